@@ -1,0 +1,177 @@
+"""Content-addressed disk cache for arrays that are costly to make, with an in-process front.
+
+An entry is one ``.npz`` file named by the SHA-256 of everything that decided its content. It is written to a
+temporary name and renamed, so a reader never sees half a file; an entry that cannot be read counts as absent; a
+folder that cannot be written switches the disk part off and nothing else.
+
+The folder is ``$BEMT_CACHE``, else ``$XDG_CACHE_HOME/bemt``, else ``~/.cache/bemt``. ``BEMT_CACHE=off`` (or empty)
+keeps everything in the process.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tempfile
+from collections import OrderedDict
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+__all__ = ["cache_dir", "cached_arrays", "clear_memory", "content_key"]
+
+Arrays = dict[str, np.ndarray]
+
+MEMORY_ENTRIES = 256
+_memory: OrderedDict[str, Arrays] = OrderedDict()
+
+
+def cache_dir() -> Path | None:
+    """Folder of the disk cache, or None when it is switched off.
+
+    Returns
+    -------
+    Path or None
+        The folder; it need not exist yet.
+
+    Notes
+    -----
+    A home folder that cannot be found counts as switched off.
+    """
+    named = os.environ.get("BEMT_CACHE")
+    if named is not None:
+        return None if named.strip().lower() in ("", "off", "0") else Path(named).expanduser()
+    xdg = os.environ.get("XDG_CACHE_HOME")
+    if xdg:
+        return Path(xdg) / "bemt"
+    try:
+        return Path.home() / ".cache" / "bemt"
+    except RuntimeError:
+        return None
+
+
+def content_key(*parts: object) -> str:
+    """Hash of everything that decides a result.
+
+    Parameters
+    ----------
+    *parts : object
+        Numbers, strings, None, tuples, lists or dicts of them, and numpy arrays. Floats are taken exactly.
+
+    Returns
+    -------
+    str
+        SHA-256 as 64 hexadecimal digits.
+
+    Examples
+    --------
+    >>> content_key("a", 1.0) == content_key("a", 1.0)
+    True
+    >>> content_key("a", 1.0) == content_key("a", 1.0 + 1e-15)
+    False
+    """
+    digest = hashlib.sha256()
+    for part in parts:
+        if isinstance(part, np.ndarray):
+            digest.update(f"{part.dtype.str}{part.shape}".encode())
+            digest.update(np.ascontiguousarray(part).tobytes())
+        else:
+            digest.update(json.dumps(part, sort_keys=True, default=_plain).encode())
+        digest.update(b"\x00")
+    return digest.hexdigest()
+
+
+def _plain(value: object) -> object:
+    """Turn numpy scalars and arrays inside containers into JSON (repr of a float is exact)."""
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
+    raise TypeError(f"cannot hash a {type(value).__name__}")
+
+
+def cached_arrays(kind: str, key: str, make: Callable[[], Arrays]) -> Arrays:
+    """Arrays of a cache entry, made and kept when absent.
+
+    Parameters
+    ----------
+    kind : str
+        Sub-folder, for example ``"polar"``.
+    key : str
+        Name of the entry, from `content_key`.
+    make : callable
+        Makes the named arrays when neither memory nor disk has them.
+
+    Returns
+    -------
+    dict of str to ndarray
+        Read-only arrays, the same bits whether made now or read back.
+
+    Notes
+    -----
+    Faults of the disk (no room, no permission, damaged entry) never reach the caller.
+
+    Examples
+    --------
+    >>> a = cached_arrays("doctest", content_key("x"), lambda: {"v": np.arange(3.0)})
+    >>> a["v"].tolist()
+    [0.0, 1.0, 2.0]
+    """
+    name = f"{kind}-{key}"
+    found = _memory.get(name)
+    if found is not None:
+        _memory.move_to_end(name)
+        return found
+    folder = cache_dir()
+    path = None if folder is None else folder / kind / f"{key}.npz"
+    arrays = _read(path) if path is not None else None
+    if arrays is None:
+        arrays = {k: np.array(v) for k, v in make().items()}
+        if path is not None:
+            _write(path, arrays)
+    for value in arrays.values():
+        value.setflags(write=False)
+    _memory[name] = arrays
+    while len(_memory) > MEMORY_ENTRIES:
+        _memory.popitem(last=False)
+    return arrays
+
+
+def clear_memory() -> None:
+    """Forget the in-process entries; the disk keeps its own."""
+    _memory.clear()
+
+
+def _seal(arrays: Arrays) -> np.ndarray:
+    """Checksum stored with an entry: a zip CRC alone would not notice a swapped or missing array."""
+    parts: list[Any] = [[name, arrays[name]] for name in sorted(arrays)]
+    return np.frombuffer(bytes.fromhex(content_key(*[x for pair in parts for x in pair])), dtype=np.uint8)
+
+
+def _read(path: Path) -> Arrays | None:
+    """Entry at path, or None when it is absent or damaged in whatever way."""
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+        seal = arrays.pop("_seal")
+        return arrays if np.array_equal(seal, _seal(arrays)) else None
+    except Exception:  # zipfile, zlib, OSError, KeyError, ValueError: a damaged entry must only cost time
+        return None
+
+
+def _write(path: Path, arrays: Arrays) -> None:
+    """Write to a temporary name in the same folder, then rename; give up quietly."""
+    temporary = None
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".new-", suffix=".npz")
+        with os.fdopen(handle, "wb") as stream:
+            np.savez(stream, **arrays, _seal=_seal(arrays))  # type: ignore[arg-type]
+        os.replace(temporary, path)
+    except OSError:
+        if temporary is not None:
+            try:
+                os.unlink(temporary)
+            except OSError:
+                pass

@@ -1,0 +1,272 @@
+"""Objects of a case: rotor, duct and air from the checked document."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from bemt.air import Air, isa_pressure
+from bemt.errors import Fault, InputError
+from geometry.airfoil import Airfoil, GeometryError, naca, naca4, parse_dat
+from geometry.blade import Blade, from_laws, from_stations
+from geometry.duct import Duct, Stator, around
+from geometry.rotor import Rotor
+
+if TYPE_CHECKING:
+    from bemt.case import Case
+
+__all__ = ["build_air", "build_duct", "build_rotor", "check_build"]
+
+T = TypeVar("T")
+_STATION_COLUMNS = ("r_over_R", "chord_over_R", "beta_deg")
+
+
+def _as_input(file: str, where: str, make: Callable[[], T]) -> T:
+    """Call, and turn geometry's faults into faults of the case file."""
+    try:
+        return make()
+    except InputError:
+        raise
+    except GeometryError as error:
+        raise InputError([Fault(file, f"{where}.{at}" if where else at, *rest) for at, *rest in error.faults]) from error
+    except ValueError as error:
+        raise InputError(Fault(file, where, "values that do not fit together", str(error))) from error
+
+
+def _per_anchor(value: Any, count: int) -> list[Any]:
+    return list(value) if isinstance(value, list) else [value] * count
+
+
+def _anchors(case: Case) -> list[tuple[float, Airfoil]]:
+    section = case.document["blade"]["section"]
+    radii = section.get("r_over_R", [0.0])
+    file = case.path.as_posix()
+    if "naca" in section:
+        shapes = [_as_input(file, "blade.section.naca", lambda d=d: naca(d))  # type: ignore[misc]
+                  for d in _per_anchor(section["naca"], len(radii))]  # fmt: skip
+    elif "dat" in section:
+        shapes = [_dat(case.folder / name) for name in _per_anchor(section["dat"], len(radii))]
+    else:
+        columns = [_per_anchor(section[key], len(radii)) for key in ("camber", "camber_position", "thickness")]
+        scale, thicker = section["camber_scale"], section["thickness_scale"]
+        shapes = [_as_input(file, "blade.section", lambda m=m, p=p, t=t: naca4(m * scale, p, t * thicker))  # type: ignore[misc]
+                  for m, p, t in zip(*columns, strict=True)]  # fmt: skip
+    return list(zip(map(float, radii), shapes, strict=True))
+
+
+def _dat(path: Path) -> Airfoil:
+    from bemt.importers import load_text
+
+    text = load_text(path).text
+    return _as_input(path.as_posix(), "", lambda: parse_dat(text, path.stem))
+
+
+def _read_stations(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Columns r/R, c/R and beta [rad] of a stations CSV; faults carry line and column."""
+    from bemt.importers import load_text, number
+
+    faults: list[Fault] = []
+    rows: list[list[float]] = []
+    header: list[str] | None = None
+    file = path.as_posix()
+    for i, line in enumerate(load_text(path).lines, 1):
+        cells = [cell.strip() for cell in line.split("#", 1)[0].split(",")]
+        if cells == [""]:
+            continue
+        if header is None:
+            header = cells
+            if tuple(cells) != _STATION_COLUMNS:
+                raise InputError(Fault(file, f"{i}", f"the header {line.strip()!r}", ",".join(_STATION_COLUMNS)))
+            continue
+        if len(cells) != len(header):
+            faults.append(Fault(file, f"{i}", f"{len(cells)} values", f"{len(header)}, as the header has"))
+            continue
+        values = [number(cell) for cell in cells]
+        for j, value in enumerate(values, 1):
+            if value is None:
+                faults.append(Fault(file, f"{i}:{j}", repr(cells[j - 1]), "a number"))
+        if None not in values:
+            rows.append([float(v) for v in values if v is not None])
+    if not faults and len(rows) < 2:
+        faults.append(Fault(file, "", f"{len(rows)} stations", "two or more"))
+    if faults:
+        raise InputError(faults)
+    x, c, beta = np.array(rows).T
+    for name, column, limit, hint in (
+        ("r_over_R", x, 1.001, "Divide the radius by the tip radius"),
+        ("chord_over_R", c, 3.0, "Divide the chord by the tip radius"),
+        ("beta_deg", np.abs(beta), 90.0, ""),
+    ):
+        if column.max() > limit:
+            faults.append(Fault(file, name, f"{column.max():g}", f"at most {limit:g}", hint))
+    if np.abs(beta).max() < 1.6:
+        faults.append(Fault(file, "beta_deg", f"angles up to {np.abs(beta).max():g}", "degrees", "Looks like radians"))
+    if faults:
+        raise InputError(faults)
+    return np.minimum(x, 1.0), c, np.radians(beta)
+
+
+def _blade(case: Case) -> Blade:
+    blade = case.document["blade"]
+    R = 0.5 * case.diameter_m
+    hub = case.hub_diameter_m / case.diameter_m
+    anchors = _anchors(case)
+    scale, turned = float(blade["chord_scale"]), math.radians(blade["beta_offset_deg"])
+    if "chord_law" in blade:
+        ratio = blade.get("pitch_ratio")
+        pitch = case.length_m("blade", "pitch") if ratio is None else ratio * case.diameter_m
+        chord = {key: blade.get(name) for key, name in (("max_chord", "max_chord_over_R"), ("taper", "taper"))}
+        laws = {"pitch": pitch, "relief": blade.get("tip_relief")}
+        made = from_laws(
+            case.diameter_m, blade["chord_law"], blade["pitch_law"], hub, anchors=anchors,
+            chord={k: v for k, v in chord.items() if v is not None}, pitch={k: v for k, v in laws.items() if v is not None},
+        )  # fmt: skip
+        return from_stations(made.r, made.chord * scale, made.beta + turned, R, hub * R, anchors, name=case.name)
+    if "stations" in blade:
+        x, c, beta = _read_stations(case.folder / blade["stations"])
+    elif "uiuc" in blade:
+        from bemt.importers._uiuc_tables import read_geometry
+
+        table = read_geometry(case.folder / blade["uiuc"])
+        x, c, beta = table.r_R, table.c_R, np.radians(table.beta_deg)
+    else:
+        from bemt.importers.apc import read_pe0
+
+        apc = read_pe0(case.folder / blade["apc"])
+        x, c, beta = apc.r_m / apc.radius_m, apc.chord_m / apc.radius_m, apc.beta_rad
+    return from_stations(x * R, c * R * scale, beta + turned, R, hub * R, anchors, name=case.name)
+
+
+def build_rotor(case: Case) -> Rotor:
+    """Build the rotor of a case.
+
+    Parameters
+    ----------
+    case : Case
+        A checked case.
+
+    Returns
+    -------
+    geometry.rotor.Rotor
+        Blades, hub and rotation (right-handed is +1).
+
+    Raises
+    ------
+    InputError
+        When the values do not make a rotor.
+    """
+    rotor = case.document["rotor"]
+    sign = -1 if rotor["rotation"] == "left" else 1
+    return _as_input(case.path.as_posix(), "blade", lambda: Rotor(_blade(case), int(rotor["blades"]), sign, case.name))
+
+
+def build_duct(case: Case) -> Duct | None:
+    """Build the duct of a case.
+
+    Parameters
+    ----------
+    case : Case
+        A checked case.
+
+    Returns
+    -------
+    geometry.duct.Duct or None
+        None when the case has no duct.
+
+    Raises
+    ------
+    InputError
+        When the values do not make a duct.
+    """
+    duct = case.document.get("duct")
+    if duct is None:
+        return None
+    rotor = build_rotor(case)
+    inner = case.length_m("duct", "inner_diameter")
+    gap = duct["tip_gap_mm"] * 1e-3 if math.isnan(inner) else 0.5 * inner - rotor.R
+    hub = 0.5e-3 * duct.get("exit_hub_diameter_mm", 0.0)
+    x = duct.get("rotor_position_mm")
+    vanes = duct.get("stator")
+    if "exit_diameter_mm" in duct:
+        ratio = math.pi * ((0.5e-3 * duct["exit_diameter_mm"]) ** 2 - hub**2) / rotor.annulus_area
+    else:
+        ratio = duct["exit_area_ratio"]
+
+    def make() -> Duct:
+        stator = None if vanes is None else Stator(int(vanes["blades"]), vanes["chord_mm"] * 1e-3)
+        return around(
+            rotor, duct["length_mm"] * 1e-3, gap, duct.get("lip_radius_mm", 0.0) * 1e-3, exit_area_ratio=ratio,
+            exit_hub_radius=hub, rotor_x=None if x is None else x * 1e-3, stator=stator, name=case.name,
+        )  # fmt: skip
+
+    return _as_input(case.path.as_posix(), "", make)
+
+
+def build_air(air: Mapping[str, Any]) -> Air:
+    """Build the state of the air from the table [air].
+
+    Parameters
+    ----------
+    air : mapping
+        ``density_kg_m3`` | ``altitude_m`` | ``pressure_hPa``, with ``temperature_C`` and ``humidity_pct``.
+
+    Returns
+    -------
+    Air
+        Density, viscosity, speed of sound. Without a temperature, a given density has that of 15 degC and a given
+        altitude that of the standard atmosphere.
+
+    Examples
+    --------
+    >>> round(build_air({"altitude_m": 0.0, "temperature_C": 30.0}).rho, 4)
+    1.1644
+    """
+    temperature = air.get("temperature_C")
+    if "density_kg_m3" in air:
+        return Air.from_density(float(air["density_kg_m3"]), 15.0 if temperature is None else float(temperature))
+    if "altitude_m" in air:
+        altitude = float(air["altitude_m"])
+        offset = 0.0 if temperature is None else float(temperature) + 273.15 - isa_pressure(altitude)[1]
+        return Air.isa(altitude, offset)
+    return Air.from_state(100.0 * air["pressure_hPa"], float(air["temperature_C"]), air.get("humidity_pct", 0.0))
+
+
+def check_build(case: Case) -> None:
+    """Build everything once, nominal and at the ends of geometric sweeps and assumptions.
+
+    Parameters
+    ----------
+    case : Case
+        A case whose document fits the schema.
+
+    Raises
+    ------
+    InputError
+        With all faults.
+    """
+    faults: list[Fault] = []
+
+    def attempt(overrides: Mapping[str, Any] | None, place: str) -> None:
+        try:
+            case.rotor(overrides)
+            case.duct(overrides)
+        except InputError as error:
+            for fault in error.faults:
+                where = f"{place}: {fault.where}" if place else fault.where
+                faults.append(Fault(fault.file, where, fault.got, fault.expected, fault.hint))
+
+    attempt(None, "")
+    if not faults:
+        for name, values in case.axes().items():
+            if name in ("pitch_in", "diameter_in", "tip_gap_mm"):
+                for value in (values.min(), values.max()):
+                    attempt({case.axis_key(name): float(value)}, f"sweep.{name} at {value:g}")
+        for i, item in enumerate(case.assumptions):
+            for option in item.values:
+                attempt({item.key: option}, f"assumptions[{i}] at {option}")
+    if faults:
+        raise InputError(faults)

@@ -1,0 +1,130 @@
+"""Command line: parses, calls one module, turns errors into exit codes.
+
+Exit codes: 0 fine; 1 out of tolerance or unconverged; 2 usage or input; 3 internal; 130 interrupted.
+The modules of the subcommands are imported only when they are chosen, so that ``--help`` answers at once.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import os
+import sys
+from collections.abc import Sequence
+
+from bemt import __version__
+from bemt.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, InputError
+
+__all__ = ["build_parser", "main"]
+
+EXIT_INTERRUPTED = 130
+
+_MODULES = {"sweep": "bemt.sweep", "validate": "bemt.validate", "reproduce": "bemt.reproduce", "bench": "bemt.bench"}
+
+
+def _positive(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"got {text}; expected a whole number of 1 or more")
+    return value
+
+
+def _polar(text: str) -> float:
+    """Reynolds number of ``fixed:RE``."""
+    kind, _, number = text.partition(":")
+    try:
+        value = float(number)
+    except ValueError:
+        value = -1.0
+    if kind != "fixed" or not 1e3 <= value <= 1e9:
+        raise argparse.ArgumentTypeError(f"got {text!r}; expected fixed:RE with RE from 1e3 to 1e9, as in fixed:100000")
+    return value
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """Make the parser of the whole command line.
+
+    Returns
+    -------
+    argparse.ArgumentParser
+        With one sub-parser per command.
+
+    Examples
+    --------
+    >>> args = build_parser().parse_args(["sweep", "cases/", "--jobs", "2"])
+    >>> args.command, args.paths, args.jobs
+    ('sweep', ['cases/'], 2)
+    """
+    parser = argparse.ArgumentParser(
+        prog="python -m bemt",
+        description="Propeller and ducted-fan aerodynamics: BEMT beside the K1/K2 model, CFD and bench recordings.",
+        epilog="Exit codes: 0 fine, 1 out of tolerance or unconverged, 2 usage or input, 3 internal.",
+    )
+    parser.add_argument("--version", action="version", version=f"bemt {__version__}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+
+    sweep = commands.add_parser("sweep", help="solve cases and print them beside their recorded values")
+    sweep.add_argument("paths", nargs="+", metavar="CASES", help="case files, or folders of <name>/case.toml")
+    sweep.add_argument("--out", metavar="DIR", help="write tables, grids and sweep.json there, and resume from there")
+    sweep.add_argument("--json", action="store_true", help="print one JSON document (bemt.sweep/1), no tables")
+    sweep.add_argument("--jobs", type=_positive, metavar="N",
+                       help="solve N cases at a time in processes (default: one case, its grid on all cores)")  # fmt: skip
+    sweep.add_argument("--quiet", action="store_true", help="print neither progress nor tables")
+    sweep.add_argument("--strict", action="store_true",
+                       help="exit 1 when a point is unconverged or BEMT is off a reference by more than --tolerance")  # fmt: skip
+    sweep.add_argument("--tolerance", type=float, default=15.0, metavar="PCT",
+                       help="tolerance of --strict on thrust, %% of the reference (default 15)")  # fmt: skip
+    sweep.add_argument("--no-resume", action="store_true", help="do not reuse results found in --out")
+
+    validate = commands.add_parser("validate", help="compare with a folder of measured propellers (UIUC layout)")
+    validate.add_argument("dir", metavar="DIR", help="folder with geometry, static and J files")
+    validate.add_argument("--json", action="store_true", help="print one JSON document (bemt.validation/1)")
+    validate.add_argument("--polar", type=_polar, metavar="fixed:RE", help="section tables at one Reynolds number")
+    validate.add_argument("--off", action="append", default=[], metavar="EFFECT", help="switch an effect off; repeatable")
+    validate.add_argument("--out", metavar="DIR", help="write the tables there as well")
+
+    reproduce = commands.add_parser("reproduce", help="print every number of the source thesis beside ours")
+    reproduce.add_argument("--json", action="store_true", help="print one JSON document")
+
+    bench = commands.add_parser("bench", help="measure the time per operating point")
+    bench.add_argument("--json", action="store_true", help="print one JSON document (bemt.bench/1)")
+    bench.add_argument("--quick", action="store_true", help="fewer repetitions")
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        Arguments; those of the process by default.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
+    for stream in (sys.stdout, sys.stderr):  # a terminal that is not UTF-8 must not end a run
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")
+    args = build_parser().parse_args(argv)
+    try:
+        code = importlib.import_module(_MODULES[args.command]).run(args)
+        sys.stdout.flush()
+        return EXIT_OK if code is None else int(code)
+    except InputError as error:
+        print(error, file=sys.stderr)
+        return EXIT_INPUT
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return EXIT_INTERRUPTED
+    except BrokenPipeError:  # the reader of our output has gone, as in `| head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return EXIT_OK
+    except Exception:
+        import traceback
+
+        traceback.print_exc()
+        print(f"internal error of bemt {__version__}; please report it with the lines above", file=sys.stderr)
+        return EXIT_INTERNAL

@@ -1,0 +1,518 @@
+"""Coefficients of a propeller or rotor, and the conversions between the two conventions.
+
+PROPELLER convention (used everywhere in this project): CT = T/(rho n^2 D^4), CQ = Q/(rho n^2 D^5),
+CP = P/(rho n^3 D^5) = 2 pi CQ, J = V/(n D), with n in revolutions per second.
+HELICOPTER convention (suffix ``_rotor``): CT_rotor = T/(rho A (Omega R)^2), CP_rotor = P/(rho A (Omega R)^3),
+CQ_rotor = Q/(rho A (Omega R)^2 R) = CP_rotor.
+
+All functions broadcast over their arguments.  A coefficient at n <= 0 is NaN, never zero or a warning.
+
+References
+----------
+.. [1] B. W. McCormick, "Aerodynamics, Aeronautics and Flight Mechanics", 2nd ed., Wiley, 1995, ch. 6 (propeller
+       coefficients; not checked against the book).
+.. [2] J. G. Leishman, "Principles of Helicopter Aerodynamics", 2nd ed., Cambridge, 2006, secs. 2.3, 2.8 (rotor
+       coefficients, figure of merit; not checked against the book).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from bemt.units import KGF
+
+CT_PER_ROTOR = math.pi**3 / 4.0
+"""CT / CT_rotor [-]: A (Omega R)^2 = (pi^3/4) n^2 D^4."""
+CP_PER_ROTOR = math.pi**4 / 4.0
+"""CP / CP_rotor [-]: A (Omega R)^3 = (pi^4/4) n^3 D^5."""
+CQ_PER_ROTOR = math.pi**3 / 8.0
+"""CQ / CQ_rotor [-]: A (Omega R)^2 R = (pi^3/8) n^2 D^5."""
+
+
+def _f(x: ArrayLike) -> np.ndarray:
+    return np.asarray(x, dtype=float)
+
+
+def _out(x: np.ndarray) -> Any:
+    """Give a float for scalar input, an array otherwise."""
+    return float(x) if np.ndim(x) == 0 else x
+
+
+def _ratio(num: ArrayLike, den: ArrayLike, valid: ArrayLike) -> Any:
+    num, den, valid = np.broadcast_arrays(_f(num), _f(den), np.asarray(valid, dtype=bool))
+    return _out(np.divide(num, den, out=np.full(num.shape, np.nan), where=valid))
+
+
+def CT(T: ArrayLike, rho: ArrayLike, n: ArrayLike, D: ArrayLike) -> Any:
+    """Thrust coefficient, propeller convention.
+
+    Parameters
+    ----------
+    T : float or array
+        Thrust. [N]
+    rho : float or array
+        Density. [kg/m3]
+    n : float or array
+        Rotational speed. [rev/s]
+    D : float or array
+        Diameter. [m]
+
+    Returns
+    -------
+    float or array
+        CT = T/(rho n^2 D^4); NaN where n <= 0. [-]
+
+    Examples
+    --------
+    >>> round(CT(2.60 * 9.80665, 1.225, 20000 / 60, 8 * 0.0254), 3)
+    0.11
+    """
+    rho, n, D = _f(rho), _f(n), _f(D)
+    return _ratio(T, rho * n**2 * D**4, n > 0)
+
+
+def CQ(Q: ArrayLike, rho: ArrayLike, n: ArrayLike, D: ArrayLike) -> Any:
+    """Torque coefficient, propeller convention.
+
+    Parameters
+    ----------
+    Q : float or array
+        Shaft torque. [N m]
+    rho : float or array
+        Density. [kg/m3]
+    n : float or array
+        Rotational speed. [rev/s]
+    D : float or array
+        Diameter. [m]
+
+    Returns
+    -------
+    float or array
+        CQ = Q/(rho n^2 D^5); NaN where n <= 0. [-]
+
+    Examples
+    --------
+    >>> CQ(0.5, 1.0, 10.0, 1.0)
+    0.005
+    """
+    rho, n, D = _f(rho), _f(n), _f(D)
+    return _ratio(Q, rho * n**2 * D**5, n > 0)
+
+
+def CP(P: ArrayLike, rho: ArrayLike, n: ArrayLike, D: ArrayLike) -> Any:
+    """Power coefficient, propeller convention.
+
+    Parameters
+    ----------
+    P : float or array
+        Shaft power. [W]
+    rho : float or array
+        Density. [kg/m3]
+    n : float or array
+        Rotational speed. [rev/s]
+    D : float or array
+        Diameter. [m]
+
+    Returns
+    -------
+    float or array
+        CP = P/(rho n^3 D^5); NaN where n <= 0. [-]
+
+    Examples
+    --------
+    >>> CP(50.0, 1.0, 10.0, 1.0)
+    0.05
+    """
+    rho, n, D = _f(rho), _f(n), _f(D)
+    return _ratio(P, rho * n**3 * D**5, n > 0)
+
+
+def thrust(CT: ArrayLike, rho: ArrayLike, n: ArrayLike, D: ArrayLike) -> Any:
+    """Thrust from its coefficient; the inverse of `CT`.
+
+    Parameters
+    ----------
+    CT : float or array
+        Thrust coefficient, propeller convention. [-]
+    rho : float or array
+        Density. [kg/m3]
+    n : float or array
+        Rotational speed. [rev/s]
+    D : float or array
+        Diameter. [m]
+
+    Returns
+    -------
+    float or array
+        Thrust. [N]
+
+    Examples
+    --------
+    >>> thrust(0.1, 1.0, 10.0, 1.0)
+    10.0
+    """
+    return _out(_f(CT) * _f(rho) * _f(n) ** 2 * _f(D) ** 4)
+
+
+def torque(CQ: ArrayLike, rho: ArrayLike, n: ArrayLike, D: ArrayLike) -> Any:
+    """Torque from its coefficient; the inverse of `CQ`.
+
+    Parameters
+    ----------
+    CQ : float or array
+        Torque coefficient, propeller convention. [-]
+    rho : float or array
+        Density. [kg/m3]
+    n : float or array
+        Rotational speed. [rev/s]
+    D : float or array
+        Diameter. [m]
+
+    Returns
+    -------
+    float or array
+        Shaft torque. [N m]
+
+    Examples
+    --------
+    >>> torque(0.01, 1.0, 10.0, 1.0)
+    1.0
+    """
+    return _out(_f(CQ) * _f(rho) * _f(n) ** 2 * _f(D) ** 5)
+
+
+def power(CP: ArrayLike, rho: ArrayLike, n: ArrayLike, D: ArrayLike) -> Any:
+    """Power from its coefficient; the inverse of `CP`.
+
+    Parameters
+    ----------
+    CP : float or array
+        Power coefficient, propeller convention. [-]
+    rho : float or array
+        Density. [kg/m3]
+    n : float or array
+        Rotational speed. [rev/s]
+    D : float or array
+        Diameter. [m]
+
+    Returns
+    -------
+    float or array
+        Shaft power. [W]
+
+    Examples
+    --------
+    >>> power(0.05, 1.0, 10.0, 1.0)
+    50.0
+    """
+    return _out(_f(CP) * _f(rho) * _f(n) ** 3 * _f(D) ** 5)
+
+
+def CP_from_CQ(CQ: ArrayLike) -> Any:
+    """Power coefficient from the torque coefficient, CP = 2 pi CQ.
+
+    Parameters
+    ----------
+    CQ : float or array
+        Torque coefficient, propeller convention. [-]
+
+    Returns
+    -------
+    float or array
+        Power coefficient, propeller convention. [-]
+
+    Examples
+    --------
+    >>> round(CP_from_CQ(0.01), 6)
+    0.062832
+    """
+    return _out(2.0 * math.pi * _f(CQ))
+
+
+def CQ_from_CP(CP: ArrayLike) -> Any:
+    """Torque coefficient from the power coefficient, CQ = CP/(2 pi).
+
+    Parameters
+    ----------
+    CP : float or array
+        Power coefficient, propeller convention. [-]
+
+    Returns
+    -------
+    float or array
+        Torque coefficient, propeller convention. [-]
+
+    Examples
+    --------
+    >>> round(CQ_from_CP(0.05), 6)
+    0.007958
+    """
+    return _out(_f(CP) / (2.0 * math.pi))
+
+
+def J(V: ArrayLike, n: ArrayLike, D: ArrayLike) -> Any:
+    """Advance ratio.
+
+    Parameters
+    ----------
+    V : float or array
+        Axial airspeed, positive in climb. [m/s]
+    n : float or array
+        Rotational speed. [rev/s]
+    D : float or array
+        Diameter. [m]
+
+    Returns
+    -------
+    float or array
+        J = V/(n D); NaN where n <= 0. [-]
+
+    Examples
+    --------
+    >>> J(15.0, 100.0, 0.25)
+    0.6
+    """
+    n, D = _f(n), _f(D)
+    return _ratio(V, n * D, n > 0)
+
+
+def airspeed(J: ArrayLike, n: ArrayLike, D: ArrayLike) -> Any:
+    """Airspeed from the advance ratio; the inverse of `J`.
+
+    Parameters
+    ----------
+    J : float or array
+        Advance ratio. [-]
+    n : float or array
+        Rotational speed. [rev/s]
+    D : float or array
+        Diameter. [m]
+
+    Returns
+    -------
+    float or array
+        Axial airspeed. [m/s]
+
+    Examples
+    --------
+    >>> airspeed(0.6, 100.0, 0.25)
+    15.0
+    """
+    return _out(_f(J) * _f(n) * _f(D))
+
+
+def eta(J: ArrayLike, CT: ArrayLike, CP: ArrayLike) -> Any:
+    """Propulsive efficiency.
+
+    Parameters
+    ----------
+    J : float or array
+        Advance ratio. [-]
+    CT : float or array
+        Thrust coefficient, propeller convention. [-]
+    CP : float or array
+        Power coefficient, propeller convention. [-]
+
+    Returns
+    -------
+    float or array
+        eta = J CT/CP where the shaft takes power (CP > 0); exactly 0 at J = 0; negative where the propeller brakes
+        (CT < 0); NaN where the shaft gives power (CP <= 0), because T V/P is then no efficiency. [-]
+
+    Notes
+    -----
+    At J = 0 the useful power T V is zero: use `FM` or `grams_per_watt` there.
+
+    Examples
+    --------
+    >>> eta([0.0, 0.5, 0.9, 1.2], [0.10, 0.05, -0.01, -0.05], [0.04, 0.035, 0.01, -0.02]).round(3)
+    array([ 0.   ,  0.714, -0.9  ,    nan])
+    """
+    J, CT, CP = np.broadcast_arrays(_f(J), _f(CT), _f(CP))
+    out = np.divide(J * CT, CP, out=np.full(J.shape, np.nan), where=CP > 0)
+    known = np.isfinite(CT) & np.isfinite(CP)
+    return _out(np.where((J == 0) & known, 0.0, out))
+
+
+def FM(CT: ArrayLike, CP: ArrayLike) -> Any:
+    """Figure of merit: ideal hover power over actual power.
+
+    Parameters
+    ----------
+    CT : float or array
+        Thrust coefficient, propeller convention. [-]
+    CP : float or array
+        Power coefficient, propeller convention. [-]
+
+    Returns
+    -------
+    float or array
+        FM = sqrt(2/pi) CT^1.5/CP; NaN where CT < 0 or CP <= 0. [-]
+
+    Notes
+    -----
+    T^1.5/(P sqrt(2 rho A)) with A = pi D^2/4.  A ducted rotor may exceed 1: its own ideal power is lower.
+
+    Examples
+    --------
+    >>> round(FM(0.1, 0.04), 4)
+    0.6308
+    """
+    CT, CP = _f(CT), _f(CP)
+    return _ratio(math.sqrt(2.0 / math.pi) * np.maximum(CT, 0.0) ** 1.5, CP, (CP > 0) & (CT >= 0))
+
+
+def grams_per_watt(T: ArrayLike, P: ArrayLike) -> Any:
+    """Gram-force of thrust per watt of shaft power.
+
+    Parameters
+    ----------
+    T : float or array
+        Thrust. [N]
+    P : float or array
+        Shaft power. [W]
+
+    Returns
+    -------
+    float or array
+        1000 T/(9.80665 P); NaN where P <= 0. [gf/W]
+
+    Examples
+    --------
+    >>> round(grams_per_watt(9.80665, 100.0), 6)
+    10.0
+    """
+    P = _f(P)
+    return _ratio(_f(T) * 1000.0 / KGF, P, P > 0)
+
+
+def M_tip(n: ArrayLike, D: ArrayLike, a_sound: ArrayLike) -> Any:
+    """Rotational tip Mach number.
+
+    Parameters
+    ----------
+    n : float or array
+        Rotational speed. [rev/s]
+    D : float or array
+        Diameter. [m]
+    a_sound : float or array
+        Speed of sound. [m/s]
+
+    Returns
+    -------
+    float or array
+        pi n D/a. [-]
+
+    Examples
+    --------
+    >>> round(M_tip(20000 / 60, 14 * 0.0254, 340.3), 2)
+    1.09
+    """
+    return _out(math.pi * _f(n) * _f(D) / _f(a_sound))
+
+
+def M_tip_helical(n: ArrayLike, D: ArrayLike, a_sound: ArrayLike, V: ArrayLike) -> Any:
+    """Helical tip Mach number, of the resultant of rotation and flight.
+
+    Parameters
+    ----------
+    n : float or array
+        Rotational speed. [rev/s]
+    D : float or array
+        Diameter. [m]
+    a_sound : float or array
+        Speed of sound. [m/s]
+    V : float or array
+        Axial airspeed. [m/s]
+
+    Returns
+    -------
+    float or array
+        sqrt((pi n D)^2 + V^2)/a; induced velocity left out. [-]
+
+    Examples
+    --------
+    >>> round(M_tip_helical(100.0, 1.0, 340.0, 100.0), 4)
+    0.9697
+    """
+    return _out(np.hypot(math.pi * _f(n) * _f(D), _f(V)) / _f(a_sound))
+
+
+def Re75(chord75: ArrayLike, n: ArrayLike, D: ArrayLike, V: ArrayLike, rho: ArrayLike, mu: ArrayLike) -> Any:
+    """Reynolds number of the section at 0.75 R.
+
+    Parameters
+    ----------
+    chord75 : float or array
+        Chord at 0.75 R. [m]
+    n : float or array
+        Rotational speed. [rev/s]
+    D : float or array
+        Diameter. [m]
+    V : float or array
+        Axial airspeed. [m/s]
+    rho : float or array
+        Density. [kg/m3]
+    mu : float or array
+        Dynamic viscosity. [Pa s]
+
+    Returns
+    -------
+    float or array
+        rho W c/mu with W = sqrt((0.75 pi n D)^2 + V^2); induced velocity left out. [-]
+
+    Examples
+    --------
+    >>> round(Re75(0.02, 100.0, 0.254, 0.0, 1.225, 1.7894e-5))
+    81941
+    """
+    W = np.hypot(0.75 * math.pi * _f(n) * _f(D), _f(V))
+    return _out(_f(rho) * W * _f(chord75) / _f(mu))
+
+
+def to_rotor(CT: ArrayLike, CP: ArrayLike) -> tuple[Any, Any]:
+    """Propeller convention to helicopter convention.
+
+    Parameters
+    ----------
+    CT, CP : float or array
+        Coefficients in the propeller convention. [-]
+
+    Returns
+    -------
+    CT_rotor, CP_rotor : float or array
+        Coefficients in the helicopter convention; CQ_rotor equals CP_rotor. [-]
+
+    Examples
+    --------
+    >>> CT_rotor, CP_rotor = to_rotor(0.1, 0.04)
+    >>> round(CT_rotor, 5), round(CP_rotor, 6)
+    (0.0129, 0.001643)
+    """
+    return _out(_f(CT) / CT_PER_ROTOR), _out(_f(CP) / CP_PER_ROTOR)
+
+
+def from_rotor(CT_rotor: ArrayLike, CP_rotor: ArrayLike) -> tuple[Any, Any]:
+    """Helicopter convention to propeller convention; the inverse of `to_rotor`.
+
+    Parameters
+    ----------
+    CT_rotor, CP_rotor : float or array
+        Coefficients in the helicopter convention; give CQ_rotor as CP_rotor, they are equal. [-]
+
+    Returns
+    -------
+    CT, CP : float or array
+        Coefficients in the propeller convention. [-]
+
+    Examples
+    --------
+    >>> CT, CP = from_rotor(0.0046, 0.0003)
+    >>> round(CT, 5), round(CP, 6)
+    (0.03566, 0.007306)
+    """
+    return _out(_f(CT_rotor) * CT_PER_ROTOR), _out(_f(CP_rotor) * CP_PER_ROTOR)

@@ -1,0 +1,25 @@
+"""Turbulent windmill and vortex-ring states."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from bemt.effects.base import Baking, Effect
+
+
+@dataclass(frozen=True)
+class HighInduction(Effect):
+    """Momentum balance where momentum theory fails: the flow through the disk nearly stops or turns back.
+
+    Notes
+    -----
+    Buhl (2005), NREL/TP-500-36834, eq. 18 between turbine induction 0.4 and 1, continued to descent by a C1 bridge of
+    our own (see :func:`bemt._kernel.mass_flow`).  Never acts on a propeller that drives air its own way.
+    """
+
+    id = "high_induction"
+    title = "turbulent windmill and vortex-ring state"
+
+    def momentum(self, bake: Baking) -> None:
+        """Switch the bridge on."""
+        bake.num["bridge"] = 1.0

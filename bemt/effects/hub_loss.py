@@ -1,0 +1,27 @@
+"""Prandtl hub loss."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from bemt.effects.base import Baking, Effect, Parameter
+
+
+@dataclass(frozen=True)
+class HubLoss(Effect):
+    """Trailing vortex at the blade root: F = (2/pi) acos(exp(-f)), f = strength B (r - Rhub) / (2 Rhub |sin phi|).
+
+    Notes
+    -----
+    Ning (2014), Wind Energy 17:1327, eq. 4 and 6, doi:10.1002/we.1636.  Multiplies the tip factor.
+    """
+
+    strength: float = 1.0
+
+    id = "hub_loss"
+    title = "loss of lift at the blade root"
+    parameters = (Parameter("strength", "1", 0.5, 1.3, "shared effect table of the project; 1 is Prandtl"),)
+
+    def momentum(self, bake: Baking) -> None:
+        """Switch the hub factor on."""
+        bake.num["hub"] = self.strength

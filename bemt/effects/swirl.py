@@ -1,0 +1,25 @@
+"""Tangential induction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from bemt.effects.base import Baking, Effect
+
+
+@dataclass(frozen=True)
+class Swirl(Effect):
+    """Angular momentum of the wake: half of the slipstream's rotation acts at the disk.
+
+    Notes
+    -----
+    Glauert (1935), Airplane Propellers, ch. VII; Ning (2014) eq. 12.  Off means that the blade meets no tangential
+    induction (axial momentum theory).
+    """
+
+    id = "swirl"
+    title = "rotation of the slipstream"
+
+    def momentum(self, bake: Baking) -> None:
+        """Switch the tangential balance on."""
+        bake.num["swirl"] = 1.0

@@ -1,0 +1,411 @@
+"""The K1/K2 model: thrust of an open propeller from diameter, pitch and speed alone.
+
+With the pitch speed v_p = n p and the disk area A::
+
+    F = rho A (v_p^2 - v_p V) (K1 D/p)^K2,      K1 = 1/3.29546,  K2 = 1.5
+
+It knows neither chord, section, blade count, Reynolds nor Mach number, and no duct.  It is kept because it is widely
+used, and as the yardstick that a blade element solver has to beat.
+
+References
+----------
+.. [1] G. Staples, "Propeller Static & Dynamic Thrust Calculation", part 1, 16 July 2013, and part 2 ("How did I come
+       up with this equation?"), 12 April 2014, electricrcaircraftguy.com.  K2 was set by trial, K1 by goal seek on 149
+       vendor points (not published).  Claim: static, 68 % of points within 13 %, 95 % within 26 %; thrust in flight
+       15 to 30 % too low.
+.. [2] T. Cahill, "System Identification of Thrust and Torque Characteristics for a Bipedal Robot with Integrated
+       Propulsion", MS thesis, Northeastern University, 2025: uses [1]; its final printed equation is dimensionally
+       wrong, see `printed_equation`.
+.. [3] F. E. Weick, "Full Scale Tests on a Thin Metal Propeller at Various Tip Speeds", NACA Report 302, 1928: effect of
+       tip speed on efficiency negligible from 0.6 to 0.9 of the speed of sound (read in the summary).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bemt import coefficients as co
+from bemt.air import Air
+from bemt.errors import Fault, InputError
+from bemt.units import KGF
+
+Array = NDArray[np.float64]
+
+K1 = 1.0 / 3.29546
+"""Coefficient of D/p [-], reference [1]."""
+K2 = 1.5
+"""Exponent [-], reference [1]."""
+RHO_FIXED = 1.225
+"""Density that the sources fix [kg/m3]; an argument here."""
+D_OVER_P_USABLE = (0.5, 2.5)
+"""Usable range of D/p stated by [1] [-]."""
+D_OVER_P_BEST = (0.8, 1.8)
+"""Best range of D/p stated by [1] [-]."""
+U_CLAIMED = 0.13
+"""Relative standard uncertainty claimed by [1]: 68 % of static points within 13 % [-]."""
+U_MEASURED = 0.196
+"""Standard deviation of F/measured on 4122 static points of 248 UIUC propellers, nominal D and p, nothing fitted [-];
+`bemt.reproduce` recomputes it where the data are."""
+M_TIP_LIMIT = 0.9
+"""Tip Mach number above which a model without Mach number is flagged [-]: upper end of the tests of [3]."""
+ZERO_THRUST_MEASURED = 1.19
+"""Measured zero-thrust J over P/D, mean over UIUC propellers [-]; the formula says 1."""
+FLIGHT_RATIO = ((0.1, 0.3, 0.5, 0.7, 0.9), (0.86, 0.77, 0.64, 0.53, 0.31))
+"""Median F/measured in flight [-] over J/(P/D) [-], bins of 0.2, 9257 points of 128 UIUC propellers of volumes 1-2,
+nominal D and p; `bemt.reproduce` recomputes it where the data are."""
+
+
+def corrected_equation(rho: Any, area: Any, v_pitch: Any, V: Any, d_over_p: Any) -> Any:
+    """K1/K2 equation in its right form, every term inside the bracket.
+
+    Parameters
+    ----------
+    rho : float or array
+        Density. [kg/m3]
+    area : float or array
+        Disk or annulus area. [m2]
+    v_pitch : float or array
+        Pitch speed n p. [m/s]
+    V : float or array
+        Airspeed. [m/s]
+    d_over_p : float or array
+        Diameter over pitch. [-]
+
+    Returns
+    -------
+    float or array
+        Thrust. [N]
+
+    Examples
+    --------
+    >>> round(corrected_equation(1.225, 1.0, 10.0, 5.0, 3.29546), 3)
+    61.25
+    """
+    return rho * area * (v_pitch**2 - v_pitch * V) * (K1 * d_over_p) ** K2
+
+
+def printed_equation(rho: Any, area: Any, v_pitch: Any, V: Any, d_over_p: Any) -> Any:
+    """K1/K2 equation as printed in the thesis, kept ONLY to show that it cannot be right.  Never use it.
+
+    Parameters
+    ----------
+    rho : float or array
+        Density. [kg/m3]
+    area : float or array
+        Disk area. [m2]
+    v_pitch : float or array
+        Pitch speed n p. [m/s]
+    V : float or array
+        Airspeed. [m/s]
+    d_over_p : float or array
+        Diameter over pitch. [-]
+
+    Returns
+    -------
+    float or array
+        A number without consistent unit: newtons minus (m/s)^2.
+
+    Notes
+    -----
+    The term with V stands outside the bracket that density and area multiply, (rho A v_p^2 - v_p V)(K1 D/p)^K2.  A
+    change of units therefore changes the ratio to `corrected_equation`; see `unit_defect`.  Static values agree.
+
+    Examples
+    --------
+    >>> static = (1.225, 0.05, 40.0, 0.0, 1.6)
+    >>> printed_equation(*static) == corrected_equation(*static)
+    True
+    """
+    return (rho * area * v_pitch**2 - v_pitch * V) * (K1 * d_over_p) ** K2
+
+
+def unit_defect(formula: Callable[..., float], mass: float = 1.0, length: float = 1.0, time: float = 1.0) -> float:
+    """Relative error that a mere change of units makes in a thrust formula; zero for a right one.
+
+    Parameters
+    ----------
+    formula : callable
+        f(rho, area, v_pitch, V, d_over_p), such as `corrected_equation`.
+    mass, length, time : float
+        New base units, in kilograms, metres and seconds. [kg], [m], [s]
+
+    Returns
+    -------
+    float
+        (Thrust computed in the new units and converted back)/(thrust computed in SI) - 1. [-]
+
+    Notes
+    -----
+    Any physical equation is homogeneous in mass, length and time (Bridgman, "Dimensional Analysis", 1922), so that the
+    result is zero for every choice of units.  Evaluated for an 8x5 at 6000 rev/min and half its pitch speed.
+
+    Examples
+    --------
+    >>> abs(unit_defect(corrected_equation, length=0.0254)) < 1e-12
+    True
+    >>> abs(unit_defect(printed_equation, length=0.0254)) > 0.5
+    True
+    """
+    rho, area, v, V, ratio = 1.225, math.pi * 0.2032**2 / 4.0, 12.7, 6.35, 1.6
+    si = formula(rho, area, v, V, ratio)
+    speed = length / time
+    other = formula(rho / (mass / length**3), area / length**2, v / speed, V / speed, ratio)
+    return float(other * mass * length / time**2 / si - 1.0)
+
+
+def _check(D: Array, pitch: Array, rpm: Array, V: Array, rho: Array, hub: Array) -> None:
+    tests = (
+        ("diameter_m", D, (D > 0) & (D < 100), "a positive length", "Inches or millimetres given?"),
+        ("pitch_m", pitch, (pitch > 0) & (pitch < 100), "a positive length", "Inches or millimetres given?"),
+        ("rpm", rpm, rpm >= 0, "0 rev/min or more", "The model has no sense of rotation"),
+        ("airspeed_m_s", V, np.isfinite(V), "a finite speed", ""),
+        ("rho", rho, (rho > 0) & np.isfinite(rho), "a positive density", ""),
+        ("hub_diameter_m", hub, hub >= 0, "0 or more", ""),
+    )
+    faults = [
+        Fault("", name, f"{float(x[~np.broadcast_to(ok, x.shape)].ravel()[0]):g}", expected, hint)
+        for name, x, ok, expected, hint in tests
+        if not np.all(ok & np.isfinite(x))
+    ]
+    if not faults and np.any(hub >= D):
+        faults.append(Fault("", "hub_diameter_m", f"{float(np.max(hub)):g}", "less than the diameter"))
+    if faults:
+        raise InputError(faults)
+
+
+def pitch_speed(rpm: ArrayLike, pitch_m: ArrayLike) -> Any:
+    """Advance of a screw in still air.
+
+    Parameters
+    ----------
+    rpm : float or array
+        Rotational speed. [rev/min]
+    pitch_m : float or array
+        Geometric pitch, advance per turn. [m]
+
+    Returns
+    -------
+    float or array
+        v_p = rpm/60 pitch. [m/s]
+
+    Examples
+    --------
+    >>> pitch_speed(6000.0, 0.127)
+    12.7
+    """
+    return co.airspeed(1.0, np.asarray(rpm, dtype=float) / 60.0, pitch_m)
+
+
+def zero_thrust_J(diameter_m: ArrayLike, pitch_m: ArrayLike) -> Any:
+    """Advance ratio at which the formula gives no thrust.
+
+    Parameters
+    ----------
+    diameter_m, pitch_m : float or array
+        Diameter and pitch. [m]
+
+    Returns
+    -------
+    float or array
+        P/D. [-]
+
+    Notes
+    -----
+    Measured on UIUC propellers it is 1.19 P/D on average: zero lift is not zero blade angle on a cambered section.
+
+    Examples
+    --------
+    >>> zero_thrust_J(0.2032, 0.127)
+    0.625
+    """
+    out = np.asarray(pitch_m, dtype=float) / np.asarray(diameter_m, dtype=float)
+    return float(out) if out.ndim == 0 else out
+
+
+def thrust(
+    diameter_m: ArrayLike, pitch_m: ArrayLike, rpm: ArrayLike, V: ArrayLike = 0.0, rho: ArrayLike = RHO_FIXED,
+    hub_diameter_m: ArrayLike = 0.0,
+) -> Any:  # fmt: skip
+    """Thrust by the K1/K2 model.
+
+    Parameters
+    ----------
+    diameter_m : float or array
+        Diameter. [m]
+    pitch_m : float or array
+        Geometric pitch, advance per turn. [m]
+    rpm : float or array
+        Rotational speed. [rev/min]
+    V : float or array
+        Airspeed along the axis. [m/s]
+    rho : float or array
+        Density. [kg/m3]
+    hub_diameter_m : float or array
+        Hub diameter: only the annulus outside it makes thrust; 0 for the whole disk as in the sources. [m]
+
+    Returns
+    -------
+    float or array
+        Thrust, negative above the pitch speed. [N]
+
+    Raises
+    ------
+    InputError
+        For lengths or densities that are not positive, negative rpm, or a hub as large as the disk; all at once.
+
+    Notes
+    -----
+    Reference [1] of the module, final equation of part 1.  Its worked example: 10x6 at 10 500 rev/min, 1619 gf.
+
+    Examples
+    --------
+    >>> round(1000 * thrust(10 * 0.0254, 6 * 0.0254, 10500.0) / 9.80665)
+    1619
+    >>> [round(thrust(d * 0.0254, p * 0.0254, 20000.0) / 9.80665, 3) for d, p in ((8, 5), (10, 5), (12, 6), (14, 8))]
+    [2.456, 5.363, 11.121, 22.025]
+    """
+    D, p, w, v, r, h = (np.asarray(x, dtype=float) for x in (diameter_m, pitch_m, rpm, V, rho, hub_diameter_m))
+    _check(D, p, w, v, r, h)
+    F = corrected_equation(r, np.pi / 4.0 * (D**2 - h**2), w / 60.0 * p, v, D / p)
+    return float(F) if np.ndim(F) == 0 else F
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Outcome of the K1/K2 model over N points.
+
+    Attributes
+    ----------
+    thrust_N : (N,) float
+        Thrust. [N]
+    rpm, airspeed_m_s : (N,) float
+        Rotational speed [rev/min], airspeed [m/s].
+    CT, J, M_tip : (N,) float
+        Thrust coefficient (propeller convention, whole-disk diameter), advance ratio, rotational tip Mach number. [-]
+    u_thrust_N : (N,) float
+        Standard uncertainty: 0.196 of the thrust at rest (measured on UIUC data); NaN (unknown) otherwise. [N]
+    flags : tuple of tuple of str
+        Per point, why not to trust it; empty when inside every stated range.
+    """
+
+    thrust_N: Array
+    rpm: Array
+    airspeed_m_s: Array
+    CT: Array
+    J: Array
+    M_tip: Array
+    u_thrust_N: Array
+    flags: tuple[tuple[str, ...], ...]
+
+    @property
+    def thrust_kgf(self) -> Array:
+        """Thrust. [kgf]"""
+        return self.thrust_N / KGF
+
+
+def validity_flags(d_over_p: float, M_tip: float = 0.0, J: float = 0.0, ducted: bool = False) -> tuple[str, ...]:
+    """Say why the model should not be trusted at a point.
+
+    Parameters
+    ----------
+    d_over_p : float
+        Diameter over pitch. [-]
+    M_tip : float
+        Rotational tip Mach number. [-]
+    J : float
+        Advance ratio. [-]
+    ducted : bool
+        Whether the rotor runs in a duct.
+
+    Returns
+    -------
+    tuple of str
+        Empty when inside every stated range.
+
+    Examples
+    --------
+    >>> validity_flags(1.6, 0.63)
+    ()
+    >>> validity_flags(1.75, 1.09)
+    ('tip Mach 1.09 is supersonic: K1/K2 knows no Mach number',)
+    """
+    out = []
+    low, high = D_OVER_P_USABLE
+    best_low, best_high = D_OVER_P_BEST
+    tol = 1e-9
+    if not low - tol <= d_over_p <= high + tol:
+        out.append(f"D/p {d_over_p:.2f} outside the usable range {low:g}-{high:g}")
+    elif not best_low - tol <= d_over_p <= best_high + tol:
+        out.append(f"D/p {d_over_p:.2f} outside the best range {best_low:g}-{best_high:g}")
+    if M_tip >= 1.0:
+        out.append(f"tip Mach {M_tip:.2f} is supersonic: K1/K2 knows no Mach number")
+    elif M_tip > M_TIP_LIMIT:
+        out.append(f"tip Mach {M_tip:.2f} above {M_TIP_LIMIT:g}: K1/K2 knows no Mach number")
+    if ducted:
+        out.append("ducted: K1/K2 is a fit to open propellers (no duct, cascade or stator)")
+    x = J * d_over_p
+    if x < 0.0:
+        out.append("airspeed from behind: outside the model")
+    elif x > 1.0 + tol:
+        out.append(f"above the pitch speed: thrust negative, measured zero-thrust J is {ZERO_THRUST_MEASURED} P/D")
+    elif x > 0.0:
+        ratio = float(np.interp(x, *FLIGHT_RATIO))
+        out.append(f"J/(P/D) {x:.2f}: in flight K1/K2 reads low, about {ratio:.2f} of measured (UIUC median)")
+    return tuple(out)
+
+
+def estimate(
+    diameter_m: ArrayLike, pitch_m: ArrayLike, rpm: ArrayLike, V: ArrayLike = 0.0, air: Air | None = None,
+    hub_diameter_m: ArrayLike = 0.0, ducted: bool = False,
+) -> Estimate:  # fmt: skip
+    """Thrust by the K1/K2 model with coefficients, uncertainty and flags.
+
+    Parameters
+    ----------
+    diameter_m, pitch_m : float or array
+        Diameter; geometric pitch. [m]
+    rpm : float or array
+        Rotational speed. [rev/min]
+    V : float or array
+        Airspeed along the axis. [m/s]
+    air : Air, optional
+        State of the air; 1.225 kg/m3 at 15 degC by default, as the sources fix it.
+    hub_diameter_m : float or array
+        Hub diameter, for the annulus. [m]
+    ducted : bool
+        Whether the rotor runs in a duct; only flagged, the model has no duct.
+
+    Returns
+    -------
+    Estimate
+        Arguments broadcast against each other and raveled to N points.
+
+    Raises
+    ------
+    InputError
+        As `thrust`.
+
+    Examples
+    --------
+    >>> e = estimate(14 * 0.0254, 8 * 0.0254, 20000.0)
+    >>> e.thrust_kgf.round(3), e.flags[0]
+    (array([22.025]), ('tip Mach 1.09 is supersonic: K1/K2 knows no Mach number',))
+    """
+    air = Air.from_density() if air is None else air
+    names = (diameter_m, pitch_m, rpm, V, air.rho, air.a_sound, hub_diameter_m)
+    D, p, w, v, rho, a, h = (np.ravel(x) for x in np.broadcast_arrays(*(np.asarray(x, float) for x in names)))
+    F = np.asarray(thrust(D, p, w, v, rho, h), dtype=float)
+    n = w / 60.0
+    J = np.asarray(co.J(v, n, D))
+    M = np.asarray(co.M_tip(n, D, a))
+    # without rotation J is NaN: the sign of V decides then
+    J_flag = np.where(np.isnan(J), np.copysign(np.where(v == 0, 0.0, np.inf), v), J)
+    flags = tuple(validity_flags(d, m, j, ducted) for d, m, j in zip(D / p, M, J_flag, strict=True))
+    u = np.where((v == 0) & (not ducted), U_MEASURED * F, np.nan)
+    return Estimate(F, w, v, np.asarray(co.CT(F, rho, n, D)), J, M, u, flags)

@@ -1,0 +1,113 @@
+"""Faults, input errors and warnings that every room of the project shares.
+
+A :class:`Fault` is one thing wrong with one place of one file, phrased as ``file: where: got X; expected Y. Hint.``
+An :class:`InputError` carries *all* faults that were found, so that a user repairs a file in one pass.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+__all__ = [
+    "EXIT_INPUT",
+    "EXIT_INTERNAL",
+    "EXIT_OK",
+    "EXIT_UNCONVERGED",
+    "BemtWarning",
+    "ConvergenceWarning",
+    "Fault",
+    "InputError",
+    "RangeWarning",
+]
+
+EXIT_OK = 0
+"""Everything fine."""
+EXIT_UNCONVERGED = 1
+"""Out of tolerance or unconverged."""
+EXIT_INPUT = 2
+"""Usage or input error."""
+EXIT_INTERNAL = 3
+"""Internal error (a bug)."""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One thing wrong with one place of one input.
+
+    Parameters
+    ----------
+    file : str
+        File (or other input) that holds the fault; empty when there is none.
+    where : str
+        Dotted key, or ``line:column`` for tables; empty when the whole file is meant.
+    got : str
+        What was found there.
+    expected : str
+        What would have been right.
+    hint : str
+        How to repair it; may be empty.
+
+    Examples
+    --------
+    >>> print(Fault("case.toml", "operating.rpm", "-5", "a number from 10 to 300000 rev/min", "Drop the sign"))
+    case.toml: operating.rpm: got -5; expected a number from 10 to 300000 rev/min. Drop the sign.
+    >>> print(Fault("", "rpm", "nan", "a finite number"))
+    rpm: got nan; expected a finite number.
+    """
+
+    file: str
+    where: str
+    got: str
+    expected: str
+    hint: str = ""
+
+    def __str__(self) -> str:
+        head = "".join(f"{part}: " for part in (self.file, self.where) if part)
+        text = f"{head}got {self.got}; expected {self.expected.rstrip('.')}."
+        if self.hint:
+            text += f" {self.hint.rstrip('.')}" + ("" if self.hint.endswith("?") else ".")
+        return text
+
+
+class InputError(ValueError):
+    """Bad input: carries every fault found; the command line leaves with exit code 2.
+
+    Parameters
+    ----------
+    faults : Fault, or iterable of Fault
+        All faults found; at least one.
+
+    Examples
+    --------
+    >>> error = InputError([Fault("a.csv", "3:2", "'x'", "a number"), Fault("a.csv", "", "no rows", "one row or more")])
+    >>> print(error)
+    a.csv: 3:2: got 'x'; expected a number.
+    a.csv: got no rows; expected one row or more.
+    >>> error.exit_code, len(error.faults)
+    (2, 2)
+    """
+
+    exit_code: int = EXIT_INPUT
+
+    def __init__(self, faults: Fault | Iterable[Fault]) -> None:
+        self.faults: tuple[Fault, ...] = (faults,) if isinstance(faults, Fault) else tuple(faults)
+        if not self.faults:
+            raise TypeError("InputError needs at least one Fault")
+        super().__init__("\n".join(str(fault) for fault in self.faults))
+
+    def __reduce__(self) -> tuple[type[InputError], tuple[tuple[Fault, ...]]]:
+        """Pickle by the faults (worker processes send errors back)."""
+        return (type(self), (self.faults,))
+
+
+class BemtWarning(UserWarning):
+    """Base of the warnings of this project."""
+
+
+class ConvergenceWarning(BemtWarning):
+    """Some operating points have no solution; their values are NaN and they are flagged."""
+
+
+class RangeWarning(BemtWarning):
+    """A model is used outside the range that its source states."""

@@ -1,0 +1,247 @@
+"""A case at operating points: the one place where cases meet polars, effects, duct and solver."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bemt import coefficients as co
+from bemt import duct as duct_model
+from bemt import effects, empirical, polars, solver
+from bemt.errors import Fault, InputError
+
+if TYPE_CHECKING:
+    from bemt.air import Air
+    from bemt.case import Case
+
+__all__ = ["Points", "Ready", "air_arrays", "evaluate", "k1k2", "prepare"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Ready:
+    """A case prepared for the solver.
+
+    Parameters
+    ----------
+    prep : bemt.solver.Prepared
+        What the solver consumes.
+    diameter_m, hub_diameter_m, pitch_m, chord75_m, solidity : float
+        Diameters, geometric pitch and chord at 0.75 R [m]; blade area over disk area [-].
+    ducted : bool
+        Whether there is a duct.
+    exit_area_m2 : float
+        Exit area of the duct, NaN without one. [m2]
+    notes : tuple of str
+        Remarks of the section tables.
+    """
+
+    prep: solver.Prepared
+    diameter_m: float
+    hub_diameter_m: float
+    pitch_m: float
+    chord75_m: float
+    solidity: float
+    ducted: bool
+    exit_area_m2: float
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Points:
+    """Results at P operating points; NaN where not converged.
+
+    Attributes
+    ----------
+    rpm, airspeed_m_s, density_kg_m3 : (P,) float
+        Conditions. [rev/min], [m/s], [kg/m3]
+    thrust_N, torque_Nm, power_W : (P,) float
+        Total thrust (with a duct, all of it) [N], shaft torque [N m], shaft power [W].
+    CT, CP, J, eta, M_tip, Re75 : (P,) float
+        Propeller convention; rotational tip Mach number; Reynolds number at 0.75 R. [-]
+    rotor_thrust_N, duct_thrust_N, stator_thrust_N, exhaust_speed_m_s : (P,) float
+        Shares of the thrust [N]; speed at the exit or in the far wake [m/s].
+    converged : (P,) bool
+        Whether every blade element has a solution.
+    flags : tuple of tuple of str
+        Words per point.
+    """
+
+    rpm: Array
+    airspeed_m_s: Array
+    density_kg_m3: Array
+    thrust_N: Array
+    torque_Nm: Array
+    power_W: Array
+    CT: Array
+    CP: Array
+    J: Array
+    eta: Array
+    M_tip: Array
+    Re75: Array
+    rotor_thrust_N: Array
+    duct_thrust_N: Array
+    stator_thrust_N: Array
+    exhaust_speed_m_s: Array
+    converged: NDArray[np.bool_]
+    flags: tuple[tuple[str, ...], ...]
+
+    @property
+    def duct_share(self) -> Array:
+        """Duct thrust over total thrust. [-]"""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return self.duct_thrust_N / self.thrust_N
+
+
+def _effects(case: Case) -> tuple[effects.Effect, ...]:
+    known = effects.catalogue()
+    faults = []
+    for key in ("effects_on", "effects_off"):
+        for i, name in enumerate(case.get(f"model.{key}")):
+            if name not in known:
+                close = difflib.get_close_matches(name, known, n=1)
+                hint = f"Did you mean {close[0]}?" if close else ""
+                where = f"model.{key}[{i}]"
+                faults.append(Fault(case.path.as_posix(), where, repr(name), f"one of {', '.join(known)}", hint))
+    if faults:
+        raise InputError(faults)
+    on, off = set(case.get("model.effects_on")), set(case.get("model.effects_off"))
+    standard = {effect.id for effect in effects.standard()}
+    return tuple(cls() for name, cls in known.items() if name in (standard | on) - off)
+
+
+def _polars(case: Case, anchors: Sequence[tuple[float, Any]]) -> list[tuple[float, polars.Polar]]:
+    given = case.document.get("polars", [])
+    if given:
+        from bemt import importers
+
+        read = [(float(p["r_over_R"]), importers.read(case.folder / p["file"], p.get("format"))) for p in given]
+        return sorted(read, key=lambda pair: pair[0])
+    n_crit = float(case.get("model.n_crit"))
+    return [(x, polars.neuralfoil_polar(section, n_crit=n_crit)) for x, section in anchors]
+
+
+def prepare(case: Case, overrides: Mapping[str, Any] | None = None, n_stations: int | None = None) -> Ready:
+    """Build geometry, section tables and effects of a case.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+    overrides : mapping, optional
+        Changed values, dotted key to value.
+    n_stations : int, optional
+        Blade elements; the case says by default.
+
+    Returns
+    -------
+    Ready
+        For :func:`evaluate`.
+
+    Raises
+    ------
+    InputError
+        When the changed values do not make a rotor, or an effect is unknown.
+    """
+    case = case.replaced(overrides)
+    rotor, duct = case.rotor(), case.duct()
+    flow = None
+    if duct is not None:
+        flow = duct_model.duct_flow(duct, rotor)
+        recovery = case.get("duct.stator.recovery")
+        if recovery is not None:
+            flow = dataclasses.replace(flow, stator=float(recovery))
+    tables = _polars(case, rotor.blade.anchors)
+    n = int(case.get("model.stations")) if n_stations is None else n_stations
+    prep = solver.prepare(rotor, tables, _effects(case), flow, n)
+    notes = tuple(dict.fromkeys(note for _, polar in tables for note in polar.notes))
+    return Ready(
+        prep, rotor.D, 2.0 * rotor.Rhub, rotor.blade.pitch_m(), float(rotor.blade.at(0.75 * rotor.R)[0]), rotor.solidity,
+        duct is not None, float("nan") if duct is None else duct.exit_area, notes,
+    )  # fmt: skip
+
+
+def air_arrays(states: Sequence[Air], index: NDArray[np.intp]) -> Air:
+    """One state of the air per point.
+
+    Parameters
+    ----------
+    states : sequence of Air
+        Distinct states.
+    index : (P,) int
+        Which one holds at each point.
+
+    Returns
+    -------
+    Air
+        An object whose rho, mu, a_sound and temperature_K are (P,) arrays.
+    """
+    names = ("rho", "mu", "a_sound", "temperature_K")
+    fields = {name: np.array([getattr(s, name) for s in states], dtype=float)[index] for name in names}
+    return cast("Air", SimpleNamespace(**fields))
+
+
+def evaluate(ready: Ready, rpm: ArrayLike, airspeed_m_s: ArrayLike, air: Air, threads: int = 1) -> Points:
+    """Solve operating points.
+
+    Parameters
+    ----------
+    ready : Ready
+        Prepared case.
+    rpm, airspeed_m_s : array_like
+        Speed of rotation [rev/min] and of flight [m/s]; broadcast.
+    air : Air
+        One state, or arrays from :func:`air_arrays`.
+    threads : int
+        Threads of the solver; the answer does not depend on it.
+
+    Returns
+    -------
+    Points
+        One entry per point.
+    """
+    s = solver.solve(ready.prep, rpm, airspeed_m_s, air, threads=threads)
+    n, D = s.rpm / 60.0, ready.diameter_m
+    rho, mu, a = (np.broadcast_to(np.asarray(getattr(air, k), float), n.shape) for k in ("rho", "mu", "a_sound"))
+    return Points(
+        rpm=s.rpm, airspeed_m_s=s.V, density_kg_m3=rho, thrust_N=s.T, torque_Nm=s.Q, power_W=s.P, CT=s.CT, CP=s.CP, J=s.J,
+        eta=np.asarray(co.eta(s.J, s.CT, s.CP)), M_tip=np.asarray(co.M_tip(n, D, a)),
+        Re75=np.asarray(co.Re75(ready.chord75_m, n, D, s.V, rho, mu)), rotor_thrust_N=s.T_rotor, duct_thrust_N=s.T_duct,
+        stator_thrust_N=s.T_stator, exhaust_speed_m_s=s.V_exit, converged=s.converged, flags=s.flags,
+    )  # fmt: skip
+
+
+def k1k2(case: Case, overrides: Mapping[str, Any] | None, rpm: Array, airspeed_m_s: Array, air: Air) -> empirical.Estimate:
+    """K1/K2 model of a case; a ducted rotor counts its annulus only.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+    overrides : mapping or None
+        Changed values.
+    rpm, airspeed_m_s : (P,) float
+        Conditions. [rev/min], [m/s]
+    air : Air
+        One state, or arrays from :func:`air_arrays`.
+
+    Returns
+    -------
+    bemt.empirical.Estimate
+        Thrust, uncertainty, flags. The pitch is the one that the case states, else that of the blade at 0.75 R.
+    """
+    case = case.replaced(overrides)
+    ratio = case.get("blade.pitch_ratio")
+    pitch = case.length_m("blade", "pitch") if ratio is None else float(ratio) * case.diameter_m
+    if np.isnan(pitch):
+        pitch = case.rotor().blade.pitch_m()
+    hub = case.hub_diameter_m if case.ducted else 0.0
+    return empirical.estimate(case.diameter_m, pitch, rpm, airspeed_m_s, air, hub, case.ducted)

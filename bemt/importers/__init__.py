@@ -1,0 +1,239 @@
+"""Readers of recorded data: one file per format, found by scanning this folder.
+
+An importer is a module of this package (its name does not start with ``_``) that defines
+
+* ``KIND`` : str, the name used in ``format = "..."``;
+* ``sniff(head) -> bool`` : True when the head of a file (:data:`HEAD_BYTES` bytes, or text) is of this format;
+* ``read(path) -> object`` : the whole file, or :class:`bemt.errors.InputError` with all its faults;
+* optionally ``sniff_folder(path) -> bool`` : True when ``read`` also takes that folder.
+
+The extension of a file decides nothing. When two sniffers claim a file, that is an error that asks for ``format =``.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import math
+import os
+import pkgutil
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from types import MappingProxyType, ModuleType
+from typing import Any
+
+from bemt.errors import Fault, InputError
+
+__all__ = ["HEAD_BYTES", "SourceText", "detect", "head_text", "importers", "load_text", "number", "read"]
+
+HEAD_BYTES = 16384
+"""Bytes of a file that a sniffer sees."""
+
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
+
+
+@dataclass(frozen=True)
+class SourceText:
+    """Text of one input file with what provenance needs.
+
+    Parameters
+    ----------
+    name : str
+        Path as given by the user; appears in faults.
+    text : str
+        Decoded content (UTF-8, or Latin-1 when it is not valid UTF-8), without a byte order mark.
+    sha256 : str
+        Hash of the bytes of the file, hexadecimal.
+    """
+
+    name: str
+    text: str
+    sha256: str
+
+    @property
+    def lines(self) -> list[str]:
+        """Lines without their ends; line numbers in faults count from 1."""
+        return self.text.splitlines()
+
+
+def _decode(raw: bytes) -> str:
+    for encoding in ("utf-8-sig", "latin-1"):
+        try:
+            return raw.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+    raise AssertionError("Latin-1 decodes any bytes")  # pragma: no cover
+
+
+def load_text(path: str | os.PathLike[str]) -> SourceText:
+    """Read one file whole.
+
+    Parameters
+    ----------
+    path : str or path
+        File to read.
+
+    Returns
+    -------
+    SourceText
+        Its text, name and hash.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read or is binary (holds NUL bytes).
+    """
+    name = os.fspath(path)
+    try:
+        raw = Path(path).read_bytes()
+    except OSError as error:
+        raise InputError(Fault(name, "", error.strerror or str(error), "a readable file", "Check the path")) from error
+    if b"\0" in raw:
+        raise InputError(Fault(name, "", "binary data (NUL bytes)", "a text file", "Export the data as plain text"))
+    return SourceText(name, _decode(raw), hashlib.sha256(raw).hexdigest())
+
+
+def head_text(head: bytes | str) -> str:
+    r"""Text of the head of a file, for sniffers.
+
+    Parameters
+    ----------
+    head : bytes or str
+        First bytes of a file, or text.
+
+    Returns
+    -------
+    str
+        Text; the empty string for binary data.
+
+    Examples
+    --------
+    >>> head_text(b"\xef\xbb\xbfRPM CT CP")
+    'RPM CT CP'
+    """
+    if isinstance(head, str):
+        return head.removeprefix("\ufeff")
+    return "" if b"\0" in head else _decode(head)
+
+
+def number(token: str) -> float | None:
+    """Read one finite decimal number, strictly.
+
+    Parameters
+    ----------
+    token : str
+        Text such as ``-1.5e-3``; Fortran's ``1.0D+00`` is accepted.
+
+    Returns
+    -------
+    float or None
+        The value; None when the text is not a finite number (``nan``, ``1,5``, ``0.34-NaN``, ``1_000``).
+
+    Examples
+    --------
+    >>> number("1.0D-02"), number("0,5"), number("nan"), number("1e999")
+    (0.01, None, None, None)
+    """
+    text = token.strip()
+    if not _NUMBER.fullmatch(text):
+        return None
+    value = float(text.replace("D", "e").replace("d", "e"))
+    return value if math.isfinite(value) else None
+
+
+@cache
+def importers() -> Mapping[str, ModuleType]:
+    """Find the importers of this folder.
+
+    Returns
+    -------
+    mapping of str to module
+        By kind, sorted; read-only.
+
+    Raises
+    ------
+    TypeError
+        When a module lacks KIND, sniff or read, or repeats a kind (a bug, not an input error).
+    """
+    found: dict[str, ModuleType] = {}
+    for info in pkgutil.iter_modules(__path__):
+        if info.name.startswith("_"):
+            continue
+        module = importlib.import_module(f"{__name__}.{info.name}")
+        kind = getattr(module, "KIND", None)
+        if not isinstance(kind, str) or not callable(getattr(module, "sniff", None)) or not hasattr(module, "read"):
+            raise TypeError(f"{module.__name__} is no importer: it needs KIND, sniff(head) and read(path)")
+        if kind in found:
+            raise TypeError(f"{module.__name__} repeats the kind {kind!r} of {found[kind].__name__}")
+        found[kind] = module
+    return MappingProxyType(dict(sorted(found.items())))
+
+
+def detect(path: str | os.PathLike[str]) -> str:
+    """Find the format of a file or folder by its content.
+
+    Parameters
+    ----------
+    path : str or path
+        File or folder.
+
+    Returns
+    -------
+    str
+        Kind of the one importer that claims it.
+
+    Raises
+    ------
+    InputError
+        When it cannot be read, when no importer claims it, or when two or more do (then give ``format =``).
+    """
+    name = os.fspath(path)
+    target = Path(path)
+    known = importers()
+    if target.is_dir():
+        kinds = [k for k, m in known.items() if hasattr(m, "sniff_folder") and m.sniff_folder(target)]
+    else:
+        try:
+            with target.open("rb") as stream:
+                head = stream.read(HEAD_BYTES)
+        except OSError as error:
+            fault = Fault(name, "", error.strerror or str(error), "a readable file or folder", "Check the path")
+            raise InputError(fault) from error
+        kinds = [k for k, m in known.items() if m.sniff(head)]
+    if len(kinds) == 1:
+        return kinds[0]
+    if not kinds:
+        hint = "Give format = if the head of the file is unusual" if target.is_file() else "Name a single file"
+        raise InputError(Fault(name, "", "content of no known format", f"one of {', '.join(known)}", hint))
+    hint = " or ".join(f'format = "{kind}"' for kind in kinds)
+    raise InputError(Fault(name, "", f"content claimed by {', '.join(kinds)}", "one format", f"Give {hint}"))
+
+
+def read(path: str | os.PathLike[str], format: str | None = None) -> Any:  # noqa: A002 - the key of the case file
+    """Read a file or folder with the importer of its format.
+
+    Parameters
+    ----------
+    path : str or path
+        File or folder.
+    format : str or None
+        Kind of the importer; None finds it by content.
+
+    Returns
+    -------
+    object
+        What that importer's ``read`` returns.
+
+    Raises
+    ------
+    InputError
+        On an unknown format, or on faults in the data.
+    """
+    known = importers()
+    kind = detect(path) if format is None else format
+    if kind not in known:
+        raise InputError(Fault(os.fspath(path), "format", repr(kind), f"one of {', '.join(known)}"))
+    return known[kind].read(path)

@@ -1,0 +1,333 @@
+"""Tables of the UIUC Propeller Database: one reader per header, see :mod:`bemt.importers.uiuc`."""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.errors import Fault, InputError
+from bemt.importers import SourceText, head_text, load_text, number
+from bemt.importers._uiuc_names import parse_file_name
+
+__all__ = [
+    "UiucGeometry", "UiucLine", "UiucStatic", "UiucThickness", "read_geometry", "read_line", "read_static",
+    "read_thickness", "role_of", "sniff",
+]  # fmt: skip
+
+Array = NDArray[np.float64]
+_COLUMNS = {
+    "geom": ("r/R", "c/R", "beta"),
+    "static": ("RPM", "CT", "CP"),
+    "line": ("J", "CT", "CP", "eta"),
+    "thick": ("r/R", "t/c"),
+}
+_RANGES: dict[str, tuple[float, float, str]] = {  # outside: a wrong column or unit, refused with this hint
+    "r/R": (0.0, 1.05, "Is this a radius in mm or in?"),
+    "c/R": (0.0, 1.5, "Is this a chord in mm or in?"),
+    "beta": (-30.0, 90.0, "Blade angles are in degrees"),
+    "t/c": (0.0, 1.0, "Is this in percent?"),
+    "RPM": (100.0, 200000.0, "Is this in rev/s or rad/s?"),
+    "J": (-2.0, 5.0, "Are the columns J CT CP eta?"),
+    "CT": (-1.0, 2.0, "Is this a rotor-convention or dimensional value?"),
+    "CP": (-1.0, 2.0, "Is this a rotor-convention or dimensional value?"),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class _Table:
+    """One file as arrays: ``file``, ``sha256``, ``rows`` (line numbers from 1), ``flags`` (per row, may be empty)."""
+
+    file: str
+    sha256: str
+    rows: tuple[int, ...]
+    flags: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class UiucGeometry(_Table):
+    """Blade stations: ``r_R``, ``c_R`` (N,), ``beta_deg`` (N,) [deg]; ``origin`` and ``rotation_deg`` as above."""
+
+    r_R: Array
+    c_R: Array
+    beta_deg: Array
+    origin: str = "own"
+    rotation_deg: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class UiucStatic(_Table):
+    """Static run: ``rpm`` (N,) [rev/min], ``CT``, ``CP`` (N,)."""
+
+    rpm: Array
+    CT: Array
+    CP: Array
+    run: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class UiucLine(_Table):
+    """Run over advance ratio at one nominal ``rpm`` [rev/min]: ``J``, ``CT``, ``CP``, ``eta`` (N,)."""
+
+    rpm: float
+    J: Array
+    CT: Array
+    CP: Array
+    eta: Array
+    run: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class UiucThickness(_Table):
+    """Thickness ratio ``t_c`` (N,) over ``r_R`` (N,)."""
+
+    r_R: Array
+    t_c: Array
+
+
+def _header(text: str) -> tuple[int, str | None]:
+    """Line number of the header and the role it announces (None: not a table of this archive)."""
+    for index, line in enumerate(text.splitlines(), 1):
+        if not line.strip() or line.lstrip().startswith("#"):
+            continue
+        names = re.sub(r"\(.*?\)|\[.*?\]", " ", line).lower().split()
+        for role, columns in _COLUMNS.items():
+            wanted = [c.lower() for c in columns]
+            if names == wanted or (role == "line" and names == wanted[:3]):
+                return index, role
+        return index, None
+    return 0, None
+
+
+def role_of(head: bytes | str) -> str | None:
+    r"""Tell which table the head of a file announces.
+
+    Parameters
+    ----------
+    head : bytes or str
+        First bytes of a file.
+
+    Returns
+    -------
+    str or None
+        ``geom``, ``static``, ``line``, ``thick``, or None.
+
+    Examples
+    --------
+    >>> role_of("RPM    CT       CP\n")
+    'static'
+    """
+    return _header(head_text(head))[1]
+
+
+def sniff(head: bytes | str) -> bool:
+    r"""Tell whether the head of a file is a table of this archive.
+
+    Parameters
+    ----------
+    head : bytes or str
+        First bytes of a file.
+
+    Returns
+    -------
+    bool
+        True when the first line names the columns of one of its tables.
+
+    Examples
+    --------
+    >>> sniff(b"J       CT       CP       eta\n0.1 0.1 0.05 0.2\n"), sniff("quantity,value,unit")
+    (True, False)
+    """
+    return role_of(head) is not None
+
+
+def _parse(source: SourceText, role: str) -> tuple[dict[str, Array], tuple[int, ...]]:
+    """Read the table of one file; every row that is not exactly its columns of finite numbers is a fault."""
+    at, found = _header(source.text)
+    columns = _COLUMNS[role]
+    if found != role:
+        got = repr(source.lines[at - 1].strip()[:60]) if at else "no header"
+        hint = f"This is a {found} table" if found else "Is the header line missing?"
+        raise InputError(Fault(source.name, str(at or 1), got, f"the header {' '.join(columns)}", hint))
+    header = re.sub(r"\(.*?\)|\[.*?\]", " ", source.lines[at - 1])
+    columns = columns[: len(header.split())]
+    faults: list[Fault] = []
+    values: list[list[float]] = []
+    rows: list[int] = []
+    for index, line in enumerate(source.lines[at:], at + 1):
+        tokens = line.split()
+        if not tokens or tokens[0].startswith("#"):
+            continue
+        if len(tokens) != len(columns):
+            hint = "Remove the trailing text" if len(tokens) > len(columns) else "The row is cut short"
+            expected = f"{len(columns)} numbers ({' '.join(columns)})"
+            faults.append(Fault(source.name, str(index), repr(line.strip()[:60]), expected, hint))
+            continue
+        row = []
+        for column, (name, token) in enumerate(zip(columns, tokens, strict=True), 1):
+            value = number(token)
+            low, high, hint = _RANGES.get(name, (-1e9, 1e9, ""))
+            where = f"{index}:{column}"
+            if value is None:
+                hint = "Use a decimal point" if "," in token else "Delete the row or repair the value"
+                faults.append(Fault(source.name, where, f"{name} = {token}", "a finite number", hint))
+            elif not low <= value <= high:
+                expected = f"{name} from {low:g} to {high:g}"
+                faults.append(Fault(source.name, where, f"{name} = {token}", expected, hint))
+            row.append(np.nan if value is None else value)
+        values.append(row)
+        rows.append(index)
+    if not values and not faults:
+        faults.append(Fault(source.name, "", "no rows", "one row or more"))
+    if faults:
+        raise InputError(faults)
+    data = np.array(values, dtype=float)
+    return {name: data[:, i] for i, name in enumerate(columns)}, tuple(rows)
+
+
+def _order_flags(x: Array, name: str) -> tuple[tuple[str, ...], ...]:
+    """Flag rows that repeat or go back; real runs do (kept as recorded)."""
+    step = np.diff(x, prepend=x[0] - 1.0)
+    return tuple((f"{name} repeated",) if d == 0 else (f"{name} goes back",) if d < 0 else () for d in step)
+
+
+def read_geometry(path: str | os.PathLike[str]) -> UiucGeometry:
+    """Read one geometry file.
+
+    Parameters
+    ----------
+    path : str or path
+        File with the header ``r/R c/R beta``.
+
+    Returns
+    -------
+    UiucGeometry
+        Stations, ascending in r/R.
+
+    Raises
+    ------
+    InputError
+        With every faulty row; also when r/R does not ascend or ends before 0.9.
+    """
+    source = load_text(path)
+    table, rows = _parse(source, "geom")
+    r_R, c_R, beta = table["r/R"], table["c/R"], table["beta"]
+    faults = [
+        Fault(source.name, f"{rows[i + 1]}:1", f"r/R = {r_R[i + 1]:g} after {r_R[i]:g}", "ascending r/R", "Sort rows")
+        for i in np.flatnonzero(np.diff(r_R) <= 0)
+    ]
+    if len(r_R) < 3 or r_R[-1] < 0.9:
+        got = f"{len(r_R)} stations to r/R = {r_R[-1]:g}"
+        faults.append(Fault(source.name, "", got, "three stations or more up to r/R = 0.9", "Is the file cut off?"))
+    if np.max(np.abs(beta)) < 1.6:
+        got = f"blade angles of at most {np.max(np.abs(beta)):g}"
+        faults.append(Fault(source.name, "", got, "blade angles in degrees", "Are these radians?"))
+    if faults:
+        raise InputError(faults)
+    return UiucGeometry(source.name, source.sha256, rows, ((),) * len(rows), r_R, c_R, beta)
+
+
+def read_static(path: str | os.PathLike[str]) -> UiucStatic:
+    """Read one static run (header ``RPM CT CP``); rows stay in the recorded order, flagged where rpm goes back.
+
+    Parameters
+    ----------
+    path : str or path
+        File to read.
+
+    Returns
+    -------
+    UiucStatic
+        The run.
+
+    Raises
+    ------
+    InputError
+        With every faulty row.
+    """
+    source = load_text(path)
+    table, rows = _parse(source, "static")
+    name = parse_file_name(Path(path).stem)
+    flags = _order_flags(table["RPM"], "rpm")
+    run = name.run if name and name.role == "static" else ""
+    return UiucStatic(source.name, source.sha256, rows, flags, table["RPM"], table["CT"], table["CP"], run)
+
+
+def read_line(path: str | os.PathLike[str], rpm: float | None = None) -> UiucLine:
+    """Read one advance-ratio run (header ``J CT CP eta``).
+
+    Parameters
+    ----------
+    path : str or path
+        File to read.
+    rpm : float or None
+        Rotational speed [rev/min]; None takes it from the file name.
+
+    Returns
+    -------
+    UiucLine
+        The run; rows whose eta disagrees with J CT/CP by more than rounding are flagged.
+
+    Raises
+    ------
+    InputError
+        With every faulty row, or when the rpm is unknown.
+    """
+    source = load_text(path)
+    name = parse_file_name(Path(path).stem)
+    faults: list[Fault] = []
+    speed = rpm if rpm is not None else (name.rpm if name and name.role == "line" else None)
+    if speed is None or not 100.0 <= speed <= 200000.0:
+        got = "no rpm in the file name" if speed is None else f"rpm {speed:g}"
+        hint = "Name the file <family>_<size>_<run>_<rpm>.txt"
+        faults.append(Fault(source.name, "", got, "rpm from 100 to 200000 as the last number of the name", hint))
+    try:
+        table, rows = _parse(source, "line")
+    except InputError as error:
+        raise InputError([*faults, *error.faults]) from None
+    if faults or speed is None:
+        raise InputError(faults)
+    J, CT, CP = table["J"], table["CT"], table["CP"]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ideal = np.where(CP != 0, J * CT / CP, np.nan)
+        # four times the rounding of the printed digits (J 0.001, CT and CP 0.0001)
+        slack = 4 * (0.0005 + np.abs(J / CP) * 5e-5 + np.abs(ideal) * 5e-5 / np.abs(CP) + np.abs(CT / CP) * 5e-4)
+    eta = table.get("eta", ideal)
+    odd = np.abs(eta - ideal) > slack
+    bad = np.flatnonzero(odd & (np.abs(eta - ideal) > 0.05 + 0.1 * np.abs(ideal)))
+    if len(bad) > max(2, len(J) // 4):
+        got = f"eta = {eta[bad[0]]:g} where J CT/CP = {ideal[bad[0]]:.3g}"
+        hint = f"{len(bad)} of {len(J)} rows disagree: are columns exchanged?"
+        raise InputError(Fault(source.name, str(rows[bad[0]]), got, "eta = J CT/CP", hint))
+    order = _order_flags(J, "J")
+    flags = tuple(f + (("eta is not J CT/CP",) if o else ()) for f, o in zip(order, odd, strict=True))
+    run = name.run if name and name.role == "line" else ""
+    return UiucLine(source.name, source.sha256, rows, flags, float(speed), J, CT, CP, eta, run)
+
+
+def read_thickness(path: str | os.PathLike[str]) -> UiucThickness:
+    """Read one thickness file (header ``r/R t/c``).
+
+    Parameters
+    ----------
+    path : str or path
+        File to read.
+
+    Returns
+    -------
+    UiucThickness
+        Thickness ratio over r/R.
+
+    Raises
+    ------
+    InputError
+        With every faulty row.
+    """
+    source = load_text(path)
+    table, rows = _parse(source, "thick")
+    r_R = table["r/R"]
+    return UiucThickness(source.name, source.sha256, rows, _order_flags(r_R, "r/R"), r_R, table["t/c"])

@@ -1,0 +1,362 @@
+r"""Recorded values of a case: ``references.csv``.
+
+A comma-separated table with a header line; lines that begin with ``#`` are comments::
+
+    quantity,value,unit,uncertainty,kind,source,remark,rpm,airspeed_m_s,density_kg_m3
+    thrust,2.60,kgf,unknown,cfd,"Cahill 2025, table 1",Fluent; set-up in FACTS,20000,0,1.225
+
+* ``unit`` must be given; ``-`` for dimensionless quantities. Mass units for a force (``kg``, ``g``) are refused.
+* ``uncertainty`` is the standard uncertainty (one sigma) in the unit of the value, or the word ``unknown``.
+* ``kind`` is one of :data:`KINDS`.
+* ``rpm``, ``airspeed_m_s``, ``density_kg_m3`` are optional columns; an empty cell means "as the case says".
+
+Nothing suspicious is converted: out-of-range values, an uncertainty larger than its value, and two rows of the same
+quantity and condition that differ by just the factor between kgf and N are refused with a hint.
+"""
+
+from __future__ import annotations
+
+import csv
+import difflib
+import io
+import math
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from bemt import units
+from bemt.errors import Fault, InputError
+from bemt.importers import head_text, load_text, number
+from bemt.series import Series
+
+__all__ = ["COLUMNS", "CONDITIONS", "KIND", "KINDS", "QUANTITIES", "Reference", "read", "sniff", "to_series"]
+
+KIND = "references"
+KINDS = ("cfd", "bench", "vendor", "k1k2_printed", "k1k2", "bemt", "flight", "other")
+COLUMNS = ("quantity", "value", "unit", "uncertainty", "kind", "source", "remark")
+
+QUANTITIES: dict[str, tuple[str, str, float, float]] = {
+    "thrust": ("force", "thrust_N", 1e-3, 1e5),
+    "duct_thrust": ("force", "duct_thrust_N", 1e-3, 1e5),
+    "torque": ("torque", "torque_Nm", 1e-6, 1e4),
+    "power": ("power", "power_W", 1e-3, 1e6),
+    "electrical_power": ("power", "electrical_power_W", 1e-3, 1e6),
+    "exhaust_speed": ("speed", "exhaust_speed_m_s", 0.1, 500.0),
+    "airspeed": ("speed", "airspeed_m_s", -100.0, 400.0),
+    "rpm": ("angular_speed", "rpm", 10.0, 300000.0),
+    "CT": ("", "CT", -1.0, 2.0),
+    "CP": ("", "CP", -1.0, 2.0),
+    "CQ": ("", "CQ", -0.2, 0.4),
+    "J": ("", "J", -2.0, 5.0),
+    "eta": ("", "eta", -10.0, 1.0),
+    "FM": ("", "FM", 0.0, 1.5),
+    "duct_share": ("", "duct_share", -1.0, 1.0),
+}
+"""Quantity -> dimension (empty: none), channel of a series, plausible range in SI (rpm for rpm)."""
+
+CONDITIONS: dict[str, tuple[float, float, str]] = {
+    "rpm": (10.0, 300000.0, "Is this in rev/s or rad/s?"),
+    "airspeed_m_s": (-100.0, 400.0, "Is this in km/h or mph?"),
+    "density_kg_m3": (0.01, 1100.0, "Is this in g/cm3?"),
+}
+"""Optional column -> lowest, highest, hint."""
+
+_ALIASES = {
+    "N_m": "Nm", "mN_m": "mNm", "N_cm": "Ncm", "N_mm": "Nmm", "in_lbf": "lbf_in", "ft_lbf": "lbf_ft",
+    "in_ozf": "ozf_in", "RPM": "rpm", "rev_min": "rpm",
+    "1_min": "rpm", "kph": "km_h", "knots": "kt", "%": "pct", "1": "-",
+}  # fmt: skip
+_MASS = {"kg": "kgf", "g": "gf", "lb": "lbf", "oz": "ozf", "lbs": "lbf", "grams": "gf"}
+
+
+@dataclass(frozen=True)
+class Reference:
+    """One recorded value.
+
+    Parameters
+    ----------
+    quantity, kind, source, remark : str
+        As in the file.
+    value : float
+        In SI units (rpm for a rotational speed).
+    u : float
+        Standard uncertainty in the unit of ``value``; NaN means unknown.
+    channel : str
+        Channel of a series, with its unit: ``thrust_N``.
+    printed : str
+        Value and unit as written, for reports: ``2.60 kgf``.
+    rpm, airspeed_m_s, density_kg_m3 : float
+        Condition [rev/min], [m/s], [kg/m3]; NaN means as the case says.
+    where : str
+        ``file:line``.
+    sha256 : str
+        Hash of the file.
+    """
+
+    quantity: str
+    value: float
+    u: float
+    channel: str
+    kind: str
+    source: str
+    remark: str
+    printed: str
+    rpm: float = math.nan
+    airspeed_m_s: float = math.nan
+    density_kg_m3: float = math.nan
+    where: str = ""
+    sha256: str = field(default="", repr=False)
+
+    @property
+    def condition(self) -> tuple[float | None, float | None, float | None]:
+        """Condition (rpm, airspeed, density) with None for NaN, so that equal conditions compare equal."""
+        values = (self.rpm, self.airspeed_m_s, self.density_kg_m3)
+        rpm, airspeed, density = (None if math.isnan(x) else x for x in values)
+        return (rpm, airspeed, density)
+
+
+def sniff(head: bytes | str) -> bool:
+    r"""Tell whether the head of a file is a table of references.
+
+    Parameters
+    ----------
+    head : bytes or str
+        First bytes of a file.
+
+    Returns
+    -------
+    bool
+        True when its first line that is no comment names quantity, value and unit.
+
+    Examples
+    --------
+    >>> sniff("# case 8x5\nquantity,value,unit,uncertainty,kind,source,remark\n"), sniff("J CT CP eta\n")
+    (True, False)
+    """
+    for line in head_text(head).splitlines():
+        if line.strip() and not line.startswith("#"):
+            return {"quantity", "value", "unit"} <= {cell.strip().strip('"').lower() for cell in line.split(",")}
+    return False
+
+
+def _near(word: str, known: Iterable[str]) -> str:
+    match = difflib.get_close_matches(word, list(known), 1)
+    return f"Did you mean {match[0]}?" if match else ""
+
+
+def _unit_factor(quantity: str, written: str) -> tuple[float, tuple[str, str, str] | None]:
+    """Factor to SI (to rpm for a rotational speed), or the fault (got, expected, hint)."""
+    dimension = QUANTITIES[quantity][0]
+    key = written.strip()
+    for sign in "/ -·*":
+        key = key if key in ("-", "1") else key.replace(sign, "_")
+    key = _ALIASES.get(key, key)
+    known = units.suffixes(dimension) if dimension else ("-", "pct")
+    if not key:
+        return math.nan, ("no unit", f"one of {', '.join(known)}", "")
+    if not dimension:
+        if key in ("-", "pct"):
+            return (0.01 if key == "pct" else 1.0), None
+        return math.nan, (f"unit {written!r}", "- (dimensionless)", "")
+    if key in known:
+        factor = units.UNITS[key].factor
+        return (factor / units.RPM if quantity == "rpm" else factor), None
+    hint = f"A mass is no force: write {_MASS[key]}" if dimension == "force" and key in _MASS else _near(key, known)
+    return math.nan, (f"unit {written!r}", f"one of {', '.join(known)}", hint)
+
+
+class _Row:
+    """One line of the table: typed cells, faults with line and column."""
+
+    def __init__(self, file: str, line: int, header: list[str], cells: list[str], faults: list[Fault]) -> None:
+        self.file, self.line, self.header, self.faults = file, line, header, faults
+        self.cells = dict(zip(header, (cell.strip() for cell in cells), strict=True))
+
+    def fault(self, column: str, got: str, expected: str, hint: str = "") -> None:
+        self.faults.append(Fault(self.file, f"{self.line}:{self.header.index(column) + 1}", got, expected, hint))
+
+    def number(self, column: str, expected: str) -> float:
+        text = self.cells[column]
+        value = number(text)
+        if value is None:
+            hint = ""
+            if "," in text:
+                hint = "Use a decimal point"
+            elif text and number(text.split()[0]) is not None:
+                hint = "Put the unit into its own column"
+            self.fault(column, f"{column} = {text or 'nothing'}", expected, hint)
+            return math.nan
+        return value
+
+
+def _reference(row: _Row, sha256: str) -> Reference | None:
+    """Read one row; None with faults appended when it cannot be used."""
+    before = len(row.faults)
+    quantity, kind, source = row.cells["quantity"], row.cells["kind"], row.cells["source"]
+    value = row.number("value", "a finite number")
+    factor = math.nan
+    if quantity not in QUANTITIES:
+        expected = f"one of {', '.join(QUANTITIES)}"
+        row.fault("quantity", f"quantity {quantity!r}", expected, _near(quantity, QUANTITIES))
+    else:
+        factor, fault = _unit_factor(quantity, row.cells["unit"])
+        if fault:
+            row.fault("unit", *fault)
+        _, _, low, high = QUANTITIES[quantity]
+        if not math.isnan(value * factor) and not low <= value * factor <= high:
+            got = f"{quantity} = {value:g} {row.cells['unit']}"
+            row.fault("value", got, f"{low:g} to {high:g} in SI units", "Is the unit right?")
+    u = math.nan
+    if row.cells["uncertainty"].lower() != "unknown":
+        u = row.number("uncertainty", 'a standard uncertainty in the unit of the value, or "unknown"')
+        if u <= 0:
+            hint = 'Write "unknown" if nobody stated it'
+            row.fault("uncertainty", f"uncertainty = {u:g}", "a positive number", hint)
+        elif abs(value) > 0 and u > abs(value):
+            hint = "Is it in percent? Give it in the unit of the value"
+            row.fault("uncertainty", f"uncertainty = {u:g}", f"less than the value, {abs(value):g}", hint)
+    if kind not in KINDS:
+        row.fault("kind", f"kind {kind!r}", f"one of {', '.join(KINDS)}", _near(kind, KINDS))
+    if not source:
+        row.fault("source", "no source", "where the value comes from", "")
+    conditions: dict[str, float] = {}
+    for column, (low, high, hint) in CONDITIONS.items():
+        if row.cells.get(column):
+            conditions[column] = row.number(column, f"a number from {low:g} to {high:g}, or an empty cell")
+            if not math.isnan(conditions[column]) and not low <= conditions[column] <= high:
+                row.fault(column, f"{column} = {conditions[column]:g}", f"{low:g} to {high:g}", hint)
+    if len(row.faults) > before:
+        return None
+    return Reference(
+        quantity, value * factor, u * factor, QUANTITIES[quantity][1], kind, source, row.cells["remark"],
+        f"{row.cells['value']} {row.cells['unit']}".removesuffix(" -"), where=f"{row.file}:{row.line}", sha256=sha256,
+        **conditions,
+    )  # fmt: skip
+
+
+def _pair_faults(file: str, references: list[Reference]) -> Iterable[Fault]:
+    """Compare rows of the same quantity and condition: repeats, and slips between kgf and N."""
+    for i, one in enumerate(references):
+        for other in references[:i]:
+            if (one.quantity, one.condition) != (other.quantity, other.condition):
+                continue
+            line, earlier = (r.where.rsplit(":", 1)[1] for r in (one, other))
+            if (one.kind, one.source, one.value) == (other.kind, other.source, other.value):
+                yield Fault(file, line, f"the row of line {earlier} again", "each value once", "Delete one of them")
+            elif QUANTITIES[one.quantity][0] == "force" and min(abs(one.value), abs(other.value)) > 0:
+                ratio = abs(one.value / other.value)
+                if abs(max(ratio, 1 / ratio) / units.KGF - 1) < 0.005:
+                    got = f"{one.printed} where line {earlier} has {other.printed}"
+                    hint = "They differ by 9.81: is one kgf and one N?"
+                    yield Fault(file, line, got, "values in their own units", hint)
+
+
+def read(path: str | os.PathLike[str]) -> list[Reference]:
+    """Read a table of references.
+
+    Parameters
+    ----------
+    path : str or path
+        CSV file.
+
+    Returns
+    -------
+    list of Reference
+        In the order of the file.
+
+    Raises
+    ------
+    InputError
+        With all faults of the file.
+    """
+    source = load_text(path)
+    file = source.name
+    if not source.text.strip():
+        raise InputError(Fault(file, "", "an empty file", f"a table with the columns {', '.join(COLUMNS)}", ""))
+    # comments become empty lines, so that line numbers stay those of the file
+    text = "\n".join("" if line.startswith("#") else line for line in source.lines)
+    reader = csv.reader(io.StringIO(text), skipinitialspace=True)
+    faults: list[Fault] = []
+    references: list[Reference] = []
+    header: list[str] = []
+    for cells in reader:
+        if not any(cell.strip() for cell in cells):
+            continue
+        if not header:
+            header = [cell.strip() for cell in cells]
+            known = (*COLUMNS, *CONDITIONS)
+            hint = "Separate columns by commas" if ";" in "".join(cells) or "\t" in "".join(cells) else ""
+            for name in COLUMNS:
+                if name not in header:
+                    expected = f"the columns {', '.join(COLUMNS)}"
+                    faults.append(Fault(file, str(reader.line_num), f"no column {name}", expected, hint))
+            for index, name in enumerate(header):
+                if name not in known or name in header[:index]:
+                    got = f"column {name!r}" + (" twice" if name in header[:index] else "")
+                    where = f"{reader.line_num}:{index + 1}"
+                    faults.append(Fault(file, where, got, f"one of {', '.join(known)}", hint or _near(name, known)))
+            if faults:
+                raise InputError(faults)
+            continue
+        if len(cells) != len(header):
+            got = f"{len(cells)} cells"
+            hint = "Quote cells that hold a comma" if len(cells) > len(header) else "Write empty cells too"
+            faults.append(Fault(file, str(reader.line_num), got, f"{len(header)} cells", hint))
+            continue
+        reference = _reference(_Row(file, reader.line_num, header, cells, faults), source.sha256)
+        if reference:
+            references.append(reference)
+    faults.extend(_pair_faults(file, references))
+    if not references and not faults:
+        faults.append(Fault(file, "", "no rows", "one recorded value or more", ""))
+    if faults:
+        raise InputError(faults)
+    return references
+
+
+def to_series(references: Iterable[Reference], name: str) -> list[Series]:
+    """Group references into series, one per kind and source.
+
+    Parameters
+    ----------
+    references : iterable of Reference
+        As read.
+    name : str
+        Name of the case.
+
+    Returns
+    -------
+    list of Series
+        Each point is one condition; conditions that the file leaves open stay NaN. Two values of one quantity at one
+        condition make two points.
+    """
+    groups: dict[tuple[str, str], list[dict[str, Reference]]] = {}
+    for ref in references:
+        points = groups.setdefault((ref.kind, ref.source), [])
+        for point in points:
+            first = next(iter(point.values()))
+            if ref.channel not in point and first.condition == ref.condition:
+                point[ref.channel] = ref
+                break
+        else:
+            points.append({ref.channel: ref})
+    out = []
+    for (kind, source), points in groups.items():
+        firsts = [next(iter(point.values())) for point in points]
+        channels = dict.fromkeys(channel for point in points for channel in point)
+        values = {c: np.array([p[c].value if c in p else math.nan for p in points]) for c in channels}
+        u = {c: np.array([p[c].u if c in p else math.nan for p in points]) for c in channels}
+        for column in CONDITIONS:
+            condition = np.array([getattr(first, column) for first in firsts])
+            if column not in values and not np.all(np.isnan(condition)):
+                values[column] = condition
+        remarks = dict.fromkeys(ref.remark for point in points for ref in point.values() if ref.remark)
+        provenance = {
+            "source": source, "file": firsts[0].where.rsplit(":", 1)[0], "sha256": firsts[0].sha256,
+            "remark": "; ".join(remarks),
+        }  # fmt: skip
+        labels = tuple(first.where for first in firsts)
+        out.append(Series(kind, name, values, u, (), provenance, labels))
+    return out

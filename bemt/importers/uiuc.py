@@ -1,0 +1,380 @@
+r"""UIUC Propeller Database: geometry, static runs and advance-ratio runs (volumes 1-4).
+
+Every file is a table under one header line, blank separated::
+
+    r/R c/R beta        geometry: radius and chord over tip radius, blade angle [deg]
+    RPM CT CP           static run
+    J CT CP eta         run over the advance ratio; the rpm is the last number of the file name
+    r/R t/c             thickness ratio (``nr640_thick.txt``)
+
+Coefficients are in the propeller convention: CT = T/(rho n^2 D^4), CP = P/(rho n^3 D^5), n in rev/s, J = V/(n D).
+What the names say, and by which rules, is in :mod:`bemt.importers._uiuc_names`.
+
+Geometry of a propeller, first rule that applies (``geometry.origin``):
+
+* ``own``: its ``_geom`` file;
+* ``shared``: 3- and 4-blade variants (``_3b``) carry the blades of the 2-blade propeller of the same name;
+* ``rotated``: pitch variants of the 3D-printed families (``da4002``, ``da4022``, ``da4052``, ``nr640``) are the tested
+  blade of the same family and diameter, nearest in nominal angle at r/R = 0.75 and turned by the difference (the site
+  heads ``da4052_9x4.76`` as "-5 deg" of 9x6.75, and ``nr640_9_20deg`` beside 15 deg);
+* ``design``: the family's design file (``da4002_geom``), turned likewise; its stations begin at r/R = 0.30.
+
+Other families never lend geometry: their sizes are other moulds.
+
+References
+----------
+J.B. Brandt, R.W. Deters, G.K. Ananda, O.D. Dantsker, M.S. Selig, UIUC Propeller Database, Vols 1-4, University of
+Illinois at Urbana-Champaign, archive of 27 June 2022. R.W. Deters, G.K. Ananda, M.S. Selig, "Reynolds Number Effects on
+the Performance of Small-Scale Propellers", AIAA 2014-2151, 2014.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bemt.errors import Fault, InputError
+from bemt.importers import HEAD_BYTES
+from bemt.importers._uiuc_names import FAMILIES, VARIABLE_PITCH, UiucFile, UiucName, parse_file_name
+from bemt.importers._uiuc_tables import (
+    UiucGeometry,
+    UiucLine,
+    UiucStatic,
+    UiucThickness,
+    read_geometry,
+    read_line,
+    read_static,
+    read_thickness,
+    role_of,
+    sniff,
+)
+from bemt.series import Series
+
+__all__ = [
+    "KIND", "SOURCE", "UiucFolder", "UiucGeometry", "UiucLine", "UiucPropeller", "UiucStatic", "UiucThickness",
+    "read", "read_folder", "read_geometry", "read_line", "read_static", "read_thickness", "scan_folder", "sniff",
+    "sniff_folder", "to_series",
+]  # fmt: skip
+
+KIND = "uiuc"
+SOURCE = "UIUC Propeller Database (Brandt, Deters, Ananda, Dantsker, Selig), archive of 27 June 2022"
+
+_READERS: dict[str, Callable[[Path], Any]] = {
+    "geom": read_geometry, "static": read_static, "line": read_line, "thick": read_thickness,
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class UiucPropeller:
+    """One propeller of the archive with all its data.
+
+    Parameters
+    ----------
+    name, family, label, folder : str
+        ``apce_10x5``, ``apce``, "APC Thin Electric", folder that holds the files.
+    diameter_in, pitch_in : float, float or None
+        Nominal, see the module notes. [in]
+    angle_deg : float or None
+        Nominal blade angle at r/R = 0.75. [deg]
+    blades, rotation, specimen : int
+        Number of blades, +1 tractor or -1 pusher, specimen.
+    blades_from : str
+        ``name``, ``family`` or ``default`` (2).
+    geometry : UiucGeometry or None
+        Stations, from this or a related propeller (``geometry.origin``).
+    thickness : UiucThickness or None
+        Thickness of its family, if published.
+    statics, lines : tuple
+        Static runs; advance-ratio runs ascending in rpm.
+    """
+
+    name: str
+    family: str
+    label: str
+    folder: str
+    diameter_in: float
+    pitch_in: float | None
+    angle_deg: float | None
+    blades: int
+    blades_from: str
+    rotation: int
+    specimen: int
+    geometry: UiucGeometry | None
+    thickness: UiucThickness | None
+    statics: tuple[UiucStatic, ...]
+    lines: tuple[UiucLine, ...]
+
+    @property
+    def diameter_m(self) -> float:
+        """Nominal diameter. [m]."""
+        return self.diameter_in * 0.0254
+
+    @property
+    def static(self) -> UiucStatic | None:
+        """All static points as one table, or None; files joined by ``+``."""
+        if len(self.statics) < 2:
+            return self.statics[0] if self.statics else None
+        tables = self.statics
+        return UiucStatic(
+            "+".join(t.file for t in tables), "+".join(t.sha256 for t in tables), sum((t.rows for t in tables), ()),
+            sum((t.flags for t in tables), ()), np.concatenate([t.rpm for t in tables]),
+            np.concatenate([t.CT for t in tables]), np.concatenate([t.CP for t in tables]),
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class UiucFolder:
+    """Outcome of a scan: propellers, what was refused (``faults``), and other files with the reason (``ignored``)."""
+
+    propellers: tuple[UiucPropeller, ...]
+    faults: tuple[Fault, ...]
+    ignored: tuple[tuple[str, str], ...]
+
+
+def _files(path: Path) -> Iterator[Path]:
+    """Files below a folder in a fixed order, hidden ones left out."""
+    for file in sorted(path.rglob("*")):
+        if file.is_file() and not any(part.startswith(".") for part in file.relative_to(path).parts):
+            yield file
+
+
+def _head(file: Path) -> bytes:
+    with file.open("rb") as stream:
+        return stream.read(HEAD_BYTES)
+
+
+def sniff_folder(path: Path) -> bool:
+    """Tell whether a folder, or one below it, holds a table of this archive.
+
+    Parameters
+    ----------
+    path : path
+        Folder.
+
+    Returns
+    -------
+    bool
+        True from the first such file on.
+    """
+    return any(sniff(_head(file)) for file in _files(path))
+
+
+def _choose_geometry(name: UiucName, own: Mapping[str, tuple[UiucName, UiucGeometry]]) -> UiucGeometry | None:
+    """Geometry of one propeller by the four rules of the module notes."""
+    if name.name in own:
+        return own[name.name][1]
+    two_blade = re.sub(r"_\d+b(l|lades?)?(?=_|$)", "", name.name, flags=re.IGNORECASE)
+    if two_blade in own and two_blade != name.family:
+        return replace(own[two_blade][1], origin="shared")
+    if name.family.lower() not in VARIABLE_PITCH or name.angle_deg is None:
+        return None
+    tested = [
+        (abs(other.angle_deg - name.angle_deg), other.name, name.angle_deg - other.angle_deg, geometry)
+        for other, geometry in own.values()
+        if other.family == name.family and other.angle_deg is not None and other.diameter_in == name.diameter_in
+    ]
+    if tested:
+        _, _, turn, geometry = min(tested, key=lambda row: row[:2])
+        origin = "rotated"
+    elif name.family in own:
+        geometry, origin = own[name.family][1], "design"
+        turn = name.angle_deg - float(np.interp(0.75, geometry.r_R, geometry.beta_deg))
+    else:
+        return None
+    return replace(geometry, beta_deg=geometry.beta_deg + turn, origin=origin, rotation_deg=turn)
+
+
+def _collect(files: list[tuple[Path, UiucFile]], faults: list[Fault]) -> Iterator[UiucPropeller]:
+    """Read the files of one folder and join them to propellers; faults are appended."""
+    parts: dict[str, dict[str, list[Any]]] = defaultdict(lambda: defaultdict(list))
+    names: dict[str, UiucName] = {}
+    counts: dict[str, int] = defaultdict(int)
+    for file, told in files:
+        name = told.propeller
+        names[name.name] = name
+        counts[name.name] += 1
+        if name.faults:
+            continue
+        try:
+            table = _READERS[told.role](file)
+        except InputError as error:
+            faults.extend(error.faults)
+            parts[name.name]["refused"].append(told.role)
+            continue
+        if told.role in ("geom", "thick") and parts[name.name][told.role]:
+            got = f"a second {told.role} table for {name.name}"
+            faults.append(Fault(os.fspath(file), "", got, "one", f"{parts[name.name][told.role][0].file} is used"))
+            continue
+        parts[name.name][told.role].append(table)
+    own = {key: (names[key], found["geom"][0]) for key, found in parts.items() if found["geom"]}
+    for key, name in sorted(names.items()):
+        folder = os.fspath(next(file for file, told in files if told.propeller.name == key).parent)
+        if name.faults:
+            where = f"{folder}/{key}_* ({counts[key]} files)"
+            faults.extend(Fault(where, "name", *fault) for fault in name.faults)
+            continue
+        if key == name.family or name.diameter_in is None:  # the design of a family is no propeller of its own
+            continue
+        found = parts[key]
+        if not (found["geom"] or found["static"] or found["line"]):
+            continue
+        thickness = found["thick"] or parts[name.family]["thick"] if name.family in parts else found["thick"]
+        yield UiucPropeller(
+            name=key, family=name.family, label=FAMILIES.get(name.family.lower(), name.family), folder=folder,
+            diameter_in=name.diameter_in, pitch_in=name.pitch_in, angle_deg=name.angle_deg, blades=name.blades,
+            blades_from=name.blades_from, rotation=name.rotation, specimen=name.specimen,
+            # a refused geometry is not quietly replaced by another
+            geometry=None if "geom" in found["refused"] else _choose_geometry(name, own),
+            thickness=thickness[0] if thickness else None, statics=tuple(found["static"]),
+            lines=tuple(sorted(found["line"], key=lambda line: (line.rpm, line.file))),
+        )  # fmt: skip
+
+
+def scan_folder(path: str | os.PathLike[str]) -> UiucFolder:
+    """Import a folder in the archive's layout, keeping what is sound and naming what is not.
+
+    Parameters
+    ----------
+    path : str or path
+        Folder; folders below it are read too, each for itself (``volume-1/data`` and ``volume-2/data`` share nothing).
+
+    Returns
+    -------
+    UiucFolder
+        Propellers by folder and name, faults, ignored files. Every file ends in one of the three.
+
+    Raises
+    ------
+    InputError
+        When the folder does not exist.
+    """
+    root = Path(path)
+    if not root.is_dir():
+        raise InputError(Fault(os.fspath(path), "", "no folder", "a folder in UIUC layout", "Check the path"))
+    faults: list[Fault] = []
+    ignored: list[tuple[str, str]] = []
+    folders: dict[Path, list[tuple[Path, UiucFile]]] = defaultdict(list)
+    for file in _files(root):
+        head, told = _head(file), parse_file_name(file.stem)
+        if b"\0" in head or head.startswith((b"%PDF", b"%!PS")):
+            ignored.append((os.fspath(file), "binary"))
+        elif told is not None:
+            folders[file.parent].append((file, told))
+        elif role_of(head) is not None:
+            expected = "a name such as apce_10x5_geom, apce_10x5_static_kt0827 or apce_10x5_kt0828_4014"
+            hint = "Diameter and rpm are read from the name"
+            faults.append(Fault(os.fspath(file), "", f"name {file.stem!r}", expected, hint))
+        else:
+            ignored.append((os.fspath(file), "neither name nor header of this archive"))
+    propellers = [p for folder in sorted(folders) for p in _collect(folders[folder], faults)]
+    return UiucFolder(tuple(propellers), tuple(faults), tuple(ignored))
+
+
+def read_folder(path: str | os.PathLike[str]) -> list[UiucPropeller]:
+    """Import a folder in the archive's layout; refuse it whole when a file of it is faulty.
+
+    Parameters
+    ----------
+    path : str or path
+        Folder, see :func:`scan_folder`, which keeps the sound part instead.
+
+    Returns
+    -------
+    list of UiucPropeller
+        By folder and name.
+
+    Raises
+    ------
+    InputError
+        With all faults of all files, or when there is no propeller.
+    """
+    folder = scan_folder(path)
+    if folder.faults:
+        raise InputError(folder.faults)
+    if not folder.propellers:
+        hint = "File names such as apce_10x5_geom.txt are expected"
+        raise InputError(Fault(os.fspath(path), "", "no propellers", "files in UIUC layout", hint))
+    return list(folder.propellers)
+
+
+def read(path: str | os.PathLike[str]) -> Any:
+    """Read a folder (list of propellers) or one table of the archive, by its header.
+
+    Parameters
+    ----------
+    path : str or path
+        File or folder.
+
+    Returns
+    -------
+    list of UiucPropeller, UiucGeometry, UiucStatic, UiucLine or UiucThickness
+        What is there.
+
+    Raises
+    ------
+    InputError
+        With all faults.
+    """
+    target = Path(path)
+    if target.is_dir():
+        return read_folder(target)
+    try:
+        role = role_of(_head(target))
+    except OSError as error:
+        raise InputError(Fault(os.fspath(path), "", error.strerror or "unreadable", "a readable file")) from error
+    if role is None:
+        expected = "one of the headers r/R c/R beta, RPM CT CP, J CT CP eta, r/R t/c"
+        raise InputError(Fault(os.fspath(path), "1", "no header of this archive", expected))
+    return _READERS[role](target)
+
+
+def to_series(propeller: UiucPropeller) -> Series:
+    """All measured points of one propeller as a series of kind ``bench``.
+
+    Parameters
+    ----------
+    propeller : UiucPropeller
+        A propeller with static or advance-ratio runs.
+
+    Returns
+    -------
+    Series
+        Channels rpm, J, CT, CP, eta; static points have J = 0 and eta = 0. The archive states no uncertainty per point:
+        ``u`` is NaN (unknown). ``labels`` are ``file:row``.
+
+    Raises
+    ------
+    InputError
+        When the propeller has geometry only.
+    """
+    columns: dict[str, list[Any]] = {"rpm": [], "J": [], "CT": [], "CP": [], "eta": []}
+    flags: list[tuple[str, ...]] = []
+    labels: list[str] = []
+    hashes: dict[str, str] = {}
+    runs: list[UiucStatic | UiucLine] = [*propeller.statics, *propeller.lines]
+    for run in runs:
+        zero = np.zeros_like(run.CT)
+        J, eta = (run.J, run.eta) if isinstance(run, UiucLine) else (zero, zero)
+        rows = (zero + run.rpm, J, run.CT, run.CP, eta)
+        for column, array in zip(columns.values(), rows, strict=True):
+            column.append(array)
+        name = Path(run.file).name
+        flags += run.flags
+        labels += [f"{name}:{row}" for row in run.rows]
+        hashes[name] = run.sha256
+    if not hashes:
+        fault = Fault(propeller.folder, propeller.name, "geometry only", "a static or advance-ratio run")
+        raise InputError(fault)
+    values = {name: np.concatenate(arrays) for name, arrays in columns.items()}
+    provenance = {
+        "source": SOURCE, "file": propeller.folder, "sha256": hashes,
+        "remark": f"coefficients on the true diameter; nominal {propeller.diameter_in:g} in",
+    }  # fmt: skip
+    return Series("bench", propeller.name, values, {}, tuple(flags), provenance, tuple(labels))

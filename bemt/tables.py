@@ -1,0 +1,278 @@
+"""Tables: aligned text for terminals, CSV rows, a fast CSV block for large grids, JSON, and files that appear whole."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["csv_block", "csv_text", "json_text", "number_text", "plain", "remove_stale", "text_table", "write_atomic"]
+
+DIGITS = 7
+_POWERS = 10.0 ** np.arange(0, 23)
+
+
+def number_text(value: float | None, digits: int = 4, none: str = "-") -> str:
+    """Show a number with some significant digits, without exponent where that is short.
+
+    Parameters
+    ----------
+    value : float or None
+        Number; None and NaN give `none`.
+    digits : int
+        Significant digits.
+    none : str
+        Text for a missing value.
+
+    Returns
+    -------
+    str
+        The number.
+
+    Examples
+    --------
+    >>> number_text(24.0851), number_text(0.110419), number_text(123456.0), number_text(None), number_text(0.0)
+    ('24.09', '0.1104', '123500', '-', '0')
+    """
+    if value is None or math.isnan(value):
+        return none
+    if value == 0 or not math.isfinite(value):
+        return f"{value:g}"
+    magnitude = math.floor(math.log10(abs(float(f"{value:.{digits - 1}e}"))))
+    if not -4 <= magnitude <= 8:
+        return f"{value:.{digits - 1}e}"
+    rounded = round(value, digits - 1 - magnitude)
+    return f"{rounded:.{max(digits - 1 - magnitude, 0)}f}"
+
+
+def plain(value: Any, digits: int = 10) -> Any:
+    """Make a value fit for JSON: NaN and infinities become None, floats keep some significant digits.
+
+    Parameters
+    ----------
+    value : object
+        Numbers, texts, mappings, sequences, numpy scalars and arrays of them.
+    digits : int
+        Significant digits.
+
+    Returns
+    -------
+    object
+        Dictionaries, lists, texts, numbers, booleans, None.
+
+    Examples
+    --------
+    >>> plain({"a": (1, 0.1 + 0.2, float("nan"))})
+    {'a': [1, 0.3, None]}
+    """
+    if isinstance(value, Mapping):
+        return {str(key): plain(item, digits) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist(), digits)
+    if isinstance(value, (list, tuple)):
+        return [plain(item, digits) for item in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float):
+        return float(f"{value:.{digits}g}") if math.isfinite(value) else None
+    return value
+
+
+def json_text(document: Any) -> str:
+    """Give a JSON text that depends on nothing but the document.
+
+    Parameters
+    ----------
+    document : object
+        As `plain` takes it.
+
+    Returns
+    -------
+    str
+        Indented, keys in their order, ends with a newline.
+    """
+    return json.dumps(plain(document), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def text_table(header: Sequence[str], rows: Iterable[Sequence[str]], left: Iterable[int] = (0,), indent: str = "") -> str:
+    """Align columns.
+
+    Parameters
+    ----------
+    header : sequence of str
+        Column names.
+    rows : iterable of sequence of str
+        Cells.
+    left : iterable of int
+        Columns to align left; the others go right.
+    indent : str
+        Put before every line.
+
+    Returns
+    -------
+    str
+        Lines without a newline at the end.
+
+    Examples
+    --------
+    >>> print(text_table(["source", "T [N]"], [["bemt", "31.2"], ["cfd", "5"]]))
+    source  T [N]
+    bemt     31.2
+    cfd         5
+    """
+    body = [list(map(str, header)), *[list(map(str, row)) for row in rows]]
+    widths = [max(len(row[i]) for row in body) for i in range(len(header))]
+    to_left = set(left)
+    lines = []
+    for row in body:
+        cells = [c.ljust(w) if i in to_left else c.rjust(w) for i, (c, w) in enumerate(zip(row, widths, strict=True))]
+        lines.append((indent + "  ".join(cells)).rstrip())
+    return "\n".join(lines)
+
+
+def csv_text(columns: Sequence[str], rows: Iterable[Mapping[str, Any]]) -> str:
+    """Give rows as CSV; lists are joined by "; ", missing values are empty.
+
+    Parameters
+    ----------
+    columns : sequence of str
+        Header.
+    rows : iterable of mapping
+        Rows; further keys are left out.
+
+    Returns
+    -------
+    str
+        Text with LF line ends.
+    """
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(columns)
+    for row in rows:
+        cells = []
+        for name in columns:
+            value = plain(row.get(name))
+            cells.append("" if value is None else "; ".join(map(str, value)) if isinstance(value, list) else value)
+        writer.writerow(cells)
+    return out.getvalue()
+
+
+def _axis_cells(values: NDArray[np.float64], index: NDArray[np.intp]) -> NDArray[np.uint8]:
+    """Cells of a column that takes few values, in their shortest form, (n, width) bytes padded by zeros."""
+    texts = np.array([f"{v:.12g}".encode() for v in values])
+    cells: NDArray[np.uint8] = texts[index].view(np.uint8).reshape(index.size, -1)
+    return cells
+
+
+def _value_cells(values: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Cells of real numbers with 7 significant digits, d.dddddde+dd, (n, 13) bytes padded by zeros."""
+    v = np.asarray(values, dtype=float)
+    size = np.abs(v)
+    odd = ~np.isfinite(v)
+    zero = ~odd & (size < 1e-99)
+    safe = np.where(odd | zero, 1.0, size)
+    exponent = np.floor(np.log10(safe)).astype(np.int64)
+
+    def mantissa(e: NDArray[np.int64]) -> NDArray[np.int64]:
+        shift = DIGITS - 1 - e
+        near = np.abs(shift) <= 22
+        power = np.where(near, _POWERS[np.minimum(np.abs(shift), 22)], 10.0 ** np.abs(shift).astype(float))
+        return np.rint(np.where(shift >= 0, safe * power, safe / power)).astype(np.int64)
+
+    m = mantissa(exponent)
+    top = 10**DIGITS
+    exponent += np.where(m >= top, 1, np.where(m < top // 10, -1, 0))
+    m = np.minimum(mantissa(exponent), top - 1)
+    m = np.where(zero, 0, m).astype(np.int32)
+    exponent = np.where(zero, 0, exponent)
+    out = np.zeros((v.size, DIGITS + 6), dtype=np.uint8)
+    out[:, 0] = np.where((v < 0) & ~zero, ord("-"), 0)
+    for k in range(DIGITS):
+        m, digit = np.divmod(m, 10)
+        out[:, 1 if k == DIGITS - 1 else DIGITS + 1 - k] = digit + 48
+    out[:, 2] = ord(".")
+    out[:, DIGITS + 2] = ord("e")
+    out[:, DIGITS + 3] = np.where(exponent < 0, ord("-"), ord("+"))
+    tens, ones = np.divmod(np.minimum(np.abs(exponent), 99), 10)
+    out[:, DIGITS + 4] = tens + 48
+    out[:, DIGITS + 5] = ones + 48
+    if odd.any():
+        out[odd] = 0
+        out[odd, :3] = np.frombuffer(b"nan", dtype=np.uint8)
+        out[np.isinf(v), :3] = np.frombuffer(b"inf", dtype=np.uint8)
+        out[np.isneginf(v), :4] = np.frombuffer(b"-inf", dtype=np.uint8)
+    return out
+
+
+def csv_block(columns: Sequence[NDArray[Any] | tuple[NDArray[np.float64], NDArray[np.intp]]]) -> bytes:
+    """Format many rows of numbers as CSV, about ten times faster than a loop.
+
+    Parameters
+    ----------
+    columns : sequence
+        Each a float (n,) array (7 significant digits), a bool (n,) array (0 or 1), or a pair (values, index) for a
+        column that takes few values (shortest form).
+
+    Returns
+    -------
+    bytes
+        n lines without a header.
+
+    Examples
+    --------
+    >>> axis = (np.array([5000.0, 20000.0]), np.array([0, 1]))
+    >>> print(csv_block([axis, np.array([-1.5, np.nan]), np.array([True, False])]).decode(), end="")
+    5000,-1.500000e+00,1
+    20000,nan,0
+    """
+    blocks: list[NDArray[np.uint8]] = []
+    for i, column in enumerate(columns):
+        if isinstance(column, tuple):
+            cells = _axis_cells(*column)
+        elif column.dtype == np.bool_:
+            cells = (column[:, None] + 48).astype(np.uint8)
+        else:
+            cells = _value_cells(column)
+        mark = ord("\n") if i == len(columns) - 1 else ord(",")
+        blocks += [cells, np.full((len(cells), 1), mark, dtype=np.uint8)]
+    page = np.hstack(blocks).ravel()
+    return page[page != 0].tobytes()
+
+
+def write_atomic(path: Path, data: bytes | str) -> None:
+    """Write a file under a temporary name and rename it, so that no half file is ever seen.
+
+    Parameters
+    ----------
+    path : Path
+        Target; its folder is made.
+    data : bytes or str
+        Content; text is written as UTF-8.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        temporary.write_bytes(data.encode() if isinstance(data, str) else data)
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def remove_stale(folder: Path) -> None:
+    """Remove what an interrupted run left behind.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of results; it need not exist.
+    """
+    for leftover in folder.glob(".*.tmp"):
+        leftover.unlink(missing_ok=True)

@@ -1,0 +1,277 @@
+"""Units: SI and radians inside, every other unit named by a suffix.
+
+The suffix of a key says its unit (``diameter_in``, ``thrust_kgf``, ``temperature_C``), and the table `UNITS` is the
+only place that knows the factors.  Nothing here guesses: an unknown suffix is an error, never a silent conversion.
+
+References
+----------
+.. [1] A. Thompson, B. N. Taylor, "Guide for the Use of the International System of Units", NIST SP 811, 2008,
+       appendix B (factors in bold there are exact; inch, pound, standard gravity and horsepower follow from them).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeVar
+
+from bemt.errors import Fault, InputError
+
+if TYPE_CHECKING:  # numpy is not needed here, and its import would slow `python -m bemt --help`
+    import numpy as np
+    from numpy.typing import NDArray
+
+Numeric = TypeVar("Numeric", float, "NDArray[np.float64]")
+
+G0 = 9.80665
+"""Standard gravity [m/s2], exact; also newtons per kilogram-force."""
+KGF = 9.80665
+"""Newtons per kilogram-force [N/kgf], exact."""
+INCH = 0.0254
+"""Metres per inch [m/in], exact."""
+FOOT = 0.3048
+"""Metres per foot [m/ft], exact."""
+POUND = 0.45359237
+"""Kilograms per avoirdupois pound [kg/lb], exact."""
+LBF = POUND * G0
+"""Newtons per pound-force [N/lbf], exact."""
+OZF = LBF / 16.0
+"""Newtons per ounce-force [N/ozf], exact."""
+HP = 550.0 * FOOT * LBF
+"""Watts per mechanical horsepower, 550 ft lbf/s [W/hp]."""
+KNOT = 1852.0 / 3600.0
+"""Metres per second in a knot [(m/s)/kt], exact."""
+MPH = 1609.344 / 3600.0
+"""Metres per second in a mile per hour [(m/s)/mph], exact."""
+RPM = 2.0 * math.pi / 60.0
+"""Radians per second in one revolution per minute [(rad/s)/rpm]."""
+DEG = math.pi / 180.0
+"""Radians per degree [rad/deg]."""
+ZERO_CELSIUS = 273.15
+"""Kelvin at zero degrees Celsius [K], exact."""
+
+
+@dataclass(frozen=True)
+class Unit:
+    """One unit: ``si = value * factor + offset``.
+
+    Attributes
+    ----------
+    suffix : str
+        As written at the end of a key.
+    dimension : str
+        Kind of quantity, such as ``length`` or ``force``.
+    factor : float
+        SI units per one of this unit.
+    offset : float
+        Added after the factor; non-zero for temperatures only. [K]
+    """
+
+    suffix: str
+    dimension: str
+    factor: float
+    offset: float = 0.0
+
+
+def _table() -> dict[str, Unit]:
+    groups: dict[str, dict[str, float]] = {
+        "length": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "km": 1e3, "in": INCH, "ft": FOOT},
+        "area": {"m2": 1.0, "cm2": 1e-4, "mm2": 1e-6, "in2": INCH**2},
+        "angle": {"rad": 1.0, "deg": DEG},
+        "speed": {"m_s": 1.0, "km_h": 1.0 / 3.6, "kt": KNOT, "mph": MPH, "ft_s": FOOT},
+        "angular_speed": {"rad_s": 1.0, "rpm": RPM, "rev_s": 2.0 * math.pi},
+        "mass": {"kg": 1.0, "g": 1e-3, "lb": POUND, "oz": POUND / 16.0},
+        "density": {"kg_m3": 1.0, "g_cm3": 1e3},
+        "force": {"N": 1.0, "mN": 1e-3, "kN": 1e3, "kgf": KGF, "gf": KGF * 1e-3, "lbf": LBF, "ozf": OZF},
+        "torque": {"Nm": 1.0, "mNm": 1e-3, "Ncm": 1e-2, "Nmm": 1e-3, "kgf_m": KGF, "kgf_cm": KGF * 1e-2,
+                   "gf_cm": KGF * 1e-5, "lbf_in": LBF * INCH, "lbf_ft": LBF * FOOT, "ozf_in": OZF * INCH},
+        "power": {"W": 1.0, "kW": 1e3, "hp": HP},
+        "pressure": {"Pa": 1.0, "hPa": 1e2, "mbar": 1e2, "kPa": 1e3, "bar": 1e5},
+        "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0},
+        "voltage": {"V": 1.0, "mV": 1e-3},
+        "current": {"A": 1.0, "mA": 1e-3},
+        "fraction": {"pct": 1e-2},
+        "viscosity": {"Pa_s": 1.0},
+    }
+    out = {s: Unit(s, dim, f) for dim, units in groups.items() for s, f in units.items()}
+    out["K"] = Unit("K", "temperature", 1.0)
+    out["C"] = Unit("C", "temperature", 1.0, ZERO_CELSIUS)
+    out["F"] = Unit("F", "temperature", 5.0 / 9.0, ZERO_CELSIUS - 32.0 * 5.0 / 9.0)
+    return out
+
+
+UNITS: dict[str, Unit] = _table()
+"""Every known suffix and its `Unit`."""
+
+SLIP_FACTORS: dict[str, float] = {
+    "kgf <-> N": KGF,
+    "lbf <-> N": LBF,
+    "kgf <-> lbf": KGF / LBF,
+    "ozf <-> N": 1.0 / OZF,
+    "kilo (gf <-> kgf, mm <-> m)": 1000.0,
+    "inch <-> mm": 25.4,
+    "rev/min <-> rev/s": 60.0,
+    "rev/s <-> rad/s": 2.0 * math.pi,
+    "rev/min <-> rad/s": 1.0 / RPM,
+    "deg <-> rad": 1.0 / DEG,
+    "diameter <-> radius": 2.0,
+    "percent <-> fraction": 100.0,
+}
+"""Usual slips of units as pure numbers [-]; either direction.  Used to search for the cause of a wrong number."""
+
+
+def _get(unit: str) -> Unit:
+    try:
+        return UNITS[unit]
+    except KeyError:
+        raise InputError(Fault("", "unit", repr(unit), f"one of {', '.join(sorted(UNITS))}")) from None
+
+
+def to_si(value: Numeric, unit: str) -> Numeric:
+    """Convert a value to SI.
+
+    Parameters
+    ----------
+    value : float or (N,) ndarray
+        Value in `unit`.
+    unit : str
+        A suffix of `UNITS`.
+
+    Returns
+    -------
+    float or (N,) ndarray
+        Value in SI units and radians (K for temperatures).
+
+    Raises
+    ------
+    InputError
+        If the unit is unknown.
+
+    Examples
+    --------
+    >>> to_si(10.0, "in")
+    0.254
+    >>> to_si(15.0, "C")
+    288.15
+    """
+    u = _get(unit)
+    return value * u.factor + u.offset
+
+
+def from_si(value: Numeric, unit: str) -> Numeric:
+    """Convert an SI value to a unit.
+
+    Parameters
+    ----------
+    value : float or (N,) ndarray
+        Value in SI units.
+    unit : str
+        A suffix of `UNITS`.
+
+    Returns
+    -------
+    float or (N,) ndarray
+        Value in `unit`.
+
+    Raises
+    ------
+    InputError
+        If the unit is unknown.
+
+    Examples
+    --------
+    >>> round(from_si(27.0, "kgf"), 4)
+    2.7532
+    """
+    u = _get(unit)
+    return (value - u.offset) / u.factor
+
+
+def convert(value: Numeric, unit: str, to: str) -> Numeric:
+    """Convert between two units of the same dimension.
+
+    Parameters
+    ----------
+    value : float or (N,) ndarray
+        Value in `unit`.
+    unit, to : str
+        Suffixes of `UNITS`.
+
+    Returns
+    -------
+    float or (N,) ndarray
+        Value in `to`.
+
+    Raises
+    ------
+    InputError
+        If a unit is unknown or the dimensions differ.
+
+    Examples
+    --------
+    >>> round(convert(1.0, "kgf", "lbf"), 5)
+    2.20462
+    >>> convert(1.0, "kgf", "kg")
+    Traceback (most recent call last):
+        ...
+    bemt.errors.InputError: unit: got 'kgf' (force) -> 'kg' (mass); expected two units of the same dimension.
+    """
+    u, v = _get(unit), _get(to)
+    if u.dimension != v.dimension:
+        got = f"{unit!r} ({u.dimension}) -> {to!r} ({v.dimension})"
+        raise InputError(Fault("", "unit", got, "two units of the same dimension"))
+    return from_si(to_si(value, unit), to)
+
+
+def split_suffix(key: str) -> tuple[str, Unit | None]:
+    """Split a key into its name and its unit.
+
+    The longest suffix wins, so ``speed_m_s`` is metres per second and not seconds.
+
+    Parameters
+    ----------
+    key : str
+        Such as ``diameter_in``.
+
+    Returns
+    -------
+    name : str
+        Key without its suffix.
+    unit : Unit or None
+        None when no known suffix ends the key.
+
+    Examples
+    --------
+    >>> name, unit = split_suffix("airspeed_m_s")
+    >>> name, unit.dimension
+    ('airspeed', 'speed')
+    >>> split_suffix("blades")
+    ('blades', None)
+    """
+    parts = key.split("_")
+    for start in range(1, len(parts)):
+        suffix = "_".join(parts[start:])
+        if suffix in UNITS:
+            return "_".join(parts[:start]), UNITS[suffix]
+    return (key, UNITS[key]) if key == "rpm" else (key, None)
+
+
+def suffixes(dimension: str) -> tuple[str, ...]:
+    """List the suffixes of a dimension, SI first.
+
+    Parameters
+    ----------
+    dimension : str
+        Such as ``length``.
+
+    Returns
+    -------
+    tuple of str
+        Empty when the dimension is unknown.
+
+    Examples
+    --------
+    >>> suffixes("angle")
+    ('rad', 'deg')
+    """
+    return tuple(s for s, u in UNITS.items() if u.dimension == dimension)

@@ -1,0 +1,5 @@
+"""Parametric shapes of propellers and ducted fans: pure geometry, no aerodynamics.
+
+Lengths in metres, angles in radians; other units carry a suffix.
+Submodules: ``airfoil``, ``blade``, ``rotor``, ``duct``.
+"""

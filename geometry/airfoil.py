@@ -1,0 +1,623 @@
+"""Section coordinates: NACA families, thin plates, Selig and Lednicer files, blending and repanelling.
+
+Every section is an :class:`Airfoil`: a closed loop in Selig order (trailing edge, upper side, leading edge, lower
+side, trailing edge) with unit chord along +x and the suction side of a lifting section at +y.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+__all__ = ["Airfoil", "GeometryError", "blend", "naca", "naca4", "parse_dat", "pchip", "plate"]
+
+
+class GeometryError(ValueError):
+    """Bad geometry input: every fault found at once.
+
+    Parameters
+    ----------
+    faults : sequence of tuple of str
+        ``(where, got, expected, hint)`` each; the hint may be empty.
+
+    Examples
+    --------
+    >>> print(GeometryError([("chord", "-0.01 m", "a positive number", "Drop the sign")]))
+    chord: got -0.01 m; expected a positive number. Drop the sign.
+    """
+
+    def __init__(self, faults: Sequence[tuple[str, str, str, str]]) -> None:
+        self.faults: tuple[tuple[str, str, str, str], ...] = tuple(faults)
+        lines = []
+        for where, got, expected, hint in self.faults:
+            tail = f" {hint.rstrip('.')}" + ("" if hint.endswith("?") else ".") if hint else ""
+            lines.append(f"{where}: got {got}; expected {expected}.{tail}")
+        super().__init__("\n".join(lines))
+
+    def __reduce__(self) -> tuple[type[GeometryError], tuple[tuple[tuple[str, str, str, str], ...]]]:
+        """Pickle by the faults (worker processes send errors back)."""
+        return (type(self), (self.faults,))
+
+
+class Faults:
+    """Collects faults, then raises them together.
+
+    Examples
+    --------
+    >>> faults = Faults()
+    >>> faults.number("gap", -1.0, 0.0, 1.0, "m")
+    >>> faults.found
+    [('gap', '-1 m', 'a number from 0 to 1 m', '')]
+    """
+
+    def __init__(self) -> None:
+        self.found: list[tuple[str, str, str, str]] = []
+
+    def add(self, where: str, got: str, expected: str, hint: str = "") -> None:
+        """Note one fault."""
+        self.found.append((where, got, expected, hint))
+
+    def number(self, where: str, value: float, low: float, high: float, unit: str = "", hint: str = "") -> None:
+        """Note a fault unless ``low <= value <= high``; infinite bounds are open, NaN always fails."""
+        if low <= value <= high and math.isfinite(value):
+            return
+        unit = f" {unit}" if unit else ""
+        span = f"from {low:g} to {high:g}" if math.isfinite(high) else f"of {low:g} or more"
+        self.add(where, f"{value:g}{unit}", f"a number {span}{unit}", hint)
+
+    def check(self) -> None:
+        """Raise all faults noted so far, if any."""
+        if self.found:
+            raise GeometryError(self.found)
+
+
+def frozen(values: ArrayLike) -> Array:
+    """Return a read-only float copy."""
+    out = np.array(values, dtype=np.float64)
+    out.flags.writeable = False
+    return out
+
+
+def pchip_slopes(x: Array, y: Array) -> Array:
+    """Return the PCHIP slopes of columns y (N, k) at the strictly ascending abscissae x (N,), N >= 2."""
+    h = np.diff(x)[:, None]
+    d = np.diff(y, axis=0) / h
+    if len(x) == 2:
+        return np.asarray(np.vstack([d, d]), dtype=np.float64)
+    m = np.zeros_like(y)
+    h0, h1, d0, d1 = h[:-1], h[1:], d[:-1], d[1:]
+    w0, w1 = 2 * h1 + h0, h1 + 2 * h0
+    same = d0 * d1 > 0
+    safe0, safe1 = np.where(same, d0, 1.0), np.where(same, d1, 1.0)
+    m[1:-1] = np.where(same, (w0 + w1) / (w0 / safe0 + w1 / safe1), 0.0)
+    for end, a, b in ((0, 0, 1), (-1, -1, -2)):
+        s = ((2 * h[a] + h[b]) * d[a] - h[a] * d[b]) / (h[a] + h[b])
+        s = np.where(s * d[a] <= 0, 0.0, s)
+        m[end] = np.where((d[a] * d[b] <= 0) & (np.abs(s) > 3 * np.abs(d[a])), 3 * d[a], s)
+    return m
+
+
+def pchip(x: Array, y: Array, xq: ArrayLike, slopes: Array | None = None) -> Array:
+    """Interpolate monotone-preserving (PCHIP), clamped to the end values outside the data.
+
+    Parameters
+    ----------
+    x : (N,) float
+        Strictly ascending abscissae, N >= 2.
+    y : (N,) or (N, k) float
+        Ordinates; columns are interpolated independently.
+    xq : (...) float
+        Where to interpolate.
+    slopes : (N, k) float or None
+        Result of :func:`pchip_slopes`, to save its time.
+
+    Returns
+    -------
+    (...) or (..., k) float
+        Interpolated values.
+
+    Notes
+    -----
+    Weighted harmonic mean slopes, one-sided three-point ends: what ``scipy.interpolate.PchipInterpolator`` does,
+    without its half-second import. Overshoots nowhere; second order at data extrema, third order elsewhere.
+
+    References
+    ----------
+    F. N. Fritsch and J. Butland, A method for constructing local monotone piecewise cubic interpolants, SIAM J. Sci.
+    Stat. Comput. 5 (1984) 300-304, doi:10.1137/0905021 (slope formula; not checked against the paper).
+
+    Examples
+    --------
+    >>> pchip(np.array([0.0, 1.0, 2.0]), np.array([0.0, 1.0, 1.0]), [-1.0, 0.5, 1.5, 9.0]).tolist()
+    [0.0, 0.6875, 1.0, 1.0]
+    """
+    y2 = y.reshape(len(x), -1)
+    m = pchip_slopes(x, y2) if slopes is None else slopes
+    q = np.clip(np.asarray(xq, dtype=np.float64), x[0], x[-1])
+    flat = q.ravel()
+    i = np.clip(np.searchsorted(x, flat, side="right") - 1, 0, len(x) - 2)
+    h = (x[i + 1] - x[i])[:, None]
+    t = (flat - x[i])[:, None] / h
+    rise, m0, m1 = y2[i + 1] - y2[i], h * m[i], h * m[i + 1]
+    out = y2[i] + t * (m0 + t * (3 * rise - 2 * m0 - m1 + t * (m0 + m1 - 2 * rise)))
+    return np.asarray(out.reshape(q.shape + y.shape[1:]), dtype=np.float64)
+
+
+def _spaced(n: int) -> Array:
+    """Chord fractions 0..1 with half-cosine spacing, n points."""
+    out: Array = 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, n)))
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class Airfoil:
+    """A section with unit chord; arrays are read-only.
+
+    Parameters
+    ----------
+    name : str
+        For people; the identity of the shape is :meth:`key`.
+    x, y : (N,) float
+        Coordinates in Selig order over the chord. [-]
+
+    Raises
+    ------
+    GeometryError
+        If the loop is not finite, not in Selig order, not of unit chord, or crosses itself.
+
+    Examples
+    --------
+    >>> section = naca4(0.04, 0.40, 0.12)
+    >>> section.name, round(section.thickness, 3), round(section.camber, 4), round(section.te_gap, 4)
+    ('naca4:0.040,0.40,0.120', 0.12, 0.04, 0.0025)
+    """
+
+    name: str
+    x: Array
+    y: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "x", frozen(self.x))
+        object.__setattr__(self, "y", frozen(self.y))
+        faults, where = Faults(), f"airfoil '{self.name}'"
+        if self.x.ndim != 1 or self.x.shape != self.y.shape or self.x.size < 7:
+            got = f"arrays x {self.x.shape} and y {self.y.shape}"
+            faults.add(where, got, "two equal 1-D arrays of 7 points or more")
+        elif not (np.isfinite(self.x).all() and np.isfinite(self.y).all()):
+            faults.add(where, "NaN or infinite coordinates", "finite numbers")
+        else:
+            chord = float(np.ptp(self.x))
+            if not 0.98 < chord < 1.02 or abs(float(self.x.min())) > 0.02:
+                hint = "Coordinates in percent or millimetres? Divide by the chord" if chord > 1.5 else ""
+                span = f"x from {self.x.min():g} to {self.x.max():g}"
+                faults.add(where, span, "x from 0 to 1 (unit chord)", hint)
+            elif self.area <= 0:
+                order = "trailing edge, upper side, leading edge, lower side"
+                faults.add(where, "points that run lower side first", order, "Reverse the list")
+            elif not 2 <= int(np.argmin(self.x)) <= self.x.size - 3:
+                faults.add(where, "a leading edge at the end of the list", "Selig order (trailing edge first and last)")
+            else:
+                s = _spaced(41)[1:-1]
+                upper, lower = self.surfaces(s)
+                if (upper < lower - 1e-6).any():
+                    at = s[int(np.argmin(upper - lower))]
+                    faults.add(where, f"a lower side above the upper side at x = {at:.3f}", "sides that do not cross")
+        faults.check()
+
+    @cached_property
+    def _sides(self) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+        """(x, y) of the upper and the lower side, leading edge first, x strictly ascending."""
+        i = int(np.argmin(self.x))
+        out = []
+        for x, y in ((self.x[i::-1], self.y[i::-1]), (self.x[i:], self.y[i:])):
+            keep = np.concatenate([[True], x[1:] > np.maximum.accumulate(x)[:-1] + 1e-9])
+            out.append((x[keep], y[keep]))
+        return out[0], out[1]
+
+    def _side(self, which: int, s: ArrayLike) -> tuple[Array, Array]:
+        """Points of one side at fractions s of its own x extent; PCHIP in the angle, which is smooth at the nose."""
+        x, y = self._sides[which]
+        span = x[-1] - x[0]
+        theta = np.arccos(np.clip(1.0 - 2.0 * (x - x[0]) / span, -1.0, 1.0))
+        s = np.clip(np.asarray(s, dtype=np.float64), 0.0, 1.0)
+        return x[0] + span * s, pchip(theta, y, np.arccos(1.0 - 2.0 * s))
+
+    def surfaces(self, x: ArrayLike) -> tuple[Array, Array]:
+        """Interpolate both sides.
+
+        Parameters
+        ----------
+        x : (...) float
+            Chord fractions. [-]
+
+        Returns
+        -------
+        upper, lower : (...) float
+            Ordinates over the chord. [-]
+        """
+        x = np.asarray(x, dtype=np.float64)
+        out = []
+        for which in (0, 1):
+            xs = self._sides[which][0]
+            out.append(self._side(which, (x - xs[0]) / (xs[-1] - xs[0]))[1])
+        return out[0], out[1]
+
+    @cached_property
+    def _lines(self) -> tuple[Array, Array, Array]:
+        x = _spaced(401)
+        upper, lower = self.surfaces(x)
+        return x, upper - lower, 0.5 * (upper + lower)
+
+    @property
+    def thickness(self) -> float:
+        """Greatest thickness over chord, measured across the chord [-]."""
+        return float(self._lines[1].max())
+
+    @property
+    def x_thickness(self) -> float:
+        """Chord fraction of the greatest thickness [-]."""
+        return float(self._lines[0][int(np.argmax(self._lines[1]))])
+
+    @property
+    def camber(self) -> float:
+        """Greatest distance of the mid line from the line (0, 0) to the trailing edge, with its sign [-]."""
+        x, _, mean = self._lines
+        line = mean - 0.5 * (self.y[0] + self.y[-1]) * x
+        return float(line[int(np.argmax(np.abs(line)))])
+
+    @property
+    def te_gap(self) -> float:
+        """Trailing edge thickness over chord [-]."""
+        return float(np.hypot(self.x[0] - self.x[-1], self.y[0] - self.y[-1]))
+
+    @property
+    def area(self) -> float:
+        """Area over chord squared (positive in Selig order) [-]."""
+        return float(0.5 * np.sum(self.x * np.roll(self.y, -1) - np.roll(self.x, -1) * self.y))
+
+    def key(self) -> str:
+        """Return the SHA-256 (hex) of the coordinates rounded to 1e-6: equal shapes, equal keys."""
+        points = np.rint(np.stack([self.x, self.y]) * 1e6).astype("<i8")
+        return hashlib.sha256(points.tobytes()).hexdigest()
+
+    def repanel(self, n: int = 161) -> Airfoil:
+        """Resample both sides with cosine spacing.
+
+        Parameters
+        ----------
+        n : int
+            Number of points, odd, 21 or more; the leading edge is point ``n // 2``.
+
+        Returns
+        -------
+        Airfoil
+            Same shape and trailing edge gap, new points.
+        """
+        s = _spaced(_half(n))
+        (xu, yu), (xl, yl) = self._side(0, s), self._side(1, s)
+        return Airfoil(self.name, _join(xu, xl), _join(yu, yl))
+
+    def __repr__(self) -> str:
+        return f"Airfoil({self.name!r}, {self.x.size} points, t/c {self.thickness:.4f}, camber {self.camber:+.4f})"
+
+
+def _half(n: int) -> int:
+    """Points per side for n points in all."""
+    if n < 21 or n % 2 == 0:
+        raise GeometryError([("n", str(n), "an odd number of points, 21 or more", "")])
+    return n // 2 + 1
+
+
+def _join(upper: Array, lower: Array) -> Array:
+    """Make a Selig loop of two sides that start at one leading edge."""
+    return np.concatenate([upper[::-1], lower[1:]])
+
+
+def _from_lines(name: str, x: Array, mean: Array, slope: Array, half: Array) -> Airfoil:
+    """Lay half thicknesses across the camber line (Abbott and von Doenhoff, eq. 6.1)."""
+    theta = np.arctan(slope)
+    xu, xl = x - half * np.sin(theta), x + half * np.sin(theta)
+    yu, yl = mean + half * np.cos(theta), mean - half * np.cos(theta)
+    return Airfoil(name, _join(xu, xl), _join(yu, yl))
+
+
+def _naca_half(x: Array, thickness: float, te_gap: float | None) -> Array:
+    """NACA four-digit half thickness; a wedge sets the trailing edge gap when one is asked for."""
+    half = 5 * thickness * (0.2969 * np.sqrt(x) + x * (-0.1260 + x * (-0.3516 + x * (0.2843 - 0.1015 * x))))
+    return half if te_gap is None else half + x * (0.5 * te_gap - half[-1])
+
+
+def naca4(camber: float, position: float, thickness: float, n: int = 161, te_gap: float | None = None) -> Airfoil:
+    """Make a NACA four-digit section from real numbers.
+
+    Parameters
+    ----------
+    camber : float
+        Greatest camber over chord, -0.25 to 0.25. [-]
+    position : float
+        Chord fraction of the greatest camber, 0.05 to 0.95; ignored without camber. [-]
+    thickness : float
+        Greatest thickness over chord, 0.005 to 0.6. [-]
+    n : int
+        Number of points, odd.
+    te_gap : float or None
+        Trailing edge thickness over chord; None keeps the family's own (0.021 times the thickness). [-]
+
+    Returns
+    -------
+    Airfoil
+        Named ``naca4:camber,position,thickness``.
+
+    Raises
+    ------
+    GeometryError
+        For numbers outside these ranges (4 for 4 % is refused).
+
+    References
+    ----------
+    I. H. Abbott and A. E. von Doenhoff, Theory of Wing Sections, Dover 1959, section 6.4 (not checked against the
+    book).
+
+    Examples
+    --------
+    >>> round(naca4(0.0, 0.4, 0.12, te_gap=0.0).area, 4)
+    0.0809
+    """
+    faults = Faults()
+    hint = "Fractions of the chord: 4 % is 0.04"
+    faults.number("camber", camber, -0.25, 0.25, hint=hint if abs(camber) >= 1 else "")
+    if camber != 0.0:
+        faults.number("position", position, 0.05, 0.95, hint="Tenths of the chord: 4 is 0.4" if position >= 1 else "")
+    faults.number("thickness", thickness, 0.005, 0.6, hint=hint if thickness >= 1 else "")
+    if te_gap is not None:
+        faults.number("te_gap", te_gap, 0.0, 0.1)
+    faults.check()
+    x = _spaced(_half(n))
+    p = position
+    if camber == 0.0:
+        mean, slope = np.zeros_like(x), np.zeros_like(x)
+    else:
+        scale = np.where(x < p, camber / p**2, camber / (1 - p) ** 2)
+        mean = np.where(x < p, scale * x * (2 * p - x), scale * (1 - 2 * p + x * (2 * p - x)))
+        slope = 2 * scale * (p - x)
+    name = f"naca4:{camber:.3f},{position:.2f},{thickness:.3f}"
+    return _from_lines(name, x, mean, slope, _naca_half(x, thickness, te_gap))
+
+
+# Camber lines of the five-digit family at design cl 0.3: second digit -> (r, k1) plain, (r, k1, k2/k1) reflexed.
+_FIVE = {1: (0.0580, 361.4), 2: (0.1260, 51.64), 3: (0.2025, 15.957), 4: (0.2900, 6.643), 5: (0.3910, 3.230)}
+_REFLEX = {2: (0.1300, 51.99, 0.000764), 3: (0.2170, 15.793, 0.00677), 4: (0.3180, 6.520, 0.0303), 5: (0.4410, 3.191, 0.1355)}  # fmt: skip  # noqa: E501
+
+
+def naca(digits: str, n: int = 161, te_gap: float | None = None) -> Airfoil:
+    """Make a NACA four- or five-digit section from its designation.
+
+    Parameters
+    ----------
+    digits : str
+        ``"4412"``, ``"NACA 23012"``, ``"naca0012"``; five-digit reflexed lines such as ``"23112"`` too.
+    n, te_gap
+        As in :func:`naca4`.
+
+    Returns
+    -------
+    Airfoil
+        Named ``naca4412`` and so on.
+
+    Raises
+    ------
+    GeometryError
+        For anything that is not such a designation.
+
+    References
+    ----------
+    E. N. Jacobs and R. M. Pinkerton, NACA Report 537 (1935), plain lines; C. L. Ladson et al., NASA TM-4741 (1996),
+    reflexed lines (constants as commonly reprinted; not checked against the reports).
+
+    Examples
+    --------
+    >>> naca("NACA 4412").name, round(naca("23012").camber, 3)
+    ('naca4412', 0.018)
+    """
+    match = re.fullmatch(r"\s*(?:naca)?[\s_-]*(\d{4,5})\s*", digits, re.IGNORECASE)
+    expected = "a NACA four- or five-digit designation such as 4412 or 23012"
+    if match is None:
+        raise GeometryError([("naca", repr(digits), expected, "")])
+    code = match[1]
+    t = int(code[-2:]) / 100
+    if t == 0:
+        raise GeometryError([("naca", repr(digits), "a thickness above 00", "For a thin plate use plate()")])
+    if len(code) == 4:
+        m, p = int(code[0]) / 100, int(code[1]) / 10
+        if m > 0 and p == 0:
+            raise GeometryError([("naca", repr(digits), expected, "Camber needs a position: the second digit is 0")])
+        shape = naca4(m, p or 0.4, t, n, te_gap)
+        return Airfoil(f"naca{code}", shape.x, shape.y)
+    line, kind, cl = int(code[1]), int(code[2]), 0.15 * int(code[0])
+    if cl == 0 or kind > 1 or line not in (_FIVE, _REFLEX)[kind]:
+        raise GeometryError([("naca", repr(digits), expected, "Known camber lines: 10 to 50 plain, 21 to 51 reflexed")])
+    x = _spaced(_half(n))
+    if kind == 0:
+        r, k1 = _FIVE[line]
+        mean = np.where(x < r, x**3 - 3 * r * x**2 + r**2 * (3 - r) * x, r**3 * (1 - x))
+        slope = np.where(x < r, 3 * x**2 - 6 * r * x + r**2 * (3 - r), -(r**3))
+    else:
+        r, k1, k21 = _REFLEX[line]
+        k = np.where(x < r, 1.0, k21)
+        mean = k * (x - r) ** 3 - k21 * (1 - r) ** 3 * x - r**3 * x + r**3
+        slope = 3 * k * (x - r) ** 2 - k21 * (1 - r) ** 3 - r**3
+    scale = k1 / 6 * cl / 0.3
+    return _from_lines(f"naca{code}", x, scale * mean, scale * slope, _naca_half(x, t, te_gap))
+
+
+def plate(camber: float, thickness: float, n: int = 161) -> Airfoil:
+    """Make a flat or circular-arc plate of constant thickness with rounded edges.
+
+    Parameters
+    ----------
+    camber : float
+        Rise of the arc over chord, -0.25 to 0.25. [-]
+    thickness : float
+        Plate thickness over chord, 0.002 to 0.3. [-]
+    n : int
+        Number of points, odd.
+
+    Returns
+    -------
+    Airfoil
+        Named ``plate:camber,thickness``; edges are half circles, so the trailing edge is closed.
+
+    Examples
+    --------
+    >>> section = plate(0.05, 0.02)
+    >>> round(section.camber, 3), round(section.thickness, 3), section.te_gap
+    (0.05, 0.02, 0.0)
+    """
+    faults = Faults()
+    hint = "Fractions of the chord: 4 % is 0.04"
+    faults.number("camber", camber, -0.25, 0.25, hint=hint if abs(camber) >= 1 else "")
+    faults.number("thickness", thickness, 0.002, 0.3, hint=hint if thickness >= 1 else "")
+    faults.check()
+    edge = 0.5 * thickness
+    # A quarter of the points go round each edge: the cosine spacing alone would leave thin plates with a sharp corner.
+    m = _half(n)
+    k = m // 4
+    nose = edge * (1 - np.cos(np.linspace(0, np.pi / 2, k + 1)))
+    s = np.concatenate([nose[:-1], edge + (1 - 2 * edge) * _spaced(m - 2 * k), 1 - nose[-2::-1]])
+    out = np.minimum(np.minimum(s, 1 - s), edge)
+    half = np.sqrt(np.maximum(out * (2 * edge - out), 0.0))
+    if camber == 0.0:
+        mean = np.zeros_like(s)
+    else:
+        radius = (0.25 + camber**2) / (2 * camber)  # signed; the arc runs through (0, 0) and (1, 0)
+        mean = camber - radius + math.copysign(1, camber) * np.sqrt(radius**2 - (s - 0.5) ** 2)
+        mean[[0, -1]] = 0.0
+    # Thickness is laid across the chord, so that nose, tail, camber and thickness are exact (2 % thin at 5 % camber).
+    return Airfoil(f"plate:{camber:.3f},{thickness:.3f}", _join(s, s), _join(mean + half, mean - half))
+
+
+def blend(a: Airfoil, b: Airfoil, w: float) -> Airfoil:
+    """Blend two sections linearly, side by side at equal chord fractions.
+
+    Parameters
+    ----------
+    a, b : Airfoil
+        The sections at w = 0 and w = 1.
+    w : float
+        Weight of `b`, 0 to 1. [-]
+
+    Returns
+    -------
+    Airfoil
+        `a` or `b` itself at the ends.
+
+    Examples
+    --------
+    >>> round(blend(naca("0010"), naca("0020"), 0.5).thickness, 4)
+    0.15
+    """
+    faults = Faults()
+    faults.number("w", w, 0.0, 1.0)
+    faults.check()
+    if w == 0.0 or a is b:
+        return a
+    if w == 1.0:
+        return b
+    n = max(a.x.size, b.x.size)
+    pa, pb = a.repanel(n + (n + 1) % 2 if n > 20 else 21), b.repanel(n + (n + 1) % 2 if n > 20 else 21)
+    name = f"{1 - w:.3f}*{a.name}+{w:.3f}*{b.name}"
+    return Airfoil(name, (1 - w) * pa.x + w * pb.x, (1 - w) * pa.y + w * pb.y)
+
+
+def _numbers(text: str, faults: Faults) -> tuple[str, list[tuple[int, float, float]]]:
+    """Read title and number pairs with their line numbers; note what is neither."""
+    title = ""
+    rows: list[tuple[int, float, float]] = []
+    for number, line in enumerate(text.lstrip("\ufeff").splitlines(), start=1):
+        words = line.split("#")[0].replace(",", " ").split()
+        if not words:
+            continue
+        try:
+            values = [float(word) for word in words]
+        except ValueError:
+            if not title and not rows:
+                title = line.strip()
+            else:
+                faults.add(f"line {number}", repr(line.strip()), "two numbers, x and y")
+            continue
+        if len(values) != 2 and not title and not rows:
+            title = line.strip()  # such as "23012"
+        elif len(values) != 2 or not all(map(math.isfinite, values)):
+            faults.add(f"line {number}", repr(line.strip()), "two finite numbers, x and y")
+        else:
+            rows.append((number, values[0], values[1]))
+    return title, rows
+
+
+def parse_dat(text: str, name: str = "") -> Airfoil:
+    r"""Read a section file in Selig or Lednicer form.
+
+    Parameters
+    ----------
+    text : str
+        The file's content: a title line (optional), then x y pairs. Selig: one loop from the trailing edge.
+        Lednicer: the two point counts, then upper and lower side, both from the leading edge.
+    name : str
+        Overrides the title.
+
+    Returns
+    -------
+    Airfoil
+        Points as given (up to 2 % off unit chord), repeated ones dropped, lower-first loops turned round.
+
+    Raises
+    ------
+    GeometryError
+        With every faulty line, or what is wrong with the shape. Percent and millimetres are refused, not converted.
+
+    Examples
+    --------
+    >>> section = naca("2412")
+    >>> text = "my section" + "".join(f"\n{x:.6f} {y:.6f}" for x, y in zip(section.x, section.y))
+    >>> parse_dat(text).name, round(parse_dat(text).thickness, 3)
+    ('my section', 0.12)
+    """
+    faults = Faults()
+    title, rows = _numbers(text, faults)
+    counts: tuple[int, int] | None = None
+    if rows and rows[0][1] > 1.5 and rows[0][2] > 1.5 and all(v == int(v) for v in rows[0][1:]):
+        counts = (int(rows[0][1]), int(rows[0][2]))
+        rows = rows[1:]
+    if len(rows) < 7 and not faults.found:
+        faults.add("section file", f"{len(rows)} points", "7 points or more", "Is it a coordinate file?")
+    if counts is not None and sum(counts) != len(rows) and not faults.found:
+        faults.add("section file", f"{len(rows)} points", f"{counts[0]} + {counts[1]} as its second line says",
+                   "Truncated file?")  # fmt: skip
+    faults.check()
+    points = np.array([row[1:] for row in rows])
+    if points[:, 0].max() > 1.5:
+        faults.add("section file", f"x up to {points[:, 0].max():g}", "x from 0 to 1",
+                   "Coordinates in percent or millimetres? Divide by the chord")  # fmt: skip
+    faults.check()
+    if counts is not None or points[0, 0] < 0.5 * points[:, 0].max():
+        fall = np.diff(points[:, 0])
+        if counts is None and fall.min() > -0.5:  # a loop that starts at the nose
+            cut = int(np.argmax(points[:, 0]))
+            points = np.vstack([points[cut:], points[: cut + 1]])
+        else:  # Lednicer; without counts the second side starts where x falls back to the nose
+            cut = counts[0] if counts is not None else int(np.argmin(fall)) + 1
+            points = np.vstack([points[:cut][::-1], points[cut:]])
+    points = points[np.concatenate([[True], np.abs(np.diff(points, axis=0)).max(axis=1) > 1e-9])]
+    x, y = points.T
+    if np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y) < 0:
+        x, y = x[::-1], y[::-1]
+    return Airfoil(name or title or "section", x, y)
