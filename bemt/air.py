@@ -69,7 +69,7 @@ def sutherland(temperature_K: float) -> float:
     """
     if not temperature_K > 0.0:
         raise InputError(Fault("", "temperature_K", f"{temperature_K:g}", "above 0 K", "Degrees Celsius given?"))
-    return 1.458e-6 * temperature_K**1.5 / (temperature_K + 110.4)
+    return 1.458e-6 * temperature_K * math.sqrt(temperature_K) / (temperature_K + 110.4)
 
 
 def isa_pressure(altitude_m: float) -> tuple[float, float]:
@@ -117,7 +117,7 @@ def isa_pressure(altitude_m: float) -> tuple[float, float]:
 def _step(p: float, T: float, lapse: float, dh: float) -> float:
     if lapse == 0.0:
         return p * math.exp(-G0 * dh / (R_DRY * T))
-    return p * (1.0 + lapse * dh / T) ** (-G0 / (R_DRY * lapse))
+    return p * math.pow(1.0 + lapse * dh / T, -G0 / (R_DRY * lapse))
 
 
 def saturation_pressure(temperature_K: float) -> float:
@@ -266,7 +266,8 @@ class Air:
         rho, mu, a, T = (np.array([getattr(x, f) for x in airs], dtype=float)
                          for f in ("rho", "mu", "a_sound", "temperature_K"))  # fmt: skip
         make: Any = cls  # the annotations of the fields say float, the common case
-        return make(rho, mu, a, T, "; ".join(dict.fromkeys(x.source for x in airs)))
+        air: Air = make(rho, mu, a, T, "; ".join(dict.fromkeys(x.source for x in airs)))
+        return air
 
     @classmethod
     def from_density(cls, rho: float = 1.225, temperature_C: float = 15.0) -> Air:

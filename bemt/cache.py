@@ -152,7 +152,7 @@ def _seal(arrays: Arrays) -> np.ndarray:
 def _read(path: Path) -> Arrays | None:
     """Entry at path, or None when it is absent or damaged in whatever way."""
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
         seal = arrays.pop("_seal")
         return arrays if np.array_equal(seal, _seal(arrays)) else None

@@ -1,6 +1,6 @@
 """Case files: a TOML document with units in its key names becomes a rotor, a duct, air and operating points.
 
-The schema is in :mod:`bemt.case_rules`; objects are built in :mod:`bemt.case_build`. A case knows which of its values
+The schema is in :mod:`bemt.case_schema`; objects are built in :mod:`bemt.case_build`. A case knows which of its values
 are *assumptions* (not given by the source) and the range of each.
 """
 
@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import case_build
-from bemt.case_rules import AXES, DEFAULTS, GROUPS, check_case
+from bemt.case_rules import check_case
+from bemt.case_schema import AXES, DEFAULTS, GROUPS, INCH
 from bemt.errors import Fault, InputError
 from bemt.schema import Collector, load_toml
 
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
 __all__ = ["Assumption", "Case", "find_cases", "load_case"]
 
 FILE_NAME = "case.toml"
-INCH = 0.0254
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 
 
@@ -383,6 +383,11 @@ def load_case(path: str | Path) -> Case:
     return case
 
 
+def _natural(path: Path) -> list[tuple[int, str]]:
+    """Sort key that counts digits as numbers."""
+    return [(int(word), "") if word.isdigit() else (-1, word) for word in re.split(r"(\d+)", path.as_posix()) if word]
+
+
 def find_cases(paths: Iterable[str | Path]) -> list[Path]:
     """Case files below the given folders.
 
@@ -394,7 +399,7 @@ def find_cases(paths: Iterable[str | Path]) -> list[Path]:
     Returns
     -------
     list of Path
-        Case files, sorted within each folder, each once.
+        Case files, sorted within each folder (8x5 before 10x5), each once.
 
     Raises
     ------
@@ -405,14 +410,20 @@ def find_cases(paths: Iterable[str | Path]) -> list[Path]:
     faults: list[Fault] = []
     for item in map(Path, paths):
         if item.is_dir():
-            here = [item / FILE_NAME] if (item / FILE_NAME).is_file() else sorted(item.glob(f"*/{FILE_NAME}"))
+            here = (
+                [item / FILE_NAME]
+                if (item / FILE_NAME).is_file()
+                else sorted(item.glob(f"*/{FILE_NAME}"), key=_natural)
+            )
             if not here:
                 faults.append(Fault(item.as_posix(), "", "no case", f"a folder with <name>/{FILE_NAME}"))
             found += here
         elif item.is_file():
             found.append(item)
         else:
-            faults.append(Fault(item.as_posix(), "", "nothing there", "a case file or a folder of cases", "Check the path"))
+            faults.append(
+                Fault(item.as_posix(), "", "nothing there", "a case file or a folder of cases", "Check the path")
+            )
     if faults:
         raise InputError(faults)
     return list(dict.fromkeys(found))

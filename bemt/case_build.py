@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from bemt.air import Air, isa_pressure
+from bemt.case_rules import check_shape
 from bemt.errors import Fault, InputError
+from bemt.schema import Collector
 from geometry.airfoil import Airfoil, GeometryError, naca, naca4, parse_dat
 from geometry.blade import Blade, from_laws, from_stations
 from geometry.duct import Duct, Stator, around
@@ -32,7 +34,9 @@ def _as_input(file: str, where: str, make: Callable[[], T]) -> T:
     except InputError:
         raise
     except GeometryError as error:
-        raise InputError([Fault(file, f"{where}.{at}" if where else at, *rest) for at, *rest in error.faults]) from error
+        raise InputError(
+            [Fault(file, f"{where}.{at}" if where else at, *rest) for at, *rest in error.faults]
+        ) from error
     except ValueError as error:
         raise InputError(Fault(file, where, "values that do not fit together", str(error))) from error
 
@@ -123,7 +127,8 @@ def _blade(case: Case) -> Blade:
         laws = {"pitch": pitch, "relief": blade.get("tip_relief")}
         made = from_laws(
             case.diameter_m, blade["chord_law"], blade["pitch_law"], hub, anchors=anchors,
-            chord={k: v for k, v in chord.items() if v is not None}, pitch={k: v for k, v in laws.items() if v is not None},
+            chord={k: v for k, v in chord.items() if v is not None},
+            pitch={k: v for k, v in laws.items() if v is not None},
         )  # fmt: skip
         return from_stations(made.r, made.chord * scale, made.beta + turned, R, hub * R, anchors, name=case.name)
     if "stations" in blade:
@@ -251,13 +256,20 @@ def check_build(case: Case) -> None:
     faults: list[Fault] = []
 
     def attempt(overrides: Mapping[str, Any] | None, place: str) -> None:
+        found: Sequence[Fault] = ()
+        if overrides:
+            joined = Collector(case.path.as_posix())
+            check_shape(joined, case.replaced(overrides).document)
+            found = joined.faults
         try:
-            case.rotor(overrides)
-            case.duct(overrides)
+            if not found:
+                case.rotor(overrides)
+                case.duct(overrides)
         except InputError as error:
-            for fault in error.faults:
-                where = f"{place}: {fault.where}" if place else fault.where
-                faults.append(Fault(fault.file, where, fault.got, fault.expected, fault.hint))
+            found = error.faults
+        for fault in found:
+            where = f"{place}: {fault.where}" if place else fault.where
+            faults.append(Fault(fault.file, where, fault.got, fault.expected, fault.hint))
 
     attempt(None, "")
     if not faults:

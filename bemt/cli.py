@@ -67,20 +67,22 @@ def build_parser() -> argparse.ArgumentParser:
     sweep.add_argument("paths", nargs="+", metavar="CASES", help="case files, or folders of <name>/case.toml")
     sweep.add_argument("--out", metavar="DIR", help="write tables, grids and sweep.json there, and resume from there")
     sweep.add_argument("--json", action="store_true", help="print one JSON document (bemt.sweep/1), no tables")
-    sweep.add_argument("--jobs", type=_positive, metavar="N",
-                       help="solve N cases at a time in processes (default: one case, its grid on all cores)")  # fmt: skip
+    jobs = "solve N cases at a time in processes (default: one case, its grid on all cores)"
+    sweep.add_argument("--jobs", type=_positive, metavar="N", help=jobs)
     sweep.add_argument("--quiet", action="store_true", help="print neither progress nor tables")
-    sweep.add_argument("--strict", action="store_true",
-                       help="exit 1 when a point is unconverged or BEMT is off a reference by more than --tolerance")  # fmt: skip
-    sweep.add_argument("--tolerance", type=float, default=15.0, metavar="PCT",
-                       help="tolerance of --strict on thrust, %% of the reference (default 15)")  # fmt: skip
+    strict = "exit 1 when a point is unconverged or BEMT is off a reference by more than --tolerance"
+    sweep.add_argument("--strict", action="store_true", help=strict)
+    tolerance = "tolerance of --strict on thrust, %% of the reference (default 15)"
+    sweep.add_argument("--tolerance", type=float, default=15.0, metavar="PCT", help=tolerance)
     sweep.add_argument("--no-resume", action="store_true", help="do not reuse results found in --out")
 
     validate = commands.add_parser("validate", help="compare with a folder of measured propellers (UIUC layout)")
     validate.add_argument("dir", metavar="DIR", help="folder with geometry, static and J files")
     validate.add_argument("--json", action="store_true", help="print one JSON document (bemt.validation/1)")
     validate.add_argument("--polar", type=_polar, metavar="fixed:RE", help="section tables at one Reynolds number")
-    validate.add_argument("--off", action="append", default=[], metavar="EFFECT", help="switch an effect off; repeatable")
+    validate.add_argument(
+        "--off", action="append", default=[], metavar="EFFECT", help="switch an effect off; repeatable"
+    )
     validate.add_argument("--out", metavar="DIR", help="write the tables there as well")
 
     reproduce = commands.add_parser("reproduce", help="print every number of the source thesis beside ours")

@@ -54,12 +54,8 @@ def CT(T: ArrayLike, rho: ArrayLike, n: ArrayLike, D: ArrayLike) -> Any:
     ----------
     T : float or array
         Thrust. [N]
-    rho : float or array
-        Density. [kg/m3]
-    n : float or array
-        Rotational speed. [rev/s]
-    D : float or array
-        Diameter. [m]
+    rho, n, D : float or array
+        Density [kg/m3], rotational speed [rev/s], diameter [m].
 
     Returns
     -------
@@ -82,12 +78,8 @@ def CQ(Q: ArrayLike, rho: ArrayLike, n: ArrayLike, D: ArrayLike) -> Any:
     ----------
     Q : float or array
         Shaft torque. [N m]
-    rho : float or array
-        Density. [kg/m3]
-    n : float or array
-        Rotational speed. [rev/s]
-    D : float or array
-        Diameter. [m]
+    rho, n, D : float or array
+        Density [kg/m3], rotational speed [rev/s], diameter [m].
 
     Returns
     -------
@@ -110,12 +102,8 @@ def CP(P: ArrayLike, rho: ArrayLike, n: ArrayLike, D: ArrayLike) -> Any:
     ----------
     P : float or array
         Shaft power. [W]
-    rho : float or array
-        Density. [kg/m3]
-    n : float or array
-        Rotational speed. [rev/s]
-    D : float or array
-        Diameter. [m]
+    rho, n, D : float or array
+        Density [kg/m3], rotational speed [rev/s], diameter [m].
 
     Returns
     -------
@@ -138,12 +126,8 @@ def thrust(CT: ArrayLike, rho: ArrayLike, n: ArrayLike, D: ArrayLike) -> Any:
     ----------
     CT : float or array
         Thrust coefficient, propeller convention. [-]
-    rho : float or array
-        Density. [kg/m3]
-    n : float or array
-        Rotational speed. [rev/s]
-    D : float or array
-        Diameter. [m]
+    rho, n, D : float or array
+        Density [kg/m3], rotational speed [rev/s], diameter [m].
 
     Returns
     -------
@@ -165,12 +149,8 @@ def torque(CQ: ArrayLike, rho: ArrayLike, n: ArrayLike, D: ArrayLike) -> Any:
     ----------
     CQ : float or array
         Torque coefficient, propeller convention. [-]
-    rho : float or array
-        Density. [kg/m3]
-    n : float or array
-        Rotational speed. [rev/s]
-    D : float or array
-        Diameter. [m]
+    rho, n, D : float or array
+        Density [kg/m3], rotational speed [rev/s], diameter [m].
 
     Returns
     -------
@@ -192,12 +172,8 @@ def power(CP: ArrayLike, rho: ArrayLike, n: ArrayLike, D: ArrayLike) -> Any:
     ----------
     CP : float or array
         Power coefficient, propeller convention. [-]
-    rho : float or array
-        Density. [kg/m3]
-    n : float or array
-        Rotational speed. [rev/s]
-    D : float or array
-        Diameter. [m]
+    rho, n, D : float or array
+        Density [kg/m3], rotational speed [rev/s], diameter [m].
 
     Returns
     -------
@@ -261,10 +237,8 @@ def J(V: ArrayLike, n: ArrayLike, D: ArrayLike) -> Any:
     ----------
     V : float or array
         Axial airspeed, positive in climb. [m/s]
-    n : float or array
-        Rotational speed. [rev/s]
-    D : float or array
-        Diameter. [m]
+    n, D : float or array
+        Rotational speed [rev/s], diameter [m].
 
     Returns
     -------
@@ -287,10 +261,8 @@ def airspeed(J: ArrayLike, n: ArrayLike, D: ArrayLike) -> Any:
     ----------
     J : float or array
         Advance ratio. [-]
-    n : float or array
-        Rotational speed. [rev/s]
-    D : float or array
-        Diameter. [m]
+    n, D : float or array
+        Rotational speed [rev/s], diameter [m].
 
     Returns
     -------
@@ -312,10 +284,8 @@ def eta(J: ArrayLike, CT: ArrayLike, CP: ArrayLike) -> Any:
     ----------
     J : float or array
         Advance ratio. [-]
-    CT : float or array
-        Thrust coefficient, propeller convention. [-]
-    CP : float or array
-        Power coefficient, propeller convention. [-]
+    CT, CP : float or array
+        Thrust and power coefficient, propeller convention. [-]
 
     Returns
     -------
@@ -343,10 +313,8 @@ def FM(CT: ArrayLike, CP: ArrayLike) -> Any:
 
     Parameters
     ----------
-    CT : float or array
-        Thrust coefficient, propeller convention. [-]
-    CP : float or array
-        Power coefficient, propeller convention. [-]
+    CT, CP : float or array
+        Thrust and power coefficient, propeller convention. [-]
 
     Returns
     -------
@@ -395,10 +363,8 @@ def M_tip(n: ArrayLike, D: ArrayLike, a_sound: ArrayLike) -> Any:
 
     Parameters
     ----------
-    n : float or array
-        Rotational speed. [rev/s]
-    D : float or array
-        Diameter. [m]
+    n, D : float or array
+        Rotational speed [rev/s], diameter [m].
     a_sound : float or array
         Speed of sound. [m/s]
 
@@ -420,10 +386,8 @@ def M_tip_helical(n: ArrayLike, D: ArrayLike, a_sound: ArrayLike, V: ArrayLike) 
 
     Parameters
     ----------
-    n : float or array
-        Rotational speed. [rev/s]
-    D : float or array
-        Diameter. [m]
+    n, D : float or array
+        Rotational speed [rev/s], diameter [m].
     a_sound : float or array
         Speed of sound. [m/s]
     V : float or array
@@ -449,10 +413,8 @@ def Re75(chord75: ArrayLike, n: ArrayLike, D: ArrayLike, V: ArrayLike, rho: Arra
     ----------
     chord75 : float or array
         Chord at 0.75 R. [m]
-    n : float or array
-        Rotational speed. [rev/s]
-    D : float or array
-        Diameter. [m]
+    n, D : float or array
+        Rotational speed [rev/s], diameter [m].
     V : float or array
         Axial airspeed. [m/s]
     rho : float or array

@@ -104,7 +104,7 @@ class Points:
 def _effects(case: Case) -> tuple[effects.Effect, ...]:
     known = effects.catalogue()
     faults = []
-    for key in ("effects_on", "effects_off"):
+    for key in ("effects_on", "effects_off", "also_without"):
         for i, name in enumerate(case.get(f"model.{key}")):
             if name not in known:
                 close = difflib.get_close_matches(name, known, n=1)
@@ -163,9 +163,11 @@ def prepare(case: Case, overrides: Mapping[str, Any] | None = None, n_stations: 
     n = int(case.get("model.stations")) if n_stations is None else n_stations
     prep = solver.prepare(rotor, tables, _effects(case), flow, n)
     notes = tuple(dict.fromkeys(note for _, polar in tables for note in polar.notes))
+    blade = rotor.blade
+    exit_area = float("nan") if duct is None else duct.exit_area
     return Ready(
-        prep, rotor.D, 2.0 * rotor.Rhub, rotor.blade.pitch_m(), float(rotor.blade.at(0.75 * rotor.R)[0]), rotor.solidity,
-        duct is not None, float("nan") if duct is None else duct.exit_area, notes,
+        prep, rotor.D, 2.0 * rotor.Rhub, blade.pitch_m(), float(blade.at(0.75 * rotor.R)[0]), rotor.solidity,
+        duct is not None, exit_area, notes,
     )  # fmt: skip
 
 
@@ -212,14 +214,17 @@ def evaluate(ready: Ready, rpm: ArrayLike, airspeed_m_s: ArrayLike, air: Air, th
     n, D = s.rpm / 60.0, ready.diameter_m
     rho, mu, a = (np.broadcast_to(np.asarray(getattr(air, k), float), n.shape) for k in ("rho", "mu", "a_sound"))
     return Points(
-        rpm=s.rpm, airspeed_m_s=s.V, density_kg_m3=rho, thrust_N=s.T, torque_Nm=s.Q, power_W=s.P, CT=s.CT, CP=s.CP, J=s.J,
-        eta=np.asarray(co.eta(s.J, s.CT, s.CP)), M_tip=np.asarray(co.M_tip(n, D, a)),
-        Re75=np.asarray(co.Re75(ready.chord75_m, n, D, s.V, rho, mu)), rotor_thrust_N=s.T_rotor, duct_thrust_N=s.T_duct,
-        stator_thrust_N=s.T_stator, exhaust_speed_m_s=s.V_exit, converged=s.converged, flags=s.flags,
+        rpm=s.rpm, airspeed_m_s=s.V, density_kg_m3=rho, thrust_N=s.T, torque_Nm=s.Q, power_W=s.P,
+        CT=s.CT, CP=s.CP, J=s.J, eta=np.asarray(co.eta(s.J, s.CT, s.CP)), M_tip=np.asarray(co.M_tip(n, D, a)),
+        Re75=np.asarray(co.Re75(ready.chord75_m, n, D, s.V, rho, mu)),
+        rotor_thrust_N=s.T_rotor, duct_thrust_N=s.T_duct, stator_thrust_N=s.T_stator,
+        exhaust_speed_m_s=s.V_exit, converged=s.converged, flags=s.flags,
     )  # fmt: skip
 
 
-def k1k2(case: Case, overrides: Mapping[str, Any] | None, rpm: Array, airspeed_m_s: Array, air: Air) -> empirical.Estimate:
+def k1k2(
+    case: Case, overrides: Mapping[str, Any] | None, rpm: Array, airspeed_m_s: Array, air: Air
+) -> empirical.Estimate:
     """K1/K2 model of a case; a ducted rotor counts its annulus only.
 
     Parameters

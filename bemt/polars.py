@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -273,7 +274,7 @@ def _first_stall(cl: Array) -> NDArray[np.intp]:
     fallen = best - cl > STALL_DROP
     end = np.where(fallen.any(axis=0), fallen.argmax(axis=0), cl.shape[0])
     inside = np.arange(cl.shape[0]).reshape((-1,) + (1,) * (cl.ndim - 1)) < end
-    return np.argmax(np.where(inside, cl, -np.inf), axis=0)
+    return np.asarray(np.argmax(np.where(inside, cl, -np.inf), axis=0), dtype=np.intp)
 
 
 def viterna_cd_max(ar: float) -> float:
@@ -385,6 +386,13 @@ def _confident_range(alpha: Array, cl: Array, confidence: Array, past_stall: flo
 @lru_cache(maxsize=1)
 def _neuralfoil_version() -> str:
     """Version of the installed NeuralFoil, without importing it."""
+    from importlib.util import find_spec
+
+    spec = find_spec("neuralfoil")
+    if spec is not None and spec.origin:  # the folder's name says it; importlib.metadata costs 15 ms to import
+        found = list(Path(spec.origin).parents[1].glob("[nN]eural[fF]oil-*.dist-info"))
+        if len(found) == 1:
+            return found[0].name.removesuffix(".dist-info").split("-")[1]
     from importlib.metadata import version
 
     return version("neuralfoil")
@@ -572,10 +580,11 @@ def _close(t: SectionTable, out: Array, cd_max: float) -> tuple[Array, Array, li
     hi = min(float(a[-1]), np.deg2rad(85.0))
     if int(_first_stall(cl[a >= 0.0])) == int(np.sum(a >= 0.0)) - 1:
         said.append(f"data end before the stall (Re {t.Re:.3g}): cl beyond {np.rad2deg(hi):.4g} deg is a guess")
-    if a[0] > -hi:
+    mirror = min(hi, np.deg2rad(RAW_LIMIT_DEG))
+    if a[0] > -mirror:
         said.append(f"negative side (Re {t.Re:.3g}) beyond the data: mirrored with {REVERSED_LIFT:g} of the lift")
-        at_hi = np.interp(hi, a, cl), np.interp(hi, a, cd)
-        a, cl, cd = np.r_[-hi, a], np.r_[-REVERSED_LIFT * at_hi[0], cl], np.r_[at_hi[1], cd]
+        at = np.interp(mirror, a, cl), np.interp(mirror, a, cd)
+        a, cl, cd = np.r_[-mirror, a], np.r_[-REVERSED_LIFT * at[0], cl], np.r_[at[1], cd]
     lo = max(float(a[0]), np.deg2rad(-85.0))
     return *extend(a, cl, cd, lo=lo, hi=hi, cd_max=cd_max, out=out), said
 

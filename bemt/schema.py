@@ -56,9 +56,11 @@ class Key:
     def expected(self) -> str:
         """What a value must be, in words."""
         if self.kind == "choice":
-            return "one of " + ", ".join(self.choices)
-        plain = {"text": "a text that is not empty", "file": "the name of a file beside the case", "axis": AXIS,
-                 "texts": "a list of texts", "text_or_texts": "a text or a list of texts", "list": "a list"}  # fmt: skip
+            return ("one of " if len(self.choices) > 1 else "") + ", ".join(self.choices)
+        plain = {
+            "text": "a text that is not empty", "file": "the name of a file beside the case", "axis": AXIS,
+            "texts": "a list of texts", "text_or_texts": "a text or a list of texts", "list": "a list",
+        }  # fmt: skip
         if self.kind in plain:
             return plain[self.kind]
         noun = {"integer": "a whole number", "numbers": "a list of numbers"}.get(self.kind, "a number")
@@ -338,16 +340,30 @@ def load_toml(path: str | Path, out: Collector) -> dict[str, Any] | None:
         return None
 
 
+_SYNTAX = {
+    "Cannot overwrite": "a repeated key or table",
+    "Cannot declare": "a repeated key or table",
+    "Cannot mutate": "a repeated key or table",
+    "Invalid value": "no value that TOML knows",
+    "Illegal character": "an open quote or an illegal character",
+    "Unterminated string": "an open quote or an illegal character",
+    "Expected newline": "more text after a value",
+    "Unescaped": "a backslash that starts no escape",
+    "Expected '='": "a key without =",
+}
+"""Start of tomllib's message to words that do not change with the version of Python."""
+
+
 def _syntax_fault(message: str, text: str) -> tuple[str, str, str, str]:
     found = re.match(r"(.*?)\s*\(at (?:line (\d+), column (\d+)|end of document)\)$", message, re.S)
     lines = text.splitlines() or [""]
     if found is None:
         return "", f"invalid TOML ({message})", "valid TOML 1.0", ""
-    what = found[1]
+    what = next((words for start, words in _SYNTAX.items() if found[1].startswith(start)), "invalid TOML")
     line, column = (int(found[2]), int(found[3])) if found[2] else (len(lines), len(lines[-1]) + 1)
     source = lines[line - 1].strip() if line <= len(lines) else ""
     hint = ""
-    if "Cannot overwrite" in what or "Cannot declare" in what:
+    if what == "a repeated key or table":
         hint = "Write each key and each table once"
     elif re.search(r"\d,\d", source) and "[" not in source:
         hint = "Use a decimal point"
@@ -355,5 +371,4 @@ def _syntax_fault(message: str, text: str) -> tuple[str, str, str, str]:
         hint = "Put text in quotes"
     elif re.search(r"=\s*(#.*)?$", source):
         hint = "Give the key a value"
-    got = f"invalid TOML ({what[:1].lower() + what[1:]})"
-    return f"{line}:{column}", got + (f" in `{source[:60]}`" if source else ""), "valid TOML 1.0", hint
+    return f"{line}:{column}", what + (f" in `{source[:60]}`" if source else ""), "valid TOML 1.0", hint

@@ -102,7 +102,9 @@ def json_text(document: Any) -> str:
     return json.dumps(plain(document), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def text_table(header: Sequence[str], rows: Iterable[Sequence[str]], left: Iterable[int] = (0,), indent: str = "") -> str:
+def text_table(
+    header: Sequence[str], rows: Iterable[Sequence[str]], left: Iterable[int] = (0,), indent: str = ""
+) -> str:
     """Align columns.
 
     Parameters
@@ -244,7 +246,7 @@ def csv_block(columns: Sequence[NDArray[Any] | tuple[NDArray[np.float64], NDArra
         mark = ord("\n") if i == len(columns) - 1 else ord(",")
         blocks += [cells, np.full((len(cells), 1), mark, dtype=np.uint8)]
     page = np.hstack(blocks).ravel()
-    return page[page != 0].tobytes()
+    return bytes(page[page != 0])
 
 
 def write_atomic(path: Path, data: bytes | str) -> None:

@@ -261,7 +261,9 @@ class Blade:
         below = [a for a in self.anchors if a[0] <= x] or [self.anchors[0]]
         above = [a for a in self.anchors if a[0] >= x] or [self.anchors[-1]]
         (x0, first), (x1, second) = below[-1], above[0]
-        return first if x1 <= x0 else blend(first, second, (x - x0) / (x1 - x0))
+        w = 0.0 if x1 <= x0 else (x - x0) / (x1 - x0)
+        w = round(w) if min(w, 1 - w) < 1e-9 else w  # r/R is rounded: an anchor is met as it is
+        return blend(first, second, w)
 
     def section_curve(self, r: float, n: int | None = None) -> Array:
         """Return the true section outline at a radius: chord, blade angle, sweep and rake applied.

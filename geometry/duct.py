@@ -254,7 +254,7 @@ class Duct:
 
     def _ellipse(self, x: Array) -> Array:
         """Ordinate of the unit quarter ellipse: 0 at the nose, 1 behind the lip."""
-        if self.lip_length == 0.0:
+        if self.lip_length < 1e-9 * self.length:
             return np.ones_like(x)
         out: Array = np.sqrt(np.clip(1 - (1 - np.minimum(x / self.lip_length, 1.0)) ** 2, 0.0, 1.0))
         return out

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.interpolate import PchipInterpolator
+from scipy.interpolate import PchipInterpolator  # type: ignore[import-untyped]
 
 from geometry.airfoil import Airfoil, GeometryError, blend, naca, naca4, parse_dat, pchip, plate
 
@@ -85,7 +85,8 @@ def test_sides_interpolate_the_four_digit_formula(n: int) -> None:
 def test_four_digit_parameters_are_measured_back(camber: float, position: float, thickness: float) -> None:
     section = naca4(camber, position, thickness)
     # Thickness is laid across the camber line and measured across the chord: longer by 1 / cos(slope) at most.
-    assert thickness * 0.998 <= section.thickness <= thickness * (1.003 + (2 * camber / min(position, 1 - position)) ** 2)
+    steepest = 2 * camber / min(position, 1 - position)
+    assert thickness * 0.998 <= section.thickness <= thickness * (1.003 + steepest**2)
     assert section.camber == pytest.approx(camber, abs=2e-4 + 0.04 * abs(camber))
     assert section.te_gap == pytest.approx(0.021 * thickness, rel=1e-6)
 
@@ -200,7 +201,7 @@ def lednicer(section: Airfoil, counts: bool) -> str:
         lambda s: lednicer(s, True),
         lambda s: lednicer(s, False),
     ],
-    ids=["selig", "crlf", "bom, commas", "no title", "number as title", "lower first", "lednicer", "lednicer, no counts"],
+    ids=["selig", "crlf", "bom, commas", "no title", "number title", "lower first", "lednicer", "lednicer, no counts"],
 )
 def test_files_come_back(section: Airfoil, write) -> None:  # type: ignore[no-untyped-def]
     back = parse_dat(write(section), "name")
@@ -237,8 +238,8 @@ def edited(change: dict[int, str]) -> str:
             "line 11: got 'nan 0.1'; expected two finite numbers, x and y.",
         ),
         (
-            "t\n" + "\n".join(f"{100 * x:.4f} {100 * y:.4f}" for x, y in zip(naca("0012").x, naca("0012").y, strict=True)),
-            "section file: got x up to 100; expected x from 0 to 1. "
+            "\n".join(f"{100 * x:.4f} {100 * y:.4f}" for x, y in zip(naca("0012").x, naca("0012").y, strict=True)),
+            "section file: got x from 0 to 100; expected x from 0 to 1 (unit chord). "
             "Coordinates in percent or millimetres? Divide by the chord.",
         ),
         (
@@ -280,10 +281,10 @@ def test_crossing_sides_are_refused() -> None:
         (lambda: naca("0000"), "naca: got '0000'; expected a thickness above 00. For a thin plate use plate()."),
         (lambda: naca4(0, 0.4, 0.12, n=80), "n: got 80; expected an odd number of points, 21 or more."),
         (lambda: blend(naca("0012"), naca("0015"), 1.2), "w: got 1.2; expected a number from 0 to 1."),
-        (lambda: Airfoil("a", [1, 0, 1], [0, 0]), "airfoil 'a': got arrays x (3,) and y (2,); expected two equal 1-D "
-         "arrays of 7 points or more."),
-        (lambda: Airfoil("a", naca("0012").x[::-1], naca("0012").y[::-1]), "airfoil 'a': got points that run lower side "
-         "first; expected trailing edge, upper side, leading edge, lower side. Reverse the list."),
+        (lambda: Airfoil("a", np.array([1.0, 0, 1]), np.zeros(2)), "airfoil 'a': got arrays x (3,) and y (2,); "
+         "expected two equal 1-D arrays of 7 points or more."),
+        (lambda: Airfoil("a", naca("0012").x[::-1], naca("0012").y[::-1]), "airfoil 'a': got points that run lower "
+         "side first; expected trailing edge, upper side, leading edge, lower side. Reverse the list."),
         (lambda: Airfoil("a", naca("0012").x * 25.4, naca("0012").y), "airfoil 'a': got x from 0 to 25.4; expected x "
          "from 0 to 1 (unit chord). Coordinates in percent or millimetres? Divide by the chord."),
     ],
@@ -305,3 +306,11 @@ def test_interpolation_is_that_of_scipy_and_clamped(steps: list[tuple[float, flo
     np.testing.assert_allclose(pchip(x, y, [x[0] - 1, x[-1] + 1]), y[[0, -1]], rtol=1e-12, atol=1e-12)
     both = np.stack([y, -2 * y], axis=1)
     np.testing.assert_allclose(pchip(x, both, q)[:, 1], -2 * pchip(x, y, q), rtol=1e-9, atol=1e-9)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.floats(-0.25, 0.25), st.floats(0.05, 0.95), st.floats(0.005, 0.6), st.floats(0.002, 0.3), st.floats(0, 1))
+def test_every_declared_parameter_makes_a_section(m: float, p: float, t: float, plate_t: float, w: float) -> None:
+    mixed = blend(naca4(m, p, t), plate(m, plate_t), w).repanel(101)
+    assert mixed.area > 0
+    assert np.isfinite([mixed.thickness, mixed.camber, mixed.te_gap]).all()

@@ -45,11 +45,11 @@ def test_a_straight_duct_passes_what_it_takes_in(gap: float) -> None:
 
 
 ducts = st.builds(
-    lambda ri, length, lip, cone, te, x, aspect: Duct(
-        ri, length * ri, lip * ri, 0.01 * ri, cone * ri, 0.1 * ri, x * length * ri, lip_aspect=aspect, te_thickness=te * ri
+    lambda k, length, lip, cone, te, x, aspect: Duct(
+        k, length * k, lip * k, 0.01 * k, cone * k, 0.1 * k, x * length * k, lip_aspect=aspect, te_thickness=te * k
     ),
-    st.floats(0.01, 2), st.floats(0.6, 5), st.floats(0.0, 0.25), st.floats(0.5, 1.6), st.floats(0.001, 0.2),
-    st.floats(0.1, 0.9), st.floats(0.3, 2.0),
+    st.floats(0.01, 2), st.floats(0.6, 5), st.just(0.0) | st.floats(0.005, 0.25), st.floats(0.5, 1.6),
+    st.floats(0.001, 0.2), st.floats(0.1, 0.9), st.floats(0.3, 2.0),
 )  # fmt: skip
 
 
@@ -74,8 +74,10 @@ def test_walls(duct: Duct) -> None:
         assert duct.inner(duct.rotor_x) == pytest.approx(duct.inner_radius)  # type: ignore[arg-type]
         assert duct.rotor_x in x
     lip = x < duct.lip_length
-    quarter = ((duct.lip_length - x[lip]) / duct.lip_length) ** 2 + ((duct.inner_radius + duct.lip_radius - inner[lip, 1]) / duct.lip_radius) ** 2  # noqa: E501
-    np.testing.assert_allclose(quarter, 1.0, rtol=1e-6)  # an ellipse
+    if lip.any():  # a quarter ellipse
+        along = (duct.lip_length - x[lip]) / duct.lip_length
+        across = (duct.inner_radius + duct.lip_radius - inner[lip, 1]) / duct.lip_radius
+        np.testing.assert_allclose(along**2 + across**2, 1.0, rtol=1e-6)
     assert math.copysign(1, duct.diffuser_angle) == math.copysign(1, duct.exit_radius - duct.inner_radius)  # type: ignore[operator]
 
 
@@ -109,7 +111,8 @@ def test_fit_to_the_rotor() -> None:
     with pytest.raises(GeometryError) as error:
         replace(DUCT, inner_radius=0.0335).check(ROTOR)
     assert str(error.value) == (
-        "duct.inner_radius: got 0.0335 m; expected tip radius plus gap, 0.0345 + 0.0004 = 0.0349 m. The blades cut the wall."
+        "duct.inner_radius: got 0.0335 m; expected tip radius plus gap, 0.0345 + 0.0004 = 0.0349 m. "
+        "The blades cut the wall."
     )
 
 

@@ -1,0 +1,163 @@
+"""Polar save files of XFOIL (``PACC``), and of XFLR5 and XOptFoil that write the same layout.
+
+One file holds one Reynolds number::
+
+    Calculated polar for: NACA 4412
+    1 1 Reynolds number fixed          Mach number fixed
+    xtrf =   1.000 (top)        1.000 (bottom)
+    Mach =   0.000     Re =     0.100 e 6     Ncrit =   9.000
+     alpha    CL        CD       CDp       CM     Top_Xtr  Bot_Xtr
+    ------ -------- --------- --------- -------- -------- --------
+
+Several such files make one polar with `read_many`.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from collections.abc import Iterable
+
+from bemt.errors import Fault, InputError
+from bemt.importers import SourceText, head_text, load_text, number
+from bemt.importers.polar_csv import PolarRow, assemble
+from bemt.polars import Polar
+
+__all__ = ["KIND", "read", "read_many", "sniff"]
+
+KIND = "polar_xfoil"
+
+_TITLE = re.compile(r"Calculated polar for:[ \t]*(.*?)[ \t]*$", re.M)
+_STATE = re.compile(r"Mach\s*=\s*(\S+)\s+Re\s*=\s*(\S+)\s*e\s*(\d+)\s+Ncrit\s*=\s*(\S+)", re.I)
+_TYPE = re.compile(r"^\s*\d+\s+\d+\s+Reynolds number\s+(.*?)\s{2,}Mach number\s+(.*?)\s*$", re.M)
+_TRIP = re.compile(r"xtrf\s*=\s*(\S+)\s*\(top\)\s*(\S+)\s*\(bottom\)")
+
+
+def sniff(head: bytes | str) -> bool:
+    r"""Tell whether a file begins like an XFOIL polar.
+
+    Parameters
+    ----------
+    head : bytes or str
+        First bytes of a file.
+
+    Returns
+    -------
+    bool
+        True when it says "Calculated polar for:".
+
+    Examples
+    --------
+    >>> sniff("       XFOIL         Version 6.99\n\n Calculated polar for: NACA 4412\n"), sniff("alpha,cl,cd")
+    (True, False)
+    """
+    return _TITLE.search(head_text(head)) is not None
+
+
+def read(path: str | os.PathLike[str]) -> Polar:
+    """Read one XFOIL polar file.
+
+    Parameters
+    ----------
+    path : str or path
+        File to read.
+
+    Returns
+    -------
+    Polar
+        One Reynolds and one Mach number, continued to +-180 deg; its notes hold Ncrit and the trips.
+
+    Raises
+    ------
+    InputError
+        With every fault: no Re line, varying Re (types 2 and 3), text for numbers.
+    """
+    return read_many([path])
+
+
+def read_many(paths: Iterable[str | os.PathLike[str]]) -> Polar:
+    """Read XFOIL polar files of one section at several Reynolds numbers.
+
+    Parameters
+    ----------
+    paths : iterable of str or path
+        Files, one per Reynolds number (or per pair of Reynolds and Mach number).
+
+    Returns
+    -------
+    Polar
+        All of them in one, continued to +-180 deg.
+
+    Raises
+    ------
+    InputError
+        With every fault of every file.
+    """
+    rows: list[PolarRow] = []
+    faults: list[Fault] = []
+    notes: list[str] = []
+    names: list[str] = []
+    first: SourceText | None = None
+    for path in paths:
+        source = load_text(path)
+        first = first or source
+        name, more, said = _parse(source, faults)
+        if names and name != names[0]:
+            faults.append(Fault(source.name, "", f"section {name!r}", f"section {names[0]!r} as in the first file", ""))
+        names.append(name)
+        rows += more
+        notes += said
+    if first is None:
+        raise InputError(Fault("", "", "no files", "one XFOIL polar or more", ""))
+    return assemble(first, rows, faults, name=names[0], kind="XFOIL polar", notes=tuple(dict.fromkeys(notes)))
+
+
+def _parse(source: SourceText, faults: list[Fault]) -> tuple[str, list[PolarRow], list[str]]:
+    """Name, rows and notes of one file; faults are added to the list."""
+    text = source.text
+    title, state, kind, trip = (p.search(text) for p in (_TITLE, _STATE, _TYPE, _TRIP))
+    notes = []
+    if title is None:
+        faults.append(Fault(source.name, "", "no line 'Calculated polar for:'", "an XFOIL polar save file", ""))
+    if kind and (kind.group(1).lower() != "fixed" or kind.group(2).lower() != "fixed"):
+        got = f"Reynolds number {kind.group(1)}, Mach number {kind.group(2)}"
+        line = str(text.count("\n", 0, kind.end()) + 1)
+        faults.append(Fault(source.name, line, got, "a polar of type 1 (both fixed)", "Run XFOIL with TYPE 1"))
+    reynolds, mach = None, 0.0
+    if state is None:
+        got, hint = "no line 'Mach = ... Re = ... e 6 Ncrit = ...'", "Save the polar with viscous mode on"
+        faults.append(Fault(source.name, "", got, "the state of the run", hint))
+    else:
+        values = [number(state.group(k)) for k in (1, 2, 4)]
+        line = str(text.count("\n", 0, state.start()) + 1)
+        if any(v is None for v in values):
+            faults.append(Fault(source.name, line, repr(state.group(0)), "numbers for Mach, Re and Ncrit", ""))
+        else:
+            mach, reynolds = float(values[0] or 0.0), float(values[1] or 0.0) * 10.0 ** int(state.group(3))
+            notes.append(f"Ncrit {values[2]:g}")
+            if reynolds == 0.0:
+                reynolds = None
+                hint = "XFOIL prints three decimals of millions: set Re by hand if it is below 500"
+                faults.append(Fault(source.name, line, "Re = 0", "a Reynolds number above 0 (viscous run)", hint))
+    if trip and (trip.group(1), trip.group(2)) != ("1.000", "1.000"):
+        notes.append(f"forced transition at x/c {trip.group(1)} (top), {trip.group(2)} (bottom)")
+    rows = []
+    lines = source.lines
+    start = next((i for i, line in enumerate(lines) if re.match(r"\s*alpha\s+CL\s+CD\b", line, re.I)), len(lines))
+    for i, line in enumerate(lines[start + 1 :], start + 2):
+        cells = line.split()
+        if not cells or set(line.strip()) <= {"-", " "}:
+            continue
+        values = [number(c) for c in cells[:3]]
+        if len(values) < 3 or any(v is None for v in values):
+            bad = next((k for k, v in enumerate(values) if v is None), len(values))
+            got = repr(cells[bad]) if bad < len(cells) else "the end of the line"
+            expected = ("alpha", "CL", "CD")[min(bad, 2)] + " as a number"
+            faults.append(Fault(source.name, f"{i}:{bad + 1}", got, expected))
+            continue
+        alpha, cl, cd = (float(v or 0.0) for v in values)
+        rows.append(PolarRow(i, math.radians(alpha), cl, cd, reynolds, mach))
+    if not rows:
+        faults.append(Fault(source.name, "", "no rows", "rows under the header 'alpha CL CD ...'", "Empty polar?"))
+    return (title.group(1) if title else ""), rows, notes

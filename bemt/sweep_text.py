@@ -1,0 +1,222 @@
+"""Tables of a sweep for terminals and spreadsheets."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from bemt.sweep_case import ROW_SOURCES
+from bemt.tables import csv_text, number_text, text_table
+
+__all__ = ["case_text", "overview_text", "rows_csv"]
+
+WIDTH = 118
+CSV_COLUMNS = (
+    "case", "source", "label", "rpm", "airspeed_m_s", "density_kg_m3", "thrust_N", "thrust_kgf", "u", "u_num",
+    "u_input", "torque_Nm", "power_W", "CT", "CP", "J", "M_tip", "Re", "exhaust_speed_m_s", "duct_share",
+    "bemt_error_pct", "bemt_u_val", "k1k2_error_pct", "k1k2_u_val", "converged", "flags", "origin", "remark",
+)  # fmt: skip
+
+
+def _n(value: Any, digits: int = 4) -> str:
+    return number_text(None if value is None else float(value), digits)
+
+
+def _pct(value: Any) -> str:
+    return "-" if value is None or math.isnan(value) else f"{value:+.1f}"
+
+
+def _wrap(text: str, indent: str, first: str = "") -> str:
+    lines = textwrap.wrap(" ".join(text.split()), WIDTH, initial_indent=indent + first,
+                          subsequent_indent=indent + " " * len(first), break_long_words=False)  # fmt: skip
+    return "\n".join(lines)
+
+
+def _u_val(row: Mapping[str, Any]) -> str:
+    if "bemt_error_pct" not in row:
+        return ""
+    value = row.get("bemt_u_val")
+    return "unknown" if value is None or math.isnan(value) else _n(value, 3)
+
+
+def _main_table(result: Mapping[str, Any]) -> str:
+    header = ["source", "rpm", "V m/s", "T kgf", "T N", "u N", "Q N m", "CT", "CP", "M_tip", "Re75",
+              "BEMT err %", "K1K2 err %", "u_val N", "flags"]  # fmt: skip
+    notes: list[str] = []
+    body = []
+    for row in [*result["rows"], *result["variants"], *result["other_rows"]]:
+        marks = []
+        for flag in row["flags"]:
+            if flag not in notes:
+                notes.append(flag)
+            marks.append(str(notes.index(flag) + 1))
+        body.append([
+            row["label"], f"{row['rpm']:g}", f"{row['airspeed_m_s']:g}", _kgf(row["thrust_kgf"]), _n(row["thrust_N"]),
+            _n(row["u"], 2) if row["u"] is not None and not math.isnan(row["u"]) else "unknown", _n(row["torque_Nm"]),
+            _n(row["CT"]), _n(row["CP"]), _n(row["M_tip"], 3), _n(row["Re"], 3), _pct(row.get("bemt_error_pct")),
+            _pct(row.get("k1k2_error_pct")), _u_val(row), ",".join(marks),
+        ])  # fmt: skip
+    table = text_table(header, body, left=(0, len(header) - 1), indent="  ")
+    return "\n".join([table, *(_wrap(note, "    ", f"{i}: ") for i, note in enumerate(notes, 1))])
+
+
+def _kgf(value: float) -> str:
+    return "-" if math.isnan(value) else f"{value:.3f}"
+
+
+def _assumption_table(result: Mapping[str, Any]) -> str:
+    rows = [
+        [a["key"], f"{a['nominal']:g}" if isinstance(a["nominal"], (int, float)) else str(a["nominal"]), a["range"],
+         " .. ".join(_n(v) for v in a["thrust_N"]), _n(a["u_thrust_N"], 2), a["why"]]
+        for a in result["assumptions"]
+    ]  # fmt: skip
+    header = ["assumed, because the source does not give it", "value", "range", "T N over the range", "u N", "why"]
+    shown = [row[:-1] for row in rows]
+    table = text_table(header[:-1], shown, left=(0,), indent="  ").split("\n")
+    reasons = [_wrap(str(row[-1]), "      ") for row in rows]
+    return "\n".join([table[0], *(f"{line}\n{why}" for line, why in zip(table[1:], reasons, strict=True))])
+
+
+def _comparison_lines(result: Mapping[str, Any]) -> list[str]:
+    """BEMT against every recorded value, with uncertainties."""
+    rows = []
+    for c in result["comparisons"]:
+        if c["model"] != "k1k2" and c["source"] in ROW_SOURCES:
+            error = "-" if math.isnan(c["E"]) else f"{c['E']:+.4g}"
+            us = [_n(c["u_num"], 2), _n(c["u_input"], 2), _u(c["u_D"]), _u(c["u_val"])]
+            values = [_n(c["S"]), _n(c["D"]), error, _pct(c["E_pct"])]
+            rows.append([c["model"], c["reference"], c["quantity"], *values, *us, c["verdict"]])
+    if not rows:
+        return []
+    header = ["E = S - D", "against", "quantity", "S", "D", "E", "E %", "u_num", "u_input", "u_D", "u_val", "verdict"]
+    return ["", text_table(header, rows, left=(0, 1, 2, 11), indent="  ")]
+
+
+def _u(value: float) -> str:
+    return "unknown" if math.isnan(value) else _n(value, 2)
+
+
+def _fan_lines(fan: Mapping[str, Any] | None) -> list[str]:
+    if fan is None:
+        return []
+    return [
+        "",
+        f"  duct: rotor {_n(fan['rotor_thrust_N'])} N + duct {_n(fan['duct_thrust_N'])} N + stator "
+        f"{_n(fan['stator_thrust_N'])} N; duct share {_n(100 * fan['duct_share'], 3)} %; blade solidity of the annulus "
+        f"{_n(fan['annulus_solidity'], 3)}",
+        f"  exhaust {_n(fan['exhaust_speed_m_s'])} m/s (u {_n(fan['u_exhaust_speed_m_s'], 2)}); momentum through the "
+        f"exit {_n(fan['exit_momentum_N'])} N; pitch speed {_n(fan['geometric_pitch_speed_m_s'])} m/s",
+    ]
+
+
+def _grid_lines(grid: Mapping[str, Any] | None) -> list[str]:
+    if grid is None:
+        return []
+    axes = ", ".join(f"{k} {v['num']} x {v['min']:g} .. {v['max']:g}" for k, v in grid["axes"].items())
+    low, high = grid["thrust_N"]
+    where = f"; {grid['file']}" if grid["file"] else "; --out DIR keeps it"
+    slow, fast = grid["M_tip"]
+    line = (
+        f"grid: {axes}: {grid['points']} points, {grid['unconverged']} unconverged, "
+        f"thrust {_n(low)} .. {_n(high)} N, tip Mach {_n(slow, 3)} .. {_n(fast, 3)}{where}"
+    )
+    return ["", _wrap(line, "  ")]
+
+
+def case_text(result: Mapping[str, Any]) -> str:
+    """Table of one case.
+
+    Parameters
+    ----------
+    result : mapping
+        As :func:`bemt.sweep_case.solve_case` gives it, plain or not.
+
+    Returns
+    -------
+    str
+        Lines for a terminal, without a newline at the end.
+    """
+    if not result["rows"]:
+        return "\n".join([f"{result['name']}: not solved", *(f"  {fault}" for fault in result["faults"])])
+    result = _with_nan(result)
+    c = result["conditions"]
+    head = (
+        f"D {_n(c['diameter_m'])} m, hub {_n(c['hub_diameter_m'])} m, {c['blades']} blades, pitch at 0.75 R "
+        f"{_n(c['pitch_075R_m'])} m, solidity {_n(c['solidity'], 3)}; {_n(c['density_kg_m3'])} kg/m3, "
+        f"{_n(c['temperature_C'], 3)} degC; {c['convention']}; {c['stations']} stations, n_crit {c['n_crit']:g}"
+    )
+    lines = [
+        f"{result['name']}: {result['title']}",
+        _wrap(head, "  "),
+        _wrap("effects: " + ", ".join(c["effects"]), "  "),
+    ]
+    lines += [_main_table(result), *_fan_lines(result["fan"]), *_comparison_lines(result)]
+    if result["assumptions"]:
+        bemt = result["rows"][0]
+        low, high = bemt["thrust_N_range"]
+        lines += ["", _assumption_table(result)]
+        lines += [f"  together: u_input {_n(bemt['u_input'], 3)} N, u_num {_n(bemt['u_num'], 2)} N; one at a time the "
+                  f"thrust runs from {_n(low)} to {_n(high)} N"]  # fmt: skip
+    lines += _grid_lines(result.get("grid"))
+    lines += [_wrap(note, "  ", "note: ") for note in result["notes"]]
+    return "\n".join(lines)
+
+
+def _with_nan(value: Any, key: str = "") -> Any:
+    """Numbers that JSON holds as null become NaN again, so that a reused result prints like a fresh one."""
+    if isinstance(value, Mapping):
+        return {k: _with_nan(v, k) for k, v in value.items()}
+    if isinstance(value, list):
+        return [_with_nan(v, key) for v in value]
+    numeric = key.startswith(
+        ("thrust", "u_", "torque", "E", "S", "D", "exhaust", "rotor_", "duct_", "stator_", "exit_")
+    )
+    return math.nan if value is None and (numeric or key in ("M_tip", "E_pct")) else value
+
+
+def overview_text(results: Sequence[Mapping[str, Any]]) -> str:
+    """Table over all cases.
+
+    Parameters
+    ----------
+    results : sequence of mapping
+        Results of the cases.
+
+    Returns
+    -------
+    str
+        One line per source and case.
+    """
+    header = ["case", "source", "T kgf", "T N", "CT", "CP", "M_tip", "Re75", "BEMT err %", "K1K2 err %", "flags"]
+    body = []
+    for result in map(_with_nan, results):
+        if not result["rows"]:
+            body.append([result["name"], "not solved", *[""] * 8, f"{len(result['faults'])} faults"])
+        for row in [*result["rows"], *result["variants"], *result["other_rows"]]:
+            count = len(row["flags"])
+            body.append([
+                result["name"], row["label"], _kgf(row["thrust_kgf"]), _n(row["thrust_N"]), _n(row["CT"]),
+                _n(row["CP"]), _n(row["M_tip"], 3), _n(row["Re"], 3),
+                _pct(row.get("bemt_error_pct")), _pct(row.get("k1k2_error_pct")),
+                f"{count} flags" if count > 1 else "1 flag" if count else "",
+            ])  # fmt: skip
+    return text_table(header, body, left=(0, 1, 10))
+
+
+def rows_csv(results: Sequence[Mapping[str, Any]]) -> str:
+    """All rows of all cases as CSV.
+
+    Parameters
+    ----------
+    results : sequence of mapping
+        Results of the cases.
+
+    Returns
+    -------
+    str
+        CSV text with a header.
+    """
+    rows = [{"case": r["name"], **row} for r in results for row in [*r["rows"], *r["variants"], *r["other_rows"]]]
+    return csv_text(CSV_COLUMNS, rows)

@@ -1,0 +1,66 @@
+"""What tests of several promises share: the reference data, a small rotor, and where caches go."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from bemt.polars import Polar
+    from geometry.rotor import Rotor
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Give section tables a cache that outlives the run, is no part of the user's own and is ignored by git.
+
+    A table is found by the hash of all that decides it, so an old one cannot be taken for a new one; a fresh folder
+    each time would only cost NeuralFoil's time again. Set before any test, so that child processes inherit it.
+    """
+    cache = getattr(config, "cache", None)  # absent under -p no:cacheprovider: the user's cache serves then
+    if cache is not None:
+        os.environ.setdefault("BEMT_CACHE", str(cache.mkdir("bemt")))
+
+
+@pytest.fixture(scope="session")
+def project() -> Path:
+    """Folder of the repository."""
+    return ROOT
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """Published reference data, which are no part of the project: ``$BEMT_DATA``, else ``../shared/data``."""
+    named = os.environ.get("BEMT_DATA")
+    folder = Path(named).expanduser() if named else ROOT.parent / "shared" / "data"
+    if not folder.is_dir():
+        pytest.skip(f"reference data not found at {folder}; name their folder in BEMT_DATA")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def rotor() -> Rotor:
+    """Two-bladed 8x5 propeller by name only: helix, generic chord law."""
+    from geometry.airfoil import naca4
+    from geometry.blade import helix
+    from geometry.rotor import Rotor
+
+    inch = 0.0254
+    return Rotor(helix(8 * inch, 5 * inch, anchors=naca4(0.04, 0.4, 0.12)), 2, name="8x5")
+
+
+@pytest.fixture(scope="session")
+def polar() -> Polar:
+    """Cambered section with a stall, from closed forms: no network, no Reynolds dependence."""
+    import numpy as np
+
+    from bemt.polars import SectionTable, from_tables
+
+    alpha = np.radians(np.arange(-20.0, 25.5, 0.5))
+    linear = 5.9 * (alpha + np.radians(4.0))
+    cl = np.clip(linear, -0.9, 1.3) - 0.8 * np.clip(np.abs(alpha) - np.radians(13.0), 0.0, None)
+    return from_tables([SectionTable(alpha, cl, 0.012 + 0.008 * cl**2)], name="closed form", source="made for tests")

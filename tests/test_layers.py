@@ -1,0 +1,314 @@
+"""The promise of the rooms: imports go up the flow of data, the core is pure, heavy libraries come when needed.
+
+The rules are the tables below; `violations` reads source text and knows nothing of the tree, so that planted faults
+can prove that every rule bites.
+"""
+
+from __future__ import annotations
+
+import ast
+import json
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from fnmatch import fnmatchcase
+from functools import lru_cache
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+# The flow, lowest first. A module may import rooms of lower floors and its own room; rooms on one floor are strangers.
+# A room is patterns of module names below `bemt.` (`|` joins two); the first that matches holds.
+FLOOR_OF_ROOMS: tuple[tuple[str, ...], ...] = (
+    ("errors",),
+    ("units", "cache", "tables"),
+    ("air", "coefficients"),
+    ("series", "polars*", "empirical*", "schema"),
+    ("effects|effects.*", "importers|importers.*"),
+    ("_kernel*", "case*"),
+    ("solver*|duct*",),
+    ("evaluate*",),
+    ("grid*",),
+    ("sweep*", "validate*|_validate*", "reproduce*|_thesis*", "bench*|_bench*"),
+    ("compare*",),
+    ("diagnose|diagnose.*",),
+    ("conceal|conceal.*", "drive|drive.*"),
+    ("report|report.*",),
+    ("cli",),
+    ("__main__",),
+)
+
+# Who may touch the world outside, and how. Whoever is not named touches nothing.
+MAY: dict[str, set[str]] = {
+    "bemt.cli": {"print", "files", "environment"},
+    "bemt.case*": {"files"},
+    "bemt.schema": {"files"},
+    "bemt.importers|bemt.importers.*": {"files"},
+    "bemt.cache": {"files", "environment"},
+    "bemt.tables": {"files"},
+    "bemt.grid*": {"files"},
+    "bemt.report|bemt.report.*": {"files", "print"},
+    # subcommands: their run() prints
+    "bemt.sweep": {"files", "print"},
+    "bemt.validate": {"files", "print"},
+    "bemt.reproduce": {"files", "print", "environment"},
+    "bemt.bench*|bemt._bench*": {"files", "print", "clock", "environment"},
+    "geometry.export": {"files"},
+    "geometry.picture": {"files"},
+}
+
+HEAVY = {
+    "OCP", "aerosandbox", "cadquery", "casadi", "dask", "manifold3d", "matplotlib", "neuralfoil", "pandas", "pyvista",
+    "scipy", "sklearn", "trimesh", "vtk", "vtkmodules", "wisdem",
+}  # fmt: skip
+NUMBA_AT_TOP = "bemt._kernel*"  # what is compiled must be decorated where it stands
+LIGHT = {"bemt", "bemt.__main__", "bemt.cli", "bemt.errors"}  # imported by --help: standard library only
+
+FILE_CALLS = {
+    "open", "read_text", "write_text", "read_bytes", "write_bytes", "mkdir", "unlink", "rename", "touch", "iterdir",
+    "glob", "rglob", "savez", "savetxt", "loadtxt", "genfromtxt", "fromfile", "tofile", "read_csv", "to_csv",
+}  # fmt: skip
+OS_ENVIRONMENT = {"environ", "environb", "getenv", "putenv"}
+OS_PURE = {"PathLike", "fspath", "path", "sep", "cpu_count", "sched_getaffinity", "getpid"}
+FILE_MODULES = {"tempfile", "shutil", "glob", "subprocess", "socket", "urllib", "sqlite3"}
+
+
+def match(name: str, room: str) -> bool:
+    return any(fnmatchcase(name, pattern) for pattern in room.split("|"))
+
+
+def place(module: str) -> tuple[int, str] | None:
+    """Floor and room of a module of bemt."""
+    name = module.removeprefix("bemt.")
+    return next(((i, room) for i, rooms in enumerate(FLOOR_OF_ROOMS) for room in rooms if match(name, room)), None)
+
+
+Import = tuple[str, tuple[str, ...], int, str]
+Touch = tuple[str, int, str]
+
+
+@lru_cache(maxsize=None)
+def facts(text: str) -> tuple[tuple[Import, ...], tuple[Touch, ...]]:
+    """Imports and touches of a module's source."""
+    tree = ast.parse(text)
+    return tuple(imports(tree)), tuple(touches(tree))
+
+
+def imports(tree: ast.Module) -> Iterator[Import]:
+    """Module, names taken from it, line, and when.
+
+    When is ``top``, ``call`` (inside a function) or ``type`` (for the type checker only).
+    """
+
+    def walk(node: ast.AST, when: str) -> Iterator[Import]:
+        if isinstance(node, ast.Import):
+            yield from ((alias.name, (), node.lineno, when) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = "." * node.level + (node.module or "")
+            yield base, tuple(alias.name for alias in node.names), node.lineno, when
+        else:
+            if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)) and when == "top":
+                when = "call"
+            guarded = isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
+            for child in ast.iter_child_nodes(node):
+                yield from walk(child, "type" if guarded else when)
+
+    yield from walk(tree, "top")
+
+
+def targets(found: Iterable[Import], modules: Mapping[str, str]) -> Iterator[tuple[str, int, str]]:
+    """Modules that imports mean: ``from bemt import air`` is bemt.air, ``from bemt.air import Air`` too."""
+    for base, names, line, when in found:
+        inner = [f"{base}.{name}" for name in names if f"{base}.{name}" in modules]
+        yield from ((name, line, when) for name in inner)
+        if len(inner) < len(names) or not names:
+            yield base, line, when
+
+
+def touches(tree: ast.Module) -> Iterator[Touch]:
+    """What of the world outside a module uses: kind, line, words."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            names = [a.name for a in node.names] if isinstance(node, ast.Import) else [node.module or ""]
+            for name in names:
+                if name.split(".")[0] in FILE_MODULES:
+                    yield "files", node.lineno, f"import {name}"
+                if name == "time":
+                    yield "clock", node.lineno, "import time"
+                if name == "os" and isinstance(node, ast.ImportFrom):
+                    yield "environment", node.lineno, "from os import; write os.name"
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            if node.func.id in ("print", "input"):
+                yield "print", node.lineno, f"{node.func.id}()"
+            if node.func.id == "open":
+                yield "files", node.lineno, "open()"
+        elif isinstance(node, ast.Attribute):
+            words = ast.unparse(node)
+            if words in ("sys.stdout", "sys.stderr", "sys.stdin"):
+                yield "print", node.lineno, words
+            elif words.startswith("os.") and words.count(".") == 1:
+                if node.attr in OS_ENVIRONMENT:
+                    yield "environment", node.lineno, words
+                elif node.attr not in OS_PURE:
+                    yield "files", node.lineno, words
+            elif node.attr in ("now", "utcnow", "today") and words.split(".")[0] in ("datetime", "date"):
+                yield "clock", node.lineno, words
+            elif node.attr in FILE_CALLS or words in ("np.load", "np.save", "numpy.load", "numpy.save"):
+                yield "files", node.lineno, words
+
+
+def violations(modules: Mapping[str, str]) -> list[str]:
+    """All broken rules, as ``module:line: what``.
+
+    ``modules`` is dotted name -> source text of everything below ``bemt`` and ``geometry``.
+    """
+    found: list[str] = []
+    graph: dict[str, set[str]] = {}
+    for name, text in modules.items():
+        imported, touched = facts(text)
+        home = place(name) if name.startswith("bemt.") else None
+        if name.startswith("bemt.") and home is None:
+            found.append(f"{name}:1: has no place in the flow; give it one in FLOOR_OF_ROOMS")
+        allowed = set().union(*(kinds for room, kinds in MAY.items() if match(name, room)))
+        found += [f"{name}:{line}: {kind} in the pure core: {words}" for kind, line, words in touched
+                  if kind not in allowed]  # fmt: skip
+        for target, line, when in targets(imported, modules):
+            top = target.split(".")[0]
+            if when == "top" and (top in HEAVY or (top == "numba" and not match(name, NUMBA_AT_TOP))):
+                found.append(f"{name}:{line}: {target} at the top; import it inside the function that needs it")
+            if name in LIGHT and when == "top" and top not in sys.stdlib_module_names and target not in LIGHT:
+                found.append(f"{name}:{line}: {target}; --help must import the standard library only")
+            if not top:
+                found.append(f"{name}:{line}: relative import; write the whole name")
+            if top == "bemt" and name.split(".")[0] == "geometry":
+                found.append(f"{name}:{line}: geometry knows nothing of bemt, got {target}")
+            if top not in ("bemt", "geometry") or when == "type":
+                continue
+            if target not in modules:
+                found.append(f"{name}:{line}: {target} does not exist")
+                continue
+            if top == "bemt" and target != "bemt" and home is not None:
+                there = place(target)
+                own = there is not None and there[1] == home[1]
+                if there is not None and not own and there[0] >= home[0]:
+                    found.append(f"{name}:{line}: {target} is not below it in the flow")
+                if match(name, "bemt.effects.*") and match(target, "bemt.effects.*") and target != "bemt.effects.base":
+                    found.append(f"{name}:{line}: an effect is one file, got {target}")
+            if when == "top" and target != name:
+                graph.setdefault(name, set()).add(target)
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        found.append(f"{error.args[1][0]}:1: imports go round: {' <- '.join(error.args[1])}")
+    return found
+
+
+@pytest.fixture(scope="module")
+def tree(project: Path) -> dict[str, str]:
+    """Source of every module."""
+    files = [path for top in ("bemt", "geometry") for path in (project / top).rglob("*.py")]
+    names = (".".join(path.relative_to(project).with_suffix("").parts).removesuffix(".__init__") for path in files)
+    return {name: path.read_text(encoding="utf-8") for name, path in zip(names, files, strict=True)}
+
+
+def test_the_tree_keeps_the_rules(tree: dict[str, str]) -> None:
+    assert {"bemt.cli", "bemt.solver", "bemt.effects.tip_loss", "geometry.blade"} <= set(tree)
+    assert not violations(tree), "\n".join(violations(tree))
+
+
+@pytest.mark.parametrize(
+    ("module", "line", "complaint"),
+    [
+        ("geometry.blade", "from bemt.units import INCH", "geometry knows nothing of bemt, got bemt.units"),
+        ("geometry.blade", "def f():\n    import bemt.units", "geometry knows nothing of bemt, got bemt.units"),
+        ("geometry.blade", "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from bemt.air import Air",
+         "geometry knows nothing of bemt, got bemt.air"),
+        ("bemt.units", "from bemt.air import Air", "bemt.air is not below it in the flow"),
+        ("bemt.units", "from bemt import solver", "bemt.solver is not below it in the flow"),
+        ("bemt.polars", "def f():\n    from bemt.solver import solve", "bemt.solver is not below it in the flow"),
+        ("bemt.solver", "import bemt.evaluate", "bemt.evaluate is not below it in the flow"),
+        ("bemt.effects.swirl", "from bemt.effects.tip_loss import TipLoss", "an effect is one file, got bemt.effects.tip_loss"),
+        ("bemt.effects.swirl", "from bemt.importers import read", "bemt.importers is not below it in the flow"),
+        ("bemt.sweep", "from bemt import reproduce", "bemt.reproduce is not below it in the flow"),
+        ("bemt.sweep", "from bemt.cli import main", "bemt.cli is not below it in the flow"),
+        ("bemt.novelty", "", "has no place in the flow; give it one in FLOOR_OF_ROOMS"),
+        ("bemt.air", "from .units import INCH", "relative import; write the whole name"),
+        ("bemt.air", "import bemt.nowhere", "bemt.nowhere does not exist"),
+        ("bemt.solver", "def f():\n    print(1)", "print in the pure core: print()"),
+        ("bemt.solver", "import sys\nsys.stderr.write('x')", "print in the pure core: sys.stderr"),
+        ("bemt.solver", "def f(p):\n    return open(p)", "files in the pure core: open()"),
+        ("bemt.air", "from pathlib import Path\nPath('x').read_text()", "files in the pure core: Path('x').read_text"),
+        ("bemt.air", "import os\nos.replace('a', 'b')", "files in the pure core: os.replace"),
+        ("bemt.effects.swirl", "import numpy as np\nnp.load('x.npy')", "files in the pure core: np.load"),
+        ("bemt.solver", "import os\nos.environ['X']", "environment in the pure core: os.environ"),
+        ("bemt.case", "import os\nos.getenv('X')", "environment in the pure core: os.getenv"),
+        ("bemt.solver", "def f():\n    import time", "clock in the pure core: import time"),
+        ("bemt.series", "import datetime\ndatetime.datetime.now()", "clock in the pure core: datetime.datetime.now"),
+        ("geometry.duct", "print('x')", "print in the pure core: print()"),
+        ("bemt.polars", "import neuralfoil", "neuralfoil at the top; import it inside the function that needs it"),
+        ("geometry.rotor", "import cadquery as cq", "cadquery at the top; import it inside the function that needs it"),
+        ("bemt.series", "class A:\n    import pandas", "pandas at the top; import it inside the function that needs it"),
+        ("bemt.series", "try:\n    import scipy.optimize\nexcept ImportError:\n    pass",
+         "scipy.optimize at the top; import it inside the function that needs it"),
+        ("bemt.duct", "from numba import njit", "numba at the top; import it inside the function that needs it"),
+        ("bemt.cli", "import numpy as np", "numpy; --help must import the standard library only"),
+        ("bemt.cli", "import bemt.sweep", "bemt.sweep; --help must import the standard library only"),
+        ("bemt.errors", "import numpy", "numpy; --help must import the standard library only"),
+    ],
+)  # fmt: skip
+def test_a_planted_fault_is_found(tree: dict[str, str], module: str, line: str, complaint: str) -> None:
+    before = violations(tree)
+    head, _, body = tree.get(module, "").partition("from __future__ import annotations")
+    after = violations({**tree, module: f"{head}from __future__ import annotations\n{line}\n{body}"})
+    new = {text.split(": ", 1)[1] for text in after} - {text.split(": ", 1)[1] for text in before}
+    assert complaint in new
+
+
+def test_imports_that_go_round_are_found() -> None:
+    modules = {"geometry": "", "geometry.a": "import geometry.b", "geometry.b": "def f(): import geometry.a"}
+    assert not violations(modules)
+    modules["geometry.b"] = "from geometry import a"
+    assert any("imports go round" in text for text in violations(modules))
+
+
+def test_what_needs_it_may_import_and_touch() -> None:
+    assert not violations(
+        {
+            "bemt": "",
+            "bemt.polars": "def f():\n    import neuralfoil",
+            "bemt._kernel": "import numba",
+            "bemt.importers": "import os\ndef f(p: 'os.PathLike[str]'):\n    return open(p)",
+            "bemt.duct": "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from bemt.evaluate import Ready",
+            "bemt.evaluate": "from bemt import duct",
+        }
+    )
+
+
+def loaded(code: str, project: Path) -> set[str]:
+    """Modules that some code brings into a fresh interpreter, by their top names."""
+    program = f"""
+import contextlib, io, json, sys
+before = set(sys.modules)
+with contextlib.redirect_stdout(io.StringIO()):
+    try:
+{chr(10).join("        " + row for row in code.splitlines())}
+    except SystemExit as stop:
+        assert not stop.code, stop.code
+print(json.dumps(sorted({{name.split('.')[0] for name in set(sys.modules) - before}})))
+"""
+    run = subprocess.run([sys.executable, "-c", program], cwd=project, capture_output=True, text=True, timeout=300)
+    assert run.returncode == 0, run.stderr
+    return set(json.loads(run.stdout.splitlines()[-1]))
+
+
+def test_help_imports_the_standard_library_only(project: Path) -> None:
+    command = "import runpy\nsys.argv = ['bemt', '--help']\nrunpy.run_module('bemt', run_name='__main__')"
+    assert loaded(command, project) - sys.stdlib_module_names == {"bemt"}
+
+
+def test_a_sweep_needs_no_solids_and_no_pictures(project: Path) -> None:
+    command = "from bemt.cli import main\nassert main(['sweep', 'cases/prop_8x5', '--json']) == 0"
+    found = loaded(command, project)
+    assert {"bemt", "geometry", "numpy"} <= found
+    assert not found & {"OCP", "cadquery", "manifold3d", "pyvista", "trimesh", "vtk", "vtkmodules"}
