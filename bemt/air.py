@@ -178,6 +178,8 @@ def vapour_fraction(pressure_Pa: float, temperature_K: float, humidity_pct: floa
 
 
 def _positive(value: Any) -> bool:
+    if isinstance(value, str):  # numpy would read "1.2" as a number
+        return False
     try:
         v = np.asarray(value, dtype=float)
     except (TypeError, ValueError):

@@ -16,12 +16,14 @@ import os
 import tempfile
 from collections import OrderedDict
 from collections.abc import Callable
+from functools import lru_cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-__all__ = ["cache_dir", "cached_arrays", "clear_memory", "content_key"]
+__all__ = ["cache_dir", "cached_arrays", "clear_memory", "content_key", "installed_version"]
 
 Arrays = dict[str, np.ndarray]
 
@@ -136,6 +138,40 @@ def cached_arrays(kind: str, key: str, make: Callable[[], Arrays]) -> Arrays:
     while len(_memory) > MEMORY_ENTRIES:
         _memory.popitem(last=False)
     return arrays
+
+
+@lru_cache(maxsize=16)
+def installed_version(package: str) -> str:
+    """Version of an installed package, found without importing it.
+
+    Parameters
+    ----------
+    package : str
+        Name of the package as it is imported; its distribution bears the same name.
+
+    Returns
+    -------
+    str
+        Version.
+
+    Raises
+    ------
+    importlib.metadata.PackageNotFoundError
+        When it is not installed.
+
+    Notes
+    -----
+    The folder beside the package says it; ``importlib.metadata`` does as well, but takes 15 ms to import.
+    """
+    spec = find_spec(package)
+    if spec is not None and spec.origin:
+        names = [p.name.removesuffix(".dist-info") for p in Path(spec.origin).parents[1].glob("*.dist-info")]
+        found = [n.split("-") for n in names if n.split("-")[0].lower() == package.lower()]
+        if len(found) == 1 and len(found[0]) == 2:
+            return found[0][1]
+    from importlib.metadata import version
+
+    return version(package)
 
 
 def clear_memory() -> None:

@@ -61,12 +61,12 @@ def check_case(out: Collector, document: Mapping[str, Any], folder: Path) -> Non
     _check_groups(out, document)
     _check_files(out, document, folder)
     if not out.faults:  # the rules below need sound values
-        for rule in (check_shape, _check_air, _check_sweep, _check_assumptions):
+        for rule in (check_shape, _check_blade, _check_air, _check_sweep, _check_assumptions):
             rule(out, document)
 
 
 def check_shape(out: Collector, document: Mapping[str, Any]) -> None:
-    """Check what joins several values of rotor, blade and duct.
+    """Check what joins the sizes of rotor, blade and duct.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def check_shape(out: Collector, document: Mapping[str, Any]) -> None:
     document : mapping
         A document whose single values are sound.
     """
-    for rule in (_check_rotor, _check_blade, _check_duct):
+    for rule in (_check_rotor, _check_pitch, _check_duct):
         rule(out, document)
 
 
@@ -137,7 +137,6 @@ def _check_rotor(out: Collector, document: Mapping[str, Any]) -> None:
 
 def _check_blade(out: Collector, document: Mapping[str, Any]) -> None:
     blade = document["blade"]
-    diameter = _length_m(document["rotor"], "diameter")
     pitches = [key for key in ("pitch_in", "pitch_mm", "pitch_ratio") if key in blade]
     if "chord_law" in blade:
         if not pitches:
@@ -156,15 +155,19 @@ def _check_blade(out: Collector, document: Mapping[str, Any]) -> None:
         out.add(
             "blade.section", "nothing", "a table [blade.section]", "Tables [[polars]] replace only its aerodynamics"
         )
-    pitch = _length_m(blade, "pitch")
+    _check_section(out, blade.get("section", {}))
+
+
+def _check_pitch(out: Collector, document: Mapping[str, Any]) -> None:
+    blade = document["blade"]
+    pitch, diameter = _length_m(blade, "pitch"), _length_m(document["rotor"], "diameter")
     if not math.isnan(pitch) and not 0.05 <= pitch / diameter <= 5:
-        key = pitches[0]
+        key = next(key for key in ("pitch_in", "pitch_mm") if key in blade)
         metric = blade[key] / 25.4
         hint = ""
         if key == "pitch_in" and 0.1 <= metric * INCH / diameter <= 3:
             hint = f"Looks like millimetres: write pitch_mm = {blade[key]:g} or pitch_in = {metric:.4g}"
         out.add(f"blade.{key}", shown(blade[key]), "a pitch of 0.05 to 5 diameters", hint)
-    _check_section(out, blade.get("section", {}))
 
 
 def _check_section(out: Collector, section: Mapping[str, Any]) -> None:

@@ -121,12 +121,35 @@ def _effects(case: Case) -> tuple[effects.Effect, ...]:
 def _polars(case: Case, anchors: Sequence[tuple[float, Any]]) -> list[tuple[float, polars.Polar]]:
     given = case.document.get("polars", [])
     if given:
-        from bemt import importers
-
-        read = [(float(p["r_over_R"]), importers.read(case.folder / p["file"], p.get("format"))) for p in given]
-        return sorted(read, key=lambda pair: pair[0])
+        return _user_polars(case, given)
     n_crit = float(case.get("model.n_crit"))
     return [(x, polars.neuralfoil_polar(section, n_crit=n_crit)) for x, section in anchors]
+
+
+def _user_polars(case: Case, given: Sequence[Mapping[str, Any]]) -> list[tuple[float, polars.Polar]]:
+    """Read the tables of a case; several XFOIL files at one r/R are its Reynolds numbers."""
+    from bemt import importers
+    from bemt.importers import polar_xfoil
+
+    groups: dict[float, list[Mapping[str, Any]]] = {}
+    for item in given:
+        groups.setdefault(float(item["r_over_R"]), []).append(item)
+    out, faults = [], []
+    for x, items in sorted(groups.items()):
+        paths = [case.folder / item["file"] for item in items]
+        kind = items[0].get("format")
+        if len(items) > 1:
+            out.append((x, polar_xfoil.read_many(paths)))
+            continue
+        read = importers.read(paths[0], None if kind is None else f"polar_{kind}")
+        if isinstance(read, polars.Polar):
+            out.append((x, read))
+        else:
+            got = f"a file of another kind ({type(read).__name__})"
+            faults.append(Fault(paths[0].as_posix(), "", got, "a polar: CSV, XFOIL, C81 or AeroDyn"))
+    if faults:
+        raise InputError(faults)
+    return out
 
 
 def prepare(case: Case, overrides: Mapping[str, Any] | None = None, n_stations: int | None = None) -> Ready:

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
-from pathlib import Path
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -40,7 +39,7 @@ DLOG_RE = float(np.log(DEFAULT_RE[-1] / DEFAULT_RE[0]) / (len(DEFAULT_RE) - 1))
 ALPHA_GRID.setflags(write=False)
 DEFAULT_RE.setflags(write=False)
 
-TABLE_VERSION = 1
+TABLE_VERSION = 2
 """Raise when the making of tables changes: older cache entries are then ignored."""
 RAW_LIMIT_DEG = 20.0
 """NeuralFoil is used up to this |alpha| at most (beyond 20-25 deg it has no training data)."""
@@ -383,21 +382,6 @@ def _confident_range(alpha: Array, cl: Array, confidence: Array, past_stall: flo
     return -edge[1], edge[0]
 
 
-@lru_cache(maxsize=1)
-def _neuralfoil_version() -> str:
-    """Version of the installed NeuralFoil, without importing it."""
-    from importlib.util import find_spec
-
-    spec = find_spec("neuralfoil")
-    if spec is not None and spec.origin:  # the folder's name says it; importlib.metadata costs 15 ms to import
-        found = list(Path(spec.origin).parents[1].glob("[nN]eural[fF]oil-*.dist-info"))
-        if len(found) == 1:
-            return found[0].name.removesuffix(".dist-info").split("-")[1]
-    from importlib.metadata import version
-
-    return version("neuralfoil")
-
-
 def neuralfoil_polar(
     airfoil: SectionShape, *, re: Array = DEFAULT_RE, n_crit: float = 9.0, xtr_upper: float = 1.0,
     xtr_lower: float = 1.0, model: str = "xlarge", ar: float = 10.0, cd_max: float | None = None,
@@ -459,9 +443,10 @@ def neuralfoil_polar(
     settings: dict[str, Any] = {"n_crit": float(n_crit), "xtr": [float(xtr_upper), float(xtr_lower)], "model": model,
                                 "cd_max": top, "method": method, "past_stall": float(past_stall),
                                 "lift_floor": float(lift_floor)}  # fmt: skip
-    key = cache.content_key(TABLE_VERSION, _neuralfoil_version(), airfoil.key(), settings, re, ALPHA_GRID)
+    version = cache.installed_version("neuralfoil")
+    key = cache.content_key(TABLE_VERSION, version, airfoil.key(), settings, re, ALPHA_GRID)
     made = cache.cached_arrays("polar", key, lambda: _make_neuralfoil(airfoil, re, settings))
-    source = f"NeuralFoil {_neuralfoil_version()} {model}, n_crit {n_crit:g}, xtr {xtr_upper:g}/{xtr_lower:g}"
+    source = f"NeuralFoil {version} {model}, n_crit {n_crit:g}, xtr {xtr_upper:g}/{xtr_lower:g}"
     return Polar(ALPHA_GRID, re, np.zeros(1), made["cl"][:, :, None], made["cd"][:, :, None], made["confidence"],
                  airfoil.name, f"{source}; {method} cd_max {top:g}")  # fmt: skip
 

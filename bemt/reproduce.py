@@ -31,16 +31,16 @@ UIUC_POINTS, UIUC_PROPELLERS = 4122, 248
 
 
 def find_uiuc() -> Path | None:
-    """Folder of the UIUC data: ``$BEMT_DATA/uiuc``, or ``../shared/data/uiuc`` beside the project.
+    """Folder of the UIUC data: ``$BEMT_DATA/uiuc``; without that variable ``../shared/data/uiuc`` beside the project.
 
     Returns
     -------
     Path or None
         None when there is none.
     """
-    roots = [Path(os.environ["BEMT_DATA"])] if os.environ.get("BEMT_DATA") else []
-    roots.append(Path(__file__).resolve().parents[2] / "shared" / "data")
-    return next((r / "uiuc" for r in roots if (r / "uiuc").is_dir()), None)
+    named = os.environ.get("BEMT_DATA")
+    folder = (Path(named) if named else Path(__file__).resolve().parents[2] / "shared" / "data") / "uiuc"
+    return folder if folder.is_dir() else None
 
 
 def uiuc_statistics(folder: Path) -> dict[str, Any]:
@@ -166,7 +166,7 @@ def _cfd(f: th.Facts) -> None:
     f.given("rotational speed", "20000", "rev/min")
     f.given("velocity nodes of the Fluent runs", "200", "", "no mesh count, no grid study; zone as wide as the disk")
     f.given("blades", "2")
-    f.check("speed of sound behind the tip Mach numbers", "340.3", Air.isa().a_sound, "m/s")
+    f.check("speed of sound for the tip Mach numbers", "340.3", Air.isa().a_sound, "m/s")
     variants = th.k1k2_variants()
     blind = th.mach_blindness()
     errors, signs = [], []
@@ -242,7 +242,7 @@ def _fan(f: th.Facts) -> None:
     f.check("vendor thrust over K1/K2 ('about ten')", "10", s["thrust_N"] / found["K1K2_at_pitch_equal_diameter_N"])
     f.check("momentum check, rho A v^2", "30.2", k.RHO_FIXED * annulus * s["exhaust_m_s"] ** 2, "N",
             note="12 % above the 27 N of the vendor: holds for a straight exhaust of the annulus area")  # fmt: skip
-    f.check("least geometric pitch from exhaust speed", "95", 1000 * s["exhaust_m_s"] / n, "mm")
+    f.check("least pitch by the exhaust speed", "95", 1000 * s["exhaust_m_s"] / n, "mm")
 
 
 def _bench(f: th.Facts) -> None:
@@ -380,7 +380,7 @@ def table(rows: list[th.Item]) -> str:
         if i.note:
             out += textwrap.wrap(i.note, WIDTH, initial_indent="      ", subsequent_indent="      ")
     counts = Counter(i.status.removesuffix(", because") for i in rows)
-    out += ["", f"{len(rows)} numbers: " + "; ".join(f"{n} {s}" for s, n in counts.items())]
+    out += ["", *textwrap.wrap(f"{len(rows)} numbers: " + "; ".join(f"{n} {s}" for s, n in counts.items()), WIDTH)]
     return "\n".join(line.rstrip() for line in out)
 
 

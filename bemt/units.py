@@ -193,14 +193,14 @@ def convert(value: Numeric, unit: str, to: str) -> Numeric:
     Parameters
     ----------
     value : float or (N,) ndarray
-        Value in `unit`.
+        Value in the unit `unit`. [unit]
     unit, to : str
         Suffixes of `UNITS`.
 
     Returns
     -------
     float or (N,) ndarray
-        Value in `to`.
+        Value in the unit `to`. [to]
 
     Raises
     ------

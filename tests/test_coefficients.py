@@ -120,7 +120,8 @@ def test_reynolds_number_scales(c, n, D, V):
 def test_arrays_equal_scalars():
     T, n, V = np.array([1.0, -2.0, 3.0]), np.array([50.0, 0.0, 70.0]), np.array([0.0, 5.0, 9.0])
     for function, args in (
-        (co.CT, (T, 1.2, n, 0.3)), (co.CP, (T, 1.2, n, 0.3)), (co.J, (V, n, 0.3)), (co.M_tip_helical, (n, 0.3, 340.0, V)),
+        (co.CT, (T, 1.2, n, 0.3)), (co.CP, (T, 1.2, n, 0.3)), (co.J, (V, n, 0.3)),
+        (co.M_tip_helical, (n, 0.3, 340.0, V)),
         (co.eta, (V / 10, T / 10, 0.05)), (co.FM, (T / 10, 0.05)), (co.grams_per_watt, (T, n)),
     ):  # fmt: skip
         whole = function(*args)

@@ -349,6 +349,15 @@ def test_cache_folder_rule(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> N
     assert cache.cache_dir() == Path.home() / ".cache" / "bemt"
 
 
+def test_installed_version_is_that_of_the_metadata() -> None:
+    from importlib.metadata import PackageNotFoundError, version
+
+    for package in ("neuralfoil", "numpy", "pytest"):
+        assert cache.installed_version(package) == version(package)
+    with pytest.raises(PackageNotFoundError):
+        cache.installed_version("no_such_package_here")
+
+
 def test_a_cache_hit_needs_no_neuralfoil(own_cache: Path) -> None:
     P.neuralfoil_polar(SECTIONS["4412"])
     code = (

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.effects.base import Baking, Effect
+from bemt.effects.base import Baking, Effect, Parameter
 
 Array = NDArray[np.float64]
 
@@ -67,14 +67,29 @@ class Cascade(Effect):
     The row turns the flow at most to the blades' own exit angle, which isolated sections do not know: at solidity 1
     they would turn it half as far again.  Applied to every rotor; at the solidity of a two-blade propeller (below
     0.1) K differs from 1 by less than 1 %.  K is held between 0.2 and 1.3: in-line plates (K growing without
-    bound towards solidity 1) do not happen on rotors that pump.
+    bound towards solidity 1) do not happen on rotors that pump.  A ducted row also pays for the walls: Howell (1945),
+    Proc. IMechE 153:441, secondary loss 0.018 cl^2 and annulus loss 0.020 s/h, with spacing s and blade height h (as
+    quoted in Cohen, Rogers and Saravanamuttoo, Gas Turbine Theory, sec. 5.9; not checked against the paper).
     """
+
+    secondary: float = 0.018
+    annulus: float = 0.020
 
     id = "cascade"
     title = "interference between blades at high solidity"
+    parameters = (
+        Parameter("secondary", "1", 0.010, 0.030, "Howell 1945: 0.018"),
+        Parameter("annulus", "1", 0.010, 0.030, "Howell 1945: 0.020"),
+    )
     order = 30
 
     def section(self, bake: Baking) -> None:
         """Scale lift."""
         K = np.clip(weinig_factor(bake.sigma, 0.5 * np.pi - bake.beta), 0.2, 1.3)
         bake.cl *= K[:, None, None, None]
+        if bake.ducted:
+            pitch_over_height = 2.0 * np.pi * bake.r / bake.B / (bake.R - bake.Rhub)
+            # a correlation of compressor rows: faded out below their solidity
+            row = np.clip((bake.sigma - 0.3) / 0.3, 0.0, 1.0)
+            wall = self.annulus * pitch_over_height
+            bake.cd += row[:, None, None, None] * (self.secondary * bake.cl**2 + wall[:, None, None, None])

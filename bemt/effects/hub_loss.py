@@ -13,7 +13,8 @@ class HubLoss(Effect):
 
     Notes
     -----
-    Ning (2014), Wind Energy 17:1327, eq. 4 and 6, doi:10.1002/we.1636.  Multiplies the tip factor.
+    Ning (2014), Wind Energy 17:1327, eq. 4 and 6, doi:10.1002/we.1636.  Multiplies the tip factor.  A ducted rotor has
+    none: its hub is one wall of an annulus, and the blade's lift goes on to it.
     """
 
     strength: float = 1.0
@@ -24,4 +25,5 @@ class HubLoss(Effect):
 
     def momentum(self, bake: Baking) -> None:
         """Switch the hub factor on."""
-        bake.num["hub"] = self.strength
+        if not bake.ducted:
+            bake.num["hub"] = self.strength

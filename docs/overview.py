@@ -1,0 +1,111 @@
+"""Draw docs/img/overview.png from the cases of this project: ``python docs/overview.py``.
+
+The numbers drawn are stored in the picture itself (PNG text "bemt"), so that a test can tell when it is out of date.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+
+from bemt import evaluate
+from bemt.case import load_case
+from bemt.sweep import sweep
+
+ROOT = Path(__file__).resolve().parents[1]
+TARGET = ROOT / "docs" / "img" / "overview.png"
+
+# Okabe and Ito (2008): colours that colour-blind readers tell apart; the markers differ too.
+LOOK = {
+    "bemt": dict(color="#0072B2", marker="o", markersize=8),
+    "k1k2": dict(color="#E69F00", marker="s", markersize=7),
+    "cfd": dict(color="#000000", marker="|", markersize=15, markeredgewidth=2.5),
+    "bench": dict(color="#009E73", marker="x", markersize=8, markeredgewidth=2.5),
+    "vendor": dict(color="#CC79A7", marker="^", markersize=8),
+}
+LABEL = {
+    "bemt": "BEMT (bar: declared assumptions, ±u)",
+    "k1k2": "K1/K2 formula",
+    "cfd": "CFD (Fluent)",
+    "bench": "bench",
+    "vendor": "vendor",
+}
+
+
+def thrusts(ax: Any) -> dict[str, float]:
+    """Thrust of the five cases, each as a ratio to its recorded CFD value; returns ours in newtons."""
+    cases = {c["name"]: c for c in sweep([ROOT / "cases"])["cases"]}
+    order = ["ds30", "prop_14x8", "prop_12x6", "prop_10x5", "prop_8x5"]
+    ours = {}
+    for y, name in enumerate(order):
+        rows: dict[str, Any] = {}
+        for row in cases[name]["rows"]:
+            rows.setdefault(row["source"], row)
+        base = rows["cfd"]["thrust_N"]
+        ours[name] = rows["bemt"]["thrust_N"]
+        spread = rows["bemt"].get("u")
+        if isinstance(spread, float):
+            ax.plot([(ours[name] - spread) / base, (ours[name] + spread) / base], [y, y], lw=6, alpha=0.3,
+                    color=LOOK["bemt"]["color"], solid_capstyle="butt")  # fmt: skip
+        for source in ("cfd", "vendor", "bench", "k1k2", "bemt"):
+            if source in rows:
+                ax.plot(rows[source]["thrust_N"] / base, y, ls="none", **LOOK[source])
+    ax.axvline(1.0, color="0.75", lw=1, zorder=0)
+    names = [f"{n.replace('prop_', '').replace('ds30', 'DS-30 fan')}\n{ours[n]:.1f} N" for n in order]
+    ax.set_yticks(range(len(order)), names)
+    ax.set_ylim(-0.6, len(order) - 0.4)
+    ax.set_xlim(0.0, 1.7)
+    ax.set_xlabel("thrust / recorded CFD thrust [-]")
+    ax.set_title("Static thrust, five cases (BEMT value beside the name)", fontsize=10)
+    handles = [plt.Line2D([], [], ls="none", **look) for look in LOOK.values()]  # type: ignore[attr-defined]
+    ax.legend(handles, [LABEL[k] for k in LOOK], fontsize=8, loc="lower center", bbox_to_anchor=(0.5, -0.42), ncol=2,
+              frameon=False)  # fmt: skip
+    ax.grid(axis="x", color="0.92")
+    return ours
+
+
+def curves(ax: Any) -> None:
+    """CT and CP of the 8x5 over advance ratio."""
+    case = load_case(ROOT / "cases" / "prop_8x5" / "case.toml")
+    ready = evaluate.prepare(case)
+    air = case.air()
+    J = np.linspace(0.0, 1.0, 101)
+    rpm = np.full(J.size, 20000.0)
+    V = J * rpm / 60.0 * ready.diameter_m
+    points = evaluate.evaluate(ready, rpm, V, air)
+    formula = evaluate.k1k2(case, None, rpm, V, air)
+    n, D = rpm / 60.0, ready.diameter_m
+    ct_formula = np.asarray(formula.thrust) / (air.rho * n**2 * D**4)
+    ax.plot(J, points.CT, color="#0072B2", lw=2, label="CT, BEMT")
+    ax.plot(J, ct_formula, color="#E69F00", lw=2, ls="--", label="CT, K1/K2 formula")
+    ax.plot(J, points.CP, color="#D55E00", lw=2, ls="-.", label="CP, BEMT")
+    ax.axhline(0.0, color="0.5", lw=0.8)
+    ax.set_xlabel("advance ratio J = V / (n D) [-]")
+    ax.set_ylabel("CT = T/(ρ n² D⁴), CP = P/(ρ n³ D⁵) [-]")
+    ax.set_title("8x5 propeller at 20,000 rev/min", fontsize=10)
+    ax.set_xlim(0.0, 1.0)
+    ax.legend(fontsize=8, frameon=False)
+    ax.grid(color="0.92")
+
+
+def main() -> None:
+    """Draw and save."""
+    figure, (left, right) = plt.subplots(1, 2, figsize=(10.5, 4.6))
+    drawn = thrusts(left)
+    curves(right)
+    for ax in (left, right):
+        ax.spines[["top", "right"]].set_visible(False)
+    figure.tight_layout()
+    TARGET.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(TARGET, dpi=110, metadata={"Software": None, "bemt": json.dumps({"thrust_N": drawn})})
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,147 @@
+"""Promise: the command line answers fast, keeps stdout for results, and its exit code says what happened."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from bemt import __version__, cli
+from bemt.errors import Fault, InputError
+
+ROOT = Path(__file__).resolve().parents[1]
+MALFORMED = ROOT / "tests" / "malformed"
+
+
+def bemt(*arguments: str, cwd: Path = ROOT, timeout: float = 120) -> subprocess.CompletedProcess[str]:
+    """Run the command line in a process of its own."""
+    env = {**os.environ, "PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-m", "bemt", *arguments]
+    return subprocess.run(command, cwd=cwd, env=env, capture_output=True, text=True, timeout=timeout)
+
+
+def test_help_is_fast_and_names_every_command() -> None:
+    times = []
+    for _ in range(3):
+        start = time.perf_counter()
+        done = bemt("--help")
+        times.append(time.perf_counter() - start)
+    assert done.returncode == 0
+    assert all(command in done.stdout for command in ("sweep", "validate", "reproduce", "bench"))
+    assert min(times) < 0.4
+
+
+def test_importing_the_command_line_imports_nothing_heavy() -> None:
+    code = "import sys, bemt.cli; bemt.cli.build_parser(); print(*sorted(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    loaded = {name.split(".")[0] for name in done.stdout.split()}
+    assert not loaded & {
+        "numpy",
+        "scipy",
+        "numba",
+        "pandas",
+        "neuralfoil",
+        "matplotlib",
+        "cadquery",
+        "trimesh",
+        "geometry",
+    }
+
+
+def test_version() -> None:
+    assert bemt("--version").stdout.strip() == f"bemt {__version__}"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [[], ["swep"], ["sweep"], ["sweep", "cases", "--jobs", "0"], ["sweep", "cases", "--jobs", "two"],
+     ["validate"], ["validate", "x", "--polar", "100000"], ["validate", "x", "--polar", "fixed:many"], ["bench", "x"]],
+)  # fmt: skip
+def test_wrong_usage_is_2_and_says_so_on_stderr(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        cli.main(arguments)
+    shown = capsys.readouterr()
+    assert caught.value.code == 2
+    assert shown.out == "" and "error:" in shown.err
+
+
+def test_polar_option_is_a_reynolds_number() -> None:
+    args = cli.build_parser().parse_args(
+        ["validate", "x", "--polar", "fixed:1e5", "--off", "swirl", "--off", "hub_loss"]
+    )
+    assert (args.polar, args.off) == (1e5, ["swirl", "hub_loss"])
+
+
+@pytest.mark.parametrize(
+    ("outcome", "code", "words"),
+    [
+        (None, 0, ""),
+        (1, 1, ""),
+        (InputError([Fault("a", "b", "1", "2"), Fault("a", "c", "3", "4")]), 2, "a: b: got 1; expected 2.\na: c: got 3;"),
+        (ZeroDivisionError("boom"), 3, "internal error"),
+        (KeyboardInterrupt(), 130, "interrupted"),
+    ],
+)  # fmt: skip
+def test_exit_code_follows_the_outcome(
+    outcome: object, code: int, words: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def run(args: object) -> object:
+        if isinstance(outcome, BaseException):
+            raise outcome
+        return outcome
+
+    monkeypatch.setattr("importlib.import_module", lambda name: SimpleNamespace(run=run))
+    assert cli.main(["bench"]) == code
+    shown = capsys.readouterr()
+    assert words in shown.err and shown.out == ""
+
+
+def test_bad_case_is_2_with_every_message_on_stderr() -> None:
+    done = bemt("sweep", "many_faults.toml", "--quiet", cwd=MALFORMED)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    announced = [
+        line[3:] for line in (MALFORMED / "many_faults.toml").read_text().splitlines() if line.startswith("#! ")
+    ]
+    assert done.stderr.splitlines() == announced
+
+
+def test_missing_path_is_2() -> None:
+    done = bemt("sweep", "no/such/folder")
+    assert done.returncode == 2
+    assert done.stderr == (
+        "no/such/folder: got nothing there; expected a case file or a folder of cases. Check the path.\n"
+    )
+
+
+def test_folder_of_results_that_is_a_file_is_2(tmp_path: Path) -> None:
+    (tmp_path / "out").write_text("")
+    done = bemt("sweep", str(ROOT / "cases"), "--out", str(tmp_path / "out"))
+    assert done.returncode == 2
+    assert "expected a folder for results" in done.stderr
+
+
+def test_reader_that_goes_away_is_no_error() -> None:
+    # `| head -1` closes the pipe while the table is being written
+    env = {**os.environ, "PYTHONPATH": str(ROOT)}
+    command = f"{sys.executable} -m bemt sweep {MALFORMED}/number_is_nan.toml --json | head -c 1"
+    done = subprocess.run(command, shell=True, env=env, capture_output=True, text=True, timeout=120)
+    assert done.stdout == "{"
+    assert "Traceback" not in done.stderr
+
+
+def test_json_of_a_bad_case_is_still_a_document() -> None:
+    done = bemt("sweep", "number_is_nan.toml", "--json", cwd=MALFORMED)
+    document = json.loads(done.stdout)
+    assert done.returncode == document["exit_code"] == 2
+    assert document["schema"] == "bemt.sweep/1"
+    assert document["cases"][0]["rows"] == []
+    assert document["cases"][0]["faults"] == [
+        "number_is_nan.toml: operating.rpm: got nan; expected a number from 10 to 300000 rev/min."
+    ]
