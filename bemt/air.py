@@ -3,9 +3,11 @@
 References
 ----------
 .. [1] U.S. Standard Atmosphere, 1976, NOAA-S/T 76-1562 (identical to ISO 2533 / ICAO Doc 7488 below 32 km):
-       layers and constants table 1-4, pressure eqs. 33a-33b, sound speed eq. 50, viscosity eq. 51.
+       layers and constants table 1-4, pressure eqs. 33a-33b, sound speed eq. 50, viscosity eq. 51
+       (equation numbers not checked against the document; its table values are in the tests).
 .. [2] A. Picard, R. S. Davis, M. Glaeser, K. Fujii, "Revised formula for the density of moist air (CIPM-2007)",
-       Metrologia 45 (2008) 149-155, doi:10.1088/0026-1394/45/2/004; eq. 1 and appendix A.
+       Metrologia 45 (2008) 149-155, doi:10.1088/0026-1394/45/2/004; eq. 1 and appendix A
+       (coefficients checked against a public implementation, not against the paper).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Draw docs/img/overview.png from the cases of this project: ``python docs/overview.py``.
+"""Draw docs/img/overview.png from the cases of this project: ``.venv/bin/python docs/overview.py``.
 
 The numbers drawn are stored in the picture itself (PNG text "bemt"), so that a test can tell when it is out of date.
 """
@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parents[1]
 TARGET = ROOT / "docs" / "img" / "overview.png"
 
 # Okabe and Ito (2008): colours that colour-blind readers tell apart; the markers differ too.
-LOOK = {
+LOOK: dict[str, dict[str, Any]] = {
     "bemt": dict(color="#0072B2", marker="o", markersize=8),
     "k1k2": dict(color="#E69F00", marker="s", markersize=7),
     "cfd": dict(color="#000000", marker="|", markersize=15, markeredgewidth=2.5),
@@ -31,7 +31,7 @@ LOOK = {
     "vendor": dict(color="#CC79A7", marker="^", markersize=8),
 }
 LABEL = {
-    "bemt": "BEMT (bar: declared assumptions, ±u)",
+    "bemt": "BEMT (bar: ±u of declared assumptions)",
     "k1k2": "K1/K2 formula",
     "cfd": "CFD (Fluent)",
     "bench": "bench",
@@ -64,9 +64,9 @@ def thrusts(ax: Any) -> dict[str, float]:
     ax.set_xlim(0.0, 1.7)
     ax.set_xlabel("thrust / recorded CFD thrust [-]")
     ax.set_title("Static thrust, five cases (BEMT value beside the name)", fontsize=10)
-    handles = [plt.Line2D([], [], ls="none", **look) for look in LOOK.values()]  # type: ignore[attr-defined]
-    ax.legend(handles, [LABEL[k] for k in LOOK], fontsize=8, loc="lower center", bbox_to_anchor=(0.5, -0.42), ncol=2,
-              frameon=False)  # fmt: skip
+    handles = [plt.Line2D([], [], ls="none", **look) for look in LOOK.values()]
+    ax.legend(handles, [LABEL[k] for k in LOOK], fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncol=3,
+              frameon=False, columnspacing=1.2, handletextpad=0.3)  # fmt: skip
     ax.grid(axis="x", color="0.92")
     return ours
 
@@ -81,10 +81,8 @@ def curves(ax: Any) -> None:
     V = J * rpm / 60.0 * ready.diameter_m
     points = evaluate.evaluate(ready, rpm, V, air)
     formula = evaluate.k1k2(case, None, rpm, V, air)
-    n, D = rpm / 60.0, ready.diameter_m
-    ct_formula = np.asarray(formula.thrust) / (air.rho * n**2 * D**4)
     ax.plot(J, points.CT, color="#0072B2", lw=2, label="CT, BEMT")
-    ax.plot(J, ct_formula, color="#E69F00", lw=2, ls="--", label="CT, K1/K2 formula")
+    ax.plot(J, formula.CT, color="#E69F00", lw=2, ls="--", label="CT, K1/K2 formula")
     ax.plot(J, points.CP, color="#D55E00", lw=2, ls="-.", label="CP, BEMT")
     ax.axhline(0.0, color="0.5", lw=0.8)
     ax.set_xlabel("advance ratio J = V / (n D) [-]")
@@ -97,12 +95,11 @@ def curves(ax: Any) -> None:
 
 def main() -> None:
     """Draw and save."""
-    figure, (left, right) = plt.subplots(1, 2, figsize=(10.5, 4.6))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(10.5, 4.4), layout="constrained")
     drawn = thrusts(left)
     curves(right)
     for ax in (left, right):
         ax.spines[["top", "right"]].set_visible(False)
-    figure.tight_layout()
     TARGET.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(TARGET, dpi=110, metadata={"Software": None, "bemt": json.dumps({"thrust_N": drawn})})
 

@@ -83,7 +83,7 @@ def test_polar_option_is_a_reynolds_number() -> None:
     [
         (None, 0, ""),
         (1, 1, ""),
-        (InputError([Fault("a", "b", "1", "2"), Fault("a", "c", "3", "4")]), 2, "a: b: got 1; expected 2.\na: c: got 3;"),
+        (InputError([Fault("a", "b", "1", "2"), Fault("a", "c", "3", "4")]), 2, "a: b: got 1; expected 2.\na: c: "),
         (ZeroDivisionError("boom"), 3, "internal error"),
         (KeyboardInterrupt(), 130, "interrupted"),
     ],

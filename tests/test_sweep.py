@@ -150,14 +150,13 @@ def test_k1k2_is_the_published_formula_at_the_density_of_the_case(solved: dict[s
 
 def test_errors_and_validation_uncertainty_are_those_of_vv20(solved: dict[str, Any]) -> None:
     S = row_of(solved, "bemt")["thrust_N"]
-    line = next(
-        c for c in solved["comparisons"] if (c["model"], c["source"], c["quantity"]) == ("bemt", "bench", "thrust_N")
-    )
+    lines = {(c["model"], c["source"], c["quantity"]): c for c in solved["comparisons"]}
+    line = lines["bemt", "bench", "thrust_N"]
     assert line["E"] == pytest.approx(S - 0.5 * KGF, rel=1e-8)
     assert line["E_pct"] == pytest.approx(100 * (S / (0.5 * KGF) - 1), rel=1e-8)
     assert line["u_val"] == pytest.approx(math.sqrt(line["u_num"] ** 2 + line["u_input"] ** 2 + (0.01 * KGF) ** 2))
     assert line["verdict"] == ("not distinguishable from noise" if abs(line["E"]) <= line["u_val"] else "differs")
-    unknown = next(c for c in solved["comparisons"] if (c["model"], c["source"]) == ("bemt", "cfd"))
+    unknown = lines["bemt", "cfd", "thrust_N"]
     assert unknown["u_val"] is None and unknown["u_D"] is None and "u_D unknown" in unknown["verdict"]
     assert row_of(solved, "bench")["bemt_error_pct"] == line["E_pct"]
     assert {c["quantity"] for c in solved["comparisons"] if c["source"] == "bench"} == {"thrust_N", "torque_Nm"}
