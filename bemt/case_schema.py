@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from bemt.schema import Key
+from bemt.section_rule import DRAG_LEVEL, N_CRIT
 from geometry.blade import CHORD_LAWS as GEOMETRY_CHORD_LAWS
 
 __all__ = ["ASSUMPTION", "AXES", "DEFAULTS", "GROUPS", "INCH", "POLAR", "SCHEMA", "TEMPERATURE"]
@@ -137,6 +138,7 @@ SCHEMA: dict[str, dict[str, Key]] = {
         "effects_off": Key("texts"),
         "also_without": Key("texts"),
         "n_crit": Key(low=0.1, high=14),
+        "drag_level": Key(low=0.3, high=3, suspect=_percent("drag_level", 20.0)),
         "stations": Key("integer", low=5, high=1000),
     },
     "sweep": {
@@ -194,5 +196,12 @@ DEFAULTS: dict[str, dict[str, Any]] = {
     "blade": {"beta_offset_deg": 0.0, "chord_scale": 1.0, "pitch_law": "helix"},
     "blade.section": {"camber": 0.0, "camber_position": 0.4, "camber_scale": 1.0, "thickness_scale": 1.0},
     "operating": {"airspeed_m_s": 0.0},
-    "model": {"effects_on": [], "effects_off": [], "also_without": [], "n_crit": 9.0, "stations": 40},
+    "model": {
+        "effects_on": [],
+        "effects_off": [],
+        "also_without": [],
+        "n_crit": N_CRIT,
+        "drag_level": DRAG_LEVEL,
+        "stations": 40,
+    },
 }

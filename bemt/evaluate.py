@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from bemt import coefficients as co
 from bemt import duct as duct_model
-from bemt import effects, empirical, polars, solver
+from bemt import effects, empirical, polars, section_rule, solver
 from bemt.errors import Fault, InputError
 
 if TYPE_CHECKING:
@@ -122,8 +122,8 @@ def _polars(case: Case, anchors: Sequence[tuple[float, Any]]) -> list[tuple[floa
     given = case.document.get("polars", [])
     if given:
         return _user_polars(case, given)
-    n_crit = float(case.get("model.n_crit"))
-    return [(x, polars.neuralfoil_polar(section, n_crit=n_crit)) for x, section in anchors]
+    rule = float(case.get("model.n_crit")), float(case.get("model.drag_level"))
+    return [(x, section_rule.polar(section, *rule)) for x, section in anchors]
 
 
 def _user_polars(case: Case, given: Sequence[Mapping[str, Any]]) -> list[tuple[float, polars.Polar]]:

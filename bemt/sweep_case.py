@@ -319,6 +319,7 @@ def _description(case: Case, ready: Any, stations: int) -> dict[str, Any]:
         "diameter_m": ready.diameter_m, "hub_diameter_m": ready.hub_diameter_m, "blades": int(case.get("rotor.blades")),
         "pitch_075R_m": ready.pitch_m, "solidity": ready.solidity, "stations": stations,
         "effects": [effect.id for effect in ready.prep.effects], "n_crit": case.get("model.n_crit"),
+        "drag_level": case.get("model.drag_level"),
         "convention": "CT = T/(rho n^2 D^4), CP = P/(rho n^3 D^5)",
     }  # fmt: skip
 

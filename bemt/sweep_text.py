@@ -66,10 +66,15 @@ def _kgf(value: float) -> str:
     return "-" if math.isnan(value) else f"{value:.3f}"
 
 
+def _ends(values: Sequence[float]) -> str:
+    """Show the results at both ends of a range, or the extremes over many values."""
+    return " .. ".join(map(_n, values if len(values) == 2 else (min(values), max(values))))
+
+
 def _assumption_table(result: Mapping[str, Any]) -> str:
     rows = [
         [a["key"], f"{a['nominal']:g}" if isinstance(a["nominal"], (int, float)) else str(a["nominal"]), a["range"],
-         " .. ".join(_n(v) for v in a["thrust_N"]), _n(a["u_thrust_N"], 2), a["why"]]
+         _ends(a["thrust_N"]), _n(a["u_thrust_N"], 2), a["why"]]
         for a in result["assumptions"]
     ]  # fmt: skip
     header = ["assumed, because the source does not give it", "value", "range", "T N over the range", "u N", "why"]
@@ -145,7 +150,8 @@ def case_text(result: Mapping[str, Any]) -> str:
     head = (
         f"D {_n(c['diameter_m'])} m, hub {_n(c['hub_diameter_m'])} m, {c['blades']} blades, pitch at 0.75 R "
         f"{_n(c['pitch_075R_m'])} m, solidity {_n(c['solidity'], 3)}; {_n(c['density_kg_m3'])} kg/m3, "
-        f"{_n(c['temperature_C'], 3)} degC; {c['convention']}; {c['stations']} stations, n_crit {c['n_crit']:g}"
+        f"{_n(c['temperature_C'], 3)} degC; {c['convention']}; {c['stations']} stations, n_crit {c['n_crit']:g}, "
+        f"section drag x {c['drag_level']:g}"
     )
     lines = [
         f"{result['name']}: {result['title']}",

@@ -14,6 +14,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.lines import Line2D
 
 from bemt import evaluate
 from bemt.case import load_case
@@ -64,7 +65,7 @@ def thrusts(ax: Any) -> dict[str, float]:
     ax.set_xlim(0.0, 1.7)
     ax.set_xlabel("thrust / recorded CFD thrust [-]")
     ax.set_title("Static thrust, five cases (BEMT value beside the name)", fontsize=10)
-    handles = [plt.Line2D([], [], ls="none", **look) for look in LOOK.values()]
+    handles = [Line2D([], [], ls="none", **look) for look in LOOK.values()]
     ax.legend(handles, [LABEL[k] for k in LOOK], fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncol=3,
               frameon=False, columnspacing=1.2, handletextpad=0.3)  # fmt: skip
     ax.grid(axis="x", color="0.92")

@@ -127,7 +127,8 @@ def test_document_has_the_declared_schema(tmp_path: Path) -> None:
 
 def test_every_source_has_its_row_at_every_operating_point(solved: dict[str, Any]) -> None:
     assert [(r["source"], r["rpm"]) for r in solved["rows"]] == [
-        ("bemt", 6000), ("k1k2", 6000), ("bemt", 5000), ("k1k2", 5000), ("bench", 6000), ("cfd", 6000), ("vendor", 5000),
+        ("bemt", 6000), ("k1k2", 6000), ("bemt", 5000), ("k1k2", 5000),
+        ("bench", 6000), ("cfd", 6000), ("vendor", 5000),
     ]  # fmt: skip
     assert [r["source"] for r in solved["other_rows"]] == ["k1k2_printed"]
     assert row_of(solved, "vendor")["density_kg_m3"] == 1.2  # empty cells of the table: as the case says
