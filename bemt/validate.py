@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.errors import Fault, InputError
+from bemt.units import INCH
 
 if TYPE_CHECKING:
     from bemt.effects import Effect
@@ -148,7 +149,7 @@ def compare(
     fixed_re : float, optional
         One Reynolds number for all section tables [1].
     stations : tuple of (N,) float, optional
-        Stations from elsewhere, see :func:`build`.
+        r/R [1], c/R [1] and beta [rad] from elsewhere, see :func:`build`.
 
     Returns
     -------
@@ -165,7 +166,11 @@ def compare(
         table = section_rule.polar(shape)
         tables.append((x, polars.fixed_re(table, fixed_re) if fixed_re else table))
     prep = solver.prepare(rotor, tables, effects, n_stations=N_STATIONS, mach_max=0.7)
-    static, rpm, J, CT, CP = [], [], [], [], []
+    static: list[NDArray[np.bool_]] = []
+    rpm: list[Array] = []
+    J: list[Array] = []
+    CT: list[Array] = []
+    CP: list[Array] = []
     for s in propeller.statics:
         static.append(np.ones(s.rpm.size, bool))
         rpm.append(s.rpm)
@@ -202,8 +207,8 @@ def errors(rows: Rows) -> dict[str, dict[str, Array]]:
     Returns
     -------
     dict
-        ``static`` and ``forward``, each ``CT`` and ``CP``: (bemt - measured) / measured [1].  Forward points lie between
-        0 and 0.8 of the measured zero-thrust J; where that is unknown the largest measured J stands in for it.
+        ``static`` and ``forward``, each ``CT`` and ``CP``: (bemt - measured) / measured [1].  Forward points lie
+        between 0 and 0.8 of the measured zero-thrust J; where that is unknown the largest measured J stands in.
     """
     limit = J_SHARE * (rows.J0 if np.isfinite(rows.J0) else float(np.max(rows.J, initial=0.0)))
     out: dict[str, dict[str, Array]] = {}
@@ -261,7 +266,7 @@ def _pe0_stations(folder: Path) -> tuple[dict[tuple[str, float, float], tuple[Ar
             notes.append(f"{file.name}: series {series!r} has no UIUC family; stations not used")
             continue
         R = blade.radius_m
-        found[family, round(blade.diameter_in, 2), round(blade.pitch_in, 2)] = (
+        found[family, round(blade.diameter_m / INCH, 2), round(blade.pitch_m / INCH, 2)] = (
             blade.r_m / R, blade.chord_m / R, blade.beta_rad,
         )  # fmt: skip
     return found, notes
@@ -311,7 +316,8 @@ def validate(
             [*scan.faults, Fault(str(folder), "propellers", f"{len(scan.propellers)} propellers, none with stations "
              "and measurements", "at least one of each", "Stations are in NAME_geom.txt or an APC PE0 file.")]
         )  # fmt: skip
-    rows, pooled = [], {k: {"CT": [], "CP": []} for k in ("static", "forward")}  # type: dict[str, dict[str, list[Array]]]
+    rows: list[dict[str, Any]] = []
+    pooled: dict[str, dict[str, list[Array]]] = {k: {"CT": [], "CP": []} for k in ("static", "forward")}
     counted = {"static": 0, "forward": 0}
     unconverged = 0
     for i, p in enumerate(usable):
@@ -373,7 +379,8 @@ def _percent(s: dict[str, float | None]) -> str:
     if s["median_abs"] is None:
         return f"{'-':>6} {'-':>6} {'-':>6}"
     bias = s["bias"]
-    return f"{100 * s['median_abs']:6.1f} {100 * (s['p90_abs'] or 0):6.1f} {'-' if bias is None else f'{100 * bias:+6.1f}':>6}"
+    shown = "-" if bias is None else f"{100 * bias:+6.1f}"
+    return f"{100 * s['median_abs']:6.1f} {100 * (s['p90_abs'] or 0):6.1f} {shown:>6}"
 
 
 def text(doc: dict[str, Any]) -> str:
@@ -417,7 +424,8 @@ def text(doc: dict[str, Any]) -> str:
         lines.append(f"Zero-thrust J: median error {100 * z['median_abs']:.1f} %, bias {100 * z['bias']:+.1f} %.")
     p = doc["polar"]
     lines.append(
-        f"Sections: declared rule, calibrated on {p['calibrated_on']}: n_crit {p['n_crit']:g}, drag x{p['drag_level']:g}"
+        f"Sections: declared rule, calibrated on {p['calibrated_on']}: n_crit {p['n_crit']:g}, "
+        f"drag x{p['drag_level']:g}"
         + (f", Reynolds number fixed at {p['fixed_re']:g}." if p["fixed_re"] else ".")
     )
     lines.append("Effects on: " + ", ".join(e["id"] for e in doc["effects"]) + ".")
@@ -459,9 +467,11 @@ def run(args: argparse.Namespace) -> int:
     doc = validate(Path(args.dir), eff, fixed, progress=sys.stderr.isatty())
     rendered = json.dumps(doc, indent=1)
     if args.out:
-        from bemt.tables import write_text
+        from bemt.tables import write_atomic
 
-        write_text(Path(args.out) / "validation.json", rendered + "\n")
-        write_text(Path(args.out) / "validation.txt", text(doc) + "\n")
+        folder = Path(args.out)
+        folder.mkdir(parents=True, exist_ok=True)
+        write_atomic(folder / "validation.json", rendered + "\n")
+        write_atomic(folder / "validation.txt", text(doc) + "\n")
     print(rendered if args.json else text(doc))
     return 1 if doc["unconverged"] else 0

@@ -34,8 +34,8 @@ def _database(name: str) -> Airfoil:
 
 
 # Caradonna and Tung (1981), NASA TM-81232: hovering two-blade model rotor, NACA 0012, untwisted, R 1.143 m, c 0.1905 m.
-# Faults: thrust comes from integrated pressures at five radii; the root cut-out (0.1667 R here) is not in the table; the
-# collective of 5 deg gives a thrust below that of every momentum-based method (ours: see the note in reports/).
+# Faults: thrust comes from integrated pressures at five radii; the root cut-out (0.1667 R here) is not in the table;
+# the collective of 5 deg gives a thrust below that of every momentum-based method (ours: see the note in reports/).
 @pytest.mark.parametrize("collective", [8, 12])
 def test_caradonna_tung_hover(shared_data: Path, collective: int) -> None:
     rows = _table(shared_data / "caradonna_tung" / "caradonna_tung_CT_vs_tipMach.csv")
@@ -83,9 +83,9 @@ def _x22a(folder: Path, beta75: float, J: np.ndarray, exit_ratio: float) -> solv
     return solver.solve(prep, 1200.0, J * 20 * 2 * R, Air.from_density())
 
 
-# X-22A full-scale ducted propeller, NASA TN D-4142 fig. 5 as digitised by two hands, which differ by up to 11 % at J 0.55.
-# Not given: sections, hub, lip radius and exit area.  Declared: NACA 2408, hub 0.2 R, lip 6 % D, exit 1.27 of the annulus
-# (duct wall 18 % thick, trailing edge at half the thickness, hub faired out); 1.2 to 1.3 is its range.
+# X-22A full-scale ducted propeller, NASA TN D-4142 fig. 5 as digitised by two hands, which differ by up to 11 % at
+# J 0.55.  Not given: sections, hub, lip radius and exit area.  Declared: NACA 2408, hub 0.2 R, lip 6 % D, exit 1.27 of
+# the annulus (duct wall 18 % thick, trailing edge at half the thickness, hub faired out); 1.2 to 1.3 is its range.
 def test_x22a_total_thrust(shared_data: Path) -> None:
     folder = shared_data / "x22a"
     with (folder / "x22a_beta19_full_J_range.csv").open() as stream:

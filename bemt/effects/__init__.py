@@ -34,7 +34,9 @@ def catalogue() -> dict[str, type[Effect]]:
             continue
         module = importlib.import_module(f"{__name__}.{info.name}")
         for obj in vars(module).values():
-            if isinstance(obj, type) and issubclass(obj, Effect) and obj is not Effect and obj.__module__ == module.__name__:
+            if not (isinstance(obj, type) and issubclass(obj, Effect)):
+                continue
+            if obj is not Effect and obj.__module__ == module.__name__:
                 if obj.id in found:
                     raise ValueError(f"two effects share the id {obj.id!r}")
                 found[obj.id] = obj

@@ -26,7 +26,7 @@ class Parameter:
     name, unit : str
         Field name in the effect and unit ("1" for a pure number).
     low, high : float
-        Physical prior range.
+        Physical prior range, in the unit of the parameter.
     source : str
         Where range and default come from.
     """
@@ -57,7 +57,7 @@ class Baking:
     M2 : (Nm,) float
         Grid of the squared Mach number [1].
     cl, cd : (N, Nm, Nr, Na) float
-        Section tables.
+        Section tables [1].
     alpha0, cla : (N, Nr) float
         Zero-lift angle [rad] and lift slope [1/rad] of the incompressible table.
     num : dict
@@ -70,6 +70,8 @@ class Baking:
         Share of the station's table that brings its own Mach dependence, 0 to 1 [1].
     gap : float
         Tip gap of a ducted rotor [m], NaN for an open one.
+    ducted : bool
+        Whether there is a duct.
     """
 
     r: Array

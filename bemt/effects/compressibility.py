@@ -11,7 +11,7 @@ from bemt.effects.base import Baking, Effect, Parameter
 
 Array = NDArray[np.float64]
 
-# Lift goes on growing a little beyond drag divergence, then the shock stalls the section within this span of Mach number.
+# Lift grows a little beyond drag divergence, then the shock stalls the section within this span of Mach number.
 _AFTER_DIVERGENCE = 0.04
 _STALL_SPAN = 0.12
 
@@ -22,11 +22,11 @@ class Compressibility(Effect):
 
     Notes
     -----
-    cl = cl_0 / sqrt(1 - M^2) (Glauert 1928, Proc. R. Soc. A 118:113) up to the lift-divergence Mach number, set 0.04 above
-    Korn's drag divergence M_dd = kappa - t/c - cl/10 (Mason 1990, AIAA 90-3029; not checked).  Behind it lift falls within
-    0.12 in M to ``shock_stall`` times the incompressible one and recovers between M = 1 and 1.1 to at most 1 or
-    Ackeret's 4 / (2 pi sqrt(M^2 - 1)).  The fall is a declared rule with the shape of published NACA 0012 tables, not a
-    fit to rotor data.  Acts on the attached part; separated flow (beyond 40 deg) is left alone.
+    cl = cl_0 / sqrt(1 - M^2) (Glauert 1928, Proc. R. Soc. A 118:113) up to the lift-divergence Mach number, set 0.04
+    above Korn's drag divergence M_dd = kappa - t/c - cl/10 (Mason 1990, AIAA 90-3029; not checked).  Behind it lift
+    falls within 0.12 in M to ``shock_stall`` times the incompressible one and recovers between M = 1 and 1.1 to at
+    most 1 or Ackeret's 4 / (2 pi sqrt(M^2 - 1)).  The fall is a declared rule with the shape of published NACA 0012
+    tables, not a fit to rotor data.  Acts on the attached part; separated flow (beyond 40 deg) is left alone.
     """
 
     amplitude: float = 1.0

@@ -17,7 +17,8 @@ class StallDelay(Effect):
     -----
     Snel, Houwink and Bosschers (1994), ECN-C--93-052, eq. 6.2 (not checked against the report); the coefficient is
     their 3.  cl_pot is the straight line through the zero-lift angle with the table's own slope.  Faded out between
-    30 and 50 deg (Lindenburg 2003) and applied to positive stall only; drag unchanged.
+    30 and 50 deg and applied to positive stall only.  What rotation adds is a force normal to the chord (Lindenburg
+    2003, ECN-C--03-025; not checked against the report), so drag grows by ``normal`` times gain times tan(alpha).
     """
 
     coefficient: float = 3.0
@@ -25,7 +26,10 @@ class StallDelay(Effect):
 
     id = "stall_delay"
     title = "rotational stall delay"
-    parameters = (Parameter("coefficient", "1", 1.0, 4.0, "Snel et al. 1994 give 3"),)
+    parameters = (
+        Parameter("coefficient", "1", 1.0, 4.0, "Snel et al. 1994 give 3"),
+        Parameter("normal", "1", 0.0, 1.0, "1: the gain is a force normal to the chord; 0: lift only"),
+    )
     order = 20
 
     def section(self, bake: Baking) -> None:
