@@ -91,6 +91,7 @@ def build_parser() -> argparse.ArgumentParser:
     bench = commands.add_parser("bench", help="measure the time per operating point")
     bench.add_argument("--json", action="store_true", help="print one JSON document (bemt.bench/1)")
     bench.add_argument("--quick", action="store_true", help="fewer repetitions")
+    bench.add_argument("--work", metavar="DIR", help="time the work in this folder instead of the shipped one")
     return parser
 
 
