@@ -13,9 +13,12 @@ from bemt.air import Air, isa_pressure
 from bemt.case_rules import check_shape
 from bemt.errors import Fault, InputError
 from bemt.schema import Collector
-from geometry.airfoil import Airfoil, GeometryError, naca, naca4, parse_dat
-from geometry.blade import Blade, from_laws, from_stations
+from geometry.airfoil import Airfoil, naca, naca4
+from geometry.airfoil_file import parse_dat
+from geometry.blade import Blade, from_stations
+from geometry.common import GeometryError
 from geometry.duct import Duct, Stator, around
+from geometry.laws import from_laws
 from geometry.rotor import Rotor
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import Any
 
 from bemt.schema import Key
 from bemt.section_rule import DRAG_LEVEL, N_CRIT
-from geometry.blade import CHORD_LAWS as GEOMETRY_CHORD_LAWS
+from geometry.laws import CHORD_LAWS as GEOMETRY_CHORD_LAWS
 
 __all__ = ["ASSUMPTION", "AXES", "DEFAULTS", "GROUPS", "INCH", "POLAR", "SCHEMA", "TEMPERATURE"]
 

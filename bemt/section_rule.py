@@ -134,7 +134,8 @@ def polar(shape: Airfoil, n_crit: float = N_CRIT, drag_level: float = DRAG_LEVEL
     Polar
         On the shared grids; from Re 6e5 on the table of the smooth section at n_crit 9.
     """
-    from bemt.polars import DEFAULT_RE, neuralfoil_polar
+    from bemt.polars import DEFAULT_RE
+    from bemt.polars_neuralfoil import neuralfoil_polar
 
     small = neuralfoil_polar(shape, n_crit=n_crit)
     large = neuralfoil_polar(shape, n_crit=max(n_crit, N_CRIT_LARGE))

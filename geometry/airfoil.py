@@ -1,4 +1,4 @@
-"""Section coordinates: NACA families, thin plates, Selig and Lednicer files, blending and repanelling.
+"""Sections: their coordinates, NACA families, thin plates, blending and repanelling.
 
 Every section is an :class:`Airfoil`: a closed loop in Selig order (trailing edge, upper side, leading edge, lower
 side, trailing edge) with unit chord along +x and the suction side of a lifting section at +y.
@@ -7,149 +7,16 @@ side, trailing edge) with unit chord along +x and the suction side of a lifting 
 from __future__ import annotations
 
 import hashlib
-import math
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from geometry.common import Array, Faults, GeometryError, frozen, pchip
 
-__all__ = ["Airfoil", "GeometryError", "blend", "naca", "naca4", "parse_dat", "pchip", "plate"]
-
-
-class GeometryError(ValueError):
-    """Bad geometry input: every fault found at once.
-
-    Parameters
-    ----------
-    faults : sequence of tuple of str
-        ``(where, got, expected, hint)`` each; the hint may be empty.
-
-    Examples
-    --------
-    >>> print(GeometryError([("chord", "-0.01 m", "a positive number", "Drop the sign")]))
-    chord: got -0.01 m; expected a positive number. Drop the sign.
-    """
-
-    def __init__(self, faults: Sequence[tuple[str, str, str, str]]) -> None:
-        self.faults: tuple[tuple[str, str, str, str], ...] = tuple(faults)
-        lines = []
-        for where, got, expected, hint in self.faults:
-            tail = f" {hint.rstrip('.')}" + ("" if hint.endswith("?") else ".") if hint else ""
-            lines.append(f"{where}: got {got}; expected {expected}.{tail}")
-        super().__init__("\n".join(lines))
-
-    def __reduce__(self) -> tuple[type[GeometryError], tuple[tuple[tuple[str, str, str, str], ...]]]:
-        """Pickle by the faults (worker processes send errors back)."""
-        return (type(self), (self.faults,))
-
-
-class Faults:
-    """Collects faults, then raises them together.
-
-    Examples
-    --------
-    >>> faults = Faults()
-    >>> faults.number("gap", -1.0, 0.0, 1.0, "m")
-    >>> faults.found
-    [('gap', '-1 m', 'a number from 0 to 1 m', '')]
-    """
-
-    def __init__(self) -> None:
-        self.found: list[tuple[str, str, str, str]] = []
-
-    def add(self, where: str, got: str, expected: str, hint: str = "") -> None:
-        """Note one fault."""
-        self.found.append((where, got, expected, hint))
-
-    def number(self, where: str, value: float, low: float, high: float, unit: str = "", hint: str = "") -> None:
-        """Note a fault unless ``low <= value <= high``; infinite bounds are open, NaN always fails."""
-        if low <= value <= high and math.isfinite(value):
-            return
-        unit = f" {unit}" if unit else ""
-        span = f"from {low:g} to {high:g}" if math.isfinite(high) else f"of {low:g} or more"
-        self.add(where, f"{value:g}{unit}", f"a number {span}{unit}", hint)
-
-    def check(self) -> None:
-        """Raise all faults noted so far, if any."""
-        if self.found:
-            raise GeometryError(self.found)
-
-
-def frozen(values: ArrayLike) -> Array:
-    """Return a read-only float copy."""
-    out = np.array(values, dtype=np.float64)
-    out.flags.writeable = False
-    return out
-
-
-def pchip_slopes(x: Array, y: Array) -> Array:
-    """Return the PCHIP slopes of columns y (N, k) at the strictly ascending abscissae x (N,), N >= 2."""
-    h = np.diff(x)[:, None]
-    d = np.diff(y, axis=0) / h
-    if len(x) == 2:
-        return np.asarray(np.vstack([d, d]), dtype=np.float64)
-    m = np.zeros_like(y)
-    h0, h1, d0, d1 = h[:-1], h[1:], d[:-1], d[1:]
-    w0, w1 = 2 * h1 + h0, h1 + 2 * h0
-    same = d0 * d1 > 0
-    safe0, safe1 = np.where(same, d0, 1.0), np.where(same, d1, 1.0)
-    m[1:-1] = np.where(same, (w0 + w1) / (w0 / safe0 + w1 / safe1), 0.0)
-    for end, a, b in ((0, 0, 1), (-1, -1, -2)):
-        s = ((2 * h[a] + h[b]) * d[a] - h[a] * d[b]) / (h[a] + h[b])
-        s = np.where(s * d[a] <= 0, 0.0, s)
-        m[end] = np.where((d[a] * d[b] <= 0) & (np.abs(s) > 3 * np.abs(d[a])), 3 * d[a], s)
-    return m
-
-
-def pchip(x: Array, y: Array, xq: ArrayLike, slopes: Array | None = None) -> Array:
-    """Interpolate monotone-preserving (PCHIP), clamped to the end values outside the data.
-
-    Parameters
-    ----------
-    x : (N,) float
-        Strictly ascending abscissae, N >= 2.
-    y : (N,) or (N, k) float
-        Ordinates; columns are interpolated independently.
-    xq : (...) float
-        Where to interpolate.
-    slopes : (N, k) float or None
-        Result of :func:`pchip_slopes`, to save its time.
-
-    Returns
-    -------
-    (...) or (..., k) float
-        Interpolated values.
-
-    Notes
-    -----
-    Weighted harmonic mean slopes, one-sided three-point ends: what ``scipy.interpolate.PchipInterpolator`` does,
-    without its half-second import. Overshoots nowhere; second order at data extrema, third order elsewhere.
-
-    References
-    ----------
-    F. N. Fritsch and J. Butland, A method for constructing local monotone piecewise cubic interpolants, SIAM J. Sci.
-    Stat. Comput. 5 (1984) 300-304, doi:10.1137/0905021 (slope formula; not checked against the paper).
-
-    Examples
-    --------
-    >>> pchip(np.array([0.0, 1.0, 2.0]), np.array([0.0, 1.0, 1.0]), [-1.0, 0.5, 1.5, 9.0]).tolist()
-    [0.0, 0.6875, 1.0, 1.0]
-    """
-    y2 = y.reshape(len(x), -1)
-    m = pchip_slopes(x, y2) if slopes is None else slopes
-    q = np.clip(np.asarray(xq, dtype=np.float64), x[0], x[-1])
-    flat = q.ravel()
-    i = np.clip(np.searchsorted(x, flat, side="right") - 1, 0, len(x) - 2)
-    h = (x[i + 1] - x[i])[:, None]
-    t = (flat - x[i])[:, None] / h
-    rise, m0, m1 = y2[i + 1] - y2[i], h * m[i], h * m[i + 1]
-    out = y2[i] + t * (m0 + t * (3 * rise - 2 * m0 - m1 + t * (m0 + m1 - 2 * rise)))
-    return np.asarray(out.reshape(q.shape + y.shape[1:]), dtype=np.float64)
+__all__ = ["Airfoil", "blend", "naca", "naca4", "plate"]
 
 
 def _spaced(n: int) -> Array:
@@ -534,89 +401,3 @@ def blend(a: Airfoil, b: Airfoil, w: float) -> Airfoil:
     pa, pb = a.repanel(n + (n + 1) % 2 if n > 20 else 21), b.repanel(n + (n + 1) % 2 if n > 20 else 21)
     name = f"{1 - w:.3f}*{a.name}+{w:.3f}*{b.name}"
     return Airfoil(name, (1 - w) * pa.x + w * pb.x, (1 - w) * pa.y + w * pb.y)
-
-
-def _numbers(text: str, faults: Faults) -> tuple[str, list[tuple[int, float, float]]]:
-    """Read title and number pairs with their line numbers; note what is neither."""
-    title = ""
-    rows: list[tuple[int, float, float]] = []
-    for number, line in enumerate(text.lstrip("\ufeff").splitlines(), start=1):
-        words = line.split("#")[0].replace(",", " ").split()
-        if not words:
-            continue
-        try:
-            values = [float(word) for word in words]
-        except ValueError:
-            if not title and not rows:
-                title = line.strip()
-            else:
-                faults.add(f"line {number}", repr(line.strip()), "two numbers, x and y")
-            continue
-        if len(values) != 2 and not title and not rows:
-            title = line.strip()  # such as "23012"
-        elif len(values) != 2 or not all(map(math.isfinite, values)):
-            faults.add(f"line {number}", repr(line.strip()), "two finite numbers, x and y")
-        else:
-            rows.append((number, values[0], values[1]))
-    return title, rows
-
-
-def parse_dat(text: str, name: str = "") -> Airfoil:
-    r"""Read a section file in Selig or Lednicer form.
-
-    Parameters
-    ----------
-    text : str
-        The file's content: a title line (optional), then x y pairs. Selig: one loop from the trailing edge.
-        Lednicer: the two point counts, then upper and lower side, both from the leading edge.
-    name : str
-        Overrides the title.
-
-    Returns
-    -------
-    Airfoil
-        Points as given (up to 2 % off unit chord), repeated ones dropped, lower-first loops turned round.
-
-    Raises
-    ------
-    GeometryError
-        With every faulty line, or what is wrong with the shape. Percent and millimetres are refused, not converted.
-
-    Examples
-    --------
-    >>> section = naca("2412")
-    >>> text = "my section" + "".join(f"\n{x:.6f} {y:.6f}" for x, y in zip(section.x, section.y))
-    >>> parse_dat(text).name, round(parse_dat(text).thickness, 3)
-    ('my section', 0.12)
-    """
-    faults = Faults()
-    title, rows = _numbers(text, faults)
-    counts: tuple[int, int] | None = None
-    if rows and rows[0][1] > 1.5 and rows[0][2] > 1.5 and all(v == int(v) for v in rows[0][1:]):
-        counts = (int(rows[0][1]), int(rows[0][2]))
-        rows = rows[1:]
-    if len(rows) < 7 and not faults.found:
-        faults.add("section file", f"{len(rows)} points", "7 points or more", "Is it a coordinate file?")
-    if counts is not None and sum(counts) != len(rows) and not faults.found:
-        faults.add("section file", f"{len(rows)} points", f"{counts[0]} + {counts[1]} as its second line says",
-                   "Truncated file?")  # fmt: skip
-    faults.check()
-    points = np.array([row[1:] for row in rows])
-    if not (abs(points[:, 0].max() - 1) <= 0.02 and abs(points[:, 0].min()) <= 0.02):
-        hint = "Coordinates in percent or millimetres? Divide by the chord" if points[:, 0].max() > 1.5 else ""
-        got = f"x from {points[:, 0].min():g} to {points[:, 0].max():g}"
-        faults.add("section file", got, "x from 0 to 1 (unit chord)", hint)
-    faults.check()
-    if counts is not None or points[0, 0] < 0.5 * points[:, 0].max():
-        fall = np.diff(points[:, 0])
-        if counts is None and fall.min() > -0.5:  # a loop that starts at the nose
-            cut = int(np.argmax(points[:, 0]))
-            points = np.vstack([points[cut:], points[: cut + 1]])
-        else:  # Lednicer; without counts the second side starts where x falls back to the nose
-            cut = counts[0] if counts is not None else int(np.argmin(fall)) + 1
-            points = np.vstack([points[:cut][::-1], points[cut:]])
-    points = points[np.concatenate([[True], np.abs(np.diff(points, axis=0)).max(axis=1) > 1e-9])]
-    x, y = points.T
-    if np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y) < 0:
-        x, y = x[::-1], y[::-1]
-    return Airfoil(name or title or "section", x, y)

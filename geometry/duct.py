@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geometry.airfoil import Airfoil, Array, Faults
+from geometry.airfoil import Airfoil
+from geometry.common import Array, Faults
 from geometry.rotor import Rotor
 
 __all__ = ["Duct", "Stator", "around"]
@@ -319,7 +320,7 @@ def around(rotor: Rotor, length: float, gap: float, lip_radius: float = 0.0, *, 
 
     Examples
     --------
-    >>> from geometry.blade import helix
+    >>> from geometry.laws import helix
     >>> rotor = Rotor(helix(0.069, 0.1, "fan", hub=0.368), 8)
     >>> round(around(rotor, 0.06, 0.0004, exit_area_ratio=0.9).area_ratio(rotor), 6)
     0.9

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geometry.airfoil import Array, Faults
 from geometry.blade import Blade
+from geometry.common import Array, Faults
 
 __all__ = ["Rotor"]
 
@@ -40,7 +40,7 @@ class Rotor:
 
     Examples
     --------
-    >>> from geometry.blade import helix
+    >>> from geometry.laws import helix
     >>> rotor = Rotor(helix(0.2032, 0.127), 2)
     >>> rotor.D, round(rotor.solidity, 3)
     (0.2032, 0.079)

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from bemt.polars import Polar
     from geometry.rotor import Rotor
 
@@ -42,11 +44,24 @@ def shared_data() -> Path:
     return folder
 
 
+@pytest.fixture(scope="module")
+def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Cache folder of one test file, empty at first, on the disk and in memory."""
+    from bemt import cache
+
+    folder = tmp_path_factory.mktemp("cache")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("BEMT_CACHE", str(folder))
+        cache.clear_memory()
+        yield folder
+    cache.clear_memory()
+
+
 @pytest.fixture(scope="session")
 def rotor() -> Rotor:
     """Two-bladed 8x5 propeller by name only: helix, generic chord law."""
     from geometry.airfoil import naca4
-    from geometry.blade import helix
+    from geometry.laws import helix
     from geometry.rotor import Rotor
 
     inch = 0.0254
@@ -58,7 +73,7 @@ def polar() -> Polar:
     """Cambered section with a stall, from closed forms: no network, no Reynolds dependence."""
     import numpy as np
 
-    from bemt.polars import SectionTable, from_tables
+    from bemt.post_stall import SectionTable, from_tables
 
     alpha = np.radians(np.arange(-20.0, 25.5, 0.5))
     linear = 5.9 * (alpha + np.radians(4.0))

@@ -23,8 +23,8 @@ from bemt.effects.base import Effect, Parameter
 from bemt.errors import InputError
 from bemt.polars import Polar
 from geometry.airfoil import naca4
-from geometry.blade import helix
 from geometry.duct import Stator, around
+from geometry.laws import helix
 from geometry.rotor import Rotor
 
 CATALOGUE = effects.catalogue()

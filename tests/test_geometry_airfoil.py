@@ -11,7 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import PchipInterpolator  # type: ignore[import-untyped]
 
-from geometry.airfoil import Airfoil, GeometryError, blend, naca, naca4, parse_dat, pchip, plate
+from geometry.airfoil import Airfoil, blend, naca, naca4, plate
+from geometry.airfoil_file import parse_dat
+from geometry.common import GeometryError, pchip
 
 # Ordinates in percent of the chord, Abbott and von Doenhoff, Theory of Wing Sections, appendix III, as commonly
 # reprinted (not checked against the book; two decimals, and the tables of the 1930s carry slips of about 0.02).

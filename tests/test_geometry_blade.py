@@ -12,17 +12,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from geometry.airfoil import GeometryError, naca
-from geometry.blade import (
-    CHORD_LAWS,
-    PITCH_LAWS,
-    Blade,
-    chord_over_R,
-    from_laws,
-    from_stations,
-    helix,
-    parse_designation,
-)  # fmt: skip
+from geometry.airfoil import naca
+from geometry.blade import Blade, from_stations
+from geometry.common import GeometryError
+from geometry.designation import parse_designation
+from geometry.laws import CHORD_LAWS, PITCH_LAWS, chord_over_R, from_laws, helix
 from geometry.rotor import Rotor
 
 INCH = 0.0254

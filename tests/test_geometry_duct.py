@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from geometry.airfoil import GeometryError
-from geometry.blade import helix
+from geometry.common import GeometryError
 from geometry.duct import Duct, Stator, around
+from geometry.laws import helix
 from geometry.rotor import Rotor
 
 ROTOR = Rotor(helix(0.069, 0.1, "fan", hub=25.4 / 69), 8)

@@ -1,45 +1,24 @@
-"""Section tables are closed, continuous, sane over Reynolds number, and the same from the cache as when made."""
+"""Section tables are read as stored, interpolated multilinearly, checked, mixed and resampled without surprise."""
 
 from __future__ import annotations
 
 import math
-import os
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from bemt import cache
 from bemt import polars as P
-from bemt.polars import ALPHA_GRID, DEFAULT_RE, Polar, SectionTable
-from geometry.airfoil import Airfoil, naca, naca4
+from bemt.polars import ALPHA_GRID, DEFAULT_RE, Polar
+from bemt.polars_neuralfoil import neuralfoil_polar
+from bemt.post_stall import SectionTable, from_tables
+from geometry.airfoil import naca
 
-SECTIONS = {
-    "0012": naca("0012"), "4412": naca("4412"), "2415": naca("2415"), "thin": naca4(0.04, 0.4, 0.06),
-    "sharp": naca4(0.06, 0.4, 0.04), "23015": naca("23015"),
-}  # fmt: skip
-METHODS = ("viterna", "normal")
-
-
-@pytest.fixture(scope="module", autouse=True)
-def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Keep the user's cache out of the tests."""
-    folder = tmp_path_factory.mktemp("cache")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("BEMT_CACHE", str(folder))
-        cache.clear_memory()
-        yield folder
-    cache.clear_memory()
+pytestmark = pytest.mark.usefixtures("own_cache")
 
 
 def deg(*angles: float) -> np.ndarray:
     """Degrees as radians."""
     return np.deg2rad(np.array(angles, dtype=float))
-
-
-# ---------------------------------------------------------------- grids and interpolation
 
 
 def test_shared_grids_are_indexed_by_arithmetic() -> None:
@@ -86,7 +65,7 @@ def test_lookup_wraps_alpha_and_holds_re_and_mach() -> None:
 def test_derived_quantities_of_a_known_curve() -> None:
     a = np.deg2rad(np.arange(-20.0, 20.5, 0.5))
     rise = np.where(a < deg(12)[0], a, 2 * deg(12)[0] - a)
-    p = P.from_tables([SectionTable(a, 6.0 * (np.maximum(rise, deg(-11)[0]) + deg(3)[0]), 0.01 + a**2)])
+    p = from_tables([SectionTable(a, 6.0 * (np.maximum(rise, deg(-11)[0]) + deg(3)[0]), 0.01 + a**2)])
     assert p.alpha0(1e5) == pytest.approx(deg(-3)[0], abs=1e-9)
     assert p.cl_alpha(1e5) == pytest.approx(6.0, abs=1e-6)
     assert p.stall(1e5) == pytest.approx((deg(12)[0], 6.0 * deg(15)[0]), abs=1e-6)
@@ -107,296 +86,6 @@ def test_bad_tables_are_refused() -> None:
         good.cl[0, 0, 0] = 1.0
 
 
-# ---------------------------------------------------------------- post-stall extension
-
-
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("half", [0.0, deg(2)[0]])
-def test_extension_is_continuous_and_periodic(method: str, half: float) -> None:
-    a = np.deg2rad(np.arange(-20.0, 20.5, 0.5))
-    cl, cd = 5.0 * np.sin(a + 0.05), 0.01 + 0.8 * np.sin(a) ** 2
-    lo, hi = deg(-11, 14)
-    step = 1e-5
-    out = np.unique(np.r_[np.linspace(-math.pi, math.pi, 20001), *(np.array([lo, hi, -lo - math.pi, math.pi - hi,
-                    -math.pi / 2, math.pi / 2])[:, None] + np.array([-step, 0.0, step])).T])  # fmt: skip
-    got = P.extend(a, cl, cd, lo=lo, hi=hi, cd_max=1.3, out=out, half=half, method=method)
-    for value in got:
-        assert np.all(np.abs(np.diff(value)) <= 25.0 * np.diff(out) + 1e-12)
-        assert value[0] == value[-1]
-    assert got[1].min() > 0.0
-    at_90 = np.isclose(np.abs(out), math.pi / 2, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(got[1][at_90], 1.3, rtol=1e-9)
-
-
-def test_extension_is_viterna_corrigan_beyond_the_match_and_data_inside() -> None:
-    a = np.deg2rad(np.arange(-20.0, 20.5, 0.5))
-    cl, cd = 5.0 * np.sin(a + 0.05), 0.01 + 0.8 * np.sin(a) ** 2
-    hi, top = float(a[-1]), 1.29
-    out = np.r_[a, deg(25, 40, 60, 85)]
-    got_cl, got_cd = P.extend(a, cl, cd, lo=float(a[0]), hi=hi, cd_max=top, out=out)
-    np.testing.assert_allclose(got_cl[: a.size], cl, atol=1e-12)
-    np.testing.assert_allclose(got_cd[: a.size], cd, atol=1e-12)
-    s, c = math.sin(hi), math.cos(hi)
-    x = out[a.size :]
-    a2 = (cl[-1] - top * s * c) * s / c**2
-    b2 = (cd[-1] - top * s**2) / c
-    np.testing.assert_allclose(got_cl[a.size :], top / 2 * np.sin(2 * x) + a2 * np.cos(x) ** 2 / np.sin(x), rtol=1e-12)
-    np.testing.assert_allclose(got_cd[a.size :], top * np.sin(x) ** 2 + b2 * np.cos(x), rtol=1e-12)
-
-
-def test_normal_method_tends_to_a_force_normal_to_the_chord() -> None:
-    a = np.deg2rad(np.arange(-16.0, 16.5, 0.5))
-    cl, cd = 5.0 * np.sin(a), 0.01 + 0.3 * a**2
-    x = deg(16, 20, 30, 45, 60)
-    lift, drag = P.extend(a, cl, cd, lo=a[0], hi=a[-1], cd_max=1.3, out=x, method="normal")
-    viterna = P.extend(a, cl, cd, lo=a[0], hi=a[-1], cd_max=1.3, out=x)
-    assert np.array_equal(lift, viterna[0]) and drag[0] == pytest.approx(viterna[1][0], rel=1e-12)
-    suction = lift * np.tan(x) - drag
-    assert np.all(np.diff(np.abs(suction)) < 0.0) and abs(suction[-1]) < 1e-3
-
-
-def test_viterna_cd_max_follows_the_aspect_ratio() -> None:
-    assert P.viterna_cd_max(0.0) == 1.11
-    assert P.viterna_cd_max(50.0) == pytest.approx(2.01) == P.viterna_cd_max(80.0)
-
-
-# ---------------------------------------------------------------- NeuralFoil
-
-
-@pytest.fixture(scope="module", params=sorted(SECTIONS))
-def section(request: pytest.FixtureRequest, own_cache: Path) -> tuple[str, Airfoil, Polar]:
-    """Name, shape and polar of one section."""
-    shape = SECTIONS[request.param]
-    return request.param, shape, P.neuralfoil_polar(shape)
-
-
-def test_neuralfoil_polar_is_closed_and_positive(section: tuple[str, Airfoil, Polar]) -> None:
-    _, shape, p = section
-    assert p.is_shared and p.M.tolist() == [0.0]
-    assert np.array_equal(p.cl[0], p.cl[-1]) and np.array_equal(p.cd[0], p.cd[-1])
-    assert p.cd.min() > 0.0 and np.abs(p.cl).max() < 2.5
-    assert p.confidence is not None and p.confidence.min() >= 0.0 and p.confidence.max() <= 1.0
-    assert np.all(p.confidence[np.abs(p.alpha) > deg(22.01)[0]] == 0.0)
-    for polar, cd_max in ((p, 1.29), (P.neuralfoil_polar(shape, cd_max=1.8), 1.8)):
-        np.testing.assert_allclose(polar.lookup(deg(-90, 90)[:, None], DEFAULT_RE)[1], cd_max, rtol=1e-9)
-
-
-def test_neuralfoil_numbers_are_untouched_where_it_is_sound(section: tuple[str, Airfoil, Polar]) -> None:
-    import neuralfoil as nf
-
-    name, shape, p = section
-    j = np.flatnonzero(DEFAULT_RE > 4e5)
-    at = np.arange(-1.0, 5.01, 0.5)
-    a, r = np.meshgrid(at, DEFAULT_RE[j], indexing="ij")
-    raw = nf.get_aero_from_coordinates(np.column_stack([shape.x, shape.y]), a.ravel(), r.ravel(), model_size="xlarge")
-    cl, cd = p.lookup(np.deg2rad(a), r)
-    np.testing.assert_allclose(cl, np.reshape(raw["CL"], a.shape), atol=1e-9, err_msg=name)
-    np.testing.assert_allclose(cd, np.reshape(raw["CD"], a.shape), atol=1e-9, err_msg=name)
-
-
-def test_lift_slope_and_zero_lift_angle_are_those_of_thin_airfoils(section: tuple[str, Airfoil, Polar]) -> None:
-    name, _, p = section
-    # thin-airfoil theory of the mean line [deg]: Abbott & von Doenhoff, NACA four- and five-digit lines
-    theory = {"0012": 0.0, "4412": -4.15, "2415": -2.08, "thin": -4.15, "sharp": -6.23, "23015": -1.09}[name]
-    for Re in (1e6, 3e6):
-        assert 0.95 < p.cl_alpha(Re) / (2 * math.pi) < (1.3 if name == "sharp" else 1.1)
-        assert math.degrees(p.alpha0(Re)) == pytest.approx(theory, abs=1.5 if name == "sharp" else 0.4)
-        angle, cl_max = p.stall(Re)
-        assert 5.0 < math.degrees(angle) < 25.0 and 0.9 < cl_max < 2.1
-
-
-def test_drag_falls_with_reynolds_number_and_stays_above_blasius(section: tuple[str, Airfoil, Polar]) -> None:
-    _, _, p = section
-    least = p.cd[:, :, 0].min(axis=0)
-    low = DEFAULT_RE < 4e5
-    assert np.all(np.diff(least[low]) < 0.0)
-    slope = np.polyfit(np.log(DEFAULT_RE[low]), np.log(least[low]), 1)[0]
-    assert -0.75 < slope < -0.3
-    assert np.all(least >= 2.656 / np.sqrt(DEFAULT_RE) - 1e-15)
-
-
-def test_low_reynolds_lift_keeps_its_share(section: tuple[str, Airfoil, Polar]) -> None:
-    _, shape, p = section
-    at = deg(*np.arange(0.0, 5.1, 0.5))
-    reference = P.neuralfoil_polar(shape, re=np.array([3e5])).lookup(at, 3e5)[0]
-    for Re in DEFAULT_RE[DEFAULT_RE < 3e5]:
-        assert np.all(p.lookup(at, Re)[0] >= 0.5 * reference - 0.1 - 1e-9)
-    free = P.neuralfoil_polar(shape, lift_floor=0.0)
-    same = DEFAULT_RE > 3e5
-    assert np.array_equal(free.cl[:, same], p.cl[:, same])
-
-
-def test_bound_on_low_reynolds_lift_is_needed_and_can_be_switched_off() -> None:
-    free = P.neuralfoil_polar(SECTIONS["2415"], lift_floor=0.0)
-    assert free.lookup(0.0, 2e4)[0] < 0.0 < P.neuralfoil_polar(SECTIONS["2415"]).lookup(0.0, 2e4)[0]
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_symmetric_section_is_antisymmetric(method: str) -> None:
-    p = P.neuralfoil_polar(SECTIONS["0012"], method=method)
-    angles = np.round(np.rad2deg(ALPHA_GRID), 6)
-    both = ALPHA_GRID[np.isin(angles, -angles)][:, None]  # nodes of the grid on both sides
-    assert both.size > 170
-    cl, cd = p.lookup(both, DEFAULT_RE)
-    mirrored = p.lookup(-both, DEFAULT_RE)
-    np.testing.assert_allclose(mirrored[0], -cl, atol=1e-6)
-    np.testing.assert_allclose(mirrored[1], cd, atol=1e-6)
-
-
-def test_past_stall_limits_the_use_of_neuralfoil() -> None:
-    short = P.neuralfoil_polar(SECTIONS["4412"], past_stall=deg(1)[0])
-    long = P.neuralfoil_polar(SECTIONS["4412"])
-    assert short.confidence is not None and long.confidence is not None
-    assert (short.confidence > 0).sum() < (long.confidence > 0).sum()
-    stall, cl_max = short.stall(1e6)
-    assert np.all(short.lookup(np.linspace(stall, deg(60)[0], 99), 1e6)[0] <= cl_max + 1e-12)
-
-
-def test_lower_n_crit_and_trips_bring_transition_forward() -> None:
-    j = np.flatnonzero(DEFAULT_RE > 1e6)[0]
-    free, early, tripped = (
-        P.neuralfoil_polar(SECTIONS["0012"], **kw).cd[:, j, 0].min()
-        for kw in ({}, {"n_crit": 3.0}, {"xtr_upper": 0.05, "xtr_lower": 0.05})
-    )
-    assert free < early < tripped
-
-
-def test_bad_settings_are_refused() -> None:
-    for kw, word in (({"method": "none"}, "viterna, normal"), ({"re": np.array([2e5, 1e5])}, "ascending")):
-        with pytest.raises(ValueError, match=word):
-            P.neuralfoil_polar(SECTIONS["0012"], **kw)
-
-
-# ---------------------------------------------------------------- cache
-
-
-def entry(folder: Path) -> Path:
-    """Return the only entry of a cache folder."""
-    (path,) = (folder / "polar").glob("*.npz")
-    return path
-
-
-@pytest.fixture
-def fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Empty cache folder, empty memory."""
-    monkeypatch.setenv("BEMT_CACHE", str(tmp_path / "c"))
-    cache.clear_memory()
-    return tmp_path / "c"
-
-
-def bits(p: Polar) -> tuple[bytes, bytes, bytes]:
-    """Bytes of the tables."""
-    assert p.confidence is not None
-    return p.cl.tobytes(), p.cd.tobytes(), p.confidence.tobytes()
-
-
-def test_cache_hit_equals_cold_bit_for_bit(fresh: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    cold = P.neuralfoil_polar(SECTIONS["4412"])
-    assert not [f for f in (fresh / "polar").iterdir() if f.suffix != ".npz" or f.name.startswith(".")]
-    cache.clear_memory()
-    monkeypatch.setattr(P, "_make_neuralfoil", lambda *a: pytest.fail("the disk entry was not used"))
-    warm = P.neuralfoil_polar(SECTIONS["4412"])
-    assert bits(warm) == bits(cold) and warm.key == cold.key
-    assert bits(P.neuralfoil_polar(SECTIONS["4412"])) == bits(cold)
-
-
-def test_every_setting_and_the_shape_make_another_entry(fresh: Path) -> None:
-    re = np.array([1e5])
-    settings = ({}, {"n_crit": 7.0}, {"xtr_upper": 0.5}, {"xtr_lower": 0.5}, {"ar": 5.0}, {"method": "normal"},
-                {"past_stall": 0.05}, {"lift_floor": 0.0}, {"model": "medium"})  # fmt: skip
-    for kw in settings:
-        P.neuralfoil_polar(SECTIONS["4412"], re=re, **kw)
-    P.neuralfoil_polar(SECTIONS["0012"], re=re)
-    P.neuralfoil_polar(SECTIONS["4412"], re=np.array([1.1e5]))
-    assert len(list((fresh / "polar").glob("*.npz"))) == len(settings) + 2
-
-
-@pytest.mark.parametrize("damage", ["empty", "cut", "noise", "swapped"])
-def test_damaged_entry_is_made_again(damage: str, fresh: Path) -> None:
-    re = np.array([1e5])
-    cold = P.neuralfoil_polar(SECTIONS["4412"], re=re)
-    path = entry(fresh)
-    raw = path.read_bytes()
-    if damage == "swapped":  # a valid archive whose content does not fit its checksum
-        with np.load(path) as archive:
-            arrays = dict(archive)
-        arrays["cl"] = arrays["cl"] + 1.0
-        np.savez(path, **arrays)
-    else:
-        middle = raw[: len(raw) // 2]
-        path.write_bytes({"empty": b"", "cut": middle, "noise": middle + bytes(64) + raw[len(middle) + 64 :]}[damage])
-    cache.clear_memory()
-    assert bits(P.neuralfoil_polar(SECTIONS["4412"], re=re)) == bits(cold)
-    cache.clear_memory()
-    with np.load(entry(fresh)) as archive:
-        assert np.array_equal(archive["cl"][:, 0], cold.cl[:, 0, 0])
-
-
-@pytest.mark.parametrize("place", ["off", "", "/dev/null/none"])
-def test_works_without_a_cache_folder(place: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("BEMT_CACHE", place)
-    cache.clear_memory()
-    assert P.neuralfoil_polar(SECTIONS["0012"], re=np.array([1e5])).cl.shape == (ALPHA_GRID.size, 1, 1)
-
-
-def test_cache_folder_rule(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setenv("BEMT_CACHE", str(tmp_path / "own"))
-    assert cache.cache_dir() == tmp_path / "own"
-    monkeypatch.delenv("BEMT_CACHE")
-    assert cache.cache_dir() == tmp_path / "bemt"
-    monkeypatch.delenv("XDG_CACHE_HOME")
-    assert cache.cache_dir() == Path.home() / ".cache" / "bemt"
-
-
-def test_installed_version_is_that_of_the_metadata() -> None:
-    from importlib.metadata import PackageNotFoundError, version
-
-    for package in ("neuralfoil", "numpy", "pytest"):
-        assert cache.installed_version(package) == version(package)
-    with pytest.raises(PackageNotFoundError):
-        cache.installed_version("no_such_package_here")
-
-
-def test_a_cache_hit_needs_no_neuralfoil(own_cache: Path) -> None:
-    P.neuralfoil_polar(SECTIONS["4412"])
-    code = (
-        "import sys; from bemt.polars import neuralfoil_polar as f; from geometry.airfoil import naca;"
-        "f(naca('4412')); print(sorted({'neuralfoil', 'aerosandbox', 'scipy', 'numba'} & set(sys.modules)))"
-    )
-    root = Path(P.__file__).parents[1]
-    env = os.environ | {"BEMT_CACHE": str(own_cache), "PYTHONPATH": str(root)}
-    done = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True, cwd=root)
-    assert done.stdout.strip() == "[]"
-
-
-# ---------------------------------------------------------------- tables of users, mixing
-
-
-def test_tables_keep_their_data_and_are_mirrored_where_none_are() -> None:
-    a = np.deg2rad(np.arange(-2.0, 14.5, 1.0))
-    tables = [SectionTable(a, 5.5 * a + 0.3, 0.02 + a**2, Re) for Re in (1e5, 4e5)]
-    p = P.from_tables(tables, name="x", cd_max=1.3)
-    for t in tables:
-        np.testing.assert_allclose(p.lookup(a, t.Re), (t.cl, t.cd), atol=1e-9)
-    cl, cd = p.lookup(-a[-1], 1e5)
-    assert float(cl) == pytest.approx(-0.7 * tables[0].cl[-1], abs=1e-9)
-    assert float(cd) == pytest.approx(tables[0].cd[-1])
-    assert any("mirrored" in n for n in p.notes) and any("before the stall" in n for n in p.notes)
-
-
-def test_tables_that_cannot_be_continued_are_refused() -> None:
-    a = np.deg2rad(np.arange(-2.0, 14.5, 1.0))
-    good = SectionTable(a, 5.5 * a, 0.02 + a**2)
-    for bad in (
-        [SectionTable(a[5:], good.cl[5:], good.cd[5:])], [SectionTable(a[:6], good.cl[:6], good.cd[:6])],
-        [SectionTable(a[::-1], good.cl, good.cd)], [good, good],
-        [good, SectionTable(a, good.cl, good.cd, 2e5, 0.5)],
-    ):  # fmt: skip
-        with pytest.raises(ValueError, match="expected"):
-            P.from_tables(bad)
-
-
 def test_on_grid_is_idempotent_and_announces_what_it_holds() -> None:
     p = smooth_polar(np.array([5e4, 5e5]), np.array([0.0, 0.5]))
     q = p.on_grid()
@@ -405,7 +94,7 @@ def test_on_grid_is_idempotent_and_announces_what_it_holds() -> None:
 
 
 def test_fixed_re_removes_reynolds_and_nothing_else() -> None:
-    p = P.neuralfoil_polar(SECTIONS["4412"])
+    p = neuralfoil_polar(naca("4412"))
     q = P.fixed_re(p, 1.3e5)
     a = np.linspace(-math.pi, math.pi, 199)
     want = np.array(p.lookup(p.alpha, 1.3e5))
@@ -416,7 +105,7 @@ def test_fixed_re_removes_reynolds_and_nothing_else() -> None:
 
 
 def test_blend_is_linear_and_meets_its_ends() -> None:
-    a, b = P.neuralfoil_polar(SECTIONS["4412"]), P.neuralfoil_polar(SECTIONS["0012"])
+    a, b = neuralfoil_polar(naca("4412")), neuralfoil_polar(naca("0012"))
     assert P.blend(a, b, 0.0).key == a.key and P.blend(a, b, 1.0).key == b.key
     mid = P.blend(a, b, 0.25)
     np.testing.assert_allclose(mid.cl, 0.75 * a.cl + 0.25 * b.cl, atol=1e-15)

@@ -12,11 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt import polars, section_rule, solver
+from bemt import section_rule, solver
 from bemt.air import Air
 from bemt.duct import duct_flow
 from bemt.effects import standard
-from geometry.airfoil import Airfoil, naca, naca4, parse_dat
+from bemt.polars_neuralfoil import neuralfoil_polar
+from geometry.airfoil import Airfoil, naca, naca4
+from geometry.airfoil_file import parse_dat
 from geometry.blade import from_stations
 from geometry.duct import Duct
 from geometry.rotor import Rotor
@@ -79,7 +81,7 @@ def _x22a(folder: Path, beta75: float, J: np.ndarray, exit_ratio: float) -> solv
     gap = 0.4 * 0.0254
     area = np.pi * R**2 * (1 - hub**2) * exit_ratio
     duct = Duct(R + gap, 1.2446, 0.06 * 2 * R, gap, exit_radius=float(np.sqrt(area / np.pi)), rotor_x=0.3556)
-    prep = solver.prepare(rotor, [(0.75, polars.neuralfoil_polar(shape))], duct=duct_flow(duct, rotor), mach_max=0.8)
+    prep = solver.prepare(rotor, [(0.75, neuralfoil_polar(shape))], duct=duct_flow(duct, rotor), mach_max=0.8)
     return solver.solve(prep, 1200.0, J * 20 * 2 * R, Air.from_density())
 
 
@@ -114,7 +116,7 @@ def test_ka_19a_duct_share_at_bollard(shared_data: Path, pitch_ratio: float) -> 
     L, gap = 0.5 * D, 0.001
     duct = Duct(D / 2 + gap, L, 0.1825 * L, gap, exit_radius=D / 2 + gap + 0.0236 * L, rotor_x=0.5 * L)
     incompressible = [e for e in standard() if not e.uses_mach]
-    tables = [(s, polars.neuralfoil_polar(a)) for s, a in shapes]
+    tables = [(s, neuralfoil_polar(a)) for s, a in shapes]
     prep = solver.prepare(rotor, tables, incompressible, duct=duct_flow(duct, rotor))
     water = dataclasses.replace(Air.from_density(), rho=1000.0, mu=1e-3, a_sound=1500.0)
     sol = solver.solve(prep, 600.0, 0.0, water)

@@ -1,0 +1,146 @@
+"""Section tables from NeuralFoil: kept within what it knows, continued to +-180 degrees, cached by content."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt import cache
+from bemt.polars import ALPHA_GRID, DEFAULT_RE, Polar, first_stall
+from bemt.post_stall import METHODS, extend, viterna_cd_max
+
+if TYPE_CHECKING:
+    from geometry.airfoil import Airfoil
+
+__all__ = ["neuralfoil_polar"]
+
+Array = NDArray[np.float64]
+
+TABLE_VERSION = 2
+"""Raise when the making of tables changes: older cache entries are then ignored."""
+RAW_LIMIT_DEG = 20.0
+"""NeuralFoil is used up to this |alpha| at most (beyond 20-25 deg it has no training data)."""
+CONFIDENCE_MIN = 0.5
+"""Past its stall, NeuralFoil is used while its own confidence is above this."""
+BLEND_DEG = 2.0
+"""Half-width of the blend between the section data and the post-stall model. [deg]"""
+RE_REFERENCE = 3e5
+"""Reynolds number whose lift bounds that of lower ones (`lift_floor`)."""
+LIFT_SLACK = 0.1
+"""Lift coefficient by which lower Reynolds numbers may miss that bound (room for a shift of the zero-lift angle)."""
+
+
+def _confident_range(alpha: Array, cl: Array, confidence: Array, past_stall: float) -> tuple[float, float]:
+    """Find the matching angles of one column of NeuralFoil numbers: past the stall while confident, 5 to 20 deg."""
+    edge = []
+    for sign in (1.0, -1.0):
+        use = np.argsort(sign * alpha)
+        use = use[(sign * alpha[use] >= -1e-9) & (sign * alpha[use] <= np.deg2rad(RAW_LIMIT_DEG) + 1e-9)]
+        i = int(first_stall(sign * cl[use]))
+        end = sign * alpha[use[i]] + past_stall + 1e-9
+        while i + 1 < use.size and confidence[use[i + 1]] >= CONFIDENCE_MIN and sign * alpha[use[i + 1]] <= end:
+            i += 1
+        edge.append(max(abs(float(alpha[use[i]])), float(np.deg2rad(5.0))))
+    return -edge[1], edge[0]
+
+
+def neuralfoil_polar(
+    airfoil: Airfoil, *, re: Array = DEFAULT_RE, n_crit: float = 9.0, xtr_upper: float = 1.0,
+    xtr_lower: float = 1.0, model: str = "xlarge", ar: float = 10.0, cd_max: float | None = None,
+    method: str = "viterna", past_stall: float = np.pi, lift_floor: float = 0.5,
+) -> Polar:  # fmt: skip
+    """Incompressible polar of a section from NeuralFoil, continued to +-180 deg, cached on disk by content.
+
+    Parameters
+    ----------
+    airfoil : geometry.airfoil.Airfoil
+        Section in Selig order, unit chord.
+    re : (Nr,) float, optional
+        Chord Reynolds numbers, ascending. [-]
+    n_crit : float, optional
+        Critical amplification factor of transition (9: average wind tunnel; lower: more disturbed flow). [-]
+    xtr_upper, xtr_lower : float, optional
+        Forced transition as fraction of chord; 1 is free transition. [-]
+    model : str, optional
+        NeuralFoil network: "medium", "large", "xlarge", "xxlarge" or "xxxlarge".
+    ar : float, optional
+        Blade aspect ratio, for the drag at 90 deg. [-]
+    cd_max : float, optional
+        Drag coefficient at 90 deg; by default 1.11 + 0.018 ar. [-]
+    method : {"viterna", "normal"}, optional
+        Post-stall model, see `bemt.post_stall.extend`.
+    past_stall : float, optional
+        How far past its first stall NeuralFoil is used at most (20 deg of alpha and its confidence bound it too). [rad]
+    lift_floor : float, optional
+        Least share of the lift at Re 3e5, less 0.1 in cl, that lower Reynolds numbers keep; 0: no bound. [-]
+
+    Returns
+    -------
+    Polar
+        On ALPHA_GRID, re and M = [0]; compressibility belongs to `bemt.effects`.
+
+    Raises
+    ------
+    ValueError
+        For a method or a network that is not known, or Reynolds numbers that do not ascend from above 0.
+
+    Notes
+    -----
+    Two bounds keep low Reynolds numbers sane. NeuralFoil mirrors XFOIL, whose steady laminar separation without
+    reattachment takes nearly all lift (NACA 2415, Re 2e4, n_crit 9: cl(0) < 0, slope 0.45 of 2 pi), while the mean
+    lift of the unsteady flow keeps about half: hence `lift_floor` (own assumption). And no cd is below laminar friction
+    on both sides, 2.656 / sqrt(Re) (Blasius).
+
+    References
+    ----------
+    Sharpe, P., Hansman, R. J.: NeuralFoil: an airfoil aerodynamics analysis tool using physics-informed machine
+    learning. arXiv:2503.16323 (2025).
+    """
+    re = np.asarray(re, dtype=float)
+    if method not in METHODS:
+        raise ValueError(f"method: got {method!r}; expected one of {', '.join(METHODS)}.")
+    if re.ndim != 1 or re.size == 0 or not np.all(re > 0.0) or np.any(np.diff(re) <= 0.0):
+        raise ValueError(f"re: got {re}; expected ascending Reynolds numbers above 0.")
+    top = viterna_cd_max(ar) if cd_max is None else float(cd_max)
+    settings: dict[str, Any] = {"n_crit": float(n_crit), "xtr": [float(xtr_upper), float(xtr_lower)], "model": model,
+                                "cd_max": top, "method": method, "past_stall": float(past_stall),
+                                "lift_floor": float(lift_floor)}  # fmt: skip
+    version = cache.installed_version("neuralfoil")
+    key = cache.content_key(TABLE_VERSION, version, airfoil.key(), settings, re, ALPHA_GRID)
+    made = cache.cached_arrays("polar", key, lambda: _make_neuralfoil(airfoil, re, settings))
+    source = f"NeuralFoil {version} {model}, n_crit {n_crit:g}, xtr {xtr_upper:g}/{xtr_lower:g}"
+    return Polar(ALPHA_GRID, re, np.zeros(1), made["cl"][:, :, None], made["cd"][:, :, None], made["confidence"],
+                 airfoil.name, f"{source}; {method} cd_max {top:g}")  # fmt: skip
+
+
+def _make_neuralfoil(airfoil: Airfoil, re: Array, settings: dict[str, Any]) -> dict[str, Array]:
+    """Tables (Na, Nr) from one vectorised NeuralFoil call."""
+    import neuralfoil as nf
+
+    reach = RAW_LIMIT_DEG + BLEND_DEG
+    raw_deg = np.arange(-2 * reach, 2 * reach + 1) / 2.0
+    a, r = np.meshgrid(raw_deg, np.append(re, RE_REFERENCE), indexing="ij")
+    aero = nf.get_aero_from_coordinates(
+        np.column_stack([airfoil.x, airfoil.y]), a.ravel(), r.ravel(), n_crit=settings["n_crit"],
+        xtr_upper=settings["xtr"][0], xtr_lower=settings["xtr"][1], model_size=settings["model"],
+    )  # fmt: skip
+    cl, cd, conf = (np.asarray(aero[k], dtype=float).reshape(a.shape) for k in ("CL", "CD", "analysis_confidence"))
+    if settings["lift_floor"] > 0.0:
+        up, down, keep = np.maximum(cl[:, -1:], 0.0), np.minimum(cl[:, -1:], 0.0), settings["lift_floor"]
+        sane = np.clip(cl, keep * up + down / keep - LIFT_SLACK, keep * down + up / keep + LIFT_SLACK)
+        cl = np.where(np.append(re, np.inf) < RE_REFERENCE, sane, cl)
+    cl, cd, conf = cl[:, :-1], cd[:, :-1], conf[:, :-1]
+    cd = np.maximum(cd, 2.656 / np.sqrt(re))
+    alpha = np.deg2rad(raw_deg)
+    out = {name: np.zeros((ALPHA_GRID.size, re.size)) for name in ("cl", "cd", "confidence")}
+    half = np.deg2rad(BLEND_DEG)
+    for j in range(re.size):
+        lo, hi = _confident_range(alpha, cl[:, j], conf[:, j], settings["past_stall"])
+        out["cl"][:, j], out["cd"][:, j] = extend(
+            alpha, cl[:, j], cd[:, j], lo=lo, hi=hi, cd_max=settings["cd_max"], half=half, method=settings["method"]
+        )
+        inside = (ALPHA_GRID > lo - half) & (ALPHA_GRID < hi + half)
+        out["confidence"][:, j] = np.where(inside, np.interp(ALPHA_GRID, alpha, conf[:, j]), 0.0)
+    return out

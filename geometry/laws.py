@@ -1,0 +1,256 @@
+"""Chord and pitch laws by name, and the blades they make: :func:`from_laws`, :func:`helix`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from geometry.airfoil import Airfoil
+from geometry.blade import Blade, from_stations
+from geometry.common import Array, Faults, GeometryError
+
+__all__ = ["CHORD_LAWS", "PITCH_LAWS", "Law", "Parameter", "chord_over_R", "from_laws", "helix"]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number of a law: its default and the range over which the default is uncertain (not a limit)."""
+
+    default: float
+    low: float
+    high: float
+    unit: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Law:
+    """A named chord or pitch law: what it is, where it comes from, its parameters, its function of r/R."""
+
+    name: str
+    text: str
+    source: str
+    parameters: Mapping[str, Parameter]
+    function: Callable[..., Array]
+
+
+def _apc_like(x: Array, hub: float) -> Array:
+    coefficients = (0.455, 0.269, 12.435, -36.84, 36.533, -12.646)  # greatest value 1.00396
+    return np.asarray(np.polynomial.polynomial.polyval(x, coefficients) / 1.00396, dtype=np.float64)
+
+
+def _elliptic(x: Array, hub: float) -> Array:
+    out: Array = np.maximum(np.sqrt(np.maximum(1 - x**2, 0.0)), 0.05)
+    return out
+
+
+def _fan(x: Array, hub: float) -> Array:
+    out: Array = 1 - 0.1 * (2 * (x - hub) / (1 - hub) - 1) ** 2
+    return out
+
+
+def _max_chord(default: float, low: float, high: float) -> dict[str, Parameter]:
+    return {"max_chord": Parameter(default, low, high, "-", "greatest chord over R")}
+
+
+_OURS = "declared assumption of this project"
+CHORD_LAWS: Mapping[str, Law] = {
+    law.name: law
+    for law in (
+        Law("apc_like", "generic modern two-blade small propeller: c/R 0.13 at r/R 0.15, greatest near 0.43, 0.13 at "
+            "0.75, 0.04 at the tip (fifth-degree polynomial)", _OURS, _max_chord(0.195, 0.15, 0.24), _apc_like),
+        Law("elliptic", "c = c0 sqrt(1 - (r/R)^2), c0 on the axis; not below 5 % of c0", "elliptic planform",
+            _max_chord(0.20, 0.15, 0.26), _elliptic),
+        Law("constant", "the same chord from hub to tip", "rectangular planform", _max_chord(0.15, 0.10, 0.20),
+            lambda x, hub: np.ones_like(x)),
+        Law("linear_taper", "straight from the hub to taper times the hub chord at the tip", "trapezoidal planform",
+            {**_max_chord(0.20, 0.15, 0.26), "taper": Parameter(0.5, 0.3, 1.0, "-", "tip chord over hub chord")},
+            lambda x, hub, taper: 1 - (1 - taper) * (x - hub) / (1 - hub)),
+        Law("fan", "ducted fan: nearly constant, 10 % less at hub and tip than at mid span", _OURS,
+            _max_chord(0.45, 0.30, 0.60), _fan),
+    )
+}  # fmt: skip
+"""Chord laws by name; each function gives chord over greatest chord at r/R for a hub ratio."""
+
+
+def _tip_relieved(x: Array, R: float, hub: float, pitch: float, relief: float, start: float) -> Array:
+    local = pitch * (1 - relief * np.clip((x - start) / (1 - start), 0.0, 1.0) ** 2)
+    out: Array = np.arctan(local / (2 * np.pi * x * R))
+    return out
+
+
+PITCH_LAWS: Mapping[str, Law] = {
+    law.name: law
+    for law in (
+        Law("helix", "constant pitch: beta = atan(pitch / (2 pi r))", "true screw",
+            {"pitch": Parameter(math.nan, 0.0, math.inf, "m", "advance per turn")},
+            lambda x, R, hub, pitch: np.arctan(pitch / (2 * np.pi * x * R))),
+        Law("linear_twist", "beta straight in r from hub to tip", "usual for rotors",
+            {"beta_root": Parameter(math.nan, 0.0, math.pi / 2, "rad", "blade angle at the hub"),
+             "beta_tip": Parameter(math.nan, 0.0, math.pi / 2, "rad", "blade angle at the tip")},
+            lambda x, R, hub, beta_root, beta_tip: beta_root + (beta_tip - beta_root) * (x - hub) / (1 - hub)),
+        Law("constant_beta", "untwisted blade (such as NASA TM-81232)", "untwisted",
+            {"beta": Parameter(math.nan, 0.0, math.pi / 2, "rad", "collective angle")},
+            lambda x, R, hub, beta: np.full_like(x, beta)),
+        Law("tip_relieved", "constant pitch to r/R = start, then it falls quadratically by `relief` at the tip", _OURS,
+            {"pitch": Parameter(math.nan, 0.0, math.inf, "m", "advance per turn inboard"),
+             "relief": Parameter(0.15, 0.0, 0.4, "-", "fraction of the pitch lost at the tip"),
+             "start": Parameter(0.7, 0.5, 0.9, "-", "r/R where the relief begins")}, _tip_relieved),
+    )
+}  # fmt: skip
+"""Pitch laws by name; each function gives beta [rad] at r/R for R [m] and a hub ratio."""
+
+
+def _arguments(kind: str, laws: Mapping[str, Law], name: str, given: Mapping[str, float | None]) -> dict[str, float]:
+    """Defaults and given parameters of a law, or its faults."""
+    if name not in laws:
+        raise GeometryError([(kind, repr(name), f"one of {', '.join(laws)}", "")])
+    faults, law = Faults(), laws[name]
+    for key in given:
+        if key not in law.parameters:
+            faults.add(f"{kind}.{key}", key, f"a parameter of '{name}': {', '.join(law.parameters)}")
+    values = {key: given.get(key) for key in law.parameters}
+    out = {key: law.parameters[key].default if v is None else float(v) for key, v in values.items()}
+    for key, value in out.items():
+        if not math.isfinite(value):
+            unit = law.parameters[key].unit
+            faults.add(f"{kind}.{key}", "nothing" if given.get(key) is None else f"{value}", f"a number in {unit}")
+        elif key == "max_chord" and not 0 < value <= 5:
+            hint = "Chord in millimetres? Divide by R" if value > 5 else ""
+            faults.add(f"{kind}.{key}", f"{value:g}", "greatest chord over R, above 0, up to 5", hint)
+        elif key == "taper" and value <= 0:
+            faults.add(f"{kind}.{key}", f"{value:g}", "a positive number")
+        elif key in ("relief", "start") and not 0 <= value < 1:
+            faults.add(f"{kind}.{key}", f"{value:g}", "a number from 0 to below 1")
+    faults.check()
+    return out
+
+
+def chord_over_R(law: str, x: ArrayLike, hub: float = 0.15, **parameters: float | None) -> Array:
+    """Evaluate a chord law.
+
+    Parameters
+    ----------
+    law : str
+        Name in :data:`CHORD_LAWS`.
+    x : (...) float
+        r/R. [-]
+    hub : float
+        Rhub/R. [-]
+    **parameters : float
+        ``max_chord`` (greatest chord over R) and the law's others; defaults from the law. [-]
+
+    Returns
+    -------
+    (...) float
+        Chord over R. [-]
+
+    Examples
+    --------
+    >>> chord_over_R("apc_like", [0.15, 0.4, 0.75, 1.0]).round(2).tolist()
+    [0.13, 0.19, 0.13, 0.04]
+    """
+    arguments = _arguments("chord_law", CHORD_LAWS, law, parameters)
+    scale = arguments.pop("max_chord")
+    out: Array = scale * CHORD_LAWS[law].function(np.asarray(x, dtype=np.float64), hub, **arguments)
+    return out
+
+
+def from_laws(
+    diameter: float, chord_law: str = "apc_like", pitch_law: str = "helix", hub: float = 0.15, *,
+    chord: Mapping[str, float | None] | None = None, pitch: Mapping[str, float | None] | None = None,
+    anchors: Airfoil | Sequence[tuple[float, Airfoil]] | None = None, n: int = 61, name: str = "",
+) -> Blade:  # fmt: skip
+    """Make a blade from a chord law and a pitch law.
+
+    Parameters
+    ----------
+    diameter : float
+        Tip diameter. [m]
+    chord_law, pitch_law : str
+        Names in :data:`CHORD_LAWS` and :data:`PITCH_LAWS`.
+    hub : float
+        Rhub/R, 0.01 to 0.95. [-]
+    chord, pitch : mapping or None
+        Parameters of the two laws (chord over R; pitch in m, angles in rad); a missing or None entry takes its default.
+    anchors : Airfoil, sequence of (r/R, Airfoil), or None
+        Sections.
+    n : int
+        Stations, cosine spaced from hub to tip; 5 or more.
+    name : str
+        For people.
+
+    Returns
+    -------
+    Blade
+        The blade.
+
+    Examples
+    --------
+    >>> blade = from_laws(2.286, "constant", "constant_beta", 0.1, chord={"max_chord": 1 / 6}, pitch={"beta": 0.1396})
+    >>> round(float(blade.chord[0]), 4), round(float(blade.beta[-1]), 4)
+    (0.1905, 0.1396)
+    """
+    faults = Faults()
+    faults.number("diameter", diameter, 1e-3, 200.0, "m", "Given in millimetres or inches?" if diameter > 200 else "")
+    faults.number("hub", hub, 0.01, 0.95, hint="The hub is given as Rhub/R")
+    faults.number("n", n, 5, math.inf)
+    parts = []
+    asked = (("chord_law", CHORD_LAWS, chord_law, chord), ("pitch_law", PITCH_LAWS, pitch_law, pitch))
+    for kind, laws, law, given in asked:
+        try:
+            parts.append(_arguments(kind, laws, law, given or {}))
+        except GeometryError as error:
+            faults.found.extend(error.faults)
+    faults.check()
+    R = 0.5 * diameter
+    x = hub + (1 - hub) * 0.5 * (1 - np.cos(np.linspace(0, np.pi, n)))
+    x[-1] = 1.0
+    beta = PITCH_LAWS[pitch_law].function(x, R, hub, **parts[1])
+    return from_stations(x * R, R * chord_over_R(chord_law, x, hub, **parts[0]), beta, R, hub * R, anchors, name=name)
+
+
+def helix(
+    diameter: float, pitch: float, chord_law: str = "apc_like", hub: float = 0.15, *, max_chord: float | None = None,
+    dbeta: float = 0.0, anchors: Airfoil | Sequence[tuple[float, Airfoil]] | None = None, n: int = 61, name: str = "",
+) -> Blade:  # fmt: skip
+    """Make a constant-pitch blade: beta = atan(pitch / (2 pi r)).
+
+    Parameters
+    ----------
+    diameter, pitch : float
+        Diameter and advance per turn. [m]
+    chord_law : str
+        Name in :data:`CHORD_LAWS`.
+    hub : float
+        Rhub/R. [-]
+    max_chord : float or None
+        Greatest chord over R; None takes the law's default. [-]
+    dbeta : float
+        Added to beta everywhere; makers quote pitch on the flat underside rather than on the chord line. [rad]
+    anchors, n, name
+        As in :func:`from_laws`.
+
+    Returns
+    -------
+    Blade
+        The blade.
+
+    Examples
+    --------
+    >>> blade = helix(8 * 0.0254, 5 * 0.0254)
+    >>> round(math.degrees(blade.at(0.75 * blade.R)[1]), 2)
+    14.86
+    """
+    faults = Faults()
+    # Pitch is checked against the diameter to catch mixed units.
+    limit = 5 * abs(diameter) if math.isfinite(diameter) else math.inf
+    faults.number("pitch", pitch, -limit, limit, "m", "Both diameter and pitch are in metres")
+    faults.check()
+    blade = from_laws(diameter, chord_law, "helix", hub, chord={"max_chord": max_chord}, pitch={"pitch": pitch},
+                      anchors=anchors, n=n, name=name)  # fmt: skip
+    return blade.with_pitch_offset(dbeta) if dbeta else blade
