@@ -1,600 +1,408 @@
-"""Compiled blade-element-momentum kernel: one residual, one root-finder, one integration.
+"""Compiled blade-element-momentum kernel: find the inflow angle of every station, integrate over the blade.
 
-Nothing here knows files, units or effects: every effect has already been baked into plain arrays and a few
-numbers by :mod:`bemt.solver`.  All functions are scalar, allocation-free and release the GIL, so a batch may be cut
-into threads by the caller.
+Nothing here knows files, units or effects: every effect has already been baked into plain arrays and a few numbers by
+:mod:`bemt.solver`; the physics is in :mod:`bemt._residual`.
 
-Conventions (SI, radians).  ``UT`` is the tangential and ``UP`` the axial onset speed at a blade element, ``phi`` the
-inflow angle, ``alpha = beta - phi``, ``cn`` along the thrust, ``ct`` along the torque.  ``sigma = B c / (2 pi r)``.
-
-Open rotor.  With ``m`` the mass flow per area over density, thrust and torque balances of one annulus are::
-
-    F m (w - UP) = sigma/4 W^2 cn        F m v_t = sigma/4 W^2 ct        w = W sin(phi),  W cos(phi) = UT - v_t
-
-and elimination of W leaves a residual without a singularity at hover (Ning 2014 eq. 6-13 in another form)::
-
-    g(phi) = F M (UT sin(phi) - UP cos(phi)) - sigma/4 (cn UT + ct UP),    M = m / W
-
-In the propeller and windmill state M = abs(sin(phi)).  From the turbulent windmill state (axial induction factor of
-a turbine above 0.4) through hover in descent, M follows the bridge of :func:`mass_flow`.
+The stations of one point are solved side by side (SIMD lanes) by Newton steps inside a bracket that always holds a
+root, starting from the unstalled side.  A station that needs more than a few steps is finished alone, by the same
+steps.  Every operating point is solved for itself: its result depends neither on the batch nor on its place in it.
 """
+
+# mypy: allow-untyped-defs, allow-untyped-calls, allow-untyped-decorators, disable-error-code="attr-defined"
+# (numba erases signatures)
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numba import njit as _njit
+from numba import carray, types
+from numba.core import cgutils
+
+from bemt import _residual, _vecmath
+from bemt._residual import (
+    N_BRIDGE,
+    N_DUCTED,
+    N_LEAK,
+    N_NUM,
+    N_STATOR,
+    N_SWIRL,
+    N_WAKE,
+    ducted_rotor,
+    lookup_full,
+    lookup_plain,
+    open_rotor,
+)
+from bemt._vecmath import atan2, fingerprint, inlined, intrinsic, njit, wide
 
 # Point and station status, in the order of severity; bemt.solver turns them into words.
-OK = 0
-NO_BRACKET = 1
-NOT_CONVERGED = 2
+OK, NOT_CONVERGED, JUMP, NOT_FINITE = range(4)
 
-_FAST = {"contract", "reassoc", "nsz", "arcp"}  # keeps NaN and infinity as they are
-
-
-def njit(inline: str = "never") -> Any:
-    """One way of compiling for the whole kernel."""
-    return _njit(cache=True, nogil=True, error_model="numpy", fastmath=_FAST, inline=inline)
-
-
-TWO_OVER_PI = 2.0 / math.pi
-PHI_TOL = 1e-11
-MAX_ITER = 60
-_EPS = 1e-9
-
-# Indices of the numbers that effects may set (array ``num``).
-N_TIP, N_HUB, N_SWIRL, N_BRIDGE, N_DUCTED, N_WAKE, N_LIP, N_STATOR, N_GAP, N_LEAK, N_FAR = range(11)
-N_NUM = 11
-N_OUT = 8
+# Columns of ``st``, of the packed points, of ``out`` and of ``radial``.
+S_R, S_DR, S_CHORD, S_BETA, S_SIGMA, S_TIP, S_HUB, S_LOGC, S_ALPHA0, S_CLA, S_AXIAL, S_TANG = range(12)
+N_STATION = 12
+P_OMEGA, P_V, P_RHO, P_MU, P_SOUND = range(5)
+N_POINT = 5
+O_T, O_Q, O_MASS, O_JET, O_STATOR, O_STATUS, O_WHERE, O_BRIDGED, O_STAGNANT, O_REVERSED = range(10)
+N_OUT = 10
 N_RADIAL = 11
 
+# Grid numbers behind ``num`` in ``par``: two-zone angle grid lo, hi, 1/fine, 1/coarse, index of lo, of hi, last cell;
+# Reynolds grid ln Re_0, 1/step, last node; Mach number grid 1/step of M^2, last node; strides of the tables along M^2,
+# Re and station; blade count.
+N_GRID = 16
+N_PAR = N_NUM + N_GRID
 
-@njit("always")
-def _sincos(x):
-    return math.sin(x), math.cos(x)
+# Newton's last step, along which the state is carried [rad].
+TOL_OPEN = 1e-7
+TOL_DUCTED = 1e-9
+MAX_VECTOR = 7
+MAX_SCALAR = 200
+_HALF_PI = 0.5 * math.pi
 
-
-@njit()
-def mass_flow(y):
-    """Mass flow per area over ``rho |UP|`` as a function of ``y = w / UP`` (open rotor).
-
-    ``y >= 0.6``: momentum theory, ``y``.  ``0 <= y < 0.6``: Buhl (2005) eq. 18 with F = 1,
-    CT = 8/9 - 4/9 a + 14/9 a^2 with a = 1 - y, tangent to momentum theory at a = 0.4.  ``-1 <= y < 0``: cubic Hermite
-    bridge to the helicopter branch (own choice, C1; vortex-ring state, flagged by the solver).  ``y < -1``: ``-y``.
-    """
-    if y >= 0.6:
-        return y
-    if y >= 0.0:
-        a = 1.0 - y
-        return (8.0 / (9.0 * a) - 4.0 / 9.0 + 14.0 / 9.0 * a) / 4.0
-    if y >= -1.0:
-        t = -y
-        t2 = t * t
-        t3 = t2 * t
-        return 0.5 * (2 * t3 - 3 * t2 + 1) + (1.0 / 6.0) * (t3 - 2 * t2 + t) + (3 * t2 - 2 * t3) + (t3 - t2)
-    return -y
+# Rows of the scratch memory, LANES wide.  It lives on the stack: the compiler then knows that tables do not overlap it.
+LANES = 64
+_ROWS = 24
+(_UT, _UP, _IUP, _BETA, _SG4, _TIP, _HUB, _LRE, _BASE, _LO, _HI, _PHI, _STEP, _CL, _CD, _DCL, _DCD, _F, _X, _S, _C, _G,
+ _BAD, _BUSY) = (LANES * i for i in range(_ROWS))  # fmt: skip
 
 
-# Prandtl factor F(u), u = sqrt(f): smooth in u, so a cubic Hermite table of it is exact to 1e-11 and needs neither exp
-# nor acos in the inner loop.  Columns F, dF/du.
-_U_MAX = 4.5
-_U_STEP = _U_MAX / 900.0
+@intrinsic
+def _stack(typingctx, stamp):
+    """Pointer to the scratch memory; the argument is not used."""
+
+    def codegen(context, builder, signature, args):
+        size = context.get_constant(types.intp, _ROWS * LANES)
+        return cgutils.alloca_once(builder, context.get_value_type(types.float64), size)
+
+    return types.CPointer(types.float64)(stamp), codegen
 
 
-def _prandtl_table() -> Any:
-    u = np.arange(902) * _U_STEP
-    f = u * u
-    F = TWO_OVER_PI * np.arccos(np.exp(-f))
-    root = np.sqrt(-np.expm1(-2.0 * f[1:]))
-    slope = np.empty_like(u)
-    slope[1:] = TWO_OVER_PI * np.exp(-f[1:]) / root * 2.0 * u[1:]
-    slope[0] = TWO_OVER_PI * math.sqrt(2.0)
-    return np.stack([F, slope], axis=1)
+@inlined
+def _evaluate(element, lookup, w, k, tab, g, fx):
+    """One residual of lane k, one bracketed Newton step; returns the size of the step."""
+    phi = w[_PHI + k]
+    res, slope, cl, cd, dcl, dcd, F, X, dX, s, c = element(
+        lookup, phi, w[_UT + k], w[_UP + k], w[_IUP + k], w[_BETA + k], w[_SG4 + k], w[_TIP + k], w[_HUB + k],
+        w[_LRE + k], np.int32(w[_BASE + k]), tab, g, fx,
+    )  # fmt: skip
+    lo = phi if res < 0.0 else w[_LO + k]
+    hi = phi if res > 0.0 else w[_HI + k]
+    d = -res / slope
+    new = phi + d
+    # not (...) so that a NaN step is refused too
+    small = abs(d)
+    good = slope > 0.0 and new >= lo and new <= hi and (2.0 * small < w[_STEP + k] or small < 1e-12)
+    d = d if good else 0.5 * (lo + hi) - phi
+    d = 0.0 if res == 0.0 else d
+    size = abs(d)
+    w[_LO + k] = lo
+    w[_HI + k] = hi
+    w[_PHI + k] = phi + d
+    w[_STEP + k] = size
+    # carried along the last step; the error is of its second order
+    w[_CL + k] = cl + dcl * d
+    w[_CD + k] = cd + dcd * d
+    w[_F + k] = F
+    w[_X + k] = X + dX * d
+    w[_S + k] = s + c * d
+    w[_C + k] = c - s * d
+    w[_G + k] = res
+    return size
 
 
-_PRANDTL = _prandtl_table()
+@inlined
+def _finish(element, lookup, w, k, tab, g, fx):
+    """Finish one lane alone; returns its status."""
+    for _ in range(MAX_SCALAR):
+        size = _evaluate(element, lookup, w, k, tab, g, fx)
+        if size < 1e-13:
+            break
+    if not (size < 1e-11 and abs(w[_CL + k]) < 1e30):
+        return NOT_FINITE if not (abs(w[_G + k]) < 1e30) else NOT_CONVERGED
+    scale = w[_UT + k] + abs(w[_UP + k]) if fx[N_DUCTED] == 0.0 else 1.0
+    return JUMP if abs(w[_G + k]) > 1e-5 * scale else OK
 
 
-@njit("always")
-def _loss(u):
-    """Prandtl factor (2/pi) acos(exp(-u^2)) and its derivative with respect to u."""
-    if u >= _U_MAX:
-        return 1.0, 0.0
-    x = u * (1.0 / _U_STEP)
-    i = int(x)
-    t = x - i
-    f0 = _PRANDTL[i, 0]
-    f1 = _PRANDTL[i + 1, 0]
-    m0 = _PRANDTL[i, 1] * _U_STEP
-    m1 = _PRANDTL[i + 1, 1] * _U_STEP
-    a = 2.0 * (f0 - f1) + m0 + m1
-    b = 3.0 * (f1 - f0) - 2.0 * m0 - m1
-    return ((a * t + b) * t + m0) * t + f0, ((3.0 * a * t + 2.0 * b) * t + m0) * (1.0 / _U_STEP)
+@inlined
+def _load(w, n_pad, first, st, Omega, V, log_rho_mu, stride):
+    """Fill the scratch rows that describe the stations; lanes beyond the last station repeat it."""
+    wide()
+    last = st.shape[0] - 1
+    for k in range(n_pad):
+        i = first + k
+        i = i if i < last else last
+        w[_UT + k] = Omega * st[i, S_R] + st[i, S_TANG]
+        UP = V + st[i, S_AXIAL]
+        w[_UP + k] = UP
+        w[_IUP + k] = 1.0 / UP if UP != 0.0 else 0.0
+        w[_BETA + k] = st[i, S_BETA]
+        w[_SG4 + k] = 0.25 * st[i, S_SIGMA]
+        w[_TIP + k] = st[i, S_TIP]
+        w[_HUB + k] = st[i, S_HUB]
+        w[_LRE + k] = log_rho_mu + st[i, S_LOGC]
+        w[_BASE + k] = stride * i
+        w[_CL + k] = st[i, S_ALPHA0]
+        w[_CD + k] = st[i, S_CLA]
 
 
-@njit("always")
-def _alpha_index(alpha, agrid):
-    """Lower index, weight and reciprocal spacing on the two-zone angle grid ``agrid`` (see bemt.solver)."""
-    # agrid = [lo, hi, 1/fine, 1/coarse, i_lo, i_hi, n]
-    if alpha < agrid[0]:
-        inv = agrid[3]
-        x = (alpha + math.pi) * inv
-    elif alpha <= agrid[1]:
-        inv = agrid[2]
-        x = (alpha - agrid[0]) * inv + agrid[4]
-    else:
-        inv = agrid[3]
-        x = (alpha - agrid[1]) * inv + agrid[5]
-    i = int(x)
-    if i < 0:
-        i = 0
-    top = int(agrid[6]) - 2
-    if i > top:
-        i = top
-    return i, x - i, inv
+@inlined
+def _guess_open(w, n_pad, fx):
+    """Brackets and first guesses: straight lift curve, F = 1; (phi_in + psi) psi + q psi = q (alpha_in - alpha0)."""
+    wide()
+    for k in range(n_pad):
+        UT = w[_UT + k]
+        UP = w[_UP + k]
+        phi_in = atan2(UP, UT)
+        q = w[_SG4 + k] * w[_CD + k]
+        lift = w[_BETA + k] - phi_in - w[_CL + k]
+        i_U = 1.0 / math.sqrt(UT * UT + UP * UP)
+        s = UP * i_U
+        c = abs(UT) * i_U
+        brake = lift < 0.0 and s > 0.0
+        b = q - s if (lift < 0.0 and not brake) else q + s
+        e = 4.0 * c * q * abs(lift)
+        disc = b * b - e if brake else b * b + e
+        disc = disc if disc > 0.0 else 0.0
+        psi = 2.0 * q * lift / (b + math.sqrt(disc) + 1e-12)
+        psi = psi if psi < 1.5 else 1.5
+        psi = psi if psi > -1.5 else -1.5
+        middle = phi_in if fx[N_SWIRL] > 0.0 else 0.0
+        lo = middle - _HALF_PI
+        hi = middle + _HALF_PI
+        phi = phi_in + psi
+        phi = phi if phi < hi else hi - 0.01
+        phi = phi if phi > lo else lo + 0.01
+        bare = w[_SG4 + k] == 0.0
+        # a station without chord does nothing to the flow
+        w[_PHI + k] = phi_in if bare else phi
+        w[_LO + k] = phi_in if bare else lo
+        w[_HI + k] = phi_in if bare else hi
+        w[_STEP + k] = 0.0 if bare else math.pi
 
 
-@njit("always")
-def _lookup(tab, k, alpha, lre0, W2, m2, agrid, rgrid):
-    """cl, cd and their slopes in alpha at station ``k``; linear in alpha, log Re and Mach squared."""
-    i, wa, inv = _alpha_index(alpha, agrid)
-    # rgrid = [log_re0, 1/dlog_re, n_re, 1/dm2, n_m]
-    nr = int(rgrid[2])
-    nm = int(rgrid[4])
-    j = 0
-    wr = 0.0
-    if nr > 1:
-        x = (lre0 + 0.5 * math.log(max(W2, 1e-12)) - rgrid[0]) * rgrid[1]
-        x = min(max(x, 0.0), nr - 1.0)
-        j = min(int(x), nr - 2)
-        wr = x - j
-    m = 0
-    wm = 0.0
-    if nm > 1:
-        x = min(m2 * rgrid[3], nm - 1.0)
-        m = min(int(x), nm - 2)
-        wm = x - m
-    l0 = tab[k, m, j, i, 0]
-    l1 = tab[k, m, j, i + 1, 0]
-    d0 = tab[k, m, j, i, 1]
-    d1 = tab[k, m, j, i + 1, 1]
-    if wr > 0.0:
-        l0 += wr * (tab[k, m, j + 1, i, 0] - l0)
-        l1 += wr * (tab[k, m, j + 1, i + 1, 0] - l1)
-        d0 += wr * (tab[k, m, j + 1, i, 1] - d0)
-        d1 += wr * (tab[k, m, j + 1, i + 1, 1] - d1)
-    if wm > 0.0:
-        a0 = tab[k, m + 1, j, i, 0]
-        a1 = tab[k, m + 1, j, i + 1, 0]
-        b0 = tab[k, m + 1, j, i, 1]
-        b1 = tab[k, m + 1, j, i + 1, 1]
-        if wr > 0.0:
-            a0 += wr * (tab[k, m + 1, j + 1, i, 0] - a0)
-            a1 += wr * (tab[k, m + 1, j + 1, i + 1, 0] - a1)
-            b0 += wr * (tab[k, m + 1, j + 1, i, 1] - b0)
-            b1 += wr * (tab[k, m + 1, j + 1, i + 1, 1] - b1)
-        l0 += wm * (a0 - l0)
-        l1 += wm * (a1 - l1)
-        d0 += wm * (b0 - d0)
-        d1 += wm * (b1 - d1)
-    return l0 + wa * (l1 - l0), d0 + wa * (d1 - d0), (l1 - l0) * inv, (d1 - d0) * inv
+@inlined
+def _guess_ducted(w, n_pad, fx):
+    """Brackets and first guesses: straight lift curve, no swirl; K phi^2 + A phi = A (beta - alpha0) + (UP/UT)^2."""
+    wide()
+    for k in range(n_pad):
+        lam = w[_UP + k] / w[_UT + k]
+        A = 4.0 * w[_SG4 + k] * w[_CD + k]
+        lift = A * (w[_BETA + k] - w[_CL + k])
+        # with the onset from behind, begin where the rotor still drives the flow its own way
+        e = lift if (lift > 0.0 and lam < 0.0) else lift + lam * abs(lam)
+        phi = 2.0 * e / (A + math.sqrt(A * A + 4.0 * fx[N_WAKE] * abs(e)) + 1e-12)
+        phi = phi if phi < 1.4 else 1.4
+        phi = phi if phi > -1.4 else -1.4
+        bare = w[_SG4 + k] == 0.0 and lam == 0.0
+        w[_PHI + k] = phi
+        w[_LO + k] = 0.0 if bare else -math.pi
+        w[_HI + k] = 0.0 if bare else math.pi
+        w[_STEP + k] = 0.0 if bare else math.pi
 
 
-@njit("always")
-def _wrap(alpha):
-    if alpha > math.pi:
-        return alpha - 2.0 * math.pi
-    if alpha < -math.pi:
-        return alpha + 2.0 * math.pi
-    return alpha
-
-
-@njit()
-def _open(phi, k, UT, UP, st, tab, agrid, rgrid, num, lre0, inv_a2):
-    """Residual g(phi), dg/dphi and the element state of an open rotor."""
-    s, c = _sincos(phi)
-    sa = abs(s)
-    sa_safe = max(sa, _EPS)
-    W0 = UT * c + UP * s  # exact but for the drag term: the induced velocity is normal to W
-    W2 = max(W0 * W0, 1e-12)
-    cl, cd, cla, cda = _lookup(
-        tab, k, _wrap(st[k, 3] - phi), lre0, W2, W2 * inv_a2, agrid, rgrid
-    )
-    cn = cl * c - cd * s
-    ct = cl * s + cd * c
-    F = 1.0
-    dF = 0.0
-    # st[:, 5:7] hold sqrt(f |sin phi|) of tip and hub, NaN-free and huge where the factor is off
-    sw = sa_safe
-    dlog = c / s if sa > _EPS else 0.0
-    if num[N_FAR] > 0.0:
-        # pitch of the vortex sheets in the far wake: tan(phi_w) = tan(phi) q^1.5, q = (2 w - V) / w
-        w0 = s * W0
-        q = 2.0
-        dq = 0.0
-        if UP != 0.0 and abs(w0) > 1e-9:
-            ratio = UP / w0
-            q = 2.0 - ratio
-            if q > 2.0:
-                q = 2.0
-            elif q < 0.3:
-                q = 0.3
+@inlined
+def _point(element, guess, lookup, w, point, st, tab, par, out, radial):
+    """Solve every station of one operating point and integrate."""
+    wide()
+    fx = (par[0], par[1], par[2], par[3], par[4], par[5], par[6], par[7], par[8], par[9], par[10])
+    o = N_NUM
+    mach2 = par[o + 10] / (point[P_SOUND] * point[P_SOUND])
+    g = (par[o], par[o + 1], par[o + 2], par[o + 3], par[o + 4], par[o + 5], par[o + 6], par[o + 7], par[o + 8],
+         par[o + 9], mach2, par[o + 11], par[o + 12], par[o + 13])  # fmt: skip
+    stride = par[o + 14]
+    B = par[o + 15]
+    n = st.shape[0]
+    Omega = point[P_OMEGA]
+    V = point[P_V]
+    rho = point[P_RHO]
+    T = 0.0
+    Q = 0.0
+    mass = 0.0
+    jet = 0.0
+    stator = 0.0
+    worst = OK
+    where = -1
+    bridged = 0
+    stagnant = 0
+    reversed_ = 0
+    log_rho_mu = math.log(rho / point[P_MU])
+    ducted = fx[N_DUCTED] > 0.0
+    swirl = fx[N_SWIRL] > 0.0
+    tol = TOL_DUCTED if ducted else TOL_OPEN
+    for first in range(0, n, LANES):
+        lanes = min(LANES, n - first)
+        n_pad = (lanes + 7) // 8 * 8
+        _load(w, n_pad, first, st, Omega, V, log_rho_mu, stride)
+        guess(w, n_pad, fx)
+        for b in range(n_pad // 8):
+            w[_BUSY + b] = 1.0
+        left = 1
+        for _ in range(MAX_VECTOR):
+            left = 0
+            for b in range(n_pad // 8):
+                if w[_BUSY + b] > 0.0:
+                    busy = 0
+                    for k in range(8 * b, 8 * b + 8):
+                        size = _evaluate(element, lookup, w, k, tab, g, fx)
+                        busy += 0 if size < tol else 1
+                    w[_BUSY + b] = busy
+                    left += busy
+            if left == 0:
+                break
+        for k in range(n_pad):
+            w[_BAD + k] = 0.0
+        if left > 0:
+            for k in range(lanes):
+                if not (w[_STEP + k] < tol):
+                    status = _finish(element, lookup, w, k, tab, g, fx)
+                    w[_BAD + k] = status
+                    if status > worst:
+                        worst = status
+                        where = first + k
+        for k in range(lanes):
+            i = first + k
+            s = w[_S + k]
+            c = w[_C + k]
+            cl = w[_CL + k]
+            cd = w[_CD + k]
+            F = w[_F + k]
+            X = w[_X + k]
+            UT = w[_UT + k]
+            UP = w[_UP + k]
+            area = 2.0 * math.pi * st[i, S_R] * st[i, S_DR]
+            if ducted:
+                W = UT / X
+                flow = F * W * abs(s)
             else:
-                dq = ratio * (UT * (c * c - s * s) + 2.0 * UP * s * c) / w0
-        rho = q * math.sqrt(q)
-        inv = 1.0 / math.sqrt(c * c + rho * rho * sa_safe * sa_safe)
-        sw = rho * sa_safe * inv
-        dlog = (1.5 * dq / q + (1.0 / (s * c) if abs(s * c) > _EPS else 0.0)) * (c * inv) ** 2
-    root = math.sqrt(1.0 / sw)
-    u = st[k, 5] * root
-    if u < _U_MAX:
-        F, slope = _loss(u)
-        F = max(F, 1e-6)
-        dF = -0.5 * slope * u * dlog
-    u = st[k, 6] * root
-    if u < _U_MAX:
-        Fh, slope = _loss(u)
-        Fh = max(Fh, 1e-6)
-        dF = dF * Fh - 0.5 * F * slope * u * dlog
-        F *= Fh
-    M = sa
-    dM = c if s >= 0.0 else -c
-    if num[N_BRIDGE] > 0.0 and UP != 0.0:
-        y = s * W0 / UP
-        if -1.0 < y < 0.6:
-            W = max(abs(W0), 1e-9)
-            M = mass_flow(y) * abs(UP) / W
-            dM = 0.0  # a safeguarded step does not need it here
-    swirl = num[N_SWIRL]
-    q = 0.25 * st[k, 4]
-    h = UT * s - UP * c
-    g = F * M * h - q * (cn * UT + swirl * ct * UP)
-    dcn = -cla * c - cl * s + cda * s - cd * c
-    dct = -cla * s + cl * c - cda * c - cd * s
-    dg = (dF * M + F * dM) * h + F * M * (UT * c + UP * s) - q * (dcn * UT + swirl * dct * UP)
-    return g, dg, cl, cd, cla, cda, F, M, s, c
+                drag = 1.0 + w[_SG4 + k] * cd / max(X, 1e-12)
+                W = (UT * c + UP * s) / drag if swirl else UT / c
+                flow = X * W
+            axial = W * s
+            v_t = UT - W * c if swirl else 0.0
+            dT = 0.5 * rho * W * W * st[i, S_CHORD] * B * st[i, S_DR] * (cl * c - cd * s)
+            dQ = 0.5 * rho * W * W * st[i, S_CHORD] * B * st[i, S_DR] * (cl * s + cd * c) * st[i, S_R]
+            if ducted:
+                dT *= 1.0 - fx[N_LEAK]
+            lost = w[_BAD + k] > 0.0
+            if not lost:
+                T += dT
+                Q += dQ
+                mass += rho * flow * area
+                jet += rho * flow * axial * area
+                if ducted:
+                    turned = max(v_t, 0.0)
+                    stator += fx[N_STATOR] * 2.0 * rho * F * turned * turned * area
+                    reversed_ += 1 if axial < 0.0 else 0
+                elif fx[N_BRIDGE] > 0.0 and UP != 0.0:
+                    y = s * (UT * c + UP * s) / UP
+                    bridged += 1 if -1.0 < y < 0.6 else 0
+                # the drag term of W's denominator exceeds the rest of it
+                stagnant += 1 if swirl and w[_SG4 + k] * cd > F * abs(s) else 0
+            if radial.shape[0] == n:
+                row = radial[i]
+                row[0] = w[_PHI + k]
+                row[1] = w[_BETA + k] - w[_PHI + k]
+                row[2] = cl
+                row[3] = cd
+                row[4] = W
+                row[5] = axial
+                row[6] = v_t
+                row[7] = F
+                row[8] = dT
+                row[9] = dQ
+                if lost:
+                    for j in range(10):
+                        row[j] = np.nan
+                row[10] = w[_BAD + k]
+    out[O_T] = T
+    out[O_Q] = Q
+    out[O_MASS] = mass
+    out[O_JET] = jet
+    out[O_STATOR] = stator
+    out[O_STATUS] = worst
+    out[O_WHERE] = where
+    out[O_BRIDGED] = bridged
+    out[O_STAGNANT] = stagnant
+    out[O_REVERSED] = reversed_
 
 
-@njit()
-def _ducted(phi, k, UT, V, st, tab, agrid, rgrid, num, lre0, inv_a2):
-    """Residual of a ducted annulus (see bemt.duct for the derivation); phi > 0 only.
+def _entries(stamp: int) -> tuple[Any, Any, Any, Any]:
+    """Entry points of the kernel.
 
-    With x = sigma ct / (4 F s), t = c + x, W = UT / t:
-    G = UT^2 (F s^2 K - sigma cn (1 - leak) - 4 eta_s F x^2) + F K_lip max(UT s - V t, 0)^2 - F V^2 t^2,
-    K = 1/sigma_w^2 + K_wall.
+    Numba's disk cache sees changes of this file only.  A closure over ``stamp`` makes it see those of the functions
+    from other files that are compiled in.
     """
-    s, c = _sincos(phi)
-    s = max(s, _EPS)
-    root = math.sqrt(1.0 / s)
-    Fp, _ = _loss(st[k, 5] * root)
-    Fh, _ = _loss(st[k, 6] * root)
-    # num[N_GAP]: 0 sealed by the wall, 1 open tip
-    F = max(1.0 - num[N_GAP] * (1.0 - Fp), 1e-6) * max(Fh, 1e-6)
-    alpha = _wrap(st[k, 3] - phi)
-    sg = st[k, 4]
-    W = UT * c
-    cl, cd, _, _ = _lookup(tab, k, alpha, lre0, W * W, W * W * inv_a2, agrid, rgrid)
-    ct = cl * s + cd * c
-    W = UT / max(c + sg * ct / (4.0 * F * s), 0.05)
-    cl, cd, _, _ = _lookup(tab, k, alpha, lre0, W * W, W * W * inv_a2, agrid, rgrid)
-    cn = cl * c - cd * s
-    ct = cl * s + cd * c
-    x = sg * ct / (4.0 * F * s)
-    t = c + x
-    suck = max(UT * s - V * t, 0.0)
-    G = UT * UT * (F * s * s * num[N_WAKE] - sg * cn * (1.0 - num[N_LEAK]) - 4.0 * num[N_STATOR] * F * x * x)
-    G += F * (num[N_LIP] * suck * suck - V * V * t * t)
-    return G, cl, cd, F, t
+
+    @njit
+    def open_plain(points, st, tab, par, out, radial):
+        wide()
+        w = carray(_stack(stamp), (_ROWS * LANES,), np.float64)
+        for p in range(points.shape[0]):
+            _point(open_rotor, _guess_open, lookup_plain, w, points[p], st, tab, par, out[p], radial[p])
+
+    @njit
+    def open_full(points, st, tab, par, out, radial):
+        wide()
+        w = carray(_stack(stamp), (_ROWS * LANES,), np.float64)
+        for p in range(points.shape[0]):
+            _point(open_rotor, _guess_open, lookup_full, w, points[p], st, tab, par, out[p], radial[p])
+
+    @njit
+    def ducted_plain(points, st, tab, par, out, radial):
+        wide()
+        w = carray(_stack(stamp), (_ROWS * LANES,), np.float64)
+        for p in range(points.shape[0]):
+            _point(ducted_rotor, _guess_ducted, lookup_plain, w, points[p], st, tab, par, out[p], radial[p])
+
+    @njit
+    def ducted_full(points, st, tab, par, out, radial):
+        wide()
+        w = carray(_stack(stamp), (_ROWS * LANES,), np.float64)
+        for p in range(points.shape[0]):
+            _point(ducted_rotor, _guess_ducted, lookup_full, w, points[p], st, tab, par, out[p], radial[p])
+
+    return open_plain, open_full, ducted_plain, ducted_full
 
 
-@njit()
-def _residual(phi, k, UT, UP, st, tab, agrid, rgrid, num, lre0, inv_a2):
-    if num[N_DUCTED] > 0.0:
-        return _ducted(phi, k, UT, UP, st, tab, agrid, rgrid, num, lre0, inv_a2)[0]
-    return _open(phi, k, UT, UP, st, tab, agrid, rgrid, num, lre0, inv_a2)[0]
+_OPEN_PLAIN, _OPEN_FULL, _DUCTED_PLAIN, _DUCTED_FULL = _entries(fingerprint(_residual, _vecmath))
 
 
-@njit()
-def _chandrupatla(a, b, fa, fb, k, UT, UP, st, tab, agrid, rgrid, num, lre0, inv_a2):
-    """Bracketed root (Chandrupatla 1997); fa and fb have opposite signs. Returns root and success."""
-    c = a
-    fc = fa
-    t = 0.5
-    for _ in range(200):
-        x = a + t * (b - a)
-        fx = _residual(x, k, UT, UP, st, tab, agrid, rgrid, num, lre0, inv_a2)
-        if (fx > 0.0) == (fa > 0.0):
-            c = a
-            fc = fa
-        else:
-            c = b
-            b = a
-            fc = fb
-            fb = fa
-        a = x
-        fa = fx
-        xm = a if abs(fa) < abs(fb) else b
-        fm = fa if abs(fa) < abs(fb) else fb
-        span = abs(b - a)
-        tol = 2.0 * 1e-15 * abs(xm) + 1e-13
-        if fm == 0.0 or span < tol:
-            return xm, True
-        xi = (a - b) / (c - b)
-        ph = (fa - fb) / (fc - fb)
-        if ph * ph < xi and (1 - ph) * (1 - ph) < 1 - xi:
-            t = fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
-        else:
-            t = 0.5
-        tl = 0.5 * tol / span
-        t = min(max(t, tl), 1.0 - tl)
-    return a, False
-
-
-@njit()
-def _bracket(k, UT, UP, st, tab, agrid, rgrid, num, lre0, inv_a2):
-    """The one bracket rule, from physics: which quadrant the flow through the element lies in.
-
-    Open: g just above phi = 0 negative (positive loading against the onset flow) puts the root above zero, otherwise
-    below; the quadrant next to zero first, the reversed one behind it.  Inside a quadrant the root nearest to the
-    unstalled side (highest phi for positive lift) is found by stepping down from the far end, so that several roots
-    near stall always give the same answer.
-    """
-    half = 0.5 * math.pi
-    if num[N_DUCTED] > 0.0:
-        lo = 1e-6
-        hi = half
-        flo = _residual(lo, k, UT, UP, st, tab, agrid, rgrid, num, lre0, inv_a2)
-        fhi = _residual(hi, k, UT, UP, st, tab, agrid, rgrid, num, lre0, inv_a2)
-        if flo < 0.0 < fhi:
-            return lo, hi, flo, fhi, True
-        return lo, hi, flo, fhi, False
-    f0 = _residual(0.0, k, UT, UP, st, tab, agrid, rgrid, num, lre0, inv_a2)
-    if f0 == 0.0:
-        return 0.0, 0.0, f0, f0, True
-    sign = 1.0 if f0 < 0.0 else -1.0
-    near = 0.0
-    fnear = f0
-    far = sign * half
-    ffar = _residual(far, k, UT, UP, st, tab, agrid, rgrid, num, lre0, inv_a2)
-    if (ffar > 0.0) == (fnear > 0.0):
-        near, fnear = far, ffar
-        far = sign * (math.pi - 1e-9)
-        ffar = _residual(far, k, UT, UP, st, tab, agrid, rgrid, num, lre0, inv_a2)
-        if (ffar > 0.0) == (fnear > 0.0):
-            return near, far, fnear, ffar, False
-        return near, far, fnear, ffar, True
-    # Step down from the windward end; the onset angle bounds the unstalled root from below.
-    n = 12
-    b = far
-    fb = ffar
-    for i in range(1, n):
-        a = far + (near - far) * i / n
-        fa = _residual(a, k, UT, UP, st, tab, agrid, rgrid, num, lre0, inv_a2)
-        if (fa > 0.0) != (fb > 0.0):
-            return a, b, fa, fb, True
-        b = a
-        fb = fa
-    return near, b, fnear, fb, True
-
-
-@njit()
-def _newton(phi, k, UT, UP, st, tab, agrid, rgrid, num, lre0, inv_a2, step_old):
-    """Newton from a good guess; gives up (False) at the first sign of trouble, never loops."""
-    for _ in range(8):
-        g, dg, cl, cd, cla, cda, F, M, s, c = _open(phi, k, UT, UP, st, tab, agrid, rgrid, num, lre0, inv_a2)
-        if dg <= 0.0:
-            break
-        d = g / dg
-        if abs(d) > 0.5 * step_old:
-            break
-        if abs(d) < 1e-5:
-            # carry the state along the last step instead of evaluating once more; the error is of order d^2
-            return phi - d, True, cl + cla * d, cd + cda * d, F, M, s - c * d, c + s * d
-        if phi * (phi - d) <= 0.0:
-            break
-        phi -= d
-        step_old = abs(d)
-    return phi, False, 0.0, 0.0, 1.0, 1.0, 0.0, 1.0
-
-
-@njit()
-def _start(k, UT, UP, st, tab, agrid, rgrid, num, lre0, inv_a2):
-    """First guess at the first station: straight lift curve through the table at 4 deg, no swirl, no losses.
-
-    F sin(phi) (UT sin - UP cos) = sigma/4 UT cl with small angles is a quadratic in phi.
-    """
-    beta = st[k, 3]
-    cl, _, cla, _ = _lookup(tab, k, 0.07, lre0, UT * UT, UT * UT * inv_a2, agrid, rgrid)
-    a0 = 0.07 - cl / max(cla, 1.0)
-    q = 0.25 * st[k, 4] * max(cla, 1.0)
-    lam = UP / UT
-    b = q - lam
-    disc = b * b + 4.0 * q * (beta - a0)
-    if disc <= 0.0:
-        return 0.0
-    return 0.5 * (-b + math.sqrt(disc))
-
-
-@njit()
-def solve_point(Omega, V, rho, mu, a_sound, st, inflow, tab, agrid, rgrid, num, B, out, radial):
-    """Solve every station of one operating point and integrate.
+def entry(ducted: bool, plain: bool) -> Callable[..., None]:
+    """Entry point that solves a batch of operating points; compiled when first called.
 
     Parameters
     ----------
-    Omega, V, rho, mu, a_sound : float
-        Rotation speed [rad/s], axial onset speed [m/s], air density [kg/m3], viscosity [Pa s], sound speed [m/s].
-    st : (N, 8) float
-        r, dr, chord [m], beta [rad], local solidity, tip and hub loss exponent times sin(phi), log(chord).
-    inflow : (N, 2) float
-        Added axial and tangential onset speed at each station [m/s].
-    tab : (N, Nm, Nr, Na, 2) float
-        Section tables cl, cd.
-    out : (8,) float
-        T, Q, mass flow, mass flow times disk speed, stator thrust, worst status, its station, number of stations in
-        the turbulent windmill or vortex-ring state.
-    radial : (N, 11) or (0, 11) float
-        Filled when it has rows: phi, alpha, cl, cd, W, w, v_t, F, dT, dQ, status.
+    ducted : bool
+        Whether the rotor runs in a duct.
+    plain : bool
+        Whether the tables have neither a Reynolds nor a Mach axis.
+
+    Returns
+    -------
+    function
+        ``f(points, st, tab, par, out, radial)``, all of float:
+
+        points : (P, 5)
+            Rotation speed [rad/s], axial onset speed [m/s], density [kg/m3], viscosity [Pa s], sound speed [m/s].
+        st : (N, 12)
+            r, dr, chord [m], beta [rad], local solidity, roots of the tip and hub loss exponents times sin(phi),
+            ln(chord), zero-lift angle [rad] and lift slope [1/rad] for the first guess, added axial and tangential
+            speed [m/s].
+        tab : (L,)
+            Section tables, flat: station, Mach number squared, Reynolds number, angle, (cl, cd).
+        par : (27,)
+            The numbers ``num`` of :mod:`bemt._residual`, then the grid (see the source).
+        out : (P, 10)
+            Filled: T, Q, mass flow, mass flow times disk speed, stator thrust, worst status, its station, number of
+            stations in the turbulent windmill or vortex-ring state, where drag more than halves W, with reversed flow.
+        radial : (P, N, 11) or (P, 0, 11)
+            Filled when it has rows: phi, alpha, cl, cd, W, w, v_t, F, dT, dQ, status.
     """
-    n = st.shape[0]
-    T = 0.0
-    Q = 0.0
-    mdot = 0.0
-    jet = 0.0
-    stat = 0.0
-    worst = 0
-    where = -1
-    bits = 0
-    inv_a2 = 1.0 / (a_sound * a_sound)
-    ducted = num[N_DUCTED] > 0.0
-    keep = radial.shape[0] == n
-    have = 0
-    p1 = 0.0
-    p2 = 0.0
-    r1 = 0.0
-    r2 = 0.0
-    log_rho_mu = math.log(rho / mu)
-    # From the best loaded part of the blade to the root, then from there to the tip.
-    mid = (2 * n) // 3
-    first_p = 0.0
-    first_r = 0.0
-    st_phi_in = 0.0
-    st_r_in = 1.0
-    have_in = 0
-    for j in range(n):
-        if j <= mid:
-            k = mid - j
-        else:
-            k = j
-            if j == mid + 1:
-                p2 = st_phi_in
-                r2 = st_r_in
-                p1 = first_p
-                r1 = first_r
-                have = have_in
-        r = st[k, 0]
-        UT = Omega * r + inflow[k, 1]
-        UP = V + inflow[k, 0]
-        lre0 = log_rho_mu + st[k, 7]
-        status = OK
-        done = False
-        phi = 0.0
-        cl = 0.0
-        cd = 0.0
-        F = 1.0
-        M = 1.0
-        t = 1.0
-        s = 0.0
-        c = 1.0
-        if not ducted:
-            if have == 0:
-                phi = _start(k, UT, UP, st, tab, agrid, rgrid, num, lre0, inv_a2)
-                limit = 0.3
-            elif have == 1:
-                phi = p1 * r1 / r  # helix
-                limit = 0.2
-            else:
-                # in the tip direction phi bends little, towards the root it follows a helix: extrapolate r phi
-                phi = (p1 * r1 + (p1 * r1 - p2 * r2) * (r - r1) / (r1 - r2)) / r
-                limit = 0.2
-            if 1e-3 < abs(phi) < 1.4:
-                phi, done, cl, cd, F, M, s, c = _newton(
-                    phi, k, UT, UP, st, tab, agrid, rgrid, num, lre0, inv_a2, limit
-                )
-        if not done:
-            lo, hi, flo, fhi, ok = _bracket(k, UT, UP, st, tab, agrid, rgrid, num, lre0, inv_a2)
-            if not ok:
-                status = NO_BRACKET
-            else:
-                if lo == hi:
-                    phi = lo
-                else:
-                    phi, ok = _chandrupatla(lo, hi, flo, fhi, k, UT, UP, st, tab, agrid, rgrid, num, lre0, inv_a2)
-                    if not ok:
-                        status = NOT_CONVERGED
-                if ducted:
-                    _, cl, cd, F, t = _ducted(phi, k, UT, UP, st, tab, agrid, rgrid, num, lre0, inv_a2)
-                else:
-                    _, _, cl, cd, _, _, F, M, s, c = _open(phi, k, UT, UP, st, tab, agrid, rgrid, num, lre0, inv_a2)
-                s, c = _sincos(phi)
-        if status != OK:
-            if status > worst:
-                worst = status
-                where = k
-            have = 0
-            if keep:
-                for i in range(10):
-                    radial[k, i] = np.nan
-                radial[k, 10] = status
-            continue
-        cn = cl * c - cd * s
-        ct = cl * s + cd * c
-        sg = st[k, 4]
-        if ducted:
-            W = UT / t
-            w = W * s
-            vt = UT - W * c
-            area = 2.0 * math.pi * r * st[k, 1]
-            dm = rho * F * w * area
-            st_t = num[N_STATOR] * 2.0 * rho * F * vt * vt * area
-            mdot += dm
-            jet += dm * w
-            stat += st_t
-        else:
-            W = (UT * c + UP * s) / (1.0 + 0.25 * sg * cd / (F * max(M, _EPS)) * num[N_SWIRL])
-            w = W * s
-            vt = UT - W * c if num[N_SWIRL] > 0.0 else 0.0
-            mdot += rho * F * w * 2.0 * math.pi * r * st[k, 1]
-            if UP != 0.0:
-                y = w / UP
-                if -1.0 < y < 0.6:
-                    bits += 1
-        qd = 0.5 * rho * W * W * st[k, 2] * B * st[k, 1]
-        dT = qd * cn * (1.0 - num[N_LEAK]) if ducted else qd * cn
-        dQ = qd * ct * r
-        T += dT
-        Q += dQ
-        p2 = p1
-        r2 = r1
-        p1 = phi
-        r1 = r
-        have = min(have + 1, 2)
-        if j == 0:
-            first_p = phi
-            first_r = r
-            have_in = 1
-        if j == 1:
-            st_phi_in = phi
-            st_r_in = r
-            have_in = have
-        if keep:
-            radial[k, 0] = phi
-            radial[k, 1] = _wrap(st[k, 3] - phi)
-            radial[k, 2] = cl
-            radial[k, 3] = cd
-            radial[k, 4] = W
-            radial[k, 5] = w
-            radial[k, 6] = vt
-            radial[k, 7] = F
-            radial[k, 8] = dT
-            radial[k, 9] = dQ
-            radial[k, 10] = status
-    out[0] = T
-    out[1] = Q
-    out[2] = mdot
-    out[3] = jet
-    out[4] = stat
-    out[5] = worst
-    out[6] = where
-    out[7] = bits
-
-
-@njit()
-def solve_batch(Omega, V, rho, mu, a_sound, st, inflow, tab, agrid, rgrid, num, B, out, radial):
-    """Run :func:`solve_point` over points; ``radial`` is (npts, N, 11) or (npts, 0, 11)."""
-    for i in range(Omega.shape[0]):
-        solve_point(
-            Omega[i], V[i], rho[i], mu[i], a_sound[i], st, inflow, tab, agrid, rgrid, num, B, out[i], radial[i]
-        )
+    entries: dict[tuple[bool, bool], Callable[..., None]] = {
+        (False, True): _OPEN_PLAIN, (False, False): _OPEN_FULL,
+        (True, True): _DUCTED_PLAIN, (True, False): _DUCTED_FULL,
+    }  # fmt: skip
+    return entries[ducted, plain]

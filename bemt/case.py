@@ -44,7 +44,7 @@ class Assumption:
     key : str
         Dotted key in the case file.
     nominal : float or str
-        Value used.
+        Value used, in the unit of the key.
     values : tuple
         The ends of the range, or the discrete values that it may take.
     discrete : bool

@@ -46,7 +46,7 @@ class Grid:
     names : tuple of str
         Axis names with their units.
     values : tuple of (N,) float
-        Axis values.
+        Axis values, in the unit of the axis's name.
     geometries : int
         Combinations of the geometric axes.
     chunk : int

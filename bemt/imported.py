@@ -54,6 +54,19 @@ class Imported:
         What a user has to know: assumptions, dropped rows, restarts, missing units.
     provenance : mapping
         File, SHA-256 and whatever the file says of itself.
+    flags : tuple of tuple of str
+        Per row; empty: no flags at all.
+    lines : tuple of int
+        Line of each row in the file, from 1; empty: not known.
+    texts : mapping of str to tuple of str
+        Columns of text, by name, one entry per row.
+    headings : mapping of str to str
+        Heading in the file of each channel, where it has one.
+    constants : mapping of str to float
+        Numbers that hold for the whole file, by name with SI unit suffix (``density_kg_m3``).
+    instrument : mapping of str to mapping
+        Standard uncertainty of the instrument per channel, correlated parts apart: ``gain`` [1], ``zero`` and
+        ``sample`` (in the unit of the channel).
     """
 
     format: str
@@ -62,3 +75,9 @@ class Imported:
     channels: Mapping[str, Channel]
     warnings: tuple[str, ...] = ()
     provenance: Mapping[str, str] = field(default_factory=dict)
+    flags: tuple[tuple[str, ...], ...] = ()
+    lines: tuple[int, ...] = ()
+    texts: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    headings: Mapping[str, str] = field(default_factory=dict)
+    constants: Mapping[str, float] = field(default_factory=dict)
+    instrument: Mapping[str, Mapping[str, float]] = field(default_factory=dict)

@@ -35,7 +35,7 @@ class Key:
     unit : str
         Unit, for messages.
     low, high : float
-        Closed range of a number.
+        Closed range of a number, in the unit of the key.
     required : bool
         Whether the key must be there.
     choices : tuple of str

@@ -7,26 +7,23 @@ kernel (:mod:`bemt._kernel`), in batch, and gives back a :class:`Solution`.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bemt import _kernel as K
+from bemt import _kernel_arrays as arrays
+from bemt import _residual as res
+from bemt._kernel_arrays import M2_STEP
 from bemt.air import Air
 from bemt.effects import Effect, standard
 from bemt.effects.base import Baking
-from bemt.polars import (
-    ALPHA_COARSE_STEP,
-    ALPHA_FINE_HI,
-    ALPHA_FINE_LO,
-    ALPHA_FINE_STEP,
-    ALPHA_GRID,
-    DEFAULT_RE,
-)
+from bemt.polars import ALPHA_GRID
 
 if TYPE_CHECKING:
     from bemt.duct import DuctFlow
@@ -34,46 +31,79 @@ if TYPE_CHECKING:
     from geometry.blade import Stations
     from geometry.rotor import Rotor
 
+__all__ = ["REASONS", "Prepared", "Solution", "prepare", "solve", "solve_point", "standard"]
+
 Array = NDArray[np.float64]
 
-_AGRID = np.array([
-    ALPHA_FINE_LO, ALPHA_FINE_HI, 1.0 / ALPHA_FINE_STEP, 1.0 / ALPHA_COARSE_STEP,
-    round((ALPHA_FINE_LO + math.pi) / ALPHA_COARSE_STEP),
-    round((ALPHA_FINE_LO + math.pi) / ALPHA_COARSE_STEP) + round((ALPHA_FINE_HI - ALPHA_FINE_LO) / ALPHA_FINE_STEP),
-    ALPHA_GRID.size,
-])  # fmt: skip
-
-# Squared Mach number grid: uniform, so that the kernel needs neither root nor search.
-M2_STEP = 0.1
-
 REASONS = {
-    K.NO_BRACKET: "no inflow angle balances momentum and blade forces",
     K.NOT_CONVERGED: "root search did not reach its tolerance",
+    K.JUMP: "the balance of momentum and blade forces jumps over zero",
+    K.NOT_FINITE: "the balance of momentum and blade forces is not finite",
 }
+"""Words for the kernel's states of failure."""
+
+THICKNESS = 0.12
+"""Thickness over chord of blades whose sections are not known [1]."""
+
+_RAD_PER_RPM = math.pi / 30.0
+_NO_RADIAL = np.empty((1, 0, K.N_RADIAL))
+# Fewer points than this are not worth a thread.
+_THREAD_MIN = 64
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Prepared:
-    """A rotor ready to solve; made by :func:`prepare`, not by hand."""
+    """A rotor ready to solve; made by :func:`prepare`, not by hand.
+
+    Attributes
+    ----------
+    rotor : geometry.rotor.Rotor
+        Rotor.
+    stations : Stations
+        Blade elements.
+    effects : tuple of Effect
+        Physics that is on.
+    duct : DuctFlow or None
+        Momentum numbers of the duct.
+    st : (N, 12) float
+        Columns ``S_*`` of :mod:`bemt._kernel`, in SI units.
+    tab : (N, Nm, Nr, Na, 2) float
+        cl and cd over Mach number squared, Reynolds number and angle of attack [1].
+    num, grid : (11,), (16,) float
+        Numbers of the effects and of the table axes, see :mod:`bemt._residual` and :mod:`bemt._kernel` [SI units].
+    """
 
     rotor: Rotor
     stations: Stations
     effects: tuple[Effect, ...]
     duct: DuctFlow | None
     st: Array
-    onset: Array
     tab: Array
-    agrid: Array
-    rgrid: Array
     num: Array
+    grid: Array
 
     @property
     def D(self) -> float:
         """Diameter [m]."""
         return 2.0 * self.rotor.R
 
+    @property
+    def mach_top(self) -> float:
+        """Largest tabulated Mach number; infinite when the tables do not depend on it [1]."""
+        n_m = self.tab.shape[1]
+        return math.inf if n_m == 1 else math.sqrt((n_m - 1) * M2_STEP)
 
-@dataclass(frozen=True)
+    @cached_property
+    def kernel(self) -> tuple[Callable[..., None], Array, Array, Array]:
+        """Entry point of the kernel that fits the rotor, and its constant arguments."""
+        plain = self.tab.shape[1] == 1 and self.tab.shape[2] == 1
+        entry = K.entry(bool(self.num[res.N_DUCTED] > 0.0), plain)
+        st = np.array(self.st, dtype=np.float64, order="C")
+        tab = np.ascontiguousarray(self.tab, dtype=np.float64).reshape(-1)
+        return entry, st, tab, np.concatenate([self.num, self.grid])
+
+
+@dataclass(frozen=True, eq=False)
 class Solution:
     """Results over P operating points, NaN where not converged.
 
@@ -86,7 +116,7 @@ class Solution:
     CT, CQ, CP, J : (P,) float
         Propeller convention, CT = T/(rho n^2 D^4) [1].
     T_rotor, T_duct, T_stator, V_exit : (P,) float
-        Thrust shares [N]; exhaust speed [m/s] (ducted) or far-wake speed (open).
+        Thrust shares [N]; exhaust speed [m/s] (ducted) or far-wake speed (open), averaged over the mass flow.
     converged : (P,) bool
         False where any blade element failed.
     flags : tuple of tuple of str
@@ -127,7 +157,7 @@ def prepare(
     Parameters
     ----------
     rotor : geometry.rotor.Rotor
-        Blades, blade count, hub.
+        Blades, blade count, hub.  A blade without sections counts as 12 % thick (wave drag).
     polars : sequence of (float, Polar)
         Section tables at r/R; linear blend in r/R between them, constant beyond the ends.
     effects : iterable of Effect, optional
@@ -150,6 +180,15 @@ def prepare(
     ------
     ValueError
         If polars are missing or a station is not usable.
+
+    Examples
+    --------
+    >>> from bemt.polars import linear_polar
+    >>> from geometry.laws import helix
+    >>> from geometry.rotor import Rotor
+    >>> ready = prepare(Rotor(helix(0.254, 0.127), 2), [(0.75, linear_polar(cd=0.01))])
+    >>> ready.tab.shape[0], round(ready.mach_top, 3)
+    (40, 1.265)
     """
     if not polars:
         raise ValueError("polars: got none; expected at least one (r/R, Polar) pair")
@@ -161,98 +200,46 @@ def prepare(
     x = np.array([p[0] for p in polars])
     if np.any(np.diff(x) <= 0):
         raise ValueError(f"polars: got r/R {x.tolist()}; expected ascending, distinct values")
-    with_mach = any(p.M.size > 1 for _, p in polars)
-    n_m = 1
-    if with_mach or any(e.uses_mach for e in eff):
-        n_m = max(2, math.ceil(mach_max**2 / M2_STEP) + 1)
-    M2 = np.arange(n_m) * M2_STEP
-    Re, cl, cd = _common_grid([p for _, p in polars], np.sqrt(M2))
+    with_mach = any(p.M.size > 1 for _, p in polars) or any(e.uses_mach for e in eff)
+    M2 = arrays.mach_grid(mach_max) if with_mach else np.zeros(1)
+    Re, cl, cd = arrays.common_grid([p for _, p in polars], np.sqrt(M2))
     rR = s.r / blade.R
-    w = _blend_weights(rR, x)
-    alpha0, cla = _zero_and_slope(ALPHA_GRID, cl[:, 0])
-    tx = np.array([a[0] for a in blade.anchors])
+    w = arrays.blend_weights(rR, x)
+    alpha0, cla = arrays.zero_and_slope(ALPHA_GRID, cl[:, 0])
+    shapes = [(a[0], a[1].thickness) for a in blade.anchors] or [(0.0, THICKNESS)]
     bake = Baking(
         r=s.r, dr=s.dr, chord=s.chord, beta=s.beta.copy(), sigma=rotor.B * s.chord / (2.0 * np.pi * s.r),
         R=blade.R, Rhub=blade.Rhub, B=rotor.B, alpha=ALPHA_GRID, Re=Re, M2=M2,
         cl=np.tensordot(w, cl, axes=1), cd=np.tensordot(w, cd, axes=1), alpha0=w @ alpha0, cla=w @ cla,
-        onset=np.zeros((s.r.size, 2)), thickness=np.interp(rR, tx, [a[1].thickness for a in blade.anchors]),
+        onset=np.zeros((s.r.size, 2)), thickness=np.interp(rR, [x for x, _ in shapes], [t for _, t in shapes]),
         own_mach=w @ np.array([float(p.M.size > 1) for _, p in polars]),
         gap=duct.gap if duct is not None else float("nan"), ducted=duct is not None,
     )  # fmt: skip
     for hook in ("blade", "inflow", "section", "momentum"):
         for e in eff:
             getattr(e, hook)(bake)
-    return _pack(rotor, s, eff, duct, bake)
+    num = _numbers(bake, duct)
+    tab = np.stack([bake.cl, bake.cd], axis=-1)
+    return Prepared(rotor, s, eff, duct, arrays.pack_stations(bake, num), tab, num, arrays.pack_grid(bake))
 
 
-def _common_grid(polars: Sequence[Polar], M: Array) -> tuple[Array, Array, Array]:
-    """Reynolds axis and cl, cd of all polars as (P, Nm, Nr, Na); one Reynolds number stays one."""
-    re = DEFAULT_RE if any(p.Re.size > 1 for p in polars) else polars[0].Re[:1]
-    cl = np.empty((len(polars), M.size, re.size, ALPHA_GRID.size))
-    cd = np.empty_like(cl)
-    for i, p in enumerate(polars):
-        q = p.on_grid(ALPHA_GRID, re, M if p.M.size > 1 else p.M)
-        cl[i] = q.cl.transpose(2, 1, 0)
-        cd[i] = q.cd.transpose(2, 1, 0)
-    return re, cl, cd
-
-
-def _zero_and_slope(alpha: Array, cl: Array) -> tuple[Array, Array]:
-    """Zero-lift angle and slope over the 5 degrees above it, per polar and Reynolds number, (P, Nr) each."""
-    window = np.abs(alpha) < np.radians(14.0)
-    a = alpha[window]
-    y = cl[..., window]
-    # last upward crossing below the strongest lift: thin sections may cross more than once in stalled flow
-    up = (y[..., :-1] <= 0.0) & (y[..., 1:] > 0.0)
-    last = up.shape[-1] - 1 - np.argmax(up[..., ::-1], axis=-1)
-    i = np.where(up.any(axis=-1), last, int(np.argmin(np.abs(a))))[..., None]
-    y0 = np.take_along_axis(y, i, -1)[..., 0]
-    y1 = np.take_along_axis(y, i + 1, -1)[..., 0]
-    i = i[..., 0]
-    a0 = a[i] - np.where(y1 != y0, y0 / np.where(y1 != y0, y1 - y0, 1.0), 0.0) * (a[1] - a[0])
-    j = np.minimum(i + round(math.radians(5.0) / (a[1] - a[0])), a.size - 1)
-    slope = np.take_along_axis(y, j[..., None], -1)[..., 0] / np.maximum(a[j] - a0, 1e-6)
-    return a0, np.clip(slope, 1.0, 8.0)
-
-
-def _blend_weights(rR: Array, x: Array) -> Array:
-    """(N, P) weights of P anchors at N stations."""
-    eye = np.eye(x.size)
-    return np.stack([np.interp(rR, x, eye[i]) for i in range(x.size)], axis=1)
-
-
-def _pack(rotor: Rotor, s: Stations, eff: tuple[Effect, ...], duct: DuctFlow | None, bake: Baking) -> Prepared:
-    num = np.zeros(K.N_NUM)
+def _numbers(bake: Baking, duct: DuctFlow | None) -> Array:
+    """Numbers of effects and duct in the order of :mod:`bemt._residual`."""
     n = bake.num
-    num[K.N_TIP] = n.get("tip", 0.0)
-    num[K.N_HUB] = n.get("hub", 0.0) if bake.Rhub > 0 else 0.0
-    num[K.N_FAR] = n.get("far_wake", 0.0)
-    num[K.N_SWIRL] = n.get("swirl", 0.0)
-    num[K.N_BRIDGE] = n.get("bridge", 0.0)
+    num = np.zeros(res.N_NUM)
+    num[res.N_TIP] = n.get("tip", 0.0)
+    num[res.N_HUB] = n.get("hub", 0.0) if bake.Rhub > 0 else 0.0
+    num[res.N_FAR] = n.get("far_wake", 0.0)
+    num[res.N_SWIRL] = n.get("swirl", 0.0)
+    num[res.N_BRIDGE] = n.get("bridge", 0.0)
     if duct is not None:
-        num[K.N_DUCTED] = 1.0
-        num[K.N_WAKE] = 1.0 / duct.wake_ratio**2 + duct.wall_loss
-        num[K.N_LIP] = duct.lip_loss
-        num[K.N_STATOR] = duct.stator
-        num[K.N_GAP] = n.get("gap_share", 0.0)
-        num[K.N_LEAK] = n.get("gap_loss", 0.0)
-    # the kernel takes the root of the Prandtl exponent, huge where the factor is off
-    off = np.full(bake.r.size, 1e6)
-    tip = np.sqrt(num[K.N_TIP] * 0.5 * bake.B * np.maximum(bake.R - bake.r, 0.0) / bake.r)
-    hub = np.sqrt(num[K.N_HUB] * 0.5 * bake.B * np.maximum(bake.r - bake.Rhub, 0.0) / max(bake.Rhub, 1e-9))
-    tip = tip if num[K.N_TIP] > 0.0 else off
-    hub = hub if num[K.N_HUB] > 0.0 else off
-    st = np.stack(
-        [bake.r, bake.dr, bake.chord, bake.beta, bake.sigma, tip, hub, np.log(np.maximum(bake.chord, 1e-9))], axis=1
-    )
-    tab = np.ascontiguousarray(np.stack([bake.cl, bake.cd], axis=-1))
-    nr = bake.Re.size
-    log_re = np.log(bake.Re)
-    rgrid = np.array(
-        [log_re[0], (nr - 1) / (log_re[-1] - log_re[0]) if nr > 1 else 0.0, nr, 1.0 / M2_STEP, bake.M2.size]
-    )
-    return Prepared(rotor, s, eff, duct, np.ascontiguousarray(st), np.ascontiguousarray(bake.onset), tab,
-                    _AGRID, rgrid, num)  # fmt: skip
+        num[res.N_DUCTED] = 1.0
+        num[res.N_WAKE] = 1.0 / duct.wake_ratio**2 + duct.wall_loss
+        num[res.N_LIP] = duct.lip_loss
+        num[res.N_STATOR] = duct.stator
+        num[res.N_GAP] = n.get("gap_share", 0.0)
+        num[res.N_LEAK] = n.get("gap_loss", 0.0)
+    return num
 
 
 def solve_point(prep: Prepared, rpm: float, V: float, air: Air) -> tuple[float, float, bool]:
@@ -274,15 +261,14 @@ def solve_point(prep: Prepared, rpm: float, V: float, air: Air) -> tuple[float, 
     tuple
         Thrust of the rotor [N], torque [N m], converged.  NaN where not converged.
     """
-    out = np.empty(K.N_OUT)
-    K.solve_point(rpm * (math.pi / 30.0), V, air.rho, air.mu, air.a_sound, prep.st, prep.onset, prep.tab, prep.agrid,
-                  prep.rgrid, prep.num, prep.rotor.B, out, _NO_RADIAL)  # fmt: skip
-    if out[5] != K.OK:
+    entry, *constant = prep.kernel
+    point = np.array([[rpm * _RAD_PER_RPM, V, air.rho, air.mu, air.a_sound]])
+    out = np.empty((1, K.N_OUT))
+    entry(point, *constant, out, _NO_RADIAL)
+    T, Q = float(out[0, K.O_T]), float(out[0, K.O_Q])
+    if out[0, K.O_STATUS] != K.OK or not math.isfinite(T + Q):
         return math.nan, math.nan, False
-    return out[0], out[1], True
-
-
-_NO_RADIAL = np.empty((0, K.N_RADIAL))
+    return T, Q, True
 
 
 def solve(
@@ -317,108 +303,131 @@ def solve(
     Raises
     ------
     ValueError
-        If a speed is not finite, rpm is not positive or density is not positive.
+        If a speed is not finite, rpm is not positive or a property of the air is not positive.
+
+    Examples
+    --------
+    >>> from bemt.polars import linear_polar
+    >>> from geometry.laws import helix
+    >>> from geometry.rotor import Rotor
+    >>> ready = prepare(Rotor(helix(0.254, 0.127), 2), [(0.75, linear_polar(cd=0.01))])
+    >>> s = solve(ready, 6000.0, [0.0, 5.0, 10.0])
+    >>> bool(s.converged.all()), bool(np.all(np.diff(s.CT) < 0))
+    (True, True)
     """
     air = Air.from_density() if air is None else air
-    rpm_, V_, rho, mu, a = (
-        np.ascontiguousarray(v, dtype=float).ravel()
-        for v in np.broadcast_arrays(
-            np.asarray(rpm, float), np.asarray(V, float), np.asarray(air.rho, float), np.asarray(air.mu, float),
-            np.asarray(air.a_sound, float),
-        )
-    )  # fmt: skip
-    if not (np.all(np.isfinite(rpm_)) and np.all(rpm_ > 0)):
+    fields = [np.asarray(v, dtype=float) for v in (rpm, V, air.rho, air.mu, air.a_sound)]
+    points = np.empty((*np.broadcast_shapes(*(f.shape for f in fields)), K.N_POINT))
+    for i, values in enumerate(fields):
+        points[..., i] = values
+    points = points.reshape(-1, K.N_POINT)
+    if not (np.all(np.isfinite(points[:, 0])) and np.all(points[:, 0] > 0)):
         raise ValueError("rpm: got a value that is not finite and positive; expected rev/min > 0")
-    if not (np.all(np.isfinite(V_)) and np.all(rho > 0)):
-        raise ValueError("airspeed or density: got a value that is not finite or not positive")
-    n_pts = rpm_.size
-    n_st = prep.st.shape[0]
-    out = np.empty((n_pts, K.N_OUT))
-    rad = np.empty((n_pts, n_st if radial else 0, K.N_RADIAL))
-    Omega = rpm_ * (np.pi / 30.0)
+    if not (np.all(np.isfinite(points)) and np.all(points[:, 2:] > 0)):
+        raise ValueError("airspeed or air: got a value that is not finite or not positive")
+    rpm_ = points[:, K.P_OMEGA].copy()
+    points[:, K.P_OMEGA] *= _RAD_PER_RPM
+    n = points.shape[0]
+    out = np.empty((n, K.N_OUT))
+    rad = np.empty((n, prep.st.shape[0] if radial else 0, K.N_RADIAL))
+    entry, *constant = prep.kernel
+    if threads > 1 and n > _THREAD_MIN:
+        edges = np.linspace(0, n, threads * 4 + 1).astype(int)
 
-    def run(i: int, j: int) -> None:
-        K.solve_batch(Omega[i:j], V_[i:j], rho[i:j], mu[i:j], a[i:j], prep.st, prep.onset, prep.tab, prep.agrid,
-                      prep.rgrid, prep.num, prep.rotor.B, out[i:j], rad[i:j])  # fmt: skip
+        def part(i: int, j: int) -> None:
+            entry(points[i:j], *constant, out[i:j], rad[i:j])
 
-    if threads > 1 and n_pts > 64:
-        edges = np.linspace(0, n_pts, threads * 4 + 1).astype(int)
         with ThreadPoolExecutor(threads) as pool:
-            list(pool.map(lambda ij: run(*ij), zip(edges[:-1], edges[1:], strict=True)))
+            list(pool.map(part, edges[:-1], edges[1:]))
     else:
-        run(0, n_pts)
-    return _collect(prep, rpm_, V_, rho, mu, a, out, rad)
+        entry(points, *constant, out, rad)
+    return _collect(prep, rpm_, points, out, rad)
 
 
-def _collect(
-    prep: Prepared, rpm: Array, V: Array, rho: Array, mu: Array, a_sound: Array, out: Array, rad: Array
-) -> Solution:
-    ok = (out[:, 5] == K.OK) & np.isfinite(out[:, 0]) & np.isfinite(out[:, 1])
+def _collect(prep: Prepared, rpm: Array, points: Array, out: Array, rad: Array) -> Solution:
+    ok = (out[:, K.O_STATUS] == K.OK) & np.isfinite(out[:, K.O_T]) & np.isfinite(out[:, K.O_Q])
     nan = np.where(ok, 1.0, np.nan)
-    T_rotor = out[:, 0] * nan
-    Q = out[:, 1] * nan
+    V, rho = points[:, K.P_V].copy(), points[:, K.P_RHO]
+    T_rotor, Q = out[:, K.O_T] * nan, out[:, K.O_Q] * nan
     n = rpm / 60.0
     D = prep.D
     if prep.duct is not None:
-        T, T_stator, V_exit = prep.duct.total(prep, rho, V, out)
-        T, T_stator, V_exit = T * nan, T_stator * nan, V_exit * nan
+        T, T_stator, V_exit = (v * nan for v in prep.duct.total(prep, rho, V, out))
         T_duct = T - T_rotor - T_stator
     else:
         T, T_stator, T_duct = T_rotor, np.zeros_like(T_rotor), np.zeros_like(T_rotor)
-        mdot = out[:, 2] * nan
+        mass = out[:, K.O_MASS] * nan
         with np.errstate(divide="ignore", invalid="ignore"):
-            V_exit = np.where(np.abs(mdot) > 0, V + T / mdot, V)
-    P = Q * rpm * (np.pi / 30.0)
+            V_exit = np.where(mass > 0.0, V + T / mass, V * nan)
     CT = T / (rho * n**2 * D**4)
     CQ = Q / (rho * n**2 * D**5)
-    radial = _radial(prep, rpm, V, rho, mu, a_sound, rad) if rad.shape[1] else {}
-    flags = tuple(_flags(prep, o, rp, v, a) for o, rp, v, a in zip(out, rpm, V, a_sound, strict=True)) \
-        if n_pts_flagged(out, ok, prep, rpm, V, a_sound) else ((),) * rpm.size  # fmt: skip
-    return Solution(rpm, V, T, Q, P, CT, CQ, 2.0 * np.pi * CQ, V / (n * D), T_rotor, T_duct, T_stator, V_exit, ok,
-                    flags, radial)  # fmt: skip
+    radial = _radial(prep, points, rad) if rad.shape[1] else {}
+    return Solution(
+        rpm, V, T, Q, Q * points[:, K.P_OMEGA], CT, CQ, 2.0 * np.pi * CQ, V / (n * D), T_rotor, T_duct, T_stator,
+        V_exit, ok, _flags(prep, points, out, ok), radial,
+    )  # fmt: skip
 
 
-def n_pts_flagged(out: Array, ok: NDArray[np.bool_], prep: Prepared, rpm: Array, V: Array, a: Array) -> bool:
-    """Whether any point needs words at all (a batch of a million usually does not)."""
-    return bool(np.any(~ok) or np.any(out[:, 7] > 0) or np.any(_mach(prep, rpm, V) / a > _mach_top(prep)))
+def _flags(prep: Prepared, points: Array, out: Array, ok: NDArray[np.bool_]) -> tuple[tuple[str, ...], ...]:
+    """Words per point: one set for each combination that occurs, so that a large batch costs no loop over points."""
+    n = out.shape[0]
+    mach = np.hypot(points[:, K.P_OMEGA] * prep.rotor.R, points[:, K.P_V]) / points[:, K.P_SOUND]
+    behind = points[:, K.P_V] < 0.0
+    # the columns of the words, each a small whole number
+    status = np.where(ok | (out[:, K.O_STATUS] > 0), out[:, K.O_STATUS], K.NOT_FINITE)
+    counts = [out[:, i] for i in (K.O_BRIDGED, K.O_STAGNANT, K.O_REVERSED)]
+    columns = [status, np.where(ok, -1.0, out[:, K.O_WHERE]) + 1.0, *counts, mach > prep.mach_top, behind]
+    backwards = behind if prep.duct is not None else np.zeros(n, dtype=bool)
+    loud = np.flatnonzero(~ok | (mach > prep.mach_top) | backwards | (np.sum(counts, axis=0) > 0))
+    flags: list[tuple[str, ...]] = [()] * n
+    if loud.size == 0:
+        return tuple(flags)
+    base = prep.st.shape[0] + 2
+    key = np.zeros(loud.size, dtype=np.int64)
+    for column in columns:
+        key = key * base + column[loud].astype(np.int64)
+    _, first, inverse = np.unique(key, return_index=True, return_inverse=True)
+    words = [_words(prep, *(int(c[loud[i]]) for c in columns)) for i in first]
+    for i, j in zip(loud.tolist(), inverse.tolist(), strict=True):
+        flags[i] = words[j]
+    return tuple(flags)
 
 
-def _mach(prep: Prepared, rpm: Array | float, V: Array | float) -> Any:
-    return np.hypot(np.asarray(rpm) * (np.pi / 30.0) * prep.rotor.R, V)
-
-
-def _mach_top(prep: Prepared) -> float:
-    n_m = int(prep.rgrid[4])
-    return math.inf if n_m == 1 else math.sqrt((n_m - 1) * M2_STEP)
-
-
-def _flags(prep: Prepared, out: Array, rpm: float, V: float, a: float) -> tuple[str, ...]:
+def _words(
+    prep: Prepared, status: int, where: int, bridged: int, stagnant: int, reversed_: int, fast: int, behind: int
+) -> tuple[str, ...]:
     words: list[str] = []
-    if out[5] != K.OK:
-        x = prep.stations.r[int(out[6])] / prep.rotor.R
-        words.append(f"not converged at r/R {x:.2f}: {REASONS[int(out[5])]}")
-    elif not (np.isfinite(out[0]) and np.isfinite(out[1])):
-        words.append("not converged: result is not finite")
-    if out[7] > 0:
-        share = out[7] / prep.st.shape[0]
-        state = "turbulent windmill state" if V > 0 else "vortex-ring or windmill-brake state"
-        words.append(f"{state} on {share:.0%} of the blade: momentum theory replaced by an empirical curve")
-    if _mach(prep, rpm, V) / a > _mach_top(prep):
-        words.append(f"helical tip Mach above {_mach_top(prep):.2f}: section tables held")
+    n = prep.st.shape[0]
+    if status != K.OK:
+        place = f" at r/R {prep.stations.r[where - 1] / prep.rotor.R:.2f}" if where > 0 else ""
+        words.append(f"not converged{place}: {REASONS[status]}")
+    if bridged:
+        state = "vortex-ring or windmill-brake state" if behind else "turbulent windmill state"
+        words.append(f"{state} on {bridged / n:.0%} of the blade: momentum theory replaced by an empirical curve")
+    if stagnant:
+        words.append(f"drag swirls the flow along with {stagnant / n:.0%} of the blade: momentum theory doubtful")
+    if reversed_:
+        words.append(f"flow reversed through the duct on {reversed_ / n:.0%} of the blade")
+    if behind and prep.duct is not None:
+        words.append("onset flow from behind the duct: exit and lip losses are not known in that direction")
+    if fast:
+        words.append(f"helical tip Mach above {prep.mach_top:.2f}: section tables held")
     return tuple(words)
 
 
-def _radial(prep: Prepared, rpm: Array, V: Array, rho: Array, mu: Array, a_sound: Array, rad: Array) -> dict[str, Array]:
+def _radial(prep: Prepared, points: Array, rad: Array) -> dict[str, Array]:
     names = ("phi", "alpha", "cl", "cd", "W", "w", "v_t", "F", "dT", "dQ")
-    res = {name: rad[:, :, i].copy() for i, name in enumerate(names)}
-    r = prep.stations.r
+    res: dict[str, Array] = {name: rad[:, :, i].copy() for i, name in enumerate(names)}
+    res["alpha"] = np.remainder(res["alpha"] + np.pi, 2.0 * np.pi) - np.pi
+    r = prep.st[:, K.S_R]
     res["r"] = np.broadcast_to(r, res["phi"].shape).copy()
-    UT = rpm[:, None] * (np.pi / 30.0) * r + prep.onset[None, :, 1]
-    UP = V[:, None] + prep.onset[None, :, 0]
+    Omega, V, rho, mu, a_sound = (points[:, i, None] for i in range(K.N_POINT))
+    UT = Omega * r + prep.st[:, K.S_TANG]
+    UP = V + prep.st[:, K.S_AXIAL]
     with np.errstate(divide="ignore", invalid="ignore"):
         # induction factors relative to the onset speed; a is infinite at rest and reported as NaN
         res["a"] = np.where(UP != 0.0, res["w"] / UP - 1.0, np.nan)
         res["ap"] = res["v_t"] / UT
-    res["Re"] = rho[:, None] * np.abs(res["W"]) * prep.stations.chord / mu[:, None]
-    res["M"] = np.abs(res["W"]) / a_sound[:, None]
+    res["Re"] = rho * np.abs(res["W"]) * prep.st[:, K.S_CHORD] / mu
+    res["M"] = np.abs(res["W"]) / a_sound
     return res

@@ -26,7 +26,7 @@ def number_text(value: float | None, digits: int = 4, none: str = "-") -> str:
     Parameters
     ----------
     value : float or None
-        Number; None and NaN give `none`.
+        Number in the unit of its column; None and NaN give `none`.
     digits : int
         Significant digits.
     none : str

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from bemt.errors import Fault, InputError
 from bemt.units import INCH
+from bemt.validate_text import text
 
 if TYPE_CHECKING:
     from bemt.effects import Effect
@@ -309,7 +310,7 @@ def validate(
     eff = registry.standard() if effects is None else tuple(effects)
     scan = uiuc.scan_folder(folder)
     pe0, notes = _pe0_stations(folder)
-    skipped = [{"name": p.name, "reason": r} for p in scan.propellers if (r := _unusable(p, pe0))]
+    skipped = [{"name": p.name, "reason": why} for p in scan.propellers if (why := _unusable(p, pe0))]
     usable = [p for p in scan.propellers if not _unusable(p, pe0)]
     if not usable:
         raise InputError(
@@ -325,13 +326,13 @@ def validate(
             print(f"\r{i + 1}/{len(usable)} {p.name:<28}", end="", file=sys.stderr, flush=True)
         own = p.geometry is not None
         stations = None if own else pe0[p.family, round(p.diameter_in, 2), round(p.pitch_in or 0.0, 2)]
-        r = compare(p, eff, fixed_re, stations)
-        unconverged += int(np.count_nonzero(~np.isfinite(r.CT_bemt)))
-        e = errors(r)
+        points = compare(p, eff, fixed_re, stations)
+        unconverged += int(np.count_nonzero(~np.isfinite(points.CT_bemt)))
+        e = errors(points)
         row: dict[str, Any] = {
             "name": p.name, "family": p.family, "diameter_in": p.diameter_in, "pitch_in": p.pitch_in,
             "blades": p.blades, "stations": p.geometry.origin if p.geometry is not None else "apc_pe0",
-            "J0": _number(r.J0), "J0_bemt": _number(r.J0_bemt),
+            "J0": _number(points.J0), "J0_bemt": _number(points.J0_bemt),
         }  # fmt: skip
         for kind in ("static", "forward"):
             counted[kind] += int(e[kind]["CT"].size > 0)
@@ -343,7 +344,7 @@ def validate(
     if progress:
         print("\r" + " " * 48 + "\r", end="", file=sys.stderr, flush=True)
     j0 = np.array([r["J0_bemt"] / r["J0"] - 1.0 for r in rows if r["J0"] and r["J0_bemt"]])
-    doc: dict[str, Any] = {"schema": SCHEMA, "folder": folder.name}
+    doc: dict[str, Any] = {"schema": SCHEMA, "folder": folder.name, "J_share": J_SHARE}
     for kind in ("static", "forward"):
         all_ct = np.concatenate(pooled[kind]["CT"])
         doc[kind] = {"propellers": counted[kind], "points": int(all_ct.size)}
@@ -373,68 +374,6 @@ def _unusable(p: UiucPropeller, pe0: dict[tuple[str, float, float], Any]) -> str
     if not p.statics and not p.lines:
         return "no measurements"
     return ""
-
-
-def _percent(s: dict[str, float | None]) -> str:
-    if s["median_abs"] is None:
-        return f"{'-':>6} {'-':>6} {'-':>6}"
-    bias = s["bias"]
-    shown = "-" if bias is None else f"{100 * bias:+6.1f}"
-    return f"{100 * s['median_abs']:6.1f} {100 * (s['p90_abs'] or 0):6.1f} {shown:>6}"
-
-
-def text(doc: dict[str, Any]) -> str:
-    """Table for people.
-
-    Parameters
-    ----------
-    doc : dict
-        From :func:`validate`.
-
-    Returns
-    -------
-    str
-        Percent, one line per propeller, totals last.
-    """
-    head = f"{'':24} {'J0':>6} {'bemt':>6}"
-    for kind in ("static", "forward"):
-        for q in ("CT", "CP"):
-            head += f" | {kind} {q:<2}{'':>{19 - len(kind) - 3}}"
-    sub = f"{'propeller':24} {'':>6} {'':>6}" + " | median    p90   bias" * 4
-    lines = [head, sub, "-" * len(sub)]
-    for r in doc["propellers"]:
-        j = [f"{r[k]:6.3f}" if r[k] is not None else f"{'-':>6}" for k in ("J0", "J0_bemt")]
-        lines.append(
-            f"{r['name'][:24]:24} {j[0]} {j[1]}"
-            + "".join(f" | {_percent(r[kind][q])}" for kind in ("static", "forward") for q in ("CT", "CP"))
-        )
-    lines.append("-" * len(sub))
-    lines.append(
-        f"{'all points':24} {'':>6} {'':>6}"
-        + "".join(f" | {_percent(doc[kind][q])}" for kind in ("static", "forward") for q in ("CT", "CP"))
-    )
-    z = doc["zero_thrust_J"]
-    lines += [
-        "",
-        f"Errors of BEMT in percent of the measured value. Static: {doc['static']['points']} points of "
-        f"{doc['static']['propellers']} propellers; forward: {doc['forward']['points']} points of "
-        f"{doc['forward']['propellers']}, J up to {J_SHARE:g} J0.",
-    ]
-    if z["median_abs"] is not None:
-        lines.append(f"Zero-thrust J: median error {100 * z['median_abs']:.1f} %, bias {100 * z['bias']:+.1f} %.")
-    p = doc["polar"]
-    lines.append(
-        f"Sections: declared rule, calibrated on {p['calibrated_on']}: n_crit {p['n_crit']:g}, "
-        f"drag x{p['drag_level']:g}"
-        + (f", Reynolds number fixed at {p['fixed_re']:g}." if p["fixed_re"] else ".")
-    )
-    lines.append("Effects on: " + ", ".join(e["id"] for e in doc["effects"]) + ".")
-    if doc["unconverged"]:
-        lines.append(f"NOT CONVERGED: {doc['unconverged']} points (counted as infinitely wrong).")
-    if doc["skipped"]:
-        lines.append(f"Skipped: {len(doc['skipped'])} propellers without stations or without measurements.")
-    lines += [f"fault: {f}" for f in doc["faults"]]
-    return "\n".join(lines)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -28,7 +28,7 @@ FLOOR_OF_ROOMS: tuple[tuple[str, ...], ...] = (
     ("errors",),
     ("units", "cache", "tables"),
     ("air", "coefficients"),
-    ("series", "polars*|post_stall", "empirical*", "schema"),
+    ("series", "imported", "polars*|post_stall", "empirical*", "schema"),
     ("effects|effects.*", "importers|importers.*", "section_rule*"),
     (COMPILED, "case*"),
     ("solver*|duct*",),

@@ -130,7 +130,7 @@ def number(token: str) -> float | None:
     Returns
     -------
     float or None
-        The value; None when the text is not a finite number (``nan``, ``1,5``, ``0.34-NaN``, ``1_000``).
+        The value, in the unit of the column; None when the text is not a finite number (``nan``, ``1,5``, ``0.34-NaN``, ``1_000``).
 
     Examples
     --------

@@ -1,0 +1,112 @@
+"""Section tables and effects become the arrays of the compiled kernel."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt import _kernel as K
+from bemt import _residual as res
+from bemt.effects.base import Baking
+from bemt.polars import (
+    ALPHA_COARSE_STEP,
+    ALPHA_FINE_HI,
+    ALPHA_FINE_LO,
+    ALPHA_FINE_STEP,
+    ALPHA_GRID,
+    DEFAULT_RE,
+)
+
+if TYPE_CHECKING:
+    from bemt.polars import Polar
+
+Array = NDArray[np.float64]
+
+# Squared Mach number grid: uniform, so that the kernel needs neither root nor search.
+M2_STEP = 0.1
+
+# A loss exponent that leaves F = 1 at any inflow angle.
+_LOSS_OFF = 1e9
+
+_FINE_LO = round((ALPHA_FINE_LO + math.pi) / ALPHA_COARSE_STEP)
+_FINE_HI = _FINE_LO + round((ALPHA_FINE_HI - ALPHA_FINE_LO) / ALPHA_FINE_STEP)
+
+
+def mach_grid(mach_max: float) -> Array:
+    """Squares of the tabulated Mach numbers, two or more [1]."""
+    return np.arange(max(2, math.ceil(mach_max**2 / M2_STEP) + 1), dtype=np.float64) * M2_STEP
+
+
+def common_grid(polars: Sequence[Polar], M: Array) -> tuple[Array, Array, Array]:
+    """Reynolds axis and cl, cd of all polars as (P, Nm, Nr, Na); one Reynolds number stays one."""
+    re = DEFAULT_RE if any(p.Re.size > 1 for p in polars) else polars[0].Re[:1]
+    cl = np.empty((len(polars), M.size, re.size, ALPHA_GRID.size))
+    cd = np.empty_like(cl)
+    for i, p in enumerate(polars):
+        q = p.on_grid(ALPHA_GRID, re, M if p.M.size > 1 else p.M)
+        cl[i] = q.cl.transpose(2, 1, 0)
+        cd[i] = q.cd.transpose(2, 1, 0)
+    return re, cl, cd
+
+
+def zero_and_slope(alpha: Array, cl: Array) -> tuple[Array, Array]:
+    """Zero-lift angle [rad] and slope [1/rad] over the 5 degrees above it, per polar and Reynolds number."""
+    window = np.abs(alpha) < np.radians(14.0)
+    a = alpha[window]
+    y = cl[..., window]
+    # last upward crossing below the strongest lift: thin sections may cross more than once in stalled flow
+    up = (y[..., :-1] <= 0.0) & (y[..., 1:] > 0.0)
+    last = up.shape[-1] - 1 - np.argmax(up[..., ::-1], axis=-1)
+    i = np.where(up.any(axis=-1), last, int(np.argmin(np.abs(a))))[..., None]
+    y0 = np.take_along_axis(y, i, -1)[..., 0]
+    y1 = np.take_along_axis(y, i + 1, -1)[..., 0]
+    i = i[..., 0]
+    a0 = a[i] - np.where(y1 != y0, y0 / np.where(y1 != y0, y1 - y0, 1.0), 0.0) * (a[1] - a[0])
+    j = np.minimum(i + round(math.radians(5.0) / (a[1] - a[0])), a.size - 1)
+    slope = np.take_along_axis(y, j[..., None], -1)[..., 0] / np.maximum(a[j] - a0, 1e-6)
+    return a0, np.clip(slope, 1.0, 8.0)
+
+
+def blend_weights(rR: Array, x: Array) -> Array:
+    """(N, P) weights of P anchors at N stations: linear in r/R, held at the ends."""
+    return np.stack([np.interp(rR, x, row) for row in np.eye(x.size)], axis=1)
+
+
+def pack_stations(bake: Baking, num: Array) -> Array:
+    """Station columns of the kernel, (N, 12)."""
+    st = np.empty((bake.r.size, K.N_STATION))
+    st[:, K.S_R], st[:, K.S_DR], st[:, K.S_CHORD] = bake.r, bake.dr, bake.chord
+    st[:, K.S_BETA], st[:, K.S_SIGMA] = bake.beta, bake.sigma
+    # the kernel takes the root of the Prandtl exponent
+    tip, hub = num[res.N_TIP], num[res.N_HUB]
+    to_tip = tip * 0.5 * bake.B * np.maximum(bake.R - bake.r, 0.0) / bake.r
+    to_hub = hub * 0.5 * bake.B * np.maximum(bake.r - bake.Rhub, 0.0) / max(bake.Rhub, 1e-9)
+    st[:, K.S_TIP] = np.sqrt(to_tip) if tip > 0.0 else _LOSS_OFF
+    st[:, K.S_HUB] = np.sqrt(to_hub) if hub > 0.0 else _LOSS_OFF
+    st[:, K.S_LOGC] = np.log(np.maximum(bake.chord, 1e-9))
+    # straight lift curve for the first guess: incompressible, middle Reynolds number, -1 to 5 deg
+    a, b = np.radians(-1.0), np.radians(5.0)
+    lift = bake.cl[:, 0, bake.Re.size // 2]
+    cl_a, cl_b = lift[:, np.searchsorted(bake.alpha, a)], lift[:, np.searchsorted(bake.alpha, b)]
+    slope = np.clip((cl_b - cl_a) / (b - a), 1.0, 12.0)
+    st[:, K.S_CLA] = slope
+    st[:, K.S_ALPHA0] = 0.5 * (a + b) - 0.5 * (cl_a + cl_b) / slope
+    st[:, K.S_AXIAL : K.S_TANG + 1] = bake.onset
+    return st
+
+
+def pack_grid(bake: Baking) -> Array:
+    """Grid numbers of the kernel in the order of its comment on ``par``; the last is the blade count."""
+    n_m, n_r, n_a = bake.cl.shape[1:]
+    log_re = np.log(bake.Re)
+    return np.array([
+        ALPHA_FINE_LO, ALPHA_FINE_HI, 1.0 / ALPHA_FINE_STEP, 1.0 / ALPHA_COARSE_STEP, _FINE_LO, _FINE_HI, n_a - 2,
+        log_re[0], (n_r - 1) / (log_re[-1] - log_re[0]) if n_r > 1 else 0.0, max(n_r - 1, 1),
+        1.0 / M2_STEP if n_m > 1 else 0.0, max(n_m - 1, 1),
+        # an axis of one node has stride zero, so that its upper neighbour is itself
+        2 * n_r * n_a if n_m > 1 else 0, 2 * n_a if n_r > 1 else 0, 2 * n_m * n_r * n_a, bake.B,
+    ])  # fmt: skip

@@ -1,0 +1,113 @@
+"""``bemt validate``: the statistics on a folder whose answer is known, and the declared rule on real propellers."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bemt import effects, section_rule, validate
+from bemt.importers import uiuc
+
+R_R = np.linspace(0.15, 1.0, 18)
+C_R = 0.12 + 0.08 * np.sin(np.pi * R_R) - 0.06 * R_R
+BETA = np.degrees(np.arctan(0.5 / (np.pi * R_R)))
+
+
+def _folder(path: Path, thrust: float = 1.0, power: float = 1.0) -> Path:
+    """UIUC folder of a 10x5 whose "measurements" are our own solution times given factors."""
+    geometry = "r/R   c/R     beta\n" + "".join(
+        f"{a:.2f}  {b:.5f}  {c:.4f}\n" for a, b, c in zip(R_R, C_R, BETA, strict=True)
+    )
+    (path / "some_10x5_geom.txt").write_text(geometry)
+    (path / "some_10x5_static_0001xx.txt").write_text("RPM CT CP\n3000.0 0.1 0.04\n5000.0 0.1 0.04\n")
+    (path / "some_10x5_0002xx_5000.txt").write_text(
+        "J CT CP eta\n" + "".join(f"{J:.3f} 0.1 0.04 {2.5 * J:.4f}\n" for J in np.linspace(0.1, 0.7, 13))
+    )
+    rows = validate.compare(uiuc.scan_folder(path).propellers[0], effects.standard())
+    CT, CP = rows.CT_bemt / thrust, rows.CP_bemt / power
+    static = "".join(f"{n:.1f} {a:.9f} {b:.9f}\n" for n, a, b in zip(rows.rpm[:2], CT[:2], CP[:2], strict=True))
+    (path / "some_10x5_static_0001xx.txt").write_text("RPM CT CP\n" + static)
+    line = "".join(
+        f"{J:.6f} {a:.9f} {b:.9f} {max(J * a / b, 0):.6f}\n" for J, a, b in zip(rows.J[2:], CT[2:], CP[2:], strict=True)
+    )
+    (path / "some_10x5_0002xx_5000.txt").write_text("J CT CP eta\n" + line)
+    return path
+
+
+def test_planted_errors_come_out(tmp_path: Path) -> None:
+    doc = validate.validate(_folder(tmp_path, thrust=1.10, power=0.95))
+    for kind in ("static", "forward"):
+        assert doc[kind]["propellers"] == 1
+        assert doc[kind]["CT"]["bias"] == pytest.approx(0.10, abs=1e-6)
+        assert doc[kind]["CT"]["median_abs"] == pytest.approx(0.10, abs=1e-6)
+        assert doc[kind]["CP"]["bias"] == pytest.approx(-0.05, abs=1e-6)
+        assert doc[kind]["CP"]["p90_abs"] == pytest.approx(0.05, abs=1e-6)
+    assert doc["zero_thrust_J"]["median_abs"] < 1e-6
+    assert doc["schema"] == "bemt.validation/1" and doc["unconverged"] == 0
+
+
+def test_forward_points_stop_at_the_share_of_zero_thrust_J(tmp_path: Path) -> None:
+    doc = validate.validate(_folder(tmp_path))
+    J0 = doc["propellers"][0]["J0"]
+    J = np.linspace(0.1, 0.7, 13)
+    assert doc["forward"]["points"] == np.count_nonzero(J <= validate.J_SHARE * J0)
+
+
+def test_unconverged_points_count_as_infinitely_wrong() -> None:
+    assert validate.statistics(np.array([0.01, np.nan, np.nan]))["median_abs"] == np.inf
+
+
+def test_command_prints_json_and_names_unknown_effects(tmp_path: Path) -> None:
+    _folder(tmp_path)
+    call = [sys.executable, "-m", "bemt", "validate", str(tmp_path)]
+    good = subprocess.run([*call, "--json", "--off", "stall_delay"], capture_output=True, text=True, check=False)
+    assert good.returncode == 0
+    doc = json.loads(good.stdout)
+    assert set(doc["static"]) == {"propellers", "points", "CT", "CP"}
+    assert "stall_delay" not in [e["id"] for e in doc["effects"]]
+    bad = subprocess.run([*call, "--off", "nonsense"], capture_output=True, text=True, check=False)
+    assert bad.returncode == 2 and "nonsense" in bad.stderr and "Traceback" not in bad.stderr
+
+
+def test_fixed_reynolds_number_removes_the_dependence_on_speed(tmp_path: Path) -> None:
+    propeller = uiuc.scan_folder(_folder(tmp_path)).propellers[0]
+    incompressible = [e for e in effects.standard() if not e.uses_mach]
+    free = validate.compare(propeller, incompressible)
+    fixed = validate.compare(propeller, incompressible, fixed_re=5e4)
+    assert fixed.CT_bemt[0] == pytest.approx(fixed.CT_bemt[1], rel=1e-9)
+    assert abs(free.CT_bemt[0] / free.CT_bemt[1] - 1) > 1e-3
+
+
+# UIUC volume 1 is what the rule was calibrated on, volume 2 what it is reported on. The bounds are what it reaches; the
+# targets of 6 % (CT), 10 % (CP) and 20 % (90th percentile of CT) are met on volume 1 at rest and missed on volume 2: see
+# reports/validation.
+@pytest.mark.parametrize(
+    ("volume", "static", "forward"),
+    [("volume-1", (0.040, 0.115, 0.055), (0.075, 0.25, 0.060)), ("volume-2", (0.11, 0.30, 0.13), (0.105, 0.42, 0.135))],
+)
+def test_uiuc(shared_data: Path, volume: str, static: tuple[float, ...], forward: tuple[float, ...]) -> None:
+    doc = validate.validate(shared_data / "uiuc" / volume)
+    assert doc["unconverged"] == 0 and not doc["faults"]
+    for kind, bound in (("static", static), ("forward", forward)):
+        assert doc[kind]["CT"]["median_abs"] < bound[0]
+        assert doc[kind]["CT"]["p90_abs"] < bound[1]
+        assert doc[kind]["CP"]["median_abs"] < bound[2]
+
+
+def test_rule_is_one_table_for_small_and_one_for_large_reynolds_numbers() -> None:
+    from bemt.polars import DEFAULT_RE
+    from bemt.polars_neuralfoil import neuralfoil_polar
+
+    shape = section_rule.airfoil(section_rule.sections()[0])
+    rule = section_rule.polar(shape)
+    small = neuralfoil_polar(shape, n_crit=section_rule.N_CRIT)
+    large = neuralfoil_polar(shape, n_crit=section_rule.N_CRIT_LARGE)
+    low, high = DEFAULT_RE < section_rule.SMALL_RE, DEFAULT_RE > 2 * section_rule.SMALL_RE
+    np.testing.assert_allclose(rule.cd[:, low], section_rule.DRAG_LEVEL * small.cd[:, low])
+    np.testing.assert_allclose(rule.cl[:, high], large.cl[:, high])
+
