@@ -84,7 +84,7 @@ def _stack(typingctx, stamp):
 def _evaluate(element, lookup, w, k, tab, g, fx):
     """One residual of lane k, one bracketed Newton step; returns the size of the step."""
     phi = w[_PHI + k]
-    res, slope, cl, cd, dcl, dcd, F, X, dX, s, c = element(
+    res, slope, cl, cd, dcl, dcd, F, dF, X, dX, s, c = element(
         lookup, phi, w[_UT + k], w[_UP + k], w[_IUP + k], w[_BETA + k], w[_SG4 + k], w[_TIP + k], w[_HUB + k],
         w[_LRE + k], np.int32(w[_BASE + k]), tab, g, fx,
     )  # fmt: skip
@@ -97,6 +97,7 @@ def _evaluate(element, lookup, w, k, tab, g, fx):
     good = slope > 0.0 and new >= lo and new <= hi and (2.0 * small < w[_STEP + k] or small < 1e-12)
     d = d if good else 0.5 * (lo + hi) - phi
     d = 0.0 if res == 0.0 else d
+    d = d if abs(res) < 1e300 else math.nan
     size = abs(d)
     w[_LO + k] = lo
     w[_HI + k] = hi
@@ -105,7 +106,7 @@ def _evaluate(element, lookup, w, k, tab, g, fx):
     # carried along the last step; the error is of its second order
     w[_CL + k] = cl + dcl * d
     w[_CD + k] = cd + dcd * d
-    w[_F + k] = F
+    w[_F + k] = F + dF * d
     w[_X + k] = X + dX * d
     w[_S + k] = s + c * d
     w[_C + k] = c - s * d
@@ -118,10 +119,10 @@ def _finish(element, lookup, w, k, tab, g, fx):
     """Finish one lane alone; returns its status."""
     for _ in range(MAX_SCALAR):
         size = _evaluate(element, lookup, w, k, tab, g, fx)
-        if size < 1e-13:
+        if not (size >= 1e-13):
             break
-    if not (size < 1e-11 and abs(w[_CL + k]) < 1e30):
-        return NOT_FINITE if not (abs(w[_G + k]) < 1e30) else NOT_CONVERGED
+    if not (size < 1e-11):
+        return NOT_CONVERGED if size >= 1e-11 else NOT_FINITE
     scale = w[_UT + k] + abs(w[_UP + k]) if fx[N_DUCTED] == 0.0 else 1.0
     return JUMP if abs(w[_G + k]) > 1e-5 * scale else OK
 

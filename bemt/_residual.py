@@ -207,7 +207,7 @@ def open_rotor(lookup, phi, UT, UP, i_UP, beta, sg4, tip, hub, lre0, base, tab, 
     Returns
     -------
     tuple of float
-        g, dg/dphi [m/s], cl, cd, their total derivatives with phi, F, F M and its derivative, sin(phi), cos(phi).
+        g, dg/dphi [m/s], cl, cd and their derivatives with phi, F and its, F M and its, sin(phi), cos(phi).
     """
     s, c = sincos(phi)
     sa = abs(s)
@@ -227,8 +227,9 @@ def open_rotor(lookup, phi, UT, UP, i_UP, beta, sg4, tip, hub, lre0, base, tab, 
     # Prandtl: u = u0 Y^(1/4), Y = 1 / sin^2 of the sheet angle at the disk, or tan(phi_w) = tan(phi) q^1.5 behind it
     ratio = UP * i_w
     q = 2.0 - ratio
-    dq = ratio * dw0 * i_w if (q > 0.3 and q < 2.0) else 0.0
-    q = q if q < 2.0 else 2.0
+    dq = ratio * dw0 * i_w if (q > 0.3 and q < 3.0) else 0.0
+    # 3 where descent leaves momentum theory (y = -1), 0.3 where the turbulent windmill does (y = 0.6)
+    q = q if q < 3.0 else 3.0
     q = q if q > 0.3 else 0.3
     far = fx[N_FAR] > 0.0
     q2s = q * q * ss
@@ -264,12 +265,12 @@ def open_rotor(lookup, phi, UT, UP, i_UP, beta, sg4, tip, hub, lre0, base, tab, 
     dFM = dF * M + F * dM
     res = FM * across - sg4 * (cn * UT + ct * ctUP)
     slope = dFM * across + FM * along - sg4 * (dcn * UT + dct * ctUP)
-    return res, slope, cl, cd, dcl, dcd, F, FM, dFM, s, c
+    return res, slope, cl, cd, dcl, dcd, F, dF, FM, dFM, s, c
 
 
 @inlined
 def ducted_rotor(lookup, phi, UT, UP, i_UP, beta, sg4, tip, hub, lre0, base, tab, g, fx):
-    """Residual of a ducted annulus over UT; parameters as :func:`open_rotor`, and t is returned in the place of F M."""
+    """Residual of a ducted annulus over UT; parameters as :func:`open_rotor`, t in the place of F M."""
     s, c = sincos(phi)
     sa = abs(s)
     sa = sa if sa > _EPS else _EPS
@@ -330,4 +331,4 @@ def ducted_rotor(lookup, phi, UT, UP, i_UP, beta, sg4, tip, hub, lre0, base, tab
     low = t < 1e-3
     res = sign if low else res
     slope = 0.0 if low else slope
-    return res, slope, cl, cd, dcl, dcd, F, t, dt, s, c
+    return res, slope, cl, cd, dcl, dcd, F, dF, t, dt, s, c

@@ -19,7 +19,8 @@ __all__ = ["build_parser", "main"]
 
 EXIT_INTERRUPTED = 130
 
-_MODULES = {"sweep": "bemt.sweep", "validate": "bemt.validate", "reproduce": "bemt.reproduce", "bench": "bemt.bench"}
+_MODULES = {"sweep": "bemt.sweep", "validate": "bemt.validate", "reproduce": "bemt.reproduce", "bench": "bemt.bench",
+            "import": "bemt.import_files"}  # fmt: skip
 
 
 def _positive(text: str) -> int:
@@ -92,6 +93,21 @@ def build_parser() -> argparse.ArgumentParser:
     bench.add_argument("--json", action="store_true", help="print one JSON document (bemt.bench/1)")
     bench.add_argument("--quick", action="store_true", help="fewer repetitions")
     bench.add_argument("--work", metavar="DIR", help="time the work in this folder instead of the shipped one")
+
+    bring = commands.add_parser("import", help="read results of CFD, benches and vendors: means, drift, warnings")
+    bring.add_argument("files", nargs="+", metavar="FILE", help="files, or folders that a reader takes whole")
+    bring.add_argument("--json", action="store_true", help="print one JSON document (bemt.import/1)")
+    bring.add_argument("--format", metavar="NAME", help="reader to use (default: found by content)")
+    speed = bring.add_mutually_exclusive_group()
+    speed.add_argument("--rpm", type=float, metavar="N", help="speed, for averages over whole revolutions [rev/min]")
+    speed.add_argument("--period", type=float, metavar="S", help="duration of a revolution [s]")
+    bring.add_argument("--revolutions", type=_positive, metavar="N", help="average the last N (default 4, or half)")
+    bring.add_argument("--sign", type=int, choices=(1, -1), default=1, help="-1 turns the loads round (default 1)")
+    sector = "the model is one of N equal sectors: loads times N (default 1)"
+    bring.add_argument("--sector", type=_positive, default=1, metavar="N", help=sector)
+    bring.add_argument("--zones", nargs="+", metavar="ZONE", help="add up the loads of these zones")
+    loads = "channel that --sign and --sector apply to; repeatable (default: all in N or Nm)"
+    bring.add_argument("--load", action="append", metavar="NAME", help=loads)
     return parser
 
 

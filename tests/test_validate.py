@@ -83,8 +83,8 @@ def test_fixed_reynolds_number_removes_the_dependence_on_speed(tmp_path: Path) -
     assert abs(free.CT_bemt[0] / free.CT_bemt[1] - 1) > 1e-3
 
 
-# UIUC volume 1 is what the rule was calibrated on, volume 2 what it is reported on. The bounds are what it reaches; the
-# targets of 6 % (CT), 10 % (CP) and 20 % (90th percentile of CT) are met on volume 1 at rest and missed on volume 2: see
+# UIUC volume 1 is what the rule was calibrated on, volume 2 what it is reported on. The bounds are what it reaches: the
+# targets of 6 % (CT), 10 % (CP) and 20 % (90th percentile of CT) are met on volume 1 at rest, missed on volume 2; see
 # reports/validation.
 @pytest.mark.parametrize(
     ("volume", "static", "forward"),

@@ -5,7 +5,8 @@ An importer is a module of this package (its name does not start with ``_``) tha
 * ``KIND`` : str, the name used in ``format = "..."``;
 * ``sniff(head) -> bool`` : True when the head of a file (:data:`HEAD_BYTES` bytes, or text) is of this format;
 * ``read(path) -> object`` : the whole file, or :class:`bemt.errors.InputError` with all its faults;
-* optionally ``sniff_folder(path) -> bool`` : True when ``read`` also takes that folder.
+* optionally ``sniff_folder(path) -> bool`` : True when ``read`` also takes that folder;
+* optionally ``FALLBACK = True`` : its claim counts only when no other importer claims the file.
 
 The extension of a file decides nothing. When two sniffers claim a file, that is an error that asks for ``format =``.
 """
@@ -130,7 +131,8 @@ def number(token: str) -> float | None:
     Returns
     -------
     float or None
-        The value, in the unit of the column; None when the text is not a finite number (``nan``, ``1,5``, ``0.34-NaN``, ``1_000``).
+        The value, in the unit of the column; None when the text is not a finite number (``nan``, ``1,5``, ``0.34-NaN``,
+        ``1_000``).
 
     Examples
     --------
@@ -203,6 +205,11 @@ def detect(path: str | os.PathLike[str]) -> str:
             fault = Fault(name, "", error.strerror or str(error), "a readable file or folder", "Check the path")
             raise InputError(fault) from error
         kinds = [k for k, m in known.items() if m.sniff(head)]
+        particular = [k for k in kinds if not getattr(known[k], "FALLBACK", False)]
+        kinds = particular or kinds
+        if b"\0" in head and not kinds:
+            fault = Fault(name, "", "binary data (NUL bytes)", "a text file", "Export the data as plain text (CSV)")
+            raise InputError(fault)
     if len(kinds) == 1:
         return kinds[0]
     if not kinds:

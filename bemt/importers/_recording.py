@@ -1,8 +1,7 @@
-"""What importers of recordings share: splitting text into cells, units in headings, rows that need a flag.
+"""What importers of recordings share: splitting text into cells, and rows that need a flag.
 
 Nothing is dropped: every line below the heading becomes a row or a fault, every cell a number, a text, or NaN with a
-flag on its row. Units come from the heading alone; a heading without one, or with one that has two meanings (``g``),
-gives a channel of unit "" and a warning.
+flag on its row. Headings are read in :mod:`bemt.importers._headings`.
 """
 
 from __future__ import annotations
@@ -19,180 +18,20 @@ from bemt import units
 from bemt.errors import Fault, InputError
 from bemt.imported import Channel, Imported
 from bemt.importers import SourceText, number
+from bemt.importers._headings import Heading, slug, unit_of
 
-__all__ = ["Builder", "Heading", "Table", "column_numbers", "heading", "some", "split_table", "spikes", "unit_of"]
+__all__ = [
+    "Builder", "Table", "column_numbers", "find_delimiter", "slip", "some", "spikes", "split_line", "split_table",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 NO_VALUE = frozenset({"", "nan", "na", "n/a", "-", "--", "null", "none"})
 """Cells that say "no value", in lower case."""
 DELIMITERS = (";", "\t", ",", "|")
 MAX_FAULTS = 20
+_WITH_UNIT = re.compile(r"[+-]?[\d.]+\s*([^\W\d][\w/·]{0,6}|%)")
 BAD_SHARE = 0.1
 """Share of cells that are no numbers from which a column is text."""
-
-_SAME = {
-    "sec": "s", "seconds": "s", "msec": "ms", "rev/min": "rpm", "1/min": "rpm", "min-1": "rpm", "min^-1": "rpm",
-    "r/min": "rpm", "u/min": "rpm", "rad/s": "rad_s", "rev/s": "rev_s", "rps": "rev_s", "m/s": "m_s", "km/h": "km_h",
-    "kn": "kt", "knots": "kt", "ft/s": "ft_s", "%": "pct", "degc": "C", "celsius": "C", "degf": "F",
-    "kg/m3": "kg_m3", "kg/m^3": "kg_m3", "inch": "in", "inches": "in", "degrees": "deg", "degree": "deg",
-    "volts": "V", "amps": "A", "watts": "W", "pa s": "Pa_s", "m^2": "m2", "n m": "Nm", "n-m": "Nm", "n cm": "Ncm",
-    "n mm": "Nmm", "mn m": "mNm", "kgf cm": "kgf_cm", "gf cm": "gf_cm", "lbf in": "lbf_in", "in lbf": "lbf_in",
-    "in-lbf": "lbf_in", "lbf ft": "lbf_ft", "ft lbf": "lbf_ft", "ft-lbf": "lbf_ft", "ozf in": "ozf_in",
-    "in ozf": "ozf_in", "kgf m": "kgf_m", "microseconds": "us", "rpm": "rpm", "volt": "V", "watt": "W", "amp": "A",
-}  # fmt: skip
-_TWO_MEANINGS = {
-    "g": "gram-force, gram or standard gravity: write gf, or say it in recording.toml",
-    "G": "gram-force or standard gravity: write gf, or say it in recording.toml",
-    "kg": "a mass: write kgf for a force", "lb": "a mass: write lbf for a force", "lbs": "a mass: write lbf for a force",
-    "oz": "a mass: write ozf for a force", "Hz": "revolutions, blades or electrical periods: say it in recording.toml",
-    "kg cm": "a mass times a length: write kgf_cm", "g cm": "a mass times a length: write gf_cm",
-    "G cm": "a mass times a length: write gf_cm", "oz in": "a mass times a length: write ozf_in",
-    "lb in": "a mass times a length: write lbf_in", "in lb": "a mass times a length: write lbf_in",
-    "g/W": "a mass per power: write gf/W", "G/W": "a mass per power: write gf/W",
-}  # fmt: skip
-_COMPOUND = {
-    "gf/W": units.Unit("N_W", "efficacy", units.KGF * 1e-3), "kgf/W": units.Unit("N_W", "efficacy", units.KGF),
-    "N/W": units.Unit("N_W", "efficacy", 1.0), "lbf/W": units.Unit("N_W", "efficacy", units.LBF),
-}  # fmt: skip
-_PURE = re.compile(
-    r"(CT|CP|CQ|KT|KQ|10KQ|CT_total|KT_total|KT_nozzle|KT_propeller|J|eta0?|FM|Re|M_tip|tip_Mach|Mach|throttle|sigma"
-    r"|[A-Za-z]\w*?/[A-Z]|[A-Za-z]\w*_over_[A-Za-z]|[xyz]/c|CT_rotor|CP_rotor|CQ_rotor)"
-)
-_WORDS = {  # heading in lower case -> name and dimension it must have
-    "time": ("time", "time"), "thrust": ("thrust", "force"), "torque": ("torque", "torque"),
-    "voltage": ("voltage", "voltage"), "current": ("current", "current"), "airspeed": ("airspeed", "speed"),
-    "electrical power": ("electrical_power", "power"), "mechanical power": ("mechanical_power", "power"),
-    "throttle": ("throttle", "fraction"), "esc signal": ("pulse_width", "time"), "esc": ("pulse_width", "time"),
-    "motor optical speed": ("optical", "angular_speed"), "motor electrical speed": ("electrical", "angular_speed"),
-    "vibration": ("vibration", "acceleration"), "accx": ("acceleration_x", "acceleration"),
-    "accy": ("acceleration_y", "acceleration"), "accz": ("acceleration_z", "acceleration"),
-}  # fmt: skip
-_GRAVITY = units.Unit("m_s2", "acceleration", units.G0)
-
-
-@dataclass(frozen=True)
-class Heading:
-    """What a heading says of its column: file's ``text``, ``name`` of the channel, ``unit`` (None: unknown), ``doubt``."""
-
-    text: str
-    name: str
-    unit: units.Unit | None
-    doubt: str = ""
-
-    @property
-    def unit_name(self) -> str:
-        """Unit of the channel after conversion: SI, ``rpm``, "-" without dimension, "" unknown."""
-        if self.unit is None:
-            return ""
-        return _si_name(self.unit)
-
-
-def _si_name(unit: units.Unit) -> str:
-    if unit.dimension in ("none", "fraction"):
-        return "-"
-    if unit.dimension in ("efficacy", "acceleration"):
-        return {"efficacy": "N/W", "acceleration": "m/s2"}[unit.dimension]
-    return "rpm" if unit.suffix == "rpm" else units.suffixes(unit.dimension)[0] if unit.suffix != "F" else "K"
-
-
-def unit_of(text: str) -> units.Unit | str:
-    """Unit that a text states.
-
-    Parameters
-    ----------
-    text : str
-        As written in a heading, without brackets.
-
-    Returns
-    -------
-    Unit or str
-        The unit; else why none is taken ("" when the text is no unit at all).
-
-    Examples
-    --------
-    >>> unit_of("N·m").suffix, unit_of("µs").suffix, unit_of("1/min").suffix
-    ('Nm', 'us', 'rpm')
-    >>> unit_of("kg")
-    'a mass: write kgf for a force'
-    """
-    t = re.sub(r"[·⋅*]", " ", text.strip()).replace("µ", "u").replace("μ", "u").replace("³", "3").replace("²", "2")
-    t = " ".join(t.replace("°", "deg").split())
-    if t in _COMPOUND:
-        return _COMPOUND[t]
-    if t in _TWO_MEANINGS:
-        return _TWO_MEANINGS[t]
-    if t in units.UNITS:
-        return units.UNITS[t]
-    key = _SAME.get(t.lower())
-    if key is not None:
-        return units.UNITS[key]
-    return ""
-
-
-def _slug(text: str) -> str:
-    return re.sub(r"_+", "_", re.sub(r"[^\w/]+", "_", text.strip())).strip("_")
-
-
-def heading(text: str) -> Heading:
-    """Read one heading.
-
-    Parameters
-    ----------
-    text : str
-        Such as ``Thrust (gf)``, ``torque_Nm`` or ``RPM``.
-
-    Returns
-    -------
-    Heading
-        With the channel's name, which ends in the SI unit where the unit is known.
-
-    Examples
-    --------
-    >>> heading("Thrust (gf)").name, heading("Q(Nm)").name, heading("RPM").name, heading("chord_mm").name
-    ('thrust_N', 'Q_Nm', 'rpm', 'chord_m')
-    >>> heading("omega").name, heading("omega").unit is None
-    ('omega', True)
-    """
-    text = " ".join(text.split())
-    base, unit, doubt = text, None, ""
-    found = re.fullmatch(r"(.*?)\s*[\(\[]\s*([^()\[\]]*?)\s*[\)\]]\s*", text)
-    if found:
-        stated = unit_of(found[2])
-        if isinstance(stated, units.Unit):
-            base, unit = found[1], stated
-        elif stated:
-            base, doubt = found[1], f"{found[2]!r} is {stated}"
-    core = re.split(r"[(\[=]", base)[0].strip() if unit is None and not doubt else base
-    if unit is None and not doubt:
-        name, suffix = units.split_suffix(core)
-        if suffix is not None and name and suffix.dimension != "mass":
-            base, unit = name, suffix
-        elif suffix is not None and suffix.dimension == "mass" and re.search(r"weight|mass", name, re.IGNORECASE):
-            base, unit = name, suffix
-        elif suffix is not None and suffix.dimension == "mass":
-            doubt = f"{suffix.suffix!r} is {_TWO_MEANINGS[suffix.suffix]}"
-        elif _PURE.fullmatch(core) and ("rotor convention" not in text or core.endswith("_rotor")):
-            base, unit = core, units.Unit("", "none", 1.0)
-        elif "rotor convention" in text and core in ("CT", "CP", "CQ"):
-            base, unit = f"{core}_rotor", units.Unit("", "none", 1.0)
-        elif re.fullmatch(r"rpm(_\w+)?|\w+_rpm", core, re.IGNORECASE):
-            base, unit = core, units.UNITS["rpm"]
-    word = _WORDS.get(base.lower().replace("_", " "))
-    if word and word[1] == "acceleration" and doubt.startswith("'g'"):
-        unit, doubt = _GRAVITY, ""
-    if unit is None:
-        return Heading(text, _slug(text) or "column", None, doubt)
-    if word and word[1] == unit.dimension:
-        base = word[0]
-    if unit.suffix == "rpm":
-        flat = re.sub(r"^(rpm|speed|n)$", "", _slug(base), flags=re.IGNORECASE)
-        flat = re.sub(r"^rpm_|_rpm$", "", flat, flags=re.IGNORECASE)
-        if re.fullmatch(r"e|erpm", flat, re.IGNORECASE):
-            flat = "electrical"
-        return Heading(text, f"{flat}_rpm" if flat else "rpm", unit)
-    si = _si_name(unit)
-    tail = "" if si == "-" else "_" + {"N/W": "N_W", "m/s2": "m_s2"}.get(si, si)
-    return Heading(text, _slug(base) + tail, unit)
 
 
 @dataclass(frozen=True)
@@ -208,12 +47,19 @@ class Table:
     cut: int | None = None  # index of a row that the end of the file cut off
 
 
-def _split(line: str, mark: str) -> list[str]:
+def split_line(line: str, mark: str) -> list[str]:
+    """Cells of one line, quotes taken off."""
     if mark == " ":
         return line.split()
     if '"' in line:
         return [c.strip() for c in next(csv.reader([line], delimiter=mark))]
     return [c.strip() for c in line.split(mark)]
+
+
+def _is_units(cells: Sequence[str]) -> bool:
+    """Whether a line below the headings holds nothing but units."""
+    stated = [unit_of(c.strip("()[]")) for c in cells if c.strip("-()[]")]
+    return bool(stated) and all(isinstance(u, units.Unit) or u for u in stated)
 
 
 def some(items: Iterable[object], limit: int = 5) -> str:
@@ -242,10 +88,26 @@ def some(items: Iterable[object], limit: int = 5) -> str:
 
 
 def find_delimiter(lines: Sequence[str]) -> str:
-    """Delimiter of some lines: one of ``; tab , |`` that the first line has, else blanks."""
-    first = lines[0] if lines else ""
-    plain = re.sub(r'"[^"]*"', "", first)
-    return next((mark for mark in DELIMITERS if mark in plain), " ")
+    """Delimiter of some lines: the first of ``; tab , |`` that all of them have, else blanks.
+
+    Parameters
+    ----------
+    lines : sequence of str
+        The first lines of a table.
+
+    Returns
+    -------
+    str
+        One character.
+
+    Examples
+    --------
+    >>> find_delimiter(["r;mm,x", "1,2"]), find_delimiter(["a;b", "1,5;2,5"]), find_delimiter(["1 2", "3 4"])
+    (',', ';', ' ')
+    """
+    plain = [re.sub(r'"[^"]*"', "", line) for line in lines]
+    everywhere = [mark for mark in DELIMITERS if plain and all(mark in line for line in plain)]
+    return everywhere[0] if everywhere else " "
 
 
 def split_table(source: SourceText, delimiter: str | None = None, header: bool | None = None) -> Table:
@@ -278,7 +140,7 @@ def split_table(source: SourceText, delimiter: str | None = None, header: bool |
     mark = delimiter or find_delimiter([t for _, t in used[:5]])
     if any(len(t) > 100_000 for _, t in used):
         raise InputError(Fault(source.name, "", "a line of more than 100000 characters", "a table of short lines"))
-    split = [(i, _split(t, mark)) for i, t in used]
+    split = [(i, split_line(t, mark)) for i, t in used]
     first = split[0][1]
     if header is None:
         header = not any(number(c) is not None for c in first)
@@ -287,6 +149,13 @@ def split_table(source: SourceText, delimiter: str | None = None, header: bool |
         width -= 1
     if not header:
         width = max((len(c) for _, c in split[:2]), default=width)
+    notes = [f"{comments} comment lines left out"] if comments else []
+    if header and len(split) > 2 and _is_units(split[1][1]):
+        stated = [*split[1][1], *[""] * width]
+        stated = [unit.strip("-()[]") for unit in stated]
+        first = [f"{name} ({unit})" if unit else name for name, unit in zip(first, stated, strict=False)]
+        notes.append(f"line {split[1][0]} holds units")
+        del split[1]
     rows: list[tuple[str, ...]] = []
     faults: list[Fault] = []
     cut = None
@@ -312,7 +181,6 @@ def split_table(source: SourceText, delimiter: str | None = None, header: bool |
         raise InputError(faults)
     if not rows:
         raise InputError(Fault(source.name, "", "no rows", "a heading line and rows of numbers"))
-    notes = [f"{comments} comment lines left out"] if comments else []
     names = tuple(first[:width]) if header else ()
     return Table(source, mark, names, tuple(rows), tuple(i for i, _ in (split[1:] if header else split)),
                  tuple(notes), cut)  # fmt: skip
@@ -413,6 +281,7 @@ class Builder:
     headings: dict[str, str] = field(default_factory=dict)
     faults: list[Fault] = field(default_factory=list)
     unitless: list[str] = field(default_factory=list)
+    empty: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.flags = [[] for _ in self.table.rows]
@@ -430,8 +299,8 @@ class Builder:
         for r in hit:
             self.flags[r].append(what)
         if hit:
-            lines = some(self.line(r) for r in hit)
-            self.warnings.append(f"{what} in {len(hit)} rows (lines {lines}), kept and flagged{why}")
+            where = f"{len(hit)} row{'s' if len(hit) > 1 else ''} (line {some(self.line(r) for r in hit)})"
+            self.warnings.append(f"{what} in {where}, kept and flagged{why}")
 
     def free(self, name: str) -> str:
         """Name that no channel or text has yet."""
@@ -446,7 +315,7 @@ class Builder:
         values, bad, empty = column_numbers(cells, decimal)
         label = head.text or f"column {index + 1}"
         if empty == len(cells):
-            self.warnings.append(f"column {label!r} is empty")
+            self.empty.append(repr(label))
             return ""
         comma = [i for i in bad if re.fullmatch(r"[+-]?\d+,\d*|[+-]?\d{1,3}(,\d{3})*\.\d*", cells[i])]
         if comma and decimal == ".":
@@ -457,19 +326,19 @@ class Builder:
             return ""
         name = self.free(head.name)
         if len(bad) > BAD_SHARE * (len(cells) - empty):
-            name = self.free(_slug(head.text) or head.name)
+            name = self.free(slug(head.text) or head.name)
             self.texts[name] = tuple(cells)
             if len(bad) < len(cells) - empty:
                 self.warnings.append(f"column {label!r} mixes numbers and text: kept as text")
+            elif sum(bool(_WITH_UNIT.fullmatch(cells[i])) for i in bad) > len(bad) / 2:
+                self.warnings.append(f"column {label!r} has units in its cells ({cells[bad[0]][:20]!r}): kept as text")
             return ""
         if bad:
             words = some((f"{cells[i][:20]!r} at {self.line(i)}:{index + 1}" for i in bad), 3)
             self.flag(bad, f"{name}: no number", f": {words}; NaN there")
         if head.unit is None:
             self.unitless.append(f"{label!r}" + (f" ({head.doubt})" if head.doubt else ""))
-        elif head.unit.suffix == "rpm":
-            pass
-        else:
+        elif head.unit.suffix != "rpm":
             values = values * head.unit.factor + head.unit.offset
         if head.name != name:
             self.warnings.append(f"column {label!r} has the name of another column: kept as {name}")
@@ -481,7 +350,7 @@ class Builder:
         """Warn of magnitudes that look like a slip of units; nothing is converted."""
         for name, (low, high, hint) in _PLAUSIBLE.items():
             for key, channel in self.channels.items():
-                if not (key == name or key.endswith("_" + name)) or not channel.unit:
+                if not (key == name or key.endswith("_" + name)) or not channel.unit or "err" in key.split("_"):
                     continue
                 v = np.abs(channel.values[np.isfinite(channel.values)])
                 if v.size and not low <= float(np.max(v)) <= high and float(np.max(v)) > 0.0:
@@ -523,6 +392,8 @@ class Builder:
             self.faults.append(Fault(self.table.source.name, "", f"no column of numbers ({columns})", expected))
         if self.faults:
             raise InputError(self.faults)
+        if self.empty:
+            self.warnings.append(f"no values in {len(self.empty)} columns: {some(self.empty, 8)}")
         if self.unitless:
             hint = "Name units in the headings or in a recording.toml"
             self.warnings.append(f"no unit known, none assumed, for {some(self.unitless, 8)}. {hint}")

@@ -1,0 +1,198 @@
+"""What readers of other rooms return, as the record that ``import`` shows; and names for files that hold no results."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bemt.errors import Fault, InputError
+from bemt.imported import Channel, Imported
+from bemt.importers import uiuc
+from bemt.importers.references import Reference
+from bemt.polars import Polar
+from bemt.series import Series
+from bemt.units import split_suffix
+
+__all__ = ["adapt", "damaged_export", "recognised"]
+
+_KIND = {"apc": "vendor", "uiuc": "bench", "references": "table"}
+_GEOMETRY = ("ApcBlade", "UiucGeometry", "UiucThickness")
+_EXPORT = "Export report files, monitors, force reports or CSV"
+_MARKS: tuple[tuple[bytes, str, str], ...] = (
+    (b"\x89HDF", "HDF5 data (a case, mesh or field file)", _EXPORT),
+    (b"PK\x03\x04", "a zip archive or an Excel workbook", "Unpack it, or save the sheet as CSV"),
+    (b"%PDF", "a PDF document", "Copy the numbers into a CSV"),
+    (b"\x89PNG", "a picture", ""),
+    (b"\xff\xd8\xff", "a picture", ""),
+    (b"(rp (", "solver settings of Fluent (no results)", "Settings hold no results; export the report files"),
+    (b"FoamFile", "an OpenFOAM dictionary or field", "Import postProcessing/*/*/*.dat"),
+    (b"$MeshFormat", "a mesh", _EXPORT),
+    (b"<?xml", "XML", "Export as CSV"),
+    (b"# vtk", "a VTK file", _EXPORT),
+)
+
+
+def recognised(path: str | os.PathLike[str]) -> tuple[str, str] | None:
+    """Say what a file is that no reader takes.
+
+    Parameters
+    ----------
+    path : str or path
+        File.
+
+    Returns
+    -------
+    (got, hint) or None
+        For the message of the refusal; None when the file cannot be read or is not known either.
+    """
+    try:
+        with Path(path).open("rb") as stream:
+            head = stream.read(16384)
+    except OSError:
+        return None
+    if not head.strip():
+        return ("an empty file", "Did the export finish?")
+    for mark, got, hint in _MARKS:
+        if head.lstrip()[: len(mark)] == mark:
+            return (got, hint)
+    if b'(0 "fluent' in head.lower()[:400]:
+        what = "data" if b"Grid size" in head else "case"
+        return (f"a Fluent {what} file (mesh, fields and settings)", _EXPORT)
+    if b"FoamFile" in head[:2000]:
+        return ("an OpenFOAM dictionary or field", "Import postProcessing/*/*/*.dat")
+    if b"\0" in head:
+        return None
+    words = head.decode("latin-1").split()
+    numbers = sum(word.strip("(),;").lstrip("+-").replace(".", "", 1)[:1].isdigit() for word in words)
+    if len(words) > 20 and numbers < 0.2 * len(words):
+        return ("a text without a table of numbers", "")
+    return None
+
+
+_DAMAGED = (
+    (re.compile(rb'^[^"\n,]*"(?:[ \t]+"[^"\n]*")+\)[ \t]*\r?$', re.MULTILINE), "a Fluent report file"),
+    (re.compile(rb'^[^"\n,]*"[ \t]+"[^"\n]*"[ \t]*\r?\n[-+.\d]', re.MULTILINE), "a Fluent monitor"),
+    (re.compile(rb"\(\([-+.\deE ]+\) \([-+.\deE ]+\)"), "an OpenFOAM forces file"),
+    (re.compile(rb"^\(\(xy/key/label", re.MULTILINE), "a Fluent XY plot"),
+)
+
+
+def damaged_export(path: str | os.PathLike[str]) -> str | None:
+    """Say which export a file was, when its body shows it and its head no longer does.
+
+    Parameters
+    ----------
+    path : str or path
+        File that no reader of a particular format takes.
+
+    Returns
+    -------
+    str or None
+        In words; None when it shows no such marks.
+    """
+    with Path(path).open("rb") as stream:
+        head = stream.read(16384)
+    return next((name for mark, name in _DAMAGED if mark.search(head)), None)
+
+
+def _columns(found: Any) -> Iterator[tuple[str, Any]]:
+    """Name and values of the one-dimensional numbers of a record."""
+    for item in fields(found):
+        value = getattr(found, item.name)
+        if isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind == "f":
+            yield item.name, value
+        elif isinstance(value, float):
+            yield item.name, np.array([value])
+
+
+def _channel(name: str, values: Any) -> Channel:
+    array = np.asarray(values, dtype=float)
+    _, unit = split_suffix(name)
+    one = float(array[0]) if array.size == 1 and np.isfinite(array[0]) else None
+    return Channel(array, unit.suffix if unit else "", one, "" if one is None else "one value")
+
+
+def adapt(found: Any, form: str, name: str) -> Imported:
+    """Make the record of whatever an importer returned.
+
+    Parameters
+    ----------
+    found : object
+        Imported, Series, Polar, list of Reference or UiucPropeller, or a record of arrays.
+    form : str
+        KIND of the importer.
+    name : str
+        File, for faults.
+
+    Returns
+    -------
+    Imported
+        Means only for single values: a mean over operating points or stations says nothing.
+
+    Raises
+    ------
+    InputError
+        When there is nothing that can be shown.
+
+    Examples
+    --------
+    >>> record = adapt(Series("bench", "stand", {"rpm": [6000.0, 7000.0], "thrust_N": [10.0, 13.5]}), "csv", "a.csv")
+    >>> record.kind, record.rows, record.channels["thrust_N"].unit
+    ('bench', 2, 'N')
+    """
+    if isinstance(found, Imported):
+        return found
+    if isinstance(found, Series):
+        channels = {key: _channel(key, found[key]) for key in found.values}
+        flags = sorted({flag for row in found.flags for flag in row})
+        return Imported(form, found.kind, len(found), channels, tuple(flags), _texts(found.provenance, name))
+    if isinstance(found, Polar):
+        channels = {"alpha_rad": _channel("alpha_rad", found.alpha), "Re": _channel("Re", found.Re)}
+        channels |= {"M": _channel("M", found.M)}
+        channels |= {key: Channel(getattr(found, key).ravel()) for key in ("cl", "cd")}
+        return Imported(form, "polar", len(found.alpha), channels, found.notes, {"file": name, "source": found.source})
+    if isinstance(found, (list, tuple)) and found and all(isinstance(item, Reference) for item in found):
+        return _references(list(found), form, name)
+    if isinstance(found, (list, tuple)) and found and all(isinstance(item, uiuc.UiucPropeller) for item in found):
+        return _propellers(list(found), form, name)
+    if is_dataclass(found) and not isinstance(found, type):
+        columns = dict(_columns(found))
+        rows = max((len(values) for values in columns.values()), default=0)
+        if rows:
+            kind = "geometry" if type(found).__name__ in _GEOMETRY else _KIND.get(form, "table")
+            notes = tuple(str(note) for note in getattr(found, "notes", ()) or ())
+            channels = {key: _channel(key, values) for key, values in columns.items()}
+            return Imported(form, kind, rows, channels, notes, _texts(getattr(found, "provenance", {}), name))
+    raise InputError(Fault(name, "", f"a {type(found).__name__} without numbers", "something that can be shown"))
+
+
+def _texts(provenance: Mapping[str, Any], name: str) -> dict[str, str]:
+    return {"file": name, **{str(k): str(v) for k, v in provenance.items() if isinstance(v, (str, int, float))}}
+
+
+def _references(found: list[Reference], form: str, name: str) -> Imported:
+    columns: dict[str, list[float]] = {}
+    for item in found:
+        columns.setdefault(item.channel, []).append(item.value)
+    kinds = {item.kind for item in found}
+    kind = kinds.pop() if len(kinds) == 1 else "table"
+    channels = {key: _channel(key, values) for key, values in columns.items()}
+    return Imported(form, kind, len(found), channels, (), {"file": name, "sha256": found[0].sha256})
+
+
+def _propellers(found: list[uiuc.UiucPropeller], form: str, name: str) -> Imported:
+    runs = [uiuc.to_series(item) for item in found if item.statics or item.lines]
+    bare = len(found) - len(runs)
+    notes = [f"{len(found)} propellers"] + ([f"{bare} of them with geometry only"] if bare else [])
+    columns = {key: np.concatenate([run[key] for run in runs]) for key in runs[0].values} if runs else {}
+    if not columns:
+        columns = {"diameter_in": np.array([item.diameter_in for item in found])}
+    rows = len(next(iter(columns.values())))
+    channels = {key: _channel(key, values) for key, values in columns.items()}
+    return Imported(form, "bench", rows, channels, tuple(notes), {"file": name})

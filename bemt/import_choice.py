@@ -1,0 +1,181 @@
+"""What only the user knows of a file of results - speed, sign, sector, zones - applied to its record, never guessed."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bemt.averaging import Average, keep_last, revolution_average
+from bemt.errors import Fault, InputError
+from bemt.imported import Channel, Imported
+
+__all__ = ["Choice", "averaged", "chosen"]
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What only the user knows.
+
+    Parameters
+    ----------
+    period : float or None
+        Duration of a revolution [s]; None: no average over revolutions.
+    revolutions : int or None
+        How many; None takes 4, or half of the run.
+    sign : int
+        +1 or -1 for the loads.
+    sector : int
+        Number of equal sectors of which the model is one; loads are multiplied by it.
+    zones : tuple of str
+        Zones whose loads are added up; empty: none are.
+    loads : tuple of str
+        Channels that sign and sector apply to; empty: all in N or Nm.
+    """
+
+    period: float | None = None
+    revolutions: int | None = None
+    sign: int = 1
+    sector: int = 1
+    zones: tuple[str, ...] = ()
+    loads: tuple[str, ...] = ()
+
+
+def averaged(record: Imported, period: float, revolutions: int | None = None) -> Imported:
+    """Replace the means of a history by those over its last whole revolutions.
+
+    Parameters
+    ----------
+    record : Imported
+        A history by time; others are returned with a warning.
+    period : float
+        Duration of a revolution. [s]
+    revolutions : int or None
+        How many, from the end; None takes 4, or half of the run.
+
+    Returns
+    -------
+    Imported
+        Means over revolutions; None with a warning where there cannot be one.
+
+    Examples
+    --------
+    >>> t = np.arange(1, 401) * 0.01
+    >>> r = Imported("x", "cfd", 400, {"time_s": Channel(t, "s"), "q": Channel(2 + np.sin(2 * np.pi * t))},
+    ...              provenance={"clock": "time", "time_channel": "time_s", "clock_channels": "time_s"})
+    >>> c = averaged(r, 1.0).channels["q"]
+    >>> round(c.mean, 9), c.averaged_over
+    (2.0, 'last 2 revolutions (2 to 4 s, 200 rows)')
+    """
+    name = record.provenance.get("time_channel", "")
+    own = set(record.provenance.get("clock_channels", "").split("\t"))
+    if name not in record.channels:
+        note = "no column of time: the speed of rotation is not used"
+        return replace(record, warnings=(*record.warnings, note))
+    time = record.channels[name].values
+    index, notes = keep_last(time, name)
+    problems: dict[str, list[str]] = {}
+    scatter: dict[str, float] = {}
+    channels: dict[str, Channel] = {}
+    for key, channel in record.channels.items():
+        if key in own or channel.values.shape != time.shape or (channel.mean is None and channel.unit == "s"):
+            channels[key] = channel
+            continue
+        average = revolution_average(time[index], channel.values[index], period, revolutions)
+        turns = average.per_revolution
+        if average.mean and turns and max(turns) - min(turns) > 0.02 * abs(average.mean):
+            scatter[key] = (max(turns) - min(turns)) / abs(average.mean)
+        if average.problem:
+            problems.setdefault(average.problem, []).append(key)
+        channels[key] = _channel(channel, average)
+    more = [f"{'no mean' if 'only' not in text else 'doubtful mean'} of {', '.join(keys)}: {text}"
+            for text, keys in problems.items()]  # fmt: skip
+    if scatter:
+        worst = ", ".join(f"{key} {value:.2%}" for key, value in list(scatter.items())[:6])
+        more.append(f"means of single revolutions differ: {worst}")
+    return replace(record, channels=channels, warnings=(*record.warnings, *notes, *more))
+
+
+def _channel(channel: Channel, average: Average) -> Channel:
+    if average.mean is None:
+        return Channel(channel.values, channel.unit)
+    turns = f"{average.revolutions} revolution" + ("s" if average.revolutions > 1 else "")
+    over = f"last {turns} ({average.start:.6g} to {average.end:.6g} s, {average.rows} rows)"
+    return Channel(channel.values, channel.unit, average.mean, over, average.drift)
+
+
+def chosen(record: Imported, choice: Choice) -> Imported:
+    """Apply zones, sector and sign, in this order.
+
+    Parameters
+    ----------
+    record : Imported
+        A record whose zones are in the names of its channels, ``name(zone)``.
+    choice : Choice
+        What the user said.
+
+    Returns
+    -------
+    Imported
+        With channels ``name(zone+zone)`` for the sums, and loads times sector and sign.
+
+    Raises
+    ------
+    InputError
+        When a zone or a load does not exist, or when sign or sector find no load.
+    """
+    channels = dict(record.channels)
+    notes = list(record.warnings)
+    file = record.provenance.get("file", "")
+    if choice.zones:
+        channels |= _zone_sums(record, choice.zones, file)
+    factor = choice.sign * choice.sector
+    if factor != 1:
+        absent = [name for name in choice.loads if name not in channels]
+        if absent:
+            hint = f"Channels: {', '.join(list(channels)[:12])}"
+            raise InputError(Fault(file, "--load", ", ".join(absent), "names of channels", hint))
+        loads = choice.loads or tuple(n for n, c in channels.items() if c.unit in ("N", "Nm"))
+        if not loads:
+            hint = "Name them: --load NAME"
+            raise InputError(Fault(file, "--sign, --sector", "no channel in N or Nm", "loads to apply them to", hint))
+        for name in loads:
+            old = channels[name]
+            mean = None if old.mean is None else old.mean * factor
+            over = f"{old.averaged_over}, times {factor}" if old.averaged_over else ""
+            channels[name] = Channel(old.values * factor, old.unit, mean, over, old.drift)
+        text = f"sign {choice.sign:+d}, {choice.sector} sectors, as told: {len(loads)} channels times {factor}"
+        notes.append(text + ("; holds only for axisymmetric flow" if choice.sector > 1 else ""))
+    return replace(record, channels=channels, warnings=tuple(notes))
+
+
+def _zone_sums(record: Imported, zones: Sequence[str], file: str) -> dict[str, Channel]:
+    groups: dict[str, dict[str, Channel]] = {}
+    for name, channel in record.channels.items():
+        match = re.fullmatch(r"(.+?)\s*\(([^()]*)\)", name)
+        if match and "center_of_pressure" not in name and "y_plus" not in name:
+            groups.setdefault(match[1], {})[match[2]] = channel
+    known = list(dict.fromkeys(zone for group in groups.values() for zone in group))
+    absent = [zone for zone in zones if zone not in known]
+    if absent:
+        hint = f"Zones: {', '.join(known)}" if known else "This file does not tell zones apart"
+        raise InputError(Fault(file, "--zones", ", ".join(absent), "zones of the file", hint))
+    if "Net" in zones and len(zones) > 1:
+        raise InputError(Fault(file, "--zones", "Net beside other zones", "Net alone, or zones", "Net holds them all"))
+    out = {}
+    for base, group in groups.items():
+        parts = [group[zone] for zone in zones if zone in group]
+        if len(parts) != len(zones) or len(zones) < 2 or len({p.values.shape for p in parts}) != 1:
+            continue
+        means = [p.mean for p in parts if p.mean is not None]
+        mean = math.fsum(means) if len(means) == len(parts) else None
+        over = f"{parts[0].averaged_over}, sum of {len(parts)} zones" if mean is not None else ""
+        drift = None
+        if mean and all(p.drift is not None for p in parts):
+            drift = sum((p.drift or 0.0) * abs(p.mean or 0.0) for p in parts) / abs(mean)  # drift is change / |mean|
+        values = np.sum([p.values for p in parts], axis=0)
+        out[f"{base}({'+'.join(zones)})"] = Channel(values, parts[0].unit, mean, over, drift)
+    return out

@@ -1,0 +1,263 @@
+r"""``python -m bemt import``: what is in a file of results, with honest means, in one table or one JSON document.
+
+Nothing is guessed. A mean over revolutions needs the speed (``--rpm`` or ``--period``); the sign, the sector of a
+one-blade model and the zones that count are the user's (``--sign``, ``--sector``, ``--zones``, ``--load``), and
+appear in ``averaged_over`` and in the warnings. Files are never joined: a restart file is named as such.
+
+Schema ``bemt.import/1``: ``files`` is a list of ``path``, ``format``, ``kind``, ``rows``, ``channels`` (name to
+``unit``, ``mean``, ``averaged_over``, ``drift``), ``warnings``, ``error`` (null when the file was read).
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bemt import importers, tables
+from bemt.averaging import relation
+from bemt.errors import EXIT_INPUT, EXIT_OK, Fault, InputError
+from bemt.import_adapt import adapt, damaged_export, recognised
+from bemt.import_choice import Choice, averaged, chosen
+from bemt.imported import Channel, Imported
+
+__all__ = ["SCHEMA", "Choice", "averaged", "chosen", "document", "import_file", "run"]
+
+SCHEMA = "bemt.import/1"
+SETTLED = 0.01
+"""Drift above which a mean is called unsettled."""
+_RESTART = re.compile(r"(.+?)((?:_\d+)+)(\.[^.]*)?(?:\.gz)?")
+
+
+def import_file(path: str | os.PathLike[str], format: str | None = None, choice: Choice | None = None) -> Imported:  # noqa: A002
+    """Read one file or folder of any known format.
+
+    Parameters
+    ----------
+    path : str or path
+        File or folder.
+    format : str or None
+        Kind of the importer; None finds it by content.
+    choice : Choice or None
+        Speed, sign, sector, zones.
+
+    Returns
+    -------
+    Imported
+        The record.
+
+    Raises
+    ------
+    InputError
+        When it is refused, with the reason.
+    """
+    choice = choice or Choice()
+    name = os.fspath(path)
+    try:
+        kind = importers.detect(path) if format is None else format
+    except InputError as error:
+        told = recognised(path)
+        if told is None:
+            raise
+        raise InputError(Fault(name, "", told[0], "results as a table of text", told[1])) from error
+    if format is None and getattr(importers.importers()[kind], "FALLBACK", False):
+        damaged = damaged_export(path)
+        if damaged:
+            hint = "Its head is cut or altered; export it again, or give --format"
+            raise InputError(Fault(name, "", f"what looks like {damaged}", "a whole file", hint))
+    record = adapt(importers.read(path, kind), kind, name)
+    if choice.period is not None:
+        record = averaged(record, choice.period, choice.revolutions)
+    elif record.provenance.get("clock") == "time":
+        note = "mean over all rows, start-up included: give --rpm or --period for whole revolutions"
+        record = replace(record, warnings=(*record.warnings, note))
+    record = chosen(record, choice)
+    return replace(record, warnings=(*record.warnings, *_unsettled(record)))
+
+
+def _unsettled(record: Imported) -> list[str]:
+    """One line for the loads whose mean still moves; small ones beside large ones of the same unit do not count."""
+    if record.provenance.get("clock") not in ("time", "iteration"):
+        return []
+    top: dict[str, float] = {}
+    for channel in record.channels.values():
+        if channel.mean is not None and channel.unit:
+            top[channel.unit] = max(top.get(channel.unit, 0.0), abs(channel.mean))
+    moving = [
+        f"{name} {channel.drift:+.2%}"
+        for name, channel in record.channels.items()
+        if channel.drift is not None and channel.mean is not None and abs(channel.drift) > SETTLED
+        and not name.lower().startswith(("rms[", "res_")) and abs(channel.mean) >= 0.05 * top.get(channel.unit, 0.0)
+    ]  # fmt: skip
+    more = f" and {len(moving) - 6} more" if len(moving) > 6 else ""
+    return [f"not settled (drift over the averaged part): {', '.join(moving[:6])}{more}"] if moving else []
+
+
+def _restart_notes(paths: Sequence[str], records: Mapping[str, Imported]) -> dict[str, list[str]]:
+    """Say of every restart file what it belongs to, and that it was not joined."""
+    notes: dict[str, list[str]] = {}
+    for path in paths:
+        record = records.get(path)
+        if record is None or record.provenance.get("clock") not in ("time", "iteration"):
+            continue
+        for other in _earlier(Path(path), paths, records):
+            text = f"beside {other}: not joined"
+            if other in records:
+                how = relation(_clock(records[other]), _clock(record))
+                text = f"restart of {other} ({how}): not joined"
+                if how == "other clock":
+                    text += "; the same steps mean other times"
+            notes.setdefault(path, []).append(text)
+    return notes
+
+
+def _earlier(path: Path, paths: Sequence[str], records: Mapping[str, Imported]) -> list[str]:
+    match = _RESTART.fullmatch(path.name)
+    if match and records[str(path)].format == "fluent_report":
+        base = path.with_name(match[1] + (match[3] or ""))
+        known = [p for p in paths if Path(p) == base]
+        return known or ([str(base)] if base.is_file() else [])
+    if records[str(path)].format == "openfoam_forces":
+        try:
+            start = float(path.parent.name)
+        except ValueError:
+            return []
+        return [p for p in paths if p != str(path) and p in records and Path(p).name == path.name
+                and Path(p).parent.parent == path.parent.parent and _before(Path(p).parent.name, start)]  # fmt: skip
+    return []
+
+
+def _before(name: str, start: float) -> bool:
+    try:
+        return float(name) < start
+    except ValueError:
+        return False
+
+
+def _clock(record: Imported) -> tuple[Any, Any]:
+    time = record.provenance.get("time_channel", "")
+    names = [n for n in record.provenance.get("clock_channels", "").split("\t") if n in record.channels and n != time]
+    times = record.channels[time].values if time in record.channels else np.empty(0)
+    return (record.channels[names[0]].values if names else times), times
+
+
+def document(
+    paths: Iterable[str | os.PathLike[str]], format: str | None = None, choice: Choice | None = None  # noqa: A002
+) -> dict[str, Any]:
+    """Read files and give the document ``bemt.import/1``.
+
+    Parameters
+    ----------
+    paths : iterable of str or path
+        Files or folders; each is read for itself.
+    format : str or None
+        Kind of the importer for all; None finds each by content.
+    choice : Choice or None
+        Speed, sign, sector, zones.
+
+    Returns
+    -------
+    dict
+        Fit for JSON; a refused file has ``error`` and no channels.
+    """
+    names = [os.fspath(path) for path in paths]
+    records: dict[str, Imported] = {}
+    errors: dict[str, str] = {}
+    for name in names:
+        try:
+            records[name] = import_file(name, format, choice)
+        except ValueError as error:  # InputError, or what a record refuses to hold
+            errors[name] = str(error) or type(error).__name__
+    notes = _restart_notes(names, records)
+    files = []
+    for name in names:
+        record = records.get(name)
+        files.append(
+            {
+                "path": name,
+                "format": record.format if record else format,
+                "kind": record.kind if record else None,
+                "rows": record.rows if record else 0,
+                "channels": {k: _shown(c) for k, c in record.channels.items()} if record else {},
+                "warnings": [*(record.warnings if record else ()), *notes.get(name, ())],
+                "error": errors.get(name),
+            }
+        )
+    return {"schema": SCHEMA, "files": files}
+
+
+def _shown(channel: Channel) -> dict[str, Any]:
+    mean = channel.mean if channel.mean is not None and math.isfinite(channel.mean) else None
+    over = channel.averaged_over if mean is not None else ""
+    return {"unit": channel.unit, "mean": mean, "averaged_over": over, "drift": channel.drift}
+
+
+def _text(file: Mapping[str, Any]) -> str:
+    if file["error"] is not None:
+        return f"{file['path']}: refused\n  " + str(file["error"]).replace("\n", "\n  ")
+    lines = [f"{file['path']}: {file['format']} ({file['kind']}), {file['rows']} rows"]
+    rows = []
+    for name, channel in file["channels"].items():
+        drift = "-" if channel["drift"] is None else f"{channel['drift']:+.2%}"
+        mean = tables.number_text(channel["mean"], 6)
+        rows.append([name, channel["unit"] or "-", mean, drift, channel["averaged_over"] or "-"])
+    lines.append(tables.text_table(["channel", "unit", "mean", "drift", "averaged over"], rows, (0, 1, 4), "  "))
+    return "\n".join([*lines, *(f"  ! {text}" for text in file["warnings"])])
+
+
+def _choice(args: argparse.Namespace) -> Choice:
+    faults = []
+    rpm, period = getattr(args, "rpm", None), getattr(args, "period", None)
+    if rpm is not None and not (math.isfinite(rpm) and 0.01 <= rpm <= 1e6):
+        faults.append(Fault("", "--rpm", f"{rpm:g}", "a number from 0.01 to 1e6 rev/min"))
+    if period is not None and not (math.isfinite(period) and 6e-5 <= period <= 6e3):
+        faults.append(Fault("", "--period", f"{period:g}", "a time from 6e-5 to 6000 s"))
+    if rpm is not None and period is not None:
+        faults.append(Fault("", "--rpm, --period", "both", "one of them"))
+    revolutions = getattr(args, "revolutions", None)
+    if revolutions is not None and not 1 <= revolutions <= 10**6:
+        faults.append(Fault("", "--revolutions", str(revolutions), "a whole number of 1 or more"))
+    if revolutions is not None and rpm is None and period is None:
+        faults.append(Fault("", "--revolutions", "no speed", "--rpm or --period beside it"))
+    sign, sector = getattr(args, "sign", 1), getattr(args, "sector", 1)
+    if sign not in (1, -1):
+        faults.append(Fault("", "--sign", str(sign), "+1 or -1"))
+    if not 1 <= sector <= 100:
+        faults.append(Fault("", "--sector", str(sector), "the number of equal sectors, 1 to 100"))
+    if faults:
+        raise InputError(faults)
+    zones, loads = (tuple(getattr(args, key, None) or ()) for key in ("zones", "load"))
+    return Choice(60.0 / rpm if rpm is not None else period, revolutions, sign, sector, zones, loads)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the subcommand.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        ``files``, ``json``, ``format``, ``rpm`` or ``period``, ``revolutions``, ``sign``, ``sector``, ``zones``,
+        ``load``.
+
+    Returns
+    -------
+    int
+        0 when every file was read, 2 when one was refused (the others are shown).
+    """
+    choice = _choice(args)
+    form = getattr(args, "format", None)
+    if form is not None and form not in importers.importers():
+        raise InputError(Fault("", "--format", repr(form), f"one of {', '.join(importers.importers())}"))
+    found = document(args.files, form, choice)
+    if args.json:
+        print(tables.json_text(found), end="")
+    else:
+        print("\n\n".join(_text(file) for file in found["files"]))
+    return EXIT_INPUT if any(file["error"] is not None for file in found["files"]) else EXIT_OK

@@ -1,0 +1,299 @@
+r"""What the readers of CFD exports share: text of any encoding, and tables that may be damaged.
+
+The rules, once for all formats: columns are matched by the header; a row whose cells do not fit the header is never
+shifted into place but left out with a warning, and a file in which more than a few rows do not fit is refused; text
+for NaN becomes NaN with a warning; a last row that may be cut is left out; nothing is joined, scaled or turned round.
+"""
+
+from __future__ import annotations
+
+import gzip
+import hashlib
+import os
+import re
+import zlib
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.errors import Fault, InputError
+from bemt.importers import SourceText, number
+
+__all__ = [
+    "Column", "Row", "Table", "cells_of", "decode", "head_lines", "load", "numeric_table", "si_unit", "slug", "unique",
+]  # fmt: skip
+
+Array = NDArray[np.float64]
+
+MAX_BYTES = 1 << 30
+"""Largest text, unpacked."""
+_NAN = re.compile(r"[+-]?(nan|-?1\.#(qnan|snan|ind|inf)\w*|inf(inity)?|null|\*+)(\(\w*\))?", re.IGNORECASE)
+_COMMA = re.compile(r"[+-]?\d+,\d+([eEdD][+-]?\d+)?")
+_HUGE = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)[eEdD]\+?\d+")
+_FIXED = re.compile(r"\d\.\d+[eEdD][+-]\d\d+")
+_GZIP = b"\x1f\x8b"
+_WIDE = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}
+_UNITS = {
+    "n": "N", "nm": "Nm", "n-m": "Nm", "n m": "Nm", "pa": "Pa", "pascal": "Pa", "m": "m", "s": "s", "k": "K", "w": "W",
+    "m s^-1": "m_s", "m/s": "m_s", "kg m^-3": "kg_m3", "kg/m^3": "kg_m3", "kg/m3": "kg_m3", "radian s^-1": "rad_s",
+    "m^2": "m2", "rad": "rad", "kg": "kg", "pa s": "Pa_s",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a header: name as it will appear, unit ("" when none is stated), and its part."""
+
+    name: str
+    unit: str = ""
+    role: str = "value"
+    """value, step (counts), time (seconds) or index (a number of a node)."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """Cells of one line."""
+
+    line: int
+    cells: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Numbers of a table.
+
+    Parameters
+    ----------
+    values : (N, K) array
+        NaN where the file says so.
+    lines : tuple of int
+        Line of each row.
+    warnings : tuple of str
+        Rows left out and why.
+    """
+
+    values: Array
+    lines: tuple[int, ...]
+    warnings: tuple[str, ...] = field(default=())
+
+
+def decode(raw: bytes) -> str:
+    r"""Text of bytes: UTF-8, UTF-16 with its mark, else Latin-1; gzip is unpacked as far as it goes.
+
+    Examples
+    --------
+    >>> decode("\ufeff°".encode("utf-16-le")), decode(b"\xb0")
+    ('°', '°')
+    """
+    wide = _WIDE.get(raw[:2])
+    if wide:
+        return raw[2:].decode(wide, errors="replace")
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        if error.start > len(raw) - 4 and "unexpected end" in error.reason:  # a head may end inside a character
+            return raw[: error.start].decode("utf-8-sig")
+        return raw.decode("latin-1")
+
+
+def head_lines(head: bytes | str, count: int = 40) -> list[str]:
+    r"""First lines of a file that are not blank, stripped, for sniffers; none for binary data.
+
+    Examples
+    --------
+    >>> head_lines(b"\n a \r\n\r\nb")
+    ['a', 'b']
+    """
+    if isinstance(head, bytes):
+        if head[:2] == _GZIP:
+            try:
+                head = zlib.decompressobj(31).decompress(head, 1 << 16)
+            except zlib.error:
+                return []
+        if b"\0" in head and head[:2] not in _WIDE:
+            return []
+        head = decode(head)
+    lines = (line.strip() for line in head.removeprefix("\ufeff").splitlines())
+    return [line for line in lines if line][:count]
+
+
+def load(path: str | os.PathLike[str]) -> SourceText:
+    """Read one file whole, unpacking gzip; the hash is that of the file as it lies there.
+
+    Raises
+    ------
+    InputError
+        When it cannot be read, is damaged gzip, binary or larger than 1 GiB.
+    """
+    name = os.fspath(path)
+    try:
+        raw = Path(path).read_bytes()
+    except OSError as error:
+        raise InputError(Fault(name, "", error.strerror or str(error), "a readable file", "Check the path")) from error
+    digest = hashlib.sha256(raw).hexdigest()
+    if raw[:2] == _GZIP:
+        try:
+            with gzip.open(Path(path), "rb") as stream:
+                raw = stream.read(MAX_BYTES + 1)
+        except (OSError, EOFError, zlib.error) as error:
+            fault = Fault(name, "", f"damaged gzip data ({error})", "a whole gzip file", "Copy it again")
+            raise InputError(fault) from error
+    if len(raw) > MAX_BYTES:
+        raise InputError(Fault(name, "", f"{len(raw)} bytes or more", f"at most {MAX_BYTES}", "Export less"))
+    if b"\0" in raw and raw[:2] not in _WIDE:
+        raise InputError(Fault(name, "", "binary data (NUL bytes)", "a text file", "Export the data as plain text"))
+    return SourceText(name, decode(raw), digest)
+
+
+def cells_of(line: str, separator: str | None) -> tuple[str, ...]:
+    """Cells of a line, stripped of blanks and quotes; ``None`` separates by blanks.
+
+    A separator at the end of the line makes no cell.
+    """
+    if separator is None:
+        return tuple(line.split())
+    cells = [cell.strip().strip('"').strip() for cell in line.split(separator)]
+    return tuple(cells[:-1] if len(cells) > 1 and not cells[-1] else cells)
+
+
+def si_unit(text: str) -> str | None:
+    """Suffix of an SI unit as programs write it, None for one that is unknown (or not SI).
+
+    Examples
+    --------
+    >>> si_unit("N m"), si_unit(" m s^-1 "), si_unit("n-m"), si_unit("lbf")
+    ('Nm', 'm_s', 'Nm', None)
+    """
+    return _UNITS.get(" ".join(text.strip().strip("[]()").split()).lower())
+
+
+def slug(text: str) -> str:
+    """Name in small letters with underscores.
+
+    Examples
+    --------
+    >>> slug("Wall Shear X")
+    'wall_shear_x'
+    """
+    return re.sub(r"\W+", "_", text.strip().lower()).strip("_") or "unnamed"
+
+
+def unique(names: Sequence[str]) -> list[str]:
+    """Make names unique by ``#2``, ``#3``.
+
+    Examples
+    --------
+    >>> unique(["x", "y", "x"])
+    ['x', 'y', 'x#2']
+    """
+    taken = set(names)
+    out: list[str] = []
+    for name in names:
+        new, k = name, 2
+        while new in out or (k > 2 and new in taken):
+            new, k = f"{name}#{k}", k + 1
+        out.append(new)
+    return out
+
+
+def _value(text: str, commas: bool) -> float | None:
+    """Number of a cell: NaN for what says so or overflows, None when it is no number."""
+    value = number(text.replace(",", ".") if commas and _COMMA.fullmatch(text) else text)
+    if value is None and (_NAN.fullmatch(text) or _HUGE.fullmatch(text)):
+        return float("nan")
+    return value
+
+
+def _maybe_cut(source: SourceText, rows: Sequence[Row]) -> bool:
+    """Whether the last row may have lost its end: no line end, and not of the fixed format of the rows before it."""
+    if not rows or source.text.endswith(("\n", "\r")) or rows[-1].line != len(source.lines) or not rows[-1].cells:
+        return False
+    last = rows[-1].cells[-1].lstrip("+-")
+    before = [row.cells[-1].lstrip("+-") for row in rows[-50:-1] if row.cells]
+    fixed = before and all(_FIXED.fullmatch(cell) and len(cell) == len(before[0]) for cell in before)
+    return not (fixed and _FIXED.fullmatch(last) and len(last) == len(before[0]))
+
+
+def numeric_table(source: SourceText, columns: Sequence[Column], rows: Sequence[Row], commas: bool = True) -> Table:
+    """Turn the cells of a table into numbers, by its header.
+
+    Parameters
+    ----------
+    source : SourceText
+        The file, for faults.
+    columns : sequence of Column
+        Header, K columns.
+    rows : sequence of Row
+        Data lines.
+    commas : bool
+        Whether a decimal comma is possible (not where commas separate).
+
+    Returns
+    -------
+    Table
+        At least one row.
+
+    Raises
+    ------
+    InputError
+        When no row, or more than 5 % (and more than two) of the rows do not fit the header.
+    """
+    width = len(columns)
+    warnings: list[str] = []
+    cut = _maybe_cut(source, rows)
+    if cut and len(rows) > 1:
+        warnings.append(f"line {rows[-1].line}: last row has no line end and may be cut; left out")
+        rows = rows[:-1]
+    elif cut:
+        warnings.append(f"line {rows[-1].line}: the only row has no line end and may be cut")
+    has_comma = commas and any(_COMMA.fullmatch(cell) for row in rows for cell in row.cells)
+    has_point = has_comma and any("." in cell and _value(cell, False) is not None for row in rows for cell in row.cells)
+    comma = has_comma and not has_point
+    good: list[list[float]] = []
+    lines: list[int] = []
+    bad: list[Fault] = []
+    widths: Counter[int] = Counter()
+    for k, row in enumerate(rows):
+        values = [_value(cell, comma) for cell in row.cells]
+        fault: Fault | None = None
+        if len(values) != width:
+            widths[len(values)] += 1
+            names = ", ".join(column.name for column in columns[:8])
+            fault = Fault(source.name, str(row.line), f"{len(values)} columns", f"{width} as in the header ({names})")
+        elif None in values:
+            at = values.index(None)
+            fault = Fault(source.name, f"{row.line}:{at + 1}", repr(row.cells[at][:40]), "a number")
+        if fault is None:
+            good.append([v for v in values if v is not None])
+            lines.append(row.line)
+        elif k == len(rows) - 1 and len(rows) > 1 and not cut:
+            warnings.append(f"line {row.line}: last row is cut or damaged ({fault.got}); left out")
+        else:
+            bad.append(fault)
+    if not good or len(bad) > max(2, 0.05 * len(rows)):
+        if not bad:
+            bad.append(Fault(source.name, "", "no rows of numbers", "one row or more", "Is the file cut?"))
+        if widths and widths.most_common(1)[0][1] > 0.5 * len(rows):
+            got = f"rows of {widths.most_common(1)[0][0]} columns"
+            hint = "A column was dropped or added; export the file again"
+            raise InputError(Fault(source.name, str(rows[0].line), got, f"{width} as in the header", hint))
+        raise InputError([*bad[:5], *_more(source.name, len(bad) - 5)])
+    warnings += [f"line {f.where}: got {f.got}, expected {f.expected}; row left out" for f in bad[:10]]
+    if len(bad) > 10:
+        warnings.append(f"{len(bad) - 10} more damaged rows left out")
+    if comma:
+        warnings.append("decimal commas read as decimal points")
+    array = np.array(good, dtype=float)
+    for k, column in enumerate(columns):
+        missing = int(np.count_nonzero(np.isnan(array[:, k])))
+        if missing:
+            warnings.append(f"{column.name}: {missing} of {len(array)} values are not finite numbers in the file")
+    return Table(array, tuple(lines), tuple(warnings))
+
+
+def _more(name: str, count: int) -> list[Fault]:
+    return [Fault(name, "", f"{count} more damaged rows", "rows as in the header")] if count > 0 else []

@@ -1,0 +1,145 @@
+"""Records of CFD exports: histories with a clock, and values at points."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.averaging import Average, keep_last, steady_average
+from bemt.imported import Channel, Imported
+from bemt.importers import SourceText
+from bemt.importers._cfd import Column, Table, unique
+
+__all__ = ["fields", "history"]
+
+Array = NDArray[np.float64]
+
+
+def _spikes(column: Column, values: Array) -> list[str]:
+    size = np.abs(values[np.isfinite(values)])
+    typical = float(np.median(size)) if size.size else 0.0
+    if size.size < 10 or typical == 0.0 or float(np.max(size)) <= 1e3 * typical:
+        return []
+    at = int(np.nanargmax(np.abs(values)))
+    note = f"{column.name}: {values[at]:.6g} in row {at + 1} is over 1000 times the usual size ({typical:.3g})"
+    return [note + (": start-up or damage" if at < 0.1 * values.size else ": damage?")]
+
+
+def _channel(values: Array, unit: str, average: Average, over: str) -> Channel:
+    """Make a channel with its average."""
+    if average.mean is None:
+        return Channel(values, unit)
+    return Channel(values, unit, average.mean, over, average.drift)
+
+
+def history(
+    format: str,  # noqa: A002 - field of the record
+    source: SourceText,
+    columns: Sequence[Column],
+    table: Table,
+    warnings: Sequence[str] = (),
+    provenance: Mapping[str, str] | None = None,
+) -> Imported:
+    """Make the record of a history: repeated rows resolved, means of the channels with what they were taken over.
+
+    A history by time gets the mean of all rows (whole revolutions need the speed, which the file does not say), one by
+    iterations that of its last fifth.
+
+    Parameters
+    ----------
+    format : str
+        KIND of the importer.
+    source : SourceText
+        The file.
+    columns : sequence of Column
+        Columns of the table.
+    table : Table
+        Its numbers.
+    warnings : sequence of str
+        Put first.
+    provenance : mapping or None
+        What the file says of itself.
+
+    Returns
+    -------
+    Imported
+        ``provenance`` tells ``clock`` (time, iteration or none), ``time_channel`` and ``clock_channels``.
+    """
+    roles = [column.role for column in columns]
+    time = _clock(table.values, roles, "time")
+    step = _clock(table.values, roles, "step")
+    notes = [*warnings, *table.warnings]
+    index: NDArray[np.intp] = np.arange(len(table.values))
+    if time is not None:
+        index, more = keep_last(table.values[:, time], columns[time].name)
+        notes += more
+    if step is not None:
+        steps = table.values[index, step]
+        if time is None or not np.any(np.diff(steps) < 0):
+            kept, more = keep_last(steps, columns[step].name)
+            index = index[kept]
+            notes += more
+        else:
+            notes.append(f"{columns[step].name} goes back while {columns[time].name} goes on: a restart")
+    clock = "time" if time is not None else "iteration"
+    names = unique([column.name for column in columns])
+    channels: dict[str, Channel] = {}
+    for k, (name, column) in enumerate(zip(names, columns, strict=True)):
+        values = table.values[index, k]
+        if column.role != "value":
+            channels[name] = Channel(values, column.unit)
+            continue
+        average = steady_average(values, 1.0) if clock == "time" else steady_average(values)
+        over = f"all {average.rows} rows, start-up included" if clock == "time" else f"last {average.rows} rows"
+        channels[name] = _channel(values, column.unit, average, over)
+        notes += _spikes(column, values)
+        if average.mean is None and average.problem:
+            notes.append(f"{name}: no mean: {average.problem}")
+    about = {"file": source.name, "sha256": source.sha256, **(provenance or {}), "clock": clock}
+    about["clock_channels"] = "\t".join(n for n, c in zip(names, columns, strict=True) if c.role in ("time", "step"))
+    if time is not None:
+        about["time_channel"] = names[time]
+    if "value" not in roles:
+        notes.append("the file has no column of values, only its clock")
+    return Imported(format, "cfd", len(index), channels, tuple(notes), about)
+
+
+def _clock(values: Array, roles: Sequence[str], role: str) -> int | None:
+    """First column of a role that really counts (a steady file may carry a time that stands still)."""
+    for k, own in enumerate(roles):
+        if own == role and (len(values) == 1 or len(np.unique(values[np.isfinite(values[:, k]), k])) > 1):
+            return k
+    return None
+
+
+def fields(
+    format: str,  # noqa: A002 - field of the record
+    source: SourceText,
+    columns: Sequence[Column],
+    table: Table,
+    warnings: Sequence[str] = (),
+    provenance: Mapping[str, str] | None = None,
+) -> Imported:
+    """Make the record of values at points: no means, since points carry no area; equal repeated columns appear once."""
+    notes = [*warnings, *table.warnings]
+    channels: dict[str, Channel] = {}
+    first: dict[str, Array] = {}
+    kept: list[Column] = []
+    for k, column in enumerate(columns):
+        values = table.values[:, k]
+        twin = first.setdefault(column.name, values)
+        if twin is not values and np.array_equal(twin, values, equal_nan=True):
+            notes.append(f"column {column.name} is repeated with the same values: taken once")
+            continue
+        kept.append(replace(column, name=f"{column.name}\t{k}"))
+    names = unique([column.name.split("\t")[0] for column in kept])
+    for name, column in zip(names, kept, strict=True):
+        channels[name] = Channel(table.values[:, int(column.name.split("\t")[1])], column.unit)
+        if "#" in name:
+            notes.append(f"two columns are named {name.split('#')[0]} and differ: the later one is {name}")
+    notes.append("values at points: no mean is taken, since points carry no areas")
+    about = {"file": source.name, "sha256": source.sha256, **(provenance or {}), "clock": "none"}
+    return Imported(format, "cfd", len(table.values), channels, tuple(notes), about)

@@ -1,0 +1,113 @@
+"""Tables of Drive Calculator: propellers as power laws of the speed, and motor points.
+
+Propellers (``myid,tbs,Name,Dia,Pitch,a,b,...,c,d,...,n10N,n100W,...``): static thrust [gf] = a (n/1000)^b and shaft
+power [W] = c (n/1000)^d with n in rev/min; Dia and Pitch in inches. The headings name no units, but the table proves
+those of thrust and power itself: ``n10N`` and ``n100W`` are the speeds at 10 N and 100 W. Rows where they disagree are
+flagged. The laws are fits of others' measurements at the altitude and temperature beside them, not measurements.
+
+Motor points (``id,motor_id,motor,...,U_V,n_rpm,I_A,...``) name most units in their headings.
+"""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+
+from bemt import units
+from bemt.imported import Imported
+from bemt.importers import head_text, load_text
+from bemt.importers._headings import Heading, heading
+from bemt.importers._recording import Builder, split_table
+
+__all__ = ["KIND", "read", "sniff"]
+
+KIND = "drivecalc"
+_PROPELLERS = {"Name", "Dia", "Pitch", "a", "b", "c", "d", "n10N", "n100W"}
+_POINTS = {"motor_id", "motor", "kV", "Rm", "U_V", "n_rpm", "I_A", "no_load"}
+_KNOWN = {
+    "Dia": ("diameter_m", "in"), "Pitch": ("pitch_m", "in"), "a": ("thrust_law_N", "gf"), "c": ("power_law_W", "W"),
+    "AltThr": ("thrust_altitude_m", "m"), "TmpThr": ("thrust_temperature_K", "C"), "MaxRPM": ("max_rpm", "rpm"),
+    "AltPwr": ("power_altitude_m", "m"), "TmpPwr": ("power_temperature_K", "C"), "n10N": ("at_10_N_rpm", "rpm"),
+    "n100W": ("at_100_W_rpm", "rpm"), "b": ("thrust_exponent", ""), "d": ("power_exponent", ""),
+}  # fmt: skip
+
+
+def sniff(head: bytes | str) -> bool:
+    r"""Tell whether the first line has the headings of one of the two tables.
+
+    Parameters
+    ----------
+    head : bytes or str
+        First bytes of a file.
+
+    Returns
+    -------
+    bool
+        True for propellers or motor points.
+
+    Examples
+    --------
+    >>> sniff("myid,tbs,Name,Dia,Pitch,a,b,c,d,n10N,n100W\n"), sniff("Name,Dia,Pitch\n")
+    (True, False)
+    """
+    text = head_text(head)
+    cells = {c.strip() for c in text.splitlines()[0].split(",")} if text.strip() else set()
+    return cells >= _PROPELLERS or cells >= _POINTS
+
+
+def read(path: str | os.PathLike[str]) -> Imported:
+    """Read one of the two tables.
+
+    Parameters
+    ----------
+    path : str or path
+        File.
+
+    Returns
+    -------
+    Imported
+        kind "table". For propellers, ``thrust_law_N`` and ``power_law_W`` are the laws at 1000 rev/min.
+
+    Raises
+    ------
+    InputError
+        With all faults.
+    """
+    source = load_text(path)
+    table = split_table(source, header=True)
+    build = Builder(table, KIND, kind="table")
+    propellers = set(table.headings) >= _PROPELLERS
+    for k, text in enumerate(table.headings):
+        build.add(k, _heading(text) if propellers else heading(text))
+    if propellers and not build.faults:
+        _check(build, "thrust_law_N", "thrust_exponent", "at_10_N_rpm", 10.0)
+        _check(build, "power_law_W", "power_exponent", "at_100_W_rpm", 100.0)
+        build.warnings.append("power laws fitted to measurements of others (columns srcThr, srcPwr), no measurements")
+    elif not build.faults:
+        build.warnings.append("kV [(rev/min)/V] and Rm [ohm] carry no unit in this table")
+        build.flag(np.flatnonzero(build.channels["rpm"].values == 0.0) if "rpm" in build.channels else [], "rpm is 0")
+    return build.finish({"program": "Drive Calculator", "form": "propellers" if propellers else "motor points"})
+
+
+def _heading(text: str) -> Heading:
+    if text not in _KNOWN:
+        return Heading(text, heading(text).name, None)
+    name, suffix = _KNOWN[text]
+    return Heading(text, name, units.UNITS[suffix] if suffix else units.Unit("", "none", 1.0))
+
+
+def _check(build: Builder, law: str, exponent: str, at: str, target: float) -> None:
+    """Hold a law against the speed at which the table says that it gives the target."""
+    if not {law, exponent, at} <= build.channels.keys():
+        return
+    a, b, n = (build.channels[name].values for name in (law, exponent, at))
+    with np.errstate(over="ignore", invalid="ignore"):
+        ratio = a * np.clip(n, 0.0, None) ** b / 1000.0**b / target
+    used = np.isfinite(ratio) & (a > 0) & (n > 0)
+    build.flag(np.flatnonzero(used & (np.abs(ratio - 1.0) > 0.02)), f"{law} disagrees with {at}")
+    build.flag(np.flatnonzero(np.isfinite(a) & ~used), f"{law} or {at} is 0: no law")
+    if np.any(used):
+        share = float(np.mean(np.abs(ratio[used] - 1.0) <= 0.02))
+        text = f"{law}: {100 * share:.1f} % of {np.count_nonzero(used)} rows agree with {at} within 2 %"
+        build.warnings.append(text + ("" if share > 0.5 else ": its unit is in doubt"))

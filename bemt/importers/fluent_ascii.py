@@ -1,0 +1,74 @@
+r"""Fluent's ASCII export of a surface or zone: ``nodenumber, x-coordinate, ...``, comma or blanks between cells.
+
+::
+
+    nodenumber,    x-coordinate,    y-coordinate,        pressure
+             1, 8.427639012E-17,-7.500000000E-01,-3.011805813E-01
+
+Fluent exports in SI whatever units it displays, but the file does not say so; units stay open. Coordinates and fields
+are values at points, which carry no areas: forces cannot be summed from them.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+
+from bemt.errors import Fault, InputError
+from bemt.imported import Imported
+from bemt.importers._cfd import Column, Row, cells_of, head_lines, load, numeric_table
+from bemt.importers._cfd_record import fields
+
+__all__ = ["KIND", "read", "sniff"]
+
+KIND = "fluent_ascii"
+
+_FIRST = ("nodenumber", "cellnumber")
+
+
+def sniff(head: bytes | str) -> bool:
+    r"""Tell whether the first line names node or cell numbers and a coordinate.
+
+    Examples
+    --------
+    >>> sniff("nodenumber,  x-coordinate, pressure\n 1, 0.1, 3"), sniff("node,x\n1,2")
+    (True, False)
+    """
+    lines = head_lines(head, 1)
+    return bool(lines) and lines[0].lower().lstrip('"').startswith(_FIRST)
+
+
+def read(path: str | os.PathLike[str]) -> Imported:
+    """Read an ASCII export.
+
+    Parameters
+    ----------
+    path : str or path
+        File to read; gzip is unpacked.
+
+    Returns
+    -------
+    Imported
+        Channels by their own names, without means.
+
+    Raises
+    ------
+    InputError
+        When rows do not fit the header.
+    """
+    source = load(path)
+    lines = [(k, text.strip()) for k, text in enumerate(source.lines, 1) if text.strip()]
+    if not lines or not lines[0][1].lower().lstrip('"').startswith(_FIRST):
+        got = repr(lines[0][1][:60]) if lines else "no text"
+        raise InputError(Fault(source.name, "1", got, "a header that begins with nodenumber or cellnumber"))
+    mark = next((m for m in (",", ";") if m in lines[0][1]), None)
+    names = cells_of(lines[0][1], mark)
+    columns = [Column(name or "unnamed") for name in names]
+    columns[0] = replace(columns[0], role="index")
+    rows = [Row(k, cells_of(text, mark)) for k, text in lines[1:]]
+    repeated = sum(row.cells == names for row in rows)
+    body = [row for row in rows if row.cells != names]
+    table = numeric_table(source, columns, body, commas=mark != ",")
+    notes = [f"header repeated {repeated} times: several surfaces in one file"] if repeated else []
+    notes.append("no units stated (Fluent exports SI)")
+    return fields(KIND, source, columns, table, notes)

@@ -1,0 +1,219 @@
+r"""Fluent force reports: forces, moments and centres of pressure by zone.
+
+::
+
+    Forces - Direction Vector (1 0 0)
+                      Forces (n)                        Coefficients
+    Zone              Pressure   Viscous    Total       Pressure   Viscous    Total
+    blade             -12.6      -7.7e-05   -12.6       -0.0142    -8.7e-08   -0.0142
+    ----------------- ---------- ---------- ---------- ...
+    Net               -253.2     -159.3     -412.5      -0.28      -0.18      -0.46
+
+Cells are numbers, or vectors in parentheses when no direction is given. Every zone is a channel of its own
+(``force_total_x_N(blade)``), Net too: which zones count is the user's choice. Numbers along a direction carry it in
+their name (``force_total_N along (1 0 0) (blade)``).
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemt.errors import Fault, InputError
+from bemt.imported import Channel, Imported
+from bemt.importers import SourceText, number
+from bemt.importers._cfd import head_lines, load, si_unit, slug, unique
+
+__all__ = ["KIND", "Entry", "blocks", "read", "sniff"]
+
+KIND = "fluent_forces"
+
+_TITLE = re.compile(r"(Forces|Moments|Center of Pressure)\b(?!\s*[\[(])(.*)")
+_CELL = re.compile(r"\([^()]*\)|\S+")
+_GROUP = re.compile(r"(\S(?:.*?\S)?)\s*(?:[\[(]([^\])]*)[\])])?\s*$")
+_BASE = {"forces": "force", "moments": "moment", "coefficients": "coefficient"}
+_SI = {"force": "N", "moment": "Nm"}
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One number of a force report: name without its zone, unit, zone, value."""
+
+    name: str
+    unit: str
+    zone: str
+    value: float
+
+
+def sniff(head: bytes | str) -> bool:
+    r"""Tell whether a title of forces is followed by a line of zones, and this is no transcript.
+
+    Examples
+    --------
+    >>> sniff("Forces\n      Forces (n)\nZone  Pressure  Viscous  Total\n"), sniff("Zone,Pressure")
+    (True, False)
+    """
+    lines = head_lines(head, 60)
+    titles = [k for k, line in enumerate(lines) if _TITLE.fullmatch(line)]
+    first = bool(lines) and (lines[0] == '"Force Report"' or (bool(titles) and titles[0] == 0))
+    return first and any(line.startswith("Zone ") for k in titles for line in lines[k + 1 : k + 3])
+
+
+def _vector(cell: str) -> list[float] | None:
+    inner = cell.strip("()").split() if cell.startswith("(") else [cell]
+    values = [number(part) for part in inner]
+    return None if None in values or not values else [v for v in values if v is not None]
+
+
+def _names(title: str, rest: str, groups_line: str, zone_line: str) -> list[tuple[str, str]] | str:
+    """Name and unit of each column, or what is wrong with the header."""
+    columns = zone_line.split()[1:]
+    if title == "Center of Pressure":
+        unit = re.search(r"\(([^()]*)\)\s*$", rest)
+        si = si_unit(unit[1]) if unit else None
+        suffix = f"_{si}" if si else ""
+        return [(f"center_of_pressure_{c}{suffix}", si or (unit[1] if unit else "")) for c in columns]
+    groups = [m for part in re.split(r"\s{3,}", groups_line.strip()) if (m := _GROUP.fullmatch(part))]
+    if not columns or not groups or len(columns) % len(groups):
+        return f"{len(columns)} columns under {len(groups)} groups"
+    each = len(columns) // len(groups)
+    if any(columns[k * each : (k + 1) * each] != columns[:each] for k in range(len(groups))):
+        return f"groups of unlike columns ({' '.join(columns)})"
+    along = re.search(r"(?:Direction Vector|Moment Axis)\s*(\([^()]*\))", rest)
+    out: list[tuple[str, str]] = []
+    for k, column in enumerate(columns):
+        group = groups[k // each]
+        word = group[1].split()[0].lower()
+        base = _BASE.get(word, slug(group[1]))
+        if base == "coefficient":
+            base = "moment_coefficient" if title == "Moments" else "force_coefficient"
+        si = si_unit(group[2]) if group[2] else None
+        if si is not None and _SI.get(base, si) != si:
+            si = None
+        tail = f" along {along[1]} " if along else ""
+        out.append((f"{base}_{column.lower()}" + (f"_{si}" if si else "") + tail, si or group[2] or ""))
+    return out
+
+
+def blocks(source: SourceText) -> Iterator[tuple[int, list[Entry], list[str], list[Fault]]]:
+    """Find the force tables of a text: line, entries, warnings and faults of each."""
+    lines = source.lines
+    k = 0
+    while k < len(lines):
+        match = _TITLE.fullmatch(lines[k].strip())
+        ahead = [i for i in range(k + 1, min(k + 3, len(lines))) if lines[i].startswith("Zone ")]
+        if not match or not ahead:
+            k += 1
+            continue
+        names = _names(match[1], match[2], lines[ahead[0] - 1], lines[ahead[0]])
+        if isinstance(names, str):
+            yield k + 1, [], [], [Fault(source.name, str(ahead[0] + 1), names, "a header of a force report")]
+            k = ahead[0] + 1
+            continue
+        start, k = k, ahead[0] + 1
+        entries: list[Entry] = []
+        notes: list[str] = []
+        faults: list[Fault] = []
+        while k < len(lines) and lines[k].strip() and not lines[k].startswith("("):
+            if not re.fullmatch(r"[-\s]+", lines[k]):
+                cells = _CELL.findall(lines[k])
+                vectors = [_vector(cell) for cell in cells[1:]]
+                sizes = {len(v) for v in vectors if v is not None}
+                cut = k == len(lines) - 1 and not source.text.endswith(("\n", "\r")) and lines[k][-1] not in " )"
+                # along a direction there are no vectors
+                right = ({1},) if " along " in names[0][0] else ({1}, {2}, {3})
+                if len(vectors) != len(names) or None in vectors or sizes not in right or cut:
+                    got = f"{len(vectors)} columns, or text among them" + (" (no line end: cut?)" if cut else "")
+                    faults.append(Fault(source.name, str(k + 1), got, f"a zone and {len(names)} numbers or vectors"))
+                else:
+                    entries += _entries(cells[0], names, [v for v in vectors if v is not None])
+            k += 1
+        notes += _sums(entries, bool(faults), start + 1)
+        yield start + 1, entries, notes, faults
+
+
+def _entries(zone: str, names: Sequence[tuple[str, str]], vectors: Sequence[list[float]]) -> Iterator[Entry]:
+    for (name, unit), vector in zip(names, vectors, strict=True):
+        for axis, value in zip("xyz" if len(vector) > 1 else ("",), vector, strict=False):
+            head, along, tail = name.partition(" along ")
+            suffix = f"_{unit}" if unit and head.endswith(f"_{unit}") else ""
+            stem = head.removesuffix(suffix) if suffix else head
+            yield Entry(stem + (f"_{axis}" if axis else "") + suffix + along + tail, unit, zone, value)
+
+
+def _sums(entries: Sequence[Entry], damaged: bool, line: int) -> list[str]:
+    """Check Net against the zones and Total against its parts: a shifted or damaged column shows here."""
+    notes: list[str] = []
+    table = {(e.name, e.zone): e.value for e in entries}
+    if len(table) < len(entries):
+        repeated = {e.zone for e in entries if sum(e.name == x.name and e.zone == x.zone for x in entries) > 1}
+        return [f"line {line}: zone {', '.join(sorted(repeated))} is repeated; sums not checked"]
+    zones = list(dict.fromkeys(e.zone for e in entries))
+    names = list(dict.fromkeys(e.name for e in entries))
+    for name in names:
+        if name.startswith("center_of_pressure") or damaged:
+            continue
+        parts = [table[name, zone] for zone in zones if zone != "Net" and (name, zone) in table]
+        net = table.get((name, "Net"))
+        if net is not None and parts and abs(net - sum(parts)) > 1e-4 * max(1e-300, sum(map(abs, parts))):
+            notes.append(f"line {line}: {name}: Net is {net:.6g}, its zones add up to {sum(parts):.6g}")
+    for name in (n for n in names if "_total" in n):
+        for zone in zones:
+            found = [table.get((name.replace("_total", f"_{part}"), zone)) for part in ("pressure", "viscous")]
+            values = [v for v in found if v is not None]
+            total = table.get((name, zone))
+            if total is None or len(values) < 2:
+                continue
+            if abs(total - sum(values)) > 1e-4 * max(1e-300, sum(map(abs, values))):
+                notes.append(f"line {line}: {name}({zone}) is {total:.6g}, its parts add up to {sum(values):.6g}")
+    return notes
+
+
+def channels_of(entries: Sequence[Entry]) -> dict[str, Channel]:
+    """Make one channel of each number, its mean being the number."""
+    names = unique([f"{e.name}({e.zone})" for e in entries])
+    return {
+        name: Channel(np.array([e.value]), e.unit, e.value, "one value of a report")
+        for name, e in zip(names, entries, strict=True)
+    }
+
+
+def read(path: str | os.PathLike[str]) -> Imported:
+    """Read a force report.
+
+    Parameters
+    ----------
+    path : str or path
+        File to read; gzip is unpacked.
+
+    Returns
+    -------
+    Imported
+        One channel for each quantity and zone; rows counts zones, over all tables.
+
+    Raises
+    ------
+    InputError
+        When there is no table, or rows do not fit their header.
+    """
+    source = load(path)
+    entries: list[Entry] = []
+    notes: list[str] = []
+    faults: list[Fault] = []
+    zones: set[tuple[int, str]] = set()
+    for line, found, more, bad in blocks(source):
+        entries += found
+        notes += more
+        faults += bad
+        zones |= {(line, entry.zone) for entry in found}
+    if not entries or len(faults) > max(1, 0.1 * len(zones)):
+        raise InputError(faults[:6] or [Fault(source.name, "", "no table of zones", "a Fluent force report")])
+    notes += [f"line {f.where}: got {f.got}; row left out" for f in faults]
+    notes.append("choose the zones that count: Net holds all that were selected in the report")
+    titles = [text.strip() for text in source.lines if _TITLE.fullmatch(text.strip())]
+    about = {"file": source.name, "sha256": source.sha256, "tables": "; ".join(titles), "clock": "none"}
+    return Imported(KIND, "cfd", len(zones), channels_of(entries), tuple(notes), about)

@@ -1,0 +1,123 @@
+r"""Fluent report files (``thrust-rfile.out``): three header lines, then rows separated by blanks.
+
+::
+
+    "thrust-rfile"
+    "Time Step" "thrust etc.."                       abbreviated: ignored
+    ("Time Step" "thrust" "torque" "flow-time")      the names and their order
+    101 9.81 0.12 0.0519
+
+Steady files count "Iteration" and have no flow-time. Columns of several zones are ``"name(zone)"`` and stay apart. The
+file states no units, except that flow-time is in seconds. Rows of a report definition with average-over above 1 are
+running averages already; the file does not say so. Forces are projected on the vector the user gave: the sign is
+that of the file.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+
+from bemt.errors import Fault, InputError
+from bemt.imported import Imported
+from bemt.importers._cfd import Column, Row, head_lines, load, numeric_table
+from bemt.importers._cfd_record import history
+
+__all__ = ["KIND", "column_of", "read", "sniff"]
+
+KIND = "fluent_report"
+
+_QUOTED = re.compile(r'"([^"]*)"')
+_HEADER = re.compile(r'\(\s*(?:"[^"]*"\s*)+\)')
+_STEPS = {"time step", "time-step", "iteration", "iterations"}
+_TIMES = {"flow time", "flow-time", "physical-time", "time"}
+
+
+def column_of(name: str) -> Column:
+    """Make the column of a name in Fluent's words; times are in seconds.
+
+    Examples
+    --------
+    >>> column_of("flow-time").name, column_of("Iteration").role, column_of("thrust(blade:1)").role
+    ('time_s', 'step', 'value')
+    """
+    word = name.strip().lower()
+    if word in _STEPS:
+        return Column(name.strip(), "", "step")
+    if word in _TIMES:
+        return Column("time_s", "s", "time")
+    if word == "delta-time":
+        return Column("delta_time_s", "s", "step_size")
+    return Column(name.strip() or "unnamed")
+
+
+def sniff(head: bytes | str) -> bool:
+    r"""Tell whether one of the first lines is a parenthesised list of quoted names under a quoted title.
+
+    Examples
+    --------
+    >>> sniff('"t-rfile"\n"Iteration" "t"\n("Iteration" "t")\n1 0.3'), sniff('(title "a")\n(labels "x" "y")')
+    (True, False)
+    """
+    lines = head_lines(head, 4)
+    if not lines or not lines[0].startswith('"') or '",' in lines[0]:
+        return False
+    return any(line.startswith('("') or line.endswith(' etc.."') for line in lines[1:])
+
+
+def read(path: str | os.PathLike[str]) -> Imported:
+    """Read a report file.
+
+    Parameters
+    ----------
+    path : str or path
+        File to read; gzip is unpacked.
+
+    Returns
+    -------
+    Imported
+        Channels by the names of line 3; flow-time is ``time_s``.
+
+    Raises
+    ------
+    InputError
+        When line 3 is absent or unreadable, or when rows do not fit it.
+    """
+    source = load(path)
+    title = ""
+    names: list[str] | None = None
+    rows: list[Row] = []
+    repeated: list[int] = []
+    for line, raw in enumerate(source.lines, 1):
+        text = raw.strip()
+        if not text:
+            continue
+        if _HEADER.fullmatch(text):
+            found = [name.strip() for name in _QUOTED.findall(text)]
+            if names is not None and found != names:
+                got, expected = f"another header ({', '.join(found)})", f"the first one ({', '.join(names)})"
+                raise InputError(Fault(source.name, str(line), got, expected, "Split the file there"))
+            if names is not None:
+                repeated.append(line)
+            names = found
+        elif text.startswith('"'):
+            title = title or text.strip('"')
+        elif names is None:
+            hint = "Line 3 of a report file lists all names; line 2 is abbreviated"
+            expected = 'a header such as ("Time Step" "thrust" "flow-time")'
+            raise InputError(Fault(source.name, str(line), repr(text[:60]), expected, hint))
+        else:
+            rows.append(Row(line, tuple(text.split())))
+    if names is None:
+        raise InputError(Fault(source.name, "", "no header", 'a line such as ("Time Step" "thrust" "flow-time")'))
+    columns = [column_of(name) for name in names]
+    if not rows:
+        hint = "Did the run write a step?"
+        raise InputError(Fault(source.name, "", f"a header ({', '.join(names)}) and no rows", "one row or more", hint))
+    table = numeric_table(source, columns, rows)
+    notes = [f"header repeated in line {', '.join(map(str, repeated[:5]))}: the run was restarted"] if repeated else []
+    if any(c.role == "value" for c in columns):
+        notes.append("report files state no units, reference values, sector or sign convention: check them")
+    if not any(c.role in ("step", "time") for c in columns):
+        notes.append("no column counts steps or time: rows are taken in their order")
+    return history(KIND, source, columns, table, notes, {"title": title})

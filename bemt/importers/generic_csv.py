@@ -1,0 +1,144 @@
+"""Any table of numbers: comma, semicolon, tab, bar or blanks between cells, units in the headings.
+
+Units are read from ``Thrust (gf)``, ``Thrust [gf]``, ``thrust_gf`` and a few names without dimension (``J``, ``CT``).
+A heading without unit, or a table without headings, gives channels of unit "" and a warning: nothing is assumed. This
+reader is a fallback: it takes a file only when no reader of a particular format claims it. A ``recording.toml``
+beside the file (see :mod:`bemt.importers.recording_toml`) says what headings do not.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+import numpy as np
+
+from bemt.imported import Imported
+from bemt.importers import SourceText, head_text, load_text, number
+from bemt.importers._headings import Heading, heading
+from bemt.importers._recording import Builder, Table, find_delimiter, spikes, split_line, split_table
+
+__all__ = ["FALLBACK", "KIND", "convert", "read", "sniff"]
+
+KIND = "table"
+FALLBACK = True
+
+
+def sniff(head: bytes | str) -> bool:
+    r"""Tell whether a text is a table with a column of numbers.
+
+    Parameters
+    ----------
+    head : bytes or str
+        First bytes of a file.
+
+    Returns
+    -------
+    bool
+        True when its first lines have equal numbers of cells, two or more, some of which are numbers.
+
+    Examples
+    --------
+    >>> sniff("time;thrust_N\n0.0;1.2\n0.1;1.3\n"), sniff("A text, with commas,\nand no numbers.\n")
+    (True, False)
+    """
+    text = head_text(head)
+    lines = [t for t in text.splitlines() if t.strip() and not t.lstrip().startswith(("#", "%"))]
+    if len(text) >= 4096 and len(lines) > 2:
+        lines = lines[:-1]  # the head may end in the middle of a line
+    if len(lines) < 2 or lines[0].lstrip().startswith(("[", "{", "<", "!", "/*", "//")):
+        return False
+    mark = find_delimiter(lines[:5])
+    if mark == " " and not all(_blank_numbers(t) for t in lines[1:20]):
+        return False
+    split = [split_line(t, mark) for t in lines[:50]]
+    width = len(split[0])
+    if width < 2:
+        return False
+    alike = sum(abs(len(cells) - width) <= 1 for cells in split[1:])
+    numbers = sum(any(_numeric(c) for c in cells) for cells in split[1:])
+    return alike >= 0.8 * (len(split) - 1) and numbers >= 0.5 * (len(split) - 1)
+
+
+def _numeric(cell: str) -> bool:
+    return number(cell) is not None or re.fullmatch(r"[+-]?\d+,\d+", cell) is not None
+
+
+def _blank_numbers(line: str) -> bool:
+    cells = line.split()
+    return len(cells) > 1 and sum(number(c) is not None for c in cells) >= 0.8 * len(cells)
+
+
+def read(path: str | os.PathLike[str]) -> Imported:
+    """Read a table.
+
+    Parameters
+    ----------
+    path : str or path
+        File.
+
+    Returns
+    -------
+    Imported
+        ``kind`` is "bench" when it has a thrust or torque over time, a speed or a pulse width, else "table".
+
+    Raises
+    ------
+    InputError
+        With all faults.
+    """
+    source = load_text(path)
+    imported = convert(source, split_table(source))
+    beside = Path(path).with_name("recording.toml")
+    if beside.is_file() and Path(path).name in beside.read_text(encoding="utf-8", errors="replace"):
+        more = f"{beside.name} beside it names this file: import {beside.name} for what it says"
+        imported = Imported(**{**vars(imported), "warnings": (*imported.warnings, more)})
+    return imported
+
+
+def convert(source: SourceText, table: Table, decimal: str = ".") -> Imported:
+    """Make channels of a split table.
+
+    Parameters
+    ----------
+    source : SourceText
+        The file.
+    table : Table
+        Its cells.
+    decimal : str
+        Decimal mark, ``.`` or ``,``.
+
+    Returns
+    -------
+    Imported
+        One channel per column of numbers, one text per other column.
+
+    Raises
+    ------
+    InputError
+        With all faults.
+    """
+    build = Builder(table, KIND, kind="table")
+    width = len(table.rows[0])
+    for k in range(width):
+        text = table.headings[k] if table.headings else ""
+        build.add(k, heading(text) if text else Heading("", f"column_{k + 1}", None), decimal)
+    if not table.headings:
+        build.warnings.append("no heading line: columns are numbered")
+    build.flag_time()
+    speeds = [n for n in build.channels if n == "rpm" or n.endswith("_rpm")]
+    for name in speeds:
+        build.flag(np.flatnonzero(build.channels[name].values == 0.0), f"{name} is 0")
+        build.flag(np.flatnonzero(build.channels[name].values < 0.0), f"{name} is negative")
+    if "rpm" in speeds:
+        build.warnings.append("rpm: the file does not say whether mechanical or electrical; taken as written")
+    if "time_s" in build.channels:
+        for name, channel in build.channels.items():
+            if name != "time_s" and channel.unit not in ("", "-"):
+                build.flag(np.flatnonzero(spikes(channel.values)), f"spike of {name}")
+    build.check_magnitudes()
+    loads = {"thrust_N", "torque_Nm"} & build.channels.keys()
+    if loads and (speeds or {"time_s", "pulse_width_s", "throttle"} & build.channels.keys()):
+        build.kind = "bench"
+    return build.finish()

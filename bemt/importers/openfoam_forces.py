@@ -1,0 +1,255 @@
+r"""OpenFOAM ``postProcessing`` tables: forces and moments of both layouts, coefficients, y+, other named columns.
+
+New layout (``force.dat``, ``moment.dat``)::
+
+    # Force
+    # CofR          : (0 0 0)
+    # Time          total_x total_y total_z  pressure_x pressure_y pressure_z  viscous_x viscous_y viscous_z
+
+Old layout (``forces.dat``), no totals, which are added here over pressure, viscous and porous::
+
+    # Time       forces(pressure viscous porous) moments(pressure viscous porous)
+    10  ((-222 119 0) (2.1 -1.4 0) (0 0 0)) ((0 0 -263) (0 0 0.4) (0 0 0))
+
+Forces are in newtons if ``rhoInf`` was the density (incompressible solvers multiply by what the user gave). ``Time``
+counts iterations in a steady run; whole-number times are taken for that, with a warning.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from bemt.errors import Fault, InputError
+from bemt.imported import Channel, Imported
+from bemt.importers import SourceText
+from bemt.importers._cfd import Column, Row, Table, head_lines, load, numeric_table
+from bemt.importers._cfd_record import history
+
+__all__ = ["KIND", "read", "sniff"]
+
+KIND = "openfoam_forces"
+
+_TIME = re.compile(r"#\s*Time\b(.*)")
+_PROBE = re.compile(r"#\s*Probe\s+(\d+)\s+\(([^()]*)\)")
+_NESTED = re.compile(r"(\w+)\(([^()]*)\)")
+_SETTING = re.compile(r"#\s*(\w+)\s*:\s*(.+)")
+_VECTOR = re.compile(r"\(\s*((?:\w+_[xyz]\s*){3})\)")
+
+
+def sniff(head: bytes | str) -> bool:
+    r"""Tell whether a comment line begins with Time and names columns.
+
+    Examples
+    --------
+    >>> sniff("# Force\n# Time  total_x total_y\n1 2 3"), sniff("# Time\n"), sniff("#  Time  forces(pressure viscous)")
+    (True, False, True)
+    """
+    lines = [line for line in head_lines(head) if line.startswith("#")]
+    return any(_PROBE.match(line) or ((m := _TIME.fullmatch(line)) and m[1].strip()) for line in lines)
+
+
+def _columns(header: str, title: str) -> tuple[list[Column], str, list[tuple[str, list[str]]]]:
+    """Columns of a header, the layout, and in the old layout its groups with their parts."""
+    nested = _NESTED.findall(header)
+    if nested and all(re.fullmatch(r"(local)?(forces?|moments?)", name, re.IGNORECASE) for name, _ in nested):
+        groups = [(name.lower().removesuffix("s"), re.split(r"[,\s]+", parts.strip())) for name, parts in nested]
+        unit = {True: "Nm", False: "N"}
+        columns = [
+            Column(f"{name}_{part}_{axis}_{unit['moment' in name]}", unit["moment" in name])
+            for name, parts in groups for part in parts for axis in "xyz"
+        ]  # fmt: skip
+        return [Column("Time", "", "time"), *columns], "nested", groups
+    names = _VECTOR.sub(r"\1", header).split()
+    kind = title.strip().lower().removesuffix("s")
+    if kind in ("force", "moment") and all(re.fullmatch(r"\w+_[xyz]", name) for name in names):
+        unit_text = "N" if kind == "force" else "Nm"
+        return [Column("Time", "", "time"), *(Column(f"{kind}_{n}_{unit_text}", unit_text) for n in names)], "flat", []
+    return [Column("Time", "", "time"), *(Column(name) for name in names)], "flat", []
+
+
+def read(path: str | os.PathLike[str]) -> Imported:
+    """Read a table of ``postProcessing``.
+
+    Parameters
+    ----------
+    path : str or path
+        File to read; gzip is unpacked.
+
+    Returns
+    -------
+    Imported
+        ``force_total_x_N``, ``moment_pressure_z_Nm``...; coefficients by their own names; y+ by patch.
+
+    Raises
+    ------
+    InputError
+        When the header is absent or rows do not fit it.
+    """
+    source = load(path)
+    title = ""
+    about: dict[str, str] = {}
+    header: str | None = None
+    rows: list[tuple[int, str]] = []
+    probes: dict[str, str] = {}
+    repeated = 0
+    for line, raw in enumerate(source.lines, 1):
+        text = raw.strip()
+        if text.startswith("#"):
+            match, setting, probe = _TIME.fullmatch(text), _SETTING.fullmatch(text), _PROBE.match(text)
+            if probe:
+                probes[probe[1]] = probe[2]
+            elif match and not match[1].strip() and probes:
+                header = f"probes {' '.join(probes)}"
+            elif match and match[1].strip():
+                found = " ".join(match[1].split())
+                if header is not None and found != header:
+                    got = "another header"
+                    raise InputError(Fault(source.name, str(line), got, "the first one", "Split the file there"))
+                repeated += header is not None
+                header = found
+            elif setting:
+                about[setting[1]] = setting[2].strip()
+            elif not title:
+                title = text.strip("# \t")
+        elif text and header is None:
+            expected = "a header such as # Time total_x total_y total_z"
+            raise InputError(Fault(source.name, str(line), repr(text[:60]), expected, "Is the header damaged?"))
+        elif text:
+            rows.append((line, text))
+    if header is None:
+        raise InputError(Fault(source.name, "", "no header", "a header such as # Time total_x total_y total_z"))
+    notes = [f"header repeated {repeated} times: the run was restarted"] if repeated else []
+    if header.split()[0] == "patch":
+        return _by_patch(source, header.split(), rows, {"title": title, **about}, notes)
+    if probes:
+        return _probes(source, probes, rows, notes)
+    columns, layout, groups = _columns(header, title)
+    table = numeric_table(source, columns, _rows(rows, layout, len(columns), groups), commas=False)
+    if groups:
+        columns, table = _totals(columns, table, groups)
+    return _record(source, columns, table, {"title": title, **about}, notes)
+
+
+def _rows(rows: Sequence[tuple[int, str]], layout: str, width: int, groups: list[tuple[str, list[str]]]) -> list[Row]:
+    """Cells of the rows; a row with other parentheses than its header has gets none, so that it is not shifted."""
+    out = []
+    wanted = "n" + "".join(f"({'(nnn)' * len(parts)})" for _, parts in groups)
+    for line, text in rows:
+        cells = tuple(text.replace("(", " ").replace(")", " ").split())
+        shape = _shape(text)
+        ok = shape == wanted if layout == "nested" else shape.replace("(nnn)", "nnn") == "n" * len(cells)
+        if not ok and len(cells) == width:
+            cells = (*cells[:-1], "damaged parentheses")
+        out.append(Row(line, cells))
+    return out
+
+
+def _totals(
+    columns: list[Column], table: Table, groups: list[tuple[str, list[str]]]
+) -> tuple[list[Column], Table]:
+    """Add the totals that the old layout does not have."""
+    new: list[Column] = []
+    sums = []
+    at = 1
+    for name, parts in groups:
+        block = table.values[:, at : at + 3 * len(parts)].reshape(len(table.values), len(parts), 3)
+        unit = columns[at].unit
+        for k, axis in enumerate("xyz"):
+            new.append(Column(f"{name}_total_{axis}_{unit}", unit))
+            with np.errstate(over="ignore", invalid="ignore"):
+                total = block[:, :, k].sum(axis=1)
+            sums.append(np.where(np.isfinite(total), total, np.nan))
+        at += 3 * len(parts)
+    return [*columns, *new], replace(table, values=np.column_stack([table.values, *sums]))
+
+
+def _record(
+    source: SourceText, columns: list[Column], table: Table, about: dict[str, str], notes: list[str]
+) -> Imported:
+    times = table.values[:, 0]
+    known = times[np.isfinite(times)]
+    if known.size and np.all(known == np.round(known)):
+        columns = [replace(columns[0], role="step"), *columns[1:]]
+        notes.append("whole-number times are taken for iterations of a steady run")
+    else:
+        columns = [Column("time_s", "s", "time"), *columns[1:]]
+    if any(c.unit in ("N", "Nm") for c in columns):
+        notes.append("newtons only if rhoInf was the density; sector and patches are those of the function object")
+        for axis in "xyz":
+            notes += _balance(columns, table, axis)
+    elif "magUInf" in about or any(c.name in ("Cd", "Cl", "CmPitch") for c in columns):
+        settings = ", ".join(f"{k} {about[k]}" for k in ("magUInf", "lRef", "Aref") if k in about)
+        told = f": {settings}" if settings else " that the file does not state"
+        notes.append(f"coefficients rest on reference values{told}")
+    return history(KIND, source, columns, table, notes, about)
+
+
+def _balance(columns: list[Column], table: Table, axis: str) -> list[str]:
+    """Total against the sum of its parts, where all are recorded: shows swapped or damaged columns."""
+    notes = []
+    by_name = {c.name: table.values[:, k] for k, c in enumerate(columns)}
+    for base, unit in (("force", "N"), ("moment", "Nm")):
+        total = by_name.get(f"{base}_total_{axis}_{unit}")
+        parts = [by_name.get(f"{base}_{part}_{axis}_{unit}") for part in ("pressure", "viscous")]
+        porous = by_name.get(f"{base}_porous_{axis}_{unit}", by_name.get(f"{base}_internal_{axis}_{unit}"))
+        if total is None or parts[0] is None or parts[1] is None:
+            continue
+        with np.errstate(over="ignore", invalid="ignore"):
+            sums = parts[0] + parts[1] + (0.0 if porous is None else porous)
+            off = np.abs(total - sums) > 1e-4 * (np.abs(parts[0]) + np.abs(parts[1]))
+        if np.any(off):
+            rows = int(np.count_nonzero(off))
+            line = table.lines[int(np.flatnonzero(off)[0])]
+            notes.append(f"{base}_total_{axis}_{unit} is not the sum of its parts in {rows} rows (first: line {line})")
+    return notes
+
+
+def _by_patch(
+    source: SourceText, names: list[str], rows: Sequence[tuple[int, str]], about: dict[str, str], notes: list[str]
+) -> Imported:
+    """Table with a patch in the second column (yPlus): one channel for each patch and column."""
+    columns = [Column("Time", "", "step"), *(Column(name) for name in names[1:])]
+    patches: dict[str, list[Row]] = {}
+    for line, text in rows:
+        cells = text.split()
+        patches.setdefault(cells[1] if len(cells) > 1 else "?", []).append(Row(line, (cells[0], *cells[2:])))
+    channels: dict[str, Channel] = {}
+    last = 0
+    prefix = "y_plus" if "y+" in about.get("title", "") else about.get("title", "").strip() or "value"
+    for patch, data in patches.items():
+        record = history(KIND, source, columns, numeric_table(source, columns, data, commas=False))
+        notes += [f"{patch}: {text}" for text in record.warnings]
+        last += record.rows
+        for name in names[1:]:
+            values = record.channels[name].values
+            mean = float(values[-1]) if np.isfinite(values[-1]) else None
+            channels[f"{prefix}_{name}({patch})"] = Channel(values, "", mean, "" if mean is None else "last row")
+    if not channels:
+        raise InputError(Fault(source.name, "", "no rows", "one patch or more"))
+    return Imported(KIND, "cfd", last, channels, tuple(notes),
+                    {"file": source.name, "sha256": source.sha256, **about, "clock": "none"})  # fmt: skip
+
+
+def _probes(source: SourceText, probes: dict[str, str], rows: Sequence[tuple[int, str]], notes: list[str]) -> Imported:
+    """Field at points over time: one channel for each probe and component; the field is named by the file's name."""
+    vector = bool(rows) and "(" in rows[0][1]
+    parts = ("_x", "_y", "_z") if vector else ("",)
+    columns = [Column("Time", "", "time"), *(Column(f"value{p}(probe {k})") for k in probes for p in parts)]
+    wanted = "n" + ("(nnn)" if vector else "n") * len(probes)
+    cells = []
+    for line, text in rows:
+        row = tuple(text.replace("(", " ").replace(")", " ").split())
+        cells.append(Row(line, row if _shape(text) == wanted else (*row[:-1], "damaged parentheses")))
+    table = numeric_table(source, columns, cells, commas=False)
+    where = "; ".join(f"probe {k} at ({at})" for k, at in probes.items())
+    return _record(source, columns, table, {"title": "probes", "probes": where}, [*notes, "the file states no unit"])
+
+
+def _shape(text: str) -> str:
+    """Parentheses of a row with one mark for each number."""
+    return "".join("n" if cell not in "()" else cell for cell in re.findall(r"[()]|[^()\s]+", text))

@@ -1,0 +1,228 @@
+r"""Logs of RCbenchmark / Tyto thrust stands: step tests and continuous records.
+
+Comma-separated, one heading line that names the units::
+
+    Time (s),ESC signal (µs),...,Thrust (gf),...,Motor Electrical Speed (RPM),Motor Optical Speed (RPM),...,App message,
+
+* Two speeds are kept apart and never mixed: ``electrical_rpm`` (from the motor's phases, divided by the number of
+  poles that was set in the stand's software and is not in the file) and ``optical_rpm`` (tape and probe). None of them
+  is called ``rpm``: a ``recording.toml`` says which one to trust. A probe that never saw a mark reads 0 throughout.
+* In a step test every row is the mean of one step and the first time stamps may step back; in a continuous record the
+  slow channels (thrust, torque) are empty in most rows.
+* ``Mechanical Power`` is torque times one of the speeds; which one is found from the numbers and reported.
+* Rows with 0 rpm, spikes, and times that go backwards are kept and flagged.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+
+import numpy as np
+
+from bemt import units
+from bemt.errors import Fault, InputError
+from bemt.imported import Imported
+from bemt.importers import head_text, load_text
+from bemt.importers._headings import heading
+from bemt.importers._recording import Array, Builder, slip, spikes, split_table
+
+__all__ = ["KIND", "read", "sniff"]
+
+KIND = "rcbenchmark"
+MOST_RPM_PER_V = 8000.0
+"""Speed over supply voltage that no usual motor reaches. [(rev/min)/V]"""
+_SPEEDS = ("electrical_rpm", "optical_rpm")
+_HEAD = re.compile(r"(ESC( signal)?( [A-D])?|Motor (Electrical|Optical) Speed( [A-D])?|App message)\b")
+
+
+def sniff(head: bytes | str) -> bool:
+    r"""Tell whether the first line names time and the stand's own channels.
+
+    Parameters
+    ----------
+    head : bytes or str
+        First bytes of a file.
+
+    Returns
+    -------
+    bool
+        True for headings with ``Time (``, an ESC signal or motor speed, and units in parentheses.
+
+    Examples
+    --------
+    >>> sniff("Time (s),ESC signal (µs),Thrust (gf),Motor Optical Speed (RPM)\n"), sniff("Time (s),Thrust (gf)\n")
+    (True, False)
+    """
+    text = head_text(head)
+    line = text.splitlines()[0] if text.strip() else ""
+    cells = [c.strip() for c in re.split(r"[,;\t]", line)]
+    return any(c.startswith("Time (") for c in cells) and sum(bool(_HEAD.match(c)) for c in cells) >= 2
+
+
+def read(path: str | os.PathLike[str]) -> Imported:
+    """Read one log.
+
+    Parameters
+    ----------
+    path : str or path
+        File.
+
+    Returns
+    -------
+    Imported
+        SI channels; ``provenance["mode"]`` is ``steps`` or ``continuous``.
+
+    Raises
+    ------
+    InputError
+        With all faults.
+    """
+    source = load_text(path)
+    table = split_table(source, header=True)
+    twice = sorted({h for h in table.headings if h and table.headings.count(h) > 1})
+    if twice:
+        faults = [Fault(source.name, "1", f"a second column {name!r}", "each column once") for name in twice]
+        raise InputError(faults)
+    build = Builder(table, KIND)
+    for k, text in enumerate(table.headings):
+        if text == "App message" or not text:
+            _messages(build, k, text)
+        else:
+            build.add(k, heading(text))
+    if "time_s" not in build.channels and not build.faults:
+        build.faults.append(Fault(source.name, "1", "no numbers in Time (s)", "the time of every row"))
+    if build.faults:
+        raise InputError(build.faults)
+    said = {"stand": "RCbenchmark / Tyto", "mode": _mode(build)}
+    build.flag_time()
+    _speeds(build)
+    _power(build)
+    for name in ("thrust_N", "torque_Nm", "current_A", "voltage_V"):
+        if name in build.channels and said["mode"] == "continuous":
+            build.flag(np.flatnonzero(spikes(build.channels[name].values)), f"spike of {name}")
+    build.check_magnitudes()
+    _sign(build)
+    return build.finish(said)
+
+
+def _messages(build: Builder, k: int, text: str) -> None:
+    """Messages of the stand's software, row by row."""
+    cells = tuple(row[k] for row in build.table.rows)
+    if any(cells):
+        build.texts["app_message" if text else f"column_{k + 1}"] = cells
+        rows = [i for i, cell in enumerate(cells) if cell]
+        build.warnings.append(f"messages of the stand in {len(rows)} rows, kept as text: {cells[rows[0]][:60]!r} ...")
+
+
+def _mode(build: Builder) -> str:
+    t = build.channels["time_s"].values
+    pulse = build.channels.get("pulse_width_s")
+    if len(t) < 2:
+        return "steps"
+    step = np.diff(t[np.isfinite(t)])
+    slow = step.size > 0 and float(np.median(step)) > 0.5
+    if pulse is None:
+        return "steps" if slow else "continuous"
+    moved = np.diff(pulse.values[np.isfinite(pulse.values)]) != 0
+    return "steps" if slow and moved.size and float(np.mean(moved)) > 0.8 else "continuous"
+
+
+def _at(build: Builder, name: str) -> Array | None:
+    channel = build.channels.get(name)
+    return None if channel is None else channel.values
+
+
+def _speeds(build: Builder) -> None:
+    """Flags of the two speeds, each for itself."""
+    load = _at(build, "thrust_N")
+    seen = 0
+    for name in [n for n in build.channels if n.startswith(_SPEEDS)]:
+        v = _at(build, name)
+        assert v is not None
+        if not np.any(v[np.isfinite(v)] != 0.0):
+            build.warnings.append(f"{name} is 0 in every row: that sensor saw nothing; it is no measurement")
+            continue
+        seen += 1
+        zero = v == 0.0
+        if load is not None and np.any(np.isfinite(load)):
+            loaded = zero & (np.abs(load) > 0.05 * np.nanmax(np.abs(load)))
+            build.flag(np.flatnonzero(loaded), f"{name} is 0 under thrust")
+            zero &= ~loaded
+        build.flag(np.flatnonzero(zero), f"{name} is 0")
+        build.flag(np.flatnonzero(v < 0.0), f"{name} is negative")
+        moving = np.where(v > 0.0, v, np.nan)
+        wild = spikes(moving) | _wild(moving, load)
+        volt = _at(build, "voltage_V")
+        if volt is not None:
+            wild |= moving > MOST_RPM_PER_V * np.where(volt > 0.5, volt, np.inf)
+        build.flag(np.flatnonzero(wild), f"spike of {name}")
+    electrical = [n for n in build.channels if n.startswith("electrical_rpm")]
+    if electrical and seen:
+        build.warnings.append(
+            f"{electrical[0]} is derived from the motor's phases with the number of poles set in the stand's software, "
+            "which the file does not state; check it against an optical speed, or state it in a recording.toml"
+        )
+    both = [_at(build, n) for n in _SPEEDS]
+    if both[0] is not None and both[1] is not None:
+        good = (both[0] > 0) & (both[1] > 0)
+        if np.count_nonzero(good) >= 3:
+            ratio = float(np.median(both[0][good] / both[1][good]))
+            text = f"electrical over optical speed: median {ratio:.4g} in {np.count_nonzero(good)} rows"
+            near = round(ratio) if ratio > 1 else 1
+            whole = near > 1 and abs(ratio / near - 1) < 0.05
+            build.warnings.append(text + (f"; were {near} pole pairs left out?" if whole else ""))
+
+
+def _wild(v: Array, load: Array | None) -> np.ndarray:
+    """Speeds far above what the thrust of the same row allows.
+
+    Thrust goes with the square of the speed; a speed more than 2.5 times what the rest of the file needs for that
+    thrust is a misreading, also at the start of a ramp where neighbours cannot tell.
+    """
+    out = np.zeros(len(v), dtype=bool)
+    if load is None:
+        return out
+    good = np.isfinite(v) & np.isfinite(load) & (load > 0.02 * np.nanmax(np.abs(np.append(load, 0.0))))
+    if np.count_nonzero(good) < 5:
+        return out
+    k = np.sqrt(load[good]) / v[good]
+    usual = float(np.median(k))
+    out[np.flatnonzero(good)[k < usual / 2.5]] = True
+    return out
+
+
+def _power(build: Builder) -> None:
+    """Tell which speed the mechanical power was computed with, and whether the units agree."""
+    power, torque = _at(build, "mechanical_power_W"), _at(build, "torque_Nm")
+    volt, ampere, electric = _at(build, "voltage_V"), _at(build, "current_A"), _at(build, "electrical_power_W")
+    if power is not None and torque is not None:
+        for name in _SPEEDS:
+            speed = _at(build, name)
+            if speed is None:
+                continue
+            shaft = np.abs(torque) * speed * units.RPM
+            good = (shaft > 0.05 * np.nanmax(np.append(shaft, 0.0))) & (power > 0)
+            if np.count_nonzero(good) >= 3:
+                ratio = float(np.median(power[good] / shaft[good]))
+                if math.isclose(ratio, 1.0, rel_tol=0.02):
+                    build.warnings.append(f"mechanical_power_W is torque times {name}")
+                elif name == "optical_rpm" or "optical_rpm" not in build.channels:
+                    text = f"mechanical_power_W is {ratio:.4g} times torque x {name}{slip(ratio)}"
+                    build.warnings.append(text + "; nothing was converted")
+    if volt is not None and ampere is not None and electric is not None:
+        product = volt * ampere
+        good = product > 0.05 * np.nanmax(np.append(product, 0.0))
+        if np.count_nonzero(good) >= 3:
+            ratio = float(np.median(electric[good] / product[good]))
+            if abs(ratio - 1.0) > 0.1:
+                text = f"electrical_power_W is {ratio:.4g} times voltage x current{slip(ratio)}"
+                build.warnings.append(text + "; nothing was converted")
+
+
+def _sign(build: Builder) -> None:
+    for name in ("thrust_N", "torque_Nm"):
+        v = _at(build, name)
+        if v is not None and np.any(np.isfinite(v)) and -np.nanmin(v) > 2.0 * max(np.nanmax(v), 0.0):
+            build.warnings.append(f"{name} is mostly negative: another sign convention? The sign was not changed")

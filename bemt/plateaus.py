@@ -1,0 +1,431 @@
+"""Plateaus: the steady parts of a recording, as means with what is needed to judge them.
+
+From a time series to steady points, in the order below; each sample ends in one plateau or in one entry of what was
+dropped, with the reason.
+
+1. *Steps.* With a command (pulse width, throttle), a step is where the command changes, and a stretch in which it
+   changes all the time is a ramp. Without one, a step is where the medians of the `window` samples before and after
+   differ by more than `least_step` and by more than five standard errors.
+2. *Settling.* The start of a stretch is cut until the running median stays within the band of the second half of the
+   stretch (twice its robust spread, or 1 % of its level). Without a command, the end is cut likewise where the samples
+   of its last window already follow the next step.
+3. *Outliers.* Within what is left, samples further than six robust standard deviations from the running median are
+   dropped, each channel for itself, and counted.
+4. *Verdict.* A plateau that is too short is dropped; one whose level still moves is kept and flagged ``drifts``.
+
+Rows whose time falls are left out and noted. Points reached from below and from above are told apart (``direction``),
+so that hysteresis stays visible.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bemt.errors import Fault, InputError
+
+__all__ = ["Dropped", "Plateau", "Plateaus", "Settings", "find", "standard_error"]
+
+Array = NDArray[np.float64]
+OUTLIER = 6.0
+"""Robust standard deviations from which a sample is an outlier."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Rules of the detection.
+
+    Parameters
+    ----------
+    window : int
+        Samples on each side of a possible step, 3 or more.
+    least_step : float
+        Smallest step that separates plateaus, as a share of the range of the signal. [1]
+    least_samples : int
+        Samples that a plateau must keep after the cuts.
+    least_time_s : float
+        Duration that a plateau must keep after the cuts. [s]
+    drift : float
+        Change over a plateau, relative to its level, from which it is flagged. [1]
+    settle_time_s : float or None
+        Cut this much after every step; None finds the settling from the signal. [s]
+    """
+
+    window: int = 8
+    least_step: float = 0.03
+    least_samples: int = 5
+    least_time_s: float = 0.0
+    drift: float = 0.02
+    settle_time_s: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Plateau:
+    """One steady stretch.
+
+    Parameters
+    ----------
+    start, stop : int
+        Rows, `stop` not included, after the cuts.
+    t0, t1 : float
+        Times of the first and last row [s], or row numbers when there is no time.
+    command : float or None
+        Command during the stretch, in its unit.
+    direction : str
+        ``up`` or ``down`` from the stretch before; ``first`` when there is none.
+    mean, sd, u : mapping of str to float
+        Mean, standard deviation and standard error of the mean by channel, in its unit; the standard error counts
+        samples that follow each other closely as fewer than they are (see `standard_error`).
+    n : mapping of str to int
+        Samples used by channel.
+    outliers : mapping of str to tuple of int
+        Rows dropped by channel; empty ones are left out.
+    settling : int
+        Rows cut at its start.
+    drift : mapping of str to float
+        Change over the plateau by a straight line, relative to the mean. [1]
+    flags : tuple of str
+        ``drifts``, ``not settled``.
+    """
+
+    start: int
+    stop: int
+    t0: float
+    t1: float
+    command: float | None
+    direction: str
+    mean: Mapping[str, float]
+    sd: Mapping[str, float]
+    u: Mapping[str, float]
+    n: Mapping[str, int]
+    outliers: Mapping[str, tuple[int, ...]]
+    settling: int
+    drift: Mapping[str, float]
+    flags: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Dropped:
+    """Rows that belong to no plateau: `start` to `stop` (not included), and why."""
+
+    start: int
+    stop: int
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class Plateaus:
+    """All plateaus of a recording, and what was dropped; together they hold every row once."""
+
+    plateaus: tuple[Plateau, ...]
+    dropped: tuple[Dropped, ...]
+    signal: str
+    rows: int
+    notes: tuple[str, ...] = field(default=())
+
+    def channel(self, name: str) -> Array:
+        """Means of one channel, (N,), NaN where a plateau has no samples of it."""
+        return np.array([p.mean.get(name, math.nan) for p in self.plateaus])
+
+    def direction(self, which: str) -> tuple[Plateau, ...]:
+        """Plateaus reached in one direction (``up`` takes the first one too)."""
+        return tuple(p for p in self.plateaus if p.direction == which or (which == "up" and p.direction == "first"))
+
+
+def standard_error(values: ArrayLike) -> float:
+    """Standard error of the mean of samples that may follow each other closely.
+
+    Parameters
+    ----------
+    values : (N,) array
+        Samples in order, without NaN.
+
+    Returns
+    -------
+    float
+        sd / sqrt(n_eff) with n_eff = n (1 - r) / (1 + r), r the correlation of neighbours, not below 0 and n_eff not
+        below 1; NaN for fewer than two samples.
+
+    Notes
+    -----
+    First-order autoregressive noise; the formula is the large-sample limit.
+
+    Examples
+    --------
+    >>> round(standard_error([1.0, 3.0, 1.0, 3.0]), 6)
+    0.57735
+    """
+    v = np.asarray(values, dtype=float)
+    n = len(v)
+    if n < 2:
+        return math.nan
+    sd = float(np.std(v, ddof=1))
+    d = v - v.mean()
+    power = float(d @ d)
+    r = float(d[1:] @ d[:-1]) / power if power > 0 else 0.0
+    r = min(max(r, 0.0), 1.0 - 1e-9)
+    return sd / math.sqrt(max(n * (1.0 - r) / (1.0 + r), 1.0))
+
+
+def _spread(v: Array) -> float:
+    """Robust standard deviation that is not 0 for quantised samples."""
+    if len(v) < 2:
+        return 0.0
+    mad = 1.4826 * float(np.median(np.abs(v - np.median(v))))
+    lo, hi = np.percentile(v, [15.87, 84.13])
+    distinct = np.diff(np.unique(v))
+    grain = float(distinct.min()) / math.sqrt(12.0) if distinct.size else 0.0
+    return max(mad, 0.5 * float(hi - lo), min(grain, float(np.std(v))))
+
+
+def _running_median(v: Array, half: int) -> Array:
+    n = len(v)
+    half = min(half, max((n - 1) // 2, 0))
+    if half == 0:
+        return v.copy()
+    padded = np.pad(v, half, mode="edge")
+    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1), axis=1))
+
+
+def find(
+    time_s: ArrayLike | None,
+    channels: Mapping[str, ArrayLike],
+    signal: str,
+    command: ArrayLike | None = None,
+    settings: Settings | None = None,
+) -> Plateaus:
+    """Find the plateaus of a recording.
+
+    Parameters
+    ----------
+    time_s : (N,) array or None
+        Time, not falling; None: rows count. [s]
+    channels : mapping of str to (N,) array
+        What to average; NaN where a row has no value.
+    signal : str
+        Channel that decides about steps (without a command) and settling.
+    command : (N,) array or None
+        Pulse width, throttle or similar, in any unit; steps are then where it changes.
+    settings : Settings or None
+        Rules; None takes the defaults.
+
+    Returns
+    -------
+    Plateaus
+        In order of time.
+
+    Raises
+    ------
+    InputError
+        When lengths differ, the signal is missing or has no values, or time falls.
+
+    Examples
+    --------
+    >>> t = np.arange(60) * 0.1
+    >>> got = find(t, {"thrust_N": np.where(t < 3.0, 1.0, 2.0)}, "thrust_N")
+    >>> [(p.mean["thrust_N"], p.direction) for p in got.plateaus]
+    [(1.0, 'first'), (2.0, 'up')]
+    """
+    rules = settings or Settings()
+    data = {name: np.asarray(v, dtype=float) for name, v in channels.items()}
+    t, faults = _checked(time_s, data, signal, command, rules)
+    if faults:
+        raise InputError(faults)
+    n = len(t)
+    notes: list[str] = []
+    if back := _backwards(t):
+        notes.append(f"rows left out because their time falls: {', '.join(map(str, back))}")
+        t = np.maximum.accumulate(t)
+        data = {name: np.where(np.isin(np.arange(n), back), np.nan, v) for name, v in data.items()}
+    used = np.flatnonzero(np.isfinite(data[signal]))
+    dropped: list[Dropped] = []
+    if command is not None:
+        stretches, moving = _by_command(np.asarray(command, dtype=float), rules)
+    else:
+        stretches, moving = _by_signal(data[signal][used], rules)
+        rows = np.append(used, n)
+        stretches = [(int(rows[a]) if a else 0, int(rows[b])) for a, b in stretches]
+        moving = [Dropped(int(rows[d.start]) if d.start else 0, int(rows[d.stop]), d.reason) for d in moving]
+    dropped += moving
+    found: list[Plateau] = []
+    levels: list[float] = []
+    for start, stop in stretches:
+        plateau, cuts = _reduce(t, data, signal, command, start, stop, rules)
+        dropped += cuts
+        if plateau is None:
+            continue
+        level = plateau.command if plateau.command is not None else plateau.mean[signal]
+        way = "first" if not levels else "up" if level >= levels[-1] else "down"
+        levels.append(level)
+        found.append(Plateau(**{**vars(plateau), "direction": way}))
+    order = sorted((d for d in dropped if d.stop > d.start), key=lambda d: d.start)
+    if not found:
+        notes.append("no plateau was found")
+    return Plateaus(tuple(found), tuple(order), signal, n, tuple(notes))
+
+
+def _checked(
+    time_s: ArrayLike | None, data: Mapping[str, Array], signal: str, command: ArrayLike | None, rules: Settings
+) -> tuple[Array, list[Fault]]:
+    faults = []
+    n = len(next(iter(data.values()))) if data else 0
+    t = np.arange(n, dtype=float) if time_s is None else np.asarray(time_s, dtype=float)
+    lengths = {name: len(v) for name, v in data.items()} | {"time_s": len(t)}
+    if command is not None:
+        lengths["command"] = len(np.asarray(command))
+    wrong = [f"{name} has {length}" for name, length in lengths.items() if length != n]
+    if wrong:
+        faults.append(Fault("", "plateaus", ", ".join(wrong), f"{n} values each"))
+    if signal not in data:
+        faults.append(Fault("", "signal", repr(signal), f"one of {', '.join(sorted(data))}"))
+    elif not np.any(np.isfinite(data[signal])):
+        faults.append(Fault("", signal, "no values", "a channel with values"))
+    if not np.all(np.isfinite(t)):
+        faults.append(Fault("", "time_s", "a value that is not finite", "finite times"))
+    elif len(back := _backwards(t)) > max(2, n // 100):
+        got = f"time that falls in {len(back)} rows, first row {back[0]}"
+        faults.append(Fault("", "time_s", got, "times in order", "Sort the file, or split it where its clock restarts"))
+    if rules.window < 3 or rules.least_samples < 2:
+        got = f"window {rules.window}, least_samples {rules.least_samples}"
+        faults.append(Fault("", "settings", got, "window 3 or more, least_samples 2 or more"))
+    return t, faults
+
+
+def _backwards(t: Array) -> list[int]:
+    """Rows whose time lies before that of an earlier row."""
+    return [int(row) for row in np.flatnonzero(t < np.maximum.accumulate(t))]
+
+
+def _by_command(command: Array, rules: Settings) -> tuple[list[tuple[int, int]], list[Dropped]]:
+    """Stretches of constant command; those too short are ramps."""
+    same = np.isclose(command[1:], command[:-1], rtol=1e-9, atol=0.0) | (np.isnan(command[1:]) & np.isnan(command[:-1]))
+    edges = [0, *(np.flatnonzero(~same) + 1).tolist(), len(command)]
+    stretches: list[tuple[int, int]] = []
+    dropped: list[Dropped] = []
+    for a, b in zip(edges[:-1], edges[1:], strict=True):
+        if np.isnan(command[a]):
+            reason = "no command"
+        elif b - a < rules.least_samples:
+            reason = "the command changes"
+        else:
+            stretches.append((a, b))
+            continue
+        if dropped and dropped[-1].stop == a and dropped[-1].reason == reason:
+            dropped[-1] = Dropped(dropped[-1].start, b, reason)
+        else:
+            dropped.append(Dropped(a, b, reason))
+    return stretches, dropped
+
+
+def _by_signal(v: Array, rules: Settings) -> tuple[list[tuple[int, int]], list[Dropped]]:
+    """Stretches between jumps of the medians of neighbouring windows."""
+    n, w = len(v), rules.window
+    if n < 2 * w:
+        return [(0, n)], []
+    medians = np.median(np.lib.stride_tricks.sliding_window_view(v, w), axis=1)
+    jump = np.zeros(n + 1)
+    jump[w : n - w + 1] = np.abs(medians[w:] - medians[: n - 2 * w + 1])
+    noise = 1.4826 * float(np.median(np.abs(np.diff(v) - np.median(np.diff(v))))) / math.sqrt(2.0)
+    lo, hi = np.percentile(v, [1.0, 99.0])
+    least = max(rules.least_step * float(hi - lo), 5.0 * 1.2533 * noise * math.sqrt(2.0 / w))
+    if least <= 0.0:
+        return [(0, n)], []
+    moving = jump > least
+    stretches: list[tuple[int, int]] = []
+    dropped: list[Dropped] = []
+    at = 0
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], moving, [False]]).astype(int)))
+    for a, b in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        if b - a <= 2 * w + 2:  # one step: the peak of the jump is its place
+            peak = a + int(np.argmax(jump[a:b]))
+            first, last = peak, peak
+        else:  # the level moves all the time
+            first, last = min(a + w // 2, n), min(b - w // 2, n)
+        if first > at:
+            stretches.append((at, first))
+        if last > first:
+            dropped.append(Dropped(first, last, "the level moves"))
+        at = last
+    if at < n:
+        stretches.append((at, n))
+    return stretches, dropped
+
+
+def _settled(t: Array, v: Array, rules: Settings) -> tuple[int, bool]:
+    """Samples to cut at the start of a stretch, and whether it settles at all."""
+    n = len(v)
+    if rules.settle_time_s is not None:
+        return int(np.searchsorted(t - t[0], rules.settle_time_s, side="left")), True
+    if n < 4:
+        return 0, True
+    tail = v[n // 2 :]
+    centre, sd = float(np.median(tail)), _spread(tail)
+    band = max(2.0 * sd / math.sqrt(min(rules.window, n // 2)) + 1e-12, 0.01 * abs(centre))
+    smooth = _running_median(v, rules.window // 4)
+    outside = np.flatnonzero(np.abs(smooth - centre) > band + 2.0 * sd)
+    early = outside[outside < n // 2]
+    cut = int(early[-1]) + 1 if early.size else 0
+    return cut, cut < n // 2
+
+
+def _leaving(v: Array, cut: int, rules: Settings) -> int:
+    """Samples at the end of a stretch that already follow the next step (at most a window)."""
+    body = v[cut:]
+    if len(body) < 3 * rules.window:
+        return 0
+    rest = body[: -rules.window]
+    band = max(OUTLIER * _spread(rest[-3 * rules.window :]), 0.01 * abs(float(np.median(rest))))
+    outside = np.flatnonzero(np.abs(body[-rules.window :] - np.median(rest[-3 * rules.window :])) > band)
+    late = rules.window - int(outside[0]) if outside.size else 0
+    return late if late and outside.size >= 0.5 * late else 0  # a single outlier is no step
+
+
+def _reduce(
+    t: Array, data: Mapping[str, Array], signal: str, command: ArrayLike | None, start: int, stop: int, rules: Settings
+) -> tuple[Plateau | None, list[Dropped]]:
+    rows = start + np.flatnonzero(np.isfinite(data[signal][start:stop]))
+    if len(rows) < rules.least_samples:
+        return None, [Dropped(start, stop, f"fewer than {rules.least_samples} samples")]
+    cut, settles = _settled(t[rows], data[signal][rows], rules)
+    if cut >= len(rows):
+        return None, [Dropped(start, stop, "shorter than the settling")]
+    first, end = (int(rows[cut]) if cut else start), stop
+    if command is None and (late := _leaving(data[signal][rows], cut, rules)):
+        stop = int(rows[len(rows) - late])
+    if len(rows) - cut < rules.least_samples or t[stop - 1] - t[first] < rules.least_time_s or stop <= first:
+        return None, [Dropped(start, end, "too short after settling")]
+    mean, sd, u, n, out, drift = {}, {}, {}, {}, {}, {}
+    for name, values in data.items():
+        own = first + np.flatnonzero(np.isfinite(values[first:stop]))
+        v = values[own]
+        if len(v) == 0:
+            continue
+        far = np.zeros(len(v), dtype=bool)
+        if len(v) >= 7:
+            rest = v - _running_median(v, 3)
+            far = np.abs(rest) > OUTLIER * max(_spread(rest), _spread(v) / 3.0, 1e-12 * float(np.max(np.abs(v))))
+        if np.any(far):
+            out[name] = tuple(int(r) for r in own[far])
+        kept, when = v[~far], t[own][~far]
+        mean[name], n[name] = float(np.mean(kept)), len(kept)
+        sd[name] = float(np.std(kept, ddof=1)) if len(kept) > 1 else math.nan
+        u[name] = standard_error(kept)
+        span = float(when[-1] - when[0])
+        if len(kept) > 2 and span > 0.0 and mean[name] != 0.0:
+            x = when - when.mean()
+            drift[name] = float(x @ kept / (x @ x)) * span / abs(mean[name])
+    flags = [] if settles else ["not settled"]
+    change = abs(drift.get(signal, 0.0) * mean.get(signal, 0.0))
+    spans = np.nanmax(data[signal]) - np.nanmin(data[signal])
+    # a drift counts when it also stands out of the noise and is no trifle beside the whole signal
+    if change > max(rules.drift * abs(mean.get(signal, 0.0)), 3.0 * u.get(signal, 0.0), 0.005 * float(spans)):
+        flags.append("drifts")
+    level = None if command is None else float(np.asarray(command, dtype=float)[start])
+    cuts = [Dropped(start, first, "settling"), Dropped(stop, end, "the next step begins")]
+    plateau = Plateau(first, stop, float(t[first]), float(t[stop - 1]), level, "first", mean, sd, u, n, out,
+                      first - start, drift, tuple(flags))  # fmt: skip
+    return plateau, cuts

@@ -1,0 +1,386 @@
+"""CAD solids (cadquery): the same blades, hubs, ducts and stators as the meshes, as smooth surfaces for STEP.
+
+The sections of :mod:`geometry.mesh` lie on cylinders, which lofts do not take. The blade is therefore cut by planes
+across its pitch axis: for every point of an outline the radius is found at which the wrapped blade meets the plane.
+A loft through these planar sections is the same blade. Frame as in :mod:`geometry.mesh`; CAD lengths in millimetres.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from geometry.common import Array, Faults, GeometryError
+from geometry.duct import Duct
+from geometry.mesh import Options, blade_volume, hub_profile, radii, wrapped_outline
+from geometry.mesh_duct import StatorPlan, centre_body, duct_profile, plan_stator
+from geometry.rotor import Rotor
+from geometry.solid import Mesh, profile_volume
+
+__all__ = ["Parts", "assembly", "blade_solid", "planar_sections", "solids", "tessellate"]
+
+MM = 1000.0
+TOLERANCE = 5e-3
+_POINTS = 45
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """CAD solids of a rotor and its duct.
+
+    Parameters
+    ----------
+    solids : tuple of (str, str, object)
+        Surface name (blade, hub, duct, stator), name of the part (blade_1 and so on), cadquery solid in millimetres.
+    volumes : dict of str to float
+        Volume by surface name. [m^3]
+    """
+
+    solids: tuple[tuple[str, str, Any], ...]
+    volumes: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def rotor_volume(self) -> float:
+        """Volume of blades and hub [m^3]."""
+        return self.volumes["blade"] + self.volumes["hub"]
+
+
+def planar_sections(rotor: Rotor, options: Options | None = None) -> list[tuple[float, Array]]:
+    """Cut the wrapped blade by planes across its pitch axis.
+
+    Parameters
+    ----------
+    rotor : Rotor
+        The rotor.
+    options : Options or None
+        Fillet and tolerance; the number of points is the module's own.
+
+    Returns
+    -------
+    list of (float, (n, 2) float)
+        Distance of the plane from the shaft; y and z of the section's points in Selig order. [m]
+
+    Raises
+    ------
+    GeometryError
+        When a blade is so wide that no plane within the hub holds its root.
+
+    Notes
+    -----
+    A point with arc t(rho) lies at x = rho cos(t/rho), y = rho sin(t/rho); x grows with rho while the arc stays below a
+    quarter turn, so that the radius is found by interpolation on a fine table of radii.
+    """
+    blade = rotor.blade
+    options = options or Options()
+    grid = Options(_POINTS, 20 * options.tolerance, options.segments, options.fillet)
+    rho = radii(blade, grid)
+    levels = rho
+    rho = np.sort(np.concatenate([rho, 0.5 * (rho[1:] + rho[:-1])]))
+    step = 0.02 * rotor.R
+    fine = Options(_POINTS, options.tolerance, options.segments, options.fillet)
+    curves = np.stack([wrapped_outline(blade, float(r), fine) for r in rho])
+    angle = curves[..., 0] / rho[:, None]
+    if np.abs(angle).max() > 1.3:
+        raise GeometryError([("chord", f"a section that reaches {math.degrees(np.abs(angle).max()):.0f} deg round the "
+                              "shaft", "75 deg or less for a CAD solid", "Less chord or a larger hub")])  # fmt: skip
+    # Inside the hub the root section goes on; outside the tip the last two rings are continued.
+    outside, slope = [], (curves[-1] - curves[-2]) / (rho[-1] - rho[-2])
+    reach = rotor.R * (1 / math.cos(float(np.abs(angle[-1]).max())) - 1) + step
+    for k in range(1, 9):
+        outside.append(curves[-1] + slope * reach * k / 8)
+    lowest = 0.75 * rotor.Rhub * math.cos(min(float(np.abs(angle[0]).max()) * 1.35, 1.4))
+    inside = np.linspace(max(lowest, 0.3 * rotor.Rhub), rho[0], 9)[:-1]
+    table = np.concatenate([inside, rho, rho[-1] + reach * np.arange(1, 9) / 8])
+    curves = np.concatenate([np.repeat(curves[:1], len(inside), axis=0), curves, np.stack(outside)])
+    angle = curves[..., 0] / table[:, None]
+    x, y = table[:, None] * np.cos(angle), table[:, None] * np.sin(angle) * rotor.rotation
+    bottom, top = float(x[0].max()), float(x[-1].min())
+    root = _inner_plane(curves[0], rotor.Rhub)
+    if root < bottom or top < rotor.R:
+        raise GeometryError([("chord", "a blade too wide for its hub", "a root that ends inside the hub",
+                              "Less chord or a larger hub")])  # fmt: skip
+    planes = np.unique(np.concatenate([[root], levels[(levels > 1.01 * root) & (levels < rotor.R)], [rotor.R + 0.4 * step]]))
+    planes = planes[np.concatenate([[True], np.diff(planes) > 1e-4 * rotor.R])]
+    out = []
+    for plane in planes:
+        section = np.empty((curves.shape[1], 2))
+        for j in range(curves.shape[1]):
+            at = float(np.interp(plane, x[:, j], table))
+            section[j] = _cubic(table, y[:, j], at), _cubic(table, curves[:, j, 1], at)
+            for _ in range(2):  # the straight table misses the plane by a trifle: two corrections along the point's path
+                miss = plane - _cubic(table, x[:, j], at)
+                at += miss
+                section[j] = _cubic(table, y[:, j], at), _cubic(table, curves[:, j, 1], at)
+        out.append((float(plane), section))
+    return out
+
+
+def _cubic(x: Array, y: Array, at: float) -> float:
+    """Interpolate by the cubic through the four nearest points."""
+    i = int(np.clip(np.searchsorted(x, at) - 2, 0, len(x) - 4))
+    xs, ys = x[i : i + 4], y[i : i + 4]
+    total = 0.0
+    for k in range(4):
+        others = np.delete(xs, k)
+        total += float(ys[k] * np.prod((at - others) / (xs[k] - others)))
+    return total
+
+
+def _inner_plane(root: Array, hub: float) -> float:
+    """Plane whose whole section lies inside the hub, with some room."""
+    wide = float(np.abs(root[:, 0]).max())
+    return hub * min(0.94 * math.cos(min(1.15 * wide / hub, 1.45)), 0.9)
+
+
+def _loft(sections: list[tuple[float, Array]]) -> Any:
+    """Smooth loft of two splines per section and, where it is blunt, the trailing edge's line."""
+    import cadquery as cq
+
+    blunt = all(np.linalg.norm(s[0] - s[-1]) > 1e-6 * float(np.ptp(s, axis=0).max()) for _, s in sections)
+    # The same parameters for every section: otherwise the loft's surface takes the knots of all sections together.
+    middle = sections[len(sections) // 2][1]
+    run = np.concatenate([[0.0], np.cumsum(np.sqrt(np.linalg.norm(np.diff(middle, axis=0), axis=1)))])
+    half = len(middle) // 2
+    first, second = (run[: half + 1] / run[half]).tolist(), ((run[half:] - run[half]) / (run[-1] - run[half])).tolist()
+    wires = []
+    for plane, section in sections:
+        points = [cq.Vector(plane * MM, float(y) * MM, float(z) * MM) for y, z in section]
+        if not blunt:
+            points[-1] = points[0] = (points[0] + points[-1]) * 0.5
+        nose = len(points) // 2
+        edges = [cq.Edge.makeSpline(points[: nose + 1], parameters=first),
+                 cq.Edge.makeSpline(points[nose:], parameters=second)]  # fmt: skip
+        if blunt:
+            edges.append(cq.Edge.makeLine(points[-1], points[0]))
+        wires.append(cq.Wire.assembleEdges(edges))
+    return cq.Solid.makeLoft(wires, False)
+
+
+def _turned(profile: Array) -> Any:
+    """Solid of revolution of a closed profile of radius and z [m] round the z axis; straight where three points are."""
+    import cadquery as cq
+
+    points = [cq.Vector(float(r) * MM, 0.0, float(z) * MM) for r, z in profile]
+    edges, i, count = [], 0, len(points)
+    # Dense runs of points are splines, the rest lines: a bore must be a straight line.
+    gap = np.linalg.norm(np.roll(profile, -1, axis=0) - profile, axis=1)
+    small = gap < 0.12 * float(np.ptp(profile, axis=0).max())
+    start = int(np.argmin(small)) + 1 if not small.all() else 0
+    order = [(start + k) % count for k in range(count)]
+    while i < count:
+        j = i
+        while j < count and small[order[j]]:
+            j += 1
+        if j - i >= 4:
+            run = [points[order[k]] for k in range(i, j)] + [points[(order[j - 1] + 1) % count]]
+            edges.append(cq.Edge.makeSpline(run))
+            i = j
+        else:
+            edges.append(cq.Edge.makeLine(points[order[i]], points[(order[i] + 1) % count]))
+            i += 1
+    face = cq.Face.makeFromWires(cq.Wire.assembleEdges(edges))
+    return cq.Solid.revolve(face, 360.0, cq.Vector(0, 0, 0), cq.Vector(0, 0, 1))
+
+
+def _one(shape: Any, where: str) -> Any:
+    """Take the one solid of a shape; it must be valid."""
+    found = [s for s in shape.Solids() if s.Volume() > 0]
+    if not found:
+        raise GeometryError([(where, "no solid", "a solid", "The sections cannot be lofted: less twist or chord?")])
+    best = max(found, key=lambda s: float(s.Volume()))
+    if sum(s.Volume() for s in found) > 1.001 * best.Volume() or not best.isValid():
+        raise GeometryError([(where, f"{len(found)} pieces, valid: {best.isValid()}", "one valid solid", "")])
+    return best
+
+
+def _fixed(solid: Any) -> Any:
+    """Turn a solid inside out when its volume is negative."""
+    return solid if solid.Volume() > 0 else type(solid)(solid.wrapped.Reversed())
+
+
+def blade_solid(rotor: Rotor, options: Options | None = None) -> tuple[Any, Array]:
+    """Make blade 1 as a CAD solid that ends exactly at hub and tip cylinder.
+
+    Parameters
+    ----------
+    rotor : Rotor
+        The rotor.
+    options : Options or None
+        Fillet and tolerance.
+
+    Returns
+    -------
+    solid : cadquery.Solid
+        The blade, in millimetres.
+    hub : (k, 2) float
+        Profile of the hub that fits it. [m]
+
+    Raises
+    ------
+    GeometryError
+        When the sections make no valid solid or its volume is off the integral of the sections.
+    """
+    import cadquery as cq
+
+    options = options or Options()
+    if not rotor.blade.anchors:
+        raise GeometryError([("anchors", "none", "one section or more", "A solid needs sections")])
+    profile = hub_profile(rotor, wrapped_outline(rotor.blade, rotor.Rhub, options))
+    try:
+        loft = _fixed(_loft(planar_sections(rotor, options)))
+        low, high = 2 * float(profile[:, 1].min()) * MM - rotor.R * MM, 2 * rotor.R * MM + 4 * rotor.R * MM
+        low_point = cq.Vector(0, 0, low)
+        tip = cq.Solid.makeCylinder(rotor.R * MM, high, low_point)
+        core = cq.Solid.makeCylinder(rotor.Rhub * MM, high, low_point)
+        solid = _one(loft.intersect(tip).cut(core), "blade")
+    except GeometryError:
+        raise
+    except Exception as error:  # the CAD kernel raises its own kinds
+        name = type(error).__name__
+        raise GeometryError([("blade", f"a failure of the CAD kernel ({name})", "sections that can be lofted",
+                              "Use the mesh formats, which need no loft")]) from error  # fmt: skip
+    expected = blade_volume(rotor.blade, options) * MM**3
+    if abs(solid.Volume() / expected - 1) > TOLERANCE:
+        off = 100 * (solid.Volume() / expected - 1)
+        raise GeometryError([("blade", f"a CAD solid whose volume is {off:+.2f} % off the integral of its sections",
+                              "at most 0.5 %", "Use the mesh formats, which need no loft")])  # fmt: skip
+    return solid, profile
+
+
+def _stator_solids(duct: Duct, plan: StatorPlan) -> list[tuple[str, str, Any]]:
+    import cadquery as cq
+
+    body = _fixed(_turned(centre_body(duct, plan)))
+    outline = plan.outline(41)
+    wide = float(np.abs(outline[:, 0]).max())
+    if wide > 0.9 * plan.body_radius:
+        raise GeometryError([("stator", f"vanes {2 * wide * MM:.3g} mm wide", "vanes that stand on the body", "")])
+    top = 1.3 * float(duct.outer(np.linspace(0, duct.length, 50)).max())
+    flat = np.stack([outline[:, 0], duct._rotor - outline[:, 1]], axis=1)
+    vane = _fixed(_loft([(0.05 * plan.body_radius, flat), (top, flat)]))
+    inner = duct.profile(81)[0]
+    room = np.array([(0.0, duct._rotor), *((r, duct._rotor - x) for x, r in inner), (0.0, duct._rotor - duct.length)])
+    between = _fixed(_turned(_thin(room))).cut(body)
+    vane = _one(vane.intersect(between), "stator")
+    out = [("stator", "centre_body", body)]
+    for k in range(plan.stator.B):
+        turned = vane.moved(cq.Location(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), 360.0 * k / plan.stator.B))
+        out.append(("stator", f"vane_{k + 1}", turned))
+    return out
+
+
+def _thin(points: Array) -> Array:
+    """Drop points on straight lines."""
+    before, after = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
+    bend = np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])
+    out: Array = points[bend > 1e-12 * float(np.ptp(points)) ** 2]
+    return out
+
+
+def solids(rotor: Rotor, duct: Duct | None = None, options: Options | None = None) -> Parts:
+    """Make the CAD solids of a rotor and its duct: parts that touch, none that overlap.
+
+    Parameters
+    ----------
+    rotor : Rotor
+        The rotor.
+    duct : Duct or None
+        The duct.
+    options : Options or None
+        Fillet and tolerance.
+
+    Returns
+    -------
+    Parts
+        Named solids and their volumes.
+
+    Raises
+    ------
+    GeometryError
+        When the numbers make no sound solid, with the reason.
+    """
+    import cadquery as cq
+
+    options = options or Options()
+    blade, profile = blade_solid(rotor, options)
+    found: list[tuple[str, str, Any]] = []
+    for k in range(rotor.B):
+        turned = blade.moved(cq.Location(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), 360.0 * k / rotor.B))
+        found.append(("blade", f"blade_{k + 1}", turned))
+    exact = [("hub", profile)]
+    found.append(("hub", "hub", _fixed(_turned(profile))))
+    if duct is not None:
+        duct.check(rotor)
+        wall = duct_profile(duct)
+        exact.append(("duct", wall))
+        found.append(("duct", "duct", _fixed(_turned(wall))))
+        plan = plan_stator(duct, float(profile[:, 1].min()), rotor.Rhub)
+        if plan is not None:
+            found += _stator_solids(duct, plan)
+    volumes: dict[str, float] = {}
+    for name, _, solid in found:
+        volumes[name] = volumes.get(name, 0.0) + solid.Volume() / MM**3
+    faults = Faults()
+    for name, outline in exact:
+        if abs(volumes[name] / profile_volume(outline) - 1) > TOLERANCE:
+            faults.add(name, f"a CAD volume of {volumes[name]:g} m^3", f"{profile_volume(outline):g} m^3")
+    faults.check()
+    return Parts(tuple(found), volumes)
+
+
+def assembly(parts: Parts, name: str) -> Any:
+    """Gather the solids in a named ``cadquery.Assembly`` for STEP."""
+    import cadquery as cq
+
+    colours = {"blade": (0.2, 0.3, 0.6), "hub": (0.4, 0.4, 0.4), "duct": (0.8, 0.8, 0.8), "stator": (0.6, 0.6, 0.6)}
+    out = cq.Assembly(name=name)
+    for surface, part, solid in parts.solids:
+        out.add(solid, name=part, color=cq.Color(*colours[surface]))
+    return out
+
+
+def tessellate(shape: Any, tolerance: float, angle: float = 0.15) -> Mesh:
+    """Mesh CAD solids; each stays a body of its own.
+
+    Parameters
+    ----------
+    shape : cadquery.Shape
+        Solid or compound, in millimetres.
+    tolerance : float
+        Greatest distance of mesh and surface. [m]
+    angle : float
+        Greatest turn between neighbouring faces. [rad]
+
+    Returns
+    -------
+    Mesh
+        One surface, ``solid``. [m]
+
+    Notes
+    -----
+    Older triangles are removed first: without that the CAD kernel returns them, whatever the tolerance.
+    """
+    from OCP.BRepTools import BRepTools
+
+    vertices: list[Array] = []
+    faces: list[Any] = []
+    count = 0
+    for solid in shape.Solids():
+        BRepTools.Clean_s(solid.wrapped)
+        points, triangles = solid.tessellate(tolerance * MM, angle)
+        raw = np.array([p.toTuple() for p in points]) / MM
+        near, index = np.unique(np.round(raw / (1e-4 * tolerance)), axis=0, return_inverse=True)
+        corner = np.zeros((len(near), 3))
+        corner[index.ravel()] = raw
+        flat = index.ravel()[np.array(triangles, dtype=np.int64)]
+        flat = flat[(flat[:, 0] != flat[:, 1]) & (flat[:, 1] != flat[:, 2]) & (flat[:, 2] != flat[:, 0])]
+        vertices.append(corner)
+        faces.append(flat + count)
+        count += len(corner)
+    if not faces:
+        raise GeometryError([("CAD file", "no solid", "one solid or more", "Surfaces alone enclose no volume")])
+    joined = np.concatenate(faces)
+    return Mesh(np.concatenate(vertices), joined, np.zeros(len(joined), np.int64), ("solid",))

@@ -1,0 +1,319 @@
+"""Files of solids: STL, OBJ, STEP and OpenFOAM surfaces with a manifest; reading STL, OBJ and STEP back.
+
+Everything is written under a temporary name, read back and checked, then renamed: a file that is there is sound.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import shutil
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.common import Array, Faults, GeometryError
+from geometry.duct import Duct
+from geometry.mesh import Model, Options, build
+from geometry.rotor import Rotor
+from geometry.solid import Mesh
+
+__all__ = ["FORMATS", "MANIFEST", "SCHEMA", "UNITS", "export", "read_solid"]
+
+FORMATS = ("stl", "step", "obj", "openfoam")
+UNITS = {"mm": 1e-3, "m": 1.0, "in": 0.0254}
+SCHEMA = "geometry.export/1"
+MANIFEST = "manifest.json"
+VOLUME_TOLERANCE = 5e-3
+FRAME = "z: shaft, towards thrust (upstream); x: pitch axis of blade 1; origin: pitch axes meet the shaft"
+READ_TOLERANCE = 2e-5  # of the size of the part, when CAD surfaces are meshed
+
+
+def export(
+    rotor: Rotor, duct: Duct | None, out: Path, formats: Sequence[str], *, name: str = "rotor", unit: str = "mm",
+    options: Options | None = None,
+) -> dict[str, Any]:  # fmt: skip
+    """Write the solids of a rotor and its duct.
+
+    Parameters
+    ----------
+    rotor : Rotor
+        The rotor.
+    duct : Duct or None
+        The duct.
+    out : Path
+        Folder; it is made.
+    formats : sequence of str
+        Some of ``stl``, ``step``, ``obj``, ``openfoam``.
+    name : str
+        Stem of the files.
+    unit : str
+        ``mm`` or ``m``; OpenFOAM surfaces are in metres whatever it is.
+    options : Options or None
+        How fine.
+
+    Returns
+    -------
+    dict
+        The manifest as written.
+
+    Raises
+    ------
+    GeometryError
+        When there is no sound solid, or a file is not sound when read back; nothing is left behind then.
+    """
+    faults = Faults()
+    for word in formats:
+        if word not in FORMATS:
+            faults.add("format", repr(word), f"some of {', '.join(FORMATS)}")
+    if unit not in ("mm", "m"):
+        faults.add("unit", repr(unit), "mm or m")
+    faults.check()
+    options = options or Options()
+    model = build(rotor, duct, options)
+    fresh = not out.exists()
+    out.mkdir(parents=True, exist_ok=True)
+    work = Path(tempfile.mkdtemp(prefix=".export-", dir=out))
+    try:
+        files: list[dict[str, Any]] = []
+        volumes = {k: v for k, v in model.checks.items() if k.startswith("volume")}
+        for word in dict.fromkeys(formats):
+            if word == "step":
+                files.append(_step(rotor, duct, work, name, unit, options, volumes))
+            elif word == "openfoam":
+                files += _openfoam(model, work)
+            else:
+                files.append(_meshes(model, work, name, word, unit))
+        for item in files:
+            data = (work / item["path"]).read_bytes()
+            item |= {"bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
+        manifest = {
+            "schema": SCHEMA, "name": name, "blades": rotor.B, "rotation": "right" if rotor.rotation > 0 else "left",
+            "diameter_m": rotor.D, "hub_diameter_m": 2 * rotor.Rhub, "frame": FRAME,
+            "tessellation": {"section_points": options.n, "chord_and_angle_tolerance": options.tolerance,
+                             "facets_round_hub": rotor.B * -(-options.segments // rotor.B)},
+            "fillet_m": options.fillet, "volumes_m3": volumes,
+            "checks_m": {k: v for k, v in model.checks.items() if not k.startswith("volume")}, "files": files,
+        }  # fmt: skip
+        (work / MANIFEST).write_text(json.dumps(_rounded(manifest), indent=1) + "\n", encoding="utf-8")
+        (out / MANIFEST).unlink(missing_ok=True)  # a manifest never speaks of files that are being replaced
+        for item in [*(entry["path"] for entry in files), MANIFEST]:
+            (out / item).parent.mkdir(parents=True, exist_ok=True)
+            os.replace(work / item, out / item)
+        return manifest
+    except BaseException:
+        shutil.rmtree(work, ignore_errors=True)
+        if fresh and not any(out.iterdir()):
+            out.rmdir()
+        raise
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
+
+
+def _rounded(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {k: _rounded(v) for k, v in value.items()}
+    if isinstance(value, list):
+        return [_rounded(v) for v in value]
+    return float(f"{float(value):.9g}") if isinstance(value, (float, np.floating)) else value
+
+
+def _surfaces(model: Model) -> list[dict[str, Any]]:
+    return [{"name": name, "triangles": len(part.part(name)), "area_m2": part.area(name)}
+            for part in model.parts for name in part.names]  # fmt: skip
+
+
+def _stl(vertices: Array, faces: NDArray[np.int64], title: str) -> str:
+    """One named solid of an ASCII STL; nine digits, so that a corner is the same text wherever it occurs."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    normal = np.cross(b - a, c - a)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    row = "facet normal %.5g %.5g %.5g\nouter loop\n" + "vertex %.9g %.9g %.9g\n" * 3 + "endloop\nendfacet\n"
+    body = (row * len(faces)) % tuple(np.concatenate([normal, a, b, c], axis=1).ravel().tolist())
+    return f"solid {title}\n{body}endsolid {title}\n"
+
+
+def _clean(part: Mesh, scale: float) -> tuple[Array, NDArray[np.int64], NDArray[np.int64]]:
+    """Vertices as the files hold them (nine digits), faces that are still triangles, their groups."""
+    values = part.vertices / scale
+    values = np.where(np.abs(values) < 1e-9 * float(np.abs(values).max()), 0.0, values)
+    _, first, index = np.unique(np.round(values, 9), axis=0, return_index=True, return_inverse=True)
+    faces = index.ravel()[part.faces]
+    keep = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
+    return values[first], faces[keep], part.group[keep]
+
+
+def _meshes(model: Model, work: Path, name: str, kind: str, unit: str) -> dict[str, Any]:
+    """STL with one named solid per surface, or OBJ with one group per surface."""
+    pieces = [f"# unit: {unit}\n# {FRAME}\n"] if kind == "obj" else []
+    count = 0
+    for part in model.parts:
+        vertices, faces, group = _clean(part, UNITS[unit])
+        if kind == "obj":
+            pieces.append(("v %.9g %.9g %.9g\n" * len(vertices)) % tuple(vertices.ravel().tolist()))
+        for k, surface in enumerate(part.names):
+            chosen = faces[group == k]
+            if kind == "obj":
+                rows = ("f %d %d %d\n" * len(chosen)) % tuple((chosen + 1 + count).ravel().tolist())
+                pieces.append(f"g {surface}\n{rows}")
+            else:
+                pieces.append(_stl(vertices, chosen, f"{surface} unit={unit}"))
+        count += len(vertices)
+    path = work / f"{name}.{kind}"
+    path.write_text("".join(pieces), encoding="ascii")
+    expected = sum(part.volume for part in model.parts)
+    _check_file([path], UNITS[unit], expected, len(model.parts))
+    return {"path": path.name, "format": kind, "unit": unit, "watertight": True, "surfaces": _surfaces(model)}
+
+
+def _openfoam(model: Model, work: Path) -> list[dict[str, Any]]:
+    folder = work / "constant" / "triSurface"
+    folder.mkdir(parents=True)
+    out, paths = [], []
+    for part in model.parts:
+        vertices, faces, group = _clean(part, 1.0)
+        for k, surface in enumerate(part.names):
+            path = folder / f"{surface}.stl"
+            path.write_text(_stl(vertices, faces[group == k], surface), encoding="ascii")
+            paths.append(path)
+            row = next(s for s in _surfaces(model) if s["name"] == surface)
+            out.append({"path": path.relative_to(work).as_posix(), "format": "openfoam", "unit": "m",
+                        "watertight": "together with the other surfaces", "surfaces": [row]})  # fmt: skip
+    _check_file(paths, 1.0, sum(part.volume for part in model.parts), len(model.parts))
+    return out
+
+
+def _check_file(paths: Sequence[Path], scale: float, volume: float, bodies: int) -> None:
+    """Read files back; together they must be the closed solids that were meant."""
+    import trimesh
+
+    read = [read_solid(path) for path in paths]
+    start = np.cumsum([0, *(len(v) for v, _, _ in read)])
+    faces = np.concatenate([f + n for (_, f, _), n in zip(read, start, strict=False)])
+    solid = trimesh.Trimesh(np.concatenate([v for v, _, _ in read]), faces, process=False)
+    solid.merge_vertices(digits_vertex=12)
+    where, faults = ", ".join(path.name for path in paths), Faults()
+    if not (solid.is_watertight and solid.is_winding_consistent):
+        faults.add(where, "a file with open or twisted edges when read back", "closed solids")
+    if abs(solid.volume * scale**3 / volume - 1) > 1e-5:
+        faults.add(where, f"{solid.volume * scale**3:g} m^3 when read back", f"{volume:g} m^3")
+    if not faults.found and solid.body_count != bodies:
+        faults.add(where, f"{solid.body_count} bodies when read back", f"{bodies}")
+    faults.check()
+
+
+def _step(
+    rotor: Rotor, duct: Duct | None, work: Path, name: str, unit: str, options: Options, volumes: dict[str, float]
+) -> dict[str, Any]:
+    """Named solids; read back, each must be valid and have the volume of the mesh within 0.5 %."""
+    import cadquery as cq
+    from OCP.Interface import Interface_Static
+    from OCP.STEPControl import STEPControl_Controller
+
+    from geometry.cad import assembly, solids
+
+    parts = solids(rotor, duct, options)
+    volumes["volume_rotor_cad"] = parts.rotor_volume
+    meshed = volumes["volume_rotor_mesh"]
+    path = work / f"{name}.step"
+    STEPControl_Controller.Init_s()
+    Interface_Static.SetCVal_s("write.step.unit", "M" if unit == "m" else "MM")
+    try:
+        assembly(parts, name).export(str(path))
+    finally:
+        Interface_Static.SetCVal_s("write.step.unit", "MM")
+    text = path.read_text(encoding="utf-8", errors="replace")
+    path.write_text(re.sub(r"\d{4}-\d\d-\d\dT[\d:]{8}", "2000-01-01T00:00:00", text, count=1), encoding="utf-8")
+    back = cq.importers.importStep(str(path)).solids().vals()
+    total = sum(solid.Volume() for solid in back) * 1e-9
+    faults = Faults()
+    if len(back) != len(parts.solids) or not all(solid.isValid() for solid in back):
+        faults.add(path.name, f"{len(back)} solids when read back", f"{len(parts.solids)} valid ones")
+    if abs(total / sum(parts.volumes.values()) - 1) > 1e-4:
+        faults.add(path.name, f"{total:g} m^3 when read back", f"{sum(parts.volumes.values()):g} m^3")
+    if abs(parts.rotor_volume / meshed - 1) > VOLUME_TOLERANCE:
+        faults.add(path.name, f"a rotor of {parts.rotor_volume:g} m^3", f"that of the mesh, {meshed:g} m^3")
+    faults.check()
+    surfaces = [{"name": key, "volume_m3": value} for key, value in parts.volumes.items()]
+    return {"path": path.name, "format": "step", "unit": unit, "watertight": True, "surfaces": surfaces,
+            "solids": [part for _, part, _ in parts.solids]}  # fmt: skip
+
+
+def _said_unit(path: Path) -> str | None:
+    """Unit that a file of this module states in its head."""
+    with path.open("rb") as stream:
+        head = stream.read(300).decode("latin-1")
+    found = re.search(r"^solid \w+ unit=(mm|m|in)\s|^# unit: (mm|m|in)\s", head, re.M)
+    return None if found is None else found[1] or found[2]
+
+
+def read_solid(path: Path) -> tuple[Array, NDArray[np.int64], str | None]:
+    """Read the triangles of an STL, OBJ or STEP file.
+
+    Parameters
+    ----------
+    path : Path
+        The file; its ending names the format.
+
+    Returns
+    -------
+    vertices : (N, 3) float
+        Corners in the file's unit, equal ones merged; STEP in metres. [unit of the file]
+    faces : (M, 3) int
+        Triangles.
+    unit : str or None
+        ``mm``, ``m`` or ``in`` when the file states it, else None.
+
+    Raises
+    ------
+    GeometryError
+        When the file is none of these, or cannot be read.
+    """
+    kind = path.suffix.lower()
+    where = path.as_posix()
+    if kind not in (".stl", ".obj", ".step", ".stp"):
+        raise GeometryError([(where, f"the ending {kind or 'none'!r}", ".stl, .obj, .step or .stp", "")])
+    if not path.is_file():
+        raise GeometryError([(where, "no file", "an STL, OBJ or STEP file", "Check the path")])
+    try:
+        if kind in (".step", ".stp"):
+            return _read_step(path)
+        import trimesh
+
+        with path.open("rb") as stream:
+            loaded = trimesh.load(stream, file_type=kind[1:], force="mesh", process=False)
+        vertices = np.asarray(loaded.vertices, dtype=np.float64)
+        faces = np.asarray(loaded.faces, dtype=np.int64)
+    except GeometryError:
+        raise
+    except Exception as error:  # readers of other people's files raise every kind
+        text = f"content that cannot be read ({type(error).__name__}: {str(error)[:80]})"
+        raise GeometryError([(where, text, f"a sound {kind[1:].upper()} file", "Truncated?")]) from error
+    if len(faces) < 20 or not np.isfinite(vertices).all():
+        raise GeometryError([(where, f"{len(faces)} triangles", "a mesh of 20 triangles or more", "Truncated?")])
+    # Corners that differ by less than single precision are one.
+    size = float(np.abs(vertices).max())
+    cell = max(size, 1e-300) * 2e-8
+    _, first, index = np.unique(np.round(vertices / cell), axis=0, return_index=True, return_inverse=True)
+    faces = index.ravel()[faces]
+    faces = faces[(faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])]
+    return vertices[first], faces, _said_unit(path)
+
+
+def _read_step(path: Path) -> tuple[Array, NDArray[np.int64], str | None]:
+    import cadquery as cq
+
+    from geometry.cad import tessellate
+
+    shape = cq.Compound.makeCompound(cq.importers.importStep(str(path)).solids().vals())
+    if not shape.Solids():
+        raise GeometryError([(path.as_posix(), "no solid", "one solid or more", "Surfaces alone enclose no volume")])
+    size = shape.BoundingBox().DiagonalLength / 1000
+    mesh = tessellate(shape, READ_TOLERANCE * size)
+    return mesh.vertices, mesh.faces, "m"

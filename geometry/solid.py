@@ -1,0 +1,226 @@
+"""Closed triangle meshes with named surfaces: skins, solids of revolution, exact unions, the checks of a solid.
+
+Lengths in metres; the shaft is the z axis. The union is that of manifold3d, the checks are those of trimesh.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.common import Array, Faults, GeometryError
+
+__all__ = ["Mesh", "Options", "as_solid", "check_closed", "join", "profile_volume", "revolve", "skin"]
+
+Faces = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Options:
+    """How fine a solid is made, and what it must keep.
+
+    Parameters
+    ----------
+    n : int
+        Points of a section, odd, 21 or more.
+    tolerance : float
+        Greatest error of chord and blade angle between two rings, of their value; 2e-3 or less keeps the promise. [-]
+    segments : int
+        Facets round hub and duct, at least.
+    fillet : float
+        Radius of the fillet between blade and hub; 0 is none. [m]
+    min_thickness : float
+        Smallest section thickness that is let pass; 0 lets all pass. [m]
+
+    Examples
+    --------
+    >>> Options(n=61).tolerance
+    0.0004
+    """
+
+    n: int = 101
+    tolerance: float = 4e-4
+    segments: int = 240
+    fillet: float = 0.0
+    min_thickness: float = 0.0
+
+    def __post_init__(self) -> None:
+        faults = Faults()
+        if self.n < 21 or self.n % 2 == 0:
+            faults.add("n", f"{self.n}", "an odd number of points, 21 or more")
+        faults.number("tolerance", self.tolerance, 1e-6, 0.05)
+        faults.number("segments", self.segments, 12, 20000)
+        faults.number("fillet", self.fillet, 0.0, 1.0, "m")
+        faults.number("min_thickness", self.min_thickness, 0.0, 1.0, "m")
+        faults.check()
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A closed triangle mesh whose faces carry names.
+
+    Parameters
+    ----------
+    vertices : (N, 3) float
+        Corners. [m]
+    faces : (M, 3) int
+        Corners of each face, counter-clockwise seen from outside.
+    group : (M,) int
+        Index into `names` of each face.
+    names : tuple of str
+        Surfaces: blade, hub, duct, stator.
+    """
+
+    vertices: Array
+    faces: Faces
+    group: NDArray[np.int64]
+    names: tuple[str, ...]
+
+    @property
+    def volume(self) -> float:
+        """Enclosed volume by the divergence theorem [m^3]."""
+        a, b, c = (self.vertices[self.faces[:, k]] for k in range(3))
+        return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
+
+    def area(self, name: str) -> float:
+        """Return the area of one named surface [m^2]."""
+        a, b, c = (self.vertices[self.faces[self.group == self.names.index(name), k]] for k in range(3))
+        return float(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+
+    def part(self, name: str) -> Faces:
+        """Return the faces of one named surface."""
+        out: Faces = self.faces[self.group == self.names.index(name)]
+        return out
+
+    def trimesh(self) -> Any:
+        """Return the mesh as a ``trimesh.Trimesh``, vertices untouched."""
+        import trimesh
+
+        return trimesh.Trimesh(self.vertices, self.faces, process=False)
+
+
+def skin(points: Array, closed_ends: bool = True) -> tuple[Array, Faces]:
+    """Mesh rings (N, m, 3) of one topology with caps at both ends; the result is oriented outwards."""
+    rows, m = points.shape[:2]
+    index = np.arange(rows * m).reshape(rows, m)
+    a, b = index[:-1], index[1:]
+    a1, b1 = np.roll(a, -1, axis=1), np.roll(b, -1, axis=1)
+    faces = [np.stack([a, a1, b1], -1).reshape(-1, 3), np.stack([a, b1, b], -1).reshape(-1, 3)]
+    if closed_ends:
+        k = np.arange((m + 1) // 2)  # pairs k and -1-k; an even m is a sharp edge, whose pair is itself
+        last = (m - 1 - k) if m % 2 else (m - k) % m
+        cap = []
+        for i in range(len(k) - 1):
+            cap += [(k[i], last[i + 1], k[i + 1]), (k[i], last[i], last[i + 1])]
+        if m % 2 == 0:
+            cap.append((k[-1], last[-1], m // 2))
+        strip = np.array([t for t in cap if len(set(t)) == 3])
+        faces += [index[0][strip], index[-1][strip[:, ::-1]]]
+    vertices, out = points.reshape(-1, 3), np.concatenate(faces)
+    if Mesh(vertices, out, np.zeros(len(out), np.int64), ("",)).volume < 0:
+        out = out[:, ::-1]
+    return vertices, out
+
+
+def revolve(profile: Array, segments: int) -> tuple[Array, Faces]:
+    """Solid of revolution of a closed profile (k, 2) of radius and z; points on the axis become poles."""
+    scale = math.sqrt((2 * math.pi / segments) / math.sin(2 * math.pi / segments))  # keeps areas, hence volumes
+    angle = 2 * math.pi * np.arange(segments) / segments
+    ids, vertices = [], []
+    count = 0
+    for rho, z in profile:
+        if rho < 1e-12:
+            ids.append(np.full(segments, count))
+            vertices.append(np.array([[0.0, 0.0, z]]))
+        else:
+            ids.append(count + np.arange(segments))
+            ring = [rho * scale * np.cos(angle), rho * scale * np.sin(angle), np.full(segments, z)]
+            vertices.append(np.stack(ring, axis=1))
+        count += len(vertices[-1])
+    faces = []
+    for a, b in zip(ids, ids[1:] + ids[:1], strict=True):
+        a1, b1 = np.roll(a, -1), np.roll(b, -1)
+        faces += [np.stack([a, a1, b1], 1), np.stack([a, b1, b], 1)]
+    out = np.concatenate(faces)
+    out = out[(out[:, 0] != out[:, 1]) & (out[:, 1] != out[:, 2]) & (out[:, 2] != out[:, 0])]
+    points = np.concatenate(vertices)
+    if Mesh(points, out, np.zeros(len(out), np.int64), ("",)).volume < 0:
+        out = out[:, ::-1]
+    return points, out
+
+
+def profile_volume(profile: Array) -> float:
+    """Exact volume of revolution of a closed profile (radius, z) (Pappus)."""
+    r, z = profile.T
+    r1, z1 = np.roll(r, -1), np.roll(z, -1)
+    return abs(float(np.pi / 3 * np.sum((z1 - z) * (r * r + r * r1 + r1 * r1))))
+
+
+def as_solid(vertices: Array, faces: Faces, where: str) -> Any:
+    import manifold3d
+
+    data = manifold3d.Mesh64(np.ascontiguousarray(vertices, dtype=np.float64), faces.astype(np.uint64))
+    solid = manifold3d.Manifold(data)
+    if solid.status() != manifold3d.Error.NoError or solid.is_empty():
+        raise GeometryError([(where, f"a surface that closes no volume ({solid.status().name})", "a closed surface", "")])
+    return solid.as_original()
+
+
+def join(parts: Sequence[tuple[str, Any]], where: str) -> Mesh:
+    """Union of named solids; every face keeps the name of the solid that it comes from."""
+    import manifold3d
+
+    total = manifold3d.Manifold.batch_boolean([solid for _, solid in parts], manifold3d.OpType.Add)
+    if total.is_empty():
+        raise GeometryError([(where, "solids whose union is empty", "solids that can be joined", "")])
+    data = total.to_mesh64()
+    names = tuple(dict.fromkeys(name for name, _ in parts))
+    by_id = {solid.original_id(): names.index(name) for name, solid in parts}
+    faces = np.asarray(data.tri_verts, dtype=np.int64)
+    group = np.zeros(len(faces), np.int64)
+    edges = np.asarray(data.run_index, dtype=np.int64) // 3
+    for start, stop, key in zip(edges[:-1], edges[1:], data.run_original_id, strict=True):
+        group[start:stop] = by_id[int(key)]
+    vertices = np.asarray(data.vert_properties, dtype=np.float64)[:, :3]
+    # Vertices that differ in their properties alone are one.
+    root = np.arange(len(vertices))
+    root[np.asarray(data.merge_from_vert, dtype=np.int64)] = np.asarray(data.merge_to_vert, dtype=np.int64)
+    used, faces = np.unique(root[faces], return_inverse=True)
+    return Mesh(vertices[used], faces.reshape(-1, 3), group, names)
+
+
+def check_closed(mesh: Mesh, where: str, bodies: int | None = None) -> None:
+    """Check with trimesh that a mesh is a solid.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh.
+    where : str
+        Name for messages.
+    bodies : int or None
+        How many separate bodies there must be; None does not ask.
+
+    Raises
+    ------
+    GeometryError
+        With everything that is wrong.
+    """
+    solid = mesh.trimesh()
+    faults = Faults()
+    if not np.isfinite(mesh.vertices).all():
+        faults.add(where, "coordinates that are no numbers", "finite numbers")
+    if not solid.is_watertight:
+        faults.add(where, "a mesh with open edges", "a watertight mesh")
+    if not solid.is_winding_consistent:
+        faults.add(where, "faces that disagree on what is outside", "one winding")
+    if mesh.volume <= 0:
+        faults.add(where, f"a volume of {mesh.volume:g} m^3", "a positive volume")
+    if bodies is not None and not faults.found and solid.body_count != bodies:
+        faults.add(where, f"{solid.body_count} separate bodies", f"{bodies}", "Parts that do not touch?")
+    faults.check()

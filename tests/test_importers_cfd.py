@@ -1,0 +1,423 @@
+"""The promise of the CFD importers: read by the header, or refused with the reason; damage is never silent."""
+# ruff: noqa: E501 - samples as they look in files
+
+from __future__ import annotations
+
+import gzip
+import random
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bemt import importers
+from bemt.errors import InputError
+from bemt.import_files import document, import_file
+from bemt.imported import Imported
+from bemt.importers import _cfd
+
+RNG = np.random.default_rng(20)
+N = 40
+
+
+def _history(rows: int = N) -> np.ndarray:
+    """Step, thrust near -12 (as projected), torque near 0.3, time: no two columns share a value."""
+    k = np.arange(1, rows + 1)
+    return np.column_stack([k + 100, -12.0 + 0.01 * np.sin(k), 0.3 + 0.001 * np.cos(k), 1e-3 * k])
+
+
+def report(names: tuple[str, ...] = ("Time Step", "thrust(blade)", "torque", "flow-time"), rows: int = N) -> str:
+    head = f'"thrust-rfile"\n"{names[0]}" "{names[1]} etc.."\n(' + " ".join(f'"{n}"' for n in names) + ")\n"
+    return head + "".join(f"{int(s)} {t:.9g} {q:.9g} {time:.9g}\n" for s, t, q, time in _history(rows))
+
+
+def monitor() -> str:
+    rows = "".join(f"{time:.5e}     {t:.5e}\r\n" for _, t, _, time in _history())
+    return '"Drag Convergence"\r\n"Flow Time" "cd"\r\n' + rows
+
+
+def xy() -> str:
+    zones = []
+    for zone, shift in (("inlet", 5.0), ("x=10d", 50.0)):
+        zones.append(f'((xy/key/label "{zone}")\n' + "".join(f"{0.01 * k:g}\t{shift + k:g}\n" for k in range(12)) + ")\n")
+    return '(title "Axial Velocity")\n(labels "Position" "Axial Velocity")\n\n' + "\n".join(zones)
+
+
+def forces(unit: str = "n") -> str:
+    zones = {"blade:1": (-10.25, -0.5), "hub": (1.25, -0.0625), "duct": (-4.5, -0.125)}
+    zones["Net"] = tuple(sum(v[k] for v in zones.values()) for k in (0, 1))  # type: ignore[assignment]
+    names = "Pressure        Viscous         Total"
+    text = '                  "Force Report"\n\nForces\n' + f"             Forces ({unit})                             Coefficients\n"
+    text += f"Zone      {names}      {names}\n"
+    lines, scalars = [], []
+    for zone, (p, v) in zones.items():
+        cells = [f"({a:g} {2 * a:g} 0)" for a in (p, v, p + v, p / 4, v / 4, (p + v) / 4)]
+        lines.append(f"{zone:24s}  " + "  ".join(cells) + "  ")
+        scalars.append(f"{zone:24s}  " + "  ".join(f"{a:g}" for a in (p, v, p + v, p / 4, v / 4, (p + v) / 4)) + "  ")
+    rule = "------------------------ --------------- ---------------\n"
+    text += "\n".join(lines[:-1]) + "\n" + rule + lines[-1] + "\n\nForces - Direction Vector (1 0 0)\n"
+    text += f"             Forces ({unit})                             Coefficients\nZone      {names}      {names}\n"
+    return text + "\n".join(scalars[:-1]) + "\n" + rule + scalars[-1] + "\n"
+
+
+def transcript() -> str:
+    out = ["              Welcome to ANSYS Fluent 2025 R2", "     1061927 cells,     3 cell zones ...", ""]
+    for k in range(3):
+        out += ["  iter  continuity  x-velocity           k     time/iter",
+                f" {10 + k}  1.8226e-0{k + 2}  1.1633e-05  1.1935e-04  0:01:28   15",
+                f"Flow time = {0.5 + 0.001 * k:.15g}s, time step = {20 + k}", ""]  # fmt: skip
+    out += ["                          Moment               [N m]", "-------------------------------- -------------------",
+            "                           blade         -0.18741116", "(cx-gui-do cx-activate-item)", ""]  # fmt: skip
+    return "\n".join(out)
+
+
+def post() -> str:
+    head = "[Name]\nBlade\n\n[Data]\nX [ m ], Y [ m ], Wall Shear [ Pa ], Velocity u [ m s^-1 ], X [ m ]\n"
+    return head + "".join(f"{k}.5e-02, {k}.25e-01, {k}.125, {k + 70}.5, {k}.5e-02\n" for k in range(10))
+
+
+def ascii_nodes() -> str:
+    head = "nodenumber,    x-coordinate,    y-coordinate,        pressure\n"
+    return head + "".join(f"{k:10d},{k + 0.5:16.9E},{-k - 0.25:16.9E},{1000 + k:16.9E}\n" for k in range(1, 15))
+
+
+def foam_new() -> str:
+    names = " ".join(f"{p}_{a}" for p in ("total", "pressure", "viscous") for a in "xyz")
+    text = f"# Force\n# CofR          : (0 0 0)\n#\n# Time          \t{names}\n"
+    for k in range(1, N):
+        p, v = np.array([20.0, 3.0, 2.0]) + 0.01 * k, np.array([-0.5, 0.25, 0.125])
+        text += f"{0.001 * k:g}\t" + " ".join(f"{x:.8e}" for x in (*(p + v), *p, *v)) + "\n"
+    return text
+
+
+def foam_old() -> str:
+    text = "# Forces\n# CofR       : (0 0 0)\n# Time       forces(pressure viscous porous)\tmoments(pressure viscous porous)\n"
+    for k in range(1, 14):
+        force = f"({20 + k}.5 {3 + k}.25 0) (-0.5 0.{k:02d} 0) (0 0 0)"
+        text += f"{10 * k:<12d}\t({force}) ((0 0 {60 + k}.5) (0 0 0.25) (0 0 0))\n"
+    return text
+
+
+def su2() -> str:
+    head = '"Time_Iter","Outer_Iter","Inner_Iter",     "rms[Rho]"     ,       "CD"       ,       "CL"       \n'
+    rows = "".join(f"{0:11d}, {0:11d}, {k:11d}, {-1 - 0.01 * k:17.10g}, {0.25 + 1e-4 * k:17.10g}, {70 + k:17.10g}\n" for k in range(N))
+    return head + rows
+
+
+SAMPLES: dict[str, Callable[[], str]] = {
+    "fluent_report": report, "fluent_monitor": monitor, "fluent_xy": xy, "fluent_forces": forces,
+    "fluent_transcript": transcript, "cfd_post_csv": post, "fluent_ascii": ascii_nodes, "openfoam_forces": foam_new,
+    "openfoam_forces:old": foam_old, "su2_history": su2,
+}  # fmt: skip
+
+
+@pytest.fixture
+def put(tmp_path: Path) -> Callable[..., Path]:
+    def write(data: str | bytes, name: str = "file.out") -> Path:
+        path = tmp_path / name
+        path.write_bytes(data.encode() if isinstance(data, str) else data)
+        return path
+
+    return write
+
+
+@pytest.mark.parametrize("form", SAMPLES)
+def test_every_format_is_found_by_content_whatever_its_name_encoding_or_packing(
+    put: Callable[..., Path], form: str
+) -> None:
+    text = SAMPLES[form]()
+    plain = importers.read(put(text, "a.xyz"))
+    assert plain.format == form.split(":")[0]
+    variants = {
+        "bom": b"\xef\xbb\xbf" + text.encode(), "utf16": text.encode("utf-16"), "gzip": gzip.compress(text.encode()),
+        "crlf": text.replace("\r\n", "\n").replace("\n", "\r\n").encode(),
+        "mixed": "".join(p + ("\r\n" if k % 2 else "\n") for k, p in enumerate(text.splitlines())).encode(),
+    }  # fmt: skip
+    for name, data in variants.items():
+        path = put(data, name)
+        assert importers.detect(path) == plain.format, name
+        other = importers.read(path)
+        assert list(other.channels) == list(plain.channels) and other.rows == plain.rows, name
+        for key, channel in plain.channels.items():
+            np.testing.assert_array_equal(channel.values, other.channels[key].values, err_msg=name)
+
+
+def test_columns_go_by_the_third_header_line(put: Callable[..., Path]) -> None:
+    names = ("thrust(blade)", "flow-time", "Time Step", "torque")
+    data = _history()[:, [1, 3, 0, 2]]
+    text = '"t"\n"Time Step" "thrust etc.."\n(' + " ".join(f'"{n}"' for n in names) + ")\n"
+    text += "".join(" ".join(f"{v:.9g}" for v in row) + "\n" for row in data)
+    record = import_file(put(text))
+    assert record.channels["torque"].mean == pytest.approx(0.3, abs=1e-3)
+    assert record.channels["thrust(blade)"].mean == pytest.approx(-12.0, abs=1e-2)  # the sign is that of the file
+    assert record.channels["time_s"].unit == "s" and record.channels["time_s"].mean is None
+    assert record.channels["torque"].unit == ""  # stated nowhere, so none
+
+
+def test_a_report_file_without_its_third_line_is_refused(put: Callable[..., Path]) -> None:
+    lines = report().splitlines(keepends=True)
+    path = put("".join(lines[:2] + lines[3:]))
+    assert importers.detect(path) == "fluent_report"
+    with pytest.raises(InputError, match="Line 3 of a report file lists all names; line 2 is abbreviated"):
+        importers.read(path)
+
+
+def test_a_report_file_without_a_value_column_says_so(put: Callable[..., Path]) -> None:
+    text = '"t"\n"Time Step"\n("Time Step" "flow-time")\n' + "".join(f"{k} {k * 0.1:.3f}\n" for k in range(5))
+    assert "the file has no column of values, only its clock" in import_file(put(text)).warnings
+
+
+@pytest.mark.parametrize(("where", "kept"), [("rows", None), ("header", None), ("both", "torque")])
+@pytest.mark.parametrize("dropped", [0, 1, 2, 3])
+def test_a_dropped_column_never_shifts_the_others(
+    put: Callable[..., Path], dropped: int, where: str, kept: str | None
+) -> None:
+    names = ["Time Step", "thrust", "torque", "flow-time"]
+    rows = [[f"{v:.9g}" for v in row] for row in _history()]
+    if where != "header":
+        rows = [[c for k, c in enumerate(row) if k != dropped] for row in rows]
+    if where != "rows":
+        names = [n for k, n in enumerate(names) if k != dropped]
+    text = '"t"\n"x etc.."\n(' + " ".join(f'"{n}"' for n in names) + ")\n" + "".join(" ".join(r) + "\n" for r in rows)
+    if where != "both":
+        with pytest.raises(InputError, match="A column was dropped or added"):
+            importers.read(put(text))
+        return
+    record = importers.read(put(text))
+    for name, low, high in (("thrust", -12.1, -11.9), ("torque", 0.29, 0.31)):
+        if name in record.channels:
+            assert low < record.channels[name].mean < high
+
+
+def test_number_oddities(put: Callable[..., Path]) -> None:
+    cells = ["1e-21", "-0", "1.5D+01", "NaN", "-1.#IND", "1e999", "20.24100076", "0.3"]
+    text = '"t"\n"i" "q"\n("Iteration" "q")\n' + "".join(f"{k + 20241} {c}\n" for k, c in enumerate(cells))
+    record = importers.read(put(text))
+    np.testing.assert_array_equal(record.channels["q"].values, [1e-21, 0, 15, *[np.nan] * 3, 20.24100076, 0.3])
+    assert record.channels["q"].mean is None
+    assert "q: 3 of 8 values are not finite numbers in the file" in record.warnings
+    commas = put('"t"\n"i" "q"\n("Iteration" "q")\n1 0,25\n2 0,75\n')
+    record = importers.read(commas)
+    assert record.channels["q"].mean == 0.5 and "decimal commas read as decimal points" in record.warnings
+
+
+def test_a_cut_last_row_is_left_out_with_a_warning(put: Callable[..., Path]) -> None:
+    text = report()
+    for cut in range(2, 24):
+        record = importers.read(put(text[:-cut]))
+        assert record.rows in (N - 1, N - 2)
+        assert record.rows == N - 2 or any("cut" in w for w in record.warnings)
+        assert set(record.channels["torque"].values) <= set(importers.read(put(text)).channels["torque"].values)
+
+
+def test_restarts_inside_a_file(put: Callable[..., Path]) -> None:
+    lines = report().splitlines()
+    head, rows = lines[:3], lines[3:]
+    later = [row.replace(" 0.3", " 0.4").replace(" 0.29", " 0.39") for row in rows[20:30]]
+    record = importers.read(put("\n".join([*head, *rows, head[2], *later]) + "\n"))
+    assert record.rows == 30  # rows 31..40 belong to the branch that was given up
+    assert np.all(record.channels["torque"].values[20:] > 0.35) and np.all(record.channels["torque"].values[:20] < 0.35)
+    assert any("header repeated" in w for w in record.warnings)
+    assert any("goes back" in w for w in record.warnings)
+    twice = importers.read(put("\n".join([*head, *rows[:5], later[0].replace("121", "105").replace("0.021", "0.005"), *rows[5:]]) + "\n"))
+    assert twice.rows == N and twice.channels["torque"].values[4] > 0.35  # the last row of a step wins
+
+
+def test_zones_stay_apart(put: Callable[..., Path]) -> None:
+    record = importers.read(put(forces()))
+    get = {name: channel.mean for name, channel in record.channels.items()}
+    assert get["force_total_x_N(blade:1)"] == -10.75 and get["force_pressure_y_N(hub)"] == 2.5
+    assert get["force_total_N along (1 0 0) (Net)"] == -14.1875 and get["force_coefficient_viscous_x(duct)"] == -0.03125
+    assert record.channels["force_total_x_N(hub)"].unit == "N"
+    wrong = forces().replace("(-10.75 ", "(-10.85 ", 1)
+    assert any("its parts add up to -10.75" in w for w in importers.read(put(wrong)).warnings)
+    pounds = importers.read(put(forces("lbf")))
+    assert pounds.channels["force_total_x(hub)"].unit == "lbf"  # shown as it is, never called newtons
+
+
+def test_transcripts_give_what_was_computed(put: Callable[..., Path]) -> None:
+    record = importers.read(put(transcript()))
+    assert record.channels["moment_Nm(blade)"].mean == -0.18741116 and record.channels["moment_Nm(blade)"].unit == "Nm"
+    assert record.channels["continuity"].mean == 1.8226e-04
+    np.testing.assert_allclose(record.channels["time_s"].values, [0.5, 0.501, 0.502])
+    assert record.provenance["cells"] == "1061927" and record.provenance["solver"] == "ANSYS Fluent 2025 R2"
+
+
+def test_openfoam_layouts_agree(put: Callable[..., Path]) -> None:
+    new, old = importers.read(put(foam_new())), importers.read(put(foam_old()))
+    total = [f"force_total_{a}_N" for a in "xyz"]
+    assert set(total) <= set(new.channels) & set(old.channels)
+    np.testing.assert_allclose(old.channels["force_total_x_N"].values, 20 + np.arange(1, 14))
+    np.testing.assert_allclose(old.channels["moment_total_z_Nm"].values, 60.75 + np.arange(1, 14))
+    swapped = foam_new().replace("total_x total_y", "total_y total_x")
+    assert any("is not the sum of its parts" in w for w in importers.read(put(swapped)).warnings)
+    plus = "# y+ ()\n# Time \tpatch \tmin \tmax \taverage\n10\tblade\t5.5\t90\t30\n10\thub\t1\t2\t1.5\n20\tblade\t5\t91\t31\n"
+    assert importers.read(put(plus)).channels["y_plus_average(blade)"].mean == 31
+
+
+def test_points_have_no_mean(put: Callable[..., Path]) -> None:
+    for make in (post, ascii_nodes, xy):
+        assert all(channel.mean is None for channel in importers.read(put(make())).channels.values())
+    record = importers.read(put(post()))
+    assert [(k, c.unit) for k, c in record.channels.items()] == [
+        ("x_m", "m"), ("y_m", "m"), ("wall_shear_Pa", "Pa"), ("velocity_u_m_s", "m_s")]  # fmt: skip
+    clash = post().replace("0.5e-02\n", "0.7e-02\n", 1)
+    assert "x_m#2" in importers.read(put(clash)).channels
+
+
+def test_dual_time_keeps_the_last_inner_iteration(put: Callable[..., Path]) -> None:
+    text = '"Time_Iter","Inner_Iter","Cur_Time","CL"\n'
+    text += "".join(f"{t}, {i}, {0.1 * (t + 1):.3f}, {t + i / 10}\n" for t in range(4) for i in range(3))
+    record = importers.read(put(text))
+    np.testing.assert_allclose(record.channels["CL"].values, [0.2, 1.2, 2.2, 3.2])
+    assert record.provenance["clock"] == "time"
+
+
+# --- damage ----------------------------------------------------------------------------------------------------------
+
+
+def _numbers(line: str) -> list[str]:
+    return line.split(",") if "," in line else line.split()
+
+
+def mutants(rng: random.Random) -> Iterator[tuple[str, bytes, str]]:
+    """Endless damaged files: format, bytes, kind of damage."""
+    texts = {form: make() for form, make in SAMPLES.items()}
+    while True:
+        form = rng.choice(list(texts))
+        text = texts[form]
+        raw = text.encode()
+        kind = rng.choice(["cut", "head", "bytes", "line", "column", "some", "huge", "encode", "zip", "swap", "noise", "comma"])
+        lines = text.splitlines(keepends=True)
+        first = next((k for k, line in enumerate(lines) if re.match(r"\s*[-\d]", line)), len(lines) - 1)
+        if kind == "cut":
+            raw = raw[: rng.randrange(len(raw))]
+        elif kind == "head":
+            raw = raw[rng.randrange(min(len(raw), 400)) :]
+        elif kind == "bytes":
+            data = bytearray(raw)
+            for _ in range(rng.randrange(1, 20)):
+                data[rng.randrange(len(data))] = rng.choice((rng.randrange(256), ord(rng.choice("0123456789.eE-+,() \n\t\""))))
+            raw = bytes(data)
+        elif kind == "line":
+            k = rng.randrange(len(lines))
+            lines[k : k + 1] = rng.choice(([], [lines[k]] * 2, [rng.choice(lines), lines[k]], ["\n"], ["garbage here\n"]))
+            raw = "".join(lines).encode()
+        elif kind in ("column", "some", "swap"):
+            mark = "," if "," in lines[-2] else "\t" if form == "fluent_xy" else " "
+            at = rng.randrange(12)
+            for k in range(first, len(lines)):
+                if kind == "some" and rng.random() < 0.7 or not re.match(r"\s*[-\d]", lines[k]):
+                    continue
+                cells = _numbers(lines[k].rstrip("\r\n"))
+                i = at % len(cells)
+                if kind == "swap" and i:
+                    cells[0], cells[i] = cells[i], cells[0]
+                elif rng.random() < 0.5 or kind == "column":
+                    del cells[i]
+                else:
+                    cells.insert(i, "7.5")
+                lines[k] = mark.join(cells) + "\n"
+            raw = "".join(lines).encode()
+        elif kind == "huge":
+            wild = rng.choice(["1e308", "-1e308", "1e999", "NaN", "inf", "*****", "9" * 400, "1.5D+300", "0x10", "1_0", "--1", "1,5"])
+            found = list(re.finditer(r"-?\d+\.\d+(e[-+]\d+)?", text))
+            for match in sorted(rng.sample(found, min(3, len(found))), key=lambda m: -m.start()):
+                text = text[: match.start()] + wild + text[match.end() :]
+            raw = text.encode()
+        elif kind == "encode":
+            raw = rng.choice([text.encode("utf-16"), text.encode("utf-16-be"), text.encode("utf-32"), b"\xff\xfe" + raw,
+                              text.replace("thrust", "poussée°").encode("latin-1"), raw.replace(b"\n", b"\r")])  # fmt: skip
+        elif kind == "zip":
+            packed = gzip.compress(raw)
+            raw = rng.choice([packed, packed[: rng.randrange(len(packed))], packed[:10] + raw])
+        elif kind == "noise":
+            raw = rng.randbytes(rng.randrange(400)) + raw[rng.randrange(len(raw)) :]
+        elif kind == "comma":
+            raw = re.sub(rb"(\d)\.(\d)", rb"\1,\2", raw, count=rng.choice([0, 1, 5]))
+        yield form, raw, kind
+
+
+EXACT = {"cut", "line", "column", "some", "zip", "encode"}
+"""Damage that changes no digits: what comes out under a name must be values of that name."""
+
+
+def check(form: str, raw: bytes, kind: str, path: Path, truth: dict[str, Imported]) -> str:
+    path.write_bytes(raw)
+    (file,) = document([path], choice=None)["files"]
+    if file["error"] is not None:
+        assert file["error"].strip() and not file["channels"]
+        return "refused"
+    for channel in file["channels"].values():
+        assert channel["mean"] is None or np.isfinite(channel["mean"])
+    if file["format"] != form.split(":")[0]:
+        return "other"
+    record = import_file(path)
+    known = truth[form]
+    spoken = set(record.warnings) - set(known.warnings)
+    if kind in EXACT and (form, kind) != ("fluent_xy", "line"):  # a point of one curve may stand in another
+        for name, channel in record.channels.items():
+            if name not in known.channels:
+                assert spoken or "°" in name, (name, kind)
+                continue
+            strange = set(channel.values[np.isfinite(channel.values)]) - set(known.channels[name].values)
+            assert not strange or any("may be cut" in w for w in spoken), (form, kind, name, sorted(strange)[:5], record.warnings)
+    return "read"
+
+
+def attack(count: int, seed: int, path: Path) -> dict[str, int]:
+    truth = {}
+    for form, make in SAMPLES.items():
+        path.write_text(make(), newline="")
+        truth[form] = import_file(path)
+    rng = random.Random(seed)
+    outcome: dict[str, int] = {}
+    source = mutants(rng)
+    for k in range(count):
+        form, raw, kind = next(source)
+        try:
+            told = check(form, raw, kind, path, truth)
+        except Exception as error:
+            raise AssertionError(f"mutant {k} of seed {seed}: {form}, {kind}: {raw[:2000]!r}") from error
+        outcome[told] = outcome.get(told, 0) + 1
+    return outcome
+
+
+def test_300_damaged_files(tmp_path: Path) -> None:
+    outcome = attack(300, 3, tmp_path / "mutant")
+    assert outcome["read"] > 50 and outcome["refused"] > 50
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(10))
+def test_20000_damaged_files(tmp_path: Path, seed: int) -> None:
+    attack(2000, 1000 + seed, tmp_path / "mutant")
+
+
+# --- the published samples -------------------------------------------------------------------------------------------
+
+
+REFUSED = {
+    "SOURCES.md": "a text without a table", "LICENSE": "a text without a table", "laminar_cylinder.cas": "a Fluent case file",
+    "laminar_cylinder.dat": "a Fluent data file", "PPTC_VP1304_CFD_report.md": "a text without a table",
+    "FFF.6.set": "solver settings of Fluent",
+}  # fmt: skip
+
+
+def test_every_published_sample_is_read_or_refused_with_the_reason(shared_data: Path) -> None:
+    files = [path for path in sorted((shared_data / "cfd_exports").rglob("*")) if path.is_file()]
+    assert len(files) >= 30
+    for file in document(files)["files"]:
+        reason = REFUSED.get(Path(file["path"]).name)
+        if reason is None:
+            assert file["error"] is None and file["rows"] > 0 and file["channels"], file["path"]
+        else:
+            assert reason in file["error"], file["path"]
+
+
+def test_si_units_only_when_stated() -> None:
+    assert _cfd.si_unit("[N m]") == "Nm" and _cfd.si_unit("dyn") is None
+    names = _cfd.unique(["a", "a", "a#2", "a"])
+    assert len(set(names)) == 4 and names[0] == "a"

@@ -1,0 +1,544 @@
+"""Recordings of thrust stands: each file is read whole, or refused with the reason; nothing vanishes in silence."""
+
+from __future__ import annotations
+
+import random
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bemt import importers, units
+from bemt.errors import InputError
+from bemt.imported import Imported
+from bemt.importers import generic_csv, jmajew, pybemt_ini, rcbenchmark
+from bemt.importers._headings import heading
+from bemt.importers._recording import NO_VALUE
+
+RC_HEAD = (
+    "Time (s),ESC signal (µs),Servo 1 (µs),AccX (g),Torque (N·m),Thrust (gf),Voltage (V),Current (A),"
+    "Motor Electrical Speed (RPM),Motor Optical Speed (RPM),Electrical Power (W),Mechanical Power (W),"
+    "Motor Efficiency (%),Overall Efficiency (gf/W),App message,"
+)
+
+
+def rc_text(rows: int = 30, optical: float = 0.0, force: str = "gf", torque: float = 1.0, step_s: float = 3.5) -> str:
+    """Step test of a made-up propeller."""
+    out = [RC_HEAD.replace("Thrust (gf)", f"Thrust ({force})")]
+    for k in range(rows):
+        rpm = 3000.0 + 400.0 * k
+        newton = 4e-8 * rpm**2
+        moment = torque * 6e-10 * rpm**2
+        shaft = abs(moment) * rpm * units.RPM
+        thrust = newton / units.UNITS[force].factor
+        cells = [k * step_s, 1100 + 25 * k, "", 0.01, moment, thrust, 11.0, shaft / 0.7 / 11.0, rpm, rpm * optical,
+                 shaft / 0.7, shaft, 70.0, thrust / (shaft / 0.7), "", ""]  # fmt: skip
+        out.append(",".join(c if isinstance(c, str) else f"{c:.10g}" for c in cells))
+    return "\ufeff" + "\n".join(out) + "\n"
+
+
+def table_text(rows: int = 9) -> str:
+    """Table in the form of the thrust_tool stand."""
+    out = ["out,th,th_err,tq,tq_err,rpm,rpm_err,v,v_err,a,a_err,pin,theff"]
+    for k in range(rows):
+        rpm = 4000.0 + 1000.0 * k
+        th, v, a = 4.0e-6 * rpm**2, 12.0 - 0.1 * k, 0.5 + 0.8 * k
+        cells = [20.0 + 10 * k, th, 0.5, 5e-6 * rpm**2, 1.0, rpm, 20.0, v, 0.004, a, 0.03, v * a, th / (v * a)]
+        out.append(",".join(f"{c:.6g}" for c in cells))
+    return "\n".join(out) + "\n"
+
+
+def raw_text(rows: int = 40, pairs: float = 7.0) -> str:
+    """Raw record of the same stand."""
+    out = ["Motor Output,Strain Gauge Thrust,ESCT RPM,Motor Level [%],Thrust [G],Torque [G cm],RPM [1/min],Vref"]
+    for k in range(rows):
+        level = 1200 if k < rows // 2 else 1400
+        esc = (400 if level == 1200 else 600) + k % 3
+        rpm = esc * 100.0 / pairs
+        thrust = 2.5e-6 * rpm**2
+        out.append(f"{level},{71000 + k},{esc},{(level - 1000) / 10},{thrust:.6g},{1.5 * thrust:.6g},{rpm:.7g},2530")
+    return "\n".join(out) + "\n"
+
+
+def plain_text(mark: str = ",", rows: int = 12) -> str:
+    out = [mark.join(["time_s", "Thrust (gf)", "Q(Nm)", "RPM", "note", "omega"])]
+    for k in range(rows):
+        cells = [f"{0.1 * k:.3f}", f"{50.0 + k:.2f}", f"{0.01 + 0.001 * k:.4f}", f"{3000 + 10 * k}", "ok", f"{314 + k}"]
+        out.append(mark.join(cells))
+    return "\n".join(out) + "\n"
+
+
+def bare_text(rows: int = 10) -> str:
+    return "".join(f"{1100 + 50 * k} {0.01 * k:.4f} {0.5 * k:.4f} {1000 + 200 * k}\n" for k in range(rows))
+
+
+INI = """[case]
+rpm = 2000.0
+v_inf = 0.0
+[rotor]
+nblades = 2
+diameter = 0.7
+radius_hub = 0.03
+section = A A B
+radius = 0.1 0.2 0.3
+chord = 0.05 0.04 0.03
+pitch = 20 12 8
+[fluid]
+rho=1.2
+mu=1.8e-5
+"""
+
+Write = Callable[..., Path]
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Write:
+    def put(text: str | bytes, name: str = "run.csv") -> Path:
+        path = tmp_path / name
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        return path
+
+    return put
+
+
+def said(imported: Imported, words: str) -> list[str]:
+    return [text for text in imported.warnings if words in text]
+
+
+# ---------------------------------------------------------------- headings and units
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "unit"),
+    [
+        ("Thrust (gf)", "thrust_N", "N"), ("Thrust (N)", "thrust_N", "N"), ("Thrust [lbf]", "thrust_N", "N"),
+        ("Torque (N·m)", "torque_Nm", "Nm"), ("Torque (lbf·in)", "torque_Nm", "Nm"), ("T(gf)", "T_N", "N"),
+        ("ESC signal (µs)", "pulse_width_s", "s"), ("ESC signal (μs)", "pulse_width_s", "s"), ("RPM", "rpm", "rpm"),
+        ("Motor Electrical Speed (RPM)", "electrical_rpm", "rpm"), ("eRPM", "electrical_rpm", "rpm"),
+        ("Motor Optical Speed (RPM)", "optical_rpm", "rpm"), ("RPM_B", "B_rpm", "rpm"), ("rpm_A", "A_rpm", "rpm"),
+        ("beta_deg", "beta_rad", "rad"), ("temp_C", "temp_K", "K"), ("airspeed_m_s", "airspeed_m_s", "m_s"),
+        ("Airspeed (km/h)", "airspeed_m_s", "m_s"), ("Motor Efficiency (%)", "motor_efficiency", "-"), ("J", "J", "-"),
+        ("Overall Efficiency (gf/W)", "overall_efficiency_N_W", "N/W"), ("CT_total=T/(rho n2 D4)", "CT_total", "-"),
+        ("CT(rotor convention T/(rho A (Omega R)^2))", "CT_rotor", "-"), ("chord_mm(D=240mm)", "chord_m", "m"),
+        ("AccX (g)", "acceleration_x_m_s2", "m/s2"), ("motor_weight_g", "motor_weight_kg", "kg"),
+        ("Motor Optical Speed (rad/s)", "optical_rpm", "rpm"), ("n_rad_s", "n_rad_s", "rad_s"),
+        ("omega", "omega", ""), ("Thrust", "Thrust", ""), ("x", "x", ""), ("Speed (Hz)", "Speed_Hz", ""),
+        ("thrust_A", "thrust_A", ""), ("T_A", "T_A", ""), ("I_A", "I_A", "A"), ("P_in", "P_m", "m"),
+    ],
+)  # fmt: skip
+def test_a_heading_says_name_and_unit(text: str, name: str, unit: str) -> None:
+    got = heading(text)
+    assert (got.name, got.unit_name) == (name, unit)
+
+
+@pytest.mark.parametrize("text", ["Thrust (g)", "Thrust (kg)", "thrust_g", "Thrust (lb)", "Torque (kg·cm)", "T [G]"])
+def test_a_mass_is_no_force(text: str, write: Write) -> None:
+    got = importers.read(write(f"Time (s),{text},RPM\n" + "".join(f"{k},{k + 1},{3000 + k}\n" for k in range(5))))
+    channel = next(c for name, c in got.channels.items() if name not in ("time_s", "rpm"))
+    assert channel.unit == ""
+    assert np.array_equal(channel.values, np.arange(1.0, 6.0))  # as written: not converted
+    assert said(got, "no unit known, none assumed") and said(got, "f")
+
+
+def test_the_same_run_in_any_unit_is_the_same_thrust(write: Write) -> None:
+    ways = [importers.read(write(rc_text(force=unit), f"{unit}.csv")) for unit in ("gf", "N", "kgf", "lbf", "ozf")]
+    for way in ways[1:]:
+        assert np.allclose(way.channels["thrust_N"].values, ways[0].channels["thrust_N"].values, rtol=1e-9)
+
+
+def test_one_quantity_in_two_units_that_disagree_is_reported(write: Write) -> None:
+    rows = "".join(f"{k},{100 + k},{(100 + k) * 0.00980665 * slip}\n" for k in range(6) for slip in [1.0])
+    assert not said(importers.read(write("time_s,T(gf),T(N)\n" + rows)), "times")
+    rows = "".join(f"{k},{100 + k},{(100 + k) * 0.001}\n" for k in range(6))  # the second column is kgf, not N
+    got = importers.read(write("time_s,T(gf),T(N)\n" + rows, "slip.csv"))
+    (text,) = said(got, "times 'T(gf)'")
+    assert "kgf <-> N" in text and "nothing was converted" in text
+
+
+# ---------------------------------------------------------------- registry
+
+
+def test_the_fallback_loses_against_every_particular_format(write: Write) -> None:
+    for text, kind in ((rc_text(), "rcbenchmark"), (table_text(), "jmajew"), (raw_text(), "jmajew"),
+                       (plain_text(), "table"), (plain_text("\t"), "table"), (bare_text(), "table"),
+                       (INI, "pybemt_ini")):  # fmt: skip
+        path = write(text, f"{kind}.txt")
+        assert importers.detect(path) == kind
+    assert generic_csv.sniff(rc_text()) and generic_csv.sniff(table_text())  # it claims them too, and yields
+
+
+@pytest.mark.parametrize("text", ["", "\n\n", "A text, with commas.\nNo numbers, here.\n", "a,b\n", "{}", "<xml/>"])
+def test_what_is_no_table_is_refused(text: str, write: Write) -> None:
+    with pytest.raises(InputError):
+        importers.read(write(text))
+
+
+def test_a_binary_file_is_refused_as_such(write: Write) -> None:
+    with pytest.raises(InputError, match="binary data.*Export the data as plain text"):
+        importers.read(write(b"PK\x03\x04\x00\x00\x00rest", "book.xlsx"))
+
+
+# ---------------------------------------------------------------- RCbenchmark
+
+
+def test_a_step_test_is_read_whole(write: Write) -> None:
+    got = rcbenchmark.read(write(rc_text()))
+    assert (got.format, got.kind, got.rows) == ("rcbenchmark", "bench", 30)
+    assert got.provenance["mode"] == "steps" and len(got.provenance["sha256"]) == 64
+    rpm = 3000.0 + 400.0 * np.arange(30)
+    assert np.allclose(got.channels["thrust_N"].values, 4e-8 * rpm**2)
+    assert np.allclose(got.channels["pulse_width_s"].values, (1100 + 25 * np.arange(30)) * 1e-6)
+    assert got.lines == tuple(range(2, 32))
+    assert said(got, "'Servo 1 (µs)'")  # an empty column is named
+
+
+def test_the_two_speeds_are_kept_apart(write: Write) -> None:
+    got = rcbenchmark.read(write(rc_text(optical=0.0)))
+    assert "rpm" not in got.channels
+    assert said(got, "optical_rpm is 0 in every row") and said(got, "mechanical_power_W is torque times electrical_rpm")
+    assert np.all(got.channels["optical_rpm"].values == 0.0)
+    got = rcbenchmark.read(write(rc_text(optical=1 / 7), "poles.csv"))
+    assert said(got, "electrical over optical speed: median 7") and said(got, "were 7 pole pairs left out?")
+    assert np.allclose(got.channels["electrical_rpm"].values, 7 * got.channels["optical_rpm"].values)
+    assert not said(rcbenchmark.read(write(rc_text(optical=1.0), "same.csv")), "left out")
+
+
+def test_rpm_zero_and_spikes_are_kept_and_flagged(write: Write) -> None:
+    lines = rc_text().split("\n")
+    column = RC_HEAD.split(",").index("Motor Electrical Speed (RPM)")
+
+    def put(row: int, value: str) -> None:
+        cells = lines[row + 1].split(",")
+        cells[column] = value
+        lines[row + 1] = ",".join(cells)
+
+    put(0, "66434")  # a misreading in the first row, where neighbours cannot tell
+    put(12, "0")
+    put(20, "99999")
+    got = rcbenchmark.read(write("\n".join(lines)))
+    assert got.rows == 30
+    assert {k: f for k, f in enumerate(got.flags) if f} == {
+        0: ("spike of electrical_rpm",), 12: ("electrical_rpm is 0 under thrust",), 20: ("spike of electrical_rpm",),
+    }  # fmt: skip
+    assert got.channels["electrical_rpm"].values[[0, 12, 20]].tolist() == [66434.0, 0.0, 99999.0]
+
+
+def test_signs_and_backward_time_are_reported_not_repaired(write: Write) -> None:
+    text = rc_text(torque=-1.0).replace("\n3.5,", "\n-0.2,")
+    got = rcbenchmark.read(write(text))
+    assert said(got, "torque_Nm is mostly negative") and np.all(got.channels["torque_Nm"].values < 0)
+    assert got.flags[1] == ("time goes backwards",) and got.channels["time_s"].values[1] == -0.2
+
+
+def test_a_continuous_record_keeps_its_sparse_channels(write: Write) -> None:
+    lines = rc_text(200, step_s=0.02).split("\n")
+    for k in range(1, 201):
+        if k % 5:
+            cells = lines[k].split(",")
+            cells[4] = cells[5] = ""
+            lines[k] = ",".join(cells)
+    got = rcbenchmark.read(write("\n".join(lines)))
+    assert got.provenance["mode"] == "continuous" and got.rows == 200
+    assert np.count_nonzero(np.isfinite(got.channels["thrust_N"].values)) == 40
+    assert np.count_nonzero(np.isfinite(got.channels["electrical_rpm"].values)) == 200
+
+
+# ---------------------------------------------------------------- thrust_tool
+
+
+def test_tables_carry_their_stated_errors(write: Write) -> None:
+    got = jmajew.read(write(table_text(), "grp01__motor1_prop-9x7_4s_duct_table2.csv"))
+    assert got.rows == 9 and got.channels["thrust_err_N"].unit == "N"
+    assert np.allclose(got.channels["thrust_err_N"].values, 0.5 * units.KGF * 1e-3)
+    assert np.allclose(got.channels["torque_Nm"].values, 5e-11 * units.KGF * got.channels["rpm"].values ** 2, rtol=1e-5)
+    assert got.provenance["propeller"] == "prop-9x7" and got.provenance["duct"] == "yes"
+    assert got.provenance["battery_cells"] == "4" and not got.warnings
+
+
+def test_units_that_the_table_contradicts_are_doubted(write: Write) -> None:
+    lines = table_text().split("\n")
+    milli = [",".join([*c[:9], f"{float(c[9]) * 1000:g}", *c[10:]]) for c in (t.split(",") for t in lines[1:-1])]
+    got = jmajew.read(write("\n".join([lines[0], *milli]) + "\n"))  # current in mA
+    assert said(got, "pin is 0.001 times v x a (the factor of kilo") and said(got, "in doubt")
+
+
+def test_rpm_of_the_raw_record_is_traced_to_telemetry(write: Write) -> None:
+    got = jmajew.read(write(raw_text()))
+    assert got.provenance["form"] == "raw" and said(got, "over 7 pole pairs, not a sensor of its own")
+    assert got.channels["Strain_Gauge_Thrust"].unit == "" and got.channels["ESCT_RPM"].unit == ""
+    assert not said(jmajew.read(write(raw_text().replace(",600,", ",500,"), "b.csv")), "telemetry of")
+
+
+# ---------------------------------------------------------------- any table
+
+
+@pytest.mark.parametrize("mark", [",", ";", "\t", "|"])
+def test_any_delimiter_gives_the_same_table(mark: str, write: Write) -> None:
+    got = importers.read(write(plain_text(mark)))
+    assert list(got.channels) == ["time_s", "thrust_N", "Q_Nm", "rpm", "omega"] and got.kind == "bench"
+    assert np.allclose(got.channels["thrust_N"].values, (50.0 + np.arange(12)) * units.KGF * 1e-3)
+    assert got.channels["omega"].unit == "" and said(got, "'omega'") and got.texts["note"] == ("ok",) * 12
+
+
+def test_a_table_without_headings_has_no_units(write: Write) -> None:
+    got = importers.read(write(bare_text()))
+    assert got.rows == 10 and [c.unit for c in got.channels.values()] == [""] * 4
+    assert said(got, "no heading line") and said(got, "no unit known, none assumed")
+
+
+def test_a_line_of_units_below_the_headings_counts(write: Write) -> None:
+    rows = "".join(f"{k},{k},{2 * k},{300 + k}\n" for k in range(9))
+    got = importers.read(write("Time,Thrust,Torque,Speed\n(s),(kgf),Nm,rad/s\n" + rows))
+    assert [c.unit for c in got.channels.values()] == ["s", "N", "Nm", "rad_s"] and got.rows == 9
+    assert np.allclose(got.channels["thrust_N"].values, units.KGF * np.arange(9)) and said(got, "line 2 holds units")
+
+
+def test_units_inside_cells_are_not_stripped(write: Write) -> None:
+    got = importers.read(write("time_s,U\n" + "".join(f"{k},{11 + k / 10} V\n" for k in range(5))))
+    assert "U" in got.texts and said(got, "has units in its cells ('11.0 V')")
+
+
+def test_decimal_commas_are_refused_with_a_hint(write: Write) -> None:
+    text = plain_text(";").replace(".", ",")
+    with pytest.raises(InputError, match='State decimal = ","') as caught:
+        importers.read(write(text))
+    assert len(caught.value.faults) == 3  # one per column, all at once
+
+
+def test_a_bad_cell_is_named_and_kept_as_nan(write: Write) -> None:
+    got = importers.read(write(plain_text(rows=40).replace("3050", "3O50")))
+    assert got.rows == 40 and np.isnan(got.channels["rpm"].values[5]) and got.flags[5] == ("rpm: no number",)
+    assert said(got, "'3O50' at 7:4")
+
+
+def test_lines_of_another_length_are_all_refused(write: Write) -> None:
+    lines = plain_text().split("\n")
+    lines[3] += ",7"
+    lines[6] = lines[6].rsplit(",", 2)[0]
+    with pytest.raises(InputError) as caught:
+        importers.read(write("\n".join(lines)))
+    assert [fault.where for fault in caught.value.faults] == ["4", "7"]
+
+
+def test_a_last_line_that_was_cut_is_kept_and_flagged(write: Write) -> None:
+    got = importers.read(write(plain_text()[:-18]))
+    assert got.rows == 12 and got.flags[-1][0] == "line cut off at the end of the file"
+    assert np.isfinite(got.channels["time_s"].values[-1]) and np.isnan(got.channels["omega"].values[-1])
+
+
+# ---------------------------------------------------------------- pyBEMT
+
+
+def test_an_ini_geometry_is_read_in_si(write: Write) -> None:
+    got = importers.read(write(INI, "rotor.ini"))
+    assert got.kind == "geometry" and got.texts["section"] == ("A", "A", "B")
+    assert np.allclose(got.channels["beta_rad"].values, np.radians([20.0, 12.0, 8.0]))
+    assert got.constants["diameter_m"] == 0.7 and got.constants["blades"] == 2 and got.constants["density_kg_m3"] == 1.2
+    assert said(got, "states no units")
+
+
+def test_all_faults_of_an_ini_are_found(write: Write) -> None:
+    text = INI.replace("diameter = 0.7", "diameter = 700").replace("pitch = 20 12 8", "pitch = 0.3 0.2 x")
+    text = text.replace("rho=1.2", "rho=-1").replace("nblades = 2", "nblades = none")
+    with pytest.raises(InputError) as caught:
+        importers.read(write(text, "rotor.ini"))
+    assert {f.where for f in caught.value.faults} == {"rotor.diameter", "rotor.pitch", "fluid.rho", "rotor.nblades"}
+    with pytest.raises(InputError, match="Radians"):
+        pybemt_ini.read(write(INI.replace("20 12 8", "0.3 0.2 0.1"), "radians.ini"))
+
+
+# ---------------------------------------------------------------- Drive Calculator
+
+
+def laws(rows: int = 6, slip: float = 1.0) -> str:
+    out = ["myid,tbs,Name,Dia,Pitch,a,b,AltThr,TmpThr,srcThr,c,d,n10N,n100W"]
+    for k in range(rows):
+        a, b, c, d = 0.5 + 0.1 * k, 2.05, 0.005 + 0.001 * k, 3.05
+        n10 = 1000 * (10 * slip / (a * units.KGF * 1e-3)) ** (1 / b)
+        n100 = 1000 * (100 / c) ** (1 / d)
+        out.append(f"{k},4,Prop {k},{8 + k},5.0,{a:.6g},{b},200,20.0,me,{c:.6g},{d},{n10:.1f},{n100:.1f}")
+    return "\n".join(out) + "\n"
+
+
+def test_the_laws_of_drive_calculator_prove_their_units(write: Write) -> None:
+    got = importers.read(write(laws()))
+    assert got.format == "drivecalc" and np.allclose(got.channels["diameter_m"].values, (8 + np.arange(6)) * 0.0254)
+    assert said(got, "thrust_law_N: 100.0 % of 6 rows agree") and not any(got.flags)
+    got = importers.read(write(laws(slip=units.KGF), "slip.csv"))  # 10 kgf under the heading of 10 N
+    assert said(got, "thrust_law_N: 0.0 % of 6 rows agree") and said(got, "its unit is in doubt")
+    assert all("thrust_law_N disagrees with at_10_N_rpm" in flags for flags in got.flags)
+
+
+# ---------------------------------------------------------------- mutations
+
+BASES: dict[str, str] = {
+    "steps.csv": rc_text(12), "continuous.csv": rc_text(25, optical=1.0, step_s=0.02), "table.csv": table_text(),
+    "raw.csv": raw_text(20), "plain.csv": plain_text(), "semicolon.csv": plain_text(";"), "bare.txt": bare_text(),
+    "laws.csv": laws(), "rotor.ini": INI,
+    "geometry.txt": "r/R c/R twist_deg\n" + "".join(f"0.{k} 0.1 {30 - k}\n" for k in range(2, 9)),
+}  # fmt: skip
+GARBAGE = [
+    "nan", "inf", "-inf", "1e999", "1,5", "--", "#", '"', "\x00", "é", "\ufeff", "\u2028", "\x1c", "\r", "=", "]",
+    "1_000", "0x10", "٣", "9" * 400, "-", "+", ";", "\t", "|", "%", "(", "kg", " ", "", "\n", "1.2.3",
+]  # fmt: skip
+
+
+def mutate(text: str, rng: random.Random) -> bytes:
+    """One to four random injuries of a text, at last of its bytes."""
+    for _ in range(rng.randint(1, 4)):
+        at = rng.randrange(len(text) + 1)
+        lines = text.split("\n")
+        row = rng.randrange(len(lines))
+        match rng.randrange(9):
+            case 0:
+                text = text[:at] + rng.choice(GARBAGE) + text[at:]
+            case 1:
+                text = text[:at] + text[at + rng.randint(1, 30) :]
+            case 2:
+                text = text[:at]
+            case 3:
+                lines.insert(rng.randrange(len(lines) + 1), lines[row])
+                text = "\n".join(lines)
+            case 4:
+                del lines[row]
+                text = "\n".join(lines)
+            case 5:
+                cells = lines[row].split(",")
+                cells[rng.randrange(len(cells))] = rng.choice(GARBAGE)
+                lines[row] = ",".join(cells)
+                text = "\n".join(lines)
+            case 6:
+                other = rng.choice([",", ";", "\t", "\r\n", " ", "."])
+                text = text.replace(rng.choice(",;.\n \t"), other, rng.choice([1, -1]))
+            case 7:
+                lines[row] = "".join(rng.sample(lines[row], len(lines[row])))
+                text = "\n".join(lines)
+            case _:
+                text = text[:at] + "".join(rng.choice("0123456789.,eE-+nN \"") for _ in range(5)) + text[at:]
+    raw = text.encode("utf-8", "surrogatepass")
+    if rng.random() < 0.1 and raw:
+        at = rng.randrange(len(raw))
+        raw = raw[:at] + bytes([rng.randrange(256)]) + raw[at + 1 :]
+    return raw
+
+
+def unexplained(imported: Imported, raw: bytes) -> list[str]:
+    """What a table lost without a word: lines that are no row, and cells that are neither number, text nor flag."""
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = raw.decode("latin-1")
+    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    used = [k for k, t in enumerate(lines, 1) if t.strip() and not t.lstrip().startswith(("#", "%"))]
+    lost = []
+    without_heading = any("no heading line" in t for t in imported.warnings)
+    expected = used if without_heading else used[1:]
+    if any("holds units" in t for t in imported.warnings):
+        del expected[0]
+    if list(imported.lines) != expected:
+        lost.append(f"lines {expected} became rows {list(imported.lines)}")
+    comments = sum(t.lstrip().startswith(("#", "%")) for t in lines)
+    if comments and not any(f"{comments} comment lines" in text for text in imported.warnings):
+        lost.append("comments")
+    for name, channel in imported.channels.items():
+        if len(channel.values) != imported.rows:
+            lost.append(f"{name} has {len(channel.values)} values in {imported.rows} rows")
+        empty = np.isnan(channel.values)
+        for row in np.flatnonzero(empty):
+            line = lines[imported.lines[row] - 1]
+            cells = [] if '"' in line else line.split(",")
+            junk = [c for c in cells if c.strip() and c.strip().lower() not in NO_VALUE and importers.number(c) is None]
+            if junk and not imported.flags[row] and not imported.texts and "," in lines[0]:
+                lost.append(f"{name}: row {row} {junk}")
+    if not all(np.all(np.isfinite(c.values) | np.isnan(c.values)) for c in imported.channels.values()):
+        lost.append("infinite values")
+    return lost
+
+
+def try_mutated(count: int, seed: int, folder: Path, bases: dict[str, str]) -> Counter[str]:
+    rng = random.Random(seed)
+    outcome: Counter[str] = Counter()
+    for k in range(count):
+        name = rng.choice(sorted(bases))
+        raw = mutate(bases[name], rng)
+        path = folder / name
+        path.write_bytes(raw)
+        try:
+            got: Any = importers.read(path)
+        except InputError as error:
+            assert error.faults and all(f.file and f.got and f.expected for f in error.faults), (k, raw)
+            outcome["refused"] += 1
+            continue
+        outcome[type(got).__name__] += 1
+        if isinstance(got, Imported) and got.format in ("rcbenchmark", "jmajew", "table", "drivecalc"):
+            assert not unexplained(got, raw), (k, raw)
+            assert set(got.channels) | set(got.texts) and len(got.flags) == got.rows
+            outcome["warned"] += bool(got.warnings)
+    return outcome
+
+
+def test_mutated_recordings_are_read_or_refused(tmp_path: Path) -> None:
+    outcome = try_mutated(400, 4, tmp_path, BASES)
+    assert outcome["refused"] + outcome["Imported"] >= 390  # others look like UIUC tables after their injuries
+    assert min(outcome["refused"], outcome["Imported"]) > 50  # both ends are reached
+
+
+@pytest.mark.slow
+def test_ten_thousand_mutated_recordings(tmp_path: Path, shared_data: Path) -> None:
+    real = dict(BASES)
+    folders = ("rcbenchmark", "jmajew", "thrust_map", "thrust_step", "mit_copter_rcbenchmark", "tmotor28_tr594", "x22a")
+    for folder in folders:
+        for file in sorted((shared_data / folder).rglob("*")):
+            if file.is_file() and file.stat().st_size < 20_000 and b"\0" not in file.read_bytes():
+                real[f"{folder}-{file.name}"] = file.read_text(encoding="utf-8-sig")
+    outcome = try_mutated(10_000, 5, tmp_path, real)
+    assert min(outcome["refused"], outcome["Imported"]) > 1000
+
+
+# ---------------------------------------------------------------- published recordings
+
+# folder: (imported, refused); what is refused there is text, a book of cells, a list of files, or has no rpm
+COUNTS = {
+    "apc": (22, 0), "caradonna_tung": (1, 0), "drivecalc": (2, 0), "ducted_marine": (4, 0),
+    "flowunsteady_apc10x7": (5, 3), "jmajew": (58, 0), "mit_copter_rcbenchmark": (2, 1), "motocalc_edf": (3, 0),
+    "rcbenchmark": (19, 2), "thrust_map": (2, 0), "thrust_step": (2, 0), "tmotor28_tr594": (5, 1), "uiuc": (999, 0),
+    "x22a": (3, 0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("folder", sorted(COUNTS))
+def test_every_published_file_is_imported_or_refused_with_the_reason(folder: str, shared_data: Path) -> None:
+    if not (shared_data / folder).is_dir():
+        pytest.skip(f"no folder {folder} in the reference data")
+    read = refused = 0
+    for file in sorted((shared_data / folder).rglob("*")):
+        if not file.is_file():
+            continue
+        try:
+            got = importers.read(file)
+        except InputError as error:
+            assert all(f.got and f.expected for f in error.faults), file
+            refused += 1
+            continue
+        read += 1
+        if isinstance(got, Imported) and got.format in ("rcbenchmark", "jmajew", "table", "drivecalc"):
+            assert not unexplained(got, file.read_bytes()), file
+            for name, channel in got.channels.items():
+                label = got.headings.get(name, "") or name.replace("_", " ")
+                assert channel.unit or said(got, "no unit known, none assumed"), (file, name, label)
+    assert (read, refused) == COUNTS[folder]
+
+
+def test_the_published_logs_show_their_known_faults(shared_data: Path) -> None:
+    logs = [importers.read(f) for f in sorted((shared_data / "rcbenchmark").glob("*.csv"))]
+    assert all(said(log, "optical_rpm is 0 in every row") for log in logs)  # no probe was used at all
+    rpm = np.concatenate([log.channels["electrical_rpm"].values for log in logs])
+    flags = [f for log in logs for f in log.flags]
+    assert {rpm[k] for k, f in enumerate(flags) if "spike of electrical_rpm" in f} >= {61525.0, 66434.0}
+    assert all(any("is 0" in w for w in flags[k]) for k in np.flatnonzero(rpm == 0.0))
+    raw = importers.read(shared_data / "jmajew" / "raw" / "curr_cal.csv")
+    assert said(raw, "over 7 pole pairs, not a sensor of its own")
+    assert [k for k, f in enumerate(raw.flags) if "spike of torque_Nm" in f] == [831]

@@ -1,0 +1,211 @@
+"""recording.toml: what a table does not say is said once, strictly, and every fault is found at once."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bemt import importers, units
+from bemt.air import Air
+from bemt.errors import InputError
+from bemt.importers import recording_toml
+
+TABLE = "t,F,M,eRPM,U\n" + "".join(f"{20 * k},{-(100 + k)},{2 * k + 40},{70000 + 700 * k},11.1\n" for k in range(12))
+
+GOOD = """
+[recording]
+file = "run.csv"
+session = "one"
+
+[columns]
+time = { column = "t", unit = "ms" }
+thrust = { column = 2, unit = "gf", sign = -1, u_gain_pct = 0.5, u_zero = 1.0, u_sample = 2.0 }
+torque = { column = "M", unit = "mNm" }
+electrical_rpm = { column = "eRPM", unit = "rpm" }
+
+[rotor]
+pole_pairs = 7
+diameter_in = 10
+gap_mm = 0.5
+name = "10x5"
+
+[air]
+pressure_hPa = 1002.0
+temperature_C = 21.0
+humidity_pct = 45.0
+
+[stand]
+wall_distance_m = 1.2
+"""
+
+Put = Callable[..., Path]
+
+
+@pytest.fixture
+def put(tmp_path: Path) -> Put:
+    def write(toml: str = GOOD, table: str = TABLE, name: str = "run.csv") -> Path:
+        (tmp_path / name).write_text(table, encoding="utf-8")
+        path = tmp_path / "recording.toml"
+        path.write_text(toml, encoding="utf-8")
+        return path
+
+    return write
+
+
+def faults(path: Path) -> dict[str, str]:
+    with pytest.raises(InputError) as caught:
+        importers.read(path)
+    return {fault.where: str(fault) for fault in caught.value.faults}
+
+
+def test_columns_units_signs_and_pole_pairs_are_applied(put: Put) -> None:
+    path = put()
+    assert importers.detect(path) == "recording"
+    got = importers.read(path)
+    k = np.arange(12)
+    assert np.allclose(got.channels["time_s"].values, 0.02 * k)
+    assert np.allclose(got.channels["thrust_N"].values, (100 + k) * units.KGF * 1e-3)
+    assert np.allclose(got.channels["torque_Nm"].values, (2 * k + 40) * 1e-3)
+    assert np.allclose(got.channels["rpm"].values, 10000 + 100 * k)
+    assert np.allclose(got.channels["electrical_rpm"].values, 70000 + 700 * k)  # kept beside it
+    assert any("over 7 pole pairs" in text for text in got.warnings)
+    assert got.channels["U"].unit == "" and any("'U'" in text for text in got.warnings)  # unnamed, unit unknown
+    assert (got.kind, got.rows, got.provenance["session"]) == ("bench", 12, "one")
+
+
+def test_constants_and_instrument_are_in_si(put: Put) -> None:
+    got = importers.read(put())
+    air = Air.from_state(100200.0, 21.0, 45.0)
+    assert got.constants == pytest.approx(
+        {"pole_pairs": 7, "diameter_m": 0.254, "gap_m": 5e-4, "wall_distance_m": 1.2, "density_kg_m3": float(air.rho),
+         "temperature_K": 294.15}
+    )  # fmt: skip
+    gf = units.KGF * 1e-3
+    assert got.instrument == {"thrust_N": pytest.approx({"gain": 0.005, "zero": gf, "sample": 2 * gf})}
+
+
+@pytest.mark.parametrize("unit", ["rpm", "rev_s", "rad_s"])
+def test_a_speed_in_any_unit_becomes_rpm(unit: str, put: Put) -> None:
+    factor = units.RPM / units.UNITS[unit].factor
+    table = "F;n\n" + "".join(f"{k};{(3000 + k) * factor!r}\n" for k in range(5))
+    toml = f'[recording]\nfile = "run.csv"\n[columns]\nrpm = {{ column = "n", unit = "{unit}" }}\n'
+    got = importers.read(put(toml, table))
+    assert got.channels["rpm"].unit == "rpm" and np.allclose(got.channels["rpm"].values, 3000 + np.arange(5))
+    assert any("no air state" in text for text in got.warnings)
+
+
+def test_decimal_commas_and_missing_headings_are_said(put: Put) -> None:
+    table = "".join(f"{k},5;{k},25\n" for k in range(5))
+    toml = """[recording]
+file = "run.csv"
+decimal = ","
+header = false
+[columns]
+time = { column = 1, unit = "s" }
+thrust = { column = 2, unit = "N" }
+"""
+    got = importers.read(put(toml, table))
+    assert np.allclose(got.channels["thrust_N"].values, np.arange(5) + 0.25) and got.rows == 5
+
+
+def test_runs_are_joined_in_their_order(put: Put, tmp_path: Path) -> None:
+    (tmp_path / "second.csv").write_text(TABLE.replace(",11.1", ",12.6"), encoding="utf-8")
+    got = importers.read(put(GOOD.replace('"run.csv"', '["run.csv", "second.csv"]')))
+    assert got.rows == 24 and np.array_equal(got.channels["run"].values, np.repeat([1.0, 2.0], 12))
+    assert np.array_equal(got.channels["U"].values, np.repeat([11.1, 12.6], 12))
+    assert len(got.flags) == len(got.lines) == 24 and got.provenance["file"] == "run.csv+second.csv"
+
+
+def test_all_faults_are_found_at_once(put: Put) -> None:
+    bad = GOOD.replace('unit = "gf"', 'unit = "g"').replace("torque =", "tork =").replace('"ms"', '"minutes"')
+    bad = bad.replace("pole_pairs = 7\n", "").replace("gap_mm = 0.5", "gap_mm = 5000").replace("[stand]", "[stnd]")
+    bad = bad.replace("pressure_hPa = 1002.0", "pressure_hPa = 100200.0").replace("sign = -1", "sign = 0")
+    found = faults(put(bad))
+    assert set(found) == {
+        "columns.thrust.unit", "columns.tork", "columns.time.unit", "rotor.pole_pairs", "rotor.gap_mm", "stnd",
+        "air.pressure_hPa", "columns.thrust.sign",
+    }  # fmt: skip
+    assert "g is a mass: write gf" in found["columns.thrust.unit"]
+    assert "Did you mean torque?" in found["columns.tork"] and "Did you mean stand?" in found["stnd"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "where"),
+    [
+        ('column = "M"', 'column = "Q"', "columns.torque.column"),
+        ('column = "M"', "column = 2", "columns.torque.column"),
+        ('column = "M"', "column = 99", "columns.torque.column"),
+        ('column = "M"', "column = 0", "columns.torque.column"),
+        ('column = "M", ', "", "columns.torque.column"), ('"mNm"', '"N"', "columns.torque.unit"),
+        ("electrical_rpm", "rpm", "rotor.pole_pairs"), ("pole_pairs = 7", "pole_pairs = 7.5", "rotor.pole_pairs"),
+        ("diameter_in = 10", "diameter_in = 10\ndiameter_mm = 254", "rotor.diameter_mm"),
+        ("diameter_in = 10", "diameter = 10", "rotor.diameter"), ("temperature_C = 21.0\n", "", "air.temperature_C"),
+        ("humidity_pct", "altitude_m = 10\nhumidity_pct", "air"), ("[air]", "[air]\ndensity_kg_m3 = 1.2", "air"),
+        ('"run.csv"', '"other.csv"', ""), ('"run.csv"', '"../run.csv"', "recording.file"),
+        ('session = "one"', "header = 1", "recording.header"), ('file = "run.csv"', "", "recording.file"),
+        ("u_zero = 1.0", "u_zero = -1.0", "columns.thrust.u_zero"), ("[columns]", "[column]", "columns"),
+    ],
+)  # fmt: skip
+def test_each_fault_has_its_place(old: str, new: str, where: str, put: Put) -> None:
+    text = GOOD.replace(old, new)
+    assert text != GOOD
+    assert where in faults(put(text))
+
+
+@pytest.mark.parametrize(
+    ("air", "density"),
+    [
+        ("density_kg_m3 = 1.19", 1.19), ("altitude_m = 0.0", 1.225), ("altitude_m = 0.0\ntemperature_C = 30.0", 1.1644),
+        ("pressure_hPa = 1013.25\ntemperature_C = 15.0", 1.2250),
+    ],
+)  # fmt: skip
+def test_every_air_state_gives_a_density(air: str, density: float, put: Put) -> None:
+    start = GOOD.index("[air]")
+    text = GOOD[:start] + "[air]\n" + air + "\n" + GOOD[GOOD.index("[stand]") :]
+    assert importers.read(put(text)).constants["density_kg_m3"] == pytest.approx(density, rel=5e-4)
+
+
+def test_a_table_points_to_the_recording_beside_it(put: Put) -> None:
+    path = put()
+    got = importers.read(path.with_name("run.csv"))
+    assert any("import recording.toml" in text for text in got.warnings)
+
+
+def test_faults_of_the_table_name_the_table(put: Put) -> None:
+    found = faults(put(table=TABLE.replace("\n40,", "\n40,7,7,")))
+    assert any("run.csv" in text and "7 cells" in text for text in found.values())
+
+
+def test_mutated_recordings_are_read_or_refused(put: Put) -> None:
+    rng = random.Random(11)
+    read = 0
+    for _ in range(250):
+        text = GOOD
+        for _ in range(rng.randint(1, 3)):
+            at = rng.randrange(len(text))
+            match rng.randrange(4):
+                case 0:
+                    text = text[:at] + text[at + rng.randint(1, 12) :]
+                case 1:
+                    junk = ["1", '"', "[", "{", "=", "\n", "nan", "-", ".", "é", "true", ","]
+                    text = text[:at] + rng.choice(junk) + text[at:]
+                case 2:
+                    lines = text.split("\n")
+                    lines[rng.randrange(len(lines))] = rng.choice(lines)
+                    text = "\n".join(lines)
+                case _:
+                    lines = text.split("\n")
+                    rng.shuffle(lines)
+                    text = "\n".join(lines)
+        try:
+            got = recording_toml.read(put(text))
+        except InputError as error:
+            assert error.faults
+            continue
+        read += 1
+        assert got.rows == 12 and len(got.flags) == 12
+    assert 5 < read < 245

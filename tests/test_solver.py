@@ -1,0 +1,363 @@
+"""The promise of the solver: it solves the stated equations, says what it could not do, and is used as documented."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+from numba import njit
+from scipy.optimize import brentq
+
+from bemt import _kernel, _residual, _vecmath, solver
+from bemt.air import Air
+from bemt.duct import DuctFlow
+from bemt.effects import standard, without
+from bemt.effects.swirl import Swirl
+from bemt.effects.tip_loss import TipLoss
+from bemt.polars import Polar, linear_polar
+from geometry.blade import Stations
+from geometry.rotor import Rotor
+
+AIR = Air.from_density(1.2)
+DUCT = DuctFlow(0.95, 0.05, 0.2, 0.8, 0.001, 0.08, 0.01)
+R = _residual
+
+
+# The pieces of the kernel -------------------------------------------------------------------------------------------
+
+
+def test_elementary_functions_are_exact() -> None:
+    @njit
+    def run(x: Any, y: Any, out: Any) -> None:
+        for i in range(x.size):
+            out[i, 0], out[i, 1] = _vecmath.sincos(x[i])
+            out[i, 2] = _vecmath.atan2(y[i], x[i])
+            out[i, 3] = _vecmath.log(abs(x[i]))
+
+    rng = np.random.default_rng(1)
+    x = np.concatenate([rng.uniform(-10, 10, 50_000), rng.uniform(-1, 1, 1000) * 1e-9, [1.0, -1.0, math.pi, 0.5]])
+    y = rng.permutation(x) * 10.0 ** rng.uniform(-3, 3, x.size)
+    out = np.empty((x.size, 4))
+    run(x, y, out)
+    exact = np.stack([np.sin(x), np.cos(x), np.arctan2(y, x), np.log(np.abs(x))], axis=1)
+    assert np.max(np.abs(out - exact) / np.maximum(1.0, np.abs(exact))) < 1e-15
+
+
+def test_prandtl_table_is_the_formula() -> None:
+    @njit
+    def run(u: Any, out: Any) -> None:
+        for i in range(u.size):
+            out[i, 0], out[i, 1] = R.loss(u[i])
+
+    u = np.concatenate([np.linspace(0.0, 6.0, 20_001), [np.nan, np.inf]])
+    out = np.empty((u.size, 2))
+    run(u, out)
+    with np.errstate(all="ignore"):
+        exact = 2.0 / np.pi * np.arccos(np.exp(-(u[:-2] ** 2)))
+    assert np.abs(out[:-2, 0] - exact).max() < 2e-9
+    assert np.abs(np.gradient(exact, u[:-2], edge_order=2) - out[:-2, 1])[1:-1].max() < 1e-5
+    assert np.all(out[-2:, 0] == 1.0)  # off, and not a number, count as far from the edge
+
+
+def test_mass_flow_joins_its_neighbours_smoothly() -> None:
+    @njit
+    def run(y: float) -> tuple[float, float]:
+        return R.mass_flow(y)
+
+    tiny = 1e-12
+    # momentum theory y for windmills, -y for helicopters in descent; one value and one slope where the pieces meet
+    assert run(0.6 - tiny) == pytest.approx((0.6, 1.0), abs=1e-11)
+    assert run(-1.0 + tiny) == pytest.approx((1.0, -1.0), abs=1e-11)
+    assert run(-tiny) == pytest.approx(run(0.0), abs=1e-11)
+    for y in (-0.9, -0.3, 0.1, 0.5):
+        assert (run(y + 1e-6)[0] - run(y - 1e-6)[0]) / 2e-6 == pytest.approx(run(y)[1], abs=1e-8)
+        a = 1.0 - y
+        if y > 0:  # Buhl's thrust coefficient 4 a (1 - a) in place of momentum theory's
+            assert 4.0 * run(y)[0] * a == pytest.approx(8 / 9 - 4 / 9 * a + 14 / 9 * a * a)
+
+
+def residual(ducted: bool, full: bool) -> Any:
+    """Compiled residual of station k: g, dg/dphi, cl, cd, ..."""
+    element = R.ducted_rotor if ducted else R.open_rotor
+    lookup = R.lookup_full if full else R.lookup_plain
+
+    @njit
+    def run(phi: float, k: int, Omega: float, V: float, st: Any, tab: Any, par: Any) -> Any:
+        fx = (par[0], par[1], par[2], par[3], par[4], par[5], par[6], par[7], par[8], par[9], par[10])
+        o = R.N_NUM
+        g = (par[o], par[o + 1], par[o + 2], par[o + 3], par[o + 4], par[o + 5], par[o + 6], par[o + 7], par[o + 8],
+             par[o + 9], par[o + 10] / 340.0**2, par[o + 11], par[o + 12], par[o + 13])  # fmt: skip
+        base = np.int32(par[o + 14] * k)
+        return element(lookup, phi, Omega * st[k, 0], V, 1.0 / V if V != 0.0 else 0.0, st[k, 3], 0.25 * st[k, 4],
+                       st[k, 5], st[k, 6], 11.0 + st[k, 7], base, tab, g, fx)  # fmt: skip
+
+    return run
+
+
+def reynolds_polar() -> Polar:
+    thin, thick = linear_polar(4.0, cd=0.02), linear_polar(6.0, alpha0=-0.05, cd=0.01)
+    ramp = np.linspace(0.0, 1.0, thin.Re.size)[None, :, None]
+    return dataclasses.replace(thin, cl=thin.cl + ramp * (thick.cl - thin.cl), cd=thin.cd + ramp * (thick.cd - thin.cd))
+
+
+@pytest.mark.parametrize("full", [False, True], ids=["plain", "full"])
+@pytest.mark.parametrize("ducted", [False, True], ids=["open", "ducted"])
+@pytest.mark.parametrize("off", ["", "swirl", "tip_loss", "high_induction", "far wake"])
+def test_slope_of_the_residual(rotor: Rotor, ducted: bool, full: bool, off: str) -> None:
+    effects = without(standard(), [off] if off and off != "far wake" else [])
+    if off == "far wake":
+        effects = (*without(standard(), ["tip_loss"]), TipLoss(sheets="disk"))
+    polar = reynolds_polar()
+    if not full:
+        effects = without(effects, ["compressibility", "drag_divergence"])
+        polar = dataclasses.replace(polar, Re=polar.Re[:1], cl=polar.cl[:, :1], cd=polar.cd[:, :1])
+    prep = solver.prepare(rotor, [(0.7, polar)], effects, DUCT if ducted else None, n_stations=9)
+    _, st, tab, par = prep.kernel
+    assert (prep.tab.shape[1:3] == (1, 1)) != full
+    run, rng = residual(ducted, full), np.random.default_rng(2)
+    zones = set()
+    for _ in range(4000):
+        k, Omega, V = int(rng.integers(9)), rng.uniform(100.0, 2500.0), rng.choice([0.0, rng.uniform(-30.0, 60.0)])
+        UT = Omega * st[k, 0]
+        inflow = math.atan2(V, UT)
+        phi = inflow + rng.uniform(-1.2, 1.2)
+        if abs(phi) < 0.02 or (off == "swirl" or ducted) and abs(phi) > 1.2:
+            continue
+        g0, slope, *_ = run(phi, k, Omega, V, st, tab, par)
+        h = 1e-6
+        left, right = (run(phi + x, k, Omega, V, st, tab, par)[0] for x in (-h, h))
+        # a kink of the tables or a switch between the two points is no slope: one-sided differences tell
+        if abs((right - g0) - (g0 - left)) > 1e-3 * h * (abs(slope) + UT):
+            continue
+        scale = 1.0 if ducted else UT + abs(V)
+        assert (right - left) / (2 * h) == pytest.approx(slope, rel=2e-5, abs=2e-5 * scale), (k, Omega, V, phi)
+        y = math.sin(phi) * (UT * math.cos(phi) + V * math.sin(phi)) / V if V else math.inf
+        zones.add((y > 0.6) + 2 * (y < -1))
+    assert zones == {0, 1, 2}
+
+
+def test_section_tables_are_read_as_they_are(rotor: Rotor, polar: Polar) -> None:
+    """cl, cd at any turn of alpha, any Re and M, held at the ends, against plain interpolation of the same tables."""
+    prep = solver.prepare(rotor, [(0.7, reynolds_polar())], n_stations=5)
+    _, st, tab, par = prep.kernel
+
+    @njit
+    def run(alpha: float, lre: float, W: float, base: int, tab: Any, par: Any) -> Any:
+        o = R.N_NUM
+        g = (par[o], par[o + 1], par[o + 2], par[o + 3], par[o + 4], par[o + 5], par[o + 6], par[o + 7], par[o + 8],
+             par[o + 9], par[o + 10] / 340.0**2, par[o + 11], par[o + 12], par[o + 13])  # fmt: skip
+        return R.lookup_full(alpha, lre, W * W, np.int32(base), tab, g)
+
+    from bemt.polars import ALPHA_GRID, DEFAULT_RE
+
+    rng = np.random.default_rng(4)
+    for _ in range(500):
+        k, alpha, W, lre = int(rng.integers(5)), rng.uniform(-9.0, 9.0), rng.uniform(1.0, 600.0), rng.uniform(0.0, 16.0)
+        got = run(alpha, lre, W, int(par[R.N_NUM + 14]) * k, tab, par)
+        a = math.remainder(alpha, 2.0 * math.pi)
+        x = np.clip(lre + math.log(W), *np.log(DEFAULT_RE[[0, -1]]))
+        m = min((W / 340.0) ** 2 / 0.1, prep.tab.shape[1] - 1.0)
+        over_alpha = np.array([[[np.interp(a, ALPHA_GRID, prep.tab[k, i, j, :, c]) for c in (0, 1)]
+                                for j in range(prep.tab.shape[2])] for i in range(prep.tab.shape[1])])  # fmt: skip
+        over_re = np.array([[np.interp(x, np.log(DEFAULT_RE), row[:, c]) for c in (0, 1)] for row in over_alpha])
+        for c in (0, 1):
+            assert got[c] == pytest.approx(np.interp(m, np.arange(len(over_re)), over_re[:, c]), rel=1e-11, abs=1e-12)
+
+
+# The equations ------------------------------------------------------------------------------------------------------
+
+
+def test_against_an_independent_solution(rotor: Rotor, polar: Polar) -> None:
+    """Induction factors after Ning 2014 eq. 6-13, thrust from the momentum side, by another root finder."""
+    polar = dataclasses.replace(polar, Re=polar.Re[:1], cl=polar.cl[:, :1], cd=polar.cd[:, :1])
+    prep = solver.prepare(rotor, [(0.7, polar)], (Swirl(), TipLoss(sheets="disk")), n_stations=15)
+    Omega, V, B = 700.0, 9.0, rotor.B
+    s = solver.solve(prep, Omega * 30.0 / np.pi, V, AIR, radial=True)
+    T = Q = 0.0
+    for r, dr, chord, beta in zip(*prep.stations, strict=True):
+        sigma = B * chord / (2.0 * math.pi * r)
+
+        def state(phi: float, r: float = r, beta: float = beta, sigma: float = sigma) -> tuple[float, float, float]:
+            cl, cd = (float(v) for v in prepared_lookup(beta - phi))
+            sin, cos = math.sin(phi), math.cos(phi)
+            F = 2.0 / math.pi * math.acos(math.exp(-0.5 * B * (rotor.R - r) / (r * sin)))
+            kappa = sigma * (cl * cos - cd * sin) / (4.0 * F * sin * sin)
+            kappa_t = sigma * (cl * sin + cd * cos) / (4.0 * F * sin * cos)
+            return F, kappa / (1.0 - kappa), kappa_t / (1.0 + kappa_t)
+
+        def prepared_lookup(alpha: float) -> tuple[Any, Any]:
+            return polar.on_grid(re=polar.Re).lookup(alpha, 1e5)
+
+        def balance(phi: float, r: float = r, state: Any = state) -> float:
+            _, a, ap = state(phi)
+            return math.sin(phi) / (1.0 + a) - V / (Omega * r) * math.cos(phi) / (1.0 - ap)
+
+        inflow = math.atan2(V, Omega * r)
+        phi = brentq(balance, inflow * 0.9, inflow + 0.15, xtol=1e-14)
+        F, a, ap = state(phi)
+        T += 4.0 * math.pi * r * AIR.rho * V * V * (1.0 + a) * a * F * dr
+        Q += 4.0 * math.pi * r**3 * AIR.rho * V * Omega * (1.0 + a) * ap * F * dr
+    assert s.T[0] == pytest.approx(T, rel=1e-9)
+    assert s.Q[0] == pytest.approx(Q, rel=1e-9)
+
+
+@pytest.mark.parametrize("sheets", ["wake", "disk"])
+def test_momentum_and_blade_agree_at_every_station(rotor: Rotor, polar: Polar, sheets: str) -> None:
+    prep = solver.prepare(rotor, [(0.7, polar)], (*without(standard(), ["tip_loss"]), TipLoss(sheets=sheets)))
+    V = np.concatenate([np.linspace(0.0, 22.0, 60), [-1.0, -2.0, -30.0]])
+    s = solver.solve(prep, 6000.0, V, AIR, radial=True)
+    r, dr = s.radial, prep.st[:, 1]
+    y = r["w"] / np.where(s.V == 0.0, 1e-9, s.V)[:, None]
+    momentum = (y > 0.62) | (y < -1.05)
+    assert momentum.mean() > 0.8
+    ring = 2.0 * AIR.rho * 2.0 * np.pi * r["r"] * dr * r["F"] * np.abs(r["w"])
+    size = np.abs(r["dT"]).max()
+    assert np.abs(ring * (r["w"] - s.V[:, None]) - r["dT"])[momentum].max() < 1e-11 * size
+    assert np.abs(ring * r["v_t"] - r["dQ"] / r["r"])[momentum].max() < 1e-11 * size
+
+
+def test_bernoulli_and_blade_agree_at_every_station_of_a_fan(rotor: Rotor, polar: Polar) -> None:
+    prep = solver.prepare(rotor, [(0.7, polar)], duct=DUCT)
+    V = np.linspace(0.0, 30.0, 60)
+    s = solver.solve(prep, 6000.0, V, AIR, radial=True)
+    r, dr = s.radial, prep.st[:, 1]
+    area = 2.0 * np.pi * r["r"] * dr
+    K = 1.0 / DUCT.wake_ratio**2 + DUCT.wall_loss
+    sucked, turned = np.maximum(r["w"] - s.V[:, None], 0.0), np.maximum(r["v_t"], 0.0)
+    push = K * r["w"] ** 2 - s.V[:, None] ** 2 + DUCT.lip_loss * sucked**2 - 4.0 * DUCT.stator * turned**2
+    size = np.abs(r["dT"]).max()
+    assert np.abs(0.5 * AIR.rho * area * r["F"] * push - r["dT"]).max() < 1e-11 * size
+    assert np.abs(2.0 * AIR.rho * area * r["F"] * r["w"] * r["v_t"] - r["dQ"] / r["r"]).max() < 1e-11 * size
+    assert np.allclose(s.T, s.T_rotor + s.T_stator + s.T_duct)
+
+
+@pytest.mark.parametrize("sheets", ["wake", "disk"])
+@pytest.mark.parametrize("V", [0.0, 6.0, 12.0])
+def test_loss_factor_is_the_documented_one(rotor: Rotor, sheets: str, V: float) -> None:
+    prep = solver.prepare(rotor, [(0.7, linear_polar())], (Swirl(), TipLoss(0.9, sheets)), n_stations=30)
+    r = {k: v[0] for k, v in solver.solve(prep, 6000.0, V, AIR, radial=True).radial.items()}
+    q = (2.0 * r["w"] - V) / r["w"] if sheets == "wake" else np.ones(30)
+    phi = np.arctan(np.tan(r["phi"]) * q**1.5)
+    f = 0.9 * 0.5 * rotor.B * (rotor.R - r["r"]) / (r["r"] * np.sin(phi))
+    assert np.allclose(r["F"], 2.0 / np.pi * np.arccos(np.exp(-f)), rtol=1e-6, atol=2e-9)
+
+
+# Use ----------------------------------------------------------------------------------------------------------------
+
+
+def test_import_compiles_nothing() -> None:
+    code = (
+        "from numba.core import event\n"
+        "with event.install_recorder('numba:compile') as record:\n"
+        "    import bemt.solver, bemt._kernel as K\n"
+        "assert not record.buffer and not K.entry(False, True).signatures"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_the_disk_cache_sees_changes_of_other_files() -> None:
+    before = _vecmath.fingerprint(_residual, _vecmath)
+    assert before == _vecmath.fingerprint(_residual, _vecmath)
+    assert before in [c.cell_contents for c in _kernel.entry(True, False).py_func.__closure__]  # type: ignore[attr-defined]
+    kept = _residual._EPS
+    try:
+        _residual._EPS = 2.0 * kept
+        assert _vecmath.fingerprint(_residual, _vecmath) != before
+    finally:
+        _residual._EPS = kept
+
+
+def test_broadcasting_of_speeds_and_air(rotor: Rotor, polar: Polar) -> None:
+    prep = solver.prepare(rotor, [(0.7, polar)], n_stations=10)
+    s = solver.solve(prep, [[4000.0], [5000.0]], [0.0, 1.0, 2.0], AIR)
+    assert s.rpm.tolist() == [4000.0] * 3 + [5000.0] * 3
+    assert s.V.tolist() == [0.0, 1.0, 2.0] * 2
+    rho = np.array([1.2, 0.6])
+    thin = solver.solve(prep, 5000.0, 3.0, dataclasses.replace(AIR, rho=rho))
+    assert thin.T[1] == pytest.approx(0.5 * thin.T[0], rel=1e-12)
+    assert thin.P == pytest.approx(thin.Q * 5000.0 * np.pi / 30.0, rel=1e-14)
+    assert solver.solve(prep, 5000.0).T[0] > 0  # standard air, at rest
+
+
+@pytest.mark.parametrize(
+    ("rpm", "V", "air", "match"),
+    [
+        (0.0, 0.0, {}, "rpm"), (-5.0, 0.0, {}, "rpm"), (math.nan, 0.0, {}, "rpm"), (5000.0, math.inf, {}, "airspeed"),
+        (5000.0, 0.0, {"rho": 0.0}, "air"), (5000.0, 0.0, {"mu": -1.0}, "air"), (5000.0, 0.0, {"a_sound": 0.0}, "air"),
+    ],
+)  # fmt: skip
+def test_bad_points_are_refused(
+    rotor: Rotor, polar: Polar, rpm: float, V: float, air: dict[str, float], match: str
+) -> None:
+    prep = solver.prepare(rotor, [(0.7, polar)], n_stations=5)
+    with pytest.raises(ValueError, match=match):
+        solver.solve(prep, rpm, V, dataclasses.replace(AIR, **air))
+
+
+def test_bad_rotors_are_refused(rotor: Rotor, polar: Polar) -> None:
+    with pytest.raises(ValueError, match="at least one"):
+        solver.prepare(rotor, [])
+    with pytest.raises(ValueError, match="ascending"):
+        solver.prepare(rotor, [(0.7, polar), (0.3, polar)])
+    s = rotor.blade.midpoints(5)
+    for bad in (s._replace(r=-s.r), s._replace(chord=-s.chord), s._replace(beta=s.beta * math.nan)):
+        with pytest.raises(ValueError, match="stations"):
+            solver.prepare(rotor, [(0.7, polar)], stations=Stations(*bad))
+
+
+def test_a_failed_station_is_a_nan_with_words(rotor: Rotor, polar: Polar) -> None:
+    prep = solver.prepare(rotor, [(0.7, polar)], n_stations=10)
+    tab = prep.tab.copy()
+    tab[3] = math.nan
+    broken = dataclasses.replace(prep, tab=tab)
+    s = solver.solve(broken, 5000.0, [0.0, 5.0], AIR, radial=True)
+    assert not s.converged.any()
+    assert np.isnan([s.T, s.Q, s.P, s.CT, s.CP, s.V_exit, s.T_rotor]).all()
+    place = prep.stations.r[3] / rotor.R
+    assert s.flags[0] == (f"not converged at r/R {place:.2f}: {solver.REASONS[_kernel.NOT_FINITE]}",)
+    assert np.isnan(s.radial["dT"][:, 3]).all()
+    assert np.isfinite(s.radial["dT"][:, [2, 4]]).all()
+    T, Q, ok = solver.solve_point(broken, 5000.0, 0.0, AIR)
+    assert math.isnan(T) and math.isnan(Q) and not ok
+
+
+def test_words_for_unusual_states(rotor: Rotor, polar: Polar) -> None:
+    prep = solver.prepare(rotor, [(0.7, polar)], n_stations=20, mach_max=0.6)
+    fan = solver.prepare(rotor, [(0.7, polar)], duct=DUCT, n_stations=20)
+    quiet = solver.solve(prep, 6000.0, [0.0, 5.0, 10.0], AIR)
+    assert quiet.flags == ((), (), ())
+    n = 6000.0
+    words = [" ".join(f) for f in solver.solve(prep, [n, n, 2.2e4], [-6.0, 40.0, 0.0], AIR).flags]
+    assert "vortex-ring or windmill-brake state" in words[0]
+    assert "turbulent windmill state" not in words[0]
+    assert "tip Mach above" in words[2]
+    assert solver.solve(fan, n, 0.0, AIR).flags == ((),)
+    assert "from behind the duct" in " ".join(solver.solve(fan, n, -1.0, AIR).flags[0])
+    assert "reversed" in " ".join(solver.solve(fan, 600.0, -20.0, AIR).flags[0])
+
+
+def test_a_symmetric_blade_at_zero_pitch_is_not_silent(rotor: Rotor) -> None:
+    """No thrust and no flow at rest: drag spins the air up with the blade, and the torque of that is no result."""
+    flat = rotor.blade.midpoints(10)._replace(beta=np.zeros(10))
+    prep = solver.prepare(rotor, [(0.7, linear_polar(cd=0.02))], stations=Stations(*flat))
+    s = solver.solve(prep, 6000.0, 0.0, AIR)
+    assert s.T[0] == pytest.approx(0.0, abs=1e-9)
+    assert "drag swirls the flow" in s.flags[0][0]
+
+
+def test_many_stations_and_few(rotor: Rotor, polar: Polar) -> None:
+    """More stations than lanes, one station, and every count between: the padding of lanes changes nothing."""
+    whole = rotor.blade.midpoints(150, "cosine")
+    effects = without(standard(), ["compressibility", "drag_divergence"])
+    s = solver.solve(solver.prepare(rotor, [(0.7, polar)], effects, stations=whole), 6000.0, 4.0, AIR, radial=True)
+    assert s.converged[0]
+    for part in (slice(0, 1), slice(3, 10), slice(60, 68), slice(60, 125), slice(100, 150)):
+        some = Stations(*(v[part] for v in whole))
+        t = solver.solve(solver.prepare(rotor, [(0.7, polar)], effects, stations=some), 6000.0, 4.0, AIR, radial=True)
+        assert np.allclose(t.radial["dT"], s.radial["dT"][:, part], rtol=1e-9, atol=1e-12)
+        assert t.T[0] == pytest.approx(s.radial["dT"][0, part].sum(), rel=1e-9)
