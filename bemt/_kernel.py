@@ -92,9 +92,9 @@ def _evaluate(element, lookup, w, k, tab, g, fx):
     hi = phi if res > 0.0 else w[_HI + k]
     d = -res / slope
     new = phi + d
-    # not (...) so that a NaN step is refused too
-    small = abs(d)
-    good = slope > 0.0 and new >= lo and new <= hi and (2.0 * small < w[_STEP + k] or small < 1e-12)
+    size = abs(d)
+    # Newton's step if it is uphill, stays inside and halves the last one (or is down to rounding); else bisection
+    good = slope > 0.0 and new >= lo and new <= hi and (2.0 * size < w[_STEP + k] or size < 1e-12)
     d = d if good else 0.5 * (lo + hi) - phi
     d = 0.0 if res == 0.0 else d
     d = d if abs(res) < 1e300 else math.nan
@@ -116,7 +116,7 @@ def _evaluate(element, lookup, w, k, tab, g, fx):
 
 @inlined
 def _finish(element, lookup, w, k, tab, g, fx):
-    """Finish one lane alone; returns its status."""
+    """Finish one lane alone; returns its status.  Every two steps halve the bracket or the step: it always ends."""
     for _ in range(MAX_SCALAR):
         size = _evaluate(element, lookup, w, k, tab, g, fx)
         if not (size >= 1e-13):

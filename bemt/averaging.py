@@ -54,7 +54,7 @@ class Average:
     spread : float or None
         Largest minus smallest value in the span relative to the mean. [1]
     per_revolution : tuple of float
-        Mean of each averaged revolution, in time order.
+        Mean of each averaged revolution, in time order. [unit of the values]
     problem : str
         Why there is no mean, or what makes it doubtful; empty when nothing does.
     """
@@ -212,7 +212,7 @@ def steady_average(values: ArrayLike, share: float = STEADY_SHARE) -> Average:
     values : (N,) array
         History by iterations.
     share : float
-        Part averaged, from the end; at least 10 rows where there are.
+        Part averaged, from the end; at least 10 rows where there are. [1]
 
     Returns
     -------

@@ -20,7 +20,8 @@ __all__ = ["build_parser", "main"]
 EXIT_INTERRUPTED = 130
 
 _MODULES = {"sweep": "bemt.sweep", "validate": "bemt.validate", "reproduce": "bemt.reproduce", "bench": "bemt.bench",
-            "import": "bemt.import_files"}  # fmt: skip
+            "import": "bemt.import_files", "export": "bemt.export_case",
+            "stations": "bemt.stations"}  # fmt: skip
 
 
 def _positive(text: str) -> int:
@@ -108,6 +109,23 @@ def build_parser() -> argparse.ArgumentParser:
     bring.add_argument("--zones", nargs="+", metavar="ZONE", help="add up the loads of these zones")
     loads = "channel that --sign and --sector apply to; repeatable (default: all in N or Nm)"
     bring.add_argument("--load", action="append", metavar="NAME", help=loads)
+
+    solid = commands.add_parser("export", help="write the solids of a case for CAD and CFD")
+    solid.add_argument("case", metavar="CASE", help="case file, its folder, or a folder of cases")
+    solid.add_argument("--out", required=True, metavar="DIR", help="folder of the files and manifest.json")
+    kinds = ("stl", "step", "obj", "openfoam")
+    solid.add_argument("--format", nargs="+", choices=kinds, default=["stl"], help="one or more (default stl)")
+    solid.add_argument("--unit", choices=("mm", "m"), default="mm", help="of the files; openfoam is always in m")
+    solid.add_argument("--fillet-mm", type=float, default=0.0, metavar="R", help="fillet of blade and hub (default 0)")
+    thin = "refuse blades that are thinner somewhere (default 0: none)"
+    solid.add_argument("--min-thickness-mm", type=float, default=0.0, metavar="T", help=thin)
+    solid.add_argument("--json", action="store_true", help="print one JSON document (bemt.export/1)")
+
+    cut = commands.add_parser("stations", help="find and cut the blades of a CAD model or scan: a case to solve")
+    cut.add_argument("file", metavar="FILE", help="STL, OBJ or STEP")
+    cut.add_argument("--unit", choices=("mm", "m", "in"), help="of an STL or OBJ that does not state it")
+    cut.add_argument("--out", metavar="DIR", help="write case.toml, stations.csv and section files there")
+    cut.add_argument("--json", action="store_true", help="print one JSON document (bemt.stations/1)")
     return parser
 
 

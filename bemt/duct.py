@@ -104,7 +104,7 @@ class DuctFlow:
         rho, V : (P,) float
             Density [kg/m3], onset speed [m/s].
         out : (P, 8) float
-            Kernel output [N, N m, kg/s, kg m/s2, ...], see :func:`bemt._kernel.solve_point`.
+            Kernel output [N, N m, kg/s, kg m/s2, ...], see :func:`bemt._kernel.entry`.
 
         Returns
         -------

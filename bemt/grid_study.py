@@ -49,19 +49,21 @@ class GridStudy:
     Parameters
     ----------
     values : tuple of float
-        f1, f2 (, f3).
+        f1, f2 (, f3). [unit of the quantity]
     ratios : tuple of float
         r21 (, r32). [1]
     order : float or None
         Observed order; the assumed one with two grids; None when it cannot be told (oscillation, no difference).
+        [1]
     extrapolated : float or None
-        Value at cell size zero; None without an order.
+        Value at cell size zero; None without an order. [unit of the quantity]
     gci_fine, gci_coarse : float or None
         GCI21 and GCI32 as fractions of f1 and f2; None without an order (gci_coarse: also with two grids).
+        [1]
     asymptotic : float or None
-        GCI32 / (r21^p GCI21), near 1 in the asymptotic range.
+        GCI32 / (r21^p GCI21), near 1 in the asymptotic range. [1]
     safety : float
-        Factor Fs.
+        Factor Fs. [1]
     u_relative : float
         Standard uncertainty of f1 by the grid, relative. [1]
     flags : tuple of str
@@ -86,7 +88,7 @@ def cell_size(cells: float, volume: float = 1.0, dimensions: int = 3) -> float:
     Parameters
     ----------
     cells : float
-        Number of cells.
+        Number of cells. [1]
     volume : float
         Size of the domain [m3, or m2 in two dimensions]; only ratios matter.
     dimensions : int
@@ -164,9 +166,9 @@ def grid_study(
     ratios : sequence of float
         Refinement ratios r21 (, r32), above 1; 1.3 or more is wanted. [1]
     formal_order : float
-        Order of the scheme; assumed when there are two grids.
+        Order of the scheme; assumed when there are two grids. [1]
     safety : float or None
-        Fs; None takes 1.25 with three grids and 3.0 with two.
+        Fs; None takes 1.25 with three grids and 3.0 with two. [1]
 
     Returns
     -------

@@ -76,7 +76,7 @@ def recognised(path: str | os.PathLike[str]) -> tuple[str, str] | None:
 
 
 _DAMAGED = (
-    (re.compile(rb'^[^"\n,]*"(?:[ \t]+"[^"\n]*")+\)[ \t]*\r?$', re.MULTILINE), "a Fluent report file"),
+    (re.compile(rb'^[^"\n,]*"(?:[ \t]+"[^"\n]*")*\)[ \t]*\r?$', re.MULTILINE), "a Fluent report file"),
     (re.compile(rb'^[^"\n,]*"[ \t]+"[^"\n]*"[ \t]*\r?\n[-+.\d]', re.MULTILINE), "a Fluent monitor"),
     (re.compile(rb"\(\([-+.\deE ]+\) \([-+.\deE ]+\)"), "an OpenFOAM forces file"),
     (re.compile(rb"^\(\(xy/key/label", re.MULTILINE), "a Fluent XY plot"),

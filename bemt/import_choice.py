@@ -155,7 +155,9 @@ def chosen(record: Imported, choice: Choice) -> Imported:
 def _zone_sums(record: Imported, zones: Sequence[str], file: str) -> dict[str, Channel]:
     groups: dict[str, dict[str, Channel]] = {}
     for name, channel in record.channels.items():
-        match = re.fullmatch(r"(.+?)\s*\(([^()]*)\)", name)
+        match = re.fullmatch(r"(.+?)\(([^()]*)\)", name)
+        if record.format == "openfoam_forces":  # Cd(f), Cd(r): front and rear, no zones
+            continue
         if match and "center_of_pressure" not in name and "y_plus" not in name:
             groups.setdefault(match[1], {})[match[2]] = channel
     known = list(dict.fromkeys(zone for group in groups.values() for zone in group))

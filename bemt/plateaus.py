@@ -5,7 +5,8 @@ dropped, with the reason.
 
 1. *Steps.* With a command (pulse width, throttle), a step is where the command changes, and a stretch in which it
    changes all the time is a ramp. Without one, a step is where the medians of the `window` samples before and after
-   differ by more than `least_step` and by more than five standard errors.
+   differ by more than `least_step`, by more than five standard errors of the whole recording and three of the samples
+   beside it.
 2. *Settling.* The start of a stretch is cut until the running median stays within the band of the second half of the
    stretch (twice its robust spread, or 1 % of its level). Without a command, the end is cut likewise where the samples
    of its last window already follow the next step.
@@ -33,6 +34,8 @@ __all__ = ["Dropped", "Plateau", "Plateaus", "Settings", "find", "standard_error
 Array = NDArray[np.float64]
 OUTLIER = 6.0
 """Robust standard deviations from which a sample is an outlier."""
+LOCAL = 3.0
+"""Standard errors, from the spread of the samples beside it, that a step must exceed."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +59,7 @@ class Settings:
     """
 
     window: int = 8
-    least_step: float = 0.03
+    least_step: float = 0.01
     least_samples: int = 5
     least_time_s: float = 0.0
     drift: float = 0.02
@@ -147,8 +150,8 @@ def standard_error(values: ArrayLike) -> float:
     Returns
     -------
     float
-        sd / sqrt(n_eff) with n_eff = n (1 - r) / (1 + r), r the correlation of neighbours, not below 0 and n_eff not
-        below 1; NaN for fewer than two samples.
+        sd / sqrt(n_eff) [unit of the samples] with n_eff = n (1 - r) / (1 + r), r the correlation of neighbours, not
+        below 0 and n_eff not below 1; NaN for fewer than two samples.
 
     Notes
     -----
@@ -326,9 +329,13 @@ def _by_signal(v: Array, rules: Settings) -> tuple[list[tuple[int, int]], list[D
     n, w = len(v), rules.window
     if n < 2 * w:
         return [(0, n)], []
-    medians = np.median(np.lib.stride_tricks.sliding_window_view(v, w), axis=1)
+    windows = np.lib.stride_tricks.sliding_window_view(v, w)
+    medians = np.median(windows, axis=1)
+    sway = 1.4826 * np.median(np.abs(windows - medians[:, None]), axis=1)  # noise may differ from level to level
     jump = np.zeros(n + 1)
     jump[w : n - w + 1] = np.abs(medians[w:] - medians[: n - 2 * w + 1])
+    local = np.zeros(n + 1)
+    local[w : n - w + 1] = LOCAL * np.maximum(sway[w:], sway[: n - 2 * w + 1]) * 1.2533 * math.sqrt(2.0 / w)
     noise = 1.4826 * float(np.median(np.abs(np.diff(v) - np.median(np.diff(v))))) / math.sqrt(2.0)
     lo, hi = np.percentile(v, [1.0, 99.0])
     least = max(rules.least_step * float(hi - lo), 5.0 * 1.2533 * noise * math.sqrt(2.0 / w))
@@ -340,7 +347,9 @@ def _by_signal(v: Array, rules: Settings) -> tuple[list[tuple[int, int]], list[D
     at = 0
     edges = np.flatnonzero(np.diff(np.concatenate([[False], moving, [False]]).astype(int)))
     for a, b in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-        if b - a <= 2 * w + 2:  # one step: the peak of the jump is its place
+        if not np.any(jump[a:b] > local[a:b]):  # no more than the noise beside it
+            continue
+        if b - a <= 3 * w:  # one step: the peak of the jump is its place
             peak = a + int(np.argmax(jump[a:b]))
             first, last = peak, peak
         else:  # the level moves all the time

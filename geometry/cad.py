@@ -77,7 +77,6 @@ def planar_sections(rotor: Rotor, options: Options | None = None) -> list[tuple[
     options = options or Options()
     grid = Options(_POINTS, 20 * options.tolerance, options.segments, options.fillet)
     rho = radii(blade, grid)
-    levels = rho
     rho = np.sort(np.concatenate([rho, 0.5 * (rho[1:] + rho[:-1])]))
     step = 0.02 * rotor.R
     fine = Options(_POINTS, options.tolerance, options.segments, options.fillet)
@@ -102,7 +101,7 @@ def planar_sections(rotor: Rotor, options: Options | None = None) -> list[tuple[
     if root < bottom or top < rotor.R:
         raise GeometryError([("chord", "a blade too wide for its hub", "a root that ends inside the hub",
                               "Less chord or a larger hub")])  # fmt: skip
-    planes = np.unique(np.concatenate([[root], levels[(levels > 1.01 * root) & (levels < rotor.R)], [rotor.R + 0.4 * step]]))
+    planes = np.unique(np.concatenate([[root], rho[(rho > 1.01 * root) & (rho < rotor.R)], [rotor.R + 0.4 * step]]))
     planes = planes[np.concatenate([[True], np.diff(planes) > 1e-4 * rotor.R])]
     out = []
     for plane in planes:
@@ -342,7 +341,7 @@ def assembly(parts: Parts, name: str) -> Any:
     return out
 
 
-def tessellate(shape: Any, tolerance: float, angle: float = 0.15) -> Mesh:
+def tessellate(shape: Any, tolerance: float, angle: float = 0.1) -> Mesh:
     """Mesh CAD solids; each stays a body of its own.
 
     Parameters
@@ -363,23 +362,35 @@ def tessellate(shape: Any, tolerance: float, angle: float = 0.15) -> Mesh:
     -----
     Older triangles are removed first: without that the CAD kernel returns them, whatever the tolerance.
     """
+    import cadquery as cq
     from OCP.BRepTools import BRepTools
+    from OCP.TopLoc import TopLoc_Location
 
     vertices: list[Array] = []
     faces: list[Any] = []
+    done: list[tuple[Any, Array, Any]] = []  # equal parts of an assembly are meshed once
     count = 0
     for solid in shape.Solids():
-        BRepTools.Clean_s(solid.wrapped)
-        points, triangles = solid.tessellate(tolerance * MM, angle)
-        raw = np.array([p.toTuple() for p in points]) / MM
-        near, index = np.unique(np.round(raw / (1e-4 * tolerance)), axis=0, return_inverse=True)
-        corner = np.zeros((len(near), 3))
-        corner[index.ravel()] = raw
-        flat = index.ravel()[np.array(triangles, dtype=np.int64)]
-        flat = flat[(flat[:, 0] != flat[:, 1]) & (flat[:, 1] != flat[:, 2]) & (flat[:, 2] != flat[:, 0])]
-        vertices.append(corner)
-        faces.append(flat + count)
-        count += len(corner)
+        known = next((row for row in done if row[0].IsPartner(solid.wrapped)), None)
+        if known is None:
+            bare = solid.wrapped.Located(TopLoc_Location())
+            BRepTools.Clean_s(bare)
+            points, triangles = cq.Shape.cast(bare).tessellate(tolerance * MM, angle)
+            raw = np.array([p.toTuple() for p in points]) / MM
+            near, index = np.unique(np.round(raw / (1e-3 * tolerance)), axis=0, return_inverse=True)
+            corner = np.zeros((len(near), 3))
+            corner[index.ravel()] = raw
+            flat = index.ravel()[np.array(triangles, dtype=np.int64)]
+            flat = flat[(flat[:, 0] != flat[:, 1]) & (flat[:, 1] != flat[:, 2]) & (flat[:, 2] != flat[:, 0])]
+            if solid.wrapped.Orientation() != bare.Orientation():
+                flat = flat[:, ::-1]
+            known = (solid.wrapped, corner, flat)
+            done.append(known)
+        move = solid.wrapped.Location().Transformation()
+        matrix = np.array([[move.Value(i, j) for j in (1, 2, 3, 4)] for i in (1, 2, 3)])
+        vertices.append(known[1] @ matrix[:, :3].T + matrix[:, 3] / MM)
+        faces.append(known[2] + count)
+        count += len(known[1])
     if not faces:
         raise GeometryError([("CAD file", "no solid", "one solid or more", "Surfaces alone enclose no volume")])
     joined = np.concatenate(faces)

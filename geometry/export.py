@@ -32,7 +32,7 @@ SCHEMA = "geometry.export/1"
 MANIFEST = "manifest.json"
 VOLUME_TOLERANCE = 5e-3
 FRAME = "z: shaft, towards thrust (upstream); x: pitch axis of blade 1; origin: pitch axes meet the shaft"
-READ_TOLERANCE = 2e-5  # of the size of the part, when CAD surfaces are meshed
+READ_TOLERANCE = 2e-6  # of the size of the part, when CAD surfaces are meshed
 
 
 def export(

@@ -34,7 +34,7 @@ FLOOR_OF_ROOMS: tuple[tuple[str, ...], ...] = (
     ("solver*|duct*",),
     ("evaluate*",),
     ("grid*",),
-    ("sweep*", "validate*|_validate*", "reproduce*|_thesis*", "bench*|_bench*", "import_*"),
+    ("sweep*", "validate*|_validate*", "reproduce*|_thesis*", "bench*|_bench*", "import_*", "export_case*", "stations*"),
     ("compare*",),
     ("diagnose|diagnose.*",),
     ("conceal|conceal.*", "drive|drive.*"),
@@ -60,6 +60,8 @@ MAY: dict[str, set[str]] = {
     "bemt.import_files": {"files", "print"},
     "bemt.import_adapt": {"files"},
     "bemt.bench*|bemt._bench*": {"files", "print", "clock", "environment"},
+    "bemt.export_case": {"files", "print"},
+    "bemt.stations": {"files", "print"},
     "geometry.export": {"files"},
     "geometry.picture": {"files"},
 }

@@ -199,3 +199,25 @@ def test_the_steps_of_a_published_log_are_found(shared_data: Path) -> None:
     rest = np.array([p.mean["thrust_N"] for p in got.plateaus if p.command and round(p.command * 1e6) == 1100])
     assert len(rest) == 10 and np.std(rest) < 0.012  # [N] the same command ten times over
     assert accounted(got)
+
+
+def test_steps_of_a_continuous_log_without_a_command_are_found(shared_data: Path) -> None:
+    log = importers.read(shared_data / "rcbenchmark" / "Log_2019-11-05_171350.csv")
+    data = {name: c.values for name, c in log.channels.items()}
+    got = find(data["time_s"], data, "thrust_N")
+    assert accounted(got) and len(got.plateaus) == 23
+    steady = [p for p in got.plateaus if not p.flags and p.mean["thrust_N"] > 3.0]
+    assert len(steady) == 13
+    k = np.array([p.mean["thrust_N"] / p.mean["electrical_rpm"] ** 2 for p in steady])
+    assert np.max(np.abs(k / np.median(k) - 1)) < 0.1  # thrust goes nearly with the square of the speed
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_noise_makes_no_plateaus(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    levels = [0.0, *rng.choice(np.arange(1, 10), 5, replace=False).tolist()]
+    noise, tau = float(rng.uniform(0.002, 0.08)), float(rng.uniform(0.02, 0.15))
+    t, _, thrust = staircase(levels, noise=noise, tau=tau, seed=seed)
+    got = find(t, {"thrust_N": thrust}, "thrust_N")
+    assert len(got.plateaus) == len(levels) and accounted(got)
+    assert np.allclose(got.channel("thrust_N"), levels, atol=0.05)

@@ -33,7 +33,8 @@ def test_committed_sweep_is_what_the_cases_give(project: Path) -> None:
 
 @pytest.mark.parametrize("volume", [1, 2])
 def test_committed_validation_is_what_the_data_give(project: Path, shared_data: Path, volume: int) -> None:
-    kept = json.loads((project / f"reports/validation/uiuc_volume_{volume}/validation.json").read_text(encoding="utf-8"))
+    folder = project / "reports" / "validation" / f"uiuc_volume_{volume}"
+    kept = json.loads((folder / "validation.json").read_text(encoding="utf-8"))
     fresh = validate(shared_data / "uiuc" / f"volume-{volume}")
     for kind in ("static", "forward"):
         assert fresh[kind]["points"] == kept[kind]["points"]

@@ -326,6 +326,17 @@ def test_a_failed_station_is_a_nan_with_words(rotor: Rotor, polar: Polar) -> Non
     assert math.isnan(T) and math.isnan(Q) and not ok
 
 
+@pytest.mark.parametrize(("K", "reason"), [(-1.0, _kernel.JUMP), (math.nan, _kernel.NOT_FINITE)])
+def test_nonsense_in_the_balance_ends_in_words(rotor: Rotor, polar: Polar, K: float, reason: int) -> None:
+    prep = solver.prepare(rotor, [(0.7, polar)], duct=DUCT, n_stations=10)
+    num = prep.num.copy()
+    num[R.N_WAKE] = K  # a diffuser that makes pressure out of nothing: no balance exists
+    s = solver.solve(dataclasses.replace(prep, num=num), 6000.0, [0.0, 10.0], AIR)
+    assert not s.converged.any()
+    assert np.isnan(s.T).all()
+    assert all(solver.REASONS[reason] in flags[0] for flags in s.flags)
+
+
 def test_words_for_unusual_states(rotor: Rotor, polar: Polar) -> None:
     prep = solver.prepare(rotor, [(0.7, polar)], n_stations=20, mach_max=0.6)
     fan = solver.prepare(rotor, [(0.7, polar)], duct=DUCT, n_stations=20)

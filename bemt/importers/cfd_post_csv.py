@@ -32,6 +32,16 @@ _HEADING = re.compile(r"(.*?)\s*\[([^\]]*)\]\s*")
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether the file begins with the section Name or Data.
 
+    Parameters
+    ----------
+    head : bytes or str
+        First bytes of a file.
+
+    Returns
+    -------
+    bool
+        True when it is for this reader, damaged or not.
+
     Examples
     --------
     >>> sniff("[Name]\nBlade\n\n[Data]\nX [ m ], Y [ m ]"), sniff("[propeller]\nname = 1")

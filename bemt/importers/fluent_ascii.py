@@ -29,6 +29,16 @@ _FIRST = ("nodenumber", "cellnumber")
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether the first line names node or cell numbers and a coordinate.
 
+    Parameters
+    ----------
+    head : bytes or str
+        First bytes of a file.
+
+    Returns
+    -------
+    bool
+        True when it is for this reader, damaged or not.
+
     Examples
     --------
     >>> sniff("nodenumber,  x-coordinate, pressure\n 1, 0.1, 3"), sniff("node,x\n1,2")

@@ -52,6 +52,16 @@ class Entry:
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a title of forces is followed by a line of zones, and this is no transcript.
 
+    Parameters
+    ----------
+    head : bytes or str
+        First bytes of a file.
+
+    Returns
+    -------
+    bool
+        True when it is for this reader, damaged or not.
+
     Examples
     --------
     >>> sniff("Forces\n      Forces (n)\nZone  Pressure  Viscous  Total\n"), sniff("Zone,Pressure")
@@ -100,7 +110,24 @@ def _names(title: str, rest: str, groups_line: str, zone_line: str) -> list[tupl
 
 
 def blocks(source: SourceText) -> Iterator[tuple[int, list[Entry], list[str], list[Fault]]]:
-    """Find the force tables of a text: line, entries, warnings and faults of each."""
+    """Find the force tables of a text.
+
+    Parameters
+    ----------
+    source : SourceText
+        A force report, or any text that holds some.
+
+    Yields
+    ------
+    line : int
+        Where the table begins.
+    entries : list of Entry
+        Its numbers.
+    warnings : list of str
+        Sums that do not fit.
+    faults : list of Fault
+        Rows that do not fit the header.
+    """
     lines = source.lines
     k = 0
     while k < len(lines):
@@ -118,6 +145,7 @@ def blocks(source: SourceText) -> Iterator[tuple[int, list[Entry], list[str], li
         entries: list[Entry] = []
         notes: list[str] = []
         faults: list[Fault] = []
+        shape: set[int] = set()
         while k < len(lines) and lines[k].strip() and not lines[k].startswith("("):
             if not re.fullmatch(r"[-\s]+", lines[k]):
                 cells = _CELL.findall(lines[k])
@@ -126,7 +154,8 @@ def blocks(source: SourceText) -> Iterator[tuple[int, list[Entry], list[str], li
                 cut = k == len(lines) - 1 and not source.text.endswith(("\n", "\r")) and lines[k][-1] not in " )"
                 # along a direction there are no vectors
                 right = ({1},) if " along " in names[0][0] else ({1}, {2}, {3})
-                if len(vectors) != len(names) or None in vectors or sizes not in right or cut:
+                shape = shape or (sizes if sizes in right else set())
+                if len(vectors) != len(names) or None in vectors or sizes not in right or sizes != shape or cut:
                     got = f"{len(vectors)} columns, or text among them" + (" (no line end: cut?)" if cut else "")
                     faults.append(Fault(source.name, str(k + 1), got, f"a zone and {len(names)} numbers or vectors"))
                 else:

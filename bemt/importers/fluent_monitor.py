@@ -29,6 +29,16 @@ _NAMES = re.compile(r'"[^"]*"(?:\s+"[^"]*")+')
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a quoted title is followed by a line of quoted names and then by a number.
 
+    Parameters
+    ----------
+    head : bytes or str
+        First bytes of a file.
+
+    Returns
+    -------
+    bool
+        True when it is for this reader, damaged or not.
+
     Examples
     --------
     >>> sniff('"Drag Convergence"\r\n"Flow Time" "cd"\r\n5e-03 7e-02'), sniff('"a","b"\n1,2')

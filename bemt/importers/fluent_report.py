@@ -36,6 +36,16 @@ _TIMES = {"flow time", "flow-time", "physical-time", "time"}
 def column_of(name: str) -> Column:
     """Make the column of a name in Fluent's words; times are in seconds.
 
+    Parameters
+    ----------
+    name : str
+        As the file has it.
+
+    Returns
+    -------
+    Column
+        ``time_s`` for the flow time; other names stay.
+
     Examples
     --------
     >>> column_of("flow-time").name, column_of("Iteration").role, column_of("thrust(blade:1)").role
@@ -53,6 +63,16 @@ def column_of(name: str) -> Column:
 
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether one of the first lines is a parenthesised list of quoted names under a quoted title.
+
+    Parameters
+    ----------
+    head : bytes or str
+        First bytes of a file.
+
+    Returns
+    -------
+    bool
+        True when it is for this reader, damaged or not.
 
     Examples
     --------

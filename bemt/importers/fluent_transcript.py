@@ -51,6 +51,16 @@ _AVERAGE = re.compile(r"\(Average Over\)\"?\s+(\d+)")
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a text shows marks of a Fluent console.
 
+    Parameters
+    ----------
+    head : bytes or str
+        First bytes of a file.
+
+    Returns
+    -------
+    bool
+        True when it is for this reader, damaged or not.
+
     Examples
     --------
     >>> sniff("  iter  continuity  x-velocity  time/iter\n 1 1.0 1.0 0:00:01 9"), sniff("iteration,continuity")

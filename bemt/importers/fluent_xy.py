@@ -35,6 +35,16 @@ _UNIT = re.compile(r"\s*[\[(]\s*([^\])]*?)\s*[\])]\s*$")
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether the file begins with a title and labels in parentheses.
 
+    Parameters
+    ----------
+    head : bytes or str
+        First bytes of a file.
+
+    Returns
+    -------
+    bool
+        True when it is for this reader, damaged or not.
+
     Examples
     --------
     >>> sniff('(title "a")\n(labels "x" "y")\n'), sniff('("Iteration" "drag")')

@@ -44,6 +44,16 @@ _VECTOR = re.compile(r"\(\s*((?:\w+_[xyz]\s*){3})\)")
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a comment line begins with Time and names columns.
 
+    Parameters
+    ----------
+    head : bytes or str
+        First bytes of a file.
+
+    Returns
+    -------
+    bool
+        True when it is for this reader, damaged or not.
+
     Examples
     --------
     >>> sniff("# Force\n# Time  total_x total_y\n1 2 3"), sniff("# Time\n"), sniff("#  Time  forces(pressure viscous)")

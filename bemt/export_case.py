@@ -1,0 +1,103 @@
+"""``python -m bemt export CASE --out DIR``: the solids of a case as STL, STEP, OBJ or OpenFOAM surfaces."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+from bemt.case import Case, find_cases, load_case
+from bemt.errors import EXIT_INPUT, EXIT_OK, Fault, InputError
+from bemt.tables import json_text, number_text, text_table
+from geometry.common import GeometryError
+from geometry.export import export
+from geometry.mesh import Options
+
+__all__ = ["export_case", "run"]
+
+
+def export_case(
+    case: Case, out: Path, formats: list[str], unit: str = "mm", options: Options | None = None
+) -> dict[str, Any]:
+    """Write the solids of one case.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+    out : Path
+        Folder.
+    formats : list of str
+        Some of ``stl``, ``step``, ``obj``, ``openfoam``.
+    unit : str
+        ``mm`` or ``m``.
+    options : Options or None
+        How fine; None is fine enough for chord and twist errors below 0.2 %.
+
+    Returns
+    -------
+    dict
+        The manifest.
+
+    Raises
+    ------
+    InputError
+        When the case makes no sound solid; nothing is written then.
+    """
+    try:
+        return export(case.rotor(), case.duct(), out, formats, name=case.name, unit=unit, options=options)
+    except GeometryError as error:
+        raise InputError([Fault(case.path.as_posix(), *fault) for fault in error.faults]) from error
+
+
+def run(args: argparse.Namespace) -> int:
+    """Do what the command line asks.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        ``case``, ``out``, ``format``, ``unit``, ``json``, ``fillet_mm``, ``min_thickness_mm``.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
+    paths = find_cases([args.case])
+    try:
+        options = Options(fillet=args.fillet_mm * 1e-3, min_thickness=args.min_thickness_mm * 1e-3)
+    except GeometryError as error:
+        raise InputError([Fault("", *fault) for fault in error.faults]) from error
+    manifests, code = [], EXIT_OK
+    for path in paths:
+        try:
+            case = load_case(path)
+            out = Path(args.out) / case.name if len(paths) > 1 else Path(args.out)
+            manifest = export_case(case, out, args.format, args.unit, options)
+        except InputError as error:
+            print(error, file=sys.stderr)
+            code = EXIT_INPUT
+            continue
+        manifests.append(manifest)
+        if not args.json:
+            print(_text(manifest, out))
+    if args.json:
+        print(json_text({"schema": "bemt.export/1", "cases": manifests}), end="")
+    return code
+
+
+def _text(manifest: dict[str, Any], out: Path) -> str:
+    rows = [[item["path"], item["format"], item["unit"], f"{item['bytes'] / 1e6:.2f}",
+             ", ".join(s["name"] for s in item["surfaces"]), item["sha256"][:12]] for item in manifest["files"]]  # fmt: skip
+    volumes, checks = manifest["volumes_m3"], manifest["checks_m"]
+    lines = [f"{manifest['name']}: {manifest['blades']} blades, in {out}",
+             text_table(["file", "format", "unit", "MB", "surfaces", "sha256"], rows, left=(0, 1, 2, 4, 5)).rstrip()]  # fmt: skip
+    meshed, exact = volumes["volume_rotor_mesh"], volumes["volume_rotor_sections"]
+    words = [f"rotor {meshed * 1e6:.4f} cm3, sections {100 * (exact / meshed - 1):+.3f} %"]
+    if "volume_rotor_cad" in volumes:
+        words.append(f"CAD {100 * (volumes['volume_rotor_cad'] / meshed - 1):+.3f} %")
+    if "gap" in checks:
+        words.append(f"gap {number_text(checks['gap'] * 1e3)} mm")
+    words.append(f"thinnest section {number_text(checks['min_section_thickness'] * 1e3)} mm")
+    return "\n".join([*lines, ", ".join(words)])

@@ -1,0 +1,196 @@
+"""The promise of the meshes: closed solids or a reason, volumes of the sections, and stations that come back."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bemt.case import find_cases, load_case
+from geometry.airfoil import naca4
+from geometry.common import GeometryError
+from geometry.cylinder_cut import blades
+from geometry.duct import Duct, Stator, around
+from geometry.laws import from_laws, helix
+from geometry.mesh import Model, Options, build, rotor_mesh
+from geometry.rotor import Rotor
+from geometry.slicing import Found, find_rotor
+from geometry.solid import check_closed
+
+CASES = ("ds30", "prop_8x5", "prop_10x5", "prop_12x6", "prop_14x8")
+
+
+def random_rotor(rng: np.random.Generator) -> tuple[Rotor, Duct | None]:
+    """A rotor of 2 to 12 blades and 50 to 600 mm, in a duct or not."""
+    blades_, diameter, ducted = int(rng.integers(2, 13)), float(rng.uniform(0.05, 0.6)), bool(rng.random() < 0.4)
+    hub = float(rng.uniform(0.25, 0.5) if ducted else rng.uniform(0.12, 0.3))
+    law = str(rng.choice(["apc_like", "elliptic", "constant", "linear_taper", "fan"]))
+    sections = [(x, naca4(float(rng.uniform(0, 0.07)), float(rng.uniform(0.3, 0.5)), float(rng.uniform(t, t + 0.08))))
+                for x, t in ((0.0, 0.09), (1.0, 0.05))]  # fmt: skip
+    blade = from_laws(diameter, law, "helix", max(hub, 0.22) if blades_ > 6 else hub, anchors=sections,
+                      chord={"max_chord": float(rng.uniform(0.08, 0.45))},
+                      pitch={"pitch": float(rng.uniform(0.3, 1.5)) * diameter})  # fmt: skip
+    rotor = Rotor(blade, blades_, int(rng.choice([1, -1])), spinner_length=float(rng.choice([0.0, 0.1])) * diameter)
+    if not ducted:
+        return rotor, None
+    stator = Stator(int(rng.integers(3, 8)), 0.12 * diameter) if rng.random() < 0.5 else None
+    duct = around(rotor, float(rng.uniform(0.4, 1.0)) * diameter, float(rng.uniform(0.003, 0.03)) * rotor.R,
+                  float(rng.uniform(0.01, 0.08)) * rotor.R, exit_area_ratio=float(rng.uniform(0.8, 1.2)),
+                  stator=stator)  # fmt: skip
+    return rotor, duct
+
+
+def turned(model: Model, rng: np.random.Generator, scale: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """All triangles somewhere else, somehow turned, in another unit; and where thrust points then."""
+    start = np.cumsum([0, *(len(part.vertices) for part in model.parts)])
+    faces = np.concatenate([part.faces + n for part, n in zip(model.parts, start, strict=False)])
+    q, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    q *= math.copysign(1.0, float(np.linalg.det(q)))
+    points = np.concatenate([part.vertices for part in model.parts])
+    return (points @ q.T + rng.normal(size=3)) * scale, faces, q[:, 2]
+
+
+def errors(found: Found, rotor: Rotor, scale: float) -> tuple[float, float]:
+    """Greatest error of chord (relative) and of beta (degrees) between 0.25 and 0.95 R."""
+    x = found.r / found.R
+    inside = (x > 0.25) & (x < 0.95)
+    assert inside.sum() >= 10
+    chord, beta = rotor.blade.at(found.r / scale)
+    return (float(np.abs(found.chord / scale / chord - 1)[inside].max()),
+            float(np.degrees(np.abs(found.beta - beta))[inside].max()))  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_cases_are_closed_and_come_back_from_any_orientation_and_unit(name: str, project: Path) -> None:
+    case = load_case(project / "cases" / name)
+    rotor = case.rotor()
+    model = build(rotor, case.duct())
+    for part in model.parts:
+        check_closed(part, name, bodies=1)
+    checks = model.checks
+    assert checks["volume_rotor_mesh"] == pytest.approx(checks["volume_rotor_sections"], rel=2e-3)
+    points, faces, thrust = turned(model, np.random.default_rng(len(name)), 1000 / 25.4)
+    found = find_rotor(points, faces)
+    chord, beta = errors(found, rotor, 1000 / 25.4)
+    assert (found.B, found.rotation) == (rotor.B, rotor.rotation)
+    assert found.axis @ thrust > 1 - 1e-9
+    assert found.R * 0.0254 == pytest.approx(rotor.R, rel=1e-6)
+    assert found.Rhub * 0.0254 == pytest.approx(rotor.Rhub, rel=1e-3)
+    assert chord < 2e-3
+    relative = np.abs(found.beta / rotor.blade.at(found.r * 0.0254)[1] - 1)
+    assert relative[(found.r > 0.25 * found.R) & (found.r < 0.95 * found.R)].max() < 2e-3
+    assert beta < 0.1
+    at = found.r / found.R
+    true = [rotor.blade.section(float(x) * rotor.R) for x in at]
+    assert np.abs(found.thickness - [s.thickness for s in true]).max() < 1e-3
+    assert np.abs(found.camber - [s.camber for s in true]).max() < 1e-3
+
+
+def tried(count: int, seed: int) -> tuple[int, list[str]]:
+    """How many random rotors are sound, and why the others were refused."""
+    rng = np.random.default_rng(seed)
+    sound, refused = 0, []
+    for _ in range(count):
+        rotor, duct = random_rotor(rng)
+        try:
+            model = build(rotor, duct, Options(n=61))
+        except GeometryError as error:
+            refused.append(str(error))
+            continue
+        for part in model.parts:
+            check_closed(part, "solid", bodies=1)
+        assert model.checks["tip_radius"] == pytest.approx(rotor.R, rel=1e-6)
+        assert model.checks["volume_rotor_mesh"] == pytest.approx(model.checks["volume_rotor_sections"], rel=5e-3)
+        if duct is not None:
+            assert 0 < model.checks["gap"] <= duct.gap * (1 + 1e-6)
+        sound += 1
+    return sound, refused
+
+
+def test_random_rotors_are_closed() -> None:
+    sound, refused = tried(12, 1)
+    assert sound == 12, refused
+
+
+@pytest.mark.slow
+def test_of_200_random_rotors_99_percent_are_closed_and_the_rest_refused() -> None:
+    sound, refused = tried(200, 2)
+    assert sound >= 198, refused
+    assert all("expected" in reason for reason in refused)
+
+
+@pytest.mark.slow
+def test_40_random_rotors_come_back() -> None:
+    rng = np.random.default_rng(5)
+    for _ in range(40):
+        rotor, duct = random_rotor(rng)
+        points, faces, thrust = turned(build(rotor, duct, Options(n=61)), rng, 1000.0)
+        found = find_rotor(points, faces)
+        chord, beta = errors(found, rotor, 1000.0)
+        assert (found.B, found.rotation) == (rotor.B, rotor.rotation)
+        assert found.axis @ thrust > 1 - 1e-6
+        assert chord < 0.01 and beta < 0.3
+
+
+def test_left_hand_is_the_mirror_image() -> None:
+    blade = helix(0.2, 0.12, anchors=naca4(0.04, 0.4, 0.12))
+    right, left = (rotor_mesh(Rotor(blade, 3, sign), Options(n=41)) for sign in (1, -1))
+    assert left.volume == pytest.approx(right.volume, rel=1e-9)
+    found = find_rotor(left.vertices, left.faces, stations=8)
+    assert (found.B, found.rotation) == (3, -1)
+    assert found.axis[2] > 1 - 1e-9
+
+
+def test_a_fillet_adds_its_own_volume_at_the_root_only() -> None:
+    blade = helix(0.2, 0.12, anchors=naca4(0.04, 0.4, 0.12))
+    bare, round_ = (build(Rotor(blade, 2), options=Options(n=61, fillet=f)) for f in (0.0, 0.003))
+    more = round_.checks["volume_blade_sections"] - bare.checks["volume_blade_sections"]
+    # perimeter times (1 - pi/4) f^2 when the section is large against the fillet; convex corners add a little
+    around_root = np.linalg.norm(np.diff(blade.section_curve(blade.Rhub), axis=0), axis=1).sum()
+    assert more == pytest.approx(around_root * (1 - np.pi / 4) * 0.003**2, rel=0.15)
+    for share in (0.4, 0.8):
+        cuts = [blades(m.rotor.vertices, m.rotor.faces, share * 0.1) for m in (bare, round_)]
+        spans = [np.ptp(np.concatenate(c)[:, 1]) for c in cuts if c]
+        assert spans[0] == pytest.approx(spans[1], rel=2e-3)
+
+
+def fan(chord: float = 0.3, blades_: int = 8, hub: float = 0.37) -> Rotor:
+    blade = from_laws(0.069, "fan", "helix", hub, chord={"max_chord": chord}, pitch={"pitch": 0.1},
+                      anchors=naca4(0.05, 0.45, 0.09))  # fmt: skip
+    return Rotor(blade, blades_)
+
+
+@pytest.mark.parametrize(
+    ("make", "reason"),
+    [
+        (lambda: build(Rotor(helix(0.2, 0.1), 2)), "anchors: got none"),
+        (lambda: build(Rotor(fan().blade, 8, hub_length=0.001)), "hub_length"),
+        (lambda: build(fan(1.2, 30)), "run into each other"),
+        (lambda: build(fan(), options=Options(min_thickness=0.005)), "thickness: got 0.8"),
+        (lambda: build(fan(), around(fan(), 0.06, 0.0)), "duct.gap"),
+        (lambda: build(fan(), Duct(0.0349, 0.06, 0.004, 0.0004, exit_radius=0.03, rotor_x=0.02, diffuser_x=0.018)),
+         "duct.gap"),
+        (lambda: build(fan(), around(fan(), 0.06, 0.0004, stator=Stator(5, 0.055))), "stator"),
+        (lambda: build(fan(), around(fan(), 0.06, 0.0004, rotor_x=0.0)), "blade tips outside the duct"),
+    ],
+)  # fmt: skip
+def test_what_makes_no_solid_is_refused_with_the_reason(make: object, reason: str) -> None:
+    with pytest.raises(GeometryError, match=reason):
+        make()  # type: ignore[operator]
+
+
+def test_a_lump_and_a_single_blade_are_no_rotor() -> None:
+    import trimesh
+
+    for mesh in (trimesh.creation.icosphere(3), trimesh.creation.cylinder(1.0, 3.0), trimesh.creation.box((1, 2, 3))):
+        with pytest.raises(GeometryError, match="mesh: got"):
+            find_rotor(np.asarray(mesh.vertices), np.asarray(mesh.faces))
+    one = rotor_mesh(Rotor(helix(0.2, 0.12, anchors=naca4(0.04, 0.4, 0.12)), 1), Options(n=41))
+    with pytest.raises(GeometryError, match="mesh: got"):
+        find_rotor(one.vertices, one.faces)
+
+
+def test_all_cases_were_tried(project: Path) -> None:
+    assert {path.parent.name for path in find_cases([project / "cases"])} == set(CASES)

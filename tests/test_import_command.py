@@ -1,0 +1,203 @@
+"""The promise of ``python -m bemt import``: one schema for every format, honest means, nothing joined or guessed."""
+# ruff: noqa: E501 - samples as they look in files
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bemt.cli import main
+from bemt.errors import InputError
+from bemt.import_choice import Choice
+from bemt.import_files import document, import_file
+
+PERIOD = 0.5
+
+
+def history(turns: float = 6.0, per_turn: int = 50, start: float = 0.0, first: int = 1) -> str:
+    """Torque -0.2 with a blade-passing ripple and a start-up; volume, which is no load."""
+    text = '"q-rfile"\n"Time Step" "torque etc.."\n("Time Step" "torque" "volume" "flow-time")\n'
+    for k in range(int(turns * per_turn)):
+        t = start + (k + 1) * PERIOD / per_turn
+        q = -0.2 - 0.01 * math.sin(2 * math.pi * 2 * t / PERIOD) - (5.0 if k < 3 else 0.0)
+        text += f"{k + first} {q:.12g} 0.25 {t:.12g}\n"
+    return text
+
+
+@pytest.fixture
+def put(tmp_path: Path) -> Callable[[str, str], Path]:
+    def write(name: str, text: str) -> Path:
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+        return path
+
+    return write
+
+
+def call(capsys: pytest.CaptureFixture[str], *args: object) -> tuple[int, dict[str, Any]]:
+    code = main(["import", *map(str, args), "--json"])
+    return code, json.loads(capsys.readouterr().out)
+
+
+def test_schema(put: Callable[..., Path], capsys: pytest.CaptureFixture[str]) -> None:
+    code, found = call(capsys, put("q.out", history()), "--rpm", "120")
+    assert code == 0 and found["schema"] == "bemt.import/1"
+    (file,) = found["files"]
+    assert list(file) == ["path", "format", "kind", "rows", "channels", "warnings", "error"]
+    assert (file["format"], file["kind"], file["rows"], file["error"]) == ("fluent_report", "cfd", 300, None)
+    assert all(list(c) == ["unit", "mean", "averaged_over", "drift"] for c in file["channels"].values())
+    torque = file["channels"]["torque"]
+    assert torque["mean"] == pytest.approx(-0.2, abs=1e-9) and abs(torque["drift"]) < 1e-9
+    assert torque["averaged_over"] == "last 3 revolutions (1.5 to 3 s, 150 rows)"
+    assert file["channels"]["time_s"] == {"unit": "s", "mean": None, "averaged_over": "", "drift": None}
+
+
+def test_period_and_revolutions(put: Callable[..., Path], capsys: pytest.CaptureFixture[str]) -> None:
+    path = put("q.out", history())
+    _, one = call(capsys, path, "--period", "0.5", "--revolutions", "1")
+    assert one["files"][0]["channels"]["torque"]["averaged_over"].startswith("last 1 revolution (2.5 to 3 s, 50 rows")
+    _, many = call(capsys, path, "--period", "0.5", "--revolutions", "6")
+    assert many["files"][0]["channels"]["torque"]["mean"] == pytest.approx(-0.2 - 3 * 5.0 / 300)  # start-up and all
+    _, more = call(capsys, path, "--period", "0.5", "--revolutions", "7")
+    assert more["files"][0]["channels"]["torque"]["mean"] is None
+    assert any("6 revolutions recorded, 7 wanted" in w for w in more["files"][0]["warnings"])
+
+
+def test_without_a_speed_the_mean_says_that_it_holds_the_start_up(put: Callable[..., Path]) -> None:
+    (file,) = document([put("q.out", history())])["files"]
+    assert file["channels"]["torque"]["averaged_over"] == "all 300 rows, start-up included"
+    assert any("give --rpm or --period" in w for w in file["warnings"])
+    assert any(w.startswith("not settled") and "torque" in w for w in file["warnings"])
+
+
+def test_a_steady_run_does_not_use_the_speed_and_must_have_settled(put: Callable[..., Path]) -> None:
+    rows = "".join(f"{k} {5.0 + 0.01 * k}\n" for k in range(1, 201))
+    path = put("t.out", '"t"\n"Iteration" "thrust"\n("Iteration" "thrust")\n' + rows)
+    (file,) = document([path], choice=Choice(period=0.1))["files"]
+    assert file["channels"]["thrust"]["averaged_over"] == "last 40 rows"
+    assert any("the speed of rotation is not used" in w for w in file["warnings"])
+    assert any(w.startswith("not settled") and "thrust +5.73%" in w for w in file["warnings"])
+
+
+def test_restart_files_are_named_and_never_joined(put: Callable[..., Path]) -> None:
+    a = put("q-rfile.out", history())
+    b = put("q-rfile_1_1.out", history(per_turn=80))  # the same steps at other times
+    found = document([a, b], choice=Choice(period=PERIOD))["files"]
+    assert [f["rows"] for f in found] == [300, 480]
+    assert any("(other clock): not joined; the same steps mean other times" in w for w in found[1]["warnings"])
+    assert not any("joined" in w for w in found[0]["warnings"])
+    alone = document([b])["files"][0]
+    assert any(f"beside {a}: not joined" in w for w in alone["warnings"])
+    c = put("other-rfile.out", history())
+    d = put("other-rfile_1_300.out", history(start=3.0, first=301))
+    assert any("(continues): not joined" in w for w in document([c, d])["files"][1]["warnings"])
+
+
+def test_openfoam_start_folders_are_restarts_too(put: Callable[..., Path]) -> None:
+    head = "# Force\n# Time\ttotal_x total_y total_z\n"
+    one = put("forces/0/force.dat", head + "".join(f"{0.01 * k:g} 1 0 0\n" for k in range(1, 30)))
+    two = put("forces/0.2/force.dat", head + "".join(f"{0.2 + 0.01 * k:g} 2 0 0\n" for k in range(1, 30)))
+    found = document([one, two])["files"]
+    assert any("not joined" in w for w in found[1]["warnings"]) and not any("joined" in w for w in found[0]["warnings"])
+
+
+def test_sign_and_sector_are_applied_only_where_told(put: Callable[..., Path]) -> None:
+    path = put("q.out", history())
+    with pytest.raises(InputError, match="Name them: --load NAME"):
+        import_file(path, choice=Choice(sector=4))
+    with pytest.raises(InputError, match="names of channels"):
+        import_file(path, choice=Choice(sector=4, loads=("thrust",)))
+    record = import_file(path, choice=Choice(PERIOD, sign=-1, sector=4, loads=("torque",)))
+    assert record.channels["torque"].mean == pytest.approx(0.8) and record.channels["volume"].mean == pytest.approx(0.25)
+    assert record.channels["torque"].averaged_over.endswith(", times -4")
+    assert any("holds only for axisymmetric flow" in w for w in record.warnings)
+
+
+def report() -> str:
+    head = "Forces - Direction Vector (1 0 0)\n             Forces (n)\nZone      Pressure   Viscous   Total\n"
+    return head + "blade   -10  -1  -11\nhub   2  -0.5   1.5\nduct  -4  -0.25  -4.25\n---- ---- ----\nNet   -12  -1.75  -13.75\n"
+
+
+def test_zones_are_added_up_only_when_named(put: Callable[..., Path]) -> None:
+    path = put("forces", report())
+    plain = import_file(path)
+    assert not any("+" in name for name in plain.channels)
+    record = import_file(path, choice=Choice(sign=-1, zones=("blade", "hub")))
+    assert record.channels["force_total_N along (1 0 0) (blade+hub)"].mean == 9.5
+    assert record.channels["force_total_N along (1 0 0) (duct)"].mean == 4.25
+    with pytest.raises(InputError, match="Zones: blade, hub, duct, Net"):
+        import_file(path, choice=Choice(zones=("rotor",)))
+    with pytest.raises(InputError, match="Net holds them all"):
+        import_file(path, choice=Choice(zones=("blade", "Net")))
+
+
+def test_a_refused_file_is_2_and_the_others_are_shown(
+    put: Callable[..., Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    good, bad = put("q.out", history()), put("x.bin", "FoamFile\n{\n version 2.0;\n}\n")
+    code, found = call(capsys, bad, good, good.parent / "absent.out")
+    assert code == 2
+    assert "an OpenFOAM dictionary or field" in found["files"][0]["error"] and found["files"][1]["error"] is None
+    assert "absent.out: got No such file" in found["files"][2]["error"] and found["files"][2]["channels"] == {}
+    assert main(["import", str(good)]) == 0
+    text = capsys.readouterr().out
+    assert "fluent_report (cfd), 300 rows" in text and "  ! report files state no units" in text
+
+
+@pytest.mark.parametrize(
+    ("args", "message"),
+    [
+        (["--rpm", "0"], "--rpm: got 0"),
+        (["--rpm", "nan"], "--rpm: got nan"),
+        (["--period", "-1"], "--period: got -1"),
+        (["--revolutions", "2"], "--revolutions: got no speed"),
+        (["--format", "nonsense"], "--format: got 'nonsense'; expected one of"),
+        (["--sector", "1000"], "--sector: got 1000"),
+    ],
+)
+def test_wrong_options(
+    put: Callable[..., Path], capsys: pytest.CaptureFixture[str], args: list[str], message: str
+) -> None:
+    assert main(["import", str(put("q.out", history())), *args]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_damaged_head_is_not_taken_for_a_plain_table(put: Callable[..., Path]) -> None:
+    text = history()
+    for cut in (70, 75, 78):
+        (file,) = document([put("q.out", text[cut:])])["files"]
+        assert file["error"] and not file["channels"], cut
+
+
+def test_other_formats_are_shown_as_well(put: Callable[..., Path], project: Path) -> None:
+    static = put("apce_10x5_static_kt0827.txt", "RPM CT CP\n2000 0.10 0.05\n3000 0.11 0.05\n")
+    blade = put("apce_10x5_geom.txt", "r/R c/R beta\n" + "".join(f"{0.15 + 0.05 * k:.2f} 0.12 {40 - 1.5 * k}\n" for k in range(18)))
+    cases = sorted((project / "cases").glob("*/references.csv"))
+    found = document([static, blade, *cases])["files"]
+    assert [f["error"] for f in found] == [None] * len(found)
+    assert (found[0]["kind"], found[0]["rows"], found[1]["kind"], found[1]["rows"]) == ("bench", 2, "geometry", 18)
+    assert all(c["mean"] is None for c in found[0]["channels"].values())
+    assert all("thrust_N" in f["channels"] for f in found[2:]) and len(cases) >= 5
+
+
+def test_means_are_over_time_when_the_step_changes(put: Callable[..., Path]) -> None:
+    times = np.cumsum(np.r_[np.full(200, 0.01), np.full(500, 0.002)])
+    text = '"t"\n"x etc.."\n("Time Step" "q" "flow-time")\n'
+    text += "".join(f"{k} {1 if t <= 2 + 1e-9 else 3} {t:.6f}\n" for k, t in enumerate(times))
+    record = import_file(put("t.out", text), choice=Choice(1.0, 2))
+    assert record.channels["q"].mean == pytest.approx(2.0)
+    assert any("means of single revolutions differ" in w for w in record.warnings)
+
+
+def test_the_published_screw(shared_data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = shared_data / "cfd_exports" / "screw" / "report-def-0-rfile_1_1.out"
+    for args, mean in ((["--rpm", "130.2"], -0.17547), (["--rpm", "130.2", "--revolutions", "1"], -0.17097), ([], -0.14100)):
+        _, found = call(capsys, path, *args)
+        assert round(found["files"][0]["channels"]["report-def-0"]["mean"], 5) == mean
