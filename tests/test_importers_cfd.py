@@ -275,6 +275,30 @@ def test_dual_time_keeps_the_last_inner_iteration(put: Callable[..., Path]) -> N
     assert record.provenance["clock"] == "time"
 
 
+def test_other_dialects(put: Callable[..., Path]) -> None:
+    rows = "".join(f"{k}, 0.1, 0.02, {k * 0.1:.1f}\n" for k in range(20))
+    old = importers.read(put('"Iteration","CL","CD","Time(min)"\n' + rows))
+    tecplot = importers.read(put('TITLE = "SU2"\nVARIABLES = "Iteration","CL","CD","Time(min)"\nZONE T= "history"\n' + rows))
+    for record in (old, tecplot):
+        assert record.format == "su2_history" and record.channels["CD"].mean == pytest.approx(0.02)
+        assert record.channels["Time(min)"].mean is None  # wall time is no result
+    names = "(total_x total_y total_z)\t(pressure_x pressure_y pressure_z)\t(viscous_x viscous_y viscous_z)"
+    foam = "# Moment\n# Time\t" + names + "\n" + "".join(f"{0.1 * k:g}\t(1.5 2 3)\t(1 1 1)\t(0.5 1 2)\n" for k in range(1, 9))
+    assert importers.read(put(foam)).channels["moment_viscous_z_Nm"].mean == 2.0
+    bare = "# Forces\n# CofR : (0 0 0)\n# Time  forces(pressure viscous)  moments(pressure viscous)\n"
+    bare += "".join(f"{0.1 * k:g} ((1 0 0) (0.5 0 0)) ((0 0 1) (0 0 {k}))\n" for k in range(1, 9))
+    np.testing.assert_allclose(importers.read(put(bare)).channels["moment_total_z_Nm"].values, np.arange(2, 10))
+    several = '"a"\n"Iteration" "a etc.."\n("Iteration" "a" "flow-time")\n'
+    several += "".join(f"{k} {k} {0.01 * ((k - 1) // 5 + 1):.4f}\n" for k in range(1, 101))
+    steps = importers.read(put(several))
+    assert steps.rows == 20 and steps.channels["a"].values[0] == 5  # the last iteration of each time step
+    still = importers.read(put('"a"\n"i"\n("Iteration" "a" "flow-time")\n' + "".join(f"{k} 7 0\n" for k in range(1, 51))))
+    assert still.provenance["clock"] == "iteration" and still.rows == 50
+    probes = "# Probe 0 (0.05 0 0)\n# Probe 1 (0.2 0 0)\n#       Probe   0   1\n#        Time\n"
+    probes += "".join(f"{0.1 * k:g}  (0 {k} 0)  (1 2 3)\n" for k in range(1, 9))
+    np.testing.assert_allclose(importers.read(put(probes)).channels["value_y(probe 0)"].values, np.arange(1, 9))
+
+
 # --- damage ----------------------------------------------------------------------------------------------------------
 
 

@@ -100,6 +100,8 @@ def read(path: str | os.PathLike[str]) -> Imported:
 def _column(name: str) -> Column:
     if name == "Cur_Time":
         return Column("time_s", "s", "time")
+    if name.startswith("Time("):  # wall time
+        return Column(name, "", "wall")
     return Column(name or "unnamed", "", "counter" if name in _STEPS else "value")
 
 
