@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -164,28 +164,28 @@ def revolution_average(time: ArrayLike, values: ArrayLike, period: float, revolu
         raise InputError(faults)
     none = Average(None, 0, 0, math.nan, math.nan)
     if t.size < 2:
-        return _with(none, problem=f"{t.size} rows: no revolution")
+        return replace(none, problem=f"{t.size} rows: no revolution")
     dt = time_steps(t)
     slack = 1e-6 * float(np.median(dt[1:]))
     length = float(t[-1] - t[0] + dt[0])
     whole = math.floor(min(length / period * (1.0 + 1e-9) + slack / period, 1e9))
     count = min(DEFAULT_REVOLUTIONS, max(1, whole // 2)) if revolutions is None else revolutions
     if whole < count:
-        return _with(none, problem=f"{length / period:.3g} revolutions recorded, {count} wanted")
+        return replace(none, problem=f"{length / period:.3g} revolutions recorded, {count} wanted")
     edges = float(t[-1]) - period * np.arange(count, -1, -1.0)
     cuts = [*np.searchsorted(t, edges[:-1] + slack, side="right"), t.size]
     part = slice(cuts[0], t.size)
     rows = t.size - int(cuts[0])
-    found = _with(none, rows=rows, revolutions=count, start=float(edges[0]), end=float(t[-1]))
+    found = replace(none, rows=rows, revolutions=count, start=float(edges[0]), end=float(t[-1]))
     gap = float(np.max(dt[part])) if rows else math.inf
     if rows < MIN_ROWS * count or min(np.diff(cuts)) < 2:
         why = f"{rows / count:.3g} rows in a revolution; {MIN_ROWS} or more are needed (are these iterations?)"
-        return _with(found, problem=why)
+        return replace(found, problem=why)
     if gap > 0.1 * period:
-        return _with(found, problem=f"a gap of {gap:.4g} s in the averaged part, {gap / period:.2g} revolutions")
+        return replace(found, problem=f"a gap of {gap:.4g} s in the averaged part, {gap / period:.2g} revolutions")
     mean = _mean(v[part], dt[part])
     if mean is None:
-        return _with(found, problem="NaN in the averaged part")
+        return replace(found, problem="NaN in the averaged part")
     turns = [_mean(v[a:b], dt[a:b]) for a, b in zip(cuts[:-1], cuts[1:], strict=True)]
     first: float | None = turns[0]
     if count == 1:  # one revolution drifts against the one before it
@@ -194,14 +194,8 @@ def revolution_average(time: ArrayLike, values: ArrayLike, period: float, revolu
     last = turns[-1]
     drift = None if first is None or last is None else _relative(last - first, mean)
     few = f"only {rows / count:.3g} rows in a revolution" if rows < FEW_ROWS * count else ""
-    return _with(found, mean=mean, drift=drift, spread=_spread(v[part], mean), problem=few,
+    return replace(found, mean=mean, drift=drift, spread=_spread(v[part], mean), problem=few,
                  per_revolution=tuple(x for x in turns if x is not None))  # fmt: skip
-
-
-def _with(average: Average, **changes: object) -> Average:
-    from dataclasses import replace
-
-    return replace(average, **changes)  # type: ignore[arg-type]
 
 
 def steady_average(values: ArrayLike, share: float = STEADY_SHARE) -> Average:
@@ -232,14 +226,14 @@ def steady_average(values: ArrayLike, share: float = STEADY_SHARE) -> Average:
     base = Average(None, rows, 0, float(v.size - rows), float(v.size))
     mean = _mean(part, np.ones(rows))
     if mean is None:
-        return _with(base, problem="NaN in the averaged part" if rows else "no rows")
+        return replace(base, problem="NaN in the averaged part" if rows else "no rows")
     drift = None
     if rows >= 3:
         scale = float(np.max(np.abs(part))) or 1.0
         x = np.arange(rows) - 0.5 * (rows - 1)
         slope = float(np.sum(x * (part / scale)) / np.sum(x * x))
         drift = _relative(slope * (rows - 1), mean / scale)
-    return _with(base, mean=mean, drift=drift, spread=_spread(part, mean))
+    return replace(base, mean=mean, drift=drift, spread=_spread(part, mean))
 
 
 def keep_last(clock: ArrayLike, name: str = "step") -> tuple[NDArray[np.intp], tuple[str, ...]]:

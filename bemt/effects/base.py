@@ -127,5 +127,5 @@ class Effect:
         """Set kernel numbers; the base does nothing."""
 
     def describe(self) -> dict[str, Any]:
-        """Id and parameter values, for provenance."""
-        return {"id": self.id, **{p.name: getattr(self, p.name) for p in self.parameters}}
+        """Id and every field, for provenance."""
+        return {"id": self.id, **{k: v for k, v in vars(self).items() if not k.startswith("_")}}
