@@ -89,10 +89,10 @@ def run(args: argparse.Namespace) -> int:
 
 def _text(manifest: dict[str, Any], out: Path) -> str:
     rows = [[item["path"], item["format"], item["unit"], f"{item['bytes'] / 1e6:.2f}",
-             ", ".join(s["name"] for s in item["surfaces"]), item["sha256"][:12]] for item in manifest["files"]]  # fmt: skip
+             ", ".join(s["name"] for s in item["surfaces"]), item["sha256"][:12]] for item in manifest["files"]]  # fmt: skip  # noqa: E501
     volumes, checks = manifest["volumes_m3"], manifest["checks_m"]
     lines = [f"{manifest['name']}: {manifest['blades']} blades, in {out}",
-             text_table(["file", "format", "unit", "MB", "surfaces", "sha256"], rows, left=(0, 1, 2, 4, 5)).rstrip()]  # fmt: skip
+             text_table(["file", "format", "unit", "MB", "surfaces", "sha256"], rows, left=(0, 1, 2, 4, 5)).rstrip()]  # fmt: skip  # noqa: E501
     meshed, exact = volumes["volume_rotor_mesh"], volumes["volume_rotor_sections"]
     words = [f"rotor {meshed * 1e6:.4f} cm3, sections {100 * (exact / meshed - 1):+.3f} %"]
     if "volume_rotor_cad" in volumes:

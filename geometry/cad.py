@@ -109,7 +109,7 @@ def planar_sections(rotor: Rotor, options: Options | None = None) -> list[tuple[
         for j in range(curves.shape[1]):
             at = float(np.interp(plane, x[:, j], table))
             section[j] = _cubic(table, y[:, j], at), _cubic(table, curves[:, j, 1], at)
-            for _ in range(2):  # the straight table misses the plane by a trifle: two corrections along the point's path
+            for _ in range(2):  # the straight table misses the plane by a trifle: two corrections along the point's path  # noqa: E501
                 miss = plane - _cubic(table, x[:, j], at)
                 at += miss
                 section[j] = _cubic(table, y[:, j], at), _cubic(table, curves[:, j, 1], at)
@@ -331,7 +331,20 @@ def solids(rotor: Rotor, duct: Duct | None = None, options: Options | None = Non
 
 
 def assembly(parts: Parts, name: str) -> Any:
-    """Gather the solids in a named ``cadquery.Assembly`` for STEP."""
+    """Gather the solids in a named ``cadquery.Assembly`` for STEP.
+
+    Parameters
+    ----------
+    parts : Parts
+        The solids.
+    name : str
+        Name of the assembly.
+
+    Returns
+    -------
+    cadquery.Assembly
+        In millimetres, coloured by surface.
+    """
     import cadquery as cq
 
     colours = {"blade": (0.2, 0.3, 0.6), "hub": (0.4, 0.4, 0.4), "duct": (0.8, 0.8, 0.8), "stator": (0.6, 0.6, 0.6)}
@@ -363,8 +376,8 @@ def tessellate(shape: Any, tolerance: float, angle: float = 0.1) -> Mesh:
     Older triangles are removed first: without that the CAD kernel returns them, whatever the tolerance.
     """
     import cadquery as cq
-    from OCP.BRepTools import BRepTools
-    from OCP.TopLoc import TopLoc_Location
+    from OCP.BRepTools import BRepTools  # type: ignore[import-untyped]
+    from OCP.TopLoc import TopLoc_Location  # type: ignore[import-untyped]
 
     vertices: list[Array] = []
     faces: list[Any] = []

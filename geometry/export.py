@@ -143,10 +143,20 @@ def _clean(part: Mesh, scale: float) -> tuple[Array, NDArray[np.int64], NDArray[
     """Vertices as the files hold them (nine digits), faces that are still triangles, their groups."""
     values = part.vertices / scale
     values = np.where(np.abs(values) < 1e-9 * float(np.abs(values).max()), 0.0, values)
-    _, first, index = np.unique(np.round(values, 9), axis=0, return_index=True, return_inverse=True)
+    cell = float(np.abs(values).max()) * 2e-7  # ten times what the reader merges: nothing is left for it
+    _, first, index = np.unique(np.round(values / cell), axis=0, return_index=True, return_inverse=True)
     faces = index.ravel()[part.faces]
     keep = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
-    return values[first], faces[keep], part.group[keep]
+    return np.round(values / cell)[first] * cell, faces[keep], part.group[keep]
+
+
+def _weld(vertices: Array, faces: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
+    """Merge corners that differ by less than single precision resolves; drop the triangles that vanish."""
+    cell = max(float(np.abs(vertices).max()), 1e-300) * 2e-8
+    _, first, index = np.unique(np.round(vertices / cell), axis=0, return_index=True, return_inverse=True)
+    faces = index.ravel()[faces]
+    keep = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
+    return vertices[first], faces[keep]
 
 
 def _meshes(model: Model, work: Path, name: str, kind: str, unit: str) -> dict[str, Any]:
@@ -196,8 +206,8 @@ def _check_file(paths: Sequence[Path], scale: float, volume: float, bodies: int)
     read = [read_solid(path) for path in paths]
     start = np.cumsum([0, *(len(v) for v, _, _ in read)])
     faces = np.concatenate([f + n for (_, f, _), n in zip(read, start, strict=False)])
-    solid = trimesh.Trimesh(np.concatenate([v for v, _, _ in read]), faces, process=False)
-    solid.merge_vertices(digits_vertex=12)
+    vertices, faces = _weld(np.concatenate([v for v, _, _ in read]), faces)
+    solid = trimesh.Trimesh(vertices, faces, process=False)
     where, faults = ", ".join(path.name for path in paths), Faults()
     if not (solid.is_watertight and solid.is_winding_consistent):
         faults.add(where, "a file with open or twisted edges when read back", "closed solids")
@@ -213,8 +223,7 @@ def _step(
 ) -> dict[str, Any]:
     """Named solids; read back, each must be valid and have the volume of the mesh within 0.5 %."""
     import cadquery as cq
-    from OCP.Interface import Interface_Static
-    from OCP.STEPControl import STEPControl_Controller
+    from cadquery.occ_impl.exporters.assembly import exportAssembly
 
     from geometry.cad import assembly, solids
 
@@ -222,15 +231,11 @@ def _step(
     volumes["volume_rotor_cad"] = parts.rotor_volume
     meshed = volumes["volume_rotor_mesh"]
     path = work / f"{name}.step"
-    STEPControl_Controller.Init_s()
-    Interface_Static.SetCVal_s("write.step.unit", "M" if unit == "m" else "MM")
-    try:
-        assembly(parts, name).export(str(path))
-    finally:
-        Interface_Static.SetCVal_s("write.step.unit", "MM")
+    export_parts: Any = exportAssembly
+    export_parts(assembly(parts, name), str(path), outputUnit=unit.upper())
     text = path.read_text(encoding="utf-8", errors="replace")
     path.write_text(re.sub(r"\d{4}-\d\d-\d\dT[\d:]{8}", "2000-01-01T00:00:00", text, count=1), encoding="utf-8")
-    back = cq.importers.importStep(str(path)).solids().vals()
+    back: list[Any] = cq.importers.importStep(str(path)).solids().vals()
     total = sum(solid.Volume() for solid in back) * 1e-9
     faults = Faults()
     if len(back) != len(parts.solids) or not all(solid.isValid() for solid in back):
@@ -287,7 +292,7 @@ def read_solid(path: Path) -> tuple[Array, NDArray[np.int64], str | None]:
         import trimesh
 
         with path.open("rb") as stream:
-            loaded = trimesh.load(stream, file_type=kind[1:], force="mesh", process=False)
+            loaded: Any = trimesh.load(stream, file_type=kind[1:], force="mesh", process=False)
         vertices = np.asarray(loaded.vertices, dtype=np.float64)
         faces = np.asarray(loaded.faces, dtype=np.int64)
     except GeometryError:
@@ -297,13 +302,8 @@ def read_solid(path: Path) -> tuple[Array, NDArray[np.int64], str | None]:
         raise GeometryError([(where, text, f"a sound {kind[1:].upper()} file", "Truncated?")]) from error
     if len(faces) < 20 or not np.isfinite(vertices).all():
         raise GeometryError([(where, f"{len(faces)} triangles", "a mesh of 20 triangles or more", "Truncated?")])
-    # Corners that differ by less than single precision are one.
-    size = float(np.abs(vertices).max())
-    cell = max(size, 1e-300) * 2e-8
-    _, first, index = np.unique(np.round(vertices / cell), axis=0, return_index=True, return_inverse=True)
-    faces = index.ravel()[faces]
-    faces = faces[(faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])]
-    return vertices[first], faces, _said_unit(path)
+    vertices, faces = _weld(vertices, faces)
+    return vertices, faces, _said_unit(path)
 
 
 def _read_step(path: Path) -> tuple[Array, NDArray[np.int64], str | None]:
@@ -311,7 +311,8 @@ def _read_step(path: Path) -> tuple[Array, NDArray[np.int64], str | None]:
 
     from geometry.cad import tessellate
 
-    shape = cq.Compound.makeCompound(cq.importers.importStep(str(path)).solids().vals())
+    found: list[Any] = cq.importers.importStep(str(path)).solids().vals()
+    shape = cq.Compound.makeCompound(found)
     if not shape.Solids():
         raise GeometryError([(path.as_posix(), "no solid", "one solid or more", "Surfaces alone enclose no volume")])
     size = shape.BoundingBox().DiagonalLength / 1000

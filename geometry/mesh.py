@@ -15,8 +15,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from geometry.common import Array, Faults, GeometryError
 from geometry.blade import Blade
+from geometry.common import Array, Faults, GeometryError
 from geometry.duct import Duct
 from geometry.mesh_duct import duct_mesh, plan_stator
 from geometry.rotor import Rotor
@@ -185,7 +185,9 @@ def hub_profile(rotor: Rotor, root: Array) -> Array:
     """
     low, high = float(root[:, 1].min()), float(root[:, 1].max())
     need, middle = high - low, 0.5 * (low + high)
-    length = rotor.hub_extent if rotor.hub_length is not None else max(rotor.hub_extent, 1.04 * need + 0.02 * rotor.Rhub)
+    length = (
+        rotor.hub_extent if rotor.hub_length is not None else max(rotor.hub_extent, 1.04 * need + 0.02 * rotor.Rhub)
+    )
     if length < need:
         raise GeometryError([("hub_length", f"{length:g} m", f"at least {need:g} m, which the blade's root takes",
                               "Leave it out to have it fitted")])  # fmt: skip
@@ -252,7 +254,7 @@ def _rotor(rotor: Rotor, options: Options) -> tuple[Mesh, dict[str, float]]:
     if abs(mesh.volume / expected - 1) > VOLUME_TOLERANCE:
         gap = 100 * (mesh.volume / expected - 1)
         raise GeometryError([("rotor", f"a solid whose volume is {gap:+.2f} % off the integral of its sections",
-                              "blades that do not run into each other", "Fewer blades, less chord or a larger hub")])  # fmt: skip
+                              "blades that do not run into each other", "Fewer blades, less chord or a larger hub")])  # fmt: skip  # noqa: E501
     tip = float(np.hypot(mesh.vertices[:, 0], mesh.vertices[:, 1]).max())
     if abs(tip / rotor.R - 1) > 1e-6:
         raise GeometryError([("rotor", f"a tip radius of {tip:g} m", f"R = {rotor.R:g} m", "")])
@@ -260,7 +262,7 @@ def _rotor(rotor: Rotor, options: Options) -> tuple[Mesh, dict[str, float]]:
     checks = {
         "volume_rotor_mesh": mesh.volume, "volume_rotor_sections": expected, "volume_blade_sections": sections,
         "tip_radius": tip, "min_section_thickness": min(thick),
-        "min_trailing_edge": float(min(np.linalg.norm(c[0] - c[-1]) if curves.shape[1] % 2 else 0.0 for c in curves[1:])),
+        "min_trailing_edge": float(min(np.linalg.norm(c[0] - c[-1]) if curves.shape[1] % 2 else 0.0 for c in curves[1:])),  # noqa: E501
     }  # fmt: skip
     return mesh, checks
 
@@ -317,8 +319,6 @@ def _integral(blade: Blade, ring: Array, options: Options) -> float:
         areas = [_area(wrapped_outline(blade, float(r), fine)) for r in mid + half * x]
         total += w * float(np.dot(half, areas))
     return total
-
-
 
 
 def build(rotor: Rotor, duct: Duct | None = None, options: Options | None = None) -> Model:

@@ -176,7 +176,7 @@ def _refined(points: Array, faces: Faces, centre: Array, axis: Array) -> tuple[A
     if len(middles) < 6:
         return centre, axis
     normal = np.linalg.eigh(scatter)[1][:, 0] @ rows
-    return centre + np.mean(middles, axis=0) @ frame, normal * math.copysign(1.0, float(normal @ axis))
+    return centre + np.mean(middles, axis=0) @ rows, normal * math.copysign(1.0, float(normal @ axis))
 
 
 def pick(points: Array, faces: Faces) -> tuple[Faces, int, float, Array, Array, list[str]]:

@@ -131,7 +131,8 @@ def find_rotor(
     if at is None:
         s = 0.5 * (1 - np.cos(np.linspace(0.0, np.pi, stations)))
         lowest = hub + 0.01 * (tip - hub)
-        at = (lowest + (0.992 * tip - lowest) * (0.5 * s + 0.5 * np.linspace(0, 1, stations))) / tip
+        at = ((lowest + (0.992 * tip - lowest) * (0.5 * s + 0.5 * np.linspace(0, 1, stations))) / tip).tolist()
+    assert at is not None
     sign, rotation, doubt = _sense(local, chosen, tip, hub, count)
     if doubt:
         notes.append(doubt)
@@ -150,17 +151,18 @@ def find_rotor(
         raise GeometryError([("mesh", f"{len(rows)} radii with {count} free blades", "four or more", "A broken mesh?")])
     columns = np.array([[c.chord, c.beta, c.thickness, c.camber, c.camber_position] for c in rows]).T
     if spread > 0.05:
-        notes.append(f"the blades differ from each other (spread {spread:.2g}): damaged, or not a rotor of equal blades")
+        notes.append(f"the blades differ from each other (spread {spread:.2g}): damaged, or no rotor of equal blades")
     return Found(
-        count, rotation, tip, hub, origin, sign * axis / np.linalg.norm(axis), np.array(r), *columns,
-        tuple(c.section for c in rows), spread, tuple(notes),
+        count, rotation, tip, hub, origin, sign * axis / np.linalg.norm(axis), np.array(r), columns[0],
+        columns[1], columns[2], columns[3], columns[4], tuple(c.section for c in rows), spread, tuple(notes),
     )  # fmt: skip
 
 
 def _mean_cut(cuts: list[Cut]) -> Cut:
     """Mean of the blades' numbers, section of the first."""
     table = np.array([[c.chord, c.beta, c.thickness, c.camber, c.camber_position] for c in cuts]).mean(axis=0)
-    return Cut(*(float(v) for v in table), cuts[0].section)
+    chord, beta, thickness, camber, position = (float(v) for v in table)
+    return Cut(chord, beta, thickness, camber, position, cuts[0].section)
 
 
 def _sense(points: Array, faces: Faces, tip: float, hub: float, count: int) -> tuple[int, int, str]:

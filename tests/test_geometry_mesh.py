@@ -143,13 +143,28 @@ def test_left_hand_is_the_mirror_image() -> None:
     assert found.axis[2] > 1 - 1e-9
 
 
+def test_a_hub_that_is_not_alike_on_all_sides_does_not_turn_the_axis() -> None:
+    import trimesh
+
+    rotor = Rotor(helix(0.2, 0.12, anchors=naca4(0.04, 0.4, 0.12)), 3)
+    mesh = rotor_mesh(rotor, Options(n=61))
+    lump = trimesh.creation.box((0.008, 0.004, 0.03))
+    lump.apply_translation((0.004, 0.002, -0.012))
+    points = np.concatenate([mesh.vertices, lump.vertices])
+    found = find_rotor(points, np.concatenate([mesh.faces, lump.faces + len(mesh.vertices)]))
+    chord, beta = errors(found, rotor, 1.0)
+    assert found.axis[2] > 1 - 1e-5
+    assert chord < 0.01 and beta < 0.3
+
+
 def test_a_fillet_adds_its_own_volume_at_the_root_only() -> None:
     blade = helix(0.2, 0.12, anchors=naca4(0.04, 0.4, 0.12))
     bare, round_ = (build(Rotor(blade, 2), options=Options(n=61, fillet=f)) for f in (0.0, 0.003))
     more = round_.checks["volume_blade_sections"] - bare.checks["volume_blade_sections"]
-    # perimeter times (1 - pi/4) f^2 when the section is large against the fillet; convex corners add a little
+    # Perimeter times the cross-section of the fillet, and a turn of 2 pi times the integral of its depth squared / 2.
     around_root = np.linalg.norm(np.diff(blade.section_curve(blade.Rhub), axis=0), axis=1).sum()
-    assert more == pytest.approx(around_root * (1 - np.pi / 4) * 0.003**2, rel=0.15)
+    exact = around_root * (1 - np.pi / 4) * 0.003**2 + np.pi * (5 / 3 - np.pi / 2) * 0.003**3
+    assert more == pytest.approx(exact, rel=0.04)
     for share in (0.4, 0.8):
         cuts = [blades(m.rotor.vertices, m.rotor.faces, share * 0.1) for m in (bare, round_)]
         spans = [np.ptp(np.concatenate(c)[:, 1]) for c in cuts if c]

@@ -1,0 +1,174 @@
+"""The promise of the files: whole, named, with their unit, never half written; stations read back make a case."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bemt.case import load_case
+from bemt.cli import main
+from geometry import export as module
+from geometry.airfoil import naca4
+from geometry.common import GeometryError
+from geometry.duct import around
+from geometry.export import export, read_solid
+from geometry.laws import helix
+from geometry.mesh import Options
+from geometry.rotor import Rotor
+from geometry.slicing import find_rotor
+
+COARSE = Options(n=61)
+
+
+@pytest.fixture(scope="module")
+def propeller() -> Rotor:
+    return Rotor(helix(0.15, 0.1, anchors=naca4(0.04, 0.4, 0.12)), 3, -1)
+
+
+def test_files_are_closed_named_and_state_their_unit(propeller: Rotor, tmp_path: Path) -> None:
+    import trimesh
+
+    duct = around(propeller, 0.08, 0.001, 0.004)
+    manifest = export(propeller, duct, tmp_path, ["stl", "obj", "openfoam"], name="p", unit="mm", options=COARSE)
+    stored = json.loads((tmp_path / "manifest.json").read_text())
+    assert [item["sha256"] for item in stored["files"]] == [item["sha256"] for item in manifest["files"]]
+    named = {item["path"]: item for item in stored["files"]}
+    assert set(named) == {"p.stl", "p.obj", *(f"constant/triSurface/{n}.stl" for n in ("blade", "hub", "duct"))}
+    on_disk = {p.relative_to(tmp_path).as_posix() for p in tmp_path.rglob("*") if p.is_file()}
+    assert on_disk == {*named, "manifest.json"}
+    for path, item in named.items():
+        assert hashlib.sha256((tmp_path / path).read_bytes()).hexdigest() == item["sha256"]
+        assert item["unit"] == ("m" if item["format"] == "openfoam" else "mm")
+    volume = stored["volumes_m3"]["volume_rotor_mesh"] + stored["volumes_m3"]["volume_duct_mesh"]
+    for name, size in (("p.stl", 150.0), ("p.obj", 150.0)):
+        points, faces, unit = read_solid(tmp_path / name)
+        solid = trimesh.Trimesh(points, faces, process=False)
+        assert unit == "mm" and solid.is_watertight and solid.is_winding_consistent and solid.body_count == 2
+        assert solid.volume == pytest.approx(volume * 1e9, rel=1e-6)
+        assert np.ptp(points[:, 0]) > size
+    words = [line.split()[1] for line in (tmp_path / "p.stl").read_text().splitlines() if line.startswith("solid ")]
+    assert words == ["blade", "hub", "duct"]
+    assert (tmp_path / "constant/triSurface/blade.stl").read_text(encoding="ascii").startswith("solid blade\n")
+    blade, _, _ = read_solid(tmp_path / "constant/triSurface/blade.stl")
+    assert np.hypot(blade[:, 0], blade[:, 1]).max() == pytest.approx(0.075, rel=1e-6)
+
+
+def test_metres_are_a_thousandth(propeller: Rotor, tmp_path: Path) -> None:
+    for unit in ("mm", "m"):
+        export(propeller, None, tmp_path / unit, ["stl"], name="p", unit=unit, options=COARSE)
+    (a, _, u), (b, _, v) = (read_solid(tmp_path / unit / "p.stl") for unit in ("mm", "m"))
+    assert (u, v) == ("mm", "m")
+    assert np.ptp(a, axis=0) == pytest.approx(1000 * np.ptp(b, axis=0), rel=1e-6)
+
+
+def test_two_runs_write_the_same_bytes(propeller: Rotor, tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        export(propeller, None, tmp_path / name, ["stl", "obj"], name="p", options=COARSE)
+    for file in ("p.stl", "p.obj", "manifest.json"):
+        assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
+
+
+def test_nothing_is_left_of_a_refused_export(propeller: Rotor, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(GeometryError, match="duct.gap"):
+        export(propeller, around(propeller, 0.08, 0.0), tmp_path / "a", ["stl"], options=COARSE)
+    monkeypatch.setattr(module, "_stl", lambda *args: "solid blade\nendsolid blade\n")
+    with pytest.raises(GeometryError):
+        export(propeller, None, tmp_path / "b", ["obj", "stl"], options=COARSE)
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_open_file_is_noticed(propeller: Rotor, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = module._stl
+    monkeypatch.setattr(module, "_stl", lambda points, faces, title: whole(points, faces[1:], title))
+    with pytest.raises(GeometryError, match="open or twisted edges"):
+        export(propeller, None, tmp_path / "a", ["stl"], options=COARSE)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("kind", ["stl", "obj"])
+def test_stations_of_an_export_make_a_case_that_solves(
+    kind: str, propeller: Rotor, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    export(propeller, None, tmp_path, [kind], name="my prop", unit="m", options=COARSE)
+    assert main(["stations", str(tmp_path / f"my prop.{kind}"), "--out", str(tmp_path / "case"), "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert (document["schema"], document["blades"], document["rotation"]) == ("bemt.stations/1", 3, "left")
+    case = load_case(tmp_path / "case")
+    rotor = case.rotor()
+    assert (rotor.B, rotor.rotation) == (3, -1)
+    assert rotor.R == pytest.approx(0.075, rel=1e-5)
+    r = np.linspace(0.25, 0.95, 29) * 0.075
+    (chord, beta), (chord0, beta0) = rotor.blade.at(r), propeller.blade.at(r)
+    assert chord == pytest.approx(chord0, rel=0.005)
+    assert np.degrees(beta) == pytest.approx(np.degrees(beta0), abs=0.1)
+    assert rotor.blade.section(0.05).thickness == pytest.approx(0.12, abs=2e-3)
+    assert rotor.blade.section(0.05).camber == pytest.approx(0.04, abs=1e-3)
+    if kind == "stl":
+        assert main(["sweep", str(tmp_path / "case"), "--json"]) == 0
+        assert json.loads(capsys.readouterr().out)["cases"]
+
+
+def test_step_is_written_read_back_and_cut(propeller: Rotor, tmp_path: Path) -> None:
+    try:
+        import cadquery  # noqa: F401
+    except ImportError as error:
+        pytest.skip(f"cadquery cannot be loaded (it needs libGL, libX11 and libexpat): {error}")
+    manifest = export(propeller, None, tmp_path, ["step"], name="p", unit="m", options=COARSE)
+    words = (tmp_path / "p.step").read_text().replace(" ", "")
+    assert "LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT($,.METRE.)" in words and "SI_UNIT(.MILLI.,.METRE.)" not in words
+    volumes = manifest["volumes_m3"]
+    assert volumes["volume_rotor_cad"] == pytest.approx(volumes["volume_rotor_mesh"], rel=5e-3)
+    points, faces, unit = read_solid(tmp_path / "p.step")
+    found = find_rotor(points, faces)
+    assert (unit, found.B, found.rotation) == ("m", 3, -1)
+    inside = (found.r > 0.25 * found.R) & (found.r < 0.95 * found.R)
+    chord, beta = propeller.blade.at(found.r)
+    assert np.abs(found.chord / chord - 1)[inside].max() < 0.005
+    assert np.degrees(np.abs(found.beta - beta))[inside].max() < 0.15
+    assert found.axis[2] > 1 - 1e-6
+    assert found.R == pytest.approx(0.075, rel=2e-4)
+
+
+def test_the_unit_is_asked_for_not_guessed(
+    propeller: Rotor, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    export(propeller, None, tmp_path, ["stl"], name="p", unit="mm", options=COARSE)
+    path = tmp_path / "p.stl"
+    assert main(["stations", str(path), "--unit", "m"]) == 2
+    assert "mm, which the file states" in capsys.readouterr().err
+    path.write_text(path.read_text().replace(" unit=mm", ""))
+    assert main(["stations", str(path)]) == 2
+    assert "Give --unit?" in capsys.readouterr().err.replace("Give --unit.", "Give --unit?")
+    assert main(["stations", str(path), "--unit", "mm"]) == 0
+    assert "diameter 150.00 mm" in capsys.readouterr().out
+    assert main(["stations", str(path), "--unit", "m"]) == 2
+    assert "Another --unit?" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"solid x\nendsolid x\n", b"\x00" * 200, b"ISO-10303-21;\nHEADER;", b"v 1 2\n"]
+)
+@pytest.mark.parametrize("kind", ["stl", "obj"])
+def test_a_broken_file_is_an_input_error(
+    content: bytes, kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / f"x.{kind}"
+    path.write_bytes(content)
+    assert main(["stations", str(path), "--unit", "mm"]) == 2
+    assert "expected" in capsys.readouterr().err
+
+
+def test_export_command_prints_one_document(project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "o"
+    assert main(["export", str(project / "cases/prop_8x5"), "--out", str(out), "--format", "openfoam", "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["schema"] == "bemt.export/1"
+    assert [s["name"] for item in document["cases"][0]["files"] for s in item["surfaces"]] == ["blade", "hub"]
+    thick = ["--format", "stl", "--min-thickness-mm", "5"]
+    assert main(["export", str(project / "cases/prop_8x5"), "--out", str(tmp_path / "q"), *thick]) == 2
+    assert "at least min_thickness, 5 mm" in capsys.readouterr().err
+    assert not (tmp_path / "q").exists()
