@@ -104,7 +104,7 @@ def test_parameters_are_the_numeric_fields_and_defaults_are_physical(name: str) 
         assert isinstance(p, Parameter) and p.unit and p.source
         assert np.isfinite([p.low, p.high]).all() and p.low < p.high
         assert p.low <= getattr(effect, p.name) <= p.high, f"{p.name}: default outside its own range"
-    assert effect.describe() == {"id": name, **{p.name: getattr(effect, p.name) for p in cls.parameters}}
+    assert effect.describe() == {"id": name, **dataclasses.asdict(effect)}
 
 
 @each_effect

@@ -299,7 +299,14 @@ def test_faults_of_parameters(make, message: str) -> None:  # type: ignore[no-un
 
 
 @settings(max_examples=60, deadline=None)
-@given(st.lists(st.tuples(st.floats(0.01, 3), st.floats(-5, 5)), min_size=2, max_size=12))
+# ordinates in steps of 1e-9: where a slope underflows, scipy's own weights lose their meaning
+@given(
+    st.lists(
+        st.tuples(st.floats(0.01, 3), st.integers(-5 * 10**9, 5 * 10**9).map(lambda i: i * 1e-9)),
+        min_size=2,
+        max_size=12,
+    )
+)
 def test_interpolation_is_that_of_scipy_and_clamped(steps: list[tuple[float, float]]) -> None:
     x = np.cumsum([dx for dx, _ in steps])
     y = np.array([v for _, v in steps])
