@@ -23,7 +23,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from bemt.solver import Prepared
     from geometry.duct import Duct
     from geometry.rotor import Rotor
 
@@ -94,13 +93,11 @@ class DuctFlow:
     span: float = 1.0
     drag_area: float = 0.0
 
-    def total(self, prep: Prepared, rho: Array, V: Array, out: Array) -> tuple[Array, Array, Array]:
+    def total(self, rho: Array, V: Array, out: Array) -> tuple[Array, Array, Array]:
         """Thrust of rotor, stator and duct together.
 
         Parameters
         ----------
-        prep : Prepared
-            Unused but for its type: the same call for every kind of duct.
         rho, V : (P,) float
             Density [kg/m3], onset speed [m/s].
         out : (P, 8) float

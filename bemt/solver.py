@@ -352,7 +352,7 @@ def _collect(prep: Prepared, rpm: Array, points: Array, out: Array, rad: Array) 
     n = rpm / 60.0
     D = prep.D
     if prep.duct is not None:
-        T, T_stator, V_exit = (v * nan for v in prep.duct.total(prep, rho, V, out))
+        T, T_stator, V_exit = (v * nan for v in prep.duct.total(rho, V, out))
         T_duct = T - T_rotor - T_stator
     else:
         T, T_stator, T_duct = T_rotor, np.zeros_like(T_rotor), np.zeros_like(T_rotor)
