@@ -97,6 +97,12 @@ class Baking:
     num: dict[str, float] = field(default_factory=dict)
 
     @property
+    def fast(self) -> slice:
+        """The one Reynolds number, nearest to 5e5, that stands for the blades whose Mach number matters."""
+        i = int(np.argmin(np.abs(np.log(self.Re / 5e5))))
+        return slice(i, i + 1)
+
+    @property
     def alpha_col(self) -> Array:
         """Angle grid shaped to broadcast against the tables, (1, 1, 1, Na) [rad]."""
         return self.alpha[None, None, None, :]

@@ -48,7 +48,8 @@ class Compressibility(Effect):
         if bake.M2.size == 1:
             return
         M = np.sqrt(bake.M2)[None, :, None, None]
-        limit = self.lift_divergence(bake.thickness[:, None, None, None], bake.cl[:, :1])
+        # lift divergence hardly knows the Reynolds number: one of them, where Mach numbers matter, keeps this cheap
+        limit = self.lift_divergence(bake.thickness[:, None, None, None], bake.cl[:, :1, bake.fast])
         a = np.abs(bake.alpha_col)
         fade = np.clip((np.radians(40.0) - a) / np.radians(15.0), 0.0, 1.0)
         own = bake.own_mach[:, None, None, None]

@@ -35,7 +35,7 @@ class DragDivergence(Effect):
             return
         M = np.sqrt(bake.M2)[None, :, None, None]
         tc = bake.thickness[:, None, None, None]
-        cl0 = np.clip(np.abs(bake.cl[:, :1]), 0.0, 1.2)
+        cl0 = np.clip(np.abs(bake.cl[:, :1, bake.fast]), 0.0, 1.2)
         m_cr = self.kappa - tc - 0.1 * cl0 - (0.1 / 80.0) ** (1.0 / 3.0)
         wave = 20.0 * np.maximum(M - m_cr, 0.0) ** 4
         a = bake.alpha_col
