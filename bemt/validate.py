@@ -8,7 +8,6 @@ from the declared rule of :mod:`bemt.section_rule`.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -34,6 +33,8 @@ SCHEMA = "bemt.validation/1"
 # of CT says more about J0 than about the model.
 J_SHARE = 0.8
 N_STATIONS = 40
+# Section tables stay at this Reynolds number with ``--off reynolds``: the upper end of small propellers.
+RE_OFF = 1.0e5
 
 # UIUC family of an APC blade series, by the suffix of the PE0 file's designation.
 _APC_SERIES = {"E": "apce", "SF": "apcsf", "": "apcsp", "F": "apcff", "MR": "apcmr"}
@@ -395,6 +396,7 @@ def run(args: argparse.Namespace) -> int:
         For a bad folder or an unknown effect.
     """
     from bemt import effects as registry
+    from bemt.tables import json_text, write_atomic
 
     off = [name for item in (args.off or []) for name in str(item).split(",") if name]
     unknown = [name for name in off if name not in registry.catalogue() and name != "reynolds"]
@@ -402,15 +404,13 @@ def run(args: argparse.Namespace) -> int:
         known = ", ".join(registry.catalogue())
         raise InputError([Fault("--off", n, "an unknown effect", f"one of {known}, reynolds", "") for n in unknown])
     eff = registry.without(registry.standard(), [n for n in off if n != "reynolds"])
-    fixed = args.polar if args.polar is not None else (1e5 if "reynolds" in off else None)
+    fixed = args.polar if args.polar is not None else (RE_OFF if "reynolds" in off else None)
     doc = validate(Path(args.dir), eff, fixed, progress=sys.stderr.isatty())
-    rendered = json.dumps(doc, indent=1)
+    rendered = json_text(doc)  # an infinite error (not converged) becomes null: JSON has no infinity
     if args.out:
-        from bemt.tables import write_atomic
-
         folder = Path(args.out)
         folder.mkdir(parents=True, exist_ok=True)
-        write_atomic(folder / "validation.json", rendered + "\n")
+        write_atomic(folder / "validation.json", rendered)
         write_atomic(folder / "validation.txt", text(doc) + "\n")
-    print(rendered if args.json else text(doc))
+    print(rendered.rstrip() if args.json else text(doc))
     return 1 if doc["unconverged"] else 0

@@ -6,11 +6,11 @@ from typing import Any
 
 
 def _percent(s: dict[str, float | None]) -> str:
-    if s["median_abs"] is None:
+    if s["median_abs"] is None or s["p90_abs"] is None:
         return f"{'-':>6} {'-':>6} {'-':>6}"
     bias = s["bias"]
     shown = "-" if bias is None else f"{100 * bias:+6.1f}"
-    return f"{100 * s['median_abs']:6.1f} {100 * (s['p90_abs'] or 0):6.1f} {shown:>6}"
+    return f"{100 * s['median_abs']:6.1f} {100 * s['p90_abs']:6.1f} {shown:>6}"
 
 
 def text(doc: dict[str, Any]) -> str:

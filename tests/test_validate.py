@@ -12,6 +12,7 @@ import pytest
 
 from bemt import effects, section_rule, validate
 from bemt.importers import uiuc
+from bemt.tables import json_text
 
 R_R = np.linspace(0.15, 1.0, 18)
 C_R = 0.12 + 0.08 * np.sin(np.pi * R_R) - 0.06 * R_R
@@ -59,7 +60,17 @@ def test_forward_points_stop_at_the_share_of_zero_thrust_J(tmp_path: Path) -> No
 
 
 def test_unconverged_points_count_as_infinitely_wrong() -> None:
-    assert validate.statistics(np.array([0.01, np.nan, np.nan]))["median_abs"] == np.inf
+    bad = validate.statistics(np.array([0.01, np.nan, np.nan]))
+    assert bad["median_abs"] == np.inf
+    assert json.loads(json_text(bad)) == {"median_abs": None, "p90_abs": None, "bias": 0.01}
+
+
+def test_unconverged_points_are_never_shown_as_zero(tmp_path: Path) -> None:
+    doc = validate.validate(_folder(tmp_path))
+    nothing = validate.statistics(np.array([np.nan, np.nan]))
+    doc["static"]["CT"] = nothing
+    line = next(row for row in validate.text(doc).splitlines() if row.startswith("all points"))
+    assert line.split("|")[1].split() == ["inf", "inf", "-"]
 
 
 def test_command_prints_json_and_names_unknown_effects(tmp_path: Path) -> None:
