@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import textwrap
 from collections import Counter
 from dataclasses import asdict
@@ -23,6 +22,7 @@ from bemt import _thesis as th
 from bemt import coefficients as co
 from bemt import empirical as k
 from bemt.air import Air
+from bemt.data_folders import find_data
 from bemt.units import INCH, KGF, RPM
 
 SCHEMA = "bemt.reproduce/1"
@@ -31,16 +31,14 @@ UIUC_POINTS, UIUC_PROPELLERS = 4122, 248
 
 
 def find_uiuc() -> Path | None:
-    """Folder of the UIUC data: ``$BEMT_DATA/uiuc``; without that variable ``../shared/data/uiuc`` beside the project.
+    """Folder of the UIUC data, see :func:`bemt.data_folders.find_data`.
 
     Returns
     -------
     Path or None
         None when there is none.
     """
-    named = os.environ.get("BEMT_DATA")
-    folder = (Path(named) if named else Path(__file__).resolve().parents[2] / "shared" / "data") / "uiuc"
-    return folder if folder.is_dir() else None
+    return find_data("uiuc")
 
 
 def uiuc_statistics(folder: Path) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.data_folders import find_data
 from bemt.errors import Fault, InputError
 from bemt.units import INCH
 from bemt.validate_text import text
@@ -33,8 +34,6 @@ SCHEMA = "bemt.validation/1"
 # of CT says more about J0 than about the model.
 J_SHARE = 0.8
 N_STATIONS = 40
-# Section tables stay at this Reynolds number with ``--off reynolds``: the upper end of small propellers.
-RE_OFF = 1.0e5
 
 # UIUC family of an APC blade series, by the suffix of the PE0 file's designation.
 _APC_SERIES = {"E": "apce", "SF": "apcsf", "": "apcsp", "F": "apcff", "MR": "apcmr"}
@@ -128,9 +127,7 @@ def build(propeller: UiucPropeller, stations: tuple[Array, Array, Array] | None 
     R = 0.5 * propeller.diameter_m
     keep = x <= 1.0
     anchors = tuple((s.r_R, airfoil(s)) for s in sections(propeller.family))
-    blade = from_stations(
-        x[keep] * R, np.maximum(c[keep], 1e-3) * R, beta[keep], R, float(x[0]) * R, anchors=anchors
-    )
+    blade = from_stations(x[keep] * R, np.maximum(c[keep], 1e-3) * R, beta[keep], R, float(x[0]) * R, anchors=anchors)
     return Rotor(blade, propeller.blades, propeller.rotation, propeller.name)
 
 
@@ -305,9 +302,7 @@ def validate(
     from bemt.importers import uiuc
 
     if not folder.is_dir():
-        raise InputError(
-            [Fault(str(folder), "folder", "nothing there", "a folder in UIUC layout", "Check the path.")]
-        )
+        raise InputError([Fault(str(folder), "folder", "nothing there", "a folder in UIUC layout", "Check the path.")])
     eff = registry.standard() if effects is None else tuple(effects)
     scan = uiuc.scan_folder(folder)
     pe0, notes = _pe0_stations(folder)
@@ -399,13 +394,14 @@ def run(args: argparse.Namespace) -> int:
     from bemt.tables import json_text, write_atomic
 
     off = [name for item in (args.off or []) for name in str(item).split(",") if name]
-    unknown = [name for name in off if name not in registry.catalogue() and name != "reynolds"]
+    unknown = [name for name in off if name not in registry.catalogue()]
     if unknown:
         known = ", ".join(registry.catalogue())
-        raise InputError([Fault("--off", n, "an unknown effect", f"one of {known}, reynolds", "") for n in unknown])
-    eff = registry.without(registry.standard(), [n for n in off if n != "reynolds"])
-    fixed = args.polar if args.polar is not None else (RE_OFF if "reynolds" in off else None)
-    doc = validate(Path(args.dir), eff, fixed, progress=sys.stderr.isatty())
+        raise InputError([Fault("--off", n, "an unknown effect", f"one of {known}", "") for n in unknown])
+    eff = registry.without(registry.standard(), off)
+    fixed = args.polar
+    folder = Path(args.dir) if Path(args.dir).exists() else find_data(args.dir) or Path(args.dir)
+    doc = validate(folder, eff, fixed, progress=sys.stderr.isatty())
     rendered = json_text(doc)  # an infinite error (not converged) becomes null: JSON has no infinity
     if args.out:
         folder = Path(args.out)

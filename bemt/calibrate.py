@@ -1,0 +1,207 @@
+"""``python -m bemt calibrate FILES``: K1/K2 refitted on measured propellers, and the compact formula beside it.
+
+Beside each other: the thesis's constants; its goal-seek (K2 = 1.5, K1 by mean error) repeated on the data; a robust
+refit at rest, and one that includes flight; the compact formula of :mod:`bemt.compact`, refitted when enough propellers
+have a chord, with measured chords and with typical ones. Fitted models are scored on FILES with the propeller (compact:
+also its maker) left out of the fit, and on ``--test`` files with the constants of FILES.
+
+Schema ``bemt.calibration/1``: ``k1k2``, ``compact``, ``scores`` (``calibration`` and ``test``: ``static``, ``flight``,
+``J/(P/D)``, ``chord_known``, ``bands``, ``power``, ``coverage``), ``refused``, ``notes``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt import calibrate_compact, calibrate_fit, calibrate_score, compact
+from bemt.calibrate_points import Points, load
+from bemt.calibrate_text import text
+from bemt.data_folders import find_data
+from bemt.errors import Fault, InputError
+
+Array = NDArray[np.float64]
+
+__all__ = ["SCHEMA", "calibrate", "run"]
+
+SCHEMA = "bemt.calibration/1"
+
+
+def _counts(points: Points) -> dict[str, int]:
+    return {
+        "propellers": len(points.propellers), "points": int(points.rpm.size),
+        "static": int(np.count_nonzero(points.J == 0)),
+        "with_chord": sum(bool(np.isfinite(p.chord_m)) for p in points.propellers),
+        "ducted": sum(p.ducted for p in points.propellers),
+    }  # fmt: skip
+
+
+def _k1k2(points: Points, draws: int, notes: list[str]) -> dict[str, calibrate_fit.K1K2]:
+    """Constants by name; those that cannot be fitted are left out with a note."""
+    found = {"thesis": calibrate_fit.THESIS}
+    if np.any(calibrate_fit.usable(points)):
+        found["goal_seek"] = calibrate_fit.goal_seek(points)
+    for name, in_flight in (("refit", False), ("refit_flight", True)):
+        try:
+            found[name] = calibrate_fit.fit(points, in_flight, draws)
+        except InputError as error:
+            notes.append(f"{name} left out: {error}")
+    return found
+
+
+def calibrate(
+    points: Points, test: Points | None = None, draws: int = calibrate_fit.DRAWS,
+    progress: Callable[[str], None] | None = None,
+) -> tuple[dict[str, Any], dict[str, tuple[Points, dict[str, Array]]]]:  # fmt: skip
+    """Fit, leave out, score.
+
+    Parameters
+    ----------
+    points : Points
+        Measured points to fit.
+    test : Points, optional
+        Held out.
+    draws : int
+        Bootstrap samples of propellers.
+    progress : callable, optional
+        Takes a line on what is being done.
+
+    Returns
+    -------
+    document : dict
+        Schema ``bemt.calibration/1``, without the names of the files.
+    predictions : dict
+        ``calibration`` and ``test``: points and the CT of each model, for the figure. [-]
+    """
+    say = progress or (lambda _: None)
+    notes = [*points.notes, *(test.notes if test else ())]
+    say("K1 and K2")
+    k1k2 = _k1k2(points, draws, notes)
+    say("compact formula")
+    fitted = calibrate_compact.fit(points)
+    if fitted is None:
+        few = f"fewer than {calibrate_compact.MIN_PROPELLERS} propellers with chord and power"
+        notes.append(f"compact formula not refitted: {few}; the published constants serve")
+    constants = fitted.constants if fitted else compact.CONSTANTS
+    document: dict[str, Any] = {
+        "schema": SCHEMA,
+        "data": {"calibration": _counts(points), "test": _counts(test) if test else None},
+        "k1k2": {name: asdict(c) for name, c in k1k2.items()},
+        "compact": {
+            "constants": asdict(constants), "published": asdict(compact.CONSTANTS), "refitted": fitted is not None,
+            "propellers": fitted.propellers if fitted else 0, "chords": fitted.chords if fitted else 0,
+        },
+    }  # fmt: skip
+    sets = {"calibration": points} | ({"test": test} if test else {})
+    predictions: dict[str, tuple[Points, dict[str, Array]]] = {}
+    document["scores"] = {"calibration": None, "test": None}
+    for name, which in sets.items():
+        CT = {key: calibrate_fit.CT_k1k2(which, c.K1, c.K2) for key, c in k1k2.items()}
+        CP: dict[str, Array] = {}
+        for key, known in (("compact", True), ("compact_no_chord", False)):
+            CT[key], CP[key] = calibrate_compact.predict(which, constants, known)
+        if name == "calibration":
+            for key, in_flight in (("refit", False), ("refit_flight", True)):
+                if key in k1k2:
+                    CT[key] = calibrate_fit.left_out(which, in_flight)
+            if fitted:
+                _leave_out(which, fitted, CT, CP, document, say)
+        found = calibrate_score.score(which, CT)
+        own_chord = np.isfinite(which.of("chord_m"))
+        part = calibrate_score.score(which.select(own_chord), {key: v[own_chord] for key, v in CT.items()})
+        found["chord_known"] = {key: part[key] for key in ("static", "flight", "J/(P/D)")}
+        found["power"] = calibrate_score.power_score(which, CP)
+        found["coverage"] = {
+            "chord": calibrate_score.coverage(which, constants, True),
+            "no_chord": calibrate_score.coverage(which, constants, False),
+        }
+        document["scores"][name] = found
+        predictions[name] = (which, CT)
+    document["refused"] = [*points.refused, *(test.refused if test else ())]
+    document["notes"] = notes
+    return document, predictions
+
+
+def _leave_out(
+    points: Points, fitted: calibrate_compact.Fitted, CT: dict[str, Array], CP: dict[str, Array],
+    document: dict[str, Any], say: Callable[[str], None],
+) -> None:  # fmt: skip
+    """Replace the compact predictions by those without the propeller, add those without the maker, and the bands."""
+    makers = np.unique([p.maker for p in points.propellers], return_inverse=True)[1][points.index]
+    names = {True: "compact", False: "compact_no_chord"}
+    for suffix, groups in (("", points.index), ("_maker_out", makers)):
+        found = calibrate_compact.left_out(
+            points, fitted, groups, lambda i, n: say(f"compact formula, left out {i} of {n}")
+        )
+        for known, key in names.items():
+            CT[key + suffix], CP[key + suffix] = found[known]
+    with_chord = np.isfinite(points.of("chord_m"))
+    document["compact"]["bands"] = {}
+    for known, key in names.items():
+        m = with_chord if known else np.ones_like(with_chord)
+        made = [np.where(m, v[f"{key}_maker_out"], np.nan) for v in (CT, CP)]
+        widths = calibrate_compact.bands(points, made[0], made[1], fitted.constants, known)
+        document["compact"]["bands"]["known" if known else "unknown"] = widths
+
+
+def _found(name: str) -> str:
+    """Path as given, or the database of this name (``uiuc/volume-2``)."""
+    return name if Path(name).exists() else str(find_data(name) or name)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Command ``calibrate``.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        files, test, json, out, quiet.
+
+    Returns
+    -------
+    int
+        0.
+
+    Raises
+    ------
+    InputError
+        For files that are missing or give no point.
+    """
+    from bemt.tables import json_text, write_atomic
+
+    files = list(args.files)
+    if not files:
+        if find_data("uiuc") is None:
+            hint = "Name files, or fetch a database: python -m bemt data uiuc"
+            raise InputError(Fault("FILES", "", "none, and no UIUC data found", "measured propellers", hint))
+        files = ["uiuc"]
+    points = load(map(_found, files))
+    test = load(map(_found, args.test)) if args.test else None
+    shown = sys.stderr.isatty() and not args.quiet
+
+    def progress(line: str) -> None:
+        if shown:
+            print(f"\r{line:<60}", end="", file=sys.stderr, flush=True)
+
+    document, predictions = calibrate(points, test, progress=progress)
+    progress("")
+    names = {"files": [Path(f).name for f in files], "test_files": [Path(f).name for f in args.test or ()]}
+    document = {"schema": document["schema"], **names, **document}
+    rendered, page = json_text(document), text(document)
+    if args.out:
+        from bemt.calibrate_figure import draw
+
+        folder = Path(args.out)
+        write_atomic(folder / "calibration.json", rendered)
+        write_atomic(folder / "calibration.txt", page + "\n")
+        draw(predictions, folder / "calibration.png")
+    if not args.quiet or args.json:
+        print(rendered.rstrip() if args.json else page)
+    return 0

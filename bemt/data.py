@@ -1,0 +1,169 @@
+"""``python -m bemt data uiuc``: a public database of measured propellers into the user's cache.
+
+The publisher gives no hash, so the first archive is trusted and its SHA-256 is written beside the data
+(``.bemt-data.json``); a later ``--refresh`` refuses an archive with another hash. The data stay the publisher's: cite
+them as they ask. Never run against the publisher's server in the tests, which use a local one.
+
+Schema ``bemt.data/1``: ``kind``, ``folder``, ``url`` (or ``archive``), ``sha256``, ``bytes``, ``files``,
+``propellers``, ``refused``, ``checksum`` (``first use``, ``as recorded``, ``replaced``), ``fetched``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from bemt.cache import cache_dir
+from bemt.data_archive import download, sha256, unpacked
+from bemt.errors import Fault, InputError
+
+__all__ = ["RECORD", "SCHEMA", "URLS", "get", "run"]
+
+SCHEMA = "bemt.data/1"
+RECORD = ".bemt-data.json"
+URLS = {"uiuc": "https://m-selig.ae.illinois.edu/props/download/UIUC-propDB.zip"}
+"""Public archive of each kind."""
+CITE = {
+    "uiuc": "J.B. Brandt, R.W. Deters, G.K. Ananda, O.D. Dantsker, M.S. Selig, UIUC Propeller Database, Vols 1-4, "
+    "University of Illinois at Urbana-Champaign",
+}
+"""What the publisher asks to cite."""
+
+
+def _record(folder: Path) -> dict[str, Any] | None:
+    """What an earlier run wrote beside the data; None when there is none."""
+    try:
+        found = json.loads((folder / RECORD).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return found if isinstance(found, dict) and isinstance(found.get("sha256"), str) else None
+
+
+def get(
+    kind: str, folder: Path, source: Path | None = None, url: str | None = None, refresh: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> dict[str, Any]:  # fmt: skip
+    """Put a database into a folder.
+
+    Parameters
+    ----------
+    kind : str
+        One of `URLS`.
+    folder : Path
+        Its folder; made, or replaced in one step when an earlier run made it.
+    source : Path, optional
+        Local archive to take instead of fetching one.
+    url : str, optional
+        Mirror to fetch from.
+    refresh : bool
+        Fetch again what is there already; it must have the recorded hash.
+    progress : callable, optional
+        Called with bytes had and bytes in all (0: unknown).
+
+    Returns
+    -------
+    dict
+        Document of schema ``bemt.data/1``.
+
+    Raises
+    ------
+    InputError
+        When the folder holds something else, the archive cannot be had, is not sound, or holds no propeller; the folder
+        is as before then.
+    """
+    from bemt.importers.uiuc import scan_folder
+    from bemt.tables import json_text
+
+    known = _record(folder)
+    if known is None and folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        hint = "Name an empty or new folder with --dir"
+        raise InputError(Fault(os.fspath(folder), "", "files that this command did not put there", "no folder", hint))
+    if known and source is None and not refresh:
+        return {**known, "folder": os.fspath(folder), "checksum": "as recorded", "fetched": False}
+    address = url or URLS[kind]
+    if source is None:
+        archive = folder.with_name(f".{folder.name}.zip")
+        digest = download(address, archive, known["sha256"] if known else None, progress)
+    else:
+        archive = source
+        if not archive.is_file():
+            raise InputError(Fault(os.fspath(source), "", "no file", "a zip archive", "Check the path"))
+        digest = sha256(archive)
+    try:
+        with unpacked(archive, folder) as fresh:
+            scan = scan_folder(fresh)
+            if not scan.propellers:
+                expected = "tables such as volume-1/data/apce_10x5_geom.txt"
+                raise InputError(Fault(os.fspath(archive), "", "no propeller", expected, "Is this the archive?"))
+            document: dict[str, Any] = {
+                "schema": SCHEMA, "kind": kind, "folder": os.fspath(folder),
+                "url": address if source is None else None, "archive": None if source is None else source.name,
+                "sha256": digest, "bytes": archive.stat().st_size,
+                "files": sum(1 for f in fresh.rglob("*") if f.is_file()), "propellers": len(scan.propellers),
+                "refused": len(scan.faults), "cite": CITE[kind],
+            }  # fmt: skip
+            (fresh / RECORD).write_text(json_text(document), encoding="utf-8")
+    finally:
+        if source is None:
+            archive.unlink(missing_ok=True)
+    same = known is not None and known["sha256"] == digest
+    return {**document, "checksum": "as recorded" if same else "replaced" if known else "first use",
+            "fetched": source is None}  # fmt: skip
+
+
+def _text(doc: dict[str, Any]) -> str:
+    said = {
+        "first use": "first use: the publisher gives no hash, so this one is trusted and recorded",
+        "as recorded": "as recorded at its first use", "replaced": "another archive than before, as asked by --from",
+    }  # fmt: skip
+    lines = [
+        f"{doc['kind']}: {doc['propellers']} propellers, {doc['files']} files in {doc['folder']}",
+        f"from {doc['url'] or doc['archive']}, {doc['bytes']} bytes",
+        f"sha256 {doc['sha256']} ({said[doc['checksum']]})",
+    ]
+    if doc["refused"]:
+        lines.append(f"{doc['refused']} faults in its files; python -m bemt calibrate names them")
+    return "\n".join([*lines, f"please cite: {doc['cite']}"])
+
+
+def run(args: argparse.Namespace) -> int:
+    """Command ``data``.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        kind, source (``--from``), dir, url, refresh, json.
+
+    Returns
+    -------
+    int
+        0.
+
+    Raises
+    ------
+    InputError
+        As `get`; also without a cache and ``--dir``.
+    """
+    from bemt.tables import json_text
+
+    cache = cache_dir()
+    if args.dir is None and cache is None:
+        raise InputError(Fault("BEMT_CACHE", "", "switched off", "a cache folder, or --dir DIR"))
+    folder = Path(args.dir) if args.dir else Path(cache or ".") / "data" / args.kind
+    shown = sys.stderr.isatty()
+
+    def progress(have: int, total: int) -> None:
+        of = f" of {total / 1e6:.1f}" if total else ""
+        print(f"\r{have / 1e6:.1f}{of} MB ", end="", file=sys.stderr, flush=True)
+
+    source = Path(args.source) if args.source else None
+    doc = get(args.kind, folder, source, args.url, args.refresh, progress if shown else None)
+    if shown:
+        print("\r" + " " * 40 + "\r", end="", file=sys.stderr, flush=True)
+    print(json_text(doc).rstrip() if args.json else _text(doc))
+    return 0

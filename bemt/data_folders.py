@@ -1,0 +1,46 @@
+"""Where published data are found: the one place that knows."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from bemt.cache import cache_dir
+
+__all__ = ["data_roots", "find_data"]
+
+
+def data_roots() -> list[Path]:
+    """Folders that may hold databases, first to last.
+
+    Returns
+    -------
+    list of Path
+        ``$BEMT_DATA``, without that variable ``../shared/data`` beside the project; then ``data`` in the cache (filled
+        by ``python -m bemt data``). They need not exist.
+    """
+    named = os.environ.get("BEMT_DATA")
+    first = Path(named).expanduser() if named else Path(__file__).resolve().parents[2] / "shared" / "data"
+    cache = cache_dir()
+    return [first] if cache is None else [first, cache / "data"]
+
+
+def find_data(kind: str) -> Path | None:
+    """Folder of one database.
+
+    Parameters
+    ----------
+    kind : str
+        Name of its folder: ``uiuc``, ``apc``, ...
+
+    Returns
+    -------
+    Path or None
+        The first that exists; None when there is none.
+
+    Examples
+    --------
+    >>> find_data("no such database") is None
+    True
+    """
+    return next((root / kind for root in data_roots() if (root / kind).is_dir()), None)

@@ -1,0 +1,202 @@
+"""Compact formula: momentum and blade integral both hold, limits, similarity, flags; errors on UIUC data."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bemt import calibrate_compact, calibrate_points, calibrate_score, compact
+from bemt import coefficients as co
+from bemt.air import Air
+from bemt.errors import InputError
+
+INCH = 0.0254
+QUICK = settings(deadline=None, max_examples=40)
+ratios = st.floats(0.2, 1.5)
+advances = st.floats(0.0, 1.5)
+solidities = st.floats(0.02, 0.4)
+reynolds = st.floats(5e3, 1e6)
+
+
+def test_it_has_eight_constants():
+    assert len(dataclasses.fields(compact.Constants)) == 8
+
+
+@QUICK
+@given(ratios, advances, solidities, reynolds)
+def test_thrust_is_that_of_the_blade_integral_and_of_momentum(pd, J, s, Re):
+    # A helix blade integrated numerically in a uniform inflow, without stall; r is the formula's loss at low Re.
+    c = dataclasses.replace(compact.CONSTANTS, loading_max=1e9)
+    r = 1.0 / (1.0 + np.sqrt(c.re_scale / Re))
+    C = float(compact.coefficients(pd, J, s, Re, c)[0]) / co.CT_PER_ROTOR / r
+    li = -J / np.pi / 2 + np.sqrt((J / np.pi / 2) ** 2 + C / 2) if C >= 0 else None
+    x, w = np.polynomial.legendre.leggauss(8)
+    x, w = (x + 1) / 2, w / 2
+    if li is not None:
+        alpha = c.pitch_factor * pd / np.pi / x + c.zero_lift * r * r - (J / np.pi + li) / x
+        assert C == pytest.approx(np.sum(w * s / 2 * compact.LIFT_SLOPE * alpha * x**2), abs=1e-12)
+    # above zero thrust the slipstream is slower than the flight
+    J0 = c.pitch_factor * pd + 2 * np.pi * c.zero_lift * r * r / 3
+    assert (C > 0) == (J0 > J) or C == pytest.approx(0.0, abs=1e-9)
+
+
+@QUICK
+@given(ratios, solidities, reynolds)
+def test_zero_thrust_where_the_docstring_says(pd, s, Re):
+    c = compact.CONSTANTS
+    r = 1.0 / (1.0 + np.sqrt(c.re_scale / Re))
+    J0 = c.pitch_factor * pd + 2 * np.pi * c.zero_lift * r**2 / 3
+    assert compact.coefficients(pd, J0, s, Re)[0] == pytest.approx(0.0, abs=1e-12)
+
+
+@QUICK
+@given(ratios, solidities, reynolds)
+def test_thrust_falls_with_advance(pd, s, Re):
+    CT, _ = compact.coefficients(pd, np.linspace(0.0, 1.2 * pd, 60), s, Re)
+    assert np.all(np.diff(CT) <= 1e-12)
+
+
+@QUICK
+@given(ratios, advances, solidities, reynolds)
+def test_no_more_thrust_than_ideal_for_its_power(pd, J, s, Re):
+    CT, CP = (float(v) for v in compact.coefficients(pd, J, s, Re))
+    if CT > 0:
+        ideal = CT * (J / 2 + np.sqrt((J / 2) ** 2 + 2 * CT / np.pi))  # T (V + vi) of an actuator disk
+        assert CP > ideal
+
+
+def test_no_chord_no_thrust_and_many_blades_the_momentum_limit():
+    c = dataclasses.replace(compact.CONSTANTS, loading_max=1e9)
+    assert compact.coefficients(0.6, 0.1, 1e-9, 1e5, c)[0] == pytest.approx(0.0, abs=1e-8)
+    # infinitely many blades turn the flow into the helix of zero lift
+    r = 1.0 / (1.0 + np.sqrt(c.re_scale / 1e5))
+    theta = c.pitch_factor * 0.6 / np.pi + 2 * c.zero_lift * r**2 / 3
+    limit = 2 * (theta - 0.1 / np.pi) * theta * r * co.CT_PER_ROTOR
+    assert compact.coefficients(0.6, 0.1, 1e9, 1e5, c)[0] == pytest.approx(limit, rel=1e-6)
+
+
+@QUICK
+@given(st.floats(0.05, 2.0), ratios, st.floats(1000, 20000), st.floats(0.0, 0.8), st.floats(0.3, 3.0))
+def test_similarity_at_equal_reynolds_number(D, pd, rpm, x, scale):
+    air = Air.from_density()
+    e = [compact.estimate(D * k, pd * D * k, 2, rpm / k**2, x * pd * D * k * rpm / k**2 / 60, air, 0.07 * D * k)
+         for k in (1.0, scale)]  # fmt: skip
+    assert e[1].CT == pytest.approx(e[0].CT, rel=1e-9)
+    assert e[1].CP == pytest.approx(e[0].CP, rel=1e-9)
+    assert e[1].thrust_N == pytest.approx(e[0].thrust_N, rel=1e-9)  # n^2 D^4 is the same
+
+
+def test_batch_is_scalar():
+    rpm, V = np.array([3000.0, 6000.0, 0.0, 5000.0]), np.array([0.0, 5.0, 0.0, 30.0])
+    many = compact.estimate(0.254, 0.127, 2, rpm, V)
+    for i in range(4):
+        one = compact.estimate(0.254, 0.127, 2, rpm[i], V[i])
+        for field in dataclasses.fields(many):
+            a, b = getattr(many, field.name)[i], getattr(one, field.name)[0]
+            assert a == b or (a != a and b != b), field.name
+
+
+def test_at_rest_without_rotation_there_is_no_thrust_and_in_wind_no_answer():
+    e = compact.estimate(0.254, 0.127, 2, 0.0, [0.0, 5.0])
+    assert e.thrust_N[0] == 0.0 and np.isnan(e.thrust_N[1]) and e.flags[1]
+
+
+def test_the_chord_given_replaces_the_typical_one_and_narrows_the_band():
+    typical = compact.estimate(0.254, 0.127, 2, 6000.0)
+    given_ = compact.estimate(0.254, 0.127, 2, 6000.0, chord_m=compact.default_chord(0.254))
+    assert given_.thrust_N == pytest.approx(typical.thrust_N, rel=1e-12)
+    assert given_.u_thrust_N[0] < 0.7 * typical.u_thrust_N[0]
+    assert typical.u_thrust_N[0] < typical.u95_thrust_N[0]
+
+
+def test_more_blades_give_more_thrust_but_less_each():
+    T = [compact.estimate(0.254, 0.1, b, 6000.0).thrust_N[0] for b in (2, 3, 4)]
+    assert T[0] < T[1] < T[2] and T[2] < 2 * T[0]
+
+
+@pytest.mark.parametrize(
+    ("kwargs", "flag"),
+    [
+        ({"diameter_m": 14 * INCH, "pitch_m": 8 * INCH, "rpm": 20000.0}, "tip Mach 1.09 is supersonic: extrapolated"),
+        ({"rpm": 18000.0, "diameter_m": 12 * INCH}, "tip Mach 0.84 above 0.7: extrapolated"),
+        ({"rpm": 12000.0}, "tip Mach 0.47 beyond the data"),
+        ({"blades": 3}, "3 blades: every propeller of the calibration has 2"),
+        ({"ducted": True}, "ducted: a fit to open propellers"),
+        ({"airspeed_m_s": -1.0}, "airspeed from behind"),
+        ({"airspeed_m_s": 40.0}, "beyond zero thrust"),
+        ({"diameter_m": 3 * INCH, "pitch_m": 2 * INCH}, "give the chord, small propellers are wider"),
+        ({"pitch_m": 20 * INCH}, "P/D 2.00 outside the data"),
+    ],
+)  # fmt: skip
+def test_outside_the_data_is_flagged(kwargs, flag):
+    base = {"diameter_m": 10 * INCH, "pitch_m": 5 * INCH, "blades": 2, "rpm": 6000.0}
+    assert compact.estimate(**base).flags == ((),)
+    e = compact.estimate(**(base | kwargs))
+    assert any(flag in text for text in e.flags[0]), e.flags
+    if any(key in flag for key in ("Mach 1.09", "above", "ducted", "behind", "beyond zero")):
+        assert np.isnan(e.u_thrust_N[0]) and np.isnan(e.u95_power_W[0])
+    assert np.isfinite(e.thrust_N[0])
+
+
+def test_all_faults_at_once():
+    with pytest.raises(InputError) as caught:
+        compact.estimate(-0.2, 500.0, 2.5, -1.0, np.nan, chord_m=0.5)
+    assert {f.where for f in caught.value.faults} == {
+        "diameter_m", "pitch_m", "blades", "rpm", "airspeed_m_s", "chord_m",
+    }  # fmt: skip
+
+
+# --- on the data: calibrated on volume 1, volume 2 held out ---
+
+
+@pytest.fixture(scope="module")
+def volumes(shared_data: Path) -> dict[int, calibrate_points.Points]:
+    folder = shared_data / "uiuc"
+    if not folder.is_dir():
+        pytest.skip(f"no UIUC data at {folder}")
+    return {v: calibrate_points.load([folder / f"volume-{v}"]) for v in (1, 2)}
+
+
+def shares(points: calibrate_points.Points, CT: np.ndarray) -> dict[str, object]:
+    found = calibrate_score.score(points, {"m": CT})
+    bands = [row["models"]["m"]["median"] for row in found["J/(P/D)"][:4]]
+    return {"static": found["static"]["models"]["m"], "flight": bands}
+
+
+def test_the_published_constants_and_bands_come_from_volume_1(volumes):
+    points = volumes[1]
+    fitted = calibrate_compact.fit(points)
+    assert fitted is not None and (fitted.propellers, fitted.chords) == (51, 92)
+    for field in dataclasses.fields(compact.Constants):
+        a, b = getattr(fitted.constants, field.name), getattr(compact.CONSTANTS, field.name)
+        assert a == pytest.approx(b, rel=0.01), field.name
+    makers = np.unique([p.maker for p in points.propellers], return_inverse=True)[1][points.index]
+    out = calibrate_compact.left_out(points, fitted, makers)
+    known = np.isfinite(points.of("chord_m"))
+    for name, mask in (("known", known), ("unknown", np.ones_like(known))):
+        made = [np.where(mask, v, np.nan) for v in out[name == "known"]]
+        found = calibrate_compact.bands(points, *made, fitted.constants, name == "known")
+        for key, widths in found.items():
+            assert widths == pytest.approx(compact.BANDS[name][key], abs=0.004), (name, key)
+    # Makers left out, chord known: at rest 82 % within 13 %, K1/K2 61 %; in flight the median stays within 5 %.
+    part = points.select(known)
+    held = shares(part, out[True][0][known])
+    assert held["static"]["within_13"] > 0.80 and held["static"]["within_26"] > 0.96
+    assert all(0.95 < m < 1.05 for m in held["flight"])
+
+
+def test_volume_2_held_out(volumes):
+    # What is reached, not what was aimed at (70 % and 0.9 to 1.1): half of it are 2-5 in propellers below Re 30,000.
+    points = volumes[2]
+    held = shares(points, calibrate_compact.predict(points, compact.CONSTANTS)[0])
+    assert held["static"]["within_13"] == pytest.approx(0.54, abs=0.01)
+    assert held["static"]["within_26"] == pytest.approx(0.80, abs=0.01)
+    assert held["flight"] == pytest.approx([1.05, 1.10, 1.12, 1.17], abs=0.01)
+    large = points.select(points.of("diameter_m") > compact.DIAMETER_RANGE[0])
+    held = shares(large, calibrate_compact.predict(large, compact.CONSTANTS)[0])
+    assert held["static"]["within_13"] > 0.66 and held["static"]["within_26"] > 0.92

@@ -1,0 +1,254 @@
+"""Fetching a database: whole or not at all, resumed, checked. A local server stands for the publisher's."""
+
+from __future__ import annotations
+
+import io
+import json
+import stat
+import threading
+import zipfile
+from collections.abc import Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+
+import pytest
+
+from bemt import cache, cli, data, data_archive, data_folders
+from bemt.errors import InputError
+
+GEOM = "r/R c/R beta\n0.15 0.11 30.0\n0.50 0.16 20.0\n0.75 0.13 13.0\n1.00 0.05 8.0\n"
+STATIC = "RPM CT CP\n3000 0.095 0.040\n4000 0.096 0.041\n"
+FILES = {  # the layout of the public archive as far as known
+    "UIUC-propDB/volume-1/data/test_10x5_geom.txt": GEOM,
+    "UIUC-propDB/volume-1/data/test_10x5_static_kt0001.txt": STATIC,
+    "UIUC-propDB/volume-2/data/test_5x3_static_kt0002.txt": STATIC,
+    "UIUC-propDB/README.txt": "words\n",
+}
+
+
+def zipped(files: dict[str, str | bytes], filler: int = 0) -> bytes:
+    page = io.BytesIO()
+    with zipfile.ZipFile(page, "w") as archive:
+        for name, text in files.items():
+            archive.writestr(name, text)
+        if filler:
+            archive.writestr("UIUC-propDB/filler.bin", bytes(range(256)) * (filler // 256))
+    return page.getvalue()
+
+
+class Server(ThreadingHTTPServer):
+    """Serves one body; may break off after `cut` bytes; remembers the ranges it was asked for."""
+
+    body = b""
+    tag = '"one"'
+    cut: int | None = None
+    ranges: list[str | None]
+    said: list[int]
+
+
+class Handler(BaseHTTPRequestHandler):
+    server: Server
+
+    def do_GET(self) -> None:
+        s = self.server
+        s.ranges.append(self.headers.get("Range"))
+        if self.path != "/UIUC-propDB.zip":
+            self.send_error(404)
+            return
+        start = 0
+        if self.headers.get("Range") and self.headers.get("If-Range") == s.tag:
+            start = int(self.headers["Range"].removeprefix("bytes=").rstrip("-"))
+        self.send_response(206 if start else 200)
+        s.said.append(206 if start else 200)
+        if start:
+            self.send_header("Content-Range", f"bytes {start}-{len(s.body) - 1}/{len(s.body)}")
+        self.send_header("Content-Length", str(len(s.body) - start))
+        self.send_header("ETag", s.tag)
+        self.end_headers()
+        self.wfile.write(s.body[start : s.cut])
+
+    def log_message(self, *args: object) -> None:
+        pass
+
+
+@pytest.fixture
+def server() -> Iterator[Server]:
+    s = Server(("127.0.0.1", 0), Handler)
+    s.body, s.ranges, s.said = zipped(FILES), [], []
+    thread = threading.Thread(target=s.serve_forever, kwargs={"poll_interval": 0.01})
+    thread.start()
+    yield s
+    s.shutdown()
+    thread.join()
+    s.server_close()
+
+
+def url(server: Server) -> str:
+    return f"http://127.0.0.1:{server.server_port}/UIUC-propDB.zip"
+
+
+@pytest.fixture
+def no_cache_but(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("BEMT_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setenv("BEMT_DATA", str(tmp_path / "nothing"))
+    return tmp_path / "cache"
+
+
+def left(folder: Path) -> set[str]:
+    return {p.name for p in folder.iterdir()} if folder.is_dir() else set()
+
+
+def test_fetched_data_are_found_by_every_reader(server, no_cache_but, capsys):
+    assert data_folders.find_data("uiuc") is None
+    assert cli.main(["data", "uiuc", "--url", url(server), "--json"]) == 0
+    doc = json.loads(capsys.readouterr().out)
+    folder = no_cache_but / "data" / "uiuc"
+    assert doc["schema"] == "bemt.data/1" and doc["propellers"] == 2 and doc["files"] == 4
+    assert (doc["checksum"], doc["fetched"], doc["folder"]) == ("first use", True, str(folder))
+    assert (folder / "volume-1" / "data" / "test_10x5_geom.txt").read_text() == GEOM  # the one top folder is left off
+    assert data_folders.find_data("uiuc") == folder and left(no_cache_but / "data") == {"uiuc"}
+    from bemt.reproduce import find_uiuc
+
+    assert find_uiuc() == folder
+    assert cli.main(["calibrate", "--quiet"]) == 0  # reads the fetched data when no file is named
+
+
+def test_a_named_folder_comes_before_the_cache(server, no_cache_but, tmp_path, monkeypatch):
+    data.get("uiuc", no_cache_but / "data" / "uiuc", url=url(server))
+    mine = tmp_path / "mine"
+    (mine / "uiuc").mkdir(parents=True)
+    monkeypatch.setenv("BEMT_DATA", str(mine))
+    assert data_folders.find_data("uiuc") == mine / "uiuc"
+    monkeypatch.setenv("BEMT_CACHE", "off")
+    (mine / "uiuc").rmdir()
+    assert data_folders.find_data("uiuc") is None
+
+
+def test_what_is_there_is_not_fetched_again(server, tmp_path):
+    first = data.get("uiuc", tmp_path / "uiuc", url=url(server))
+    again = data.get("uiuc", tmp_path / "uiuc", url=url(server))
+    assert len(server.ranges) == 1 and again["sha256"] == first["sha256"]
+    assert (again["checksum"], again["fetched"]) == ("as recorded", False)
+    fresh = data.get("uiuc", tmp_path / "uiuc", url=url(server), refresh=True)
+    assert len(server.ranges) == 2 and (fresh["checksum"], fresh["fetched"]) == ("as recorded", True)
+
+
+def test_a_changed_archive_is_refused(server, tmp_path):
+    data.get("uiuc", tmp_path / "uiuc", url=url(server))
+    before = sorted(p.read_bytes() for p in (tmp_path / "uiuc").rglob("*") if p.is_file())
+    server.body = zipped(FILES | {"UIUC-propDB/volume-1/data/new_9x5_static_kt0009.txt": STATIC})
+    with pytest.raises(InputError, match="changed since its first use"):
+        data.get("uiuc", tmp_path / "uiuc", url=url(server), refresh=True)
+    assert sorted(p.read_bytes() for p in (tmp_path / "uiuc").rglob("*") if p.is_file()) == before
+    assert left(tmp_path) == {"uiuc"}
+
+
+def test_an_interrupted_download_goes_on_where_it_stopped(server, tmp_path):
+    server.body = zipped(FILES, filler=400_000)
+    server.cut = 150_000
+    with pytest.raises(InputError):
+        data.get("uiuc", tmp_path / "uiuc", url=url(server))
+    part = tmp_path / ".uiuc.zip.part"
+    have = part.stat().st_size
+    assert 0 < have <= 150_000 and not (tmp_path / "uiuc").exists()
+    server.cut = None
+    doc = data.get("uiuc", tmp_path / "uiuc", url=url(server))
+    assert server.ranges[-1] == f"bytes={have}-" and server.said[-1] == 206
+    assert doc["bytes"] == len(server.body) and left(tmp_path) == {"uiuc"}
+
+
+def test_after_a_change_the_rest_is_not_glued_to_the_old_part(server, tmp_path):
+    server.body, server.cut = zipped(FILES, filler=400_000), 150_000
+    with pytest.raises(InputError):
+        data.get("uiuc", tmp_path / "uiuc", url=url(server))
+    server.body, server.cut, server.tag = zipped(FILES, filler=500_000), None, '"two"'
+    doc = data.get("uiuc", tmp_path / "uiuc", url=url(server))
+    assert server.said[-1] == 200 and doc["bytes"] == len(server.body)
+
+
+def test_an_address_that_does_not_answer_is_an_input_error(server, tmp_path, capsys):
+    where = url(server).replace("UIUC-propDB", "elsewhere")
+    assert cli.main(["data", "uiuc", "--dir", str(tmp_path / "uiuc"), "--url", where]) == 2
+    error = capsys.readouterr().err
+    assert "404" in error and "--from FILE.zip" in error and "Traceback" not in error
+    assert not (tmp_path / "uiuc").exists()
+
+
+def test_too_much_is_refused(server, tmp_path, monkeypatch):
+    monkeypatch.setattr(data_archive, "MAX_ARCHIVE", 100)
+    with pytest.raises(InputError, match="at most 100 bytes"):
+        data.get("uiuc", tmp_path / "uiuc", url=url(server))
+    monkeypatch.setattr(data_archive, "MAX_ARCHIVE", 10**9)
+    monkeypatch.setattr(data_archive, "MAX_UNPACKED", 10)
+    with pytest.raises(InputError, match="bytes unpacked"):
+        data.get("uiuc", tmp_path / "uiuc", url=url(server))
+    assert left(tmp_path) == set()
+
+
+def test_a_local_archive(tmp_path, capsys):
+    archive = tmp_path / "mine.zip"
+    archive.write_bytes(zipped(FILES))
+    assert cli.main(["data", "uiuc", "--from", str(archive), "--dir", str(tmp_path / "uiuc")]) == 0
+    out = capsys.readouterr().out
+    assert "2 propellers, 4 files" in out and "first use" in out and "please cite" in out
+    assert archive.exists() and left(tmp_path) == {"mine.zip", "uiuc"}
+    archive.write_bytes(zipped(FILES | {"UIUC-propDB/volume-1/data/new_9x5_static_kt0009.txt": STATIC}))
+    doc = data.get("uiuc", tmp_path / "uiuc", archive)
+    assert (doc["propellers"], doc["checksum"]) == (3, "replaced")
+
+
+def link() -> bytes:
+    page = io.BytesIO(zipped(FILES))
+    with zipfile.ZipFile(page, "a") as archive:
+        info = zipfile.ZipInfo("UIUC-propDB/link.txt")
+        info.external_attr = (stat.S_IFLNK | 0o777) << 16
+        archive.writestr(info, "/etc/hostname")
+    return page.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        (zipped(FILES | {"UIUC-propDB/../../evil.txt": "x"}), "a path that leaves the folder"),
+        (zipped(FILES | {"/evil.txt": "x"}), "a path that leaves the folder"),
+        (zipped(FILES | {"C:/evil.txt": "x"}), "a path that leaves the folder"),
+        (zipped(FILES | {"a\\..\\evil.txt": "x"}), "a path that leaves the folder"),
+        (link(), "a link"),
+        (zipped(FILES | {"UIUC-propDB/readme.txt": "x"}), "a second file of this name"),
+        (zipped({"notes/a.txt": "words"}), "no propeller"),
+        (b"no zip at all", "a sound zip archive"),
+        (zipped(FILES)[:-40], "a sound zip archive"),
+        (zipped(FILES).replace(b"0.095 0.040", b"0.095 0.099"), "a sound zip archive"),  # CRC
+    ],
+)
+def test_an_unsound_archive_changes_nothing(tmp_path, body, words):
+    archive = tmp_path / "in" / "bad.zip"
+    archive.parent.mkdir()
+    archive.write_bytes(body)
+    for there in (False, True):  # into nothing, and over an earlier good one
+        if there:
+            good = tmp_path / "in" / "good.zip"
+            good.write_bytes(zipped(FILES))
+            data.get("uiuc", tmp_path / "out" / "uiuc", good)
+        with pytest.raises(InputError, match=words):
+            data.get("uiuc", tmp_path / "out" / "uiuc", archive)
+        assert left(tmp_path / "out") == ({"uiuc"} if there else set())
+    assert (tmp_path / "out" / "uiuc" / "volume-1" / "data" / "test_10x5_geom.txt").read_text() == GEOM
+    assert not list(tmp_path.rglob("evil*"))
+
+
+def test_a_folder_with_other_files_is_left_alone(tmp_path):
+    archive = tmp_path / "a.zip"
+    archive.write_bytes(zipped(FILES))
+    (tmp_path / "uiuc").mkdir()
+    (tmp_path / "uiuc" / "thesis.txt").write_text("mine")
+    with pytest.raises(InputError, match="did not put there"):
+        data.get("uiuc", tmp_path / "uiuc", archive)
+    assert left(tmp_path / "uiuc") == {"thesis.txt"}
+
+
+def test_without_a_cache_a_folder_must_be_named(monkeypatch, capsys):
+    monkeypatch.setenv("BEMT_CACHE", "off")
+    assert cache.cache_dir() is None
+    assert cli.main(["data", "uiuc"]) == 2
+    assert "--dir DIR" in capsys.readouterr().err
