@@ -41,9 +41,15 @@ def mach_grid(mach_max: float) -> Array:
     return np.arange(max(2, math.ceil(mach_max**2 / M2_STEP) + 1), dtype=np.float64) * M2_STEP
 
 
-def common_grid(polars: Sequence[Polar], M: Array) -> tuple[Array, Array, Array]:
-    """Reynolds axis and cl, cd of all polars as (P, Nm, Nr, Na); one Reynolds number stays one."""
+def common_grid(
+    polars: Sequence[Polar], M: Array, re_range: tuple[float, float] | None = None
+) -> tuple[Array, Array, Array]:
+    """Reynolds axis (of ``re_range`` only) and cl, cd of all polars as (P, Nm, Nr, Na); one number stays one."""
     re = DEFAULT_RE if any(p.Re.size > 1 for p in polars) else polars[0].Re[:1]
+    if re_range is not None and re.size > 1:
+        first = min(max(int(np.searchsorted(re, re_range[0], side="right")) - 1, 0), re.size - 2)
+        last = max(int(np.searchsorted(re, re_range[1])), first + 1)
+        re = re[first : last + 1]
     cl = np.empty((len(polars), M.size, re.size, ALPHA_GRID.size))
     cd = np.empty_like(cl)
     for i, p in enumerate(polars):

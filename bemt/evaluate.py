@@ -14,12 +14,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from bemt import coefficients as co
 from bemt import duct as duct_model
-from bemt import effects, empirical, polars, section_rule, solver
+from bemt import effects, empirical, forward, polars, section_rule, solver
 from bemt.errors import Fault, InputError
 
 if TYPE_CHECKING:
     from bemt.air import Air
     from bemt.case import Case
+    from geometry.rotor import Rotor
 
 __all__ = ["Points", "Ready", "air_arrays", "evaluate", "k1k2", "prepare"]
 
@@ -32,8 +33,10 @@ class Ready:
 
     Parameters
     ----------
-    prep : bemt.solver.Prepared
-        What the solver consumes.
+    model : bemt.forward.Model
+        Rotor and tables, to prepare with any effects.
+    effects : tuple of Effect
+        Physics that is on.
     diameter_m, hub_diameter_m, pitch_m, chord75_m, solidity : float
         Diameters, geometric pitch and chord at 0.75 R [m]; blade area over disk area [-].
     ducted : bool
@@ -44,7 +47,8 @@ class Ready:
         Remarks of the section tables.
     """
 
-    prep: solver.Prepared
+    model: forward.Model
+    effects: tuple[effects.Effect, ...]
     diameter_m: float
     hub_diameter_m: float
     pitch_m: float
@@ -53,6 +57,11 @@ class Ready:
     ducted: bool
     exit_area_m2: float
     notes: tuple[str, ...]
+
+    @property
+    def prep(self) -> solver.Prepared:
+        """What the solver consumes."""
+        return self.model.prepared(self.effects)
 
 
 @dataclass(frozen=True)
@@ -104,18 +113,26 @@ class Points:
 def _effects(case: Case) -> tuple[effects.Effect, ...]:
     known = effects.catalogue()
     faults = []
+    on: dict[str, effects.Effect] = {}
     for key in ("effects_on", "effects_off", "also_without"):
-        for i, name in enumerate(case.get(f"model.{key}")):
-            if name not in known:
+        for i, text in enumerate(case.get(f"model.{key}")):
+            name = text.partition("(")[0].strip()
+            where = f"model.{key}[{i}]"
+            if name not in known or (key != "effects_on" and name != text):
                 close = difflib.get_close_matches(name, known, n=1)
                 hint = f"Did you mean {close[0]}?" if close else ""
-                where = f"model.{key}[{i}]"
-                faults.append(Fault(case.path.as_posix(), where, repr(name), f"one of {', '.join(known)}", hint))
+                faults.append(Fault(case.path.as_posix(), where, repr(text), f"one of {', '.join(known)}", hint))
+            elif key == "effects_on":
+                try:
+                    on[name] = effects.from_text(text)
+                except ValueError as error:
+                    got, _, expected = str(error).partition("; expected ")
+                    faults.append(Fault(case.path.as_posix(), where, got, expected))
     if faults:
         raise InputError(faults)
-    on, off = set(case.get("model.effects_on")), set(case.get("model.effects_off"))
+    off = set(case.get("model.effects_off"))
     standard = {effect.id for effect in effects.standard()}
-    return tuple(cls() for name, cls in known.items() if name in (standard | on) - off)
+    return tuple(on.get(name) or cls() for name, cls in known.items() if name in (standard | set(on)) - off)
 
 
 def _polars(case: Case, anchors: Sequence[tuple[float, Any]]) -> list[tuple[float, polars.Polar]]:
@@ -152,6 +169,15 @@ def _user_polars(case: Case, given: Sequence[Mapping[str, Any]]) -> list[tuple[f
     return out
 
 
+def _duct_flow(case: Case, rotor: Rotor) -> duct_model.DuctFlow | None:
+    duct = case.duct()
+    if duct is None:
+        return None
+    flow = duct_model.duct_flow(duct, rotor)
+    recovery = case.get("duct.stator.recovery")
+    return flow if recovery is None else dataclasses.replace(flow, stator=float(recovery))
+
+
 def prepare(case: Case, overrides: Mapping[str, Any] | None = None, n_stations: int | None = None) -> Ready:
     """Build geometry, section tables and effects of a case.
 
@@ -176,20 +202,17 @@ def prepare(case: Case, overrides: Mapping[str, Any] | None = None, n_stations: 
     """
     case = case.replaced(overrides)
     rotor, duct = case.rotor(), case.duct()
-    flow = None
-    if duct is not None:
-        flow = duct_model.duct_flow(duct, rotor)
-        recovery = case.get("duct.stator.recovery")
-        if recovery is not None:
-            flow = dataclasses.replace(flow, stator=float(recovery))
+    if "duct" in case.get("model.effects_off"):
+        duct = None
     tables = _polars(case, rotor.blade.anchors)
     n = int(case.get("model.stations")) if n_stations is None else n_stations
-    prep = solver.prepare(rotor, tables, _effects(case), flow, n)
+    model = forward.Model(rotor, tables, _duct_flow(case, rotor) if duct is not None else None, n)
+    chosen = _effects(case)
     notes = tuple(dict.fromkeys(note for _, polar in tables for note in polar.notes))
     blade = rotor.blade
     exit_area = float("nan") if duct is None else duct.exit_area
     return Ready(
-        prep, rotor.D, 2.0 * rotor.Rhub, blade.pitch_m(), float(blade.at(0.75 * rotor.R)[0]), rotor.solidity,
+        model, chosen, rotor.D, 2.0 * rotor.Rhub, blade.pitch_m(), float(blade.at(0.75 * rotor.R)[0]), rotor.solidity,
         duct is not None, exit_area, notes,
     )  # fmt: skip
 
@@ -234,6 +257,9 @@ def evaluate(ready: Ready, rpm: ArrayLike, airspeed_m_s: ArrayLike, air: Air, th
         One entry per point.
     """
     s = solver.solve(ready.prep, rpm, airspeed_m_s, air, threads=threads)
+    around = [e for e in ready.effects if forward.acts_on_points(e)]
+    if around:
+        s = _with_points(ready, s, air)
     n, D = s.rpm / 60.0, ready.diameter_m
     rho, mu, a = (np.broadcast_to(np.asarray(getattr(air, k), float), n.shape) for k in ("rho", "mu", "a_sound"))
     return Points(
@@ -242,6 +268,23 @@ def evaluate(ready: Ready, rpm: ArrayLike, airspeed_m_s: ArrayLike, air: Air, th
         Re75=np.asarray(co.Re75(ready.chord75_m, n, D, s.V, rho, mu)),
         rotor_thrust_N=s.T_rotor, duct_thrust_N=s.T_duct, stator_thrust_N=s.T_stator,
         exhaust_speed_m_s=s.V_exit, converged=s.converged, flags=s.flags,
+    )  # fmt: skip
+
+
+def _with_points(ready: Ready, s: solver.Solution, air: Air) -> solver.Solution:
+    """Solution after the effects that act on points; what instruments would show is not part of it."""
+    base = ready.model.prepared([e for e in ready.effects if not forward.acts_on_points(e)])
+    flow = forward.flow_of(base, s.rpm, s.V, air)
+    loads, met, ok = forward.respond(ready.model.prepared, ready.effects, flow)
+    nan = np.where(ok, 1.0, np.nan)
+    T, Q = loads.T * nan, loads.Q * nan
+    scale = flow.rho * flow.n**2 * ready.diameter_m**4
+    flags = tuple((*f, *(() if good else ("unconverged with the effects of the case",)))
+                  for f, good in zip(s.flags, ok, strict=True))  # fmt: skip
+    return dataclasses.replace(
+        s, T=T, Q=Q, P=Q * flow.omega, CT=T / scale, CQ=Q / (scale * ready.diameter_m),
+        CP=2.0 * np.pi * Q / (scale * ready.diameter_m), T_duct=loads.T_duct * nan,
+        T_rotor=T - s.T_stator - loads.T_duct, converged=s.converged & ok, flags=flags,
     )  # fmt: skip
 
 

@@ -18,7 +18,7 @@ from bemt import cache
 
 __all__ = [
     "ALPHA_COARSE_STEP", "ALPHA_FINE_HI", "ALPHA_FINE_LO", "ALPHA_FINE_STEP", "ALPHA_GRID", "DEFAULT_RE", "DLOG_RE",
-    "LOG_RE0", "Polar", "blend", "first_stall", "fixed_re", "linear_polar",
+    "LOG_RE0", "RE_FIXED", "Polar", "blend", "first_stall", "fixed_re", "linear_polar",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -36,6 +36,9 @@ LOG_RE0 = float(np.log(DEFAULT_RE[0]))
 DLOG_RE = float(np.log(DEFAULT_RE[-1] / DEFAULT_RE[0]) / (len(DEFAULT_RE) - 1))
 ALPHA_GRID.setflags(write=False)
 DEFAULT_RE.setflags(write=False)
+
+RE_FIXED = 1.0e5
+"""Reynolds number of all sections when the effect ``reynolds`` is off: upper end of small propellers [-]."""
 
 STALL_DROP = 0.03
 """Fall of cl behind a local maximum that makes it a stall."""

@@ -7,9 +7,9 @@ kernel (:mod:`bemt._kernel`), in batch, and gives back a :class:`Solution`.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -23,7 +23,7 @@ from bemt._kernel_arrays import M2_STEP
 from bemt.air import Air
 from bemt.effects import Effect, standard
 from bemt.effects.base import Baking
-from bemt.polars import ALPHA_GRID
+from bemt.polars import ALPHA_GRID, RE_FIXED, fixed_re
 
 if TYPE_CHECKING:
     from bemt.duct import DuctFlow
@@ -151,6 +151,9 @@ def prepare(
     n_stations: int = 40,
     stations: Stations | None = None,
     mach_max: float = 1.25,
+    *,
+    level: float = 1.0,
+    re_range: tuple[float, float] | None = None,
 ) -> Prepared:
     """Bake a rotor, its section tables and its effects for the kernel.
 
@@ -170,6 +173,10 @@ def prepare(
         Blade elements to use as they are, instead.
     mach_max : float
         Largest section Mach number to tabulate [1]; beyond it the last table is held and the point flagged.
+    level : float
+        Share at which effects act whose size differs between points, see :meth:`bemt.effects.Effect.share` [1].
+    re_range : tuple of float, optional
+        Reynolds numbers that will occur: other tables are left out, which makes many preparations cheap [1].
 
     Returns
     -------
@@ -193,6 +200,10 @@ def prepare(
     if not polars:
         raise ValueError("polars: got none; expected at least one (r/R, Polar) pair")
     eff = standard() if effects is None else tuple(effects)
+    if not any(e.id == "reynolds" for e in eff):
+        polars = [(x, fixed_re(p, RE_FIXED)) for x, p in polars]
+    for e in eff:
+        duct = _enclosed(duct, e.duct(), rotor)
     blade = rotor.blade
     s = stations if stations is not None else blade.midpoints(n_stations, spacing="cosine")
     if not np.all(np.isfinite([s.r, s.dr, s.chord, s.beta])) or np.any(s.r <= 0) or np.any(s.chord < 0):
@@ -202,7 +213,7 @@ def prepare(
         raise ValueError(f"polars: got r/R {x.tolist()}; expected ascending, distinct values")
     with_mach = any(p.M.size > 1 for _, p in polars) or any(e.uses_mach for e in eff)
     M2 = arrays.mach_grid(mach_max) if with_mach else np.zeros(1)
-    Re, cl, cd = arrays.common_grid([p for _, p in polars], np.sqrt(M2))
+    Re, cl, cd = arrays.common_grid([p for _, p in polars], np.sqrt(M2), re_range)
     rR = s.r / blade.R
     w = arrays.blend_weights(rR, x)
     alpha0, cla = arrays.zero_and_slope(ALPHA_GRID, cl[:, 0])
@@ -213,7 +224,7 @@ def prepare(
         cl=np.tensordot(w, cl, axes=1), cd=np.tensordot(w, cd, axes=1), alpha0=w @ alpha0, cla=w @ cla,
         onset=np.zeros((s.r.size, 2)), thickness=np.interp(rR, [x for x, _ in shapes], [t for _, t in shapes]),
         own_mach=w @ np.array([float(p.M.size > 1) for _, p in polars]),
-        gap=duct.gap if duct is not None else float("nan"), ducted=duct is not None,
+        gap=duct.gap if duct is not None else float("nan"), ducted=duct is not None, level=level,
     )  # fmt: skip
     for hook in ("blade", "inflow", "section", "momentum"):
         for e in eff:
@@ -221,6 +232,15 @@ def prepare(
     num = _numbers(bake, duct)
     tab = np.stack([bake.cl, bake.cd], axis=-1)
     return Prepared(rotor, s, eff, duct, arrays.pack_stations(bake, num), tab, num, arrays.pack_grid(bake))
+
+
+def _enclosed(duct: DuctFlow | None, numbers: Mapping[str, float] | None, rotor: Rotor) -> DuctFlow | None:
+    """Duct with the numbers that an effect sets; an open rotor gets a duct of its own."""
+    if numbers is None:
+        return duct
+    from bemt.duct import DuctFlow
+
+    return replace(duct or DuctFlow(1.0, span=rotor.R - rotor.Rhub), **numbers)
 
 
 def _numbers(bake: Baking, duct: DuctFlow | None) -> Array:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import __version__, series, units
+from bemt import __version__, audit, effects, series, units
 from bemt.case import Assumption, Case
 from bemt.importers import references as reference_file
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from bemt.air import Air
     from bemt.evaluate import Points
 
-__all__ = ["ROW_SOURCES", "solve_case"]
+__all__ = ["ROW_SOURCES", "solve_case", "spread"]
 
 ROW_SOURCES = ("bemt", "k1k2", "cfd", "bench", "vendor")
 COMPARED = {
@@ -64,8 +64,23 @@ def _references(case: Case) -> list[reference_file.Reference]:
     return [replace(r, **{k: v for k, v in own.items() if math.isnan(getattr(r, k))}) for r in read]  # type: ignore[arg-type]
 
 
-def _spread(discrete: bool, nominal: Array, at: Sequence[Array]) -> Array:
-    """Give the standard uncertainty from one assumption, per point; `at` holds the result at each of its values."""
+def spread(discrete: bool, nominal: Array, at: Sequence[Array]) -> Array:
+    """Give the standard uncertainty from one assumption.
+
+    Parameters
+    ----------
+    discrete : bool
+        Whether `at` holds all values; otherwise the two ends of a range.
+    nominal : (P,) float
+        Results at the nominal value, in the unit of the quantity.
+    at : sequence of (P,) float
+        Results at each value of the assumption, same unit.
+
+    Returns
+    -------
+    (P,) float
+        Standard uncertainty per point, same unit.
+    """
     if discrete:
         return np.asarray(np.std(at, axis=0))
     low, high = at
@@ -88,7 +103,7 @@ class _Model:
     def add(self, assumption: Assumption, runs: Sequence[dict[str, Array] | None]) -> None:
         """Take in the runs at the values of one assumption (None at the nominal value)."""
         at = {k: [v if run is None else run[k] for run in runs] for k, v in self.nominal.items()}
-        u = {k: _spread(assumption.discrete, v, at[k]) for k, v in self.nominal.items()}
+        u = {k: spread(assumption.discrete, v, at[k]) for k, v in self.nominal.items()}
         for k in self.nominal:
             self.variance[k] = self.variance[k] + u[k] ** 2
             for values in at[k]:
@@ -246,6 +261,7 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
         "variants": variants,
         "other_rows": [r for r in recorded if r["source"] not in ROW_SOURCES],
         "comparisons": comparisons,
+        "audit": audit.audit_rows(recorded, ready.diameter_m, ready.pitch_m, case.ducted),
         "conditions": _description(case, ready, stations),
         "assumptions": [_assumption(a, m) for a, m in zip(case.assumptions, bemt.by_assumption, strict=True)],
         "references": [{"quantity": r.quantity, "kind": r.kind, "printed": r.printed, "value": r.value, "u": r.u,
@@ -318,7 +334,7 @@ def _description(case: Case, ready: Any, stations: int) -> dict[str, Any]:
         "temperature_C": air.temperature_K - 273.15, "a_sound_m_s": air.a_sound, "air": air.source,
         "diameter_m": ready.diameter_m, "hub_diameter_m": ready.hub_diameter_m, "blades": int(case.get("rotor.blades")),
         "pitch_075R_m": ready.pitch_m, "solidity": ready.solidity, "stations": stations,
-        "effects": [effect.id for effect in ready.prep.effects], "n_crit": case.get("model.n_crit"),
+        "effects": [effects.to_text(effect) for effect in ready.effects], "n_crit": case.get("model.n_crit"),
         "drag_level": case.get("model.drag_level"),
         "convention": "CT = T/(rho n^2 D^4), CP = P/(rho n^3 D^5)",
     }  # fmt: skip

@@ -83,6 +83,13 @@ def signature_names(item: object) -> list[str]:
     return [name for name in names if name not in ("self", "cls")]
 
 
+def overrides(method: object) -> bool:
+    """Whether a method stands for one of a base class of ours, whose docstring says what it takes."""
+    assert inspect.isfunction(method)
+    owner = vars(sys.modules[method.__module__])[method.__qualname__.partition(".")[0]]
+    return any(method.__name__ in vars(base) for base in owner.__mro__[1:] if base.__module__.startswith(PACKAGES))
+
+
 def docstring_faults(name: str, item: object) -> list[str]:
     """What is wrong with one docstring."""
     text = vars(item).get("__doc__") if inspect.isclass(item) else getattr(item, "__doc__", None)
@@ -94,7 +101,7 @@ def docstring_faults(name: str, item: object) -> list[str]:
         faults.append(f"{name}: the summary is no sentence")
     said, given = documented_names(item, doc), signature_names(item)
     method = name.count(".") > item.__module__.count(".") + 1
-    optional = inspect.isclass(item) or (method and len(given) <= 1 and not said)
+    optional = inspect.isclass(item) or (method and not said and (len(given) <= 1 or overrides(item)))
     # fields may be grouped by unit, arguments keep their order
     agree = sorted(said) == sorted(given) if inspect.isclass(item) else said == given
     if not agree and not (optional and not said):

@@ -7,7 +7,7 @@ import importlib
 import inspect
 import re
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -16,12 +16,13 @@ import numpy as np
 import pytest
 
 from bemt import duct as duct_model
-from bemt import effects, evaluate, solver
+from bemt import effects, evaluate, forward
 from bemt.air import Air
 from bemt.case import load_case
-from bemt.effects.base import Effect, Parameter
+from bemt.effects.base import Effect, Flow, Parameter, Reading
 from bemt.errors import InputError
 from bemt.polars import Polar
+from bemt.post_stall import SectionTable, from_tables
 from geometry.airfoil import naca4
 from geometry.duct import Stator, around
 from geometry.laws import helix
@@ -29,48 +30,92 @@ from geometry.rotor import Rotor
 
 CATALOGUE = effects.catalogue()
 FOLDER = Path(effects.__file__).parent
-HOOKS = ("blade", "inflow", "section", "momentum")
+HOOKS = ("blade", "inflow", "section", "momentum", "duct", "flow", "loads", "reading")
+# Effects without a value of their parameters that is the same as not having them.
+NO_OFF = {
+    "cascade", "drag_divergence", "duct", "high_induction", "hub_loss", "post_stall", "reynolds", "swirl", "tip_gap",
+    "tip_loss",
+}  # fmt: skip
 each_effect = pytest.mark.parametrize("name", list(CATALOGUE))
 
 
 class Trial(NamedTuple):
-    """A rotor at operating points; some trial must show every effect."""
+    """A rotor at recorded points; some trial must show every effect."""
 
     rotor: Rotor
     ducted: bool
     rpm: tuple[float, ...]
     V: tuple[float, ...]
+    extra: Mapping[str, tuple[float, ...]] = {}
+
+
+RAMP = tuple(float(x) for x in np.linspace(5000.0, 9000.0, 9))
+TRANSIENT = {
+    "time_s": tuple(0.02 * i for i in range(9)), "pwm_s": tuple(1e-3 + 1e-4 * i for i in range(9)),
+    "temperature_K": tuple(293.0 + i for i in range(9)),
+}  # fmt: skip
+SLOW = {"time_s": (0.0, 60.0, 600.0), "run": (1.0, 1.0, 1.0), "temperature_K": (293.0, 293.0, 299.0)}
 
 
 @cache
 def trials() -> dict[str, Trial]:
     section = naca4(0.04, 0.4, 0.12)
-    propeller = Rotor(helix(0.2032, 0.127, anchors=section), 2)
+    propeller = Rotor(helix(0.2032, 0.127, hub=0.1, anchors=section), 2)
     steep = Rotor(helix(0.2032, 0.25, anchors=section), 2)
     fan = Rotor(helix(0.069, 0.100, "fan", hub=0.368, anchors=section), 11)
     return {
-        "static, cruise, transonic": Trial(propeller, False, (6000.0, 6000.0, 30000.0), (0.0, 8.0, 0.0)),
+        "static, cruise, transonic": Trial(propeller, False, (6000.0, 6000.0, 30000.0), (0.0, 8.0, 0.0), SLOW),
         "stalled": Trial(steep, False, (6000.0, 6000.0), (0.0, 3.0)),
         "windmill, descent": Trial(propeller, False, (6000.0, 6000.0), (25.0, -6.0)),
-        "ducted fan": Trial(fan, True, (40000.0, 40000.0), (0.0, 10.0)),
+        "ducted fan": Trial(fan, True, (40000.0, 30000.0, 40000.0), (0.0, 0.0, 10.0)),
+        "transient": Trial(propeller, False, RAMP, (0.0,) * 9, TRANSIENT),
     }
 
 
-def solve(trial: Trial, polar: Polar, chosen: Sequence[Effect] | None) -> solver.Solution:
-    flow = None
+@cache
+def section_table() -> Polar:
+    """The closed form of conftest at two Reynolds numbers."""
+    alpha = np.radians(np.arange(-20.0, 25.5, 0.5))
+    cl = np.clip(5.9 * (alpha + np.radians(4.0)), -0.9, 1.3)
+    cl = cl - 0.8 * np.clip(np.abs(alpha) - np.radians(13.0), 0.0, None)
+    tables = [SectionTable(alpha, cl * k, (0.012 + 0.008 * cl**2) / k, Re) for Re, k in ((3e4, 0.9), (3e5, 1.05))]
+    return from_tables(tables, name="closed form", source="made for tests")
+
+
+def model(label: str) -> forward.Model:
+    trial, duct = trials()[label], None
     if trial.ducted:
-        duct = around(trial.rotor, 0.06, 0.0004, 0.004, exit_area_ratio=0.95, stator=Stator(5, 0.02))
-        flow = duct_model.duct_flow(duct, trial.rotor)
-    prep = solver.prepare(trial.rotor, [(0.7, polar)], chosen, flow, n_stations=20)
-    return solver.solve(prep, np.array(trial.rpm), np.array(trial.V), Air.from_density(1.225))
+        shape = around(trial.rotor, 0.06, 0.0004, 0.004, exit_area_ratio=0.95, stator=Stator(5, 0.02))
+        duct = duct_model.duct_flow(shape, trial.rotor)
+    return forward.Model(trial.rotor, [(0.7, section_table())], duct, 12)
 
 
-def numbers(s: solver.Solution) -> np.ndarray:
-    return np.array([s.T, s.Q, s.T_rotor, s.T_duct, s.T_stator, s.V_exit])
+@cache
+def kept(label: str) -> tuple[forward.Model, Flow]:
+    trial, ours = trials()[label], model(label)
+    extra = {k: np.array(v) for k, v in trial.extra.items()}
+    base = ours.prepared(effects.standard())
+    return ours, forward.flow_of(base, trial.rpm, trial.V, Air.from_density(1.225), extra)
 
 
-def everything() -> tuple[Effect, ...]:
-    return tuple(cls() for cls in CATALOGUE.values())
+def readings(label: str, chosen: Sequence[Effect], ours: forward.Model | None = None) -> np.ndarray:
+    """Thrust, torque, duct thrust and what the instruments show, (6, P)."""
+    cached, flow = kept(label)
+    loads, met, ok = forward.respond((ours or cached).prepared, chosen, flow)
+    nan = np.where(ok, 1.0, np.nan)
+    shown = Reading({"thrust_N": loads.T * nan, "torque_Nm": loads.Q * nan, "rpm": flow.rpm.copy()},
+                    {"thrust_N": 1.0, "torque_Nm": 0.1, "rpm": 9000.0})  # fmt: skip
+    for e in chosen:
+        e.reading(shown, met)
+    return np.array([loads.T * nan, loads.Q * nan, loads.T_duct * nan, *shown.values.values()])
+
+
+def rest(name: str) -> tuple[Effect, ...]:
+    return effects.without(effects.standard(), [name])
+
+
+def with_(effect: Effect) -> tuple[Effect, ...]:
+    return (*rest(effect.id), effect)
 
 
 def test_the_catalogue_is_the_folder() -> None:
@@ -104,7 +149,7 @@ def test_parameters_are_the_numeric_fields_and_defaults_are_physical(name: str) 
         assert isinstance(p, Parameter) and p.unit and p.source
         assert np.isfinite([p.low, p.high]).all() and p.low < p.high
         assert p.low <= getattr(effect, p.name) <= p.high, f"{p.name}: default outside its own range"
-    assert effect.describe() == {"id": name, **dataclasses.asdict(effect)}
+    assert effect.describe() == {"id": name, **dataclasses.asdict(effect)}  # type: ignore[call-overload]
 
 
 @each_effect
@@ -130,11 +175,45 @@ def test_an_effect_says_where_it_comes_from(name: str) -> None:
 
 
 @each_effect
-def test_on_changes_something(name: str, polar: Polar) -> None:
-    rest = effects.without(everything(), [name])
+def test_an_effect_speaks_to_an_engineer(name: str) -> None:
+    cls = CATALOGUE[name]
+    assert cls.kind in ("air", "stand", "drive")
+    assert len(cls.sign) > 20 and cls.sign[0].islower() and not cls.sign.endswith(".")
+    known = {"time_s", "temperature_K", "pressure_Pa", "voltage_V", "current_A", "pwm_s", "tip_gap_m", "sideslip_rad"}
+    assert set(cls.needs) <= known | {"wall_distance_m", "run"}
+    needy = Trial(trials()["stalled"].rotor, False, (6000.0,), (5.0,))
+    flow = dataclasses.replace(kept("stalled")[1], V=np.array(needy.V * 2))
+    if cls.needs:
+        assert all(need in cls().applies(flow) for need in cls.needs)
+    else:
+        assert isinstance(cls().applies(flow), str)
+
+
+@each_effect
+def test_settings_that_a_diagnosis_tries_are_lawful(name: str) -> None:
+    cls = CATALOGUE[name]
+    given = cls().variants()
+    if given is None:
+        assert all(p.steps >= 0 for p in cls.parameters)
+        return
+    ranges = {p.name: p for p in cls.parameters}
+    made = [cls(**v) for v in given]
+    assert len(set(made)) == len(given) > 1, "a setting twice"
+    for v, e in zip(given, made, strict=True):
+        assert all(ranges[k].low <= x <= ranges[k].high for k, x in v.items() if k in ranges)
+        assert effects.from_text(effects.to_text(e)) == e
+    words = {f.name for f in dataclasses.fields(cls)} - set(ranges)  # type: ignore[arg-type]
+    for word in words & {"form", "channel"}:
+        assert len({v[word] for v in given}) > 1, "one form needs no choice"
+        with pytest.raises(ValueError, match=f"{word}='none of them'; expected"):
+            cls(**{word: "none of them"})
+
+
+@each_effect
+def test_on_changes_something(name: str) -> None:
     shown = []
-    for label, trial in trials().items():
-        change = numbers(solve(trial, polar, everything())) - numbers(solve(trial, polar, rest))
+    for label in trials():
+        change = readings(label, with_(CATALOGUE[name]())) - readings(label, rest(name))
         if np.any(np.isfinite(change) & (change != 0.0)):
             shown.append(label)
     assert shown, "solve(with) equals solve(without) in every trial"
@@ -142,17 +221,34 @@ def test_on_changes_something(name: str, polar: Polar) -> None:
 
 @each_effect
 @pytest.mark.parametrize("label", list(trials()))
-def test_off_is_the_baseline_to_the_bit(name: str, label: str, polar: Polar) -> None:
-    trial, rest = trials()[label], effects.without(everything(), [name])
-    blade_before, polar_before = trial.rotor.key(), polar.key
-    baseline = numbers(solve(trial, polar, rest))
-    solve(trial, polar, everything())
-    assert np.array_equal(numbers(solve(trial, polar, rest)), baseline, equal_nan=True)
-    # the whole set less one is the set without it, and no hook has written into the rotor or the tables
-    listed = tuple(cls() for key, cls in CATALOGUE.items() if key != name)
-    assert np.array_equal(numbers(solve(trial, polar, listed)), baseline, equal_nan=True)
+def test_off_is_the_baseline_to_the_bit(name: str, label: str) -> None:
+    trial = trials()[label]
+    blade_before, polar_before = trial.rotor.key(), section_table().key
+    recorded = dataclasses.replace(kept(label)[1])
+    arrays = {
+        f.name: np.copy(v)
+        for f in dataclasses.fields(recorded)
+        if isinstance(v := getattr(recorded, f.name), np.ndarray)
+    }
+    baseline = readings(label, rest(name))
+    readings(label, with_(CATALOGUE[name]()))
+    again = model(label) if forward.acts_on_rotor(CATALOGUE[name]()) else None
+    assert np.array_equal(readings(label, rest(name), again), baseline, equal_nan=True)
+    # no hook has written into the rotor, the tables or the recording
     assert trial.rotor.key() == blade_before
-    assert dataclasses.replace(polar).key == polar_before
+    assert dataclasses.replace(section_table()).key == polar_before
+    assert all(np.array_equal(getattr(recorded, k), v, equal_nan=True) for k, v in arrays.items())
+
+
+@each_effect
+@pytest.mark.parametrize("label", list(trials()))
+def test_at_its_off_value_an_effect_is_nothing(name: str, label: str) -> None:
+    off = {p.name: p.off for p in CATALOGUE[name].parameters if p.off is not None}
+    if not off:
+        assert name in NO_OFF, "say at which value it does nothing, or list it here"
+        return
+    nothing = dataclasses.replace(CATALOGUE[name](), **off)  # type: ignore[type-var]
+    np.testing.assert_allclose(readings(label, with_(nothing)), readings(label, rest(name)), rtol=1e-12, atol=0.0)
 
 
 @each_effect
@@ -160,29 +256,29 @@ def test_a_case_switches_an_effect(name: str, project: Path) -> None:
     case = load_case(project / "cases" / "prop_8x5" / "case.toml")
 
     def ids(key: str) -> list[str]:
-        return [e.id for e in evaluate.prepare(case, {key: [name], "model.stations": 10}).prep.effects]
+        return [e.id for e in evaluate.prepare(case, {key: [name], "model.stations": 10}).effects]
 
     assert name in ids("model.effects_on") and name not in ids("model.effects_off")
     assert {*ids("model.effects_off"), name} == {*ids("model.effects_on")}
 
 
-def test_effects_that_must_not_act_do_not(polar: Polar) -> None:
-    def acts(name: str, label: str, point: int) -> bool:
-        trial = trials()[label]
-        trial = trial._replace(rpm=trial.rpm[point : point + 1], V=trial.V[point : point + 1])
-        rest = effects.without(everything(), [name])
-        off, on = numbers(solve(trial, polar, rest)), numbers(solve(trial, polar, everything()))
+def test_effects_that_must_not_act_do_not() -> None:
+    def acts(name: str, label: str) -> list[bool]:
+        off, on = readings(label, rest(name)), readings(label, with_(CATALOGUE[name]()))
         assert np.isfinite(off[:2]).all() and np.isfinite(on[:2]).all()
-        return not np.array_equal(off, on, equal_nan=True)
+        return [bool(b) for b in np.any(off != on, axis=0)]
 
-    for point in range(3):
-        assert not acts("tip_gap", "static, cruise, transonic", point), "an open rotor has no gap"
-    assert acts("tip_gap", "ducted fan", 0)
-    for point in range(2):
-        assert not acts("high_induction", "static, cruise, transonic", point), "a working propeller is not a windmill"
-    assert acts("high_induction", "windmill, descent", 1)
-    assert acts("drag_divergence", "static, cruise, transonic", 2)
-    assert not acts("drag_divergence", "static, cruise, transonic", 0), "tip Mach 0.19"
+    prop = "static, cruise, transonic"
+    assert acts("tip_gap", prop) == [False] * 3, "an open rotor has no gap"
+    assert all(acts("tip_gap", "ducted fan"))
+    assert acts("high_induction", prop) == [False] * 3, "a working propeller is not a windmill"
+    assert acts("high_induction", "windmill, descent")[1]
+    assert acts("drag_divergence", prop) == [False, False, True], "tip Mach 0.19, 0.19, 0.94"
+    for name in ("nacelle", "tunnel_blockage", "oblique_inflow", "airspeed_offset"):
+        assert acts(name, prop) == [False, True, False], "nothing without airspeed"
+    assert acts("lip_separation", prop) == [False] * 3
+    for name in ("rotor_inertia", "inflow_lag"):
+        assert acts(name, prop) == [False] * 3, "minutes are no transient"
 
 
 def test_unknown_effects_are_refused(project: Path) -> None:
@@ -226,14 +322,13 @@ def extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
         sys.modules.pop(f"bemt.effects.{path.stem}", None)
 
 
-def test_a_new_effect_is_one_new_file(extra: Path, polar: Polar) -> None:
+def test_a_new_effect_is_one_new_file(extra: Path) -> None:
     (extra / "made_up.py").write_text(NEW.format(cls="MadeUp", id="made_up"))
     assert set(effects.catalogue()) == {*CATALOGUE, "made_up"}
     assert "made_up" in [e.id for e in effects.standard()]
-    trial = trials()["static, cruise, transonic"]
-    off = solve(trial, polar, effects.without(effects.standard(), ["made_up"]))
-    on = solve(trial, polar, None)
-    assert np.all(on.Q > off.Q)
+    label = "static, cruise, transonic"
+    off, on = readings(label, rest("made_up")), readings(label, effects.standard())
+    assert np.all(on[1] > off[1])
 
 
 def test_the_catalogue_forgets_the_new_effect() -> None:

@@ -4,11 +4,13 @@
 >>> "tip_loss" in catalogue()
 True
 >>> [e.id for e in standard()][:2]
-['stall_delay', 'cascade']
+['reynolds', 'stall_delay']
 """
 
 from __future__ import annotations
 
+import ast
+import dataclasses
 import importlib
 import pkgutil
 from collections.abc import Iterable
@@ -16,7 +18,7 @@ from functools import lru_cache
 
 from bemt.effects.base import Baking, Effect, Parameter
 
-__all__ = ["Baking", "Effect", "Parameter", "catalogue", "standard", "without"]
+__all__ = ["Baking", "Effect", "Parameter", "catalogue", "from_text", "standard", "to_text", "without"]
 
 
 @lru_cache(maxsize=1)
@@ -79,3 +81,79 @@ def without(effects: Iterable[Effect], ids: Iterable[str]) -> tuple[Effect, ...]
     if unknown:
         raise ValueError(f"unknown effect {', '.join(unknown)}; known: {', '.join(catalogue())}")
     return tuple(e for e in effects if e.id not in ids)
+
+
+def from_text(text: str) -> Effect:
+    """Effect as a case file writes it: its id, with parameters in brackets where they are not the default.
+
+    Parameters
+    ----------
+    text : str
+        Such as ``"tip_loss"`` or ``"tip_loss(strength=0.9)"``.
+
+    Returns
+    -------
+    Effect
+        The effect.
+
+    Raises
+    ------
+    ValueError
+        With what was got and what would be lawful.
+
+    >>> from_text("tip_loss(strength=0.9)").strength
+    0.9
+    """
+    name, _, rest = text.partition("(")
+    cls = catalogue().get(name.strip())
+    if cls is None:
+        raise ValueError(f"{name.strip()!r}; expected one of {', '.join(catalogue())}")
+    fields = {f.name: f for f in dataclasses.fields(cls)}  # type: ignore[arg-type]
+    lawful = ", ".join(fields) or "none"
+    if not rest:
+        return cls()
+    try:
+        call = ast.parse(f"f({rest}", mode="eval").body
+        assert isinstance(call, ast.Call) and not call.args
+        given = {str(k.arg): ast.literal_eval(k.value) for k in call.keywords}
+    except (SyntaxError, ValueError, AssertionError):
+        raise ValueError(f"{text!r}; expected {name}(parameter=value, ...) with parameters: {lawful}") from None
+    ranges = {p.name: p for p in cls.parameters}
+    for key, value in given.items():
+        if key not in fields:
+            raise ValueError(f"parameter {key!r} of {name}; expected one of: {lawful}")
+        default = fields[key].default
+        number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if isinstance(default, str) is not isinstance(value, str) or not (number or isinstance(value, str)):
+            raise ValueError(f"{key}={value!r} of {name}; expected a value like {default!r}")
+        if key in ranges and not ranges[key].low <= value <= ranges[key].high:
+            p = ranges[key]
+            raise ValueError(f"{key}={value!r} of {name}; expected {p.low:g} to {p.high:g} {p.unit}".rstrip("1 "))
+    try:
+        return cls(**given)
+    except (ValueError, KeyError) as error:
+        raise ValueError(f"{text!r}; {error}") from None
+
+
+def to_text(effect: Effect) -> str:
+    """Write an effect as :func:`from_text` reads it.
+
+    Parameters
+    ----------
+    effect : Effect
+        Any effect of the catalogue.
+
+    Returns
+    -------
+    str
+        Id, and the parameters that differ from their defaults.
+
+    >>> to_text(from_text("tip_loss(strength=0.9)")), to_text(from_text("swirl()"))
+    ('tip_loss(strength=0.9)', 'swirl')
+    """
+    given = [
+        f"{f.name}={getattr(effect, f.name)!r}"
+        for f in dataclasses.fields(effect)  # type: ignore[arg-type]
+        if getattr(effect, f.name) != f.default
+    ]
+    return f"{effect.id}({', '.join(given)})" if given else effect.id

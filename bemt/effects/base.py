@@ -1,13 +1,17 @@
-"""What an effect is, and the working record that effects change.
+"""What an effect is, and the working records that effects change.
 
-An effect is a frozen dataclass with an ``id`` and hooks that the solver calls in a fixed order:
-``blade`` (adds to beta) -> ``inflow`` (adds to the onset speeds) -> ``section`` (changes cl, cd tables) ->
-``momentum`` (sets the few numbers of the compiled kernel).  A hook that an effect does not have is not called.
+An effect is a frozen dataclass with an ``id`` and hooks that are called in a fixed order.  The solver calls, once per
+rotor: ``blade`` (adds to beta) -> ``inflow`` (adds to the onset speeds) -> ``section`` (changes cl, cd tables) ->
+``momentum`` (sets the few numbers of the compiled kernel).  The model of a recording (:mod:`bemt.forward`) calls, once
+per set of points: ``flow`` (what the rotor meets) before the solver, ``loads`` (thrust and torque) and ``reading``
+(what the instruments show) after it.  A hook that an effect does not have is not called.
 Each file of this folder that defines a subclass of :class:`Effect` is found by :func:`bemt.effects.catalogue`.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -29,6 +33,11 @@ class Parameter:
         Physical prior range, in the unit of the parameter.
     source : str
         Where range and default come from.
+    steps : int
+        Values of the range at which a diagnosis solves (it interpolates between them); 0: it leaves the default [1].
+    off : float, optional
+        Value at which nothing is changed; an effect with several such parameters is nothing at all of them together,
+        in the unit of the parameter.
     """
 
     name: str
@@ -36,6 +45,27 @@ class Parameter:
     low: float
     high: float
     source: str
+    steps: int = 5
+    off: float | None = None
+
+
+def choice(name: str, value: str, lawful: tuple[str, ...]) -> None:
+    """Refuse a word that a field of an effect does not know.
+
+    Parameters
+    ----------
+    name, value : str
+        Field and what it got.
+    lawful : tuple of str
+        What it knows.
+
+    Raises
+    ------
+    ValueError
+        If the word is another one.
+    """
+    if value not in lawful:
+        raise ValueError(f"{name}={value!r}; expected {', '.join(lawful)}")
 
 
 @dataclass
@@ -72,6 +102,9 @@ class Baking:
         Tip gap of a ducted rotor [m], NaN for an open one.
     ducted : bool
         Whether there is a duct.
+    level : float
+        Share of an effect whose size differs from point to point, see :meth:`Effect.share`; the effect that uses it
+        sets it back to 1 [1].
     """
 
     r: Array
@@ -94,6 +127,7 @@ class Baking:
     own_mach: Array
     gap: float = float("nan")
     ducted: bool = False
+    level: float = 1.0
     num: dict[str, float] = field(default_factory=dict)
 
     @property
@@ -108,17 +142,167 @@ class Baking:
         return self.alpha[None, None, None, :]
 
 
+@dataclass
+class Flow:
+    """What the rotor meets at P points of a recording; the hook ``flow`` changes it before the solver runs.
+
+    Attributes
+    ----------
+    rpm, V, rho, mu, a_sound : (P,) float
+        Speed of rotation [rev/min], axial onset speed [m/s], density [kg/m3], viscosity [Pa s], speed of sound [m/s].
+    R, Rhub, chord : float
+        Tip radius, hub radius, chord at 0.75 R [m].
+    B : int
+        Blade count.
+    ducted : bool
+        Whether the model has a duct.
+    T0, Q0 : (P,) float
+        Thrust [N] and torque [N m] of the baseline at the recorded conditions.
+    dT_dV, dQ_dV : (P,) float
+        Their slopes with the axial onset speed [N s/m], [N s].
+    extra : mapping of str to (P,) float
+        What else the recording carries, SI by name: time_s, temperature_K, pressure_Pa, voltage_V, current_A, pwm_s,
+        tip_gap_m, wall_distance_m, sideslip_rad, run.  Absent: not recorded.
+    """
+
+    rpm: Array
+    V: Array
+    rho: Array
+    mu: Array
+    a_sound: Array
+    R: float
+    Rhub: float
+    chord: float
+    B: int
+    ducted: bool
+    T0: Array
+    Q0: Array
+    dT_dV: Array
+    dQ_dV: Array
+    extra: Mapping[str, Array] = field(default_factory=dict)
+
+    @property
+    def n(self) -> Array:
+        """Revolutions per second, (P,) [1/s]."""
+        return self.rpm / 60.0
+
+    @property
+    def omega(self) -> Array:
+        """Angular speed, (P,) [rad/s]."""
+        return self.rpm * (math.pi / 30.0)
+
+    @property
+    def J(self) -> Array:
+        """Advance ratio, (P,) [1]."""
+        return self.V / (self.n * 2.0 * self.R)
+
+    @property
+    def M_tip(self) -> Array:
+        """Rotational tip Mach number, (P,) [1]."""
+        return self.omega * self.R / self.a_sound
+
+    @property
+    def area(self) -> float:
+        """Disk area [m2]."""
+        return math.pi * self.R**2
+
+    @property
+    def runs(self) -> list[NDArray[np.intp]]:
+        """Points of each run (of the only one, if runs are not recorded) in the order of time; [] without time_s."""
+        if "time_s" not in self.extra:
+            return []
+        t = self.extra["time_s"]
+        label = self.extra.get("run", np.zeros_like(t))
+        members = (np.flatnonzero((label == name) & np.isfinite(t)) for name in np.unique(label[np.isfinite(label)]))
+        return [m[np.argsort(t[m], kind="stable")] for m in members if m.size]
+
+    @property
+    def clock(self) -> Array:
+        """Time since the first point of the run, (P,), zero where it is not recorded [s]."""
+        t = np.zeros_like(self.rpm)
+        for run in self.runs:
+            t[run] = self.extra["time_s"][run] - self.extra["time_s"][run[0]]
+        return t
+
+    @property
+    def induced(self) -> Array:
+        """Induced speed of the baseline's thrust by momentum theory of the open disk, (P,) [m/s].
+
+        v = sqrt(V^2/4 + T/(2 rho A)) - V/2 (Glauert 1935, eq. VII 2.3), zero for a thrust that is not positive.
+        """
+        load = np.maximum(self.T0, 0.0) / (2.0 * self.rho * self.area)
+        half = 0.5 * np.abs(self.V)
+        return np.asarray(np.sqrt(half**2 + load) - half)
+
+
+@dataclass
+class Loads:
+    """Thrust and torque of the rotor at P points; the hook ``loads`` changes them.
+
+    Attributes
+    ----------
+    T, Q : (P,) float
+        Thrust, with a duct the total [N]; shaft torque [N m].
+    T_duct : (P,) float
+        Thrust of the duct, zero without one [N].
+    """
+
+    T: Array
+    Q: Array
+    T_duct: Array
+
+
+@dataclass
+class Reading:
+    """What the instruments show at P points; the hook ``reading`` changes it.
+
+    Attributes
+    ----------
+    values : dict of str to (P,) float
+        Channels: thrust_N and torque_Nm; also ``rpm`` where the recording has a pulse width to set it by.
+    full_scale : mapping of str to float
+        Largest magnitude of each channel over the baseline, for errors stated as a share of full scale.
+    """
+
+    values: dict[str, Array]
+    full_scale: Mapping[str, float]
+
+
 class Effect:
     """Base of all effects; subclasses are frozen dataclasses whose fields are the parameters."""
 
     id: ClassVar[str] = ""
     title: ClassVar[str] = ""
+    # What an engineer would say of it: where it shows and why it cannot be something else.
+    sign: ClassVar[str] = ""
+    # "air" (the flow), "stand" (instruments and what was written down) or "drive" (motor, battery).
+    kind: ClassVar[str] = "air"
+    # Covariates along which it shows first, of those that a diagnosis knows (J, rpm, Re, M_tip, time_s, ...).
+    along: ClassVar[tuple[str, ...]] = ()
+    # What one would look at to be sure, without a run.
+    check: ClassVar[str] = ""
+    # Parameters that take a few values only (a ratio of units), nothing between them.
+    discrete: ClassVar[tuple[str, ...]] = ()
+    # Names in Flow.extra without which it cannot be seen.
+    needs: ClassVar[tuple[str, ...]] = ()
+    # Whether a diagnosis may name it.
+    diagnosed: ClassVar[bool] = True
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     # Position among the section hooks: polars first (10), rotation (20), cascade (30), compressibility (40).
     order: ClassVar[int] = 50
     # Whether its tables need a Mach axis.
     uses_mach: ClassVar[bool] = False
     on_by_default: ClassVar[bool] = True
+
+    def __init_subclass__(cls) -> None:
+        """Refuse a parameter that would hide a hook."""
+        hidden = sorted(
+            set(cls.__dict__.get("__annotations__", {})) & {n for n, v in vars(Effect).items() if callable(v)}
+        )
+        if hidden:
+            raise TypeError(
+                f"{cls.__name__}: parameter {', '.join(hidden)} has the name of a hook; choose another name"
+            )
 
     def blade(self, bake: Baking) -> None:
         """Change blade angles; the base does nothing."""
@@ -131,6 +315,70 @@ class Effect:
 
     def momentum(self, bake: Baking) -> None:
         """Set kernel numbers; the base does nothing."""
+
+    def duct(self) -> Mapping[str, float] | None:
+        """Numbers of :class:`bemt.duct.DuctFlow` that the effect sets, which ducts an open rotor; None: none."""
+        return None
+
+    def flow(self, flow: Flow) -> None:
+        """Change what the rotor meets; the base does nothing."""
+
+    def loads(self, loads: Loads, flow: Flow) -> None:
+        """Change thrust and torque; the base does nothing.
+
+        Parameters
+        ----------
+        loads : Loads
+            Thrust and torque, changed in place.
+        flow : Flow
+            What the rotor meets.
+        """
+
+    def reading(self, reading: Reading, flow: Flow) -> None:
+        """Change what instruments show; the base does nothing.
+
+        Parameters
+        ----------
+        reading : Reading
+            What instruments show, changed in place.
+        flow : Flow
+            What the rotor meets.
+        """
+
+    def share(self, flow: Flow) -> Array | None:
+        """Size of the effect at each point of a recording for effects of the solver that differ between points.
+
+        Parameters
+        ----------
+        flow : Flow
+            The points.
+
+        Returns
+        -------
+        (P,) float or None
+            Between 0 and 1, the ``level`` at which the hooks of the solver shall act; None: 1 everywhere [1].
+        """
+        return None
+
+    def applies(self, flow: Flow) -> str:
+        """Reason why the effect cannot be at work in a recording, "" when it can.
+
+        Parameters
+        ----------
+        flow : Flow
+            The points.
+
+        Returns
+        -------
+        str
+            Reason in words.
+        """
+        missing = [name for name in self.needs if name not in flow.extra]
+        return f"the recording has no {', '.join(missing)}" if missing else ""
+
+    def variants(self) -> tuple[dict[str, Any], ...] | None:
+        """Discrete settings that a diagnosis tries instead of the ranges of ``parameters``; None: the ranges."""
+        return None
 
     def describe(self) -> dict[str, Any]:
         """Id and every field, for provenance."""

@@ -77,9 +77,11 @@ class Cascade(Effect):
 
     id = "cascade"
     title = "interference between blades at high solidity"
+    sign = "less lift where blades overlap; only rotors of solidity above about 0.3 show it"
+    diagnosed = False
     parameters = (
-        Parameter("secondary", "1", 0.010, 0.030, "Howell 1945: 0.018"),
-        Parameter("annulus", "1", 0.010, 0.030, "Howell 1945: 0.020"),
+        Parameter("secondary", "1", 0.010, 0.030, "Howell 1945: 0.018", steps=0),
+        Parameter("annulus", "1", 0.010, 0.030, "Howell 1945: 0.020", steps=0),
     )
     order = 30
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from bemt.effects.base import Baking, Effect, Parameter
+from bemt.effects.base import Array, Baking, Effect, Parameter, choice
 
-Array = NDArray[np.float64]
-
+FORMS = ("prandtl_glauert", "karman_tsien")
 # Lift grows a little beyond drag divergence, then the shock stalls the section within this span of Mach number.
 _AFTER_DIVERGENCE = 0.04
 _STALL_SPAN = 0.12
@@ -18,30 +17,39 @@ _STALL_SPAN = 0.12
 
 @dataclass(frozen=True)
 class Compressibility(Effect):
-    """Prandtl-Glauert growth of lift up to lift divergence, shock stall behind it, recovery above M = 1.
+    """Growth of lift with Mach number up to lift divergence, shock stall behind it, recovery above M = 1.
 
     Notes
     -----
-    cl = cl_0 / sqrt(1 - M^2) (Glauert 1928, Proc. R. Soc. A 118:113) up to the lift-divergence Mach number, set 0.04
-    above Korn's drag divergence M_dd = kappa - t/c - cl/10 (Mason 1990, AIAA 90-3029; not checked).  Behind it lift
-    falls within 0.12 in M to ``shock_stall`` times the incompressible one and recovers between M = 1 and 1.1 to at
-    most 1 or Ackeret's 4 / (2 pi sqrt(M^2 - 1)).  The fall is a declared rule with the shape of published NACA 0012
-    tables, not a fit to rotor data.  Acts on the attached part; separated flow (beyond 40 deg) is left alone.
+    ``form = "prandtl_glauert"``: cl = cl_0 / sqrt(1 - M^2) (Glauert 1928, Proc. R. Soc. A 118:113). ``form =
+    "karman_tsien"``: cp = cp_0 / (b + k cp_0), b = sqrt(1 - M^2), k = M^2 / (2 (1 + b)) (von Karman 1941, J. Aeronaut.
+    Sci. 8:337; Tsien 1939, 6:399), on both sides of a section whose mean pressures are -2 t/c (thin ellipse) -+ cl/2.
+    Either holds up to the lift-divergence Mach number, set 0.04 above Korn's drag divergence M_dd = kappa - t/c -
+    cl/10 (Mason 1990, AIAA 90-3029; not checked).  Behind it lift falls within 0.12 in M to ``shock_stall`` times the
+    incompressible one and recovers between M = 1 and 1.1 to at most 1 or Ackeret's 4 / (2 pi sqrt(M^2 - 1)).  The fall
+    is a declared rule with the shape of published NACA 0012 tables, not a fit to rotor data.  Acts on the attached
+    part; separated flow (beyond 40 deg) is left alone.
     """
 
     amplitude: float = 1.0
     kappa: float = 0.87
     shock_stall: float = 0.75
+    form: str = "prandtl_glauert"
 
     id = "compressibility"
     title = "compressible lift"
+    sign = "thrust coefficient grows as 1 + M^2/2 of the tip; colder air at the same speed moves it, density does not"
     parameters = (
-        Parameter("amplitude", "1", 0.8, 1.2, "1 is Prandtl-Glauert"),
-        Parameter("kappa", "1", 0.80, 0.95, "0.87 NACA sections, 0.95 supercritical (Mason 1990)"),
-        Parameter("shock_stall", "1", 0.6, 0.9, "declared; NACA 0012 tables at M 0.85-0.95"),
+        Parameter("amplitude", "1", 0.8, 1.2, "1 is the published form", 5, 0.0),
+        Parameter("kappa", "1", 0.80, 0.95, "0.87 NACA sections, 0.95 supercritical (Mason 1990)", 0),
+        Parameter("shock_stall", "1", 0.6, 0.9, "declared; NACA 0012 tables at M 0.85-0.95", 0),
     )
     uses_mach = True
     order = 40
+
+    def __post_init__(self) -> None:
+        """Refuse unknown forms."""
+        choice("form", self.form, FORMS)
 
     def section(self, bake: Baking) -> None:
         """Scale lift by Mach number."""
@@ -49,11 +57,13 @@ class Compressibility(Effect):
             return
         M = np.sqrt(bake.M2)[None, :, None, None]
         # lift divergence hardly knows the Reynolds number: one of them, where Mach numbers matter, keeps this cheap
-        limit = self.lift_divergence(bake.thickness[:, None, None, None], bake.cl[:, :1, bake.fast])
+        thickness, cl = bake.thickness[:, None, None, None], bake.cl[:, :1, bake.fast]
+        limit = self.lift_divergence(thickness, cl)
+        growth = self.growth(np.minimum(M, limit), cl, thickness)
         a = np.abs(bake.alpha_col)
         fade = np.clip((np.radians(40.0) - a) / np.radians(15.0), 0.0, 1.0)
         own = bake.own_mach[:, None, None, None]
-        bake.cl *= 1.0 + (self.factor(M, limit) - 1.0) * fade * (1.0 - own)
+        bake.cl *= 1.0 + (self.factor(M, limit, growth) - 1.0) * fade * (1.0 - own)
 
     def lift_divergence(self, thickness: ArrayLike, cl: ArrayLike) -> Array:
         """Mach number of the largest lift.
@@ -73,7 +83,36 @@ class Compressibility(Effect):
         m_dd = self.kappa - np.asarray(thickness) - 0.1 * np.minimum(np.abs(np.asarray(cl)), 1.2)
         return np.asarray(np.clip(m_dd + _AFTER_DIVERGENCE, 0.4, 0.95))
 
-    def factor(self, M: ArrayLike, limit: ArrayLike) -> Array:
+    def growth(self, M: ArrayLike, cl: ArrayLike = 0.0, thickness: ArrayLike = 0.0) -> Array:
+        """Lift ratio cl(M) / cl(0) of subsonic flow by the chosen form.
+
+        Parameters
+        ----------
+        M : float or array
+            Mach number below 1 [1].
+        cl, thickness : float or array
+            Incompressible lift coefficient, thickness over chord [1].
+
+        Returns
+        -------
+        array
+            Ratio; Karman-Tsien is held at 1.5 times Prandtl-Glauert, where the local flow is supersonic [1].
+
+        >>> e = Compressibility(form="karman_tsien")
+        >>> [round(float(e.growth(0.6, cl, t)), 3) for cl, t in ((0.0, 0.0), (0.8, 0.0), (0.8, 0.12))]
+        [1.25, 1.253, 1.332]
+        """
+        M = np.asarray(M, dtype=float)
+        b = np.sqrt(1.0 - M**2)
+        if self.form == "prandtl_glauert":
+            return np.asarray(1.0 / b)
+        k = M**2 / (2.0 * (1.0 + b))
+        # with p the pressure of thickness: (l - p) / (b + k (l - p)) + (l + p) / (b - k (l + p)) over 2 l, l = cl / 2
+        lift, p = 0.5 * np.minimum(np.abs(np.asarray(cl, dtype=float)), 1.5), 2.0 * np.asarray(thickness, dtype=float)
+        upper, lower = b - k * (p + lift), b - k * (p - lift)
+        return np.asarray(np.minimum(b / (np.maximum(upper, 0.1 * b) * np.maximum(lower, 0.1 * b)), 1.5 / b))
+
+    def factor(self, M: ArrayLike, limit: ArrayLike, growth: ArrayLike | None = None) -> Array:
         """Lift ratio cl(M) / cl(0).
 
         Parameters
@@ -82,6 +121,8 @@ class Compressibility(Effect):
             Mach number [1].
         limit : float or array
             Lift-divergence Mach number, see :meth:`lift_divergence` [1].
+        growth : float or array, optional
+            Ratio at the smaller of M and limit, see :meth:`growth`; Prandtl-Glauert by default [1].
 
         Returns
         -------
@@ -93,10 +134,16 @@ class Compressibility(Effect):
         [1.0, 1.25, 0.75, 0.96]
         """
         M, limit = np.asarray(M, dtype=float), np.asarray(limit, dtype=float)
-        pg = 1.0 / np.sqrt(1.0 - np.minimum(M, limit) ** 2)
+        pg = 1.0 / np.sqrt(1.0 - np.minimum(M, limit) ** 2) if growth is None else np.asarray(growth)
         fall = np.clip((M - limit) / _STALL_SPAN, 0.0, 1.0)
         sub = pg + (self.shock_stall - pg) * fall
         ackeret = np.minimum(1.0, 4.0 / (2.0 * np.pi * np.sqrt(np.maximum(M**2 - 1.0, 1e-6))))
         rise = np.clip((M - 1.0) / 0.1, 0.0, 1.0)
         ratio = np.where(M < 1.0, sub, sub + (ackeret - sub) * rise)
         return np.asarray(1.0 + self.amplitude * (ratio - 1.0))
+
+    def variants(self) -> tuple[dict[str, str | float], ...]:
+        """Both forms at nine amplitudes."""
+        return tuple(
+            {"form": f, "amplitude": a} for f in FORMS for a in (0.8, 0.85, 0.9, 0.95, 1.0, 1.05, 1.1, 1.15, 1.2)
+        )

@@ -5,8 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from bemt.effects.base import Baking, Effect, Parameter
+from bemt.effects.base import Array, Baking, Effect, Parameter, choice
+
+FORMS = ("lock", "cubic")
 
 
 @dataclass(frozen=True)
@@ -15,19 +18,27 @@ class DragDivergence(Effect):
 
     Notes
     -----
-    Korn's drag-divergence Mach number M_dd = kappa - t/c - cl/10 and Lock's fourth-power law cd_w = 20 (M - M_cr)^4
-    with M_cr = M_dd - (0.1/80)^(1/3); Mason (1990), AIAA 90-3029, as quoted in Malone and Mason (1995), J. Aircraft
-    32:1045 (not checked against the papers).  Above M = 1 the law is capped at Ackeret's supersonic level
-    4 (alpha^2 + (t/c)^2) / sqrt(M^2 - 1) evaluated not closer to M = 1 than 1.05.
+    Korn's drag-divergence Mach number M_dd = kappa - t/c - cl/10.  ``form = "lock"``: fourth-power law cd_w = 20 (M -
+    M_cr)^4 with M_cr = M_dd - (0.1/80)^(1/3); Mason (1990), AIAA 90-3029, as quoted in Malone and Mason (1995), J.
+    Aircraft 32:1045 (not checked against the papers).  ``form = "cubic"``: cd_w = 10 (M - M_cr)^3 with M_cr = M_dd -
+    (0.002/10)^(1/3), which makes 0.002 at M_dd, the rise in Drela and Youngren's XROTOR (2003; read from memory of its
+    source).  Above M = 1 the law is capped at Ackeret's supersonic level 4 (alpha^2 + (t/c)^2) / sqrt(M^2 - 1)
+    evaluated not closer to M = 1 than 1.05.
     """
 
     kappa: float = 0.87
+    form: str = "lock"
 
     id = "drag_divergence"
     title = "drag divergence near sonic speed"
-    parameters = (Parameter("kappa", "1", 0.80, 0.95, "0.87 NACA sections, 0.95 supercritical (Mason 1990)"),)
+    sign = "torque rises in a knee above one tip Mach number, thrust hardly; Reynolds number would act at every speed"
+    parameters = (Parameter("kappa", "1", 0.80, 0.95, "0.87 NACA sections, 0.95 supercritical (Mason 1990)", 5),)
     uses_mach = True
     order = 45
+
+    def __post_init__(self) -> None:
+        """Refuse unknown forms."""
+        choice("form", self.form, FORMS)
 
     def section(self, bake: Baking) -> None:
         """Add wave drag."""
@@ -36,9 +47,33 @@ class DragDivergence(Effect):
         M = np.sqrt(bake.M2)[None, :, None, None]
         tc = bake.thickness[:, None, None, None]
         cl0 = np.clip(np.abs(bake.cl[:, :1, bake.fast]), 0.0, 1.2)
-        m_cr = self.kappa - tc - 0.1 * cl0 - (0.1 / 80.0) ** (1.0 / 3.0)
-        wave = 20.0 * np.maximum(M - m_cr, 0.0) ** 4
+        wave = self.rise(M, self.kappa - tc - 0.1 * cl0)
         a = bake.alpha_col
         small = np.abs(a) < np.radians(30.0)
         cap = 4.0 * (np.minimum(np.abs(a), 0.2) ** 2 + tc**2) / np.sqrt(np.maximum(M**2, 1.1025) - 1.0)
         bake.cd += np.where(small, np.minimum(wave, cap), 0.0) * (1.0 - bake.own_mach[:, None, None, None])
+
+    def rise(self, M: ArrayLike, M_dd: ArrayLike) -> Array:
+        """Wave drag coefficient by the chosen law.
+
+        Parameters
+        ----------
+        M, M_dd : array_like
+            Mach number and drag-divergence Mach number [1].
+
+        Returns
+        -------
+        array
+            Drag coefficient [1].
+
+        >>> [round(float(DragDivergence(form=f).rise(0.75, 0.75)), 4) for f in FORMS]
+        [0.0027, 0.002]
+        """
+        above = np.asarray(M, dtype=float) - np.asarray(M_dd, dtype=float)
+        if self.form == "lock":
+            return np.asarray(20.0 * np.maximum(above + (0.1 / 80.0) ** (1.0 / 3.0), 0.0) ** 4)
+        return np.asarray(10.0 * np.maximum(above + (0.002 / 10.0) ** (1.0 / 3.0), 0.0) ** 3)
+
+    def variants(self) -> tuple[dict[str, str | float], ...]:
+        """Both laws at seven technology factors."""
+        return tuple({"form": f, "kappa": k} for f in FORMS for k in (0.80, 0.825, 0.85, 0.87, 0.89, 0.92, 0.95))

@@ -19,6 +19,8 @@ class HighInduction(Effect):
 
     id = "high_induction"
     title = "turbulent windmill and vortex-ring state"
+    sign = "windmilling and descent only; never a propeller that drives air its own way"
+    diagnosed = False
 
     def momentum(self, bake: Baking) -> None:
         """Switch the bridge on."""

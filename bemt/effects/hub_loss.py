@@ -21,7 +21,8 @@ class HubLoss(Effect):
 
     id = "hub_loss"
     title = "loss of lift at the blade root"
-    parameters = (Parameter("strength", "1", 0.5, 1.3, "shared effect table of the project; 1 is Prandtl"),)
+    sign = "less thrust and torque by constant shares, growing with loading; the root is so slow that it hardly shows"
+    parameters = (Parameter("strength", "1", 0.5, 1.3, "shared effect table of the project; 1 is Prandtl", 3),)
 
     def momentum(self, bake: Baking) -> None:
         """Switch the hub factor on."""

@@ -6,35 +6,50 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.effects.base import Baking, Effect, Parameter
+from bemt.effects.base import Array, Baking, Effect, Parameter, choice
+
+FORMS = ("snel", "du_selig")
+# Du and Selig's weight turns back at wider roots than wind turbines have, and below zero at chord = r.
+_WIDEST = 0.75
 
 
 @dataclass(frozen=True)
 class StallDelay(Effect):
-    """Snel's rotational lift: cl_3D = cl_2D + coefficient (c/r)^2 (cl_pot - cl_2D).
+    """Rotational lift of stalled sections: cl_3D = cl_2D + weight (cl_pot - cl_2D).
 
     Notes
     -----
-    Snel, Houwink and Bosschers (1994), ECN-C--93-052, eq. 6.2 (not checked against the report); the coefficient is
-    their 3.  cl_pot is the straight line through the zero-lift angle with the table's own slope.  Faded out between
-    30 and 50 deg and applied to positive stall only.  What rotation adds is a force normal to the chord (Lindenburg
+    ``form = "snel"``: weight = coefficient (c/r)^2, 3 in Snel, Houwink and Bosschers (1994), ECN-C--93-052, eq. 6.2.
+    ``form = "du_selig"``: weight = (1.6 (c/r)/0.1267 (1 - (c/r)^e) / (1 + (c/r)^e) - 1) / (2 pi), e = R/r, times
+    coefficient / 3 and not below zero (Du and Selig 1998, AIAA-98-0021, with a = b = d = 1 and Lambda = 1, the limit
+    of a tip that is fast against the airspeed; c/r held at 0.75, declared). Checked against public codes, not against
+    the reports. cl_pot is the straight line through the zero-lift angle with the table's own slope. Faded out between
+    30 and 50 deg and applied to positive stall only. What rotation adds is a force normal to the chord (Lindenburg
     2003, ECN-C--03-025; not checked against the report), so drag grows by ``normal`` times gain times tan(alpha).
     """
 
     coefficient: float = 3.0
     normal: float = 1.0
+    form: str = "snel"
 
     id = "stall_delay"
     title = "rotational stall delay"
+    sign = (
+        "more thrust than tables give where the root stalls: low advance ratio and high pitch, inboard; none unstalled"
+    )
     parameters = (
-        Parameter("coefficient", "1", 1.0, 4.0, "Snel et al. 1994 give 3"),
-        Parameter("normal", "1", 0.0, 1.0, "1: the gain is a force normal to the chord; 0: lift only"),
+        Parameter("coefficient", "1", 1.0, 4.0, "3 is the published strength of both forms", 5, 0.0),
+        Parameter("normal", "1", 0.0, 1.0, "1: the gain is a force normal to the chord; 0: lift only", 0),
     )
     order = 20
 
+    def __post_init__(self) -> None:
+        """Refuse unknown forms."""
+        choice("form", self.form, FORMS)
+
     def section(self, bake: Baking) -> None:
         """Lift the stalled part of the tables."""
-        weight = np.minimum(self.coefficient * (bake.chord / bake.r) ** 2, 1.0)[:, None, None, None]
+        weight = np.clip(self.weight(bake.chord / bake.r, bake.r / bake.R), 0.0, 1.0)[:, None, None, None]
         a = bake.alpha_col
         a0 = bake.alpha0[:, None, :, None]
         pot = np.minimum(bake.cla[:, None, :, None], 2.0 * np.pi) * (a - a0)
@@ -42,3 +57,31 @@ class StallDelay(Effect):
         gain = weight * fade * np.maximum(pot - bake.cl, 0.0)
         bake.cl += gain
         bake.cd += self.normal * gain * np.tan(np.clip(a, 0.0, np.radians(60.0)))
+
+    def weight(self, chord_over_r: Array, r_over_R: Array) -> Array:
+        """Share of the way to potential-flow lift, before it is held between 0 and 1.
+
+        Parameters
+        ----------
+        chord_over_r, r_over_R : (N,) float
+            Chord over radius, radius over tip radius [1].
+
+        Returns
+        -------
+        (N,) float
+            Share [1].
+
+        >>> x = np.array([0.5])
+        >>> [round(float(StallDelay(form=f).weight(x, x)[0]), 3) for f in FORMS]
+        [0.75, 0.444]
+        """
+        if self.form == "snel":
+            return np.asarray(self.coefficient * chord_over_r**2)
+        wide = np.minimum(chord_over_r, _WIDEST)
+        power = wide ** (1.0 / r_over_R)
+        lead = 1.6 * wide / 0.1267 * (1.0 - power) / (1.0 + power) - 1.0
+        return np.asarray(self.coefficient / 3.0 * lead / (2.0 * np.pi))
+
+    def variants(self) -> tuple[dict[str, str | float], ...]:
+        """Both forms at seven strengths."""
+        return tuple({"form": f, "coefficient": c} for f in FORMS for c in (1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0))

@@ -19,6 +19,7 @@ class Swirl(Effect):
 
     id = "swirl"
     title = "rotation of the slipstream"
+    sign = "thrust and torque off at heavy loading by constant shares; their ratio tells it from density or speed"
 
     def momentum(self, bake: Baking) -> None:
         """Switch the tangential balance on."""

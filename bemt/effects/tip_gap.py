@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from bemt.effects.base import Baking, Effect, Parameter
+import numpy as np
+
+from bemt.effects.base import Array, Baking, Effect, Flow, Parameter
 
 
 @dataclass(frozen=True)
@@ -14,10 +16,12 @@ class TipGap(Effect):
 
     Notes
     -----
-    Two parts.  The wall mirrors the tip vortex, so Prandtl's deficit 1 - F is scaled by 1 - exp(-gap / (scale R)): none
-    when sealed, whole when the wall is far (declared rule, between two limits that are known).  Leakage costs pressure
-    rise in proportion to gap over span, ``loss`` points per point: 1 to 2 in Wisler (1985), J. Turbomach. 107:372, and
-    Cumpsty (1989), Compressor Aerodynamics, ch. 8 (not checked against the books).  Off means a sealed tip.
+    Two parts.  The wall mirrors the tip vortex, so Prandtl's deficit 1 - F is scaled by 1 - exp(-gap / (scale R)):
+    none when sealed, whole when the wall is far (declared rule, between two limits that are known).  Leakage costs
+    pressure rise in proportion to gap over span, ``loss`` points per point: 1 to 2 in Wisler (1985), J. Turbomach.
+    107:372, and Cumpsty (1989), Compressor Aerodynamics, ch. 8 (not checked against the books).  Off means a sealed
+    tip.  In a recording with ``tip_gap_m`` the gap of the case stands for the largest recorded one, the others are in
+    proportion, see :meth:`share`.
     """
 
     loss: float = 1.5
@@ -25,14 +29,27 @@ class TipGap(Effect):
 
     id = "tip_gap"
     title = "leakage through the tip gap of a ducted rotor"
+    sign = "thrust and pressure rise fall in proportion to gap over span; an open rotor has none"
     parameters = (
-        Parameter("loss", "1", 1.0, 2.0, "Wisler 1985; Cumpsty 1989, not checked"),
-        Parameter("scale", "1", 0.02, 0.10, "declared"),
+        Parameter("loss", "1", 1.0, 2.0, "Wisler 1985; Cumpsty 1989, not checked", 3),
+        Parameter("scale", "1", 0.02, 0.10, "declared", 0),
     )
 
     def momentum(self, bake: Baking) -> None:
         """Open the tip."""
         if not bake.ducted:
             return
-        bake.num["gap_share"] = 1.0 - math.exp(-max(bake.gap, 0.0) / (self.scale * bake.R))
-        bake.num["gap_loss"] = min(self.loss * max(bake.gap, 0.0) / (bake.R - bake.Rhub), 0.5)
+        gap, bake.level = bake.level * max(bake.gap, 0.0), 1.0
+        bake.num["gap_share"] = 1.0 - math.exp(-gap / (self.scale * bake.R))
+        bake.num["gap_loss"] = min(self.loss * gap / (bake.R - bake.Rhub), 0.5)
+
+    def share(self, flow: Flow) -> Array | None:
+        """Recorded gap over the largest recorded one."""
+        gap = flow.extra.get("tip_gap_m")
+        if gap is None or not np.nanmax(gap) > 0.0:
+            return None
+        return np.asarray(np.nan_to_num(gap / np.nanmax(gap), nan=1.0))
+
+    def applies(self, flow: Flow) -> str:
+        """An open rotor has no wall to leak along."""
+        return "" if flow.ducted else "the rotor has no duct"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bemt.effects.base import Baking, Effect, Parameter
+from bemt.effects.base import Baking, Effect, Parameter, choice
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,12 @@ class TipLoss(Effect):
 
     id = "tip_loss"
     title = "tip loss of a finite number of blades"
+    sign = "less thrust than torque lost, more of both the heavier the loading: follows J and blade count, not speed"
     parameters = (Parameter("strength", "1", 0.5, 1.3, "shared effect table of the project; 1 is Prandtl"),)
+
+    def __post_init__(self) -> None:
+        """Refuse unknown sheets."""
+        choice("sheets", self.sheets, ("wake", "disk"))
 
     def momentum(self, bake: Baking) -> None:
         """Switch the tip factor on."""

@@ -1,0 +1,30 @@
+"""Density other than written down."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from bemt.effects.base import Effect, Flow, Parameter
+
+
+@dataclass(frozen=True)
+class AirDensity(Effect):
+    """Air of another density: barometer not read, other altitude, warm or humid room.
+
+    Notes
+    -----
+    rho (1 + change).  +-3 % is weather (CIPM-2007, Picard et al. 2008, Metrologia 45:149: 1 % per 3 K or 10 hPa); -30 %
+    is 3500 m of the U.S. Standard Atmosphere (1976).  Viscosity and sound speed stay: they know the temperature only.
+    """
+
+    change: float = -0.10
+
+    id = "air_density"
+    title = "density of the air"
+    sign = "thrust and torque off by the same share at every speed and advance ratio; one cell's gain moves one of them"
+    parameters = (Parameter("change", "1", -0.35, 0.06, "weather +-3 %, altitude to 3500 m", 5, 0.0),)
+    on_by_default = False
+
+    def flow(self, flow: Flow) -> None:
+        """Change the density."""
+        flow.rho = flow.rho * (1.0 + self.change)

@@ -1,0 +1,37 @@
+"""Zero of the airspeed meter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemt.effects.base import Effect, Flow, Parameter
+
+
+@dataclass(frozen=True)
+class AirspeedOffset(Effect):
+    """The rotor meets the recorded airspeed plus a constant, where there is airspeed.
+
+    Notes
+    -----
+    Draught of a hall or zero of a pitot's transducer: 0.15 Pa is 0.5 m/s at rest.  Range +-1 m/s is declared.  Points
+    recorded at V = 0 are static by decision and stay; a speed below zero counts as zero.
+    """
+
+    offset_m_s: float = 0.5
+
+    id = "airspeed_offset"
+    title = "airspeed other than recorded"
+    sign = "shift of J that fades as 1/n at high speed of rotation; a blade angle would shift every speed alike"
+    kind = "stand"
+    parameters = (Parameter("offset_m_s", "m/s", -1.0, 1.0, "declared, pitot zero", 5, 0.0),)
+    on_by_default = False
+
+    def applies(self, flow: Flow) -> str:
+        """Static points have no airspeed to be wrong."""
+        return "" if np.any(flow.V > 0.0) else "no point has airspeed"
+
+    def flow(self, flow: Flow) -> None:
+        """Shift the airspeed."""
+        flow.V = np.where(flow.V > 0.0, np.maximum(flow.V + self.offset_m_s, 0.0), flow.V)

@@ -1,0 +1,64 @@
+"""Flow that leaves the lip of a duct."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.effects.base import Array, Effect, Flow, Loads, Parameter
+
+
+@dataclass(frozen=True)
+class LipSeparation(Effect):
+    """Duct thrust that is lost once the suction on the lip exceeds what its boundary layer bears.
+
+    Notes
+    -----
+    The suction of the lip carries the duct's thrust, so its limit is stated as the duct's thrust over the largest of
+    the recording: beyond ``onset`` the share ``loss`` of it goes, in proportion, whole at the largest.  Small lip
+    radii (below 6 % of the diameter) separate early and lose up to half of the thrust: Martin and Tung (2004), 60th
+    AHS Forum; Pereira (2008), PhD thesis Univ. of Maryland, ch. 4 (not checked).  Proportion and hysteresis are
+    declared: once separated, the flow attaches again below onset (1 - hysteresis), seen only when the recording has
+    time.
+    """
+
+    onset: float = 0.7
+    loss: float = 0.3
+    hysteresis: float = 0.0
+
+    id = "lip_separation"
+    title = "separation at the lip of the duct"
+    sign = "thrust falls beyond one loading and returns below a lower one, torque stays; Mach effects return at once"
+    parameters = (
+        Parameter("onset", "1", 0.3, 0.95, "declared; share of the largest duct thrust", 4),
+        Parameter("loss", "1", 0.0, 1.0, "share of the duct's thrust, Martin and Tung 2004", 3, 0.0),
+        Parameter("hysteresis", "1", 0.0, 0.3, "declared", 2),
+    )
+    on_by_default = False
+
+    def applies(self, flow: Flow) -> str:
+        """An open rotor has no lip."""
+        return "" if flow.ducted else "the rotor has no duct"
+
+    def loads(self, loads: Loads, flow: Flow) -> None:
+        """Take the lost share off the duct's thrust."""
+        top = np.max(loads.T_duct, initial=0.0, where=np.isfinite(loads.T_duct))
+        if not (flow.ducted and top > 0.0):
+            return
+        load = np.maximum(loads.T_duct / top, 0.0)
+        low = np.where(self._separated(load, flow), self.onset * (1.0 - self.hysteresis), self.onset)
+        lost = self.loss * np.clip((load - low) / (1.0 - low), 0.0, 1.0) * np.maximum(loads.T_duct, 0.0)
+        loads.T = loads.T - lost
+        loads.T_duct = loads.T_duct - lost
+
+    def _separated(self, load: Array, flow: Flow) -> NDArray[np.bool_]:
+        """Whether the flow has separated at a point or before and not attached since."""
+        state = load > self.onset
+        for run in flow.runs:
+            order = np.arange(run.size)
+            gone = np.maximum.accumulate(np.where(load[run] > self.onset, order, -1))
+            back = np.maximum.accumulate(np.where(load[run] < self.onset * (1.0 - self.hysteresis), order, -1))
+            state[run] = gone > back
+        return state

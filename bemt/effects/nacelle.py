@@ -1,0 +1,56 @@
+"""Body behind the propeller."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemt.effects.base import Effect, Flow, Loads, Parameter
+
+
+@dataclass(frozen=True)
+class Nacelle(Effect):
+    """Motor, nacelle or stand behind the disk: slower air near the root, and drag on the balance.
+
+    Notes
+    -----
+    Half-body of the hub's radius a: a source of flux pi a^2 V one radius behind the disk slows the axial flow there by
+    V deficit (1 + (r/a)^2)^-1.5, deficit 1/4 on the axis (Rankine 1871; Katz and Plotkin 2001, Low-Speed Aerodynamics,
+    sec. 3.10; not checked).  It scales with V, which a prepared rotor does not know, so the rotor meets its mean over
+    the disk with the weight r^2, the thrust of a blade of constant chord and lift coefficient.  The balance reads the
+    drag cd 1/2 rho V^2 pi a^2; 0.1 a spinner to 1.2 a bluff motor (Hoerner 1965, Fluid-Dynamic Drag, ch. 3; not
+    checked).  A rotor without hub counts a = R/10.
+    """
+
+    deficit: float = 0.10
+    cd: float = 0.5
+
+    id = "nacelle"
+    title = "body behind the propeller"
+    sign = "thrust lacks an amount that grows with V^2 whatever the rotor's speed, torque hardly moves; none at rest"
+    parameters = (
+        Parameter("deficit", "1", 0.0, 0.25, "0.25 on the axis of a half-body", 3, 0.0),
+        Parameter("cd", "1", 0.0, 1.2, "spinner to bluff motor, on hub area, Hoerner 1965", 4, 0.0),
+    )
+    on_by_default = False
+
+    def applies(self, flow: Flow) -> str:
+        """A body at rest in still air does nothing."""
+        return "" if np.any(flow.V > 0.0) else "no point has airspeed"
+
+    def flow(self, flow: Flow) -> None:
+        """Slow the flow by the weighted mean deficit."""
+        a = _radius(flow)
+        r = np.linspace(a, flow.R, 200)
+        mean = np.sum(r**2 * (1.0 + (r / a) ** 2) ** -1.5) / np.sum(r**2)
+        flow.V = flow.V * (1.0 - self.deficit * mean)
+
+    def loads(self, loads: Loads, flow: Flow) -> None:
+        """Take the drag of the body off the thrust."""
+        area = np.pi * _radius(flow) ** 2
+        loads.T = loads.T - self.cd * 0.5 * flow.rho * flow.V * np.abs(flow.V) * area
+
+
+def _radius(flow: Flow) -> float:
+    return flow.Rhub if flow.Rhub > 0.0 else 0.1 * flow.R

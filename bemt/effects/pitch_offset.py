@@ -1,0 +1,31 @@
+"""Blade angle other than stated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemt.effects.base import Baking, Effect, Parameter
+
+
+@dataclass(frozen=True)
+class PitchOffset(Effect):
+    """All blade angles differ by the same amount: manufacture, setting of the hub, wrong reference line.
+
+    Notes
+    -----
+    beta + offset at every station.  The range of +-2 deg is declared: settings by hand and moulded blades.
+    """
+
+    offset_deg: float = 1.0
+
+    id = "pitch_offset"
+    title = "blade angle other than stated"
+    sign = "moves the advance ratio of zero thrust, the same at every speed; a gain or density leaves it where it is"
+    parameters = (Parameter("offset_deg", "deg", -2.0, 2.0, "declared, workshop tolerance", 5, 0.0),)
+    on_by_default = False
+
+    def blade(self, bake: Baking) -> None:
+        """Turn the blade."""
+        bake.beta = bake.beta + np.radians(self.offset_deg)

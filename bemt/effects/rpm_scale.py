@@ -1,0 +1,55 @@
+"""Speed of rotation that is not the indicated one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+from bemt.effects.base import Effect, Flow, Parameter
+
+# Magnet pole pairs of outrunners and in-runners; blade or mark counts set on an optical tachometer.
+_POLE_PAIRS = (2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 14, 16, 18, 20, 21)
+_COUNTS = (1, 2, 3, 4, 5, 6)
+_EPS = tuple(e / 400.0 for e in range(-8, 9) if e)
+_NEIGHBOURS = ((6, 7), (7, 8), (10, 11), (11, 12), (12, 14))
+
+
+@dataclass(frozen=True)
+class RpmScale(Effect):
+    """The indicated speed is factor (1 + eps) times the true one.
+
+    Notes
+    -----
+    Electronic speed controllers count electrical turns, pole pairs times the mechanical ones; optical tachometers count
+    blades: a wrong setting is a rational factor (the counts that occur are declared).  ``eps``: clock error of cheap
+    counters, +-1 % (declared).  The rotor turns at the indicated speed over the factor.
+    """
+
+    factor: float = 1.0
+    eps: float = 0.01
+
+    id = "rpm_scale"
+    title = "speed of rotation other than indicated"
+    sign = (
+        "thrust and torque off by the same square and airspeed effects come at another J: a rational ratio of pole or "
+        "blade counts; density leaves J alone"
+    )
+    kind = "stand"
+    discrete = ("factor",)
+    parameters = (
+        Parameter("factor", "1", 1.0 / 24.0, 24.0, "pole pairs and blade counts", 0, 1.0),
+        Parameter("eps", "1", -0.02, 0.02, "declared, clock of a counter", 0, 0.0),
+    )
+    on_by_default = False
+
+    def flow(self, flow: Flow) -> None:
+        """Turn the rotor at its true speed."""
+        flow.rpm = flow.rpm / (self.factor * (1.0 + self.eps))
+
+    def variants(self) -> tuple[dict[str, float], ...]:
+        """Small errors, then the rational factors."""
+        ratios = {Fraction(p, 1) for p in _POLE_PAIRS} | {Fraction(1, p) for p in _POLE_PAIRS}
+        ratios |= {Fraction(p, q) for p in _COUNTS for q in _COUNTS}
+        ratios |= {Fraction(p, q) for pair in _NEIGHBOURS for p, q in (pair, pair[::-1])}
+        small = [{"factor": 1.0, "eps": e} for e in _EPS]
+        return (*small, *({"factor": float(f), "eps": 0.0} for f in sorted(ratios - {Fraction(1)})))

@@ -1,0 +1,67 @@
+"""Drift of the thrust cell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemt.effects.base import Array, Effect, Flow, Parameter, Reading
+
+
+@dataclass(frozen=True)
+class ThrustDrift(Effect):
+    """The zero of the cell creeps with time from the start of a run, and follows temperature.
+
+    Notes
+    -----
+    zero (1 - exp(-t/tau)) + thermal (T - T_0), shares of full scale, T_0 at the start of the run: creep and warm-up of
+    strain-gauge cells (OIML R 60:2017 bounds both: creep in 30 min, zero in %/5 K; not checked).  Ranges are declared,
+    wide enough for hobby cells beside a hot motor.
+    """
+
+    zero: float = 0.02
+    tau_s: float = 300.0
+    thermal: float = 0.0
+
+    id = "thrust_drift"
+    title = "drift of the thrust cell"
+    sign = (
+        "thrust follows clock or temperature, not the condition: the same point reads otherwise later; torque does not"
+    )
+    kind = "stand"
+    parameters = (
+        Parameter("zero", "1", -0.10, 0.10, "declared, share of full scale", 3, 0.0),
+        Parameter("tau_s", "s", 60.0, 1800.0, "warm-up of strain-gauge cells, 1 to 30 min", 4),
+        Parameter("thermal", "1/K", -0.003, 0.003, "declared, ten times OIML R 60 class C", 3, 0.0),
+    )
+    on_by_default = False
+
+    def applies(self, flow: Flow) -> str:
+        """Only time or temperature can show it."""
+        if np.ptp(flow.clock) > 0.0 or np.nanmax(np.abs(_warming(flow))) > 0.0:
+            return ""
+        return "the recording has neither time nor a temperature that changes"
+
+    def reading(self, reading: Reading, flow: Flow) -> None:
+        """Shift the channel."""
+        share = self.zero * -np.expm1(-flow.clock / self.tau_s) + self.thermal * _warming(flow)
+        reading.values["thrust_N"] = reading.values["thrust_N"] + share * reading.full_scale["thrust_N"]
+
+    def variants(self) -> tuple[dict[str, float], ...]:
+        """Creep alone, with times in ratio, and temperature alone."""
+        times = (60.0, 120.0, 240.0, 480.0, 930.0, 1800.0)
+        creep = [{"zero": z / 100.0, "tau_s": t, "thermal": 0.0} for z in range(-10, 11) if z for t in times]
+        warm = [{"zero": 0.0, "tau_s": 300.0, "thermal": a / 4000.0} for a in range(-12, 13) if a]
+        return (*creep, *warm)
+
+
+def _warming(flow: Flow) -> Array:
+    """Temperature less that at the start of the run, (P,), zero where not recorded [K]."""
+    if "temperature_K" not in flow.extra:
+        return np.zeros_like(flow.rpm)
+    T = flow.extra["temperature_K"]
+    start = np.full_like(flow.rpm, T[0])
+    for run in flow.runs:
+        start[run] = T[run[0]]
+    return np.nan_to_num(T - start)

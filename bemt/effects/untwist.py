@@ -1,0 +1,46 @@
+"""Elastic twist of the blade."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemt.effects.base import Array, Baking, Effect, Flow, Parameter
+
+
+@dataclass(frozen=True)
+class Untwist(Effect):
+    """Blade that twists under load: d beta = -tip_deg (r/R)^2 at the hardest point, in proportion to rho Omega^2.
+
+    Notes
+    -----
+    Centrifugal ("propeller") moment, which turns sections towards flat pitch, and aerodynamic moment of cambered
+    sections (nose down) both grow as the square of the speed; lift ahead of the elastic axis turns the nose up.
+    Flexible propellers do both: Sodja, Drazumeric, Kosel and Marzocca (2014), J. Aircraft 51:117 (not checked); shape
+    and proportion to rho Omega^2 are declared.  Positive: nose down (untwist).  Parameters belong to the point with
+    the largest rho Omega^2 of a recording, see :meth:`share`; without a recording they hold as they are.
+    """
+
+    tip_deg: float = 1.0
+
+    id = "untwist"
+    title = "elastic twist of the blades"
+    sign = (
+        "thrust coefficient falls (or rises) with rho Omega^2 and not with Mach number: another density at the same "
+        "speed moves it, another air temperature does not"
+    )
+    parameters = (
+        Parameter("tip_deg", "deg", -1.0, 3.0, "declared; plastic blades 1 to 3 deg, seldom nose up", 5, 0.0),
+    )
+    on_by_default = False
+
+    def blade(self, bake: Baking) -> None:
+        """Twist the blade."""
+        bake.beta = bake.beta - np.radians(self.tip_deg) * bake.level * (bake.r / bake.R) ** 2
+        bake.level = 1.0  # it was meant for this effect, not for one that comes later
+
+    def share(self, flow: Flow) -> Array:
+        """Rho Omega^2 over its largest value."""
+        load = flow.rho * flow.omega**2
+        return np.asarray(load / np.max(load))

@@ -1,0 +1,372 @@
+"""The promise of effects that act on points of a recording: known limits, right directions, nothing invented."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+
+from bemt import effects, forward
+from bemt.air import Air
+from bemt.effects.air_density import AirDensity
+from bemt.effects.airspeed_offset import AirspeedOffset
+from bemt.effects.base import Effect, Flow, Loads, Reading
+from bemt.effects.battery_sag import BatterySag
+from bemt.effects.cross_talk import CrossTalk
+from bemt.effects.ground_effect import FORMS, GroundEffect
+from bemt.effects.inflow_lag import InflowLag
+from bemt.effects.lip_separation import LipSeparation
+from bemt.effects.motor_heating import MotorHeating
+from bemt.effects.nacelle import Nacelle
+from bemt.effects.oblique_inflow import ObliqueInflow
+from bemt.effects.recirculation import Recirculation
+from bemt.effects.rotor_inertia import RotorInertia, slope
+from bemt.effects.rpm_scale import RpmScale
+from bemt.effects.thrust_drift import ThrustDrift
+from bemt.effects.thrust_gain import ThrustGain
+from bemt.effects.thrust_zero import ThrustZero
+from bemt.effects.tip_gap import TipGap
+from bemt.effects.tunnel_blockage import TunnelBlockage
+from bemt.effects.unit_slip import UnitSlip
+from bemt.effects.untwist import Untwist
+from bemt.polars import linear_polar
+from geometry.laws import helix
+from geometry.rotor import Rotor
+
+Array = np.ndarray
+FULL = {"thrust_N": 40.0, "torque_Nm": 0.8, "rpm": 9000.0}
+
+
+@cache
+def model() -> forward.Model:
+    return forward.Model(Rotor(helix(0.254, 0.127, hub=0.12), 2), [(0.7, linear_polar(cd=0.012))], None, 16)
+
+
+def recorded(rpm: Array | list[float], V: Array | list[float] | float = 0.0, **extra: Array) -> Flow:
+    return forward.flow_of(model().prepared(effects.standard()), rpm, V, Air.from_density(1.2), extra)
+
+
+def loads(flow: Flow, *more: Effect) -> tuple[Array, Array]:
+    found, _, ok = forward.respond(model().prepared, (*effects.standard(), *more), flow)
+    assert ok.all()
+    return found.T, found.Q
+
+
+def met(flow: Flow, effect: Effect) -> Flow:
+    changed = dataclasses.replace(flow)
+    effect.flow(changed)
+    return changed
+
+
+def shown(flow: Flow, effect: Effect) -> dict[str, Array]:
+    reading = Reading({"thrust_N": flow.T0.copy(), "torque_Nm": flow.Q0.copy(), "rpm": flow.rpm.copy()}, FULL)
+    effect.reading(reading, flow)
+    return reading.values
+
+
+# ---- the flow
+
+
+def test_induced_speed_is_that_of_momentum_theory() -> None:
+    flow = recorded([4000.0, 6000.0], [0.0, 6.0])
+    v = flow.induced
+    np.testing.assert_allclose(2.0 * flow.rho * flow.area * v * (flow.V + v), flow.T0, rtol=1e-12)
+
+
+def test_clock_starts_with_every_run_and_order_of_rows_does_not_matter() -> None:
+    t, run = np.array([5.0, 3.0, 100.0, 4.0, 107.0]), np.array([1.0, 1.0, 2.0, 1.0, 2.0])
+    flow = recorded([6000.0] * 5, time_s=t, run=run)
+    assert flow.clock.tolist() == [2.0, 0.0, 0.0, 1.0, 7.0]
+    assert [r.tolist() for r in flow.runs] == [[1, 3, 0], [2, 4]]
+    assert recorded([6000.0]).clock.tolist() == [0.0] and recorded([6000.0]).runs == []
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_wall_raises_thrust_at_rest_and_less_with_speed_and_distance(form: str) -> None:
+    flow = recorded([6000.0] * 4, [0.0, 2.0, 4.0, 8.0])
+    gain = loads(flow, GroundEffect(form=form, z_over_R=0.6))[0] / loads(flow)[0] - 1.0
+    assert np.all(gain > 0.0) and np.all(np.diff(gain) < 0.0) and gain[3] < 0.3 * gain[0]
+    far = loads(flow, GroundEffect(form=form, z_over_R=3.0))[0] / loads(flow)[0] - 1.0
+    assert np.all(far < 0.35 * gain) and np.all(far >= 0.0)
+
+
+def test_cheeseman_and_bennett_hold_at_constant_power() -> None:
+    # their thrust ratio 1 / (1 - (R/4z)^2) at constant T w: the rotor meets w = v (1 - (R/4z)^2) at the same thrust
+    flow = recorded([6000.0])
+    z = 0.7
+    w = flow.induced + met(flow, GroundEffect(z_over_R=z)).V
+    assert flow.induced[0] / w[0] == pytest.approx(1.0 / (1.0 - (1.0 / (4.0 * z)) ** 2), rel=1e-12)
+
+
+def test_a_recorded_distance_replaces_the_assumed_one() -> None:
+    flow = recorded([6000.0] * 3, wall_distance_m=np.array([0.127, 0.254, np.nan]))
+    a, b = (met(flow, GroundEffect(z_over_R=z)).V for z in (0.5, 3.0))
+    assert np.array_equal(a, b) and a[0] < a[1] < a[2] == 0.0
+
+
+def test_recirculation_grows_from_the_start_of_a_run() -> None:
+    t = np.array([0.0, 5.0, 10.0, 1000.0])
+    flow = recorded([6000.0] * 4, time_s=t)
+    V = met(flow, Recirculation(k=0.1, tau_s=10.0)).V
+    np.testing.assert_allclose(V / flow.induced, 0.1 * (1.0 - np.exp(-t / 10.0)), atol=1e-15)
+    T = loads(flow, Recirculation(k=0.1, tau_s=10.0))[0]
+    assert T[0] == flow.T0[0] and np.all(np.diff(T) < 0.0)
+    assert "time_s" in Recirculation().applies(recorded([6000.0]))
+
+
+def test_blockage_is_glauert_s() -> None:
+    flow = recorded([6000.0] * 3, [0.0, 4.0, 8.0])
+    V = met(flow, TunnelBlockage(area_ratio=0.06)).V
+    tau = flow.T0[1:] / (flow.rho[1:] * flow.area * flow.V[1:] ** 2)
+    np.testing.assert_allclose(V[1:] / flow.V[1:], 1.0 - 0.06 * tau / (2.0 * np.sqrt(1.0 + 2.0 * tau)), rtol=1e-12)
+    T, T0 = loads(flow, TunnelBlockage(area_ratio=0.06))[0], loads(flow)[0]
+    assert T[0] == T0[0] and np.all(T[1:] > T0[1:])
+
+
+def test_a_nacelle_costs_drag_and_slows_the_root() -> None:
+    flow = recorded([6000.0] * 3, [0.0, 4.0, 8.0])
+    body = Nacelle(deficit=0.0, cd=0.8)
+    T, Q = loads(flow, body)
+    T0, Q0 = loads(flow)
+    np.testing.assert_allclose(T0 - T, 0.8 * 0.5 * 1.2 * flow.V**2 * np.pi * flow.Rhub**2, rtol=1e-9, atol=1e-12)
+    assert np.array_equal(Q, Q0)
+    slow = met(flow, Nacelle(deficit=0.2)).V[1:] / flow.V[1:]
+    assert np.all((slow < 1.0) & (slow > 1.0 - 0.2))
+
+
+def test_skewed_flow_is_axial_at_0_and_keeps_glauert_s_balance() -> None:
+    flow = recorded([6000.0] * 3, [0.0, 5.0, 10.0])
+    assert np.array_equal(met(flow, ObliqueInflow(0.0)).V, flow.V)
+    for angle in (20.0, 60.0, 90.0):
+        m = met(flow, ObliqueInflow(angle))
+        # the same flow w through the disk at the same thrust: axially T = 2 rho A w (w - V_axial), skewed by Glauert
+        load = flow.T0 / (2.0 * flow.rho * flow.area)
+        w = 0.5 * m.V + np.sqrt(0.25 * m.V**2 + load)
+        Vx, Vy = flow.V * math.cos(math.radians(angle)), flow.V * math.sin(math.radians(angle))
+        np.testing.assert_allclose((w - Vx) * np.hypot(w, Vy), load, rtol=1e-9)
+        assert m.rpm[0] == flow.rpm[0] and np.all(m.rpm[1:] > flow.rpm[1:])
+    turned = recorded([6000.0], [8.0], sideslip_rad=np.array([math.radians(40.0)]))
+    assert met(turned, ObliqueInflow(5.0)).V == pytest.approx(met(recorded([6000.0], [8.0]), ObliqueInflow(40.0)).V)
+    T = [float(loads(recorded([6000.0], [8.0]), ObliqueInflow(a))[0][0]) for a in (0.0, 30.0, 60.0, 90.0)]
+    assert np.all(np.diff(T) > 0.0)
+
+
+def test_density_moves_thrust_and_torque_alike() -> None:
+    flow = recorded([6000.0, 6000.0], [0.0, 5.0])
+    T, Q = loads(flow, AirDensity(-0.2))
+    T0, Q0 = loads(flow)
+    np.testing.assert_allclose(T / T0, 0.8, rtol=1e-6)  # sections without a Reynolds number
+    np.testing.assert_allclose(Q / Q0, 0.8, rtol=1e-6)
+
+
+def test_airspeed_offset_leaves_static_points_alone_and_never_blows_backwards() -> None:
+    flow = recorded([6000.0] * 3, [0.0, 0.4, 6.0])
+    assert met(flow, AirspeedOffset(0.5)).V.tolist() == [0.0, 0.9, 6.5]
+    assert met(flow, AirspeedOffset(-0.5)).V.tolist() == [0.0, 0.0, 5.5]
+
+
+# ---- what is written down
+
+
+def test_electrical_speed_is_pole_pairs_times_the_true_one() -> None:
+    flow = recorded([42000.0])
+    assert met(flow, RpmScale(factor=7.0, eps=0.0)).rpm[0] == pytest.approx(6000.0, rel=1e-15)
+    assert flow.rpm[0] == 42000.0, "the recording stays"
+    ratios = {v["factor"] for v in RpmScale().variants()}
+    assert {7.0, 1 / 7.0, 2 / 3, 6 / 7, 12 / 14, 0.5, 1.0} <= ratios
+
+
+@pytest.mark.parametrize(
+    ("channel", "factor"),
+    [
+        ("thrust_N", 1.0 / 9.80665), ("thrust_N", 9.80665), ("thrust_N", 4.4482216), ("thrust_N", 101.97162),
+        ("thrust_N", 1000.0), ("thrust_N", 0.45359237), ("torque_Nm", 10.197162), ("torque_Nm", 141.61193),
+        ("torque_Nm", 8.8507458), ("torque_Nm", 0.73756215), ("torque_Nm", 1000.0), ("torque_Nm", 2.0 * math.pi),
+        ("torque_Nm", 60.0), ("torque_Nm", 25.4), ("rpm", 2.0 * math.pi / 60.0), ("rpm", 60.0),
+        ("airspeed_m_s", 3.6), ("airspeed_m_s", 0.44704), ("density_kg_m3", 0.06242796), ("density_kg_m3", 1e-3),
+    ],
+)  # fmt: skip
+def test_slips_of_units_are_known_by_their_exact_ratio(channel: str, factor: float) -> None:
+    known = [v for v in UnitSlip().variants() if v["channel"] == channel]
+    assert any(math.isclose(float(v["factor"]), factor, rel_tol=1e-7) for v in known)
+
+
+def test_a_slip_touches_one_channel() -> None:
+    flow = recorded([6000.0], [5.0])
+    plain = shown(flow, UnitSlip(factor=1.0))
+    for channel in ("thrust_N", "torque_Nm"):
+        slip = UnitSlip(channel=channel, factor=1.0 / 9.80665)
+        after, m = shown(flow, slip), met(flow, slip)
+        assert {c for c in plain if after[c] != plain[c]} == {channel}
+        assert after[channel] == pytest.approx(plain[channel] / 9.80665)
+        assert (m.rpm, m.V, m.rho) == (flow.rpm, flow.V, flow.rho)
+    for channel, field in (("rpm", "rpm"), ("airspeed_m_s", "V"), ("density_kg_m3", "rho")):
+        slip = UnitSlip(channel=channel, factor=3.6)
+        m = met(flow, slip)
+        assert {f for f in ("rpm", "V", "rho") if getattr(m, f) != getattr(flow, f)} == {field}
+        assert getattr(m, field) == pytest.approx(getattr(flow, field) / 3.6)
+        assert shown(flow, slip) == plain
+
+
+# ---- instruments
+
+
+@pytest.mark.parametrize(
+    "name", [n for n, c in effects.catalogue().items() if c.kind == "stand" and "reading" in vars(c)]
+)
+def test_a_stand_error_of_readings_leaves_the_air_alone(name: str) -> None:
+    cls = effects.catalogue()[name]
+    assert not forward.acts_on_rotor(cls()) and "loads" not in vars(cls)
+    assert "flow" not in vars(cls) or name == "unit_slip"
+
+
+def test_zero_gain_and_cross_talk() -> None:
+    flow = recorded([3000.0, 6000.0, 9000.0], [0.0, 3.0, 9.0])
+    T, Q = flow.T0, flow.Q0
+    np.testing.assert_allclose(shown(flow, ThrustGain(0.04))["thrust_N"], 1.04 * T)
+    np.testing.assert_allclose(shown(flow, ThrustZero(0.02))["thrust_N"] - T, 0.8)
+    np.testing.assert_allclose(shown(flow, CrossTalk(k=0.03))["thrust_N"] - T, 0.03 * Q / flow.R)
+    np.testing.assert_allclose(shown(flow, CrossTalk("thrust_in_torque", -0.03))["torque_Nm"] - Q, -0.03 * T * flow.R)
+
+
+def test_drift_follows_clock_and_temperature_of_its_run() -> None:
+    t = np.array([0.0, 300.0, 3000.0, 9000.0])
+    flow = recorded([6000.0] * 4, time_s=t, run=np.array([1.0, 1.0, 1.0, 2.0]),
+                    temperature_K=np.array([290.0, 295.0, 300.0, 310.0]))  # fmt: skip
+    creep = (shown(flow, ThrustDrift(0.05, 300.0))["thrust_N"] - flow.T0) / 40.0
+    np.testing.assert_allclose(creep, [0.0, 0.05 * (1 - math.exp(-1)), 0.05 * (1 - math.exp(-10)), 0.0], atol=1e-15)
+    warm = (shown(flow, ThrustDrift(0.0, 300.0, 0.001))["thrust_N"] - flow.T0) / 40.0
+    np.testing.assert_allclose(warm, [0.0, 0.005, 0.010, 0.0], atol=1e-15)
+    assert ThrustDrift().applies(flow) == ""
+    assert ThrustDrift().applies(recorded([6000.0] * 2)) != ""
+    assert ThrustDrift().applies(recorded([6000.0] * 2, temperature_K=np.array([290.0, 291.0]))) == ""
+
+
+def test_inertia_is_the_derivative_of_the_speed() -> None:
+    t = np.linspace(0.0, 1.0, 101)
+    rpm = 6000.0 + 1500.0 * np.sin(2.0 * np.pi * t)
+    shuffled = np.random.default_rng(3).permutation(t.size)
+    flow = recorded(rpm[shuffled], time_s=t[shuffled])
+    exact = 1500.0 * np.pi / 30.0 * 2.0 * np.pi * np.cos(2.0 * np.pi * t)
+    found = np.empty_like(t)
+    found[shuffled] = slope(flow)
+    assert np.max(np.abs(found - exact)[1:-1]) < 1e-3 * exact.max()
+    inertia = 2 * 1300.0 * 0.068 * flow.chord**2 * flow.R**3 / 3.0
+    np.testing.assert_allclose(shown(flow, RotorInertia(3.0))["torque_Nm"] - flow.Q0, 3.0 * inertia * slope(flow))
+    assert np.all(slope(recorded(rpm, time_s=100.0 * t * 2)) == 0.0), "steps of 2 s are plateaus"
+
+
+def test_inflow_lag_overshoots_when_the_speed_rises_and_settles() -> None:
+    t = np.arange(0.0, 1.0, 0.01)
+    rpm = np.where(t < 0.3, 5000.0, 7000.0)
+    flow = recorded(rpm, time_s=t)
+    found = Loads(flow.T0.copy(), flow.Q0.copy(), np.zeros_like(t))
+    InflowLag(0.05).loads(found, flow)
+    extra = found.T - flow.T0
+    assert np.all(extra[:30] == 0.0) and extra[30] > 0.05 * flow.T0[30]
+    decay = extra[31:60] / extra[30:59]
+    np.testing.assert_allclose(decay, math.exp(-0.01 / 0.05), rtol=1e-6)
+    # a jump between two points 10 ms apart: the induced speed has gone a share 1 - (1 - exp(-x))/x of the way
+    late = flow.induced[29] - flow.induced[30]
+    x = 0.01 / 0.05
+    frozen = extra[30] / (late * (1.0 - math.exp(-x)) / x)
+    assert frozen < flow.dT_dV[30] < 0.0, "with the induced speed held, thrust falls faster with onset speed"
+    down = recorded(rpm[::-1].copy(), time_s=t)
+    InflowLag(0.05).loads(less := Loads(down.T0.copy(), down.Q0.copy(), np.zeros_like(t)), down)
+    assert np.min(less.T - down.T0) < 0.0 and np.max(less.T - down.T0) == 0.0
+
+
+def test_inflow_lag_matches_blades_at_frozen_inflow() -> None:
+    # blades whose induced speed is held: thrust at V + dv with the momentum balance shifted by -dv; by definition
+    # dT/dw = dT/dV / (1 + dv/dV), checked here against the induced speed of the solved thrust itself
+    flow, h = recorded([6000.0], [4.0]), 1e-3
+    up, down = recorded([6000.0], [4.0 + h]), recorded([6000.0], [4.0 - h])
+    total = (up.T0 - down.T0) / (up.V + up.induced - down.V - down.induced)
+    v, disk = flow.induced, 2.0 * flow.rho * flow.area
+    follow = (flow.dT_dV / disk - v) / (flow.V + 2.0 * v)
+    assert flow.dT_dV / (1.0 + follow) == pytest.approx(total, rel=1e-3)
+
+
+# ---- duct and blade
+
+
+def ducted(load: list[float], **extra: Array) -> tuple[Flow, Loads]:
+    T_duct = np.array(load)
+    flow = dataclasses.replace(recorded([6000.0] * T_duct.size, **extra), ducted=True)
+    return flow, Loads(flow.T0 + T_duct, flow.Q0.copy(), T_duct)
+
+
+def test_the_lip_separates_above_its_limit_only() -> None:
+    flow, found = ducted([1.0, 6.0, 8.0, 10.0])
+    T0, Q0 = found.T.copy(), found.Q.copy()
+    LipSeparation(onset=0.6, loss=0.5).loads(found, flow)
+    np.testing.assert_allclose(T0 - found.T, [0.0, 0.0, 0.5 * 0.5 * 8.0, 0.5 * 10.0], atol=1e-12)
+    np.testing.assert_allclose(found.T_duct, [1.0, 6.0, 6.0, 5.0])
+    assert np.array_equal(found.Q, Q0)
+    assert LipSeparation().applies(recorded([6000.0])) == "the rotor has no duct"
+
+
+def test_the_lip_remembers() -> None:
+    up_down = [2.0, 5.5, 8.0, 10.0, 8.0, 5.5, 2.0]
+    flow, found = ducted(up_down, time_s=np.arange(7.0))
+    LipSeparation(onset=0.6, loss=0.5, hysteresis=0.2).loads(found, flow)
+    lost = np.array(up_down) - found.T_duct
+    assert lost[1] == 0.0 < lost[5] and lost[0] == lost[6] == 0.0
+    assert lost[2] == pytest.approx(lost[4])
+
+
+def test_untwist_is_measured_at_the_hardest_point() -> None:
+    flow = recorded([3000.0, 6000.0, 9000.0])
+    share = Untwist().share(flow)
+    np.testing.assert_allclose(share, [1 / 9, 4 / 9, 1.0])
+    CT, CT0 = (loads(flow, *e)[0] / flow.rpm**2 for e in ((Untwist(2.0),), ()))
+    fall = 1.0 - CT / CT0
+    assert np.all(fall > 0.0) and np.all(np.diff(fall) > 0.0)
+    np.testing.assert_allclose(fall / fall[2], share, rtol=0.08)
+    assert np.all(loads(flow, Untwist(-1.0))[0] > loads(flow)[0])
+
+
+def test_gaps_of_a_recording_are_in_proportion_to_the_largest() -> None:
+    gaps = np.array([1e-4, 4e-4, np.nan])
+    assert TipGap().share(recorded([6000.0] * 3, tip_gap_m=gaps)) == pytest.approx([0.25, 1.0, 1.0])
+    assert TipGap().share(recorded([6000.0])) is None
+    assert TipGap().applies(recorded([6000.0])) == "the rotor has no duct"
+
+
+# ---- drive
+
+
+def test_the_drive_never_shows_in_thrust() -> None:
+    t = np.array([0.0, 50.0, 500.0])
+    flow = recorded([5000.0, 7000.0, 9000.0], time_s=t, pwm_s=np.array([1.3e-3, 1.5e-3, 1.8e-3]))
+    for e in (MotorHeating(), BatterySag()):
+        values = shown(flow, e)
+        assert np.array_equal(values["thrust_N"], flow.T0) and np.array_equal(values["torque_Nm"], flow.Q0)
+        assert not np.array_equal(values["rpm"], flow.rpm)
+        still = Reading({"thrust_N": flow.T0, "torque_Nm": flow.Q0}, FULL)
+        e.reading(still, flow)
+        assert set(still.values) == {"thrust_N", "torque_Nm"}, "no speed channel is made up"
+        assert "pwm_s" in e.applies(recorded([6000.0], time_s=np.zeros(1)))
+
+
+@pytest.mark.parametrize("copper", [0.03, 0.15, 0.4])
+def test_a_hot_motor_obeys_its_voltage_balance(copper: float) -> None:
+    flow = recorded([9000.0, 9000.0], time_s=np.array([0.0, 1e9]))
+    cold, hot = shown(flow, MotorHeating(60.0, 120.0, copper))["rpm"] / 9000.0
+    assert cold == 1.0
+    k, R = 1.0 - 0.06, copper * (1.0 + 0.0039 * 60.0)  # in units of the cold motor at this point
+    assert k * hot + R * hot**2 / k == pytest.approx(1.0 + copper, rel=1e-12)
+    assert bool(hot < 1.0) is (copper > 0.3), "weaker magnets speed a lightly loaded motor up"
+
+
+def test_a_recorded_voltage_is_taken_as_it_is() -> None:
+    volts = np.array([16.0, 15.2, 14.4])
+    flow = recorded([9000.0] * 3, voltage_V=volts, pwm_s=np.full(3, 1.8e-3))
+    y = shown(flow, BatterySag(copper=0.03))["rpm"] / 9000.0
+    assert np.array_equal(y, shown(flow, BatterySag(sag=0.2, discharge=0.0, copper=0.03))["rpm"] / 9000.0)
+    np.testing.assert_allclose(y * 1.0 + 0.03 * y**2, 1.03 * volts / 16.0, rtol=1e-12)
+    late = recorded([9000.0] * 3, time_s=np.array([0.0, 60.0, 120.0]))
+    np.testing.assert_allclose(np.diff(shown(late, BatterySag(sag=0.0, discharge=0.1))["rpm"]) < 0.0, True)
