@@ -19,9 +19,14 @@ __all__ = ["build_parser", "main"]
 
 EXIT_INTERRUPTED = 130
 
-_MODULES = {"sweep": "bemt.sweep", "validate": "bemt.validate", "reproduce": "bemt.reproduce", "bench": "bemt.bench",
-            "import": "bemt.import_files", "export": "bemt.export_case",
-            "stations": "bemt.stations"}  # fmt: skip
+_MODULES = {"sweep": "bemt.sweep", "report": "bemt.report",
+            "validate": "bemt.validate", "reproduce": "bemt.reproduce", "bench": "bemt.bench",
+            "import": "bemt.import_files", "export": "bemt.export_case", "cfd": "bemt.cfd",
+            "calibrate": "bemt.calibrate", "data": "bemt.data",
+            "prove": "bemt.conceal.prove",
+            "effects": "bemt.effects_list", "diagnose": "bemt.diagnose.command", "plan": "bemt.diagnose.command",
+            "stations": "bemt.stations", "map": "bemt.drive.map_command", "motor": "bemt.drive.motor_command",
+            "drive": "bemt.drive.drive_command", "thrusters": "bemt.drive.thrusters_command"}  # fmt: skip
 
 
 def _positive(text: str) -> int:
@@ -78,8 +83,14 @@ def build_parser() -> argparse.ArgumentParser:
     sweep.add_argument("--tolerance", type=float, default=15.0, metavar="PCT", help=tolerance)
     sweep.add_argument("--no-resume", action="store_true", help="do not reuse results found in --out")
 
+    report = commands.add_parser("report", help="write the validation report: one HTML file, and a summary")
+    report.add_argument("paths", nargs="+", metavar="CASES", help="case files, or folders of <name>/case.toml")
+    report.add_argument("--out", required=True, metavar="DIR", help="folder of the report and of the sweep behind it")
+    report.add_argument("--quiet", action="store_true", help="print neither progress nor file names")
+
     validate = commands.add_parser("validate", help="compare with a folder of measured propellers (UIUC layout)")
-    validate.add_argument("dir", metavar="DIR", help="folder with geometry, static and J files")
+    found = "folder with geometry, static and J files, or uiuc for the data found"
+    validate.add_argument("dir", metavar="DIR", help=found)
     validate.add_argument("--json", action="store_true", help="print one JSON document (bemt.validation/1)")
     validate.add_argument("--polar", type=_polar, metavar="fixed:RE", help="section tables at one Reynolds number")
     validate.add_argument(
@@ -110,6 +121,22 @@ def build_parser() -> argparse.ArgumentParser:
     loads = "channel that --sign and --sector apply to; repeatable (default: all in N or Nm)"
     bring.add_argument("--load", action="append", metavar="NAME", help=loads)
 
+    refit = commands.add_parser("calibrate", help="refit K1 and K2 on measured propellers, beside the compact formula")
+    which = "files or folders with diameter, pitch, rpm and thrust or CT (default: uiuc, the data found)"
+    refit.add_argument("files", nargs="*", metavar="FILES", help=which)
+    refit.add_argument("--test", nargs="+", metavar="FILES", help="held out: scored, never fitted")
+    refit.add_argument("--out", metavar="DIR", help="write the tables, JSON and a figure there")
+    refit.add_argument("--json", action="store_true", help="print one JSON document (bemt.calibration/1)")
+    refit.add_argument("--quiet", action="store_true", help="print neither progress nor tables")
+
+    fetch = commands.add_parser("data", help="fetch a public database of measured propellers into the cache")
+    fetch.add_argument("kind", choices=("uiuc",), help="uiuc: UIUC Propeller Database")
+    fetch.add_argument("--from", dest="source", metavar="FILE.zip", help="take this archive instead of fetching it")
+    fetch.add_argument("--dir", metavar="DIR", help="folder for the data (default: the cache)")
+    fetch.add_argument("--url", metavar="URL", help="fetch from this mirror instead of the publisher")
+    fetch.add_argument("--refresh", action="store_true", help="fetch again what is there already")
+    fetch.add_argument("--json", action="store_true", help="print one JSON document (bemt.data/1)")
+
     solid = commands.add_parser("export", help="write the solids of a case for CAD and CFD")
     solid.add_argument("case", metavar="CASE", help="case file, its folder, or a folder of cases")
     solid.add_argument("--out", required=True, metavar="DIR", help="folder of the files and manifest.json")
@@ -119,14 +146,111 @@ def build_parser() -> argparse.ArgumentParser:
     solid.add_argument("--fillet-mm", type=float, default=0.0, metavar="R", help="fillet of blade and hub (default 0)")
     thin = "refuse blades that are thinner somewhere (default 0: none)"
     solid.add_argument("--min-thickness-mm", type=float, default=0.0, metavar="T", help=thin)
+    solid.add_argument("--rpm", type=float, metavar="N", help="openfoam: speed (default: the case's) [rev/min]")
+    solid.add_argument("--airspeed", type=float, metavar="V", help="openfoam: axial speed (default: the case's) [m/s]")
+    solid.add_argument("--sideslip-deg", type=float, default=0.0, metavar="A", help="openfoam: shaft to wind, 0 to 90")
+    grid = "openfoam: cells on the blade are R/2^(level+2), all others scale (default 6; 5 is quick)"
+    solid.add_argument("--level", type=float, default=6.0, help=grid)
+    domain = "openfoam: free field, or a cylinder of the propeller's diameter"
+    solid.add_argument("--domain", choices=("free", "pipe"), default="free", help=domain)
+    sector = "openfoam: periodic part (default: one blade from three up, else half; full in oblique flow)"
+    solid.add_argument("--sector", choices=("half", "blade", "full"), help=sector)
+    models = ("kOmegaSST", "realizableKE")
+    solid.add_argument("--turbulence", choices=models, default=models[0], help=f"openfoam (default {models[0]})")
+    law = solid.add_mutually_exclusive_group()
+    law.add_argument("--compressible", dest="solver", action="store_const", const="compressible",
+                     help="openfoam: rhoSimpleFoam (default above a tip Mach number of 0.5)")  # fmt: skip
+    law.add_argument("--incompressible", dest="solver", action="store_const", const="incompressible",
+                     help="openfoam: simpleFoam")  # fmt: skip
     solid.add_argument("--json", action="store_true", help="print one JSON document (bemt.export/1)")
+
+    flow = commands.add_parser("cfd", help="run a campaign of OpenFOAM cases and record what comes out")
+    flow.add_argument("campaign", metavar="CAMPAIGN", help="campaign.toml; recording and manifest go beside it")
+    flow.add_argument("--only", type=_positive, metavar="N", help="run point N alone, even if it is recorded")
+    flow.add_argument("--ranks", type=_positive, default=2, metavar="N", help="processes of a run (default 2)")
+    flow.add_argument("--work", metavar="DIR", help="folder of grids and runs (default: a temporary one)")
+    flow.add_argument("--keep", action="store_true", help="keep the work folder")
+    flow.add_argument("--json", action="store_true", help="print one JSON document (bemt.cfd-run/1)")
+    flow.add_argument("--quiet", action="store_true", help="print neither progress nor tables")
+
+    known = commands.add_parser("effects", help="list every physical effect: parameters, ranges, sources, signs")
+    form = known.add_mutually_exclusive_group()
+    form.add_argument("--markdown", action="store_true", help="as the page docs/effects.md")
+    form.add_argument("--json", action="store_true", help="print one JSON document (bemt.effects/1)")
+
+    proof = commands.add_parser("prove", help="conceal causes, let the diagnosis find them, score it")
+    proof.add_argument("--size", choices=("small", "full"), default="small", help="41 or 605 cases (default small)")
+    proof.add_argument("--seed", type=int, metavar="N", help="of everything (default: from the operating system)")
+    proof.add_argument("--out", metavar="DIR", help="keep items, key, answers and score there")
+    proof.add_argument("--jobs", type=_positive, metavar="N", help="diagnoses at a time (default: one per core)")
+    proof.add_argument("--json", action="store_true", help="print one JSON document (bemt.proof/1)")
+    proof.add_argument("--quiet", action="store_true", help="print no tables")
 
     cut = commands.add_parser("stations", help="find and cut the blades of a CAD model or scan: a case to solve")
     cut.add_argument("file", metavar="FILE", help="STL, OBJ or STEP")
     cut.add_argument("--unit", choices=("mm", "m", "in"), help="of an STL or OBJ that does not state it")
     cut.add_argument("--out", metavar="DIR", help="write case.toml, stations.csv and section files there")
     cut.add_argument("--json", action="store_true", help="print one JSON document (bemt.stations/1)")
+    _drive_parsers(commands)
+    why = commands.add_parser("diagnose", help="say what physics was left out when recording and simulation differ")
+    why.add_argument("recordings", nargs="+", metavar="RECORDING", help="tables or logs, analysed together")
+    why.add_argument("--case", required=True, nargs="+", metavar="CASE", help="case of all recordings, or one each")
+    off = "leave out of the baseline; repeatable"
+    why.add_argument("--off", action="append", default=[], metavar="EFFECT", help=off)
+    why.add_argument("--only", nargs="+", metavar="EFFECT", help="consider these effects only (default: all)")
+    why.add_argument("--out", metavar="DIR", help="write diagnosis.json, figures and the improved case there")
+    why.add_argument("--no-figures", action="store_true", help="with --out: no figures")
+    why.add_argument("--json", action="store_true", help="print one JSON document (bemt.diagnosis/1)")
+    why.add_argument("--quiet", action="store_true", help="print neither progress nor answer")
+
+    ahead = commands.add_parser("plan", help="say which effects a test plan can see, before anyone measures")
+    ahead.add_argument("--case", required=True, metavar="CASE", help="case file or its folder")
+    ahead.add_argument("--plan", required=True, metavar="CSV", help="table of points: rpm, airspeed_m_s, time_s, ...")
+    ahead.add_argument("--off", action="append", default=[], metavar="EFFECT", help=off)
+    ahead.add_argument("--out", metavar="DIR", help="write plan.json there")
+    ahead.add_argument("--json", action="store_true", help="print one JSON document (bemt.plan/1)")
+    ahead.add_argument("--quiet", action="store_true", help="print neither progress nor tables")
     return parser
+
+
+def _drive_parsers(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the commands of the drive behind the rotor."""
+    chart = commands.add_parser("map", help="bench recording to a map pulse width - thrust and its inverse")
+    chart.add_argument("files", nargs="+", metavar="FILE", help="recordings of one drive, of one or more batteries")
+    chart.add_argument("--sign", type=int, choices=(1, -1), default=1, help="-1 turns the thrust round (default 1)")
+    chart.add_argument("--nodes", type=_positive, default=41, metavar="N", help="rows of the tables (default 41)")
+    chart.add_argument("--name", help="name of the files and of the C tables (default: the first recording's)")
+    chart.add_argument("--thrust", type=float, metavar="N", help="print the pulse width for this thrust [N]")
+    chart.add_argument("--voltage", type=float, metavar="V", help="battery voltage for --thrust [V]")
+    chart.add_argument("--out", metavar="DIR", help="write CSV, JSON, a C header and a picture there")
+    chart.add_argument("--json", action="store_true", help="print one JSON document (bemt.map/1)")
+
+    motor = commands.add_parser("motor", help="motor constant from data sheet, back-EMF and torque sensor, compared")
+    motor.add_argument("file", nargs="?", metavar="FILE", help="motor.toml, or a folder that holds one")
+    made = "write generated trials (labelled so) and their motor.toml into DIR"
+    motor.add_argument("--generate", metavar="DIR", help=made)
+    motor.add_argument("--seed", type=int, default=0, metavar="N", help="of --generate (default 0)")
+    plant = "with --generate: plant a systematic error, e.g. torque.shunt=1.04; repeatable"
+    motor.add_argument("--plant", action="append", default=[], metavar="NAME=SIZE", help=plant)
+    motor.add_argument("--out", metavar="DIR", help="write JSON, trials as CSV and a box plot there")
+    motor.add_argument("--json", action="store_true", help="print one JSON document (bemt.motor/1)")
+
+    drive = commands.add_parser("drive", help="battery, ESC, motor and the rotor of a case: thrust over pulse width")
+    drive.add_argument("case", nargs="?", metavar="CASE", help="case file or its folder")
+    drive.add_argument("--drive", metavar="FILE", help="drive.toml (default: beside the case)")
+    off = "battery_sag, motor_heating, rotor_inertia or inflow_lag; repeatable"
+    drive.add_argument("--off", action="append", default=[], metavar="EFFECT", help=off)
+    drive.add_argument("--airspeed", type=float, default=0.0, metavar="V", help="speed of flight [m/s] (default 0)")
+    drive.add_argument("--validate", metavar="DIR", help="compare the model with the recordings in this folder instead")
+    drive.add_argument("--out", metavar="DIR", help="write JSON, CSV and a picture there")
+    drive.add_argument("--json", action="store_true", help="print one JSON document (bemt.drive/1)")
+
+    body = commands.add_parser("thrusters", help="share force and roll moment among thrusters on a body")
+    body.add_argument("file", metavar="FILE", help="thrusters.toml, or a folder that holds one")
+    body.add_argument("--force", type=float, metavar="N", help="wanted force (default: the file's) [N]")
+    body.add_argument("--moment", type=float, metavar="NM", help="wanted roll moment (default: the file's) [N m]")
+    body.add_argument("--out", metavar="DIR", help="write JSON, CSV and a picture there")
+    body.add_argument("--json", action="store_true", help="print one JSON document (bemt.thrusters/1)")
 
 
 def main(argv: Sequence[str] | None = None) -> int:

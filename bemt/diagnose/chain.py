@@ -1,0 +1,177 @@
+"""The chain of a diagnosis, from records and cases to one answer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt import effects
+from bemt.diagnose import confusion, evidence, gate, signatures, verdict
+from bemt.diagnose import fit as fitting
+from bemt.diagnose import locate as location
+from bemt.diagnose import suggest as suggestion
+from bemt.diagnose.problem import CHANNELS, Problem, build
+
+if TYPE_CHECKING:
+    from bemt.case import Case
+    from bemt.diagnose.record import Record
+
+__all__ = ["Diagnosis", "diagnose"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """Everything that was found.
+
+    Attributes
+    ----------
+    found : Evidence
+        Outcome of the weighing, with the problem in it.
+    decision : Decision
+        Verdict.
+    best : Fit
+        Leading explanation at its best setting; no effects for "none".
+    parameters : dict
+        Effect to parameter to value and 90 % interval, of the leading explanation.
+    p_value : float
+        Of the gate [1].
+    where : Location or None
+        Of the mismatch; None without one.
+    scores : dict
+        Channel to RMSE in its unit: before, after, noise, gp_only, holdout_before, holdout_after.
+    blocks : str
+        What was left out in turn for the held-out scores.
+    after, held : (M,) float
+        Readings as the improved model gives them: fitted, and each block from the others.
+    next : Suggestion or None
+        Run that would decide.
+    alike : Confusion
+        Distances of effects in this plan.
+    absent : dict of str to str
+        Effects that could not be tried, and why.
+    """
+
+    found: evidence.Evidence
+    decision: verdict.Decision
+    best: fitting.Fit
+    parameters: dict[str, dict[str, dict[str, Any]]]
+    p_value: float
+    where: location.Location | None
+    scores: dict[str, dict[str, float]]
+    blocks: str
+    after: Array
+    held: Array
+    next: suggestion.Suggestion | None
+    alike: confusion.Confusion
+    absent: dict[str, str]
+
+    @property
+    def problem(self) -> Problem:
+        """Readings, baseline, nuisances."""
+        return self.found.problem
+
+
+def diagnose(
+    records: Sequence[Record],
+    cases: Sequence[Case],
+    only: Sequence[str] | None = None,
+    progress: Callable[[str], None] | None = None,
+    nulls: int = gate.NULLS,
+) -> Diagnosis:
+    """Say what was left out.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        Recordings, analysed together.
+    cases : sequence of Case
+        One for all recordings, or one each.
+    only : sequence of str, optional
+        Effects to consider; all by default.
+    progress : callable, optional
+        Told what is being done.
+    nulls : int
+        Bootstrapped nulls of the gate [1].
+
+    Returns
+    -------
+    Diagnosis
+        The answer.
+    """
+    from threadpoolctl import threadpool_limits
+
+    # matrices of a few hundred rows: more threads only wait for each other, badly so on a busy machine
+    with threadpool_limits(1, "blas"):
+        return _diagnose(records, cases, only, progress or (lambda _: None), nulls)
+
+
+def _diagnose(
+    records: Sequence[Record],
+    cases: Sequence[Case],
+    only: Sequence[str] | None,
+    say: Callable[[str], None],
+    nulls: int,
+) -> Diagnosis:
+    say("baseline and nuisances")
+    problem = build(records, cases)
+    candidates, absent = signatures.candidates(problem, only, lambda name: say(f"solving with {name}"))
+    say("weighing explanations")
+    found = evidence.weigh(problem, candidates)
+    say("bootstrapped nulls")
+    p = gate.p_value(found, nulls)
+    decision = verdict.decide(found, p)
+    best, parameters = fitting.refined(found, fitting.fit(found, decision.leading))
+    say("held-out blocks")
+    words, held, gp_only = fitting.held_out(found, decision.leading if decision.verdict != "unknown" else "none")
+    smooth = fitting.smooth(found, best)
+    after = problem.f0 + best.signature + smooth
+    where = location.locate(found, best) if decision.verdict != "none" else None
+    say("next measurement")
+    return Diagnosis(
+        found, decision, best, parameters, p, where, _scores(found, after, held, gp_only), words, after, held,
+        _next(found, decision, best), confusion.confusion(found), absent,
+    )  # fmt: skip
+
+
+def _scores(found: evidence.Evidence, after: Array, held: Array, gp_only: Array) -> dict[str, dict[str, float]]:
+    problem, scale = found.problem, found.states[0].hyper.scale
+    out = {}
+    for c, name in enumerate(CHANNELS):
+        here = problem.channel == c
+        if not here.any():
+            continue
+
+        def rmse(model: Array, here: NDArray[np.bool_] = here) -> float:
+            return float(np.sqrt(np.mean((problem.y - model)[here] ** 2)))
+
+        out[name] = {
+            "before": rmse(problem.f0), "after": rmse(after),
+            "noise": float(np.sqrt(np.mean((scale * problem.u[here]) ** 2))),
+            "gp_only": rmse(gp_only), "holdout_before": rmse(problem.f0), "holdout_after": rmse(held),
+            "mean": float(np.mean(np.abs(problem.y[here]))),
+        }  # fmt: skip
+    return out
+
+
+def _next(found: evidence.Evidence, decision: verdict.Decision, best: fitting.Fit) -> suggestion.Suggestion | None:
+    """Run against the strongest rival that is not the leading explanation itself."""
+    singles = sorted((i for i in found.spans), key=lambda i: -found.probability[i])
+    if not singles:
+        return None
+    lead = best.ids[0] if best.ids else singles[0]
+    rivals = [i for i in (*decision.effects, *(j for g in decision.classes for j in g), *singles) if i != lead]
+    first = (lead, fitting.fit(found, lead).settings[0])
+    if decision.verdict in ("none", "insufficient") or not rivals:
+        return suggestion.suggest(found, first, None)
+    return suggestion.suggest(found, first, (rivals[0], fitting.fit(found, rivals[0]).settings[0]))
+
+
+def titles(ids: Sequence[str]) -> str:
+    """Titles of effects, in words."""
+    return " and ".join(effects.catalogue()[i].title for i in ids)

@@ -1,0 +1,169 @@
+"""``python -m bemt diagnose`` and ``python -m bemt plan``: files in, answer out."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bemt import effects, evaluate
+from bemt.case import find_cases, load_case
+from bemt.diagnose import record as records
+from bemt.errors import Fault, InputError
+from bemt.series import Series
+from bemt.tables import json_text, write_atomic
+
+if TYPE_CHECKING:
+    from bemt.case import Case
+    from bemt.diagnose.record import Record
+    from bemt.imported import Imported
+
+__all__ = ["load", "run"]
+
+_POINT = ("rpm", "J", "CT", "CP", "airspeed_m_s", "density_kg_m3", *records.COVARIATES)
+
+
+def cases_of(paths: Sequence[str], off: Sequence[str], n: int) -> list[Case]:
+    """Cases of the command line, one or one for each recording."""
+    found = [load_case(p) for given in paths for p in find_cases([given])]
+    if len(found) not in (1, n):
+        got, expected = f"{len(found)} cases for {n} recordings", "one case, or one for each recording"
+        raise InputError(Fault("--case", "", got, expected))
+    unknown = [i for i in off if i not in effects.catalogue()]
+    if unknown:
+        known = ", ".join(effects.catalogue())
+        raise InputError([Fault("--off", i, "an unknown effect", f"one of {known}") for i in unknown])
+    if off:
+        found = [c.replaced({"model.effects_off": [*c.get("model.effects_off"), *off]}) for c in found]
+    return found
+
+
+def load(path: str, case: Case) -> Record:
+    """Read one recording, whatever its format.
+
+    Parameters
+    ----------
+    path : str
+        File.
+    case : Case
+        Diameter, and what the recording does not say.
+
+    Returns
+    -------
+    Record
+        Points.
+
+    Raises
+    ------
+    InputError
+        If the file is not a recording.
+    """
+    from bemt import reduction
+    from bemt.import_files import import_file
+
+    imported = import_file(path)
+    if {"CT", "CP"} & set(imported.channels):
+        return records.from_series(_coefficients(imported, path), case)
+    reduced = reduction.reduce(imported, diameter_m=case.diameter_m)
+    return records.from_series(reduced.series, case, reduced.correlated)
+
+
+def _coefficients(imported: Imported, path: str) -> Series:
+    """Table of coefficients: its points are steady already and need no diameter."""
+    n = imported.rows
+    values = {
+        k: np.broadcast_to(c.values, (n,)) for k, c in imported.channels.items()
+        if k in _POINT and c.values.shape in ((n,), (1,))
+    }  # fmt: skip
+    u = {k[2:]: np.abs(c.values) for k, c in imported.channels.items() if k.startswith("u_") and k[2:] in values}
+    return Series("bench", Path(path).name, values, u, imported.flags, {"file": path})
+
+
+def _progress(args: argparse.Namespace) -> Callable[[str], None] | None:
+    if args.quiet or args.json or not sys.stderr.isatty():
+        return None
+
+    def say(what: str) -> None:
+        print(f"\r\x1b[K{what} ...", end="", file=sys.stderr, flush=True)
+
+    return say
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run ``diagnose`` or ``plan``.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Parsed command line.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
+    return _plan(args) if args.command == "plan" else _diagnose(args)
+
+
+def _diagnose(args: argparse.Namespace) -> int:
+    from bemt.diagnose.chain import diagnose
+    from bemt.diagnose.document import document, text
+
+    cases = cases_of(args.case, args.off, len(args.recordings))
+    for case in cases:
+        evaluate.prepare(case, None, 10)  # an unknown effect in the case is said before the work begins
+    chosen = cases * len(args.recordings) if len(cases) == 1 else cases
+    loaded = [load(p, c) for p, c in zip(args.recordings, chosen, strict=True)]
+    say = _progress(args)
+    answer = diagnose(loaded, cases, args.only or None, say)
+    if say:
+        print("\r\x1b[K", end="", file=sys.stderr)
+    doc = document(answer) | {"recordings": list(args.recordings), "cases": [c.name for c in cases]}
+    rendered = json_text(doc)
+    if args.out:
+        out = Path(args.out)
+        out.mkdir(parents=True, exist_ok=True)
+        write_atomic(out / "diagnosis.json", rendered)
+        write_atomic(out / "diagnosis.txt", text(answer) + "\n")
+        _improved(out, answer, cases[0])
+        if not args.no_figures:
+            from bemt.diagnose import figures
+
+            figures.draw(answer, out)
+    if args.json:
+        print(rendered, end="")
+    elif not args.quiet:
+        print(text(answer))
+    return 0
+
+
+def _improved(out: Path, answer: Any, case: Case) -> None:
+    """Save the case with what was found on: a case that `sweep` runs."""
+    from bemt.diagnose.improve import improved_case
+
+    document = improved_case(answer, case, case.path.read_text(encoding="utf-8"))
+    if document:
+        write_atomic(out / "case.toml", document)
+
+
+def _plan(args: argparse.Namespace) -> int:
+    from bemt.diagnose import plan
+
+    cases = cases_of([args.case], args.off, 1)
+    say = _progress(args)
+    answer = plan.plan(plan.points(load, args.plan, cases[0]), cases[0], say)
+    if say:
+        print("\r\x1b[K", end="", file=sys.stderr)
+    if args.json:
+        print(json_text(plan.document(answer)), end="")
+    elif not args.quiet:
+        print(plan.text(answer))
+    if args.out:
+        out = Path(args.out)
+        out.mkdir(parents=True, exist_ok=True)
+        write_atomic(out / "plan.json", json_text(plan.document(answer)))
+    return 0

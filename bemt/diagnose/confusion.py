@@ -1,0 +1,116 @@
+"""Which effects look alike in a test plan: classes that no algorithm can tell apart with these points.
+
+With the covariance C of noise, nuisances and solver error, the distance of an effect from another is the length of what
+is left of its whitened signature after the best setting of the other one (and, free in sign and size, the same with the
+principal angle of their signatures: d^2 sin^2(phi), Eriksson, Frisk and Krysander 2013, Automatica 49:1591, in the
+Gaussian case).  Below :data:`ALIKE` standard deviations two effects are one class.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.diagnose.evidence import Form, form_modes
+
+if TYPE_CHECKING:
+    from bemt.diagnose.evidence import Evidence, State
+
+__all__ = ["ALIKE", "VISIBLE", "Confusion", "confusion", "distance"]
+
+Array = NDArray[np.float64]
+
+ALIKE = 3.0
+"""Distance below which two effects are one class [1]."""
+VISIBLE = 5.0
+"""Length of a whitened signature from which a plan is said to see an effect [1]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Confusion:
+    """Distances between effects in a plan.
+
+    Attributes
+    ----------
+    ids : tuple of str
+        Effects.
+    size : (N,) float
+        Length of each effect's whitened signature at the setting that was used [1].
+    distance : (N, N) float
+        Row effect from the nearest setting of the column effect [1].
+    """
+
+    ids: tuple[str, ...]
+    size: Array
+    distance: Array
+
+    def classes(self) -> list[list[str]]:
+        """Effects that are seen but not told apart: connected groups of two or more."""
+        seen = [i for i in range(len(self.ids)) if self.size[i] >= ALIKE]
+        groups: list[set[int]] = []
+        for i in seen:
+            near = {j for j in seen if j != i and min(self.distance[i, j], self.distance[j, i]) < ALIKE} | {i}
+            touching = [g for g in groups if g & near]
+            for g in touching:
+                near |= g
+                groups.remove(g)
+            groups.append(near)
+        return [[self.ids[i] for i in sorted(g)] for g in groups if len(g) > 1]
+
+
+def distance(state: State, s: Array, span: slice, form: Form | None = None) -> float:
+    """Distance of a whitened signature from a candidate, over its settings.
+
+    Parameters
+    ----------
+    state : State
+        Whitened signatures.
+    s : (M,) float
+        Whitened signature.
+    span : slice
+        Columns of the candidate.
+    form : Form, optional
+        Error of the form of the effect that the signature belongs to.
+
+    Returns
+    -------
+    float
+        In standard deviations [1].
+    """
+    d = s[:, None] - state.S[:, span]
+    square = np.sum(d * d, axis=0)
+    if form is not None:
+        p = form.project(d)
+        square = square - np.sum(p * p, axis=0)
+    return float(np.sqrt(max(float(np.min(square)), 0.0)))
+
+
+def confusion(found: Evidence, settings: dict[str, int] | None = None) -> Confusion:
+    """Distances between all candidates.
+
+    Parameters
+    ----------
+    found : Evidence
+        Whitened signatures.
+    settings : dict of str to int, optional
+        Setting (column within the candidate) that stands for an effect; its ordinary strength by default.
+
+    Returns
+    -------
+    Confusion
+        Matrix over all candidates.
+    """
+    state = found.states[0]
+    ids = tuple(c.id for c in found.candidates)
+    chosen = [state.S[:, found.spans[c.id].start + (settings or {}).get(c.id, c.middle)] for c in found.candidates]
+    size = np.array([float(np.sqrt(s @ s)) for s in chosen])
+    modes = form_modes(found.problem, found.candidates)
+    settings = settings or {}
+    forms = {c.id: Form.of(state.white, c.signatures[:, settings.get(c.id, c.middle)], modes[c.id])
+             for c in found.candidates}  # fmt: skip
+    matrix = np.array([[0.0 if a == b else distance(state, s, found.spans[b], forms[a]) for b in ids]
+                       for a, s in zip(ids, chosen, strict=True)]).reshape(len(ids), len(ids))  # fmt: skip
+    return Confusion(ids, size, matrix)

@@ -1,0 +1,427 @@
+"""How well "nothing", every effect, every pair and "an unknown smooth effect" explain the readings.
+
+For Gaussian readings with covariance C the evidence of a signature s_g of prior weight w_g is exact on the grid:
+Z = sum_g w_g exp(-|L^-1 (r - s_g)|^2 / 2) / |L|, C = L L^T (MacKay 2003, Information Theory, ch. 28).  Everything is
+done for all settings of the covariance and added up with their prior weights.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt import effects
+from bemt.diagnose import noise
+
+if TYPE_CHECKING:
+    from bemt.diagnose.noise import Hyper, Whitener
+    from bemt.diagnose.problem import Problem
+    from bemt.diagnose.signatures import Candidate
+
+__all__ = ["PRIOR", "Evidence", "State", "weigh"]
+
+Array = NDArray[np.float64]
+
+PRIOR = {"none": 0.35, "single": 0.55, "pair": 0.05, "unknown": 0.05}
+"""Prior probability of the kinds of explanation; shared within a kind by the weights of the effects. [1]"""
+LEFT_OUT = 50.0
+"""Weight of an effect of every real rotor that the baseline leaves out, beside 1 for all others [1]."""
+
+FORM = 0.2
+"""Standard deviation of the form of an effect, share of its size: published laws of one effect differ by that [1]."""
+
+NONE, UNKNOWN = "none", "unknown"
+
+# Settings of the covariance this far (in natural logarithm) below the best are dropped.
+_DROP = 8.0
+_KEEP = 6
+_PAIR_LEADERS = 60
+
+
+def log_mean(log_values: Array, log_weights: Array, axis: int = -1) -> Array:
+    """Logarithm of a weighted sum of exponentials."""
+    total = log_values + log_weights
+    top = np.max(total, axis=axis, keepdims=True)
+    top = np.where(np.isfinite(top), top, 0.0)
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.squeeze(top, axis) + np.log(np.sum(np.exp(total - top), axis=axis)))
+
+
+@dataclass(frozen=True, eq=False)
+class Form:
+    """Error of the form of one effect, whitened: published laws of one effect differ by a share of its own size.
+
+    Adds B B^T to the whitened covariance; everything follows from the projection of :meth:`project` (Woodbury).
+
+    Attributes
+    ----------
+    B : (M, q) float
+        Whitened modes, none for instruments, whose laws are exact.
+    root : (q, q) float
+        Cholesky factor of 1 + B^T B.
+    """
+
+    B: Array
+    root: Array
+
+    @classmethod
+    def of(cls, white: Whitener, signature: Array, modes: Array) -> Form:
+        """Modes times the size of a signature, whitened."""
+        B = white(signature[:, None] * modes)
+        return cls(B, np.asarray(np.linalg.cholesky(np.eye(B.shape[1]) + B.T @ B), dtype=float))
+
+    def project(self, x: Array) -> Array:
+        """Part of whitened vectors (M,) or (M, n) that the form may explain, (q,) or (q, n)."""
+        from scipy.linalg import solve_triangular
+
+        if not self.B.shape[1]:
+            return np.zeros((0, *x.shape[1:]))
+        return np.asarray(solve_triangular(self.root, self.B.T @ x, lower=True, check_finite=False))
+
+    @property
+    def half_log_det(self) -> float:
+        """Half the logarithm of the determinant of 1 + B^T B."""
+        return float(np.sum(np.log(np.diag(self.root))))
+
+
+@dataclass(eq=False)
+class State:
+    """Readings and signatures whitened by one setting of the covariance.
+
+    Attributes
+    ----------
+    hyper : Hyper
+        The setting.
+    white : Whitener
+        Its factor.
+    r : (M,) float
+        Whitened residual.
+    S : (M, G) float
+        Whitened signatures of all settings of all candidates.
+    half : (G,) float
+        Half of their squared lengths.
+    forms : dict of str to Form
+        Error of the form of each candidate, at its best setting.
+    rivals : list of (str, Whitener)
+        Factors for the unknown smooth effect.
+    log_z : dict of str to float
+        Logarithm of the evidence per explanation.
+    """
+
+    hyper: Hyper
+    white: Whitener
+    r: Array
+    S: Array
+    half: Array
+    forms: dict[str, Form] = field(default_factory=dict)
+    rivals: list[tuple[str, Whitener]] = field(default_factory=list)
+    log_z: dict[str, float] = field(default_factory=dict)
+    best_rival: str = ""
+
+    def gains(self, name: str, span: slice, R: Array) -> Array:
+        """Log likelihood over that of "none" of every setting of a candidate for whitened residuals.
+
+        Parameters
+        ----------
+        name : str
+            Candidate.
+        span : slice
+            Its columns of S.
+        R : (M, n) float
+            Whitened residuals.
+
+        Returns
+        -------
+        (g, n) float
+            Settings by residuals.
+        """
+        S = self.S[:, span]
+        out = S.T @ R - self.half[span][:, None]
+        form = self.forms.get(name)
+        if form is not None and form.B.shape[1]:
+            pS, pR = form.project(S), form.project(R)
+            out += (
+                0.5 * np.sum(pS * pS, axis=0)[:, None] - pS.T @ pR + 0.5 * np.sum(pR * pR, axis=0) - form.half_log_det
+            )
+        return np.asarray(out)
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """Outcome of the weighing.
+
+    Attributes
+    ----------
+    problem : Problem
+        Readings.
+    candidates : tuple of Candidate
+        Effects.
+    states : tuple of State
+        Settings of the covariance that matter, best first.
+    probability : dict of str to float
+        Posterior probability: "none", "unknown", ids, pairs as "a+b" [1].
+    spans : dict of str to slice
+        Columns of each candidate in ``State.S``.
+    log_w : (G,) float
+        Logarithm of the prior weight of each column within its candidate.
+    """
+
+    problem: Problem
+    candidates: tuple[Candidate, ...]
+    states: tuple[State, ...]
+    probability: dict[str, float]
+    spans: dict[str, slice]
+    log_w: Array
+
+    def of(self, name: str) -> Candidate:
+        """Candidate by id."""
+        return next(c for c in self.candidates if c.id == name)
+
+    def log_bayes(self, name: str) -> float:
+        """Natural logarithm of the odds of the readings under an explanation over "none"."""
+        top = np.array([s.log_z[NONE] for s in self.states])
+        mine = np.array([s.log_z.get(name, -np.inf) for s in self.states])
+        w = np.log([s.hyper.weight for s in self.states])
+        return float(log_mean(mine, w) - log_mean(top, w))
+
+
+def prior_weights(problem: Problem, ids: Sequence[str]) -> dict[str, float]:
+    """Weight of each effect: physics that every rotor has is likelier to be missing than a fault is to be there.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its baselines say what is off.
+    ids : sequence of str
+        Effects.
+
+    Returns
+    -------
+    dict
+        Id to weight [1].
+    """
+    usual = {e.id for e in effects.standard()}
+    on = [{e.id for e in p.baseline} for p in problem.parts]
+    return {i: LEFT_OUT if i in usual and not all(i in o for o in on) else 1.0 for i in ids}
+
+
+def log_priors(weights: dict[str, float], pairs: bool = True) -> dict[str, float]:
+    """Logarithm of the prior probability of every explanation.
+
+    Parameters
+    ----------
+    weights : dict of str to float
+        Weight of each effect [1].
+    pairs : bool
+        Also of every pair.
+
+    Returns
+    -------
+    dict
+        "none", "unknown", ids, pairs as "a+b".
+    """
+    total = sum(weights.values()) or 1.0
+    out = {NONE: PRIOR["none"], UNKNOWN: PRIOR["unknown"]}
+    out |= {i: PRIOR["single"] * w / total for i, w in weights.items()}
+    if pairs:
+        names = list(weights)
+        both = {f"{a}+{b}": weights[a] * weights[b] for k, a in enumerate(names) for b in names[k + 1 :]}
+        total = sum(both.values()) or 1.0
+        out |= {k: PRIOR["pair"] * w / total for k, w in both.items()}
+    return {k: float(np.log(v)) for k, v in out.items()}
+
+
+def singles(state: State, R: Array, spans: dict[str, slice], log_w: Array) -> dict[str, Array]:
+    """Log evidence over that of "none" of each candidate, for whitened residuals (M, n): (n,) each."""
+    out = {}
+    for name, span in spans.items():
+        gain = state.gains(name, span, R)
+        out[name] = log_mean(gain, np.broadcast_to(log_w[span][:, None], gain.shape), axis=0)
+    return out
+
+
+def unknown(r: Array, rivals: Sequence[tuple[str, Whitener]], log_det: float, back: Array, base: Array) -> Array:
+    """Log evidence over that of "none" of each rival kernel, (K,) or (K, B).
+
+    ``back`` is the residual before whitening, ``base`` half its squared whitened length.
+    """
+    rows = []
+    for _, white in rivals:
+        w = white(back)
+        rows.append(base - 0.5 * np.sum(w * w, axis=0) - (white.log_det - log_det))
+    return np.array(rows)
+
+
+def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True) -> Evidence:
+    """Weigh all explanations.
+
+    Parameters
+    ----------
+    problem : Problem
+        Readings, baseline, nuisances.
+    candidates : sequence of Candidate
+        Effects over their ranges.
+    pairs : bool
+        Also two effects at a time.
+
+    Returns
+    -------
+    Evidence
+        Posterior probabilities and what they follow from.
+    """
+    r = problem.residual
+    spans, S, log_w = _stacked(problem, candidates)
+    some = _few(candidates)
+    few = {c.id: slice(*np.searchsorted(some, [spans[c.id].start, spans[c.id].stop])) for c in candidates}
+    covariance = dict(noise.covariances(problem))
+    modes = form_modes(problem, candidates)
+    # a few settings of each effect are enough to see which covariances matter
+    coarse = [_state(problem, h, C, S[:, some], few, log_w[some], modes) for h, C in covariance.items()]
+    kept = [s.hyper for s in _leading(coarse)]
+    states = [_state(problem, h, covariance[h], S, spans, log_w, modes) for h in kept]
+    kernels = noise.rivals(problem)
+    for state in states:
+        state.rivals = [(name, noise.whitener(covariance[state.hyper] + K, problem.u)) for name, K in kernels]
+        base = 0.5 * float(state.r @ state.r)
+        gains = unknown(state.r, state.rivals, state.white.log_det, r, np.asarray(base))
+        if gains.size:
+            state.best_rival = kernels[int(np.argmax(gains))][0]
+            state.log_z[UNKNOWN] = state.log_z[NONE] + float(log_mean(gains, np.full(gains.size, -np.log(gains.size))))
+        else:
+            state.log_z[UNKNOWN] = state.log_z[NONE]
+        if pairs:
+            _pairs(state, spans, log_w)
+    weights = prior_weights(problem, list(spans))
+    probability = _posterior(states, log_priors(weights, pairs))
+    states.sort(key=lambda s: -(max(s.log_z.values()) + np.log(s.hyper.weight)))
+    return Evidence(problem, tuple(candidates), tuple(states), probability, spans, log_w)
+
+
+def _stacked(problem: Problem, candidates: Sequence[Candidate]) -> tuple[dict[str, slice], Array, Array]:
+    """Columns of each candidate, all signatures, logarithm of the weights."""
+    ends = np.cumsum([0, *(c.weight.size for c in candidates)])
+    spans = {c.id: slice(int(a), int(b)) for c, a, b in zip(candidates, ends, ends[1:], strict=False)}
+    S = np.concatenate([np.zeros((problem.y.size, 0)), *(c.signatures for c in candidates)], axis=1)
+    return spans, S, np.concatenate([np.zeros(0), *(np.log(c.weight) for c in candidates)])
+
+
+def bare(problem: Problem, candidates: Sequence[Candidate], hyper: Hyper) -> Evidence:
+    """Whitened signatures under one covariance, without weighing: all that a plan needs.
+
+    Parameters
+    ----------
+    problem : Problem
+        Points and baseline.
+    candidates : sequence of Candidate
+        Effects over their ranges.
+    hyper : Hyper
+        The covariance.
+
+    Returns
+    -------
+    Evidence
+        One state, no probabilities.
+    """
+    spans, S, log_w = _stacked(problem, candidates)
+    white = noise.whitener(noise.covariance(problem, hyper), problem.u)
+    Sw = white(S)
+    state = State(hyper, white, white(problem.residual), Sw, 0.5 * np.sum(Sw * Sw, axis=0))
+    return Evidence(problem, tuple(candidates), (state,), {}, spans, log_w)
+
+
+def form_modes(problem: Problem, candidates: Sequence[Candidate]) -> dict[str, Array]:
+    """Modes of the error of each effect's form: smooth ones for physics, none for instruments.
+
+    Parameters
+    ----------
+    problem : Problem
+        Readings.
+    candidates : sequence of Candidate
+        Effects.
+
+    Returns
+    -------
+    dict
+        Id to (M, q), to be multiplied by the effect's signature [1].
+    """
+    smooth = FORM * noise.smooth_modes(problem)
+    return {c.id: smooth if c.kind != "stand" else smooth[:, :0] for c in candidates}
+
+
+def _few(candidates: Sequence[Candidate], most: int = 9) -> NDArray[np.intp]:
+    """Columns that stand for each candidate: some of the settings that were solved, evenly chosen."""
+    out, start = [], 0
+    for c in candidates:
+        solved = np.flatnonzero(c.solved)
+        out.append(start + solved[np.unique(np.linspace(0, solved.size - 1, most).round().astype(int))])
+        start += c.weight.size
+    return np.concatenate([np.zeros(0, dtype=np.intp), *out])
+
+
+def _state(
+    problem: Problem, h: Hyper, C: Array, S: Array, spans: dict[str, slice], log_w: Array, modes: dict[str, Array]
+) -> State:  # fmt: skip
+    """Whitened readings and the evidence of none and of every single effect."""
+    white = noise.whitener(C, problem.u)
+    w = white(np.column_stack([problem.residual, S]))
+    rw, Sw = w[:, 0], w[:, 1:]
+    state = State(h, white, rw, Sw, 0.5 * np.sum(Sw * Sw, axis=0))
+    state.log_z[NONE] = none = -0.5 * float(rw @ rw) - white.log_det
+    R = rw[:, None]
+    for name, span in spans.items():
+        for _ in range(2):  # the form follows the size of the best setting, which depends on the form
+            best = span.start + int(np.argmax(state.gains(name, span, R)[:, 0] + log_w[span]))
+            state.forms[name] = Form.of(white, S[:, best], modes[name])
+    for name, gain in singles(state, R, spans, log_w).items():
+        state.log_z[name] = none + float(gain[0])
+    return state
+
+
+def _leading(states: list[State]) -> list[State]:
+    """Settings of the covariance under which some explanation is good."""
+    score = np.array([max(s.log_z.values()) + np.log(s.hyper.weight) for s in states])
+    order = np.argsort(-score)[:_KEEP]
+    chosen = [int(i) for i in order if score[i] > score[order[0]] - _DROP]
+    # the best setting for "none" stays in, so that "none" is judged at its best
+    none = int(np.argmax([s.log_z[NONE] + np.log(s.hyper.weight) for s in states]))
+    return [states[i] for i in dict.fromkeys([*chosen, none])]
+
+
+def _pairs(state: State, spans: dict[str, slice], log_w: Array) -> None:
+    """Evidence of two effects at a time, signatures added.
+
+    The error of both forms is worked out for the leading pairs only, at their best settings; others cannot matter.
+    """
+    gain = state.S.T @ state.r - state.half + log_w
+    none = state.log_z[NONE]
+    names = list(spans)
+    best: dict[str, tuple[int, int]] = {}
+    for i, a in enumerate(names):
+        for b in names[i + 1 :]:
+            A, B = spans[a], spans[b]
+            total = gain[A][:, None] + gain[B][None, :] - state.S[:, A].T @ state.S[:, B]
+            state.log_z[f"{a}+{b}"] = none + float(log_mean(total.ravel(), np.zeros(total.size)))
+            k, m = np.unravel_index(int(np.argmax(total)), total.shape)
+            best[f"{a}+{b}"] = A.start + int(k), B.start + int(m)
+    upper = {k: max(state.log_z[k], *(state.log_z[i] for i in k.split("+"))) for k in best}
+    for name in sorted(upper, key=lambda k: -upper[k])[:_PAIR_LEADERS]:
+        forms = [state.forms[i] for i in name.split("+")]
+        both = np.concatenate([f.B for f in forms], axis=1)
+        if not both.shape[1]:
+            continue
+        form = Form(both, np.linalg.cholesky(np.eye(both.shape[1]) + both.T @ both))
+        d = state.r - state.S[:, best[name][0]] - state.S[:, best[name][1]]
+        p = form.project(d)
+        state.log_z[name] += 0.5 * float(p @ p) - form.half_log_det
+
+
+def _posterior(states: Sequence[State], prior: dict[str, float]) -> dict[str, float]:
+    names = list(states[0].log_z)
+    table = np.array([[s.log_z[name] + np.log(s.hyper.weight) for s in states] for name in names])
+    log_post = log_mean(table, np.zeros_like(table), axis=1) + np.array([prior[name] for name in names])
+    p = np.exp(log_post - log_post.max())
+    return {name: float(v) for name, v in zip(names, p / p.sum(), strict=True)}

@@ -1,0 +1,314 @@
+"""Figures of a diagnosis: where the mismatch sits, what explains it, what cannot be told apart."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.diagnose import figures_effects, figures_posterior
+from bemt.diagnose.canvas import BLACK, BLUE, DPI, GREEN, GREY, ORANGE, RED, STYLE, blank
+from bemt.diagnose.problem import CHANNELS
+from bemt.tables import write_atomic
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from bemt.diagnose.chain import Diagnosis
+
+__all__ = ["NAMES", "draw"]
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+NAMES = ("residual", "before_after", "posterior", "radius", "confusion", "ranking")
+"""Stems of the files."""
+
+LARGEST = 120_000
+"""Largest file that is written [B]; a larger SVG is left out, a larger PNG loses colours."""
+
+_CHANNEL = {"thrust_N": "thrust", "torque_Nm": "torque", "rpm": "speed of rotation"}
+_COEFFICIENT = {
+    "thrust_N": "$C_T$ = T/($\\rho n^2 D^4$) [1]", "torque_Nm": "$C_P$ = P/($\\rho n^3 D^5$) [1]",
+    "rpm": "rpm [rev/min]",
+}  # fmt: skip
+_AXIS = {
+    "J": "advance ratio J [1]", "M_tip": "tip Mach number [1]", "Re": "Reynolds number at 0.75 R [1]",
+    "rpm": "speed of rotation [rev/min]", "time_s": "time [s]", "temperature_K": "temperature [K]",
+    "wall_distance_m": "wall distance [m]", "tip_gap_m": "tip gap [m]", "sideslip_rad": "sideslip [rad]",
+    "density_kg_m3": "density [kg/m³]", "voltage_V": "voltage [V]", "current_A": "current [A]",
+    "pwm_s": "pulse width [s]", "pressure_Pa": "pressure [Pa]", "run": "run",
+}  # fmt: skip
+_CONDITIONS = ("J", "rpm", "M_tip", "Re", "density_kg_m3")
+_MOST_LINES = 4
+
+
+def draw(answer: Diagnosis, out: Path) -> list[Path]:
+    """Draw all figures that have something to show.
+
+    Parameters
+    ----------
+    answer : Diagnosis
+        The answer.
+    out : Path
+        Folder; it is made.  Figures of an earlier answer go away.
+
+    Returns
+    -------
+    list of Path
+        Files written, each stem of :data:`NAMES` as PNG and, where that is small, as SVG.
+    """
+    import matplotlib
+
+    makers: dict[str, Callable[[Diagnosis], Figure | None]] = {
+        "residual": _residual, "before_after": _before_after, "posterior": figures_posterior.posterior,
+        "radius": figures_effects.radius, "confusion": figures_effects.matrix, "ranking": figures_effects.ranking,
+    }  # fmt: skip
+    written = []
+    with matplotlib.rc_context(STYLE):
+        for name in NAMES:
+            figure = makers[name](answer)
+            pages = {} if figure is None else _pages(figure)
+            for kind in ("png", "svg"):
+                path = out / f"{name}.{kind}"
+                if kind in pages:
+                    write_atomic(path, pages[kind])
+                    written.append(path)
+                else:
+                    path.unlink(missing_ok=True)
+    return written
+
+
+def _pages(figure: Figure) -> dict[str, bytes]:
+    """Files of a figure; the same figure gives the same bytes."""
+    png, svg = io.BytesIO(), io.BytesIO()
+    figure.savefig(png, format="png", dpi=DPI, metadata={"Software": None}, pil_kwargs={"optimize": True})
+    figure.set_layout_engine("none")  # as it is laid out already
+    figure.savefig(svg, format="svg", metadata={"Date": None})
+    pages = {"png": _slim(png.getvalue())}
+    if len(svg.getvalue()) <= LARGEST:
+        pages["svg"] = svg.getvalue()
+    return pages
+
+
+def _slim(png: bytes) -> bytes:
+    """PNG with fewer colours until it is small enough."""
+    from PIL import Image
+
+    small = png
+    for colours in (256, 64, 16):
+        if len(small) <= LARGEST:
+            break
+        page = io.BytesIO()
+        with Image.open(io.BytesIO(png)) as image:
+            image.convert("RGB").quantize(colours).save(page, format="png", optimize=True)
+        small = page.getvalue()
+    return small
+
+
+def _varies(x: Array) -> bool:
+    return bool(np.ptp(x) > 0.02 * max(float(np.max(np.abs(x))), 1e-12))
+
+
+def _channels(answer: Diagnosis) -> list[int]:
+    return [int(c) for c in np.unique(answer.problem.channel)]
+
+
+def _across(answer: Diagnosis) -> str:
+    """Covariate to draw over: that of the mismatch if it is no condition, else J, else another that varies."""
+    X, where = answer.problem.covariates, answer.where
+    if where is not None and where.variable in X and where.variable not in _CONDITIONS:
+        return where.variable
+    return next((name for name in dict.fromkeys((*_CONDITIONS, *_AXIS)) if name in X and _varies(X[name])), "rpm")
+
+
+def _lines(x: Array) -> Index:
+    """Line of each point: values closer than 3 % are one, a range without gaps is cut into equal counts."""
+    order = np.argsort(x, kind="stable")
+    size = max(float(np.max(np.abs(x))), 1e-12)
+    step = np.diff(x[order]) > 0.03 * np.maximum(np.abs(x[order][1:]), 1e-3 * size)
+    line = np.empty(x.size, dtype=np.intp)
+    line[order] = np.cumsum(np.r_[0, step])
+    if any(np.ptp(x[line == k]) > 0.1 * size for k in np.unique(line)):
+        line[order] = np.arange(x.size) * 3 // x.size
+    return line
+
+
+def _percent(d: Array) -> str:
+    return f"{100.0 * float(d):+.1f} %"
+
+
+# Residual
+
+
+def _residual(answer: Diagnosis) -> Figure:
+    X, where = answer.problem.covariates, answer.where
+    x = _across(answer)
+    y = where.variable if where is not None and where.variable in ("M_tip", "Re") else "rpm"
+    if x == "J" and _varies(X["rpm"]):
+        return _map(answer, x, y)
+    return _strip(answer, y if x in ("rpm", "M_tip", "Re") else x)
+
+
+def _shares(answer: Diagnosis, c: int) -> tuple[NDArray[np.bool_], Array]:
+    here = answer.problem.channel == c
+    return here, 100.0 * (answer.problem.residual / answer.problem.scale)[here]
+
+
+def _located(answer: Diagnosis, c: int, name: str) -> tuple[float, float] | None:
+    """Located interval of a covariate in a channel, with half a gap to the next points on either side."""
+    where = answer.where
+    if where is None or where.channel != CHANNELS[c] or where.variable != name:
+        return None
+    problem = answer.problem
+    values = np.unique(problem.covariates[name][problem.point[problem.channel == c]])
+    below, above = values[values < where.low], values[values > where.high]
+    least = 0.05 * float(np.ptp(values))
+    low = where.low - (max(0.4 * (where.low - below[-1]), 0.25 * least) if below.size else least)
+    high = where.high + (max(0.4 * (above[0] - where.high), 0.25 * least) if above.size else least)
+    return float(low), float(high)
+
+
+def _heading(answer: Diagnosis, c: int, region: bool) -> str:
+    text, where = _CHANNEL[CHANNELS[c]], answer.where
+    if region and where is not None:
+        text += f": {_percent(np.asarray(where.size))} of the mean in the marked region"
+    return text
+
+
+def _map(answer: Diagnosis, x: str, y: str) -> Figure:
+    from matplotlib.colors import LinearSegmentedColormap
+
+    problem, channels = answer.problem, _channels(answer)
+    figure, axes = blank(3.9, 1, len(channels), sharex=True, sharey=True)
+    colours = LinearSegmentedColormap.from_list("signed", [BLUE, "#f4f4f4", RED])
+    values = {c: _shares(answer, c) for c in channels}
+    top = max(float(np.quantile(np.abs(np.concatenate([v for _, v in values.values()])), 0.98)), 0.1)
+    for axis, c in zip(axes[0], channels, strict=True):
+        here, e = values[c]
+        at = problem.point[here]
+        size = float(np.clip(6000.0 / at.size, 12.0, 110.0))
+        drawn = axis.scatter(
+            problem.covariates[x][at], problem.covariates[y][at], c=e, cmap=colours, vmin=-top, vmax=top, s=size,
+            edgecolors="#555555", linewidths=0.4, zorder=3,
+        )  # fmt: skip
+        span = next((s for n in (x, y) if (s := _located(answer, c, n)) is not None), None)
+        if span is not None and answer.where is not None:
+            mark = axis.axvspan if answer.where.variable == x else axis.axhspan
+            mark(*span, facecolor=ORANGE, alpha=0.25, edgecolor="none", zorder=1)
+            mark(*span, facecolor="none", edgecolor=BLACK, linewidth=1.0, linestyle="--", zorder=2)
+        axis.set(title=_heading(answer, c, span is not None), xlabel=_AXIS.get(x, x))
+        axis.margins(0.09)
+    axes[0, 0].set_ylabel(_AXIS.get(y, y))
+    figure.colorbar(drawn, ax=axes, label="recording − baseline [% of scale]", extend="both", pad=0.02)
+    return figure
+
+
+def _strip(answer: Diagnosis, name: str) -> Figure:
+    problem, channels = answer.problem, _channels(answer)
+    figure, axes = blank(3.4, 1, len(channels), sharex=True)
+    factor = answer.found.states[0].hyper.scale
+    for axis, c in zip(axes[0], channels, strict=True):
+        here, e = _shares(answer, c)
+        x = problem.covariates[name][problem.point[here]]
+        span = _located(answer, c, name)
+        if span is not None:
+            axis.axvspan(*span, facecolor=ORANGE, alpha=0.25, edgecolor="none")
+        axis.axhline(0.0, color=GREY, linewidth=0.8)
+        u = 100.0 * factor * (problem.u / problem.scale)[here]
+        axis.errorbar(x, e, u, fmt="o", color=BLUE, markersize=4, elinewidth=1.0)
+        axis.set(title=_heading(answer, c, span is not None), xlabel=_AXIS.get(name, name))
+    axes[0, 0].set_ylabel("recording − baseline [% of scale]")
+    return figure
+
+
+# Before and after
+
+
+def _groups(answer: Diagnosis, name: str) -> list[tuple[str, NDArray[np.bool_]]]:
+    """Lines of points to draw over a covariate: what else was held, in words, and which points."""
+    problem = answer.problem
+    X, P = problem.covariates, problem.covariates["rpm"].size
+    part = np.concatenate([np.full(len(p.record), i) for i, p in enumerate(problem.parts)])
+    held = next((n for n in ("rpm", "J") if n != name and _varies(X[n])), "") if name != "rpm" else (
+        "J" if _varies(X["J"]) else "")  # fmt: skip
+    found = []
+    for i, p in enumerate(problem.parts):
+        mine = part == i
+        tag = p.record.name if len(problem.parts) > 1 else ""
+        line = np.zeros(P, dtype=np.intp)
+        if held and _varies(X[held][mine]):
+            line[mine] = _lines(X[held][mine])
+        for k in np.unique(line[mine]):
+            here = mine & (line == k)
+            found.append((", ".join(t for t in (tag, _label(held, X[held][here]) if held else "") if t), here))
+    return found
+
+
+def _label(name: str, x: Array) -> str:
+    unit, digits = (" rev/min", 0) if name == "rpm" else ("", 2)
+    lead = "" if name == "rpm" else f"{name} = "
+    if np.ptp(x) <= 0.1 * float(np.max(np.abs(x))):
+        return f"{lead}{float(np.mean(x)):.{digits}f}{unit}"
+    return f"{lead}{float(x.min()):.{digits}f} to {float(x.max()):.{digits}f}{unit}"
+
+
+def _coefficients(answer: Diagnosis) -> Array:
+    """Factor of every reading that makes it CT or CP; 1 for the speed of rotation."""
+    problem, out = answer.problem, []
+    for p in problem.parts:
+        f, D = p.flow, 2.0 * p.flow.R
+        unit = {"thrust_N": 1.0 / (f.rho * f.n**2 * D**4), "torque_Nm": 2.0 * np.pi / (f.rho * f.n**2 * D**5)}
+        out += [unit.get(c, np.ones_like(f.rho)) for c in p.channels]
+    return np.concatenate(out)[problem.kept]
+
+
+def _before_after(answer: Diagnosis) -> Figure:
+    problem, channels, name = answer.problem, _channels(answer), _across(answer)
+    groups = _groups(answer, name)
+    long = [g for g in groups if np.unique(problem.covariates[name][g[1]].round(12)).size >= 3] or groups
+    chosen = np.unique(np.linspace(0, len(long) - 1, _MOST_LINES).round().astype(int))
+    shown = [long[i] for i in chosen]
+    figure, axes = blank(0.9 + 2.2 * len(channels), len(channels), len(shown), sharex=True, sharey="row")
+    unit, factor = _coefficients(answer), answer.found.states[0].hyper.scale
+    what = " + ".join(answer.best.ids) or "calibration only"
+    models = (
+        ("baseline", problem.f0, RED, "--"), (f"improved ({what})", answer.after, BLUE, "-"),
+        (f"improved, {answer.blocks} held out", answer.held, GREEN, ":"),
+    )  # fmt: skip
+    for row, c in zip(axes, channels, strict=True):
+        for axis, (label, points) in zip(row, shown, strict=True):
+            here = (problem.channel == c) & points[problem.point]
+            x = problem.covariates[name][problem.point[here]]
+            u = (factor * problem.u * unit)[here]
+            axis.errorbar(x, (problem.y * unit)[here], u, fmt="o", color=BLACK, markersize=3, elinewidth=0.8,
+                          label="recording, standard uncertainty", zorder=2)  # fmt: skip
+            for words, model, colour, style in models:
+                curve = _curve(x, (model * unit)[here])
+                single = "_" if curve[0].size == 1 else ""
+                axis.plot(*curve, style, color=colour, label=words, zorder=3, marker=single, markersize=14)
+            if c == channels[0]:
+                axis.set_title(label)
+            if c == channels[-1]:
+                axis.set_xlabel(_AXIS.get(name, name))
+                if len(shown) > 2:
+                    axis.locator_params(axis="x", nbins=4)
+        row[0].set_ylabel(_COEFFICIENT[CHANNELS[c]])
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=2)
+    if len(shown) < len(groups):
+        figure.suptitle(f"{len(shown)} of {len(groups)} lines of points", fontsize=9)
+    return figure
+
+
+def _curve(x: Array, y: Array) -> tuple[Array, Array]:
+    """Means of y over equal x, in the order of x."""
+    order = np.argsort(x, kind="stable")
+    step = np.diff(x[order]) > 5e-3 * max(float(np.ptp(x)), 1e-12)
+    group = np.cumsum(np.r_[0, step])
+    count = np.bincount(group)
+    return np.bincount(group, x[order]) / count, np.bincount(group, y[order]) / count

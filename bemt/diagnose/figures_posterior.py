@@ -1,0 +1,216 @@
+"""The posterior of the parameters of the leading explanation, beside their prior ranges."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.diagnose.canvas import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, RED, SKY, blank
+from bemt.diagnose.signatures import effect_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from bemt.diagnose.chain import Diagnosis
+    from bemt.diagnose.evidence import Evidence
+    from bemt.diagnose.signatures import Candidate
+
+__all__ = ["posterior", "weights"]
+
+Array = NDArray[np.float64]
+
+_MOST_PANELS, _MOST_BARS, _MOST_CURVES = 6, 6, 4
+_CURVES = ((BLUE, "-"), (RED, "--"), (GREEN, "-."), (PURPLE, ":"))
+
+
+@dataclass(frozen=True, eq=False)
+class _Panel:
+    """Numbers or words of one effect: no key is a bar per setting, one a curve, two a map."""
+
+    candidate: Candidate
+    p: Array
+    keys: tuple[str, ...]
+    intervals: dict[str, dict[str, Any]]
+
+    def values(self, key: str) -> Array:
+        return np.array([float(s[key]) for s in self.candidate.settings])
+
+    def words(self) -> list[str]:
+        """Per setting what is not a number of the panel's own, in words."""
+        own = {k for k in _keys(self.candidate) if _numeric(self.candidate, k)} if self.keys else set()
+        return [_words({k: v for k, v in s.items() if k not in own}) for s in self.candidate.settings]
+
+    def range(self, key: str) -> tuple[float, float]:
+        """Prior range of a parameter."""
+        x = self.values(key)
+        return float(x.min()), float(x.max())
+
+    def label(self, key: str) -> str:
+        known = {q.name: q.unit for q in type(effect_of(self.candidate.id, self.candidate.settings[0])).parameters}
+        return f"{self.candidate.id}: {key} [{known.get(key, '1')}]"
+
+
+def _keys(candidate: Candidate) -> list[str]:
+    return list(dict.fromkeys(k for s in candidate.settings for k in s))
+
+
+def _numeric(candidate: Candidate, key: str) -> bool:
+    return all(isinstance(s.get(key), (int, float)) for s in candidate.settings)
+
+
+def _words(setting: dict[str, Any]) -> str:
+    return ", ".join(f"{k} {v:.4g}" if isinstance(v, float) else str(v) for k, v in setting.items())
+
+
+def weights(found: Evidence, name: str) -> dict[str, Array]:
+    """Posterior probability of every setting of the effects of an explanation.
+
+    Parameters
+    ----------
+    found : Evidence
+        Outcome of the weighing.
+    name : str
+        Id, or two joined by "+".
+
+    Returns
+    -------
+    dict
+        Id to (G,) probabilities that add up to 1, over all settings of the covariance [1].
+    """
+    ids = tuple(name.split("+"))
+    states = [s for s in found.states if name in s.log_z]
+    share = np.array([s.log_z[name] + np.log(s.hyper.weight) for s in states])
+    share = np.exp(share - share.max())
+    out = {i: np.zeros(found.of(i).weight.size) for i in ids}
+    for s, w in zip(states, share / share.sum(), strict=True):
+        spans = [found.spans[i] for i in ids]
+        if len(ids) == 1:
+            total = s.gains(ids[0], spans[0], s.r[:, None])[:, 0] + found.log_w[spans[0]]
+        else:
+            a, b = (s.S[:, span].T @ s.r - s.half[span] + found.log_w[span] for span in spans)
+            total = a[:, None] + b[None, :] - s.S[:, spans[0]].T @ s.S[:, spans[1]]
+        p = np.exp(total - total.max())
+        p /= p.sum()
+        for k, i in enumerate(ids):
+            out[i] += w * (p if p.ndim == 1 else p.sum(axis=1 - k))
+    return out
+
+
+def posterior(answer: Diagnosis) -> Figure | None:
+    """Draw one panel per parameter, or a map of two.
+
+    Parameters
+    ----------
+    answer : Diagnosis
+        The answer.
+
+    Returns
+    -------
+    Figure or None
+        None when the leading explanation has nothing to choose.
+    """
+    if not answer.best.ids:
+        return None
+    panels = []
+    for i, p in weights(answer.found, "+".join(answer.best.ids)).items():
+        panels += _panels(answer.found.of(i), p, answer.parameters.get(i, {}))
+    panels = panels[:_MOST_PANELS]
+    if not panels:
+        return None
+    columns = min(len(panels), 2 if len(panels) in (2, 4) else 3)
+    rows = -(-len(panels) // columns)
+    figure, axes = blank(0.4 + 3.1 * rows, rows, columns)
+    for axis, panel in zip(axes.ravel(), panels, strict=False):
+        (_bars, _curve, _map)[len(panel.keys)](axis, panel)
+    for axis in axes.ravel()[len(panels) :]:
+        axis.set_visible(False)
+    return figure
+
+
+def _panels(candidate: Candidate, p: Array, intervals: dict[str, dict[str, Any]]) -> list[_Panel]:
+    if len(candidate.settings) < 2:
+        return []
+    numbers = [k for k in _keys(candidate) if _numeric(candidate, k)]
+    numbers = [k for k in numbers if len({s[k] for s in candidate.settings}) >= 3]
+    words = {_words({k: v for k, v in s.items() if k not in numbers}) for s in candidate.settings}
+    if not numbers or len(words) * 2 > len(candidate.settings):
+        return [_Panel(candidate, p, (), intervals)]
+    sizes = [len({s[k] for s in candidate.settings}) for k in numbers]
+    if len(numbers) == 2 and len(words) == 1 and sizes[0] * sizes[1] == p.size:
+        return [_Panel(candidate, p, tuple(numbers), intervals)]
+    return [_Panel(candidate, p, (k,), intervals) for k in numbers]
+
+
+def _bars(axis: Axes, panel: _Panel) -> None:
+    words = panel.words()
+    total = {w: sum(float(q) for v, q in zip(words, panel.p, strict=True) if v == w) for w in words}
+    top = sorted(total, key=lambda w: -total[w])[:_MOST_BARS]
+    top = [w for w in top if total[w] >= 0.005]
+    bars = axis.barh(range(len(top)), [total[w] for w in top], color=BLUE, height=0.6)
+    axis.bar_label(bars, fmt="%.2f", padding=3, fontsize=8)
+    axis.axvline(1.0 / len(total), color=GREY, linestyle=":", label="prior")
+    axis.set_yticks(range(len(top)), top)
+    axis.invert_yaxis()
+    axis.set(xlim=(0, 1.15), xlabel=f"{panel.candidate.id}: probability [1]")
+    axis.legend(loc="lower right")
+
+
+def _curve(axis: Axes, panel: _Panel) -> None:
+    key = panel.keys[0]
+    x, words = panel.values(key), np.array(panel.words())
+    grid = np.unique(x)
+    width = np.gradient(grid)
+    low, high = panel.range(key)
+    names = sorted(set(words), key=lambda w: -float(panel.p[words == w].sum()))[:_MOST_CURVES]
+    inside = panel.intervals.get(key)
+    if inside:
+        axis.axvspan(inside["low"], inside["high"], color=SKY, alpha=0.3, linewidth=0, label="90 % interval")
+    peak = 0.0
+    for name, (colour, style) in zip(names, _CURVES, strict=False):
+        density = np.array([panel.p[(x == g) & (words == name)].sum() for g in grid]) / width
+        peak = max(peak, float(density.max()))
+        axis.plot(grid, density, style, color=colour, label=name or "posterior", marker="o" if grid.size < 12 else "")
+    flat = 1.0 / (high - low) / len(set(words))
+    axis.plot([low, low, high, high], [0.0, flat, flat, 0.0], ":", color=BLACK, linewidth=1.0, label="prior")
+    axis.set_xlim(low - 0.04 * (high - low), high + 0.04 * (high - low))
+    axis.set_ylim(0.0, 1.35 * max(peak, flat))
+    unit = panel.label(key).rpartition("[")[2].rstrip("]")
+    axis.set(
+        xlabel=panel.label(key),
+        ylabel=f"density [{'1' if unit in ('', '1') else f'1/{unit}' if unit.isalpha() else f'1/({unit})'}]",
+    )
+    axis.legend(loc="upper center", ncols=2, columnspacing=1.0, handlelength=1.6)
+
+
+def _map(axis: Axes, panel: _Panel) -> None:
+    from matplotlib.colors import LinearSegmentedColormap
+
+    a, b = panel.keys
+    x, y = panel.values(a), panel.values(b)
+    gx, gy = np.unique(x), np.unique(y)
+    table = np.zeros((gy.size, gx.size))
+    np.add.at(table, (np.searchsorted(gy, y), np.searchsorted(gx, x)), panel.p)
+    colours = LinearSegmentedColormap.from_list("posterior", ["#ffffff", SKY, BLUE])
+    axis.pcolormesh(gx, gy, table, cmap=colours, shading="nearest", vmin=0.0)
+    order = np.sort(table.ravel())[::-1]
+    level = float(order[min(int(np.searchsorted(np.cumsum(order), 0.9)), order.size - 1)])
+    if order[-1] < level < order[0]:
+        axis.contour(gx, gy, table, levels=[level], colors=[BLACK], linewidths=1.0)
+        axis.plot([], [], color=BLACK, linewidth=1.0, label="90 % region")
+    for k, key in enumerate((a, b)):
+        inside, (low, high) = panel.intervals.get(key), panel.range(key)
+        mark = axis.axvline if k == 0 else axis.axhline
+        if inside:  # a bar at the edge of the panel, so that the map keeps its colours
+            ends, edge = [inside["low"], inside["high"]], [0.99 if k == 0 else 0.005] * 2
+            frame = axis.get_xaxis_transform() if k == 0 else axis.get_yaxis_transform()
+            axis.plot(*((ends, edge) if k == 0 else (edge, ends)), color=ORANGE, linewidth=5.0, transform=frame,
+                      solid_capstyle="butt", label="90 % interval of one" if k == 0 else None)  # fmt: skip
+        for end in (low, high):
+            mark(end, color=GREY, linestyle=":", linewidth=1.2, label="prior range" if k == 0 and end == low else None)
+    axis.set(xlabel=panel.label(a), ylabel=panel.label(b))
+    axis.locator_params(axis="x", nbins=5)
+    axis.legend(loc="upper right", frameon=True, framealpha=0.85, edgecolor="none")

@@ -1,0 +1,400 @@
+"""The best setting of an explanation, its intervals, and its prediction for readings that it has not seen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.diagnose import noise
+from bemt.diagnose.evidence import form_modes, log_mean
+from bemt.diagnose.signatures import effect_of
+
+if TYPE_CHECKING:
+    from bemt.diagnose.evidence import Evidence
+    from bemt.diagnose.problem import Problem
+
+__all__ = ["Fit", "blocks", "fit", "form_covariance", "held_out", "intervals", "left_over", "refined", "smooth"]
+
+Array = NDArray[np.float64]
+
+_STEPS = 5
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """An explanation at its best setting.
+
+    Attributes
+    ----------
+    ids : tuple of str
+        Effects, none for "none".
+    settings : tuple of dict
+        Parameters of each.
+    columns : tuple of int
+        Columns of ``State.S``.
+    signature : (M,) float
+        Change of the readings, solved together (not added up).
+    """
+
+    ids: tuple[str, ...]
+    settings: tuple[dict[str, Any], ...]
+    columns: tuple[int, ...]
+    signature: Array
+
+
+def fit(found: Evidence, name: str) -> Fit:
+    """Best setting of an explanation under the preferred covariance.
+
+    Parameters
+    ----------
+    found : Evidence
+        Outcome of the weighing.
+    name : str
+        Id, or two joined by "+", or "none".
+
+    Returns
+    -------
+    Fit
+        Setting of largest evidence; the signature is solved with all effects at once.
+    """
+    problem, state = found.problem, found.states[0]
+    ids = tuple(name.split("+")) if name in found.probability and name not in ("none", "unknown") else ()
+    if not ids:
+        return Fit((), (), (), np.zeros_like(problem.y))
+    gain = state.S.T @ state.r - state.half + found.log_w
+    if len(ids) == 1:
+        span = found.spans[ids[0]]
+        own = state.gains(ids[0], span, state.r[:, None])[:, 0] + found.log_w[span]
+        columns: tuple[int, ...] = (span.start + int(np.argmax(own)),)
+    else:
+        A, B = (found.spans[i] for i in ids)
+        total = gain[A][:, None] + gain[B][None, :] - state.S[:, A].T @ state.S[:, B]
+        i, j = np.unravel_index(int(np.argmax(total)), total.shape)
+        columns = (A.start + int(i), B.start + int(j))
+    settings = tuple(found.of(i).settings[c - found.spans[i].start] for i, c in zip(ids, columns, strict=True))
+    signature = problem.signature(tuple(effect_of(i, s) for i, s in zip(ids, settings, strict=True)))
+    if not np.isfinite(signature).all():
+        parts = [found.of(i).signatures[:, c - found.spans[i].start] for i, c in zip(ids, columns, strict=True)]
+        signature = np.sum(parts, axis=0)
+    return Fit(ids, settings, columns, signature)
+
+
+def intervals(found: Evidence, name: str, share: float = 0.9) -> dict[str, dict[str, dict[str, Any]]]:
+    """Posterior medians and intervals of the parameters of an explanation.
+
+    Parameters
+    ----------
+    found : Evidence
+        Outcome of the weighing.
+    name : str
+        Id, or two joined by "+".
+    share : float
+        Probability inside the interval [1].
+
+    Returns
+    -------
+    dict
+        Effect to parameter to ``value``, ``low``, ``high``, ``unit``; words have equal ends.
+    """
+    ids = tuple(name.split("+"))
+    logs: dict[str, list[Array]] = {i: [] for i in ids}
+    weights = []
+    for s in found.states:
+        if name not in s.log_z:
+            continue
+        gain = s.S.T @ s.r - s.half + found.log_w
+        weights.append(s.log_z[name] + np.log(s.hyper.weight))
+        if len(ids) == 1:
+            span = found.spans[ids[0]]
+            logs[ids[0]].append(s.gains(ids[0], span, s.r[:, None])[:, 0] + found.log_w[span])
+        else:
+            A, B = (found.spans[i] for i in ids)
+            total = gain[A][:, None] + gain[B][None, :] - s.S[:, A].T @ s.S[:, B]
+            total = total - total.max()
+            logs[ids[0]].append(np.log(np.exp(total).sum(axis=1) + 1e-300))
+            logs[ids[1]].append(np.log(np.exp(total).sum(axis=0) + 1e-300))
+    w = np.exp(np.array(weights) - max(weights))
+    out: dict[str, dict[str, dict[str, Any]]] = {}
+    for i in ids:
+        p = sum(wk * _normal(g) for wk, g in zip(w, logs[i], strict=True)) / w.sum()
+        out[i] = _marginals(found, i, np.asarray(p), share)
+    return out
+
+
+def _normal(log_p: Array) -> Array:
+    p = np.exp(log_p - log_p.max())
+    return np.asarray(p / p.sum())
+
+
+def _marginals(found: Evidence, id_: str, p: Array, share: float) -> dict[str, dict[str, Any]]:
+    candidate = found.of(id_)
+    units = {q.name: q.unit for q in type(effect_of(id_, candidate.settings[0])).parameters}
+    out: dict[str, dict[str, Any]] = {}
+    for key in dict.fromkeys(k for s in candidate.settings for k in s):
+        values = [s.get(key) for s in candidate.settings]
+        if all(isinstance(v, (int, float)) for v in values if v is not None):
+            have = np.array([v is not None for v in values])
+            x, q = np.array([float(v) for v in values if v is not None]), p[have]
+            if q.sum() <= 0:
+                continue
+            order = np.argsort(x, kind="stable")
+            cumulative = np.cumsum(q[order]) / q.sum()
+            middle = cumulative - 0.5 * q[order] / q.sum()
+            # a grid of settings stands for a density: interpolate its distribution
+            at = [float(np.interp(t, middle, x[order])) for t in (0.5, 0.5 - share / 2, 0.5 + share / 2)]
+            out[key] = {"value": at[0], "low": at[1], "high": at[2], "unit": units.get(key, "1")}
+        else:
+            best = candidate.settings[int(np.argmax(p))].get(key)
+            out[key] = {"value": best, "low": best, "high": best, "unit": ""}
+    return out
+
+
+def refined(found: Evidence, best: Fit, share: float = 0.9) -> tuple[Fit, dict[str, dict[str, dict[str, Any]]]]:
+    """Parameters between the grid's settings: Gauss-Newton on the solved model, Laplace intervals.
+
+    Parameters
+    ----------
+    found : Evidence
+        Outcome of the weighing.
+    best : Fit
+        Explanation at its best setting of the grid.
+    share : float
+        Probability inside the intervals [1].
+
+    Returns
+    -------
+    tuple
+        The explanation at the refined setting, and effect to parameter to ``value``, ``low``, ``high``, ``unit``.
+    """
+    from scipy.special import erfinv
+
+    problem = found.problem
+    where = [(k, p) for k, i in enumerate(best.ids) for p in _continuous(i, best.settings[k])]
+    C = noise.covariance(problem, found.states[0].hyper) + form_covariance(found, best)
+    white = noise.whitener(C, problem.u)
+    settings = [dict(s) for s in best.settings]
+    low, high = (np.array([getattr(p, e) for _, p in where]) for e in ("low", "high"))
+    x = np.array([float(settings[k][p.name]) for k, p in where])
+
+    def solve(values: Array) -> Array:
+        for (k, p), v in zip(where, values, strict=True):
+            settings[k][p.name] = float(v)
+        return problem.signature(tuple(effect_of(i, s) for i, s in zip(best.ids, settings, strict=True)))
+
+    def misfit(s: Array) -> float:
+        w = white(problem.residual - s)
+        return float(w @ w)
+
+    s = solve(x)
+    H = np.zeros((x.size, x.size))
+    for _ in range(_STEPS if x.size and np.isfinite(s).all() else 0):
+        step = np.where(x + 0.02 * (high - low) <= high, 0.02, -0.02) * (high - low)
+        tangent = np.stack([(solve(x + d) - s) / d[k] for k, d in enumerate(np.diag(step))], axis=1)
+        if not np.isfinite(tangent).all():
+            break
+        J = white(tangent)
+        H = J.T @ J + np.diag(12.0 / (high - low) ** 2)  # as wide as the uniform prior
+        move = np.linalg.solve(H, J.T @ white(problem.residual - s))
+        for shrink in (1.0, 0.3):
+            new = np.clip(x + shrink * move, low, high)
+            trial = solve(new)
+            if np.isfinite(trial).all() and misfit(trial) < misfit(s):
+                break
+        else:
+            break
+        settled = bool(np.all(np.abs(new - x) < 1e-3 * (high - low)))
+        x, s = new, trial
+        if settled:
+            break
+    s = solve(x)
+    half = np.sqrt(np.diag(np.linalg.inv(H))) * np.sqrt(2.0) * erfinv(share) if H.any() else np.full(x.size, np.nan)
+    out: dict[str, dict[str, dict[str, Any]]] = {i: {} for i in best.ids}
+    for k, i in enumerate(best.ids):
+        units = {p.name: p.unit for p in type(effect_of(i, settings[k])).parameters}
+        for key, v in settings[k].items():
+            out[i][key] = {"value": v, "low": v, "high": v, "unit": units.get(key, "")}
+    for (k, p), v, h, a, b in zip(where, x, half, low, high, strict=True):
+        ends = (float(max(v - h, a)), float(min(v + h, b))) if np.isfinite(h) else (float(a), float(b))
+        out[best.ids[k]][p.name] = {"value": float(v), "low": ends[0], "high": ends[1], "unit": p.unit}
+    final = tuple(dict(q) for q in settings)
+    return (Fit(best.ids, final, best.columns, s) if np.isfinite(s).all() else best), out
+
+
+def _continuous(id_: str, setting: dict[str, Any]) -> list[Any]:
+    """Parameters of a setting that may take any value in their range."""
+    cls = type(effect_of(id_, setting))
+    return [p for p in cls.parameters if p.name in setting and p.name not in cls.discrete]
+
+
+def blocks(problem: Problem, most: int = 6) -> tuple[str, NDArray[np.intp]]:
+    """Blocks of points for scoring on what was left out: whole runs, speeds or advance ratios, never random rows.
+
+    Parameters
+    ----------
+    problem : Problem
+        Readings.
+    most : int
+        Largest number of blocks [1].
+
+    Returns
+    -------
+    tuple
+        What the blocks are, and the block of each of P points.
+    """
+    X = problem.covariates
+    P = X["rpm"].size
+    run = X["run"].astype(int)
+    if len(problem.parts) > 1 and np.unique(run).size <= most and np.unique(run).size >= 3:
+        return "recordings", np.unique(run, return_inverse=True)[1]
+    for name in ("rpm", "J"):
+        x = np.log(X[name]) if name == "rpm" else X[name]
+        gap = 0.03 if name == "rpm" else 0.02
+        order = np.argsort(x, kind="stable")
+        line = np.empty(P, dtype=int)
+        line[order] = np.cumsum(np.r_[0, np.diff(x[order]) > gap])
+        lines = int(line.max()) + 1
+        if 3 <= lines <= max(P // 2, 3):
+            return f"whole lines of {name}", np.minimum(
+                line * most // max(lines, most), most - 1
+            ) if lines > most else line
+    spread = {
+        k: float(np.ptp(v)) / max(float(np.max(np.abs(v))), 1e-12) for k, v in X.items() if k in ("rpm", "J", "time_s")
+    }
+    name = max(spread, key=lambda k: spread[k])
+    rank = np.argsort(np.argsort(X[name], kind="stable"))
+    return f"intervals of {name}", rank * 4 // P
+
+
+def held_out(found: Evidence, name: str) -> tuple[str, Array, Array]:
+    """Predict every block from the others, with and without an explanation.
+
+    Parameters
+    ----------
+    found : Evidence
+        Outcome of the weighing.
+    name : str
+        Explanation.
+
+    Returns
+    -------
+    tuple
+        What the blocks are, (M,) prediction of the explanation and (M,) of a physics-free smooth error.
+    """
+    problem = found.problem
+    words, block = blocks(problem)
+    member = block[problem.point]
+    hyper = found.states[0].hyper
+    C = noise.covariance(problem, hyper)
+    K = next((k for n, k in noise.rivals(problem) if n == found.states[0].best_rival), np.zeros_like(C))
+    ids = tuple(name.split("+")) if name not in ("none", "unknown") else ()
+    S, log_w = _columns(found, ids)
+    r = problem.residual
+    after, smooth_part = np.array(problem.f0), np.array(problem.f0)
+    systematic = C - hyper.scale**2 * noise.noise(problem, hyper.ar)
+    own = form_covariance(found, fit(found, name))
+    for b in np.unique(member):
+        test, train = member == b, member != b
+        if not train.any():
+            continue
+        white = noise.whitener((C + own)[np.ix_(train, train)], problem.u[train])
+        w = white(np.column_stack([r[train], S[train]]))
+        gain = w[:, 1:].T @ w[:, 0] - 0.5 * np.sum(w[:, 1:] ** 2, axis=0) + log_w
+        p = _normal(gain) if gain.size else np.zeros(0)
+        expected = S @ p if gain.size else np.zeros_like(r)
+        cross = (systematic + own)[np.ix_(test, train)]
+        after[test] += expected[test] + cross @ _solve(white, (r - expected)[train])
+        white = noise.whitener((C + K)[np.ix_(train, train)], problem.u[train])
+        smooth_part[test] += (systematic + K)[np.ix_(test, train)] @ _solve(white, r[train])
+    return words, after, smooth_part
+
+
+def _columns(found: Evidence, ids: Sequence[str]) -> tuple[Array, Array]:
+    """Signatures of an explanation; of a pair the settings near the best one."""
+    M = found.problem.y.size
+    if not ids:
+        return np.zeros((M, 0)), np.zeros(0)
+    if len(ids) == 1:
+        c = found.of(ids[0])
+        return c.signatures, np.log(c.weight)
+    best = fit(found, "+".join(ids))
+    a, b = (found.of(i) for i in ids)
+    i, j = (col - found.spans[k].start for col, k in zip(best.columns, ids, strict=True))
+    interaction = best.signature - a.signatures[:, i] - b.signatures[:, j]
+    rows, weight = [], []
+    for k in range(a.weight.size):
+        for m in range(b.weight.size):
+            rows.append(a.signatures[:, k] + b.signatures[:, m] + interaction)
+            weight.append(np.log(a.weight[k] * b.weight[m]))
+    return np.stack(rows, axis=1), np.array(weight)
+
+
+def _solve(white: noise.Whitener, x: Array) -> Array:
+    from scipy.linalg import solve_triangular
+
+    return np.asarray(solve_triangular(white.factor, white(x), lower=True, trans="T", check_finite=False))
+
+
+def form_covariance(found: Evidence, best: Fit) -> Array:
+    """Covariance of the error of the forms of an explanation at its best setting, (M, M)."""
+    M = found.problem.y.size
+    modes = form_modes(found.problem, found.candidates)
+    out = np.zeros((M, M))
+    for i, c in zip(best.ids, best.columns, strict=True):
+        B = found.of(i).signatures[:, c - found.spans[i].start, None] * modes[i]
+        out += B @ B.T
+    return out
+
+
+def smooth(found: Evidence, best: Fit) -> Array:
+    """What nuisances, the solver's own error and that of the effect's form add to an explanation, posterior mean.
+
+    Parameters
+    ----------
+    found : Evidence
+        Outcome of the weighing.
+    best : Fit
+        The explanation.
+
+    Returns
+    -------
+    (M,) float
+        Systematic part of the rest, in the unit of each reading.
+    """
+    problem, hyper = found.problem, found.states[0].hyper
+    C = noise.covariance(problem, hyper) + form_covariance(found, best)
+    systematic = C - hyper.scale**2 * noise.noise(problem, hyper.ar)
+    return np.asarray(systematic @ _solve(noise.whitener(C, problem.u), problem.residual - best.signature))
+
+
+def left_over(found: Evidence, name: str) -> float:
+    """Logarithm of the odds that something smooth is left when an explanation is taken away.
+
+    Parameters
+    ----------
+    found : Evidence
+        Outcome of the weighing.
+    name : str
+        Explanation.
+
+    Returns
+    -------
+    float
+        Natural logarithm, averaged over the rival kernels [1].
+    """
+    problem, hyper = found.problem, found.states[0].hyper
+    best = fit(found, name)
+    rest = problem.residual - best.signature
+    C = noise.covariance(problem, hyper) + form_covariance(found, best)
+    white = noise.whitener(C, problem.u)
+    w = white(rest)
+    base = 0.5 * float(w @ w) + white.log_det
+    gains = []
+    for _, K in noise.rivals(problem):
+        rival = noise.whitener(C + K, problem.u)
+        v = rival(rest)
+        gains.append(base - 0.5 * float(v @ v) - rival.log_det)
+    return float(log_mean(np.array(gains), np.full(len(gains), -np.log(len(gains))))) if gains else float("-inf")

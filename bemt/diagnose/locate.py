@@ -1,0 +1,144 @@
+"""Where the mismatch sits: channel, variable, interval, and how large it is there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt import effects
+from bemt.diagnose import fit as fitting
+from bemt.diagnose.problem import CHANNELS
+
+if TYPE_CHECKING:
+    from bemt.diagnose.evidence import Evidence
+    from bemt.diagnose.fit import Fit
+
+__all__ = ["Location", "locate"]
+
+Array = NDArray[np.float64]
+
+_BINS = 12
+# Variables that explain the mismatch this nearly as well as the best one are ties: many of them move together.
+_TIE = 0.04
+_ORDER = ("J", "M_tip", "Re", "rpm", "wall_distance_m", "tip_gap_m", "sideslip_rad", "time_s", "temperature_K",
+          "density_kg_m3", "voltage_V", "current_A", "pwm_s", "run")  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Location:
+    """An interval of one variable in one channel.
+
+    Attributes
+    ----------
+    channel, variable : str
+        Reading and covariate.
+    low, high : float
+        Interval of the covariate, in its unit.
+    size : float
+        Mean mismatch in the interval over the mean reading there [1].
+    z : float
+        Sum of the standardised mismatch over the root of the number of readings [1].
+    ties : tuple of str
+        Other variables that explain it as well in this plan.
+    """
+
+    channel: str
+    variable: str
+    low: float
+    high: float
+    size: float
+    z: float
+    ties: tuple[str, ...] = ()
+
+    def document(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        return {k: (list(v) if isinstance(v, tuple) else v) for k, v in vars(self).items()}
+
+
+def mismatch(found: Evidence, best: Fit) -> Array:
+    """Recording minus baseline, free of what nuisances take in the light of an explanation, (M,)."""
+    return np.asarray(found.problem.residual - fitting.smooth(found, best))
+
+
+def locate(found: Evidence, best: Fit) -> Location:
+    """Find channel, variable and interval of the mismatch.
+
+    Parameters
+    ----------
+    found : Evidence
+        Outcome of the weighing.
+    best : Fit
+        Preferred explanation; "none" for a bare residual.
+
+    Returns
+    -------
+    Location
+        Largest scan statistic; among variables that tie, the one along which the effect acts by its nature.
+    """
+    problem = found.problem
+    d = mismatch(found, best)
+    e = d / (problem.u * found.states[0].hyper.scale)
+    natural = tuple(v for i in best.ids for v in effects.catalogue()[i].along)
+    channel = max(np.unique(problem.channel), key=lambda c: float(np.sum(e[problem.channel == c] ** 2)))
+    here = problem.channel == channel
+    scores = {}
+    for name in _ORDER:
+        if name not in problem.covariates:
+            continue
+        x = problem.covariates[name][problem.point][here]
+        if np.ptp(x) > 1e-6 * max(float(np.max(np.abs(x))), 1e-12):
+            scores[name] = _explained(x, e[here])
+    if not scores:
+        name = "rpm"
+        ties: tuple[str, ...] = ()
+    else:
+        top = max(scores.values())
+        tied = [n for n, s in scores.items() if s >= top - _TIE]
+        name = next((n for n in natural if n in tied), tied[0])
+        ties = tuple(n for n in tied if n != name)
+    x = problem.covariates[name][problem.point][here]
+    low, high, z = _scan(x, e[here])
+    inside = (x >= low) & (x <= high)
+    size = float(np.mean(d[here][inside]) / max(float(np.mean(np.abs(problem.f0[here][inside]))), 1e-12))
+    return Location(CHANNELS[int(channel)], name, low, high, size, z, ties)
+
+
+def _groups(x: Array) -> NDArray[np.intp]:
+    """Group of each value: distinct values where there are few, quantiles otherwise."""
+    order = np.argsort(x, kind="stable")
+    step = np.diff(x[order]) > 0.01 * float(np.ptp(x))
+    group = np.empty(x.size, dtype=np.intp)
+    group[order] = np.cumsum(np.r_[0, step])
+    if group.max() + 1 > _BINS:
+        rank = np.empty(x.size, dtype=np.intp)
+        rank[order] = np.arange(x.size)
+        group = rank * _BINS // x.size
+    return group
+
+
+def _explained(x: Array, e: Array) -> float:
+    """Share of the squares of e that its means over groups of x explain, less what chance would give."""
+    group = _groups(x)
+    count = np.bincount(group).astype(float)
+    mean = np.bincount(group, e) / np.maximum(count, 1.0)
+    total = float(e @ e)
+    explained = float(np.sum(count * mean**2))
+    k = int(np.sum(count > 0))
+    return (explained - k) / max(total, 1e-12)
+
+
+def _scan(x: Array, e: Array) -> tuple[float, float, float]:
+    """Interval of the groups of x with the largest sum of e over the root of its size."""
+    group = _groups(x)
+    labels = np.unique(group)
+    best = (float(x.min()), float(x.max()), 0.0)
+    for i in range(labels.size):
+        for j in range(i, labels.size):
+            inside = (group >= labels[i]) & (group <= labels[j])
+            z = float(np.sum(e[inside]) / np.sqrt(inside.sum()))
+            if abs(z) > abs(best[2]):
+                best = (float(x[inside].min()), float(x[inside].max()), z)
+    return best

@@ -1,0 +1,250 @@
+"""What the readings may scatter by: noise, its correlation in time, nuisances, and what the solver gets wrong anyway.
+
+Four numbers are not known beforehand and are marginalised over a small grid: how much larger the noise is than stated,
+how it is correlated from point to point, how far blade element theory itself is off (a smooth error over advance ratio,
+a tenth of whose variance may change with speed), and the readings decide between them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from bemt.diagnose.problem import Problem
+
+__all__ = ["Hyper", "Whitener", "discrepancy", "hypers", "rivals", "whitener"]
+
+Array = NDArray[np.float64]
+
+# Noise over the stated uncertainty, or over the default where none is stated; correlation of neighbours.
+_SCALES = {True: (0.7, 1.0, 1.5, 2.5), False: (0.1, 0.25, 0.5, 1.0, 2.0, 4.0)}
+_AR = (0.0, 0.6, 0.9)
+_WHITE = 0.2
+# Error of the solver as a share of the largest coefficient: prior weights are declared, see docs.
+_MODEL = {0.0: 0.2, 0.01: 0.3, 0.03: 0.3, 0.08: 0.2}
+_MODEL_RPM = 0.1
+_LENGTH_J = 0.3
+_LENGTH_RPM = 0.7
+# Below the smooth error there is a finer one: stall and transition set in at other advance ratios than computed.
+_MODEL_FINE = 0.1
+_LENGTH_FINE = 0.08
+# Length, over the spread of each variable, on which the form of an effect may be off.
+_FORM_LENGTH = 0.7
+# Unknown smooth effect: lengths over the spread of a variable, sizes as a share of the largest coefficient.
+_RIVAL_LENGTHS = (0.15, 0.5)
+_RIVAL_SIZES = (0.03, 0.12)
+
+
+@dataclass(frozen=True)
+class Hyper:
+    """One setting of the unknown numbers of the covariance.
+
+    Attributes
+    ----------
+    scale : float
+        Noise over stated uncertainty [1].
+    ar : float
+        Correlation of neighbouring points of a run [1].
+    model : float
+        Error of the solver, share of the largest coefficient [1].
+    weight : float
+        Prior probability [1].
+    """
+
+    scale: float
+    ar: float
+    model: float
+    weight: float
+
+
+def hypers(problem: Problem) -> tuple[Hyper, ...]:
+    """All settings, with prior weights that add up to 1.
+
+    Parameters
+    ----------
+    problem : Problem
+        Says whether uncertainties are stated.
+
+    Returns
+    -------
+    tuple of Hyper
+        The grid.
+    """
+    scales = _SCALES[problem.u_known]
+    each = 1.0 / (len(scales) * len(_AR))
+    return tuple(Hyper(s, a, m, each * w) for s in scales for a in _AR for m, w in _MODEL.items())
+
+
+def _order(problem: Problem) -> tuple[Array, Array]:
+    """Run and position in time of every point."""
+    run = problem.covariates["run"]
+    time = problem.covariates.get("time_s", np.arange(run.size, dtype=float))
+    place = np.zeros(run.size)
+    for label in np.unique(run):
+        mine = np.flatnonzero(run == label)
+        place[mine[np.argsort(time[mine], kind="stable")]] = np.arange(mine.size)
+    return run, place
+
+
+def noise(problem: Problem, ar: float) -> Array:
+    """Covariance of the noise at the stated uncertainty, (M, M)."""
+    if ar == 0.0:
+        return np.diag(problem.u**2)
+    run, place = _order(problem)
+    p, c = problem.point, problem.channel
+    same = (run[p][:, None] == run[p][None, :]) & (c[:, None] == c[None, :])
+    correlation = np.where(same, ar ** np.abs(place[p][:, None] - place[p][None, :]), 0.0)
+    correlation = (1.0 - _WHITE) * correlation + _WHITE * np.eye(p.size)
+    return np.asarray(correlation * problem.u[:, None] * problem.u[None, :])
+
+
+def discrepancy(problem: Problem) -> Array:
+    """Covariance of the solver's own error of relative size 1, (M, M): smooth in J, nearly constant in speed."""
+    J = problem.covariates["J"][problem.point]
+    n = np.log(problem.covariates["rpm"][problem.point])
+    spread = max(float(np.ptp(J)), 0.6)
+    apart = ((J[:, None] - J[None, :]) / spread) ** 2
+    kernel = (1.0 - _MODEL_FINE) * np.exp(-0.5 * apart / _LENGTH_J**2) + _MODEL_FINE * np.exp(
+        -0.5 * apart / _LENGTH_FINE**2
+    )
+    kernel *= 1.0 - _MODEL_RPM + _MODEL_RPM * np.exp(-0.5 * ((n[:, None] - n[None, :]) / _LENGTH_RPM) ** 2)
+    same = (problem.channel[:, None] == problem.channel[None, :]) & (problem.part[:, None] == problem.part[None, :])
+    load = (problem.channel < 2)[:, None] & (problem.channel < 2)[None, :]
+    return np.asarray(np.where(same & load, kernel, 0.0) * problem.scale[:, None] * problem.scale[None, :])
+
+
+@dataclass(frozen=True, eq=False)
+class Whitener:
+    """Cholesky factor of one covariance.
+
+    Attributes
+    ----------
+    factor : (M, M) float
+        Lower triangular.
+    log_det : float
+        Sum of the logarithms of its diagonal.
+    """
+
+    factor: Array
+    log_det: float
+
+    def __call__(self, vectors: Array) -> Array:
+        """Whiten vectors or columns."""
+        from scipy.linalg import solve_triangular
+
+        return np.asarray(solve_triangular(self.factor, vectors, lower=True, check_finite=False))
+
+
+def whitener(covariance: Array, u: Array) -> Whitener:
+    """Factor a covariance.
+
+    Parameters
+    ----------
+    covariance : (M, M) float
+        Symmetric, positive.
+    u : (M,) float
+        Size of the readings' noise, to keep rounding away.
+
+    Returns
+    -------
+    Whitener
+        Its factor.
+    """
+    jitter = np.diag((1e-4 * u) ** 2)
+    factor = np.asarray(np.linalg.cholesky(covariance + jitter), dtype=float)
+    return Whitener(factor, float(np.sum(np.log(np.diag(factor)))))
+
+
+def covariance(problem: Problem, h: Hyper) -> Array:
+    """Covariance of noise, nuisances and solver for one setting, (M, M)."""
+    fixed = problem.tangents @ problem.tangents.T
+    return np.asarray(h.scale**2 * noise(problem, h.ar) + fixed + h.model**2 * discrepancy(problem))
+
+
+def covariances(problem: Problem) -> Iterator[tuple[Hyper, Array]]:
+    """Covariance of noise, nuisances and solver for every setting."""
+    fixed = problem.tangents @ problem.tangents.T
+    wrong = discrepancy(problem)
+    by_ar = {ar: noise(problem, ar) for ar in _AR}
+    for h in hypers(problem):
+        yield h, h.scale**2 * by_ar[h.ar] + fixed + h.model**2 * wrong
+
+
+def rivals(problem: Problem) -> tuple[tuple[str, Array], ...]:
+    """Covariances of an unknown smooth effect: along each recorded variable, and pairs of them.
+
+    Parameters
+    ----------
+    problem : Problem
+        Readings.
+
+    Returns
+    -------
+    tuple of (str, (M, M) float)
+        Name ("thrust and torque over J, M_tip: 10 %") and covariance.
+    """
+    X: dict[str, Array] = {}
+    for name, values in problem.covariates.items():
+        if name in ("run", "Re", "M_tip", "pressure_Pa"):
+            continue
+        x = np.log(values) if name == "rpm" and np.all(values > 0) else values
+        spread = float(np.ptp(x))
+        if spread > 1e-3 * max(float(np.max(np.abs(x))), 1e-12) and np.unique(np.round(x / spread, 6)).size >= 3:
+            X[name] = (x - x.min()) / spread
+    sets: list[tuple[str, ...]] = [(name,) for name in X]
+    if {"rpm", "J"} <= set(X):
+        sets.append(("rpm", "J"))
+    p, c = problem.point, problem.channel
+    same = c[:, None] == c[None, :]
+    S = problem.scale[:, None] * problem.scale[None, :]
+    present = [k for k in (0, 1, 2) if np.any(c == k)]
+    words = ("thrust", "torque", "speed")
+    groups = [tuple(present)] if len(present) == 1 else [tuple(present), *((k,) for k in present)]
+    out = []
+    for names in sets:
+        for length in _RIVAL_LENGTHS:
+            kernel = np.ones((p.size, p.size))
+            for name in names:
+                x = X[name][p]
+                kernel *= np.exp(-0.5 * ((x[:, None] - x[None, :]) / length) ** 2)
+            for group in groups:
+                inside = np.isin(c, group)
+                K = np.where(same & inside[:, None] & inside[None, :], kernel, 0.0) * S
+                for size in _RIVAL_SIZES:
+                    label = " and ".join(words[k] for k in group)
+                    out.append((f"{label} over {', '.join(names)}: {size:.0%}", size**2 * K))
+    return tuple(out)
+
+
+def smooth_modes(problem: Problem) -> Array:
+    """Modes of a smooth function of unit variance over everything that varies, each channel for itself.
+
+    Parameters
+    ----------
+    problem : Problem
+        Readings.
+
+    Returns
+    -------
+    (M, q) float
+        Columns whose products add up to the covariance, but for small modes [1].
+    """
+    P = problem.covariates["rpm"].size
+    apart = np.zeros((P, P))
+    for name, values in problem.covariates.items():
+        if name in ("run", "Re", "M_tip", "pressure_Pa"):
+            continue
+        x = np.log(values) if name == "rpm" else values
+        spread = float(np.ptp(x))
+        if spread > 1e-3 * max(float(np.max(np.abs(x))), 1e-12):
+            apart += ((x[:, None] - x[None, :]) / (_FORM_LENGTH * spread)) ** 2
+    value, vector = np.linalg.eigh(np.exp(-0.5 * apart))
+    keep = value > 0.02 * value[-1]
+    modes = (vector[:, keep] * np.sqrt(value[keep]))[problem.point]
+    channels = np.unique(problem.channel)
+    return np.concatenate([np.where((problem.channel == c)[:, None], modes, 0.0) for c in channels], axis=1)

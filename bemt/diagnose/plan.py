@@ -1,0 +1,189 @@
+"""Before anyone measures: which effects a test plan can see, and which it cannot tell apart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bemt import effects
+from bemt.diagnose import confusion as look
+from bemt.diagnose import evidence, noise, problem, signatures
+from bemt.diagnose import suggest as suggestion
+from bemt.diagnose.record import Record
+from bemt.tables import text_table
+
+if TYPE_CHECKING:
+    from bemt.case import Case
+
+__all__ = ["SCHEMA", "Plan", "document", "plan", "points", "text"]
+
+SCHEMA = "bemt.plan/1"
+
+# What a plan may count on: noise as stated, and a solver error that earlier comparisons suggest.
+_HYPER = (1.0, 0.0, 0.01)
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """What a plan can do.
+
+    Attributes
+    ----------
+    confusion : Confusion
+        Sizes and distances.
+    absent : dict of str to str
+        Effects that cannot show, and why.
+    added : Suggestion or None
+        A run that separates the largest pair of look-alikes.
+    points : int
+        Points of the plan [1].
+    """
+
+    confusion: look.Confusion
+    absent: dict[str, str]
+    added: suggestion.Suggestion | None
+    points: int
+
+    @property
+    def sight(self) -> dict[str, str]:
+        """Each effect: visible, marginal or invisible at its ordinary strength."""
+        words = {}
+        for i, s in zip(self.confusion.ids, self.confusion.size, strict=True):
+            words[i] = "visible" if s >= look.VISIBLE else "marginal" if s >= look.ALIKE else "invisible"
+        return words | dict.fromkeys(self.absent, "invisible")
+
+
+def points(load: Callable[[str, Case], Record], path: str, case: Case) -> Record:
+    """Read the points of a plan: a recording whose loads are not there yet.
+
+    Parameters
+    ----------
+    load : callable
+        Reader of recordings.
+    path : str
+        Table with rpm, airspeed_m_s and what else is planned; loads are ignored.
+    case : Case
+        The case.
+
+    Returns
+    -------
+    Record
+        With loads that mean nothing.
+    """
+    from bemt.diagnose.record import from_series
+    from bemt.errors import Fault, InputError
+    from bemt.import_files import import_file
+    from bemt.series import Series
+
+    imported = import_file(path)
+    values = {k: c.values for k, c in imported.channels.items() if c.unit or k in ("rpm", "J", "run")}
+    if "rpm" not in values:
+        raise InputError(Fault(path, "", f"columns {', '.join(imported.channels)}", "a column rpm"))
+    n = imported.rows
+    loads = {k: values.get(k, np.ones(n)) for k in ("thrust_N", "torque_Nm")}
+    lawful = {k: v for k, v in values.items() if not k.startswith("u_")}
+    u = {k[2:]: np.abs(v) for k, v in values.items() if k.startswith("u_") and k[2:] in loads}
+    return from_series(Series("bench", path, lawful | loads, u), case)
+
+
+def plan(record: Record, case: Case, progress: Callable[[str], None] | None = None) -> Plan:
+    """Say what a plan can see.
+
+    Parameters
+    ----------
+    record : Record
+        Points; their loads are replaced by those of the baseline.
+    case : Case
+        The case.
+    progress : callable, optional
+        Told what is being done.
+
+    Returns
+    -------
+    Plan
+        Sizes, distances, a run to add.
+    """
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1, "blas"):
+        return _plan(record, case, progress)
+
+
+def _plan(record: Record, case: Case, progress: Callable[[str], None] | None) -> Plan:
+    first = problem.build([record], [case])
+    flow = first.parts[0].flow
+    own = {"thrust_N": flow.T0, "torque_Nm": flow.Q0}
+    measured = {k: own[k] for k in record.measured if k in own}
+    whole = problem.assemble((replace(first.parts[0], record=replace(record, measured=measured), _solved={}),))
+    candidates, absent = signatures.candidates(
+        whole, None, (lambda n: progress(f"solving with {n}")) if progress else None
+    )
+    found = evidence.bare(whole, candidates, noise.Hyper(*_HYPER, 1.0))
+    alike = look.confusion(found)
+    added = None
+    groups = sorted(alike.classes(), key=len, reverse=True)
+    if groups:
+        a, b = groups[0][:2]
+        settings = {c.id: c.settings[c.middle] for c in candidates}
+        added = suggestion.suggest(found, (a, settings[a]), (b, settings[b]))
+    return Plan(alike, absent, added, len(record))
+
+
+def document(answer: Plan) -> dict[str, Any]:
+    """Give the document ``bemt.plan/1``.
+
+    Parameters
+    ----------
+    answer : Plan
+        The answer.
+
+    Returns
+    -------
+    dict
+        Fit for JSON.
+    """
+    c = answer.confusion
+    return {
+        "schema": SCHEMA, "points": answer.points, "sight": answer.sight,
+        "size": {i: float(s) for i, s in zip(c.ids, c.size, strict=True)},
+        "classes": c.classes(),
+        "distance": {i: {j: float(c.distance[a, b]) for b, j in enumerate(c.ids)} for a, i in enumerate(c.ids)},
+        "not_tried": answer.absent,
+        "next_measurement": None if answer.added is None else answer.added.document(),
+    }  # fmt: skip
+
+
+def text(answer: Plan) -> str:
+    """Tables for a terminal.
+
+    Parameters
+    ----------
+    answer : Plan
+        The answer.
+
+    Returns
+    -------
+    str
+        Sight of each effect, classes, the run to add.
+    """
+    c = answer.confusion
+    order = np.argsort(-c.size)
+    rows = []
+    for a in order:
+        near = [(c.distance[a, b], c.ids[b]) for b in range(len(c.ids)) if b != a and c.size[b] >= look.ALIKE]
+        nearest = min(near, default=(float("nan"), "-"))
+        rows.append([c.ids[a], effects.catalogue()[c.ids[a]].title, f"{c.size[a]:.1f}", answer.sight[c.ids[a]],
+                     f"{nearest[1]} ({nearest[0]:.1f})" if near else "-"])  # fmt: skip
+    header = ["effect", "", "size", "sight", "nearest look-alike"]
+    out = [f"plan of {answer.points} points: size of each effect at ordinary strength, in standard deviations",
+           text_table(header, rows, left=(0, 1, 3, 4), indent="  ")]  # fmt: skip
+    for group in c.classes():
+        out.append(f"  not told apart: {', '.join(group)}")
+    if answer.added is not None:
+        a = answer.added
+        out.append(f"  to add: {a.text} (separates {' from '.join(a.separates)}: {a.before:.1f} to {a.after:.1f})")
+    out += [f"  cannot show: {i}: {why}" for i, why in answer.absent.items()]
+    return "\n".join(out)

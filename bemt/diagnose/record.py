@@ -1,0 +1,297 @@
+"""A series of measured or computed points becomes what a diagnosis works on: channels, conditions, covariates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.air import Air
+from bemt.errors import Fault, InputError
+from bemt.units import ZERO_CELSIUS
+
+if TYPE_CHECKING:
+    from bemt.case import Case
+    from bemt.series import Series
+
+__all__ = ["COVARIATES", "Record", "air_of", "concatenated", "from_series", "merged"]
+
+Array = NDArray[np.float64]
+
+COVARIATES = (
+    "time_s", "temperature_K", "pressure_Pa", "voltage_V", "current_A", "pwm_s", "tip_gap_m", "wall_distance_m",
+    "sideslip_rad", "run",
+)  # fmt: skip
+"""Channels of a series, besides the conditions, that an effect may know."""
+
+MAX_POINTS = 160
+"""Points beyond this number are averaged in blocks of neighbours: they would cost time and add nothing. [1]"""
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """P points of one recording.
+
+    Parameters
+    ----------
+    name : str
+        What was recorded.
+    rpm, V : (P,) float
+        Speed of rotation [rev/min], axial onset speed [m/s].
+    air : Air
+        Its fields are (P,) arrays.
+    measured : dict of str to (P,) float
+        thrust_N, torque_Nm, and rpm where a pulse width was recorded; NaN: not measured.
+    u : dict of str to (P,) float
+        Standard uncertainty of each, uncorrelated part; NaN: unknown.
+    extra : dict of str to (P,) float
+        Covariates of :data:`COVARIATES` that were recorded.
+    gain, zero : dict of str to float
+        Correlated standard uncertainty of a channel: share of the value [1], in its unit.
+    air_recorded : bool
+        Whether density, or pressure and temperature, came with the recording.
+    notes : tuple of str
+        What was assumed or dropped.
+    """
+
+    name: str
+    rpm: Array
+    V: Array
+    air: Air
+    measured: dict[str, Array]
+    u: dict[str, Array]
+    extra: dict[str, Array] = field(default_factory=dict)
+    gain: Mapping[str, float] = field(default_factory=dict)
+    zero: Mapping[str, float] = field(default_factory=dict)
+    air_recorded: bool = False
+    notes: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        """Give the number of points."""
+        return int(self.rpm.size)
+
+    def take(self, index: NDArray[Any]) -> Record:
+        """Give some of the points.
+
+        Parameters
+        ----------
+        index : (K,) int or (P,) bool
+            Points to keep.
+
+        Returns
+        -------
+        Record
+            In that order.
+        """
+
+        def cut(values: Mapping[str, Array]) -> dict[str, Array]:
+            return {key: v[index] for key, v in values.items()}
+
+        return Record(
+            self.name, self.rpm[index], self.V[index], air_of({k: getattr(self.air, k)[index] for k in _AIR}),
+            cut(self.measured), cut(self.u), cut(self.extra), self.gain, self.zero, self.air_recorded, self.notes,
+        )  # fmt: skip
+
+
+_AIR = ("rho", "mu", "a_sound", "temperature_K")
+
+
+def air_of(fields: Mapping[str, Array]) -> Air:
+    """State of the air with (P,) arrays as fields: rho, mu, a_sound, temperature_K."""
+    return cast("Air", SimpleNamespace(**fields))
+
+
+def from_series(series: Series, case: Case, correlated: Mapping[str, Mapping[str, float]] | None = None) -> Record:
+    """Points of a series with the conditions that the case adds.
+
+    Parameters
+    ----------
+    series : Series
+        Any kind.  Thrust and torque may be given as coefficients, torque as shaft power.
+    case : Case
+        Diameter, speed and air where the series has none.
+    correlated : mapping, optional
+        Uncertainty that all points of a channel share: ``gain`` [1], ``zero`` [unit of the channel].
+
+    Returns
+    -------
+    Record
+        Points with a speed and at least one load.
+
+    Raises
+    ------
+    InputError
+        If there is no load, or fewer than three points remain.
+    """
+    notes: list[str] = []
+    n = len(series)
+    values = {key: np.asarray(v, dtype=float) for key, v in series.values.items()}
+    if "rpm" not in values:
+        values["rpm"] = np.full(n, case.rpm)
+        notes.append(f"rpm: not recorded; {case.rpm:g} rev/min of the case")
+    air, recorded = _states(values, case, notes)
+    filled = series.derive(case.diameter_m, air.rho) if "rpm" in series else _with_rpm(series, case, air)
+    got = {key: np.asarray(v, dtype=float) for key, v in filled.values.items()}
+    measured: dict[str, Array] = {}
+    u: dict[str, Array] = {}
+    for name in ("thrust_N", "torque_Nm"):
+        if name in got and np.isfinite(got[name]).any():
+            measured[name], u[name] = got[name].copy(), np.asarray(filled.u[name], dtype=float).copy()
+    if not measured:
+        channels = ", ".join(series.values)
+        raise InputError(
+            Fault(series.name, "", f"channels {channels}", "a thrust, a torque or a power, or coefficients")
+        )
+    rpm = got["rpm"].copy()
+    if "airspeed_m_s" in got:
+        V = got["airspeed_m_s"].copy()
+    else:
+        V = np.full(n, case.airspeed_m_s)
+        notes.append(f"airspeed: not recorded; {case.airspeed_m_s:g} m/s of the case")
+    if "sideslip_deg" in got:
+        got["sideslip_rad"] = np.radians(got["sideslip_deg"])
+    extra = {k: got[k].copy() for k in COVARIATES if k in got and np.isfinite(got[k]).all()}
+    if "pwm_s" in extra and "rpm" in series and np.ptp(extra["pwm_s"]) > 0:
+        measured["rpm"], u["rpm"] = rpm.copy(), np.asarray(filled.u["rpm"], dtype=float).copy()
+    loads = np.any([np.isfinite(measured[k]) for k in measured if k != "rpm"], axis=0)
+    keep = np.isfinite(rpm) & (rpm > 0) & np.isfinite(V) & loads
+    if (~keep).any():
+        notes.append(f"{int((~keep).sum())} of {n} points without speed or load were left out")
+    if keep.sum() < 3:
+        raise InputError(Fault(series.name, "", f"{int(keep.sum())} points with speed and load", "three or more"))
+    correlated = correlated or {}
+    record = Record(
+        series.name, rpm, V, air, measured, u, extra,
+        {k: float(v["gain"]) for k, v in correlated.items() if v.get("gain")},
+        {k: float(v["zero"]) for k, v in correlated.items() if v.get("zero")}, recorded, tuple(notes),
+    ).take(np.flatnonzero(keep))  # fmt: skip
+    return _thinned(record)
+
+
+def _with_rpm(series: Series, case: Case, air: Air) -> Series:
+    from dataclasses import replace
+
+    rpm = np.full(len(series), case.rpm)
+    return replace(series, values={**series.values, "rpm": rpm}).derive(case.diameter_m, air.rho)
+
+
+def _states(values: Mapping[str, Array], case: Case, notes: list[str]) -> tuple[Air, bool]:
+    """Air per point: density, or pressure and temperature, of the recording; else of the case."""
+    n = len(values["rpm"])
+    default = case.air()
+    rho, temperature = values.get("density_kg_m3"), values.get("temperature_K")
+    pressure, humidity = values.get("pressure_Pa"), values.get("humidity_fraction")
+    fields = {key: np.full(n, float(getattr(default, key))) for key in _AIR}
+    recorded = False
+    cache: dict[tuple[float, ...], Air] = {}
+    for i in range(n):
+        t = temperature[i] if temperature is not None and np.isfinite(temperature[i]) else fields["temperature_K"][i]
+        if rho is not None and np.isfinite(rho[i]):
+            key: tuple[float, ...] = (0.0, float(rho[i]), float(t))
+            if key not in cache:
+                cache[key] = Air.from_density(key[1], key[2] - ZERO_CELSIUS)
+        elif pressure is not None and np.isfinite(pressure[i]):
+            wet = humidity[i] * 100.0 if humidity is not None and np.isfinite(humidity[i]) else 0.0
+            key = (1.0, float(pressure[i]), float(t), float(wet))
+            if key not in cache:
+                cache[key] = Air.from_state(key[1], key[2] - ZERO_CELSIUS, key[3])
+        elif temperature is not None and np.isfinite(temperature[i]):
+            # pressure of the case, temperature of the recording
+            key = (2.0, float(t))
+            if key not in cache:
+                ratio = float(default.temperature_K) / key[1]
+                cache[key] = Air.from_density(float(default.rho) * ratio, key[1] - ZERO_CELSIUS)
+        else:
+            continue
+        recorded = recorded or key[0] < 2.0
+        for name in _AIR:
+            fields[name][i] = float(getattr(cache[key], name))
+    if not recorded:
+        notes.append(f"density: not recorded; {float(default.rho):.4g} kg/m3 of the case")
+    return air_of(fields), recorded
+
+
+def _thinned(record: Record) -> Record:
+    """Average blocks of neighbours when there are too many points, never over the ends of a run."""
+    P = len(record)
+    if P <= MAX_POINTS:
+        return record
+    size = -(-P // MAX_POINTS)
+    run = record.extra.get("run", np.zeros(P))
+    start = np.flatnonzero(np.r_[True, np.diff(run) != 0])
+    within = np.arange(P) - np.repeat(start, np.diff(np.r_[start, P]))
+    block = np.cumsum(np.r_[True, (np.diff(run) != 0) | (within[1:] % size == 0)]) - 1
+    count = np.bincount(block).astype(float)
+
+    def mean(values: Array) -> Array:
+        return np.asarray(np.bincount(block, values) / count)
+
+    # neighbours share slow errors: their mean is taken to be no better than one of them
+    note = f"{P} points averaged in blocks of {size} neighbours"
+    return Record(
+        record.name, mean(record.rpm), mean(record.V), air_of({k: mean(getattr(record.air, k)) for k in _AIR}),
+        {k: mean(v) for k, v in record.measured.items()}, {k: mean(v) for k, v in record.u.items()},
+        {k: mean(v) for k, v in record.extra.items()}, record.gain, record.zero, record.air_recorded,
+        (*record.notes, note),
+    )  # fmt: skip
+
+
+def merged(records: Sequence[Record]) -> Record:
+    """Join recordings of one rotor into one, with their runs numbered through.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        One or more of the same case.
+
+    Returns
+    -------
+    Record
+        Channels of all, NaN where a part has none; covariates that all have.
+    """
+    if len(records) == 1:
+        return records[0]
+    join = np.concatenate
+
+    def channel(of: str, name: str) -> Array:
+        return join([getattr(r, of).get(name, np.full(len(r), np.nan)) for r in records])
+
+    names = list(dict.fromkeys(n for r in records for n in r.measured))
+    notes = tuple(dict.fromkeys(note for r in records for note in r.notes))
+    return _thinned(Record(
+        ", ".join(r.name for r in records), join([r.rpm for r in records]), join([r.V for r in records]),
+        air_of({k: join([getattr(r.air, k) for r in records]) for k in _AIR}),
+        {n: channel("measured", n) for n in names}, {n: channel("u", n) for n in names}, concatenated(records),
+        {n: max(r.gain.get(n, 0.0) for r in records) for n in names if any(n in r.gain for r in records)},
+        {n: max(r.zero.get(n, 0.0) for r in records) for n in names if any(n in r.zero for r in records)},
+        all(r.air_recorded for r in records), notes,
+    ))  # fmt: skip
+
+
+def concatenated(records: Sequence[Record]) -> dict[str, Array]:
+    """Covariates that all records share, joined, with runs numbered through.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        One or more.
+
+    Returns
+    -------
+    dict
+        Name to (P,) over all points.
+    """
+    names = [n for n in COVARIATES if all(n in r.extra for r in records)]
+    joined = {n: np.concatenate([r.extra[n] for r in records]) for n in names}
+    runs, offset = [], 0.0
+    for r in records:
+        own = r.extra.get("run", np.zeros(len(r)))
+        _, index = np.unique(own, return_inverse=True)
+        runs.append(index + offset)
+        offset += float(index.max()) + 1.0
+    joined["run"] = np.concatenate(runs).astype(float)
+    return joined

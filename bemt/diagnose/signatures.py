@@ -1,0 +1,179 @@
+"""Every effect solved over its physical ranges: what each would change in these readings.
+
+Parameters are solved at a few values and interpolated between them, so that evidence becomes linear algebra over a
+fixed set of vectors, for the recording and for hundreds of bootstrapped nulls alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt import effects
+
+if TYPE_CHECKING:
+    from bemt.diagnose.problem import Problem
+    from bemt.effects import Effect
+
+__all__ = ["Candidate", "candidates", "effect_of"]
+
+Array = NDArray[np.float64]
+
+_FINE = {1: 41, 2: 15, 3: 7}
+_LARGEST = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """One effect over its ranges.
+
+    Attributes
+    ----------
+    id : str
+        Effect.
+    settings : tuple of dict
+        G settings of its parameters.
+    signatures : (M, G) float
+        Change of the readings for each.
+    weight : (G,) float
+        Prior probability of each setting, adds up to 1.
+    solved : (G,) bool
+        Whether the setting was solved rather than interpolated.
+    """
+
+    id: str
+    settings: tuple[dict[str, Any], ...]
+    signatures: Array
+    weight: Array
+    solved: NDArray[np.bool_]
+
+    @property
+    def kind(self) -> str:
+        """Kind of the effect: air, stand or drive."""
+        return effects.catalogue()[self.id].kind
+
+    @property
+    def middle(self) -> int:
+        """Setting that stands for the effect at ordinary strength: the one of median size."""
+        size = np.sqrt(np.sum(self.signatures**2, axis=0))
+        size = np.where(size > 0, size, np.nan)
+        if not np.isfinite(size).any():
+            return 0
+        return int(np.nanargmin(np.abs(size - np.nanmedian(size))))
+
+
+def effect_of(id: str, setting: dict[str, Any]) -> Effect:  # noqa: A002
+    """Effect with a setting of its parameters.
+
+    Parameters
+    ----------
+    id : str
+        Effect.
+    setting : dict
+        Fields.
+
+    Returns
+    -------
+    Effect
+        The effect.
+    """
+    return effects.catalogue()[id](**setting)
+
+
+def candidates(
+    problem: Problem, only: Sequence[str] | None = None, progress: Callable[[str], None] | None = None
+) -> tuple[tuple[Candidate, ...], dict[str, str]]:
+    """Signatures of all effects that can be at work.
+
+    Parameters
+    ----------
+    problem : Problem
+        Readings and baseline.
+    only : sequence of str, optional
+        Effects to try; all by default.
+    progress : callable, optional
+        Told the id of each effect before it is solved.
+
+    Returns
+    -------
+    tuple
+        Candidates in the order of the catalogue, and why others cannot be seen, by id.
+    """
+    found: list[Candidate] = []
+    absent: dict[str, str] = {}
+    for name, cls in effects.catalogue().items():
+        if not cls.diagnosed or (only is not None and name not in only):
+            continue
+        if progress:
+            progress(name)
+        reasons = [cls().applies(p.flow) for p in problem.parts]
+        if all(reasons):
+            absent[name] = reasons[0]
+            continue
+        candidate = _candidate(problem, name, cls)
+        if candidate is None:
+            absent[name] = "it changes nothing in these readings"
+        else:
+            found.append(candidate)
+    return tuple(found), absent
+
+
+def _candidate(problem: Problem, name: str, cls: type[Effect]) -> Candidate | None:
+    present = next((e for e in problem.baseline if e.id == name), None)
+    given = cls().variants()
+    columns: list[tuple[dict[str, Any], Array, bool, float]] = []
+    if given is not None:
+        for setting in given:
+            columns.append((dict(setting), problem.signature((cls(**setting),)), True, 1.0 / len(given)))
+    else:
+        axes = [p for p in cls.parameters if p.steps > 0]
+        if not axes:
+            if present is None:
+                columns.append(({}, problem.signature((cls(),)), True, 1.0))
+        else:
+            columns.extend(_grid(problem, cls, axes))
+    floor = 1e-3 * problem.u
+    kept = [c for c in columns if np.isfinite(c[1]).all()]
+    if not any(np.any(np.abs(c[1]) > floor) for c in kept):
+        return None
+    weight = np.array([c[3] for c in kept])
+    return Candidate(
+        name, tuple(c[0] for c in kept), np.stack([c[1] for c in kept], axis=1), weight / weight.sum(),
+        np.array([c[2] for c in kept]),
+    )  # fmt: skip
+
+
+def _grid(
+    problem: Problem, cls: type[Effect], axes: Sequence[Any]
+) -> Iterator[tuple[dict[str, Any], Array, bool, float]]:
+    """Solve at the nodes of all parameters and interpolate between them by cubic splines."""
+    from scipy.interpolate import CubicSpline
+
+    nodes = [np.linspace(p.low, p.high, p.steps) for p in axes]
+    names = [p.name for p in axes]
+    table = np.stack(
+        [problem.signature((cls(**dict(zip(names, map(float, v), strict=True))),)) for v in product(*nodes)], axis=-1
+    ).reshape(-1, *(n.size for n in nodes))
+    if not np.isfinite(table).all():
+        # where a corner does not converge, the nodes stand for themselves
+        flat = table.reshape(table.shape[0], -1)
+        for k, v in enumerate(product(*nodes)):
+            yield dict(zip(names, map(float, v), strict=True)), flat[:, k], True, 1.0
+        return
+    count = _FINE.get(len(axes), 5)
+    fine = [np.linspace(n[0], n[-1], count) if n.size > 2 else n for n in nodes]
+    for k, (n, f) in enumerate(zip(nodes, fine, strict=True)):
+        if n.size > 2:
+            matrix = CubicSpline(n, np.eye(n.size), bc_type="natural" if n.size < 4 else "not-a-knot")(f)
+            table = np.moveaxis(np.tensordot(matrix, table, axes=(1, k + 1)), 0, k + 1)
+    flat = table.reshape(table.shape[0], -1)
+    on_node: list[Any] = [np.isclose(f[:, None], n[None, :], rtol=0, atol=1e-9 * max(1.0, abs(n[-1]))).any(axis=1)
+               for n, f in zip(nodes, fine, strict=True)]  # fmt: skip
+    solved = np.array([all(s) for s in product(*on_node)])
+    for k, v in enumerate(product(*fine)):
+        yield dict(zip(names, map(float, v), strict=True)), flat[:, k], bool(solved[k]), 1.0

@@ -1,0 +1,214 @@
+"""The next measurement: of runs that one can afford, the one that separates the surviving explanations best."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt import effects, forward
+from bemt.diagnose import noise
+from bemt.diagnose.problem import PRIORS, Part, Problem, assemble
+from bemt.diagnose.record import Record, air_of
+from bemt.diagnose.signatures import effect_of
+
+if TYPE_CHECKING:
+    from bemt.diagnose.evidence import Evidence
+
+__all__ = ["Suggestion", "suggest"]
+
+Array = NDArray[np.float64]
+
+_POINTS = 4
+_ENOUGH = 3.0
+
+
+@dataclass(frozen=True)
+class Suggestion:
+    """A run, and what it would do.
+
+    Attributes
+    ----------
+    text : str
+        What to do.
+    points : tuple of dict
+        Operating points: rpm, airspeed_m_s and what else is set.
+    separates : tuple of str
+        The two explanations.
+    before, after : float
+        Distance of the two in standard deviations, now and with the run [1].
+    """
+
+    text: str
+    points: tuple[dict[str, float], ...]
+    separates: tuple[str, ...]
+    before: float
+    after: float
+
+    def document(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        return {"text": self.text, "points": [dict(p) for p in self.points], "separates": list(self.separates),
+                "distance_before": self.before, "distance_after": self.after}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Option:
+    text: str
+    rpm: Array
+    V: Array
+    change: dict[str, float]
+    extra: dict[str, Array]
+
+
+def _options(part: Part) -> list[_Option]:
+    """Runs that a stand can do, around what was recorded."""
+    record, f = part.record, part.flow
+    D = 2.0 * f.R
+    low, high = float(record.rpm.min()), float(record.rpm.max())
+    middle = float(np.median(record.rpm))
+    top_J = float(np.max(f.J))
+    tip = float(np.max(f.M_tip))
+    spread = np.linspace(low, high, _POINTS) if high > 1.05 * low else np.full(_POINTS, middle)
+    now = {k: float(np.median(v)) for k, v in record.extra.items()}
+    J0 = max(top_J, 0.6)
+
+    def at(text: str, rpm: Array, V: Array, change: dict[str, float] | None = None, **extra: float) -> _Option:
+        return _Option(text, rpm, V, change or {}, {k: np.full(rpm.size, v) for k, v in {**now, **extra}.items()})
+
+    static, same = np.zeros(_POINTS), np.full(_POINTS, middle)
+    out = [
+        at(f"static runs (no airspeed) at {low:.0f} to {high:.0f} rev/min", spread, static),
+        at(f"runs in wind at {middle:.0f} rev/min, J 0.2 to {1.15 * J0:.2f}", same,
+           np.linspace(0.2, 1.15 * J0, _POINTS) * middle / 60.0 * D),
+        at(f"slower: static at {0.4 * low:.0f} to {0.8 * low:.0f} rev/min", np.linspace(0.4, 0.8, _POINTS) * low,
+           static),
+        at(f"repeat {low:.0f} to {high:.0f} rev/min in air 15 % thinner (altitude, or a hot day)", spread, static,
+           {"rho": 0.85}),
+        at(f"repeat {low:.0f} to {high:.0f} rev/min at 5 C instead of 35 C (cold air, same density)", spread, static,
+           {"a_sound": (278.15 / 308.15) ** 0.5}),
+        at("repeat the first points after 30 minutes of running", spread, static, None,
+           time_s=now.get("time_s", 0.0) + 1800.0),
+    ]  # fmt: skip
+    if tip < 0.75:
+        up = min(1.3, 0.85 / max(tip, 1e-6))
+        out.append(
+            at(f"faster: static at {high:.0f} to {up * high:.0f} rev/min", np.linspace(1.0, up, _POINTS) * high, static)
+        )
+    if "wall_distance_m" in record.extra:
+        out.append(at(f"the same static runs with the wall {8 * f.R:.2f} m away", spread, static, None,
+                      wall_distance_m=8 * f.R))  # fmt: skip
+    if f.ducted and "tip_gap_m" in record.extra:
+        out.append(
+            at("the same static runs with twice the tip gap", spread, static, None, tip_gap_m=2 * now["tip_gap_m"])
+        )
+    return out
+
+
+def _extended(problem: Problem, option: _Option) -> Problem:
+    """Plan with the option's points appended to the first recording; readings are those of the baseline."""
+    part = problem.parts[0]
+    old = part.record
+    air_now = {k: float(np.median(getattr(old.air, k))) for k in ("rho", "mu", "a_sound", "temperature_K")}
+    air = {k: np.full(option.rpm.size, v * option.change.get(k, 1.0)) for k, v in air_now.items()}
+    if "a_sound" in option.change:
+        air["temperature_K"] = air["temperature_K"] * option.change["a_sound"] ** 2
+    join = np.concatenate
+    extra = {k: join([v, option.extra.get(k, np.full(option.rpm.size, float(v[-1])))]) for k, v in old.extra.items()}
+    if "run" in extra:
+        extra["run"][-option.rpm.size :] = extra["run"].max() + 1.0
+    rpm, V = join([old.rpm, option.rpm]), join([old.V, option.V])
+    both = air_of({k: join([getattr(old.air, k), air[k]]) for k in air})
+    plain = [e for e in part.baseline if not forward.acts_on_points(e)]
+    flow = forward.flow_of(part.model.prepared(plain), rpm, V, both, extra, part.flow.chord)
+    ratio = {c: _relative(old.u[c], old.measured[c]) for c in old.u}
+    filled = {}
+    for c, values in (("thrust_N", flow.T0), ("torque_Nm", flow.Q0)):
+        if c in old.measured:
+            filled[c] = join([old.measured[c], values[-option.rpm.size :]])
+    u = {c: join([old.u[c], np.abs(filled[c][-option.rpm.size :]) * (ratio[c] if np.isfinite(ratio[c]) else np.nan)])
+         for c in filled}  # fmt: skip
+    record = Record(old.name, rpm, V, both, filled, u, extra, old.gain, old.zero, old.air_recorded)
+    return assemble((replace(part, record=record, flow=flow, _solved={}),))
+
+
+def _relative(u: Array, y: Array) -> float:
+    """Usual share of a reading that its uncertainty is; NaN where none is stated."""
+    known = np.isfinite(u) & np.isfinite(y)
+    return float(np.median(u[known] / np.maximum(np.abs(y[known]), 1e-12))) if known.any() else float("nan")
+
+
+def _distance(problem: Problem, covariance_of: noise.Hyper, a: Array, b: Array) -> float:
+    d = noise.whitener(noise.covariance(problem, covariance_of), problem.u)(a - b)
+    return float(np.sqrt(d @ d))
+
+
+def suggest(
+    found: Evidence, first: tuple[str, dict[str, Any]], second: tuple[str, dict[str, Any]] | None
+) -> Suggestion:
+    """Choose the run that separates two explanations best.
+
+    Parameters
+    ----------
+    found : Evidence
+        Outcome of the weighing.
+    first, second : tuple of (str, dict) or None
+        Effects and their settings; None stands for "nothing is left out".
+
+    Returns
+    -------
+    Suggestion
+        The best run, or a look at the part in question where no run separates them.
+    """
+    pair = [effect_of(*first)] + ([effect_of(*second)] if second else [])
+    names = (first[0], second[0] if second else "nothing")
+    hyper = found.states[0].hyper
+    problem = found.problem
+
+    def signatures(p: Problem) -> list[Array]:
+        s = [p.signature((e,)) for e in pair]
+        return s if len(s) == 2 else [s[0], np.zeros_like(s[0])]
+
+    alone = assemble_alone(problem)
+    now = _distance(alone, hyper, *signatures(alone))
+    best: tuple[float, _Option | None] = (now, None)
+    for option in _options(problem.parts[0]):
+        try:
+            extended = _extended(problem, option)
+            a, b = signatures(extended)
+        except (ValueError, FloatingPointError):
+            continue
+        if not (np.isfinite(a).all() and np.isfinite(b).all()):
+            continue
+        gained = _distance(extended, hyper, a, b)
+        if gained > best[0]:
+            best = (gained, option)
+    look = _look(names, found)
+    if best[1] is None or (best[0] < _ENOUGH and look) or (best[0] < now + 0.5 and look):
+        text = look or "more repeats of the same points: no other affordable run separates them better"
+        return Suggestion(text, (), names, now, max(best[0], _ENOUGH) if look else best[0])
+    o = best[1]
+    points = tuple({"rpm": float(n), "airspeed_m_s": float(v)} for n, v in zip(o.rpm, o.V, strict=True))
+    return Suggestion(o.text, points, names, now, best[0])
+
+
+def _look(names: Sequence[str], found: Evidence) -> str:
+    """What to look at without a run, for the first of the effects that says so."""
+    for name in names:
+        cls = effects.catalogue().get(name)
+        if cls is not None and cls.check:
+            return cls.check
+    kinds = {effects.catalogue()[n].kind for n in names if n in effects.catalogue()}
+    if "stand" in kinds and {"thrust_gain", "torque_gain", "thrust_zero", "torque_zero"} & set(names):
+        share = PRIORS["thrust gain"]
+        return (
+            f"hang dead weights on the cells before and after a run: the gain is then known better than {share / 4:.2%}"
+        )
+    return ""
+
+
+def assemble_alone(problem: Problem) -> Problem:
+    """Plan of the first recording alone."""
+    return problem if len(problem.parts) == 1 else assemble(problem.parts[:1])

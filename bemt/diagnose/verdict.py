@@ -1,0 +1,196 @@
+"""The decision: none, a named effect, a class of look-alikes, the stand, something unknown, or not enough data.
+
+The order of the questions is the order of caution.  Is there a mismatch that nulls do not show?  Does an unknown smooth
+effect explain it better, or is something smooth left after the best listed effect?  Which effects are in nearly all
+of the probability?  Are there look-alikes of these in this plan?  Only then is a name given.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt import effects
+from bemt.diagnose import confusion as look
+from bemt.diagnose import evidence as ev
+from bemt.diagnose import fit as fitting
+
+if TYPE_CHECKING:
+    from bemt.diagnose.evidence import Evidence
+
+__all__ = ["GATE", "Decision", "decide"]
+
+Array = NDArray[np.float64]
+
+GATE = 0.01
+"""Largest p-value at which a mismatch counts as one [1]."""
+SURE = 0.85
+"""Probability from which an effect, or a class of them, is named [1]."""
+LEFT_OVER = 4.0
+"""Log odds of a smooth rest beside the best listed effect over no rest, from which the cause is unknown [1]."""
+NEAR = 5.0
+"""Effects of a class may be this far (natural logarithm of the evidence) behind the best one [1]."""
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What is said, and why.
+
+    Attributes
+    ----------
+    verdict : str
+        none, named, class, sensor, unknown or insufficient.
+    effects : tuple of str
+        Effects of the verdict; of a class all members.
+    leading : str
+        Explanation that is shown: an id, a pair "a+b", or "none".
+    probability : float
+        Of the verdict [1].
+    left_over : float
+        Logarithm of the odds of a smooth rest beside the leading explanation [1].
+    classes : tuple of tuple of str
+        Effects that this plan cannot tell from the leading ones.
+    why : str
+        The rule that decided.
+    """
+
+    verdict: str
+    effects: tuple[str, ...]
+    leading: str
+    probability: float
+    left_over: float
+    classes: tuple[tuple[str, ...], ...]
+    why: str
+
+
+def inclusion(found: Evidence) -> dict[str, float]:
+    """Probability that an effect is at work, alone or in a pair, by id.
+
+    Parameters
+    ----------
+    found : Evidence
+        Outcome of the weighing.
+
+    Returns
+    -------
+    dict
+        Id to probability, largest first.
+    """
+    out = dict.fromkeys(found.spans, 0.0)
+    for name, p in found.probability.items():
+        if name not in (ev.NONE, ev.UNKNOWN):
+            for i in name.split("+"):
+                out[i] += p
+    return dict(sorted(out.items(), key=lambda kv: -kv[1]))
+
+
+def alike(found: Evidence, name: str) -> tuple[str, ...]:
+    """Single effects that explain what an explanation explains, within noise and evidence, itself left out."""
+    state = found.states[0]
+    best = fitting.fit(found, name)
+    s = state.white(best.signature)
+    forms = [state.forms[i] for i in best.ids]
+    form = forms[0] if len(forms) == 1 else None
+    limit = found.log_bayes(name) - NEAR
+    return tuple(
+        i for i, span in found.spans.items()
+        if i not in best.ids and look.distance(state, s, span, form) < look.ALIKE and found.log_bayes(i) > limit
+    )  # fmt: skip
+
+
+def decide(found: Evidence, p_value: float) -> Decision:
+    """Decide.
+
+    Parameters
+    ----------
+    found : Evidence
+        Outcome of the weighing.
+    p_value : float
+        Of the gate [1].
+
+    Returns
+    -------
+    Decision
+        What is said.
+    """
+    P = found.probability
+    listed = {k: v for k, v in P.items() if k not in (ev.NONE, ev.UNKNOWN)}
+    if not listed:
+        return Decision("insufficient", (), ev.NONE, 1.0, -np.inf, (), "no effect can be seen in these readings")
+    leading = max(listed, key=lambda k: listed[k])
+    if p_value > GATE:
+        why = f"nulls of the same plan look as much like a cause in {p_value:.0%} of draws"
+        word = "none" if p_value > 5.0 * GATE or P[ev.NONE] > 0.5 else "insufficient"
+        return Decision(word, (), ev.NONE, P[ev.NONE], -np.inf, (), why)
+    if P[ev.NONE] > 0.5:
+        return Decision(
+            "none", (), ev.NONE, P[ev.NONE], -np.inf, (), "nothing explains the readings better than the noise"
+        )
+    rest = fitting.left_over(found, leading)
+    if P[ev.UNKNOWN] > 0.5 or rest > LEFT_OVER:
+        why = "a smooth mismatch remains when the best listed effect is taken away"
+        if P[ev.UNKNOWN] > 0.5:
+            why = "a smooth effect that is not in the library explains the readings better than any that is"
+        return Decision("unknown", (), leading, max(P[ev.UNKNOWN], 1.0 - listed[leading]), rest, (), why)
+    share = inclusion(found)
+    in_pair = sum(v for k, v in listed.items() if "+" in k) > 0.5
+    sure = tuple(i for i, p in share.items() if p >= SURE)
+    if sure and (len(sure) > 1 or not in_pair):
+        group = () if len(sure) > 1 else _class(found, sure[0], share)
+        if len(group) <= 1:
+            return _named(found, sure, min(share[i] for i in sure), rest)
+    if in_pair:
+        return _pair(found, leading, share, rest)
+    group = _class(found, leading.split("+")[0], share)
+    total = sum(v for k, v in P.items() if set(k.split("+")) & set(group))
+    if len(group) > 1 and total >= SURE:
+        return Decision("class", group, leading, total, rest, (group,), "these look alike in this plan")
+    if total >= SURE:
+        return _named(found, group, total, rest)
+    return Decision("insufficient", (), leading, listed[leading], rest, (group,) if len(group) > 1 else (),
+                    "several explanations are left that are not alike")  # fmt: skip
+
+
+def _class(found: Evidence, first: str, share: dict[str, float]) -> tuple[str, ...]:
+    others = [i for i in alike(found, first) if found.probability[i] > 0.02 * found.probability[first]]
+    return (first, *sorted(others, key=lambda i: -share[i]))
+
+
+def _pair(found: Evidence, leading: str, share: dict[str, float], rest: float) -> Decision:
+    """Two effects at work: name those that are sure, and the look-alikes of the other."""
+    ids = list(leading.split("+")) if "+" in leading else [leading]
+    sure = [i for i in ids if share[i] >= SURE]
+    unsure = [i for i in ids if i not in sure]
+    pairs = {k: v for k, v in found.probability.items() if "+" in k and (not sure or set(k.split("+")) & set(sure))}
+    total = sum(pairs.values())
+    members: list[str] = list(sure)
+    for _ in unsure:
+        partner = {j: 0.0 for j in found.spans if j not in sure}
+        for k, v in pairs.items():
+            for j in set(k.split("+")) & set(partner):
+                partner[j] += v
+        near, mass = [], 0.0
+        for j in sorted(partner, key=lambda j: -partner[j]):
+            near.append(j)
+            mass += partner[j]
+            if mass >= SURE * total:
+                break
+        members += [j for j in near if j not in members][:5]
+    if not unsure:
+        return _named(found, tuple(sure), min(share[i] for i in sure), rest)
+    if len(sure) == len(ids) - 1 and len(members) <= 5:
+        return Decision("class", tuple(members), leading, total, rest, (tuple(m for m in members if m not in sure),),
+                        "two effects are at work; one of them has look-alikes")  # fmt: skip
+    return Decision(
+        "insufficient", (), leading, found.probability[leading], rest, (), "two effects or more, not told apart"
+    )
+
+
+def _named(found: Evidence, ids: tuple[str, ...], probability: float, rest: float) -> Decision:
+    stand = all(effects.catalogue()[i].kind == "stand" for i in ids)
+    leading = "+".join(i for i in found.spans if i in ids)
+    why = "nearly all of the probability is on it" if len(ids) == 1 else "nearly all of the probability is on both"
+    return Decision("sensor" if stand else "named", ids, leading, probability, rest, (), why)

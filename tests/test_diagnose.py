@@ -1,0 +1,84 @@
+"""The promise of `diagnose`: it names what was left out where the plan shows it, and nothing where it does not."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from diagnosing import case, diagnose, from_text, left_out, points, recording
+
+from bemt.diagnose import document, plan, record
+from bemt.series import Series
+
+GRID = points("grid")
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_nothing_is_named_where_nothing_is_left_out(seed: int) -> None:
+    answer = diagnose(recording(case(), GRID, seed=seed), case())
+    assert answer.decision.verdict == "none", document.text(answer)
+    assert not answer.decision.effects
+
+
+def test_correlated_noise_alone_names_nothing() -> None:
+    answer = diagnose(recording(case(), GRID, seed=3, ar=0.8), case())
+    assert answer.decision.verdict in ("none", "insufficient"), document.text(answer)
+
+
+def test_compressibility_left_out_is_named_located_and_mended() -> None:
+    answer = diagnose(recording(case(), GRID), left_out("compressibility", case()))
+    assert (answer.decision.verdict, answer.decision.effects) == ("named", ("compressibility",)), document.text(answer)
+    assert answer.where is not None and answer.where.variable == "M_tip"
+    assert answer.where.low > 0.3, "Mach number acts at the fast end"
+    for score in answer.scores.values():
+        assert score["holdout_after"] < 0.5 * score["holdout_before"]
+        assert score["holdout_after"] < 1.3 * score["noise"]
+    value = answer.parameters["compressibility"]["amplitude"]
+    assert value["low"] - 0.05 <= 1.0 <= value["high"] + 0.05
+
+
+def test_torque_in_other_units_is_a_slip_of_units() -> None:
+    series = recording(case(), GRID)
+    wrong = Series("bench", "slipped", {**series.values, "thrust_N": series["thrust_N"] / 9.80665}, dict(series.u))
+    answer = diagnose(wrong, case())
+    assert answer.decision.verdict == "sensor", document.text(answer)
+    assert answer.decision.effects == ("unit_slip",)
+
+
+def test_a_shuffled_covariate_takes_the_claim_away() -> None:
+    series = recording(case(), GRID)
+    order = np.random.default_rng(5).permutation(len(series))
+    shuffled = {k: (v[order] if k == "rpm" else v) for k, v in series.values.items()}
+    # loads stay with the true speed as coefficients, so that only the link to the speed is cut
+    factor = (series["rpm"][order] / series["rpm"]) ** 2
+    shuffled |= {k: series[k] * factor for k in ("thrust_N", "torque_Nm")}
+    shuffled["airspeed_m_s"] = series["airspeed_m_s"] * series["rpm"][order] / series["rpm"]
+    u = {k: series.u[k] * factor for k in ("thrust_N", "torque_Nm")}
+    answer = diagnose(Series("bench", "shuffled", shuffled, u), left_out("compressibility", case()))
+    assert "compressibility" not in answer.decision.effects, document.text(answer)
+
+
+def test_the_document_keeps_its_schema() -> None:
+    answer = diagnose(recording(case(), GRID), left_out("compressibility", case()))
+    doc = json.loads(json.dumps(document.document(answer)))
+    assert doc["schema"] == "bemt.diagnosis/1"
+    assert {"verdict", "effects", "ranking", "location", "fit", "classes", "next_measurement", "p_value", "explanation"} <= set(doc)
+    assert set(doc["location"]) >= {"channel", "variable", "low", "high", "size", "z"}
+    assert all(set(f) >= {"before", "after", "noise", "gp_only", "holdout_before", "holdout_after"} for f in doc["fit"].values())
+    assert all(set(r) == {"effect", "probability", "parameters"} for r in doc["ranking"])
+    assert sum(r["probability"] for r in doc["ranking"]) <= 1.0 + 1e-9
+    assert set(doc["next_measurement"]) >= {"text", "points", "separates"}
+
+
+def test_a_plan_knows_what_it_can_see() -> None:
+    static, grid = (
+        plan.plan(record.from_series(Series("bench", p, {**points(p), "thrust_N": np.ones_like(points(p)["rpm"]),
+                                                         "torque_Nm": np.ones_like(points(p)["rpm"])}), case()), case())
+        for p in ("static", "grid")
+    )  # fmt: skip
+    seen = [sum(w == "visible" for w in p.sight.values()) for p in (static, grid)]
+    assert seen[1] > seen[0], "a grid over speed and advance ratio sees more than a static sweep"
+    assert "airspeed_offset" in static.absent and static.sight["airspeed_offset"] == "invisible"
+    doc = plan.document(grid)
+    assert doc["schema"] == "bemt.plan/1" and set(doc["sight"].values()) <= {"visible", "marginal", "invisible"}
