@@ -165,7 +165,7 @@ def build_parser() -> argparse.ArgumentParser:
     solid.add_argument("--json", action="store_true", help="print one JSON document (bemt.export/1)")
 
     flow = commands.add_parser("cfd", help="run a campaign of OpenFOAM cases and record what comes out")
-    flow.add_argument("campaign", metavar="CAMPAIGN", help="campaign.toml; recording and manifest go beside it")
+    flow.add_argument("campaign", metavar="CAMPAIGN", help="campaign.toml or its folder; a folder of campaigns is summed up")
     flow.add_argument("--only", type=_positive, metavar="N", help="run point N alone, even if it is recorded")
     flow.add_argument("--ranks", type=_positive, default=2, metavar="N", help="processes of a run (default 2)")
     flow.add_argument("--work", metavar="DIR", help="folder of grids and runs (default: a temporary one)")
@@ -197,6 +197,8 @@ def build_parser() -> argparse.ArgumentParser:
     why.add_argument("--case", required=True, nargs="+", metavar="CASE", help="case of all recordings, or one each")
     off = "leave out of the baseline; repeatable"
     why.add_argument("--off", action="append", default=[], metavar="EFFECT", help=off)
+    known = "recordings without the cause: how far model and stand differ anyway"
+    why.add_argument("--reference", nargs="+", default=[], metavar="RECORDING", help=known)
     why.add_argument("--only", nargs="+", metavar="EFFECT", help="consider these effects only (default: all)")
     why.add_argument("--out", metavar="DIR", help="write diagnosis.json, figures and the improved case there")
     why.add_argument("--no-figures", action="store_true", help="with --out: no figures")

@@ -5,7 +5,10 @@ one-blade model and the zones that count are the user's (``--sign``, ``--sector`
 appear in ``averaged_over`` and in the warnings. Files are never joined: a restart file is named as such.
 
 Schema ``bemt.import/1``: ``files`` is a list of ``path``, ``format``, ``kind``, ``rows``, ``channels`` (name to
-``unit``, ``mean``, ``averaged_over``, ``drift``), ``warnings``, ``error`` (null when the file was read).
+``unit``, ``mean``, ``averaged_over``, ``drift``), ``warnings``, ``error`` (null when the file was read), ``findings``
+(``id``, ``channel``, ``evidence``, ``correction``, ``rows``, ``severity``; nothing is corrected) and ``reduction``
+(null unless it is a recording: ``mode``, ``points``, ``correlated``, ``dropped``, ``notes``, ``error``). A channel of
+a recording has a mean only where the recording is one steady point.
 """
 
 from __future__ import annotations
@@ -15,7 +18,7 @@ import math
 import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +29,9 @@ from bemt.averaging import relation
 from bemt.errors import EXIT_INPUT, EXIT_OK, Fault, InputError
 from bemt.import_adapt import adapt, damaged_export, recognised
 from bemt.import_choice import Choice, averaged, chosen
+from bemt.import_recording import findings, is_recording, points_text, reduction_document, reduction_of
 from bemt.imported import Channel, Imported
+from bemt.reduction import Reduced
 
 __all__ = ["SCHEMA", "Choice", "averaged", "chosen", "document", "import_file", "run"]
 
@@ -72,7 +77,10 @@ def import_file(path: str | os.PathLike[str], format: str | None = None, choice:
         if damaged:
             hint = "Its head is cut or altered; export it again, or give --format"
             raise InputError(Fault(name, "", f"what looks like {damaged}", "a whole file", hint))
-    record = adapt(importers.read(path, kind), kind, name)
+    found = importers.read(path, kind)
+    record = adapt(found, kind, name)
+    if record is not found:  # made from a series, a polar, a geometry: no recording of a stand
+        record = replace(record, provenance={**record.provenance, "adapted": type(found).__name__})
     if choice.period is not None:
         record = averaged(record, choice.period, choice.revolutions)
     elif record.provenance.get("clock") == "time":
@@ -149,7 +157,9 @@ def _clock(record: Imported) -> tuple[Any, Any]:
 
 
 def document(
-    paths: Iterable[str | os.PathLike[str]], format: str | None = None, choice: Choice | None = None  # noqa: A002
+    paths: Iterable[str | os.PathLike[str]],
+    format: str | None = None,
+    choice: Choice | None = None,  # noqa: A002
 ) -> dict[str, Any]:
     """Read files and give the document ``bemt.import/1``.
 
@@ -179,18 +189,43 @@ def document(
     files = []
     for name in names:
         record = records.get(name)
+        reduced = _reduced(record)
+        means = _means(record, reduced) if record else {}
         files.append(
             {
                 "path": name,
                 "format": record.format if record else format,
                 "kind": record.kind if record else None,
                 "rows": record.rows if record else 0,
-                "channels": {k: _shown(c) for k, c in record.channels.items()} if record else {},
+                "channels": {k: _shown(c) for k, c in means.items()},
                 "warnings": [*(record.warnings if record else ()), *notes.get(name, ())],
                 "error": errors.get(name),
+                "findings": [asdict(finding) for finding in findings(record)] if record else [],
+                "reduction": reduction_document(reduced),
             }
         )
     return {"schema": SCHEMA, "files": files}
+
+
+def _reduced(record: Imported | None) -> Reduced | str | None:
+    """Steady points of a recording."""
+    if record is None or not is_recording(record, "adapted" in record.provenance):
+        return None
+    return reduction_of(record)
+
+
+def _means(record: Imported, reduced: Reduced | str | None) -> Mapping[str, Channel]:
+    """Channels, with means where the whole recording is one steady point."""
+    if not isinstance(reduced, Reduced) or len(reduced.series) != 1:
+        return record.channels
+    rows = len(reduced.rows[0])
+    over = f"the steady rows ({rows} of {record.rows})"
+    series = reduced.series
+    return {
+        name: replace(channel, mean=float(series[name][0]), averaged_over=over)
+        if name in series and channel.mean is None else channel
+        for name, channel in record.channels.items()
+    }  # fmt: skip
 
 
 def _shown(channel: Channel) -> dict[str, Any]:
@@ -209,7 +244,14 @@ def _text(file: Mapping[str, Any]) -> str:
         mean = tables.number_text(channel["mean"], 6)
         rows.append([name, channel["unit"] or "-", mean, drift, channel["averaged_over"] or "-"])
     lines.append(tables.text_table(["channel", "unit", "mean", "drift", "averaged over"], rows, (0, 1, 4), "  "))
-    return "\n".join([*lines, *(f"  ! {text}" for text in file["warnings"])])
+    if file["reduction"] is not None:
+        lines += points_text(file["reduction"])
+    lines += [f"  ! {text}" for text in file["warnings"]]
+    for f in file["findings"]:
+        lines.append(
+            f"  ! {f['severity']}: {f['id']} in {f['channel']}: {f['evidence']}. Would take: {f['correction']}"
+        )
+    return "\n".join(lines)
 
 
 def _choice(args: argparse.Namespace) -> Choice:

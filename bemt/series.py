@@ -30,7 +30,7 @@ KINDS = ("bemt", "k1k2", "cfd", "bench", "vendor")
 """Kinds that comparisons know; others (``k1k2_printed``, ``flight``) are allowed and kept apart."""
 
 DIMENSIONLESS = frozenset(
-    {"CT", "CP", "CQ", "J", "eta", "FM", "Re", "M_tip", "M_tip_helical", "throttle", "duct_share"}
+    {"CT", "CP", "CQ", "J", "eta", "FM", "Re", "M_tip", "M_tip_helical", "throttle", "duct_share", "run"}
 )
 """Channel names without a unit."""
 

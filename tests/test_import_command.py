@@ -50,7 +50,8 @@ def test_schema(put: Callable[..., Path], capsys: pytest.CaptureFixture[str]) ->
     code, found = call(capsys, put("q.out", history()), "--rpm", "120")
     assert code == 0 and found["schema"] == "bemt.import/1"
     (file,) = found["files"]
-    assert list(file) == ["path", "format", "kind", "rows", "channels", "warnings", "error"]
+    keys = ["path", "format", "kind", "rows", "channels", "warnings", "error", "findings", "reduction"]
+    assert list(file) == keys and file["findings"] == [] and file["reduction"] is None
     assert (file["format"], file["kind"], file["rows"], file["error"]) == ("fluent_report", "cfd", 300, None)
     assert all(list(c) == ["unit", "mean", "averaged_over", "drift"] for c in file["channels"].values())
     torque = file["channels"]["torque"]

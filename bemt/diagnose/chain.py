@@ -143,7 +143,7 @@ def _scores(found: evidence.Evidence, after: Array, held: Array, gp_only: Array)
     problem, scale = found.problem, found.states[0].hyper.scale
     out = {}
     for c, name in enumerate(CHANNELS):
-        here = problem.channel == c
+        here = (problem.channel == c) & problem.free
         if not here.any():
             continue
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -118,6 +119,9 @@ def _diagnose(args: argparse.Namespace) -> int:
         evaluate.prepare(case, None, 10)  # an unknown effect in the case is said before the work begins
     chosen = cases * len(args.recordings) if len(cases) == 1 else cases
     loaded = [load(p, c) for p, c in zip(args.recordings, chosen, strict=True)]
+    if args.reference and len(cases) > 1:
+        raise InputError(Fault("--reference", "", f"{len(cases)} cases", "one case for all when there are references"))
+    loaded += [replace(load(p, cases[0]), reference=True) for p in args.reference]
     say = _progress(args)
     answer = diagnose(loaded, cases, args.only or None, say)
     if say:

@@ -109,7 +109,7 @@ def confusion(found: Evidence, settings: dict[str, int] | None = None) -> Confus
     size = np.array([float(np.sqrt(s @ s)) for s in chosen])
     modes = form_modes(found.problem, found.candidates)
     settings = settings or {}
-    forms = {c.id: Form.of(state.white, c.signatures[:, settings.get(c.id, c.middle)], modes[c.id])
+    forms = {c.id: Form.of(state.white, c, settings.get(c.id, c.middle), modes[c.id])
              for c in found.candidates}  # fmt: skip
     matrix = np.array([[0.0 if a == b else distance(state, s, found.spans[b], forms[a]) for b in ids]
                        for a, s in zip(ids, chosen, strict=True)]).reshape(len(ids), len(ids))  # fmt: skip

@@ -79,6 +79,7 @@ def document(d: Diagnosis) -> dict[str, Any]:
         "baseline": [effects.to_text(e) for e in d.problem.baseline],
         "not_tried": dict(d.absent),
         "rule": d.decision.why,
+        "left_over": _number(d.decision.left_over),
         "notes": list(d.problem.notes),
         "readings": int(d.problem.y.size),
         "explanation": " ".join(explanation(d)),

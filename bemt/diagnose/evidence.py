@@ -69,9 +69,9 @@ class Form:
     root: Array
 
     @classmethod
-    def of(cls, white: Whitener, signature: Array, modes: Array) -> Form:
-        """Modes times the size of a signature, whitened."""
-        B = white(signature[:, None] * modes)
+    def of(cls, white: Whitener, candidate: Candidate, g: int, modes: Array) -> Form:
+        """Modes times the size of a signature, and what lies between it and its neighbours on the grid, whitened."""
+        B = white(np.column_stack([candidate.signatures[:, g, None] * modes, candidate.between(g)]))
         return cls(B, np.asarray(np.linalg.cholesky(np.eye(B.shape[1]) + B.T @ B), dtype=float))
 
     def project(self, x: Array) -> Array:
@@ -279,10 +279,13 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
     few = {c.id: slice(*np.searchsorted(some, [spans[c.id].start, spans[c.id].stop])) for c in candidates}
     covariance = dict(noise.covariances(problem))
     modes = form_modes(problem, candidates)
+    every = np.arange(log_w.size)
     # a few settings of each effect are enough to see which covariances matter
-    coarse = [_state(problem, h, C, S[:, some], few, log_w[some], modes) for h, C in covariance.items()]
+    coarse = [
+        _state(problem, h, C, S[:, some], few, log_w[some], modes, candidates, some) for h, C in covariance.items()
+    ]
     kept = [s.hyper for s in _leading(coarse)]
-    states = [_state(problem, h, covariance[h], S, spans, log_w, modes) for h in kept]
+    states = [_state(problem, h, covariance[h], S, spans, log_w, modes, candidates, every) for h in kept]
     kernels = noise.rivals(problem)
     for state in states:
         state.rivals = [(name, noise.whitener(covariance[state.hyper] + K, problem.u)) for name, K in kernels]
@@ -363,7 +366,8 @@ def _few(candidates: Sequence[Candidate], most: int = 9) -> NDArray[np.intp]:
 
 
 def _state(
-    problem: Problem, h: Hyper, C: Array, S: Array, spans: dict[str, slice], log_w: Array, modes: dict[str, Array]
+    problem: Problem, h: Hyper, C: Array, S: Array, spans: dict[str, slice], log_w: Array, modes: dict[str, Array],
+    candidates: Sequence[Candidate], columns: NDArray[np.intp],
 ) -> State:  # fmt: skip
     """Whitened readings and the evidence of none and of every single effect."""
     white = noise.whitener(C, problem.u)
@@ -372,10 +376,13 @@ def _state(
     state = State(h, white, rw, Sw, 0.5 * np.sum(Sw * Sw, axis=0))
     state.log_z[NONE] = none = -0.5 * float(rw @ rw) - white.log_det
     R = rw[:, None]
-    for name, span in spans.items():
+    first = 0
+    for c in candidates:
+        span = spans[c.id]
         for _ in range(2):  # the form follows the size of the best setting, which depends on the form
-            best = span.start + int(np.argmax(state.gains(name, span, R)[:, 0] + log_w[span]))
-            state.forms[name] = Form.of(white, S[:, best], modes[name])
+            best = span.start + int(np.argmax(state.gains(c.id, span, R)[:, 0] + log_w[span]))
+            state.forms[c.id] = Form.of(white, c, int(columns[best]) - first, modes[c.id])
+        first += c.weight.size
     for name, gain in singles(state, R, spans, log_w).items():
         state.log_z[name] = none + float(gain[0])
     return state

@@ -179,10 +179,8 @@ def _curve(axis: Axes, panel: _Panel) -> None:
     axis.set_xlim(low - 0.04 * (high - low), high + 0.04 * (high - low))
     axis.set_ylim(0.0, 1.35 * max(peak, flat))
     unit = panel.label(key).rpartition("[")[2].rstrip("]")
-    axis.set(
-        xlabel=panel.label(key),
-        ylabel=f"density [{'1' if unit in ('', '1') else f'1/{unit}' if unit.isalpha() else f'1/({unit})'}]",
-    )
+    density_unit = "1" if unit in ("", "1") else f"1/{unit}" if unit.isalpha() else f"1/({unit})"
+    axis.set(xlabel=panel.label(key), ylabel=f"density [{density_unit}]")
     axis.legend(loc="upper center", ncols=2, columnspacing=1.0, handlelength=1.6)
 
 

@@ -82,8 +82,9 @@ def locate(found: Evidence, best: Fit) -> Location:
     d = mismatch(found, best)
     e = d / (problem.u * found.states[0].hyper.scale)
     natural = tuple(v for i in best.ids for v in effects.catalogue()[i].along)
-    channel = max(np.unique(problem.channel), key=lambda c: float(np.sum(e[problem.channel == c] ** 2)))
-    here = problem.channel == channel
+    free = problem.free
+    channel = max(np.unique(problem.channel), key=lambda c: float(np.sum(e[(problem.channel == c) & free] ** 2)))
+    here = (problem.channel == channel) & free
     scores = {}
     for name in _ORDER:
         if name not in problem.covariates:

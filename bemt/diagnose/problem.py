@@ -31,7 +31,7 @@ CHANNELS = ("thrust_N", "torque_Nm", "rpm")
 PRIORS = {
     "section drag": 0.10, "lift slope": 0.03, "pitch": 0.3, "thrust gain": 0.01, "torque gain": 0.01,
     "thrust zero": 0.002, "torque zero": 0.002, "speed of rotation": 0.003, "density": 0.005,
-    "density not recorded": 0.015, "airspeed": 0.01, "session": 0.01, "parameter of the model": 0.25,
+    "density not recorded": 0.015, "airspeed": 0.005, "session": 0.01, "parameter of the model": 0.25,
 }  # fmt: skip
 """Standard deviations: shares [1], pitch in [deg], zeros of full scale [1], parameters of active effects as a share of
 their published range [1].  The first six are those of the project's note on diagnosis; the rest are declared."""
@@ -76,12 +76,15 @@ class Part:
         Physics that the case has on.
     flow : Flow
         Recorded conditions with the baseline's loads.
+    key : str
+        Rotor: parts of one rotor share the error of its model.
     """
 
     record: Record
     model: forward.Model
     baseline: tuple[Effect, ...]
     flow: Flow
+    key: str = ""
     _solved: dict[tuple[Effect, ...], tuple[Array, Array, Flow]] = field(default_factory=dict, repr=False)
 
     def predict(self, effects: Sequence[Effect]) -> Array:
@@ -179,6 +182,17 @@ class Problem:
     predicted: dict[Any, Array] = field(default_factory=dict, repr=False)
 
     @property
+    def free(self) -> NDArray[np.bool_]:
+        """Readings in which a cause may be at work, (M,): all but those of reference recordings."""
+        return np.array([not p.record.reference for p in self.parts])[self.part]
+
+    @property
+    def rotor(self) -> NDArray[np.intp]:
+        """Index of the rotor of each reading, (M,)."""
+        keys = list(dict.fromkeys(p.key for p in self.parts))
+        return np.array([keys.index(p.key) for p in self.parts])[self.part]
+
+    @property
     def residual(self) -> Array:
         """Recording minus baseline, (M,)."""
         return self.y - self.f0
@@ -204,7 +218,10 @@ class Problem:
         key = tuple(extra)
         if key not in self.predicted:
             ids = {e.id for e in extra}
-            full = [p.predict((*(e for e in p.baseline if e.id not in ids), *extra)) for p in self.parts]
+            full = [
+                p.predict(p.baseline if p.record.reference else (*(e for e in p.baseline if e.id not in ids), *extra))
+                for p in self.parts
+            ]
             self.predicted[key] = np.concatenate(full)[self.kept]
         return self.predicted[key]
 
@@ -226,7 +243,7 @@ def _part(record: Record, case: Case) -> Part:
     model = replace(model, mach_max=top, re_range=(re_low, re_high), _kept={})
     plain = [e for e in ready.effects if not forward.acts_on_points(e)]
     flow = forward.flow_of(model.prepared(plain), record.rpm, record.V, record.air, record.extra, ready.chord75_m)
-    return Part(record, model, ready.effects, flow)
+    return Part(record, model, ready.effects, flow, case.content_hash())
 
 
 def build(records: Sequence[Record], cases: Sequence[Case]) -> Problem:
@@ -246,10 +263,11 @@ def build(records: Sequence[Record], cases: Sequence[Case]) -> Problem:
     """
     chosen = list(cases) * len(records) if len(cases) == 1 else list(cases)
     # recordings of one case share the errors of its model
-    groups: dict[str, tuple[Case, list[Record]]] = {}
+    groups: dict[tuple[bool, str], tuple[Case, list[Record]]] = {}
     for r, c in zip(records, chosen, strict=True):
-        groups.setdefault(c.content_hash(), (c, []))[1].append(r)
-    return assemble(tuple(_part(merged(rs), c) for c, rs in groups.values()))
+        groups.setdefault((r.reference, c.content_hash()), (c, []))[1].append(r)
+    order = sorted(groups, key=lambda k: k[0])
+    return assemble(tuple(_part(merged(groups[k][1]), groups[k][0]) for k in order))
 
 
 def assemble(parts: tuple[Part, ...]) -> Problem:
@@ -336,8 +354,13 @@ def _nuisances(problem: Problem) -> tuple[Array, tuple[str, ...]]:
             columns.append(column)
             names.append(name)
 
+    def everywhere(extra: Effect) -> Array:
+        """Readings with an effect that reference recordings have too."""
+        full = [p.predict((*(e for e in p.baseline if e.id != extra.id), extra)) for p in problem.parts]
+        return np.concatenate(full)[problem.kept]
+
     def calibrated(name: str, **change: float) -> None:
-        up, down = (problem.predict((_Calibration(**{k: s * v for k, v in change.items()}),)) for s in (1.0, -1.0))
+        up, down = (everywhere(_Calibration(**{k: s * v for k, v in change.items()})) for s in (1.0, -1.0))
         add(name, 0.5 * (up - down))
 
     calibrated("pitch", pitch_deg=PRIORS["pitch"])
@@ -356,7 +379,6 @@ def _nuisances(problem: Problem) -> tuple[Array, tuple[str, ...]]:
             add(f"{name} zero{tag}", np.where(mine, zero, 0.0))
     load = channel < 2
     slope_V = np.concatenate([np.concatenate([_slope(p, c) for c in p.channels]) for p in problem.parts])[problem.kept]
-    V = problem.covariates["J"][problem.point] * 0.0
     V = np.concatenate([p.flow.V for p in problem.parts])[problem.point]
     # at fixed V a speed error moves loads by 2 and by the change of J; at J = 0 only by 2
     add("speed of rotation", np.where(load, PRIORS["speed of rotation"] * (2.0 * f0 - V * slope_V), 0.0))
@@ -388,7 +410,7 @@ def _nuisances(problem: Problem) -> tuple[Array, tuple[str, ...]]:
             step = PRIORS["parameter of the model"] * (parameter.high - parameter.low)
             value = float(getattr(e, parameter.name))
             value = value + step if value + step <= parameter.high else value - step
-            add(f"{e.id} {parameter.name}", problem.signature((replace(e, **{parameter.name: value}),)))  # type: ignore[type-var]
+            add(f"{e.id} {parameter.name}", everywhere(replace(e, **{parameter.name: value})) - f0)  # type: ignore[type-var]
     matrix = np.stack(columns, axis=1) if columns else np.zeros((y.size, 0))
     return matrix, tuple(names)
 

@@ -56,6 +56,8 @@ class Record:
         Whether density, or pressure and temperature, came with the recording.
     notes : tuple of str
         What was assumed or dropped.
+    reference : bool
+        Known to be without the cause that is looked for: shows how far model and stand differ anyway.
     """
 
     name: str
@@ -69,6 +71,7 @@ class Record:
     zero: Mapping[str, float] = field(default_factory=dict)
     air_recorded: bool = False
     notes: tuple[str, ...] = ()
+    reference: bool = False
 
     def __len__(self) -> int:
         """Give the number of points."""
@@ -94,6 +97,7 @@ class Record:
         return Record(
             self.name, self.rpm[index], self.V[index], air_of({k: getattr(self.air, k)[index] for k in _AIR}),
             cut(self.measured), cut(self.u), cut(self.extra), self.gain, self.zero, self.air_recorded, self.notes,
+            self.reference,
         )  # fmt: skip
 
 
@@ -236,7 +240,7 @@ def _thinned(record: Record) -> Record:
         record.name, mean(record.rpm), mean(record.V), air_of({k: mean(getattr(record.air, k)) for k in _AIR}),
         {k: mean(v) for k, v in record.measured.items()}, {k: mean(v) for k, v in record.u.items()},
         {k: mean(v) for k, v in record.extra.items()}, record.gain, record.zero, record.air_recorded,
-        (*record.notes, note),
+        (*record.notes, note), record.reference,
     )  # fmt: skip
 
 
@@ -268,7 +272,7 @@ def merged(records: Sequence[Record]) -> Record:
         {n: channel("measured", n) for n in names}, {n: channel("u", n) for n in names}, concatenated(records),
         {n: max(r.gain.get(n, 0.0) for r in records) for n in names if any(n in r.gain for r in records)},
         {n: max(r.zero.get(n, 0.0) for r in records) for n in names if any(n in r.zero for r in records)},
-        all(r.air_recorded for r in records), notes,
+        all(r.air_recorded for r in records), notes, records[0].reference,
     ))  # fmt: skip
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
@@ -57,6 +58,45 @@ class Candidate:
         """Kind of the effect: air, stand or drive."""
         return effects.catalogue()[self.id].kind
 
+    def between(self, g: int) -> Array:
+        """Change of the signature within half the way to the neighbouring settings, one column per parameter.
+
+        Parameters
+        ----------
+        g : int
+            Setting.
+
+        Returns
+        -------
+        (M, k) float
+            For parameters that may take any value; what the grid leaves out, in the unit of each reading.
+        """
+        discrete = effects.catalogue()[self.id].discrete
+        columns = []
+        for key, value in self.settings[g].items():
+            if key in discrete or not isinstance(value, float):
+                continue
+            near = self._lines[(key, _rest(self.settings[g], key))]
+            at = near.index(g)
+            a, b = near[max(at - 1, 0)], near[min(at + 1, len(near) - 1)]
+            if a != b:
+                columns.append(
+                    0.5
+                    * (self.signatures[:, b] - self.signatures[:, a])
+                    / (min(at + 1, len(near) - 1) - max(at - 1, 0))
+                )
+        return np.stack(columns, axis=1) if columns else np.zeros((self.signatures.shape[0], 0))
+
+    @cached_property
+    def _lines(self) -> dict[tuple[str, Any], list[int]]:
+        """Settings that differ in one parameter only, in its order."""
+        lines: dict[tuple[str, Any], list[int]] = {}
+        for g, setting in enumerate(self.settings):
+            for key, value in setting.items():
+                if isinstance(value, float):
+                    lines.setdefault((key, _rest(setting, key)), []).append(g)
+        return {k: sorted(v, key=lambda g: float(self.settings[g][k[0]])) for k, v in lines.items()}
+
     @property
     def middle(self) -> int:
         """Setting that stands for the effect at ordinary strength: the one of median size."""
@@ -65,6 +105,10 @@ class Candidate:
         if not np.isfinite(size).any():
             return 0
         return int(np.nanargmin(np.abs(size - np.nanmedian(size))))
+
+
+def _rest(setting: dict[str, Any], key: str) -> tuple[tuple[str, Any], ...]:
+    return tuple((k, v) for k, v in setting.items() if k != key)
 
 
 def effect_of(id: str, setting: dict[str, Any]) -> Effect:  # noqa: A002

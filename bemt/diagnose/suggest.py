@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import effects, forward
+from bemt.air import R_DRY
 from bemt.diagnose import noise
 from bemt.diagnose.problem import PRIORS, Part, Problem, assemble
 from bemt.diagnose.record import Record, air_of
 from bemt.diagnose.signatures import effect_of
+from bemt.units import ZERO_CELSIUS
 
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence
@@ -134,6 +136,21 @@ def _extended(problem: Problem, option: _Option) -> Problem:
     return assemble((replace(part, record=record, flow=flow, _solved={}),))
 
 
+def _points(record: Record, option: _Option) -> tuple[dict[str, float], ...]:
+    """Operating points of a run, with what has to be set besides speed and airspeed."""
+    rho = float(np.median(record.air.rho)) * option.change.get("rho", 1.0)
+    T = float(np.median(record.air.temperature_K)) * option.change.get("a_sound", 1.0) ** 2
+    changed = {}
+    if option.change:
+        changed = {"density_kg_m3": rho, "temperature_C": T - ZERO_CELSIUS, "pressure_Pa": rho * R_DRY * T}
+    units = {"time_s": ("time_s", 1.0), "wall_distance_m": ("wall_distance_m", 1.0), "tip_gap_m": ("tip_gap_mm", 1e3)}
+    out = []
+    for k in range(option.rpm.size):
+        more = {new: float(option.extra[old][k]) * f for old, (new, f) in units.items() if old in option.extra}
+        out.append({"rpm": float(option.rpm[k]), "airspeed_m_s": float(option.V[k]), **changed, **more})
+    return tuple(out)
+
+
 def _relative(u: Array, y: Array) -> float:
     """Usual share of a reading that its uncertainty is; NaN where none is stated."""
     known = np.isfinite(u) & np.isfinite(y)
@@ -189,9 +206,7 @@ def suggest(
     if best[1] is None or (best[0] < _ENOUGH and look) or (best[0] < now + 0.5 and look):
         text = look or "more repeats of the same points: no other affordable run separates them better"
         return Suggestion(text, (), names, now, max(best[0], _ENOUGH) if look else best[0])
-    o = best[1]
-    points = tuple({"rpm": float(n), "airspeed_m_s": float(v)} for n, v in zip(o.rpm, o.V, strict=True))
-    return Suggestion(o.text, points, names, now, best[0])
+    return Suggestion(best[1].text, _points(problem.parts[0].record, best[1]), names, now, best[0])
 
 
 def _look(names: Sequence[str], found: Evidence) -> str:

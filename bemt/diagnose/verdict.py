@@ -31,6 +31,12 @@ SURE = 0.85
 """Probability from which an effect, or a class of them, is named [1]."""
 LEFT_OVER = 4.0
 """Log odds of a smooth rest beside the best listed effect over no rest, from which the cause is unknown [1]."""
+SMALL = 0.1
+"""A rest this small beside what the effect explains (both as log odds) is a detail of it, not another cause [1]."""
+EARNED = 8.0
+"""Log odds that each effect of a pair must add to the other alone: small model errors are not a second cause [1]."""
+ENOUGH = 8.0
+"""Log odds over none, prior weight of the effect included, from which a name is given at all (about 4 sigma) [1]."""
 NEAR = 5.0
 """Effects of a class may be this far (natural logarithm of the evidence) behind the best one [1]."""
 
@@ -130,13 +136,19 @@ def decide(found: Evidence, p_value: float) -> Decision:
             "none", (), ev.NONE, P[ev.NONE], -np.inf, (), "nothing explains the readings better than the noise"
         )
     rest = fitting.left_over(found, leading)
-    if P[ev.UNKNOWN] > 0.5 or rest > LEFT_OVER:
+    if P[ev.UNKNOWN] > 0.5 or rest > max(LEFT_OVER, SMALL * found.log_bayes(leading)):
         why = "a smooth mismatch remains when the best listed effect is taken away"
         if P[ev.UNKNOWN] > 0.5:
             why = "a smooth effect that is not in the library explains the readings better than any that is"
         return Decision("unknown", (), leading, max(P[ev.UNKNOWN], 1.0 - listed[leading]), rest, (), why)
     share = inclusion(found)
-    in_pair = sum(v for k, v in listed.items() if "+" in k) > 0.5
+    weight = ev.prior_weights(found.problem, leading.split("+"))
+    if found.log_bayes(leading) + max(np.log(list(weight.values()))) < ENOUGH:
+        why = "the best explanation is not much better than none"
+        return Decision("insufficient", (), leading, listed[leading], rest, (), why)
+    if "+" in leading:
+        leading, share = _earned(found, leading, share)
+    in_pair = "+" in leading and sum(v for k, v in listed.items() if "+" in k) > 0.5
     sure = tuple(i for i, p in share.items() if p >= SURE)
     if sure and (len(sure) > 1 or not in_pair):
         group = () if len(sure) > 1 else _class(found, sure[0], share)
@@ -152,6 +164,15 @@ def decide(found: Evidence, p_value: float) -> Decision:
         return _named(found, group, total, rest)
     return Decision("insufficient", (), leading, listed[leading], rest, (group,) if len(group) > 1 else (),
                     "several explanations are left that are not alike")  # fmt: skip
+
+
+def _earned(found: Evidence, pair: str, share: dict[str, float]) -> tuple[str, dict[str, float]]:
+    """Leading explanation without the effect that adds too little to the other one, and the probabilities to match."""
+    ids = pair.split("+")
+    for other, one in (ids, ids[::-1]):
+        if found.log_bayes(pair) - found.log_bayes(one) < EARNED and share[one] >= share[other]:
+            return one, {i: (0.0 if i == other else p) for i, p in share.items()}
+    return pair, share
 
 
 def _class(found: Evidence, first: str, share: dict[str, float]) -> tuple[str, ...]:

@@ -22,7 +22,9 @@ class AirDensity(Effect):
     id = "air_density"
     title = "density of the air"
     sign = "thrust and torque off by the same share at every speed and advance ratio; one cell's gain moves one of them"
-    parameters = (Parameter("change", "1", -0.35, 0.06, "weather +-3 %, altitude to 3500 m", 5, 0.0),)
+    parameters = (
+        Parameter("change", "1", -0.35, 0.5, "weather +-3 %; altitude to 3500 m, forgotten or wrongly stated", 7, 0.0),
+    )
     on_by_default = False
 
     def flow(self, flow: Flow) -> None:

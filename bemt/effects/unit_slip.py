@@ -12,6 +12,8 @@ _G, _LB, _INCH = 9.80665, 0.45359237, 0.0254
 _LBF, _OZF = _G * _LB, _G * _LB / 16.0
 
 # What one SI unit is in each of the units that get mixed up with it; the slip may go either way.
+# A ratio nearer to 1 than this (natural logarithm) is a gain, not a slip.
+_LARGE = 0.5
 _UNITS: dict[str, dict[str, float]] = {
     "thrust_N": {
         "kgf": 1.0 / _G, "gf": 1000.0 / _G, "lbf": 1.0 / _LBF, "ozf": 1.0 / _OZF, "kN": 1e-3, "lb for kg": _LB,
@@ -76,4 +78,5 @@ class UnitSlip(Effect):
             for channel, units in _UNITS.items()
             for unit, factor in units.items()
             for f, words in ((factor, unit), (1.0 / factor, f"taken for {unit}"))
+            if abs(math.log(f)) > _LARGE
         )

@@ -26,6 +26,8 @@ from pathlib import Path
 from types import MappingProxyType, ModuleType
 from typing import Any
 
+import numpy as np
+
 from bemt.errors import Fault, InputError
 
 __all__ = ["HEAD_BYTES", "SourceText", "detect", "head_text", "importers", "load_text", "number", "read"]
@@ -243,4 +245,5 @@ def read(path: str | os.PathLike[str], format: str | None = None) -> Any:  # noq
     kind = detect(path) if format is None else format
     if kind not in known:
         raise InputError(Fault(os.fspath(path), "format", repr(kind), f"one of {', '.join(known)}"))
-    return known[kind].read(path)
+    with np.errstate(all="ignore"):  # a damaged file may hold any number; what is not finite is flagged or refused
+        return known[kind].read(path)

@@ -38,7 +38,7 @@ _COMPOUND = {
     "N/W": units.Unit("N_W", "efficacy", 1.0), "lbf/W": units.Unit("N_W", "efficacy", units.LBF),
 }  # fmt: skip
 _PURE = re.compile(
-    r"(CT|CP|CQ|KT|KQ|10KQ|CT_total|KT_total|KT_nozzle|KT_propeller|J|eta0?|FM|Re|M_tip|tip_Mach|Mach|throttle|sigma"
+    r"(CT|CP|CQ|KT|KQ|10KQ|CT_total|KT_total|KT_nozzle|KT_propeller|J|eta0?|FM|Re|M_tip|run|tip_Mach|Mach|throttle|sigma"
     r"|[A-Za-z]\w*?/[A-Z]|[A-Za-z]\w*_over_[A-Za-z]|[xyz]/c|\w+_ratio|CT_rotor|CP_rotor|CQ_rotor)"
 )
 _WORDS = {  # heading in lower case -> name and dimension it must have
@@ -46,6 +46,7 @@ _WORDS = {  # heading in lower case -> name and dimension it must have
     "voltage": ("voltage", "voltage"), "current": ("current", "current"), "airspeed": ("airspeed", "speed"),
     "electrical power": ("electrical_power", "power"), "mechanical power": ("mechanical_power", "power"),
     "throttle": ("throttle", "fraction"), "esc signal": ("pulse_width", "time"), "esc": ("pulse_width", "time"),
+    "pwm": ("pulse_width", "time"),
     "motor optical speed": ("optical", "angular_speed"), "motor electrical speed": ("electrical", "angular_speed"),
     "vibration": ("vibration", "acceleration"), "accx": ("acceleration_x", "acceleration"),
     "accy": ("acceleration_y", "acceleration"), "accz": ("acceleration_z", "acceleration"),
@@ -179,6 +180,8 @@ def heading(text: str) -> Heading:
         unit, doubt = _GRAVITY, ""
     if unit is None:
         return Heading(text, slug(text) or "column", None, doubt)
+    if unit.offset and base.startswith("u_"):  # an uncertainty in Celsius is one in kelvin
+        unit = units.Unit(unit.suffix, unit.dimension, unit.factor)
     if word and word[1] == unit.dimension:
         base = word[0]
         if unit.dimension == "angular_speed" and unit.suffix != "rpm":

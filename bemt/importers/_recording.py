@@ -339,7 +339,11 @@ class Builder:
         if head.unit is None:
             self.unitless.append(f"{label!r}" + (f" ({head.doubt})" if head.doubt else ""))
         elif head.unit.suffix != "rpm":
-            values = values * head.unit.factor + head.unit.offset
+            with np.errstate(over="ignore"):
+                values = values * head.unit.factor + head.unit.offset
+            over = np.isinf(values)
+            self.flag(np.flatnonzero(over), f"{name}: too large a number", "; NaN there")
+            values[over] = np.nan
         if head.name != name:
             self.warnings.append(f"column {label!r} has the name of another column: kept as {name}")
         self.channels[name] = Channel(values * sign, head.unit_name)
@@ -350,7 +354,9 @@ class Builder:
         """Warn of magnitudes that look like a slip of units; nothing is converted."""
         for name, (low, high, hint) in _PLAUSIBLE.items():
             for key, channel in self.channels.items():
-                if not (key == name or key.endswith("_" + name)) or not channel.unit or "err" in key.split("_"):
+                if not (key == name or key.endswith("_" + name)) or not channel.unit:
+                    continue
+                if {"err", "u"} & {*key.split("_")}:  # an uncertainty has no usual magnitude
                     continue
                 v = np.abs(channel.values[np.isfinite(channel.values)])
                 if v.size and not low <= float(np.max(v)) <= high and float(np.max(v)) > 0.0:
@@ -364,8 +370,8 @@ class Builder:
             first = self.channels.get(re.sub(r"_\d+$", "", key))
             if first is None or first is channel or channel.unit != first.unit or not channel.unit:
                 continue
-            with np.errstate(divide="ignore", invalid="ignore"):
-                ratio = float(np.nanmedian(np.where(first.values != 0, channel.values / first.values, np.nan)))
+            both = np.isfinite(channel.values) & np.isfinite(first.values) & (first.values != 0.0)
+            ratio = float(np.median(channel.values[both] / first.values[both])) if np.any(both) else np.nan
             if np.isfinite(ratio) and abs(ratio - 1.0) > 0.01:
                 self.warnings.append(
                     f"{self.headings[key]!r} is {ratio:.5g} times {self.headings[re.sub(r'_[0-9]+$', '', key)]!r} "

@@ -147,5 +147,3 @@ def _record(
         if columns[0].role == "time" and len(clocks) == 1:
             about["time_channel"] = clocks[0]
     return Imported(KIND, "cfd", rows, channels, tuple(notes), about)
-
-

@@ -99,7 +99,8 @@ def read(path: str | os.PathLike[str]) -> Imported:
                 build.faults.append(Fault(source.name, "1", f"no numbers for {name}", "a column of numbers"))
     said = {"stand": "thrust_tool (J. Majewski)", "form": "raw" if raw else "table", **_name(Path(source.name).stem)}
     if not build.faults:
-        (_check_raw if raw else _check_table)(build)
+        with np.errstate(over="ignore", invalid="ignore"):  # damaged cells may hold any number
+            (_check_raw if raw else _check_table)(build)
         build.flag(np.flatnonzero(build.channels["rpm"].values == 0.0), "rpm is 0")
         if said.get("propeller") == "none":
             build.warnings.append("recorded without a propeller: a tare of the stand, no performance data")

@@ -159,9 +159,7 @@ def _rows(rows: Sequence[tuple[int, str]], layout: str, width: int, groups: list
     return out
 
 
-def _totals(
-    columns: list[Column], table: Table, groups: list[tuple[str, list[str]]]
-) -> tuple[list[Column], Table]:
+def _totals(columns: list[Column], table: Table, groups: list[tuple[str, list[str]]]) -> tuple[list[Column], Table]:
     """Add the totals that the old layout does not have."""
     new: list[Column] = []
     sums = []

@@ -1,0 +1,154 @@
+"""Sets of the proof: which causes, how strong, on which rigs and plans, all from one seed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemt.conceal import rigs
+from bemt.conceal.causes import CAUSES, LISTED, UNLISTED
+from bemt.conceal.items import Bench, Item, make_item
+
+__all__ = ["SETS", "SIZES", "benches", "draw_items"]
+
+SETS = ("single", "pair", "null", "mismatch", "unlisted", "sensor", "underpowered")
+"""Kinds of items; a null is noise only, a mismatch the difference of truth and solver only."""
+
+_STRENGTHS = (0.5, 1.0, 1.7)
+_PHYSICAL = ("reynolds", "compressibility", "drag_divergence", "stall_delay", "duct", "tip_gap", "ground_effect")
+_GRIDS = ("grid_shuffled", "grid_ordered", "two_air")
+
+
+@dataclass(frozen=True)
+class Size:
+    """Counts of a run of the proof.
+
+    Parameters
+    ----------
+    items : dict of str to int
+        Items of each set. [-]
+    plans : tuple of tuple
+        Rigs: whether ducted, and plans. [-]
+    """
+
+    items: dict[str, int]
+    plans: tuple[tuple[bool, tuple[str, ...]], ...]
+
+
+_OPEN, _DUCTED, _POOR = rigs.OPEN_PLANS, rigs.DUCTED_PLANS, rigs.UNDERPOWERED
+SIZES = {
+    "small": Size(
+        {"single": 16, "pair": 3, "null": 5, "mismatch": 3, "unlisted": 5, "sensor": 6, "underpowered": 3},
+        (
+            (False, ("grid_shuffled", "endurance", "static_sweep", "static_narrow")),
+            (False, ("two_air", "wall", "transient", "single_line")),
+            (True, ("grid_shuffled", "gap")),
+        ),
+    ),
+    "full": Size(
+        {"single": 240, "pair": 60, "null": 70, "mismatch": 35, "unlisted": 80, "sensor": 80, "underpowered": 40},
+        (*((False, (*_OPEN, *_POOR)),) * 6, *((True, (*_DUCTED, "static_narrow")),) * 4),
+    ),
+}
+"""Runs of the proof by name."""
+
+
+def benches(size: Size, seeds: np.random.SeedSequence) -> list[Bench]:
+    """Draw rigs and their plans.
+
+    Parameters
+    ----------
+    size : Size
+        What to draw.
+    seeds : numpy SeedSequence
+        Source.
+
+    Returns
+    -------
+    list of Bench
+        One per rig and plan.
+    """
+    out = []
+    for k, ((ducted, plans), seed) in enumerate(zip(size.plans, seeds.spawn(len(size.plans)), strict=True)):
+        rng = np.random.default_rng(seed)
+        rig = rigs.draw_rig(f"{'ducted' if ducted else 'open'}_{k}", ducted, rng)
+        out += [Bench.draw(rig, plan, rng) for plan in plans]
+    return out
+
+
+def _pick(
+    found: list[Bench], ids: Collection[str], rng: np.random.Generator, plans: Collection[str] = ()
+) -> Bench | None:
+    fit = [b for b in found if (not plans or b.plan in plans) and set(ids) <= {c.id for c in b.allowed()}]
+    return fit[int(rng.integers(len(fit)))] if fit else None
+
+
+def _strength(name: str, k: int, rng: np.random.Generator) -> float:
+    """Three strengths, each a little off; what is real everywhere cannot be much stronger or weaker."""
+    f = _STRENGTHS[k % 3] * float(rng.uniform(0.85, 1.15))
+    return float(f**0.35) if name in _PHYSICAL else f
+
+
+def draw_items(
+    size: Size, seed: int, known: Collection[str], standard: Collection[str],
+    tell: Callable[[int, int], None] = lambda i, n: None,
+) -> Iterator[Item]:  # fmt: skip
+    """Draw and measure all items of a run, in mixed order.
+
+    Parameters
+    ----------
+    size : Size
+        Counts.
+    seed : int
+        Of everything.
+    known, standard : collection of str
+        Effects that a case file may name, and those on by default.
+    tell : callable
+        Called with the number of items done and to do.
+
+    Yields
+    ------
+    Item
+        Files and key entry.
+    """
+    first, second = np.random.SeedSequence(seed).spawn(2)
+    found = benches(size, first)
+    rng = np.random.default_rng(second)
+    jobs: list[tuple[str, tuple[str, ...], tuple[float, ...], Bench]] = []
+
+    def cycle(pool: list[str], kind: str, plans: Collection[str] = ()) -> None:
+        """Every cause in turn at every strength, as long as some bench allows it."""
+        able = [i for i in pool if _pick(found, (i,), rng, plans)]
+        turn = [(i, k) for k in rng.permutation(3) for i in rng.permutation(able)]
+        for j in range(size.items[kind]):
+            name, k = turn[j % len(turn)]
+            bench = _pick(found, (name,), rng, plans)
+            assert bench is not None
+            jobs.append((kind, (str(name),), (_strength(str(name), int(k), rng),), bench))
+
+    good = [p for p in (*_OPEN, *_DUCTED) if p not in _POOR]
+    air = [i for i in LISTED if CAUSES[i].kind in ("air", "drive")]
+    cycle(air, "single", good)
+    cycle([i for i in LISTED if CAUSES[i].kind == "stand"], "sensor", good)
+    cycle(list(UNLISTED), "unlisted", good)
+    cycle(air, "underpowered", _POOR)
+    for _ in range(size.items["pair"]):
+        while True:
+            bench = _pick(found, (), rng, _GRIDS)
+            assert bench is not None
+            able = [c.id for c in bench.allowed() if c.kind != "unlisted" and c.id != "unit_slip"]
+            ids = tuple(str(i) for i in rng.choice(able, 2, replace=False))
+            if any(CAUSES[i].kind == "air" for i in ids):
+                break
+        jobs.append(("pair", ids, tuple(_strength(i, int(rng.integers(1, 3)), rng) for i in ids), bench))
+    for kind in ("null", "mismatch"):
+        for _ in range(size.items[kind]):
+            bench = _pick(found, (), rng, good)
+            assert bench is not None
+            jobs.append((kind, (), (), bench))
+    for j, at in enumerate(rng.permutation(len(jobs))):
+        kind, ids, strengths, bench = jobs[int(at)]
+        yield make_item(bench, ids, strengths, int(rng.integers(2**62)), kind, known, standard)
+        tell(j + 1, len(jobs))

@@ -1,0 +1,444 @@
+"""Concealed items: a recording and a case in a folder, and the entry of the key that tells what is in them."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.conceal.causes import CAUSES, LISTED, Cause, Change, applied
+from bemt.conceal.rigs import Rig, conditions
+from bemt.conceal.separation import FREEDOM, Yardstick, freedom, yardstick
+from bemt.conceal.stand import Stand, record
+from bemt.conceal.truth import Answer
+from bemt.conceal.truth_section import SectionPhysics
+from bemt.conceal.truth_world import Conditions, Loads, World, loads
+
+__all__ = ["Bench", "Item", "case_text", "make_item", "recording_text", "stations_text"]
+
+Array = NDArray[np.float64]
+_DIGITS = 6
+
+
+@dataclass
+class Bench:
+    """A rig in a plan, with the signatures of the causes once they were asked for.
+
+    Parameters
+    ----------
+    rig : Rig
+        What is tested.
+    plan : str
+        Name of the plan.
+    rows : Conditions
+        Real conditions.
+    """
+
+    rig: Rig
+    plan: str
+    rows: Conditions
+    _signatures: dict[str, dict[str, Array]] = field(default_factory=dict)
+    _tangents: list[dict[str, Array]] = field(default_factory=list)
+    _starts: dict[bool, Answer] = field(default_factory=dict)
+
+    @classmethod
+    def draw(cls, rig: Rig, plan: str, rng: np.random.Generator) -> Bench:
+        """Draw weather and order of a plan.
+
+        Parameters
+        ----------
+        rig : Rig
+            What is tested.
+        plan : str
+            Name of the plan.
+        rng : numpy Generator
+            Source.
+
+        Returns
+        -------
+        Bench
+            The bench.
+        """
+        return cls(rig, plan, conditions(plan, rig, rng))
+
+    def allowed(self) -> list[Cause]:
+        """Causes that can be at work here.
+
+        Returns
+        -------
+        list of Cause
+            Of `CAUSES`.
+        """
+        ducted = self.rig.duct is not None
+        return [c for c in CAUSES.values() if self.plan in c.plans and c.ducted in (None, ducted)]
+
+    def plain(self) -> World:
+        """World without any cause: with a wall behind the rotor in plans that have one.
+
+        Returns
+        -------
+        World
+            The plain world.
+        """
+        return World(ground=1.0 if self.plan == "wall" else 0.0)
+
+    def measure(
+        self, world: World, stand: Stand, rng: np.random.Generator | None = None, ducted: bool = True,
+        scales: tuple[float, float] | None = None,
+    ) -> tuple[Loads, dict[str, Array]]:  # fmt: skip
+        """Real loads and what the stand reads.
+
+        Parameters
+        ----------
+        world : World
+            What is there.
+        stand : Stand
+            Quality and faults.
+        rng : numpy Generator, optional
+            Source of noise; none: exact readings.
+        ducted : bool
+            False takes the duct away.
+        scales : (thrust, torque), optional
+            Full scales. [N], [N m]
+
+        Returns
+        -------
+        loads : Loads
+            Real loads.
+        columns : dict of str to (P,) float
+            Readings.
+        """
+        duct = self.rig.duct if ducted else None
+        rotor = self.rig.rotor if duct is not None else replace(self.rig.rotor, wall=float("nan"))
+        real = loads(rotor, world, self.rows, duct, self._starts.get(duct is not None))
+        self._starts.setdefault(duct is not None, real.answer)
+        motor = self.rig.motor if self.plan == "endurance" else None
+        return real, record(real, self.rows, self.rig.rotor.radius, motor, stand, rng, scales)
+
+    def signature(self, change: Change, cause: Cause) -> dict[str, Array]:
+        """Readings with a cause less those without it, noise apart.
+
+        Parameters
+        ----------
+        change : Change
+            The cause at its strength.
+        cause : Cause
+            What is taken away for the comparison.
+
+        Returns
+        -------
+        dict of str to (P,) float
+            Differences, at the recorded conditions.
+        """
+        quiet = Stand()
+        without_world, without_stand = applied(self.plain(), quiet, cause.without)
+        if cause.id == "ground_effect":
+            without_world = replace(without_world, ground=0.0)
+        real, base = self.measure(without_world, without_stand, ducted=cause.without.ducted is not False)
+        scales = (1.2 * float(np.nanmax(np.abs(real.thrust))), 1.2 * float(np.nanmax(np.abs(real.torque))))
+        world, stand = applied(self.plain(), quiet, change)
+        _, with_it = self.measure(world, stand, scales=scales)
+        out = {name: with_it[name] - base[name] for name in base if name not in ("rpm", "airspeed_m_s", "time_s")}
+        # a wrong speed or airspeed is seen through what the model says there
+        if stand.rpm_scale or stand.airspeed_offset:
+            shifted = replace(self.rows, rpm=with_it["rpm"], airspeed=with_it["airspeed_m_s"])
+            there = Bench(self.rig, self.plan, shifted, _starts=self._starts).measure(world, quiet)[1]
+            for name in ("thrust_N", "torque_Nm"):
+                out[name] = base[name] - there[name]
+        return out
+
+    def signatures(self) -> dict[str, dict[str, Array]]:
+        """Signatures of all listed causes at ordinary strength; kept.
+
+        Returns
+        -------
+        dict of str to dict
+            Id to differences of the readings.
+        """
+        if not self._signatures:
+            rng = np.random.default_rng(0)
+            for cause in self.allowed():
+                if cause.kind != "unlisted":
+                    self._signatures[cause.id] = self.signature(cause.make(1.0, self.rig, self.rows, rng), cause)
+        return self._signatures
+
+    def tangents(self) -> list[dict[str, Array]]:
+        """Differences of the readings for one standard deviation of each nuisance; kept.
+
+        Returns
+        -------
+        list of dict
+            Of thrust_N and torque_Nm. [N], [N m]
+        """
+        if not self._tangents:
+            quiet, world = Stand(), self.plain()
+            base = self.measure(world, quiet)[1]
+            for changed in freedom(world).values():
+                got = self.measure(changed, quiet)[1]
+                self._tangents.append({n: got[n] - base[n] for n in ("thrust_N", "torque_Nm")})
+            faster = Bench(
+                self.rig,
+                self.plan,
+                replace(self.rows, rpm=self.rows.rpm * (1.0 + FREEDOM["rpm"])),
+                _starts=self._starts,
+            )
+            got = faster.measure(world, quiet)[1]
+            self._tangents.append({n: got[n] - base[n] for n in ("thrust_N", "torque_Nm")})
+        return self._tangents
+
+
+@dataclass(frozen=True)
+class Item:
+    """One concealed item.
+
+    Parameters
+    ----------
+    files : dict of str to str
+        Name to text: recording.csv, case.toml, stations.csv.
+    entry : dict
+        What the key says of it.
+    """
+
+    files: Mapping[str, str]
+    entry: Mapping[str, Any]
+
+
+def _quality(rng: np.random.Generator, quiet: bool) -> Stand:
+    if quiet:
+        return Stand(noise=0.001, floor=0.0002, session=0.0, rpm_noise=0.0001, airspeed_noise=0.01)
+    return Stand(
+        noise=float(rng.uniform(0.003, 0.010)), floor=float(rng.uniform(0.0005, 0.0015)),
+        share=float(rng.uniform(0.3, 0.8)), memory=float(rng.uniform(0.4, 0.85)),
+        session=float(rng.uniform(0.0, 0.004)), airspeed_noise=float(rng.uniform(0.02, 0.08)),
+    )  # fmt: skip
+
+
+def make_item(
+    bench: Bench, ids: tuple[str, ...], strengths: tuple[float, ...], seed: int, kind: str,
+    known: Collection[str] = (), standard: Collection[str] = (),
+) -> Item:  # fmt: skip
+    """Measure a truth with concealed causes.
+
+    Parameters
+    ----------
+    bench : Bench
+        Rig and plan.
+    ids : tuple of str
+        Concealed causes; none for a null.
+    strengths : tuple of float
+        Relative strength of each. [1]
+    seed : int
+        Of everything random in the item.
+    kind : str
+        Set: single, pair, null, mismatch, unlisted, sensor, underpowered.
+    known, standard : collection of str
+        Effects that a case file may name, and those that are on by default.
+
+    Returns
+    -------
+    Item
+        Files and entry of the key.
+
+    Raises
+    ------
+    ValueError
+        When the truth has no solution at most of the rows.
+    """
+    rng = np.random.default_rng(seed)
+    causes = [CAUSES[i] for i in ids]
+    changes = [c.make(f, bench.rig, bench.rows, rng) for c, f in zip(causes, strengths, strict=True)]
+    stand = _quality(rng, kind == "mismatch")
+    # no two blades and no two stands are alike: half of the freedom that a diagnosis must allow for
+    section = SectionPhysics(
+        drag_level=1.0 + 0.5 * FREEDOM["drag"] * rng.standard_normal(),
+        slope_level=1.0 + 0.5 * FREEDOM["slope"] * rng.standard_normal(),
+    )
+    world = replace(bench.plain(), section=section, pitch_offset=0.5 * FREEDOM["pitch"] * float(rng.standard_normal()))
+    if kind == "mismatch":
+        world = bench.plain()
+    for change in changes:
+        own = dict(change.world)
+        if "pitch_offset" in own:
+            own["pitch_offset"] += world.pitch_offset
+        world, stand = applied(world, stand, replace(change, world=own))
+    real, columns = bench.measure(world, stand, rng)
+    good = np.isfinite(columns["thrust_N"]) & np.isfinite(columns["torque_Nm"])
+    if np.mean(good) < 0.8:
+        raise ValueError(f"{bench.rig.name} {bench.plan} {ids}: the truth has no solution at most rows")
+
+    rows = bench.rows
+    air_known = "air_density" not in ids and (bench.plan == "two_air" or bool(rng.random() < 0.5))
+    shown: dict[str, Array] = {"run": rows.run.astype(float), **columns}
+    shown["temperature_C"] = rows.temperature_C + 0.1 * rng.standard_normal(rows.rpm.size)
+    if air_known:
+        shown["pressure_Pa"] = rows.pressure_Pa + 30.0 * rng.standard_normal()
+    if np.any(np.isfinite(rows.wall)):
+        shown["wall_distance_m"] = rows.wall
+    if bench.plan == "gap":
+        shown["tip_gap_mm"] = rows.gap * 1e3
+    exact = record(real, rows, bench.rig.rotor.radius, None, stand, None)
+    for name, value in (("u_thrust_N", exact["thrust_N"]), ("u_torque_Nm", exact["torque_Nm"])):
+        full = float(np.nanmax(np.abs(value)))
+        shown[name] = np.hypot(np.hypot(stand.noise, stand.session) * np.abs(value), stand.floor * full)
+    off = tuple(dict.fromkeys(e for c in causes for e in c.off))
+    on = ("ground_effect",) if bench.plan == "wall" and "ground_effect" not in ids else ()
+    files = {
+        "recording.csv": recording_text({n: v[good] for n, v in shown.items()}),
+        "case.toml": case_text(
+            bench, [e for e in off if e in standard], [e for e in on if e in known], with_duct="duct" not in off
+        ),
+        "stations.csv": stations_text(bench.rig),
+    }
+
+    base = Stand(**{k: v for k, v in vars(stand).items() if k in _QUALITY})
+    signed = [bench.signature(ch, c) for ch, c in zip(changes, causes, strict=True)]
+    plain_loads, plain_columns = bench.measure(bench.plain(), Stand())
+    electric: dict[str, Array] = {
+        n: plain_columns[n] for n in ("voltage_V", "current_A", "pwm_us") if n in plain_columns
+    }
+    rule = yardstick(plain_loads, rows.run, base, bench.tangents(), electric)
+    parts = [_judge(rule, bench, cause, s) for cause, s in zip(causes, signed, strict=True)]
+    entry: dict[str, Any] = {
+        "set": kind,
+        "causes": list(ids),
+        "kinds": [c.kind for c in causes],
+        "strengths": list(strengths),
+        "parameters": {
+            c.id: {n: {"value": v, "unit": u} for n, (v, u) in ch.parameters.items()}
+            for c, ch in zip(causes, changes, strict=True)
+        },
+        "separation": [p["separation"] for p in parts],
+        "separation_noise": [p["separation_noise"] for p in parts],
+        "alike": [p["alike"] for p in parts],
+        "variables": [list(c.variables) for c in causes],
+        "plan": bench.plan,
+        "rig": bench.rig.name,
+        "ducted": bench.rig.duct is not None,
+        "seed": seed,
+        "rows": int(np.count_nonzero(good)),
+        "stand": {k: v for k, v in vars(stand).items() if k in _QUALITY},
+    }
+    if len(parts) > 1:  # how far the weaker of a pair stands out when the stronger may take what it can
+        vectors = [rule.whole @ rule.stack(s) for s in signed]
+        entry["separation_together"] = [_across(vectors[k], vectors[1 - k]) for k in (0, 1)]
+    return Item(files, entry)
+
+
+_QUALITY = ("noise", "floor", "share", "memory", "session", "step", "rpm_noise", "airspeed_noise")
+
+
+def _across(own: Array, other: Array) -> float:
+    length = float(other @ other)
+    return float(np.linalg.norm(own - (own @ other) / length * other)) if length > 0.0 else float(np.linalg.norm(own))
+
+
+def _judge(rule: Yardstick, bench: Bench, cause: Cause, signature: Mapping[str, Array]) -> dict[str, Any]:
+    own = rule.stack(signature)
+    noise, whole = rule.separation(own)
+    others = {i: rule.stack(s) for i, s in bench.signatures().items() if i != cause.id and i in LISTED}
+    return {"separation": whole, "separation_noise": noise, "alike": rule.alike(own, others)}
+
+
+def recording_text(columns: Mapping[str, Array]) -> str:
+    """Recording as CSV.
+
+    Parameters
+    ----------
+    columns : mapping of str to (P,) float
+        Name with unit suffix to values, in that unit.
+
+    Returns
+    -------
+    str
+        The file.
+    """
+    head = ["# concealed recording", ",".join(columns)]
+    body = zip(*([f"{float(v):.{_DIGITS}g}" if n != "run" else str(int(v)) for v in column]
+                 for n, column in columns.items()), strict=True)  # fmt: skip
+    return "\n".join([*head[1:], *(",".join(row) for row in body)]) + "\n"
+
+
+def stations_text(rig: Rig) -> str:
+    """Stations of a blade as CSV.
+
+    Parameters
+    ----------
+    rig : Rig
+        Whose blade.
+
+    Returns
+    -------
+    str
+        The file.
+    """
+    rows = zip(rig.rotor.r_R, rig.rotor.c_R, np.degrees(rig.rotor.beta), strict=True)
+    return "r_over_R,chord_over_R,beta_deg\n" + "".join(f"{x:.5f},{c:.6f},{b:.4f}\n" for x, c, b in rows)
+
+
+def case_text(bench: Bench, off: Collection[str], on: Collection[str], with_duct: bool = True) -> str:
+    """Case file of a rig: its geometry, its laboratory's air, and what the baseline leaves out.
+
+    Parameters
+    ----------
+    bench : Bench
+        Rig and plan.
+    off, on : collection of str
+        Effects switched off and on.
+    with_duct : bool
+        Whether the case knows of the duct.
+
+    Returns
+    -------
+    str
+        TOML, schema bemt.case/1.
+    """
+    rig, rows = bench.rig, bench.rows
+    rotor, section = rig.rotor, rig.rotor.section
+    duct = rig.duct if with_duct else None
+    lines = [
+        'schema = "bemt.case/1"',
+        f'name = "{rig.name}"',
+        "",
+        "[rotor]",
+        f'kind = "{"fan" if duct is not None else "propeller"}"',
+        f"blades = {rotor.blades}",
+        f"diameter_mm = {2e3 * rotor.radius:.4f}",
+        f"hub_ratio = {rotor.hub:g}",
+        "",
+        "[blade]",
+        'stations = "stations.csv"',
+        "",
+        "[blade.section]",
+        f"camber = {section.camber:.5f}",
+        f"camber_position = {section.position:g}",
+        f"thickness = {section.thickness:.5f}",
+        "",
+        "[operating]",
+        f"rpm = {float(np.median(rows.rpm)):.1f}",
+        "airspeed_m_s = 0",
+        "",
+        "[air]",
+        f"pressure_hPa = {float(np.max(rows.pressure_Pa)) / 100.0:.2f}",
+        f"temperature_C = {float(np.median(rows.temperature_C)):.2f}",
+        "",
+        "[model]",
+        "stations = 30",
+        f"effects_off = [{', '.join(f'{chr(34)}{e}{chr(34)}' for e in off)}]",
+        f"effects_on = [{', '.join(f'{chr(34)}{e}{chr(34)}' for e in on)}]",
+    ]
+    if duct is not None:
+        R = rotor.radius * 1e3
+        gap = float(np.nanmax(rows.gap)) * 1e3 if np.any(np.isfinite(rows.gap)) else duct.gap * R
+        lines += [
+            "",
+            "[duct]",
+            f"tip_gap_mm = {gap:.4f}",
+            f"length_mm = {duct.length * R:.3f}",
+            f"lip_radius_mm = {duct.lip_radius * R:.3f}",
+            f"rotor_position_mm = {duct.position * R:.3f}",
+            f"exit_area_ratio = {duct.exit_ratio:.5f}",
+        ]
+    return "\n".join(lines) + "\n"

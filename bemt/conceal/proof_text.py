@@ -1,0 +1,112 @@
+"""The score of a proof for people: a table on the terminal, one HTML file."""
+
+from __future__ import annotations
+
+import html as markup
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from bemt.tables import text_table
+
+__all__ = ["html", "text"]
+
+
+def _percent(value: float | None) -> str:
+    return "-" if value is None or not math.isfinite(value) else f"{100 * value:.1f} %"
+
+
+def _rows(rows: Sequence[Mapping[str, Any]]) -> list[list[str]]:
+    out = []
+    for r in rows:
+        share = r["low"] is not None and math.isfinite(r["low"])
+        value = r["value"]
+        words = "-" if value is None or not math.isfinite(value) else f"{value:.3g}"
+        interval = f"{_percent(r['low'])} to {_percent(r['high'])}" if share and r["n"] else ""
+        count = f"{r['hits']}/{r['n']}" if share else str(r["n"])
+        state = {True: "yes", False: "NO", None: "no data"}[r["met"]] if r["target"] else ""
+        out.append([r["what"], count, _percent(value) if share else words, interval, r["target"], state])
+    return out
+
+
+_HEADER = ["metric", "count", "value", "95 % (Wilson)", "target", "met"]
+
+
+def _tables(document: Mapping[str, Any]) -> list[tuple[str, list[str], list[list[str]]]]:
+    strata = [[f"{s['low']:g} to {s['high']:g}" if s["high"] is not None else f"above {s['low']:g}", str(s["n"]),
+               str(s["top1"]), str(s["claims"]), str(s["right"])] for s in document["strata"]]  # fmt: skip
+    risk = [[_percent(r["coverage"]), f"{r['n']:.0f}", _percent(r["risk"]), f"{r['probability']:.3f}"]
+            for r in document["risk_coverage"]]  # fmt: skip
+    confusion = [[there, ", ".join(f"{said} {n}" for said, n in sorted(row.items(), key=lambda kv: -kv[1]))]
+                 for there, row in document["confusion"].items()]  # fmt: skip
+    misses = [
+        [m["folder"], m["set"], "+".join(m["causes"]) or "-", m["plan"], f"{m['separation']:.1f}",
+         "class: " + ", ".join(m["effects"]) if m["verdict"] == "class" else m["said"]]
+        for m in document["misses"]
+    ]  # fmt: skip
+    return [
+        ("Score", _HEADER, _rows(document["score"])),
+        ("Simpler rules on the same data", _HEADER, _rows(document["baselines"])),
+        ("Single causes by separation", ["sigma", "items", "top 1", "claims", "right claims"], strata),
+        ("Wrong claims against claims listened to", ["share", "claims", "wrong", "down to probability"], risk),
+        ("What was there, and what was said", ["there", "said"], confusion),
+        ("Misses", ["item", "set", "there", "plan", "sigma", "said"], misses),
+    ]
+
+
+def text(document: Mapping[str, Any]) -> str:
+    """Give the tables for a terminal.
+
+    Parameters
+    ----------
+    document : mapping
+        ``bemt.proof/1``.
+
+    Returns
+    -------
+    str
+        Lines.
+    """
+    parts = [f"{document['items']} concealed items ({document['size']}), seed {document['seed']}, "
+             f"commit {document['commit'] or 'unknown'}\nkey SHA-256 {document['key_sha256']}"]  # fmt: skip
+    for title, header, rows in _tables(document):
+        left = (0, 1, 2, 3, 5) if title == "Misses" else (0, 1) if "said" in header else (0,)
+        parts.append(f"{title}\n" + text_table(header, rows, left=left, indent="  ") if rows else f"{title}: none")
+    return "\n\n".join(parts)
+
+
+_STYLE = """body{font:15px/1.5 system-ui,sans-serif;max-width:68rem;margin:2rem auto;padding:0 1rem;color:#1c2330}
+table{border-collapse:collapse;margin:.6rem 0 1.6rem}th,td{padding:.25rem .7rem;text-align:left;border-bottom:1px solid
+#d9dee7;vertical-align:top}
+th{border-bottom:2px solid #8a94a6}td.NO{color:#b3261e;font-weight:600}code{word-break:break-all}"""
+
+
+def html(document: Mapping[str, Any]) -> str:
+    """Give one HTML file with the same tables.
+
+    Parameters
+    ----------
+    document : mapping
+        ``bemt.proof/1``.
+
+    Returns
+    -------
+    str
+        The file.
+    """
+    out = ["<!doctype html><html lang=en><meta charset=utf-8><title>Proof</title>", f"<style>{_STYLE}</style>",
+           "<h1>Proof on concealed causes</h1>",
+           f"<p>{document['items']} items ({document['size']}), seed {document['seed']}, commit "
+           f"{markup.escape(document['commit'] or 'unknown')}. Key SHA-256 <code>{document['key_sha256']}</code>, "
+           "sealed before the diagnosis began.</p>"]  # fmt: skip
+    for title, header, rows in _tables(document):
+        out.append(f"<h2>{title}</h2>")
+        if not rows:
+            out.append("<p>none</p>")
+            continue
+        out.append("<table><tr>" + "".join(f"<th>{h}</th>" for h in header) + "</tr>")
+        for row in rows:
+            cells = (f"<td{' class=NO' if cell == 'NO' else ''}>{markup.escape(cell)}</td>" for cell in row)
+            out.append("<tr>" + "".join(cells) + "</tr>")
+        out.append("</table>")
+    return "\n".join(out) + "</html>\n"

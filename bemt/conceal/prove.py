@@ -1,0 +1,247 @@
+"""``python -m bemt prove``: conceal causes, seal the key, let the diagnosis run on its own, open the key, score."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import secrets
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bemt import __version__
+from bemt.conceal import draw, proof_text, resolve, score, seal
+from bemt.errors import EXIT_OK, Fault, InputError
+from bemt.tables import json_text, write_atomic
+
+__all__ = ["SCHEMA", "conceal", "diagnose_all", "diagnose_folder", "proof", "run"]
+
+SCHEMA, KEY_SCHEMA = "bemt.proof/1", "bemt.key/1"
+_GIVEN = ("recording.csv", "case.toml", "stations.csv")
+TIME_LIMIT_S = 900.0
+
+
+def conceal(out: Path, size: str, seed: int) -> str:
+    """Draw and write all items, and the sealed key.
+
+    Parameters
+    ----------
+    out : Path
+        Folder of the proof; must not hold one yet.
+    size : str
+        Of `draw.SIZES`.
+    seed : int
+        Of everything.
+
+    Returns
+    -------
+    str
+        SHA-256 of the key.
+
+    Raises
+    ------
+    InputError
+        If the folder holds a proof already.
+    """
+    from bemt import effects
+
+    if (out / "items").exists() or (out / seal.KEY).exists():
+        raise InputError(Fault(out.as_posix(), "", "a proof", "a folder without one", "Choose another --out"))
+    known = set(effects.catalogue())
+    standard = {e.id for e in effects.standard()}
+    entries = []
+    for k, item in enumerate(draw.draw_items(draw.SIZES[size], seed, known, standard, _teller("concealed"))):
+        name = f"{k:04d}"
+        folder = out / "items" / name
+        folder.mkdir(parents=True)
+        for file, text in item.files.items():
+            write_atomic(folder / file, text)
+        hashes = {file: seal.sha256(text) for file, text in item.files.items()}
+        entries.append({"folder": name, "files": hashes, **item.entry})
+    return seal.seal(out, {"schema": KEY_SCHEMA, "version": __version__, "seed": str(seed), "size": size,
+                           "items": entries})  # fmt: skip
+
+
+def _teller(what: str) -> Any:
+    def tell(done: int, n: int) -> None:
+        if sys.stderr.isatty():
+            print(f"\r\x1b[K{what} {done}/{n}", end="\n" if done == n else "", file=sys.stderr, flush=True)
+
+    return tell
+
+
+def diagnose_folder(folder: Path) -> tuple[dict[str, Any] | None, str]:
+    """Run the diagnosis on one folder, as a process of its own that sees a copy of recording and case only.
+
+    Parameters
+    ----------
+    folder : Path
+        Holds recording.csv, case.toml, stations.csv.
+
+    Returns
+    -------
+    answer : dict or None
+        ``bemt.diagnosis/1``; None when it failed.
+    words : str
+        What the process said on the error stream.
+    """
+    with tempfile.TemporaryDirectory(prefix="bemt-") as box:
+        for name in _GIVEN:
+            shutil.copy(folder / name, box)
+        command = [sys.executable, "-m", "bemt", "diagnose", "recording.csv", "--case", "case.toml", "--json"]
+        # the numerical libraries' own threads would fight over the cores that --jobs shares out
+        one = {
+            name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+        }
+        found = str(Path(__file__).resolve().parents[2])
+        path = os.pathsep.join(p for p in (found, os.environ.get("PYTHONPATH", "")) if p)
+        try:
+            ran = subprocess.run(command, cwd=box, env={**os.environ, **one, "PYTHONPATH": path}, capture_output=True,
+                                 text=True, timeout=TIME_LIMIT_S, check=False)  # fmt: skip
+            answer = json.loads(ran.stdout)
+            return (answer if "verdict" in answer else None), ran.stderr.strip()
+        except subprocess.TimeoutExpired:
+            return None, f"no answer within {TIME_LIMIT_S:g} s"
+        except ValueError:
+            return None, ran.stderr.strip() or "no JSON document on the output"
+
+
+def diagnose_all(out: Path, jobs: int) -> None:
+    """Diagnose all items that have no answer yet; answers go to ``answers/<folder>.json``.
+
+    Parameters
+    ----------
+    out : Path
+        Folder of the proof.
+    jobs : int
+        Processes at a time. [-]
+    """
+    answers = out / "answers"
+    answers.mkdir(exist_ok=True)
+    todo = [f for f in sorted((out / "items").iterdir()) if not (answers / f"{f.name}.json").exists()]
+    tell = _teller("diagnosed")
+
+    def one(folder: Path) -> None:
+        began = time.monotonic()
+        answer, words = diagnose_folder(folder)
+        document = {"answer": answer, "error": "" if answer else words[-2000:], "seconds": time.monotonic() - began}
+        write_atomic(answers / f"{folder.name}.json", json.dumps(document))
+
+    with ThreadPoolExecutor(jobs) as pool:
+        for k, _ in enumerate(pool.map(one, todo), 1):
+            tell(k, len(todo))
+
+
+def proof(out: Path, digest: str | None = None) -> dict[str, Any]:
+    """Open the key and score the answers.
+
+    Parameters
+    ----------
+    out : Path
+        Folder of the proof.
+    digest : str, optional
+        SHA-256 of the key as printed before the diagnosis.
+
+    Returns
+    -------
+    dict
+        ``bemt.proof/1``.
+
+    Raises
+    ------
+    InputError
+        When key, recordings or cases were changed.
+    """
+    key = seal.unseal(out, digest)
+    judged, seconds, errors = [], [], {}
+    settled: list[bool] = []
+    first, _ = np.random.SeedSequence(int(key["seed"])).spawn(2)
+    found = {(b.rig.name, b.plan): b for b in draw.benches(draw.SIZES[key["size"]], first)}
+    for entry in key["items"]:
+        file = out / "answers" / f"{entry['folder']}.json"
+        stored: Mapping[str, Any] = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
+        judged.append(score.judge(entry, stored.get("answer")))
+        if judged[-1].answer:
+            settles = resolve.resolves(found[entry["rig"], entry["plan"]], entry, judged[-1].answer)
+            settled += [] if settles is None else [settles]
+        seconds.append(float(stored.get("seconds", math.nan)))
+        if not stored.get("answer"):
+            errors[entry["folder"]] = stored.get("error", "no answer")
+    misses = [
+        {"folder": j.entry["folder"], "set": j.entry["set"], "causes": j.entry["causes"], "plan": j.entry["plan"],
+         "rig": j.entry["rig"], "separation": j.separation, "alike": j.entry["alike"], "said": j.said,
+         "verdict": j.answer.get("verdict"), "effects": j.answer.get("effects", []),
+         "ranking": [[r["effect"], r["probability"]] for r in j.answer.get("ranking", [])[:4]],
+         "error": errors.get(j.entry["folder"], "")}
+        for j in judged if not j.right and (j.claims or j.visible or not j.answer)
+    ]  # fmt: skip
+    rows = score.score(judged, settled)
+    return {
+        "schema": SCHEMA, "version": __version__, "size": key["size"], "seed": key["seed"], "commit": _commit(),
+        "key_sha256": digest or (out / seal.SEAL).read_text(encoding="utf-8").strip(), "items": len(judged),
+        "score": [vars(r) for r in rows], "baselines": [vars(r) for r in score.baselines(judged)],
+        "strata": score.strata(judged), "risk_coverage": score.risk_coverage(judged),
+        "confusion": score.confusion(judged), "misses": misses,
+        "seconds_median": sorted(seconds)[len(seconds) // 2] if seconds else math.nan,
+    }  # fmt: skip
+
+
+def _commit() -> str:
+    """Commit of the checkout, with a plus sign when files differ; empty outside of one."""
+    here = Path(__file__).resolve().parents[2]
+    words: list[str] = []
+    for command in (["git", "rev-parse", "--short=12", "HEAD"], ["git", "status", "--porcelain"]):
+        try:
+            words.append(subprocess.run(command, cwd=here, capture_output=True, text=True, check=True).stdout.strip())
+        except (OSError, subprocess.CalledProcessError):
+            return ""
+    return words[0] + ("+" if words[1] else "")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Parsed command line: size, seed, out, jobs, json, quiet.
+
+    Returns
+    -------
+    int
+        Exit code: 0 every target met, 1 some missed.
+    """
+    seed = secrets.randbits(63) if args.seed is None else int(args.seed)
+    with tempfile.TemporaryDirectory(prefix="bemt-proof-") as spare:
+        out = Path(args.out) if args.out else Path(spare)
+        began = time.monotonic()
+        if args.seed is None and (out / seal.SEAL).exists():  # an interrupted run: its key stays as it is
+            digest = (out / seal.SEAL).read_text(encoding="utf-8").strip()
+            seal.unseal(out, digest)
+            print(f"going on with the sealed key, SHA-256 {digest}", file=sys.stderr, flush=True)
+        else:
+            digest = conceal(out, args.size, seed)
+            print(f"key sealed, SHA-256 {digest}", file=sys.stderr, flush=True)
+        sealed = time.monotonic()
+        diagnose_all(out, args.jobs or os.cpu_count() or 1)
+        document = proof(out, digest)
+        document["seconds"] = {"conceal": sealed - began, "diagnose": time.monotonic() - sealed}
+        if args.out:
+            write_atomic(out / "proof.json", json_text(document))
+            write_atomic(out / "proof.txt", proof_text.text(document) + "\n")
+            write_atomic(out / "proof.html", proof_text.html(document))
+    if args.json:
+        print(json_text(document), end="")
+    elif not args.quiet:
+        print(proof_text.text(document))
+    return EXIT_OK if all(row["met"] is not False for row in document["score"]) else 1

@@ -1,0 +1,397 @@
+"""Score of the proof: what was said beside what was there, in the rows of DIAGNOSIS 5."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bemt.conceal.causes import CAUSES
+
+__all__ = ["VISIBLE", "Judged", "Row", "baselines", "confusion", "judge", "risk_coverage", "score", "strata", "wilson"]
+
+VISIBLE = 5.0
+"""Separation in standard deviations from which on a cause counts as visible. [1]"""
+_CLEAR = 10.0
+_CLAIMS = ("named", "sensor", "class")
+_NOTHING = ("none", "unknown")
+
+
+def wilson(hits: int, n: int, z: float = 1.96) -> tuple[float, float]:
+    """Wilson interval of a share.
+
+    Parameters
+    ----------
+    hits, n : int
+        Count, of how many. [-]
+    z : float
+        Normal quantile. [-]
+
+    Returns
+    -------
+    low, high : float
+        Ends; 0 to 1 when there is nothing to count. [-]
+
+    Notes
+    -----
+    E. B. Wilson, J. American Statistical Association 22, 1927, 209.
+
+    Examples
+    --------
+    >>> [round(v, 3) for v in wilson(9, 10)]
+    [0.596, 0.982]
+    """
+    if n == 0:
+        return 0.0, 1.0
+    p = hits / n
+    middle = p + z * z / (2 * n)
+    spread = z * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
+    return max((middle - spread) / (1 + z * z / n), 0.0), min((middle + spread) / (1 + z * z / n), 1.0)
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One item with its answer.
+
+    Parameters
+    ----------
+    entry : mapping
+        Of the key.
+    answer : mapping
+        The diagnosis, empty when it failed.
+    claims : bool
+        Whether a cause or a class of causes was claimed.
+    right : bool
+        Whether the claim holds, or, where nothing is to be claimed, nothing was.
+    top1, top3 : bool
+        Whether the cause, or one that the plan cannot tell from it, leads the ranking or is among its first three.
+    """
+
+    entry: Mapping[str, Any]
+    answer: Mapping[str, Any]
+    claims: bool
+    right: bool
+    top1: bool
+    top3: bool
+
+    @property
+    def separation(self) -> float:
+        """Of the weaker cause, when the other may take what it can. [1]"""
+        return float(min(self.entry.get("separation_together") or self.entry["separation"] or [0.0]))
+
+    @property
+    def visible(self) -> bool:
+        """Whether the plan can see the cause."""
+        return bool(self.entry["causes"]) and self.separation >= VISIBLE
+
+    @property
+    def said(self) -> str:
+        """The answer in a word."""
+        if not self.answer:
+            return "failed"
+        verdict = str(self.answer["verdict"])
+        return "+".join(self.answer["effects"]) if verdict in ("named", "sensor") else verdict
+
+
+@dataclass(frozen=True)
+class Row:
+    """A row of the score table.
+
+    Parameters
+    ----------
+    what : str
+        Metric.
+    hits, n : int
+        Count, of how many; for medians the count of values. [-]
+    value, low, high : float
+        Share or median, with its 95 % Wilson interval (NaN for medians). [-]
+    target : str
+        Wanted.
+    met : bool or None
+        Whether the value meets the target; None without data.
+    """
+
+    what: str
+    hits: int
+    n: int
+    value: float
+    low: float
+    high: float
+    target: str
+    met: bool | None
+
+
+def judge(entry: Mapping[str, Any], answer: Mapping[str, Any] | None) -> Judged:
+    """Judge one answer.
+
+    Parameters
+    ----------
+    entry : mapping
+        Of the key.
+    answer : mapping or None
+        ``bemt.diagnosis/1``; None when the diagnosis failed.
+
+    Returns
+    -------
+    Judged
+        With the answer.
+    """
+    if not answer:
+        return Judged(entry, {}, False, False, False, False)
+    causes = list(entry["causes"])
+    verdict, said = str(answer["verdict"]), list(answer["effects"])
+    claims = verdict in _CLAIMS
+    if not causes or entry["set"] == "unlisted":
+        return Judged(entry, answer, claims, not claims, False, False)
+    allowed = [{c, *a} for c, a in zip(causes, entry["alike"], strict=True)]
+    if verdict == "class":
+        right = any(c in said for c in causes)
+    else:
+        right = claims and _matches(said, allowed)
+    names = [str(r["effect"]) for r in answer["ranking"]]
+    listed = [n for n in names if n not in _NOTHING]
+    top1 = (verdict == "class" and right) or bool(listed) and _matches(listed[0].split("+"), allowed)
+    top3 = top1 or any(_matches(n.split("+"), allowed) for n in names[:3])
+    return Judged(entry, answer, claims, right, top1, top3)
+
+
+def _matches(said: Sequence[str], allowed: Sequence[set[str]]) -> bool:
+    """Whether every cause is met by one word that the plan cannot tell from it, and no word is left over."""
+    if len(said) != len(allowed):
+        return False
+    if len(said) == 1:
+        return said[0] in allowed[0]
+    a, b = said
+    return (a in allowed[0] and b in allowed[1]) or (a in allowed[1] and b in allowed[0])
+
+
+def _share(what: str, flags: Iterable[bool], target: str, limit: float, low_is_good: bool = False) -> Row:
+    values = list(flags)
+    hits, n = sum(values), len(values)
+    value = hits / n if n else math.nan
+    met = None if not n else (value <= limit if low_is_good else value >= limit)
+    return Row(what, hits, n, value, *wilson(hits, n), target, met)
+
+
+def _median(what: str, values: Sequence[float], target: str, limit: float) -> Row:
+    good = [v for v in values if math.isfinite(v)]
+    value = float(np.median(good)) if good else math.nan
+    return Row(what, len(good), len(good), value, math.nan, math.nan, target, value <= limit if good else None)
+
+
+def _blamed(j: Judged) -> bool:
+    """Whether a fault of the stand was put down to the air."""
+    said = set(j.answer.get("effects", ()))
+    return j.claims and not said & set(j.entry["causes"]) and any(
+        i not in CAUSES or CAUSES[i].kind == "air" for i in said
+    )  # fmt: skip
+
+
+def _parameters(j: Judged) -> list[tuple[float, bool]]:
+    """Relative error of each parameter that both sides name, and whether its interval holds the truth."""
+    out = []
+    ranking = {str(r["effect"]): r.get("parameters", {}) for r in j.answer.get("ranking", ())}
+    name = next((n for n in ranking if set(n.split("+")) == set(j.entry["causes"])), None)
+    if name is None or not j.right or j.answer["verdict"] not in ("named", "sensor"):
+        return []
+    for cause, wanted in j.entry["parameters"].items():
+        for parameter, true in wanted.items():
+            got = ranking[name].get(parameter) or ranking[name].get(f"{cause}.{parameter}")
+            if got and isinstance(got.get("value"), (int, float)) and true["value"]:
+                size = abs(float(got["value"]) - true["value"]) / abs(true["value"])
+                low, high = got.get("low"), got.get("high")
+                inside = low is not None and high is not None and low <= true["value"] <= high
+                out.append((size, inside))
+    return out
+
+
+def _held_out(j: Judged) -> tuple[float, float]:
+    """Held-out error after over before, and after over noise, all channels together."""
+    before = after = 0.0
+    count = 0
+    for channel in j.answer.get("fit", {}).values():
+        noise, first, last = (channel.get(k) for k in ("noise", "holdout_before", "holdout_after"))
+        if noise and first is not None and last is not None:
+            before, after, count = before + (first / noise) ** 2, after + (last / noise) ** 2, count + 1
+    return (math.sqrt(after / before), math.sqrt(after / count)) if count and before else (math.nan, math.nan)
+
+
+def _located(j: Judged) -> bool:
+    where = j.answer.get("location") or {}
+    # what rises and falls together in this plan is one variable to it
+    words = [str(v).lower() for v in (where.get("variable", ""), *where.get("ties", ()))]
+    families = j.entry["variables"][0]
+    return any(w == f or w.startswith(f"{f}_") or (len(f) > 2 and f in w) for w in words for f in families)
+
+
+def score(judged: Sequence[Judged], settled: Sequence[bool] = ()) -> list[Row]:
+    """The table of DIAGNOSIS 5.
+
+    Parameters
+    ----------
+    judged : sequence of Judged
+        All items.
+    settled : sequence of bool
+        Whether the recommended run settles the tie, for every item with one.
+
+    Returns
+    -------
+    list of Row
+        Metrics with Wilson intervals and targets.
+    """
+
+    def of(*sets: str) -> list[Judged]:
+        return [j for j in judged if j.entry["set"] in sets]
+
+    def told(*sets: str) -> list[Judged]:
+        """Items with an answer: who does not answer has not refrained from a wrong claim."""
+        return [j for j in of(*sets) if j.answer]
+
+    visible = [j for j in of("single", "sensor") if j.visible]
+    pairs = [j for j in of("pair") if j.visible and j.entry["plan"].startswith(("grid", "two_air"))]
+    hidden = [j for j in told("single", "sensor", "underpowered") if not j.visible]
+    with_cause = [j for j in of("single", "sensor", "pair", "underpowered") if j.claims]
+    unlisted = told("unlisted")
+    clear = [j for j in unlisted if j.separation >= _CLEAR]
+    sizes = [p for j in visible + pairs for p in _parameters(j)]
+    seen = [j for j in visible + pairs if j.answer]
+    held = [_held_out(j) for j in seen]
+    where = [j for j in visible if j.answer and j.entry["variables"][0]]
+    return [
+        _share("claims on nulls, noise", (j.claims for j in told("null")), "<= 2 %", 0.02, True),
+        _share("claims on nulls, solver mismatch only", (j.claims for j in told("mismatch")), "<= 2 %", 0.02, True),
+        _share("top 1, visible", (j.top1 for j in visible), ">= 90 %", 0.90),
+        _share("top 3, visible", (j.top3 for j in visible), ">= 98 %", 0.98),
+        _share("right when it claims", (j.right for j in with_cause), ">= 98 %", 0.98),
+        _share("claims on visible", (j.claims for j in visible), ">= 75 %", 0.75),
+        _share("wrong claims on what the plan cannot see", (j.claims and not j.right for j in hidden), "<= 2 %", 0.02,
+               True),
+        _share("pairs named exactly, rpm x J", (j.right and j.answer["verdict"] != "class" for j in pairs), ">= 75 %",
+               0.75),
+        _share("unlisted given a listed name", (j.claims for j in unlisted), "<= 5 %", 0.05, True),
+        _share("unlisted at 10 sigma called unknown", (j.answer.get("verdict") == "unknown" for j in clear), ">= 80 %",
+               0.80),
+        _share("sensor faults blamed on the air", (_blamed(j) for j in told("sensor")), "<= 2 %", 0.02, True),
+        _median("parameter error, median", [s for s, _ in sizes], "<= 15 %", 0.15),
+        _share("90 % interval holds the truth", (inside for _, inside in sizes), "85 to 95 %", 0.85),
+        _median("held-out RMSE after / before, median", [a for a, _ in held], "<= 0.5", 0.5),
+        _median("held-out RMSE after / noise, median", [b for _, b in held], "<= 1.2", 1.2),
+        _share("right variable in the location", (_located(j) for j in where), ">= 90 %", 0.90),
+        _share("recommended run settles the tie", settled, ">= 70 %", 0.70),
+        _share("failed", (not j.answer for j in judged), "0", 0.0, True),
+    ]  # fmt: skip
+
+
+def baselines(judged: Sequence[Judged]) -> list[Row]:
+    """What simpler rules would have said of the same data.
+
+    Parameters
+    ----------
+    judged : sequence of Judged
+        All items.
+
+    Returns
+    -------
+    list of Row
+        Best single effect by its evidence whatever the rivals; a smooth curve without physics.
+    """
+    visible = [j for j in judged if j.entry["set"] in ("single", "sensor") and j.visible and j.answer]
+    nothing = [j for j in judged if j.entry["set"] in ("null", "mismatch", "unlisted") and j.answer]
+
+    def best(j: Judged) -> tuple[str, float]:
+        odds = {k: v for k, v in (j.answer.get("log_bayes") or {}).items() if k not in _NOTHING and "+" not in k}
+        name = max(odds, key=lambda k: odds[k], default="")
+        return name, float(odds.get(name, 0.0))
+
+    def smooth(j: Judged) -> float:
+        pairs = [(c.get("gp_only"), c.get("noise")) for c in j.answer.get("fit", {}).values()]
+        good = [(a / b) ** 2 for a, b in pairs if a is not None and b]
+        return math.sqrt(sum(good) / len(good)) if good else math.nan
+
+    return [
+        _share("best single: top 1, visible",
+               (best(j)[0] in {*j.entry["causes"], *j.entry["alike"][0]} for j in visible), "", 0.0),
+        _share("best single: claims where nothing listed is", (best(j)[1] > 0.0 for j in nothing), "", 1.0, True),
+        _median("smooth curve only: held-out RMSE / noise", [smooth(j) for j in visible], "", math.inf),
+    ]  # fmt: skip
+
+
+def risk_coverage(
+    judged: Sequence[Judged], points: Sequence[float] = (0.25, 0.5, 0.75, 0.9, 1.0)
+) -> list[dict[str, float]]:
+    """Share of wrong claims against the share of claims that one listens to, the surest first.
+
+    Parameters
+    ----------
+    judged : sequence of Judged
+        All items.
+    points : sequence of float
+        Shares of the claims. [-]
+
+    Returns
+    -------
+    list of dict
+        coverage, risk, n and the probability down to which one listens.
+    """
+    claims = sorted((j for j in judged if j.claims), key=lambda j: -float(j.answer.get("probability") or 0.0))
+    out = []
+    for share in points:
+        n = max(round(share * len(claims)), 1) if claims else 0
+        if n:
+            wrong = sum(not j.right for j in claims[:n])
+            least = float(claims[n - 1].answer.get("probability") or 0.0)
+            out.append({"coverage": share, "risk": wrong / n, "n": float(n), "probability": least})
+    return out
+
+
+def strata(
+    judged: Sequence[Judged], edges: Sequence[float] = (0.0, 3.0, 5.0, 10.0, 20.0, math.inf)
+) -> list[dict[str, Any]]:
+    """Single causes by separation.
+
+    Parameters
+    ----------
+    judged : sequence of Judged
+        All items.
+    edges : sequence of float
+        Ends of the strata. [1]
+
+    Returns
+    -------
+    list of dict
+        low, high, n, top1, claims, right per stratum.
+    """
+    single = [j for j in judged if j.entry["set"] in ("single", "sensor", "underpowered")]
+    out: list[dict[str, Any]] = []
+    for low, high in zip(edges[:-1], edges[1:], strict=True):
+        some = [j for j in single if low <= j.separation < high]
+        counts = {"top1": sum(j.top1 for j in some), "claims": sum(j.claims for j in some)}
+        right = sum(j.claims and j.right for j in some)
+        out.append({"low": low, "high": high, "n": len(some), **counts, "right": right})
+    return out
+
+
+def confusion(judged: Sequence[Judged], key: Callable[[Judged], str] | None = None) -> dict[str, dict[str, int]]:
+    """How often what was there was called what.
+
+    Parameters
+    ----------
+    judged : sequence of Judged
+        All items.
+    key : callable, optional
+        Word for what was there.
+
+    Returns
+    -------
+    dict of str to dict
+        Cause to answer to count.
+    """
+    out: dict[str, dict[str, int]] = {}
+    for j in judged:
+        there = key(j) if key else "+".join(j.entry["causes"]) or str(j.entry["set"])
+        row = out.setdefault(there, {})
+        row[j.said] = row.get(j.said, 0) + 1
+    return dict(sorted(out.items()))

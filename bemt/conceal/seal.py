@@ -1,0 +1,104 @@
+"""Seal of the proof: a key that is fixed before the diagnosis begins, and the check that nothing was changed since."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from bemt.errors import Fault, InputError
+from bemt.tables import json_text, write_atomic
+
+__all__ = ["KEY", "SEAL", "sha256", "seal", "unseal"]
+
+KEY, SEAL = "key.json", "key.sha256"
+
+
+def sha256(text: str) -> str:
+    """Hash of a text.
+
+    Parameters
+    ----------
+    text : str
+        The text.
+
+    Returns
+    -------
+    str
+        SHA-256, hexadecimal.
+
+    Examples
+    --------
+    >>> sha256("")[:8]
+    'e3b0c442'
+    """
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def seal(folder: Path, key: Mapping[str, Any]) -> str:
+    """Write a key and its hash.
+
+    Parameters
+    ----------
+    folder : Path
+        Where to.
+    key : mapping
+        The key; each of its ``items`` holds ``files``, name to hash.
+
+    Returns
+    -------
+    str
+        SHA-256 of the key file.
+    """
+    text = json_text(key)
+    folder.mkdir(parents=True, exist_ok=True)
+    write_atomic(folder / KEY, text)
+    digest = sha256(text)
+    write_atomic(folder / SEAL, digest + "\n")
+    return digest
+
+
+def unseal(folder: Path, digest: str | None = None) -> dict[str, Any]:
+    """Read a key after checking it and every file that it vouches for.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the key, with the items in ``items/<folder>``.
+    digest : str, optional
+        SHA-256 that was printed before the diagnosis; the one in the folder by default.
+
+    Returns
+    -------
+    dict
+        The key.
+
+    Raises
+    ------
+    InputError
+        When key, seal or a file are missing or were changed; all faults at once.
+    """
+    path = folder / KEY
+    try:
+        text = path.read_text(encoding="utf-8")
+        wanted = digest or (folder / SEAL).read_text(encoding="utf-8").strip()
+    except OSError as error:
+        raise InputError(Fault(str(error.filename), "", "no such file", "the key and its seal of a proof")) from error
+    if sha256(text) != wanted:
+        raise InputError(Fault(path.as_posix(), "", f"SHA-256 {sha256(text)}", wanted, "The key was changed"))
+    key: dict[str, Any] = json.loads(text)
+    faults = []
+    for item in key["items"]:
+        for name, known in item["files"].items():
+            file = folder / "items" / item["folder"] / name
+            try:
+                found = sha256(file.read_text(encoding="utf-8"))
+            except (OSError, UnicodeDecodeError):
+                found = "nothing readable"
+            if found != known:
+                faults.append(Fault(file.as_posix(), "", found, f"SHA-256 {known}", "The file was changed"))
+    if faults:
+        raise InputError(faults)
+    return key

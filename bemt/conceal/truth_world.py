@@ -1,0 +1,312 @@
+"""World of the truth: everything that acts on a rotor between its blades and the load cell's flange.
+
+`World` says what is there and how strong, `Conditions` where and when; `loads` gives thrust and torque.  Every
+correction has another form than the one in the solver's library (named in `World`), so that a diagnosis never fits the
+formula that made the data.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.conceal import truth, truth_duct
+from bemt.conceal.truth_section import SectionPhysics
+
+__all__ = ["Conditions", "Loads", "World", "loads"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class World:
+    """What is really there.  The defaults are a plain rotor in free, quiet air with all its section physics.
+
+    Parameters
+    ----------
+    section : truth_section.SectionPhysics
+        Reynolds, Mach and rotation in the sections.
+    pitch_offset : float
+        Every blade angle is larger by this. [deg]
+    untwist : float
+        Elastic turn of the tip at ``untwist_at``; along the blade the integral of torsion moment over stiffness. [deg]
+    untwist_at : float
+        rho Omega^2 where the tip turns by ``untwist``. [kg/m3/s2]
+    leak : float
+        Scale of the leakage over the tips of a ducted rotor, 1 is real. [-]
+    lip : float
+        Scale of the loss of duct thrust behind a lip that separates. [-]
+    ground : float
+        Scale of the images of the wake in a wall behind the rotor, 1 is real. [-]
+    recirculation, recirculation_time : float
+        Onset speed over induced speed when the room has been stirred up for long; time to half of it. [-], [s]
+    blockage : float
+        Rotor over tunnel area: the stream outside the slipstream slows down by continuity. [-]
+    nacelle, nacelle_cd : float
+        Radius of a body behind the rotor over R, whose half-body flow slows the root; its tare drag on pi R^2. [-]
+    oblique : float
+        Angle of the stream to the axis: azimuth by azimuth with Pitt-Peters skew. [deg]
+    inflow_lag : float
+        Time by which induced flow follows the load. [s]
+    inertia : float
+        Rotor inertia, seen by a torque cell under the motor. [kg m2]
+    density_error : float
+        Real density over the one that the air data say, less 1. [-]
+    resonance, resonance_rpm : float
+        Share of thrust and torque lost at the peak of a blade's resonance; where. [-], [rev/min]
+    bearing : float
+        Viscous drag of a bearing behind the torque cell, at 10,000 rev/min. [N m]
+    """
+
+    section: SectionPhysics = field(default_factory=SectionPhysics)
+    pitch_offset: float = 0.0
+    untwist: float = 0.0
+    untwist_at: float = 1.0
+    leak: float = 1.0
+    lip: float = 0.0
+    ground: float = 0.0
+    recirculation: float = 0.0
+    recirculation_time: float = 5.0
+    blockage: float = 0.0
+    nacelle: float = 0.0
+    nacelle_cd: float = 0.0
+    oblique: float = 0.0
+    inflow_lag: float = 0.0
+    inertia: float = 0.0
+    density_error: float = 0.0
+    resonance: float = 0.0
+    resonance_rpm: float = 6000.0
+    bearing: float = 0.0
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """Where and when each of P rows of a recording was taken; real values, not recorded ones.
+
+    Parameters
+    ----------
+    rpm, airspeed, temperature_C, pressure_Pa : (P,) float
+        [rev/min], [m/s], [C], [Pa]
+    time : (P,) float
+        Since the first row. [s]
+    since_start : (P,) float
+        Since the rotor of this run was started. [s]
+    wall : (P,) float
+        Distance to a wall behind the rotor, NaN without one. [m]
+    gap : (P,) float
+        Tip clearance in a duct, NaN without one. [m]
+    run : (P,) int
+        Number of the run.
+    transient : bool
+        Whether the rows are one history in time rather than settled points.
+    """
+
+    rpm: Array
+    airspeed: Array
+    temperature_C: Array
+    pressure_Pa: Array
+    time: Array
+    since_start: Array
+    wall: Array
+    gap: Array
+    run: NDArray[np.int64]
+    transient: bool = False
+
+
+@dataclass(frozen=True)
+class Loads:
+    """Real loads of P rows.
+
+    Attributes
+    ----------
+    thrust, torque : (P,) float
+        On the shaft and the duct together [N], on the shaft [N m]; NaN where the rotor has no solution.
+    re75, m_tip : (P,) float
+        Reynolds number at 0.75 R; tip Mach number. [-]
+    answer : truth.Answer
+        What the rotor does, to begin another solution from.
+    """
+
+    thrust: Array
+    torque: Array
+    re75: Array
+    m_tip: Array
+    answer: truth.Answer
+
+
+def _torsion(rotor: truth.TruthRotor) -> Array:
+    """Turn along the blade over that of the tip: moment ~ chord^2 r^2 gathered from the tip, stiffness ~ chord^4."""
+    x, c, dx = rotor.x, rotor.chord / rotor.radius, np.diff(rotor.edges)
+    moment = np.cumsum((c**2 * x**2 * dx)[::-1])[::-1]
+    turn = np.cumsum(moment / np.maximum(c, 0.25 * c.max()) ** 4 * dx)
+    return np.asarray(turn / turn[-1])
+
+
+def _wall_factor(x: Array, distance: Array) -> Array:
+    """Share of the wake's downwash that is left before a wall, (P, N): the wake ends there, its image blows back.
+
+    Vortex tubes of the contracted wake from the disk to the wall and, of opposite sense, from the wall to twice the
+    distance, as M. Knight and R. A. Hefner did (NACA TN 835, 1941).  Mixing and the turn along the wall leave a share
+    of that, declared so that the power at given thrust falls as J. S. Hayden's flight tests say (AHS Forum 32, 1976:
+    P / P_free = 1 / (0.9926 + 0.0379 (2 R / z)^2); not checked against the paper).
+    """
+    out = np.ones((distance.size, x.size))
+    radius, left = 0.78, 0.6
+    inside = np.minimum(x, radius - 0.08)
+    here = truth_duct.tube_speed(inside, np.zeros(x.size), radius)[0]
+    for z in np.unique(distance[np.isfinite(distance)]):
+        wall = truth_duct.tube_speed(inside, np.full(x.size, -z), radius)[0]
+        far = truth_duct.tube_speed(inside, np.full(x.size, -2.0 * z), radius)[0]
+        out[distance == z] = 1.0 - left * (2.0 * wall - far) / here
+    return out
+
+
+def _solve(
+    rotor: truth.TruthRotor,
+    c: Conditions,
+    pressure: Array,
+    world: World,
+    extra: dict[str, Any],
+    start: truth.Answer | None,
+) -> truth.Answer:
+    v = c.airspeed * np.cos(np.radians(world.oblique))
+    return truth.solve(rotor, c.rpm, v, c.temperature_C, pressure, world.section, extra, start)
+
+
+def loads(
+    rotor: truth.TruthRotor, world: World, c: Conditions, duct: truth_duct.TruthDuct | None = None,
+    start: truth.Answer | None = None,
+) -> Loads:  # fmt: skip
+    """Thrust and torque of every row.
+
+    Parameters
+    ----------
+    rotor : truth.TruthRotor
+        Blades; ``wall`` must be set with a duct.
+    world : World
+        What is there.
+    c : Conditions
+        Rows.
+    duct : truth_duct.TruthDuct, optional
+        Duct around the rotor.
+    start : truth.Answer, optional
+        Solution of the same rows in a world nearby.
+
+    Returns
+    -------
+    Loads
+        Real loads.
+    """
+    pressure = c.pressure_Pa * (1.0 + world.density_error)
+    rho = truth.air(c.temperature_C, pressure)[0]
+    omega = c.rpm * (2.0 * np.pi / 60.0)
+    area = np.pi * rotor.radius**2
+    shape = (c.rpm.size, rotor.x.size)
+    twist = np.full(shape, np.radians(world.pitch_offset))
+    if world.untwist:
+        twist = twist + np.radians(world.untwist) * np.outer(rho * omega**2 / world.untwist_at, _torsion(rotor))
+    extra: dict[str, Any] = {"twist": twist}
+    span = (1.0 - rotor.hub) * rotor.radius
+    leak = np.zeros(c.rpm.size)
+    per_v: Array = np.zeros(rotor.x.size)
+    if duct is not None:
+        per_w, per_v = truth_duct.disk_speeds(duct, rotor.hub, tuple(rotor.x))
+        gap = np.where(np.isfinite(c.gap), c.gap, duct.gap * rotor.radius) / span
+        leak = world.leak * gap
+        extra |= {"duct": per_w, "seal": truth_duct.seal(gap, world.leak)}
+    if world.ground and np.any(np.isfinite(c.wall)):
+        extra["induction"] = 1.0 + world.ground * (_wall_factor(rotor.x, c.wall / rotor.radius) - 1.0)
+    along = c.airspeed * np.cos(np.radians(world.oblique))
+    axial = np.outer(along, per_v)
+    if world.nacelle:
+        # Rankine half body of this radius, its nose half a radius behind the disk: axial speed of its point source
+        x2 = rotor.x**2
+        axial = axial - np.outer(along, 0.25 * world.nacelle**2 * 0.5 / (x2 + 0.25) ** 1.5)
+    extra["axial"] = axial
+    if world.recirculation or world.blockage or world.inflow_lag or world.oblique:
+        first = start = _solve(rotor, c, pressure, world, extra, start)
+        vi = np.nan_to_num(first.induced)
+        if world.recirculation:
+            stirred = c.since_start / (c.since_start + world.recirculation_time)
+            fade = 1.0 / (1.0 + (along / np.maximum(vi, 1e-3)) ** 2)
+            axial = axial + (world.recirculation * vi * stirred * fade)[:, None]
+        if world.blockage:
+            stream = (along + vi) / np.maximum(along + 2.0 * vi, 1e-3)
+            axial = axial - (0.5 * world.blockage * 2.0 * vi * stream * (along > 0.05))[:, None]
+        if world.inflow_lag and c.transient:
+            late = _two_stage_lag(c.time, vi, world.inflow_lag)
+            axial = axial + (late - vi)[:, None]
+        extra["axial"] = axial
+    how = _round if world.oblique else _solve
+    answer = how(rotor, c, pressure, world, extra, start)
+    thrust, torque = answer.thrust, answer.torque
+    if duct is not None:
+        ring = rotor.x * np.diff(rotor.edges)
+        through = np.sum((along[:, None] * (1.0 + per_v) + answer.ua) * ring, axis=1) / np.sum(ring)
+        whole = rho * area * (1.0 - rotor.hub**2) * through * answer.jet
+        skin = 0.5 * rho * (0.006 * 2.0 * np.pi * rotor.radius**2 * duct.length) * (through**2 + along**2)
+        shroud = whole - thrust - skin
+        if world.lip:
+            # suction peak over head of the lip, with the flow that turns into the mouth; separates gradually above 4
+            turn = np.maximum(through - along, 0.0) ** 2 / (2.0 * duct.lip_radius) / np.maximum(120.0, 1e-9)
+            shroud = shroud * (1.0 - 0.6 * world.lip / (1.0 + np.exp(-(turn - 4.0) / 0.6)))
+        thrust = (thrust + shroud) * (1.0 - 1.3 * leak)
+        torque = torque * (1.0 - 0.5 * leak)
+    if world.nacelle_cd:
+        slip = along + 2.0 * np.maximum(np.nan_to_num(answer.induced), 0.0)
+        thrust = thrust - 0.5 * rho * slip**2 * world.nacelle_cd * area
+    if world.resonance:
+        bell = 1.0 / (1.0 + ((c.rpm - world.resonance_rpm) / (0.035 * world.resonance_rpm)) ** 2)
+        thrust, torque = thrust * (1.0 - world.resonance * bell), torque * (1.0 + 0.6 * world.resonance * bell)
+    if world.bearing:
+        torque = torque + world.bearing * (c.rpm / 1e4)
+    if world.inertia and c.transient:
+        torque = torque + world.inertia * np.gradient(omega, c.time)
+    return Loads(thrust, torque, answer.re75, answer.m_tip, answer)
+
+
+def _two_stage_lag(time: Array, target: Array, lag: float) -> Array:
+    """Two first-order stages in row, half of the time each: near wake, then far wake."""
+    near, far, out = target[0], target[0], np.empty_like(target)
+    for i, aim in enumerate(target):
+        dt = 0.0 if i == 0 else max(time[i] - time[i - 1], 0.0)
+        k = 1.0 - np.exp(-dt / (0.5 * lag))
+        near += k * (aim - near)
+        far += k * (near - far)
+        out[i] = far
+    return out
+
+
+def _round(
+    rotor: truth.TruthRotor,
+    c: Conditions,
+    pressure: Array,
+    world: World,
+    extra: dict[str, Any],
+    start: truth.Answer | None,
+) -> truth.Answer:
+    """Mean of eight azimuths of a blade in a stream across the disk.
+
+    Induced speed is skewed by 15 pi / 32 tan(chi / 2) r/R cos psi (D. M. Pitt and D. A. Peters, Vertica 5, 1981).
+    """
+    first = _solve(rotor, c, pressure, world, extra, start)
+    across = c.airspeed * np.sin(np.radians(world.oblique))
+    vi = np.maximum(np.nan_to_num(first.induced), 0.0)
+    into = c.airspeed * np.cos(np.radians(world.oblique)) + vi
+    # Glauert's mean induced speed: the resultant flow feeds the disk
+    feed = np.maximum(into, 1e-3) / np.hypot(np.maximum(into, 1e-3), across)
+    chi = np.arctan2(across, np.maximum(into, 1e-3))
+    skew = 15.0 * np.pi / 32.0 * np.tan(0.5 * chi)
+    parts = []
+    for psi in np.arange(8) * (np.pi / 4.0):
+        more = dict(extra)
+        more["tangential"] = np.broadcast_to((across * np.sin(psi))[:, None], (c.rpm.size, rotor.x.size))
+        more["axial"] = extra["axial"] + np.outer(vi * skew * np.cos(psi) * feed, rotor.x)
+        more["induction"] = feed[:, None] * np.broadcast_to(extra.get("induction", 1.0), (c.rpm.size, rotor.x.size))
+        parts.append(_solve(rotor, c, pressure, world, more, first))
+    return replace(
+        first, thrust=np.mean([p.thrust for p in parts], axis=0), torque=np.mean([p.torque for p in parts], axis=0)
+    )

@@ -1,0 +1,456 @@
+"""Bench map: pulse width to rpm, thrust, current and power, monotone, with battery voltage where it can be told apart.
+
+Each quantity is a monotone smooth curve over the pulse width: values at equidistant nodes whose increments are not
+negative (non-negative least squares) with a penalty on second differences, the discrete form of a cubic smoothing
+spline (Whittaker 1923; Eilers and Marx 1996). Leave-one-level-out decides how smooth. Between nodes stands a monotone
+cubic (Fritsch and Carlson 1980). With voltage, q = q_ref(pulse) (V / V_ref)^m; m is fitted when the voltage varies by
+itself, not only as the sag that belongs to a pulse width.
+
+References
+----------
+F. N. Fritsch, R. E. Carlson, "Monotone piecewise cubic interpolation", SIAM J. Numer. Anal. 17 (1980) 238-246,
+doi:10.1137/0717021. P. H. C. Eilers, B. D. Marx, "Flexible smoothing with B-splines and penalties", Statistical
+Science 11 (1996) 89-121, doi:10.1214/ss/1038425655. (Not checked against the papers.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bemt.drive.map_points import QUANTITIES, MapPoints
+from bemt.errors import Fault, InputError
+
+__all__ = ["BenchMap", "Curve", "HeldOut", "fit", "held_out", "misfit", "repeat_spread"]
+
+Array = NDArray[np.float64]
+NODES = 49
+SMOOTHNESS = 10.0 ** np.arange(-10.0, 0.1, 2.0)
+OWN_VOLTAGE = 0.01
+"""Spread of ln V beside the sag from which the voltage is a parameter. [1]"""
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """One quantity over pulse width.
+
+    Parameters
+    ----------
+    pulse_us, values : (K,) float
+        Nodes [us] and values in the unit of the quantity, not falling.
+    exponent : float
+        Power of V / V_ref; 0 when the voltage is no parameter. [-]
+    smoothness : float
+        Penalty chosen. [-]
+    """
+
+    pulse_us: Array
+    values: Array
+    exponent: float = 0.0
+    smoothness: float = 0.0
+
+    def at(self, pulse_us: ArrayLike) -> Array:
+        """Evaluate at the reference voltage; NaN outside the recorded pulse widths.
+
+        Parameters
+        ----------
+        pulse_us : array_like
+            Pulse widths. [us]
+
+        Returns
+        -------
+        (N,) float
+            In the unit of the quantity.
+        """
+        return np.asarray(self._cubic(np.asarray(pulse_us, dtype=float)))
+
+    @cached_property
+    def _cubic(self) -> Callable[[Array], Array]:
+        from scipy.interpolate import PchipInterpolator
+
+        cubic: Callable[[Array], Array] = PchipInterpolator(self.pulse_us, self.values, extrapolate=False)
+        return cubic
+
+
+@dataclass(frozen=True, eq=False)
+class BenchMap:
+    """Map of one drive.
+
+    Parameters
+    ----------
+    curves : mapping of str to Curve
+        thrust [N], rpm [rev/min], current [A], power [W], as recorded.
+    voltage : Curve or None
+        Voltage that belongs to a pulse width, as minus its value (it falls). [V]
+    voltage_ref : float
+        V_ref, NaN when no voltage was recorded. [V]
+    voltage_range : tuple of float
+        Least and greatest voltage recorded. [V]
+    notes : tuple of str
+        What was assumed.
+    points : MapPoints or None
+        What it was fitted to.
+    """
+
+    curves: dict[str, Curve]
+    voltage: Curve | None
+    voltage_ref: float
+    voltage_range: tuple[float, float]
+    notes: tuple[str, ...] = ()
+    points: MapPoints | None = field(default=None, repr=False)
+
+    @property
+    def with_voltage(self) -> bool:
+        """Whether the voltage is a parameter."""
+        return any(curve.exponent != 0.0 for curve in self.curves.values())
+
+    @property
+    def pulse_range_us(self) -> tuple[float, float]:
+        """Recorded range of the pulse width. [us]"""
+        nodes = self.curves["thrust"].pulse_us
+        return float(nodes[0]), float(nodes[-1])
+
+    @property
+    def full_thrust_N(self) -> float:
+        """Thrust at the greatest pulse width and the reference voltage. [N]"""
+        return float(self.curves["thrust"].values[-1])
+
+    def voltage_at(self, pulse_us: ArrayLike) -> Array:
+        """Voltage recorded with a pulse width (battery sag); NaN without a record.
+
+        Parameters
+        ----------
+        pulse_us : array_like
+            Pulse widths. [us]
+
+        Returns
+        -------
+        (N,) float
+            Voltage. [V]
+        """
+        pulse = np.asarray(pulse_us, dtype=float)
+        return np.full(pulse.shape, np.nan) if self.voltage is None else -self.voltage.at(pulse)
+
+    def at(self, quantity: str, pulse_us: ArrayLike, voltage_V: ArrayLike | None = None) -> Array:
+        """Read the map.
+
+        Parameters
+        ----------
+        quantity : str
+            thrust, rpm, current or power.
+        pulse_us : array_like
+            Pulse widths [us]; NaN comes back outside the recorded ones.
+        voltage_V : array_like or None
+            Voltage at the ESC [V]; None: V_ref.
+
+        Returns
+        -------
+        (N,) float
+            In the unit of the quantity.
+
+        Raises
+        ------
+        InputError
+            When the map does not hold the quantity, or a voltage is asked of a map that has none as a parameter.
+        """
+        if quantity not in self.curves:
+            raise InputError(Fault("", "quantity", repr(quantity), f"one of {', '.join(self.curves)}"))
+        curve = self.curves[quantity]
+        out = curve.at(pulse_us)
+        return out if voltage_V is None else out * self._scale(curve, voltage_V)
+
+    def _scale(self, curve: Curve, voltage_V: ArrayLike) -> Array:
+        if not self.with_voltage:
+            hint = "Add a recording of the same drive at another battery voltage"
+            raise InputError(Fault("", "voltage_V", "a voltage", "none: the recording cannot tell its effect", hint))
+        v = np.asarray(voltage_V, dtype=float)
+        return np.asarray((v / self.voltage_ref) ** curve.exponent)
+
+    def pulse_for(self, thrust_N: ArrayLike, voltage_V: ArrayLike | None = None) -> Array:
+        """Inverse map: the least pulse width that gives a thrust.
+
+        Parameters
+        ----------
+        thrust_N : array_like
+            Wanted thrust. [N]
+        voltage_V : array_like or None
+            Voltage at the ESC [V]; None: V_ref.
+
+        Returns
+        -------
+        (N,) float
+            Pulse width [us]; NaN for more than the drive gives, the least pulse width for no more than its thrust.
+        """
+        curve = self.curves["thrust"]
+        wanted = np.atleast_1d(np.asarray(thrust_N, dtype=float))
+        scale = np.ones(wanted.shape)
+        if voltage_V is not None:
+            scale = np.broadcast_to(self._scale(curve, voltage_V), wanted.shape)
+        wanted = wanted / scale
+        lo = np.full(wanted.shape, curve.pulse_us[0])
+        hi = np.full(wanted.shape, curve.pulse_us[-1])
+        for _ in range(60):  # monotone: bisection cannot fail and finds the left end of a flat stretch
+            mid = 0.5 * (lo + hi)
+            reached = curve.at(mid) >= wanted
+            lo, hi = np.where(reached, lo, mid), np.where(reached, mid, hi)
+        out = np.where(wanted <= curve.values[0], curve.pulse_us[0], hi)
+        missing = (wanted > curve.values[-1]) | ~np.isfinite(wanted)
+        return np.where(missing, np.nan, out).reshape(np.shape(thrust_N))
+
+
+def _monotone(x: Array, y: Array, w: Array, grid: Array, smoothness: float) -> Array:
+    """Values at the grid: non-negative increments, penalised second differences; y is of the order of 1."""
+    from scipy.optimize import nnls
+
+    step = grid[1] - grid[0]
+    k = np.clip(((x - grid[0]) / step).astype(int), 0, len(grid) - 2)
+    f = (x - grid[k]) / step
+    rows = np.arange(len(x))
+    to_data = np.zeros((len(x), len(grid)))
+    to_data[rows, k], to_data[rows, k + 1] = 1.0 - f, f
+    second = np.diff(np.eye(len(grid)), n=2, axis=0) * len(grid) ** 1.5 * np.sqrt(smoothness)
+    sums = np.tril(np.ones((len(grid), len(grid))))  # value = start + sum of increments
+    root = np.sqrt(w / w.sum())
+    a = np.vstack([(root[:, None] * to_data) @ sums, second @ sums])
+    b = np.concatenate([root * y, np.zeros(len(second))])
+    # the start is free: its column enters with both signs
+    solution, _ = nnls(np.hstack([a, -a[:, :1]]), b, maxiter=50 * len(grid))
+    solution[0] -= solution[-1]
+    return np.asarray(sums @ solution[:-1])
+
+
+def _levels(pulse: Array) -> NDArray[np.intp]:
+    """Number of the level of each point; pulse widths within 1 us, or within a fortieth of the range of a ramp."""
+    near = np.round(pulse).astype(int)
+    found, index = np.unique(near, return_inverse=True)
+    if len(found) <= 40:
+        return np.asarray(index)
+    bins = np.linspace(pulse.min(), pulse.max(), 31)[1:-1]
+    return np.asarray(np.digitize(pulse, bins))
+
+
+def _curve(pulse: Array, y: Array, w: Array, smoothness: float | None, grid: Array) -> Curve:
+    ok = np.isfinite(y)
+    x, v, w = pulse[ok], y[ok], w[ok]
+    size = float(np.max(np.abs(v))) or 1.0
+    if smoothness is None:
+        smoothness = _chosen(x, v / size, w, grid)
+    return Curve(grid, size * _monotone(x, v / size, w, grid, smoothness), 0.0, smoothness)
+
+
+def _chosen(x: Array, y: Array, w: Array, grid: Array) -> float:
+    level = _levels(x)
+    inner = [k for k in np.unique(level) if np.min(x) < np.mean(x[level == k]) < np.max(x)]
+    if len(inner) < 2:
+        return float(SMOOTHNESS[0])
+    folds = [inner[i::6] for i in range(min(6, len(inner)))]
+    best = []
+    for smoothness in SMOOTHNESS:
+        error = 0.0
+        for fold in folds:
+            out = np.isin(level, fold)
+            values = _monotone(x[~out], y[~out], w[~out], grid, float(smoothness))
+            error += float(np.sum(w[out] * (np.interp(x[out], grid, values) - y[out]) ** 2))
+        best.append(error)
+    return float(SMOOTHNESS[int(np.argmin(best))])
+
+
+def _own_voltage(pulse: Array, voltage: Array, current: Array, sag: Curve) -> float:
+    """Spread of ln V that is not the sag of one battery: a line over current, or a curve over pulse width. [1]"""
+    own = np.log(voltage) - np.log(-sag.at(pulse))
+    ok = np.isfinite(current)
+    if np.count_nonzero(ok) >= 4:
+        line = np.polyval(np.polyfit(current[ok], voltage[ok], 1), current[ok])
+        own = np.log(voltage[ok]) - np.log(np.maximum(line, 1e-3))
+    return float(np.std(own))
+
+
+def fit(
+    points: MapPoints,
+    smoothness: float | None = None,
+    nodes: int = NODES,
+    quantities: Iterable[str] = tuple(QUANTITIES),
+) -> BenchMap:
+    """Fit the map of one drive.
+
+    Parameters
+    ----------
+    points : MapPoints
+        Steady points.
+    smoothness : float or None
+        Penalty [-]; None: chosen by leaving levels out.
+    nodes : int
+        Nodes of the curves.
+    quantities : iterable of str
+        What to fit, of `QUANTITIES`.
+
+    Returns
+    -------
+    BenchMap
+        The map.
+
+    Raises
+    ------
+    InputError
+        With fewer than four points.
+    """
+    if len(points) < 4:
+        raise InputError(Fault("", "points", f"{len(points)}", "4 or more"))
+    pulse, w = points.pulse_us, points.weight
+    grid = np.linspace(pulse.min(), pulse.max(), nodes)
+    notes = list(points.notes)
+    voltage = points.values["voltage"]
+    known = np.isfinite(voltage) & (voltage > 0.0)
+    sag, ref, limits, own = None, float("nan"), (float("nan"), float("nan")), 0.0
+    if np.count_nonzero(known) >= 4:
+        sag = _curve(pulse[known], -voltage[known], w[known], 1e-6, grid)
+        ref = float(np.median(voltage[known]))
+        limits = float(voltage[known].min()), float(voltage[known].max())
+        own = _own_voltage(pulse[known], voltage[known], points.values["current"][known], sag)
+        if own < OWN_VOLTAGE:
+            notes.append("voltage varies only with the sag of this battery: the map holds for it, not for others")
+    curves: dict[str, Curve] = {}
+    for name in quantities:
+        y = points.values[name]
+        ok = np.isfinite(y)
+        if np.count_nonzero(ok) < 4:
+            continue
+        if own < OWN_VOLTAGE:
+            curves[name] = _curve(pulse[ok], y[ok], w[ok], smoothness, grid)
+            continue
+        ok &= known
+        curves[name] = _with_voltage(pulse[ok], y[ok], w[ok], voltage[ok] / ref, smoothness, grid)
+    return BenchMap(curves, sag, ref, limits, tuple(notes), points)
+
+
+def _with_voltage(x: Array, y: Array, w: Array, ratio: Array, smoothness: float | None, grid: Array) -> Curve:
+    from scipy.optimize import minimize_scalar
+
+    def misfit(m: float) -> float:
+        values = _curve(x, y / ratio**m, w, 1e-3, grid).values
+        return float(np.sum(w * (np.interp(x, grid, values) * ratio**m - y) ** 2))
+
+    m = float(minimize_scalar(misfit, bounds=(0.0, 4.0), method="bounded", options={"xatol": 1e-3}).x)
+    curve = _curve(x, y / ratio**m, w, smoothness, grid)
+    return Curve(curve.pulse_us, curve.values, m, curve.smoothness)
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """Round trip on plateaus that the map was not fitted to.
+
+    Parameters
+    ----------
+    thrust_N : (M,) float
+        Wanted: the thrust recorded there. [N]
+    pulse_us : (M,) float
+        Pulse width at which it was recorded. [us]
+    pulse_found_us : (M,) float
+        What the inverse map asks for. [us]
+    error : (M,) float
+        Thrust that the drive gives there minus the wanted one, over full thrust [1]; what the drive gives is read
+        from the record between its neighbouring levels.
+    """
+
+    thrust_N: Array
+    pulse_us: Array
+    pulse_found_us: Array
+    error: Array
+
+    @property
+    def worst(self) -> float:
+        """Greatest error, over full thrust. [1]"""
+        return float(np.nanmax(np.abs(self.error)))
+
+    @property
+    def rms(self) -> float:
+        """Root mean square error, over full thrust. [1]"""
+        return float(np.sqrt(np.nanmean(self.error**2)))
+
+
+def misfit(points: MapPoints, chart: BenchMap) -> float:
+    """How far the points lie from a map that may not fall.
+
+    Parameters
+    ----------
+    points : MapPoints
+        What the map was fitted to.
+    chart : BenchMap
+        The map.
+
+    Returns
+    -------
+    float
+        Root mean square of thrust, over full thrust [1]; large where thrust does not follow the pulse width.
+    """
+    volts = points.values["voltage"] if chart.with_voltage else None
+    rest = chart.at("thrust", points.pulse_us, volts) - points.values["thrust"]
+    return float(np.sqrt(np.nanmean(rest**2))) / float(np.nanmax(np.abs(points.values["thrust"])))
+
+
+def repeat_spread(points: MapPoints, chart: BenchMap) -> float:
+    """How far the recording itself differs at one pulse width: a map of pulse width alone cannot be nearer.
+
+    Parameters
+    ----------
+    points : MapPoints
+        Steady points.
+    chart : BenchMap
+        Their map; where it knows the voltage, the points are taken to its reference.
+
+    Returns
+    -------
+    float
+        Greatest range of thrust within a level of equal pulse widths, over the greatest thrust [1]; NaN without
+        repeats.
+    """
+    near, thrust = np.round(points.pulse_us), points.values["thrust"]
+    if chart.with_voltage:
+        thrust = thrust / (points.values["voltage"] / chart.voltage_ref) ** chart.curves["thrust"].exponent
+    spans = [float(np.ptp(thrust[near == u])) for u in np.unique(near) if np.count_nonzero(near == u) > 1]
+    return max(spans) / float(np.max(thrust)) if spans else float("nan")
+
+
+def held_out(points: MapPoints, folds: int = 5, smoothness: float | None = None) -> HeldOut:
+    """Leave levels out in turn, fit to the rest, and make the round trip on what was left out.
+
+    Parameters
+    ----------
+    points : MapPoints
+        Steady points; the least and the greatest pulse width always stay in, a map does not extrapolate.
+    folds : int
+        Groups of levels.
+    smoothness : float or None
+        As in `fit`. [-]
+
+    Returns
+    -------
+    HeldOut
+        One entry per point that was left out.
+
+    Notes
+    -----
+    A plateau was recorded at pulse p with thrust T. The inverse map gives p' for T. The drive gives T at p, so the
+    round trip misses by map(p) - T up to the slope's change between p and p'; that is the error stated.
+    """
+    level = _levels(points.pulse_us)
+    inner = np.unique(level)[1:-1]
+    wanted, pulses, found, errors = [], [], [], []
+    for k in range(min(folds, len(inner))):
+        out = np.isin(level, inner[k::folds])
+        chart = fit(points.take(~out), smoothness, quantities=("thrust",))
+        test = points.take(out)
+        thrust, pulse = test.values["thrust"], test.pulse_us
+        volts = test.values["voltage"] if chart.with_voltage else None
+        full = chart.full_thrust_N if volts is None else chart.at("thrust", chart.pulse_range_us[1], volts)
+        wanted.append(thrust)
+        pulses.append(pulse)
+        found.append(chart.pulse_for(thrust, volts))
+        errors.append((chart.at("thrust", pulse, volts) - thrust) / full)
+    if not wanted:
+        raise InputError(Fault("", "points", f"{len(np.unique(level))} levels", "3 or more to leave one out"))
+    return HeldOut(*(np.concatenate(part) for part in (wanted, pulses, found, errors)))

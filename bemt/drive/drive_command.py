@@ -1,0 +1,113 @@
+"""``python -m bemt drive``: thrust over pulse width, hover, endurance and response of a case with its drive."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bemt.case import load_case
+from bemt.drive import drive_file, mission, picture, rotor_table, validate_command
+from bemt.drive.drive_model import EFFECTS, Drive, Steady
+from bemt.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
+from bemt.tables import csv_text, json_text, number_text, text_table, write_atomic
+
+__all__ = ["run"]
+
+COLUMNS = {"pulse_us": "pulse [us]", "rpm": "rpm", "thrust_N": "T [N]", "battery_A": "I [A]", "voltage_V": "V [V]",
+           "power_W": "P [W]", "efficiency": "eta"}  # fmt: skip
+LOW, HIGH = 0.2, 0.8
+"""Shares of full thrust of the step."""
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Of the command line: case, drive, off, airspeed, out, json.
+
+    Returns
+    -------
+    int
+        Exit code: 1 when the wanted hover is beyond the drive or a point is unconverged.
+
+    Raises
+    ------
+    InputError
+        With the faults of the case and of drive.toml.
+    """
+    if args.validate:
+        return validate_command.run(args)
+    if not args.case:
+        raise InputError(Fault("", "CASE", "nothing", "a case file or its folder", "Or --validate DIR"))
+    wrong = [name for name in args.off if name not in EFFECTS]
+    if wrong:
+        raise InputError([Fault("", "--off", repr(name), f"one of {', '.join(EFFECTS)}") for name in wrong])
+    path = Path(args.case)
+    case = load_case(path / "case.toml" if path.is_dir() else path)
+    file = drive_file.read(Path(args.drive) if args.drive else case.folder / "drive.toml")
+    rotor = rotor_table.from_case(case, 1.02 * file.rpm_max, args.airspeed, case.air(), file.rotor_inertia_kg_m2)
+    drive = file.drive(rotor).without(*args.off)
+    pulse = np.linspace(drive.esc.pulse_min_us, drive.esc.pulse_max_us, 21)
+    steady = drive.steady(pulse, file.soc)
+    steps, course = mission.response(drive, LOW, HIGH, file.soc)
+    hover = duration = None
+    if math.isfinite(file.mass_kg):
+        hover = mission.hover(drive, file.mass_kg, file.rotors, file.soc)
+        duration = mission.endurance(drive, file.mass_kg, file.rotors, file.soc, file.soc_min)
+    full_pulse = drive.esc.pulse_max_us
+    document: dict[str, Any] = {
+        "schema": "bemt.drive.result/1", "case": case.name, "drive": file.path.as_posix(), "off": sorted(drive.off),
+        "airspeed_m_s": args.airspeed, "soc": file.soc,
+        "steady": {f.name: getattr(steady, f.name) for f in dataclasses.fields(Steady)},
+        "full_thrust_settled_temperature_C": mission.settled_temperature(drive, full_pulse, file.soc),
+        "hover": dataclasses.asdict(hover) if hover else None,
+        "endurance_s": duration[0] if duration else None, "soc_end": duration[1] if duration else None,
+        "response": [dataclasses.asdict(s) for s in steps], "assumed": dict(file.assumed), "notes": list(rotor.notes),
+    }  # fmt: skip
+    if args.out:
+        folder = Path(args.out)
+        rows = [{k: float(getattr(steady, k)[i]) for k in COLUMNS} for i in range(len(pulse))]
+        write_atomic(folder / "drive.json", json_text(document))
+        write_atomic(folder / "drive.csv", csv_text(list(COLUMNS), rows))
+        panels = [
+            {"x": "pulse width [µs]", "y": "thrust [N]", "series": [("", pulse, steady.thrust_N, "-")]},
+            {"x": "pulse width [µs]", "y": "battery current [A]", "series": [("", pulse, steady.battery_A, "-")]},
+            {"x": "time [s]", "y": "thrust [N]", "series": [("", course.time_s, course.thrust_N, "-")]},
+        ]
+        write_atomic(folder / "drive.png", picture.curves(panels, case.name))
+    print(json_text(document) if args.json else _text(document, steady, drive, file) + "\n", end="")
+    reached = hover is None or math.isfinite(hover.pulse_us)
+    return EXIT_OK if reached and bool(np.all(steady.converged)) and course.converged else EXIT_UNCONVERGED
+
+
+def _text(doc: dict[str, Any], steady: Steady, drive: Drive, file: drive_file.DriveFile) -> str:
+    rows = [[number_text(float(getattr(steady, k)[i])) for k in COLUMNS] for i in range(len(steady.rpm))]
+    lines = [
+        f"{doc['case']}: {file.path.as_posix()}, charge {file.soc:.0%}",
+        text_table(list(COLUMNS.values()), rows, left=()),
+    ]
+    if np.any(steady.limited):
+        lines.append(f"the ESC's limit of {drive.esc.current_limit_A:g} A acts in {int(steady.limited.sum())} rows")
+    warm = doc["full_thrust_settled_temperature_C"]
+    if drive.motor.thermal_K_W > 0.0:
+        words = f"{warm:.0f} C" if math.isfinite(warm) else "no temperature (it runs away)"
+        over = " above its limit" if warm > file.max_temperature_C or not math.isfinite(warm) else ""
+        lines.append(f"at full pulse width the winding settles at {words}{over}")
+    if (h := doc["hover"]) is not None:
+        if math.isfinite(h["pulse_us"]):
+            lines.append(f"hover: {h['wanted_N']:.2f} N of each rotor at {h['pulse_us']:.0f} us, {h['rpm']:.0f} rpm, "
+                         f"{h['battery_A']:.2f} A, {h['power_W']:.1f} W, {h['g_per_W']:.2f} gf/W")  # fmt: skip
+            lines.append(f"endurance: {doc['endurance_s'] / 60.0:.1f} min, to a charge of {doc['soc_end']:.0%}")
+        else:
+            lines.append(f"no hover: each rotor must give {h['wanted_N']:.1f} N and gives {h['full_N']:.1f} N")
+    for s in doc["response"]:
+        lines.append(f"thrust {s['before_N']:.2f} to {s['after_N']:.2f} N: 63 % after {1e3 * s['time63_s']:.1f} ms")
+    lines += [f"! assumed: {key}: {why}" for key, why in file.assumed.items()] + [f"! {note}" for note in doc["notes"]]
+    return "\n".join(lines)

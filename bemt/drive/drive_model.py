@@ -1,0 +1,385 @@
+r"""Battery, ESC, motor and rotor: what a pulse width gives, steady.
+
+The motor is a direct-current machine at the duty d of the ESC, k = 60/(2 pi K_v):
+
+    I = (d V_b - k Omega) / (R_m + R_e),   V_b = V_oc(SoC) - R_b (d I + I_e),   k (I - I_0) = Q(Omega)
+
+with the ESC's own current I_e and the copper's R_m and the magnets' k at the winding's temperature (coefficients of
+`bemt.effects.motor_heating`, so that model and diagnosis agree). Above the current limit the ESC lowers d.
+
+References
+----------
+M. Drela, "First-order DC electric motor model", MIT, 2007 (motor equations; not checked). O. Tremblay, L.-A. Dessaint,
+"Experimental validation of a battery dynamic model for EV applications", World Electric Vehicle J. 3 (2009) 289-298,
+doi:10.3390/wevj3020289 (battery as source and resistance; not checked).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bemt.drive.rotor_table import RotorTable
+from bemt.effects.motor_heating import COPPER, MAGNET
+
+__all__ = ["EFFECTS", "Battery", "Drive", "Esc", "Motor", "Steady"]
+
+Array = NDArray[np.float64]
+EFFECTS = ("battery_sag", "motor_heating", "rotor_inertia", "inflow_lag")
+"""Effects of the drive that can be switched off; ids of the diagnosis."""
+LIPO_SOC = (0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
+LIPO_V = (3.27, 3.61, 3.69, 3.73, 3.77, 3.80, 3.84, 3.87, 3.95, 4.02, 4.11, 4.20)
+"""Open-circuit voltage of a lithium polymer cell, as printed on hobby charts: declared, not measured here. [V]"""
+REFERENCE_C = 25.0
+
+
+@dataclass(frozen=True)
+class Battery:
+    """Source with one resistance.
+
+    Parameters
+    ----------
+    cells : int
+        In series.
+    resistance_ohm : float
+        Of the pack with its leads, as seen by one drive. [ohm]
+    capacity_Ah : float
+        Share of one drive. [A h]
+    soc_table, ocv_V : tuple of float
+        State of charge, rising [1], and open-circuit voltage of a cell [V].
+    """
+
+    cells: int
+    resistance_ohm: float
+    capacity_Ah: float = math.nan
+    soc_table: tuple[float, ...] = LIPO_SOC
+    ocv_V: tuple[float, ...] = LIPO_V
+
+    def voc(self, soc: ArrayLike) -> Array:
+        """Open-circuit voltage of the pack.
+
+        Parameters
+        ----------
+        soc : array_like
+            State of charge. [1]
+
+        Returns
+        -------
+        (N,) float
+            Voltage. [V]
+        """
+        return np.asarray(self.cells * np.interp(np.asarray(soc, dtype=float), self.soc_table, self.ocv_V))
+
+
+@dataclass(frozen=True)
+class Esc:
+    """Speed controller.
+
+    Parameters
+    ----------
+    pulse_min_us, pulse_max_us : float
+        Pulse width of no and of full duty. [us]
+    exponent : float
+        duty = share ** exponent; 1 is linear. [-]
+    resistance_ohm : float
+        Of bridge and leads. [ohm]
+    idle_A : float
+        Own current. [A]
+    current_limit_A : float
+        Battery current above which it lowers the duty, and motor current to which it limits braking. [A]
+    braking : bool
+        Whether it can slow the rotor (complementary switching); else the current never goes below 0.
+    """
+
+    pulse_min_us: float = 1000.0
+    pulse_max_us: float = 2000.0
+    exponent: float = 1.0
+    resistance_ohm: float = 0.0
+    idle_A: float = 0.0
+    current_limit_A: float = math.inf
+    braking: bool = True
+
+    def duty(self, pulse_us: ArrayLike) -> Array:
+        """Duty of a pulse width.
+
+        Parameters
+        ----------
+        pulse_us : array_like
+            Pulse width. [us]
+
+        Returns
+        -------
+        (N,) float
+            From 0 to 1. [1]
+        """
+        share = (np.asarray(pulse_us, dtype=float) - self.pulse_min_us) / (self.pulse_max_us - self.pulse_min_us)
+        return np.clip(share, 0.0, 1.0) ** self.exponent
+
+
+@dataclass(frozen=True)
+class Motor:
+    """Brushless motor as a direct-current machine.
+
+    Parameters
+    ----------
+    kv_rpm_V : float
+        Speed constant. [rev/min/V]
+    resistance_ohm : float
+        Between lines, at 25 C. [ohm]
+    no_load_A : float
+        Current that covers friction and iron. [A]
+    inertia_kg_m2 : float
+        Of the turning part. [kg m2]
+    heat_capacity_J_K, thermal_K_W : float
+        Of the winding [J/K]; to the air [K/W].
+    ambient_C : float
+        Temperature of the air. [C]
+    """
+
+    kv_rpm_V: float
+    resistance_ohm: float
+    no_load_A: float = 0.0
+    inertia_kg_m2: float = 0.0
+    heat_capacity_J_K: float = math.inf
+    thermal_K_W: float = 0.0
+    ambient_C: float = REFERENCE_C
+
+    def k(self, temperature_C: ArrayLike = REFERENCE_C) -> Array:
+        """EMF per speed and torque per current.
+
+        Parameters
+        ----------
+        temperature_C : array_like
+            Of the motor. [C]
+
+        Returns
+        -------
+        (N,) float
+            k. [V s/rad]
+        """
+        warm = np.asarray(temperature_C, dtype=float) - REFERENCE_C
+        return 60.0 / (2.0 * math.pi * self.kv_rpm_V) * (1.0 - MAGNET * warm)
+
+    def resistance(self, temperature_C: ArrayLike = REFERENCE_C) -> Array:
+        """Resistance of the winding.
+
+        Parameters
+        ----------
+        temperature_C : array_like
+            Of the motor. [C]
+
+        Returns
+        -------
+        (N,) float
+            R. [ohm]
+        """
+        warm = np.asarray(temperature_C, dtype=float) - REFERENCE_C
+        return self.resistance_ohm * (1.0 + COPPER * warm)
+
+
+@dataclass(frozen=True)
+class Steady:
+    """Steady answers at N pulse widths; zero speed where the motor cannot start.
+
+    Attributes
+    ----------
+    pulse_us, duty : (N,) float
+        Pulse width [us] and duty in effect [1].
+    rpm, thrust_N, torque_Nm : (N,) float
+        Speed [rev/min], thrust [N], shaft torque [N m].
+    motor_A, battery_A, voltage_V : (N,) float
+        Currents [A] and voltage at the ESC [V].
+    power_W : (N,) float
+        Drawn from the battery. [W]
+    efficiency : (N,) float
+        Shaft power over `power_W`. [1]
+    limited : (N,) bool
+        Whether the current limit acts.
+    converged : (N,) bool
+        False where the rotor table does not reach; values there are NaN.
+    """
+
+    pulse_us: Array
+    duty: Array
+    rpm: Array
+    thrust_N: Array
+    torque_Nm: Array
+    motor_A: Array
+    battery_A: Array
+    voltage_V: Array
+    power_W: Array
+    efficiency: Array
+    limited: NDArray[np.bool_]
+    converged: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Drive:
+    """One battery share, ESC, motor and rotor.
+
+    Parameters
+    ----------
+    battery : Battery
+        Source.
+    esc : Esc
+        Controller.
+    motor : Motor
+        Machine.
+    rotor : RotorTable
+        Load.
+    off : frozenset of str
+        Effects switched off, see `EFFECTS`.
+    """
+
+    battery: Battery
+    esc: Esc
+    motor: Motor
+    rotor: RotorTable
+    off: frozenset[str] = field(default_factory=frozenset)
+
+    def without(self, *effects: str) -> Drive:
+        """The drive with some effects off.
+
+        Parameters
+        ----------
+        *effects : str
+            Ids of `EFFECTS`.
+
+        Returns
+        -------
+        Drive
+            Another one.
+
+        Raises
+        ------
+        ValueError
+            On an unknown id.
+        """
+        for name in effects:
+            if name not in EFFECTS:
+                raise ValueError(f"effect {name!r}; expected {', '.join(EFFECTS)}")
+        return replace(self, off=self.off | set(effects))
+
+    @property
+    def battery_ohm(self) -> float:
+        """Resistance of the battery in effect. [ohm]"""
+        return 0.0 if "battery_sag" in self.off else self.battery.resistance_ohm
+
+    def currents(self, duty: Array, omega: Array, voc: Array, temperature_C: Array) -> tuple[Array, Array, Array]:
+        """Motor current at a speed, with the limits of the ESC.
+
+        Parameters
+        ----------
+        duty, omega, voc, temperature_C : (N,) float
+            Duty [1], speed [rad/s], open-circuit voltage [V], motor temperature [C].
+
+        Returns
+        -------
+        motor_A, battery_A, duty : (N,) float
+            Currents [A] and duty in effect [1].
+        """
+        k, rb = self.motor.k(temperature_C), self.battery_ohm
+        rt = self.motor.resistance(temperature_C) + self.esc.resistance_ohm
+
+        def at(d: Array) -> Array:
+            amps = (d * (voc - rb * self.esc.idle_A) - k * omega) / (rt + d * d * rb)
+            return np.maximum(amps, -self.esc.current_limit_A if self.esc.braking else 0.0)
+
+        amps = at(duty)
+        room = self.esc.current_limit_A - self.esc.idle_A
+        over = duty * amps > room
+        if np.any(over):
+            # the duty at which d I meets the limit: I(d) d rises with d while I > 0
+            lo, hi = np.zeros_like(duty), duty.copy()
+            for _ in range(50):
+                mid = 0.5 * (lo + hi)
+                high = mid * at(mid) > room
+                lo, hi = np.where(high, lo, mid), np.where(high, mid, hi)
+            duty = np.where(over, lo, duty)
+            amps = at(duty)
+        return amps, duty * amps + self.esc.idle_A, duty
+
+    def steady(self, pulse_us: ArrayLike, soc: ArrayLike = 1.0, temperature_C: ArrayLike | None = None) -> Steady:
+        """Solve for the speed at which motor and rotor agree.
+
+        Parameters
+        ----------
+        pulse_us : array_like
+            Pulse widths. [us]
+        soc : array_like
+            State of charge. [1]
+        temperature_C : array_like or None
+            Of the motor [C]; None: the air's.
+
+        Returns
+        -------
+        Steady
+            One entry per pulse width.
+
+        Notes
+        -----
+        Motor torque falls with speed and rotor torque rises: one root, found by bisection between rest and twice the
+        speed at no load.
+        """
+        pulse, charge, warm = np.broadcast_arrays(
+            np.atleast_1d(np.asarray(pulse_us, dtype=float)), np.asarray(soc, dtype=float),
+            np.asarray(self.motor.ambient_C if temperature_C is None else temperature_C, dtype=float),
+        )  # fmt: skip
+        voc, duty = self.battery.voc(charge), self.esc.duty(pulse)
+        k = self.motor.k(warm)
+
+        def surplus(omega: Array) -> Array:
+            amps, _, _ = self.currents(duty, omega, voc, warm)
+            return np.asarray(k * (amps - self.motor.no_load_A) - self.rotor.torque(omega))
+
+        lo, hi = np.zeros(pulse.shape), 2.0 * voc / k
+        still = surplus(lo) <= 0.0
+        for _ in range(60):
+            mid = 0.5 * (lo + hi)
+            up = surplus(mid) > 0.0
+            lo, hi = np.where(up, mid, lo), np.where(up, hi, mid)
+        omega = np.where(still, 0.0, 0.5 * (lo + hi))
+        amps, bus, used = self.currents(duty, omega, voc, warm)
+        amps, bus = np.where(still, 0.0, amps), np.where(still, self.esc.idle_A, bus)
+        inside = omega <= self.rotor.omega_max * (1.0 + 1e-9)
+        volts = voc - self.battery_ohm * bus
+        torque, thrust = self.rotor.torque(omega), self.rotor.thrust(omega)
+        power = volts * bus
+        with np.errstate(divide="ignore", invalid="ignore"):
+            eta = np.where(power > 0.0, torque * omega / power, 0.0)
+
+        def kept(v: Array) -> Array:
+            return np.where(inside, v, np.nan)
+
+        return Steady(pulse, used, kept(omega * 30.0 / math.pi), kept(thrust), kept(torque), kept(amps), kept(bus),
+                      kept(volts), kept(power), kept(eta), used < duty, inside)  # fmt: skip
+
+    def pulse_for(self, thrust_N: float, soc: float = 1.0, temperature_C: float | None = None) -> float:
+        """Pulse width that gives a thrust.
+
+        Parameters
+        ----------
+        thrust_N : float
+            Wanted. [N]
+        soc : float
+            State of charge. [1]
+        temperature_C : float or None
+            Of the motor [C]; None: the air's.
+
+        Returns
+        -------
+        float
+            Pulse width [us]; NaN when the drive does not reach it.
+        """
+        lo, hi = self.esc.pulse_min_us, self.esc.pulse_max_us
+        for _ in range(6):  # thrust rises with pulse width: 40 parts at a time
+            grid = np.linspace(lo, hi, 41)
+            enough = self.steady(grid, soc, temperature_C).thrust_N >= thrust_N
+            if not enough[-1]:
+                return math.nan
+            i = int(np.argmax(enough))
+            lo, hi = float(grid[max(i - 1, 0)]), float(grid[i])
+        return hi

@@ -1,0 +1,319 @@
+"""What a data sheet does not give, from recordings: ESC law, resistances, rotor constants, inertia.
+
+A thrust map gives rotor constants (thrust and torque over speed squared), battery (voltage over current) and, by least
+squares of thrust, speed and current over pulse width, the ESC's pulse of no thrust, the exponent of its throttle curve
+and the resistance of motor and ESC together; with them K_v and I_0 when no data sheet states them. A log of a step
+gives the inertia. Everything stated stays as stated.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bemt import plateaus
+from bemt.drive import transient
+from bemt.drive.drive_model import Battery, Drive, Esc, Motor
+from bemt.drive.map_points import MapPoints
+from bemt.drive.rotor_table import RotorTable, quadratic
+from bemt.errors import Fault, InputError
+
+__all__ = [
+    "FREE",
+    "MapFit",
+    "battery_of",
+    "find_steps",
+    "fit_inertia",
+    "fit_map",
+    "no_load",
+    "step_constant",
+    "thrust_error",
+]
+
+Array = NDArray[np.float64]
+FREE: dict[str, tuple[float, float, float]] = {
+    "pulse_min_us": (1030.0, 800.0, 1250.0), "exponent": (1.0, 0.4, 2.5), "resistance_ohm": (0.1, 1e-3, 2.0),
+    "kv_rpm_V": (1000.0, 50.0, 20000.0), "no_load_A": (0.3, 0.0, 10.0), "kQ": (1e-7, 1e-12, 1e-2),
+}  # fmt: skip
+"""What can be fitted: start and bounds, in the unit of the name; kQ in N m s2/rad2."""
+
+
+@dataclass(frozen=True, eq=False)
+class MapFit:
+    """Drive fitted to a thrust map.
+
+    Parameters
+    ----------
+    drive : Drive
+        The drive, with a battery whose voltage at rest is that of the recording.
+    fitted : mapping of str to float
+        What was fitted, in the unit of its name.
+    kT, kQ : float
+        Rotor constants. [N s2/rad2], [N m s2/rad2]
+    full_thrust_N : float
+        Greatest thrust recorded. [N]
+    """
+
+    drive: Drive
+    fitted: Mapping[str, float]
+    kT: float
+    kQ: float
+    full_thrust_N: float
+
+
+def no_load(points: MapPoints) -> tuple[float, float]:
+    """K_v and I_0 of a run without propeller at full pulse width, as data sheets define them.
+
+    Parameters
+    ----------
+    points : MapPoints
+        Steady points with rpm [rev/min], current [A] and voltage [V].
+
+    Returns
+    -------
+    kv_rpm_V, no_load_A : float
+        Speed over voltage at the greatest pulse width [rev/min/V], its resistive drop not taken off; current there [A].
+    """
+    top = points.pulse_us >= np.max(points.pulse_us) - 1.0
+    v = points.values
+    return float(np.mean(v["rpm"][top] / v["voltage"][top])), float(np.mean(v["current"][top]))
+
+
+def _rotor_constant(omega: Array, load: Array) -> float:
+    ok = np.isfinite(omega) & np.isfinite(load) & (omega > 0.0)
+    return float(np.sum(load[ok] * omega[ok] ** 2) / np.sum(omega[ok] ** 4))
+
+
+def fit_map(
+    points: MapPoints, known: Mapping[str, float] | None = None, torque_Nm: ArrayLike | None = None,
+    diameter_m: float = 0.2,
+) -> MapFit:  # fmt: skip
+    """Fit a drive to a thrust map.
+
+    Parameters
+    ----------
+    points : MapPoints
+        Steady points of one battery: thrust, rpm, current; voltage where recorded, else ``voltage_V`` in `known`.
+    known : mapping of str to float, optional
+        What a data sheet states, by the names of `FREE` (kv_rpm_V, no_load_A, resistance_ohm ...); the rest is fitted.
+        pulse_max_us is 2000 us unless given.
+    torque_Nm : array_like or None
+        Torque of the points; None: kQ is fitted with the current. [N m]
+    diameter_m : float
+        Of the rotor; only the lag of the inflow needs it. [m]
+
+    Returns
+    -------
+    MapFit
+        The drive.
+
+    Raises
+    ------
+    InputError
+        Without rpm or current, or without a voltage.
+    """
+    from scipy.optimize import least_squares
+
+    known = dict(known or {})
+    v = points.values
+    faults = [Fault("", name, "no values", "a recorded channel") for name in ("rpm", "current")
+              if np.count_nonzero(np.isfinite(v[name])) < 4]  # fmt: skip
+    if np.count_nonzero(np.isfinite(v["voltage"])) < 4 and "voltage_V" not in known:
+        faults.append(Fault("", "voltage", "no values", "recorded, or stated as voltage_V"))
+    if faults:
+        raise InputError(faults)
+    omega = v["rpm"] * math.pi / 30.0
+    kT = _rotor_constant(omega, v["thrust"])
+    if torque_Nm is not None:
+        known.setdefault("kQ", _rotor_constant(omega, np.asarray(torque_Nm, dtype=float)))
+    voc, rb = _battery(v["current"], v["voltage"], known)
+    free = [name for name in FREE if name not in known]
+    full = {name: float(np.nanmax(v[name])) for name in ("thrust", "rpm", "current")}
+    start = {name: FREE[name][0] for name in free}
+    top = int(np.nanargmax(v["thrust"]))
+    if "kv_rpm_V" in free:
+        start["kv_rpm_V"] = 1.25 * full["rpm"] / (v["voltage"][top] if np.isfinite(v["voltage"][top]) else voc)
+    if "kQ" in free:
+        k = 60.0 / (2.0 * math.pi * known.get("kv_rpm_V", start.get("kv_rpm_V", 1000.0)))
+        start["kQ"] = k * full["current"] / (full["rpm"] * math.pi / 30.0) ** 2
+
+    def built(theta: Mapping[str, float]) -> Drive:
+        every = {**known, **theta}
+        esc = Esc(every["pulse_min_us"], every.get("pulse_max_us", 2000.0), every["exponent"])
+        motor = Motor(every["kv_rpm_V"], every["resistance_ohm"], every["no_load_A"])
+        return Drive(Battery(1, rb, ocv_V=(voc, voc), soc_table=(0.0, 1.0)), esc, motor,
+                     quadratic(kT, every["kQ"], diameter_m))  # fmt: skip
+
+    low = np.array([math.log(FREE[n][1] + 1e-9) for n in free])
+    high = np.array([math.log(FREE[n][2]) for n in free])
+
+    def misfit(x: Array) -> Array:
+        got = built(dict(zip(free, map(float, np.exp(x)), strict=True))).steady(points.pulse_us)
+        parts = [(got.thrust_N - v["thrust"]) / full["thrust"], (got.rpm - v["rpm"]) / full["rpm"],
+                 0.5 * (got.battery_A - v["current"]) / full["current"]]  # fmt: skip
+        return np.nan_to_num(np.concatenate(parts))
+
+    x0 = np.clip([math.log(start[n] + 1e-9) for n in free], low + 1e-6, high - 1e-6)
+    found = least_squares(misfit, x0, bounds=(low, high), loss="soft_l1", f_scale=0.03, x_scale=0.1, diff_step=1e-4)
+    fitted = dict(zip(free, map(float, np.exp(found.x)), strict=True))
+    return MapFit(built(fitted), fitted | {"battery_ohm": rb, "voltage_at_rest_V": voc}, kT,
+                  {**known, **fitted}["kQ"], full["thrust"])  # fmt: skip
+
+
+def _battery(current: Array, voltage: Array, known: Mapping[str, float]) -> tuple[float, float]:
+    """Voltage at rest and resistance from voltage over current; not below no resistance."""
+    ok = np.isfinite(current) & np.isfinite(voltage)
+    if np.count_nonzero(ok) < 4:
+        return known["voltage_V"], known.get("battery_ohm", 0.0)
+    if "battery_ohm" in known:
+        return float(np.mean(voltage[ok] + known["battery_ohm"] * current[ok])), known["battery_ohm"]
+    slope, rest = np.polyfit(current[ok], voltage[ok], 1)
+    return (float(rest), float(-slope)) if slope < 0.0 else (float(np.mean(voltage[ok])), 0.0)
+
+
+def battery_of(points: MapPoints) -> tuple[float, float]:
+    """Voltage at rest and resistance of the battery of a recording.
+
+    Parameters
+    ----------
+    points : MapPoints
+        Steady points with voltage and current.
+
+    Returns
+    -------
+    voltage_V, resistance_ohm : float
+        Straight line of voltage over current. [V], [ohm]
+
+    Raises
+    ------
+    InputError
+        Without voltage and current.
+    """
+    current, voltage = points.values["current"], points.values["voltage"]
+    if np.count_nonzero(np.isfinite(current) & np.isfinite(voltage)) < 4:
+        raise InputError(Fault("", "voltage", "no values", "recorded voltage and current"))
+    return _battery(current, voltage, {})
+
+
+def thrust_error(drive: Drive, points: MapPoints, full_thrust_N: float) -> Array:
+    """Thrust over pulse width, model minus recording.
+
+    Parameters
+    ----------
+    drive : Drive
+        The drive.
+    points : MapPoints
+        Steady points.
+    full_thrust_N : float
+        Full scale. [N]
+
+    Returns
+    -------
+    (N,) float
+        Over full scale. [1]
+    """
+    return np.asarray((drive.steady(points.pulse_us).thrust_N - points.values["thrust"]) / full_thrust_N)
+
+
+def fit_inertia(
+    drive: Drive, time_s: ArrayLike, thrust_N: ArrayLike, before_us: float, after_us: float
+) -> tuple[float, float]:
+    """Inertia of motor and rotor together from a recorded step.
+
+    Parameters
+    ----------
+    drive : Drive
+        The drive; its inertias are replaced.
+    time_s, thrust_N : array_like
+        Samples around one step, settled at both ends: time [s], thrust [N].
+    before_us, after_us : float
+        Pulse widths before and after. [us]
+
+    Returns
+    -------
+    inertia_kg_m2, tau_s : float
+        Inertia for which the model's thrust, sampled at the same times, has the first-order time constant of the
+        recording [kg m2]; that time constant [s].
+
+    Raises
+    ------
+    InputError
+        When no inertia gives the time constant: the air or the limits of the ESC are slower.
+    """
+    from scipy.optimize import brentq
+
+    step = transient.first_order(time_s, thrust_N)
+    tau, delay = step.tau_s, step.delay_s
+    t = np.asarray(time_s, dtype=float)
+
+    def gap(log_inertia: float) -> float:
+        return math.log(step_constant(drive, math.exp(log_inertia), t, delay, before_us, after_us) / tau)
+
+    low, high = math.log(1e-9), math.log(1.0)
+    grid = np.linspace(low, high, 22)
+    values = [gap(float(x)) for x in grid]
+    for a, b, ya, yb in zip(grid[:-1], grid[1:], values[:-1], values[1:], strict=True):
+        if ya < 0.0 <= yb:
+            return math.exp(float(brentq(gap, a, b, xtol=1e-3))), tau
+    raise InputError(Fault("", "inertia", f"a time constant of {tau:.4g} s", "one that an inertia can give"))
+
+
+def step_constant(
+    drive: Drive, inertia_kg_m2: float, times_s: Array, step_s: float, before_us: float, after_us: float
+) -> float:
+    """First-order time constant of the model's thrust, sampled and read as the recording is.
+
+    Parameters
+    ----------
+    drive : Drive
+        The drive.
+    inertia_kg_m2 : float
+        Of motor and rotor together. [kg m2]
+    times_s : (N,) float
+        Times of the samples. [s]
+    step_s : float
+        Time of the step. [s]
+    before_us, after_us : float
+        Pulse widths. [us]
+
+    Returns
+    -------
+    float
+        Time constant. [s]
+    """
+    motor = replace(drive.motor, inertia_kg_m2=inertia_kg_m2)
+    rotor = RotorTable(**{**vars(drive.rotor), "inertia_kg_m2": 0.0})
+    t = times_s - times_s[0]
+    got = transient.simulate(replace(drive, motor=motor, rotor=rotor),
+                             [(0.0, before_us), (step_s - float(times_s[0]), after_us)], float(t[-1]), t)  # fmt: skip
+    return transient.first_order(t, got.thrust_N).tau_s
+
+
+def find_steps(time_s: ArrayLike, thrust_N: ArrayLike, least: float = 0.1) -> list[tuple[Array, Array]]:
+    """Cut the steps out of a log of thrust.
+
+    Parameters
+    ----------
+    time_s, thrust_N : array_like
+        The log: time [s] and thrust [N].
+    least : float
+        Smallest step, over the range of the log. [1]
+
+    Returns
+    -------
+    list of (time_s, thrust_N)
+        Each from 0.4 s before a step to 0.5 s after it has settled, less where the next step comes first.
+    """
+    t, y = np.asarray(time_s, dtype=float), np.asarray(thrust_N, dtype=float)
+    found = plateaus.find(t, {"thrust_N": y}, "thrust_N", settings=plateaus.Settings(least_step=0.05)).plateaus
+    span = float(np.nanmax(y) - np.nanmin(y))
+    out = []
+    for p, q in zip(found[:-1], found[1:], strict=True):
+        if abs(q.mean["thrust_N"] - p.mean["thrust_N"]) >= least * span and q.t0 - p.t1 < 1.0:
+            rows = (t >= max(p.t0, p.t1 - 0.4)) & (t <= min(q.t1, q.t0 + 0.5)) & np.isfinite(y)
+            out.append((t[rows], y[rows]))
+    return out

@@ -1,0 +1,193 @@
+"""From a recording to the points of a bench map: pulse width, thrust, rpm, current, power, voltage when steady."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt import plateaus
+from bemt.errors import Fault, InputError
+from bemt.imported import Imported
+
+__all__ = ["QUANTITIES", "MapPoints", "join", "points"]
+
+Array = NDArray[np.float64]
+QUANTITIES = {"thrust": "N", "rpm": "rev/min", "current": "A", "power": "W"}
+"""What a map gives beside the pulse width, with units."""
+RAMP = 40
+"""Distinct commands, one sample each, from which a recording is a ramp and not a table of steps."""
+
+
+@dataclass(frozen=True, eq=False)
+class MapPoints:
+    """Steady points of one or more recordings.
+
+    Parameters
+    ----------
+    pulse_us : (N,) float
+        Pulse width. [us]
+    values : mapping of str to (N,) float
+        thrust [N], rpm [rev/min], current [A], power [W], voltage [V]; NaN where not recorded.
+    weight : (N,) float
+        Weight of each point in a fit. [-]
+    run : (N,) int
+        Which recording a point is from.
+    notes : tuple of str
+        What was assumed or left out.
+    ramp : bool
+        Whether the command moved all the time.
+    """
+
+    pulse_us: Array
+    values: dict[str, Array]
+    weight: Array
+    run: NDArray[np.intp]
+    notes: tuple[str, ...] = ()
+    ramp: bool = False
+
+    def __len__(self) -> int:
+        return len(self.pulse_us)
+
+    def take(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> MapPoints:
+        """Some of the points.
+
+        Parameters
+        ----------
+        rows : (M,) int or (N,) bool
+            Which.
+
+        Returns
+        -------
+        MapPoints
+            Those.
+        """
+        values = {name: v[rows] for name, v in self.values.items()}
+        return MapPoints(self.pulse_us[rows], values, self.weight[rows], self.run[rows], self.notes, self.ramp)
+
+
+def _channel(got: Imported, *names: str) -> Array | None:
+    for name in names:
+        channel = got.channels.get(name)
+        if channel is not None and channel.unit and np.any(np.isfinite(channel.values) & (channel.values != 0.0)):
+            return np.asarray(channel.values, dtype=float)
+    return None
+
+
+def _command(got: Imported, name: str, notes: list[str]) -> Array:
+    pulse = _channel(got, "pulse_width_s")
+    if pulse is not None:
+        return pulse * 1e6
+    throttle = _channel(got, "throttle")
+    if throttle is not None:
+        notes.append("throttle read as 1000 us at 0 % and 2000 us at 100 %, which the file does not say")
+        return 1000.0 + 1000.0 * throttle
+    hint = "Log the ESC signal, or name its column as pulse_width or throttle in a recording.toml"
+    raise InputError(Fault(name, "pulse_width_s", "no pulse width and no throttle", "a command per row", hint))
+
+
+def points(got: Imported, name: str = "", sign: int = 1, run: int = 0) -> MapPoints:
+    """Find the steady points of one recording.
+
+    Parameters
+    ----------
+    got : Imported
+        The recording, read.
+    name : str
+        Its name, for faults.
+    sign : int
+        -1 turns the thrust round.
+    run : int
+        Number of the recording.
+
+    Returns
+    -------
+    MapPoints
+        Plateaus of a time series, the rows of a table of steps, or all samples of a ramp.
+
+    Raises
+    ------
+    InputError
+        Without command or thrust, with negative thrust at the greatest command, or with fewer than four points.
+    """
+    notes: list[str] = []
+    command = _command(got, name, notes)
+    thrust = _channel(got, "thrust_N")
+    if thrust is None:
+        hint = "Name its column and unit in a recording.toml"
+        raise InputError(Fault(name, "thrust_N", "no thrust with a unit", "a channel of thrust", hint))
+    thrust = sign * thrust
+    rpm = _channel(got, "rpm", "optical_rpm", "electrical_rpm")
+    if rpm is not None and _channel(got, "rpm", "optical_rpm") is None:
+        notes.append("rpm is the electrical reading of the stand, with the pole pairs set in its software")
+    current, voltage = _channel(got, "current_A"), _channel(got, "voltage_V")
+    power = _channel(got, "electrical_power_W")
+    if power is None and current is not None and voltage is not None:
+        power = current * voltage
+    empty = np.full(len(command), np.nan)
+    raw = {"thrust": thrust, "rpm": rpm, "current": current, "power": power, "voltage": voltage}
+    data = {key: empty if v is None else v for key, v in raw.items()}
+    full = float(np.nanmax(np.abs(thrust)))
+    silent = (data["rpm"] == 0.0) & (np.abs(thrust) > 0.05 * full)
+    if np.any(silent):
+        notes.append(f"rpm of 0 under thrust in {int(silent.sum())} rows: no rpm there")
+        data["rpm"] = np.where(silent, np.nan, data["rpm"])
+    out = _reduced(got, command, data, notes, run)
+    if len(out) < 4 or np.ptp(out.pulse_us) <= 0.0:
+        got_text = f"{len(out)} steady points"
+        raise InputError(Fault(name, "", got_text, "4 points or more at different pulse widths"))
+    top = out.pulse_us >= np.max(out.pulse_us) - 0.2 * np.ptp(out.pulse_us)
+    if np.nanmean(out.values["thrust"][top]) <= 0.0:
+        shown = f"{np.nanmean(out.values['thrust'][top]):.3g} N at the greatest pulse widths"
+        hint = "Give --sign -1 if the stand counts thrust the other way"
+        raise InputError(Fault(name, "thrust_N", shown, "positive thrust", hint))
+    return out
+
+
+def _reduced(got: Imported, command: Array, data: dict[str, Array], notes: list[str], run: int) -> MapPoints:
+    used = np.isfinite(command) & np.isfinite(data["thrust"])
+    stays = np.mean(np.isclose(np.diff(command[used]), 0.0)) if np.count_nonzero(used) > 1 else 0.0
+    if stays < 0.4:  # one row per step, or a ramp
+        ramp = len(np.unique(command[used])) > RAMP
+        if ramp:
+            notes.append("the command moves all the time: lag of the drive is part of the map")
+        pulse, values = command[used], {key: v[used] for key, v in data.items()}
+        weight = np.ones(len(pulse))
+    else:
+        ramp = False
+        time = got.channels.get("time_s")
+        clock = None if time is None else np.asarray(time.values, dtype=float)
+        found = plateaus.find(clock, data, "thrust", command)
+        kept = [p for p in found.plateaus if "not settled" not in p.flags]
+        lost = len(found.plateaus) - len(kept)
+        if lost:
+            notes.append(f"{lost} plateaus that do not settle were left out")
+        pulse = np.array([p.command for p in kept], dtype=float)
+        values = {key: np.array([p.mean.get(key, np.nan) for p in kept]) for key in data}
+        weight = np.ones(len(kept))
+    return MapPoints(pulse, values, weight, np.full(len(pulse), run), tuple(notes), ramp)
+
+
+def join(parts: Sequence[MapPoints]) -> MapPoints:
+    """Put recordings of one drive together.
+
+    Parameters
+    ----------
+    parts : sequence of MapPoints
+        One or more.
+
+    Returns
+    -------
+    MapPoints
+        All points; the notes once.
+    """
+    keys = list(parts[0].values)
+    notes = tuple(dict.fromkeys(note for part in parts for note in part.notes))
+    return MapPoints(
+        np.concatenate([p.pulse_us for p in parts]),
+        {key: np.concatenate([p.values[key] for p in parts]) for key in keys},
+        np.concatenate([p.weight for p in parts]), np.concatenate([p.run for p in parts]),
+        notes, any(p.ramp for p in parts),
+    )  # fmt: skip

@@ -1,0 +1,210 @@
+"""Questions that a vehicle asks of its drive: hover, endurance, response."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.drive import transient
+from bemt.drive.drive_model import Drive
+
+__all__ = ["Hover", "Response", "endurance", "hover", "response", "settled_temperature"]
+
+Array = NDArray[np.float64]
+G0 = 9.80665
+
+
+@dataclass(frozen=True)
+class Hover:
+    """Hover of one rotor; NaN where the drive does not carry the weight.
+
+    Attributes
+    ----------
+    wanted_N, full_N : float
+        Thrust that one rotor must give, and the most it gives at this charge. [N]
+    pulse_us, rpm : float
+        Pulse width [us] and speed [rev/min].
+    battery_A, power_W, g_per_W : float
+        Current [A], power [W] and thrust over power [gf/W].
+    temperature_C : float
+        Where the winding settles. [C]
+    """
+
+    wanted_N: float
+    full_N: float
+    pulse_us: float
+    rpm: float
+    battery_A: float
+    power_W: float
+    g_per_W: float
+    temperature_C: float
+
+
+def settled_temperature(drive: Drive, pulse_us: float, soc: float) -> float:
+    """Temperature at which copper loss and cooling agree.
+
+    Parameters
+    ----------
+    drive : Drive
+        The drive.
+    pulse_us : float
+        Command. [us]
+    soc : float
+        State of charge. [1]
+
+    Returns
+    -------
+    float
+        Temperature [C]; the air's when the motor has no thermal data, NaN when it runs away.
+    """
+    motor = drive.motor
+    warm = motor.ambient_C
+    if "motor_heating" in drive.off or motor.thermal_K_W <= 0.0:
+        return warm
+    for _ in range(200):
+        amps = float(drive.steady(pulse_us, soc, warm).motor_A[0])
+        new = motor.ambient_C + motor.thermal_K_W * float(motor.resistance(warm)) * amps**2
+        if not math.isfinite(new) or new > 1000.0:
+            return math.nan
+        if abs(new - warm) < 1e-6:
+            return new
+        warm = 0.5 * (warm + new)
+    return math.nan
+
+
+def hover(drive: Drive, mass_kg: float, rotors: int, soc: float) -> Hover:
+    """Find the hover point.
+
+    Parameters
+    ----------
+    drive : Drive
+        Of one rotor.
+    mass_kg : float
+        Of the vehicle. [kg]
+    rotors : int
+        That carry it.
+    soc : float
+        State of charge. [1]
+
+    Returns
+    -------
+    Hover
+        With a cold motor; the temperature is where it would settle.
+    """
+    wanted = mass_kg * G0 / rotors
+    full = float(drive.steady(drive.esc.pulse_max_us, soc).thrust_N[0])
+    pulse = drive.pulse_for(wanted, soc)
+    if math.isnan(pulse):
+        return Hover(wanted, full, *[math.nan] * 6)
+    s = drive.steady(pulse, soc)
+    power = float(s.power_W[0])
+    return Hover(wanted, full, pulse, float(s.rpm[0]), float(s.battery_A[0]), power, wanted / G0 * 1e3 / power,
+                 settled_temperature(drive, pulse, soc))  # fmt: skip
+
+
+def endurance(
+    drive: Drive, mass_kg: float, rotors: int, soc: float, soc_min: float, points: int = 21
+) -> tuple[float, float]:
+    """Time in hover until the charge is used, or the drive no longer carries the weight.
+
+    Parameters
+    ----------
+    drive : Drive
+        Of one rotor.
+    mass_kg : float
+        Of the vehicle. [kg]
+    rotors : int
+        That carry it.
+    soc, soc_min : float
+        State of charge at start and end. [1]
+    points : int
+        Charges at which the hover point is solved.
+
+    Returns
+    -------
+    time_s, soc_end : float
+        Time [s], NaN when it does not hover at all; charge at the end [1].
+    """
+    wanted = mass_kg * G0 / rotors
+
+    def drawn(c: float) -> float:
+        pulse = drive.pulse_for(wanted, c)
+        return math.nan if math.isnan(pulse) else float(drive.steady(pulse, c).battery_A[0])
+
+    charge = np.linspace(soc, soc_min, points)
+    amps = np.array([drawn(float(c)) for c in charge])
+    good = int(np.argmax(~np.isfinite(amps))) if np.any(~np.isfinite(amps)) else len(amps)
+    if good < 1:
+        return math.nan, soc
+    if good < len(amps) and good >= 1:  # the last charge that carries, by bisection
+        lo, hi = charge[good], charge[good - 1]
+        for _ in range(20):
+            mid = 0.5 * (lo + hi)
+            carries = math.isfinite(drawn(float(mid)))
+            lo, hi = (lo, mid) if carries else (mid, hi)
+        charge = np.append(charge[:good], hi)
+        amps = np.append(amps[:good], drawn(float(hi)))
+    share = 3600.0 * drive.battery.capacity_Ah
+    time = float(np.sum(-np.diff(charge) * 0.5 * (1.0 / amps[1:] + 1.0 / amps[:-1]))) * share
+    return time, float(charge[-1])
+
+
+@dataclass(frozen=True)
+class Response:
+    """Answer to a step of the command.
+
+    Attributes
+    ----------
+    before_us, after_us : float
+        Command. [us]
+    before_N, after_N : float
+        Thrust. [N]
+    time63_s : float
+        Time to 63 % of the change of thrust. [s]
+    """
+
+    before_us: float
+    after_us: float
+    before_N: float
+    after_N: float
+    time63_s: float
+
+
+def response(drive: Drive, low: float, high: float, soc: float) -> tuple[list[Response], transient.History]:
+    """Step between two shares of full thrust, up and down.
+
+    Parameters
+    ----------
+    drive : Drive
+        The drive.
+    low, high : float
+        Shares of full thrust. [1]
+    soc : float
+        State of charge. [1]
+
+    Returns
+    -------
+    list of Response
+        Up, down.
+    bemt.drive.transient.History
+        Course of both.
+    """
+    full = float(drive.steady(drive.esc.pulse_max_us, soc).thrust_N[0])
+    a, b = (drive.pulse_for(share * full, soc) for share in (low, high))
+    guess = 0.2
+    for _ in range(6):  # long enough that both steps settle
+        end = 2.0 * guess + 0.1 * guess
+        t = np.linspace(0.0, end, 4001)
+        course = transient.simulate(drive, [(0.0, a), (0.1 * guess, b), (1.1 * guess, a)], end, t, soc)
+        up = (t >= 0.05 * guess) & (t < 1.1 * guess)
+        down = t >= 1.05 * guess
+        times = [transient.time_to(t[up], course.thrust_N[up], 0.1 * guess),
+                 transient.time_to(t[down], course.thrust_N[down], 1.1 * guess)]  # fmt: skip
+        if not np.all(np.isfinite(times)) or max(times) < 0.1 * guess:
+            break
+        guess *= 2.5
+    T = [float(course.thrust_N[i]) for i in (0, int(np.flatnonzero(up)[-1]), -1)]
+    return [Response(a, b, T[0], T[1], times[0]), Response(b, a, T[1], T[2], times[1])], course

@@ -1,0 +1,138 @@
+"""Pictures of the drive as PNG bytes."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from bemt.drive.bench_map import BenchMap
+
+__all__ = ["bench_map", "box_plot", "curves"]
+
+Array = NDArray[np.float64]
+# Okabe and Ito (2008): colours that colour-blind readers tell apart
+COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#000000")
+
+
+def _figure(columns: int = 1, width: float = 6.0, height: float = 4.0) -> tuple[Any, list[Any]]:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width * columns, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = [figure.add_subplot(1, columns, i + 1) for i in range(columns)]
+    for ax in axes:
+        ax.grid(True, alpha=0.3)
+        for side in ("top", "right"):
+            ax.spines[side].set_visible(False)
+    return figure, axes
+
+
+def _png(figure: Any) -> bytes:
+    out = io.BytesIO()
+    figure.savefig(out, format="png", dpi=110, metadata={"Software": None})
+    return out.getvalue()
+
+
+def bench_map(chart: BenchMap, name: str) -> bytes:
+    """Draw a bench map with the points it was fitted to.
+
+    Parameters
+    ----------
+    chart : BenchMap
+        The map.
+    name : str
+        Title.
+
+    Returns
+    -------
+    bytes
+        PNG.
+    """
+    label = {"thrust": "thrust [N]", "rpm": "speed [rev/min]", "current": "current [A]", "power": "power [W]"}
+    figure, axes = _figure(len(chart.curves), 4.0, 3.6)
+    pulse = np.linspace(*chart.pulse_range_us, 400)
+    for ax, quantity in zip(axes, chart.curves, strict=True):
+        if chart.points is not None:
+            y = chart.points.values[quantity]
+            words = "recorded"
+            if chart.with_voltage:
+                ratio = chart.points.values["voltage"] / chart.voltage_ref
+                y, words = y / ratio ** chart.curves[quantity].exponent, f"recorded, taken to {chart.voltage_ref:.1f} V"
+            ax.plot(chart.points.pulse_us, y, "o", ms=4, mfc="none", color=COLOURS[6], label=words)
+        reference = f"map at {chart.voltage_ref:.1f} V" if chart.with_voltage else "map"
+        ax.plot(pulse, chart.at(quantity, pulse), color=COLOURS[0], label=reference)
+        ax.set_xlabel("pulse width [µs]")
+        ax.set_ylabel(label[quantity])
+    axes[0].legend(frameon=False)
+    figure.suptitle(name)
+    return _png(figure)
+
+
+def box_plot(values: Mapping[str, Array], marks: Mapping[str, float], ylabel: str, title: str) -> bytes:
+    """Draw trials by method as boxes, with single values beside them.
+
+    Parameters
+    ----------
+    values : mapping of str to (N,) float
+        Trials by method, in the unit of `ylabel`; a single value becomes a diamond.
+    marks : mapping of str to float
+        Further values, as dashed lines with a label, in the unit of `ylabel`.
+    ylabel, title : str
+        Words.
+
+    Returns
+    -------
+    bytes
+        PNG.
+    """
+    figure, (ax,) = _figure(1, 8.5, 4.6)
+    names = list(values)
+    for i, name in enumerate(names):
+        v = values[name]
+        if len(v) > 1:
+            ax.boxplot([v], positions=[i], widths=0.45, showfliers=False, medianprops={"color": COLOURS[5]})
+            ax.plot(i + np.linspace(-0.15, 0.15, len(v)), v, "o", ms=3, alpha=0.6, color=COLOURS[0])
+        else:
+            ax.plot([i], v, "D", color=COLOURS[0])
+    for k, (name, value) in enumerate(marks.items()):
+        ax.axhline(value, ls="--", lw=1.2, color=COLOURS[(2, 3, 1)[k % 3]], label=name)
+    ax.set_xticks(range(len(names)), [f"{n}\n(n = {len(values[n])})" for n in names])
+    ax.set_xlim(-0.6, len(names) - 0.4)
+    ax.set_ylabel(ylabel)
+    figure.suptitle(title)
+    if marks:
+        ax.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return _png(figure)
+
+
+def curves(panels: Sequence[Mapping[str, Any]], title: str = "") -> bytes:
+    """Draw panels of lines and points.
+
+    Parameters
+    ----------
+    panels : sequence of mapping
+        Each with ``x`` and ``y`` (labels with units) and ``series``: (label, x, y, style) with a style of matplotlib.
+    title : str
+        Above all.
+
+    Returns
+    -------
+    bytes
+        PNG.
+    """
+    figure, axes = _figure(len(panels), 5.0, 3.9)
+    for ax, panel in zip(axes, panels, strict=True):
+        for k, (label, x, y, style) in enumerate(panel["series"]):
+            ax.plot(x, y, style, color=COLOURS[k % len(COLOURS)], ms=4, mfc="none", label=label)
+        ax.set_xlabel(panel["x"])
+        ax.set_ylabel(panel["y"])
+        if any(label for label, *_ in panel["series"]):
+            ax.legend(frameon=False, fontsize=8)
+    figure.suptitle(title)
+    return _png(figure)

@@ -1,0 +1,237 @@
+"""Thrust and torque of a rotor over speed, for the drive: from a case by BEMT, or from coefficients."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bemt import evaluate
+from bemt.air import Air
+from bemt.case import Case
+from bemt.errors import Fault, InputError
+
+__all__ = ["RotorTable", "from_case", "from_coefficients", "quadratic"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class RotorTable:
+    """Loads of a rotor over speed.
+
+    Parameters
+    ----------
+    omega_max : float
+        Greatest speed of the table. [rad/s]
+    thrust_law, torque_law, slope_law : callable
+        Speed [rad/s] to thrust [N], torque [N m] and thrust per induced speed at fixed rotation [N s/m].
+    radius_m, area_m2 : float
+        Of the rotor [m]; swept area that carries the thrust [m2].
+    rho : float
+        Density of the air. [kg/m3]
+    airspeed_m_s : float
+        Of flight. [m/s]
+    inertia_kg_m2 : float
+        Of the rotor alone. [kg m2]
+    notes : tuple of str
+        What was left out.
+    """
+
+    omega_max: float
+    thrust_law: Callable[[Array], Array]
+    torque_law: Callable[[Array], Array]
+    slope_law: Callable[[Array], Array] | None
+    radius_m: float
+    area_m2: float
+    rho: float
+    airspeed_m_s: float = 0.0
+    inertia_kg_m2: float = 0.0
+    notes: tuple[str, ...] = ()
+
+    def thrust(self, omega: ArrayLike) -> Array:
+        """Steady thrust.
+
+        Parameters
+        ----------
+        omega : array_like
+            Speed. [rad/s]
+
+        Returns
+        -------
+        (N,) float
+            Thrust. [N]
+        """
+        return np.asarray(self.thrust_law(np.maximum(np.asarray(omega, dtype=float), 0.0)))
+
+    def torque(self, omega: ArrayLike) -> Array:
+        """Steady shaft torque.
+
+        Parameters
+        ----------
+        omega : array_like
+            Speed. [rad/s]
+
+        Returns
+        -------
+        (N,) float
+            Torque. [N m]
+        """
+        return np.asarray(self.torque_law(np.maximum(np.asarray(omega, dtype=float), 0.0)))
+
+    def induced(self, thrust_N: ArrayLike) -> Array:
+        """Induced speed of momentum theory, 2 rho A v (V + v) = T.
+
+        Parameters
+        ----------
+        thrust_N : array_like
+            Thrust. [N]
+
+        Returns
+        -------
+        (N,) float
+            Speed. [m/s]
+        """
+        load = np.maximum(np.asarray(thrust_N, dtype=float), 0.0) / (2.0 * self.rho * self.area_m2)
+        half = 0.5 * self.airspeed_m_s
+        return np.asarray(np.sqrt(half**2 + load) - half)
+
+    @property
+    def apparent_mass_kg(self) -> float:
+        """Air that follows the rotor, 8/3 rho R^3 (Carpenter and Fridovich, NACA TN 3044, 1953; not checked). [kg]"""
+        return 8.0 / 3.0 * self.rho * self.radius_m**3
+
+
+def from_coefficients(
+    CT: float, CQ: float, diameter_m: float, rho: float = 1.225, inertia_kg_m2: float = 0.0,
+    solidity: float | None = None,
+) -> RotorTable:  # fmt: skip
+    """Rotor with constant coefficients.
+
+    Parameters
+    ----------
+    CT, CQ : float
+        T/(rho n^2 D^4), Q/(rho n^2 D^5). [-]
+    diameter_m : float
+        D. [m]
+    rho : float
+        Density. [kg/m3]
+    inertia_kg_m2 : float
+        Of the rotor. [kg m2]
+    solidity : float or None
+        Blade area over disk area [-]; None: no lag of the inflow can be given.
+
+    Returns
+    -------
+    RotorTable
+        At rest in the air.
+
+    Notes
+    -----
+    With a lift slope a of 5.7 per radian, dT/dw = -rho sigma a A Omega R / 4 (blade element, uniform inflow; J. G.
+    Leishman, "Principles of Helicopter Aerodynamics", 2006, ch. 3; not checked).
+    """
+    kT = rho * CT * diameter_m**4 / (2.0 * math.pi) ** 2
+    kQ = rho * CQ * diameter_m**5 / (2.0 * math.pi) ** 2
+    return quadratic(kT, kQ, diameter_m, rho, inertia_kg_m2, solidity)
+
+
+def quadratic(
+    kT: float, kQ: float, diameter_m: float, rho: float = 1.225, inertia_kg_m2: float = 0.0,
+    solidity: float | None = None,
+) -> RotorTable:  # fmt: skip
+    """Rotor whose loads go with the square of the speed.
+
+    Parameters
+    ----------
+    kT, kQ : float
+        Thrust and torque over speed squared. [N s2/rad2], [N m s2/rad2]
+    diameter_m, rho, inertia_kg_m2 : float
+        As in `from_coefficients`. [m], [kg/m3], [kg m2]
+    solidity : float or None
+        As in `from_coefficients`. [-]
+
+    Returns
+    -------
+    RotorTable
+        At rest in the air.
+    """
+    R, A = 0.5 * diameter_m, math.pi * diameter_m**2 / 4.0
+    slope = None if solidity is None else (lambda w: -0.25 * rho * solidity * 5.7 * A * R * w)
+    return RotorTable(math.inf, lambda w: kT * w**2, lambda w: kQ * w**2, slope, R, A, rho, 0.0, inertia_kg_m2)
+
+
+def from_case(
+    case: Case, rpm_max: float, airspeed_m_s: float = 0.0, air: Air | None = None, inertia_kg_m2: float = 0.0,
+    points: int = 33,
+) -> RotorTable:  # fmt: skip
+    """Rotor of a case by BEMT.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+    rpm_max : float
+        Greatest speed of the table. [rev/min]
+    airspeed_m_s : float
+        Speed of flight. [m/s]
+    air : Air or None
+        State of the air; None: the case's first.
+    inertia_kg_m2 : float
+        Of the rotor. [kg m2]
+    points : int
+        Speeds solved; between them T/Omega^2 and Q/Omega^2 are monotone cubics, below the first they are constant.
+
+    Returns
+    -------
+    RotorTable
+        At this airspeed.
+
+    Raises
+    ------
+    InputError
+        When fewer than half of the speeds converge.
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    ready = evaluate.prepare(case)
+    state = air if air is not None else Air.isa(0.0)
+    rpm = np.linspace(0.04, 1.0, points) * rpm_max
+    step = 0.02 * math.pi * ready.diameter_m * rpm[-1] / 60.0
+    got = evaluate.evaluate(ready, rpm, airspeed_m_s, state)
+    fast = evaluate.evaluate(ready, rpm, airspeed_m_s + step, state)
+    ok = got.converged & np.isfinite(got.thrust_N) & np.isfinite(got.torque_Nm)
+    if np.count_nonzero(ok) < max(4, points // 2):
+        got_text = f"{np.count_nonzero(ok)} of {points} speeds up to {rpm_max:.0f} rev/min converge"
+        raise InputError(Fault(case.path.as_posix(), "", got_text, "a rotor that can be solved over its speed range"))
+    notes = [] if np.all(ok) else [f"{points - np.count_nonzero(ok)} of {points} speeds do not converge: left out"]
+    omega = rpm[ok] * math.pi / 30.0
+    area = math.pi / 4.0 * (ready.diameter_m**2 - (ready.hub_diameter_m**2 if ready.ducted else 0.0))
+    rho = float(state.rho)
+    T, Q = got.thrust_N[ok], got.torque_Nm[ok]
+    tT, tQ = PchipInterpolator(omega, T / omega**2), PchipInterpolator(omega, Q / omega**2)
+    table = RotorTable(
+        float(omega[-1]), lambda w: tT(np.clip(w, omega[0], omega[-1])) * w**2,
+        lambda w: tQ(np.clip(w, omega[0], omega[-1])) * w**2, None, 0.5 * ready.diameter_m, area, rho, airspeed_m_s,
+        inertia_kg_m2, tuple(notes),
+    )  # fmt: skip
+    both = ok & fast.converged & np.isfinite(fast.thrust_N)
+    if ready.ducted or np.count_nonzero(both) < 4:
+        why = (
+            "the inflow of a duct follows the fan at once here" if ready.ducted else "no slope of thrust over airspeed"
+        )
+        return _with(table, None, (*notes, f"{why}: no lag of the inflow"))
+    # slope at fixed induced speed from the solver's, whose induced speed follows (bemt.effects.inflow_lag)
+    w = rpm[both] * math.pi / 30.0
+    dT_dV = (fast.thrust_N[both] - got.thrust_N[both]) / step
+    v = table.induced(got.thrust_N[both])
+    follow = (dT_dV / (2.0 * rho * area) - v) / np.maximum(airspeed_m_s + 2.0 * v, 1e-9)
+    law = PchipInterpolator(w, dT_dV / np.maximum(1.0 + follow, 0.1) / w)
+    return _with(table, lambda x: law(np.clip(x, w[0], w[-1])) * x, tuple(notes))
+
+
+def _with(table: RotorTable, slope: Callable[[Array], Array] | None, notes: tuple[str, ...]) -> RotorTable:
+    return RotorTable(**{**vars(table), "slope_law": slope, "notes": notes})

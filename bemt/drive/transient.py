@@ -1,0 +1,263 @@
+r"""The drive in time: speed, induced flow, winding temperature and charge, integrated with scipy.
+
+    (J_m + J_r) dOmega/dt = k (I - I_0) - Q(Omega)                                       rotor_inertia
+    m dv/dt = T(Omega, v) - 2 rho A v (V + v),  T = T_s(Omega) + T_v (v - v_s(Omega))    inflow_lag
+    C dtheta/dt = R_m I^2 - (theta - theta_air) / R_th                                   motor_heating
+    dSoC/dt = -I_b / (3600 capacity)                                                     battery_sag
+
+m = 8/3 rho R^3 (Carpenter and Fridovich, NACA TN 3044, 1953; not checked). Switched off, a state follows at once.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bemt.drive.drive_model import Drive
+from bemt.errors import Fault, InputError
+
+__all__ = ["FirstOrder", "History", "first_order", "simulate", "time_to"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """Course of a simulation; all (N,) float.
+
+    Attributes
+    ----------
+    time_s, pulse_us : (N,) float
+        Time [s] and command [us].
+    rpm, thrust_N, torque_Nm : (N,) float
+        Speed [rev/min], thrust [N], torque of the air [N m].
+    motor_A, battery_A, voltage_V : (N,) float
+        Currents [A], voltage at the ESC [V].
+    temperature_C, soc : (N,) float
+        Of the winding [C]; state of charge [1].
+    converged : bool
+        Whether the integrator reached the end; NaN after where it stopped.
+    """
+
+    time_s: Array
+    pulse_us: Array
+    rpm: Array
+    thrust_N: Array
+    torque_Nm: Array
+    motor_A: Array
+    battery_A: Array
+    voltage_V: Array
+    temperature_C: Array
+    soc: Array
+    converged: bool
+
+
+def simulate(
+    drive: Drive, steps: Sequence[tuple[float, float]], end_s: float, times_s: ArrayLike | None = None,
+    soc: float = 1.0, temperature_C: float | None = None, omega0: float | None = None,
+) -> History:  # fmt: skip
+    """Integrate the drive through steps of the command.
+
+    Parameters
+    ----------
+    drive : Drive
+        The drive.
+    steps : sequence of tuple of float
+        (time [s], pulse width [us]) from which a command holds; the first also before.
+    end_s : float
+        End. [s]
+    times_s : array_like or None
+        Times of the answer, from 0 to the end [s]; None: 400 of them.
+    soc : float
+        State of charge at the start. [1]
+    temperature_C : float or None
+        Of the motor at the start [C]; None: the air's.
+    omega0 : float or None
+        Speed at the start [rad/s]; None: steady at the first command.
+
+    Returns
+    -------
+    History
+        At the times asked for.
+
+    Raises
+    ------
+    InputError
+        When there is nothing that turns, or the times are not in order.
+    """
+    from scipy.integrate import solve_ivp
+
+    inertia = drive.motor.inertia_kg_m2 + drive.rotor.inertia_kg_m2
+    if not inertia > 0.0:
+        raise InputError(Fault("", "inertia_kg_m2", f"{inertia:g}", "more than 0, of motor and rotor together"))
+    at = np.linspace(0.0, end_s, 400) if times_s is None else np.asarray(times_s, dtype=float)
+    orders = sorted(steps)
+    if not orders or np.any(np.diff(at) < 0.0) or at[0] < 0.0 or at[-1] > end_s * (1 + 1e-12):
+        raise InputError(Fault("", "times_s", "times or steps out of order", "0 to end_s, rising"))
+    warm0 = drive.motor.ambient_C if temperature_C is None else temperature_C
+    if "rotor_inertia" in drive.off:
+        inertia *= 1e-3
+    first = drive.steady(orders[0][1], soc, warm0)
+    omega = float(first.rpm[0]) * math.pi / 30.0 if omega0 is None else omega0
+    state = np.array([omega, float(drive.rotor.induced(drive.rotor.thrust(omega))), warm0, soc])
+    out = np.full((4, len(at)), np.nan)
+    pulse = np.full(len(at), orders[0][1])
+    edges = [0.0, *[t for t, _ in orders if 0.0 < t < end_s], end_s]
+    done = True
+    for a, b in zip(edges[:-1], edges[1:], strict=True):
+        command = [p for t, p in orders if t <= a + 1e-12 or t == orders[0][0]][-1]
+        inside = (at >= a) & (at <= b) if b == end_s else (at >= a) & (at < b)
+        pulse[inside] = command
+        duty = drive.esc.duty([command])
+        when, place = np.unique(np.append(at[inside], b), return_inverse=True)
+        answer = solve_ivp(_rates, (a, b), state, method="LSODA", t_eval=when, rtol=1e-7,
+                           atol=[1e-4, 1e-5, 1e-5, 1e-9], args=(drive, duty, inertia))  # fmt: skip
+        if not answer.success:
+            done = False
+            break
+        out[:, inside] = answer.y[:, place[:-1]]
+        state = answer.y[:, -1]
+    omega_t, v, warm, charge = out
+    good = np.isfinite(omega_t)
+    safe = np.where(good, omega_t, 0.0)
+    voc = drive.battery.voc(np.where(good, charge, 1.0))
+    amps, bus, _ = drive.currents(drive.esc.duty(pulse), safe, voc, np.where(good, warm, warm0))
+    thrust = _thrust(drive, safe, np.where(good, v, 0.0))
+    nan = np.where(good, 0.0, np.nan)
+    return History(at, pulse, omega_t * 30.0 / math.pi, thrust + nan, drive.rotor.torque(safe) + nan, amps + nan,
+                   bus + nan, voc - drive.battery_ohm * bus + nan, warm, charge, done)  # fmt: skip
+
+
+def _thrust(drive: Drive, omega: Array, v: Array) -> Array:
+    steady = drive.rotor.thrust(omega)
+    if drive.rotor.slope_law is None or "inflow_lag" in drive.off:
+        return steady
+    return np.asarray(steady + drive.rotor.slope_law(omega) * (v - drive.rotor.induced(steady)))
+
+
+def _rates(t: float, y: Array, drive: Drive, duty: Array, inertia: float) -> list[float]:
+    omega, v, warm, soc = (np.atleast_1d(x) for x in y)
+    omega = np.maximum(omega, 0.0)
+    motor, rotor = drive.motor, drive.rotor
+    amps, bus, _ = drive.currents(duty, omega, drive.battery.voc(soc), warm)
+    k = motor.k(warm)
+    push = k * amps - rotor.torque(omega)
+    friction = k * motor.no_load_A
+    net = push - friction if omega[0] > 0.0 else np.maximum(push - friction, 0.0)
+    rates = [float(net[0]) / inertia, 0.0, 0.0, 0.0]
+    if rotor.slope_law is not None and "inflow_lag" not in drive.off:
+        air = 2.0 * rotor.rho * rotor.area_m2 * v * (rotor.airspeed_m_s + v)
+        rates[1] = float((_thrust(drive, omega, v) - air)[0]) / rotor.apparent_mass_kg
+    if "motor_heating" not in drive.off and math.isfinite(motor.heat_capacity_J_K) and motor.thermal_K_W > 0.0:
+        loss = float((motor.resistance(warm) * amps**2)[0])
+        rates[2] = (loss - float(warm[0] - motor.ambient_C) / motor.thermal_K_W) / motor.heat_capacity_J_K
+    if "battery_sag" not in drive.off and math.isfinite(drive.battery.capacity_Ah):
+        rates[3] = -float(bus[0]) / (3600.0 * drive.battery.capacity_Ah)
+    return rates
+
+
+def time_to(time_s: Array, values: Array, start_s: float, share: float = 1.0 - math.exp(-1.0)) -> float:
+    """Time from a step until a share of the change is reached.
+
+    Parameters
+    ----------
+    time_s, values : (N,) float
+        Course: time [s] and, in any unit, what changes from its value at the step to its last value.
+    start_s : float
+        Time of the step. [s]
+    share : float
+        Of the change. [1]
+
+    Returns
+    -------
+    float
+        Time [s]; NaN when it is not reached.
+
+    Examples
+    --------
+    >>> t = np.linspace(0.0, 1.0, 1001)
+    >>> round(time_to(t, 1 - np.exp(-t / 0.05), 0.0), 4)
+    0.05
+    """
+    before = float(np.interp(start_s, time_s, values))
+    change = float(values[-1]) - before
+    if change == 0.0 or not math.isfinite(change):
+        return math.nan
+    done = (values - before) / change
+    later = np.flatnonzero((time_s >= start_s) & (done >= share))
+    if len(later) == 0 or later[0] == 0:
+        return math.nan
+    i = int(later[0])
+    x = (share - done[i - 1]) / (done[i] - done[i - 1])
+    return float(time_s[i - 1] + x * (time_s[i] - time_s[i - 1]) - start_s)
+
+
+@dataclass(frozen=True)
+class FirstOrder:
+    """Delayed first-order step.
+
+    Attributes
+    ----------
+    tau_s, u_tau_s, delay_s : float
+        Time constant, its standard uncertainty from the scatter of the samples, time of the step. [s]
+    before, after : float
+        Levels, in the unit of the samples.
+    """
+
+    tau_s: float
+    u_tau_s: float
+    delay_s: float
+    before: float
+    after: float
+
+
+def first_order(time_s: ArrayLike, values: ArrayLike) -> FirstOrder:
+    """Fit a delayed first-order step, as load-cell logs are usually read.
+
+    Parameters
+    ----------
+    time_s, values : array_like
+        Samples around one step, from before it until it has settled: time [s], values in any unit.
+
+    Returns
+    -------
+    FirstOrder
+        Time constant, its uncertainty, time of the step, levels.
+
+    Notes
+    -----
+    Least squares of before + (after - before) (1 - exp(-(t - t0)/tau)), levels solved linearly.
+
+    Examples
+    --------
+    >>> t = np.arange(0.0, 1.0, 0.02)
+    >>> got = first_order(t, np.where(t > 0.31, 2.0 * (1 - np.exp(-(t - 0.31) / 0.05)), 0.0))
+    >>> round(got.tau_s, 3), round(got.delay_s, 3), round(got.after, 3)
+    (0.05, 0.31, 2.0)
+    """
+    from scipy.optimize import least_squares
+
+    t, y = np.asarray(time_s, dtype=float), np.asarray(values, dtype=float)
+
+    def basis(p: Array) -> tuple[Array, Array]:
+        rise = np.where(t > p[1], -np.expm1(-np.maximum(t - p[1], 0.0) / math.exp(p[0])), 0.0)
+        a = np.column_stack([1.0 - rise, rise])
+        return a, np.linalg.lstsq(a, y, rcond=None)[0]
+
+    def misfit(p: Array) -> Array:
+        a, c = basis(p)
+        return np.asarray(y - a @ c)
+
+    starts = [np.array([math.log(tau), t0]) for tau in (0.02, 0.06, 0.2) for t0 in np.linspace(t[0], t[-1], 26)[1:-1]]
+    start = min(starts, key=lambda p: float(np.sum(misfit(p) ** 2)))
+    bounds = ([math.log(1e-4), t[0]], [math.log(10.0 * (t[-1] - t[0])), t[-1]])
+    found = least_squares(misfit, start, bounds=bounds, x_scale=[0.1, 0.01], diff_step=1e-5)
+    before, after = basis(found.x)[1]
+    tau = math.exp(found.x[0])
+    sigma2 = 2.0 * float(found.cost) / max(len(t) - 4, 1)
+    spread = np.linalg.pinv(found.jac.T @ found.jac) * sigma2
+    return FirstOrder(tau, tau * math.sqrt(float(spread[0, 0])), float(found.x[1]), float(before), float(after))

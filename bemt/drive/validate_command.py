@@ -1,0 +1,177 @@
+"""``python -m bemt drive --validate DIR``: the drive model against thrust maps and step logs of public stands.
+
+DIR holds the folders ``jmajew``, ``thrust_map``, ``thrust_step``, ``mit_copter_rcbenchmark`` as their publishers laid
+them out (see README, Data). What a data sheet gives stays: K_v and I_0 of the MN2206 come from its run without
+propeller. No data sheet of the other motors is known; there K_v and I_0 are fitted too, and said to be.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt import importers
+from bemt.drive import identify, map_points, picture, validation
+from bemt.drive.map_points import MapPoints
+from bemt.errors import EXIT_OK, Fault, InputError
+from bemt.tables import json_text, number_text, text_table, write_atomic
+
+__all__ = ["maps", "run", "steps"]
+
+Array = NDArray[np.float64]
+KGF = 9.80665
+OWN = "battery, R, pulse of no thrust and throttle exponent; K_v and I0 of its run without propeller"
+ALL = "battery, R, K_v, I0, pulse of no thrust and throttle exponent: no data sheet known"
+
+
+def _read(path: Path, sign: int = 1) -> tuple[MapPoints, Array | None]:
+    """Points of a map and their torque, where each row is a point."""
+    got = importers.read(path)
+    points = map_points.points(got, path.as_posix(), sign)
+    torque = got.channels.get("torque_Nm")
+    usable = torque is not None and len(torque.values) == len(points)
+    return points, sign * np.asarray(torque.values) if usable and torque is not None else None
+
+
+def _mit(path: Path) -> tuple[MapPoints, Array]:
+    """Columns without headings: pulse width [us], torque [N m], thrust [N], speed [rev/min], current [A]."""
+    c = [np.asarray(v.values) for v in importers.read(path).channels.values()]
+    nothing = np.full(len(c[0]), np.nan)
+    values = {"thrust": c[2], "rpm": c[3], "current": c[4], "power": nothing, "voltage": nothing}
+    return MapPoints(c[0], values, np.ones(len(c[0])), np.zeros(len(c[0]), dtype=np.intp)), c[1]
+
+
+def maps(folder: Path) -> list[validation.MapCheck]:
+    """Fit and predict the thrust maps of a folder.
+
+    Parameters
+    ----------
+    folder : Path
+        With the publishers' folders; those that are missing are left out.
+
+    Returns
+    -------
+    list of MapCheck
+        One per map.
+    """
+    out = []
+    bare = folder / "jmajew" / "grp01__mn2206_noprop_3s.csv"
+    if bare.is_file():
+        channels = importers.read(bare).channels
+        v = {k: np.asarray(channels[f"{k}{u}"].values) for k, u in (("rpm", ""), ("current", "_A"), ("voltage", "_V"))}
+        empty = MapPoints(1000.0 + 1000.0 * np.asarray(channels["throttle"].values), v, np.ones(len(v["rpm"])),
+                          np.zeros(len(v["rpm"]), dtype=np.intp))  # fmt: skip
+        kv, i0 = identify.no_load(empty)
+        for path in sorted(bare.parent.glob("grp01__mn2206_*_table1.csv")):
+            points, torque = _read(path)
+            fit = identify.fit_map(points, {"kv_rpm_V": kv, "no_load_A": i0}, torque)
+            out.append(validation.check_map(f"jmajew {path.stem[14:]}", OWN, fit.drive, points, fit.fitted))
+    steps_file = folder / "thrust_map" / "xNova-SR-steps.csv"
+    if steps_file.is_file():
+        points, _ = _read(steps_file, -1)
+        fit = identify.fit_map(points)
+        out.append(validation.check_map("xNova steps (to 1600 us)", ALL, fit.drive, points, fit.fitted))
+        points, _ = _read(steps_file.with_name("xNova-SR-ramp.csv"), -1)
+        drive = validation.other_battery(fit.drive, points)
+        words = "predicted from the steps; its own battery"
+        out.append(validation.check_map("xNova ramp (to 1800 us)", words, drive, points, {}))
+    for size in ("10", "14"):
+        path = folder / "mit_copter_rcbenchmark" / "resources" / "measurement" / f"motor_{size}inch_prop.txt"
+        if path.is_file():
+            points, torque = _mit(path)
+            fit = identify.fit_map(points, {"voltage_V": 12.0}, torque)
+            words = f"{ALL}; 12 V assumed, no voltage recorded"
+            out.append(validation.check_map(f"MIT {size} in", words, fit.drive, points, fit.fitted))
+    return out
+
+
+def steps(folder: Path) -> tuple[list[validation.StepCheck], float]:
+    """Fit the inertia to one step of the logs of ``thrust_step`` and predict the others.
+
+    Parameters
+    ----------
+    folder : Path
+        With ``thrust_step``.
+
+    Returns
+    -------
+    list of StepCheck
+        All steps.
+    float
+        Inertia fitted. [kg m2]
+    """
+    logs = {}
+    for name in ("0500_thrust_response", "increasing_thrust_response"):
+        t, scale = (
+            np.asarray(v.values) for v in importers.read(folder / "thrust_step" / f"{name}.csv").channels.values()
+        )
+        thrust = (np.median(scale[:50]) - scale) * KGF  # the scale carries the motor, thrust lifts it [kgf]
+        logs[name] = identify.find_steps(t, thrust)
+    full = max(float(np.max(y)) for parts in logs.values() for _, y in parts)
+    drive = validation.step_drive(15.82, 1.05 * full)  # battery voltage stated by the log's publisher
+    return validation.check_steps(drive, logs, ("0500_thrust_response", 0))
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the validation.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Of the command line: validate, out, json.
+
+    Returns
+    -------
+    int
+        Exit code.
+
+    Raises
+    ------
+    InputError
+        When the folder holds none of the recordings.
+    """
+    folder = Path(args.validate)
+    found = maps(folder)
+    checks, inertia = steps(folder) if (folder / "thrust_step").is_dir() else ([], float("nan"))
+    if not found and not checks:
+        raise InputError(Fault(folder.as_posix(), "", "no recordings", "folders jmajew, thrust_map, thrust_step"))
+    document: dict[str, Any] = {
+        "schema": "bemt.drive.validation/1",
+        "maps": [{k: v for k, v in vars(m).items()} for m in found],
+        "steps": [{**dataclasses.asdict(s), "ratio": s.ratio} for s in checks], "inertia_kg_m2": inertia,
+    }  # fmt: skip
+    rows = [[m.name, f"{100 * m.worst:.1f}", f"{100 * m.rms:.1f}", m.how] for m in found]
+    lines = [text_table(["thrust over pulse width", "worst [%FS]", "rms [%FS]", "fitted"], rows, left=(0, 3))]
+    rows = [[f"{s.log} at {s.at_s:.2f} s", f"{s.before_N:.2f} to {s.after_N:.2f}",
+             f"{1e3 * s.tau_s:.1f} ± {1e3 * s.u_tau_s:.1f}" if s.resolved else "-",
+             number_text(1e3 * s.model_s, 3), number_text(s.ratio, 3), s.how] for s in checks]  # fmt: skip
+    head = ["step", "thrust [N]", "tau recorded [ms]", "model [ms]", "ratio", ""]
+    if checks:
+        lines += ["", text_table(head, rows, left=(0, 5)), f"samples every {1e3 * checks[0].sample_s:.0f} ms"]
+    text = "\n".join(lines) + "\n"
+    if args.out:
+        out = Path(args.out)
+        write_atomic(out / "validation.json", json_text(document))
+        write_atomic(out / "validation.txt", text)
+        shown = [m for m in found if not m.name.startswith("MIT 1") or m.name.endswith("14 in")][:5]
+        panels = [
+            {
+                "x": "pulse width [µs]",
+                "y": "thrust [N]",
+                "series": [("model", *_sorted(m.pulse_us, m.model_N), "-"), ("recorded", m.pulse_us, m.thrust_N, "o")],
+            }
+            for m in shown
+        ]
+        write_atomic(out / "maps.png", picture.curves(panels, "; ".join(m.name for m in shown)))
+    print(json_text(document) if args.json else text, end="")
+    return EXIT_OK
+
+
+def _sorted(x: Array, y: Array) -> tuple[Array, Array]:
+    order = np.argsort(x)
+    return x[order], y[order]

@@ -1,0 +1,185 @@
+"""What ``import`` shows of a recording beyond its columns: findings of the sanity checks, and its steady points."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict
+from typing import Any
+
+from bemt import tables
+from bemt.errors import InputError
+from bemt.imported import Imported
+from bemt.reduction import Reduced, reduce
+from bemt.sanity import Finding, check
+
+__all__ = ["findings", "is_recording", "points_text", "reduction_document", "reduction_of"]
+
+SHOWN = ("run", "pwm_s", "throttle", "rpm", "airspeed_m_s", "J", "thrust_N", "torque_Nm", "power_W",
+         "electrical_power_W", "CT", "CP", "eta", "FM")  # fmt: skip
+"""Channels of the table of points, as far as they are there."""
+MOST = 40
+"""Points shown; JSON has all."""
+
+
+def is_recording(record: Imported, adapted: bool) -> bool:
+    """Whether a record is a table of measurements as a stand wrote it: to be checked and reduced.
+
+    Parameters
+    ----------
+    record : Imported
+        As read.
+    adapted : bool
+        Made from another kind of record (a series of published coefficients is reduced already).
+
+    Returns
+    -------
+    bool
+        True for recordings, and for plain tables with a load or a speed in a known unit.
+    """
+    if adapted:
+        return False
+    known = {name for name, c in record.channels.items() if c.unit}
+    loads = {"thrust_N", "torque_Nm", "T_N", "Q_Nm", "power_W"} & known
+    return record.kind == "bench" or (record.kind == "table" and bool(loads) and any("rpm" in n for n in known))
+
+
+def findings(record: Imported) -> tuple[Finding, ...]:
+    """Faults of a recording.
+
+    Parameters
+    ----------
+    record : Imported
+        As read; only measurements are looked at.
+
+    Returns
+    -------
+    tuple of Finding
+        Empty for other kinds.
+    """
+    return check(record) if record.kind in ("bench", "table") else ()
+
+
+def reduction_of(record: Imported) -> Reduced | str:
+    """Reduce, or say why not.
+
+    Parameters
+    ----------
+    record : Imported
+        A recording.
+
+    Returns
+    -------
+    Reduced or str
+        The points, or the reason.
+    """
+    try:
+        return reduce(record)
+    except InputError as error:
+        return "; ".join(
+            f"got {f.got}; expected {f.expected}" + (f". {f.hint}" if f.hint else "") for f in error.faults
+        )
+
+
+def reduction_document(reduced: Reduced | str | None) -> dict[str, Any] | None:
+    """The part of the JSON document that holds the steady points.
+
+    Parameters
+    ----------
+    reduced : Reduced, str or None
+        The points, why there are none, or None for no recording.
+
+    Returns
+    -------
+    dict or None
+        ``mode``, ``points`` (rows of a series with ``direction``), ``correlated``, ``dropped`` (every row and value),
+        ``notes``, ``error``.
+    """
+    if reduced is None:
+        return None
+    if isinstance(reduced, str):
+        return {"mode": None, "points": [], "correlated": {}, "dropped": [], "notes": [], "error": reduced}
+    rows = [{**row, "direction": way} for row, way in zip(reduced.series.to_rows(), reduced.directions, strict=True)]
+    return {
+        "mode": reduced.mode, "points": rows, "correlated": {k: dict(v) for k, v in reduced.correlated.items()},
+        "dropped": [asdict(lost) for lost in reduced.dropped], "notes": list(reduced.notes), "error": None,
+    }  # fmt: skip
+
+
+def ranges(lines: Iterable[int]) -> str:
+    """Lines as ranges.
+
+    Parameters
+    ----------
+    lines : iterable of int
+        Line numbers.
+
+    Returns
+    -------
+    str
+        In order.
+
+    Examples
+    --------
+    >>> ranges([5, 2, 3, 4, 9])
+    '2-5, 9'
+    """
+    out: list[list[int]] = []
+    for line in sorted(set(lines)):
+        if out and line == out[-1][1] + 1:
+            out[-1][1] = line
+        else:
+            out.append([line, line])
+    return ", ".join(f"{a}" if a == b else f"{a}-{b}" for a, b in out)
+
+
+def points_text(found: Mapping[str, Any], indent: str = "  ") -> list[str]:
+    """Steady points, what was dropped and the notes, as lines of text.
+
+    Parameters
+    ----------
+    found : mapping
+        As `reduction_document` gives it.
+    indent : str
+        Before each line.
+
+    Returns
+    -------
+    list of str
+        Empty lines never.
+    """
+    if found["error"] is not None:
+        return [f"{indent}not reduced: {found['error']}"]
+    points = found["points"]
+    names = [k for k in SHOWN if any(_number(p.get(k)) is not None for p in points)]
+    head = ["from"]
+    for name in names:
+        head += [name] + ([f"u({name})"] if any(_number(p["u"].get(name)) is not None for p in points) else [])
+    rows = []
+    for p in points[:MOST]:
+        row = [str(p.get("label", "")).rsplit(":", 1)[-1]]
+        for name in names:
+            row.append(tables.number_text(_number(p.get(name)), 5))
+            if f"u({name})" in head:
+                row.append(tables.number_text(_number(p["u"].get(name)), 2))
+        rows.append([*row, ", ".join(p["flags"]) or "-"])
+    many = "" if len(points) <= MOST else f", the first {MOST} of them"
+    what = "each row one" if found["mode"] == "points" else "means of plateaus"
+    out = [f"{indent}{len(points)} steady point{'s' if len(points) > 1 else ''}, {what}{many}:"]
+    out.append(tables.text_table([*head, "flags"], rows, (len(head),), indent + "  "))
+    reasons: dict[tuple[str, str], list[int]] = {}
+    for lost in found["dropped"]:
+        what = "rows" if not lost["channel"] else f"values of {lost['channel']}"
+        reasons.setdefault((what, lost["reason"]), []).append(lost["line"])
+    for (what, reason), lines in reasons.items():
+        text = ranges(lines)
+        text = text if len(text) <= 90 else text[:90].rsplit(",", 1)[0] + ", ..."
+        out.append(f"{indent}dropped {len(lines)} {what} (lines {text}): {reason}")
+    for channel, parts in found["correlated"].items():
+        words = ", ".join(f"{part} {value:.3g}" for part, value in parts.items())
+        out.append(f"{indent}shared by all points, {channel}: {words}")
+    return out + [f"{indent}. {note}" for note in found["notes"]]
+
+
+def _number(value: object) -> float | None:
+    return float(value) if isinstance(value, (int, float)) and math.isfinite(value) else None

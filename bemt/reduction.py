@@ -1,0 +1,420 @@
+"""From a recording to an honest `Series`: steady points with uncertainties, and everything that was left out.
+
+In this order: the rows are told to be samples or points (:mod:`bemt.reduction_rows`); samples are cut into plateaus
+(:mod:`bemt.plateaus`: start-up, settling, outliers); rows at rest, or a run without propeller, give the zero that is
+subtracted (:mod:`bemt.reduction_tare`); the air is found (:mod:`bemt.reduction_air`); coefficients follow where
+diameter and density are known; scatter comes from plateaus, stated errors, repeats (:mod:`bemt.reduction_scatter`).
+
+The uncertainties of the series are the UNCORRELATED part, independent from point to point. What all points share is in
+`Reduced.correlated`: ``gain`` [1], ``zero`` [unit of the channel], ``session`` [1] (between runs of one condition).
+Nothing is corrected but the zero, and that is said.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt import coefficients as co
+from bemt.air import Air
+from bemt.errors import Fault, InputError
+from bemt.imported import Imported
+from bemt.plateaus import Settings
+from bemt.reduction_air import AirOfPoints, air_of
+from bemt.reduction_channels import LOADS, Lost, Recorded, shaft_power, view
+from bemt.reduction_points import Found, Point, from_rows, from_samples
+from bemt.reduction_rows import command_of, is_samples
+from bemt.reduction_scatter import Hysteresis, hysteresis, repeats, session
+from bemt.reduction_tare import TARED, Zero, from_rest, from_table
+from bemt.series import Series
+
+__all__ = ["Reduced", "reduce"]
+
+Array = NDArray[np.float64]
+_SCATTERED = ("thrust_N", "duct_thrust_N", "torque_Nm")
+
+
+@dataclass(frozen=True, eq=False)
+class Reduced:
+    """Outcome of `reduce`.
+
+    Parameters
+    ----------
+    series : Series
+        Kind ``bench``; uncertainties are the uncorrelated part.
+    correlated : mapping of str to mapping
+        By channel: ``gain`` [1], ``zero`` [unit of the channel], ``session`` [1], as far as known.
+    dropped : tuple of Lost
+        Line, channel ("" for the whole row) and reason of everything that was left out.
+    notes : tuple of str
+        What was decided and found.
+    mode : str
+        ``samples`` or ``points``.
+    rows : tuple of tuple of int
+        Rows of the recording in each point.
+    directions : tuple of str
+        ``first``, ``up`` or ``down`` per point.
+    hysteresis : mapping of str to Hysteresis
+        By channel, where both branches were recorded.
+    drift : mapping of str to float
+        Change of the zero from first to last rest, by channel. [unit of the channel]
+    """
+
+    series: Series
+    correlated: Mapping[str, Mapping[str, float]]
+    dropped: tuple[Lost, ...]
+    notes: tuple[str, ...]
+    mode: str
+    rows: tuple[tuple[int, ...], ...]
+    directions: tuple[str, ...]
+    hysteresis: Mapping[str, Hysteresis]
+    drift: Mapping[str, float]
+
+
+@np.errstate(all="ignore")  # a damaged file may hold any number; what is not finite becomes NaN or a refusal
+def reduce(
+    imported: Imported | Sequence[Imported], *, diameter_m: float | None = None, chord75_m: float | None = None,
+    air: Air | None = None, isa_altitude_m: float | None = None, tare: Imported | Literal[False] | None = None,
+    steady: bool | None = None, speed: str | None = None, settings: Settings | None = None,
+) -> Reduced:  # fmt: skip
+    """Reduce a recording to steady points.
+
+    Parameters
+    ----------
+    imported : Imported, or sequence of Imported
+        One recording, or runs of one stand in the order in which they were made.
+    diameter_m : float or None
+        Diameter [m]; None takes that of the recording, if it states one.
+    chord75_m : float or None
+        Chord at 0.75 R [m], for the Reynolds number.
+    air : Air or None
+        Air state for a recording that tells none.
+    isa_altitude_m : float or None
+        Declares the standard atmosphere at this altitude [m] for a recording that tells no air; points are flagged.
+    tare : Imported, False or None
+        Run without propeller to subtract at equal speed; False subtracts nothing; None subtracts what rows at rest
+        show, where there are any.
+    steady : bool or None
+        True: rows are points; False: samples; None decides (:mod:`bemt.reduction_rows`).
+    speed : str or None
+        Channel that is the speed of the rotor (``optical_rpm``, ``electrical_rpm``); None decides.
+    settings : Settings or None
+        Rules of the plateau search.
+
+    Returns
+    -------
+    Reduced
+        With one point or more.
+
+    Raises
+    ------
+    InputError
+        When no point is left, or the recording cannot be cut.
+
+    Examples
+    --------
+    >>> from bemt.imported import Channel
+    >>> table = {"rpm": Channel([5000.0, 6000.0], "rpm"), "thrust_N": Channel([4.0, 5.8], "N")}
+    >>> got = reduce(Imported("table", "bench", 2, table), diameter_m=0.254, isa_altitude_m=0.0)
+    >>> got.mode, got.series["CT"].round(3).tolist(), got.series.flags[0]
+    ('points', [0.113, 0.114], ('standard air',))
+    """
+    records = [imported] if isinstance(imported, Imported) else list(imported)
+    if not records:
+        raise InputError(Fault("", "recordings", "none", "one or more"))
+    name = records[0].provenance.get("file", "") or records[0].format
+    rec = _trusted(_joined([view(record, speed) for record in records]))
+    constants = {k: v for record in reversed(records) for k, v in record.constants.items()}
+    if not set(LOADS) & rec.values.keys():
+        got = "no thrust, torque, power, current or coefficient with a unit"
+        raise InputError(Fault(name, "", got, "one of them", "Name units in the headings or in a recording.toml"))
+    samples, reason = is_samples(rec) if steady is None else (not steady, "as told")
+    found = from_samples(rec, name, settings) if samples else from_rows(rec)
+    _outliers(rec, found)
+    if not found.points:
+        reasons = ", ".join(sorted({lost.reason for lost in found.lost if not lost.channel}))
+        raise InputError(Fault(name, "", f"no steady point in {len(rec)} rows ({reasons or 'no rows'})", "one or more"))
+    values, u = _columns(found.points)
+    notes = [reason, *rec.notes, *found.notes, *_shared(values, rec.u)]
+    for key, constant in (("tip_gap_m", "gap_m"), ("wall_distance_m", "wall_distance_m")):
+        if key not in values and constant in constants:
+            values[key] = np.full(len(found.points), constants[constant])
+    correlated = _instrument(records, rec, values, u)
+    drift = _subtract(rec, found, values, correlated, tare, notes)
+    surroundings = air_of(values, len(found.points), constants, air, isa_altitude_m)
+    notes += surroundings.notes
+    _fill_scatter(found, values, u, correlated, notes)
+    diameter = diameter_m if diameter_m is not None else constants.get("diameter_m")
+    series = _series(records, found, rec, values, u, surroundings, diameter, chord75_m, reason)
+    loops = _hysteresis(found, values, rec, notes)
+    return Reduced(
+        series, {k: dict(v) for k, v in correlated.items() if v}, tuple([*rec.lost, *found.lost]), tuple(notes),
+        "samples" if samples else "points", tuple(p.rows for p in found.points),
+        tuple(p.direction for p in found.points), loops, drift,
+    )  # fmt: skip
+
+
+def _joined(views: Sequence[Recorded]) -> Recorded:
+    """Runs one after the other, numbered through."""
+    if len(views) == 1:
+        return views[0]
+    keys = list(dict.fromkeys(k for v in views for k in v.values))
+    u_keys = list(dict.fromkeys(k for v in views for k in v.u))
+
+    def column(part: str, key: str) -> Array:
+        return np.concatenate([getattr(v, part).get(key, np.full(len(v), np.nan)) for v in views])
+
+    run, k = [], 0
+    for v in views:
+        labels, index = np.unique(v.run, return_inverse=True)
+        run.append(k + 1.0 + index)
+        k += len(labels)
+    runs = np.concatenate(run)
+    notes = tuple(dict.fromkeys(n for v in views for n in v.notes))
+    return Recorded(
+        {**{key: column("values", key) for key in keys}, "run": runs}, {key: column("u", key) for key in u_keys},
+        sum((v.lines for v in views), ()), runs, {a: b for v in views for a, b in v.names.items()}, notes,
+        sum((v.lost for v in views), ()), sum((v.flags for v in views), ()),
+    )  # fmt: skip
+
+
+def _trusted(rec: Recorded) -> Recorded:
+    """Without sensors that saw nothing, and without a computed shaft power that its factors contradict."""
+    values, notes = dict(rec.values), list(rec.notes)
+    for name in ("rpm", "power_W", "electrical_power_W", "voltage_V", "current_A", "density_kg_m3"):
+        v = values.get(name)
+        if v is not None and np.any(np.isfinite(v)) and not np.any(np.nan_to_num(v)):
+            del values[name]
+            notes.append(f"{rec.names.get(name, name)} is 0 in every row: no measurement, left out")
+    product, told = shaft_power(values), values.get("power_W")
+    if product is not None and told is not None:
+        size = np.abs(product)
+        good = np.isfinite(size) & np.isfinite(told) & (told != 0.0)
+        good &= size > 0.2 * (np.percentile(size[good], 95) if np.any(good) else 0.0)
+        ratio = float(np.median(np.abs(told[good]) / size[good])) if np.count_nonzero(good) >= 3 else 1.0
+        if abs(ratio - 1.0) > 0.05:
+            own = rec.names.get("power_W", "power_W")
+            words = f"{own} is {ratio:.4g} times torque x speed"
+            if own == "mechanical_power_W":  # computed by the stand's software, no sensor of its own
+                del values["power_W"]
+                notes.append(f"{words}: left out; the power is taken from torque and speed")
+            else:
+                notes.append(f"{words}: kept as recorded, one of them is wrong")
+    return replace(rec, values=values, notes=tuple(notes))
+
+
+def _columns(points: Sequence[Point]) -> tuple[dict[str, Array], dict[str, Array]]:
+    keys = list(dict.fromkeys(k for p in points for k in p.values))
+    values = {k: np.array([p.values.get(k, math.nan) for p in points]) for k in keys}
+    u = {k: np.array([p.u.get(k, math.nan) for p in points]) for k in keys}
+    return {k: v for k, v in values.items() if np.any(np.isfinite(v))}, u
+
+
+def _flow(values: Mapping[str, Array]) -> Array | None:
+    """Airspeed over speed; None at rest."""
+    v = values.get("airspeed_m_s")
+    if v is None or not np.any(np.abs(np.nan_to_num(v)) > 0.0):
+        return values.get("J")
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.nan_to_num(v / values["rpm"] * 60.0) if "rpm" in values else None
+
+
+def _outliers(rec: Recorded, found: Found) -> None:
+    """Drop points that stand apart from four or more repeats of their own condition."""
+    values, _ = _columns(found.points)
+    if "rpm" not in values:
+        return
+    group = np.array([p.run for p in found.points])
+    out: dict[int, str] = {}
+    for name in _SCATTERED:
+        if name in values:
+            for i, far, n in repeats(values[name], values["rpm"], group, _flow(values)).outliers:
+                words = f"outlier: {name} is {far:.3g} robust standard deviations from the median of its {n} repeats"
+                out.setdefault(i, words)
+    found.lost += [Lost(rec.lines[r], "", reason) for i, reason in out.items() for r in found.points[i].rows]
+    found.points = [p for i, p in enumerate(found.points) if i not in out]
+
+
+def _shared(values: Mapping[str, Array], u: Mapping[str, Array]) -> list[str]:
+    """Say of stated errors that do not know how large the load is that they look shared."""
+    out = []
+    for name in set(_SCATTERED) & u.keys() & values.keys():
+        e, v = u[name][np.isfinite(u[name])], np.abs(values[name])
+        if len(e) >= 5 and e.min() > 0.8 * e.max() > 0.0 and np.nanmax(v) > 3.0 * np.nanmin(v):
+            unit = name.rsplit("_", 1)[1]
+            out.append(f"{name}: the stated error is {np.median(e):.3g} {unit} at any load: it looks like a zero "
+                       "that all rows share; kept as independent")  # fmt: skip
+    return sorted(out)
+
+
+def _instrument(
+    records: Sequence[Imported], rec: Recorded, values: Mapping[str, Array], u: dict[str, Array]
+) -> dict[str, dict[str, float]]:
+    """Correlated parts as stated; the sample part goes into `u` where it is larger than what is there."""
+    out: dict[str, dict[str, float]] = {key: {} for key in values}
+    for key in values:
+        for record in records:
+            stated = record.instrument.get(rec.names.get(key, key), {})
+            out[key] |= {part: stated[part] for part in ("gain", "zero") if part in stated}
+            if "sample" in stated:
+                u[key] = np.fmax(u[key], stated["sample"])
+    return out
+
+
+def _subtract(
+    rec: Recorded, found: Found, values: dict[str, Array], correlated: dict[str, dict[str, float]],
+    tare: Imported | Literal[False] | None, notes: list[str],
+) -> dict[str, float]:  # fmt: skip
+    """Subtract the zero; gives its drift."""
+    drift: dict[str, float] = {}
+    loads = [name for name in TARED if name in values]
+    if tare is False or not loads:
+        return drift
+    top = {name: float(np.nanmax(np.abs(values[name]))) for name in loads}
+
+    def take(zero: Zero, rows: NDArray[np.intp]) -> None:
+        for name in loads:
+            if name in zero.value:
+                values[name] = values[name].copy()
+                values[name][rows] -= zero.value[name]
+                part = correlated[name]
+                part["zero"] = math.hypot(part.get("zero", 0.0), zero.u[name])
+        for name, change in zero.drift.items():
+            if name in loads:
+                drift[name] = max(change, drift.get(name, change), key=abs)
+        notes.extend(n for n in zero.notes if n.split(":")[0] in loads)
+
+    if tare is not None:
+        if "rpm" not in values:
+            notes.append("the tare was not subtracted: no speed to find its rows by")
+            return drift
+        other = view(tare)
+        if "rpm" not in other.values:
+            raise InputError(Fault(tare.provenance.get("file", "tare"), "rpm", "no speed", "a speed for each row"))
+        take(from_table(values["rpm"], other.values["rpm"], other.values, other.u), np.arange(len(found.points)))
+        return drift
+    runs = np.array([p.run for p in found.points])
+    when = np.array([p.when for p in found.points])
+    for run, rests in found.rests.items():
+        rows = np.flatnonzero(runs == run)
+        if rows.size:
+            take(from_rest(when[rows], rests, top), rows)
+    if not found.rests:
+        notes.append("no rows at rest: the zero of the load cells is unknown and nothing was subtracted")
+    elif bare := sorted(set(runs.tolist()) - found.rests.keys()):
+        notes.append(f"runs without rest, nothing subtracted there: {', '.join(f'{r:g}' for r in bare)}")
+    return drift
+
+
+def _fill_scatter(
+    found: Found, values: Mapping[str, Array], u: dict[str, Array], correlated: dict[str, dict[str, float]],
+    notes: list[str],
+) -> None:  # fmt: skip
+    """Uncertainty from repeats where a point has none, and the scatter between runs."""
+    if "rpm" not in values:
+        return
+    run = np.array([p.run for p in found.points])
+    for name in _SCATTERED:
+        if name not in values:
+            continue
+        again = repeats(values[name], values["rpm"], run, _flow(values))
+        if again.dof >= 3 and again.scatter > 0.0:
+            missing = ~np.isfinite(u[name])
+            u[name] = np.where(missing, again.scatter * np.abs(values[name]), u[name])
+            use = (
+                f"; taken as the uncertainty of {int(missing.sum())} points that state none" if np.any(missing) else ""
+            )
+            notes.append(f"{name}: repeats scatter by {again.scatter:.2%} ({again.dof} degrees of freedom){use}")
+        between = session(values[name], values["rpm"], run, _flow(values))
+        if math.isfinite(between.scatter):
+            correlated[name]["session"] = between.scatter
+            words = f"{name}: runs differ by {between.scatter:.2%} at equal speed"
+            notes.append(f"{words} ({between.runs} runs, {between.pairs} common points)")
+
+
+def _series(
+    records: Sequence[Imported], found: Found, rec: Recorded, values: Mapping[str, Array], u: Mapping[str, Array],
+    air: AirOfPoints, diameter: float | None, chord75_m: float | None, reason: str,
+) -> Series:  # fmt: skip
+    """Channels and derived ones, as a `Series`."""
+    n = len(found.points)
+    shown = {k: v for k, v in values.items() if k not in ("humidity", "electrical_rpm", "optical_rpm")}
+    if len({p.run for p in found.points}) > 1 or "run" in rec.values:
+        shown["run"] = np.array([p.run for p in found.points])
+    if np.any(np.isfinite(air.rho)):
+        shown["density_kg_m3"] = air.rho
+    said = records[0].provenance
+    file = str(said.get("file", records[0].format))
+    short = file.replace("\\", "/").rsplit("/", 1)[-1]
+    labels = []
+    for p in found.points:
+        first, last = rec.lines[p.rows[0]], rec.lines[p.rows[-1]]
+        labels.append(f"{short}:{first}" + (f"-{last}" if len(p.rows) > 1 else ""))
+    flags = tuple((*p.flags, *((air.flag,) if air.flag else ())) for p in found.points)
+    provenance = {**said, "format": records[0].format, "reduction": reason}
+    series = Series("bench", str(said.get("run_name", short)), shown, {k: v for k, v in u.items() if k in shown},
+                    flags, provenance, tuple(labels))  # fmt: skip
+    if diameter is None:
+        if {"torque_Nm", "rpm"} <= shown.keys() and "power_W" not in shown:
+            series = series.derive(1.0, np.full(n, np.nan))
+            keep = [k for k in series.values if k in shown or k == "power_W"]
+            series = replace(series, values={k: series[k] for k in keep}, u={k: series.u[k] for k in keep})
+        return series
+    series = series.derive(diameter, air.rho if np.any(np.isfinite(air.rho)) else None)
+    return _numbers(series, air, diameter, chord75_m)
+
+
+def _numbers(series: Series, air: AirOfPoints, D: float, chord75_m: float | None) -> Series:
+    """Tip Mach and Reynolds numbers, figure of merit at rest, thrust per shaft power."""
+    more: dict[str, Array] = {}
+    u_more: dict[str, Array] = {}
+    rpm = series.values.get("rpm")
+    V = series.values.get("airspeed_m_s", np.zeros(len(series)))
+    if rpm is not None:
+        n = rpm / 60.0
+        if np.any(np.isfinite(air.a_sound)):
+            more["M_tip"] = np.asarray(co.M_tip(n, D, air.a_sound), dtype=float)
+        if chord75_m is not None and np.any(np.isfinite(air.mu)):
+            more["Re"] = np.asarray(co.Re75(chord75_m, n, D, V, air.rho, air.mu), dtype=float)
+    if {"CT", "CP"} <= series.values.keys():
+        still = np.abs(np.nan_to_num(V)) <= 0.0
+        with np.errstate(all="ignore"):
+            fm = np.where(still & (series["CT"] > 0) & (series["CP"] > 0), co.FM(series["CT"], series["CP"]), np.nan)
+            share = np.hypot(1.5 * series.u["CT"] / series["CT"], series.u["CP"] / series["CP"])
+        more["FM"], u_more["FM"] = fm, np.abs(fm * share)
+    if {"thrust_N", "power_W"} <= series.values.keys():
+        with np.errstate(all="ignore"):
+            ratio = np.where(series["power_W"] > 0, series["thrust_N"] / series["power_W"], np.nan)
+            share = np.hypot(series.u["thrust_N"] / series["thrust_N"], series.u["power_W"] / series["power_W"])
+        more["efficacy_N_W"], u_more["efficacy_N_W"] = ratio, np.abs(ratio * share)
+    u_more = {k: np.where(np.isfinite(v), v, np.nan) for k, v in u_more.items()}
+    return replace(series, values={**series.values, **more}, u={**series.u, **u_more})
+
+
+def _hysteresis(found: Found, values: Mapping[str, Array], rec: Recorded, notes: list[str]) -> dict[str, Hysteresis]:
+    """Down against up, for a sweep that goes up and comes down; a table in any order has no branches."""
+    ways = [p.direction for p in found.points]
+    turns = sum(a != b for a, b in zip(ways[1:-1], ways[2:], strict=True)) if len(ways) > 2 else 0
+    if turns > 2 * len({p.run for p in found.points}) or "down" not in ways:
+        return {}
+    command = command_of(rec)
+    key, power = ("rpm", 2.0) if "rpm" in values else (command[0] if command is not None else "", 0.0)
+    if key not in values:
+        return {}
+    down = np.array([w == "down" for w in ways])
+    top = int(np.nanargmax(np.where(np.isfinite(values[key]), values[key], -np.inf)))
+    out = {}
+    for name in _SCATTERED:
+        if name in values:
+            loop = hysteresis(values[name], values[key], ~down | (np.arange(len(ways)) == top), down, power)
+            if loop is not None:
+                out[name] = loop
+                unit = name.rsplit("_", 1)[1]
+                notes.append(f"{name}: down is {loop.difference:+.3g} +- {loop.u:.2g} {unit} from up at equal {key} "
+                             f"({loop.share:+.2%} of the largest, {loop.points} points)")  # fmt: skip
+    return out

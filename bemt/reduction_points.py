@@ -1,0 +1,265 @@
+"""From rows to points: plateaus of a record of samples, or the rows of a table of steady points.
+
+Every row ends in one point, in one stretch at rest, or in one entry of what was dropped, with the reason.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt import plateaus
+from bemt.errors import Fault, InputError
+from bemt.reduction_channels import LOADS, Lost, Recorded
+from bemt.reduction_rows import at_rest, command_of
+from bemt.reduction_tare import Rest
+
+__all__ = ["Found", "Point", "from_rows", "from_samples"]
+
+Array = NDArray[np.float64]
+SIGNALS = ("thrust_N", "torque_Nm", "rpm", "power_W", "current_A", "electrical_power_W", "CT", "CP")
+"""Channels that decide about steps, first one first."""
+WILD = 2.5
+"""Times that a speed may differ from what the load of the row needs, before it counts as misread."""
+SLOWEST = 1e-3
+"""Speed below which a number is no reading. [rev/min]"""
+_SKIP = ("time_s", "run", "electrical_rpm", "optical_rpm")
+_COMMANDS = ("pwm_s", "throttle")
+
+
+@dataclass(frozen=True)
+class Point:
+    """One steady point: means, standard uncertainties (uncorrelated part), rows, when, run, direction, flags."""
+
+    values: Mapping[str, float]
+    u: Mapping[str, float]
+    rows: tuple[int, ...]
+    when: float
+    run: float
+    direction: str
+    flags: tuple[str, ...] = ()
+
+
+@dataclass
+class Found:
+    """Points, stretches at rest by run, what was dropped, notes."""
+
+    points: list[Point] = field(default_factory=list)
+    rests: dict[float, list[Rest]] = field(default_factory=dict)
+    lost: list[Lost] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+
+def _clean(rec: Recorded, rest: NDArray[np.bool_], found: Found) -> dict[str, Array]:
+    """Copies of the channels without readings of a speed sensor that failed."""
+    data = {name: v.copy() for name, v in rec.values.items() if name not in _SKIP}
+    if "rpm" in data:
+        failed = np.flatnonzero((data["rpm"] == 0.0) & ~rest)
+        found.lost += [Lost(rec.lines[i], "rpm", "reads 0 while the rotor turns: no reading") for i in failed]
+        slow = np.flatnonzero((np.abs(data["rpm"]) < SLOWEST) & (data["rpm"] != 0.0))
+        found.lost += [Lost(rec.lines[i], "rpm", f"{data['rpm'][i]:.3g} rev/min is no speed of a rotor") for i in slow]
+        data["rpm"][[*failed, *slow]] = np.nan
+    return data
+
+
+def _rest(rows: Sequence[int], data: Mapping[str, Array], when: float) -> Rest:
+    mean, u = {}, {}
+    for name, v in data.items():
+        own = v[list(rows)]
+        own = own[np.isfinite(own)]
+        if own.size:
+            mean[name], u[name] = float(np.median(own)), plateaus.standard_error(own)
+    return Rest(when, mean, u)
+
+
+def _note_rest(found: Found, rec: Recorded, rows: Sequence[int]) -> None:
+    found.lost += [Lost(rec.lines[i], "", "at rest: a zero of the stand, no point") for i in rows]
+
+
+def from_samples(rec: Recorded, name: str, settings: plateaus.Settings | None) -> Found:
+    """Plateaus of every run.
+
+    Parameters
+    ----------
+    rec : Recorded
+        A record of samples.
+    name : str
+        File, for faults.
+    settings : Settings or None
+        Rules of the plateau search.
+
+    Returns
+    -------
+    Found
+        In order of time.
+
+    Raises
+    ------
+    InputError
+        When there is nothing to reduce, or time falls too often.
+    """
+    found = Found()
+    signal = next((s for s in SIGNALS if s in rec.values and _moves(rec.values[s])), None)
+    if signal is None:
+        signal = next((s for s in SIGNALS if s in rec.values and np.any(np.isfinite(rec.values[s]))), None)
+    if signal is None:
+        raise InputError(Fault(name, "", "no load with a value", f"one of {', '.join(SIGNALS)}"))
+    rest = at_rest(rec)
+    data = _clean(rec, rest, found)
+    _spikes(rec, data, found)
+    for run in dict.fromkeys(rec.run.tolist()):
+        rows = np.flatnonzero(rec.run == run)
+        rows, t = _clock(rec, rows, found)
+        part = {key: v[rows] for key, v in data.items() if np.any(np.isfinite(v[rows]))}
+        if signal not in part:
+            found.lost += [Lost(rec.lines[i], "", f"a run without {signal}") for i in rows]
+            continue
+        command = command_of(rec)
+        own = command[1][rows] if command is not None else None
+        if own is not None and not np.any(np.isfinite(own)):
+            own = None
+        try:
+            got = plateaus.find(t, part, signal, own, settings)
+        except InputError as error:
+            raise InputError([Fault(name, f.where, f.got, f.expected, f.hint) for f in error.faults]) from error
+        found.notes += [f"run {run:g}: {n}" if len(np.unique(rec.run)) > 1 else n for n in got.notes]
+        for d in got.dropped:
+            found.lost += [Lost(rec.lines[i], "", d.reason) for i in rows[d.start : d.stop]]
+        for p in got.plateaus:
+            inside = rows[p.start : p.stop]
+            middle = 0.5 * (p.t0 + p.t1)
+            if np.mean(rest[inside]) > 0.5:
+                still, moving = inside[rest[inside]], inside[~rest[inside]]
+                found.rests.setdefault(run, []).append(_rest(still.tolist(), data, middle))
+                _note_rest(found, rec, still.tolist())
+                found.lost += [Lost(rec.lines[i], "", "coming to rest, or starting") for i in moving]
+                continue
+            for channel, outliers in p.outliers.items():
+                reason = f"outlier: more than {plateaus.OUTLIER:g} robust standard deviations from its neighbours"
+                found.lost += [Lost(rec.lines[rows[i]], channel, reason) for i in outliers]
+            u = {key: e for key, e in p.u.items() if e > 1e-12 * abs(p.mean[key]) and key not in _COMMANDS}
+            for key, e in rec.u.items():  # what rows state averages down no further than the scatter shows
+                own_u = e[inside][np.isfinite(e[inside])]
+                if own_u.size:
+                    stated = float(np.sqrt(np.mean(own_u**2) / own_u.size))
+                    u[key] = max(stated, u.get(key, 0.0)) if math.isfinite(u.get(key, 0.0)) else stated
+            values = dict(p.mean)
+            if t is not None:
+                values["time_s"] = middle
+            found.points.append(Point(values, u, tuple(inside.tolist()), middle, run, p.direction, p.flags))
+    return found
+
+
+def _moves(v: Array) -> bool:
+    finite = v[np.isfinite(v)]
+    return finite.size > 1 and float(np.ptp(finite)) > 0.0
+
+
+def _spikes(rec: Recorded, data: dict[str, Array], found: Found) -> None:
+    """Leave out what the importer flagged as a jump away from all neighbours."""
+    by_file: dict[str, list[str]] = {}
+    for key, own in rec.names.items():
+        if key in data:
+            by_file.setdefault(own, []).append(key)
+    for i, flags in enumerate(rec.flags):
+        for flag in flags:
+            for key in by_file.get(flag.removeprefix("spike of "), []) if flag.startswith("spike of ") else []:
+                if np.isfinite(data[key][i]):
+                    data[key][i] = np.nan
+                    found.lost.append(Lost(rec.lines[i], key, "spike: jumps away from all its neighbours and back"))
+
+
+def _clock(rec: Recorded, rows: NDArray[np.intp], found: Found) -> tuple[NDArray[np.intp], Array | None]:
+    """Rows with a time, and the times; None: rows count."""
+    t = rec.values.get("time_s")
+    if t is None or np.mean(np.isfinite(t[rows])) < 0.5:
+        return rows, None
+    none = rows[~np.isfinite(t[rows])]
+    found.lost += [Lost(rec.lines[i], "", "no time") for i in none]
+    kept = rows[np.isfinite(t[rows])]
+    return kept, t[kept]
+
+
+def from_rows(rec: Recorded) -> Found:
+    """Each row a point.
+
+    Parameters
+    ----------
+    rec : Recorded
+        A table of steady points.
+
+    Returns
+    -------
+    Found
+        In the order of the file.
+    """
+    found = Found()
+    rest = at_rest(rec)
+    data = _clean(rec, rest, found)
+    _wild(rec, data, rest, found)
+    time = rec.values.get("time_s")
+    loads = [data[name] for name in LOADS if name in data]
+    empty = ~np.any([np.isfinite(v) for v in loads], axis=0) if loads else np.ones(len(rec), dtype=bool)
+    found.lost += [Lost(rec.lines[i], "", "no load, power or coefficient in this row") for i in np.flatnonzero(empty)]
+    before: dict[float, float] = {}
+    at: dict[float, list[int]] = {}
+    level_of = data.get("rpm", command_of(rec)[1] if command_of(rec) is not None else None)  # type: ignore[index]
+    for i in np.flatnonzero(~empty):
+        run = float(rec.run[i])
+        when = float(time[i]) if time is not None and math.isfinite(time[i]) else float(i)
+        if rest[i]:
+            at.setdefault(run, []).append(int(i))
+            continue
+        _close(rec, data, time, at, run, found)
+        level = float(level_of[i]) if level_of is not None else math.nan
+        way = "first" if run not in before else "up" if level >= before[run] else "down"
+        before[run] = level if math.isfinite(level) else before.get(run, level)
+        values = {name: float(v[i]) for name, v in data.items()}
+        if time is not None:
+            values["time_s"] = float(time[i])
+        u = {name: float(v[i]) for name, v in rec.u.items()}
+        flags = tuple(f for f in rec.flags[i] if not f.startswith("spike of "))
+        found.points.append(Point(values, u, (int(i),), when, run, way, flags))
+    for run in list(at):
+        _close(rec, data, time, at, run, found)
+    return found
+
+
+def _close(
+    rec: Recorded, data: Mapping[str, Array], time: Array | None, at: dict[float, list[int]], run: float, found: Found
+) -> None:
+    """End a stretch at rest."""
+    rows = at.pop(run, [])
+    if rows:
+        times = time[rows] if time is not None else np.array(rows, dtype=float)
+        when = float(np.mean(times)) if np.all(np.isfinite(times)) else float(np.mean(rows))
+        found.rests.setdefault(run, []).append(_rest(rows, data, when))
+        _note_rest(found, rec, rows)
+
+
+def _wild(rec: Recorded, data: dict[str, Array], rest: NDArray[np.bool_], found: Found) -> None:
+    """Leave out speeds of a static table that the load of their row contradicts.
+
+    Load goes with the square of the speed; a factor of more than 2.5 in speed against the rest of the table is a
+    misreading. A row whose load is odd is kept: that may be physics.
+    """
+    speed, v = data.get("rpm"), data.get("airspeed_m_s")
+    load = next((data[k] for k in ("thrust_N", "torque_Nm") if k in data and _moves(data[k])), None)
+    if speed is None or load is None or (v is not None and np.any(np.abs(np.nan_to_num(v)) > 0.5)):
+        return
+    size = np.abs(load)
+    good = np.isfinite(size) & (speed > 0.0) & ~rest & (size > 0.05 * np.nanmax(np.append(size, 0.0)))
+    if np.count_nonzero(good) < 6:
+        return
+    with np.errstate(all="ignore"):
+        k = np.sqrt(size[good]) / speed[good]
+        ratio = k / float(np.median(k))
+    for j in np.flatnonzero((ratio > WILD) | (ratio < 1.0 / WILD)):
+        i = int(np.flatnonzero(good)[j])
+        times = 1.0 / ratio[j]
+        found.lost.append(Lost(rec.lines[i], "rpm", f"misread: {times:.3g} times what the load of its row needs"))
+        data["rpm"][i] = np.nan

@@ -1,0 +1,54 @@
+"""Sanity before physics: faults of a recording, each named with its evidence and the correction it would take.
+
+Nothing is corrected here. The checks work with whatever channels there are, and say nothing where they cannot know:
+slips of units (:mod:`bemt.sanity_slips`), signs and physical bounds (:mod:`bemt.sanity_signs`), columns
+(:mod:`bemt.sanity_columns`). A new check is one function with the decorator ``check_for``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bemt import sanity_columns, sanity_signs, sanity_slips  # they register themselves
+from bemt.imported import Imported
+from bemt.sanity_base import CHECKS, SEVERITIES, Finding, facts_of
+from bemt.series import Series
+
+__all__ = ["Finding", "check"]
+
+_ROOMS = (sanity_slips, sanity_signs, sanity_columns)
+
+
+@np.errstate(all="ignore")  # a damaged file may hold any number
+def check(
+    source: Imported | Series, *, diameter_m: float | None = None, pitch_m: float | None = None,
+    blades: int | None = None, ducted: bool = False,
+) -> tuple[Finding, ...]:  # fmt: skip
+    """Look for faults in a recording.
+
+    Parameters
+    ----------
+    source : Imported or Series
+        The recording as read, or points.
+    diameter_m, pitch_m : float or None
+        Diameter and pitch [m], as far as known; None takes what the recording states.
+    blades : int or None
+        Number of blades.
+    ducted : bool
+        Rotor in a duct: its bounds of CT, CP and figure of merit are wider.
+
+    Returns
+    -------
+    tuple of Finding
+        Worst first; empty when nothing looks wrong, or nothing can be known.
+
+    Examples
+    --------
+    >>> rpm = [4000.0, 5000.0, 6000.0, 7000.0]
+    >>> stand = Series("bench", "stand", {"rpm": rpm, "thrust_N": [0.22, 0.34, 0.50, 0.68]})  # kgf, not N
+    >>> [(f.id, f.correction.split(".")[0]) for f in check(stand, diameter_m=0.254)]
+    [('thrust_unit', 'thrust_N: kgf taken for N: multiply by 9')]
+    """
+    facts = facts_of(source, diameter_m, pitch_m, blades, ducted)
+    found = [finding for run in CHECKS.values() for finding in run(facts)]
+    return tuple(sorted(found, key=lambda f: SEVERITIES.index(f.severity)))

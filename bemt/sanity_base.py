@@ -1,0 +1,223 @@
+"""What the sanity checks share: a finding, the facts that they look at, and their registry."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt import units
+from bemt.imported import Imported
+from bemt.reduction_channels import view
+from bemt.series import Series
+
+__all__ = ["CHECKS", "MANY", "SEVERITIES", "Facts", "Finding", "check_for", "facts_of"]
+
+Array = NDArray[np.float64]
+SEVERITIES = ("error", "warning", "note")
+MANY, GAP = 50, 50
+"""Rows from which a recording is a log with fast and slow channels; rows over which a slow one is interpolated."""
+LIKELY_RHO = 1.2
+"""Density for windows so wide that its true value does not matter. [kg/m3]"""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that looks wrong; nothing was corrected.
+
+    Parameters
+    ----------
+    id : str
+        Name of the fault, such as ``thrust_unit``.
+    channel : str
+        Channel as the file names it in SI.
+    evidence : str
+        Numbers that show it.
+    correction : str
+        What would make it right.
+    rows : tuple of int
+        Rows, from 0; empty: the whole channel.
+    severity : str
+        ``error`` (cannot be so), ``warning`` (hardly so) or ``note`` (known habit of stands).
+    """
+
+    id: str
+    channel: str
+    evidence: str
+    correction: str
+    rows: tuple[int, ...] = ()
+    severity: str = "error"
+
+    def __str__(self) -> str:
+        return f"{self.severity}: {self.id} ({self.channel}): {self.evidence}. Correction: {self.correction}"
+
+
+@dataclass(frozen=True, eq=False)
+class Facts:
+    """What the checks look at; every array has one entry per row.
+
+    Parameters
+    ----------
+    values : mapping of str to (N,) float
+        Channels by name of a Series.
+    raw : mapping of str to (N,) float
+        All channels as the file names them, with or without a unit.
+    unit : mapping of str to str
+        Unit of each of them.
+    names : mapping of str to str
+        Name in the file of each channel of `values`.
+    lines : tuple of int
+        Line in the file.
+    diameter_m, pitch_m : float or None
+        As far as known. [m]
+    blades : int or None
+        Blades.
+    ducted : bool
+        Rotor in a duct.
+    bare : bool
+        Recorded without a propeller: nothing is expected of its loads.
+    """
+
+    values: Mapping[str, Array]
+    raw: Mapping[str, Array]
+    unit: Mapping[str, str]
+    names: Mapping[str, str]
+    lines: tuple[int, ...]
+    diameter_m: float | None = None
+    pitch_m: float | None = None
+    blades: int | None = None
+    ducted: bool = False
+    bare: bool = False
+
+    def __len__(self) -> int:
+        """Give the number of rows."""
+        return len(self.lines)
+
+    def get(self, name: str) -> Array | None:
+        """Channel with a finite value, else None."""
+        v = self.values.get(name)
+        return v if v is not None and bool(np.any(np.isfinite(v))) else None
+
+    def named(self, name: str) -> str:
+        """Name in the file."""
+        return self.names.get(name, name)
+
+    @property
+    def rho(self) -> Array:
+        """Density, a usual one where none is recorded. [kg/m3]"""
+        v = self.values.get("density_kg_m3", np.full(len(self), np.nan))
+        return np.where((v > 0.2) & (v < 2.0), v, LIKELY_RHO)
+
+    @cached_property
+    def filled(self) -> Mapping[str, Array]:
+        """Channels, the gaps of slow ones closed in a log."""
+        return {k: _filled(v) for k, v in self.values.items()}
+
+    @cached_property
+    def still(self) -> NDArray[np.bool_]:
+        """Rows without airspeed, as far as the recording tells."""
+        out = np.ones(len(self), dtype=bool)
+        for name, most in (("airspeed_m_s", 0.5), ("J", 0.05)):
+            v = self.values.get(name)
+            if v is not None:
+                out &= ~(np.abs(np.nan_to_num(v)) > most)
+        return out
+
+    @cached_property
+    def loaded(self) -> NDArray[np.bool_]:
+        """Rows in the upper part of the load, where zeros and resolution count for little."""
+        n = len(self)
+        out = np.ones(n, dtype=bool)
+        for name in ("thrust_N", "torque_Nm", "power_W", "electrical_power_W"):
+            v = self.filled.get(name)
+            if v is not None and np.any(np.isfinite(v)) and float(np.nanpercentile(np.abs(v), 95)) > 0.0:
+                size = np.abs(np.nan_to_num(v))
+                out &= size >= 0.2 * float(np.percentile(size[size > 0.0], 95))
+                break
+        speed = self.get("rpm")
+        if speed is not None and np.any(np.nan_to_num(speed) != 0.0):
+            out &= np.nan_to_num(speed) != 0.0
+        return out
+
+
+def _filled(v: Array) -> Array:
+    """Channel with its gaps closed, where a slow sensor has a value in some rows of a fast log only."""
+    rows = np.flatnonzero(np.isfinite(v))
+    if len(v) < MANY or len(rows) < 10 or len(rows) > 0.8 * len(v):
+        return v
+    at = np.arange(len(v))
+    after = np.clip(np.searchsorted(rows, at), 0, len(rows) - 1)
+    before = np.clip(after - 1, 0, len(rows) - 1)
+    near = (rows[after] - rows[before] <= GAP) & (at >= rows[0]) & (at <= rows[-1])
+    return np.where(near, np.interp(at, rows, v[rows]), v)
+
+
+Check = Callable[[Facts], Iterator[Finding]]
+CHECKS: dict[str, Check] = {}
+"""Checks by name, in the order in which they run."""
+
+
+def check_for(name: str) -> Callable[[Check], Check]:
+    """Register a check.
+
+    Parameters
+    ----------
+    name : str
+        Its name; taken once.
+
+    Returns
+    -------
+    callable
+        Decorator that leaves the function as it is.
+    """
+
+    def register(check: Check) -> Check:
+        if name in CHECKS:
+            raise TypeError(f"two checks are called {name}")
+        CHECKS[name] = check
+        return check
+
+    return register
+
+
+def facts_of(
+    source: Imported | Series, diameter_m: float | None, pitch_m: float | None, blades: int | None, ducted: bool
+) -> Facts:
+    """Gather the facts of a recording or a series.
+
+    Parameters
+    ----------
+    source : Imported or Series
+        What is looked at.
+    diameter_m, pitch_m : float or None
+        Diameter, pitch [m]; None takes what the recording states.
+    blades : int or None
+        Blades.
+    ducted : bool
+        Rotor in a duct.
+
+    Returns
+    -------
+    Facts
+        Without readings that are no physical magnitude.
+    """
+    if isinstance(source, Series):
+        raw = {k: np.asarray(v, dtype=float) for k, v in source.values.items()}
+        told = {k: units.split_suffix(k)[1] for k in raw}
+        unit = {k: u.suffix if u is not None else "-" for k, u in told.items()}
+        return Facts(raw, raw, unit, {}, tuple(range(1, len(source) + 1)), diameter_m, pitch_m, blades, ducted)
+    rec = view(source)
+    raw = {k: np.asarray(c.values, dtype=float) for k, c in source.channels.items()}
+    raw = {k: np.where(np.abs(v) > 1e12, np.nan, v) for k, v in raw.items() if v.shape == (source.rows,)}
+    said = source.constants
+    own = int(said["blades"]) if "blades" in said else None
+    return Facts(
+        rec.values, raw, {k: c.unit for k, c in source.channels.items()}, rec.names, rec.lines,
+        diameter_m if diameter_m is not None else said.get("diameter_m"),
+        pitch_m if pitch_m is not None else said.get("pitch_m"), blades if blades is not None else own,
+        ducted or source.provenance.get("rotor_ducted") == "yes" or source.provenance.get("duct") == "yes",
+        source.provenance.get("propeller") == "none",
+    )  # fmt: skip

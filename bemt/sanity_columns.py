@@ -1,0 +1,185 @@
+"""Columns that are copies, stuck, dead, or out of order; units of lengths and of the air."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.sanity_base import Facts, Finding, check_for
+
+__all__: list[str] = []
+
+Array = NDArray[np.float64]
+SENSORS = (
+    "thrust_N", "duct_thrust_N", "torque_Nm", "voltage_V", "current_A", "electrical_rpm", "optical_rpm", "rpm",
+    "temperature_K", "airspeed_m_s", "pressure_Pa",
+)  # fmt: skip
+"""Channels with a sensor of their own."""
+STUCK = ("thrust_N", "duct_thrust_N", "torque_Nm", "current_A", "power_W", "electrical_power_W", "rpm",
+         "electrical_rpm", "optical_rpm", "voltage_V")  # fmt: skip
+"""Channels that cannot stay the same while others change."""
+
+
+def _varies(v: Array, share: float = 0.05) -> bool:
+    """Whether a channel changes by more than a share of its size."""
+    v = v[np.isfinite(v)]
+    if v.size < 3:
+        return False
+    low, high = np.percentile(v, [5.0, 95.0])
+    return bool(high - low > share * max(abs(high), abs(low)))
+
+
+def _same(a: Array, b: Array) -> float | None:
+    """Constant ratio b / a over five distinct values or more, else None."""
+    both = np.isfinite(a) & np.isfinite(b)
+    if np.count_nonzero(both) < 5 or np.any(np.isfinite(a) != np.isfinite(b)):
+        return None
+    x, y = a[both], b[both]
+    if len(np.unique(x)) < 5 or not np.any(x != 0.0):
+        return None
+    k = int(np.argmax(np.abs(x)))
+    ratio = float(y[k] / x[k])
+    close = np.abs(y - ratio * x) <= 1e-9 * np.abs(ratio * x[k])
+    return ratio if bool(np.all(close)) and ratio != 0.0 else None
+
+
+@check_for("duplicates")
+def duplicates(facts: Facts) -> Iterator[Finding]:
+    """Two channels with the same numbers."""
+    by_file = {facts.named(k): k for k in SENSORS if k in facts.values}
+    names = [k for k in facts.raw if not k.startswith("u_")]
+    for i, a in enumerate(names):
+        for b in names[i + 1 :]:
+            one, two = facts.raw[a], facts.raw[b]
+            sensors = a in by_file and b in by_file and facts.unit.get(a) and facts.unit.get(b)
+            ratio = _same(one, two)
+            if ratio is None or b.startswith(a + "_") and b[len(a) + 1 :].isdigit():
+                continue  # a column in two units is compared by the importer
+            equal = ratio == 1.0 and facts.unit.get(a) == facts.unit.get(b) == ""
+            if sensors or equal:
+                text = f"the same numbers as {a}" + ("" if ratio == 1.0 else f" times {ratio:.6g}")
+                text += f" in all {int(np.isfinite(one).sum())} rows: two sensors never agree to the last digit"
+                fix = f"one of the two is a copy: find the column that belongs to {b} or {a}, leave the other out"
+                yield Finding("duplicate_column", b, text, fix, (), "error")
+
+
+@check_for("constant")
+def constant(facts: Facts) -> Iterator[Finding]:
+    """A channel that stays the same while others change; all zeros are a sensor that was not there."""
+    asked = ("rpm", "thrust_N", "torque_Nm", "current_A", "pwm_s", "throttle", "power_W", "voltage_V", "CT")
+    moving = [k for k in asked if k in facts.values and _varies(facts.values[k])]
+    if not moving or len(facts) < 5:
+        return
+    seen: set[str] = set()
+    for name in STUCK:
+        v, own = facts.values.get(name), facts.named(name)
+        if v is None or own in seen or own not in facts.raw:
+            continue
+        finite = v[np.isfinite(v)]
+        if finite.size < 5 or float(np.ptp(finite)) > 0.0 or len([k for k in moving if k != name]) == 0:
+            continue
+        if name == "rpm" and not facts.still.all():
+            continue  # a line of constant speed through the advance ratios
+        seen.add(own)
+        others = ", ".join(facts.named(k) for k in moving if k != name)
+        if finite[0] == 0.0:
+            text = f"0 in all {finite.size} rows while {others} change: that sensor saw nothing"
+            yield Finding("dead_sensor", own, text, "leave the column out", (), "note")
+        else:
+            text = f"{finite[0]:.6g} in all {finite.size} rows while {others} change"
+            fix = "the sensor is stuck, or the column was filled in: leave it out or record it again"
+            severity = "note" if name == "voltage_V" else "error"  # a set value of a supply
+            yield Finding("constant_column", own, text, fix, (), severity)
+
+
+@check_for("time")
+def time_backwards(facts: Facts) -> Iterator[Finding]:
+    """Time that falls."""
+    t = facts.get("time_s")
+    if t is None:
+        return
+    rows = np.flatnonzero(np.isfinite(t))
+    if len(rows) < 2:
+        return
+    run = facts.values.get("run")
+    back = np.diff(t[rows]) < 0.0
+    if run is not None:
+        back &= np.diff(run[rows]) == 0.0
+    odd = rows[1:][back]
+    if odd.size:
+        lines = ", ".join(str(facts.lines[int(r)]) for r in odd[:6]) + (" ..." if odd.size > 6 else "")
+        fall = float(np.min(np.diff(t[rows])[back]))
+        first = odd.size == 1 and odd[0] <= 2 and abs(fall) < 1.0
+        text = f"time falls in {odd.size} rows (line {lines}), by {-fall:.4g} s at most"
+        fix = (
+            "leave those rows out" if first else "sort the rows by time, or split the file where its clock starts again"
+        )
+        why = "note" if first else "error"  # the first sample of a log is often stamped late
+        yield Finding("time_backwards", facts.named("time_s"), text, fix, tuple(int(r) for r in odd), why)
+
+
+@check_for("lengths")
+def lengths(facts: Facts) -> Iterator[Finding]:
+    """Lengths that only another unit makes sense of."""
+    scales = ((1e-3, "mm taken for m"), (0.0254, "in taken for m"), (25.4, "in taken for mm"),
+              (1 / 25.4, "mm taken for in"), (1e3, "m taken for mm"), (1 / 0.0254, "m taken for in"))  # fmt: skip
+    D, pitch = facts.diameter_m, facts.pitch_m
+    asked: list[tuple[str, float, float, float]] = []
+    if D is not None:
+        asked.append(("diameter_m", D, 0.015, 12.0))
+        if pitch is not None:
+            asked.append(("pitch_m", pitch, 0.15 * D, 3.0 * D))
+    for name, low, high in (("tip_gap_m", 1e-5, 0.03), ("wall_distance_m", 0.02, 100.0)):
+        v = facts.get(name)
+        top = float(np.nanmax(np.abs(v))) if v is not None else 0.0
+        if v is not None and top > 0.0:
+            scale = D if D is not None and 0.015 <= D <= 12.0 else None
+            bounds = (
+                (low, high)
+                if scale is None
+                else (scale / 2e4, scale / 8)
+                if name == "tip_gap_m"
+                else (scale / 20, 500 * scale)
+            )
+            asked.append((name, top, *bounds))
+    for name, value, low, high in asked:
+        if low <= value <= high:
+            continue
+        fits = [f"{words}: multiply by {f:.6g}" for f, words in scales if low <= value * f <= high]
+        text = f"{value:.5g} m is outside {low:.3g} to {high:.3g} m" + (
+            f" for a rotor of {D:.4g} m" if D is not None and name != "diameter_m" else ""
+        )
+        yield Finding("length_unit", facts.named(name), text, "; or ".join(fits) or "check the length", (), "warning")
+
+
+@check_for("air")
+def air_units(facts: Facts) -> Iterator[Finding]:
+    """Pressure, temperature and humidity in another unit than their heading says."""
+    asked: tuple[tuple[str, float, float, tuple[tuple[float, float, str], ...]], ...] = (
+        ("pressure_Pa", 3e4, 1.2e5, (
+            (100.0, 0.0, "hPa taken for Pa: multiply by 100"), (1e3, 0.0, "kPa taken for Pa: multiply by 1000"),
+            (0.01, 0.0, "Pa taken for hPa: multiply by 0.01"),
+        )),
+        ("temperature_K", 220.0, 340.0, (
+            (1.0, 273.15, "Celsius taken for kelvin: add 273.15"),
+            (1.0, -273.15, "kelvin taken for Celsius: subtract 273.15"),
+            (5 / 9, 255.372, "Fahrenheit taken for kelvin"),
+        )),
+        ("density_kg_m3", 0.2, 2.0, (
+            (1e3, 0.0, "g/cm3 taken for kg/m3: multiply by 1000"),
+            (1e-3, 0.0, "g/m3 taken for kg/m3: multiply by 0.001"),
+        )),
+        ("humidity", 0.0, 1.0, ((0.01, 0.0, "per cent taken for a fraction: multiply by 0.01"),)),
+    )  # fmt: skip
+    for name, low, high, ways in asked:
+        v = facts.get(name)
+        if v is None:
+            continue
+        value = float(np.nanmedian(v))
+        if low <= value <= high:
+            continue
+        fits = [words for factor, offset, words in ways if low <= value * factor + offset <= high]
+        text = f"median {value:.5g} is outside {low:g} to {high:g}"
+        yield Finding("air_unit", facts.named(name), text, "; or ".join(fits) or "check the sensor", (), "warning")

@@ -1,0 +1,363 @@
+"""Slips of units, found by what must hold between the channels.
+
+Every relation used here is a product of powers of the recorded quantities: CT = T / (rho n^2 D^4), figure of merit,
+shaft power over electrical power, thrust over (efficacy x power), tip Mach number, thrust over that of the K1/K2
+formula. A relation has a window that any propeller of any size keeps, or, where the file holds a product of its own
+columns, the exact value 1. The windows of static CT, CQ and figure of merit are about twice as wide as the 130 static
+tests of the UIUC database at hand (CT 0.059 to 0.21, figure of merit 0.22 to 0.71).
+
+When a relation is violated, each usual slip of each quantity is tried: a slip is named when it repairs every violated
+relation and breaks none. Several may fit; then all are told, the likeliest first.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt import empirical, units
+from bemt.sanity_base import Facts, Finding, check_for
+
+__all__ = ["Relation", "Slip", "relations", "slips"]
+
+Array = NDArray[np.float64]
+EXACT = 0.03
+"""Relative width of a relation that holds within the file."""
+ALIKE = 4.0
+"""Difference in score (chi-square) within which slips are told together."""
+
+
+@dataclass(frozen=True)
+class Relation:
+    """A product of powers with the value that it must have.
+
+    Parameters
+    ----------
+    name : str
+        In words.
+    powers : mapping of str to float
+        Exponent of each quantity: T, Q, n, D, P (shaft), E (electrical), U, I, H (thrust per electrical power), G
+        (thrust per shaft power), n2 (second speed), p (pitch).
+    value : float
+        Median over the rows under load. [1]
+    range_low, range_high : float
+        Between which the middle three fifths of those rows lie. [1]
+    low, high : float
+        Bounds. [1]
+    centre, spread : float
+        Usual value and the factor of one standard deviation. [1]
+    exact : bool
+        Whether it holds by definition.
+    """
+
+    name: str
+    powers: Mapping[str, float]
+    value: float
+    range_low: float
+    range_high: float
+    low: float
+    high: float
+    centre: float
+    spread: float
+    exact: bool = False
+
+    def after(self, shift: Mapping[str, float]) -> float:
+        """Value once quantities are multiplied by the factors of `shift`."""
+        return self.value * float(math.prod(factor ** self.powers.get(q, 0.0) for q, factor in shift.items()))
+
+    @property
+    def broken(self) -> bool:
+        """Whether most rows are outside the bounds: a slip of a unit moves all rows alike, a poor sensor does not."""
+        return self.range_low > self.high or self.range_high < self.low
+
+    def holds(self, shift: Mapping[str, float]) -> bool:
+        """Whether it is inside its bounds after `shift`."""
+        return self.low <= self.after(shift) <= self.high
+
+    def distance(self, shift: Mapping[str, float]) -> float:
+        """Square of the distance from the usual value, in standard deviations."""
+        return (math.log(max(self.after(shift), 1e-300) / self.centre) / math.log(self.spread)) ** 2
+
+
+@dataclass(frozen=True)
+class Slip:
+    """A usual mistake: `id`, `quantity`, `factor` that would repair it, words, and how unusual it is (chi-square)."""
+
+    id: str
+    quantity: str
+    factor: float
+    words: str
+    rarity: float = 0.0
+
+
+_QUANTITY = {
+    "T": "thrust_N", "Q": "torque_Nm", "n": "rpm", "P": "power_W", "E": "electrical_power_W", "U": "voltage_V",
+    "I": "current_A",
+}  # fmt: skip
+
+
+def _both_ways(id_: str, q: str, table: Mapping[str, tuple[float, float]]) -> list[Slip]:
+    out = []
+    for words, (factor, rarity) in table.items():
+        wrong, right = words.split(" taken for ")
+        out.append(Slip(id_, q, factor, f"{wrong} taken for {right}: multiply by {factor:.6g}", rarity))
+        out.append(Slip(id_, q, 1 / factor, f"{right} taken for {wrong}: multiply by {1 / factor:.6g}", rarity))
+    return out
+
+
+def slips() -> tuple[Slip, ...]:
+    """List the usual slips.
+
+    Returns
+    -------
+    tuple of Slip
+        Both directions of each.
+
+    Examples
+    --------
+    >>> next(s.words for s in slips() if s.quantity == "T")
+    'kgf taken for N: multiply by 9.80665'
+    """
+    u = {k: unit.factor for k, unit in units.UNITS.items()}
+    found = _both_ways("thrust_unit", "T", {
+        "kgf taken for N": (u["kgf"], 0.0), "lbf taken for N": (u["lbf"], 0.0), "gf taken for N": (u["gf"], 0.0),
+        "kgf taken for gf": (1000.0, 0.0), "kgf taken for lbf": (u["kgf"] / u["lbf"], 1.0),
+        "lbf taken for gf": (u["lbf"] / u["gf"], 1.0), "ozf taken for N": (u["ozf"], 2.0),
+    })  # fmt: skip
+    found += _both_ways("torque_unit", "Q", {
+        "mNm taken for Nm": (1e-3, 0.0), "kgf cm taken for Nm": (u["kgf_cm"], 0.0),
+        "gf cm taken for Nm": (u["gf_cm"], 0.0), "kgf m taken for Nm": (u["kgf_m"], 0.0),
+        "lbf in taken for Nm": (u["lbf_in"], 0.0), "lbf ft taken for Nm": (u["lbf_ft"], 1.0),
+        "ozf in taken for Nm": (u["ozf_in"], 1.0), "Ncm taken for Nm": (1e-2, 1.0),
+    })  # fmt: skip
+    found += [
+        Slip("rpm_electrical", q, 1 / p, f"electrical revolutions taken for mechanical: divide by {p} pole pairs",
+             0.0 if p in (6, 7, 11, 12, 14) else 0.5) for q in ("n", "n2") for p in range(2, 31)
+    ]  # fmt: skip
+    found += _both_ways("rpm_unit", "n", {
+        "rad/s taken for rev/min": (1 / units.RPM, 0.0), "rev/s (Hz) taken for rev/min": (60.0, 0.0),
+    })  # fmt: skip
+    found += _both_ways("power_unit", "P", {
+        "kW taken for W": (1e3, 0.5), "hp taken for W": (u["hp"], 0.5),
+        "torque x rev/s taken for torque x rad/s": (2.0 * math.pi, 0.5),
+        "torque x rev/min taken for torque x rad/s": (units.RPM, 0.5),
+    })  # fmt: skip
+    found += _both_ways("electrical_power_unit", "E", {"kW taken for W": (1e3, 1.0)})
+    found += _both_ways("current_unit", "I", {"A taken for mA": (1e3, 0.5)})
+    found += _both_ways("voltage_unit", "U", {"V taken for mV": (1e3, 0.5)})
+    found += _both_ways("diameter_unit", "D", {
+        "mm taken for m": (1e-3, 0.5), "in taken for m": (units.INCH, 0.5), "in taken for mm": (25.4, 0.5),
+        "cm taken for m": (1e-2, 1.0), "radius taken for diameter": (2.0, 1.0),
+    })  # fmt: skip
+    for q, words in (("H", "thrust per electrical power"), ("G", "thrust per shaft power")):
+        found += [Slip("efficacy_unit", q, f, f"{words} in another unit: multiply by {f:.6g}", 5.0)
+                  for k in ("kgf", "lbf", "gf") for f in (u[k], 1 / u[k])]  # fmt: skip
+        found += [Slip("efficacy_unit", q, f, f"{words} in another unit: multiply by {f:.6g}", 5.0)
+                  for f in (1e3, 1e-3)]  # fmt: skip
+    return tuple(found)
+
+
+def _quantities(facts: Facts) -> dict[str, Array]:
+    """Absolute values of the recorded quantities; NaN where there is none."""
+    q = {key: np.abs(facts.filled[name]) for key, name in _QUANTITY.items() if facts.get(name) is not None}
+    if "n" in q:
+        q["n"] = q["n"] / 60.0
+    if facts.names.get("electrical_power_W") == "voltage_V x current_A":
+        q.pop("E", None)
+    if "E" not in q and {"U", "I"} <= q.keys():
+        q["E"] = q["U"] * q["I"]
+    for key, words in (("H", ("overall_efficiency_N_W", "efficacy_N_W")), ("G", ("propeller_mech_efficiency_N_W",))):
+        for name in words:
+            if name in facts.raw and np.any(np.isfinite(facts.raw[name])):
+                q[key] = np.abs(facts.raw[name])
+    n = len(facts)
+    for key, length in (("D", facts.diameter_m), ("p", facts.pitch_m)):
+        if length is not None and length > 0.0:
+            q[key] = np.full(n, length)
+    optical, electrical = facts.get("optical_rpm"), facts.get("electrical_rpm")
+    if optical is not None and electrical is not None:
+        q["n2"] = np.abs(electrical if facts.named("rpm") == "optical_rpm" else optical) / 60.0
+    return {k: np.where(v > 0.0, v, np.nan) for k, v in q.items()}
+
+
+def relations(facts: Facts) -> list[Relation]:
+    """Relations that the recorded channels allow.
+
+    Parameters
+    ----------
+    facts : Facts
+        Of a recording.
+
+    Returns
+    -------
+    list of Relation
+        With their values; only those with three rows under load or more.
+    """
+    q = _quantities(facts)
+    out: list[Relation] = []
+    rho = facts.rho
+    duct = facts.ducted
+    still = facts.loaded & facts.still
+    product = facts.names.get("electrical_power_W") == "voltage_V x current_A"  # E is U I then, by construction
+    electric = {"U": 1.0, "I": 1.0} if product else {"E": 1.0}
+
+    def add(name: str, powers: Mapping[str, float], scale: Array | float, bounds: tuple[float, float],
+            usual: tuple[float, float], rows: NDArray[np.bool_] = still, exact: bool = False) -> None:  # fmt: skip
+        if not powers.keys() <= q.keys():
+            return
+        with np.errstate(all="ignore"):
+            v = np.exp(sum(p * np.log(q[k]) for k, p in powers.items())) * scale
+        v = np.broadcast_to(v, rows.shape)[rows]
+        v = v[np.isfinite(v) & (v > 0.0)]
+        if v.size < 3:
+            return
+        value = float(np.median(v))
+        span = np.percentile(v, [20.0, 80.0])
+        if exact and float(np.median(np.abs(v / value - 1.0))) > EXACT:
+            return  # no fixed ratio: no slip of a unit
+        out.append(Relation(name, powers, value, float(span[0]), float(span[1]), *bounds, *usual, exact))
+
+    tau = 2.0 * math.pi
+    shaft = {"Q": 1.0, "n": 1.0}
+    alike = (1 - EXACT, 1 + EXACT)
+    any_row = facts.loaded
+    add("shaft power over torque x speed", {"P": 1.0, "Q": -1.0, "n": -1.0}, 1 / tau, alike, (1.0, 1.01), any_row, True)
+    if not product:
+        add("electrical power over voltage x current", {"E": 1.0, "U": -1.0, "I": -1.0}, 1.0, (0.85, 1.15), (1.0, 1.05),
+            any_row, True)  # fmt: skip
+    minus = {k: -p for k, p in electric.items()}
+    add("thrust over (efficacy x electrical power)", {"T": 1.0, "H": -1.0, **minus}, 1.0, (0.9, 1.1), (1.0, 1.02),
+        any_row, True)  # fmt: skip
+    add(
+        "thrust over (efficacy x shaft power)",
+        {"T": 1.0, "G": -1.0, "P": -1.0},
+        1.0,
+        (0.9, 1.1),
+        (1.0, 1.02),
+        any_row,
+        True,
+    )
+    add("one speed over the other", {"n": 1.0, "n2": -1.0}, 1.0, (0.95, 1.05), (1.0, 1.01), any_row, True)
+    add("CT", {"T": 1.0, "n": -2.0, "D": -4.0}, 1 / rho, (0.015, 2.0 if duct else 0.42), (0.11, 1.4))
+    add("CQ", {"Q": 1.0, "n": -2.0, "D": -5.0}, 1 / rho, (1e-3, 0.3 if duct else 0.06), (0.009, 1.7))
+    add(
+        "CQ from shaft power",
+        {"P": 1.0, "n": -3.0, "D": -5.0},
+        1 / (tau * rho),
+        (1e-3, 0.3 if duct else 0.06),
+        (0.009, 1.7),
+    )
+    add("torque over thrust x diameter", {"Q": 1.0, "T": -1.0, "D": -1.0}, 1.0, (0.025, 0.4), (0.08, 1.4))
+    area = 2.0 * math.pi / 4.0 * rho
+    merit = math.sqrt(2.0 * 1.3) if duct else 1.05
+    usual = (0.5, 1.4)
+    for words, power in (("torque x speed", shaft), ("shaft power", {"P": 1.0})):
+        inverse = {k: -p for k, p in power.items()}
+        scale = 1 / tau if power is shaft else 1.0
+        if "D" in q:
+            add(
+                f"figure of merit from {words}",
+                {"T": 1.5, "D": -1.0, **inverse},
+                scale / np.sqrt(area),
+                (0.11, merit),
+                usual,
+            )
+        elif "n" in q:  # the diameter that makes CT = 0.1 stands in; it enters with the fourth root only
+            powers = {"T": 1.25, **inverse}
+            powers["n"] = powers.get("n", 0.0) + 0.5
+            add(f"figure of merit from {words}, diameter guessed by CT = 0.1", powers,
+                scale / np.sqrt(area) * (0.1 * rho) ** 0.25, (0.11, 2.4 if duct else 1.4), usual)  # fmt: skip
+    if "D" in q:
+        add(
+            "figure of merit from electrical power",
+            {"T": 1.5, "D": -1.0, **minus},
+            1 / np.sqrt(area),
+            (0.02, merit),
+            (0.33, 1.8),
+        )
+    elif "n" in q:
+        add("figure of merit from electrical power, diameter guessed by CT = 0.1", {"T": 1.25, "n": 0.5, **minus},
+            (0.1 * rho) ** 0.25 / np.sqrt(area), (0.02, 2.0 if duct else 1.2), (0.33, 1.8))  # fmt: skip
+    add("torque x speed over electrical power", {**shaft, **minus}, tau, (0.02, 1.05), (0.6, 1.5), any_row)
+    add("shaft power over electrical power", {"P": 1.0, **minus}, 1.0, (0.02, 1.05), (0.6, 1.5), any_row)
+    add("tip Mach number", {"n": 1.0, "D": 1.0}, math.pi / 343.0, (0.02, 1.1), (0.3, 2.0), any_row)
+    add("speed [rev/min]", {"n": 1.0}, 60.0, (150.0, 3e5), (8000.0, 3.0), any_row)
+    add("speed over voltage [rev/min/V]", {"n": 1.0, "U": -1.0}, 60.0, (20.0, 8000.0), (700.0, 3.0), any_row)
+    add("supply voltage [V]", {"U": 1.0}, 1.0, (0.5, 1000.0), (15.0, 3.0), any_row)
+    if "p" in q and "D" in q and not duct:
+        ratio = float(q["D"][0] / q["p"][0])
+        if empirical.D_OVER_P_USABLE[0] <= ratio <= empirical.D_OVER_P_USABLE[1]:
+            model = np.asarray(empirical.thrust(q["D"][0], q["p"][0], 60.0, 0.0, rho), dtype=float)  # at 1 rev/s
+            add("thrust over that of the K1/K2 formula", {"T": 1.0, "n": -2.0, "D": -3.5},
+                q["D"] ** 3.5 / model, (0.35, 2.5), (1.0, 1.25))  # fmt: skip
+    return out
+
+
+def _told(q: str, facts: Facts) -> str:
+    if q in _QUANTITY:
+        return facts.named(_QUANTITY[q])
+    if q == "n2":
+        return "electrical_rpm" if facts.named("rpm") == "optical_rpm" else "optical_rpm"
+    return {"D": "diameter_m", "H": "efficacy_N_W", "G": "propeller_mech_efficiency_N_W"}.get(q, q)
+
+
+@check_for("slips")
+def find_slips(facts: Facts) -> Iterator[Finding]:
+    """Name the slip of a unit that repairs what does not fit together.
+
+    Parameters
+    ----------
+    facts : Facts
+        Of a recording.
+
+    Yields
+    ------
+    Finding
+        One, or none when everything fits or nothing can be known.
+    """
+    known = relations(facts) if not facts.bare else []
+    broken = [r for r in known if r.broken]
+    if not broken:
+        return
+    quantities = {q for r in known for q in r.powers}
+    fits: list[tuple[float, Slip]] = []
+    for slip in slips():
+        if slip.quantity not in quantities or facts.diameter_m is None and slip.quantity == "D":
+            continue
+        shift = {slip.quantity: slip.factor}
+        if all(r.holds(shift) for r in known if r in broken or slip.quantity in r.powers):
+            fits.append((sum(r.distance(shift) for r in known) + slip.rarity, slip))
+    evidence = "; ".join(f"{r.name} is {r.value:.4g}, must be {_bounds(r)}" for r in broken[:4])
+    certain = any(r.exact for r in broken)
+    if not fits:
+        channels = sorted({_told(q, facts) for r in broken for q in r.powers if q in _QUANTITY or q == "D"})
+        text = "no single slip of a unit repairs it: check " + ", ".join(channels)
+        yield Finding(
+            "inconsistent", channels[0] if len(channels) == 1 else "+".join(channels), evidence, text, (), "warning"
+        )
+        return
+    fits.sort(key=lambda fit: fit[0])
+    best, slip = fits[0]
+    others = [s for score, s in fits[1:] if score - best < ALIKE]
+    words = f"{_told(slip.quantity, facts)}: {slip.words}"
+    if others:
+        words += ". Fits as well: " + "; ".join(_listed(others, facts))
+    yield Finding(slip.id, _told(slip.quantity, facts), evidence, words, (), "error" if certain else "warning")
+
+
+def _listed(others: list[Slip], facts: Facts) -> list[str]:
+    """Alternatives in words; pole pairs as one range."""
+    poles = sorted(round(1 / s.factor) for s in others if s.id == "rpm_electrical")
+    out = [f"{_told(s.quantity, facts)}: {s.words}" for s in others if s.id != "rpm_electrical"][:5]
+    if poles:
+        span = f"{poles[0]}" if len(poles) == 1 else f"{poles[0]} to {poles[-1]}"
+        out.insert(0, f"{_told('n', facts)}: electrical revolutions over {span} pole pairs")
+    return out
+
+
+def _bounds(r: Relation) -> str:
+    return f"{r.centre:g}" if r.exact else f"{r.low:g} to {r.high:g}"

@@ -1,0 +1,114 @@
+"""The promise of the figures of a diagnosis: each with something to show is written and shows it."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bemt import evaluate
+from bemt.case import load_case
+from bemt.diagnose import chain, figures, figures_effects, figures_posterior, fit, record
+from bemt.series import Series
+
+ALL = set(figures.NAMES)
+LEFT_OUT = "compressibility"
+
+
+@pytest.fixture(scope="module")
+def named(project: Path) -> chain.Diagnosis:
+    """The solver's own points with 1 % noise against a case without the Mach number."""
+    case = load_case(project / "cases" / "prop_8x5" / "case.toml")
+    rpm, J = (a.ravel() for a in np.meshgrid([8000.0, 15000.0, 22000.0], [0.0, 0.2, 0.4, 0.6]))
+    V = J * rpm / 60.0 * case.diameter_m
+    points = evaluate.evaluate(evaluate.prepare(case, None, 24), rpm, V, case.air())
+    noise = np.random.default_rng(1).standard_normal((2, rpm.size))
+    u = {"thrust_N": 0.01 * points.thrust_N, "torque_Nm": 0.01 * points.torque_Nm}
+    values = {"rpm": rpm, "airspeed_m_s": V, "density_kg_m3": np.full(rpm.size, 1.225),
+              "thrust_N": points.thrust_N + noise[0] * u["thrust_N"],
+              "torque_Nm": points.torque_Nm + noise[1] * u["torque_Nm"]}  # fmt: skip
+    without = case.replaced({"model.effects_off": [LEFT_OUT]})
+    only = [LEFT_OUT, "hub_loss", "pitch_offset", "thrust_gain"]
+    return chain.diagnose([record.from_series(Series("bench", "own", values, u), without)], [without], only, nulls=120)
+
+
+def seen_as(answer: chain.Diagnosis, verdict: str, effects: tuple[str, ...]) -> chain.Diagnosis:
+    """The same readings with another answer."""
+    name = "+".join(effects[:2] if verdict == "named" else effects[:1]) or "none"
+    best = fit.fit(answer.found, name)
+    decision = replace(answer.decision, verdict=verdict, effects=effects, leading=name)
+    parameters = fit.intervals(answer.found, name) if best.ids else {}
+    where = None if verdict == "none" else answer.where
+    return replace(answer, decision=decision, best=best, parameters=parameters, where=where)
+
+
+@pytest.mark.parametrize(
+    ("verdict", "effects", "expected"),
+    [
+        ("named", (LEFT_OUT,), ALL),
+        ("named", (LEFT_OUT, "thrust_gain"), ALL),
+        ("class", ("pitch_offset", LEFT_OUT), ALL),
+        ("sensor", ("thrust_gain",), ALL - {"radius"}),
+        ("none", (), ALL - {"radius", "posterior"}),
+    ],
+    ids=["named", "pair", "class", "sensor", "none"],
+)
+def test_what_there_is_to_show_is_written(
+    named: chain.Diagnosis, tmp_path: Path, verdict: str, effects: tuple[str, ...], expected: set[str]
+) -> None:
+    from PIL import Image
+
+    answer = seen_as(named, verdict, effects)
+    if len(effects) == 2 and verdict == "named":  # ids of a pair are in the order of the catalogue
+        assert answer.best.ids == effects
+    for stem in ALL:
+        (tmp_path / f"{stem}.png").write_bytes(b"of an earlier answer")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        written = figures.draw(answer, tmp_path)
+    assert {p.stem for p in written if p.suffix == ".png"} == expected
+    assert sorted(written) == sorted(tmp_path.iterdir())
+    for path in written:
+        assert 2000 < path.stat().st_size <= figures.LARGEST, path.name
+        if path.suffix == ".png":
+            with Image.open(path) as image:
+                assert image.width == 1200
+                assert image.convert("RGB").getpixel((0, 0)) == (255, 255, 255)
+
+
+def test_the_same_answer_gives_the_same_files_and_leaves_no_figure_open(named: chain.Diagnosis, tmp_path: Path) -> None:
+    from matplotlib import pyplot as plt
+
+    first, second = (figures.draw(named, tmp_path / name) for name in ("a", "b"))
+    assert [p.name for p in first] == [p.name for p in second]
+    assert [p.read_bytes() for p in first] == [p.read_bytes() for p in second]
+    assert not plt.get_fignums()
+
+
+def test_the_loads_on_the_blade_add_up_to_the_signature(named: chain.Diagnosis) -> None:
+    answer = seen_as(named, "named", (LEFT_OUT,))
+    found = figures_effects.blade_loads(answer)
+    assert found is not None
+    reading, r, dr, curves = found
+    assert np.all(np.diff(r) > 0)
+    point = answer.problem.point[reading]
+    for channel, change in enumerate((curves[1] - curves[0]) @ dr):
+        row = np.flatnonzero((answer.problem.point == point) & (answer.problem.channel == channel))
+        assert change == pytest.approx(answer.best.signature[row[0]], rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["pitch_offset", "thrust_gain", "pitch_offset+thrust_gain"])
+def test_the_posterior_that_is_drawn_is_the_one_of_the_intervals(named: chain.Diagnosis, name: str) -> None:
+    weights = figures_posterior.weights(named.found, name)
+    intervals = fit.intervals(named.found, name)
+    assert set(weights) == set(intervals) == set(name.split("+"))
+    for i, p in weights.items():
+        assert p.sum() == pytest.approx(1.0)
+        ((key, interval),) = intervals[i].items()
+        x = np.array([s[key] for s in named.found.of(i).settings])
+        middle = np.cumsum(p) - 0.5 * p
+        for end, share in (("low", 0.05), ("value", 0.5), ("high", 0.95)):
+            assert np.interp(interval[end], x, middle) == pytest.approx(max(share, middle[0]), abs=1e-6)

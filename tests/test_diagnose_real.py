@@ -1,0 +1,141 @@
+"""`diagnose` on real recordings whose cause is known and left out of the model, or that show none.
+
+The measured data are not part of the project; everything here skips without them.  Slow: minutes.
+"""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from diagnosing import left_out
+
+from bemt import section_rule
+from bemt.case import Case, load_case
+from bemt.diagnose import chain, document, record
+from bemt.diagnose.command import load
+from bemt.series import Series
+
+pytestmark = pytest.mark.slow
+
+# Static thrust or torque coefficient changes by more than 10 % over the speeds of volume 1; alphabetical, none left out
+# of the families named here.
+UIUC = ("apc29ff_9x5", "apce_10x7", "apce_11x8", "apcsf_10x7", "apcsp_10x8", "apcsp_11x4", "apcsp_11x8", "grcp_11x8",
+        "grcp_9x4", "gwsdd_9x5", "mae_10x7", "mas_9x5")  # fmt: skip
+
+
+def write(folder: Path, body: str, geometry: str = "") -> Case:
+    folder.mkdir(parents=True, exist_ok=True)
+    if geometry:
+        (folder / "geom.txt").write_text(geometry)
+    (folder / "case.toml").write_text(f'schema = "bemt.case/1"\nname = "{folder.name}"\n{body}')
+    return load_case(folder / "case.toml")
+
+
+def stations(rows: list[tuple[float, float, float]]) -> str:
+    return "r/R c/R beta\n" + "\n".join(f"{r:g} {c:g} {b:g}" for r, c, b in rows)
+
+
+def uiuc(folder: Path, data: Path, name: str) -> Case:
+    family, size = name.split("_")[:2]
+    diameter = float(size.split("x")[0])
+    section = section_rule.sections(family)[0]
+    body = f"""[rotor]
+kind = "propeller"
+blades = 2
+diameter_in = {diameter}
+hub_ratio = 0.1
+[blade]
+uiuc = "geom.txt"
+[blade.section]
+camber = {section.camber}
+camber_position = {section.position}
+thickness = {section.thickness}
+[operating]
+rpm = 5000
+[air]
+density_kg_m3 = 1.18
+"""
+    return write(folder / name.replace(".", "p"), body, (data / f"{name}_geom.txt").read_text())
+
+
+def test_reynolds_is_named_where_uiuc_shows_it(shared_data: Path, tmp_path: Path) -> None:
+    data = shared_data / "uiuc" / "volume-1"
+    told = {}
+    for name in UIUC:
+        case = left_out("reynolds", uiuc(tmp_path, data, name))
+        files = sorted(data.glob(f"{name}_static_*.txt"))
+        answer = chain.diagnose([load(str(f), case) for f in files], [case])
+        told[name] = (answer.decision.verdict, answer.decision.effects)
+    right = [n for n, (_, ids) in told.items() if "reynolds" in ids]
+    wrong = [n for n, (_, ids) in told.items() if ids and "reynolds" not in ids]
+    assert len(right) >= 0.8 * len(UIUC), told
+    assert not wrong, told
+
+
+def test_the_duct_of_the_x22a_is_missed(shared_data: Path, tmp_path: Path) -> None:
+    folder = shared_data / "x22a"
+    shape = np.genfromtxt(folder / "x22a_geometry.csv", delimiter=",", skip_header=1)
+    with (folder / "x22a_measured_CT_CP_vs_J.csv").open() as stream:
+        rows = np.array([[float(x) for x in row[:4]] for row in list(csv.reader(stream))[1:]])
+    records, cases = [], []
+    for angle in (19, 29):
+        body = """[rotor]
+kind = "fan"
+blades = 3
+diameter_m = 2.1336
+hub_ratio = 0.2
+[blade]
+uiuc = "geom.txt"
+[blade.section]
+camber = 0.02
+thickness = 0.08
+[duct]
+tip_gap_mm = 10.16
+length_mm = 1244.6
+lip_radius_mm = 128
+exit_area_ratio = 1.27
+[operating]
+rpm = 1200
+[air]
+density_kg_m3 = 1.225
+"""
+        geometry = stations([(r[0], r[3] / 1.0668, r[2] + angle - 20) for r in shape])
+        case = left_out("duct", write(tmp_path / f"x22a_{angle}", body, geometry))
+        q = rows[rows[:, 0] == angle]
+        values = {"J": q[:, 1], "CT": q[:, 2], "CP": q[:, 3], "rpm": np.full(len(q), 1200.0)}
+        records.append(record.from_series(Series("bench", f"x22a {angle}", values), case))
+        cases.append(case)
+    answer = chain.diagnose(records, cases)
+    assert answer.decision.effects == ("duct",), document.text(answer)
+    for score in answer.scores.values():
+        assert score["holdout_after"] < 0.2 * score["holdout_before"]
+
+
+def test_the_duct_around_a_76_mm_fan_is_missed(shared_data: Path, tmp_path: Path) -> None:
+    body = """[rotor]
+kind = "propeller"
+blades = 8
+diameter_mm = 76
+hub_ratio = 0.25
+[blade]
+pitch_mm = 70
+chord_law = "apc_like"
+max_chord_over_R = 0.35
+[blade.section]
+camber = 0.05
+thickness = 0.09
+[operating]
+rpm = 20000
+[air]
+density_kg_m3 = 1.2
+"""
+    case = write(tmp_path / "fan", body)
+    folder = shared_data / "jmajew"
+    ducted = [load(str(f), case) for f in sorted(folder.glob("grp01__f1507_hqprop76x8_4s_duct_table*.csv"))]
+    bare = [load(str(f), case) for f in sorted(folder.glob("grp01__f1507_hqprop76x8_4s_table*.csv"))]
+    answer = chain.diagnose([*ducted, *(replace(r, reference=True) for r in bare)], [case])
+    assert "duct" in answer.decision.effects, document.text(answer)

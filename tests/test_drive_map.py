@@ -1,0 +1,182 @@
+"""Bench map: monotone, exact on made drives, inverse of itself, exported as CSV, JSON and C that agree, real trips."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bemt import importers
+from bemt.cli import main
+from bemt.drive import bench_map, map_export
+from bemt.drive.map_points import MapPoints, join, points
+from bemt.errors import InputError
+
+
+def made(pulse: np.ndarray, volts: np.ndarray | float = 12.0, noise: float = 0.0, seed: int = 0) -> MapPoints:
+    """Steady points of a drive with a dead band, whose thrust goes with the square of the voltage."""
+    volts = np.broadcast_to(np.asarray(volts, dtype=float), pulse.shape).copy()
+    share = np.clip((pulse - 1080.0) / 920.0, 0.0, None)
+    rng = np.random.default_rng(seed)
+    thrust = 20.0 * share**1.7 * (volts / 12.0) ** 2 + noise * rng.standard_normal(len(pulse))
+    values = {"thrust": thrust, "rpm": 9000.0 * share**0.85 * volts / 12.0, "current": 30.0 * share**2.4,
+              "power": 30.0 * share**2.4 * volts, "voltage": volts}  # fmt: skip
+    return MapPoints(pulse, values, np.ones(len(pulse)), np.zeros(len(pulse), dtype=np.intp))
+
+
+LEVELS = np.linspace(1000.0, 2000.0, 21)
+
+
+def test_the_map_is_monotone_and_near_the_truth_between_levels() -> None:
+    chart = bench_map.fit(made(LEVELS, noise=0.05))
+    pulse = np.linspace(1000.0, 2000.0, 2001)
+    truth = made(pulse).values["thrust"]
+    for name in chart.curves:
+        assert np.all(np.diff(chart.at(name, pulse)) >= 0.0), name
+    assert np.max(np.abs(chart.at("thrust", pulse) - truth)) < 0.01 * 20.0
+    assert not chart.with_voltage and chart.full_thrust_N == pytest.approx(20.0, rel=0.01)
+
+
+def test_the_inverse_returns_what_the_map_gives() -> None:
+    chart = bench_map.fit(made(LEVELS, noise=0.05))
+    wanted = np.linspace(0.1, 0.999, 50) * chart.full_thrust_N
+    pulse = chart.pulse_for(wanted)
+    assert np.allclose(chart.at("thrust", pulse), wanted, atol=1e-6)
+    assert np.all(np.diff(pulse) > 0.0)
+    assert np.isnan(chart.pulse_for(1.01 * chart.full_thrust_N))
+    assert chart.pulse_for(-1.0) == 1000.0
+    assert np.isnan(chart.at("thrust", 2001.0)) and np.isnan(chart.at("thrust", 999.0))
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.floats(0.0, 50.0), min_size=4, max_size=20), st.floats(1e-10, 10.0))
+def test_any_points_give_a_monotone_map(thrust: list[float], smoothness: float) -> None:
+    pulse = np.linspace(1000.0, 2000.0, len(thrust))
+    base = made(pulse)
+    chart = bench_map.fit(
+        MapPoints(pulse, {**base.values, "thrust": np.array(thrust)}, base.weight, base.run), smoothness
+    )
+    values = chart.at("thrust", np.linspace(1000.0, 2000.0, 300))
+    assert np.all(np.diff(values) >= -1e-9 * max(1.0, *thrust)) and np.all(np.isfinite(values))
+
+
+def test_two_batteries_make_voltage_a_parameter() -> None:
+    both = join([made(LEVELS, 12.0 - 0.001 * (LEVELS - 1000.0)), made(LEVELS, 16.0 - 0.001 * (LEVELS - 1000.0))])
+    chart = bench_map.fit(both)
+    assert chart.with_voltage and chart.curves["thrust"].exponent == pytest.approx(2.0, abs=0.02)
+    assert chart.curves["rpm"].exponent == pytest.approx(1.0, abs=0.02)
+    pulse = float(chart.pulse_for(9.0, 14.0))
+    assert made(np.array([pulse]), 14.0).values["thrust"][0] == pytest.approx(9.0, abs=0.2)
+    one = bench_map.fit(made(LEVELS, 12.0 - 0.001 * (LEVELS - 1000.0)))  # sag alone says nothing of another battery
+    assert not one.with_voltage
+    with pytest.raises(InputError, match="another battery voltage"):
+        one.pulse_for(5.0, 14.0)
+    assert one.voltage_at(1500.0) == pytest.approx(11.5, abs=0.02)
+
+
+def test_held_out_levels_of_a_smooth_drive_are_met() -> None:
+    trip = bench_map.held_out(made(LEVELS, noise=0.02))
+    assert len(trip.error) == 19 and trip.worst < 0.01
+    turning = trip.pulse_us > 1150.0  # below, thrust is flat and any pulse width gives it
+    assert np.allclose(trip.pulse_found_us[turning], trip.pulse_us[turning], atol=12.0)
+
+
+def log(tmp_path: Path, sign: int = 1, extra: str = "") -> Path:
+    rows = ["Time (s),ESC signal (us),Thrust (N),Voltage (V),Current (A),Motor Optical Speed (RPM)"]
+    t = 0.0
+    for pulse in np.linspace(1000.0, 2000.0, 11):
+        p = made(np.array([pulse]))
+        for _ in range(20):
+            t += 0.1
+            rows.append(f"{t:.2f},{pulse:.0f},{sign * p.values['thrust'][0]:.4f},12.0,{p.values['current'][0]:.3f},"
+                        f"{p.values['rpm'][0]:.0f}")  # fmt: skip
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(rows) + "\n" + extra)
+    return path
+
+
+def test_command_writes_tables_that_agree(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, out = log(tmp_path), tmp_path / "out"
+    assert main(["map", str(path), "--out", str(out), "--json", "--thrust", "10", "--name", "my drive"]) == 0
+    doc = json.loads(capsys.readouterr().out)
+    assert doc["schema"] == "bemt.map/1" and doc == json.loads((out / "my drive.map.json").read_text())
+    assert doc["steady_points"] == 11 and doc["held_out"]["worst_of_full_thrust"] < 0.02
+    table = list(csv.DictReader(io.StringIO((out / "my drive.map.csv").read_text())))
+    assert [float(r["thrust_N"]) for r in table] == pytest.approx(doc["forward"]["thrust_N"])
+    inverse = list(csv.DictReader(io.StringIO((out / "my drive.inverse.csv").read_text())))
+    near = np.interp(10.0, [float(r["thrust_N"]) for r in inverse], [float(r["pulse_us"]) for r in inverse])
+    assert near == pytest.approx(doc["answer"]["pulse_us"], abs=2.0)
+    assert (out / "my drive.map.png").read_bytes()[:4] == b"\x89PNG"
+    assert not list(out.glob(".*"))
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+@pytest.mark.parametrize("batteries", [1, 2])
+def test_the_c_header_compiles_and_gives_the_map(tmp_path: Path, batteries: int) -> None:
+    chart = bench_map.fit(join([made(LEVELS, 12.0 + 4.0 * k) for k in range(batteries)]))
+    (tmp_path / "map.h").write_text(map_export.c_header(chart, "2 fans", 101))
+    volts = chart.voltage_ref if batteries == 2 else None
+    arg = f", {volts}f" if volts else ""
+    calls = "".join(f'printf("%.4f %.4f\\n", m_2_fans_pulse({t}.0f{arg}), m_2_fans_thrust({p}.0f{arg}));'
+                    for t, p in ((1, 1200), (5, 1500), (15, 1900), (1000, 2500)))  # fmt: skip
+    program = f'#include <stdio.h>\n#include "map.h"\nint main(void) {{ {calls} return 0; }}\n'
+    (tmp_path / "a.c").write_text(program)
+    flags = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-Wno-unused-const-variable"]
+    subprocess.run(["cc", *flags, "a.c", "-o", "a", "-lm"], cwd=tmp_path, check=True, capture_output=True)
+    run = subprocess.run([str(tmp_path / "a")], capture_output=True, text=True, check=True).stdout
+    got = np.array([[float(c) for c in line.split()] for line in run.splitlines()])
+    assert np.allclose(got[:3, 0], chart.pulse_for([1.0, 5.0, 15.0]), atol=1.5)
+    assert np.allclose(got[:3, 1], chart.at("thrust", [1200.0, 1500.0, 1900.0]), atol=0.01)
+    assert got[3, 0] == pytest.approx(2000.0) and got[3, 1] == pytest.approx(chart.full_thrust_N, rel=1e-4)  # held
+
+
+def test_bad_recordings_are_refused_with_the_reason(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    turned, bare = log(tmp_path, sign=-1), tmp_path / "bare.csv"
+    bare.write_text("Time (s),Thrust (N)\n" + "".join(f"{0.1 * k:.1f},{k}\n" for k in range(30)))
+    assert main(["map", str(turned), str(bare)]) == 2
+    text = capsys.readouterr().err
+    assert "--sign -1" in text and "no pulse width and no throttle" in text  # both files at once
+    assert main(["map", str(turned), "--sign", "-1"]) == 0
+
+
+# Where a recording repeats itself worse than 1 %, no map can hold 1 %: reports/drive/README.md lists all of them.
+REAL = [
+    ("thrust_map/xNova-SR-steps.csv", -1, 0.010), ("rcbenchmark/a1_7.csv", 1, 0.010),
+    ("rcbenchmark/a4_7.csv", 1, 0.010),
+    ("jmajew/grp01__mn2206_gemfanbull6045_3s_table1.csv", 1, 0.010),
+    ("jmajew/grp01__f1507_t3140_4s_table1.csv", 1, 0.010), ("jmajew/grp01__mn2206_hqprop6x4x3_3s_table1.csv", 1, 0.010),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("file", "sign", "worst"), REAL)
+def test_round_trip_on_held_out_plateaus_of_real_recordings(
+    shared_data: Path, file: str, sign: int, worst: float
+) -> None:  # fmt: skip
+    trip = bench_map.held_out(points(importers.read(shared_data / file), file, sign))
+    assert trip.worst <= worst and trip.rms <= 0.5 * worst + 0.001
+
+
+def test_another_battery_of_a_real_drive_is_told_by_the_voltage(shared_data: Path) -> None:
+    runs = [
+        points(importers.read(shared_data / "rcbenchmark" / f"a1_{v}.csv"), "", 1, i) for i, v in enumerate((7, 11))
+    ]
+    chart = bench_map.fit(join(runs))
+    assert chart.with_voltage and 1.4 < chart.curves["thrust"].exponent < 2.2
+    assert bench_map.held_out(join(runs)).rms < 0.01
+
+
+def test_recordings_without_a_map_in_them_are_refused(shared_data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A motor without propeller, and a run whose supply gave up half-way."""
+    bare = shared_data / "jmajew" / "grp01__racestar-br2507s_noprop_3s_table1.csv"
+    broken = shared_data / "rcbenchmark" / "StepsTest_2020-06-16_214537.csv"
+    for path in (bare, broken):
+        assert main(["map", str(path)]) == 2
+        assert "off any rising curve" in capsys.readouterr().err

@@ -1,0 +1,245 @@
+"""Drive model: closed forms, energy, limits, effects that are those of the diagnosis, real maps and step logs."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bemt import effects
+from bemt.cli import main
+from bemt.drive import identify, mission, rotor_table, transient, validate_command
+from bemt.drive.drive_model import EFFECTS, Battery, Drive, Esc, Motor
+from bemt.drive.map_points import MapPoints
+from bemt.errors import InputError
+
+FLAT = dict(soc_table=(0.0, 1.0), ocv_V=(3.7, 3.7))
+PULSE = np.linspace(1050.0, 2000.0, 20)
+
+
+def drive(**changes: object) -> Drive:
+    """Ordinary 4S drive of an 8 in propeller."""
+    parts = {
+        "battery": Battery(4, 0.02, 2.2), "esc": Esc(resistance_ohm=0.005, idle_A=0.05),
+        "motor": Motor(1100.0, 0.06, 0.8, 1.2e-5, 25.0, 4.0),
+        "rotor": rotor_table.from_coefficients(0.11, 0.0082, 0.2032, 1.225, 1.5e-5, 0.09),
+    }  # fmt: skip
+    return Drive(**{**parts, **changes})  # type: ignore[arg-type]
+
+
+def test_without_load_the_motor_turns_at_kv_times_voltage() -> None:
+    free = drive(
+        battery=Battery(4, 0.0, **FLAT), motor=Motor(1000.0, 0.1, 0.0), rotor=rotor_table.quadratic(0.0, 0.0, 0.2)
+    )
+    assert np.allclose(free.steady(PULSE).rpm, 1000.0 * 14.8 * (PULSE - 1000.0) / 1000.0, rtol=1e-9)
+
+
+def test_steady_speed_is_the_root_of_the_quadratic() -> None:
+    """k^2/R omega + kQ omega^2 + k I0 = k d V/R for constant coefficients."""
+    d = drive(battery=Battery(4, 0.0, **FLAT), esc=Esc())
+    k, R, kQ = float(d.motor.k()), 0.06, float(d.rotor.torque(1.0))
+    c = k * 14.8 * (PULSE - 1000.0) / 1000.0 / R - k * 0.8
+    b = k * k / R
+    omega = (-b + np.sqrt(b * b + 4.0 * kQ * np.maximum(c, 0.0))) / (2.0 * kQ)
+    assert np.allclose(d.steady(PULSE).rpm, omega * 30.0 / math.pi, rtol=1e-9)
+
+
+def test_power_is_accounted_for() -> None:
+    d = drive()
+    s = d.steady(PULSE)
+    omega = s.rpm * math.pi / 30.0
+    copper = s.motor_A**2 * (0.06 + 0.005)
+    friction = float(d.motor.k()) * 0.8 * omega
+    assert np.allclose(s.power_W, s.torque_Nm * omega + copper + friction + 0.05 * s.voltage_V, rtol=1e-9)
+    assert np.allclose(s.voltage_V, d.battery.voc(1.0) - 0.02 * s.battery_A)
+    assert np.all((s.efficiency > 0.0) & (s.efficiency < 1.0)) and np.all(np.diff(s.thrust_N) > 0.0)
+
+
+def test_the_current_limit_holds_and_says_so() -> None:
+    free, tied = drive(), drive(esc=Esc(resistance_ohm=0.005, idle_A=0.05, current_limit_A=15.0))
+    a, b = free.steady(PULSE), tied.steady(PULSE)
+    assert np.max(a.battery_A) > 20.0 and np.max(b.battery_A) == pytest.approx(15.0, rel=1e-6)
+    assert np.array_equal(b.limited, a.battery_A > 15.0) and np.allclose(b.rpm[~b.limited], a.rpm[~b.limited])
+
+
+def test_too_small_a_duty_does_not_start_the_motor() -> None:
+    s = drive(motor=Motor(1100.0, 0.5, 2.0)).steady([1000.0, 1020.0, 1200.0])
+    assert list(s.rpm[:2] == 0.0) == [True, True] and s.rpm[2] > 0.0 and np.all(s.converged)
+
+
+def test_pulse_for_is_the_inverse() -> None:
+    d = drive()
+    for wanted in (0.5, 3.0, 9.0):
+        assert d.steady(d.pulse_for(wanted)).thrust_N[0] == pytest.approx(wanted, rel=1e-6)
+    assert math.isnan(d.pulse_for(1000.0))
+
+
+def test_beyond_the_rotor_table_is_nan_and_flagged() -> None:
+    table = replace(drive().rotor, omega_max=500.0)
+    s = drive(rotor=table).steady([1100.0, 2000.0])
+    assert s.converged.tolist() == [True, False] and np.isnan(s.thrust_N[1]) and np.isnan(s.rpm[1])
+
+
+def test_speed_without_load_rises_with_the_motor_time_constant() -> None:
+    """J R / k^2: the textbook time constant of a motor without load."""
+    J = 2e-5
+    free = drive(battery=Battery(4, 0.0, **FLAT), esc=Esc(), motor=Motor(1100.0, 0.06, 0.0, J),
+                 rotor=rotor_table.quadratic(0.0, 0.0, 0.2))  # fmt: skip
+    tau = J * 0.06 / float(free.motor.k()) ** 2
+    t = np.linspace(0.0, 12.0 * tau, 6001)
+    got = transient.simulate(free, [(0.0, 1200.0), (2.0 * tau, 1800.0)], t[-1], t)
+    assert transient.time_to(t, got.rpm, 2.0 * tau) == pytest.approx(tau, rel=2e-3)
+
+
+def test_a_long_step_ends_in_the_steady_state() -> None:
+    d = replace(drive(), off=frozenset({"motor_heating"}), battery=Battery(4, 0.02))
+    got = transient.simulate(d, [(0.0, 1300.0), (0.2, 1700.0)], 1.5)
+    assert got.converged and got.thrust_N[-1] == pytest.approx(d.steady(1700.0).thrust_N[0], rel=1e-5)
+    assert got.thrust_N[0] == pytest.approx(d.steady(1300.0).thrust_N[0], rel=1e-9)
+
+
+def test_charge_heat_and_energy_are_conserved() -> None:
+    d = drive()
+    got = transient.simulate(d, [(0.0, 1600.0)], 30.0, np.linspace(0.0, 30.0, 601))
+    drawn = np.trapezoid(got.battery_A, got.time_s) / 3600.0 / 2.2
+    assert 1.0 - got.soc[-1] == pytest.approx(drawn, rel=1e-4)
+    loss = d.motor.resistance(got.temperature_C) * got.motor_A**2
+    kept = 25.0 * (got.temperature_C[-1] - 25.0) + np.trapezoid((got.temperature_C - 25.0) / 4.0, got.time_s)
+    assert kept == pytest.approx(np.trapezoid(loss, got.time_s), rel=1e-4)
+
+
+def test_each_effect_does_what_its_name_says_and_nothing_when_off() -> None:
+    assert set(EFFECTS) <= set(effects.catalogue())  # the ids of the diagnosis
+    d = drive()
+    steps, end = [(0.0, 1200.0), (0.05, 1700.0)], 3.0
+    t = np.linspace(0.0, end, 3001)
+    full = transient.simulate(d, steps, end, t)
+    off = {name: transient.simulate(d.without(name), steps, end, t) for name in EFFECTS}
+    early, late = (t > 0.05) & (t < 0.12), t > 2.5
+    assert np.all(off["battery_sag"].thrust_N[late] > full.thrust_N[late]) and np.all(off["battery_sag"].soc == 1.0)
+    assert np.all(off["motor_heating"].temperature_C == 25.0) and full.temperature_C[-1] > 26.0
+    assert transient.time_to(t, off["rotor_inertia"].thrust_N, 0.05) < 0.1 * transient.time_to(t, full.thrust_N, 0.05)
+    # the inflow comes late: thrust at a given speed is higher while it rises
+    over = full.thrust_N - d.rotor.thrust(full.rpm * math.pi / 30.0)
+    none = off["inflow_lag"].thrust_N - d.rotor.thrust(off["inflow_lag"].rpm * math.pi / 30.0)
+    assert np.max(over[early]) > 0.02 * full.thrust_N[-1] and np.allclose(none, 0.0, atol=1e-9)
+    with pytest.raises(ValueError, match="expected battery_sag"):
+        d.without("gravity")
+
+
+def test_sag_and_heat_change_the_speed_as_the_effects_of_the_diagnosis_say() -> None:
+    """(1 - lost)(1 + u) = b y + u r y^2 / b: battery_sag (b = r = 1) and motor_heating (lost = 0)."""
+    d = drive(battery=Battery(4, 0.0, **FLAT), esc=Esc(), motor=Motor(1100.0, 0.06, 0.0))
+    base = d.steady(PULSE)
+    u = 0.06 * base.torque_Nm / float(d.motor.k()) ** 2 / (base.rpm * math.pi / 30.0)
+    low = replace(d, battery=Battery(4, 0.0, soc_table=(0.0, 1.0), ocv_V=(3.33, 3.33))).steady(PULSE)
+    c = 0.9 * (1.0 + u)
+    assert np.allclose(low.rpm / base.rpm, 2.0 * c / (1.0 + np.sqrt(1.0 + 4.0 * u * c)), rtol=1e-9)
+    warm = d.steady(PULSE, temperature_C=65.0)
+    b, r = 1.0 - 0.001 * 40.0, 1.0 + 0.0039 * 40.0
+    y = 2.0 * (1.0 + u) / (b + np.sqrt(b**2 + 4.0 * (u * r / b) * (1.0 + u)))
+    assert np.allclose(warm.rpm / base.rpm, y, rtol=1e-9)
+
+
+def test_hover_and_endurance() -> None:
+    d = drive()
+    h = mission.hover(d, 1.2, 4, 1.0)
+    assert d.steady(h.pulse_us).thrust_N[0] == pytest.approx(1.2 * 9.80665 / 4)
+    time, end = mission.endurance(d, 1.2, 4, 1.0, 0.2)
+    assert end == pytest.approx(0.2) and time == pytest.approx(3600 * 2.2 * 0.8 / h.battery_A, rel=0.15)
+    flat = drive(battery=Battery(4, 0.02, 2.2, **FLAT))  # constant voltage: exactly charge over current
+    amps = mission.hover(flat, 1.2, 4, 1.0).battery_A
+    assert mission.endurance(flat, 1.2, 4, 1.0, 0.2)[0] == pytest.approx(3600 * 2.2 * 0.8 / amps, rel=1e-6)
+    most = float(d.steady(2000.0, 0.6).thrust_N[0]) * 4 / 9.80665  # a mass that needs a charge of 60 %
+    assert mission.endurance(d, most, 4, 1.0, 0.2)[1] == pytest.approx(0.6, abs=1e-3)
+    assert math.isnan(mission.endurance(d, 100.0, 4, 1.0, 0.2)[0])
+
+
+def test_a_planted_drive_is_found_from_its_thrust_map() -> None:
+    truth = drive(battery=Battery(1, 0.03, soc_table=(0.0, 1.0), ocv_V=(15.0, 15.0)), esc=Esc(1040.0, 2000.0, 1.15))
+    s = truth.steady(PULSE)
+    values = {"thrust": s.thrust_N, "rpm": s.rpm, "current": s.battery_A, "power": s.power_W, "voltage": s.voltage_V}
+    points = MapPoints(PULSE, values, np.ones(20), np.zeros(20, dtype=np.intp))
+    fit = identify.fit_map(points, {"kv_rpm_V": 1100.0, "no_load_A": 0.8}, s.torque_Nm)
+    assert fit.fitted["pulse_min_us"] == pytest.approx(1040.0, abs=2.0)
+    assert fit.fitted["exponent"] == pytest.approx(1.15, abs=0.01)
+    assert fit.fitted["resistance_ohm"] == pytest.approx(0.06, abs=0.002)
+    assert fit.fitted["battery_ohm"] == pytest.approx(0.03, rel=1e-6)
+    assert np.max(np.abs(identify.thrust_error(fit.drive, points, fit.full_thrust_N))) < 1e-3
+
+
+def test_a_planted_inertia_is_found_from_a_step() -> None:
+    d = drive(motor=Motor(1100.0, 0.06, 0.8, 3e-5))
+    t = np.arange(0.0, 1.0, 0.01)
+    rotor = replace(d.rotor, inertia_kg_m2=0.0)
+    got = transient.simulate(replace(d, rotor=rotor), [(0.0, 1200.0), (0.305, 1600.0)], t[-1], t)
+    inertia, _ = identify.fit_inertia(d, t, got.thrust_N, 1200.0, 1600.0)
+    assert inertia == pytest.approx(3e-5, rel=0.03)
+
+
+def test_the_rotor_of_a_case_is_the_solver_s(project: Path) -> None:
+    from bemt import evaluate
+    from bemt.case import load_case
+
+    case = load_case(project / "cases" / "prop_8x5" / "case.toml")
+    rpm = np.array([4000.0, 9000.0, 20000.0])
+    points = evaluate.evaluate(evaluate.prepare(case), rpm, 0.0, case.air())
+    table = rotor_table.from_case(case, 20000.0, air=case.air(), points=17)
+    assert np.allclose(table.thrust(rpm * math.pi / 30.0), points.thrust_N, rtol=5e-3)
+    assert np.allclose(table.torque(rpm * math.pi / 30.0), points.torque_Nm, rtol=5e-3)
+    assert table.slope_law is not None and np.all(table.slope_law(rpm * math.pi / 30.0) < 0.0)
+
+
+def test_command_on_the_fan(project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    assert main(["drive", str(project / "cases" / "ds30"), "--json", "--out", str(out)]) == 1  # it cannot hover
+    doc = json.loads(capsys.readouterr().out)
+    assert doc["schema"] == "bemt.drive.result/1" and doc["hover"]["pulse_us"] is None
+    assert doc["hover"]["wanted_N"] == pytest.approx(6.5 * 9.80665 / 2)
+    assert "motor.kv_rpm_V" in doc["assumed"] and len(doc["steady"]["thrust_N"]) == 21
+    assert {p.name for p in out.iterdir()} == {"drive.json", "drive.csv", "drive.png"}
+
+
+def test_faults_of_drive_toml_come_all_at_once(
+    project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (project / "cases" / "ds30" / "drive.toml").read_text()
+    bad = text.replace("cells = 6", "cells = 0").replace("resistance_mohm = 9", "resistance_mohm = 0.009")
+    bad = bad.replace("thermal_K_W = 1.0", "thermal = 1").replace('key = "esc.resistance_mohm"', 'key = "esc.r"')
+    (tmp_path / "drive.toml").write_text(bad)
+    case = str(project / "cases" / "ds30")
+    assert main(["drive", case, "--drive", str(tmp_path / "drive.toml")]) == 2
+    words = capsys.readouterr().err
+    assert all(w in words for w in ("battery.cells", "motor.resistance_mohm", "Write milliohm", "motor.thermal"))
+    (tmp_path / "drive.toml").write_text(text.replace('key = "esc.resistance_mohm"', 'key = "esc.r"'))
+    assert main(["drive", case, "--drive", str(tmp_path / "drive.toml")]) == 2
+    assert "assumed[9].key" in capsys.readouterr().err
+    assert main(["drive", case, "--off", "wind"]) == 2
+    assert main(["drive"]) == 2
+
+
+def test_steps_need_something_that_turns() -> None:
+    with pytest.raises(InputError, match="inertia_kg_m2"):
+        still = drive(motor=Motor(1100.0, 0.06), rotor=rotor_table.from_coefficients(0.1, 0.01, 0.2))
+        transient.simulate(still, [(0.0, 1200.0)], 1.0)
+
+
+def test_real_thrust_maps_within_five_percent(shared_data: Path) -> None:
+    found = {m.name: m for m in validate_command.maps(shared_data)}
+    for name in ("jmajew gemfanbull6045_3s_table1", "jmajew hqprop6x3-5_3s_table1", "jmajew hqprop6x4x3_3s_table1",
+                 "xNova steps (to 1600 us)", "xNova ramp (to 1800 us)", "MIT 14 in"):  # fmt: skip
+        assert found[name].worst < 0.05, name
+    assert found["MIT 10 in"].worst < 0.08  # missed: a kink of this ESC above 1750 us that no throttle exponent follows
+
+
+def test_time_constants_of_real_steps(shared_data: Path) -> None:
+    """Inertia fitted to the first step; both logs' rises and the small fall within 20 %, the fall from full is not."""
+    checks, _ = validate_command.steps(shared_data)
+    seen = [c for c in checks if c.resolved]
+    assert len(seen) == 4 and [c.log[:4] for c in seen] == ["0500", "0500", "incr", "incr"]
+    assert all(abs(c.ratio - 1.0) < 0.2 for c in seen[:3])
+    assert 0.7 < seen[3].ratio < 0.8  # from 7.3 N to idle the recording is slower than the model

@@ -1,0 +1,509 @@
+"""Reduction: from anybody's log to steady points with honest uncertainties; nothing is left out without a reason."""
+
+from __future__ import annotations
+
+import json
+import math
+import random
+import re
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bemt import coefficients as co
+from bemt import importers, units
+from bemt.air import Air
+from bemt.cli import main
+from bemt.errors import InputError
+from bemt.imported import Channel, Imported
+from bemt.reduction import Reduced, reduce
+from bemt.reduction_channels import view
+from bemt.reduction_rows import is_samples
+from bemt.series import Series
+
+D = 0.254
+K_T, K_Q = 2.0e-7, 3.0e-9
+
+
+def recording(values: dict[str, np.ndarray], **more: object) -> Imported:
+    told = {k: units.split_suffix(k)[1] for k in values}
+    channels = {k: Channel(np.asarray(v, float), u.suffix if u else "-") for k, v in values.items() for u in [told[k]]}
+    rows = len(next(iter(values.values())))
+    return Imported("table", "bench", rows, channels, lines=tuple(range(2, rows + 2)), **more)  # type: ignore[arg-type]
+
+
+def noise(rng: np.random.Generator, n: int, sd: float, r: float = 0.0) -> np.ndarray:
+    """Noise whose neighbours correlate by r, of standard deviation sd."""
+    e = rng.standard_normal(n)
+    for i in range(1, n):
+        e[i] = r * e[i - 1] + math.sqrt(1 - r * r) * e[i]
+    return sd * e
+
+
+def log(
+    seed: int = 0, levels: tuple[float, ...] = (0, 3000, 5000, 7000, 9000, 7000, 5000, 3000, 0), each: int = 80,
+    sd: float = 0.02, r: float = 0.5, zero: float = 0.4, drift: float = 0.2, loop: float = 0.0, rate: float = 50.0,
+) -> dict[str, np.ndarray]:  # fmt: skip
+    """A continuous log: steps up and down with a lag, a zero that drifts, noise, hysteresis of the load cell."""
+    rng = np.random.default_rng(seed)
+    n = each * len(levels)
+    t = np.arange(n) / rate
+    target = np.repeat(np.array(levels, float), each)
+    rpm = np.zeros(n)
+    for i in range(1, n):
+        rpm[i] = rpm[i - 1] + (target[i] - rpm[i - 1]) * (1 - math.exp(-1 / rate / 0.06))
+    rpm = np.where(rpm < 1.0, 0.0, rpm)
+    down = np.repeat(np.array([b < a for a, b in zip((0, *levels), levels, strict=False)]), each)
+    thrust = K_T * rpm**2 + zero + drift * t / t[-1] + np.where(down & (target > 0), loop, 0.0) + noise(rng, n, sd, r)
+    torque = K_Q * rpm**2 + noise(rng, n, 2e-4, r)
+    command = 1e-3 + np.repeat(np.array(levels, float) / 9000 * 8e-4, each)
+    measured = np.where(rpm > 0, rpm + noise(rng, n, 4.0), 0.0)
+    current = 0.001 + (rpm / 9000) ** 3 * 20
+    return {"time_s": t, "pulse_width_s": command, "rpm": measured, "thrust_N": thrust, "torque_Nm": torque,
+            "current_A": current, "voltage_V": np.full(n, 15.0) - 0.02 * current}  # fmt: skip
+
+
+def accounted(imported: Imported, got: Reduced) -> bool:
+    """Every row is in one point, or was dropped with a reason."""
+    kept = [imported.lines[r] for rows in got.rows for r in rows]
+    gone = [lost.line for lost in got.dropped if not lost.channel]
+    return sorted(kept + gone) == sorted(imported.lines) and all(lost.reason for lost in got.dropped)
+
+
+# ---------------------------------------------------------------- samples
+
+
+@pytest.mark.parametrize("with_command", [True, False])
+def test_a_log_becomes_points_with_their_true_values(with_command: bool) -> None:
+    values = log()
+    if not with_command:
+        del values["pulse_width_s"]
+    imported = recording(values)
+    got = reduce(imported, diameter_m=D)
+    assert got.mode == "samples" and len(got.series) == 7 and accounted(imported, got)
+    true = np.array([3000.0, 5000, 7000, 9000, 7000, 5000, 3000])
+    assert np.allclose(got.series["rpm"], true, rtol=2e-3)  # the lag of the rotor is not quite over
+    off = got.series["thrust_N"] - K_T * got.series["rpm"] ** 2
+    assert np.all(np.abs(off) < 4 * np.hypot(got.series.u["thrust_N"], got.correlated["thrust_N"]["zero"]))
+    assert got.directions == ("up", "up", "up", "up", "down", "down", "down")
+    assert got.drift["thrust_N"] == pytest.approx(0.2 * 8 / 9, abs=0.02)  # between the middles of the rests
+    assert any("drift" in n and "linear in time" in n for n in got.notes)
+    assert got.series["power_W"] == pytest.approx(got.series["torque_Nm"] * got.series["rpm"] * units.RPM)
+    assert np.all((got.series["time_s"] > 0.02 * 79) & (got.series["time_s"] < 0.02 * 641))
+    assert got.series.labels[0].startswith("table:")
+
+
+def test_uncertainties_cover_the_errors_that_they_claim() -> None:
+    """Correlated samples count as fewer: the error of a mean over its uncertainty has a spread near one."""
+    z = []
+    for seed in range(12):
+        got = reduce(recording(log(seed, zero=0.0, drift=0.0, sd=0.05, r=0.7)), tare=False)
+        z += list((got.series["thrust_N"] - K_T * got.series["rpm"] ** 2) / got.series.u["thrust_N"])
+    assert len(z) == 84 and 0.7 < np.sqrt(np.mean(np.square(z))) < 1.4
+
+
+def test_hysteresis_is_reported_up_and_down_apart() -> None:
+    got = reduce(recording(log(loop=0.3, drift=0.0)))
+    loop = got.hysteresis["thrust_N"]
+    assert loop.difference == pytest.approx(0.3, abs=0.03) and loop.points == 3
+    assert loop.share == pytest.approx(0.3 / (K_T * 9000**2), rel=0.1)
+    assert abs(reduce(recording(log(drift=0.0))).hysteresis["thrust_N"].difference) < 0.03
+    assert any("down is" in n for n in got.notes)
+
+
+def test_start_up_settling_and_outliers_are_dropped_with_their_lines() -> None:
+    values = log()
+    values["thrust_N"][300] += 5.0
+    values["torque_Nm"][210] = 3.0
+    imported = recording(values)
+    got = reduce(imported)
+    single = {(lost.line, lost.channel) for lost in got.dropped if "outlier" in lost.reason}
+    assert {(302, "thrust_N"), (212, "torque_Nm")} <= single and len(single) < 12
+    assert any(lost.reason == "settling" for lost in got.dropped) and accounted(imported, got)
+    clean = reduce(recording(log()))
+    assert np.allclose(got.series["thrust_N"], clean.series["thrust_N"], atol=0.01)
+
+
+def test_a_speed_of_zero_under_load_is_no_reading() -> None:
+    values = log()
+    values["rpm"][250:255] = 0.0
+    got = reduce(recording(values))
+    assert {lost.line for lost in got.dropped if lost.channel == "rpm" and "no reading" in lost.reason} >= {
+        *range(252, 257)
+    }
+    assert np.allclose(got.series["rpm"][:4], [3000, 5000, 7000, 9000], rtol=2e-3)
+
+
+def test_runs_of_one_log_are_cut_for_themselves() -> None:
+    one, two = log(1), log(2)
+    values = {k: np.concatenate([one[k], two[k]]) for k in one}  # the clock starts again
+    values["run"] = np.repeat([1.0, 2.0], len(one["rpm"]))
+    imported = recording(values)
+    got = reduce(imported)
+    assert len(got.series) == 14 and got.series["run"].tolist() == [1.0] * 7 + [2.0] * 7 and accounted(imported, got)
+
+
+def test_a_log_whose_clock_falls_again_and_again_is_refused() -> None:
+    values = log()
+    values["time_s"] = values["time_s"] % 2.0
+    with pytest.raises(InputError, match="split it where its clock restarts"):
+        reduce(recording(values))
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.integers(0, 10**6))
+def test_every_row_is_accounted_for(seed: int) -> None:
+    rng = random.Random(seed)
+    values = log(seed % 50, each=rng.randint(8, 40))
+    n = len(values["rpm"])
+    for name in rng.sample(sorted(values), rng.randint(0, 4)):
+        rows = rng.sample(range(n), rng.randint(1, n // 2))
+        values[name][rows] = rng.choice([np.nan, 0.0, -1.0, 1e15, 1e300])
+    for name in rng.sample(
+        ["current_A", "voltage_V", "torque_Nm", "rpm", "pulse_width_s", "time_s"], rng.randint(0, 4)
+    ):
+        del values[name]
+    imported = recording(values)
+    try:
+        got = reduce(imported, diameter_m=D, isa_altitude_m=0.0, steady=rng.choice([None, True, False]))
+    except InputError as error:
+        assert all(f.got and f.expected for f in error.faults)
+        return
+    assert accounted(imported, got) and len(got.series) == len(got.rows) == len(got.directions)
+
+
+# ---------------------------------------------------------------- points
+
+HEAD = {
+    "rpm": 6000.0, "airspeed_m_s": 4.0, "thrust_N": 7.0, "torque_Nm": 0.1, "power_W": 62.8, "time_s": 30.0,
+    "temperature_C": 22.0, "pressure_Pa": 99500.0, "humidity_pct": 60.0, "voltage_V": 14.8, "current_A": 6.0,
+    "pwm_us": 1500.0, "tip_gap_mm": 0.4, "wall_distance_m": 1.5, "run": 1.0,
+}  # fmt: skip
+NAMES = {"temperature_C": ("temperature_K", 1.0, 273.15), "humidity_pct": ("", 0.01, 0.0),
+         "pwm_us": ("pwm_s", 1e-6, 0.0), "tip_gap_mm": ("tip_gap_m", 1e-3, 0.0)}  # fmt: skip
+
+
+def contract(path: Path, headings: list[str], rows: int = 24) -> dict[str, np.ndarray]:
+    """A table with the headings of the diagnosis, u_... for standard uncertainties."""
+    k = np.arange(rows)
+    table = {}
+    for name in headings:
+        base = HEAD[name.removeprefix("u_")]
+        grows = {"rpm": 1 + 0.05 * (k % 6), "time_s": 1.0 + k, "run": 1.0 + k // 12, "pressure_Pa": 1 + 0.001 * k,
+                 "power_W": (1 + 0.05 * (k % 6)) * (1 + 0.01 * k)}.get(name, 1 + 0.01 * k)  # fmt: skip
+        table[name] = 0.01 * base * (1 + 0.02 * k) if name.startswith("u_") else base * grows
+    lines = [",".join(headings)] + [",".join(f"{table[h][i]:.10g}" for h in headings) for i in range(rows)]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return table
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_the_columns_of_the_diagnosis_mean_what_they_say(seed: int, tmp_path: Path) -> None:
+    rng = random.Random(seed)
+    headings = list(HEAD) if seed == 0 else ["thrust_N", *rng.sample([h for h in HEAD if h != "thrust_N"], 8)]
+    headings += [f"u_{h}" for h in headings if h not in ("time_s", "run") and (seed == 0 or rng.random() < 0.5)]
+    if seed:
+        rng.shuffle(headings)
+    table = contract(tmp_path / "run.csv", headings)
+    imported = importers.read(tmp_path / "run.csv")
+    assert not [w for w in imported.warnings if "unit" in w]
+    got = reduce(imported)
+    assert (got.mode, len(got.series)) == ("points", 24) and accounted(imported, got)
+    for heading in headings:
+        stated = heading.startswith("u_")
+        base = heading.removeprefix("u_")
+        name, factor, offset = NAMES.get(base, (base, 1.0, 0.0))
+        if not name:
+            continue
+        where = got.series.u if stated else got.series.values
+        assert np.allclose(where[name], table[heading] * factor + (0.0 if stated else offset), rtol=1e-9), heading
+    if {"temperature_C", "pressure_Pa"} <= set(headings):
+        wet = table.get("humidity_pct", np.zeros(24))
+        rho = [
+            Air.from_state(p, t, h).rho
+            for p, t, h in zip(table["pressure_Pa"], table["temperature_C"], wet, strict=True)
+        ]
+        assert np.allclose(got.series["density_kg_m3"], rho, rtol=1e-9)
+    else:
+        assert "density_kg_m3" not in got.series and any("no density" in n for n in got.notes)
+
+
+@pytest.mark.parametrize(
+    ("values", "samples"),
+    [
+        ({"time_s": 0.02 * np.arange(60)}, True), ({"time_s": 5.0 * np.arange(60)}, False),
+        ({"time_s": 0.4 * np.arange(60)}, True), ({}, False),
+        ({"pulse_width_s": np.repeat([1e-3, 1.2e-3, 1.4e-3], 20)}, True),
+        ({"pulse_width_s": np.linspace(1e-3, 2e-3, 60)}, False),
+        ({"time_s": 1.5 * np.arange(60), "throttle": np.repeat([0.2, 0.4, 0.6], 20)}, True),
+        ({"time_s": 1.5 * np.arange(60), "throttle": np.linspace(0.2, 0.6, 60)}, False),
+        ({"time_s": 0.02 * np.arange(60), "u_thrust_N": np.full(60, 0.1)}, False),
+        ({"time_s": 0.4 * np.arange(60), "pulse_width_s": np.linspace(1e-3, 2e-3, 60)}, False),
+    ],
+)  # fmt: skip
+def test_the_rule_for_samples_or_points(values: dict[str, np.ndarray], samples: bool) -> None:
+    thrust = np.repeat([1.0, 2.0, 3.0], 20) + 0.01 * np.sin(np.arange(60))
+    rec = view(recording({"thrust_N": thrust, **values}))
+    got, reason = is_samples(rec)
+    assert got is samples and reason.startswith("rows are samples" if samples else "rows are points")
+    shuffled = np.random.default_rng(0).permutation(np.linspace(1.0, 3.0, 60))
+    if "pulse_width_s" not in values and "throttle" not in values:
+        assert not is_samples(view(recording({"thrust_N": shuffled, **values})))[0]
+
+
+def table(rows: int = 12, **more: np.ndarray) -> dict[str, np.ndarray]:
+    rpm = np.linspace(3000.0, 9000.0, rows)
+    return {"rpm": rpm, "thrust_N": K_T * rpm**2, "torque_Nm": K_Q * rpm**2, **more}
+
+
+def test_coefficients_and_numbers_follow_from_diameter_and_air() -> None:
+    rows = 12
+    values = table(rows, temperature_K=np.full(rows, 295.0), pressure_Pa=np.full(rows, 1.0e5))
+    s = reduce(recording(values), diameter_m=D, chord75_m=0.02).series
+    air = Air.from_state(1.0e5, 295.0 - 273.15)
+    n = values["rpm"] / 60
+    assert np.allclose(s["CT"], co.CT(values["thrust_N"], air.rho, n, D))
+    assert np.allclose(s["CP"], 2 * np.pi * co.CQ(values["torque_Nm"], air.rho, n, D))
+    assert np.allclose(s["FM"], co.FM(s["CT"], s["CP"])) and np.allclose(s["M_tip"], co.M_tip(n, D, air.a_sound))
+    assert np.allclose(s["Re"], co.Re75(0.02, n, D, 0.0, air.rho, air.mu))
+    assert np.allclose(s["efficacy_N_W"] * 1e3 / units.KGF, co.grams_per_watt(values["thrust_N"], s["power_W"]))
+    flying = reduce(recording(values | {"airspeed_m_s": np.full(rows, 8.0)}), diameter_m=D).series
+    assert np.allclose(flying["J"], 8.0 / (n * D)) and np.all(np.isnan(flying["FM"]))
+
+
+def test_air_is_never_assumed() -> None:
+    got = reduce(recording(table()), diameter_m=D)
+    assert not {"CT", "density_kg_m3", "M_tip"} & set(got.series.values) and any("no density" in n for n in got.notes)
+    isa = reduce(recording(table()), diameter_m=D, isa_altitude_m=500.0)
+    assert set(isa.series.flags) == {("standard air",)}
+    assert isa.series["density_kg_m3"][0] == pytest.approx(Air.isa(500.0).rho)
+    warm = reduce(recording(table(temperature_K=np.full(12, 303.15))), diameter_m=D, isa_altitude_m=500.0)
+    assert warm.series["density_kg_m3"][0] == pytest.approx(Air.isa(500.0, 303.15 - Air.isa(500.0).temperature_K).rho)
+    told = reduce(recording(table()), diameter_m=D, air=Air.from_density(1.1, 30.0))
+    assert told.series["density_kg_m3"][0] == 1.1 and told.series.flags[0] == ()
+    measured = table(temperature_K=np.full(12, 295.0), pressure_Pa=np.full(12, 1.0e5))
+    both = reduce(recording(measured), air=Air.from_density(1.1, 30.0), isa_altitude_m=0.0)
+    assert both.series["density_kg_m3"][0] == pytest.approx(Air.from_state(1e5, 21.85).rho)
+    assert any("the recorded one was taken" in n for n in both.notes) and both.series.flags[0] == ()
+    bad = reduce(recording(table(temperature_K=np.full(12, 22.0), pressure_Pa=np.full(12, 1.0e5))))
+    assert "density_kg_m3" not in bad.series and any("no density in 12 points" in n for n in bad.notes)
+
+
+def test_a_tare_without_propeller_is_subtracted_at_equal_speed() -> None:
+    bare = {"rpm": np.array([2000.0, 6000.0, 10000.0]), "thrust_N": np.array([0.0, 0.1, 0.2]),
+            "torque_Nm": np.array([0.001, 0.003, 0.005])}  # fmt: skip
+    values = table(rpm=np.array([4000.0, 8000.0, 12000.0]), thrust_N=np.full(3, 5.0), torque_Nm=np.full(3, 0.1))
+    got = reduce(recording(values), tare=recording(bare))
+    assert np.allclose(got.series["thrust_N"], [4.95, 4.85, 4.8]) and np.allclose(
+        got.series["torque_Nm"], [0.098, 0.096, 0.095]
+    )
+    assert any("tare without propeller" in n and "1 points outside" in n for n in got.notes)
+    assert got.correlated["thrust_N"]["zero"] > 0
+    assert np.allclose(reduce(recording(values), tare=False).series["thrust_N"], 5.0)
+
+
+def test_the_parts_of_the_instrument_are_kept_apart() -> None:
+    instrument = {"thrust_N": {"gain": 0.005, "zero": 0.02, "sample": 0.05}}
+    got = reduce(recording(table(), instrument=instrument))
+    assert got.correlated["thrust_N"] == {"gain": 0.005, "zero": 0.02}
+    assert np.allclose(got.series.u["thrust_N"], 0.05) and np.all(np.isnan(got.series.u["torque_Nm"]))
+
+
+def test_repeats_give_the_scatter_and_only_they_show_outliers() -> None:
+    rng = np.random.default_rng(5)
+    rpm = np.tile([4000.0, 6000.0, 8000.0], 8)
+    thrust = K_T * rpm**2 * (1 + 0.01 * rng.standard_normal(24))
+    thrust[10] *= 1.5
+    got = reduce(recording({"rpm": rpm, "thrust_N": thrust}))
+    assert len(got.series) == 23 and [lost.line for lost in got.dropped] == [12]
+    assert "median of its 8 repeats" in got.dropped[0].reason
+    share = got.series.u["thrust_N"] / got.series["thrust_N"]
+    assert np.allclose(share, share[0]) and 0.006 < share[0] < 0.015
+    lone = table()
+    lone["thrust_N"][5] *= 1.5  # odd, but it may be physics
+    assert len(reduce(recording(lone)).series) == 12
+
+
+def test_runs_that_differ_at_equal_speed_show_their_session_scatter() -> None:
+    rng = np.random.default_rng(3)
+    gains = [0.02, -0.01, 0.03, -0.03, 0.0, -0.01]
+    runs = []
+    for k, gain in enumerate(gains):
+        rpm = np.linspace(3000.0, 9000.0, 15) * (1 + 0.004 * k)
+        thrust = K_T * (1 + 0.1 * (rpm / 9000)) * rpm**2 * (1 + gain) * (1 + 0.003 * rng.standard_normal(15))
+        runs.append(recording({"rpm": rpm, "thrust_N": thrust}))
+    got = reduce(runs)
+    assert got.correlated["thrust_N"]["session"] == pytest.approx(np.std(gains, ddof=1), rel=0.15)
+    assert got.series["run"].tolist() == [float(k) for k in range(1, 7) for _ in range(15)]
+    same = reduce([runs[0], runs[0]])
+    assert same.correlated["thrust_N"]["session"] == pytest.approx(0.0, abs=1e-9)
+    apart = {"rpm": np.linspace(12000.0, 15000.0, 5), "thrust_N": np.linspace(30.0, 40.0, 5)}
+    assert "session" not in reduce([runs[0], recording(apart)]).correlated.get("thrust_N", {})
+
+
+def test_a_misread_speed_is_left_out_and_the_row_kept() -> None:
+    values = table()
+    values["rpm"] = values["rpm"].copy()
+    values["rpm"][8] *= 7.0
+    got = reduce(recording(values))
+    assert len(got.series) == 12 and np.isnan(got.series["rpm"][8]) and got.series["thrust_N"][8] > 0
+    (lost,) = got.dropped
+    assert (lost.line, lost.channel) == (10, "rpm") and "misread: 7 times" in lost.reason
+
+
+def test_what_is_zero_throughout_or_contradicted_is_left_out_with_a_note() -> None:
+    dead = reduce(recording(table(power_W=np.zeros(12))))
+    assert np.all(dead.series["power_W"] > 0) and any("power_W is 0 in every row" in n for n in dead.notes)
+    true = table()["torque_Nm"] * table()["rpm"] * units.RPM
+    computed = reduce(recording(table(mechanical_power_W=true / 6.16)))
+    assert np.allclose(computed.series["power_W"], true) and any("speed: left out" in n for n in computed.notes)
+    kept = reduce(recording(table(power_W=true / 6.16)))
+    assert np.allclose(kept.series["power_W"], true / 6.16) and any("0.1623 times torque" in n for n in kept.notes)
+
+
+def test_the_speed_is_chosen_and_named() -> None:
+    base = {k: v for k, v in table().items() if k != "rpm"}
+    rpm = table()["rpm"]
+    both = base | {"optical_rpm": rpm, "electrical_rpm": 7 * rpm}
+    assert np.allclose(reduce(recording(both)).series["rpm"], rpm)
+    assert np.allclose(reduce(recording(both), speed="electrical_rpm").series["rpm"], 7 * rpm)
+    dead = reduce(recording(both | {"optical_rpm": np.zeros(12)}))
+    assert np.allclose(dead.series["rpm"], 7 * rpm) and any("right only if the pole count" in n for n in dead.notes)
+
+
+@pytest.mark.parametrize("values", [{"rpm": np.ones(5)}, {"thrust_N": np.full(5, np.nan)}, {"time_s": np.arange(5.0)}])
+def test_what_holds_nothing_is_refused_with_the_reason(values: dict[str, np.ndarray]) -> None:
+    with pytest.raises(InputError) as caught:
+        reduce(recording(values))
+    assert all(f.got and f.expected for f in caught.value.faults)
+
+
+def test_a_recording_toml_carries_its_constants_and_instrument(tmp_path: Path) -> None:
+    rows = "".join(f"{20 * k},{100 + k},{6000 + 50 * k}\n" for k in range(8))
+    (tmp_path / "run.csv").write_text("t,F,n\n" + rows)
+    (tmp_path / "recording.toml").write_text(
+        '[recording]\nfile = "run.csv"\n[columns]\ntime = { column = "t", unit = "s" }\n'
+        'thrust = { column = "F", unit = "gf", u_gain_pct = 0.5, u_zero = 1.0, u_sample = 2.0 }\n'
+        'rpm = { column = "n", unit = "rpm" }\n[rotor]\ndiameter_in = 8\ngap_mm = 0.5\n'
+        "[air]\npressure_hPa = 1002\ntemperature_C = 21\n[stand]\nwall_distance_m = 1.2\n"
+    )
+    got = reduce(importers.read(tmp_path / "recording.toml"))
+    gf = units.KGF * 1e-3
+    assert got.correlated["thrust_N"] == pytest.approx({"gain": 0.005, "zero": gf})
+    assert np.allclose(got.series.u["thrust_N"], 2 * gf) and np.allclose(got.series["tip_gap_m"], 5e-4)
+    assert np.allclose(got.series["wall_distance_m"], 1.2)
+    rho = Air.from_state(100200.0, 21.0).rho
+    expected = co.CT(got.series["thrust_N"], rho, got.series["rpm"] / 60, 8 * units.INCH)
+    assert np.allclose(got.series["CT"], expected)
+
+
+# ---------------------------------------------------------------- the command
+
+
+def put(tmp_path: Path, values: dict[str, np.ndarray]) -> Path:
+    path = tmp_path / "log.csv"
+    rows = np.column_stack(list(values.values()))
+    body = "\n".join(",".join(f"{x:.9g}" for x in row) for row in rows)
+    path.write_text(",".join(values) + "\n" + body + "\n")
+    return path
+
+
+def test_import_shows_the_points_and_what_was_dropped(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = put(tmp_path, log())
+    assert main(["import", str(path), "--json"]) == 0
+    (file,) = json.loads(capsys.readouterr().out)["files"]
+    found = file["reduction"]
+    assert found["mode"] == "samples" and len(found["points"]) == 7 and found["error"] is None
+    assert found["points"][3]["rpm"] == pytest.approx(9000, rel=1e-3) and found["points"][3]["direction"] == "up"
+    assert found["points"][0]["u"]["thrust_N"] > 0 and found["correlated"]["thrust_N"]["zero"] > 0
+    assert {d["reason"] for d in found["dropped"]} >= {"settling"} and file["channels"]["thrust_N"]["mean"] is None
+    assert main(["import", str(path)]) == 0
+    text = capsys.readouterr().out
+    assert "7 steady points, means of plateaus" in text and re.search(r"dropped \d+ rows \(lines .*\): settling", text)
+
+
+def test_one_steady_point_gives_the_channels_their_means(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = put(tmp_path, log(levels=(5000,), zero=0.0, drift=0.0))
+    assert main(["import", str(path), "--json"]) == 0
+    (file,) = json.loads(capsys.readouterr().out)["files"]
+    assert file["channels"]["thrust_N"]["mean"] == pytest.approx(K_T * 5000**2, abs=0.02)
+    assert file["channels"]["thrust_N"]["averaged_over"].startswith("the steady rows (")
+
+
+def test_import_shows_findings_and_changes_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    values = table()
+    values["power_W"] = values["torque_Nm"] * values["rpm"] * units.RPM
+    values["rpm"] = 7.0 * values["rpm"]
+    path = put(tmp_path, values)
+    assert main(["import", str(path), "--json"]) == 0
+    (file,) = json.loads(capsys.readouterr().out)["files"]
+    (finding,) = [f for f in file["findings"] if f["id"] == "rpm_electrical"]
+    assert list(finding) == ["id", "channel", "evidence", "correction", "rows", "severity"]
+    assert "divide by 7" in finding["correction"] and file["reduction"]["points"][0]["rpm"] == pytest.approx(21000)
+    assert main(["import", str(path)]) == 0
+    assert "! error: rpm_electrical in rpm" in capsys.readouterr().out
+
+
+# ---------------------------------------------------------------- published recordings
+
+
+def stand_files(folder: Path) -> list[Path]:
+    found = [
+        *(folder / "rcbenchmark").glob("*.csv"),
+        *(folder / "thrust_map").glob("*.csv"),
+        *(folder / "jmajew").rglob("*.csv"),
+    ]
+    return sorted([*found, folder / "tmotor28_tr594" / "tmotor28_data.csv"])
+
+
+def test_every_published_recording_reduces_and_every_row_is_accounted_for(shared_data: Path) -> None:
+    modes: dict[str, int] = defaultdict(int)
+    for file in stand_files(shared_data):
+        imported = importers.read(file)
+        got = reduce(imported)
+        assert accounted(imported, got), file
+        modes[got.mode] += 1
+    assert modes == {"samples": 3, "points": 77}
+
+
+def test_runs_of_one_condition_agree_within_the_errors_that_their_maker_states(shared_data: Path) -> None:
+    """No published table is of the same run as the raw record; but the tables repeat each other, run after run."""
+    groups: dict[str, list[Series]] = defaultdict(list)
+    for file in sorted((shared_data / "jmajew").glob("*table*.csv")):
+        if not re.search("no-?prop", file.name):
+            groups[re.sub(r"_table\d", "", file.stem)].append(reduce(importers.read(file)).series)
+    for channel in ("thrust_N", "torque_Nm"):
+        z: list[float] = []
+        for runs in groups.values():
+            for i, a in enumerate(runs):
+                for b in runs[i + 1 :]:
+                    inside = (b["rpm"] > a["rpm"].min()) & (b["rpm"] < a["rpm"].max())
+                    x, y = b["rpm"][inside], b[channel][inside]
+                    at = [np.interp(x, a["rpm"], v) for v in (a[channel] / a["rpm"] ** 2, a.u[channel], a.u["rpm"])]
+                    speed = 2 * np.abs(y) * np.hypot(b.u["rpm"][inside], at[2]) / x
+                    u = np.sqrt(b.u[channel][inside] ** 2 + at[1] ** 2 + speed**2)
+                    z += list((y - at[0] * x**2) / u)
+        assert len(z) > 800 and np.mean(np.abs(z) < 2) > 0.98 and np.mean(np.abs(z) < 1) > 0.85, channel
+    joined = reduce(
+        [importers.read(f) for f in sorted((shared_data / "jmajew").glob("grp01__f1507_hqprop76x8_4s_table*.csv"))]
+    )
+    assert joined.correlated["thrust_N"]["session"] < 0.01 and joined.correlated["torque_Nm"]["session"] < 0.01
+
+
+def test_plateaus_of_the_raw_record_keep_to_one_propeller(shared_data: Path) -> None:
+    got = reduce(importers.read(shared_data / "jmajew" / "raw" / "curr_cal.csv"))
+    assert [round(1e6 * p) for p in got.series["pwm_s"]] == [1200, 1400, 1450, 1500, 1550, 1600]
+    k = got.series["thrust_N"] / got.series["rpm"] ** 2
+    assert np.ptp(k[1:]) / k.mean() < 0.05 and got.drift["thrust_N"] == pytest.approx(0.0069, abs=0.002)
+    assert any("power_W" in n and "times torque x speed: left out" in n for n in got.notes)
+
+
+def test_a_slow_ramp_up_and_down_shows_its_hysteresis(shared_data: Path) -> None:
+    got = reduce(importers.read(shared_data / "thrust_map" / "xNova-SR-ramp.csv"))
+    assert got.mode == "points" and "quasi-steady" in got.notes[0]
+    loop = got.hysteresis["thrust_N"]
+    assert 0.002 < abs(loop.share) < 0.02 and loop.points > 50

@@ -1,0 +1,446 @@
+"""Sanity before physics: each planted fault is found, named and explained; a clean recording is left in peace."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bemt import units
+from bemt.errors import InputError
+from bemt.import_files import import_file
+from bemt.imported import Channel, Imported
+from bemt.sanity import Finding, check
+from bemt.series import Series
+
+INCH = units.INCH
+KGF, LBF = units.KGF, units.LBF
+
+
+def stand(rows: int = 15, seed: int = 0, diameter: float = 10 * INCH, noise: float = 0.004) -> dict[str, np.ndarray]:
+    """A made-up stand: constant CT and CQ, a motor with 72 % efficiency, noise on every sensor."""
+    rng = np.random.default_rng(seed)
+
+    def noisy(v: np.ndarray) -> np.ndarray:
+        return v * (1 + noise * rng.standard_normal(rows))
+
+    rpm = np.linspace(2500.0, 8500.0, rows)
+    n = rpm / 60
+    thrust, torque = 0.105 * 1.18 * n**2 * diameter**4, 0.0075 * 1.18 * n**2 * diameter**5
+    power = torque * n * 2 * math.pi
+    voltage = 16.0 - 0.1 * np.arange(rows)
+    return {
+        "time_s": 4.0 * np.arange(rows), "pulse_width_s": np.linspace(1.1e-3, 1.9e-3, rows), "rpm": noisy(rpm),
+        "thrust_N": noisy(thrust), "torque_Nm": noisy(torque), "voltage_V": noisy(voltage),
+        "current_A": noisy(power / 0.72 / voltage), "temperature_K": np.full(rows, 294.0),
+        "pressure_Pa": np.full(rows, 100900.0),
+    }  # fmt: skip
+
+
+def recording(values: dict[str, np.ndarray]) -> Imported:
+    told = {k: units.split_suffix(k)[1] for k in values}
+    channels = {k: Channel(np.asarray(v, float), u.suffix if u else "") for k, v in values.items() for u in [told[k]]}
+    rows = len(next(iter(values.values())))
+    return Imported("table", "bench", rows, channels, lines=tuple(range(2, rows + 2)))
+
+
+def said(found: tuple[Finding, ...], id_: str, channel: str = "") -> list[Finding]:
+    return [f for f in found if f.id == id_ and channel in f.channel]
+
+
+# ---------------------------------------------------------------- made-up stand
+
+
+@pytest.mark.parametrize("diameter", [3 * INCH, 5 * INCH, 10 * INCH, 18 * INCH, 28 * INCH])
+@pytest.mark.parametrize("told", [True, False])
+def test_a_clean_recording_has_no_findings(diameter: float, told: bool) -> None:
+    values = stand(diameter=diameter)
+    values["rpm"] = values["rpm"] * (10 * INCH / diameter)
+    scale = (10 * INCH / diameter) ** 2
+    values["thrust_N"], values["torque_Nm"] = values["thrust_N"] * scale, values["torque_Nm"] * scale
+    values["current_A"] = values["current_A"] * scale * (10 * INCH / diameter)
+    assert check(recording(values), diameter_m=diameter if told else None) == ()
+
+
+SLIPS = [
+    ("thrust_N", 1 / KGF, "thrust_unit", "kgf taken for N"),
+    ("thrust_N", 1000 / KGF, "thrust_unit", "gf taken for N"),
+    ("thrust_N", 1 / LBF, "thrust_unit", "lbf taken for N"),
+    ("thrust_N", KGF, "thrust_unit", "N taken for kgf"),
+    ("thrust_N", 1000.0, "thrust_unit", "gf taken for kgf"),
+    ("thrust_N", 1e-3, "thrust_unit", "kgf taken for gf"),
+    ("torque_Nm", 1000.0, "torque_unit", "mNm taken for Nm"),
+    ("torque_Nm", 100 / KGF, "torque_unit", "kgf cm taken for Nm"),
+    ("torque_Nm", 1 / (LBF * INCH), "torque_unit", "lbf in taken for Nm"),
+    ("rpm", 7.0, "rpm_electrical", "7 pole pairs"),
+    ("rpm", 14.0, "rpm_electrical", "14 pole pairs"),
+    ("rpm", units.RPM, "rpm_unit", "rad/s taken for rev/min"),
+    ("rpm", 1 / 60, "rpm_unit", "rev/s (Hz) taken for rev/min"),
+]
+
+
+@pytest.mark.parametrize("pitch", [None, 6 * INCH])
+@pytest.mark.parametrize(("channel", "factor", "id_", "words"), SLIPS)
+def test_a_slip_of_a_unit_is_named_with_its_factor(
+    channel: str, factor: float, id_: str, words: str, pitch: float | None
+) -> None:
+    values = stand()
+    values[channel] = values[channel] * factor
+    found = check(recording(values), diameter_m=10 * INCH, pitch_m=pitch)
+    named = [f for f in found if f.id.endswith(("unit", "electrical")) and "diameter" not in f.channel]
+    assert len(named) == 1, found
+    text = named[0].correction
+    told = re.search(r"over (\d+) to (\d+) pole pairs", text)
+    pairs = round(factor)
+    inside = told is not None and int(told[1]) <= pairs <= int(told[2])
+    assert words in text or (id_ == "rpm_electrical" and inside), text
+    assert f"{channel}: " in text and re.search(r"is [-\d.e+]+, must be", named[0].evidence)
+
+
+@pytest.mark.parametrize(("channel", "factor", "id_", "words"), [s for s in SLIPS if s[0] != "rpm"])
+def test_the_file_s_own_products_name_the_slip_exactly(channel: str, factor: float, id_: str, words: str) -> None:
+    """Shaft power and efficacy as the stand's software wrote them: one answer, no alternatives, no diameter needed."""
+    values = stand()
+    shaft = values["torque_Nm"] * values["rpm"] * units.RPM
+    values["power_W"] = shaft
+    values["electrical_power_W"] = values["voltage_V"] * values["current_A"]
+    values["efficacy_N_W"] = values["thrust_N"] / values["electrical_power_W"]
+    values[channel] = values[channel] * factor
+    got = recording(values)
+    got.channels["efficacy_N_W"].__dict__["unit"] = "N/W"  # type: ignore[index]
+    (finding,) = [f for f in check(got) if f.id == id_]
+    assert words in finding.correction.split("Fits as well")[0] and finding.severity == "error"
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"), [(7.0, "divide by 7"), (units.RPM, "rad/s taken"), (1 / 60, "rev/s (Hz)")]
+)
+def test_a_speed_that_the_shaft_power_contradicts(factor: float, words: str) -> None:
+    values = stand()
+    values["power_W"] = values["torque_Nm"] * values["rpm"] * units.RPM
+    values["rpm"] = values["rpm"] * factor
+    (finding,) = [f for f in check(recording(values)) if f.id.startswith("rpm")]
+    assert words in finding.correction.split("Fits as well")[0]
+
+
+def test_electrical_beside_optical_speed() -> None:
+    values = stand()
+    speed = values.pop("rpm")
+    other = speed * (1 + 1e-3 * np.sin(np.arange(15)))
+    assert check(recording(values | {"optical_rpm": speed, "electrical_rpm": other})) == ()
+    both = recording(values | {"optical_rpm": speed, "electrical_rpm": 7.0 * other})
+    (finding,) = check(both)
+    assert finding.id == "rpm_electrical" and finding.channel == "electrical_rpm"
+    assert "divide by 7" in finding.correction and "one speed over the other is 0.1429" in finding.evidence
+
+
+@pytest.mark.parametrize("factor", [25.4, 1 / 25.4, 1 / INCH, 1e3])
+def test_a_diameter_in_another_unit(factor: float) -> None:
+    found = check(recording(stand()), diameter_m=10 * INCH * factor)
+    assert any("diameter" in f.channel and f"{1 / factor:.3g}"[:4] in f.correction for f in found), found
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("tip_gap_m", 0.5, "mm taken for m"),
+        ("tip_gap_m", 0.02 / INCH, "in taken for m"),
+        ("wall_distance_m", 1500.0, "mm taken"),
+    ],
+)
+def test_lengths_in_another_unit(name: str, value: float, words: str) -> None:
+    values = stand() | {name: np.full(15, value)}
+    (finding,) = check(recording(values), diameter_m=10 * INCH)
+    assert finding.id == "length_unit" and finding.channel == name and words in finding.correction
+    good = {"tip_gap_m": 5e-4, "wall_distance_m": 1.5}[name]
+    assert check(recording(values | {name: np.full(15, good)}), diameter_m=10 * INCH) == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "words"),
+    [
+        ("temperature_K", lambda v: v - 273.15, "add 273.15"), ("pressure_Pa", lambda v: v / 100, "hPa taken for Pa"),
+        ("pressure_Pa", lambda v: v / 1000, "kPa taken for Pa"),
+    ],
+)  # fmt: skip
+def test_the_air_in_another_unit(name: str, change: Callable[[np.ndarray], np.ndarray], words: str) -> None:
+    values = stand()
+    values[name] = change(values[name])
+    (finding,) = check(recording(values), diameter_m=10 * INCH)
+    assert finding.id == "air_unit" and words in finding.correction
+
+
+@pytest.mark.parametrize("channel", ["thrust_N", "torque_Nm", "current_A", "rpm"])
+def test_signs(channel: str) -> None:
+    values = stand()
+    values[channel] = -values[channel]
+    (finding,) = said(check(recording(values), diameter_m=10 * INCH), "sign_flipped", channel)
+    assert finding.rows == () and "multiply by -1" in finding.correction
+    values[channel] = -values[channel]
+    values[channel][9:12] *= -1
+    (finding,) = said(check(recording(values), diameter_m=10 * INCH), "sign_flipped", channel)
+    assert finding.rows == (9, 10, 11) and "lines 11, 12, 13" in finding.evidence
+
+
+def test_negative_thrust() -> None:
+    values = stand()
+    values["thrust_N"][7] = -0.3 * values["thrust_N"].max() / 5
+    (finding,) = check(recording(values), diameter_m=10 * INCH)
+    assert (finding.id, finding.rows) == ("negative_thrust", (7,))
+    flying = values | {"airspeed_m_s": np.where(np.arange(15) == 7, 30.0, 0.0)}  # above the pitch speed: physics
+    assert not said(check(recording(flying), diameter_m=10 * INCH), "negative_thrust")
+
+
+def test_power_above_the_electrical_input() -> None:
+    values = stand()
+    values["current_A"] = values["current_A"] * 0.6
+    (finding,) = said(check(recording(values), diameter_m=10 * INCH), "power_above_input")
+    assert "1.2" in finding.evidence and finding.severity == "error"
+    values = stand()
+    values["current_A"][12] *= 0.5
+    (finding,) = check(recording(values), diameter_m=10 * INCH)
+    assert (finding.id, finding.rows) == ("power_above_input", (12,))
+
+
+def test_a_figure_of_merit_above_one_with_the_limit_of_a_duct() -> None:
+    values = stand()
+    values["torque_Nm"] = values["torque_Nm"] * 0.5  # FM 0.67 becomes 1.15
+    found = check(recording(values), diameter_m=10 * INCH)
+    assert said(found, "fm_above_1") and "an open one stays below 1" in said(found, "fm_above_1")[0].evidence
+    assert check(recording(values), diameter_m=10 * INCH, ducted=True) == ()
+    values["torque_Nm"] = values["torque_Nm"] * 0.6
+    assert said(check(recording(values), diameter_m=10 * INCH, ducted=True), "fm_above_1")
+    assert not said(check(recording(values)), "fm_above_1")  # unknown diameter: nothing can be known
+
+
+def test_duplicated_channels() -> None:
+    for one, two in (("torque_Nm", "thrust_N"), ("current_A", "voltage_V"), ("thrust_N", "rpm")):
+        values = stand()
+        values[one] = values[two] * (1.0 if one != "thrust_N" else KGF)
+        found = said(check(recording(values)), "duplicate_column")
+        assert len(found) == 1 and {one, two} == {found[0].channel, *re.findall(r"as (\w+)", found[0].evidence)}
+
+
+@pytest.mark.parametrize("channel", ["thrust_N", "torque_Nm", "rpm", "current_A"])
+def test_constant_columns_and_dead_sensors(channel: str) -> None:
+    values = stand()
+    values[channel] = np.full(15, float(np.median(values[channel])))
+    (finding,) = said(check(recording(values), diameter_m=10 * INCH), "constant_column")
+    assert finding.channel == channel and finding.severity == "error"
+    values[channel] = np.zeros(15)
+    (finding,) = said(check(recording(values), diameter_m=10 * INCH), "dead_sensor")
+    assert finding.channel == channel and finding.severity == "note"
+
+
+def test_a_line_of_constant_speed_is_no_stuck_sensor() -> None:
+    J = np.linspace(0.1, 0.7, 13)
+    line = Series("bench", "line", {"rpm": np.full(13, 5000.0), "J": J, "CT": 0.1 - 0.1 * J, "CP": 0.05 - 0.02 * J})
+    assert check(line) == ()
+
+
+def test_time_going_backwards() -> None:
+    values = stand()
+    values["time_s"][8:] -= 20.0
+    (finding,) = check(recording(values), diameter_m=10 * INCH)
+    assert (finding.id, finding.rows, finding.severity) == ("time_backwards", (8,), "error")
+    assert "line 10" in finding.evidence and "sort the rows" in finding.correction
+    runs = values | {"run": np.where(np.arange(15) < 8, 1.0, 2.0)}  # another run has its own clock
+    assert check(recording(runs), diameter_m=10 * INCH) == ()
+
+
+def test_nothing_is_said_where_nothing_can_be_known() -> None:
+    values = stand()
+    assert check(recording({"thrust_N": values["thrust_N"] * KGF})) == ()
+    assert check(recording({"rpm": values["rpm"], "thrust_N": values["thrust_N"] / KGF})) == ()
+    assert check(Imported("table", "table", 2, {"x": Channel(np.array([1.0, 2.0]))})) == ()
+    assert check(Imported("table", "table", 1, {"thrust_N": Channel(np.array([np.nan]), "N")})) == ()
+
+
+def test_nothing_is_changed() -> None:
+    values = stand()
+    values["thrust_N"] = values["thrust_N"] / KGF
+    got = recording(values)
+    before = {k: c.values.copy() for k, c in got.channels.items()}
+    assert check(got, diameter_m=10 * INCH)
+    assert all(np.array_equal(before[k], c.values) for k, c in got.channels.items())
+
+
+def test_several_faults_are_all_found() -> None:
+    values = stand()
+    values["thrust_N"] = -values["thrust_N"]
+    values["time_s"][5] = -1.0
+    values["voltage_V"] = np.full(15, 15.0)
+    values["optical_rpm"] = np.zeros(15)
+    ids = {f.id for f in check(recording(values), diameter_m=10 * INCH)}
+    assert ids == {"sign_flipped", "time_backwards", "constant_column", "dead_sensor"}
+
+
+# ---------------------------------------------------------------- published recordings
+
+STEPS = "rcbenchmark/StepsTest_2020-05-22_102946.csv"
+LOG = "rcbenchmark/Log_2019-11-05_171350.csv"
+XNOVA = "thrust_map/xNova-SR-steps.csv"
+DUALSKY = "jmajew/grp01__dualsky-eco2814c-v2_graupner-10x6_4s_table1.csv"
+MN2206 = "jmajew/grp01__mn2206_hqprop6x3-5_3s_table2.csv"
+TMOTOR = "tmotor28_tr594/tmotor28_data.csv"
+SIZE = {DUALSKY: (10 * INCH, 6 * INCH), MN2206: (6 * INCH, 3.5 * INCH), TMOTOR: (28 * INCH, 9.2 * INCH)}
+"""Diameter and pitch where the name of the file tells them."""
+THRUST = {STEPS: "Thrust (gf)", LOG: "Thrust (gf)", DUALSKY: "th", MN2206: "th", TMOTOR: "T(gf)"}
+TORQUE = {STEPS: "Torque (N·m)", LOG: "Torque (N·m)", DUALSKY: "tq", MN2206: "tq", TMOTOR: "Q(Nm)"}
+SPEED = {
+    STEPS: "Motor Electrical Speed (RPM)",
+    LOG: "Motor Electrical Speed (RPM)",
+    DUALSKY: "rpm",
+    MN2206: "rpm",
+    TMOTOR: "RPM",
+}
+CURRENT = {STEPS: "Current (A)", DUALSKY: "a", LOG: "Current (A)"}
+TIME = {STEPS: "Time (s)", LOG: "Time (s)", XNOVA: "Time (s)"}
+SAME_AS = {TMOTOR: {"T(gf)": ("T(N)",)}}
+"""Columns that repeat another one: who mistakes a unit mistakes both."""
+
+DOCUMENTED = {
+    "jmajew": {"power_above_input", "power_unit"},
+    "rcbenchmark": {"dead_sensor", "time_backwards", "sign_flipped", "power_above_input"},
+    "thrust_map": {"dead_sensor", "time_backwards", "sign_flipped"},
+}
+"""Real faults of the published files.
+
+jmajew: with the small motors, torque x speed exceeds the electrical power at part throttle (up to 1.7 times, back below
+1 at full throttle), and `Power Out` of the raw record is torque x rev/s. rcbenchmark: no optical probe, a first time
+stamp that is late, torque of a left-hand rotor, two misread speeds of one log. thrust_map: a thrust stand that pulls.
+"""
+
+Change = Callable[[np.ndarray], np.ndarray]
+
+
+def planted(source: Path, folder: Path, name: str, changes: dict[str, Change | str]) -> Imported:
+    """The file with some columns changed (a function) or overwritten by another one (its heading)."""
+    text = source.read_text(encoding="utf-8-sig")
+    mark = ";" if ";" in text.split("\n", 1)[0] else ","
+    lines = [line.split(mark) for line in text.rstrip("\n").split("\n")]
+    head = [cell.strip() for cell in lines[0]]
+    for heading, change in list(changes.items()):
+        for twin in SAME_AS.get(name, {}).get(heading, ()):
+            changes[twin] = change
+    for heading, change in changes.items():
+        at = head.index(heading)
+        if isinstance(change, str):
+            for row in lines[1:]:
+                row[at] = row[head.index(change)]
+            continue
+        rows = [row for row in lines[1:] if row[at].strip()]
+        for row, value in zip(rows, change(np.array([float(r[at]) for r in rows])), strict=True):
+            row[at] = f"{value:.10g}"
+    path = folder / source.name
+    path.write_text("\n".join(mark.join(row) for row in lines) + "\n", encoding="utf-8")
+    return import_file(path)
+
+
+def times(factor: float) -> Change:
+    return lambda v: v * factor
+
+
+def flip(first: int, last: int) -> Change:
+    return lambda v: np.where((np.arange(len(v)) >= first) & (np.arange(len(v)) < last), -v, v)
+
+
+def stuck(v: np.ndarray) -> np.ndarray:
+    return np.full(len(v), float(np.median(v)))
+
+
+def jump_back(v: np.ndarray) -> np.ndarray:
+    out = v.copy()
+    out[len(v) // 2 :] -= 0.4 * (v[-1] - v[0])
+    return out
+
+
+def _cases() -> list[tuple[str, str, str, dict[str, Change | str], str, str]]:
+    out: list[tuple[str, str, str, dict[str, Change | str], str, str]] = []
+    for f in (STEPS, DUALSKY, TMOTOR):
+        T, Q, n = THRUST[f], TORQUE[f], SPEED[f]
+        gf = units.UNITS["gf"].factor
+        for words, factor in (("N for gf", gf), ("kgf for gf", 1e-3), ("lbf for gf", gf / LBF)):
+            out.append((f"thrust: {words}", f, "thrust_unit", {T: times(factor)}, "thrust", words.split()[0]))
+        for words, unit in (("mNm", "mNm"), ("kgf cm", "kgf_cm"), ("lbf in", "lbf_in")):
+            factor = units.UNITS["Nm"].factor / units.UNITS[unit].factor
+            out.append((f"torque: {words}", f, "torque_unit", {Q: times(factor)}, "torque", words))
+        out.append(("electrical rpm, 7 pole pairs", f, "rpm_electrical", {n: times(7.0)}, "rpm", "pole pairs"))
+        out.append(("electrical rpm, 11 pole pairs", f, "rpm_electrical", {n: times(11.0)}, "rpm", "pole pairs"))
+        out.append(("rad/s for rpm", f, "rpm_unit", {n: times(units.RPM)}, "rpm", "rad/s"))
+        out.append(("rev/s for rpm", f, "rpm_unit", {n: times(1 / 60)}, "rpm", "rev/s"))
+        out.append(("thrust of the other sign", f, "sign_flipped", {T: times(-1.0)}, "thrust", "-1"))
+        out.append(("thrust of the other sign in rows", f, "sign_flipped", {T: flip(5, 8)}, "thrust", "those rows"))
+        out.append(("torque of the other sign", f, "sign_flipped", {Q: times(-1.0)}, "torque", "-1"))
+        low: Change = lambda v: np.where(np.arange(len(v)) == 5, -0.08 * v.max(), v)  # noqa: E731
+        out.append(("negative thrust", f, "negative_thrust", {T: low}, "thrust", "still air"))
+        out.append(("torque column is a copy", f, "duplicate_column", {Q: T}, "", "copy"))
+        for what, column in (("thrust", T), ("torque", Q), ("speed", n)):
+            out.append((f"constant {what}", f, "constant_column", {column: stuck}, "", "stuck"))
+    for f in (STEPS, DUALSKY, LOG):
+        power = "pin" if f == DUALSKY else "Electrical Power (W)"
+        less: dict[str, Change | str] = {CURRENT[f]: times(0.3), power: times(0.3)}
+        out.append(("power above the input", f, "power_above_input", less, "", "unit or gain"))
+    for f in (STEPS, LOG, XNOVA):
+        out.append(("time going backwards", f, "time_backwards", {TIME[f]: jump_back}, "time", "clock"))
+    for f in (DUALSKY, MN2206, TMOTOR):
+        out.append(("figure of merit above 1", f, "fm_above_1", {TORQUE[f]: times(0.3)}, "", "gain"))
+    return out
+
+
+@pytest.mark.parametrize(
+    ("what", "file", "id_", "changes", "channel", "words"), _cases(), ids=lambda v: v if isinstance(v, str) else ""
+)
+def test_each_planted_fault_is_found_in_real_files(
+    what: str,
+    file: str,
+    id_: str,
+    changes: dict[str, Change | str],
+    channel: str,
+    words: str,
+    shared_data: Path,
+    tmp_path: Path,
+) -> None:
+    D, pitch = SIZE.get(file, (None, None))
+    source = shared_data / file
+    if not source.is_file():
+        pytest.skip(f"{file} is not in the reference data")
+    original = {
+        (f.id, f.channel) for f in check(import_file(source), diameter_m=D, pitch_m=pitch) if f.severity == "error"
+    }
+    found = check(planted(source, tmp_path, file, dict(changes)), diameter_m=D, pitch_m=pitch)
+    channel = {"thrust": "T_N", "torque": "Q_Nm"}.get(channel, channel) if file == TMOTOR else channel
+    named = [
+        f
+        for f in found
+        if channel in f.channel and words in f.correction and (f.id == id_ or id_.endswith(("unit", "electrical")))
+    ]
+    assert named, (what, [str(f) for f in found])
+    assert (id_, named[0].channel) not in original
+
+
+def test_the_originals_have_the_documented_findings_and_no_others(shared_data: Path) -> None:
+    seen: dict[str, dict[str, int]] = {}
+    for folder in sorted({*DOCUMENTED, "mit_copter_rcbenchmark", "thrust_step", "tmotor28_tr594", "uiuc", "x22a"}):
+        files = sorted(f for f in (shared_data / folder).rglob("*") if f.is_file())
+        for file in files[:: 10 if folder == "uiuc" else 1]:
+            try:
+                found = check(import_file(file))
+            except InputError:
+                continue
+            for finding in found:
+                assert finding.id in DOCUMENTED.get(folder, set()), (file.name, str(finding))
+                kinds = seen.setdefault(folder, {})
+                kinds[finding.id] = kinds.get(finding.id, 0) + 1
+    assert seen["rcbenchmark"]["dead_sensor"] == 17 and seen["jmajew"]["power_unit"] == 1
+    assert seen["jmajew"]["power_above_input"] == 28 and seen["thrust_map"]["sign_flipped"] == 4
+
+
+def test_the_names_of_propellers_tell_sizes_with_which_nothing_is_found(shared_data: Path) -> None:
+    for file, (diameter, pitch) in SIZE.items():
+        found = {f.id for f in check(import_file(shared_data / file), diameter_m=diameter, pitch_m=pitch)}
+        assert found <= ({"power_above_input"} if file == MN2206 else set()), file
