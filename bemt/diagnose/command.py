@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bemt import effects, evaluate
 from bemt.case import find_cases, load_case
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
     from bemt.imported import Imported
 
 __all__ = ["load", "run"]
+
+Array = NDArray[np.float64]
 
 _POINT = ("rpm", "J", "CT", "CP", "airspeed_m_s", "density_kg_m3", *records.COVARIATES)
 
@@ -65,11 +68,16 @@ def load(path: str, case: Case) -> Record:
     """
     from bemt import reduction
     from bemt.import_files import import_file
+    from bemt.reduction_channels import view
 
     imported = import_file(path)
     if {"CT", "CP"} & set(imported.channels):
         return records.from_series(_coefficients(imported, path), case)
     reduced = reduction.reduce(imported, diameter_m=case.diameter_m)
+    if reduced.mode == "points" and imported.format == "table":
+        # somebody's own table of points: every row counts, a jump from row to row may be what it shows
+        rows = view(imported)
+        return records.from_series(_plain(rows.values, rows.u, path), case, reduced.correlated)
     return records.from_series(reduced.series, case, reduced.correlated)
 
 
@@ -82,6 +90,11 @@ def _coefficients(imported: Imported, path: str) -> Series:
     }  # fmt: skip
     u = {k[2:]: np.abs(c.values) for k, c in imported.channels.items() if k.startswith("u_") and k[2:] in values}
     return Series("bench", Path(path).name, values, u, imported.flags, {"file": path})
+
+
+def _plain(values: Mapping[str, Array], u: Mapping[str, Array], path: str) -> Series:
+    kept = {k: v for k, v in values.items() if k in (*_POINT, "thrust_N", "torque_Nm", "power_W", "humidity_fraction")}
+    return Series("bench", Path(path).name, kept, {k: np.abs(v) for k, v in u.items() if k in kept}, (), {"file": path})
 
 
 def _progress(args: argparse.Namespace) -> Callable[[str], None] | None:

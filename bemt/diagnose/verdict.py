@@ -31,12 +31,14 @@ SURE = 0.85
 """Probability from which an effect, or a class of them, is named [1]."""
 LEFT_OVER = 4.0
 """Log odds of a smooth rest beside the best listed effect over no rest, from which the cause is unknown [1]."""
-SMALL = 0.1
+SMALL = 0.15
 """A rest this small beside what the effect explains (both as log odds) is a detail of it, not another cause [1]."""
 EARNED = 8.0
 """Log odds that each effect of a pair must add to the other alone: small model errors are not a second cause [1]."""
-ENOUGH = 8.0
-"""Log odds over none, prior weight of the effect included, from which a name is given at all (about 4 sigma) [1]."""
+ENOUGH, EXPECTED = 8.0, 2.5
+"""Log odds over none from which a name is given at all (about 4 sigma); of physics known to be left out [1]."""
+PROVEN, FORETELLS = 20.0, 0.9
+"""Below the first (log odds) an explanation must lower the error on left-out blocks to the second, a ratio [1]."""
 NEAR = 5.0
 """Effects of a class may be this far (natural logarithm of the evidence) behind the best one [1]."""
 
@@ -143,8 +145,12 @@ def decide(found: Evidence, p_value: float) -> Decision:
         return Decision("unknown", (), leading, max(P[ev.UNKNOWN], 1.0 - listed[leading]), rest, (), why)
     share = inclusion(found)
     weight = ev.prior_weights(found.problem, leading.split("+"))
-    if found.log_bayes(leading) + max(np.log(list(weight.values()))) < ENOUGH:
+    expected = min(weight.values()) > 1.0
+    if found.log_bayes(leading) < (EXPECTED if expected else ENOUGH):
         why = "the best explanation is not much better than none"
+        return Decision("insufficient", (), leading, listed[leading], rest, (), why)
+    if not expected and found.log_bayes(leading) < PROVEN and not _foretells(found, leading):
+        why = "the best explanation does not foretell what it has not seen"
         return Decision("insufficient", (), leading, listed[leading], rest, (), why)
     if "+" in leading:
         leading, share = _earned(found, leading, share)
@@ -164,6 +170,18 @@ def decide(found: Evidence, p_value: float) -> Decision:
         return _named(found, group, total, rest)
     return Decision("insufficient", (), leading, listed[leading], rest, (group,) if len(group) > 1 else (),
                     "several explanations are left that are not alike")  # fmt: skip
+
+
+def _foretells(found: Evidence, leading: str) -> bool:
+    """Whether an explanation brings left-out blocks nearer than calibration alone does."""
+    problem = found.problem
+    size = problem.u[problem.free]
+
+    def error(name: str) -> float:
+        d = (problem.y - fitting.held_out(found, name)[1])[problem.free] / size
+        return float(np.sqrt(np.mean(d**2)))
+
+    return error(leading) < FORETELLS * error(ev.NONE)
 
 
 def _earned(found: Evidence, pair: str, share: dict[str, float]) -> tuple[str, dict[str, float]]:

@@ -63,9 +63,20 @@ def slope(flow: Flow) -> Array:
         step = np.diff(t)
         good = (step > 0.0) & (step < LONGEST_STEP_S)
         rate = np.where(good, np.diff(omega) / np.where(good, step, 1.0), 0.0)
-        # mean of the slopes on both sides, weighted with their steps; of one side at the end of a dense stretch
-        weight = np.where(good, step, 0.0)
-        total = np.r_[weight, 0.0] + np.r_[0.0, weight]
-        both = np.r_[weight * rate, 0.0] + np.r_[0.0, weight * rate]
-        out[run] = both / np.where(total > 0.0, total, 1.0)
+        out[run] = _kinked(np.where(good, rate, 0.0))
     return out
+
+
+def _kinked(rate: Array) -> Array:
+    """Slope at points from those of the K-1 intervals between them, (K,): the smoothest of left, middle and right.
+
+    A step of the throttle is a kink of the speed; a centred slope would smear it over two points (essentially
+    non-oscillatory choice of the stencil: Harten, Engquist, Osher and Chakravarthy 1987, J. Comput. Phys. 71:231).
+    """
+    if rate.size < 2:
+        return np.repeat(rate, 2)[: rate.size + 1]
+    padded = np.r_[rate[0], rate[0], rate, rate[-1], rate[-1]]
+    far_left, left, right, far_right = (padded[k : k + rate.size + 1] for k in range(4))
+    bend = np.abs([left - far_left, right - left, far_right - right])
+    slopes = np.array([left + 0.5 * (left - far_left), 0.5 * (left + right), right - 0.5 * (far_right - right)])
+    return np.asarray(np.take_along_axis(slopes, np.argmin(bend, axis=0)[None], axis=0)[0])

@@ -11,7 +11,8 @@ from bemt.effects.base import Effect, Flow, Parameter
 _POLE_PAIRS = (2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 14, 16, 18, 20, 21)
 _COUNTS = (1, 2, 3, 4, 5, 6)
 _EPS = tuple(e / 400.0 for e in range(-8, 9) if e)
-_NEIGHBOURS = ((6, 7), (7, 8), (10, 11), (11, 12), (12, 14))
+# Nearer ratios (11 : 12) are within what the level of a model may be off.
+_NEIGHBOURS = ((6, 7), (7, 8), (12, 14))
 
 
 @dataclass(frozen=True)
