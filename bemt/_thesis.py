@@ -125,9 +125,7 @@ def k1k2_variants() -> list[tuple[str, tuple[float, ...]]]:
     for combo in itertools.product(*choices.values()):
         changed = [f"{name} = {v:g}" for (name, c), v in zip(choices.items(), combo, strict=True) if v != c[0]]
         g, k1, inch = combo
-        values = tuple(
-            float(k.thrust(d * inch, p * inch, RPM_PROPS)) * (k1 / k.K1) ** k.K2 / g for d, p, *_ in PROPS
-        )
+        values = tuple(float(k.thrust(d * inch, p * inch, RPM_PROPS)) * (k1 / k.K1) ** k.K2 / g for d, p, *_ in PROPS)
         if all(matches(row[3], v) for row, v in zip(PROPS, values, strict=True)):
             found.append((len(changed), ", ".join(changed) or "as stated", values))
     return [(name, values) for _, name, values in sorted(found)]
@@ -325,4 +323,3 @@ class Facts:
         same = stated == ours
         self.items.append(Item(self.section, quantity, stated, ours, "", REPRODUCED if same else NOT,
                                note if same else because))  # fmt: skip
-

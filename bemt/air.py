@@ -391,8 +391,19 @@ class Air:
             raise InputError(faults)
         T, t, p = temperature_C + ZERO_CELSIUS, temperature_C, pressure_Pa
         x = vapour_fraction(p, T, humidity_pct)
-        Z = (1.0 - p / T * (1.58123e-6 - 2.9331e-8 * t + 1.1043e-10 * t * t + (5.707e-6 - 2.051e-8 * t) * x
-                            + (1.9898e-4 - 2.376e-6 * t) * x * x) + (p / T) ** 2 * (1.83e-11 - 0.765e-8 * x * x))
+        Z = (
+            1.0
+            - p
+            / T
+            * (
+                1.58123e-6
+                - 2.9331e-8 * t
+                + 1.1043e-10 * t * t
+                + (5.707e-6 - 2.051e-8 * t) * x
+                + (1.9898e-4 - 2.376e-6 * t) * x * x
+            )
+            + (p / T) ** 2 * (1.83e-11 - 0.765e-8 * x * x)
+        )
         rho = p * _M_DRY / (Z * _R_GAS * T) * (1.0 - x * (1.0 - _M_WATER / _M_DRY))
         cp = 3.5 * (1.0 - x) + 4.0 * x
         molar = _M_DRY * (1.0 - x) + _M_WATER * x

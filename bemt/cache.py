@@ -15,7 +15,8 @@ import json
 import os
 import tempfile
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -23,12 +24,13 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["cache_dir", "cached_arrays", "clear_memory", "content_key", "installed_version"]
+__all__ = ["cache_dir", "cached_arrays", "clear_memory", "content_key", "installed_version", "used"]
 
 Arrays = dict[str, np.ndarray]
 
 MEMORY_ENTRIES = 256
 _memory: OrderedDict[str, Arrays] = OrderedDict()
+_watched: list[dict[tuple[str, str], Arrays]] = []
 
 
 def cache_dir() -> Path | None:
@@ -124,6 +126,8 @@ def cached_arrays(kind: str, key: str, make: Callable[[], Arrays]) -> Arrays:
     found = _memory.get(name)
     if found is not None:
         _memory.move_to_end(name)
+        for watched in _watched:
+            watched[kind, key] = found
         return found
     folder = cache_dir()
     path = None if folder is None else folder / kind / f"{key}.npz"
@@ -137,7 +141,33 @@ def cached_arrays(kind: str, key: str, make: Callable[[], Arrays]) -> Arrays:
     _memory[name] = arrays
     while len(_memory) > MEMORY_ENTRIES:
         _memory.popitem(last=False)
+    for watched in _watched:
+        watched[kind, key] = arrays
     return arrays
+
+
+@contextmanager
+def used() -> Iterator[dict[tuple[str, str], Arrays]]:
+    """Collect the entries that are asked for, so that another process can be given them.
+
+    Yields
+    ------
+    dict of (str, str) to dict
+        (kind, key) to arrays; it fills while the context is open.
+
+    Examples
+    --------
+    >>> with used() as entries:
+    ...     _ = cached_arrays("doctest", "0" * 64, lambda: {"v": np.arange(2.0)})
+    >>> list(entries) == [("doctest", "0" * 64)]
+    True
+    """
+    entries: dict[tuple[str, str], Arrays] = {}
+    _watched.append(entries)
+    try:
+        yield entries
+    finally:
+        _watched[:] = [held for held in _watched if held is not entries]
 
 
 @lru_cache(maxsize=16)

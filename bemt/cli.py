@@ -74,7 +74,7 @@ def build_parser() -> argparse.ArgumentParser:
     sweep.add_argument("paths", nargs="+", metavar="CASES", help="case files, or folders of <name>/case.toml")
     sweep.add_argument("--out", metavar="DIR", help="write tables, grids and sweep.json there, and resume from there")
     sweep.add_argument("--json", action="store_true", help="print one JSON document (bemt.sweep/1), no tables")
-    jobs = "solve N cases at a time in processes (default: one case, its grid on all cores)"
+    jobs = "solve N cases at a time in processes (default: one case, its grid on all cores); dask: N local workers"
     sweep.add_argument("--jobs", type=_positive, metavar="N", help=jobs)
     sweep.add_argument("--quiet", action="store_true", help="print neither progress nor tables")
     strict = "exit 1 when a point is unconverged or BEMT is off a reference by more than --tolerance"
@@ -82,6 +82,12 @@ def build_parser() -> argparse.ArgumentParser:
     tolerance = "tolerance of --strict on thrust, %% of the reference (default 15)"
     sweep.add_argument("--tolerance", type=float, default=15.0, metavar="PCT", help=tolerance)
     sweep.add_argument("--no-resume", action="store_true", help="do not reuse results found in --out")
+    engine = "where grids are solved: this machine, or a Dask cluster (default local); the answer is the same"
+    sweep.add_argument("--engine", choices=("local", "dask"), default="local", help=engine)
+    address = "with --engine dask: an existing cluster, as in tcp://host:8786 (default: processes of this machine)"
+    sweep.add_argument("--scheduler", metavar="ADDRESS", help=address)
+    form = "csv with 7 digits (default), or parquet with all"
+    sweep.add_argument("--grid-format", choices=("csv", "parquet"), default="csv", help=form)
 
     report = commands.add_parser("report", help="write the validation report: one HTML file, and a summary")
     report.add_argument("paths", nargs="+", metavar="CASES", help="case files, or folders of <name>/case.toml")

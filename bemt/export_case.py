@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from pathlib import Path
 from typing import Any
 
 from bemt.case import Case, find_cases, load_case
 from bemt.errors import EXIT_INPUT, EXIT_OK, Fault, InputError
-from bemt.tables import json_text, number_text, text_table
+from bemt.export_case_openfoam import Run, settings_of, write_openfoam
+from bemt.tables import json_text, number_text, text_table, write_atomic
 from geometry.common import GeometryError
-from geometry.export import export
+from geometry.export import MANIFEST, export
 from geometry.mesh import Options
 
 __all__ = ["export_case", "run"]
 
 
 def export_case(
-    case: Case, out: Path, formats: list[str], unit: str = "mm", options: Options | None = None
+    case: Case, out: Path, formats: list[str], unit: str = "mm", options: Options | None = None, flow: Run | None = None
 ) -> dict[str, Any]:
     """Write the solids of one case.
 
@@ -34,6 +36,8 @@ def export_case(
         ``mm`` or ``m``.
     options : Options or None
         How fine; None is fine enough for chord and twist errors below 0.2 %.
+    flow : Run or None
+        What the OpenFOAM case is to compute; None is the case's own point.
 
     Returns
     -------
@@ -45,10 +49,23 @@ def export_case(
     InputError
         When the case makes no sound solid; nothing is written then.
     """
+    others = [word for word in formats if word != "openfoam"]
+    run = flow or Run()
+    if "openfoam" in formats:
+        settings_of(case, run, options)  # its faults come before anything is written
     try:
-        return export(case.rotor(), case.duct(), out, formats, name=case.name, unit=unit, options=options)
+        solids = (
+            export(case.rotor(), case.duct(), out, others, name=case.name, unit=unit, options=options) if others else {}
+        )  # noqa: E501
     except GeometryError as error:
         raise InputError([Fault(case.path.as_posix(), *fault) for fault in error.faults]) from error
+    if "openfoam" not in formats:
+        return solids
+    manifest = write_openfoam(case, out, run, options)
+    if solids:
+        manifest |= {"volumes_m3": solids["volumes_m3"], "files": [*solids["files"], *manifest["files"]]}
+        write_atomic(out / MANIFEST, json.dumps(manifest, indent=1) + "\n")
+    return manifest
 
 
 def run(args: argparse.Namespace) -> int:
@@ -57,7 +74,8 @@ def run(args: argparse.Namespace) -> int:
     Parameters
     ----------
     args : argparse.Namespace
-        ``case``, ``out``, ``format``, ``unit``, ``json``, ``fillet_mm``, ``min_thickness_mm``.
+        ``case``, ``out``, ``format``, ``unit``, ``json``, ``fillet_mm``, ``min_thickness_mm``; for OpenFOAM ``rpm``,
+        ``airspeed``, ``sideslip_deg``, ``level``, ``domain``, ``sector``, ``turbulence``, ``solver``.
 
     Returns
     -------
@@ -69,12 +87,14 @@ def run(args: argparse.Namespace) -> int:
         options = Options(fillet=args.fillet_mm * 1e-3, min_thickness=args.min_thickness_mm * 1e-3)
     except GeometryError as error:
         raise InputError([Fault("", *fault) for fault in error.faults]) from error
+    flow = Run(rpm=args.rpm, airspeed_m_s=args.airspeed, sideslip_deg=args.sideslip_deg, level=args.level,
+               domain=args.domain, sector=args.sector, turbulence=args.turbulence, solver=args.solver)  # fmt: skip
     manifests, code = [], EXIT_OK
     for path in paths:
         try:
             case = load_case(path)
             out = Path(args.out) / case.name if len(paths) > 1 else Path(args.out)
-            manifest = export_case(case, out, args.format, args.unit, options)
+            manifest = export_case(case, out, args.format, args.unit, options, flow)
         except InputError as error:
             print(error, file=sys.stderr)
             code = EXIT_INPUT
@@ -100,4 +120,10 @@ def _text(manifest: dict[str, Any], out: Path) -> str:
     if "gap" in checks:
         words.append(f"gap {number_text(checks['gap'] * 1e3)} mm")
     words.append(f"thinnest section {number_text(checks['min_section_thickness'] * 1e3)} mm")
-    return "\n".join([*lines, ", ".join(words)])
+    lines.append(", ".join(words))
+    if "openfoam" in manifest:
+        about = manifest["openfoam"]
+        lines.append(f"OpenFOAM case: {about['solver']}, {about['turbulence']}, {about['domain']}, {about['sector']}, "
+                     f"level {about['level']:g}; run it with ./Allrun")  # fmt: skip
+        lines += about["notes"]
+    return "\n".join(lines)

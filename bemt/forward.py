@@ -89,17 +89,50 @@ def _has(effect: Effect, *hooks: str) -> bool:
 
 
 def acts_on_rotor(effect: Effect) -> bool:
-    """Whether an effect changes the prepared rotor (an effect without any hook is a switch of the solver)."""
+    """Whether an effect changes the prepared rotor (an effect without any hook is a switch of the solver).
+
+    Parameters
+    ----------
+    effect : Effect
+        Any effect.
+
+    Returns
+    -------
+    bool
+        True when it does.
+    """
     return _has(effect, "blade", "inflow", "section", "momentum", "duct") or not acts_on_points(effect)
 
 
 def acts_on_points(effect: Effect) -> bool:
-    """Whether an effect has hooks around the solver."""
+    """Whether an effect has hooks around the solver.
+
+    Parameters
+    ----------
+    effect : Effect
+        Any effect.
+
+    Returns
+    -------
+    bool
+        True when it does.
+    """
     return _has(effect, "flow", "loads", "reading")
 
 
 def only_reads(effect: Effect) -> bool:
-    """Whether an effect changes nothing but what instruments show."""
+    """Whether an effect changes nothing but what instruments show.
+
+    Parameters
+    ----------
+    effect : Effect
+        Any effect.
+
+    Returns
+    -------
+    bool
+        True when it does.
+    """
     return _has(effect, "reading") and not _has(
         effect, "blade", "inflow", "section", "momentum", "duct", "flow", "loads", "share"
     )

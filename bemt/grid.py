@@ -1,8 +1,8 @@
-"""Parameter sweeps: every combination of the axes of a case, in batches, as CSV that survives a kill.
+"""Parameter sweeps: every combination of the axes of a case, in batches, as one file that survives a kill.
 
 Rows run over the axes in the order geometry (pitch, diameter, gap), air, then rpm and airspeed, the last one fastest.
-The grid is cut into chunks whose edges depend on the axes alone; each finished chunk is a file, so an interrupted run
-goes on where it stopped and gives the same bytes.
+The grid is cut into chunks whose edges depend on the axes alone, and a chunk depends on nothing but its number; each
+finished chunk is a file, so an interrupted run goes on where it stopped and gives the same bytes, whoever solves them.
 """
 
 from __future__ import annotations
@@ -10,22 +10,29 @@ from __future__ import annotations
 import json
 import math
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bemt.case import Case
 from bemt.evaluate import Points, air_arrays, evaluate, prepare
-from bemt.tables import csv_block, plain, write_atomic
+from bemt.grid_formats import FORMATS, Block, encode, join
+from bemt.tables import plain, write_atomic
 
-__all__ = ["CHUNK", "Grid", "run_grid"]
+if TYPE_CHECKING:
+    from bemt.air import Air
+
+__all__ = ["CHUNK", "Engine", "Grid", "Solver", "run_grid", "solve_chunk"]
 
 CHUNK = 50_000
 """Points per chunk, at most."""
+MAX_AIRS = 100_000
+"""States of the air that a solver remembers."""
 MAX_GEOMETRIES = 16
 """Geometries per chunk, about, at most: each takes longer than many points."""
 GEOMETRY = ("diameter_in", "pitch_in", "tip_gap_mm")
@@ -97,29 +104,53 @@ class Grid:
         return -(-self.size // self.chunk)
 
 
-class _Solver:
-    """Evaluates stretches of a grid; remembers the last geometry and all states of the air."""
+Solved = tuple[int, bytes, dict[str, Any]]
+Engine = Callable[[Case, Grid, Sequence[int], str | None], Generator[Solved]]
+"""Solves chunks: (case, grid, numbers, format) to (number, bytes, statistics) in whatever order."""
 
-    def __init__(self, case: Case, grid: Grid, threads: int) -> None:
-        self.case, self.grid, self.threads = case, grid, threads
+
+class Solver:
+    """Evaluates stretches of a grid; remembers the last geometry and states of the air.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+    grid : Grid
+        Its grid.
+    threads : int
+        Threads of the solver.
+    form : str or None
+        Format of the chunks; None makes statistics only.
+    """
+
+    def __init__(self, case: Case, grid: Grid, threads: int = 1, form: str | None = "csv") -> None:
+        self.case, self.grid, self.threads, self.form = case, grid, threads, form
+        self.columns = (*VALUES, *(DUCT_VALUES if case.ducted else ()))
+        self._axes = dict(zip(grid.names, grid.values, strict=True))
         self._last: tuple[int, Any] = (-1, None)
-        air_axes = [(n, v) for n, v in zip(grid.names, grid.values, strict=True) if n in AIR]
-        self._air_names = [n for n, _ in air_axes]
-        shape = tuple(v.size for _, v in air_axes)
-        self._airs = []
-        for flat in range(math.prod(shape)):
-            at = np.unravel_index(flat, shape) if shape else ()
-            overrides = {case.axis_key(n): float(v[i]) for (n, v), i in zip(air_axes, at, strict=True)}
-            self._airs.append(case.air(overrides))
+        self._air_names = [name for name in grid.names if name in AIR]
+        self._airs: dict[int, Air] = {}
 
     def _ready(self, geometry: int, overrides: Mapping[str, float]) -> Any:
         if self._last[0] != geometry:
             self._last = (geometry, prepare(self.case, overrides))
         return self._last[1]
 
-    def stretch(self, index: Mapping[str, NDArray[np.intp]], geometry: int) -> Points:
+    def _state(self, flat: int) -> Air:
+        """State of the air at a position on the axes of the air."""
+        if flat not in self._airs:
+            if len(self._airs) >= MAX_AIRS:
+                self._airs.clear()
+            shape = tuple(self._axes[name].size for name in self._air_names)
+            at = np.unravel_index(flat, shape) if shape else ()
+            values = {name: float(self._axes[name][i]) for name, i in zip(self._air_names, at, strict=True)}
+            self._airs[flat] = self.case.air({self.case.axis_key(name): value for name, value in values.items()})
+        return self._airs[flat]
+
+    def _stretch(self, index: Mapping[str, NDArray[np.intp]], geometry: int) -> Points:
         """Points of one geometry; `index` holds the position on each axis."""
-        axes = dict(zip(self.grid.names, self.grid.values, strict=True))
+        axes = self._axes
         overrides = {self.case.axis_key(n): float(axes[n][index[n][0]]) for n in axes if n in GEOMETRY}
         size = next(iter(index.values())).size
         which = np.zeros(size, dtype=np.intp)
@@ -127,34 +158,74 @@ class _Solver:
             which = which * axes[name].size + index[name]
         flow = [axes[n][index[n]] if n in axes else np.full(size, default)
                 for n, default in zip(FLOW, (self.case.rpm, self.case.airspeed_m_s), strict=True)]  # fmt: skip
-        air = self._airs[0] if not self._air_names else air_arrays(self._airs, which)
+        distinct, here = np.unique(which, return_inverse=True)
+        states = [self._state(flat) for flat in distinct.tolist()]
+        air = states[0] if not self._air_names else air_arrays(states, here)
         return evaluate(self._ready(geometry, overrides), flow[0], flow[1], air, self.threads)
 
+    def block(self, flat: NDArray[np.intp]) -> Block:
+        """Solve some points.
 
-def _chunk(solver: _Solver, number: int) -> tuple[bytes, dict[str, Any]]:
-    """CSV lines and statistics of one chunk."""
+        Parameters
+        ----------
+        flat : (N,) int
+            Positions in the grid, ascending.
+
+        Returns
+        -------
+        Block
+            Their rows.
+        """
+        grid = self.grid
+        index = dict(zip(grid.names, np.unravel_index(flat, grid.shape), strict=True))
+        owner = flat // (grid.size // grid.geometries)
+        edges = [0, *(np.flatnonzero(np.diff(owner)) + 1).tolist(), flat.size]
+        found = []
+        for start, stop in zip(edges[:-1], edges[1:], strict=True):
+            here = {name: i[start:stop] for name, i in index.items()}
+            found.append(self._stretch(here, int(owner[start])))
+        columns = {name: np.concatenate([getattr(points, name) for points in found]) for name in self.columns}
+        axes = {name: (self._axes[name], index[name]) for name in grid.names}
+        return Block(axes, columns, np.concatenate([points.converged for points in found]))
+
+
+def solve_chunk(solver: Solver, number: int) -> tuple[bytes, dict[str, Any]]:
+    """Bytes and statistics of one chunk.
+
+    Parameters
+    ----------
+    solver : Solver
+        Of the grid.
+    number : int
+        Which chunk.
+
+    Returns
+    -------
+    bytes
+        As `bemt.grid_formats.encode` gives them; none without a format.
+    dict
+        Points, unconverged points, ranges.
+    """
     grid = solver.grid
-    start, stop = number * grid.chunk, min((number + 1) * grid.chunk, grid.size)
-    flat = np.arange(start, stop)
-    index = dict(zip(grid.names, np.unravel_index(flat, grid.shape), strict=True))
-    per_geometry = grid.size // grid.geometries
-    names = (*VALUES, *(DUCT_VALUES if solver.case.ducted else ()))
-    parts: dict[str, list[NDArray[np.float64]]] = {name: [] for name in names}
-    converged: list[NDArray[np.bool_]] = []
-    for geometry in range(start // per_geometry, (stop - 1) // per_geometry + 1):
-        here = slice(max(start, geometry * per_geometry) - start, min(stop, (geometry + 1) * per_geometry) - start)
-        points = solver.stretch({name: i[here] for name, i in index.items()}, geometry)
-        for name in names:
-            parts[name].append(getattr(points, name))
-        converged.append(points.converged)
-    columns = {name: np.concatenate(arrays) for name, arrays in parts.items()}
-    fine = np.concatenate(converged)
-    cells: list[Any] = [(v, index[n]) for n, v in zip(grid.names, grid.values, strict=True)]
+    block = solver.block(np.arange(number * grid.chunk, min((number + 1) * grid.chunk, grid.size)))
+    fine = block.converged
     statistics: dict[str, Any] = {"points": int(fine.size), "unconverged": int((~fine).sum())}
     for name in STATISTICS:
-        good = columns[name][np.isfinite(columns[name])]
+        good = block.columns[name][np.isfinite(block.columns[name])]
         statistics[name] = [float(good.min()), float(good.max())] if good.size else [None, None]
-    return csv_block([*cells, *columns.values(), fine]), plain(statistics)
+    return b"" if solver.form is None else encode(block, solver.form), plain(statistics)
+
+
+def _here(threads: int) -> Engine:
+    """Engine in this process."""
+
+    def solve(case: Case, grid: Grid, numbers: Sequence[int], form: str | None) -> Generator[Solved]:
+        solver = Solver(case, grid, threads, form) if numbers else None
+        for number in numbers:
+            assert solver is not None
+            yield number, *solve_chunk(solver, number)
+
+    return solve
 
 
 def _merge(statistics: list[dict[str, Any]]) -> dict[str, Any]:
@@ -172,6 +243,8 @@ def run_grid(
     threads: int = 1,
     progress: Callable[[int, int], None] | None = None,
     resume: bool = True,
+    form: str = "csv",
+    engine: Engine | None = None,
 ) -> dict[str, Any] | None:
     """Solve the grid of a case.
 
@@ -180,15 +253,19 @@ def run_grid(
     case : Case
         The case.
     folder : Path or None
-        Where ``grid.csv`` is written; None keeps only the statistics.
+        Where ``grid.csv`` or ``grid.parquet`` is written; None keeps only the statistics.
     fingerprint : str
         Identity of everything that decides the result; chunks of another one are thrown away.
     threads : int
-        Threads of the solver.
+        Threads of the solver in this process.
     progress : callable, optional
         Called with (points done, points).
     resume : bool
         Whether finished chunks are reused.
+    form : str
+        Format of the file.
+    engine : Engine, optional
+        Who solves the chunks; this process by default.
 
     Returns
     -------
@@ -198,54 +275,59 @@ def run_grid(
     grid = Grid.of(case)
     if grid is None:
         return None
-    parts = None if folder is None else folder / f"grid.parts-{fingerprint[:16]}"
+    parts = None if folder is None else folder / f"grid.parts-{fingerprint[:16]}-{form}"
     if folder is not None and parts is not None:
         for old in folder.glob("grid.parts-*"):
             if old != parts or not resume:
                 shutil.rmtree(old)
         parts.mkdir(parents=True, exist_ok=True)
-    solver: _Solver | None = None
-    statistics = []
-    for number in range(grid.chunks):
-        found = None if parts is None else _finished(parts, number)
-        if found is None:
-            solver = solver or _Solver(case, grid, threads)
-            lines, found = _chunk(solver, number)
-            if parts is not None:
-                write_atomic(parts / f"{number:06d}.csv", lines)
-                write_atomic(parts / f"{number:06d}.json", json.dumps(found | {"bytes": len(lines)}))
-        statistics.append(found)
+    statistics: dict[int, dict[str, Any]] = {}
+    done = 0
+
+    def count(number: int, found: dict[str, Any]) -> None:
+        nonlocal done
+        statistics[number] = found
+        done += found["points"]
         if progress is not None:
-            progress(min((number + 1) * grid.chunk, grid.size), grid.size)
+            progress(done, grid.size)
+
+    if parts is not None:
+        for number in range(grid.chunks):
+            found = _finished(_part(parts, number, form))
+            if found is not None:
+                count(number, found)
+    todo = [number for number in range(grid.chunks) if number not in statistics]
+    with closing((engine or _here(threads))(case, grid, todo, None if parts is None else form)) as solved:
+        for number, data, made in solved:
+            if parts is not None:
+                path = _part(parts, number, form)
+                write_atomic(path, data)
+                write_atomic(path.with_suffix(".json"), json.dumps(made | {"bytes": len(data)}))
+            count(number, made)
     names = (*grid.names, *VALUES, *(DUCT_VALUES if case.ducted else ()), "converged")
     if folder is not None and parts is not None:
-        _join(folder / "grid.csv", names, parts, grid.chunks)
+        files = [_part(parts, number, form) for number in range(grid.chunks)]
+        join(folder / f"grid.{form}", names, grid.names, files, form)
+        for other in FORMATS:
+            if other != form:
+                (folder / f"grid.{other}").unlink(missing_ok=True)
+        shutil.rmtree(parts, ignore_errors=True)
     axes = {n: {"num": v.size, "min": v.min(), "max": v.max()} for n, v in zip(grid.names, grid.values, strict=True)}
-    file = None if folder is None else f"{case.name}/grid.csv"
-    return {"axes": axes, **_merge(statistics), "columns": list(names), "file": file}
+    file = None if folder is None else f"{case.name}/grid.{form}"
+    merged = _merge([statistics[number] for number in range(grid.chunks)])
+    return {"axes": axes, **merged, "columns": list(names), "file": file}
 
 
-def _finished(parts: Path, number: int) -> dict[str, Any] | None:
+def _part(parts: Path, number: int, form: str) -> Path:
+    return parts / f"{number:06d}.{form}"
+
+
+def _finished(path: Path) -> dict[str, Any] | None:
     """Statistics of a chunk that an earlier run finished, or None."""
     try:
-        found = json.loads((parts / f"{number:06d}.json").read_text())
-        if (parts / f"{number:06d}.csv").stat().st_size == found.pop("bytes"):
+        found = json.loads(path.with_suffix(".json").read_text())
+        if path.stat().st_size == found.pop("bytes"):
             return dict(found)
     except (OSError, ValueError, KeyError):
         pass
     return None
-
-
-def _join(target: Path, names: tuple[str, ...], parts: Path, count: int) -> None:
-    """Put header and chunks together under a temporary name, rename, and remove the chunks."""
-    temporary = target.with_name(f".{target.name}.tmp")
-    try:
-        with temporary.open("wb") as out:
-            out.write(",".join(names).encode() + b"\n")
-            for number in range(count):
-                with (parts / f"{number:06d}.csv").open("rb") as part:
-                    shutil.copyfileobj(part, out, 1 << 20)
-        temporary.replace(target)
-    finally:
-        temporary.unlink(missing_ok=True)
-    shutil.rmtree(parts, ignore_errors=True)

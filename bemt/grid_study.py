@@ -227,9 +227,7 @@ def grid_study(
     return GridStudy(f, r, p, f[0] - e21 / factor, fine, coarse, asymptotic, fs, u, tuple(flags))
 
 
-def _three(
-    e21: float, e32: float, r: tuple[float, ...], formal_order: float
-) -> tuple[float | None, list[str], bool]:
+def _three(e21: float, e32: float, r: tuple[float, ...], formal_order: float) -> tuple[float | None, list[str], bool]:
     """Order of three grids with its flags, and whether the index must not be trusted."""
     if e21 == 0.0 or e32 == 0.0:
         which = "the two finest grids agree exactly" if e21 == 0.0 else "the two coarser grids agree exactly"

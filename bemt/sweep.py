@@ -1,29 +1,30 @@
 """``python -m bemt sweep``: solve cases, print them beside their recorded values, write results that survive a kill.
 
 Every case is solved for itself: its faults go into its own result and the others go on. With ``--out`` each case gets
-a folder with ``result.json``, ``table.txt`` and, when it sweeps axes, ``grid.csv``. A result is reused when its
-fingerprint (case, references and other files, program, libraries) is unchanged.
+a folder with ``result.json``, ``table.txt`` and, when it sweeps axes, ``grid.csv`` or ``grid.parquet``. A result is
+reused when its fingerprint (case, references and other files, program, libraries) is unchanged.
 """
 
 from __future__ import annotations
 
 import argparse
 import hashlib
-import importlib.metadata
 import json
 import os
 import signal
 import sys
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import lru_cache
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import bemt
 from bemt.case import find_cases, load_case
 from bemt.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
-from bemt.grid import run_grid
+from bemt.grid import Engine, run_grid
+from bemt.grid_formats import FORMATS, require_extra
+from bemt.grid_identity import program_hash
 from bemt.sweep_case import solve_case
 from bemt.sweep_text import case_text, overview_text, rows_csv
 from bemt.tables import json_text, plain, remove_stale, write_atomic
@@ -32,22 +33,6 @@ __all__ = ["SCHEMA", "fingerprint", "run", "sweep"]
 
 SCHEMA = "bemt.sweep/1"
 Progress = Callable[[str], None]
-
-
-@lru_cache(maxsize=1)
-def _program_hash() -> str:
-    """Hash of the program text and of the libraries that decide numbers."""
-    digest = hashlib.sha256(bemt.__version__.encode())
-    here = Path(bemt.__file__).parent
-    for folder in (here, here.parent / "geometry"):
-        for path in sorted(folder.rglob("*.py")):
-            digest.update(path.relative_to(folder).as_posix().encode() + b"\0" + path.read_bytes())
-    for library in ("numpy", "numba", "neuralfoil"):
-        try:
-            digest.update(f"{library} {importlib.metadata.version(library)}\0".encode())
-        except importlib.metadata.PackageNotFoundError:
-            digest.update(f"{library} absent\0".encode())
-    return digest.hexdigest()
 
 
 def fingerprint(content: str) -> str:
@@ -63,17 +48,17 @@ def fingerprint(content: str) -> str:
     str
         SHA-256, hexadecimal.
     """
-    return hashlib.sha256(f"{SCHEMA} {_program_hash()} {content}".encode()).hexdigest()
+    return hashlib.sha256(f"{SCHEMA} {program_hash()} {content}".encode()).hexdigest()
 
 
-def _reuse(folder: Path, mark: str) -> dict[str, Any] | None:
+def _reuse(folder: Path, mark: str, form: str) -> dict[str, Any] | None:
     """Read the result of an earlier run with the same fingerprint, if it is whole."""
     try:
         stored = json.loads((folder / "result.json").read_text(encoding="utf-8"))
         if stored["fingerprint"] != mark:
             return None
         grid = stored["result"].get("grid")
-        if grid is not None and not (folder / "grid.csv").is_file():
+        if grid is not None and not (Path(grid["file"]).name == f"grid.{form}" and (folder / f"grid.{form}").is_file()):
             return None
         return dict(stored["result"])
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
@@ -87,7 +72,13 @@ def _failed(path: Path, faults: Sequence[str], code: int) -> dict[str, Any]:
 
 
 def run_case(
-    path: Path, out: Path | None, resume: bool, threads: int, progress: Callable[[float, str], None] | None = None
+    path: Path,
+    out: Path | None,
+    resume: bool,
+    threads: int,
+    progress: Callable[[float, str], None] | None = None,
+    form: str = "csv",
+    engine: Engine | None = None,
 ) -> dict[str, Any]:
     """Do everything for one case; never raises but for an interrupt.
 
@@ -103,6 +94,10 @@ def run_case(
         Threads of the solver.
     progress : callable, optional
         Called with (share done, what).
+    form : str
+        Format of the grid.
+    engine : Engine, optional
+        Who solves the grid; this process by default.
 
     Returns
     -------
@@ -116,20 +111,21 @@ def run_case(
         folder = None if out is None else out / case.name
         if folder is not None:
             remove_stale(folder)
-            stored = _reuse(folder, mark) if resume else None
+            stored = _reuse(folder, mark, form) if resume else None
             if stored is not None:
                 return stored
         with_grid = bool(case.axes())
         share = 0.5 if with_grid else 1.0
         result = solve_case(case, threads, lambda i, n, what: tell(share * i / n, what))
         result["grid"] = run_grid(
-            case, folder, mark, threads, lambda i, n: tell(0.5 + 0.5 * i / n, f"grid {i}/{n}"), resume
+            case, folder, mark, threads, lambda i, n: tell(0.5 + 0.5 * i / n, f"grid {i}/{n}"), resume, form, engine
         )
         result["exit_code"] = EXIT_OK
         document: dict[str, Any] = plain(result)
         if folder is not None:
             if not with_grid:
-                (folder / "grid.csv").unlink(missing_ok=True)
+                for other in FORMATS:
+                    (folder / f"grid.{other}").unlink(missing_ok=True)
             write_atomic(folder / "table.txt", case_text(document) + "\n")
             write_atomic(folder / "result.json", json_text({"fingerprint": mark, "result": document}))
         return document
@@ -146,15 +142,22 @@ def _ignore_interrupt() -> None:
 
 
 def _results(
-    paths: Sequence[Path], out: Path | None, resume: bool, jobs: int | None, bar: Progress
+    paths: Sequence[Path],
+    out: Path | None,
+    resume: bool,
+    jobs: int | None,
+    bar: Progress,
+    form: str,
+    engine: Engine | None,
 ) -> Iterator[tuple[int, dict[str, Any]]]:
     """Results in the order in which they come."""
-    if jobs is None or jobs == 1 or len(paths) == 1:  # one process; its grid may use all cores
+    if engine is not None or jobs is None or jobs == 1 or len(paths) == 1:  # one process; its grid may use all cores
         cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-        threads = cores if jobs is None else jobs
+        threads = cores if jobs is None or engine is not None else jobs
         for i, path in enumerate(paths):
             at = f"[{i + 1}/{len(paths)}] {path.parent.name or path.stem}"
-            yield i, run_case(path, out, resume, threads, lambda s, what, at=at: bar(f"{at} {_bar(s)} {what}"))  # type: ignore[misc]
+            tell = lambda s, what, at=at: bar(f"{at} {_bar(s)} {what}")  # noqa: E731
+            yield i, run_case(path, out, resume, threads, tell, form, engine)
         return
     import multiprocessing
     from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -162,7 +165,7 @@ def _results(
     context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(min(jobs, len(paths)), mp_context=context, initializer=_ignore_interrupt)
     try:
-        futures = {pool.submit(run_case, path, out, resume, 1): i for i, path in enumerate(paths)}
+        futures = {pool.submit(run_case, path, out, resume, 1, None, form): i for i, path in enumerate(paths)}
         for n, future in enumerate(as_completed(futures), 1):
             i = futures[future]
             bar(f"{_bar(n / len(paths))} {n}/{len(paths)} cases")
@@ -188,7 +191,7 @@ def _bar(share: float, width: int = 20) -> str:
 
 def sweep(
     paths: Sequence[str | Path], out: str | Path | None = None, *, jobs: int | None = None, resume: bool = True,
-    progress: Progress | None = None,
+    progress: Progress | None = None, engine: str = "local", scheduler: str | None = None, grid_format: str = "csv",
 ) -> dict[str, Any]:  # fmt: skip
     """Solve cases.
 
@@ -199,11 +202,17 @@ def sweep(
     out : str or Path, optional
         Folder of results.
     jobs : int, optional
-        Cases at a time; by default one, with all cores for its grid.
+        Cases at a time; by default one, with all cores for its grid. With Dask: workers of the local cluster.
     resume : bool
         Whether earlier results are reused.
     progress : callable, optional
         Called with a line of text.
+    engine : str
+        ``local`` solves grids on this machine, ``dask`` on a Dask cluster; the answer is the same.
+    scheduler : str, optional
+        Address of an existing Dask cluster; without it Dask runs on processes of this machine.
+    grid_format : str
+        ``csv``, or ``parquet``, which keeps all digits.
 
     Returns
     -------
@@ -213,8 +222,10 @@ def sweep(
     Raises
     ------
     InputError
-        When a path holds no case, or the folder of results cannot be made.
+        When a path holds no case, the folder of results cannot be made, options contradict each other or need what
+        is not installed, or the scheduler does not answer.
     """
+    _check_options(engine, scheduler, grid_format, jobs)
     files = find_cases(paths)
     folder = None if out is None else Path(out)
     if folder is not None:
@@ -222,7 +233,14 @@ def sweep(
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise InputError(Fault(str(out), "", error.strerror or "no folder", "a folder for results")) from error
-    found: dict[int, dict[str, Any]] = dict(_results(files, folder, resume, jobs, progress or (lambda line: None)))
+    with ExitStack() as stack:
+        on: Engine | None = None
+        if engine == "dask":
+            from bemt.grid_dask import Cluster
+
+            on = stack.enter_context(Cluster(scheduler, jobs))
+        tell = progress or (lambda line: None)
+        found: dict[int, dict[str, Any]] = dict(_results(files, folder, resume, jobs, tell, grid_format, on))
     results = [found[i] for i in range(len(files))]
     _refuse_repeats(files, results)
     document = {"schema": SCHEMA, "version": bemt.__version__, "cases": results,
@@ -232,6 +250,25 @@ def sweep(
         write_atomic(folder / "sweep.csv", rows_csv(results))
         write_atomic(folder / "sweep.txt", overview_text(results) + "\n")
     return document
+
+
+def _check_options(engine: str, scheduler: str | None, grid_format: str, jobs: int | None) -> None:
+    """Refuse options of the grid that do not fit together, all at once."""
+    faults = []
+    for option, value, known in (("--engine", engine, ("local", "dask")), ("--grid-format", grid_format, FORMATS)):
+        if value not in known:
+            faults.append(Fault("", option, repr(value), " or ".join(known)))
+    if scheduler is not None and engine == "local":
+        faults.append(Fault("", "--scheduler", scheduler, "nothing with --engine local", "Add --engine dask"))
+    if scheduler is not None and jobs is not None:
+        expected = "nothing with --scheduler, whose cluster has its workers"
+        faults.append(Fault("", "--jobs", str(jobs), expected, "Leave it out"))
+    if faults:
+        raise InputError(faults)
+    if grid_format == "parquet":
+        require_extra("--grid-format parquet", "pyarrow")
+    if engine == "dask":
+        require_extra("--engine dask", "dask", "distributed")
 
 
 def _refuse_repeats(files: Sequence[Path], results: list[dict[str, Any]]) -> None:
@@ -283,7 +320,8 @@ def run(args: argparse.Namespace) -> int:
             sys.stderr.flush()
 
     try:
-        document = sweep(args.paths, args.out, jobs=args.jobs, resume=not args.no_resume, progress=progress)
+        document = sweep(args.paths, args.out, jobs=args.jobs, resume=not args.no_resume, progress=progress,
+                         engine=args.engine, scheduler=args.scheduler, grid_format=args.grid_format)  # fmt: skip
     finally:
         if show:
             sys.stderr.write("\r\x1b[2K")

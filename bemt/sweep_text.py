@@ -99,6 +99,23 @@ def _comparison_lines(result: Mapping[str, Any]) -> list[str]:
     return ["", text_table(header, rows, left=(0, 1, 2, 11), indent="  ")]
 
 
+def _audit_lines(result: Mapping[str, Any]) -> list[str]:
+    """What the set-up of every recorded CFD value does to its uncertainty."""
+    out: list[str] = []
+    for item in result.get("audit", []):
+        whole, known = _share(item["u_relative"]), item["u_relative_known"]
+        rest = f"known parts together {_share(known)}" if known else "no part known"
+        out += ["", _wrap(f"audit of {item['reference']}: u of its thrust {whole}; {rest}", "  ")]
+        for line in item["lines"]:
+            words = f"{line['status']}, u {_share(line['u_relative'])}: {line['finding']}; {line['consequence']}"
+            out.append(_wrap(words, "    ", f"{line['topic']}: "))
+    return out
+
+
+def _share(value: float) -> str:
+    return "unknown" if math.isnan(value) else f"{100 * value:.1f} %"
+
+
 def _u(value: float) -> str:
     return "unknown" if math.isnan(value) else _n(value, 2)
 
@@ -158,7 +175,7 @@ def case_text(result: Mapping[str, Any]) -> str:
         _wrap(head, "  "),
         _wrap("effects: " + ", ".join(c["effects"]), "  "),
     ]
-    lines += [_main_table(result), *_fan_lines(result["fan"]), *_comparison_lines(result)]
+    lines += [_main_table(result), *_fan_lines(result["fan"]), *_comparison_lines(result), *_audit_lines(result)]
     if result["assumptions"]:
         bemt = result["rows"][0]
         low, high = bemt["thrust_N_range"]

@@ -55,8 +55,7 @@ def text(doc: dict[str, Any]) -> str:
     p = doc["polar"]
     lines.append(
         f"Sections: declared rule, calibrated on {p['calibrated_on']}: n_crit {p['n_crit']:g}, "
-        f"drag x{p['drag_level']:g}"
-        + (f", Reynolds number fixed at {p['fixed_re']:g}." if p["fixed_re"] else ".")
+        f"drag x{p['drag_level']:g}" + (f", Reynolds number fixed at {p['fixed_re']:g}." if p["fixed_re"] else ".")
     )
     lines.append("Effects on: " + ", ".join(e["id"] for e in doc["effects"]) + ".")
     if doc["unconverged"]:

@@ -63,9 +63,22 @@ def test_the_document_keeps_its_schema() -> None:
     answer = diagnose(recording(case(), GRID), left_out("compressibility", case()))
     doc = json.loads(json.dumps(document.document(answer)))
     assert doc["schema"] == "bemt.diagnosis/1"
-    assert {"verdict", "effects", "ranking", "location", "fit", "classes", "next_measurement", "p_value", "explanation"} <= set(doc)
+    assert {
+        "verdict",
+        "effects",
+        "ranking",
+        "location",
+        "fit",
+        "classes",
+        "next_measurement",
+        "p_value",
+        "explanation",
+    } <= set(doc)
     assert set(doc["location"]) >= {"channel", "variable", "low", "high", "size", "z"}
-    assert all(set(f) >= {"before", "after", "noise", "gp_only", "holdout_before", "holdout_after"} for f in doc["fit"].values())
+    assert all(
+        set(f) >= {"before", "after", "noise", "gp_only", "holdout_before", "holdout_after"}
+        for f in doc["fit"].values()
+    )
     assert all(set(r) == {"effect", "probability", "parameters"} for r in doc["ranking"])
     assert sum(r["probability"] for r in doc["ranking"]) <= 1.0 + 1e-9
     assert set(doc["next_measurement"]) >= {"text", "points", "separates"}

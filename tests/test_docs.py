@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import ast
 import dataclasses
+import doctest
 import importlib
+import importlib.util
 import inspect
 import json
 import os
 import pkgutil
 import re
+import shlex
+import shutil
 import struct
 import sys
 import tomllib
@@ -201,6 +205,14 @@ def test_the_commands_of_the_readme_exist(project: Path) -> None:
     assert choices is not None and {command.split()[0] for command, _ in table} == set(choices)
 
 
+def test_the_structure_of_the_readme_names_every_room(project: Path) -> None:
+    readme = (project / "README.md").read_text(encoding="utf-8")
+    block = readme.partition("## Structure")[2].partition("```text\n")[2].partition("```")[0]
+    words = {word.strip("_") for word in re.findall(r"\w+", block)}
+    rooms = {path.stem.strip("_") for path in (project / "bemt").iterdir() if not path.name.startswith("__")}
+    assert [room for room in rooms if not {room, room.partition("_")[0]} & words] == []
+
+
 def test_the_python_of_the_readme_runs(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
     readme = (project / "README.md").read_text(encoding="utf-8")
     blocks = re.findall(r"^```python\n(.*?)^```", readme, flags=re.M | re.S)
@@ -212,14 +224,98 @@ def test_the_python_of_the_readme_runs(project: Path, capsys: pytest.CaptureFixt
     assert capsys.readouterr().out
 
 
-@pytest.mark.parametrize("document", ["README.md", "CHANGELOG.md", "docs/nomenclature.md"])
+DOCUMENTS = sorted(path.name for path in (Path(__file__).parents[1] / "docs").glob("*.md"))
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_the_commands_of_the_documents_exist(project: Path, document: str) -> None:
+    from bemt.cli import build_parser
+
+    for line in shell_commands((project / "docs" / document).read_text(encoding="utf-8")):
+        if " -m bemt " in line:
+            words = shlex.split(line.rpartition(" -m bemt ")[2], comments=True)
+            assert build_parser().parse_args(words).command == words[0]
+
+
+@pytest.fixture
+def pages(project: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A folder with the cases, whose bemt/effects and bemt/importers are scanned like the project's own."""
+    from bemt import effects, importers
+
+    shutil.copytree(project / "cases", tmp_path / "cases")
+    monkeypatch.chdir(tmp_path)
+    for package, known in ((effects, effects.catalogue), (importers, importers.importers)):
+        folder = tmp_path.joinpath(*package.__name__.split("."))
+        monkeypatch.setattr(package, "__path__", [*package.__path__, str(folder)])
+        known.cache_clear()
+    yield tmp_path
+    monkeypatch.undo()
+    for path in tmp_path.glob("bemt/*/*.py"):
+        sys.modules.pop(f"bemt.{path.parent.name}.{path.stem}", None)
+    effects.catalogue.cache_clear()
+    importers.importers.cache_clear()
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_the_python_of_the_documents_runs(project: Path, pages: Path, document: str) -> None:
+    """Blocks below a line that is a path in backticks are files; lines marked >>> run in order, with these files."""
+    text = (project / "docs" / document).read_text(encoding="utf-8")
+    for name, body in re.findall(r"^`([\w./]+)`:\n\n```\w+\n(.*?)^```", text, flags=re.M | re.S):
+        pages.joinpath(name).parent.mkdir(parents=True, exist_ok=True)
+        pages.joinpath(name).write_text(body, encoding="utf-8")
+    told: list[str] = []
+    test = doctest.DocTestParser().get_doctest(text, {}, document, document, 0)
+    doctest.DocTestRunner().run(test, out=told.append)
+    assert not told, "".join(told)
+
+
+@pytest.fixture
+def maker(project: Path) -> ModuleType:
+    """The script docs/make.py."""
+    spec = importlib.util.spec_from_file_location("docs_make", project / "docs" / "make.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_diagnosis_page_says_what_the_code_does(project: Path, maker: ModuleType) -> None:
+    from bemt.diagnose import confusion, document, evidence, gate, plan, verdict
+
+    text = (project / "docs" / "diagnosis.md").read_text(encoding="utf-8")
+    assert maker.numbers(text) == text, "run python docs/make.py"
+    for module in (confusion, evidence, gate, verdict):
+        steers = {k for k, v in vars(module).items() if k.isupper() and not isinstance(v, (str, bool)) and k[0] != "_"}
+        name = module.__name__.rpartition(".")[2]
+        assert steers == set(re.findall(rf"^\| `{name}\.([A-Z]\w*)`", text, flags=re.M)), f"constants of {name}"
+    for module, more in ((document, {"recordings", "cases"}), (plan, set())):
+        part = text.partition(f"## The document `{module.SCHEMA}`")[2].partition("\n## ")[0]
+        told = {
+            name for cell in re.findall(r"^\| (`.*?) \|", part, flags=re.M) for name in re.findall(r"`(\w+)`", cell)
+        }
+        returned = ast.parse(inspect.getsource(module.document)).body[0].body[-1].value  # type: ignore[attr-defined]
+        assert told == {ast.literal_eval(key) for key in returned.keys} | more
+
+
+def test_the_gallery_shows_every_case(project: Path, maker: ModuleType) -> None:
+    from bemt.case import find_cases, load_case
+
+    text = (project / "docs" / "gallery.md").read_text(encoding="utf-8")
+    made = maker.gallery([load_case(path) for path in find_cases([str(project / "cases")])])
+    number = re.compile(r"\d+\.\d+")
+    assert number.sub("", made) == number.sub("", text), "run python docs/make.py"
+    assert [float(x) for x in number.findall(text)] == pytest.approx([float(x) for x in number.findall(made)], rel=0.01)
+
+
+@pytest.mark.parametrize("document", ["README.md", "CHANGELOG.md", *(f"docs/{name}" for name in DOCUMENTS)])
 def test_links_lead_somewhere(project: Path, document: str) -> None:
     path = project / document
     text = path.read_text(encoding="utf-8")
     targets = [t for t in re.findall(r"\]\(([^)#\s]+)", text) if not t.startswith("http")]
     assert all((path.parent / target).exists() for target in targets)
     named = re.findall(r"`((?:bemt|geometry|cases|tests|docs|\.ci)/[\w./]+)`", text)
-    made_up = {"tests/test_importers_name.py", "cases/name"}
+    made_up = set(re.findall(r"^`([^`]+)`:$", text, flags=re.M))
+    made_up |= {"tests/test_importers_example_stand.py", "cases/example", "cases/mine"}
     assert [name for name in named if not (project / name).exists() and name not in made_up] == []
 
 
@@ -273,7 +369,7 @@ def test_the_packaging_lists_every_package_and_data_file(project: Path) -> None:
 def test_every_imported_library_is_declared(project: Path) -> None:
     config = tomllib.loads((project / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     extras = config["optional-dependencies"]
-    lines = [*config["dependencies"], *extras["test"], *extras["wisdem"]]
+    lines = [*config["dependencies"], *(line for group in extras.values() for line in group)]
     declared = {re.match(r"[\w-]+", line)[0].lower() for line in lines}  # type: ignore[index]
     assert all(re.search(r">=\d", line) for line in lines), "every dependency has a lower bound"
     found = set()
@@ -282,6 +378,8 @@ def test_every_imported_library_is_declared(project: Path) -> None:
             names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
             names += [node.module or ""] if isinstance(node, ast.ImportFrom) and not node.level else []
             found |= {name.split(".")[0].lower() for name in names}
-    # OCP is the kernel that cadquery is bound to; it comes with it and has no version of its own to ask for
-    ours = {"bemt", "geometry", "conftest", "tests", "__future__", "ocp"}
-    assert found - {n.lower() for n in sys.stdlib_module_names} - ours <= declared
+    # what comes with a declared library, and has no version of its own to ask for
+    comes_with = {"ocp": "cadquery", "distributed": "dask", "pil": "matplotlib", "psutil": "dask", "requests": "pooch"}
+    assert set(comes_with.values()) <= declared
+    ours = {"bemt", "geometry", "conftest", "tests", "__future__", *(p.stem for p in (project / "tests").glob("*.py"))}
+    assert found - {n.lower() for n in sys.stdlib_module_names} - ours - set(comes_with) <= declared

@@ -300,7 +300,7 @@ def test_grid_holds_every_combination_and_equals_single_points(tmp_path: Path) -
 def test_interrupted_grid_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = make_case(tmp_path / "cases", extra=GRID)
     chunks: list[int] = []
-    real = grid_module._chunk
+    real = grid_module.solve_chunk
 
     def interrupted(solver: Any, number: int) -> Any:
         if number == 3 and not chunks.count(-1):
@@ -309,7 +309,7 @@ def test_interrupted_grid_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: 
         chunks.append(number)
         return real(solver, number)
 
-    monkeypatch.setattr(grid_module, "_chunk", interrupted)
+    monkeypatch.setattr(grid_module, "solve_chunk", interrupted)
     with pytest.raises(KeyboardInterrupt):
         sweep([path], tmp_path / "out")
     assert not (tmp_path / "out" / "one" / "grid.csv").exists()

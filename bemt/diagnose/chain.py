@@ -48,7 +48,7 @@ class Diagnosis:
     blocks : str
         What was left out in turn for the held-out scores.
     after, held : (M,) float
-        Readings as the improved model gives them: fitted, and each block from the others.
+        Readings as the improved model gives them: fitted, and each block from the others [units of the readings].
     next : Suggestion or None
         Run that would decide.
     alike : Confusion

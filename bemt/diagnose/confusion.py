@@ -69,7 +69,7 @@ def distance(state: State, s: Array, span: slice, form: Form | None = None) -> f
     state : State
         Whitened signatures.
     s : (M,) float
-        Whitened signature.
+        Whitened signature [1].
     span : slice
         Columns of the candidate.
     form : Form, optional

@@ -99,17 +99,19 @@ class State:
     white : Whitener
         Its factor.
     r : (M,) float
-        Whitened residual.
+        Whitened residual [1].
     S : (M, G) float
-        Whitened signatures of all settings of all candidates.
+        Whitened signatures of all settings of all candidates [1].
     half : (G,) float
-        Half of their squared lengths.
+        Half of their squared lengths [1].
     forms : dict of str to Form
         Error of the form of each candidate, at its best setting.
     rivals : list of (str, Whitener)
         Factors for the unknown smooth effect.
     log_z : dict of str to float
         Logarithm of the evidence per explanation.
+    best_rival : str
+        Unknown smooth effect of largest evidence.
     """
 
     hyper: Hyper
@@ -132,12 +134,12 @@ class State:
         span : slice
             Its columns of S.
         R : (M, n) float
-            Whitened residuals.
+            Whitened residuals [1].
 
         Returns
         -------
         (g, n) float
-            Settings by residuals.
+            Settings by residuals [1].
         """
         S = self.S[:, span]
         out = S.T @ R - self.half[span][:, None]
@@ -167,7 +169,7 @@ class Evidence:
     spans : dict of str to slice
         Columns of each candidate in ``State.S``.
     log_w : (G,) float
-        Logarithm of the prior weight of each column within its candidate.
+        Logarithm of the prior weight of each column within its candidate [1].
     """
 
     problem: Problem
@@ -204,7 +206,7 @@ def prior_weights(problem: Problem, ids: Sequence[str]) -> dict[str, float]:
     dict
         Id to weight [1].
     """
-    usual = {e.id for e in effects.standard()}
+    usual = {e.id for e in effects.standard()} | {i for p in problem.parts for i in p.left_out}
     on = [{e.id for e in p.baseline} for p in problem.parts]
     return {i: LEFT_OUT if i in usual and not all(i in o for o in on) else 1.0 for i in ids}
 

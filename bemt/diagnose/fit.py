@@ -37,7 +37,7 @@ class Fit:
     columns : tuple of int
         Columns of ``State.S``.
     signature : (M,) float
-        Change of the readings, solved together (not added up).
+        Change of the readings, solved together (not added up) [units of the readings].
     """
 
     ids: tuple[str, ...]
@@ -339,12 +339,26 @@ def _solve(white: noise.Whitener, x: Array) -> Array:
 
 
 def form_covariance(found: Evidence, best: Fit) -> Array:
-    """Covariance of the error of the forms of an explanation at its best setting, (M, M)."""
+    """Covariance of the forms of an explanation and of what lies between settings of the grid.
+
+    Parameters
+    ----------
+    found : Evidence
+        Outcome of the weighing.
+    best : Fit
+        The explanation.
+
+    Returns
+    -------
+    (M, M) float
+        Covariance [units of the readings, squared].
+    """
     M = found.problem.y.size
     modes = form_modes(found.problem, found.candidates)
     out = np.zeros((M, M))
     for i, c in zip(best.ids, best.columns, strict=True):
-        B = found.of(i).signatures[:, c - found.spans[i].start, None] * modes[i]
+        candidate, g = found.of(i), c - found.spans[i].start
+        B = np.column_stack([candidate.signatures[:, g, None] * modes[i], candidate.between(g)])
         out += B @ B.T
     return out
 

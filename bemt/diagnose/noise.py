@@ -22,7 +22,7 @@ __all__ = ["Hyper", "Whitener", "discrepancy", "hypers", "rivals", "whitener"]
 Array = NDArray[np.float64]
 
 # Noise over the stated uncertainty, or over the default where none is stated; correlation of neighbours.
-_SCALES = {True: (0.7, 1.0, 1.5, 2.5), False: (0.1, 0.25, 0.5, 1.0, 2.0, 4.0)}
+_SCALES = {True: (0.7, 1.0, 1.5, 2.5, 5.0), False: (0.1, 0.25, 0.5, 1.0, 2.0, 4.0)}
 _AR = (0.0, 0.6, 0.9)
 _WHITE = 0.2
 # Error of the solver over advance ratio, share of the largest coefficient.  Declared after volume 1 of the UIUC
@@ -33,6 +33,8 @@ _MODEL_SHOWN = {0.0: 0.15, 0.01: 0.2, 0.03: 0.2, 0.08: 0.2, 0.25: 0.25}
 _MODEL_RPM = 0.1
 _LENGTH_J = 0.3
 _LENGTH_RPM = 0.7
+# Smooth error of a single run (temperature of cells and blades, a mount put back), share of the largest coefficient.
+_SESSION = 0.01
 # Below the smooth error there is a finer one: stall and transition set in at other advance ratios than computed.
 _MODEL_FINE = 0.1
 _LENGTH_FINE = 0.08
@@ -108,7 +110,18 @@ def noise(problem: Problem, ar: float) -> Array:
 
 
 def discrepancy(problem: Problem) -> Array:
-    """Covariance of the solver's own error of relative size 1, (M, M): smooth in J, nearly constant in speed."""
+    """Covariance of the solver's own error of relative size 1: smooth in J, nearly constant in speed.
+
+    Parameters
+    ----------
+    problem : Problem
+        Readings.
+
+    Returns
+    -------
+    (M, M) float
+        Covariance [units of the readings, squared].
+    """
     J = problem.covariates["J"][problem.point]
     n = np.log(problem.covariates["rpm"][problem.point])
     spread = max(float(np.ptp(J)), 0.6)
@@ -129,9 +142,9 @@ class Whitener:
     Attributes
     ----------
     factor : (M, M) float
-        Lower triangular.
+        Lower triangular [units of the readings].
     log_det : float
-        Sum of the logarithms of its diagonal.
+        Sum of the logarithms of its diagonal [1].
     """
 
     factor: Array
@@ -150,9 +163,9 @@ def whitener(covariance: Array, u: Array) -> Whitener:
     Parameters
     ----------
     covariance : (M, M) float
-        Symmetric, positive.
+        Symmetric, positive [units of the readings, squared].
     u : (M,) float
-        Size of the readings' noise, to keep rounding away.
+        Size of the readings' noise, to keep rounding away [units of the readings].
 
     Returns
     -------
@@ -164,15 +177,29 @@ def whitener(covariance: Array, u: Array) -> Whitener:
     return Whitener(factor, float(np.sum(np.log(np.diag(factor)))))
 
 
+def sessions(problem: Problem) -> Array:
+    """Covariance of what differs from run to run, smooth in speed and advance ratio, (M, M); zero for a single run."""
+    run = problem.covariates["run"][problem.point]
+    if np.ptp(run) == 0.0:
+        return np.zeros((run.size, run.size))
+    n = np.log(problem.covariates["rpm"][problem.point])
+    J = problem.covariates["J"][problem.point]
+    kernel = np.exp(
+        -0.5 * ((n[:, None] - n[None, :]) / _LENGTH_RPM) ** 2 - 0.5 * ((J[:, None] - J[None, :]) / _LENGTH_J) ** 2
+    )
+    same = (run[:, None] == run[None, :]) & (problem.channel[:, None] == problem.channel[None, :])
+    return np.asarray(np.where(same, kernel, 0.0) * _SESSION**2 * problem.scale[:, None] * problem.scale[None, :])
+
+
 def covariance(problem: Problem, h: Hyper) -> Array:
     """Covariance of noise, nuisances and solver for one setting, (M, M)."""
-    fixed = problem.tangents @ problem.tangents.T
+    fixed = problem.tangents @ problem.tangents.T + sessions(problem)
     return np.asarray(h.scale**2 * noise(problem, h.ar) + fixed + h.model**2 * discrepancy(problem))
 
 
 def covariances(problem: Problem) -> Iterator[tuple[Hyper, Array]]:
     """Covariance of noise, nuisances and solver for every setting."""
-    fixed = problem.tangents @ problem.tangents.T
+    fixed = problem.tangents @ problem.tangents.T + sessions(problem)
     wrong = discrepancy(problem)
     by_ar = {ar: noise(problem, ar) for ar in _AR}
     for h in hypers(problem):

@@ -84,6 +84,8 @@ class Part:
         Recorded conditions with the baseline's loads.
     key : str
         Rotor: parts of one rotor share the error of its model.
+    left_out : tuple of str
+        Effects that the case switches off.
     """
 
     record: Record
@@ -91,6 +93,7 @@ class Part:
     baseline: tuple[Effect, ...]
     flow: Flow
     key: str = ""
+    left_out: tuple[str, ...] = ()
     _solved: dict[tuple[Effect, ...], tuple[Array, Array, Flow]] = field(default_factory=dict, repr=False)
 
     def predict(self, effects: Sequence[Effect]) -> Array:
@@ -104,7 +107,7 @@ class Part:
         Returns
         -------
         (C P,) float
-            Channels of :attr:`channels`, one after the other; NaN where not converged.
+            Channels of :attr:`channels`, one after the other; NaN where not converged [N], [N m], [rev/min].
         """
         # instruments do not change the flow: what they show of the same flow needs no new solution
         key = tuple(e for e in effects if not forward.only_reads(e))
@@ -166,9 +169,13 @@ class Problem:
     covariates : dict of str to (P,) float
         rpm, J, M_tip, Re and what was recorded besides.
     tangents : (M, K) float
-        Change of the readings for one standard deviation of each nuisance.
+        Change of the readings for one standard deviation of each nuisance [units of the readings].
     names : tuple of str
         Names of the nuisances.
+    notes : tuple of str
+        What was assumed or left out.
+    predicted : dict
+        Readings that were solved already, by the effects added.
     """
 
     parts: tuple[Part, ...]
@@ -219,7 +226,7 @@ class Problem:
         Returns
         -------
         (M,) float
-            Kept readings; NaN where not converged.
+            Kept readings; NaN where not converged [units of the readings].
         """
         key = tuple(extra)
         if key not in self.predicted:
@@ -249,7 +256,7 @@ def _part(record: Record, case: Case) -> Part:
     model = replace(model, mach_max=top, re_range=(re_low, re_high), _kept={})
     plain = [e for e in ready.effects if not forward.acts_on_points(e)]
     flow = forward.flow_of(model.prepared(plain), record.rpm, record.V, record.air, record.extra, ready.chord75_m)
-    return Part(record, model, ready.effects, flow, case.content_hash())
+    return Part(record, model, ready.effects, flow, case.content_hash(), tuple(case.get("model.effects_off")))
 
 
 def build(records: Sequence[Record], cases: Sequence[Case]) -> Problem:
@@ -423,7 +430,7 @@ def _nuisances(problem: Problem) -> tuple[Array, tuple[str, ...]]:
                 add(f"pulse width^{k}", 0.05 * whole[problem.kept] * p.full_scale["rpm"])
     for e in problem.baseline:
         for parameter in e.parameters:
-            if parameter.steps <= 0 or not e.diagnosed:
+            if not e.diagnosed:
                 continue
             step = PRIORS["parameter of the model"] * (parameter.high - parameter.low)
             value = float(getattr(e, parameter.name))

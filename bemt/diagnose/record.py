@@ -28,6 +28,8 @@ COVARIATES = (
 )  # fmt: skip
 """Channels of a series, besides the conditions, that an effect may know."""
 
+# Samples closer in time than this may show how loads follow a change of speed.
+_DENSE_S = 1.0
 MAX_POINTS = 160
 """Points beyond this number are averaged in blocks of neighbours: they would cost time and add nothing. [1]"""
 
@@ -105,7 +107,18 @@ _AIR = ("rho", "mu", "a_sound", "temperature_K")
 
 
 def air_of(fields: Mapping[str, Array]) -> Air:
-    """State of the air with (P,) arrays as fields: rho, mu, a_sound, temperature_K."""
+    """State of the air of many points.
+
+    Parameters
+    ----------
+    fields : mapping of str to (P,) float
+        rho [kg/m3], mu [Pa s], a_sound [m/s], temperature_K [K].
+
+    Returns
+    -------
+    Air
+        With arrays as fields.
+    """
     return cast("Air", SimpleNamespace(**fields))
 
 
@@ -163,6 +176,13 @@ def from_series(series: Series, case: Case, correlated: Mapping[str, Mapping[str
         measured["rpm"], u["rpm"] = rpm.copy(), np.asarray(filled.u["rpm"], dtype=float).copy()
     loads = np.any([np.isfinite(measured[k]) for k in measured if k != "rpm"], axis=0)
     keep = np.isfinite(rpm) & (rpm > 0) & np.isfinite(V) & loads
+    kinks = _kinks(rpm, extra)
+    if kinks.any():
+        notes.append(
+            f"{int(kinks.sum())} points where the speed sets off or stops were left out: no acceleration there"
+        )
+        for values in measured.values():
+            values[kinks] = np.nan
     if (~keep).any():
         notes.append(f"{int((~keep).sum())} of {n} points without speed or load were left out")
     if keep.sum() < 3:
@@ -174,6 +194,21 @@ def from_series(series: Series, case: Case, correlated: Mapping[str, Mapping[str
         {k: float(v["zero"]) for k, v in correlated.items() if v.get("zero")}, recorded, tuple(notes),
     ).take(np.flatnonzero(keep))  # fmt: skip
     return _thinned(record)
+
+
+def _kinks(rpm: Array, extra: Mapping[str, Array]) -> NDArray[np.bool_]:
+    """Samples at which a dense record of the speed bends so sharply that its acceleration has no value."""
+    out = np.zeros(rpm.size, dtype=bool)
+    if "time_s" not in extra or rpm.size < 5:
+        return out
+    step, rise = np.diff(extra["time_s"]), np.diff(rpm)
+    dense = (step > 0.0) & (step < _DENSE_S)
+    rate = np.where(dense, rise / np.where(dense, step, 1.0), 0.0)
+    left, right = rate[:-1], rate[1:]
+    size = np.maximum(np.abs(left), np.abs(right))
+    large = np.abs(rise) > 0.01 * np.abs(rpm[1:])
+    out[1:-1] = dense[:-1] & dense[1:] & (np.abs(right - left) > 0.6 * size) & (large[:-1] | large[1:])
+    return out
 
 
 def _with_rpm(series: Series, case: Case, air: Air) -> Series:

@@ -40,9 +40,9 @@ class Candidate:
     settings : tuple of dict
         G settings of its parameters.
     signatures : (M, G) float
-        Change of the readings for each.
+        Change of the readings for each [units of the readings].
     weight : (G,) float
-        Prior probability of each setting, adds up to 1.
+        Prior probability of each setting, adds up to 1 [1].
     solved : (G,) bool
         Whether the setting was solved rather than interpolated.
     """

@@ -31,7 +31,7 @@ SURE = 0.85
 """Probability from which an effect, or a class of them, is named [1]."""
 LEFT_OVER = 4.0
 """Log odds of a smooth rest beside the best listed effect over no rest, from which the cause is unknown [1]."""
-SMALL = 0.15
+SMALL = 0.1
 """A rest this small beside what the effect explains (both as log odds) is a detail of it, not another cause [1]."""
 EARNED = 8.0
 """Log odds that each effect of a pair must add to the other alone: small model errors are not a second cause [1]."""

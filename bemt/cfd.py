@@ -1,0 +1,153 @@
+"""``python -m bemt cfd CAMPAIGN.toml``: run a list of CFD cases, resume where it stopped, record what came out."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import signal
+import sys
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from bemt.cfd_record import Record
+from bemt.cfd_run import Worker, point_key
+from bemt.cfd_schema import Campaign, load_campaign
+from bemt.errors import EXIT_INPUT, EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
+from bemt.tables import json_text, number_text, remove_stale, text_table
+
+if TYPE_CHECKING:
+    from bemt.openfoam import Settings
+
+__all__ = ["run", "run_campaign"]
+
+
+def run_campaign(
+    campaign: Campaign, work: Path, only: int | None = None, ranks: int = 2, quiet: bool = False
+) -> Record:
+    """Run the points of a campaign that are not recorded yet.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        The campaign.
+    work : Path
+        Folder of grids and runs; grids are reused from there.
+    only : int or None
+        Run this point alone, counted from 1, even if it is recorded.
+    ranks : int
+        Processes of a run.
+    quiet : bool
+        No progress.
+
+    Returns
+    -------
+    Record
+        What is recorded now; it is on the disk already.
+
+    Raises
+    ------
+    InputError
+        When a point cannot be, before anything runs.
+    """
+    keys: list[tuple[str, str, Settings]] = []
+    faults: list[Fault] = []
+    for k, point in enumerate(campaign.points, 1):
+        try:
+            keys.append(point_key(point))
+        except InputError as error:
+            file = campaign.path.as_posix()
+            faults += [Fault(file, f"point {k}: {f.where}", f.got, f.expected, f.hint) for f in error.faults]
+    if only is not None and not 1 <= only <= len(campaign.points):
+        faults.append(Fault("", "--only", str(only), f"1 to {len(campaign.points)}"))
+    order = [name for name, _, _ in keys]
+    if not faults and len(set(order)) < len(order):
+        twice = sorted({str(order.index(name) + 1) for name in order if order.count(name) > 1})
+        faults.append(Fault(campaign.path.as_posix(), f"points {', '.join(twice)}", "the same run twice", "each once"))
+    if faults:
+        raise InputError(faults)
+    remove_stale(campaign.path.parent)
+    record = Record(campaign)
+    record.borrow(order if only is None else [])
+    record.write(order)
+    work.mkdir(parents=True, exist_ok=True)
+
+    def tell(text: str) -> None:
+        if not quiet:
+            print(text, file=sys.stderr, flush=True)
+
+    worker = Worker(work, ranks)
+    for k, (point, key) in enumerate(zip(campaign.points, keys, strict=True), 1):
+        if (only is not None and k != only) or (only is None and key[0] in record.done):
+            continue
+        said = ", ".join(f"{name} {value}" for name, value in point.values.items()
+                         if name not in ("iterations", "average", "start"))  # fmt: skip
+        tell(f"{campaign.name} {k}/{len(campaign.points)}: {said}")
+        outcome = worker.run(point, key)
+        record.add(outcome, order)
+        v = outcome.values
+        state = "" if v["converged"] else f"  NOT CONVERGED {v['note']}"
+        tell(f"  T {number_text(v['thrust_N'])} N, Q {number_text(v['torque_Nm'])} N m, {v['cells']} cells, "
+             f"{v['seconds']:.0f} s{state}")  # fmt: skip
+    record.write(order)
+    return record
+
+
+def _table(record: Record) -> str:
+    head = ["run", "rpm", "V [m/s]", "T [N]", "u [N]", "Q [N m]", "solver", "level", "cells", "drift T [%]", "y+", "s"]
+    rows = []
+    for r in record.rows:
+        drift = 100 * r["drift_thrust"]
+        rows.append([r["run"], number_text(r["rpm"], 6), number_text(r["airspeed_m_s"]), number_text(r["thrust_N"]),
+                     number_text(r["u_thrust_N"], 2), number_text(r["torque_Nm"]), r["solver"], number_text(r["level"]),
+                     f"{r['cells']:.0f}", number_text(drift, 2), number_text(r["yplus_avg"], 3),
+                     number_text(r["seconds"], 3)])  # fmt: skip
+    return text_table(head, rows, left=(0, 6))
+
+
+def run(args: argparse.Namespace) -> int:
+    """Do what the command line asks.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        ``campaign``, ``only``, ``ranks``, ``work``, ``keep``, ``json``, ``quiet``.
+
+    Returns
+    -------
+    int
+        1 when a point did not converge.
+
+    Notes
+    -----
+    A folder of campaigns is summed up beside BEMT; nothing runs.
+    """
+    folder = Path(args.campaign)
+    if folder.is_dir() and not (folder / "campaign.toml").is_file():
+        from bemt.cfd_summary import summary, summary_text
+
+        found = summary(folder)
+        print(json_text(found) if args.json else summary_text(found), end="")
+        return EXIT_OK
+    campaign = load_campaign(args.campaign)
+    for program in ("blockMesh", "snappyHexMesh", "simpleFoam"):
+        if shutil.which(program) is None:
+            fault = Fault("", "", f"no program {program}", "OpenFOAM", "Debian and Ubuntu: the package openfoam")
+            print(InputError(fault), file=sys.stderr)
+            return EXIT_INPUT
+    named = args.work or os.environ.get("BEMT_CFD_WORK")
+    work = Path(named) if named else Path(tempfile.gettempdir()) / f"bemt-cfd-{campaign.name}"
+    before = signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))  # so that the solver ends with us
+    try:
+        record = run_campaign(campaign, work, args.only, args.ranks, args.quiet)
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    if not args.keep and args.only is None:
+        shutil.rmtree(work, ignore_errors=True)
+    if args.json:
+        document: dict[str, Any] = {"schema": "bemt.cfd-run/1", "campaign": campaign.name, "rows": record.rows}
+        print(json_text(document), end="")
+    elif not args.quiet:
+        print(f"{campaign.name}: {campaign.title}\n{_table(record)}")
+    return EXIT_OK if all(row["converged"] == 1 for row in record.rows) else EXIT_UNCONVERGED

@@ -1,0 +1,282 @@
+"""What a campaign leaves: recording, manifest, loads along the radius, histories of runs that did not settle."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import json
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bemt import __version__
+from bemt.cfd_run import DRIFT_LIMIT, SCATTER_LIMIT, Outcome
+from bemt.cfd_schema import Campaign
+from bemt.errors import Fault, InputError
+from bemt.grid_study import grid_study, ratios
+from bemt.importers import number
+from bemt.tables import csv_text, plain, write_atomic
+
+__all__ = ["COLUMNS", "Record", "grid_studies", "grid_uncertainty"]
+
+COLUMNS = (
+    "run", "rpm", "airspeed_m_s", "J", "thrust_N", "torque_Nm", "u_thrust_N", "u_torque_Nm", "thrust_rotor_N",
+    "thrust_standing_N", "density_kg_m3", "temperature_C", "pressure_Pa", "wall_distance_m", "tip_gap_mm",
+    "sideslip_deg", "pitch_offset_deg", "solver", "gas", "domain", "sector", "turbulence", "level", "cells",
+    "iterations", "averaged", "drift_thrust", "drift_torque", "scatter_thrust", "scatter_torque", "yplus_avg",
+    "seconds", "start", "converged", "note",
+)  # fmt: skip
+TEXTS = {"run", "solver", "gas", "domain", "sector", "turbulence", "start", "note"}
+RADIAL = ("run", "r_m", "thrust_per_radius_N_m", "torque_per_radius_Nm_m")
+SAME = ("rpm", "airspeed_m_s", "wall_distance_m", "tip_gap_mm", "sideslip_deg", "pitch_offset_deg", "solver", "gas",
+        "domain", "sector", "turbulence")  # fmt: skip
+HISTORY_ROWS = 400
+FORMAL_ORDER = 2.0
+
+
+def _same(a: Any, b: Any) -> bool:
+    if isinstance(a, float) and isinstance(b, float):
+        return (math.isnan(a) and math.isnan(b)) or math.isclose(a, b, rel_tol=1e-6, abs_tol=1e-9)
+    return bool(a == b)
+
+
+def _read(path: Path) -> list[dict[str, Any]]:
+    if not path.is_file():
+        return []
+    with path.open(newline="", encoding="utf-8") as stream:
+        reader = csv.DictReader(stream)
+        if tuple(reader.fieldnames or ()) != COLUMNS:
+            expected = "the header of a campaign's recording"
+            raise InputError(Fault(path.as_posix(), "1", "another header", expected, "Move the file away"))
+        rows = []
+        for line, cells in enumerate(reader, 2):
+            row: dict[str, Any] = {}
+            for key in COLUMNS:
+                text = cells.get(key)
+                if text is None:
+                    hint = "Delete the line; the point will be run again"
+                    raise InputError(Fault(path.as_posix(), str(line), "a line cut short", "all cells", hint))
+                value = text if key in TEXTS else number(text) if text else math.nan
+                if value is None:
+                    raise InputError(Fault(path.as_posix(), f"{line}: {key}", repr(text), "a number"))
+                row[key] = value
+            rows.append(row)
+    return rows
+
+
+def grid_studies(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Find the points that differ in their grid alone and do a grid study of each.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        Rows of a recording.
+
+    Returns
+    -------
+    list of dict
+        Per point: its columns, ``levels`` and ``cells`` (finest first), per quantity the values, observed order,
+        extrapolated value, GCI of fine and coarse grid, flags, and the standard uncertainty of every level.
+    """
+    groups: list[list[Mapping[str, Any]]] = []
+    for row in rows:
+        home = next((g for g in groups if all(_same(g[0].get(k), row.get(k)) for k in SAME)), None)
+        groups.append([row]) if home is None else home.append(row)
+    out = []
+    for group in groups:
+        fine = sorted((r for r in group if r["converged"] == 1), key=lambda r: -r["level"])[:3]
+        if len({r["level"] for r in fine}) < 2:
+            continue
+        study: dict[str, Any] = {k: fine[0].get(k) for k in SAME}
+        cells = [float(r["cells"]) for r in fine]
+        steps = [2.0 ** (a["level"] - b["level"]) for a, b in zip(fine, fine[1:], strict=False)]
+        study |= {
+            "levels": [r["level"] for r in fine],
+            "cells": cells,
+            "ratios": steps,
+            "by_cells": list(ratios(cells)),
+        }
+        for key in ("thrust_N", "torque_Nm"):
+            values = [float(r[key]) for r in fine]
+            found = grid_study(values, study["ratios"], FORMAL_ORDER)
+            spread = 3.0 * (max(values) - min(values)) / 1.15
+            each = {}
+            for row, value in zip(fine, values, strict=True):
+                u = found.u_relative * abs(values[0])
+                if row is not fine[0]:  # a coarser grid owes its distance to the best estimate as well
+                    best = found.extrapolated if found.extrapolated is not None and not found.flags else values[0]
+                    u = max(u, 1.25 * abs(value - best) / 1.15)
+                each[f"{row['level']:g}"] = u / abs(value)
+            study[key] = {
+                "values": values, "order": found.order, "extrapolated": found.extrapolated, "gci_fine": found.gci_fine,
+                "gci_coarse": found.gci_coarse, "spread": spread / abs(values[0]), "flags": list(found.flags),
+                "u_relative": each,
+            }  # fmt: skip
+        out.append(study)
+    return out
+
+
+def grid_uncertainty(studies: Sequence[Mapping[str, Any]], row: Mapping[str, Any]) -> dict[str, float]:
+    """Look up the standard uncertainty by the grid, of a row's level and solver.
+
+    Parameters
+    ----------
+    studies : sequence of mapping
+        From :func:`grid_studies`.
+    row : mapping
+        A row.
+
+    Returns
+    -------
+    dict
+        ``thrust_N`` and ``torque_Nm`` to the relative uncertainty [1]; empty without a study of that level. A study of
+        the other solver serves when there is none of its own.
+    """
+    level = f"{row['level']:g}"
+    for own in (True, False):
+        for study in studies:
+            if level in study["thrust_N"]["u_relative"] and (not own or study["solver"] == row["solver"]):
+                return {key: float(study[key]["u_relative"][level]) for key in ("thrust_N", "torque_Nm")}
+    return {}
+
+
+class Record:
+    """Files of one campaign; every change is written whole.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        The campaign.
+
+    Raises
+    ------
+    InputError
+        When the recording that is there is not one of ours.
+    """
+
+    def __init__(self, campaign: Campaign) -> None:
+        self.campaign = campaign
+        self.folder = campaign.path.parent
+        self.path = self.folder / "recording.csv"
+        self.rows: list[dict[str, Any]] = _read(self.path)
+
+    @property
+    def done(self) -> set[str]:
+        """Runs that are recorded, converged or not."""
+        return {row["run"] for row in self.rows}
+
+    def borrow(self, names: Sequence[str]) -> None:
+        """Take over runs that a campaign beside this one has recorded already.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Runs of this campaign; a name stands for all that decides a run.
+        """
+        for path in sorted(self.folder.parent.glob("*/recording.csv")):
+            if path != self.path and not set(names) <= self.done:
+                wanted = set(names) - self.done
+                self.rows += [row for row in _read(path) if row["run"] in wanted]
+                self._radial(path.parent / "radial.csv", wanted)
+
+    def add(self, outcome: Outcome, order: Sequence[str]) -> None:
+        """Add a run and write everything.
+
+        Parameters
+        ----------
+        outcome : Outcome
+            What it gave.
+        order : sequence of str
+            Runs of the campaign in their order.
+        """
+        name = outcome.values["run"]
+        others = [row for row in _read(self.path) if row["run"] not in self.done]  # by another process, meanwhile
+        self.rows = [row for row in [*self.rows, *others] if row["run"] != name] + [outcome.values]
+        place = {run: k for k, run in enumerate(order)}
+        self.rows.sort(key=lambda row: place.get(row["run"], len(place)))
+        if outcome.history is not None and not outcome.values["converged"]:
+            step = max(1, len(outcome.history) // HISTORY_ROWS)
+            names = ("iteration", "thrust_rotor_N", "torque_Nm", "thrust_standing_N")
+            rows = [dict(zip(names, map(float, row), strict=True)) for row in outcome.history[::step]]
+            write_atomic(self.folder / "histories" / f"{name}.csv", csv_text(names, _short(rows)))
+        if outcome.radial is not None:
+            self._radial(self.path, {name}, outcome.radial)
+        self.write(order)
+
+    def _radial(self, source: Path, names: set[str], table: Any = None) -> None:
+        """Put the loads along the radius of some runs into our file: from a table, or from another campaign's file."""
+        path = self.folder / "radial.csv"
+        kept = [row for row in _lines(path) if row["run"] not in names]
+        if table is None:
+            rows: list[dict[str, Any]] = [dict(row) for row in _lines(source) if row["run"] in names]
+        else:
+            rows = _short([dict(zip(RADIAL, (*names, *map(float, row)), strict=True)) for row in table])
+        if rows:
+            write_atomic(path, csv_text(RADIAL, [*kept, *rows]))
+
+    def studies(self) -> list[dict[str, Any]]:
+        """Grid studies: those of this recording, else those of the campaign that it names."""
+        own = grid_studies(self.rows)
+        other = self.campaign.grid_study
+        if own or other is None or not (other / "manifest.json").is_file():
+            return own
+        found = json.loads((other / "manifest.json").read_text(encoding="utf-8")).get("grid_studies", [])
+        return list(found)
+
+    def write(self, order: Sequence[str]) -> None:
+        """Write recording and manifest, uncertainties from what is known now.
+
+        Parameters
+        ----------
+        order : sequence of str
+            Runs of the campaign in their order.
+        """
+        # a run that did not converge and is no longer asked for says nothing any more
+        gone = {row["run"] for row in self.rows if not row["converged"] and row["run"] not in order}
+        self.rows = [row for row in self.rows if row["run"] not in gone]
+        for run in gone:
+            (self.folder / "histories" / f"{run}.csv").unlink(missing_ok=True)
+        studies = self.studies()
+        for row in self.rows:
+            grid = grid_uncertainty(studies, row)
+            for key, scatter in (("thrust_N", "scatter_thrust"), ("torque_Nm", "scatter_torque")):
+                relative = math.hypot(row[scatter], grid.get(key, 0.0))
+                row[f"u_{key}"] = abs(row[key]) * relative if row["converged"] == 1 else math.nan
+        write_atomic(self.path, csv_text(COLUMNS, _short(self.rows)))
+        names = set(order)
+        done = [row for row in self.rows if row["run"] in names]
+        manifest = {
+            "schema": "bemt.cfd-recording/1", "name": self.campaign.name, "title": self.campaign.title,
+            "bemt": __version__, "openfoam": "1912 (Debian package)", "case": self.campaign.case.name,
+            "case_sha256": self.campaign.case.content_hash(),
+            "campaign_sha256": hashlib.sha256(self.campaign.path.read_bytes()).hexdigest(),
+            "points": len(order), "recorded": len(done), "converged": sum(int(r["converged"]) for r in done),
+            "missing": [run for run in order if run not in self.done],
+            "not_converged": [{"run": r["run"], "note": r["note"]} for r in done if not r["converged"]],
+            "older": [row["run"] for row in self.rows if row["run"] not in names],
+            "rule": {"drift_limit": DRIFT_LIMIT, "scatter_limit": SCATTER_LIMIT,
+                     "u": "hypot of the standard deviation over the averaged iterations and the grid study",
+                     "grid_study": bool(studies)},
+            "grid_studies": grid_studies(self.rows), "seconds": float(np.nansum([r["seconds"] for r in self.rows])),
+        }  # fmt: skip
+        write_atomic(self.folder / "manifest.json", json.dumps(plain(manifest), indent=1) + "\n")
+
+
+def _lines(path: Path) -> list[dict[str, str]]:
+    if not path.is_file():
+        return []
+    with path.open(newline="", encoding="utf-8") as stream:
+        return list(csv.DictReader(stream))
+
+
+def _short(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Rows with seven digits, more are noise; whole numbers without a point, so that reading changes nothing."""
+
+    def short(value: Any) -> Any:
+        value = plain(value, 7)
+        return int(value) if isinstance(value, float) and value.is_integer() else value
+
+    return [{k: short(v) for k, v in row.items()} for row in rows]

@@ -1,0 +1,387 @@
+"""One CFD run: grid (shared by runs of one geometry), start, solver, what came out."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+import re
+import shutil
+import signal
+import subprocess
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.averaging import steady_average
+from bemt.cfd_schema import Point
+from bemt.cfd_start import State, splice
+from bemt.errors import InputError
+from bemt.export_case_openfoam import settings_of, write_openfoam
+from bemt.openfoam import Settings, case_files
+from bemt.openfoam.run import BINS
+from bemt.tables import write_atomic
+
+__all__ = ["DRIFT_LIMIT", "SCATTER_LIMIT", "Outcome", "Worker", "history_of", "point_key", "radial_of"]
+
+DRIFT_LIMIT = 0.03
+"""Change over the averaged iterations, of the mean, above which a run counts as not converged."""
+SCATTER_LIMIT = 0.05
+"""Standard deviation over the averaged iterations, of the mean, above which it counts as not converged."""
+GRID_FILES = ("system/blockMeshDict", "system/snappyHexMeshDict", "system/topoSetDict", "system/createPatchDict",
+              "constant/triSurface/lines.obj")  # fmt: skip
+Array = NDArray[np.float64]
+
+
+def _digest(*parts: str) -> str:
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()
+
+
+def point_key(point: Point) -> tuple[str, str, Settings]:
+    """Name a run and its grid by all that decides them.
+
+    Parameters
+    ----------
+    point : Point
+        The run.
+
+    Returns
+    -------
+    run, grid : str
+        Twelve hexadecimal digits each.
+    settings : Settings
+        The run's settings.
+
+    Notes
+    -----
+    The number of ranks and the place of the files do not count.
+    """
+    settings, parts = settings_of(point.case, point.run)
+    files = case_files(settings)
+    shape = (
+        f"{parts['rotor'].key()}|{parts['duct']!r}|{None if parts['tail'] is None else parts['tail'].round(9).tolist()}"
+    )
+    body = [f"{name}\n{text}" for name, text in sorted(files.items()) if name != "Allrun"]
+    grid = _digest(shape, *(files[name] for name in GRID_FILES))
+    return _digest(shape, *body, str(settings.average), str(point.warm))[:12], grid[:12], settings
+
+
+@dataclass
+class Outcome:
+    """What a run gave.
+
+    Parameters
+    ----------
+    values : dict
+        Columns of the recording.
+    history : (N, 3) array or None
+        Iteration, thrust [N], torque [N m] of the whole rotor.
+    radial : (M, 3) array or None
+        Radius [m], thrust and torque of all blades per radius [N/m, N m/m].
+    """
+
+    values: dict[str, Any]
+    history: Array | None = None
+    radial: Array | None = None
+
+
+def history_of(folder: Path, settings: Settings) -> Array:
+    """Read the loads of a run: rotor, and all that stands on the same mount.
+
+    Parameters
+    ----------
+    folder : Path
+        The case's folder.
+    settings : Settings
+        Its settings.
+
+    Returns
+    -------
+    (N, 4) array
+        Iteration, rotor thrust [N], shaft torque [N m], thrust of duct, stator and body [N]; whole rotor.
+
+    Raises
+    ------
+    InputError
+        When a file is absent or damaged.
+    """
+    from bemt.importers.openfoam_forces import read
+
+    def column(name: str, file: str, channel: str) -> Array:
+        return np.asarray(read(folder / "postProcessing" / name / "0" / file).channels[channel].values, dtype=float)
+
+    force, moment = (
+        column("forces", "force.dat", "force_total_z_N"),
+        column("forces", "moment.dat", "moment_total_z_Nm"),
+    )
+    other = np.zeros_like(force)
+    if any(name != "plate" for name in settings.walls):
+        other = column("standing", "force.dat", "force_total_z_N")
+    n = min(len(force), len(moment), len(other))
+    parts = settings.sectors
+    return np.column_stack([np.arange(1.0, n + 1), parts * force[:n], -settings.rotation * parts * moment[:n],
+                            parts * other[:n]])  # fmt: skip
+
+
+def radial_of(folder: Path, settings: Settings, last: int) -> Array | None:
+    """Read the loads of the blades along the radius.
+
+    Parameters
+    ----------
+    folder : Path
+        The case's folder.
+    settings : Settings
+        Its settings.
+    last : int
+        Iterations that are averaged.
+
+    Returns
+    -------
+    (M, 3) array or None
+        Radius [m], dT/dr [N/m], dQ/dr [N m/m] of all blades; None where nothing was recorded.
+
+    Notes
+    -----
+    Bins are those of x, along blade 1: within 1 - cos of the blade's half angle of the radius.
+    """
+    loads = []
+    for file in ("forceBin.dat", "momentBin.dat"):
+        path = folder / "postProcessing" / "radial" / "0" / file
+        if not path.is_file():
+            return None
+        text = path.read_text(encoding="ascii", errors="replace")
+        about = dict(re.findall(r"^# (start|delta)\s+: (\S+)", text, re.M))
+        rows = [[float(w) for w in line.replace("(", " ").replace(")", " ").split()]
+                for line in text.splitlines() if line and not line.startswith("#")]  # fmt: skip
+        rows = [row for row in rows if len(row) == 1 + 9 * BINS]
+        if not rows or len(about) < 2:
+            return None
+        table = np.array(rows)
+        table = table[table[:, 0] > table[-1, 0] - last]
+        loads.append(table[:, 1:].mean(axis=0).reshape(BINS, 3, 3)[:, 0, 2])
+    start, delta = float(about["start"]), float(about["delta"])
+    r = start + delta * (np.arange(BINS) + 0.5)
+    parts = settings.sectors
+    return np.column_stack([r, parts * loads[0] / delta, -settings.rotation * parts * loads[1] / delta])
+
+
+def _y_plus(folder: Path) -> float:
+    path = folder / "postProcessing" / "yPlus" / "0" / "yPlus.dat"
+    rows = [line.split() for line in path.read_text().splitlines()] if path.is_file() else []
+    found = [float(row[4]) for row in rows if len(row) == 5 and row[1] == "blade"]
+    return found[-1] if found else math.nan
+
+
+def _grid_report(folder: Path) -> tuple[int, str]:
+    path = folder / "log.checkMesh"
+    text = path.read_text(errors="replace") if path.is_file() else ""
+    cells = re.search(r"^\s*cells:\s+(\d+)", text, re.M)
+    bad = re.findall(r"\*\*\*([^\n]*)", text)
+    return (int(cells[1]) if cells else 0), "; ".join(bad) or "ok"
+
+
+@dataclass
+class Worker:
+    """Runs points in a work folder.
+
+    Parameters
+    ----------
+    work : Path
+        Folder of grids and runs.
+    ranks : int
+        Processes of a run.
+    """
+
+    work: Path
+    ranks: int = 1
+
+    def _program(self, folder: Path, step: str) -> int:
+        """Run one step of Allrun; its processes end with us."""
+        with (folder / f"out.{step}").open("wb") as stream:
+            process = subprocess.Popen(["./Allrun", step], cwd=folder, stdout=stream, stderr=subprocess.STDOUT,
+                                       env={**os.environ, "NP": str(self.ranks)}, start_new_session=True)  # fmt: skip
+            try:
+                return process.wait()
+            except BaseException:
+                os.killpg(process.pid, signal.SIGTERM)
+                process.wait()
+                raise
+
+    def _places(self, folder: Path) -> list[Path]:
+        return [folder] if self.ranks == 1 else sorted(folder.glob("processor*"))
+
+    def grid(self, point: Point, key: str) -> Path:
+        """Make the grid of a point, or find it.
+
+        Parameters
+        ----------
+        point : Point
+            The run.
+        key : str
+            Name of the grid.
+
+        Returns
+        -------
+        Path
+            Folder with the grid.
+
+        Raises
+        ------
+        InputError
+            When the case makes no sound solid.
+        RuntimeError
+            When a program failed; the message ends with its words.
+        """
+        folder = self.work / f"grid-{key}-{self.ranks}"
+        if (folder / "done").is_file():
+            return folder
+        shutil.rmtree(folder, ignore_errors=True)
+        write_openfoam(point.case, folder, point.run)
+        begin = time.monotonic()
+        if self._program(folder, "mesh") != 0:
+            words = (folder / "out.mesh").read_text(errors="replace").strip().splitlines()
+            raise RuntimeError("grid: " + " ".join(words[-3:])[:300])
+        write_atomic(folder / "done", f"{time.monotonic() - begin:.1f}\n")
+        return folder
+
+    def _prepare(self, point: Point, run: str, grid: str, settings: Settings) -> tuple[Path, str]:
+        """Case folder with its grid and, where there is one, the flow of a neighbour."""
+        source = self.grid(point, grid)
+        folder = self.work / f"run-{run}"
+        shutil.rmtree(folder, ignore_errors=True)
+        for name, text in case_files(settings, point.case.title).items():
+            write_atomic(folder / name, text)
+        os.chmod(folder / "Allrun", 0o755)
+        for place in self._places(source):
+            mesh = place.relative_to(source) / "constant" / "polyMesh"
+            shutil.copytree(source / mesh, folder / mesh, copy_function=os.link)
+        for name in ("log.checkMesh", "system/decomposeParDict"):
+            if (source / name).is_file():
+                shutil.copy(source / name, folder / name)
+        started = self._warm(folder, grid, settings) if point.warm else ""
+        return folder, started or "slipstream"
+
+    def _neighbour(self, grid: str, new: State) -> tuple[Path, State] | None:
+        """Nearest finished run on a grid: by advance ratio, then solver, then speed."""
+        found = []
+        for path in sorted(self.work.glob("run-*/state.json")):
+            about = json.loads(path.read_text(encoding="utf-8"))
+            if about.pop("grid") == grid and about.pop("ranks") == self.ranks:
+                old = State(about["rpm"], tuple(about["wind"]), about["pressure"], about["compressible"])
+                gap = np.array(new.wind) / new.rpm - np.array(old.wind) / old.rpm
+                away = 1e3 * float(np.linalg.norm(gap)) + 2.0 * (old.compressible != new.compressible)
+                found.append((away + abs(math.log(new.rpm / old.rpm)), path.parent.name, old))
+        if not found:
+            return None
+        _, name, old = min(found, key=lambda item: item[:2])
+        return self.work / name, old
+
+    def _warm(self, folder: Path, grid: str, settings: Settings) -> str:
+        new = _state(settings)
+        nearest = self._neighbour(grid, new)
+        if nearest is None:
+            return ""
+        before, old = nearest
+        for place in self._places(before):
+            times = [p for p in place.iterdir() if p.name.isdigit() and p.name != "0"]
+            if not times:
+                return ""
+            latest = max(times, key=lambda p: int(p.name))
+            target = folder / "warm" / place.relative_to(before) / "0"
+            for initial in sorted((folder / "0.orig").iterdir()):
+                if (latest / initial.name).is_file():
+                    data = splice(initial.name, (latest / initial.name).read_bytes(), initial.read_bytes(), old, new)
+                    if data is not None:
+                        write_atomic(target / initial.name, data)
+        write_atomic(folder / "start", "#!/bin/sh\ncp -r warm/. .\n")
+        os.chmod(folder / "start", 0o755)
+        return before.name.removeprefix("run-")
+
+    def run(self, point: Point, keys: tuple[str, str, Settings] | None = None) -> Outcome:
+        """Run one point.
+
+        Parameters
+        ----------
+        point : Point
+            The run.
+        keys : tuple or None
+            What :func:`point_key` gave.
+
+        Returns
+        -------
+        Outcome
+            NaN and ``converged`` 0 when the run failed, diverged or kept drifting; its history is there.
+        """
+        name, grid, settings = keys or point_key(point)
+        begin = time.monotonic()
+        values = _columns(point, settings, name)
+        history, radial, note = None, None, ""
+        try:
+            folder, values["start"] = self._prepare(point, name, grid, settings)
+            values["cells"], note = _grid_report(folder)
+            code = self._program(folder, "solve")
+            history = history_of(folder, settings)
+            _means(values, history, settings, code)
+            values["yplus_avg"] = _y_plus(folder)
+            radial = radial_of(folder, settings, settings.average)
+            if code == 0:
+                about = {"grid": grid, "ranks": self.ranks, **asdict(_state(settings))}
+                write_atomic(folder / "state.json", json.dumps(about) + "\n")
+            else:
+                words = (folder / "out.solve").read_text(errors="replace").strip().splitlines()
+                note = " ".join([note, *words[-2:]])[:300]
+        except (RuntimeError, InputError, OSError) as error:
+            note = str(error)[:300]
+        values |= {"seconds": round(time.monotonic() - begin, 1), "note": note.replace("\n", " ")}
+        return Outcome(values, history, radial if values["converged"] else None)
+
+
+def _state(s: Settings) -> State:
+    return State(s.rpm, s.wind, s.pressure if s.compressible else 0.0, s.compressible)
+
+
+def _columns(point: Point, s: Settings, name: str) -> dict[str, Any]:
+    """What is known of a run beforehand; results are NaN until they are there."""
+    nan = math.nan
+    return {
+        "run": name, "rpm": s.rpm, "airspeed_m_s": s.V, "J": s.V / (s.rpm / 60 * 2 * s.R), "thrust_N": nan,
+        "torque_Nm": nan, "u_thrust_N": nan, "u_torque_Nm": nan, "thrust_rotor_N": nan, "thrust_standing_N": nan,
+        "density_kg_m3": s.rho, "temperature_C": s.temperature - 273.15, "pressure_Pa": s.pressure,
+        "wall_distance_m": nan if s.plate_z is None else -s.plate_z,
+        "tip_gap_mm": nan if s.duct is None else 1e3 * s.gap,
+        "sideslip_deg": point.run.sideslip_deg, "pitch_offset_deg": point.values.get("pitch_offset_deg", 0.0),
+        "solver": "compressible" if s.compressible else "incompressible", "gas": s.gas if s.compressible else "",
+        "domain": s.domain, "sector": s.sector, "turbulence": s.turbulence, "level": s.level, "cells": 0,
+        "iterations": 0, "averaged": s.average, "drift_thrust": nan, "drift_torque": nan, "scatter_thrust": nan,
+        "scatter_torque": nan, "yplus_avg": nan, "seconds": nan, "start": "", "converged": 0, "note": "",
+    }  # fmt: skip
+
+
+def _means(values: dict[str, Any], history: Array, s: Settings, code: int) -> None:
+    """Fill in means, drift and scatter; the means stay NaN unless the run converged."""
+    values["iterations"] = len(history)
+    if len(history) < s.average:
+        return
+    share = s.average / len(history)
+    total = history[:, 1] + history[:, 3]
+    fine = code == 0 and len(history) >= s.iterations
+    means = {}
+    for key, series in (("thrust", total), ("torque", history[:, 2])):
+        average = steady_average(series, share)
+        if average.mean is None:
+            return
+        scale = max(abs(average.mean), 1e-12)
+        drift = math.nan if average.drift is None else average.drift
+        scatter = float(np.std(series[-s.average :])) / scale
+        values[f"drift_{key}"], values[f"scatter_{key}"] = drift, scatter
+        means[key] = average.mean
+        fine = fine and abs(drift) <= DRIFT_LIMIT and scatter <= SCATTER_LIMIT
+    if fine:
+        parts = {"thrust_rotor_N": 1, "thrust_standing_N": 3}
+        values |= {"thrust_N": means["thrust"], "torque_Nm": means["torque"], "converged": 1}
+        values |= {key: float(history[-s.average :, k].mean()) for key, k in parts.items()}

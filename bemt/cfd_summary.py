@@ -1,0 +1,204 @@
+"""All campaigns of a folder beside BEMT: one row a run, and the loads along the radius in bands."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bemt import evaluate, solver
+from bemt.case import Case, load_case
+from bemt.cfd_schema import Campaign, load_campaign
+from bemt.errors import Fault, InputError
+from bemt.tables import number_text, text_table
+
+__all__ = ["BANDS", "summary", "summary_text"]
+
+BANDS = (0.15, 0.30, 0.45, 0.60, 0.75, 0.90, 1.0)
+"""Edges of the bands. [R]"""
+MACH_EFFECTS = ["compressibility", "drag_divergence"]
+
+
+class _Bemt:
+    """BEMT of the cases of the runs; without effects of Mach number beside incompressible flow."""
+
+    def __init__(self) -> None:
+        self.ready: dict[str, evaluate.Ready] = {}
+
+    def solve(self, case: Case, row: dict[str, str]) -> solver.Solution:
+        turned = float(row["pitch_offset_deg"] or 0)
+        overrides: dict[str, Any] = {}
+        if turned:
+            overrides["blade.beta_offset_deg"] = case.get("blade.beta_offset_deg", 0.0) + turned
+        if row["solver"] == "incompressible":
+            overrides["model.effects_off"] = sorted({*case.get("model.effects_off", []), *MACH_EFFECTS})
+        key = f"{case.path}|{sorted(overrides.items())}"
+        if key not in self.ready:
+            self.ready[key] = evaluate.prepare(case.replaced(overrides))
+        V = float(row["airspeed_m_s"]) * math.cos(math.radians(float(row["sideslip_deg"] or 0)))
+        return solver.solve(self.ready[key].prep, float(row["rpm"]), V, case.air(), radial=True)
+
+
+def _bands(R: float, edges: np.ndarray, load: np.ndarray) -> np.ndarray:
+    """Share out loads of pieces between edges over the bands, evenly within each piece."""
+    limits = np.array(BANDS) * R
+    limits[-1] = max(limits[-1], edges[-1])
+    total = np.concatenate([[0.0], np.cumsum(load)])
+    return np.diff(np.interp(limits, edges, total))
+
+
+def _edges(r: np.ndarray) -> np.ndarray:
+    middle = 0.5 * (r[1:] + r[:-1])
+    return np.concatenate([[2 * r[0] - middle[0]], middle, [2 * r[-1] - middle[-1]]])
+
+
+def _rows(path: Path) -> list[dict[str, str]]:
+    if not path.is_file():
+        return []
+    with path.open(newline="", encoding="utf-8") as stream:
+        return list(csv.DictReader(stream))
+
+
+def _radial(campaign: Campaign, run: str, found: solver.Solution) -> dict[str, Any] | None:
+    rows = [row for row in _rows(campaign.path.parent / "radial.csv") if row["run"] == run]
+    if not rows:
+        return None
+    names = ("r_m", "thrust_per_radius_N_m", "torque_per_radius_Nm_m")
+    r, dT, dQ = (np.array([float(row[name]) for row in rows]) for name in names)
+    R = 0.5 * campaign.case.diameter_m
+    s, edges = found.radial, _edges(found.radial["r"][0])
+    out: dict[str, Any] = {"edges_over_R": list(BANDS)}
+    for key, ours, theirs in (("thrust_N", dT, "dT"), ("torque_Nm", dQ, "dQ")):
+        out[f"cfd_{key}"] = _bands(R, _edges(r), ours * np.diff(_edges(r))).tolist()
+        out[f"bemt_{key}"] = _bands(R, edges, s[theirs][0]).tolist()
+    out["bemt_alpha_deg"] = [
+        float(np.degrees(np.interp((a + b) * R / 2, s["r"][0], s["alpha"][0])))
+        for a, b in zip(BANDS, BANDS[1:], strict=False)
+    ]
+    return out
+
+
+def summary(folder: Path) -> dict[str, Any]:
+    """Collect the recordings of all campaigns in a folder and solve their points by BEMT.
+
+    Parameters
+    ----------
+    folder : Path
+        Holds ``<name>/campaign.toml``.
+
+    Returns
+    -------
+    dict
+        ``campaigns``: per campaign its counts and rows; the rows carry ``bemt_thrust_N`` and ``bemt_torque_Nm`` (of the
+        open rotor in axial flow: a plate, a pipe and a duct that the case itself does not have are not in it), and
+        ``radial`` where loads along the radius were recorded.
+
+    Raises
+    ------
+    InputError
+        When there is no campaign, or one has faults.
+    """
+    paths = sorted(folder.glob("*/campaign.toml"))
+    if not paths:
+        raise InputError(Fault(folder.as_posix(), "", "no campaign", "campaign.toml, or folders with one each"))
+    model, out = _Bemt(), []
+    for path in paths:
+        campaign = load_campaign(path)
+        manifest_path = path.parent / "manifest.json"
+        manifest = json.loads(manifest_path.read_text(encoding="utf-8")) if manifest_path.is_file() else {}
+        rows = []
+        for row in _rows(path.parent / "recording.csv"):
+            found = model.solve(load_case(campaign.case.path), row)
+            rows.append({**row, "bemt_thrust_N": float(found.T[0]), "bemt_torque_Nm": float(found.Q[0]),
+                         "radial": _radial(campaign, row["run"], found)})  # fmt: skip
+        out.append({"name": campaign.name, "title": campaign.title, "points": len(campaign.points),
+                    "recorded": len(rows), "converged": sum(row["converged"] == "1" for row in rows),
+                    "grid_studies": manifest.get("grid_studies", []), "rows": rows})  # fmt: skip
+    return {"schema": "bemt.cfd-summary/1", "campaigns": out}
+
+
+def _number(text: str) -> float:
+    return float(text) if text else math.nan
+
+
+def summary_text(document: dict[str, Any], radial: bool = True) -> str:
+    """Give the summary as tables.
+
+    Parameters
+    ----------
+    document : dict
+        From :func:`summary`.
+    radial : bool
+        Whether the loads in bands are shown.
+
+    Returns
+    -------
+    str
+        Lines.
+    """
+    lines = []
+    counts = [[c["name"], str(c["points"]), str(c["recorded"]), str(c["converged"])] for c in document["campaigns"]]
+    counts.append(["all", *(str(sum(int(row[k]) for row in counts)) for k in (1, 2, 3))])
+    lines.append(text_table(["campaign", "points", "run", "converged"], counts))
+    head = ["run", "solver", "level", "cells", "rpm", "J", "other", "T [N]", "u", "BEMT", "Q [N m]", "u", "BEMT", "y+"]
+    for campaign in document["campaigns"]:
+        rows = []
+        for row in campaign["rows"]:
+            other = [f"{word} {row[key]}" for key, word in (
+                ("wall_distance_m", "plate m"), ("tip_gap_mm", "gap mm"), ("sideslip_deg", "wind deg"),
+                ("pitch_offset_deg", "pitch deg")) if row[key] not in ("", "0", "0.0")]  # fmt: skip
+            other += [row["domain"]] if row["domain"] != "free" else []
+            other += [row["turbulence"]] if row["turbulence"] != "kOmegaSST" else []
+            other += ["energy equation"] if row["gas"] == "perfect" else []
+            values = [number_text(_number(row[key])) for key in ("thrust_N", "torque_Nm")]
+            us = [number_text(_number(row[key]), 2) for key in ("u_thrust_N", "u_torque_Nm")]
+            rows.append([row["run"][:6], row["solver"], row["level"], row["cells"], row["rpm"],
+                         number_text(_number(row["J"]), 3), ", ".join(other), values[0], us[0],
+                         number_text(row["bemt_thrust_N"]), values[1], us[1], number_text(row["bemt_torque_Nm"]),
+                         number_text(_number(row["yplus_avg"]), 3)])  # fmt: skip
+        lines += ["", f"{campaign['name']}: {campaign['title']}"]
+        lines.append(text_table(head, rows, left=(0, 1, 6)) if rows else "  nothing has run yet")
+        for study in campaign["grid_studies"]:
+            words = []
+            for key in ("thrust_N", "torque_Nm"):
+                found = study[key]
+                gci = number_text(_percent(found["gci_fine"]), 2)
+                said = f": {'; '.join(found['flags'])}" if found["flags"] else ""
+                order, limit = number_text(found["order"], 3), number_text(found["extrapolated"])
+                words.append(f"{key} order {order}, limit {limit}, GCI {gci} %{said}")
+            levels = ", ".join(f"{level:g}" for level in study["levels"])
+            lines.append(f"  grid study {study['solver']} levels {levels}: {' | '.join(words)}")
+    if radial:
+        lines += _radial_text(document)
+    return "\n".join(lines) + "\n"
+
+
+def _percent(value: float | None) -> float:
+    return math.nan if value is None else 100 * value
+
+
+def _radial_text(document: dict[str, Any]) -> list[str]:
+    lines = ["", "Loads along the radius, CFD / BEMT, in bands of r/R"]
+    rows, seen = [], set()
+    for campaign in document["campaigns"]:
+        for row in campaign["rows"]:
+            table = row["radial"]
+            plain = row["domain"] == "free" and not row["wall_distance_m"] and not row["tip_gap_mm"]
+            if table is None or not plain or row["run"] in seen or _number(row["rpm"]) < 20000:
+                continue
+            seen.add(row["run"])
+            for key in ("thrust_N", "torque_Nm"):
+                cells = [f"{number_text(a, 3)} / {number_text(b, 3)}"
+                         for a, b in zip(table[f"cfd_{key}"], table[f"bemt_{key}"], strict=True)]  # fmt: skip
+                rows.append(
+                    [campaign["name"], row["solver"], row["level"], number_text(_number(row["J"]), 2), key, *cells]
+                )
+            angles = [f"{a:.1f}" for a in table["bemt_alpha_deg"]]
+            rows.append(["", "", "", "", "BEMT alpha [deg]", *angles])
+    heads = [f"{a:.2f}-{b:.2f}" for a, b in zip(BANDS, BANDS[1:], strict=False)]
+    lines.append(text_table(["campaign", "solver", "level", "J", "load", *heads], rows, left=(0, 1, 4)))
+    return lines

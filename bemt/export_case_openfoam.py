@@ -1,0 +1,213 @@
+"""The OpenFOAM case of a case file: surfaces, dictionaries and ``Allrun``, ready to run."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bemt.case import Case
+from bemt.errors import Fault, InputError
+from bemt.openfoam import Body, Settings, Sweep, case_files, sector_choice
+from bemt.openfoam.settings import MACH_COMPRESSIBLE
+from bemt.tables import write_atomic
+from geometry.common import GeometryError
+from geometry.export import MANIFEST, export
+from geometry.mesh import Options, build
+from geometry.mesh_duct import centre_body, plan_stator
+from geometry.solid import revolve
+
+if TYPE_CHECKING:
+    from geometry.duct import Duct
+    from geometry.mesh import Model
+    from geometry.rotor import Rotor
+
+__all__ = ["Run", "settings_of", "write_openfoam"]
+
+FACETS = 96  # of the centre body
+
+
+@dataclass(frozen=True)
+class Run:
+    """What is asked of a CFD run; the case gives the rest.
+
+    Parameters
+    ----------
+    rpm, airspeed_m_s : float or None
+        Operating point; None is the case's. [rev/min, m/s]
+    sideslip_deg : float
+        Angle between shaft and wind, 0 to 90. With a frozen rotor (MRF) this is an approximation: the blades are seen
+        at one azimuth only. [deg]
+    solver : str or None
+        ``incompressible`` or ``compressible``; None decides by the helical tip Mach number, compressible above 0.5.
+    gas : str
+        As in :class:`bemt.openfoam.settings.Settings`.
+    sector, domain, turbulence, level, iterations, average, ranks
+        As there; `sector` None is the smallest that fits.
+    wall_distance_over_R, plate_radius_over_R : float or None
+        Where a round plate stands behind the rotor, and its radius. [R]
+    """
+
+    rpm: float | None = None
+    airspeed_m_s: float | None = None
+    sideslip_deg: float = 0.0
+    solver: str | None = None
+    gas: str = "isentropic"
+    sector: str | None = None
+    domain: str = "free"
+    turbulence: str = "kOmegaSST"
+    level: float = 6.0
+    wall_distance_over_R: float | None = None
+    plate_radius_over_R: float = 2.0
+    iterations: int = 400
+    average: int = 100
+    ranks: int = 2
+
+
+def _standing(duct: Duct | None, parts: int) -> tuple[Duct | None, bool]:
+    """Duct that fits into a sector, and whether its vanes had to be left out."""
+    if duct is None or duct.stator is None or duct.stator.B % parts == 0:
+        return duct, False
+    return replace(duct, stator=None), True
+
+
+def _tail(rotor: Rotor, duct: Duct, model: Model) -> np.ndarray | None:
+    """Outline of the centre body alone."""
+    mesh = model.rotor
+    back = float(mesh.vertices[np.unique(mesh.part("hub")), 2].min())
+    plan = plan_stator(duct, back, rotor.Rhub)
+    return None if plan is None else centre_body(duct, plan)
+
+
+def settings_of(case: Case, run: Run, options: Options | None = None) -> tuple[Settings, dict[str, Any]]:
+    """Work out the settings of a run.
+
+    Parameters
+    ----------
+    case : Case
+        The case, changes included.
+    run : Run
+        What is asked.
+    options : Options or None
+        How fine the surfaces are.
+
+    Returns
+    -------
+    Settings
+        For :func:`bemt.openfoam.case_files`.
+    dict
+        ``rotor``, ``duct`` as exported, ``tail`` (outline of the centre body, or None), ``notes``.
+
+    Raises
+    ------
+    InputError
+        When the case makes no sound solid or the run cannot be.
+    """
+    file = case.path.as_posix()
+    rotor, whole, air = case.rotor(), case.duct(), case.air()
+    rpm = case.rpm if run.rpm is None else run.rpm
+    V = case.airspeed_m_s if run.airspeed_m_s is None else run.airspeed_m_s
+    sideslip = math.radians(run.sideslip_deg)
+    sector = run.sector or sector_choice(rotor.B, sideslip)
+    parts = {"half": 2, "blade": rotor.B}.get(sector, 1)
+    duct, left_out = _standing(whole, parts)
+    try:
+        model = build(rotor, duct, options)
+        tail = _tail(rotor, whole, model) if whole is not None and left_out else None
+    except GeometryError as error:
+        raise InputError([Fault(file, *fault) for fault in error.faults]) from error
+    points = model.rotor.vertices
+    blade = points[np.unique(model.rotor.part("blade"))]
+    tip = blade[np.hypot(blade[:, 0], blade[:, 1]) > 0.985 * rotor.R]
+    azimuth = np.arctan2(tip[:, 1], tip[:, 0])
+    first = np.abs(azimuth) < math.pi / max(rotor.B, 2)
+    sweep = Sweep(float(blade[:, 2].min()), float(blade[:, 2].max()), float(tip[:, 2].min()), float(tip[:, 2].max()),
+                  float(np.abs(azimuth[first]).max()))  # fmt: skip
+    surfaces = [name for part in model.parts for name in part.names]
+    around = None
+    if model.duct is not None:
+        z = model.duct.vertices[:, 2]
+        around = Body(float(z.min()), float(z.max()), float(np.hypot(*model.duct.vertices[:, :2].T).max()))
+    inner = None
+    if tail is not None:
+        surfaces.append("centrebody")
+        inner = Body(float(tail[:, 1].min()), float(tail[:, 1].max()), float(tail[:, 0].max()))
+    rho, mu, a = float(air.rho), float(air.mu), float(air.a_sound)
+    temperature = a * a / (1.4 * 287.05)
+    mach = math.hypot(rpm * math.pi / 30 * rotor.R, V) / a
+    compressible = mach > MACH_COMPRESSIBLE if run.solver is None else run.solver == "compressible"
+    plate = None if run.wall_distance_over_R is None else -run.wall_distance_over_R * rotor.R
+    try:
+        settings = Settings(
+            R=rotor.R, Rhub=rotor.Rhub, B=rotor.B, rotation=rotor.rotation,
+            rotor=Body(float(points[:, 2].min()), float(points[:, 2].max()), rotor.R), blades=sweep, rpm=rpm, rho=rho,
+            mu=mu, a_sound=a, temperature=temperature, V=V, sideslip=sideslip, sector=sector, domain=run.domain,
+            level=run.level, turbulence=run.turbulence, compressible=compressible, gas=run.gas, duct=around, body=inner,
+            gap=0.0 if duct is None else duct.gap, plate_z=plate, plate_radius=run.plate_radius_over_R * rotor.R,
+            pitch=2 * math.pi * 0.75 * rotor.R * math.tan(float(rotor.blade.at(0.75 * rotor.R)[1])),
+            iterations=run.iterations, average=run.average, ranks=run.ranks, surfaces=tuple(surfaces),
+        )  # fmt: skip
+    except InputError as error:
+        raise InputError([replace(fault, file=fault.file or file) for fault in error.faults]) from error
+    notes = [f"tip Mach number {mach:.3f}: {'compressible' if compressible else 'incompressible'}"]
+    if left_out:
+        notes.append("the vanes do not fit into the sector: left out, their centre body is there")
+    if sideslip:
+        notes.append("oblique flow with a frozen rotor is an approximation: one azimuth of the blades")
+    if compressible and run.gas == "perfect":
+        notes.append("energy equation without the work of the turning frame: temperatures at the blade are wrong")
+    return settings, {"rotor": rotor, "duct": duct, "tail": tail, "notes": notes}
+
+
+def write_openfoam(case: Case, out: Path, run: Run, options: Options | None = None) -> dict[str, Any]:
+    """Write a whole case: ``cd OUT && ./Allrun`` runs it.
+
+    Parameters
+    ----------
+    case : Case
+        The case, changes included.
+    out : Path
+        Folder; it is made.
+    run : Run
+        What is asked.
+    options : Options or None
+        How fine the surfaces are.
+
+    Returns
+    -------
+    dict
+        The manifest of the surfaces with a section ``openfoam``.
+
+    Raises
+    ------
+    InputError
+        As :func:`settings_of`; nothing is written then.
+    """
+    settings, parts = settings_of(case, run, options)
+    manifest = export(parts["rotor"], parts["duct"], out, ["openfoam"], name=case.name, options=options)
+    if parts["tail"] is not None:
+        import trimesh
+
+        solid = trimesh.Trimesh(*revolve(parts["tail"], FACETS), process=False)
+        write_atomic(out / "constant" / "triSurface" / "centrebody.stl", str(solid.export(file_type="stl_ascii")))
+    files = case_files(settings, case.title)
+    for name, text in files.items():
+        write_atomic(out / name, text)
+    os.chmod(out / "Allrun", 0o755)
+    manifest["openfoam"] = {
+        "version": 1912, "solver": "rhoSimpleFoam" if settings.compressible else "simpleFoam",
+        "gas": settings.gas if settings.compressible else "incompressible", "turbulence": settings.turbulence,
+        "sector": settings.sector, "sectors": settings.sectors, "domain": settings.domain, "level": settings.level,
+        "rpm": settings.rpm, "airspeed_m_s": settings.V, "sideslip_deg": run.sideslip_deg,
+        "density_kg_m3": settings.rho, "iterations": settings.iterations, "averaged": settings.average,
+        "notes": parts["notes"],
+        "files": {name: hashlib.sha256(text.encode()).hexdigest() for name, text in sorted(files.items())},
+    }  # fmt: skip
+    write_atomic(out / MANIFEST, json.dumps(manifest, indent=1) + "\n")
+    return manifest

@@ -1,0 +1,159 @@
+"""Blocks of a grid as bytes, and finished blocks joined into one file: CSV or Parquet.
+
+CSV shows 7 significant digits. Parquet keeps every bit of the numbers; it needs pyarrow, which the extra ``dask``
+brings. The bytes of a block depend on its numbers alone, and joining reads one block at a time.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.errors import Fault, InputError
+from bemt.tables import csv_block
+
+__all__ = ["FORMATS", "Block", "encode", "join", "require_extra"]
+
+FORMATS = ("csv", "parquet")
+ROW_GROUP = 50_000
+"""Rows of a row group of Parquet, about, at least: small blocks are put together, or the footer outgrows the data."""
+
+
+def require_extra(option: str, *modules: str) -> None:
+    """Refuse an option whose optional packages are not installed.
+
+    Parameters
+    ----------
+    option : str
+        What the user asked for.
+    *modules : str
+        Modules that it needs.
+
+    Raises
+    ------
+    InputError
+        When one is missing.
+    """
+    missing = [name for name in modules if importlib.util.find_spec(name) is None]
+    if missing:
+        expected = "the optional packages of the extra 'dask'"
+        raise InputError(Fault("", option, f"no {' and no '.join(missing)}", expected, "pip install 'bemt[dask]'"))
+
+
+@dataclass(frozen=True)
+class Block:
+    """N rows of a grid.
+
+    Parameters
+    ----------
+    axes : dict of str to ((A,) float, (N,) int)
+        Values of each axis, in the unit of its name, and which one holds in each row.
+    columns : dict of str to (N,) float
+        Results, in the unit of the name; NaN where not converged.
+    converged : (N,) bool
+        Whether the point has a solution.
+    """
+
+    axes: dict[str, tuple[NDArray[np.float64], NDArray[np.intp]]]
+    columns: dict[str, NDArray[np.float64]]
+    converged: NDArray[np.bool_]
+
+
+def encode(block: Block, form: str) -> bytes:
+    """Bytes of a block.
+
+    Parameters
+    ----------
+    block : Block
+        Rows.
+    form : str
+        One of `FORMATS`.
+
+    Returns
+    -------
+    bytes
+        CSV lines without a header, or a Parquet file.
+
+    Examples
+    --------
+    >>> axis = {"rpm": (np.array([5000.0, 6000.0]), np.array([0, 1]))}
+    >>> print(encode(Block(axis, {"CT": np.array([0.1, np.nan])}, np.array([True, False])), "csv").decode(), end="")
+    5000,1.000000e-01,1
+    6000,nan,0
+    """
+    if form == "csv":
+        return csv_block([*(_near(*axis) for axis in block.axes.values()), *block.columns.values(), block.converged])
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    cells: dict[str, NDArray[Any]] = {name: values[index] for name, (values, index) in block.axes.items()}
+    table = pa.table({**cells, **block.columns, "converged": block.converged})
+    sink = pa.BufferOutputStream()
+    pq.write_table(table, sink, **_options(list(cells), list(block.columns)))
+    return bytes(sink.getvalue())
+
+
+def _near(values: NDArray[np.float64], index: NDArray[np.intp]) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Only the stretch of an axis that occurs: formatting a long axis in every block would cost the square."""
+    low = int(index.min())
+    return values[low : int(index.max()) + 1], index - low
+
+
+def _options(axes: list[str], columns: list[str]) -> dict[str, Any]:
+    """How Parquet is written: an axis takes few values; the bytes of real numbers compress better sorted by place."""
+    encoding = dict.fromkeys(columns, "BYTE_STREAM_SPLIT")
+    return {"compression": "zstd", "use_dictionary": axes, "column_encoding": encoding}
+
+
+def join(target: Path, names: Sequence[str], axes: Sequence[str], parts: Sequence[Path], form: str) -> None:
+    """Put blocks together under a temporary name, in order, and rename.
+
+    Parameters
+    ----------
+    target : Path
+        The file to be.
+    names : sequence of str
+        All columns.
+    axes : sequence of str
+        Those that are axes.
+    parts : sequence of Path
+        Files of the blocks, as `encode` makes their content.
+    form : str
+        One of `FORMATS`.
+    """
+    temporary = target.with_name(f".{target.name}.tmp")
+    try:
+        if form == "csv":
+            with temporary.open("wb") as out:
+                out.write(",".join(names).encode() + b"\n")
+                for path in parts:
+                    with path.open("rb") as part:
+                        shutil.copyfileobj(part, out, 1 << 20)
+        else:
+            _join_parquet(temporary, [n for n in names[:-1] if n not in axes], axes, parts)
+        temporary.replace(target)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _join_parquet(target: Path, columns: list[str], axes: Sequence[str], parts: Sequence[Path]) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    with pq.ParquetFile(parts[0]) as first:
+        schema = first.schema_arrow
+    with pq.ParquetWriter(target, schema, **_options(list(axes), columns)) as out:
+        held: list[Any] = []
+        for i, path in enumerate(parts):
+            with pq.ParquetFile(path) as part:
+                held.append(part.read(use_threads=False))
+            if i == len(parts) - 1 or sum(table.num_rows for table in held) >= ROW_GROUP:
+                out.write_table(pa.concat_tables(held).combine_chunks())
+                held = []

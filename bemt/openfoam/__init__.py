@@ -1,0 +1,10 @@
+"""OpenFOAM cases as text: settings in, names and contents of files out. Nothing here touches a disk.
+
+Made for OpenFOAM 1912 (the package of Debian 12). The frame is that of :mod:`geometry.mesh`: z along the shaft towards
+thrust, blade 1 on the x axis.
+"""
+
+from bemt.openfoam.case import case_files
+from bemt.openfoam.settings import Body, Settings, Sweep, sector_choice
+
+__all__ = ["Body", "Settings", "Sweep", "case_files", "sector_choice"]

@@ -1,0 +1,374 @@
+"""Grid of a case: a cylinder or a sector of one in hexahedra, refined and cut by snappyHexMesh.
+
+The base grid is made of kites round the shaft (sectors of at most 120 deg, so that no corner is flat) and rings of
+hexahedra outside. With many blades the kites shrink into the hub. Sectors are periodic by ``cyclicAMI``; parallel
+snappyHexMesh aborts with such patches present, therefore they are plain at first and made by createPatch afterwards.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from bemt.openfoam.settings import PIPE_RADIUS, Settings
+from bemt.openfoam.text import dictionary, vector
+
+__all__ = ["block_mesh", "create_patch", "extent", "lines", "mrf_zone", "set_fields", "snappy", "topo_set"]
+
+SURFACE_LEVEL = 6
+LINES = "lines.obj"
+LINE_LEVEL = 4
+GROWTH = 1.25
+
+
+def extent(s: Settings) -> tuple[float, float, float]:
+    """Size of the domain.
+
+    Parameters
+    ----------
+    s : Settings
+        The case.
+
+    Returns
+    -------
+    radius, low, high : float
+        Radius, z of the ends. [m]
+    """
+    if s.domain == "pipe":
+        return PIPE_RADIUS * s.R, -8 * s.R, 5 * s.R
+    size = max([s.R, *([s.duct.radius] if s.duct else []), 0.4 * s.plate_radius])
+    low = -10 * size if s.plate_z is None else min(-6 * size, s.plate_z - 4 * size)
+    return (6.0 if s.sideslip else 5.0) * size, low, 6 * size
+
+
+def _graded(length: float, first: float) -> tuple[int, float]:
+    """Count and ratio of last to first of cells that grow away from one that is `first` wide."""
+    count = max(1, round(math.log(1 + length * (GROWTH - 1) / first) / math.log(GROWTH)))
+    return count, GROWTH ** (count - 1)
+
+
+def _narrow(s: Settings) -> tuple[int, int]:
+    """Halvings that the base cells of a narrow sector have already, and their number across half of it.
+
+    The cells of a narrow sector are as wide as it allows, and as long and as high; the levels of refinement count from
+    there. (0, 0) when the kites round the shaft can be larger than the rotor.
+    """
+    step = 2 * math.pi / s.sectors
+    if s.sectors <= 2 or step >= math.radians(80):
+        return 0, 0
+    half = 0.4 * step * s.R
+    across = max(1, round(half / s.base_cell))
+    return max(0, round(math.log2(s.base_cell * across / half))), across
+
+
+def block_mesh(s: Settings) -> str:
+    """Write ``blockMeshDict``.
+
+    Parameters
+    ----------
+    s : Settings
+        The case.
+
+    Returns
+    -------
+    str
+        The file.
+    """
+    radius, low, high = extent(s)
+    angle = 2 * math.pi / s.sectors
+    parts = math.ceil(angle / math.radians(120) - 1e-9) if s.sectors > 2 else 4 // s.sectors
+    step = angle / parts
+    shift, across = _narrow(s)
+    cell = s.base_cell / 2**shift
+    inner = 0.6 * radius if s.domain == "pipe" else 1.3 * s.R
+    if across:
+        inner = 0.6 * s.Rhub
+    mid = inner * (0.75 * math.sqrt(2.0) if step > 1.3 else 1 / math.cos(0.5 * step))
+    n = across or max(2, round(inner / cell), math.ceil(0.5 * step * (s.R if inner < s.R else inner) / cell))
+    if s.domain == "pipe":
+        rings, out = max(2, round((radius - inner) / cell)), 1.0
+    else:
+        rings, out = _graded(radius - inner, cell)
+    others = [body for body in (s.duct, s.body) if body is not None]
+    near = [min([s.rotor.low, -1.5 * s.R, *(b.low - 0.3 * s.R for b in others)]),
+            max([s.rotor.high, 0.75 * s.R, *(b.high + 0.3 * s.R for b in others)])]  # fmt: skip
+    if s.plate_z is not None:
+        near[0] = min(near[0], s.plate_z - 0.5 * s.R)
+    below, ratio_below = _graded(near[0] - low, cell)
+    middle = round((near[1] - near[0]) / cell)
+    above, ratio_above = _graded(high - near[1], cell)
+    layers = below + middle + above
+    z_grading = (f"(({near[0] - low:.6g} {below} {1 / ratio_below:.6g}) ({near[1] - near[0]:.6g} {middle} 1) "
+                 f"({high - near[1]:.6g} {above} {ratio_above:.6g}))")  # fmt: skip
+    turns = [-0.5 * angle + k * step for k in range(parts + (s.sectors > 1))]
+    points: list[tuple[float, float]] = [(0.0, 0.0)]
+    for r, at in ((inner, turns), (mid, [t + 0.5 * step for t in turns[:parts]]),
+                  (radius, turns), (radius, [t + 0.5 * step for t in turns[:parts]])):  # fmt: skip
+        points += [(r * math.cos(t), r * math.sin(t)) for t in at]
+    count, ends = len(points), len(turns)
+    A = [1 + k % ends for k in range(parts + 1)]
+    M = [1 + ends + k for k in range(parts)]
+    P = [1 + ends + parts + k % ends for k in range(parts + 1)]
+    Q = [1 + 2 * ends + parts + k for k in range(parts)]
+
+    def hexa(ids: tuple[int, ...], cells: tuple[int, int], grading: float) -> str:
+        corners = " ".join(str(i) for i in (*ids, *(i + count for i in ids)))
+        return f"    hex ({corners}) ({cells[0]} {cells[1]} {layers}) simpleGrading ({grading:.6g} 1 {z_grading})\n"
+
+    blocks, arcs, side, ends_faces = "", "", "", []
+    for k in range(parts):
+        kite, first, second = (0, A[k], M[k], A[k + 1]), (A[k], P[k], Q[k], M[k]), (M[k], Q[k], P[k + 1], A[k + 1])
+        for ids, cells, grading in ((kite, (n, n), 1.0), (first, (rings, n), out), (second, (rings, n), out)):
+            blocks += hexa(ids, cells, grading)
+            ends_faces.append(ids)
+        for a, b, t in ((P[k], Q[k], turns[0] + (k + 0.25) * step), (Q[k], P[k + 1], turns[0] + (k + 0.75) * step)):
+            side += f"            ({a} {b} {b + count} {a + count})\n"
+            for shift, z in ((0, low), (count, high)):
+                on_arc = vector(radius * math.cos(t), radius * math.sin(t), z)
+                arcs += f"    arc {a + shift} {b + shift} {on_arc}\n"
+    vertices = "".join(f"    {vector(x, y, z)}\n" for z in (low, high) for x, y in points)
+    bottom = "".join(f"            ({' '.join(map(str, ids))})\n" for ids in ends_faces)
+    top = "".join(f"            ({' '.join(str(i + count) for i in ids)})\n" for ids in ends_faces)
+    patches = [("inlet", "patch", top), ("outlet", "patch", bottom), ("side", "patch", side)]
+    if s.sectors > 1:
+        for name, a, p in (("periodic1", A[0], P[0]), ("periodic2", A[parts], P[parts])):
+            faces = "".join(f"            ({i} {j} {j + count} {i + count})\n" for i, j in ((0, a), (a, p)))
+            patches.append((name, "patch", faces))
+    row = "    {}\n    {{\n        type {};\n        faces\n        (\n{}        );\n    }}\n"
+    boundary = "".join(row.format(*patch) for patch in patches)
+    head = dictionary("blockMeshDict", {"convertToMeters": 1}, note=f"base cell {cell:.4g} m")
+    return (f"{head}\nvertices\n(\n{vertices});\n\nblocks\n(\n{blocks});\n\nedges\n(\n{arcs});\n\n"
+            f"boundary\n(\n{boundary});\n\nmergePatchPairs\n(\n);\n")  # fmt: skip
+
+
+def mrf_zone(s: Settings) -> tuple[float, float, float]:
+    """Cylinder that turns with the rotor.
+
+    Parameters
+    ----------
+    s : Settings
+        The case.
+
+    Returns
+    -------
+    radius, low, high : float
+        Radius, z of the ends. [m]
+
+    Notes
+    -----
+    It may reach into a duct's wall, which does not turn with it, but never beyond one.
+    """
+    margin = 0.15 * s.R
+    low, high = s.rotor.low - margin, s.rotor.high + margin
+    if s.body is not None:
+        low = max(low, 0.5 * (s.rotor.low + s.body.high))
+    if s.plate_z is not None:
+        low = max(low, 0.5 * (s.rotor.low + s.plate_z))
+    if s.duct is not None:
+        return 0.5 * (s.R + s.gap + s.duct.radius), low, high
+    return (1.1 if s.domain == "free" else 1.5) * s.R, low, high
+
+
+def lines(s: Settings) -> str:
+    """Write lines along the blades' pitch axes and in the duct's wall, from which refinement starts.
+
+    Parameters
+    ----------
+    s : Settings
+        The case.
+
+    Returns
+    -------
+    str
+        An OBJ file of lines.
+
+    Notes
+    -----
+    snappyHexMesh looks for surfaces between the centres of neighbouring cells. A blade is thinner and narrower than the
+    base cells and would be overlooked.
+    """
+    chains = []
+    for k in range(s.B):
+        turn = 2 * math.pi * k / s.B
+        radii = [s.Rhub + (0.98 * s.R - s.Rhub) * i / 8 for i in range(9)]
+        chains.append([(r * math.cos(turn), r * math.sin(turn), 0.0) for r in radii])
+    if s.duct is not None:
+        r = 0.5 * (s.R + s.gap + s.duct.radius)
+        for f in (0.02, 0.25, 0.5, 0.75, 0.98):
+            z = s.duct.low + f * (s.duct.high - s.duct.low)
+            chains.append([(r * math.cos(t), r * math.sin(t), z) for t in (math.pi * i / 36 for i in range(73))])
+    points, rows, count = "", "", 0
+    for chain in chains:
+        points += "".join(f"v {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in chain)
+        rows += "".join(f"l {count + i} {count + i + 1}\n" for i in range(1, len(chain)))
+        count += len(chain)
+    return points + rows
+
+
+def _cylinder(low: float, high: float, radius: float) -> dict[str, Any]:
+    return {"type": "searchableCylinder", "point1": vector(0, 0, low), "point2": vector(0, 0, high), "radius": radius}
+
+
+def _tips(s: Settings) -> dict[str, dict[str, Any]]:
+    """Boxes round the clearance of every blade in the domain."""
+    out = {}
+    inside = s.B // s.sectors
+    depth = max(s.gap, 0.01 * s.R)
+    wide = 2 * s.R * math.sin(min(s.blades.tip_half_angle + 0.02, 1.2))
+    sag = s.R * (1 - math.cos(min(s.blades.tip_half_angle + 0.02, 1.2)))
+    start, span = s.R - depth - sag, 2 * depth + s.gap + sag
+    high = s.blades.tip_high - s.blades.tip_low + 4 * s.gap
+    for k in range(inside):
+        turn = 2 * math.pi * k / s.B
+        e1, e2 = (math.cos(turn), math.sin(turn)), (-math.sin(turn), math.cos(turn))
+        origin = [start * e1[i] - 0.5 * wide * e2[i] for i in (0, 1)]
+        out[f"tip{k + 1}"] = {
+            "type": "searchableRotatedBox", "span": vector(span, wide, high), "e1": vector(*e1, 0),
+            "e3": vector(0, 0, 1), "origin": vector(*origin, s.blades.tip_low - 2 * s.gap),
+        }  # fmt: skip
+    return out
+
+
+def snappy(s: Settings) -> str:
+    """Write ``snappyHexMeshDict``.
+
+    Parameters
+    ----------
+    s : Settings
+        The case.
+
+    Returns
+    -------
+    str
+        The file.
+    """
+    R, cell = s.R, s.base_cell
+    geometry: dict[str, Any] = {f"{name}.stl": {"type": "triSurfaceMesh", "name": name} for name in s.surfaces}
+    thick = 0.12 * R
+    if s.plate_z is not None:
+        geometry["plate"] = _cylinder(s.plate_z - thick, s.plate_z, s.plate_radius)
+    reach = 1.15 * R if s.duct is None else s.duct.radius + 0.1 * R
+    tail = s.plate_z if s.plate_z is not None else -4 * R
+    geometry["disk"] = _cylinder(s.blades.low - 0.08 * R, s.blades.high + 0.08 * R, min(1.08 * R, reach))
+    geometry["stream"] = _cylinder(max(-2.0 * R, tail), 0.35 * R, reach)
+    geometry["wake"] = _cylinder(tail, 0.8 * R, 1.2 * reach)
+    regions = {"disk": 3, "stream": 2, "wake": 1}
+    level = {"blade": (SURFACE_LEVEL - 1, SURFACE_LEVEL), "hub": (4, 4), "duct": (3, 4), "stator": (4, 5),
+             "centrebody": (4, 4), "plate": (2, 2)}  # fmt: skip
+    if s.duct is not None and s.gap > 0:
+        fine = math.ceil(math.log2(3 * cell / s.gap) - 0.25)
+        boxes = _tips(s)
+        geometry |= boxes
+        regions |= dict.fromkeys(boxes, min(max(fine, SURFACE_LEVEL - 1), SURFACE_LEVEL + 1))
+    shift = _narrow(s)[0]
+    regions = {name: max(0, depth - shift) for name, depth in regions.items()}
+    level = {name: (max(0, a - shift), max(0, b - shift)) for name, (a, b) in level.items()}
+    surfaces = {name: {"level": level[name], "patchInfo": {"type": "wall"}}
+                for name in (*s.surfaces, *(["plate"] if s.plate_z is not None else []))}  # fmt: skip
+    radius, _, high = extent(s)
+    inside = (
+        0.537 * min(radius, R),
+        0.0131 * R,
+        0.5 * (high + max(b.high for b in (s.rotor, s.duct) if b)) + 0.0123 * R,
+    )
+    entries = {
+        "castellatedMesh": True, "snap": True, "addLayers": False, "geometry": geometry,
+        "castellatedMeshControls": {
+            "maxLocalCells": 20000000, "maxGlobalCells": 40000000, "minRefinementCells": 0, "maxLoadUnbalance": 0.2,
+            "nCellsBetweenLevels": 2, "resolveFeatureAngle": 20, "allowFreeStandingZoneFaces": True,
+            "features": f"( {{ file \"{LINES}\"; level {LINE_LEVEL - shift}; }} )",
+            "refinementSurfaces": surfaces,
+            "refinementRegions": {k: {"mode": "inside", "levels": [(1e15, n)]} for k, n in regions.items()},
+            "locationInMesh": vector(*inside),
+        },
+        "snapControls": {
+            "nSmoothPatch": 3, "tolerance": 2.0, "nSolveIter": 40, "nRelaxIter": 5, "nFeatureSnapIter": 10,
+            "implicitFeatureSnap": True, "explicitFeatureSnap": False, "multiRegionFeatureSnap": False,
+        },
+        "addLayersControls": {
+            "relativeSizes": True, "layers": {}, "expansionRatio": 1.2, "finalLayerThickness": 0.5, "minThickness": 0.1,
+            "nGrow": 0, "featureAngle": 60, "nRelaxIter": 3, "nSmoothSurfaceNormals": 1, "nSmoothNormals": 3,
+            "nSmoothThickness": 10, "maxFaceThicknessRatio": 0.5, "maxThicknessToMedialRatio": 0.3,
+            "minMedianAxisAngle": 90, "nBufferCellsNoExtrude": 0, "nLayerIter": 20,
+        },
+        "meshQualityControls": {
+            "maxNonOrtho": 65, "maxBoundarySkewness": 20, "maxInternalSkewness": 4, "maxConcave": 80, "minVol": 1e-20,
+            "minTetQuality": 1e-15, "minArea": -1, "minTwist": 0.02, "minDeterminant": 0.001, "minFaceWeight": 0.05,
+            "minVolRatio": 0.01, "minTriangleTwist": -1, "nSmoothScale": 4, "errorReduction": 0.75,
+            "relaxed": {"maxNonOrtho": 75},
+        },
+        "mergeTolerance": 1e-6,
+    }  # fmt: skip
+    return dictionary("snappyHexMeshDict", entries)
+
+
+def topo_set(s: Settings) -> str:
+    """Write ``topoSetDict``: the cells that turn.
+
+    Parameters
+    ----------
+    s : Settings
+        The case.
+
+    Returns
+    -------
+    str
+        The file.
+    """
+    radius, low, high = mrf_zone(s)
+    where = {"p1": vector(0, 0, low), "p2": vector(0, 0, high), "radius": radius}
+    actions: list[dict[str, Any]] = [
+        {"name": "turning", "type": "cellSet", "action": "new", "source": "cylinderToCell", **where},
+        {"name": "turning", "type": "cellZoneSet", "action": "new", "source": "setToCellZone", "set": "turning"},
+    ]
+    body = "".join("    { " + " ".join(f"{k} {v if isinstance(v, str) else f'{v:.9g}'};" for k, v in a.items()) + " }\n"
+                   for a in actions)  # fmt: skip
+    return dictionary("topoSetDict", {}) + f"actions\n(\n{body});\n"
+
+
+def create_patch(s: Settings) -> str:
+    """Write ``createPatchDict``: the periodic sides.
+
+    Parameters
+    ----------
+    s : Settings
+        The case.
+
+    Returns
+    -------
+    str
+        The file; empty of patches for the whole rotor.
+    """
+    rows = ""
+    pairs = (("side1", "side2", "periodic1"), ("side2", "side1", "periodic2")) if s.sectors > 1 else ()
+    for name, other, source in pairs:
+        # side1 is the lower side: turned by plus the angle it falls on side2
+        angle = 360 / s.sectors
+        rows += (f"    {{\n        name {name};\n        patchInfo\n        {{\n            type cyclicAMI;\n"
+                 f"            neighbourPatch {other};\n            transform rotational;\n"
+                 f"            rotationAxis (0 0 1);\n            rotationCentre (0 0 0);\n"
+                 f"            rotationAngle {angle:.9g};\n            lowWeightCorrection 0.2;\n"
+                 f"            matchTolerance 0.0001;\n        }}\n"
+                 f"        constructFrom patches;\n        patches ({source});\n    }}\n")  # fmt: skip
+    return dictionary("createPatchDict", {"pointSync": False}) + f"patches\n(\n{rows});\n"
+
+
+def set_fields(s: Settings) -> str:
+    """Write ``setFieldsDict``: the run starts with a slipstream behind the disk.
+
+    Parameters
+    ----------
+    s : Settings
+        The case.
+
+    Returns
+    -------
+    str
+        The file.
+    """
+    tail = -5 * s.R if s.plate_z is None else s.plate_z
+    front, radius = (0.1 * s.R, 0.85 * s.R) if s.duct is None else (s.duct.high, s.R)
+    body = (f"defaultFieldValues\n(\n);\n\nregions\n(\n    cylinderToCell\n    {{\n        p1 {vector(0, 0, tail)};\n"
+            f"        p2 {vector(0, 0, front)};\n        radius {radius:.9g};\n        fieldValues\n        (\n"
+            f"            volVectorFieldValue U {vector(0, 0, -s.slipstream)}\n        );\n    }}\n);\n")  # fmt: skip
+    return dictionary("setFieldsDict", {}) + body

@@ -1,0 +1,121 @@
+"""``python -m bemt report CASES --out DIR``: the validation report as one self-contained HTML file and a summary.
+
+What the pages show is gathered as plain values (:mod:`bemt.report.gather`), then written; no value of a file reaches a
+page unescaped, no file outside of DIR is written, and the HTML lets no script run but its own.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from bemt.errors import Fault, InputError
+
+__all__ = ["HTML_NAME", "MARKDOWN_NAME", "book_html", "run"]
+
+HTML_NAME, MARKDOWN_NAME = "report.html", "report.md"
+
+
+def book_html(book: Mapping[str, Any]) -> str:
+    """Write the HTML of a report.
+
+    Parameters
+    ----------
+    book : mapping
+        From :func:`bemt.report.gather.gather`.
+
+    Returns
+    -------
+    str
+        The whole file.
+    """
+    from bemt.report.case_page import case_page, reproduction_table
+    from bemt.report.cfd_page import cfd_page
+    from bemt.report.diagnosis_block import diagnosis_parts
+    from bemt.report.front import front_page
+    from bemt.report.markup import document, esc, section
+    from bemt.report.trend_page import trend_page
+
+    ids = {
+        i: f"case-{i + 1}-" + re.sub(r"[^A-Za-z0-9_-]+", "-", str(page["result"]["name"]))[:60]
+        for i, page in enumerate(book["cases"])
+    }
+    pages = [("front", "Front page", front_page(book, ids))]
+    for i, page in enumerate(book["cases"]):
+        pages.append((ids[i], str(page["result"]["name"])[:40], case_page(page, book["reproduction"])))
+    pages.append(("trends", "Trends", trend_page(book)))
+    pages.append(("cfd", "Own CFD", cfd_page(book["cfd"])))
+    told = "".join(section(item["name"], diagnosis_parts(item)) for item in book["diagnoses"])
+    pages.append(("diagnoses", "Diagnoses", f"<h2>Diagnoses</h2>{told}" if told else ""))
+    numbers = reproduction_table(book["reproduction"])
+    words = (
+        "<p>T. Cahill, MS thesis, Northeastern University, April 2025. Statistics of the UIUC database are checked by "
+        f"<code>{esc('python -m bemt reproduce')}</code> where those data are.</p>"
+    )
+    pages.append(
+        (
+            "reproduction",
+            "Reproduction",
+            f"<h2>Every number of the source thesis</h2>{words}{numbers}" if numbers else "",
+        )
+    )
+    lead = (
+        "Propellers and ducted fans: blade element momentum theory beside the K1/K2 formula, CFD, bench and vendor. "
+        "Nothing here is fitted to the value it is compared with."
+    )
+    foot = (
+        f"bemt {book['version']}. Thrust in newtons, CT = T/(ρ n² D⁴), CP = P/(ρ n³ D⁵). Colours after Okabe and Ito. "
+        "This file loads nothing from the network."
+    )
+    return document("Validation report", lead, [page for page in pages if page[2]], foot)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Do what the command line asks.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        ``paths``, ``out``, ``quiet``.
+
+    Returns
+    -------
+    int
+        Exit code: that of the sweep behind the report.
+    """
+    from bemt.report.gather import gather
+    from bemt.report.summary import summary
+    from bemt.tables import write_atomic
+
+    show = sys.stderr.isatty() and not args.quiet
+
+    def progress(line: str) -> None:
+        if show:
+            sys.stderr.write(f"\r\x1b[2K{line[:110]}")
+            sys.stderr.flush()
+
+    out = Path(args.out)
+    try:
+        book = gather(args.paths, out, progress)
+        text = book_html(book)
+        try:
+            write_atomic(out / HTML_NAME, text)
+            write_atomic(out / MARKDOWN_NAME, summary(book))
+        except OSError as error:
+            raise InputError(
+                Fault(str(out), "", error.strerror or "no file", "a folder that can be written")
+            ) from error
+    finally:
+        if show:
+            sys.stderr.write("\r\x1b[2K")
+    for page in book["cases"]:
+        for fault in page["result"]["faults"]:
+            print(fault, file=sys.stderr)
+    if not args.quiet:
+        print(f"{out / HTML_NAME}: {len(text.encode()) / 1e6:.2f} MB, {len(book['cases'])} cases")
+        print(f"{out / MARKDOWN_NAME}")
+    return int(book["exit_code"])

@@ -1,0 +1,413 @@
+"""The page of one case."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from bemt.report.audit_block import audit_block
+from bemt.report.diagnosis_block import diagnosis_block
+from bemt.report.markup import Cell, badge, esc, image, num, section, table
+from bemt.report.plot import COLOURS, Plot, Trace, figure
+from bemt.report.verdicts import headline, verdict
+from bemt.tables import number_text
+
+__all__ = ["case_page", "reproduction_table"]
+
+LOOK = {"cfd": "bar", "bench": "cross", "vendor": "triangle", "openfoam": "star", "openfoam incompressible": "diamond",
+        "flight": "square"}  # fmt: skip
+NAMES = {"cfd": "CFD, recorded", "openfoam": "CFD, own, compressible",
+         "openfoam incompressible": "CFD, own, incompressible"}  # fmt: skip
+CHANNEL_UNITS = {
+    "CT": "CT [-]",
+    "CP": "CP [-]",
+    "thrust_N": "thrust [N]",
+    "torque_Nm": "torque [N m]",
+    "power_W": "shaft power [W]",
+    "eta": "efficiency η [-]",
+}
+
+
+def _points(page: Mapping[str, Any], x: str, y: str, keep: Any) -> list[Trace]:
+    """Recorded values as points, one trace per source."""
+    out, result = [], page["result"]
+    everything = [*result["rows"], *page.get("own_rows", [])]
+    D = result["conditions"]["diameter_m"]
+    for source, shape in LOOK.items():
+        rows = [r for r in everything if r["source"] == source and r.get(y) is not None and keep(r)]
+        if not rows:
+            continue
+        xs = [r["airspeed_m_s"] / (r["rpm"] / 60.0 * D) if x == "J" else r[x] for r in rows]
+        u = [r.get("u") if y == "thrust_N" else None for r in rows]
+        out.append(
+            Trace(
+                NAMES.get(source, source),
+                xs,
+                [r[y] for r in rows],
+                u,
+                COLOURS.get(source, COLOURS["other"]),
+                "",
+                shape,
+                True,
+                [r["label"] for r in rows],
+            )
+        )
+    return out
+
+
+def _geometry(page: Mapping[str, Any]) -> str:
+    g, parts = page["geometry"], []
+    title = headline(page["result"])
+    for name, words in (("rotor", "rotor"), ("blade", "one blade, root left, seen from the front")):
+        if name in page["pictures"]:
+            parts.append(
+                f"<figure><figcaption>{esc(words.capitalize())}</figcaption>"
+                f"{image(page['pictures'][name], f'{title}: {words}')}</figure>"
+            )
+    if g:
+        r = g["r_over_R"]
+        parts.append(figure(Plot("Chord", "r/R [-]", "chord [mm]", [Trace("chord", r, g["chord_mm"])])))
+        parts.append(
+            figure(
+                Plot(
+                    "Blade angle and twist",
+                    "r/R [-]",
+                    "blade angle β [deg]",
+                    [Trace("β", r, g["beta_deg"], colour=COLOURS["bench"])],
+                )
+            )
+        )
+    inner = "".join(parts)
+    return section("Geometry", f'<div class="figures">{inner}</div>' if inner else "")
+
+
+def _inputs(page: Mapping[str, Any]) -> str:
+    result = page["result"]
+    c = result["conditions"]
+    rows: list[Sequence[Cell | str]] = [
+        ["rotational speed", num(c["rpm"], 6), "rev/min"],
+        ["airspeed", num(c["airspeed_m_s"]), "m/s"],
+        ["density", num(c["density_kg_m3"]), "kg/m³"],
+        ["temperature", num(c["temperature_C"], 3), "°C"],
+        ["diameter", num(c["diameter_m"]), "m"],
+        ["hub diameter", num(c["hub_diameter_m"]), "m"],
+        ["blades", num(c["blades"]), "-"],
+        ["pitch at 0.75 R", num(c["pitch_075R_m"]), "m"],
+        ["solidity", num(c["solidity"], 3), "-"],
+        ["blade elements", num(c["stations"]), "-"],
+        ["n_crit of the section tables", num(c["n_crit"], 3), "-"],
+        ["section drag level", num(c["drag_level"], 3), "-"],
+    ]
+    out = [table(["input", "value", "unit"], rows, sortable=False)]
+    out.append(
+        f"<p>Effects on: {esc(', '.join(map(str, c['effects'])))}. Convention: {esc(c['convention'])}. Air: "
+        f"{esc(c['air'])}. Program version {esc(result.get('version', 'unknown'))}.</p>"
+    )
+    files = [[f["name"], Cell(markup=f"<code>{esc(f['sha256'])}</code>")] for f in page["files"]]
+    out.append(table(["file", "SHA-256"], files, sortable=False))
+    if result["assumptions"]:
+        out.append(
+            "<p>The source does not give the following. Each is declared as a range; the last columns show what "
+            "the range does to the thrust when it alone is changed.</p>"
+        )
+        lines = []
+        for a in result["assumptions"]:
+            at = [v for v in a["thrust_N"] if v is not None]
+            spread = f"{number_text(min(at))} – {number_text(max(at))}" if at else "unknown"
+            nominal = a["nominal"]
+            shown = num(nominal) if isinstance(nominal, int | float) else Cell(str(nominal))
+            lines.append(
+                [
+                    Cell(markup=f"<code>{esc(a['key'])}</code>"),
+                    shown,
+                    a["range"],
+                    spread,
+                    num(a["u_thrust_N"], 2),
+                    a["why"],
+                ]
+            )
+        out.append(table(["assumed", "value", "range", "thrust over the range [N]", "u [N]", "why"], lines))
+    return section("Inputs and assumptions", *out)
+
+
+def _performance(page: Mapping[str, Any]) -> str:
+    result, c = page["result"], page["curves"]
+    if not c:
+        return ""
+    own, j, w = result["conditions"], c["over_J"], c["over_rpm"]
+    plots = []
+
+    def near(row: Mapping[str, Any], key: str) -> bool:
+        return bool(abs(row[key] - own[key]) <= 0.02 * max(abs(own[key]), 1.0))
+
+    for name in ("CT", "CP", "eta"):
+        y, label = j[name], CHANNEL_UNITS[name]
+        if name == "eta":  # a ratio of two small numbers where thrust ends
+            y = np.where(j["CT"] > 0.1 * np.nanmax(np.append(j["CT"], 0.0)), y, np.nan)
+        traces = [Trace("BEMT", j["J"], y, j[f"u_{name}"], COLOURS["bemt"])]
+        if name == "CT":
+            traces.append(Trace("K1/K2", j["J"], j["k1k2_CT"], None, COLOURS["k1k2"], "7 4"))
+        if name != "eta":
+            traces += _points(page, "J", name, lambda r: near(r, "rpm"))
+        plots.append(
+            Plot(
+                f"{label.split(' [')[0]} over advance ratio at {own['rpm']:g} rev/min",
+                "J = V / (n D) [-]",
+                label,
+                traces,
+            )
+        )
+    T = [
+        Trace("BEMT", w["rpm"], w["thrust_N"], w["u_thrust_N"], COLOURS["bemt"]),
+        Trace("K1/K2", w["rpm"], w["k1k2_thrust_N"], None, COLOURS["k1k2"], "7 4"),
+        *_points(page, "rpm", "thrust_N", lambda r: near(r, "airspeed_m_s")),
+    ]
+    at = f" at {own['airspeed_m_s']:g} m/s"
+    plots.append(Plot("Thrust over rotational speed" + at, "rotational speed [rev/min]", "thrust [N]", T, x_zero=True))
+    P = [
+        Trace("BEMT", w["rpm"], w["power_W"], w["u_power_W"], COLOURS["bemt"]),
+        *_points(page, "rpm", "power_W", lambda r: near(r, "airspeed_m_s")),
+    ]
+    plots.append(
+        Plot("Shaft power over rotational speed" + at, "rotational speed [rev/min]", "shaft power [W]", P, x_zero=True)
+    )
+    with np.errstate(divide="ignore", invalid="ignore"):
+        per_kW = np.where(w["power_W"] > 0, 1e3 * w["thrust_N"] / w["power_W"], np.nan)
+    plots.append(
+        Plot(
+            "Thrust per shaft power" + at,
+            "rotational speed [rev/min]",
+            "thrust per power [N/kW]",
+            [Trace("BEMT", w["rpm"], per_kW.tolist(), None, COLOURS["bemt"])],
+            x_zero=True,
+        )
+    )
+    drawn = "".join(figure(p) for p in plots)
+    words = (
+        "<p>Bands: one standard uncertainty from the declared assumptions. They do not hold the error of the theory. "
+        "Points: recorded values; a value without a bar states no uncertainty.</p>"
+    )
+    return section("Performance", words + f'<div class="figures">{drawn}</div>' if drawn else "")
+
+
+def _radial(page: Mapping[str, Any]) -> str:
+    d = page["radial"]
+    if not d:
+        return ""
+    r = d["r_over_R"]
+    R = 0.5 * page["result"]["conditions"]["diameter_m"]
+    own = page.get("own_radial") or []
+    name = f"CFD, own, {page['own_cfd']['solver']}" if own else ""
+    x = [p[0] / R for p in own]
+    thrust, torque = (
+        [Trace(name, x, [p[k] for p in own], None, COLOURS["openfoam"], "7 4")] if own else [] for k in (1, 2)
+    )
+    plots = (
+        Plot("Thrust loading, all blades", "r/R [-]", "dT/dr [N/m]", [Trace("BEMT", r, d["dT_dr"]), *thrust]),
+        Plot("Torque loading, all blades", "r/R [-]", "dQ/dr [N]", [Trace("BEMT", r, d["dQ_dr"]), *torque]),
+        Plot("Angle of attack", "r/R [-]", "α [deg]", [Trace("BEMT", r, d["alpha_deg"])]),
+        Plot("Section Mach number", "r/R [-]", "M [-]", [Trace("BEMT", r, d["M"])]),
+    )
+    drawn = "".join(figure(p) for p in plots)
+    return section("Radial loading", f'<div class="figures">{drawn}</div>' if drawn else "")
+
+
+def _fan(result: Mapping[str, Any]) -> str:
+    fan = result.get("fan")
+    if not fan:
+        return ""
+    rows = [
+        ["thrust of the rotor", num(fan["rotor_thrust_N"]), "N"],
+        ["thrust of the duct", num(fan["duct_thrust_N"]), "N"],
+        ["thrust of the stator", num(fan["stator_thrust_N"]), "N"],
+        ["share of the duct", num(fan["duct_share"], 3), "-"],
+        ["exhaust speed", num(fan["exhaust_speed_m_s"]), "m/s"],
+        ["u of the exhaust speed", num(fan["u_exhaust_speed_m_s"], 2, none="unknown"), "m/s"],
+        ["momentum through the exit", num(fan["exit_momentum_N"]), "N"],
+        ["pitch speed", num(fan["geometric_pitch_speed_m_s"]), "m/s"],
+    ]
+    return section("Duct and fan", table(["part", "value", "unit"], rows, sortable=False))
+
+
+def _verification(page: Mapping[str, Any]) -> str:
+    v = page["refinement"]
+    if not v:
+        return ""
+    plot = figure(
+        Plot(
+            "Thrust against blade elements",
+            "blade elements [-]",
+            "thrust [N]",
+            [Trace("BEMT", v["stations"], v["thrust_N"], colour=COLOURS["bemt"])],
+            log_x=True,
+            zero=False,
+        )
+    )
+    rows = [
+        [num(n), num(T, 7), num(Q, 6)]
+        for n, T, Q in zip(v["stations"], v["thrust_N"].tolist(), v["torque_Nm"].tolist(), strict=True)
+    ]  # noqa: E501
+    words, study = [], v.get("grid_study")
+    if math.isfinite(v["change_to_finest"]):
+        words.append(
+            f"With the {v['used']} elements used, the thrust is {100 * v['change_to_finest']:+.3f} % off that with "
+            f"{v['stations'][-1]}."
+        )
+    if study and study["order"] is not None and study["gci_fine"] is not None:
+        words.append(f"Observed order {study['order']:.2f}; grid convergence index {100 * study['gci_fine']:.4f} %.")
+    if study and study["flags"]:
+        words.append("Remarks: " + "; ".join(study["flags"]) + ".")
+    text = f"<p>{esc(' '.join(words))}</p>" if words else ""
+    if not (plot or text):
+        return ""
+    side = f"<div>{table(['elements', 'thrust [N]', 'torque [N m]'], rows)}{text}</div>"
+    return section("Verification", f'<div class="figures">{plot}{side}</div>')
+
+
+def _validation(result: Mapping[str, Any]) -> str:
+    rows = []
+    for c in result["comparisons"]:
+        if c["source"] == "k1k2_printed" and c["model"] != "k1k2":
+            continue
+        rows.append(
+            [
+                c["model"],
+                c["reference"],
+                _quantity(c),
+                num(c["S"]),
+                num(c["D"]),
+                num(c["E"], 3),
+                num(c["E_pct"], signed=True),
+                num(c["u_num"], 2),
+                num(c["u_input"], 2),
+                num(c["u_D"], 2, none="unknown"),
+                num(c["u_val"], 2, none="unknown"),
+                c["verdict"],
+            ]
+        )
+    if not rows:
+        return ""
+    words = (
+        "<p>After ASME V&amp;V 20: E = S − D, u_val² = u_num² + u_input² + u_D². |E| ≤ u_val reads “not "
+        "distinguishable from noise”. An uncertainty that nobody stated stays unknown, and so does the verdict.</p>"
+    )
+    header = ["model", "against", "quantity", "S", "D", "E", "E %", "u_num", "u_input", "u_D", "u_val", "verdict"]
+    return section("Validation", words, table(header, rows))
+
+
+def _quantity(c: Mapping[str, Any]) -> str:
+    """Name of a channel with its unit: thrust [N]."""
+    name, unit = str(c["quantity"]), str(c["unit"])
+    for suffix in ("_m_s", "_Nm", "_N", "_W"):
+        name = name.removesuffix(suffix)
+    return f"{name.replace('_', ' ')} [{unit}]"
+
+
+def reproduction_table(items: Sequence[Mapping[str, Any]]) -> str:
+    """Make the table of numbers of the thesis beside ours.
+
+    Parameters
+    ----------
+    items : sequence of mapping
+        From :mod:`bemt.reproduce`.
+
+    Returns
+    -------
+    str
+        HTML; empty without items.
+    """
+    rows = []
+    for item in items:
+        status = str(item["status"])
+        kind = "fault" if status.startswith("not reproduced") else "unknown" if "input" in status else "fine"
+        ours = item["ours"]
+        shown = num(ours, 5) if isinstance(ours, int | float) else Cell("" if ours is None else str(ours))
+        try:
+            stated = num(float(item["stated"]))
+            stated = Cell(str(item["stated"]), stated.value, True)
+        except ValueError:
+            stated = Cell(str(item["stated"]))
+        words = status.removesuffix(", because")
+        rows.append(
+            [
+                str(item["quantity"]),
+                stated,
+                shown,
+                str(item["unit"]),
+                Cell(words, markup=badge(kind, words)),
+                str(item["note"]),
+            ]
+        )
+    return table(["quantity", "stated", "ours", "unit", "status", "note"], rows)
+
+
+def _of_case(items: Sequence[Mapping[str, Any]], name: str) -> list[Mapping[str, Any]]:
+    """Items that name the case: its last word before a colon, or its name in the heading of their section."""
+    last = name.rpartition("_")[2].lower()
+    flat = "".join(c for c in name.lower() if c.isalnum())
+
+    def about(item: Mapping[str, Any]) -> bool:
+        head = "".join(c for c in str(item["section"]).lower() if c.isalnum())
+        return str(item["quantity"]).lower().startswith(last + ":") or (len(flat) > 3 and flat in head)
+
+    return [item for item in items if about(item)]
+
+
+def _limits(page: Mapping[str, Any]) -> str:
+    result = page["result"]
+    flags: dict[str, None] = {}
+    for row in [*result["rows"], *result["variants"]]:
+        for flag in row["flags"]:
+            flags.setdefault(f"{row['label']}: {flag}")
+    notes = [*flags, *result["notes"], *page["problems"]]
+    general = [
+        "Blade elements are independent: no sweep, no radial flow, no blade-vortex interaction, no unsteady loads.",
+        "Section tables come from a network trained on XFOIL, weak near stall at low Reynolds numbers; beyond stall "
+        "they continue as a flat plate.",
+    ]
+    items = "".join(
+        f"<li>{'<span class=long>' + esc(n) + '</span>' if len(n) > 600 else esc(n)}</li>" for n in [*notes, *general]
+    )
+    return section("Limits", f"<ul>{items}</ul>")
+
+
+def case_page(page: Mapping[str, Any], reproduction: Sequence[Mapping[str, Any]]) -> str:
+    """Write the page of one case.
+
+    Parameters
+    ----------
+    page : mapping
+        As :func:`bemt.report.gather.gather` makes it.
+    reproduction : sequence of mapping
+        All numbers of the thesis; those of this case are shown.
+
+    Returns
+    -------
+    str
+        HTML.
+    """
+    result = page["result"]
+    kind, word, sentence = verdict(result)
+    head = f"<h2>{esc(headline(result))}</h2><p>{badge(kind, word)} {esc(sentence)}</p>"
+    if not result.get("rows"):
+        faults = "".join(f'<li><span class="long">{esc(fault)}</span></li>' for fault in result.get("faults", []))
+        return head + f"<ul>{faults}</ul>"
+    return "".join(
+        [
+            head,
+            _geometry(page),
+            _performance(page),
+            _radial(page),
+            _fan(result),
+            _validation(result),
+            audit_block(result.get("audit", [])),
+            _verification(page),
+            diagnosis_block(page.get("diagnosis")),
+            _inputs(page),
+            section("Reproduction of the thesis", reproduction_table(_of_case(reproduction, str(result["name"])))),
+            _limits(page),
+        ]
+    )

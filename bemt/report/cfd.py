@@ -1,0 +1,251 @@
+"""This project's own CFD: recordings of campaigns (schema ``bemt.cfd-recording/1``) found in the folder of results.
+
+A recording is audited like anybody else's number. What has another shape than expected is left out.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from bemt.audit import CfdFacts, audit, audit_document
+from bemt.importers import number
+
+__all__ = ["attach", "cfd_runs", "is_plain", "operating_run", "radial_of"]
+
+SCHEMA = "bemt.cfd-recording/"
+CSV_BYTES = 20_000_000
+DOMAIN_OVER_D = {"free": 5.0, "pipe": 1.0}
+"""Width of the domains of :mod:`bemt.openfoam` over the rotor's diameter. [1]"""
+TURBULENCE = {"kOmegaSST": "k-omega SST", "realizableKE": "realizable k-epsilon"}
+NUMBERS = ("rpm", "airspeed_m_s", "J", "thrust_N", "torque_Nm", "u_thrust_N", "u_torque_Nm", "density_kg_m3",
+           "wall_distance_m", "tip_gap_mm", "sideslip_deg", "pitch_offset_deg", "level", "cells", "iterations",
+           "drift_thrust", "drift_torque", "scatter_thrust", "yplus_avg", "seconds", "converged")  # fmt: skip
+WORDS = ("run", "solver", "gas", "domain", "sector", "turbulence", "note")
+
+
+def _rows(path: Path) -> list[dict[str, str]]:
+    """Lines of a CSV file that somebody else wrote; none when it is missing or no text."""
+    try:
+        if path.stat().st_size > CSV_BYTES:
+            return []
+        text = path.read_text(encoding="utf-8", errors="replace")
+        return [{k: v for k, v in row.items() if isinstance(k, str) and isinstance(v, str)}
+                for row in csv.DictReader(io.StringIO(text))]  # fmt: skip
+    except (OSError, csv.Error):
+        return []
+
+
+def _value(text: str | None) -> float:
+    found = number(text) if text else None
+    return found if found is not None and math.isfinite(found) else math.nan
+
+
+def cfd_runs(out: Path) -> list[dict[str, Any]]:
+    """Read the recordings of CFD campaigns.
+
+    Parameters
+    ----------
+    out : Path
+        Folder of the results; ``cfd/*/manifest.json`` with a ``recording.csv`` beside it are read.
+
+    Returns
+    -------
+    list of dict
+        ``name``, ``title``, ``case``, ``manifest``, ``runs``, ``radial`` (run to radius [m], dT/dr [N/m] and dQ/dr
+        [N]), ``figures``. A run holds the columns of the recording, numbers as float with NaN where there is none.
+    """
+    from bemt.report.gather import read_json, safe_files
+
+    found = []
+    for path in sorted(out.glob("cfd/*/manifest.json")):
+        manifest = read_json(path)
+        if not isinstance(manifest, Mapping) or not str(manifest.get("schema", "")).startswith(SCHEMA):
+            continue
+        runs = []
+        for row in _rows(path.parent / "recording.csv"):
+            run: dict[str, Any] = {k: _value(row.get(k)) for k in NUMBERS} | {k: row.get(k, "") for k in WORDS}
+            if run["rpm"] > 0 and math.isfinite(run["thrust_N"]):
+                runs.append(run)
+        radial: dict[str, list[tuple[float, float, float]]] = {}
+        for row in _rows(path.parent / "radial.csv"):
+            point = tuple(_value(row.get(k)) for k in ("r_m", "thrust_per_radius_N_m", "torque_per_radius_Nm_m"))
+            if all(map(math.isfinite, point)):
+                radial.setdefault(row.get("run", ""), []).append(point)  # type: ignore[arg-type]
+        if runs:
+            found.append({"name": path.parent.name, "title": str(manifest.get("title") or path.parent.name),
+                          "case": str(manifest.get("case") or ""), "manifest": dict(manifest), "runs": runs,
+                          "radial": radial, "figures": safe_files(path.parent)})  # fmt: skip
+    return found
+
+
+def is_plain(run: Mapping[str, Any]) -> bool:
+    """Tell whether a run is the bare case: free domain, axial flow, no plate, blades as they are, settled.
+
+    Parameters
+    ----------
+    run : mapping
+        From :func:`cfd_runs`.
+
+    Returns
+    -------
+    bool
+        True for such a run.
+    """
+    apart = [run["sideslip_deg"], run["pitch_offset_deg"]]
+    return (run["domain"] == "free" and run["converged"] == 1 and math.isnan(run["wall_distance_m"])
+            and all(not abs(v) > 1e-9 for v in apart))  # fmt: skip
+
+
+def operating_run(found: Sequence[Mapping[str, Any]], result: Mapping[str, Any]) -> dict[str, Any] | None:
+    """Choose the run that stands for a case at its operating point: compressible before not, then the finest grid.
+
+    Parameters
+    ----------
+    found : sequence of mapping
+        From :func:`cfd_runs`.
+    result : mapping
+        Result of the case.
+
+    Returns
+    -------
+    dict or None
+        The run, with ``campaign``; None when there is none.
+    """
+    c = result.get("conditions")
+    if not c:
+        return None
+    ducted = result.get("kind") == "fan"
+    best = None
+    for item in found:
+        if item["case"] != result["name"] or ("duct" in item["name"] and not ducted):
+            continue
+        for run in item["runs"]:
+            if not is_plain(run) or abs(run["rpm"] / c["rpm"] - 1) > 1e-3 or (
+                math.isfinite(run["tip_gap_mm"]) and not ducted
+            ) or abs(run["airspeed_m_s"] - c["airspeed_m_s"]) > 0.05:  # fmt: skip
+                continue
+            rank = (run["solver"] == "compressible", run["turbulence"] == "kOmegaSST", run["level"])
+            if best is None or rank > best[0]:
+                best = (rank, {**run, "campaign": item["name"]})
+    return None if best is None else best[1]
+
+
+def radial_of(found: Sequence[Mapping[str, Any]], run: Mapping[str, Any]) -> list[tuple[float, float, float]]:
+    """Loads along the radius of a run, ascending.
+
+    Parameters
+    ----------
+    found : sequence of mapping
+        From :func:`cfd_runs`.
+    run : mapping
+        A run.
+
+    Returns
+    -------
+    list of (float, float, float)
+        Radius [m], dT/dr [N/m], dQ/dr [N]; empty when nothing was recorded.
+    """
+    return next((sorted(item["radial"][run["run"]]) for item in found if run["run"] in item["radial"]), [])
+
+
+def _facts(run: Mapping[str, Any], conditions: Mapping[str, Any], levels: int) -> CfdFacts:
+    """What the audit asks for."""
+    D, n = conditions["diameter_m"], run["rpm"] / 60.0
+    T, u = abs(run["thrust_N"]), run["u_thrust_N"]
+    grid = math.sqrt(max((u / T) ** 2 - run["scatter_thrust"] ** 2, 0.0)) if T > 0 and levels > 1 else math.nan
+    return CfdFacts(
+        M_tip=math.pi * D * n / conditions["a_sound_m_s"], J=run["airspeed_m_s"] / (n * D), cells=run["cells"],
+        pitch_over_D=conditions["pitch_075R_m"] / D, CT=run["thrust_N"] / (run["density_kg_m3"] * n**2 * D**4),
+        domain_over_D=DOMAIN_OVER_D.get(run["domain"], math.nan), compressible=run["solver"] == "compressible",
+        grids=levels, u_grid=grid if grid > 0 else math.nan, drift=run["drift_thrust"], wall="function",
+        y_plus=run["yplus_avg"], turbulence=TURBULENCE.get(run["turbulence"], run["turbulence"]), thrust_from="forces",
+        steady_mrf=True, skew_deg=0.0 if math.isnan(run["sideslip_deg"]) else run["sideslip_deg"],
+        ducted=conditions["ducted"],
+    )  # fmt: skip
+
+
+def _levels(item: Mapping[str, Any], found: Iterable[Mapping[str, Any]]) -> int:
+    """Grids behind the uncertainty of a recording: its own study, else that of the same case."""
+    rule = item["manifest"].get("rule")
+    if not isinstance(rule, Mapping) or rule.get("grid_study") is not True:
+        return 1
+    sizes = [1]
+    for other in (item, *(o for o in found if o["case"] == item["case"])):
+        studies = other["manifest"].get("grid_studies")
+        if isinstance(studies, list):
+            sizes += [len(s["levels"]) for s in studies if isinstance(s, Mapping) and isinstance(s.get("levels"), list)]
+    return max(sizes)
+
+
+def _plain_rows(found: Sequence[Mapping[str, Any]], result: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Runs of the bare case as rows like those of a sweep, each condition and flow once, finest grid."""
+    c: Mapping[str, Any] = result.get("conditions") or {}
+    best: dict[tuple[Any, ...], Mapping[str, Any]] = {}
+    for item in found if c else ():
+        if item["case"] != result["name"] or ("duct" in item["name"] and result.get("kind") != "fan"):
+            continue
+        for run in filter(is_plain, item["runs"]):
+            if run["turbulence"] == "kOmegaSST":
+                key = (run["solver"], round(run["rpm"], 3), round(run["airspeed_m_s"], 3))
+                if key not in best or run["level"] > best[key]["level"]:
+                    best[key] = run
+    rows = []
+    for run in best.values():
+        n, D, rho = run["rpm"] / 60.0, c["diameter_m"], run["density_kg_m3"]
+        power = 2 * math.pi * n * run["torque_Nm"]
+        rows.append({
+            "source": "openfoam" if run["solver"] == "compressible" else "openfoam incompressible",
+            "label": f"{run['solver']}, {run['cells']:.0f} cells", "rpm": run["rpm"],
+            "airspeed_m_s": run["airspeed_m_s"],
+            "thrust_N": run["thrust_N"], "u": run["u_thrust_N"], "torque_Nm": run["torque_Nm"], "power_W": power,
+            "CT": run["thrust_N"] / (rho * n**2 * D**4), "CP": power / (rho * n**3 * D**5),
+        })  # fmt: skip
+    return rows
+
+
+def attach(book: dict[str, Any]) -> None:
+    """Audit every run, and compare the run at a case's operating point with its BEMT.
+
+    Parameters
+    ----------
+    book : dict
+        From :func:`bemt.report.gather.gather`; runs get ``audit``, pages get ``own_cfd``, their results a comparison.
+
+    Notes
+    -----
+    The uncertainty of the run is that of its audit, so it is unknown as long as one of its lines is.
+    """
+    found = book["cfd"]
+    results = {page["result"]["name"]: page["result"] for page in book["cases"] if page["result"].get("conditions")}
+    for item in found:
+        result = results.get(item["case"])
+        for run in item["runs"]:
+            run["audit"] = None
+            if result is not None:
+                ducted = result.get("kind") == "fan" or "duct" in item["name"]
+                facts = _facts(run, {**result["conditions"], "ducted": ducted}, _levels(item, found))
+                run["audit"] = audit_document(f"{item['name']}: {run['run']}", audit(facts))
+    for page in book["cases"]:
+        result = page["result"]
+        run = operating_run(found, result)
+        page["own_cfd"] = run
+        page["own_rows"] = _plain_rows(found, result)
+        page["own_radial"] = radial_of(found, run) if run else []
+        bemt = next((r for r in result.get("rows", []) if r["source"] == "bemt"), None)
+        if run is None or bemt is None or bemt.get("thrust_N") is None:
+            continue
+        share = run["audit"]["u_relative"] if run["audit"] else math.nan
+        S, D, u_D = bemt["thrust_N"], run["thrust_N"], abs(run["thrust_N"]) * share
+        u_num, u_input = (math.nan if bemt.get(k) is None else bemt[k] for k in ("u_num", "u_input"))
+        u_val = math.sqrt(u_num**2 + u_input**2 + u_D**2)
+        word = "u_D unknown" if math.isnan(u_val) else (
+            "not distinguishable from noise" if abs(S - D) <= u_val else "differs")  # fmt: skip
+        line = {"model": "bemt", "reference": f"own CFD, {run['solver']}", "source": "openfoam", "quantity": "thrust_N",
+                "unit": "N", "S": S, "D": D, "E": S - D, "E_pct": 100 * (S - D) / D if D else None, "u_num": u_num,
+                "u_input": u_input, "u_D": u_D, "u_val": u_val, "verdict": word}  # fmt: skip
+        page["result"] = {**result, "comparisons": [*result["comparisons"], line]}

@@ -1,0 +1,211 @@
+"""What a case page plots: geometry, performance over J and rpm with bands, radial loading, refinement of the stations.
+
+The bands are the standard uncertainty from the declared assumptions, propagated as in :mod:`bemt.sweep_case`: one at a
+time through its range. They do not hold the error of the theory.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.case import Case
+from bemt.errors import InputError
+
+__all__ = ["case_curves", "geometry_curves", "radial_curves", "refinement"]
+
+Array = NDArray[np.float64]
+
+N_J, N_RPM = 29, 21
+COARSE = 20
+"""Blade elements of runs whose differences alone count."""
+REFINED = (10, 20, 40, 80)
+CHANNELS = ("CT", "CP", "eta", "thrust_N", "torque_Nm", "power_W")
+
+
+def geometry_curves(case: Case, n: int = 41) -> dict[str, Any]:
+    """Chord, blade angle and thickness over the radius.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+    n : int
+        Points.
+
+    Returns
+    -------
+    dict
+        ``r_over_R``, ``chord_over_R`` [1], ``beta_deg`` [deg], ``thickness`` [of the chord], ``chord_mm`` [mm].
+    """
+    rotor = case.rotor()
+    blade = rotor.blade
+    r = np.linspace(blade.Rhub, blade.R, n)
+    chord, beta = blade.at(r)
+    x = [a for a, _ in blade.anchors]
+    t = [section.thickness for _, section in blade.anchors]
+    return {
+        "r_over_R": r / rotor.R,
+        "chord_over_R": chord / rotor.R,
+        "chord_mm": 1e3 * chord,
+        "beta_deg": np.degrees(beta),
+        "thickness": np.interp(r / rotor.R, x, t) if x else np.full(n, np.nan),
+    }
+
+
+def _grids(case: Case, pitch_over_D: float) -> tuple[Array, Array, int]:
+    """Points of the curves: a line of J at the case's rpm, then a line of rpm at its airspeed."""
+    J = np.linspace(0.0, 1.45 * pitch_over_D, N_J)
+    rpm = np.linspace(0.2, 1.1, N_RPM) * case.rpm
+    speeds = J * case.rpm / 60.0 * case.diameter_m
+    return (
+        np.concatenate([np.full(N_J, case.rpm), rpm]),
+        np.concatenate([speeds, np.full(N_RPM, case.airspeed_m_s)]),
+        N_J,
+    )
+
+
+def case_curves(case: Case, threads: int = 1) -> dict[str, Any]:
+    """Performance over J and over rpm, BEMT with bands and K1/K2.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+    threads : int
+        Threads of the solver.
+
+    Returns
+    -------
+    dict
+        ``over_J`` and ``over_rpm``, each with the abscissa, the channels of BEMT, ``u_`` of each, the K1/K2 values and
+        the tip Mach number, arrays with NaN where not converged.
+    """
+    from bemt.evaluate import evaluate, k1k2, prepare
+    from bemt.sweep_case import spread
+
+    ready = prepare(case)
+    rpm, V, cut = _grids(case, ready.pitch_m / ready.diameter_m)
+    air = case.air()
+    nominal = evaluate(ready, rpm, V, air, threads)
+    values_of = {name: np.asarray(getattr(nominal, name), float) for name in CHANNELS}
+    rough = evaluate(prepare(case, None, COARSE), rpm, V, air, threads)
+    base = {name: np.asarray(getattr(rough, name), float) for name in CHANNELS}
+    variance = {name: np.zeros_like(v) for name, v in base.items()}
+    for assumption in case.assumptions:
+        runs: list[dict[str, Array]] = []
+        for value in assumption.values:
+            if value == assumption.nominal:
+                runs.append(base)
+                continue
+            changes = {assumption.key: value}
+            state = case.air(changes) if assumption.key.startswith("air.") else air
+            points = evaluate(prepare(case, changes, COARSE), rpm, V, state, threads)
+            runs.append({name: np.asarray(getattr(points, name), float) for name in CHANNELS})
+        for name, values in base.items():
+            variance[name] = variance[name] + spread(assumption.discrete, values, [run[name] for run in runs]) ** 2
+    simple = k1k2(case, None, rpm, V, air)
+    whole: dict[str, Array] = {
+        **values_of,
+        **{f"u_{name}": np.sqrt(v) for name, v in variance.items()},
+        "J": nominal.J,
+        "rpm": rpm,
+        "M_tip": nominal.M_tip,
+        "k1k2_thrust_N": simple.thrust_N,
+        "k1k2_CT": simple.CT,
+    }
+    over_J = {name: v[:cut] for name, v in whole.items()}
+    keep = _until_windmill(over_J["CT"])
+    return {
+        "over_J": {name: v[:keep] for name, v in over_J.items()},
+        "over_rpm": {name: v[cut:] for name, v in whole.items()},
+    }
+
+
+def _until_windmill(CT: Array) -> int:
+    """Points up to the first without thrust, that one included."""
+    below = np.flatnonzero(CT < 0.0)
+    return int(below[0]) + 1 if below.size else len(CT)
+
+
+def radial_curves(case: Case) -> dict[str, Any]:
+    """Loading along the blade at the case's own operating point.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+
+    Returns
+    -------
+    dict
+        ``r_over_R`` [1], ``dT_dr`` [N/m] and ``dQ_dr`` [N] of all blades, ``alpha_deg`` [deg], ``cl`` [1], ``M`` [1],
+        ``Re`` [1].
+    """
+    from bemt import solver
+    from bemt.evaluate import prepare
+
+    prep = prepare(case).prep
+    answer = solver.solve(prep, case.rpm, case.airspeed_m_s, case.air(), radial=True)
+    stations = prep.stations
+    radial = {name: values[0] for name, values in answer.radial.items()}
+    ok = np.where(answer.converged[0], 1.0, np.nan)
+    return {
+        "r_over_R": stations.r / prep.rotor.R,
+        "dT_dr": radial["dT"] / stations.dr * ok,
+        "dQ_dr": radial["dQ"] / stations.dr * ok,
+        "alpha_deg": np.degrees(radial["alpha"]) * ok,
+        "cl": radial["cl"] * ok,
+        "M": radial["M"] * ok,
+        "Re": radial["Re"] * ok,
+    }
+
+
+def refinement(case: Case) -> dict[str, Any]:
+    """Thrust and torque against the number of blade elements.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+
+    Returns
+    -------
+    dict
+        ``stations`` (ascending), ``thrust_N`` [N], ``torque_Nm`` [N m], and ``grid_study`` of the thrust on the three
+        finest as :class:`bemt.grid_study.GridStudy` has it, or None.
+    """
+    from bemt.evaluate import evaluate, prepare
+    from bemt.grid_study import grid_study
+
+    air = case.air()
+    points = [evaluate(prepare(case, None, n), case.rpm, case.airspeed_m_s, air) for n in REFINED]
+    T, Q = (np.array([float(getattr(p, name)[0]) for p in points]) for name in ("thrust_N", "torque_Nm"))
+    study = None
+    if np.all(np.isfinite(T[-3:])) and not np.any(T[-2:] == 0.0):
+        try:
+            found = grid_study(T[:-4:-1].tolist(), [2.0, 2.0])
+            study = {
+                "order": found.order,
+                "extrapolated": found.extrapolated,
+                "gci_fine": found.gci_fine,
+                "u_relative": found.u_relative,
+                "flags": list(found.flags),
+            }
+        except InputError:
+            study = None
+    used = int(case.get("model.stations"))
+    finest = float(T[-1])
+    near = REFINED.index(used) if used in REFINED else None
+    change = math.nan if near is None or finest == 0.0 else float(T[near]) / finest - 1.0
+    return {
+        "stations": list(REFINED),
+        "used": used,
+        "thrust_N": T,
+        "torque_Nm": Q,
+        "change_to_finest": change,
+        "grid_study": study,
+    }

@@ -1,0 +1,230 @@
+"""Everything a report shows, as plain values: results, curves, pictures, diagnoses, CFD runs."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import bemt
+from bemt.case import Case, find_cases, load_case
+from bemt.errors import InputError
+from bemt.report import curves, trends
+from geometry.common import GeometryError
+from geometry.picture import PictureError, Scene, blade_scene, cutaway_scene, render, rotor_scene
+
+__all__ = ["attach_diagnoses", "gather", "read_json", "safe_files"]
+
+Progress = Callable[[str], None]
+FIGURE_BYTES = 600_000
+FIGURES = 12
+ALL_BYTES = 4_000_000
+"""Of all figures of diagnoses together, so that the report stays below 8 MB."""
+JSON_BYTES = 20_000_000
+_FIGURE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,80}\.(png|svg)")
+
+
+def gather(paths: Sequence[str | Path], out: Path, progress: Progress | None = None) -> dict[str, Any]:
+    """Solve the cases (or take up the results of a sweep in `out`) and compute what the report plots.
+
+    Parameters
+    ----------
+    paths : sequence of str or Path
+        Case files, or folders of cases.
+    out : Path
+        Folder of the results.
+    progress : callable, optional
+        Called with a line of text.
+
+    Returns
+    -------
+    dict
+        ``version``, ``cases``, ``trends``, ``reproduction``, ``diagnoses``, ``cfd``, ``exit_code``.
+
+    Raises
+    ------
+    InputError
+        When a path holds no case.
+    """
+    from bemt.report.cfd import attach, cfd_runs
+    from bemt.sweep import sweep
+
+    tell = progress or (lambda line: None)
+    document = sweep(paths, out, progress=tell)
+    pages, solved = [], []
+    for path, result in zip(find_cases(paths), document["cases"], strict=True):
+        tell(f"report: {result['name']}")
+        page, case = _case(path, result)
+        pages.append(page)
+        if case is not None and result["rows"]:
+            solved.append((case, page))
+    tell("report: pictures")
+    _pictures(solved)
+    tell("report: trends")
+    book = {
+        "version": bemt.__version__,
+        "cases": pages,
+        "trends": _trends(solved, document["cases"]),
+        "reproduction": _reproduction(),
+        "exit_code": document["exit_code"],
+        "cfd": cfd_runs(out),
+    }
+    attach(book)
+    attach_diagnoses(book, out)
+    return book
+
+
+def _case(path: Path, result: Mapping[str, Any]) -> tuple[dict[str, Any], Case | None]:
+    """Page of one case."""
+    page: dict[str, Any] = {
+        "result": result,
+        "files": [],
+        "problems": [],
+        "pictures": {},
+        "geometry": {},
+        "curves": {},
+        "radial": {},
+        "refinement": {},
+    }
+    if not result["rows"]:
+        return page, None
+    try:
+        case = load_case(path)
+        page["files"] = [
+            {"name": file.name, "sha256": hashlib.sha256(file.read_bytes()).hexdigest()} for file in case.files()
+        ]
+        page["geometry"] = curves.geometry_curves(case)
+        page["curves"] = curves.case_curves(case)
+        page["radial"] = curves.radial_curves(case)
+        page["refinement"] = curves.refinement(case)
+    except (InputError, GeometryError, ValueError) as error:
+        page["problems"].append(f"some figures could not be computed: {error}")
+        return page, None
+    return page, case
+
+
+def _pictures(solved: Sequence[tuple[Case, dict[str, Any]]]) -> None:
+    """Rotor and blade of every case, drawn in one child process; on failure the reason instead."""
+    jobs: list[tuple[Scene, dict[str, Any], str]] = []
+    for case, page in solved:
+        try:
+            rotor, duct = case.rotor(), case.duct()
+            first = rotor_scene(rotor) if duct is None else cutaway_scene(rotor, duct)
+            jobs += [(first, page, "rotor"), (blade_scene(rotor), page, "blade")]
+        except GeometryError as error:
+            page["problems"].append(f"no picture: {error}")
+    if not jobs:
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        files = [Path(folder) / f"{i}.png" for i in range(len(jobs))]
+        try:
+            render([(job[0], file) for job, file in zip(jobs, files, strict=True)])
+        except PictureError as error:
+            for _, page in solved:
+                page["problems"].append(f"no picture: {error}")
+            return
+        for (_, page, name), file in zip(jobs, files, strict=True):
+            page["pictures"][name] = file.read_bytes()
+
+
+def _trends(solved: Sequence[tuple[Case, dict[str, Any]]], results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    base = next((case for case, _ in solved if not case.ducted), None)
+    family: dict[str, Any] = {}
+    if base is not None:
+        try:
+            family = trends.families(base)
+        except (InputError, GeometryError, ValueError):
+            family = {}
+    return {"family": family, "choice": trends.choice(results), "moments": trends.moments(results)}
+
+
+def _reproduction() -> list[dict[str, Any]]:
+    """Give the numbers of the thesis beside ours, without the database statistics, which need data from outside."""
+    from bemt import reproduce
+
+    return [asdict(item) for item in reproduce.items(None) if not item.status.startswith("not checked")]
+
+
+def read_json(path: Path) -> Any:
+    """Read a JSON file that somebody else wrote.
+
+    Parameters
+    ----------
+    path : Path
+        File.
+
+    Returns
+    -------
+    object
+        Its content; None when it is not there, too large or no JSON.
+    """
+    try:
+        if path.stat().st_size > JSON_BYTES:
+            return None
+        return json.loads(path.read_text(encoding="utf-8"), parse_constant=lambda name: None)
+    except (OSError, ValueError, RecursionError):
+        return None
+
+
+def safe_files(folder: Path) -> list[tuple[str, bytes]]:
+    """Figures in a folder: plain names, no links, PNG or SVG by content, of a moderate size.
+
+    Of two pictures with one stem the smaller is taken.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder; nothing outside of it is read.
+
+    Returns
+    -------
+    list of (str, bytes)
+        Name and content, by name.
+    """
+    found: dict[str, tuple[str, bytes]] = {}
+    for path in sorted(folder.glob("*")):
+        if not _FIGURE.fullmatch(path.name) or path.is_symlink() or not path.is_file():
+            continue
+        if path.stat().st_size > FIGURE_BYTES:
+            continue
+        data = path.read_bytes()
+        good = data.startswith(b"\x89PNG\r\n") if path.suffix == ".png" else b"<svg" in data[:1000]
+        if good and (path.stem not in found or len(data) < len(found[path.stem][1])):
+            found[path.stem] = (path.name, data)
+    return list(found.values())[:FIGURES]
+
+
+def attach_diagnoses(book: dict[str, Any], out: Path) -> None:
+    """Put diagnoses found in the folder of results to their cases, the others on a page of their own.
+
+    Parameters
+    ----------
+    book : dict
+        From :func:`gather`; changed.
+    out : Path
+        Folder of the results.
+    """
+    others, room = [], ALL_BYTES
+    named = {page["result"]["name"]: page for page in book["cases"]}
+    files = [*sorted(out.glob("*/diagnosis/diagnosis.json")), *sorted(out.glob("diagnosis/*/diagnosis.json"))]
+    for path in files:
+        document = read_json(path)
+        if not isinstance(document, Mapping) or not str(document.get("schema", "")).startswith("bemt.diagnosis/"):
+            continue
+        name = path.parent.parent.name if path.parent.name == "diagnosis" else path.parent.name
+        figures = []
+        for figure in safe_files(path.parent):
+            room -= len(figure[1])
+            figures += [figure] if room > 0 else []
+        item = {"name": name, "document": document, "figures": figures}
+        page = named.get(name)
+        if page is not None and path.parent.name == "diagnosis":
+            page["diagnosis"] = item
+        else:
+            others.append(item)
+    book["diagnoses"] = others

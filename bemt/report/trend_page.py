@@ -1,0 +1,272 @@
+"""The trend page: how thrust moves with size, pitch and speed, and what that means for a robot."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from bemt.empirical import D_OVER_P_USABLE, M_TIP_LIMIT
+from bemt.report.markup import esc, num, section, table
+from bemt.report.plot import COLOURS, DASHES, Mark, Plot, Trace, figure
+from bemt.report.trends import ROBOT
+
+__all__ = ["trend_page"]
+
+NAMES = {"bemt": "BEMT", "cfd": "CFD, recorded"}
+
+
+def _recorded(results: Sequence[Mapping[str, Any]], x: Any, keep: Any) -> list[Trace]:
+    rows = [
+        (x(r, row), row["thrust_N"], f"{r['name']}: {row['label']}")
+        for r in results
+        for row in r.get("rows", [])
+        if row["source"] == "cfd" and row.get("thrust_N") is not None and keep(r, row)
+    ]
+    return [
+        Trace(
+            "recorded CFD of the cases",
+            [a[0] for a in rows],
+            [a[1] for a in rows],
+            None,
+            COLOURS["cfd"],
+            "",
+            "bar",
+            True,
+            [a[2] for a in rows],
+        )
+    ]
+
+
+def _pair(x: Any, line: Mapping[str, Any]) -> list[Trace]:
+    return [
+        Trace("BEMT", x, line["thrust_N"], None, COLOURS["bemt"]),
+        Trace("K1/K2", x, line["k1k2_thrust_N"], None, COLOURS["k1k2"], "7 4"),
+    ]
+
+
+def _families(f: Mapping[str, Any], results: Sequence[Mapping[str, Any]]) -> str:
+    if not f:
+        return ""
+    D, p, rpm = f["D_in"], f["pitch_in"], f["rpm_case"]
+    per_inch, per_rpm = f["mach_per_inch"], f["mach_per_rpm"]
+    low, high = D_OVER_P_USABLE
+    open_ones = [r for r in results if r.get("kind") != "fan"]
+    size = _recorded(open_ones, lambda r, row: r["conditions"]["diameter_m"] / 0.0254, lambda r, row: row["rpm"] == rpm)
+    mach = [
+        Trace(
+            t.name,
+            [
+                row["M_tip"]
+                for r in open_ones
+                for row in r.get("rows", [])
+                if row["source"] == "cfd" and row.get("thrust_N") is not None
+            ],
+            t.y,
+            None,
+            t.colour,
+            "",
+            t.shape,
+            True,
+            t.labels,
+        )
+        for t in _recorded(open_ones, lambda r, row: 0.0, lambda r, row: True)
+    ]
+    k_over = (M_TIP_LIMIT, f"K1/K2: tip Mach {M_TIP_LIMIT:g}")
+    plots = [
+        Plot(
+            f"Thrust over diameter, pitch {p:.3g} in, {rpm:g} rev/min",
+            "diameter [in]",
+            "thrust [N]",
+            [*_pair(f["diameter"]["diameter_in"], f["diameter"]), *size],
+            [
+                Mark(k_over[0] / per_inch, k_over[1]),
+                Mark(1.0 / per_inch, "supersonic tip", beyond="above"),
+                Mark(low * p, f"K1/K2: D/p {low:g}"),
+                Mark(high * p, f"K1/K2: D/p {high:g}"),
+            ],
+            "The recorded propellers have pitches of their own. Shaded: outside of section theory.",
+        ),
+        Plot(
+            f"Thrust over pitch, {D:.3g} in, {rpm:g} rev/min",
+            "pitch [in]",
+            "thrust [N]",
+            _pair(f["pitch"]["pitch_in"], f["pitch"]),
+            [
+                Mark(D / high, f"K1/K2: D/p {high:g}", beyond="below"),
+                Mark(D / low, f"K1/K2: D/p {low:g}", beyond="above"),
+            ],
+            "BEMT sees the blades stall where the formula goes on. Shaded: outside of the formula's range.",
+        ),
+        Plot(
+            f"Thrust over rotational speed, {D:.3g}x{p:.3g} in",
+            "rotational speed [rev/min]",
+            "thrust [N]",
+            _pair(f["rpm"]["rpm"], f["rpm"]),
+            [Mark(k_over[0] / per_rpm, k_over[1]), Mark(1.0 / per_rpm, "supersonic tip", beyond="above")],
+        ),
+        Plot(
+            f"Thrust over tip Mach number, {D:.3g}x{p:.3g} in",
+            "tip Mach number [-]",
+            "thrust [N]",
+            [*_pair(f["rpm"]["M_tip"], f["rpm"]), *mach],
+            [Mark(*k_over), Mark(1.0, "supersonic tip", beyond="above")],
+            "One propeller by speed, against the recorded propellers, which differ in size.",
+        ),
+    ]
+    drawn = "".join(figure(plot) for plot in plots)
+    return section(
+        f"Thrust against size, pitch and speed ({f['name']})",
+        f"<p>One quantity changes, all else stays as in {esc(f['title'])}.</p>",
+        f'<div class="figures">{drawn}</div>',
+    )
+
+
+def _choice(rows: Sequence[Mapping[str, Any]]) -> str:
+    if not rows:
+        return ""
+    m, n = ROBOT["mass_kg"], ROBOT["drives"]
+    names = [str(r["name"]) for r in reversed(rows)]
+    at = {name: i for i, name in enumerate(names)}
+    traces = [
+        Trace(
+            "BEMT",
+            [r["robot_ratio"] for r in rows],
+            [at[str(r["name"])] for r in rows],
+            [r["u_ratio"] for r in rows],
+            COLOURS["bemt"],
+            "",
+            "circle",
+            True,
+            (),
+            True,
+        )
+    ]
+    for source, shape in (("cfd", "bar"), ("bench", "cross"), ("vendor", "triangle")):
+        points = [(ratio, at[str(r["name"])], label) for r in rows for label, s, ratio in r["rows"] if s == source]
+        traces.append(
+            Trace(
+                NAMES.get(source, source),
+                [a[0] for a in points],
+                [a[1] for a in points],
+                None,
+                COLOURS[source],
+                "",
+                shape,
+                True,
+                [a[2] for a in points],
+            )
+        )
+    wanted = ROBOT["wanted_kgf"] / m
+    plot = figure(
+        Plot(
+            f"Thrust of {n} drives over the weight of a {m:g} kg robot",
+            "thrust / weight [-]",
+            "",
+            traces,
+            [Mark(1.0, "carries its weight"), Mark(wanted, f"{ROBOT['wanted_kgf']:g} kgf wanted")],
+            "At the speed of each case; the mass of propeller, motor and battery is not added.",
+            names,
+            x_zero=True,
+            wide=True,
+        )
+    )
+    lines = [
+        [
+            str(r["name"]),
+            num(r["thrust_N"]),
+            num(r["u"], 2),
+            num(r["power_W"]),
+            num(r["g_per_W"], 3),
+            num(r["disk_loading"], 3),
+            num(r["robot_ratio"], 3),
+            num(r["needed"], 3),
+        ]
+        for r in rows
+    ]
+    header = [
+        "drive",
+        "thrust [N]",
+        "u [N]",
+        "shaft power [W]",
+        "gf per W",
+        "disk loading [N/m²]",
+        f"{n} drives over {m:g} kg",
+        f"drives for {ROBOT['wanted_kgf']:g} kgf",
+    ]
+    fan = ROBOT["fan_mass_kg"]
+    words = (
+        f"<p>A ducted fan buys its small diameter with power: compare thrust per watt and disk loading. Masses are "
+        f"given for the DS-30 only ({fan:g} kg with motor: 27 N is {27 / (fan * 9.80665):.1f} times its weight); for "
+        f"the propellers none is, so the choice is made on the robot's weight.</p>"
+    )
+    return section(
+        "Choice of a drive by thrust to weight", words, f'<div class="figures">{plot}</div>', table(header, lines)
+    )
+
+
+def _moments(d: Mapping[str, Any]) -> str:
+    if not d or not d["lines"]:
+        return ""
+    x, arm = d["distance_m"], ROBOT["arm_m"]
+    traces = []
+    used: dict[str, int] = {}
+    for label, source, T, u in d["lines"]:
+        k = used[source] = used.get(source, -1) + 1
+        band = [v * u for v in x] if u is not None and math.isfinite(u) and source == "bemt" else None
+        dash = DASHES[(k + list(COLOURS).index(source)) % len(DASHES)] if source in COLOURS else ""
+        name = f"{NAMES.get(source, source) if source == 'bemt' else label}, {T:.4g} N"
+        traces.append(Trace(name, x, [v * T for v in x], band, COLOURS.get(source, COLOURS["other"]), dash))
+    traces.append(
+        Trace(
+            f"at {arm:g} m",
+            [arm] * len(d["lines"]),
+            [arm * T for _, _, T, _ in d["lines"]],
+            None,
+            COLOURS["other"],
+            "",
+            "circle",
+            True,
+            [f"{label}: {T:.4g} N at {arm:g} m = {arm * T:.3g} N m" for label, _, T, _ in d["lines"]],
+        )
+    )
+    note = (
+        f"One drive of the pair pushes, the other rests. The thesis: 27 N at 0.2 m = 5.4 N m. Here {arm:g} m gives "
+        + "; ".join(f"{label} {arm * T:.3g} N m" for label, _, T, _ in d["lines"])
+        + "."
+    )
+    return section(
+        "Moment of two drives against mounting distance",
+        '<div class="figures">'
+        + figure(
+            Plot(
+                f"Roll moment about the middle ({d['name']})",
+                "distance from the centre of mass [m]",
+                "roll moment [N m]",
+                traces,
+                [Mark(arm, f"arm {arm:g} m")],
+                note,
+                wide=True,
+            )
+        )
+        + "</div>",
+    )
+
+
+def trend_page(book: Mapping[str, Any]) -> str:
+    """Write the trend page.
+
+    Parameters
+    ----------
+    book : mapping
+        From :func:`bemt.report.gather.gather`.
+
+    Returns
+    -------
+    str
+        HTML; empty when nothing was solved.
+    """
+    results = [page["result"] for page in book["cases"]]
+    t = book["trends"]
+    inner = _families(t["family"], results) + _choice(t["choice"]) + _moments(t["moments"])
+    return f"<h2>Trends</h2>{inner}" if inner else ""

@@ -1,0 +1,90 @@
+"""Rewrite what the documents take from code and cases: ``.venv/bin/python docs/make.py``.
+
+Numbers of docs/diagnosis.md, the page docs/effects.md, docs/gallery.md with its pictures (``--no-pictures``: without).
+The picture of the README has a script of its own, docs/overview.py.
+"""
+
+from __future__ import annotations
+
+import importlib
+import re
+import sys
+from pathlib import Path
+
+from bemt import effects_list, evaluate
+from bemt.case import Case, find_cases, load_case
+from bemt.diagnose.problem import PRIORS
+
+DOCS = Path(__file__).resolve().parent
+ROOT = DOCS.parent
+
+
+def numbers(text: str) -> str:
+    """Fill in the constants of the tables under "The numbers"."""
+
+    def now(row: re.Match[str]) -> str:
+        value = getattr(importlib.import_module(f"bemt.diagnose.{row[1]}"), row[2])
+        return f"| `{row[1]}.{row[2]}` | `{value!r}` |"
+
+    rows = "".join(f"| {name} | {value:g} |\n" for name, value in PRIORS.items())
+    head = "| nuisance | standard deviation |\n|---|---|\n"
+    text = re.sub(re.escape(head) + r"(\|.*\n)*", lambda _: head + rows, text)
+    return re.sub(r"^\| `(\w+)\.(\w+)` \| `[^`]+` \|", now, text, flags=re.M)
+
+
+def picture(case: Case) -> str:
+    """Name of the picture of a case."""
+    return f"{case.name}.png"
+
+
+def gallery(cases: list[Case]) -> str:
+    """Page of all cases."""
+    lines = [
+        "# Gallery", "",
+        "Every case of `cases/`, as the solver sees it. Written by `python docs/make.py`; do not edit.", "",
+        "Thrust and torque are those of BEMT at the case's point; what was recorded stands in the",
+        "[report](../reports/report.md).", "",
+    ]  # fmt: skip
+    for case in cases:
+        ready = evaluate.prepare(case)
+        row = evaluate.evaluate(ready, case.rpm, case.airspeed_m_s, case.air())
+        kind = "duct cut open" if ready.ducted else "rotor"
+        lines += [
+            f"## {case.name}", "", case.title, "", f"![{case.title}: {kind}](img/{picture(case)})", "",
+            f"| `cases/{case.name}` | |", "|---|---|",
+            f"| diameter, blades | {1e3 * ready.diameter_m:.0f} mm, {case.rotor().B} |",
+            f"| rev/min, airspeed | {case.rpm:.0f}, {case.airspeed_m_s:g} m/s |",
+            f"| thrust, torque | {row.thrust_N[0]:.1f} N, {row.torque_Nm[0]:.3f} N m |", "",
+        ]  # fmt: skip
+    return "\n".join([*lines, *CFD])
+
+
+CFD = [
+    "## This project's own CFD of the 8x5", "",
+    "Cells of a coarse OpenFOAM grid, and the pressure on the blade at rest, 20,000 rev/min, incompressible. How far",
+    "these runs can be trusted is said in the report: their grid is coarse, and its uncertainty large.", "",
+    "![Plane through the shaft and cells on the blade](img/mesh_8x5.png)", "",
+    "![Pressure on the blade, from the front and from behind](img/pressure_8x5.png)", "",
+]  # fmt: skip
+
+
+def main() -> None:
+    """Rewrite everything."""
+    from geometry.picture import cutaway_scene, render, rotor_scene
+
+    page = DOCS / "diagnosis.md"
+    page.write_text(numbers(page.read_text(encoding="utf-8")), encoding="utf-8")
+    (DOCS / "effects.md").write_text(effects_list.markdown(), encoding="utf-8")
+    cases = [load_case(path) for path in find_cases([str(ROOT / "cases")])]
+    if "--no-pictures" not in sys.argv:
+        scenes = []
+        for case in cases:
+            rotor, duct = case.rotor(), case.duct()
+            scene = rotor_scene(rotor) if duct is None else cutaway_scene(rotor, duct)
+            scenes.append((scene, DOCS / "img" / picture(case)))
+        render(scenes)
+    (DOCS / "gallery.md").write_text(gallery(cases), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,311 @@
+"""The promise of CFD campaigns: strict files, whole records, a run that goes on where it was stopped."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bemt.cfd import run_campaign
+from bemt.cfd_record import COLUMNS, Record, grid_studies, grid_uncertainty
+from bemt.cfd_run import point_key, radial_of
+from bemt.cfd_schema import load_campaign
+from bemt.cfd_start import State, splice
+from bemt.cli import main
+from bemt.errors import InputError
+from bemt.export_case_openfoam import settings_of
+
+HEAD = 'schema = "bemt.cfd/1"\nname = "t"\ncase = "{case}"\n'
+TWO = "[defaults]\nlevel = 4\niterations = 30\naverage = 10\n[axes]\nrpm = [6000, 9000]\n"
+
+# Programs that do as OpenFOAM does, as far as a campaign sees it: a log of calls, a grid, forces, fields.
+PROGRAMS = {
+    "blockMesh": "mkdir -p constant/polyMesh; echo grid > constant/polyMesh/points",
+    "snappyHexMesh": ":", "topoSet": ":", "createPatch": ":", "setFields": ":",
+    "checkMesh": "echo '    cells:            1234'",
+    "simpleFoam": """
+w=$(grep -o 'omega [-0-9.]*' constant/MRFProperties | cut -d' ' -f2)
+if [ -n "$SLEEP_ABOVE" ] && awk "BEGIN {exit !($w > $SLEEP_ABOVE)}"; then touch asleep; sleep 600; fi
+mkdir -p postProcessing/forces/0
+awk -v w=$w 'BEGIN {
+    f = "postProcessing/forces/0/force.dat"; m = "postProcessing/forces/0/moment.dat"
+    h = "(total_x total_y total_z) (pressure_x pressure_y pressure_z) (viscous_x viscous_y viscous_z)"
+    print "# Force\\n# Time " h > f; print "# Moment\\n# Time " h > m
+    for (i = 1; i <= 30; i++) {
+        t = 1e-5 * w * w * (1 + DRIFT * (i - 25) / 10)
+        printf "%d (0 0 %.9g) (0 0 %.9g) (0 0 0)\\n", i, t, t > f
+        printf "%d (0 0 %.9g) (0 0 %.9g) (0 0 0)\\n", i, -0.02 * t, -0.02 * t > m
+    }
+}'
+""",
+}  # fmt: skip
+
+
+@pytest.fixture
+def programs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Log of the calls of the programs that stand in for OpenFOAM."""
+    folder, log = tmp_path / "bin", tmp_path / "calls"
+    folder.mkdir()
+    for name, text in PROGRAMS.items():
+        body = text.replace("DRIFT", "0")
+        (folder / name).write_text(f"#!/bin/sh\necho {name} >> {log}\n{body}\n")
+        (folder / name).chmod(0o755)
+    monkeypatch.setenv("PATH", f"{folder}:{os.environ['PATH']}")
+    return log
+
+
+def calls(log: Path, name: str) -> int:
+    return log.read_text().split().count(name) if log.is_file() else 0
+
+
+def write(folder: Path, project: Path, text: str) -> Path:
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / "campaign.toml"
+    path.write_text(HEAD.format(case=(project / "cases" / "prop_8x5").as_posix()) + text)
+    return path
+
+
+def rows_of(folder: Path) -> list[dict[str, str]]:
+    with (folder / "recording.csv").open(newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", ["no points"]),
+        ("[axes]\nrpm = []\n", ["axes.rpm: got a list of 0"]),
+        ("[axes]\nrpms = [9000]\n", ["rpms: got an unknown key", "Did you mean rpm"]),
+        ("[axes]\nJ = [0.2]\n", ["J without rpm"]),
+        ("[[points]]\nrpm = 9000\nJ = 0.1\nairspeed_m_s = 3\n", ["J and airspeed_m_s"]),
+        ("[[points]]\nrpm = '9000'\nlevel = 40\nsolver = 'compresible'\n",
+         ["rpm: got '9000'", "level: got 40", "Did you mean compressible?"]),
+        ("[[points]]\nrpm = 9000\ntip_gap_pct_R = 1\n", ["a table [duct] or a case with a duct"]),
+        ("[[points]]\nrpm = 9000\n[duct]\nlength_mm = 80\n", ["duct.exit_area_ratio: got nothing"]),
+        ("[[points]]\nrpm = 9000\niterations = 30\naverage = 40\n", ["average = 40 of 30 iterations"]),
+        ("nmae = 'x'\n[[points]]\nrpm = 9000\n", ["nmae: got an unknown key"]),
+        ("[[points]]\nrpm = 9000,5\n", ["Use a decimal point"]),
+    ],
+)  # fmt: skip
+def test_all_faults_of_a_file_are_reported(
+    project: Path, tmp_path: Path, text: str, words: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write(tmp_path / "c", project, text)
+    assert main(["cfd", str(path)]) == 2
+    told = capsys.readouterr().err
+    for word in words:
+        assert word in told
+    assert sorted(p.name for p in path.parent.iterdir()) == ["campaign.toml"]
+
+
+def test_points_that_cannot_be_stop_the_campaign_before_it_runs(project: Path, tmp_path: Path, programs: Path) -> None:
+    path = write(tmp_path / "c", project, "[[points]]\nrpm = 9000\n[[points]]\nrpm = 9000\nsector = 'blade'\n")
+    with pytest.raises(InputError, match="point 2: sector: got one of 2 blades"):
+        run_campaign(load_campaign(path), tmp_path / "w", ranks=1, quiet=True)
+    path = write(tmp_path / "c", project, "[[points]]\nrpm = 9000\n[[points]]\nrpm = 9000\n")
+    with pytest.raises(InputError, match="the same run twice"):
+        run_campaign(load_campaign(path), tmp_path / "w", ranks=1, quiet=True)
+    assert calls(programs, "blockMesh") == 0
+
+
+def test_axes_points_and_changes_reach_the_run(project: Path, tmp_path: Path) -> None:
+    text = ("[defaults]\npitch_offset_deg = 1.5\n[[points]]\nrpm = 7000\nwall_distance_over_R = 1.0\n"
+            "[axes]\nrpm = [6000, 9000]\nJ = [0.0, 0.5]\n")  # fmt: skip
+    campaign = load_campaign(write(tmp_path / "c", project, text))
+    assert [(p.run.rpm, round(float(p.run.airspeed_m_s or 0.0), 3)) for p in campaign.points] == [
+        (7000, 0.0), (6000, 0.0), (6000, 10.16), (9000, 0.0), (9000, 15.24)]  # fmt: skip
+    assert campaign.points[0].run.wall_distance_over_R == 1.0
+    turned = campaign.points[0].case.rotor().blade.at(0.05)[1] - campaign.case.rotor().blade.at(0.05)[1]
+    assert math.degrees(float(turned)) == pytest.approx(1.5)
+    duct = "[duct]\nlength_mm = 80\nexit_area_ratio = 1\n[[points]]\nrpm = 7000\ntip_gap_pct_R = 2\n"
+    point = load_campaign(write(tmp_path / "d", project, duct)).points[0]
+    assert settings_of(point.case, point.run)[0].gap == pytest.approx(0.02 * 0.1016)
+
+
+def test_the_key_of_a_run_stands_for_what_decides_it(project: Path, tmp_path: Path) -> None:
+    text = (
+        "[defaults]\nrpm = 9000\n[[points]]\n[[points]]\nJ = 0.2\n[[points]]\nlevel = 5\n[[points]]\niterations = 500\n"
+    )
+    points = load_campaign(write(tmp_path / "c", project, text)).points
+    keys = [point_key(point)[:2] for point in points]
+    assert len({run for run, _ in keys}) == 4
+    assert keys[0][1] == keys[1][1] == keys[3][1] != keys[2][1], "speed and iterations share a grid, levels do not"
+    assert [point_key(p)[:2] for p in load_campaign(write(tmp_path / "other", project, text)).points] == keys
+
+
+def test_a_campaign_is_recorded(
+    project: Path, tmp_path: Path, programs: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write(tmp_path / "c", project, TWO)
+    work = str(tmp_path / "w")
+    assert main(["cfd", str(path.parent), "--ranks", "1", "--work", work, "--keep", "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["schema"] == "bemt.cfd-run/1" and len(document["rows"]) == 2
+    rows = rows_of(path.parent)
+    assert tuple(rows[0]) == COLUMNS
+    for row, rpm in zip(rows, (6000, 9000), strict=True):
+        omega = rpm * math.pi / 30
+        assert float(row["thrust_N"]) == pytest.approx(2 * 1e-5 * omega**2, rel=1e-5)  # half domain
+        assert float(row["torque_Nm"]) == pytest.approx(0.02 * float(row["thrust_N"]), rel=1e-5)
+        assert (row["converged"], row["cells"], row["iterations"]) == ("1", "1234", "30")
+        assert float(row["density_kg_m3"]) == 1.225 and row["wall_distance_m"] == ""
+    assert calls(programs, "blockMesh") == 1, "one grid serves both speeds"
+    manifest = json.loads((path.parent / "manifest.json").read_text())
+    assert (manifest["points"], manifest["recorded"], manifest["converged"], manifest["missing"]) == (2, 2, 2, [])
+    assert main(["cfd", str(path), "--ranks", "1", "--work", work, "--quiet"]) == 0
+    assert calls(programs, "simpleFoam") == 2, "finished points are not run again"
+    write(path.parent, project, TWO.replace("[6000, 9000]", "[6000, 9000, 12000]"))
+    assert main(["cfd", str(path), "--ranks", "1", "--work", work, "--quiet"]) == 0
+    assert calls(programs, "simpleFoam") == 3 and len(rows_of(path.parent)) == 3
+    assert not Path(work).exists()
+
+
+def test_a_killed_campaign_goes_on(project: Path, tmp_path: Path, programs: Path) -> None:
+    path = write(tmp_path / "c", project, TWO)
+    command = [sys.executable, "-m", "bemt", "cfd", str(path), "--ranks", "1", "--work", str(tmp_path / "w"), "--quiet"]
+    process = subprocess.Popen(command, env={**os.environ, "SLEEP_ABOVE": "900"}, cwd=project, start_new_session=True)
+    end = time.monotonic() + 120
+    while not list((tmp_path / "w").glob("run-*/asleep")) and time.monotonic() < end:
+        time.sleep(0.1)
+    asleep = list((tmp_path / "w").glob("run-*/asleep"))
+    assert asleep, "the second run never began"
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    before = rows_of(path.parent)
+    assert [row["rpm"] for row in before] == ["6000"]
+    json.loads((path.parent / "manifest.json").read_text())
+    assert subprocess.run(command, cwd=project, timeout=120).returncode == 0
+    after = rows_of(path.parent)
+    assert [row["rpm"] for row in after] == ["6000", "9000"] and after[0] == before[0]
+    assert calls(programs, "simpleFoam") == 3, "the first once, the second twice"
+    assert calls(programs, "blockMesh") == 1, "its grid was finished"
+    assert not [p for p in path.parent.iterdir() if p.name.startswith(".")]
+
+
+def test_a_run_that_drifts_is_nan_flagged_and_its_history_kept(project: Path, tmp_path: Path, programs: Path) -> None:
+    solver = tmp_path / "bin" / "simpleFoam"
+    solver.write_text(f"#!/bin/sh\n{PROGRAMS['simpleFoam'].replace('DRIFT', '0.2')}\n")
+    path = write(tmp_path / "c", project, TWO)
+    record = run_campaign(load_campaign(path), tmp_path / "w", only=1, ranks=1, quiet=True)
+    (row,) = record.rows
+    assert row["converged"] == 0 and math.isnan(row["thrust_N"]) and math.isnan(row["u_thrust_N"])
+    assert row["drift_thrust"] == pytest.approx(0.18, abs=0.02)
+    (history,) = (path.parent / "histories").iterdir()
+    assert len(history.read_text().splitlines()) == 31
+    manifest = json.loads((path.parent / "manifest.json").read_text())
+    assert [item["run"] for item in manifest["not_converged"]] == [row["run"]]
+    solver.write_text("#!/bin/sh\necho 'FOAM FATAL ERROR: negative' ; exit 1\n")
+    record = run_campaign(load_campaign(path), tmp_path / "w2", only=2, ranks=1, quiet=True)
+    assert [r["converged"] for r in record.rows] == [0, 0] and len(record.rows) == 2
+
+
+def test_a_recording_that_is_not_ours_is_left_alone(project: Path, tmp_path: Path) -> None:
+    path = write(tmp_path / "c", project, TWO)
+    (path.parent / "recording.csv").write_text("rpm,thrust_N\n1,2\n")
+    with pytest.raises(InputError, match="another header"):
+        Record(load_campaign(path))
+    (path.parent / "recording.csv").write_text(",".join(COLUMNS) + "\nabc,1\n")
+    with pytest.raises(InputError, match="a line cut short"):
+        Record(load_campaign(path))
+
+
+def test_a_run_that_a_campaign_beside_has_is_taken_over(project: Path, tmp_path: Path, programs: Path) -> None:
+    first = load_campaign(write(tmp_path / "all" / "a", project, TWO))
+    second = load_campaign(write(tmp_path / "all" / "b", project, TWO.replace("[6000, 9000]", "[9000]")))
+    run_campaign(first, tmp_path / "w", ranks=1, quiet=True)
+    record = run_campaign(second, tmp_path / "w", ranks=1, quiet=True)
+    assert calls(programs, "simpleFoam") == 2 and [row["rpm"] for row in record.rows] == [9000]
+
+
+def row(level: float, thrust: float, **more: Any) -> dict[str, Any]:
+    base = {"rpm": 9000.0, "airspeed_m_s": 0.0, "solver": "incompressible", "gas": "", "converged": 1.0}
+    return {
+        **base,
+        "level": level,
+        "cells": 1e4 * 8 ** (level - 5),
+        "thrust_N": thrust,
+        "torque_Nm": 0.02 * thrust,
+        **more,
+    }
+
+
+def test_three_levels_make_a_grid_study() -> None:
+    """Values of a scheme of second order: the order, the limit and the uncertainty of every level come out."""
+    sizes = {level: 2.0 ** (-(level - 5)) for level in (5.0, 5.5, 6.0)}
+    rows = [row(level, 20.0 + 2.0 * h**2) for level, h in sizes.items()] + [row(5.0, 30.0, airspeed_m_s=9.0)]
+    (study,) = grid_studies(rows)
+    found = study["thrust_N"]
+    assert study["levels"] == [6.0, 5.5, 5.0] and study["ratios"] == pytest.approx([math.sqrt(2)] * 2)
+    assert found["order"] == pytest.approx(2.0) and found["extrapolated"] == pytest.approx(20.0) and not found["flags"]
+    for level, h in sizes.items():
+        assert found["u_relative"][f"{level:g}"] >= 2.0 * h**2 / 22.0, "covers the distance to the limit"
+    assert grid_uncertainty([study], row(5.0, 7.0))["thrust_N"] == found["u_relative"]["5"]
+    assert grid_uncertainty([study], row(4.0, 7.0)) == {}
+
+
+def test_a_flow_is_scaled_to_another_speed() -> None:
+    """Velocities with the speed, pressures with its square, the wind of the new run far away."""
+    U = np.array([[1.0, 2.0, -3.0], [0.0, 0.0, -5.0]])
+    head = b"FoamFile\n{\n    format binary;\n}\ninternalField   nonuniform List<"
+    source = head + b"vector> \n2\n(" + U.tobytes() + b")\n;\nboundaryField {}"
+    target = b"FoamFile\n{\n    format ascii;\n}\ninternalField uniform (0 0 -8);\nboundaryField {a}"
+    old, new = State(1000.0, (0.0, 0.0, -5.0), 0.0, False), State(2000.0, (0.0, 0.0, -8.0), 0.0, False)
+    made = splice("U", source, target, old, new)
+    assert made is not None and made.endswith(b"boundaryField {a}") and b"format binary;" in made
+    values = np.frombuffer(made.split(b"2\n(", 1)[1][: U.nbytes]).reshape(2, 3)
+    assert values == pytest.approx(2 * U + np.array([0.0, 0.0, 2.0]))  # far away: 2 (-5) + 2 = -8
+    p = np.array([10.0, -4.0])
+    source = head + b"scalar> \n2\n(" + p.tobytes() + b")\n;\n"
+    made = splice("p", source, b"internalField uniform 0;\n", old, new)
+    assert made is not None and np.frombuffer(made.split(b"2\n(", 1)[1][:16]) == pytest.approx(4 * p)
+    assert splice("p", source, target, old, State(2000.0, (0.0, 0.0, 0.0), 1e5, True)) is None
+    assert splice("U", source[:-10], target, old, new) is None and splice("T", source, target, old, new) is None
+
+
+def test_loads_along_the_radius_add_up(project: Path, tmp_path: Path) -> None:
+    campaign = load_campaign(write(tmp_path / "c", project, TWO))
+    settings = point_key(campaign.points[0])[2]
+    folder = tmp_path / "postProcessing" / "radial" / "0"
+    folder.mkdir(parents=True)
+    bins = np.linspace(1.0, 2.0, 24)
+    for file, values in (("forceBin.dat", bins), ("momentBin.dat", -0.01 * bins)):
+        cells = " ".join(f"(0 0 {v:.9g}) (0 0 {v:.9g}) (0 0 0)" for v in values)
+        (folder / file).write_text(
+            f"# bins  : 24\n# start         : 0.02\n# delta         : 0.003\n# Time\n30 {cells}\n"
+        )
+    table = radial_of(tmp_path, settings, 10)
+    assert table is not None
+    assert table[:, 0] == pytest.approx(0.02 + 0.003 * (np.arange(24) + 0.5))
+    assert (table[:, 1] * 0.003).sum() == pytest.approx(2 * bins.sum())
+    assert (table[:, 2] * 0.003).sum() == pytest.approx(2 * 0.01 * bins.sum())
+
+
+def test_the_committed_campaigns_are_whole(project: Path) -> None:
+    """Every recording belongs to its campaign and case as they are now, and says what is missing."""
+    found = sorted((project / "reports" / "cfd").glob("*/campaign.toml"))
+    assert found
+    for path in found:
+        campaign = load_campaign(path)
+        manifest = json.loads((path.parent / "manifest.json").read_text())
+        assert manifest["case_sha256"] == campaign.case.content_hash(), f"{path.parent.name}: the case has changed"
+        order = [point_key(point)[0] for point in campaign.points]
+        rows = {row["run"]: row for row in rows_of(path.parent)}
+        assert set(rows) <= set(order), f"{path.parent.name}: runs of other settings"
+        assert set(manifest["missing"]) == set(order) - set(rows)
+        for run, values in rows.items():
+            assert (values["converged"] == "1") == bool(re.match(r"\d", values["thrust_N"])), run
+            if values["converged"] != "1":
+                assert (path.parent / "histories" / f"{run}.csv").is_file() or values["iterations"] == "0"
+    total = sum(p.stat().st_size for p in (project / "reports" / "cfd").rglob("*") if p.is_file())
+    assert total < 2e6

@@ -1,0 +1,706 @@
+"""Promise: one file that loads nothing, shows every case with honest words, and lets nothing of the data act."""
+
+from __future__ import annotations
+
+import base64
+import copy
+import hashlib
+import html.parser
+import json
+import math
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bemt.cli import main
+from bemt.report import book_html
+from bemt.report.cfd import attach, cfd_runs
+from bemt.report.gather import attach_diagnoses, gather, safe_files
+from bemt.report.markup import esc
+from bemt.report.plot import Mark, Plot, Trace, figure, ticks
+from bemt.report.summary import summary
+from bemt.report.verdicts import verdict
+
+CASE = """
+schema = "bemt.case/1"
+name = "{name}"
+title = "{title}"
+references = "references.csv"
+[rotor]
+kind = "propeller"
+blades = 2
+diameter_in = 10
+hub_ratio = 0.15
+[blade]
+pitch_in = 5
+chord_law = "apc_like"
+max_chord_over_R = 0.2
+[blade.section]
+naca = "4412"
+[[polars]]
+file = "polar.csv"
+r_over_R = 0.75
+[operating]
+rpm = 6000
+[air]
+density_kg_m3 = 1.2
+[model]
+stations = 20
+[[assumptions]]
+key = "blade.max_chord_over_R"
+low = 0.18
+high = 0.22
+why = "made for a test"
+"""
+EVIL = "<script>window.pwned=1</script><img src=x onerror=window.pwned=1>\"'`]]>--><svg onload=window.pwned=1>"
+
+
+def write_case(folder: Path, name: str, title: str, remark: str, bench_u: str = "0.01") -> Path:
+    """Write a case with its own section table, so that no network of sections is loaded."""
+    here = folder / name
+    here.mkdir(parents=True)
+    alpha = np.arange(-20.0, 21.0)
+    cl = np.clip(0.1 * (alpha + 4.0), -0.9, 1.3)
+    rows = [f"{a:g},{c:.5f},{0.012 + 0.008 * c * c:.5f}" for a, c in zip(alpha, cl, strict=True)]
+    (here / "polar.csv").write_text("alpha_deg,cl,cd\n" + "\n".join(rows) + "\n")
+    quoted = remark.replace('"', '""')
+    (here / "references.csv").write_text(
+        "quantity,value,unit,uncertainty,kind,source,remark,rpm,airspeed_m_s,density_kg_m3\n"
+        f'thrust,0.5,kgf,{bench_u},bench,"{quoted[:300]}",,6000,0,1.2\n'
+        f'thrust,0.62,kgf,unknown,cfd,solver,"{quoted}",6000,0,1.2\n'
+    )
+    (here / "case.toml").write_text(CASE.replace("{name}", name).replace("{title}", title))
+    return here
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], Path]:
+    """Book and folder of two cases that can be solved, one of them hostile, and one that cannot."""
+    root = tmp_path_factory.mktemp("report")
+    write_case(root / "cases", "plain", "A plain propeller", "MRF, incompressible; domain 5 D")
+    write_case(
+        root / "cases", "rude", EVIL.replace("\\", "").replace('"', "'"), (EVIL.replace("\n", "") * 200)[:10_000]
+    )
+    wrong = root / "cases" / "wrong"
+    wrong.mkdir()
+    (wrong / "case.toml").write_text(f"schema = 'bemt.case/1'\nname = '''../{EVIL}'''\n")
+    return gather([root / "cases"], root / "out"), root
+
+
+@pytest.fixture(scope="module")
+def text(made: tuple[dict[str, Any], Path]) -> str:
+    return book_html(made[0])
+
+
+class Reader(html.parser.HTMLParser):
+    """Elements with their attributes, and the text of every element."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.found: list[tuple[str, dict[str, str | None]]] = []
+        self.words: dict[str, list[str]] = {}
+        self.open: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.found.append((tag, dict(attrs)))
+        self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        while self.open and self.open.pop() != tag:
+            pass
+
+    def handle_data(self, data: str) -> None:
+        if self.open:
+            self.words.setdefault(self.open[-1], []).append(data)
+
+
+def read(page: str) -> Reader:
+    reader = Reader()
+    reader.feed(page)
+    return reader
+
+
+TAGS = {
+    "html",
+    "head",
+    "meta",
+    "link",
+    "title",
+    "style",
+    "body",
+    "header",
+    "h1",
+    "h2",
+    "h3",
+    "p",
+    "nav",
+    "ul",
+    "li",
+    "a",
+    "main",
+    "section",
+    "article",
+    "div",
+    "span",
+    "strong",
+    "code",
+    "img",
+    "figure",
+    "figcaption",
+    "svg",
+    "path",
+    "g",
+    "text",
+    "circle",
+    "rect",
+    "button",
+    "details",
+    "summary",
+    "table",
+    "thead",
+    "tbody",
+    "tr",
+    "th",
+    "td",
+    "footer",
+    "script",
+}
+
+
+def assert_harmless(page: str) -> None:
+    """Only known elements, one script, no handlers, no address but inner ones and data."""
+    reader = read(page)
+    assert {tag for tag, _ in reader.found} <= TAGS
+    assert sum(tag == "script" for tag, _ in reader.found) == 1
+    for tag, attributes in reader.found:
+        for name, value in attributes.items():
+            assert not name.startswith("on"), (tag, name)
+            if name in ("href", "src"):
+                assert value is not None and value.startswith(("#", "data:image/", "data:,")), (tag, value)
+
+
+def test_the_file_stands_alone(text: str) -> None:
+    assert_harmless(text)
+    assert len(text.encode()) < 8e6
+    assert "http:" not in text and "https:" not in text and "@import" not in text and "url(" not in text
+    reader = read(text)
+    policy = next(a["content"] for t, a in reader.found if t == "meta" and a.get("http-equiv"))
+    script = "".join(reader.words["script"])
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    assert policy is not None and "default-src 'none'" in policy and f"script-src 'sha256-{digest}'" in policy
+    assert len(script) < 40_000
+
+
+def test_no_clock_and_no_chance_is_in_the_file(made: tuple[dict[str, Any], Path], text: str) -> None:
+    assert book_html(made[0]) == text
+    plain = text[text.index('id="case-1-plain"') : text.index('id="case-2-rude"')]
+    assert str(made[1]) not in plain, "no path of this machine"
+
+
+def test_menu_leads_to_pages_and_no_panel_is_empty(text: str) -> None:
+    reader = read(text)
+    ids = [a["id"] for t, a in reader.found if t == "section"]
+    menu = [a["href"] for t, a in reader.found if t == "a"]
+    assert {f"#{i}" for i in ids} == set(menu) and len(ids) == len(set(ids))
+    assert "front" in ids and "trends" in ids and "reproduction" in ids
+    for plot in re.findall(r"<figure class=\"plot[^>]*>.*?</figure>", text, re.DOTALL):
+        assert re.search(r'<g class="trace" data-t="0">.*<(path|circle|rect)', plot)
+    assert not re.search(r"<h3>[^<]*</h3>\s*(<h3>|</section>)|</h2>\s*</section>", text), (
+        "a heading without anything below"
+    )
+    assert not re.search(r"<tbody></tbody>", text)
+
+
+def test_every_plot_names_its_axes_with_units(text: str) -> None:
+    plots = [json.loads(a["data-plot"] or "") for t, a in read(text).found if "data-plot" in a]
+    assert len(plots) >= 30
+    for plot in plots:
+        assert re.search(r"\[.+\]$", plot["xl"]), plot["xl"]
+        assert plot["rows"] or re.search(r"\[.+\]$", plot["yl"]), plot["yl"]
+
+
+def test_every_part_of_a_case_is_there(text: str) -> None:
+    page = text[text.index('id="case-1-plain"') :]
+    page = page[: page.index('<section class="page"')]
+    for heading in (
+        "Geometry",
+        "Performance",
+        "Radial loading",
+        "Validation",
+        "Audit of the CFD",
+        "Verification",
+        "Inputs and assumptions",
+        "Limits",
+    ):
+        assert f"<h3>{heading}</h3>" in page
+    assert "Diagnosis" not in page, "nothing is shown of what is not there"
+    for name in ("case.toml", "references.csv", "polar.csv"):
+        assert name in page
+    assert re.search(r"<code>[0-9a-f]{64}</code>", page)
+
+
+def test_a_faulty_case_is_named_and_does_not_stop_the_others(made: tuple[dict[str, Any], Path], text: str) -> None:
+    assert made[0]["exit_code"] == 2
+    assert "not solved" in text and "A plain propeller" in text
+    inside = {path.relative_to(made[1]).as_posix().split("/")[0] for path in made[1].rglob("*")}
+    assert inside == {"cases", "out"}, "nothing is written beside the folder of results"
+
+
+def poison(value: Any) -> Any:
+    """Same shape; every text hostile, every number NaN."""
+    if isinstance(value, dict):
+        return {k: v if k in ("source", "status", "model") else poison(v) for k, v in value.items()}
+    if isinstance(value, list):
+        return [poison(v) for v in value]
+    if isinstance(value, tuple):
+        return tuple(poison(v) for v in value)
+    if isinstance(value, np.ndarray):
+        return np.full(value.shape, np.nan)
+    if isinstance(value, str):
+        return (EVIL * 100)[:10_000]
+    return math.nan if isinstance(value, float) else value
+
+
+def test_nan_everywhere_and_hostile_words_render_harmlessly(made: tuple[dict[str, Any], Path]) -> None:
+    book = poison(copy.deepcopy(made[0]))
+    page = book_html(book)
+    assert_harmless(page)
+    assert 'data-plot="' not in page, "NaN makes no panel"
+    assert ">nan<" not in page.lower() and ">inf<" not in page.lower()
+    markdown = summary(book)
+    assert "<script" not in markdown and "<img" not in markdown
+
+
+DIAGNOSIS = {
+    "schema": "bemt.diagnosis/1",
+    "verdict": "named",
+    "effects": ["duct"],
+    "explanation": "Thrust is low. " + EVIL,
+    "ranking": [
+        {
+            "effect": "duct",
+            "probability": 0.97,
+            "parameters": {"sigma": {"value": 1.1, "low": 1.0, "high": 1.2, "unit": "-"}},
+        }
+    ],
+    "location": {"channel": "thrust", "variable": "J", "low": 0.0, "high": 0.4, "size": 0.08, "z": 6.0},
+    "fit": {
+        "thrust": {"before": 8.1, "after": 1.9, "noise": 1.6, "gp_only": 2.0, "holdout_before": 8.4, "holdout_after": 2}
+    },
+    "classes": [["duct", "ground_effect"]],
+    "next_measurement": {"text": "Weigh the duct alone."},
+    "p_value": 0.001,
+}
+
+
+def test_a_diagnosis_is_shown_with_its_figures_and_none_from_outside(
+    made: tuple[dict[str, Any], Path], tmp_path: Path
+) -> None:
+    book = copy.deepcopy(made[0])
+    folder = tmp_path / "plain" / "diagnosis"
+    folder.mkdir(parents=True)
+    (folder / "diagnosis.json").write_text(json.dumps(DIAGNOSIS))
+    (folder / "residual_map.svg").write_text('<svg xmlns="x"><script>window.pwned=1</script></svg>')
+    (folder / "residual_map.png").write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(5000))  # the same, larger
+    (folder / "no_picture.png").write_bytes(b"not a png")
+    (tmp_path / "secret.svg").write_text("<svg>secret</svg>")
+    (folder / "link.svg").symlink_to(tmp_path / "secret.svg")
+    assert [name for name, _ in safe_files(folder)] == ["residual_map.svg"]
+    attach_diagnoses(book, tmp_path)
+    page = book_html(book)
+    assert_harmless(page)
+    assert "Diagnosis: what physics was left out" in page and "Weigh the duct alone." in page
+    assert "residual map" in page and "duct = ground_effect" in page
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "",
+        "[]",
+        "{",
+        '{"schema": 3}',
+        '{"schema": "bemt.diagnosis/1"}',
+        '{"schema": "bemt.diagnosis/1", "ranking": {"a": 1}, "fit": [1], "location": "x", '
+        '"effects": 7, "classes": [1], "next_measurement": []}',
+    ],
+)
+def test_a_broken_diagnosis_breaks_nothing(made: tuple[dict[str, Any], Path], tmp_path: Path, content: str) -> None:
+    book = copy.deepcopy(made[0])
+    (tmp_path / "plain" / "diagnosis").mkdir(parents=True)
+    (tmp_path / "plain" / "diagnosis" / "diagnosis.json").write_text(content)
+    attach_diagnoses(book, tmp_path)
+    assert_harmless(book_html(book))
+
+
+RECORDING = """run,rpm,airspeed_m_s,J,thrust_N,torque_Nm,u_thrust_N,u_torque_Nm,density_kg_m3,wall_distance_m,tip_gap_mm,sideslip_deg,pitch_offset_deg,solver,gas,domain,sector,turbulence,level,cells,iterations,drift_thrust,drift_torque,scatter_thrust,yplus_avg,seconds,converged,note
+coarse,6000,0,0,4.6,0.09,0.02,0.001,1.2,,,0,0,incompressible,,free,half,kOmegaSST,5,34000,300,0.002,0.002,0.001,60,200,1,
+fine,6000,0,0,4.8,0.09,0.05,0.001,1.2,,,0,0,compressible,,free,half,kOmegaSST,6,90000,300,0.002,0.002,0.001,45,200,1,
+finer,6000,0,0,9.9,0.09,0.05,0.001,1.2,,,0,0,compressible,,free,half,kOmegaSST,7,90000,300,0.9,0.9,0.9,45,200,0,
+plate,6000,0,0,5.9,0.09,0.05,0.001,1.2,0.1,,0,0,compressible,,free,half,kOmegaSST,7,90000,300,0,0,0,45,200,1,
+pipe,6000,0,0,2.9,0.09,0.05,0.001,1.2,,,0,0,compressible,,pipe,half,kOmegaSST,7,90000,300,0,0,0,45,200,1,
+fast,6000,9.0,0.35,3.1,0.08,0.05,0.001,1.2,,,0,0,compressible,,free,half,kOmegaSST,6,90000,300,0,0,0,45,200,1,
+"""  # noqa: E501
+STUDY = {"schema": "bemt.cfd-recording/1", "title": "made " + EVIL, "case": "plain", "rule": {"grid_study": True},
+         "grid_studies": [{"levels": [6, 5.5, 5]}]}  # fmt: skip
+
+
+def cfd_folder(root: Path, manifest: object, recording: str) -> Path:
+    folder = root / "cfd" / "made"
+    folder.mkdir(parents=True)
+    (folder / "manifest.json").write_text(manifest if isinstance(manifest, str) else json.dumps(manifest))
+    (folder / "recording.csv").write_text(recording)
+    (folder / "radial.csv").write_text(
+        "run,r_m,thrust_per_radius_N_m,torque_per_radius_Nm_m\nfine,0.05,40,1\nfine,0.1,60,2\n"
+    )
+    return root
+
+
+def test_own_cfd_stands_beside_bemt_with_its_audit(made: tuple[dict[str, Any], Path], tmp_path: Path) -> None:
+    book = copy.deepcopy(made[0])
+    book["cfd"] = cfd_runs(cfd_folder(tmp_path, STUDY, RECORDING))
+    attach(book)
+    page = book["cases"][0]
+    assert page["own_cfd"]["run"] == "fine", "settled, free, bare, compressible, finest"
+    assert {row["label"] for row in page["own_rows"]} == {"incompressible, 34000 cells", "compressible, 90000 cells"}
+    assert page["own_radial"] == [(0.05, 40.0, 1.0), (0.1, 60.0, 2.0)]
+    line = page["result"]["comparisons"][-1]
+    audit = page["own_cfd"]["audit"]
+    parts = [item["u_relative"] for item in audit["lines"]]
+    assert line["D"] == 4.8 and line["u_D"] == pytest.approx(4.8 * math.sqrt(sum(p * p for p in parts)))
+    grid = next(item for item in audit["lines"] if item["topic"] == "grid study")
+    assert grid["u_relative"] == pytest.approx(math.sqrt((0.05 / 4.8) ** 2 - 0.001**2))
+    assert line["u_val"] > 0 and line["verdict"] in ("not distinguishable from noise", "differs")
+    html_text = book_html(book)
+    assert_harmless(html_text)
+    assert "Own CFD" in html_text and "did not settle" in html_text
+
+
+@pytest.mark.parametrize(("manifest", "recording"), [
+    ("", RECORDING), ("[]", RECORDING), ({"schema": "bemt.cfd-recording/1"}, ""),
+    ({"schema": "bemt.cfd-recording/1", "rule": 3, "grid_studies": "x", "case": ["plain"]}, RECORDING),
+    (STUDY, RECORDING.replace("6000", EVIL.replace(",", ""))),
+    (STUDY, RECORDING.replace(",4.8,", ",nan,") + "cut,60\x00"),
+    (STUDY, "run,rpm\n" + "a," * 500),
+])  # fmt: skip
+def test_broken_recordings_break_nothing(made: tuple[dict[str, Any], Path], tmp_path: Path, manifest: object,
+                                         recording: str) -> None:  # fmt: skip
+    book = copy.deepcopy(made[0])
+    book["cfd"] = cfd_runs(cfd_folder(tmp_path, manifest, recording))
+    attach(book)
+    assert_harmless(book_html(book))
+
+
+def comparison(E: float, u_val: float | None, source: str = "bench") -> dict[str, Any]:
+    return {
+        "model": "bemt",
+        "reference": "bench",
+        "source": source,
+        "quantity": "thrust_N",
+        "E": E,
+        "E_pct": E,
+        "u_num": 0.0,
+        "u_input": 1.0,
+        "u_val": u_val,
+    }
+
+
+@pytest.mark.parametrize(
+    ("E", "u_val", "kind", "words"),
+    [
+        (1.0, 2.0, "same", "Not distinguishable from noise"),
+        (3.0, 2.0, "differs", "more than the validation uncertainty"),
+        (3.0, None, "unknown", "without a verdict; the differences are 3.0 times"),
+        (3.0, math.nan, "unknown", "without a verdict"),
+    ],
+)
+def test_verdicts_follow_validation_uncertainty(E: float, u_val: float | None, kind: str, words: str) -> None:
+    rows = [{"source": "bemt", "thrust_N": 10.0, "u": 1.0}]
+    found, _, sentence = verdict({"rows": rows, "comparisons": [comparison(E, u_val)], "faults": []})
+    assert found == kind and words in sentence
+
+
+def test_nothing_is_ever_called_correct(text: str, made: tuple[dict[str, Any], Path]) -> None:
+    assert not re.search(r"\b(correct|validated|accurate|proven)\b", text + summary(made[0]), re.IGNORECASE)
+
+
+def test_plots_keep_their_numbers_and_leave_out_what_is_not_one() -> None:
+    plot = Plot(
+        "t",
+        "x [m]",
+        "y [N]",
+        [Trace("a", [0.0, 1.0, 2.0, 3.0], [1.0, math.nan, 3.0, None], [0.1] * 4), Trace("gone", [math.inf], [1.0])],
+        [Mark(math.nan, "nowhere"), Mark(1.5, "here")],
+    )
+    out = figure(plot)
+    data = json.loads(next(a["data-plot"] or "" for _, a in read(out).found if "data-plot" in a))
+    assert [t["n"] for t in data["t"]] == ["a"]
+    assert data["t"][0]["y"] == [1.0, None, 3.0, None]
+    assert "here" in out and "nowhere" not in out and "nan" not in out.lower().replace("nan]", "")
+    x0, x1, left, right = data["x"]
+    assert x0 <= 0.0 < 2.0 <= x1 and left < right
+
+
+@pytest.mark.parametrize(
+    ("low", "high"), [(0.0, 1.0), (-3.2e-5, 7.7e-5), (18_000.0, 61_000.0), (-1e9, 2e9), (0.97, 0.971)]
+)
+def test_ticks_are_round_and_inside(low: float, high: float) -> None:
+    marks = ticks(low, high)
+    assert 3 <= len(marks) <= 12 and low <= marks[0] and marks[-1] <= high
+    steps = np.diff(marks)
+    assert np.allclose(steps, steps[0])
+
+
+def test_escaping_leaves_nothing_that_acts() -> None:
+    assert "<" not in esc(EVIL) and '"' not in esc(EVIL) and "'" not in esc(EVIL)
+    assert esc("a\x00b\u202ec\ud800") == "abc"
+
+
+def test_command_writes_two_files_and_says_so(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    made: tuple[dict[str, Any], Path],
+) -> None:
+    monkeypatch.setattr("bemt.report.gather.gather", lambda paths, out, progress: made[0])
+    assert main(["report", str(made[1] / "cases"), "--out", str(tmp_path / "r")]) == 2
+    assert sorted(p.name for p in (tmp_path / "r").iterdir()) == ["report.html", "report.md"]
+    assert "report.html" in capsys.readouterr().out
+
+
+# ---- the committed report -------------------------------------------------------------------------------------------
+
+
+def numbers(page: str) -> list[tuple[str, list[float]]]:
+    """Numbers of all plots and tables, in the order of the page."""
+    out: list[tuple[str, list[float]]] = []
+    for tag, attributes in read(page).found:
+        if "data-plot" in attributes:
+            for trace in json.loads(attributes["data-plot"] or "")["t"]:
+                values = [v for key in ("x", "y", "u") for v in trace[key]]
+                out.append((f"plot {trace['n']}", [math.nan if v is None else v for v in values]))
+        elif tag == "td" and "data-v" in attributes:
+            out.append(("table", [float(attributes["data-v"] or "nan")]))
+    return out
+
+
+def test_committed_report_agrees_with_the_committed_sweep(project: Path) -> None:
+    page = (project / "reports" / "report.html").read_text(encoding="utf-8")
+    kept = json.loads((project / "reports" / "sweep.json").read_text(encoding="utf-8"))
+    assert_harmless(page)
+    shown = {value for _, values in numbers(page) for value in values}
+    for case in kept["cases"]:
+        assert f">{esc(case['name'])}<" in page
+        for row in case["rows"]:
+            if row["source"] in ("bemt", "k1k2") and row["thrust_N"] is not None:
+                assert any(math.isclose(row["thrust_N"], v, rel_tol=1e-8) for v in shown), (case["name"], row["source"])
+
+
+@pytest.mark.slow
+def test_committed_report_is_what_the_command_generates(project: Path, tmp_path: Path) -> None:
+    for name in ("cfd", "diagnosis"):
+        if (project / "reports" / name).is_dir():
+            shutil.copytree(project / "reports" / name, tmp_path / name)
+    for found in (project / "reports").glob("*/diagnosis"):
+        shutil.copytree(found, tmp_path / found.parent.name / "diagnosis", dirs_exist_ok=True)
+    call = [sys.executable, "-m", "bemt", "report", "cases/", "--out", str(tmp_path), "--quiet"]
+    subprocess.run(call, cwd=project, check=True)
+    fresh = numbers((tmp_path / "report.html").read_text(encoding="utf-8"))
+    kept = numbers((project / "reports" / "report.html").read_text(encoding="utf-8"))
+    assert [name for name, _ in fresh] == [name for name, _ in kept]
+    for (name, a), (_, b) in zip(fresh, kept, strict=True):
+        assert len(a) == len(b), name
+        scale = np.nanmax(np.abs(b)) if np.isfinite(b).any() else 1.0
+        assert np.allclose(a, b, rtol=1e-2, atol=2e-3 * scale, equal_nan=True), name
+
+
+# ---- in a browser ---------------------------------------------------------------------------------------------------
+
+RELAY = (
+    "import os, sys\nos.dup2(int(sys.argv[1]), 3)\nos.dup2(int(sys.argv[2]), 4)\nos.execvp(sys.argv[3], sys.argv[3:])"
+)
+
+
+class Browser:
+    """Headless Chromium, driven over the pipes of its debugging protocol."""
+
+    def __init__(self, program: str, profile: str) -> None:
+        to_read, self.write = os.pipe()
+        self.read, to_write = os.pipe()
+        flags = [
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--disable-quic",
+            "--no-first-run",
+            "--disable-sync",
+            "--disable-background-networking",
+            "--disable-component-update",
+            "--disable-dev-shm-usage",
+            "--remote-debugging-pipe",
+            f"--user-data-dir={profile}",
+            "about:blank",
+        ]
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", RELAY, str(to_read), str(to_write), program, *flags],
+            pass_fds=(to_read, to_write),
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        os.close(to_read)
+        os.close(to_write)
+        self.buffer, self.count, self.session = b"", 0, ""
+        self.complaints: list[str] = []
+        self.addresses: list[str] = []
+        self.loaded = False
+        target = self.call("Target.createTarget", url="about:blank")["targetId"]
+        self.session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        for domain in ("Page", "Runtime", "Log", "Network"):
+            self.call(f"{domain}.enable")
+
+    def _event(self) -> dict[str, Any]:
+        while b"\0" not in self.buffer:
+            part = os.read(self.read, 1 << 20)
+            assert part, "the browser has gone"
+            self.buffer += part
+        line, _, self.buffer = self.buffer.partition(b"\0")
+        message: dict[str, Any] = json.loads(line)
+        method, params = message.get("method"), message.get("params", {})
+        if method == "Runtime.exceptionThrown":
+            self.complaints.append(str(params["exceptionDetails"]))
+        elif method == "Runtime.consoleAPICalled" and params["type"] in ("error", "warning"):
+            self.complaints.append(str(params["args"]))
+        elif method == "Log.entryAdded" and params["entry"]["level"] in ("error", "warning"):
+            self.complaints.append(params["entry"]["text"])
+        elif method == "Network.requestWillBeSent":
+            self.addresses.append(params["request"]["url"])
+        elif method == "Page.loadEventFired":
+            self.loaded = True
+        return message
+
+    def call(self, method: str, **params: Any) -> dict[str, Any]:
+        """Send one command and wait for its answer."""
+        self.count += 1
+        message: dict[str, Any] = {"id": self.count, "method": method, "params": params}
+        if self.session:
+            message["sessionId"] = self.session
+        os.write(self.write, json.dumps(message).encode() + b"\0")
+        while True:
+            answer = self._event()
+            if answer.get("id") == self.count:
+                assert "error" not in answer, answer["error"]
+                return dict(answer.get("result", {}))
+
+    def open(self, path: Path, width: int = 1280) -> None:
+        self.call(
+            "Emulation.setDeviceMetricsOverride", width=width, height=900, deviceScaleFactor=1, mobile=width < 600
+        )
+        self.loaded = False
+        self.call("Page.navigate", url=path.as_uri())
+        while not self.loaded:
+            self._event()
+
+    def run(self, code: str) -> Any:
+        """Value of an expression on the page."""
+        result = self.call("Runtime.evaluate", expression=code, returnByValue=True)
+        assert "exceptionDetails" not in result, result["exceptionDetails"]
+        return result["result"].get("value")
+
+    def close(self) -> None:
+        self.process.terminate()
+        self.process.wait(timeout=30)
+        os.close(self.read)
+        os.close(self.write)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    program = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if program is None:
+        pytest.skip("no chromium on this machine")
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
+        window = Browser(program, profile)
+        yield window
+        window.close()
+
+
+@pytest.fixture(scope="module")
+def opened(browser: Browser, text: str, tmp_path_factory: pytest.TempPathFactory) -> Browser:
+    path = tmp_path_factory.mktemp("page") / "report.html"
+    path.write_text(text, encoding="utf-8")
+    browser.open(path)
+    browser.path = path  # type: ignore[attr-defined]
+    return browser
+
+
+def test_it_opens_without_complaint_and_asks_for_nothing(opened: Browser) -> None:
+    assert opened.complaints == []
+    assert [a for a in opened.addresses if not a.startswith(("file:", "data:"))] == []
+    assert opened.run("typeof window.pwned") == "undefined"
+    assert opened.run("document.querySelectorAll('script').length") == 1
+
+
+def test_one_page_is_shown_at_a_time(opened: Browser) -> None:
+    shown = "Array.from(document.querySelectorAll('section.page')).filter(s => s.offsetHeight > 0).map(s => s.id)"
+    for page in ("trends", "front"):
+        opened.run(f"document.querySelector('nav a[href=\"#{page}\"]').click()")
+        opened.run("new Promise(r => setTimeout(r, 50))")
+        for _ in range(50):
+            if opened.run(shown) == [page]:
+                break
+        assert opened.run(shown) == [page]
+        assert opened.run("document.querySelector('nav a[aria-current]').getAttribute('href')") == f"#{page}"
+
+
+def test_plots_answer_the_pointer_and_their_keys(opened: Browser) -> None:
+    opened.run("location.hash = '#front'; 0")
+    at = "document.querySelector('#front svg[data-plot]')"
+    point = (
+        f"(() => {{const s = {at}, c = s.querySelector('g.trace circle').getBoundingClientRect();"
+        "const o = {clientX: c.x + c.width / 2, clientY: c.y + c.height / 2, bubbles: true};"
+        "s.dispatchEvent(new PointerEvent('pointermove', o));"
+        "const t = s.closest('figure').querySelector('.tip'); return [t.hidden, t.textContent];})()"
+    )
+    hidden, words = opened.run(point)
+    assert not hidden and words.startswith("BEMT") and re.search(r"thrust / recorded thrust \[-\]: \d", words)
+    key = f"{at}.closest('figure').querySelector('.key')"
+    state = f"[getComputedStyle({at}.querySelector('g.trace')).display, {key}.getAttribute('aria-pressed')]"
+    assert opened.run(state) == ["inline", "true"]
+    opened.run(f"{key}.click()")
+    assert opened.run(state) == ["none", "false"]
+    opened.run(f"{key}.click()")
+    assert opened.run(state) == ["inline", "true"]
+
+
+def test_tables_sort_up_and_down_with_gaps_last(opened: Browser) -> None:
+    at = "document.querySelector('#front table.sort')"
+    column = f"Array.from({at}.tBodies[0].rows).map(r => r.cells[2].getAttribute('data-v'))"
+    click = f"{at}.querySelectorAll('thead button')[2].click()"
+    for order in (1, -1):
+        opened.run(click)
+        values = opened.run(column)
+        assert values[-1] == "", "the case without a result"
+        known = [float(v) for v in values[:-1]]
+        assert len(known) == 2 and known == sorted(known, reverse=order < 0)
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+def test_no_page_is_wider_than_the_window(opened: Browser, width: int) -> None:
+    opened.open(opened.path, width)  # type: ignore[attr-defined]
+    wide = (
+        "Array.from(document.querySelectorAll('section.page')).map(s => {location.hash = '#' + s.id;"
+        "document.querySelectorAll('section.page').forEach(p => p.classList.toggle('shown', p === s));"
+        "return [s.id, document.documentElement.scrollWidth];})"
+    )
+    for page, size in opened.run(wide):
+        assert size <= width, page
+    assert opened.complaints == []
