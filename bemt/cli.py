@@ -171,7 +171,8 @@ def build_parser() -> argparse.ArgumentParser:
     solid.add_argument("--json", action="store_true", help="print one JSON document (bemt.export/1)")
 
     flow = commands.add_parser("cfd", help="run a campaign of OpenFOAM cases and record what comes out")
-    flow.add_argument("campaign", metavar="CAMPAIGN", help="campaign.toml or its folder; a folder of campaigns is summed up")
+    plans = "campaign.toml or its folder; a folder of campaigns is summed up"
+    flow.add_argument("campaign", metavar="CAMPAIGN", help=plans)
     flow.add_argument("--only", type=_positive, metavar="N", help="run point N alone, even if it is recorded")
     flow.add_argument("--ranks", type=_positive, default=2, metavar="N", help="processes of a run (default 2)")
     flow.add_argument("--work", metavar="DIR", help="folder of grids and runs (default: a temporary one)")
@@ -179,10 +180,10 @@ def build_parser() -> argparse.ArgumentParser:
     flow.add_argument("--json", action="store_true", help="print one JSON document (bemt.cfd-run/1)")
     flow.add_argument("--quiet", action="store_true", help="print neither progress nor tables")
 
-    known = commands.add_parser("effects", help="list every physical effect: parameters, ranges, sources, signs")
-    form = known.add_mutually_exclusive_group()
-    form.add_argument("--markdown", action="store_true", help="as the page docs/effects.md")
-    form.add_argument("--json", action="store_true", help="print one JSON document (bemt.effects/1)")
+    physics = commands.add_parser("effects", help="list every physical effect: parameters, ranges, sources, signs")
+    style = physics.add_mutually_exclusive_group()
+    style.add_argument("--markdown", action="store_true", help="as the page docs/effects.md")
+    style.add_argument("--json", action="store_true", help="print one JSON document (bemt.effects/1)")
 
     proof = commands.add_parser("prove", help="conceal causes, let the diagnosis find them, score it")
     proof.add_argument("--size", choices=("small", "full"), default="small", help="41 or 605 cases (default small)")

@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from diagnosing import case, diagnose, from_text, left_out, points, recording
+from diagnosing import case, diagnose, left_out, points, recording
 
 from bemt.diagnose import document, plan, record
 from bemt.series import Series

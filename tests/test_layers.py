@@ -91,8 +91,8 @@ UNSEEN = (
 )
 
 HEAVY = {
-    "OCP", "aerosandbox", "cadquery", "casadi", "dask", "distributed", "manifold3d", "matplotlib", "neuralfoil", "pandas",
-    "pyarrow", "pyvista", "scipy", "sklearn", "trimesh", "vtk", "vtkmodules", "wisdem",
+    "OCP", "aerosandbox", "cadquery", "casadi", "dask", "distributed", "manifold3d", "matplotlib", "neuralfoil",
+    "pandas", "pyarrow", "pyvista", "scipy", "sklearn", "trimesh", "vtk", "vtkmodules", "wisdem",
 }  # fmt: skip
 LIGHT = {"bemt", "bemt.__main__", "bemt.cli", "bemt.errors"}  # imported by --help: standard library only
 

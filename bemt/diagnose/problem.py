@@ -42,6 +42,7 @@ and bend are errors of the solver itself, declared after volume 1 of the UIUC da
 
 _STATIONS = 24
 _U_DEFAULT = 0.01
+_U_RPM = 0.001
 _U_FLOOR = 0.002
 # Effects whose whole size is below this share of the largest coefficient need no error of their form.
 _FORM_FLOOR = 0.005
@@ -133,7 +134,7 @@ class Part:
     def steady_rpm(self) -> Array:
         """Speed as a smooth function of the pulse width, the baseline of the drive [rev/min]."""
         p, rpm = self.record.extra["pwm_s"], self.record.measured["rpm"]
-        degree = min(3, max(1, np.unique(np.round(p, 6)).size - 2))
+        degree = min(3, np.unique(np.round(p, 6)).size - 1)
         x = (p - p.mean()) / max(float(np.ptp(p)), 1e-12)
         return np.asarray(np.polyval(np.polyfit(x, rpm, degree), x))
 
@@ -316,7 +317,8 @@ def assemble(parts: tuple[Part, ...]) -> Problem:
         notes.append(f"{lost} readings left out: the baseline does not converge there")
     scale = np.concatenate([_scale(p) for p in parts])
     known = np.isfinite(u[kept])
-    fallback = np.maximum(_U_DEFAULT * np.abs(y), _U_FLOOR * scale)
+    share = np.where(channel == CHANNELS.index("rpm"), _U_RPM, _U_DEFAULT)
+    fallback = np.maximum(share * np.abs(y), np.minimum(share, _U_FLOOR) * scale)
     sigma = np.where(np.isfinite(u) & (u > 0), u, fallback)
     problem = Problem(
         parts, y[kept], f0[kept], sigma[kept], scale[kept], bool(known.mean() > 0.5), channel[kept], point[kept],

@@ -172,7 +172,7 @@ def from_series(series: Series, case: Case, correlated: Mapping[str, Mapping[str
     if "sideslip_deg" in got:
         got["sideslip_rad"] = np.radians(got["sideslip_deg"])
     extra = {k: got[k].copy() for k in COVARIATES if k in got and np.isfinite(got[k]).all()}
-    if "pwm_s" in extra and "rpm" in series and np.ptp(extra["pwm_s"]) > 0:
+    if "pwm_s" in extra and "rpm" in series:
         measured["rpm"], u["rpm"] = rpm.copy(), np.asarray(filled.u["rpm"], dtype=float).copy()
     loads = np.any([np.isfinite(measured[k]) for k in measured if k != "rpm"], axis=0)
     keep = np.isfinite(rpm) & (rpm > 0) & np.isfinite(V) & loads
@@ -181,8 +181,8 @@ def from_series(series: Series, case: Case, correlated: Mapping[str, Mapping[str
         notes.append(
             f"{int(kinks.sum())} points where the speed sets off or stops were left out: no acceleration there"
         )
-        for values in measured.values():
-            values[kinks] = np.nan
+        for reading in measured.values():
+            reading[kinks] = np.nan
     if (~keep).any():
         notes.append(f"{int((~keep).sum())} of {n} points without speed or load were left out")
     if keep.sum() < 3:
