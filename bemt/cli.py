@@ -206,6 +206,8 @@ def build_parser() -> argparse.ArgumentParser:
     why.add_argument("--off", action="append", default=[], metavar="EFFECT", help=off)
     known = "recordings without the cause: how far model and stand differ anyway"
     why.add_argument("--reference", nargs="+", default=[], metavar="RECORDING", help=known)
+    model = "model that is compared with the recordings (default bemt; k1k2: thrust only)"
+    why.add_argument("--baseline", choices=("bemt", "k1k2"), default="bemt", help=model)
     why.add_argument("--only", nargs="+", metavar="EFFECT", help="consider these effects only (default: all)")
     why.add_argument("--out", metavar="DIR", help="write diagnosis.json, figures and the improved case there")
     why.add_argument("--no-figures", action="store_true", help="with --out: no figures")

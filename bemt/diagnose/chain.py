@@ -83,6 +83,7 @@ def diagnose(
     only: Sequence[str] | None = None,
     progress: Callable[[str], None] | None = None,
     nulls: int = gate.NULLS,
+    baseline: str = "bemt",
 ) -> Diagnosis:
     """Say what was left out.
 
@@ -98,6 +99,8 @@ def diagnose(
         Told what is being done.
     nulls : int
         Bootstrapped nulls of the gate [1].
+    baseline : str
+        Model that is compared: "bemt", or "k1k2" for its thrust.
 
     Returns
     -------
@@ -108,7 +111,7 @@ def diagnose(
 
     # matrices of a few hundred rows: more threads only wait for each other, badly so on a busy machine
     with threadpool_limits(1, "blas"):
-        return _diagnose(records, cases, only, progress or (lambda _: None), nulls)
+        return _diagnose(records, cases, only, progress or (lambda _: None), nulls, baseline)
 
 
 def _diagnose(
@@ -117,9 +120,10 @@ def _diagnose(
     only: Sequence[str] | None,
     say: Callable[[str], None],
     nulls: int,
+    baseline: str,
 ) -> Diagnosis:
     say("baseline and nuisances")
-    problem = build(records, cases)
+    problem = build(records, cases, baseline)
     candidates, absent = signatures.candidates(problem, only, lambda name: say(f"solving with {name}"))
     say("weighing explanations")
     found = evidence.weigh(problem, candidates)

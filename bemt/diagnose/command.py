@@ -136,7 +136,7 @@ def _diagnose(args: argparse.Namespace) -> int:
         raise InputError(Fault("--reference", "", f"{len(cases)} cases", "one case for all when there are references"))
     loaded += [replace(load(p, cases[0]), reference=True) for p in args.reference]
     say = _progress(args)
-    answer = diagnose(loaded, cases, args.only or None, say)
+    answer = diagnose(loaded, cases, args.only or None, say, baseline=args.baseline)
     if say:
         print("\r\x1b[K", end="", file=sys.stderr)
     doc = document(answer) | {"recordings": list(args.recordings), "cases": [c.name for c in cases]}

@@ -19,6 +19,7 @@ from bemt import evaluate, forward
 from bemt.diagnose.noise import smooth_modes
 from bemt.diagnose.record import Record, concatenated, merged
 from bemt.effects.base import Baking, Effect, Flow, Reading
+from bemt.errors import Fault, InputError
 
 if TYPE_CHECKING:
     from bemt.case import Case
@@ -41,6 +42,7 @@ their published range [1].  Drag, lift, pitch, gains and zeros are working calib
 and bend are errors of the solver itself, declared after volume 1 of the UIUC database; the rest is declared."""
 
 _STATIONS = 24
+_FEWEST = 3
 _U_DEFAULT = 0.01
 _U_RPM = 0.001
 _U_FLOOR = 0.002
@@ -87,6 +89,8 @@ class Part:
         Rotor: parts of one rotor share the error of its model.
     left_out : tuple of str
         Effects that the case switches off.
+    instead : (C P,) float or None
+        Baseline of another model, to which effects add what share they change in ours [N], [N m], [rev/min].
     """
 
     record: Record
@@ -95,10 +99,30 @@ class Part:
     flow: Flow
     key: str = ""
     left_out: tuple[str, ...] = ()
+    instead: Array | None = None
     _solved: dict[tuple[Effect, ...], tuple[Array, Array, Flow]] = field(default_factory=dict, repr=False)
 
     def predict(self, effects: Sequence[Effect]) -> Array:
-        """Readings with a set of effects.
+        """Readings with a set of effects, around the baseline of another model where there is one.
+
+        Parameters
+        ----------
+        effects : sequence of Effect
+            All physics that is on.
+
+        Returns
+        -------
+        (C P,) float
+            Channels of :attr:`channels`, one after the other; NaN where not converged [N], [N m], [rev/min].
+        """
+        ours = self._ours(effects)
+        if self.instead is None:
+            return ours
+        base = self._ours(self.baseline)
+        return self.instead * (ours / base)
+
+    def _ours(self, effects: Sequence[Effect]) -> Array:
+        """Readings of the blade element model with a set of effects.
 
         Parameters
         ----------
@@ -244,7 +268,7 @@ class Problem:
         return self.predict(extra) - self.f0
 
 
-def _part(record: Record, case: Case) -> Part:
+def _part(record: Record, case: Case, baseline: str) -> Part:
     ready = evaluate.prepare(case, None, _STATIONS)
     model, R = ready.model, ready.diameter_m / 2.0
     omega = record.rpm * np.pi / 30.0
@@ -257,10 +281,15 @@ def _part(record: Record, case: Case) -> Part:
     model = replace(model, mach_max=top, re_range=(re_low, re_high), _kept={})
     plain = [e for e in ready.effects if not forward.acts_on_points(e)]
     flow = forward.flow_of(model.prepared(plain), record.rpm, record.V, record.air, record.extra, ready.chord75_m)
-    return Part(record, model, ready.effects, flow, case.content_hash(), tuple(case.get("model.effects_off")))
+    part = Part(record, model, ready.effects, flow, case.content_hash(), tuple(case.get("model.effects_off")))
+    if baseline == "bemt":
+        return part
+    thrust = evaluate.k1k2(case, None, record.rpm, record.V, record.air).thrust_N
+    nothing = np.full_like(thrust, np.nan)
+    return replace(part, instead=np.concatenate([thrust if c == "thrust_N" else nothing for c in part.channels]))
 
 
-def build(records: Sequence[Record], cases: Sequence[Case]) -> Problem:
+def build(records: Sequence[Record], cases: Sequence[Case], baseline: str = "bemt") -> Problem:
     """Put recordings beside the baselines of their cases.
 
     Parameters
@@ -269,11 +298,18 @@ def build(records: Sequence[Record], cases: Sequence[Case]) -> Problem:
         One or more.
     cases : sequence of Case
         One for all, or one each.
+    baseline : str
+        Model that is compared: "bemt", or "k1k2" for its thrust.
 
     Returns
     -------
     Problem
         Everything that follows needs no case any more.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than three readings.
     """
     chosen = list(cases) * len(records) if len(cases) == 1 else list(cases)
     # recordings of one case share the errors of its model
@@ -281,7 +317,11 @@ def build(records: Sequence[Record], cases: Sequence[Case]) -> Problem:
     for r, c in zip(records, chosen, strict=True):
         groups.setdefault((r.reference, c.content_hash()), (c, []))[1].append(r)
     order = sorted(groups, key=lambda k: k[0])
-    return assemble(tuple(_part(merged(groups[k][1]), groups[k][0]) for k in order))
+    problem = assemble(tuple(_part(merged(groups[k][1]), groups[k][0], baseline) for k in order))
+    if problem.y.size < _FEWEST:
+        got = f"{problem.y.size} readings beside a converged baseline"
+        raise InputError(Fault(records[0].name, "", got, f"{_FEWEST} or more"))
+    return problem
 
 
 def assemble(parts: tuple[Part, ...]) -> Problem:

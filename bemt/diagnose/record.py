@@ -142,7 +142,7 @@ def from_series(series: Series, case: Case, correlated: Mapping[str, Mapping[str
     Raises
     ------
     InputError
-        If there is no load, or fewer than three points remain.
+        If there is no load, or no point with one.
     """
     notes: list[str] = []
     n = len(series)
@@ -185,8 +185,8 @@ def from_series(series: Series, case: Case, correlated: Mapping[str, Mapping[str
             reading[kinks] = np.nan
     if (~keep).any():
         notes.append(f"{int((~keep).sum())} of {n} points without speed or load were left out")
-    if keep.sum() < 3:
-        raise InputError(Fault(series.name, "", f"{int(keep.sum())} points with speed and load", "three or more"))
+    if not keep.any():
+        raise InputError(Fault(series.name, "", "no point with a speed and a load", "one or more"))
     correlated = correlated or {}
     record = Record(
         series.name, rpm, V, air, measured, u, extra,
