@@ -163,8 +163,14 @@ def _improved(out: Path, answer: Any, case: Case) -> None:
     from bemt.diagnose.improve import improved_case
 
     document = improved_case(answer, case, case.path.read_text(encoding="utf-8"))
-    if document:
-        write_atomic(out / "case.toml", document)
+    if not document:
+        return
+    write_atomic(out / "case.toml", document)
+    for file in case.files():
+        if file != case.path:  # stations, sections and recorded values lie beside the case, as before
+            target = out / file.relative_to(case.folder)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            write_atomic(target, file.read_bytes())
 
 
 def _plan(args: argparse.Namespace) -> int:

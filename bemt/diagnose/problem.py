@@ -43,8 +43,10 @@ and bend are errors of the solver itself, declared after volume 1 of the UIUC da
 
 _STATIONS = 24
 _FEWEST = 3
+# Speed over pulse width at rest of everything else: terms of the polynomial.
+_PULSE_POWERS = 6
 _U_DEFAULT = 0.01
-_U_RPM = 0.001
+_U_RPM = 0.01
 _U_FLOOR = 0.002
 # Effects whose whole size is below this share of the largest coefficient need no error of their form.
 _FORM_FLOOR = 0.005
@@ -158,7 +160,7 @@ class Part:
     def steady_rpm(self) -> Array:
         """Speed as a smooth function of the pulse width, the baseline of the drive [rev/min]."""
         p, rpm = self.record.extra["pwm_s"], self.record.measured["rpm"]
-        degree = min(3, np.unique(np.round(p, 6)).size - 1)
+        degree = min(_PULSE_POWERS - 1, np.unique(np.round(p, 6)).size - 1)
         x = (p - p.mean()) / max(float(np.ptp(p)), 1e-12)
         return np.asarray(np.polyval(np.polyfit(x, rpm, degree), x))
 
@@ -464,7 +466,7 @@ def _nuisances(problem: Problem) -> tuple[Array, tuple[str, ...]]:
             x = p.record.extra["pwm_s"]
             x = (x - x.mean()) / max(float(np.ptp(x)), 1e-12)
             basis = np.concatenate([np.zeros(len(p.record) * (len(p.channels) - 1)), np.ones(len(p.record))])
-            for k in range(4):
+            for k in range(_PULSE_POWERS):
                 power = np.concatenate([np.zeros(len(p.record) * (len(p.channels) - 1)), x**k]) * basis
                 whole = np.concatenate(
                     [power if j == i else np.zeros(len(q.record) * len(q.channels)) for j, q in rows]

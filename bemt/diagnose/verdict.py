@@ -230,6 +230,9 @@ def _pair(found: Evidence, leading: str, share: dict[str, float], rest: float) -
 
 def _named(found: Evidence, ids: tuple[str, ...], probability: float, rest: float) -> Decision:
     stand = all(effects.catalogue()[i].kind == "stand" for i in ids)
+    if len(ids) > 1 and stand and len({i.partition("_")[2] for i in ids}) < len(ids):
+        why = "two instruments with the same fault at once: one cause that is not in the library is likelier"
+        return Decision("unknown", (), "+".join(i for i in found.spans if i in ids), probability, rest, (), why)
     leading = "+".join(i for i in found.spans if i in ids)
     why = "nearly all of the probability is on it" if len(ids) == 1 else "nearly all of the probability is on both"
     return Decision("sensor" if stand else "named", ids, leading, probability, rest, (), why)
