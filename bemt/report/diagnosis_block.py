@@ -32,6 +32,9 @@ def _parameters(value: Any) -> str:
     words = []
     for name, p in _mapping(value).items():
         p = _mapping(p)
+        if isinstance(p.get("value"), str):  # a form of the law, not a number
+            words.append(f"{name} {p['value'].replace('_', ' ')}")
+            continue
         shown, low, high = (num(p.get(k), 3).text for k in ("value", "low", "high"))
         unit = str(p.get("unit") or "")
         words.append(f"{name} {shown} ({low} to {high}){' ' + unit if unit not in ('', '-', '1') else ''}")
