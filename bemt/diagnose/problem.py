@@ -43,6 +43,8 @@ and bend are errors of the solver itself, declared after volume 1 of the UIUC da
 
 _STATIONS = 24
 _FEWEST = 3
+# Readings further than this factor from the baseline are in other units.
+_SLIPPED = 3.0
 # Speed over pulse width at rest of everything else: terms of the polynomial.
 _PULSE_POWERS = 6
 _U_DEFAULT = 0.01
@@ -400,13 +402,28 @@ def _covariates(parts: Sequence[Part]) -> dict[str, Array]:
     return found | concatenated([p.record for p in parts])
 
 
+def _stretch(problem: Problem) -> Array:
+    """Size of the readings over the baseline for channels in other units, else 1: errors are shares of what is read."""
+    out = np.ones_like(problem.y)
+    for k in np.unique(problem.rotor):
+        for c in np.unique(problem.channel):
+            mine = (problem.rotor == k) & (problem.channel == c) & problem.free
+            if mine.any():
+                ratio = float(np.median(np.abs(problem.y[mine]) / np.maximum(np.abs(problem.f0[mine]), 1e-12)))
+                out[mine] = 1.0 if 1.0 / _SLIPPED < ratio < _SLIPPED else ratio
+    return out
+
+
 def _nuisances(problem: Problem) -> tuple[Array, tuple[str, ...]]:
     """Tangents of the calibration, one standard deviation each."""
     columns: list[Array] = []
     names: list[str] = []
     y, f0, channel = problem.y, problem.f0, problem.channel
 
-    def add(name: str, column: Array) -> None:
+    stretch = _stretch(problem)
+
+    def add(name: str, column: Array, of_reading: bool = False) -> None:
+        column = column if of_reading else column * stretch
         if np.isfinite(column).all() and np.any(column != 0.0):
             columns.append(column)
             names.append(name)
@@ -432,7 +449,7 @@ def _nuisances(problem: Problem) -> tuple[Array, tuple[str, ...]]:
             gain = p.record.gain.get(key, PRIORS[f"{name} gain"])
             zero = p.record.zero.get(key, PRIORS[f"{name} zero"] * p.full_scale.get(key, 0.0))
             tag = f" ({p.record.name})" if len(rows) > 1 else ""
-            add(f"{name} gain{tag}", np.where(mine, gain * y, 0.0))
+            add(f"{name} gain{tag}", np.where(mine, gain * y, 0.0), of_reading=True)
             add(f"{name} zero{tag}", np.where(mine, zero, 0.0))
     load = channel < 2
     slope_V = np.concatenate([np.concatenate([_slope(p, c) for c in p.channels]) for p in problem.parts])[problem.kept]
@@ -444,13 +461,16 @@ def _nuisances(problem: Problem) -> tuple[Array, tuple[str, ...]]:
     rotor = problem.rotor
     for k in np.unique(rotor):
         for c, name in ((0, "thrust"), (1, "torque")):
-            own = np.where((rotor == k) & (channel == c), f0, 0.0)
+            mine = (rotor == k) & (channel == c)
+            if not mine.any():
+                continue
+            own = np.where(mine, f0, 0.0)
             tag = f" (rotor {k})" if rotor.max() else ""
             add(f"level of {name}{tag}", PRIORS[f"level of {name}"] * own)
             size = np.where(own != 0.0, problem.scale, 0.0)
             if np.ptp(J) > 0.05:
-                add(f"slope of {name} over J{tag}", PRIORS["slope over J"] * x * size)
-                add(f"bend of {name} over J{tag}", PRIORS["bend over J"] * (1.5 * x**2 - 0.5) * size)
+                add(f"slope of {name} over J{tag}", PRIORS["slope over J"] * x * size, of_reading=True)
+                add(f"bend of {name} over J{tag}", PRIORS["bend over J"] * (1.5 * x**2 - 0.5) * size, of_reading=True)
     recorded = all(p.record.air_recorded for p in problem.parts)
     add("density", np.where(load, PRIORS["density" if recorded else "density not recorded"] * f0, 0.0))
     add("airspeed", np.where(load, PRIORS["airspeed"] * V * slope_V, 0.0))
@@ -460,7 +480,7 @@ def _nuisances(problem: Problem) -> tuple[Array, tuple[str, ...]]:
         for label in labels:
             for c, name in ((0, "thrust"), (1, "torque")):
                 mine = (run == label) & (channel == c)
-                add(f"session {label:g} {name}", np.where(mine, PRIORS["session"] * y, 0.0))
+                add(f"session {label:g} {name}", np.where(mine, PRIORS["session"] * y, 0.0), of_reading=True)
     for i, p in rows:
         if "rpm" in p.channels:
             x = p.record.extra["pwm_s"]
