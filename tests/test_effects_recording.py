@@ -184,7 +184,7 @@ def test_electrical_speed_is_pole_pairs_times_the_true_one() -> None:
     [
         ("thrust_N", 1.0 / 9.80665), ("thrust_N", 9.80665), ("thrust_N", 4.4482216), ("thrust_N", 101.97162),
         ("thrust_N", 1000.0), ("thrust_N", 0.45359237), ("torque_Nm", 10.197162), ("torque_Nm", 141.61193),
-        ("torque_Nm", 8.8507458), ("torque_Nm", 1000.0), ("torque_Nm", 2.0 * math.pi),
+        ("torque_Nm", 8.8507458), ("torque_Nm", 0.73756215), ("torque_Nm", 1000.0), ("torque_Nm", 2.0 * math.pi),
         ("torque_Nm", 60.0), ("torque_Nm", 25.4), ("rpm", 2.0 * math.pi / 60.0), ("rpm", 60.0),
         ("airspeed_m_s", 3.6), ("airspeed_m_s", 0.44704), ("density_kg_m3", 0.06242796), ("density_kg_m3", 1e-3),
     ],
@@ -253,7 +253,7 @@ def test_inertia_is_the_derivative_of_the_speed() -> None:
     exact = 1500.0 * np.pi / 30.0 * 2.0 * np.pi * np.cos(2.0 * np.pi * t)
     found = np.empty_like(t)
     found[shuffled] = slope(flow)
-    assert np.max(np.abs(found - exact)[1:-1]) < 2e-3 * exact.max()
+    assert np.max(np.abs(found - exact)[1:-1]) < 1e-3 * exact.max()
     inertia = 2 * 1300.0 * 0.068 * flow.chord**2 * flow.R**3 / 3.0
     np.testing.assert_allclose(shown(flow, RotorInertia(3.0))["torque_Nm"] - flow.Q0, 3.0 * inertia * slope(flow))
     assert np.all(slope(recorded(rpm, time_s=100.0 * t * 2)) == 0.0), "steps of 2 s are plateaus"

@@ -202,6 +202,17 @@ class Flow:
         return self.omega * self.R / self.a_sound
 
     @property
+    def warming(self) -> Array:
+        """Temperature less that at the start of the run, (P,), zero where it is not recorded [K]."""
+        if "temperature_K" not in self.extra:
+            return np.zeros_like(self.rpm)
+        T = self.extra["temperature_K"]
+        start = np.full_like(self.rpm, T[0])
+        for run in self.runs:
+            start[run] = T[run[0]]
+        return np.nan_to_num(T - start)
+
+    @property
     def area(self) -> float:
         """Disk area [m2]."""
         return math.pi * self.R**2

@@ -12,6 +12,8 @@ from bemt.effects.base import Array, Effect, Flow, Parameter, Reading
 _SECTION, _DENSITY = 0.068, 1300.0
 # Points further apart than this are no transient [s].
 LONGEST_STEP_S = 1.0
+# Change of the slope across a point, over the larger slope, from which it may be a kink.
+_KINK = 0.5
 
 
 @dataclass(frozen=True)
@@ -22,7 +24,7 @@ class RotorInertia(Effect):
     -----
     Euler's law of a rotating body (Euler 1765).  I = B rho_b 0.068 c^2 R^3 / 3 from the chord at 0.75 R with 1300
     kg/m3 (declared); ``ratio`` takes in what that misses, above all the bell of the motor: 0 to 10.  Slopes by central
-    differences within runs whose points are less than 1 s apart.
+    differences, one-sided at kinks, within runs whose points are less than 1 s apart.
     """
 
     ratio: float = 1.0
@@ -68,15 +70,19 @@ def slope(flow: Flow) -> Array:
 
 
 def _kinked(rate: Array) -> Array:
-    """Slope at points from those of the K-1 intervals between them, (K,): the smoothest of left, middle and right.
+    """Slope at points from those of the K-1 intervals between them, (K,): centred, or the smoothest side of a kink.
 
     A step of the throttle is a kink of the speed; a centred slope would smear it over two points (essentially
     non-oscillatory choice of the stencil: Harten, Engquist, Osher and Chakravarthy 1987, J. Comput. Phys. 71:231).
     """
-    if rate.size < 2:
+    if rate.size < 3:
         return np.repeat(rate, 2)[: rate.size + 1]
     padded = np.r_[rate[0], rate[0], rate, rate[-1], rate[-1]]
     far_left, left, right, far_right = (padded[k : k + rate.size + 1] for k in range(4))
     bend = np.abs([left - far_left, right - left, far_right - right])
+    bend[0, :2] = bend[2, -2:] = np.inf  # there are not two intervals on that side
+    bend[1, [0, -1]] = np.inf
+    # a centred slope is the most accurate one wherever the slope changes by little from one interval to the next
+    bend[1, 1:-1][bend[1, 1:-1] < _KINK * np.maximum(np.abs(left), np.abs(right))[1:-1]] = 0.0
     slopes = np.array([left + 0.5 * (left - far_left), 0.5 * (left + right), right - 0.5 * (far_right - right)])
     return np.asarray(np.take_along_axis(slopes, np.argmin(bend, axis=0)[None], axis=0)[0])

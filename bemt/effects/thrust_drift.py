@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.effects.base import Array, Effect, Flow, Parameter, Reading
+from bemt.effects.base import Effect, Flow, Parameter, Reading
 
 
 @dataclass(frozen=True)
@@ -39,13 +39,13 @@ class ThrustDrift(Effect):
 
     def applies(self, flow: Flow) -> str:
         """Only time or temperature can show it."""
-        if np.ptp(flow.clock) > 0.0 or np.nanmax(np.abs(_warming(flow))) > 0.0:
+        if np.ptp(flow.clock) > 0.0 or np.nanmax(np.abs(flow.warming)) > 0.0:
             return ""
         return "the recording has neither time nor a temperature that changes"
 
     def reading(self, reading: Reading, flow: Flow) -> None:
         """Shift the channel."""
-        share = self.zero * -np.expm1(-flow.clock / self.tau_s) + self.thermal * _warming(flow)
+        share = self.zero * -np.expm1(-flow.clock / self.tau_s) + self.thermal * flow.warming
         reading.values["thrust_N"] = reading.values["thrust_N"] + share * reading.full_scale["thrust_N"]
 
     def variants(self) -> tuple[dict[str, float], ...]:
@@ -54,14 +54,3 @@ class ThrustDrift(Effect):
         creep = [{"zero": z / 100.0, "tau_s": t, "thermal": 0.0} for z in range(-10, 11) if z for t in times]
         warm = [{"zero": 0.0, "tau_s": 300.0, "thermal": a / 4000.0} for a in range(-12, 13) if a]
         return (*creep, *warm)
-
-
-def _warming(flow: Flow) -> Array:
-    """Temperature less that at the start of the run, (P,), zero where not recorded [K]."""
-    if "temperature_K" not in flow.extra:
-        return np.zeros_like(flow.rpm)
-    T = flow.extra["temperature_K"]
-    start = np.full_like(flow.rpm, T[0])
-    for run in flow.runs:
-        start[run] = T[run[0]]
-    return np.nan_to_num(T - start)

@@ -13,7 +13,7 @@ _LBF, _OZF = _G * _LB, _G * _LB / 16.0
 
 # What one SI unit is in each of the units that get mixed up with it; the slip may go either way.
 # A ratio nearer to 1 than this (natural logarithm) is a gain, not a slip.
-_LARGE = 0.5
+_LARGE = 0.25
 _UNITS: dict[str, dict[str, float]] = {
     "thrust_N": {
         "kgf": 1.0 / _G, "gf": 1000.0 / _G, "lbf": 1.0 / _LBF, "ozf": 1.0 / _OZF, "kN": 1e-3, "lb for kg": _LB,
