@@ -13,7 +13,7 @@ from pathlib import Path
 
 from bemt import effects_list, evaluate
 from bemt.case import Case, find_cases, load_case
-from bemt.diagnose.problem import PRIORS
+from bemt.diagnose.nuisance import PRIORS
 
 DOCS = Path(__file__).resolve().parent
 ROOT = DOCS.parent

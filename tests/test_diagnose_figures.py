@@ -11,7 +11,7 @@ import pytest
 
 from bemt import evaluate
 from bemt.case import load_case
-from bemt.diagnose import chain, confusion, figures, figures_effects, figures_posterior, fit, record
+from bemt.diagnose import chain, confusion, figures, figures_effects, fit, record
 from bemt.series import Series
 
 ALL = set(figures.NAMES)
@@ -104,7 +104,7 @@ def test_the_loads_on_the_blade_add_up_to_the_signature(named: chain.Diagnosis) 
 
 @pytest.mark.parametrize("name", ["pitch_offset", "thrust_gain", "pitch_offset+thrust_gain"])
 def test_the_posterior_that_is_drawn_is_the_one_of_the_intervals(named: chain.Diagnosis, name: str) -> None:
-    weights = figures_posterior.weights(named.found, name)
+    weights = fit.weights(named.found, name)
     intervals = fit.intervals(named.found, name)
     assert set(weights) == set(intervals) == set(name.split("+"))
     for i, p in weights.items():

@@ -72,9 +72,9 @@ def test_reynolds_is_named_where_uiuc_shows_it(shared_data: Path, tmp_path: Path
         told[name] = (answer.decision.verdict, answer.decision.effects)
     right = [n for n, (_, ids) in told.items() if "reynolds" in ids]
     wrong = [n for n, (_, ids) in told.items() if ids and "reynolds" not in ids]
-    # eight of ten were asked for; nine of twelve are reached, the others are left open and not misnamed
-    assert len(right) >= 0.75 * len(UIUC), told
     assert not wrong, told
+    if len(right) < 0.8 * len(UIUC):
+        pytest.xfail(f"eight of ten asked for, {len(right)} of {len(UIUC)} reached; the others are left open: {told}")
 
 
 def test_the_duct_of_the_x22a_is_missed(shared_data: Path, tmp_path: Path) -> None:
@@ -144,5 +144,6 @@ density_kg_m3 = 1.2
     ducted = [load(str(f), case) for f in sorted(folder.glob("grp01__f1507_hqprop76x8_4s_duct_table*.csv"))]
     bare = [load(str(f), case) for f in sorted(folder.glob("grp01__f1507_hqprop76x8_4s_table*.csv"))]
     answer = chain.diagnose([*ducted, *(replace(r, reference=True) for r in bare)], [case])
-    # runs of one condition differ by a smooth 3 % over the speed, which leaves the verdict open: not reached
     assert answer.decision.effects in ((), ("duct",)), document.text(answer)
+    if not answer.decision.effects:
+        pytest.xfail("duct not named: runs of one condition differ by a smooth 3 % over the speed")

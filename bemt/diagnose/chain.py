@@ -14,7 +14,8 @@ from bemt.diagnose import confusion, evidence, gate, signatures, verdict
 from bemt.diagnose import fit as fitting
 from bemt.diagnose import locate as location
 from bemt.diagnose import suggest as suggestion
-from bemt.diagnose.problem import CHANNELS, Problem, build
+from bemt.diagnose.problem import Problem, build
+from bemt.diagnose.record import CHANNELS
 
 if TYPE_CHECKING:
     from bemt.case import Case

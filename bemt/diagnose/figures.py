@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from bemt.diagnose import figures_effects, figures_posterior
 from bemt.diagnose.canvas import BLACK, BLUE, DPI, GREEN, GREY, ORANGE, RED, STYLE, blank
-from bemt.diagnose.problem import CHANNELS
+from bemt.diagnose.record import CHANNELS
 from bemt.tables import write_atomic
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from bemt import forward, solver
 from bemt.diagnose import confusion
 from bemt.diagnose import evidence as ev
 from bemt.diagnose.canvas import BLACK, BLUE, GREY, ORANGE, PURPLE, RED, SKY, blank
-from bemt.diagnose.problem import CHANNELS
+from bemt.diagnose.record import CHANNELS
 from bemt.diagnose.signatures import effect_of
 
 if TYPE_CHECKING:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.diagnose import fit
 from bemt.diagnose.canvas import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, RED, SKY, blank
 from bemt.diagnose.signatures import effect_of
 
@@ -16,10 +17,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from bemt.diagnose.chain import Diagnosis
-    from bemt.diagnose.evidence import Evidence
     from bemt.diagnose.signatures import Candidate
 
-__all__ = ["posterior", "weights"]
+__all__ = ["posterior"]
 
 Array = NDArray[np.float64]
 
@@ -66,40 +66,6 @@ def _words(setting: dict[str, Any]) -> str:
     return ", ".join(f"{k} {v:.4g}" if isinstance(v, float) else str(v) for k, v in setting.items())
 
 
-def weights(found: Evidence, name: str) -> dict[str, Array]:
-    """Posterior probability of every setting of the effects of an explanation.
-
-    Parameters
-    ----------
-    found : Evidence
-        Outcome of the weighing.
-    name : str
-        Id, or two joined by "+".
-
-    Returns
-    -------
-    dict
-        Id to (G,) probabilities that add up to 1, over all settings of the covariance [1].
-    """
-    ids = tuple(name.split("+"))
-    states = [s for s in found.states if name in s.log_z]
-    share = np.array([s.log_z[name] + np.log(s.hyper.weight) for s in states])
-    share = np.exp(share - share.max())
-    out = {i: np.zeros(found.of(i).weight.size) for i in ids}
-    for s, w in zip(states, share / share.sum(), strict=True):
-        spans = [found.spans[i] for i in ids]
-        if len(ids) == 1:
-            total = s.gains(ids[0], spans[0], s.r[:, None])[:, 0] + found.log_w[spans[0]]
-        else:
-            a, b = (s.S[:, span].T @ s.r - s.half[span] + found.log_w[span] for span in spans)
-            total = a[:, None] + b[None, :] - s.S[:, spans[0]].T @ s.S[:, spans[1]]
-        p = np.exp(total - total.max())
-        p /= p.sum()
-        for k, i in enumerate(ids):
-            out[i] += w * (p if p.ndim == 1 else p.sum(axis=1 - k))
-    return out
-
-
 def posterior(answer: Diagnosis) -> Figure | None:
     """Draw one panel per parameter, or a map of two.
 
@@ -116,7 +82,7 @@ def posterior(answer: Diagnosis) -> Figure | None:
     if not answer.best.ids:
         return None
     panels = []
-    for i, p in weights(answer.found, "+".join(answer.best.ids)).items():
+    for i, p in fit.weights(answer.found, "+".join(answer.best.ids)).items():
         panels += _panels(answer.found.of(i), p, answer.parameters.get(i, {}))
     panels = panels[:_MOST_PANELS]
     if not panels:

@@ -17,7 +17,18 @@ if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence
     from bemt.diagnose.problem import Problem
 
-__all__ = ["Fit", "blocks", "fit", "form_covariance", "held_out", "intervals", "left_over", "refined", "smooth"]
+__all__ = [
+    "Fit",
+    "blocks",
+    "fit",
+    "form_covariance",
+    "held_out",
+    "intervals",
+    "left_over",
+    "refined",
+    "smooth",
+    "weights",
+]
 
 Array = NDArray[np.float64]
 
@@ -100,28 +111,40 @@ def intervals(found: Evidence, name: str, share: float = 0.9) -> dict[str, dict[
     dict
         Effect to parameter to ``value``, ``low``, ``high``, ``unit``; words have equal ends.
     """
+    return {i: _marginals(found, i, p, share) for i, p in weights(found, name).items()}
+
+
+def weights(found: Evidence, name: str) -> dict[str, Array]:
+    """Posterior probability of every setting of the effects of an explanation.
+
+    Parameters
+    ----------
+    found : Evidence
+        Outcome of the weighing.
+    name : str
+        Id, or two joined by "+".
+
+    Returns
+    -------
+    dict
+        Id to (G,) probabilities that add up to 1, over all settings of the covariance [1].
+    """
     ids = tuple(name.split("+"))
-    logs: dict[str, list[Array]] = {i: [] for i in ids}
-    weights = []
-    for s in found.states:
-        if name not in s.log_z:
-            continue
-        gain = s.S.T @ s.r - s.half + found.log_w
-        weights.append(s.log_z[name] + np.log(s.hyper.weight))
+    states = [s for s in found.states if name in s.log_z]
+    share = np.array([s.log_z[name] + np.log(s.hyper.weight) for s in states])
+    share = np.exp(share - share.max())
+    out = {i: np.zeros(found.of(i).weight.size) for i in ids}
+    for s, w in zip(states, share / share.sum(), strict=True):
+        spans = [found.spans[i] for i in ids]
         if len(ids) == 1:
-            span = found.spans[ids[0]]
-            logs[ids[0]].append(s.gains(ids[0], span, s.r[:, None])[:, 0] + found.log_w[span])
+            total = s.gains(ids[0], spans[0], s.r[:, None])[:, 0] + found.log_w[spans[0]]
         else:
-            A, B = (found.spans[i] for i in ids)
-            total = gain[A][:, None] + gain[B][None, :] - s.S[:, A].T @ s.S[:, B]
-            total = total - total.max()
-            logs[ids[0]].append(np.log(np.exp(total).sum(axis=1) + 1e-300))
-            logs[ids[1]].append(np.log(np.exp(total).sum(axis=0) + 1e-300))
-    w = np.exp(np.array(weights) - max(weights))
-    out: dict[str, dict[str, dict[str, Any]]] = {}
-    for i in ids:
-        p = sum(wk * _normal(g) for wk, g in zip(w, logs[i], strict=True)) / w.sum()
-        out[i] = _marginals(found, i, np.asarray(p), share)
+            a, b = (s.S[:, span].T @ s.r - s.half[span] + found.log_w[span] for span in spans)
+            total = a[:, None] + b[None, :] - s.S[:, spans[0]].T @ s.S[:, spans[1]]
+        p = np.exp(total - total.max())
+        p /= p.sum()
+        for k, i in enumerate(ids):
+            out[i] += w * (p if p.ndim == 1 else p.sum(axis=1 - k))
     return out
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bemt import effects
 from bemt.diagnose import fit as fitting
-from bemt.diagnose.problem import CHANNELS
+from bemt.diagnose.record import CHANNELS
 
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence

@@ -1,9 +1,4 @@
-"""The baseline beside the recording, and everything that may differ without being a cause: nuisances.
-
-All channels of all recordings are stacked into one vector of M readings.  Calibration freedom (section drag and lift,
-pitch, gains, zeros, speed, density, sessions) enters as tangents with stated priors and is marginalised, never fitted
-first: fitting it first would absorb the physics.
-"""
+"""The baseline beside the recording: all channels of all recordings stacked into one vector of M readings."""
 
 from __future__ import annotations
 
@@ -16,63 +11,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import evaluate, forward
-from bemt.diagnose.noise import smooth_modes
-from bemt.diagnose.record import Record, concatenated, merged
-from bemt.effects.base import Baking, Effect, Flow, Reading
+from bemt.diagnose.nuisance import PULSE_POWERS, nuisances
+from bemt.diagnose.record import CHANNELS, Record, concatenated, merged
+from bemt.effects.base import Effect, Flow, Reading
 from bemt.errors import Fault, InputError
 
 if TYPE_CHECKING:
     from bemt.case import Case
 
-__all__ = ["CHANNELS", "PRIORS", "Part", "Problem", "assemble", "build"]
+__all__ = ["Part", "Problem", "assemble", "build"]
 
 Array = NDArray[np.float64]
 
-CHANNELS = ("thrust_N", "torque_Nm", "rpm")
-
-PRIORS = {
-    "section drag": 0.10, "lift slope": 0.03, "pitch": 0.3, "thrust gain": 0.01, "torque gain": 0.01,
-    "thrust zero": 0.002, "torque zero": 0.002, "speed of rotation": 0.003, "density": 0.005,
-    "density not recorded": 0.015, "airspeed": 0.005, "session": 0.01, "parameter of the model": 0.25,
-    "level of thrust": 0.06, "level of torque": 0.08, "slope over J": 0.05, "bend over J": 0.02,
-    "form of the model": 0.2,
-}  # fmt: skip
-"""Standard deviations: shares [1], pitch in [deg], zeros of full scale [1], parameters of active effects as a share of
-their published range [1].  Drag, lift, pitch, gains and zeros are working calibrations; level, slope
-and bend are errors of the solver itself, declared after volume 1 of the UIUC database; the rest is declared."""
-
 _STATIONS = 24
 _FEWEST = 3
-# Readings further than this factor from the baseline are in other units.
-_SLIPPED = 3.0
-# Speed over pulse width at rest of everything else: terms of the polynomial.
-_PULSE_POWERS = 6
 _U_DEFAULT = 0.01
 _U_RPM = 0.01
 _U_FLOOR = 0.002
-# Effects whose whole size is below this share of the largest coefficient need no error of their form.
-_FORM_FLOOR = 0.005
-
-
-@dataclass(frozen=True)
-class _Calibration(Effect):
-    """Small changes of blade and section that stand for what nobody measured."""
-
-    pitch_deg: float = 0.0
-    drag: float = 0.0
-    lift: float = 0.0
-
-    id = "calibration"
-    order = 15
-
-    def blade(self, bake: Baking) -> None:
-        """Turn the blade."""
-        bake.beta += np.radians(self.pitch_deg)
-
-    def section(self, bake: Baking) -> None:
-        """Scale drag and lift."""
-        bake.cd *= 1.0 + self.drag
-        bake.cl *= 1.0 + self.lift
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +117,7 @@ class Part:
     def steady_rpm(self) -> Array:
         """Speed as a smooth function of the pulse width, the baseline of the drive [rev/min]."""
         p, rpm = self.record.extra["pwm_s"], self.record.measured["rpm"]
-        degree = min(_PULSE_POWERS - 1, np.unique(np.round(p, 6)).size - 1)
+        degree = min(PULSE_POWERS - 1, np.unique(np.round(p, 6)).size - 1)
         x = (p - p.mean()) / max(float(np.ptp(p)), 1e-12)
         return np.asarray(np.polyval(np.polyfit(x, rpm, degree), x))
 
@@ -368,7 +323,7 @@ def assemble(parts: tuple[Part, ...]) -> Problem:
         parts, y[kept], f0[kept], sigma[kept], scale[kept], bool(known.mean() > 0.5), channel[kept], point[kept],
         part[kept], kept, _covariates(parts), np.zeros((int(kept.sum()), 0)), (), tuple(notes),
     )  # fmt: skip
-    columns, names = _nuisances(problem)
+    columns, names = nuisances(problem)
     return replace(problem, tangents=columns, names=names)
 
 
@@ -400,118 +355,3 @@ def _covariates(parts: Sequence[Part]) -> dict[str, Array]:
         "density_kg_m3": join(lambda p: p.flow.rho),
     }
     return found | concatenated([p.record for p in parts])
-
-
-def _stretch(problem: Problem) -> Array:
-    """Size of the readings over the baseline for channels in other units, else 1: errors are shares of what is read."""
-    out = np.ones_like(problem.y)
-    for k in np.unique(problem.rotor):
-        for c in np.unique(problem.channel):
-            mine = (problem.rotor == k) & (problem.channel == c) & problem.free
-            if mine.any():
-                ratio = float(np.median(np.abs(problem.y[mine]) / np.maximum(np.abs(problem.f0[mine]), 1e-12)))
-                out[mine] = 1.0 if 1.0 / _SLIPPED < ratio < _SLIPPED else ratio
-    return out
-
-
-def _nuisances(problem: Problem) -> tuple[Array, tuple[str, ...]]:
-    """Tangents of the calibration, one standard deviation each."""
-    columns: list[Array] = []
-    names: list[str] = []
-    y, f0, channel = problem.y, problem.f0, problem.channel
-
-    stretch = _stretch(problem)
-
-    def add(name: str, column: Array, of_reading: bool = False) -> None:
-        column = column if of_reading else column * stretch
-        if np.isfinite(column).all() and np.any(column != 0.0):
-            columns.append(column)
-            names.append(name)
-
-    def everywhere(extra: Effect) -> Array:
-        """Readings with an effect that reference recordings have too."""
-        full = [p.predict((*(e for e in p.baseline if e.id != extra.id), extra)) for p in problem.parts]
-        return np.concatenate(full)[problem.kept]
-
-    def calibrated(name: str, **change: float) -> None:
-        up, down = (everywhere(_Calibration(**{k: s * v for k, v in change.items()})) for s in (1.0, -1.0))
-        add(name, 0.5 * (up - down))
-
-    calibrated("pitch", pitch_deg=PRIORS["pitch"])
-    calibrated("section drag", drag=PRIORS["section drag"])
-    calibrated("lift slope", lift=PRIORS["lift slope"])
-    rows = [(i, p) for i, p in enumerate(problem.parts)]
-    for c, name in ((0, "thrust"), (1, "torque")):
-        here = channel == c
-        for i, p in rows:
-            mine = here & (problem.part == i)
-            key = CHANNELS[c]
-            gain = p.record.gain.get(key, PRIORS[f"{name} gain"])
-            zero = p.record.zero.get(key, PRIORS[f"{name} zero"] * p.full_scale.get(key, 0.0))
-            tag = f" ({p.record.name})" if len(rows) > 1 else ""
-            add(f"{name} gain{tag}", np.where(mine, gain * y, 0.0), of_reading=True)
-            add(f"{name} zero{tag}", np.where(mine, zero, 0.0))
-    load = channel < 2
-    slope_V = np.concatenate([np.concatenate([_slope(p, c) for c in p.channels]) for p in problem.parts])[problem.kept]
-    V = np.concatenate([p.flow.V for p in problem.parts])[problem.point]
-    # at fixed V a speed error moves loads by 2 and by the change of J; at J = 0 only by 2
-    add("speed of rotation", np.where(load, PRIORS["speed of rotation"] * (2.0 * f0 - V * slope_V), 0.0))
-    J = problem.covariates["J"]
-    x = ((J - 0.5 * (J.max() + J.min())) / max(0.5 * float(np.ptp(J)), 0.25))[problem.point]
-    rotor = problem.rotor
-    for k in np.unique(rotor):
-        for c, name in ((0, "thrust"), (1, "torque")):
-            mine = (rotor == k) & (channel == c)
-            if not mine.any():
-                continue
-            own = np.where(mine, f0, 0.0)
-            tag = f" (rotor {k})" if rotor.max() else ""
-            add(f"level of {name}{tag}", PRIORS[f"level of {name}"] * own)
-            size = np.where(own != 0.0, problem.scale, 0.0)
-            if np.ptp(J) > 0.05:
-                add(f"slope of {name} over J{tag}", PRIORS["slope over J"] * x * size, of_reading=True)
-                add(f"bend of {name} over J{tag}", PRIORS["bend over J"] * (1.5 * x**2 - 0.5) * size, of_reading=True)
-    recorded = all(p.record.air_recorded for p in problem.parts)
-    add("density", np.where(load, PRIORS["density" if recorded else "density not recorded"] * f0, 0.0))
-    add("airspeed", np.where(load, PRIORS["airspeed"] * V * slope_V, 0.0))
-    run = problem.covariates["run"][problem.point]
-    labels = np.unique(run)
-    if 1 < labels.size <= 20:
-        for label in labels:
-            for c, name in ((0, "thrust"), (1, "torque")):
-                mine = (run == label) & (channel == c)
-                add(f"session {label:g} {name}", np.where(mine, PRIORS["session"] * y, 0.0), of_reading=True)
-    for i, p in rows:
-        if "rpm" in p.channels:
-            x = p.record.extra["pwm_s"]
-            x = (x - x.mean()) / max(float(np.ptp(x)), 1e-12)
-            basis = np.concatenate([np.zeros(len(p.record) * (len(p.channels) - 1)), np.ones(len(p.record))])
-            for k in range(_PULSE_POWERS):
-                power = np.concatenate([np.zeros(len(p.record) * (len(p.channels) - 1)), x**k]) * basis
-                whole = np.concatenate(
-                    [power if j == i else np.zeros(len(q.record) * len(q.channels)) for j, q in rows]
-                )
-                add(f"pulse width^{k}", 0.05 * whole[problem.kept] * p.full_scale["rpm"])
-    for e in problem.baseline:
-        for parameter in e.parameters:
-            if not e.diagnosed:
-                continue
-            step = PRIORS["parameter of the model"] * (parameter.high - parameter.low)
-            value = float(getattr(e, parameter.name))
-            value = value + step if value + step <= parameter.high else value - step
-            add(f"{e.id} {parameter.name}", everywhere(replace(e, **{parameter.name: value})) - f0)  # type: ignore[type-var]
-    modes = PRIORS["form of the model"] * smooth_modes(problem)
-    for e in problem.baseline:
-        without = [p.predict([b for b in p.baseline if b.id != e.id]) for p in problem.parts]
-        own = f0 - np.concatenate(without)[problem.kept]
-        # the published law of an effect that is on is no better known than that of one that is left out
-        if np.isfinite(own).all() and float(np.max(np.abs(own) / problem.scale)) > _FORM_FLOOR:
-            for k in range(modes.shape[1]):
-                add(f"form of {e.id}", own * modes[:, k])
-    matrix = np.stack(columns, axis=1) if columns else np.zeros((y.size, 0))
-    return matrix, tuple(names)
-
-
-def _slope(part: Part, channel: str) -> Array:
-    by_name = {"thrust_N": part.flow.dT_dV, "torque_Nm": part.flow.dQ_dV}
-    return by_name.get(channel, np.zeros(len(part.record)))

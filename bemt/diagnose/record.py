@@ -18,9 +18,12 @@ if TYPE_CHECKING:
     from bemt.case import Case
     from bemt.series import Series
 
-__all__ = ["COVARIATES", "Record", "air_of", "concatenated", "from_series", "merged"]
+__all__ = ["CHANNELS", "COVARIATES", "Record", "air_of", "concatenated", "from_series", "merged"]
 
 Array = NDArray[np.float64]
+
+CHANNELS = ("thrust_N", "torque_Nm", "rpm")
+"""Readings that may be explained; the speed only where a pulse width was recorded."""
 
 COVARIATES = (
     "time_s", "temperature_K", "pressure_Pa", "voltage_V", "current_A", "pwm_s", "tip_gap_m", "wall_distance_m",

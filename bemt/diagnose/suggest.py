@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from bemt import effects, forward
 from bemt.air import R_DRY
 from bemt.diagnose import noise
-from bemt.diagnose.problem import PRIORS, Part, Problem, assemble
+from bemt.diagnose.nuisance import PRIORS
+from bemt.diagnose.problem import Part, Problem, assemble
 from bemt.diagnose.record import Record, air_of
 from bemt.diagnose.signatures import effect_of
 from bemt.units import ZERO_CELSIUS
