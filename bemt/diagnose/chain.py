@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import effects
 from bemt.diagnose import confusion, evidence, gate, signatures, verdict
 from bemt.diagnose import fit as fitting
 from bemt.diagnose import locate as location
@@ -175,8 +174,3 @@ def _next(found: evidence.Evidence, decision: verdict.Decision, best: fitting.Fi
     if decision.verdict in ("none", "insufficient") or not rivals:
         return suggestion.suggest(found, first, None)
     return suggestion.suggest(found, first, (rivals[0], fitting.fit(found, rivals[0]).settings[0]))
-
-
-def titles(ids: Sequence[str]) -> str:
-    """Titles of effects, in words."""
-    return " and ".join(effects.catalogue()[i].title for i in ids)
