@@ -138,6 +138,7 @@ def test_every_dictionary_parses_and_names_patches_that_exist(kind: str) -> None
     turning = parse(files["constant/MRFProperties"])["rotor"]
     standing = turning["nonRotatingPatches"]
     assert set(standing) <= patches and not {"blade", "hub"} & set(standing)
+    assert {"side1", "side2"} & patches <= set(standing)  # else nothing flows through them where the grid turns
     assert float(turning["omega"]) == pytest.approx(12000 * math.pi / 30, rel=1e-6)
     needed = {"p", "U", "k", "nut", "epsilon" if s.turbulence == "realizableKE" else "omega"}
     needed |= {"T", "alphat"} if s.compressible else set()
