@@ -21,8 +21,8 @@ EXIT_INTERRUPTED = 130
 
 _MODULES = {"sweep": "bemt.sweep", "report": "bemt.report",
             "validate": "bemt.validate", "reproduce": "bemt.reproduce", "bench": "bemt.bench",
-            "import": "bemt.import_files", "export": "bemt.export_case", "cfd": "bemt.cfd",
-            "calibrate": "bemt.calibrate", "data": "bemt.data",
+            "import": "bemt.import_files", "export": "bemt.export_case", "cfd": "bemt.cfd.command",
+            "calibrate": "bemt.calibrate.command", "data": "bemt.data",
             "prove": "bemt.conceal.prove",
             "effects": "bemt.effects_list", "diagnose": "bemt.diagnose.command", "plan": "bemt.diagnose.command",
             "stations": "bemt.stations", "map": "bemt.drive.map_command", "motor": "bemt.drive.motor_command",

@@ -31,7 +31,7 @@ from bemt.import_adapt import adapt, damaged_export, recognised
 from bemt.import_choice import Choice, averaged, chosen
 from bemt.import_recording import findings, is_recording, points_text, reduction_document, reduction_of
 from bemt.imported import Channel, Imported
-from bemt.reduction import Reduced
+from bemt.reduction.reduce import Reduced
 
 __all__ = ["SCHEMA", "Choice", "averaged", "chosen", "document", "import_file", "run"]
 

@@ -10,8 +10,8 @@ from typing import Any
 from bemt import tables
 from bemt.errors import InputError
 from bemt.imported import Imported
-from bemt.reduction import Reduced, reduce
-from bemt.sanity import Finding, check
+from bemt.reduction.reduce import Reduced, reduce
+from bemt.sanity.check import Finding, check
 
 __all__ = ["findings", "is_recording", "points_text", "reduction_document", "reduction_of"]
 

@@ -22,9 +22,9 @@ from typing import Any
 import bemt
 from bemt.case import find_cases, load_case
 from bemt.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
-from bemt.grid import Engine, run_grid
-from bemt.grid_formats import FORMATS, require_extra
-from bemt.grid_identity import program_hash
+from bemt.grid.formats import FORMATS, require_extra
+from bemt.grid.identity import program_hash
+from bemt.grid.run import Engine, run_grid
 from bemt.sweep_case import solve_case
 from bemt.sweep_text import case_text, overview_text, rows_csv
 from bemt.tables import json_text, plain, remove_stale, write_atomic
@@ -236,7 +236,7 @@ def sweep(
     with ExitStack() as stack:
         on: Engine | None = None
         if engine == "dask":
-            from bemt.grid_dask import Cluster
+            from bemt.grid.dask_engine import Cluster
 
             on = stack.enter_context(Cluster(scheduler, jobs))
         tell = progress or (lambda line: None)

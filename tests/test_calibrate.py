@@ -9,9 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt import calibrate, calibrate_compact, calibrate_fit, calibrate_points, calibrate_score, cli, compact
+from bemt import cli
 from bemt import coefficients as co
-from bemt.calibrate_points import Points, Propeller
+from bemt.calibrate import command as calibrate
+from bemt.calibrate import compact, fit, refit, score
+from bemt.calibrate import points as reading
+from bemt.calibrate.points import Points, Propeller
 from bemt.errors import InputError
 
 INCH = 0.0254
@@ -27,13 +30,13 @@ def planted(K1=0.31, K2=1.4, spoil=()) -> Points:
         pd = p / d
         CT = np.full(4, np.pi / 4 * pd**2 * (K1 / pd) ** K2) * (3.0 if i in spoil else 1.0)
         rows.append((made, RPM, np.zeros(4), CT, 0.4 * CT))
-    return calibrate_points.join(rows)
+    return reading.join(rows)
 
 
 def test_planted_constants_come_back_and_two_wild_propellers_do_not_move_them():
-    exact = calibrate_fit.fit(planted())
+    exact = fit.fit(planted())
     assert (exact.K1, exact.K2) == pytest.approx((0.31, 1.4), abs=1e-9)
-    wild = calibrate_fit.fit(planted(spoil=(3, 8)))
+    wild = fit.fit(planted(spoil=(3, 8)))
     assert (wild.K1, wild.K2) == pytest.approx((0.31, 1.4), abs=0.01)
 
 
@@ -47,7 +50,7 @@ def noisy(seed: int, scatter=0.1) -> Points:
 def test_intervals_cover_the_truth():
     inside = 0
     for seed in range(40):
-        found = calibrate_fit.fit(noisy(seed), draws=100)
+        found = fit.fit(noisy(seed), draws=100)
         inside += found.K1_95[0] <= 0.31 <= found.K1_95[1]
     assert inside >= 32  # nominal 38 of 40; twelve propellers make a bootstrap a little narrow
 
@@ -55,7 +58,7 @@ def test_intervals_cover_the_truth():
 def test_more_rows_of_the_same_propellers_are_no_more_evidence():
     points = noisy(1)
     many = Points(points.propellers, *(np.tile(getattr(points, n), 5) for n in ("index", "rpm", "J", "CT", "CP")))
-    a, b = calibrate_fit.fit(points, draws=300), calibrate_fit.fit(many, draws=300)
+    a, b = fit.fit(points, draws=300), fit.fit(many, draws=300)
     assert (b.K1, b.K2) == pytest.approx((a.K1, a.K2), rel=1e-9)
     assert np.ptp(b.K1_95) == pytest.approx(np.ptp(a.K1_95), rel=1e-6)
 
@@ -65,41 +68,41 @@ def test_a_propeller_with_many_rows_does_not_rule():
     own = points.index == 0
     many = Points(points.propellers, *(np.concatenate([getattr(points, n), np.tile(getattr(points, n)[own], 50)])
                                        for n in ("index", "rpm", "J", "CT", "CP")))  # fmt: skip
-    assert calibrate_fit.fit(many, draws=0).K1 == pytest.approx(0.31, abs=0.01)
+    assert fit.fit(many, draws=0).K1 == pytest.approx(0.31, abs=0.01)
 
 
 def test_the_goal_seek_makes_the_mean_error_zero():
     points = noisy(2)
-    found = calibrate_fit.goal_seek(points)
+    found = fit.goal_seek(points)
     assert found.K2 == 1.5
-    assert np.mean(calibrate_fit.CT_k1k2(points, found.K1, 1.5) / points.CT - 1.0) == pytest.approx(0.0, abs=1e-12)
+    assert np.mean(fit.CT_k1k2(points, found.K1, 1.5) / points.CT - 1.0) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_left_out_means_left_out():
     points = planted(spoil=(5,))
-    out = calibrate_fit.left_out(points)
-    truth = calibrate_fit.CT_k1k2(points, 0.31, 1.4)
+    out = fit.left_out(points)
+    truth = fit.CT_k1k2(points, 0.31, 1.4)
     own = points.index == 5
     assert out[own] == pytest.approx(truth[own], rel=1e-9)  # the rest is exact
     changed = replace(points, CT=np.where(own, 2 * points.CT, points.CT))
-    assert calibrate_fit.left_out(changed)[own] == pytest.approx(out[own], rel=1e-12)
+    assert fit.left_out(changed)[own] == pytest.approx(out[own], rel=1e-12)
 
 
 def test_ducted_rotors_are_scored_but_never_fitted():
     points = planted()
     ducts = tuple(replace(p, ducted=i in (2, 7)) for i, p in enumerate(points.propellers))
     with_ducts = replace(points, propellers=ducts, CT=np.where(np.isin(points.index, (2, 7)), 9 * points.CT, points.CT))
-    assert calibrate_fit.fit(with_ducts).K1 == pytest.approx(0.31, abs=1e-9)
-    rows = calibrate_score.score(with_ducts, {"m": with_ducts.CT})["bands"]
+    assert fit.fit(with_ducts).K1 == pytest.approx(0.31, abs=1e-9)
+    rows = score.score(with_ducts, {"m": with_ducts.CT})["bands"]
     assert [(r["band"], r["points"]) for r in rows if r["quantity"] == "ducted"] == [("no", 40), ("yes", 8)]
 
 
 def test_too_little_to_fit_is_refused():
     points = planted()
     with pytest.raises(InputError, match="two|2 open propellers"):
-        calibrate_fit.fit(points.select(points.index < 2))
+        fit.fit(points.select(points.index < 2))
     with pytest.raises(InputError, match="one P/D"):
-        calibrate_fit.fit(points.select(np.isin(points.index, (0, 2, 4))))
+        fit.fit(points.select(np.isin(points.index, (0, 2, 4))))
 
 
 def from_formula(constants: compact.Constants) -> Points:
@@ -112,14 +115,14 @@ def from_formula(constants: compact.Constants) -> Points:
             for x in (0.0, 0.2, 0.4, 0.6, 0.8):
                 J = np.array([x * p * INCH / D])
                 rows.append((made, np.array([rpm]), J, np.zeros(1), np.zeros(1)))
-    points = calibrate_points.join(rows)
-    CT, CP = calibrate_compact.predict(points, constants)
+    points = reading.join(rows)
+    CT, CP = refit.predict(points, constants)
     return replace(points, CT=CT, CP=CP)
 
 
 def test_the_compact_formula_finds_its_planted_constants():
     truth = compact.Constants(0.95, 0.10, 0.23, 5000.0, 0.025, 0.6, 0.15, -0.3)
-    fitted = calibrate_compact.fit(from_formula(truth))
+    fitted = refit.fit(from_formula(truth))
     assert fitted is not None
     for name in ("pitch_factor", "zero_lift", "loading_max", "cd0", "stall_drag"):
         assert getattr(fitted.constants, name) == pytest.approx(getattr(truth, name), rel=0.01), name
@@ -129,7 +132,7 @@ def test_the_compact_formula_finds_its_planted_constants():
 def test_chords_that_thrust_implies_are_those_it_was_made_with():
     points = from_formula(compact.CONSTANTS)
     hidden = tuple(replace(p, chord_m=float("nan")) for p in points.propellers)
-    found = calibrate_compact.implied_chords(replace(points, propellers=hidden), compact.CONSTANTS)
+    found = refit.implied_chords(replace(points, propellers=hidden), compact.CONSTANTS)
     wanted = [p.chord_m / (p.diameter_m / 2) for p in points.propellers]
     assert np.all(np.isfinite(found)) and found == pytest.approx(wanted, rel=0.01)
 
@@ -137,7 +140,7 @@ def test_chords_that_thrust_implies_are_those_it_was_made_with():
 def test_bands_hold_the_share_that_they_say():
     points = from_formula(compact.CONSTANTS)
     made = points.CT * (1 + 0.1 * np.random.default_rng(0).standard_normal(points.CT.size))
-    found = calibrate_compact.bands(points, made, points.CP, compact.CONSTANTS, True)
+    found = refit.bands(points, made, points.CP, compact.CONSTANTS, True)
     still = points.J == 0
     inside = np.abs(made - points.CT)[still] <= found["CT95"][0] * points.CT[still]
     assert np.mean(inside) == pytest.approx(0.95, abs=0.02)
@@ -156,7 +159,7 @@ fan,2.7,3.5,40000,2000,600,0,11,,1
 def test_a_table_with_units_gives_points(tmp_path: Path):
     file = tmp_path / "stand.csv"
     file.write_text(TABLE)
-    points = calibrate_points.load([file])
+    points = reading.load([file])
     assert [(p.name, p.blades, p.ducted) for p in points.propellers] == [
         ("a_10x5", 2, False), ("b_9x6", 3, False), ("fan", 11, True),
     ]  # fmt: skip
@@ -175,7 +178,7 @@ def test_a_drive_calculator_table_gives_points_at_three_tip_speeds(tmp_path: Pat
         "myid,tbs,Name,Dia,Pitch,a,b,AltThr,TmpThr,srcThr,c,d,AltPwr,TmpPwr,srcPwr,n10N,n100W\n"
         "1,4,GWS HD 3-blade,9.0,5.0,14.0,2.0,0,15.0,x,0.25,3.0,0,15.0,x,8534.6,7368.1\n"
     )
-    points = calibrate_points.load([file])
+    points = reading.load([file])
     assert points.propellers[0].blades == 3 and points.rpm.size == 3
     assert points.M_tip == pytest.approx([0.2, 0.3, 0.4])
     n = points.rpm / 60
@@ -231,18 +234,18 @@ def volume_1(shared_data: Path) -> Points:
     folder = shared_data / "uiuc" / "volume-1"
     if not folder.is_dir():
         pytest.skip(f"no UIUC data at {folder}")
-    return calibrate_points.load([folder])
+    return reading.load([folder])
 
 
 def test_volume_1_against_the_thesis(volume_1: Points):
-    k = calibrate_fit.fit(volume_1, draws=200)
-    assert calibrate_fit.goal_seek(volume_1).K1 == pytest.approx(0.2984, abs=1e-4)
+    k = fit.fit(volume_1, draws=200)
+    assert fit.goal_seek(volume_1).K1 == pytest.approx(0.2984, abs=1e-4)
     assert (k.K1, k.K2) == pytest.approx((0.3218, 1.647), abs=2e-3)
     assert k.K1_95[0] < k.K1 < k.K1_95[1]
     assert k.K2_95[0] > 1.5  # the exponent of the thesis lies outside the interval
-    models = {"thesis": calibrate_fit.CT_k1k2(volume_1, calibrate_fit.THESIS.K1, calibrate_fit.THESIS.K2)}
-    models["refit"] = calibrate_fit.left_out(volume_1)
-    found = calibrate_score.score(volume_1, models)
+    models = {"thesis": fit.CT_k1k2(volume_1, fit.THESIS.K1, fit.THESIS.K2)}
+    models["refit"] = fit.left_out(volume_1)
+    found = score.score(volume_1, models)
     static, flight = found["static"]["models"], found["flight"]["models"]
     assert static["thesis"]["within_13"] == pytest.approx(0.572, abs=1e-3)
     assert static["refit"]["within_13"] == pytest.approx(0.586, abs=5e-3)  # a better K1 and K2 hardly help
@@ -252,7 +255,7 @@ def test_volume_1_against_the_thesis(volume_1: Points):
 @pytest.mark.slow
 def test_the_report_is_what_the_command_gives(shared_data: Path, project: Path):
     kept = json.loads((project / "reports" / "calibration" / "calibration.json").read_text())
-    sets = [calibrate_points.load([shared_data / "uiuc" / f"volume-{v}"]) for v in (1, 2)]
+    sets = [reading.load([shared_data / "uiuc" / f"volume-{v}"]) for v in (1, 2)]
     found, _ = calibrate.calibrate(*sets)
     for name in ("calibration", "test"):
         for motion in ("static", "flight"):

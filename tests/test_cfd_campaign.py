@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bemt.cfd import run_campaign
-from bemt.cfd_record import COLUMNS, Record, grid_studies, grid_uncertainty
-from bemt.cfd_run import point_key, radial_of
-from bemt.cfd_schema import load_campaign
-from bemt.cfd_start import State, splice
+from bemt.cfd.command import run_campaign
+from bemt.cfd.record import COLUMNS, Record, grid_studies, grid_uncertainty
+from bemt.cfd.schema import load_campaign
+from bemt.cfd.start import State, splice
+from bemt.cfd.worker import point_key, radial_of
 from bemt.cli import main
 from bemt.errors import InputError
 from bemt.export_case_openfoam import settings_of

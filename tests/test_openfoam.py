@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from bemt.case import load_case
-from bemt.cfd_run import history_of
+from bemt.cfd.worker import history_of
 from bemt.cli import main
 from bemt.errors import InputError
 from bemt.export_case_openfoam import Run, settings_of, write_openfoam

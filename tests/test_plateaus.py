@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from bemt import importers
 from bemt.errors import InputError
-from bemt.plateaus import Plateaus, Settings, find, standard_error
+from bemt.reduction.plateaus import Plateaus, Settings, find, standard_error
 
 RATE = 50.0
 

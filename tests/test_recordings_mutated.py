@@ -16,8 +16,8 @@ import pytest
 from bemt.errors import InputError
 from bemt.import_files import import_file
 from bemt.import_recording import findings, is_recording, points_text, reduction_document, reduction_of
-from bemt.reduction import Reduced
-from bemt.reduction_channels import view
+from bemt.reduction.channels import view
+from bemt.reduction.reduce import Reduced
 
 INJURIES = (
     "cut", "garble", "bytes", "encoding", "huge", "tiny", "swap columns", "drop column", "double column", "rename",

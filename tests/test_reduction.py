@@ -20,9 +20,9 @@ from bemt.air import Air
 from bemt.cli import main
 from bemt.errors import InputError
 from bemt.imported import Channel, Imported
-from bemt.reduction import Reduced, reduce
-from bemt.reduction_channels import view
-from bemt.reduction_rows import is_samples
+from bemt.reduction.channels import view
+from bemt.reduction.reduce import Reduced, reduce
+from bemt.reduction.rows import is_samples
 from bemt.series import Series
 
 D = 0.254

@@ -14,7 +14,7 @@ from bemt import units
 from bemt.errors import InputError
 from bemt.import_files import import_file
 from bemt.imported import Channel, Imported
-from bemt.sanity import Finding, check
+from bemt.sanity.check import Finding, check
 from bemt.series import Series
 
 INCH = units.INCH

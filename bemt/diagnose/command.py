@@ -66,9 +66,9 @@ def load(path: str, case: Case) -> Record:
     InputError
         If the file is not a recording.
     """
-    from bemt import reduction
     from bemt.import_files import import_file
-    from bemt.reduction_channels import view
+    from bemt.reduction import reduce as reduction
+    from bemt.reduction.channels import view
 
     imported = import_file(path)
     if {"CT", "CP"} & set(imported.channels):

@@ -15,12 +15,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bemt import plateaus
 from bemt.drive import transient
 from bemt.drive.drive_model import Battery, Drive, Esc, Motor
 from bemt.drive.map_points import MapPoints
 from bemt.drive.rotor_table import RotorTable, quadratic
 from bemt.errors import Fault, InputError
+from bemt.reduction import plateaus
 
 __all__ = [
     "FREE",

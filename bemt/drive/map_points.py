@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import plateaus
 from bemt.errors import Fault, InputError
 from bemt.imported import Imported
+from bemt.reduction import plateaus
 
 __all__ = ["QUANTITIES", "MapPoints", "join", "points"]
 

@@ -120,7 +120,7 @@ def constants(s: Settings) -> dict[str, str]:
     dict of str to str
         Name to file.
     """
-    # Periodic sides must be among them: cyclicAMI does not count as coupled, and the flow through it would be set to zero
+    # Periodic sides too: cyclicAMI does not count as coupled here, and the flow through it would be set to zero
     standing = [*s.walls, *(["side"] if s.domain == "pipe" else []), *(["side1", "side2"] if s.sectors > 1 else [])]
     zone = {"cellZone": "turning", "active": True, "nonRotatingPatches": standing, "origin": vector(0, 0, 0),
             "axis": vector(0, 0, 1), "omega": s.omega}  # fmt: skip

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from bemt import __version__
-from bemt.cfd_run import DRIFT_LIMIT, SCATTER_LIMIT, Outcome
-from bemt.cfd_schema import Campaign
+from bemt.cfd.schema import Campaign
+from bemt.cfd.worker import DRIFT_LIMIT, SCATTER_LIMIT, Outcome
 from bemt.errors import Fault, InputError
 from bemt.grid_study import grid_study, ratios
 from bemt.importers import number

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import empirical
-from bemt.calibrate_points import Points
+from bemt.calibrate.points import Points
 from bemt.errors import Fault, InputError
 
 Array = NDArray[np.float64]

@@ -28,8 +28,8 @@ import numpy as np
 from bemt import cache
 from bemt.case import Case
 from bemt.errors import Fault, InputError
-from bemt.grid import Grid, Solved, Solver, solve_chunk
-from bemt.grid_identity import program_hash
+from bemt.grid.identity import program_hash
+from bemt.grid.run import Grid, Solved, Solver, solve_chunk
 
 __all__ = ["Cluster"]
 

@@ -1,22 +1,22 @@
 """Sanity before physics: faults of a recording, each named with its evidence and the correction it would take.
 
 Nothing is corrected here. The checks work with whatever channels there are, and say nothing where they cannot know:
-slips of units (:mod:`bemt.sanity_slips`), signs and physical bounds (:mod:`bemt.sanity_signs`), columns
-(:mod:`bemt.sanity_columns`). A new check is one function with the decorator ``check_for``.
+slips of units (:mod:`bemt.sanity.slips`), signs and physical bounds (:mod:`bemt.sanity.signs`), columns
+(:mod:`bemt.sanity.columns`). A new check is one function with the decorator ``check_for``.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from bemt import sanity_columns, sanity_signs, sanity_slips  # they register themselves
 from bemt.imported import Imported
-from bemt.sanity_base import CHECKS, SEVERITIES, Finding, facts_of
+from bemt.sanity import columns, signs, slips  # they register themselves
+from bemt.sanity.base import CHECKS, SEVERITIES, Finding, facts_of
 from bemt.series import Series
 
 __all__ = ["Finding", "check"]
 
-_ROOMS = (sanity_slips, sanity_signs, sanity_columns)
+_ROOMS = (slips, signs, columns)
 
 
 @np.errstate(all="ignore")  # a damaged file may hold any number

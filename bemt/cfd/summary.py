@@ -12,7 +12,7 @@ import numpy as np
 
 from bemt import evaluate, solver
 from bemt.case import Case, load_case
-from bemt.cfd_schema import Campaign, load_campaign
+from bemt.cfd.schema import Campaign, load_campaign
 from bemt.errors import Fault, InputError
 from bemt.tables import number_text, text_table
 

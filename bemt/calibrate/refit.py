@@ -1,4 +1,4 @@
-"""The eight constants of :mod:`bemt.compact` from measured points, and its error bands with the maker left out.
+"""Constants of :mod:`bemt.calibrate.compact` from measured points, and its error bands with the maker left out.
 
 Order: thrust and power constants on propellers whose chord is known; Re0 so that static CT follows rpm WITHIN each
 propeller (propellers differ in more than Reynolds number); then the chord law, on the known chords and on those that
@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import compact
-from bemt.calibrate_points import Points
+from bemt.calibrate import compact
+from bemt.calibrate.points import Points
 
 Array = NDArray[np.float64]
 

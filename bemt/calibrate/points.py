@@ -18,8 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import coefficients as co
-from bemt import compact, importers
+from bemt import importers
 from bemt.air import Air, isa_pressure
+from bemt.calibrate import compact
 from bemt.errors import Fault, InputError
 from bemt.imported import Imported
 from bemt.importers import apc, uiuc

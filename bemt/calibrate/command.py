@@ -1,9 +1,9 @@
 """``python -m bemt calibrate FILES``: K1/K2 refitted on measured propellers, and the compact formula beside it.
 
 Beside each other: the thesis's constants; its goal-seek (K2 = 1.5, K1 by mean error) repeated on the data; a robust
-refit at rest, and one that includes flight; the compact formula of :mod:`bemt.compact`, refitted when enough propellers
-have a chord, with measured chords and with typical ones. Fitted models are scored on FILES with the propeller (compact:
-also its maker) left out of the fit, and on ``--test`` files with the constants of FILES.
+refit at rest, and one that includes flight; the compact formula (:mod:`bemt.calibrate.compact`), refitted when enough
+propellers have a chord, with measured chords and with typical ones. Fitted models are scored on FILES with the
+propeller (compact: also its maker) left out of the fit, and on ``--test`` files with the constants of FILES.
 
 Schema ``bemt.calibration/1``: ``k1k2``, ``compact``, ``scores`` (``calibration`` and ``test``: ``static``, ``flight``,
 ``J/(P/D)``, ``chord_known``, ``bands``, ``power``, ``coverage``), ``refused``, ``notes``.
@@ -21,9 +21,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import calibrate_compact, calibrate_fit, calibrate_score, compact
-from bemt.calibrate_points import Points, load
-from bemt.calibrate_text import text
+from bemt.calibrate import compact, refit, score
+from bemt.calibrate import fit as fitting
+from bemt.calibrate.points import Points, load
+from bemt.calibrate.text import text
 from bemt.data_folders import find_data
 from bemt.errors import Fault, InputError
 
@@ -43,21 +44,21 @@ def _counts(points: Points) -> dict[str, int]:
     }  # fmt: skip
 
 
-def _k1k2(points: Points, draws: int, notes: list[str]) -> dict[str, calibrate_fit.K1K2]:
+def _k1k2(points: Points, draws: int, notes: list[str]) -> dict[str, fitting.K1K2]:
     """Constants by name; those that cannot be fitted are left out with a note."""
-    found = {"thesis": calibrate_fit.THESIS}
-    if np.any(calibrate_fit.usable(points)):
-        found["goal_seek"] = calibrate_fit.goal_seek(points)
+    found = {"thesis": fitting.THESIS}
+    if np.any(fitting.usable(points)):
+        found["goal_seek"] = fitting.goal_seek(points)
     for name, in_flight in (("refit", False), ("refit_flight", True)):
         try:
-            found[name] = calibrate_fit.fit(points, in_flight, draws)
+            found[name] = fitting.fit(points, in_flight, draws)
         except InputError as error:
             notes.append(f"{name} left out: {error}")
     return found
 
 
 def calibrate(
-    points: Points, test: Points | None = None, draws: int = calibrate_fit.DRAWS,
+    points: Points, test: Points | None = None, draws: int = fitting.DRAWS,
     progress: Callable[[str], None] | None = None,
 ) -> tuple[dict[str, Any], dict[str, tuple[Points, dict[str, Array]]]]:  # fmt: skip
     """Fit, leave out, score.
@@ -85,9 +86,9 @@ def calibrate(
     say("K1 and K2")
     k1k2 = _k1k2(points, draws, notes)
     say("compact formula")
-    fitted = calibrate_compact.fit(points)
+    fitted = refit.fit(points)
     if fitted is None:
-        few = f"fewer than {calibrate_compact.MIN_PROPELLERS} propellers with chord and power"
+        few = f"fewer than {refit.MIN_PROPELLERS} propellers with chord and power"
         notes.append(f"compact formula not refitted: {few}; the published constants serve")
     constants = fitted.constants if fitted else compact.CONSTANTS
     document: dict[str, Any] = {
@@ -103,24 +104,24 @@ def calibrate(
     predictions: dict[str, tuple[Points, dict[str, Array]]] = {}
     document["scores"] = {"calibration": None, "test": None}
     for name, which in sets.items():
-        CT = {key: calibrate_fit.CT_k1k2(which, c.K1, c.K2) for key, c in k1k2.items()}
+        CT = {key: fitting.CT_k1k2(which, c.K1, c.K2) for key, c in k1k2.items()}
         CP: dict[str, Array] = {}
         for key, known in (("compact", True), ("compact_no_chord", False)):
-            CT[key], CP[key] = calibrate_compact.predict(which, constants, known)
+            CT[key], CP[key] = refit.predict(which, constants, known)
         if name == "calibration":
             for key, in_flight in (("refit", False), ("refit_flight", True)):
                 if key in k1k2:
-                    CT[key] = calibrate_fit.left_out(which, in_flight)
+                    CT[key] = fitting.left_out(which, in_flight)
             if fitted:
                 _leave_out(which, fitted, CT, CP, document, say)
-        found = calibrate_score.score(which, CT)
+        found = score.score(which, CT)
         own_chord = np.isfinite(which.of("chord_m"))
-        part = calibrate_score.score(which.select(own_chord), {key: v[own_chord] for key, v in CT.items()})
+        part = score.score(which.select(own_chord), {key: v[own_chord] for key, v in CT.items()})
         found["chord_known"] = {key: part[key] for key in ("static", "flight", "J/(P/D)")}
-        found["power"] = calibrate_score.power_score(which, CP)
+        found["power"] = score.power_score(which, CP)
         found["coverage"] = {
-            "chord": calibrate_score.coverage(which, constants, True),
-            "no_chord": calibrate_score.coverage(which, constants, False),
+            "chord": score.coverage(which, constants, True),
+            "no_chord": score.coverage(which, constants, False),
         }
         document["scores"][name] = found
         predictions[name] = (which, CT)
@@ -130,16 +131,14 @@ def calibrate(
 
 
 def _leave_out(
-    points: Points, fitted: calibrate_compact.Fitted, CT: dict[str, Array], CP: dict[str, Array],
+    points: Points, fitted: refit.Fitted, CT: dict[str, Array], CP: dict[str, Array],
     document: dict[str, Any], say: Callable[[str], None],
 ) -> None:  # fmt: skip
     """Replace the compact predictions by those without the propeller, add those without the maker, and the bands."""
     makers = np.unique([p.maker for p in points.propellers], return_inverse=True)[1][points.index]
     names = {True: "compact", False: "compact_no_chord"}
     for suffix, groups in (("", points.index), ("_maker_out", makers)):
-        found = calibrate_compact.left_out(
-            points, fitted, groups, lambda i, n: say(f"compact formula, left out {i} of {n}")
-        )
+        found = refit.left_out(points, fitted, groups, lambda i, n: say(f"compact formula, left out {i} of {n}"))
         for known, key in names.items():
             CT[key + suffix], CP[key + suffix] = found[known]
     with_chord = np.isfinite(points.of("chord_m"))
@@ -147,7 +146,7 @@ def _leave_out(
     for known, key in names.items():
         m = with_chord if known else np.ones_like(with_chord)
         made = [np.where(m, v[f"{key}_maker_out"], np.nan) for v in (CT, CP)]
-        widths = calibrate_compact.bands(points, made[0], made[1], fitted.constants, known)
+        widths = refit.bands(points, made[0], made[1], fitted.constants, known)
         document["compact"]["bands"]["known" if known else "unknown"] = widths
 
 
@@ -196,7 +195,7 @@ def run(args: argparse.Namespace) -> int:
     document = {"schema": document["schema"], **names, **document}
     rendered, page = json_text(document), text(document)
     if args.out:
-        from bemt.calibrate_figure import draw
+        from bemt.calibrate.figure import draw
 
         folder = Path(args.out)
         write_atomic(folder / "calibration.json", rendered)

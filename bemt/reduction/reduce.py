@@ -1,9 +1,9 @@
 """From a recording to an honest `Series`: steady points with uncertainties, and everything that was left out.
 
-In this order: the rows are told to be samples or points (:mod:`bemt.reduction_rows`); samples are cut into plateaus
-(:mod:`bemt.plateaus`: start-up, settling, outliers); rows at rest, or a run without propeller, give the zero that is
-subtracted (:mod:`bemt.reduction_tare`); the air is found (:mod:`bemt.reduction_air`); coefficients follow where
-diameter and density are known; scatter comes from plateaus, stated errors, repeats (:mod:`bemt.reduction_scatter`).
+In this order: the rows are told to be samples or points (``rows``); samples are cut into ``plateaus`` (start-up,
+settling, outliers); rows at rest, or a run without propeller, give the zero that is subtracted (``tare``); the ``air``
+is found; coefficients follow where diameter and density are known; ``scatter`` comes from plateaus, stated errors,
+repeats.
 
 The uncertainties of the series are the UNCORRELATED part, independent from point to point. What all points share is in
 `Reduced.correlated`: ``gain`` [1], ``zero`` [unit of the channel], ``session`` [1] (between runs of one condition).
@@ -24,13 +24,13 @@ from bemt import coefficients as co
 from bemt.air import Air
 from bemt.errors import Fault, InputError
 from bemt.imported import Imported
-from bemt.plateaus import Settings
-from bemt.reduction_air import AirOfPoints, air_of
-from bemt.reduction_channels import LOADS, Lost, Recorded, shaft_power, view
-from bemt.reduction_points import Found, Point, from_rows, from_samples
-from bemt.reduction_rows import command_of, is_samples
-from bemt.reduction_scatter import Hysteresis, hysteresis, repeats, session
-from bemt.reduction_tare import TARED, Zero, from_rest, from_table
+from bemt.reduction.air import AirOfPoints, air_of
+from bemt.reduction.channels import LOADS, Lost, Recorded, shaft_power, view
+from bemt.reduction.plateaus import Settings
+from bemt.reduction.points import Found, Point, from_rows, from_samples
+from bemt.reduction.rows import command_of, is_samples
+from bemt.reduction.scatter import Hysteresis, hysteresis, repeats, session
+from bemt.reduction.tare import TARED, Zero, from_rest, from_table
 from bemt.series import Series
 
 __all__ = ["Reduced", "reduce"]
@@ -100,7 +100,7 @@ def reduce(
         Run without propeller to subtract at equal speed; False subtracts nothing; None subtracts what rows at rest
         show, where there are any.
     steady : bool or None
-        True: rows are points; False: samples; None decides (:mod:`bemt.reduction_rows`).
+        True: rows are points; False: samples; None decides (:mod:`bemt.reduction.rows`).
     speed : str or None
         Channel that is the speed of the rotor (``optical_rpm``, ``electrical_rpm``); None decides.
     settings : Settings or None

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import empirical, units
-from bemt.sanity_base import Facts, Finding, check_for
+from bemt.sanity.base import Facts, Finding, check_for
 
 __all__ = ["Relation", "Slip", "relations", "slips"]
 

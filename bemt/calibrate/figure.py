@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.calibrate_points import Points
-from bemt.calibrate_score import FAR, NEAR, X_EDGES
-from bemt.calibrate_text import NAMES
+from bemt.calibrate.points import Points
+from bemt.calibrate.score import FAR, NEAR, X_EDGES
+from bemt.calibrate.text import NAMES
 
 Array = NDArray[np.float64]
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from bemt.case import Case
 from bemt.evaluate import Points, air_arrays, evaluate, prepare
-from bemt.grid_formats import FORMATS, Block, encode, join
+from bemt.grid.formats import FORMATS, Block, encode, join
 from bemt.tables import plain, write_atomic
 
 if TYPE_CHECKING:
@@ -202,7 +202,7 @@ def solve_chunk(solver: Solver, number: int) -> tuple[bytes, dict[str, Any]]:
     Returns
     -------
     bytes
-        As `bemt.grid_formats.encode` gives them; none without a format.
+        As `bemt.grid.formats.encode` gives them; none without a format.
     dict
         Points, unconverged points, ranges.
     """

@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.averaging import steady_average
-from bemt.cfd_schema import Point
-from bemt.cfd_start import State, splice
+from bemt.cfd.schema import Point
+from bemt.cfd.start import State, splice
 from bemt.errors import InputError
 from bemt.export_case_openfoam import settings_of, write_openfoam
 from bemt.openfoam import Settings, case_files

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import compact
-from bemt.calibrate_compact import predict
-from bemt.calibrate_points import Points
+from bemt.calibrate import compact
+from bemt.calibrate.points import Points
+from bemt.calibrate.refit import predict
 from bemt.units import INCH
 
 Array = NDArray[np.float64]

@@ -69,7 +69,7 @@ def text(doc: Mapping[str, Any]) -> str:
     Parameters
     ----------
     doc : mapping
-        Document of schema ``bemt.calibration/1``, see :func:`bemt.calibrate.calibrate`.
+        Document of schema ``bemt.calibration/1``, see :func:`bemt.calibrate.command.calibrate`.
 
     Returns
     -------

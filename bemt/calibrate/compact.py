@@ -109,7 +109,7 @@ class Constants:
 
 
 CONSTANTS = Constants(0.8859, 0.1341, 0.1979, 2643.0, 0.03114, 0.7896, 0.146, -0.2329)
-"""Fitted on UIUC volume 1; `bemt.calibrate` finds them again where the data are."""
+"""Fitted on UIUC volume 1; `python -m bemt calibrate` finds them again where the data are."""
 
 BAND_X = (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.1)
 """J/(P/D) of the error bands [-]; 0 is at rest."""

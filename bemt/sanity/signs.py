@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import coefficients as co
-from bemt.reduction_channels import shaft_power
-from bemt.sanity_base import MANY, Facts, Finding, check_for
+from bemt.reduction.channels import shaft_power
+from bemt.sanity.base import MANY, Facts, Finding, check_for
 
 __all__: list[str] = []
 

@@ -12,11 +12,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import plateaus
 from bemt.errors import Fault, InputError
-from bemt.reduction_channels import LOADS, Lost, Recorded
-from bemt.reduction_rows import at_rest, command_of
-from bemt.reduction_tare import Rest
+from bemt.reduction import plateaus
+from bemt.reduction.channels import LOADS, Lost, Recorded
+from bemt.reduction.rows import at_rest, command_of
+from bemt.reduction.tare import Rest
 
 __all__ = ["Found", "Point", "from_rows", "from_samples"]
 

@@ -11,9 +11,9 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bemt.cfd_record import Record
-from bemt.cfd_run import Worker, point_key
-from bemt.cfd_schema import Campaign, load_campaign
+from bemt.cfd.record import Record
+from bemt.cfd.schema import Campaign, load_campaign
+from bemt.cfd.worker import Worker, point_key
 from bemt.errors import EXIT_INPUT, EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
 from bemt.tables import json_text, number_text, remove_stale, text_table
 
@@ -125,7 +125,7 @@ def run(args: argparse.Namespace) -> int:
     """
     folder = Path(args.campaign)
     if folder.is_dir() and not (folder / "campaign.toml").is_file():
-        from bemt.cfd_summary import summary, summary_text
+        from bemt.cfd.summary import summary, summary_text
 
         found = summary(folder)
         print(json_text(found) if args.json else summary_text(found), end="")

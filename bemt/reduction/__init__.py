@@ -1,0 +1,1 @@
+"""Recordings to steady points: plateaus, tare, air, scatter, coefficients (`reduce` joins them)."""
