@@ -78,6 +78,7 @@ MAY: dict[str, set[str]] = {
     "bemt.diagnose.command": {"files", "print"},
     "bemt.diagnose.figures": {"files"},
     "bemt.conceal.prove": {"files", "print", "clock", "environment"},
+    "bemt.conceal.real": {"files"},
     "bemt.conceal.seal": {"files"},
     "geometry.export": {"files"},
     "geometry.picture*": {"files"},

@@ -12,7 +12,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -20,14 +20,16 @@ from typing import Any
 import numpy as np
 
 from bemt import __version__
-from bemt.conceal import draw, proof_text, resolve, score, seal
+from bemt.conceal import draw, items, proof_text, real, resolve, score, seal
 from bemt.errors import EXIT_OK, Fault, InputError
 from bemt.tables import json_text, write_atomic
 
 __all__ = ["SCHEMA", "conceal", "diagnose_all", "diagnose_folder", "proof", "run"]
 
 SCHEMA, KEY_SCHEMA = "bemt.proof/1", "bemt.key/1"
-_GIVEN = ("recording.csv", "case.toml", "stations.csv")
+REAL = "real"
+"""Size of the run on published recordings."""
+_GIVEN = ("recording.csv", "case.toml", "stations.csv", "reference.csv")
 TIME_LIMIT_S = 900.0
 
 
@@ -39,7 +41,7 @@ def conceal(out: Path, size: str, seed: int) -> str:
     out : Path
         Folder of the proof; must not hold one yet.
     size : str
-        Of `draw.SIZES`.
+        Of `draw.SIZES`, or ``real``.
     seed : int
         Of everything.
 
@@ -51,7 +53,7 @@ def conceal(out: Path, size: str, seed: int) -> str:
     Raises
     ------
     InputError
-        If the folder holds a proof already.
+        If the folder holds a proof already, or published recordings are asked for and there are none.
     """
     from bemt import effects
 
@@ -60,7 +62,11 @@ def conceal(out: Path, size: str, seed: int) -> str:
     known = set(effects.catalogue())
     standard = {e.id for e in effects.standard()}
     entries = []
-    for k, item in enumerate(draw.draw_items(draw.SIZES[size], seed, known, standard, _teller("concealed"))):
+    drawn: Iterable[items.Item] = (
+        real.draw_real(np.random.default_rng(seed)) if size == REAL
+        else draw.draw_items(draw.SIZES[size], seed, known, standard, _teller("concealed"))
+    )  # fmt: skip
+    for k, item in enumerate(drawn):
         name = f"{k:04d}"
         folder = out / "items" / name
         folder.mkdir(parents=True)
@@ -86,7 +92,7 @@ def diagnose_folder(folder: Path) -> tuple[dict[str, Any] | None, str]:
     Parameters
     ----------
     folder : Path
-        Holds recording.csv, case.toml, stations.csv.
+        Holds recording.csv, case.toml, stations.csv; reference.csv if there is a reference.
 
     Returns
     -------
@@ -96,9 +102,11 @@ def diagnose_folder(folder: Path) -> tuple[dict[str, Any] | None, str]:
         What the process said on the error stream.
     """
     with tempfile.TemporaryDirectory(prefix="bemt-") as box:
-        for name in _GIVEN:
+        given = [name for name in _GIVEN if (folder / name).exists()]
+        for name in given:
             shutil.copy(folder / name, box)
         command = [sys.executable, "-m", "bemt", "diagnose", "recording.csv", "--case", "case.toml", "--json"]
+        command += ["--reference", "reference.csv"] if "reference.csv" in given else []
         # the numerical libraries' own threads would fight over the cores that --jobs shares out
         one = {
             name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -165,13 +173,14 @@ def proof(out: Path, digest: str | None = None) -> dict[str, Any]:
     key = seal.unseal(out, digest)
     judged, seconds, errors = [], [], {}
     settled: list[bool] = []
+    made = key["size"] != REAL
     first, _ = np.random.SeedSequence(int(key["seed"])).spawn(2)
-    found = {(b.rig.name, b.plan): b for b in draw.benches(draw.SIZES[key["size"]], first)}
+    found = {(b.rig.name, b.plan): b for b in draw.benches(draw.SIZES[key["size"]], first)} if made else {}
     for entry in key["items"]:
         file = out / "answers" / f"{entry['folder']}.json"
         stored: Mapping[str, Any] = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
         judged.append(score.judge(entry, stored.get("answer")))
-        if judged[-1].answer:
+        if made and judged[-1].answer:
             settles = resolve.resolves(found[entry["rig"], entry["plan"]], entry, judged[-1].answer)
             settled += [] if settles is None else [settles]
         seconds.append(float(stored.get("seconds", math.nan)))
@@ -185,12 +194,12 @@ def proof(out: Path, digest: str | None = None) -> dict[str, Any]:
          "error": errors.get(j.entry["folder"], "")}
         for j in judged if not j.right and (j.claims or j.visible or not j.answer)
     ]  # fmt: skip
-    rows = score.score(judged, settled)
+    rows = score.score(judged, settled) if made else score.score_real(judged)
     return {
         "schema": SCHEMA, "version": __version__, "size": key["size"], "seed": key["seed"], "commit": _commit(),
         "key_sha256": digest or (out / seal.SEAL).read_text(encoding="utf-8").strip(), "items": len(judged),
-        "score": [vars(r) for r in rows], "baselines": [vars(r) for r in score.baselines(judged)],
-        "strata": score.strata(judged), "risk_coverage": score.risk_coverage(judged),
+        "score": [vars(r) for r in rows], "baselines": [vars(r) for r in score.baselines(judged)] if made else [],
+        "strata": score.strata(judged) if made else [], "risk_coverage": score.risk_coverage(judged),
         "confusion": score.confusion(judged), "misses": misses,
         "seconds_median": sorted(seconds)[len(seconds) // 2] if seconds else math.nan,
     }  # fmt: skip

@@ -11,7 +11,19 @@ import numpy as np
 
 from bemt.conceal.causes import CAUSES
 
-__all__ = ["VISIBLE", "Judged", "Row", "baselines", "confusion", "judge", "risk_coverage", "score", "strata", "wilson"]
+__all__ = [
+    "VISIBLE",
+    "Judged",
+    "Row",
+    "baselines",
+    "confusion",
+    "judge",
+    "risk_coverage",
+    "score",
+    "score_real",
+    "strata",
+    "wilson",
+]
 
 VISIBLE = 5.0
 """Separation in standard deviations from which on a cause counts as visible. [1]"""
@@ -283,6 +295,29 @@ def score(judged: Sequence[Judged], settled: Sequence[bool] = ()) -> list[Row]:
         _share("recommended run settles the tie", settled, ">= 70 %", 0.70),
         _share("failed", (not j.answer for j in judged), "0", 0.0, True),
     ]  # fmt: skip
+
+
+def score_real(judged: Sequence[Judged]) -> list[Row]:
+    """Score of published recordings: by set, what was found and what was claimed wrongly.
+
+    Parameters
+    ----------
+    judged : sequence of Judged
+        All items.
+
+    Returns
+    -------
+    list of Row
+        Two rows for a set with a cause, one for a control; targets as in DIAGNOSIS 5 for real noise.
+    """
+    out = []
+    for kind in sorted({str(j.entry["set"]) for j in judged}):
+        some = [j for j in judged if j.entry["set"] == kind and j.answer]
+        wrong = (j.claims and not j.right for j in some)
+        if some and some[0].entry["causes"]:
+            out.append(_share(f"{kind}: found", (j.claims and j.right for j in some), ">= 80 %", 0.80))
+        out.append(_share(f"{kind}: wrong claims", wrong, "<= 2 %", 0.02, True))
+    return [*out, _share("failed", (not j.answer for j in judged), "0", 0.0, True)]
 
 
 def baselines(judged: Sequence[Judged]) -> list[Row]:

@@ -1,0 +1,310 @@
+"""Published recordings with a known effect hidden from the model, or with none: the proof's real part.
+
+``real.toml`` registers what is concealed and where it is known from.  The recordings are found in the data folders and
+are no part of the project.
+"""
+
+from __future__ import annotations
+
+import csv
+import tomllib
+from collections.abc import Collection, Iterator, Mapping
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt import section_rule
+from bemt.conceal.items import Item, recording_text
+from bemt.data_folders import data_roots, find_data
+from bemt.errors import Fault, InputError
+
+if TYPE_CHECKING:
+    from bemt.importers.uiuc import UiucPropeller
+
+__all__ = ["SETS", "draw_real", "manifest"]
+
+Array = NDArray[np.float64]
+
+CLEAR, ABSENT = 0.10, 0.02
+"""Change of CT or CP over the speeds that counts as clear, and below which there is none. [1]"""
+EVERY = 3
+PITCH_DEG, DENSITY, WRONG_DENSITY = -3.0, 1.225, 1.00
+POUND = 4.4482216152605
+MIN_POINTS = 8
+MAX_POINTS = 90
+
+
+@cache
+def manifest() -> Mapping[str, Mapping[str, Any]]:
+    """Registered sets.
+
+    Returns
+    -------
+    mapping of str to mapping
+        Name of the set to causes, alike (what cannot be told from them), how, source.
+    """
+    text = Path(__file__).with_name("real.toml").read_text(encoding="utf-8")
+    return {entry["set"]: entry for entry in tomllib.loads(text)["concealed"]}
+
+
+SETS = ("real reynolds", "real pitch", "real density", "real slip", "real duct", "real mach", "real null",
+        "real shuffled")  # fmt: skip
+"""Names in the manifest."""
+
+
+def _item(
+    kind: str, rig: str, columns: Mapping[str, Array], case: str, stations: str, variables: list[str],
+    reference: Mapping[str, Array] | None = None,
+) -> Item:  # fmt: skip
+    causes = list(manifest()[kind]["causes"])
+    entry = {
+        "set": kind, "causes": causes, "kinds": [], "strengths": [1.0] * len(causes), "parameters": {},
+        # what a table shows to the eye; there is no yardstick for a truth that nobody knows
+        "separation": [99.0] * len(causes), "separation_noise": [], "alike": [list(manifest()[kind].get("alike", [])) for _ in causes],
+        "variables": [variables for _ in causes], "plan": "real", "rig": rig, "ducted": False, "seed": 0,
+        "rows": int(next(iter(columns.values())).size), "stand": {},
+    }  # fmt: skip
+    files = {"recording.csv": recording_text(columns), "case.toml": case, "stations.csv": stations}
+    return Item(files | ({} if reference is None else {"reference.csv": recording_text(reference)}), entry)
+
+
+def _case(name: str, rotor: Mapping[str, Any], section: Mapping[str, float], rpm: float, air: Mapping[str, float],
+          off: Collection[str] = ()) -> str:  # fmt: skip
+    def table(head: str, rows: Mapping[str, Any]) -> list[str]:
+        words = (f'{k} = "{v}"' if isinstance(v, str) else f"{k} = {v:.7g}" for k, v in rows.items())
+        return [f"[{head}]", *words, ""]
+
+    lines = ['schema = "bemt.case/1"', f'name = "{name}"', "", *table("rotor", rotor),
+             *table("blade", {"stations": "stations.csv"}), *table("blade.section", section),
+             *table("operating", {"rpm": rpm, "airspeed_m_s": 0.0}), *table("air", air), "[model]", "stations = 30",
+             f"effects_off = [{', '.join(f'{chr(34)}{e}{chr(34)}' for e in off)}]"]  # fmt: skip
+    return "\n".join(lines) + "\n"
+
+
+def _stations(r_R: Array, c_R: Array, beta_deg: Array) -> str:
+    rows = zip(r_R, c_R, beta_deg, strict=True)
+    return "r_over_R,chord_over_R,beta_deg\n" + "".join(f"{x:.5f},{c:.6f},{b:.4f}\n" for x, c, b in rows)
+
+
+def change_over_speed(rpm: Array, coefficient: Array) -> float:
+    """Change of a coefficient over the speeds of rotation, noise smoothed away.
+
+    Parameters
+    ----------
+    rpm : (N,) float
+        Speeds. [rev/min]
+    coefficient : (N,) float
+        CT or CP. [1]
+
+    Returns
+    -------
+    float
+        Largest less smallest value of a parabola in log rpm, of their mean. [1]
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> n = np.geomspace(2000.0, 8000.0, 9)
+    >>> round(change_over_speed(n, 0.1 * (1.0 + 0.2 * np.log(n / 2000.0) / np.log(4.0))), 3)
+    0.182
+    """
+    x = np.log(rpm / rpm.mean())
+    smooth = np.polyval(np.polyfit(x, coefficient, 2), x)
+    return float(np.ptp(smooth) / abs(smooth.mean()))
+
+
+def _uiuc_case(
+    p: UiucPropeller, rpm: float, air: Mapping[str, float], off: Collection[str] = (), turned: float = 0.0
+) -> tuple[str, str]:
+    g = p.geometry
+    assert g is not None
+    s = section_rule.sections(p.family)[0]
+    rotor = {"kind": "propeller", "blades": p.blades, "diameter_in": p.diameter_in, "hub_ratio": 0.1}
+    section = {"camber": s.camber, "camber_position": s.position, "thickness": s.thickness}
+    keep = (g.r_R <= 1.0) & (g.r_R > 0.1)
+    name = p.name.replace(".", "p")
+    return (_case(name, rotor, section, rpm, air, off),
+            _stations(g.r_R[keep], np.maximum(g.c_R[keep], 0.005), g.beta_deg[keep] + turned))  # fmt: skip
+
+
+def _dimensional(p: UiucPropeller) -> dict[str, Array]:
+    """All points of a propeller as a stand at `DENSITY` would have read them."""
+    still = p.static
+    parts = [] if still is None else [(still.rpm, np.zeros(still.rpm.size), still.CT, still.CP)]
+    parts += [(np.full(line.J.size, line.rpm), line.J, line.CT, line.CP) for line in p.lines]
+    rpm, J, CT, CP = (np.concatenate([part[k] for part in parts]) for k in range(4))
+    run = np.concatenate([np.full(part[0].size, float(k)) for k, part in enumerate(parts)])
+    good = np.isfinite(CT + CP) & (CT > 0.0)
+    # long tables are thinned evenly
+    keep = np.flatnonzero(good)
+    keep = keep[np.unique(np.linspace(0, keep.size - 1, min(MAX_POINTS, keep.size)).round().astype(int))]
+    rpm, J, CT, CP, run = (v[keep] for v in (rpm, J, CT, CP, run))
+    n, D = rpm / 60.0, p.diameter_m
+    return {"run": run, "rpm": rpm, "airspeed_m_s": J * n * D, "thrust_N": CT * DENSITY * n**2 * D**4,
+            "torque_Nm": CP * DENSITY * n**2 * D**5 / (2.0 * np.pi)}  # fmt: skip
+
+
+def _uiuc(rng: np.random.Generator) -> Iterator[Item]:
+    from bemt.importers import uiuc
+
+    root = find_data("uiuc")
+    folders = [] if root is None else [f for f in (root / "volume-1", root / "volume-2") if f.is_dir()] or [root]
+    propellers = [p for f in folders for p in uiuc.scan_folder(f).propellers if p.geometry is not None]
+    known = {"density_kg_m3": DENSITY}
+    k = 0
+    for p in sorted(propellers, key=lambda p: (p.folder, p.name)):
+        still = p.static
+        if still is not None and still.rpm.size >= MIN_POINTS:
+            order = np.argsort(still.rpm, kind="stable")
+            rpm, CT, CP = still.rpm[order], still.CT[order], still.CP[order]
+            most = max(change_over_speed(rpm, CT), change_over_speed(rpm, CP))
+            text, blade = _uiuc_case(p, float(np.median(rpm)), known, ("reynolds",))
+            columns = {"rpm": rpm, "CT": CT, "CP": CP}
+            if most > CLEAR:
+                yield _item("real reynolds", p.name, columns, text, blade, ["rpm", "Re"])
+                deal = rng.permutation(rpm.size)
+                yield _item("real shuffled", p.name, {"rpm": rpm, "CT": CT[deal], "CP": CP[deal]}, text, blade, [])
+            elif most < ABSENT:
+                yield _item("real null", p.name, columns, text, blade, [])
+        if still is None or not p.lines:
+            continue
+        k += 1
+        points = _dimensional(p)
+        middle = float(np.median(points["rpm"]))
+        if k % EVERY == 0:
+            text, blade = _uiuc_case(p, middle, known, turned=PITCH_DEG)
+            yield _item("real pitch", p.name, points, text, blade, [])
+        elif k % EVERY == 1:
+            text, blade = _uiuc_case(p, middle, {"density_kg_m3": WRONG_DENSITY})
+            yield _item("real density", p.name, points, text, blade, [])
+        else:
+            text, blade = _uiuc_case(p, middle, known)
+            slipped = {**points, "thrust_N": points["thrust_N"] / POUND}
+            yield _item("real slip", p.name, slipped, text, blade, [])
+
+
+def _x22a() -> Iterator[Item]:
+    root = find_data("x22a")
+    if root is None:
+        return
+    R = 1.0668
+    shape = np.genfromtxt(root / "x22a_geometry.csv", delimiter=",", skip_header=1)
+    with (root / "x22a_measured_CT_CP_vs_J.csv").open(encoding="utf-8") as stream:
+        rows = np.array([[float(x) for x in row[:4]] for row in list(csv.reader(stream))[1:]])
+    rotor = {"kind": "propeller", "blades": 3, "diameter_m": 2 * R, "hub_ratio": 0.2}
+    for angle in (19, 29):
+        q = rows[rows[:, 0] == angle]
+        columns = {"rpm": np.full(len(q), 1200.0), "J": q[:, 1], "CT": q[:, 2], "CP": q[:, 3]}
+        text = _case(f"x22a_{angle}", rotor, {"camber": 0.02, "thickness": 0.08}, 1200.0, {"density_kg_m3": 1.225},
+                     ("duct",))  # fmt: skip
+        keep = shape[:, 0] <= 1.0
+        blade = _stations(shape[keep, 0], shape[keep, 3] / R, shape[keep, 2] + angle - 20.0)
+        yield _item("real duct", f"x22a_{angle}", columns, text, blade, ["J", "airspeed_m_s"])
+
+
+def _caradonna_tung() -> Iterator[Item]:
+    root = find_data("caradonna_tung")
+    if root is None:
+        return
+    with (root / "caradonna_tung_CT_vs_tipMach.csv").open(encoding="utf-8") as stream:
+        rows = np.array([[float(x) for x in row[:4]] for row in list(csv.reader(stream))[1:]])
+    r_R = np.linspace(0.18, 1.0, 10)
+    rotor = {"kind": "propeller", "blades": 2, "diameter_m": 2.286, "hub_ratio": 0.17}
+    for angle in np.unique(rows[:, 0]):
+        q = rows[rows[:, 0] == angle]
+        # thrust alone was measured: CT_rotor = T/(rho A (Omega R)^2)
+        columns = {"rpm": q[:, 1], "airspeed_m_s": np.zeros(len(q)),
+                   "thrust_N": q[:, 3] * 1.225 * np.pi * 1.143**2 * (q[:, 1] * np.pi / 30.0 * 1.143) ** 2}  # fmt: skip
+        text = _case(f"caradonna_tung_{angle:g}", rotor, {"camber": 0.0, "thickness": 0.12}, float(q[0, 1]),
+                     {"density_kg_m3": 1.225}, ("compressibility", "drag_divergence"))  # fmt: skip
+        blade = _stations(r_R, np.full(r_R.size, 0.1905 / 1.143), np.full(r_R.size, float(angle)))
+        yield _item("real mach", f"caradonna_tung_{angle:g}", columns, text, blade, ["M_tip", "rpm"])
+
+
+def _tmotor() -> Iterator[Item]:
+    root = find_data("tmotor28_tr594")
+    if root is None:
+        return
+    rows = np.genfromtxt(root / "tmotor28_data.csv", delimiter=";", skip_header=1)[:, :6]
+    given = {}
+    for line in (root / "tmotor28.ini").read_text(encoding="utf-8").splitlines():
+        name, _, values = line.partition("=")
+        if name.strip() in ("radius", "chord", "pitch"):
+            given[name.strip()] = np.array([float(v) for v in values.split()])
+    R = 0.3556
+    blade = _stations(given["radius"] / R, given["chord"] / R, given["pitch"])
+    rotor = {"kind": "propeller", "blades": 2, "diameter_m": 2 * R, "hub_ratio": 0.0844}
+    section = {"camber": 0.04, "camber_position": 0.4, "thickness": 0.10}
+    columns = {"rpm": rows[:, 0], "airspeed_m_s": np.zeros(len(rows)), "thrust_N": rows[:, 3], "torque_Nm": rows[:, 4]}
+    for kind, density in (("real null", DENSITY), ("real density", WRONG_DENSITY)):
+        text = _case("tmotor_28", rotor, section, 2200.0, {"density_kg_m3": density})
+        yield _item(kind, "tmotor_28", columns, text, blade, [])
+
+
+_FAN = """schema = "bemt.case/1"
+name = "fan_76"
+[rotor]
+kind = "propeller"
+blades = 8
+diameter_mm = 76
+hub_ratio = 0.25
+[blade]
+pitch_mm = 70
+chord_law = "fan"
+max_chord_over_R = 0.35
+[blade.section]
+camber = 0.05
+thickness = 0.09
+[operating]
+rpm = 20000
+airspeed_m_s = 0
+[air]
+density_kg_m3 = 1.2
+"""
+
+
+def _fan() -> Iterator[Item]:
+    from bemt.import_files import import_file
+    from bemt.reduction.reduce import reduce
+
+    root = find_data("jmajew")
+    found = {}
+    for name, pattern in (("ducted", "grp01__f1507_hqprop76x8_4s_duct_table*.csv"),
+                          ("open", "grp01__f1507_hqprop76x8_4s_table*.csv")):  # fmt: skip
+        parts = [reduce(import_file(str(f)), diameter_m=0.076).series.values
+                 for f in sorted(root.glob(pattern))] if root else []  # fmt: skip
+        if not parts:
+            return
+        keys = ("rpm", "thrust_N", "torque_Nm")
+        run = np.concatenate([np.full(part["rpm"].size, float(k)) for k, part in enumerate(parts)])
+        found[name] = {"run": run, **{k: np.concatenate([part[k] for part in parts]) for k in keys}}
+    yield _item("real duct", "fan_76", found["ducted"], _FAN, "", ["rpm"], found["open"])
+
+
+def draw_real(rng: np.random.Generator) -> list[Item]:
+    """Make all real items, in mixed order.
+
+    Parameters
+    ----------
+    rng : numpy Generator
+        Source of the shuffles.
+
+    Returns
+    -------
+    list of Item
+        Files and key entries.
+
+    Raises
+    ------
+    InputError
+        When none of the recordings is found.
+    """
+    items = [*_uiuc(rng), *_x22a(), *_fan(), *_caradonna_tung(), *_tmotor()]
+    if not items:
+        roots = ", ".join(r.as_posix() for r in data_roots())
+        hint = "`python -m bemt data uiuc` fetches the largest; BEMT_DATA names a folder of them"
+        raise InputError(Fault(roots, "", "no published recordings", "uiuc, x22a, jmajew ...", hint))
+    return [items[int(i)] for i in rng.permutation(len(items))]
