@@ -186,8 +186,8 @@ def build_parser() -> argparse.ArgumentParser:
     style.add_argument("--json", action="store_true", help="print one JSON document (bemt.effects/1)")
 
     proof = commands.add_parser("prove", help="conceal causes, let the diagnosis find them, score it")
-    size = "41 or 605 made cases (default small), or published recordings, as far as they are found"
-    proof.add_argument("--size", choices=("small", "full", "real"), default="small", help=size)
+    size = "41 or 605 made cases (default small), 68 made by CCBlade (extra wisdem), published recordings as found"
+    proof.add_argument("--size", choices=("small", "full", "ccblade", "real"), default="small", help=size)
     proof.add_argument("--seed", type=int, metavar="N", help="of everything (default: from the operating system)")
     proof.add_argument("--out", metavar="DIR", help="keep items, key, answers and score there")
     proof.add_argument("--jobs", type=_positive, metavar="N", help="diagnoses at a time (default: one per core)")

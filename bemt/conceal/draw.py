@@ -31,10 +31,13 @@ class Size:
         Items of each set. [-]
     plans : tuple of tuple
         Rigs: whether ducted, and plans. [-]
+    code : str
+        Code of the truth.
     """
 
     items: dict[str, int]
     plans: tuple[tuple[bool, tuple[str, ...]], ...]
+    code: str = "vortex"
 
 
 _OPEN, _DUCTED, _POOR = rigs.OPEN_PLANS, rigs.DUCTED_PLANS, rigs.UNDERPOWERED
@@ -50,6 +53,11 @@ SIZES = {
     "full": Size(
         {"single": 240, "pair": 60, "null": 70, "mismatch": 35, "unlisted": 80, "sensor": 80, "underpowered": 40},
         (*((False, (*_OPEN, *_POOR)),) * 6, *((True, (*_DUCTED, "static_narrow")),) * 4),
+    ),
+    "ccblade": Size(
+        {"single": 30, "pair": 6, "null": 10, "mismatch": 4, "unlisted": 6, "sensor": 12, "underpowered": 0},
+        ((False, _GRIDS),) * 3,
+        "ccblade",
     ),
 }
 """Runs of the proof by name."""
@@ -73,7 +81,7 @@ def benches(size: Size, seeds: np.random.SeedSequence) -> list[Bench]:
     out = []
     for k, ((ducted, plans), seed) in enumerate(zip(size.plans, seeds.spawn(len(size.plans)), strict=True)):
         rng = np.random.default_rng(seed)
-        rig = rigs.draw_rig(f"{'ducted' if ducted else 'open'}_{k}", ducted, rng)
+        rig = rigs.draw_rig(f"{'ducted' if ducted else 'open'}_{k}", ducted, rng, size.code)
         out += [Bench.draw(rig, plan, rng) for plan in plans]
     return out
 

@@ -14,6 +14,7 @@ from bemt.conceal.rigs import Rig, conditions
 from bemt.conceal.separation import FREEDOM, Yardstick, freedom, yardstick
 from bemt.conceal.stand import Stand, record
 from bemt.conceal.truth import Answer
+from bemt.conceal.truth_ccblade import EXPRESSIBLE
 from bemt.conceal.truth_section import SectionPhysics
 from bemt.conceal.truth_world import Conditions, Loads, World, loads
 
@@ -73,7 +74,8 @@ class Bench:
             Of `CAUSES`.
         """
         ducted = self.rig.duct is not None
-        return [c for c in CAUSES.values() if self.plan in c.plans and c.ducted in (None, ducted)]
+        able = EXPRESSIBLE if self.rig.rotor.code == "ccblade" else CAUSES
+        return [c for c in CAUSES.values() if self.plan in c.plans and c.ducted in (None, ducted) and c.id in able]
 
     def plain(self) -> World:
         """World without any cause: with a wall behind the rotor in plans that have one.

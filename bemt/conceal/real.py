@@ -59,11 +59,11 @@ def _item(
     kind: str, rig: str, columns: Mapping[str, Array], case: str, stations: str, variables: list[str],
     reference: Mapping[str, Array] | None = None,
 ) -> Item:  # fmt: skip
-    causes = list(manifest()[kind]["causes"])
+    causes, alike = list(manifest()[kind]["causes"]), list(manifest()[kind].get("alike", []))
     entry = {
         "set": kind, "causes": causes, "kinds": [], "strengths": [1.0] * len(causes), "parameters": {},
         # what a table shows to the eye; there is no yardstick for a truth that nobody knows
-        "separation": [99.0] * len(causes), "separation_noise": [], "alike": [list(manifest()[kind].get("alike", [])) for _ in causes],
+        "separation": [99.0] * len(causes), "separation_noise": [], "alike": [alike for _ in causes],
         "variables": [variables for _ in causes], "plan": "real", "rig": rig, "ducted": False, "seed": 0,
         "rows": int(next(iter(columns.values())).size), "stand": {},
     }  # fmt: skip

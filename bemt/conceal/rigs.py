@@ -57,7 +57,7 @@ class Rig:
         return self.tip_mach * _SOUND / self.rotor.radius * 60.0 / (2.0 * np.pi)
 
 
-def draw_rig(name: str, ducted: bool, rng: np.random.Generator) -> Rig:
+def draw_rig(name: str, ducted: bool, rng: np.random.Generator, code: str = "vortex") -> Rig:
     """Draw a rotor from the ranges of small propellers and fans.
 
     Parameters
@@ -68,6 +68,8 @@ def draw_rig(name: str, ducted: bool, rng: np.random.Generator) -> Rig:
         Whether it runs in a duct.
     rng : numpy Generator
         Source.
+    code : str
+        Code of the truth.
 
     Returns
     -------
@@ -91,7 +93,7 @@ def draw_rig(name: str, ducted: bool, rng: np.random.Generator) -> Rig:
     beta = np.arctan(pitch / (np.pi * x))
     rotor = TruthRotor(
         radius, blades, tuple(map(float, x)), tuple(map(float, chord)), tuple(map(float, beta)), section,
-        wall=WALL if ducted else float("nan"),
+        wall=WALL if ducted else float("nan"), code=code,
     )  # fmt: skip
     duct = None
     if ducted:

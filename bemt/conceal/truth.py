@@ -50,6 +50,8 @@ class TruthRotor:
         Lifting-line panels. [-]
     wall : float
         Inner radius of a duct over R, NaN without one. [-]
+    code : str
+        Which code solves it: ``vortex`` (this module) or ``ccblade`` (`bemt.conceal.truth_ccblade`).
     """
 
     radius: float
@@ -60,6 +62,7 @@ class TruthRotor:
     section: ts.Section = field(default_factory=ts.Section)
     panels: int = 14
     wall: float = float("nan")
+    code: str = "vortex"
 
     @property
     def hub(self) -> float:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.conceal import truth, truth_duct
+from bemt.conceal import truth, truth_ccblade, truth_duct
 from bemt.conceal.truth_section import SectionPhysics
 
 __all__ = ["Conditions", "Loads", "World", "loads"]
@@ -173,6 +173,8 @@ def _solve(
     start: truth.Answer | None,
 ) -> truth.Answer:
     v = c.airspeed * np.cos(np.radians(world.oblique))
+    if rotor.code == "ccblade":
+        return truth_ccblade.solve(rotor, c.rpm, v, c.temperature_C, pressure, world.section, extra)
     return truth.solve(rotor, c.rpm, v, c.temperature_C, pressure, world.section, extra, start)
 
 
