@@ -15,7 +15,8 @@ import pytest
 from bemt import section_rule, solver
 from bemt.air import Air
 from bemt.duct import duct_flow
-from bemt.effects import standard
+from bemt.effects import Effect, standard
+from bemt.effects.lifting_surface import LiftingSurface
 from bemt.polars_neuralfoil import neuralfoil_polar
 from geometry.airfoil import Airfoil, naca, naca4
 from geometry.airfoil_file import parse_dat
@@ -38,27 +39,30 @@ def _database(name: str) -> Airfoil:
 # Caradonna and Tung (1981), NASA TM-81232: hovering two-blade model rotor, NACA 0012, untwisted, R 1.143 m, c 0.1905 m.
 # Faults: thrust comes from integrated pressures at five radii; the root cut-out (0.1667 R here) is not in the table;
 # the collective of 5 deg gives a thrust below that of every momentum-based method (ours: see the note in reports/).
+# Five per cent was asked for.  Half of the rest is the lifting line (six chords of span); see effects/lifting_surface.
+@pytest.mark.parametrize(("more", "bound"), [((), 0.28), ((LiftingSurface(),), 0.14)])
 @pytest.mark.parametrize("collective", [8, 12])
-def test_caradonna_tung_hover(shared_data: Path, collective: int) -> None:
+def test_caradonna_tung_hover(shared_data: Path, collective: int, more: tuple[Effect, ...], bound: float) -> None:
     rows = _table(shared_data / "caradonna_tung" / "caradonna_tung_CT_vs_tipMach.csv")
     rows = rows[rows[:, 0] == collective]
     shape = naca("0012")
     R, x = 1.143, np.array([1 / 6, 0.5, 1.0])
     blade = from_stations(x * R, np.full(3, 0.1905), np.full(3, np.radians(collective)), R, x[0] * R, ((0.75, shape),))
-    prep = solver.prepare(Rotor(blade, 2), [(0.75, section_rule.polar(shape))], mach_max=1.0)
+    prep = solver.prepare(Rotor(blade, 2), [(0.75, section_rule.polar(shape))], (*standard(), *more), mach_max=1.0)
     error = []
     for _, rpm, tip_mach, ct_rotor in rows:
         speed = rpm * np.pi / 30 * R
         air = dataclasses.replace(Air.from_density(1.2), a_sound=speed / tip_mach)
         T = solver.solve(prep, rpm, 0.0, air).T[0]
         error.append(T / (1.2 * np.pi * R**2 * speed**2) / ct_rotor - 1)
-    assert np.max(np.abs(error)) < 0.28
+    assert np.max(np.abs(error)) < bound
 
 
 # T-Motor 28 in, laboratory data in pyBEMT's repository (source of the geometry too: eight stations; NACA 4412, GOE 450
 # and GOE 408 sections). Faults: CT of the table rises by 14 % from 1006 to 3223 rev/min, which no Reynolds dependence
 # of these sections gives, so the slow end is the worst; stations begin at 0.07 m, the file's hub (0.03 m) is kept.
-def test_tmotor_28_static_thrust(shared_data: Path) -> None:
+@pytest.mark.parametrize(("more", "bound"), [((), 0.06), ((LiftingSurface(),), 0.02)])
+def test_tmotor_28_static_thrust(shared_data: Path, more: tuple[Effect, ...], bound: float) -> None:
     rows = np.genfromtxt(shared_data / "tmotor28_tr594" / "tmotor28_data.csv", delimiter=";", skip_header=1)[:, :6]
     r = np.array([0.07112, 0.10668, 0.14224, 0.1778, 0.21336, 0.24892, 0.28448, 0.32004])
     chord = np.array([0.056, 0.07, 0.07, 0.065, 0.058, 0.05, 0.043, 0.034])
@@ -67,9 +71,9 @@ def test_tmotor_28_static_thrust(shared_data: Path) -> None:
     shapes = ((0.2, naca("4412")), (0.3, goe450), (0.7, goe450), (0.8, goe408))
     blade = from_stations(r, chord, beta, 0.3556, 0.03, shapes)
     tables = [(x, section_rule.polar(s)) for x, s in shapes]
-    sol = solver.solve(solver.prepare(Rotor(blade, 2), tables, mach_max=0.6), rows[:, 0], 0.0, Air.from_density())
-    error = sol.T / rows[:, 3] - 1
-    assert abs(np.median(error)) < 0.06
+    prep = solver.prepare(Rotor(blade, 2), tables, (*standard(), *more), mach_max=0.6)
+    error = solver.solve(prep, rows[:, 0], 0.0, Air.from_density()).T / rows[:, 3] - 1
+    assert abs(np.median(error)) < bound
 
 
 def _x22a(folder: Path, beta75: float, J: np.ndarray, exit_ratio: float) -> solver.Solution:
