@@ -11,7 +11,7 @@ import pytest
 
 from bemt import evaluate
 from bemt.case import load_case
-from bemt.diagnose import chain, confusion, figures, figures_effects, fit, record
+from bemt.diagnose import canvas, chain, confusion, figures, figures_effects, fit, record
 from bemt.series import Series
 
 ALL = set(figures.NAMES)
@@ -114,3 +114,25 @@ def test_the_posterior_that_is_drawn_is_the_one_of_the_intervals(named: chain.Di
         middle = np.cumsum(p) - 0.5 * p
         for end, share in (("low", 0.05), ("value", 0.5), ("high", 0.95)):
             assert np.interp(interval[end], x, middle) == pytest.approx(np.clip(share, middle[0], middle[-1]), abs=1e-6)
+
+
+@pytest.mark.parametrize("columns", [1, 2, 3, 4])
+def test_titles_of_panels_do_not_touch(columns: int) -> None:
+    import matplotlib
+
+    name = "StepsTest_2020-06-16_212137_of_the_second_stand.csv, 20000 to 21000 rev/min"
+    with matplotlib.rc_context(canvas.STYLE):
+        figure, axes = canvas.blank(3.0, 1, columns)
+        for axis in axes[0]:
+            axis.set_title(figures._title(name, columns))
+        figure.canvas.draw()
+        boxes = [axis.title.get_window_extent() for axis in axes[0]]
+    assert all(left.x1 < right.x0 for left, right in zip(boxes[:-1], boxes[1:], strict=True))
+    assert boxes[0].x0 >= 0.0 and boxes[-1].x1 <= figure.bbox.x1
+
+
+def test_every_recording_has_a_line_among_those_shown() -> None:
+    """A diagnosed recording of one speed beside a reference of many lines."""
+    assert figures._chosen([0, 1, 1, 1, 1, 1], [2, 4, 4, 4, 4, 4]) == [0, 1, 3, 5]
+    assert figures._chosen([0] * 6, [4] * 6) == [0, 2, 3, 5]
+    assert figures._chosen([0, 1], [1, 1]) == [0, 1]

@@ -693,6 +693,13 @@ def test_tables_sort_up_and_down_with_gaps_last(opened: Browser) -> None:
         assert len(known) == 2 and known == sorted(known, reverse=order < 0)
 
 
+def test_no_column_of_the_front_page_is_cut_off_on_a_desktop(opened: Browser) -> None:
+    opened.open(opened.path)  # type: ignore[attr-defined]
+    opened.run("location.hash = '#front'; 0")
+    box = "document.querySelector('#front table').closest('.scroll')"
+    assert opened.run(f"{box}.scrollWidth - {box}.clientWidth") == 0
+
+
 @pytest.mark.parametrize("width", [1280, 390])
 def test_no_page_is_wider_than_the_window(opened: Browser, width: int) -> None:
     opened.open(opened.path, width)  # type: ignore[attr-defined]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import textwrap
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -110,6 +111,13 @@ def _slim(png: bytes) -> bytes:
     return small
 
 
+def _title(text: str, columns: int) -> str:
+    """Words in lines that fit over one of so many panels."""
+    width = 96 // columns
+    parts = [text] if len(text) <= width else text.rsplit(", ", 1)  # the recording, then what was held
+    return "\n".join("\n".join(textwrap.wrap(part, width, max_lines=2, placeholder=" …")) for part in parts)
+
+
 def _varies(x: Array) -> bool:
     return bool(np.ptp(x) > 0.02 * max(float(np.max(np.abs(x))), 1e-12))
 
@@ -201,7 +209,7 @@ def _map(answer: Diagnosis, x: str, y: str) -> Figure:
             mark = axis.axvspan if answer.where.variable == x else axis.axhspan
             mark(*span, facecolor=ORANGE, alpha=0.25, edgecolor="none", zorder=1)
             mark(*span, facecolor="none", edgecolor=BLACK, linewidth=1.0, linestyle="--", zorder=2)
-        axis.set(title=_heading(answer, c, span is not None), xlabel=_AXIS.get(x, x))
+        axis.set(title=_title(_heading(answer, c, span is not None), len(channels)), xlabel=_AXIS.get(x, x))
         axis.margins(0.09)
     axes[0, 0].set_ylabel(_AXIS.get(y, y))
     figure.colorbar(drawn, ax=axes, label="recording − baseline [% of scale]", extend="both", pad=0.02)
@@ -221,7 +229,7 @@ def _strip(answer: Diagnosis, name: str) -> Figure:
         axis.axhline(0.0, color=GREY, linewidth=0.8)
         u = 100.0 * factor * (problem.u / problem.scale)[here]
         axis.errorbar(x, e, u, fmt="o", color=BLUE, markersize=4, elinewidth=1.0)
-        axis.set(title=_heading(answer, c, span is not None), xlabel=_AXIS.get(name, name))
+        axis.set(title=_title(_heading(answer, c, span is not None), len(channels)), xlabel=_AXIS.get(name, name))
     axes[0, 0].set_ylabel("recording − baseline [% of scale]")
     return figure
 
@@ -229,8 +237,8 @@ def _strip(answer: Diagnosis, name: str) -> Figure:
 # Before and after
 
 
-def _groups(answer: Diagnosis, name: str) -> list[tuple[str, NDArray[np.bool_]]]:
-    """Lines of points to draw over a covariate: what else was held, in words, and which points."""
+def _groups(answer: Diagnosis, name: str) -> list[tuple[str, NDArray[np.bool_], int]]:
+    """Lines of points to draw over a covariate: what else was held, in words, which points, which recording."""
     problem = answer.problem
     X, P = problem.covariates, problem.covariates["rpm"].size
     part = np.concatenate([np.full(len(p.record), i) for i, p in enumerate(problem.parts)])
@@ -245,8 +253,18 @@ def _groups(answer: Diagnosis, name: str) -> list[tuple[str, NDArray[np.bool_]]]
             line[mine] = _lines(X[held][mine])
         for k in np.unique(line[mine]):
             here = mine & (line == k)
-            found.append((", ".join(t for t in (tag, _label(held, X[held][here]) if held else "") if t), here))
+            found.append((", ".join(t for t in (tag, _label(held, X[held][here]) if held else "") if t), here, i))
     return found
+
+
+def _chosen(parts: list[int], sizes: list[int]) -> list[int]:
+    """Lines to show of recordings and positions: long ones evenly picked, and one of each recording that has none."""
+    long = [i for i, size in enumerate(sizes) if size >= 3]
+    own = {p: max((i for i, q in enumerate(parts) if q == p), key=lambda i: sizes[i]) for p in dict.fromkeys(parts)}
+    lone = [i for p, i in own.items() if all(parts[k] != p for k in long)][:_MOST_LINES]
+    room = _MOST_LINES - len(lone)
+    picked = [long[i] for i in np.unique(np.linspace(0, len(long) - 1, room).round().astype(int))] if long else []
+    return sorted({*picked, *lone})
 
 
 def _label(name: str, x: Array) -> str:
@@ -270,9 +288,8 @@ def _coefficients(answer: Diagnosis) -> Array:
 def _before_after(answer: Diagnosis) -> Figure:
     problem, channels, name = answer.problem, _channels(answer), _across(answer)
     groups = _groups(answer, name)
-    long = [g for g in groups if np.unique(problem.covariates[name][g[1]].round(12)).size >= 3] or groups
-    chosen = np.unique(np.linspace(0, len(long) - 1, _MOST_LINES).round().astype(int))
-    shown = [long[i] for i in chosen]
+    sizes = [np.unique(problem.covariates[name][here].round(12)).size for _, here, _ in groups]
+    shown = [groups[i][:2] for i in _chosen([part for _, _, part in groups], sizes)]
     figure, axes = blank(0.9 + 2.2 * len(channels), len(channels), len(shown), sharex=True, sharey="row")
     unit, factor = _coefficients(answer), answer.found.states[0].hyper.scale
     what = " + ".join(answer.best.ids) or "calibration only"
@@ -292,7 +309,8 @@ def _before_after(answer: Diagnosis) -> Figure:
                 single = "_" if curve[0].size == 1 else ""
                 axis.plot(*curve, style, color=colour, label=words, zorder=3, marker=single, markersize=14)
             if c == channels[0]:
-                axis.set_title(label)
+                axis.set_title(_title(label, len(shown)))
+                axis.margins(x=0.08)
             if c == channels[-1]:
                 axis.set_xlabel(_AXIS.get(name, name))
                 if len(shown) > 2:

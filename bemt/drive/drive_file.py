@@ -19,7 +19,8 @@
     resistance_mohm = 5.0
     idle_A = 0.05
     current_limit_A = 95
-    braking = "yes"
+    braking = "yes"                 # complementary switching; "no": diodes
+    # pwm_kHz: switching frequency; with motor.inductance_uH it says when a current through diodes stops
 
     [motor]
     name = "HET 700-68-1400"
@@ -30,6 +31,7 @@
     heat_capacity_J_K = 60.0        # these two or none: without them the motor stays cold
     thermal_K_W = 1.5
     max_temperature_C = 120
+    # inductance_uH (between lines) and pole_pairs: reactance of the winding
 
     [rotor]
     inertia_kg_mm2 = 8.0
@@ -80,6 +82,7 @@ TABLES: dict[str, dict[str, Key]] = {
         "resistance_mohm": Key(unit="mohm", low=0.0, high=1000.0, suspect=_slip_mohm),
         "idle_A": Key(unit="A", low=0.0, high=5.0), "current_limit_A": Key(unit="A", low=0.1, high=1000.0),
         "braking": Key("choice", choices=("yes", "no")), "name": Key("text"),
+        "pwm_kHz": Key(unit="kHz", low=0.1, high=1000.0),
     },
     "motor": {
         "name": Key("text"), "kv_rpm_V": Key(unit="rev/min/V", low=1.0, high=50000.0, required=True),
@@ -89,6 +92,7 @@ TABLES: dict[str, dict[str, Key]] = {
         "heat_capacity_J_K": Key(unit="J/K", low=0.01, high=1e6),
         "thermal_K_W": Key(unit="K/W", low=0.001, high=1000.0),
         "ambient_C": Key(unit="C", low=-60.0, high=60.0), "max_temperature_C": Key(unit="C", low=20.0, high=400.0),
+        "inductance_uH": Key(unit="uH", low=0.01, high=1e5), "pole_pairs": Key("integer", low=1, high=200),
     },
     "rotor": {"inertia_kg_mm2": Key(unit="kg mm2", low=0.0, high=1e7, required=True)},
     "vehicle": {
@@ -207,10 +211,12 @@ def read(path: Path) -> DriveFile:
         e.get("pulse_min_us", 1000.0), e.get("pulse_max_us", 2000.0), e.get("exponent", 1.0),
         e.get("resistance_mohm", 0.0) * 1e-3, e.get("idle_A", 0.0), e.get("current_limit_A", math.inf),
         e.get("braking", "yes") == "yes",
+        2e-3 * m["inductance_uH"] * e["pwm_kHz"] if "inductance_uH" in m and "pwm_kHz" in e else math.inf,
     )  # fmt: skip
     motor = Motor(
         m["kv_rpm_V"], m["resistance_mohm"] * 1e-3, m["no_load_A"], m["inertia_kg_mm2"] * 1e-6,
         m.get("heat_capacity_J_K", math.inf), m.get("thermal_K_W", 0.0), m.get("ambient_C", 25.0),
+        m["pole_pairs"] * m["inductance_uH"] * 1e-6 if "pole_pairs" in m else 0.0,
     )  # fmt: skip
     return DriveFile(
         path, battery, esc, motor, doc["rotor"]["inertia_kg_mm2"] * 1e-6, b.get("soc", 1.0), b.get("soc_min", 0.2),
@@ -231,6 +237,9 @@ def _consistent(doc: Mapping[str, Any], out: Collector) -> None:
             out.add("battery.soc_table", "lists that do not fit", "rising values, as many as ocv_cell_V, 2 or more")
     if ("heat_capacity_J_K" in m) != ("thermal_K_W" in m):
         out.add("motor.thermal_K_W", "one of heat_capacity_J_K, thermal_K_W", "both or none")
+    for key, has in (("esc.pwm_kHz", "pwm_kHz" in e), ("motor.pole_pairs", "pole_pairs" in m)):
+        if has and "inductance_uH" not in m:
+            out.add("motor.inductance_uH", "nothing", f"a value, as {key} is given")
     if b.get("soc_min", 0.2) >= b.get("soc", 1.0):
         out.add("battery.soc_min", f"{b.get('soc_min', 0.2):g}", "less than soc")
     if doc["rotor"]["inertia_kg_mm2"] + m["inertia_kg_mm2"] <= 0.0:

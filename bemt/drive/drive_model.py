@@ -2,16 +2,29 @@ r"""Battery, ESC, motor and rotor: what a pulse width gives, steady.
 
 The motor is a direct-current machine at the duty d of the ESC, k = 60/(2 pi K_v):
 
-    I = (d V_b - k Omega) / (R_m + R_e),   V_b = V_oc(SoC) - R_b (d I + I_e),   k (I - I_0) = Q(Omega)
+    I = (d V_b - k Omega) / (R + X^2/R),   V_b = V_oc(SoC) - R_b (d I + I_e),   k (I - I_0) = Q(Omega)
 
-with the ESC's own current I_e and the copper's R_m and the magnets' k at the winding's temperature (coefficients of
-`bemt.effects.motor_heating`, so that model and diagnosis agree). Above the current limit the ESC lowers d.
+R = R_m + R_e, with the ESC's own current I_e and the copper's R_m and the magnets' k at the winding's temperature
+(coefficients of `bemt.effects.motor_heating`, so that model and diagnosis agree). X = p L Omega is the reactance of the
+winding, which turns the current away from the EMF: at d = 0 this is the brake of a motor with shorted terminals,
+strongest at X = R and softer above. Above the current limit the ESC lowers d.
+
+An ESC with diodes in place of complementary switching carries no current against the motor. Where the ripple of the
+switching, of Z = 2 L f, is larger than the current, the current stops within each period: it flows for the share u of
+it, and the motor runs faster than d says,
+
+    k Omega = (d V_b - R I) / u,   u = d + I Z / (d V_b) < 1,   battery current d I / u
+
+until u reaches 1. With V_b from the battery, u is the root of a linear equation.
 
 References
 ----------
 M. Drela, "First-order DC electric motor model", MIT, 2007 (motor equations; not checked). O. Tremblay, L.-A. Dessaint,
 "Experimental validation of a battery dynamic model for EV applications", World Electric Vehicle J. 3 (2009) 289-298,
-doi:10.3390/wevj3020289 (battery as source and resistance; not checked).
+doi:10.3390/wevj3020289 (battery as source and resistance; not checked). R. W. Erickson, D. Maksimovic, "Fundamentals of
+Power Electronics", 2001, ch. 5 (buck converter whose current stops, here with the EMF as load and with resistance; not
+checked). P. Pillay, R. Krishnan, "Modeling, simulation, and analysis of permanent-magnet motor drives, part I", IEEE
+Trans. Ind. Appl. 25 (1989) 265-273, doi:10.1109/28.25541 (dq equations, here steady with v_d = 0; not checked).
 """
 
 from __future__ import annotations
@@ -92,6 +105,8 @@ class Esc:
         Battery current above which it lowers the duty, and motor current to which it limits braking. [A]
     braking : bool
         Whether it can slow the rotor (complementary switching); else the current never goes below 0.
+    ripple_ohm : float
+        Z = 2 L f: winding between lines, switching frequency; without braking it says when the current stops. [ohm]
     """
 
     pulse_min_us: float = 1000.0
@@ -101,6 +116,7 @@ class Esc:
     idle_A: float = 0.0
     current_limit_A: float = math.inf
     braking: bool = True
+    ripple_ohm: float = math.inf
 
     def duty(self, pulse_us: ArrayLike) -> Array:
         """Duty of a pulse width.
@@ -137,6 +153,8 @@ class Motor:
         Of the winding [J/K]; to the air [K/W].
     ambient_C : float
         Temperature of the air. [C]
+    reactance_ohm_s : float
+        p L: pole pairs and inductance between lines; reactance over speed. [ohm s/rad]
     """
 
     kv_rpm_V: float
@@ -146,6 +164,7 @@ class Motor:
     heat_capacity_J_K: float = math.inf
     thermal_K_W: float = 0.0
     ambient_C: float = REFERENCE_C
+    reactance_ohm_s: float = 0.0
 
     def k(self, temperature_C: ArrayLike = REFERENCE_C) -> Array:
         """EMF per speed and torque per current.
@@ -281,26 +300,42 @@ class Drive:
         motor_A, battery_A, duty : (N,) float
             Currents [A] and duty in effect [1].
         """
-        k, rb = self.motor.k(temperature_C), self.battery_ohm
+        emf, rb = self.motor.k(temperature_C) * omega, self.battery_ohm
         rt = self.motor.resistance(temperature_C) + self.esc.resistance_ohm
+        if self.motor.reactance_ohm_s > 0.0:
+            rt = rt + (self.motor.reactance_ohm_s * omega) ** 2 / rt
+        rest = voc - rb * self.esc.idle_A
 
-        def at(d: Array) -> Array:
-            amps = (d * (voc - rb * self.esc.idle_A) - k * omega) / (rt + d * d * rb)
-            return np.maximum(amps, -self.esc.current_limit_A if self.esc.braking else 0.0)
+        def at(d: Array) -> tuple[Array, Array]:
+            amps = (d * rest - emf) / (rt + d * d * rb)
+            if self.esc.braking:
+                amps = np.maximum(amps, -self.esc.current_limit_A)
+                return amps, d * amps
+            amps = np.maximum(amps, 0.0)
+            if math.isinf(self.esc.ripple_ohm):
+                return amps, d * amps
+            z = self.esc.ripple_ohm
+            fall = (emf * rb * d * d + rest * d * rt) / z
+            with np.errstate(divide="ignore", invalid="ignore"):
+                u = np.where(emf > 0.0, (rest + fall) * d / (emf + fall), 1.0)
+                more = np.maximum(u - d, 0.0)  # 0 where the EMF is above the battery
+                pulses = d * rest / (1.0 + rb * d * d * more / (z * u)) * more / z
+                stops = (u < 1.0) & (d > 0.0)
+                return np.where(stops, pulses, amps), np.where(stops, d * pulses / u, d * amps)
 
-        amps = at(duty)
+        amps, bus = at(duty)
         room = self.esc.current_limit_A - self.esc.idle_A
-        over = duty * amps > room
+        over = bus > room
         if np.any(over):
-            # the duty at which d I meets the limit: I(d) d rises with d while I > 0
+            # the duty at which the battery's current meets the limit: it rises with duty while I > 0
             lo, hi = np.zeros_like(duty), duty.copy()
             for _ in range(50):
                 mid = 0.5 * (lo + hi)
-                high = mid * at(mid) > room
+                high = at(mid)[1] > room
                 lo, hi = np.where(high, lo, mid), np.where(high, mid, hi)
             duty = np.where(over, lo, duty)
-            amps = at(duty)
-        return amps, duty * amps + self.esc.idle_A, duty
+            amps, bus = at(duty)
+        return amps, bus + self.esc.idle_A, duty
 
     def steady(self, pulse_us: ArrayLike, soc: ArrayLike = 1.0, temperature_C: ArrayLike | None = None) -> Steady:
         """Solve for the speed at which motor and rotor agree.

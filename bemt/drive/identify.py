@@ -1,9 +1,10 @@
 """What a data sheet does not give, from recordings: ESC law, resistances, rotor constants, inertia.
 
 A thrust map gives rotor constants (thrust and torque over speed squared), battery (voltage over current) and, by least
-squares of thrust, speed and current over pulse width, the ESC's pulse of no thrust, the exponent of its throttle curve
-and the resistance of motor and ESC together; with them K_v and I_0 when no data sheet states them. A log of a step
-gives the inertia. Everything stated stays as stated.
+squares of thrust, speed and current over pulse width, the ESC's pulses of no thrust and of full duty, the resistance of
+motor and ESC together and, where the current of an ESC with diodes stops within its periods, the ripple; with them K_v
+and I_0 when no data sheet states them. The duty is linear between the two pulses unless an exponent is stated. What is
+stated stays. A log of a step gives the inertia.
 """
 
 from __future__ import annotations
@@ -20,13 +21,11 @@ from bemt.drive.drive_model import Battery, Drive, Esc, Motor
 from bemt.drive.map_points import MapPoints
 from bemt.drive.rotor_table import RotorTable, quadratic
 from bemt.errors import Fault, InputError
-from bemt.reduction import plateaus
 
 __all__ = [
     "FREE",
     "MapFit",
     "battery_of",
-    "find_steps",
     "fit_inertia",
     "fit_map",
     "no_load",
@@ -36,7 +35,8 @@ __all__ = [
 
 Array = NDArray[np.float64]
 FREE: dict[str, tuple[float, float, float]] = {
-    "pulse_min_us": (1030.0, 800.0, 1250.0), "exponent": (1.0, 0.4, 2.5), "resistance_ohm": (0.1, 1e-3, 2.0),
+    "pulse_min_us": (1030.0, 800.0, 1250.0), "pulse_max_us": (1960.0, 1700.0, 2050.0),
+    "resistance_ohm": (0.1, 1e-3, 2.0), "ripple_ohm": (0.3, 1e-2, 1e3),
     "kv_rpm_V": (1000.0, 50.0, 20000.0), "no_load_A": (0.3, 0.0, 10.0), "kQ": (1e-7, 1e-12, 1e-2),
 }  # fmt: skip
 """What can be fitted: start and bounds, in the unit of the name; kQ in N m s2/rad2."""
@@ -100,7 +100,7 @@ def fit_map(
         Steady points of one battery: thrust, rpm, current; voltage where recorded, else ``voltage_V`` in `known`.
     known : mapping of str to float, optional
         What a data sheet states, by the names of `FREE` (kv_rpm_V, no_load_A, resistance_ohm ...); the rest is fitted.
-        pulse_max_us is 2000 us unless given.
+        exponent is 1 unless given; a ripple_ohm of infinity says complementary switching.
     torque_Nm : array_like or None
         Torque of the points; None: kQ is fitted with the current. [N m]
     diameter_m : float
@@ -142,24 +142,35 @@ def fit_map(
         start["kQ"] = k * full["current"] / (full["rpm"] * math.pi / 30.0) ** 2
 
     def built(theta: Mapping[str, float]) -> Drive:
-        every = {**known, **theta}
-        esc = Esc(every["pulse_min_us"], every.get("pulse_max_us", 2000.0), every["exponent"])
+        every = {"exponent": 1.0, **known, **theta}
+        ripple = every.get("ripple_ohm", math.inf)
+        esc = Esc(every["pulse_min_us"], every["pulse_max_us"], every["exponent"], braking=math.isinf(ripple),
+                  ripple_ohm=ripple)  # fmt: skip
         motor = Motor(every["kv_rpm_V"], every["resistance_ohm"], every["no_load_A"])
         return Drive(Battery(1, rb, ocv_V=(voc, voc), soc_table=(0.0, 1.0)), esc, motor,
                      quadratic(kT, every["kQ"], diameter_m))  # fmt: skip
 
-    low = np.array([math.log(FREE[n][1] + 1e-9) for n in free])
-    high = np.array([math.log(FREE[n][2]) for n in free])
+    def fitted_to(names: list[str], begin: Mapping[str, float]) -> tuple[float, dict[str, float]]:
+        low = np.array([math.log(FREE[n][1] + 1e-9) for n in names])
+        high = np.array([math.log(FREE[n][2]) for n in names])
 
-    def misfit(x: Array) -> Array:
-        got = built(dict(zip(free, map(float, np.exp(x)), strict=True))).steady(points.pulse_us)
-        parts = [(got.thrust_N - v["thrust"]) / full["thrust"], (got.rpm - v["rpm"]) / full["rpm"],
-                 0.5 * (got.battery_A - v["current"]) / full["current"]]  # fmt: skip
-        return np.nan_to_num(np.concatenate(parts))
+        def misfit(x: Array) -> Array:
+            got = built(dict(zip(names, map(float, np.exp(x)), strict=True))).steady(points.pulse_us)
+            parts = [(got.thrust_N - v["thrust"]) / full["thrust"], (got.rpm - v["rpm"]) / full["rpm"],
+                     0.5 * (got.battery_A - v["current"]) / full["current"]]  # fmt: skip
+            return np.nan_to_num(np.concatenate(parts))
 
-    x0 = np.clip([math.log(start[n] + 1e-9) for n in free], low + 1e-6, high - 1e-6)
-    found = least_squares(misfit, x0, bounds=(low, high), loss="soft_l1", f_scale=0.03, x_scale=0.1, diff_step=1e-4)
-    fitted = dict(zip(free, map(float, np.exp(found.x)), strict=True))
+        x0 = np.clip([math.log(begin[n] + 1e-9) for n in names], low + 1e-6, high - 1e-6)
+        found = least_squares(misfit, x0, bounds=(low, high), loss="soft_l1", f_scale=0.03, x_scale=0.1, diff_step=1e-4)
+        return float(found.cost), dict(zip(names, map(float, np.exp(found.x)), strict=True))
+
+    cost, fitted = fitted_to([n for n in free if n != "ripple_ohm"], start)
+    if "ripple_ohm" in free:  # is the current seen to stop? One constant more has to earn its place (Schwarz 1978)
+        size = 3 * len(points.pulse_us)
+        tries = [fitted_to(free, {**start, **at, "ripple_ohm": z}) for z in (0.3, 3.0) for at in ({}, fitted)]
+        less, better = min(tries, key=lambda one: one[0])
+        if size * math.log(max(less, 1e-12) / max(cost, 1e-12)) < -math.log(size):
+            fitted = better
     return MapFit(built(fitted), fitted | {"battery_ohm": rb, "voltage_at_rest_V": voc}, kT,
                   {**known, **fitted}["kQ"], full["thrust"])  # fmt: skip
 
@@ -291,29 +302,3 @@ def step_constant(
     got = transient.simulate(replace(drive, motor=motor, rotor=rotor),
                              [(0.0, before_us), (step_s - float(times_s[0]), after_us)], float(t[-1]), t)  # fmt: skip
     return transient.first_order(t, got.thrust_N).tau_s
-
-
-def find_steps(time_s: ArrayLike, thrust_N: ArrayLike, least: float = 0.1) -> list[tuple[Array, Array]]:
-    """Cut the steps out of a log of thrust.
-
-    Parameters
-    ----------
-    time_s, thrust_N : array_like
-        The log: time [s] and thrust [N].
-    least : float
-        Smallest step, over the range of the log. [1]
-
-    Returns
-    -------
-    list of (time_s, thrust_N)
-        Each from 0.4 s before a step to 0.5 s after it has settled, less where the next step comes first.
-    """
-    t, y = np.asarray(time_s, dtype=float), np.asarray(thrust_N, dtype=float)
-    found = plateaus.find(t, {"thrust_N": y}, "thrust_N", settings=plateaus.Settings(least_step=0.05)).plateaus
-    span = float(np.nanmax(y) - np.nanmin(y))
-    out = []
-    for p, q in zip(found[:-1], found[1:], strict=True):
-        if abs(q.mean["thrust_N"] - p.mean["thrust_N"]) >= least * span and q.t0 - p.t1 < 1.0:
-            rows = (t >= max(p.t0, p.t1 - 0.4)) & (t <= min(q.t1, q.t0 + 0.5)) & np.isfinite(y)
-            out.append((t[rows], y[rows]))
-    return out

@@ -117,7 +117,8 @@ def curves(panels: Sequence[Mapping[str, Any]], title: str = "") -> bytes:
     Parameters
     ----------
     panels : sequence of mapping
-        Each with ``x`` and ``y`` (labels with units) and ``series``: (label, x, y, style) with a style of matplotlib.
+        Each with ``x`` and ``y`` (labels with units) and ``series``: (label, x, y, style) with a style of matplotlib;
+        ``title`` where one is wanted.
     title : str
         Above all.
 
@@ -132,6 +133,7 @@ def curves(panels: Sequence[Mapping[str, Any]], title: str = "") -> bytes:
             ax.plot(x, y, style, color=COLOURS[k % len(COLOURS)], ms=4, mfc="none", label=label)
         ax.set_xlabel(panel["x"])
         ax.set_ylabel(panel["y"])
+        ax.set_title(panel.get("title", ""), fontsize=10)
         if any(label for label, *_ in panel["series"]):
             ax.legend(frameon=False, fontsize=8)
     figure.suptitle(title)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from bemt import importers
 from bemt.drive import identify, map_points, picture, validation
+from bemt.drive.drive_model import Drive
 from bemt.drive.map_points import MapPoints
 from bemt.errors import EXIT_OK, Fault, InputError
 from bemt.tables import json_text, number_text, text_table, write_atomic
@@ -25,8 +26,17 @@ __all__ = ["maps", "run", "steps"]
 
 Array = NDArray[np.float64]
 KGF = 9.80665
-OWN = "battery, R, pulse of no thrust and throttle exponent; K_v and I0 of its run without propeller"
-ALL = "battery, R, K_v, I0, pulse of no thrust and throttle exponent: no data sheet known"
+VOLTS = 15.82
+"""Of the battery of ``thrust_step``, stated by its publisher. [V]"""
+COMMANDS = {
+    "0500_thrust_response": ((100, 1.0), (500, 1.5)),
+    "increasing_thrust_response": ((600, 1.0), *((order, 1.0) for order in range(100, 2001, 100))),
+}
+"""DShot commands of the publisher's firmware and how long each holds [s]; 48, no throttle, before and after."""
+ESC = "battery, R, ripple, pulses of no thrust and full duty"
+OWN = f"{ESC}; K_v and I0 of its run without propeller"
+ALL = f"{ESC}, K_v and I0: no data sheet known"
+MIT = f"{ESC} and I0; K_v 775 by its motor's name, 12 V assumed, no voltage recorded"
 
 
 def _read(path: Path, sign: int = 1) -> tuple[MapPoints, Array | None]:
@@ -71,6 +81,11 @@ def maps(folder: Path) -> list[validation.MapCheck]:
             points, torque = _read(path)
             fit = identify.fit_map(points, {"kv_rpm_V": kv, "no_load_A": i0}, torque)
             out.append(validation.check_map(f"jmajew {path.stem[14:]}", OWN, fit.drive, points, fit.fitted))
+    for path in sorted((folder / "jmajew").glob("grp01__*_table1.csv")):
+        if "mn2206" not in path.name and "noprop" not in path.name:
+            points, torque = _read(path)
+            fit = identify.fit_map(points, None, torque)
+            out.append(validation.check_map(f"jmajew {path.stem[7:]}", ALL, fit.drive, points, fit.fitted))
     steps_file = folder / "thrust_map" / "xNova-SR-steps.csv"
     if steps_file.is_file():
         points, _ = _read(steps_file, -1)
@@ -84,14 +99,22 @@ def maps(folder: Path) -> list[validation.MapCheck]:
         path = folder / "mit_copter_rcbenchmark" / "resources" / "measurement" / f"motor_{size}inch_prop.txt"
         if path.is_file():
             points, torque = _mit(path)
-            fit = identify.fit_map(points, {"voltage_V": 12.0}, torque)
-            words = f"{ALL}; 12 V assumed, no voltage recorded"
-            out.append(validation.check_map(f"MIT {size} in", words, fit.drive, points, fit.fitted))
+            fit = identify.fit_map(points, {"voltage_V": 12.0, "kv_rpm_V": 775.0}, torque)
+            out.append(validation.check_map(f"MIT {size} in", MIT, fit.drive, points, fit.fitted))
+    for path in sorted((folder / "rcbenchmark").glob("a*_*.csv")) + sorted((folder / "rcbenchmark").glob("Steps*.csv")):
+        try:
+            points, torque = _read(path)
+            fit = identify.fit_map(points, None, torque)
+        except InputError:  # too few steady points, or no speed
+            continue
+        thrust = points.values["thrust"]
+        if np.corrcoef(points.pulse_us, thrust)[0, 1] > 0.9:  # else no propeller, or the run broke off
+            out.append(validation.check_map(f"rcbenchmark {path.stem}", ALL, fit.drive, points, fit.fitted))
     return out
 
 
-def steps(folder: Path) -> tuple[list[validation.StepCheck], float]:
-    """Fit the inertia to one step of the logs of ``thrust_step`` and predict the others.
+def steps(folder: Path) -> tuple[list[validation.StepCheck], Drive]:
+    """Compare the steps of the logs of ``thrust_step``.
 
     Parameters
     ----------
@@ -102,19 +125,29 @@ def steps(folder: Path) -> tuple[list[validation.StepCheck], float]:
     -------
     list of StepCheck
         All steps.
-    float
-        Inertia fitted. [kg m2]
+    Drive
+        The drive that was fitted to them.
     """
-    logs = {}
-    for name in ("0500_thrust_response", "increasing_thrust_response"):
+    found, levels = [], (np.array([]), np.array([]))
+    for name, orders in COMMANDS.items():
         t, scale = (
             np.asarray(v.values) for v in importers.read(folder / "thrust_step" / f"{name}.csv").channels.values()
         )
         thrust = (np.median(scale[:50]) - scale) * KGF  # the scale carries the motor, thrust lifts it [kgf]
-        logs[name] = identify.find_steps(t, thrust)
-    full = max(float(np.max(y)) for parts in logs.values() for _, y in parts)
-    drive = validation.step_drive(15.82, 1.05 * full)  # battery voltage stated by the log's publisher
-    return validation.check_steps(drive, logs, ("0500_thrust_response", 0))
+        hold = np.array([seconds for _, seconds in orders])
+        pulse = 1000.0 + (np.array([48, *(order for order, _ in orders), 48]) - 48.0) / 1.999  # DShot has 48 to 2047
+        last = float(np.mean(thrust[(t > t[np.argmax(thrust)]) & (t < t[np.argmax(thrust)] + 0.2)]))
+        end = float(t[np.flatnonzero(thrust > 0.5 * last)[-1]])
+        starts = end - np.concatenate([np.cumsum(hold[::-1])[::-1], [0.0]])
+        size = np.array([np.median(thrust[(t > a + 0.4 * h) & (t < a + 0.95 * h)])
+                         for a, h in zip(starts, [*hold, 1.0], strict=True)])  # fmt: skip
+        if len(orders) > 10:
+            levels = (pulse[2:-1], size[1:-1])
+        for i, change in enumerate(np.diff(np.concatenate([[0.0], size]))):
+            if abs(change) >= 0.1 * np.max(size):
+                rows = (t >= starts[i] - 0.4) & (t <= starts[i] + 0.8)
+                found.append(validation.Step(name, (float(pulse[i]), float(pulse[i + 1])), t[rows], thrust[rows]))
+    return validation.check_steps(VOLTS, levels, found)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -137,37 +170,41 @@ def run(args: argparse.Namespace) -> int:
     """
     folder = Path(args.validate)
     found = maps(folder)
-    checks, inertia = steps(folder) if (folder / "thrust_step").is_dir() else ([], float("nan"))
+    checks, drive = steps(folder) if (folder / "thrust_step").is_dir() else ([], None)
     if not found and not checks:
         raise InputError(Fault(folder.as_posix(), "", "no recordings", "folders jmajew, thrust_map, thrust_step"))
     document: dict[str, Any] = {
         "schema": "bemt.drive.validation/1",
         "maps": [{k: v for k, v in vars(m).items()} for m in found],
-        "steps": [{**dataclasses.asdict(s), "ratio": s.ratio} for s in checks], "inertia_kg_m2": inertia,
+        "steps": [{**dataclasses.asdict(s), "ratio": s.ratio} for s in checks],
+        "inertia_kg_m2": drive.motor.inertia_kg_m2 if drive else None,
+        "reactance_ohm_s": drive.motor.reactance_ohm_s if drive else None,
     }  # fmt: skip
     rows = [[m.name, f"{100 * m.worst:.1f}", f"{100 * m.rms:.1f}", m.how] for m in found]
     lines = [text_table(["thrust over pulse width", "worst [%FS]", "rms [%FS]", "fitted"], rows, left=(0, 3))]
     rows = [[f"{s.log} at {s.at_s:.2f} s", f"{s.before_N:.2f} to {s.after_N:.2f}",
              f"{1e3 * s.tau_s:.1f} ± {1e3 * s.u_tau_s:.1f}" if s.resolved else "-",
-             number_text(1e3 * s.model_s, 3), number_text(s.ratio, 3), s.how] for s in checks]  # fmt: skip
-    head = ["step", "thrust [N]", "tau recorded [ms]", "model [ms]", "ratio", ""]
+             number_text(1e3 * s.model_s, 3), number_text(s.ratio, 3)] for s in checks]  # fmt: skip
+    head = ["step", "thrust [N]", "tau recorded [ms]", "model [ms]", "ratio"]
     if checks:
-        lines += ["", text_table(head, rows, left=(0, 5)), f"samples every {1e3 * checks[0].sample_s:.0f} ms"]
+        lines += ["", text_table(head, rows, left=(0,)), f"samples every {1e3 * checks[0].sample_s:.0f} ms"]
     text = "\n".join(lines) + "\n"
     if args.out:
         out = Path(args.out)
         write_atomic(out / "validation.json", json_text(document))
         write_atomic(out / "validation.txt", text)
-        shown = [m for m in found if not m.name.startswith("MIT 1") or m.name.endswith("14 in")][:5]
+        wanted = ("jmajew gemfan", "jmajew hqprop6x4x3", "xNova ramp", "MIT 10", "MIT 14")
+        shown = [m for name in wanted for m in found if m.name.startswith(name)]
         panels = [
             {
+                "title": m.name,
                 "x": "pulse width [µs]",
                 "y": "thrust [N]",
                 "series": [("model", *_sorted(m.pulse_us, m.model_N), "-"), ("recorded", m.pulse_us, m.thrust_N, "o")],
             }
             for m in shown
         ]
-        write_atomic(out / "maps.png", picture.curves(panels, "; ".join(m.name for m in shown)))
+        write_atomic(out / "maps.png", picture.curves(panels))
     print(json_text(document) if args.json else text, end="")
     return EXIT_OK
 

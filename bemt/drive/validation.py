@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +13,7 @@ from bemt.drive.drive_model import Battery, Drive, Esc, Motor
 from bemt.drive.map_points import MapPoints
 from bemt.drive.rotor_table import quadratic
 
-__all__ = ["MapCheck", "StepCheck", "check_map", "check_steps", "other_battery", "step_drive"]
+__all__ = ["MapCheck", "Step", "StepCheck", "check_map", "check_steps", "other_battery", "step_drive"]
 
 Array = NDArray[np.float64]
 
@@ -89,14 +89,36 @@ def other_battery(drive: Drive, points: MapPoints) -> Drive:
     return replace(drive, battery=Battery(1, rb, soc_table=(0.0, 1.0), ocv_V=(voc, voc)))
 
 
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One step of a log.
+
+    Parameters
+    ----------
+    log : str
+        Which log.
+    pulse_us : (float, float)
+        Commands before and after. [us]
+    time_s, thrust_N : (N,) float
+        Samples from before the step until it has settled: time [s], thrust [N].
+    """
+
+    log: str
+    pulse_us: tuple[float, float]
+    time_s: Array
+    thrust_N: Array
+
+
 @dataclass(frozen=True)
 class StepCheck:
     """One step of a log, model beside recording.
 
     Attributes
     ----------
-    log, how : str
-        Which log; fitted or predicted.
+    log : str
+        Which log.
+    from_us, to_us : float
+        Commands. [us]
     at_s, before_N, after_N : float
         Time of the step [s], levels [N].
     tau_s, u_tau_s, model_s : float
@@ -106,7 +128,8 @@ class StepCheck:
     """
 
     log: str
-    how: str
+    from_us: float
+    to_us: float
     at_s: float
     before_N: float
     after_N: float
@@ -127,78 +150,99 @@ class StepCheck:
 
 
 def step_drive(
-    voltage_V: float, full_thrust_N: float, diameter_m: float = 0.127, tip_m_s: float = 170.0, loaded: float = 0.8,
-    drop: float = 0.15,
+    voltage_V: float, full_thrust_N: float, drop: float, skew: float, inertia_kg_m2: float = 0.0,
+    diameter_m: float = 0.127, tip_m_s: float = 170.0,
 ) -> Drive:  # fmt: skip
-    """Drive of a log that states neither motor nor propeller: an ordinary one of that thrust, its inertia unknown.
+    """Drive of logs that state neither motor nor propeller, by what their thrust over duty says of it.
 
     Parameters
     ----------
     voltage_V : float
         Of the battery. [V]
     full_thrust_N : float
-        Greatest thrust of the log. [N]
+        Thrust at full duty. [N]
+    drop : float
+        Share of the voltage that the resistance takes at full duty. [1]
+    skew : float
+        X/R of the winding at full duty. [1]
+    inertia_kg_m2 : float
+        Of motor and rotor. [kg m2]
     diameter_m, tip_m_s : float
-        Assumed: diameter [m] and tip speed at full thrust [m/s].
-    loaded, drop : float
-        Assumed: speed at full thrust over that at no load, and the share of the voltage that the resistance takes. [1]
+        Assumed: diameter [m] and tip speed at full thrust [m/s]. With Q/(T D) = 0.1 they set units, which the inertia
+        takes up, and the small lag of the inflow.
 
     Returns
     -------
     Drive
-        With Q/(T D) = 0.1. The inertia that is fitted afterwards takes up most of what is assumed here.
+        Linear duty, complementary switching, no friction.
     """
     omega = tip_m_s / (0.5 * diameter_m)
     kT = full_thrust_N / omega**2
     kQ = 0.1 * diameter_m * kT
-    kv = omega * 30.0 / np.pi / (loaded * voltage_V)
-    k = 30.0 / (np.pi * kv)
-    motor = Motor(float(kv), drop * voltage_V / float(kQ * omega**2 / k), 0.5)
-    return Drive(Battery(1, 0.02, soc_table=(0.0, 1.0), ocv_V=(voltage_V, voltage_V)), Esc(), motor,
+    k = voltage_V * (1.0 - drop * (1.0 + skew**2)) / omega
+    ohm = drop * voltage_V * k / (kQ * omega**2)
+    motor = Motor(30.0 / (np.pi * k), ohm, 0.0, inertia_kg_m2, reactance_ohm_s=skew * ohm / omega)
+    return Drive(Battery(1, 0.0, soc_table=(0.0, 1.0), ocv_V=(voltage_V, voltage_V)), Esc(), motor,
                  quadratic(kT, kQ, diameter_m, solidity=0.1))  # fmt: skip
 
 
 def check_steps(
-    drive: Drive, logs: Mapping[str, list[tuple[Array, Array]]], fit_to: tuple[str, int]
-) -> tuple[list[StepCheck], float]:
-    """Fit the inertia to one step and predict all others.
+    voltage_V: float, levels: tuple[Array, Array], steps: Sequence[Step], u_level: float = 0.02,
+    u_tau: float = 0.1,
+) -> tuple[list[StepCheck], Drive]:  # fmt: skip
+    """Fit drop, reactance and inertia to levels and steps of logs, and compare the time constants.
 
     Parameters
     ----------
-    drive : Drive
-        The drive.
-    logs : mapping of str to list of (time_s, thrust_N)
-        Steps of each log, from `bemt.drive.identify.find_steps`.
-    fit_to : (str, int)
-        Log and number of the step that the inertia is fitted to.
+    voltage_V : float
+        Of the battery. [V]
+    levels : (pulse_us, thrust_N)
+        Steady levels of a log. [us], [N]
+    steps : sequence of Step
+        Of all logs.
+    u_level : float
+        Uncertainty of a level as duty: the battery's sag during the log was not recorded. [1]
+    u_tau : float
+        Least relative uncertainty of a time constant: like falls of these logs differ by more than their scatter. [1]
 
     Returns
     -------
     list of StepCheck
         All steps.
-    float
-        The inertia. [kg m2]
+    Drive
+        The drive, with its inertia.
     """
+    from scipy.optimize import least_squares
 
-    def ends(y: Array) -> tuple[float, float]:
-        k = max(3, len(y) // 8)
-        low = 1e-3 * float(np.max(np.abs(y)))
-        before, after = (drive.pulse_for(max(float(np.median(part)), low)) for part in (y[:k], y[-k:]))
-        return before, after
+    seen = [transient.first_order(s.time_s, s.thrust_N) for s in steps]
+    held = [i for i, got in enumerate(seen) if got.u_tau_s < 0.3 * got.tau_s]
+    pulse, thrust = levels
 
-    t, y = logs[fit_to[0]][fit_to[1]]
-    inertia, _ = identify.fit_inertia(drive, t, y, *ends(y))
-    out = []
-    for name, steps in logs.items():
-        for i, (t, y) in enumerate(steps):
-            step = transient.first_order(t, y)
-            if not step.u_tau_s < 0.3 * step.tau_s:
-                out.append(StepCheck(name, "not resolved by the recording", step.delay_s, step.before, step.after,
-                                     step.tau_s, step.u_tau_s, float("nan"), float(np.median(np.diff(t)))))  # fmt: skip
-                continue
-            before, after = ends(y)
-            model = identify.step_constant(drive, inertia, t, step.delay_s, before, after)
-            how = "inertia fitted to it" if (name, i) == fit_to else "predicted"
-            out.append(StepCheck(name, how, step.delay_s, step.before, step.after, step.tau_s, step.u_tau_s, model,
-                                 float(np.median(np.diff(t)))))  # fmt: skip
-    return out, inertia
+    def drive_of(x: Array) -> Drive:
+        full, lost, skew, inertia = np.exp(x)
+        lost = 1.0 / (1.0 + 1.0 / lost)  # of the voltage, below 1
+        return step_drive(voltage_V, float(full), float(lost / (1.0 + skew**2)), float(skew), float(inertia))
+
+    def constants(drive: Drive) -> Array:
+        return np.array([identify.step_constant(drive, drive.motor.inertia_kg_m2, steps[i].time_s, seen[i].delay_s,
+                                                *steps[i].pulse_us) for i in held])  # fmt: skip
+
+    def misfit(x: Array) -> Array:
+        drive = drive_of(x)
+        omega = np.sqrt(np.maximum(thrust, 0.0) / drive.rotor.thrust(1.0))
+        k, ohm = drive.motor.k(), drive.motor.resistance_ohm
+        ohms = ohm + (drive.motor.reactance_ohm_s * omega) ** 2 / ohm
+        duty = (k * omega + ohms * drive.rotor.torque(omega) / k) / voltage_V
+        gaps = [np.log(m / seen[i].tau_s) / np.hypot(u_tau, seen[i].u_tau_s / seen[i].tau_s)
+                for i, m in zip(held, constants(drive), strict=True)]  # fmt: skip
+        return np.concatenate([(duty - drive.esc.duty(pulse)) / u_level, gaps])
+
+    start = np.log([1.05 * float(np.max(thrust)), 0.5, 1.0, 4e-6])
+    found = least_squares(misfit, start, loss="soft_l1", diff_step=1e-2, xtol=1e-3, ftol=1e-3)
+    drive = drive_of(found.x)
+    model = np.full(len(steps), np.nan)
+    model[held] = constants(drive)
+    return [
+        StepCheck(s.log, *s.pulse_us, got.delay_s, got.before, got.after, got.tau_s, got.u_tau_s, float(m),
+                  float(np.median(np.diff(s.time_s)))) for s, got, m in zip(steps, seen, model, strict=True)
+    ], drive  # fmt: skip

@@ -58,7 +58,7 @@ def figure_of(name: str, data: bytes) -> str:
     """
     words = name.rpartition(".")[0].replace("_", " ")
     picture = image(data, words, "png" if name.endswith(".png") else "svg+xml")
-    return f"<figure>{picture}<figcaption>{esc(words)}</figcaption></figure>"
+    return f'<figure class="picture">{picture}<figcaption>{esc(words)}</figcaption></figure>'
 
 
 def diagnosis_parts(item: Mapping[str, Any]) -> str:

@@ -153,8 +153,8 @@ def _comparison_table(book: Mapping[str, Any], ids: Mapping[int, str]) -> str:
         "own CFD [N]",
         "bench [N]",
         "vendor [N]",
-        "BEMT − CFD %",
-        "K1/K2 − CFD %",
+        "BEMT − CFD [%]",
+        "K1/K2 − CFD [%]",
         "verdict",
     ]
     keep = [

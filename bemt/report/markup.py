@@ -6,6 +6,7 @@ import base64
 import hashlib
 import html
 import math
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -116,7 +117,8 @@ def badge(kind: str, words: str) -> str:
     str
         HTML.
     """
-    return f'<span class="badge {esc(kind)}">{esc(words)}</span>'
+    size = " long" if len(words) > 24 else ""
+    return f'<span class="badge {esc(kind)}{size}">{esc(words)}</span>'
 
 
 def _long(text: str) -> str:
@@ -147,7 +149,8 @@ def table(header: Sequence[str], rows: Iterable[Sequence[object]], sortable: boo
     out = [
         '<div class="scroll"><table class="sort"><thead><tr>' if sortable else '<div class="scroll"><table><thead><tr>'
     ]
-    for k, name in enumerate(header):
+    for k, words in enumerate(header):
+        name = re.sub(r"\[[^]]*\]", lambda unit: unit[0].replace(" ", "\u00a0"), words)  # a unit stays on one line
         kind = ' class="n"' if numeric[k] else ""
         out.append(
             f'<th{kind}><button type="button">{esc(name)}</button></th>' if sortable else f"<th{kind}>{esc(name)}</th>"
