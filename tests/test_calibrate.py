@@ -12,7 +12,7 @@ import pytest
 from bemt import cli
 from bemt import coefficients as co
 from bemt.calibrate import command as calibrate
-from bemt.calibrate import compact, fit, refit, score
+from bemt.calibrate import compact, fit, limit, refit, score
 from bemt.calibrate import points as reading
 from bemt.calibrate.points import Points, Propeller
 from bemt.errors import InputError
@@ -116,7 +116,7 @@ def from_formula(constants: compact.Constants) -> Points:
                 J = np.array([x * p * INCH / D])
                 rows.append((made, np.array([rpm]), J, np.zeros(1), np.zeros(1)))
     points = reading.join(rows)
-    CT, CP = refit.predict(points, constants)
+    CT, CP = refit.predict(points, refit.Fitted(constants, {}, 0, 0))
     return replace(points, CT=CT, CP=CP)
 
 
@@ -127,12 +127,28 @@ def test_the_compact_formula_finds_its_planted_constants():
     for name in ("pitch_factor", "zero_lift", "loading_max", "cd0", "stall_drag"):
         assert getattr(fitted.constants, name) == pytest.approx(getattr(truth, name), rel=0.01), name
     assert fitted.constants.re_scale == pytest.approx(5000.0, rel=0.05)
+    assert all(abs(series.zero_lift) < 1e-3 for series in fitted.series.values())
+
+
+def test_a_planted_series_comes_back_and_is_shrunk_where_one_propeller_speaks_for_it():
+    base = from_formula(compact.CONSTANTS)
+    names = ["odd" if i % 3 == 0 else "single" if i == 1 else f"m{i % 4}" for i in range(len(base.propellers))]
+    propellers = tuple(replace(p, maker=name) for p, name in zip(base.propellers, names, strict=True))
+    planted_ = {"odd": compact.Series(0.05), "single": compact.Series(0.05)}
+    points = replace(base, propellers=propellers)
+    CT, CP = refit.predict(points, refit.Fitted(compact.CONSTANTS, planted_, 0, 0))
+    fitted = refit.fit(replace(points, CT=CT, CP=CP))
+    assert fitted is not None
+    contrast = {name: fitted.series[name].zero_lift - fitted.series["m2"].zero_lift for name in planted_}
+    assert contrast["odd"] == pytest.approx(0.05, abs=0.01)
+    assert 0.01 < contrast["single"] < contrast["odd"]
 
 
 def test_chords_that_thrust_implies_are_those_it_was_made_with():
     points = from_formula(compact.CONSTANTS)
+    points = replace(points, propellers=tuple(replace(p, maker=f"m{i}") for i, p in enumerate(points.propellers)))
     hidden = tuple(replace(p, chord_m=float("nan")) for p in points.propellers)
-    found = refit.implied_chords(replace(points, propellers=hidden), compact.CONSTANTS)
+    found = refit.implied_chords(replace(points, propellers=hidden), refit.PUBLISHED)
     wanted = [p.chord_m / (p.diameter_m / 2) for p in points.propellers]
     assert np.all(np.isfinite(found)) and found == pytest.approx(wanted, rel=0.01)
 
@@ -140,7 +156,7 @@ def test_chords_that_thrust_implies_are_those_it_was_made_with():
 def test_bands_hold_the_share_that_they_say():
     points = from_formula(compact.CONSTANTS)
     made = points.CT * (1 + 0.1 * np.random.default_rng(0).standard_normal(points.CT.size))
-    found = refit.bands(points, made, points.CP, compact.CONSTANTS, True)
+    found = refit.bands(points, made, points.CP, refit.PUBLISHED, "chord")
     still = points.J == 0
     inside = np.abs(made - points.CT)[still] <= found["CT95"][0] * points.CT[still]
     assert np.mean(inside) == pytest.approx(0.95, abs=0.02)
@@ -219,7 +235,7 @@ def test_the_document_the_page_and_the_figure(tmp_path: Path, capsys: pytest.Cap
     doc = json.loads(capsys.readouterr().out)
     assert doc["schema"] == "bemt.calibration/1" and (doc["files"], doc["test_files"]) == (["a.csv"], ["b.csv"])
     assert doc == json.loads((out / "calibration.json").read_text())
-    assert doc["compact"]["refitted"] and set(doc["compact"]["bands"]) == {"known", "unknown"}
+    assert doc["compact"]["refitted"] and set(doc["compact"]["bands"]) == set(refit.GIVEN)
     static = doc["scores"]["calibration"]["static"]["models"]
     assert {"thesis", "goal_seek", "refit", "refit_flight", "compact", "compact_maker_out"} <= set(static)
     assert doc["scores"]["test"]["static"]["points"] == 2 and doc["data"]["test"]["ducted"] == 1
@@ -262,6 +278,41 @@ def test_the_report_is_what_the_command_gives(shared_data: Path, project: Path):
             for model, row in found["scores"][name][motion]["models"].items():
                 assert row == pytest.approx(kept["scores"][name][motion]["models"][model], abs=0.005), (name, model)
     static = found["scores"]["calibration"]["static"]["models"]
-    assert static["compact"]["within_13"] > static["compact_no_chord"]["within_13"] > static["refit"]["within_13"]
+    assert static["compact"]["within_13"] > 0.78 and static["compact_no_chord"]["within_13"] > 0.78
+    assert static["refit"]["within_13"] < 0.6
+    # Volume 2: a free function of the same inputs, fitted there with the maker left out, is no better than the formula.
+    held = found["scores"]["test"]
+    for key, given in calibrate.MODELS.items():
+        reached, carried = held["static"]["models"][key]["within_13"], held["limit"][given]
+        assert reached > carried["maker_out_13"] - 0.02, key
+        assert reached < carried["within_13"] + 0.02, key
+    assert (
+        held["limit"]["chord"]["ideal_13"] < 0.65
+    )  # the 70 % aimed at are not in diameter, label pitch, blades and chord
     bands = found["scores"]["calibration"]["J/(P/D)"][:4]
     assert all(0.98 < row["models"]["compact"]["median"] < 1.05 for row in bands)
+
+
+def test_what_the_inputs_carry_is_the_scatter_that_was_planted():
+    rng = np.random.default_rng(2)
+    rows = []
+    for i in range(60):
+        d, p = rng.uniform(5, 15), rng.uniform(0.4, 1.0)
+        made = Propeller(
+            f"{i}", f"maker{i % 6}", "made", d * INCH, p * d * INCH, chord_m=rng.uniform(0.04, 0.1) * d * INCH
+        )
+        rows.append((made, RPM[::3], np.zeros(2), np.zeros(2), np.full(2, np.nan)))
+    points = reading.join(rows)
+    exact = refit.predict(points)[0]
+    sigma = 0.12
+    off = np.exp(sigma * rng.standard_normal(60))[points.index]
+    found = limit.limit(replace(points, CT=exact * off), "chord")
+    assert found is not None and found["propellers"] == 60
+    assert found["scatter"] == pytest.approx(sigma, rel=0.25)
+    assert found["ideal_13"] == pytest.approx(0.72, abs=0.1)  # |N(0, 0.12)| within ln 0.87 to ln 1.13
+    assert found["within_13"] < found["ideal_13"] + 0.1
+    smooth = limit.limit(replace(points, CT=exact), "chord")
+    assert smooth is not None and smooth["within_13"] > 0.95 and smooth["maker_out_13"] > 0.95
+    blind = limit.limit(replace(points, CT=exact), "label")  # the chord is not told: its scatter shows
+    assert blind is not None and blind["scatter"] > 3 * smooth["scatter"]
+    assert limit.limit(points.select(points.index < 5), "label") is None

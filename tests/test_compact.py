@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from bemt import coefficients as co
 from bemt.air import Air
-from bemt.calibrate import compact, points, refit, score
+from bemt.calibrate import compact, estimate, points, refit, score
 from bemt.errors import InputError
 
 INCH = 0.0254
@@ -38,10 +38,10 @@ def test_thrust_is_that_of_the_blade_integral_and_of_momentum(pd, J, s, Re):
     x, w = np.polynomial.legendre.leggauss(8)
     x, w = (x + 1) / 2, w / 2
     if li is not None:
-        alpha = c.pitch_factor * pd / np.pi / x + c.zero_lift * r * r - (J / np.pi + li) / x
+        alpha = c.pitch_factor * pd / np.pi / x + c.zero_lift * r**4 - (J / np.pi + li) / x
         assert C == pytest.approx(np.sum(w * s / 2 * compact.LIFT_SLOPE * alpha * x**2), abs=1e-12)
     # above zero thrust the slipstream is slower than the flight
-    J0 = c.pitch_factor * pd + 2 * np.pi * c.zero_lift * r * r / 3
+    J0 = c.pitch_factor * pd + 2 * np.pi * c.zero_lift * r**4 / 3
     assert (C > 0) == (J0 > J) or C == pytest.approx(0.0, abs=1e-9)
 
 
@@ -50,7 +50,7 @@ def test_thrust_is_that_of_the_blade_integral_and_of_momentum(pd, J, s, Re):
 def test_zero_thrust_where_the_docstring_says(pd, s, Re):
     c = compact.CONSTANTS
     r = 1.0 / (1.0 + np.sqrt(c.re_scale / Re))
-    J0 = c.pitch_factor * pd + 2 * np.pi * c.zero_lift * r**2 / 3
+    J0 = c.pitch_factor * pd + 2 * np.pi * c.zero_lift * r**4 / 3
     assert compact.coefficients(pd, J0, s, Re)[0] == pytest.approx(0.0, abs=1e-12)
 
 
@@ -75,7 +75,7 @@ def test_no_chord_no_thrust_and_many_blades_the_momentum_limit():
     assert compact.coefficients(0.6, 0.1, 1e-9, 1e5, c)[0] == pytest.approx(0.0, abs=1e-8)
     # infinitely many blades turn the flow into the helix of zero lift
     r = 1.0 / (1.0 + np.sqrt(c.re_scale / 1e5))
-    theta = c.pitch_factor * 0.6 / np.pi + 2 * c.zero_lift * r**2 / 3
+    theta = c.pitch_factor * 0.6 / np.pi + 2 * c.zero_lift * r**4 / 3
     limit = 2 * (theta - 0.1 / np.pi) * theta * r * co.CT_PER_ROTOR
     assert compact.coefficients(0.6, 0.1, 1e9, 1e5, c)[0] == pytest.approx(limit, rel=1e-6)
 
@@ -84,7 +84,7 @@ def test_no_chord_no_thrust_and_many_blades_the_momentum_limit():
 @given(st.floats(0.05, 2.0), ratios, st.floats(1000, 20000), st.floats(0.0, 0.8), st.floats(0.3, 3.0))
 def test_similarity_at_equal_reynolds_number(D, pd, rpm, x, scale):
     air = Air.from_density()
-    e = [compact.estimate(D * k, pd * D * k, 2, rpm / k**2, x * pd * D * k * rpm / k**2 / 60, air, 0.07 * D * k)
+    e = [estimate.estimate(D * k, pd * D * k, 2, rpm / k**2, x * pd * D * k * rpm / k**2 / 60, air, 0.07 * D * k)
          for k in (1.0, scale)]  # fmt: skip
     assert e[1].CT == pytest.approx(e[0].CT, rel=1e-9)
     assert e[1].CP == pytest.approx(e[0].CP, rel=1e-9)
@@ -93,29 +93,54 @@ def test_similarity_at_equal_reynolds_number(D, pd, rpm, x, scale):
 
 def test_batch_is_scalar():
     rpm, V = np.array([3000.0, 6000.0, 0.0, 5000.0]), np.array([0.0, 5.0, 0.0, 30.0])
-    many = compact.estimate(0.254, 0.127, 2, rpm, V)
+    many = estimate.estimate(0.254, 0.127, 2, rpm, V)
     for i in range(4):
-        one = compact.estimate(0.254, 0.127, 2, rpm[i], V[i])
+        one = estimate.estimate(0.254, 0.127, 2, rpm[i], V[i])
         for field in dataclasses.fields(many):
             a, b = getattr(many, field.name)[i], getattr(one, field.name)[0]
             assert a == b or (a != a and b != b), field.name
 
 
 def test_at_rest_without_rotation_there_is_no_thrust_and_in_wind_no_answer():
-    e = compact.estimate(0.254, 0.127, 2, 0.0, [0.0, 5.0])
+    e = estimate.estimate(0.254, 0.127, 2, 0.0, [0.0, 5.0])
     assert e.thrust_N[0] == 0.0 and np.isnan(e.thrust_N[1]) and e.flags[1]
 
 
 def test_the_chord_given_replaces_the_typical_one_and_narrows_the_band():
-    typical = compact.estimate(0.254, 0.127, 2, 6000.0)
-    given_ = compact.estimate(0.254, 0.127, 2, 6000.0, chord_m=compact.default_chord(0.254))
+    typical = estimate.estimate(0.254, 0.127, 2, 6000.0)
+    given_ = estimate.estimate(0.254, 0.127, 2, 6000.0, chord_m=compact.default_chord(0.254))
     assert given_.thrust_N == pytest.approx(typical.thrust_N, rel=1e-12)
-    assert given_.u_thrust_N[0] < 0.7 * typical.u_thrust_N[0]
+    assert given_.u_thrust_N[0] < 0.75 * typical.u_thrust_N[0]
     assert typical.u_thrust_N[0] < typical.u95_thrust_N[0]
 
 
+def test_a_measured_pitch_counts_as_much_as_the_label():
+    known = {"chord_m": 0.02}
+    e = estimate.estimate(0.254, 0.127, 2, 6000.0, **known, measured_pitch_m=0.147)
+    mean = estimate.estimate(0.254, 0.137, 2, 6000.0, **known)
+    assert e.CT == pytest.approx(mean.CT, rel=1e-12) and e.CP == pytest.approx(mean.CP, rel=1e-12)
+    same = estimate.estimate(0.254, 0.127, 2, 6000.0, **known, measured_pitch_m=0.127)
+    label = estimate.estimate(0.254, 0.127, 2, 6000.0, **known)
+    assert same.CT == pytest.approx(label.CT, rel=1e-12)
+    assert same.u_thrust_N[0] < label.u_thrust_N[0]
+
+
+def test_a_series_shifts_zero_thrust_and_the_typical_chord():
+    kwargs = {"diameter_m": 0.254, "pitch_m": 0.127, "blades": 2, "rpm": 6000.0}
+    plain, slow = estimate.estimate(**kwargs), estimate.estimate(**kwargs, series="APC slow flyer")
+    own = compact.SERIES["apcsf"]
+    assert slow.Re == pytest.approx(own.chord * plain.Re, rel=1e-12) and slow.CT > plain.CT
+    chord = 0.5 * 0.254 * 0.2
+    Re = float(estimate.estimate(**kwargs, chord_m=chord).Re[0])
+    c, r = compact.CONSTANTS, 1.0 / (1.0 + np.sqrt(compact.CONSTANTS.re_scale / Re))
+    J0 = c.pitch_factor * 0.5 + 2 * np.pi * (c.zero_lift + own.zero_lift) * r**4 / 3
+    assert compact.coefficients(0.5, J0, 0.1, Re, zero_lift=own.zero_lift)[0] == pytest.approx(0.0, abs=1e-12)
+    with pytest.raises(InputError, match=r"apcsf \(APC Slow Flyer\)"):
+        estimate.estimate(**kwargs, series="nobody")
+
+
 def test_more_blades_give_more_thrust_but_less_each():
-    T = [compact.estimate(0.254, 0.1, b, 6000.0).thrust_N[0] for b in (2, 3, 4)]
+    T = [estimate.estimate(0.254, 0.1, b, 6000.0).thrust_N[0] for b in (2, 3, 4)]
     assert T[0] < T[1] < T[2] and T[2] < 2 * T[0]
 
 
@@ -135,8 +160,8 @@ def test_more_blades_give_more_thrust_but_less_each():
 )  # fmt: skip
 def test_outside_the_data_is_flagged(kwargs, flag):
     base = {"diameter_m": 10 * INCH, "pitch_m": 5 * INCH, "blades": 2, "rpm": 6000.0}
-    assert compact.estimate(**base).flags == ((),)
-    e = compact.estimate(**(base | kwargs))
+    assert estimate.estimate(**base).flags == ((),)
+    e = estimate.estimate(**(base | kwargs))
     assert any(flag in text for text in e.flags[0]), e.flags
     if any(key in flag for key in ("Mach 1.09", "above", "ducted", "behind", "beyond zero")):
         assert np.isnan(e.u_thrust_N[0]) and np.isnan(e.u95_power_W[0])
@@ -145,9 +170,9 @@ def test_outside_the_data_is_flagged(kwargs, flag):
 
 def test_all_faults_at_once():
     with pytest.raises(InputError) as caught:
-        compact.estimate(-0.2, 500.0, 2.5, -1.0, np.nan, chord_m=0.5)
+        estimate.estimate(-0.2, 500.0, 2.5, -1.0, np.nan, chord_m=0.5, measured_pitch_m=-0.1)
     assert {f.where for f in caught.value.faults} == {
-        "diameter_m", "pitch_m", "blades", "rpm", "airspeed_m_s", "chord_m",
+        "diameter_m", "pitch_m", "blades", "rpm", "airspeed_m_s", "chord_m", "measured_pitch_m",
     }  # fmt: skip
 
 
@@ -175,28 +200,38 @@ def test_the_published_constants_and_bands_come_from_volume_1(volumes):
     for field in dataclasses.fields(compact.Constants):
         a, b = getattr(fitted.constants, field.name), getattr(compact.CONSTANTS, field.name)
         assert a == pytest.approx(b, rel=0.01), field.name
+    assert fitted.series.keys() == compact.SERIES.keys()
+    for key, own in fitted.series.items():
+        assert own.zero_lift == pytest.approx(compact.SERIES[key].zero_lift, abs=0.001), key
+        assert own.chord == pytest.approx(compact.SERIES[key].chord, abs=0.005), key
     makers = np.unique([p.maker for p in points.propellers], return_inverse=True)[1][points.index]
     out = refit.left_out(points, fitted, makers)
-    known = np.isfinite(points.of("chord_m"))
-    for name, mask in (("known", known), ("unknown", np.ones_like(known))):
-        made = [np.where(mask, v, np.nan) for v in out[name == "known"]]
-        found = refit.bands(points, *made, fitted.constants, name == "known")
-        for key, widths in found.items():
-            assert widths == pytest.approx(compact.BANDS[name][key], abs=0.004), (name, key)
-    # Makers left out, chord known: at rest 82 % within 13 %, K1/K2 61 %; in flight the median stays within 5 %.
-    part = points.select(known)
-    held = shares(part, out[True][0][known])
-    assert held["static"]["within_13"] > 0.80 and held["static"]["within_26"] > 0.96
-    assert all(0.95 < m < 1.05 for m in held["flight"])
+    for known in refit.GIVEN:
+        made = [np.where(refit.has(points, known), v, np.nan) for v in out[known]]
+        for key, widths in refit.bands(points, *made, fitted, known).items():
+            assert widths == pytest.approx(compact.BANDS[known][key], abs=0.004), (known, key)
+    # Makers left out, chord known: at rest 84 % within 13 %, K1/K2 61 %; in flight the median stays within 5 %.
+    have = refit.has(points, "chord")
+    for known in ("chord", "pitch"):
+        held = shares(points.select(have), out[known][0][have])
+        assert held["static"]["within_13"] > 0.83 and held["static"]["within_26"] > 0.96
+        assert all(0.95 < m < 1.05 for m in held["flight"])
+    # and three numbers of a maker never seen: 70 %, K1/K2 57 %
+    assert shares(points, out["label"][0])["static"]["within_13"] > 0.69
 
 
 def test_volume_2_held_out(volumes):
-    # What is reached, not what was aimed at (70 % and 0.9 to 1.1): half of it are 2-5 in propellers below Re 30,000.
+    # What is reached. In flight as aimed at (0.9 to 1.1). At rest not (70 %): the inputs themselves carry no more, see
+    # test_calibrate; half of the propellers are 2-5 in, below Re 30,000.
     points = volumes[2]
-    held = shares(points, refit.predict(points, compact.CONSTANTS)[0])
-    assert held["static"]["within_13"] == pytest.approx(0.54, abs=0.01)
-    assert held["static"]["within_26"] == pytest.approx(0.80, abs=0.01)
-    assert held["flight"] == pytest.approx([1.05, 1.10, 1.12, 1.17], abs=0.01)
+    held = shares(points, refit.predict(points)[0])
+    assert held["static"]["within_13"] == pytest.approx(0.595, abs=0.01)
+    assert held["static"]["within_26"] == pytest.approx(0.86, abs=0.01)
+    assert held["flight"] == pytest.approx([1.01, 1.05, 1.07, 1.10], abs=0.01)
+    assert all(0.9 < median < 1.1 for median in held["flight"])
+    held = shares(points, refit.predict(points, given="pitch")[0])
+    assert held["static"]["within_13"] == pytest.approx(0.65, abs=0.01)
+    assert held["static"]["within_26"] == pytest.approx(0.90, abs=0.01)
     large = points.select(points.of("diameter_m") > compact.DIAMETER_RANGE[0])
-    held = shares(large, refit.predict(large, compact.CONSTANTS)[0])
+    held = shares(large, refit.predict(large)[0])
     assert held["static"]["within_13"] > 0.66 and held["static"]["within_26"] > 0.92

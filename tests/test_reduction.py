@@ -502,6 +502,29 @@ def test_plateaus_of_the_raw_record_keep_to_one_propeller(shared_data: Path) -> 
     assert any("power_W" in n and "times torque x speed: left out" in n for n in got.notes)
 
 
+def test_plateaus_of_the_raw_record_agree_with_its_makers_own_evaluation(shared_data: Path) -> None:
+    """The maker evaluated this record too, sample by sample (Thrust Efficiency and Power In): its median per step.
+
+    No published table is of this run (T/rpm^2 is 2.8e-6 gf/rpm^2 with Q/T 1.30 cm; the tables have 2.65e-6 with 1.60,
+    2.15e-6 with 1.33, or are further off), so this is the only raw-against-maker comparison in the data.
+    """
+    record = importers.read(shared_data / "jmajew" / "raw" / "curr_cal.csv")
+    got = reduce(record).series
+    stated = []
+    for file in sorted((shared_data / "jmajew").glob("*table*.csv")):
+        if not re.search("no-?prop", file.name):
+            stated += list(reduce(importers.read(file)).series.u["thrust_N"])
+    pulse, power, efficacy = (
+        record.channels[name].values for name in ("pulse_width_s", "electrical_power_W", "efficacy_N_W")
+    )
+    off = []
+    for i, p in enumerate(got["pwm_s"]):
+        step = np.isclose(pulse, p)
+        assert got["electrical_power_W"][i] == pytest.approx(np.median(power[step]), rel=0.01)
+        off.append(got["thrust_N"][i] - np.median(efficacy[step]) * got["electrical_power_W"][i])
+    assert len(off) == 6 and np.max(np.abs(off)) < np.median(stated)  # 23 mN; the tables state 1 to 135 mN
+
+
 def test_a_slow_ramp_up_and_down_shows_its_hysteresis(shared_data: Path) -> None:
     got = reduce(importers.read(shared_data / "thrust_map" / "xNova-SR-ramp.csv"))
     assert got.mode == "points" and "quasi-steady" in got.notes[0]

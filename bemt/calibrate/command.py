@@ -2,11 +2,12 @@
 
 Beside each other: the thesis's constants; its goal-seek (K2 = 1.5, K1 by mean error) repeated on the data; a robust
 refit at rest, and one that includes flight; the compact formula (:mod:`bemt.calibrate.compact`), refitted when enough
-propellers have a chord, with measured chords and with typical ones. Fitted models are scored on FILES with the
-propeller (compact: also its maker) left out of the fit, and on ``--test`` files with the constants of FILES.
+propellers have a chord, from measured chords and pitches, from measured chords, and from labels alone. Fitted models
+are scored on FILES with the propeller (compact: also its maker) left out of the fit, and on ``--test`` files with the
+constants of FILES; beside them what the same inputs can carry at all (:mod:`bemt.calibrate.limit`).
 
 Schema ``bemt.calibration/1``: ``k1k2``, ``compact``, ``scores`` (``calibration`` and ``test``: ``static``, ``flight``,
-``J/(P/D)``, ``chord_known``, ``bands``, ``power``, ``coverage``), ``refused``, ``notes``.
+``J/(P/D)``, ``chord_known``, ``bands``, ``power``, ``coverage``, ``limit``), ``refused``, ``notes``.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from numpy.typing import NDArray
 
 from bemt.calibrate import compact, refit, score
 from bemt.calibrate import fit as fitting
+from bemt.calibrate.limit import limit
 from bemt.calibrate.points import Points, load
 from bemt.calibrate.text import text
 from bemt.data_folders import find_data
@@ -33,6 +35,8 @@ Array = NDArray[np.float64]
 __all__ = ["SCHEMA", "calibrate", "run"]
 
 SCHEMA = "bemt.calibration/1"
+MODELS = {"compact_pitch": "pitch", "compact": "chord", "compact_no_chord": "label"}
+"""Compact models by what they are given, of `bemt.calibrate.refit.GIVEN`."""
 
 
 def _counts(points: Points) -> dict[str, int]:
@@ -90,14 +94,15 @@ def calibrate(
     if fitted is None:
         few = f"fewer than {refit.MIN_PROPELLERS} propellers with chord and power"
         notes.append(f"compact formula not refitted: {few}; the published constants serve")
-    constants = fitted.constants if fitted else compact.CONSTANTS
+    used = fitted or refit.PUBLISHED
     document: dict[str, Any] = {
         "schema": SCHEMA,
         "data": {"calibration": _counts(points), "test": _counts(test) if test else None},
         "k1k2": {name: asdict(c) for name, c in k1k2.items()},
         "compact": {
-            "constants": asdict(constants), "published": asdict(compact.CONSTANTS), "refitted": fitted is not None,
-            "propellers": fitted.propellers if fitted else 0, "chords": fitted.chords if fitted else 0,
+            "constants": asdict(used.constants), "published": asdict(compact.CONSTANTS), "refitted": fitted is not None,
+            "propellers": used.propellers, "chords": used.chords,
+            "series": {name: asdict(series) for name, series in used.series.items()},
         },
     }  # fmt: skip
     sets = {"calibration": points} | ({"test": test} if test else {})
@@ -106,8 +111,8 @@ def calibrate(
     for name, which in sets.items():
         CT = {key: fitting.CT_k1k2(which, c.K1, c.K2) for key, c in k1k2.items()}
         CP: dict[str, Array] = {}
-        for key, known in (("compact", True), ("compact_no_chord", False)):
-            CT[key], CP[key] = refit.predict(which, constants, known)
+        for key, given in MODELS.items():
+            CT[key], CP[key] = refit.predict(which, used, given)
         if name == "calibration":
             for key, in_flight in (("refit", False), ("refit_flight", True)):
                 if key in k1k2:
@@ -119,10 +124,9 @@ def calibrate(
         part = score.score(which.select(own_chord), {key: v[own_chord] for key, v in CT.items()})
         found["chord_known"] = {key: part[key] for key in ("static", "flight", "J/(P/D)")}
         found["power"] = score.power_score(which, CP)
-        found["coverage"] = {
-            "chord": score.coverage(which, constants, True),
-            "no_chord": score.coverage(which, constants, False),
-        }
+        found["coverage"] = {given: score.coverage(which, used, given) for given in refit.GIVEN}
+        say("what the inputs carry")
+        found["limit"] = {given: limit(which, given) for given in refit.GIVEN}
         document["scores"][name] = found
         predictions[name] = (which, CT)
     document["refused"] = [*points.refused, *(test.refused if test else ())]
@@ -136,18 +140,14 @@ def _leave_out(
 ) -> None:  # fmt: skip
     """Replace the compact predictions by those without the propeller, add those without the maker, and the bands."""
     makers = np.unique([p.maker for p in points.propellers], return_inverse=True)[1][points.index]
-    names = {True: "compact", False: "compact_no_chord"}
     for suffix, groups in (("", points.index), ("_maker_out", makers)):
         found = refit.left_out(points, fitted, groups, lambda i, n: say(f"compact formula, left out {i} of {n}"))
-        for known, key in names.items():
-            CT[key + suffix], CP[key + suffix] = found[known]
-    with_chord = np.isfinite(points.of("chord_m"))
+        for key, given in MODELS.items():
+            CT[key + suffix], CP[key + suffix] = found[given]
     document["compact"]["bands"] = {}
-    for known, key in names.items():
-        m = with_chord if known else np.ones_like(with_chord)
-        made = [np.where(m, v[f"{key}_maker_out"], np.nan) for v in (CT, CP)]
-        widths = refit.bands(points, made[0], made[1], fitted.constants, known)
-        document["compact"]["bands"]["known" if known else "unknown"] = widths
+    for key, given in MODELS.items():
+        made = [np.where(refit.has(points, given), v[f"{key}_maker_out"], np.nan) for v in (CT, CP)]
+        document["compact"]["bands"][given] = refit.bands(points, made[0], made[1], fitted, given)
 
 
 def _found(name: str) -> str:

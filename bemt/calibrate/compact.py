@@ -1,34 +1,37 @@
-"""The compact formula: thrust and power of an open propeller from diameter, pitch and blade count, chord if known.
+"""The compact formula: thrust and power of an open propeller from diameter, pitch and blade count, and what else is
+known: chord, measured pitch, series.
 
 A helix blade (blade angle times radius constant) has a uniform inflow by momentum theory [1]_, so that the blade
 integral closes. With the advance ratio J, lc = J/pi, the solidity s = B c/(pi R) at 0.75 R, r = 1/(1 + sqrt(Re0/Re))::
 
-    theta = k (P/D)/pi + (2/3) a0 r^2                pitch and zero-lift (camber) angle of the helix
+    theta = k (P/D)/pi + (2/3) a0 r^4                pitch and zero-lift (camber) angle of the helix
     K     = 5.73 s/4                                 lift slope 0.1 per degree [1]_
     li    = (-(2 lc + K) + sqrt((2 lc + K)^2 + 8 K (theta - lc)))/4       momentum: C = 2 li (lc + li)
     C     = r min(K (theta - lc - li), s m)          the blade loading C/s ends at m (stall)
     Cp    = C (lc + 1.15 li') + s cd0 sqrt(1e5/Re)/8 + d (C_unstalled - C) (P/D)/pi
     CT    = C pi^3/4,   CP = Cp pi^4/4               propeller convention; li' from C
 
-Without a chord, c/R = c1 (D/10 in)^e. Zero thrust lies at J = k P/D + 2 pi a0 r^2/3. Eight constants were fitted
-(:data:`CONSTANTS`); 5.73, 1.15 (induced power factor) and the square root in the drag are textbook values [1]_.
+Zero thrust lies at J = k P/D + 2 pi a0 r^4/3. Eight constants were fitted (:data:`CONSTANTS`); 5.73, 1.15 (induced
+power factor) and the square root in the drag are textbook values [1]_. Three further numbers sharpen it, each optional:
+
+* chord at 0.75 R. Without it c/R = c1 (D/10 in)^e, times the factor of the series;
+* pitch measured at 0.75 R (2 pi 0.75 R tan of the blade angle). P/D is then the MEAN of label and measurement: makers
+  left out, the mean beats either alone (label and protractor are about equally wrong);
+* series (:data:`SERIES`): sections differ by maker and series, most of all in a0. Unknown series: the mean of all.
 
 How it was found
 ----------------
-On UIUC volume 1 only: thrust and power constants on the 51 propellers whose chord is published, Re0 by the change of
-static CT with rpm WITHIN each propeller, robustly; the chord law on those 51 chords and the 41 that static thrust
-implies. Forms were compared by leave-one-maker-out on volume 1: stall as a smooth saturation (powers 3, 6, 8, 12) or a
-corner, Reynolds number on the camber angle, the lift slope, the stall or all of them, as a power or bounded, pitch with
-and without k, a representative section at 0.7 R with exact angles, profile drag as quadratic or cubic in the loading.
-Exact angles bought nothing; k and the corner did; r on thrust and r^2 on camber follow the measured change of CT and of
-zero-thrust J with rpm within propellers (0.035 per unit of ln Re; measured, median of 83: 0.040).
+On UIUC volume 1 only, on the 51 propellers whose blades are published (chord law: also the 41 chords that static thrust
+implies). Forms were compared with the maker left out: stall as a smooth saturation or a corner, Reynolds number on
+camber, lift slope, stall or all, as a power, linear in its logarithm or bounded, pitch with and without k, lift slope
+falling with the chord, exact angles at 0.7 R, drag quadratic or cubic in loading. k, the corner and r did it. Series
+and propellers are random effects (a0 by 0.06 rad each, level by 5 %): so r follows the change with rpm WITHIN each
+propeller (ln CT 0.12 and zero-thrust J 0.05 per unit of ln Re, measured and made), the eight constants stand for
+the mean series, and the series' own a0 shrinks to it as far as its propellers disagree.
 
-Held out, not blind: volume 2 was scored with four versions. The first had r on thrust alone and a constant chord; r on
-camber, the fit on known chords with the chord law, and r^2 came after scores had been seen, each settled on volume 1
-(the chord law with the Drive Calculator table in view too). No constant was fitted to volume 2. There, static thrust is
-within 13 % on 54 % of the points with measured chords (K1/K2: 41 %) and on 31 % with typical ones, and the medians in
-flight run from 1.05 to 1.17: NOT the 70 % and 0.9 to 1.1 aimed at. Makers left out of volume 1, chord known: 82 %, and
-0.97 to 1.01. See ``reports/calibration``.
+Held out, not blind: volume 2 had been scored with earlier versions; that its GWS blades reach zero thrust at J = P/D
+was known when series were tried; GWS has its a0 from three propellers of volume 1. What the inputs can carry at all is
+printed by `bemt calibrate` (:mod:`bemt.calibrate.limit`); scores are in ``reports/calibration``.
 
 References
 ----------
@@ -46,9 +49,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bemt import coefficients as co
-from bemt.air import Air
 from bemt.errors import Fault, InputError
-from bemt.units import INCH, KGF
+from bemt.units import INCH
 
 Array = NDArray[np.float64]
 
@@ -108,27 +110,102 @@ class Constants:
     chord_exponent: float
 
 
-CONSTANTS = Constants(0.8859, 0.1341, 0.1979, 2643.0, 0.03114, 0.7896, 0.146, -0.2329)
+CONSTANTS = Constants(0.9143, 0.1714, 0.1966, 2548.0, 0.02961, 0.7756, 0.1462, -0.2348)
 """Fitted on UIUC volume 1; `python -m bemt calibrate` finds them again where the data are."""
+
+
+@dataclass(frozen=True)
+class Series:
+    """What sets a series of propellers apart from the mean of all.
+
+    Attributes
+    ----------
+    zero_lift : float
+        Added to a0. [rad]
+    chord : float
+        Chord over the typical one. [-]
+    name : str
+        Maker and series.
+    """
+
+    zero_lift: float = 0.0
+    chord: float = 1.0
+    name: str = ""
+
+
+SERIES: dict[str, Series] = {
+    "ance": Series(0.0000, 0.961, "Aeronaut Carbon Electric"),
+    "apc29ff": Series(0.0263, 0.987, "APC 29 Free Flight"),
+    "apccf": Series(0.0000, 0.996, "APC Carbon Fiber"),
+    "apce": Series(0.0027, 0.922, "APC Thin Electric"),
+    "apcsf": Series(0.0289, 1.280, "APC Slow Flyer"),
+    "apcsp": Series(0.0122, 0.964, "APC Sport"),
+    "grcp": Series(-0.0133, 0.890, "Graupner CAM Prop"),
+    "grcsp": Series(0.0231, 1.053, "Graupner CAM Slim"),
+    "grsn": Series(-0.0407, 1.145, "Graupner Super Nylon"),
+    "gwsdd": Series(-0.0521, 0.998, "GWS Direct Drive"),
+    "kavfk": Series(0.0000, 0.977, "Kavon FK"),
+    "mae": Series(0.0499, 1.004, "Master Airscrew Electric"),
+    "mas": Series(-0.0400, 0.934, "Master Airscrew Scimitar"),
+    "rusp": Series(0.0000, 1.006, "Rev Up Special Prop"),
+    "zin": Series(0.0000, 0.827, "Zingali"),
+}
+"""By UIUC family; fitted on volume 1 together with `CONSTANTS`, shrunk to the mean by the number of propellers."""
 
 BAND_X = (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.1)
 """J/(P/D) of the error bands [-]; 0 is at rest."""
 BANDS: dict[str, dict[str, tuple[float, ...]]] = {
-    "known": {
-        "CT68": (0.095, 0.092, 0.100, 0.118, 0.133, 0.115, 0.114),
-        "CT95": (0.168, 0.159, 0.175, 0.181, 0.196, 0.204, 0.224),
-        "CP68": (0.155, 0.136, 0.149, 0.165, 0.198, 0.191, 0.192),
-        "CP95": (0.288, 0.254, 0.255, 0.284, 0.331, 0.356, 0.417),
+    "label": {
+        "CT68": (0.128, 0.143, 0.138, 0.136, 0.133, 0.112, 0.102),
+        "CT95": (0.282, 0.268, 0.266, 0.301, 0.244, 0.218, 0.226),
+        "CP68": (0.158, 0.178, 0.151, 0.140, 0.138, 0.139, 0.179),
+        "CP95": (0.331, 0.351, 0.297, 0.275, 0.335, 0.356, 0.407),
     },
-    "unknown": {
-        "CT68": (0.160, 0.157, 0.160, 0.161, 0.155, 0.119, 0.113),
-        "CT95": (0.330, 0.297, 0.286, 0.290, 0.269, 0.246, 0.238),
-        "CP68": (0.171, 0.175, 0.155, 0.137, 0.150, 0.170, 0.201),
-        "CP95": (0.385, 0.396, 0.355, 0.318, 0.336, 0.348, 0.430),
+    "chord": {
+        "CT68": (0.091, 0.087, 0.101, 0.115, 0.132, 0.111, 0.109),
+        "CT95": (0.181, 0.166, 0.178, 0.181, 0.194, 0.208, 0.233),
+        "CP68": (0.162, 0.136, 0.152, 0.170, 0.205, 0.182, 0.186),
+        "CP95": (0.297, 0.255, 0.257, 0.298, 0.341, 0.389, 0.439),
+    },
+    "pitch": {
+        "CT68": (0.085, 0.082, 0.096, 0.099, 0.106, 0.104, 0.105),
+        "CT95": (0.181, 0.160, 0.171, 0.180, 0.189, 0.193, 0.202),
+        "CP68": (0.142, 0.119, 0.114, 0.125, 0.142, 0.136, 0.147),
+        "CP95": (0.254, 0.231, 0.246, 0.277, 0.324, 0.351, 0.337),
     },
 }
 """Half-widths over the model's own static CT or CP [-] that hold 68 % (``CT68``) and 95 % (``CT95``) of the points when
-the maker is left out of the fit, over `BAND_X`; ``known`` and ``unknown`` chord."""
+the maker is left out of the fit, over `BAND_X`; given label, chord, chord and measured pitch."""
+
+
+def find_series(name: str) -> Series:
+    """Series by UIUC family (``gwsdd``) or name (``GWS Direct Drive``).
+
+    Parameters
+    ----------
+    name : str
+        In any case.
+
+    Returns
+    -------
+    Series
+        Of `SERIES`.
+
+    Raises
+    ------
+    InputError
+        For an unknown one.
+
+    Examples
+    --------
+    >>> find_series("GWS Direct Drive") is SERIES["gwsdd"]
+    True
+    """
+    for key, series in SERIES.items():
+        if name.casefold() in (key, series.name.casefold()):
+            return series
+    known = ", ".join(f"{key} ({series.name})" for key, series in SERIES.items())
+    raise InputError(Fault("", "series", name, known, "Leave it out: the mean of all series serves"))
 
 
 def default_chord(diameter_m: ArrayLike, constants: Constants = CONSTANTS) -> Any:
@@ -144,21 +221,39 @@ def default_chord(diameter_m: ArrayLike, constants: Constants = CONSTANTS) -> An
     Returns
     -------
     float or array
-        Chord; single propellers scatter by 16 % about it. [m]
+        Chord; times the factor of the series; single propellers scatter about it. [m]
 
     Examples
     --------
     >>> round(1000 * default_chord(0.254), 1)
-    18.5
+    18.6
     """
     D = np.asarray(diameter_m, dtype=float)
     out = 0.5 * D * constants.chord_R * (D / D_CHORD) ** constants.chord_exponent
     return float(out) if out.ndim == 0 else out
 
 
+def effective_pitch(label: ArrayLike, measured: ArrayLike) -> Array:
+    """Pitch that the formula takes.
+
+    Parameters
+    ----------
+    label, measured : float or array
+        Of the label; at 0.75 R, NaN when unknown. [m] or over the diameter [-]
+
+    Returns
+    -------
+    array
+        Mean of both, or the label. [m] or [-]
+    """
+    a, b = np.asarray(label, dtype=float), np.asarray(measured, dtype=float)
+    return np.asarray(np.where(np.isfinite(b), 0.5 * (a + b), a))
+
+
 def coefficients(
-    P_D: ArrayLike, J: ArrayLike, solidity: ArrayLike, Re: ArrayLike, constants: Constants = CONSTANTS
-) -> tuple[Array, Array]:
+    P_D: ArrayLike, J: ArrayLike, solidity: ArrayLike, Re: ArrayLike, constants: Constants = CONSTANTS,
+    zero_lift: ArrayLike = 0.0, level: ArrayLike = 1.0,
+) -> tuple[Array, Array]:  # fmt: skip
     """Thrust and power coefficient by the formula of the module.
 
     Parameters
@@ -171,6 +266,10 @@ def coefficients(
         Reynolds number of the section at 0.75 R. [-]
     constants : Constants
         Fitted constants.
+    zero_lift : float or array
+        Of the series, added to a0. [rad]
+    level : float or array
+        Factor on r. [-]
 
     Returns
     -------
@@ -185,14 +284,15 @@ def coefficients(
     --------
     >>> CT, CP = coefficients(0.5, [0.0, 0.3, 0.6], 0.0929, 5e4)
     >>> CT.round(3), CP.round(3)
-    (array([0.095, 0.058, 0.006]), array([0.039, 0.036, 0.016]))
+    (array([0.093, 0.056, 0.003]), array([0.038, 0.034, 0.014]))
     """
     c = constants
-    pd, J, s, Re = (np.asarray(x, dtype=float) for x in (P_D, J, solidity, Re))
+    pd, J, s, Re, change = (np.asarray(x, dtype=float) for x in (P_D, J, solidity, Re, zero_lift))
     with np.errstate(divide="ignore", invalid="ignore"):
         r = 1.0 / (1.0 + np.sqrt(c.re_scale / Re))
         K, lc = LIFT_SLOPE * s / 4.0, J / np.pi
-        theta = c.pitch_factor * pd / np.pi + 2.0 / 3.0 * c.zero_lift * r * r
+        theta = c.pitch_factor * pd / np.pi + 2.0 / 3.0 * (c.zero_lift + change) * r**4
+        r = r * np.asarray(level, dtype=float)
         b = 2.0 * lc + K
         # the root is (2 lc - K)^2 + 8 K theta, never negative for theta >= 0; this form of li does not cancel
         li = 2.0 * K * (theta - lc) / (b + np.sqrt(np.maximum(b * b + 8.0 * K * (theta - lc), 0.0)))
@@ -205,200 +305,3 @@ def coefficients(
         Cp = C * (lc + INDUCED_FACTOR * induced) + s * c.cd0 * np.sqrt(RE_DRAG / Re) / 8.0
         Cp = Cp + c.stall_drag * lost * pd / np.pi
     return np.asarray(C * co.CT_PER_ROTOR), np.asarray(Cp * co.CP_PER_ROTOR)
-
-
-@dataclass(frozen=True, eq=False)
-class Estimate:
-    """Outcome of the compact formula over N points.
-
-    Attributes
-    ----------
-    thrust_N, power_W : (N,) float
-        Thrust [N], shaft power [W].
-    rpm, airspeed_m_s : (N,) float
-        Rotational speed [rev/min], airspeed [m/s].
-    CT, CP, J, M_tip, Re : (N,) float
-        Propeller convention, advance ratio, rotational tip Mach number, Reynolds number at 0.75 R. [-]
-    u_thrust_N, u_power_W : (N,) float
-        Half-widths that held 68 % of the points of makers left out of the fit; NaN (unknown) for ducted rotors, near
-        the speed of sound and beyond zero thrust. At flagged points too narrow: on volume 2 they hold about half. [N],
-        [W]
-    u95_thrust_N, u95_power_W : (N,) float
-        The same for 95 %. [N], [W]
-    flags : tuple of tuple of str
-        Per point, why not to trust it; empty when inside the data.
-    """
-
-    thrust_N: Array
-    power_W: Array
-    rpm: Array
-    airspeed_m_s: Array
-    CT: Array
-    CP: Array
-    J: Array
-    M_tip: Array
-    Re: Array
-    u_thrust_N: Array
-    u_power_W: Array
-    u95_thrust_N: Array
-    u95_power_W: Array
-    flags: tuple[tuple[str, ...], ...]
-
-    @property
-    def thrust_kgf(self) -> Array:
-        """Thrust. [kgf]"""
-        return self.thrust_N / KGF
-
-
-def validity_flags(
-    diameter_m: float, P_D: float, blades: float, Re: float, M_tip: float, x: float, chord_known: bool = True,
-    ducted: bool = False,
-) -> tuple[str, ...]:  # fmt: skip
-    """Say where a point leaves the data of the calibration.
-
-    Parameters
-    ----------
-    diameter_m : float
-        Diameter. [m]
-    P_D : float
-        Pitch over diameter. [-]
-    blades : float
-        Number of blades. [-]
-    Re, M_tip : float
-        Reynolds number at 0.75 R, rotational tip Mach number. [-]
-    x : float
-        J/(P/D). [-]
-    chord_known : bool
-        Whether the chord was given.
-    ducted : bool
-        Whether the rotor runs in a duct.
-
-    Returns
-    -------
-    tuple of str
-        Empty inside the data.
-
-    Examples
-    --------
-    >>> validity_flags(0.254, 0.5, 2, 5e4, 0.2, 0.3)
-    ()
-    >>> validity_flags(0.3556, 0.57, 2, 3e5, 1.09, 0.0)[-1]
-    'tip Mach 1.09 is supersonic: extrapolated, the formula knows no Mach number'
-    """
-    out = []
-    low, high = DIAMETER_RANGE
-    if not low * 0.999 <= diameter_m <= high * 1.001:
-        hint = "" if chord_known else "; give the chord, small propellers are wider than the default"
-        out.append(f"diameter {diameter_m / INCH:.3g} in outside the data (7-19 in){hint}")
-    low, high = P_OVER_D_RANGE
-    if not low <= P_D <= high:
-        out.append(f"P/D {P_D:.2f} outside the data ({low:g}-{high:g})")
-    if blades != 2:
-        out.append(f"{blades:g} blades: every propeller of the calibration has 2")
-    if np.isfinite(Re) and not RE_RANGE[0] <= Re <= RE_RANGE[1]:
-        out.append(f"Reynolds number {Re:.2g} outside the data ({RE_RANGE[0]:.2g}-{RE_RANGE[1]:.2g})")
-    if M_tip >= 1.0:
-        out.append(f"tip Mach {M_tip:.2f} is supersonic: extrapolated, the formula knows no Mach number")
-    elif M_tip > M_TIP_LIMIT:
-        out.append(f"tip Mach {M_tip:.2f} above {M_TIP_LIMIT:g}: extrapolated, the formula knows no Mach number")
-    elif M_tip > M_TIP_DATA:
-        out.append(f"tip Mach {M_tip:.2f} beyond the data ({M_TIP_DATA:g})")
-    if ducted:
-        out.append("ducted: a fit to open propellers (no duct, cascade or stator)")
-    if x < 0.0:
-        out.append("airspeed from behind: outside the model")
-    elif x > X_LIMIT:
-        out.append(f"J/(P/D) {x:.2f}: beyond zero thrust, outside the data")
-    return tuple(out)
-
-
-def _check(D: Array, pitch: Array, B: Array, rpm: Array, V: Array, chord: Array) -> None:
-    hint = "Inches or millimetres given?"
-    tests = (
-        ("diameter_m", D, (D > 0) & (D < 100), "a positive length", hint),
-        ("pitch_m", pitch, (pitch > 0) & (pitch < 100), "a positive length", hint),
-        ("blades", B, (B >= 1) & (B <= 20) & (B == np.floor(B)), "a whole number from 1 to 20", ""),
-        ("rpm", rpm, (rpm >= 0) & np.isfinite(rpm), "0 rev/min or more", "The model has no sense of rotation"),
-        ("airspeed_m_s", V, np.isfinite(V), "a finite speed", ""),
-        ("chord_m", chord, (chord > 0) & (chord < 0.5 * D), "more than 0 and less than the radius", hint),
-    )
-    faults = [
-        Fault("", name, f"{float(x[~ok].ravel()[0]):g}", expected, hint)
-        for name, x, ok, expected, hint in tests
-        if not np.all(ok)
-    ]
-    if faults:
-        raise InputError(faults)
-
-
-def estimate(
-    diameter_m: ArrayLike, pitch_m: ArrayLike, blades: ArrayLike, rpm: ArrayLike, airspeed_m_s: ArrayLike = 0.0,
-    air: Air | None = None, chord_m: ArrayLike | None = None, ducted: bool = False,
-) -> Estimate:  # fmt: skip
-    """Thrust and power with their bands and flags.
-
-    Parameters
-    ----------
-    diameter_m, pitch_m : float or array
-        Diameter; geometric pitch, advance per turn. [m]
-    blades : int or array
-        Number of blades. [-]
-    rpm : float or array
-        Rotational speed. [rev/min]
-    airspeed_m_s : float or array
-        Airspeed along the axis. [m/s]
-    air : Air, optional
-        State of the air; 1.225 kg/m3 at 15 degC by default.
-    chord_m : float or array, optional
-        Chord of a blade at 0.75 R, by far the best fourth number; a typical one by default. [m]
-    ducted : bool
-        Whether the rotor runs in a duct; only flagged, the formula has no duct.
-
-    Returns
-    -------
-    Estimate
-        Arguments broadcast against each other and raveled to N points; NaN without rotation in moving air.
-
-    Raises
-    ------
-    InputError
-        For lengths that are not positive, a chord above the radius, a blade count that is not whole, negative rpm; all
-        at once.
-
-    Examples
-    --------
-    >>> e = estimate(10 * 0.0254, 5 * 0.0254, 2, 6000.0)
-    >>> e.thrust_N.round(1), e.u_thrust_N.round(1), e.power_W.round(0), e.flags
-    (array([5.2]), array([0.8]), array([51.]), ((),))
-    """
-    air = Air.from_density() if air is None else air
-    known = chord_m is not None
-    names = (diameter_m, pitch_m, blades, rpm, airspeed_m_s, default_chord(diameter_m) if chord_m is None else chord_m,
-             air.rho, air.mu, air.a_sound)  # fmt: skip
-    arrays = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in names))
-    D, p, B, w, V, c, rho, mu, a = (np.ravel(x) for x in arrays)
-    _check(D, p, B, w, V, c)
-    n = w / 60.0
-    J = np.asarray(co.J(V, n, D))
-    Re = np.asarray(co.Re75(c, n, D, V, rho, mu))
-    M = np.asarray(co.M_tip(n, D, a))
-    pd, s = p / D, 2.0 * B * c / (np.pi * D)
-    turning = np.where(n > 0, Re, np.nan)  # without rotation there is no coefficient
-    CT, CP = coefficients(pd, J, s, turning)
-    CT0, CP0 = coefficients(pd, np.zeros_like(pd), s, turning)
-    still = (n == 0) & (V == 0)
-    T = np.where(still, 0.0, co.thrust(CT, rho, n, D))
-    P = np.where(still, 0.0, co.power(CP, rho, n, D))
-    # without rotation J is NaN: the sign of V decides then
-    x = np.where(np.isnan(J), np.copysign(np.where(V == 0, 0.0, np.inf), V), J / pd)
-    rows = zip(D, pd, B, Re, M, x, strict=True)
-    flags = tuple(validity_flags(d, ratio, b, re, m, at, known, ducted) for d, ratio, b, re, m, at in rows)
-    unknown = ducted | (M > M_TIP_LIMIT) | (x < 0.0) | (x > X_LIMIT)
-    band = BANDS["known" if known else "unknown"]
-
-    def width(key: str, scale: Array) -> Array:
-        return np.where(unknown, np.nan, np.interp(x, BAND_X, band[key]) * scale)
-
-    T0, P0 = np.asarray(co.thrust(CT0, rho, n, D)), np.asarray(co.power(CP0, rho, n, D))
-    return Estimate(T, P, w, V, CT, CP, J, M, Re, width("CT68", T0), width("CP68", P0), width("CT95", T0),
-                    width("CP95", P0), flags)  # fmt: skip

@@ -14,7 +14,7 @@ from bemt.calibrate.text import NAMES
 
 Array = NDArray[np.float64]
 
-_COLOURS = {"thesis": "#b2182b", "refit": "#ef8a62", "compact": "#2166ac", "compact_no_chord": "#67a9cf"}
+_COLOURS = {"thesis": "#b2182b", "compact_pitch": "#1b7837", "compact": "#2166ac", "compact_no_chord": "#67a9cf"}
 
 
 def draw(sets: Mapping[str, tuple[Points, Mapping[str, Array]]], path: Path) -> None:

@@ -2,14 +2,15 @@
 
 UIUC folders and files, APC performance files (the vendor's computation), Drive Calculator's table (power laws, taken at
 three tip speeds), and any table with the columns (or ``recording.toml`` constants) diameter, pitch, rpm and thrust or
-CT; further columns are airspeed or J, power, torque or CP, density, blades, chord (at 0.75 R), ducted (0 or 1), name.
+CT; further columns are airspeed or J, power, torque or CP, density, blades, chord and measured pitch (at 0.75 R),
+ducted (0 or 1), name.
 """
 
 from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -53,6 +54,8 @@ class Propeller:
         Chord at 0.75 R; NaN when unknown. [m]
     ducted : bool
         In a duct: scored, never fitted.
+    measured_pitch_m : float
+        2 pi 0.75 R tan(blade angle there); NaN when unknown. [m]
     """
 
     name: str
@@ -63,6 +66,7 @@ class Propeller:
     blades: int = 2
     chord_m: float = float("nan")
     ducted: bool = False
+    measured_pitch_m: float = float("nan")
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +104,7 @@ class Points:
         Parameters
         ----------
         name : str
-            ``diameter_m``, ``pitch_m``, ``blades`` or ``chord_m``.
+            ``diameter_m``, ``pitch_m``, ``blades``, ``chord_m`` or ``measured_pitch_m``.
 
         Returns
         -------
@@ -124,7 +128,10 @@ class Points:
         """Whether the rotor runs in a duct."""
         return np.array([p.ducted for p in self.propellers])[self.index]
 
-    def chord(self, constants: compact.Constants = compact.CONSTANTS, known: bool = True) -> Array:
+    def chord(
+        self, constants: compact.Constants = compact.CONSTANTS, known: bool = True,
+        series: Mapping[str, compact.Series] = compact.SERIES,
+    ) -> Array:  # fmt: skip
         """Chord at 0.75 R.
 
         Parameters
@@ -133,6 +140,8 @@ class Points:
             For the typical chord.
         known : bool
             Use measured chords where there are any.
+        series : mapping of str to Series
+            By maker.
 
         Returns
         -------
@@ -140,7 +149,8 @@ class Points:
             Measured or typical. [m]
         """
         c = self.of("chord_m")
-        typical = np.asarray(compact.default_chord(self.of("diameter_m"), constants))
+        own = np.array([series.get(p.maker, compact.Series()).chord for p in self.propellers])[self.index]
+        typical = own * np.asarray(compact.default_chord(self.of("diameter_m"), constants))
         return np.where(np.isfinite(c) & known, c, typical)
 
     def Re(self, chord_m: Array) -> Array:
@@ -187,10 +197,13 @@ Rows = tuple[Propeller, Array, Array, Array, Array]
 def _from_uiuc(p: uiuc.UiucPropeller) -> tuple[list[Rows], list[str]]:
     if p.pitch_in is None:
         return [], [f"{p.name}: no nominal pitch"]
-    chord = float("nan")
+    chord = pitch = float("nan")
     if p.geometry is not None and p.geometry.r_R[0] <= 0.75 <= p.geometry.r_R[-1]:
         chord = float(np.interp(0.75, p.geometry.r_R, p.geometry.c_R)) * p.diameter_m / 2.0
-    made = Propeller(p.name, p.family, "UIUC", p.diameter_m, p.pitch_in * INCH, p.blades, chord)
+        beta = np.radians(np.interp(0.75, p.geometry.r_R, p.geometry.beta_deg))
+        pitch = 0.75 * np.pi * p.diameter_m * float(np.tan(beta))
+    made = Propeller(p.name, p.family, "UIUC", p.diameter_m, p.pitch_in * INCH, p.blades, chord,
+                     measured_pitch_m=pitch)  # fmt: skip
     rows: list[Rows] = [(made, s.rpm, np.zeros_like(s.rpm), s.CT, s.CP) for s in p.statics]
     rows += [(made, np.full_like(line.J, line.rpm), line.J, line.CT, line.CP) for line in p.lines]
     return rows, [] if rows else [f"{p.name}: geometry only"]
@@ -291,11 +304,13 @@ def _from_table(path: Path, found: Imported) -> tuple[list[Rows], list[str], lis
     if J is None:
         J = np.zeros(N) if V is None else np.asarray(co.J(V, n, D))
     B, chord, duct = column("blades", "B"), column("chord_m", "chord75_m"), column("ducted")
+    measured = column("measured_pitch_m", "pitch75_m")
     if B is None:
         B = np.full(N, 2.0)
         notes.append(f"{path}: no column blades, 2 assumed")
     chord = np.full(N, np.nan) if chord is None else chord
     duct = np.zeros(N) if duct is None else duct
+    measured = np.full(N, np.nan) if measured is None else measured
     names = found.texts.get("name") or found.texts.get("propeller") or (path.stem,) * N
     groups: dict[tuple[Any, ...], list[int]] = {}
     bad = 0
@@ -304,12 +319,13 @@ def _from_table(path: Path, found: Imported) -> tuple[list[Rows], list[str], lis
         if not (all(np.isfinite(v) and v > 0 for v in values) and B[i] == round(B[i])):
             bad += 1
             continue
-        key = (names[i], *values, None if np.isnan(chord[i]) else float(chord[i]), bool(duct[i] > 0))
+        more = (None if np.isnan(v) else float(v) for v in (chord[i], measured[i]))  # NaN never equals NaN
+        key = (names[i], *values, *more, bool(duct[i] > 0))
         groups.setdefault(key, []).append(i)
     rows: list[Rows] = []
-    for (name, d, p, b, c, inside), at in groups.items():
+    for (name, d, p, b, c, q, inside), at in groups.items():
         made = Propeller(str(name), str(name).split("_")[0].split(" ")[0], path.name, float(d), float(p), int(b),
-                         float("nan") if c is None else c, inside)  # fmt: skip
+                         float("nan") if c is None else c, inside, float("nan") if q is None else q)  # fmt: skip
         rows.append((made, rpm[at], J[at], CT[at], CP[at]))
     return rows, [f"{path}: {bad} rows without a positive diameter, pitch and blade count"] if bad else [], notes
 

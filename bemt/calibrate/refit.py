@@ -1,14 +1,15 @@
-"""Constants of :mod:`bemt.calibrate.compact` from measured points, and its error bands with the maker left out.
+"""Constants and series of :mod:`bemt.calibrate.compact` from measured points, and its bands with the maker left out.
 
-Order: thrust and power constants on propellers whose chord is known; Re0 so that static CT follows rpm WITHIN each
-propeller (propellers differ in more than Reynolds number); then the chord law, on the known chords and on those that
-static thrust implies. Residuals are taken in arsinh, which is a logarithm except near zero, with scipy's soft_l1 loss;
-each propeller weighs one at rest and one in flight.
+Thrust first, on propellers whose chord is known, as a mixed model: eight constants for all, a0 of each series, a0 and
+level of each propeller as random effects (`SIGMA`). So Reynolds number acts as it does WITHIN propellers, and a series
+with many sizes counts as little more than one with few. Then power, then the chord law on the known chords and on those
+that static thrust implies. Residuals are taken in arsinh, which is a logarithm except near zero, with scipy's soft_l1
+loss; each propeller weighs one at rest and one in flight.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,50 +17,90 @@ from numpy.typing import NDArray
 
 from bemt.calibrate import compact
 from bemt.calibrate.points import Points
+from bemt.importers._uiuc_names import FAMILIES
 
 Array = NDArray[np.float64]
 
 MIN_PROPELLERS = 8
 """Propellers with a known chord and power that a fit of the eight constants needs."""
+GIVEN_FIELDS = {"label": (), "chord": ("chord_m",), "pitch": ("chord_m", "measured_pitch_m")}
+GIVEN = tuple(GIVEN_FIELDS)
+"""What a prediction may use of each propeller: label and series; its chord too; chord and measured pitch."""
 SOFT_CT, SOFT_CP = 0.02, 0.012
 """Coefficients below which residuals become absolute [-]."""
 LOSS_SCALE = 0.03
+SIGMA = {"series": 0.06, "propeller": 0.06, "level": 0.05, "run": 0.05}
+"""Spread of a0 by series and by propeller [rad], of the logarithm of the level, of a run in arsinh [-]: the smallest
+error with the propeller left out of volume 1 among 0.03 to 0.1."""
+RUN_POINTS = 6.0
+"""Independent readings that a run at rest or in flight counts for."""
 X_THRUST, X_POWER = 0.95, 1.0
 """J/(P/D) up to which thrust and power are fitted [-]."""
 RE0_RANGE = (500.0, 30000.0)
-WITHIN_SCALE = 0.02
 CHORD_GRID = np.linspace(0.05, 0.4, 141)
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """Constants and what they were fitted on: ``propellers`` with chord, ``chords`` of the chord law."""
+    """Constants and series, and what they were fitted on: ``propellers`` with chord, ``chords`` of the chord law."""
 
     constants: compact.Constants
+    series: Mapping[str, compact.Series]
     propellers: int
     chords: int
 
 
-def predict(points: Points, constants: compact.Constants, known: bool = True) -> tuple[Array, Array]:
+PUBLISHED = Fitted(compact.CONSTANTS, compact.SERIES, 0, 0)
+"""What :mod:`bemt.calibrate.compact` holds."""
+
+
+def _zero_lift(points: Points, series: Mapping[str, compact.Series]) -> Array:
+    return np.array([series.get(p.maker, compact.Series()).zero_lift for p in points.propellers])[points.index]
+
+
+def predict(points: Points, fitted: Fitted = PUBLISHED, given: str = "chord") -> tuple[Array, Array]:
     """CT and CP of the formula at measured conditions.
 
     Parameters
     ----------
     points : Points
         Conditions, in standard air.
-    constants : compact.Constants
-        Constants.
-    known : bool
-        Use measured chords where there are any.
+    fitted : Fitted
+        Constants and series.
+    given : str
+        One of `GIVEN`: what is used where the propeller has it.
 
     Returns
     -------
     CT, CP : (N,) float
         Propeller convention. [-]
     """
-    chord = points.chord(constants, known)
+    chord = points.chord(fitted.constants, given != "label", fitted.series)
     s = 2.0 * points.of("blades") * chord / (np.pi * points.of("diameter_m"))
-    return compact.coefficients(points.P_D, points.J, s, points.Re(chord), constants)
+    pd = points.P_D
+    if given == "pitch":
+        pd = compact.effective_pitch(pd, points.of("measured_pitch_m") / points.of("diameter_m"))
+    Re, change = points.Re(chord), _zero_lift(points, fitted.series)
+    return compact.coefficients(pd, points.J, s, Re, fitted.constants, change)
+
+
+def has(points: Points, given: str) -> NDArray[np.bool_]:
+    """Points of propellers that have what a prediction may use.
+
+    Parameters
+    ----------
+    points : Points
+        Measured points.
+    given : str
+        One of `GIVEN`.
+
+    Returns
+    -------
+    (N,) bool
+        True where they have.
+    """
+    names = GIVEN_FIELDS[given]
+    return np.asarray(np.all([np.isfinite(points.of(name)) for name in ("diameter_m", *names)], axis=0))
 
 
 def fittable(points: Points) -> NDArray[np.bool_]:
@@ -87,59 +128,76 @@ def _weights(points: Points) -> Array:
     return np.asarray(1.0 / np.sqrt(np.bincount(group)[group]))
 
 
-def _least_squares(residual: Callable[[Array], Array], start: tuple[float, ...]) -> Array:
+def _thrust_fit(points: Points, start: compact.Constants) -> tuple[compact.Constants, dict[str, float]]:
+    """The four thrust constants and a0 of each series by the mixed model of the module."""
     from scipy.optimize import least_squares
+    from scipy.sparse import lil_matrix
 
-    x0 = np.array(start)
-    found = least_squares(residual, x0, loss="soft_l1", f_scale=LOSS_SCALE, x_scale=np.abs(x0))
-    return np.asarray(found.x)
-
-
-def _thrust_fit(points: Points, start: compact.Constants) -> compact.Constants:
-    """The three thrust constants at a given Re0."""
     used = points.select(points.x < X_THRUST)
-    w, y = _weights(used), _arsinh(used.CT, SOFT_CT)
+    makers, series_of = np.unique([p.maker for p in used.propellers], return_inverse=True)
+    present, own = np.unique(used.index, return_inverse=True)
+    series = series_of[used.index]
+    S, K, N = makers.size, present.size, used.rpm.size
+    w = _weights(used) * np.sqrt(RUN_POINTS) / SIGMA["run"]
+    y = _arsinh(used.CT, SOFT_CT)
+    D = used.of("diameter_m")
+    pd = compact.effective_pitch(used.P_D, used.of("measured_pitch_m") / D)
+    chord = used.of("chord_m")
+    s, Re = 2.0 * used.of("blades") * chord / (np.pi * D), used.Re(chord)
+    spread = np.repeat([SIGMA["series"], SIGMA["propeller"], SIGMA["level"]], [S, K, K])
 
     def make(v: Array) -> compact.Constants:
-        return replace(start, pitch_factor=float(v[0]), zero_lift=float(v[1]), loading_max=float(v[2]))
+        values = {"pitch_factor": v[0], "zero_lift": v[1], "loading_max": v[2], "re_scale": np.exp(v[3])}
+        return replace(start, **{name: float(x) for name, x in values.items()})
 
     def residual(v: Array) -> Array:
-        return (_arsinh(predict(used, make(v))[0], SOFT_CT) - y) * w
+        change, level = v[4 + series] + v[4 + S + own], np.exp(v[4 + S + K + own])
+        CT = compact.coefficients(pd, used.J, s, Re, make(v), change, level)[0]
+        return np.concatenate([(_arsinh(CT, SOFT_CT) - y) * w, v[4:] / spread])
 
-    return make(_least_squares(residual, (start.pitch_factor, start.zero_lift, start.loading_max)))
+    pattern = lil_matrix((N + spread.size, 4 + spread.size), dtype=int)
+    rows = np.arange(N)
+    pattern[:N, :4] = 1
+    for column in (4 + series, 4 + S + own, 4 + S + K + own):
+        pattern[rows, column] = 1
+    effects = np.arange(spread.size)
+    pattern[N + effects, 4 + effects] = 1
+    v0 = np.array([start.pitch_factor, start.zero_lift, start.loading_max, np.log(start.re_scale)])
+    low, high = np.full((2, v0.size + spread.size), [[-np.inf], [np.inf]])
+    low[3], high[3] = np.log(RE0_RANGE)  # data that know no Reynolds number would send it to zero
+    found = least_squares(residual, np.concatenate([v0, np.zeros(spread.size)]), loss="soft_l1", f_scale=2.0,
+                          bounds=(low, high), x_scale=np.concatenate([np.abs(v0), spread]), jac_sparsity=pattern,
+                          ftol=1e-7)  # fmt: skip
+    changes = {str(name): float(x) for name, x in zip(makers, found.x[4 : 4 + S], strict=True)}
+    return make(found.x), {name: changes[name] for name in np.unique(makers[series])}
 
 
-def _power_fit(points: Points, start: compact.Constants) -> compact.Constants:
-    used = points.select(np.isfinite(points.CP))
+def _power_fit(points: Points, fitted: Fitted) -> compact.Constants:
+    from scipy.optimize import least_squares
+
+    used, start = points.select(np.isfinite(points.CP)), fitted.constants
     w, y = _weights(used), _arsinh(used.CP, SOFT_CP)
 
     def make(v: Array) -> compact.Constants:
         return replace(start, stall_drag=float(v[0]), cd0=float(v[1]))
 
     def residual(v: Array) -> Array:
-        return (_arsinh(predict(used, make(v))[1], SOFT_CP) - y) * w
+        made = predict(used, replace(fitted, constants=make(v)), "pitch")[1]
+        return (_arsinh(made, SOFT_CP) - y) * w
 
-    return make(_least_squares(residual, (start.stall_drag, start.cd0)))
-
-
-def _within(points: Points, constants: compact.Constants) -> float:
-    """How badly static CT follows the rpm of each propeller, its own level taken away."""
-    still = points.select((points.J == 0) & (points.CT > 0))
-    d = np.log(still.CT) - np.log(predict(still, constants)[0])
-    k = still.index
-    e = d - (np.bincount(k, d) / np.maximum(np.bincount(k), 1))[k]
-    return float(np.mean(np.sqrt(1.0 + (e / WITHIN_SCALE) ** 2) - 1.0))
+    v0 = np.array([start.stall_drag, start.cd0])
+    return make(least_squares(residual, v0, loss="soft_l1", f_scale=LOSS_SCALE, x_scale=v0).x)
 
 
-def implied_chords(points: Points, constants: compact.Constants) -> Array:
+def implied_chords(points: Points, fitted: Fitted) -> Array:
     """Chord over radius that makes the formula's static CT the measured one, for propellers without a chord.
 
     Parameters
     ----------
     points : Points
         Measured points.
-    constants : compact.Constants
-        Constants; the chord law is not used.
+    fitted : Fitted
+        Constants and series; the chord law is not used.
 
     Returns
     -------
@@ -147,6 +205,7 @@ def implied_chords(points: Points, constants: compact.Constants) -> Array:
         NaN for propellers with a chord, without static points, or whose thrust no chord of 0.05 to 0.4 R explains. [-]
     """
     out = np.full(len(points.propellers), np.nan)
+    change = fitted.series
     for k, propeller in enumerate(points.propellers):
         own = points.select((points.index == k) & (points.J == 0) & (points.CT > 0))
         if np.isfinite(propeller.chord_m) or propeller.ducted or own.rpm.size == 0:
@@ -154,15 +213,40 @@ def implied_chords(points: Points, constants: compact.Constants) -> Array:
         R = propeller.diameter_m / 2.0
         s = propeller.blades * CHORD_GRID / np.pi
         Re = own.Re(np.full(own.rpm.size, R))[:, None] * CHORD_GRID
-        CT = compact.coefficients(propeller.pitch_m / propeller.diameter_m, 0.0, s, Re, constants)[0]
+        a0 = change.get(propeller.maker, compact.Series()).zero_lift
+        pd = propeller.pitch_m / propeller.diameter_m
+        CT = compact.coefficients(pd, 0.0, s, Re, fitted.constants, a0)[0]
         level = np.median(np.log(CT / own.CT[:, None]), axis=0)
         if level[0] < 0.0 < level[-1]:
             out[k] = np.interp(0.0, level, CHORD_GRID)
     return out
 
 
-def fit(points: Points, start: compact.Constants = compact.CONSTANTS, re_scale: float | None = None) -> Fitted | None:
-    """Fit the eight constants.
+def _chord_law(points: Points, fitted: Fitted) -> Fitted:
+    """Chord over diameter, and each series' factor on it: its mean over n propellers, shrunk by n/(n + 1)."""
+    known = np.array([p.chord_m / (p.diameter_m / 2.0) if not p.ducted else np.nan for p in points.propellers])
+    per_blade = np.where(np.isfinite(known), known, implied_chords(points, fitted))
+    have = np.isfinite(per_blade)
+    D = np.array([p.diameter_m for p in points.propellers])[have] / compact.D_CHORD
+    y = np.log(per_blade[have])
+    exponent = fitted.constants.chord_exponent
+    if np.ptp(np.log(D)) > 0.2:
+        exponent = float(np.polyfit(np.log(D), y, 1)[0])
+    level = float(np.mean(y - exponent * np.log(D)))
+    makers = np.array([p.maker for p in points.propellers])[have]
+    off = y - level - exponent * np.log(D)
+    series = {}
+    for name in np.unique(makers):
+        own = makers == name
+        a0 = fitted.series.get(str(name), compact.Series()).zero_lift
+        factor = float(np.exp(np.sum(off[own]) / (np.count_nonzero(own) + 1.0)))
+        series[str(name)] = compact.Series(a0, factor, FAMILIES.get(str(name), str(name)))
+    constants = replace(fitted.constants, chord_R=float(np.exp(level)), chord_exponent=exponent)
+    return replace(fitted, constants=constants, series=series, chords=int(np.count_nonzero(have)))
+
+
+def fit(points: Points, start: compact.Constants = compact.CONSTANTS) -> Fitted | None:
+    """Fit the eight constants and the series.
 
     Parameters
     ----------
@@ -170,52 +254,32 @@ def fit(points: Points, start: compact.Constants = compact.CONSTANTS, re_scale: 
         Measured points.
     start : compact.Constants
         Where the search begins.
-    re_scale : float, optional
-        Re0 to keep instead of fitting it. [-]
 
     Returns
     -------
     Fitted or None
         None when fewer than `MIN_PROPELLERS` propellers have chord and power.
     """
-    from scipy.optimize import minimize_scalar
-
     used = points.select(fittable(points))
     if np.unique(used.index[np.isfinite(used.CP)]).size < MIN_PROPELLERS or not np.any(used.J == 0):
         return None
-    if re_scale is None:
-
-        def cost(log_re: float) -> float:
-            return _within(used, _thrust_fit(used, replace(start, re_scale=float(np.exp(log_re)))))
-
-        bounds = (float(np.log(RE0_RANGE[0])), float(np.log(RE0_RANGE[1])))
-        found = minimize_scalar(cost, bounds=bounds, method="bounded", options={"xatol": 0.01})
-        re_scale = float(np.exp(found.x))
-    constants = _power_fit(used, _thrust_fit(used, replace(start, re_scale=re_scale)))
-    known = np.array([p.chord_m / (p.diameter_m / 2.0) if not p.ducted else np.nan for p in points.propellers])
-    per_blade = np.where(np.isfinite(known), known, implied_chords(points, constants))
-    have = np.isfinite(per_blade)
-    D = np.array([p.diameter_m for p in points.propellers])
-    exponent, level = constants.chord_exponent, 0.0
-    if np.ptp(np.log(D[have])) > 0.2:
-        exponent, level = np.polyfit(np.log(D[have] / compact.D_CHORD), np.log(per_blade[have]), 1)
-    else:
-        level = float(np.mean(np.log(per_blade[have]) - exponent * np.log(D[have] / compact.D_CHORD)))
-    constants = replace(constants, chord_R=float(np.exp(level)), chord_exponent=float(exponent))
-    return Fitted(constants, int(np.unique(used.index).size), int(np.count_nonzero(have)))
+    constants, changes = _thrust_fit(used, start)
+    series = {name: compact.Series(change) for name, change in changes.items()}
+    fitted = Fitted(constants, series, int(np.unique(used.index).size), 0)
+    return _chord_law(points, replace(fitted, constants=_power_fit(used, fitted)))
 
 
 def left_out(
     points: Points, fitted: Fitted, groups: NDArray[np.intp], progress: Callable[[int, int], None] | None = None
-) -> dict[bool, tuple[Array, Array]]:
-    """CT and CP of every point by constants fitted without its group; Re0 is kept.
+) -> dict[str, tuple[Array, Array]]:
+    """CT and CP of every point by constants and series fitted without its group.
 
     Parameters
     ----------
     points : Points
         Measured points.
     fitted : Fitted
-        Fit on all of them: start and Re0.
+        Fit on all of them, where each search begins.
     groups : (N,) int
         Group of each point: its propeller, or its maker.
     progress : callable, optional
@@ -224,24 +288,22 @@ def left_out(
     Returns
     -------
     dict
-        By whether measured chords are used: CT and CP; NaN where too few propellers are left to fit. [-]
+        By what is `GIVEN`: CT and CP; NaN where too few propellers are left to fit. [-]
     """
-    out = {known: (np.full(points.rpm.size, np.nan), np.full(points.rpm.size, np.nan)) for known in (True, False)}
+    out = {given: (np.full(points.rpm.size, np.nan), np.full(points.rpm.size, np.nan)) for given in GIVEN}
     all_groups = np.unique(groups)
     for done, g in enumerate(all_groups):
         own = groups == g
-        rest = fit(points.select(~own), fitted.constants, fitted.constants.re_scale)
-        for known, (CT, CP) in out.items():
+        rest = fit(points.select(~own), fitted.constants)
+        for given, (CT, CP) in out.items():
             if rest is not None:
-                CT[own], CP[own] = predict(points.select(own), rest.constants, known)
+                CT[own], CP[own] = predict(points.select(own), rest, given)
         if progress is not None:
             progress(done + 1, all_groups.size)
     return out
 
 
-def bands(
-    points: Points, CT: Array, CP: Array, constants: compact.Constants, known: bool
-) -> dict[str, tuple[float, ...]]:
+def bands(points: Points, CT: Array, CP: Array, fitted: Fitted, given: str) -> dict[str, tuple[float, ...]]:
     """Half-widths of the error bands over `compact.BAND_X`.
 
     Parameters
@@ -250,10 +312,10 @@ def bands(
         Measured points.
     CT, CP : (N,) float
         Predictions by fits without the maker. [-]
-    constants : compact.Constants
+    fitted : Fitted
         For the model's own static values.
-    known : bool
-        Chords as in the predictions.
+    given : str
+        As in the predictions, of `GIVEN`.
 
     Returns
     -------
@@ -262,7 +324,7 @@ def bands(
         NaN for bands with fewer than 20 points. [-]
     """
     own = replace(points, J=np.zeros_like(points.J))
-    CT0, CP0 = predict(own, constants, known)
+    CT0, CP0 = predict(own, fitted, given)
     x = points.x
     out: dict[str, tuple[float, ...]] = {}
     for name, measured, made, scale in (("CT", points.CT, CT, CT0), ("CP", points.CP, CP, CP0)):

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bemt.calibrate import compact
 from bemt.calibrate.points import Points
-from bemt.calibrate.refit import predict
+from bemt.calibrate.refit import Fitted, has, predict
 from bemt.units import INCH
 
 Array = NDArray[np.float64]
@@ -157,17 +157,17 @@ def power_score(points: Points, CP: Mapping[str, Array]) -> dict[str, Any]:
     return out
 
 
-def coverage(points: Points, constants: compact.Constants, known: bool) -> dict[str, float | None]:
+def coverage(points: Points, fitted: Fitted, given: str) -> dict[str, float | None]:
     """Share of points inside the published bands of the compact formula.
 
     Parameters
     ----------
     points : Points
         Measured points that took no part in the fit.
-    constants : compact.Constants
-        Constants of the formula.
-    known : bool
-        Use measured chords; only propellers that have one are counted then.
+    fitted : Fitted
+        Constants and series of the formula.
+    given : str
+        Of `bemt.calibrate.refit.GIVEN`; only propellers that have it are counted.
 
     Returns
     -------
@@ -175,16 +175,14 @@ def coverage(points: Points, constants: compact.Constants, known: bool) -> dict[
         ``CT68``, ``CT95``, ``CP68``, ``CP95``, at rest and in flight below `X_MAX` together; None without points. [-]
     """
     m = ~points.ducted & ((points.J == 0) | flight(points))
-    if known:
-        m &= np.isfinite(points.of("chord_m"))
-    used = points.select(m)
+    used = points.select(m & has(points, given))
     still = replace(used, J=np.zeros_like(used.J))
-    made, scale = predict(used, constants, known), predict(still, constants, known)
+    made, scale = predict(used, fitted, given), predict(still, fitted, given)
     out: dict[str, float | None] = {}
     for i, (name, measured) in enumerate((("CT", used.CT), ("CP", used.CP))):
         ok = np.isfinite(measured)
         for share in ("68", "95"):
-            width = np.interp(used.x, compact.BAND_X, compact.BANDS["known" if known else "unknown"][name + share])
+            width = np.interp(used.x, compact.BAND_X, compact.BANDS[given][name + share])
             inside = np.abs(measured - made[i]) <= width * scale[i]
             out[name + share] = float(np.mean(inside[ok])) if np.any(ok) else None
     return out

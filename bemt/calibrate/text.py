@@ -9,10 +9,13 @@ from bemt.tables import text_table
 
 NAMES = {
     "thesis": "K1/K2, thesis", "goal_seek": "K1/K2, goal-seek", "refit": "K1/K2, refit at rest",
-    "refit_flight": "K1/K2, refit with flight", "compact": "compact", "compact_no_chord": "compact, typical chord",
-    "compact_maker_out": "compact, maker out", "compact_no_chord_maker_out": "compact, typical chord, maker out",
+    "refit_flight": "K1/K2, refit with flight", "compact_pitch": "compact, chord and pitch",
+    "compact": "compact, chord", "compact_no_chord": "compact, label",
+    "compact_pitch_maker_out": "compact, chord and pitch, maker out", "compact_maker_out": "compact, chord, maker out",
+    "compact_no_chord_maker_out": "compact, label, maker out",
 }  # fmt: skip
-_SHORT = ("thesis", "refit", "compact", "compact_no_chord")
+_SHORT = ("thesis", "compact_pitch", "compact", "compact_no_chord")
+_GIVEN = {"pitch": "chord and pitch", "chord": "chord", "label": "label"}
 
 
 def _cell(row: Mapping[str, Any] | None) -> str:
@@ -48,11 +51,19 @@ def _set(name: str, found: Mapping[str, Any]) -> list[str]:
     power = found["power"]
     rows = [[NAMES.get(key, key), _cell(v), _cell(power["flight"][key])] for key, v in power["static"].items()]
     lines += ["", text_table(["power", "at rest", "in flight"], rows, indent="  ")]
-    for key, words in (("chord", "measured chords"), ("no_chord", "typical chords")):
+    for key, words in _GIVEN.items():
         c = found["coverage"][key]
         if c["CT68"] is not None:
             text = ", ".join(f"{k[:2]} {k[2:]} %: {100 * v:.0f} %" for k, v in c.items() if v is not None)
-            lines.append(f"  inside the published bands with {words}: {text}")
+            lines.append(f"  inside the published bands, given {words}: {text}")
+    limits = [[words, str(c["propellers"]),
+               *[f"{100 * c[f'{k}_13']:3.0f} {100 * c[f'{k}_26']:3.0f}" for k in ("maker_out", "within", "ideal")],
+               f"{c['scatter']:.3f}"]
+              for key, words in _GIVEN.items() if (c := found["limit"][key]) is not None]  # fmt: skip
+    if limits:
+        header = ["free function of the inputs, fitted on these data: % in 13, 26 % at rest", "propellers", "maker out",
+                  "propeller out", "perfect", "scatter of ln CT"]  # fmt: skip
+        lines += ["", text_table(header, limits, left=(0,), indent="  ")]
     models = [k for k in _SHORT if k in s["models"]]
     rows = [
         [r["quantity"], r["band"], r["motion"], str(r["propellers"]), str(r["points"]),
@@ -88,6 +99,8 @@ def text(doc: Mapping[str, Any]) -> str:
     on = f" on {c['propellers']} propellers with chord and {c['chords']} chords" if c["refitted"] else ""
     lines += ["", f"Compact formula, {head}{on} (published beside it):"]
     lines += ["  " + ", ".join(f"{k} {v:.4g} ({c['published'][k]:.4g})" for k, v in c["constants"].items())]
+    lines += ["  series (a0 added [rad], chord over typical):"]
+    lines += [f"    {key} {v['zero_lift']:+.3f} {v['chord']:.2f}  {v['name']}" for key, v in c["series"].items()]
     for name, found in doc["scores"].items():
         if found is not None:
             lines += _set(name, found)

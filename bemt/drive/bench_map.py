@@ -31,7 +31,9 @@ Array = NDArray[np.float64]
 NODES = 49
 SMOOTHNESS = 10.0 ** np.arange(-10.0, 0.1, 2.0)
 OWN_VOLTAGE = 0.01
-"""Spread of ln V beside the sag from which the voltage is a parameter. [1]"""
+"""Spread of ln V beside a line over current from which the voltage is a parameter. [1]"""
+REPEAT_VOLTAGE = 0.005
+"""The same at equal pulse widths, where half as much tells it (runs on one emptying battery). [1]"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,14 +261,15 @@ def _chosen(x: Array, y: Array, w: Array, grid: Array) -> float:
     return float(SMOOTHNESS[int(np.argmin(best))])
 
 
-def _own_voltage(pulse: Array, voltage: Array, current: Array, sag: Curve) -> float:
-    """Spread of ln V that is not the sag of one battery: a line over current, or a curve over pulse width. [1]"""
-    own = np.log(voltage) - np.log(-sag.at(pulse))
+def _own_voltage(pulse: Array, voltage: Array, current: Array, sag: Curve, ramp: bool) -> float:
+    """Spread of ln V that is not the sag of one battery, over what tells it: above 1 the voltage is a parameter. [1]"""
+    repeats = float(np.std(np.log(voltage) - np.log(-sag.at(pulse))))
     ok = np.isfinite(current)
-    if np.count_nonzero(ok) >= 4:
-        line = np.polyval(np.polyfit(current[ok], voltage[ok], 1), current[ok])
-        own = np.log(voltage[ok]) - np.log(np.maximum(line, 1e-3))
-    return float(np.std(own))
+    if np.count_nonzero(ok) < 4:
+        return repeats / OWN_VOLTAGE
+    line = np.polyval(np.polyfit(current[ok], voltage[ok], 1), current[ok])
+    own = float(np.std(np.log(voltage[ok]) - np.log(np.maximum(line, 1e-3))))
+    return max(own / OWN_VOLTAGE, 0.0 if ramp else repeats / REPEAT_VOLTAGE)  # in a ramp the lag moves it too
 
 
 def fit(
@@ -310,8 +313,8 @@ def fit(
         sag = _curve(pulse[known], -voltage[known], w[known], 1e-6, grid)
         ref = float(np.median(voltage[known]))
         limits = float(voltage[known].min()), float(voltage[known].max())
-        own = _own_voltage(pulse[known], voltage[known], points.values["current"][known], sag)
-        if own < OWN_VOLTAGE:
+        own = _own_voltage(pulse[known], voltage[known], points.values["current"][known], sag, points.ramp)
+        if own < 1.0:
             notes.append("voltage varies only with the sag of this battery: the map holds for it, not for others")
     curves: dict[str, Curve] = {}
     for name in quantities:
@@ -319,7 +322,7 @@ def fit(
         ok = np.isfinite(y)
         if np.count_nonzero(ok) < 4:
             continue
-        if own < OWN_VOLTAGE:
+        if own < 1.0:
             curves[name] = _curve(pulse[ok], y[ok], w[ok], smoothness, grid)
             continue
         ok &= known

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from bemt import importers
-from bemt.drive import bench_map, map_export, map_points, picture
+from bemt.drive import bench_map, map_export, map_points, map_scatter, picture
 from bemt.errors import EXIT_OK, Fault, InputError
 from bemt.imported import Imported
 from bemt.tables import json_text, number_text, text_table, write_atomic
@@ -58,14 +58,14 @@ def run(args: argparse.Namespace) -> int:
         hint = "Is there a propeller, and did the motor run through? Different drives do not share a map"
         raise InputError(Fault(", ".join(args.files), "thrust_N", got, "thrust that rises with the pulse width", hint))
     trip = bench_map.held_out(points)
-    spread = bench_map.repeat_spread(points, chart)
+    spread, speed = bench_map.repeat_spread(points, chart), map_scatter.document(points)
     name = args.name or Path(args.files[0]).stem
     document = {
         "schema": SCHEMA, "name": name, "files": list(args.files), **map_export.document(chart, args.nodes),
         "steady_points": len(points),
         "held_out": {"points": len(trip.error), "worst_of_full_thrust": trip.worst, "rms_of_full_thrust": trip.rms,
                      "share_within_1_pct": float(np.mean(np.abs(trip.error) <= 0.01))},
-        "repeat_spread_of_full_thrust": spread,
+        "repeat_spread_of_full_thrust": spread, "speed_known": speed,
         "misfit_of_full_thrust": off,
     }  # fmt: skip
     answer = None
@@ -86,6 +86,11 @@ def run(args: argparse.Namespace) -> int:
     )
     if np.isfinite(spread):
         print(f"the recording itself differs by up to {100 * spread:.2f} % of full thrust at equal pulse width")
+    if speed["points"]:
+        worst, rms = (100 * speed[f"{key}_of_full_thrust"] for key in ("worst", "rms"))
+        print(
+            f"with its speed known thrust would still miss by {worst:.2f} %, rms {rms:.2f} %: scatter of the readings"
+        )
     if chart.with_voltage:
         m = chart.curves["thrust"].exponent
         low, high = chart.voltage_range
