@@ -22,7 +22,7 @@ EXIT_INTERRUPTED = 130
 _MODULES = {"sweep": "bemt.sweep", "report": "bemt.report",
             "validate": "bemt.validate", "reproduce": "bemt.reproduce", "bench": "bemt.bench",
             "import": "bemt.import_files", "export": "bemt.export_case", "cfd": "bemt.cfd.command",
-            "calibrate": "bemt.calibrate.command", "data": "bemt.data",
+            "calibrate": "bemt.calibrate.command", "estimate": "bemt.calibrate.estimate_command", "data": "bemt.data",
             "prove": "bemt.conceal.prove",
             "effects": "bemt.effects_list", "diagnose": "bemt.diagnose.command", "plan": "bemt.diagnose.command",
             "stations": "bemt.stations", "map": "bemt.drive.map_command", "motor": "bemt.drive.motor_command",
@@ -134,6 +134,19 @@ def build_parser() -> argparse.ArgumentParser:
     refit.add_argument("--out", metavar="DIR", help="write the tables, JSON and a figure there")
     refit.add_argument("--json", action="store_true", help="print one JSON document (bemt.calibration/1)")
     refit.add_argument("--quiet", action="store_true", help="print neither progress nor tables")
+
+    guess = commands.add_parser("estimate", help="thrust and power from a label such as 10x5, with bands, beside K1/K2")
+    guess.add_argument("label", metavar="LABEL", help="diameter x pitch in inches, blades if not 2: 10x4.7, 8x5x3")
+    guess.add_argument("--rpm", type=float, nargs="+", required=True, metavar="N", help="one or more [rev/min]")
+    guess.add_argument("--airspeed", type=float, nargs="+", metavar="V", help="one or more (default 0) [m/s]")
+    guess.add_argument("--blades", type=_positive, metavar="B", help="number (default: of the label, else 2)")
+    guess.add_argument("--chord-mm", type=float, metavar="C", help="at 0.75 R: by far the best fourth number")
+    twist = "2 pi r tan(blade angle) at r = 0.75 R: the fifth"
+    guess.add_argument("--measured-pitch-in", type=float, metavar="P", help=twist)
+    guess.add_argument("--series", metavar="NAME", help='maker and series, as "APC Thin Electric" or apce')
+    guess.add_argument("--density", type=float, default=1.225, metavar="RHO", help="of the air [kg/m3]")
+    guess.add_argument("--ducted", action="store_true", help="flagged only: neither formula knows a duct")
+    guess.add_argument("--json", action="store_true", help="print one JSON document (bemt.estimate/1)")
 
     fetch = commands.add_parser("data", help="fetch a public database of measured propellers into the cache")
     fetch.add_argument("kind", choices=("uiuc",), help="uiuc: UIUC Propeller Database")

@@ -64,6 +64,7 @@ MAY: dict[str, set[str]] = {
     "bemt.import_files": {"files", "print"},
     "bemt.import_adapt": {"files"},
     "bemt.calibrate.command": {"files", "print"},
+    "bemt.calibrate.estimate_command": {"print"},
     "bemt.calibrate.points": {"files"},
     "bemt.data": {"files", "print"},
     "bemt.data_archive": {"files"},

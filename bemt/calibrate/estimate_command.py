@@ -1,0 +1,128 @@
+"""``python -m bemt estimate 10x5 --rpm 6000``: thrust and power from a label, with bands, K1/K2 beside them."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from typing import Any
+
+import numpy as np
+
+from bemt import empirical
+from bemt.air import Air
+from bemt.calibrate.estimate import estimate
+from bemt.errors import EXIT_OK, Fault, InputError
+from bemt.tables import json_text, number_text, text_table
+from bemt.units import INCH
+from geometry.common import GeometryError
+from geometry.designation import parse_designation
+
+__all__ = ["SCHEMA", "document", "run"]
+
+SCHEMA = "bemt.estimate/1"
+
+
+def _label(text: str) -> tuple[float, float, int | None]:
+    try:
+        return parse_designation(text)
+    except GeometryError as error:
+        raise InputError([Fault("LABEL", *fault) for fault in error.faults]) from error
+
+
+def document(args: argparse.Namespace) -> dict[str, Any]:
+    """Estimate what the command line asks for.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        ``label``, ``rpm`` and ``airspeed`` (lists), ``blades``, ``chord_mm``, ``measured_pitch_in``, ``series``,
+        ``density``, ``ducted``.
+
+    Returns
+    -------
+    dict
+        Schema ``bemt.estimate/1``: ``given``, and a row for every speed and airspeed; unknown numbers are null.
+
+    Raises
+    ------
+    InputError
+        For an unreadable label, an impossible number (all at once), or an unknown series.
+    """
+    D, pitch, marked = _label(args.label)
+    blades = args.blades or marked or 2
+    faults = []
+    if args.blades and marked and args.blades != marked:
+        faults.append(Fault("--blades", "", str(args.blades), f"{marked}, as in {args.label}"))
+    if not 0.1 <= args.density <= 2.0:
+        faults.append(Fault("--density", "", f"{args.density:g}", "kg/m3 from 0.1 to 2 (1.225 at sea level)"))
+    if faults:
+        raise InputError(faults)
+    rpm, V = (v.ravel() for v in np.meshgrid(args.rpm, args.airspeed or [0.0], indexing="ij"))
+    air = Air.from_density(args.density)
+    chord = None if args.chord_mm is None else args.chord_mm * 1e-3
+    measured = None if args.measured_pitch_in is None else args.measured_pitch_in * INCH
+    e = estimate(D * INCH, pitch * INCH, blades, rpm, V, air, chord, measured, args.series, args.ducted)
+    k = empirical.estimate(D * INCH, pitch * INCH, rpm, V, air, ducted=args.ducted)
+
+    def number(value: float) -> float | None:
+        return float(value) if math.isfinite(value) else None
+
+    columns = {
+        "rpm": e.rpm, "airspeed_m_s": e.airspeed_m_s, "thrust_N": e.thrust_N, "u_thrust_N": e.u_thrust_N,
+        "u95_thrust_N": e.u95_thrust_N, "power_W": e.power_W, "u_power_W": e.u_power_W, "u95_power_W": e.u95_power_W,
+        "J": e.J, "CT": e.CT, "CP": e.CP, "M_tip": e.M_tip, "Re75": e.Re, "k1k2_thrust_N": k.thrust_N,
+    }  # fmt: skip
+    rows = [{name: number(column[i]) for name, column in columns.items()} | {"flags": list(e.flags[i])}
+            for i in range(rpm.size)]  # fmt: skip
+    given = {"label": args.label, "diameter_in": D, "pitch_in": pitch, "blades": blades, "chord_mm": args.chord_mm,
+             "measured_pitch_in": args.measured_pitch_in, "series": args.series, "density_kg_m3": args.density,
+             "ducted": args.ducted}  # fmt: skip
+    return {"schema": SCHEMA, "given": given, "rows": rows}
+
+
+def text(doc: dict[str, Any]) -> str:
+    """Give the rows as a table, with what not to trust below.
+
+    Parameters
+    ----------
+    doc : dict
+        Schema ``bemt.estimate/1``.
+
+    Returns
+    -------
+    str
+        Lines.
+    """
+
+    def shown(value: float | None, digits: int = 4) -> str:
+        return number_text(math.nan if value is None else value, digits)
+
+    head = ["rpm", "V [m/s]", "T [N]", "+- 68 %", "+- 95 %", "P [W]", "+- 68 %", "+- 95 %", "K1/K2 [N]", "J", "M tip"]
+    keys = ("rpm", "airspeed_m_s", "thrust_N", "u_thrust_N", "u95_thrust_N", "power_W", "u_power_W", "u95_power_W",
+            "k1k2_thrust_N", "J", "M_tip")  # fmt: skip
+    table = [[shown(row[key], 2 if key.startswith("u") else 6 if key == "rpm" else 4) for key in keys]
+             for row in doc["rows"]]  # fmt: skip
+    words = {flag: None for row in doc["rows"] for flag in row["flags"]}
+    notes = [f"do not trust: {flag}" for flag in words]
+    more = [f"--{key.replace('_', '-')}" for key in ("chord_mm", "measured_pitch_in") if doc["given"][key] is None]
+    if more:
+        notes.append(f"narrower bands with {' and '.join(more)}, both at 0.75 R")
+    return "\n".join([text_table(head, table, left=()), *notes]) + "\n"
+
+
+def run(args: argparse.Namespace) -> int:
+    """Do what the command line asks.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        As `document`, and ``json``.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
+    doc = document(args)
+    print(json_text(doc) if args.json else text(doc), end="")
+    return EXIT_OK

@@ -1,0 +1,62 @@
+"""The promise of `estimate`: three numbers in, thrust and power with a band out; where not to trust them is said."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from bemt import cli, empirical
+from bemt.calibrate.estimate import estimate
+from bemt.units import INCH
+
+
+def told(capsys: pytest.CaptureFixture[str], *words: str) -> dict[str, object]:
+    assert cli.main(["estimate", *words, "--json"]) == 0
+    return dict(json.loads(capsys.readouterr().out))
+
+
+def test_the_document_is_the_formula_with_k1k2_beside_it(capsys: pytest.CaptureFixture[str]) -> None:
+    doc = told(capsys, "10x4.7x3", "--rpm", "5000", "7000", "--airspeed", "0", "8", "--chord-mm", "21",
+               "--series", "APC Slow Flyer", "--density", "1.1")  # fmt: skip
+    assert doc["schema"] == "bemt.estimate/1" and doc["given"]["blades"] == 3  # type: ignore[index]
+    rows = doc["rows"]
+    assert [(r["rpm"], r["airspeed_m_s"]) for r in rows] == [(5000, 0), (5000, 8), (7000, 0), (7000, 8)]  # type: ignore[attr-defined]
+    from bemt.air import Air
+
+    air = Air.from_density(1.1)
+    ours = estimate(10 * INCH, 4.7 * INCH, 3, 7000.0, 8.0, air, 0.021, None, "apcsf")
+    theirs = empirical.estimate(10 * INCH, 4.7 * INCH, 7000.0, 8.0, air)
+    assert rows[3]["thrust_N"] == pytest.approx(ours.thrust_N[0], rel=1e-6)  # type: ignore[index]
+    assert rows[3]["u95_power_W"] == pytest.approx(ours.u95_power_W[0], rel=1e-6)  # type: ignore[index]
+    assert rows[3]["k1k2_thrust_N"] == pytest.approx(theirs.thrust_N[0], rel=1e-6)  # type: ignore[index]
+
+
+def test_an_unknown_band_is_null_and_its_reason_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    doc = told(capsys, "14x8", "--rpm", "20000")
+    row = doc["rows"][0]  # type: ignore[index]
+    assert row["u_thrust_N"] is None and any("supersonic" in flag for flag in row["flags"])
+    assert cli.main(["estimate", "14x8", "--rpm", "20000"]) == 0
+    out = capsys.readouterr().out
+    assert "do not trust: tip Mach 1.09 is supersonic" in out and "--chord-mm" in out
+
+
+def test_the_chord_narrows_the_band(capsys: pytest.CaptureFixture[str]) -> None:
+    wide, narrow = (told(capsys, "10x5", "--rpm", "6000", *more)["rows"][0] for more in ((), ("--chord-mm", "20")))  # type: ignore[index]
+    assert narrow["u_thrust_N"] / narrow["thrust_N"] < 0.8 * wide["u_thrust_N"] / wide["thrust_N"]
+
+
+@pytest.mark.parametrize(("words", "message"), [
+    (("10x47", "--rpm", "5000"), "Meant 10x4.7?"),
+    (("8x5x3", "--blades", "2", "--density", "1225", "--rpm", "1"), "--blades: got 2; expected 3, as in 8x5x3."),
+    (("8x5x3", "--blades", "2", "--density", "1225", "--rpm", "1"), "--density: got 1225; expected kg/m3"),
+    (("5x3", "--rpm", "-1", "--chord-mm", "300"), "chord_m: got 0.3"),
+    (("5x3", "--rpm", "-1", "--chord-mm", "300"), "rpm: got -1"),
+    (("5x3", "--rpm", "9000", "--series", "nobody"), "series: got nobody"),
+])  # fmt: skip
+def test_bad_input_is_refused_all_at_once(
+    words: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(["estimate", *words]) == 2
+    said = capsys.readouterr()
+    assert message in said.err and not said.out
