@@ -135,6 +135,10 @@ def test_a_nacelle_costs_drag_and_slows_the_root() -> None:
     assert np.array_equal(Q, Q0)
     slow = met(flow, Nacelle(deficit=0.2)).V[1:] / flow.V[1:]
     assert np.all((slow < 1.0) & (slow > 1.0 - 0.2))
+    wide = Nacelle(deficit=0.2, cd=0.0, body_over_R=0.4)
+    assert np.all(met(flow, wide).V[1:] / flow.V[1:] < slow)
+    drag = T0 - loads(flow, Nacelle(deficit=0.0, cd=0.8, body_over_R=0.4))[0]
+    np.testing.assert_allclose(drag, 0.8 * 0.5 * 1.2 * flow.V**2 * np.pi * (0.4 * flow.R) ** 2, rtol=1e-9, atol=1e-12)
 
 
 def test_skewed_flow_is_axial_at_0_and_keeps_glauert_s_balance() -> None:
@@ -240,6 +244,8 @@ def test_drift_follows_clock_and_temperature_of_its_run() -> None:
     np.testing.assert_allclose(creep, [0.0, 0.05 * (1 - math.exp(-1)), 0.05 * (1 - math.exp(-10)), 0.0], atol=1e-15)
     warm = (shown(flow, ThrustDrift(0.0, 300.0, 0.001))["thrust_N"] - flow.T0) / 40.0
     np.testing.assert_allclose(warm, [0.0, 0.005, 0.010, 0.0], atol=1e-15)
+    once = (shown(flow, ThrustDrift(0.05, 300.0, tared="once"))["thrust_N"] - flow.T0) / 40.0
+    np.testing.assert_allclose(once, 0.05 * (1.0 - np.exp(-t / 300.0)), atol=1e-15)
     assert ThrustDrift().applies(flow) == ""
     assert ThrustDrift().applies(recorded([6000.0] * 2)) != ""
     assert ThrustDrift().applies(recorded([6000.0] * 2, temperature_K=np.array([290.0, 291.0]))) == ""
@@ -307,6 +313,10 @@ def test_the_lip_separates_above_its_limit_only() -> None:
     np.testing.assert_allclose(found.T_duct, [1.0, 6.0, 6.0, 5.0])
     assert np.array_equal(found.Q, Q0)
     assert LipSeparation().applies(recorded([6000.0])) == "the rotor has no duct"
+    flow, found = ducted([1.0, 3.0, 4.0, 10.0])
+    T0 = found.T.copy()
+    LipSeparation(onset=0.2, loss=0.5, width=1.0).loads(found, flow)  # whole from twice the onset
+    np.testing.assert_allclose(T0 - found.T, [0.0, 0.25 * 3.0, 0.5 * 4.0, 0.5 * 10.0], atol=1e-12)
 
 
 def test_the_lip_remembers() -> None:
@@ -360,6 +370,16 @@ def test_a_hot_motor_obeys_its_voltage_balance(copper: float) -> None:
     k, R = 1.0 - 0.06, copper * (1.0 + 0.0039 * 60.0)  # in units of the cold motor at this point
     assert k * hot + R * hot**2 / k == pytest.approx(1.0 + copper, rel=1e-12)
     assert bool(hot < 1.0) is (copper > 0.3), "weaker magnets speed a lightly loaded motor up"
+
+
+def test_a_motor_that_stands_cools_and_a_new_clock_starts_cold() -> None:
+    t, run = np.array([0.0, 200.0, 400.0, 1e9, 2e9]), np.array([1.0, 1.0, 2.0, 3.0, 3.0])
+    share = shown(recorded([9000.0] * 5, time_s=t, run=run), MotorHeating(60.0, 100.0, 0.05))["rpm"] / 9000.0 - 1.0
+    assert share[0] == share[3] == 0.0, "cold at the start and after a long stand"
+    assert 0.0 < share[2] < 0.2 * share[1] < share[1] < share[4]
+    again = shown(recorded([9000.0] * 4, time_s=np.array([0.0, 200.0, 0.0, 200.0]), run=np.array([1.0, 1.0, 2.0, 2.0])),
+                  MotorHeating(60.0, 100.0, 0.05))["rpm"]  # fmt: skip
+    assert again[0] == again[2] < again[1] == again[3]
 
 
 def test_a_recorded_voltage_is_taken_as_it_is() -> None:

@@ -133,6 +133,8 @@ def _diagnose(
     best, parameters = fitting.refined(found, fitting.fit(found, decision.leading))
     say("held-out blocks")
     words, held, gp_only = fitting.held_out(found, decision.leading if decision.verdict != "unknown" else "none")
+    if decision.verdict == "unknown":  # what is not in the library is foretold as what it is: something smooth
+        held = gp_only
     smooth = fitting.smooth(found, best)
     after = problem.f0 + best.signature + smooth
     where = location.locate(found, best) if decision.verdict != "none" else None

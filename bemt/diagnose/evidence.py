@@ -28,11 +28,13 @@ Array = NDArray[np.float64]
 
 PRIOR = {"none": 0.35, "single": 0.55, "pair": 0.05, "unknown": 0.05}
 """Prior probability of the kinds of explanation; shared within a kind by the weights of the effects. [1]"""
-LEFT_OUT = 50.0
-"""Weight of an effect of every real rotor that the baseline leaves out, beside 1 for all others [1]."""
+LEFT_OUT, PRESENT = 50.0, 0.2
+"""Weight of an effect of every real rotor that the baseline leaves out, and of one that the baseline has, with other
+parameters, beside 1 for all others [1]."""
 
-FORM = 0.2
-"""Standard deviation of the form of an effect, share of its size: published laws of one effect differ by that [1]."""
+FORM = {0.15: 0.7, 0.45: 0.3}
+"""Standard deviation of the form of an effect, share of its size, with its prior weight: published laws of one effect
+differ by that, of some by half [1]."""
 
 NONE, UNKNOWN = "none", "unknown"
 
@@ -63,16 +65,34 @@ class Form:
         Whitened modes, none for instruments, whose laws are exact.
     root : (q, q) float
         Cholesky factor of 1 + B^T B.
+    size : float
+        Standard deviation of the form, share of the effect's size [1].
     """
 
     B: Array
     root: Array
+    size: float = 0.0
 
     @classmethod
-    def of(cls, white: Whitener, candidate: Candidate, g: int, modes: Array) -> Form:
-        """Modes times the size of a signature, and what lies between it and its neighbours on the grid, whitened."""
-        B = white(np.column_stack([candidate.signatures[:, g, None] * modes, candidate.between(g)]))
-        return cls(B, np.asarray(np.linalg.cholesky(np.eye(B.shape[1]) + B.T @ B), dtype=float))
+    def of(
+        cls, white: Whitener, candidate: Candidate, g: int, modes: Array, r: Array | None = None, size: float = 0.0
+    ) -> Form:
+        """Modes times the size of a signature, and what lies between it and its neighbours on the grid, whitened.
+
+        The size of the form is that which explains a whitened residual best, if it is not given.
+        """
+        signature = candidate.signatures[:, g]
+        shape, between = white(signature[:, None] * modes), white(candidate.between(g))
+
+        def sized(f: float) -> Form:
+            B = np.column_stack([f * shape, between])
+            return cls(B, np.asarray(np.linalg.cholesky(np.eye(B.shape[1]) + B.T @ B), dtype=float), f)
+
+        if r is None or not shape.shape[1]:
+            return sized(size or min(FORM))
+        d = r - white(signature)
+        forms = [sized(f) for f in FORM]
+        return max(forms, key=lambda f: 0.5 * float(np.sum(f.project(d) ** 2)) - f.half_log_det)
 
     def project(self, x: Array) -> Array:
         """Part of whitened vectors (M,) or (M, n) that the form may explain, (q,) or (q, n)."""
@@ -84,8 +104,8 @@ class Form:
 
     @property
     def half_log_det(self) -> float:
-        """Half the logarithm of the determinant of 1 + B^T B."""
-        return float(np.sum(np.log(np.diag(self.root))))
+        """Half the logarithm of the determinant of 1 + B^T B, less that of the prior weight of the size."""
+        return float(np.sum(np.log(np.diag(self.root)))) - float(np.log(FORM.get(self.size, 1.0)))
 
 
 @dataclass(eq=False)
@@ -208,7 +228,7 @@ def prior_weights(problem: Problem, ids: Sequence[str]) -> dict[str, float]:
     """
     usual = {e.id for e in effects.standard()} | {i for p in problem.parts for i in p.left_out}
     on = [{e.id for e in p.baseline} for p in problem.parts]
-    return {i: LEFT_OUT if i in usual and not all(i in o for o in on) else 1.0 for i in ids}
+    return {i: PRESENT if all(i in o for o in on) else LEFT_OUT if i in usual else 1.0 for i in ids}
 
 
 def log_priors(weights: dict[str, float], pairs: bool = True) -> dict[str, float]:
@@ -353,8 +373,17 @@ def form_modes(problem: Problem, candidates: Sequence[Candidate]) -> dict[str, A
     dict
         Id to (M, q), to be multiplied by the effect's signature [1].
     """
-    smooth = FORM * noise.smooth_modes(problem)
-    return {c.id: smooth if c.kind != "stand" else smooth[:, :0] for c in candidates}
+    out: dict[tuple[bool, tuple[str, ...]], Array] = {}
+    for key in {_law(c) for c in candidates}:
+        stand, along = key
+        # instruments are exact but for what they say themselves that they follow: a drift the clock
+        modes = noise.smooth_modes(problem, along, flow=not stand)
+        out[key] = modes[:, :0] if stand and not along else modes
+    return {c.id: out[_law(c)] for c in candidates}
+
+
+def _law(candidate: Candidate) -> tuple[bool, tuple[str, ...]]:
+    return candidate.kind == "stand", effects.catalogue()[candidate.id].along
 
 
 def _few(candidates: Sequence[Candidate], most: int = 9) -> NDArray[np.intp]:
@@ -383,7 +412,7 @@ def _state(
         span = spans[c.id]
         for _ in range(2):  # the form follows the size of the best setting, which depends on the form
             best = span.start + int(np.argmax(state.gains(c.id, span, R)[:, 0] + log_w[span]))
-            state.forms[c.id] = Form.of(white, c, int(columns[best]) - first, modes[c.id])
+            state.forms[c.id] = Form.of(white, c, int(columns[best]) - first, modes[c.id], rw)
         first += c.weight.size
     for name, gain in singles(state, R, spans, log_w).items():
         state.log_z[name] = none + float(gain[0])
@@ -425,7 +454,8 @@ def _pairs(state: State, spans: dict[str, slice], log_w: Array) -> None:
         form = Form(both, np.linalg.cholesky(np.eye(both.shape[1]) + both.T @ both))
         d = state.r - state.S[:, best[name][0]] - state.S[:, best[name][1]]
         p = form.project(d)
-        state.log_z[name] += 0.5 * float(p @ p) - form.half_log_det
+        chosen = sum(float(np.log(FORM.get(f.size, 1.0))) for f in forms)
+        state.log_z[name] += 0.5 * float(p @ p) - form.half_log_det + chosen
 
 
 def _posterior(states: Sequence[State], prior: dict[str, float]) -> dict[str, float]:

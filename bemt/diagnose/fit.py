@@ -25,6 +25,7 @@ __all__ = [
     "held_out",
     "intervals",
     "left_over",
+    "partitions",
     "refined",
     "smooth",
     "weights",
@@ -268,11 +269,30 @@ def blocks(problem: Problem, most: int = 6) -> tuple[str, NDArray[np.intp]]:
     tuple
         What the blocks are, and the block of each of P points.
     """
+    return partitions(problem, most)[0]
+
+
+def partitions(problem: Problem, most: int = 6) -> list[tuple[str, NDArray[np.intp]]]:
+    """All ways to leave out whole blocks: recordings, lines of speed, lines of advance ratio; else intervals of one.
+
+    Parameters
+    ----------
+    problem : Problem
+        Readings.
+    most : int
+        Largest number of blocks [1].
+
+    Returns
+    -------
+    list of tuple
+        What the blocks are, and the block of each of P points; at least one.
+    """
     X = problem.covariates
     P = X["rpm"].size
     run = X["run"].astype(int)
+    out: list[tuple[str, NDArray[np.intp]]] = []
     if len(problem.parts) > 1 and np.unique(run).size <= most and np.unique(run).size >= 3:
-        return "recordings", np.unique(run, return_inverse=True)[1]
+        out.append(("recordings", np.unique(run, return_inverse=True)[1]))
     for name in ("rpm", "J"):
         x = np.log(X[name]) if name == "rpm" else X[name]
         gap = 0.03 if name == "rpm" else 0.02
@@ -281,18 +301,19 @@ def blocks(problem: Problem, most: int = 6) -> tuple[str, NDArray[np.intp]]:
         line[order] = np.cumsum(np.r_[0, np.diff(x[order]) > gap])
         lines = int(line.max()) + 1
         if 3 <= lines <= max(P // 2, 3):
-            return f"whole lines of {name}", np.minimum(
-                line * most // max(lines, most), most - 1
-            ) if lines > most else line
+            few = np.minimum(line * most // max(lines, most), most - 1) if lines > most else line
+            out.append((f"whole lines of {name}", few))
+    if out:
+        return out
     spread = {
         k: float(np.ptp(v)) / max(float(np.max(np.abs(v))), 1e-12) for k, v in X.items() if k in ("rpm", "J", "time_s")
     }
     name = max(spread, key=lambda k: spread[k])
     rank = np.argsort(np.argsort(X[name], kind="stable"))
-    return f"intervals of {name}", rank * 4 // P
+    return [(f"intervals of {name}", rank * 4 // P)]
 
 
-def held_out(found: Evidence, name: str) -> tuple[str, Array, Array]:
+def held_out(found: Evidence, name: str, split: tuple[str, NDArray[np.intp]] | None = None) -> tuple[str, Array, Array]:
     """Predict every block from the others, with and without an explanation.
 
     Parameters
@@ -301,6 +322,8 @@ def held_out(found: Evidence, name: str) -> tuple[str, Array, Array]:
         Outcome of the weighing.
     name : str
         Explanation.
+    split : tuple, optional
+        What the blocks are and the block of each point; :func:`blocks` by default.
 
     Returns
     -------
@@ -308,7 +331,7 @@ def held_out(found: Evidence, name: str) -> tuple[str, Array, Array]:
         What the blocks are, (M,) prediction of the explanation and (M,) of a physics-free smooth error.
     """
     problem = found.problem
-    words, block = blocks(problem)
+    words, block = split or blocks(problem)
     member = block[problem.point]
     hyper = found.states[0].hyper
     C = noise.covariance(problem, hyper)
@@ -381,7 +404,8 @@ def form_covariance(found: Evidence, best: Fit) -> Array:
     out = np.zeros((M, M))
     for i, c in zip(best.ids, best.columns, strict=True):
         candidate, g = found.of(i), c - found.spans[i].start
-        B = np.column_stack([candidate.signatures[:, g, None] * modes[i], candidate.between(g)])
+        shape = found.states[0].forms[i].size * candidate.signatures[:, g, None] * modes[i]
+        B = np.column_stack([shape, candidate.between(g)])
         out += B @ B.T
     return out
 

@@ -1,13 +1,15 @@
 """What the readings may scatter by: noise, its correlation in time, nuisances, and what the solver gets wrong anyway.
 
-Four numbers are not known beforehand and are marginalised over a small grid: how much larger the noise is than stated,
-how it is correlated from point to point, how far blade element theory itself is off (a smooth error over advance ratio,
-a tenth of whose variance may change with speed), and the readings decide between them.
+Three things are not known beforehand and are marginalised over a small grid: how much larger the noise is than stated,
+how it is correlated from point to point, and how good blade element theory is for this rotor.  The last scales the
+errors of the solver together: nuisances of its own (slope, bend, form and parameters of its laws) and a smooth error
+over advance ratio, a tenth of whose variance may change with speed.  Its level stays as uncertain as declared: a rotor
+whose curves have the right shape may still be off by a constant.  The readings decide between them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -25,11 +27,12 @@ Array = NDArray[np.float64]
 _SCALES = {True: (0.7, 1.0, 1.5, 2.5, 5.0), False: (0.1, 0.25, 0.5, 1.0, 2.0, 4.0)}
 _AR = (0.0, 0.6, 0.9)
 _WHITE = 0.2
-# Error of the solver over advance ratio, share of the largest coefficient.  Declared after volume 1 of the UIUC
-# database, where thrust and torque at rest are off by 3 and 5 % (median) and one propeller in ten by more than 10 %.
-_MODEL = {0.0: 0.05, 0.01: 0.25, 0.03: 0.4, 0.08: 0.3}
+# How good the solver is: smooth error over advance ratio as a share of the largest coefficient, and a factor on its own
+# nuisances, with the prior weight.  Declared after volume 1 of the UIUC database, where thrust and torque at rest are
+# off by 3 and 5 % (median) and one propeller in ten by more than 10 %.
+_MODEL = {(0.003, 0.3): 0.2, (0.01, 0.6): 0.25, (0.03, 1.0): 0.3, (0.08, 1.0): 0.25}
 # Reference recordings show the error of the solver, however large: it need not be kept small by its prior.
-_MODEL_SHOWN = {0.0: 0.15, 0.01: 0.2, 0.03: 0.2, 0.08: 0.2, 0.25: 0.25}
+_MODEL_SHOWN = {(0.0, 1.0): 0.15, (0.01, 1.0): 0.2, (0.03, 1.0): 0.2, (0.08, 1.0): 0.2, (0.25, 1.0): 0.25}
 _MODEL_RPM = 0.1
 _LENGTH_J = 0.3
 _LENGTH_RPM = 0.7
@@ -45,6 +48,15 @@ _RIVAL_LENGTHS = (0.15, 0.5)
 _RIVAL_SIZES = (0.03, 0.12)
 
 
+# What every law of the flow depends on, and the spread below which a variable hardly changes it: natural logarithms of
+# speed, density and lengths, advance ratio, angles [rad], time [s].  Voltages and the weather's tenths of a kelvin are
+# nothing to it.
+_FLOW = {"rpm": 0.5, "J": 0.5, "density_kg_m3": 0.2}
+# What some laws depend on besides, as they say themselves.
+_BESIDES = {"tip_gap_m": 0.5, "wall_distance_m": 0.5, "sideslip_rad": 0.3, "time_s": 1.0}
+_LOGARITHMIC = ("rpm", "density_kg_m3", "tip_gap_m", "wall_distance_m")
+
+
 @dataclass(frozen=True)
 class Hyper:
     """One setting of the unknown numbers of the covariance.
@@ -57,6 +69,8 @@ class Hyper:
         Correlation of neighbouring points of a run [1].
     model : float
         Error of the solver, share of the largest coefficient [1].
+    own : float
+        Factor on the nuisances that are errors of the solver itself [1].
     weight : float
         Prior probability [1].
     """
@@ -64,6 +78,7 @@ class Hyper:
     scale: float
     ar: float
     model: float
+    own: float
     weight: float
 
 
@@ -83,7 +98,7 @@ def hypers(problem: Problem) -> tuple[Hyper, ...]:
     scales = _SCALES[problem.u_known]
     each = 1.0 / (len(scales) * len(_AR))
     model = _MODEL if problem.free.all() else _MODEL_SHOWN
-    return tuple(Hyper(s, a, m, each * w) for s in scales for a in _AR for m, w in model.items())
+    return tuple(Hyper(s, a, m, f, each * w) for s in scales for a in _AR for (m, f), w in model.items())
 
 
 def _order(problem: Problem) -> tuple[Array, Array]:
@@ -193,17 +208,24 @@ def sessions(problem: Problem) -> Array:
 
 def covariance(problem: Problem, h: Hyper) -> Array:
     """Covariance of noise, nuisances and solver for one setting, (M, M)."""
-    fixed = problem.tangents @ problem.tangents.T + sessions(problem)
-    return np.asarray(h.scale**2 * noise(problem, h.ar) + fixed + h.model**2 * discrepancy(problem))
+    stand, own = _tangents(problem)
+    wrong = h.own**2 * own + h.model**2 * discrepancy(problem)
+    return np.asarray(h.scale**2 * noise(problem, h.ar) + stand + wrong)
 
 
 def covariances(problem: Problem) -> Iterator[tuple[Hyper, Array]]:
     """Covariance of noise, nuisances and solver for every setting."""
-    fixed = problem.tangents @ problem.tangents.T + sessions(problem)
+    stand, own = _tangents(problem)
     wrong = discrepancy(problem)
     by_ar = {ar: noise(problem, ar) for ar in _AR}
     for h in hypers(problem):
-        yield h, h.scale**2 * by_ar[h.ar] + fixed + h.model**2 * wrong
+        yield h, h.scale**2 * by_ar[h.ar] + stand + h.own**2 * own + h.model**2 * wrong
+
+
+def _tangents(problem: Problem) -> tuple[Array, Array]:
+    """Covariance of what nobody knows of stand, blade and sessions, and of the errors of the solver itself."""
+    stand, own = problem.tangents[:, ~problem.own], problem.tangents[:, problem.own]
+    return stand @ stand.T + sessions(problem), own @ own.T
 
 
 def rivals(problem: Problem) -> tuple[tuple[str, Array], ...]:
@@ -252,13 +274,17 @@ def rivals(problem: Problem) -> tuple[tuple[str, Array], ...]:
     return tuple(out)
 
 
-def smooth_modes(problem: Problem) -> Array:
-    """Modes of a smooth function of unit variance over everything that varies, each channel for itself.
+def smooth_modes(problem: Problem, besides: Sequence[str] = (), flow: bool = True) -> Array:
+    """Modes of a smooth function of unit variance, each channel for itself.
 
     Parameters
     ----------
     problem : Problem
         Readings.
+    besides : sequence of str
+        Covariates that it depends on besides speed, advance ratio and density.
+    flow : bool
+        Whether it depends on these.
 
     Returns
     -------
@@ -267,13 +293,11 @@ def smooth_modes(problem: Problem) -> Array:
     """
     P = problem.covariates["rpm"].size
     apart = np.zeros((P, P))
-    for name, values in problem.covariates.items():
-        if name in ("run", "Re", "M_tip", "pressure_Pa"):
-            continue
-        x = np.log(values) if name == "rpm" else values
-        spread = float(np.ptp(x))
-        if spread > 1e-3 * max(float(np.max(np.abs(x))), 1e-12):
-            apart += ((x[:, None] - x[None, :]) / (_FORM_LENGTH * spread)) ** 2
+    for name, least in {**(_FLOW if flow else {}), **{k: v for k, v in _BESIDES.items() if k in besides}}.items():
+        if name in problem.covariates:
+            x = problem.covariates[name]
+            x = np.log(x) if name in _LOGARITHMIC else x
+            apart += ((x[:, None] - x[None, :]) / (_FORM_LENGTH * max(float(np.ptp(x)), least))) ** 2
     value, vector = np.linalg.eigh(np.exp(-0.5 * apart))
     keep = value > 0.02 * value[-1]
     modes = (vector[:, keep] * np.sqrt(value[keep]))[problem.point]

@@ -28,7 +28,7 @@ PRIORS = {
     "thrust zero": 0.002, "torque zero": 0.002, "speed of rotation": 0.003, "density": 0.005,
     "density not recorded": 0.015, "airspeed": 0.005, "session": 0.01, "parameter of the model": 0.25,
     "level of thrust": 0.06, "level of torque": 0.08, "slope over J": 0.05, "bend over J": 0.02,
-    "form of the model": 0.2,
+    "form of the model": 0.2, "form in a variable of its own": 0.45,
 }  # fmt: skip
 """Standard deviations: shares [1], pitch in [deg], zeros of full scale [1], parameters of active effects as a share of
 their published range [1].  Drag, lift, pitch, gains and zeros are working calibrations; level, slope
@@ -75,7 +75,7 @@ def _stretch(problem: Problem) -> Array:
     return out
 
 
-def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...]]:
+def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...], NDArray[np.bool_]]:
     """Tangents of everything that may differ without being a cause.
 
     Parameters
@@ -86,19 +86,22 @@ def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...]]:
     Returns
     -------
     tuple
-        (M, K) change of the readings for one standard deviation of each nuisance, and their names.
+        (M, K) change of the readings for one standard deviation of each nuisance, their names, and (K,) whether each
+        is an error of the solver itself.
     """
     columns: list[Array] = []
     names: list[str] = []
+    solver: list[bool] = []
     y, f0, channel = problem.y, problem.f0, problem.channel
 
     stretch = _stretch(problem)
 
-    def add(name: str, column: Array, of_reading: bool = False) -> None:
+    def add(name: str, column: Array, of_reading: bool = False, own: bool = False) -> None:
         column = column if of_reading else column * stretch
         if np.isfinite(column).all() and np.any(column != 0.0):
             columns.append(column)
             names.append(name)
+            solver.append(own)
 
     def everywhere(extra: Effect) -> Array:
         """Readings with an effect that reference recordings have too."""
@@ -136,13 +139,13 @@ def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...]]:
             mine = (rotor == k) & (channel == c)
             if not mine.any():
                 continue
-            own = np.where(mine, f0, 0.0)
             tag = f" (rotor {k})" if rotor.max() else ""
-            add(f"level of {name}{tag}", PRIORS[f"level of {name}"] * own)
-            size = np.where(own != 0.0, problem.scale, 0.0)
+            add(f"level of {name}{tag}", PRIORS[f"level of {name}"] * np.where(mine, f0, 0.0))
+            size = np.where(mine, problem.scale, 0.0)
             if np.ptp(J) > 0.05:
-                add(f"slope of {name} over J{tag}", PRIORS["slope over J"] * x * size, of_reading=True)
-                add(f"bend of {name} over J{tag}", PRIORS["bend over J"] * (1.5 * x**2 - 0.5) * size, of_reading=True)
+                for word, shape in (("slope", x), ("bend", 1.5 * x**2 - 0.5)):
+                    column = PRIORS[f"{word} over J"] * shape * size
+                    add(f"{word} of {name} over J{tag}", column, of_reading=True, own=True)
     recorded = all(p.record.air_recorded for p in problem.parts)
     add("density", np.where(load, PRIORS["density" if recorded else "density not recorded"] * f0, 0.0))
     add("airspeed", np.where(load, PRIORS["airspeed"] * V * slope_V, 0.0))
@@ -171,17 +174,20 @@ def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...]]:
             step = PRIORS["parameter of the model"] * (parameter.high - parameter.low)
             value = float(getattr(e, parameter.name))
             value = value + step if value + step <= parameter.high else value - step
-            add(f"{e.id} {parameter.name}", everywhere(replace(e, **{parameter.name: value})) - f0)  # type: ignore[type-var]
-    modes = PRIORS["form of the model"] * smooth_modes(problem)
+            changed = everywhere(replace(e, **{parameter.name: value})) - f0  # type: ignore[type-var]
+            add(f"{e.id} {parameter.name}", changed, own=True)
     for e in problem.baseline:
         without = [p.predict([b for b in p.baseline if b.id != e.id]) for p in problem.parts]
-        own = f0 - np.concatenate(without)[problem.kept]
+        share = f0 - np.concatenate(without)[problem.kept]
         # the published law of an effect that is on is no better known than that of one that is left out
-        if np.isfinite(own).all() and float(np.max(np.abs(own) / problem.scale)) > _FORM_FLOOR:
+        if np.isfinite(share).all() and float(np.max(np.abs(share) / problem.scale)) > _FORM_FLOOR:
+            alone = any(k in problem.covariates for k in e.along)
+            spread = PRIORS["form in a variable of its own" if alone else "form of the model"]
+            modes = spread * smooth_modes(problem, e.along)
             for k in range(modes.shape[1]):
-                add(f"form of {e.id}", own * modes[:, k])
+                add(f"form of {e.id}", share * modes[:, k], own=not alone)
     matrix = np.stack(columns, axis=1) if columns else np.zeros((y.size, 0))
-    return matrix, tuple(names)
+    return matrix, tuple(names), np.array(solver, dtype=bool)
 
 
 def _slope(part: Part, channel: str) -> Array:

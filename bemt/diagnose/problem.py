@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import evaluate, forward
-from bemt.diagnose.nuisance import PULSE_POWERS, nuisances
+from bemt.diagnose.nuisance import nuisances
 from bemt.diagnose.record import CHANNELS, Record, concatenated, merged
 from bemt.effects.base import Effect, Flow, Reading
 from bemt.errors import Fault, InputError
@@ -23,11 +23,26 @@ __all__ = ["Part", "Problem", "assemble", "build"]
 
 Array = NDArray[np.float64]
 
-_STATIONS = 24
+_STATIONS = 16
 _FEWEST = 3
 _U_DEFAULT = 0.01
-_U_RPM = 0.01
+_U_RPM = 0.003
 _U_FLOOR = 0.002
+# Prepared rotors that are kept at a time.
+_PREPARED = 30
+
+
+class _Recent(dict[Any, Any]):
+    """The last few prepared rotors: each holds megabytes of tables, and what they gave is kept by the part itself."""
+
+    def __getitem__(self, key: Any) -> Any:
+        self[key] = value = super().pop(key)
+        return value
+
+    def __setitem__(self, key: Any, value: Any) -> None:
+        super().__setitem__(key, value)
+        if len(self) > _PREPARED:
+            del self[next(iter(self))]
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,11 +130,15 @@ class Part:
 
     @cached_property
     def steady_rpm(self) -> Array:
-        """Speed as a smooth function of the pulse width, the baseline of the drive [rev/min]."""
+        """Speed as a parabola over the pulse width, the baseline of the drive [rev/min].
+
+        More terms would follow what drifts within a few settings of the pulse width, as steps.
+        """
         p, rpm = self.record.extra["pwm_s"], self.record.measured["rpm"]
-        degree = min(PULSE_POWERS - 1, np.unique(np.round(p, 6)).size - 1)
+        good = np.isfinite(rpm)
+        degree = min(2, np.unique(np.round(p[good], 6)).size - 1)
         x = (p - p.mean()) / max(float(np.ptp(p)), 1e-12)
-        return np.asarray(np.polyval(np.polyfit(x, rpm, degree), x))
+        return np.asarray(np.polyval(np.polyfit(x[good], rpm[good], degree), x))
 
     @cached_property
     def full_scale(self) -> dict[str, float]:
@@ -156,6 +175,8 @@ class Problem:
         Change of the readings for one standard deviation of each nuisance [units of the readings].
     names : tuple of str
         Names of the nuisances.
+    own : (K,) bool
+        Which of them are errors of the solver itself.
     notes : tuple of str
         What was assumed or left out.
     predicted : dict
@@ -175,6 +196,7 @@ class Problem:
     covariates: dict[str, Array]
     tangents: Array
     names: tuple[str, ...]
+    own: NDArray[np.bool_]
     notes: tuple[str, ...] = ()
     predicted: dict[Any, Array] = field(default_factory=dict, repr=False)
 
@@ -237,7 +259,7 @@ def _part(record: Record, case: Case, baseline: str) -> Part:
     ratio = record.air.rho / record.air.mu
     re_low = 0.15 * float(np.min(speed * ratio)) * float(np.min(chord))
     re_high = 1.3 * float(np.max(speed * ratio)) * float(np.max(chord))
-    model = replace(model, mach_max=top, re_range=(re_low, re_high), _kept={})
+    model = replace(model, mach_max=top, re_range=(re_low, re_high), _kept=_Recent())
     plain = [e for e in ready.effects if not forward.acts_on_points(e)]
     flow = forward.flow_of(model.prepared(plain), record.rpm, record.V, record.air, record.extra, ready.chord75_m)
     part = Part(record, model, ready.effects, flow, case.content_hash(), tuple(case.get("model.effects_off")))
@@ -321,10 +343,10 @@ def assemble(parts: tuple[Part, ...]) -> Problem:
     sigma = np.where(np.isfinite(u) & (u > 0), u, fallback)
     problem = Problem(
         parts, y[kept], f0[kept], sigma[kept], scale[kept], bool(known.mean() > 0.5), channel[kept], point[kept],
-        part[kept], kept, _covariates(parts), np.zeros((int(kept.sum()), 0)), (), tuple(notes),
+        part[kept], kept, _covariates(parts), np.zeros((int(kept.sum()), 0)), (), np.zeros(0, dtype=bool), tuple(notes),
     )  # fmt: skip
-    columns, names = nuisances(problem)
-    return replace(problem, tangents=columns, names=names)
+    columns, names, own = nuisances(problem)
+    return replace(problem, tangents=columns, names=names, own=own)
 
 
 def _scale(part: Part) -> Array:

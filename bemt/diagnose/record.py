@@ -33,6 +33,8 @@ COVARIATES = (
 
 # Samples closer in time than this may show how loads follow a change of speed.
 _DENSE_S = 1.0
+# Pulse widths from here on are the end of the range, whatever was asked for [s].
+_FULL_THROTTLE = 1.9995e-3
 MAX_POINTS = 160
 """Points beyond this number are averaged in blocks of neighbours: they would cost time and add nothing. [1]"""
 
@@ -177,6 +179,10 @@ def from_series(series: Series, case: Case, correlated: Mapping[str, Mapping[str
     extra = {k: got[k].copy() for k in COVARIATES if k in got and np.isfinite(got[k]).all()}
     if "pwm_s" in extra and "rpm" in series:
         measured["rpm"], u["rpm"] = rpm.copy(), np.asarray(filled.u["rpm"], dtype=float).copy()
+        full = extra["pwm_s"] > _FULL_THROTTLE
+        if full.any() and not full.all():
+            measured["rpm"][full] = np.nan
+            notes.append(f"{int(full.sum())} speeds at full throttle were left out: the pulse width does not set them")
     loads = np.any([np.isfinite(measured[k]) for k in measured if k != "rpm"], axis=0)
     keep = np.isfinite(rpm) & (rpm > 0) & np.isfinite(V) & loads
     kinks = _kinks(rpm, extra)

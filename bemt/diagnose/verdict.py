@@ -7,6 +7,7 @@ of the probability?  Are there look-alikes of these in this plan?  Only then is 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -152,6 +153,9 @@ def decide(found: Evidence, p_value: float) -> Decision:
     if not expected and found.log_bayes(leading) < PROVEN and not _foretells(found, leading):
         why = "the best explanation does not foretell what it has not seen"
         return Decision("insufficient", (), leading, listed[leading], rest, (), why)
+    if _twins(leading.split("+")):
+        why = "two instruments with the same fault at once: one cause that is not in the library is likelier"
+        return Decision("unknown", (), leading, listed.get(leading, 0.0), rest, (), why)
     if "+" in leading:
         leading, share = _earned(found, leading, share)
     in_pair = "+" in leading and sum(v for k, v in listed.items() if "+" in k) > 0.5
@@ -173,15 +177,18 @@ def decide(found: Evidence, p_value: float) -> Decision:
 
 
 def _foretells(found: Evidence, leading: str) -> bool:
-    """Whether an explanation brings left-out blocks nearer than calibration alone does."""
+    """Whether an explanation brings left-out blocks nearer than calibration alone does, along some variable.
+
+    What does not change along a variable is learnt from the other lines of it without any cause.
+    """
     problem = found.problem
     size = problem.u[problem.free]
 
-    def error(name: str) -> float:
-        d = (problem.y - fitting.held_out(found, name)[1])[problem.free] / size
+    def error(name: str, split: tuple[str, NDArray[np.intp]]) -> float:
+        d = (problem.y - fitting.held_out(found, name, split)[1])[problem.free] / size
         return float(np.sqrt(np.mean(d**2)))
 
-    return error(leading) < FORETELLS * error(ev.NONE)
+    return any(error(leading, s) < FORETELLS * error(ev.NONE, s) for s in fitting.partitions(problem))
 
 
 def _earned(found: Evidence, pair: str, share: dict[str, float]) -> tuple[str, dict[str, float]]:
@@ -191,6 +198,12 @@ def _earned(found: Evidence, pair: str, share: dict[str, float]) -> tuple[str, d
         if found.log_bayes(pair) - found.log_bayes(one) < EARNED and share[one] >= share[other]:
             return one, {i: (0.0 if i == other else p) for i, p in share.items()}
     return pair, share
+
+
+def _twins(ids: Sequence[str]) -> bool:
+    """Whether two instruments are said to have the same fault: offsets that stay or creep, or gains."""
+    faults = [("zero" if i.endswith("_drift") else i.partition("_")[2]) for i in ids]
+    return len(ids) > 1 and len(set(faults)) == 1 and all(effects.catalogue()[i].kind == "stand" for i in ids)
 
 
 def _class(found: Evidence, first: str, share: dict[str, float]) -> tuple[str, ...]:
@@ -230,9 +243,6 @@ def _pair(found: Evidence, leading: str, share: dict[str, float], rest: float) -
 
 def _named(found: Evidence, ids: tuple[str, ...], probability: float, rest: float) -> Decision:
     stand = all(effects.catalogue()[i].kind == "stand" for i in ids)
-    if len(ids) > 1 and stand and len({i.partition("_")[2] for i in ids}) < len(ids):
-        why = "two instruments with the same fault at once: one cause that is not in the library is likelier"
-        return Decision("unknown", (), "+".join(i for i in found.spans if i in ids), probability, rest, (), why)
     leading = "+".join(i for i in found.spans if i in ids)
     why = "nearly all of the probability is on it" if len(ids) == 1 else "nearly all of the probability is on both"
     return Decision("sensor" if stand else "named", ids, leading, probability, rest, (), why)

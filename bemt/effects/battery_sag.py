@@ -29,13 +29,14 @@ class BatterySag(Effect):
 
     id = "battery_sag"
     title = "battery voltage gives way"
+    along = ("time_s",)
     sign = "speed at one pulse width lacks most at full power and late in a run; thrust at the measured speed stays"
     kind = "drive"
     needs = ("pwm_s",)
     parameters = (
         Parameter("sag", "1", 0.0, 0.25, "declared; 10 to 30 mOhm packs at full current", 3, 0.0),
         Parameter("discharge", "1", 0.0, 0.2, "lithium cell, 4.2 to 3.4 V", 3, 0.0),
-        Parameter("copper", "1", 0.03, 0.4, "declared, share of the back-EMF at full load", 0),
+        Parameter("copper", "1", 0.03, 0.4, "declared, share of the back-EMF at full load", 2),
     )
     on_by_default = False
 

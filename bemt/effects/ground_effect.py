@@ -31,6 +31,7 @@ class GroundEffect(Effect):
 
     id = "ground_effect"
     title = "wall behind the propeller"
+    along = ("wall_distance_m",)
     sign = "more thrust at the same speed and torque, at rest only: it fades with airspeed, as no load-cell gain does"
     parameters = (
         Parameter("z_over_R", "1", 0.5, 3.0, "validity of Cheeseman and Bennett 1955"),

@@ -27,14 +27,16 @@ class LipSeparation(Effect):
     onset: float = 0.7
     loss: float = 0.3
     hysteresis: float = 0.0
+    width: float = 0.0
 
     id = "lip_separation"
     title = "separation at the lip of the duct"
     sign = "thrust falls beyond one loading and returns below a lower one, torque stays; Mach effects return at once"
     parameters = (
-        Parameter("onset", "1", 0.3, 0.95, "declared; share of the largest duct thrust", 4),
+        Parameter("onset", "1", 0.01, 0.95, "declared; share of the largest duct thrust", 4),
         Parameter("loss", "1", 0.0, 1.0, "share of the duct's thrust, Martin and Tung 2004", 3, 0.0),
         Parameter("hysteresis", "1", 0.0, 0.3, "declared", 2),
+        Parameter("width", "1", 0.0, 2.0, "declared; a lip stalls at once or bit by bit", 2),
     )
     on_by_default = False
 
@@ -49,7 +51,8 @@ class LipSeparation(Effect):
             return
         load = np.maximum(loads.T_duct / top, 0.0)
         low = np.where(self._separated(load, flow), self.onset * (1.0 - self.hysteresis), self.onset)
-        lost = self.loss * np.clip((load - low) / (1.0 - low), 0.0, 1.0) * np.maximum(loads.T_duct, 0.0)
+        span = self.width * low if self.width > 0.0 else 1.0 - low
+        lost = self.loss * np.clip((load - low) / span, 0.0, 1.0) * np.maximum(loads.T_duct, 0.0)
         loads.T = loads.T - lost
         loads.T_duct = loads.T_duct - lost
 
@@ -62,3 +65,13 @@ class LipSeparation(Effect):
             back = np.maximum.accumulate(np.where(load[run] < self.onset * (1.0 - self.hysteresis), order, -1))
             state[run] = gone > back
         return state
+
+    def variants(self) -> tuple[dict[str, float], ...]:
+        """Seven onsets and six losses in ratio, at once and bit by bit, with and without hysteresis."""
+        return tuple(
+            {"onset": o, "loss": k, "hysteresis": h, "width": w}
+            for o in (0.02, 0.04, 0.08, 0.16, 0.32, 0.6, 0.85)
+            for k in (0.1, 0.2, 0.35, 0.5, 0.7, 1.0)
+            for h in (0.0, 0.2)
+            for w in (0.0, 1.0)
+        )

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.effects.base import Effect, Flow, Parameter, Reading
+from bemt.effects.base import Array, Effect, Flow, Parameter, Reading
 
 COPPER, MAGNET = 0.0039, 0.001  # per kelvin
 
@@ -20,9 +20,10 @@ class MotorHeating(Effect):
     Direct-current motor at constant duty: d V = k Omega + (R/k) Q, Q proportional to Omega^2.  R grows by 0.39 %/K
     (copper, IEC 60034-1), k falls by 0.1 %/K (NdFeB remanence, typical data sheet; not checked).  With u the copper
     drop over the back-EMF when cold, b = 1 - 0.001 dT and r = 1 + 0.0039 dT the speed changes by y of (1 + u) = b y +
-    (u r / b) y^2. u is ``copper`` at the largest Q / Omega of the recording, elsewhere in proportion.  dT = rise (Q /
-    Qmax)^2 (1 - exp(-t/tau)), copper loss of the load and one thermal time constant (declared).  Loads at the measured
-    speed stay.
+    (u r / b) y^2. u is ``copper`` at the largest Q / Omega of the recording, elsewhere in proportion.  One heat
+    capacity, one time constant (declared): tau d(dT)/dt = c (Q / Qmax)^2 - dT, from cold, with c such that the warmest
+    point of the recording is warmer by ``rise_K``.  Between runs on one clock the motor stands and cools; a clock that
+    starts again starts cold.  Loads at the measured speed stay.
     """
 
     rise_K: float = 40.0
@@ -31,12 +32,13 @@ class MotorHeating(Effect):
 
     id = "motor_heating"
     title = "winding and magnets of the motor get warm"
+    along = ("time_s",)
     sign = "speed at the same pulse width creeps with time under load; thrust at the measured speed does not change"
     kind = "drive"
     needs = ("pwm_s", "time_s")
     parameters = (
         Parameter("rise_K", "K", 0.0, 80.0, "insulation class B, IEC 60034-1", 3, 0.0),
-        Parameter("tau_s", "s", 20.0, 900.0, "declared, small outrunner to large", 4),
+        Parameter("tau_s", "s", 20.0, 1800.0, "declared, small outrunner to large", 4),
         Parameter("copper", "1", 0.03, 0.4, "declared, share of the back-EMF at full load", 0),
     )
     on_by_default = False
@@ -48,13 +50,30 @@ class MotorHeating(Effect):
         Q = np.maximum(np.nan_to_num(flow.Q0), 0.0)
         lever = Q / flow.omega
         u = self.copper * lever / max(float(np.max(lever)), 1e-30)
-        warm = self.rise_K * (Q / max(float(np.max(Q)), 1e-30)) ** 2 * -np.expm1(-flow.clock / self.tau_s)
+        warm = self.rise_K * self._warmth(flow, (Q / max(float(np.max(Q)), 1e-30)) ** 2)
         b, r = 1.0 - MAGNET * warm, 1.0 + COPPER * warm
         y = 2.0 * (1.0 + u) / (b + np.sqrt(b**2 + 4.0 * (u * r / b) * (1.0 + u)))
         reading.values["rpm"] = reading.values["rpm"] * y
 
+    def _warmth(self, flow: Flow, heat: Array) -> Array:
+        """Warming over that of the warmest point, (P,) [1]."""
+        out = np.zeros_like(heat)
+        warm, last = 0.0, np.inf
+        for run in flow.runs:
+            t = flow.extra["time_s"][run]
+            warm = warm * float(np.exp(-(t[0] - last) / self.tau_s)) if t[0] > last else 0.0
+            out[run[0]] = warm
+            for i in range(1, run.size):
+                left = float(np.exp(-(t[i] - t[i - 1]) / self.tau_s))
+                warm = warm * left + 0.5 * (heat[run[i]] + heat[run[i - 1]]) * (1.0 - left)
+                out[run[i]] = warm
+            last = float(t[-1])
+        return np.asarray(out / max(float(np.max(out)), 1e-30))
+
     def variants(self) -> tuple[dict[str, float], ...]:
-        """Eight temperatures at six times, the times in ratio, for an efficient and a hard-driven motor."""
-        times = (20.0, 43.0, 92.0, 196.0, 420.0, 900.0)
+        """Eight temperatures at six times, the times in ratio, for motors from efficient to hard-driven."""
+        times = (20.0, 50.0, 120.0, 300.0, 750.0, 1800.0)
         rises = tuple(10.0 * k for k in range(1, 9))
-        return tuple({"rise_K": k, "tau_s": t, "copper": c} for c in (0.1, 0.35) for k in rises for t in times)
+        return tuple(
+            {"rise_K": k, "tau_s": t, "copper": c} for c in (0.05, 0.1, 0.2, 0.35) for k in rises for t in times
+        )

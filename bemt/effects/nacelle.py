@@ -15,16 +15,18 @@ class Nacelle(Effect):
 
     Notes
     -----
-    Half-body of the hub's radius a: a source of flux pi a^2 V one radius behind the disk slows the axial flow there by
+    Half-body of radius a, that of the hub where ``body_over_R`` is smaller: a source of flux pi a^2 V one radius behind
+    the disk slows the axial flow there by
     V deficit (1 + (r/a)^2)^-1.5, deficit 1/4 on the axis (Rankine 1871; Katz and Plotkin 2001, Low-Speed Aerodynamics,
     sec. 3.10; not checked).  It scales with V, which a prepared rotor does not know, so the rotor meets its mean over
     the disk with the weight r^2, the thrust of a blade of constant chord and lift coefficient.  The balance reads the
     drag cd 1/2 rho V^2 pi a^2; 0.1 a spinner to 1.2 a bluff motor (Hoerner 1965, Fluid-Dynamic Drag, ch. 3; not
-    checked).  A rotor without hub counts a = R/10.
+    checked).  A rotor without hub counts a = R/10.  Motors, balances and fairings are often wider than the hub.
     """
 
     deficit: float = 0.10
     cd: float = 0.5
+    body_over_R: float = 0.0
 
     id = "nacelle"
     title = "body behind the propeller"
@@ -32,6 +34,7 @@ class Nacelle(Effect):
     parameters = (
         Parameter("deficit", "1", 0.0, 0.25, "0.25 on the axis of a half-body", 3, 0.0),
         Parameter("cd", "1", 0.0, 1.2, "spinner to bluff motor, on hub area, Hoerner 1965", 4, 0.0),
+        Parameter("body_over_R", "1", 0.0, 0.5, "declared, hub to a wide balance", 3),
     )
     on_by_default = False
 
@@ -41,16 +44,25 @@ class Nacelle(Effect):
 
     def flow(self, flow: Flow) -> None:
         """Slow the flow by the weighted mean deficit."""
-        a = _radius(flow)
+        a = self._radius(flow)
         r = np.linspace(a, flow.R, 200)
         mean = np.sum(r**2 * (1.0 + (r / a) ** 2) ** -1.5) / np.sum(r**2)
         flow.V = flow.V * (1.0 - self.deficit * mean)
 
     def loads(self, loads: Loads, flow: Flow) -> None:
         """Take the drag of the body off the thrust."""
-        area = np.pi * _radius(flow) ** 2
+        area = np.pi * self._radius(flow) ** 2
         loads.T = loads.T - self.cd * 0.5 * flow.rho * flow.V * np.abs(flow.V) * area
 
+    def _radius(self, flow: Flow) -> float:
+        return max(flow.Rhub if flow.Rhub > 0.0 else 0.1 * flow.R, self.body_over_R * flow.R)
 
-def _radius(flow: Flow) -> float:
-    return flow.Rhub if flow.Rhub > 0.0 else 0.1 * flow.R
+    def variants(self) -> tuple[dict[str, float], ...]:
+        """Three bodies of three deficits, and six drags in ratio."""
+        return tuple(
+            {"deficit": d, "cd": c, "body_over_R": b}
+            for b in (0.0, 0.3, 0.5)
+            for d in (0.0, 0.12, 0.25)
+            for c in (0.0, 0.08, 0.16, 0.32, 0.64, 1.2)
+            if d + c > 0.0
+        )

@@ -27,6 +27,7 @@ class ObliqueInflow(Effect):
 
     id = "oblique_inflow"
     title = "airspeed at an angle to the shaft"
+    along = ("sideslip_rad",)
     sign = "thrust and torque up with airspeed as if J were lower, and a force in the plane of the disk; none at rest"
     parameters = (Parameter("angle_deg", "deg", 0.0, 90.0, "full turn of the stand", 7, 0.0),)
     on_by_default = False

@@ -26,6 +26,7 @@ class Recirculation(Effect):
 
     id = "recirculation"
     title = "slipstream that returns through the room"
+    along = ("time_s",)
     sign = "thrust decays within seconds of each start and at low advance ratio only; a drifting cell knows no speed"
     needs = ("time_s",)
     parameters = (

@@ -31,6 +31,7 @@ class RotorInertia(Effect):
 
     id = "rotor_inertia"
     title = "inertia of the rotor"
+    along = ("time_s",)
     sign = "torque only and in transients only: it leads while the speed rises, lags while it falls, zero on plateaus"
     needs = ("time_s",)
     parameters = (Parameter("ratio", "1", 0.0, 10.0, "declared, blades alone to heavy bell", 3, 0.0),)

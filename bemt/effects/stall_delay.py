@@ -50,13 +50,16 @@ class StallDelay(Effect):
     def section(self, bake: Baking) -> None:
         """Lift the stalled part of the tables."""
         weight = np.clip(self.weight(bake.chord / bake.r, bake.r / bake.R), 0.0, 1.0)[:, None, None, None]
-        a = bake.alpha_col
+        # elsewhere the gain is zero; most of the table need not be touched
+        some = slice(*np.searchsorted(bake.alpha, [float(np.min(bake.alpha0)), np.radians(50.0)]))
+        a = bake.alpha_col[..., some]
         a0 = bake.alpha0[:, None, :, None]
         pot = np.minimum(bake.cla[:, None, :, None], 2.0 * np.pi) * (a - a0)
         fade = np.clip((np.radians(50.0) - a) / np.radians(20.0), 0.0, 1.0) * (a > a0)
-        gain = weight * fade * np.maximum(pot - bake.cl, 0.0)
-        bake.cl += gain
-        bake.cd += self.normal * gain * np.tan(np.clip(a, 0.0, np.radians(60.0)))
+        gain = np.maximum(pot - bake.cl[..., some], 0.0)
+        gain *= weight * fade
+        bake.cl[..., some] += gain
+        bake.cd[..., some] += self.normal * gain * np.tan(np.clip(a, 0.0, np.radians(60.0)))
 
     def weight(self, chord_over_r: Array, r_over_R: Array) -> Array:
         """Share of the way to potential-flow lift, before it is held between 0 and 1.

@@ -29,6 +29,7 @@ class TipGap(Effect):
 
     id = "tip_gap"
     title = "leakage through the tip gap of a ducted rotor"
+    along = ("tip_gap_m",)
     sign = "thrust and pressure rise fall in proportion to gap over span; an open rotor has none"
     parameters = (
         Parameter("loss", "1", 1.0, 2.0, "Wisler 1985; Cumpsty 1989, not checked", 3),

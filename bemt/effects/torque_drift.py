@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.effects.base import Effect, Flow, Parameter, Reading
+from bemt.effects.base import Array, Effect, Flow, Parameter, Reading, choice
+
+TARED = ("run", "once")
 
 
 @dataclass(frozen=True)
@@ -17,15 +19,18 @@ class TorqueDrift(Effect):
     -----
     zero (1 - exp(-t/tau)) + thermal (T - T_0), shares of full scale, T_0 at the start of the run: creep and warm-up of
     strain-gauge cells (OIML R 60:2017 bounds both: creep in 30 min, zero in %/5 K; not checked).  Ranges are declared,
-    wide enough for hobby cells beside a hot motor.
+    wide enough for hobby cells beside a hot motor.  ``tared = "once"``: t counts from the start of the recording, for a
+    cell that is not set to zero again before each run.
     """
 
     zero: float = 0.02
     tau_s: float = 300.0
     thermal: float = 0.0
+    tared: str = "run"
 
     id = "torque_drift"
     title = "drift of the torque cell"
+    along = ("time_s",)
     sign = (
         "torque follows clock or temperature, not the condition: the same point reads otherwise later; thrust does not"
     )
@@ -37,6 +42,10 @@ class TorqueDrift(Effect):
     )
     on_by_default = False
 
+    def __post_init__(self) -> None:
+        """Refuse unknown words."""
+        choice("tared", self.tared, TARED)
+
     def applies(self, flow: Flow) -> str:
         """Only time or temperature can show it."""
         if np.ptp(flow.clock) > 0.0 or np.nanmax(np.abs(flow.warming)) > 0.0:
@@ -45,12 +54,25 @@ class TorqueDrift(Effect):
 
     def reading(self, reading: Reading, flow: Flow) -> None:
         """Shift the channel."""
-        share = self.zero * -np.expm1(-flow.clock / self.tau_s) + self.thermal * flow.warming
+        share = self.zero * -np.expm1(-self._elapsed(flow) / self.tau_s) + self.thermal * flow.warming
         reading.values["torque_Nm"] = reading.values["torque_Nm"] + share * reading.full_scale["torque_Nm"]
 
-    def variants(self) -> tuple[dict[str, float], ...]:
-        """Creep alone, with times in ratio, and temperature alone."""
+    def _elapsed(self, flow: Flow) -> Array:
+        """Time since the cell was set to zero, (P,) [s]."""
+        if self.tared == "run" or "time_s" not in flow.extra:
+            return flow.clock
+        t = flow.extra["time_s"]
+        return np.asarray(np.nan_to_num(t - np.nanmin(t)))
+
+    def variants(self) -> tuple[dict[str, float | str], ...]:
+        """Creep alone, with sizes and times in ratio, and temperature alone."""
         times = (60.0, 120.0, 240.0, 480.0, 930.0, 1800.0)
-        creep = [{"zero": z / 100.0, "tau_s": t, "thermal": 0.0} for z in range(-10, 11) if z for t in times]
-        warm = [{"zero": 0.0, "tau_s": 300.0, "thermal": a / 4000.0} for a in range(-12, 13) if a]
+        sizes = (0.005, 0.01, 0.02, 0.03, 0.05, 0.075, 0.10)
+        creep: list[dict[str, float | str]] = [
+            {"zero": s * z, "tau_s": t, "thermal": 0.0, "tared": k}
+            for k in TARED for s in (-1.0, 1.0) for z in sizes for t in times
+        ]  # fmt: skip
+        warm: list[dict[str, float | str]] = [
+            {"zero": 0.0, "tau_s": 300.0, "thermal": a / 4000.0, "tared": "run"} for a in range(-12, 13) if a
+        ]
         return (*creep, *warm)

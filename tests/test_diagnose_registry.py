@@ -1,0 +1,91 @@
+"""The promise of `plan` and `diagnose` together, over the whole registry: what a plan calls visible is named, or its
+class is; what it calls invisible gives no other name, nor does noise alone.  The solver's own data: a necessary check.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosing import case, diagnose, left_out, points, recording
+
+from bemt import effects, forward
+from bemt.case import Case
+from bemt.diagnose import document, evidence, gate, plan, problem, record, signatures, verdict
+from bemt.diagnose.signatures import effect_of
+from bemt.effects.base import Reading
+from bemt.series import Series
+
+pytestmark = pytest.mark.slow
+
+DIAGNOSED = tuple(i for i, cls in effects.catalogue().items() if cls.diagnosed)
+NULLS, SHARE = 300, 0.02
+
+
+def conditions(name: str) -> dict[str, np.ndarray]:
+    """Points at which an effect can be at work: two densities, or what it needs to be known."""
+    needs = effects.catalogue()[name].needs
+    if "pwm_s" in needs:  # a long run at five powers
+        rpm = np.tile([9000.0, 14000.0, 20000.0, 12000.0, 17000.0], 10)
+        return {"rpm": rpm, "airspeed_m_s": 0.0 * rpm, "density_kg_m3": np.full(rpm.size, 1.225),
+                "time_s": 30.0 * np.arange(rpm.size), "pwm_s": 1e-3 + rpm / 24e6}  # fmt: skip
+    if name in ("rotor_inertia", "inflow_lag"):
+        t = 0.025 * np.arange(120)
+        rpm = 14000.0 + 5000.0 * np.sin(2.0 * np.pi * t / 1.5)
+        return {"rpm": rpm, "airspeed_m_s": 0.0 * rpm, "density_kg_m3": np.full(t.size, 1.225), "time_s": t}
+    if name in ("duct", "tip_gap", "lip_separation"):
+        return points("grid", case("ds30").diameter_m) | {"rpm": points("grid")["rpm"] * 2.0}
+    return points("air")
+
+
+def as_record(given: dict[str, np.ndarray], of: Case) -> record.Record:
+    ones = np.ones_like(given["rpm"])
+    return record.from_series(Series("bench", "points", {**given, "thrust_N": ones, "torque_Nm": ones}), of)
+
+
+@pytest.mark.parametrize("name", DIAGNOSED)
+def test_what_a_plan_sees_is_named_and_nothing_else(name: str) -> None:
+    given = conditions(name)
+    truth = case("ds30" if name in ("duct", "tip_gap", "lip_separation") else "prop_8x5")
+    on = name in {e.id for e in effects.standard()} or name == "duct"
+    baseline = left_out(name, truth) if on else truth
+    rec = as_record(given, baseline)
+    sight = plan.plan(rec, baseline).sight.get(name, "invisible")
+    found, absent = signatures.candidates(problem.build([rec], [baseline]), [name])
+    if not found:
+        assert sight == "invisible" and name in absent
+        return
+    extra: tuple[effects.Effect, ...] = (effect_of(name, found[0].settings[found[0].middle]),)  # as strong as planned
+    if effects.catalogue()[name].kind == "drive":  # the same pulse width gives another speed
+        flow = forward.flow_of(problem.build([rec], [baseline]).parts[0].model.prepared([]), rec.rpm, rec.V, rec.air,
+                               rec.extra)  # fmt: skip
+        reading = Reading({"rpm": rec.rpm.copy()}, {"rpm": float(rec.rpm.max())})
+        extra[0].reading(reading, flow)
+        given, extra = given | {"rpm": reading.values["rpm"]}, ()
+    answer = diagnose(recording(truth, given, extra), baseline)
+    said = answer.decision
+    if sight == "visible":
+        assert name in said.effects, document.text(answer)
+    else:  # a plan counts on a worse solver than these readings show: some are named all the same, rightly
+        assert not said.effects or name in said.effects, document.text(answer)
+
+
+def test_correlated_noise_and_a_stand_within_its_calibration_name_nothing() -> None:
+    n, J = np.meshgrid(np.linspace(8000.0, 20000.0, 4), np.linspace(0.0, 0.5, 4))
+    given = {"rpm": n.ravel(), "airspeed_m_s": (J * n / 60.0 * case().diameter_m).ravel(),
+             "density_kg_m3": np.full(n.size, 1.225), "time_s": 20.0 * np.arange(n.size)}  # fmt: skip
+    plain = problem.build([record.from_series(recording(case(), given), case())], [case()])
+    candidates, _ = signatures.candidates(plain)
+    rng = np.random.default_rng(2026)
+    stand = plain.tangents[:, ~plain.own]
+    named = []
+    for _ in range(NULLS):
+        e = rng.standard_normal((2, n.size))
+        for i in range(1, n.size):
+            e[:, i] = 0.8 * e[:, i - 1] + 0.6 * e[:, i]
+        y = plain.f0 + plain.u * e[plain.channel, plain.point] + stand @ rng.standard_normal(stand.shape[1])
+        found = evidence.weigh(replace(plain, y=y), candidates)
+        said = verdict.decide(found, gate.p_value(found, 200))
+        named += [said.effects] if said.effects else []
+    assert len(named) <= SHARE * NULLS, named
