@@ -242,14 +242,15 @@ def row(level: float, thrust: float, **more: Any) -> dict[str, Any]:
 
 def test_three_levels_make_a_grid_study() -> None:
     """Values of a scheme of second order: the order, the limit and the uncertainty of every level come out."""
-    sizes = {level: 2.0 ** (-(level - 5)) for level in (5.0, 5.5, 6.0)}
+    sizes = {level: 2.0 ** (-(level - 5)) for level in (4.5, 5.0, 5.5, 6.0)}
     rows = [row(level, 20.0 + 2.0 * h**2) for level, h in sizes.items()] + [row(5.0, 30.0, airspeed_m_s=9.0)]
     (study,) = grid_studies(rows)
     found = study["thrust_N"]
     assert study["levels"] == [6.0, 5.5, 5.0] and study["ratios"] == pytest.approx([math.sqrt(2)] * 2)
     assert found["order"] == pytest.approx(2.0) and found["extrapolated"] == pytest.approx(20.0) and not found["flags"]
+    assert len(found["values"]) == 3
     for level, h in sizes.items():
-        assert found["u_relative"][f"{level:g}"] >= 2.0 * h**2 / 22.0, "covers the distance to the limit"
+        assert found["u_relative"][f"{level:g}"] >= 2.0 * h**2 / (20.0 + 2.0 * h**2), "covers the distance to the limit"
     assert grid_uncertainty([study], row(5.0, 7.0))["thrust_N"] == found["u_relative"]["5"]
     assert grid_uncertainty([study], row(4.0, 7.0)) == {}
 

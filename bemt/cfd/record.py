@@ -79,7 +79,8 @@ def grid_studies(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     -------
     list of dict
         Per point: its columns, ``levels`` and ``cells`` (finest first), per quantity the values, observed order,
-        extrapolated value, GCI of fine and coarse grid, flags, and the standard uncertainty of every level.
+        extrapolated value, GCI of fine and coarse grid (of the three finest levels), flags, and the standard
+        uncertainty of every level.
     """
     groups: list[list[Mapping[str, Any]]] = []
     for row in rows:
@@ -87,7 +88,8 @@ def grid_studies(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
         groups.append([row]) if home is None else home.append(row)
     out = []
     for group in groups:
-        fine = sorted((r for r in group if r["converged"] == 1), key=lambda r: -r["level"])[:3]
+        solved = sorted((r for r in group if r["converged"] == 1), key=lambda r: -r["level"])
+        fine = solved[:3]
         if len({r["level"] for r in fine}) < 2:
             continue
         study: dict[str, Any] = {k: fine[0].get(k) for k in SAME}
@@ -104,8 +106,8 @@ def grid_studies(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
             found = grid_study(values, study["ratios"], FORMAL_ORDER)
             spread = 3.0 * (max(values) - min(values)) / 1.15
             each = {}
-            for row, value in zip(fine, values, strict=True):
-                u = found.u_relative * abs(values[0])
+            for row in solved:
+                value, u = float(row[key]), found.u_relative * abs(values[0])
                 if row is not fine[0]:  # a coarser grid owes its distance to the best estimate as well
                     best = found.extrapolated if found.extrapolated is not None and not found.flags else values[0]
                     u = max(u, 1.25 * abs(value - best) / 1.15)
