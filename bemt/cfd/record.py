@@ -134,15 +134,14 @@ def grid_uncertainty(studies: Sequence[Mapping[str, Any]], row: Mapping[str, Any
     Returns
     -------
     dict
-        ``thrust_N`` and ``torque_Nm`` to the relative uncertainty [1]; empty without a study of that level. A study of
-        the other solver serves when there is none of its own.
+        ``thrust_N`` and ``torque_Nm`` to the relative uncertainty [1]; empty without a study of that level. The largest
+        counts, whichever solver it was made with: two grids of one know less than three of the other.
     """
     level = f"{row['level']:g}"
-    for own in (True, False):
-        for study in studies:
-            if level in study["thrust_N"]["u_relative"] and (not own or study["solver"] == row["solver"]):
-                return {key: float(study[key]["u_relative"][level]) for key in ("thrust_N", "torque_Nm")}
-    return {}
+    found = [study for study in studies if level in study["thrust_N"]["u_relative"]]
+    if not found:
+        return {}
+    return {key: max(float(study[key]["u_relative"][level]) for study in found) for key in ("thrust_N", "torque_Nm")}
 
 
 class Record:
