@@ -62,7 +62,7 @@ def gallery(cases: list[Case]) -> str:
 CFD = [
     "## This project's own CFD of the 8x5", "",
     "Cells of the finest OpenFOAM grid (494,000), and the pressure on the blade at rest, 20,000 rev/min,",
-    "incompressible: the other blade's tip vortex passes at 0.85 R. How far to trust them is said in `reports/cfd`.", "",
+    "incompressible: the other blade's tip vortex passes at 0.85 R. How far to trust them: `reports/cfd`.", "",
     "![Plane through the shaft and cells on the blade](img/mesh_8x5.png)", "",
     "![Pressure on the blade, from the front and from behind](img/pressure_8x5.png)", "",
 ]  # fmt: skip
