@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,8 @@ import numpy as np
 
 from bemt.errors import Fault, InputError
 from bemt.imported import Channel, Imported
-from bemt.importers import uiuc
+from bemt.importers import polar_c81, uiuc
+from bemt.importers.apc import ApcPerformance
 from bemt.importers.references import Reference
 from bemt.polars import Polar
 from bemt.series import Series
@@ -35,7 +36,17 @@ _MARKS: tuple[tuple[bytes, str, str], ...] = (
     (b"$MeshFormat", "a mesh", _EXPORT),
     (b"<?xml", "XML", "Export as CSV"),
     (b"# vtk", "a VTK file", _EXPORT),
+    (b"version https://git-lfs", "a pointer of Git LFS in place of the file", "Fetch it: git lfs pull"),
+    (b"{", "JSON, or a program's settings", "Save the numbers as CSV with a line of headings"),
+    (b"<!DOCTYPE", "a web page", "Download the file that it shows, or save its table as CSV"),
+    (b"<html", "a web page", "Download the file that it shows, or save its table as CSV"),
 )
+_INSIDE: tuple[tuple[re.Pattern[bytes], str, str], ...] = (
+    (re.compile(rb"APC Propeller .*(Predictions|RPM Range)"), "a summary of APC over many propellers (PER2)",
+     "Import the propeller's own file, PER3_*.dat"),
+    (re.compile(rb"^\s*Force vector: \(", re.MULTILINE), "a force report of Fluent 6 or older",
+     "Copy its table into a CSV with units in the headings"),
+)  # fmt: skip
 
 
 def recognised(path: str | os.PathLike[str]) -> tuple[str, str] | None:
@@ -67,7 +78,21 @@ def recognised(path: str | os.PathLike[str]) -> tuple[str, str] | None:
     if b"FoamFile" in head[:2000]:
         return ("an OpenFOAM dictionary or field", "Import postProcessing/*/*/*.dat")
     if b"\0" in head:
+        zeros = max(head[0:400:2].count(0), head[1:400:2].count(0))
+        if zeros > 0.8 * len(head[:400]) / 2:
+            return ("what looks like UTF-16 without its mark", "Save the file as UTF-8")
         return None
+    for pattern, got, hint in _INSIDE:
+        if pattern.search(head):
+            return (got, hint)
+    if polar_c81.resembles(head.decode("latin-1")):
+        hint = "Fields are 7 characters wide, nine values after the first; or write alpha_deg, cl, cd, mach as CSV"
+        return ("a C81 table whose columns have another width", hint)
+    lines = [line for line in head.decode("latin-1").splitlines() if line.strip()]
+    if len(lines) == 1 and len(re.split(r"[,;\t]", lines[0])) > 1:
+        return ("one line and no rows", "Did the logger write any?")
+    if len(lines) > 2 and not any(re.search(r"[\s,;|]", line.strip()) for line in lines):
+        return ("a single column", "One column says nothing alone: export time, speed or setting beside it")
     words = head.decode("latin-1").split()
     numbers = sum(word.strip("(),;").lstrip("+-").replace(".", "", 1)[:1].isdigit() for word in words)
     if len(words) > 20 and numbers < 0.2 * len(words):
@@ -161,6 +186,11 @@ def adapt(found: Any, form: str, name: str) -> Imported:
         return _references(list(found), form, name)
     if isinstance(found, (list, tuple)) and found and all(isinstance(item, uiuc.UiucPropeller) for item in found):
         return _propellers(list(found), form, name)
+    if isinstance(found, ApcPerformance):
+        told = f"{found.name}: {found.blades} blades, D {found.diameter_m:.4g} m, pitch {found.pitch_m:.4g} m"
+        table = adapt(found.series, form, name)
+        remark = str(found.series.provenance.get("remark", ""))
+        return replace(table, warnings=(told, *([remark] if remark else []), *table.warnings))
     if is_dataclass(found) and not isinstance(found, type):
         columns = dict(_columns(found))
         rows = max((len(values) for values in columns.values()), default=0)

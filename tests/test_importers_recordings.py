@@ -301,8 +301,15 @@ def test_units_inside_cells_are_not_stripped(write: Write) -> None:
     assert "U" in got.texts and said(got, "has units in its cells ('11.0 V')")
 
 
-def test_decimal_commas_are_refused_with_a_hint(write: Write) -> None:
-    text = plain_text(";").replace(".", ",")
+def test_decimal_commas_are_read_where_they_can_be_nothing_else(write: Write) -> None:
+    points = importers.read(write(plain_text(";")))
+    commas = importers.read(write(plain_text(";").replace(".", ",")))
+    assert said(commas, "decimal commas read as decimal points") and not said(points, "decimal commas")
+    assert all(np.array_equal(commas.channels[k].values, c.values) for k, c in points.channels.items())
+
+
+def test_doubtful_commas_are_refused_with_a_hint(write: Write) -> None:
+    text = plain_text(";").replace(".", ",").replace("ok", "0.5")  # a number with a point beside them
     with pytest.raises(InputError, match='State decimal = ","') as caught:
         importers.read(write(text))
     assert len(caught.value.faults) == 3  # one per column, all at once
@@ -417,7 +424,7 @@ def mutate(text: str, rng: random.Random) -> bytes:
                 lines[row] = "".join(rng.sample(lines[row], len(lines[row])))
                 text = "\n".join(lines)
             case _:
-                text = text[:at] + "".join(rng.choice("0123456789.,eE-+nN \"") for _ in range(5)) + text[at:]
+                text = text[:at] + "".join(rng.choice('0123456789.,eE-+nN "') for _ in range(5)) + text[at:]
     raw = text.encode("utf-8", "surrogatepass")
     if rng.random() < 0.1 and raw:
         at = rng.randrange(len(raw))
@@ -434,6 +441,13 @@ def unexplained(imported: Imported, raw: bytes) -> list[str]:
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     used = [k for k, t in enumerate(lines, 1) if t.strip() and not t.lstrip().startswith(("#", "%"))]
     lost = []
+    bare = [k for k in used if not lines[k - 1].strip(" \t;,|")]
+    if bare and not any(f"{len(bare)} lines of empty cells" in t for t in imported.warnings):
+        lost.append("lines of empty cells")
+    used = [k for k in used if k not in bare]
+    if any("lines above the headings" in t for t in imported.warnings):  # they have fewer cells than the rows
+        first = next(k for k in used if lines[k - 1].count(",") >= lines[imported.lines[0] - 1].count(","))
+        used = [k for k in used if k >= first]
     without_heading = any("no heading line" in t for t in imported.warnings)
     expected = used if without_heading else used[1:]
     if any("holds units" in t for t in imported.warnings):

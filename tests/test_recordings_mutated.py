@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 import random
+import re
 from collections import Counter
 from pathlib import Path
 
@@ -181,12 +182,13 @@ def injured(text: str, rng: random.Random) -> tuple[list[str], bytes]:
 
 def lines_below_the_heading(raw: bytes) -> set[int]:
     """Lines that hold something and are no comment."""
+    wide = raw[:2] in (b"\xff\xfe", b"\xfe\xff")
     try:
-        text = raw.decode("utf-8-sig")
+        text = raw.decode("utf-16" if wide else "utf-8-sig", "replace" if wide else "strict")
     except UnicodeDecodeError:
         text = raw.decode("latin-1")
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    return {k for k, line in enumerate(lines, 1) if line.strip() and not line.lstrip().startswith(("#", "%"))}
+    return {k for k, line in enumerate(lines, 1) if line.strip(" \t;,|") and not line.lstrip().startswith(("#", "%"))}
 
 
 def try_injured(count: int, seed: int, folder: Path, bases: dict[str, str]) -> Counter[str]:
@@ -210,6 +212,7 @@ def try_injured(count: int, seed: int, folder: Path, bases: dict[str, str]) -> C
             continue
         notes = " ".join(record.warnings)
         head = ("no heading line" not in notes) + ("holds units" in notes)
+        head += sum(int(n) for n in re.findall(r"(\d+) lines above the headings", notes))
         below = lines_below_the_heading(raw)
         assert len(record.lines) == record.rows == len(below) - head and set(record.lines) <= below, case
         found = findings(record)

@@ -47,7 +47,7 @@ class SourceText:
     name : str
         Path as given by the user; appears in faults.
     text : str
-        Decoded content (UTF-8, or Latin-1 when it is not valid UTF-8), without a byte order mark.
+        Decoded content (UTF-8, UTF-16 with its mark, else Latin-1), without a byte order mark.
     sha256 : str
         Hash of the bytes of the file, hexadecimal.
     """
@@ -62,7 +62,17 @@ class SourceText:
         return self.text.splitlines()
 
 
+_WIDE = (b"\xff\xfe", b"\xfe\xff")
+
+
+def _binary(raw: bytes) -> bool:
+    """Whether bytes are no text: NUL outside UTF-16 with its mark."""
+    return b"\0" in raw and raw[:2] not in _WIDE
+
+
 def _decode(raw: bytes) -> str:
+    if raw[:2] in _WIDE:  # a head may end inside a character
+        return raw[: len(raw) // 2 * 2].decode("utf-16", errors="replace")
     for encoding in ("utf-8-sig", "latin-1"):
         try:
             return raw.decode(encoding)
@@ -94,7 +104,7 @@ def load_text(path: str | os.PathLike[str]) -> SourceText:
         raw = Path(path).read_bytes()
     except OSError as error:
         raise InputError(Fault(name, "", error.strerror or str(error), "a readable file", "Check the path")) from error
-    if b"\0" in raw:
+    if _binary(raw):
         raise InputError(Fault(name, "", "binary data (NUL bytes)", "a text file", "Export the data as plain text"))
     return SourceText(name, _decode(raw), hashlib.sha256(raw).hexdigest())
 
@@ -119,7 +129,7 @@ def head_text(head: bytes | str) -> str:
     """
     if isinstance(head, str):
         return head.removeprefix("\ufeff")
-    return "" if b"\0" in head else _decode(head)
+    return "" if _binary(head) else _decode(head)
 
 
 def number(token: str) -> float | None:
@@ -209,13 +219,13 @@ def detect(path: str | os.PathLike[str]) -> str:
         kinds = [k for k, m in known.items() if m.sniff(head)]
         particular = [k for k in kinds if not getattr(known[k], "FALLBACK", False)]
         kinds = particular or kinds
-        if b"\0" in head and not kinds:
+        if _binary(head) and not kinds:
             fault = Fault(name, "", "binary data (NUL bytes)", "a text file", "Export the data as plain text (CSV)")
             raise InputError(fault)
     if len(kinds) == 1:
         return kinds[0]
     if not kinds:
-        hint = "Give format = if the head of the file is unusual" if target.is_file() else "Name a single file"
+        hint = "Give --format (format = in a case) if its head is unusual" if target.is_file() else "Name a single file"
         raise InputError(Fault(name, "", "content of no known format", f"one of {', '.join(known)}", hint))
     hint = " or ".join(f'format = "{kind}"' for kind in kinds)
     raise InputError(Fault(name, "", f"content claimed by {', '.join(kinds)}", "one format", f"Give {hint}"))

@@ -43,7 +43,7 @@ def parse_designation(text: str) -> tuple[float, float, int] | None:
     diameter = _readings(match[1], 4.0, 28.0) if match else None
     if match is None or diameter is None:
         return None
-    pitch = _readings(match[2], 0.25 * diameter, 1.7 * diameter)
+    pitch = _readings(match[2], 0.25 * diameter, 1.7 * diameter) or _readings(match[2], 0.25 * diameter, 2.5 * diameter)
     blades = re.search(r"-B?([2-8])(?![0-9A-Za-z])", match[3])
     return None if pitch is None else (diameter, pitch, int(blades[1]) if blades else 2)
 

@@ -66,6 +66,9 @@ def _per3_rows(source: SourceText, faults: list[Fault]) -> tuple[list[tuple[floa
         if not width or not words or not (words[0][0].isdigit() or words[0][0] in "+-.*"):
             continue
         tokens = _TOKEN.findall(line)
+        if len(tokens) == 2 and rpm is not None:  # V and J of a point at which the code failed
+            tokens += ["NaN"] * (width - 2)
+            line = " ".join(tokens)
         if len(tokens) != width or _TOKEN.sub("", line).strip():
             expected = f"{width} numbers ({' '.join(_PER3_COLUMNS[:width])})"
             faults.append(Fault(source.name, str(index), repr(line.strip()[:60]), expected, "Repair or delete the row"))

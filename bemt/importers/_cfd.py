@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 MAX_BYTES = 1 << 30
 """Largest text, unpacked."""
-_NAN = re.compile(r"[+-]?(nan|-?1\.#(qnan|snan|ind|inf)\w*|inf(inity)?|null|\*+)(\(\w*\))?", re.IGNORECASE)
+_NAN = re.compile(r"[+-]?(nan|n/a|-?1\.#(qnan|snan|ind|inf)\w*|inf(inity)?|null|\*+)(\(\w*\))?", re.IGNORECASE)
 _COMMA = re.compile(r"[+-]?\d+,\d+([eEdD][+-]?\d+)?")
 _HUGE = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)[eEdD]\+?\d+")
 _FIXED = re.compile(r"\d\.\d+[eEdD][+-]\d\d+")

@@ -104,6 +104,8 @@ def history(
         about["time_channel"] = names[time]
     if "value" not in roles:
         notes.append("the file has no column of values, only its clock")
+    elif len(index) > 1 and not any(np.any(table.values[index, k]) for k, r in enumerate(roles) if r == "value"):
+        notes.append("every value is 0: did the function object, or the report, find its surfaces?")
     return Imported(format, "cfd", len(index), channels, tuple(notes), about)
 
 

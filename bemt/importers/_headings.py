@@ -21,6 +21,9 @@ _SAME = {
     "n mm": "Nmm", "mn m": "mNm", "kgf cm": "kgf_cm", "gf cm": "gf_cm", "lbf in": "lbf_in", "in lbf": "lbf_in",
     "in-lbf": "lbf_in", "lbf ft": "lbf_ft", "ft lbf": "lbf_ft", "ft-lbf": "lbf_ft", "ozf in": "ozf_in",
     "in ozf": "ozf_in", "kgf m": "kgf_m", "microseconds": "us", "rpm": "rpm", "volt": "V", "watt": "W", "amp": "A",
+    "newton": "N", "newtons": "N", "newton metre": "Nm", "newton meter": "Nm", "gram force": "gf", "milliseconds": "ms",
+    "kilogram force": "kgf", "pound force": "lbf", "g f": "gf", "kg f": "kgf", "second": "s", "ampere": "A",
+    "amperes": "A", "rad/sec": "rad_s", "m/sec": "m_s", "rev/sec": "rev_s", "percent": "pct",
 }  # fmt: skip
 _TWO_MEANINGS = {
     "g": "gram-force, gram or standard gravity: write gf, or say it in recording.toml",
@@ -31,16 +34,28 @@ _TWO_MEANINGS = {
     "kg cm": "a mass times a length: write kgf_cm", "g cm": "a mass times a length: write gf_cm",
     "G cm": "a mass times a length: write gf_cm", "oz in": "a mass times a length: write ozf_in",
     "lb in": "a mass times a length: write lbf_in", "in lb": "a mass times a length: write lbf_in",
+    "lb ft": "a mass times a length: write lbf_ft", "ft lb": "a mass times a length: write lbf_ft",
+    "in oz": "a mass times a length: write ozf_in", "kg m": "a mass times a length: write kgf_m",
+    "1/s": "revolutions or radians per second: write rev/s or rad/s", "grams": "a mass: write gf for a force",
+    "s-1": "revolutions or radians per second: write rev/s or rad/s", "pounds": "a mass: write lbf for a force",
+    "s^-1": "revolutions or radians per second: write rev/s or rad/s",
     "g/W": "a mass per power: write gf/W", "G/W": "a mass per power: write gf/W",
 }  # fmt: skip
 _COMPOUND = {
     "gf/W": units.Unit("N_W", "efficacy", units.KGF * 1e-3), "kgf/W": units.Unit("N_W", "efficacy", units.KGF),
     "N/W": units.Unit("N_W", "efficacy", 1.0), "lbf/W": units.Unit("N_W", "efficacy", units.LBF),
+    "m/s2": units.Unit("m_s2", "acceleration", 1.0), "m/s^2": units.Unit("m_s2", "acceleration", 1.0),
 }  # fmt: skip
 _PURE = re.compile(
     r"(CT|CP|CQ|KT|KQ|10KQ|CT_total|KT_total|KT_nozzle|KT_propeller|J|eta0?|FM|Re|M_tip|run|tip_Mach|Mach|throttle|sigma"
-    r"|[A-Za-z]\w*?/[A-Z]|[A-Za-z]\w*_over_[A-Za-z]|[xyz]/c|\w+_ratio|CT_rotor|CP_rotor|CQ_rotor)"
+    r"|[A-Za-z]\w*?/(?![NAVWKCF]\b)[A-Z]|[A-Za-z]\w*_over_[A-Za-z]|[xyz]/c|\w+_ratio|CT_rotor|CP_rotor|CQ_rotor"
+    r"|C_[TPQ]|C[tpq])"
 )
+_PURE_NAMES = {"Ct": "CT", "C_T": "CT", "C_P": "CP", "C_Q": "CQ"}  # Cp may be that of a pressure: the table tells
+_ALONE = {  # a heading that is the name of a unit
+    "volts": ("voltage", "V"), "volt": ("voltage", "V"), "amps": ("current", "A"), "amp": ("current", "A"),
+    "amperes": ("current", "A"), "watts": ("P", "W"), "newtons": ("F", "N"),
+}  # fmt: skip
 _WORDS = {  # heading in lower case -> name and dimension it must have
     "time": ("time", "time"), "thrust": ("thrust", "force"), "torque": ("torque", "torque"),
     "voltage": ("voltage", "voltage"), "current": ("current", "current"), "airspeed": ("airspeed", "speed"),
@@ -48,7 +63,14 @@ _WORDS = {  # heading in lower case -> name and dimension it must have
     "throttle": ("throttle", "fraction"), "esc signal": ("pulse_width", "time"), "esc": ("pulse_width", "time"),
     "pwm": ("pulse_width", "time"),
     "motor optical speed": ("optical", "angular_speed"), "motor electrical speed": ("electrical", "angular_speed"),
-    "vibration": ("vibration", "acceleration"), "accx": ("acceleration_x", "acceleration"),
+    "elapsed": ("time", "time"), "elapsed time": ("time", "time"), "time since start": ("time", "time"),
+    "timestamp": ("time", "time"), "air speed": ("airspeed", "speed"), "throttle input": ("throttle", "fraction"),
+    "rotation speed": ("speed", "angular_speed"), "rotational speed": ("speed", "angular_speed"),
+    "motor speed": ("speed", "angular_speed"), "rotor speed": ("speed", "angular_speed"),
+    "propeller speed": ("speed", "angular_speed"), "force fz (thrust)": ("thrust", "force"),
+    "torque mz (torque)": ("torque", "torque"), "electrical speed": ("electrical", "angular_speed"),
+    "optical speed": ("optical", "angular_speed"), "vibration": ("vibration", "acceleration"),
+    "accx": ("acceleration_x", "acceleration"),
     "accy": ("acceleration_y", "acceleration"), "accz": ("acceleration_z", "acceleration"),
 }  # fmt: skip
 _GOES: dict[str, tuple[str, ...]] = {  # what a suffix may be: T_A is rotor A's thrust, not a current
@@ -57,6 +79,10 @@ _GOES: dict[str, tuple[str, ...]] = {  # what a suffix may be: T_A is rotor A's 
     "Q": ("torque",), "M": ("torque",), "P": ("power", "pressure", "length"), "I": ("current",), "U": ("voltage",),
     "V": ("voltage", "speed"), "n": ("angular_speed",), "D": ("length",), "R": ("length",), "r": ("length",),
 }  # fmt: skip
+_PULSE = re.compile(r"(esc )?(throttle|signal|pwm|pulse( width)?|esc)( signal| input| command)?")
+_SEPARATORS = (r"\s+[-–—]\s+", r"\s*,\s*", r"\s+in\s+", r"\s*/\s*", r"\s+")
+_MOJIBAKE = (("Âµ", "µ"), ("Î¼", "µ"), ("Â·", "·"), ("â‹…", "·"), ("Â°", "°"), ("Â²", "²"), ("Â³", "³"))
+"""UTF-8 that a program took for Latin-1 or its Windows form."""
 _GRAVITY = units.Unit("m_s2", "acceleration", units.G0)
 
 
@@ -107,8 +133,14 @@ def unit_of(text: str) -> units.Unit | str:
     >>> unit_of("kg")
     'a mass: write kgf for a force'
     """
-    t = re.sub(r"[·⋅*]", " ", text.strip()).replace("µ", "u").replace("μ", "u").replace("³", "3").replace("²", "2")
-    t = " ".join(t.replace("°", "deg").split())
+    t = text.strip()
+    for wrong, right in _MOJIBAKE:
+        t = t.replace(wrong, right)
+    t = re.sub(r"[·⋅*]|(?<=[A-Za-z])[.-](?=[A-Za-z])", " ", t).replace("µ", "u").replace("μ", "u")
+    t = " ".join(re.sub("[°º˚]", "deg", t.replace("³", "3").replace("²", "2")).split())
+    power = re.fullmatch(r"(\w+) (\w+)\^?-([123])", t)  # m s^-1
+    if power:
+        t = f"{power[1]}/{power[2]}" + (power[3] if power[3] != "1" else "")
     if t in _COMPOUND:
         return _COMPOUND[t]
     if t in _TWO_MEANINGS:
@@ -119,6 +151,31 @@ def unit_of(text: str) -> units.Unit | str:
     if key is not None:
         return units.UNITS[key]
     return ""
+
+
+def _tail(core: str) -> tuple[str, units.Unit | str] | None:
+    """Name and unit of a heading that ends in its unit without brackets: ``Thrust - gf``, ``T/N``, ``torque Nm``.
+
+    A bar or a blank alone counts only where the name asks for such a unit: ``c/R`` is a ratio, ``Thrust A`` a rotor.
+    """
+    for separator in _SEPARATORS:
+        for found in reversed(list(re.finditer(separator, core))):
+            name, tail = core[: found.start()], core[found.end() :]
+            unit = unit_of(tail)
+            if not name or unit == "":
+                continue
+            if isinstance(unit, str):
+                if separator in _SEPARATORS[:3]:
+                    return name, f"{tail!r} is {unit}"
+                continue
+            word = _WORDS.get(name.lower().replace("_", " "))
+            last = re.split(r"[\s_]+", name)[-1]
+            goes = _GOES.get(last if len(last) == 1 else last.lower(), (word[1],) if word else ())
+            loose = separator in _SEPARATORS[:3] and not goes
+            letter = separator == _SEPARATORS[4] and tail in ("A", "C", "F", "in")
+            if (unit.dimension in goes or loose) and not letter:
+                return name, unit
+    return None
 
 
 def slug(text: str) -> str:
@@ -156,7 +213,16 @@ def heading(text: str) -> Heading:
         elif stated:
             base, doubt = found[1], f"{found[2]!r} is {stated}"
     core = re.split(r"[(\[=]", base)[0].strip() if unit is None and not doubt else base
-    if unit is None and not doubt:
+    if found and found[2].strip().lower() == "erpm":
+        return Heading(text, "electrical_rpm", units.UNITS["rpm"])
+    alone = _ALONE.get(core.lower())
+    ending = _tail(core) if unit is None and not doubt else None
+    if unit is None and not doubt and alone:
+        base, unit = alone[0], units.UNITS[alone[1]]
+    elif ending is not None:
+        base, stated = ending
+        unit, doubt = (stated, "") if isinstance(stated, units.Unit) else (None, stated)
+    elif unit is None and not doubt:
         name, suffix = units.split_suffix(core)
         goes = _GOES.get(name.split("_")[-1].lower() if len(name) > 1 else name)
         if re.fullmatch(r"(e[_ ]?)?rpm(_\w)?", core, re.IGNORECASE):  # before suffixes: rpm_A is no current
@@ -170,12 +236,16 @@ def heading(text: str) -> Heading:
         elif suffix is not None and suffix.dimension == "mass":
             doubt = f"{suffix.suffix!r} is {_TWO_MEANINGS[suffix.suffix]}"
         elif _PURE.fullmatch(core) and ("rotor convention" not in text or core.endswith("_rotor")):
-            base, unit = core, units.Unit("", "none", 1.0)
+            base, unit = _PURE_NAMES.get(core, core), units.Unit("", "none", 1.0)
+        elif re.fullmatch(r"\w+/[NAVWKCF]", core):
+            doubt = f"{core!r} is a ratio, or a quantity and its unit: write the unit in brackets"
         elif "rotor convention" in text and core in ("CT", "CP", "CQ"):
             base, unit = f"{core}_rotor", units.Unit("", "none", 1.0)
         elif re.fullmatch(r"rpm(_\w+)?|\w+_rpm", core, re.IGNORECASE):
             base, unit = core, units.UNITS["rpm"]
     word = _WORDS.get(base.lower().replace("_", " "))
+    if unit is not None and unit.dimension == "time" and _PULSE.fullmatch(base.lower().replace("_", " ")):
+        word = ("pulse_width", "time")
     if word and word[1] == "acceleration" and doubt.startswith("'g'"):
         unit, doubt = _GRAVITY, ""
     if unit is None:

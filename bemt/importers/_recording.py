@@ -1,12 +1,11 @@
-"""What importers of recordings share: splitting text into cells, and rows that need a flag.
+"""What importers of recordings share: cells that become channels, and rows that need a flag.
 
-Nothing is dropped: every line below the heading becomes a row or a fault, every cell a number, a text, or NaN with a
-flag on its row. Headings are read in :mod:`bemt.importers._headings`.
+Nothing is dropped: every line below the heading becomes a row or a fault (:mod:`bemt.importers._split`), every cell a
+number, a text, or NaN with a flag on its row. Headings are read in :mod:`bemt.importers._headings`.
 """
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,173 +16,20 @@ from numpy.typing import NDArray
 from bemt import units
 from bemt.errors import Fault, InputError
 from bemt.imported import Channel, Imported
-from bemt.importers import SourceText, number
-from bemt.importers._headings import Heading, slug, unit_of
+from bemt.importers import number
+from bemt.importers._clock import clock_seconds
+from bemt.importers._headings import Heading, slug
+from bemt.importers._split import Table, some
 
-__all__ = [
-    "Builder", "Table", "column_numbers", "find_delimiter", "slip", "some", "spikes", "split_line", "split_table",
-]  # fmt: skip
+__all__ = ["Builder", "column_numbers", "slip", "spikes"]
 
 Array = NDArray[np.float64]
 NO_VALUE = frozenset({"", "nan", "na", "n/a", "-", "--", "null", "none"})
 """Cells that say "no value", in lower case."""
-DELIMITERS = (";", "\t", ",", "|")
-MAX_FAULTS = 20
 _WITH_UNIT = re.compile(r"[+-]?[\d.]+\s*([^\W\d][\w/·]{0,6}|%)")
 BAD_SHARE = 0.1
 """Share of cells that are no numbers from which a column is text."""
-
-
-@dataclass(frozen=True)
-class Table:
-    """Cells of a delimited file: headings (empty when it has none), rows of equal length with their line numbers."""
-
-    source: SourceText
-    delimiter: str
-    headings: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    lines: tuple[int, ...]
-    warnings: tuple[str, ...] = ()
-    cut: int | None = None  # index of a row that the end of the file cut off
-
-
-def split_line(line: str, mark: str) -> list[str]:
-    """Cells of one line, quotes taken off."""
-    if mark == " ":
-        return line.split()
-    if '"' in line:
-        return [c.strip() for c in next(csv.reader([line], delimiter=mark))]
-    return [c.strip() for c in line.split(mark)]
-
-
-def _is_units(cells: Sequence[str]) -> bool:
-    """Whether a line below the headings holds nothing but units."""
-    stated = [unit_of(c.strip("()[]")) for c in cells if c.strip("-()[]")]
-    return bool(stated) and all(isinstance(u, units.Unit) or u for u in stated)
-
-
-def some(items: Iterable[object], limit: int = 5) -> str:
-    """First few of many, in words.
-
-    Parameters
-    ----------
-    items : iterable
-        Things to name.
-    limit : int
-        How many to name.
-
-    Returns
-    -------
-    str
-        Such as ``3, 4, 7 and 12 more``.
-
-    Examples
-    --------
-    >>> some([1, 2]), some(range(9), 3)
-    ('1, 2', '0, 1, 2 and 6 more')
-    """
-    words = [str(item) for item in items]
-    more = f" and {len(words) - limit} more" if len(words) > limit else ""
-    return ", ".join(words[:limit]) + more
-
-
-def find_delimiter(lines: Sequence[str]) -> str:
-    """Delimiter of some lines: the first of ``; tab , |`` that all of them have, else blanks.
-
-    Parameters
-    ----------
-    lines : sequence of str
-        The first lines of a table.
-
-    Returns
-    -------
-    str
-        One character.
-
-    Examples
-    --------
-    >>> find_delimiter(["r;mm,x", "1,2"]), find_delimiter(["a;b", "1,5;2,5"]), find_delimiter(["1 2", "3 4"])
-    (',', ';', ' ')
-    """
-    plain = [re.sub(r'"[^"]*"', "", line) for line in lines]
-    everywhere = [mark for mark in DELIMITERS if plain and all(mark in line for line in plain)]
-    return everywhere[0] if everywhere else " "
-
-
-def split_table(source: SourceText, delimiter: str | None = None, header: bool | None = None) -> Table:
-    """Split a file into rows of equal length.
-
-    Parameters
-    ----------
-    source : SourceText
-        The file.
-    delimiter : str or None
-        One of ``; tab , |`` or a blank; None finds it in the first line.
-    header : bool or None
-        Whether the first line names the columns; None: it does when no cell of it is a number.
-
-    Returns
-    -------
-    Table
-        Lines that are blank or begin with ``#`` or ``%`` are left out and counted in its warnings.
-
-    Raises
-    ------
-    InputError
-        With the lines whose number of cells differs from the first one's; a last line that is cut off is kept.
-    """
-    lines = source.text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    used = [(i, t) for i, t in enumerate(lines, 1) if t.strip() and not t.lstrip().startswith(("#", "%"))]
-    comments = sum(1 for t in lines if t.lstrip().startswith(("#", "%")))
-    if not used:
-        raise InputError(Fault(source.name, "", "no data", "a heading line and rows of numbers"))
-    mark = delimiter or find_delimiter([t for _, t in used[:5]])
-    if any(len(t) > 100_000 for _, t in used):
-        raise InputError(Fault(source.name, "", "a line of more than 100000 characters", "a table of short lines"))
-    split = [(i, split_line(t, mark)) for i, t in used]
-    first = split[0][1]
-    if header is None:
-        header = not any(number(c) is not None for c in first)
-    width = len(first)
-    while header and width > 1 and not first[width - 1]:  # a heading line that ends in the delimiter
-        width -= 1
-    if not header:
-        width = max((len(c) for _, c in split[:2]), default=width)
-    notes = [f"{comments} comment lines left out"] if comments else []
-    if header and len(split) > 2 and _is_units(split[1][1]):
-        stated = [*split[1][1], *[""] * width]
-        stated = [unit.strip("-()[]") for unit in stated]
-        first = [f"{name} ({unit})" if unit else name for name, unit in zip(first, stated, strict=False)]
-        notes.append(f"line {split[1][0]} holds units")
-        del split[1]
-    rows: list[tuple[str, ...]] = []
-    faults: list[Fault] = []
-    cut = None
-    body = split[1:] if header else split
-    for k, (i, cells) in enumerate(body):
-        over = cells[width:]
-        if any(over):
-            got, hint = f"{len(cells)} cells", "A delimiter inside a value, or a decimal comma?"
-            faults.append(Fault(source.name, str(i), got, f"{width} as in line {split[0][0]}", hint))
-        elif len(cells) < width and k == len(body) - 1 and not lines[-1] == "" and k > 0:
-            cut = k
-            rows.append(tuple(cells) + ("",) * (width - len(cells)))
-        elif len(cells) < width:
-            hint = "Was a line cut?"
-            faults.append(Fault(source.name, str(i), f"{len(cells)} cells", f"{width} as in line {split[0][0]}", hint))
-        else:
-            rows.append(tuple(cells[:width]))
-    if faults:
-        extra = len(faults) - MAX_FAULTS
-        faults = faults[:MAX_FAULTS]
-        if extra > 0:
-            faults.append(Fault(source.name, "", f"{extra} more lines of another length", f"{width} cells"))
-        raise InputError(faults)
-    if not rows:
-        raise InputError(Fault(source.name, "", "no rows", "a heading line and rows of numbers"))
-    names = tuple(first[:width]) if header else ()
-    return Table(source, mark, names, tuple(rows), tuple(i for i, _ in (split[1:] if header else split)),
-                 tuple(notes), cut)  # fmt: skip
+_THOUSANDS = re.compile(r"[+-]?\d{1,3}(,\d{3})+(\.\d*)?")
 
 
 def column_numbers(cells: Sequence[str], decimal: str = ".") -> tuple[Array, list[int], int]:
@@ -282,12 +128,16 @@ class Builder:
     faults: list[Fault] = field(default_factory=list)
     unitless: list[str] = field(default_factory=list)
     empty: list[str] = field(default_factory=list)
+    words: list[str] = field(default_factory=list)
+    clocks: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.flags = [[] for _ in self.table.rows]
         self.warnings.extend(self.table.warnings)
         if self.table.cut is not None:
             self.flag([self.table.cut], "line cut off at the end of the file")
+        width = len(self.table.rows[0]) if self.table.rows else 0
+        self.flag(self.table.misfits, f"not {width} cells", "; no value of them is taken")
 
     def line(self, row: int) -> int:
         """Line in the file of a row."""
@@ -322,16 +172,27 @@ class Builder:
             where = f"{self.line(comma[0])}:{index + 1}"
             got = f"{cells[comma[0]]!r} ({len(comma)} such cells of {label!r})"
             hint = 'State decimal = "," in a recording.toml beside the file, or export with decimal points'
+            if all(_THOUSANDS.fullmatch(cells[i]) for i in comma):
+                hint = f"A comma between thousands? Export without. If not: {hint[0].lower()}{hint[1:]}"
             self.faults.append(Fault(self.table.source.name, where, got, "a number with a decimal point", hint))
             return ""
         name = self.free(head.name)
         if len(bad) > BAD_SHARE * (len(cells) - empty):
+            seconds = clock_seconds(cells)
+            if seconds is not None:
+                name = self.free(f"{slug(head.text) or head.name}_s")
+                self.channels[name], self.headings[name] = Channel(seconds, "s"), head.text
+                self.clocks.append(name)
+                self.warnings.append(f"column {label!r} is a clock: seconds since {cells[0] or 'its first time'}")
+                return name
             name = self.free(slug(head.text) or head.name)
             self.texts[name] = tuple(cells)
             if len(bad) < len(cells) - empty:
                 self.warnings.append(f"column {label!r} mixes numbers and text: kept as text")
             elif sum(bool(_WITH_UNIT.fullmatch(cells[i])) for i in bad) > len(bad) / 2:
                 self.warnings.append(f"column {label!r} has units in its cells ({cells[bad[0]][:20]!r}): kept as text")
+            else:
+                self.words.append(repr(label))
             return ""
         if bad:
             words = some((f"{cells[i][:20]!r} at {self.line(i)}:{index + 1}" for i in bad), 3)
@@ -379,7 +240,11 @@ class Builder:
                 )
 
     def flag_time(self, name: str = "time_s") -> None:
-        """Flag rows where time does not advance."""
+        """Flag rows where time does not advance; the only clock is the time of a file that has no other."""
+        if name not in self.channels and len(self.clocks) == 1:
+            clock = self.clocks.pop()
+            self.channels = {name if k == clock else k: channel for k, channel in self.channels.items()}
+            self.headings[name] = self.headings.pop(clock)
         if name in self.channels:
             t = self.channels[name].values
             rows = np.flatnonzero(np.isfinite(t))
@@ -400,6 +265,8 @@ class Builder:
             raise InputError(self.faults)
         if self.empty:
             self.warnings.append(f"no values in {len(self.empty)} columns: {some(self.empty, 8)}")
+        if self.words:
+            self.warnings.append(f"text, kept as such, in {len(self.words)} columns: {some(self.words, 8)}")
         if self.unitless:
             hint = "Name units in the headings or in a recording.toml"
             self.warnings.append(f"no unit known, none assumed, for {some(self.unitless, 8)}. {hint}")

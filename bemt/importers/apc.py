@@ -6,10 +6,9 @@ against itself (maximum thickness = ratio x chord, twist = atan(pitch/(2 pi r)) 
 column cannot pass.
 
 PER3 holds blocks of constant rpm: V [mph], J, Pe, Ct, Cp, PWR [hp], Torque [in lbf], Thrust [lbf]; newer files add
-W, N m, N, g/W, Mach, Reynolds number, figure of merit (that form: not checked against a file). It is APC's own vortex
-code, NOT measured, so the series is of kind ``vendor``. Points at which that code failed are printed as ``-NaN`` and
-glued to the column before (``0.34-NaN``); they stay in the series as NaN with a flag. Coefficients are in the propeller
-convention.
+W, N m, N, g/W, Mach, Reynolds number, figure of merit. It is APC's own vortex code, NOT measured, so the series is of
+kind ``vendor``. Points at which that code failed are printed as ``-NaN`` and glued to the column before (``0.34-NaN``),
+or end after V and J; they stay in the series as NaN with a flag. Coefficients are in the propeller convention.
 
 Sizes come from the designation printed in the first line. Where it drops the decimal point (``134x135-3`` is 13.4x13.5
 with 3 blades), the largest reading with a diameter of 4 to 28 in and pitch/diameter of 0.25 to 1.7 is taken, and then

@@ -18,7 +18,8 @@ from bemt import units
 from bemt.imported import Imported
 from bemt.importers import head_text, load_text
 from bemt.importers._headings import Heading, heading
-from bemt.importers._recording import Builder, split_table
+from bemt.importers._recording import Builder
+from bemt.importers._split import split_table
 
 __all__ = ["KIND", "read", "sniff"]
 

@@ -136,7 +136,7 @@ def blocks(source: SourceText) -> Iterator[tuple[int, list[Entry], list[str], li
         if not match or not ahead:
             k += 1
             continue
-        names = _names(match[1], match[2], lines[ahead[0] - 1], lines[ahead[0]])
+        names = _names(match[1], match[2], lines[ahead[0] - 1] if ahead[0] - 1 > k else "", lines[ahead[0]])
         if isinstance(names, str):
             yield k + 1, [], [], [Fault(source.name, str(ahead[0] + 1), names, "a header of a force report")]
             k = ahead[0] + 1

@@ -20,7 +20,7 @@ import re
 
 from bemt.errors import Fault, InputError
 from bemt.imported import Imported
-from bemt.importers._cfd import Column, Row, head_lines, load, numeric_table
+from bemt.importers._cfd import Column, Row, head_lines, load, numeric_table, si_unit
 from bemt.importers._cfd_record import history
 
 __all__ = ["KIND", "column_of", "read", "sniff"]
@@ -29,6 +29,7 @@ KIND = "fluent_report"
 
 _QUOTED = re.compile(r'"([^"]*)"')
 _HEADER = re.compile(r'\(\s*(?:"[^"]*"\s*)+\)')
+_UNIT = re.compile(r"(.+?)\s*\[\s*([^\[\]]+?)\s*\]")
 _STEPS = {"time step", "time-step", "iteration", "iterations"}
 _TIMES = {"flow time", "flow-time", "physical-time", "time"}
 
@@ -51,14 +52,16 @@ def column_of(name: str) -> Column:
     >>> column_of("flow-time").name, column_of("Iteration").role, column_of("thrust(blade:1)").role
     ('time_s', 'step', 'value')
     """
-    word = name.strip().lower()
+    stated = _UNIT.fullmatch(name.strip())
+    word = (stated[1] if stated else name).strip().lower()
     if word in _STEPS:
         return Column(name.strip(), "", "step")
-    if word in _TIMES:
+    if word in _TIMES and (stated is None or stated[2] == "s"):
         return Column("time_s", "s", "time")
-    if word == "delta-time":
+    if word == "delta-time" and stated is None:
         return Column("delta_time_s", "s", "step_size")
-    return Column(name.strip() or "unnamed")
+    unit = (si_unit(stated[2]) or stated[2].strip()) if stated else ""
+    return Column(name.strip() or "unnamed", unit)
 
 
 def sniff(head: bytes | str) -> bool:
@@ -136,7 +139,7 @@ def read(path: str | os.PathLike[str]) -> Imported:
         raise InputError(Fault(source.name, "", f"a header ({', '.join(names)}) and no rows", "one row or more", hint))
     table = numeric_table(source, columns, rows)
     notes = [f"header repeated in line {', '.join(map(str, repeated[:5]))}: the run was restarted"] if repeated else []
-    if any(c.role == "value" for c in columns):
+    if any(c.role == "value" and not c.unit for c in columns):
         notes.append("report files state no units, reference values, sector or sign convention: check them")
     if not any(c.role in ("step", "time") for c in columns):
         notes.append("no column counts steps or time: rows are taken in their order")

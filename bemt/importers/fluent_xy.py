@@ -28,7 +28,7 @@ __all__ = ["KIND", "read", "sniff"]
 KIND = "fluent_xy"
 
 _LABELS = re.compile(r'\(labels\s+"([^"]*)"\s+"([^"]*)"\s*\)')
-_ZONE = re.compile(r'\(\(xy/key/label\s+"([^"]*)"\s*\)(?:\s*\((?:xy/key/visible\?|[\w/?-]+)[^)]*\))*')
+_ZONE = re.compile(r'\(\(xy/key/label\s+("[^"]*"|[^\s"()]+)\s*\)(?:\s*\((?:xy/key/visible\?|[\w/?-]+)[^)]*\))*')
 _UNIT = re.compile(r"\s*[\[(]\s*([^\])]*?)\s*[\])]\s*$")
 
 
@@ -88,7 +88,7 @@ def read(path: str | os.PathLike[str]) -> Imported:
         elif text.startswith("(title"):
             title = text[6:].strip().strip(')"').strip()
         elif zone:
-            zones.append((zone[1], []))
+            zones.append((zone[1].strip('"'), []))
             closed = False
         elif text == ")":
             closed = True
@@ -108,6 +108,8 @@ def _column(label: str) -> Column:
     match = _UNIT.search(label)
     name = label[: match.start()].strip() if match else label
     column = column_of(name or label)
+    if column.role == "time" and match and match[1] not in ("s", "sec", "seconds", ""):  # no clock in seconds
+        return Column(label, match[1])
     return column if column.role != "value" else replace(column, name=label)
 
 

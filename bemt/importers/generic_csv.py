@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,8 @@ import numpy as np
 from bemt.imported import Imported
 from bemt.importers import SourceText, head_text, load_text, number
 from bemt.importers._headings import Heading, heading
-from bemt.importers._recording import Builder, Table, find_delimiter, spikes, split_line, split_table
+from bemt.importers._recording import Builder, spikes
+from bemt.importers._split import Table, decimal_mark, find_start, split_line, split_table
 
 __all__ = ["FALLBACK", "KIND", "convert", "read", "sniff"]
 
@@ -49,7 +51,11 @@ def sniff(head: bytes | str) -> bool:
         lines = lines[:-1]  # the head may end in the middle of a line
     if len(lines) < 2 or lines[0].lstrip().startswith(("[", "{", "<", "!", "/*", "//")):
         return False
-    mark = find_delimiter(lines[:5])
+    lines = [t for t in lines if t.strip(" \t;,|")]
+    start, mark = find_start(lines[:60])
+    lines = lines[start:]
+    if len(lines) < 2:
+        return False
     if mark == " " and not all(_blank_numbers(t) for t in lines[1:20]):
         return False
     split = [split_line(t, mark) for t in lines[:50]]
@@ -89,7 +95,8 @@ def read(path: str | os.PathLike[str]) -> Imported:
         With all faults.
     """
     source = load_text(path)
-    imported = convert(source, split_table(source))
+    table = split_table(source)
+    imported = convert(source, table, decimal_mark(table))
     beside = Path(path).with_name("recording.toml")
     if beside.is_file() and Path(path).name in beside.read_text(encoding="utf-8", errors="replace"):
         more = f"{beside.name} beside it names this file: import {beside.name} for what it says"
@@ -120,12 +127,16 @@ def convert(source: SourceText, table: Table, decimal: str = ".") -> Imported:
         With all faults.
     """
     build = Builder(table, KIND, kind="table")
-    width = len(table.rows[0])
-    for k in range(width):
-        text = table.headings[k] if table.headings else ""
-        build.add(k, heading(text) if text else Heading("", f"column_{k + 1}", None), decimal)
+    heads = [heading(t) if t else Heading("", f"column_{k + 1}", None) for k, t in enumerate(table.headings)]
+    heads = heads or [Heading("", f"column_{k + 1}", None) for k in range(len(table.rows[0]))]
+    if any(head.name == "CT" for head in heads):  # beside a thrust coefficient, Cp is that of the power
+        heads = [replace(h, name={"Cp": "CP", "Cq": "CQ"}.get(h.name, h.name)) for h in heads]
+    for k, head in enumerate(heads):
+        build.add(k, head, decimal)
     if not table.headings:
         build.warnings.append("no heading line: columns are numbered")
+    if decimal == ",":
+        build.warnings.append("decimal commas read as decimal points")
     build.flag_time()
     speeds = [n for n in build.channels if n == "rpm" or n.endswith("_rpm")]
     for name in speeds:

@@ -25,7 +25,8 @@ from bemt.errors import Fault
 from bemt.imported import Imported
 from bemt.importers import head_text, load_text
 from bemt.importers._headings import Heading, heading
-from bemt.importers._recording import Builder, slip, spikes, split_table
+from bemt.importers._recording import Builder, slip, spikes
+from bemt.importers._split import split_table
 
 __all__ = ["KIND", "read", "sniff"]
 

@@ -133,6 +133,9 @@ def read(path: str | os.PathLike[str]) -> Imported:
             rows.append((line, text))
     if header is None:
         raise InputError(Fault(source.name, "", "no header", "a header such as # Time total_x total_y total_z"))
+    if "bins" in about or re.search(r"\[\d+\]\(|_\d+_[xyz]\b", header):
+        got, hint = "forces in bins along a direction", "Their sum is in the forces or force and moment file beside it"
+        raise InputError(Fault(source.name, "", got, "forces of the whole", hint))
     notes = [f"header repeated {repeated} times: the run was restarted"] if repeated else []
     if header.split()[0] == "patch":
         return _by_patch(source, header.split(), rows, {"title": title, **about}, notes)

@@ -23,7 +23,7 @@ from bemt.importers import SourceText, head_text, load_text, number
 from bemt.importers.polar_csv import PolarRow, assemble
 from bemt.polars import Polar
 
-__all__ = ["KIND", "read", "sniff"]
+__all__ = ["KIND", "read", "resembles", "sniff"]
 
 KIND = "polar_c81"
 
@@ -55,6 +55,24 @@ def sniff(head: bytes | str) -> bool:
         return False
     mach = [number(lines[1][k : k + WIDTH]) for k in range(WIDTH, len(lines[1].rstrip()), WIDTH)]
     return bool(mach) and all(m is not None and 0.0 <= m <= 2.0 for m in mach)
+
+
+def resembles(text: str) -> bool:
+    """Whether a text begins as a C81 table does and goes on in columns of another width.
+
+    Parameters
+    ----------
+    text : str
+        Head of a file that is no C81 table.
+
+    Returns
+    -------
+    bool
+        True for six counts and a line of Mach numbers below, wherever they stand.
+    """
+    lines = text.splitlines()
+    mach = [number(cell) for cell in lines[1].split()] if len(lines) > 1 else []
+    return bool(lines) and _counts(lines[0]) is not None and len(mach) > 1 and None not in mach
 
 
 def read(path: str | os.PathLike[str]) -> Polar:

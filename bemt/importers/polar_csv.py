@@ -261,7 +261,8 @@ def _doubts(file: str, rows: Sequence[PolarRow], radians: bool) -> list[Fault]:
     elif not radians and math.degrees(max(-lo, hi)) <= math.pi + 1e-3:
         got = f"angles from {math.degrees(lo):.4g} to {math.degrees(hi):.4g} in a column of degrees"
         out.append(Fault(file, "", got, f"degrees that reach {MIN_SPAN_DEG:g}", "The span looks like radians"))
-    if min(r.cd for r in rows) > 0.2:
-        got = f"a least cd of {min(r.cd for r in rows):g}"
+    least, bluff = min(r.cd for r in rows), all(abs(r.cl) < 1e-3 for r in rows)  # a round blade root has no lift
+    if least > (2.0 if bluff else 0.2):
+        got = f"a least cd of {least:g}"
         out.append(Fault(file, "", got, "a least cd below 0.2", "Drag counts, or columns swapped? cd is not scaled"))
     return out

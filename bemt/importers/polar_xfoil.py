@@ -1,4 +1,4 @@
-"""Polar save files of XFOIL (``PACC``), and of XFLR5 and XOptFoil that write the same layout.
+"""Polar save files of XFOIL (``PACC``), of XFLR5 and XOptFoil that write the same layout, and the CSV of airfoiltools.
 
 One file holds one Reynolds number::
 
@@ -8,6 +8,15 @@ One file holds one Reynolds number::
     Mach =   0.000     Re =     0.100 e 6     Ncrit =   9.000
      alpha    CL        CD       CDp       CM     Top_Xtr  Bot_Xtr
     ------ -------- --------- --------- -------- -------- --------
+
+XFLR5 may put commas between the cells. The CSV of airfoiltools.com says the same in other words::
+
+    Xfoil polar. Reynolds number fixed. Mach  number fixed
+    Airfoil,n0012-il
+    Reynolds number,100000
+    Ncrit,9
+    Mach,0
+    Alpha,Cl,Cd,Cdp,Cm,Top_Xtr,Bot_Xtr
 
 Several such files make one polar with `read_many`.
 """
@@ -31,6 +40,9 @@ KIND = "polar_xfoil"
 _TITLE = re.compile(r"Calculated polar for:[ \t]*(.*?)[ \t]*$", re.M)
 _STATE = re.compile(r"Mach\s*=\s*(\S+)\s+Re\s*=\s*(\S+)\s*e\s*(\d+)\s+Ncrit\s*=\s*(\S+)", re.I)
 _TYPE = re.compile(r"^\s*\d+\s+\d+\s+Reynolds number\s+(.*?)\s{2,}Mach number\s+(.*?)\s*$", re.M)
+_HEADER = re.compile(r"\s*alpha\s*[,;\s]\s*CL\s*[,;\s]\s*CD\b", re.I)
+_SITE = re.compile(r"\s*Xfoil polar\. Reynolds number (\w+)\. Mach\s+number (\w+)", re.I)
+_FACT = re.compile(r"^(Airfoil|Reynolds number|Ncrit|Mach)\s*[,;]\s*(.*?)[,;\s]*$", re.M)
 _TRIP = re.compile(r"xtrf\s*=\s*(\S+)\s*\(top\)\s*(\S+)\s*\(bottom\)")
 
 
@@ -45,14 +57,15 @@ def sniff(head: bytes | str) -> bool:
     Returns
     -------
     bool
-        True when it says "Calculated polar for:".
+        True when it says "Calculated polar for:" or begins as the CSV of airfoiltools does.
 
     Examples
     --------
     >>> sniff("       XFOIL         Version 6.99\n\n Calculated polar for: NACA 4412\n"), sniff("alpha,cl,cd")
     (True, False)
     """
-    return _TITLE.search(head_text(head)) is not None
+    text = head_text(head)
+    return _TITLE.search(text) is not None or _SITE.match(text) is not None
 
 
 def read(path: str | os.PathLike[str]) -> Polar:
@@ -113,9 +126,29 @@ def read_many(paths: Iterable[str | os.PathLike[str]]) -> Polar:
     return assemble(first, rows, faults, name=names[0], kind="XFOIL polar", notes=tuple(dict.fromkeys(notes)))
 
 
+def _rewritten(text: str) -> str:
+    """Head of the CSV of airfoiltools in the words of XFOIL, on as many lines."""
+    site = _SITE.match(text)
+    if site is None:
+        return text
+    facts = dict(_FACT.findall(text))
+    re_number = number(facts.get("Reynolds number", ""))
+    if re_number is None:
+        return text
+    kind = f" 1 1 Reynolds number {site[1]}          Mach number {site[2]}"
+    state = f"Mach = {facts.get('Mach', '0')} Re = {re_number / 1e6!r} e 6 Ncrit = {facts.get('Ncrit', '?')}"
+    lines = text.splitlines()
+    head = next((i for i, line in enumerate(lines) if _HEADER.match(line)), 0)
+    if head < 3:
+        return text
+    return "\n".join(
+        [f"Calculated polar for: {facts.get('Airfoil', '')}", kind, state, *[""] * (head - 3), *lines[head:]]
+    )
+
+
 def _parse(source: SourceText, faults: list[Fault]) -> tuple[str, list[PolarRow], list[str]]:
     """Name, rows and notes of one file; faults are added to the list."""
-    text = source.text
+    text = _rewritten(source.text)
     title, state, kind, trip = (p.search(text) for p in (_TITLE, _STATE, _TYPE, _TRIP))
     notes = []
     if title is None:
@@ -143,11 +176,12 @@ def _parse(source: SourceText, faults: list[Fault]) -> tuple[str, list[PolarRow]
     if trip and (trip.group(1), trip.group(2)) != ("1.000", "1.000"):
         notes.append(f"forced transition at x/c {trip.group(1)} (top), {trip.group(2)} (bottom)")
     rows = []
-    lines = source.lines
-    start = next((i for i, line in enumerate(lines) if re.match(r"\s*alpha\s+CL\s+CD\b", line, re.I)), len(lines))
+    lines = text.splitlines()
+    start = next((i for i, line in enumerate(lines) if _HEADER.match(line)), len(lines))
+    mark = re.search("[,;]", lines[start]) if start < len(lines) else None
     for i, line in enumerate(lines[start + 1 :], start + 2):
-        cells = line.split()
-        if not cells or set(line.strip()) <= {"-", " "}:
+        cells = [c.strip() for c in line.split(mark[0])] if mark else line.split()
+        if not any(cells) or set(line.strip()) <= {"-", " "}:
             continue
         values = [number(c) for c in cells[:3]]
         if len(values) < 3 or any(v is None for v in values):

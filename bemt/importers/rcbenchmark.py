@@ -9,6 +9,9 @@ Comma-separated, one heading line that names the units::
   is called ``rpm``: a ``recording.toml`` says which one to trust. A probe that never saw a mark reads 0 throughout.
 * In a step test every row is the mean of one step and the first time stamps may step back; in a continuous record the
   slow channels (thrust, torque) are empty in most rows.
+* The Flight Stand software writes ``Powertrain 1 - rotation speed (rpm)``: one speed, whose sensor it does not name.
+* Two motors on one stand are ``Thrust A``, ``Thrust B``, or powertrains 1 and 2. If only one of them turned, its
+  columns get the plain names; two that turned keep their letters, and the user says which one a recording is about.
 * ``Mechanical Power`` is torque times one of the speeds; which one is found from the numbers and reported.
 * Rows with 0 rpm, spikes, and times that go backwards are kept and flagged.
 """
@@ -18,15 +21,18 @@ from __future__ import annotations
 import math
 import os
 import re
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from bemt import units
 from bemt.errors import Fault, InputError
 from bemt.imported import Imported
-from bemt.importers import head_text, load_text
+from bemt.importers import head_text, load_text, number
 from bemt.importers._headings import heading
-from bemt.importers._recording import Array, Builder, slip, spikes, split_table
+from bemt.importers._recording import Array, Builder, slip, spikes
+from bemt.importers._split import Table, split_table
 
 __all__ = ["KIND", "read", "sniff"]
 
@@ -34,6 +40,9 @@ KIND = "rcbenchmark"
 MOST_RPM_PER_V = 8000.0
 """Speed over supply voltage that no usual motor reaches. [(rev/min)/V]"""
 _SPEEDS = ("electrical_rpm", "optical_rpm")
+_POWERTRAIN = re.compile(r"Powertrain (\d+) - (.+)")
+_LETTER = re.compile(r"((?:ESC|Torque|Thrust|Voltage|Current|Motor|Electrical|Mechanical|Propeller|Overall|Vibration)"
+                     r"\b.*?) ([A-D])(\s*\(.*\))?")  # fmt: skip
 _HEAD = re.compile(r"(ESC( signal)?( [A-D])?|Motor (Electrical|Optical) Speed( [A-D])?|App message)\b")
 
 
@@ -54,11 +63,14 @@ def sniff(head: bytes | str) -> bool:
     --------
     >>> sniff("Time (s),ESC signal (µs),Thrust (gf),Motor Optical Speed (RPM)\n"), sniff("Time (s),Thrust (gf)\n")
     (True, False)
+    >>> sniff("Time (s),Powertrain 1 - voltage (V),Powertrain 1 - current (A)\n")
+    True
     """
     text = head_text(head)
     line = text.splitlines()[0] if text.strip() else ""
-    cells = [c.strip() for c in re.split(r"[,;\t]", line)]
-    return any(c.startswith("Time (") for c in cells) and sum(bool(_HEAD.match(c)) for c in cells) >= 2
+    cells = [c.strip().strip('"') for c in re.split(r"[,;\t]", line)]
+    own = sum(bool(_HEAD.match(c) or _POWERTRAIN.fullmatch(c)) for c in cells)
+    return any(c.startswith("Time (") for c in cells) and own >= 2
 
 
 def read(path: str | os.PathLike[str]) -> Imported:
@@ -86,11 +98,18 @@ def read(path: str | os.PathLike[str]) -> Imported:
         faults = [Fault(source.name, "1", f"a second column {name!r}", "each column once") for name in twice]
         raise InputError(faults)
     build = Builder(table, KIND)
-    for k, text in enumerate(table.headings):
+    sides = [_side(text) for text in table.headings]
+    turned = [side for side in dict.fromkeys(side for _, side in sides if side) if _turned(table, sides, side)]
+    for k, (text, (plain, side)) in enumerate(zip(table.headings, sides, strict=True)):
         if text == "App message" or not text:
             _messages(build, k, text)
         else:
-            build.add(k, heading(text))
+            head = heading(plain if [side] == turned else text)
+            build.add(k, replace(head, text=text))
+    if len(turned) > 1:
+        build.warnings.append(f"motors {' and '.join(turned)} turned: name the columns of one in a recording.toml")
+    elif turned and len({side for _, side in sides if side}) > 1:
+        build.warnings.append(f"only motor {turned[0]} turned: its columns have the plain names")
     if "time_s" not in build.channels and not build.faults:
         build.faults.append(Fault(source.name, "1", "no numbers in Time (s)", "the time of every row"))
     if build.faults:
@@ -105,6 +124,25 @@ def read(path: str | os.PathLike[str]) -> Imported:
     build.check_magnitudes()
     _sign(build)
     return build.finish(said)
+
+
+def _side(text: str) -> tuple[str, str]:
+    """Heading without the motor that it is about, and that motor ("" when it names none)."""
+    if found := _POWERTRAIN.fullmatch(text):
+        return found[2], found[1]
+    if found := _LETTER.fullmatch(text):
+        return found[1] + (found[3] or ""), found[2]
+    return text, ""
+
+
+def _turned(table: Table, sides: Sequence[tuple[str, str]], side: str) -> bool:
+    """Whether a motor turned: its speed, or without one its thrust, was ever other than 0."""
+    for words in ("speed", "thrust"):
+        own = [k for k, (text, s) in enumerate(sides) if s == side and words in text.lower()]
+        values = [v for k in own for row in table.rows if (v := number(row[k])) is not None]
+        if values:
+            return any(v != 0.0 for v in values)
+    return False
 
 
 def _messages(build: Builder, k: int, text: str) -> None:
@@ -138,7 +176,7 @@ def _speeds(build: Builder) -> None:
     """Flags of the two speeds, each for itself."""
     load = _at(build, "thrust_N")
     seen = 0
-    for name in [n for n in build.channels if n.startswith(_SPEEDS)]:
+    for name in [n for n in build.channels if n.startswith(_SPEEDS) or n == "rpm"]:
         v = _at(build, name)
         assert v is not None
         if not np.any(v[np.isfinite(v)] != 0.0):
@@ -163,6 +201,10 @@ def _speeds(build: Builder) -> None:
         build.warnings.append(
             f"{electrical[0]} is derived from the motor's phases with the number of poles set in the stand's software, "
             "which the file does not state; check it against an optical speed, or state it in a recording.toml"
+        )
+    if "rpm" in build.channels and seen:
+        build.warnings.append(
+            "rpm: the file names neither its sensor nor the number of poles set in the stand's software"
         )
     both = [_at(build, n) for n in _SPEEDS]
     if both[0] is not None and both[1] is not None:
@@ -198,7 +240,7 @@ def _power(build: Builder) -> None:
     power, torque = _at(build, "mechanical_power_W"), _at(build, "torque_Nm")
     volt, ampere, electric = _at(build, "voltage_V"), _at(build, "current_A"), _at(build, "electrical_power_W")
     if power is not None and torque is not None:
-        for name in _SPEEDS:
+        for name in (*_SPEEDS, "rpm"):
             speed = _at(build, name)
             if speed is None:
                 continue

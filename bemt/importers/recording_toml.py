@@ -48,7 +48,8 @@ from bemt.errors import Fault, InputError
 from bemt.imported import Channel, Imported
 from bemt.importers import head_text, load_text
 from bemt.importers._headings import Heading, heading
-from bemt.importers._recording import Builder, some, spikes, split_table
+from bemt.importers._recording import Builder, spikes
+from bemt.importers._split import some, split_table
 from bemt.schema import Collector, Key, check_table, load_toml, shown
 
 __all__ = ["KIND", "QUANTITIES", "read", "sniff"]
