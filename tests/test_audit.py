@@ -87,13 +87,13 @@ def test_the_thesis_is_found_out() -> None:
     ("compressible", "M", "status", "u"),
     [
         (True, 1.09, "fine", 0.0),
-        (False, 0.2, "fine", 0.07 * (0.2 / 0.625) ** 2),
-        (False, 0.45, "doubtful", 0.07 * (0.45 / 0.625) ** 2),
-        (False, 0.625, "fault", 0.07),
+        (False, 0.2, "fine", 0.063 * (0.2 / 0.625) ** 2),
+        (False, 0.45, "doubtful", 0.063 * (0.45 / 0.625) ** 2),
+        (False, 0.625, "fault", 0.063),
         (False, 0.94, "fault", math.nan),
-        (None, 0.625, "not stated", 0.07 / math.sqrt(3)),
+        (None, 0.625, "not stated", 0.063 / math.sqrt(3)),
         (None, 0.94, "not stated", math.nan),
-        (None, 0.2, "fine", 0.07 * (0.2 / 0.625) ** 2),
+        (None, 0.2, "fine", 0.063 * (0.2 / 0.625) ** 2),
     ],
 )
 def test_compressibility_follows_the_tip_mach_number(
