@@ -84,6 +84,16 @@ def test_the_document_keeps_its_schema() -> None:
     assert set(doc["next_measurement"]) >= {"text", "points", "separates"}
 
 
+def test_a_plan_with_pulse_widths_sees_the_drive() -> None:
+    """Speed is a channel of such a plan, though nothing was measured yet."""
+    rpm = np.tile([9000.0, 14000.0, 20000.0], 4)
+    given = {"rpm": rpm, "airspeed_m_s": 0.0 * rpm, "density_kg_m3": np.full(rpm.size, 1.225),
+             "time_s": 60.0 * np.arange(rpm.size), "pwm_s": 1e-3 + rpm / 24e6, "thrust_N": np.ones(rpm.size),
+             "torque_Nm": np.ones(rpm.size)}  # fmt: skip
+    seen = plan.plan(record.from_series(Series("bench", "drive", given), case()), case())
+    assert {"battery_sag", "motor_heating"} <= set(seen.sight)
+
+
 def test_a_plan_knows_what_it_can_see() -> None:
     static, grid = (
         plan.plan(record.from_series(Series("bench", p, {**points(p), "thrust_N": np.ones_like(points(p)["rpm"]),

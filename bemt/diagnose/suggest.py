@@ -126,7 +126,7 @@ def _extended(problem: Problem, option: _Option) -> Problem:
     both = air_of({k: join([getattr(old.air, k), air[k]]) for k in air})
     plain = [e for e in part.baseline if not forward.acts_on_points(e)]
     flow = forward.flow_of(part.model.prepared(plain), rpm, V, both, extra, part.flow.chord)
-    ratio = {c: _relative(old.u[c], old.measured[c]) for c in old.u}
+    ratio = {c: _relative(old.u[c], old.measured[c]) for c in old.u if c in old.measured}
     filled = {}
     for c, values in (("thrust_N", flow.T0), ("torque_Nm", flow.Q0)):
         if c in old.measured:
