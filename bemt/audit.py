@@ -49,8 +49,8 @@ STATUSES = ("fine", "doubtful", "fault", "not stated")
 MEASURED = {"compressible": 0.063, "compressible_M_tip": 0.625, "buffer_layer": 0.012, "turbulence": 0.016}
 """Relative change of static thrust of one 8x5 propeller at 20,000 rev/min, OpenFOAM, half domain [1]: compressible for
 incompressible flow (at tip Mach 0.625, isentropic gas, ``reports/cfd``; torque 7.5 %), first cell at y+ 16 for 51,
-realizable k-epsilon for k-omega SST.  The last two are differences on one grid of 249,000 cells from before the periodic
-sides were mended, and have not been measured again."""
+realizable k-epsilon for k-omega SST.  The last two are differences on one grid of 249,000 cells from before the
+periodic sides were mended, and have not been measured again."""
 
 M_TIP_NEGLIGIBLE = 0.3
 M_TIP_KNOWN = 0.75

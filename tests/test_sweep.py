@@ -352,7 +352,9 @@ def test_interrupt_ends_at_once_with_130_and_no_half_file(tmp_path: Path, jobs: 
         make_case(tmp_path / "cases", name, extra=GRID.replace("num = 96", "num = 960"))
     env = {**os.environ, "PYTHONPATH": str(ROOT)}
     command = [sys.executable, "-m", "bemt", "sweep", str(tmp_path / "cases"), "--out", str(tmp_path / "out"), *jobs]
-    process = subprocess.Popen(command, env=env, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    # in the background of a shell the signal is ignored, and children inherit that
+    process = subprocess.Popen(command, env=env, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+                               preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))  # fmt: skip
     deadline = time.monotonic() + 60
     while not list(tmp_path.glob("out/*/grid.parts-*/*.json")) and time.monotonic() < deadline:
         time.sleep(0.005)
