@@ -117,7 +117,7 @@ def badge(kind: str, words: str) -> str:
     str
         HTML.
     """
-    size = " long" if len(words) > 24 else ""
+    size = " wrap" if len(words) > 24 else ""
     return f'<span class="badge {esc(kind)}{size}">{esc(words)}</span>'
 
 
