@@ -243,8 +243,9 @@ class Record:
         studies = self.studies()
         for row in self.rows:
             grid = grid_uncertainty(studies, row)
-            for key, scatter in (("thrust_N", "scatter_thrust"), ("torque_Nm", "scatter_torque")):
-                relative = math.hypot(row[scatter], grid.get(key, 0.0))
+            for key in ("thrust_N", "torque_Nm"):
+                name = key.partition("_")[0]
+                relative = math.hypot(row[f"scatter_{name}"], row[f"drift_{name}"], grid.get(key, 0.0))
                 row[f"u_{key}"] = abs(row[key]) * relative if row["converged"] == 1 else math.nan
         write_atomic(self.path, csv_text(COLUMNS, _short(self.rows)))
         names = set(order)
@@ -259,7 +260,7 @@ class Record:
             "not_converged": [{"run": r["run"], "note": r["note"]} for r in done if not r["converged"]],
             "older": [row["run"] for row in self.rows if row["run"] not in names],
             "rule": {"drift_limit": DRIFT_LIMIT, "scatter_limit": SCATTER_LIMIT,
-                     "u": "hypot of the standard deviation over the averaged iterations and the grid study",
+                     "u": "hypot of standard deviation and drift over the averaged iterations, and the grid study",
                      "grid_study": bool(studies)},
             "grid_studies": grid_studies(self.rows), "seconds": float(np.nansum([r["seconds"] for r in self.rows])),
         }  # fmt: skip
