@@ -208,7 +208,8 @@ def respond(prepared: Callable[[Sequence[Effect], float], solver.Prepared], effe
     and interpolated by the parabola through them; several of them add up.
     """
     met = replace(flow, **{k: getattr(flow, k).copy() for k in ("rpm", "V", "rho", "mu", "a_sound")})
-    for e in effects:
+    # what instruments got wrong first: a wrong airspeed is that of the tunnel, not what a wall makes of it
+    for e in sorted(effects, key=lambda e: e.kind != "stand"):
         e.flow(met)
     shared = [(e, s) for e in effects if (s := e.share(met)) is not None]
     varying = [e for e, _ in shared]

@@ -53,7 +53,7 @@ FREE = "prop_8x5_incompressible"
 QUESTIONS = {
     "compressibility": lambda: (rows("prop_8x5_compressible"), rows(FREE)),
     "ground_effect": lambda: (rows("prop_8x5_plate"), rows(FREE)),
-    "duct": lambda: (rows("prop_8x5_duct"), rows(FREE, J=0.0)),
+    "duct": lambda: (rows("prop_8x5_duct"), rows(FREE)),
     "pitch_offset": lambda: (rows("prop_8x5_pitch"), rows(FREE)),
     "oblique_inflow": lambda: (
         [r for r in rows("prop_8x5_skew") if float(r["sideslip_deg"]) > 0], rows("prop_8x5_skew", sideslip_deg=0.0),
@@ -69,11 +69,8 @@ def test_what_the_campaigns_have_is_told_in_four_of_five() -> None:
         print(cause, document.text(answer), sep="\n")
     right = [cause for cause, (_, ids) in said.items() if cause in ids]
     wrong = [cause for cause, (_, ids) in said.items() if ids and cause not in ids]
-    assert set(right) >= {"compressibility", "duct", "pitch_offset"}, said
-    # The plate stops the wind of the runs at J = 0.2, which no effect of the list does: it looks like oblique inflow.
-    assert set(wrong) <= {"ground_effect"}, said
-    if len(right) < 4:
-        pytest.xfail(f"four of five asked for, {len(right)} reached: {said}")
+    # a frozen rotor hardly shows the angle of the wind (under 2 % at J 0.2)
+    assert set(right) >= {"compressibility", "ground_effect", "duct", "pitch_offset"} and not wrong, said
 
 
 def test_nothing_is_named_on_the_campaign_without_a_cause() -> None:

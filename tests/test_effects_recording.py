@@ -94,11 +94,36 @@ def test_a_wall_raises_thrust_at_rest_and_less_with_speed_and_distance(form: str
 
 
 def test_cheeseman_and_bennett_hold_at_constant_power() -> None:
-    # their thrust ratio 1 / (1 - (R/4z)^2) at constant T w: the rotor meets w = v (1 - (R/4z)^2) at the same thrust
+    # at equal thrust the rotor meets share * v, and v goes with the root of thrust: T^(3/2) share is constant power
     flow = recorded([6000.0])
     z = 0.7
-    w = flow.induced + met(flow, GroundEffect(z_over_R=z)).V
-    assert flow.induced[0] / w[0] == pytest.approx(1.0 / (1.0 - (1.0 / (4.0 * z)) ** 2), rel=1e-12)
+    share = (flow.induced + met(flow, GroundEffect(z_over_R=z)).V)[0] / flow.induced[0]
+    assert share ** (-2.0 / 3.0) == pytest.approx(1.0 / (1.0 - (1.0 / (4.0 * z)) ** 2), rel=1e-12)
+
+
+@pytest.mark.parametrize("z", [0.3, 1.0, 4.0])
+def test_a_plate_dams_the_wind_as_a_disk_does(z: float) -> None:
+    """Potential of a disk broadside on by its sources: the normal speed on the axis, integrated over the disk.
+
+    A disk moving broadside on is a layer of doublets of strength (4/pi) U sqrt(a^2 - s^2), Lamb art. 102.
+    """
+    from scipy.integrate import quad
+
+    def doublets(s: float) -> float:
+        # speed on the axis at z of a ring of unit axial doublets: s (2 z^2 - s^2) / (2 (z^2 + s^2)^(5/2))
+        return 4.0 / np.pi * np.sqrt(1.0 - s**2) * s * (2.0 * z**2 - s**2) / (2.0 * (z**2 + s**2) ** 2.5)
+
+    dammed = GroundEffect(plate_radius_over_R=1.0).dammed(np.array([z]))
+    assert dammed == pytest.approx(quad(doublets, 0, 1)[0], rel=1e-6)
+
+
+def test_wind_is_dammed_where_the_wall_was_measured_only() -> None:
+    plate = GroundEffect(strength=0.0, plate_radius_over_R=1.5)
+    there = recorded([6000.0] * 3, [8.0] * 3, wall_distance_m=np.array([0.05, 0.2, np.nan]))
+    V = met(there, plate).V
+    assert V[0] < V[1] < V[2] == 8.0
+    hidden = recorded([6000.0], [8.0])
+    assert met(hidden, plate).V[0] == 8.0
 
 
 def test_a_recorded_distance_replaces_the_assumed_one() -> None:

@@ -241,7 +241,7 @@ _ALL: tuple[Cause, ...] = (
           "drive", ("endurance",), variables=_CLOCK),
     Cause("battery_sag", lambda f, rig, c, rng: Change(stand={"battery_sag": 0.10 * f},
                                                        parameters={"discharge": (0.10 * f, "1")}),
-          "drive", ("endurance",), variables=(*_CLOCK, *_SPEED)),
+          "drive", ("endurance",), variables=(*_CLOCK, *_SPEED, "voltage")),
     Cause("resonance", _resonance, "unlisted", ("static_sweep", "grid_shuffled", "grid_ordered", "two_air")),
     Cause("bearing_drag", _bearing, "unlisted", ("static_sweep", "grid_shuffled", "grid_ordered", "two_air")),
     Cause("hysteresis", lambda f, rig, c, rng: Change(stand={"hysteresis": 0.03 * f}), "unlisted",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -315,7 +315,7 @@ def make_item(
         "separation": [p["separation"] for p in parts],
         "separation_noise": [p["separation_noise"] for p in parts],
         "alike": [p["alike"] for p in parts],
-        "variables": [list(c.variables) for c in causes],
+        "variables": [_varied(c.variables, rows) for c in causes],
         "plan": bench.plan,
         "rig": bench.rig.name,
         "ducted": bench.rig.duct is not None,
@@ -330,6 +330,12 @@ def make_item(
 
 
 _QUALITY = ("noise", "floor", "share", "memory", "session", "step", "rpm_noise", "airspeed_noise")
+
+
+def _varied(names: Sequence[str], rows: Conditions) -> list[str]:
+    """Variables of a cause that the plan varies: where nothing changes along one, nothing can be located in it."""
+    still = float(np.ptp(rows.airspeed)) == 0.0
+    return [n for n in names if not (still and n in ("j", "airspeed"))]
 
 
 def _across(own: Array, other: Array) -> float:

@@ -77,7 +77,8 @@ class Judged:
     claims : bool
         Whether a cause or a class of causes was claimed.
     right : bool
-        Whether the claim holds, or, where nothing is to be claimed, nothing was.
+        Whether the claim holds, or, where nothing is to be claimed, nothing was.  A claim holds when every effect it
+        names is at work and none is missing that the plan can see; of a class, when one of its members is.
     top1, top3 : bool
         Whether the cause, or one that the plan cannot tell from it, leads the ranking or is among its first three.
     """
@@ -162,7 +163,11 @@ def judge(entry: Mapping[str, Any], answer: Mapping[str, Any] | None) -> Judged:
     if verdict == "class":
         right = any(c in said for c in causes)
     else:
-        right = claims and _matches(said, allowed)
+        seen = entry.get("separation_together") or entry["separation"]
+        right = claims and (_matches(said, allowed) or any(
+            _matches(said, [allowed[k]]) and max(seen[:k] + seen[k + 1 :], default=0.0) < VISIBLE
+            for k in range(len(allowed)) if len(allowed) > 1
+        ))  # fmt: skip
     names = [str(r["effect"]) for r in answer["ranking"]]
     listed = [n for n in names if n not in _NOTHING]
     top1 = (verdict == "class" and right) or bool(listed) and _matches(listed[0].split("+"), allowed)
@@ -215,7 +220,10 @@ def _parameters(j: Judged) -> list[tuple[float, bool]]:
             if got and isinstance(got.get("value"), (int, float)) and true["value"]:
                 size = abs(float(got["value"]) - true["value"]) / abs(true["value"])
                 low, high = got.get("low"), got.get("high")
-                inside = low is not None and high is not None and low <= true["value"] <= high
+                # ratios of units are exact in the library and rounded in the key
+                inside = low is not None and high is not None and (
+                    low <= true["value"] <= high or (low == high and math.isclose(low, true["value"], rel_tol=1e-3))
+                )
                 out.append((size, inside))
     return out
 
@@ -331,7 +339,7 @@ def baselines(judged: Sequence[Judged]) -> list[Row]:
     Returns
     -------
     list of Row
-        Best single effect by its evidence whatever the rivals; a smooth curve without physics.
+        Best single effect by its evidence whatever the rivals; nearest signature; a smooth curve without physics.
     """
     visible = [j for j in judged if j.entry["set"] in ("single", "sensor") and j.visible and j.answer]
     nothing = [j for j in judged if j.entry["set"] in ("null", "mismatch", "unlisted") and j.answer]
@@ -350,6 +358,9 @@ def baselines(judged: Sequence[Judged]) -> list[Row]:
         _share("best single: top 1, visible",
                (best(j)[0] in {*j.entry["causes"], *j.entry["alike"][0]} for j in visible), "", 0.0),
         _share("best single: claims where nothing listed is", (best(j)[1] > 0.0 for j in nothing), "", 1.0, True),
+        _share("nearest signature: top 1, visible",
+               (j.answer.get("nearest_signature") in {*j.entry["causes"], *j.entry["alike"][0]} for j in visible), "",
+               0.0),
         _median("smooth curve only: held-out RMSE / noise", [smooth(j) for j in visible], "", math.inf),
     ]  # fmt: skip
 

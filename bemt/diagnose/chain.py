@@ -41,8 +41,8 @@ class Diagnosis:
         Effect to parameter to value and 90 % interval, of the leading explanation.
     p_value : float
         Of the gate [1].
-    where : Location or None
-        Of the mismatch; None without one.
+    where : Location
+        Of the mismatch; of the largest scatter when the verdict is none.
     scores : dict
         Channel to RMSE in its unit: before, after, noise, gp_only, holdout_before, holdout_after.
     blocks : str
@@ -62,7 +62,7 @@ class Diagnosis:
     best: fitting.Fit
     parameters: dict[str, dict[str, dict[str, Any]]]
     p_value: float
-    where: location.Location | None
+    where: location.Location
     scores: dict[str, dict[str, float]]
     blocks: str
     after: Array
@@ -75,6 +75,11 @@ class Diagnosis:
     def problem(self) -> Problem:
         """Readings, baseline, nuisances."""
         return self.found.problem
+
+    @property
+    def marked(self) -> location.Location | None:
+        """Location of the mismatch; None without one."""
+        return None if self.decision.verdict == "none" else self.where
 
 
 def diagnose(
@@ -137,7 +142,10 @@ def _diagnose(
         held = gp_only
     smooth = fitting.smooth(found, best)
     after = problem.f0 + best.signature + smooth
-    where = location.locate(found, best) if decision.verdict != "none" else None
+    # without a verdict the likeliest explanation still says best which part of the mismatch is not calibration
+    listed = max((k for k in found.probability if k not in (evidence.NONE, evidence.UNKNOWN)),
+                 key=lambda k: found.probability[k], default=None)  # fmt: skip
+    where = location.locate(found, best if best.ids or listed is None else fitting.fit(found, listed))
     say("next measurement")
     return Diagnosis(
         found, decision, best, parameters, p, where, _scores(found, after, held, gp_only), words, after, held,

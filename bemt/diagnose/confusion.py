@@ -19,7 +19,7 @@ from bemt.diagnose.evidence import Form, form_modes
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence, State
 
-__all__ = ["ALIKE", "VISIBLE", "Confusion", "confusion", "distance"]
+__all__ = ["ALIKE", "VISIBLE", "Confusion", "confusion", "distance", "nearest"]
 
 Array = NDArray[np.float64]
 
@@ -114,3 +114,28 @@ def confusion(found: Evidence, settings: dict[str, int] | None = None) -> Confus
     matrix = np.array([[0.0 if a == b else distance(state, s, found.spans[b], forms[a]) for b in ids]
                        for a, s in zip(ids, chosen, strict=True)]).reshape(len(ids), len(ids))  # fmt: skip
     return Confusion(ids, size, matrix)
+
+
+def nearest(found: Evidence) -> str:
+    """Effect whose signature is most nearly parallel to the mismatch: what a look at the curves would say.
+
+    Parameters
+    ----------
+    found : Evidence
+        Signatures and readings.
+
+    Returns
+    -------
+    str
+        Id; neither nuisances nor sizes count, so it is a baseline and nothing that the diagnosis uses. Empty without
+        candidates.
+    """
+    problem = found.problem
+    r = problem.residual / problem.u
+
+    def cosine(signatures: Array) -> float:
+        s = signatures / problem.u[:, None]
+        length = np.sqrt(np.sum(s * s, axis=0))
+        return float(np.max(s.T @ r / np.where(length > 0, length, np.inf)))
+
+    return max(((cosine(c.signatures), c.id) for c in found.candidates), default=(0.0, ""))[1]

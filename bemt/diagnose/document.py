@@ -10,6 +10,7 @@ import numpy as np
 from bemt import __version__, effects
 from bemt.diagnose import evidence as ev
 from bemt.diagnose import fit as fitting
+from bemt.diagnose.confusion import nearest
 from bemt.diagnose.verdict import inclusion
 from bemt.tables import text_table
 
@@ -66,13 +67,14 @@ def document(d: Diagnosis) -> dict[str, Any]:
         "probability": d.decision.probability,
         "ranking": ranking,
         "inclusion": {k: v for k, v in inclusion(found).items() if v > 1e-3},
-        "location": None if d.where is None else d.where.document(),
+        "location": d.where.document(),
         "fit": {c: {k: _number(v) for k, v in s.items()} for c, s in d.scores.items()},
         "blocks": d.blocks,
         "classes": [list(c) for c in d.decision.classes] or d.alike.classes(),
         "next_measurement": {"text": "", "points": [], "separates": []} if d.next is None else d.next.document(),
         "p_value": d.p_value,
         "log_bayes": {i: found.log_bayes(i) for i in (*found.spans, ev.UNKNOWN)},
+        "nearest_signature": nearest(found),
         "visibility": {i: float(s) for i, s in zip(d.alike.ids, d.alike.size, strict=True)},
         "covariance": {"noise_scale": state.hyper.scale, "correlation": state.hyper.ar,
                        "solver_error": state.hyper.model},
@@ -88,8 +90,6 @@ def document(d: Diagnosis) -> dict[str, Any]:
 
 def _where(d: Diagnosis) -> str:
     w = d.where
-    if w is None:
-        return ""
     name, unit, digits = _VARIABLE.get(w.variable, (w.variable, "", 3))
     sign = "high" if w.size > 0 else "low"
     both = f"{w.low:.{digits}f} to {w.high:.{digits}f}{unit}" if w.high > w.low else f"{w.low:.{digits}f}{unit}"
@@ -148,7 +148,8 @@ def explanation(d: Diagnosis) -> list[str]:
         if signs:
             lines.append("Because: " + "; ".join(signs) + ".")
     elif decision.verdict == "class":
-        lines.append(f"One of these, which this plan cannot tell apart ({decision.probability:.2f} together): "
+        lead = "One of these, which this plan cannot tell apart" if decision.classes else decision.why.capitalize()
+        lines.append(f"{lead} ({decision.probability:.2f} together): "
                      + ", ".join(f"{i} ({catalogue[i].title})" for i in decision.effects) + ".")  # fmt: skip
     elif decision.verdict == "unknown":
         kernel = d.found.states[0].best_rival

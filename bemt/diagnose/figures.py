@@ -128,7 +128,7 @@ def _channels(answer: Diagnosis) -> list[int]:
 
 def _across(answer: Diagnosis) -> str:
     """Covariate to draw over: that of the mismatch if it is no condition, else J, else another that varies."""
-    X, where = answer.problem.covariates, answer.where
+    X, where = answer.problem.covariates, answer.marked
     if where is not None and where.variable in X and where.variable not in _CONDITIONS:
         return where.variable
     return next((name for name in dict.fromkeys((*_CONDITIONS, *_AXIS)) if name in X and _varies(X[name])), "rpm")
@@ -154,7 +154,7 @@ def _percent(d: Array) -> str:
 
 
 def _residual(answer: Diagnosis) -> Figure:
-    X, where = answer.problem.covariates, answer.where
+    X, where = answer.problem.covariates, answer.marked
     x = _across(answer)
     y = where.variable if where is not None and where.variable in ("M_tip", "Re") else "rpm"
     if x == "J" and _varies(X["rpm"]):
@@ -169,7 +169,7 @@ def _shares(answer: Diagnosis, c: int) -> tuple[NDArray[np.bool_], Array]:
 
 def _located(answer: Diagnosis, c: int, name: str) -> tuple[float, float] | None:
     """Located interval of a covariate in a channel, with half a gap to the next points on either side."""
-    where = answer.where
+    where = answer.marked
     if where is None or where.channel != CHANNELS[c] or where.variable != name:
         return None
     problem = answer.problem
@@ -182,7 +182,7 @@ def _located(answer: Diagnosis, c: int, name: str) -> tuple[float, float] | None
 
 
 def _heading(answer: Diagnosis, c: int, region: bool) -> str:
-    text, where = _CHANNEL[CHANNELS[c]], answer.where
+    text, where = _CHANNEL[CHANNELS[c]], answer.marked
     if region and where is not None:
         text += f": {_percent(np.asarray(where.size))} of the mean in the marked region"
     return text
@@ -205,8 +205,8 @@ def _map(answer: Diagnosis, x: str, y: str) -> Figure:
             edgecolors="#555555", linewidths=0.4, zorder=3,
         )  # fmt: skip
         span = next((s for n in (x, y) if (s := _located(answer, c, n)) is not None), None)
-        if span is not None and answer.where is not None:
-            mark = axis.axvspan if answer.where.variable == x else axis.axhspan
+        if span is not None and answer.marked is not None:
+            mark = axis.axvspan if answer.marked.variable == x else axis.axhspan
             mark(*span, facecolor=ORANGE, alpha=0.25, edgecolor="none", zorder=1)
             mark(*span, facecolor="none", edgecolor=BLACK, linewidth=1.0, linestyle="--", zorder=2)
         axis.set(title=_title(_heading(answer, c, span is not None), len(channels)), xlabel=_AXIS.get(x, x))

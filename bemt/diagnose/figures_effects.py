@@ -33,7 +33,7 @@ _MOST_EFFECTS, _MOST_BARS = 15, 8
 
 def _representative(answer: Diagnosis) -> int:
     """Reading of median signature among those of the located region."""
-    problem, where = answer.problem, answer.where
+    problem, where = answer.problem, answer.marked
     size = np.abs(answer.best.signature / problem.scale)
     inside = np.isfinite(size)
     if where is not None:

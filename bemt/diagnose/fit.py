@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.diagnose import noise
-from bemt.diagnose.evidence import form_modes, log_mean
+from bemt.diagnose.evidence import FORM, form_modes, log_mean
 from bemt.diagnose.signatures import effect_of
 
 if TYPE_CHECKING:
@@ -25,6 +25,7 @@ __all__ = [
     "held_out",
     "intervals",
     "left_over",
+    "log_score",
     "partitions",
     "refined",
     "smooth",
@@ -34,6 +35,11 @@ __all__ = [
 Array = NDArray[np.float64]
 
 _STEPS = 5
+# Root mean square of the prior sizes of a form's error.
+_FORM_SIZE = float(np.sqrt(sum(w * f**2 for f, w in FORM.items())))
+
+REFERENCE = -1
+"""Block of points that are always given: readings without the cause."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,7 +184,7 @@ def _marginals(found: Evidence, id_: str, p: Array, share: float) -> dict[str, d
 
 
 def refined(found: Evidence, best: Fit, share: float = 0.9) -> tuple[Fit, dict[str, dict[str, dict[str, Any]]]]:
-    """Parameters between the grid's settings: Gauss-Newton on the solved model, Laplace intervals.
+    """Parameters between the grid's settings: Gauss-Newton on the solved model, Laplace within the physical ranges.
 
     Parameters
     ----------
@@ -194,11 +200,10 @@ def refined(found: Evidence, best: Fit, share: float = 0.9) -> tuple[Fit, dict[s
     tuple
         The explanation at the refined setting, and effect to parameter to ``value``, ``low``, ``high``, ``unit``.
     """
-    from scipy.special import erfinv
-
     problem = found.problem
     where = [(k, p) for k, i in enumerate(best.ids) for p in _continuous(i, best.settings[k])]
-    C = noise.covariance(problem, found.states[0].hyper) + form_covariance(found, best)
+    # what the form does to the scale of a law looks like its parameter: no fit shows it, so its prior size holds
+    C = noise.covariance(problem, found.states[0].hyper) + form_covariance(found, best, _FORM_SIZE)
     white = noise.whitener(C, problem.u)
     settings = [dict(s) for s in best.settings]
     low, high = (np.array([getattr(p, e) for _, p in where]) for e in ("low", "high"))
@@ -214,15 +219,18 @@ def refined(found: Evidence, best: Fit, share: float = 0.9) -> tuple[Fit, dict[s
         return float(w @ w)
 
     s = solve(x)
-    H = np.zeros((x.size, x.size))
+    mean, sigma = x, np.full(x.size, np.inf)
     for _ in range(_STEPS if x.size and np.isfinite(s).all() else 0):
         step = np.where(x + 0.02 * (high - low) <= high, 0.02, -0.02) * (high - low)
         tangent = np.stack([(solve(x + d) - s) / d[k] for k, d in enumerate(np.diag(step))], axis=1)
         if not np.isfinite(tangent).all():
             break
         J = white(tangent)
-        H = J.T @ J + np.diag(12.0 / (high - low) ** 2)  # as wide as the uniform prior
-        move = np.linalg.solve(H, J.T @ white(problem.residual - s))
+        H, g = J.T @ J, J.T @ white(problem.residual - s)
+        # of the readings alone, but for a prior so wide that it only keeps directions that they do not see finite
+        wide = H + np.diag(0.1 / (high - low) ** 2)
+        mean, sigma = x + np.linalg.solve(wide, g), np.sqrt(np.diag(np.linalg.inv(wide)))
+        move = np.linalg.solve(H + np.diag(12.0 / (high - low) ** 2), g)  # as wide as the uniform prior
         for shrink in (1.0, 0.3):
             new = np.clip(x + shrink * move, low, high)
             trial = solve(new)
@@ -234,18 +242,35 @@ def refined(found: Evidence, best: Fit, share: float = 0.9) -> tuple[Fit, dict[s
         x, s = new, trial
         if settled:
             break
+    middle, ends = _truncated(mean, sigma, low, high, share)
+    trial = solve(middle)
+    if np.isfinite(trial).all() and misfit(trial) < misfit(s) + 1.0:
+        x = middle
     s = solve(x)
-    half = np.sqrt(np.diag(np.linalg.inv(H))) * np.sqrt(2.0) * erfinv(share) if H.any() else np.full(x.size, np.nan)
     out: dict[str, dict[str, dict[str, Any]]] = {i: {} for i in best.ids}
     for k, i in enumerate(best.ids):
         units = {p.name: p.unit for p in type(effect_of(i, settings[k])).parameters}
         for key, v in settings[k].items():
             out[i][key] = {"value": v, "low": v, "high": v, "unit": units.get(key, "")}
-    for (k, p), v, h, a, b in zip(where, x, half, low, high, strict=True):
-        ends = (float(max(v - h, a)), float(min(v + h, b))) if np.isfinite(h) else (float(a), float(b))
-        out[best.ids[k]][p.name] = {"value": float(v), "low": ends[0], "high": ends[1], "unit": p.unit}
+    for (k, p), v, a, b in zip(where, x, *ends, strict=True):
+        out[best.ids[k]][p.name] = {
+            "value": float(v), "low": float(min(a, v)), "high": float(max(b, v)), "unit": p.unit
+        }  # fmt: skip
     final = tuple(dict(q) for q in settings)
     return (Fit(best.ids, final, best.columns, s) if np.isfinite(s).all() else best), out
+
+
+def _truncated(mean: Array, sigma: Array, low: Array, high: Array, share: float) -> tuple[Array, tuple[Array, Array]]:
+    """Medians and ends of the interval of normal distributions that end at physical bounds."""
+    from scipy.stats import truncnorm
+
+    if not mean.size:
+        return mean, (mean, mean)
+    sigma = np.clip(sigma, 1e-9 * (high - low), 1e3 * (high - low))
+    # further out than this the distribution is an exponential at the bound, and its tail numbers underflow
+    mean = np.clip(mean, low - 8.0 * sigma, high + 8.0 * sigma)
+    law = truncnorm((low - mean) / sigma, (high - mean) / sigma, loc=mean, scale=sigma)
+    return law.ppf(0.5), (law.ppf(0.5 - share / 2), law.ppf(0.5 + share / 2))
 
 
 def _continuous(id_: str, setting: dict[str, Any]) -> list[Any]:
@@ -285,24 +310,33 @@ def partitions(problem: Problem, most: int = 6) -> list[tuple[str, NDArray[np.in
     Returns
     -------
     list of tuple
-        What the blocks are, and the block of each of P points; at least one.
+        What the blocks are, and the block of each of P points, `REFERENCE` for those of references; at least one.
     """
-    X = problem.covariates
-    P = X["rpm"].size
+    P = problem.covariates["rpm"].size
+    mine = np.zeros(P, dtype=bool)
+    mine[problem.point[problem.free]] = True
+    X = {k: v[mine] for k, v in problem.covariates.items()}
+    count = int(mine.sum())
     run = X["run"].astype(int)
     out: list[tuple[str, NDArray[np.intp]]] = []
-    if len(problem.parts) > 1 and np.unique(run).size <= most and np.unique(run).size >= 3:
-        out.append(("recordings", np.unique(run, return_inverse=True)[1]))
+
+    def whole(block: NDArray[np.intp]) -> NDArray[np.intp]:
+        every = np.full(P, REFERENCE, dtype=np.intp)
+        every[mine] = block
+        return every
+
+    if len(problem.parts) > 1 and 3 <= np.unique(run).size <= most:
+        out.append(("recordings", whole(np.unique(run, return_inverse=True)[1])))
     for name in ("rpm", "J"):
         x = np.log(X[name]) if name == "rpm" else X[name]
         gap = 0.03 if name == "rpm" else 0.02
         order = np.argsort(x, kind="stable")
-        line = np.empty(P, dtype=int)
+        line = np.empty(count, dtype=np.intp)
         line[order] = np.cumsum(np.r_[0, np.diff(x[order]) > gap])
         lines = int(line.max()) + 1
-        if 3 <= lines <= max(P // 2, 3):
+        if 3 <= lines <= max(count // 2, 3):
             few = np.minimum(line * most // max(lines, most), most - 1) if lines > most else line
-            out.append((f"whole lines of {name}", few))
+            out.append((f"whole lines of {name}", whole(few)))
     if out:
         return out
     spread = {
@@ -310,7 +344,7 @@ def partitions(problem: Problem, most: int = 6) -> list[tuple[str, NDArray[np.in
     }
     name = max(spread, key=lambda k: spread[k])
     rank = np.argsort(np.argsort(X[name], kind="stable"))
-    return [(f"intervals of {name}", rank * 4 // P)]
+    return [(f"intervals of {name}", whole(rank * min(4, count) // count))]
 
 
 def held_out(found: Evidence, name: str, split: tuple[str, NDArray[np.intp]] | None = None) -> tuple[str, Array, Array]:
@@ -342,7 +376,7 @@ def held_out(found: Evidence, name: str, split: tuple[str, NDArray[np.intp]] | N
     after, smooth_part = np.array(problem.f0), np.array(problem.f0)
     systematic = C - hyper.scale**2 * noise.noise(problem, hyper.ar)
     own = form_covariance(found, fit(found, name))
-    for b in np.unique(member):
+    for b in np.unique(member[member != REFERENCE]):
         test, train = member == b, member != b
         if not train.any():
             continue
@@ -356,6 +390,51 @@ def held_out(found: Evidence, name: str, split: tuple[str, NDArray[np.intp]] | N
         white = noise.whitener((C + K)[np.ix_(train, train)], problem.u[train])
         smooth_part[test] += (systematic + K)[np.ix_(test, train)] @ _solve(white, r[train])
     return words, after, smooth_part
+
+
+def log_score(found: Evidence, name: str, split: tuple[str, NDArray[np.intp]]) -> float:
+    """Logarithm of the probability density of every block given the others.
+
+    Parameters
+    ----------
+    found : Evidence
+        Outcome of the weighing.
+    name : str
+        Explanation.
+    split : tuple
+        What the blocks are and the block of each point, of :func:`partitions`.
+
+    Returns
+    -------
+    float
+        Sum over the blocks (Gneiting and Raftery 2007, J. American Statistical Association 102:359, sec. 4.1); unlike
+        an error it counts what is small beside the noise of a single reading [1].
+    """
+    from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
+
+    problem, hyper = found.problem, found.states[0].hyper
+    member = split[1][problem.point]
+    S, log_w = _columns(found, tuple(name.split("+")) if name != "none" else ())
+    rest = problem.residual[:, None] - (S if S.shape[1] else np.zeros((problem.y.size, 1)))
+    log_w = log_w if S.shape[1] else np.zeros(1)
+    u = problem.u
+    C = (noise.covariance(problem, hyper) + form_covariance(found, fit(found, name))) / (u[:, None] * u[None, :])
+    z = rest / u[:, None]
+    total = 0.0
+    for b in np.unique(member[member != REFERENCE]):
+        test, train = member == b, member != b
+        if not train.any():
+            continue
+        factor = cho_factor(C[np.ix_(train, train)], lower=True, check_finite=False)
+        known = cho_solve(factor, z[train], check_finite=False)
+        weight = np.log(np.maximum(_normal(-0.5 * np.sum(z[train] * known, axis=0) + log_w), 1e-300))
+        across = C[np.ix_(test, train)]
+        spread = C[np.ix_(test, test)] - across @ cho_solve(factor, across.T, check_finite=False)
+        root = cholesky(spread + 1e-9 * np.eye(int(test.sum())), lower=True, check_finite=False)
+        w = solve_triangular(root, z[test] - across @ known, lower=True, check_finite=False)
+        density = -0.5 * np.sum(w * w, axis=0) - float(np.sum(np.log(np.diag(root))))
+        total += float(log_mean(density, weight))
+    return total
 
 
 def _columns(found: Evidence, ids: Sequence[str]) -> tuple[Array, Array]:
@@ -384,7 +463,7 @@ def _solve(white: noise.Whitener, x: Array) -> Array:
     return np.asarray(solve_triangular(white.factor, white(x), lower=True, trans="T", check_finite=False))
 
 
-def form_covariance(found: Evidence, best: Fit) -> Array:
+def form_covariance(found: Evidence, best: Fit, size: float | None = None) -> Array:
     """Covariance of the forms of an explanation and of what lies between settings of the grid.
 
     Parameters
@@ -393,6 +472,8 @@ def form_covariance(found: Evidence, best: Fit) -> Array:
         Outcome of the weighing.
     best : Fit
         The explanation.
+    size : float, optional
+        Standard deviation of the forms, share of the effect's size; what explains the readings best by default [1].
 
     Returns
     -------
@@ -404,7 +485,8 @@ def form_covariance(found: Evidence, best: Fit) -> Array:
     out = np.zeros((M, M))
     for i, c in zip(best.ids, best.columns, strict=True):
         candidate, g = found.of(i), c - found.spans[i].start
-        shape = found.states[0].forms[i].size * candidate.signatures[:, g, None] * modes[i]
+        spread = found.states[0].forms[i].size if size is None else size
+        shape = spread * candidate.signatures[:, g, None] * modes[i]
         B = np.column_stack([shape, candidate.between(g)])
         out += B @ B.T
     return out

@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 _BINS = 12
 # Variables that explain the mismatch this nearly as well as the best one are ties: many of them move together.
 _TIE = 0.04
+# The one along which the preferred effect acts by its nature may explain less by this: groups are not as fine for all.
+_TIE_NATURAL = 0.1
 _ORDER = ("J", "M_tip", "Re", "rpm", "wall_distance_m", "tip_gap_m", "sideslip_rad", "time_s", "temperature_K",
           "density_kg_m3", "voltage_V", "current_A", "pwm_s", "run")  # fmt: skip
 
@@ -98,7 +100,7 @@ def locate(found: Evidence, best: Fit) -> Location:
     else:
         top = max(scores.values())
         tied = [n for n, s in scores.items() if s >= top - _TIE]
-        name = next((n for n in natural if n in tied), tied[0])
+        name = next((n for n in natural if scores.get(n, -np.inf) >= top - _TIE_NATURAL), tied[0])
         ties = tuple(n for n in tied if n != name)
     x = problem.covariates[name][problem.point][here]
     low, high, z = _scan(x, e[here])

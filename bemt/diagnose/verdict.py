@@ -2,7 +2,8 @@
 
 The order of the questions is the order of caution.  Is there a mismatch that nulls do not show?  Does an unknown smooth
 effect explain it better, or is something smooth left after the best listed effect?  Which effects are in nearly all
-of the probability?  Are there look-alikes of these in this plan?  Only then is a name given.
+of the probability?  Are there look-alikes of these in this plan, or a second effect that may be there, too?  Only then
+is a name given; with a few explanations left, these.
 """
 
 from __future__ import annotations
@@ -36,10 +37,14 @@ SMALL = 0.1
 """A rest this small beside what the effect explains (both as log odds) is a detail of it, not another cause [1]."""
 EARNED = 8.0
 """Log odds that each effect of a pair must add to the other alone: small model errors are not a second cause [1]."""
-ENOUGH, EXPECTED = 8.0, 2.5
+ENOUGH, EXPECTED = 7.0, 2.5
 """Log odds over none from which a name is given at all (about 4 sigma); of physics known to be left out [1]."""
-PROVEN, FORETELLS = 20.0, 0.9
-"""Below the first (log odds) an explanation must lower the error on left-out blocks to the second, a ratio [1]."""
+PROVEN, FORETELLS = 20.0, 3.0
+"""Below the first (log odds) an explanation must make left-out blocks likelier by the second (natural logarithm of a
+ratio, 3 is called strong) and their error smaller; physics that is on already needs the first in any case, to be on
+differently [1]."""
+PARTNER, MOST = 0.1, 3
+"""Probability from which a second effect beside a sure one is mentioned; most members of an open answer [1]."""
 NEAR = 5.0
 """Effects of a class may be this far (natural logarithm of the evidence) behind the best one [1]."""
 
@@ -147,7 +152,8 @@ def decide(found: Evidence, p_value: float) -> Decision:
     share = inclusion(found)
     weight = ev.prior_weights(found.problem, leading.split("+"))
     expected = min(weight.values()) > 1.0
-    if found.log_bayes(leading) < (EXPECTED if expected else ENOUGH):
+    needed = PROVEN if min(weight.values()) < 1.0 else EXPECTED if expected else ENOUGH
+    if found.log_bayes(leading) < needed:
         why = "the best explanation is not much better than none"
         return Decision("insufficient", (), leading, listed[leading], rest, (), why)
     if not expected and found.log_bayes(leading) < PROVEN and not _foretells(found, leading):
@@ -160,35 +166,56 @@ def decide(found: Evidence, p_value: float) -> Decision:
         leading, share = _earned(found, leading, share)
     in_pair = "+" in leading and sum(v for k, v in listed.items() if "+" in k) > 0.5
     sure = tuple(i for i, p in share.items() if p >= SURE)
-    if sure and (len(sure) > 1 or not in_pair):
-        group = () if len(sure) > 1 else _class(found, sure[0], share)
+    if len(sure) > 1:
+        return _named(found, sure, min(share[i] for i in sure), rest)
+    if sure and not in_pair:
+        group = _class(found, sure[0], share)
+        beside = tuple(i for i, p in inclusion(found).items() if p >= PARTNER and i not in group)
+        if len(group) <= 1 and not beside:
+            return _named(found, sure, share[sure[0]], rest)
         if len(group) <= 1:
-            return _named(found, sure, min(share[i] for i in sure), rest)
+            why = f"{sure[0]} is at work; whether another effect is, too, is left open"
+            return Decision("class", (*sure, *beside[: MOST - 1]), leading, share[sure[0]], rest, (), why)
     if in_pair:
         return _pair(found, leading, share, rest)
     group = _class(found, leading.split("+")[0], share)
-    total = sum(v for k, v in P.items() if set(k.split("+")) & set(group))
+    total = _mass(found, group)
     if len(group) > 1 and total >= SURE:
         return Decision("class", group, leading, total, rest, (group,), "these look alike in this plan")
     if total >= SURE:
         return _named(found, group, total, rest)
-    return Decision("insufficient", (), leading, listed[leading], rest, (group,) if len(group) > 1 else (),
-                    "several explanations are left that are not alike")  # fmt: skip
+    some = tuple(share)
+    groups = (group,) if len(group) > 1 else ()
+    for n in range(2, MOST + 1):
+        total = _mass(found, some[:n])
+        if total >= SURE:
+            return Decision("class", some[:n], leading, total, rest, groups, "the readings leave these open")
+    why = "several explanations are left that are not alike"
+    return Decision("insufficient", (), leading, listed[leading], rest, groups, why)
+
+
+def _mass(found: Evidence, group: Sequence[str]) -> float:
+    """Probability that at least one of some effects is at work."""
+    return sum(v for k, v in found.probability.items() if set(k.split("+")) & set(group))
 
 
 def _foretells(found: Evidence, leading: str) -> bool:
-    """Whether an explanation brings left-out blocks nearer than calibration alone does, along some variable.
+    """Whether an explanation makes left-out blocks likelier than calibration alone does, along some variable.
 
     What does not change along a variable is learnt from the other lines of it without any cause.
     """
     problem = found.problem
-    size = problem.u[problem.free]
+    u = problem.u[problem.free]
 
-    def error(name: str, split: tuple[str, NDArray[np.intp]]) -> float:
-        d = (problem.y - fitting.held_out(found, name, split)[1])[problem.free] / size
-        return float(np.sqrt(np.mean(d**2)))
+    def scores(name: str, split: tuple[str, NDArray[np.intp]]) -> tuple[float, float]:
+        error = (problem.y - fitting.held_out(found, name, split)[1])[problem.free] / u
+        return fitting.log_score(found, name, split), float(error @ error)
 
-    return any(error(leading, s) < FORETELLS * error(ev.NONE, s) for s in fitting.partitions(problem))
+    for split in fitting.partitions(problem):
+        (density, error), (plain, largest) = scores(leading, split), scores(ev.NONE, split)
+        if density - plain > FORETELLS and error < largest:
+            return True
+    return False
 
 
 def _earned(found: Evidence, pair: str, share: dict[str, float]) -> tuple[str, dict[str, float]]:

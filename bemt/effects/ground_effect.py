@@ -17,25 +17,36 @@ class GroundEffect(Effect):
 
     Notes
     -----
-    ``form = "cheeseman_bennett"``: the image of a source at the rotor takes (R/4z)^2 off the induced speed, hence
-    T/T_inf = 1 / (1 - (R/4z)^2) at constant power, and less with speed by 1 / (1 + (V/v)^2) (Cheeseman and Bennett
-    1955, ARC R&M 3021).  ``form = "hayden"``: induced power at equal thrust times 1 / (0.9926 + 0.0379 (2R/z)^2), a fit
-    of flight tests (Hayden 1976, 32nd AHS Forum), fading in the same way.  Coefficients checked against public codes,
-    not against the papers; the fading belongs to edgewise flow there and is used for axial flow here.  The rotor
-    meets V - share v.  A recorded ``wall_distance_m`` replaces ``z_over_R``; closer than R/2 counts as R/2.
+    ``form = "cheeseman_bennett"``: T/T_inf = 1 / (1 - (R/4z)^2) at constant power, and less with speed by 1 / (1 +
+    (V/v)^2) (Cheeseman and Bennett 1955, ARC R&M 3021).  Constant power is v/v_inf = 1 - (R/4z)^2, and at equal thrust,
+    as v_inf goes with the root of thrust, v/v_inf = (1 - (R/4z)^2)^(3/2).  ``form = "hayden"``: induced power at equal
+    thrust times 1 / (0.9926 + 0.0379 (2R/z)^2), a fit of flight tests (Hayden 1976, 32nd AHS Forum), fading in the same
+    way.  Coefficients checked against public codes, not against the papers; the fading belongs to edgewise flow there
+    and is used for axial flow here.  The rotor meets V - share v.  A recorded ``wall_distance_m`` replaces z_over_R;
+    closer than R/2 counts as R/2.
+
+    Wind along the axis is dammed by the wall as well.  Ahead of a disk of radius a, on its axis, a stream V is
+    V (1 - (2/pi) (acot(zeta) - zeta / (1 + zeta^2))), zeta = z/a (potential of a disk moving broadside on, Lamb 1932,
+    Hydrodynamics, art. 108, superposed on the stream; derived here from the potential).  Used only where the distance
+    of the wall is recorded; ``plate_radius_over_R`` is a, and 0 leaves the wind as it is.
     """
 
     form: str = "cheeseman_bennett"
     z_over_R: float = 1.0
     strength: float = 1.0
+    plate_radius_over_R: float = 0.0
 
     id = "ground_effect"
     title = "wall behind the propeller"
     along = ("wall_distance_m",)
-    sign = "more thrust at the same speed and torque, at rest only: it fades with airspeed, as no load-cell gain does"
+    sign = (
+        "more thrust at the same speed and torque; with airspeed it fades, as no load-cell gain does, unless the wall "
+        "stops the wind as well"
+    )
     parameters = (
         Parameter("z_over_R", "1", 0.5, 3.0, "validity of Cheeseman and Bennett 1955"),
         Parameter("strength", "1", 0.0, 1.5, "1 is the published form", steps=0, off=0.0),
+        Parameter("plate_radius_over_R", "1", 0.0, 3.0, "radius of plates of stands", steps=0, off=0.0),
     )
     on_by_default = False
 
@@ -44,11 +55,35 @@ class GroundEffect(Effect):
         choice("form", self.form, FORMS)
 
     def flow(self, flow: Flow) -> None:
-        """Take the dammed share of the induced speed off the onset speed."""
+        """Take the dammed shares of induced speed and wind off the onset speed."""
         z = flow.extra["wall_distance_m"] / flow.R if "wall_distance_m" in flow.extra else np.array(self.z_over_R)
         v = flow.induced
         fade = v**2 / np.maximum(v**2 + flow.V**2, 1e-12)
-        flow.V = flow.V - self.strength * self.relief(z) * v * fade
+        wind = flow.V * (self.dammed(z) if "wall_distance_m" in flow.extra else 0.0)
+        flow.V = flow.V - wind - self.strength * self.relief(z) * v * fade
+
+    def dammed(self, z_over_R: Array) -> Array:
+        """Share of the wind that the plate takes off at the rotor.
+
+        Parameters
+        ----------
+        z_over_R : (P,) float
+            Distance of the plate over tip radius [1]; NaN: no plate.
+
+        Returns
+        -------
+        (P,) float
+            Share [1].
+
+        >>> GroundEffect(plate_radius_over_R=1.0).dammed(np.array([1e-9, 1.0, 1e9])).round(3).tolist()
+        [1.0, 0.182, 0.0]
+        """
+        if self.plate_radius_over_R <= 0.0:
+            return np.zeros_like(z_over_R)
+        zeta = np.where(np.isnan(z_over_R), np.inf, z_over_R) / self.plate_radius_over_R
+        with np.errstate(invalid="ignore"):
+            share = np.arctan2(1.0, zeta) - zeta / (1.0 + zeta**2)
+        return np.asarray(2.0 / np.pi * np.where(np.isinf(zeta), 0.0, share))
 
     def relief(self, z_over_R: Array) -> Array:
         """Share of the induced speed that the wall takes off.
@@ -64,13 +99,19 @@ class GroundEffect(Effect):
             Share [1].
 
         >>> round(float(GroundEffect().relief(np.array(1.0))), 4)
-        0.0625
+        0.0923
         """
         z = np.maximum(np.where(np.isnan(z_over_R), np.inf, z_over_R), 0.5)
         if self.form == "hayden":
             return np.asarray(np.maximum(1.0 - 1.0 / (0.9926 + 0.0379 * (2.0 / z) ** 2), 0.0))
-        return np.asarray((0.25 / z) ** 2)
+        return np.asarray(1.0 - (1.0 - (0.25 / z) ** 2) ** 1.5)
 
     def variants(self) -> tuple[dict[str, str | float], ...]:
-        """Both forms at twelve distances."""
-        return tuple({"form": f, "z_over_R": z} for f in FORMS for z in map(float, np.geomspace(0.5, 3.0, 12)))
+        """Both forms at twelve distances as published; weaker, stronger and behind plates at three."""
+        settings = [(f, z, 1.0, 0.0) for f in FORMS for z in map(float, np.geomspace(0.5, 3.0, 12))]
+        settings += [
+            (f, z, s, a) for f in FORMS for z in (0.7, 1.2, 2.0) for s in (0.6, 1.0, 1.5) for a in (0.0, 1.0, 2.0)
+            if (s, a) != (1.0, 0.0)
+        ]  # fmt: skip
+        names = ("form", "z_over_R", "strength", "plate_radius_over_R")
+        return tuple(dict(zip(names, values, strict=True)) for values in settings)

@@ -80,7 +80,7 @@ def diagnosis_parts(item: Mapping[str, Any]) -> str:
     words = f"{verdict}: {effects}" if effects else verdict
     out = [f"<p>{badge(KIND.get(verdict, 'unknown'), words)} {esc(d.get('explanation') or '')}</p>"]
     place = _mapping(d.get("location"))
-    if place.get("channel"):
+    if place.get("channel") and verdict != "none":
         low, high = num(place.get("low"), 3).text, num(place.get("high"), 3).text
         out.append(
             f"<p>Located in {esc(place['channel'])} where {esc(place.get('variable') or '?')} is {esc(low)} "
