@@ -204,6 +204,9 @@ def test_a_tool_that_never_speaks_is_not_praised() -> None:
         (entry("single", "untwist"), answer("class", "nacelle", "section"), False),  # a class without it
         (entry("single", "untwist", alike=("section",)), answer("named", "section"), True),  # the plan cannot tell
         (entry("pair", "untwist", "section"), answer("named", "untwist"), False),  # half a pair
+        (entry("pair", "untwist", "section", separation_together=[12.0, 2.0]), answer("named", "untwist"), True),
+        (entry("pair", "untwist", "section", separation_together=[12.0, 2.0]), answer("named", "section"), False),
+        (entry("pair", "untwist", "section", separation_together=[12.0, 2.0]), answer("named", "nacelle"), False),
         (entry("null"), answer("class", "untwist", "section"), False),  # a class is a claim
         (entry("single", "untwist"), None, False),
     ],

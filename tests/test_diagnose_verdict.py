@@ -1,0 +1,106 @@
+"""What is said for given probabilities, and the scores that a name must pass."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from diagnosing import case, diagnose, left_out, points, recording
+from scipy.stats import multivariate_normal
+
+from bemt import effects, forward
+from bemt.diagnose import chain, confusion, fit, noise, verdict
+
+
+@pytest.fixture(scope="module")
+def answer() -> chain.Diagnosis:
+    return diagnose(recording(case(), points("grid")), left_out("compressibility", case()))
+
+
+def told(answer: chain.Diagnosis, **probability: float) -> verdict.Decision:
+    """Decision if the explanations had these probabilities; "a__b" is a pair."""
+    share = dict.fromkeys(answer.found.probability, 0.0) | {k.replace("__", "+"): v for k, v in probability.items()}
+    return verdict.decide(replace(answer.found, probability=share), 0.002)
+
+
+def test_a_sure_effect_is_named(answer: chain.Diagnosis) -> None:
+    said = told(answer, compressibility=0.97, none=0.03)
+    assert (said.verdict, said.effects) == ("named", ("compressibility",))
+
+
+def test_a_second_effect_that_may_be_there_is_mentioned(answer: chain.Diagnosis) -> None:
+    said = told(answer, compressibility=0.7, compressibility__thrust_zero=0.28, none=0.02)
+    assert (said.verdict, said.effects) == ("class", ("compressibility", "thrust_zero"))
+    assert said.probability > 0.95 and "left open" in said.why
+
+
+def test_a_few_explanations_are_an_answer_and_many_are_not(answer: chain.Diagnosis) -> None:
+    said = told(answer, compressibility=0.5, thrust_zero=0.45, none=0.05)
+    assert (said.verdict, set(said.effects)) == ("class", {"compressibility", "thrust_zero"})
+    assert said.probability == pytest.approx(0.95)
+    many = {k: 0.2 for k in ("thrust_zero", "torque_gain", "airspeed_offset", "nacelle")}
+    assert told(answer, compressibility=0.21, **many).verdict == "insufficient"
+
+
+def test_what_is_on_already_is_not_what_was_left_out(answer: chain.Diagnosis) -> None:
+    assert "tip_loss" in {e.id for e in answer.problem.baseline}
+    assert answer.found.log_bayes("tip_loss") < verdict.PROVEN
+    assert told(answer, tip_loss=0.99).verdict in ("insufficient", "unknown")
+
+
+def test_the_nearest_signature_is_a_baseline_of_its_own(answer: chain.Diagnosis) -> None:
+    assert confusion.nearest(answer.found) == "compressibility"
+
+
+def test_the_score_of_left_out_blocks_is_the_density_given_the_others(answer: chain.Diagnosis) -> None:
+    found = answer.found
+    problem, split = found.problem, fit.partitions(found.problem)[0]
+    member = split[1][problem.point]
+    C = noise.covariance(problem, found.states[0].hyper)
+    r, u = problem.residual, problem.u
+    expected = 0.0
+    for b in np.unique(member):
+        train = member != b
+        whole = multivariate_normal(np.zeros(r.size), C).logpdf(r)
+        known = multivariate_normal(np.zeros(int(train.sum())), C[np.ix_(train, train)]).logpdf(r[train])
+        # the score is that of readings over their uncertainty, and leaves the constant of the normal law out
+        expected += whole - known + float(np.sum(np.log(u[~train]))) + 0.5 * np.log(2 * np.pi) * int((~train).sum())
+    assert fit.log_score(found, "none", split) == pytest.approx(expected, rel=1e-5, abs=1e-3)
+    assert fit.log_score(found, "compressibility", split) > fit.log_score(found, "none", split) + verdict.FORETELLS
+
+
+def test_references_are_in_no_block() -> None:
+    rpm = np.repeat([4000.0, 6000.0, 8000.0, 10000.0], 3)
+    covariates = {"rpm": rpm, "J": np.tile([0.0, 0.3, 0.6], 4), "run": np.zeros(12)}
+    problem: Any = SimpleNamespace(
+        covariates=covariates, parts=(1, 2), point=np.tile(np.arange(12), 2), free=np.tile(rpm > 5000, 2)
+    )
+    for _, block in fit.partitions(problem):
+        assert np.array_equal(block == fit.REFERENCE, rpm < 5000)
+        assert np.unique(block[block >= 0]).size == 3
+
+
+def test_intervals_end_at_the_physical_bounds() -> None:
+    low, high = np.zeros(3), np.ones(3)
+    middle, (a, b) = fit._truncated(np.array([0.4, 3.0, -5.0]), np.array([0.05, np.inf, 0.1]), low, high, 0.9)
+    assert middle[0] == pytest.approx(0.4) and b[0] - a[0] == pytest.approx(2 * 1.6449 * 0.05, rel=1e-3)
+    # readings that do not see it leave the uniform prior; readings that want it outside leave it at the bound
+    np.testing.assert_allclose((a[1], middle[1], b[1]), (0.05, 0.5, 0.95), atol=2e-3)
+    assert 0.0 <= a[2] < middle[2] < b[2] < 0.1
+
+
+def test_a_wrong_airspeed_is_that_of_the_tunnel_not_of_the_wall(answer: chain.Diagnosis) -> None:
+    """At rest no factor on the airspeed changes anything, whatever a wall does to the inflow."""
+    flow = answer.problem.parts[0].flow
+    still = replace(flow, V=np.zeros_like(flow.V))
+    wall = effects.catalogue()["ground_effect"](z_over_R=0.6)
+    slip = effects.catalogue()["unit_slip"](channel="airspeed_m_s", factor=3.6)
+    part = answer.problem.parts[0]
+
+    def thrust(*extra: effects.Effect) -> np.ndarray:
+        return forward.respond(part.model.prepared, (*part.baseline, *extra), still)[0].T
+
+    assert np.array_equal(thrust(wall, slip), thrust(wall)) and np.all(thrust(wall) > thrust())
