@@ -173,22 +173,17 @@ class Bench:
         Returns
         -------
         list of dict
-            Of thrust_N and torque_Nm. [N], [N m]
+            Of thrust, torque and what is recorded of the drive. [units of the channels]
         """
         if not self._tangents:
             quiet, world = Stand(), self.plain()
             base = self.measure(world, quiet)[1]
-            for changed in freedom(world).values():
-                got = self.measure(changed, quiet)[1]
-                self._tangents.append({n: got[n] - base[n] for n in ("thrust_N", "torque_Nm")})
-            faster = Bench(
-                self.rig,
-                self.plan,
-                replace(self.rows, rpm=self.rows.rpm * (1.0 + FREEDOM["rpm"])),
-                _starts=self._starts,
-            )
-            got = faster.measure(world, quiet)[1]
-            self._tangents.append({n: got[n] - base[n] for n in ("thrust_N", "torque_Nm")})
+            rows = replace(self.rows, rpm=self.rows.rpm * (1.0 + FREEDOM["rpm"]))
+            faster = Bench(self.rig, self.plan, rows, _starts=self._starts)
+            found = [self.measure(changed, quiet)[1] for changed in freedom(world).values()]
+            names = [n for n in base if n not in ("rpm", "airspeed_m_s", "time_s")]
+            found.append(faster.measure(world, quiet)[1])
+            self._tangents += [{n: got[n] - base[n] for n in names} for got in found]
         return self._tangents
 
 

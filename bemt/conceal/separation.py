@@ -20,8 +20,9 @@ __all__ = ["FREEDOM", "Yardstick", "freedom", "yardstick"]
 Array = NDArray[np.float64]
 
 # One standard deviation of what nobody knows of a blade and a stand (DIAGNOSIS 2.2): pitch [deg], drag level, lift
-# slope, gains, zeros over full scale, tachometer, density.
-FREEDOM = {"pitch": 0.3, "drag": 0.10, "slope": 0.03, "gain": 0.01, "zero": 0.003, "rpm": 0.003, "density": 0.01}
+# slope, gains, zeros over full scale, tachometer, density, constants of motor and controller (no case states them).
+FREEDOM = {"pitch": 0.3, "drag": 0.10, "slope": 0.03, "gain": 0.01, "zero": 0.003, "rpm": 0.003, "density": 0.01,
+           "drive": 0.10}  # fmt: skip
 _RELATIVE = {"voltage_V": 0.001, "current_A": 0.004, "pwm_us": 0.002}
 
 
@@ -137,7 +138,7 @@ def yardstick(
     stand : Stand
         Quality.
     tangents : sequence of mapping
-        Differences of thrust_N and torque_Nm for one standard deviation of each nuisance. [N], [N m]
+        Differences of the readings for one standard deviation of each nuisance. [units of the channels]
     electric : mapping of str to (P,) float
         Voltage, current and pulse width, if recorded. [V], [A], [us]
 
@@ -163,6 +164,10 @@ def yardstick(
             row = np.zeros(size)
             row[k * n : (k + 1) * n] = vector
             rows.append(row)
+    for k, value in enumerate(electric.values(), start=2):
+        row = np.zeros(size)
+        row[k * n : (k + 1) * n] = FREEDOM["drive"] * value
+        rows.append(row)
     for row in rows:
         wide += np.outer(row, row)
     return Yardstick(channels, noise, np.linalg.inv(np.linalg.cholesky(wide)))

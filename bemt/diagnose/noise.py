@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.diagnose.record import CHANNELS
+
 if TYPE_CHECKING:
     from bemt.diagnose.problem import Problem
 
@@ -203,6 +205,8 @@ def sessions(problem: Problem) -> Array:
         -0.5 * ((n[:, None] - n[None, :]) / _LENGTH_RPM) ** 2 - 0.5 * ((J[:, None] - J[None, :]) / _LENGTH_J) ** 2
     )
     same = (run[:, None] == run[None, :]) & (problem.channel[:, None] == problem.channel[None, :])
+    # a tachometer has no cells: what the speed at a pulse width does from run to run is what the drive does
+    same &= (problem.channel != CHANNELS.index("rpm"))[:, None]
     return np.asarray(np.where(same, kernel, 0.0) * _SESSION**2 * problem.scale[:, None] * problem.scale[None, :])
 
 

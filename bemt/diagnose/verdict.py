@@ -151,6 +151,8 @@ def decide(found: Evidence, p_value: float) -> Decision:
             why = "a smooth effect that is not in the library explains the readings better than any that is"
         return Decision("unknown", (), leading, max(P[ev.UNKNOWN], 1.0 - listed[leading]), rest, (), why)
     share = inclusion(found)
+    if "+" in leading and not _twins(leading.split("+")):
+        leading, share = _earned(found, leading, share)
     weight = ev.prior_weights(found.problem, leading.split("+"))
     expected = min(weight.values()) > 1.0
     needed = PROVEN if min(weight.values()) < 1.0 else 0.0 if expected else ENOUGH
@@ -163,8 +165,6 @@ def decide(found: Evidence, p_value: float) -> Decision:
     if _twins(leading.split("+")):
         why = "two instruments with the same fault at once: one cause that is not in the library is likelier"
         return Decision("unknown", (), leading, listed.get(leading, 0.0), rest, (), why)
-    if "+" in leading:
-        leading, share = _earned(found, leading, share)
     in_pair = "+" in leading and sum(v for k, v in listed.items() if "+" in k) > 0.5
     sure = tuple(i for i, p in share.items() if p >= SURE)
     if len(sure) > 1:
@@ -222,8 +222,10 @@ def _foretells(found: Evidence, leading: str) -> bool:
 def _earned(found: Evidence, pair: str, share: dict[str, float]) -> tuple[str, dict[str, float]]:
     """Leading explanation without the effect that adds too little to the other one, and the probabilities to match."""
     ids = pair.split("+")
+    weight = ev.prior_weights(found.problem, ids)
     for other, one in (ids, ids[::-1]):
-        if found.log_bayes(pair) - found.log_bayes(one) < EARNED and share[one] >= share[other]:
+        price = PROVEN if weight[other] < 1.0 else EARNED
+        if found.log_bayes(pair) - found.log_bayes(one) < price and share[one] >= share[other]:
             return one, {i: (0.0 if i == other else p) for i, p in share.items()}
     return pair, share
 
