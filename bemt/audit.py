@@ -24,9 +24,8 @@ paper). ASME V&V 20-2009. Limits of y+ for wall functions: B.E. Launder, D.B. Sp
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from bemt.empirical import ZERO_THRUST_MEASURED
@@ -38,10 +37,7 @@ __all__ = [
     "CfdFacts",
     "audit",
     "audit_document",
-    "audit_rows",
     "combined",
-    "facts_from_mapping",
-    "facts_from_remark",
 ]
 
 STATUSES = ("fine", "doubtful", "fault", "not stated")
@@ -388,137 +384,6 @@ def combined(lines: Iterable[AuditLine]) -> tuple[float, float]:
     parts = [line.u_relative for line in lines]
     known = math.hypot(*(p for p in parts if not math.isnan(p)))
     return (math.nan if any(map(math.isnan, parts)) else known), known
-
-
-_PHRASES: tuple[tuple[str, dict[str, Any]], ...] = (
-    (r"cylinder of the (propeller|rotor|fan)'s (own )?diameter", {"domain_over_D": 1.0}),
-    (r"\bincompressible\b", {"compressible": False}),
-    (r"(?<!in)\bcompressible\b", {"compressible": True}),
-    (r"\bno grid study\b|\bno mesh study\b", {"grids": 0}),
-    (r"\bscalable wall functions?\b", {"wall": "scalable"}),
-    (r"(?<!scalable )(?<!automatic )\bwall functions?\b", {"wall": "function"}),
-    (r"\bautomatic wall functions?\b", {"wall": "automatic"}),
-    (r"\bat (one|a single) node\b", {"thrust_from": "node"}),
-    (r"\bforces integrated\b|\bintegrated over the blades\b", {"thrust_from": "forces"}),
-    (r"\brotating (cell )?(zone|frame)\b|\bMRF\b|\bfrozen rotor\b", {"steady_mrf": True}),
-    (r"\bsliding mesh\b", {"steady_mrf": False}),
-    (r"\brealizable k-epsilon\b", {"turbulence": "realizable k-epsilon"}),
-    (r"\bk-omega SST\b", {"turbulence": "k-omega SST"}),
-)
-"""Words of a remark and what they state."""
-_NUMBER = r"([0-9]*\.?[0-9]+)"
-_NUMBERS: tuple[tuple[str, str, float], ...] = (
-    (rf"\bdomain {_NUMBER} D\b", "domain_over_D", 1.0),
-    (rf"\by\+ {_NUMBER}", "y_plus", 1.0),
-    (rf"\bu_grid {_NUMBER} ?%", "u_grid", 0.01),
-    (rf"\bGCI {_NUMBER} ?%", "u_grid", 0.01 / 1.15),
-    (rf"\bdrift {_NUMBER} ?%", "drift", 0.01),
-    (rf"\bskew {_NUMBER} deg\b", "skew_deg", 1.0),
-    (rf"\b{_NUMBER} cells\b", "cells", 1.0),
-)
-
-
-def facts_from_remark(remark: str, known: CfdFacts | None = None) -> CfdFacts:
-    """Read set phrases of a remark in ``references.csv``; other words say nothing.
-
-    Parameters
-    ----------
-    remark : str
-        Such as "MRF, incompressible, domain 5 D, y+ 51, no grid study".
-    known : CfdFacts or None
-        What is known otherwise.
-
-    Returns
-    -------
-    CfdFacts
-        With what the remark states put in.
-
-    Examples
-    --------
-    >>> f = facts_from_remark("MRF; k-omega SST with automatic wall functions; domain 5 D, y+ 51, GCI 2.3 %")
-    >>> f.steady_mrf, f.wall, f.domain_over_D, f.y_plus, f.u_grid, f.compressible
-    (True, 'automatic', 5.0, 51.0, 0.02, None)
-    """
-    found: dict[str, Any] = {}
-    for pattern, values in _PHRASES:
-        if re.search(pattern, remark, re.IGNORECASE):
-            found |= values
-    for pattern, name, factor in _NUMBERS:
-        match = re.search(pattern, remark, re.IGNORECASE)
-        if match:
-            found[name] = float(f"{float(match[1]) * factor:.12g}")
-    return replace(known or CfdFacts(), **found)
-
-
-def facts_from_mapping(document: Mapping[str, Any], known: CfdFacts | None = None) -> CfdFacts:
-    """Take facts from a manifest; what is of another type than expected is not taken.
-
-    Parameters
-    ----------
-    document : mapping
-        Keys are fields of :class:`CfdFacts`; other keys say nothing.
-    known : CfdFacts or None
-        What is known otherwise.
-
-    Returns
-    -------
-    CfdFacts
-        The facts.
-
-    Examples
-    --------
-    >>> facts_from_mapping({"y_plus": 40, "compressible": "perhaps", "cells": 249000}).y_plus
-    40.0
-    """
-    found: dict[str, Any] = {}
-    for field in fields(CfdFacts):
-        value, kind = document.get(field.name), str(field.type)
-        if kind.startswith("bool"):
-            good = isinstance(value, bool)
-        elif kind.startswith(("float", "int")):
-            good = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-            value = (float(value) if kind == "float" else int(value)) if good and value is not None else value
-        else:
-            good = isinstance(value, str)
-        if good:
-            found[field.name] = value
-    return replace(known or CfdFacts(), **found)
-
-
-def audit_rows(
-    rows: Iterable[Mapping[str, Any]], diameter_m: float, pitch_m: float, ducted: bool
-) -> list[dict[str, Any]]:
-    """Audit the recorded CFD values of a case by their remarks.
-
-    Parameters
-    ----------
-    rows : iterable of mapping
-        Rows of a sweep; those of source ``cfd`` are taken.
-    diameter_m, pitch_m : float
-        Of the rotor. [m]
-    ducted : bool
-        Whether there is a duct.
-
-    Returns
-    -------
-    list of dict
-        ``reference``, ``lines`` (as :class:`AuditLine`), ``u_relative`` and ``u_relative_known``.
-    """
-    out = []
-    for row in rows:
-        if row["source"] != "cfd":
-            continue
-        n = row["rpm"] / 60.0
-        CT = row["CT"]
-        facts = CfdFacts(
-            M_tip=float(row["M_tip"]),
-            J=row["airspeed_m_s"] / (n * diameter_m),
-            pitch_over_D=pitch_m / diameter_m,
-            CT=math.nan if CT is None else float(CT),
-            ducted=ducted,
-        )
-        out.append(audit_document(row["label"], audit(facts_from_remark(str(row.get("remark", "")), facts))))
-    return out
 
 
 def audit_document(reference: str, lines: Sequence[AuditLine]) -> dict[str, Any]:

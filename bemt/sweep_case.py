@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import __version__, audit, effects, series, units
+from bemt import __version__, audit_remarks, effects, series, units
 from bemt.case import Assumption, Case
 from bemt.importers import references as reference_file
 
@@ -261,7 +261,7 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
         "variants": variants,
         "other_rows": [r for r in recorded if r["source"] not in ROW_SOURCES],
         "comparisons": comparisons,
-        "audit": audit.audit_rows(recorded, ready.diameter_m, ready.pitch_m, case.ducted),
+        "audit": audit_remarks.audit_rows(recorded, ready.diameter_m, ready.pitch_m, case.ducted),
         "conditions": _description(case, ready, stations),
         "assumptions": [_assumption(a, m) for a, m in zip(case.assumptions, bemt.by_assumption, strict=True)],
         "references": [{"quantity": r.quantity, "kind": r.kind, "printed": r.printed, "value": r.value, "u": r.u,

@@ -8,7 +8,8 @@ from dataclasses import replace
 import pytest
 
 from bemt import audit as au
-from bemt.audit import STATUSES, AuditLine, CfdFacts, audit, combined, facts_from_mapping, facts_from_remark
+from bemt.audit import STATUSES, AuditLine, CfdFacts, audit, combined
+from bemt.audit_remarks import audit_rows, facts_from_remark
 
 TOPICS = [
     "domain against disk",
@@ -180,21 +181,6 @@ def test_other_words_say_nothing() -> None:
     assert facts_from_remark("a nice picture; ran on Tuesday; the propeller is 8 in") == replace(CfdFacts())
 
 
-def test_a_manifest_of_wrong_types_says_nothing() -> None:
-    wrong = {
-        "y_plus": "many",
-        "compressible": 1,
-        "grids": None,
-        "cells": math.inf,
-        "wall": 3,
-        "M_tip": True,
-        "other": 1,
-    }
-    assert repr(facts_from_mapping(wrong)) == repr(CfdFacts())
-    right = facts_from_mapping({"y_plus": 40, "compressible": False, "grids": 3, "wall": "function"})
-    assert (right.y_plus, right.compressible, right.grids, right.wall) == (40.0, False, 3, "function")
-
-
 def test_rows_of_a_sweep_are_audited_by_their_remarks() -> None:
     row = {
         "source": "cfd",
@@ -205,6 +191,6 @@ def test_rows_of_a_sweep_are_audited_by_their_remarks() -> None:
         "M_tip": 0.63,
         "remark": THESIS,
     }
-    found = au.audit_rows([row, {**row, "source": "bench"}, {**row, "label": "b", "CT": None}], 0.2032, 0.127, False)
+    found = audit_rows([row, {**row, "source": "bench"}, {**row, "label": "b", "CT": None}], 0.2032, 0.127, False)
     assert [item["reference"] for item in found] == ["cfd 2.6 kgf", "b"]
     assert [entry["topic"] for entry in found[0]["lines"]] == TOPICS
