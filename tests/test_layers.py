@@ -30,6 +30,7 @@ FLOOR_OF_ROOMS: tuple[tuple[str, ...], ...] = (
     ("air", "coefficients", "averaging", "grid_study", "data_folders"),
     ("series", "imported", "reduction.plateaus", "polars*|post_stall", "empirical*", "calibrate.compact", "schema"),
     ("audit",),
+    ("audit_remarks",),
     ("effects|effects.*", "importers|importers.*", "reduction*|sanity*", "section_rule*", "openfoam|openfoam.*"),
     (COMPILED, "case*"),
     ("solver*|duct*",),
