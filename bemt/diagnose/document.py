@@ -149,7 +149,7 @@ def explanation(d: Diagnosis) -> list[str]:
             lines.append("Because: " + "; ".join(signs) + ".")
     elif decision.verdict == "class":
         lead = "One of these, which this plan cannot tell apart" if decision.classes else decision.why.capitalize()
-        lines.append(f"{lead} ({decision.probability:.2f} together): "
+        lines.append(f"{lead} ({decision.probability:.2f}): "
                      + ", ".join(f"{i} ({catalogue[i].title})" for i in decision.effects) + ".")  # fmt: skip
     elif decision.verdict == "unknown":
         kernel = d.found.states[0].best_rival

@@ -8,7 +8,7 @@ is a name given; with a few explanations left, these.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -171,7 +171,7 @@ def decide(found: Evidence, p_value: float) -> Decision:
         return _named(found, sure, min(share[i] for i in sure), rest)
     if sure and not in_pair:
         group = _class(found, sure[0], share)
-        beside = tuple(i for i, p in inclusion(found).items() if p >= PARTNER and i not in group)
+        beside = tuple(i for i in inclusion(found) if _together(P, sure[0], i) >= PARTNER and i not in group)
         if len(group) <= 1 and not beside:
             return _named(found, sure, share[sure[0]], rest)
         if len(group) <= 1:
@@ -193,6 +193,11 @@ def decide(found: Evidence, p_value: float) -> Decision:
             return Decision("class", some[:n], leading, total, rest, groups, "the readings leave these open")
     why = "several explanations are left that are not alike"
     return Decision("insufficient", (), leading, listed[leading], rest, groups, why)
+
+
+def _together(probability: Mapping[str, float], a: str, b: str) -> float:
+    """Probability that two effects are at work."""
+    return probability.get(f"{a}+{b}", 0.0) + probability.get(f"{b}+{a}", 0.0)
 
 
 def _mass(found: Evidence, group: Sequence[str]) -> float:
