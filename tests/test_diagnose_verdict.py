@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 from diagnosing import case, diagnose, left_out, points, recording
-from scipy.stats import multivariate_normal
 
 from bemt import effects, forward
-from bemt.diagnose import chain, confusion, fit, noise, verdict
+from bemt.diagnose import chain, confusion, fit, verdict
 
 
 @pytest.fixture(scope="module")
@@ -53,23 +52,6 @@ def test_what_is_on_already_is_not_what_was_left_out(answer: chain.Diagnosis) ->
 
 def test_the_nearest_signature_is_a_baseline_of_its_own(answer: chain.Diagnosis) -> None:
     assert confusion.nearest(answer.found) == "compressibility"
-
-
-def test_the_score_of_left_out_blocks_is_the_density_given_the_others(answer: chain.Diagnosis) -> None:
-    found = answer.found
-    problem, split = found.problem, fit.partitions(found.problem)[0]
-    member = split[1][problem.point]
-    C = noise.covariance(problem, found.states[0].hyper)
-    r, u = problem.residual, problem.u
-    expected = 0.0
-    for b in np.unique(member):
-        train = member != b
-        whole = multivariate_normal(np.zeros(r.size), C).logpdf(r)
-        known = multivariate_normal(np.zeros(int(train.sum())), C[np.ix_(train, train)]).logpdf(r[train])
-        # the score is that of readings over their uncertainty, and leaves the constant of the normal law out
-        expected += whole - known + float(np.sum(np.log(u[~train]))) + 0.5 * np.log(2 * np.pi) * int((~train).sum())
-    assert fit.log_score(found, "none", split) == pytest.approx(expected, rel=1e-5, abs=1e-3)
-    assert fit.log_score(found, "compressibility", split) > fit.log_score(found, "none", split) + verdict.FORETELLS
 
 
 def test_references_are_in_no_block() -> None:

@@ -25,7 +25,6 @@ __all__ = [
     "held_out",
     "intervals",
     "left_over",
-    "log_score",
     "partitions",
     "refined",
     "smooth",
@@ -390,51 +389,6 @@ def held_out(found: Evidence, name: str, split: tuple[str, NDArray[np.intp]] | N
         white = noise.whitener((C + K)[np.ix_(train, train)], problem.u[train])
         smooth_part[test] += (systematic + K)[np.ix_(test, train)] @ _solve(white, r[train])
     return words, after, smooth_part
-
-
-def log_score(found: Evidence, name: str, split: tuple[str, NDArray[np.intp]]) -> float:
-    """Logarithm of the probability density of every block given the others.
-
-    Parameters
-    ----------
-    found : Evidence
-        Outcome of the weighing.
-    name : str
-        Explanation.
-    split : tuple
-        What the blocks are and the block of each point, of :func:`partitions`.
-
-    Returns
-    -------
-    float
-        Sum over the blocks (Gneiting and Raftery 2007, J. American Statistical Association 102:359, sec. 4.1); unlike
-        an error it counts what is small beside the noise of a single reading [1].
-    """
-    from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
-
-    problem, hyper = found.problem, found.states[0].hyper
-    member = split[1][problem.point]
-    S, log_w = _columns(found, tuple(name.split("+")) if name != "none" else ())
-    rest = problem.residual[:, None] - (S if S.shape[1] else np.zeros((problem.y.size, 1)))
-    log_w = log_w if S.shape[1] else np.zeros(1)
-    u = problem.u
-    C = (noise.covariance(problem, hyper) + form_covariance(found, fit(found, name))) / (u[:, None] * u[None, :])
-    z = rest / u[:, None]
-    total = 0.0
-    for b in np.unique(member[member != REFERENCE]):
-        test, train = member == b, member != b
-        if not train.any():
-            continue
-        factor = cho_factor(C[np.ix_(train, train)], lower=True, check_finite=False)
-        known = cho_solve(factor, z[train], check_finite=False)
-        weight = np.log(np.maximum(_normal(-0.5 * np.sum(z[train] * known, axis=0) + log_w), 1e-300))
-        across = C[np.ix_(test, train)]
-        spread = C[np.ix_(test, test)] - across @ cho_solve(factor, across.T, check_finite=False)
-        root = cholesky(spread + 1e-9 * np.eye(int(test.sum())), lower=True, check_finite=False)
-        w = solve_triangular(root, z[test] - across @ known, lower=True, check_finite=False)
-        density = -0.5 * np.sum(w * w, axis=0) - float(np.sum(np.log(np.diag(root))))
-        total += float(log_mean(density, weight))
-    return total
 
 
 def _columns(found: Evidence, ids: Sequence[str]) -> tuple[Array, Array]:

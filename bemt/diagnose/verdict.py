@@ -37,13 +37,12 @@ SMALL = 0.1
 """A rest this small beside what the effect explains (both as log odds) is a detail of it, not another cause [1]."""
 EARNED = 8.0
 """Log odds that each effect of a pair must add to the other alone: small model errors are not a second cause [1]."""
-ENOUGH = 7.0
+ENOUGH = 8.0
 """Log odds over none (about 4 sigma) from which a name is given at all, unless the physics is known to be left out:
 then gate and probability decide [1]."""
-PROVEN, FORETELLS = 20.0, 3.0
-"""Below the first (log odds) an explanation must make left-out blocks likelier by the second (natural logarithm of a
-ratio, 3 is called strong) and their error smaller; physics that is on already needs the first in any case, to be on
-differently [1]."""
+PROVEN, FORETELLS = 20.0, 0.9
+"""Below the first (log odds) an explanation must lower the error on left-out blocks to the second, a ratio; physics
+that is on already needs the first in any case, to be on differently [1]."""
 PARTNER, MOST = 0.1, 3
 """Probability from which a second effect beside a sure one is mentioned; most members of an open answer [1]."""
 NEAR = 5.0
@@ -206,22 +205,18 @@ def _mass(found: Evidence, group: Sequence[str]) -> float:
 
 
 def _foretells(found: Evidence, leading: str) -> bool:
-    """Whether an explanation makes left-out blocks likelier than calibration alone does, along some variable.
+    """Whether an explanation brings left-out blocks nearer than calibration alone does, along some variable.
 
     What does not change along a variable is learnt from the other lines of it without any cause.
     """
     problem = found.problem
     u = problem.u[problem.free]
 
-    def scores(name: str, split: tuple[str, NDArray[np.intp]]) -> tuple[float, float]:
-        error = (problem.y - fitting.held_out(found, name, split)[1])[problem.free] / u
-        return fitting.log_score(found, name, split), float(error @ error)
+    def error(name: str, split: tuple[str, NDArray[np.intp]]) -> float:
+        d = (problem.y - fitting.held_out(found, name, split)[1])[problem.free] / u
+        return float(np.sqrt(np.mean(d**2)))
 
-    for split in fitting.partitions(problem):
-        (density, error), (plain, largest) = scores(leading, split), scores(ev.NONE, split)
-        if density - plain > FORETELLS and error < largest:
-            return True
-    return False
+    return any(error(leading, s) < FORETELLS * error(ev.NONE, s) for s in fitting.partitions(problem))
 
 
 def _earned(found: Evidence, pair: str, share: dict[str, float]) -> tuple[str, dict[str, float]]:
