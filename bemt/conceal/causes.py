@@ -129,7 +129,10 @@ def _section(name: str, size: float, parameter: str = "", signed: bool = False) 
 
 
 def _stand(name: str, size: float, parameter: str, unit: str = "1", scale: float = 1.0) -> Make:
-    """Make a fault of the stand; ``scale`` turns our full scale (1.2 of the largest load) into the largest load."""
+    """Make a fault of the stand; ``scale`` turns our value into that of the library.
+
+    Its full scale is the largest load, ours 1.2 of it; its airspeed is the recorded one plus an offset.
+    """
 
     def make(f: float, rig: Rig, c: Conditions, rng: np.random.Generator) -> Change:
         value = f * size * _sign(rng)
@@ -223,7 +226,8 @@ _ALL: tuple[Cause, ...] = (
     Cause("oblique_inflow", _world("oblique", 35.0, "angle_deg", "deg"), ducted=False, plans=_FLIGHT, variables=_FLOW),
     Cause("air_density", _density, plans=tuple(p for p in _ANY if p != "two_air"), variables=(*_SPEED, *_FLOW)),
     Cause("rpm_scale", _stand("rpm_scale", 0.012, "eps"), "stand", _ANY, variables=(*_SPEED, *_FLOW)),
-    Cause("airspeed_offset", _stand("airspeed_offset", 0.45, "offset_m_s", "m/s"), "stand", _FLIGHT, variables=_FLOW),
+    Cause("airspeed_offset", _stand("airspeed_offset", 0.45, "offset_m_s", "m/s", scale=-1.0), "stand", _FLIGHT,
+          variables=_FLOW),
     Cause("thrust_gain", _stand("thrust_gain", 0.05, "gain"), "stand", _ANY),
     Cause("torque_gain", _stand("torque_gain", 0.05, "gain"), "stand", _ANY),
     Cause("thrust_zero", _stand("thrust_zero", 0.02, "zero", scale=1.2), "stand", _ANY, variables=_SPEED),

@@ -202,7 +202,8 @@ def refined(found: Evidence, best: Fit, share: float = 0.9) -> tuple[Fit, dict[s
     problem = found.problem
     where = [(k, p) for k, i in enumerate(best.ids) for p in _continuous(i, best.settings[k])]
     # what the form does to the scale of a law looks like its parameter: no fit shows it, so its prior size holds
-    C = noise.covariance(problem, found.states[0].hyper) + form_covariance(found, best, _FORM_SIZE)
+    C = noise.covariance(problem, found.states[0].hyper)
+    C = C + form_covariance(found, best, _FORM_SIZE) + _scale(found, best)
     white = noise.whitener(C, problem.u)
     settings = [dict(s) for s in best.settings]
     low, high = (np.array([getattr(p, e) for _, p in where]) for e in ("low", "high"))
@@ -443,6 +444,20 @@ def form_covariance(found: Evidence, best: Fit, size: float | None = None) -> Ar
         shape = spread * candidate.signatures[:, g, None] * modes[i]
         B = np.column_stack([shape, candidate.between(g)])
         out += B @ B.T
+    return out
+
+
+def _scale(found: Evidence, best: Fit) -> Array:
+    """Covariance of the scale of each law as far as the modes of its form average out over the readings, (M, M)."""
+    M = found.problem.y.size
+    modes = form_modes(found.problem, found.candidates)
+    out = np.zeros((M, M))
+    for i, c in zip(best.ids, best.columns, strict=True):
+        s = found.of(i).signatures[:, c - found.spans[i].start]
+        weight = (s / found.problem.u) ** 2
+        if modes[i].shape[1] and weight.any():
+            mean = modes[i].T @ (weight / weight.sum())
+            out += _FORM_SIZE**2 * max(1.0 - float(mean @ mean), 0.0) * np.outer(s, s)
     return out
 
 

@@ -142,14 +142,14 @@ class Part:
 
     @cached_property
     def full_scale(self) -> dict[str, float]:
-        """Largest magnitude of the baseline per channel."""
-        scale = {
-            "thrust_N": float(np.nanmax(np.abs(self.flow.T0))),
-            "torque_Nm": float(np.nanmax(np.abs(self.flow.Q0))),
-        }
+        """Largest magnitude of the readings per channel; of the baseline where there are none."""
+        out = {}
+        for name, computed in (("thrust_N", self.flow.T0), ("torque_Nm", self.flow.Q0)):
+            read = self.record.measured.get(name, computed)
+            out[name] = float(np.nanmax(np.abs(read if np.isfinite(read).any() else computed)))
         if "rpm" in self.record.measured:
-            scale["rpm"] = float(self.record.rpm.max())
-        return scale
+            out["rpm"] = float(self.record.rpm.max())
+        return out
 
 
 @dataclass(frozen=True, eq=False)
