@@ -37,9 +37,8 @@ SMALL = 0.1
 """A rest this small beside what the effect explains (both as log odds) is a detail of it, not another cause [1]."""
 EARNED = 8.0
 """Log odds that each effect of a pair must add to the other alone: small model errors are not a second cause [1]."""
-ENOUGH = 8.0
-"""Log odds over none (about 4 sigma) from which a name is given at all, unless the physics is known to be left out:
-then gate and probability decide [1]."""
+ENOUGH, EXPECTED = 8.0, 2.5
+"""Log odds over none from which a name is given at all (about 4 sigma); of physics known to be left out [1]."""
 PROVEN, FORETELLS = 20.0, 0.9
 """Below the first (log odds) an explanation must lower the error on left-out blocks to the second, a ratio; physics
 that is on already needs the first in any case, to be on differently [1]."""
@@ -154,7 +153,7 @@ def decide(found: Evidence, p_value: float) -> Decision:
         leading, share = _earned(found, leading, share)
     weight = ev.prior_weights(found.problem, leading.split("+"))
     expected = min(weight.values()) > 1.0
-    needed = PROVEN if min(weight.values()) < 1.0 else 0.0 if expected else ENOUGH
+    needed = PROVEN if min(weight.values()) < 1.0 else EXPECTED if expected else ENOUGH
     if found.log_bayes(leading) < needed:
         why = "the best explanation is not much better than none"
         return Decision("insufficient", (), leading, listed[leading], rest, (), why)
