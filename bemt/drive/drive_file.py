@@ -20,6 +20,7 @@
     idle_A = 0.05
     current_limit_A = 95
     braking = "yes"                 # complementary switching; "no": diodes
+    brake_on_stop = 1.0             # brake force at no throttle; 0: the rotor coasts (firmware setting of that name)
     # pwm_kHz: switching frequency; with motor.inductance_uH it says when a current through diodes stops
 
     [motor]
@@ -82,6 +83,7 @@ TABLES: dict[str, dict[str, Key]] = {
         "resistance_mohm": Key(unit="mohm", low=0.0, high=1000.0, suspect=_slip_mohm),
         "idle_A": Key(unit="A", low=0.0, high=5.0), "current_limit_A": Key(unit="A", low=0.1, high=1000.0),
         "braking": Key("choice", choices=("yes", "no")), "name": Key("text"),
+        "brake_on_stop": Key(low=0.0, high=1.0),
         "pwm_kHz": Key(unit="kHz", low=0.1, high=1000.0),
     },
     "motor": {
@@ -211,6 +213,7 @@ def read(path: Path) -> DriveFile:
         e.get("pulse_min_us", 1000.0), e.get("pulse_max_us", 2000.0), e.get("exponent", 1.0),
         e.get("resistance_mohm", 0.0) * 1e-3, e.get("idle_A", 0.0), e.get("current_limit_A", math.inf),
         e.get("braking", "yes") == "yes",
+        e.get("brake_on_stop", 1.0),
         2e-3 * m["inductance_uH"] * e["pwm_kHz"] if "inductance_uH" in m and "pwm_kHz" in e else math.inf,
     )  # fmt: skip
     motor = Motor(

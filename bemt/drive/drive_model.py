@@ -7,7 +7,8 @@ The motor is a direct-current machine at the duty d of the ESC, k = 60/(2 pi K_v
 R = R_m + R_e, with the ESC's own current I_e and the copper's R_m and the magnets' k at the winding's temperature
 (coefficients of `bemt.effects.motor_heating`, so that model and diagnosis agree). X = p L Omega is the reactance of the
 winding, which turns the current away from the EMF: at d = 0 this is the brake of a motor with shorted terminals,
-strongest at X = R and softer above. Above the current limit the ESC lowers d.
+strongest at X = R and softer above. Firmware sets for which share of the time it shorts them at no throttle
+(`brake_on_stop`); at any throttle above it brakes fully. Above the current limit the ESC lowers d.
 
 An ESC with diodes in place of complementary switching carries no current against the motor. Where the ripple of the
 switching, of Z = 2 L f, is larger than the current, the current stops within each period: it flows for the share u of
@@ -25,6 +26,8 @@ doi:10.3390/wevj3020289 (battery as source and resistance; not checked). R. W. E
 Power Electronics", 2001, ch. 5 (buck converter whose current stops, here with the EMF as load and with resistance; not
 checked). P. Pillay, R. Krishnan, "Modeling, simulation, and analysis of permanent-magnet motor drives, part I", IEEE
 Trans. Ind. Appl. 25 (1989) 265-273, doi:10.1109/28.25541 (dq equations, here steady with v_d = 0; not checked).
+Turnigy, "Multistar Race Spec 4-in-1 35A BLHeli-S", user manual, page 4 ("Brake On Stop": 1 to 100 % or disabled,
+without effect at non-zero throttle).
 """
 
 from __future__ import annotations
@@ -116,6 +119,7 @@ class Esc:
     idle_A: float = 0.0
     current_limit_A: float = math.inf
     braking: bool = True
+    brake_on_stop: float = 1.0
     ripple_ohm: float = math.inf
 
     def duty(self, pulse_us: ArrayLike) -> Array:
@@ -310,6 +314,7 @@ class Drive:
             amps = (d * rest - emf) / (rt + d * d * rb)
             if self.esc.braking:
                 amps = np.maximum(amps, -self.esc.current_limit_A)
+                amps = np.where(d > 0.0, amps, self.esc.brake_on_stop * amps)
                 return amps, d * amps
             amps = np.maximum(amps, 0.0)
             if math.isinf(self.esc.ripple_ohm):

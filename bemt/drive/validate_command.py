@@ -179,6 +179,7 @@ def run(args: argparse.Namespace) -> int:
         "steps": [{**dataclasses.asdict(s), "ratio": s.ratio} for s in checks],
         "inertia_kg_m2": drive.motor.inertia_kg_m2 if drive else None,
         "reactance_ohm_s": drive.motor.reactance_ohm_s if drive else None,
+        "brake_on_stop": drive.esc.brake_on_stop if drive else None,
     }  # fmt: skip
     rows = [[m.name, f"{100 * m.worst:.1f}", f"{100 * m.rms:.1f}", m.how] for m in found]
     lines = [text_table(["thrust over pulse width", "worst [%FS]", "rms [%FS]", "fitted"], rows, left=(0, 3))]

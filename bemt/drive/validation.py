@@ -151,7 +151,7 @@ class StepCheck:
 
 def step_drive(
     voltage_V: float, full_thrust_N: float, drop: float, skew: float, inertia_kg_m2: float = 0.0,
-    diameter_m: float = 0.127, tip_m_s: float = 170.0,
+    diameter_m: float = 0.127, tip_m_s: float = 170.0, brake_on_stop: float = 1.0,
 ) -> Drive:  # fmt: skip
     """Drive of logs that state neither motor nor propeller, by what their thrust over duty says of it.
 
@@ -170,6 +170,8 @@ def step_drive(
     diameter_m, tip_m_s : float
         Assumed: diameter [m] and tip speed at full thrust [m/s]. With Q/(T D) = 0.1 they set units, which the inertia
         takes up, and the small lag of the inflow.
+    brake_on_stop : float
+        Brake force of the ESC at no throttle. [1]
 
     Returns
     -------
@@ -182,15 +184,15 @@ def step_drive(
     k = voltage_V * (1.0 - drop * (1.0 + skew**2)) / omega
     ohm = drop * voltage_V * k / (kQ * omega**2)
     motor = Motor(30.0 / (np.pi * k), ohm, 0.0, inertia_kg_m2, reactance_ohm_s=skew * ohm / omega)
-    return Drive(Battery(1, 0.0, soc_table=(0.0, 1.0), ocv_V=(voltage_V, voltage_V)), Esc(), motor,
-                 quadratic(kT, kQ, diameter_m, solidity=0.1))  # fmt: skip
+    battery = Battery(1, 0.0, soc_table=(0.0, 1.0), ocv_V=(voltage_V, voltage_V))
+    return Drive(battery, Esc(brake_on_stop=brake_on_stop), motor, quadratic(kT, kQ, diameter_m, solidity=0.1))
 
 
 def check_steps(
     voltage_V: float, levels: tuple[Array, Array], steps: Sequence[Step], u_level: float = 0.02,
     u_tau: float = 0.1,
 ) -> tuple[list[StepCheck], Drive]:  # fmt: skip
-    """Fit drop, reactance and inertia to levels and steps of logs, and compare the time constants.
+    """Fit drop, reactance, inertia and brake force to levels and steps of logs, and compare the time constants.
 
     Parameters
     ----------
@@ -213,15 +215,17 @@ def check_steps(
         The drive, with its inertia.
     """
     from scipy.optimize import least_squares
+    from scipy.special import expit
 
     seen = [transient.first_order(s.time_s, s.thrust_N) for s in steps]
     held = [i for i, got in enumerate(seen) if got.u_tau_s < 0.3 * got.tau_s]
     pulse, thrust = levels
 
     def drive_of(x: Array) -> Drive:
-        full, lost, skew, inertia = np.exp(x)
+        full, lost, skew, inertia = np.exp(x[:4])
         lost = 1.0 / (1.0 + 1.0 / lost)  # of the voltage, below 1
-        return step_drive(voltage_V, float(full), float(lost / (1.0 + skew**2)), float(skew), float(inertia))
+        return step_drive(voltage_V, float(full), float(lost / (1.0 + skew**2)), float(skew), float(inertia),
+                          brake_on_stop=float(expit(x[4])))  # fmt: skip
 
     def constants(drive: Drive) -> Array:
         return np.array([identify.step_constant(drive, drive.motor.inertia_kg_m2, steps[i].time_s, seen[i].delay_s,
@@ -237,7 +241,7 @@ def check_steps(
                 for i, m in zip(held, constants(drive), strict=True)]  # fmt: skip
         return np.concatenate([(duty - drive.esc.duty(pulse)) / u_level, gaps])
 
-    start = np.log([1.05 * float(np.max(thrust)), 0.5, 1.0, 4e-6])
+    start = np.append(np.log([1.05 * float(np.max(thrust)), 0.5, 1.0, 4e-6]), 1.0)
     found = least_squares(misfit, start, loss="soft_l1", diff_step=1e-2, xtol=1e-3, ftol=1e-3)
     drive = drive_of(found.x)
     model = np.full(len(steps), np.nan)
