@@ -30,8 +30,8 @@ ALPHA_COARSE_STEP = float(np.deg2rad(5.0))
 _deg = np.r_[np.arange(-180.0, -30.0, 5.0), np.arange(-60, 81) / 2.0, np.arange(45.0, 181.0, 5.0)]
 ALPHA_GRID: Array = np.deg2rad(_deg)
 """Shared angles of attack [rad]: 30 coarse steps, 140 fine ones, 28 coarse ones."""
-DEFAULT_RE: Array = np.geomspace(1e4, 5e6, 12)
-"""Shared chord Reynolds numbers [-]."""
+DEFAULT_RE: Array = 1e4 * 500.0 ** (np.arange(-3, 12) / 11.0)
+"""Shared chord Reynolds numbers: 15 in ratio, 1.8e3 to 5e6, with 1e4 the fourth [-]."""
 LOG_RE0 = float(np.log(DEFAULT_RE[0]))
 DLOG_RE = float(np.log(DEFAULT_RE[-1] / DEFAULT_RE[0]) / (len(DEFAULT_RE) - 1))
 ALPHA_GRID.setflags(write=False)

@@ -18,7 +18,7 @@ __all__ = ["neuralfoil_polar"]
 
 Array = NDArray[np.float64]
 
-TABLE_VERSION = 2
+TABLE_VERSION = 4
 """Raise when the making of tables changes: older cache entries are then ignored."""
 RAW_LIMIT_DEG = 20.0
 """NeuralFoil is used up to this |alpha| at most (beyond 20-25 deg it has no training data)."""
@@ -28,6 +28,8 @@ BLEND_DEG = 2.0
 """Half-width of the blend between the section data and the post-stall model. [deg]"""
 RE_REFERENCE = 3e5
 """Reynolds number whose lift bounds that of lower ones (`lift_floor`)."""
+RE_LOWEST = 1e4
+"""Lowest Reynolds number at which NeuralFoil is asked; below it lift stays and drag follows laminar friction."""
 LIFT_SLACK = 0.1
 """Lift coefficient by which lower Reynolds numbers may miss that bound (room for a shift of the zero-lift angle)."""
 
@@ -93,6 +95,9 @@ def neuralfoil_polar(
     lift of the unsteady flow keeps about half: hence `lift_floor` (own assumption). And no cd is below laminar friction
     on both sides, 2.656 / sqrt(Re) (Blasius).
 
+    Below Re 1e4 the network is not asked: lift is that at 1e4, and the least drag of the section grows as laminar
+    friction does, with 1 / sqrt(Re) (Schlichting 1979, Boundary-Layer Theory, eq. 7.34), at other angles with cos^2.
+
     References
     ----------
     Sharpe, P., Hansman, R. J.: NeuralFoil: an airfoil aerodynamics analysis tool using physics-informed machine
@@ -115,10 +120,11 @@ def neuralfoil_polar(
                  airfoil.name, f"{source}; {method} cd_max {top:g}")  # fmt: skip
 
 
-def _make_neuralfoil(airfoil: Airfoil, re: Array, settings: dict[str, Any]) -> dict[str, Array]:
+def _make_neuralfoil(airfoil: Airfoil, wanted: Array, settings: dict[str, Any]) -> dict[str, Array]:
     """Tables (Na, Nr) from one vectorised NeuralFoil call."""
     import neuralfoil as nf
 
+    re = np.unique(np.maximum(wanted, RE_LOWEST))
     reach = RAW_LIMIT_DEG + BLEND_DEG
     raw_deg = np.arange(-2 * reach, 2 * reach + 1) / 2.0
     a, r = np.meshgrid(raw_deg, np.append(re, RE_REFERENCE), indexing="ij")
@@ -143,4 +149,12 @@ def _make_neuralfoil(airfoil: Airfoil, re: Array, settings: dict[str, Any]) -> d
         )
         inside = (ALPHA_GRID > lo - half) & (ALPHA_GRID < hi + half)
         out["confidence"][:, j] = np.where(inside, np.interp(ALPHA_GRID, alpha, conf[:, j]), 0.0)
+    below = wanted < RE_LOWEST
+    if np.any(below):
+        of = np.searchsorted(re, np.maximum(wanted, RE_LOWEST))
+        out = {name: table[:, of] for name, table in out.items()}
+        friction = np.sqrt(RE_LOWEST / np.minimum(wanted, RE_LOWEST)) - 1.0
+        along = np.cos(ALPHA_GRID[:, None]) ** 2  # friction acts along the chord
+        out["cd"] = out["cd"] + friction * np.min(out["cd"], axis=0) * along
+        out["confidence"] = np.where(below, 0.0, out["confidence"])
     return out

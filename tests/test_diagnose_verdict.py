@@ -11,7 +11,7 @@ import pytest
 from diagnosing import case, diagnose, left_out, points, recording
 
 from bemt import effects, forward
-from bemt.diagnose import chain, confusion, fit, verdict
+from bemt.diagnose import blocks, chain, confusion, fit, verdict
 
 
 @pytest.fixture(scope="module")
@@ -60,8 +60,8 @@ def test_references_are_in_no_block() -> None:
     problem: Any = SimpleNamespace(
         covariates=covariates, parts=(1, 2), point=np.tile(np.arange(12), 2), free=np.tile(rpm > 5000, 2)
     )
-    for _, block in fit.partitions(problem):
-        assert np.array_equal(block == fit.REFERENCE, rpm < 5000)
+    for _, block in blocks.partitions(problem):
+        assert np.array_equal(block == blocks.REFERENCE, rpm < 5000)
         assert np.unique(block[block >= 0]).size == 3
 
 

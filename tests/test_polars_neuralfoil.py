@@ -127,3 +127,15 @@ def test_bad_settings_are_refused() -> None:
     for kw, word in (({"method": "none"}, "viterna, normal"), ({"re": np.array([2e5, 1e5])}, "ascending")):
         with pytest.raises(ValueError, match=word):
             neuralfoil_polar(SECTIONS["0012"], **kw)
+
+
+def test_below_the_network_lift_stays_and_friction_is_laminar() -> None:
+    """From Re 1e4 down: cl as at 1e4, least cd as 1 / sqrt(Re), no friction across the flow at 90 deg."""
+    p = neuralfoil_polar(naca4(0.035, 0.4, 0.09), n_crit=3.0)
+    edge = int(np.argmin(np.abs(DEFAULT_RE - 1e4)))
+    assert DEFAULT_RE[edge] == pytest.approx(1e4, rel=1e-12) and edge == 3
+    assert np.array_equal(p.cl[:, :edge], np.repeat(p.cl[:, edge : edge + 1], edge, axis=1))
+    fine = np.abs(ALPHA_GRID) < np.deg2rad(20)
+    least = p.cd[fine, : edge + 1, 0].min(axis=0) * np.sqrt(DEFAULT_RE[: edge + 1])
+    assert least == pytest.approx(least[-1], rel=3e-3)
+    assert np.all(p.confidence[:, :edge] == 0.0)

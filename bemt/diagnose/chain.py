@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.diagnose import confusion, evidence, gate, signatures, verdict
+from bemt.diagnose import blocks, confusion, evidence, gate, signatures, verdict
 from bemt.diagnose import fit as fitting
 from bemt.diagnose import locate as location
 from bemt.diagnose import suggest as suggestion
@@ -137,7 +137,7 @@ def _diagnose(
     decision = verdict.decide(found, p)
     best, parameters = fitting.refined(found, fitting.fit(found, decision.leading))
     say("held-out blocks")
-    words, held, gp_only = fitting.held_out(found, decision.leading if decision.verdict != "unknown" else "none")
+    words, held, gp_only = blocks.held_out(found, decision.leading if decision.verdict != "unknown" else "none")
     if decision.verdict == "unknown":  # what is not in the library is foretold as what it is: something smooth
         held = gp_only
     smooth = fitting.smooth(found, best)
@@ -174,13 +174,14 @@ def _scores(found: evidence.Evidence, after: Array, held: Array, gp_only: Array)
 
 
 def _next(found: evidence.Evidence, decision: verdict.Decision, best: fitting.Fit) -> suggestion.Suggestion | None:
-    """Run against the strongest rival that is not the leading explanation itself."""
+    """Run against the strongest rival of the leading explanation, "nothing" included where no name is given."""
     singles = sorted((i for i in found.spans), key=lambda i: -found.probability[i])
     if not singles:
         return None
     lead = best.ids[0] if best.ids else singles[0]
     rivals = [i for i in (*decision.effects, *(j for g in decision.classes for j in g), *singles) if i != lead]
     first = (lead, fitting.fit(found, lead).settings[0])
-    if decision.verdict in ("none", "insufficient") or not rivals:
+    likelier = bool(rivals) and found.probability[rivals[0]] > found.probability[evidence.NONE]
+    if not rivals or decision.verdict == "none" or (decision.verdict == "insufficient" and not likelier):
         return suggestion.suggest(found, first, None)
     return suggestion.suggest(found, first, (rivals[0], fitting.fit(found, rivals[0]).settings[0]))

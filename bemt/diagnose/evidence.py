@@ -373,17 +373,16 @@ def form_modes(problem: Problem, candidates: Sequence[Candidate]) -> dict[str, A
     dict
         Id to (M, q), to be multiplied by the effect's signature [1].
     """
-    out: dict[tuple[bool, tuple[str, ...]], Array] = {}
-    for key in {_law(c) for c in candidates}:
-        stand, along = key
-        # instruments are exact but for what they say themselves that they follow: a drift the clock
-        modes = noise.smooth_modes(problem, along, flow=not stand)
-        out[key] = modes[:, :0] if stand and not along else modes
-    return {c.id: out[_law(c)] for c in candidates}
-
-
-def _law(candidate: Candidate) -> tuple[bool, tuple[str, ...]]:
-    return candidate.kind == "stand", effects.catalogue()[candidate.id].along
+    out: dict[tuple[tuple[str, ...], tuple[str, ...]], Array] = {}
+    laws = {}
+    for c in candidates:
+        effect = effects.catalogue()[c.id]
+        laws[c.id] = key = (effect.along, noise.law_of(effect))
+        if key not in out:
+            modes = noise.smooth_modes(problem, *key)
+            # instruments are exact but for what they say themselves that they follow: a drift the clock
+            out[key] = modes if any(key) else modes[:, :0]
+    return {name: out[key] for name, key in laws.items()}
 
 
 def _few(candidates: Sequence[Candidate], most: int = 9) -> NDArray[np.intp]:

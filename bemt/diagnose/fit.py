@@ -1,8 +1,7 @@
-"""The best setting of an explanation, its intervals, and its prediction for readings that it has not seen."""
+"""The best setting of an explanation, its intervals, and what smooth rest it leaves."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -15,30 +14,14 @@ from bemt.diagnose.signatures import effect_of
 
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence
-    from bemt.diagnose.problem import Problem
 
-__all__ = [
-    "Fit",
-    "blocks",
-    "fit",
-    "form_covariance",
-    "held_out",
-    "intervals",
-    "left_over",
-    "partitions",
-    "refined",
-    "smooth",
-    "weights",
-]
+__all__ = ["Fit", "fit", "form_covariance", "intervals", "left_over", "refined", "smooth", "weights"]
 
 Array = NDArray[np.float64]
 
 _STEPS = 5
 # Root mean square of the prior sizes of a form's error.
 _FORM_SIZE = float(np.sqrt(sum(w * f**2 for f, w in FORM.items())))
-
-REFERENCE = -1
-"""Block of points that are always given: readings without the cause."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,11 +135,6 @@ def weights(found: Evidence, name: str) -> dict[str, Array]:
         for k, i in enumerate(ids):
             out[i] += w * (p if p.ndim == 1 else p.sum(axis=1 - k))
     return out
-
-
-def _normal(log_p: Array) -> Array:
-    p = np.exp(log_p - log_p.max())
-    return np.asarray(p / p.sum())
 
 
 def _marginals(found: Evidence, id_: str, p: Array, share: float) -> dict[str, dict[str, Any]]:
@@ -279,145 +257,6 @@ def _continuous(id_: str, setting: dict[str, Any]) -> list[Any]:
     return [p for p in cls.parameters if p.name in setting and p.name not in cls.discrete]
 
 
-def blocks(problem: Problem, most: int = 6) -> tuple[str, NDArray[np.intp]]:
-    """Blocks of points for scoring on what was left out: whole runs, speeds or advance ratios, never random rows.
-
-    Parameters
-    ----------
-    problem : Problem
-        Readings.
-    most : int
-        Largest number of blocks [1].
-
-    Returns
-    -------
-    tuple
-        What the blocks are, and the block of each of P points.
-    """
-    return partitions(problem, most)[0]
-
-
-def partitions(problem: Problem, most: int = 6) -> list[tuple[str, NDArray[np.intp]]]:
-    """All ways to leave out whole blocks: recordings, lines of speed, lines of advance ratio; else intervals of one.
-
-    Parameters
-    ----------
-    problem : Problem
-        Readings.
-    most : int
-        Largest number of blocks [1].
-
-    Returns
-    -------
-    list of tuple
-        What the blocks are, and the block of each of P points, `REFERENCE` for those of references; at least one.
-    """
-    P = problem.covariates["rpm"].size
-    mine = np.zeros(P, dtype=bool)
-    mine[problem.point[problem.free]] = True
-    X = {k: v[mine] for k, v in problem.covariates.items()}
-    count = int(mine.sum())
-    run = X["run"].astype(int)
-    out: list[tuple[str, NDArray[np.intp]]] = []
-
-    def whole(block: NDArray[np.intp]) -> NDArray[np.intp]:
-        every = np.full(P, REFERENCE, dtype=np.intp)
-        every[mine] = block
-        return every
-
-    if len(problem.parts) > 1 and 3 <= np.unique(run).size <= most:
-        out.append(("recordings", whole(np.unique(run, return_inverse=True)[1])))
-    for name in ("rpm", "J"):
-        x = np.log(X[name]) if name == "rpm" else X[name]
-        gap = 0.03 if name == "rpm" else 0.02
-        order = np.argsort(x, kind="stable")
-        line = np.empty(count, dtype=np.intp)
-        line[order] = np.cumsum(np.r_[0, np.diff(x[order]) > gap])
-        lines = int(line.max()) + 1
-        if 3 <= lines <= max(count // 2, 3):
-            few = np.minimum(line * most // max(lines, most), most - 1) if lines > most else line
-            out.append((f"whole lines of {name}", whole(few)))
-    if out:
-        return out
-    spread = {
-        k: float(np.ptp(v)) / max(float(np.max(np.abs(v))), 1e-12) for k, v in X.items() if k in ("rpm", "J", "time_s")
-    }
-    name = max(spread, key=lambda k: spread[k])
-    rank = np.argsort(np.argsort(X[name], kind="stable"))
-    return [(f"intervals of {name}", whole(rank * min(4, count) // count))]
-
-
-def held_out(found: Evidence, name: str, split: tuple[str, NDArray[np.intp]] | None = None) -> tuple[str, Array, Array]:
-    """Predict every block from the others, with and without an explanation.
-
-    Parameters
-    ----------
-    found : Evidence
-        Outcome of the weighing.
-    name : str
-        Explanation.
-    split : tuple, optional
-        What the blocks are and the block of each point; :func:`blocks` by default.
-
-    Returns
-    -------
-    tuple
-        What the blocks are, (M,) prediction of the explanation and (M,) of a physics-free smooth error.
-    """
-    problem = found.problem
-    words, block = split or blocks(problem)
-    member = block[problem.point]
-    hyper = found.states[0].hyper
-    C = noise.covariance(problem, hyper)
-    K = next((k for n, k in noise.rivals(problem) if n == found.states[0].best_rival), np.zeros_like(C))
-    ids = tuple(name.split("+")) if name not in ("none", "unknown") else ()
-    S, log_w = _columns(found, ids)
-    r = problem.residual
-    after, smooth_part = np.array(problem.f0), np.array(problem.f0)
-    systematic = C - hyper.scale**2 * noise.noise(problem, hyper.ar)
-    own = form_covariance(found, fit(found, name))
-    for b in np.unique(member[member != REFERENCE]):
-        test, train = member == b, member != b
-        if not train.any():
-            continue
-        white = noise.whitener((C + own)[np.ix_(train, train)], problem.u[train])
-        w = white(np.column_stack([r[train], S[train]]))
-        gain = w[:, 1:].T @ w[:, 0] - 0.5 * np.sum(w[:, 1:] ** 2, axis=0) + log_w
-        p = _normal(gain) if gain.size else np.zeros(0)
-        expected = S @ p if gain.size else np.zeros_like(r)
-        cross = (systematic + own)[np.ix_(test, train)]
-        after[test] += expected[test] + cross @ _solve(white, (r - expected)[train])
-        white = noise.whitener((C + K)[np.ix_(train, train)], problem.u[train])
-        smooth_part[test] += (systematic + K)[np.ix_(test, train)] @ _solve(white, r[train])
-    return words, after, smooth_part
-
-
-def _columns(found: Evidence, ids: Sequence[str]) -> tuple[Array, Array]:
-    """Signatures of an explanation; of a pair the settings near the best one."""
-    M = found.problem.y.size
-    if not ids:
-        return np.zeros((M, 0)), np.zeros(0)
-    if len(ids) == 1:
-        c = found.of(ids[0])
-        return c.signatures, np.log(c.weight)
-    best = fit(found, "+".join(ids))
-    a, b = (found.of(i) for i in ids)
-    i, j = (col - found.spans[k].start for col, k in zip(best.columns, ids, strict=True))
-    interaction = best.signature - a.signatures[:, i] - b.signatures[:, j]
-    rows, weight = [], []
-    for k in range(a.weight.size):
-        for m in range(b.weight.size):
-            rows.append(a.signatures[:, k] + b.signatures[:, m] + interaction)
-            weight.append(np.log(a.weight[k] * b.weight[m]))
-    return np.stack(rows, axis=1), np.array(weight)
-
-
-def _solve(white: noise.Whitener, x: Array) -> Array:
-    from scipy.linalg import solve_triangular
-
-    return np.asarray(solve_triangular(white.factor, white(x), lower=True, trans="T", check_finite=False))
-
-
 def form_covariance(found: Evidence, best: Fit, size: float | None = None) -> Array:
     """Covariance of the forms of an explanation and of what lies between settings of the grid.
 
@@ -479,7 +318,7 @@ def smooth(found: Evidence, best: Fit) -> Array:
     problem, hyper = found.problem, found.states[0].hyper
     C = noise.covariance(problem, hyper) + form_covariance(found, best)
     systematic = C - hyper.scale**2 * noise.noise(problem, hyper.ar)
-    return np.asarray(systematic @ _solve(noise.whitener(C, problem.u), problem.residual - best.signature))
+    return np.asarray(systematic @ noise.whitener(C, problem.u).solve(problem.residual - best.signature))
 
 
 def left_over(found: Evidence, name: str) -> float:

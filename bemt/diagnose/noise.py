@@ -20,6 +20,7 @@ from bemt.diagnose.record import CHANNELS
 
 if TYPE_CHECKING:
     from bemt.diagnose.problem import Problem
+    from bemt.effects.base import Effect
 
 __all__ = ["Hyper", "Whitener", "discrepancy", "hypers", "rivals", "whitener"]
 
@@ -173,6 +174,12 @@ class Whitener:
 
         return np.asarray(solve_triangular(self.factor, vectors, lower=True, check_finite=False))
 
+    def solve(self, vectors: Array) -> Array:
+        """Inverse of the covariance times vectors or columns."""
+        from scipy.linalg import solve_triangular
+
+        return np.asarray(solve_triangular(self.factor, self(vectors), lower=True, trans="T", check_finite=False))
+
 
 def whitener(covariance: Array, u: Array) -> Whitener:
     """Factor a covariance.
@@ -278,7 +285,23 @@ def rivals(problem: Problem) -> tuple[tuple[str, Array], ...]:
     return tuple(out)
 
 
-def smooth_modes(problem: Problem, besides: Sequence[str] = (), flow: bool = True) -> Array:
+def law_of(effect: Effect | type[Effect]) -> tuple[str, ...]:
+    """What the law of an effect depends on, of speed, advance ratio and density.
+
+    Parameters
+    ----------
+    effect : Effect
+        The effect, or its class.
+
+    Returns
+    -------
+    tuple of str
+        Nothing for instruments; advance ratio alone for a flow without friction and compressibility; else all.
+    """
+    return () if effect.kind == "stand" else ("J",) if effect.inviscid else tuple(_FLOW)
+
+
+def smooth_modes(problem: Problem, besides: Sequence[str] = (), flow: Sequence[str] = tuple(_FLOW)) -> Array:
     """Modes of a smooth function of unit variance, each channel for itself.
 
     Parameters
@@ -286,9 +309,9 @@ def smooth_modes(problem: Problem, besides: Sequence[str] = (), flow: bool = Tru
     problem : Problem
         Readings.
     besides : sequence of str
-        Covariates that it depends on besides speed, advance ratio and density.
-    flow : bool
-        Whether it depends on these.
+        Covariates that it depends on besides those of the flow.
+    flow : sequence of str
+        Which of speed, advance ratio and density it depends on.
 
     Returns
     -------
@@ -297,8 +320,8 @@ def smooth_modes(problem: Problem, besides: Sequence[str] = (), flow: bool = Tru
     """
     P = problem.covariates["rpm"].size
     apart = np.zeros((P, P))
-    for name, least in {**(_FLOW if flow else {}), **{k: v for k, v in _BESIDES.items() if k in besides}}.items():
-        if name in problem.covariates:
+    for name, least in (_FLOW | _BESIDES).items():
+        if name in (*flow, *besides) and name in problem.covariates:
             x = problem.covariates[name]
             x = np.log(x) if name in _LOGARITHMIC else x
             apart += ((x[:, None] - x[None, :]) / (_FORM_LENGTH * max(float(np.ptp(x)), least))) ** 2

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.diagnose.noise import smooth_modes
+from bemt.diagnose.noise import law_of, smooth_modes
 from bemt.diagnose.record import CHANNELS
 from bemt.effects.base import Baking, Effect
 
@@ -183,7 +183,7 @@ def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...], NDArray[np.bool
         if np.isfinite(share).all() and float(np.max(np.abs(share) / problem.scale)) > _FORM_FLOOR:
             alone = any(k in problem.covariates for k in e.along)
             spread = PRIORS["form in a variable of its own" if alone else "form of the model"]
-            modes = spread * smooth_modes(problem, e.along)
+            modes = spread * smooth_modes(problem, e.along, law_of(e))
             for k in range(modes.shape[1]):
                 add(f"form of {e.id}", share * modes[:, k], own=not alone)
     matrix = np.stack(columns, axis=1) if columns else np.zeros((y.size, 0))

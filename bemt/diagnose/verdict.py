@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import effects
+from bemt.diagnose import blocks
 from bemt.diagnose import confusion as look
 from bemt.diagnose import evidence as ev
 from bemt.diagnose import fit as fitting
@@ -212,10 +213,10 @@ def _foretells(found: Evidence, leading: str) -> bool:
     u = problem.u[problem.free]
 
     def error(name: str, split: tuple[str, NDArray[np.intp]]) -> float:
-        d = (problem.y - fitting.held_out(found, name, split)[1])[problem.free] / u
+        d = (problem.y - blocks.held_out(found, name, split)[1])[problem.free] / u
         return float(np.sqrt(np.mean(d**2)))
 
-    return any(error(leading, s) < FORETELLS * error(ev.NONE, s) for s in fitting.partitions(problem))
+    return any(error(leading, s) < FORETELLS * error(ev.NONE, s) for s in blocks.partitions(problem))
 
 
 def _earned(found: Evidence, pair: str, share: dict[str, float]) -> tuple[str, dict[str, float]]:

@@ -108,6 +108,9 @@ class Esc:
         Battery current above which it lowers the duty, and motor current to which it limits braking. [A]
     braking : bool
         Whether it can slow the rotor (complementary switching); else the current never goes below 0.
+    brake_on_stop : float
+        Share of the time for which it shorts the motor at no duty; 0: the bridge is open there and the rotor coasts.
+        Without `braking` it has no effect. [1]
     ripple_ohm : float
         Z = 2 L f: winding between lines, switching frequency; without braking it says when the current stops. [ohm]
     """

@@ -290,6 +290,9 @@ class Effect:
     kind: ClassVar[str] = "air"
     # Covariates along which it shows first, of those that a diagnosis knows (J, rpm, Re, M_tip, time_s, ...).
     along: ClassVar[tuple[str, ...]] = ()
+    # Law of a flow without friction and compressibility: by similarity (Buckingham 1914) its dimensionless form may
+    # depend on the advance ratio and on `along`, not on speed or density.
+    inviscid: ClassVar[bool] = False
     # What one would look at to be sure, without a run.
     check: ClassVar[str] = ""
     # Parameters that take a few values only (a ratio of units), nothing between them.

@@ -76,6 +76,7 @@ class Cascade(Effect):
     annulus: float = 0.020
 
     id = "cascade"
+    inviscid = True
     title = "interference between blades at high solidity"
     sign = "less lift where blades overlap; only rotors of solidity above about 0.3 show it"
     diagnosed = False

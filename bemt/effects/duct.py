@@ -23,6 +23,7 @@ class Duct(Effect):
     wake_ratio: float = 1.0
 
     id = "duct"
+    inviscid = True
     title = "thrust of a duct"
     sign = "more thrust for the same torque, fading with advance ratio"
     parameters = (Parameter("wake_ratio", "1", 0.8, 1.3, "exit over disk area; Pereira 2008"),)

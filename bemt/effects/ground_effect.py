@@ -37,6 +37,7 @@ class GroundEffect(Effect):
     plate_radius_over_R: float = 0.0
 
     id = "ground_effect"
+    inviscid = True
     title = "wall behind the propeller"
     along = ("wall_distance_m",)
     sign = (

@@ -18,6 +18,7 @@ class HighInduction(Effect):
     """
 
     id = "high_induction"
+    inviscid = True
     title = "turbulent windmill and vortex-ring state"
     sign = "windmilling and descent only; never a propeller that drives air its own way"
     diagnosed = False

@@ -57,6 +57,7 @@ class LiftingSurface(Effect):
     strength: float = 1.0
 
     id = "lifting_surface"
+    inviscid = True
     title = "lifting-surface loss of lift at wide tips"
     sign = "less thrust and torque by nearly one share at every advance ratio, the more the wider the tip"
     diagnosed = False

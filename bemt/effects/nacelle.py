@@ -29,6 +29,7 @@ class Nacelle(Effect):
     body_over_R: float = 0.0
 
     id = "nacelle"
+    inviscid = True
     title = "body behind the propeller"
     sign = "thrust lacks an amount that grows with V^2 whatever the rotor's speed, torque hardly moves; none at rest"
     parameters = (

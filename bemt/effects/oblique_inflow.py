@@ -26,6 +26,7 @@ class ObliqueInflow(Effect):
     angle_deg: float = 20.0
 
     id = "oblique_inflow"
+    inviscid = True
     title = "airspeed at an angle to the shaft"
     along = ("sideslip_rad",)
     sign = "thrust and torque up with airspeed as if J were lower, and a force in the plane of the disk; none at rest"

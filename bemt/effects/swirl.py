@@ -18,6 +18,7 @@ class Swirl(Effect):
     """
 
     id = "swirl"
+    inviscid = True
     title = "rotation of the slipstream"
     sign = "thrust and torque off at heavy loading by constant shares; their ratio tells it from density or speed"
 

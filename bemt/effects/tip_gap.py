@@ -28,6 +28,7 @@ class TipGap(Effect):
     scale: float = 0.05
 
     id = "tip_gap"
+    inviscid = True
     title = "leakage through the tip gap of a ducted rotor"
     along = ("tip_gap_m",)
     sign = "thrust and pressure rise fall in proportion to gap over span; an open rotor has none"

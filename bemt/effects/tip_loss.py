@@ -27,6 +27,7 @@ class TipLoss(Effect):
     sheets: str = "wake"
 
     id = "tip_loss"
+    inviscid = True
     title = "tip loss of a finite number of blades"
     sign = "less thrust than torque lost, more of both the heavier the loading: follows J and blade count, not speed"
     parameters = (Parameter("strength", "1", 0.5, 1.3, "shared effect table of the project; 1 is Prandtl"),)

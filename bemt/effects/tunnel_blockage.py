@@ -23,6 +23,7 @@ class TunnelBlockage(Effect):
     area_ratio: float = 0.05
 
     id = "tunnel_blockage"
+    inviscid = True
     title = "blockage of a closed wind tunnel"
     sign = "more thrust and torque the higher the loading at airspeed: the shift of J grows with thrust, not with V"
     parameters = (Parameter("area_ratio", "1", 0.0, 0.15, "disk over test-section area", 4, 0.0),)
