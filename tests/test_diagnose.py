@@ -91,7 +91,8 @@ def test_a_plan_with_pulse_widths_sees_the_drive() -> None:
              "time_s": 60.0 * np.arange(rpm.size), "pwm_s": 1e-3 + rpm / 24e6, "thrust_N": np.ones(rpm.size),
              "torque_Nm": np.ones(rpm.size)}  # fmt: skip
     seen = plan.plan(record.from_series(Series("bench", "drive", given), case()), case())
-    assert {"battery_sag", "motor_heating"} <= set(seen.sight)
+    assert {"battery_sag", "motor_heating"} <= set(seen.confusion.ids)
+    assert all(seen.sight[i] == "visible" for i in ("battery_sag", "motor_heating"))
 
 
 def test_a_plan_knows_what_it_can_see() -> None:

@@ -19,7 +19,7 @@ from bemt.diagnose.evidence import Form, form_modes
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence, State
 
-__all__ = ["ALIKE", "VISIBLE", "Confusion", "confusion", "distance", "nearest"]
+__all__ = ["ALIKE", "VISIBLE", "Confusion", "confusion", "distance", "nearest", "sizes"]
 
 Array = NDArray[np.float64]
 
@@ -86,6 +86,23 @@ def distance(state: State, s: Array, span: slice, form: Form | None = None) -> f
         p = form.project(d)
         square = square - np.sum(p * p, axis=0)
     return float(np.sqrt(max(float(np.min(square)), 0.0)))
+
+
+def sizes(found: Evidence) -> Array:
+    """Length of the whitened signature of every candidate at its ordinary strength, (N,) [1].
+
+    Parameters
+    ----------
+    found : Evidence
+        Whitened signatures.
+
+    Returns
+    -------
+    (N,) float
+        In standard deviations [1].
+    """
+    S = found.states[0].S
+    return np.array([float(np.linalg.norm(S[:, found.spans[c.id].start + c.middle])) for c in found.candidates])
 
 
 def confusion(found: Evidence, settings: dict[str, int] | None = None) -> Confusion:

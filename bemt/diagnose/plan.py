@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bemt import effects
 from bemt.diagnose import confusion as look
@@ -20,10 +21,14 @@ if TYPE_CHECKING:
 
 __all__ = ["SCHEMA", "Plan", "document", "plan", "points", "text"]
 
+Array = NDArray[np.float64]
+
 SCHEMA = "bemt.plan/1"
 
-# What a plan may count on: noise as stated, and a solver error that earlier comparisons suggest.
+# What a plan may count on: noise as stated, and a solver error that earlier comparisons suggest; and the best that it
+# may meet, the solver being as good as any rotor has shown it.
 _HYPER = (1.0, 0.0, 0.01, 0.7)
+_BEST = (1.0, 0.0, 0.003, 0.3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +39,8 @@ class Plan:
     ----------
     confusion : Confusion
         Sizes and distances.
+    best : (N,) float
+        The same sizes if the solver is at its best [1].
     absent : dict of str to str
         Effects that cannot show, and why.
     added : Suggestion or None
@@ -43,16 +50,17 @@ class Plan:
     """
 
     confusion: look.Confusion
+    best: Array
     absent: dict[str, str]
     added: suggestion.Suggestion | None
     points: int
 
     @property
     def sight(self) -> dict[str, str]:
-        """Each effect: visible, marginal or invisible at its ordinary strength."""
+        """Each effect at its ordinary strength: visible, invisible (even if the solver is at its best) or marginal."""
         words = {}
-        for i, s in zip(self.confusion.ids, self.confusion.size, strict=True):
-            words[i] = "visible" if s >= look.VISIBLE else "marginal" if s >= look.ALIKE else "invisible"
+        for i, s, most in zip(self.confusion.ids, self.confusion.size, self.best, strict=True):
+            words[i] = "visible" if s >= look.VISIBLE else "marginal" if most >= look.ALIKE else "invisible"
         return words | dict.fromkeys(self.absent, "invisible")
 
 
@@ -115,7 +123,7 @@ def plan(record: Record, case: Case, progress: Callable[[str], None] | None = No
 def _plan(record: Record, case: Case, progress: Callable[[str], None] | None) -> Plan:
     first = problem.build([record], [case])
     flow = first.parts[0].flow
-    own = {"thrust_N": flow.T0, "torque_Nm": flow.Q0}
+    own = {"thrust_N": flow.T0, "torque_Nm": flow.Q0, "rpm": record.rpm}
     measured = {k: own[k] for k in record.measured if k in own}
     whole = problem.assemble((replace(first.parts[0], record=replace(record, measured=measured), _solved={}),))
     candidates, absent = signatures.candidates(
@@ -123,13 +131,14 @@ def _plan(record: Record, case: Case, progress: Callable[[str], None] | None) ->
     )
     found = evidence.bare(whole, candidates, noise.Hyper(*_HYPER, 1.0))
     alike = look.confusion(found)
+    best = look.sizes(evidence.bare(whole, candidates, noise.Hyper(*_BEST, 1.0)))
     added = None
     groups = sorted(alike.classes(), key=len, reverse=True)
     if groups:
         a, b = groups[0][:2]
         settings = {c.id: c.settings[c.middle] for c in candidates}
         added = suggestion.suggest(found, (a, settings[a]), (b, settings[b]))
-    return Plan(alike, absent, added, len(record))
+    return Plan(alike, best, absent, added, len(record))
 
 
 def document(answer: Plan) -> dict[str, Any]:
@@ -149,6 +158,7 @@ def document(answer: Plan) -> dict[str, Any]:
     return {
         "schema": SCHEMA, "points": answer.points, "sight": answer.sight,
         "size": {i: float(s) for i, s in zip(c.ids, c.size, strict=True)},
+        "size_at_best": {i: float(s) for i, s in zip(c.ids, answer.best, strict=True)},
         "classes": c.classes(),
         "distance": {i: {j: float(c.distance[a, b]) for b, j in enumerate(c.ids)} for a, i in enumerate(c.ids)},
         "not_tried": answer.absent,
