@@ -8,8 +8,8 @@ on UIUC volume 1 (51 propellers with stations, static and wind-tunnel data); UIU
 * Section: NACA four-digit, camber 3.5 % at 40 % chord, thickness 9 %; six of the nine families of volume 1 with two
   or more propellers come out at 3.0 to 3.5 %.  Families that do not are in :data:`FAMILIES`.
 * Transition: n_crit 3.  Rotating small blades keep their lift down to Re 20,000, which n_crit 9 does not (static CT
-  at Re 20,000-30,000 relative to the same propellers' top speed: -16 to -18 % with n_crit 9, -0 to +5 % with 3).
-* Drag: 1.2 times the smooth section's, for moulded blades; without it CP is 4 % low in both static and forward flight.
+  at Re 20,000-30,000 relative to the same propellers' top speed: -15 to -17 % with n_crit 9, -3 to +4 % with 3).
+* Drag: 1.2 times the smooth section's, for moulded blades; without it CP is 2 % low at rest and 3 % in flight.
 """
 
 from __future__ import annotations

@@ -92,7 +92,7 @@ def test_a_plan_with_pulse_widths_sees_the_drive() -> None:
              "torque_Nm": np.ones(rpm.size)}  # fmt: skip
     seen = plan.plan(record.from_series(Series("bench", "drive", given), case()), case())
     assert {"battery_sag", "motor_heating"} <= set(seen.confusion.ids)
-    assert all(seen.sight[i] == "visible" for i in ("battery_sag", "motor_heating"))
+    assert (seen.sight["battery_sag"], seen.sight["motor_heating"]) == ("visible", "marginal")
 
 
 def test_a_plan_knows_what_it_can_see() -> None:

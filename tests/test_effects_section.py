@@ -152,12 +152,14 @@ def test_wave_drag_has_the_published_values_at_divergence() -> None:
 def test_stall_delay_forms_at_published_strength() -> None:
     x = np.array([0.25, 0.5, 0.75, 1.0])
     c = np.array([0.6, 0.4, 0.2, 0.05])
-    snel, du_selig = (np.asarray(StallDelay(form=f).weight(c, x)) for f in stall_delay.FORMS)
+    beta = np.radians([40.0, 25.0, 16.0, 10.0])
+    whole, snel, du_selig = (np.asarray(StallDelay(form=f).weight(c, x, beta)) for f in stall_delay.FORMS)
+    np.testing.assert_allclose(whole, 2.2 * c * np.cos(beta) ** 4)
     np.testing.assert_allclose(snel, 3.0 * c**2)
     power = c ** (1.0 / x)
     np.testing.assert_allclose(du_selig, (1.6 * c / 0.1267 * (1 - power) / (1 + power) - 1.0) / (2.0 * np.pi))
     assert du_selig[-1] < 0.0, "taken as none at the tip"
-    np.testing.assert_allclose(StallDelay(1.5, form="du_selig").weight(c, x), 0.5 * du_selig)
+    np.testing.assert_allclose(StallDelay(1.5, form="du_selig").weight(c, x, beta), 0.5 * du_selig)
 
 
 @pytest.mark.parametrize("form", stall_delay.FORMS)
