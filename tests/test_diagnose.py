@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from diagnosing import case, diagnose, left_out, points, recording
 
-from bemt.diagnose import document, plan, record
+from bemt import effects
+from bemt.diagnose import document, noise, plan, problem, record
 from bemt.series import Series
 
 GRID = points("grid")
@@ -36,6 +37,20 @@ def test_compressibility_left_out_is_named_located_and_mended() -> None:
         assert score["holdout_after"] < 1.3 * score["noise"]
     value = answer.parameters["compressibility"]["amplitude"]
     assert value["low"] - 0.05 <= 1.0 <= value["high"] + 0.05
+
+
+def test_an_inviscid_law_errs_over_advance_ratio_only() -> None:
+    """Similarity: at one advance ratio the error of such a law is the same at every speed and density."""
+    given = points("air")
+    built = problem.build([record.from_series(recording(case(), given), case())], [case()])
+    J = np.round(built.covariates["J"][built.point], 6)
+    for name, free in (("tip_loss", False), ("ground_effect", False), ("duct", False), ("reynolds", True)):
+        modes = noise.smooth_modes(built, (), noise.law_of(effects.catalogue()[name]))
+        shown = modes @ modes.T  # the covariance, whatever the signs of its modes
+        thrust = np.flatnonzero(built.channel == 0)
+        spread = [np.ptp(shown[np.ix_(thrust[J[thrust] == x], thrust)], axis=0).max() for x in np.unique(J)]
+        assert (max(spread) > 0.5) == free and (free or max(spread) < 1e-6), name
+    assert noise.law_of(effects.catalogue()["thrust_gain"]) == ()
 
 
 def test_torque_in_other_units_is_a_slip_of_units() -> None:
