@@ -161,6 +161,9 @@ def decide(found: Evidence, p_value: float) -> Decision:
     if not expected and found.log_bayes(leading) < PROVEN and not _foretells(found, leading):
         why = "the best explanation does not foretell what it has not seen"
         return Decision("insufficient", (), leading, listed[leading], rest, (), why)
+    if needed == PROVEN and "+" not in leading and _leaves_its_range(found, leading):
+        why = f"{leading}, which is on, would have to leave its range: its law is off, not its parameter"
+        return Decision("unknown", (), leading, listed[leading], rest, (), why)
     if _twins(leading.split("+")):
         why = "two instruments with the same fault at once: one cause that is not in the library is likelier"
         return Decision("unknown", (), leading, listed.get(leading, 0.0), rest, (), why)
@@ -228,6 +231,17 @@ def _earned(found: Evidence, pair: str, share: dict[str, float]) -> tuple[str, d
         if found.log_bayes(pair) - found.log_bayes(one) < price and share[one] >= share[other]:
             return one, {i: (0.0 if i == other else p) for i, p in share.items()}
     return pair, share
+
+
+def _leaves_its_range(found: Evidence, leading: str) -> bool:
+    """Whether physics that is on explains the readings best at the end of the range of a parameter, not as it is on."""
+    on = {e.id: e for e in found.problem.baseline}
+    best = fitting.fit(found, leading).settings[0]
+    for p in effects.catalogue()[leading].parameters:
+        value = best.get(p.name)
+        if value is not None and value not in (getattr(on[leading], p.name), p.off) and not p.low < value < p.high:
+            return True
+    return False
 
 
 def _twins(ids: Sequence[str]) -> bool:
