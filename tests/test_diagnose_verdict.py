@@ -50,6 +50,20 @@ def test_what_is_on_already_is_not_what_was_left_out(answer: chain.Diagnosis) ->
     assert told(answer, tip_loss=0.99).verdict in ("insufficient", "unknown")
 
 
+@pytest.mark.parametrize(
+    ("setting", "beyond"),
+    [({"strength": 1.5, "form": "hayden"}, True), ({"z_over_R": 0.5}, True), ({"strength": 1.2}, False),
+     ({"strength": 0.0}, False), ({"strength": 1.0, "z_over_R": 2.0}, False)],
+)  # fmt: skip
+def test_physics_that_is_on_is_wrong_at_the_end_of_its_range(
+    setting: dict[str, Any], beyond: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not where the end of the range is "off", nor at the value that it is on with."""
+    found: Any = SimpleNamespace(problem=SimpleNamespace(baseline=(effects.catalogue()["ground_effect"](),)))
+    monkeypatch.setattr(fit, "fit", lambda *_: SimpleNamespace(settings=(setting,)))
+    assert verdict._leaves_its_range(found, "ground_effect") == beyond
+
+
 def test_the_nearest_signature_is_a_baseline_of_its_own(answer: chain.Diagnosis) -> None:
     assert confusion.nearest(answer.found) == "compressibility"
 

@@ -19,14 +19,12 @@ from bemt.diagnose.evidence import Form, form_modes
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence, State
 
-__all__ = ["ALIKE", "VISIBLE", "Confusion", "confusion", "distance", "nearest", "sizes"]
+__all__ = ["ALIKE", "Confusion", "confusion", "distance", "nearest"]
 
 Array = NDArray[np.float64]
 
 ALIKE = 3.0
 """Distance below which two effects are one class [1]."""
-VISIBLE = 5.0
-"""Length of a whitened signature from which a plan is said to see an effect [1]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,23 +84,6 @@ def distance(state: State, s: Array, span: slice, form: Form | None = None) -> f
         p = form.project(d)
         square = square - np.sum(p * p, axis=0)
     return float(np.sqrt(max(float(np.min(square)), 0.0)))
-
-
-def sizes(found: Evidence) -> Array:
-    """Length of the whitened signature of every candidate at its ordinary strength, (N,) [1].
-
-    Parameters
-    ----------
-    found : Evidence
-        Whitened signatures.
-
-    Returns
-    -------
-    (N,) float
-        In standard deviations [1].
-    """
-    S = found.states[0].S
-    return np.array([float(np.linalg.norm(S[:, found.spans[c.id].start + c.middle])) for c in found.candidates])
 
 
 def confusion(found: Evidence, settings: dict[str, int] | None = None) -> Confusion:
