@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import lzma
 import os
 import shutil
 import stat
@@ -212,9 +213,12 @@ def unpacked(archive: Path, folder: Path) -> Iterator[Path]:
                     place.parent.mkdir(parents=True, exist_ok=True)
                     with source.open(info) as stream, place.open("wb") as out:
                         shutil.copyfileobj(stream, out)
-        except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
+        except (zipfile.BadZipFile, zlib.error, lzma.LZMAError, EOFError, UnicodeDecodeError, RuntimeError) as error:
+            # RuntimeError: encrypted, or compressed in a way that zipfile does not know
             raise InputError(Fault(name, "", str(error) or "damaged data", "a sound zip archive")) from error
         except OSError as error:
+            if error.errno is None:  # of bz2, not of the disk
+                raise InputError(Fault(name, "", str(error), "a sound zip archive")) from error
             hint = "Is there a file where a folder should be, or no room?"
             raise InputError(Fault(name, "", error.strerror or str(error), "an archive to unpack", hint)) from error
         fresh.mkdir(parents=True, exist_ok=True)

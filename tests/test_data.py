@@ -26,6 +26,24 @@ FILES = {  # the layout of the public archive as far as known
 }
 
 
+def damaged(method: int) -> bytes:
+    """Archive whose compressed bytes are no stream of their method."""
+    page = io.BytesIO()
+    with zipfile.ZipFile(page, "w", method) as archive:
+        archive.writestr("a.txt", "words " * 500)
+    data = bytearray(page.getvalue())
+    data[45:51] = bytes(b ^ 0xFF for b in data[45:51])
+    return bytes(data)
+
+
+def misnamed() -> bytes:
+    """Archive that says of a file name that it is UTF-8 where it is not."""
+    data = bytearray(zipped({"a.txt": "words"}).replace(b"a.txt", b"\xff\xfe.tx"))
+    data[7] |= 0x08
+    data[data.find(b"PK\x01\x02") + 9] |= 0x08
+    return bytes(data)
+
+
 def zipped(files: dict[str, str | bytes], filler: int = 0) -> bytes:
     page = io.BytesIO()
     with zipfile.ZipFile(page, "w") as archive:
@@ -219,6 +237,10 @@ def link() -> bytes:
         (b"no zip at all", "a sound zip archive"),
         (zipped(FILES)[:-40], "a sound zip archive"),
         (zipped(FILES).replace(b"0.095 0.040", b"0.095 0.099"), "a sound zip archive"),  # CRC
+        (damaged(zipfile.ZIP_DEFLATED), "a sound zip archive"),
+        (damaged(zipfile.ZIP_LZMA), "a sound zip archive"),
+        (damaged(zipfile.ZIP_BZIP2), "a sound zip archive"),
+        (misnamed(), "a sound zip archive"),
     ],
 )
 def test_an_unsound_archive_changes_nothing(tmp_path, body, words):
