@@ -51,8 +51,8 @@ def test_it_is_linear_in_density_and_in_annulus_area(D, p, rpm, V, rho):
 def test_similarity(D, p, rpm, x, scale):
     V = x * k.pitch_speed(rpm, p)
     F, still = k.thrust(D, p, rpm, V), k.thrust(D, p, rpm, 0.0)  # near the pitch speed F is a small difference
-    assert k.thrust(D * scale, p * scale, rpm, V * scale) / scale**4 == pytest.approx(F, rel=1e-9, abs=1e-12 * still)
-    assert k.thrust(D, p, rpm * scale, V * scale) / scale**2 == pytest.approx(F, rel=1e-9, abs=1e-12 * still)
+    assert k.thrust(D * scale, p * scale, rpm, V * scale) / scale**4 == pytest.approx(F, rel=1e-9, abs=1e-14 * still)
+    assert k.thrust(D, p, rpm * scale, V * scale) / scale**2 == pytest.approx(F, rel=1e-9, abs=1e-14 * still)
 
 
 @given(lengths, lengths, rpms)

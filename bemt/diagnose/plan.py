@@ -142,7 +142,7 @@ def _plan(record: Record, case: Case, progress: Callable[[str], None] | None) ->
     )
     found = evidence.bare(whole, candidates, noise.Hyper(*_HYPER, 1.0))
     alike = look.confusion(found)
-    size, best = (_sizes(whole, candidates, noise.Hyper(*h, 1.0)) for h in (_HYPER, _BEST))
+    size, best = _sizes(whole, candidates, [noise.Hyper(*h, 1.0) for h in (_HYPER, _BEST)])
     added = None
     groups = sorted(alike.classes(), key=len, reverse=True)
     if groups:
@@ -154,25 +154,30 @@ def _plan(record: Record, case: Case, progress: Callable[[str], None] | None) ->
     return Plan(alike, size, best, bar, absent, added, len(record))
 
 
-def _sizes(whole: problem.Problem, candidates: Sequence[signatures.Candidate], truth: noise.Hyper) -> Array:
-    """Root of twice the expected log odds of each candidate over nothing, if the covariance is `truth`.
+def _sizes(
+    whole: problem.Problem, candidates: Sequence[signatures.Candidate], truths: Sequence[noise.Hyper]
+) -> list[Array]:
+    """Root of twice the expected log odds of each candidate over nothing, for each covariance that may be the true one.
 
     "Nothing" may choose another covariance, which costs what it makes of everything else (Kullback and Leibler 1951):
     correlated noise or a bad solver is a rival of every effect. An effect pays for settings that it might have had.
     """
-    own = noise.whitener(noise.covariance(whole, truth), whole.u)
     shown = np.zeros((whole.y.size, len(candidates)))
-    paid = np.zeros(len(candidates))
     for k, c in enumerate(candidates):
         shown[:, k] = c.signatures[:, c.middle]
-        apart = own(c.signatures - shown[:, k, None])
-        paid[k] = -evidence.log_mean(-0.5 * np.sum(apart**2, axis=0), np.log(c.weight))
-    least = np.full(len(candidates), np.inf)
+    own = [noise.whitener(noise.covariance(whole, h), whole.u) for h in truths]
+    least = np.full((len(truths), len(candidates)), np.inf)
     for _, C in noise.covariances(whole):
         white = noise.whitener(C, whole.u)
-        price = 0.5 * (float(np.sum(white(own.factor) ** 2)) - whole.y.size) + white.log_det - own.log_det
-        least = np.minimum(least, 0.5 * np.sum(white(shown) ** 2, axis=0) + price)
-    return np.asarray(np.sqrt(2.0 * np.maximum(least - paid, 0.0)))
+        gain = 0.5 * np.sum(white(shown) ** 2, axis=0)
+        for k, true in enumerate(own):
+            price = 0.5 * (float(np.sum(white(true.factor) ** 2)) - whole.y.size) + white.log_det - true.log_det
+            least[k] = np.minimum(least[k], gain + price)
+    for k, true in enumerate(own):
+        for i, c in enumerate(candidates):
+            apart = true(c.signatures - shown[:, i, None])
+            least[k, i] += evidence.log_mean(-0.5 * np.sum(apart**2, axis=0), np.log(c.weight))
+    return [np.asarray(row) for row in np.sqrt(2.0 * np.maximum(least, 0.0))]
 
 
 def document(answer: Plan) -> dict[str, Any]:
