@@ -144,6 +144,30 @@ def test_the_key_of_a_run_stands_for_what_decides_it(project: Path, tmp_path: Pa
     assert [point_key(p)[:2] for p in load_campaign(write(tmp_path / "other", project, text)).points] == keys
 
 
+@pytest.mark.parametrize(
+    ("line", "new", "same"),
+    [("drag_level = 1.1", "drag_level = 1.3", True), ("camber = 0.035", "camber = 0.036", False),
+     ("beta_offset_deg = 0.7", "beta_offset_deg = 0.8", False), ("density_kg_m3 = 1.225", "density_kg_m3 = 1.2", False)],
+)  # fmt: skip
+def test_a_recording_outlives_changes_of_the_case_that_no_run_saw(
+    project: Path, tmp_path: Path, line: str, new: str, same: bool
+) -> None:
+    """Options of the BEMT are no reason to run a CFD again; anything that the grid, the gas or the flow knows is."""
+    keys = []
+    for folder, old in (("a", line), ("b", new)):
+        case = tmp_path / folder / "cases" / "prop_8x5"
+        case.mkdir(parents=True)
+        given = project / "cases" / "prop_8x5"
+        (case / "references.csv").write_bytes((given / "references.csv").read_bytes())
+        text = (given / "case.toml").read_text()
+        assert text.count(line) == 1
+        (case / "case.toml").write_text(text.replace(line, old))
+        path = tmp_path / folder / "campaign.toml"
+        path.write_text(HEAD.format(case="cases/prop_8x5") + "[[points]]\nrpm = 9000\n")
+        keys.append(point_key(load_campaign(path).points[0])[0])
+    assert (keys[0] == keys[1]) is same
+
+
 def test_a_campaign_is_recorded(
     project: Path, tmp_path: Path, programs: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -293,13 +317,12 @@ def test_loads_along_the_radius_add_up(project: Path, tmp_path: Path) -> None:
 
 
 def test_the_committed_campaigns_are_whole(project: Path) -> None:
-    """Every recording belongs to its campaign and case as they are now, and says what is missing."""
+    """Every run is the one that campaign and case ask for now (its key), and what is missing is said."""
     found = sorted((project / "reports" / "cfd").glob("*/campaign.toml"))
     assert found
     for path in found:
         campaign = load_campaign(path)
         manifest = json.loads((path.parent / "manifest.json").read_text())
-        assert manifest["case_sha256"] == campaign.case.content_hash(), f"{path.parent.name}: the case has changed"
         order = [point_key(point)[0] for point in campaign.points]
         rows = {row["run"]: row for row in rows_of(path.parent)}
         assert set(rows) <= set(order), f"{path.parent.name}: runs of other settings"
