@@ -9,8 +9,8 @@ on UIUC volume 1 (51 propellers with stations, static and wind-tunnel data); UIU
   or more propellers come out at 3.0 to 3.5 %.  Families that do not are in :data:`FAMILIES`.
 * Transition: n_crit 3.  Rotating small blades keep their lift down to Re 20,000, which n_crit 9 does not (static CT
   at Re 20,000-30,000 relative to the same propellers' top speed: -15 to -17 % with n_crit 9, -3 to +4 % with 3).
-* Drag: 1.1 times the smooth section's, for moulded blades: static CP of volume 1 is then right in the median (-1.5 % at 1.0,
-  +1.7 % at 1.2); in flight it is 2 % low.
+* Drag: 1.1 times the smooth section's, for moulded blades: static CP of volume 1 is then right in the median (-1.5 %
+  at 1.0, +1.7 % at 1.2); in flight it is 2 % low.
 """
 
 from __future__ import annotations
