@@ -11,6 +11,7 @@ import importlib
 import os
 import sys
 from collections.abc import Sequence
+from typing import Any
 
 from bemt import __version__
 from bemt.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, InputError
@@ -18,6 +19,8 @@ from bemt.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, InputError
 __all__ = ["build_parser", "main"]
 
 EXIT_INTERRUPTED = 130
+# Options of several words: `--case A B` and `--case A --case B` are the same, none is dropped without a word.
+MANY: dict[str, Any] = {"action": "extend", "nargs": "+"}
 
 _MODULES = {"sweep": "bemt.sweep", "report": "bemt.report",
             "validate": "bemt.validate", "reproduce": "bemt.reproduce", "bench": "bemt.bench",
@@ -123,22 +126,22 @@ def build_parser() -> argparse.ArgumentParser:
     bring.add_argument("--sign", type=int, choices=(1, -1), default=1, help="-1 turns the loads round (default 1)")
     sector = "the model is one of N equal sectors: loads times N (default 1)"
     bring.add_argument("--sector", type=_positive, default=1, metavar="N", help=sector)
-    bring.add_argument("--zones", nargs="+", metavar="ZONE", help="add up the loads of these zones")
+    bring.add_argument("--zones", metavar="ZONE", help="add up the loads of these zones", **MANY)
     loads = "channel that --sign and --sector apply to; repeatable (default: all in N or Nm)"
     bring.add_argument("--load", action="append", metavar="NAME", help=loads)
 
     refit = commands.add_parser("calibrate", help="refit K1 and K2 on measured propellers, beside the compact formula")
     which = "files or folders with diameter, pitch, rpm and thrust or CT (default: uiuc, the data found)"
     refit.add_argument("files", nargs="*", metavar="FILES", help=which)
-    refit.add_argument("--test", nargs="+", metavar="FILES", help="held out: scored, never fitted")
+    refit.add_argument("--test", metavar="FILES", help="held out: scored, never fitted", **MANY)
     refit.add_argument("--out", metavar="DIR", help="write the tables, JSON and a figure there")
     refit.add_argument("--json", action="store_true", help="print one JSON document (bemt.calibration/1)")
     refit.add_argument("--quiet", action="store_true", help="print neither progress nor tables")
 
     guess = commands.add_parser("estimate", help="thrust and power from a label such as 10x5, with bands, beside K1/K2")
     guess.add_argument("label", metavar="LABEL", help="diameter x pitch in inches, blades if not 2: 10x4.7, 8x5x3")
-    guess.add_argument("--rpm", type=float, nargs="+", required=True, metavar="N", help="one or more [rev/min]")
-    guess.add_argument("--airspeed", type=float, nargs="+", metavar="V", help="one or more (default 0) [m/s]")
+    guess.add_argument("--rpm", type=float, required=True, metavar="N", help="one or more [rev/min]", **MANY)
+    guess.add_argument("--airspeed", type=float, metavar="V", help="one or more (default 0) [m/s]", **MANY)
     guess.add_argument("--blades", type=_positive, metavar="B", help="number (default: of the label, else 2)")
     guess.add_argument("--chord-mm", type=float, metavar="C", help="at 0.75 R: by far the best fourth number")
     twist = "2 pi r tan(blade angle) at r = 0.75 R: the fifth"
@@ -160,7 +163,7 @@ def build_parser() -> argparse.ArgumentParser:
     solid.add_argument("case", metavar="CASE", help="case file, its folder, or a folder of cases")
     solid.add_argument("--out", required=True, metavar="DIR", help="folder of the files and manifest.json")
     kinds = ("stl", "step", "obj", "openfoam")
-    solid.add_argument("--format", nargs="+", choices=kinds, default=["stl"], help="one or more (default stl)")
+    solid.add_argument("--format", choices=kinds, help="one or more (default stl)", **MANY)
     solid.add_argument("--unit", choices=("mm", "m"), default="mm", help="of the files; openfoam is always in m")
     solid.add_argument("--fillet-mm", type=float, default=0.0, metavar="R", help="fillet of blade and hub (default 0)")
     thin = "refuse blades that are thinner somewhere (default 0: none)"
@@ -215,14 +218,14 @@ def build_parser() -> argparse.ArgumentParser:
     _drive_parsers(commands)
     why = commands.add_parser("diagnose", help="say what physics was left out when recording and simulation differ")
     why.add_argument("recordings", nargs="+", metavar="RECORDING", help="tables or logs, analysed together")
-    why.add_argument("--case", required=True, nargs="+", metavar="CASE", help="case of all recordings, or one each")
+    why.add_argument("--case", required=True, metavar="CASE", help="case of all recordings, or one each", **MANY)
     off = "leave out of the baseline; repeatable"
     why.add_argument("--off", action="append", default=[], metavar="EFFECT", help=off)
     known = "recordings without the cause: how far model and stand differ anyway"
-    why.add_argument("--reference", nargs="+", default=[], metavar="RECORDING", help=known)
+    why.add_argument("--reference", default=[], metavar="RECORDING", help=known, **MANY)
     model = "model that is compared with the recordings (default bemt; k1k2: thrust only)"
     why.add_argument("--baseline", choices=("bemt", "k1k2"), default="bemt", help=model)
-    why.add_argument("--only", nargs="+", metavar="EFFECT", help="consider these effects only (default: all)")
+    why.add_argument("--only", metavar="EFFECT", help="consider these effects only (default: all)", **MANY)
     why.add_argument("--out", metavar="DIR", help="write diagnosis.json, figures and the improved case there")
     why.add_argument("--no-figures", action="store_true", help="with --out: no figures")
     why.add_argument("--json", action="store_true", help="print one JSON document (bemt.diagnosis/1)")

@@ -94,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
         try:
             case = load_case(path)
             out = Path(args.out) / case.name if len(paths) > 1 else Path(args.out)
-            manifest = export_case(case, out, args.format, args.unit, options, flow)
+            manifest = export_case(case, out, args.format or ["stl"], args.unit, options, flow)
         except InputError as error:
             print(error, file=sys.stderr)
             code = EXIT_INPUT

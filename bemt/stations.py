@@ -165,6 +165,7 @@ def run(args: argparse.Namespace) -> int:
     stem = re.sub(r"[^A-Za-z0-9_.-]", "_", path.stem).lstrip("_.-") or "rotor"
     if args.out is not None:
         files = case_files(found, scale, stem, re.sub(r'["\\\n]', "_", path.name))
+        _refuse_other(Path(args.out) / "case.toml", files["case.toml"])
         for name in sorted(files, key=lambda n: n == "case.toml"):  # the case last: what it names is there
             write_atomic(Path(args.out) / name, files[name])
     if args.json:
@@ -172,6 +173,13 @@ def run(args: argparse.Namespace) -> int:
     else:
         print(_text(found, scale, path, words, args.out))
     return EXIT_OK
+
+
+def _refuse_other(path: Path, text: str) -> None:
+    """Refuse to replace a case that somebody has changed or written."""
+    if path.is_file() and path.read_bytes() != text.encode():
+        raise InputError(Fault("--out", "", f"a folder with another case, {path.as_posix()}", "a folder without one",
+                               "Its case.toml would be replaced"))  # fmt: skip
 
 
 def _document(found: Found, scale: float, path: Path, words: str) -> dict[str, Any]:

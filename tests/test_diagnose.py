@@ -9,7 +9,7 @@ import pytest
 from diagnosing import case, diagnose, left_out, points, recording
 
 from bemt import effects
-from bemt.diagnose import document, noise, plan, problem, record
+from bemt.diagnose import document, noise, plan, problem, record, signatures
 from bemt.series import Series
 
 GRID = points("grid")
@@ -51,6 +51,21 @@ def test_an_inviscid_law_errs_over_advance_ratio_only() -> None:
         spread = [np.ptp(shown[np.ix_(thrust[J[thrust] == x], thrust)], axis=0).max() for x in np.unique(J)]
         assert (max(spread) > 0.5) == free and (free or max(spread) < 1e-6), name
     assert noise.law_of(effects.catalogue()["thrust_gain"]) == ()
+
+
+@pytest.mark.parametrize("walls", [None, (0.1, 0.4)])
+def test_a_parameter_that_the_recording_replaces_is_no_parameter(walls: tuple[float, float] | None) -> None:
+    """The recorded distance of a wall stands for the assumed one; what the readings do not know is not reported."""
+    given = dict(points("static"))
+    if walls:
+        given["wall_distance_m"] = np.linspace(*walls, given["rpm"].size)
+    built = problem.build([record.from_series(recording(case(), given), case())], [case()])
+    (wall,) = signatures.candidates(built, ["ground_effect"])[0]
+    assert wall.weight.sum() == pytest.approx(1.0)
+    assert any("z_over_R" in s for s in wall.settings) == (walls is None)
+    assert all({"form", "strength"} <= s.keys() for s in wall.settings)
+    # at rest there is no wind for a plate to dam
+    assert not any("plate_radius_over_R" in s for s in wall.settings if s["strength"] != 1.0)
 
 
 def test_torque_in_other_units_is_a_slip_of_units() -> None:

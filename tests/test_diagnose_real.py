@@ -146,3 +146,27 @@ density_kg_m3 = 1.2
     assert answer.decision.effects in ((), ("duct",)), document.text(answer)
     if not answer.decision.effects:
         pytest.xfail("duct not named: runs of one condition differ by a smooth 3 % over the speed")
+
+
+# U.S. Standard Atmosphere (1976).  What the diagnosis allows a blade-element code to be off in the level of an unknown
+# rotor hides the first three kilometres: there it says so or nothing, and names nothing else.
+@pytest.mark.parametrize(
+    ("altitude", "density"), [(1000, 1.112), (2000, 1.007), (3000, 0.909), (4000, 0.819), (5000, 0.736)]
+)
+def test_the_density_of_another_altitude_is_found_from_four_kilometres_on(
+    shared_data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, altitude: int, density: float
+) -> None:
+    from bemt.conceal.real import draw_real
+
+    monkeypatch.setenv("BEMT_DATA", str(shared_data))
+    items = draw_real(np.random.default_rng(0))
+    item = next(i for i in items if (i.entry["set"], i.entry["rig"]) == ("real null", "tmotor_28"))
+    for name, text in item.files.items():
+        (tmp_path / name).write_text(text.replace("density_kg_m3 = 1.225", f"density_kg_m3 = {density}"))
+    case = load_case(tmp_path / "case.toml")
+    assert case.get("air.density_kg_m3") == density
+    answer = chain.diagnose([load(str(tmp_path / "recording.csv"), case)], [case]).decision
+    if altitude >= 4000:
+        assert answer.verdict in ("named", "class") and "air_density" in answer.effects
+    else:
+        assert answer.verdict in ("insufficient", "unknown")

@@ -110,6 +110,12 @@ def test_stations_of_an_export_make_a_case_that_solves(
     if kind == "stl":
         assert main(["sweep", str(tmp_path / "case"), "--json"]) == 0
         assert json.loads(capsys.readouterr().out)["cases"]
+    again = ["stations", str(tmp_path / f"my prop.{kind}"), "--out", str(tmp_path / "case")]
+    assert main(again) == 0
+    edited = (tmp_path / "case" / "case.toml").read_bytes() + b"# mine\n"
+    (tmp_path / "case" / "case.toml").write_bytes(edited)
+    assert main(again) == 2
+    assert (tmp_path / "case" / "case.toml").read_bytes() == edited
 
 
 def test_step_is_written_read_back_and_cut(propeller: Rotor, tmp_path: Path) -> None:

@@ -128,6 +128,8 @@ def _diagnose(args: argparse.Namespace) -> int:
     from bemt.diagnose.document import document, text
 
     cases = cases_of(args.case, args.off, len(args.recordings))
+    if args.out:
+        _refuse_foreign(Path(args.out) / "case.toml")
     for case in cases:
         evaluate.prepare(case, None, 10)  # an unknown effect in the case is said before the work begins
     chosen = cases * len(args.recordings) if len(cases) == 1 else cases
@@ -158,12 +160,22 @@ def _diagnose(args: argparse.Namespace) -> int:
     return 0
 
 
+def _refuse_foreign(path: Path) -> None:
+    """Let nobody lose a case of their own: the improved one goes where only its like has been."""
+    from bemt.diagnose.improve import is_improved
+
+    if path.is_file() and not is_improved(path.read_text(encoding="utf-8", errors="replace")):
+        raise InputError(Fault("--out", "", f"a folder with a case of its own, {path.as_posix()}",
+                               "a folder without one", "The improved case would replace it"))  # fmt: skip
+
+
 def _improved(out: Path, answer: Any, case: Case) -> None:
-    """Save the case with what was found on: a case that `sweep` runs."""
+    """Save the case with what was found on, a case that `sweep` runs; that of an earlier answer goes away."""
     from bemt.diagnose.improve import improved_case
 
     document = improved_case(answer, case, case.path.read_text(encoding="utf-8"))
     if not document:
+        (out / "case.toml").unlink(missing_ok=True)
         return
     write_atomic(out / "case.toml", document)
     for file in case.files():

@@ -12,8 +12,9 @@ if TYPE_CHECKING:
     from bemt.case import Case
     from bemt.diagnose.chain import Diagnosis
 
-__all__ = ["improved_case"]
+__all__ = ["improved_case", "is_improved"]
 
+_HEAD = "with what `python -m bemt diagnose` found: "
 _LINE = re.compile(r"^(effects_on|effects_off)\s*=.*$")
 
 
@@ -63,8 +64,28 @@ def improved_case(answer: Diagnosis, case: Case, source: str) -> str:
         out.append(line)
     if not done:
         out += ["", "[model]", *new]
-    head = f"# {case.name} with what `python -m bemt diagnose` found: {', '.join(effects.to_text(e) for e in found)}"
+    head = f"# {case.name} {_HEAD}{', '.join(effects.to_text(e) for e in found)}"
     return "\n".join([head, *out]) + "\n"
+
+
+def is_improved(source: str) -> bool:
+    """Whether a case file was written here, not by hand.
+
+    Parameters
+    ----------
+    source : str
+        Text of the file.
+
+    Returns
+    -------
+    bool
+        True if its first line says so.
+
+    >>> is_improved("# mine with what `python -m bemt diagnose` found: swirl()"), is_improved("# mine")
+    (True, False)
+    """
+    first = source.partition("\n")[0]
+    return first.startswith("#") and _HEAD in first
 
 
 def _quote(text: str) -> str:

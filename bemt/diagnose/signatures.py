@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 __all__ = ["Candidate", "candidates", "effect_of"]
 
 Array = NDArray[np.float64]
+# Setting, its signature, whether it was solved, its prior weight.
+_Column = tuple[dict[str, Any], Array, bool, float]
 
 _FINE = {1: 41, 2: 15, 3: 7}
 _LARGEST = 0.02
@@ -170,7 +172,7 @@ def candidates(
 def _candidate(problem: Problem, name: str, cls: type[Effect]) -> Candidate | None:
     present = next((e for e in problem.baseline if e.id == name), None)
     given = cls().variants()
-    columns: list[tuple[dict[str, Any], Array, bool, float]] = []
+    columns: list[_Column] = []
     if given is not None:
         for setting in given:
             columns.append((dict(setting), problem.signature((cls(**setting),)), True, 1.0 / len(given)))
@@ -182,7 +184,7 @@ def _candidate(problem: Problem, name: str, cls: type[Effect]) -> Candidate | No
         else:
             columns.extend(_grid(problem, cls, axes))
     floor = 1e-3 * problem.u
-    kept = [c for c in columns if np.isfinite(c[1]).all()]
+    kept = _merged([c for c in columns if np.isfinite(c[1]).all()])
     if not any(np.any(np.abs(c[1]) > floor) for c in kept):
         return None
     weight = np.array([c[3] for c in kept])
@@ -192,9 +194,20 @@ def _candidate(problem: Problem, name: str, cls: type[Effect]) -> Candidate | No
     )  # fmt: skip
 
 
-def _grid(
-    problem: Problem, cls: type[Effect], axes: Sequence[Any]
-) -> Iterator[tuple[dict[str, Any], Array, bool, float]]:
+def _merged(columns: Sequence[_Column]) -> list[_Column]:
+    """Join settings that change the readings alike; a parameter in which they differ is not at work and is dropped."""
+    groups: dict[bytes, list[int]] = {}
+    for k, column in enumerate(columns):
+        groups.setdefault(column[1].tobytes(), []).append(k)
+    out = []
+    for group in groups.values():
+        setting, signature, solved, _ = columns[group[0]]
+        same = {n: v for n, v in setting.items() if all(columns[k][0].get(n) == v for k in group)}
+        out.append((same, signature, solved, sum(columns[k][3] for k in group)))
+    return out
+
+
+def _grid(problem: Problem, cls: type[Effect], axes: Sequence[Any]) -> Iterator[_Column]:
     """Solve at the nodes of all parameters and interpolate between them by cubic splines."""
     from scipy.interpolate import CubicSpline
 
