@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.diagnose import blocks, confusion, evidence, gate, signatures, verdict
+from bemt.diagnose import blocks, confusion, evidence, gate, prior, signatures, verdict
 from bemt.diagnose import fit as fitting
 from bemt.diagnose import locate as location
 from bemt.diagnose import suggest as suggestion
@@ -143,7 +143,7 @@ def _diagnose(
     smooth = fitting.smooth(found, best)
     after = problem.f0 + best.signature + smooth
     # without a verdict the likeliest explanation still says best which part of the mismatch is not calibration
-    listed = max((k for k in found.probability if k not in (evidence.NONE, evidence.UNKNOWN)),
+    listed = max((k for k in found.probability if k not in (prior.NONE, prior.UNKNOWN)),
                  key=lambda k: found.probability[k], default=None)  # fmt: skip
     where = location.locate(found, best if best.ids or listed is None else fitting.fit(found, listed))
     say("next measurement")
@@ -181,7 +181,7 @@ def _next(found: evidence.Evidence, decision: verdict.Decision, best: fitting.Fi
     lead = best.ids[0] if best.ids else singles[0]
     rivals = [i for i in (*decision.effects, *(j for g in decision.classes for j in g), *singles) if i != lead]
     first = (lead, fitting.fit(found, lead).settings[0])
-    likelier = bool(rivals) and found.probability[rivals[0]] > found.probability[evidence.NONE]
+    likelier = bool(rivals) and found.probability[rivals[0]] > found.probability[prior.NONE]
     if not rivals or decision.verdict == "none" or (decision.verdict == "insufficient" and not likelier):
         return suggestion.suggest(found, first, None)
     return suggestion.suggest(found, first, (rivals[0], fitting.fit(found, rivals[0]).settings[0]))

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.diagnose.evidence import Form, form_modes
+from bemt.diagnose.form import Form, form_modes
 
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence, State

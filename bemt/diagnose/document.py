@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bemt import __version__, effects
-from bemt.diagnose import evidence as ev
 from bemt.diagnose import fit as fitting
+from bemt.diagnose import prior
 from bemt.diagnose.confusion import nearest
 from bemt.diagnose.verdict import inclusion
 from bemt.tables import text_table
@@ -52,7 +52,7 @@ def document(d: Diagnosis) -> dict[str, Any]:
     found = d.found
     ranking = []
     for name, p in sorted(found.probability.items(), key=lambda kv: -kv[1])[:12]:
-        listed = name not in (ev.NONE, ev.UNKNOWN)
+        listed = name not in (prior.NONE, prior.UNKNOWN)
         parameters = fitting.intervals(found, name) if listed and p > 1e-3 else {}
         if name == d.decision.leading:
             parameters = d.parameters
@@ -73,7 +73,7 @@ def document(d: Diagnosis) -> dict[str, Any]:
         "classes": [list(c) for c in d.decision.classes] or d.alike.classes(),
         "next_measurement": {"text": "", "points": [], "separates": []} if d.next is None else d.next.document(),
         "p_value": d.p_value,
-        "log_bayes": {i: found.log_bayes(i) for i in (*found.spans, ev.UNKNOWN)},
+        "log_bayes": {i: found.log_bayes(i) for i in (*found.spans, prior.UNKNOWN)},
         "nearest_signature": nearest(found),
         "visibility": {i: float(s) for i, s in zip(d.alike.ids, d.alike.size, strict=True)},
         "covariance": {"noise_scale": state.hyper.scale, "correlation": state.hyper.ar,
@@ -191,7 +191,7 @@ def text(d: Diagnosis) -> str:
     rows = []
     for name, p in sorted(found.probability.items(), key=lambda kv: -kv[1])[:_SHOWN]:
         seen = f"{size[name]:.1f}" if name in size else "-"
-        rows.append([name, f"{p:.3f}", f"{found.log_bayes(name):.1f}" if name != ev.NONE else "0.0", seen])
+        rows.append([name, f"{p:.3f}", f"{found.log_bayes(name):.1f}" if name != prior.NONE else "0.0", seen])
     out += [
         "",
         text_table(

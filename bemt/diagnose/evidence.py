@@ -14,29 +14,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import effects
-from bemt.diagnose import noise
+from bemt.diagnose import form, noise, prior
+from bemt.diagnose.form import Form
+from bemt.diagnose.prior import NONE, UNKNOWN
 
 if TYPE_CHECKING:
     from bemt.diagnose.noise import Hyper, Whitener
     from bemt.diagnose.problem import Problem
     from bemt.diagnose.signatures import Candidate
 
-__all__ = ["PRIOR", "Evidence", "State", "weigh"]
+__all__ = ["Evidence", "State", "weigh"]
 
 Array = NDArray[np.float64]
-
-PRIOR = {"none": 0.35, "single": 0.55, "pair": 0.05, "unknown": 0.05}
-"""Prior probability of the kinds of explanation; shared within a kind by the weights of the effects. [1]"""
-LEFT_OUT, PRESENT = 50.0, 0.2
-"""Weight of an effect of every real rotor that the baseline leaves out, and of one that the baseline has, with other
-parameters, beside 1 for all others [1]."""
-
-FORM = {0.15: 0.7, 0.45: 0.3}
-"""Standard deviation of the form of an effect, share of its size, with its prior weight: published laws of one effect
-differ by that, of some by half [1]."""
-
-NONE, UNKNOWN = "none", "unknown"
 
 # Settings of the covariance this far (in natural logarithm) below the best are dropped.
 _DROP = 8.0
@@ -51,61 +40,6 @@ def log_mean(log_values: Array, log_weights: Array, axis: int = -1) -> Array:
     top = np.where(np.isfinite(top), top, 0.0)
     with np.errstate(divide="ignore"):
         return np.asarray(np.squeeze(top, axis) + np.log(np.sum(np.exp(total - top), axis=axis)))
-
-
-@dataclass(frozen=True, eq=False)
-class Form:
-    """Error of the form of one effect, whitened: published laws of one effect differ by a share of its own size.
-
-    Adds B B^T to the whitened covariance; everything follows from the projection of :meth:`project` (Woodbury).
-
-    Attributes
-    ----------
-    B : (M, q) float
-        Whitened modes, none for instruments, whose laws are exact.
-    root : (q, q) float
-        Cholesky factor of 1 + B^T B.
-    size : float
-        Standard deviation of the form, share of the effect's size [1].
-    """
-
-    B: Array
-    root: Array
-    size: float = 0.0
-
-    @classmethod
-    def of(
-        cls, white: Whitener, candidate: Candidate, g: int, modes: Array, r: Array | None = None, size: float = 0.0
-    ) -> Form:
-        """Modes times the size of a signature, and what lies between it and its neighbours on the grid, whitened.
-
-        The size of the form is that which explains a whitened residual best, if it is not given.
-        """
-        signature = candidate.signatures[:, g]
-        shape, between = white(signature[:, None] * modes), white(candidate.between(g))
-
-        def sized(f: float) -> Form:
-            B = np.column_stack([f * shape, between])
-            return cls(B, np.asarray(np.linalg.cholesky(np.eye(B.shape[1]) + B.T @ B), dtype=float), f)
-
-        if r is None or not shape.shape[1]:
-            return sized(size or min(FORM))
-        d = r - white(signature)
-        forms = [sized(f) for f in FORM]
-        return max(forms, key=lambda f: 0.5 * float(np.sum(f.project(d) ** 2)) - f.half_log_det)
-
-    def project(self, x: Array) -> Array:
-        """Part of whitened vectors (M,) or (M, n) that the form may explain, (q,) or (q, n)."""
-        from scipy.linalg import solve_triangular
-
-        if not self.B.shape[1]:
-            return np.zeros((0, *x.shape[1:]))
-        return np.asarray(solve_triangular(self.root, self.B.T @ x, lower=True, check_finite=False))
-
-    @property
-    def half_log_det(self) -> float:
-        """Half the logarithm of the determinant of 1 + B^T B, less that of the prior weight of the size."""
-        return float(np.sum(np.log(np.diag(self.root)))) - float(np.log(FORM.get(self.size, 1.0)))
 
 
 @dataclass(eq=False)
@@ -211,52 +145,6 @@ class Evidence:
         return float(log_mean(mine, w) - log_mean(top, w))
 
 
-def prior_weights(problem: Problem, ids: Sequence[str]) -> dict[str, float]:
-    """Weight of each effect: physics that every rotor has is likelier to be missing than a fault is to be there.
-
-    Parameters
-    ----------
-    problem : Problem
-        Its baselines say what is off.
-    ids : sequence of str
-        Effects.
-
-    Returns
-    -------
-    dict
-        Id to weight [1].
-    """
-    usual = {e.id for e in effects.standard()} | {i for p in problem.parts for i in p.left_out}
-    on = [{e.id for e in p.baseline} for p in problem.parts]
-    return {i: PRESENT if all(i in o for o in on) else LEFT_OUT if i in usual else 1.0 for i in ids}
-
-
-def log_priors(weights: dict[str, float], pairs: bool = True) -> dict[str, float]:
-    """Logarithm of the prior probability of every explanation.
-
-    Parameters
-    ----------
-    weights : dict of str to float
-        Weight of each effect [1].
-    pairs : bool
-        Also of every pair.
-
-    Returns
-    -------
-    dict
-        "none", "unknown", ids, pairs as "a+b".
-    """
-    total = sum(weights.values()) or 1.0
-    out = {NONE: PRIOR["none"], UNKNOWN: PRIOR["unknown"]}
-    out |= {i: PRIOR["single"] * w / total for i, w in weights.items()}
-    if pairs:
-        names = list(weights)
-        both = {f"{a}+{b}": weights[a] * weights[b] for k, a in enumerate(names) for b in names[k + 1 :]}
-        total = sum(both.values()) or 1.0
-        out |= {k: PRIOR["pair"] * w / total for k, w in both.items()}
-    return {k: float(np.log(v)) for k, v in out.items()}
-
-
 def singles(state: State, R: Array, spans: dict[str, slice], log_w: Array) -> dict[str, Array]:
     """Log evidence over that of "none" of each candidate, for whitened residuals (M, n): (n,) each."""
     out = {}
@@ -300,7 +188,7 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
     some = _few(candidates)
     few = {c.id: slice(*np.searchsorted(some, [spans[c.id].start, spans[c.id].stop])) for c in candidates}
     covariance = dict(noise.covariances(problem))
-    modes = form_modes(problem, candidates)
+    modes = form.form_modes(problem, candidates)
     every = np.arange(log_w.size)
     # a few settings of each effect are enough to see which covariances matter
     coarse = [
@@ -320,8 +208,8 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
             state.log_z[UNKNOWN] = state.log_z[NONE]
         if pairs:
             _pairs(state, spans, log_w)
-    weights = prior_weights(problem, list(spans))
-    probability = _posterior(states, log_priors(weights, pairs))
+    weights = prior.prior_weights(problem, list(spans))
+    probability = _posterior(states, prior.log_priors(weights, pairs))
     states.sort(key=lambda s: -(max(s.log_z.values()) + np.log(s.hyper.weight)))
     return Evidence(problem, tuple(candidates), tuple(states), probability, spans, log_w)
 
@@ -356,33 +244,6 @@ def bare(problem: Problem, candidates: Sequence[Candidate], hyper: Hyper) -> Evi
     Sw = white(S)
     state = State(hyper, white, white(problem.residual), Sw, 0.5 * np.sum(Sw * Sw, axis=0))
     return Evidence(problem, tuple(candidates), (state,), {}, spans, log_w)
-
-
-def form_modes(problem: Problem, candidates: Sequence[Candidate]) -> dict[str, Array]:
-    """Modes of the error of each effect's form: smooth ones for physics, none for instruments.
-
-    Parameters
-    ----------
-    problem : Problem
-        Readings.
-    candidates : sequence of Candidate
-        Effects.
-
-    Returns
-    -------
-    dict
-        Id to (M, q), to be multiplied by the effect's signature [1].
-    """
-    out: dict[tuple[tuple[str, ...], tuple[str, ...]], Array] = {}
-    laws = {}
-    for c in candidates:
-        effect = effects.catalogue()[c.id]
-        laws[c.id] = key = (effect.along, noise.law_of(effect))
-        if key not in out:
-            modes = noise.smooth_modes(problem, *key)
-            # instruments are exact but for what they say themselves that they follow: a drift the clock
-            out[key] = modes if any(key) else modes[:, :0]
-    return {name: out[key] for name, key in laws.items()}
 
 
 def _few(candidates: Sequence[Candidate], most: int = 9) -> NDArray[np.intp]:
@@ -450,16 +311,16 @@ def _pairs(state: State, spans: dict[str, slice], log_w: Array) -> None:
         both = np.concatenate([f.B for f in forms], axis=1)
         if not both.shape[1]:
             continue
-        form = Form(both, np.linalg.cholesky(np.eye(both.shape[1]) + both.T @ both))
+        joint = Form(both, np.linalg.cholesky(np.eye(both.shape[1]) + both.T @ both))
         d = state.r - state.S[:, best[name][0]] - state.S[:, best[name][1]]
-        p = form.project(d)
-        chosen = sum(float(np.log(FORM.get(f.size, 1.0))) for f in forms)
-        state.log_z[name] += 0.5 * float(p @ p) - form.half_log_det + chosen
+        p = joint.project(d)
+        chosen = sum(float(np.log(form.FORM.get(f.size, 1.0))) for f in forms)
+        state.log_z[name] += 0.5 * float(p @ p) - joint.half_log_det + chosen
 
 
-def _posterior(states: Sequence[State], prior: dict[str, float]) -> dict[str, float]:
+def _posterior(states: Sequence[State], before: dict[str, float]) -> dict[str, float]:
     names = list(states[0].log_z)
     table = np.array([[s.log_z[name] + np.log(s.hyper.weight) for s in states] for name in names])
-    log_post = log_mean(table, np.zeros_like(table), axis=1) + np.array([prior[name] for name in names])
+    log_post = log_mean(table, np.zeros_like(table), axis=1) + np.array([before[name] for name in names])
     p = np.exp(log_post - log_post.max())
     return {name: float(v) for name, v in zip(names, p / p.sum(), strict=True)}

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import forward, solver
-from bemt.diagnose import confusion
-from bemt.diagnose import evidence as ev
+from bemt.diagnose import confusion, prior
 from bemt.diagnose.canvas import BLACK, BLUE, GREY, ORANGE, PURPLE, RED, SKY, blank
 from bemt.diagnose.record import CHANNELS
 from bemt.diagnose.signatures import effect_of
@@ -199,12 +198,12 @@ def ranking(answer: Diagnosis) -> Figure:
     """
     found = answer.found
     names = sorted(found.probability, key=lambda k: -found.probability[k])[:_MOST_BARS]
-    odds = [0.0 if k == ev.NONE else found.log_bayes(k) for k in names]
+    odds = [0.0 if k == prior.NONE else found.log_bayes(k) for k in names]
     chosen = set(answer.decision.effects)
 
     def colour(name: str) -> str:
-        if name in (ev.NONE, ev.UNKNOWN):
-            return GREY if name == ev.NONE else PURPLE
+        if name in (prior.NONE, prior.UNKNOWN):
+            return GREY if name == prior.NONE else PURPLE
         return BLUE if chosen and chosen & set(name.split("+")) else SKY
 
     figure, axes = blank(1.1 + 0.3 * len(names), 1, 2, sharey=True)

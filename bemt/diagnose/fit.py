@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.diagnose import noise
-from bemt.diagnose.evidence import FORM, form_modes, log_mean
+from bemt.diagnose.evidence import log_mean
+from bemt.diagnose.form import FORM, form_modes
 from bemt.diagnose.signatures import effect_of
 
 if TYPE_CHECKING:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.diagnose import evidence as ev
+from bemt.diagnose import prior
 
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence
@@ -54,17 +55,17 @@ def p_value(found: Evidence, nulls: int = NULLS, seed: int = 0) -> float:
 
 def statistic(found: Evidence, residuals: Array) -> Array:
     """Log odds of any cause over none for residuals (M, B), all settings of the covariance added up."""
-    prior = ev.log_priors(ev.prior_weights(found.problem, list(found.spans)), pairs=False)
+    before = prior.log_priors(prior.prior_weights(found.problem, list(found.spans)), pairs=False)
     some, none = [], []
     for s in found.states[:_STATES]:
         r = s.white(residuals)
         base = 0.5 * np.sum(r * r, axis=0)
         w = np.log(s.hyper.weight) - s.white.log_det - base
-        gains = [g + prior[name] for name, g in ev.singles(s, r, found.spans, found.log_w).items()]
+        gains = [g + before[name] for name, g in ev.singles(s, r, found.spans, found.log_w).items()]
         if s.rivals:
             rival = ev.unknown(r, s.rivals, s.white.log_det, residuals, base)
             share = np.full(rival.shape, -np.log(rival.shape[0]))
-            gains.append(ev.log_mean(rival, share, axis=0) + prior[ev.UNKNOWN])
+            gains.append(ev.log_mean(rival, share, axis=0) + before[prior.UNKNOWN])
         stack = np.array(gains)
         some.append(ev.log_mean(stack, np.zeros_like(stack), axis=0) + w)
         none.append(w)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bemt import effects
 from bemt.diagnose import confusion as look
-from bemt.diagnose import evidence, noise, problem, signatures, verdict
+from bemt.diagnose import evidence, noise, prior, problem, signatures, verdict
 from bemt.diagnose import suggest as suggestion
 from bemt.diagnose.record import Record
 from bemt.tables import text_table
@@ -149,7 +149,7 @@ def _plan(record: Record, case: Case, progress: Callable[[str], None] | None) ->
         a, b = groups[0][:2]
         settings = {c.id: c.settings[c.middle] for c in candidates}
         added = suggestion.suggest(found, (a, settings[a]), (b, settings[b]))
-    weight = evidence.prior_weights(whole, alike.ids)
+    weight = prior.prior_weights(whole, alike.ids)
     bar = np.array([verdict.EXPECTED if weight[i] > 1.0 else verdict.ENOUGH for i in alike.ids])
     return Plan(alike, size, best, bar, absent, added, len(record))
 

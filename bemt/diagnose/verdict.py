@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import effects
-from bemt.diagnose import blocks
+from bemt.diagnose import blocks, prior
 from bemt.diagnose import confusion as look
-from bemt.diagnose import evidence as ev
 from bemt.diagnose import fit as fitting
 
 if TYPE_CHECKING:
@@ -95,7 +94,7 @@ def inclusion(found: Evidence) -> dict[str, float]:
     """
     out = dict.fromkeys(found.spans, 0.0)
     for name, p in found.probability.items():
-        if name not in (ev.NONE, ev.UNKNOWN):
+        if name not in (prior.NONE, prior.UNKNOWN):
             for i in name.split("+"):
                 out[i] += p
     return dict(sorted(out.items(), key=lambda kv: -kv[1]))
@@ -131,28 +130,28 @@ def decide(found: Evidence, p_value: float) -> Decision:
         What is said.
     """
     P = found.probability
-    listed = {k: v for k, v in P.items() if k not in (ev.NONE, ev.UNKNOWN)}
+    listed = {k: v for k, v in P.items() if k not in (prior.NONE, prior.UNKNOWN)}
     if not listed:
-        return Decision("insufficient", (), ev.NONE, 1.0, -np.inf, (), "no effect can be seen in these readings")
+        return Decision("insufficient", (), prior.NONE, 1.0, -np.inf, (), "no effect can be seen in these readings")
     leading = max(listed, key=lambda k: listed[k])
     if p_value > GATE:
         why = f"nulls of the same plan look as much like a cause in {p_value:.0%} of draws"
-        word = "none" if p_value > 5.0 * GATE or P[ev.NONE] > 0.5 else "insufficient"
-        return Decision(word, (), ev.NONE, P[ev.NONE], -np.inf, (), why)
-    if P[ev.NONE] > 0.5:
+        word = "none" if p_value > 5.0 * GATE or P[prior.NONE] > 0.5 else "insufficient"
+        return Decision(word, (), prior.NONE, P[prior.NONE], -np.inf, (), why)
+    if P[prior.NONE] > 0.5:
         return Decision(
-            "none", (), ev.NONE, P[ev.NONE], -np.inf, (), "nothing explains the readings better than the noise"
+            "none", (), prior.NONE, P[prior.NONE], -np.inf, (), "nothing explains the readings better than the noise"
         )
     rest = fitting.left_over(found, leading)
-    if P[ev.UNKNOWN] > 0.5 or rest > max(LEFT_OVER, SMALL * found.log_bayes(leading)):
+    if P[prior.UNKNOWN] > 0.5 or rest > max(LEFT_OVER, SMALL * found.log_bayes(leading)):
         why = "a smooth mismatch remains when the best listed effect is taken away"
-        if P[ev.UNKNOWN] > 0.5:
+        if P[prior.UNKNOWN] > 0.5:
             why = "a smooth effect that is not in the library explains the readings better than any that is"
-        return Decision("unknown", (), leading, max(P[ev.UNKNOWN], 1.0 - listed[leading]), rest, (), why)
+        return Decision("unknown", (), leading, max(P[prior.UNKNOWN], 1.0 - listed[leading]), rest, (), why)
     share = inclusion(found)
     if "+" in leading and not _twins(leading.split("+")):
         leading, share = _earned(found, leading, share)
-    weight = ev.prior_weights(found.problem, leading.split("+"))
+    weight = prior.prior_weights(found.problem, leading.split("+"))
     expected = min(weight.values()) > 1.0
     needed = PROVEN if min(weight.values()) < 1.0 else EXPECTED if expected else ENOUGH
     if found.log_bayes(leading) < needed:
@@ -219,13 +218,13 @@ def _foretells(found: Evidence, leading: str) -> bool:
         d = (problem.y - blocks.held_out(found, name, split)[1])[problem.free] / u
         return float(np.sqrt(np.mean(d**2)))
 
-    return any(error(leading, s) < FORETELLS * error(ev.NONE, s) for s in blocks.partitions(problem))
+    return any(error(leading, s) < FORETELLS * error(prior.NONE, s) for s in blocks.partitions(problem))
 
 
 def _earned(found: Evidence, pair: str, share: dict[str, float]) -> tuple[str, dict[str, float]]:
     """Leading explanation without the effect that adds too little to the other one, and the probabilities to match."""
     ids = pair.split("+")
-    weight = ev.prior_weights(found.problem, ids)
+    weight = prior.prior_weights(found.problem, ids)
     for other, one in (ids, ids[::-1]):
         price = PROVEN if weight[other] < 1.0 else EARNED
         if found.log_bayes(pair) - found.log_bayes(one) < price and share[one] >= share[other]:

@@ -1,0 +1,69 @@
+"""How likely each explanation is before a reading is looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bemt import effects
+
+if TYPE_CHECKING:
+    from bemt.diagnose.problem import Problem
+
+__all__ = ["LEFT_OUT", "NONE", "PRESENT", "PRIOR", "UNKNOWN", "log_priors", "prior_weights"]
+
+PRIOR = {"none": 0.35, "single": 0.55, "pair": 0.05, "unknown": 0.05}
+"""Prior probability of the kinds of explanation; shared within a kind by the weights of the effects. [1]"""
+LEFT_OUT, PRESENT = 50.0, 0.2
+"""Weight of an effect of every real rotor that the baseline leaves out, and of one that the baseline has, with other
+parameters, beside 1 for all others [1]."""
+
+NONE, UNKNOWN = "none", "unknown"
+
+
+def prior_weights(problem: Problem, ids: Sequence[str]) -> dict[str, float]:
+    """Weight of each effect: physics that every rotor has is likelier to be missing than a fault is to be there.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its baselines say what is off.
+    ids : sequence of str
+        Effects.
+
+    Returns
+    -------
+    dict
+        Id to weight [1].
+    """
+    usual = {e.id for e in effects.standard()} | {i for p in problem.parts for i in p.left_out}
+    on = [{e.id for e in p.baseline} for p in problem.parts]
+    return {i: PRESENT if all(i in o for o in on) else LEFT_OUT if i in usual else 1.0 for i in ids}
+
+
+def log_priors(weights: dict[str, float], pairs: bool = True) -> dict[str, float]:
+    """Logarithm of the prior probability of every explanation.
+
+    Parameters
+    ----------
+    weights : dict of str to float
+        Weight of each effect [1].
+    pairs : bool
+        Also of every pair.
+
+    Returns
+    -------
+    dict
+        "none", "unknown", ids, pairs as "a+b".
+    """
+    total = sum(weights.values()) or 1.0
+    out = {NONE: PRIOR["none"], UNKNOWN: PRIOR["unknown"]}
+    out |= {i: PRIOR["single"] * w / total for i, w in weights.items()}
+    if pairs:
+        names = list(weights)
+        both = {f"{a}+{b}": weights[a] * weights[b] for k, a in enumerate(names) for b in names[k + 1 :]}
+        total = sum(both.values()) or 1.0
+        out |= {k: PRIOR["pair"] * w / total for k, w in both.items()}
+    return {k: float(np.log(v)) for k, v in out.items()}
