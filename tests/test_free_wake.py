@@ -1,4 +1,4 @@
-"""The promise of the induced flow: what a free wake says of it, momentum in annuli says too, within a few per cent.
+"""The promise of the induced flow: momentum in annuli gives the loads of a free wake, 3 % in flight and 8 % at rest.
 
 Bound vortices on each blade, trailing vortices that start at its trailing edge and go where the flow takes them,
 Biot-Savart on straight segments, section lift 2 pi: nothing of it is the solver's.  It settles after ten turns and then
@@ -136,5 +136,6 @@ def test_momentum_in_annuli_gives_the_loads_of_a_free_wake(B: int, J: float, sha
         chord, beta = chord_over_R("apc_like", r, HUB), np.arctan(shape / (np.pi * r))
         alpha0 = np.radians(-3.5)
     free, ours = free_wake(B, edges, chord, beta, alpha0, J, 18), annuli(B, r, chord, beta, alpha0, J)
-    print(B, J, shape, np.divide(free, ours).round(3))
-    assert ours == pytest.approx(free, rel=0.07)
+    # in flight within 1.6 %; at rest the wake contracts, which annuli do not know: free over ours 0.94 to 1.03 in thrust,
+    # 0.93 to 1.02 in torque, lowest with four blades
+    assert ours == pytest.approx(free, rel=0.03 if J else 0.08)
