@@ -136,6 +136,6 @@ def test_momentum_in_annuli_gives_the_loads_of_a_free_wake(B: int, J: float, sha
         chord, beta = chord_over_R("apc_like", r, HUB), np.arctan(shape / (np.pi * r))
         alpha0 = np.radians(-3.5)
     free, ours = free_wake(B, edges, chord, beta, alpha0, J, 18), annuli(B, r, chord, beta, alpha0, J)
-    # in flight within 1.6 %; at rest the wake contracts, which annuli do not know: free over ours 0.94 to 1.03 in thrust,
-    # 0.93 to 1.02 in torque, lowest with four blades
+    # in flight within 1.6 %; at rest the wake contracts, which annuli do not know: free over ours 0.94 to 1.03 in
+    # thrust, 0.93 to 1.02 in torque, lowest with four blades
     assert ours == pytest.approx(free, rel=0.03 if J else 0.08)

@@ -13,22 +13,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import effects, evaluate
+from bemt.air import Air
 from bemt.case import find_cases, load_case
 from bemt.diagnose import record as records
 from bemt.errors import Fault, InputError
+from bemt.reduction.channels import view
+from bemt.sanity.check import check
 from bemt.series import Series
 from bemt.tables import json_text, write_atomic
+from bemt.units import ZERO_CELSIUS
 
 if TYPE_CHECKING:
     from bemt.case import Case
     from bemt.diagnose.record import Record
     from bemt.imported import Imported
+    from bemt.reduction.channels import Recorded
 
 __all__ = ["load", "run"]
 
 Array = NDArray[np.float64]
 
-_POINT = ("rpm", "J", "CT", "CP", "airspeed_m_s", "density_kg_m3", *records.COVARIATES)
+_POINT = ("rpm", "J", "airspeed_m_s", "density_kg_m3", "sideslip_deg", *records.COVARIATES)
+_LOADS = ("CT", "CP", "CQ", "thrust_N", "torque_Nm", "power_W")
+# Share by which a stated diameter or advance ratio may differ from the case's; advance ratios that are as good as none.
+_SAME, _SLOW = 0.05, 0.02
+_NAMED = 8
 
 
 def cases_of(paths: Sequence[str], off: Sequence[str], n: int) -> list[Case]:
@@ -68,17 +77,60 @@ def load(path: str, case: Case) -> Record:
     """
     from bemt.import_files import import_file
     from bemt.reduction import reduce as reduction
-    from bemt.reduction.channels import view
 
     imported = import_file(path)
-    if {"CT", "CP"} & set(imported.channels):
-        return records.from_series(_coefficients(imported, path), case)
-    reduced = reduction.reduce(imported, diameter_m=case.diameter_m)
-    if reduced.mode == "points" and imported.format == "table":
-        # somebody's own table of points: every row counts, a jump from row to row may be what it shows
-        rows = view(imported)
-        return records.from_series(_plain(rows.values, rows.u, path), case, reduced.correlated)
-    return records.from_series(reduced.series, case, reduced.correlated)
+    _same_rotor(imported, case, path)
+    ducted = bool(case.document.get("duct"))
+    findings = check(imported, diameter_m=case.diameter_m, blades=int(case.get("rotor.blades")), ducted=ducted)
+    found = tuple(str(f) for f in findings if f.severity != "note")
+    rows = view(imported)
+    if {"CT", "CP", "CQ"} & set(imported.channels):
+        made = records.from_series(_coefficients(imported, path), case)
+    else:
+        reduced = reduction.reduce(imported, diameter_m=case.diameter_m)
+        if reduced.mode == "points" and imported.format == "table":
+            # somebody's own table of points: every row counts, a jump from row to row may be what it shows
+            made = records.from_series(_plain(rows.values, rows.u, path), case, reduced.correlated)
+        else:
+            made = records.from_series(reduced.series, case, reduced.correlated)
+    notes = (*made.notes, *imported.warnings, *rows.notes, *_unused(imported, rows, case))
+    return replace(made, findings=found, notes=notes)
+
+
+def _same_rotor(imported: Imported, case: Case, path: str) -> None:
+    """Refuse a recording that says itself that it is of another rotor, or contradicts itself."""
+    faults = []
+    told = imported.constants.get("diameter_m")
+    if told and abs(told / case.diameter_m - 1.0) > _SAME:
+        faults.append(Fault(path, "diameter_m", f"{told:.4g}", f"{case.diameter_m:.4g} as in the case {case.name}",
+                            "The case of another rotor?"))  # fmt: skip
+    v = view(imported).values
+    if {"J", "airspeed_m_s", "rpm"} <= v.keys():
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = v["airspeed_m_s"] / (v["rpm"] / 60.0 * case.diameter_m) / v["J"]
+        ratio = ratio[np.isfinite(ratio) & (v["J"] > _SLOW)]
+        if ratio.size and abs(float(np.median(ratio)) - 1.0) > _SAME:
+            faults.append(Fault(path, "J", f"airspeed over n D is {np.median(ratio):.3g} times it", "the same number",
+                                "Another diameter than the case's, or another unit of the airspeed?"))  # fmt: skip
+    if faults:
+        raise InputError(faults)
+
+
+def _unused(imported: Imported, rows: Recorded, case: Case) -> list[str]:
+    """Channels that the file has and that nothing here looks at, and loads that it has twice."""
+    known = {*_POINT, *_LOADS, "humidity"}
+    heard = {rows.names.get(k, k) for k in rows.values if k in known} | {k for k in imported.channels if k in known}
+    left = [k for k in imported.channels if k not in heard and not k.startswith("u_") and "err" not in k]
+    shown = ", ".join(left[:_NAMED]) + (f" and {len(left) - _NAMED} more" if len(left) > _NAMED else "")
+    out = [f"not used: {shown}"] if left else []
+    v, n = rows.values, rows.values.get("rpm", np.full(len(rows), np.nan)) / 60.0
+    for load, coefficient, power in (("thrust_N", "CT", 4), ("power_W", "CP", 5), ("torque_Nm", "CQ", 5)):
+        if load in v and coefficient in v:
+            unit = case.air().rho * n ** (3 if load == "power_W" else 2) * case.diameter_m**power
+            with np.errstate(divide="ignore", invalid="ignore"):
+                ratio = float(np.nanmedian(v[load] / (v[coefficient] * unit)))
+            out.append(f"{coefficient}: {load} is used, which is {ratio:.3g} times it in the air of the case")
+    return out
 
 
 def _coefficients(imported: Imported, path: str) -> Series:
@@ -86,14 +138,18 @@ def _coefficients(imported: Imported, path: str) -> Series:
     n = imported.rows
     values = {
         k: np.broadcast_to(c.values, (n,)) for k, c in imported.channels.items()
-        if k in _POINT and c.values.shape in ((n,), (1,))
+        if k in (*_POINT, *_LOADS) and c.values.shape in ((n,), (1,))
     }  # fmt: skip
     u = {k[2:]: np.abs(c.values) for k, c in imported.channels.items() if k.startswith("u_") and k[2:] in values}
     return Series("bench", Path(path).name, values, u, imported.flags, {"file": path})
 
 
 def _plain(values: Mapping[str, Array], u: Mapping[str, Array], path: str) -> Series:
-    kept = {k: v for k, v in values.items() if k in (*_POINT, "thrust_N", "torque_Nm", "power_W", "humidity_fraction")}
+    kept = {k: v for k, v in values.items() if k in (*_POINT, *_LOADS)}
+    wet = {k: values.get(k) for k in ("pressure_Pa", "temperature_K", "humidity")}
+    if "density_kg_m3" not in kept and all(v is not None and np.isfinite(v).all() for v in wet.values()):
+        states = zip(*wet.values(), strict=True)
+        kept["density_kg_m3"] = np.array([Air.from_state(p, t - ZERO_CELSIUS, 100.0 * h).rho for p, t, h in states])
     return Series("bench", Path(path).name, kept, {k: np.abs(v) for k, v in u.items() if k in kept}, (), {"file": path})
 
 

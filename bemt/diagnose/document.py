@@ -30,6 +30,7 @@ _VARIABLE = {
     "density_kg_m3": ("density", " kg/m3", 3),    "pwm_s": ("pulse width", " s", 6), "run": ("run", "", 0),
 }  # fmt: skip
 _SHOWN = 8
+_FINDINGS = 3
 
 
 def _number(x: float) -> float | None:
@@ -82,6 +83,7 @@ def document(d: Diagnosis) -> dict[str, Any]:
         "not_tried": dict(d.absent),
         "rule": d.decision.why,
         "left_over": _number(d.decision.left_over),
+        "findings": list(d.problem.findings),
         "notes": list(d.problem.notes),
         "readings": int(d.problem.y.size),
         "explanation": " ".join(explanation(d)),
@@ -135,15 +137,18 @@ def explanation(d: Diagnosis) -> list[str]:
         About five lines.
     """
     decision, catalogue = d.decision, effects.catalogue()
-    lines = []
+    lines = [f"Before any physics: {f}" for f in d.problem.findings[:_FINDINGS]]
+    if len(d.problem.findings) > _FINDINGS:
+        lines[-1] += f" And {len(d.problem.findings) - _FINDINGS} more; `import` shows all."
     if decision.verdict == "none":
-        return [f"No mismatch beyond noise and calibration: {decision.why} (p = {d.p_value:.2g}).", _gain(d),
+        return [*lines, f"No mismatch beyond noise and calibration: {decision.why} (p = {d.p_value:.2g}).", _gain(d),
                 *_next(d, "To see more")]  # fmt: skip
     lines.append(_where(d))
     names = " and ".join(catalogue[i].title for i in decision.effects)
     if decision.verdict in ("named", "sensor"):
         lead = "Not the air but the stand" if decision.verdict == "sensor" else "Left out"
-        lines.append(f"{lead}: {names} ({decision.probability:.2f}). {_parameters(d)}.")
+        told = _parameters(d)
+        lines.append(f"{lead}: {names} ({decision.probability:.2f})." + (f" {told}." if told else ""))
         signs = [catalogue[i].sign for i in decision.effects if catalogue[i].sign]
         if signs:
             lines.append("Because: " + "; ".join(signs) + ".")

@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 
 _STATIONS = 16
 _FEWEST = 3
+# No slip of units is larger, and numbers beyond it are beyond floating point.
+_FARTHEST = 1e6
 _U_DEFAULT = 0.01
 _U_RPM = 0.003
 _U_FLOOR = 0.002
@@ -201,6 +203,11 @@ class Problem:
     predicted: dict[Any, Array] = field(default_factory=dict, repr=False)
 
     @property
+    def findings(self) -> tuple[str, ...]:
+        """What looks wrong in the recordings before any physics."""
+        return tuple(f"{p.record.name}: {f}" for p in self.parts for f in p.record.findings)
+
+    @property
     def free(self) -> NDArray[np.bool_]:
         """Readings in which a cause may be at work, (M,): all but those of reference recordings."""
         return np.array([not p.record.reference for p in self.parts])[self.part]
@@ -302,6 +309,12 @@ def build(records: Sequence[Record], cases: Sequence[Case], baseline: str = "bem
     if problem.y.size < _FEWEST:
         got = f"{problem.y.size} readings beside a converged baseline"
         raise InputError(Fault(records[0].name, "", got, f"{_FEWEST} or more"))
+    for k, name in enumerate(CHANNELS):
+        mine = problem.channel == k
+        ratio = float(np.median(np.abs(problem.y[mine])) / np.median(np.abs(problem.f0[mine]))) if mine.any() else 1.0
+        if not 1.0 / _FARTHEST < ratio < _FARTHEST:
+            raise InputError(Fault(records[0].name, name, f"{ratio:.2g} times what the case gives",
+                                   "readings of this rotor", "Another unit, or another case?"))  # fmt: skip
     return problem
 
 
@@ -359,7 +372,8 @@ def _scale(part: Part) -> Array:
             out.append(np.abs(part.steady_rpm))
         else:
             coefficient = np.abs(y / unit[c])
-            out.append(unit[c] * float(np.nanquantile(coefficient, 0.9)))
+            # where nearly all readings are 0 the largest stands for the size
+            out.append(unit[c] * float(np.nanquantile(coefficient, 0.9) or np.nanmax(coefficient)))
     return np.concatenate(out)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, cast
 
@@ -35,8 +35,15 @@ COVARIATES = (
 _DENSE_S = 1.0
 # Pulse widths from here on are the end of the range, whatever was asked for [s].
 _FULL_THROTTLE = 1.9995e-3
+# Speeds that differ by less are one speed, share.
+_SAME_SPEED = 0.02
+# Channel, lowest and highest value of a room, a sky or a pressure tunnel, hint.
+_AIR_LIMITS = (
+    ("temperature_K", 150.0, 400.0, "Celsius under a heading in kelvin, or a sensor that was not there?"),
+    ("pressure_Pa", 1e3, 2.5e6, "Another unit than the heading says?"),
+)
 MAX_POINTS = 160
-"""Points beyond this number are averaged in blocks of neighbours: they would cost time and add nothing. [1]"""
+"""Points beyond this number are averaged with alike ones: they would cost time and add nothing. [1]"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +72,8 @@ class Record:
         What was assumed or dropped.
     reference : bool
         Known to be without the cause that is looked for: shows how far model and stand differ anyway.
+    findings : tuple of str
+        What looks wrong in the file before any physics; nothing was corrected.
     """
 
     name: str
@@ -79,6 +88,7 @@ class Record:
     air_recorded: bool = False
     notes: tuple[str, ...] = ()
     reference: bool = False
+    findings: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         """Give the number of points."""
@@ -101,10 +111,9 @@ class Record:
         def cut(values: Mapping[str, Array]) -> dict[str, Array]:
             return {key: v[index] for key, v in values.items()}
 
-        return Record(
-            self.name, self.rpm[index], self.V[index], air_of({k: getattr(self.air, k)[index] for k in _AIR}),
-            cut(self.measured), cut(self.u), cut(self.extra), self.gain, self.zero, self.air_recorded, self.notes,
-            self.reference,
+        return replace(
+            self, rpm=self.rpm[index], V=self.V[index], air=air_of({k: getattr(self.air, k)[index] for k in _AIR}),
+            measured=cut(self.measured), u=cut(self.u), extra=cut(self.extra),
         )  # fmt: skip
 
 
@@ -155,13 +164,16 @@ def from_series(series: Series, case: Case, correlated: Mapping[str, Mapping[str
     if "rpm" not in values:
         values["rpm"] = np.full(n, case.rpm)
         notes.append(f"rpm: not recorded; {case.rpm:g} rev/min of the case")
-    air, recorded = _states(values, case, notes)
+    air, recorded = _states(values, case, notes, series.name)
     filled = series.derive(case.diameter_m, air.rho) if "rpm" in series else _with_rpm(series, case, air)
     got = {key: np.asarray(v, dtype=float) for key, v in filled.values.items()}
     measured: dict[str, Array] = {}
     u: dict[str, Array] = {}
     for name in ("thrust_N", "torque_Nm"):
         if name in got and np.isfinite(got[name]).any():
+            if not np.any(np.nan_to_num(got[name])):
+                notes.append(f"{name} is 0 in every row: no measurement, left out")
+                continue
             measured[name], u[name] = got[name].copy(), np.asarray(filled.u[name], dtype=float).copy()
     if not measured:
         channels = ", ".join(series.values)
@@ -221,18 +233,17 @@ def _kinks(rpm: Array, extra: Mapping[str, Array]) -> NDArray[np.bool_]:
 
 
 def _with_rpm(series: Series, case: Case, air: Air) -> Series:
-    from dataclasses import replace
-
     rpm = np.full(len(series), case.rpm)
     return replace(series, values={**series.values, "rpm": rpm}).derive(case.diameter_m, air.rho)
 
 
-def _states(values: Mapping[str, Array], case: Case, notes: list[str]) -> tuple[Air, bool]:
+def _states(values: Mapping[str, Array], case: Case, notes: list[str], name: str) -> tuple[Air, bool]:
     """Air per point: density, or pressure and temperature, of the recording; else of the case."""
     n = len(values["rpm"])
     default = case.air()
     rho, temperature = values.get("density_kg_m3"), values.get("temperature_K")
-    pressure, humidity = values.get("pressure_Pa"), values.get("humidity_fraction")
+    pressure = values.get("pressure_Pa")
+    _plausible(values, name)
     fields = {key: np.full(n, float(getattr(default, key))) for key in _AIR}
     recorded = False
     cache: dict[tuple[float, ...], Air] = {}
@@ -243,10 +254,9 @@ def _states(values: Mapping[str, Array], case: Case, notes: list[str]) -> tuple[
             if key not in cache:
                 cache[key] = Air.from_density(key[1], key[2] - ZERO_CELSIUS)
         elif pressure is not None and np.isfinite(pressure[i]):
-            wet = humidity[i] * 100.0 if humidity is not None and np.isfinite(humidity[i]) else 0.0
-            key = (1.0, float(pressure[i]), float(t), float(wet))
+            key = (1.0, float(pressure[i]), float(t))
             if key not in cache:
-                cache[key] = Air.from_state(key[1], key[2] - ZERO_CELSIUS, key[3])
+                cache[key] = Air.from_state(key[1], key[2] - ZERO_CELSIUS)
         elif temperature is not None and np.isfinite(temperature[i]):
             # pressure of the case, temperature of the recording
             key = (2.0, float(t))
@@ -263,29 +273,76 @@ def _states(values: Mapping[str, Array], case: Case, notes: list[str]) -> tuple[
     return air_of(fields), recorded
 
 
+def _plausible(values: Mapping[str, Array], name: str) -> None:
+    """Refuse air that nobody has measured in, all rows at once."""
+    faults = []
+    for key, low, high, hint in _AIR_LIMITS:
+        v = values.get(key)
+        bad = np.flatnonzero(np.isfinite(v) & ((v < low) | (v > high))) if v is not None else np.zeros(0, dtype=int)
+        if bad.size and v is not None:
+            rows = ", ".join(str(i + 1) for i in bad[:5]) + (" ..." if bad.size > 5 else "")
+            faults.append(Fault(name, f"{key}, point {rows}", f"{v[bad[0]]:.4g}", f"{low:g} to {high:g}", hint))
+    if faults:
+        raise InputError(faults)
+
+
 def _thinned(record: Record) -> Record:
-    """Average blocks of neighbours when there are too many points, never over the ends of a run."""
+    """Average alike points when there are too many, never over the ends of a run.
+
+    Samples close in time stay with their neighbours; anything else with points of the same speed and wind, so that the
+    order of the rows does not matter.  Loads are averaged as coefficients: they go with the square of the speed.
+    """
     P = len(record)
     if P <= MAX_POINTS:
         return record
     size = -(-P // MAX_POINTS)
     run = record.extra.get("run", np.zeros(P))
-    start = np.flatnonzero(np.r_[True, np.diff(run) != 0])
-    within = np.arange(P) - np.repeat(start, np.diff(np.r_[start, P]))
-    block = np.cumsum(np.r_[True, (np.diff(run) != 0) | (within[1:] % size == 0)]) - 1
-    count = np.bincount(block).astype(float)
+    order = np.arange(P) if _dense(record, run) else _alike(record, run)
+    block = np.empty(P, dtype=np.intp)
+    n = record.rpm[order]
+    current, first = -1, 0
+    for k in range(P):
+        new = k == 0 or k - first == size or run[order[k]] != run[order[k - 1]]
+        if new or abs(n[k] / n[first] - 1.0) > _SAME_SPEED:
+            current, first = current + 1, k
+        block[order[k]] = current
+    # in the order of the rows: noise may be correlated along it
+    _, block = np.unique(block, return_inverse=True)
+    place = np.argsort(np.argsort(np.bincount(block, np.arange(P)) / np.bincount(block), kind="stable"))
+    block = place[block]
 
     def mean(values: Array) -> Array:
-        return np.asarray(np.bincount(block, values) / count)
+        good = np.isfinite(values)
+        count = np.bincount(block, good)
+        with np.errstate(invalid="ignore"):
+            return np.asarray(np.bincount(block, np.where(good, values, 0.0)) / np.where(count > 0, count, np.nan))
 
+    density = np.asarray(record.air.rho, dtype=float)
+    rpm, rho = mean(record.rpm), mean(density)
+    unit = {c: density * record.rpm**2 for c in ("thrust_N", "torque_Nm")}
     # neighbours share slow errors: their mean is taken to be no better than one of them
-    note = f"{P} points averaged in blocks of {size} neighbours"
-    return Record(
-        record.name, mean(record.rpm), mean(record.V), air_of({k: mean(getattr(record.air, k)) for k in _AIR}),
-        {k: mean(v) for k, v in record.measured.items()}, {k: mean(v) for k, v in record.u.items()},
-        {k: mean(v) for k, v in record.extra.items()}, record.gain, record.zero, record.air_recorded,
-        (*record.notes, note), record.reference,
+    note = f"{P} points averaged to {rpm.size}, up to {size} alike"
+    return replace(
+        record, rpm=rpm, V=mean(record.V), air=air_of({k: mean(getattr(record.air, k)) for k in _AIR}),
+        measured={k: mean(v / unit[k]) * rho * rpm**2 if k in unit else mean(v) for k, v in record.measured.items()},
+        u={k: mean(v) for k, v in record.u.items()}, extra={k: mean(v) for k, v in record.extra.items()},
+        notes=(*record.notes, note),
     )  # fmt: skip
+
+
+def _dense(record: Record, run: Array) -> bool:
+    """Whether most samples follow each other closely enough to show how loads follow the speed."""
+    time = record.extra.get("time_s")
+    if time is None:
+        return False
+    step = np.diff(time)[np.diff(run) == 0]
+    return bool(step.size) and bool(np.mean((step > 0.0) & (step < _DENSE_S)) > 0.5)
+
+
+def _alike(record: Record, run: Array) -> NDArray[np.intp]:
+    """Order of the points that brings like conditions together, whatever the order of the rows."""
+    bins = np.round(np.log(record.rpm) / _SAME_SPEED)
+    return np.lexsort((record.rpm, record.V / record.rpm, np.asarray(record.air.rho, dtype=float), bins, run))
 
 
 def merged(records: Sequence[Record]) -> Record:
@@ -317,6 +374,7 @@ def merged(records: Sequence[Record]) -> Record:
         {n: max(r.gain.get(n, 0.0) for r in records) for n in names if any(n in r.gain for r in records)},
         {n: max(r.zero.get(n, 0.0) for r in records) for n in names if any(n in r.zero for r in records)},
         all(r.air_recorded for r in records), notes, records[0].reference,
+        tuple(dict.fromkeys(f for r in records for f in r.findings)),
     ))  # fmt: skip
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from bemt.effects.base import Effect, Flow, Parameter, Reading, choice
 
+_SIGNED = ("thrust_N", "torque_Nm", "airspeed_m_s")
 CHANNELS = ("thrust_N", "torque_Nm", "rpm", "airspeed_m_s", "density_kg_m3")
 _G, _LB, _INCH = 9.80665, 0.45359237, 0.0254
 _LBF, _OZF = _G * _LB, _G * _LB / 16.0
@@ -32,7 +33,7 @@ _UNITS: dict[str, dict[str, float]] = {
 
 @dataclass(frozen=True)
 class UnitSlip(Effect):
-    """One channel is recorded as ``factor`` times its true value, the ratio of two units.
+    """One channel is recorded as ``factor`` times its true value, the ratio of two units, or with the other sign.
 
     Notes
     -----
@@ -46,11 +47,11 @@ class UnitSlip(Effect):
     unit: str = "kgf"
 
     id = "unit_slip"
-    title = "number in another unit than its label"
-    sign = "one channel off by exactly the ratio of two units, at every point; no physics keeps such a factor"
+    title = "number in another unit than its label, or with the other sign"
+    sign = "one channel off by exactly the ratio of two units, or by -1, at every point; no physics keeps such a factor"
     kind = "stand"
     discrete = ("factor",)
-    parameters = (Parameter("factor", "1", 1e-5, 1e5, "ratios of units by definition", 0, 1.0),)
+    parameters = (Parameter("factor", "1", -1e5, 1e5, "ratios of units by definition; -1: the other sign", 0, 1.0),)
     on_by_default = False
 
     def __post_init__(self) -> None:
@@ -72,8 +73,11 @@ class UnitSlip(Effect):
             reading.values[self.channel] = reading.values[self.channel] * self.factor
 
     def variants(self) -> tuple[dict[str, str | float], ...]:
-        """Every pair of units of every channel, both ways."""
-        return tuple(
+        """Every pair of units of every channel, both ways, and the sign of what a stand may count the other way."""
+        signs: tuple[dict[str, str | float], ...] = tuple(
+            {"channel": c, "factor": -1.0, "unit": "the other sign"} for c in _SIGNED
+        )
+        return signs + tuple(
             {"channel": channel, "factor": f, "unit": words}
             for channel, units in _UNITS.items()
             for unit, factor in units.items()
