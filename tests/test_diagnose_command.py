@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 from diagnosing import CASES, case, points, recording
 
 from bemt.case import load_case
 from bemt.cli import build_parser, main
+from bemt.diagnose import record
+from bemt.diagnose.command import load
 from bemt.evaluate import prepare
+from bemt.series import Series
 
 
 def _recorded(path: Path, noise_seed: int) -> str:
@@ -43,7 +48,7 @@ def test_a_case_of_the_users_own_is_not_replaced(tmp_path: Path, capsys: pytest.
     before = {p.name: p.read_bytes() for p in own.iterdir()}
     arguments = ["diagnose", file, "--case", str(own), "--off", "compressibility", "--out", str(own), "--quiet"]
     assert main(arguments) == 2
-    assert "--out: got a folder with a case of its own" in capsys.readouterr().err
+    assert "--out: got a folder with a file of its own" in capsys.readouterr().err
     assert {p.name: p.read_bytes() for p in own.iterdir()} == before
 
 
@@ -55,3 +60,130 @@ def test_an_option_of_several_words_may_be_given_again() -> None:
         assert (args.case, args.reference, args.recordings) == (["a", "b"], ["q"], ["x.csv", "y.csv"])
     assert parse(["export", "c", "--out", "o", "--format", "stl", "--format", "step"]).format == ["stl", "step"]
     assert parse(["diagnose", "x.csv", "--case", "a"]).reference == []
+
+
+def _table(path: Path, columns: dict[str, object]) -> str:
+    rows = np.broadcast_arrays(*(np.asarray(v) for v in columns.values()))
+    with path.open("w", newline="") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(columns)
+        writer.writerows(zip(*rows, strict=True))
+    return str(path)
+
+
+RPM = np.linspace(6000.0, 16000.0, 12)
+LOADS: dict[str, object] = {"rpm": RPM, "thrust_N": 6.8e-8 * RPM**2, "torque_Nm": 9.5e-10 * RPM**2}
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"temperature_K": np.r_[np.full(11, 290.0), 20.0]}, ["temperature_K, point 12: got 20", "Celsius"]),
+        ({"temperature_K": 290.0, "pressure_Pa": 29.9}, ["pressure_Pa, point 1, 2, 3, 4, 5 ...: got 29.9"]),
+        ({"J": 0.3, "airspeed_m_s": 0.36 * RPM / 60 * 0.2032}, ["J: got airspeed over n D is 1.2 times it"]),
+        ({"thrust_N": 1e9}, ["times what the case gives", "Another unit, or another case?"]),
+    ],
+)
+def test_what_cannot_be_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], change: dict[str, object], words: list[str]
+) -> None:
+    file = _table(tmp_path / "log.csv", LOADS | change)
+    assert main(["diagnose", file, "--case", str(CASES / "prop_8x5"), "--quiet"]) == 2
+    said = capsys.readouterr().err
+    assert all(w in said for w in words), said
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"torque_Nm": 0.0}, "torque_Nm is 0 in every row: no measurement, left out"),
+        ({"thrust": 3.0}, "no unit known, none assumed, for 'thrust'"),
+        ({"vibration_V": 3.0}, "not used: vibration_V"),
+        ({"CT": 0.05}, "CT: thrust_N is used, which is"),
+        ({"airspeed_kmh": 30.0}, "no unit known, none assumed, for 'airspeed_kmh'"),
+    ],
+)
+def test_nothing_of_a_file_goes_unmentioned(tmp_path: Path, change: dict[str, object], words: str) -> None:
+    notes = load(_table(tmp_path / "log.csv", LOADS | change), case()).notes
+    assert any(words in note for note in notes), notes
+
+
+def test_humid_air_is_thinner_than_dry(tmp_path: Path) -> None:
+    air = {"temperature_K": 311.15, "pressure_Pa": 101325.0}
+    files = [_table(tmp_path / f"{h}.csv", LOADS | air | {"humidity_pct": h}) for h in (0, 95)]
+    rho = [float(np.mean(load(f, case()).air.rho)) for f in files]
+    assert rho == pytest.approx([1.1345, 1.1067], abs=2e-3)
+
+
+def test_a_reversed_cell_is_said_before_physics_and_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    series = recording(case(), points("grid"))
+    columns = {**series.values, "thrust_N": -series["thrust_N"]}
+    assert main(["diagnose", _table(tmp_path / "log.csv", columns), "--case", str(CASES / "prop_8x5"), "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert (answer["verdict"], answer["effects"]) == ("sensor", ["unit_slip"])
+    slip = answer["ranking"][0]["parameters"]
+    assert (slip["channel"]["value"], slip["factor"]["value"]) == ("thrust_N", -1.0)
+    assert "sign_flipped (thrust_N)" in answer["findings"][0]
+
+
+@pytest.mark.parametrize("order", ["speed first", "wind first", "shuffled", "half of the thrusts empty"])
+def test_many_points_say_the_same_in_any_order(order: str) -> None:
+    """They are averaged with alike ones, as coefficients."""
+    rpm, J = (x.ravel() for x in np.meshgrid(np.linspace(4000.0, 20000.0, 30), np.linspace(0.0, 0.5, 9)))
+    index = {"wind first": np.lexsort((J, rpm)), "shuffled": np.random.default_rng(1).permutation(rpm.size)}
+    rpm, J = (x[index.get(order, np.arange(rpm.size))] for x in (rpm, J))
+    T = 1.2 * (rpm / 60) ** 2 * 0.2032**4 * (0.12 - 0.1 * J)
+    if order.startswith("half"):
+        T[::2] = np.nan
+    values = {"rpm": rpm, "airspeed_m_s": J * rpm / 60 * 0.2032, "density_kg_m3": np.full(rpm.size, 1.2), "thrust_N": T,
+              "torque_Nm": 0.02 * 1.2 * (rpm / 60) ** 2 * 0.2032**5}  # fmt: skip
+    made = record.from_series(Series("bench", "x", values), case())
+    n, D = made.rpm / 60, 0.2032
+    assert len(made) == 150 and np.ptp(made.rpm) > 15000
+    CT, J = made.measured["thrust_N"] / (1.2 * n**2 * D**4), made.V / (n * D)
+    seen = np.isfinite(CT)
+    assert seen.sum() == (75 if order.startswith("half") else 150)  # every second speed
+    np.testing.assert_allclose(CT[seen], 0.12 - 0.1 * J[seen], atol=1e-12)
+
+
+CASE_TEXTS = {
+    "several lines": ('[model]\n', '[model]\neffects_off = [\n  "compressibility",  # mine\n]\n'),
+    "dotted": ('[model]\nn_crit = 3\ndrag_level = 1.1\nstations = 40\nalso_without', 'also_without'),
+    "spaces": ("[model]", "[ model ]"),
+}
+
+
+@pytest.mark.parametrize("form", [*CASE_TEXTS, "byte order mark", "references elsewhere"])
+def test_the_improved_case_runs_however_the_case_is_written(tmp_path: Path, form: str) -> None:
+    own, out = tmp_path / "own", tmp_path / "results" / "out"
+    shutil.copytree(CASES / "prop_8x5", own)
+    text = (own / "case.toml").read_text()
+    old, new = CASE_TEXTS.get(form, ("", ""))
+    assert old in text
+    text = text.replace(old, new, 1)
+    if form == "dotted":
+        text = re.sub(r"^also_without.*$", "", text, flags=re.M)
+        text = text.replace("[rotor]", "model.n_crit = 3\nmodel.drag_level = 1.1\n\n[rotor]", 1)
+    if form == "references elsewhere":
+        (own / "references.csv").rename(tmp_path / "shared.csv")
+        text = text.replace('references = "references.csv"', 'references = "../shared.csv"')
+    (own / "case.toml").write_text(("\ufeff" if form == "byte order mark" else "") + text, encoding="utf-8")
+    off = [] if form == "several lines" else ["--off", "compressibility"]
+    run = ["diagnose", _recorded(tmp_path / "log.csv", 0), "--case", str(own), *off, "--out", str(out), "--no-figures"]
+    assert main([*run, "--quiet"]) == 0
+    improved = load_case(out)
+    assert "compressibility" in [e.id for e in prepare(improved).effects]
+    assert improved.get("model.drag_level") == 1.1
+    assert {p.name for p in (tmp_path / "results").iterdir()} == {"out"}
+    assert main(["sweep", str(out), "--quiet"]) == 0
+    # again into its own folder: the input would be replaced by the answer
+    assert main(["diagnose", str(tmp_path / "log.csv"), "--case", str(out), "--out", str(out), "--quiet"]) == 2
+
+
+def test_a_recording_counts_once_and_an_effect_has_a_known_name(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = _table(tmp_path / "log.csv", LOADS)
+    assert main(["diagnose", file, file, "--case", str(CASES / "prop_8x5"), "--only", "compresibility"]) == 2
+    said = capsys.readouterr().err
+    assert "a recording given twice" in said and "--only: compresibility: got an unknown effect" in said

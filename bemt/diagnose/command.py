@@ -183,9 +183,10 @@ def _diagnose(args: argparse.Namespace) -> int:
     from bemt.diagnose.chain import diagnose
     from bemt.diagnose.document import document, text
 
+    _told_twice(args)
     cases = cases_of(args.case, args.off, len(args.recordings))
     if args.out:
-        _refuse_foreign(Path(args.out) / "case.toml")
+        _refuse_foreign(Path(args.out), cases)
     for case in cases:
         evaluate.prepare(case, None, 10)  # an unknown effect in the case is said before the work begins
     chosen = cases * len(args.recordings) if len(cases) == 1 else cases
@@ -216,29 +217,45 @@ def _diagnose(args: argparse.Namespace) -> int:
     return 0
 
 
-def _refuse_foreign(path: Path) -> None:
-    """Let nobody lose a case of their own: the improved one goes where only its like has been."""
-    from bemt.diagnose.improve import is_improved
+def _told_twice(args: argparse.Namespace) -> None:
+    """Refuse recordings that count twice and effects that nobody knows."""
+    files = [Path(p).resolve() for p in (*args.recordings, *args.reference)]
+    faults = [Fault(p, "", "a recording given twice", "each once", "Its points would count twice")
+              for k, p in enumerate((*args.recordings, *args.reference)) if files[k] in files[:k]]  # fmt: skip
+    known = effects.catalogue()
+    faults += [Fault("--only", i, "an unknown effect", f"one of {', '.join(known)}") for i in args.only or ()
+               if i not in known]  # fmt: skip
+    if faults:
+        raise InputError(faults)
 
-    if path.is_file() and not is_improved(path.read_text(encoding="utf-8", errors="replace")):
-        raise InputError(Fault("--out", "", f"a folder with a case of its own, {path.as_posix()}",
-                               "a folder without one", "The improved case would replace it"))  # fmt: skip
+
+def _refuse_foreign(out: Path, cases: Sequence[Case]) -> None:
+    """Let nobody lose files of their own: the improved case goes where only its like has been."""
+    from bemt.diagnose.improve import beside, is_improved
+
+    target = out / "case.toml"
+    mine = target.is_file() and is_improved(target.read_text(encoding="utf-8", errors="replace"))
+    lost = [target] if target.is_file() and (not mine or target.resolve() in {c.path.resolve() for c in cases}) else []
+    for file in () if mine else beside(cases[0]):
+        copy = out / file.relative_to(cases[0].folder)
+        if copy.is_file() and copy.read_bytes() != file.read_bytes():
+            lost.append(copy)
+    if lost:
+        raise InputError([Fault("--out", "", f"a folder with a file of its own, {p.as_posix()}", "a folder without one",
+                                "The improved case would replace it") for p in lost])  # fmt: skip
 
 
 def _improved(out: Path, answer: Any, case: Case) -> None:
     """Save the case with what was found on, a case that `sweep` runs; that of an earlier answer goes away."""
-    from bemt.diagnose.improve import improved_case
+    from bemt.diagnose.improve import beside, improved_case
 
-    document = improved_case(answer, case, case.path.read_text(encoding="utf-8"))
+    document = improved_case(answer, case, case.path.read_text(encoding="utf-8-sig"))
     if not document:
         (out / "case.toml").unlink(missing_ok=True)
         return
+    for file in beside(case):  # stations, sections and recorded values lie beside the case, as before
+        write_atomic(out / file.relative_to(case.folder), file.read_bytes())
     write_atomic(out / "case.toml", document)
-    for file in case.files():
-        if file != case.path:  # stations, sections and recorded values lie beside the case, as before
-            target = out / file.relative_to(case.folder)
-            target.parent.mkdir(parents=True, exist_ok=True)
-            write_atomic(target, file.read_bytes())
 
 
 def _plan(args: argparse.Namespace) -> int:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-import re
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import tomlkit
 
 from bemt import effects, forward
 from bemt.diagnose.signatures import effect_of
@@ -12,10 +14,9 @@ if TYPE_CHECKING:
     from bemt.case import Case
     from bemt.diagnose.chain import Diagnosis
 
-__all__ = ["improved_case", "is_improved"]
+__all__ = ["beside", "improved_case", "is_improved"]
 
 _HEAD = "with what `python -m bemt diagnose` found: "
-_LINE = re.compile(r"^(effects_on|effects_off)\s*=.*$")
 
 
 def improved_case(answer: Diagnosis, case: Case, source: str) -> str:
@@ -47,25 +48,44 @@ def improved_case(answer: Diagnosis, case: Case, source: str) -> str:
     off = [i for i in case.get("model.effects_off") if i not in ids]
     if "duct" in ids and case.document.get("duct"):
         on = [t for t in on if t.partition("(")[0] != "duct"]  # the case's own duct is there again
-    lines = source.splitlines()
-    quoted = {"effects_on": on, "effects_off": off}
-    new = [f"{key} = [{', '.join(_quote(t) for t in values)}]" for key, values in quoted.items()]
-    out, inside, done = [], False, False
-    for line in lines:
-        if line.strip().startswith("["):
-            inside = line.split("#")[0].strip() == "[model]"
-            out.append(line)
-            if inside:
-                out += new
-                done = True
-            continue
-        if inside and _LINE.match(line.strip()):
-            continue
-        out.append(line)
-    if not done:
-        out += ["", "[model]", *new]
+    text = tomlkit.parse(source.lstrip("\ufeff"))
+    if "model" not in text:
+        text["model"] = tomlkit.table()
+    model: Any = text["model"]
+    model["effects_on"], model["effects_off"] = on, off
+    _elsewhere(text, case)
     head = f"# {case.name} {_HEAD}{', '.join(effects.to_text(e) for e in found)}"
-    return "\n".join([head, *out]) + "\n"
+    return f"{head}\n{tomlkit.dumps(text).rstrip()}\n"
+
+
+def beside(case: Case) -> list[Path]:
+    """Files of a case that lie in its folder, and so go with it.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+
+    Returns
+    -------
+    list of Path
+        Without the case file.
+    """
+    folder = case.folder.resolve()
+    return [f for f in case.files() if f != case.path and f.resolve().is_relative_to(folder)]
+
+
+def _elsewhere(node: Any, case: Case) -> None:
+    """Name files that lie elsewhere by their whole path: the improved case stands in another folder."""
+    far = {f.resolve() for f in case.files()} - {case.path.resolve(), *(f.resolve() for f in beside(case))}
+    keys = range(len(node)) if isinstance(node, list) else list(node)
+    for key in keys:
+        value = node[key]
+        if isinstance(value, str):
+            if (case.folder / value).resolve() in far:
+                node[key] = (case.folder / value).resolve().as_posix()
+        elif isinstance(value, (dict, list)):
+            _elsewhere(value, case)
 
 
 def is_improved(source: str) -> bool:
@@ -86,8 +106,3 @@ def is_improved(source: str) -> bool:
     """
     first = source.partition("\n")[0]
     return first.startswith("#") and _HEAD in first
-
-
-def _quote(text: str) -> str:
-    """TOML literal string; ids and numbers hold no quotes but those of words."""
-    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'

@@ -51,6 +51,8 @@ class Plan:
         A run that separates the largest pair of look-alikes.
     points : int
         Points of the plan [1].
+    notes : tuple of str
+        What the file left open, and what was assumed for it.
     """
 
     confusion: look.Confusion
@@ -60,6 +62,7 @@ class Plan:
     absent: dict[str, str]
     added: suggestion.Suggestion | None
     points: int
+    notes: tuple[str, ...] = ()
 
     @property
     def sight(self) -> dict[str, str]:
@@ -95,17 +98,21 @@ def points(load: Callable[[str, Case], Record], path: str, case: Case) -> Record
     from bemt.diagnose.record import from_series
     from bemt.errors import Fault, InputError
     from bemt.import_files import import_file
+    from bemt.reduction.channels import view
     from bemt.series import Series
 
     imported = import_file(path)
+    rows = view(imported)
     values = {k: c.values for k, c in imported.channels.items() if c.unit or k in ("rpm", "J", "run")}
+    values |= dict(rows.values)
     if "rpm" not in values:
         raise InputError(Fault(path, "", f"columns {', '.join(imported.channels)}", "a column rpm"))
     n = imported.rows
     loads = {k: values.get(k, np.ones(n)) for k in ("thrust_N", "torque_Nm")}
     lawful = {k: v for k, v in values.items() if not k.startswith("u_")}
     u = {k[2:]: np.abs(v) for k, v in values.items() if k.startswith("u_") and k[2:] in loads}
-    return from_series(Series("bench", path, lawful | loads, u), case)
+    made = from_series(Series("bench", path, lawful | loads, u), case)
+    return replace(made, notes=(*made.notes, *imported.warnings, *rows.notes))
 
 
 def plan(record: Record, case: Case, progress: Callable[[str], None] | None = None) -> Plan:
@@ -151,7 +158,7 @@ def _plan(record: Record, case: Case, progress: Callable[[str], None] | None) ->
         added = suggestion.suggest(found, (a, settings[a]), (b, settings[b]))
     weight = prior.prior_weights(whole, alike.ids)
     bar = np.array([verdict.EXPECTED if weight[i] > 1.0 else verdict.ENOUGH for i in alike.ids])
-    return Plan(alike, size, best, bar, absent, added, len(record))
+    return Plan(alike, size, best, bar, absent, added, len(record), record.notes)
 
 
 def _sizes(
@@ -202,6 +209,7 @@ def document(answer: Plan) -> dict[str, Any]:
         "distance": {i: {j: float(c.distance[a, b]) for b, j in enumerate(c.ids)} for a, i in enumerate(c.ids)},
         "not_tried": answer.absent,
         "next_measurement": None if answer.added is None else answer.added.document(),
+        "notes": list(answer.notes),
     }  # fmt: skip
 
 
@@ -235,4 +243,5 @@ def text(answer: Plan) -> str:
         a = answer.added
         out.append(f"  to add: {a.text} (separates {' from '.join(a.separates)}: {a.before:.1f} to {a.after:.1f})")
     out += [f"  cannot show: {i}: {why}" for i, why in answer.absent.items()]
+    out += [f"  note: {note}" for note in answer.notes]
     return "\n".join(out)
