@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from bemt import __version__
-from bemt.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, InputError
+from bemt.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError
 
 __all__ = ["build_parser", "main"]
 
@@ -30,6 +30,42 @@ _MODULES = {"sweep": "bemt.sweep", "report": "bemt.report",
             "effects": "bemt.effects_list", "diagnose": "bemt.diagnose.command", "plan": "bemt.diagnose.command",
             "stations": "bemt.stations", "map": "bemt.drive.map_command", "motor": "bemt.drive.motor_command",
             "drive": "bemt.drive.drive_command", "thrusters": "bemt.drive.thrusters_command"}  # fmt: skip
+
+
+class _Once(argparse.Action):
+    """Option with one value: given again it is refused, for the last one would win without a word."""
+
+    def __call__(
+        self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any, option: str | None = None
+    ) -> None:
+        given = namespace.__dict__.setdefault("_given", set())
+        if self.dest in given and self.option_strings:
+            parser.error(f"argument {option}: got it twice; expected it once")
+        given.add(self.dest)
+        setattr(namespace, self.dest, values)
+
+
+class _Parser(argparse.ArgumentParser):
+    """Parser that takes options by their whole name, each once."""
+
+    def __init__(self, **more: Any) -> None:
+        super().__init__(**{**more, "allow_abbrev": False})
+        self.register("action", None, _Once)
+        self.register("action", "store", _Once)
+
+
+def _tolerance(text: str) -> float:
+    value = float(text)
+    if not 0.0 <= value < float("inf"):
+        raise argparse.ArgumentTypeError(f"got {text}; expected a finite number of 0 or more")
+    return value
+
+
+def _seed(text: str) -> int:
+    value = int(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"got {text}; expected a whole number of 0 or more")
+    return value
 
 
 def _positive(text: str) -> int:
@@ -65,7 +101,7 @@ def build_parser() -> argparse.ArgumentParser:
     >>> args.command, args.paths, args.jobs
     ('sweep', ['cases/'], 2)
     """
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="python -m bemt",
         description="Propeller and ducted-fan aerodynamics: BEMT beside the K1/K2 model, CFD and bench recordings.",
         epilog="Exit codes: 0 fine, 1 out of tolerance or unconverged, 2 usage or input, 3 internal.",
@@ -83,7 +119,7 @@ def build_parser() -> argparse.ArgumentParser:
     strict = "exit 1 when a point is unconverged or BEMT is off a reference by more than --tolerance"
     sweep.add_argument("--strict", action="store_true", help=strict)
     tolerance = "tolerance of --strict on thrust, %% of the reference (default 15)"
-    sweep.add_argument("--tolerance", type=float, default=15.0, metavar="PCT", help=tolerance)
+    sweep.add_argument("--tolerance", type=_tolerance, default=15.0, metavar="PCT", help=tolerance)
     sweep.add_argument("--no-resume", action="store_true", help="do not reuse results found in --out")
     engine = "where grids are solved: this machine, or a Dask cluster (default local); the answer is the same"
     sweep.add_argument("--engine", choices=("local", "dask"), default="local", help=engine)
@@ -204,7 +240,7 @@ def build_parser() -> argparse.ArgumentParser:
     proof = commands.add_parser("prove", help="conceal causes, let the diagnosis find them, score it")
     size = "41 or 605 made cases (default small), 68 made by CCBlade (extra wisdem), published recordings as found"
     proof.add_argument("--size", choices=("small", "full", "ccblade", "real"), default="small", help=size)
-    proof.add_argument("--seed", type=int, metavar="N", help="of everything (default: from the operating system)")
+    proof.add_argument("--seed", type=_seed, metavar="N", help="of everything (default: from the operating system)")
     proof.add_argument("--out", metavar="DIR", help="keep items, key, answers and score there")
     proof.add_argument("--jobs", type=_positive, metavar="N", help="diagnoses at a time (default: one per core)")
     proof.add_argument("--json", action="store_true", help="print one JSON document (bemt.proof/1)")
@@ -241,7 +277,7 @@ def build_parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _drive_parsers(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def _drive_parsers(commands: argparse._SubParsersAction[_Parser]) -> None:
     """Add the commands of the drive behind the rotor."""
     chart = commands.add_parser("map", help="bench recording to a map pulse width - thrust and its inverse")
     chart.add_argument("files", nargs="+", metavar="FILE", help="recordings of one drive, of one or more batteries")
@@ -257,7 +293,7 @@ def _drive_parsers(commands: argparse._SubParsersAction[argparse.ArgumentParser]
     motor.add_argument("file", nargs="?", metavar="FILE", help="motor.toml, or a folder that holds one")
     made = "write generated trials (labelled so) and their motor.toml into DIR"
     motor.add_argument("--generate", metavar="DIR", help=made)
-    motor.add_argument("--seed", type=int, default=0, metavar="N", help="of --generate (default 0)")
+    motor.add_argument("--seed", type=_seed, default=0, metavar="N", help="of --generate (default 0)")
     plant = "with --generate: plant a systematic error, e.g. torque.shunt=1.04; repeatable"
     motor.add_argument("--plant", action="append", default=[], metavar="NAME=SIZE", help=plant)
     motor.add_argument("--out", metavar="DIR", help="write JSON, trials as CSV and a box plot there")
@@ -298,6 +334,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
     args = build_parser().parse_args(argv)
+    if getattr(args, "json", False) and hasattr(sys.stdout, "reconfigure"):
+        sys.stdout.reconfigure(encoding="utf-8", errors="backslashreplace")  # RFC 8259, 8.1
     try:
         code = importlib.import_module(_MODULES[args.command]).run(args)
         sys.stdout.flush()
@@ -311,6 +349,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our output has gone, as in `| head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return EXIT_OK
+    except OSError as error:
+        what = error.strerror or type(error).__name__
+        print(Fault(str(error.filename or ""), "", what, "a file or folder that can be used"), file=sys.stderr)
+        return EXIT_INPUT
     except Exception:
         import traceback
 

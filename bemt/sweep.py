@@ -110,6 +110,9 @@ def run_case(
         mark = fingerprint(case.content_hash())
         folder = None if out is None else out / case.name
         if folder is not None:
+            if folder.resolve() == case.folder.resolve():
+                raise InputError(Fault("--out", "", f"the folder of the case {case.name} itself", "another folder",
+                                       "Results would stand among its files"))  # fmt: skip
             remove_stale(folder)
             stored = _reuse(folder, mark, form) if resume else None
             if stored is not None:

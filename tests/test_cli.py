@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -69,6 +70,53 @@ def test_wrong_usage_is_2_and_says_so_on_stderr(arguments: list[str], capsys: py
     shown = capsys.readouterr()
     assert caught.value.code == 2
     assert shown.out == "" and "error:" in shown.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["plan", "--case", "a", "--case", "b", "--plan", "c"], "argument --case: got it twice; expected it once"),
+        (["estimate", "8x5", "--rpm", "5000", "--chord", "3"], "unrecognized arguments: --chord 3"),
+        (["sweep", "cases", "--tolerance", "nan"], "got nan; expected a finite number of 0 or more"),
+        (["prove", "--seed", "-1"], "got -1; expected a whole number of 0 or more"),
+    ],
+)
+def test_no_option_is_guessed_or_dropped(
+    arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A last one that wins, half a name that loses its unit: neither is what was meant."""
+    with pytest.raises(SystemExit) as stopped:
+        cli.main(arguments)
+    assert stopped.value.code == 2
+    assert words in capsys.readouterr().err
+
+
+def test_results_do_not_go_among_the_files_of_a_case(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shutil.copytree(ROOT / "cases" / "prop_8x5", tmp_path / "prop_8x5")
+    before = sorted((tmp_path / "prop_8x5").iterdir())
+    assert cli.main(["sweep", str(tmp_path), "--out", str(tmp_path), "--quiet"]) == 2
+    assert "--out: got the folder of the case prop_8x5 itself" in capsys.readouterr().err
+    assert sorted((tmp_path / "prop_8x5").iterdir()) == before
+
+
+@pytest.mark.parametrize("command", [["validate", "x"], ["drive", "cases/ds30"], ["estimate", "8x5", "--rpm", "5000"]])
+def test_trouble_with_files_is_an_input_fault(
+    command: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def full(_: object) -> int:
+        raise OSError(28, "No space left on device", "out/table.txt")
+
+    monkeypatch.setattr(cli.importlib, "import_module", lambda _: SimpleNamespace(run=full))
+    assert cli.main(command) == 2
+    assert capsys.readouterr().err == (
+        "out/table.txt: got No space left on device; expected a file or folder that can be used.\n"
+    )
+
+
+def test_json_is_utf_8_whatever_the_terminal_is() -> None:
+    env = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "latin-1"}
+    done = subprocess.run([sys.executable, "-m", "bemt", "effects", "--json"], cwd=ROOT, env=env, capture_output=True)
+    assert json.loads(done.stdout.decode("utf-8"))["schema"] == "bemt.effects/1"
 
 
 def test_polar_option_is_a_reynolds_number() -> None:

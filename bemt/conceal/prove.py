@@ -142,6 +142,8 @@ def diagnose_all(out: Path, jobs: int) -> None:
     def one(folder: Path) -> None:
         began = time.monotonic()
         answer, words = diagnose_folder(folder)
+        if words == "interrupted":  # not an answer: it is asked for again
+            return
         document = {"answer": answer, "error": "" if answer else words[-2000:], "seconds": time.monotonic() - began}
         write_atomic(answers / f"{folder.name}.json", json.dumps(document))
 
