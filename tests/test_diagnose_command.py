@@ -14,7 +14,7 @@ from diagnosing import CASES, case, points, recording
 
 from bemt.case import load_case
 from bemt.cli import build_parser, main
-from bemt.diagnose import record
+from bemt.diagnose import chain, document, record
 from bemt.diagnose.command import load
 from bemt.evaluate import prepare
 from bemt.series import Series
@@ -187,3 +187,16 @@ def test_a_recording_counts_once_and_an_effect_has_a_known_name(
     assert main(["diagnose", file, file, "--case", str(CASES / "prop_8x5"), "--only", "compresibility"]) == 2
     said = capsys.readouterr().err
     assert "a recording given twice" in said and "--only: compresibility: got an unknown effect" in said
+
+
+@pytest.mark.parametrize(
+    ("diameter_in", "torque", "words"),
+    [(9, 1.0, "Are diameter, pitch and blades those of this rotor?"), (8, 1.25, "torque by +25%")],
+)
+def test_a_level_that_no_cause_explains_is_said(tmp_path: Path, diameter_in: int, torque: float, words: str) -> None:
+    """A recording of another rotor, and a torque that gains and the solver may be off by."""
+    series = recording(case(), points("grid"))
+    values = {**series.values, "torque_Nm": torque * series["torque_Nm"]}
+    other = case().replaced({"rotor.diameter_in": diameter_in, "blade.pitch_in": 5 * diameter_in / 8})
+    answer = chain.diagnose([record.from_series(Series("bench", "log", values, dict(series.u)), other)], [other])
+    assert words in " ".join(document.explanation(answer))

@@ -31,6 +31,10 @@ _VARIABLE = {
 }  # fmt: skip
 _SHOWN = 8
 _FINDINGS = 3
+# All loads off the case by more than this share: first the question whether it is the rotor of the case.
+_ANOTHER_ROTOR = 0.25
+# Level that is said even where no cause shows.
+_WORTH_SAYING = 0.05
 
 
 def _number(x: float) -> float | None:
@@ -138,11 +142,17 @@ def explanation(d: Diagnosis) -> list[str]:
     """
     decision, catalogue = d.decision, effects.catalogue()
     lines = [f"Before any physics: {f}" for f in d.problem.findings[:_FINDINGS]]
+    level = d.problem.level
+    off = " and ".join(f"{_CHANNEL[c].lower()} by {v:+.0%}" for c, v in level.items())
+    if not lines and level and min(abs(v) for v in level.values()) > _ANOTHER_ROTOR:
+        lines.append(f"Before any physics: off the case {off}. Are diameter, pitch and blades those of this rotor?")
     if len(d.problem.findings) > _FINDINGS:
         lines[-1] += f" And {len(d.problem.findings) - _FINDINGS} more; `import` shows all."
     if decision.verdict == "none":
-        return [*lines, f"No mismatch beyond noise and calibration: {decision.why} (p = {d.p_value:.2g}).", _gain(d),
-                *_next(d, "To see more")]  # fmt: skip
+        lines.append(f"No mismatch beyond noise and calibration: {decision.why} (p = {d.p_value:.2g}).")
+        if max((abs(v) for v in level.values()), default=0.0) > _WORTH_SAYING:
+            lines.append(f"The level is off ({off}), which gains, blade angles and the solver may be; no cause shows.")
+        return [*lines, _gain(d), *_next(d, "To see more")]
     lines.append(_where(d))
     names = " and ".join(catalogue[i].title for i in decision.effects)
     if decision.verdict in ("named", "sensor"):

@@ -208,6 +208,16 @@ class Problem:
         return tuple(f"{p.record.name}: {f}" for p in self.parts for f in p.record.findings)
 
     @property
+    def level(self) -> dict[str, float]:
+        """Median of each load over what the case gives, less 1 [1]."""
+        out = {}
+        for k, name in enumerate(CHANNELS[:2]):
+            mine = (self.channel == k) & self.free & (np.abs(self.f0) > 0.0)
+            if mine.any():
+                out[name] = float(np.median(self.y[mine] / self.f0[mine])) - 1.0
+        return out
+
+    @property
     def free(self) -> NDArray[np.bool_]:
         """Readings in which a cause may be at work, (M,): all but those of reference recordings."""
         return np.array([not p.record.reference for p in self.parts])[self.part]
