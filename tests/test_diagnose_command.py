@@ -200,3 +200,13 @@ def test_a_level_that_no_cause_explains_is_said(tmp_path: Path, diameter_in: int
     other = case().replaced({"rotor.diameter_in": diameter_in, "blade.pitch_in": 5 * diameter_in / 8})
     answer = chain.diagnose([record.from_series(Series("bench", "log", values, dict(series.u)), other)], [other])
     assert words in " ".join(document.explanation(answer))
+
+
+def test_rows_copied_count_once() -> None:
+    rpm = np.linspace(5000.0, 15000.0, 20)
+    once = {"rpm": rpm, "airspeed_m_s": 0.0 * rpm, "thrust_N": 6.8e-8 * rpm**2}
+    twice = {k: np.concatenate([v, v]) for k, v in once.items()}
+    made = record.from_series(Series("bench", "x", twice), case())
+    assert len(made) == 20 and any("20 rows repeat others digit by digit" in n for n in made.notes)
+    other = twice | {"time_s": np.arange(40.0)}  # a second run that came out the same
+    assert len(record.from_series(Series("bench", "x", other), case())) == 40

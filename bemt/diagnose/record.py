@@ -35,6 +35,8 @@ COVARIATES = (
 _DENSE_S = 1.0
 # Pulse widths from here on are the end of the range, whatever was asked for [s].
 _FULL_THROTTLE = 1.9995e-3
+# Share of the rows from which on exact copies are copies, not repeats that came out the same.
+_COPIED = 0.2
 # Speeds that differ by less are one speed, share.
 _SAME_SPEED = 0.02
 # Channel, lowest and highest value of a room, a sky or a pressure tunnel, hint.
@@ -206,6 +208,10 @@ def from_series(series: Series, case: Case, correlated: Mapping[str, Mapping[str
             reading[kinks] = np.nan
     if (~keep).any():
         notes.append(f"{int((~keep).sum())} of {n} points without speed or load were left out")
+    again = _repeated(keep, [rpm, V, *measured.values(), *(v for k, v in extra.items() if k != "run")])
+    if again.any():
+        notes.append(f"{int(again.sum())} rows repeat others digit by digit: counted once")
+        keep &= ~again
     if not keep.any():
         raise InputError(Fault(series.name, "", "no point with a speed and a load", "one or more"))
     correlated = correlated or {}
@@ -215,6 +221,17 @@ def from_series(series: Series, case: Case, correlated: Mapping[str, Mapping[str
         {k: float(v["zero"]) for k, v in correlated.items() if v.get("zero")}, recorded, tuple(notes),
     ).take(np.flatnonzero(keep))  # fmt: skip
     return _thinned(record)
+
+
+def _repeated(keep: NDArray[np.bool_], columns: Sequence[Array]) -> NDArray[np.bool_]:
+    """Rows that are copies of earlier ones, where copies are no accident of coarse digits."""
+    out = np.zeros(keep.size, dtype=bool)
+    rows = np.flatnonzero(keep)
+    if rows.size:
+        _, first = np.unique(np.column_stack(columns)[rows], axis=0, return_index=True)
+        copies = np.setdiff1d(rows, rows[first])
+        out[copies] = copies.size >= max(3, _COPIED * rows.size)
+    return out
 
 
 def _kinks(rpm: Array, extra: Mapping[str, Array]) -> NDArray[np.bool_]:

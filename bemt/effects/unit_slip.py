@@ -77,10 +77,11 @@ class UnitSlip(Effect):
         signs: tuple[dict[str, str | float], ...] = tuple(
             {"channel": c, "factor": -1.0, "unit": "the other sign"} for c in _SIGNED
         )
-        return signs + tuple(
+        slips = tuple(
             {"channel": channel, "factor": f, "unit": words}
             for channel, units in _UNITS.items()
             for unit, factor in units.items()
             for f, words in ((factor, unit), (1.0 / factor, f"taken for {unit}"))
             if abs(math.log(f)) > _LARGE
         )
+        return slips + signs
