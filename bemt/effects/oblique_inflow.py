@@ -29,7 +29,10 @@ class ObliqueInflow(Effect):
     inviscid = True
     title = "airspeed at an angle to the shaft"
     along = ("sideslip_rad",)
-    sign = "thrust and torque up with airspeed as if J were lower, and a force in the plane of the disk; none at rest"
+    sign = (
+        "thrust and torque up with airspeed as if J were lower, and a force in the plane of the disk; none at rest; a "
+        "pitot that reads high by 1 / cos(angle) looks alike"
+    )
     parameters = (Parameter("angle_deg", "deg", 0.0, 90.0, "full turn of the stand", 7, 0.0),)
     on_by_default = False
 
