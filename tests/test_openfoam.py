@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 import os
 import re
@@ -345,6 +346,10 @@ def test_a_sector_leaves_out_vanes_that_do_not_fit(project: Path, tmp_path: Path
     assert manifest["openfoam"]["sectors"] == case.rotor().B and "left out" in " ".join(manifest["openfoam"]["notes"])
     stl = {path.stem for path in (tmp_path / "fan" / "constant" / "triSurface").glob("*.stl")}
     assert stl == {"blade", "hub", "duct", "centrebody"}
+    listed = {item["path"]: item["sha256"] for item in manifest["files"]}
+    for name in stl:
+        path = f"constant/triSurface/{name}.stl"
+        assert hashlib.sha256((tmp_path / "fan" / path).read_bytes()).hexdigest() == listed[path]
     s, _ = settings_of(case, Run(), COARSE)
     assert set(s.surfaces) == stl
     whole, _ = settings_of(case, Run(sector="full"), COARSE)

@@ -69,7 +69,7 @@ def _read(path: Path) -> list[dict[str, Any]]:
 
 def _tried(row: Mapping[str, Any]) -> bool:
     """Whether a run says something of its flow; else a program failed before, which may have been the machine's."""
-    return row["converged"] == 1 or row["iterations"] > 0
+    return bool(row["converged"] == 1 or row["iterations"] > 0)
 
 
 def grid_studies(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
