@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from geometry.duct import Duct
     from geometry.rotor import Rotor
 
-__all__ = ["Assumption", "Case", "find_cases", "load_case"]
+__all__ = ["Assumption", "Case", "check_name", "find_cases", "load_case"]
 
 FILE_NAME = "case.toml"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
@@ -346,6 +346,28 @@ def _assumptions(document: Mapping[str, Any], filled: Case) -> tuple[Assumption,
     return tuple(out)
 
 
+def check_name(out: Collector, name: Any) -> None:
+    """Check a name that becomes the name of a folder or file; add what is wrong to the collector.
+
+    Parameters
+    ----------
+    out : Collector
+        Receives the fault.
+    name : object
+        Value of the key ``name``; what is no text, or empty, is a fault of the schema and none here.
+
+    Examples
+    --------
+    >>> out = Collector("case.toml")
+    >>> check_name(out, "8x5_v1.2"), check_name(out, "../8x5")
+    (None, None)
+    >>> [fault.got for fault in out.faults]
+    ["'../8x5'"]
+    """
+    if isinstance(name, str) and name.strip() and not _NAME.fullmatch(name):
+        out.add("name", repr(name), "letters, digits, dot, dash and underscore", "It names a folder of results")
+
+
 def load_case(path: str | Path) -> Case:
     """Read and check a case file.
 
@@ -372,9 +394,7 @@ def load_case(path: str | Path) -> Case:
     if document is None:
         raise InputError(out.faults)
     check_case(out, document, path.parent)
-    name = document.get("name")
-    if isinstance(name, str) and name.strip() and not _NAME.fullmatch(name):
-        out.add("name", repr(name), "letters, digits, dot, dash and underscore", "It names a folder of results")
+    check_name(out, document.get("name"))
     if out.faults:
         raise InputError(out.faults)
     bare = Case(path, _with_defaults(document), ())

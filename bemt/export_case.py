@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from bemt.case import Case, find_cases, load_case
 from bemt.errors import EXIT_INPUT, EXIT_OK, Fault, InputError
-from bemt.export_case_openfoam import Run, settings_of, write_openfoam
+from bemt.export_case_openfoam import Run, check_run, settings_of, write_openfoam
+from bemt.schema import shown
 from bemt.tables import json_text, number_text, text_table, write_atomic
 from geometry.common import GeometryError
-from geometry.export import MANIFEST, export
+from geometry.export import MANIFEST, SCHEMA, export
 from geometry.mesh import Options
 
 __all__ = ["export_case", "run"]
+
+NAMES = {"rpm": "--rpm", "airspeed_m_s": "--airspeed", "sideslip_deg": "--sideslip-deg", "level": "--level",
+         "domain": "--domain", "sector": "--sector", "turbulence": "--turbulence",
+         "solver": "--compressible"}  # fmt: skip
+"""Options that say what the OpenFOAM case is to compute."""
 
 
 def export_case(
@@ -29,7 +37,8 @@ def export_case(
     case : Case
         The case.
     out : Path
-        Folder.
+        Folder. What an earlier export wrote there and this one does not goes: the files that the earlier manifest lists
+        and that are as they were written; no others.
     formats : list of str
         Some of ``stl``, ``step``, ``obj``, ``openfoam``.
     unit : str
@@ -49,6 +58,7 @@ def export_case(
     InputError
         When the case makes no sound solid; nothing is written then.
     """
+    earlier = _listed(out)
     others = [word for word in formats if word != "openfoam"]
     run = flow or Run()
     if "openfoam" in formats:
@@ -59,13 +69,48 @@ def export_case(
         )  # noqa: E501
     except GeometryError as error:
         raise InputError([Fault(case.path.as_posix(), *fault) for fault in error.faults]) from error
-    if "openfoam" not in formats:
-        return solids
-    manifest = write_openfoam(case, out, run, options)
-    if solids:
-        manifest |= {"volumes_m3": solids["volumes_m3"], "files": [*solids["files"], *manifest["files"]]}
-        write_atomic(out / MANIFEST, json.dumps(manifest, indent=1) + "\n")
+    manifest = solids
+    if "openfoam" in formats:
+        manifest = write_openfoam(case, out, run, options)
+        if solids:
+            manifest |= {"volumes_m3": solids["volumes_m3"], "files": [*solids["files"], *manifest["files"]]}
+            write_atomic(out / MANIFEST, json.dumps(manifest, indent=1) + "\n")
+    if manifest:
+        now = _hashes(manifest)
+        _remove(out, {path: digest for path, digest in earlier.items() if path not in now})
     return manifest
+
+
+def _hashes(manifest: Mapping[str, Any]) -> dict[str, str]:
+    """Files that a manifest lists, and what was in them."""
+    files: dict[str, str] = {item["path"]: item["sha256"] for item in manifest["files"]}
+    return files | dict(manifest.get("openfoam", {}).get("files", {}))
+
+
+def _listed(out: Path) -> dict[str, str]:
+    """Files of the export that is in a folder; none when its manifest is not one of ours."""
+    try:
+        manifest = json.loads((out / MANIFEST).read_text(encoding="utf-8"))
+        found = _hashes(manifest) if manifest["schema"] == SCHEMA else {}
+        return {Path(path).as_posix(): digest for path, digest in found.items() if "\0" not in path}
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        return {}
+
+
+def _remove(out: Path, files: Mapping[str, str]) -> None:
+    """Remove files of an earlier export that are below a folder and unchanged, and folders that they leave empty."""
+    home = out.resolve()
+    for name, digest in files.items():
+        path = (home / name).parent.resolve() / Path(name).name
+        if not path.is_relative_to(home) or path.is_symlink() or not path.is_file():
+            continue  # a manifest is a file that anybody may have edited
+        if hashlib.sha256(path.read_bytes()).hexdigest() != digest:
+            continue
+        path.unlink()
+        for folder in path.parents:
+            if folder == home or any(folder.iterdir()):
+                break
+            folder.rmdir()
 
 
 def run(args: argparse.Namespace) -> int:
@@ -82,19 +127,31 @@ def run(args: argparse.Namespace) -> int:
     int
         Exit code.
     """
-    paths = find_cases([args.case])
+    flow = Run(rpm=args.rpm, airspeed_m_s=args.airspeed, sideslip_deg=args.sideslip_deg, level=args.level,
+               domain=args.domain, sector=args.sector, turbulence=args.turbulence, solver=args.solver)  # fmt: skip
+    formats = args.format or ["stl"]
+    faults = check_run(flow, NAMES) if "openfoam" in formats else _unused(flow)
     try:
         options = Options(fillet=args.fillet_mm * 1e-3, min_thickness=args.min_thickness_mm * 1e-3)
     except GeometryError as error:
-        raise InputError([Fault("", *fault) for fault in error.faults]) from error
-    flow = Run(rpm=args.rpm, airspeed_m_s=args.airspeed, sideslip_deg=args.sideslip_deg, level=args.level,
-               domain=args.domain, sector=args.sector, turbulence=args.turbulence, solver=args.solver)  # fmt: skip
-    manifests, code = [], EXIT_OK
+        faults += [Fault("", *fault) for fault in error.faults]
+    if faults:
+        raise InputError(faults)
+    paths = find_cases([args.case])
+    cases, code = [], EXIT_OK
     for path in paths:
         try:
-            case = load_case(path)
-            out = Path(args.out) / case.name if len(paths) > 1 else Path(args.out)
-            manifest = export_case(case, out, args.format or ["stl"], args.unit, options, flow)
+            cases.append(load_case(path))
+        except InputError as error:
+            print(error, file=sys.stderr)
+            code = EXIT_INPUT
+    if len(paths) > 1:
+        _refuse_repeats(cases)
+    manifests = []
+    for case in cases:
+        out = Path(args.out) / case.name if len(paths) > 1 else Path(args.out)
+        try:
+            manifest = export_case(case, out, formats, args.unit, options, flow)
         except InputError as error:
             print(error, file=sys.stderr)
             code = EXIT_INPUT
@@ -105,6 +162,31 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(json_text({"schema": "bemt.export/1", "cases": manifests}), end="")
     return code
+
+
+def _unused(flow: Run) -> list[Fault]:
+    """Options of OpenFOAM that were given without that format: what they ask for would not be done."""
+    plain, faults = Run(), []
+    for key, option in NAMES.items():
+        value = getattr(flow, key)
+        if value != getattr(plain, key):
+            option, got = (f"--{value}", "the option") if key == "solver" else (option, shown(value).strip("'"))
+            faults.append(Fault("", option, got, "nothing without the format openfoam", "Add --format openfoam"))
+    return faults
+
+
+def _refuse_repeats(cases: Sequence[Case]) -> None:
+    """Two cases of one name would write into one folder."""
+    first: dict[str, str] = {}
+    faults = []
+    for case in cases:
+        file = case.path.as_posix()
+        # folders that differ in case alone are one folder on some disks
+        earlier = first.setdefault(case.name.casefold(), file)
+        if earlier != file:
+            faults.append(Fault(file, "name", f"{case.name!r} as in {earlier}", "a name of its own"))
+    if faults:
+        raise InputError(faults)
 
 
 def _text(manifest: dict[str, Any], out: Path) -> str:

@@ -6,6 +6,7 @@ import hashlib
 import json
 import math
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,9 +14,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bemt.case import Case
+from bemt.case_schema import SCHEMA
 from bemt.errors import Fault, InputError
 from bemt.openfoam import Body, Settings, Sweep, case_files, sector_choice
 from bemt.openfoam.settings import MACH_COMPRESSIBLE
+from bemt.schema import Collector, Key, check_value
 from bemt.tables import write_atomic
 from geometry.common import GeometryError
 from geometry.export import MANIFEST, export
@@ -28,9 +31,16 @@ if TYPE_CHECKING:
     from geometry.mesh import Model
     from geometry.rotor import Rotor
 
-__all__ = ["Run", "settings_of", "write_openfoam"]
+__all__ = ["RANGES", "Run", "check_run", "settings_of", "write_openfoam"]
 
 FACETS = 96  # of the centre body
+RANGES: dict[str, Key] = {
+    "rpm": SCHEMA["operating"]["rpm"],
+    "airspeed_m_s": replace(SCHEMA["operating"]["airspeed_m_s"], low=0.0),  # backward flight has no inlet
+    "sideslip_deg": Key(unit="deg", low=0, high=90),
+    "level": Key(low=4, high=9),
+}
+"""What the numbers of a :class:`Run` may be: those of a case file, where it has them."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +78,37 @@ class Run:
     iterations: int = 400
     average: int = 100
     ranks: int = 2
+
+
+def check_run(run: Run, names: Mapping[str, str] | None = None, file: str = "") -> list[Fault]:
+    """Find the numbers of a run that are not finite or out of range.
+
+    Parameters
+    ----------
+    run : Run
+        What is asked.
+    names : mapping or None
+        Name of each number for the messages; None is that of :class:`Run`.
+    file : str
+        What every fault starts with.
+
+    Returns
+    -------
+    list of Fault
+        All faults.
+
+    Examples
+    --------
+    >>> for fault in check_run(Run(rpm=float("nan"), level=20.0)): print(fault)
+    rpm: got nan; expected a number from 10 to 300000 rev/min.
+    level: got 20; expected a number from 4 to 9.
+    """
+    out = Collector(file)
+    for key, allowed in RANGES.items():
+        value = getattr(run, key)
+        if value is not None:
+            check_value(out, key if names is None else names[key], value, allowed)
+    return out.faults
 
 
 def _standing(duct: Duct | None, parts: int) -> tuple[Duct | None, bool]:
@@ -110,6 +151,9 @@ def settings_of(case: Case, run: Run, options: Options | None = None) -> tuple[S
         When the case makes no sound solid or the run cannot be.
     """
     file = case.path.as_posix()
+    faults = check_run(run, file=file)
+    if faults:
+        raise InputError(faults)
     rotor, whole, air = case.rotor(), case.duct(), case.air()
     rpm = case.rpm if run.rpm is None else run.rpm
     V = case.airspeed_m_s if run.airspeed_m_s is None else run.airspeed_m_s
@@ -195,7 +239,13 @@ def write_openfoam(case: Case, out: Path, run: Run, options: Options | None = No
         import trimesh
 
         solid = trimesh.Trimesh(*revolve(parts["tail"], FACETS), process=False)
-        write_atomic(out / "constant" / "triSurface" / "centrebody.stl", str(solid.export(file_type="stl_ascii")))
+        data = str(solid.export(file_type="stl_ascii")).encode()
+        path = "constant/triSurface/centrebody.stl"
+        write_atomic(out / path, data)
+        surface = {"name": "centrebody", "triangles": len(solid.faces), "area_m2": float(solid.area)}
+        manifest["files"].append({"path": path, "format": "openfoam", "unit": "m", "watertight": True,
+                                  "surfaces": [surface], "bytes": len(data),
+                                  "sha256": hashlib.sha256(data).hexdigest()})  # fmt: skip
     files = case_files(settings, case.title)
     for name, text in files.items():
         write_atomic(out / name, text)

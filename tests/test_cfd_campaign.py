@@ -76,6 +76,10 @@ def write(folder: Path, project: Path, text: str) -> Path:
     return path
 
 
+def tree(folder: Path) -> set[str]:
+    return {path.relative_to(folder).as_posix() for path in folder.rglob("*")}
+
+
 def rows_of(folder: Path) -> list[dict[str, str]]:
     with (folder / "recording.csv").open(newline="") as stream:
         return list(csv.DictReader(stream))
@@ -191,9 +195,11 @@ def test_a_campaign_is_recorded(
     assert main(["cfd", str(path), "--ranks", "1", "--work", work, "--quiet"]) == 0
     assert calls(programs, "simpleFoam") == 2, "finished points are not run again"
     write(path.parent, project, TWO.replace("[6000, 9000]", "[6000, 9000, 12000]"))
+    kept = tree(Path(work))
+    assert len([name for name in kept if name.count("/") == 0]) == 3, "a grid and two runs"
     assert main(["cfd", str(path), "--ranks", "1", "--work", work, "--quiet"]) == 0
     assert calls(programs, "simpleFoam") == 3 and len(rows_of(path.parent)) == 3
-    assert not Path(work).exists()
+    assert tree(Path(work)) == kept, "what was kept stays, the new run's folder goes"
 
 
 def test_a_killed_campaign_goes_on(project: Path, tmp_path: Path, programs: Path) -> None:
@@ -216,6 +222,112 @@ def test_a_killed_campaign_goes_on(project: Path, tmp_path: Path, programs: Path
     assert calls(programs, "simpleFoam") == 3, "the first once, the second twice"
     assert calls(programs, "blockMesh") == 1, "its grid was finished"
     assert not [p for p in path.parent.iterdir() if p.name.startswith(".")]
+    assert not tree(tmp_path / "w"), "neither from now nor from before it was killed"
+
+
+def test_the_work_folder_loses_nothing_that_the_campaign_did_not_make(
+    project: Path, tmp_path: Path, programs: Path
+) -> None:
+    path, work = write(tmp_path / "c", project, TWO), tmp_path / "w"
+    names = [point_key(point)[:2] for point in load_campaign(path).points]
+    mine = ["thesis.tex", "run-1/data.csv", "grid-old/points", f"run-{names[0][0]}-mine/a", "run-0123456789ab/U",
+            f"grid-{names[0][1]}-8/done"]  # fmt: skip
+    for name in mine:
+        (work / name).parent.mkdir(parents=True, exist_ok=True)
+        (work / name).write_text("mine")
+    before = tree(work)
+    command = ["cfd", str(path), "--ranks", "1", "--work", str(work), "--quiet"]
+    for runs in (2, 2):  # the second time all is recorded and nothing runs
+        assert main(command) == 0
+        assert calls(programs, "simpleFoam") == runs and tree(work) == before
+    assert {(work / name).read_text() for name in mine} == {"mine"}
+    assert main([*command, "--only", "1"]) == 0
+    made = tree(work) - before
+    assert {name for name in made if "/" not in name} == {f"run-{names[0][0]}", f"grid-{names[0][1]}-1"}
+    assert main(command) == 0
+    assert tree(work) == before, "what --only left goes with the whole campaign"
+    (tmp_path / "empty").mkdir()
+    (path.parent / "recording.csv").unlink()
+    assert main([*command[:-2], str(tmp_path / "empty"), "--quiet"]) == 0
+    assert not tree(tmp_path / "empty")
+    (path.parent / "recording.csv").unlink()
+    assert main([*command[:-2], str(tmp_path / "new"), "--quiet"]) == 0
+    assert not (tmp_path / "new").exists(), "a folder that was not there is not left behind"
+
+
+def test_the_default_work_folder_is_left_as_it_was(
+    project: Path, tmp_path: Path, programs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("BEMT_CFD_WORK", raising=False)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "tmp"))
+    (tmp_path / "tmp").mkdir()
+    path = write(tmp_path / "c", project, TWO)
+    command = ["cfd", str(path), "--ranks", "1", "--quiet"]
+    assert main([*command, "--only", "1"]) == 0
+    assert [p.name for p in (tmp_path / "tmp").iterdir()] == ["bemt-cfd-t"]
+    assert main(command) == 0 and calls(programs, "blockMesh") == 1
+    assert not list((tmp_path / "tmp").iterdir())
+    (path.parent / "recording.csv").unlink()
+    (tmp_path / "tmp" / "bemt-cfd-t").mkdir()
+    (tmp_path / "tmp" / "bemt-cfd-t" / "notes").write_text("mine")
+    assert main(command) == 0
+    assert tree(tmp_path / "tmp") == {"bemt-cfd-t", "bemt-cfd-t/notes"}
+
+
+@pytest.mark.parametrize("name", ["a/../h/deadly", "..", "/h", ".hidden", "a b", "x\\n", "-x"])
+def test_a_name_leads_nowhere(
+    project: Path, tmp_path: Path, programs: Path, name: str, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    """A campaign's name obeys the rule of a case's: the default work folder bears it."""
+    monkeypatch.delenv("BEMT_CFD_WORK", raising=False)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "tmp"))
+    (tmp_path / "tmp" / "h" / "deadly").mkdir(parents=True)
+    path = write(tmp_path / "c", project, TWO)
+    path.write_text(path.read_text().replace('name = "t"', f'name = "{name}"'))
+    assert main(["cfd", str(path), "--ranks", "1"]) == 2
+    told = capsys.readouterr().err
+    assert "campaign.toml: name: got " in told and "letters, digits, dot, dash and underscore" in told
+    assert tree(tmp_path / "tmp") == {"h", "h/deadly"} and tree(path.parent) == {"campaign.toml"}
+    assert calls(programs, "blockMesh") == 0
+
+
+LOG = ["Creating block mesh", "--> FOAM FATAL ERROR:", "Unknown patch, \"walls\"", "", "    From function x",
+       "    in file blockMesh.C at line 99.", "FOAM exiting"]  # fmt: skip
+
+
+@pytest.mark.parametrize("program", ["blockMesh", "simpleFoam"])
+@pytest.mark.parametrize("again", [[], ["--only", "1"]])
+def test_a_run_that_never_began_says_why_and_is_tried_again(
+    project: Path, tmp_path: Path, programs: Path, program: str, again: list[str]
+) -> None:
+    path, work = write(tmp_path / "c", project, TWO.replace("[6000, 9000]", "[6000]")), tmp_path / "w"
+    file = tmp_path / "bin" / program
+    sound = file.read_text()
+    lines = "\n".join(LOG)
+    file.write_text(f"#!/bin/sh\nprintf '%s\\n' '{lines}'\nexit 1\n")
+    command = ["cfd", str(path), "--ranks", "1", "--work", str(work), "--quiet"]
+    assert main(command) == 1
+    (row,) = rows_of(path.parent)
+    assert (row["converged"], row["iterations"], row["thrust_N"]) == ("0", "0", "")
+    for words in (f"{program} failed", *(" ".join(line.split()) for line in LOG)):
+        assert words in row["note"]
+    (manifest,) = json.loads((path.parent / "manifest.json").read_text())["not_converged"]
+    assert manifest["note"] == row["note"]
+    assert [p.read_text().split("\n")[:7] for p in work.glob(f"*/log.{program}")] == [LOG], "the log can be read"
+    beside = write(tmp_path / "d", project, TWO)  # a campaign beside it borrows no failure
+    assert main(["cfd", str(beside), "--ranks", "1", "--work", str(tmp_path / "w2"), "--quiet"]) == 1
+    assert [r["iterations"] for r in rows_of(beside.parent)] == ["0", "0"]
+    file.write_text(sound)
+    assert main(["cfd", str(beside), "--ranks", "1", "--work", str(tmp_path / "w2"), "--quiet"]) == 0
+    assert [(r["rpm"], r["converged"]) for r in rows_of(beside.parent)] == [("6000", "1"), ("9000", "1")]
+    for other in beside.parent.iterdir():  # else its result would be taken over
+        other.unlink()
+    assert main([*command, *again]) == 0
+    (row,) = rows_of(path.parent)
+    assert (row["converged"], row["iterations"], row["note"]) == ("1", "30", "ok")
+    assert json.loads((path.parent / "manifest.json").read_text())["not_converged"] == []
+    assert main(command) == 0 and not tree(work), "the logs of the failure go once it has run"
 
 
 def test_a_run_that_drifts_is_nan_flagged_and_its_history_kept(project: Path, tmp_path: Path, programs: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,9 @@ import pytest
 
 from bemt.case import load_case
 from bemt.cli import main
+from bemt.errors import InputError
+from bemt.export_case import export_case
+from bemt.export_case_openfoam import Run, settings_of
 from geometry import export as module
 from geometry.airfoil import naca4
 from geometry.common import GeometryError
@@ -178,3 +182,129 @@ def test_export_command_prints_one_document(project: Path, tmp_path: Path, capsy
     assert main(["export", str(project / "cases/prop_8x5"), "--out", str(tmp_path / "q"), *thick]) == 2
     assert "at least min_thickness, 5 mm" in capsys.readouterr().err
     assert not (tmp_path / "q").exists()
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if not p.is_dir()}
+
+
+def copies(project: Path, folder: Path, names: dict[str, str]) -> Path:
+    """Cases in folders, with names of their own."""
+    for sub, name in names.items():
+        shutil.copytree(project / "cases" / "prop_8x5", folder / sub)
+        path = folder / sub / "case.toml"
+        text = path.read_text()
+        assert text.count('name = "prop_8x5"') == 1
+        path.write_text(text.replace('name = "prop_8x5"', f'name = "{name}"'))
+    return folder
+
+
+def test_cases_of_one_name_are_refused_before_anything_is_written(
+    project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    names = {"a": "p", "b": "q", "c": "p", "d": "q", "e": "P", "f": "r"}
+    folder = copies(project, tmp_path / "cases", names)
+    out = tmp_path / "out"
+    assert main(["export", str(folder), "--out", str(out)]) == 2
+    told = capsys.readouterr().err.splitlines()
+    assert [line.split("/cases/")[1].split("/")[0] for line in told] == ["c", "d", "e"]
+    assert f"name: got 'q' as in {folder.as_posix()}/b/case.toml; expected a name of its own." in told[1]
+    assert not out.exists()
+    for name in "cde":
+        shutil.rmtree(folder / name)
+    assert main(["export", str(folder), "--out", str(out)]) == 0
+    assert {p.name for p in out.iterdir()} == {"p", "q", "r"}
+
+
+BAD = [("--rpm", "nan"), ("--rpm", "inf"), ("--rpm", "0"), ("--rpm", "-5"), ("--rpm", "1e6"), ("--rpm", "1e308"),
+       ("--airspeed", "1e4"), ("--airspeed", "-1"), ("--airspeed", "nan"), ("--airspeed", "1e308"),
+       ("--level", "nan"), ("--level", "3.9"), ("--sideslip-deg", "nan"), ("--sideslip-deg", "91")]  # fmt: skip
+
+
+@pytest.mark.parametrize(("option", "value"), BAD)
+def test_numbers_of_the_flow_are_checked_as_those_of_a_case(
+    project: Path, tmp_path: Path, option: str, value: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Refused on the command line and from Python alike, before anything is written."""
+    out = tmp_path / "o"
+    command = ["export", str(project / "cases/prop_8x5"), "--out", str(out), "--format", "stl", "openfoam"]
+    assert main([*command, f"{option}={value}"]) == 2
+    told = capsys.readouterr().err
+    assert told.startswith(f"{option}: got ") and "expected a number from " in told and len(told.splitlines()) == 1
+    assert not out.exists()
+    key = {"--rpm": "rpm", "--airspeed": "airspeed_m_s", "--level": "level", "--sideslip-deg": "sideslip_deg"}[option]
+    with pytest.raises(InputError, match=f"case.toml: {key}: got "):
+        settings_of(load_case(project / "cases" / "prop_8x5"), Run(**{key: float(value)}))
+
+
+def test_all_faults_of_the_options_are_told_at_once(
+    project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["export", str(project / "cases/prop_8x5"), "--out", str(tmp_path / "o"), "--fillet-mm", "-1"]
+    assert main([*command, "--format", "openfoam", "--rpm", "nan", "--airspeed", "1000", "--level", "12"]) == 2
+    told = capsys.readouterr().err
+    assert [line.split(":")[0] for line in told.splitlines()] == ["--rpm", "--airspeed", "--level", "fillet"]
+    assert "from 10 to 300000 rev/min" in told and "from 0 to 300 m/s. Looks like km/h" in told
+    assert main([*command, "--format", "stl", "obj", "--rpm", "9000", "--airspeed", "4", "--sideslip-deg", "5",
+                 "--level", "5", "--domain", "pipe", "--sector", "full", "--turbulence", "realizableKE",
+                 "--incompressible"]) == 2  # fmt: skip
+    told = capsys.readouterr().err
+    assert [line.split(":")[0] for line in told.splitlines()] == [
+        "--rpm", "--airspeed", "--sideslip-deg", "--level", "--domain", "--sector", "--turbulence", "--incompressible",
+        "fillet"]  # fmt: skip
+    assert told.count("expected nothing without the format openfoam. Add --format openfoam.") == 8
+    assert not (tmp_path / "o").exists()
+
+
+def test_an_earlier_export_leaves_nothing_that_no_manifest_lists(project: Path, tmp_path: Path) -> None:
+    case = load_case(project / "cases" / "prop_8x5")
+    mine = {"notes.txt": b"mine", "mine.obj": b"mine", "constant/triSurface/mine.stl": b"mine"}
+
+    def now(formats: list[str], unit: str = "mm") -> set[str]:
+        """What is in the folder after an export, the owner's own files aside, which are as they were."""
+        export_case(case, tmp_path, formats, unit, COARSE)
+        there = files(tmp_path)
+        assert {name: there.pop(name) for name in mine} == mine
+        manifest = json.loads(there.pop("manifest.json"))
+        listed = {item["path"]: item["sha256"] for item in manifest["files"]}
+        listed |= manifest.get("openfoam", {}).get("files", {})
+        assert {name: hashlib.sha256(data).hexdigest() for name, data in there.items()} == listed
+        return {name for name in there if "/" not in name}
+
+    for name, data in mine.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_bytes(data)
+    assert now(["stl", "obj"], "m") == {"prop_8x5.stl", "prop_8x5.obj"}
+    assert now(["stl"]) == {"prop_8x5.stl"}, "the OBJ of the other unit is gone"
+    assert now(["stl", "openfoam"]) == {"prop_8x5.stl", "Allrun"}
+    assert now(["obj"]) == {"prop_8x5.obj"}
+    assert {p.name for p in tmp_path.iterdir() if p.is_dir()} == {"constant"}, "no empty folders"
+    edited = tmp_path / "prop_8x5.obj"
+    edited.write_text("my own edit")
+    export_case(case, tmp_path, ["stl"], "mm", COARSE)
+    assert edited.read_text() == "my own edit", "not what the manifest lists any more"
+
+
+@pytest.mark.parametrize("schema", ["geometry.export/1", "another/1"])
+def test_a_manifest_removes_nothing_elsewhere(project: Path, tmp_path: Path, schema: str) -> None:
+    """A manifest is a file that anybody may have written."""
+    out, case = tmp_path / "out", load_case(project / "cases" / "prop_8x5")
+    (tmp_path / "elsewhere").mkdir()
+    out.mkdir()
+    (out / "link").symlink_to(tmp_path / "elsewhere")
+    (tmp_path / "elsewhere" / "a").write_text("mine")
+    (tmp_path / "b").write_text("mine")
+    (out / "c").symlink_to(tmp_path / "b")
+    (out / "d").write_text("mine")
+    digest = hashlib.sha256(b"mine").hexdigest()
+    paths = ["../b", (tmp_path / "b").as_posix(), "link/a", "c", "", "..", "x/../../b", "link", "a\0b", "d"]
+    listed = [{"path": path, "sha256": digest} for path in paths]
+    (out / "manifest.json").write_text(json.dumps({"schema": schema, "files": listed}))
+    before = files(tmp_path)
+    export_case(case, out, ["stl"], "mm", COARSE)
+    after = files(tmp_path)
+    gone = {"out/d"} if schema == "geometry.export/1" else set()
+    assert {name for name in before if after.get(name) != before[name]} == {"out/manifest.json", *gone}
+    for text in ("", "[]", "{}", '{"schema": "geometry.export/1", "files": [1]}', "[" * 100_000, "\xff"):
+        (out / "manifest.json").write_bytes(text.encode("latin-1"))
+        export_case(case, out, ["stl"], "mm", COARSE)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 import os
 import re
@@ -283,6 +284,44 @@ def test_allrun_says_when_openfoam_is_absent(tmp_path: Path) -> None:
     assert run.returncode == 1 and "OpenFOAM is not installed" in run.stderr
 
 
+@pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
+@pytest.mark.parametrize("step", ["mesh", "solve"])
+@pytest.mark.parametrize("ranks", ["1", "2"])
+def test_allrun_removes_what_a_run_left_and_nothing_else(tmp_path: Path, step: str, ranks: str) -> None:
+    """The folder may be one that its owner keeps other things in, with digits at the start of their names."""
+    case = tmp_path / "case"
+    for name, text in case_files(settings()).items():
+        (case / name).parent.mkdir(parents=True, exist_ok=True)
+        (case / name).write_text(text)
+    elsewhere = tmp_path / "elsewhere" / "U"
+    mine = ["2024_bench/run.csv", "8x5.stl", "9", "2024/run.csv", "1.5 mm/a", "10 x/U", "0.orig/notes", "processor.txt",
+            "processor_old/0/U", "processor0.md", "30-mesh/U", "-1/U"]  # fmt: skip
+    stale = ["0/U", "400/U", "400/uniform/time", "500/p", "constant/polyMesh/points", "postProcessing/forces/0/x"]
+    parts = ["processor0/0/U", "processor0/400/U", "processor1/400/U", "processor17/0/U"]
+    for path in [elsewhere, *(case / name for name in [*mine, *stale, *parts])]:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("old")
+    (case / "77").symlink_to(elsewhere.parent)
+    env = fake_programs(tmp_path / "bin") | {"NP": ranks}
+    for name in ("decomposePar", "topoSet", "createPatch", "checkMesh", "setFields", "mpirun"):
+        (tmp_path / "bin" / name).write_text("#!/bin/sh\nexit 0\n")
+        (tmp_path / "bin" / name).chmod(0o755)
+    run = subprocess.run(["bash", str(case / "Allrun"), step], capture_output=True, text=True, env=env, timeout=60)
+    assert run.returncode == (0 if step == "mesh" else 3) and "rm:" not in run.stderr, run.stdout + run.stderr
+    for name in mine:
+        assert (case / name).read_text() == "old", name
+    assert (case / "77").is_symlink() and elsewhere.read_text() == "old"
+    left = {name for name in [*stale, *parts] if (case / name).exists() and (case / name).read_text() == "old"}
+    if step == "mesh":
+        assert not left and not list(case.glob("processor[0-9]")), "the grid is new: neither times nor processors stay"
+    else:
+        times = {name for name in stale if name[0] in "045"} if ranks == "1" else {*parts}
+        assert not left & (times | {stale[-1]}), "the old fields of the folders that are solved in"
+        fresh = ["0"] if ranks == "1" else ["processor0/0", "processor1/0", "processor17/0"]
+        for name in fresh:
+            assert (case / name / "U").read_text() == (case / "0.orig" / "U").read_text()
+
+
 def test_the_solver_follows_the_tip_mach_number(project: Path) -> None:
     case = load_case(project / "cases" / "prop_8x5")
     assert settings_of(case, Run(), COARSE)[0].compressible  # tip Mach number 0.63
@@ -307,6 +346,10 @@ def test_a_sector_leaves_out_vanes_that_do_not_fit(project: Path, tmp_path: Path
     assert manifest["openfoam"]["sectors"] == case.rotor().B and "left out" in " ".join(manifest["openfoam"]["notes"])
     stl = {path.stem for path in (tmp_path / "fan" / "constant" / "triSurface").glob("*.stl")}
     assert stl == {"blade", "hub", "duct", "centrebody"}
+    listed = {item["path"]: item["sha256"] for item in manifest["files"]}
+    for name in stl:
+        path = f"constant/triSurface/{name}.stl"
+        assert hashlib.sha256((tmp_path / "fan" / path).read_bytes()).hexdigest() == listed[path]
     s, _ = settings_of(case, Run(), COARSE)
     assert set(s.surfaces) == stl
     whole, _ = settings_of(case, Run(sector="full"), COARSE)

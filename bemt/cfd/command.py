@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import shutil
 import signal
@@ -24,7 +25,7 @@ __all__ = ["run", "run_campaign"]
 
 
 def run_campaign(
-    campaign: Campaign, work: Path, only: int | None = None, ranks: int = 2, quiet: bool = False
+    campaign: Campaign, work: Path, only: int | None = None, ranks: int = 2, quiet: bool = False, keep: bool = True
 ) -> Record:
     """Run the points of a campaign that are not recorded yet.
 
@@ -40,6 +41,10 @@ def run_campaign(
         Processes of a run.
     quiet : bool
         No progress.
+    keep : bool
+        Leave the folders of grids and runs in `work`. Else those that this campaign made there (now, with `only`, or
+        before it was stopped) go at the end, and `work` with them when it was made here and nothing else is in it;
+        what was kept once stays, and so do the logs of a program that failed before the first iteration.
 
     Returns
     -------
@@ -71,13 +76,14 @@ def run_campaign(
     record = Record(campaign)
     record.borrow(order if only is None else [])
     record.write(order)
+    fresh = not work.exists()
     work.mkdir(parents=True, exist_ok=True)
 
     def tell(text: str) -> None:
         if not quiet:
             print(text, file=sys.stderr, flush=True)
 
-    worker = Worker(work, ranks)
+    worker = Worker(work, ranks, keep)
     for k, (point, key) in enumerate(zip(campaign.points, keys, strict=True), 1):
         if (only is not None and k != only) or (only is None and key[0] in record.done):
             continue
@@ -90,8 +96,20 @@ def run_campaign(
         state = "" if v["converged"] else f"  NOT CONVERGED {v['note']}"
         tell(f"  T {number_text(v['thrust_N'])} N, Q {number_text(v['torque_Nm'])} N m, {v['cells']} cells, "
              f"{v['seconds']:.0f} s{state}")  # fmt: skip
+        if not v["iterations"]:
+            tell(f"  nothing was computed: it will be tried again; logs below {work}")
     record.write(order)
+    if not keep and only is None:  # a single point is tried again and again: its grid waits for the whole campaign
+        worker.clear([key[:2] for key in keys])
+        if fresh:
+            _remove_empty(work)
     return record
+
+
+def _remove_empty(folder: Path) -> None:
+    """Remove a folder unless something is in it."""
+    with contextlib.suppress(OSError):
+        folder.rmdir()
 
 
 def _table(record: Record) -> str:
@@ -140,11 +158,11 @@ def run(args: argparse.Namespace) -> int:
     work = Path(named) if named else Path(tempfile.gettempdir()) / f"bemt-cfd-{campaign.name}"
     before = signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))  # so that the solver ends with us
     try:
-        record = run_campaign(campaign, work, args.only, args.ranks, args.quiet)
+        record = run_campaign(campaign, work, args.only, args.ranks, args.quiet, args.keep)
     finally:
         signal.signal(signal.SIGTERM, before)
-    if not args.keep and args.only is None:
-        shutil.rmtree(work, ignore_errors=True)
+    if not named and not args.keep:
+        _remove_empty(work)  # made by us, now or before we were stopped
     if args.json:
         document: dict[str, Any] = {"schema": "bemt.cfd-run/1", "campaign": campaign.name, "rows": record.rows}
         print(json_text(document), end="")

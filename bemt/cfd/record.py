@@ -6,7 +6,7 @@ import csv
 import hashlib
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -65,6 +65,11 @@ def _read(path: Path) -> list[dict[str, Any]]:
                 row[key] = value
             rows.append(row)
     return rows
+
+
+def _tried(row: Mapping[str, Any]) -> bool:
+    """Whether a run says something of its flow; else a program failed before, which may have been the machine's."""
+    return bool(row["converged"] == 1 or row["iterations"] > 0)
 
 
 def grid_studies(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
@@ -166,8 +171,8 @@ class Record:
 
     @property
     def done(self) -> set[str]:
-        """Runs that are recorded, converged or not."""
-        return {row["run"] for row in self.rows}
+        """Runs that are recorded, converged or not; one that never came to iterate is to be tried again."""
+        return {row["run"] for row in self.rows if _tried(row)}
 
     def borrow(self, names: Sequence[str]) -> None:
         """Take over runs that a campaign beside this one has recorded already.
@@ -180,8 +185,13 @@ class Record:
         for path in sorted(self.folder.parent.glob("*/recording.csv")):
             if path != self.path and not set(names) <= self.done:
                 wanted = set(names) - self.done
-                self.rows += [row for row in _read(path) if row["run"] in wanted]
+                self._take(row for row in _read(path) if row["run"] in wanted and _tried(row))
                 self._radial(path.parent / "radial.csv", wanted)
+
+    def _take(self, rows: Iterable[dict[str, Any]]) -> None:
+        """Put in rows, in place of those of the same run."""
+        new = {row["run"]: row for row in rows}
+        self.rows = [row for row in self.rows if row["run"] not in new] + list(new.values())
 
     def add(self, outcome: Outcome, order: Sequence[str]) -> None:
         """Add a run and write everything.
@@ -194,8 +204,8 @@ class Record:
             Runs of the campaign in their order.
         """
         name = outcome.values["run"]
-        others = [row for row in _read(self.path) if row["run"] not in self.done]  # by another process, meanwhile
-        self.rows = [row for row in [*self.rows, *others] if row["run"] != name] + [outcome.values]
+        self._take(row for row in _read(self.path) if row["run"] not in self.done)  # by another process, meanwhile
+        self._take([outcome.values])
         place = {run: k for k, run in enumerate(order)}
         self.rows.sort(key=lambda row: place.get(row["run"], len(place)))
         if outcome.history is not None and not outcome.values["converged"]:
@@ -256,7 +266,7 @@ class Record:
             "case_sha256": self.campaign.case.content_hash(),
             "campaign_sha256": hashlib.sha256(self.campaign.path.read_bytes()).hexdigest(),
             "points": len(order), "recorded": len(done), "converged": sum(int(r["converged"]) for r in done),
-            "missing": [run for run in order if run not in self.done],
+            "missing": [run for run in order if run not in {row["run"] for row in self.rows}],
             "not_converged": [{"run": r["run"], "note": r["note"]} for r in done if not r["converged"]],
             "older": [row["run"] for row in self.rows if row["run"] not in names],
             "rule": {"drift_limit": DRIFT_LIMIT, "scatter_limit": SCATTER_LIMIT,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bemt.case import Case, load_case
+from bemt.case import Case, check_name, load_case
 from bemt.errors import Fault, InputError
 from bemt.export_case_openfoam import Run
 from bemt.openfoam.settings import DOMAINS, GASES, SECTORS, TURBULENCE
@@ -131,6 +131,7 @@ def load_campaign(path: str | Path) -> Campaign:
         raise InputError(out.faults)
     tables = ("defaults", "axes", "points", "duct")
     check_table(out, "", document, SCHEMA, subtables=tables)
+    check_name(out, document.get("name"))  # the default work folder bears it
     for table in ("defaults", "duct"):
         if table in document:
             check_table(out, table, document[table], SCHEMA)

@@ -11,6 +11,7 @@ import shutil
 import signal
 import subprocess
 import time
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -33,6 +34,10 @@ DRIFT_LIMIT = 0.03
 """Change over the averaged iterations, of the mean, above which a run counts as not converged."""
 SCATTER_LIMIT = 0.05
 """Standard deviation over the averaged iterations, of the mean, above which it counts as not converged."""
+TEMPORARY = "temporary"
+"""File in a folder of grid or run that may go when its campaign has ended."""
+NOTE_LENGTH = 800
+"""Characters of a program's last lines that a note keeps."""
 GRID_FILES = ("system/blockMeshDict", "system/snappyHexMeshDict", "system/topoSetDict", "system/createPatchDict",
               "constant/triSurface/lines.obj")  # fmt: skip
 Array = NDArray[np.float64]
@@ -185,6 +190,17 @@ def _grid_report(folder: Path) -> tuple[int, str]:
     return (int(cells[1]) if cells else 0), "; ".join(bad) or "ok"
 
 
+def _last_words(out: Path) -> str:
+    """Why a step of Allrun failed: which program, and the end of its log."""
+    text = out.read_text(errors="replace") if out.is_file() else ""
+    lines = [" ".join(line.split()) for line in text.splitlines() if line.strip()]
+    head = [k for k, line in enumerate(lines) if " failed; the end of log." in line]
+    if not head:
+        return " | ".join(lines[-3:])[-NOTE_LENGTH:]
+    end = " | ".join(lines[head[-1] + 1 :])
+    return f"{lines[head[-1]]} {end[-NOTE_LENGTH:]}".strip()
+
+
 @dataclass
 class Worker:
     """Runs points in a work folder.
@@ -195,10 +211,33 @@ class Worker:
         Folder of grids and runs.
     ranks : int
         Processes of a run.
+    keep : bool
+        Whether the folders made there stay for good; else they are marked, and :meth:`clear` removes them.
     """
 
     work: Path
     ranks: int = 1
+    keep: bool = True
+
+    def _own(self, folder: Path) -> None:
+        """Mark a folder as one that goes at the end, or as one that stays."""
+        if self.keep:
+            (folder / TEMPORARY).unlink(missing_ok=True)
+        else:
+            write_atomic(folder / TEMPORARY, "")
+
+    def clear(self, keys: Iterable[tuple[str, str]]) -> None:
+        """Remove the folders of some runs that were made here without `keep`, and nothing else.
+
+        Parameters
+        ----------
+        keys : iterable of (str, str)
+            Run and grid, as :func:`point_key` names them.
+        """
+        for run, grid in keys:
+            for folder in [self.work / f"run-{run}", *self.work.glob(f"grid-{grid}-*")]:
+                if (folder / TEMPORARY).is_file():
+                    shutil.rmtree(folder, ignore_errors=True)
 
     def _program(self, folder: Path, step: str) -> int:
         """Run one step of Allrun; its processes end with us."""
@@ -239,13 +278,16 @@ class Worker:
         """
         folder = self.work / f"grid-{key}-{self.ranks}"
         if (folder / "done").is_file():
+            if self.keep:
+                self._own(folder)
             return folder
         shutil.rmtree(folder, ignore_errors=True)
+        self._own(folder)
         write_openfoam(point.case, folder, point.run)
         begin = time.monotonic()
         if self._program(folder, "mesh") != 0:
-            words = (folder / "out.mesh").read_text(errors="replace").strip().splitlines()
-            raise RuntimeError("grid: " + " ".join(words[-3:])[:300])
+            (folder / TEMPORARY).unlink(missing_ok=True)  # its logs stay to be read
+            raise RuntimeError(f"grid: {_last_words(folder / 'out.mesh')}")
         write_atomic(folder / "done", f"{time.monotonic() - begin:.1f}\n")
         return folder
 
@@ -254,6 +296,7 @@ class Worker:
         source = self.grid(point, grid)
         folder = self.work / f"run-{run}"
         shutil.rmtree(folder, ignore_errors=True)
+        self._own(folder)
         for name, text in case_files(settings, point.case.title).items():
             write_atomic(folder / name, text)
         os.chmod(folder / "Allrun", 0o755)
@@ -315,16 +358,19 @@ class Worker:
         Returns
         -------
         Outcome
-            NaN and ``converged`` 0 when the run failed, diverged or kept drifting; its history is there.
+            NaN and ``converged`` 0 when the run failed, diverged or kept drifting; its history is there, unless a
+            program failed before the first iteration: then the note ends with that program's words.
         """
         name, grid, settings = keys or point_key(point)
         begin = time.monotonic()
         values = _columns(point, settings, name)
-        history, radial, note = None, None, ""
+        history, radial, note, failed = None, None, "", ""
         try:
             folder, values["start"] = self._prepare(point, name, grid, settings)
             values["cells"], note = _grid_report(folder)
             code = self._program(folder, "solve")
+            if code != 0:  # said before the loads are read: there may be none
+                failed = _last_words(folder / "out.solve")
             history = history_of(folder, settings)
             _means(values, history, settings, code)
             values["yplus_avg"] = _y_plus(folder)
@@ -332,11 +378,10 @@ class Worker:
             if code == 0:
                 about = {"grid": grid, "ranks": self.ranks, **asdict(_state(settings))}
                 write_atomic(folder / "state.json", json.dumps(about) + "\n")
-            else:
-                words = (folder / "out.solve").read_text(errors="replace").strip().splitlines()
-                note = " ".join([note, *words[-2:]])[:300]
         except (RuntimeError, InputError, OSError) as error:
-            note = str(error)[:300]
+            failed = failed or str(error)[: NOTE_LENGTH + 100]
+            (self.work / f"run-{name}" / TEMPORARY).unlink(missing_ok=True)  # its logs stay to be read
+        note = " ".join(words for words in (note, failed) if words)
         values |= {"seconds": round(time.monotonic() - begin, 1), "note": note.replace("\n", " ")}
         return Outcome(values, history, radial if values["converged"] else None)
 

@@ -86,11 +86,28 @@ parallel() {
     echo "$1 on $NP processes"
     mpirun -np "$NP" "$@" -parallel > "log.$1" 2>&1 || failed "$1"
 }
-each() { if [ "$NP" -eq 1 ]; then "$1" .; else for d in processor*; do "$1" "$d"; done; fi; }
-start_fields() { rm -rf "$1/0" "$1"/[1-9]*; cp -r 0.orig "$1/0"; }
+# folders in $1 that are named by a number alone, with $2 before it
+numbered() {
+    for d in "$1"/"$2"*/; do
+        d=${d%/} && n=${d##*/} && n=${n#"$2"}
+        case $n in "" | *[!0-9]*) continue ;; esac
+        [ -L "$d" ] || echo "$d"
+    done
+}
+# a folder 2024 of yours has no fields: it is no time of a run
+is_time() {
+    for f in U p uniform polyMesh; do if [ -e "$1/$f" ]; then return 0; fi; done
+    [ "${1##*/}" = 0 ] || [ -z "$(ls -A "$1")" ]
+}
+clear_times() { numbered "$1" "" | while IFS= read -r old; do if is_time "$old"; then rm -rf "$old"; fi; done; }
+clear_processors() { numbered . processor | while IFS= read -r old; do rm -rf "$old"; done; }
+each() { if [ "$NP" -eq 1 ]; then "$1" .; else for part in $(numbered . processor); do "$1" "$part"; done; fi; }
+start_fields() { clear_times "$1"; cp -r 0.orig "$1/0"; }
 
 if [ "$step" = all ] || [ "$step" = mesh ]; then
-    rm -rf processor* constant/polyMesh postProcessing 0 [1-9]*
+    rm -rf constant/polyMesh postProcessing
+    clear_processors
+    clear_times .
     cat > system/decomposeParDict << EOF
 FoamFile { version 2.0; format ascii; class dictionary; object decomposeParDict; }
 numberOfSubdomains $NP;
