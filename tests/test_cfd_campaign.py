@@ -150,7 +150,7 @@ def test_the_key_of_a_run_stands_for_what_decides_it(project: Path, tmp_path: Pa
 
 @pytest.mark.parametrize(
     ("line", "new", "same"),
-    [("drag_level = 1.1", "drag_level = 1.3", True), ("camber = 0.035", "camber = 0.036", False),
+    [("drag_level = 1.1", "drag_level = 1.15", True), ("camber = 0.035", "camber = 0.036", False),
      ("beta_offset_deg = 0.7", "beta_offset_deg = 0.8", False),
      ("density_kg_m3 = 1.225", "density_kg_m3 = 1.2", False)],
 )  # fmt: skip
