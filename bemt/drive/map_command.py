@@ -128,7 +128,7 @@ def _option_faults(args: argparse.Namespace) -> list[Fault]:
         faults.append(Fault("", "--voltage", f"{args.voltage:g}", "none without --thrust, which it belongs to"))
     if args.nodes < 2:
         faults.append(Fault("", "--nodes", str(args.nodes), "2 or more: between them the tables are read"))
-    if args.name is not None and (not args.name.strip(" .") or any(c in '/\\:' or c < " " for c in args.name)):
+    if args.name is not None and (not args.name.strip(" .") or any(c in "/\\:" or c < " " for c in args.name)):
         hint = "It names files in --out DIR"
         faults.append(Fault("", "--name", repr(args.name), "a name without /, \\ and :, and not of dots alone", hint))
     return faults

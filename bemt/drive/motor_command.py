@@ -120,6 +120,7 @@ def _generate(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _generated(path: Path) -> bool:
+    """Whether a file says in its first line that it was generated."""
     if not path.is_file():
         return False
     with path.open("rb") as stream:

@@ -114,6 +114,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _toml(path: Path) -> Path:
+    """The file itself, also where its folder is named."""
     return path / "thrusters.toml" if path.is_dir() else path
 
 
