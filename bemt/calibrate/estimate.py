@@ -189,7 +189,7 @@ def _check(
     tests = (
         ("diameter_m", D, (D > 0) & (D < 100), "a positive length", hint),
         ("blades", B, (B >= 1) & (B <= 20) & (B == np.floor(B)), "a whole number from 1 to 20", ""),
-        ("rpm", rpm, (rpm >= 0) & np.isfinite(rpm), "a finite number of 0 rev/min or more", "The model has no sense of rotation"),
+        ("rpm", rpm, (rpm >= 0) & np.isfinite(rpm), "0 rev/min or more, finite", "The model has no sense of rotation"),
         ("airspeed_m_s", V, np.isfinite(V), "a finite speed", ""),
     )
     faults = [
