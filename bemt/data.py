@@ -1,7 +1,8 @@
 """``python -m bemt data uiuc``: a public database of measured propellers into the user's cache.
 
 The publisher gives no hash, so the first archive is trusted and its SHA-256 is written beside the data
-(``.bemt-data.json``); a later ``--refresh`` refuses an archive with another hash. The data stay the publisher's: cite
+(``.bemt-data.json``) with the hash of every file, so that what others put there or changed is told from it and never
+deleted; a later ``--refresh`` refuses an archive with another hash. The data stay the publisher's: cite
 them as they ask. Never run against the publisher's server in the tests, which use a local one.
 
 Schema ``bemt.data/1``: ``kind``, ``folder``, ``url`` (or ``archive``), ``sha256``, ``bytes``, ``files``,
@@ -44,6 +45,28 @@ def _record(folder: Path) -> dict[str, Any] | None:
     return found if isinstance(found, dict) and isinstance(found.get("sha256"), str) else None
 
 
+def _files(folder: Path) -> dict[str, str]:
+    """Start of the hash of every file below a folder but the record, by its path there."""
+    found = (p for p in sorted(folder.rglob("*")) if p.is_symlink() or not p.is_dir())
+    names = {p.relative_to(folder).as_posix(): p for p in found}
+    return {n: "link" if p.is_symlink() else sha256(p)[:16] for n, p in names.items() if n != RECORD}
+
+
+def _check_own(folder: Path, known: dict[str, Any]) -> None:
+    """Refuse to replace a folder that holds more than an earlier run put there."""
+    there, names = _files(folder), known.get("names")
+    hint = "Move them away, or name another folder with --dir"
+    if isinstance(names, dict):
+        strange = [name for name, start in there.items() if names.get(name) != start]
+        got = f"files added or changed since ({len(strange)}): {', '.join(strange[:5])}"
+        got += ", ..." if len(strange) > 5 else ""
+    else:  # a record of earlier versions: it only counts
+        strange = list(there) if len(there) != known.get("files") else []
+        got = f"{len(there)} files where its record counts {known.get('files')}"
+    if strange:
+        raise InputError(Fault(os.fspath(folder), "", got, "only what this command put there", hint))
+
+
 def get(
     kind: str, folder: Path, source: Path | None = None, url: str | None = None, refresh: bool = False,
     progress: Callable[[int, int], None] | None = None,
@@ -59,7 +82,7 @@ def get(
     source : Path, optional
         Local archive to take instead of fetching one.
     url : str, optional
-        Mirror to fetch from.
+        Mirror to fetch from; not with `source`.
     refresh : bool
         Fetch again what is there already; it must have the recorded hash.
     progress : callable, optional
@@ -73,18 +96,24 @@ def get(
     Raises
     ------
     InputError
-        When the folder holds something else, the archive cannot be had, is not sound, or holds no propeller; the folder
+        When the folder holds something else, also beside the data of an earlier run, `source` and `url` are both given,
+        the archive cannot be had, is not sound, or holds no propeller; the folder
         is as before then.
     """
     from bemt.importers.uiuc import scan_folder
     from bemt.tables import json_text
 
+    if source is not None and url is not None:
+        raise InputError(Fault("", "--url", url, "none beside --from, which fetches nothing", "Give one of the two"))
     known = _record(folder)
     if known is None and folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         hint = "Name an empty or new folder with --dir"
         raise InputError(Fault(os.fspath(folder), "", "files that this command did not put there", "no folder", hint))
     if known and source is None and not refresh:
-        return {**known, "folder": os.fspath(folder), "checksum": "as recorded", "fetched": False}
+        said = {key: value for key, value in known.items() if key != "names"}
+        return {**said, "folder": os.fspath(folder), "checksum": "as recorded", "fetched": False}
+    if known:
+        _check_own(folder, known)
     address = url or URLS[kind]
     if source is None:
         archive = folder.with_name(f".{folder.name}.zip")
@@ -100,14 +129,15 @@ def get(
             if not scan.propellers:
                 expected = "tables such as volume-1/data/apce_10x5_geom.txt"
                 raise InputError(Fault(os.fspath(archive), "", "no propeller", expected, "Is this the archive?"))
+            names = _files(fresh)
             document: dict[str, Any] = {
                 "schema": SCHEMA, "kind": kind, "folder": os.fspath(folder),
                 "url": address if source is None else None, "archive": None if source is None else source.name,
                 "sha256": digest, "bytes": archive.stat().st_size,
-                "files": sum(1 for f in fresh.rglob("*") if f.is_file()), "propellers": len(scan.propellers),
+                "files": len(names), "propellers": len(scan.propellers),
                 "refused": len(scan.faults), "cite": CITE[kind],
             }  # fmt: skip
-            (fresh / RECORD).write_text(json_text(document), encoding="utf-8")
+            (fresh / RECORD).write_text(json_text({**document, "names": names}), encoding="utf-8")
     finally:
         if source is None:
             archive.unlink(missing_ok=True)

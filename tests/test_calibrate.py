@@ -316,3 +316,62 @@ def test_what_the_inputs_carry_is_the_scatter_that_was_planted():
     blind = limit.limit(replace(points, CT=exact), "label")  # the chord is not told: its scatter shows
     assert blind is not None and blind["scatter"] > 3 * smooth["scatter"]
     assert limit.limit(points.select(points.index < 5), "label") is None
+
+
+def archive(root: Path) -> Path:
+    """Two volumes of a small archive: three propellers, one with two runs, and a table that is not of the archive."""
+    for volume, names in (("volume-1", ("a_10x5", "b_9x6")), ("volume-2", ("c_11x7",))):
+        (root / "uiuc" / volume / "data").mkdir(parents=True)
+        for k, name in enumerate(names):
+            file = root / "uiuc" / volume / "data" / f"{name}_static_kt000{k}.txt"
+            file.write_text(f"RPM CT CP\n3000 0.{95 + k:03d} 0.040\n4000 0.{96 + k:03d} 0.041\n")
+    flight = root / "uiuc" / "volume-1" / "data" / "a_10x5_kt0009_4000.txt"
+    flight.write_text("J CT CP eta\n0.2 0.08 0.04 0.4\n0.3 0.07 0.04 0.525\n")
+    (root / "uiuc" / "volume-2" / "stand.csv").write_text(TABLE)
+    return root / "uiuc"
+
+
+def counted(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[dict, dict]:
+    assert cli.main(["calibrate", *words, "--json"]) == 0
+    doc = json.loads(capsys.readouterr().out)
+    return doc, {name: set_ and (set_["propellers"], set_["points"]) for name, set_ in doc["data"].items()}
+
+
+def test_what_is_held_out_is_not_in_the_data_found(tmp_path, capsys, monkeypatch):
+    root = archive(tmp_path)
+    monkeypatch.setenv("BEMT_DATA", str(tmp_path))
+    monkeypatch.setenv("BEMT_CACHE", "off")
+    doc, data = counted(capsys)
+    assert data == {"calibration": (6, 12), "test": None} and not any("left out of uiuc" in n for n in doc["notes"])
+    doc, data = counted(capsys, "--test", "uiuc/volume-2")  # its table is not fitted either
+    assert data == {"calibration": (2, 6), "test": (4, 6)} and doc["files"] == ["uiuc"]
+    assert doc["notes"][0].startswith("2 files of --test are left out of uiuc before the fit")
+    # the fit is that of the other volume, named
+    assert doc["k1k2"] == counted(capsys, str(root / "volume-1"), "--test", "uiuc/volume-2")[0]["k1k2"]
+    one = root / "volume-1" / "data" / "a_10x5_kt0009_4000.txt"
+    for name in (one, root / "volume-2" / ".." / "volume-1" / "data" / one.name):
+        assert counted(capsys, "--test", str(name))[1] == {"calibration": (5, 8), "test": (1, 2)}  # no run of a_10x5
+    assert cli.main(["calibrate", "--test", "uiuc/volume-2"]) == 0
+    assert "note: 2 files of --test are left out of uiuc before the fit" in capsys.readouterr().out
+    assert cli.main(["calibrate", "--test", "uiuc"]) == 2
+    assert capsys.readouterr().err.startswith("--test: got all of the data found; expected less than all.")
+
+
+def test_a_file_is_fitted_once_and_never_held_out_too(tmp_path, capsys):
+    root = archive(tmp_path)
+    stand, volume = str(root / "volume-2" / "stand.csv"), str(root / "volume-2")
+    (tmp_path / "link.csv").symlink_to(stand)
+    for words, message in (
+        ((stand, stand), f"FILES: {stand}: got files that FILES {stand} holds too (1: stand.csv); expected every file"),
+        ((volume, stand), f"FILES: {stand}: got files that FILES {volume} holds too (1: stand.csv)"),
+        ((stand, str(tmp_path / "link.csv")), "link.csv: got files that FILES"),
+        ((stand, "--test", stand), f"--test: {stand}: got files that FILES {stand} holds too"),
+        ((str(root), "--test", volume), f"--test: {volume}: got files that FILES {root} holds too (2: c_11x7_static_"),
+        ((volume, "--test", str(root)), "Held out is only what is not fitted."),
+        ((str(root / "volume-1"), "--test", volume, stand), f"--test: {stand}: got files that --test {volume} holds"),
+    ):
+        out = tmp_path / "out"
+        # with all other faults at once, and nothing written
+        assert cli.main(["calibrate", *words, str(tmp_path / "absent"), "--out", str(out)]) == 2
+        said = capsys.readouterr()
+        assert message in said.err and "absent: got nothing there" in said.err and not said.out and not out.exists()

@@ -170,9 +170,9 @@ def test_outside_the_data_is_flagged(kwargs, flag):
 
 def test_all_faults_at_once():
     with pytest.raises(InputError) as caught:
-        estimate.estimate(-0.2, 500.0, 2.5, -1.0, np.nan, chord_m=0.5, measured_pitch_m=-0.1)
+        estimate.estimate(-0.2, 500.0, 2.5, -1.0, np.nan, chord_m=-0.5, measured_pitch_m=-0.1, series="nobody")
     assert {f.where for f in caught.value.faults} == {
-        "diameter_m", "pitch_m", "blades", "rpm", "airspeed_m_s", "chord_m", "measured_pitch_m",
+        "diameter_m", "pitch_m", "blades", "rpm", "airspeed_m_s", "chord_m", "measured_pitch_m", "series",
     }  # fmt: skip
 
 

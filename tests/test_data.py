@@ -269,6 +269,51 @@ def test_a_folder_with_other_files_is_left_alone(tmp_path):
     assert left(tmp_path / "uiuc") == {"thesis.txt"}
 
 
+def test_what_the_user_added_or_changed_is_not_deleted(server, tmp_path):
+    archive, folder = tmp_path / "a.zip", tmp_path / "uiuc"
+    archive.write_bytes(zipped(FILES))
+    data.get("uiuc", folder, archive)
+
+    def refused(*words: str, **how: object) -> None:
+        before = {p: p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+        with pytest.raises(InputError) as caught:
+            data.get("uiuc", folder, **({"source": archive} | how))
+        assert all(word in str(caught.value) for word in words)
+        assert {p: p.read_bytes() for p in folder.rglob("*") if p.is_file()} == before
+
+    mine = folder / "volume-1" / "mine" / "notes.txt"
+    mine.parent.mkdir()
+    mine.write_text("days of work")
+    refused("files added or changed since (1): volume-1/mine/notes.txt", "--dir")
+    refused("notes.txt", source=None, url=url(server), refresh=True)
+    assert not server.ranges and left(tmp_path) == {"a.zip", "uiuc"}  # told before anything is fetched
+    assert "names" not in data.get("uiuc", folder)  # only looked at: nothing to refuse
+    mine.unlink()
+    table = folder / "volume-1" / "data" / "test_10x5_geom.txt"
+    table.write_text(GEOM + "\n")  # corrected by hand
+    refused("test_10x5_geom.txt")
+    table.write_text(GEOM)
+    assert data.get("uiuc", folder, archive)["checksum"] == "as recorded"
+    table.unlink()  # what is missing is put back
+    assert data.get("uiuc", folder, archive)["files"] == 4 and table.read_text() == GEOM
+    record = folder / data.RECORD  # of an earlier version: without names
+    record.write_text(json.dumps({k: v for k, v in json.loads(record.read_text()).items() if k != "names"}))
+    mine.parent.mkdir(exist_ok=True)
+    mine.write_text("days of work")
+    refused("5 files where its record counts 4")
+    mine.unlink()
+    assert data.get("uiuc", folder, archive)["checksum"] == "as recorded"
+
+
+def test_a_mirror_beside_a_local_archive_is_refused(tmp_path, capsys):
+    archive = tmp_path / "a.zip"
+    archive.write_bytes(zipped(FILES))
+    words = ["data", "uiuc", "--from", str(archive), "--url", "http://localhost/a.zip", "--dir", str(tmp_path / "d")]
+    assert cli.main(words) == 2
+    assert "--url: got http://localhost/a.zip; expected none beside --from" in capsys.readouterr().err
+    assert left(tmp_path) == {"a.zip"}
+
+
 def test_without_a_cache_a_folder_must_be_named(monkeypatch, capsys):
     monkeypatch.setenv("BEMT_CACHE", "off")
     assert cache.cache_dir() is None

@@ -221,3 +221,59 @@ def test_recordings_without_a_map_in_them_are_refused(shared_data: Path, capsys:
     for path in (bare, broken):
         assert main(["map", str(path)]) == 2
         assert "off any rising curve" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("words", "message"), [
+    (("--thrust", "nan"), "--thrust: got nan; expected a finite number of 0 or more [N]."),
+    (("--thrust", "inf"), "--thrust: got inf"),
+    (("--thrust=-5",), "--thrust: got -5; expected a finite number of 0 or more [N]. --sign -1"),
+    (("--nodes", "1"), "--nodes: got 1; expected 2 or more"),
+    (("--name", "../evil"), "--name: got '../evil'"),
+    (("--name", ".."), "--name: got '..'"),
+    (("--name", ""), "--name: got ''"),
+    (("--name", "a\\b"), "--name: got"),
+    (("--voltage", "12"), "--voltage: got 12; expected none without --thrust"),
+    (("--thrust", "5", "--voltage", "-3"), "--voltage: got -3; expected a finite number above 0 [V]."),
+    (("--thrust", "5", "--voltage", "nan"), "--voltage: got nan"),
+])  # fmt: skip
+def test_bad_options_are_refused_and_nothing_is_written(
+    tmp_path: Path, words: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = log(tmp_path)
+    # together with what is wrong with a file
+    assert main(["map", str(path), str(tmp_path / "none.csv"), *words, "--out", str(tmp_path / "in" / "out")]) == 2
+    said = capsys.readouterr()
+    assert message in said.err and "none.csv" in said.err and not said.out
+    assert main(["map", str(path), *words, "--out", str(tmp_path / "in" / "out")]) == 2
+    assert {p.name for p in tmp_path.iterdir()} == {"log.csv"}
+
+
+def test_thrust_out_of_reach_is_told_by_the_exit_code(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = str(log(tmp_path))
+    assert main(["map", path, "--thrust", "1e9"]) == 1
+    assert "1e+09 N: pulse width more than this drive gives" in capsys.readouterr().out
+    assert main(["map", path, "--thrust", "1e9", "--json", "--out", str(tmp_path / "out")]) == 1
+    doc = json.loads(capsys.readouterr().out)
+    assert doc["answer"]["pulse_us"] is None and doc == json.loads((tmp_path / "out" / "log.map.json").read_text())
+    assert main(["map", path, "--thrust", "0", "--nodes", "2"]) == 0
+
+
+def test_a_recording_counts_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = log(tmp_path)
+    (tmp_path / "link.csv").symlink_to(path)
+    for again in (path, tmp_path / "link.csv", tmp_path / "x" / ".." / "log.csv"):
+        (tmp_path / "x").mkdir(exist_ok=True)
+        assert main(["map", str(path), str(again)]) == 2
+        assert f"got the recording of {path} again; expected each recording once." in capsys.readouterr().err
+    copy = tmp_path / "copy.csv"  # another file may hold the same readings
+    copy.write_text(path.read_text())
+    assert main(["map", str(path), str(copy)]) == 0
+
+
+def test_results_never_replace_a_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = log(tmp_path).rename(tmp_path / "stand.map.csv")
+    before = path.read_bytes()
+    assert main(["map", str(path), "--name", "stand", "--out", str(tmp_path)]) == 2
+    assert "stand.map.csv, which this run reads" in capsys.readouterr().err
+    assert path.read_bytes() == before and len(list(tmp_path.iterdir())) == 1
+    assert main(["map", str(path), "--name", "fan", "--out", str(tmp_path)]) == 0

@@ -306,3 +306,44 @@ def test_time_constants_of_real_steps(shared_data: Path) -> None:
     assert [c.log[:4] for c in checks] == ["0500", "0500", "incr", "incr", "incr"] and all(c.resolved for c in checks)
     assert all(abs(c.ratio - 1.0) < 0.2 for c in checks)
     assert 0.6 < fitted.esc.brake_on_stop < 0.8
+
+
+@pytest.mark.parametrize("airspeed", ["nan", "inf", "-inf"])
+def test_an_airspeed_that_is_no_number_is_refused(
+    project: Path, airspeed: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["drive", str(project / "cases" / "ds30"), f"--airspeed={airspeed}", "--off", "wind"]) == 2
+    words = capsys.readouterr().err
+    assert f"--airspeed: got {airspeed}; expected a finite number" in words and "--off" in words
+
+
+@pytest.mark.parametrize(("airspeed", "known"), [("100", True), ("200", False), ("400", False)])
+def test_an_airspeed_beyond_the_drive_is_answered(
+    project: Path, tmp_path: Path, airspeed: str, known: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    case = str(project / "cases" / "ds30")
+    assert main(["drive", case, "--airspeed", airspeed, "--json", "--out", str(tmp_path / "out")]) == 1
+    doc = json.loads(capsys.readouterr().out)
+    assert doc["response"] == [] and doc["hover"]["pulse_us"] is None
+    full = doc["steady"]["thrust_N"][-1]
+    # 100 m/s turns the fan faster than the battery does: drag; above, faster than its table reaches
+    assert (full is not None and full < 0.0) if known else full is None
+    assert doc["steady"]["converged"][-1] is known
+    assert f"at {airspeed} m/s" in doc["notes"][-1] and "does not hold this airspeed" in doc["notes"][-1]
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {"drive.json", "drive.csv", "drive.png"}
+    assert main(["drive", case, "--airspeed", airspeed]) == 1
+    words = capsys.readouterr().out
+    assert "does not hold this airspeed" in words and "runs away" not in words
+    assert ("gives none that is known" in words) is not known and " nan " not in words
+
+
+def test_results_never_replace_the_drive_file(
+    project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "drive.json"  # TOML inside: the name is the user's
+    file.write_text((project / "cases" / "ds30" / "drive.toml").read_text())
+    before = file.read_text()
+    case = str(project / "cases" / "ds30")
+    assert main(["drive", case, "--drive", str(file), "--out", str(tmp_path)]) == 2
+    assert "drive.json, which this run reads" in capsys.readouterr().err
+    assert file.read_text() == before and len(list(tmp_path.iterdir())) == 1

@@ -211,3 +211,71 @@ def test_faults_of_motor_toml_come_all_at_once(tmp_path: Path, capsys: pytest.Ca
     words = capsys.readouterr().err
     assert "column in V" in words and "no column trial" in words
     assert main(["motor", "--generate", str(tmp_path), "--plant", "torque.shnt=1.0"]) == 2
+
+
+def test_measured_trials_are_never_replaced_by_generated_ones(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mine = tmp_path / "mine"
+    mine.mkdir()
+    for name in ("torque.csv", "back_emf.csv"):
+        (mine / name).write_text("trial,current_A,shunt_V\n1,0,1.0\n")
+    assert main(["motor", "--generate", str(mine)]) == 2
+    words = capsys.readouterr().err
+    assert f"{(mine / 'torque.csv').as_posix()}: got a file that was not generated" in words and "back_emf.csv" in words
+    assert {p.name: p.read_text()[:5] for p in mine.iterdir()} == {"torque.csv": "trial", "back_emf.csv": "trial"}
+    # what was generated may be generated again; a mixed folder stays whole
+    made = tmp_path / "made"
+    assert main(["motor", "--generate", str(made)]) == 0
+    assert main(["motor", "--generate", str(made), "--seed", "4"]) == 0
+    assert (made / "motor.toml").read_text() == motor_generate.generate(4)["motor.toml"]
+    (made / "back_emf.csv").write_text("trial,rpm,v_V\n1,2,3\n")
+    before = {p.name: p.read_text() for p in made.iterdir()}
+    assert main(["motor", "--generate", str(made), "--seed", "5"]) == 2
+    assert {p.name: p.read_text() for p in made.iterdir()} == before
+    # trials that are judged in the same run are not replaced, even where they are generated
+    other = folder(made, 6) / "motor.toml"
+    text = before["motor.toml"] = other.read_text()
+    text = text.replace('"torque.csv"', '"made/torque.csv"').replace('"back', '"made/back')
+    (tmp_path / "mine.toml").write_text(text)
+    capsys.readouterr()
+    assert main(["motor", str(tmp_path / "mine.toml"), "--generate", str(made), "--seed", "7"]) == 2
+    assert "which this run reads" in capsys.readouterr().err and other.read_text() == before["motor.toml"]
+
+
+def test_options_that_would_be_ignored_are_refused_at_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    made, out = str(tmp_path / "made"), str(tmp_path / "out")
+    assert main(["motor", "--generate", made, "--out", out]) == 2
+    assert "--out" in capsys.readouterr().err
+    assert main(["motor", "--generate", made, "--seed", "-1", "--plant", "x=1"]) == 2
+    words = capsys.readouterr().err
+    assert "--seed: got -1; expected a whole number of 0 or more." in words and "--plant: got 'x=1'" in words
+    assert main(["motor", "--plant", "torque.shunt=1.1", "--seed", "3"]) == 2
+    words = capsys.readouterr().err
+    assert all(w in words for w in ("--plant", "--seed: got 3; expected none without --generate", "FILE: got nothing"))
+    assert not list(tmp_path.iterdir())
+    assert main(["motor", "--generate", made, "--json", "--seed", "3", "--plant", "torque.shunt=1.1"]) == 0
+    doc = json.loads(capsys.readouterr().out)
+    assert doc["schema"] == "bemt.motor.generated/1" and (doc["seed"], doc["planted"]) == (3, {"torque.shunt": 1.1})
+    assert doc["folder"] == Path(made).as_posix() and {p.name for p in Path(made).iterdir()} == set(doc["files"])
+    assert main(["motor", made, "--generate", made, "--out", out, "--json"]) == 0  # both at once: judged and written
+    assert json.loads(capsys.readouterr().out) == json.loads((Path(out) / "motor.json").read_text())
+
+
+@pytest.mark.parametrize("link", [False, True])
+def test_results_never_replace_trials(tmp_path: Path, capsys: pytest.CaptureFixture[str], link: bool) -> None:
+    path = folder(tmp_path, 2)
+    if link:  # the same folder under another name
+        (tmp_path.parent / f"{tmp_path.name}_link").symlink_to(tmp_path)
+    (path / "torque.csv").rename(path / "trials.csv")
+    text = (path / "motor.toml").read_text().replace('"torque.csv"', '"trials.csv"')
+    (path / "motor.toml").write_text(text)
+    before = {p.name: p.read_bytes() for p in path.iterdir()}
+    out = str(tmp_path.parent / f"{tmp_path.name}_link") if link else str(path)
+    assert main(["motor", str(path), "--out", out]) == 2
+    said = capsys.readouterr()
+    assert "trials.csv, which this run reads" in said.err and not said.out
+    assert {p.name: p.read_bytes() for p in path.iterdir()} == before
+    assert main(["motor", str(path), "--out", str(path / "out")]) == 0
+    assert main(["motor", str(path), "--out", str(path / "motor.toml" / "deep")]) == 2
+    assert "motor.toml, a file; expected a folder" in capsys.readouterr().err

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 
 from bemt import cli, empirical
 from bemt.calibrate.estimate import estimate
+from bemt.errors import InputError
 from bemt.units import INCH
 
 
@@ -50,7 +52,7 @@ def test_the_chord_narrows_the_band(capsys: pytest.CaptureFixture[str]) -> None:
     (("10x47", "--rpm", "5000"), "Meant 10x4.7?"),
     (("8x5x3", "--blades", "2", "--density", "1225", "--rpm", "1"), "--blades: got 2; expected 3, as in 8x5x3."),
     (("8x5x3", "--blades", "2", "--density", "1225", "--rpm", "1"), "--density: got 1225; expected kg/m3"),
-    (("5x3", "--rpm", "-1", "--chord-mm", "300"), "chord_m: got 0.3"),
+    (("5x3", "--rpm", "-1", "--chord-mm", "300"), "--chord-mm: got 300; expected 0.02 to 0.4 diameters, 2.54 to 50.8"),
     (("5x3", "--rpm", "-1", "--chord-mm", "300"), "rpm: got -1"),
     (("5x3", "--rpm", "9000", "--series", "nobody"), "series: got nobody"),
 ])  # fmt: skip
@@ -60,3 +62,43 @@ def test_bad_input_is_refused_all_at_once(
     assert cli.main(["estimate", *words]) == 2
     said = capsys.readouterr()
     assert message in said.err and not said.out
+
+
+@pytest.mark.parametrize(("words", "expected"), [
+    (("--measured-pitch-in", "127"), "0.1 to 2.5 diameters, 0.8 to 20 in. 127 mm would be 0.62 diameters."),
+    (("--measured-pitch-in", "0.127"), "0.1 to 2.5 diameters, 0.8 to 20 in. 0.127 m would be 0.62 diameters."),
+    (("--measured-pitch-in", "12.7e6"), "0.1 to 2.5 diameters, 0.8 to 20 in."),
+    (("--chord-mm", "0.02"), "0.02 to 0.4 diameters, 4.06 to 81.3 mm. 0.02 m would be 0.098 diameters."),
+    (("--chord-mm", "0.8"), "0.02 to 0.4 diameters, 4.06 to 81.3 mm. 0.8 in would be 0.1 diameters."),
+    (("--chord-mm", "1.9"), "0.02 to 0.4 diameters, 4.06 to 81.3 mm. 1.9 in would be 0.24 diameters."),
+])  # fmt: skip
+def test_a_length_in_another_unit_is_refused_with_the_unit_that_fits(
+    words: tuple[str, str], expected: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(["estimate", "8x5", "--rpm", "5000", *words]) == 2
+    said = capsys.readouterr()
+    assert said.err == f"{words[0]}: got {float(words[1]):g}; expected {expected}\n" and not said.out
+
+
+@pytest.mark.parametrize("D", [0.05, 0.2032, 3.0])
+def test_every_length_that_may_be_is_taken_and_its_neighbours_are_not(D: float) -> None:
+    ends = {"pitch_m": (0.1, 2.5), "chord_m": (0.02, 0.4), "measured_pitch_m": (0.1, 2.5)}
+    for name, limits in ends.items():
+        for end, outward in zip(limits, (0.999, 1.001), strict=True):
+            base = {"diameter_m": D, "pitch_m": 0.6 * D, "blades": 2, "rpm": 5000.0}
+            assert np.isfinite(estimate(**(base | {name: end * D})).thrust_N[0])
+            with pytest.raises(InputError, match=f"^{name}: "):
+                estimate(**(base | {name: [0.3 * D, end * D * outward]}))
+
+
+def test_numbers_that_are_none_come_all_at_once(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["8x5", "--rpm", "5000", "nan", "--airspeed", "inf", "--density", "nan", "--chord-mm", "nan",
+             "--measured-pitch-in", "inf", "--series", "nobody"]  # fmt: skip
+    assert cli.main(["estimate", *words]) == 2
+    said = capsys.readouterr().err.splitlines()
+    heads = ["--density: got nan", "--chord-mm: got nan", "--measured-pitch-in: got inf", "series: got nobody",
+             "rpm: got nan", "airspeed_m_s: got inf"]  # fmt: skip
+    assert len(said) == len(heads) and all(any(line.startswith(head) for line in said) for head in heads)
+    assert cli.main(["estimate", "8by5", *words[1:-2], "--density", "9"]) == 2  # an unreadable label hides nothing
+    said = capsys.readouterr().err.splitlines()
+    assert said[0].startswith("LABEL") and "--density: got 9" in said[1] and len(said) == 6

@@ -102,3 +102,14 @@ def test_faults_come_all_at_once(tmp_path: Path, capsys: pytest.CaptureFixture[s
         allocate(PAIR, 1.0, 0.0, "both")
     with pytest.raises(InputError, match="one or more"):
         allocate([], 1.0, 0.0)
+
+
+def test_results_never_replace_the_file_that_was_read(
+    project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "mounting.csv"  # an odd name, but the user's
+    text = (project / "cases" / "ds30" / "thrusters.toml").read_text()
+    path.write_text(text)
+    assert main(["thrusters", str(path), "--out", str(tmp_path)]) == 2
+    assert "which this run reads" in capsys.readouterr().err
+    assert path.read_text() == text and len(list(tmp_path.iterdir())) == 1

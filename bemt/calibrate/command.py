@@ -4,7 +4,8 @@ Beside each other: the thesis's constants; its goal-seek (K2 = 1.5, K1 by mean e
 refit at rest, and one that includes flight; the compact formula (:mod:`bemt.calibrate.compact`), refitted when enough
 propellers have a chord, from measured chords and pitches, from measured chords, and from labels alone. Fitted models
 are scored on FILES with the propeller (compact: also its maker) left out of the fit, and on ``--test`` files with the
-constants of FILES; beside them what the same inputs can carry at all (:mod:`bemt.calibrate.limit`).
+constants of FILES, which must be other files (without FILES, the test is left out of the data found); beside them
+what the same inputs can carry at all (:mod:`bemt.calibrate.limit`).
 
 Schema ``bemt.calibration/1``: ``k1k2``, ``compact``, ``scores`` (``calibration`` and ``test``: ``static``, ``flight``,
 ``J/(P/D)``, ``chord_known``, ``bands``, ``power``, ``coverage``, ``limit``), ``refused``, ``notes``.
@@ -14,8 +15,8 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable
-from dataclasses import asdict
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ from numpy.typing import NDArray
 from bemt.calibrate import compact, refit, score
 from bemt.calibrate import fit as fitting
 from bemt.calibrate.limit import limit
-from bemt.calibrate.points import Points, load
+from bemt.calibrate.points import Points, files, load
 from bemt.calibrate.text import text
 from bemt.data_folders import find_data
 from bemt.errors import Fault, InputError
@@ -155,6 +156,52 @@ def _found(name: str) -> str:
     return name if Path(name).exists() else str(find_data(name) or name)
 
 
+def _resolved(name: str) -> frozenset[Path]:
+    """Files that a name stands for, each under its one true name."""
+    return frozenset(file.resolve() for file in files(Path(_found(name))))
+
+
+def _twice(option: str, names: Iterable[str], seen: dict[Path, str]) -> list[Fault]:
+    """Names that stand for files seen before; what they stand for is added to those."""
+    faults = []
+    hint = "Held out is only what is not fitted" if option == "--test" else "Points that count twice weigh twice"
+    for name in names:
+        own = _resolved(name)
+        again = sorted(own & seen.keys())
+        if again:
+            some = ", ".join(file.name for file in again[:3]) + (", ..." if len(again) > 3 else "")
+            got = f"files that {seen[again[0]]} holds too ({len(again)}: {some})"
+            faults.append(Fault(option, name, got, "every file once", hint))
+        seen |= {file: f"{option} {name}" for file in own if file not in seen}
+    return faults
+
+
+def _read(given: list[str], test: list[str]) -> tuple[Points, Points | None]:
+    """Points to fit, and held out; all faults of both at once."""
+    seen: dict[Path, str] = {}
+    faults = _twice("FILES", given, seen)
+    faults += _twice("--test", test, seen)
+    found = frozenset[Path]() if given else _resolved("uiuc")
+    held = found & seen.keys()  # of the data that nobody named
+    names = given or ["uiuc"]
+    if held and held == found:
+        faults.append(Fault("--test", "", "all of the data found", "less than all", "Or name other FILES to fit"))
+        names = []
+    read: list[Points] = []
+    for which, without in ((names, held), (test, frozenset[Path]())):
+        try:
+            read += [load(map(_found, which), without)] if which else []
+        except InputError as error:
+            faults += error.faults
+    if faults:
+        raise InputError(faults)
+    points = read[0]
+    if held:
+        note = f"{len(held)} files of --test are left out of uiuc before the fit, with all runs of their propellers"
+        points = replace(points, notes=(note, *points.notes))
+    return points, read[1] if test else None
+
+
 def run(args: argparse.Namespace) -> int:
     """Command ``calibrate``.
 
@@ -171,18 +218,15 @@ def run(args: argparse.Namespace) -> int:
     Raises
     ------
     InputError
-        For files that are missing or give no point.
+        For files that are missing, give no point, or are given twice or both to fit and to test.
     """
     from bemt.tables import json_text, write_atomic
 
-    files = list(args.files)
-    if not files:
-        if find_data("uiuc") is None:
-            hint = "Name files, or fetch a database: python -m bemt data uiuc"
-            raise InputError(Fault("FILES", "", "none, and no UIUC data found", "measured propellers", hint))
-        files = ["uiuc"]
-    points = load(map(_found, files))
-    test = load(map(_found, args.test)) if args.test else None
+    given = list(args.files)
+    if not given and find_data("uiuc") is None:
+        hint = "Name files, or fetch a database: python -m bemt data uiuc"
+        raise InputError(Fault("FILES", "", "none, and no UIUC data found", "measured propellers", hint))
+    points, test = _read(given, list(args.test or ()))
     shown = sys.stderr.isatty() and not args.quiet
 
     def progress(line: str) -> None:
@@ -191,7 +235,7 @@ def run(args: argparse.Namespace) -> int:
 
     document, predictions = calibrate(points, test, progress=progress)
     progress("")
-    names = {"files": [Path(f).name for f in files], "test_files": [Path(f).name for f in args.test or ()]}
+    names = {"files": [Path(f).name for f in given or ["uiuc"]], "test_files": [Path(f).name for f in args.test or ()]}
     document = {"schema": document["schema"], **names, **document}
     rendered, page = json_text(document), text(document)
     if args.out:

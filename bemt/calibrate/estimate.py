@@ -28,6 +28,10 @@ from bemt.errors import Fault, InputError
 from bemt.units import INCH, KGF
 
 Array = NDArray[np.float64]
+UNITS = {"mm": 1e-3, "in": INCH, "cm": 1e-2, "m": 1.0}
+"""Units in which a length may have been meant. [m]"""
+POSSIBLE = {"pitch": (0.1, 2.5), "chord": (0.02, 0.4)}
+"""Over the diameter; outside, a propeller is no propeller, mostly one unit has been taken for another. [1]"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,24 +139,72 @@ def validity_flags(
     return tuple(out)
 
 
-def _check(D: Array, pitch: Array, B: Array, rpm: Array, V: Array, chord: Array, measured: Array) -> None:
+def length_faults(
+    where: tuple[str, str], value: float, unit: str, diameter_m: float, limits: tuple[float, float]
+) -> list[Fault]:
+    """Say whether a length fits the diameter, and in which unit it would.
+
+    Parameters
+    ----------
+    where : tuple of str
+        File or option, and key, for the fault.
+    value : float
+        Length. [unit]
+    unit : str
+        One of `UNITS`.
+    diameter_m : float
+        Of the propeller; NaN when it is not known. [m]
+    limits : tuple of float
+        Least and greatest length over the diameter, both possible. [1]
+
+    Returns
+    -------
+    list of Fault
+        One or none.
+
+    Examples
+    --------
+    >>> print(*length_faults(("--measured-pitch-in", ""), 127.0, "in", 8 * 0.0254, POSSIBLE["pitch"]))
+    --measured-pitch-in: got 127; expected 0.1 to 2.5 diameters, 0.8 to 20 in. 127 mm would be 0.62 diameters.
+    """
+    file, key = where
+    if not diameter_m > 0.0:
+        fine = 0.0 < value * UNITS[unit] < 100.0
+        return [] if fine else [Fault(file, key, f"{value:g}", "a positive length")]
+    low, high = limits[0] * (1.0 - 1e-9), limits[1] * (1.0 + 1e-9)  # 2.5 times a diameter in inches is inside
+    if low <= value * UNITS[unit] / diameter_m <= high:
+        return []
+    ends = " to ".join(f"{limit * diameter_m / UNITS[unit]:.3g}" for limit in limits)
+    meant = {name: value * size / diameter_m for name, size in UNITS.items()}
+    fits = (f"{value:g} {name} would be {ratio:.2g} diameters" for name, ratio in meant.items() if low <= ratio <= high)
+    expected = f"{limits[0]:g} to {limits[1]:g} diameters, {ends} {unit}"
+    return [Fault(file, key, f"{value:g}", expected, next(fits, ""))]
+
+
+def _check(
+    D: Array, pitch: Array, B: Array, rpm: Array, V: Array, chord: Array | None, measured: Array | None
+) -> list[Fault]:
+    """All that is wrong with the numbers; what was not given needs no look."""
     hint = "Inches or millimetres given?"
     tests = (
         ("diameter_m", D, (D > 0) & (D < 100), "a positive length", hint),
-        ("pitch_m", pitch, (pitch > 0) & (pitch < 100), "a positive length", hint),
         ("blades", B, (B >= 1) & (B <= 20) & (B == np.floor(B)), "a whole number from 1 to 20", ""),
-        ("rpm", rpm, (rpm >= 0) & np.isfinite(rpm), "0 rev/min or more", "The model has no sense of rotation"),
+        ("rpm", rpm, (rpm >= 0) & np.isfinite(rpm), "0 rev/min or more, finite", "The model has no sense of rotation"),
         ("airspeed_m_s", V, np.isfinite(V), "a finite speed", ""),
-        ("chord_m", chord, (chord > 0) & (chord < 0.5 * D), "more than 0 and less than the radius", hint),
-        ("measured_pitch_m", measured, (measured > 0) & (measured < 100), "a positive length", hint),
     )
     faults = [
         Fault("", name, f"{float(x[~ok].ravel()[0]):g}", expected, hint)
         for name, x, ok, expected, hint in tests
         if not np.all(ok)
     ]
-    if faults:
-        raise InputError(faults)
+    for name, values in (("pitch_m", pitch), ("chord_m", chord), ("measured_pitch_m", measured)):
+        if values is not None:
+            limits = POSSIBLE["chord" if name == "chord_m" else "pitch"]
+            with np.errstate(all="ignore"):
+                odd = np.flatnonzero(~((values >= limits[0] * D) & (values <= limits[1] * D)))
+            found = (length_faults(("", name), float(values[i]), "m", float(D[i]), limits) for i in odd)
+            faults += next((fault for fault in found if fault), [])
+    return faults
 
 
 def estimate(
@@ -191,8 +243,8 @@ def estimate(
     Raises
     ------
     InputError
-        For lengths that are not positive, a chord above the radius, a blade count that is not whole, negative rpm (all
-        at once), or an unknown series.
+        For lengths that are not positive, a pitch or chord that no propeller of this diameter has (`POSSIBLE`), a blade
+        count that is not whole, negative rpm, numbers that are not finite, or an unknown series; all at once.
 
     Examples
     --------
@@ -202,13 +254,20 @@ def estimate(
     """
     air = Air.from_density() if air is None else air
     known = chord_m is not None
-    own = Series() if series is None else find_series(series)
+    own = Series()
+    faults: list[Fault] = []
+    try:
+        own = own if series is None else find_series(series)
+    except InputError as error:
+        faults += error.faults
     chord = own.chord * np.asarray(default_chord(diameter_m)) if chord_m is None else chord_m
     measured = pitch_m if measured_pitch_m is None else measured_pitch_m
     names = (diameter_m, pitch_m, blades, rpm, airspeed_m_s, chord, measured, air.rho, air.mu, air.a_sound)
     arrays = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in names))
     D, p, B, w, V, c, q, rho, mu, a = (np.ravel(x) for x in arrays)
-    _check(D, p, B, w, V, c, q)
+    faults += _check(D, p, B, w, V, c if known else None, None if measured_pitch_m is None else q)
+    if faults:
+        raise InputError(faults)
     n = w / 60.0
     J = np.asarray(co.J(V, n, D))
     Re = np.asarray(co.Re75(c, n, D, V, rho, mu))

@@ -10,7 +10,7 @@ import numpy as np
 
 from bemt import empirical
 from bemt.air import Air
-from bemt.calibrate.estimate import estimate
+from bemt.calibrate.estimate import POSSIBLE, estimate, length_faults
 from bemt.errors import EXIT_OK, Fault, InputError
 from bemt.tables import json_text, number_text, text_table
 from bemt.units import INCH
@@ -22,11 +22,13 @@ __all__ = ["SCHEMA", "document", "run"]
 SCHEMA = "bemt.estimate/1"
 
 
-def _label(text: str) -> tuple[float, float, int | None]:
+def _label(text: str, faults: list[Fault]) -> tuple[float, float, int | None]:
+    """Diameter and pitch [in], blades if stated; NaN where the label cannot be read."""
     try:
         return parse_designation(text)
     except GeometryError as error:
-        raise InputError([Fault("LABEL", *fault) for fault in error.faults]) from error
+        faults += [Fault("LABEL", *fault) for fault in error.faults]
+        return math.nan, math.nan, None
 
 
 def document(args: argparse.Namespace) -> dict[str, Any]:
@@ -46,18 +48,26 @@ def document(args: argparse.Namespace) -> dict[str, Any]:
     Raises
     ------
     InputError
-        For an unreadable label, an impossible number (all at once), or an unknown series.
+        For an unreadable label, impossible numbers, or an unknown series; all at once.
     """
-    D, pitch, marked = _label(args.label)
+    faults: list[Fault] = []
+    D, pitch, marked = _label(args.label, faults)
     blades = args.blades or marked or 2
-    faults = []
     if args.blades and marked and args.blades != marked:
         faults.append(Fault("--blades", "", str(args.blades), f"{marked}, as in {args.label}"))
     if not 0.1 <= args.density <= 2.0:
         faults.append(Fault("--density", "", f"{args.density:g}", "kg/m3 from 0.1 to 2 (1.225 at sea level)"))
-    if faults:
-        raise InputError(faults)
+    lengths = (("--chord-mm", args.chord_mm, "mm", "chord"),
+               ("--measured-pitch-in", args.measured_pitch_in, "in", "pitch"))  # fmt: skip
+    for option, value, unit, name in lengths:
+        faults += [] if value is None else length_faults((option, ""), value, unit, D * INCH, POSSIBLE[name])
     rpm, V = (v.ravel() for v in np.meshgrid(args.rpm, args.airspeed or [0.0], indexing="ij"))
+    if faults:  # the rest is looked at beside a propeller that is right, so that all faults come at once
+        try:
+            estimate(0.254, 0.127, blades, rpm, V, series=args.series)
+        except InputError as error:
+            faults += error.faults
+        raise InputError(faults)
     air = Air.from_density(args.density)
     chord = None if args.chord_mm is None else args.chord_mm * 1e-3
     measured = None if args.measured_pitch_in is None else args.measured_pitch_in * INCH

@@ -347,22 +347,44 @@ def _file(path: Path) -> tuple[list[Rows], list[str], list[str]]:
     return [], [f"{path}: a {type(found).__name__} says nothing of diameter, pitch, rpm and thrust"], []
 
 
-def _folder(path: Path) -> tuple[list[Rows], list[str], list[str]]:
+def files(path: Path) -> list[Path]:
+    """All files that a name stands for.
+
+    Parameters
+    ----------
+    path : Path
+        File or folder.
+
+    Returns
+    -------
+    list of Path
+        The file itself, or those below the folder, hidden ones left out; empty when nothing is there.
+    """
+    if not path.is_dir():
+        return [path] if path.exists() else []
+    return [f for f in sorted(path.rglob("*")) if f.is_file() and not f.name.startswith(".")]
+
+
+def _folder(path: Path, without: frozenset[Path]) -> tuple[list[Rows], list[str], list[str]]:
     """Rows, refusals and notes of a folder: the UIUC files as an archive, every other file for itself."""
     rows: list[Rows] = []
     refused: list[str] = []
     notes: list[str] = []
-    files = [f for f in sorted(path.rglob("*")) if f.is_file() and not f.name.startswith(".")]
+    found = files(path)
     if uiuc.sniff_folder(path):
         scan = uiuc.scan_folder(path)
         refused += [str(fault) for fault in scan.faults]
         for p in scan.propellers:
+            if any(Path(table.file).resolve() in without for table in (*p.statics, *p.lines)):
+                continue  # the whole propeller: its other runs would tell of the one held out
             made, why = _from_uiuc(p)
             rows += made
             refused += why
         others = {name for name, _ in scan.ignored}
-        files = [f for f in files if os.fspath(f) in others]
-    for file in files:
+        found = [f for f in found if os.fspath(f) in others]
+    for file in found:
+        if file.resolve() in without:
+            continue
         made, why, note = _file(file)
         rows += made
         refused += why
@@ -370,13 +392,15 @@ def _folder(path: Path) -> tuple[list[Rows], list[str], list[str]]:
     return rows, refused, notes
 
 
-def load(paths: Iterable[str | os.PathLike[str]]) -> Points:
+def load(paths: Iterable[str | os.PathLike[str]], without: frozenset[Path] = frozenset()) -> Points:
     """Gather the points of files and folders.
 
     Parameters
     ----------
     paths : iterable of path
         Files or folders.
+    without : frozenset of Path
+        Files to leave out of the folders, resolved; of UIUC data with all other runs of their propellers.
 
     Returns
     -------
@@ -397,7 +421,7 @@ def load(paths: Iterable[str | os.PathLike[str]]) -> Points:
         if not path.exists():
             faults.append(Fault(os.fspath(item), "", "nothing there", "a file or folder", "Check the path"))
             continue
-        made, why, note = _folder(path) if path.is_dir() else _file(path)
+        made, why, note = _folder(path, without) if path.is_dir() else _file(path)
         if not made:
             more = f" ({'; '.join(why[:3])})" if why else ""
             hint = "Needed are diameter, pitch, rpm and thrust or CT"

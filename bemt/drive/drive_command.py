@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from bemt.case import load_case
-from bemt.drive import drive_file, mission, picture, rotor_table, validate_command
+from bemt.drive import drive_file, mission, outputs, picture, rotor_table, validate_command
 from bemt.drive.drive_model import EFFECTS, Drive, Steady
 from bemt.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
 from bemt.tables import csv_text, json_text, number_text, text_table, write_atomic
@@ -20,6 +20,7 @@ __all__ = ["run"]
 
 COLUMNS = {"pulse_us": "pulse [us]", "rpm": "rpm", "thrust_N": "T [N]", "battery_A": "I [A]", "voltage_V": "V [V]",
            "power_W": "P [W]", "efficiency": "eta"}  # fmt: skip
+RESULTS = ("drive.json", "drive.csv", "drive.png")
 LOW, HIGH = 0.2, 0.8
 """Shares of full thrust of the step."""
 
@@ -35,7 +36,7 @@ def run(args: argparse.Namespace) -> int:
     Returns
     -------
     int
-        Exit code: 1 when the wanted hover is beyond the drive or a point is unconverged.
+        Exit code: 1 when the wanted hover or the airspeed is beyond the drive, or a point is unconverged.
 
     Raises
     ------
@@ -46,17 +47,26 @@ def run(args: argparse.Namespace) -> int:
         return validate_command.run(args)
     if not args.case:
         raise InputError(Fault("", "CASE", "nothing", "a case file or its folder", "Or --validate DIR"))
-    wrong = [name for name in args.off if name not in EFFECTS]
+    wrong = [Fault("", "--off", repr(n), f"one of {', '.join(EFFECTS)}") for n in args.off if n not in EFFECTS]
+    if not math.isfinite(args.airspeed):
+        wrong.append(Fault("", "--airspeed", f"{args.airspeed:g}", "a finite number [m/s]"))
     if wrong:
-        raise InputError([Fault("", "--off", repr(name), f"one of {', '.join(EFFECTS)}") for name in wrong])
+        raise InputError(wrong)
     path = Path(args.case)
     case = load_case(path / "case.toml" if path.is_dir() else path)
     file = drive_file.read(Path(args.drive) if args.drive else case.folder / "drive.toml")
+    if args.out:
+        outputs.check("--out", Path(args.out), RESULTS, [*case.files(), file.path])
     rotor = rotor_table.from_case(case, 1.02 * file.rpm_max, args.airspeed, case.air(), file.rotor_inertia_kg_m2)
     drive = file.drive(rotor).without(*args.off)
     pulse = np.linspace(drive.esc.pulse_min_us, drive.esc.pulse_max_us, 21)
     steady = drive.steady(pulse, file.soc)
     steps, course = mission.response(drive, LOW, HIGH, file.soc)
+    notes = list(rotor.notes)
+    if course is None:
+        full = float(steady.thrust_N[-1])
+        got = f"full pulse width gives {full:.2f} N" if math.isfinite(full) else "the air turns it beyond its table"
+        notes.append(f"at {args.airspeed:g} m/s {got}: the drive does not hold this airspeed, no step")
     hover = duration = None
     if math.isfinite(file.mass_kg):
         hover = mission.hover(drive, file.mass_kg, file.rotors, file.soc)
@@ -69,22 +79,25 @@ def run(args: argparse.Namespace) -> int:
         "full_thrust_settled_temperature_C": mission.settled_temperature(drive, full_pulse, file.soc),
         "hover": dataclasses.asdict(hover) if hover else None,
         "endurance_s": duration[0] if duration else None, "soc_end": duration[1] if duration else None,
-        "response": [dataclasses.asdict(s) for s in steps], "assumed": dict(file.assumed), "notes": list(rotor.notes),
+        "response": [dataclasses.asdict(s) for s in steps], "assumed": dict(file.assumed), "notes": notes,
     }  # fmt: skip
     if args.out:
         folder = Path(args.out)
         rows = [{k: float(getattr(steady, k)[i]) for k in COLUMNS} for i in range(len(pulse))]
-        write_atomic(folder / "drive.json", json_text(document))
-        write_atomic(folder / "drive.csv", csv_text(list(COLUMNS), rows))
+        write_atomic(folder / RESULTS[0], json_text(document))
+        write_atomic(folder / RESULTS[1], csv_text(list(COLUMNS), rows))
         panels = [
             {"x": "pulse width [µs]", "y": "thrust [N]", "series": [("", pulse, steady.thrust_N, "-")]},
             {"x": "pulse width [µs]", "y": "battery current [A]", "series": [("", pulse, steady.battery_A, "-")]},
-            {"x": "time [s]", "y": "thrust [N]", "series": [("", course.time_s, course.thrust_N, "-")]},
         ]
-        write_atomic(folder / "drive.png", picture.curves(panels, case.name))
+        if course is not None:
+            series = [("", course.time_s, course.thrust_N, "-")]
+            panels.append({"x": "time [s]", "y": "thrust [N]", "series": series})
+        write_atomic(folder / RESULTS[2], picture.curves(panels, case.name))
     print(json_text(document) if args.json else _text(document, steady, drive, file) + "\n", end="")
     reached = hover is None or math.isfinite(hover.pulse_us)
-    return EXIT_OK if reached and bool(np.all(steady.converged)) and course.converged else EXIT_UNCONVERGED
+    settled = bool(np.all(steady.converged)) and course is not None and course.converged
+    return EXIT_OK if reached and settled else EXIT_UNCONVERGED
 
 
 def _text(doc: dict[str, Any], steady: Steady, drive: Drive, file: drive_file.DriveFile) -> str:
@@ -96,7 +109,7 @@ def _text(doc: dict[str, Any], steady: Steady, drive: Drive, file: drive_file.Dr
     if np.any(steady.limited):
         lines.append(f"the ESC's limit of {drive.esc.current_limit_A:g} A acts in {int(steady.limited.sum())} rows")
     warm = doc["full_thrust_settled_temperature_C"]
-    if drive.motor.thermal_K_W > 0.0:
+    if drive.motor.thermal_K_W > 0.0 and steady.converged[-1]:
         words = f"{warm:.0f} C" if math.isfinite(warm) else "no temperature (it runs away)"
         over = " above its limit" if warm > file.max_temperature_C or not math.isfinite(warm) else ""
         lines.append(f"at full pulse width the winding settles at {words}{over}")
@@ -106,7 +119,8 @@ def _text(doc: dict[str, Any], steady: Steady, drive: Drive, file: drive_file.Dr
                          f"{h['battery_A']:.2f} A, {h['power_W']:.1f} W, {h['g_per_W']:.2f} gf/W")  # fmt: skip
             lines.append(f"endurance: {doc['endurance_s'] / 60.0:.1f} min, to a charge of {doc['soc_end']:.0%}")
         else:
-            lines.append(f"no hover: each rotor must give {h['wanted_N']:.1f} N and gives {h['full_N']:.1f} N")
+            gives = f"{h['full_N']:.1f} N" if math.isfinite(h["full_N"]) else "none that is known"
+            lines.append(f"no hover: each rotor must give {h['wanted_N']:.1f} N and gives {gives}")
     for s in doc["response"]:
         lines.append(f"thrust {s['before_N']:.2f} to {s['after_N']:.2f} N: 63 % after {1e3 * s['time63_s']:.1f} ms")
     lines += [f"! assumed: {key}: {why}" for key, why in file.assumed.items()] + [f"! {note}" for note in doc["notes"]]

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import argparse
+import math
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 
 from bemt import importers
-from bemt.drive import bench_map, map_export, map_points, map_scatter, picture
-from bemt.errors import EXIT_OK, Fault, InputError
+from bemt.drive import bench_map, map_export, map_points, map_scatter, outputs, picture
+from bemt.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
 from bemt.imported import Imported
 from bemt.tables import json_text, number_text, text_table, write_atomic
 
@@ -18,6 +20,8 @@ __all__ = ["run"]
 SCHEMA = "bemt.map/1"
 UNFIT = 0.05
 """Misfit from which a recording holds no map. [1]"""
+RESULTS = ("{}.map.json", "{}.map.csv", "{}.inverse.csv", "{}_map.h", "{}.map.png")
+"""Names of the results, for the name of the map."""
 
 
 def run(args: argparse.Namespace) -> int:
@@ -31,23 +35,32 @@ def run(args: argparse.Namespace) -> int:
     Returns
     -------
     int
-        Exit code.
+        Exit code: 1 when the wanted thrust is more than the drive gives.
 
     Raises
     ------
     InputError
-        With the faults of all files.
+        With the faults of the options and of all files.
     """
     parts: list[map_points.MapPoints] = []
-    faults: list[Fault] = []
+    faults = _option_faults(args)
+    name = args.name or Path(args.files[0]).stem
+    read: dict[Path, str] = {}
     for i, file in enumerate(args.files):
         try:
             got = importers.read(file)
+            own = _sources(Path(file), got)
+            if twice := next((read[path] for path in own if path in read), None):
+                hint = "A recording that counts twice makes the map look surer than it is"
+                raise InputError(Fault(file, "", f"the recording of {twice} again", "each recording once", hint))
+            read |= dict.fromkeys(own, file)
             if not isinstance(got, Imported):
                 raise InputError(Fault(file, "", "no recording", "a log or a table of a thrust stand"))
             parts.append(map_points.points(got, file, args.sign, i))
         except InputError as error:
             faults += error.faults
+    if args.out:
+        faults += outputs.faults("--out", Path(args.out), [form.format(name) for form in RESULTS], read)
     if faults:
         raise InputError(faults)
     points = map_points.join(parts)
@@ -59,7 +72,6 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(Fault(", ".join(args.files), "thrust_N", got, "thrust that rises with the pulse width", hint))
     trip = bench_map.held_out(points)
     spread, speed = bench_map.repeat_spread(points, chart), map_scatter.document(points)
-    name = args.name or Path(args.files[0]).stem
     document = {
         "schema": SCHEMA, "name": name, "files": list(args.files), **map_export.document(chart, args.nodes),
         "steady_points": len(points),
@@ -68,16 +80,17 @@ def run(args: argparse.Namespace) -> int:
         "repeat_spread_of_full_thrust": spread, "speed_known": speed,
         "misfit_of_full_thrust": off,
     }  # fmt: skip
-    answer = None
+    answer, code = None, EXIT_OK
     if args.thrust is not None:
         pulse = float(chart.pulse_for(args.thrust, args.voltage))
         answer = {"thrust_N": args.thrust, "voltage_V": args.voltage, "pulse_us": pulse}
         document["answer"] = answer
+        code = EXIT_OK if math.isfinite(pulse) else EXIT_UNCONVERGED
     if args.out:
         _write(Path(args.out), name, chart, args.nodes, json_text(document))
     if args.json:
         print(json_text(document), end="")
-        return EXIT_OK
+        return code
     forward, _ = map_export.tables(chart, args.nodes)
     rows = [[number_text(float(v[i])) for v in forward.values()] for i in range(args.nodes)]
     print(text_table(list(forward), rows, left=()))
@@ -100,13 +113,39 @@ def run(args: argparse.Namespace) -> int:
     if answer is not None:
         shown = number_text(answer["pulse_us"], 6, none="more than this drive gives")
         print(f"{args.thrust:g} N: pulse width {shown}{' us' if np.isfinite(answer['pulse_us']) else ''}")
-    return EXIT_OK
+    return code
+
+
+def _option_faults(args: argparse.Namespace) -> list[Fault]:
+    """What is wrong with the options."""
+    faults = []
+    if args.thrust is not None and not 0.0 <= args.thrust < math.inf:
+        hint = "--sign -1 turns the recorded thrust round" if args.thrust < 0.0 else ""
+        faults.append(Fault("", "--thrust", f"{args.thrust:g}", "a finite number of 0 or more [N]", hint))
+    if args.voltage is not None and not 0.0 < args.voltage < math.inf:
+        faults.append(Fault("", "--voltage", f"{args.voltage:g}", "a finite number above 0 [V]"))
+    if args.voltage is not None and args.thrust is None:
+        faults.append(Fault("", "--voltage", f"{args.voltage:g}", "none without --thrust, which it belongs to"))
+    if args.nodes < 2:
+        faults.append(Fault("", "--nodes", str(args.nodes), "2 or more: between them the tables are read"))
+    if args.name is not None and (not args.name.strip(" .") or any(c in "/\\:" or c < " " for c in args.name)):
+        hint = "It names files in --out DIR"
+        faults.append(Fault("", "--name", repr(args.name), "a name without /, \\ and :, and not of dots alone", hint))
+    return faults
+
+
+def _sources(path: Path, got: object) -> set[Path]:
+    """The file itself and the tables beside it that it names."""
+    names = got.provenance.get("file", "").split("+") if isinstance(got, Imported) else []
+    beside = [path.parent / Path(name).name for name in names if name]
+    return {path.resolve(), *(p.resolve() for p in beside if p.is_file())}
 
 
 def _write(folder: Path, name: str, chart: bench_map.BenchMap, nodes: int, text: str) -> None:
     forward, inverse = map_export.tables(chart, nodes)
-    write_atomic(folder / f"{name}.map.json", text)
-    write_atomic(folder / f"{name}.map.csv", map_export.table_csv(forward))
-    write_atomic(folder / f"{name}.inverse.csv", map_export.table_csv(inverse))
-    write_atomic(folder / f"{name}_map.h", map_export.c_header(chart, name, nodes))
-    write_atomic(folder / f"{name}.map.png", picture.bench_map(chart, name))
+    contents: Iterable[bytes | str] = (
+        text, map_export.table_csv(forward), map_export.table_csv(inverse), map_export.c_header(chart, name, nodes),
+        picture.bench_map(chart, name),
+    )  # fmt: skip
+    for form, content in zip(RESULTS, contents, strict=True):
+        write_atomic(folder / form.format(name), content)

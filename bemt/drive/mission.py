@@ -173,7 +173,7 @@ class Response:
     time63_s: float
 
 
-def response(drive: Drive, low: float, high: float, soc: float) -> tuple[list[Response], transient.History]:
+def response(drive: Drive, low: float, high: float, soc: float) -> tuple[list[Response], transient.History | None]:
     """Step between two shares of full thrust, up and down.
 
     Parameters
@@ -188,12 +188,16 @@ def response(drive: Drive, low: float, high: float, soc: float) -> tuple[list[Re
     Returns
     -------
     list of Response
-        Up, down.
-    bemt.drive.transient.History
+        Up, down; none where the drive gives no thrust at the airspeed of its rotor, so that there is no step.
+    bemt.drive.transient.History or None
         Course of both.
     """
     full = float(drive.steady(drive.esc.pulse_max_us, soc).thrust_N[0])
+    if not full > 0.0:  # NaN too: turned by the wind beyond the rotor's table
+        return [], None
     a, b = (drive.pulse_for(share * full, soc) for share in (low, high))
+    if not math.isfinite(a + b):
+        return [], None
     guess = 0.2
     for _ in range(6):  # long enough that both steps settle
         end = 2.0 * guess + 0.1 * guess

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.drive import motor_errors, motor_file, motor_generate, picture
+from bemt.drive import motor_errors, motor_file, motor_generate, outputs, picture
 from bemt.drive.motor_constant import Line
 from bemt.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
 from bemt.tables import csv_text, json_text, number_text, text_table, write_atomic
@@ -18,6 +18,7 @@ from bemt.tables import csv_text, json_text, number_text, text_table, write_atom
 __all__ = ["document", "run", "verdict_text"]
 
 Array = NDArray[np.float64]
+RESULTS = ("motor.json", "trials.csv", "motor.png")
 TITLES = {"data_sheet": "data sheet", "back_emf": "back-EMF", "torque": "torque sensor"}
 
 
@@ -37,18 +38,19 @@ def run(args: argparse.Namespace) -> int:
     Raises
     ------
     InputError
-        With the faults of motor.toml and its recordings.
+        With the faults of the options, of motor.toml and its recordings; for results that would replace what is read,
+        or generated trials what was measured. Nothing is written then.
     """
+    _check_options(args)
     if args.generate:
-        folder = Path(args.generate)
-        for name, text in motor_generate.generate(args.seed, motor_generate.plants(args.plant)).items():
-            write_atomic(folder / name, text)
+        made_up = _generate(args)
         if not args.file:
-            print(f"generated trials (seed {args.seed}); now: python -m bemt motor {folder.as_posix()}")
+            said = f"generated trials (seed {made_up['seed']}); now: python -m bemt motor {made_up['folder']}\n"
+            print(json_text(made_up) if args.json else said, end="")
             return EXIT_OK
-    if not args.file:
-        raise InputError(Fault("", "FILE", "nothing", "motor.toml or its folder", "Or --generate DIR for an example"))
     trials = motor_file.read(args.file)
+    if args.out:
+        outputs.check("--out", Path(args.out), RESULTS, trials.files)
     verdict = motor_errors.judge(trials.measured)
     made = document(trials, verdict)
     values = {TITLES[m["method"]]: np.array(m["trials"] or [m["mean"]]) for m in made["methods"]}
@@ -66,6 +68,63 @@ def run(args: argparse.Namespace) -> int:
     else:
         print(_text(trials, made))
     return EXIT_OK if verdict.agree else EXIT_UNCONVERGED
+
+
+def _check_options(args: argparse.Namespace) -> None:
+    """Refuse options that would be ignored, all at once."""
+    faults = []
+    if not args.generate:
+        # the seed cannot be told from its default where it is 0; there it changes nothing
+        given = [("--plant", " ".join(args.plant)), ("--seed", args.seed)]
+        faults = [Fault("", name, str(value), "none without --generate DIR") for name, value in given if value]
+        if not args.file:
+            hint = "Or --generate DIR for an example"
+            faults.append(Fault("", "FILE", "nothing", "motor.toml or its folder", hint))
+    elif args.out and not args.file:
+        hint = "Name the generated folder as FILE too, to judge it at once"
+        faults.append(Fault("", "--out", args.out, "none with --generate DIR alone, which only writes to DIR", hint))
+    if faults:
+        raise InputError(faults)
+
+
+def _generate(args: argparse.Namespace) -> dict[str, Any]:
+    """Write generated trials, over nothing but other generated ones."""
+    folder, seed = Path(args.generate), args.seed or 0
+    faults: list[Fault] = []
+    planted: dict[str, float] = {}
+    texts: dict[str, str] = {}
+    try:
+        planted = motor_generate.plants(args.plant)
+    except InputError as error:
+        faults += error.faults
+    try:
+        texts = motor_generate.generate(seed, planted)
+    except InputError as error:
+        faults += error.faults
+    inputs: tuple[Path, ...] = ()
+    if args.file and Path(args.file).resolve() not in (folder.resolve(), (folder / "motor.toml").resolve()):
+        inputs = motor_file.read(args.file).files  # before writing: its faults leave nothing behind
+    faults += outputs.faults("--generate", folder, texts, inputs)
+    if args.out:
+        faults += outputs.faults("--out", Path(args.out), RESULTS, [*inputs, *(folder / name for name in texts)])
+    hint = "Name another folder: what was measured is not replaced by invented numbers"
+    for name in texts:
+        if (folder / name).exists() and not _generated(folder / name):
+            faults.append(Fault((folder / name).as_posix(), "", "a file that was not generated", "none, or one", hint))
+    if faults:
+        raise InputError(faults)
+    for name, text in texts.items():
+        write_atomic(folder / name, text)
+    return {"schema": "bemt.motor.generated/1", "folder": folder.as_posix(), "files": list(texts), "seed": seed,
+            "planted": planted}  # fmt: skip
+
+
+def _generated(path: Path) -> bool:
+    """Whether a file says in its first line that it was generated."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as stream:
+        return stream.readline(200).startswith(motor_generate.LABEL.encode())
 
 
 def _method(name: str, line: Line, u_gain: float, to_kt: float) -> dict[str, Any]:

@@ -110,6 +110,8 @@ class MotorTrials:
         Values of others. [N m/A]
     notes : tuple of str
         What a reader has to know.
+    files : tuple of Path
+        All that was read: motor.toml and its recordings.
     """
 
     name: str
@@ -119,6 +121,7 @@ class MotorTrials:
     convention: str
     stated: Mapping[str, float]
     notes: tuple[str, ...] = ()
+    files: tuple[Path, ...] = ()
 
 
 def read(path: str | Path) -> MotorTrials:
@@ -195,8 +198,10 @@ def _built(file: Path, doc: dict[str, Any], out: Collector) -> MotorTrials:
     where = "a winding" if between == "phase" else "a line"
     convention = f"torque per {measure.replace('_', ' ')} current in {where}, {winding}"
     stated = {item["name"]: float(item["Kt_Nm_A"]) for item in doc.get("stated", [])}
+    tables = doc.get("back_emf", {}), doc.get("torque", {})
+    names = [name for table in tables for name in (table.get("file"), *table.get("waveforms", ())) if name]
     return MotorTrials(motor["name"], motor.get("data", ""), measured, mc.ke_to_kt(1.0, measure, between, winding),
-                       convention, stated, tuple(notes))  # fmt: skip
+                       convention, stated, tuple(notes), (file, *(file.parent / name for name in names)))  # fmt: skip
 
 
 def _columns(path: Path, units: tuple[str, ...]) -> tuple[Array, ...]:

@@ -13,11 +13,13 @@ from bemt.drive import motor_constant as mc
 from bemt.drive.motor_errors import FACTORS
 from bemt.errors import Fault, InputError
 
-__all__ = ["PLANTS", "Bench", "generate", "plants"]
+__all__ = ["LABEL", "PLANTS", "Bench", "generate", "plants"]
 
 Array = NDArray[np.float64]
 PLANTS = ("back_emf.offset", "torque.offset", "torque.shunt", "data_sheet.factor", "back_emf.factor", "torque.factor")
 """Errors that can be planted: offsets in V and N m, R_true/R_assumed, a factor on the method's result."""
+LABEL = "# generated, not measured"
+"""Start of the first line of every generated file; no other file may be replaced."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +100,7 @@ def generate(seed: int, planted: Mapping[str, float] | None = None, bench: Bench
     Parameters
     ----------
     seed : int
-        Of the random numbers.
+        Of the random numbers, 0 or more.
     planted : mapping of str to float, optional
         Errors by name, see `PLANTS`.
     bench : Bench, optional
@@ -109,11 +111,18 @@ def generate(seed: int, planted: Mapping[str, float] | None = None, bench: Bench
     dict of str to str
         Text of motor.toml, back_emf.csv and torque.csv, all labelled as generated.
 
+    Raises
+    ------
+    InputError
+        For a negative seed.
+
     Notes
     -----
     The readings carry the error, the motor.toml does not know of it. The data sheet's K_v is drawn within its tolerance
     of what belongs to the true constant only when a seed other than 0 asks for it; seed 0 keeps the printed K_v.
     """
+    if seed < 0:
+        raise InputError(Fault("", "--seed", str(seed), "a whole number of 0 or more"))
     b, error = bench or Bench(), dict(planted or {})
     rng = np.random.default_rng(seed)
     winding = "delta"
@@ -126,7 +135,7 @@ def generate(seed: int, planted: Mapping[str, float] | None = None, bench: Bench
     gain_emf = 1.0 + b.u_gain_emf_pct / 100.0 * rng.standard_normal()
     gain_torque = 1.0 + b.u_gain_torque_pct / 100.0 * rng.standard_normal()
     shunt = b.shunt_ohm * error.get("torque.shunt", 1.0) * (1.0 + b.u_shunt_pct / 100.0 * rng.standard_normal())
-    label = f"# generated, not measured: seed {seed}"
+    label = f"{LABEL}: seed {seed}"
     rows = [label, "trial,rpm,peak_to_peak_V"]
     for k in range(b.emf_trials):
         slope = 2.0 * ke * gain_emf * error.get("back_emf.factor", 1.0) * (1.0 + b.sd_trial * rng.standard_normal())

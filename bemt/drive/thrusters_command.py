@@ -33,7 +33,7 @@ from typing import Any
 
 import numpy as np
 
-from bemt.drive import picture
+from bemt.drive import outputs, picture
 from bemt.drive.thrusters import Allocation, Thruster, allocate, attainable, moment_at
 from bemt.errors import EXIT_OK, EXIT_UNCONVERGED, InputError
 from bemt.schema import Collector, Key, check_table, load_toml
@@ -42,6 +42,7 @@ from bemt.tables import csv_text, json_text, number_text, text_table, write_atom
 __all__ = ["run"]
 
 KGF = 9.80665
+RESULTS = ("thrusters.json", "mounting.csv", "thrusters.png")
 _LENGTH = Key(unit="m", low=-50.0, high=50.0)
 TABLES: dict[str, dict[str, Key]] = {
     "": {"schema": Key("choice", choices=("bemt.thrusters/1",), required=True)},
@@ -104,15 +105,21 @@ def run(args: argparse.Namespace) -> int:
     }  # fmt: skip
     if args.out:
         folder = Path(args.out)
-        write_atomic(folder / "thrusters.json", json_text(document))
-        write_atomic(folder / "mounting.csv", csv_text(list(rows[0]), rows))
-        write_atomic(folder / "thrusters.png", _picture(doc["body"]["name"], most, force, distance, corners, got))
+        outputs.check("--out", folder, RESULTS, [_toml(Path(args.file))])
+        write_atomic(folder / RESULTS[0], json_text(document))
+        write_atomic(folder / RESULTS[1], csv_text(list(rows[0]), rows))
+        write_atomic(folder / RESULTS[2], _picture(doc["body"]["name"], most, force, distance, corners, got))
     print(json_text(document) if args.json else _text(doc["body"], thrusters, got, rows) + "\n", end="")
     return EXIT_OK if got.met else EXIT_UNCONVERGED
 
 
+def _toml(path: Path) -> Path:
+    """The file itself, also where its folder is named."""
+    return path / "thrusters.toml" if path.is_dir() else path
+
+
 def _read(path: Path) -> dict[str, Any]:
-    file = path / "thrusters.toml" if path.is_dir() else path
+    file = _toml(path)
     out = Collector(file.as_posix())
     doc = load_toml(file, out)
     if doc is None:

@@ -1,0 +1,60 @@
+"""Where results may go: into a folder, and never over a file that the command reads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from bemt.errors import Fault, InputError
+
+__all__ = ["check", "faults"]
+
+
+def faults(option: str, folder: Path, names: Iterable[str], inputs: Iterable[Path]) -> list[Fault]:
+    """Say which results must not be written.
+
+    Parameters
+    ----------
+    option : str
+        That names the folder, for the faults.
+    folder : Path
+        Of the results; it need not exist.
+    names : iterable of str
+        Of the files to be written there.
+    inputs : iterable of Path
+        All files that the command reads.
+
+    Returns
+    -------
+    list of Fault
+        Empty when all may be written.
+    """
+    near = next((path for path in (folder, *folder.parents) if path.exists()), None)
+    if near is not None and not near.is_dir():
+        return [Fault(option, "", f"{near.as_posix()}, a file", "a folder")]
+    # resolved: the same file may be named in two ways, or stand behind a link
+    read = {path.resolve() for path in inputs}
+    hint = "Name another folder"
+    return [
+        Fault(option, "", f"{(folder / name).as_posix()}, which this run reads", "no input among the results", hint)
+        for name in names
+        if (folder / name).resolve() in read
+    ]
+
+
+def check(option: str, folder: Path, names: Iterable[str], inputs: Iterable[Path]) -> None:
+    """Refuse to write over what is read; to be called before anything is written.
+
+    Parameters
+    ----------
+    option, folder, names, inputs
+        As in `faults`.
+
+    Raises
+    ------
+    InputError
+        With all faults.
+    """
+    found = faults(option, folder, names, inputs)
+    if found:
+        raise InputError(found)
