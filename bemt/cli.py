@@ -297,7 +297,8 @@ def _drive_parsers(commands: argparse._SubParsersAction[_Parser]) -> None:
     plant = "with --generate: plant a systematic error, e.g. torque.shunt=1.04; repeatable"
     motor.add_argument("--plant", action="append", default=[], metavar="NAME=SIZE", help=plant)
     motor.add_argument("--out", metavar="DIR", help="write JSON, trials as CSV and a box plot there")
-    motor.add_argument("--json", action="store_true", help="print one JSON document (bemt.motor/1)")
+    made = "print one JSON document (bemt.motor.result/1; with --generate alone bemt.motor.generated/1)"
+    motor.add_argument("--json", action="store_true", help=made)
 
     drive = commands.add_parser("drive", help="battery, ESC, motor and the rotor of a case: thrust over pulse width")
     drive.add_argument("case", nargs="?", metavar="CASE", help="case file or its folder")
@@ -307,14 +308,15 @@ def _drive_parsers(commands: argparse._SubParsersAction[_Parser]) -> None:
     drive.add_argument("--airspeed", type=float, default=0.0, metavar="V", help="speed of flight [m/s] (default 0)")
     drive.add_argument("--validate", metavar="DIR", help="compare the model with the recordings in this folder instead")
     drive.add_argument("--out", metavar="DIR", help="write JSON, CSV and a picture there")
-    drive.add_argument("--json", action="store_true", help="print one JSON document (bemt.drive/1)")
+    told = "print one JSON document (bemt.drive.result/1; with --validate bemt.drive.validation/1)"
+    drive.add_argument("--json", action="store_true", help=told)
 
     body = commands.add_parser("thrusters", help="share force and roll moment among thrusters on a body")
     body.add_argument("file", metavar="FILE", help="thrusters.toml, or a folder that holds one")
     body.add_argument("--force", type=float, metavar="N", help="wanted force (default: the file's) [N]")
     body.add_argument("--moment", type=float, metavar="NM", help="wanted roll moment (default: the file's) [N m]")
     body.add_argument("--out", metavar="DIR", help="write JSON, CSV and a picture there")
-    body.add_argument("--json", action="store_true", help="print one JSON document (bemt.thrusters/1)")
+    body.add_argument("--json", action="store_true", help="print one JSON document (bemt.thrusters.result/1)")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
