@@ -77,7 +77,7 @@ class UnitSlip(Effect):
         signs: tuple[dict[str, str | float], ...] = tuple(
             {"channel": c, "factor": -1.0, "unit": "the other sign"} for c in _SIGNED
         )
-        slips = tuple(
+        slips: tuple[dict[str, str | float], ...] = tuple(
             {"channel": channel, "factor": f, "unit": words}
             for channel, units in _UNITS.items()
             for unit, factor in units.items()

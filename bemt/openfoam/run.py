@@ -176,7 +176,8 @@ def all_run(s: Settings, title: str) -> str:
         The script.
     """
     limit = 100 * s.rho * (s.rpm / 60) ** 2 * (2 * s.R) ** 4
-    words = {"TITLE": " ".join(title.split()), "RANKS": s.ranks, "SOLVER": "rhoSimpleFoam" if s.compressible else "simpleFoam",
+    words = {"TITLE": " ".join(title.split()), "RANKS": s.ranks,
+             "SOLVER": "rhoSimpleFoam" if s.compressible else "simpleFoam",
              "AVERAGE": s.average, "SECTORS": s.sectors, "ROTATION": s.rotation, "ITERATIONS": s.iterations,
              "LIMIT": f"{limit:.6g}"}  # fmt: skip
     text = _SCRIPT
