@@ -122,6 +122,9 @@ def _effects(case: Case) -> tuple[effects.Effect, ...]:
                 close = difflib.get_close_matches(name, known, n=1)
                 hint = f"Did you mean {close[0]}?" if close else ""
                 faults.append(Fault(case.path.as_posix(), where, repr(text), f"one of {', '.join(known)}", hint))
+            elif name in on and key == "effects_on":
+                got, hint = f"{text!r} after {effects.to_text(on[name])!r}", "The last one would win"
+                faults.append(Fault(case.path.as_posix(), where, got, "each effect once", hint))
             elif key == "effects_on":
                 try:
                     on[name] = effects.from_text(text)

@@ -99,6 +99,7 @@ def test_what_cannot_be_is_refused(
         ({"torque_Nm": 0.0}, "torque_Nm is 0 in every row: no measurement, left out"),
         ({"thrust": 3.0}, "no unit known, none assumed, for 'thrust'"),
         ({"vibration_V": 3.0}, "not used: vibration_V"),
+        ({"Power (W)": 30.0}, "power_W: taken as shaft power; if a wattmeter read it"),
         ({"CT": 0.05}, "CT: thrust_N is used, which is"),
         ({"airspeed_kmh": 30.0}, "no unit known, none assumed, for 'airspeed_kmh'"),
     ],

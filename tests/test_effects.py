@@ -287,6 +287,8 @@ def test_unknown_effects_are_refused(project: Path) -> None:
     case = load_case(project / "cases" / "prop_8x5" / "case.toml")
     with pytest.raises(InputError, match=r"'tiploss'; expected one of .*Did you mean tip_loss\?"):
         evaluate.prepare(case, {"model.effects_off": ["tiploss"]})
+    with pytest.raises(InputError, match=r"effects_on\[1\]: got 'swirl\(\)' after 'swirl'; expected each effect once"):
+        evaluate.prepare(case, {"model.effects_on": ["swirl()", "swirl()"]})
 
 
 NEW = '''

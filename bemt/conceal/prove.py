@@ -238,8 +238,8 @@ def run(args: argparse.Namespace) -> int:
         began = time.monotonic()
         if args.seed is None and (out / seal.SEAL).exists():  # an interrupted run: its key stays as it is
             digest = (out / seal.SEAL).read_text(encoding="utf-8").strip()
-            seal.unseal(out, digest)
-            print(f"going on with the sealed key, SHA-256 {digest}", file=sys.stderr, flush=True)
+            size = seal.unseal(out, digest)["size"]
+            print(f"going on with the sealed key of size {size}, SHA-256 {digest}", file=sys.stderr, flush=True)
         else:
             digest = conceal(out, args.size, seed)
             print(f"key sealed, SHA-256 {digest}", file=sys.stderr, flush=True)

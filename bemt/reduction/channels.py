@@ -36,6 +36,8 @@ _ALIASES = {
     "mechanical_power_W": "power_W", "shaft_power_W": "power_W",
 }  # fmt: skip
 _SPEEDS = ("optical_rpm", "electrical_rpm")
+# Says neither whose power it is.
+_BARE_POWER = re.compile(r"\s*power\s*[\[(]\s*w(atts?)?\s*[\])]\s*", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -155,6 +157,8 @@ def view(imported: Imported, speed: str | None = None) -> Recorded:
             notes.append(f"{name}: uncertainty of a channel that the file has not; left out")
     _speed(values, names, notes, speed)
     _power(values, names, notes, raw.get("P_W"))
+    if names.get("power_W") == "power_W" and _BARE_POWER.fullmatch(imported.headings.get("power_W", "")):
+        notes.append("power_W: taken as shaft power; if a wattmeter read it, name the column electrical_power_W")
     run = values.get("run", np.ones(n))
     if np.any(~np.isfinite(run)):
         notes.append(f"{int(np.sum(~np.isfinite(run)))} rows without a run: taken as run 0")
