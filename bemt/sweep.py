@@ -243,9 +243,12 @@ def sweep(
 
             on = stack.enter_context(Cluster(scheduler, jobs))
         tell = progress or (lambda line: None)
-        found: dict[int, dict[str, Any]] = dict(_results(files, folder, resume, jobs, tell, grid_format, on))
-    results = [found[i] for i in range(len(files))]
-    _refuse_repeats(files, results)
+        again = _repeats(files)
+        rest = [i for i in range(len(files)) if i not in again]
+        paths_left = [files[i] for i in rest]
+        for i, result in _results(paths_left, folder, resume, jobs, tell, grid_format, on) if rest else ():
+            again[rest[i]] = result
+    results = [again[i] for i in range(len(files))]
     document = {"schema": SCHEMA, "version": bemt.__version__, "cases": results,
                 "exit_code": max((r["exit_code"] for r in results), default=EXIT_OK)}  # fmt: skip
     if folder is not None:
@@ -274,17 +277,20 @@ def _check_options(engine: str, scheduler: str | None, grid_format: str, jobs: i
         require_extra("--engine dask", "dask", "distributed")
 
 
-def _refuse_repeats(files: Sequence[Path], results: list[dict[str, Any]]) -> None:
-    """Two cases of one name would write into one folder."""
+def _repeats(files: Sequence[Path]) -> dict[int, dict[str, Any]]:
+    """Cases whose name another one has already: they would write into one folder, and are refused unsolved."""
     first: dict[str, Path] = {}
-    for i, (path, result) in enumerate(zip(files, results, strict=True)):
-        if result["rows"]:
-            earlier = first.setdefault(result["name"], path)
-            if earlier != path:
-                fault = Fault(
-                    path.as_posix(), "name", f"{result['name']!r} as in {earlier.as_posix()}", "a name of its own"
-                )
-                results[i] = _failed(path, [str(fault)], EXIT_INPUT)
+    refused = {}
+    for i, path in enumerate(files):
+        try:
+            name = load_case(path).name
+        except InputError:
+            continue  # said where it is solved
+        earlier = first.setdefault(name, path)
+        if earlier != path:
+            fault = Fault(path.as_posix(), "name", f"{name!r} as in {earlier.as_posix()}", "a name of its own")
+            refused[i] = _failed(path, [str(fault)], EXIT_INPUT)
+    return refused
 
 
 def _off_tolerance(result: Mapping[str, Any], tolerance: float) -> list[str]:

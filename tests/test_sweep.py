@@ -21,7 +21,7 @@ from bemt import sweep as sweep_module
 from bemt.case import load_case
 from bemt.evaluate import evaluate, prepare
 from bemt.grid import run as grid_module
-from bemt.sweep import sweep
+from bemt.sweep import fingerprint, sweep
 from bemt.sweep_case import solve_case
 from bemt.tables import csv_block, json_text, number_text, plain
 
@@ -227,6 +227,12 @@ def test_two_cases_of_one_name_are_refused(tmp_path: Path) -> None:
     document = sweep([tmp_path])
     assert [case["exit_code"] for case in document["cases"]] == [0, 2]
     assert "a name of its own" in document["cases"][1]["faults"][0]
+    text = (tmp_path / "two" / "case.toml").read_text()
+    (tmp_path / "two" / "case.toml").write_text(text + "# another case under the name of the first\n")
+    sweep([tmp_path], tmp_path / "out")
+    stored = json.loads((tmp_path / "out" / document["cases"][0]["name"] / "result.json").read_text())
+    mark = fingerprint(load_case(tmp_path / "one").content_hash())
+    assert stored["fingerprint"] == mark, "the refused one has left nothing there"
 
 
 def test_processes_give_what_one_process_gives(tmp_path: Path) -> None:
