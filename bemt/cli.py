@@ -293,7 +293,7 @@ def _drive_parsers(commands: argparse._SubParsersAction[_Parser]) -> None:
     motor.add_argument("file", nargs="?", metavar="FILE", help="motor.toml, or a folder that holds one")
     made = "write generated trials (labelled so) and their motor.toml into DIR"
     motor.add_argument("--generate", metavar="DIR", help=made)
-    motor.add_argument("--seed", type=_seed, default=0, metavar="N", help="of --generate (default 0)")
+    motor.add_argument("--seed", type=int, metavar="N", help="of --generate (default 0)")
     plant = "with --generate: plant a systematic error, e.g. torque.shunt=1.04; repeatable"
     motor.add_argument("--plant", action="append", default=[], metavar="NAME=SIZE", help=plant)
     motor.add_argument("--out", metavar="DIR", help="write JSON, trials as CSV and a box plot there")

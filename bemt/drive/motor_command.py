@@ -74,7 +74,6 @@ def _check_options(args: argparse.Namespace) -> None:
     """Refuse options that would be ignored, all at once."""
     faults = []
     if not args.generate:
-        # the seed cannot be told from its default where it is 0; there it changes nothing
         given = [("--plant", " ".join(args.plant)), ("--seed", args.seed)]
         faults = [Fault("", name, str(value), "none without --generate DIR") for name, value in given if value]
         if not args.file:
