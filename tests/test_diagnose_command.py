@@ -211,3 +211,18 @@ def test_rows_copied_count_once() -> None:
     assert len(made) == 20 and any("20 rows repeat others digit by digit" in n for n in made.notes)
     other = twice | {"time_s": np.arange(40.0)}  # a second run that came out the same
     assert len(record.from_series(Series("bench", "x", other), case())) == 40
+
+
+@pytest.mark.parametrize("what", ["a ramp sampled densely", "many short runs", "many speeds"])
+def test_no_recording_keeps_too_many_points(what: str) -> None:
+    n = 3000
+    rpm = np.linspace(2000.0, 20000.0, n) if what == "many speeds" else 2000.0 + 6.0 * (np.arange(n) * 37 % n)
+    values = {"rpm": rpm, "airspeed_m_s": 0.0 * rpm, "thrust_N": 6.8e-8 * rpm**2}
+    if what.startswith("a ramp"):
+        values["time_s"] = 0.05 * np.arange(n)
+    if what.startswith("many short"):
+        values["run"] = np.repeat(np.arange(n / 20), 20)
+    made = record.from_series(Series("bench", "x", values), case())
+    assert 100 <= len(made) <= 1.6 * record.MAX_POINTS
+    seen = np.isfinite(made.measured["thrust_N"])
+    np.testing.assert_allclose(made.measured["thrust_N"][seen], 6.8e-8 * made.rpm[seen] ** 2, rtol=1e-9)

@@ -254,13 +254,13 @@ def _with_rpm(series: Series, case: Case, air: Air) -> Series:
     return replace(series, values={**series.values, "rpm": rpm}).derive(case.diameter_m, air.rho)
 
 
-def _states(values: Mapping[str, Array], case: Case, notes: list[str], name: str) -> tuple[Air, bool]:
+def _states(values: Mapping[str, Array], case: Case, notes: list[str], file: str) -> tuple[Air, bool]:
     """Air per point: density, or pressure and temperature, of the recording; else of the case."""
     n = len(values["rpm"])
     default = case.air()
     rho, temperature = values.get("density_kg_m3"), values.get("temperature_K")
     pressure = values.get("pressure_Pa")
-    _plausible(values, name)
+    _plausible(values, file)
     fields = {key: np.full(n, float(getattr(default, key))) for key in _AIR}
     recorded = False
     cache: dict[tuple[float, ...], Air] = {}
@@ -290,7 +290,7 @@ def _states(values: Mapping[str, Array], case: Case, notes: list[str], name: str
     return air_of(fields), recorded
 
 
-def _plausible(values: Mapping[str, Array], name: str) -> None:
+def _plausible(values: Mapping[str, Array], file: str) -> None:
     """Refuse air that nobody has measured in, all rows at once."""
     faults = []
     for key, low, high, hint in _AIR_LIMITS:
@@ -298,7 +298,7 @@ def _plausible(values: Mapping[str, Array], name: str) -> None:
         bad = np.flatnonzero(np.isfinite(v) & ((v < low) | (v > high))) if v is not None else np.zeros(0, dtype=int)
         if bad.size and v is not None:
             rows = ", ".join(str(i + 1) for i in bad[:5]) + (" ..." if bad.size > 5 else "")
-            faults.append(Fault(name, f"{key}, point {rows}", f"{v[bad[0]]:.4g}", f"{low:g} to {high:g}", hint))
+            faults.append(Fault(file, f"{key}, point {rows}", f"{v[bad[0]]:.4g}", f"{low:g} to {high:g}", hint))
     if faults:
         raise InputError(faults)
 
@@ -314,15 +314,15 @@ def _thinned(record: Record) -> Record:
         return record
     size = -(-P // MAX_POINTS)
     run = record.extra.get("run", np.zeros(P))
-    order = np.arange(P) if _dense(record, run) else _alike(record, run)
-    block = np.empty(P, dtype=np.intp)
-    n = record.rpm[order]
-    current, first = -1, 0
-    for k in range(P):
-        new = k == 0 or k - first == size or run[order[k]] != run[order[k - 1]]
-        if new or abs(n[k] / n[first] - 1.0) > _SAME_SPEED:
-            current, first = current + 1, k
-        block[order[k]] = current
+    if _dense(record, run):
+        block = _blocks(np.arange(P), record.rpm, run, size, np.inf)
+    else:
+        order = _alike(record, run)
+        loose = [(same * _SAME_SPEED, size) for same in (1, 3, 10)] + [(np.inf, size * k) for k in (1, 2, 4)]
+        for same, most in loose:
+            block = _blocks(order, record.rpm, run, most, same)
+            if block.max() < 1.5 * MAX_POINTS:
+                break
     # in the order of the rows: noise may be correlated along it
     _, block = np.unique(block, return_inverse=True)
     place = np.argsort(np.argsort(np.bincount(block, np.arange(P)) / np.bincount(block), kind="stable"))
@@ -338,13 +338,25 @@ def _thinned(record: Record) -> Record:
     rpm, rho = mean(record.rpm), mean(density)
     unit = {c: density * record.rpm**2 for c in ("thrust_N", "torque_Nm")}
     # neighbours share slow errors: their mean is taken to be no better than one of them
-    note = f"{P} points averaged to {rpm.size}, up to {size} alike"
+    note = f"{P} points averaged to {rpm.size} of like conditions"
     return replace(
         record, rpm=rpm, V=mean(record.V), air=air_of({k: mean(getattr(record.air, k)) for k in _AIR}),
         measured={k: mean(v / unit[k]) * rho * rpm**2 if k in unit else mean(v) for k, v in record.measured.items()},
         u={k: mean(v) for k, v in record.u.items()}, extra={k: mean(v) for k, v in record.extra.items()},
         notes=(*record.notes, note),
     )  # fmt: skip
+
+
+def _blocks(order: NDArray[np.intp], rpm: Array, run: Array, size: int, same: float) -> NDArray[np.intp]:
+    """Block of each point: up to ``size`` that follow each other in this order, of one run and one speed."""
+    block = np.empty(order.size, dtype=np.intp)
+    current, first = -1, 0
+    for k in range(order.size):
+        new = k == 0 or k - first == size or run[order[k]] != run[order[k - 1]]
+        if new or abs(rpm[order[k]] / rpm[order[first]] - 1.0) > same:
+            current, first = current + 1, k
+        block[order[k]] = current
+    return block
 
 
 def _dense(record: Record, run: Array) -> bool:

@@ -75,7 +75,8 @@ def _check_options(args: argparse.Namespace) -> None:
     faults = []
     if not args.generate:
         given = [("--plant", " ".join(args.plant)), ("--seed", args.seed)]
-        faults = [Fault("", name, str(value), "none without --generate DIR") for name, value in given if value not in (None, "")]
+        told = [(name, value) for name, value in given if value not in (None, "")]
+        faults = [Fault("", name, str(value), "none without --generate DIR") for name, value in told]
         if not args.file:
             hint = "Or --generate DIR for an example"
             faults.append(Fault("", "FILE", "nothing", "motor.toml or its folder", hint))
