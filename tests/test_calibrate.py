@@ -12,7 +12,7 @@ import pytest
 from bemt import cli
 from bemt import coefficients as co
 from bemt.calibrate import command as calibrate
-from bemt.calibrate import compact, fit, limit, refit, score
+from bemt.calibrate import compact, fit, gather, limit, refit, score
 from bemt.calibrate import points as reading
 from bemt.calibrate.points import Points, Propeller
 from bemt.errors import InputError
@@ -175,7 +175,7 @@ fan,2.7,3.5,40000,2000,600,0,11,,1
 def test_a_table_with_units_gives_points(tmp_path: Path):
     file = tmp_path / "stand.csv"
     file.write_text(TABLE)
-    points = reading.load([file])
+    points = gather.load([file])
     assert [(p.name, p.blades, p.ducted) for p in points.propellers] == [
         ("a_10x5", 2, False), ("b_9x6", 3, False), ("fan", 11, True),
     ]  # fmt: skip
@@ -194,7 +194,7 @@ def test_a_drive_calculator_table_gives_points_at_three_tip_speeds(tmp_path: Pat
         "myid,tbs,Name,Dia,Pitch,a,b,AltThr,TmpThr,srcThr,c,d,AltPwr,TmpPwr,srcPwr,n10N,n100W\n"
         "1,4,GWS HD 3-blade,9.0,5.0,14.0,2.0,0,15.0,x,0.25,3.0,0,15.0,x,8534.6,7368.1\n"
     )
-    points = reading.load([file])
+    points = gather.load([file])
     assert points.propellers[0].blades == 3 and points.rpm.size == 3
     assert points.M_tip == pytest.approx([0.2, 0.3, 0.4])
     n = points.rpm / 60
@@ -250,7 +250,7 @@ def volume_1(shared_data: Path) -> Points:
     folder = shared_data / "uiuc" / "volume-1"
     if not folder.is_dir():
         pytest.skip(f"no UIUC data at {folder}")
-    return reading.load([folder])
+    return gather.load([folder])
 
 
 def test_volume_1_against_the_thesis(volume_1: Points):
@@ -271,7 +271,7 @@ def test_volume_1_against_the_thesis(volume_1: Points):
 @pytest.mark.slow
 def test_the_report_is_what_the_command_gives(shared_data: Path, project: Path):
     kept = json.loads((project / "reports" / "calibration" / "calibration.json").read_text())
-    sets = [reading.load([shared_data / "uiuc" / f"volume-{v}"]) for v in (1, 2)]
+    sets = [gather.load([shared_data / "uiuc" / f"volume-{v}"]) for v in (1, 2)]
     found, _ = calibrate.calibrate(*sets)
     for name in ("calibration", "test"):
         for motion in ("static", "flight"):

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from bemt import coefficients as co
 from bemt.air import Air
-from bemt.calibrate import compact, estimate, points, refit, score
+from bemt.calibrate import compact, estimate, gather, refit, score
+from bemt.calibrate.points import Points
 from bemt.errors import InputError
 
 INCH = 0.0254
@@ -180,14 +181,14 @@ def test_all_faults_at_once():
 
 
 @pytest.fixture(scope="module")
-def volumes(shared_data: Path) -> dict[int, points.Points]:
+def volumes(shared_data: Path) -> dict[int, Points]:
     folder = shared_data / "uiuc"
     if not folder.is_dir():
         pytest.skip(f"no UIUC data at {folder}")
-    return {v: points.load([folder / f"volume-{v}"]) for v in (1, 2)}
+    return {v: gather.load([folder / f"volume-{v}"]) for v in (1, 2)}
 
 
-def shares(points: points.Points, CT: np.ndarray) -> dict[str, object]:
+def shares(points: Points, CT: np.ndarray) -> dict[str, object]:
     found = score.score(points, {"m": CT})
     bands = [row["models"]["m"]["median"] for row in found["J/(P/D)"][:4]]
     return {"static": found["static"]["models"]["m"], "flight": bands}

@@ -66,7 +66,7 @@ MAY: dict[str, set[str]] = {
     "bemt.import_adapt": {"files"},
     "bemt.calibrate.command": {"files", "print"},
     "bemt.calibrate.estimate_command": {"print"},
-    "bemt.calibrate.points": {"files"},
+    "bemt.calibrate.gather": {"files"},
     "bemt.data": {"files", "print"},
     "bemt.data_archive": {"files"},
     "bemt.data_folders": {"environment"},

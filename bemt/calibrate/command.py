@@ -25,8 +25,9 @@ from numpy.typing import NDArray
 
 from bemt.calibrate import compact, refit, score
 from bemt.calibrate import fit as fitting
+from bemt.calibrate.gather import files, load
 from bemt.calibrate.limit import limit
-from bemt.calibrate.points import Points, files, load
+from bemt.calibrate.points import Points
 from bemt.calibrate.text import text
 from bemt.data_folders import find_data
 from bemt.errors import Fault, InputError

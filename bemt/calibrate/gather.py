@@ -1,0 +1,279 @@
+"""Measured points gathered for a calibration: diameter, pitch, speed and thrust, from any importer that has them.
+
+UIUC folders and files, APC performance files (the vendor's computation), Drive Calculator's table (power laws, taken at
+three tip speeds), and any table with the columns (or ``recording.toml`` constants) diameter, pitch, rpm and thrust or
+CT; further columns are airspeed or J, power, torque or CP, density, blades, chord and measured pitch (at 0.75 R),
+ducted (0 or 1), name.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt import coefficients as co
+from bemt import importers
+from bemt.air import Air, isa_pressure
+from bemt.calibrate.points import Points, Propeller, Rows, join
+from bemt.errors import Fault, InputError
+from bemt.imported import Imported
+from bemt.importers import apc, uiuc
+from bemt.importers._uiuc_names import parse_file_name
+from bemt.units import INCH, ZERO_CELSIUS
+
+__all__ = ["LAW_M_TIP", "RHO", "files", "load"]
+
+Array = NDArray[np.float64]
+
+RHO = 1.225
+"""Density where a source states none [kg/m3]; coefficients do not depend on it."""
+LAW_M_TIP = (0.2, 0.3, 0.4)
+"""Tip Mach numbers at which a power law stands for measurements [-]."""
+_BLADES = re.compile(r"(\d)\s*-?\s*(?:blatt|blades?|bl\b)", re.IGNORECASE)
+_DUCTED = re.compile(r"impeller|\bedf\b|ducted", re.IGNORECASE)
+
+
+def _from_uiuc(p: uiuc.UiucPropeller) -> tuple[list[Rows], list[str]]:
+    if p.pitch_in is None:
+        return [], [f"{p.name}: no nominal pitch"]
+    chord = pitch = float("nan")
+    if p.geometry is not None and p.geometry.r_R[0] <= 0.75 <= p.geometry.r_R[-1]:
+        chord = float(np.interp(0.75, p.geometry.r_R, p.geometry.c_R)) * p.diameter_m / 2.0
+        beta = np.radians(np.interp(0.75, p.geometry.r_R, p.geometry.beta_deg))
+        pitch = 0.75 * np.pi * p.diameter_m * float(np.tan(beta))
+    made = Propeller(p.name, p.family, "UIUC", p.diameter_m, p.pitch_in * INCH, p.blades, chord,
+                     measured_pitch_m=pitch)  # fmt: skip
+    rows: list[Rows] = [(made, s.rpm, np.zeros_like(s.rpm), s.CT, s.CP) for s in p.statics]
+    rows += [(made, np.full_like(line.J, line.rpm), line.J, line.CT, line.CP) for line in p.lines]
+    return rows, [] if rows else [f"{p.name}: geometry only"]
+
+
+def _from_uiuc_table(path: Path, table: Any) -> tuple[list[Rows], list[str]]:
+    told = parse_file_name(path.stem)
+    if told is None or told.propeller.faults or told.propeller.diameter_in is None or told.propeller.pitch_in is None:
+        return [], [f"{path}: the name says no diameter and pitch"]
+    name = told.propeller
+    assert name.diameter_in is not None and name.pitch_in is not None
+    made = Propeller(name.name, name.family, "UIUC", name.diameter_in * INCH, name.pitch_in * INCH, name.blades)
+    if isinstance(table, uiuc.UiucStatic):
+        return [(made, table.rpm, np.zeros_like(table.rpm), table.CT, table.CP)], []
+    if isinstance(table, uiuc.UiucLine):
+        return [(made, np.full_like(table.J, table.rpm), table.J, table.CT, table.CP)], []
+    return [], [f"{path}: geometry only"]
+
+
+def _from_apc(found: apc.ApcPerformance) -> list[Rows]:
+    s = found.series
+    made = Propeller(found.name, "APC", "APC, computed", found.diameter_m, found.pitch_m, found.blades)
+    return [(made, s["rpm"], s["J"], s["CT"], s["CP"])]
+
+
+def _from_drivecalc(path: Path, found: Imported) -> list[Rows]:
+    """Power laws at `LAW_M_TIP`, in the air that the table states for them."""
+    c = {name: channel.values for name, channel in found.channels.items()}
+    names = found.texts.get("Name", ("",) * found.rows)
+    nothing = np.full(found.rows, np.nan)
+    rows: list[Rows] = []
+    for i, name in enumerate(names):
+        D, pitch = c["diameter_m"][i], c["pitch_m"][i]
+        a, b = c["thrust_law_N"][i], c["thrust_exponent"][i]
+        if not (D > 0 and pitch > 0 and a > 0 and b > 1.0):
+            continue
+        blades = _BLADES.search(name)
+        made = Propeller(
+            f"{name} {D / INCH:.3g}x{pitch / INCH:.3g}", name.split()[0] if name.split() else "?", "Drive Calculator",
+            D, pitch, int(blades[1]) if blades else 2, ducted=_DUCTED.search(name) is not None,
+        )  # fmt: skip
+        rpm = np.array(LAW_M_TIP) * Air.from_density().a_sound / (np.pi * D) * 60.0
+        limit = c.get("max_rpm", nothing)[i]
+        rpm = rpm[rpm <= limit] if limit > 0 else rpm
+        n = rpm / 60.0
+        T = a * (rpm / 1000.0) ** b
+        CT = np.asarray(co.CT(T, _density(c, "thrust", i), n, D))
+        p, q = c.get("power_law_W", nothing)[i], c.get("power_exponent", nothing)[i]
+        P = p * (rpm / 1000.0) ** q if p > 0 else np.full_like(rpm, np.nan)
+        CP = np.asarray(co.CP(P, _density(c, "power", i), n, D))
+        rows.append((made, rpm, np.zeros_like(rpm), CT, CP))
+    return rows
+
+
+def _density(c: dict[str, Array], what: str, i: int) -> float:
+    h, T = (c[f"{what}_{k}"][i] if f"{what}_{k}" in c else float("nan") for k in ("altitude_m", "temperature_K"))
+    if not (np.isfinite(h) and -500.0 <= h <= 5000.0):
+        return RHO
+    p, T_isa = isa_pressure(float(h))
+    celsius = (T if 200.0 < T < 330.0 else T_isa) - ZERO_CELSIUS
+    return Air.from_state(p, float(celsius)).rho
+
+
+def _from_table(path: Path, found: Imported) -> tuple[list[Rows], list[str], list[str]]:
+    """Any table with the columns of the module notes."""
+    N = found.rows
+
+    def column(*names: str) -> Array | None:
+        for name in names:
+            if name in found.channels:
+                return found.channels[name].values
+            if name in found.constants:
+                return np.full(N, float(found.constants[name]))
+        return None
+
+    D, pitch, rpm = column("diameter_m", "D_m"), column("pitch_m"), column("rpm")
+    T, CT = column("thrust_N", "T_N"), column("CT")
+    missing = [name for name, values in (("diameter (with its unit)", D), ("pitch (with its unit)", pitch),
+               ("rpm", rpm), ("thrust (with its unit) or CT", T if CT is None else CT)) if values is None]  # fmt: skip
+    if missing or D is None or pitch is None or rpm is None:
+        return [], [f"{path}: no column {', '.join(missing)}"], []
+    notes = []
+    n = rpm / 60.0
+    rho = column("density_kg_m3", "rho_kg_m3")
+    P, Q, CP = column("power_W", "shaft_power_W"), column("torque_Nm"), column("CP")
+    if rho is None:
+        rho = np.full(N, RHO)
+        if CT is None:
+            notes.append(f"{path}: no density, {RHO:g} kg/m3 assumed")
+    if CT is None:
+        assert T is not None
+        CT = np.asarray(co.CT(T, rho, n, D))
+    if CP is None and P is None and Q is not None:
+        P = 2.0 * np.pi * n * Q
+    if CP is None:
+        CP = np.full(N, np.nan) if P is None else np.asarray(co.CP(P, rho, n, D))
+    J, V = column("J"), column("airspeed_m_s", "V_m_s")
+    if J is None:
+        J = np.zeros(N) if V is None else np.asarray(co.J(V, n, D))
+    B, chord, duct = column("blades", "B"), column("chord_m", "chord75_m"), column("ducted")
+    measured = column("measured_pitch_m", "pitch75_m")
+    if B is None:
+        B = np.full(N, 2.0)
+        notes.append(f"{path}: no column blades, 2 assumed")
+    chord = np.full(N, np.nan) if chord is None else chord
+    duct = np.zeros(N) if duct is None else duct
+    measured = np.full(N, np.nan) if measured is None else measured
+    names = found.texts.get("name") or found.texts.get("propeller") or (path.stem,) * N
+    groups: dict[tuple[Any, ...], list[int]] = {}
+    bad = 0
+    for i in range(N):
+        values = (D[i], pitch[i], B[i])
+        if not (all(np.isfinite(v) and v > 0 for v in values) and B[i] == round(B[i])):
+            bad += 1
+            continue
+        more = (None if np.isnan(v) else float(v) for v in (chord[i], measured[i]))  # NaN never equals NaN
+        key = (names[i], *values, *more, bool(duct[i] > 0))
+        groups.setdefault(key, []).append(i)
+    rows: list[Rows] = []
+    for (name, d, p, b, c, q, inside), at in groups.items():
+        made = Propeller(str(name), str(name).split("_")[0].split(" ")[0], path.name, float(d), float(p), int(b),
+                         float("nan") if c is None else c, inside, float("nan") if q is None else q)  # fmt: skip
+        rows.append((made, rpm[at], J[at], CT[at], CP[at]))
+    return rows, [f"{path}: {bad} rows without a positive diameter, pitch and blade count"] if bad else [], notes
+
+
+def _file(path: Path) -> tuple[list[Rows], list[str], list[str]]:
+    """Rows, refusals and notes of one file."""
+    try:
+        found = importers.read(path)
+    except InputError as error:
+        return [], [str(fault) for fault in error.faults], []
+    if isinstance(found, apc.ApcPerformance):
+        return _from_apc(found), [], [f"{path}: computed by the vendor, not measured"]
+    if isinstance(found, (uiuc.UiucStatic, uiuc.UiucLine, uiuc.UiucGeometry, uiuc.UiucThickness)):
+        return *_from_uiuc_table(path, found), []
+    if isinstance(found, Imported) and found.format == "drivecalc" and "thrust_law_N" in found.channels:
+        return _from_drivecalc(path, found), [], [f"{path}: power laws fitted by others, not measurements"]
+    if isinstance(found, Imported):
+        return _from_table(path, found)
+    return [], [f"{path}: a {type(found).__name__} says nothing of diameter, pitch, rpm and thrust"], []
+
+
+def files(path: Path) -> list[Path]:
+    """All files that a name stands for.
+
+    Parameters
+    ----------
+    path : Path
+        File or folder.
+
+    Returns
+    -------
+    list of Path
+        The file itself, or those below the folder, hidden ones left out; empty when nothing is there.
+    """
+    if not path.is_dir():
+        return [path] if path.exists() else []
+    return [f for f in sorted(path.rglob("*")) if f.is_file() and not f.name.startswith(".")]
+
+
+def _folder(path: Path, without: frozenset[Path]) -> tuple[list[Rows], list[str], list[str]]:
+    """Rows, refusals and notes of a folder: the UIUC files as an archive, every other file for itself."""
+    rows: list[Rows] = []
+    refused: list[str] = []
+    notes: list[str] = []
+    found = files(path)
+    if uiuc.sniff_folder(path):
+        scan = uiuc.scan_folder(path)
+        refused += [str(fault) for fault in scan.faults]
+        for p in scan.propellers:
+            if any(Path(table.file).resolve() in without for table in (*p.statics, *p.lines)):
+                continue  # the whole propeller: its other runs would tell of the one held out
+            made, why = _from_uiuc(p)
+            rows += made
+            refused += why
+        others = {name for name, _ in scan.ignored}
+        found = [f for f in found if os.fspath(f) in others]
+    for file in found:
+        if file.resolve() in without:
+            continue
+        made, why, note = _file(file)
+        rows += made
+        refused += why
+        notes += note
+    return rows, refused, notes
+
+
+def load(paths: Iterable[str | os.PathLike[str]], without: frozenset[Path] = frozenset()) -> Points:
+    """Gather the points of files and folders.
+
+    Parameters
+    ----------
+    paths : iterable of path
+        Files or folders.
+    without : frozenset of Path
+        Files to leave out of the folders, resolved; of UIUC data with all other runs of their propellers.
+
+    Returns
+    -------
+    Points
+        Rows with rpm > 0 and finite J and CT; what was left out is in ``refused``.
+
+    Raises
+    ------
+    InputError
+        For paths that do not exist, named files that give no point, or no point at all; all at once.
+    """
+    rows: list[Rows] = []
+    refused: list[str] = []
+    notes: list[str] = []
+    faults: list[Fault] = []
+    for item in paths:
+        path = Path(item)
+        if not path.exists():
+            faults.append(Fault(os.fspath(item), "", "nothing there", "a file or folder", "Check the path"))
+            continue
+        made, why, note = _folder(path, without) if path.is_dir() else _file(path)
+        if not made:
+            more = f" ({'; '.join(why[:3])})" if why else ""
+            hint = "Needed are diameter, pitch, rpm and thrust or CT"
+            faults.append(Fault(os.fspath(item), "", f"no usable point{more}", "measured propellers", hint))
+        rows += made
+        refused += why
+        notes += note
+    if faults:
+        raise InputError(faults)
+    return join(rows, refused, notes)
