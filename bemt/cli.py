@@ -351,11 +351,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our output has gone, as in `| head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return EXIT_OK
-    except OSError as error:
-        what = error.strerror or type(error).__name__
-        print(Fault(str(error.filename or ""), "", what, "a file or folder that can be used"), file=sys.stderr)
-        return EXIT_INPUT
-    except Exception:
+    except Exception as error:
+        if isinstance(error, OSError) and error.strerror:  # the system's word; others come from libraries
+            what = Fault(str(error.filename or ""), "", error.strerror, "a file or folder that can be used")
+            print(what, file=sys.stderr)
+            return EXIT_INPUT
         import traceback
 
         traceback.print_exc()

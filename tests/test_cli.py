@@ -113,6 +113,19 @@ def test_trouble_with_files_is_an_input_fault(
     )
 
 
+def test_a_library_that_fails_is_no_fault_of_the_input(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Shared libraries that are missing come as OSError, too: their words must be seen."""
+
+    def broken(_: object) -> int:
+        raise OSError("libGL.so.1: cannot open shared object file")
+
+    monkeypatch.setattr(cli.importlib, "import_module", lambda _: SimpleNamespace(run=broken))
+    assert cli.main(["validate", "x"]) == 3
+    assert "libGL.so.1: cannot open shared object file" in capsys.readouterr().err
+
+
 def test_json_is_utf_8_whatever_the_terminal_is() -> None:
     env = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "latin-1"}
     done = subprocess.run([sys.executable, "-m", "bemt", "effects", "--json"], cwd=ROOT, env=env, capture_output=True)

@@ -109,6 +109,13 @@ def test_nothing_of_a_file_goes_unmentioned(tmp_path: Path, change: dict[str, ob
     assert any(words in note for note in notes), notes
 
 
+def test_loads_beside_coefficients_are_used_under_any_of_their_names(tmp_path: Path) -> None:
+    columns = {"rpm": RPM, "CT": 0.05, "F (N)": LOADS["thrust_N"], "torque_Nm": LOADS["torque_Nm"]}
+    made = load(_table(tmp_path / "log.csv", columns), case())
+    np.testing.assert_allclose(made.measured["thrust_N"], LOADS["thrust_N"])
+    assert any("CT: thrust_N is used" in note for note in made.notes)
+
+
 def test_humid_air_is_thinner_than_dry(tmp_path: Path) -> None:
     air = {"temperature_K": 311.15, "pressure_Pa": 101325.0}
     files = [_table(tmp_path / f"{h}.csv", LOADS | air | {"humidity_pct": h}) for h in (0, 95)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -85,12 +85,12 @@ def load(path: str, case: Case) -> Record:
     found = tuple(str(f) for f in findings if f.severity != "note")
     rows = view(imported)
     if {"CT", "CP", "CQ"} & set(imported.channels):
-        made = records.from_series(_coefficients(imported, path), case)
+        made = records.from_series(_points(imported, rows, path), case)
     else:
         reduced = reduction.reduce(imported, diameter_m=case.diameter_m)
         if reduced.mode == "points" and imported.format == "table":
             # somebody's own table of points: every row counts, a jump from row to row may be what it shows
-            made = records.from_series(_plain(rows.values, rows.u, path), case, reduced.correlated)
+            made = records.from_series(_points(imported, rows, path), case, reduced.correlated)
         else:
             made = records.from_series(reduced.series, case, reduced.correlated)
     notes = (*made.notes, *imported.warnings, *rows.notes, *_unused(imported, rows, case))
@@ -133,24 +133,18 @@ def _unused(imported: Imported, rows: Recorded, case: Case) -> list[str]:
     return out
 
 
-def _coefficients(imported: Imported, path: str) -> Series:
-    """Table of coefficients: its points are steady already and need no diameter."""
-    n = imported.rows
-    values = {
-        k: np.broadcast_to(c.values, (n,)) for k, c in imported.channels.items()
-        if k in (*_POINT, *_LOADS) and c.values.shape in ((n,), (1,))
-    }  # fmt: skip
-    u = {k[2:]: np.abs(c.values) for k, c in imported.channels.items() if k.startswith("u_") and k[2:] in values}
-    return Series("bench", Path(path).name, values, u, imported.flags, {"file": path})
-
-
-def _plain(values: Mapping[str, Array], u: Mapping[str, Array], path: str) -> Series:
-    kept = {k: v for k, v in values.items() if k in (*_POINT, *_LOADS)}
-    wet = {k: values.get(k) for k in ("pressure_Pa", "temperature_K", "humidity")}
-    if "density_kg_m3" not in kept and all(v is not None and np.isfinite(v).all() for v in wet.values()):
+def _points(imported: Imported, rows: Recorded, path: str) -> Series:
+    """Rows as they are: coefficients by their own names, measured channels as a recording names them."""
+    n, known = imported.rows, {*_POINT, *_LOADS}
+    raw = {k: np.broadcast_to(c.values, (n,)) for k, c in imported.channels.items() if c.values.shape in ((n,), (1,))}
+    values = {k: v for k, v in {**raw, **rows.values}.items() if k in known}
+    u = {k[2:]: v for k, v in raw.items() if k.startswith("u_")} | dict(rows.u)
+    wet = {k: rows.values.get(k) for k in ("pressure_Pa", "temperature_K", "humidity")}
+    if "density_kg_m3" not in values and all(v is not None and np.isfinite(v).all() for v in wet.values()):
         states = zip(*wet.values(), strict=True)
-        kept["density_kg_m3"] = np.array([Air.from_state(p, t - ZERO_CELSIUS, 100.0 * h).rho for p, t, h in states])
-    return Series("bench", Path(path).name, kept, {k: np.abs(v) for k, v in u.items() if k in kept}, (), {"file": path})
+        values["density_kg_m3"] = np.array([Air.from_state(p, t - ZERO_CELSIUS, 100.0 * h).rho for p, t, h in states])
+    told = {k: np.abs(v) for k, v in u.items() if k in values}
+    return Series("bench", Path(path).name, values, told, imported.flags, {"file": path})
 
 
 def _progress(args: argparse.Namespace) -> Callable[[str], None] | None:
@@ -263,7 +257,7 @@ def _plan(args: argparse.Namespace) -> int:
 
     cases = cases_of([args.case], args.off, 1)
     say = _progress(args)
-    answer = plan.plan(plan.points(load, args.plan, cases[0]), cases[0], say)
+    answer = plan.plan(plan.points(args.plan, cases[0]), cases[0], say)
     if say:
         print("\r\x1b[K", end="", file=sys.stderr)
     if args.json:

@@ -78,13 +78,11 @@ class Plan:
         return words | dict.fromkeys(self.absent, "invisible")
 
 
-def points(load: Callable[[str, Case], Record], path: str, case: Case) -> Record:
+def points(path: str, case: Case) -> Record:
     """Read the points of a plan: a recording whose loads are not there yet.
 
     Parameters
     ----------
-    load : callable
-        Reader of recordings.
     path : str
         Table with rpm, airspeed_m_s and what else is planned; loads are ignored.
     case : Case
