@@ -23,7 +23,7 @@ EXIT_INTERRUPTED = 130
 MANY: dict[str, Any] = {"action": "extend", "nargs": "+"}
 
 _MODULES = {"sweep": "bemt.sweep", "report": "bemt.report",
-            "validate": "bemt.validate", "reproduce": "bemt.reproduce", "bench": "bemt.bench",
+            "validate": "bemt.validate.command", "reproduce": "bemt.reproduce", "bench": "bemt.bench",
             "import": "bemt.import_files", "export": "bemt.export_case", "cfd": "bemt.cfd.command",
             "calibrate": "bemt.calibrate.command", "estimate": "bemt.calibrate.estimate_command", "data": "bemt.data",
             "prove": "bemt.conceal.prove",
@@ -141,6 +141,8 @@ def build_parser() -> argparse.ArgumentParser:
     validate.add_argument(
         "--off", action="append", default=[], metavar="EFFECT", help="switch an effect off; repeatable"
     )
+    turned = "also with each blade turned to the measured zero-thrust J: an experiment that uses the measurement"
+    validate.add_argument("--match-J0", action="store_true", help=turned)
     validate.add_argument("--out", metavar="DIR", help="write the tables there as well")
 
     reproduce = commands.add_parser("reproduce", help="print every number of the source thesis beside ours")

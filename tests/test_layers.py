@@ -37,7 +37,7 @@ FLOOR_OF_ROOMS: tuple[tuple[str, ...], ...] = (
     ("forward",),
     ("evaluate*",),
     ("grid*",),
-    ("effects_list", "sweep*", "validate*|_validate*", "reproduce*|_thesis*", "bench*|_bench*"),
+    ("effects_list", "sweep*", "validate|validate.*", "reproduce*|_thesis*", "bench*|_bench*"),
     ("import_*", "export_case*", "stations*", "calibrate*", "data|data_archive"),
     ("cfd*",),
     ("compare*",),
@@ -60,7 +60,8 @@ MAY: dict[str, set[str]] = {
     "bemt.report|bemt.report.*": {"files", "print"},
     # subcommands: their run() prints
     "bemt.sweep": {"files", "print"},
-    "bemt.validate": {"files", "print"},
+    "bemt.validate.command": {"files", "print"},
+    "bemt.validate.folder": {"files"},
     "bemt.reproduce": {"files", "print", "environment"},
     "bemt.import_files": {"files", "print"},
     "bemt.import_adapt": {"files"},
