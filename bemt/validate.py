@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.data_folders import find_data
+from bemt.data.folders import find_data
 from bemt.errors import Fault, InputError
 from bemt.units import INCH
 from bemt.validate_text import text
