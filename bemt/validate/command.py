@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bemt.data_folders import find_data
+from bemt.data.folders import find_data
 from bemt.errors import Fault, InputError
 from bemt.validate.folder import read_folder
 from bemt.validate.match import matched
