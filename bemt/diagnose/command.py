@@ -82,7 +82,7 @@ def load(path: str, case: Case) -> Record:
     _same_rotor(imported, case, path)
     ducted = bool(case.document.get("duct"))
     findings = check(imported, diameter_m=case.diameter_m, blades=int(case.get("rotor.blades")), ducted=ducted)
-    found = tuple(str(f) for f in findings if f.severity != "note")
+    found = tuple(f"{Path(path).name}: {f}" for f in findings if f.severity != "note")
     rows = view(imported)
     if {"CT", "CP", "CQ"} & set(imported.channels):
         made = records.from_series(_points(imported, rows, path), case)
