@@ -127,6 +127,39 @@ def test_a_speed_that_the_shaft_power_contradicts(factor: float, words: str) -> 
     assert words in finding.correction.split("Fits as well")[0]
 
 
+@pytest.mark.parametrize("efficiency", [0.35, 0.6, 0.74, 0.85])
+@pytest.mark.parametrize("over_load", [0.0, 0.03, 0.1])
+@pytest.mark.parametrize("battery", [False, True])
+def test_power_of_a_wattmeter_beside_the_torque(efficiency: float, over_load: float, battery: bool) -> None:
+    """Its ratio to torque x speed is an efficiency; at 0.74 that is nearly a foot-pound, and the torque was blamed."""
+    values = stand()
+    share = efficiency * (1.0 + over_load * np.linspace(1.0, -1.0, 15))
+    values["power_W"] = values["torque_Nm"] * values["rpm"] * units.RPM / share
+    values["voltage_V"], values["current_A"] = np.full(15, 15.0), values["power_W"] / 15.0
+    values["voltage_V"][::2] = 15.3
+    if not battery:
+        del values["voltage_V"], values["current_A"]
+    noise = 1.0 + 0.003 * np.random.default_rng(1).standard_normal(15)
+    found = check(recording(values | {"power_W": values["power_W"] * noise}), diameter_m=10 * INCH)
+    (finding,) = found
+    assert (finding.id, finding.channel, finding.severity) == ("power_electrical", "power_W", "warning")
+    assert f"torque x speed is {efficiency:.2g}"[:-1] in finding.evidence
+    assert finding.correction.startswith("is it electrical power? Then name the column electrical_power_W")
+    # the unit comes second, and only where it fits
+    assert ("torque_Nm: lbf ft" in finding.correction) == (efficiency == 0.74 and over_load < 0.1)
+
+
+def test_a_foot_pound_to_the_last_digit_and_a_shaft_power_are_no_wattmeter() -> None:
+    values = stand()
+    values["power_W"] = values["torque_Nm"] * values["rpm"] * units.RPM
+    pounds = values | {"torque_Nm": values["torque_Nm"] / units.UNITS["lbf_ft"].factor}
+    (finding,) = check(recording(pounds), diameter_m=10 * INCH)
+    assert finding.id == "torque_unit" and "lbf ft taken for Nm" in finding.correction
+    # torque of a poor gain beside a power of the shaft: the battery gives more than either
+    poor = values | {"torque_Nm": 0.8 * values["torque_Nm"] * (1 + 0.01 * np.sin(np.arange(15)))}
+    assert not said(check(recording(poor), diameter_m=10 * INCH), "power_electrical")
+
+
 def test_electrical_beside_optical_speed() -> None:
     values = stand()
     speed = values.pop("rpm")
