@@ -211,6 +211,24 @@ def test_a_level_that_no_cause_explains_is_said(tmp_path: Path, diameter_in: int
     assert words in " ".join(document.explanation(answer))
 
 
+@pytest.mark.parametrize("channel", ["thrust_N", "torque_Nm"])
+def test_without_an_explanation_the_first_sentence_is_what_the_recording_shows(channel: str) -> None:
+    """A load 15 % up above 13000 rpm, which nothing explains: what calibration leaves of it is low at low speed."""
+    series = recording(case(), points("grid"))
+    values = {**series.values, channel: series[channel] * np.where(series["rpm"] > 13000.0, 1.15, 1.0)}
+    made = record.from_series(Series("bench", "log", values, dict(series.u)), case())
+    answer = chain.diagnose([made], [case()], nulls=20)
+    assert answer.decision.verdict in ("unknown", "insufficient")
+    first, second = document.explanation(answer)[:2]
+    word = {"thrust_N": "Thrust", "torque_Nm": "Torque"}[channel]
+    told = re.match(rf"{word} is high by (\d+\.\d)% .* at tip Mach number (\d\.\d+) to (\d\.\d+)\.$", first)
+    assert told is not None, first
+    assert float(told[1]) == pytest.approx(15.0, abs=1.5)
+    assert (float(told[2]), float(told[3])) == pytest.approx((0.41, 0.69), abs=0.1)
+    where = answer.where
+    assert second.startswith("Beyond what gains") == ((where.channel, where.size > 0) != (channel, True))
+
+
 def test_rows_copied_count_once() -> None:
     rpm = np.linspace(5000.0, 15000.0, 20)
     once = {"rpm": rpm, "airspeed_m_s": 0.0 * rpm, "thrust_N": 6.8e-8 * rpm**2}
