@@ -43,6 +43,43 @@ def test_an_improved_case_stands_as_long_as_its_answer_does(tmp_path: Path) -> N
     assert not (out / "case.toml").exists()
 
 
+def test_each_case_has_its_improved_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Only that of the first was written. Those of an earlier answer go, whatever cases it had."""
+    names, out = ["prop_8x5", "prop_10x5"], tmp_path / "out"
+    files = []
+    for k, name in enumerate(names):
+        own = case(name)
+        series = recording(own, points("grid", own.diameter_m), seed=k)
+        columns = {**series.values, **{f"u_{q}": v for q, v in series.u.items()}}
+        files.append(_table(tmp_path / f"{name}.csv", columns))
+    both = ["--case", *(str(CASES / n) for n in names)]
+    plain = ["--only", "compressibility", "--out", str(out), "--no-figures", "--quiet"]
+    assert main(["diagnose", *files, *both, "--off", "compressibility", *plain]) == 0
+    assert json.loads((out / "diagnosis.json").read_text())["effects"] == ["compressibility"]
+    assert not (out / "case.toml").exists()
+    for name in names:
+        improved = load_case(out / name)
+        assert improved.name == name and "compressibility" in [e.id for e in prepare(improved).effects]
+        assert main(["sweep", str(out / name), "--quiet"]) == 0
+    # the next answer is of one case: the folders of the two are no answer any more
+    alone = ["diagnose", files[0], "--case", str(CASES / names[0]), "--off", "compressibility", *plain]
+    assert main(alone) == 0
+    assert load_case(out).name == names[0]
+    assert not any((out / n / "case.toml").exists() for n in names)
+    (out / names[1] / "case.toml").write_text((CASES / names[1] / "case.toml").read_text())
+    assert main(["diagnose", *files, *both, *plain]) == 2
+    assert f"{names[1]}/case.toml; expected a folder without one" in capsys.readouterr().err
+
+
+def test_cases_of_one_name_have_no_folder_each(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shutil.copytree(CASES / "prop_8x5", tmp_path / "own")
+    files = [_table(tmp_path / f"{k}.csv", LOADS) for k in "ab"]
+    two = ["--case", str(CASES / "prop_8x5"), str(tmp_path / "own"), "--out", str(tmp_path / "out")]
+    assert main(["diagnose", *files, *two, "--quiet"]) == 2
+    assert "name: got 'prop_8x5'; expected a name that no other case has" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_case_of_the_users_own_is_not_replaced(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file, own = _recorded(tmp_path / "log.csv", 0), tmp_path / "prop_8x5"
     shutil.copytree(CASES / "prop_8x5", own)
