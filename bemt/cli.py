@@ -264,7 +264,7 @@ def build_parser() -> argparse.ArgumentParser:
     model = "model that is compared with the recordings (default bemt; k1k2: thrust only)"
     why.add_argument("--baseline", choices=("bemt", "k1k2"), default="bemt", help=model)
     why.add_argument("--only", metavar="EFFECT", help="consider these effects only (default: all)", **MANY)
-    why.add_argument("--out", metavar="DIR", help="write diagnosis.json, figures and the improved case there")
+    why.add_argument("--out", metavar="DIR", help="write diagnosis.json, figures and the improved cases there")
     why.add_argument("--no-figures", action="store_true", help="with --out: no figures")
     why.add_argument("--json", action="store_true", help="print one JSON document (bemt.diagnosis/1)")
     why.add_argument("--quiet", action="store_true", help="print neither progress nor answer")

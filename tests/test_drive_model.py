@@ -308,16 +308,26 @@ def test_time_constants_of_real_steps(shared_data: Path) -> None:
     assert 0.6 < fitted.esc.brake_on_stop < 0.8
 
 
-@pytest.mark.parametrize("airspeed", ["nan", "inf", "-inf"])
-def test_an_airspeed_that_is_no_number_is_refused(
-    project: Path, airspeed: str, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize("airspeed", ["nan", "inf", "-inf", "-300", "-100.1", "300.1", "1e+09"])
+def test_an_airspeed_that_nothing_flies_at_is_refused_with_all_other_faults(
+    project: Path, tmp_path: Path, airspeed: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["drive", str(project / "cases" / "ds30"), f"--airspeed={airspeed}", "--off", "wind"]) == 2
+    case, out = str(project / "cases" / "ds30"), tmp_path / "out"
+    text = (project / "cases" / "ds30" / "drive.toml").read_text()
+    (tmp_path / "drive.toml").write_text(text.replace("cells = 6", "cells = -6"))
+    wrong = [f"--airspeed={airspeed}", "--off", "wind", "--drive", str(tmp_path / "drive.toml"), "--out", str(out)]
+    assert main(["drive", case, *wrong]) == 2
     words = capsys.readouterr().err
-    assert f"--airspeed: got {airspeed}; expected a finite number" in words and "--off" in words
+    assert f"--airspeed: got {airspeed}; expected a number from -100 to 300 m/s" in words
+    assert ("km/h?" in words) == (airspeed == "300.1")
+    assert "--off: got 'wind'" in words and "battery.cells: got -6" in words
+    assert main(["drive", case, f"--airspeed={airspeed}", "--out", str(out)]) == 2 and not out.exists()
+    assert main(["drive", str(tmp_path / "none"), f"--airspeed={airspeed}"]) == 2
+    words = capsys.readouterr().err
+    assert "--airspeed: got" in words and "none" in words
 
 
-@pytest.mark.parametrize(("airspeed", "known"), [("100", True), ("200", False), ("400", False)])
+@pytest.mark.parametrize(("airspeed", "known"), [("100", True), ("200", False), ("300", False)])
 def test_an_airspeed_beyond_the_drive_is_answered(
     project: Path, tmp_path: Path, airspeed: str, known: bool, capsys: pytest.CaptureFixture[str]
 ) -> None:

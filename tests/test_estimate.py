@@ -55,6 +55,8 @@ def test_the_chord_narrows_the_band(capsys: pytest.CaptureFixture[str]) -> None:
     (("5x3", "--rpm", "-1", "--chord-mm", "300"), "--chord-mm: got 300; expected 0.02 to 0.4 diameters, 2.54 to 50.8"),
     (("5x3", "--rpm", "-1", "--chord-mm", "300"), "rpm: got -1"),
     (("5x3", "--rpm", "9000", "--series", "nobody"), "series: got nobody"),
+    (("5x3", "--rpm", "1e9", "--airspeed=-300"), "--rpm: got 1e+09; expected 0 to 300000 rev/min"),
+    (("5x3", "--rpm", "1e9", "--airspeed=-300"), "--airspeed: got -300; expected -100 to 300 m/s"),
 ])  # fmt: skip
 def test_bad_input_is_refused_all_at_once(
     words: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str]

@@ -127,6 +127,39 @@ def test_a_speed_that_the_shaft_power_contradicts(factor: float, words: str) -> 
     assert words in finding.correction.split("Fits as well")[0]
 
 
+@pytest.mark.parametrize("efficiency", [0.35, 0.6, 0.74, 0.85])
+@pytest.mark.parametrize("over_load", [0.0, 0.03, 0.1])
+@pytest.mark.parametrize("battery", [False, True])
+def test_power_of_a_wattmeter_beside_the_torque(efficiency: float, over_load: float, battery: bool) -> None:
+    """Its ratio to torque x speed is an efficiency; at 0.74 that is nearly a foot-pound, and the torque was blamed."""
+    values = stand()
+    share = efficiency * (1.0 + over_load * np.linspace(1.0, -1.0, 15))
+    values["power_W"] = values["torque_Nm"] * values["rpm"] * units.RPM / share
+    values["voltage_V"], values["current_A"] = np.full(15, 15.0), values["power_W"] / 15.0
+    values["voltage_V"][::2] = 15.3
+    if not battery:
+        del values["voltage_V"], values["current_A"]
+    noise = 1.0 + 0.003 * np.random.default_rng(1).standard_normal(15)
+    found = check(recording(values | {"power_W": values["power_W"] * noise}), diameter_m=10 * INCH)
+    (finding,) = found
+    assert (finding.id, finding.channel, finding.severity) == ("power_electrical", "power_W", "warning")
+    assert f"torque x speed is {efficiency:.2g}"[:-1] in finding.evidence
+    assert finding.correction.startswith("is it electrical power? Then name the column electrical_power_W")
+    # the unit comes second, and only where it fits
+    assert ("torque_Nm: lbf ft" in finding.correction) == (efficiency == 0.74 and over_load < 0.1)
+
+
+def test_a_foot_pound_to_the_last_digit_and_a_shaft_power_are_no_wattmeter() -> None:
+    values = stand()
+    values["power_W"] = values["torque_Nm"] * values["rpm"] * units.RPM
+    pounds = values | {"torque_Nm": values["torque_Nm"] / units.UNITS["lbf_ft"].factor}
+    (finding,) = check(recording(pounds), diameter_m=10 * INCH)
+    assert finding.id == "torque_unit" and "lbf ft taken for Nm" in finding.correction
+    # torque of a poor gain beside a power of the shaft: the battery gives more than either
+    poor = values | {"torque_Nm": 0.8 * values["torque_Nm"] * (1 + 0.01 * np.sin(np.arange(15)))}
+    assert not said(check(recording(poor), diameter_m=10 * INCH), "power_electrical")
+
+
 def test_electrical_beside_optical_speed() -> None:
     values = stand()
     speed = values.pop("rpm")
@@ -250,6 +283,43 @@ def test_time_going_backwards() -> None:
     assert "line 10" in finding.evidence and "sort the rows" in finding.correction
     runs = values | {"run": np.where(np.arange(15) < 8, 1.0, 2.0)}  # another run has its own clock
     assert check(recording(runs), diameter_m=10 * INCH) == ()
+
+
+def stepped(interval: float, lag: float, late: int = 0) -> dict[str, np.ndarray]:
+    """A log of steps of the pulse width, each held over 40 rows; the speed follows with a time constant."""
+    command = np.repeat([1.1e-3, 1.5e-3, 1.3e-3, 1.8e-3, 1.2e-3], 40)
+    rpm = 1.2e7 * (command - 0.9e-3)
+    for i in range(1, rpm.size):
+        rpm[i] += (rpm[i - 1] - rpm[i]) * math.exp(-interval / lag)
+    rpm = np.r_[np.full(late, rpm[0]), rpm[: rpm.size - late]] * (1 + 1e-3 * np.sin(np.arange(rpm.size)))
+    return {"time_s": interval * np.arange(rpm.size), "pulse_width_s": command, "rpm": rpm,
+            "thrust_N": 1.2e-7 * rpm**2}  # fmt: skip
+
+
+@pytest.mark.parametrize(("scale", "words"), [(1e3, "ms taken for s"), (1e6, "us taken for s")])
+@pytest.mark.parametrize("response", ["rpm", "thrust_N"])
+def test_a_rotor_that_takes_minutes_to_follow_has_another_unit_of_time(scale: float, words: str, response: str) -> None:
+    values = stepped(0.02, 0.12)
+    values["time_s"] *= scale
+    del values[{"rpm": "thrust_N", "thrust_N": "rpm"}[response]]
+    (found,) = said(check(recording(values)), "time_unit")
+    assert found.channel == "time_s" and found.evidence.startswith(f"{response} has followed 4 steps of the command")
+    assert words in found.correction
+
+
+@pytest.mark.parametrize(
+    ("interval", "lag", "late"),
+    [
+        (0.02, 0.12, 0),  # the same log in seconds
+        (30.0, 0.12, 0),  # points written down by hand
+        (30.0, 0.12, 1),  # read at the moment of the command
+        (1000.0, 0.5, 1),  # one point in a quarter of an hour
+        (1.0, 3.0, 0),  # a slow controller
+        (20.0, 4.0, 1),
+    ],
+)
+def test_slow_recordings_keep_their_seconds(interval: float, lag: float, late: int) -> None:
+    assert not said(check(recording(stepped(interval, lag, late))), "time_unit")
 
 
 def test_nothing_is_said_where_nothing_can_be_known() -> None:

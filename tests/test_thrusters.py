@@ -98,6 +98,11 @@ def test_faults_come_all_at_once(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert main(["thrusters", str(path)]) == 2
     words = capsys.readouterr().err
     assert all(w in words for w in ("body.nam", "thruster[0].y", "thruster[0].thrust_max_N"))
+    assert main(["thrusters", str(path), "--force=nan", "--moment=-1e300"]) == 2
+    words = capsys.readouterr().err
+    limits = "expected a number from -1e+06 to 1e+06"
+    assert f"--force: got nan; {limits} N." in words and f"--moment: got -1e+300; {limits} N m." in words
+    assert "thruster[0].thrust_max_N" in words
     with pytest.raises(InputError, match="moment or force"):
         allocate(PAIR, 1.0, 0.0, "both")
     with pytest.raises(InputError, match="one or more"):

@@ -20,6 +20,8 @@ from geometry.designation import parse_designation
 __all__ = ["SCHEMA", "document", "run"]
 
 SCHEMA = "bemt.estimate/1"
+FASTEST_RPM, AIRSPEED = 300_000, (-100.0, 300.0)
+"""Speeds of rotation [rev/min] and airspeeds [m/s] that a case may have."""
 
 
 def _label(text: str, faults: list[Fault]) -> tuple[float, float, int | None]:
@@ -61,6 +63,11 @@ def document(args: argparse.Namespace) -> dict[str, Any]:
                ("--measured-pitch-in", args.measured_pitch_in, "in", "pitch"))  # fmt: skip
     for option, value, unit, name in lengths:
         faults += [] if value is None else length_faults((option, ""), value, unit, D * INCH, POSSIBLE[name])
+    # what is no number, or turns backwards, the formula refuses itself
+    faults += [Fault("--rpm", "", f"{n:g}", f"0 to {FASTEST_RPM:g} rev/min") for n in args.rpm
+               if FASTEST_RPM < n < math.inf]  # fmt: skip
+    faults += [Fault("--airspeed", "", f"{v:g}", f"{AIRSPEED[0]:g} to {AIRSPEED[1]:g} m/s") for v in args.airspeed or []
+               if math.isfinite(v) and not AIRSPEED[0] <= v <= AIRSPEED[1]]  # fmt: skip
     rpm, V = (v.ravel() for v in np.meshgrid(args.rpm, args.airspeed or [0.0], indexing="ij"))
     if faults:  # the rest is looked at beside a propeller that is right, so that all faults come at once
         try:

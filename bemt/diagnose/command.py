@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -82,7 +83,7 @@ def load(path: str, case: Case) -> Record:
     _same_rotor(imported, case, path)
     ducted = bool(case.document.get("duct"))
     findings = check(imported, diameter_m=case.diameter_m, blades=int(case.get("rotor.blades")), ducted=ducted)
-    found = tuple(str(f) for f in findings if f.severity != "note")
+    found = tuple(f"{Path(path).name}: {f}" for f in findings if f.severity != "note")
     rows = view(imported)
     if {"CT", "CP", "CQ"} & set(imported.channels):
         made = records.from_series(_points(imported, rows, path), case)
@@ -197,9 +198,10 @@ def _diagnose(args: argparse.Namespace) -> int:
     if args.out:
         out = Path(args.out)
         out.mkdir(parents=True, exist_ok=True)
+        _forget(out, cases)
         write_atomic(out / "diagnosis.json", rendered)
         write_atomic(out / "diagnosis.txt", text(answer) + "\n")
-        _improved(out, answer, cases[0])
+        _improved(out, answer, cases)
         if not args.no_figures:
             from bemt.diagnose import figures
 
@@ -223,33 +225,68 @@ def _told_twice(args: argparse.Namespace) -> None:
         raise InputError(faults)
 
 
-def _refuse_foreign(out: Path, cases: Sequence[Case]) -> None:
-    """Let nobody lose files of their own: the improved case goes where only its like has been."""
-    from bemt.diagnose.improve import beside, is_improved
+def _targets(out: Path, cases: Sequence[Case]) -> dict[Path, Case]:
+    """Folder of the improved case of each case: that of the answer, or one by name in it where there are several."""
+    own = list({c.path.resolve(): c for c in cases}.values())
+    if len(own) == 1:
+        return {out: own[0]}
+    names = [c.name for c in own]
+    twice = [Fault(str(c.path), "name", repr(c.name), "a name that no other case has", "--out makes a folder of each")
+             for k, c in enumerate(own) if c.name in names[:k]]  # fmt: skip
+    if twice:
+        raise InputError(twice)
+    return {out / c.name: c for c in own}
 
-    target = out / "case.toml"
-    mine = target.is_file() and is_improved(target.read_text(encoding="utf-8", errors="replace"))
-    lost = [target] if target.is_file() and (not mine or target.resolve() in {c.path.resolve() for c in cases}) else []
-    for file in () if mine else beside(cases[0]):
-        copy = out / file.relative_to(cases[0].folder)
-        if copy.is_file() and copy.read_bytes() != file.read_bytes():
-            lost.append(copy)
+
+def _written(file: Path) -> bool:
+    """Whether a case file is an improved one."""
+    from bemt.diagnose.improve import is_improved
+
+    return file.is_file() and is_improved(file.read_text(encoding="utf-8", errors="replace"))
+
+
+def _refuse_foreign(out: Path, cases: Sequence[Case]) -> None:
+    """Let nobody lose files of their own: an improved case goes where only its like has been."""
+    from bemt.diagnose.improve import beside
+
+    given, lost = {c.path.resolve() for c in cases}, []
+    for folder, case in _targets(out, cases).items():
+        target = folder / "case.toml"
+        mine = _written(target)
+        if target.is_file() and (not mine or target.resolve() in given):
+            lost.append(target)
+        for file in () if mine else beside(case):
+            copy = folder / file.relative_to(case.folder)
+            if copy.is_file() and copy.read_bytes() != file.read_bytes():
+                lost.append(copy)
     if lost:
         raise InputError([Fault("--out", "", f"a folder with a file of its own, {p.as_posix()}", "a folder without one",
                                 "The improved case would replace it") for p in lost])  # fmt: skip
 
 
-def _improved(out: Path, answer: Any, case: Case) -> None:
-    """Save the case with what was found on, a case that `sweep` runs; that of an earlier answer goes away."""
+def _forget(out: Path, cases: Sequence[Case]) -> None:
+    """Take away the improved cases of the answer that stands in a folder: the next one may have none, or others."""
+    try:
+        earlier = [str(name) for name in json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))["cases"]]
+    except (OSError, ValueError, KeyError, TypeError):
+        earlier = []
+    given = {c.path.resolve() for c in cases}
+    for folder in {out, *(out / name for name in earlier if Path(name).name == name != "..")}:
+        file = folder / "case.toml"
+        if _written(file) and file.resolve() not in given:
+            file.unlink()
+
+
+def _improved(out: Path, answer: Any, cases: Sequence[Case]) -> None:
+    """Save the cases with what was found on, cases that `sweep` runs."""
     from bemt.diagnose.improve import beside, improved_case
 
-    document = improved_case(answer, case, case.path.read_text(encoding="utf-8-sig"))
-    if not document:
-        (out / "case.toml").unlink(missing_ok=True)
-        return
-    for file in beside(case):  # stations, sections and recorded values lie beside the case, as before
-        write_atomic(out / file.relative_to(case.folder), file.read_bytes())
-    write_atomic(out / "case.toml", document)
+    for folder, case in _targets(out, cases).items():
+        document = improved_case(answer, case, case.path.read_text(encoding="utf-8-sig"))
+        if document:
+            for file in beside(case):  # stations, sections and recorded values lie beside the case, as before
+                write_atomic(folder / file.relative_to(case.folder), file.read_bytes())
+            write_atomic(folder / "case.toml", document)
 
 
 def _plan(args: argparse.Namespace) -> int:

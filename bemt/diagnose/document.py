@@ -11,11 +11,13 @@ from bemt import __version__, effects
 from bemt.diagnose import fit as fitting
 from bemt.diagnose import prior
 from bemt.diagnose.confusion import nearest
+from bemt.diagnose.locate import bare
 from bemt.diagnose.verdict import inclusion
 from bemt.tables import text_table
 
 if TYPE_CHECKING:
     from bemt.diagnose.chain import Diagnosis
+    from bemt.diagnose.locate import Location
 
 __all__ = ["SCHEMA", "document", "explanation", "text"]
 
@@ -94,14 +96,27 @@ def document(d: Diagnosis) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _where(d: Diagnosis) -> str:
-    w = d.where
+def _where(w: Location) -> str:
     name, unit, digits = _VARIABLE.get(w.variable, (w.variable, "", 3))
     sign = "high" if w.size > 0 else "low"
     both = f"{w.low:.{digits}f} to {w.high:.{digits}f}{unit}" if w.high > w.low else f"{w.low:.{digits}f}{unit}"
     error = abs(w.size / w.z) if w.z else float("nan")
     spread = "" if not np.isfinite(error) else f" +- {max(error, 1e-4):.1%}"
     return f"{_CHANNEL[w.channel]} is {sign} by {abs(w.size):.1%}{spread} of the model's mean at {name} {both}."
+
+
+def _unexplained(d: Diagnosis) -> list[str]:
+    """What the recording shows, and, where it is another thing, what calibration would leave of it.
+
+    The location of the document is what remains in the light of the likeliest explanation. Where none is given, its
+    sign and even its channel may be those of something that the recording does not show.
+    """
+    seen, rest = bare(d.found), d.where
+    lines = [_where(seen)]
+    if (seen.channel, seen.size > 0) != (rest.channel, rest.size > 0):
+        words = _where(rest)
+        lines.append(f"Beyond what gains, blade angles and the solver may be: {words[0].lower()}{words[1:]}")
+    return lines
 
 
 def _gain(d: Diagnosis) -> str:
@@ -153,7 +168,7 @@ def explanation(d: Diagnosis) -> list[str]:
         if max((abs(v) for v in level.values()), default=0.0) > _WORTH_SAYING:
             lines.append(f"The level is off ({off}), which gains, blade angles and the solver may be; no cause shows.")
         return [*lines, _gain(d), *_next(d, "To see more")]
-    lines.append(_where(d))
+    lines += _unexplained(d) if decision.verdict in ("unknown", "insufficient") else [_where(d.where)]
     names = " and ".join(catalogue[i].title for i in decision.effects)
     if decision.verdict in ("named", "sensor"):
         lead = "Not the air but the stand" if decision.verdict == "sensor" else "Left out"

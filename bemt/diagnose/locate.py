@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence
     from bemt.diagnose.fit import Fit
 
-__all__ = ["Location", "locate"]
+__all__ = ["Location", "bare", "locate"]
 
 Array = NDArray[np.float64]
 
@@ -80,10 +80,30 @@ def locate(found: Evidence, best: Fit) -> Location:
     Location
         Largest scan statistic; among variables that tie, the one along which the effect acts by its nature.
     """
-    problem = found.problem
-    d = mismatch(found, best)
-    e = d / (problem.u * found.states[0].hyper.scale)
     natural = tuple(v for i in best.ids for v in effects.catalogue()[i].along)
+    return _largest(found, mismatch(found, best), natural)
+
+
+def bare(found: Evidence) -> Location:
+    """Find channel, variable and interval in which the recording itself is farthest from the case.
+
+    Parameters
+    ----------
+    found : Evidence
+        Outcome of the weighing.
+
+    Returns
+    -------
+    Location
+        Nothing taken away: what the figures of recording and case show to the eye.
+    """
+    return _largest(found, found.problem.residual, ())
+
+
+def _largest(found: Evidence, d: Array, natural: tuple[str, ...]) -> Location:
+    """Largest scan statistic of a mismatch, (M,) in the unit of each reading."""
+    problem = found.problem
+    e = d / (problem.u * found.states[0].hyper.scale)
     free = problem.free
     channel = max(np.unique(problem.channel), key=lambda c: float(np.sum(e[(problem.channel == c) & free] ** 2)))
     here = (problem.channel == channel) & free

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from bemt import evaluate, forward
 from bemt.diagnose.nuisance import nuisances
-from bemt.diagnose.record import CHANNELS, Record, concatenated, merged
+from bemt.diagnose.record import CHANNELS, Record, concatenated, merged, owners
 from bemt.effects.base import Effect, Flow, Reading
 from bemt.errors import Fault, InputError
+from bemt.sanity.between import Level, odd_ones
 
 if TYPE_CHECKING:
     from bemt.case import Case
@@ -25,6 +26,8 @@ Array = NDArray[np.float64]
 
 _STATIONS = 16
 _FEWEST = 3
+# Share of the largest load coefficient from which on a reading shows the level of its recording.
+_LOADED = 0.3
 # No slip of units is larger, and numbers beyond it are beyond floating point.
 _FARTHEST = 1e6
 _U_DEFAULT = 0.01
@@ -181,6 +184,8 @@ class Problem:
         Which of them are errors of the solver itself.
     notes : tuple of str
         What was assumed or left out.
+    between : tuple of str
+        What looks wrong in a recording beside the others, its file named in front.
     predicted : dict
         Readings that were solved already, by the effects added.
     """
@@ -200,12 +205,13 @@ class Problem:
     names: tuple[str, ...]
     own: NDArray[np.bool_]
     notes: tuple[str, ...] = ()
+    between: tuple[str, ...] = ()
     predicted: dict[Any, Array] = field(default_factory=dict, repr=False)
 
     @property
     def findings(self) -> tuple[str, ...]:
         """What looks wrong in the recordings before any physics."""
-        return tuple(f"{p.record.name}: {f}" for p in self.parts for f in p.record.findings)
+        return (*self.between, *(f for p in self.parts for f in p.record.findings))
 
     @property
     def level(self) -> dict[str, float]:
@@ -325,7 +331,33 @@ def build(records: Sequence[Record], cases: Sequence[Case], baseline: str = "bem
         if not 1.0 / _FARTHEST < ratio < _FARTHEST:
             raise InputError(Fault(records[0].name, name, f"{ratio:.2g} times what the case gives",
                                    "readings of this rotor", "Another unit, or another case?"))  # fmt: skip
-    return problem
+    return replace(problem, between=_between(problem, [groups[k][1] for k in order], records))
+
+
+def _between(problem: Problem, joined: Sequence[Sequence[Record]], records: Sequence[Record]) -> tuple[str, ...]:
+    """Recordings in other units than their companions, by the level of their loads beside the baseline."""
+    names = [r.name for r in records]
+    label = {id(r): r.name if names.count(r.name) == 1 else f"{r.name} (recording {k})"
+             for k, r in enumerate(records, 1)}  # fmt: skip
+    unit = np.concatenate([p.flow.rho * p.flow.n**2 for p in problem.parts])[problem.point]
+    owner = np.concatenate([owners(rs, p.record) for rs, p in zip(joined, problem.parts, strict=True)])[problem.point]
+    size, levels = np.abs(problem.f0) / unit, []
+    with np.errstate(divide="ignore", invalid="ignore"):
+        off = np.log(np.abs(problem.y / problem.f0))
+    for c, channel in enumerate(CHANNELS[:2]):
+        for i, rs in enumerate(joined):
+            same = np.array([p.key == problem.parts[i].key for p in problem.parts])[problem.part]
+            alike = (problem.channel == c) & same
+            if not alike.any():
+                continue
+            # where the load fades the ratio is that of two errors, and says nothing of the level
+            loaded = alike & np.isfinite(off) & (size >= _LOADED * np.quantile(size[alike], 0.9))
+            for k, r in enumerate(rs):
+                mine = off[loaded & (problem.part == i) & (owner == k)]
+                if mine.size >= _FEWEST:
+                    low, mid, high = np.quantile(mine, [0.1, 0.5, 0.9])
+                    levels.append(Level(label[id(r)], channel, float(mid), float(high - low) / 2.0))
+    return tuple(f"{level.name}: {finding}" for level, finding in odd_ones(levels))
 
 
 def assemble(parts: tuple[Part, ...]) -> Problem:

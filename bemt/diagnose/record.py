@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from bemt.case import Case
     from bemt.series import Series
 
-__all__ = ["CHANNELS", "COVARIATES", "Record", "air_of", "concatenated", "from_series", "merged"]
+__all__ = ["CHANNELS", "COVARIATES", "Record", "air_of", "concatenated", "from_series", "merged", "owners"]
 
 Array = NDArray[np.float64]
 
@@ -75,7 +75,7 @@ class Record:
     reference : bool
         Known to be without the cause that is looked for: shows how far model and stand differ anyway.
     findings : tuple of str
-        What looks wrong in the file before any physics; nothing was corrected.
+        What looks wrong in the file before any physics, the file named in front; nothing was corrected.
     """
 
     name: str
@@ -405,6 +405,27 @@ def merged(records: Sequence[Record]) -> Record:
         all(r.air_recorded for r in records), notes, records[0].reference,
         tuple(dict.fromkeys(f for r in records for f in r.findings)),
     ))  # fmt: skip
+
+
+def owners(records: Sequence[Record], whole: Record) -> NDArray[np.intp]:
+    """Tell which of the recordings that were joined each point comes from.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        What was joined.
+    whole : Record
+        What :func:`merged` made of them.
+
+    Returns
+    -------
+    (P,) int
+        Index into the recordings.  Points of two runs are never averaged, so that each has one.
+    """
+    if len(records) == 1:
+        return np.zeros(len(whole), dtype=np.intp)
+    runs = [np.unique(r.extra.get("run", np.zeros(1))).size for r in records]
+    return np.searchsorted(np.cumsum(runs), whole.extra["run"], side="right")
 
 
 def concatenated(records: Sequence[Record]) -> dict[str, Array]:

@@ -21,6 +21,8 @@ __all__ = ["run"]
 COLUMNS = {"pulse_us": "pulse [us]", "rpm": "rpm", "thrust_N": "T [N]", "battery_A": "I [A]", "voltage_V": "V [V]",
            "power_W": "P [W]", "efficiency": "eta"}  # fmt: skip
 RESULTS = ("drive.json", "drive.csv", "drive.png")
+AIRSPEED = (-100.0, 300.0)
+"""Airspeeds that are answered, those that a case may have. [m/s]"""
 LOW, HIGH = 0.2, 0.8
 """Shares of full thrust of the step."""
 
@@ -41,20 +43,26 @@ def run(args: argparse.Namespace) -> int:
     Raises
     ------
     InputError
-        With the faults of the case and of drive.toml.
+        With the faults of the options and of the case or, where that is right, of drive.toml.
     """
     if args.validate:
         return validate_command.run(args)
     if not args.case:
         raise InputError(Fault("", "CASE", "nothing", "a case file or its folder", "Or --validate DIR"))
     wrong = [Fault("", "--off", repr(n), f"one of {', '.join(EFFECTS)}") for n in args.off if n not in EFFECTS]
-    if not math.isfinite(args.airspeed):
-        wrong.append(Fault("", "--airspeed", f"{args.airspeed:g}", "a finite number [m/s]"))
+    if not AIRSPEED[0] <= args.airspeed <= AIRSPEED[1]:
+        hint = "" if not AIRSPEED[1] < args.airspeed < 3.6 * AIRSPEED[1] else "km/h? Divide by 3.6"
+        expected = f"a number from {AIRSPEED[0]:g} to {AIRSPEED[1]:g} m/s"
+        wrong.append(Fault("", "--airspeed", f"{args.airspeed:g}", expected, hint))
+    path = Path(args.case)
+    path = path / "case.toml" if path.is_dir() else path
+    try:  # what is wrong with the files comes with what is wrong with the options
+        case = load_case(path)
+        file = drive_file.read(Path(args.drive) if args.drive else case.folder / "drive.toml")
+    except InputError as error:
+        raise InputError([*wrong, *error.faults]) from None
     if wrong:
         raise InputError(wrong)
-    path = Path(args.case)
-    case = load_case(path / "case.toml" if path.is_dir() else path)
-    file = drive_file.read(Path(args.drive) if args.drive else case.folder / "drive.toml")
     if args.out:
         outputs.check("--out", Path(args.out), RESULTS, [*case.files(), file.path])
     rotor = rotor_table.from_case(case, 1.02 * file.rpm_max, args.airspeed, case.air(), file.rotor_inertia_kg_m2)

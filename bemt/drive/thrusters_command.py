@@ -35,7 +35,7 @@ import numpy as np
 
 from bemt.drive import outputs, picture
 from bemt.drive.thrusters import Allocation, Thruster, allocate, attainable, moment_at
-from bemt.errors import EXIT_OK, EXIT_UNCONVERGED, InputError
+from bemt.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
 from bemt.schema import Collector, Key, check_table, load_toml
 from bemt.tables import csv_text, json_text, number_text, text_table, write_atomic
 
@@ -43,6 +43,8 @@ __all__ = ["run"]
 
 KGF = 9.80665
 RESULTS = ("thrusters.json", "mounting.csv", "thrusters.png")
+MOST = 1e6
+"""Largest wanted force [N] and moment [N m]."""
 _LENGTH = Key(unit="m", low=-50.0, high=50.0)
 TABLES: dict[str, dict[str, Key]] = {
     "": {"schema": Key("choice", choices=("bemt.thrusters/1",), required=True)},
@@ -54,8 +56,8 @@ TABLES: dict[str, dict[str, Key]] = {
         "cant_deg": Key(unit="deg", low=-180.0, high=180.0),
     },
     "command": {
-        "force_N": Key(unit="N", low=-1e6, high=1e6, required=True),
-        "moment_Nm": Key(unit="N m", low=-1e6, high=1e6, required=True),
+        "force_N": Key(unit="N", low=-MOST, high=MOST, required=True),
+        "moment_Nm": Key(unit="N m", low=-MOST, high=MOST, required=True),
         "priority": Key("choice", choices=("moment", "force")),
     },
     "mounting": {"distance_m": Key("axis", unit="m", low=0.0, high=50.0, required=True)},
@@ -78,9 +80,17 @@ def run(args: argparse.Namespace) -> int:
     Raises
     ------
     InputError
-        With all faults of the file.
+        With all faults of the options and of the file.
     """
-    doc = _read(Path(args.file))
+    wrong = [Fault("", option, f"{value:g}", f"a number from {-MOST:g} to {MOST:g} {unit}")
+             for option, value, unit in (("--force", args.force, "N"), ("--moment", args.moment, "N m"))
+             if value is not None and not -MOST <= value <= MOST]  # fmt: skip
+    try:
+        doc = _read(Path(args.file))
+    except InputError as error:
+        raise InputError([*wrong, *error.faults]) from None
+    if wrong:
+        raise InputError(wrong)
     thrusters = [
         Thruster(float(t["y_m"]), float(t["thrust_max_N"]), float(t.get("thrust_min_N", 0.0)), float(t.get("z_m", 0.0)),
                  math.radians(t.get("cant_deg", 0.0)), t.get("name", f"thruster {i + 1}"))

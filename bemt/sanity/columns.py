@@ -20,6 +20,10 @@ SENSORS = (
 STUCK = ("thrust_N", "duct_thrust_N", "torque_Nm", "current_A", "power_W", "electrical_power_W", "rpm",
          "electrical_rpm", "optical_rpm", "voltage_V")  # fmt: skip
 """Channels that cannot stay the same while others change."""
+SLOWEST_S = 10.0
+"""Time in which any rotor has followed a step of its command by two thirds, slow controllers included. [s]"""
+HELD, STEPS = 6, 2
+"""Rows for which a command is held after a step; steps that are looked at, at least. [1]"""
 
 
 def _varies(v: Array, share: float = 0.05) -> bool:
@@ -118,6 +122,42 @@ def time_backwards(facts: Facts) -> Iterator[Finding]:
         )
         why = "note" if first else "error"  # the first sample of a log is often stamped late
         yield Finding("time_backwards", facts.named("time_s"), text, fix, tuple(int(r) for r in odd), why)
+
+
+@check_for("slow_rotor")
+def slow_rotor(facts: Facts) -> Iterator[Finding]:
+    """Time in a smaller unit than its heading: the rotor follows steps of its command over minutes.
+
+    Rows far apart alone say nothing, since points written down by hand are. But one that took the new speed is there
+    by the next row; none needs more than `SLOWEST_S`, whatever its size.
+    """
+    t, response = facts.get("time_s"), next((k for k in ("rpm", "thrust_N") if facts.get(k) is not None), None)
+    command = next((v for k in ("pwm_s", "throttle") if (v := facts.get(k)) is not None), None)
+    if t is None or command is None or response is None:
+        return
+    y = facts.values[response]
+    rows = np.flatnonzero(np.isfinite(t) & np.isfinite(command) & np.isfinite(y))
+    t, c, y = t[rows], command[rows], np.abs(y[rows])
+    if rows.size < 2 * HELD or float(np.ptp(c)) == 0.0 or float(np.ptp(y)) == 0.0:
+        return
+    level = (c - c.min()) / np.ptp(c)
+    first = np.flatnonzero(np.abs(np.diff(level)) > 0.1) + 1  # the row that has a new command first
+    followed, waited = [], []
+    for i in first[(first >= 2) & (first <= rows.size - HELD)]:
+        held = level[i : i + HELD]
+        before, after = float(np.median(y[i - 2 : i])), float(np.median(y[i + HELD - 2 : i + HELD]))
+        steady = float(np.ptp(held)) < 0.01 and abs(level[i - 2] - level[i - 1]) < 0.01
+        if steady and abs(after - before) > 0.1 * float(np.max(y)):
+            # the first row may be read at the moment of the command: one whole interval later counts
+            followed.append((float(y[i + 1]) - before) / (after - before))
+            waited.append(float(t[i + 1] - t[i]))
+    if len(followed) < STEPS or float(np.median(waited)) < SLOWEST_S or float(np.median(followed)) > 1.0 - np.exp(-1.0):
+        return
+    text = f"{response} has followed {len(followed)} steps of the command by {np.median(followed):.0%} only, "
+    text += f"{np.median(waited):.4g} s after them, in the median; a rotor takes less than {SLOWEST_S:g} s"
+    ms = 1e-3 * float(np.median(waited)) < SLOWEST_S
+    fix = "ms taken for s: multiply by 0.001" if ms else "us taken for s: multiply by 1e-06"
+    yield Finding("time_unit", facts.named("time_s"), text, fix, (), "warning")
 
 
 @check_for("lengths")

@@ -30,6 +30,9 @@ EXACT = 0.03
 ALIKE = 4.0
 """Difference in score (chi-square) within which slips are told together."""
 
+EFFICIENCY, SAME_DIGITS = (0.2, 0.95), 0.001
+"""Range of a motor's efficiency under load; scatter of a product that the file itself formed. [1]"""
+
 
 @dataclass(frozen=True)
 class Relation:
@@ -321,16 +324,26 @@ def find_slips(facts: Facts) -> Iterator[Finding]:
     """
     known = relations(facts) if not facts.bare else []
     broken = [r for r in known if r.broken]
-    if not broken:
+    share = _electrical(facts, broken) if not facts.bare else None
+    if not broken and share is None:
         return
     quantities = {q for r in known for q in r.powers}
     fits: list[tuple[float, Slip]] = []
-    for slip in slips():
+    for slip in slips() if broken else ():
         if slip.quantity not in quantities or facts.diameter_m is None and slip.quantity == "D":
             continue
         shift = {slip.quantity: slip.factor}
         if all(r.holds(shift) for r in known if r in broken or slip.quantity in r.powers):
             fits.append((sum(r.distance(shift) for r in known) + slip.rarity, slip))
+    fits.sort(key=lambda fit: fit[0])
+    if share is not None:
+        text = f"torque x speed is {share[1]:.3g} of it ({share[0]:.3g} to {share[2]:.3g} under load), "
+        text += "as the efficiency of a motor would be"
+        fix = "is it electrical power? Then name the column electrical_power_W"
+        if fits:
+            fix += f". If it is power of the shaft: {_told(fits[0][1].quantity, facts)}: {fits[0][1].words}"
+        yield Finding("power_electrical", facts.named("power_W"), text, fix, (), "warning")
+        return
     evidence = "; ".join(f"{r.name} is {r.value:.4g}, must be {_bounds(r)}" for r in broken[:4])
     certain = any(r.exact for r in broken)
     if not fits:
@@ -340,13 +353,38 @@ def find_slips(facts: Facts) -> Iterator[Finding]:
             "inconsistent", channels[0] if len(channels) == 1 else "+".join(channels), evidence, text, (), "warning"
         )
         return
-    fits.sort(key=lambda fit: fit[0])
     best, slip = fits[0]
     others = [s for score, s in fits[1:] if score - best < ALIKE]
     words = f"{_told(slip.quantity, facts)}: {slip.words}"
     if others:
         words += ". Fits as well: " + "; ".join(_listed(others, facts))
     yield Finding(slip.id, _told(slip.quantity, facts), evidence, words, (), "error" if certain else "warning")
+
+
+def _electrical(facts: Facts, broken: list[Relation]) -> tuple[float, float, float] | None:
+    """Share of a power that torque x speed is, when it can be that of a motor: low, middle, high; else None.
+
+    A unit is one number to the last digit; an efficiency goes with the load, or scatters as sensors do.
+    """
+    q = _quantities(facts)
+    if facts.named("power_W") not in ("power_W", "P_W") or not {"P", "Q", "n"} <= q.keys():
+        return None
+    if any("P" not in r.powers for r in broken):
+        return None  # something else is wrong, and may be the reason
+    with np.errstate(all="ignore"):
+        ratio = (2.0 * math.pi * q["Q"] * q["n"] / q["P"])[facts.loaded]
+        battery = (q["P"] / q["E"])[facts.loaded] if "E" in q else np.ones(1)
+    ratio, battery = ratio[np.isfinite(ratio)], battery[np.isfinite(battery)]
+    if ratio.size < 3 or (battery.size and abs(float(np.median(battery)) - 1.0) > 0.1):
+        return None
+    low, middle, high = (float(x) for x in np.percentile(ratio, [20.0, 50.0, 80.0]))
+    if not (EFFICIENCY[0] <= low and high <= EFFICIENCY[1]):
+        return None
+    digits = float(np.median(np.abs(ratio / middle - 1.0))) < SAME_DIGITS
+    repairs = {"Q": 1.0 / middle, "n": 1.0 / middle, "P": middle}
+    if digits and any(abs(s.factor / repairs[s.quantity] - 1.0) < 0.005 for s in slips() if s.quantity in repairs):
+        return None
+    return low, middle, high
 
 
 def _listed(others: list[Slip], facts: Facts) -> list[str]:
