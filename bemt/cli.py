@@ -22,7 +22,7 @@ EXIT_INTERRUPTED = 130
 # Options of several words: `--case A B` and `--case A --case B` are the same, none is dropped without a word.
 MANY: dict[str, Any] = {"action": "extend", "nargs": "+"}
 
-_MODULES = {"sweep": "bemt.sweep", "report": "bemt.report",
+_MODULES = {"sweep": "bemt.sweep.command", "report": "bemt.report",
             "validate": "bemt.validate", "reproduce": "bemt.reproduce", "bench": "bemt.bench",
             "import": "bemt.import_files", "export": "bemt.export_case", "cfd": "bemt.cfd.command",
             "calibrate": "bemt.calibrate.command", "estimate": "bemt.calibrate.estimate_command", "data": "bemt.data",

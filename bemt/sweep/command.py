@@ -25,8 +25,8 @@ from bemt.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, EXIT_UNCONVERGED, Fa
 from bemt.grid.formats import FORMATS, require_extra
 from bemt.grid.identity import program_hash
 from bemt.grid.run import Engine, run_grid
-from bemt.sweep_case import solve_case
-from bemt.sweep_text import case_text, overview_text, rows_csv
+from bemt.sweep.case import solve_case
+from bemt.sweep.text import case_text, overview_text, rows_csv
 from bemt.tables import json_text, plain, remove_stale, write_atomic
 
 __all__ = ["SCHEMA", "fingerprint", "run", "sweep"]
