@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from bemt import __version__
-from bemt.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError
+from bemt.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, InputError, system_fault
 
 __all__ = ["build_parser", "main"]
 
@@ -353,8 +353,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return EXIT_OK
     except Exception as error:
         if isinstance(error, OSError) and error.strerror:  # the system's word; others come from libraries
-            what = Fault(str(error.filename or ""), "", error.strerror, "a file or folder that can be used")
-            print(what, file=sys.stderr)
+            print(system_fault(error), file=sys.stderr)
             return EXIT_INPUT
         import traceback
 

@@ -60,6 +60,7 @@ MAY: dict[str, set[str]] = {
     "bemt.report|bemt.report.*": {"files", "print"},
     # subcommands: their run() prints
     "bemt.sweep.command": {"files", "print"},
+    "bemt.sweep.store": {"files"},
     "bemt.validate": {"files", "print"},
     "bemt.reproduce": {"files", "print", "environment"},
     "bemt.import_files": {"files", "print"},
