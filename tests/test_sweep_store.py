@@ -197,9 +197,15 @@ def test_a_worker_that_dies_does_not_take_other_cases_with_it(tmp_path: Path) ->
     assert tree(tmp_path / "out") == tree(tmp_path / "whole")
 
 
+def nothing_left(folder: Path) -> None:
+    """An empty file: only its folder has a name."""
+    (folder / "case.toml").write_text("")
+
+
 def broken_syntax(folder: Path) -> None:
     """No TOML."""
-    (folder / "case.toml").write_text("rpm = = 3")
+    with (folder / "case.toml").open("a") as stream:
+        stream.write("rpm = = 3")
 
 
 def broken_value(folder: Path) -> None:
@@ -215,7 +221,7 @@ def broken_references(folder: Path) -> None:
 
 @pytest.mark.parametrize(
     ("fault", "name"),
-    [(broken_syntax, "bad"), (broken_value, "bad"), (broken_value, "renamed"), (broken_references, "renamed")],
+    [(nothing_left, "bad"), (broken_syntax, "renamed"), (broken_value, "renamed"), (broken_references, "renamed")],
 )
 def test_a_case_that_fails_has_no_result(tmp_path: Path, fault: Callable[[Path], None], name: str) -> None:
     bad = make_case(tmp_path / "cases", "bad", extra=AXES)
@@ -237,7 +243,7 @@ def test_a_case_that_fails_has_no_result(tmp_path: Path, fault: Callable[[Path],
 
 
 def test_the_result_of_another_case_is_not_taken_for_that_of_a_faulty_one(tmp_path: Path) -> None:
-    broken_syntax(make_case(tmp_path / "cases", "one").parent)
+    nothing_left(make_case(tmp_path / "cases", "one").parent)
     other = make_case(tmp_path / "cases", "two")
     other.write_text(other.read_text().replace('name = "two"', 'name = "one"'))  # the name of the other's folder
     sweep([other], tmp_path / "out")
@@ -250,13 +256,18 @@ def test_files_of_the_user_beside_a_faulty_case_are_not_results(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = make_case(tmp_path / "cases").parent
-    broken_syntax(folder)
+    nothing_left(folder)
     (folder / "table.txt").write_text("of the user")
     before = tree(folder)
     assert sweep([folder], tmp_path / "cases")["exit_code"] == 2
     (tmp_path / "table.txt").write_text("of the user")
     monkeypatch.chdir(folder)
+    (folder / "..toml").write_text("")
+    before = tree(folder)
     sweep(["../one/case.toml", "case.toml"], ".")
+    (tmp_path / "cases" / "table.txt").write_text("of the user")
+    sweep(["..toml"], "..")  # its stem is a dot
+    assert (tmp_path / "cases" / "table.txt").exists()
     assert {name: data for name, data in tree(folder).items() if not name.startswith("sweep.")} == before
 
 

@@ -150,6 +150,11 @@ def join(target: Path, names: Sequence[str], axes: Sequence[str], parts: Sequenc
     -------
     str
         SHA-256 of the file, hexadecimal.
+
+    Raises
+    ------
+    OSError
+        When it cannot be written; its `filename` is the target.
     """
     temporary = target.with_name(f".{target.name}.tmp")
     try:
@@ -164,6 +169,9 @@ def join(target: Path, names: Sequence[str], axes: Sequence[str], parts: Sequenc
         digest = file_hash(temporary)
         temporary.replace(target)
         return digest
+    except OSError as error:  # a full disk names no file; the temporary one nobody knows
+        error.filename = str(target)
+        raise
     finally:
         temporary.unlink(missing_ok=True)
 

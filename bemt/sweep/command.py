@@ -11,12 +11,13 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import signal
 import sys
 import threading
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ from bemt.case import Case, check_name, find_cases, load_case
 from bemt.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, EXIT_UNCONVERGED, Fault, InputError, system_fault
 from bemt.grid.formats import FORMATS, require_extra
 from bemt.grid.run import Engine, run_grid
-from bemt.schema import Collector, load_toml
+from bemt.schema import Collector
 from bemt.sweep import store
 from bemt.sweep.case import solve_case
 from bemt.sweep.store import SCHEMA, fingerprint
@@ -35,6 +36,7 @@ from bemt.tables import json_text, plain, remove_stale
 __all__ = ["SCHEMA", "fingerprint", "run", "sweep"]
 
 Progress = Callable[[str], None]
+_NAME = re.compile(r"""^name\s*=\s*["']([^"']+)["']""", re.M)
 Ready = tuple[Case, str]
 """A case and its fingerprint, taken when it was read."""
 
@@ -47,10 +49,13 @@ def _fit(name: str) -> bool:
 
 
 def _name(path: Path) -> str:
-    """Name of a case that may be faulty: what the file says, else the name of its folder or file."""
-    said = (load_toml(path, Collector("")) or {}).get("name")
-    if isinstance(said, str) and _fit(said):
-        return said
+    """Name of a case that may be faulty: what the file says, sound or not, else the name of its folder or file."""
+    text = ""
+    with suppress(OSError):
+        text = path.read_text(encoding="utf-8", errors="replace")
+    said = _NAME.search(text.partition("\n[")[0])
+    if said is not None and _fit(said[1]):
+        return said[1]
     whole = Path(os.path.abspath(path))
     return whole.parent.name if whole.name == "case.toml" else whole.stem
 

@@ -28,8 +28,8 @@ __all__ = [
 ]  # fmt: skip
 
 SCHEMA = "bemt.sweep/1"
-OVERVIEW = ("sweep.json", "sweep.csv", "sweep.txt")
-"""Files over all cases."""
+OVERVIEW = ("sweep.csv", "sweep.txt", "sweep.json")
+"""Files over all cases, in the order in which they are written."""
 RESULT, TABLE, LOCK = "result.json", "table.txt", ".sweep.lock"
 
 
@@ -137,7 +137,7 @@ def keep_overview(folder: Path, document: Mapping[str, Any]) -> None:
     document : mapping
         ``bemt.sweep/1``.
     """
-    texts = (json_text(document), rows_csv(document["cases"]), overview_text(document["cases"]) + "\n")
+    texts = (rows_csv(document["cases"]), overview_text(document["cases"]) + "\n", json_text(document))
     for name, text in zip(OVERVIEW, texts, strict=True):
         write_atomic(folder / name, text)
 
