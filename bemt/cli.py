@@ -24,10 +24,10 @@ EXIT_INTERRUPTED = 130
 MANY: dict[str, Any] = {"action": "extend", "nargs": "+"}
 
 _MODULES = {"sweep": "bemt.sweep.command", "report": "bemt.report",
-            "validate": "bemt.validate", "reproduce": "bemt.reproduce", "bench": "bemt.bench",
-            "import": "bemt.import_files", "export": "bemt.export_case", "cfd": "bemt.cfd.command",
-            "calibrate": "bemt.calibrate.command", "estimate": "bemt.calibrate.estimate_command", "data": "bemt.data",
-            "prove": "bemt.conceal.prove",
+            "validate": "bemt.validate.command", "reproduce": "bemt.reproduce", "bench": "bemt.bench",
+            "import": "bemt.importing.command", "export": "bemt.export.command", "cfd": "bemt.cfd.command",
+            "calibrate": "bemt.calibrate.command", "estimate": "bemt.calibrate.estimate_command",
+            "data": "bemt.data.command", "prove": "bemt.conceal.prove",
             "effects": "bemt.effects_list", "diagnose": "bemt.diagnose.command", "plan": "bemt.diagnose.command",
             "stations": "bemt.stations", "map": "bemt.drive.map_command", "motor": "bemt.drive.motor_command",
             "drive": "bemt.drive.drive_command", "thrusters": "bemt.drive.thrusters_command"}  # fmt: skip
@@ -142,6 +142,8 @@ def build_parser() -> argparse.ArgumentParser:
     validate.add_argument(
         "--off", action="append", default=[], metavar="EFFECT", help="switch an effect off; repeatable"
     )
+    turned = "also with each blade turned to the measured zero-thrust J: an experiment that uses the measurement"
+    validate.add_argument("--match-J0", action="store_true", help=turned)
     validate.add_argument("--out", metavar="DIR", help="write the tables there as well")
 
     reproduce = commands.add_parser("reproduce", help="print every number of the source thesis beside ours")

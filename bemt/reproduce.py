@@ -22,7 +22,7 @@ from bemt import _thesis as th
 from bemt import coefficients as co
 from bemt import empirical as k
 from bemt.air import Air
-from bemt.data_folders import find_data
+from bemt.data.folders import find_data
 from bemt.units import INCH, KGF, RPM
 
 SCHEMA = "bemt.reproduce/1"
@@ -31,7 +31,7 @@ UIUC_POINTS, UIUC_PROPELLERS = 4122, 248
 
 
 def find_uiuc() -> Path | None:
-    """Folder of the UIUC data, see :func:`bemt.data_folders.find_data`.
+    """Folder of the UIUC data, see :func:`bemt.data.folders.find_data`.
 
     Returns
     -------

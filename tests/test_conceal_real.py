@@ -12,7 +12,7 @@ from bemt.conceal import prove, real, score
 from bemt.conceal.items import Item
 from bemt.effects import catalogue
 from bemt.errors import InputError
-from bemt.import_files import import_file
+from bemt.importing import import_file
 
 
 @pytest.fixture(scope="module")

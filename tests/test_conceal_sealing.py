@@ -14,7 +14,7 @@ import pytest
 from bemt.case import load_case
 from bemt.conceal import draw, items, proof_text, prove, resolve, rigs, score, seal
 from bemt.errors import InputError
-from bemt.import_files import import_file
+from bemt.importing import import_file
 
 TINY = draw.Size(
     {"single": 2, "pair": 0, "null": 1, "mismatch": 1, "unlisted": 0, "sensor": 2, "underpowered": 1},

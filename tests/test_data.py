@@ -13,7 +13,10 @@ from pathlib import Path
 
 import pytest
 
-from bemt import cache, cli, data, data_archive, data_folders
+from bemt import cache, cli
+from bemt.data import archive as data_archive
+from bemt.data import command as data
+from bemt.data import folders
 from bemt.errors import InputError
 
 GEOM = "r/R c/R beta\n0.15 0.11 30.0\n0.50 0.16 20.0\n0.75 0.13 13.0\n1.00 0.05 8.0\n"
@@ -117,14 +120,14 @@ def left(folder: Path) -> set[str]:
 
 
 def test_fetched_data_are_found_by_every_reader(server, no_cache_but, capsys):
-    assert data_folders.find_data("uiuc") is None
+    assert folders.find_data("uiuc") is None
     assert cli.main(["data", "uiuc", "--url", url(server), "--json"]) == 0
     doc = json.loads(capsys.readouterr().out)
     folder = no_cache_but / "data" / "uiuc"
     assert doc["schema"] == "bemt.data/1" and doc["propellers"] == 2 and doc["files"] == 4
     assert (doc["checksum"], doc["fetched"], doc["folder"]) == ("first use", True, str(folder))
     assert (folder / "volume-1" / "data" / "test_10x5_geom.txt").read_text() == GEOM  # the one top folder is left off
-    assert data_folders.find_data("uiuc") == folder and left(no_cache_but / "data") == {"uiuc"}
+    assert folders.find_data("uiuc") == folder and left(no_cache_but / "data") == {"uiuc"}
     from bemt.reproduce import find_uiuc
 
     assert find_uiuc() == folder
@@ -136,10 +139,10 @@ def test_a_named_folder_comes_before_the_cache(server, no_cache_but, tmp_path, m
     mine = tmp_path / "mine"
     (mine / "uiuc").mkdir(parents=True)
     monkeypatch.setenv("BEMT_DATA", str(mine))
-    assert data_folders.find_data("uiuc") == mine / "uiuc"
+    assert folders.find_data("uiuc") == mine / "uiuc"
     monkeypatch.setenv("BEMT_CACHE", "off")
     (mine / "uiuc").rmdir()
-    assert data_folders.find_data("uiuc") is None
+    assert folders.find_data("uiuc") is None
 
 
 def test_what_is_there_is_not_fetched_again(server, tmp_path):

@@ -13,8 +13,8 @@ import pytest
 from bemt.case import load_case
 from bemt.cli import main
 from bemt.errors import InputError
-from bemt.export_case import export_case
-from bemt.export_case_openfoam import Run, settings_of
+from bemt.export.command import export_case
+from bemt.export.openfoam import Run, settings_of
 from geometry import export as module
 from geometry.airfoil import naca4
 from geometry.common import GeometryError

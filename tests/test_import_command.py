@@ -14,8 +14,8 @@ import pytest
 
 from bemt.cli import main
 from bemt.errors import InputError
-from bemt.import_choice import Choice
-from bemt.import_files import document, import_file
+from bemt.importing import document, import_file
+from bemt.importing.choice import Choice
 
 PERIOD = 0.5
 

@@ -14,9 +14,9 @@ import pytest
 
 from bemt import importers
 from bemt.errors import InputError
-from bemt.import_files import document, import_file
 from bemt.imported import Imported
 from bemt.importers import _cfd
+from bemt.importing import document, import_file
 
 RNG = np.random.default_rng(20)
 N = 40

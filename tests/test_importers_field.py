@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from bemt.errors import InputError
-from bemt.import_files import import_file
 from bemt.imported import Imported
 from bemt.importers._headings import heading
+from bemt.importing import import_file
 
 Write = Callable[..., Path]
 

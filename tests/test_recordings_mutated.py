@@ -15,8 +15,8 @@ from pathlib import Path
 import pytest
 
 from bemt.errors import InputError
-from bemt.import_files import import_file
-from bemt.import_recording import findings, is_recording, points_text, reduction_document, reduction_of
+from bemt.importing import import_file
+from bemt.importing.recording import findings, is_recording, points_text, reduction_document, reduction_of
 from bemt.reduction.channels import view
 from bemt.reduction.reduce import Reduced
 

@@ -12,8 +12,8 @@ import pytest
 
 from bemt import units
 from bemt.errors import InputError
-from bemt.import_files import import_file
 from bemt.imported import Channel, Imported
+from bemt.importing import import_file
 from bemt.sanity.check import Finding, check
 from bemt.series import Series
 

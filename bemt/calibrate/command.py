@@ -29,7 +29,7 @@ from bemt.calibrate.gather import files, load
 from bemt.calibrate.limit import limit
 from bemt.calibrate.points import Points
 from bemt.calibrate.text import text
-from bemt.data_folders import find_data
+from bemt.data.folders import find_data
 from bemt.errors import Fault, InputError
 
 Array = NDArray[np.float64]

@@ -10,7 +10,7 @@ from typing import Any
 
 from bemt.case import Case, check_name, load_case
 from bemt.errors import Fault, InputError
-from bemt.export_case_openfoam import Run
+from bemt.export.openfoam import Run
 from bemt.openfoam.settings import DOMAINS, GASES, SECTORS, TURBULENCE
 from bemt.schema import Collector, Key, check_table, load_toml, shown
 

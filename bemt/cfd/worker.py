@@ -23,7 +23,7 @@ from bemt.averaging import steady_average
 from bemt.cfd.schema import Point
 from bemt.cfd.start import State, splice
 from bemt.errors import InputError
-from bemt.export_case_openfoam import settings_of, write_openfoam
+from bemt.export.openfoam import settings_of, write_openfoam
 from bemt.openfoam import Settings, case_files
 from bemt.openfoam.run import BINS
 from bemt.tables import write_atomic

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from bemt import section_rule
 from bemt.conceal.items import Item, recording_text
-from bemt.data_folders import data_roots, find_data
+from bemt.data.folders import data_roots, find_data
 from bemt.errors import Fault, InputError
 
 if TYPE_CHECKING:
@@ -267,7 +267,7 @@ density_kg_m3 = 1.2
 
 
 def _fan() -> Iterator[Item]:
-    from bemt.import_files import import_file
+    from bemt.importing import import_file
     from bemt.reduction.reduce import reduce
 
     root = find_data("jmajew")

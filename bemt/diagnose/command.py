@@ -75,7 +75,7 @@ def load(path: str, case: Case) -> Record:
     InputError
         If the file is not a recording.
     """
-    from bemt.import_files import import_file
+    from bemt.importing import import_file
     from bemt.reduction import reduce as reduction
 
     imported = import_file(path)

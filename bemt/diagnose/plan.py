@@ -95,7 +95,7 @@ def points(path: str, case: Case) -> Record:
     """
     from bemt.diagnose.record import from_series
     from bemt.errors import Fault, InputError
-    from bemt.import_files import import_file
+    from bemt.importing import import_file
     from bemt.reduction.channels import view
     from bemt.series import Series
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from bemt.case_schema import ASSUMPTION, GROUPS, INCH, POLAR, SCHEMA, TEMPERATURE
+from bemt.case.schema import ASSUMPTION, GROUPS, INCH, POLAR, SCHEMA, TEMPERATURE
 from bemt.schema import Collector, Key, check_table, check_value, shown
 
 __all__ = ["check_case", "check_shape"]

@@ -27,10 +27,10 @@ import numpy as np
 from bemt import importers, tables
 from bemt.averaging import relation
 from bemt.errors import EXIT_INPUT, EXIT_OK, Fault, InputError
-from bemt.import_adapt import adapt, damaged_export, recognised
-from bemt.import_choice import Choice, averaged, chosen
-from bemt.import_recording import findings, is_recording, points_text, reduction_document, reduction_of
 from bemt.imported import Channel, Imported
+from bemt.importing.adapt import adapt, damaged_export, recognised
+from bemt.importing.choice import Choice, averaged, chosen
+from bemt.importing.recording import findings, is_recording, points_text, reduction_document, reduction_of
 from bemt.reduction.reduce import Reduced
 
 __all__ = ["SCHEMA", "Choice", "averaged", "chosen", "document", "import_file", "run"]

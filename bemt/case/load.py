@@ -1,6 +1,6 @@
 """Case files: a TOML document with units in its key names becomes a rotor, a duct, air and operating points.
 
-The schema is in :mod:`bemt.case_schema`; objects are built in :mod:`bemt.case_build`. A case knows which of its values
+The schema is in :mod:`bemt.case.schema`; objects are built in :mod:`bemt.case.build`. A case knows which of its values
 are *assumptions* (not given by the source) and the range of each.
 """
 
@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import case_build
-from bemt.case_rules import check_case
-from bemt.case_schema import AXES, DEFAULTS, GROUPS, INCH
+from bemt.case.build import build_air, build_duct, build_rotor, check_build
+from bemt.case.rules import check_case
+from bemt.case.schema import AXES, DEFAULTS, GROUPS, INCH
 from bemt.errors import Fault, InputError
 from bemt.schema import Collector, load_toml
 
@@ -228,7 +228,7 @@ class Case:
         geometry.rotor.Rotor
             Blades, hub and rotation.
         """
-        return case_build.build_rotor(self.replaced(overrides))
+        return build_rotor(self.replaced(overrides))
 
     def duct(self, overrides: Mapping[str, Any] | None = None) -> Duct | None:
         """Build the duct.
@@ -243,7 +243,7 @@ class Case:
         geometry.duct.Duct or None
             None when the case has no duct.
         """
-        return case_build.build_duct(self.replaced(overrides))
+        return build_duct(self.replaced(overrides))
 
     def air(self, overrides: Mapping[str, Any] | None = None) -> Air:
         """Build the state of the air.
@@ -258,7 +258,7 @@ class Case:
         bemt.air.Air
             Density, viscosity, speed of sound.
         """
-        return case_build.build_air(self.replaced(overrides).document["air"])
+        return build_air(self.replaced(overrides).document["air"])
 
     def axes(self) -> dict[str, NDArray[np.float64]]:
         """Axes of the parameter sweep, in the order of the file.
@@ -399,7 +399,7 @@ def load_case(path: str | Path) -> Case:
         raise InputError(out.faults)
     bare = Case(path, _with_defaults(document), ())
     case = replace(bare, assumptions=_assumptions(document, bare))
-    case_build.check_build(case)
+    check_build(case)
     return case
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from bemt.air import Air, isa_pressure
-from bemt.case_rules import check_shape
+from bemt.case.rules import check_shape
 from bemt.errors import Fault, InputError
 from bemt.schema import Collector
 from geometry.airfoil import Airfoil, naca, naca4
@@ -22,7 +22,7 @@ from geometry.laws import from_laws
 from geometry.rotor import Rotor
 
 if TYPE_CHECKING:
-    from bemt.case import Case
+    from bemt.case.load import Case
 
 __all__ = ["build_air", "build_duct", "build_rotor", "check_build"]
 

@@ -20,7 +20,7 @@ def data_roots() -> list[Path]:
         by ``python -m bemt data``). They need not exist.
     """
     named = os.environ.get("BEMT_DATA")
-    first = Path(named).expanduser() if named else Path(__file__).resolve().parents[2] / "shared" / "data"
+    first = Path(named).expanduser() if named else Path(__file__).resolve().parents[3] / "shared" / "data"
     cache = cache_dir()
     return [first] if cache is None else [first, cache / "data"]
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bemt.case import Case
-from bemt.case_schema import SCHEMA
+from bemt.case.schema import SCHEMA
 from bemt.errors import Fault, InputError
 from bemt.openfoam import Body, Settings, Sweep, case_files, sector_choice
 from bemt.openfoam.settings import MACH_COMPRESSIBLE

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from bemt.cache import cache_dir
-from bemt.data_archive import download, sha256, unpacked
+from bemt.data.archive import download, sha256, unpacked
 from bemt.errors import Fault, InputError
 
 __all__ = ["RECORD", "SCHEMA", "URLS", "get", "run"]

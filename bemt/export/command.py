@@ -12,7 +12,7 @@ from typing import Any
 
 from bemt.case import Case, find_cases, load_case
 from bemt.errors import EXIT_INPUT, EXIT_OK, Fault, InputError
-from bemt.export_case_openfoam import Run, check_run, settings_of, write_openfoam
+from bemt.export.openfoam import Run, check_run, settings_of, write_openfoam
 from bemt.schema import shown
 from bemt.tables import json_text, number_text, text_table, write_atomic
 from geometry.common import GeometryError

@@ -13,13 +13,18 @@ def _percent(s: dict[str, float | None]) -> str:
     return f"{100 * s['median_abs']:6.1f} {100 * s['p90_abs']:6.1f} {shown:>6}"
 
 
+def _totals(name: str, doc: dict[str, Any]) -> str:
+    cells = "".join(f" | {_percent(doc[kind][q])}" for kind in ("static", "forward") for q in ("CT", "CP"))
+    return f"{name:38}{cells}"
+
+
 def text(doc: dict[str, Any]) -> str:
     """Table for people.
 
     Parameters
     ----------
     doc : dict
-        Document of schema ``bemt.validation/1``, see :func:`bemt.validate.validate`.
+        Document of schema ``bemt.validation/1``, see :func:`bemt.validate.command.validate`.
 
     Returns
     -------
@@ -39,10 +44,10 @@ def text(doc: dict[str, Any]) -> str:
             + "".join(f" | {_percent(r[kind][q])}" for kind in ("static", "forward") for q in ("CT", "CP"))
         )
     lines.append("-" * len(sub))
-    lines.append(
-        f"{'all points':24} {'':>6} {'':>6}"
-        + "".join(f" | {_percent(doc[kind][q])}" for kind in ("static", "forward") for q in ("CT", "CP"))
-    )
+    lines.append(_totals("all points", doc))
+    turned = doc.get("matched_J0")
+    if turned and turned["propellers"]:
+        lines.append(_totals(f"turned to measured J0, {turned['propellers']}", turned))
     z = doc["zero_thrust_J"]
     lines += [
         "",
@@ -52,6 +57,12 @@ def text(doc: dict[str, Any]) -> str:
     ]
     if z["median_abs"] is not None:
         lines.append(f"Zero-thrust J: median error {100 * z['median_abs']:.1f} %, bias {100 * z['bias']:+.1f} %.")
+    if turned and turned["propellers"]:
+        low, mid, high = turned["shift_deg_p10_p50_p90"]
+        lines.append(
+            f"Turned: blades of {turned['propellers']} propellers by {mid:+.1f} deg in the median ({low:+.1f} to "
+            f"{high:+.1f}, 80 %), to the measured zero-thrust J; an experiment that uses the measurement."
+        )
     p = doc["polar"]
     lines.append(
         f"Sections: declared rule, calibrated on {p['calibrated_on']}: n_crit {p['n_crit']:g}, "

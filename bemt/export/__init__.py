@@ -1,0 +1,1 @@
+"""Command ``export``: a case as solids, surfaces and OpenFOAM cases (`command` joins them)."""

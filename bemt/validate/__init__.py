@@ -1,0 +1,1 @@
+"""BEMT against folders of measured propellers (`command` joins the rest)."""

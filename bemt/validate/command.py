@@ -1,0 +1,172 @@
+"""``python -m bemt validate DIR``: BEMT against a folder of measured propellers, statistics per propeller and over all.
+
+The folder is in the layout of the UIUC database (geometry, static and advance-ratio files).  Nothing is fitted:
+sections and transition come from the declared rule of :mod:`bemt.section_rule`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bemt.data.folders import find_data
+from bemt.errors import Fault, InputError
+from bemt.validate.folder import read_folder
+from bemt.validate.match import matched
+from bemt.validate.points import J_SHARE, Array, Rows, compare, errors, statistics
+from bemt.validate.text import text
+
+if TYPE_CHECKING:
+    from bemt.effects import Effect
+
+SCHEMA = "bemt.validation/1"
+KINDS = ("static", "forward")
+
+
+class _Pool:
+    """Errors of many propellers, together."""
+
+    def __init__(self) -> None:
+        self._errors: dict[str, dict[str, list[Array]]] = {kind: {"CT": [], "CP": []} for kind in KINDS}
+
+    def add(self, rows: Rows) -> dict[str, Any]:
+        """Take the points of one propeller; returns its own statistics."""
+        out: dict[str, Any] = {}
+        for kind, found in errors(rows).items():
+            out[kind] = {"points": int(found["CT"].size)}
+            for q, e in found.items():
+                self._errors[kind][q].append(e)
+                out[kind][q] = statistics(e)
+        return out
+
+    def total(self) -> dict[str, Any]:
+        """Statistics over all points."""
+        out: dict[str, Any] = {}
+        for kind, found in self._errors.items():
+            sizes = [e.size for e in found["CT"]]
+            out[kind] = {"propellers": sum(size > 0 for size in sizes), "points": sum(sizes)}
+            out[kind].update({q: statistics(np.concatenate([*e, np.empty(0)])) for q, e in found.items()})
+        return out
+
+
+def validate(
+    folder: Path, effects: Sequence[Effect] | None = None, fixed_re: float | None = None, progress: bool = False,
+    match_J0: bool = False,
+) -> dict[str, Any]:  # fmt: skip
+    """Compare a folder.
+
+    Parameters
+    ----------
+    folder : Path
+        UIUC layout, with APC PE0 files if any.
+    effects : sequence of Effect, optional
+        Physics that is on; default all.
+    fixed_re : float, optional
+        One Reynolds number for all section tables [1].
+    progress : bool
+        Show a counter on stderr.
+    match_J0 : bool
+        Also solve each propeller with its blades turned to the measured zero-thrust advance ratio.  An experiment that
+        uses the measurement: it tells an error of blade angle or camber from others, and is kept apart from the rest.
+
+    Returns
+    -------
+    dict
+        Document of schema ``bemt.validation/1``; errors are fractions.
+
+    Raises
+    ------
+    InputError
+        If the folder is missing or holds no propeller that can be compared.
+    """
+    from bemt import effects as registry
+    from bemt import section_rule
+
+    found = read_folder(folder)
+    eff = registry.standard() if effects is None else tuple(effects)
+    rows: list[dict[str, Any]] = []
+    pool, turned = _Pool(), _Pool()
+    shifts: list[float] = []
+    unconverged = 0
+    for i, (p, stations) in enumerate(found.propellers):
+        if progress:
+            print(f"\r{i + 1}/{len(found.propellers)} {p.name:<28}", end="", file=sys.stderr, flush=True)
+        points = compare(p, eff, fixed_re, stations)
+        unconverged += int(np.count_nonzero(~np.isfinite(points.CT_bemt)))
+        row: dict[str, Any] = {
+            "name": p.name, "family": p.family, "diameter_in": p.diameter_in, "pitch_in": p.pitch_in,
+            "blades": p.blades, "stations": p.geometry.origin if p.geometry is not None else "apc_pe0",
+            "J0": _number(points.J0), "J0_bemt": _number(points.J0_bemt), **pool.add(points),
+        }  # fmt: skip
+        if match_J0:
+            fit = matched(p, eff, fixed_re, stations, points.J0)
+            row["matched_J0"] = None if fit is None else {"shift_deg": fit[0], **turned.add(fit[1])}
+            shifts.extend([] if fit is None else [fit[0]])
+        rows.append(row)
+    if progress:
+        print("\r" + " " * 48 + "\r", end="", file=sys.stderr, flush=True)
+    j0 = np.array([r["J0_bemt"] / r["J0"] - 1.0 for r in rows if r["J0"] and r["J0_bemt"]])
+    doc: dict[str, Any] = {"schema": SCHEMA, "folder": folder.name, "J_share": J_SHARE, **pool.total()}
+    doc["zero_thrust_J"] = {"propellers": int(j0.size), **statistics(j0)}
+    if match_J0:
+        spread = np.quantile(shifts, (0.1, 0.5, 0.9)).tolist() if shifts else None
+        doc["matched_J0"] = {"propellers": len(shifts), "shift_deg_p10_p50_p90": spread, **turned.total()}
+    doc["unconverged"] = unconverged
+    doc["effects"] = [e.describe() for e in eff]
+    doc["polar"] = {
+        "rule": "bemt.section_rule", "n_crit": section_rule.N_CRIT, "drag_level": section_rule.DRAG_LEVEL,
+        "fixed_re": fixed_re, "calibrated_on": "UIUC volume 1",
+    }  # fmt: skip
+    doc["propellers"] = rows
+    doc["skipped"] = [{"name": name, "reason": why} for name, why in found.skipped]
+    doc["faults"] = list(found.faults)
+    return doc
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def run(args: argparse.Namespace) -> int:
+    """Command ``validate``.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        dir, json, polar (Reynolds number or None), off (list of effect ids), match_J0, out.
+
+    Returns
+    -------
+    int
+        0, or 1 when points did not converge.
+
+    Raises
+    ------
+    InputError
+        For a bad folder or an unknown effect.
+    """
+    from bemt import effects as registry
+    from bemt.tables import json_text, write_atomic
+
+    off = [name for item in (args.off or []) for name in str(item).split(",") if name]
+    unknown = [name for name in off if name not in registry.catalogue()]
+    if unknown:
+        known = ", ".join(registry.catalogue())
+        raise InputError([Fault("--off", n, "an unknown effect", f"one of {known}", "") for n in unknown])
+    eff = registry.without(registry.standard(), off)
+    fixed = args.polar
+    folder = Path(args.dir) if Path(args.dir).exists() else find_data(args.dir) or Path(args.dir)
+    doc = validate(folder, eff, fixed, progress=sys.stderr.isatty(), match_J0=args.match_J0)
+    rendered = json_text(doc)  # an infinite error (not converged) becomes null: JSON has no infinity
+    if args.out:
+        folder = Path(args.out)
+        folder.mkdir(parents=True, exist_ok=True)
+        write_atomic(folder / "validation.json", rendered)
+        write_atomic(folder / "validation.txt", text(doc) + "\n")
+    print(rendered.rstrip() if args.json else text(doc))
+    return 1 if doc["unconverged"] else 0
