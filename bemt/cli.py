@@ -11,10 +11,11 @@ import importlib
 import os
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 
 from bemt import __version__
-from bemt.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError
+from bemt.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, InputError, system_fault
 
 __all__ = ["build_parser", "main"]
 
@@ -22,7 +23,7 @@ EXIT_INTERRUPTED = 130
 # Options of several words: `--case A B` and `--case A --case B` are the same, none is dropped without a word.
 MANY: dict[str, Any] = {"action": "extend", "nargs": "+"}
 
-_MODULES = {"sweep": "bemt.sweep", "report": "bemt.report",
+_MODULES = {"sweep": "bemt.sweep.command", "report": "bemt.report",
             "validate": "bemt.validate.command", "reproduce": "bemt.reproduce", "bench": "bemt.bench",
             "import": "bemt.importing.command", "export": "bemt.export.command", "cfd": "bemt.cfd.command",
             "calibrate": "bemt.calibrate.command", "estimate": "bemt.calibrate.estimate_command",
@@ -55,24 +56,24 @@ class _Parser(argparse.ArgumentParser):
 
 
 def _tolerance(text: str) -> float:
-    value = float(text)
-    if not 0.0 <= value < float("inf"):
-        raise argparse.ArgumentTypeError(f"got {text}; expected a finite number of 0 or more")
-    return value
+    with suppress(ValueError):
+        if 0.0 <= float(text) < float("inf"):
+            return float(text)
+    raise argparse.ArgumentTypeError(f"got {text}; expected a finite number of 0 or more")
 
 
 def _seed(text: str) -> int:
-    value = int(text)
-    if value < 0:
-        raise argparse.ArgumentTypeError(f"got {text}; expected a whole number of 0 or more")
-    return value
+    with suppress(ValueError):
+        if int(text) >= 0:
+            return int(text)
+    raise argparse.ArgumentTypeError(f"got {text}; expected a whole number of 0 or more")
 
 
 def _positive(text: str) -> int:
-    value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"got {text}; expected a whole number of 1 or more")
-    return value
+    with suppress(ValueError):
+        if int(text) >= 1:
+            return int(text)
+    raise argparse.ArgumentTypeError(f"got {text}; expected a whole number of 1 or more")
 
 
 def _polar(text: str) -> float:
@@ -355,8 +356,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return EXIT_OK
     except Exception as error:
         if isinstance(error, OSError) and error.strerror:  # the system's word; others come from libraries
-            what = Fault(str(error.filename or ""), "", error.strerror, "a file or folder that can be used")
-            print(what, file=sys.stderr)
+            print(system_fault(error), file=sys.stderr)
             return EXIT_INPUT
         import traceback
 

@@ -19,6 +19,7 @@ __all__ = [
     "Fault",
     "InputError",
     "RangeWarning",
+    "system_fault",
 ]
 
 EXIT_OK = 0
@@ -99,6 +100,27 @@ class InputError(ValueError):
     def __reduce__(self) -> tuple[type[InputError], tuple[tuple[Fault, ...]]]:
         """Pickle by the faults (worker processes send errors back)."""
         return (type(self), (self.faults,))
+
+
+def system_fault(error: OSError) -> Fault:
+    """Say what the system would not do.
+
+    Parameters
+    ----------
+    error : OSError
+        With the system's word, `strerror`; an error of a library may have none, and is quoted.
+
+    Returns
+    -------
+    Fault
+        The fault, at the file that the error names.
+
+    Examples
+    --------
+    >>> print(system_fault(OSError(28, "No space left on device", "out/grid.csv")))
+    out/grid.csv: got No space left on device; expected a file or folder that can be used.
+    """
+    return Fault(str(error.filename or ""), "", error.strerror or str(error), "a file or folder that can be used")
 
 
 class BemtWarning(UserWarning):

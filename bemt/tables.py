@@ -258,6 +258,11 @@ def write_atomic(path: Path, data: bytes | str) -> None:
         Target; its folder is made.
     data : bytes or str
         Content; text is written as UTF-8.
+
+    Raises
+    ------
+    OSError
+        When it cannot be written; its `filename` is the target.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
@@ -265,6 +270,9 @@ def write_atomic(path: Path, data: bytes | str) -> None:
         # a file name that is no UTF-8 may be quoted in a text
         temporary.write_bytes(data.encode(errors="backslashreplace") if isinstance(data, str) else data)
         os.replace(temporary, path)
+    except OSError as error:  # a full disk names no file; the temporary one nobody knows
+        error.filename = str(path)
+        raise
     finally:
         temporary.unlink(missing_ok=True)
 

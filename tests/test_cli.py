@@ -78,7 +78,10 @@ def test_wrong_usage_is_2_and_says_so_on_stderr(arguments: list[str], capsys: py
         (["plan", "--case", "a", "--case", "b", "--plan", "c"], "argument --case: got it twice; expected it once"),
         (["estimate", "8x5", "--rpm", "5000", "--chord", "3"], "unrecognized arguments: --chord 3"),
         (["sweep", "cases", "--tolerance", "nan"], "got nan; expected a finite number of 0 or more"),
+        (["sweep", "cases", "--tolerance", "few"], "argument --tolerance: got few; expected a finite number of 0 or"),
+        (["sweep", "cases", "--jobs", "two"], "argument --jobs: got two; expected a whole number of 1 or more"),
         (["prove", "--seed", "-1"], "got -1; expected a whole number of 0 or more"),
+        (["prove", "--seed", "x"], "argument --seed: got x; expected a whole number of 0 or more"),
     ],
 )
 def test_no_option_is_guessed_or_dropped(

@@ -6,6 +6,7 @@ brings. The bytes of a block depend on its numbers alone, and joining reads one 
 
 from __future__ import annotations
 
+import hashlib
 import importlib.util
 import shutil
 from collections.abc import Sequence
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 from bemt.errors import Fault, InputError
 from bemt.tables import csv_block
 
-__all__ = ["FORMATS", "Block", "encode", "join", "require_extra"]
+__all__ = ["FORMATS", "Block", "encode", "file_hash", "join", "require_extra"]
 
 FORMATS = ("csv", "parquet")
 ROW_GROUP = 50_000
@@ -112,7 +113,24 @@ def _options(axes: list[str], columns: list[str]) -> dict[str, Any]:
     return {"compression": "zstd", "use_dictionary": axes, "column_encoding": encoding}
 
 
-def join(target: Path, names: Sequence[str], axes: Sequence[str], parts: Sequence[Path], form: str) -> None:
+def file_hash(path: Path) -> str:
+    """SHA-256 of a file of any size.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    str
+        Hexadecimal.
+    """
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def join(target: Path, names: Sequence[str], axes: Sequence[str], parts: Sequence[Path], form: str) -> str:
     """Put blocks together under a temporary name, in order, and rename.
 
     Parameters
@@ -127,6 +145,16 @@ def join(target: Path, names: Sequence[str], axes: Sequence[str], parts: Sequenc
         Files of the blocks, as `encode` makes their content.
     form : str
         One of `FORMATS`.
+
+    Returns
+    -------
+    str
+        SHA-256 of the file, hexadecimal.
+
+    Raises
+    ------
+    OSError
+        When it cannot be written; its `filename` is the target.
     """
     temporary = target.with_name(f".{target.name}.tmp")
     try:
@@ -138,7 +166,12 @@ def join(target: Path, names: Sequence[str], axes: Sequence[str], parts: Sequenc
                         shutil.copyfileobj(part, out, 1 << 20)
         else:
             _join_parquet(temporary, [n for n in names[:-1] if n not in axes], axes, parts)
+        digest = file_hash(temporary)
         temporary.replace(target)
+        return digest
+    except OSError as error:  # a full disk names no file; the temporary one nobody knows
+        error.filename = str(target)
+        raise
     finally:
         temporary.unlink(missing_ok=True)
 

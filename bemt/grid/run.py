@@ -7,6 +7,7 @@ finished chunk is a file, so an interrupted run goes on where it stopped and giv
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import shutil
@@ -21,7 +22,7 @@ from numpy.typing import NDArray
 
 from bemt.case import Case
 from bemt.evaluate import Points, air_arrays, evaluate, prepare
-from bemt.grid.formats import FORMATS, Block, encode, join
+from bemt.grid.formats import Block, encode, join
 from bemt.tables import plain, write_atomic
 
 if TYPE_CHECKING:
@@ -270,7 +271,7 @@ def run_grid(
     Returns
     -------
     dict or None
-        Axes, points, unconverged points, ranges, file name; None when the case sweeps nothing.
+        Axes, points, unconverged points, ranges, name and SHA-256 of the file; None when the case sweeps nothing.
     """
     grid = Grid.of(case)
     if grid is None:
@@ -302,32 +303,37 @@ def run_grid(
             if parts is not None:
                 path = _part(parts, number, form)
                 write_atomic(path, data)
-                write_atomic(path.with_suffix(".json"), json.dumps(made | {"bytes": len(data)}))
+                record = {"statistics": made, "sha256": _seal(data, made)}
+                write_atomic(path.with_suffix(".json"), json.dumps(record))
             count(number, made)
+    digest = None
     names = (*grid.names, *VALUES, *(DUCT_VALUES if case.ducted else ()), "converged")
     if folder is not None and parts is not None:
         files = [_part(parts, number, form) for number in range(grid.chunks)]
-        join(folder / f"grid.{form}", names, grid.names, files, form)
-        for other in FORMATS:
-            if other != form:
-                (folder / f"grid.{other}").unlink(missing_ok=True)
+        digest = join(folder / f"grid.{form}", names, grid.names, files, form)
         shutil.rmtree(parts, ignore_errors=True)
     axes = {n: {"num": v.size, "min": v.min(), "max": v.max()} for n, v in zip(grid.names, grid.values, strict=True)}
     file = None if folder is None else f"{case.name}/grid.{form}"
     merged = _merge([statistics[number] for number in range(grid.chunks)])
-    return {"axes": axes, **merged, "columns": list(names), "file": file}
+    return {"axes": axes, **merged, "columns": list(names), "file": file, "sha256": digest}
 
 
 def _part(parts: Path, number: int, form: str) -> Path:
     return parts / f"{number:06d}.{form}"
 
 
+def _seal(data: bytes, statistics: Mapping[str, Any]) -> str:
+    """Hash of a chunk and of what is said about it."""
+    return hashlib.sha256(data + json.dumps(statistics).encode()).hexdigest()
+
+
 def _finished(path: Path) -> dict[str, Any] | None:
-    """Statistics of a chunk that an earlier run finished, or None."""
+    """Statistics of a chunk that an earlier run finished, or None when it is not as it was written."""
     try:
-        found = json.loads(path.with_suffix(".json").read_text())
-        if path.stat().st_size == found.pop("bytes"):
-            return dict(found)
-    except (OSError, ValueError, KeyError):
+        record = json.loads(path.with_suffix(".json").read_text())
+        statistics: dict[str, Any] = record["statistics"]
+        if _seal(path.read_bytes(), statistics) == record["sha256"]:
+            return statistics
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         pass
     return None

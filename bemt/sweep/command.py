@@ -2,77 +2,79 @@
 
 Every case is solved for itself: its faults go into its own result and the others go on. With ``--out`` each case gets
 a folder with ``result.json``, ``table.txt`` and, when it sweeps axes, ``grid.csv`` or ``grid.parquet``. A result is
-reused when its fingerprint (case, references and other files, program, libraries) is unchanged.
+reused when its fingerprint (case, references and other files, program, libraries) and its content are unchanged;
+otherwise it is removed before the case is solved. So a case that fails has no result there, and ``sweep.json``,
+``sweep.csv`` and ``sweep.txt``, which come last, say why. Cases that the sweep was not asked for keep theirs.
 """
 
 from __future__ import annotations
 
 import argparse
-import hashlib
-import json
 import os
+import re
 import signal
 import sys
+import threading
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
 import bemt
-from bemt.case import find_cases, load_case
-from bemt.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
+from bemt.case import Case, check_name, find_cases, load_case
+from bemt.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, EXIT_UNCONVERGED, Fault, InputError, system_fault
 from bemt.grid.formats import FORMATS, require_extra
-from bemt.grid.identity import program_hash
 from bemt.grid.run import Engine, run_grid
-from bemt.sweep_case import solve_case
-from bemt.sweep_text import case_text, overview_text, rows_csv
-from bemt.tables import json_text, plain, remove_stale, write_atomic
+from bemt.schema import Collector
+from bemt.sweep import store
+from bemt.sweep.case import solve_case
+from bemt.sweep.store import SCHEMA, fingerprint
+from bemt.sweep.text import case_text, overview_text
+from bemt.tables import json_text, plain, remove_stale
 
 __all__ = ["SCHEMA", "fingerprint", "run", "sweep"]
 
-SCHEMA = "bemt.sweep/1"
 Progress = Callable[[str], None]
+_NAME = re.compile(r"""^name\s*=\s*["']([^"']+)["']""", re.M)
+Ready = tuple[Case, str]
+"""A case and its fingerprint, taken when it was read."""
 
 
-def fingerprint(content: str) -> str:
-    """Identity of everything that decides a result.
-
-    Parameters
-    ----------
-    content : str
-        Hash of the files of the case.
-
-    Returns
-    -------
-    str
-        SHA-256, hexadecimal.
-    """
-    return hashlib.sha256(f"{SCHEMA} {program_hash()} {content}".encode()).hexdigest()
+def _fit(name: str) -> bool:
+    """Whether a name may name a folder."""
+    out = Collector("")
+    check_name(out, name)
+    return bool(name.strip()) and not out.faults
 
 
-def _reuse(folder: Path, mark: str, form: str) -> dict[str, Any] | None:
-    """Read the result of an earlier run with the same fingerprint, if it is whole."""
-    try:
-        stored = json.loads((folder / "result.json").read_text(encoding="utf-8"))
-        if stored["fingerprint"] != mark:
-            return None
-        grid = stored["result"].get("grid")
-        if grid is not None and not (Path(grid["file"]).name == f"grid.{form}" and (folder / f"grid.{form}").is_file()):
-            return None
-        return dict(stored["result"])
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        return None
+def _name(path: Path) -> str:
+    """Name of a case that may be faulty: what the file says, sound or not, else the name of its folder or file."""
+    text = ""
+    with suppress(OSError):
+        text = path.read_text(encoding="utf-8", errors="replace")
+    said = _NAME.search(text.partition("\n[")[0])
+    if said is not None and _fit(said[1]):
+        return said[1]
+    whole = Path(os.path.abspath(path))
+    return whole.parent.name if whole.name == "case.toml" else whole.stem
 
 
-def _failed(path: Path, faults: Sequence[str], code: int) -> dict[str, Any]:
-    name = path.parent.name if path.name == "case.toml" else path.stem
+def _failed(path: Path, error: BaseException, name: str = "") -> dict[str, Any]:
+    """Result of a case that has none."""
+    if isinstance(error, InputError):
+        faults, code = [str(fault) for fault in error.faults], EXIT_INPUT
+    elif isinstance(error, OSError) and error.strerror:
+        faults, code = [str(system_fault(error))], EXIT_INPUT
+    else:
+        faults = [f"{path.as_posix()}: internal error", *"".join(traceback.format_exception(error)).splitlines()]
+        code = EXIT_INTERNAL
     empty: dict[str, Any] = {key: [] for key in ("rows", "variants", "other_rows", "comparisons")}
-    return {"name": name, "title": "", **empty, "faults": list(faults), "exit_code": code}
+    return {"name": name or _name(path), "title": "", **empty, "faults": faults, "exit_code": code}
 
 
 def run_case(
-    path: Path,
+    ready: Ready,
     out: Path | None,
     resume: bool,
     threads: int,
@@ -84,8 +86,8 @@ def run_case(
 
     Parameters
     ----------
-    path : Path
-        Case file.
+    ready : (Case, str)
+        The case, and its fingerprint when it was read.
     out : Path or None
         Folder of results.
     resume : bool
@@ -105,47 +107,57 @@ def run_case(
         Plain result; ``faults`` and ``exit_code`` tell what went wrong.
     """
     tell = progress or (lambda share, what: None)
+    case, mark = ready
     try:
-        case = load_case(path)
-        mark = fingerprint(case.content_hash())
         folder = None if out is None else out / case.name
         if folder is not None:
             if folder.resolve() == case.folder.resolve():
                 raise InputError(Fault("--out", "", f"the folder of the case {case.name} itself", "another folder",
                                        "Results would stand among its files"))  # fmt: skip
             remove_stale(folder)
-            stored = _reuse(folder, mark, form) if resume else None
-            if stored is not None:
-                return stored
-        with_grid = bool(case.axes())
-        share = 0.5 if with_grid else 1.0
+            kept = store.reuse(folder, mark, form) if resume else None
+            if kept is not None:
+                return kept
+            store.remove_result(folder)
+        share = 0.5 if case.axes() else 1.0
         result = solve_case(case, threads, lambda i, n, what: tell(share * i / n, what))
         result["grid"] = run_grid(
             case, folder, mark, threads, lambda i, n: tell(0.5 + 0.5 * i / n, f"grid {i}/{n}"), resume, form, engine
         )
         result["exit_code"] = EXIT_OK
         document: dict[str, Any] = plain(result)
+        if fingerprint(case.content_hash()) != mark:  # no telling which of them the numbers are of
+            if folder is not None:
+                store.remove_result(folder)
+            raise InputError(Fault(case.path.as_posix(), "", "files that changed while they were solved",
+                                   "files that stay", "Run it again"))  # fmt: skip
         if folder is not None:
-            if not with_grid:
-                for other in FORMATS:
-                    (folder / f"grid.{other}").unlink(missing_ok=True)
-            write_atomic(folder / "table.txt", case_text(document) + "\n")
-            write_atomic(folder / "result.json", json_text({"fingerprint": mark, "result": document}))
+            store.keep(folder, mark, document)
         return document
-    except InputError as error:
-        return _failed(path, [str(fault) for fault in error.faults], EXIT_INPUT)
-    except Exception:
-        return _failed(
-            path, [f"{path.as_posix()}: internal error", *traceback.format_exc().splitlines()], EXIT_INTERNAL
-        )
+    except Exception as error:
+        return _failed(case.path, error, case.name)
 
 
-def _ignore_interrupt() -> None:
+def _follow_parent() -> None:
+    """Worker process: leaves interrupts to its parent, and ends when that ends, killed or not.
+
+    It would go on writing into a folder that a next sweep takes up.
+    """
+    import multiprocessing
+
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+
+    def wait() -> None:
+        parent.join()
+        os._exit(EXIT_INTERNAL)
+
+    threading.Thread(target=wait, daemon=True).start()
 
 
 def _results(
-    paths: Sequence[Path],
+    cases: Sequence[Ready],
     out: Path | None,
     resume: bool,
     jobs: int | None,
@@ -154,31 +166,50 @@ def _results(
     engine: Engine | None,
 ) -> Iterator[tuple[int, dict[str, Any]]]:
     """Results in the order in which they come."""
-    if engine is not None or jobs is None or jobs == 1 or len(paths) == 1:  # one process; its grid may use all cores
+    if engine is not None or jobs is None or jobs == 1 or len(cases) == 1:  # one process; its grid may use all cores
         cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
         threads = cores if jobs is None or engine is not None else jobs
-        for i, path in enumerate(paths):
-            at = f"[{i + 1}/{len(paths)}] {path.parent.name or path.stem}"
+        for i, ready in enumerate(cases):
+            at = f"[{i + 1}/{len(cases)}] {ready[0].name}"
             tell = lambda s, what, at=at: bar(f"{at} {_bar(s)} {what}")  # noqa: E731
-            yield i, run_case(path, out, resume, threads, tell, form, engine)
+            yield i, run_case(ready, out, resume, threads, tell, form, engine)
         return
+    args = (out, resume, 1, None, form)
+    lost = []
+    done = 0
+    for i, outcome in _in_processes(dict(enumerate(cases)), jobs, args):
+        if outcome is None:
+            lost.append(i)
+            continue
+        done += 1
+        bar(f"{_bar(done / len(cases))} {done}/{len(cases)} cases")
+        yield i, outcome
+    for i in lost:  # a worker that dies takes all with it that wait: one by one, it takes its own case only
+        ((_, outcome),) = _in_processes({i: cases[i]}, 1, args)
+        case = cases[i][0]
+        yield i, outcome or _failed(case.path, RuntimeError("the worker process ended"), case.name)
+
+
+def _in_processes(
+    cases: Mapping[int, Ready], jobs: int, args: tuple[Any, ...]
+) -> Iterator[tuple[int, dict[str, Any] | None]]:
+    """Results from worker processes as they come; None for those that were lost with a process."""
     import multiprocessing
     from concurrent.futures import ProcessPoolExecutor, as_completed
+    from concurrent.futures.process import BrokenProcessPool
 
     context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(min(jobs, len(paths)), mp_context=context, initializer=_ignore_interrupt)
+    pool = ProcessPoolExecutor(min(jobs, len(cases)), mp_context=context, initializer=_follow_parent)
     try:
-        futures = {pool.submit(run_case, path, out, resume, 1, None, form): i for i, path in enumerate(paths)}
-        for n, future in enumerate(as_completed(futures), 1):
+        futures = {pool.submit(run_case, ready, *args): i for i, ready in cases.items()}
+        for future in as_completed(futures):
             i = futures[future]
-            bar(f"{_bar(n / len(paths))} {n}/{len(paths)} cases")
             try:
                 yield i, future.result()
-            except Exception as error:  # a worker that died takes its case with it, not the sweep
-                yield (
-                    i,
-                    _failed(paths[i], [f"{paths[i].as_posix()}: the worker process ended ({error!r})"], EXIT_INTERNAL),
-                )
+            except BrokenProcessPool:
+                yield i, None
+            except Exception as error:  # on the way here or there
+                yield i, _failed(cases[i][0].path, error, cases[i][0].name)
     except BaseException:
         for process in list((pool._processes or {}).values()):
             process.terminate()
@@ -203,7 +234,7 @@ def sweep(
     paths : sequence of str or Path
         Case files, or folders of cases.
     out : str or Path, optional
-        Folder of results.
+        Folder of results. It is this sweep's alone until it has ended; results of cases that fail are removed from it.
     jobs : int, optional
         Cases at a time; by default one, with all cores for its grid. With Dask: workers of the local cluster.
     resume : bool
@@ -225,8 +256,8 @@ def sweep(
     Raises
     ------
     InputError
-        When a path holds no case, the folder of results cannot be made, options contradict each other or need what
-        is not installed, or the scheduler does not answer.
+        When a path holds no case, the folder of results cannot be made, another sweep is at work in it, options
+        contradict each other or need what is not installed, or the scheduler does not answer.
     """
     _check_options(engine, scheduler, grid_format, jobs)
     files = find_cases(paths)
@@ -237,24 +268,26 @@ def sweep(
         except OSError as error:
             raise InputError(Fault(str(out), "", error.strerror or "no folder", "a folder for results")) from error
     with ExitStack() as stack:
+        if folder is not None:
+            stack.enter_context(store.locked(folder))
         on: Engine | None = None
         if engine == "dask":
             from bemt.grid.dask_engine import Cluster
 
             on = stack.enter_context(Cluster(scheduler, jobs))
+        if folder is not None:
+            store.clear_overview(folder)
+        ready, found = _read(files, folder)
+        todo = list(ready)
         tell = progress or (lambda line: None)
-        again = _repeats(files)
-        rest = [i for i in range(len(files)) if i not in again]
-        paths_left = [files[i] for i in rest]
-        for i, result in _results(paths_left, folder, resume, jobs, tell, grid_format, on) if rest else ():
-            again[rest[i]] = result
-    results = [again[i] for i in range(len(files))]
-    document = {"schema": SCHEMA, "version": bemt.__version__, "cases": results,
-                "exit_code": max((r["exit_code"] for r in results), default=EXIT_OK)}  # fmt: skip
-    if folder is not None:
-        write_atomic(folder / "sweep.json", json_text(document))
-        write_atomic(folder / "sweep.csv", rows_csv(results))
-        write_atomic(folder / "sweep.txt", overview_text(results) + "\n")
+        left = [ready[i] for i in todo]
+        for i, result in _results(left, folder, resume, jobs, tell, grid_format, on) if left else ():
+            found[todo[i]] = result
+        results = [found[i] for i in range(len(files))]
+        document = {"schema": SCHEMA, "version": bemt.__version__, "cases": results,
+                    "exit_code": max((r["exit_code"] for r in results), default=EXIT_OK)}  # fmt: skip
+        if folder is not None:
+            store.keep_overview(folder, document)
     return document
 
 
@@ -277,20 +310,40 @@ def _check_options(engine: str, scheduler: str | None, grid_format: str, jobs: i
         require_extra("--engine dask", "dask", "distributed")
 
 
-def _repeats(files: Sequence[Path]) -> dict[int, dict[str, Any]]:
-    """Cases whose name another one has already: they would write into one folder, and are refused unsolved."""
-    first: dict[str, Path] = {}
-    refused = {}
+def _read(files: Sequence[Path], out: Path | None) -> tuple[dict[int, Ready], dict[int, dict[str, Any]]]:
+    """Cases that can be solved, and results of those that cannot, by their place; each file is read once."""
+    ready: dict[int, Ready] = {}
+    failed: dict[int, dict[str, Any]] = {}
     for i, path in enumerate(files):
         try:
-            name = load_case(path).name
-        except InputError:
-            continue  # said where it is solved
-        earlier = first.setdefault(name, path)
-        if earlier != path:
-            fault = Fault(path.as_posix(), "name", f"{name!r} as in {earlier.as_posix()}", "a name of its own")
-            refused[i] = _failed(path, [str(fault)], EXIT_INPUT)
-    return refused
+            case = load_case(path)
+            ready[i] = case, fingerprint(case.content_hash())
+        except Exception as error:
+            failed[i] = _failed(path, error)
+    taken = {case.name.casefold() for case, _ in ready.values()}
+    for i, result in failed.items():
+        name = result["name"]
+        if out is not None and _fit(name) and name.casefold() not in taken:
+            if (out / name).resolve() != files[i].parent.resolve():
+                store.remove_result(out / name)
+    for i, fault in _unfit_names({i: case for i, (case, _) in ready.items()}, out is not None).items():
+        failed[i] = _failed(files[i], InputError(fault), ready.pop(i)[0].name)
+    return ready, failed
+
+
+def _unfit_names(cases: Mapping[int, Case], kept: bool) -> dict[int, Fault]:
+    """Cases that would write where another one or the sweep itself does."""
+    first: dict[str, str] = {}
+    faults = {}
+    for i, case in cases.items():
+        file = case.path.as_posix()
+        # folders that differ in case alone are one folder on some disks
+        earlier = first.setdefault(case.name.casefold(), file)
+        if earlier != file:
+            faults[i] = Fault(file, "name", f"{case.name!r} as in {earlier}", "a name of its own")
+        elif kept and case.name.casefold() in store.OVERVIEW:
+            faults[i] = Fault(file, "name", repr(case.name), "another name", "The sweep writes a file of that name")
+    return faults
 
 
 def _off_tolerance(result: Mapping[str, Any], tolerance: float) -> list[str]:

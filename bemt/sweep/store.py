@@ -1,0 +1,206 @@
+"""What a sweep keeps in its folder: results that know their content, of one sweep at a time.
+
+``DIR/<case>`` holds ``result.json``, ``table.txt`` and, when the case sweeps axes, ``grid.csv`` or ``grid.parquet``.
+A result says what it was made from (its fingerprint) and what it was when it was written (SHA-256 of itself and of the
+grid); one that was edited, cut off or made from something else is never used. It is removed before the case is solved
+anew, so that no reader takes an old one for the answer of a case that has failed or was interrupted.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import IO, Any
+
+from bemt.errors import Fault, InputError
+from bemt.grid.formats import FORMATS, file_hash
+from bemt.grid.identity import program_hash
+from bemt.sweep.text import case_text, overview_text, rows_csv
+from bemt.tables import json_text, write_atomic
+
+__all__ = [
+    "OVERVIEW", "SCHEMA", "clear_overview", "fingerprint", "keep", "keep_overview", "locked", "remove_result", "reuse",
+]  # fmt: skip
+
+SCHEMA = "bemt.sweep/1"
+OVERVIEW = ("sweep.csv", "sweep.txt", "sweep.json")
+"""Files over all cases, in the order in which they are written."""
+RESULT, TABLE, LOCK = "result.json", "table.txt", ".sweep.lock"
+
+
+def fingerprint(content: str) -> str:
+    """Identity of everything that decides a result.
+
+    Parameters
+    ----------
+    content : str
+        Hash of the files of the case.
+
+    Returns
+    -------
+    str
+        SHA-256, hexadecimal.
+    """
+    return hashlib.sha256(f"{SCHEMA} {program_hash()} {content}".encode()).hexdigest()
+
+
+def _seal(stored: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json_text(stored).encode(errors="backslashreplace")).hexdigest()
+
+
+def reuse(folder: Path, mark: str, form: str) -> dict[str, Any] | None:
+    """Take up the result of an earlier sweep; its table is written anew.
+
+    Parameters
+    ----------
+    folder : Path
+        Results of the case.
+    mark : str
+        Fingerprint of the case as it is now.
+    form : str
+        Format of the grid.
+
+    Returns
+    -------
+    dict or None
+        The result, or None when there is none, it has another fingerprint, or it or its grid was changed.
+    """
+    try:
+        stored = json.loads((folder / RESULT).read_text(encoding="utf-8"))
+        seal = stored.pop("sha256")
+        if stored["fingerprint"] != mark or seal != _seal(stored):
+            return None
+        result: dict[str, Any] = stored["result"]
+        grid = result["grid"]
+        if grid is not None and file_hash(folder / f"grid.{form}") != grid["sha256"]:
+            return None
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return None
+    write_atomic(folder / TABLE, case_text(result) + "\n")
+    return result
+
+
+def keep(folder: Path, mark: str, result: Mapping[str, Any]) -> None:
+    """Write table and result; the result comes last, for it says that all is there.
+
+    Parameters
+    ----------
+    folder : Path
+        Results of the case; its grid is there already.
+    mark : str
+        Fingerprint of the case.
+    result : mapping
+        Plain result.
+    """
+    stored = {"fingerprint": mark, "result": result}
+    write_atomic(folder / TABLE, case_text(result) + "\n")
+    write_atomic(folder / RESULT, json_text({**stored, "sha256": _seal(stored)}))
+
+
+def remove_result(folder: Path) -> None:
+    """Remove the result of a case; finished chunks of its grid, which only their fingerprint makes a result, stay.
+
+    Parameters
+    ----------
+    folder : Path
+        Results of the case; it need not exist.
+    """
+    for name in (RESULT, TABLE, *(f"grid.{form}" for form in FORMATS)):
+        with suppress(FileNotFoundError, NotADirectoryError):
+            (folder / name).unlink()
+
+
+def clear_overview(folder: Path) -> None:
+    """Remove the files over all cases, and what a kill left of them: they stand there only when a sweep has ended.
+
+    Parameters
+    ----------
+    folder : Path
+        Results of the sweep.
+    """
+    for path in (*(folder / name for name in OVERVIEW), *folder.glob(".sweep.*.tmp")):
+        path.unlink(missing_ok=True)
+
+
+def keep_overview(folder: Path, document: Mapping[str, Any]) -> None:
+    """Write the files over all cases.
+
+    Parameters
+    ----------
+    folder : Path
+        Results of the sweep.
+    document : mapping
+        ``bemt.sweep/1``.
+    """
+    texts = (rows_csv(document["cases"]), overview_text(document["cases"]) + "\n", json_text(document))
+    for name, text in zip(OVERVIEW, texts, strict=True):
+        write_atomic(folder / name, text)
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Hold a folder of results for one sweep.
+
+    The whole folder, not a case of it: the files over all cases belong to one sweep as well. The process that was
+    started holds it, for itself, its worker processes (which end with it) and a cluster (which writes nothing here).
+    The system keeps the lock on an open file, so that it goes with the process, however that ends; the file itself
+    means nothing.
+
+    Parameters
+    ----------
+    folder : Path
+        An existing folder.
+
+    Yields
+    ------
+    None
+        While it is held. Where the system or the disk has no locks, nothing is held and nothing refused.
+
+    Raises
+    ------
+    InputError
+        When another sweep holds it.
+    """
+    path = folder / LOCK
+    while True:
+        stream = path.open("ab")
+        if not _lock(stream):
+            stream.close()
+            raise InputError(Fault(str(folder), "", "a folder in which another sweep is at work", "one for this sweep",
+                                   "Wait for the other one, or give another --out"))  # fmt: skip
+        with suppress(FileNotFoundError):
+            if os.path.samestat(os.fstat(stream.fileno()), path.stat()):
+                break
+        stream.close()  # its holder has just removed it: whoever comes now locks another file
+    try:
+        yield
+    finally:
+        with suppress(OSError):  # Windows keeps open files: there it stays
+            path.unlink()
+        stream.close()
+
+
+def _lock(stream: IO[bytes]) -> bool:
+    """Lock an open file unless somebody else has."""
+    if sys.platform == "win32":
+        import msvcrt
+
+        try:
+            msvcrt.locking(stream.fileno(), msvcrt.LK_NBLCK, 1)
+        except OSError:
+            return False
+        return True
+    try:
+        import fcntl
+
+        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except (BlockingIOError, PermissionError):
+        return False
+    except (ImportError, OSError):  # no locks here
+        return True
+    return True
