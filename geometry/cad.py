@@ -109,7 +109,9 @@ def planar_sections(rotor: Rotor, options: Options | None = None) -> list[tuple[
         for j in range(curves.shape[1]):
             at = float(np.interp(plane, x[:, j], table))
             section[j] = _cubic(table, y[:, j], at), _cubic(table, curves[:, j, 1], at)
-            for _ in range(2):  # the straight table misses the plane by a trifle: two corrections along the point's path  # noqa: E501
+            for _ in range(
+                2
+            ):  # the straight table misses the plane by a trifle: two corrections along the point's path  # noqa: E501
                 miss = plane - _cubic(table, x[:, j], at)
                 at += miss
                 section[j] = _cubic(table, y[:, j], at), _cubic(table, curves[:, j, 1], at)

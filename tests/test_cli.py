@@ -84,9 +84,7 @@ def test_wrong_usage_is_2_and_says_so_on_stderr(arguments: list[str], capsys: py
         (["prove", "--seed", "x"], "argument --seed: got x; expected a whole number of 0 or more"),
     ],
 )
-def test_no_option_is_guessed_or_dropped(
-    arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_no_option_is_guessed_or_dropped(arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]) -> None:
     """A last one that wins, half a name that loses its unit: neither is what was meant."""
     with pytest.raises(SystemExit) as stopped:
         cli.main(arguments)

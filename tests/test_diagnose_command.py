@@ -193,8 +193,8 @@ def test_many_points_say_the_same_in_any_order(order: str) -> None:
 
 
 CASE_TEXTS = {
-    "several lines": ('[model]\n', '[model]\neffects_off = [\n  "compressibility",  # mine\n]\n'),
-    "dotted": ('[model]\nn_crit = 3\ndrag_level = 1.1\nstations = 40\nalso_without', 'also_without'),
+    "several lines": ("[model]\n", '[model]\neffects_off = [\n  "compressibility",  # mine\n]\n'),
+    "dotted": ("[model]\nn_crit = 3\ndrag_level = 1.1\nstations = 40\nalso_without", "also_without"),
     "spaces": ("[model]", "[ model ]"),
 }
 

@@ -87,7 +87,11 @@ def test_wrong_input(values: list[float], r: list[float], message: str) -> None:
 
 
 @settings(max_examples=300, deadline=None)
-@given(st.lists(st.floats(-1e300, 1e300).filter(bool), min_size=2, max_size=3), st.floats(1.0001, 100), st.floats(1.0001, 100))
+@given(
+    st.lists(st.floats(-1e300, 1e300).filter(bool), min_size=2, max_size=3),
+    st.floats(1.0001, 100),
+    st.floats(1.0001, 100),
+)
 def test_any_finite_values_give_a_study(values: list[float], r21: float, r32: float) -> None:
     s = grid_study(values, [r21, r32][: len(values) - 1])
     assert s.u_relative >= 0.0 and not math.isnan(s.u_relative)

@@ -116,14 +116,19 @@ def test_sign_and_sector_are_applied_only_where_told(put: Callable[..., Path]) -
     with pytest.raises(InputError, match="names of channels"):
         import_file(path, choice=Choice(sector=4, loads=("thrust",)))
     record = import_file(path, choice=Choice(PERIOD, sign=-1, sector=4, loads=("torque",)))
-    assert record.channels["torque"].mean == pytest.approx(0.8) and record.channels["volume"].mean == pytest.approx(0.25)
+    assert record.channels["torque"].mean == pytest.approx(0.8) and record.channels["volume"].mean == pytest.approx(
+        0.25
+    )
     assert record.channels["torque"].averaged_over.endswith(", times -4")
     assert any("holds only for axisymmetric flow" in w for w in record.warnings)
 
 
 def report() -> str:
     head = "Forces - Direction Vector (1 0 0)\n             Forces (n)\nZone      Pressure   Viscous   Total\n"
-    return head + "blade   -10  -1  -11\nhub   2  -0.5   1.5\nduct  -4  -0.25  -4.25\n---- ---- ----\nNet   -12  -1.75  -13.75\n"
+    return (
+        head
+        + "blade   -10  -1  -11\nhub   2  -0.5   1.5\nduct  -4  -0.25  -4.25\n---- ---- ----\nNet   -12  -1.75  -13.75\n"
+    )
 
 
 def test_zones_are_added_up_only_when_named(put: Callable[..., Path]) -> None:
@@ -179,7 +184,10 @@ def test_a_damaged_head_is_not_taken_for_a_plain_table(put: Callable[..., Path])
 
 def test_other_formats_are_shown_as_well(put: Callable[..., Path], project: Path) -> None:
     static = put("apce_10x5_static_kt0827.txt", "RPM CT CP\n2000 0.10 0.05\n3000 0.11 0.05\n")
-    blade = put("apce_10x5_geom.txt", "r/R c/R beta\n" + "".join(f"{0.15 + 0.05 * k:.2f} 0.12 {40 - 1.5 * k}\n" for k in range(18)))
+    blade = put(
+        "apce_10x5_geom.txt",
+        "r/R c/R beta\n" + "".join(f"{0.15 + 0.05 * k:.2f} 0.12 {40 - 1.5 * k}\n" for k in range(18)),
+    )
     cases = sorted((project / "cases").glob("*/references.csv"))
     found = document([static, blade, *cases])["files"]
     assert [f["error"] for f in found] == [None] * len(found)
@@ -199,6 +207,10 @@ def test_means_are_over_time_when_the_step_changes(put: Callable[..., Path]) -> 
 
 def test_the_published_screw(shared_data: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = shared_data / "cfd_exports" / "screw" / "report-def-0-rfile_1_1.out"
-    for args, mean in ((["--rpm", "130.2"], -0.17547), (["--rpm", "130.2", "--revolutions", "1"], -0.17097), ([], -0.14100)):
+    for args, mean in (
+        (["--rpm", "130.2"], -0.17547),
+        (["--rpm", "130.2", "--revolutions", "1"], -0.17097),
+        ([], -0.14100),
+    ):
         _, found = call(capsys, path, *args)
         assert round(found["files"][0]["channels"]["report-def-0"]["mean"], 5) == mean

@@ -41,7 +41,9 @@ def monitor() -> str:
 def xy() -> str:
     zones = []
     for zone, shift in (("inlet", 5.0), ("x=10d", 50.0)):
-        zones.append(f'((xy/key/label "{zone}")\n' + "".join(f"{0.01 * k:g}\t{shift + k:g}\n" for k in range(12)) + ")\n")
+        zones.append(
+            f'((xy/key/label "{zone}")\n' + "".join(f"{0.01 * k:g}\t{shift + k:g}\n" for k in range(12)) + ")\n"
+        )
     return '(title "Axial Velocity")\n(labels "Position" "Axial Velocity")\n\n' + "\n".join(zones)
 
 
@@ -49,7 +51,10 @@ def forces(unit: str = "n") -> str:
     zones = {"blade:1": (-10.25, -0.5), "hub": (1.25, -0.0625), "duct": (-4.5, -0.125)}
     zones["Net"] = tuple(sum(v[k] for v in zones.values()) for k in (0, 1))  # type: ignore[assignment]
     names = "Pressure        Viscous         Total"
-    text = '                  "Force Report"\n\nForces\n' + f"             Forces ({unit})                             Coefficients\n"
+    text = (
+        '                  "Force Report"\n\nForces\n'
+        + f"             Forces ({unit})                             Coefficients\n"
+    )
     text += f"Zone      {names}      {names}\n"
     lines, scalars = [], []
     for zone, (p, v) in zones.items():
@@ -102,7 +107,10 @@ def foam_old() -> str:
 
 def su2() -> str:
     head = '"Time_Iter","Outer_Iter","Inner_Iter",     "rms[Rho]"     ,       "CD"       ,       "CL"       \n'
-    rows = "".join(f"{0:11d}, {0:11d}, {k:11d}, {-1 - 0.01 * k:17.10g}, {0.25 + 1e-4 * k:17.10g}, {70 + k:17.10g}\n" for k in range(N))
+    rows = "".join(
+        f"{0:11d}, {0:11d}, {k:11d}, {-1 - 0.01 * k:17.10g}, {0.25 + 1e-4 * k:17.10g}, {70 + k:17.10g}\n"
+        for k in range(N)
+    )
     return head + rows
 
 
@@ -221,7 +229,9 @@ def test_restarts_inside_a_file(put: Callable[..., Path]) -> None:
     assert np.all(record.channels["torque"].values[20:] > 0.35) and np.all(record.channels["torque"].values[:20] < 0.35)
     assert any("header repeated" in w for w in record.warnings)
     assert any("goes back" in w for w in record.warnings)
-    twice = importers.read(put("\n".join([*head, *rows[:5], later[0].replace("121", "105").replace("0.021", "0.005"), *rows[5:]]) + "\n"))
+    twice = importers.read(
+        put("\n".join([*head, *rows[:5], later[0].replace("121", "105").replace("0.021", "0.005"), *rows[5:]]) + "\n")
+    )
     assert twice.rows == N and twice.channels["torque"].values[4] > 0.35  # the last row of a step wins
 
 
@@ -278,12 +288,19 @@ def test_dual_time_keeps_the_last_inner_iteration(put: Callable[..., Path]) -> N
 def test_other_dialects(put: Callable[..., Path]) -> None:
     rows = "".join(f"{k}, 0.1, 0.02, {k * 0.1:.1f}\n" for k in range(20))
     old = importers.read(put('"Iteration","CL","CD","Time(min)"\n' + rows))
-    tecplot = importers.read(put('TITLE = "SU2"\nVARIABLES = "Iteration","CL","CD","Time(min)"\nZONE T= "history"\n' + rows))
+    tecplot = importers.read(
+        put('TITLE = "SU2"\nVARIABLES = "Iteration","CL","CD","Time(min)"\nZONE T= "history"\n' + rows)
+    )
     for record in (old, tecplot):
         assert record.format == "su2_history" and record.channels["CD"].mean == pytest.approx(0.02)
         assert record.channels["Time(min)"].mean is None  # wall time is no result
     names = "(total_x total_y total_z)\t(pressure_x pressure_y pressure_z)\t(viscous_x viscous_y viscous_z)"
-    foam = "# Moment\n# Time\t" + names + "\n" + "".join(f"{0.1 * k:g}\t(1.5 2 3)\t(1 1 1)\t(0.5 1 2)\n" for k in range(1, 9))
+    foam = (
+        "# Moment\n# Time\t"
+        + names
+        + "\n"
+        + "".join(f"{0.1 * k:g}\t(1.5 2 3)\t(1 1 1)\t(0.5 1 2)\n" for k in range(1, 9))
+    )
     assert importers.read(put(foam)).channels["moment_viscous_z_Nm"].mean == 2.0
     bare = "# Forces\n# CofR : (0 0 0)\n# Time  forces(pressure viscous)  moments(pressure viscous)\n"
     bare += "".join(f"{0.1 * k:g} ((1 0 0) (0.5 0 0)) ((0 0 1) (0 0 {k}))\n" for k in range(1, 9))
@@ -292,7 +309,9 @@ def test_other_dialects(put: Callable[..., Path]) -> None:
     several += "".join(f"{k} {k} {0.01 * ((k - 1) // 5 + 1):.4f}\n" for k in range(1, 101))
     steps = importers.read(put(several))
     assert steps.rows == 20 and steps.channels["a"].values[0] == 5  # the last iteration of each time step
-    still = importers.read(put('"a"\n"i"\n("Iteration" "a" "flow-time")\n' + "".join(f"{k} 7 0\n" for k in range(1, 51))))
+    still = importers.read(
+        put('"a"\n"i"\n("Iteration" "a" "flow-time")\n' + "".join(f"{k} 7 0\n" for k in range(1, 51)))
+    )
     assert still.provenance["clock"] == "iteration" and still.rows == 50
     probes = "# Probe 0 (0.05 0 0)\n# Probe 1 (0.2 0 0)\n#       Probe   0   1\n#        Time\n"
     probes += "".join(f"{0.1 * k:g}  (0 {k} 0)  (1 2 3)\n" for k in range(1, 9))
@@ -313,7 +332,9 @@ def mutants(rng: random.Random) -> Iterator[tuple[str, bytes, str]]:
         form = rng.choice(list(texts))
         text = texts[form]
         raw = text.encode()
-        kind = rng.choice(["cut", "head", "bytes", "line", "column", "some", "huge", "encode", "zip", "swap", "noise", "comma"])
+        kind = rng.choice(
+            ["cut", "head", "bytes", "line", "column", "some", "huge", "encode", "zip", "swap", "noise", "comma"]
+        )
         lines = text.splitlines(keepends=True)
         first = next((k for k, line in enumerate(lines) if re.match(r"\s*[-\d]", line)), len(lines) - 1)
         if kind == "cut":
@@ -323,11 +344,15 @@ def mutants(rng: random.Random) -> Iterator[tuple[str, bytes, str]]:
         elif kind == "bytes":
             data = bytearray(raw)
             for _ in range(rng.randrange(1, 20)):
-                data[rng.randrange(len(data))] = rng.choice((rng.randrange(256), ord(rng.choice("0123456789.eE-+,() \n\t\""))))
+                data[rng.randrange(len(data))] = rng.choice(
+                    (rng.randrange(256), ord(rng.choice('0123456789.eE-+,() \n\t"')))
+                )
             raw = bytes(data)
         elif kind == "line":
             k = rng.randrange(len(lines))
-            lines[k : k + 1] = rng.choice(([], [lines[k]] * 2, [rng.choice(lines), lines[k]], ["\n"], ["garbage here\n"]))
+            lines[k : k + 1] = rng.choice(
+                ([], [lines[k]] * 2, [rng.choice(lines), lines[k]], ["\n"], ["garbage here\n"])
+            )
             raw = "".join(lines).encode()
         elif kind in ("column", "some", "swap"):
             mark = "," if "," in lines[-2] else "\t" if form == "fluent_xy" else " "
@@ -346,7 +371,9 @@ def mutants(rng: random.Random) -> Iterator[tuple[str, bytes, str]]:
                 lines[k] = mark.join(cells) + "\n"
             raw = "".join(lines).encode()
         elif kind == "huge":
-            wild = rng.choice(["1e308", "-1e308", "1e999", "NaN", "inf", "*****", "9" * 400, "1.5D+300", "0x10", "1_0", "--1", "1,5"])
+            wild = rng.choice(
+                ["1e308", "-1e308", "1e999", "NaN", "inf", "*****", "9" * 400, "1.5D+300", "0x10", "1_0", "--1", "1,5"]
+            )
             found = list(re.finditer(r"-?\d+\.\d+(e[-+]\d+)?", text))
             for match in sorted(rng.sample(found, min(3, len(found))), key=lambda m: -m.start()):
                 text = text[: match.start()] + wild + text[match.end() :]
@@ -387,7 +414,13 @@ def check(form: str, raw: bytes, kind: str, path: Path, truth: dict[str, Importe
                 assert spoken or "°" in name, (name, kind)
                 continue
             strange = set(channel.values[np.isfinite(channel.values)]) - set(known.channels[name].values)
-            assert not strange or any("may be cut" in w for w in spoken), (form, kind, name, sorted(strange)[:5], record.warnings)
+            assert not strange or any("may be cut" in w for w in spoken), (
+                form,
+                kind,
+                name,
+                sorted(strange)[:5],
+                record.warnings,
+            )
     return "read"
 
 

@@ -99,7 +99,9 @@ def test_faults(tmp_path: Path, row: str, expected: str) -> None:
 
 def test_unknown_quantity(tmp_path: Path) -> None:
     (fault,) = faults(save(tmp_path, "trust,3,N,unknown,cfd,x,,,,"))
-    assert fault.startswith("2:1: got quantity 'trust'; expected one of thrust,") and fault.endswith("Did you mean thrust?")
+    assert fault.startswith("2:1: got quantity 'trust'; expected one of thrust,") and fault.endswith(
+        "Did you mean thrust?"
+    )
 
 
 def test_all_faults_at_once(tmp_path: Path) -> None:
@@ -163,7 +165,11 @@ def test_series_by_kind_and_source(tmp_path: Path) -> None:
 
 
 @settings(max_examples=80, deadline=None)
-@given(at=st.integers(0, 200), length=st.integers(0, 40), junk=st.text("0123456789.,-+eE \n\"#kgfNunow/%\xe9\u4e2d", max_size=12))
+@given(
+    at=st.integers(0, 200),
+    length=st.integers(0, 40),
+    junk=st.text('0123456789.,-+eE \n"#kgfNunow/%\xe9\u4e2d', max_size=12),
+)
 def test_damage_is_read_or_refused(tmp_path_factory: pytest.TempPathFactory, at: int, length: int, junk: str) -> None:
     text = HEAD + 'thrust,2.60,kgf,0.1,cfd,"Cahill, 1",Fluent,20000,0,1.225\nCT,0.11,-,unknown,bench,x,,,,\n'
     path = tmp_path_factory.mktemp("fuzz") / "references.csv"

@@ -54,8 +54,6 @@ def run(
     return solver.solve(prep, RPM, V, AIR, radial=True)
 
 
-
-
 def test_ideal_hover_has_figure_of_merit_one() -> None:
     w = 8.0
     s = run(uniform_rotor(w))

@@ -42,7 +42,9 @@ def test_conversion_through_any_third_unit_is_the_direct_one(data, value):
     dimension = data.draw(st.sampled_from(sorted({x.dimension for x in u.UNITS.values()})))
     a, b, c = (data.draw(st.sampled_from(u.suffixes(dimension))) for _ in range(3))
     direct = u.convert(value, a, c)
-    assert u.convert(u.convert(value, a, b), b, c) == pytest.approx(direct, rel=1e-9, abs=1e-9 * u.UNITS[c].factor**-1)
+    assert u.convert(u.convert(value, a, b), b, c) == pytest.approx(
+        direct, rel=1e-9, abs=1e-9 * u.UNITS[c].factor ** -1
+    )
 
 
 def test_arrays_convert_element_by_element():

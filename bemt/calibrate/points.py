@@ -16,7 +16,6 @@ from bemt.errors import Fault, InputError
 Array = NDArray[np.float64]
 
 
-
 @dataclass(frozen=True)
 class Propeller:
     """One propeller of the data.

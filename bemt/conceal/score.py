@@ -221,8 +221,12 @@ def _parameters(j: Judged) -> list[tuple[float, bool]]:
                 size = abs(float(got["value"]) - true["value"]) / abs(true["value"])
                 low, high = got.get("low"), got.get("high")
                 # ratios of units are exact in the library and rounded in the key
-                inside = low is not None and high is not None and (
-                    low <= true["value"] <= high or (low == high and math.isclose(low, true["value"], rel_tol=1e-3))
+                inside = (
+                    low is not None
+                    and high is not None
+                    and (
+                        low <= true["value"] <= high or (low == high and math.isclose(low, true["value"], rel_tol=1e-3))
+                    )
                 )
                 out.append((size, inside))
     return out
