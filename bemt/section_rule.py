@@ -6,7 +6,9 @@ on UIUC volume 1 (51 propellers with stations, static and wind-tunnel data); UIU
 (``reports/validation``): held out of every fit, though looked at on the way.
 
 * Section: NACA four-digit, camber 3.5 % at 40 % chord, thickness 9 %; six of the nine families of volume 1 with two
-  or more propellers come out at 3.0 to 3.5 %.  Families that do not are in :data:`FAMILIES`.
+  or more propellers come out at 3.0 to 3.5 %.  Families that do not are in :data:`FAMILIES`, and so are families whose
+  section is published, with its coordinates.  APC publishes sections too (its PE0 files: E63 to NACA 4412, or Clark Y,
+  scaled); with them static CT of volume 1 is off by 5.3 % in the median, with the rule by 3.7 %: not taken.
 * Transition: n_crit 3.  Rotating small blades keep their lift down to Re 20,000, which n_crit 9 does not (static CT
   at Re 20,000-30,000 relative to the same propellers' top speed: -14 to -16 % with n_crit 9, -3 to +3 % with 3).
 * Lift at small angles and Re below 20,000: as computed, without the bound of :func:`neuralfoil_polar` (``lift_floor``),
@@ -24,6 +26,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 if TYPE_CHECKING:
     from bemt.polars import Polar
@@ -41,20 +44,23 @@ N_CRIT_LARGE = 9.0
 
 @dataclass(frozen=True)
 class Section:
-    """NACA four-digit parameters at one radius.
+    """A section at one radius: NACA four-digit, or a published one.
 
     Attributes
     ----------
     r_R : float
         Where it applies, r/R [1].
     camber, position, thickness : float
-        Fractions of the chord [1].
+        Fractions of the chord [1]; a published section has its own camber, which goes with its thickness.
+    shape : str
+        ``naca4``, or a name of :data:`geometry.published.PUBLISHED`.
     """
 
     r_R: float
     camber: float
     position: float
     thickness: float
+    shape: str = "naca4"
 
 
 def _one(camber: float, thickness: float = 0.09) -> tuple[Section, ...]:
@@ -63,43 +69,76 @@ def _one(camber: float, thickness: float = 0.09) -> tuple[Section, ...]:
 
 DEFAULT = _one(0.035)
 
-# Clark Y (t/c 0.117, camber 0.0343) scaled in thickness: the standard propeller 5868-9 of NACA Report 640, which the
-# UIUC family nr640 copies at model scale.  The thickness law is read from memory of that report, not checked.
-_CLARK_Y_640 = tuple(
-    Section(x, 0.293 * min(t, 0.15), 0.4, t)
-    for x, t in ((0.2, 0.25), (0.3, 0.20), (0.45, 0.13), (0.6, 0.10), (0.75, 0.085), (0.95, 0.075))
-)
+# Deters, Ananda and Selig (2014), AIAA 2014-2151: SDA1075 over the whole blade of DA4002 and DA4022.  That DA4052, of
+# the same designers, has it too is an assumption.
+_SDA1075 = (Section(0.75, 0.0196, 0.4, 0.11996, "sda1075"),)
+
+# Clark Y thinned towards the tip: the standard propeller 5868-9 of NACA Report 640, which the UIUC family nr640 copies
+# at model scale.  The thickness law is from memory of that report, not checked; a thickness file replaces it.
+_CLARK_Y_640 = (0.2, 0.3, 0.45, 0.6, 0.75, 0.95), (0.25, 0.20, 0.13, 0.10, 0.085, 0.075)
+# A root thicker than this is part of the hub, and no section.
+_THICKEST = 0.25
 
 FAMILIES: dict[str, tuple[Section, ...]] = {
     "apcsf": _one(0.065),  # slow flyers and old wooden-style blades: strongly cambered (calibrated on volume 1)
     "mae": _one(0.065),
     "apcsp": _one(0.050),
     "apc29ff": _one(0.045),
-    # Published section SDA1075 (Deters, Ananda and Selig 2014, AIAA 2014-2151, appendix A), 10.75 % thick; camber from
-    # its XFOIL moment coefficient of -0.043, thin-aerofoil theory: not its true coordinates.
-    "da4002": _one(0.021, 0.1075),
-    "da4022": _one(0.021, 0.1075),
-    "nr640": _CLARK_Y_640,
+    "da4002": _SDA1075,
+    "da4022": _SDA1075,
+    "da4052": _SDA1075,
 }
 
 
-def sections(family: str | None = None) -> tuple[Section, ...]:
+def _clark_y(r_R: ArrayLike, thickness: ArrayLike) -> tuple[Section, ...]:
+    """Clark Y at a few radii of a thickness law."""
+    x, t = np.asarray(r_R, dtype=float), np.asarray(thickness, dtype=float)
+    at = np.linspace(x[0], x[-1], 6)
+    law = np.minimum(np.interp(at, x, t), _THICKEST)
+    return tuple(Section(float(a), 0.306 * float(b), 0.4, float(b), "clark_y") for a, b in zip(at, law, strict=True))
+
+
+def sections(family: str | None = None, law: tuple[ArrayLike, ArrayLike] | None = None) -> tuple[Section, ...]:
     """Sections of the rule.
 
     Parameters
     ----------
     family : str, optional
         Family in the naming of the UIUC database; unknown ones get the general section.
+    law : (N,) float, (N,) float, optional
+        r/R and thickness over chord of a thickness file [1]; used by families whose section is scaled along the blade.
 
     Returns
     -------
     tuple of Section
-        One for the whole blade, or several along it.
+        One for the whole blade, or several along it, root first.
 
     >>> sections("apcsf")[0].camber, sections("somebody")[0].camber
     (0.065, 0.035)
+    >>> [(round(s.r_R, 2), round(s.thickness, 3)) for s in sections("nr640")][-2:]
+    [(0.8, 0.083), (0.95, 0.075)]
     """
+    if family == "nr640":
+        return _clark_y(*(law or _CLARK_Y_640))
     return FAMILIES.get(family or "", DEFAULT)
+
+
+def section_at(r_R: float, family: str | None = None) -> Section:
+    """Section of the rule nearest to a radius.
+
+    Parameters
+    ----------
+    r_R : float
+        r/R [1].
+    family : str, optional
+        As in :func:`sections`.
+
+    Returns
+    -------
+    Section
+        For cases that take one section for the whole blade.
+    """
+    return min(sections(family), key=lambda s: abs(s.r_R - r_R))
 
 
 @lru_cache(maxsize=256)
@@ -114,11 +153,14 @@ def airfoil(section: Section) -> Airfoil:
     Returns
     -------
     geometry.airfoil.Airfoil
-        NACA four-digit shape.
+        Its shape.
     """
     from geometry.airfoil import naca4
+    from geometry.published import published, thickened
 
-    return naca4(section.camber, section.position, section.thickness)
+    if section.shape == "naca4":
+        return naca4(section.camber, section.position, section.thickness)
+    return thickened(published(section.shape), section.thickness)
 
 
 def polar(shape: Airfoil, n_crit: float = N_CRIT, drag_level: float = DRAG_LEVEL) -> Polar:

@@ -42,7 +42,7 @@ def stations(rows: list[tuple[float, float, float]]) -> str:
 def uiuc(folder: Path, data: Path, name: str) -> Case:
     family, size = name.split("_")[:2]
     diameter = float(size.split("x")[0])
-    section = section_rule.sections(family)[0]
+    section = section_rule.section_at(0.75, family)
     body = f"""[rotor]
 kind = "propeller"
 blades = 2

@@ -51,6 +51,7 @@ def write(folder: Path, **files: str) -> Path:
         ("ancf_12x13_0784od_4015", 12.0, 13.0, 2),
         ("ancf_11x10_geom", 11.0, 10.0, 2),
         ("apce_19x12_geom", 19.0, 12.0, 2),
+        ("apcr-rh_9x4.5_0678rd_4000", 9.0, 4.5, 2),
     ],
 )
 def test_sizes_from_names(stem: str, diameter: float, pitch: float | None, blades: int) -> None:

@@ -121,7 +121,7 @@ def _uiuc_case(
 ) -> tuple[str, str]:
     g = p.geometry
     assert g is not None
-    s = section_rule.sections(p.family)[0]
+    s = section_rule.section_at(0.75, p.family)
     rotor = {"kind": "propeller", "blades": p.blades, "diameter_in": p.diameter_in, "hub_ratio": 0.1}
     section = {"camber": s.camber, "camber_position": s.position, "thickness": s.thickness}
     keep = (g.r_R <= 1.0) & (g.r_R > 0.1)

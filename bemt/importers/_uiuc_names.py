@@ -59,7 +59,7 @@ FAMILIES = {
 _N = r"(\d+(?:\.\d+)?)"
 _SIZE = re.compile(rf"{_N}x{_N}(?:[x-](\d))?([a-z]*)", re.IGNORECASE)
 _RUN = re.compile(r"[a-z]{0,3}\d{3,5}[a-z]{0,3}", re.IGNORECASE)
-_FILE = re.compile(r"[a-z][a-z0-9]*", re.IGNORECASE)
+_FILE = re.compile(r"[a-z][a-z0-9]*(?:-[a-z0-9]+)*", re.IGNORECASE)
 
 
 @dataclass(frozen=True)

@@ -110,7 +110,9 @@ def build(propeller: UiucPropeller, stations: Stations | None = None) -> Rotor:
     x, c, beta = stations
     R = 0.5 * propeller.diameter_m
     keep = x <= 1.0
-    anchors = tuple((s.r_R, airfoil(s)) for s in sections(propeller.family))
+    thickness = propeller.thickness
+    law = None if thickness is None else (thickness.r_R, thickness.t_c)
+    anchors = tuple((s.r_R, airfoil(s)) for s in sections(propeller.family, law))
     blade = from_stations(x[keep] * R, np.maximum(c[keep], 1e-3) * R, beta[keep], R, float(x[0]) * R, anchors=anchors)
     return Rotor(blade, propeller.blades, propeller.rotation, propeller.name)
 
