@@ -15,7 +15,7 @@ from contextlib import suppress
 from typing import Any
 
 from bemt import __version__
-from bemt.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, InputError, system_fault
+from bemt.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError, system_fault
 
 __all__ = ["build_parser", "main"]
 
@@ -147,7 +147,7 @@ def build_parser() -> argparse.ArgumentParser:
     validate.add_argument("--out", metavar="DIR", help="write the tables there as well")
 
     reproduce = commands.add_parser("reproduce", help="print every number of the source thesis beside ours")
-    reproduce.add_argument("--json", action="store_true", help="print one JSON document")
+    reproduce.add_argument("--json", action="store_true", help="print one JSON document (bemt.reproduce/1)")
 
     bench = commands.add_parser("bench", help="measure the time per operating point")
     bench.add_argument("--json", action="store_true", help="print one JSON document (bemt.bench/1)")
@@ -232,7 +232,8 @@ def build_parser() -> argparse.ArgumentParser:
     flow.add_argument("--ranks", type=_positive, default=2, metavar="N", help="processes of a run (default 2)")
     flow.add_argument("--work", metavar="DIR", help="folder of grids and runs (default: a temporary one)")
     flow.add_argument("--keep", action="store_true", help="keep the work folder")
-    flow.add_argument("--json", action="store_true", help="print one JSON document (bemt.cfd-run/1)")
+    one = "print one JSON document (bemt.cfd-run/1; of a folder of campaigns bemt.cfd-summary/1)"
+    flow.add_argument("--json", action="store_true", help=one)
     flow.add_argument("--quiet", action="store_true", help="print neither progress nor tables")
 
     physics = commands.add_parser("effects", help="list every physical effect: parameters, ranges, sources, signs")
@@ -322,6 +323,19 @@ def _drive_parsers(commands: argparse._SubParsersAction[_Parser]) -> None:
     body.add_argument("--json", action="store_true", help="print one JSON document (bemt.thrusters.result/1)")
 
 
+def _check_folders(args: argparse.Namespace) -> None:
+    """Refuse a file where a folder is wanted, before minutes of work end at it."""
+    faults = []
+    for name in ("out", "work", "dir"):
+        near = getattr(args, name, None) or "."
+        while near and not os.path.exists(near):
+            near = os.path.dirname(near)
+        if near and not os.path.isdir(near):
+            faults.append(Fault(f"--{name}", "", f"{near}, a file", "a folder"))
+    if faults:
+        raise InputError(faults)
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line.
 
@@ -342,6 +356,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if getattr(args, "json", False) and hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(encoding="utf-8", errors="backslashreplace")  # RFC 8259, 8.1
     try:
+        _check_folders(args)
         code = importlib.import_module(_MODULES[args.command]).run(args)
         sys.stdout.flush()
         return EXIT_OK if code is None else int(code)

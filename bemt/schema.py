@@ -321,10 +321,10 @@ def load_toml(path: str | Path, out: Collector) -> dict[str, Any] | None:
     try:
         raw = Path(path).read_bytes()
     except FileNotFoundError:
-        out.add("", "no such file", "a case file", "Check the path")
+        out.add("", "no such file", "a TOML file", "Check the path")
         return None
     except OSError as error:
-        out.add("", f"an unreadable file ({error.strerror})", "a case file")
+        out.add("", f"an unreadable file ({error.strerror})", "a TOML file")
         return None
     try:
         text = raw.decode("utf-8-sig")

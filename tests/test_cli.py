@@ -186,7 +186,38 @@ def test_folder_of_results_that_is_a_file_is_2(tmp_path: Path) -> None:
     (tmp_path / "out").write_text("")
     done = bemt("sweep", str(ROOT / "cases"), "--out", str(tmp_path / "out"))
     assert done.returncode == 2
-    assert "expected a folder for results" in done.stderr
+    assert done.stderr == f"--out: got {tmp_path / 'out'}, a file; expected a folder.\n"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["validate", "uiuc", "--out"], ["calibrate", "--out"], ["prove", "--out"], ["export", "case", "--out"],
+     ["diagnose", "log.csv", "--case", "case", "--out"], ["cfd", "campaign", "--work"], ["data", "uiuc", "--dir"]],
+    ids=lambda a: a[0],
+)  # fmt: skip
+@pytest.mark.parametrize("below", ["", "/deeper/still"])
+def test_a_file_for_a_folder_is_refused_before_any_work(
+    arguments: list[str], below: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    begun: list[str] = []
+    monkeypatch.setattr("importlib.import_module", lambda name: SimpleNamespace(run=lambda args: begun.append(name)))
+    file = tmp_path / "file"
+    file.write_text("")
+    assert cli.main([*arguments, f"{file}{below}"]) == 2
+    assert not begun
+    assert capsys.readouterr().err == f"{arguments[-1]}: got {file}, a file; expected a folder.\n"
+    assert cli.main([*arguments, str(tmp_path / "new" / "folder")]) == 0
+    assert begun
+
+
+@pytest.mark.parametrize("command", ["thrusters", "motor", "cfd"])
+def test_a_missing_file_is_not_called_a_case_file_where_none_is_wanted(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main([command, str(tmp_path / "absent.toml")]) == 2
+    words = "absent.toml: got no such file; expected a TOML file. Check the path."
+    assert capsys.readouterr().err == f"{tmp_path}/{words}\n"
 
 
 def test_reader_that_goes_away_is_no_error() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -88,6 +89,27 @@ def test_the_same_answer_gives_the_same_files_and_leaves_no_figure_open(named: c
     assert [p.name for p in first] == [p.name for p in second]
     assert [p.read_bytes() for p in first] == [p.read_bytes() for p in second]
     assert not plt.get_fignums()
+
+
+@pytest.mark.parametrize(
+    "odds", [(0.0, 0.009, -0.25, -0.333), (0.0, 57.2), (0.0, 214.0, -3.1), (0.0, 1.04), (0.0, 0.0)]
+)
+def test_labels_of_the_ranking_do_not_run_into_each_other(named: chain.Diagnosis, odds: tuple[float, ...]) -> None:
+    import matplotlib
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    weights = dict(zip(("none", "untwist", "pitch_offset", "thrust_gain"), odds, strict=False))
+    found = SimpleNamespace(probability=dict.fromkeys(weights, 1 / len(weights)), log_bayes=weights.__getitem__)
+    with matplotlib.rc_context(figures.STYLE):
+        figure = figures_effects.ranking(SimpleNamespace(found=found, decision=named.decision, p_value=0.2))  # type: ignore[arg-type]
+        canvas_ = FigureCanvasAgg(figure)
+        canvas_.draw()
+        for axis in figure.axes:
+            low, high = axis.get_xlim()
+            shown = [t for x, t in zip(axis.get_xticks(), axis.get_xticklabels(), strict=True) if low <= x <= high]
+            boxes = sorted((t.get_window_extent(canvas_.get_renderer()) for t in shown), key=lambda b: b.x0)
+            assert len(boxes) >= 2
+            assert all(b.x0 - a.x1 > 3 for a, b in zip(boxes, boxes[1:], strict=False))
 
 
 def test_the_loads_on_the_blade_add_up_to_the_signature(named: chain.Diagnosis) -> None:

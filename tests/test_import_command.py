@@ -109,6 +109,15 @@ def test_openfoam_start_folders_are_restarts_too(put: Callable[..., Path]) -> No
     assert any("not joined" in w for w in found[1]["warnings"]) and not any("joined" in w for w in found[0]["warnings"])
 
 
+def test_a_load_is_refused_where_nothing_is_done_to_it(
+    put: Callable[..., Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = put("q.out", history())
+    assert main(["import", str(path), "--load", "torqe"]) == 2  # neither dropped nor its slip passed over
+    assert capsys.readouterr().err.startswith("--load: got torqe; expected --sign -1 or --sector N beside it")
+    assert main(["import", str(path), "--load", "torque", "--sign", "-1"]) == 0
+
+
 def test_sign_and_sector_are_applied_only_where_told(put: Callable[..., Path]) -> None:
     path = put("q.out", history())
     with pytest.raises(InputError, match="Name them: --load NAME"):

@@ -322,6 +322,19 @@ def test_a_diagnosis_is_shown_with_its_figures_and_none_from_outside(
     assert "residual map" in page and "duct = ground_effect" in page
 
 
+def test_a_parameter_of_another_form_of_the_law_is_not_shown(made: tuple[dict[str, Any], Path], tmp_path: Path) -> None:
+    unused, used = (dict(zip(("value", "low", "high"), values, strict=True), unit="")
+                    for values in ([None] * 3, (0.84, 0.8, 0.91)))  # fmt: skip
+    ranking = [{"effect": "drag_divergence", "probability": 0.9, "parameters": {"form": unused, "kappa": used}}]
+    folder = tmp_path / "diagnosis" / "one"
+    folder.mkdir(parents=True)
+    (folder / "diagnosis.json").write_text(json.dumps({**DIAGNOSIS, "ranking": ranking}))
+    book = copy.deepcopy(made[0])
+    attach_diagnoses(book, tmp_path)
+    page = book_html(book)
+    assert "kappa 0.840 (0.800 to 0.910)" in page and "form -" not in page
+
+
 @pytest.mark.parametrize(
     "content",
     [

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from bemt import effects, section_rule
+from bemt.errors import InputError
 from bemt.importers import uiuc
 from bemt.tables import json_text
 from bemt.validate import command, match, points, text
@@ -109,6 +110,14 @@ def test_command_prints_json_and_names_unknown_effects(tmp_path: Path) -> None:
     assert "stall_delay" not in [e["id"] for e in doc["effects"]]
     bad = subprocess.run([*call, "--off", "nonsense"], capture_output=True, text=True, check=False)
     assert bad.returncode == 2 and "nonsense" in bad.stderr and "Traceback" not in bad.stderr
+
+
+def test_a_file_for_the_folder_is_called_a_file(tmp_path: Path) -> None:
+    (tmp_path / "file.txt").write_text("x")
+    for name, got in (("file.txt", "a file"), ("absent", "nothing there")):
+        with pytest.raises(InputError) as caught:
+            command.validate(tmp_path / name)
+        assert str(caught.value) == f"{tmp_path / name}: got {got}; expected a folder in UIUC layout. Check the path."
 
 
 def test_fixed_reynolds_number_removes_the_dependence_on_speed(tmp_path: Path) -> None:

@@ -220,6 +220,7 @@ def ranking(answer: Diagnosis) -> Figure:
     right.axvline(0.0, color=BLACK, linewidth=0.8)
     right.set(xlabel="ln odds of the readings over none [1]")
     right.margins(x=0.15)
+    right.locator_params(axis="x", nbins=6)  # beyond that, labels with two digits run into each other
     words = " ".join(["verdict:", answer.decision.verdict, ", ".join(answer.decision.effects)]).strip()
     words += f"; p = {answer.p_value:.2g}"
     figure.suptitle(words, fontsize=9)

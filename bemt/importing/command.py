@@ -273,9 +273,11 @@ def _choice(args: argparse.Namespace) -> Choice:
         faults.append(Fault("", "--sign", str(sign), "+1 or -1"))
     if not 1 <= sector <= 100:
         faults.append(Fault("", "--sector", str(sector), "the number of equal sectors, 1 to 100"))
+    zones, loads = (tuple(getattr(args, key, None) or ()) for key in ("zones", "load"))
+    if loads and sign == sector == 1:
+        faults.append(Fault("", "--load", ", ".join(loads), "--sign -1 or --sector N beside it, which it belongs to"))
     if faults:
         raise InputError(faults)
-    zones, loads = (tuple(getattr(args, key, None) or ()) for key in ("zones", "load"))
     return Choice(60.0 / rpm if rpm is not None else period, revolutions, sign, sector, zones, loads)
 
 

@@ -32,6 +32,8 @@ def _parameters(value: Any) -> str:
     words = []
     for name, p in _mapping(value).items():
         p = _mapping(p)
+        if p.get("value") is None:  # of another form of the law
+            continue
         if isinstance(p.get("value"), str):  # a form of the law, not a number
             words.append(f"{name} {p['value'].replace('_', ' ')}")
             continue

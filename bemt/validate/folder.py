@@ -59,7 +59,8 @@ def read_folder(folder: Path) -> Folder:
     from bemt.importers import uiuc
 
     if not folder.is_dir():
-        raise InputError([Fault(str(folder), "folder", "nothing there", "a folder in UIUC layout", "Check the path.")])
+        got = "a file" if folder.exists() else "nothing there"
+        raise InputError([Fault(str(folder), "", got, "a folder in UIUC layout", "Check the path")])
     scan = uiuc.scan_folder(folder)
     pe0, notes = _pe0_stations(folder)
     usable, skipped = [], []
