@@ -235,7 +235,7 @@ def _drift(f: CfdFacts) -> AuditLine:
     return AuditLine(
         topic,
         status,
-        f"thrust drifts by {f.drift:+.2%} over the averaged part",
+        f"thrust drifts by {round(f.drift, 4) + 0.0:+.2%} over the averaged part",
         "taken whole as its standard uncertainty",
         size,
     )
