@@ -11,7 +11,7 @@ import pytest
 from diagnosing import case, diagnose, left_out, points, recording
 
 from bemt import effects, forward
-from bemt.diagnose import blocks, chain, confusion, fit, verdict
+from bemt.diagnose import blocks, chain, confusion, fit, prior, verdict
 
 
 @pytest.fixture(scope="module")
@@ -62,6 +62,23 @@ def test_physics_that_is_on_is_wrong_at_the_end_of_its_range(
     found: Any = SimpleNamespace(problem=SimpleNamespace(baseline=(effects.catalogue()["ground_effect"](),)))
     monkeypatch.setattr(fit, "fit", lambda *_: SimpleNamespace(settings=(setting,)))
     assert verdict._leaves_its_range(found, "ground_effect") == beyond
+
+
+@pytest.mark.parametrize(
+    ("first", "adds", "rest", "left"),
+    [("unit_slip", 20.0, 3.9, "unit_slip+untwist"), ("unit_slip", 20.0, 4.1, "unit_slip"),
+     ("unit_slip", 60.0, 4.1, "unit_slip+untwist"), ("duct", 20.0, 4.1, "duct+untwist")],
+)  # fmt: skip
+def test_what_is_named_beside_a_slip_explains_its_own(
+    first: str, adds: float, rest: float, left: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A slip explains so much that any rest is small beside it; the second effect may not hide behind that."""
+    pair = f"{first}+untwist"
+    weights = {first: 1000.0, "untwist": 5.0, pair: 1000.0 + adds}
+    found: Any = SimpleNamespace(problem=None, log_bayes=weights.__getitem__)
+    monkeypatch.setattr(prior, "prior_weights", lambda _, ids: dict.fromkeys(ids, 1.0))
+    leading, share = verdict._earned(found, pair, {first: 1.0, "untwist": 0.99}, rest)
+    assert leading == left and share["untwist"] == (0.99 if left == pair else 0.0)
 
 
 def test_the_nearest_signature_is_a_baseline_of_its_own(answer: chain.Diagnosis) -> None:

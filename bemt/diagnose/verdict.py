@@ -150,7 +150,7 @@ def decide(found: Evidence, p_value: float) -> Decision:
         return Decision("unknown", (), leading, max(P[prior.UNKNOWN], 1.0 - listed[leading]), rest, (), why)
     share = inclusion(found)
     if "+" in leading and not _twins(leading.split("+")):
-        leading, share = _earned(found, leading, share)
+        leading, share = _earned(found, leading, share, rest)
     weight = prior.prior_weights(found.problem, leading.split("+"))
     expected = min(weight.values()) > 1.0
     needed = PROVEN if min(weight.values()) < 1.0 else EXPECTED if expected else ENOUGH
@@ -221,13 +221,16 @@ def _foretells(found: Evidence, leading: str) -> bool:
     return any(error(leading, s) < FORETELLS * error(prior.NONE, s) for s in blocks.partitions(problem))
 
 
-def _earned(found: Evidence, pair: str, share: dict[str, float]) -> tuple[str, dict[str, float]]:
+def _earned(found: Evidence, pair: str, share: dict[str, float], rest: float) -> tuple[str, dict[str, float]]:
     """Leading explanation without the effect that adds too little to the other one, and the probabilities to match."""
     ids = pair.split("+")
     weight = prior.prior_weights(found.problem, ids)
     for other, one in (ids, ids[::-1]):
         price = PROVEN if weight[other] < 1.0 else EARNED
-        if found.log_bayes(pair) - found.log_bayes(one) < price and share[one] >= share[other]:
+        adds = found.log_bayes(pair) - found.log_bayes(one)
+        # beside the thousands of a slip every rest is small: what is named next to it must explain its own
+        vague = one == "unit_slip" and rest > max(LEFT_OVER, SMALL * adds)
+        if (adds < price or vague) and share[one] >= share[other]:
             return one, {i: (0.0 if i == other else p) for i, p in share.items()}
     return pair, share
 
