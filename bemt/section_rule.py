@@ -1,9 +1,9 @@
-"""The declared general rule for blade sections that nobody published.
+"""The declared general rule for blade sections, which hardly anybody publishes.
 
 Propellers come with a diameter, a pitch and at best stations; sections, surface and transition are unknown.  The rule
-gives every one of them the same answer unless the maker's family is known to differ.  Its numbers were calibrated
-on UIUC volume 1 (51 propellers with stations, static and wind-tunnel data); UIUC volume 2 is what it is reported on
-(``reports/validation``): held out of every fit, though looked at on the way.
+gives every one of them the same answer unless its family is known to differ or has published its section.  Its
+numbers were calibrated on UIUC volume 1 (51 propellers with stations, static and wind-tunnel data); UIUC volume 2 is
+what it is reported on (``reports/validation``): held out of every fit, though looked at on the way.
 
 * Section: NACA four-digit, camber 3.5 % at 40 % chord, thickness 9 %; six of the nine families of volume 1 with two
   or more propellers come out at 3.0 to 3.5 %.  Families that do not are in :data:`FAMILIES`, and so are families whose

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import io
 import json
 import math
@@ -14,7 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["csv_block", "csv_text", "json_text", "number_text", "plain", "remove_stale", "text_table", "write_atomic"]
+__all__ = [
+    "csv_block", "csv_text", "file_hash", "json_text", "number_text", "plain", "remove_stale", "text_table",
+    "write_atomic",
+]  # fmt: skip
 
 DIGITS = 7
 _POWERS = 10.0 ** np.arange(0, 23)
@@ -287,3 +291,20 @@ def remove_stale(folder: Path) -> None:
     """
     for leftover in folder.glob(".*.tmp"):
         leftover.unlink(missing_ok=True)
+
+
+def file_hash(path: Path) -> str:
+    """SHA-256 of a file of any size.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    str
+        Hexadecimal.
+    """
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()

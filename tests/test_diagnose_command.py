@@ -76,7 +76,8 @@ def test_cases_of_one_name_have_no_folder_each(tmp_path: Path, capsys: pytest.Ca
     files = [_table(tmp_path / f"{k}.csv", LOADS) for k in "ab"]
     two = ["--case", str(CASES / "prop_8x5"), str(tmp_path / "own"), "--out", str(tmp_path / "out")]
     assert main(["diagnose", *files, *two, "--quiet"]) == 2
-    assert "name: got 'prop_8x5'; expected a name that no other case has" in capsys.readouterr().err
+    first = (CASES / "prop_8x5" / "case.toml").as_posix()
+    assert f"name: got 'prop_8x5' as in {first}; expected a name of its own" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from bemt import empirical
 from bemt.air import Air
 from bemt.calibrate.estimate import POSSIBLE, estimate, length_faults
+from bemt.case.schema import AIRSPEED, RPM
 from bemt.errors import EXIT_OK, Fault, InputError
 from bemt.tables import json_text, number_text, text_table
 from bemt.units import INCH
@@ -20,8 +21,6 @@ from geometry.designation import parse_designation
 __all__ = ["SCHEMA", "document", "run"]
 
 SCHEMA = "bemt.estimate/1"
-FASTEST_RPM, AIRSPEED = 300_000, (-100.0, 300.0)
-"""Speeds of rotation [rev/min] and airspeeds [m/s] that a case may have."""
 
 
 def _label(text: str, faults: list[Fault]) -> tuple[float, float, int | None]:
@@ -64,10 +63,11 @@ def document(args: argparse.Namespace) -> dict[str, Any]:
     for option, value, unit, name in lengths:
         faults += [] if value is None else length_faults((option, ""), value, unit, D * INCH, POSSIBLE[name])
     # what is no number, or turns backwards, the formula refuses itself
-    faults += [Fault("--rpm", "", f"{n:g}", f"0 to {FASTEST_RPM:g} rev/min") for n in args.rpm
-               if FASTEST_RPM < n < math.inf]  # fmt: skip
-    faults += [Fault("--airspeed", "", f"{v:g}", f"{AIRSPEED[0]:g} to {AIRSPEED[1]:g} m/s") for v in args.airspeed or []
-               if math.isfinite(v) and not AIRSPEED[0] <= v <= AIRSPEED[1]]  # fmt: skip
+    faults += [Fault("--rpm", "", f"{n:g}", f"0 to {RPM.high:g} rev/min") for n in args.rpm
+               if RPM.high < n < math.inf]  # fmt: skip
+    speeds = f"{AIRSPEED.low:g} to {AIRSPEED.high:g} m/s"
+    faults += [Fault("--airspeed", "", f"{v:g}", speeds) for v in args.airspeed or []
+               if math.isfinite(v) and not AIRSPEED.low <= v <= AIRSPEED.high]  # fmt: skip
     rpm, V = (v.ravel() for v in np.meshgrid(args.rpm, args.airspeed or [0.0], indexing="ij"))
     if faults:  # the rest is looked at beside a propeller that is right, so that all faults come at once
         try:

@@ -447,3 +447,26 @@ def find_cases(paths: Iterable[str | Path]) -> list[Path]:
     if faults:
         raise InputError(faults)
     return list(dict.fromkeys(found))
+
+
+def repeated_names(cases: Mapping[int, Case]) -> dict[int, Fault]:
+    """Find cases that would write into the folder of another one.
+
+    Parameters
+    ----------
+    cases : mapping of int to Case
+        Cases by any number, in order.
+
+    Returns
+    -------
+    dict of int to Fault
+        Every case but the first of a name; names that differ in case alone are one folder on some disks.
+    """
+    first: dict[str, str] = {}
+    faults = {}
+    for i, case in cases.items():
+        file = case.path.as_posix()
+        earlier = first.setdefault(case.name.casefold(), file)
+        if earlier != file:
+            faults[i] = Fault(file, "name", f"{case.name!r} as in {earlier}", "a name of its own")
+    return faults

@@ -41,11 +41,9 @@ def _percent(key: str, low: float = 1.0) -> Suspect:
     return _looks((low, 1000.0, "percent", lambda v: v / 100.0, key))
 
 
-_RPM = Key(unit="rev/min", low=10, high=300_000, required=True,
+RPM = Key(unit="rev/min", low=10, high=300_000, required=True,
            suspect=_looks((1e-9, 9.999, "rev/s", lambda v: v * 60, "rpm")))  # fmt: skip
-_AIRSPEED = Key(
-    unit="m/s", low=-100, high=300, suspect=_looks((300.1, 1100, "km/h", lambda v: v / 3.6, "airspeed_m_s"))
-)
+AIRSPEED = Key(unit="m/s", low=-100, high=300, suspect=_looks((300.1, 1100, "km/h", lambda v: v / 3.6, "airspeed_m_s")))
 _DENSITY = Key(unit="kg/m3", low=0.01, high=10, suspect=_looks(
     (800, 1500, "g/m3", lambda v: v / 1000, "density_kg_m3"),
     (0.0755, 0.0775, "lb/ft3", lambda v: v * 16.018463, "density_kg_m3"),
@@ -121,7 +119,7 @@ SCHEMA: dict[str, dict[str, Key]] = {
         "chord_mm": Key(unit="mm", low=1, high=1000, required=True, suspect=_metres("chord_mm", 0.999)),
         "recovery": Key(low=0, high=1, suspect=_percent("recovery", 1.5)),
     },
-    "operating": {"rpm": _RPM, "airspeed_m_s": _AIRSPEED},
+    "operating": {"rpm": RPM, "airspeed_m_s": AIRSPEED},
     "air": {
         "density_kg_m3": _DENSITY,
         "altitude_m": _ALTITUDE,
@@ -142,8 +140,8 @@ SCHEMA: dict[str, dict[str, Key]] = {
         "stations": Key("integer", low=5, high=1000),
     },
     "sweep": {
-        "rpm": Key("axis", unit="rev/min", low=10, high=300_000, suspect=_RPM.suspect),
-        "airspeed_m_s": Key("axis", unit="m/s", low=-100, high=300, suspect=_AIRSPEED.suspect),
+        "rpm": Key("axis", unit="rev/min", low=RPM.low, high=RPM.high, suspect=RPM.suspect),
+        "airspeed_m_s": Key("axis", unit="m/s", low=AIRSPEED.low, high=AIRSPEED.high, suspect=AIRSPEED.suspect),
         "altitude_m": Key("axis", unit="m", low=-500, high=20_000, suspect=_ALTITUDE.suspect),
         "density_kg_m3": Key("axis", unit="kg/m3", low=0.01, high=10, suspect=_DENSITY.suspect),
         "temperature_C": Key("axis", unit="C", low=-60, high=60, suspect=TEMPERATURE.suspect),

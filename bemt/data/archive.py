@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import lzma
 import os
@@ -16,8 +15,9 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from bemt.errors import Fault, InputError
+from bemt.tables import file_hash
 
-__all__ = ["MAX_ARCHIVE", "MAX_FILES", "MAX_UNPACKED", "download", "sha256", "unpacked"]
+__all__ = ["MAX_ARCHIVE", "MAX_FILES", "MAX_UNPACKED", "download", "unpacked"]
 
 MAX_ARCHIVE = 500_000_000
 """Bytes that an archive may have."""
@@ -28,23 +28,6 @@ MAX_FILES = 50_000
 _BLOCK = 1 << 16
 
 Progress = Callable[[int, int], None]
-
-
-def sha256(path: Path) -> str:
-    """Hash of a file.
-
-    Parameters
-    ----------
-    path : Path
-        File.
-
-    Returns
-    -------
-    str
-        64 hexadecimal digits.
-    """
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def _get(url: str, part: Path, progress: Progress | None) -> None:
@@ -142,7 +125,7 @@ def download(url: str, target: Path, known_sha256: str | None = None, progress: 
     except ValueError as error:  # pooch: the hash differs
         hint = "The archive has changed since its first use: delete the folder of the data to accept the new one"
         raise InputError(Fault(url, "sha256", "another hash", str(known_sha256), hint)) from error
-    return sha256(target)
+    return file_hash(target)
 
 
 def _members(archive: zipfile.ZipFile, name: str) -> list[tuple[zipfile.ZipInfo, PurePosixPath]]:

@@ -20,8 +20,9 @@ from pathlib import Path
 from typing import Any
 
 from bemt.cache import cache_dir
-from bemt.data.archive import download, sha256, unpacked
+from bemt.data.archive import download, unpacked
 from bemt.errors import Fault, InputError
+from bemt.tables import file_hash, json_text
 
 __all__ = ["RECORD", "SCHEMA", "URLS", "get", "run"]
 
@@ -49,7 +50,7 @@ def _files(folder: Path) -> dict[str, str]:
     """Start of the hash of every file below a folder but the record, by its path there."""
     found = (p for p in sorted(folder.rglob("*")) if p.is_symlink() or not p.is_dir())
     names = {p.relative_to(folder).as_posix(): p for p in found}
-    return {n: "link" if p.is_symlink() else sha256(p)[:16] for n, p in names.items() if n != RECORD}
+    return {n: "link" if p.is_symlink() else file_hash(p)[:16] for n, p in names.items() if n != RECORD}
 
 
 def _check_own(folder: Path, known: dict[str, Any]) -> None:
@@ -101,7 +102,6 @@ def get(
         is as before then.
     """
     from bemt.importers.uiuc import scan_folder
-    from bemt.tables import json_text
 
     if source is not None and url is not None:
         raise InputError(Fault("", "--url", url, "none beside --from, which fetches nothing", "Give one of the two"))
@@ -122,7 +122,7 @@ def get(
         archive = source
         if not archive.is_file():
             raise InputError(Fault(os.fspath(source), "", "no file", "a zip archive", "Check the path"))
-        digest = sha256(archive)
+        digest = file_hash(archive)
     try:
         with unpacked(archive, folder) as fresh:
             scan = scan_folder(fresh)
@@ -179,8 +179,6 @@ def run(args: argparse.Namespace) -> int:
     InputError
         As `get`; also without a cache and ``--dir``.
     """
-    from bemt.tables import json_text
-
     cache = cache_dir()
     if args.dir is None and cache is None:
         raise InputError(Fault("BEMT_CACHE", "", "switched off", "a cache folder, or --dir DIR"))

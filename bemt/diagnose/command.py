@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from bemt import effects, evaluate
 from bemt.air import Air
-from bemt.case import find_cases, load_case
+from bemt.case import find_cases, load_case, repeated_names
 from bemt.diagnose import record as records
 from bemt.errors import Fault, InputError
 from bemt.reduction.channels import view
@@ -230,11 +230,9 @@ def _targets(out: Path, cases: Sequence[Case]) -> dict[Path, Case]:
     own = list({c.path.resolve(): c for c in cases}.values())
     if len(own) == 1:
         return {out: own[0]}
-    names = [c.name for c in own]
-    twice = [Fault(str(c.path), "name", repr(c.name), "a name that no other case has", "--out makes a folder of each")
-             for k, c in enumerate(own) if c.name in names[:k]]  # fmt: skip
-    if twice:
-        raise InputError(twice)
+    repeated = repeated_names(dict(enumerate(own)))
+    if repeated:
+        raise InputError(list(repeated.values()))
     return {out / c.name: c for c in own}
 
 

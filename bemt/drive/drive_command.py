@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from bemt.case import load_case
+from bemt.case.schema import AIRSPEED
 from bemt.drive import drive_file, mission, outputs, picture, rotor_table, validate_command
 from bemt.drive.drive_model import EFFECTS, Drive, Steady
 from bemt.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
@@ -21,8 +22,6 @@ __all__ = ["run"]
 COLUMNS = {"pulse_us": "pulse [us]", "rpm": "rpm", "thrust_N": "T [N]", "battery_A": "I [A]", "voltage_V": "V [V]",
            "power_W": "P [W]", "efficiency": "eta"}  # fmt: skip
 RESULTS = ("drive.json", "drive.csv", "drive.png")
-AIRSPEED = (-100.0, 300.0)
-"""Airspeeds that are answered, those that a case may have. [m/s]"""
 LOW, HIGH = 0.2, 0.8
 """Shares of full thrust of the step."""
 
@@ -50,9 +49,9 @@ def run(args: argparse.Namespace) -> int:
     if not args.case:
         raise InputError(Fault("", "CASE", "nothing", "a case file or its folder", "Or --validate DIR"))
     wrong = [Fault("", "--off", repr(n), f"one of {', '.join(EFFECTS)}") for n in args.off if n not in EFFECTS]
-    if not AIRSPEED[0] <= args.airspeed <= AIRSPEED[1]:
-        hint = "" if not AIRSPEED[1] < args.airspeed < 3.6 * AIRSPEED[1] else "km/h? Divide by 3.6"
-        expected = f"a number from {AIRSPEED[0]:g} to {AIRSPEED[1]:g} m/s"
+    if not AIRSPEED.low <= args.airspeed <= AIRSPEED.high:
+        hint = "" if not AIRSPEED.high < args.airspeed < 3.6 * AIRSPEED.high else "km/h? Divide by 3.6"
+        expected = f"a number from {AIRSPEED.low:g} to {AIRSPEED.high:g} m/s"
         wrong.append(Fault("", "--airspeed", f"{args.airspeed:g}", expected, hint))
     path = Path(args.case)
     path = path / "case.toml" if path.is_dir() else path

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import argparse
-import hashlib
 import json
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from bemt.case import Case, find_cases, load_case
+from bemt.case import Case, find_cases, load_case, repeated_names
 from bemt.errors import EXIT_INPUT, EXIT_OK, Fault, InputError
 from bemt.export.openfoam import Run, check_run, settings_of, write_openfoam
 from bemt.schema import shown
-from bemt.tables import json_text, number_text, text_table, write_atomic
+from bemt.tables import file_hash, json_text, number_text, text_table, write_atomic
 from geometry.common import GeometryError
 from geometry.export import MANIFEST, SCHEMA, export
 from geometry.mesh import Options
@@ -104,7 +103,7 @@ def _remove(out: Path, files: Mapping[str, str]) -> None:
         path = (home / name).parent.resolve() / Path(name).name
         if not path.is_relative_to(home) or path.is_symlink() or not path.is_file():
             continue  # a manifest is a file that anybody may have edited
-        if hashlib.sha256(path.read_bytes()).hexdigest() != digest:
+        if file_hash(path) != digest:
             continue
         path.unlink()
         for folder in path.parents:
@@ -146,7 +145,9 @@ def run(args: argparse.Namespace) -> int:
             print(error, file=sys.stderr)
             code = EXIT_INPUT
     if len(paths) > 1:
-        _refuse_repeats(cases)
+        repeated = repeated_names(dict(enumerate(cases)))
+        if repeated:  # they would write into one folder
+            raise InputError(list(repeated.values()))
     manifests = []
     for case in cases:
         out = Path(args.out) / case.name if len(paths) > 1 else Path(args.out)
@@ -173,20 +174,6 @@ def _unused(flow: Run) -> list[Fault]:
             option, got = (f"--{value}", "the option") if key == "solver" else (option, shown(value).strip("'"))
             faults.append(Fault("", option, got, "nothing without the format openfoam", "Add --format openfoam"))
     return faults
-
-
-def _refuse_repeats(cases: Sequence[Case]) -> None:
-    """Two cases of one name would write into one folder."""
-    first: dict[str, str] = {}
-    faults = []
-    for case in cases:
-        file = case.path.as_posix()
-        # folders that differ in case alone are one folder on some disks
-        earlier = first.setdefault(case.name.casefold(), file)
-        if earlier != file:
-            faults.append(Fault(file, "name", f"{case.name!r} as in {earlier}", "a name of its own"))
-    if faults:
-        raise InputError(faults)
 
 
 def _text(manifest: dict[str, Any], out: Path) -> str:

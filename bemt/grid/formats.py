@@ -6,7 +6,6 @@ brings. The bytes of a block depend on its numbers alone, and joining reads one 
 
 from __future__ import annotations
 
-import hashlib
 import importlib.util
 import shutil
 from collections.abc import Sequence
@@ -18,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.errors import Fault, InputError
-from bemt.tables import csv_block
+from bemt.tables import csv_block, file_hash
 
-__all__ = ["FORMATS", "Block", "encode", "file_hash", "join", "require_extra"]
+__all__ = ["FORMATS", "Block", "encode", "join", "require_extra"]
 
 FORMATS = ("csv", "parquet")
 ROW_GROUP = 50_000
@@ -111,23 +110,6 @@ def _options(axes: list[str], columns: list[str]) -> dict[str, Any]:
     """How Parquet is written: an axis takes few values; the bytes of real numbers compress better sorted by place."""
     encoding = dict.fromkeys(columns, "BYTE_STREAM_SPLIT")
     return {"compression": "zstd", "use_dictionary": axes, "column_encoding": encoding}
-
-
-def file_hash(path: Path) -> str:
-    """SHA-256 of a file of any size.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    str
-        Hexadecimal.
-    """
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def join(target: Path, names: Sequence[str], axes: Sequence[str], parts: Sequence[Path], form: str) -> str:

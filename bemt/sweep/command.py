@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 import bemt
-from bemt.case import Case, check_name, find_cases, load_case
+from bemt.case import Case, check_name, find_cases, load_case, repeated_names
 from bemt.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, EXIT_UNCONVERGED, Fault, InputError, system_fault
 from bemt.grid.formats import FORMATS, require_extra
 from bemt.grid.run import Engine, run_grid
@@ -333,17 +333,10 @@ def _read(files: Sequence[Path], out: Path | None) -> tuple[dict[int, Ready], di
 
 def _unfit_names(cases: Mapping[int, Case], kept: bool) -> dict[int, Fault]:
     """Cases that would write where another one or the sweep itself does."""
-    first: dict[str, str] = {}
-    faults = {}
-    for i, case in cases.items():
-        file = case.path.as_posix()
-        # folders that differ in case alone are one folder on some disks
-        earlier = first.setdefault(case.name.casefold(), file)
-        if earlier != file:
-            faults[i] = Fault(file, "name", f"{case.name!r} as in {earlier}", "a name of its own")
-        elif kept and case.name.casefold() in store.OVERVIEW:
-            faults[i] = Fault(file, "name", repr(case.name), "another name", "The sweep writes a file of that name")
-    return faults
+    taken = "The sweep writes a file of that name"
+    ours = {i: Fault(case.path.as_posix(), "name", repr(case.name), "another name", taken)
+            for i, case in cases.items() if kept and case.name.casefold() in store.OVERVIEW}  # fmt: skip
+    return ours | repeated_names(cases)
 
 
 def _off_tolerance(result: Mapping[str, Any], tolerance: float) -> list[str]:
