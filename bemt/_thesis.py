@@ -18,7 +18,7 @@ import numpy as np
 
 from bemt import coefficients as co
 from bemt import empirical as k
-from bemt.units import G0, INCH, KGF, LBF, SLIP_FACTORS
+from bemt.base.units import G0, INCH, KGF, LBF, SLIP_FACTORS
 
 REPRODUCED = "reproduced"
 ROUNDING = "reproduced within rounding"

@@ -19,8 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from bemt.errors import Fault, InputError
-from bemt.units import G0, ZERO_CELSIUS
+from bemt.base.errors import Fault, InputError
+from bemt.base.units import G0, ZERO_CELSIUS
 
 R_DRY = 287.05287
 """Specific gas constant of dry air in the standard atmosphere [J/(kg K)]."""

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bemt.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError
 
 __all__ = ["Average", "keep_last", "relation", "revolution_average", "steady_average", "time_steps"]
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import coefficients as co
-from bemt.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError
 
 if TYPE_CHECKING:
     from bemt.solver import Prepared

@@ -15,7 +15,7 @@ from contextlib import suppress
 from typing import Any
 
 from bemt import __version__
-from bemt.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError, system_fault
+from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError, system_fault
 
 __all__ = ["build_parser", "main"]
 

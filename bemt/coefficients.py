@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bemt.units import KGF
+from bemt.base.units import KGF
 
 CT_PER_ROTOR = math.pi**3 / 4.0
 """CT / CT_rotor [-]: A (Omega R)^2 = (pi^3/4) n^2 D^4."""

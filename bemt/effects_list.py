@@ -9,9 +9,9 @@ import re
 import textwrap
 from typing import TYPE_CHECKING, Any
 
+from bemt.base.errors import EXIT_OK
+from bemt.base.tables import json_text, text_table
 from bemt.effects import catalogue
-from bemt.errors import EXIT_OK
-from bemt.tables import json_text, text_table
 
 if TYPE_CHECKING:
     from bemt.effects import Effect

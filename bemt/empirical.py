@@ -32,8 +32,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from bemt import coefficients as co
 from bemt.air import Air
-from bemt.errors import Fault, InputError
-from bemt.units import KGF
+from bemt.base.errors import Fault, InputError
+from bemt.base.units import KGF
 
 Array = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from bemt import coefficients as co
 from bemt import duct as duct_model
 from bemt import effects, empirical, forward, polars, section_rule, solver
-from bemt.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError
 
 if TYPE_CHECKING:
     from bemt.air import Air

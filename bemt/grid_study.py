@@ -26,7 +26,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from bemt.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError
 
 __all__ = ["FS_THREE", "FS_TWO", "GridStudy", "cell_size", "grid_study", "ratios"]
 

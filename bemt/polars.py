@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bemt import cache
+from bemt.base import cache
 
 __all__ = [
     "ALPHA_COARSE_STEP", "ALPHA_FINE_HI", "ALPHA_FINE_LO", "ALPHA_FINE_STEP", "ALPHA_GRID", "DEFAULT_RE", "DLOG_RE",

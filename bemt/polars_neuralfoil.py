@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import cache
+from bemt.base import cache
 from bemt.polars import ALPHA_GRID, DEFAULT_RE, Polar, first_stall
 from bemt.post_stall import METHODS, extend, viterna_cd_max
 

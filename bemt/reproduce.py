@@ -22,8 +22,8 @@ from bemt import _thesis as th
 from bemt import coefficients as co
 from bemt import empirical as k
 from bemt.air import Air
-from bemt.data.folders import find_data
-from bemt.units import INCH, KGF, RPM
+from bemt.base.folders import find_data
+from bemt.base.units import INCH, KGF, RPM
 
 SCHEMA = "bemt.reproduce/1"
 WIDTH = 100
@@ -31,7 +31,7 @@ UIUC_POINTS, UIUC_PROPELLERS = 4122, 248
 
 
 def find_uiuc() -> Path | None:
-    """Folder of the UIUC data, see :func:`bemt.data.folders.find_data`.
+    """Folder of the UIUC data, see :func:`bemt.base.folders.find_data`.
 
     Returns
     -------

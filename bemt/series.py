@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bemt import coefficients as co
-from bemt import units
-from bemt.errors import Fault, InputError
+from bemt.base import units
+from bemt.base.errors import Fault, InputError
 
 __all__ = ["DIMENSIONLESS", "KINDS", "Series", "concat"]
 

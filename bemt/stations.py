@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from bemt.errors import EXIT_OK, Fault, InputError
-from bemt.tables import json_text, number_text, text_table, write_atomic
+from bemt.base.errors import EXIT_OK, Fault, InputError
+from bemt.base.tables import json_text, number_text, text_table, write_atomic
 from geometry.common import GeometryError
 from geometry.export import UNITS, read_solid
 from geometry.slicing import Found, find_rotor

@@ -47,7 +47,7 @@ def shared_data() -> Path:
 @pytest.fixture(scope="module")
 def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """Cache folder of one test file, empty at first, on the disk and in memory."""
-    from bemt import cache
+    from bemt.base import cache
 
     folder = tmp_path_factory.mktemp("cache")
     with pytest.MonkeyPatch.context() as patch:

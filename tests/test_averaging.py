@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bemt.averaging import keep_last, relation, revolution_average, steady_average, time_steps
-from bemt.errors import InputError
+from bemt.base.errors import InputError
 
 
 @settings(max_examples=60, deadline=None)

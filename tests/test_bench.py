@@ -9,7 +9,7 @@ import pytest
 
 from bemt import bench, benchwork, cli, solver
 from bemt.air import Air
-from bemt.errors import InputError
+from bemt.base.errors import InputError
 
 
 @pytest.fixture(scope="module")

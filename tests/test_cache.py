@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt import cache, polars_neuralfoil
+from bemt import polars_neuralfoil
+from bemt.base import cache
 from bemt.polars import ALPHA_GRID, Polar
 from bemt.polars_neuralfoil import neuralfoil_polar
 from geometry.airfoil import naca

@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bemt.base.errors import InputError
 from bemt.cfd.command import run_campaign
 from bemt.cfd.record import COLUMNS, Record, grid_studies, grid_uncertainty
 from bemt.cfd.schema import load_campaign
 from bemt.cfd.start import State, splice
 from bemt.cfd.worker import point_key, radial_of
 from bemt.cli import main
-from bemt.errors import InputError
 from bemt.export.openfoam import settings_of
 
 HEAD = 'schema = "bemt.cfd/1"\nname = "t"\ncase = "{case}"\n'

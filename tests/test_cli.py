@@ -14,7 +14,7 @@ from types import SimpleNamespace
 import pytest
 
 from bemt import __version__, cli
-from bemt.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError
 
 ROOT = Path(__file__).resolve().parents[1]
 MALFORMED = ROOT / "tests" / "malformed"

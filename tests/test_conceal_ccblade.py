@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bemt.base.errors import InputError
 from bemt.conceal import draw, rigs, truth_ccblade, truth_world
 from bemt.conceal.items import Bench
 from bemt.conceal.stand import Stand
-from bemt.errors import InputError
 
 
 @pytest.fixture(scope="module")

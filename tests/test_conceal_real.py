@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bemt.base.errors import InputError
 from bemt.case import load_case
 from bemt.conceal import prove, real, score
 from bemt.conceal.items import Item
 from bemt.effects import catalogue
-from bemt.errors import InputError
 from bemt.importing import import_file
 
 

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bemt.base.errors import InputError
 from bemt.case import load_case
 from bemt.conceal import draw, items, proof_text, prove, resolve, rigs, score, seal
-from bemt.errors import InputError
 from bemt.importing import import_file
 
 TINY = draw.Size(

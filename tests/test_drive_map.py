@@ -15,10 +15,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bemt import importers
+from bemt.base.errors import InputError
 from bemt.cli import main
 from bemt.drive import bench_map, map_export, map_scatter
 from bemt.drive.map_points import MapPoints, join, points
-from bemt.errors import InputError
 
 
 def made(pulse: np.ndarray, volts: np.ndarray | float = 12.0, noise: float = 0.0, seed: int = 0) -> MapPoints:

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from bemt import effects
+from bemt.base.errors import InputError
 from bemt.cli import main
 from bemt.drive import identify, mission, rotor_table, transient, validate_command
 from bemt.drive.drive_model import EFFECTS, Battery, Drive, Esc, Motor
 from bemt.drive.map_points import MapPoints
-from bemt.errors import InputError
 
 FLAT = dict(soc_table=(0.0, 1.0), ocv_V=(3.7, 3.7))
 PULSE = np.linspace(1050.0, 2000.0, 20)

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bemt.base.errors import InputError
 from bemt.cli import main
 from bemt.drive import motor_constant as mc
 from bemt.drive import motor_errors, motor_file, motor_generate
-from bemt.errors import InputError
 
 S32, S3 = math.sqrt(1.5), math.sqrt(3.0)
 

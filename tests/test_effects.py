@@ -18,9 +18,9 @@ import pytest
 from bemt import duct as duct_model
 from bemt import effects, evaluate, forward
 from bemt.air import Air
+from bemt.base.errors import InputError
 from bemt.case import load_case
 from bemt.effects.base import Effect, Flow, Parameter, Reading
-from bemt.errors import InputError
 from bemt.polars import Polar
 from bemt.post_stall import SectionTable, from_tables
 from geometry.airfoil import naca4

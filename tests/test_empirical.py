@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from bemt import empirical as k
 from bemt.air import Air
-from bemt.errors import InputError
+from bemt.base.errors import InputError
 
 INCH, KGF = 0.0254, 9.80665
 lengths = st.floats(0.02, 3.0)

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from bemt import cli, empirical
+from bemt.base.errors import InputError
+from bemt.base.units import INCH
 from bemt.calibrate.estimate import estimate
-from bemt.errors import InputError
-from bemt.units import INCH
 
 
 def told(capsys: pytest.CaptureFixture[str], *words: str) -> dict[str, object]:

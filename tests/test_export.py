@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bemt.base.errors import InputError
 from bemt.case import load_case
 from bemt.cli import main
-from bemt.errors import InputError
 from bemt.export.command import export_case
 from bemt.export.openfoam import Run, settings_of
 from geometry import export as module

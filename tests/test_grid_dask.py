@@ -18,14 +18,14 @@ import numpy as np
 import pytest
 from test_sweep import make_case, read_grid, tree
 
+from bemt.base.errors import InputError
+from bemt.base.tables import json_text
 from bemt.case import load_case
 from bemt.cli import main
-from bemt.errors import InputError
 from bemt.evaluate import evaluate, prepare
 from bemt.grid import run as grid_module
 from bemt.grid.run import Grid, Solver
 from bemt.sweep import sweep
-from bemt.tables import json_text
 
 needs_dask = pytest.mark.skipif(
     any(__import__("importlib.util").util.find_spec(name) is None for name in ("distributed", "pyarrow")),

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from bemt.errors import InputError
+from bemt.base.errors import InputError
 from bemt.grid_study import grid_study, ratios
 
 

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bemt.base.errors import InputError
 from bemt.cli import main
-from bemt.errors import InputError
 from bemt.importing import document, import_file
 from bemt.importing.choice import Choice
 

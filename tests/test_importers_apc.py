@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bemt import importers, units
-from bemt.errors import InputError
+from bemt import importers
+from bemt.base import units
+from bemt.base.errors import InputError
 from bemt.importers import apc
 from bemt.series import Series
 

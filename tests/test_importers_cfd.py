@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from bemt import importers
-from bemt.errors import InputError
+from bemt.base.errors import InputError
 from bemt.imported import Imported
 from bemt.importers import _cfd
 from bemt.importing import document, import_file

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt.errors import InputError
+from bemt.base.errors import InputError
 from bemt.imported import Imported
 from bemt.importers._headings import heading
 from bemt.importing import import_file

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from bemt import importers
-from bemt.errors import InputError
+from bemt.base.errors import InputError
 from bemt.importers import polar_aerodyn, polar_c81, polar_csv, polar_xfoil
 from bemt.polars import ALPHA_GRID, DEFAULT_RE, Polar
 

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bemt import importers, units
-from bemt.errors import InputError
+from bemt import importers
+from bemt.base import units
+from bemt.base.errors import InputError
 from bemt.imported import Imported
 from bemt.importers import generic_csv, jmajew, pybemt_ini, rcbenchmark
 from bemt.importers._headings import heading

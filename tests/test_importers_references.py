@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bemt import importers
-from bemt.errors import InputError
+from bemt.base.errors import InputError
 from bemt.importers import references
 
 HEAD = "quantity,value,unit,uncertainty,kind,source,remark,rpm,airspeed_m_s,density_kg_m3\n"

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bemt import importers
-from bemt.errors import InputError
+from bemt.base.errors import InputError
 from bemt.importers import uiuc
 from bemt.importers._uiuc_names import parse_file_name
 

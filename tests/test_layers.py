@@ -52,10 +52,10 @@ FLOOR_OF_ROOMS: tuple[tuple[str, ...], ...] = (
 MAY: dict[str, set[str]] = {
     "bemt.cli": {"print", "files", "environment"},
     "bemt.case|bemt.case.*": {"files"},
-    "bemt.schema": {"files"},
+    "bemt.base.toml": {"files"},
     "bemt.importers|bemt.importers.*": {"files"},
-    "bemt.cache": {"files", "environment"},
-    "bemt.tables": {"files"},
+    "bemt.base.cache": {"files", "environment"},
+    "bemt.base.tables": {"files"},
     "bemt.grid.*": {"files"},
     "bemt.report|bemt.report.*": {"files", "print"},
     # subcommands: their run() prints
@@ -71,7 +71,7 @@ MAY: dict[str, set[str]] = {
     "bemt.calibrate.gather": {"files"},
     "bemt.data.command": {"files", "print"},
     "bemt.data.archive": {"files"},
-    "bemt.data.folders": {"environment"},
+    "bemt.base.folders": {"environment"},
     "bemt.bench*|bemt._bench*": {"files", "print", "clock", "environment"},
     "bemt.export.*": {"files", "print"},
     "bemt.cfd.*": {"files", "print", "clock", "environment"},
@@ -99,7 +99,7 @@ HEAVY = {
     "OCP", "aerosandbox", "cadquery", "casadi", "dask", "distributed", "manifold3d", "matplotlib", "neuralfoil",
     "pandas", "pyarrow", "pyvista", "scipy", "sklearn", "trimesh", "vtk", "vtkmodules", "wisdem",
 }  # fmt: skip
-LIGHT = {"bemt", "bemt.__main__", "bemt.cli", "bemt.errors"}  # imported by --help: standard library only
+LIGHT = {"bemt", "bemt.__main__", "bemt.cli", "bemt.base.errors"}  # imported by --help: standard library only
 
 FILE_CALLS = {
     "open", "read_text", "write_text", "read_bytes", "write_bytes", "mkdir", "unlink", "rename", "touch", "iterdir",
@@ -291,12 +291,12 @@ def test_the_tree_keeps_the_rules(tree: dict[str, str]) -> None:
 @pytest.mark.parametrize(
     ("module", "line", "complaint"),
     [
-        ("geometry.blade", "from bemt.units import INCH", "geometry knows nothing of bemt, got bemt.units"),
-        ("geometry.blade", "def f():\n    import bemt.units", "geometry knows nothing of bemt, got bemt.units"),
+        ("geometry.blade", "from bemt.base.units import INCH", "geometry knows nothing of bemt, got bemt.base.units"),
+        ("geometry.blade", "def f():\n    import bemt.base.units", "geometry knows nothing of bemt, got bemt.base.units"),
         ("geometry.blade", "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from bemt.air import Air",
          "geometry knows nothing of bemt, got bemt.air"),
-        ("bemt.units", "from bemt.air import Air", "bemt.air is not below it in the flow"),
-        ("bemt.units", "from bemt import solver", "bemt.solver is not below it in the flow"),
+        ("bemt.base.units", "from bemt.air import Air", "bemt.air is not below it in the flow"),
+        ("bemt.base.units", "from bemt import solver", "bemt.solver is not below it in the flow"),
         ("bemt.polars", "def f():\n    from bemt.solver import solve", "bemt.solver is not below it in the flow"),
         ("bemt.solver", "import bemt.evaluate", "bemt.evaluate is not below it in the flow"),
         ("bemt.effects.swirl", "import bemt.effects.tip_loss", "an effect is one file, got bemt.effects.tip_loss"),
@@ -325,13 +325,13 @@ def test_the_tree_keeps_the_rules(tree: dict[str, str]) -> None:
         ("bemt.duct", "from numba import njit", "numba at the top; import it inside the function that needs it"),
         ("bemt.cli", "import numpy as np", "numpy; --help must import the standard library only"),
         ("bemt.cli", "import bemt.sweep", "bemt.sweep; --help must import the standard library only"),
-        ("bemt.errors", "import numpy", "numpy; --help must import the standard library only"),
+        ("bemt.base.errors", "import numpy", "numpy; --help must import the standard library only"),
         ("bemt.conceal.truth", "import bemt.solver", "must not see bemt.solver"),
         ("bemt.conceal.truth_world", "def f():\n    from bemt.effects import standard", "must not see bemt.effects"),
         ("bemt.conceal.truth_duct", "from bemt import duct", "must not see bemt.duct"),
         ("bemt.conceal.stand", "from bemt import sweep", "must not see bemt.evaluate through bemt.sweep"),
         ("bemt.conceal.truth_section", "from bemt import case", "must not see bemt.section_rule through bemt.case"),
-        ("bemt.tables", "def f():\n    import bemt.polars", "bemt.polars is not below it in the flow"),
+        ("bemt.base.tables", "def f():\n    import bemt.polars", "bemt.polars is not below it in the flow"),
     ],
 )  # fmt: skip
 def test_a_planted_fault_is_found(tree: dict[str, str], module: str, line: str, complaint: str) -> None:
@@ -345,7 +345,7 @@ def test_a_planted_fault_is_found(tree: dict[str, str], module: str, line: str, 
     ("package", "line", "complaint"),
     [
         ("bemt.data", "from bemt.data import command",
-         "bemt.data.folders:1: bemt.data.command is not below it in the flow"),
+         "bemt.base.folders:1: bemt.data.command is not below it in the flow"),
         ("bemt.reduction", "import bemt.audit", "bemt.reduction.plateaus:1: bemt.audit is not below it in the flow"),
         ("bemt.conceal", "from bemt import solver", "bemt.conceal.truth:1: must not see bemt.solver"),
     ],

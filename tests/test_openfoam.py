@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bemt.base.errors import InputError
 from bemt.case import load_case
 from bemt.cfd.worker import history_of
 from bemt.cli import main
-from bemt.errors import InputError
 from bemt.export.openfoam import Run, settings_of, write_openfoam
 from bemt.openfoam import Body, Settings, Sweep, case_files
 from geometry.mesh import Options

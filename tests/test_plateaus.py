@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bemt import importers
-from bemt.errors import InputError
+from bemt.base.errors import InputError
 from bemt.reduction.plateaus import Plateaus, Settings, find, standard_error
 
 RATE = 50.0

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from bemt.errors import InputError
+from bemt.base.errors import InputError
 from bemt.importing import import_file
 from bemt.importing.recording import findings, is_recording, points_text, reduction_document, reduction_of
 from bemt.reduction.channels import view

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt import units
-from bemt.errors import InputError
+from bemt.base import units
+from bemt.base.errors import InputError
 from bemt.imported import Channel, Imported
 from bemt.importing import import_file
 from bemt.sanity.check import Finding, check

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bemt import coefficients as co
-from bemt.errors import InputError
+from bemt.base.errors import InputError
 from bemt.series import Series, concat
 
 

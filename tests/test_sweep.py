@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bemt.base.tables import csv_block, json_text, number_text, plain
 from bemt.case import load_case
 from bemt.evaluate import evaluate, prepare
 from bemt.grid import run as grid_module
 from bemt.sweep import command as sweep_module
 from bemt.sweep import fingerprint, sweep
 from bemt.sweep.case import solve_case
-from bemt.tables import csv_block, json_text, number_text, plain
 
 ROOT = Path(__file__).resolve().parents[1]
 KGF = 9.80665

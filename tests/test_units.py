@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bemt import units as u
-from bemt.errors import InputError
+from bemt.base import units as u
+from bemt.base.errors import InputError
 
 
 # NIST SP 811 (2008), appendix B.8: factors as printed there.

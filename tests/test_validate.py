@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from bemt import effects, section_rule
-from bemt.errors import InputError
+from bemt.base.errors import InputError
+from bemt.base.tables import json_text
 from bemt.importers import uiuc
-from bemt.tables import json_text
 from bemt.validate import command, match, points, text
 
 R_R = np.linspace(0.15, 1.0, 18)

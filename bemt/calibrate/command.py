@@ -23,14 +23,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.errors import Fault, InputError
+from bemt.base.folders import find_data
 from bemt.calibrate import compact, refit, score
 from bemt.calibrate import fit as fitting
 from bemt.calibrate.gather import files, load
 from bemt.calibrate.limit import limit
 from bemt.calibrate.points import Points
 from bemt.calibrate.text import text
-from bemt.data.folders import find_data
-from bemt.errors import Fault, InputError
 
 Array = NDArray[np.float64]
 
@@ -221,7 +221,7 @@ def run(args: argparse.Namespace) -> int:
     InputError
         For files that are missing, give no point, or are given twice or both to fit and to test.
     """
-    from bemt.tables import json_text, write_atomic
+    from bemt.base.tables import json_text, write_atomic
 
     given = list(args.files)
     if not given and find_data("uiuc") is None:

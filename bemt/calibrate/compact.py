@@ -49,8 +49,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bemt import coefficients as co
-from bemt.errors import Fault, InputError
-from bemt.units import INCH
+from bemt.base.errors import Fault, InputError
+from bemt.base.units import INCH
 
 Array = NDArray[np.float64]
 

@@ -9,6 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from bemt import coefficients as co
 from bemt.air import Air
+from bemt.base.errors import Fault, InputError
+from bemt.base.units import INCH, KGF
 from bemt.calibrate.compact import (
     BAND_X,
     BANDS,
@@ -24,8 +26,6 @@ from bemt.calibrate.compact import (
     effective_pitch,
     find_series,
 )  # fmt: skip
-from bemt.errors import Fault, InputError
-from bemt.units import INCH, KGF
 
 Array = NDArray[np.float64]
 UNITS = {"mm": 1e-3, "in": INCH, "cm": 1e-2, "m": 1.0}

@@ -32,7 +32,7 @@ def draw(sets: Mapping[str, tuple[Points, Mapping[str, Array]]], path: Path) -> 
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    from bemt.tables import write_atomic
+    from bemt.base.tables import write_atomic
 
     figure = Figure(figsize=(10.0, 3.9 * len(sets)), layout="constrained")
     FigureCanvasAgg(figure)

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import empirical
+from bemt.base.errors import Fault, InputError
 from bemt.calibrate.points import Points
-from bemt.errors import Fault, InputError
 
 Array = NDArray[np.float64]
 

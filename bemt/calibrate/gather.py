@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 from bemt import coefficients as co
 from bemt import importers
 from bemt.air import Air, isa_pressure
+from bemt.base.errors import Fault, InputError
+from bemt.base.units import INCH, ZERO_CELSIUS
 from bemt.calibrate.points import Points, Propeller, Rows, join
-from bemt.errors import Fault, InputError
 from bemt.imported import Imported
 from bemt.importers import apc, uiuc
 from bemt.importers._uiuc_names import parse_file_name
-from bemt.units import INCH, ZERO_CELSIUS
 
 __all__ = ["LAW_M_TIP", "RHO", "files", "load"]
 

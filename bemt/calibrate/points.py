@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from bemt import coefficients as co
 from bemt.air import Air
+from bemt.base.errors import Fault, InputError
 from bemt.calibrate import compact
-from bemt.errors import Fault, InputError
 
 Array = NDArray[np.float64]
 

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.units import INCH
 from bemt.calibrate import compact
 from bemt.calibrate.points import Points
 from bemt.calibrate.refit import Fitted, has, predict
-from bemt.units import INCH
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

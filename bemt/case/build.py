@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from bemt.air import Air, isa_pressure
+from bemt.base.errors import Fault, InputError
+from bemt.base.toml import Collector
 from bemt.case.rules import check_shape
-from bemt.errors import Fault, InputError
-from bemt.schema import Collector
 from geometry.airfoil import Airfoil, naca, naca4
 from geometry.airfoil_file import parse_dat
 from geometry.blade import Blade, from_stations

@@ -18,11 +18,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.errors import Fault, InputError
+from bemt.base.toml import Collector, load_toml
 from bemt.case.build import build_air, build_duct, build_rotor, check_build
 from bemt.case.rules import check_case
 from bemt.case.schema import AXES, DEFAULTS, GROUPS, INCH
-from bemt.errors import Fault, InputError
-from bemt.schema import Collector, load_toml
 
 if TYPE_CHECKING:
     from bemt.air import Air

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from bemt.base.toml import Collector, Key, check_table, check_value, shown
 from bemt.case.schema import ASSUMPTION, GROUPS, INCH, POLAR, SCHEMA, TEMPERATURE
-from bemt.schema import Collector, Key, check_table, check_value, shown
 
 __all__ = ["check_case", "check_shape"]
 

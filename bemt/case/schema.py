@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from bemt.schema import Key
+from bemt.base.toml import Key
 from bemt.section_rule import DRAG_LEVEL, N_CRIT
 from geometry.laws import CHORD_LAWS as GEOMETRY_CHORD_LAWS
 

@@ -12,11 +12,11 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from bemt.base.errors import EXIT_INPUT, EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
+from bemt.base.tables import json_text, number_text, remove_stale, text_table
 from bemt.cfd.record import Record
 from bemt.cfd.schema import Campaign, load_campaign
 from bemt.cfd.worker import Worker, point_key
-from bemt.errors import EXIT_INPUT, EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
-from bemt.tables import json_text, number_text, remove_stale, text_table
 
 if TYPE_CHECKING:
     from bemt.openfoam import Settings

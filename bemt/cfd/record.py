@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 
 from bemt import __version__
+from bemt.base.errors import Fault, InputError
+from bemt.base.tables import csv_text, plain, write_atomic
 from bemt.cfd.schema import Campaign
 from bemt.cfd.worker import DRIFT_LIMIT, SCATTER_LIMIT, Outcome
-from bemt.errors import Fault, InputError
 from bemt.grid_study import grid_study, ratios
 from bemt.importers import number
-from bemt.tables import csv_text, plain, write_atomic
 
 __all__ = ["COLUMNS", "Record", "grid_studies", "grid_uncertainty"]
 

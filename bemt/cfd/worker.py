@@ -20,13 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.averaging import steady_average
+from bemt.base.errors import InputError
+from bemt.base.tables import write_atomic
 from bemt.cfd.schema import Point
 from bemt.cfd.start import State, splice
-from bemt.errors import InputError
 from bemt.export.openfoam import settings_of, write_openfoam
 from bemt.openfoam import Settings, case_files
 from bemt.openfoam.run import BINS
-from bemt.tables import write_atomic
 
 __all__ = ["DRIFT_LIMIT", "SCATTER_LIMIT", "Outcome", "Worker", "history_of", "point_key", "radial_of"]
 

@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from bemt.tables import text_table
+from bemt.base.tables import text_table
 
 __all__ = ["html", "text"]
 

@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 
 from bemt import __version__
+from bemt.base.errors import EXIT_OK, Fault, InputError
+from bemt.base.tables import json_text, write_atomic
 from bemt.conceal import draw, items, proof_text, real, resolve, score, seal
-from bemt.errors import EXIT_OK, Fault, InputError
-from bemt.tables import json_text, write_atomic
 
 __all__ = ["SCHEMA", "conceal", "diagnose_all", "diagnose_folder", "proof", "run"]
 

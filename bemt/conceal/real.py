@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import section_rule
+from bemt.base.errors import Fault, InputError
+from bemt.base.folders import data_roots, find_data
 from bemt.conceal.items import Item, recording_text
-from bemt.data.folders import data_roots, find_data
-from bemt.errors import Fault, InputError
 
 if TYPE_CHECKING:
     from bemt.importers.uiuc import UiucPropeller

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from bemt.errors import Fault, InputError
-from bemt.tables import json_text, write_atomic
+from bemt.base.errors import Fault, InputError
+from bemt.base.tables import json_text, write_atomic
 
 __all__ = ["KEY", "SEAL", "sha256", "seal", "unseal"]
 

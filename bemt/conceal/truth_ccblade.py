@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.errors import Fault, InputError
 from bemt.conceal import truth
 from bemt.conceal import truth_section as ts
-from bemt.errors import Fault, InputError
 
 __all__ = ["EXPRESSIBLE", "solve"]
 

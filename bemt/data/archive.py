@@ -14,8 +14,8 @@ from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from bemt.errors import Fault, InputError
-from bemt.tables import file_hash
+from bemt.base.errors import Fault, InputError
+from bemt.base.tables import file_hash
 
 __all__ = ["MAX_ARCHIVE", "MAX_FILES", "MAX_UNPACKED", "download", "unpacked"]
 

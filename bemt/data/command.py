@@ -19,10 +19,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from bemt.cache import cache_dir
+from bemt.base.cache import cache_dir
+from bemt.base.errors import Fault, InputError
+from bemt.base.tables import file_hash, json_text
 from bemt.data.archive import download, unpacked
-from bemt.errors import Fault, InputError
-from bemt.tables import file_hash, json_text
 
 __all__ = ["RECORD", "SCHEMA", "URLS", "get", "run"]
 

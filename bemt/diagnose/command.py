@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 
 from bemt import effects, evaluate
 from bemt.air import Air
+from bemt.base.errors import Fault, InputError
+from bemt.base.tables import json_text, write_atomic
+from bemt.base.units import ZERO_CELSIUS
 from bemt.case import find_cases, load_case, repeated_names
 from bemt.diagnose import record as records
-from bemt.errors import Fault, InputError
 from bemt.reduction.channels import view
 from bemt.sanity.check import check
 from bemt.series import Series
-from bemt.tables import json_text, write_atomic
-from bemt.units import ZERO_CELSIUS
 
 if TYPE_CHECKING:
     from bemt.case import Case

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bemt import __version__, effects
+from bemt.base.tables import text_table
 from bemt.diagnose import fit as fitting
 from bemt.diagnose import prior
 from bemt.diagnose.confusion import nearest
 from bemt.diagnose.locate import bare
 from bemt.diagnose.verdict import inclusion
-from bemt.tables import text_table
 
 if TYPE_CHECKING:
     from bemt.diagnose.chain import Diagnosis

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.tables import write_atomic
 from bemt.diagnose import figures_effects, figures_posterior
 from bemt.diagnose.canvas import BLACK, BLUE, DPI, GREEN, GREY, ORANGE, RED, STYLE, blank
 from bemt.diagnose.record import CHANNELS
-from bemt.tables import write_atomic
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

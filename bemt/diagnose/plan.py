@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import effects
+from bemt.base.tables import text_table
 from bemt.diagnose import confusion as look
 from bemt.diagnose import evidence, noise, prior, problem, signatures, verdict
 from bemt.diagnose import suggest as suggestion
 from bemt.diagnose.record import Record
-from bemt.tables import text_table
 
 if TYPE_CHECKING:
     from bemt.case import Case
@@ -93,8 +93,8 @@ def points(path: str, case: Case) -> Record:
     Record
         With loads that mean nothing.
     """
+    from bemt.base.errors import Fault, InputError
     from bemt.diagnose.record import from_series
-    from bemt.errors import Fault, InputError
     from bemt.importing import import_file
     from bemt.reduction.channels import view
     from bemt.series import Series

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import evaluate, forward
+from bemt.base.errors import Fault, InputError
 from bemt.diagnose.nuisance import nuisances
 from bemt.diagnose.record import CHANNELS, Record, concatenated, merged, owners
 from bemt.effects.base import Effect, Flow, Reading
-from bemt.errors import Fault, InputError
 from bemt.sanity.between import Level, odd_ones
 
 if TYPE_CHECKING:

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.air import Air
-from bemt.errors import Fault, InputError
-from bemt.units import ZERO_CELSIUS
+from bemt.base.errors import Fault, InputError
+from bemt.base.units import ZERO_CELSIUS
 
 if TYPE_CHECKING:
     from bemt.case import Case

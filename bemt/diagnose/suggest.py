@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from bemt import effects, forward
 from bemt.air import R_DRY
+from bemt.base.units import ZERO_CELSIUS
 from bemt.diagnose import noise
 from bemt.diagnose.nuisance import PRIORS
 from bemt.diagnose.problem import Part, Problem, assemble
 from bemt.diagnose.record import Record, air_of
 from bemt.diagnose.signatures import effect_of
-from bemt.units import ZERO_CELSIUS
 
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence

@@ -22,8 +22,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bemt.base.errors import Fault, InputError
 from bemt.drive.map_points import QUANTITIES, MapPoints
-from bemt.errors import Fault, InputError
 
 __all__ = ["BenchMap", "Curve", "HeldOut", "fit", "held_out", "misfit", "repeat_spread"]
 

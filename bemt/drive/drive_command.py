@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
+from bemt.base.tables import csv_text, json_text, number_text, text_table, write_atomic
 from bemt.case import load_case
 from bemt.case.schema import AIRSPEED
 from bemt.drive import drive_file, mission, outputs, picture, rotor_table, validate_command
 from bemt.drive.drive_model import EFFECTS, Drive, Steady
-from bemt.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
-from bemt.tables import csv_text, json_text, number_text, text_table, write_atomic
 
 __all__ = ["run"]
 

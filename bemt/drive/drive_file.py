@@ -54,10 +54,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from bemt.base.errors import InputError
+from bemt.base.toml import Collector, Key, check_table, load_toml
 from bemt.drive.drive_model import LIPO_SOC, LIPO_V, Battery, Drive, Esc, Motor
 from bemt.drive.rotor_table import RotorTable
-from bemt.errors import InputError
-from bemt.schema import Collector, Key, check_table, load_toml
 
 __all__ = ["SCHEMA", "DriveFile", "read"]
 

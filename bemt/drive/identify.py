@@ -16,11 +16,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bemt.base.errors import Fault, InputError
 from bemt.drive import transient
 from bemt.drive.drive_model import Battery, Drive, Esc, Motor
 from bemt.drive.map_points import MapPoints
 from bemt.drive.rotor_table import RotorTable, quadratic
-from bemt.errors import Fault, InputError
 
 __all__ = [
     "FREE",

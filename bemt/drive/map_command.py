@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from bemt import importers
+from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
+from bemt.base.tables import json_text, number_text, text_table, write_atomic
 from bemt.drive import bench_map, map_export, map_points, map_scatter, outputs, picture
-from bemt.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
 from bemt.imported import Imported
-from bemt.tables import json_text, number_text, text_table, write_atomic
 
 __all__ = ["run"]
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.tables import csv_text
 from bemt.drive.bench_map import BenchMap
-from bemt.tables import csv_text
 
 __all__ = ["c_header", "document", "table_csv", "tables"]
 

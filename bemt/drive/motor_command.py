@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
+from bemt.base.tables import csv_text, json_text, number_text, text_table, write_atomic
 from bemt.drive import motor_errors, motor_file, motor_generate, outputs, picture
 from bemt.drive.motor_constant import Line
-from bemt.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
-from bemt.tables import csv_text, json_text, number_text, text_table, write_atomic
 
 __all__ = ["document", "run", "verdict_text"]
 

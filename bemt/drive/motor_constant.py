@@ -28,7 +28,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bemt.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError
 
 __all__ = [
     "CURRENTS", "VOLTAGES", "Line", "TorqueLoop", "Waveform", "current_factor", "fit_waveform", "from_kv", "ke_to_kt",

@@ -55,11 +55,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import importers
+from bemt.base.errors import Fault, InputError
+from bemt.base.toml import Collector, Key, check_table, load_toml
 from bemt.drive import motor_constant as mc
 from bemt.drive.motor_errors import Measured
-from bemt.errors import Fault, InputError
 from bemt.imported import Imported
-from bemt.schema import Collector, Key, check_table, load_toml
 
 __all__ = ["SCHEMA", "MotorTrials", "read", "read_waveform"]
 

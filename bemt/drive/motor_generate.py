@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.errors import Fault, InputError
 from bemt.drive import motor_constant as mc
 from bemt.drive.motor_errors import FACTORS
-from bemt.errors import Fault, InputError
 
 __all__ = ["LABEL", "PLANTS", "Bench", "generate", "plants"]
 

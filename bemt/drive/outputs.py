@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from bemt.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError
 
 __all__ = ["check", "faults"]
 

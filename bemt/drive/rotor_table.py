@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from bemt import evaluate
 from bemt.air import Air
+from bemt.base.errors import Fault, InputError
 from bemt.case import Case
-from bemt.errors import Fault, InputError
 
 __all__ = ["RotorTable", "from_case", "from_coefficients", "quadratic"]
 

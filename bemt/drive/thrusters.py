@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bemt.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError
 
 __all__ = ["Allocation", "Thruster", "allocate", "attainable", "effectiveness", "moment_at"]
 

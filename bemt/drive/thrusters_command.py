@@ -33,11 +33,11 @@ from typing import Any
 
 import numpy as np
 
+from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
+from bemt.base.tables import csv_text, json_text, number_text, text_table, write_atomic
+from bemt.base.toml import Collector, Key, check_table, load_toml
 from bemt.drive import outputs, picture
 from bemt.drive.thrusters import Allocation, Thruster, allocate, attainable, moment_at
-from bemt.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
-from bemt.schema import Collector, Key, check_table, load_toml
-from bemt.tables import csv_text, json_text, number_text, text_table, write_atomic
 
 __all__ = ["run"]
 

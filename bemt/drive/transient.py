@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bemt.base.errors import Fault, InputError
 from bemt.drive.drive_model import Drive
-from bemt.errors import Fault, InputError
 
 __all__ = ["FirstOrder", "History", "first_order", "simulate", "time_to"]
 

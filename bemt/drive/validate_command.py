@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import importers
+from bemt.base.errors import EXIT_OK, Fault, InputError
+from bemt.base.tables import json_text, number_text, text_table, write_atomic
 from bemt.drive import identify, map_points, picture, validation
 from bemt.drive.drive_model import Drive
 from bemt.drive.map_points import MapPoints
-from bemt.errors import EXIT_OK, Fault, InputError
-from bemt.tables import json_text, number_text, text_table, write_atomic
 
 __all__ = ["maps", "run", "steps"]
 

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bemt.base.errors import Fault, InputError
+from bemt.base.tables import write_atomic
+from bemt.base.toml import Collector, Key, check_value
 from bemt.case import Case
 from bemt.case.schema import SCHEMA
-from bemt.errors import Fault, InputError
 from bemt.openfoam import Body, Settings, Sweep, case_files, sector_choice
 from bemt.openfoam.settings import MACH_COMPRESSIBLE
-from bemt.schema import Collector, Key, check_value
-from bemt.tables import write_atomic
 from geometry.common import GeometryError
 from geometry.export import MANIFEST, export
 from geometry.mesh import Options, build

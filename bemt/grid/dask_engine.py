@@ -25,9 +25,9 @@ from typing import Any
 
 import numpy as np
 
-from bemt import cache
+from bemt.base import cache
+from bemt.base.errors import Fault, InputError
 from bemt.case import Case
-from bemt.errors import Fault, InputError
 from bemt.grid.identity import program_hash
 from bemt.grid.run import Grid, Solved, Solver, solve_chunk
 

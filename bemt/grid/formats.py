@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.errors import Fault, InputError
-from bemt.tables import csv_block, file_hash
+from bemt.base.errors import Fault, InputError
+from bemt.base.tables import csv_block, file_hash
 
 __all__ = ["FORMATS", "Block", "encode", "join", "require_extra"]
 

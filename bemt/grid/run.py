@@ -20,10 +20,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.tables import plain, write_atomic
 from bemt.case import Case
 from bemt.evaluate import Points, air_arrays, evaluate, prepare
 from bemt.grid.formats import Block, encode, join
-from bemt.tables import plain, write_atomic
 
 if TYPE_CHECKING:
     from bemt.air import Air

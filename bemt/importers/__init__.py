@@ -4,7 +4,7 @@ An importer is a module of this package (its name does not start with ``_``) tha
 
 * ``KIND`` : str, the name used in ``format = "..."``;
 * ``sniff(head) -> bool`` : True when the head of a file (:data:`HEAD_BYTES` bytes, or text) is of this format;
-* ``read(path) -> object`` : the whole file, or :class:`bemt.errors.InputError` with all its faults;
+* ``read(path) -> object`` : the whole file, or :class:`bemt.base.errors.InputError` with all its faults;
 * optionally ``sniff_folder(path) -> bool`` : True when ``read`` also takes that folder;
 * optionally ``FALLBACK = True`` : its claim counts only when no other importer claims the file.
 
@@ -28,7 +28,7 @@ from typing import Any
 
 import numpy as np
 
-from bemt.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError
 
 __all__ = ["HEAD_BYTES", "SourceText", "detect", "head_text", "importers", "load_text", "number", "read"]
 

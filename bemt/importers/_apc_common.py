@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 
-from bemt.errors import Fault
+from bemt.base.errors import Fault
 from bemt.importers import SourceText
 
 __all__ = ["designation", "parse_designation", "provenance"]

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt import units
-from bemt.errors import Fault, InputError
+from bemt.base import units
+from bemt.base.errors import Fault, InputError
 from bemt.importers import SourceText, load_text, number
 from bemt.importers._apc_common import designation, provenance
 from bemt.series import Series

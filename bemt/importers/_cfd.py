@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError
 from bemt.importers import SourceText, number
 
 __all__ = [

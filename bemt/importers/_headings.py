@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from bemt import units
+from bemt.base import units
 
 __all__ = ["Heading", "heading", "slug", "unit_of"]
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import units
-from bemt.errors import Fault, InputError
+from bemt.base import units
+from bemt.base.errors import Fault, InputError
 from bemt.imported import Channel, Imported
 from bemt.importers import number
 from bemt.importers._clock import clock_seconds

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError
 from bemt.importers import SourceText, head_text, load_text, number
 from bemt.importers._uiuc_names import parse_file_name
 

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import os
 
-from bemt.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError
 from bemt.importers import head_text, load_text
 from bemt.importers._apc_common import parse_designation
 from bemt.importers._apc_pe0 import ApcBlade, read_pe0

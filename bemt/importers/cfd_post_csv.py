@@ -15,7 +15,7 @@ from __future__ import annotations
 import os
 import re
 
-from bemt.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError
 from bemt.imported import Channel, Imported
 from bemt.importers import SourceText
 from bemt.importers._cfd import Column, Row, cells_of, head_lines, load, numeric_table, si_unit, slug

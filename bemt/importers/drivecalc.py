@@ -14,7 +14,7 @@ import os
 
 import numpy as np
 
-from bemt import units
+from bemt.base import units
 from bemt.imported import Imported
 from bemt.importers import head_text, load_text
 from bemt.importers._headings import Heading, heading

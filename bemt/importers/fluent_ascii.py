@@ -14,7 +14,7 @@ from __future__ import annotations
 import os
 from dataclasses import replace
 
-from bemt.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError
 from bemt.imported import Imported
 from bemt.importers._cfd import Column, Row, cells_of, head_lines, load, numeric_table
 from bemt.importers._cfd_record import fields

@@ -12,7 +12,7 @@ from __future__ import annotations
 import os
 import re
 
-from bemt.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError
 from bemt.imported import Imported
 from bemt.importers._cfd import Row, head_lines, load, numeric_table
 from bemt.importers._cfd_record import history

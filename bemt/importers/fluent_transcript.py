@@ -23,7 +23,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from bemt.averaging import keep_last
-from bemt.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError
 from bemt.imported import Channel, Imported
 from bemt.importers import SourceText, number
 from bemt.importers._cfd import head_lines, load, si_unit, slug

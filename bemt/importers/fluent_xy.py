@@ -16,7 +16,7 @@ import os
 import re
 from dataclasses import replace
 
-from bemt.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError
 from bemt.imported import Channel, Imported
 from bemt.importers import SourceText
 from bemt.importers._cfd import Column, Row, head_lines, load, numeric_table, unique

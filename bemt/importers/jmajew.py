@@ -20,8 +20,8 @@ from pathlib import Path
 
 import numpy as np
 
-from bemt import units
-from bemt.errors import Fault
+from bemt.base import units
+from bemt.base.errors import Fault
 from bemt.imported import Imported
 from bemt.importers import head_text, load_text
 from bemt.importers._headings import Heading, heading

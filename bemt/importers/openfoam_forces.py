@@ -24,7 +24,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bemt.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError
 from bemt.imported import Channel, Imported
 from bemt.importers import SourceText
 from bemt.importers._cfd import Column, Row, Table, head_lines, load, numeric_table

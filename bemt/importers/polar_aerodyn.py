@@ -14,7 +14,7 @@ import math
 import os
 import re
 
-from bemt.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError
 from bemt.importers import SourceText, head_text, load_text, number
 from bemt.importers.polar_csv import PolarRow, assemble
 from bemt.polars import Polar

@@ -18,7 +18,7 @@ import os
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError
 from bemt.importers import SourceText, head_text, load_text, number
 from bemt.importers.polar_csv import PolarRow, assemble
 from bemt.polars import Polar

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bemt.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError
 from bemt.importers import SourceText, head_text, load_text, number
 from bemt.polars import Polar
 from bemt.post_stall import SectionTable, from_tables

@@ -28,7 +28,7 @@ import os
 import re
 from collections.abc import Iterable
 
-from bemt.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError
 from bemt.importers import SourceText, head_text, load_text, number
 from bemt.importers.polar_csv import PolarRow, assemble
 from bemt.polars import Polar

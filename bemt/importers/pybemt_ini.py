@@ -13,8 +13,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from bemt import units
-from bemt.errors import Fault, InputError
+from bemt.base import units
+from bemt.base.errors import Fault, InputError
 from bemt.imported import Channel, Imported
 from bemt.importers import head_text, load_text, number
 

@@ -42,15 +42,15 @@ from typing import Any
 
 import numpy as np
 
-from bemt import units
 from bemt.air import Air
-from bemt.errors import Fault, InputError
+from bemt.base import units
+from bemt.base.errors import Fault, InputError
+from bemt.base.toml import Collector, Key, check_table, load_toml, shown
 from bemt.imported import Channel, Imported
 from bemt.importers import head_text, load_text
 from bemt.importers._headings import Heading, heading
 from bemt.importers._recording import Builder, spikes
 from bemt.importers._split import some, split_table
-from bemt.schema import Collector, Key, check_table, load_toml, shown
 
 __all__ = ["KIND", "QUANTITIES", "read", "sniff"]
 

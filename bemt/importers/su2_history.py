@@ -16,7 +16,7 @@ import re
 
 import numpy as np
 
-from bemt.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError
 from bemt.imported import Imported
 from bemt.importers._cfd import Column, Row, Table, cells_of, head_lines, load, numeric_table
 from bemt.importers._cfd_record import history

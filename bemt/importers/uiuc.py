@@ -40,7 +40,7 @@ from typing import Any
 
 import numpy as np
 
-from bemt.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError
 from bemt.importers import HEAD_BYTES
 from bemt.importers._uiuc_names import FAMILIES, VARIABLE_PITCH, UiucFile, UiucName, parse_file_name
 from bemt.importers._uiuc_tables import (

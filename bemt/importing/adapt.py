@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from bemt.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError
+from bemt.base.units import split_suffix
 from bemt.imported import Channel, Imported
 from bemt.importers import polar_c81, uiuc
 from bemt.importers.apc import ApcPerformance
 from bemt.importers.references import Reference
 from bemt.polars import Polar
 from bemt.series import Series
-from bemt.units import split_suffix
 
 __all__ = ["adapt", "damaged_export", "recognised"]
 

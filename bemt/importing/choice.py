@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bemt.averaging import Average, keep_last, revolution_average
-from bemt.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError
 from bemt.imported import Channel, Imported
 
 __all__ = ["Choice", "averaged", "chosen"]

@@ -24,9 +24,10 @@ from typing import Any
 
 import numpy as np
 
-from bemt import importers, tables
+from bemt import importers
 from bemt.averaging import relation
-from bemt.errors import EXIT_INPUT, EXIT_OK, Fault, InputError
+from bemt.base import tables
+from bemt.base.errors import EXIT_INPUT, EXIT_OK, Fault, InputError
 from bemt.imported import Channel, Imported
 from bemt.importing.adapt import adapt, damaged_export, recognised
 from bemt.importing.choice import Choice, averaged, chosen

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from typing import Any
 
-from bemt import tables
-from bemt.errors import InputError
+from bemt.base import tables
+from bemt.base.errors import InputError
 from bemt.imported import Imported
 from bemt.reduction.reduce import Reduced, reduce
 from bemt.sanity.check import Finding, check

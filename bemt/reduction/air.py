@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.air import Air
-from bemt.errors import InputError
-from bemt.units import ZERO_CELSIUS
+from bemt.base.errors import InputError
+from bemt.base.units import ZERO_CELSIUS
 
 __all__ = ["AirOfPoints", "air_of"]
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import units
+from bemt.base import units
 from bemt.imported import Imported
 
 __all__ = ["LOADS", "MEASURED", "Lost", "Recorded", "shaft_power", "view"]

@@ -27,7 +27,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bemt.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError
 
 __all__ = ["Dropped", "Plateau", "Plateaus", "Settings", "find", "standard_error"]
 

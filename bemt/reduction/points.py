@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError
 from bemt.reduction import plateaus
 from bemt.reduction.channels import LOADS, Lost, Recorded
 from bemt.reduction.rows import at_rest, command_of

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from bemt import coefficients as co
 from bemt.air import Air
-from bemt.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError
 from bemt.imported import Imported
 from bemt.reduction.air import AirOfPoints, air_of
 from bemt.reduction.channels import LOADS, Lost, Recorded, shaft_power, view

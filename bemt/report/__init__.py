@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from bemt.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError
 
 __all__ = ["HTML_NAME", "MARKDOWN_NAME", "book_html", "run"]
 
@@ -87,9 +87,9 @@ def run(args: argparse.Namespace) -> int:
     int
         Exit code: that of the sweep behind the report.
     """
+    from bemt.base.tables import write_atomic
     from bemt.report.gather import gather
     from bemt.report.summary import summary
-    from bemt.tables import write_atomic
 
     show = sys.stderr.isatty() and not args.quiet
 

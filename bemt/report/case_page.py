@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from bemt.base.tables import number_text
 from bemt.report.audit_block import audit_block
 from bemt.report.diagnosis_block import diagnosis_block
 from bemt.report.markup import Cell, badge, esc, image, num, section, table
 from bemt.report.plot import COLOURS, Plot, Trace, figure
 from bemt.report.verdicts import headline, verdict
-from bemt.tables import number_text
 
 __all__ = ["case_page", "reproduction_table"]
 

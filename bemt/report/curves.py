@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.errors import InputError
 from bemt.case import Case
-from bemt.errors import InputError
 
 __all__ = ["case_curves", "geometry_curves", "radial_curves", "refinement"]
 

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import bemt
+from bemt.base.errors import InputError
 from bemt.case import Case, find_cases, load_case
-from bemt.errors import InputError
 from bemt.report import curves, trends
 from geometry.common import GeometryError
 from geometry.picture import PictureError, Scene, blade_scene, cutaway_scene, render, rotor_scene

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bemt.tables import number_text
+from bemt.base.tables import number_text
 
 __all__ = ["Cell", "badge", "document", "esc", "image", "num", "section", "table"]
 

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from bemt.tables import number_text, plain
+from bemt.base.tables import number_text, plain
 
 __all__ = ["COLOURS", "Mark", "Plot", "Trace", "figure", "ticks"]
 

@@ -7,8 +7,8 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
+from bemt.base.tables import number_text
 from bemt.report.verdicts import headline, verdict
-from bemt.tables import number_text
 
 __all__ = ["plain_markdown", "summary"]
 

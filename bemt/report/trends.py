@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.errors import InputError
+from bemt.base.units import G0, INCH, KGF
 from bemt.case import Case
-from bemt.errors import InputError
-from bemt.units import G0, INCH, KGF
 from geometry.common import GeometryError
 
 __all__ = ["ROBOT", "choice", "families", "moments"]

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from bemt.tables import number_text
+from bemt.base.tables import number_text
 
 __all__ = ["headline", "recorded", "verdict"]
 

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import units
+from bemt.base import units
 from bemt.imported import Imported
 from bemt.reduction.channels import view
 from bemt.series import Series

@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import __version__, audit_remarks, effects, series, units
+from bemt import __version__, audit_remarks, effects, series
+from bemt.base import units
 from bemt.case import Assumption, Case
 from bemt.importers import references as reference_file
 

@@ -22,16 +22,16 @@ from pathlib import Path
 from typing import Any
 
 import bemt
+from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, EXIT_UNCONVERGED, Fault, InputError, system_fault
+from bemt.base.tables import json_text, plain, remove_stale
+from bemt.base.toml import Collector
 from bemt.case import Case, check_name, find_cases, load_case, repeated_names
-from bemt.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, EXIT_UNCONVERGED, Fault, InputError, system_fault
 from bemt.grid.formats import FORMATS, require_extra
 from bemt.grid.run import Engine, run_grid
-from bemt.schema import Collector
 from bemt.sweep import store
 from bemt.sweep.case import solve_case
 from bemt.sweep.store import SCHEMA, fingerprint
 from bemt.sweep.text import case_text, overview_text
-from bemt.tables import json_text, plain, remove_stale
 
 __all__ = ["SCHEMA", "fingerprint", "run", "sweep"]
 

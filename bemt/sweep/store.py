@@ -17,11 +17,11 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
 
-from bemt.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError
+from bemt.base.tables import file_hash, json_text, write_atomic
 from bemt.grid.formats import FORMATS
 from bemt.grid.identity import program_hash
 from bemt.sweep.text import case_text, overview_text, rows_csv
-from bemt.tables import file_hash, json_text, write_atomic
 
 __all__ = [
     "OVERVIEW", "SCHEMA", "clear_overview", "fingerprint", "keep", "keep_overview", "locked", "remove_result", "reuse",

@@ -7,8 +7,8 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from bemt.base.tables import csv_text, number_text, text_table
 from bemt.sweep.case import ROW_SOURCES
-from bemt.tables import csv_text, number_text, text_table
 
 __all__ = ["case_text", "overview_text", "rows_csv"]
 

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bemt.data.folders import find_data
-from bemt.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError
+from bemt.base.folders import find_data
 from bemt.validate.folder import read_folder
 from bemt.validate.match import matched
 from bemt.validate.points import J_SHARE, Array, Rows, compare, errors, statistics
@@ -151,7 +151,7 @@ def run(args: argparse.Namespace) -> int:
         For a bad folder or an unknown effect.
     """
     from bemt import effects as registry
-    from bemt.tables import json_text, write_atomic
+    from bemt.base.tables import json_text, write_atomic
 
     off = [name for item in (args.off or []) for name in str(item).split(",") if name]
     unknown = [name for name in off if name not in registry.catalogue()]

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bemt.errors import Fault, InputError
-from bemt.units import INCH
+from bemt.base.errors import Fault, InputError
+from bemt.base.units import INCH
 from bemt.validate.points import Stations
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bemt.errors import Fault
+from bemt.base.errors import Fault
 
 __all__ = ["AXIS", "Collector", "Key", "check_table", "check_value", "load_toml", "shown"]
 
@@ -92,7 +92,7 @@ class Collector:
         Parameters
         ----------
         where, got, expected, hint : str
-            As in :class:`bemt.errors.Fault`.
+            As in :class:`bemt.base.errors.Fault`.
         """
         self.faults.append(Fault(self.file, where, got, expected, hint))
 

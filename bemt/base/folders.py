@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from bemt.cache import cache_dir
+from bemt.base.cache import cache_dir
 
 __all__ = ["data_roots", "find_data"]
 

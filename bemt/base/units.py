@@ -15,7 +15,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
-from bemt.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError
 
 if TYPE_CHECKING:  # numpy is not needed here, and its import would slow `python -m bemt --help`
     import numpy as np
@@ -224,7 +224,7 @@ def convert(value: Numeric, unit: str, to: str) -> Numeric:
     >>> convert(1.0, "kgf", "kg")
     Traceback (most recent call last):
         ...
-    bemt.errors.InputError: unit: got 'kgf' (force) -> 'kg' (mass); expected two units of the same dimension.
+    bemt.base.errors.InputError: unit: got 'kgf' (force) -> 'kg' (mass); expected two units of the same dimension.
     """
     u, v = _get(unit), _get(to)
     if u.dimension != v.dimension:
