@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bemt import _kernel as K
 from bemt import _residual as res
 from bemt.effects.base import Baking
-from bemt.polars import (
+from bemt.sections.polars import (
     ALPHA_COARSE_STEP,
     ALPHA_FINE_HI,
     ALPHA_FINE_LO,
@@ -22,7 +22,7 @@ from bemt.polars import (
 )
 
 if TYPE_CHECKING:
-    from bemt.polars import Polar
+    from bemt.sections.polars import Polar
 
 Array = NDArray[np.float64]
 

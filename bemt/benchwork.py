@@ -157,7 +157,7 @@ def generate(folder: Path | str) -> list[Path]:
     beta = atan(pitch/(2 pi r)) with 5 in of pitch on 10 in, chord ``apc_like``; 30 equal elements from r/R 0.15 to 1,
     values at their centres.  The table: every degree from -180 to 180.
     """
-    from bemt.polars_neuralfoil import neuralfoil_polar
+    from bemt.sections.neuralfoil import neuralfoil_polar
     from geometry.airfoil import naca
     from geometry.laws import chord_over_R
 
@@ -203,7 +203,7 @@ def prepare(work: Work, effects: tuple[str, ...] | None = PEER_EFFECTS) -> Prepa
     """
     from bemt import solver
     from bemt.effects import standard
-    from bemt.post_stall import SectionTable, from_tables
+    from bemt.sections.extrapolation import SectionTable, from_tables
     from geometry.airfoil import naca
     from geometry.blade import Stations, from_stations
     from geometry.rotor import Rotor

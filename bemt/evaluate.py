@@ -14,8 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from bemt import coefficients as co
 from bemt import duct as duct_model
-from bemt import effects, empirical, forward, polars, section_rule, solver
+from bemt import effects, empirical, forward, solver
 from bemt.base.errors import Fault, InputError
+from bemt.sections import polars
+from bemt.sections import rule as section_rule
 
 if TYPE_CHECKING:
     from bemt.air import Air

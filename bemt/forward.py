@@ -20,7 +20,7 @@ from bemt.effects.base import Effect, Flow, Loads
 if TYPE_CHECKING:
     from bemt.air import Air
     from bemt.duct import DuctFlow
-    from bemt.polars import Polar
+    from bemt.sections.polars import Polar
     from geometry.rotor import Rotor
 
 __all__ = ["Model", "acts_on_points", "flow_of", "respond"]

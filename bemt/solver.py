@@ -23,11 +23,11 @@ from bemt._kernel_arrays import M2_STEP
 from bemt.air import Air
 from bemt.effects import Effect, standard
 from bemt.effects.base import Baking
-from bemt.polars import ALPHA_GRID, RE_FIXED, fixed_re
+from bemt.sections.polars import ALPHA_GRID, RE_FIXED, fixed_re
 
 if TYPE_CHECKING:
     from bemt.duct import DuctFlow
-    from bemt.polars import Polar
+    from bemt.sections.polars import Polar
     from geometry.blade import Stations
     from geometry.rotor import Rotor
 
@@ -190,7 +190,7 @@ def prepare(
 
     Examples
     --------
-    >>> from bemt.polars import linear_polar
+    >>> from bemt.sections.polars import linear_polar
     >>> from geometry.laws import helix
     >>> from geometry.rotor import Rotor
     >>> ready = prepare(Rotor(helix(0.254, 0.127), 2), [(0.75, linear_polar(cd=0.01))])
@@ -327,7 +327,7 @@ def solve(
 
     Examples
     --------
-    >>> from bemt.polars import linear_polar
+    >>> from bemt.sections.polars import linear_polar
     >>> from geometry.laws import helix
     >>> from geometry.rotor import Rotor
     >>> ready = prepare(Rotor(helix(0.254, 0.127), 2), [(0.75, linear_polar(cd=0.01))])

@@ -11,7 +11,7 @@ import pytest
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from bemt.polars import Polar
+    from bemt.sections.polars import Polar
     from geometry.rotor import Rotor
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -73,7 +73,7 @@ def polar() -> Polar:
     """Cambered section with a stall, from closed forms: no network, no Reynolds dependence."""
     import numpy as np
 
-    from bemt.post_stall import SectionTable, from_tables
+    from bemt.sections.extrapolation import SectionTable, from_tables
 
     alpha = np.radians(np.arange(-20.0, 25.5, 0.5))
     linear = 5.9 * (alpha + np.radians(4.0))

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt import polars_neuralfoil
 from bemt.base import cache
-from bemt.polars import ALPHA_GRID, Polar
-from bemt.polars_neuralfoil import neuralfoil_polar
+from bemt.sections import neuralfoil as polars_neuralfoil
+from bemt.sections.neuralfoil import neuralfoil_polar
+from bemt.sections.polars import ALPHA_GRID, Polar
 from geometry.airfoil import naca
 
 SECTIONS = {"0012": naca("0012"), "4412": naca("4412")}
@@ -111,7 +111,7 @@ def test_installed_version_is_that_of_the_metadata() -> None:
 def test_a_cache_hit_needs_no_neuralfoil(own_cache: Path) -> None:
     neuralfoil_polar(SECTIONS["4412"])
     code = (
-        "import sys; from bemt.polars_neuralfoil import neuralfoil_polar as f; from geometry.airfoil import naca;"
+        "import sys; from bemt.sections.neuralfoil import neuralfoil_polar as f; from geometry.airfoil import naca;"
         "f(naca('4412')); print(sorted({'neuralfoil', 'aerosandbox', 'scipy', 'numba'} & set(sys.modules)))"
     )
     root = Path(cache.__file__).parents[1]

@@ -11,7 +11,7 @@ import pytest
 from bemt import solver
 from bemt.air import Air
 from bemt.duct import DuctFlow
-from bemt.polars import Polar, linear_polar
+from bemt.sections.polars import Polar, linear_polar
 from geometry.laws import helix
 from geometry.rotor import Rotor
 

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from diagnosing import left_out
 
-from bemt import section_rule
 from bemt.case import Case, load_case
 from bemt.diagnose import chain, document, record
 from bemt.diagnose.command import load
+from bemt.sections import rule as section_rule
 from bemt.series import Series
 
 pytestmark = pytest.mark.slow

@@ -21,8 +21,8 @@ from bemt.air import Air
 from bemt.base.errors import InputError
 from bemt.case import load_case
 from bemt.effects.base import Effect, Flow, Parameter, Reading
-from bemt.polars import Polar
-from bemt.post_stall import SectionTable, from_tables
+from bemt.sections.extrapolation import SectionTable, from_tables
+from bemt.sections.polars import Polar
 from geometry.airfoil import naca4
 from geometry.duct import Stator, around
 from geometry.laws import helix

@@ -32,7 +32,7 @@ from bemt.effects.tip_gap import TipGap
 from bemt.effects.tunnel_blockage import TunnelBlockage
 from bemt.effects.unit_slip import UnitSlip
 from bemt.effects.untwist import Untwist
-from bemt.polars import linear_polar
+from bemt.sections.polars import linear_polar
 from geometry.laws import helix
 from geometry.rotor import Rotor
 

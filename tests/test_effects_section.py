@@ -17,8 +17,8 @@ from bemt.effects.pitch_offset import PitchOffset
 from bemt.effects.post_stall import PostStall
 from bemt.effects.section import Section
 from bemt.effects.stall_delay import StallDelay
-from bemt.polars import ALPHA_GRID, Polar
-from bemt.post_stall import SectionTable, from_tables
+from bemt.sections.extrapolation import SectionTable, from_tables
+from bemt.sections.polars import ALPHA_GRID, Polar
 from geometry.laws import helix
 from geometry.rotor import Rotor
 

@@ -14,7 +14,7 @@ from numba import njit, prange
 from bemt import solver
 from bemt.air import Air
 from bemt.effects import standard
-from bemt.polars import linear_polar
+from bemt.sections.polars import linear_polar
 from geometry.blade import from_stations
 from geometry.laws import chord_over_R
 from geometry.rotor import Rotor

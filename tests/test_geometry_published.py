@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bemt import section_rule
+from bemt.sections import rule as section_rule
 from geometry.airfoil import naca
 from geometry.common import GeometryError
 from geometry.published import PUBLISHED, published, thickened

@@ -12,7 +12,7 @@ import pytest
 from bemt import importers
 from bemt.base.errors import InputError
 from bemt.importers import polar_aerodyn, polar_c81, polar_csv, polar_xfoil
-from bemt.polars import ALPHA_GRID, DEFAULT_RE, Polar
+from bemt.sections.polars import ALPHA_GRID, DEFAULT_RE, Polar
 
 KINDS = {m.KIND: m for m in (polar_aerodyn, polar_c81, polar_csv, polar_xfoil)}
 ALPHA = np.arange(-12.0, 16.5, 1.0)

@@ -11,7 +11,7 @@ from bemt import solver
 from bemt.air import Air
 from bemt.duct import DuctFlow
 from bemt.effects import Effect, standard, without
-from bemt.polars import Polar, linear_polar
+from bemt.sections.polars import Polar, linear_polar
 from geometry.blade import Blade, from_stations
 from geometry.laws import helix
 from geometry.rotor import Rotor

@@ -17,7 +17,7 @@ from bemt.duct import DuctFlow
 from bemt.effects import standard
 from bemt.effects.lifting_surface import LiftingSurface, slope_ratio
 from bemt.effects.tip_loss import TipLoss
-from bemt.polars import ALPHA_GRID, linear_polar
+from bemt.sections.polars import ALPHA_GRID, linear_polar
 from geometry.blade import from_stations
 from geometry.laws import helix
 from geometry.rotor import Rotor

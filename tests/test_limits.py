@@ -18,7 +18,7 @@ from bemt.effects import Effect, standard
 from bemt.effects.high_induction import HighInduction
 from bemt.effects.swirl import Swirl
 from bemt.effects.tip_loss import TipLoss
-from bemt.polars import Polar, linear_polar
+from bemt.sections.polars import Polar, linear_polar
 from geometry.blade import Blade, Stations, from_stations
 from geometry.laws import helix
 from geometry.rotor import Rotor

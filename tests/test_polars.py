@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from bemt import polars as P
-from bemt.polars import ALPHA_GRID, DEFAULT_RE, Polar
-from bemt.polars_neuralfoil import neuralfoil_polar
-from bemt.post_stall import SectionTable, from_tables
+from bemt.sections import polars as P
+from bemt.sections.extrapolation import SectionTable, from_tables
+from bemt.sections.neuralfoil import neuralfoil_polar
+from bemt.sections.polars import ALPHA_GRID, DEFAULT_RE, Polar
 from geometry.airfoil import naca
 
 pytestmark = pytest.mark.usefixtures("own_cache")

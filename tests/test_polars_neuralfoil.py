@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt.polars import ALPHA_GRID, DEFAULT_RE, Polar
-from bemt.polars_neuralfoil import neuralfoil_polar
-from bemt.post_stall import METHODS
+from bemt.sections.extrapolation import METHODS
+from bemt.sections.neuralfoil import neuralfoil_polar
+from bemt.sections.polars import ALPHA_GRID, DEFAULT_RE, Polar
 from geometry.airfoil import Airfoil, naca, naca4
 
 SECTIONS = {

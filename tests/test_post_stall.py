@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from bemt.post_stall import METHODS, SectionTable, extend, from_tables, viterna_cd_max
+from bemt.sections.extrapolation import METHODS, SectionTable, extend, from_tables, viterna_cd_max
 
 
 def deg(*angles: float) -> np.ndarray:

@@ -12,12 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt import section_rule, solver
+from bemt import solver
 from bemt.air import Air
 from bemt.duct import duct_flow
 from bemt.effects import Effect, standard
 from bemt.effects.lifting_surface import LiftingSurface
-from bemt.polars_neuralfoil import neuralfoil_polar
+from bemt.sections import rule as section_rule
+from bemt.sections.neuralfoil import neuralfoil_polar
 from geometry.airfoil import Airfoil, naca, naca4
 from geometry.airfoil_file import parse_dat
 from geometry.blade import from_stations

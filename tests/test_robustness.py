@@ -18,8 +18,8 @@ from bemt import solver
 from bemt.air import Air
 from bemt.duct import DuctFlow
 from bemt.effects import catalogue, standard, without
-from bemt.polars import Polar, linear_polar
-from bemt.post_stall import SectionTable, from_tables
+from bemt.sections.extrapolation import SectionTable, from_tables
+from bemt.sections.polars import Polar, linear_polar
 from geometry.blade import from_stations
 from geometry.rotor import Rotor
 

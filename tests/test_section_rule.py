@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bemt import section_rule
 from bemt.effects import catalogue, standard
-from bemt.polars import DEFAULT_RE, Polar
-from bemt.polars_neuralfoil import neuralfoil_polar
+from bemt.sections import rule as section_rule
+from bemt.sections.neuralfoil import neuralfoil_polar
+from bemt.sections.polars import DEFAULT_RE, Polar
 from bemt.validate.command import validate
 from geometry.airfoil import Airfoil
 

@@ -19,7 +19,7 @@ from bemt.duct import DuctFlow
 from bemt.effects import standard, without
 from bemt.effects.swirl import Swirl
 from bemt.effects.tip_loss import TipLoss
-from bemt.polars import Polar, linear_polar
+from bemt.sections.polars import Polar, linear_polar
 from geometry.blade import Stations
 from geometry.rotor import Rotor
 
@@ -153,7 +153,7 @@ def test_section_tables_are_read_as_they_are(rotor: Rotor, polar: Polar) -> None
              par[o + 9], par[o + 10] / 340.0**2, par[o + 11], par[o + 12], par[o + 13])  # fmt: skip
         return R.lookup_full(alpha, lre, W * W, np.int32(base), tab, g)
 
-    from bemt.polars import ALPHA_GRID, DEFAULT_RE
+    from bemt.sections.polars import ALPHA_GRID, DEFAULT_RE
 
     rng = np.random.default_rng(4)
     for _ in range(500):

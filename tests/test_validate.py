@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt import effects, section_rule
+from bemt import effects
 from bemt.base.errors import InputError
 from bemt.base.tables import json_text
 from bemt.importers import uiuc
+from bemt.sections import rule as section_rule
 from bemt.validate import command, match, points, text
 
 R_R = np.linspace(0.15, 1.0, 18)
@@ -147,8 +148,8 @@ def test_uiuc(shared_data: Path, volume: str, static: tuple[float, ...], forward
 
 
 def test_rule_is_one_table_for_small_and_one_for_large_reynolds_numbers() -> None:
-    from bemt.polars import DEFAULT_RE
-    from bemt.polars_neuralfoil import neuralfoil_polar
+    from bemt.sections.neuralfoil import neuralfoil_polar
+    from bemt.sections.polars import DEFAULT_RE
 
     shape = section_rule.airfoil(section_rule.sections()[0])
     rule = section_rule.polar(shape)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from bemt.base.toml import Key
-from bemt.section_rule import DRAG_LEVEL, N_CRIT
+from bemt.sections.rule import DRAG_LEVEL, N_CRIT
 from geometry.laws import CHORD_LAWS as GEOMETRY_CHORD_LAWS
 
 __all__ = ["ASSUMPTION", "AXES", "DEFAULTS", "GROUPS", "INCH", "POLAR", "SCHEMA", "TEMPERATURE"]

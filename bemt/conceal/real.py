@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import section_rule
 from bemt.base.errors import Fault, InputError
 from bemt.base.folders import data_roots, find_data
 from bemt.conceal.items import Item, recording_text
+from bemt.sections import rule as section_rule
 
 if TYPE_CHECKING:
     from bemt.importers.uiuc import UiucPropeller

@@ -50,7 +50,7 @@ class LiftingSurface(Effect):
 
     Off by default: rotors of known section and Re above 1e5 come closer to measurement with it (Caradonna and Tung at
     8 and 12 deg +16 to +26 % becomes +5 to +13 %, 28 in propeller +5.4 to +0.9 %), small propellers, whose sections
-    the general rule was calibrated for without it, do not (``bemt.section_rule``; UIUC volume 2 static 10.4 to
+    the general rule was calibrated for without it, do not (``bemt.sections.rule``; UIUC volume 2 static 10.4 to
     12.4 %): two errors that cancel there, is our reading.
     """
 

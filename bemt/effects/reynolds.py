@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from bemt.effects.base import Baking, Effect, Parameter, choice
-from bemt.polars import RE_FIXED
+from bemt.sections.polars import RE_FIXED
 
 
 @dataclass(frozen=True)

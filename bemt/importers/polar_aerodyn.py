@@ -17,7 +17,7 @@ import re
 from bemt.base.errors import Fault, InputError
 from bemt.importers import SourceText, head_text, load_text, number
 from bemt.importers.polar_csv import PolarRow, assemble
-from bemt.polars import Polar
+from bemt.sections.polars import Polar
 
 __all__ = ["KIND", "read", "sniff"]
 

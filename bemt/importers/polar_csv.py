@@ -18,8 +18,8 @@ import numpy as np
 
 from bemt.base.errors import Fault, InputError
 from bemt.importers import SourceText, head_text, load_text, number
-from bemt.polars import Polar
-from bemt.post_stall import SectionTable, from_tables
+from bemt.sections.extrapolation import SectionTable, from_tables
+from bemt.sections.polars import Polar
 
 __all__ = ["KIND", "PolarRow", "assemble", "read", "sniff"]
 
@@ -93,7 +93,7 @@ def read(path: str | os.PathLike[str]) -> Polar:
     Returns
     -------
     Polar
-        Continued to +-180 deg where the data stop (see `bemt.post_stall.from_tables`); its notes say so.
+        Continued to +-180 deg where the data stop (see `bemt.sections.extrapolation.from_tables`); its notes say so.
 
     Raises
     ------

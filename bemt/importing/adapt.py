@@ -17,7 +17,7 @@ from bemt.imported import Channel, Imported
 from bemt.importers import polar_c81, uiuc
 from bemt.importers.apc import ApcPerformance
 from bemt.importers.references import Reference
-from bemt.polars import Polar
+from bemt.sections.polars import Polar
 from bemt.series import Series
 
 __all__ = ["adapt", "damaged_export", "recognised"]

@@ -1,7 +1,7 @@
 """``python -m bemt validate DIR``: BEMT against a folder of measured propellers, statistics per propeller and over all.
 
 The folder is in the layout of the UIUC database (geometry, static and advance-ratio files).  Nothing is fitted:
-sections and transition come from the declared rule of :mod:`bemt.section_rule`.
+sections and transition come from the declared rule of :mod:`bemt.sections.rule`.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def validate(
         If the folder is missing or holds no propeller that can be compared.
     """
     from bemt import effects as registry
-    from bemt import section_rule
+    from bemt.sections import rule as section_rule
 
     found = read_folder(folder)
     eff = registry.standard() if effects is None else tuple(effects)
@@ -119,7 +119,7 @@ def validate(
     doc["unconverged"] = unconverged
     doc["effects"] = [e.describe() for e in eff]
     doc["polar"] = {
-        "rule": "bemt.section_rule", "n_crit": section_rule.N_CRIT, "drag_level": section_rule.DRAG_LEVEL,
+        "rule": "bemt.sections.rule", "n_crit": section_rule.N_CRIT, "drag_level": section_rule.DRAG_LEVEL,
         "fixed_re": fixed_re, "calibrated_on": "UIUC volume 1",
     }  # fmt: skip
     doc["propellers"] = rows

@@ -98,7 +98,7 @@ def build(propeller: UiucPropeller, stations: Stations | None = None) -> Rotor:
     geometry.rotor.Rotor
         At the nominal diameter.
     """
-    from bemt.section_rule import airfoil, sections
+    from bemt.sections.rule import airfoil, sections
     from geometry.blade import from_stations
     from geometry.rotor import Rotor
 
@@ -141,8 +141,10 @@ def compare(
     Rows
         Measured and computed values, point by point.
     """
-    from bemt import polars, section_rule, solver
+    from bemt import solver
     from bemt.air import Air
+    from bemt.sections import polars
+    from bemt.sections import rule as section_rule
 
     air = Air.from_density()
     rotor = build(propeller, stations)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.polars import ALPHA_GRID, Polar, first_stall
+from bemt.sections.polars import ALPHA_GRID, Polar, first_stall
 
 __all__ = ["METHODS", "SectionTable", "extend", "from_tables", "viterna_cd_max"]
 

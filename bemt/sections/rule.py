@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 if TYPE_CHECKING:
-    from bemt.polars import Polar
+    from bemt.sections.polars import Polar
     from geometry.airfoil import Airfoil
 
 N_CRIT = 3.0
@@ -180,8 +180,8 @@ def polar(shape: Airfoil, n_crit: float = N_CRIT, drag_level: float = DRAG_LEVEL
     Polar
         On the shared grids; from Re 6e5 on the table of the smooth section at n_crit 9.
     """
-    from bemt.polars import DEFAULT_RE
-    from bemt.polars_neuralfoil import neuralfoil_polar
+    from bemt.sections.neuralfoil import neuralfoil_polar
+    from bemt.sections.polars import DEFAULT_RE
 
     small = neuralfoil_polar(shape, n_crit=n_crit, lift_floor=0.0)
     large = neuralfoil_polar(shape, n_crit=max(n_crit, N_CRIT_LARGE))

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base import cache
-from bemt.polars import ALPHA_GRID, DEFAULT_RE, Polar, first_stall
-from bemt.post_stall import METHODS, extend, viterna_cd_max
+from bemt.sections.extrapolation import METHODS, extend, viterna_cd_max
+from bemt.sections.polars import ALPHA_GRID, DEFAULT_RE, Polar, first_stall
 
 if TYPE_CHECKING:
     from geometry.airfoil import Airfoil
@@ -72,7 +72,7 @@ def neuralfoil_polar(
     cd_max : float, optional
         Drag coefficient at 90 deg; by default 1.11 + 0.018 ar. [-]
     method : {"viterna", "normal"}, optional
-        Post-stall model, see `bemt.post_stall.extend`.
+        Post-stall model, see `bemt.sections.extrapolation.extend`.
     past_stall : float, optional
         How far past its first stall NeuralFoil is used at most (20 deg of alpha and its confidence bound it too). [rad]
     lift_floor : float, optional

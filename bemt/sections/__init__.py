@@ -1,0 +1,1 @@
+"""Blade sections: polars, their continuation beyond stall, NeuralFoil tables and the section rule."""
