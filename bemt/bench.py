@@ -81,7 +81,7 @@ def measure(work: Work, quick: bool = False) -> dict[str, Any]:
         when quick), ``standard`` (batch with all standard effects) [us]; ``CT``, ``CP``, ``J``, ``rpm`` and
         ``converged`` of the work; ``prepare_ms`` and ``compile_s``.
     """
-    from bemt import solver
+    from bemt.bem import solver
 
     air = Air.from_density()
     rpm, V = work.rpm, work.V

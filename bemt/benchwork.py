@@ -17,7 +17,7 @@ from bemt import coefficients as co
 from bemt.base.errors import Fault, InputError
 
 if TYPE_CHECKING:
-    from bemt.solver import Prepared
+    from bemt.bem.solver import Prepared
 
 Array = NDArray[np.float64]
 DATA = Path(__file__).with_name("benchdata")
@@ -199,9 +199,9 @@ def prepare(work: Work, effects: tuple[str, ...] | None = PEER_EFFECTS) -> Prepa
     Returns
     -------
     Prepared
-        For `bemt.solver`.
+        For `bemt.bem.solver`.
     """
-    from bemt import solver
+    from bemt.bem import solver
     from bemt.effects import standard
     from bemt.sections.extrapolation import SectionTable, from_tables
     from geometry.airfoil import naca

@@ -11,7 +11,8 @@ import re
 import sys
 from pathlib import Path
 
-from bemt import effects_list, evaluate
+from bemt import effects_list
+from bemt.bem import evaluate
 from bemt.case import Case, find_cases, load_case
 from bemt.diagnose.nuisance import PRIORS
 

@@ -16,7 +16,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.lines import Line2D
 
-from bemt import evaluate
+from bemt.bem import evaluate
 from bemt.case import load_case
 from bemt.sweep import sweep
 

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from bemt import effects, evaluate, forward
+from bemt import effects
+from bemt.bem import evaluate, forward
 from bemt.case import Case, load_case
 from bemt.diagnose import chain, record
 from bemt.effects.base import Effect, Reading

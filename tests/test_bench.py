@@ -7,9 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from bemt import bench, benchwork, cli, solver
+from bemt import bench, benchwork, cli
 from bemt.air import Air
 from bemt.base.errors import InputError
+from bemt.bem import solver
 
 
 @pytest.fixture(scope="module")

@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bemt import solver
 from bemt.air import Air
-from bemt.duct import DuctFlow
+from bemt.bem import solver
+from bemt.bem.duct import DuctFlow
 from bemt.sections.polars import Polar, linear_polar
 from geometry.laws import helix
 from geometry.rotor import Rotor

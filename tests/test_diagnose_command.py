@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from diagnosing import CASES, case, points, recording
 
+from bemt.bem.evaluate import prepare
 from bemt.case import load_case
 from bemt.cli import build_parser, main
 from bemt.diagnose import chain, document, problem, record
 from bemt.diagnose.command import load
-from bemt.evaluate import prepare
 from bemt.series import Series
 
 

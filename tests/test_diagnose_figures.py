@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bemt import evaluate
+from bemt.bem import evaluate
 from bemt.case import load_case
 from bemt.diagnose import canvas, chain, confusion, figures, figures_effects, fit, record
 from bemt.series import Series

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from diagnosing import case, diagnose, left_out, points, recording
 
-from bemt import effects, forward
+from bemt import effects
+from bemt.bem import forward
 from bemt.case import Case
 from bemt.diagnose import document, evidence, gate, plan, problem, record, signatures, verdict
 from bemt.diagnose.signatures import effect_of

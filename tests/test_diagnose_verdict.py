@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from diagnosing import case, diagnose, left_out, points, recording
 
-from bemt import effects, forward
+from bemt import effects
+from bemt.bem import forward
 from bemt.diagnose import blocks, chain, confusion, fit, prior, verdict
 
 

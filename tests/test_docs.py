@@ -325,7 +325,7 @@ def test_the_changelog_speaks_of_this_version(project: Path) -> None:
 
 
 def test_the_picture_shows_today_s_numbers(project: Path) -> None:
-    from bemt import evaluate
+    from bemt.bem import evaluate
     from bemt.case import load_case
 
     text = png_text((project / "docs" / "img" / "overview.png").read_bytes())

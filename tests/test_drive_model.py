@@ -204,7 +204,7 @@ def test_a_planted_inertia_is_found_from_a_step() -> None:
 
 
 def test_the_rotor_of_a_case_is_the_solver_s(project: Path) -> None:
-    from bemt import evaluate
+    from bemt.bem import evaluate
     from bemt.case import load_case
 
     case = load_case(project / "cases" / "prop_8x5" / "case.toml")

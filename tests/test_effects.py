@@ -15,10 +15,11 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from bemt import duct as duct_model
-from bemt import effects, evaluate, forward
+from bemt import effects
 from bemt.air import Air
 from bemt.base.errors import InputError
+from bemt.bem import duct as duct_model
+from bemt.bem import evaluate, forward
 from bemt.case import load_case
 from bemt.effects.base import Effect, Flow, Parameter, Reading
 from bemt.sections.extrapolation import SectionTable, from_tables

@@ -9,8 +9,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from bemt import effects, forward
+from bemt import effects
 from bemt.air import Air
+from bemt.bem import forward
 from bemt.effects.air_density import AirDensity
 from bemt.effects.airspeed_offset import AirspeedOffset
 from bemt.effects.base import Effect, Flow, Loads, Reading

@@ -7,8 +7,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from bemt import effects, solver
+from bemt import effects
 from bemt.air import Air
+from bemt.bem import solver
 from bemt.effects import compressibility, drag_divergence, stall_delay
 from bemt.effects.base import Effect
 from bemt.effects.compressibility import Compressibility

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from numba import njit, prange
 
-from bemt import solver
 from bemt.air import Air
+from bemt.bem import solver
 from bemt.effects import standard
 from bemt.sections.polars import linear_polar
 from geometry.blade import from_stations

@@ -20,9 +20,9 @@ from test_sweep import make_case, read_grid, tree
 
 from bemt.base.errors import InputError
 from bemt.base.tables import json_text
+from bemt.bem.evaluate import evaluate, prepare
 from bemt.case import load_case
 from bemt.cli import main
-from bemt.evaluate import evaluate, prepare
 from bemt.grid import run as grid_module
 from bemt.grid.run import Grid, Solver
 from bemt.sweep import sweep

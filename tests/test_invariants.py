@@ -7,9 +7,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from bemt import solver
 from bemt.air import Air
-from bemt.duct import DuctFlow
+from bemt.bem import solver
+from bemt.bem.duct import DuctFlow
 from bemt.effects import Effect, standard, without
 from bemt.sections.polars import Polar, linear_polar
 from geometry.blade import Blade, from_stations

@@ -91,8 +91,8 @@ MAY: dict[str, set[str]] = {
 # What makes the data of the proof must know nothing of what is proved, not even through others.
 BLIND = "bemt.conceal.truth*|bemt.conceal.stand*|bemt.conceal.rigs|bemt.conceal.causes|bemt.conceal.separation"
 UNSEEN = (
-    "bemt.solver*|bemt.duct*|bemt.effects*|bemt.sections.polars*|bemt.sections.extrapolation|bemt.evaluate*|bemt.forward*|bemt._kernel*|"
-    "bemt._residual*|bemt.sections.rule*|bemt.diagnose*"
+    "bemt.bem.solver*|bemt.bem.duct*|bemt.effects*|bemt.sections.polars*|bemt.sections.extrapolation|bemt.bem.evaluate*|bemt.bem.forward*|bemt.bem.kernel*|"
+    "bemt.bem.residual*|bemt.sections.rule*|bemt.diagnose*"
 )
 
 HEAVY = {
@@ -284,7 +284,7 @@ def tree(project: Path) -> dict[str, str]:
 
 
 def test_the_tree_keeps_the_rules(tree: dict[str, str]) -> None:
-    assert {"bemt.cli", "bemt.solver", "bemt.effects.tip_loss", "geometry.blade"} <= set(tree)
+    assert {"bemt.cli", "bemt.bem.solver", "bemt.effects.tip_loss", "geometry.blade"} <= set(tree)
     assert not violations(tree), "\n".join(violations(tree))
 
 
@@ -296,9 +296,9 @@ def test_the_tree_keeps_the_rules(tree: dict[str, str]) -> None:
         ("geometry.blade", "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from bemt.air import Air",
          "geometry knows nothing of bemt, got bemt.air"),
         ("bemt.base.units", "from bemt.air import Air", "bemt.air is not below it in the flow"),
-        ("bemt.base.units", "from bemt import solver", "bemt.solver is not below it in the flow"),
-        ("bemt.sections.polars", "def f():\n    from bemt.solver import solve", "bemt.solver is not below it in the flow"),
-        ("bemt.solver", "import bemt.evaluate", "bemt.evaluate is not below it in the flow"),
+        ("bemt.base.units", "from bemt import solver", "bemt.bem.solver is not below it in the flow"),
+        ("bemt.sections.polars", "def f():\n    from bemt.bem.solver import solve", "bemt.bem.solver is not below it in the flow"),
+        ("bemt.bem.solver", "import bemt.bem.evaluate", "bemt.bem.evaluate is not below it in the flow"),
         ("bemt.effects.swirl", "import bemt.effects.tip_loss", "an effect is one file, got bemt.effects.tip_loss"),
         ("bemt.effects.swirl", "from bemt.importers import read", "bemt.importers is not below it in the flow"),
         ("bemt.sweep.command", "from bemt import reproduce", "bemt.reproduce is not below it in the flow"),
@@ -306,15 +306,15 @@ def test_the_tree_keeps_the_rules(tree: dict[str, str]) -> None:
         ("bemt.novelty", "", "has no place in the flow; give it one in FLOOR_OF_ROOMS"),
         ("bemt.air", "from .units import INCH", "relative import; write the whole name"),
         ("bemt.air", "import bemt.nowhere", "bemt.nowhere does not exist"),
-        ("bemt.solver", "def f():\n    print(1)", "print in the pure core: print()"),
-        ("bemt.solver", "import sys\nsys.stderr.write('x')", "print in the pure core: sys.stderr"),
-        ("bemt.solver", "def f(p):\n    return open(p)", "files in the pure core: open()"),
+        ("bemt.bem.solver", "def f():\n    print(1)", "print in the pure core: print()"),
+        ("bemt.bem.solver", "import sys\nsys.stderr.write('x')", "print in the pure core: sys.stderr"),
+        ("bemt.bem.solver", "def f(p):\n    return open(p)", "files in the pure core: open()"),
         ("bemt.air", "from pathlib import Path\nPath('x').read_text()", "files in the pure core: Path('x').read_text"),
         ("bemt.air", "import os\nos.replace('a', 'b')", "files in the pure core: os.replace"),
         ("bemt.effects.swirl", "import numpy as np\nnp.load('x.npy')", "files in the pure core: np.load"),
-        ("bemt.solver", "import os\nos.environ['X']", "environment in the pure core: os.environ"),
+        ("bemt.bem.solver", "import os\nos.environ['X']", "environment in the pure core: os.environ"),
         ("bemt.case", "import os\nos.getenv('X')", "environment in the pure core: os.getenv"),
-        ("bemt.solver", "def f():\n    import time", "clock in the pure core: import time"),
+        ("bemt.bem.solver", "def f():\n    import time", "clock in the pure core: import time"),
         ("bemt.series", "import datetime\ndatetime.datetime.now()", "clock in the pure core: datetime.datetime.now"),
         ("geometry.duct", "print('x')", "print in the pure core: print()"),
         ("bemt.sections.polars", "import neuralfoil", "neuralfoil at the top; import it inside the function that needs it"),
@@ -322,14 +322,14 @@ def test_the_tree_keeps_the_rules(tree: dict[str, str]) -> None:
         ("bemt.series", "class A:\n  import pandas", "pandas at the top; import it inside the function that needs it"),
         ("bemt.series", "try:\n    import scipy.optimize\nexcept ImportError:\n    pass",
          "scipy.optimize at the top; import it inside the function that needs it"),
-        ("bemt.duct", "from numba import njit", "numba at the top; import it inside the function that needs it"),
+        ("bemt.bem.duct", "from numba import njit", "numba at the top; import it inside the function that needs it"),
         ("bemt.cli", "import numpy as np", "numpy; --help must import the standard library only"),
         ("bemt.cli", "import bemt.sweep", "bemt.sweep; --help must import the standard library only"),
         ("bemt.base.errors", "import numpy", "numpy; --help must import the standard library only"),
-        ("bemt.conceal.truth", "import bemt.solver", "must not see bemt.solver"),
+        ("bemt.conceal.truth", "import bemt.bem.solver", "must not see bemt.bem.solver"),
         ("bemt.conceal.truth_world", "def f():\n    from bemt.effects import standard", "must not see bemt.effects"),
-        ("bemt.conceal.truth_duct", "from bemt import duct", "must not see bemt.duct"),
-        ("bemt.conceal.stand", "from bemt import sweep", "must not see bemt.evaluate through bemt.sweep"),
+        ("bemt.conceal.truth_duct", "from bemt import duct", "must not see bemt.bem.duct"),
+        ("bemt.conceal.stand", "from bemt import sweep", "must not see bemt.bem.evaluate through bemt.sweep"),
         ("bemt.conceal.truth_section", "from bemt import case", "must not see bemt.sections.rule through bemt.case"),
         ("bemt.base.tables", "def f():\n    import bemt.sections.polars", "bemt.sections.polars is not below it in the flow"),
     ],
@@ -347,7 +347,7 @@ def test_a_planted_fault_is_found(tree: dict[str, str], module: str, line: str, 
         ("bemt.data", "from bemt.data import command",
          "bemt.base.folders:1: bemt.data.command is not below it in the flow"),
         ("bemt.reduction", "import bemt.audit", "bemt.reduction.plateaus:1: bemt.audit is not below it in the flow"),
-        ("bemt.conceal", "from bemt import solver", "bemt.conceal.truth:1: must not see bemt.solver"),
+        ("bemt.conceal", "from bemt import solver", "bemt.conceal.truth:1: must not see bemt.bem.solver"),
     ],
 )  # fmt: skip
 def test_what_a_package_brings_along_counts(tree: dict[str, str], package: str, line: str, complaint: str) -> None:
@@ -366,10 +366,10 @@ def test_what_needs_it_may_import_and_touch() -> None:
         {
             "bemt": "",
             "bemt.sections.polars": "def f():\n    import neuralfoil",
-            "bemt._kernel": "import numba",
+            "bemt.bem.kernel": "import numba",
             "bemt.importers": "import os\ndef f(p: 'os.PathLike[str]'):\n    return open(p)",
-            "bemt.duct": "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from bemt.evaluate import Ready",
-            "bemt.evaluate": "from bemt import duct",
+            "bemt.bem.duct": "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from bemt.bem.evaluate import Ready",
+            "bemt.bem.evaluate": "from bemt import duct",
         }
     )
 

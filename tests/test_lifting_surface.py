@@ -11,9 +11,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from bemt import solver
 from bemt.air import Air
-from bemt.duct import DuctFlow
+from bemt.bem import solver
+from bemt.bem.duct import DuctFlow
 from bemt.effects import standard
 from bemt.effects.lifting_surface import LiftingSurface, slope_ratio
 from bemt.effects.tip_loss import TipLoss

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from bemt import solver
 from bemt.air import Air
-from bemt.duct import DuctFlow
+from bemt.bem import solver
+from bemt.bem.duct import DuctFlow
 from bemt.effects import Effect, standard
 from bemt.effects.high_induction import HighInduction
 from bemt.effects.swirl import Swirl

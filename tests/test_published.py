@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt import solver
 from bemt.air import Air
-from bemt.duct import duct_flow
+from bemt.bem import solver
+from bemt.bem.duct import duct_flow
 from bemt.effects import Effect, standard
 from bemt.effects.lifting_surface import LiftingSurface
 from bemt.sections import rule as section_rule

@@ -14,9 +14,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bemt import solver
 from bemt.air import Air
-from bemt.duct import DuctFlow
+from bemt.bem import solver
+from bemt.bem.duct import DuctFlow
 from bemt.effects import catalogue, standard, without
 from bemt.sections.extrapolation import SectionTable, from_tables
 from bemt.sections.polars import Polar, linear_polar

@@ -13,9 +13,12 @@ import pytest
 from numba import njit
 from scipy.optimize import brentq
 
-from bemt import _kernel, _residual, _vecmath, solver
 from bemt.air import Air
-from bemt.duct import DuctFlow
+from bemt.bem import kernel as _kernel
+from bemt.bem import residual as _residual
+from bemt.bem import solver
+from bemt.bem import vecmath as _vecmath
+from bemt.bem.duct import DuctFlow
 from bemt.effects import standard, without
 from bemt.effects.swirl import Swirl
 from bemt.effects.tip_loss import TipLoss
@@ -254,7 +257,7 @@ def test_import_compiles_nothing() -> None:
     code = (
         "from numba.core import event\n"
         "with event.install_recorder('numba:compile') as record:\n"
-        "    import bemt.solver, bemt._kernel as K\n"
+        "    import bemt.bem.solver, bemt.bem.kernel as K\n"
         "assert not record.buffer and not K.entry(False, True).signatures"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

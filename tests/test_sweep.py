@@ -18,8 +18,8 @@ import numpy as np
 import pytest
 
 from bemt.base.tables import csv_block, json_text, number_text, plain
+from bemt.bem.evaluate import evaluate, prepare
 from bemt.case import load_case
-from bemt.evaluate import evaluate, prepare
 from bemt.grid import run as grid_module
 from bemt.sweep import command as sweep_module
 from bemt.sweep import fingerprint, sweep
@@ -393,7 +393,7 @@ def test_unconverged_points_are_counted_and_never_zero(tmp_path: Path, monkeypat
             converged=np.zeros(lost.shape, dtype=bool), flags=(("not converged: planted",),) * lost.size,
         )  # fmt: skip
 
-    monkeypatch.setattr("bemt.evaluate.evaluate", failing)
+    monkeypatch.setattr("bemt.bem.evaluate.evaluate", failing)
     monkeypatch.setattr(grid_module, "evaluate", failing)
     path = make_case(tmp_path, extra="[sweep]\nrpm = [3000, 6000]\n")
     result = json.loads(json_text(sweep([path], tmp_path / "out")))["cases"][0]
@@ -427,7 +427,7 @@ def test_numbers_for_people_and_for_json() -> None:
     ("name", "kgf"), [("prop_8x5", 2.456), ("prop_10x5", 5.363), ("prop_12x6", 11.121), ("prop_14x8", 22.025)]
 )
 def test_k1k2_of_the_shipped_cases(name: str, kgf: float) -> None:
-    from bemt.evaluate import k1k2
+    from bemt.bem.evaluate import k1k2
 
     case = load_case(ROOT / "cases" / name)
     made = k1k2(case, None, np.array([case.rpm]), np.array([0.0]), case.air())

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from bemt import evaluate, solver
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_text, text_table
+from bemt.bem import evaluate, solver
 from bemt.case import Case, load_case
 from bemt.cfd.schema import Campaign, load_campaign
 

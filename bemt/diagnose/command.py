@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import effects, evaluate
+from bemt import effects
 from bemt.air import Air
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import json_text, write_atomic
 from bemt.base.units import ZERO_CELSIUS
+from bemt.bem import evaluate
 from bemt.case import find_cases, load_case, repeated_names
 from bemt.diagnose import record as records
 from bemt.reduction.channels import view

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import forward, solver
+from bemt.bem import forward, solver
 from bemt.diagnose import confusion, prior
 from bemt.diagnose.canvas import BLACK, BLUE, GREY, ORANGE, PURPLE, RED, SKY, blank
 from bemt.diagnose.record import CHANNELS

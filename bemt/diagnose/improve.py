@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import tomlkit
 
-from bemt import effects, forward
+from bemt import effects
+from bemt.bem import forward
 from bemt.diagnose.signatures import effect_of
 
 if TYPE_CHECKING:

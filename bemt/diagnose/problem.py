@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import evaluate, forward
 from bemt.base.errors import Fault, InputError
+from bemt.bem import evaluate, forward
 from bemt.diagnose.nuisance import nuisances
 from bemt.diagnose.record import CHANNELS, Record, concatenated, merged, owners
 from bemt.effects.base import Effect, Flow, Reading

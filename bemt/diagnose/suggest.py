@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import effects, forward
+from bemt import effects
 from bemt.air import R_DRY
 from bemt.base.units import ZERO_CELSIUS
+from bemt.bem import forward
 from bemt.diagnose import noise
 from bemt.diagnose.nuisance import PRIORS
 from bemt.diagnose.problem import Part, Problem, assemble

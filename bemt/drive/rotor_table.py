@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bemt import evaluate
 from bemt.air import Air
 from bemt.base.errors import Fault, InputError
+from bemt.bem import evaluate
 from bemt.case import Case
 
 __all__ = ["RotorTable", "from_case", "from_coefficients", "quadratic"]

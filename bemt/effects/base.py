@@ -2,7 +2,7 @@
 
 An effect is a frozen dataclass with an ``id`` and hooks that are called in a fixed order.  The solver calls, once per
 rotor: ``blade`` (adds to beta) -> ``inflow`` (adds to the onset speeds) -> ``section`` (changes cl, cd tables) ->
-``momentum`` (sets the few numbers of the compiled kernel).  The model of a recording (:mod:`bemt.forward`) calls, once
+``momentum`` (sets the few numbers of the compiled kernel).  The model of a recording (:mod:`bemt.bem.forward`) calls, once
 per set of points: ``flow`` (what the rotor meets) before the solver, ``loads`` (thrust and torque) and ``reading``
 (what the instruments show) after it.  A hook that an effect does not have is not called.
 Each file of this folder that defines a subclass of :class:`Effect` is found by :func:`bemt.effects.catalogue`.
@@ -91,7 +91,7 @@ class Baking:
     alpha0, cla : (N, Nr) float
         Zero-lift angle [rad] and lift slope [1/rad] of the incompressible table.
     num : dict
-        Numbers for the kernel (see :mod:`bemt.solver`).
+        Numbers for the kernel (see :mod:`bemt.bem.solver`).
     onset : (N, 2) float
         Added axial and tangential speed [m/s].
     thickness : (N,) float
@@ -331,7 +331,7 @@ class Effect:
         """Set kernel numbers; the base does nothing."""
 
     def duct(self) -> Mapping[str, float] | None:
-        """Numbers of :class:`bemt.duct.DuctFlow` that the effect sets, which ducts an open rotor; None: none."""
+        """Numbers of :class:`bemt.bem.duct.DuctFlow` that the effect sets, which ducts an open rotor; None: none."""
         return None
 
     def flow(self, flow: Flow) -> None:

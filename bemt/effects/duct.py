@@ -15,7 +15,7 @@ class Duct(Effect):
     Notes
     -----
     T / T_rotor = 2 sigma_w at rest, sigma_w exit over disk area; fades with speed (McCormick 1967, Aerodynamics of
-    V/STOL Flight, ch. 9; Pereira 2008, PhD thesis Univ. of Maryland, eq. 2.20-2.40; see :mod:`bemt.duct`).  A case
+    V/STOL Flight, ch. 9; Pereira 2008, PhD thesis Univ. of Maryland, eq. 2.20-2.40; see :mod:`bemt.bem.duct`).  A case
     with a duct has it from its geometry and not from here; ``effects_off = ["duct"]`` leaves it out.  Lip, walls and
     gap of the case are kept where it states them.
     """

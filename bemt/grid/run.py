@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.tables import plain, write_atomic
+from bemt.bem.evaluate import Points, air_arrays, evaluate, prepare
 from bemt.case import Case
-from bemt.evaluate import Points, air_arrays, evaluate, prepare
 from bemt.grid.formats import Block, encode, join
 
 if TYPE_CHECKING:

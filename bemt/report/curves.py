@@ -84,7 +84,7 @@ def case_curves(case: Case, threads: int = 1) -> dict[str, Any]:
         ``over_J`` and ``over_rpm``, each with the abscissa, the channels of BEMT, ``u_`` of each, the K1/K2 values and
         the tip Mach number, arrays with NaN where not converged.
     """
-    from bemt.evaluate import evaluate, k1k2, prepare
+    from bemt.bem.evaluate import evaluate, k1k2, prepare
     from bemt.sweep.case import spread
 
     ready = prepare(case)
@@ -145,8 +145,8 @@ def radial_curves(case: Case) -> dict[str, Any]:
         ``r_over_R`` [1], ``dT_dr`` [N/m] and ``dQ_dr`` [N] of all blades, ``alpha_deg`` [deg], ``cl`` [1], ``M`` [1],
         ``Re`` [1].
     """
-    from bemt import solver
-    from bemt.evaluate import prepare
+    from bemt.bem import solver
+    from bemt.bem.evaluate import prepare
 
     prep = prepare(case).prep
     answer = solver.solve(prep, case.rpm, case.airspeed_m_s, case.air(), radial=True)
@@ -178,7 +178,7 @@ def refinement(case: Case) -> dict[str, Any]:
         ``stations`` (ascending), ``thrust_N`` [N], ``torque_Nm`` [N m], and ``grid_study`` of the thrust on the three
         finest as :class:`bemt.grid_study.GridStudy` has it, or None.
     """
-    from bemt.evaluate import evaluate, prepare
+    from bemt.bem.evaluate import evaluate, prepare
     from bemt.grid_study import grid_study
 
     air = case.air()

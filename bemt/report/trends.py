@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 def _line(case: Case, key: str, values: Array) -> dict[str, Any]:
     """Solve one point for each value of a key of the case."""
-    from bemt.evaluate import evaluate, k1k2, prepare
+    from bemt.bem.evaluate import evaluate, k1k2, prepare
 
     out: dict[str, list[float]] = {name: [] for name in ("thrust_N", "k1k2_thrust_N", "M_tip", "power_W")}
     for value in values:
@@ -64,7 +64,7 @@ def families(case: Case) -> dict[str, Any]:
         ``name``, and ``diameter``, ``pitch``, ``rpm`` with their abscissa (``diameter_in``, ``pitch_in`` [in], ``rpm``
         [rev/min]), ``thrust_N``, ``k1k2_thrust_N`` [N], ``M_tip`` [1], ``power_W`` [W]; NaN where there is no answer.
     """
-    from bemt.evaluate import evaluate, k1k2, prepare
+    from bemt.bem.evaluate import evaluate, k1k2, prepare
 
     ready = prepare(case)
     D_in, p_in = case.diameter_m / INCH, ready.pitch_m / INCH

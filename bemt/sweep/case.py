@@ -23,7 +23,7 @@ from bemt.importers import references as reference_file
 
 if TYPE_CHECKING:
     from bemt.air import Air
-    from bemt.evaluate import Points
+    from bemt.bem.evaluate import Points
 
 __all__ = ["ROW_SOURCES", "solve_case", "spread"]
 
@@ -44,7 +44,7 @@ def _conditions(
     case: Case, refs: Sequence[reference_file.Reference]
 ) -> tuple[list[tuple[float, float, float]], Conditions]:
     """Distinct operating points: the case's own first, then those of its references."""
-    from bemt.evaluate import air_arrays
+    from bemt.bem.evaluate import air_arrays
 
     own = case.air()
     wanted = dict.fromkeys(
@@ -183,7 +183,7 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
     InputError
         When the recorded values, polars or effects of the case are faulty.
     """
-    from bemt.evaluate import evaluate, k1k2, prepare
+    from bemt.bem.evaluate import evaluate, k1k2, prepare
 
     refs = _references(case)
     points, (rpm, speed, air) = _conditions(case, refs)

@@ -141,8 +141,8 @@ def compare(
     Rows
         Measured and computed values, point by point.
     """
-    from bemt import solver
     from bemt.air import Air
+    from bemt.bem import solver
     from bemt.sections import polars
     from bemt.sections import rule as section_rule
 

@@ -1,6 +1,6 @@
 """Loads at recorded points with every hook of the effects: what the rotor meets, the solver, what follows.
 
-:mod:`bemt.solver` knows effects that change a rotor; effects that change single points (a wall behind it, a lagging
+:mod:`bemt.bem.solver` knows effects that change a rotor; effects that change single points (a wall behind it, a lagging
 inflow, wrong density) act here, around it.  Cases and diagnosis share this one way.
 """
 
@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bemt import solver
+from bemt.bem import solver
 from bemt.effects.base import Effect, Flow, Loads
 
 if TYPE_CHECKING:
     from bemt.air import Air
-    from bemt.duct import DuctFlow
+    from bemt.bem.duct import DuctFlow
     from bemt.sections.polars import Polar
     from geometry.rotor import Rotor
 
@@ -72,7 +72,7 @@ class Model:
         Returns
         -------
         Prepared
-            For :func:`bemt.solver.solve`.
+            For :func:`bemt.bem.solver.solve`.
         """
         chosen = tuple(sorted((e for e in effects if acts_on_rotor(e)), key=lambda e: (e.order, e.id)))
         key = (chosen, level)

@@ -1,7 +1,7 @@
 """Compiled blade-element-momentum kernel: find the inflow angle of every station, integrate over the blade.
 
 Nothing here knows files, units or effects: every effect has already been baked into plain arrays and a few numbers by
-:mod:`bemt.solver`; the physics is in :mod:`bemt._residual`.
+:mod:`bemt.bem.solver`; the physics is in :mod:`bemt.bem.residual`.
 
 The stations of one point are solved side by side (SIMD lanes) by Newton steps inside a bracket that always holds a
 root, starting from the unstalled side.  A station that needs more than a few steps is finished alone, by the same
@@ -21,8 +21,9 @@ import numpy as np
 from numba import carray, types
 from numba.core import cgutils
 
-from bemt import _residual, _vecmath
-from bemt._residual import (
+from bemt.bem import residual as _residual
+from bemt.bem import vecmath as _vecmath
+from bemt.bem.residual import (
     N_BRIDGE,
     N_DUCTED,
     N_LEAK,
@@ -35,9 +36,9 @@ from bemt._residual import (
     lookup_plain,
     open_rotor,
 )
-from bemt._vecmath import atan2, fingerprint, inlined, intrinsic, njit, wide
+from bemt.bem.vecmath import atan2, fingerprint, inlined, intrinsic, njit, wide
 
-# Point and station status, in the order of severity; bemt.solver turns them into words.
+# Point and station status, in the order of severity; bemt.bem.solver turns them into words.
 OK, NOT_CONVERGED, JUMP, NOT_FINITE = range(4)
 
 # Columns of ``st``, of the packed points, of ``out`` and of ``radial``.
@@ -395,7 +396,7 @@ def entry(ducted: bool, plain: bool) -> Callable[..., None]:
         tab : (L,)
             Section tables, flat: station, Mach number squared, Reynolds number, angle, (cl, cd).
         par : (27,)
-            The numbers ``num`` of :mod:`bemt._residual`, then the grid (see the source).
+            The numbers ``num`` of :mod:`bemt.bem.residual`, then the grid (see the source).
         out : (P, 10)
             Filled: T, Q, mass flow, mass flow times disk speed, stator thrust, worst status, its station, number of
             stations in the turbulent windmill or vortex-ring state, where drag more than halves W, with reversed flow.

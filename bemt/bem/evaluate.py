@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bemt import coefficients as co
-from bemt import duct as duct_model
-from bemt import effects, empirical, forward, solver
+from bemt import effects, empirical
 from bemt.base.errors import Fault, InputError
+from bemt.bem import duct as duct_model
+from bemt.bem import forward, solver
 from bemt.sections import polars
 from bemt.sections import rule as section_rule
 
@@ -35,7 +36,7 @@ class Ready:
 
     Parameters
     ----------
-    model : bemt.forward.Model
+    model : bemt.bem.forward.Model
         Rotor and tables, to prepare with any effects.
     effects : tuple of Effect
         Physics that is on.

@@ -1,7 +1,7 @@
 """Blade-element-momentum solver: prepare a rotor once, solve any number of operating points.
 
 :func:`prepare` bakes geometry, section tables and effects into arrays; :func:`solve` hands them to the compiled
-kernel (:mod:`bemt._kernel`), in batch, and gives back a :class:`Solution`.
+kernel (:mod:`bemt.bem.kernel`), in batch, and gives back a :class:`Solution`.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bemt import _kernel as K
-from bemt import _kernel_arrays as arrays
-from bemt import _residual as res
-from bemt._kernel_arrays import M2_STEP
 from bemt.air import Air
+from bemt.bem import kernel as K
+from bemt.bem import packing as arrays
+from bemt.bem import residual as res
+from bemt.bem.packing import M2_STEP
 from bemt.effects import Effect, standard
 from bemt.effects.base import Baking
 from bemt.sections.polars import ALPHA_GRID, RE_FIXED, fixed_re
 
 if TYPE_CHECKING:
-    from bemt.duct import DuctFlow
+    from bemt.bem.duct import DuctFlow
     from bemt.sections.polars import Polar
     from geometry.blade import Stations
     from geometry.rotor import Rotor
@@ -66,11 +66,11 @@ class Prepared:
     duct : DuctFlow or None
         Momentum numbers of the duct.
     st : (N, 12) float
-        Columns ``S_*`` of :mod:`bemt._kernel`, in SI units.
+        Columns ``S_*`` of :mod:`bemt.bem.kernel`, in SI units.
     tab : (N, Nm, Nr, Na, 2) float
         cl and cd over Mach number squared, Reynolds number and angle of attack [1].
     num, grid : (11,), (16,) float
-        Numbers of the effects and of the table axes, see :mod:`bemt._residual` and :mod:`bemt._kernel` [SI units].
+        Numbers of the effects and of the table axes, see :mod:`bemt.bem.residual` and :mod:`bemt.bem.kernel` [SI units].
     """
 
     rotor: Rotor
@@ -166,7 +166,7 @@ def prepare(
     effects : iterable of Effect, optional
         Physics that is on; default :func:`bemt.effects.standard`.
     duct : DuctFlow, optional
-        Momentum numbers of a duct, see :mod:`bemt.duct`.
+        Momentum numbers of a duct, see :mod:`bemt.bem.duct`.
     n_stations : int
         Blade elements, cosine spaced [1].
     stations : Stations, optional
@@ -238,13 +238,13 @@ def _enclosed(duct: DuctFlow | None, numbers: Mapping[str, float] | None, rotor:
     """Duct with the numbers that an effect sets; an open rotor gets a duct of its own."""
     if numbers is None:
         return duct
-    from bemt.duct import DuctFlow
+    from bemt.bem.duct import DuctFlow
 
     return replace(duct or DuctFlow(1.0, span=rotor.R - rotor.Rhub), **numbers)
 
 
 def _numbers(bake: Baking, duct: DuctFlow | None) -> Array:
-    """Numbers of effects and duct in the order of :mod:`bemt._residual`."""
+    """Numbers of effects and duct in the order of :mod:`bemt.bem.residual`."""
     n = bake.num
     num = np.zeros(res.N_NUM)
     num[res.N_TIP] = n.get("tip", 0.0)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import _kernel as K
-from bemt import _residual as res
+from bemt.bem import kernel as K
+from bemt.bem import residual as res
 from bemt.effects.base import Baking
 from bemt.sections.polars import (
     ALPHA_COARSE_STEP,

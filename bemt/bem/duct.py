@@ -101,7 +101,7 @@ class DuctFlow:
         rho, V : (P,) float
             Density [kg/m3], onset speed [m/s].
         out : (P, 8) float
-            Kernel output [N, N m, kg/s, kg m/s2, ...], see :func:`bemt._kernel.entry`.
+            Kernel output [N, N m, kg/s, kg m/s2, ...], see :func:`bemt.bem.kernel.entry`.
 
         Returns
         -------
@@ -129,7 +129,7 @@ def duct_flow(duct: Duct, rotor: Rotor) -> DuctFlow:
     Returns
     -------
     DuctFlow
-        For :func:`bemt.solver.prepare`.
+        For :func:`bemt.bem.solver.prepare`.
 
     Raises
     ------
