@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from bemt import coefficients as co
-from bemt import empirical as k
 from bemt.base.units import G0, INCH, KGF, LBF, SLIP_FACTORS
+from bemt.formula import k1k2 as k
 
 REPRODUCED = "reproduced"
 ROUNDING = "reproduced within rounding"

@@ -26,7 +26,7 @@ MANY: dict[str, Any] = {"action": "extend", "nargs": "+"}
 _MODULES = {"sweep": "bemt.sweep.command", "report": "bemt.report",
             "validate": "bemt.validate.command", "reproduce": "bemt.reproduce", "bench": "bemt.bench",
             "import": "bemt.importing.command", "export": "bemt.export.command", "cfd": "bemt.cfd.command",
-            "calibrate": "bemt.calibrate.command", "estimate": "bemt.calibrate.estimate_command",
+            "calibrate": "bemt.commands.calibrate", "estimate": "bemt.commands.estimate",
             "data": "bemt.data.command", "prove": "bemt.conceal.prove",
             "effects": "bemt.effects_list", "diagnose": "bemt.diagnose.command", "plan": "bemt.diagnose.command",
             "stations": "bemt.stations", "map": "bemt.drive.map_command", "motor": "bemt.drive.motor_command",

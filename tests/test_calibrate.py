@@ -12,10 +12,10 @@ import pytest
 from bemt import cli
 from bemt import coefficients as co
 from bemt.base.errors import InputError
-from bemt.calibrate import command as calibrate
-from bemt.calibrate import compact, fit, gather, limit, refit, score
-from bemt.calibrate import points as reading
-from bemt.calibrate.points import Points, Propeller
+from bemt.commands import calibrate
+from bemt.formula import compact, fit, gather, limit, refit, score
+from bemt.formula import points as reading
+from bemt.formula.points import Points, Propeller
 
 INCH = 0.0254
 SIZES = [(8, 4), (8, 6), (9, 4.5), (9, 7), (10, 5), (10, 7), (11, 5.5), (11, 8), (12, 6), (12, 10), (14, 5), (14, 8)]

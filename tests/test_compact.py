@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from bemt import coefficients as co
 from bemt.air import Air
 from bemt.base.errors import InputError
-from bemt.calibrate import compact, estimate, gather, refit, score
-from bemt.calibrate.points import Points
+from bemt.formula import compact, estimate, gather, refit, score
+from bemt.formula.points import Points
 
 INCH = 0.0254
 QUICK = settings(deadline=None, max_examples=40)

@@ -7,10 +7,11 @@ import json
 import numpy as np
 import pytest
 
-from bemt import cli, empirical
+from bemt import cli
 from bemt.base.errors import InputError
 from bemt.base.units import INCH
-from bemt.calibrate.estimate import estimate
+from bemt.formula import k1k2 as empirical
+from bemt.formula.estimate import estimate
 
 
 def told(capsys: pytest.CaptureFixture[str], *words: str) -> dict[str, object]:

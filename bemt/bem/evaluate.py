@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bemt import coefficients as co
-from bemt import effects, empirical
+from bemt import effects
 from bemt.base.errors import Fault, InputError
 from bemt.bem import duct as duct_model
 from bemt.bem import forward, solver
+from bemt.formula import k1k2 as empirical
 from bemt.sections import polars
 from bemt.sections import rule as section_rule
 
@@ -312,7 +313,7 @@ def k1k2(
 
     Returns
     -------
-    bemt.empirical.Estimate
+    bemt.formula.k1k2.Estimate
         Thrust, uncertainty, flags. The pitch is the one that the case states, else that of the blade at 0.75 R.
     """
     case = case.replaced(overrides)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from bemt.empirical import D_OVER_P_USABLE, M_TIP_LIMIT
+from bemt.formula.k1k2 import D_OVER_P_USABLE, M_TIP_LIMIT
 from bemt.report.markup import esc, num, section, table
 from bemt.report.plot import COLOURS, DASHES, Mark, Plot, Trace, figure
 from bemt.report.trends import ROBOT

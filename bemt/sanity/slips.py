@@ -19,8 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import empirical
 from bemt.base import units
+from bemt.formula import k1k2 as empirical
 from bemt.sanity.base import Facts, Finding, check_for
 
 __all__ = ["Relation", "Slip", "relations", "slips"]

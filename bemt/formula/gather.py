@@ -22,7 +22,7 @@ from bemt import importers
 from bemt.air import Air, isa_pressure
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH, ZERO_CELSIUS
-from bemt.calibrate.points import Points, Propeller, Rows, join
+from bemt.formula.points import Points, Propeller, Rows, join
 from bemt.imported import Imported
 from bemt.importers import apc, uiuc
 from bemt.importers._uiuc_names import parse_file_name

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.calibrate.points import Points
-from bemt.calibrate.score import FAR, NEAR, X_EDGES
-from bemt.calibrate.text import NAMES
+from bemt.formula.points import Points
+from bemt.formula.score import FAR, NEAR, X_EDGES
+from bemt.formula.text import NAMES
 
 Array = NDArray[np.float64]
 

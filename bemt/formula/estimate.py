@@ -11,7 +11,7 @@ from bemt import coefficients as co
 from bemt.air import Air
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH, KGF
-from bemt.calibrate.compact import (
+from bemt.formula.compact import (
     BAND_X,
     BANDS,
     DIAMETER_RANGE,
@@ -231,7 +231,7 @@ def estimate(
     measured_pitch_m : float or array, optional
         2 pi 0.75 R tan(blade angle there); the fifth. [m]
     series : str, optional
-        Maker and series, as in `bemt.calibrate.compact.SERIES`.
+        Maker and series, as in `bemt.formula.compact.SERIES`.
     ducted : bool
         Whether the rotor runs in a duct; only flagged, the formula has no duct.
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bemt import coefficients as co
 from bemt.air import Air
 from bemt.base.errors import Fault, InputError
-from bemt.calibrate import compact
+from bemt.formula import compact
 
 Array = NDArray[np.float64]
 

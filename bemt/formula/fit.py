@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import empirical
 from bemt.base.errors import Fault, InputError
-from bemt.calibrate.points import Points
+from bemt.formula import k1k2 as empirical
+from bemt.formula.points import Points
 
 Array = NDArray[np.float64]
 

@@ -31,7 +31,7 @@ the mean series, and the series' own a0 shrinks to it as far as its propellers d
 
 Held out, not blind: volume 2 had been scored with earlier versions; that its GWS blades reach zero thrust at J = P/D
 was known when series were tried; GWS has its a0 from three propellers of volume 1. What the inputs can carry at all is
-printed by `bemt calibrate` (:mod:`bemt.calibrate.limit`); scores are in ``reports/calibration``.
+printed by `bemt calibrate` (:mod:`bemt.formula.limit`); scores are in ``reports/calibration``.
 
 References
 ----------

@@ -1,11 +1,11 @@
 """``python -m bemt calibrate FILES``: K1/K2 refitted on measured propellers, and the compact formula beside it.
 
 Beside each other: the thesis's constants; its goal-seek (K2 = 1.5, K1 by mean error) repeated on the data; a robust
-refit at rest, and one that includes flight; the compact formula (:mod:`bemt.calibrate.compact`), refitted when enough
+refit at rest, and one that includes flight; the compact formula (:mod:`bemt.formula.compact`), refitted when enough
 propellers have a chord, from measured chords and pitches, from measured chords, and from labels alone. Fitted models
 are scored on FILES with the propeller (compact: also its maker) left out of the fit, and on ``--test`` files with the
 constants of FILES, which must be other files (without FILES, the test is left out of the data found); beside them
-what the same inputs can carry at all (:mod:`bemt.calibrate.limit`).
+what the same inputs can carry at all (:mod:`bemt.formula.limit`).
 
 Schema ``bemt.calibration/1``: ``k1k2``, ``compact``, ``scores`` (``calibration`` and ``test``: ``static``, ``flight``,
 ``J/(P/D)``, ``chord_known``, ``bands``, ``power``, ``coverage``, ``limit``), ``refused``, ``notes``.
@@ -25,12 +25,12 @@ from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.folders import find_data
-from bemt.calibrate import compact, refit, score
-from bemt.calibrate import fit as fitting
-from bemt.calibrate.gather import files, load
-from bemt.calibrate.limit import limit
-from bemt.calibrate.points import Points
-from bemt.calibrate.text import text
+from bemt.formula import compact, refit, score
+from bemt.formula import fit as fitting
+from bemt.formula.gather import files, load
+from bemt.formula.limit import limit
+from bemt.formula.points import Points
+from bemt.formula.text import text
 
 Array = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ __all__ = ["SCHEMA", "calibrate", "run"]
 
 SCHEMA = "bemt.calibration/1"
 MODELS = {"compact_pitch": "pitch", "compact": "chord", "compact_no_chord": "label"}
-"""Compact models by what they are given, of `bemt.calibrate.refit.GIVEN`."""
+"""Compact models by what they are given, of `bemt.formula.refit.GIVEN`."""
 
 
 def _counts(points: Points) -> dict[str, int]:
@@ -240,7 +240,7 @@ def run(args: argparse.Namespace) -> int:
     document = {"schema": document["schema"], **names, **document}
     rendered, page = json_text(document), text(document)
     if args.out:
-        from bemt.calibrate.figure import draw
+        from bemt.formula.figure import draw
 
         folder = Path(args.out)
         write_atomic(folder / "calibration.json", rendered)

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.units import INCH
-from bemt.calibrate import compact
-from bemt.calibrate.points import Points
-from bemt.calibrate.refit import Fitted, has, predict
+from bemt.formula import compact
+from bemt.formula.points import Points
+from bemt.formula.refit import Fitted, has, predict
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -167,7 +167,7 @@ def coverage(points: Points, fitted: Fitted, given: str) -> dict[str, float | No
     fitted : Fitted
         Constants and series of the formula.
     given : str
-        Of `bemt.calibrate.refit.GIVEN`; only propellers that have it are counted.
+        Of `bemt.formula.refit.GIVEN`; only propellers that have it are counted.
 
     Returns
     -------

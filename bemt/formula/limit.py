@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.calibrate.points import Points
-from bemt.calibrate.refit import MIN_PROPELLERS, has
-from bemt.calibrate.score import FAR, NEAR
+from bemt.formula.points import Points
+from bemt.formula.refit import MIN_PROPELLERS, has
+from bemt.formula.score import FAR, NEAR
 
 Array = NDArray[np.float64]
 
@@ -75,14 +75,14 @@ def limit(points: Points, given: str) -> dict[str, Any] | None:
     points : Points
         Measured points; open propellers at rest are used, with chord (and measured pitch) where `given` says so.
     given : str
-        ``label``, ``chord`` or ``pitch``: what a formula may know, see `bemt.calibrate.refit.GIVEN`.
+        ``label``, ``chord`` or ``pitch``: what a formula may know, see `bemt.formula.refit.GIVEN`.
 
     Returns
     -------
     dict or None
         ``propellers``; ``within_13``, ``within_26``: shares with the propeller left out; ``maker_out_13``,
         ``maker_out_26``: with its maker; ``scatter``: of ln CT between propellers alike in all inputs; ``ideal_13``,
-        ``ideal_26``: shares that it leaves. [-] None with fewer than `bemt.calibrate.refit.MIN_PROPELLERS`.
+        ``ideal_26``: shares that it leaves. [-] None with fewer than `bemt.formula.refit.MIN_PROPELLERS`.
     """
     from scipy.optimize import minimize
     from scipy.special import erf

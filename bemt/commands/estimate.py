@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from bemt import empirical
 from bemt.air import Air
 from bemt.base.errors import EXIT_OK, Fault, InputError
 from bemt.base.tables import json_text, number_text, text_table
 from bemt.base.units import INCH
-from bemt.calibrate.estimate import POSSIBLE, estimate, length_faults
 from bemt.case.schema import AIRSPEED, RPM
+from bemt.formula import k1k2 as empirical
+from bemt.formula.estimate import POSSIBLE, estimate, length_faults
 from geometry.common import GeometryError
 from geometry.designation import parse_designation
 

@@ -1,4 +1,4 @@
-"""Constants and series of :mod:`bemt.calibrate.compact` from measured points, and its bands with the maker left out.
+"""Constants and series of :mod:`bemt.formula.compact` from measured points, and its bands with the maker left out.
 
 Thrust first, on propellers whose chord is known, as a mixed model: eight constants for all, a0 of each series, a0 and
 level of each propeller as random effects (`SIGMA`). So Reynolds number acts as it does WITHIN propellers, and a series
@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.calibrate import compact
-from bemt.calibrate.points import Points
+from bemt.formula import compact
+from bemt.formula.points import Points
 from bemt.importers._uiuc_names import FAMILIES
 
 Array = NDArray[np.float64]
@@ -51,7 +51,7 @@ class Fitted:
 
 
 PUBLISHED = Fitted(compact.CONSTANTS, compact.SERIES, 0, 0)
-"""What :mod:`bemt.calibrate.compact` holds."""
+"""What :mod:`bemt.formula.compact` holds."""
 
 
 def _zero_lift(points: Points, series: Mapping[str, compact.Series]) -> Array:
