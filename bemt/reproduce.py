@@ -61,7 +61,7 @@ def uiuc_statistics(folder: Path) -> dict[str, Any]:
     Thrust follows from CT at 1.225 kg/m3: density cancels in the ratio, and so does n.  Propellers without a nominal
     pitch are left out; 3- and 4-blade ones are kept, as the model has no blade count.
     """
-    from bemt.importers.uiuc import scan_folder
+    from bemt.readers.uiuc import scan_folder
 
     static: list[np.ndarray] = []
     x: list[np.ndarray] = []

@@ -240,7 +240,8 @@ def test_the_commands_of_the_documents_exist(project: Path, document: str) -> No
 @pytest.fixture
 def pages(project: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A folder with the cases, whose bemt/effects and bemt/importers are scanned like the project's own."""
-    from bemt import effects, importers
+    from bemt import effects
+    from bemt import readers as importers
 
     shutil.copytree(project / "cases", tmp_path / "cases")
     monkeypatch.chdir(tmp_path)

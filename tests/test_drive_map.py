@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bemt import importers
+from bemt import readers as importers
 from bemt.base.errors import InputError
 from bemt.cli import main
 from bemt.drive import bench_map, map_export, map_scatter

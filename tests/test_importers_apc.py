@@ -1,4 +1,4 @@
-"""The promise of bemt.importers.apc: PE0 and PER3 in SI units, checked against themselves, nothing dropped."""
+"""The promise of bemt.readers.apc: PE0 and PER3 in SI units, checked against themselves, nothing dropped."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bemt import importers
+from bemt import readers as importers
 from bemt.base import units
 from bemt.base.errors import InputError
-from bemt.importers import apc
+from bemt.readers import apc
 from bemt.series import Series
 
 NAMES = ["STATION", "CHORD", "PITCH", "PITCH", "PITCH", "SWEEP", "THICKNESS", "TWIST", "MAX-THICK", "CROSS-SECTION"]

@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt import importers
+from bemt import readers as importers
 from bemt.base.errors import InputError
-from bemt.imported import Imported
-from bemt.importers import _cfd
 from bemt.importing import document, import_file
+from bemt.readers import _cfd
+from bemt.readers._imported import Imported
 
 RNG = np.random.default_rng(20)
 N = 40

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from bemt.base.errors import InputError
-from bemt.imported import Imported
-from bemt.importers._headings import heading
 from bemt.importing import import_file
+from bemt.readers._headings import heading
+from bemt.readers._imported import Imported
 
 Write = Callable[..., Path]
 

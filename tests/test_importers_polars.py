@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt import importers
+from bemt import readers as importers
 from bemt.base.errors import InputError
-from bemt.importers import polar_aerodyn, polar_c81, polar_csv, polar_xfoil
+from bemt.readers import polar_aerodyn, polar_c81, polar_csv, polar_xfoil
 from bemt.sections.polars import ALPHA_GRID, DEFAULT_RE, Polar
 
 KINDS = {m.KIND: m for m in (polar_aerodyn, polar_c81, polar_csv, polar_xfoil)}

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bemt import importers
+from bemt import readers as importers
 from bemt.base import units
 from bemt.base.errors import InputError
-from bemt.imported import Imported
-from bemt.importers import generic_csv, jmajew, pybemt_ini, rcbenchmark
-from bemt.importers._headings import heading
-from bemt.importers._recording import NO_VALUE
+from bemt.readers import generic_csv, jmajew, pybemt_ini, rcbenchmark
+from bemt.readers._headings import heading
+from bemt.readers._imported import Imported
+from bemt.readers._recording import NO_VALUE
 
 RC_HEAD = (
     "Time (s),ESC signal (µs),Servo 1 (µs),AccX (g),Torque (N·m),Thrust (gf),Voltage (V),Current (A),"

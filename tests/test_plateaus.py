@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bemt import importers
+from bemt import readers as importers
 from bemt.base.errors import InputError
 from bemt.reduction.plateaus import Plateaus, Settings, find, standard_error
 

@@ -15,12 +15,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bemt import coefficients as co
-from bemt import importers
+from bemt import readers as importers
 from bemt.air import Air
 from bemt.base import units
 from bemt.base.errors import InputError
 from bemt.cli import main
-from bemt.imported import Channel, Imported
+from bemt.readers._imported import Channel, Imported
 from bemt.reduction.channels import view
 from bemt.reduction.reduce import Reduced, reduce
 from bemt.reduction.rows import is_samples

@@ -12,8 +12,8 @@ import pytest
 
 from bemt.base import units
 from bemt.base.errors import InputError
-from bemt.imported import Channel, Imported
 from bemt.importing import import_file
+from bemt.readers._imported import Channel, Imported
 from bemt.sanity.check import Finding, check
 from bemt.series import Series
 

@@ -13,7 +13,7 @@ import pytest
 from bemt import effects
 from bemt.base.errors import InputError
 from bemt.base.tables import json_text
-from bemt.importers import uiuc
+from bemt.readers import uiuc
 from bemt.sections import rule as section_rule
 from bemt.validate import command, match, points, text
 

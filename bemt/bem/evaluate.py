@@ -152,8 +152,8 @@ def _polars(case: Case, anchors: Sequence[tuple[float, Any]]) -> list[tuple[floa
 
 def _user_polars(case: Case, given: Sequence[Mapping[str, Any]]) -> list[tuple[float, polars.Polar]]:
     """Read the tables of a case; several XFOIL files at one r/R are its Reynolds numbers."""
-    from bemt import importers
-    from bemt.importers import polar_xfoil
+    from bemt import readers as importers
+    from bemt.readers import polar_xfoil
 
     groups: dict[float, list[Mapping[str, Any]]] = {}
     for item in given:

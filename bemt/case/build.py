@@ -66,7 +66,7 @@ def _anchors(case: Case) -> list[tuple[float, Airfoil]]:
 
 
 def _dat(path: Path) -> Airfoil:
-    from bemt.importers import load_text
+    from bemt.readers import load_text
 
     text = load_text(path).text
     return _as_input(path.as_posix(), "", lambda: parse_dat(text, path.stem))
@@ -74,7 +74,7 @@ def _dat(path: Path) -> Airfoil:
 
 def _read_stations(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Columns r/R, c/R and beta [rad] of a stations CSV; faults carry line and column."""
-    from bemt.importers import load_text, number
+    from bemt.readers import load_text, number
 
     faults: list[Fault] = []
     rows: list[list[float]] = []
@@ -137,12 +137,12 @@ def _blade(case: Case) -> Blade:
     if "stations" in blade:
         x, c, beta = _read_stations(case.folder / blade["stations"])
     elif "uiuc" in blade:
-        from bemt.importers._uiuc_tables import read_geometry
+        from bemt.readers._uiuc_tables import read_geometry
 
         table = read_geometry(case.folder / blade["uiuc"])
         x, c, beta = table.r_R, table.c_R, np.radians(table.beta_deg)
     else:
-        from bemt.importers.apc import read_pe0
+        from bemt.readers.apc import read_pe0
 
         apc = read_pe0(case.folder / blade["apc"])
         x, c, beta = apc.r_m / apc.radius_m, apc.chord_m / apc.radius_m, apc.beta_rad

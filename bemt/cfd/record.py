@@ -18,7 +18,7 @@ from bemt.base.tables import csv_text, plain, write_atomic
 from bemt.cfd.schema import Campaign
 from bemt.cfd.worker import DRIFT_LIMIT, SCATTER_LIMIT, Outcome
 from bemt.grid_study import grid_study, ratios
-from bemt.importers import number
+from bemt.readers import number
 
 __all__ = ["COLUMNS", "Record", "grid_studies", "grid_uncertainty"]
 

@@ -115,7 +115,7 @@ def history_of(folder: Path, settings: Settings) -> Array:
     InputError
         When a file is absent or damaged.
     """
-    from bemt.importers.openfoam_forces import read
+    from bemt.readers.openfoam_forces import read
 
     def column(name: str, file: str, channel: str) -> Array:
         return np.asarray(read(folder / "postProcessing" / name / "0" / file).channels[channel].values, dtype=float)

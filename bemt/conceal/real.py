@@ -22,7 +22,7 @@ from bemt.conceal.items import Item, recording_text
 from bemt.sections import rule as section_rule
 
 if TYPE_CHECKING:
-    from bemt.importers.uiuc import UiucPropeller
+    from bemt.readers.uiuc import UiucPropeller
 
 __all__ = ["SETS", "draw_real", "manifest"]
 
@@ -148,7 +148,7 @@ def _dimensional(p: UiucPropeller) -> dict[str, Array]:
 
 
 def _uiuc(rng: np.random.Generator) -> Iterator[Item]:
-    from bemt.importers import uiuc
+    from bemt.readers import uiuc
 
     root = find_data("uiuc")
     folders = [] if root is None else [f for f in (root / "volume-1", root / "volume-2") if f.is_dir()] or [root]

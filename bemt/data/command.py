@@ -101,7 +101,7 @@ def get(
         the archive cannot be had, is not sound, or holds no propeller; the folder
         is as before then.
     """
-    from bemt.importers.uiuc import scan_folder
+    from bemt.readers.uiuc import scan_folder
 
     if source is not None and url is not None:
         raise InputError(Fault("", "--url", url, "none beside --from, which fetches nothing", "Give one of the two"))

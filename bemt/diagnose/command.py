@@ -28,7 +28,7 @@ from bemt.series import Series
 if TYPE_CHECKING:
     from bemt.case import Case
     from bemt.diagnose.record import Record
-    from bemt.imported import Imported
+    from bemt.readers._imported import Imported
     from bemt.reduction.channels import Recorded
 
 __all__ = ["load", "run"]

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from bemt import importers
+from bemt import readers as importers
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
 from bemt.base.tables import json_text, number_text, text_table, write_atomic
 from bemt.drive import bench_map, map_export, map_points, map_scatter, outputs, picture
-from bemt.imported import Imported
+from bemt.readers._imported import Imported
 
 __all__ = ["run"]
 

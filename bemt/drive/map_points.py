@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
-from bemt.imported import Imported
+from bemt.readers._imported import Imported
 from bemt.reduction import plateaus
 
 __all__ = ["QUANTITIES", "MapPoints", "join", "points"]

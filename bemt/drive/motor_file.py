@@ -54,12 +54,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import importers
+from bemt import readers as importers
 from bemt.base.errors import Fault, InputError
 from bemt.base.toml import Collector, Key, check_table, load_toml
 from bemt.drive import motor_constant as mc
 from bemt.drive.motor_errors import Measured
-from bemt.imported import Imported
+from bemt.readers._imported import Imported
 
 __all__ = ["SCHEMA", "MotorTrials", "read", "read_waveform"]
 

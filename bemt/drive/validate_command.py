@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import importers
+from bemt import readers as importers
 from bemt.base.errors import EXIT_OK, Fault, InputError
 from bemt.base.tables import json_text, number_text, text_table, write_atomic
 from bemt.drive import identify, map_points, picture, validation

@@ -18,14 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import coefficients as co
-from bemt import importers
+from bemt import readers as importers
 from bemt.air import Air, isa_pressure
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH, ZERO_CELSIUS
 from bemt.formula.points import Points, Propeller, Rows, join
-from bemt.imported import Imported
-from bemt.importers import apc, uiuc
-from bemt.importers._uiuc_names import parse_file_name
+from bemt.readers import apc, uiuc
+from bemt.readers._imported import Imported
+from bemt.readers._uiuc_names import parse_file_name
 
 __all__ = ["LAW_M_TIP", "RHO", "files", "load"]
 

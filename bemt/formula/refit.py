@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from bemt.formula import compact
 from bemt.formula.points import Points
-from bemt.importers._uiuc_names import FAMILIES
+from bemt.readers._uiuc_names import FAMILIES
 
 Array = NDArray[np.float64]
 

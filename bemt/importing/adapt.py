@@ -13,10 +13,10 @@ import numpy as np
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import split_suffix
-from bemt.imported import Channel, Imported
-from bemt.importers import polar_c81, uiuc
-from bemt.importers.apc import ApcPerformance
-from bemt.importers.references import Reference
+from bemt.readers import polar_c81, uiuc
+from bemt.readers._imported import Channel, Imported
+from bemt.readers.apc import ApcPerformance
+from bemt.readers.references import Reference
 from bemt.sections.polars import Polar
 from bemt.series import Series
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from bemt.averaging import Average, keep_last, revolution_average
 from bemt.base.errors import Fault, InputError
-from bemt.imported import Channel, Imported
+from bemt.readers._imported import Channel, Imported
 
 __all__ = ["Choice", "averaged", "chosen"]
 

@@ -24,14 +24,14 @@ from typing import Any
 
 import numpy as np
 
-from bemt import importers
+from bemt import readers as importers
 from bemt.averaging import relation
 from bemt.base import tables
 from bemt.base.errors import EXIT_INPUT, EXIT_OK, Fault, InputError
-from bemt.imported import Channel, Imported
 from bemt.importing.adapt import adapt, damaged_export, recognised
 from bemt.importing.choice import Choice, averaged, chosen
 from bemt.importing.recording import findings, is_recording, points_text, reduction_document, reduction_of
+from bemt.readers._imported import Channel, Imported
 from bemt.reduction.reduce import Reduced
 
 __all__ = ["SCHEMA", "Choice", "averaged", "chosen", "document", "import_file", "run"]

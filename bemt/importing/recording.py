@@ -9,7 +9,7 @@ from typing import Any
 
 from bemt.base import tables
 from bemt.base.errors import InputError
-from bemt.imported import Imported
+from bemt.readers._imported import Imported
 from bemt.reduction.reduce import Reduced, reduce
 from bemt.sanity.check import Finding, check
 

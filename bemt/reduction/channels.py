@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base import units
-from bemt.imported import Imported
+from bemt.readers._imported import Imported
 
 __all__ = ["LOADS", "MEASURED", "Lost", "Recorded", "shaft_power", "view"]
 
@@ -119,7 +119,7 @@ def view(imported: Imported, speed: str | None = None) -> Recorded:
 
     Examples
     --------
-    >>> from bemt.imported import Channel
+    >>> from bemt.readers._imported import Channel
     >>> read = Imported("table", "bench", 2, {"T_N": Channel([1.0, 2.0], "N"), "x": Channel([0.0, 1.0])})
     >>> sorted(view(read).values)
     ['thrust_N']

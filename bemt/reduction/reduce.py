@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from bemt import coefficients as co
 from bemt.air import Air
 from bemt.base.errors import Fault, InputError
-from bemt.imported import Imported
+from bemt.readers._imported import Imported
 from bemt.reduction.air import AirOfPoints, air_of
 from bemt.reduction.channels import LOADS, Lost, Recorded, shaft_power, view
 from bemt.reduction.plateaus import Settings
@@ -118,7 +118,7 @@ def reduce(
 
     Examples
     --------
-    >>> from bemt.imported import Channel
+    >>> from bemt.readers._imported import Channel
     >>> table = {"rpm": Channel([5000.0, 6000.0], "rpm"), "thrust_N": Channel([4.0, 5.8], "N")}
     >>> got = reduce(Imported("table", "bench", 2, table), diameter_m=0.254, isa_altitude_m=0.0)
     >>> got.mode, got.series["CT"].round(3).tolist(), got.series.flags[0]

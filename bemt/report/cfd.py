@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from bemt.audit import CfdFacts, audit, audit_document
-from bemt.importers import number
+from bemt.readers import number
 
 __all__ = ["attach", "cfd_runs", "is_plain", "operating_run", "radial_of"]
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base import units
-from bemt.imported import Imported
+from bemt.readers._imported import Imported
 from bemt.reduction.channels import view
 from bemt.series import Series
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bemt.imported import Imported
+from bemt.readers._imported import Imported
 from bemt.sanity import columns, signs, slips  # they register themselves
 from bemt.sanity.base import CHECKS, SEVERITIES, Finding, facts_of
 from bemt.series import Series

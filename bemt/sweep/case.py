@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from bemt import __version__, audit_remarks, effects, series
 from bemt.base import units
 from bemt.case import Assumption, Case
-from bemt.importers import references as reference_file
+from bemt.readers import references as reference_file
 
 if TYPE_CHECKING:
     from bemt.air import Air

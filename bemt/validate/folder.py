@@ -13,7 +13,7 @@ from bemt.base.units import INCH
 from bemt.validate.points import Stations
 
 if TYPE_CHECKING:
-    from bemt.importers.uiuc import UiucPropeller
+    from bemt.readers.uiuc import UiucPropeller
 
 # UIUC family of an APC blade series, by the suffix of the PE0 file's designation.
 _APC_SERIES = {"E": "apce", "SF": "apcsf", "": "apcsp", "F": "apcff", "MR": "apcmr"}
@@ -56,7 +56,7 @@ def read_folder(folder: Path) -> Folder:
     InputError
         If the folder is missing or holds no propeller that can be compared.
     """
-    from bemt.importers import uiuc
+    from bemt.readers import uiuc
 
     if not folder.is_dir():
         got = "a file" if folder.exists() else "nothing there"
@@ -86,7 +86,7 @@ def _own(p: UiucPropeller) -> Stations | None:
 
 
 def _pe0_stations(folder: Path) -> tuple[dict[tuple[str, float, float], Stations], list[str]]:
-    from bemt.importers import apc
+    from bemt.readers import apc
 
     found: dict[tuple[str, float, float], Stations] = {}
     notes: list[str] = []

@@ -11,7 +11,7 @@ from bemt.validate.points import Rows, Stations, compare
 
 if TYPE_CHECKING:
     from bemt.effects import Effect
-    from bemt.importers.uiuc import UiucPropeller
+    from bemt.readers.uiuc import UiucPropeller
 
 # A blade angle that is further off than this is no error of setting or section any more.
 REACH_DEG = 6.0

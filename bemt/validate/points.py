@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from bemt.effects import Effect
-    from bemt.importers.uiuc import UiucPropeller
+    from bemt.readers.uiuc import UiucPropeller
     from geometry.rotor import Rotor
 
 Array = NDArray[np.float64]

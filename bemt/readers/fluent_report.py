@@ -19,9 +19,9 @@ import os
 import re
 
 from bemt.base.errors import Fault, InputError
-from bemt.imported import Imported
-from bemt.importers._cfd import Column, Row, head_lines, load, numeric_table, si_unit
-from bemt.importers._cfd_record import history
+from bemt.readers._cfd import Column, Row, head_lines, load, numeric_table, si_unit
+from bemt.readers._cfd_record import history
+from bemt.readers._imported import Imported
 
 __all__ = ["KIND", "column_of", "read", "sniff"]
 

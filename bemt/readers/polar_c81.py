@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
-from bemt.importers import SourceText, head_text, load_text, number
-from bemt.importers.polar_csv import PolarRow, assemble
+from bemt.readers import SourceText, head_text, load_text, number
+from bemt.readers.polar_csv import PolarRow, assemble
 from bemt.sections.polars import Polar
 
 __all__ = ["KIND", "read", "resembles", "sniff"]

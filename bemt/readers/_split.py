@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 from bemt.base import units
 from bemt.base.errors import Fault, InputError
-from bemt.importers import SourceText, number
-from bemt.importers._headings import unit_of
+from bemt.readers import SourceText, number
+from bemt.readers._headings import unit_of
 
 __all__ = ["Table", "decimal_mark", "find_delimiter", "find_start", "some", "split_line", "split_table"]
 

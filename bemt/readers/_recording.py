@@ -1,7 +1,7 @@
 """What importers of recordings share: cells that become channels, and rows that need a flag.
 
-Nothing is dropped: every line below the heading becomes a row or a fault (:mod:`bemt.importers._split`), every cell a
-number, a text, or NaN with a flag on its row. Headings are read in :mod:`bemt.importers._headings`.
+Nothing is dropped: every line below the heading becomes a row or a fault (:mod:`bemt.readers._split`), every cell a
+number, a text, or NaN with a flag on its row. Headings are read in :mod:`bemt.readers._headings`.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from bemt.base import units
 from bemt.base.errors import Fault, InputError
-from bemt.imported import Channel, Imported
-from bemt.importers import number
-from bemt.importers._clock import clock_seconds
-from bemt.importers._headings import Heading, slug
-from bemt.importers._split import Table, some
+from bemt.readers import number
+from bemt.readers._clock import clock_seconds
+from bemt.readers._headings import Heading, slug
+from bemt.readers._imported import Channel, Imported
+from bemt.readers._split import Table, some
 
 __all__ = ["Builder", "column_numbers", "slip", "spikes"]
 

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from bemt.base.errors import Fault, InputError
-from bemt.importers import SourceText, head_text, load_text, number
+from bemt.readers import SourceText, head_text, load_text, number
 from bemt.sections.extrapolation import SectionTable, from_tables
 from bemt.sections.polars import Polar
 

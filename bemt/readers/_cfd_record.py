@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.averaging import Average, keep_last, steady_average
-from bemt.imported import Channel, Imported
-from bemt.importers import SourceText
-from bemt.importers._cfd import Column, Table, unique
+from bemt.readers import SourceText
+from bemt.readers._cfd import Column, Table, unique
+from bemt.readers._imported import Channel, Imported
 
 __all__ = ["fields", "history"]
 

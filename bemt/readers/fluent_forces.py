@@ -24,9 +24,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemt.base.errors import Fault, InputError
-from bemt.imported import Channel, Imported
-from bemt.importers import SourceText, number
-from bemt.importers._cfd import head_lines, load, si_unit, slug, unique
+from bemt.readers import SourceText, number
+from bemt.readers._cfd import head_lines, load, si_unit, slug, unique
+from bemt.readers._imported import Channel, Imported
 
 __all__ = ["KIND", "Entry", "blocks", "read", "sniff"]
 

@@ -28,11 +28,11 @@ import numpy as np
 
 from bemt.base import units
 from bemt.base.errors import Fault, InputError
-from bemt.imported import Imported
-from bemt.importers import head_text, load_text, number
-from bemt.importers._headings import heading
-from bemt.importers._recording import Array, Builder, slip, spikes
-from bemt.importers._split import Table, split_table
+from bemt.readers import head_text, load_text, number
+from bemt.readers._headings import heading
+from bemt.readers._imported import Imported
+from bemt.readers._recording import Array, Builder, slip, spikes
+from bemt.readers._split import Table, split_table
 
 __all__ = ["KIND", "read", "sniff"]
 

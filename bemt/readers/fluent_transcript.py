@@ -24,10 +24,10 @@ import numpy as np
 
 from bemt.averaging import keep_last
 from bemt.base.errors import Fault, InputError
-from bemt.imported import Channel, Imported
-from bemt.importers import SourceText, number
-from bemt.importers._cfd import head_lines, load, si_unit, slug
-from bemt.importers.fluent_forces import blocks
+from bemt.readers import SourceText, number
+from bemt.readers._cfd import head_lines, load, si_unit, slug
+from bemt.readers._imported import Channel, Imported
+from bemt.readers.fluent_forces import blocks
 
 __all__ = ["KIND", "read", "sniff"]
 

@@ -25,10 +25,10 @@ from dataclasses import replace
 import numpy as np
 
 from bemt.base.errors import Fault, InputError
-from bemt.imported import Channel, Imported
-from bemt.importers import SourceText
-from bemt.importers._cfd import Column, Row, Table, head_lines, load, numeric_table
-from bemt.importers._cfd_record import history
+from bemt.readers import SourceText
+from bemt.readers._cfd import Column, Row, Table, head_lines, load, numeric_table
+from bemt.readers._cfd_record import history
+from bemt.readers._imported import Channel, Imported
 
 __all__ = ["KIND", "read", "sniff"]
 

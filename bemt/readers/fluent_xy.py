@@ -17,11 +17,11 @@ import re
 from dataclasses import replace
 
 from bemt.base.errors import Fault, InputError
-from bemt.imported import Channel, Imported
-from bemt.importers import SourceText
-from bemt.importers._cfd import Column, Row, head_lines, load, numeric_table, unique
-from bemt.importers._cfd_record import history
-from bemt.importers.fluent_report import column_of
+from bemt.readers import SourceText
+from bemt.readers._cfd import Column, Row, head_lines, load, numeric_table, unique
+from bemt.readers._cfd_record import history
+from bemt.readers._imported import Channel, Imported
+from bemt.readers.fluent_report import column_of
 
 __all__ = ["KIND", "read", "sniff"]
 

@@ -15,8 +15,8 @@ import numpy as np
 
 from bemt.base import units
 from bemt.base.errors import Fault, InputError
-from bemt.imported import Channel, Imported
-from bemt.importers import head_text, load_text, number
+from bemt.readers import head_text, load_text, number
+from bemt.readers._imported import Channel, Imported
 
 __all__ = ["KIND", "read", "sniff"]
 

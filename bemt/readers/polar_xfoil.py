@@ -29,8 +29,8 @@ import re
 from collections.abc import Iterable
 
 from bemt.base.errors import Fault, InputError
-from bemt.importers import SourceText, head_text, load_text, number
-from bemt.importers.polar_csv import PolarRow, assemble
+from bemt.readers import SourceText, head_text, load_text, number
+from bemt.readers.polar_csv import PolarRow, assemble
 from bemt.sections.polars import Polar
 
 __all__ = ["KIND", "read", "read_many", "sniff"]

@@ -3,7 +3,7 @@
 Units are read from ``Thrust (gf)``, ``Thrust [gf]``, ``thrust_gf`` and a few names without dimension (``J``, ``CT``).
 A heading without unit, or a table without headings, gives channels of unit "" and a warning: nothing is assumed. This
 reader is a fallback: it takes a file only when no reader of a particular format claims it. A ``recording.toml``
-beside the file (see :mod:`bemt.importers.recording_toml`) says what headings do not.
+beside the file (see :mod:`bemt.readers.recording_toml`) says what headings do not.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from pathlib import Path
 
 import numpy as np
 
-from bemt.imported import Imported
-from bemt.importers import SourceText, head_text, load_text, number
-from bemt.importers._headings import Heading, heading
-from bemt.importers._recording import Builder, spikes
-from bemt.importers._split import Table, decimal_mark, find_start, split_line, split_table
+from bemt.readers import SourceText, head_text, load_text, number
+from bemt.readers._headings import Heading, heading
+from bemt.readers._imported import Imported
+from bemt.readers._recording import Builder, spikes
+from bemt.readers._split import Table, decimal_mark, find_start, split_line, split_table
 
 __all__ = ["FALLBACK", "KIND", "convert", "read", "sniff"]
 

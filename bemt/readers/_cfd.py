@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
-from bemt.importers import SourceText, number
+from bemt.readers import SourceText, number
 
 __all__ = [
     "Column", "Row", "Table", "cells_of", "decode", "head_lines", "load", "numeric_table", "si_unit", "slug", "unique",

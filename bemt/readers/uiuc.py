@@ -8,7 +8,7 @@ Every file is a table under one header line, blank separated::
     r/R t/c             thickness ratio (``nr640_thick.txt``)
 
 Coefficients are in the propeller convention: CT = T/(rho n^2 D^4), CP = P/(rho n^3 D^5), n in rev/s, J = V/(n D).
-What the names say, and by which rules, is in :mod:`bemt.importers._uiuc_names`.
+What the names say, and by which rules, is in :mod:`bemt.readers._uiuc_names`.
 
 Geometry of a propeller, first rule that applies (``geometry.origin``):
 
@@ -41,9 +41,9 @@ from typing import Any
 import numpy as np
 
 from bemt.base.errors import Fault, InputError
-from bemt.importers import HEAD_BYTES
-from bemt.importers._uiuc_names import FAMILIES, VARIABLE_PITCH, UiucFile, UiucName, parse_file_name
-from bemt.importers._uiuc_tables import (
+from bemt.readers import HEAD_BYTES
+from bemt.readers._uiuc_names import FAMILIES, VARIABLE_PITCH, UiucFile, UiucName, parse_file_name
+from bemt.readers._uiuc_tables import (
     UiucGeometry,
     UiucLine,
     UiucStatic,

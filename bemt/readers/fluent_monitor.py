@@ -13,10 +13,10 @@ import os
 import re
 
 from bemt.base.errors import Fault, InputError
-from bemt.imported import Imported
-from bemt.importers._cfd import Row, head_lines, load, numeric_table
-from bemt.importers._cfd_record import history
-from bemt.importers.fluent_report import column_of
+from bemt.readers._cfd import Row, head_lines, load, numeric_table
+from bemt.readers._cfd_record import history
+from bemt.readers._imported import Imported
+from bemt.readers.fluent_report import column_of
 
 __all__ = ["KIND", "read", "sniff"]
 

@@ -16,10 +16,10 @@ import os
 import re
 
 from bemt.base.errors import Fault, InputError
-from bemt.imported import Channel, Imported
-from bemt.importers import SourceText
-from bemt.importers._cfd import Column, Row, cells_of, head_lines, load, numeric_table, si_unit, slug
-from bemt.importers._cfd_record import fields, history
+from bemt.readers import SourceText
+from bemt.readers._cfd import Column, Row, cells_of, head_lines, load, numeric_table, si_unit, slug
+from bemt.readers._cfd_record import fields, history
+from bemt.readers._imported import Channel, Imported
 
 __all__ = ["KIND", "read", "sniff"]
 

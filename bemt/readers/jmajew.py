@@ -22,11 +22,11 @@ import numpy as np
 
 from bemt.base import units
 from bemt.base.errors import Fault
-from bemt.imported import Imported
-from bemt.importers import head_text, load_text
-from bemt.importers._headings import Heading, heading
-from bemt.importers._recording import Builder, slip, spikes
-from bemt.importers._split import split_table
+from bemt.readers import head_text, load_text
+from bemt.readers._headings import Heading, heading
+from bemt.readers._imported import Imported
+from bemt.readers._recording import Builder, slip, spikes
+from bemt.readers._split import split_table
 
 __all__ = ["KIND", "read", "sniff"]
 

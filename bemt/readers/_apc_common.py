@@ -1,4 +1,4 @@
-"""What both APC files share: sizes from the designation, and provenance; see :mod:`bemt.importers.apc`."""
+"""What both APC files share: sizes from the designation, and provenance; see :mod:`bemt.readers.apc`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 import re
 
 from bemt.base.errors import Fault
-from bemt.importers import SourceText
+from bemt.readers import SourceText
 
 __all__ = ["designation", "parse_designation", "provenance"]
 

@@ -1,4 +1,4 @@
-"""APC blade geometry (PE0), see :mod:`bemt.importers.apc`."""
+"""APC blade geometry (PE0), see :mod:`bemt.readers.apc`."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from bemt.base import units
 from bemt.base.errors import Fault, InputError
-from bemt.importers import SourceText, load_text, number
-from bemt.importers._apc_common import designation, provenance
+from bemt.readers import SourceText, load_text, number
+from bemt.readers._apc_common import designation, provenance
 
 __all__ = ["ApcBlade", "read_pe0"]
 

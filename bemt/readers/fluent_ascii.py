@@ -15,9 +15,9 @@ import os
 from dataclasses import replace
 
 from bemt.base.errors import Fault, InputError
-from bemt.imported import Imported
-from bemt.importers._cfd import Column, Row, cells_of, head_lines, load, numeric_table
-from bemt.importers._cfd_record import fields
+from bemt.readers._cfd import Column, Row, cells_of, head_lines, load, numeric_table
+from bemt.readers._cfd_record import fields
+from bemt.readers._imported import Imported
 
 __all__ = ["KIND", "read", "sniff"]
 

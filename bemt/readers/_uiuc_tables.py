@@ -1,4 +1,4 @@
-"""Tables of the UIUC Propeller Database: one reader per header, see :mod:`bemt.importers.uiuc`."""
+"""Tables of the UIUC Propeller Database: one reader per header, see :mod:`bemt.readers.uiuc`."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
-from bemt.importers import SourceText, head_text, load_text, number
-from bemt.importers._uiuc_names import parse_file_name
+from bemt.readers import SourceText, head_text, load_text, number
+from bemt.readers._uiuc_names import parse_file_name
 
 __all__ = [
     "UiucGeometry", "UiucLine", "UiucStatic", "UiucThickness", "read_geometry", "read_line", "read_static",

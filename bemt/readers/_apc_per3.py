@@ -1,4 +1,4 @@
-"""APC computed performance (PER3), see :mod:`bemt.importers.apc`."""
+"""APC computed performance (PER3), see :mod:`bemt.readers.apc`."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import numpy as np
 
 from bemt.base import units
 from bemt.base.errors import Fault, InputError
-from bemt.importers import SourceText, load_text, number
-from bemt.importers._apc_common import designation, provenance
+from bemt.readers import SourceText, load_text, number
+from bemt.readers._apc_common import designation, provenance
 from bemt.series import Series
 
 __all__ = ["ApcPerformance", "read_per3"]

@@ -20,10 +20,10 @@ from __future__ import annotations
 import os
 
 from bemt.base.errors import Fault, InputError
-from bemt.importers import head_text, load_text
-from bemt.importers._apc_common import parse_designation
-from bemt.importers._apc_pe0 import ApcBlade, read_pe0
-from bemt.importers._apc_per3 import ApcPerformance, read_per3
+from bemt.readers import head_text, load_text
+from bemt.readers._apc_common import parse_designation
+from bemt.readers._apc_pe0 import ApcBlade, read_pe0
+from bemt.readers._apc_per3 import ApcPerformance, read_per3
 
 __all__ = ["KIND", "ApcBlade", "ApcPerformance", "parse_designation", "read", "read_pe0", "read_per3", "sniff"]
 

@@ -46,11 +46,11 @@ from bemt.air import Air
 from bemt.base import units
 from bemt.base.errors import Fault, InputError
 from bemt.base.toml import Collector, Key, check_table, load_toml, shown
-from bemt.imported import Channel, Imported
-from bemt.importers import head_text, load_text
-from bemt.importers._headings import Heading, heading
-from bemt.importers._recording import Builder, spikes
-from bemt.importers._split import some, split_table
+from bemt.readers import head_text, load_text
+from bemt.readers._headings import Heading, heading
+from bemt.readers._imported import Channel, Imported
+from bemt.readers._recording import Builder, spikes
+from bemt.readers._split import some, split_table
 
 __all__ = ["KIND", "QUANTITIES", "read", "sniff"]
 

@@ -28,7 +28,7 @@ import numpy as np
 
 from bemt.base import units
 from bemt.base.errors import Fault, InputError
-from bemt.importers import head_text, load_text, number
+from bemt.readers import head_text, load_text, number
 from bemt.series import Series
 
 __all__ = ["COLUMNS", "CONDITIONS", "KIND", "KINDS", "QUANTITIES", "Reference", "read", "sniff", "to_series"]

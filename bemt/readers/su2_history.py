@@ -17,9 +17,9 @@ import re
 import numpy as np
 
 from bemt.base.errors import Fault, InputError
-from bemt.imported import Imported
-from bemt.importers._cfd import Column, Row, Table, cells_of, head_lines, load, numeric_table
-from bemt.importers._cfd_record import history
+from bemt.readers._cfd import Column, Row, Table, cells_of, head_lines, load, numeric_table
+from bemt.readers._cfd_record import history
+from bemt.readers._imported import Imported
 
 __all__ = ["KIND", "read", "sniff"]
 
