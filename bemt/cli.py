@@ -25,9 +25,9 @@ MANY: dict[str, Any] = {"action": "extend", "nargs": "+"}
 
 _MODULES = {"sweep": "bemt.sweep.command", "report": "bemt.report",
             "validate": "bemt.validate.command", "reproduce": "bemt.reproduce", "bench": "bemt.bench",
-            "import": "bemt.importing.command", "export": "bemt.export.command", "cfd": "bemt.cfd.command",
+            "import": "bemt.recordings.load", "export": "bemt.export.command", "cfd": "bemt.cfd.command",
             "calibrate": "bemt.commands.calibrate", "estimate": "bemt.commands.estimate",
-            "data": "bemt.data.command", "prove": "bemt.conceal.prove",
+            "data": "bemt.commands.data", "prove": "bemt.conceal.prove",
             "effects": "bemt.effects_list", "diagnose": "bemt.diagnose.command", "plan": "bemt.diagnose.command",
             "stations": "bemt.stations", "map": "bemt.drive.map_command", "motor": "bemt.drive.motor_command",
             "drive": "bemt.drive.drive_command", "thrusters": "bemt.drive.thrusters_command"}  # fmt: skip

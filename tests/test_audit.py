@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import pytest
 
-from bemt import audit as au
-from bemt.audit import STATUSES, AuditLine, CfdFacts, audit, combined
-from bemt.audit_remarks import audit_rows, facts_from_remark
+from bemt.recordings import audit as au
+from bemt.recordings.audit import STATUSES, AuditLine, CfdFacts, audit, combined
+from bemt.recordings.audit_remarks import audit_rows, facts_from_remark
 
 TOPICS = [
     "domain against disk",

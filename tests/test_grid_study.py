@@ -1,4 +1,4 @@
-"""The promise of bemt.grid_study: order, extrapolation and index of published values; what is implausible is flagged."""
+"""The promise of bemt.recordings.grid_study: order, extrapolation and index of published values; what is implausible is flagged."""
 # ruff: noqa: E501 - tables of values
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from bemt.base.errors import InputError
-from bemt.grid_study import grid_study, ratios
+from bemt.recordings.grid_study import grid_study, ratios
 
 
 def test_published_value() -> None:

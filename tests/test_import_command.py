@@ -15,7 +15,7 @@ import pytest
 from bemt.base.errors import InputError
 from bemt.cli import main
 from bemt.importing import document, import_file
-from bemt.importing.choice import Choice
+from bemt.recordings.choice import Choice
 
 PERIOD = 0.5
 

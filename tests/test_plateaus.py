@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from bemt import readers as importers
 from bemt.base.errors import InputError
-from bemt.reduction.plateaus import Plateaus, Settings, find, standard_error
+from bemt.recordings.plateaus import Plateaus, Settings, find, standard_error
 
 RATE = 50.0
 

@@ -16,9 +16,9 @@ import pytest
 
 from bemt.base.errors import InputError
 from bemt.importing import import_file
-from bemt.importing.recording import findings, is_recording, points_text, reduction_document, reduction_of
-from bemt.reduction.channels import view
-from bemt.reduction.reduce import Reduced
+from bemt.recordings.channels import view
+from bemt.recordings.overview import findings, is_recording, points_text, reduction_document, reduction_of
+from bemt.recordings.reduce import Reduced
 
 INJURIES = (
     "cut", "garble", "bytes", "encoding", "huge", "tiny", "swap columns", "drop column", "double column", "rename",

@@ -21,9 +21,9 @@ from bemt.base import units
 from bemt.base.errors import InputError
 from bemt.cli import main
 from bemt.readers._imported import Channel, Imported
-from bemt.reduction.channels import view
-from bemt.reduction.reduce import Reduced, reduce
-from bemt.reduction.rows import is_samples
+from bemt.recordings.channels import view
+from bemt.recordings.reduce import Reduced, reduce
+from bemt.recordings.rows import is_samples
 from bemt.series import Series
 
 D = 0.254

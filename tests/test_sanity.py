@@ -14,7 +14,7 @@ from bemt.base import units
 from bemt.base.errors import InputError
 from bemt.importing import import_file
 from bemt.readers._imported import Channel, Imported
-from bemt.sanity.check import Finding, check
+from bemt.recordings.check import Finding, check
 from bemt.series import Series
 
 INCH = units.INCH

@@ -17,8 +17,8 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.tables import csv_text, plain, write_atomic
 from bemt.cfd.schema import Campaign
 from bemt.cfd.worker import DRIFT_LIMIT, SCATTER_LIMIT, Outcome
-from bemt.grid_study import grid_study, ratios
 from bemt.readers import number
+from bemt.recordings.grid_study import grid_study, ratios
 
 __all__ = ["COLUMNS", "Record", "grid_studies", "grid_uncertainty"]
 

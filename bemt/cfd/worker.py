@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.averaging import steady_average
 from bemt.base.errors import InputError
 from bemt.base.tables import write_atomic
 from bemt.cfd.schema import Point
@@ -27,6 +26,7 @@ from bemt.cfd.start import State, splice
 from bemt.export.openfoam import settings_of, write_openfoam
 from bemt.openfoam import Settings, case_files
 from bemt.openfoam.run import BINS
+from bemt.recordings.averaging import steady_average
 
 __all__ = ["DRIFT_LIMIT", "SCATTER_LIMIT", "Outcome", "Worker", "history_of", "point_key", "radial_of"]
 

@@ -268,7 +268,7 @@ density_kg_m3 = 1.2
 
 def _fan() -> Iterator[Item]:
     from bemt.importing import import_file
-    from bemt.reduction.reduce import reduce
+    from bemt.recordings.reduce import reduce
 
     root = find_data("jmajew")
     found = {}

@@ -21,15 +21,15 @@ from bemt.base.units import ZERO_CELSIUS
 from bemt.bem import evaluate
 from bemt.case import find_cases, load_case, repeated_names
 from bemt.diagnose import record as records
-from bemt.reduction.channels import view
-from bemt.sanity.check import check
+from bemt.recordings.channels import view
+from bemt.recordings.check import check
 from bemt.series import Series
 
 if TYPE_CHECKING:
     from bemt.case import Case
     from bemt.diagnose.record import Record
     from bemt.readers._imported import Imported
-    from bemt.reduction.channels import Recorded
+    from bemt.recordings.channels import Recorded
 
 __all__ = ["load", "run"]
 
@@ -78,7 +78,7 @@ def load(path: str, case: Case) -> Record:
         If the file is not a recording.
     """
     from bemt.importing import import_file
-    from bemt.reduction import reduce as reduction
+    from bemt.recordings import reduce as reduction
 
     imported = import_file(path)
     _same_rotor(imported, case, path)

@@ -15,7 +15,7 @@ from bemt.bem import evaluate, forward
 from bemt.diagnose.nuisance import nuisances
 from bemt.diagnose.record import CHANNELS, Record, concatenated, merged, owners
 from bemt.effects.base import Effect, Flow, Reading
-from bemt.sanity.between import Level, odd_ones
+from bemt.recordings.between import Level, odd_ones
 
 if TYPE_CHECKING:
     from bemt.case import Case

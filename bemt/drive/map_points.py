@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
 from bemt.readers._imported import Imported
-from bemt.reduction import plateaus
+from bemt.recordings import plateaus
 
 __all__ = ["QUANTITIES", "MapPoints", "join", "points"]
 

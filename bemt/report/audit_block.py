@@ -22,7 +22,7 @@ def audit_table(audit: Mapping[str, Any]) -> str:
     Parameters
     ----------
     audit : mapping
-        As :func:`bemt.audit.audit_document` makes it.
+        As :func:`bemt.recordings.audit.audit_document` makes it.
 
     Returns
     -------

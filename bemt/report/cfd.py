@@ -12,8 +12,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from bemt.audit import CfdFacts, audit, audit_document
 from bemt.readers import number
+from bemt.recordings.audit import CfdFacts, audit, audit_document
 
 __all__ = ["attach", "cfd_runs", "is_plain", "operating_run", "radial_of"]
 

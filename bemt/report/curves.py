@@ -176,10 +176,10 @@ def refinement(case: Case) -> dict[str, Any]:
     -------
     dict
         ``stations`` (ascending), ``thrust_N`` [N], ``torque_Nm`` [N m], and ``grid_study`` of the thrust on the three
-        finest as :class:`bemt.grid_study.GridStudy` has it, or None.
+        finest as :class:`bemt.recordings.grid_study.GridStudy` has it, or None.
     """
     from bemt.bem.evaluate import evaluate, prepare
-    from bemt.grid_study import grid_study
+    from bemt.recordings.grid_study import grid_study
 
     air = case.air()
     points = [evaluate(prepare(case, None, n), case.rpm, case.airspeed_m_s, air) for n in REFINED]

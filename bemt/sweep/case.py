@@ -16,10 +16,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import __version__, audit_remarks, effects, series
+from bemt import __version__, effects, series
 from bemt.base import units
 from bemt.case import Assumption, Case
 from bemt.readers import references as reference_file
+from bemt.recordings import audit_remarks
 
 if TYPE_CHECKING:
     from bemt.air import Air

@@ -25,14 +25,14 @@ from typing import Any
 import numpy as np
 
 from bemt import readers as importers
-from bemt.averaging import relation
 from bemt.base import tables
 from bemt.base.errors import EXIT_INPUT, EXIT_OK, Fault, InputError
-from bemt.importing.adapt import adapt, damaged_export, recognised
-from bemt.importing.choice import Choice, averaged, chosen
-from bemt.importing.recording import findings, is_recording, points_text, reduction_document, reduction_of
 from bemt.readers._imported import Channel, Imported
-from bemt.reduction.reduce import Reduced
+from bemt.recordings.adapt import adapt, damaged_export, recognised
+from bemt.recordings.averaging import relation
+from bemt.recordings.choice import Choice, averaged, chosen
+from bemt.recordings.overview import findings, is_recording, points_text, reduction_document, reduction_of
+from bemt.recordings.reduce import Reduced
 
 __all__ = ["SCHEMA", "Choice", "averaged", "chosen", "document", "import_file", "run"]
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bemt.base import units
 from bemt.readers._imported import Imported
-from bemt.reduction.channels import view
+from bemt.recordings.channels import view
 from bemt.series import Series
 
 __all__ = ["CHECKS", "MANY", "SEVERITIES", "Facts", "Finding", "check_for", "facts_of"]

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.sanity.base import Facts, Finding, check_for
+from bemt.recordings.findings import Facts, Finding, check_for
 
 __all__: list[str] = []
 

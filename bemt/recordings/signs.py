@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import coefficients as co
-from bemt.reduction.channels import shaft_power
-from bemt.sanity.base import MANY, Facts, Finding, check_for
+from bemt.recordings.channels import shaft_power
+from bemt.recordings.findings import MANY, Facts, Finding, check_for
 
 __all__: list[str] = []
 

@@ -21,7 +21,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.reduction.channels import Recorded
+from bemt.recordings.channels import Recorded
 
 __all__ = ["at_rest", "command_of", "is_samples"]
 

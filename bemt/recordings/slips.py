@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from bemt.base import units
 from bemt.formula import k1k2 as empirical
-from bemt.sanity.base import Facts, Finding, check_for
+from bemt.recordings.findings import Facts, Finding, check_for
 
 __all__ = ["Relation", "Slip", "relations", "slips"]
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from bemt.audit import CfdFacts, audit, audit_document
+from bemt.recordings.audit import CfdFacts, audit, audit_document
 
 __all__ = ["audit_rows", "facts_from_remark"]
 

@@ -1,8 +1,8 @@
 """Sanity before physics: faults of a recording, each named with its evidence and the correction it would take.
 
 Nothing is corrected here. The checks work with whatever channels there are, and say nothing where they cannot know:
-slips of units (:mod:`bemt.sanity.slips`), signs and physical bounds (:mod:`bemt.sanity.signs`), columns
-(:mod:`bemt.sanity.columns`). A new check is one function with the decorator ``check_for``.
+slips of units (:mod:`bemt.recordings.slips`), signs and physical bounds (:mod:`bemt.recordings.signs`), columns
+(:mod:`bemt.recordings.columns`). A new check is one function with the decorator ``check_for``.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from bemt.readers._imported import Imported
-from bemt.sanity import columns, signs, slips  # they register themselves
-from bemt.sanity.base import CHECKS, SEVERITIES, Finding, facts_of
+from bemt.recordings import columns, signs, slips  # they register themselves
+from bemt.recordings.findings import CHECKS, SEVERITIES, Finding, facts_of
 from bemt.series import Series
 
 __all__ = ["Finding", "check"]

@@ -10,8 +10,8 @@ from typing import Any
 from bemt.base import tables
 from bemt.base.errors import InputError
 from bemt.readers._imported import Imported
-from bemt.reduction.reduce import Reduced, reduce
-from bemt.sanity.check import Finding, check
+from bemt.recordings.check import Finding, check
+from bemt.recordings.reduce import Reduced, reduce
 
 __all__ = ["findings", "is_recording", "points_text", "reduction_document", "reduction_of"]
 

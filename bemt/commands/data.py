@@ -22,7 +22,7 @@ from typing import Any
 from bemt.base.cache import cache_dir
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import file_hash, json_text
-from bemt.data.archive import download, unpacked
+from bemt.recordings.archive import download, unpacked
 
 __all__ = ["RECORD", "SCHEMA", "URLS", "get", "run"]
 

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
-from bemt.reduction import plateaus
-from bemt.reduction.channels import LOADS, Lost, Recorded
-from bemt.reduction.rows import at_rest, command_of
-from bemt.reduction.tare import Rest
+from bemt.recordings import plateaus
+from bemt.recordings.channels import LOADS, Lost, Recorded
+from bemt.recordings.rows import at_rest, command_of
+from bemt.recordings.tare import Rest
 
 __all__ = ["Found", "Point", "from_rows", "from_samples"]
 

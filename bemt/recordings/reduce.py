@@ -24,13 +24,13 @@ from bemt import coefficients as co
 from bemt.air import Air
 from bemt.base.errors import Fault, InputError
 from bemt.readers._imported import Imported
-from bemt.reduction.air import AirOfPoints, air_of
-from bemt.reduction.channels import LOADS, Lost, Recorded, shaft_power, view
-from bemt.reduction.plateaus import Settings
-from bemt.reduction.points import Found, Point, from_rows, from_samples
-from bemt.reduction.rows import command_of, is_samples
-from bemt.reduction.scatter import Hysteresis, hysteresis, repeats, session
-from bemt.reduction.tare import TARED, Zero, from_rest, from_table
+from bemt.recordings.channels import LOADS, Lost, Recorded, shaft_power, view
+from bemt.recordings.plateaus import Settings
+from bemt.recordings.points import Found, Point, from_rows, from_samples
+from bemt.recordings.rows import command_of, is_samples
+from bemt.recordings.scatter import Hysteresis, hysteresis, repeats, session
+from bemt.recordings.site_air import AirOfPoints, air_of
+from bemt.recordings.tare import TARED, Zero, from_rest, from_table
 from bemt.series import Series
 
 __all__ = ["Reduced", "reduce"]
@@ -100,7 +100,7 @@ def reduce(
         Run without propeller to subtract at equal speed; False subtracts nothing; None subtracts what rows at rest
         show, where there are any.
     steady : bool or None
-        True: rows are points; False: samples; None decides (:mod:`bemt.reduction.rows`).
+        True: rows are points; False: samples; None decides (:mod:`bemt.recordings.rows`).
     speed : str or None
         Channel that is the speed of the rotor (``optical_rpm``, ``electrical_rpm``); None decides.
     settings : Settings or None
