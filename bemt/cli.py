@@ -23,8 +23,8 @@ EXIT_INTERRUPTED = 130
 # Options of several words: `--case A B` and `--case A --case B` are the same, none is dropped without a word.
 MANY: dict[str, Any] = {"action": "extend", "nargs": "+"}
 
-_MODULES = {"sweep": "bemt.sweep.command", "report": "bemt.report",
-            "validate": "bemt.validate.command", "reproduce": "bemt.reproduce", "bench": "bemt.bench",
+_MODULES = {"sweep": "bemt.compare.sweep.command", "report": "bemt.report",
+            "validate": "bemt.compare.validate.command", "reproduce": "bemt.compare.reproduce", "bench": "bemt.compare.bench.timing",
             "import": "bemt.recordings.load", "export": "bemt.export.command", "cfd": "bemt.cfd.command",
             "calibrate": "bemt.commands.calibrate", "estimate": "bemt.commands.estimate",
             "data": "bemt.commands.data", "prove": "bemt.conceal.prove",

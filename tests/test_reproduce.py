@@ -5,8 +5,9 @@ import json
 
 import pytest
 
-from bemt import _thesis as th
-from bemt import cli, reproduce
+from bemt import cli
+from bemt.compare import reproduce
+from bemt.compare import thesis as th
 
 INCH, KGF = 0.0254, 9.80665
 

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bemt.compare.validate.command import validate
 from bemt.effects import catalogue, standard
 from bemt.sections import rule as section_rule
 from bemt.sections.neuralfoil import neuralfoil_polar
 from bemt.sections.polars import DEFAULT_RE, Polar
-from bemt.validate.command import validate
 from geometry.airfoil import Airfoil
 
 # What volume 2 is asked for: median and 90th percentile of the error of static CT.

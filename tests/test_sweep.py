@@ -20,10 +20,10 @@ import pytest
 from bemt.base.tables import csv_block, json_text, number_text, plain
 from bemt.bem.evaluate import evaluate, prepare
 from bemt.case import load_case
-from bemt.grid import run as grid_module
-from bemt.sweep import command as sweep_module
-from bemt.sweep import fingerprint, sweep
-from bemt.sweep.case import solve_case
+from bemt.compare.grid import run as grid_module
+from bemt.compare.sweep import command as sweep_module
+from bemt.compare.sweep import fingerprint, sweep
+from bemt.compare.sweep.case import solve_case
 
 ROOT = Path(__file__).resolve().parents[1]
 KGF = 9.80665

@@ -18,8 +18,8 @@ import pytest
 from test_sweep import GRID, ROOT, make_case, tree
 
 from bemt.cli import main
-from bemt.grid import run as grid_module
-from bemt.sweep import command, sweep
+from bemt.compare.grid import run as grid_module
+from bemt.compare.sweep import command, sweep
 
 AXES = "[sweep]\nrpm = {start = 3000, stop = 9000, num = 50}\n"
 needs_sigkill = pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs SIGKILL")

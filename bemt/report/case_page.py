@@ -312,7 +312,7 @@ def reproduction_table(items: Sequence[Mapping[str, Any]]) -> str:
     Parameters
     ----------
     items : sequence of mapping
-        From :mod:`bemt.reproduce`.
+        From :mod:`bemt.compare.reproduce`.
 
     Returns
     -------

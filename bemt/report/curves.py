@@ -1,6 +1,6 @@
 """What a case page plots: geometry, performance over J and rpm with bands, radial loading, refinement of the stations.
 
-The bands are the standard uncertainty from the declared assumptions, propagated as in :mod:`bemt.sweep.case`: one at a
+The bands are the standard uncertainty from the declared assumptions, propagated as in :mod:`bemt.compare.sweep.case`: one at a
 time through its range. They do not hold the error of the theory.
 """
 
@@ -85,7 +85,7 @@ def case_curves(case: Case, threads: int = 1) -> dict[str, Any]:
         the tip Mach number, arrays with NaN where not converged.
     """
     from bemt.bem.evaluate import evaluate, k1k2, prepare
-    from bemt.sweep.case import spread
+    from bemt.compare.sweep.case import spread
 
     ready = prepare(case)
     rpm, V, cut = _grids(case, ready.pitch_m / ready.diameter_m)

@@ -51,8 +51,8 @@ def gather(paths: Sequence[str | Path], out: Path, progress: Progress | None = N
     InputError
         When a path holds no case.
     """
+    from bemt.compare.sweep import sweep
     from bemt.report.cfd import attach, cfd_runs
-    from bemt.sweep import sweep
 
     tell = progress or (lambda line: None)
     document = sweep(paths, out, progress=tell)
@@ -145,7 +145,7 @@ def _trends(solved: Sequence[tuple[Case, dict[str, Any]]], results: Sequence[Map
 
 def _reproduction() -> list[dict[str, Any]]:
     """Give the numbers of the thesis beside ours, without the database statistics, which need data from outside."""
-    from bemt import reproduce
+    from bemt.compare import reproduce
 
     return [asdict(item) for item in reproduce.items(None) if not item.status.startswith("not checked")]
 

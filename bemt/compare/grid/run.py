@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from bemt.base.tables import plain, write_atomic
 from bemt.bem.evaluate import Points, air_arrays, evaluate, prepare
 from bemt.case import Case
-from bemt.grid.formats import Block, encode, join
+from bemt.compare.grid.formats import Block, encode, join
 
 if TYPE_CHECKING:
     from bemt.air import Air
@@ -203,7 +203,7 @@ def solve_chunk(solver: Solver, number: int) -> tuple[bytes, dict[str, Any]]:
     Returns
     -------
     bytes
-        As `bemt.grid.formats.encode` gives them; none without a format.
+        As `bemt.compare.grid.formats.encode` gives them; none without a format.
     dict
         Points, unconverged points, ranges.
     """

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from bemt.sweep.command import SCHEMA, fingerprint, run, sweep
+from bemt.compare.sweep.command import SCHEMA, fingerprint, run, sweep
 
 __all__ = ["SCHEMA", "fingerprint", "run", "sweep"]

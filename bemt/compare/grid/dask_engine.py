@@ -28,8 +28,8 @@ import numpy as np
 from bemt.base import cache
 from bemt.base.errors import Fault, InputError
 from bemt.case import Case
-from bemt.grid.identity import program_hash
-from bemt.grid.run import Grid, Solved, Solver, solve_chunk
+from bemt.compare.grid.identity import program_hash
+from bemt.compare.grid.run import Grid, Solved, Solver, solve_chunk
 
 __all__ = ["Cluster"]
 

@@ -16,10 +16,10 @@ import numpy as np
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.folders import find_data
-from bemt.validate.folder import read_folder
-from bemt.validate.match import matched
-from bemt.validate.points import J_SHARE, Array, Rows, compare, errors, statistics
-from bemt.validate.text import text
+from bemt.compare.validate.folder import read_folder
+from bemt.compare.validate.match import matched
+from bemt.compare.validate.points import J_SHARE, Array, Rows, compare, errors, statistics
+from bemt.compare.validate.text import text
 
 if TYPE_CHECKING:
     from bemt.effects import Effect

@@ -2,7 +2,7 @@
 
 Only facts and figures of T. Cahill, "System Identification of Thrust and Torque Characteristics for a Bipedal Robot
 with Integrated Propulsion", MS thesis, Northeastern University, April 2025, and of public data they were checked with.
-Nothing here prints; `bemt.reproduce` does.
+Nothing here prints; `bemt.compare.reproduce` does.
 """
 
 from __future__ import annotations

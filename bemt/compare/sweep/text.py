@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from bemt.base.tables import csv_text, number_text, text_table
-from bemt.sweep.case import ROW_SOURCES
+from bemt.compare.sweep.case import ROW_SOURCES
 
 __all__ = ["case_text", "overview_text", "rows_csv"]
 
@@ -153,7 +153,7 @@ def case_text(result: Mapping[str, Any]) -> str:
     Parameters
     ----------
     result : mapping
-        As :func:`bemt.sweep.case.solve_case` gives it, plain or not.
+        As :func:`bemt.compare.sweep.case.solve_case` gives it, plain or not.
 
     Returns
     -------

@@ -26,12 +26,12 @@ from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, EXIT_UNCONVERGE
 from bemt.base.tables import json_text, plain, remove_stale
 from bemt.base.toml import Collector
 from bemt.case import Case, check_name, find_cases, load_case, repeated_names
-from bemt.grid.formats import FORMATS, require_extra
-from bemt.grid.run import Engine, run_grid
-from bemt.sweep import store
-from bemt.sweep.case import solve_case
-from bemt.sweep.store import SCHEMA, fingerprint
-from bemt.sweep.text import case_text, overview_text
+from bemt.compare.grid.formats import FORMATS, require_extra
+from bemt.compare.grid.run import Engine, run_grid
+from bemt.compare.sweep import store
+from bemt.compare.sweep.case import solve_case
+from bemt.compare.sweep.store import SCHEMA, fingerprint
+from bemt.compare.sweep.text import case_text, overview_text
 
 __all__ = ["SCHEMA", "fingerprint", "run", "sweep"]
 
@@ -272,7 +272,7 @@ def sweep(
             stack.enter_context(store.locked(folder))
         on: Engine | None = None
         if engine == "dask":
-            from bemt.grid.dask_engine import Cluster
+            from bemt.compare.grid.dask_engine import Cluster
 
             on = stack.enter_context(Cluster(scheduler, jobs))
         if folder is not None:

@@ -19,9 +19,9 @@ from typing import IO, Any
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import file_hash, json_text, write_atomic
-from bemt.grid.formats import FORMATS
-from bemt.grid.identity import program_hash
-from bemt.sweep.text import case_text, overview_text, rows_csv
+from bemt.compare.grid.formats import FORMATS
+from bemt.compare.grid.identity import program_hash
+from bemt.compare.sweep.text import case_text, overview_text, rows_csv
 
 __all__ = [
     "OVERVIEW", "SCHEMA", "clear_overview", "fingerprint", "keep", "keep_overview", "locked", "remove_result", "reuse",

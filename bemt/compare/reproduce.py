@@ -18,11 +18,11 @@ from typing import Any
 import numpy as np
 
 from bemt import __version__
-from bemt import _thesis as th
 from bemt import coefficients as co
 from bemt.air import Air
 from bemt.base.folders import find_data
 from bemt.base.units import INCH, KGF, RPM
+from bemt.compare import thesis as th
 from bemt.formula import k1k2 as k
 
 SCHEMA = "bemt.reproduce/1"

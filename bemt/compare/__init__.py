@@ -1,0 +1,1 @@
+"""Models beside recordings: sweep, validation, grids, the thesis, benchmark."""

@@ -1,0 +1,1 @@
+"""Time per operating point, beside any peer that is installed."""
