@@ -27,7 +27,7 @@ _MODULES = {"sweep": "bemt.compare.sweep.command", "report": "bemt.report",
             "validate": "bemt.compare.validate.command", "reproduce": "bemt.compare.reproduce", "bench": "bemt.compare.bench.timing",
             "import": "bemt.recordings.load", "export": "bemt.export.command", "cfd": "bemt.cfd.command",
             "calibrate": "bemt.commands.calibrate", "estimate": "bemt.commands.estimate",
-            "data": "bemt.commands.data", "prove": "bemt.conceal.prove",
+            "data": "bemt.commands.data", "prove": "bemt.proof.prove",
             "effects": "bemt.effects_list", "diagnose": "bemt.diagnose.command", "plan": "bemt.diagnose.command",
             "stations": "bemt.stations", "map": "bemt.drive.map_command", "motor": "bemt.drive.motor_command",
             "drive": "bemt.drive.drive_command", "thrusters": "bemt.drive.thrusters_command"}  # fmt: skip

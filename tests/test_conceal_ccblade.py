@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from bemt.base.errors import InputError
-from bemt.conceal import draw, rigs, truth_ccblade, truth_world
-from bemt.conceal.items import Bench
-from bemt.conceal.stand import Stand
+from bemt.proof import draw, rigs, truth_ccblade, truth_world
+from bemt.proof.items import Bench
+from bemt.proof.stand import Stand
 
 
 @pytest.fixture(scope="module")

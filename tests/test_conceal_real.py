@@ -9,10 +9,10 @@ import pytest
 
 from bemt.base.errors import InputError
 from bemt.case import load_case
-from bemt.conceal import prove, real, score
-from bemt.conceal.items import Item
 from bemt.effects import catalogue
 from bemt.importing import import_file
+from bemt.proof import prove, real, score
+from bemt.proof.items import Item
 
 
 @pytest.fixture(scope="module")

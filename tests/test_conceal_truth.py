@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt.conceal import causes, rigs, truth, truth_duct, truth_section, truth_wake, truth_world
-from bemt.conceal.items import Bench
-from bemt.conceal.stand import Stand, covariance, full_scales, record
+from bemt.proof import causes, rigs, truth, truth_duct, truth_section, truth_wake, truth_world
+from bemt.proof.items import Bench
+from bemt.proof.stand import Stand, covariance, full_scales, record
 
 P_ROOM, T_ROOM = 101325.0, 20.0
 

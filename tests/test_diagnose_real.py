@@ -156,7 +156,7 @@ density_kg_m3 = 1.2
 def test_the_density_of_another_altitude_is_found_from_four_kilometres_on(
     shared_data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, altitude: int, density: float
 ) -> None:
-    from bemt.conceal.real import draw_real
+    from bemt.proof.real import draw_real
 
     monkeypatch.setenv("BEMT_DATA", str(shared_data))
     items = draw_real(np.random.default_rng(0))

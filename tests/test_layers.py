@@ -81,15 +81,15 @@ MAY: dict[str, set[str]] = {
     "bemt.drive.*_file": {"files"},
     "bemt.diagnose.command": {"files", "print"},
     "bemt.diagnose.figures": {"files"},
-    "bemt.conceal.prove": {"files", "print", "clock", "environment"},
-    "bemt.conceal.real": {"files"},
-    "bemt.conceal.seal": {"files"},
+    "bemt.proof.prove": {"files", "print", "clock", "environment"},
+    "bemt.proof.real": {"files"},
+    "bemt.proof.seal": {"files"},
     "geometry.export": {"files"},
     "geometry.picture*": {"files"},
 }
 
 # What makes the data of the proof must know nothing of what is proved, not even through others.
-BLIND = "bemt.conceal.truth*|bemt.conceal.stand*|bemt.conceal.rigs|bemt.conceal.causes|bemt.conceal.separation"
+BLIND = "bemt.proof.truth*|bemt.proof.stand*|bemt.proof.rigs|bemt.proof.causes|bemt.proof.separation"
 UNSEEN = (
     "bemt.bem.solver*|bemt.bem.duct*|bemt.effects*|bemt.sections.polars*|bemt.sections.extrapolation|bemt.bem.evaluate*|bemt.bem.forward*|bemt.bem.kernel*|"
     "bemt.bem.residual*|bemt.sections.rule*|bemt.diagnose*"
@@ -326,11 +326,11 @@ def test_the_tree_keeps_the_rules(tree: dict[str, str]) -> None:
         ("bemt.cli", "import numpy as np", "numpy; --help must import the standard library only"),
         ("bemt.cli", "import bemt.compare.sweep", "bemt.compare.sweep; --help must import the standard library only"),
         ("bemt.base.errors", "import numpy", "numpy; --help must import the standard library only"),
-        ("bemt.conceal.truth", "import bemt.bem.solver", "must not see bemt.bem.solver"),
-        ("bemt.conceal.truth_world", "def f():\n    from bemt.effects import standard", "must not see bemt.effects"),
-        ("bemt.conceal.truth_duct", "from bemt import duct", "must not see bemt.bem.duct"),
-        ("bemt.conceal.stand", "from bemt import sweep", "must not see bemt.bem.evaluate through bemt.compare.sweep"),
-        ("bemt.conceal.truth_section", "from bemt import case", "must not see bemt.sections.rule through bemt.case"),
+        ("bemt.proof.truth", "import bemt.bem.solver", "must not see bemt.bem.solver"),
+        ("bemt.proof.truth_world", "def f():\n    from bemt.effects import standard", "must not see bemt.effects"),
+        ("bemt.proof.truth_duct", "from bemt import duct", "must not see bemt.bem.duct"),
+        ("bemt.proof.stand", "from bemt import sweep", "must not see bemt.bem.evaluate through bemt.compare.sweep"),
+        ("bemt.proof.truth_section", "from bemt import case", "must not see bemt.sections.rule through bemt.case"),
         ("bemt.base.tables", "def f():\n    import bemt.sections.polars", "bemt.sections.polars is not below it in the flow"),
     ],
 )  # fmt: skip
@@ -347,7 +347,7 @@ def test_a_planted_fault_is_found(tree: dict[str, str], module: str, line: str, 
         ("bemt.data", "from bemt.data import command",
          "bemt.base.folders:1: bemt.commands.data is not below it in the flow"),
         ("bemt.recordings", "import bemt.recordings.audit", "bemt.recordings.plateaus:1: bemt.recordings.audit is not below it in the flow"),
-        ("bemt.conceal", "from bemt import solver", "bemt.conceal.truth:1: must not see bemt.bem.solver"),
+        ("bemt.proof", "from bemt import solver", "bemt.proof.truth:1: must not see bemt.bem.solver"),
     ],
 )  # fmt: skip
 def test_what_a_package_brings_along_counts(tree: dict[str, str], package: str, line: str, complaint: str) -> None:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.conceal import rigs
-from bemt.conceal.causes import CAUSES, LISTED, UNLISTED
-from bemt.conceal.items import Bench, Item, make_item
+from bemt.proof import rigs
+from bemt.proof.causes import CAUSES, LISTED, UNLISTED
+from bemt.proof.items import Bench, Item, make_item
 
 __all__ = ["SETS", "SIZES", "benches", "draw_items"]
 

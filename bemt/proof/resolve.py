@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from bemt.conceal.causes import CAUSES
-from bemt.conceal.items import Bench
-from bemt.conceal.separation import yardstick
-from bemt.conceal.stand import Stand
-from bemt.conceal.truth_world import Conditions
+from bemt.proof.causes import CAUSES
+from bemt.proof.items import Bench
+from bemt.proof.separation import yardstick
+from bemt.proof.stand import Stand
+from bemt.proof.truth_world import Conditions
 
 __all__ = ["extended", "resolves"]
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.conceal.stand import Stand, covariance, full_scales
-from bemt.conceal.truth_world import Loads, World
+from bemt.proof.stand import Stand, covariance, full_scales
+from bemt.proof.truth_world import Loads, World
 
 __all__ = ["FREEDOM", "Yardstick", "freedom", "yardstick"]
 

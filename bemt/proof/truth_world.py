@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.conceal import truth, truth_ccblade, truth_duct
-from bemt.conceal.truth_section import SectionPhysics
+from bemt.proof import truth, truth_ccblade, truth_duct
+from bemt.proof.truth_section import SectionPhysics
 
 __all__ = ["Conditions", "Loads", "World", "loads"]
 

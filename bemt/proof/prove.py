@@ -22,7 +22,7 @@ import numpy as np
 from bemt import __version__
 from bemt.base.errors import EXIT_OK, Fault, InputError
 from bemt.base.tables import json_text, write_atomic
-from bemt.conceal import draw, items, proof_text, real, resolve, score, seal
+from bemt.proof import draw, items, proof_text, real, resolve, score, seal
 
 __all__ = ["SCHEMA", "conceal", "diagnose_all", "diagnose_folder", "proof", "run"]
 

@@ -1,7 +1,7 @@
 """Second truth of the proof: CCBlade of WISDEM (extra ``wisdem``), somebody else's blade-element momentum code.
 
 It shares no line with this project's solver.  It gives no loads at rest and knows uniform axial flow only; what an item
-may conceal with it is in `EXPRESSIBLE`.  Sections are those of `bemt.conceal.truth_section`.
+may conceal with it is in `EXPRESSIBLE`.  Sections are those of `bemt.proof.truth_section`.
 
 References
 ----------
@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
-from bemt.conceal import truth
-from bemt.conceal import truth_section as ts
+from bemt.proof import truth
+from bemt.proof import truth_section as ts
 
 __all__ = ["EXPRESSIBLE", "solve"]
 

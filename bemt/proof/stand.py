@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.conceal.truth_world import Conditions, Loads
+from bemt.proof.truth_world import Conditions, Loads
 
 __all__ = ["Motor", "Stand", "covariance", "record"]
 

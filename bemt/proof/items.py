@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.conceal.causes import CAUSES, LISTED, Cause, Change, applied
-from bemt.conceal.rigs import Rig, conditions
-from bemt.conceal.separation import FREEDOM, Yardstick, freedom, yardstick
-from bemt.conceal.stand import Stand, record
-from bemt.conceal.truth import Answer
-from bemt.conceal.truth_ccblade import EXPRESSIBLE
-from bemt.conceal.truth_section import SectionPhysics
-from bemt.conceal.truth_world import Conditions, Loads, World, loads
+from bemt.proof.causes import CAUSES, LISTED, Cause, Change, applied
+from bemt.proof.rigs import Rig, conditions
+from bemt.proof.separation import FREEDOM, Yardstick, freedom, yardstick
+from bemt.proof.stand import Stand, record
+from bemt.proof.truth import Answer
+from bemt.proof.truth_ccblade import EXPRESSIBLE
+from bemt.proof.truth_section import SectionPhysics
+from bemt.proof.truth_world import Conditions, Loads, World, loads
 
 __all__ = ["Bench", "Item", "case_text", "make_item", "recording_text", "stations_text"]
 

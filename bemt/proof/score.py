@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from bemt.conceal.causes import CAUSES
+from bemt.proof.causes import CAUSES
 
 __all__ = [
     "VISIBLE",

@@ -1,14 +1,14 @@
 """Truth of the proof: a vortex rotor, lifting lines with helical wakes and their own Kutta-Joukowski balance.
 
 Each blade is a lifting line of horseshoe vortices; the trailing ones are the helices of
-`bemt.conceal.truth_wake`, whose advance and contraction follow the speed that the rotor itself induces.  On every panel
+`bemt.proof.truth_wake`, whose advance and contraction follow the speed that the rotor itself induces.  On every panel
 the circulation equals that of the section's lift in the local flow.  No momentum theory, no tip-loss factor: finite
 blade number, swirl and hub come out of Biot-Savart.  All operating points of a recording are solved at once.
 
 References
 ----------
 .. [1] J. E. Kerwin, C.-S. Lee, J. SNAME Transactions 86, 1978 (moderately loaded lifting line and lattice).
-.. [2] A. J. Landgrebe, J. AHS 17(4), 1972 (contraction, see `bemt.conceal.truth_wake`).
+.. [2] A. J. Landgrebe, J. AHS 17(4), 1972 (contraction, see `bemt.proof.truth_wake`).
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.conceal import truth_section as ts
-from bemt.conceal import truth_wake as tw
+from bemt.proof import truth_section as ts
+from bemt.proof import truth_wake as tw
 
 __all__ = ["Answer", "TruthRotor", "air", "solve"]
 
@@ -51,7 +51,7 @@ class TruthRotor:
     wall : float
         Inner radius of a duct over R, NaN without one. [-]
     code : str
-        Which code solves it: ``vortex`` (this module) or ``ccblade`` (`bemt.conceal.truth_ccblade`).
+        Which code solves it: ``vortex`` (this module) or ``ccblade`` (`bemt.proof.truth_ccblade`).
     """
 
     radius: float

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from bemt.conceal.rigs import DUCTED_PLANS, OPEN_PLANS, UNDERPOWERED, Rig
-from bemt.conceal.stand import Stand
-from bemt.conceal.truth_world import Conditions, World
+from bemt.proof.rigs import DUCTED_PLANS, OPEN_PLANS, UNDERPOWERED, Rig
+from bemt.proof.stand import Stand
+from bemt.proof.truth_world import Conditions, World
 
 __all__ = ["CAUSES", "LISTED", "UNLISTED", "Cause", "Change", "applied"]
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.folders import data_roots, find_data
-from bemt.conceal.items import Item, recording_text
+from bemt.proof.items import Item, recording_text
 from bemt.sections import rule as section_rule
 
 if TYPE_CHECKING:

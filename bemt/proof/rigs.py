@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.conceal.stand import Motor
-from bemt.conceal.truth import TruthRotor
-from bemt.conceal.truth_duct import TruthDuct
-from bemt.conceal.truth_section import Section
-from bemt.conceal.truth_world import Conditions
+from bemt.proof.stand import Motor
+from bemt.proof.truth import TruthRotor
+from bemt.proof.truth_duct import TruthDuct
+from bemt.proof.truth_section import Section
+from bemt.proof.truth_world import Conditions
 
 __all__ = ["DUCTED_PLANS", "OPEN_PLANS", "UNDERPOWERED", "Rig", "conditions", "draw_rig"]
 
