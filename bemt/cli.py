@@ -25,7 +25,7 @@ MANY: dict[str, Any] = {"action": "extend", "nargs": "+"}
 
 _MODULES = {"sweep": "bemt.compare.sweep.command", "report": "bemt.report",
             "validate": "bemt.compare.validate.command", "reproduce": "bemt.compare.reproduce", "bench": "bemt.compare.bench.timing",
-            "import": "bemt.recordings.load", "export": "bemt.export.command", "cfd": "bemt.cfd.command",
+            "import": "bemt.recordings.load", "export": "bemt.exports.command", "cfd": "bemt.cfd.command",
             "calibrate": "bemt.commands.calibrate", "estimate": "bemt.commands.estimate",
             "data": "bemt.commands.data", "prove": "bemt.proof.prove",
             "effects": "bemt.effects_list", "diagnose": "bemt.diagnose.command", "plan": "bemt.diagnose.command",

@@ -73,7 +73,7 @@ MAY: dict[str, set[str]] = {
     "bemt.recordings.archive": {"files"},
     "bemt.base.folders": {"environment"},
     "bemt.compare.bench.timing*|bemt._bench*": {"files", "print", "clock", "environment"},
-    "bemt.export.*": {"files", "print"},
+    "bemt.exports.*": {"files", "print"},
     "bemt.cfd.*": {"files", "print", "clock", "environment"},
     "bemt.stations": {"files", "print"},
     "bemt.effects_list": {"print"},

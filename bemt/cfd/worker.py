@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 
 from bemt.base.errors import InputError
 from bemt.base.tables import write_atomic
+from bemt.cfd.openfoam import Settings, case_files
+from bemt.cfd.openfoam.run import BINS
 from bemt.cfd.schema import Point
 from bemt.cfd.start import State, splice
-from bemt.export.openfoam import settings_of, write_openfoam
-from bemt.openfoam import Settings, case_files
-from bemt.openfoam.run import BINS
+from bemt.exports.openfoam import settings_of, write_openfoam
 from bemt.recordings.averaging import steady_average
 
 __all__ = ["DRIFT_LIMIT", "SCATTER_LIMIT", "Outcome", "Worker", "history_of", "point_key", "radial_of"]
