@@ -2,7 +2,7 @@
 
 import sys
 
-from bemt.cli import main
+from bemt.commands.cli import main
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from bemt import cli
 from bemt.air import Air
 from bemt.base.errors import InputError
 from bemt.bem import solver
+from bemt.commands import cli
 from bemt.compare.bench import timing as bench
 from bemt.compare.bench import work as benchwork
 

@@ -9,10 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt import cli
 from bemt import coefficients as co
 from bemt.base.errors import InputError
-from bemt.commands import calibrate
+from bemt.commands import calibrate, cli
 from bemt.formula import compact, fit, gather, limit, refit, score
 from bemt.formula import points as reading
 from bemt.formula.points import Points, Propeller

@@ -23,7 +23,7 @@ from bemt.cfd.record import COLUMNS, Record, grid_studies, grid_uncertainty
 from bemt.cfd.schema import load_campaign
 from bemt.cfd.start import State, splice
 from bemt.cfd.worker import point_key, radial_of
-from bemt.cli import main
+from bemt.commands.cli import main
 from bemt.exports.openfoam import settings_of
 
 HEAD = 'schema = "bemt.cfd/1"\nname = "t"\ncase = "{case}"\n'

@@ -13,8 +13,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from bemt import __version__, cli
+from bemt import __version__
 from bemt.base.errors import Fault, InputError
+from bemt.commands import cli
 
 ROOT = Path(__file__).resolve().parents[1]
 MALFORMED = ROOT / "tests" / "malformed"
@@ -39,7 +40,7 @@ def test_help_is_fast_and_names_every_command() -> None:
 
 
 def test_importing_the_command_line_imports_nothing_heavy() -> None:
-    code = "import sys, bemt.cli; bemt.cli.build_parser(); print(*sorted(sys.modules))"
+    code = "import sys, bemt.commands.cli; bemt.commands.cli.build_parser(); print(*sorted(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     loaded = {name.split(".")[0] for name in done.stdout.split()}
     assert not loaded & {

@@ -13,10 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from bemt import cli
 from bemt.base import cache, folders
 from bemt.base.errors import InputError
-from bemt.commands import data
+from bemt.commands import cli, data
 from bemt.recordings import archive as data_archive
 
 GEOM = "r/R c/R beta\n0.15 0.11 30.0\n0.50 0.16 20.0\n0.75 0.13 13.0\n1.00 0.05 8.0\n"

@@ -15,7 +15,7 @@ from diagnosing import CASES, case, points, recording
 
 from bemt.bem.evaluate import prepare
 from bemt.case import load_case
-from bemt.cli import build_parser, main
+from bemt.commands.cli import build_parser, main
 from bemt.diagnose import chain, document, problem, record
 from bemt.diagnose.command import load
 from bemt.series import Series

@@ -192,7 +192,7 @@ def test_the_two_commands_are_those_that_ci_runs(project: Path) -> None:
 
 
 def test_the_commands_of_the_readme_exist(project: Path) -> None:
-    from bemt.cli import build_parser
+    from bemt.commands.cli import build_parser
 
     readme = (project / "README.md").read_text(encoding="utf-8")
     table = re.findall(r"^\| `python -m bemt ([^`]+)` \| (.*) \|$", readme, flags=re.MULTILINE)
@@ -229,7 +229,7 @@ DOCUMENTS = sorted(path.name for path in (Path(__file__).parents[1] / "docs").gl
 
 @pytest.mark.parametrize("document", DOCUMENTS)
 def test_the_commands_of_the_documents_exist(project: Path, document: str) -> None:
-    from bemt.cli import build_parser
+    from bemt.commands.cli import build_parser
 
     for line in shell_commands((project / "docs" / document).read_text(encoding="utf-8")):
         if " -m bemt " in line:

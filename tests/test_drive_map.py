@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from bemt import readers as importers
 from bemt.base.errors import InputError
-from bemt.cli import main
+from bemt.commands.cli import main
 from bemt.drive import bench_map, map_export, map_scatter
 from bemt.drive.map_points import MapPoints, join, points
 

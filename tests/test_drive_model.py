@@ -12,7 +12,7 @@ import pytest
 
 from bemt import effects
 from bemt.base.errors import InputError
-from bemt.cli import main
+from bemt.commands.cli import main
 from bemt.drive import identify, mission, rotor_table, transient, validate_command
 from bemt.drive.drive_model import EFFECTS, Battery, Drive, Esc, Motor
 from bemt.drive.map_points import MapPoints

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from bemt.base.errors import InputError
-from bemt.cli import main
+from bemt.commands.cli import main
 from bemt.drive import motor_constant as mc
 from bemt.drive import motor_errors, motor_file, motor_generate
 

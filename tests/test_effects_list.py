@@ -9,7 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from bemt import cli, effects, effects_list
+from bemt import effects
+from bemt.commands import cli
+from bemt.commands import effects as effects_list
 
 NEW = '''
 from dataclasses import dataclass

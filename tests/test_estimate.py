@@ -7,9 +7,9 @@ import json
 import numpy as np
 import pytest
 
-from bemt import cli
 from bemt.base.errors import InputError
 from bemt.base.units import INCH
+from bemt.commands import cli
 from bemt.formula import k1k2 as empirical
 from bemt.formula.estimate import estimate
 

@@ -12,7 +12,7 @@ import pytest
 
 from bemt.base.errors import InputError
 from bemt.case import load_case
-from bemt.cli import main
+from bemt.commands.cli import main
 from bemt.exports.command import export_case
 from bemt.exports.openfoam import Run, settings_of
 from geometry import export as module

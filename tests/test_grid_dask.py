@@ -22,7 +22,7 @@ from bemt.base.errors import InputError
 from bemt.base.tables import json_text
 from bemt.bem.evaluate import evaluate, prepare
 from bemt.case import load_case
-from bemt.cli import main
+from bemt.commands.cli import main
 from bemt.compare.grid import run as grid_module
 from bemt.compare.grid.run import Grid, Solver
 from bemt.compare.sweep import sweep

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from bemt.base.errors import InputError
-from bemt.cli import main
+from bemt.commands.cli import main
 from bemt.importing import document, import_file
 from bemt.recordings.choice import Choice
 

@@ -50,7 +50,7 @@ FLOOR_OF_ROOMS: tuple[tuple[str, ...], ...] = (
 
 # Who may touch the world outside, and how. Whoever is not named touches nothing.
 MAY: dict[str, set[str]] = {
-    "bemt.cli": {"print", "files", "environment"},
+    "bemt.commands.cli": {"print", "files", "environment"},
     "bemt.case|bemt.case.*": {"files"},
     "bemt.base.toml": {"files"},
     "bemt.readers|bemt.readers.*": {"files"},
@@ -75,8 +75,8 @@ MAY: dict[str, set[str]] = {
     "bemt.compare.bench.timing*|bemt._bench*": {"files", "print", "clock", "environment"},
     "bemt.exports.*": {"files", "print"},
     "bemt.cfd.*": {"files", "print", "clock", "environment"},
-    "bemt.stations": {"files", "print"},
-    "bemt.effects_list": {"print"},
+    "bemt.commands.stations": {"files", "print"},
+    "bemt.commands.effects": {"print"},
     "bemt.drive.*_command": {"files", "print"},
     "bemt.drive.*_file": {"files"},
     "bemt.diagnose.command": {"files", "print"},
@@ -99,7 +99,7 @@ HEAVY = {
     "OCP", "aerosandbox", "cadquery", "casadi", "dask", "distributed", "manifold3d", "matplotlib", "neuralfoil",
     "pandas", "pyarrow", "pyvista", "scipy", "sklearn", "trimesh", "vtk", "vtkmodules", "wisdem",
 }  # fmt: skip
-LIGHT = {"bemt", "bemt.__main__", "bemt.cli", "bemt.base.errors"}  # imported by --help: standard library only
+LIGHT = {"bemt", "bemt.__main__", "bemt.commands.cli", "bemt.base.errors"}  # imported by --help: standard library only
 
 FILE_CALLS = {
     "open", "read_text", "write_text", "read_bytes", "write_bytes", "mkdir", "unlink", "rename", "touch", "iterdir",
@@ -284,7 +284,7 @@ def tree(project: Path) -> dict[str, str]:
 
 
 def test_the_tree_keeps_the_rules(tree: dict[str, str]) -> None:
-    assert {"bemt.cli", "bemt.bem.solver", "bemt.effects.tip_loss", "geometry.blade"} <= set(tree)
+    assert {"bemt.commands.cli", "bemt.bem.solver", "bemt.effects.tip_loss", "geometry.blade"} <= set(tree)
     assert not violations(tree), "\n".join(violations(tree))
 
 
@@ -302,7 +302,7 @@ def test_the_tree_keeps_the_rules(tree: dict[str, str]) -> None:
         ("bemt.effects.swirl", "import bemt.effects.tip_loss", "an effect is one file, got bemt.effects.tip_loss"),
         ("bemt.effects.swirl", "from bemt.readers import read", "bemt.readers is not below it in the flow"),
         ("bemt.compare.sweep.command", "from bemt import reproduce", "bemt.compare.reproduce is not below it in the flow"),
-        ("bemt.compare.sweep.command", "from bemt.cli import main", "bemt.cli is not below it in the flow"),
+        ("bemt.compare.sweep.command", "from bemt.commands.cli import main", "bemt.commands.cli is not below it in the flow"),
         ("bemt.novelty", "", "has no place in the flow; give it one in FLOOR_OF_ROOMS"),
         ("bemt.air", "from .units import INCH", "relative import; write the whole name"),
         ("bemt.air", "import bemt.nowhere", "bemt.nowhere does not exist"),
@@ -323,8 +323,8 @@ def test_the_tree_keeps_the_rules(tree: dict[str, str]) -> None:
         ("bemt.series", "try:\n    import scipy.optimize\nexcept ImportError:\n    pass",
          "scipy.optimize at the top; import it inside the function that needs it"),
         ("bemt.bem.duct", "from numba import njit", "numba at the top; import it inside the function that needs it"),
-        ("bemt.cli", "import numpy as np", "numpy; --help must import the standard library only"),
-        ("bemt.cli", "import bemt.compare.sweep", "bemt.compare.sweep; --help must import the standard library only"),
+        ("bemt.commands.cli", "import numpy as np", "numpy; --help must import the standard library only"),
+        ("bemt.commands.cli", "import bemt.compare.sweep", "bemt.compare.sweep; --help must import the standard library only"),
         ("bemt.base.errors", "import numpy", "numpy; --help must import the standard library only"),
         ("bemt.proof.truth", "import bemt.bem.solver", "must not see bemt.bem.solver"),
         ("bemt.proof.truth_world", "def f():\n    from bemt.effects import standard", "must not see bemt.effects"),
@@ -398,7 +398,7 @@ def test_help_imports_the_standard_library_only(project: Path) -> None:
 
 
 def test_a_sweep_needs_no_solids_and_no_pictures(project: Path) -> None:
-    command = "from bemt.cli import main\nassert main(['sweep', 'cases/prop_8x5', '--json']) == 0"
+    command = "from bemt.commands.cli import main\nassert main(['sweep', 'cases/prop_8x5', '--json']) == 0"
     found = loaded(command, project, BEMT_CACHE="off")
     assert {"bemt", "geometry", "neuralfoil", "numpy"} <= found
     assert not found & {"OCP", "cadquery", "manifold3d", "pyvista", "trimesh", "vtk", "vtkmodules"}

@@ -19,7 +19,7 @@ from bemt.base.errors import InputError
 from bemt.case import load_case
 from bemt.cfd.openfoam import Body, Settings, Sweep, case_files
 from bemt.cfd.worker import history_of
-from bemt.cli import main
+from bemt.commands.cli import main
 from bemt.exports.openfoam import Run, settings_of, write_openfoam
 from geometry.mesh import Options
 

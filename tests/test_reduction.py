@@ -19,7 +19,7 @@ from bemt import readers as importers
 from bemt.air import Air
 from bemt.base import units
 from bemt.base.errors import InputError
-from bemt.cli import main
+from bemt.commands.cli import main
 from bemt.readers._imported import Channel, Imported
 from bemt.recordings.channels import view
 from bemt.recordings.reduce import Reduced, reduce

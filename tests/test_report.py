@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bemt.cli import main
+from bemt.commands.cli import main
 from bemt.report import book_html
 from bemt.report.cfd import attach, cfd_runs
 from bemt.report.gather import attach_diagnoses, gather, safe_files

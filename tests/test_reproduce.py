@@ -5,7 +5,7 @@ import json
 
 import pytest
 
-from bemt import cli
+from bemt.commands import cli
 from bemt.compare import reproduce
 from bemt.compare import thesis as th
 

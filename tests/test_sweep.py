@@ -372,7 +372,7 @@ def test_interrupt_ends_at_once_with_130_and_no_half_file(tmp_path: Path, jobs: 
 
 
 def test_strict_turns_a_large_error_into_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from bemt.cli import main
+    from bemt.commands.cli import main
 
     path = str(make_case(tmp_path))
     assert main(["sweep", path, "--quiet"]) == 0

@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 from test_sweep import GRID, ROOT, make_case, tree
 
-from bemt.cli import main
+from bemt.commands.cli import main
 from bemt.compare.grid import run as grid_module
 from bemt.compare.sweep import command, sweep
 

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bemt.base.errors import InputError
-from bemt.cli import main
+from bemt.commands.cli import main
 from bemt.drive.thrusters import Thruster, allocate, attainable, effectiveness, moment_at
 
 PAIR = [Thruster(0.2, 27.0), Thruster(-0.2, 27.0)]

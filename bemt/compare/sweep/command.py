@@ -360,7 +360,7 @@ def run(args: argparse.Namespace) -> int:
     Parameters
     ----------
     args : argparse.Namespace
-        As :func:`bemt.cli.build_parser` makes it.
+        As :func:`bemt.commands.cli.build_parser` makes it.
 
     Returns
     -------

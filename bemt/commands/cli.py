@@ -28,8 +28,8 @@ _MODULES = {"sweep": "bemt.compare.sweep.command", "report": "bemt.report",
             "import": "bemt.recordings.load", "export": "bemt.exports.command", "cfd": "bemt.cfd.command",
             "calibrate": "bemt.commands.calibrate", "estimate": "bemt.commands.estimate",
             "data": "bemt.commands.data", "prove": "bemt.proof.prove",
-            "effects": "bemt.effects_list", "diagnose": "bemt.diagnose.command", "plan": "bemt.diagnose.command",
-            "stations": "bemt.stations", "map": "bemt.drive.map_command", "motor": "bemt.drive.motor_command",
+            "effects": "bemt.commands.effects", "diagnose": "bemt.diagnose.command", "plan": "bemt.diagnose.command",
+            "stations": "bemt.commands.stations", "map": "bemt.drive.map_command", "motor": "bemt.drive.motor_command",
             "drive": "bemt.drive.drive_command", "thrusters": "bemt.drive.thrusters_command"}  # fmt: skip
 
 
