@@ -1,6 +1,6 @@
 """Same numbers before and after a change of structure: run every command that prints JSON, then compare two such runs.
 
-``python tests/same_numbers.py save FOLDER [--tree CHECKOUT]`` runs the commands in a checkout and keeps what they print;
+``python tests/same_numbers.py save FOLDER [--tree CHECKOUT]`` runs the commands in a checkout and keeps the output;
 ``python tests/same_numbers.py compare BEFORE AFTER`` lists every number that differs by more than 1e-9 of its size and
 every key that came or went, and exits 1 when there is one. Keys that name versions, times or files are left out.
 """
@@ -36,14 +36,14 @@ COMMANDS: dict[str, list[str]] = {
        for n in ("pitch", "plate", "duct", "compressible")},
     "plan": ["plan", "--case", "cases/prop_8x5", "--plan", "reports/diagnosis/cfd_pitch.csv", "--json"],
     "drive": ["drive", "cases/ds30", "--json"],
-    "map": ["map", f"{D}/thrust_map/thrust_map.csv", "--json"],
+    "map": ["map", f"{D}/thrust_map/xNova-SR-steps.csv", "--json"],
     "motor": ["motor", "reports/drive/motor_mn4006", "--json"],
     "cfd": ["cfd", "reports/cfd", "--json"],
     "calibrate": ["calibrate", f"{D}/uiuc/volume-1", "--test", f"{D}/uiuc/volume-2", "--json"],
     "estimate": ["estimate", "10x5", "--rpm", "6000", "--airspeed", "5", "10", "--json"],
     "effects": ["effects", "--json"],
-    "import_fluent": ["import", f"{D}/cfd_exports/screw", "--json"],
-    "import_bench": ["import", f"{D}/jmajew", "--json"],
+    "import_fluent": ["import", f"{D}/cfd_exports/screw/report-def-0-rfile.out", "--json"],
+    "import_bench": ["import", f"{D}/jmajew/grp01__f1507_hqprop76x8_4s_table1.csv", "--json"],
 }  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""The promise of bemt.recordings.averaging: whole revolutions by time, honest drift, later rows win, clocks are never mixed."""
+"""The promise of averages: whole revolutions by time, honest drift, later rows win, clocks are never mixed."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bemt.base.averaging import keep_last, relation, revolution_average, steady_average, time_steps
 from bemt.base.errors import InputError
-from bemt.recordings.averaging import keep_last, relation, revolution_average, steady_average, time_steps
 
 
 @settings(max_examples=60, deadline=None)

@@ -24,7 +24,7 @@ from bemt.cfd.schema import load_campaign
 from bemt.cfd.start import State, splice
 from bemt.cfd.worker import point_key, radial_of
 from bemt.commands.cli import main
-from bemt.exports.openfoam import settings_of
+from bemt.exports.openfoam.write import settings_of
 
 HEAD = 'schema = "bemt.cfd/1"\nname = "t"\ncase = "{case}"\n'
 TWO = "[defaults]\nlevel = 4\niterations = 30\naverage = 10\n[axes]\nrpm = [6000, 9000]\n"

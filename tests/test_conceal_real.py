@@ -10,9 +10,9 @@ import pytest
 from bemt.base.errors import InputError
 from bemt.case import load_case
 from bemt.effects import catalogue
-from bemt.importing import import_file
 from bemt.proof import prove, real, score
 from bemt.proof.items import Item
+from bemt.recordings.load import import_file
 
 
 @pytest.fixture(scope="module")

@@ -13,8 +13,8 @@ import pytest
 
 from bemt.base.errors import InputError
 from bemt.case import load_case
-from bemt.importing import import_file
 from bemt.proof import draw, items, proof_text, prove, resolve, rigs, score, seal
+from bemt.recordings.load import import_file
 
 TINY = draw.Size(
     {"single": 2, "pair": 0, "null": 1, "mismatch": 1, "unlisted": 0, "sensor": 2, "underpowered": 1},

@@ -14,8 +14,8 @@ import pytest
 
 from bemt.base.errors import InputError
 from bemt.commands.cli import main
-from bemt.importing import document, import_file
 from bemt.recordings.choice import Choice
+from bemt.recordings.load import document, import_file
 
 PERIOD = 0.5
 

@@ -14,9 +14,9 @@ import pytest
 
 from bemt import readers as importers
 from bemt.base.errors import InputError
-from bemt.importing import document, import_file
 from bemt.readers import _cfd
 from bemt.readers._imported import Imported
+from bemt.recordings.load import document, import_file
 
 RNG = np.random.default_rng(20)
 N = 40

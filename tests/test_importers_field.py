@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from bemt.base.errors import InputError
-from bemt.importing import import_file
 from bemt.readers._headings import heading
 from bemt.readers._imported import Imported
+from bemt.recordings.load import import_file
 
 Write = Callable[..., Path]
 

@@ -17,10 +17,10 @@ import pytest
 
 from bemt.base.errors import InputError
 from bemt.case import load_case
-from bemt.cfd.openfoam import Body, Settings, Sweep, case_files
 from bemt.cfd.worker import history_of
 from bemt.commands.cli import main
-from bemt.exports.openfoam import Run, settings_of, write_openfoam
+from bemt.exports.openfoam import Body, Settings, Sweep, case_files
+from bemt.exports.openfoam.write import Run, settings_of, write_openfoam
 from geometry.mesh import Options
 
 COARSE = Options(n=41, segments=48)

@@ -15,8 +15,8 @@ from pathlib import Path
 import pytest
 
 from bemt.base.errors import InputError
-from bemt.importing import import_file
 from bemt.recordings.channels import view
+from bemt.recordings.load import import_file
 from bemt.recordings.overview import findings, is_recording, points_text, reduction_document, reduction_of
 from bemt.recordings.reduce import Reduced
 

@@ -12,9 +12,9 @@ import pytest
 
 from bemt.base import units
 from bemt.base.errors import InputError
-from bemt.importing import import_file
 from bemt.readers._imported import Channel, Imported
 from bemt.recordings.check import Finding, check
+from bemt.recordings.load import import_file
 from bemt.series import Series
 
 INCH = units.INCH

@@ -14,10 +14,7 @@ from numba import njit
 from scipy.optimize import brentq
 
 from bemt.air import Air
-from bemt.bem import kernel as _kernel
-from bemt.bem import residual as _residual
-from bemt.bem import solver
-from bemt.bem import vecmath as _vecmath
+from bemt.bem import kernel, residual, solver, vecmath
 from bemt.bem.duct import DuctFlow
 from bemt.effects import standard, without
 from bemt.effects.swirl import Swirl
@@ -28,7 +25,7 @@ from geometry.rotor import Rotor
 
 AIR = Air.from_density(1.2)
 DUCT = DuctFlow(0.95, 0.05, 0.2, 0.8, 0.001, 0.08, 0.01)
-R = _residual
+R = residual
 
 
 # The pieces of the kernel -------------------------------------------------------------------------------------------
@@ -38,9 +35,9 @@ def test_elementary_functions_are_exact() -> None:
     @njit
     def run(x: Any, y: Any, out: Any) -> None:
         for i in range(x.size):
-            out[i, 0], out[i, 1] = _vecmath.sincos(x[i])
-            out[i, 2] = _vecmath.atan2(y[i], x[i])
-            out[i, 3] = _vecmath.log(abs(x[i]))
+            out[i, 0], out[i, 1] = vecmath.sincos(x[i])
+            out[i, 2] = vecmath.atan2(y[i], x[i])
+            out[i, 3] = vecmath.log(abs(x[i]))
 
     rng = np.random.default_rng(1)
     x = np.concatenate([rng.uniform(-10, 10, 50_000), rng.uniform(-1, 1, 1000) * 1e-9, [1.0, -1.0, math.pi, 0.5]])
@@ -264,15 +261,15 @@ def test_import_compiles_nothing() -> None:
 
 
 def test_the_disk_cache_sees_changes_of_other_files() -> None:
-    before = _vecmath.fingerprint(_residual, _vecmath)
-    assert before == _vecmath.fingerprint(_residual, _vecmath)
-    assert before in [c.cell_contents for c in _kernel.entry(True, False).py_func.__closure__]  # type: ignore[attr-defined]
-    kept = _residual._EPS
+    before = vecmath.fingerprint(residual, vecmath)
+    assert before == vecmath.fingerprint(residual, vecmath)
+    assert before in [c.cell_contents for c in kernel.entry(True, False).py_func.__closure__]  # type: ignore[attr-defined]
+    kept = residual._EPS
     try:
-        _residual._EPS = 2.0 * kept
-        assert _vecmath.fingerprint(_residual, _vecmath) != before
+        residual._EPS = 2.0 * kept
+        assert vecmath.fingerprint(residual, vecmath) != before
     finally:
-        _residual._EPS = kept
+        residual._EPS = kept
 
 
 def test_broadcasting_of_speeds_and_air(rotor: Rotor, polar: Polar) -> None:
@@ -322,14 +319,14 @@ def test_a_failed_station_is_a_nan_with_words(rotor: Rotor, polar: Polar) -> Non
     assert not s.converged.any()
     assert np.isnan([s.T, s.Q, s.P, s.CT, s.CP, s.V_exit, s.T_rotor]).all()
     place = prep.stations.r[3] / rotor.R
-    assert s.flags[0] == (f"not converged at r/R {place:.2f}: {solver.REASONS[_kernel.NOT_FINITE]}",)
+    assert s.flags[0] == (f"not converged at r/R {place:.2f}: {solver.REASONS[kernel.NOT_FINITE]}",)
     assert np.isnan(s.radial["dT"][:, 3]).all()
     assert np.isfinite(s.radial["dT"][:, [2, 4]]).all()
     T, Q, ok = solver.solve_point(broken, 5000.0, 0.0, AIR)
     assert math.isnan(T) and math.isnan(Q) and not ok
 
 
-@pytest.mark.parametrize(("K", "reason"), [(-1.0, _kernel.JUMP), (math.nan, _kernel.NOT_FINITE)])
+@pytest.mark.parametrize(("K", "reason"), [(-1.0, kernel.JUMP), (math.nan, kernel.NOT_FINITE)])
 def test_nonsense_in_the_balance_ends_in_words(rotor: Rotor, polar: Polar, K: float, reason: int) -> None:
     prep = solver.prepare(rotor, [(0.7, polar)], duct=DUCT, n_stations=10)
     num = prep.num.copy()

@@ -21,8 +21,8 @@ import numpy as np
 from numba import carray, types
 from numba.core import cgutils
 
-from bemt.bem import residual as _residual
-from bemt.bem import vecmath as _vecmath
+from bemt.bem import residual
+from bemt.bem import vecmath as vecmath
 from bemt.bem.residual import (
     N_BRIDGE,
     N_DUCTED,
@@ -369,7 +369,7 @@ def _entries(stamp: int) -> tuple[Any, Any, Any, Any]:
     return open_plain, open_full, ducted_plain, ducted_full
 
 
-_OPEN_PLAIN, _OPEN_FULL, _DUCTED_PLAIN, _DUCTED_FULL = _entries(fingerprint(_residual, _vecmath))
+_OPEN_PLAIN, _OPEN_FULL, _DUCTED_PLAIN, _DUCTED_FULL = _entries(fingerprint(residual, vecmath))
 
 
 def entry(ducted: bool, plain: bool) -> Callable[..., None]:

@@ -70,7 +70,8 @@ class Prepared:
     tab : (N, Nm, Nr, Na, 2) float
         cl and cd over Mach number squared, Reynolds number and angle of attack [1].
     num, grid : (11,), (16,) float
-        Numbers of the effects and of the table axes, see :mod:`bemt.bem.residual` and :mod:`bemt.bem.kernel` [SI units].
+        Numbers of the effects and of the table axes, see :mod:`bemt.bem.residual` and
+        :mod:`bemt.bem.kernel` [SI units].
     """
 
     rotor: Rotor

@@ -19,7 +19,7 @@ from bemt.cfd.schema import Campaign, load_campaign
 from bemt.cfd.worker import Worker, point_key
 
 if TYPE_CHECKING:
-    from bemt.cfd.openfoam import Settings
+    from bemt.exports.openfoam import Settings
 
 __all__ = ["run", "run_campaign"]
 

@@ -11,8 +11,8 @@ from typing import Any
 from bemt.base.errors import Fault, InputError
 from bemt.base.toml import Collector, Key, check_table, load_toml, shown
 from bemt.case import Case, check_name, load_case
-from bemt.cfd.openfoam.settings import DOMAINS, GASES, SECTORS, TURBULENCE
-from bemt.exports.openfoam import Run
+from bemt.exports.openfoam.settings import DOMAINS, GASES, SECTORS, TURBULENCE
+from bemt.exports.openfoam.write import Run
 
 __all__ = ["SCHEMA_NAME", "Campaign", "Point", "load_campaign"]
 

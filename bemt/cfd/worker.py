@@ -19,14 +19,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.averaging import steady_average
 from bemt.base.errors import InputError
 from bemt.base.tables import write_atomic
-from bemt.cfd.openfoam import Settings, case_files
-from bemt.cfd.openfoam.run import BINS
 from bemt.cfd.schema import Point
 from bemt.cfd.start import State, splice
-from bemt.exports.openfoam import settings_of, write_openfoam
-from bemt.recordings.averaging import steady_average
+from bemt.exports.openfoam import Settings, case_files
+from bemt.exports.openfoam.run import BINS
+from bemt.exports.openfoam.write import settings_of, write_openfoam
 
 __all__ = ["DRIFT_LIMIT", "SCATTER_LIMIT", "Outcome", "Worker", "history_of", "point_key", "radial_of"]
 

@@ -24,7 +24,8 @@ EXIT_INTERRUPTED = 130
 MANY: dict[str, Any] = {"action": "extend", "nargs": "+"}
 
 _MODULES = {"sweep": "bemt.compare.sweep.command", "report": "bemt.report",
-            "validate": "bemt.compare.validate.command", "reproduce": "bemt.compare.reproduce", "bench": "bemt.compare.bench.timing",
+            "validate": "bemt.compare.validate.command", "reproduce": "bemt.compare.reproduce",
+            "bench": "bemt.compare.bench.timing",
             "import": "bemt.recordings.load", "export": "bemt.exports.command", "cfd": "bemt.cfd.command",
             "calibrate": "bemt.commands.calibrate", "estimate": "bemt.commands.estimate",
             "data": "bemt.commands.data", "prove": "bemt.proof.prove",

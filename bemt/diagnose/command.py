@@ -77,8 +77,8 @@ def load(path: str, case: Case) -> Record:
     InputError
         If the file is not a recording.
     """
-    from bemt.importing import import_file
     from bemt.recordings import reduce as reduction
+    from bemt.recordings.load import import_file
 
     imported = import_file(path)
     _same_rotor(imported, case, path)

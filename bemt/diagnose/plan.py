@@ -95,8 +95,8 @@ def points(path: str, case: Case) -> Record:
     """
     from bemt.base.errors import Fault, InputError
     from bemt.diagnose.record import from_series
-    from bemt.importing import import_file
     from bemt.recordings.channels import view
+    from bemt.recordings.load import import_file
     from bemt.series import Series
 
     imported = import_file(path)

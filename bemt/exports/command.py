@@ -13,7 +13,7 @@ from bemt.base.errors import EXIT_INPUT, EXIT_OK, Fault, InputError
 from bemt.base.tables import file_hash, json_text, number_text, text_table, write_atomic
 from bemt.base.toml import shown
 from bemt.case import Case, find_cases, load_case, repeated_names
-from bemt.exports.openfoam import Run, check_run, settings_of, write_openfoam
+from bemt.exports.openfoam.write import Run, check_run, settings_of, write_openfoam
 from geometry.common import GeometryError
 from geometry.export import MANIFEST, SCHEMA, export
 from geometry.mesh import Options

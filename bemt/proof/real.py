@@ -267,7 +267,7 @@ density_kg_m3 = 1.2
 
 
 def _fan() -> Iterator[Item]:
-    from bemt.importing import import_file
+    from bemt.recordings.load import import_file
     from bemt.recordings.reduce import reduce
 
     root = find_data("jmajew")

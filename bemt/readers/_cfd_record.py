@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.averaging import Average, keep_last, steady_average
 from bemt.readers import SourceText
 from bemt.readers._cfd import Column, Table, unique
 from bemt.readers._imported import Channel, Imported
-from bemt.recordings.averaging import Average, keep_last, steady_average
 
 __all__ = ["fields", "history"]
 

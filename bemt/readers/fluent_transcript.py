@@ -22,12 +22,12 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from bemt.base.averaging import keep_last
 from bemt.base.errors import Fault, InputError
 from bemt.readers import SourceText, number
 from bemt.readers._cfd import head_lines, load, si_unit, slug
 from bemt.readers._imported import Channel, Imported
 from bemt.readers.fluent_forces import blocks
-from bemt.recordings.averaging import keep_last
 
 __all__ = ["KIND", "read", "sniff"]
 

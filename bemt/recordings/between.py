@@ -1,6 +1,6 @@
 """A recording in other units than its companions, found by its level: readings over what the same model gives.
 
-One recording alone shows a slip of a unit only where it leaves the windows of :mod:`bemt.recordings.slips`. Beside others
+One recording alone shows a slip of a unit only where it leaves the windows of `slips`. Beside others
 of the same rotor, or of rotors with models of their own, its level does: what they share, the error of the model
 included, drops out, and what is left is one factor. A mixture of units otherwise looks like physics, since the levels
 of the recordings then go with whatever else differs between them.

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bemt.base.averaging import Average, keep_last, revolution_average
 from bemt.base.errors import Fault, InputError
 from bemt.readers._imported import Channel, Imported
-from bemt.recordings.averaging import Average, keep_last, revolution_average
 
 __all__ = ["Choice", "averaged", "chosen"]
 

@@ -26,10 +26,10 @@ import numpy as np
 
 from bemt import readers as importers
 from bemt.base import tables
+from bemt.base.averaging import relation
 from bemt.base.errors import EXIT_INPUT, EXIT_OK, Fault, InputError
 from bemt.readers._imported import Channel, Imported
 from bemt.recordings.adapt import adapt, damaged_export, recognised
-from bemt.recordings.averaging import relation
 from bemt.recordings.choice import Choice, averaged, chosen
 from bemt.recordings.overview import findings, is_recording, points_text, reduction_document, reduction_of
 from bemt.recordings.reduce import Reduced

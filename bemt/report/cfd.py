@@ -20,7 +20,7 @@ __all__ = ["attach", "cfd_runs", "is_plain", "operating_run", "radial_of"]
 SCHEMA = "bemt.cfd-recording/"
 CSV_BYTES = 20_000_000
 DOMAIN_OVER_D = {"free": 5.0, "pipe": 1.0}
-"""Width of the domains of :mod:`bemt.cfd.openfoam` over the rotor's diameter. [1]"""
+"""Width of the domains of :mod:`bemt.exports.openfoam` over the rotor's diameter. [1]"""
 TURBULENCE = {"kOmegaSST": "k-omega SST", "realizableKE": "realizable k-epsilon"}
 NUMBERS = ("rpm", "airspeed_m_s", "J", "thrust_N", "torque_Nm", "u_thrust_N", "u_torque_Nm", "density_kg_m3",
            "wall_distance_m", "tip_gap_mm", "sideslip_deg", "pitch_offset_deg", "level", "cells", "iterations",

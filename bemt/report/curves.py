@@ -1,6 +1,6 @@
 """What a case page plots: geometry, performance over J and rpm with bands, radial loading, refinement of the stations.
 
-The bands are the standard uncertainty from the declared assumptions, propagated as in :mod:`bemt.compare.sweep.case`: one at a
+The bands are the standard uncertainty from the declared assumptions, propagated as in `bemt.compare.sweep`: one at a
 time through its range. They do not hold the error of the theory.
 """
 

@@ -1,8 +1,8 @@
 """Time per operating point: ``python -m bemt bench [--json] [--quick]``.
 
 The work: one two-bladed 10x5 in 30 elements with one NACA 4412 table of one Reynolds number, at 3000, 5000 and 6700
-rev/min and 20 advance ratios from 0 to 0.8.  See `bemt.compare.bench.work`; ``--work DIR`` times the same on other files of
-its layout (``<name>_edges31.csv``, ``<name>_mid30.csv``, ``polar_*.csv``).
+rev/min and 20 advance ratios from 0 to 0.8.  See `bemt.compare.bench.work`; ``--work DIR`` times the same on other
+files of its layout (``<name>_edges31.csv``, ``<name>_mid30.csv``, ``polar_*.csv``).
 
 All times are CPU time of one thread, best of several repeats, after compilation.  Physics as in the peers: tip and hub
 loss, swirl; ``standard`` repeats the batch with every standard effect on.  JSON: schema ``bemt.bench/1``.

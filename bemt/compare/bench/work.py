@@ -1,4 +1,4 @@
-"""The work that `bemt.compare.bench.timing` times: one two-bladed 10x5 in 30 elements, one section table, 60 operating points.
+"""The work that is timed: one two-bladed 10x5 in 30 elements, one section table, 60 operating points.
 
 The files in ``benchdata`` were made by `generate` and are read by `load`; `prepare` makes the rotor.
 """

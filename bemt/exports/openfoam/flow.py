@@ -15,8 +15,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from bemt.cfd.openfoam.settings import Settings
-from bemt.cfd.openfoam.text import dictionary, vector
+from bemt.exports.openfoam.settings import Settings
+from bemt.exports.openfoam.text import dictionary, vector
 
 __all__ = ["constants", "fields", "schemes", "solution"]
 

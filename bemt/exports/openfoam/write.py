@@ -18,8 +18,8 @@ from bemt.base.tables import write_atomic
 from bemt.base.toml import Collector, Key, check_value
 from bemt.case import Case
 from bemt.case.schema import SCHEMA
-from bemt.cfd.openfoam import Body, Settings, Sweep, case_files, sector_choice
-from bemt.cfd.openfoam.settings import MACH_COMPRESSIBLE
+from bemt.exports.openfoam import Body, Settings, Sweep, case_files, sector_choice
+from bemt.exports.openfoam.settings import MACH_COMPRESSIBLE
 from geometry.common import GeometryError
 from geometry.export import MANIFEST, export
 from geometry.mesh import Options, build
@@ -57,7 +57,7 @@ class Run:
     solver : str or None
         ``incompressible`` or ``compressible``; None decides by the helical tip Mach number, compressible above 0.5.
     gas : str
-        As in :class:`bemt.cfd.openfoam.settings.Settings`.
+        As in :class:`bemt.exports.openfoam.settings.Settings`.
     sector, domain, turbulence, level, iterations, average, ranks
         As there; `sector` None is the smallest that fits.
     wall_distance_over_R, plate_radius_over_R : float or None
@@ -141,7 +141,7 @@ def settings_of(case: Case, run: Run, options: Options | None = None) -> tuple[S
     Returns
     -------
     Settings
-        For :func:`bemt.cfd.openfoam.case_files`.
+        For :func:`bemt.exports.openfoam.case_files`.
     dict
         ``rotor``, ``duct`` as exported, ``tail`` (outline of the centre body, or None), ``notes``.
 

@@ -4,7 +4,7 @@ Made for OpenFOAM 1912 (the package of Debian 12). The frame is that of :mod:`ge
 thrust, blade 1 on the x axis.
 """
 
-from bemt.cfd.openfoam.case import case_files
-from bemt.cfd.openfoam.settings import Body, Settings, Sweep, sector_choice
+from bemt.exports.openfoam.case import case_files
+from bemt.exports.openfoam.settings import Body, Settings, Sweep, sector_choice
 
 __all__ = ["Body", "Settings", "Sweep", "case_files", "sector_choice"]

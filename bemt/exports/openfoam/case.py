@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from bemt.cfd.openfoam.flow import constants, fields, schemes, solution
-from bemt.cfd.openfoam.grid import block_mesh, create_patch, lines, set_fields, snappy, topo_set
-from bemt.cfd.openfoam.run import all_run, control
-from bemt.cfd.openfoam.settings import Settings
+from bemt.exports.openfoam.flow import constants, fields, schemes, solution
+from bemt.exports.openfoam.grid import block_mesh, create_patch, lines, set_fields, snappy, topo_set
+from bemt.exports.openfoam.run import all_run, control
+from bemt.exports.openfoam.settings import Settings
 
 __all__ = ["case_files"]
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from bemt.cfd.openfoam.settings import PIPE_RADIUS, Settings
-from bemt.cfd.openfoam.text import dictionary, vector
+from bemt.exports.openfoam.settings import PIPE_RADIUS, Settings
+from bemt.exports.openfoam.text import dictionary, vector
 
 __all__ = ["block_mesh", "create_patch", "extent", "lines", "mrf_zone", "set_fields", "snappy", "topo_set"]
 

@@ -127,7 +127,7 @@ class Settings:
     compressible : bool
         Whether rhoSimpleFoam runs instead of simpleFoam.
     gas : str
-        ``isentropic`` (density follows pressure) or ``perfect`` (energy equation; see :mod:`bemt.cfd.openfoam.flow`).
+        ``isentropic`` (density follows pressure) or ``perfect`` (energy equation; see `flow`).
     duct, body : Body or None
         Extents of the duct and of the centre body or stator, when exported.
     gap : float
