@@ -11,9 +11,9 @@ import numpy as np
 from bemt import effects
 from bemt.bem import evaluate, forward
 from bemt.case import Case, load_case
+from bemt.dataset import Dataset
 from bemt.diagnose import chain, record
 from bemt.effects.base import Effect, Reading
-from bemt.series import Series
 
 CASES = Path(__file__).resolve().parent.parent / "cases"
 NOISE = 0.01
@@ -42,14 +42,14 @@ def points(plan: str, D: float = 0.2032) -> dict[str, np.ndarray]:
 def recording(
     truth: Case, given: dict[str, np.ndarray], extra: tuple[Effect, ...] = (), noise: float = NOISE, seed: int = 0,
     ar: float = 0.0,
-) -> Series:  # fmt: skip
+) -> Dataset:  # fmt: skip
     """What a stand would record of a case with effects on, instruments included."""
     rng = np.random.default_rng(seed)
     ready = evaluate.prepare(truth)
     ids = {e.id for e in extra}
     chosen = (*(e for e in ready.effects if e.id not in ids), *extra)
     ready = replace(ready, effects=chosen)
-    base = record.from_series(Series("bench", "x", {**given, "thrust_N": np.ones_like(given["rpm"])}), truth)
+    base = record.from_series(Dataset("bench", "x", {**given, "thrust_N": np.ones_like(given["rpm"])}), truth)
     plain = [e for e in chosen if not forward.acts_on_points(e)]
     flow = forward.flow_of(ready.model.prepared(plain), base.rpm, base.V, base.air, base.extra)
     loads, met, ok = forward.respond(ready.model.prepared, chosen, flow)
@@ -65,10 +65,10 @@ def recording(
             e[i] = ar * e[i - 1] + np.sqrt(1.0 - ar * ar) * e[i]
         u[name] = noise * np.abs(y) + 1e-3 * float(np.abs(y).max())
         values[name] = y + u[name] * e
-    return Series("bench", "generated", values, u)
+    return Dataset("bench", "generated", values, u)
 
 
-def diagnose(series: Series, baseline: Case, nulls: int = 200) -> chain.Diagnosis:
+def diagnose(series: Dataset, baseline: Case, nulls: int = 200) -> chain.Diagnosis:
     return chain.diagnose([record.from_series(series, baseline)], [baseline], nulls=nulls)
 
 

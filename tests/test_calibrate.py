@@ -133,7 +133,7 @@ def test_a_planted_series_comes_back_and_is_shrunk_where_one_propeller_speaks_fo
     base = from_formula(compact.CONSTANTS)
     names = ["odd" if i % 3 == 0 else "single" if i == 1 else f"m{i % 4}" for i in range(len(base.propellers))]
     propellers = tuple(replace(p, maker=name) for p, name in zip(base.propellers, names, strict=True))
-    planted_ = {"odd": compact.Series(0.05), "single": compact.Series(0.05)}
+    planted_ = {"odd": compact.MakerSeries(0.05), "single": compact.MakerSeries(0.05)}
     points = replace(base, propellers=propellers)
     CT, CP = refit.predict(points, refit.Fitted(compact.CONSTANTS, planted_, 0, 0))
     fitted = refit.fit(replace(points, CT=CT, CP=CP))

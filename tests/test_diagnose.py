@@ -9,8 +9,8 @@ import pytest
 from diagnosing import case, diagnose, left_out, points, recording
 
 from bemt import effects
+from bemt.dataset import Dataset
 from bemt.diagnose import document, noise, plan, problem, record, signatures
-from bemt.series import Series
 
 GRID = points("grid")
 
@@ -70,7 +70,7 @@ def test_a_parameter_that_the_recording_replaces_is_no_parameter(walls: tuple[fl
 
 def test_torque_in_other_units_is_a_slip_of_units() -> None:
     series = recording(case(), GRID)
-    wrong = Series("bench", "slipped", {**series.values, "thrust_N": series["thrust_N"] / 9.80665}, dict(series.u))
+    wrong = Dataset("bench", "slipped", {**series.values, "thrust_N": series["thrust_N"] / 9.80665}, dict(series.u))
     answer = diagnose(wrong, case())
     assert answer.decision.verdict == "sensor", document.text(answer)
     assert answer.decision.effects == ("unit_slip",)
@@ -85,7 +85,7 @@ def test_a_shuffled_covariate_takes_the_claim_away() -> None:
     shuffled |= {k: series[k] * factor for k in ("thrust_N", "torque_Nm")}
     shuffled["airspeed_m_s"] = series["airspeed_m_s"] * series["rpm"][order] / series["rpm"]
     u = {k: series.u[k] * factor for k in ("thrust_N", "torque_Nm")}
-    answer = diagnose(Series("bench", "shuffled", shuffled, u), left_out("compressibility", case()))
+    answer = diagnose(Dataset("bench", "shuffled", shuffled, u), left_out("compressibility", case()))
     assert "compressibility" not in answer.decision.effects, document.text(answer)
 
 
@@ -120,14 +120,14 @@ def test_a_plan_with_pulse_widths_sees_the_drive() -> None:
     given = {"rpm": rpm, "airspeed_m_s": 0.0 * rpm, "density_kg_m3": np.full(rpm.size, 1.225),
              "time_s": 60.0 * np.arange(rpm.size), "pwm_s": 1e-3 + rpm / 24e6, "thrust_N": np.ones(rpm.size),
              "torque_Nm": np.ones(rpm.size)}  # fmt: skip
-    seen = plan.plan(record.from_series(Series("bench", "drive", given), case()), case())
+    seen = plan.plan(record.from_series(Dataset("bench", "drive", given), case()), case())
     assert {"battery_sag", "motor_heating"} <= set(seen.confusion.ids)
     assert (seen.sight["battery_sag"], seen.sight["motor_heating"]) == ("visible", "marginal")
 
 
 def test_a_plan_knows_what_it_can_see() -> None:
     static, grid = (
-        plan.plan(record.from_series(Series("bench", p, {**points(p), "thrust_N": np.ones_like(points(p)["rpm"]),
+        plan.plan(record.from_series(Dataset("bench", p, {**points(p), "thrust_N": np.ones_like(points(p)["rpm"]),
                                                          "torque_Nm": np.ones_like(points(p)["rpm"])}), case()), case())
         for p in ("static", "grid")
     )  # fmt: skip

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 from bemt.case import Case, load_case
+from bemt.dataset import Dataset
 from bemt.diagnose import chain, document, record
 from bemt.diagnose.chain import Diagnosis
 from bemt.diagnose.record import Record
-from bemt.series import Series
 
 pytestmark = pytest.mark.slow
 
@@ -41,7 +41,7 @@ def taken(found: list[dict[str, str]], case: Case, reference: bool = False) -> R
     for k, q in (("thrust_N", "thrust"), ("torque_Nm", "torque")):
         share = [max(abs(float(row[f"drift_{q}"])), float(row[f"scatter_{q}"]), 1e-3) for row in found]
         u[k] = np.array(share) * values[k]
-    return replace(record.from_series(Series("cfd", "recording", values, u), case), reference=reference)
+    return replace(record.from_series(Dataset("cfd", "recording", values, u), case), reference=reference)
 
 
 def told(left_out: frozenset[str], found: list[dict[str, str]], reference: list[dict[str, str]]) -> Diagnosis:

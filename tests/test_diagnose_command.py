@@ -16,9 +16,9 @@ from diagnosing import CASES, case, points, recording
 from bemt.bem.evaluate import prepare
 from bemt.case import load_case
 from bemt.commands.cli import build_parser, main
+from bemt.dataset import Dataset
 from bemt.diagnose import chain, document, problem, record
 from bemt.diagnose.command import load
-from bemt.series import Series
 
 
 def _recorded(path: Path, noise_seed: int) -> str:
@@ -184,7 +184,7 @@ def test_many_points_say_the_same_in_any_order(order: str) -> None:
         T[::2] = np.nan
     values = {"rpm": rpm, "airspeed_m_s": J * rpm / 60 * 0.2032, "density_kg_m3": np.full(rpm.size, 1.2), "thrust_N": T,
               "torque_Nm": 0.02 * 1.2 * (rpm / 60) ** 2 * 0.2032**5}  # fmt: skip
-    made = record.from_series(Series("bench", "x", values), case())
+    made = record.from_series(Dataset("bench", "x", values), case())
     n, D = made.rpm / 60, 0.2032
     assert len(made) == 150 and np.ptp(made.rpm) > 15000
     CT, J = made.measured["thrust_N"] / (1.2 * n**2 * D**4), made.V / (n * D)
@@ -245,7 +245,7 @@ def test_a_level_that_no_cause_explains_is_said(tmp_path: Path, diameter_in: int
     series = recording(case(), points("grid"))
     values = {**series.values, "torque_Nm": torque * series["torque_Nm"]}
     other = case().replaced({"rotor.diameter_in": diameter_in, "blade.pitch_in": 5 * diameter_in / 8})
-    answer = chain.diagnose([record.from_series(Series("bench", "log", values, dict(series.u)), other)], [other])
+    answer = chain.diagnose([record.from_series(Dataset("bench", "log", values, dict(series.u)), other)], [other])
     assert words in " ".join(document.explanation(answer))
 
 
@@ -254,7 +254,7 @@ def test_without_an_explanation_the_first_sentence_is_what_the_recording_shows(c
     """A load 15 % up above 13000 rpm, which nothing explains: what calibration leaves of it is low at low speed."""
     series = recording(case(), points("grid"))
     values = {**series.values, channel: series[channel] * np.where(series["rpm"] > 13000.0, 1.15, 1.0)}
-    made = record.from_series(Series("bench", "log", values, dict(series.u)), case())
+    made = record.from_series(Dataset("bench", "log", values, dict(series.u)), case())
     answer = chain.diagnose([made], [case()], nulls=20)
     assert answer.decision.verdict in ("unknown", "insufficient")
     first, second = document.explanation(answer)[:2]
@@ -271,10 +271,10 @@ def test_rows_copied_count_once() -> None:
     rpm = np.linspace(5000.0, 15000.0, 20)
     once = {"rpm": rpm, "airspeed_m_s": 0.0 * rpm, "thrust_N": 6.8e-8 * rpm**2}
     twice = {k: np.concatenate([v, v]) for k, v in once.items()}
-    made = record.from_series(Series("bench", "x", twice), case())
+    made = record.from_series(Dataset("bench", "x", twice), case())
     assert len(made) == 20 and any("20 rows repeat others digit by digit" in n for n in made.notes)
     other = twice | {"time_s": np.arange(40.0)}  # a second run that came out the same
-    assert len(record.from_series(Series("bench", "x", other), case())) == 40
+    assert len(record.from_series(Dataset("bench", "x", other), case())) == 40
 
 
 @pytest.mark.parametrize("what", ["a ramp sampled densely", "many short runs", "many speeds"])
@@ -286,7 +286,7 @@ def test_no_recording_keeps_too_many_points(what: str) -> None:
         values["time_s"] = 0.05 * np.arange(n)
     if what.startswith("many short"):
         values["run"] = np.repeat(np.arange(n / 20), 20)
-    made = record.from_series(Series("bench", "x", values), case())
+    made = record.from_series(Dataset("bench", "x", values), case())
     assert 100 <= len(made) <= 1.6 * record.MAX_POINTS
     seen = np.isfinite(made.measured["thrust_N"])
     np.testing.assert_allclose(made.measured["thrust_N"][seen], 6.8e-8 * made.rpm[seen] ** 2, rtol=1e-9)
@@ -306,7 +306,7 @@ def _of(name: str, seed: int, plan: str = "grid", truth: str = "prop_8x5", **fac
     own = case(truth)
     series = recording(own, points(plan, own.diameter_m), seed=seed)
     values = {k: v * factors.get(k, 1.0) for k, v in series.values.items()}
-    return record.from_series(Series("bench", name, values), own)
+    return record.from_series(Dataset("bench", name, values), own)
 
 
 @pytest.mark.parametrize(("channel", "factor", "words"), ODD_UNITS)
@@ -329,7 +329,7 @@ def test_both_loads_off_by_one_factor_are_a_matter_of_the_speed() -> None:
     records = [_of(f"{k}.csv", k, "static") for k in range(2)]
     series = recording(case(), points("static"), seed=2)
     low = {k: v / 49.0 if k in ("thrust_N", "torque_Nm") else v for k, v in series.values.items()}
-    records.append(record.from_series(Series("bench", "2.csv", low), case()))
+    records.append(record.from_series(Dataset("bench", "2.csv", low), case()))
     (found,) = problem.build(records, [case()]).findings
     assert found.startswith("2.csv: error: rpm_electrical (rpm): readings over what the case gives are 0.02")
     assert "taken for mechanical: divide by 7 pole pairs" in found
@@ -361,7 +361,8 @@ def test_a_recording_without_load_has_no_level() -> None:
     rpm = np.full(6, 15000.0)
     J = np.linspace(0.72, 0.78, 6)
     fading = {"rpm": rpm, "airspeed_m_s": J * rpm / 60 * 0.2032, "thrust_N": np.full(6, 0.5)}
-    records = [_of("a.csv", 0, "static"), _of("b.csv", 1), record.from_series(Series("bench", "c.csv", fading), case())]
+    last = record.from_series(Dataset("bench", "c.csv", fading), case())
+    records = [_of("a.csv", 0, "static"), _of("b.csv", 1), last]
     assert problem.build(records, [case()]).findings == ()
 
 

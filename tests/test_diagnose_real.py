@@ -14,10 +14,10 @@ import pytest
 from diagnosing import left_out
 
 from bemt.case import Case, load_case
+from bemt.dataset import Dataset
 from bemt.diagnose import chain, document, record
 from bemt.diagnose.command import load
 from bemt.sections import rule as section_rule
-from bemt.series import Series
 
 pytestmark = pytest.mark.slow
 
@@ -107,7 +107,7 @@ density_kg_m3 = 1.225
         case = left_out("duct", write(tmp_path / f"x22a_{angle}", body, geometry))
         q = rows[rows[:, 0] == angle]
         values = {"J": q[:, 1], "CT": q[:, 2], "CP": q[:, 3], "rpm": np.full(len(q), 1200.0)}
-        records.append(record.from_series(Series("bench", f"x22a {angle}", values), case))
+        records.append(record.from_series(Dataset("bench", f"x22a {angle}", values), case))
         cases.append(case)
     answer = chain.diagnose(records, cases)
     assert answer.decision.effects == ("duct",), document.text(answer)

@@ -13,10 +13,10 @@ from diagnosing import case, diagnose, left_out, points, recording
 from bemt import effects
 from bemt.bem import forward
 from bemt.case import Case
+from bemt.dataset import Dataset
 from bemt.diagnose import document, evidence, gate, plan, problem, record, signatures, verdict
 from bemt.diagnose.signatures import effect_of
 from bemt.effects.base import Reading
-from bemt.series import Series
 
 pytestmark = pytest.mark.slow
 
@@ -42,7 +42,7 @@ def conditions(name: str) -> dict[str, np.ndarray]:
 
 def as_record(given: dict[str, np.ndarray], of: Case) -> record.Record:
     ones = np.ones_like(given["rpm"])
-    return record.from_series(Series("bench", "points", {**given, "thrust_N": ones, "torque_Nm": ones}), of)
+    return record.from_series(Dataset("bench", "points", {**given, "thrust_N": ones, "torque_Nm": ones}), of)
 
 
 @pytest.mark.parametrize("name", DIAGNOSED)

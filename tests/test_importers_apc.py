@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from bemt import readers as importers
 from bemt.base import units
 from bemt.base.errors import InputError
+from bemt.dataset import Dataset
 from bemt.readers import apc
-from bemt.series import Series
 
 NAMES = ["STATION", "CHORD", "PITCH", "PITCH", "PITCH", "SWEEP", "THICKNESS", "TWIST", "MAX-THICK", "CROSS-SECTION"]
 NAMES += ["ZHIGH", "CGY", "CGZ"]
@@ -151,7 +151,7 @@ def test_per3_glued_nan_is_kept_and_flagged(tmp_path: Path) -> None:
 def test_per3_units(tmp_path: Path) -> None:
     s = apc.read_per3(save(tmp_path, per3(glued=False))).series
     rebuilt = s.select(s["rpm"] == 6000.0)
-    direct = Series("vendor", "x", {k: rebuilt[k] for k in ("rpm", "CT", "CP", "J")}).derive(13.4 * 0.0254, 1.2256)
+    direct = Dataset("vendor", "x", {k: rebuilt[k] for k in ("rpm", "CT", "CP", "J")}).derive(13.4 * 0.0254, 1.2256)
     for name in ("thrust_N", "torque_Nm", "power_W"):
         assert np.allclose(rebuilt[name], direct[name], rtol=2e-3)
 

@@ -20,11 +20,11 @@ from bemt.air import Air
 from bemt.base import units
 from bemt.base.errors import InputError
 from bemt.commands.cli import main
+from bemt.dataset import Dataset
 from bemt.readers._imported import Channel, Imported
 from bemt.recordings.channels import view
 from bemt.recordings.reduce import Reduced, reduce
 from bemt.recordings.rows import is_samples
-from bemt.series import Series
 
 D = 0.254
 K_T, K_Q = 2.0e-7, 3.0e-9
@@ -473,7 +473,7 @@ def test_every_published_recording_reduces_and_every_row_is_accounted_for(shared
 
 def test_runs_of_one_condition_agree_within_the_errors_that_their_maker_states(shared_data: Path) -> None:
     """No published table is of the same run as the raw record; but the tables repeat each other, run after run."""
-    groups: dict[str, list[Series]] = defaultdict(list)
+    groups: dict[str, list[Dataset]] = defaultdict(list)
     for file in sorted((shared_data / "jmajew").glob("*table*.csv")):
         if not re.search("no-?prop", file.name):
             groups[re.sub(r"_table\d", "", file.stem)].append(reduce(importers.read(file)).series)

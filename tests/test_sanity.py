@@ -12,10 +12,10 @@ import pytest
 
 from bemt.base import units
 from bemt.base.errors import InputError
+from bemt.dataset import Dataset
 from bemt.readers._imported import Channel, Imported
 from bemt.recordings.check import Finding, check
 from bemt.recordings.load import import_file
-from bemt.series import Series
 
 INCH = units.INCH
 KGF, LBF = units.KGF, units.LBF
@@ -271,7 +271,7 @@ def test_constant_columns_and_dead_sensors(channel: str) -> None:
 
 def test_a_line_of_constant_speed_is_no_stuck_sensor() -> None:
     J = np.linspace(0.1, 0.7, 13)
-    line = Series("bench", "line", {"rpm": np.full(13, 5000.0), "J": J, "CT": 0.1 - 0.1 * J, "CP": 0.05 - 0.02 * J})
+    line = Dataset("bench", "line", {"rpm": np.full(13, 5000.0), "J": J, "CT": 0.1 - 0.1 * J, "CP": 0.05 - 0.02 * J})
     assert check(line) == ()
 
 

@@ -6,8 +6,10 @@ An :class:`InputError` carries *all* faults that were found, so that a user repa
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 __all__ = [
     "EXIT_INPUT",
@@ -19,6 +21,7 @@ __all__ = [
     "Fault",
     "InputError",
     "RangeWarning",
+    "needs",
     "system_fault",
 ]
 
@@ -121,6 +124,45 @@ def system_fault(error: OSError) -> Fault:
     out/grid.csv: got No space left on device; expected a file or folder that can be used.
     """
     return Fault(str(error.filename or ""), "", error.strerror or str(error), "a file or folder that can be used")
+
+
+def needs(module: str, extra: str) -> Any:
+    """Import a library that an extra brings, or say which extra is missing.
+
+    Parameters
+    ----------
+    module : str
+        Dotted name of the module.
+    extra : str
+        Extra of this project that installs it.
+
+    Returns
+    -------
+    module
+        The imported module.
+
+    Raises
+    ------
+    InputError
+        When it is not installed.
+
+    Examples
+    --------
+    >>> needs("math", "cad").floor(2.5)
+    2
+    >>> needs("no_such_library", "cad")
+    Traceback (most recent call last):
+        ...
+    bemt.base.errors.InputError: no_such_library: got no such library; expected the extra [cad]. Install it with
+    python -m pip install "bemt[cad]".
+    """
+    try:
+        return importlib.import_module(module)
+    except ModuleNotFoundError as error:
+        if error.name is None or not module.startswith(error.name):
+            raise
+        hint = f'Install it with python -m pip install "bemt[{extra}]"'
+        raise InputError(Fault(module, "", "no such library", f"the extra [{extra}]", hint)) from error
 
 
 class BemtWarning(UserWarning):

@@ -20,10 +20,10 @@ from bemt.base.tables import json_text, write_atomic
 from bemt.base.units import ZERO_CELSIUS
 from bemt.bem import evaluate
 from bemt.case import find_cases, load_case, repeated_names
+from bemt.dataset import Dataset
 from bemt.diagnose import record as records
 from bemt.recordings.channels import view
 from bemt.recordings.check import check
-from bemt.series import Series
 
 if TYPE_CHECKING:
     from bemt.case import Case
@@ -135,7 +135,7 @@ def _unused(imported: Imported, rows: Recorded, case: Case) -> list[str]:
     return out
 
 
-def _points(imported: Imported, rows: Recorded, path: str) -> Series:
+def _points(imported: Imported, rows: Recorded, path: str) -> Dataset:
     """Rows as they are: coefficients by their own names, measured channels as a recording names them."""
     n, known = imported.rows, {*_POINT, *_LOADS}
     raw = {k: np.broadcast_to(c.values, (n,)) for k, c in imported.channels.items() if c.values.shape in ((n,), (1,))}
@@ -146,7 +146,7 @@ def _points(imported: Imported, rows: Recorded, path: str) -> Series:
         states = zip(*wet.values(), strict=True)
         values["density_kg_m3"] = np.array([Air.from_state(p, t - ZERO_CELSIUS, 100.0 * h).rho for p, t, h in states])
     told = {k: np.abs(v) for k, v in u.items() if k in values}
-    return Series("bench", Path(path).name, values, told, imported.flags, {"file": path})
+    return Dataset("bench", Path(path).name, values, told, imported.flags, {"file": path})
 
 
 def _progress(args: argparse.Namespace) -> Callable[[str], None] | None:

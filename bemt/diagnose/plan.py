@@ -94,10 +94,10 @@ def points(path: str, case: Case) -> Record:
         With loads that mean nothing.
     """
     from bemt.base.errors import Fault, InputError
+    from bemt.dataset import Dataset
     from bemt.diagnose.record import from_series
     from bemt.recordings.channels import view
     from bemt.recordings.load import import_file
-    from bemt.series import Series
 
     imported = import_file(path)
     rows = view(imported)
@@ -109,7 +109,7 @@ def points(path: str, case: Case) -> Record:
     loads = {k: values.get(k, np.ones(n)) for k in ("thrust_N", "torque_Nm")}
     lawful = {k: v for k, v in values.items() if not k.startswith("u_")}
     u = {k[2:]: np.abs(v) for k, v in values.items() if k.startswith("u_") and k[2:] in loads}
-    made = from_series(Series("bench", path, lawful | loads, u), case)
+    made = from_series(Dataset("bench", path, lawful | loads, u), case)
     return replace(made, notes=(*made.notes, *imported.warnings, *rows.notes))
 
 

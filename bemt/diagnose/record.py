@@ -16,7 +16,7 @@ from bemt.base.units import ZERO_CELSIUS
 
 if TYPE_CHECKING:
     from bemt.case import Case
-    from bemt.series import Series
+    from bemt.dataset import Dataset
 
 __all__ = ["CHANNELS", "COVARIATES", "Record", "air_of", "concatenated", "from_series", "merged", "owners"]
 
@@ -138,12 +138,12 @@ def air_of(fields: Mapping[str, Array]) -> Air:
     return cast("Air", SimpleNamespace(**fields))
 
 
-def from_series(series: Series, case: Case, correlated: Mapping[str, Mapping[str, float]] | None = None) -> Record:
+def from_series(series: Dataset, case: Case, correlated: Mapping[str, Mapping[str, float]] | None = None) -> Record:
     """Points of a series with the conditions that the case adds.
 
     Parameters
     ----------
-    series : Series
+    series : Dataset
         Any kind.  Thrust and torque may be given as coefficients, torque as shaft power.
     case : Case
         Diameter, speed and air where the series has none.
@@ -249,7 +249,7 @@ def _kinks(rpm: Array, extra: Mapping[str, Array]) -> NDArray[np.bool_]:
     return out
 
 
-def _with_rpm(series: Series, case: Case, air: Air) -> Series:
+def _with_rpm(series: Dataset, case: Case, air: Air) -> Dataset:
     rpm = np.full(len(series), case.rpm)
     return replace(series, values={**series.values, "rpm": rpm}).derive(case.diameter_m, air.rho)
 

@@ -115,7 +115,7 @@ CONSTANTS = Constants(0.9143, 0.1714, 0.1966, 2548.0, 0.02961, 0.7756, 0.1462, -
 
 
 @dataclass(frozen=True)
-class Series:
+class MakerSeries:
     """What sets a series of propellers apart from the mean of all.
 
     Attributes
@@ -133,22 +133,22 @@ class Series:
     name: str = ""
 
 
-SERIES: dict[str, Series] = {
-    "ance": Series(0.0000, 0.961, "Aeronaut Carbon Electric"),
-    "apc29ff": Series(0.0263, 0.987, "APC 29 Free Flight"),
-    "apccf": Series(0.0000, 0.996, "APC Carbon Fiber"),
-    "apce": Series(0.0027, 0.922, "APC Thin Electric"),
-    "apcsf": Series(0.0289, 1.280, "APC Slow Flyer"),
-    "apcsp": Series(0.0122, 0.964, "APC Sport"),
-    "grcp": Series(-0.0133, 0.890, "Graupner CAM Prop"),
-    "grcsp": Series(0.0231, 1.053, "Graupner CAM Slim"),
-    "grsn": Series(-0.0407, 1.145, "Graupner Super Nylon"),
-    "gwsdd": Series(-0.0521, 0.998, "GWS Direct Drive"),
-    "kavfk": Series(0.0000, 0.977, "Kavon FK"),
-    "mae": Series(0.0499, 1.004, "Master Airscrew Electric"),
-    "mas": Series(-0.0400, 0.934, "Master Airscrew Scimitar"),
-    "rusp": Series(0.0000, 1.006, "Rev Up Special Prop"),
-    "zin": Series(0.0000, 0.827, "Zingali"),
+SERIES: dict[str, MakerSeries] = {
+    "ance": MakerSeries(0.0000, 0.961, "Aeronaut Carbon Electric"),
+    "apc29ff": MakerSeries(0.0263, 0.987, "APC 29 Free Flight"),
+    "apccf": MakerSeries(0.0000, 0.996, "APC Carbon Fiber"),
+    "apce": MakerSeries(0.0027, 0.922, "APC Thin Electric"),
+    "apcsf": MakerSeries(0.0289, 1.280, "APC Slow Flyer"),
+    "apcsp": MakerSeries(0.0122, 0.964, "APC Sport"),
+    "grcp": MakerSeries(-0.0133, 0.890, "Graupner CAM Prop"),
+    "grcsp": MakerSeries(0.0231, 1.053, "Graupner CAM Slim"),
+    "grsn": MakerSeries(-0.0407, 1.145, "Graupner Super Nylon"),
+    "gwsdd": MakerSeries(-0.0521, 0.998, "GWS Direct Drive"),
+    "kavfk": MakerSeries(0.0000, 0.977, "Kavon FK"),
+    "mae": MakerSeries(0.0499, 1.004, "Master Airscrew Electric"),
+    "mas": MakerSeries(-0.0400, 0.934, "Master Airscrew Scimitar"),
+    "rusp": MakerSeries(0.0000, 1.006, "Rev Up Special Prop"),
+    "zin": MakerSeries(0.0000, 0.827, "Zingali"),
 }
 """By UIUC family; fitted on volume 1 together with `CONSTANTS`, shrunk to the mean by the number of propellers."""
 
@@ -178,8 +178,8 @@ BANDS: dict[str, dict[str, tuple[float, ...]]] = {
 the maker is left out of the fit, over `BAND_X`; given label, chord, chord and measured pitch."""
 
 
-def find_series(name: str) -> Series:
-    """Series by UIUC family (``gwsdd``) or name (``GWS Direct Drive``).
+def find_series(name: str) -> MakerSeries:
+    """Maker series by UIUC family (``gwsdd``) or name (``GWS Direct Drive``).
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ def find_series(name: str) -> Series:
 
     Returns
     -------
-    Series
+    MakerSeries
         Of `SERIES`.
 
     Raises

@@ -20,7 +20,7 @@ from bemt.formula.compact import (
     P_OVER_D_RANGE,
     RE_RANGE,
     X_LIMIT,
-    Series,
+    MakerSeries,
     coefficients,
     default_chord,
     effective_pitch,
@@ -254,7 +254,7 @@ def estimate(
     """
     air = Air.from_density() if air is None else air
     known = chord_m is not None
-    own = Series()
+    own = MakerSeries()
     faults: list[Fault] = []
     try:
         own = own if series is None else find_series(series)

@@ -108,7 +108,7 @@ class Points:
 
     def chord(
         self, constants: compact.Constants = compact.CONSTANTS, known: bool = True,
-        series: Mapping[str, compact.Series] = compact.SERIES,
+        series: Mapping[str, compact.MakerSeries] = compact.SERIES,
     ) -> Array:  # fmt: skip
         """Chord at 0.75 R.
 
@@ -118,7 +118,7 @@ class Points:
             For the typical chord.
         known : bool
             Use measured chords where there are any.
-        series : mapping of str to Series
+        series : mapping of str to MakerSeries
             By maker.
 
         Returns
@@ -127,7 +127,7 @@ class Points:
             Measured or typical. [m]
         """
         c = self.of("chord_m")
-        own = np.array([series.get(p.maker, compact.Series()).chord for p in self.propellers])[self.index]
+        own = np.array([series.get(p.maker, compact.MakerSeries()).chord for p in self.propellers])[self.index]
         typical = own * np.asarray(compact.default_chord(self.of("diameter_m"), constants))
         return np.where(np.isfinite(c) & known, c, typical)
 

@@ -45,7 +45,7 @@ class Fitted:
     """Constants and series, and what they were fitted on: ``propellers`` with chord, ``chords`` of the chord law."""
 
     constants: compact.Constants
-    series: Mapping[str, compact.Series]
+    series: Mapping[str, compact.MakerSeries]
     propellers: int
     chords: int
 
@@ -54,8 +54,8 @@ PUBLISHED = Fitted(compact.CONSTANTS, compact.SERIES, 0, 0)
 """What :mod:`bemt.formula.compact` holds."""
 
 
-def _zero_lift(points: Points, series: Mapping[str, compact.Series]) -> Array:
-    return np.array([series.get(p.maker, compact.Series()).zero_lift for p in points.propellers])[points.index]
+def _zero_lift(points: Points, series: Mapping[str, compact.MakerSeries]) -> Array:
+    return np.array([series.get(p.maker, compact.MakerSeries()).zero_lift for p in points.propellers])[points.index]
 
 
 def predict(points: Points, fitted: Fitted = PUBLISHED, given: str = "chord") -> tuple[Array, Array]:
@@ -213,7 +213,7 @@ def implied_chords(points: Points, fitted: Fitted) -> Array:
         R = propeller.diameter_m / 2.0
         s = propeller.blades * CHORD_GRID / np.pi
         Re = own.Re(np.full(own.rpm.size, R))[:, None] * CHORD_GRID
-        a0 = change.get(propeller.maker, compact.Series()).zero_lift
+        a0 = change.get(propeller.maker, compact.MakerSeries()).zero_lift
         pd = propeller.pitch_m / propeller.diameter_m
         CT = compact.coefficients(pd, 0.0, s, Re, fitted.constants, a0)[0]
         level = np.median(np.log(CT / own.CT[:, None]), axis=0)
@@ -238,9 +238,9 @@ def _chord_law(points: Points, fitted: Fitted) -> Fitted:
     series = {}
     for name in np.unique(makers):
         own = makers == name
-        a0 = fitted.series.get(str(name), compact.Series()).zero_lift
+        a0 = fitted.series.get(str(name), compact.MakerSeries()).zero_lift
         factor = float(np.exp(np.sum(off[own]) / (np.count_nonzero(own) + 1.0)))
-        series[str(name)] = compact.Series(a0, factor, FAMILIES.get(str(name), str(name)))
+        series[str(name)] = compact.MakerSeries(a0, factor, FAMILIES.get(str(name), str(name)))
     constants = replace(fitted.constants, chord_R=float(np.exp(level)), chord_exponent=exponent)
     return replace(fitted, constants=constants, series=series, chords=int(np.count_nonzero(have)))
 
@@ -264,7 +264,7 @@ def fit(points: Points, start: compact.Constants = compact.CONSTANTS) -> Fitted 
     if np.unique(used.index[np.isfinite(used.CP)]).size < MIN_PROPELLERS or not np.any(used.J == 0):
         return None
     constants, changes = _thrust_fit(used, start)
-    series = {name: compact.Series(change) for name, change in changes.items()}
+    series = {name: compact.MakerSeries(change) for name, change in changes.items()}
     fitted = Fitted(constants, series, int(np.unique(used.index).size), 0)
     return _chord_law(points, replace(fitted, constants=_power_fit(used, fitted)))
 

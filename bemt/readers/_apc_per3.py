@@ -11,9 +11,9 @@ import numpy as np
 
 from bemt.base import units
 from bemt.base.errors import Fault, InputError
+from bemt.dataset import Dataset
 from bemt.readers import SourceText, load_text, number
 from bemt.readers._apc_common import designation, provenance
-from bemt.series import Series
 
 __all__ = ["ApcPerformance", "read_per3"]
 
@@ -33,7 +33,7 @@ class ApcPerformance:
         Nominal. [m]
     blades : int
         Number of blades.
-    series : Series
+    series : Dataset
         Kind ``vendor``; channels rpm, airspeed_m_s, J, eta, CT, CP, power_W, torque_Nm, thrust_N.
     """
 
@@ -41,7 +41,7 @@ class ApcPerformance:
     diameter_m: float
     pitch_m: float
     blades: int
-    series: Series
+    series: Dataset
 
 
 def _per3_rows(source: SourceText, faults: list[Fault]) -> tuple[list[tuple[float, ...]], list[int]]:
@@ -130,5 +130,5 @@ def read_per3(path: str | os.PathLike[str]) -> ApcPerformance:
     }  # fmt: skip
     remark = "computed by APC's vortex code, not measured; dimensional columns are rounded (use CT, CP at low rpm)"
     labels = tuple(f"{os.path.basename(source.name)}:{line}" for line in lines)
-    series = Series("vendor", f"APC {name}", values, {}, flags, provenance(source, remark), labels)
+    series = Dataset("vendor", f"APC {name}", values, {}, flags, provenance(source, remark), labels)
     return ApcPerformance(name, diameter_in * units.INCH, pitch_in * units.INCH, blades, series)

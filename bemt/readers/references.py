@@ -28,8 +28,8 @@ import numpy as np
 
 from bemt.base import units
 from bemt.base.errors import Fault, InputError
+from bemt.dataset import Dataset
 from bemt.readers import head_text, load_text, number
-from bemt.series import Series
 
 __all__ = ["COLUMNS", "CONDITIONS", "KIND", "KINDS", "QUANTITIES", "Reference", "read", "sniff", "to_series"]
 
@@ -316,7 +316,7 @@ def read(path: str | os.PathLike[str]) -> list[Reference]:
     return references
 
 
-def to_series(references: Iterable[Reference], name: str) -> list[Series]:
+def to_series(references: Iterable[Reference], name: str) -> list[Dataset]:
     """Group references into series, one per kind and source.
 
     Parameters
@@ -328,7 +328,7 @@ def to_series(references: Iterable[Reference], name: str) -> list[Series]:
 
     Returns
     -------
-    list of Series
+    list of Dataset
         Each point is one condition; conditions that the file leaves open stay NaN. Two values of one quantity at one
         condition make two points.
     """
@@ -358,5 +358,5 @@ def to_series(references: Iterable[Reference], name: str) -> list[Series]:
             "remark": "; ".join(remarks),
         }  # fmt: skip
         labels = tuple(first.where for first in firsts)
-        out.append(Series(kind, name, values, u, (), provenance, labels))
+        out.append(Dataset(kind, name, values, u, (), provenance, labels))
     return out

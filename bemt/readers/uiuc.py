@@ -41,6 +41,7 @@ from typing import Any
 import numpy as np
 
 from bemt.base.errors import Fault, InputError
+from bemt.dataset import Dataset
 from bemt.readers import HEAD_BYTES
 from bemt.readers._uiuc_names import FAMILIES, VARIABLE_PITCH, UiucFile, UiucName, parse_file_name
 from bemt.readers._uiuc_tables import (
@@ -55,7 +56,6 @@ from bemt.readers._uiuc_tables import (
     role_of,
     sniff,
 )
-from bemt.series import Series
 
 __all__ = [
     "KIND", "SOURCE", "UiucFolder", "UiucGeometry", "UiucLine", "UiucPropeller", "UiucStatic", "UiucThickness",
@@ -335,7 +335,7 @@ def read(path: str | os.PathLike[str]) -> Any:
     return _READERS[role](target)
 
 
-def to_series(propeller: UiucPropeller) -> Series:
+def to_series(propeller: UiucPropeller) -> Dataset:
     """All measured points of one propeller as a series of kind ``bench``.
 
     Parameters
@@ -345,7 +345,7 @@ def to_series(propeller: UiucPropeller) -> Series:
 
     Returns
     -------
-    Series
+    Dataset
         Channels rpm, J, CT, CP, eta; static points have J = 0 and eta = 0. The archive states no uncertainty per point:
         ``u`` is NaN (unknown). ``labels`` are ``file:row``.
 
@@ -377,4 +377,4 @@ def to_series(propeller: UiucPropeller) -> Series:
         "source": SOURCE, "file": propeller.folder, "sha256": hashes,
         "remark": f"coefficients on the true diameter; nominal {propeller.diameter_in:g} in",
     }  # fmt: skip
-    return Series("bench", propeller.name, values, {}, tuple(flags), provenance, tuple(labels))
+    return Dataset("bench", propeller.name, values, {}, tuple(flags), provenance, tuple(labels))

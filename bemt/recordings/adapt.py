@@ -13,12 +13,12 @@ import numpy as np
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import split_suffix
+from bemt.dataset import Dataset
 from bemt.readers import polar_c81, uiuc
 from bemt.readers._imported import Channel, Imported
 from bemt.readers.apc import ApcPerformance
 from bemt.readers.references import Reference
 from bemt.sections.polars import Polar
-from bemt.series import Series
 
 __all__ = ["adapt", "damaged_export", "recognised"]
 
@@ -149,7 +149,7 @@ def adapt(found: Any, form: str, name: str) -> Imported:
     Parameters
     ----------
     found : object
-        Imported, Series, Polar, list of Reference or UiucPropeller, or a record of arrays.
+        Imported, Dataset, Polar, list of Reference or UiucPropeller, or a record of arrays.
     form : str
         KIND of the importer.
     name : str
@@ -167,13 +167,13 @@ def adapt(found: Any, form: str, name: str) -> Imported:
 
     Examples
     --------
-    >>> record = adapt(Series("bench", "stand", {"rpm": [6000.0, 7000.0], "thrust_N": [10.0, 13.5]}), "csv", "a.csv")
+    >>> record = adapt(Dataset("bench", "stand", {"rpm": [6000.0, 7000.0], "thrust_N": [10.0, 13.5]}), "csv", "a.csv")
     >>> record.kind, record.rows, record.channels["thrust_N"].unit
     ('bench', 2, 'N')
     """
     if isinstance(found, Imported):
         return found
-    if isinstance(found, Series):
+    if isinstance(found, Dataset):
         channels = {key: _channel(key, found[key]) for key in found.values}
         flags = sorted({flag for row in found.flags for flag in row})
         return Imported(form, found.kind, len(found), channels, tuple(flags), _texts(found.provenance, name))

@@ -1,4 +1,4 @@
-"""What a recording measured, under the names that a `Series` has: one view for reduction and sanity checks.
+"""What a recording measured, under the names that a `Dataset` has: one view for reduction and sanity checks.
 
 The importers keep the names of the file; here ``T_N`` becomes ``thrust_N``, the pulse width ``pwm_s``, one of several
 speeds ``rpm``. Every choice is a note, every value that is left out an entry of `lost`.
@@ -51,7 +51,7 @@ class Lost:
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
-    """Channels of a recording by name of a Series.
+    """Channels of a recording by name of a Dataset.
 
     Parameters
     ----------

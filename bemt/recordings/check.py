@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from bemt.dataset import Dataset
 from bemt.readers._imported import Imported
 from bemt.recordings import columns, signs, slips  # they register themselves
 from bemt.recordings.findings import CHECKS, SEVERITIES, Finding, facts_of
-from bemt.series import Series
 
 __all__ = ["Finding", "check"]
 
@@ -21,14 +21,14 @@ _ROOMS = (slips, signs, columns)
 
 @np.errstate(all="ignore")  # a damaged file may hold any number
 def check(
-    source: Imported | Series, *, diameter_m: float | None = None, pitch_m: float | None = None,
+    source: Imported | Dataset, *, diameter_m: float | None = None, pitch_m: float | None = None,
     blades: int | None = None, ducted: bool = False,
 ) -> tuple[Finding, ...]:  # fmt: skip
     """Look for faults in a recording.
 
     Parameters
     ----------
-    source : Imported or Series
+    source : Imported or Dataset
         The recording as read, or points.
     diameter_m, pitch_m : float or None
         Diameter and pitch [m], as far as known; None takes what the recording states.
@@ -45,7 +45,7 @@ def check(
     Examples
     --------
     >>> rpm = [4000.0, 5000.0, 6000.0, 7000.0]
-    >>> stand = Series("bench", "stand", {"rpm": rpm, "thrust_N": [0.22, 0.34, 0.50, 0.68]})  # kgf, not N
+    >>> stand = Dataset("bench", "stand", {"rpm": rpm, "thrust_N": [0.22, 0.34, 0.50, 0.68]})  # kgf, not N
     >>> [(f.id, f.correction.split(".")[0]) for f in check(stand, diameter_m=0.254)]
     [('thrust_unit', 'thrust_N: kgf taken for N: multiply by 9')]
     """

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base import units
+from bemt.dataset import Dataset
 from bemt.readers._imported import Imported
 from bemt.recordings.channels import view
-from bemt.series import Series
 
 __all__ = ["CHECKS", "MANY", "SEVERITIES", "Facts", "Finding", "check_for", "facts_of"]
 
@@ -62,7 +62,7 @@ class Facts:
     Parameters
     ----------
     values : mapping of str to (N,) float
-        Channels by name of a Series.
+        Channels by name of a Dataset.
     raw : mapping of str to (N,) float
         All channels as the file names them, with or without a unit.
     unit : mapping of str to str
@@ -184,13 +184,13 @@ def check_for(name: str) -> Callable[[Check], Check]:
 
 
 def facts_of(
-    source: Imported | Series, diameter_m: float | None, pitch_m: float | None, blades: int | None, ducted: bool
+    source: Imported | Dataset, diameter_m: float | None, pitch_m: float | None, blades: int | None, ducted: bool
 ) -> Facts:
     """Gather the facts of a recording or a series.
 
     Parameters
     ----------
-    source : Imported or Series
+    source : Imported or Dataset
         What is looked at.
     diameter_m, pitch_m : float or None
         Diameter, pitch [m]; None takes what the recording states.
@@ -204,7 +204,7 @@ def facts_of(
     Facts
         Without readings that are no physical magnitude.
     """
-    if isinstance(source, Series):
+    if isinstance(source, Dataset):
         raw = {k: np.asarray(v, dtype=float) for k, v in source.values.items()}
         told = {k: units.split_suffix(k)[1] for k in raw}
         unit = {k: u.suffix if u is not None else "-" for k, u in told.items()}

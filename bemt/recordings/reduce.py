@@ -1,4 +1,4 @@
-"""From a recording to an honest `Series`: steady points with uncertainties, and everything that was left out.
+"""From a recording to an honest `Dataset`: steady points with uncertainties, and everything that was left out.
 
 In this order: the rows are told to be samples or points (``rows``); samples are cut into ``plateaus`` (start-up,
 settling, outliers); rows at rest, or a run without propeller, give the zero that is subtracted (``tare``); the ``air``
@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from bemt import coefficients as co
 from bemt.air import Air
 from bemt.base.errors import Fault, InputError
+from bemt.dataset import Dataset
 from bemt.readers._imported import Imported
 from bemt.recordings.channels import LOADS, Lost, Recorded, shaft_power, view
 from bemt.recordings.plateaus import Settings
@@ -31,7 +32,6 @@ from bemt.recordings.rows import command_of, is_samples
 from bemt.recordings.scatter import Hysteresis, hysteresis, repeats, session
 from bemt.recordings.site_air import AirOfPoints, air_of
 from bemt.recordings.tare import TARED, Zero, from_rest, from_table
-from bemt.series import Series
 
 __all__ = ["Reduced", "reduce"]
 
@@ -45,7 +45,7 @@ class Reduced:
 
     Parameters
     ----------
-    series : Series
+    series : Dataset
         Kind ``bench``; uncertainties are the uncorrelated part.
     correlated : mapping of str to mapping
         By channel: ``gain`` [1], ``zero`` [unit of the channel], ``session`` [1], as far as known.
@@ -65,7 +65,7 @@ class Reduced:
         Change of the zero from first to last rest, by channel. [unit of the channel]
     """
 
-    series: Series
+    series: Dataset
     correlated: Mapping[str, Mapping[str, float]]
     dropped: tuple[Lost, ...]
     notes: tuple[str, ...]
@@ -340,8 +340,8 @@ def _fill_scatter(
 def _series(
     records: Sequence[Imported], found: Found, rec: Recorded, values: Mapping[str, Array], u: Mapping[str, Array],
     air: AirOfPoints, diameter: float | None, chord75_m: float | None, reason: str,
-) -> Series:  # fmt: skip
-    """Channels and derived ones, as a `Series`."""
+) -> Dataset:  # fmt: skip
+    """Channels and derived ones, as a `Dataset`."""
     n = len(found.points)
     shown = {k: v for k, v in values.items() if k not in ("humidity", "electrical_rpm", "optical_rpm")}
     if len({p.run for p in found.points}) > 1 or "run" in rec.values:
@@ -357,7 +357,7 @@ def _series(
         labels.append(f"{short}:{first}" + (f"-{last}" if len(p.rows) > 1 else ""))
     flags = tuple((*p.flags, *((air.flag,) if air.flag else ())) for p in found.points)
     provenance = {**said, "format": records[0].format, "reduction": reason}
-    series = Series("bench", str(said.get("run_name", short)), shown, {k: v for k, v in u.items() if k in shown},
+    series = Dataset("bench", str(said.get("run_name", short)), shown, {k: v for k, v in u.items() if k in shown},
                     flags, provenance, tuple(labels))  # fmt: skip
     if diameter is None:
         if {"torque_Nm", "rpm"} <= shown.keys() and "power_W" not in shown:
@@ -369,7 +369,7 @@ def _series(
     return _numbers(series, air, diameter, chord75_m)
 
 
-def _numbers(series: Series, air: AirOfPoints, D: float, chord75_m: float | None) -> Series:
+def _numbers(series: Dataset, air: AirOfPoints, D: float, chord75_m: float | None) -> Dataset:
     """Tip Mach and Reynolds numbers, figure of merit at rest, thrust per shaft power."""
     more: dict[str, Array] = {}
     u_more: dict[str, Array] = {}

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import __version__, effects, series
+from bemt import __version__, effects
 from bemt.base import units
 from bemt.case import Assumption, Case
 from bemt.readers import references as reference_file
@@ -282,7 +282,7 @@ def _recorded_rows(
     rows = []
     printed = {r.where: r.printed for r in refs}
     for group in reference_file.to_series(refs, case.name):
-        full: series.Series = group.derive(diameter)
+        full = group.derive(diameter)
         for i in range(len(full)):
             get = {k: float(full[k][i]) for k in full.values}
             at = points.index((get["rpm"], get["airspeed_m_s"], get["density_kg_m3"]))

@@ -1,11 +1,12 @@
-"""Series: the one currency in which BEMT, K1/K2, CFD, bench and vendor numbers meet.
+"""Dataset: the one currency in which BEMT, K1/K2, CFD, bench and vendor numbers meet.
 
-A series holds N points as named channels. A channel name ends in its SI unit (``thrust_N``, ``airspeed_m_s``), except
+A dataset holds N points as named channels. A channel name ends in its SI unit (``thrust_N``, ``airspeed_m_s``), except
 for ``rpm`` [rev/min] and dimensionless channels (``CT``, ``CP``, ``CQ``, ``J``, ``eta``, ...). Coefficients are in the
 PROPELLER convention: CT = T/(rho n^2 D^4), CQ = Q/(rho n^2 D^5), CP = P/(rho n^3 D^5) = 2 pi CQ, J = V/(n D), n in
-rev/s; :meth:`Series.from_rotor_convention` takes the helicopter convention. Torque and power are those of the shaft.
+rev/s; :meth:`Dataset.from_rotor_convention` takes the helicopter convention. Torque and power are those of the shaft.
 
-Standard uncertainties (one sigma) go with each channel; NaN means unknown, which is not zero.
+Standard uncertainties (one sigma) go with each channel; NaN means unknown, which is not zero. Where their origin is known
+they are split by :data:`ORIGINS`, and the total is the root of the sum of squares.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,10 +25,18 @@ from bemt import coefficients as co
 from bemt.base import units
 from bemt.base.errors import Fault, InputError
 
-__all__ = ["DIMENSIONLESS", "KINDS", "Series", "concat"]
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+__all__ = ["DIMENSIONLESS", "KINDS", "ORIGINS", "Dataset", "concat", "from_pandas"]
 
 KINDS = ("bemt", "k1k2", "cfd", "bench", "vendor")
 """Kinds that comparisons know; others (``k1k2_printed``, ``flight``) are allowed and kept apart."""
+
+ORIGINS = ("random", "session", "input", "model", "numerics")
+"""What an uncertainty comes from: scatter of single points, what a session shares (gain, zero), inputs not known exactly,
+the model's own error on real rotors, discretisation."""
 
 DIMENSIONLESS = frozenset(
     {"CT", "CP", "CQ", "J", "eta", "FM", "Re", "M_tip", "M_tip_helical", "throttle", "duct_share", "run"}
@@ -58,8 +67,8 @@ def _frozen(array: ArrayLike) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Series:
-    """N points of one source.
+class Dataset:
+    """N points of one source: channels, uncertainties by origin, provenance.
 
     Parameters
     ----------
@@ -77,6 +86,11 @@ class Series:
         ``source``, ``file``, ``sha256``, ``remark`` and more, as far as known.
     labels : tuple of str
         Per point, where it comes from (``file:row``); empty: none.
+    u_by : mapping of str to mapping of str to (N,) array or float
+        Parts of ``u`` by origin (:data:`ORIGINS`), then channel, in its unit. Channels without an entry in ``u`` get
+        the root of the sum of squares of their parts.
+    notes : tuple of str
+        What was assumed, dropped or averaged.
 
     Raises
     ------
@@ -85,7 +99,7 @@ class Series:
 
     Examples
     --------
-    >>> s = Series("bench", "stand", {"rpm": [6000.0], "thrust_N": [10.0]}, {"thrust_N": 0.1})
+    >>> s = Dataset("bench", "stand", {"rpm": [6000.0], "thrust_N": [10.0]}, {"thrust_N": 0.1})
     >>> d = s.derive(diameter_m=0.254, density_kg_m3=1.225)
     >>> round(float(d["CT"][0]), 4), round(float(d.u["CT"][0]), 4)
     (0.1961, 0.002)
@@ -98,22 +112,37 @@ class Series:
     flags: tuple[tuple[str, ...], ...] = ()
     provenance: Mapping[str, Any] = field(default_factory=dict)
     labels: tuple[str, ...] = ()
+    u_by: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         values = {key: _frozen(v) for key, v in self.values.items()}
         n = next((len(v) for v in values.values() if v.ndim == 1), 0)
         found = [*self._head_faults(values, n)]
-        u: dict[str, Array] = {}
-        for key, raw in self.u.items():
-            array = _frozen(raw)
-            if key not in values:
-                found.append((f"u.{key}", "uncertainty of an absent channel", "a channel of values", ""))
-            elif array.shape not in ((), (n,)):
-                found.append((f"u.{key}", f"shape {array.shape}", f"one number or shape ({n},)", ""))
-            elif np.any(array < 0) or np.any(np.isinf(array)):
-                found.append((f"u.{key}", "a negative or infinite uncertainty", "zero or more; NaN = unknown", ""))
-            else:
-                u[key] = _frozen(np.broadcast_to(array, (n,)))
+
+        def checked(where: str, given: Mapping[str, Any]) -> dict[str, Array]:
+            kept: dict[str, Array] = {}
+            for key, raw in given.items():
+                array = _frozen(raw)
+                if key not in values:
+                    found.append((f"{where}.{key}", "uncertainty of an absent channel", "a channel of values", ""))
+                elif array.shape not in ((), (n,)):
+                    found.append((f"{where}.{key}", f"shape {array.shape}", f"one number or shape ({n},)", ""))
+                elif np.any(array < 0) or np.any(np.isinf(array)):
+                    got = "a negative or infinite uncertainty"
+                    found.append((f"{where}.{key}", got, "zero or more; NaN = unknown", ""))
+                else:
+                    kept[key] = _frozen(np.broadcast_to(array, (n,)))
+            return kept
+
+        u = checked("u", self.u)
+        u_by = {origin: checked(f"u_by.{origin}", parts) for origin, parts in self.u_by.items()}
+        for origin in u_by.keys() - set(ORIGINS):
+            found.append((f"u_by.{origin}", "an unknown origin", f"one of {', '.join(ORIGINS)}", ""))
+        for key in values.keys() - u.keys():
+            parts = [part[key] for part in u_by.values() if key in part]
+            if parts:
+                u[key] = _frozen(np.sqrt(np.sum(np.square(parts), axis=0)))
         if found:
             file = str(self.provenance.get("file", "")) or self.name
             raise InputError([Fault(file, *fault) for fault in found])
@@ -123,6 +152,9 @@ class Series:
         object.__setattr__(self, "flags", tuple(tuple(f) for f in self.flags) or ((),) * n)
         object.__setattr__(self, "labels", tuple(self.labels))
         object.__setattr__(self, "provenance", MappingProxyType(dict(self.provenance)))
+        by = {origin: MappingProxyType(u_by[origin]) for origin in ORIGINS if u_by.get(origin)}
+        object.__setattr__(self, "u_by", MappingProxyType(by))
+        object.__setattr__(self, "notes", tuple(self.notes))
 
     def _head_faults(self, values: Mapping[str, Array], n: int) -> Iterable[tuple[str, str, str, str]]:
         if not _KIND.fullmatch(self.kind):
@@ -155,11 +187,25 @@ class Series:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle as plain dictionaries (worker processes send series back)."""
-        plain = (dict(self.values), dict(self.u), self.flags, dict(self.provenance), self.labels)
-        return (Series, (self.kind, self.name, *plain))
+        by = {origin: dict(parts) for origin, parts in self.u_by.items()}
+        plain = (dict(self.values), dict(self.u), self.flags, dict(self.provenance), self.labels, by, self.notes)
+        return (Dataset, (self.kind, self.name, *plain))
+
+    @property
+    def converged(self) -> NDArray[np.bool_]:
+        """Points whose channels that were computed are all numbers, (N,)."""
+        loads = [v for key, v in self.values.items() if key in ("thrust_N", "torque_Nm", "CT", "CP")]
+        return np.asarray(np.all(np.isfinite(loads or list(self.values.values())), axis=0))
+
+    def __getattr__(self, channel: str) -> Array:
+        """Give a channel as an attribute, as in ``d.thrust_N``."""
+        values = self.__dict__.get("values", {})
+        if channel in values:
+            return values[channel]  # type: ignore[no-any-return]
+        raise AttributeError(f"no channel {channel!r}; there are {', '.join(values)}")
 
     @classmethod
-    def from_rotor_convention(cls, kind: str, name: str, values: Mapping[str, ArrayLike], **kwargs: Any) -> Series:
+    def from_rotor_convention(cls, kind: str, name: str, values: Mapping[str, ArrayLike], **kwargs: Any) -> Dataset:
         """Make a series from helicopter coefficients.
 
         Parameters
@@ -174,12 +220,12 @@ class Series:
 
         Returns
         -------
-        Series
+        Dataset
             With CT = (pi^3/4) CT_rotor, CP = (pi^4/4) CP_rotor, J = pi mu_axial.
 
         Examples
         --------
-        >>> s = Series.from_rotor_convention("bench", "rotor", {"CT_rotor": [0.004]})
+        >>> s = Dataset.from_rotor_convention("bench", "rotor", {"CT_rotor": [0.004]})
         >>> round(float(s["CT"][0]), 5)
         0.03101
         """
@@ -195,7 +241,7 @@ class Series:
         u = convert(kwargs.pop("u", {}))
         return cls(kind, name, convert(values), u, **kwargs)
 
-    def derive(self, diameter_m: float, density_kg_m3: ArrayLike | None = None) -> Series:
+    def derive(self, diameter_m: float, density_kg_m3: ArrayLike | None = None) -> Dataset:
         """Add every channel that follows from the ones that are there; none is replaced.
 
         Parameters
@@ -208,7 +254,7 @@ class Series:
 
         Returns
         -------
-        Series
+        Dataset
             With thrust_N-CT, torque_Nm-CQ, power_W-CP, CQ-CP, torque_Nm-power_W, airspeed_m_s-J, eta = J CT/CP.
 
         Raises
@@ -262,7 +308,7 @@ class Series:
             u["eta"] = np.where(np.isfinite(u_eta), u_eta, np.nan)
         return replace(self, values=values, u=u)
 
-    def select(self, where: ArrayLike | slice | Callable[[Series], ArrayLike]) -> Series:
+    def select(self, where: ArrayLike | slice | Callable[[Dataset], ArrayLike]) -> Dataset:
         """Take some points.
 
         Parameters
@@ -272,12 +318,12 @@ class Series:
 
         Returns
         -------
-        Series
+        Dataset
             Same channels and provenance.
 
         Examples
         --------
-        >>> s = Series("bench", "s", {"J": [0.0, 0.3, 0.6]}, flags=((), ("odd",), ()))
+        >>> s = Dataset("bench", "s", {"J": [0.0, 0.3, 0.6]}, flags=((), ("odd",), ()))
         >>> s.select(lambda s: s["J"] > 0.1).flags
         (('odd',), ())
         """
@@ -289,7 +335,58 @@ class Series:
             u={key: v[index] for key, v in self.u.items()},
             flags=tuple(self.flags[i] for i in index),
             labels=tuple(self.labels[i] for i in index) if self.labels else (),
+            u_by={origin: {key: v[index] for key, v in parts.items()} for origin, parts in self.u_by.items()},
         )
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Give the points as a table.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A column per channel, ``u_<channel>`` where its uncertainty is known somewhere, ``u_<origin>_<channel>`` for
+            its parts, ``flags`` (joined by "; ") where there are any; ``attrs`` holds kind, name, provenance and notes.
+
+        Examples
+        --------
+        >>> Dataset("bench", "stand", {"rpm": [6000.0], "thrust_N": [10.0]}, {"thrust_N": 0.1}).to_pandas()
+              rpm  thrust_N  u_thrust_N
+        0  6000.0      10.0         0.1
+        """
+        import pandas as pd
+
+        columns: dict[str, Any] = dict(self.values)
+        columns |= {f"u_{key}": v for key, v in self.u.items() if not np.all(np.isnan(v))}
+        columns |= {f"u_{origin}_{key}": v for origin, parts in self.u_by.items() for key, v in parts.items()}
+        if any(self.flags):
+            columns["flags"] = ["; ".join(words) for words in self.flags]
+        frame = pd.DataFrame(columns, index=pd.Index(self.labels) if self.labels else None)
+        about = {"kind": self.kind, "name": self.name, "provenance": dict(self.provenance), "notes": list(self.notes)}
+        frame.attrs.update(about)
+        return frame
+
+    def to_xarray(self) -> xr.Dataset:
+        """Give the points as an xarray dataset over the dimension ``point``.
+
+        Returns
+        -------
+        xarray.Dataset
+            The columns of :meth:`to_pandas` as variables, with ``units`` in their attributes.
+
+        Raises
+        ------
+        InputError
+            When xarray is not installed.
+        """
+        from bemt.base.errors import needs
+
+        xarray = needs("xarray", "xarray")
+        frame = self.to_pandas()
+        out = xarray.Dataset({key: ("point", frame[key].to_numpy()) for key in frame.columns}, attrs=dict(frame.attrs))
+        for key in out.data_vars:
+            _, unit = units.split_suffix(str(key))
+            out[key].attrs["units"] = "1" if unit is None else unit.suffix
+        return out
 
     def to_rows(self) -> list[dict[str, Any]]:
         """Give one plain dictionary per point, fit for JSON.
@@ -302,7 +399,7 @@ class Series:
 
         Examples
         --------
-        >>> Series("vendor", "fan", {"thrust_N": [27.0]}).to_rows()
+        >>> Dataset("vendor", "fan", {"thrust_N": [27.0]}).to_rows()
         [{'source': 'vendor', 'name': 'fan', 'thrust_N': 27.0, 'u': {'thrust_N': None}, 'flags': []}]
         """
 
@@ -320,19 +417,19 @@ class Series:
         return rows
 
 
-def concat(series: Iterable[Series], name: str | None = None) -> Series:
+def concat(series: Iterable[Dataset], name: str | None = None) -> Dataset:
     """Join series of one kind, point after point.
 
     Parameters
     ----------
-    series : iterable of Series
+    series : iterable of Dataset
         At least one; all of the same kind.
     name : str or None
         Name of the result; None takes the first.
 
     Returns
     -------
-    Series
+    Dataset
         All channels of all; NaN where a part lacks one. ``provenance["parts"]`` lists (name, points, provenance).
 
     Raises
@@ -342,7 +439,7 @@ def concat(series: Iterable[Series], name: str | None = None) -> Series:
 
     Examples
     --------
-    >>> a, b = Series("bench", "a", {"J": [0.1]}), Series("bench", "b", {"J": [0.2], "CT": [0.1]})
+    >>> a, b = Dataset("bench", "a", {"J": [0.1]}), Dataset("bench", "b", {"J": [0.2], "CT": [0.1]})
     >>> concat([a, b])["CT"]
     array([nan, 0.1])
     """
@@ -358,7 +455,7 @@ def concat(series: Iterable[Series], name: str | None = None) -> Series:
     def joined(attribute: str, key: str) -> Array:
         return np.concatenate([getattr(p, attribute).get(key, np.full(len(p), np.nan)) for p in parts])
 
-    return Series(
+    return Dataset(
         kinds[0],
         parts[0].name if name is None else name,
         {key: joined("values", key) for key in channels},
@@ -367,3 +464,74 @@ def concat(series: Iterable[Series], name: str | None = None) -> Series:
         {"parts": tuple((part.name, len(part), dict(part.provenance)) for part in parts)},
         sum((part.labels or ("",) * len(part) for part in parts), ()) if any(part.labels for part in parts) else (),
     )
+
+
+def from_pandas(frame: pd.DataFrame, kind: str = "bench", name: str = "table", **more: Any) -> Dataset:
+    """Make a dataset from a table whose headings carry their units.
+
+    Parameters
+    ----------
+    frame : pandas.DataFrame
+        Columns ``rpm``, coefficients, or names that end in a unit (``thrust_N``, ``thrust_gf``, ``airspeed_km_h``); they
+        are converted to SI by that suffix. ``u_<column>`` is a standard uncertainty, ``flags`` words joined by "; ".
+    kind, name : str
+        As for :class:`Dataset`.
+    **more
+        ``provenance``, ``notes``.
+
+    Returns
+    -------
+    Dataset
+        With the index as labels, unless it only counts.
+
+    Raises
+    ------
+    InputError
+        With all faults: headings without a known unit, cells that are no numbers.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> d = from_pandas(pd.DataFrame({"rpm": [6000], "thrust_gf": [1000.0]}))
+    >>> d["thrust_N"].round(5), d.kind
+    (array([9.80665]), 'bench')
+    """
+    import pandas as pd
+
+    faults: list[Fault] = []
+    values: dict[str, Array] = {}
+    u: dict[str, Array] = {}
+    u_by: dict[str, dict[str, Array]] = {}
+    for heading in map(str, frame.columns):
+        if heading == "flags":
+            continue
+        column = heading.removeprefix("u_") if heading.startswith("u_") else heading
+        origin = next((o for o in ORIGINS if column.startswith(f"{o}_") and heading.startswith("u_")), "")
+        column = column.removeprefix(f"{origin}_") if origin else column
+        base, unit = units.split_suffix(column)
+        scale, offset, channel = 1.0, 0.0, column
+        named = column == "rpm" or column in DIMENSIONLESS
+        if not named and unit is not None and (unit.factor, unit.offset) != (1.0, 0.0):
+            base_unit = (unit.dimension, 1.0, 0.0)
+            si = next(s for s, o in units.UNITS.items() if (o.dimension, o.factor, o.offset) == base_unit)
+            scale, offset, channel = unit.factor, unit.offset, f"{base}_{si}"
+        elif fault := _channel_fault(column):
+            faults.append(Fault(name, heading, *fault))
+            continue
+        try:
+            numbers = pd.to_numeric(frame[heading]).to_numpy(dtype=float)
+        except (ValueError, TypeError) as error:
+            faults.append(Fault(name, heading, str(error), "a column of numbers"))
+            continue
+        if heading == column:
+            values[channel] = numbers * scale + offset
+        elif origin:
+            u_by.setdefault(origin, {})[channel] = numbers * scale
+        else:
+            u[channel] = numbers * scale
+    if faults:
+        raise InputError(faults)
+    flags = tuple(tuple(w for w in str(words).split("; ") if w) for words in frame["flags"]) if "flags" in frame else ()
+    counted = isinstance(frame.index, pd.RangeIndex)
+    labels = () if counted else tuple(map(str, frame.index))
+    return Dataset(kind, name, values, u, flags, more.pop("provenance", {}), labels, u_by, more.pop("notes", ()))

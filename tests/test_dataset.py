@@ -1,4 +1,4 @@
-"""The promise of bemt.series: one currency, validated on entry, exact round trips, unknown stays unknown."""
+"""The promise of bemt.dataset: one currency, validated on entry, exact round trips, unknown stays unknown."""
 
 from __future__ import annotations
 
@@ -7,23 +7,24 @@ import math
 import pickle
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bemt import coefficients as co
 from bemt.base.errors import InputError
-from bemt.series import Series, concat
+from bemt.dataset import Dataset, concat, from_pandas
 
 
-def stand(**kwargs: object) -> Series:
+def stand(**kwargs: object) -> Dataset:
     values = {"rpm": [3000.0, 6000.0], "thrust_N": [2.0, 9.0], "torque_Nm": [0.03, 0.12], "airspeed_m_s": [0.0, 6.0]}
-    return Series("bench", "stand", values, **kwargs)  # type: ignore[arg-type]
+    return Dataset("bench", "stand", values, **kwargs)  # type: ignore[arg-type]
 
 
 def test_all_faults_at_once() -> None:
     with pytest.raises(InputError) as caught:
-        Series(
+        Dataset(
             "Bench!", "s", {"thrust_kgf": [1.0], "CT": [0.1, 0.2], "speed": [1.0], "J": [math.inf]},
             {"eta": [0.1], "J": [-1.0]}, flags=((), ()),
         )  # fmt: skip
@@ -36,7 +37,7 @@ def test_all_faults_at_once() -> None:
 
 def test_arrays_are_copied_and_read_only() -> None:
     mine = np.array([1.0, 2.0])
-    s = Series("bench", "s", {"J": mine})
+    s = Dataset("bench", "s", {"J": mine})
     mine[0] = 99.0
     assert s["J"][0] == 1.0
     with pytest.raises(ValueError, match="read-only"):
@@ -56,10 +57,10 @@ def test_absent_uncertainty_is_unknown_not_zero() -> None:
     CP=st.floats(1e-4, 1.0), J=st.floats(0.0, 2.0),
 )  # fmt: skip
 def test_derive_round_trip(D: float, rho: float, rpm: float, CT: float, CP: float, J: float) -> None:
-    start = Series("bemt", "s", {"rpm": [rpm], "CT": [CT], "CP": [CP], "J": [J]}, {"CT": 0.01, "CP": 0.002})
+    start = Dataset("bemt", "s", {"rpm": [rpm], "CT": [CT], "CP": [CP], "J": [J]}, {"CT": 0.01, "CP": 0.002})
     full = start.derive(D, rho)
     names = ("rpm", "thrust_N", "torque_Nm", "airspeed_m_s")
-    dimensional = Series("bemt", "s", {k: full[k] for k in names}, {k: full.u[k] for k in names})
+    dimensional = Dataset("bemt", "s", {k: full[k] for k in names}, {k: full.u[k] for k in names})
     back = dimensional.derive(D, rho)
     for name in ("CT", "CP", "J", "CQ", "power_W", "eta"):
         assert np.allclose(back[name], full[name], rtol=1e-12, atol=1e-300)
@@ -77,15 +78,15 @@ def test_derive_uses_the_propeller_convention() -> None:
 
 
 def test_derive_never_replaces_and_needs_density_for_forces() -> None:
-    s = Series("vendor", "s", {"rpm": [6000.0], "CT": [0.1], "thrust_N": [7.0]})
+    s = Dataset("vendor", "s", {"rpm": [6000.0], "CT": [0.1], "thrust_N": [7.0]})
     assert s.derive(0.2, 1.2)["thrust_N"][0] == 7.0
     assert "CT" not in stand().derive(0.254)
-    own = Series("bench", "s", {"rpm": [6000.0], "CT": [0.1], "density_kg_m3": [1.1]})
+    own = Dataset("bench", "s", {"rpm": [6000.0], "CT": [0.1], "density_kg_m3": [1.1]})
     assert np.isclose(own.derive(0.2)["thrust_N"][0], co.thrust(0.1, 1.1, 100.0, 0.2), rtol=1e-14)
 
 
 def test_derive_at_zero_rpm_is_nan_not_zero() -> None:
-    s = Series("bench", "s", {"rpm": [0.0], "thrust_N": [0.1], "airspeed_m_s": [3.0]})
+    s = Dataset("bench", "s", {"rpm": [0.0], "thrust_N": [0.1], "airspeed_m_s": [3.0]})
     d = s.derive(0.2, 1.2)
     assert np.isnan(d["CT"][0]) and np.isnan(d["J"][0])
 
@@ -97,7 +98,7 @@ def test_derive_refuses_nonsense(diameter: float, density: object) -> None:
 
 
 def test_eta_uncertainty_adds_in_quadrature() -> None:
-    s = Series("bench", "s", {"J": [0.5], "CT": [0.08], "CP": [0.05]}, {"CT": 0.0024, "CP": 0.002})
+    s = Dataset("bench", "s", {"J": [0.5], "CT": [0.08], "CP": [0.05]}, {"CT": 0.0024, "CP": 0.002})
     d = s.derive(0.2)
     assert np.isclose(d.u["eta"][0], d["eta"][0] * math.hypot(0.03, 0.04), rtol=1e-12)
 
@@ -106,7 +107,7 @@ def test_from_rotor_convention() -> None:
     T, P, rho, R, Omega, V = 30.0, 400.0, 1.2, 0.5, 200.0, 10.0
     area, tip = math.pi * R**2, Omega * R
     rotor = {"CT_rotor": T / (rho * area * tip**2), "CP_rotor": P / (rho * area * tip**3), "mu_axial": V / tip}
-    s = Series.from_rotor_convention(
+    s = Dataset.from_rotor_convention(
         "bench", "rotor", {k: [v] for k, v in rotor.items()}, u={"CT_rotor": [rotor["CT_rotor"] / 10]}
     )
     n, D = Omega / (2 * math.pi), 2 * R
@@ -126,21 +127,21 @@ def test_select_keeps_points_together() -> None:
 
 
 def test_concat_fills_with_nan_and_keeps_provenance() -> None:
-    a = Series("bench", "a", {"J": [0.1]}, {"J": 0.01}, labels=("f:1",), provenance={"file": "f"})
-    b = Series("bench", "b", {"J": [0.2], "CT": [0.1]}, flags=(("odd",),))
+    a = Dataset("bench", "a", {"J": [0.1]}, {"J": 0.01}, labels=("f:1",), provenance={"file": "f"})
+    b = Dataset("bench", "b", {"J": [0.2], "CT": [0.1]}, flags=(("odd",),))
     s = concat([a, b], "both")
     assert np.array_equal(s["CT"], [np.nan, 0.1], equal_nan=True)
     assert np.array_equal(s.u["J"], [0.01, np.nan], equal_nan=True)
     assert (s.flags, s.labels) == (((), ("odd",)), ("f:1", ""))
     assert [(name, n) for name, n, _ in s.provenance["parts"]] == [("a", 1), ("b", 1)]
     with pytest.raises(InputError, match="kinds bench, cfd"):
-        concat([a, Series("cfd", "c", {"J": [0.1]})])
+        concat([a, Dataset("cfd", "c", {"J": [0.1]})])
     with pytest.raises(InputError, match="no series"):
         concat([])
 
 
 def test_rows_are_json_and_nan_becomes_null() -> None:
-    s = Series("bemt", "s", {"CT": [math.nan, 0.1]}, flags=(("not converged",), ()))
+    s = Dataset("bemt", "s", {"CT": [math.nan, 0.1]}, flags=(("not converged",), ()))
     rows = json.loads(json.dumps(s.to_rows(), allow_nan=False))
     assert rows[0] == {"source": "bemt", "name": "s", "CT": None, "u": {"CT": None}, "flags": ["not converged"]}
 
@@ -148,3 +149,29 @@ def test_rows_are_json_and_nan_becomes_null() -> None:
 def test_pickles_for_worker_processes() -> None:
     s = pickle.loads(pickle.dumps(stand(u={"thrust_N": 0.1}, provenance={"file": "f"}, labels=("a", "b"))))
     assert s["rpm"].tolist() == [3000.0, 6000.0] and s.provenance["file"] == "f" and s.labels == ("a", "b")
+
+
+def test_tables_go_out_and_come_back_the_same() -> None:
+    d = Dataset(
+        "bench", "stand", {"rpm": [6000.0, 7000.0], "thrust_N": [10.0, 13.6]},
+        u_by={"random": {"thrust_N": 0.3}, "session": {"thrust_N": [0.4, 0.4]}}, flags=(("odd",), ()),
+        labels=("a:1", "a:2"),
+    )
+    assert d.u["thrust_N"] == pytest.approx([0.5, 0.5])  # 3-4-5
+    back = from_pandas(d.to_pandas(), "bench", "stand")
+    assert back.labels == d.labels and back.flags == d.flags
+    for key in d.values:
+        assert np.array_equal(back[key], d[key])
+    assert np.array_equal(back.u_by["random"]["thrust_N"], d.u_by["random"]["thrust_N"])
+    with pytest.raises(InputError, match="u_by.luck"):
+        Dataset("bench", "s", {"J": [0.1]}, u_by={"luck": {"J": 0.1}})
+
+
+def test_headings_of_a_table_are_converted_by_their_unit_and_all_faults_are_said() -> None:
+    frame = pd.DataFrame({"rpm": [6000], "thrust_gf": [1000.0], "temperature_C": [15.0], "airspeed_km_h": [36.0]})
+    d = from_pandas(frame)
+    assert d["thrust_N"][0] == pytest.approx(9.80665)
+    assert d["temperature_K"][0] == pytest.approx(288.15) and d["airspeed_m_s"][0] == pytest.approx(10.0)
+    with pytest.raises(InputError) as error:
+        from_pandas(pd.DataFrame({"thrust": [1.0], "torque_Nm": ["x"]}))
+    assert {fault.where for fault in error.value.faults} == {"thrust", "torque_Nm"}
