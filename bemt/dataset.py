@@ -5,8 +5,8 @@ for ``rpm`` [rev/min] and dimensionless channels (``CT``, ``CP``, ``CQ``, ``J``,
 PROPELLER convention: CT = T/(rho n^2 D^4), CQ = Q/(rho n^2 D^5), CP = P/(rho n^3 D^5) = 2 pi CQ, J = V/(n D), n in
 rev/s; :meth:`Dataset.from_rotor_convention` takes the helicopter convention. Torque and power are those of the shaft.
 
-Standard uncertainties (one sigma) go with each channel; NaN means unknown, which is not zero. Where their origin is known
-they are split by :data:`ORIGINS`, and the total is the root of the sum of squares.
+Standard uncertainties (one sigma) go with each channel; NaN means unknown, which is not zero. Where their origin is
+known they are split by :data:`ORIGINS`, and the total is the root of the sum of squares.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ KINDS = ("bemt", "k1k2", "cfd", "bench", "vendor")
 """Kinds that comparisons know; others (``k1k2_printed``, ``flight``) are allowed and kept apart."""
 
 ORIGINS = ("random", "session", "input", "model", "numerics")
-"""What an uncertainty comes from: scatter of single points, what a session shares (gain, zero), inputs not known exactly,
-the model's own error on real rotors, discretisation."""
+"""Where an uncertainty comes from: scatter of points, what a session shares (gain, zero), inputs not known exactly, the
+ model's own error on real rotors, discretisation."""
 
 DIMENSIONLESS = frozenset(
     {"CT", "CP", "CQ", "J", "eta", "FM", "Re", "M_tip", "M_tip_helical", "throttle", "duct_share", "run"}
@@ -472,8 +472,8 @@ def from_pandas(frame: pd.DataFrame, kind: str = "bench", name: str = "table", *
     Parameters
     ----------
     frame : pandas.DataFrame
-        Columns ``rpm``, coefficients, or names that end in a unit (``thrust_N``, ``thrust_gf``, ``airspeed_km_h``); they
-        are converted to SI by that suffix. ``u_<column>`` is a standard uncertainty, ``flags`` words joined by "; ".
+        Columns ``rpm``, coefficients, or names that end in a unit (``thrust_N``, ``thrust_gf``, ``airspeed_km_h``);
+        they are converted to SI by that suffix. ``u_<column>`` is a standard uncertainty, ``flags`` words joined by "; ".
     kind, name : str
         As for :class:`Dataset`.
     **more

@@ -6,6 +6,7 @@ import csv
 import json
 import math
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -103,6 +104,41 @@ def solved(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
 def row_of(result: dict[str, Any], source: str, at: int = 0) -> dict[str, Any]:
     """Row of a source."""
     return [row for row in result["rows"] if row["source"] == source][at]  # type: ignore[no-any-return]
+
+
+def assumed(folder: Path, key: str, low: float, high: float, air: str = "density_kg_m3 = 1.2") -> dict[str, Any]:
+    """Solve the case with one more assumption; the references state their own conditions."""
+    extra = f'[[assumptions]]\nkey = "{key}"\nlow = {low}\nhigh = {high}\nwhy = "made for a test"\n'
+    path = make_case(folder, key.replace(".", "_"), extra)
+    text = path.read_text().replace("rpm = 6000", "rpm = 6000\nairspeed_m_s = 3").replace("density_kg_m3 = 1.2", air)
+    path.write_text(re.sub(r'\[\[assumptions\]\]\nkey = "(blade|rotor)[^\[]*', "", text))
+    return solve_case(load_case(path))
+
+
+@pytest.mark.parametrize(
+    ("key", "low", "high", "model"),
+    [
+        ("operating.airspeed_m_s", 2.0, 4.0, "bemt"),
+        ("operating.airspeed_m_s", 2.0, 4.0, "k1k2"),
+        ("operating.rpm", 5900.0, 6100.0, "k1k2"),
+        ("air.density_kg_m3", 1.1, 1.3, "k1k2"),
+        ("air.density_kg_m3", 1.1, 1.3, "bemt"),
+    ],
+)
+def test_an_assumption_on_a_condition_reaches_both_models(
+    tmp_path: Path, key: str, low: float, high: float, model: str
+) -> None:
+    result = assumed(tmp_path, key, low, high)
+    assert row_of(result, model)["u_input"] > 1e-3 * row_of(result, model)["thrust_N"]
+
+
+def test_an_assumption_on_temperature_leaves_the_density_that_a_reference_states(tmp_path: Path) -> None:
+    air = "pressure_hPa = 1013.25\ntemperature_C = 20"
+    result = assumed(tmp_path, "air.temperature_C", 0.0, 40.0, air)
+    own, reference = (row_of(result, "bemt", i) for i in (0, 1))
+    assert own["density_kg_m3"] != pytest.approx(reference["density_kg_m3"])
+    assert own["u_input"] > 0.02 * own["thrust_N"]  # density moves by +-7 %
+    assert reference["u_input"] < 0.005 * reference["thrust_N"]  # viscosity and Mach number only
 
 
 REQUIRED = {"source": str, "thrust_N": float, "thrust_kgf": float, "torque_Nm": float, "CT": float, "CP": float,

@@ -1,7 +1,8 @@
-"""A small declarative schema for TOML documents: types, units, ranges, suspicious values, all faults at once.
+"""TOML documents as typed models: types, units, ranges, suspicious values, all faults at once.
 
-A schema is a mapping of table name to a mapping of key name to :class:`Key`. Units live in the key names
-(``diameter_in``); a suspicious value (127 in a key that ends in ``_in``) is refused with a hint, never converted.
+A file is a :class:`Table` (a pydantic model) whose fields say in a :class:`Key` what they may hold; :func:`validated`
+gives the model or every fault. Units live in the key names (``diameter_in``); a suspicious value (127 in a key that ends
+in ``_in``) is refused with a hint, never converted. Files that are not cases use tables of Keys (:func:`check_table`).
 """
 
 from __future__ import annotations
@@ -13,11 +14,25 @@ import tomllib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, get_args
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
+from pydantic_core import PydanticCustomError
 
 from bemt.base.errors import Fault
 
-__all__ = ["AXIS", "Collector", "Key", "check_table", "check_value", "load_toml", "shown"]
+__all__ = [
+    "AXIS",
+    "Collector",
+    "Key",
+    "Table",
+    "check_table",
+    "check_value",
+    "entry",
+    "load_toml",
+    "shown",
+    "validated",
+]
 
 AXIS = "a list of distinct numbers, or {start, stop, num}"
 _UNIT_TAIL = re.compile(r"_(in|mm|cm|m|m_s|kg_m3|hPa|C|pct|deg)$")
@@ -372,3 +387,170 @@ def _syntax_fault(message: str, text: str) -> tuple[str, str, str, str]:
     elif re.search(r"=\s*(#.*)?$", source):
         hint = "Give the key a value"
     return f"{line}:{column}", what + (f" in `{source[:60]}`" if source else ""), "valid TOML 1.0", hint
+
+
+_FAULTS = "bemt_faults"
+
+
+def entry(
+    kind: str = "number",
+    unit: str = "",
+    low: float = -math.inf,
+    high: float = math.inf,
+    choices: tuple[str, ...] = (),
+    suspect: Callable[[float], str] | None = None,
+    default: Any = None,
+    required: bool = False,
+    key: Key | None = None,
+    alias: str | None = None,
+) -> Any:
+    """Declare one field of a :class:`Table`: a :class:`Key`, and its default (none when ``required``)."""
+    held = key or Key(kind, unit, low, high, required, choices, suspect)
+    extra: Any = {"key": held}
+    return Field(... if held.required else default, json_schema_extra=extra, alias=alias)
+
+
+class Table(BaseModel):
+    """A TOML table with typed keys; frozen, unknown keys refused. Fields are declared by :func:`entry`."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+
+    @classmethod
+    def declared(cls, name: str) -> Key | None:
+        """What a key may hold; None for a table inside this one."""
+        extra: Any = cls.named()[name].json_schema_extra
+        return extra["key"] if extra else None
+
+    @classmethod
+    def named(cls) -> dict[str, Any]:
+        """Fields by the names that a file uses."""
+        return {field.alias or name: field for name, field in cls.model_fields.items()}
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _sound(cls, value: Any, info: ValidationInfo) -> Any:
+        name = cls.model_fields[str(info.field_name)].alias or str(info.field_name)
+        key, out = cls.declared(name), Collector("")
+        if key is not None:
+            check_value(out, "", value, key)
+        elif isinstance(value, list) and not _is_array(cls, name):
+            out.add("", shown(value), f"a table [{name}]")
+        elif not isinstance(value, (Mapping, BaseModel)) and not _is_array(cls, name):
+            out.add("", shown(value), f"a table [{name}]")
+        elif _is_array(cls, name) and not isinstance(value, (list, tuple)):
+            out.add("", shown(value), f"tables [[{name}]]", f"Write [[{name}]] with two brackets")
+        if out.faults:
+            found = [(f.where, f.got, f.expected, f.hint) for f in out.faults]
+            raise PydanticCustomError(_FAULTS, "not as declared", {"faults": found})
+        return tuple(value) if isinstance(value, list) else value
+
+
+def _is_array(model: type[Table], name: str) -> bool:
+    return str(model.named()[name].annotation).startswith("tuple[")
+
+
+T = TypeVar("T", bound=Table)
+
+
+def validated(model: type[T], document: Mapping[str, Any], out: Collector) -> T | None:
+    """Make a typed model of a document; add what is wrong to the collector.
+
+    Parameters
+    ----------
+    model : subclass of Table
+        What the document should be.
+    document : mapping
+        As tomllib returned it.
+    out : Collector
+        Receives every fault, in the order of the file; missing keys come last.
+
+    Returns
+    -------
+    Table or None
+        The model, or None when something is wrong.
+
+    Examples
+    --------
+    >>> class Rotor(Table):
+    ...     blades: int = entry("integer", low=1, high=64, required=True)
+    >>> out = Collector("case.toml")
+    >>> validated(Rotor, {"blads": 2}, out)
+    >>> for fault in out.faults: print(fault)
+    case.toml: blads: got an unknown key; expected one of blades. Did you mean blades?
+    case.toml: blades: got nothing; expected a whole number from 1 to 64.
+    """
+    try:
+        return model.model_validate(document)
+    except ValidationError as error:
+        found = [(_rank(document, e["loc"]), fault) for e in error.errors() for fault in _faults_of(model, e)]
+    for _, fault in sorted(found, key=lambda pair: pair[0]):
+        out.add(*fault)
+    return None
+
+
+def _rank(document: Any, loc: tuple[int | str, ...]) -> tuple[int, ...]:
+    """Place of a value in its document: by depth of the table, order of the keys; absent ones last."""
+    ranks = []
+    for part in loc:
+        if isinstance(document, Mapping):
+            names = list(document)
+            ranks.append(names.index(part) if part in names else len(names))
+            document = document.get(part)
+        elif isinstance(part, int) and isinstance(document, (list, tuple)):
+            ranks.append(part)
+            document = document[part] if part < len(document) else None
+    return (len(loc) > 1, *ranks)
+
+
+def _faults_of(model: type[Table], error: Any) -> Iterable[tuple[str, str, str, str]]:
+    """Our words for one error of pydantic."""
+    loc = tuple(error["loc"])
+    where = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in loc).removeprefix(".")
+    if error["type"] == _FAULTS:
+        for at, got, expected, hint in error["ctx"]["faults"]:
+            yield where + at, got, expected, hint
+        return
+    owner = _model_at(model, loc[:-1])
+    name = str(loc[-1]) if loc else ""
+    if error["type"] == "extra_forbidden":
+        known = list(owner.named())
+        yield where, "an unknown key", "one of " + ", ".join(known), _stray_hint(name, owner, model)
+    elif error["type"] == "missing":
+        key = owner.declared(name)
+        yield where, "nothing", f"a table [{name}]" if key is None else key.expected, ""
+    else:
+        key = owner.declared(name) if name in owner.named() else None
+        yield where, shown(error["input"]), error["msg"] if key is None else key.expected, ""
+
+
+def _model_at(model: type[Table], loc: tuple[int | str, ...]) -> type[Table]:
+    """Model of the table at a place."""
+    for part in loc:
+        if isinstance(part, str) and part in model.named():
+            model = next((m for m in _models(model.named()[part].annotation)), model)
+    return model
+
+
+def _models(annotation: Any) -> Iterable[type[Table]]:
+    """Models that an annotation holds."""
+    if isinstance(annotation, type) and issubclass(annotation, Table):
+        yield annotation
+    for inner in get_args(annotation):
+        yield from _models(inner)
+
+
+def _tables(model: type[Table], where: str = "") -> Iterable[tuple[str, dict[str, Key]]]:
+    """All tables of a model by dotted name, with their keys; arrays of tables are left out."""
+    yield where, {name: key for name in model.named() if (key := model.declared(name)) is not None}
+    for name, field in model.named().items():
+        if not _is_array(model, name):
+            for inner in _models(field.annotation):
+                yield from _tables(inner, f"{where}.{name}".removeprefix("."))
+
+
+def _stray_hint(name: str, owner: type[Table], root: type[Table]) -> str:
+    schema = dict(_tables(root))
+    keys = {n: key for n in owner.named() if (key := owner.declared(n)) is not None}
+    mine = next((where for where, known in schema.items() if known == keys), None)
+    homes = {} if mine is None else schema
+    return _unknown_key_hint(name, mine or "", keys, homes) or _did_you_mean(name, owner.named())

@@ -24,6 +24,7 @@ from bemt.sections import rule as section_rule
 if TYPE_CHECKING:
     from bemt.air import Air
     from bemt.case import Case
+    from bemt.case.schema import PolarTable
     from geometry.rotor import Rotor
 
 __all__ = ["Points", "Ready", "air_arrays", "evaluate", "k1k2", "prepare"]
@@ -119,7 +120,7 @@ def _effects(case: Case) -> tuple[effects.Effect, ...]:
     faults = []
     on: dict[str, effects.Effect] = {}
     for key in ("effects_on", "effects_off", "also_without"):
-        for i, text in enumerate(case.get(f"model.{key}")):
+        for i, text in enumerate(getattr(case.file.model, key)):
             name = text.partition("(")[0].strip()
             where = f"model.{key}[{i}]"
             if name not in known or (key != "effects_on" and name != text):
@@ -137,31 +138,31 @@ def _effects(case: Case) -> tuple[effects.Effect, ...]:
                     faults.append(Fault(case.path.as_posix(), where, got, expected))
     if faults:
         raise InputError(faults)
-    off = set(case.get("model.effects_off"))
+    off = set(case.file.model.effects_off)
     standard = {effect.id for effect in effects.standard()}
     return tuple(on.get(name) or cls() for name, cls in known.items() if name in (standard | set(on)) - off)
 
 
 def _polars(case: Case, anchors: Sequence[tuple[float, Any]]) -> list[tuple[float, polars.Polar]]:
-    given = case.document.get("polars", [])
+    given = case.file.polars
     if given:
         return _user_polars(case, given)
-    rule = float(case.get("model.n_crit")), float(case.get("model.drag_level"))
+    rule = case.file.model.n_crit, case.file.model.drag_level
     return [(x, section_rule.polar(section, *rule)) for x, section in anchors]
 
 
-def _user_polars(case: Case, given: Sequence[Mapping[str, Any]]) -> list[tuple[float, polars.Polar]]:
+def _user_polars(case: Case, given: Sequence[PolarTable]) -> list[tuple[float, polars.Polar]]:
     """Read the tables of a case; several XFOIL files at one r/R are its Reynolds numbers."""
     from bemt import readers as importers
     from bemt.readers import polar_xfoil
 
-    groups: dict[float, list[Mapping[str, Any]]] = {}
+    groups: dict[float, list[PolarTable]] = {}
     for item in given:
-        groups.setdefault(float(item["r_over_R"]), []).append(item)
+        groups.setdefault(item.r_over_R, []).append(item)
     out, faults = [], []
     for x, items in sorted(groups.items()):
-        paths = [case.folder / item["file"] for item in items]
-        kind = items[0].get("format")
+        paths = [case.folder / item.file for item in items]
+        kind = items[0].format
         if len(items) > 1:
             out.append((x, polar_xfoil.read_many(paths)))
             continue
@@ -209,10 +210,10 @@ def prepare(case: Case, overrides: Mapping[str, Any] | None = None, n_stations: 
     """
     case = case.replaced(overrides)
     rotor, duct = case.rotor(), case.duct()
-    if "duct" in case.get("model.effects_off"):
+    if "duct" in case.file.model.effects_off:
         duct = None
     tables = _polars(case, rotor.blade.anchors)
-    n = int(case.get("model.stations")) if n_stations is None else n_stations
+    n = case.file.model.stations if n_stations is None else n_stations
     model = forward.Model(rotor, tables, _duct_flow(case, rotor) if duct is not None else None, n)
     chosen = _effects(case)
     notes = tuple(dict.fromkeys(note for _, polar in tables for note in polar.notes))
@@ -317,8 +318,7 @@ def k1k2(
         Thrust, uncertainty, flags. The pitch is the one that the case states, else that of the blade at 0.75 R.
     """
     case = case.replaced(overrides)
-    ratio = case.get("blade.pitch_ratio")
-    pitch = case.length_m("blade", "pitch") if ratio is None else float(ratio) * case.diameter_m
+    pitch = case.stated_pitch_m
     if np.isnan(pitch):
         pitch = case.rotor().blade.pitch_m()
     hub = case.hub_diameter_m if case.ducted else 0.0

@@ -12,7 +12,9 @@ import numpy as np
 from bemt.air import Air, isa_pressure
 from bemt.base.errors import Fault, InputError
 from bemt.base.toml import Collector
+from bemt.base.units import ZERO_CELSIUS
 from bemt.case.rules import check_shape
+from bemt.case.schema import AirTable
 from geometry.airfoil import Airfoil, naca, naca4
 from geometry.airfoil_file import parse_dat
 from geometry.blade import Blade, from_stations
@@ -45,21 +47,23 @@ def _as_input(file: str, where: str, make: Callable[[], T]) -> T:
 
 
 def _per_anchor(value: Any, count: int) -> list[Any]:
-    return list(value) if isinstance(value, list) else [value] * count
+    return list(value) if isinstance(value, (list, tuple)) else [value] * count
 
 
 def _anchors(case: Case) -> list[tuple[float, Airfoil]]:
-    section = case.document["blade"]["section"]
-    radii = section.get("r_over_R", [0.0])
+    section = case.file.blade.section
+    assert section is not None  # a rule of the file
+    radii = section.r_over_R or (0.0,)
     file = case.path.as_posix()
-    if "naca" in section:
+    if section.naca is not None:
         shapes = [_as_input(file, "blade.section.naca", lambda d=d: naca(d))  # type: ignore[misc]
-                  for d in _per_anchor(section["naca"], len(radii))]  # fmt: skip
-    elif "dat" in section:
-        shapes = [_dat(case.folder / name) for name in _per_anchor(section["dat"], len(radii))]
+                  for d in _per_anchor(section.naca, len(radii))]  # fmt: skip
+    elif section.dat is not None:
+        shapes = [_dat(case.folder / name) for name in _per_anchor(section.dat, len(radii))]
     else:
-        columns = [_per_anchor(section[key], len(radii)) for key in ("camber", "camber_position", "thickness")]
-        scale, thicker = section["camber_scale"], section["thickness_scale"]
+        shape = (section.camber, section.camber_position, section.thickness)
+        columns = [_per_anchor(value, len(radii)) for value in shape]
+        scale, thicker = section.camber_scale, section.thickness_scale
         shapes = [_as_input(file, "blade.section", lambda m=m, p=p, t=t: naca4(m * scale, p, t * thicker))  # type: ignore[misc]
                   for m, p, t in zip(*columns, strict=True)]  # fmt: skip
     return list(zip(map(float, radii), shapes, strict=True))
@@ -118,35 +122,39 @@ def _read_stations(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _blade(case: Case) -> Blade:
-    blade = case.document["blade"]
+    blade = case.file.blade
     R = 0.5 * case.diameter_m
     hub = case.hub_diameter_m / case.diameter_m
     anchors = _anchors(case)
-    scale, turned = float(blade["chord_scale"]), math.radians(blade["beta_offset_deg"])
-    if "chord_law" in blade:
-        ratio = blade.get("pitch_ratio")
-        pitch = case.length_m("blade", "pitch") if ratio is None else ratio * case.diameter_m
-        chord = {key: blade.get(name) for key, name in (("max_chord", "max_chord_over_R"), ("taper", "taper"))}
-        laws = {"pitch": pitch, "relief": blade.get("tip_relief")}
+    scale, turned = blade.chord_scale, math.radians(blade.beta_offset_deg)
+    if blade.chord_law is not None:
+        chord = {"max_chord": blade.max_chord_over_R, "taper": blade.taper}
+        laws = {"pitch": blade.pitch_m(case.diameter_m), "relief": blade.tip_relief}
         made = from_laws(
-            case.diameter_m, blade["chord_law"], blade["pitch_law"], hub, anchors=anchors,
+            case.diameter_m, blade.chord_law, blade.pitch_law, hub, anchors=anchors,
             chord={k: v for k, v in chord.items() if v is not None},
             pitch={k: v for k, v in laws.items() if v is not None},
         )  # fmt: skip
         return from_stations(made.r, made.chord * scale, made.beta + turned, R, hub * R, anchors, name=case.name)
-    if "stations" in blade:
-        x, c, beta = _read_stations(case.folder / blade["stations"])
-    elif "uiuc" in blade:
+    x, c, beta = _stations(case)
+    return from_stations(x * R, c * R * scale, beta + turned, R, hub * R, anchors, name=case.name)
+
+
+def _stations(case: Case) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Columns r/R, c/R and beta [rad] of whichever file of stations the case names."""
+    blade = case.file.blade
+    if blade.stations is not None:
+        return _read_stations(case.folder / blade.stations)
+    if blade.uiuc is not None:
         from bemt.readers._uiuc_tables import read_geometry
 
-        table = read_geometry(case.folder / blade["uiuc"])
-        x, c, beta = table.r_R, table.c_R, np.radians(table.beta_deg)
-    else:
-        from bemt.readers.apc import read_pe0
+        table = read_geometry(case.folder / blade.uiuc)
+        return table.r_R, table.c_R, np.radians(table.beta_deg)
+    from bemt.readers.apc import read_pe0
 
-        apc = read_pe0(case.folder / blade["apc"])
-        x, c, beta = apc.r_m / apc.radius_m, apc.chord_m / apc.radius_m, apc.beta_rad
-    return from_stations(x * R, c * R * scale, beta + turned, R, hub * R, anchors, name=case.name)
+    assert blade.apc is not None  # a rule of the file
+    apc = read_pe0(case.folder / blade.apc)
+    return apc.r_m / apc.radius_m, apc.chord_m / apc.radius_m, apc.beta_rad
 
 
 def build_rotor(case: Case) -> Rotor:
@@ -167,9 +175,9 @@ def build_rotor(case: Case) -> Rotor:
     InputError
         When the values do not make a rotor.
     """
-    rotor = case.document["rotor"]
-    sign = -1 if rotor["rotation"] == "left" else 1
-    return _as_input(case.path.as_posix(), "blade", lambda: Rotor(_blade(case), int(rotor["blades"]), sign, case.name))
+    rotor = case.file.rotor
+    sign = -1 if rotor.rotation == "left" else 1
+    return _as_input(case.path.as_posix(), "blade", lambda: Rotor(_blade(case), rotor.blades, sign, case.name))
 
 
 def build_duct(case: Case) -> Duct | None:
@@ -190,57 +198,46 @@ def build_duct(case: Case) -> Duct | None:
     InputError
         When the values do not make a duct.
     """
-    duct = case.document.get("duct")
+    duct = case.file.duct
     if duct is None:
         return None
-    rotor = build_rotor(case)
-    inner = case.length_m("duct", "inner_diameter")
-    gap = duct["tip_gap_mm"] * 1e-3 if math.isnan(inner) else 0.5 * inner - rotor.R
-    hub = 0.5e-3 * duct.get("exit_hub_diameter_mm", 0.0)
-    x = duct.get("rotor_position_mm")
-    vanes = duct.get("stator")
-    if "exit_diameter_mm" in duct:
-        ratio = math.pi * ((0.5e-3 * duct["exit_diameter_mm"]) ** 2 - hub**2) / rotor.annulus_area
-    else:
-        ratio = duct["exit_area_ratio"]
+    rotor = case.rotor()
+    inner, hub, x = duct.inner_diameter_m, 0.5e-3 * duct.exit_hub_diameter_mm, duct.rotor_position_mm
+    gap = 1e-3 * (duct.tip_gap_mm or 0.0) if math.isnan(inner) else 0.5 * inner - rotor.R
+    ratio = duct.exit_area_ratio
+    if duct.exit_diameter_mm is not None:
+        ratio = math.pi * ((0.5e-3 * duct.exit_diameter_mm) ** 2 - hub**2) / rotor.annulus_area
+    assert ratio is not None  # a rule of the file
 
     def make() -> Duct:
-        stator = None if vanes is None else Stator(int(vanes["blades"]), vanes["chord_mm"] * 1e-3)
+        vanes = duct.stator
+        stator = None if vanes is None else Stator(vanes.blades, vanes.chord_mm * 1e-3)
         return around(
-            rotor, duct["length_mm"] * 1e-3, gap, duct.get("lip_radius_mm", 0.0) * 1e-3, exit_area_ratio=ratio,
-            exit_hub_radius=hub, rotor_x=None if x is None else x * 1e-3, stator=stator, name=case.name,
+            rotor, duct.length_mm * 1e-3, gap, duct.lip_radius_mm * 1e-3, exit_area_ratio=ratio, exit_hub_radius=hub,
+             rotor_x=None if x is None else x * 1e-3, stator=stator, name=case.name,
         )  # fmt: skip
 
     return _as_input(case.path.as_posix(), "", make)
 
 
-def build_air(air: Mapping[str, Any]) -> Air:
+def build_air(air: AirTable) -> Air:
     """Build the state of the air from the table [air].
 
-    Parameters
-    ----------
-    air : mapping
-        ``density_kg_m3`` | ``altitude_m`` | ``pressure_hPa``, with ``temperature_C`` and ``humidity_pct``.
-
-    Returns
-    -------
-    Air
-        Density, viscosity, speed of sound. Without a temperature, a given density has that of 15 degC and a given
-        altitude that of the standard atmosphere.
+    Without a temperature, a given density has that of 15 degC and a given altitude that of the standard atmosphere.
 
     Examples
     --------
-    >>> round(build_air({"altitude_m": 0.0, "temperature_C": 30.0}).rho, 4)
+    >>> round(build_air(AirTable(altitude_m=0.0, temperature_C=30.0)).rho, 4)
     1.1644
     """
-    temperature = air.get("temperature_C")
-    if "density_kg_m3" in air:
-        return Air.from_density(float(air["density_kg_m3"]), 15.0 if temperature is None else float(temperature))
-    if "altitude_m" in air:
-        altitude = float(air["altitude_m"])
-        offset = 0.0 if temperature is None else float(temperature) + 273.15 - isa_pressure(altitude)[1]
-        return Air.isa(altitude, offset)
-    return Air.from_state(100.0 * air["pressure_hPa"], float(air["temperature_C"]), air.get("humidity_pct", 0.0))
+    temperature = air.temperature_C
+    if air.density_kg_m3 is not None:
+        return Air.from_density(air.density_kg_m3, 15.0 if temperature is None else temperature)
+    if air.altitude_m is not None:
+        offset = 0.0 if temperature is None else temperature + ZERO_CELSIUS - isa_pressure(air.altitude_m)[1]
+        return Air.isa(air.altitude_m, offset)
+    assert air.pressure_hPa is not None and temperature is not None  # rules of the file
+    return Air.from_state(100.0 * air.pressure_hPa, temperature, air.humidity_pct or 0.0)
 
 
 def check_build(case: Case) -> None:
@@ -262,7 +259,7 @@ def check_build(case: Case) -> None:
         found: Sequence[Fault] = ()
         if overrides:
             joined = Collector(case.path.as_posix())
-            check_shape(joined, case.replaced(overrides).document)
+            check_shape(joined, case.replaced(overrides).file)
             found = joined.faults
         try:
             if not found:

@@ -1,17 +1,16 @@
 """Case files: a TOML document with units in its key names becomes a rotor, a duct, air and operating points.
 
-The schema is in :mod:`bemt.case.schema`; objects are built in :mod:`bemt.case.build`. A case knows which of its values
-are *assumptions* (not given by the source) and the range of each.
+The models are in :mod:`bemt.case.schema`; objects are built in :mod:`bemt.case.build`, each once. A case knows which
+of its values are *assumptions* (not given by the source) and the range of each.
 """
 
 from __future__ import annotations
 
 import copy
 import hashlib
-import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
-from bemt.base.toml import Collector, load_toml
+from bemt.base.toml import Collector, load_toml, validated
 from bemt.case.build import build_air, build_duct, build_rotor, check_build
-from bemt.case.rules import check_case
-from bemt.case.schema import AXES, DEFAULTS, GROUPS, INCH
+from bemt.case.rules import check_case, value_at
+from bemt.case.schema import AXES, GROUPS, CaseFile
 
 if TYPE_CHECKING:
     from bemt.air import Air
@@ -72,33 +71,37 @@ class Assumption:
         return (", " if self.discrete else " .. ").join(words)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Case:
-    """One validated case.
+    """One validated case. :meth:`replaced` gives a new one; nothing else knows of changed values.
 
     Parameters
     ----------
     path : Path
         The case file.
-    document : dict
-        Its content with defaults filled in; use :meth:`get` and :meth:`replaced`.
+    written : mapping
+        The document as the file has it, without defaults.
+    file : CaseFile
+        The same, typed, with defaults.
     assumptions : tuple of Assumption
         Declared unknowns.
     """
 
     path: Path
-    document: Mapping[str, Any]
-    assumptions: tuple[Assumption, ...]
+    written: Mapping[str, Any]
+    file: CaseFile
+    assumptions: tuple[Assumption, ...] = ()
+    _built: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     @property
     def name(self) -> str:
         """Name of the case, fit for a folder."""
-        return str(self.document["name"])
+        return self.file.name
 
     @property
     def title(self) -> str:
         """One line for people."""
-        return str(self.document["title"]) or self.name
+        return self.file.title or self.name
 
     @property
     def folder(self) -> Path:
@@ -108,82 +111,48 @@ class Case:
     @property
     def kind(self) -> str:
         """``propeller`` or ``fan``."""
-        return str(self.document["rotor"]["kind"])
+        return self.file.rotor.kind
 
     @property
     def ducted(self) -> bool:
         """Whether there is a duct."""
-        return "duct" in self.document
+        return self.file.duct is not None
 
     @property
     def rpm(self) -> float:
         """Rotational speed. [rev/min]"""
-        return float(self.document["operating"]["rpm"])
+        return self.file.operating.rpm
 
     @property
     def airspeed_m_s(self) -> float:
         """Axial speed of flight. [m/s]"""
-        return float(self.document["operating"]["airspeed_m_s"])
+        return self.file.operating.airspeed_m_s
 
     @property
     def references_path(self) -> Path | None:
         """File of the recorded values, if the case names one."""
-        name = self.document.get("references")
+        name = self.file.references
         return None if name is None else self.folder / name
 
     @property
     def diameter_m(self) -> float:
         """Rotor diameter. [m]"""
-        return self.length_m("rotor", "diameter")
+        return self.file.rotor.diameter_m
 
     @property
     def hub_diameter_m(self) -> float:
         """Hub diameter. [m]"""
-        ratio = self.document["rotor"].get("hub_ratio")
-        return self.length_m("rotor", "hub_diameter") if ratio is None else float(ratio) * self.diameter_m
+        return self.file.rotor.hub_diameter_m
 
-    def length_m(self, table: str, stem: str) -> float:
-        """Length in metres of whichever of ``stem_in``, ``stem_mm``, ``stem_m`` is given, else NaN.
-
-        Parameters
-        ----------
-        table : str
-            Table of the case file.
-        stem : str
-            Key without its unit.
-
-        Returns
-        -------
-        float
-            The length. [m]
-        """
-        values = self.document.get(table, {})
-        for suffix, factor in (("_in", INCH), ("_mm", 1e-3), ("_m", 1.0)):
-            if stem + suffix in values:
-                return float(values[stem + suffix]) * factor
-        return math.nan
+    @property
+    def stated_pitch_m(self) -> float:
+        """Advance per turn that the case states, NaN where it states none. [m]"""
+        return self.file.blade.pitch_m(self.diameter_m)
 
     def get(self, key: str, default: Any = None) -> Any:
-        """Value at a dotted key.
-
-        Parameters
-        ----------
-        key : str
-            Such as ``blade.section.camber``.
-        default : object
-            Returned when the case does not hold the key.
-
-        Returns
-        -------
-        object
-            The value.
-        """
-        value: Any = self.document
-        for part in key.split("."):
-            if not isinstance(value, Mapping) or part not in value:
-                return default
-            value = value[part]
-        return value
+        """Value at a dotted key such as ``blade.section.camber``; ``default`` where the case does not hold it."""
+        value = value_at(self.file, key)
+        return default if value is None else value
 
     def replaced(self, overrides: Mapping[str, Any] | None) -> Case:
         """Case with some values changed; keys of the same quantity in another unit are dropped.
@@ -197,122 +166,76 @@ class Case:
         -------
         Case
             A new case, or this one when nothing changes.
+
+        Raises
+        ------
+        InputError
+            When a value is not one that a file may hold.
         """
         if not overrides:
             return self
-        document = copy.deepcopy(dict(self.document))
+        written = copy.deepcopy(dict(self.written))
         for key, value in overrides.items():
             table_name, _, name = key.rpartition(".")
-            table = document
+            table = written
             for part in table_name.split(".") if table_name else ():
                 table = table.setdefault(part, {})
             for group_table, names, _required in GROUPS:
                 if group_table == table_name and name in names:
                     for other in names:
                         table.pop(other, None)
-            table[name] = value
+            table[name] = list(value) if isinstance(value, tuple) else value
             if key in ("air.altitude_m", "air.density_kg_m3"):
                 table.pop("humidity_pct", None)
-        return replace(self, document=document)
+        out = Collector(self.path.as_posix())
+        file = validated(CaseFile, written, out)
+        if file is None:
+            raise InputError(out.faults)
+        return replace(self, written=written, file=file)
+
+    def _once(self, what: str, parts: tuple[Any, ...], make: Callable[[Case], Any], overrides: Any) -> Any:
+        """Build one object of the case, or take the one that was built of the same tables."""
+        case = self.replaced(overrides)
+        tables = [getattr(case.file, part) for part in parts]
+        key = (what, *("" if table is None else table.model_dump_json() for table in tables))
+        if key not in self._built:
+            self._built[key] = make(case)
+        return self._built[key]
 
     def rotor(self, overrides: Mapping[str, Any] | None = None) -> Rotor:
-        """Build the rotor.
-
-        Parameters
-        ----------
-        overrides : mapping, optional
-            Changed values, as in :meth:`replaced`.
-
-        Returns
-        -------
-        geometry.rotor.Rotor
-            Blades, hub and rotation.
-        """
-        return build_rotor(self.replaced(overrides))
+        """Give the rotor, built once per geometry; overrides as in :meth:`replaced`."""
+        rotor: Rotor = self._once("rotor", ("rotor", "blade"), build_rotor, overrides)
+        return rotor
 
     def duct(self, overrides: Mapping[str, Any] | None = None) -> Duct | None:
-        """Build the duct.
-
-        Parameters
-        ----------
-        overrides : mapping, optional
-            Changed values, as in :meth:`replaced`.
-
-        Returns
-        -------
-        geometry.duct.Duct or None
-            None when the case has no duct.
-        """
-        return build_duct(self.replaced(overrides))
+        """Give the duct, None when the case has none; overrides as in :meth:`replaced`."""
+        duct: Duct | None = self._once("duct", ("rotor", "blade", "duct"), build_duct, overrides)
+        return duct
 
     def air(self, overrides: Mapping[str, Any] | None = None) -> Air:
-        """Build the state of the air.
-
-        Parameters
-        ----------
-        overrides : mapping, optional
-            Changed values, as in :meth:`replaced`.
-
-        Returns
-        -------
-        bemt.air.Air
-            Density, viscosity, speed of sound.
-        """
-        return build_air(self.replaced(overrides).document["air"])
+        """Give the state of the air; overrides as in :meth:`replaced`."""
+        return build_air(self.replaced(overrides).file.air)
 
     def axes(self) -> dict[str, NDArray[np.float64]]:
-        """Axes of the parameter sweep, in the order of the file.
-
-        Returns
-        -------
-        dict of str to (N,) float
-            Axis name (with its unit) to values.
-        """
-        out: dict[str, NDArray[np.float64]] = {}
-        for name, axis in self.document.get("sweep", {}).items():
-            if isinstance(axis, Mapping):
-                out[name] = np.linspace(float(axis["start"]), float(axis["stop"]), int(axis["num"]))
-            else:
-                out[name] = np.array(axis, dtype=float)
-        return out
+        """Axes of the parameter sweep in the order of the file: name (with its unit) to values, (N,)."""
+        made = self.file.sweep.axes()
+        return {name: made[name] for name in self.written.get("sweep", {})}
 
     def axis_key(self, axis: str) -> str:
-        """Dotted key that a sweep axis changes.
-
-        Parameters
-        ----------
-        axis : str
-            Axis name.
-
-        Returns
-        -------
-        str
-            Dotted key.
-        """
+        """Dotted key that a sweep axis changes."""
         return AXES[axis]
 
     def files(self) -> list[Path]:
-        """All files that the case names, itself first.
-
-        Returns
-        -------
-        list of Path
-            Existing files.
-        """
-        names = [self.document.get("references"), *(self.get(f"blade.{k}") for k in ("stations", "uiuc", "apc"))]
-        dat = self.get("blade.section.dat")
-        names += dat if isinstance(dat, list) else [dat]
-        names += [polar["file"] for polar in self.document.get("polars", [])]
+        """All files that the case names, itself first."""
+        blade = self.file.blade
+        dat = blade.section.dat if blade.section is not None else None
+        names = [self.file.references, blade.stations, blade.uiuc, blade.apc]
+        names += dat if isinstance(dat, tuple) else [dat]
+        names += [polar.file for polar in self.file.polars]
         return [self.path, *(self.folder / name for name in names if name)]
 
     def content_hash(self) -> str:
-        """SHA-256 over the content of all files of the case.
-
-        Returns
-        -------
-        str
-            Hexadecimal digest; it does not depend on where the case lies.
-        """
+        """SHA-256 over the content of all files of the case; it does not depend on where the case lies."""
         digest = hashlib.sha256()
         for path in self.files():
             data = path.read_bytes()
@@ -320,29 +243,11 @@ class Case:
         return digest.hexdigest()
 
 
-def _with_defaults(document: Mapping[str, Any]) -> dict[str, Any]:
-    filled = copy.deepcopy(dict(document))
-    for table, values in DEFAULTS.items():
-        target: Any = filled
-        for part in table.split(".") if table else ():
-            if part not in target:
-                if table == "blade.section":
-                    target = None
-                    break
-                target[part] = {}
-            target = target[part]
-        if target is not None:
-            for key, value in values.items():
-                target.setdefault(key, copy.deepcopy(value))
-    return filled
-
-
-def _assumptions(document: Mapping[str, Any], filled: Case) -> tuple[Assumption, ...]:
+def _assumptions(case: CaseFile) -> tuple[Assumption, ...]:
     out = []
-    for item in document.get("assumptions", []):
-        discrete = "values" in item
-        values: Sequence[Any] = item["values"] if discrete else (item["low"], item["high"])
-        out.append(Assumption(item["key"], filled.get(item["key"]), tuple(values), discrete, item["why"]))
+    for item in case.assumptions:
+        values = item.values if item.values is not None else (item.low, item.high)
+        out.append(Assumption(item.key, value_at(case, item.key), tuple(values), item.values is not None, item.why))
     return tuple(out)
 
 
@@ -393,12 +298,11 @@ def load_case(path: str | Path) -> Case:
     document = load_toml(path, out)
     if document is None:
         raise InputError(out.faults)
-    check_case(out, document, path.parent)
+    file = check_case(out, document, path.parent)
     check_name(out, document.get("name"))
-    if out.faults:
+    if file is None or out.faults:
         raise InputError(out.faults)
-    bare = Case(path, _with_defaults(document), ())
-    case = replace(bare, assumptions=_assumptions(document, bare))
+    case = Case(path, document, file, _assumptions(file))
     check_build(case)
     return case
 

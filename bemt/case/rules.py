@@ -1,4 +1,4 @@
-"""Rules of a case file that join several keys, and the check of a whole document."""
+"""Rules of a case file that join several keys; single values are checked by their models."""
 
 from __future__ import annotations
 
@@ -8,21 +8,17 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from bemt.base.toml import Collector, Key, check_table, check_value, shown
-from bemt.case.schema import ASSUMPTION, GROUPS, INCH, POLAR, SCHEMA, TEMPERATURE
+from bemt.base.toml import Collector, Key, Table, check_value, shown, validated
+from bemt.case.schema import GROUPS, INCH, TEMPERATURE, CaseFile, SectionTable
 
-__all__ = ["check_case", "check_shape"]
+__all__ = ["check_case", "check_shape", "table_at", "value_at"]
 
 A_SOUND = 340.3  # only to refuse impossible tip speeds
 MAX_TIP_MACH = 2.0
 MAX_GRID = 50_000_000
 
-_TABLES = ("rotor", "blade", "duct", "operating", "air", "model", "sweep")
-_OPTIONAL = ("duct", "model", "sweep")
-_ARRAYS = ("assumptions", "polars")
 
-
-def check_case(out: Collector, document: Mapping[str, Any], folder: Path) -> None:
+def check_case(out: Collector, document: Mapping[str, Any], folder: Path) -> CaseFile | None:
     """Check a whole case document; add every fault to the collector.
 
     Parameters
@@ -34,6 +30,11 @@ def check_case(out: Collector, document: Mapping[str, Any], folder: Path) -> Non
     folder : Path
         Folder of the case file; named files are looked for there.
 
+    Returns
+    -------
+    CaseFile or None
+        The typed document, None when something is wrong.
+
     Examples
     --------
     >>> out = Collector("case.toml")
@@ -41,54 +42,49 @@ def check_case(out: Collector, document: Mapping[str, Any], folder: Path) -> Non
     >>> print(out.faults[0])  # doctest: +ELLIPSIS
     case.toml: rotr: got an unknown key; expected one of schema, ... Did you mean rotor?
     """
-    check_table(out, "", document, SCHEMA, subtables=(*_TABLES, *_ARRAYS))
-    for name in _TABLES:
-        if name in document:
-            inner = {"blade": ("section",), "duct": ("stator",)}.get(name, ())
-            check_table(out, name, document[name], SCHEMA, subtables=inner)
-            for sub in inner:
-                if isinstance(document[name], Mapping) and sub in document[name]:
-                    check_table(out, f"{name}.{sub}", document[name][sub], SCHEMA)
-        elif name not in _OPTIONAL:
-            out.add(name, "nothing", f"a table [{name}]")
-    for name, schema in (("assumptions", ASSUMPTION), ("polars", POLAR)):
-        items = document.get(name, [])
-        if not isinstance(items, list):
-            out.add(name, shown(items), f"tables [[{name}]]", f"Write [[{name}]] with two brackets")
-            continue
-        for i, item in enumerate(items):
-            check_table(out, name, item, {name: schema}, where=f"{name}[{i}]", homes={})
+    case = validated(CaseFile, document, out)
     _check_groups(out, document)
     _check_files(out, document, folder)
-    if not out.faults:  # the rules below need sound values
+    if case is not None and not out.faults:  # the rules below need sound values
         for rule in (check_shape, _check_blade, _check_air, _check_sweep, _check_assumptions):
-            rule(out, document)
+            rule(out, case)
+    return None if out.faults else case
 
 
-def check_shape(out: Collector, document: Mapping[str, Any]) -> None:
-    """Check what joins the sizes of rotor, blade and duct.
-
-    Parameters
-    ----------
-    out : Collector
-        Receives the faults.
-    document : mapping
-        A document whose single values are sound.
-    """
+def check_shape(out: Collector, case: CaseFile) -> None:
+    """Check what joins the sizes of rotor, blade and duct."""
     for rule in (_check_rotor, _check_pitch, _check_duct):
-        rule(out, document)
+        rule(out, case)
 
 
-def _table(document: Mapping[str, Any], name: str) -> Mapping[str, Any] | None:
+def table_at(case: CaseFile, name: str) -> Table | None:
+    """Table of a case by dotted name, "" for the file itself; None when it is not there."""
+    table: Any = case
+    for part in name.split(".") if name else ():
+        table = getattr(table, part, None)
+    return table if isinstance(table, Table) else None
+
+
+def value_at(case: CaseFile, key: str) -> Any:
+    """Value at a dotted key, None when the case does not hold it."""
+    home, _, name = key.rpartition(".")
+    table = table_at(case, home)
+    if table is None or name not in table.named():
+        return None
+    field = next(field for field, info in type(table).model_fields.items() if (info.alias or field) == name)
+    value = getattr(table, field)
+    return list(value) if isinstance(value, tuple) else value
+
+
+def _inner(document: Mapping[str, Any], name: str) -> Mapping[str, Any] | None:
     value: Any = document
     for part in name.split("."):
         value = value.get(part) if isinstance(value, Mapping) else None
     return value if isinstance(value, Mapping) else None
 
-
 def _check_groups(out: Collector, document: Mapping[str, Any]) -> None:
     for name, keys, required in GROUPS:
-        table = _table(document, name)
+        table = _inner(document, name)
         if table is None:
             continue
         given = [key for key in keys if key in table]
@@ -102,7 +98,7 @@ def _check_files(out: Collector, document: Mapping[str, Any], folder: Path) -> N
     places = [("references", document.get("references"))]
     for name in ("blade.stations", "blade.uiuc", "blade.apc", "blade.section.dat"):
         table, key = name.rsplit(".", 1)
-        value = (_table(document, table) or {}).get(key)
+        value = (_inner(document, table) or {}).get(key)
         places += [(name, v) for v in (value if isinstance(value, list) else [value])]
     polars = document.get("polars", [])
     if isinstance(polars, list):
@@ -112,143 +108,141 @@ def _check_files(out: Collector, document: Mapping[str, Any], folder: Path) -> N
             out.add(where, f"{value!r}, which does not exist", "the name of a file beside the case", "Check the name")
 
 
-def _length_m(table: Mapping[str, Any], stem: str) -> float:
-    for suffix, factor in (("_in", INCH), ("_mm", 1e-3), ("_m", 1.0)):
-        if stem + suffix in table:
-            return float(table[stem + suffix]) * factor
-    return math.nan
+def _given(table: Table, *names: str) -> list[str]:
+    """Those of some keys that a table states."""
+    fields = {(info.alias or field): field for field, info in type(table).model_fields.items()}
+    return [n for n in names if n in fields and fields[n] in table.model_fields_set]
 
 
-def _check_rotor(out: Collector, document: Mapping[str, Any]) -> None:
-    rotor = document["rotor"]
-    diameter = _length_m(rotor, "diameter")
-    hub = _length_m(rotor, "hub_diameter")
-    if hub >= diameter:
-        key = "hub_diameter_mm" if "hub_diameter_mm" in rotor else "hub_diameter_in"
-        out.add(f"rotor.{key}", shown(rotor[key]), f"less than the diameter, {diameter * 1e3:.6g} mm")
-    mach = math.pi * diameter * document["operating"]["rpm"] / 60 / A_SOUND
+def _check_rotor(out: Collector, case: CaseFile) -> None:
+    rotor = case.rotor
+    if rotor.hub_diameter_m >= rotor.diameter_m:
+        (key,) = _given(rotor, "hub_diameter_mm", "hub_diameter_in", "hub_ratio")
+        out.add(f"rotor.{key}", shown(getattr(rotor, key)), f"less than the diameter, {rotor.diameter_m * 1e3:.6g} mm")
+    mach = math.pi * rotor.diameter_m * case.operating.rpm / 60 / A_SOUND
     if mach > MAX_TIP_MACH:
-        rpm = shown(document["operating"]["rpm"])
-        got = f"{rpm} with a diameter of {diameter:.4g} m, a tip Mach number of {mach:.3g}"
+        rpm = shown(case.operating.rpm)
+        got = f"{rpm} with a diameter of {rotor.diameter_m:.4g} m, a tip Mach number of {mach:.3g}"
         out.add("operating.rpm", got, f"a tip Mach number of {MAX_TIP_MACH:g} or less", "Are both units right?")
-    if rotor["kind"] == "fan" and "duct" not in document:
+    if rotor.kind == "fan" and case.duct is None:
         out.add("duct", "nothing", "a table [duct], because rotor.kind is fan", "A fan without a duct is a propeller")
 
 
-def _check_blade(out: Collector, document: Mapping[str, Any]) -> None:
-    blade = document["blade"]
-    pitches = [key for key in ("pitch_in", "pitch_mm", "pitch_ratio") if key in blade]
-    if "chord_law" in blade:
+def _check_blade(out: Collector, case: CaseFile) -> None:
+    blade = case.blade
+    pitches = _given(blade, "pitch_in", "pitch_mm", "pitch_ratio")
+    if blade.chord_law is not None:
         if not pitches:
             out.add("blade", "chord_law without a pitch", "one of pitch_in, pitch_mm, pitch_ratio")
-        if "taper" in blade and blade["chord_law"] != "linear_taper":
-            out.add("blade.taper", shown(blade["taper"]), "nothing, because chord_law is not linear_taper")
-        if "tip_relief" in blade and blade.get("pitch_law") != "tip_relieved":
-            out.add("blade.tip_relief", shown(blade["tip_relief"]), "nothing, because pitch_law is not tip_relieved")
+        if blade.taper is not None and blade.chord_law != "linear_taper":
+            out.add("blade.taper", shown(blade.taper), "nothing, because chord_law is not linear_taper")
+        if blade.tip_relief is not None and blade.pitch_law != "tip_relieved":
+            out.add("blade.tip_relief", shown(blade.tip_relief), "nothing, because pitch_law is not tip_relieved")
     else:
-        source = next(key for key in ("stations", "uiuc", "apc") if key in blade)
-        for key in (*pitches, "max_chord_over_R", "taper", "pitch_law", "tip_relief"):
-            if key in blade:
-                hint = "Use beta_offset_deg to turn the blade" if key in pitches else ""
-                out.add(f"blade.{key}", shown(blade[key]), f"nothing beside {source}, which gives it", hint)
-    if "section" not in blade:
-        out.add(
-            "blade.section", "nothing", "a table [blade.section]", "Tables [[polars]] replace only its aerodynamics"
-        )
-    _check_section(out, blade.get("section", {}))
+        (source,) = _given(blade, "stations", "uiuc", "apc")
+        for key in (*pitches, *_given(blade, "max_chord_over_R", "taper", "pitch_law", "tip_relief")):
+            hint = "Use beta_offset_deg to turn the blade" if key in pitches else ""
+            out.add(f"blade.{key}", shown(getattr(blade, key)), f"nothing beside {source}, which gives it", hint)
+    if blade.section is None:
+        hint = "Tables [[polars]] replace only its aerodynamics"
+        out.add("blade.section", "nothing", "a table [blade.section]", hint)
+    else:
+        _check_section(out, blade.section)
 
 
-def _check_pitch(out: Collector, document: Mapping[str, Any]) -> None:
-    blade = document["blade"]
-    pitch, diameter = _length_m(blade, "pitch"), _length_m(document["rotor"], "diameter")
-    if not math.isnan(pitch) and not 0.05 <= pitch / diameter <= 5:
-        key = next(key for key in ("pitch_in", "pitch_mm") if key in blade)
-        metric = blade[key] / 25.4
-        hint = ""
-        if key == "pitch_in" and 0.1 <= metric * INCH / diameter <= 3:
-            hint = f"Looks like millimetres: write pitch_mm = {blade[key]:g} or pitch_in = {metric:.4g}"
-        out.add(f"blade.{key}", shown(blade[key]), "a pitch of 0.05 to 5 diameters", hint)
+def _check_pitch(out: Collector, case: CaseFile) -> None:
+    blade, diameter = case.blade, case.rotor.diameter_m
+    given = _given(blade, "pitch_in", "pitch_mm")
+    if not given or 0.05 <= blade.pitch_m(diameter) / diameter <= 5:
+        return
+    (key,) = given
+    value = getattr(blade, key)
+    metric, hint = value / 25.4, ""
+    if key == "pitch_in" and 0.1 <= metric * INCH / diameter <= 3:
+        hint = f"Looks like millimetres: write pitch_mm = {value:g} or pitch_in = {metric:.4g}"
+    out.add(f"blade.{key}", shown(value), "a pitch of 0.05 to 5 diameters", hint)
 
 
-def _check_section(out: Collector, section: Mapping[str, Any]) -> None:
-    lists = {k: len(v) for k, v in section.items() if isinstance(v, list) and k != "r_over_R"}
-    radii = section.get("r_over_R", [])
+def _check_section(out: Collector, section: SectionTable) -> None:
+    stated = {name: getattr(section, name) for name in section.model_fields_set}
+    lists = {k: len(v) for k, v in stated.items() if isinstance(v, tuple) and k != "r_over_R"}
+    radii = section.r_over_R or ()
     for key, count in lists.items():
         if count != len(radii):
             out.add(f"blade.section.{key}", f"a list of {count}", f"as many values as r_over_R has, {len(radii)}")
-    names = section.get("naca", [])
-    for name in [names] if isinstance(names, str) else names:
+    names = section.naca or ()
+    for name in (names,) if isinstance(names, str) else names:
         if not re.fullmatch(r"\d{4,5}", name):
             hint = "Leave the word NACA out" if name.upper().startswith("NACA") else ""
             out.add("blade.section.naca", repr(name), "four or five digits, such as 4412 or 23012", hint)
     if any(b <= a for a, b in zip(radii, radii[1:], strict=False)):
         out.add("blade.section.r_over_R", "radii that do not ascend", "ascending radii")
     if radii and not lists:
-        out.add(
-            "blade.section.r_over_R", f"a list of {len(radii)}", "nothing, because the section is the same everywhere"
-        )
+        got, expected = f"a list of {len(radii)}", "nothing, because the section is the same everywhere"
+        out.add("blade.section.r_over_R", got, expected)
     for key in ("camber", "camber_position"):
-        if key in section and "thickness" not in section:
-            out.add(f"blade.section.{key}", shown(section[key]), "nothing without thickness")
+        if key in stated and "thickness" not in stated:
+            value = stated[key]
+            out.add(f"blade.section.{key}", shown(list(value) if isinstance(value, tuple) else value),
+                    "nothing without thickness")  # fmt: skip
 
 
-def _check_duct(out: Collector, document: Mapping[str, Any]) -> None:
-    duct = document.get("duct")
+def _check_duct(out: Collector, case: CaseFile) -> None:
+    duct, diameter = case.duct, case.rotor.diameter_m
     if duct is None:
         return
-    inner, diameter = _length_m(duct, "inner_diameter"), _length_m(document["rotor"], "diameter")
-    if inner < diameter:
-        key = "inner_diameter_mm" if "inner_diameter_mm" in duct else "inner_diameter_in"
-        out.add(f"duct.{key}", shown(duct[key]), f"at least the rotor diameter, {diameter * 1e3:.6g} mm")
-    if duct.get("tip_gap_mm", 0) > 0.1 * diameter / 2 * 1e3:
-        out.add("duct.tip_gap_mm", shown(duct["tip_gap_mm"]), f"at most a tenth of the radius, {diameter * 50:.4g} mm")
-    if duct.get("lip_radius_mm", 0) > duct["length_mm"]:
-        out.add("duct.lip_radius_mm", shown(duct["lip_radius_mm"]), f"at most length_mm, {duct['length_mm']:g}")
-    if duct.get("rotor_position_mm", 0) > duct["length_mm"]:
-        out.add("duct.rotor_position_mm", shown(duct["rotor_position_mm"]), f"at most length_mm, {duct['length_mm']:g}")
+    if duct.inner_diameter_m < diameter:
+        (key,) = _given(duct, "inner_diameter_mm", "inner_diameter_in")
+        out.add(f"duct.{key}", shown(getattr(duct, key)), f"at least the rotor diameter, {diameter * 1e3:.6g} mm")
+    if (duct.tip_gap_mm or 0.0) > 0.1 * diameter / 2 * 1e3:
+        out.add("duct.tip_gap_mm", shown(duct.tip_gap_mm), f"at most a tenth of the radius, {diameter * 50:.4g} mm")
+    for key in ("lip_radius_mm", "rotor_position_mm"):
+        value = getattr(duct, key) or 0.0
+        if value > duct.length_mm:
+            out.add(f"duct.{key}", shown(value), f"at most length_mm, {duct.length_mm:g}")
 
 
-def _check_air(out: Collector, document: Mapping[str, Any]) -> None:
-    air = document["air"]
-    if "pressure_hPa" in air and "temperature_C" not in air:
+def _check_air(out: Collector, case: CaseFile) -> None:
+    air = case.air
+    if air.pressure_hPa is not None and air.temperature_C is None:
         out.add("air.temperature_C", "nothing", f"{TEMPERATURE.expected}, because pressure_hPa is given")
-    if "humidity_pct" in air and "pressure_hPa" not in air:
-        out.add("air.humidity_pct", shown(air["humidity_pct"]), "nothing without pressure_hPa")
+    if air.humidity_pct is not None and air.pressure_hPa is None:
+        out.add("air.humidity_pct", shown(air.humidity_pct), "nothing without pressure_hPa")
 
 
-def _check_sweep(out: Collector, document: Mapping[str, Any]) -> None:
-    sweep = document.get("sweep", {})
-    air = document["air"]
+def _check_sweep(out: Collector, case: CaseFile) -> None:
+    sweep = case.sweep.axes()
     if "density_kg_m3" in sweep and ("altitude_m" in sweep or "temperature_C" in sweep):
         other = "altitude_m" if "altitude_m" in sweep else "temperature_C"
         out.add("sweep.density_kg_m3", f"an axis beside {other}", f"density_kg_m3 or {other}, not both")
-    if "temperature_C" in sweep and "density_kg_m3" in air and "altitude_m" not in sweep:
+    if "temperature_C" in sweep and case.air.density_kg_m3 is not None and "altitude_m" not in sweep:
         out.add("sweep.temperature_C", "an axis with air.density_kg_m3", "air.altitude_m or air.pressure_hPa",
                 "Temperature changes nothing when the density is fixed")  # fmt: skip
-    if "pitch_in" in sweep and "chord_law" not in document["blade"]:
+    if "pitch_in" in sweep and case.blade.chord_law is None:
         out.add("sweep.pitch_in", "an axis", "nothing, because the blade comes from stations")
-    if "tip_gap_mm" in sweep and "duct" not in document:
+    if "tip_gap_mm" in sweep and case.duct is None:
         out.add("sweep.tip_gap_mm", "an axis", "nothing, because there is no duct")
-    points = 1
-    for axis in sweep.values():
-        points *= int(axis["num"]) if isinstance(axis, Mapping) else len(axis)
+    points = math.prod(axis.size for axis in sweep.values())
     if points > MAX_GRID:
         out.add("sweep", f"a grid of {points} points", f"{MAX_GRID} points or fewer", "Take fewer values")
 
 
-def _check_assumptions(out: Collector, document: Mapping[str, Any]) -> None:
+def _check_assumptions(out: Collector, case: CaseFile) -> None:
     seen: set[str] = set()
-    for i, item in enumerate(document.get("assumptions", [])):
-        where, key = f"assumptions[{i}]", item["key"]
-        table, _, name = key.rpartition(".")
-        values = _table(document, table) if table else None
-        if values is None or name not in values or name not in SCHEMA.get(table, {}):
+    for i, item in enumerate(case.assumptions):
+        where, key = f"assumptions[{i}]", item.key
+        home, _, name = key.rpartition(".")
+        table, nominal = table_at(case, home), value_at(case, key)
+        if not home or table is None or nominal is None or table.declared(name) is None:
             out.add(f"{where}.key", repr(key), "the dotted key of a value in this file")
             continue
         if key in seen:
             out.add(f"{where}.key", f"{key!r} again", "each key once")
         seen.add(key)
-        _check_assumption(out, where, item, values[name], SCHEMA[table][name])
+        stated = {k: list(v) if isinstance(v, tuple) else v for k, v in item.model_dump(exclude_unset=True).items()}
+        what = table.declared(name)
+        assert what is not None
+        _check_assumption(out, where, stated, nominal, what)
 
 
 def _check_assumption(out: Collector, where: str, item: Mapping[str, Any], nominal: Any, key: Key) -> None:

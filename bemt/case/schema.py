@@ -1,15 +1,42 @@
-"""What a case file may hold: the schema ``bemt.case/1``, units in the key names, ranges and suspicious values."""
+"""What a case file may hold: the typed models of ``bemt.case/1``, units in the key names, ranges, suspicious values.
+
+A length that may be written in several units is one property in metres (``rotor.diameter_m``); whichever key the file
+uses, exactly one of :data:`GROUPS` is given.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal
 
-from bemt.base.toml import Key
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.base.toml import Key, Table, entry
 from bemt.sections.rule import DRAG_LEVEL, N_CRIT
 from geometry.laws import CHORD_LAWS as GEOMETRY_CHORD_LAWS
 
-__all__ = ["ASSUMPTION", "AXES", "DEFAULTS", "GROUPS", "INCH", "POLAR", "SCHEMA", "TEMPERATURE"]
+__all__ = [
+    "AIRSPEED",
+    "AXES",
+    "GROUPS",
+    "INCH",
+    "RPM",
+    "TEMPERATURE",
+    "AirTable",
+    "AssumptionTable",
+    "BladeTable",
+    "CaseFile",
+    "DuctTable",
+    "ModelTable",
+    "OperatingTable",
+    "PolarTable",
+    "RotorTable",
+    "SectionTable",
+    "StatorTable",
+    "SweepTable",
+]
 
 SCHEMA_NAME = "bemt.case/1"
 CHORD_LAWS = tuple(GEOMETRY_CHORD_LAWS)
@@ -57,112 +84,219 @@ _PITCH_IN = Key(unit="in", low=0.1, high=120, suspect=_inch("pitch_in", 120.1))
 _DIAMETER_IN = Key(unit="in", low=0.5, high=200, suspect=_inch("diameter_in", 200.1))
 _GAP = Key(unit="mm", low=0, high=50, suspect=_metres("tip_gap_mm", 0.005))
 
-SCHEMA: dict[str, dict[str, Key]] = {
-    "": {
-        "schema": Key("choice", required=True, choices=(SCHEMA_NAME,)),
-        "name": Key("text", required=True),
-        "title": Key("text"),
-        "notes": Key("text"),
-        "references": Key("file"),
-    },
-    "rotor": {
-        "kind": Key("choice", required=True, choices=("propeller", "fan")),
-        "blades": Key("integer", low=1, high=64, required=True),
-        "diameter_in": _DIAMETER_IN,
-        "diameter_mm": Key(unit="mm", low=10, high=6000, suspect=_metres("diameter_mm", 6.0)),
-        "diameter_m": Key(unit="m", low=0.01, high=6),
-        "hub_ratio": Key(low=0.01, high=0.95, suspect=_percent("hub_ratio")),
-        "hub_diameter_mm": Key(unit="mm", low=0.5, high=3000, suspect=_metres("hub_diameter_mm", 0.499)),
-        "hub_diameter_in": Key(unit="in", low=0.02, high=120),
-        "rotation": Key("choice", choices=("right", "left")),
-    },
-    "blade": {
-        "pitch_in": _PITCH_IN,
-        "pitch_mm": Key(unit="mm", low=2.5, high=3000, suspect=_metres("pitch_mm", 2.0)),
-        "pitch_ratio": Key(low=0.01, high=10),
-        "pitch_law": Key("choice", choices=("helix", "tip_relieved")),
-        "tip_relief": Key(low=0, high=0.6, suspect=_percent("tip_relief")),
-        "chord_law": Key("choice", choices=CHORD_LAWS),
-        "max_chord_over_R": Key(unit="of the tip radius", low=0.005, high=2, suspect=_percent("max_chord_over_R", 3.0)),
-        "taper": Key(low=0.05, high=3),
-        "chord_scale": Key(low=0.1, high=10, suspect=_percent("chord_scale", 20.0)),
-        "stations": Key("file"),
-        "uiuc": Key("file"),
-        "apc": Key("file"),
-        "beta_offset_deg": Key(unit="deg", low=-45, high=45),
-    },
-    "blade.section": {
-        "naca": Key("text_or_texts"),
-        "dat": Key("text_or_texts"),
-        "camber": Key("scalar_or_list", unit="of the chord", low=-0.2, high=0.2, suspect=_percent("camber", 0.9)),
-        "camber_position": Key("scalar_or_list", unit="of the chord", low=0.1, high=0.8,
-                               suspect=_percent("camber_position")),
-        "thickness": Key("scalar_or_list", unit="of the chord", low=0.01, high=0.5,
-                         suspect=_percent("thickness", 1.5)),
-        "camber_scale": Key(low=0, high=5),
-        "thickness_scale": Key(low=0.1, high=5),
-        "r_over_R": Key("numbers", low=0, high=1, suspect=_percent("r_over_R", 2.0)),
-    },
-    "duct": {
-        "inner_diameter_mm": Key(unit="mm", low=10, high=6000, suspect=_metres("inner_diameter_mm", 6.0)),
-        "inner_diameter_in": Key(unit="in", low=0.5, high=240),
-        "tip_gap_mm": _GAP,
-        "length_mm": Key(unit="mm", low=1, high=10_000, required=True, suspect=_metres("length_mm", 0.999)),
-        "lip_radius_mm": Key(unit="mm", low=0, high=1000),
-        "rotor_position_mm": Key(unit="mm", low=-1000, high=10_000),
-        "exit_area_ratio": Key(low=0.3, high=3, suspect=_percent("exit_area_ratio", 20.0)),
-        "exit_diameter_mm": Key(unit="mm", low=5, high=6000, suspect=_metres("exit_diameter_mm", 4.9)),
-        "exit_hub_diameter_mm": Key(unit="mm", low=0, high=6000),
-    },
-    "duct.stator": {
-        "blades": Key("integer", low=1, high=64, required=True),
-        "chord_mm": Key(unit="mm", low=1, high=1000, required=True, suspect=_metres("chord_mm", 0.999)),
-        "recovery": Key(low=0, high=1, suspect=_percent("recovery", 1.5)),
-    },
-    "operating": {"rpm": RPM, "airspeed_m_s": AIRSPEED},
-    "air": {
-        "density_kg_m3": _DENSITY,
-        "altitude_m": _ALTITUDE,
-        "pressure_hPa": Key(unit="hPa", low=50, high=1200, suspect=_looks(
-            (5000, 120_000, "pascals", lambda v: v / 100, "pressure_hPa"),
-            (0.5, 1.2, "bar", lambda v: v * 1000, "pressure_hPa"),
-            (25, 32, "inches of mercury", lambda v: v * 33.86389, "pressure_hPa"))),
-        "temperature_C": TEMPERATURE,
-        "humidity_pct": Key(unit="%", low=0, high=100,
-                            suspect=_looks((1e-9, 0.999, "a fraction", lambda v: v * 100, "humidity_pct"))),
-    },
-    "model": {
-        "effects_on": Key("texts"),
-        "effects_off": Key("texts"),
-        "also_without": Key("texts"),
-        "n_crit": Key(low=0.1, high=14),
-        "drag_level": Key(low=0.3, high=3, suspect=_percent("drag_level", 20.0)),
-        "stations": Key("integer", low=5, high=1000),
-    },
-    "sweep": {
-        "rpm": Key("axis", unit="rev/min", low=RPM.low, high=RPM.high, suspect=RPM.suspect),
-        "airspeed_m_s": Key("axis", unit="m/s", low=AIRSPEED.low, high=AIRSPEED.high, suspect=AIRSPEED.suspect),
-        "altitude_m": Key("axis", unit="m", low=-500, high=20_000, suspect=_ALTITUDE.suspect),
-        "density_kg_m3": Key("axis", unit="kg/m3", low=0.01, high=10, suspect=_DENSITY.suspect),
-        "temperature_C": Key("axis", unit="C", low=-60, high=60, suspect=TEMPERATURE.suspect),
-        "pitch_in": Key("axis", unit="in", low=0.1, high=120, suspect=_PITCH_IN.suspect),
-        "diameter_in": Key("axis", unit="in", low=0.5, high=200, suspect=_DIAMETER_IN.suspect),
-        "tip_gap_mm": Key("axis", unit="mm", low=0, high=50, suspect=_GAP.suspect),
-    },
-}  # fmt: skip
+_PRESSURE = Key(unit="hPa", low=50, high=1200, suspect=_looks(
+    (5000, 120_000, "pascals", lambda v: v / 100, "pressure_hPa"),
+    (0.5, 1.2, "bar", lambda v: v * 1000, "pressure_hPa"),
+    (25, 32, "inches of mercury", lambda v: v * 33.86389, "pressure_hPa")))  # fmt: skip
+_FRACTION_OF_HUMIDITY = _looks((1e-9, 0.999, "a fraction", lambda v: v * 100, "humidity_pct"))
 
-ASSUMPTION = {
-    "key": Key("text", required=True),
-    "low": Key(),
-    "high": Key(),
-    "values": Key("list"),
-    "why": Key("text", required=True),
-}
-POLAR = {
-    "file": Key("file", required=True),
-    "r_over_R": Key(low=0, high=1, required=True, suspect=_percent("r_over_R", 2.0)),
-    "format": Key("choice", choices=("csv", "xfoil", "c81", "aerodyn")),
-}
+Rotations = Literal["right", "left"]
+Numbers = float | tuple[float, ...] | None
+Texts = str | tuple[str, ...] | None
+
+
+def _metres_of(inch: float | None, millimetre: float | None, metre: float | None = None) -> float:
+    """Length in metres of whichever unit is given, else NaN."""
+    for value, factor in ((inch, INCH), (millimetre, 1e-3), (metre, 1.0)):
+        if value is not None:
+            return value * factor
+    return math.nan
+
+
+class RotorTable(Table):
+    """[rotor]: what turns."""
+
+    kind: Literal["propeller", "fan"] = entry("choice", choices=("propeller", "fan"), required=True)
+    blades: int = entry("integer", low=1, high=64, required=True)
+    diameter_in: float | None = entry(key=_DIAMETER_IN)
+    diameter_mm: float | None = entry(unit="mm", low=10, high=6000, suspect=_metres("diameter_mm", 6.0))
+    diameter_m_: float | None = entry(unit="m", low=0.01, high=6, alias="diameter_m")
+    hub_ratio: float | None = entry(low=0.01, high=0.95, suspect=_percent("hub_ratio"))
+    hub_diameter_mm: float | None = entry(unit="mm", low=0.5, high=3000, suspect=_metres("hub_diameter_mm", 0.499))
+    hub_diameter_in: float | None = entry(unit="in", low=0.02, high=120)
+    rotation: Rotations = entry("choice", choices=("right", "left"), default="right")
+
+    @property
+    def diameter_m(self) -> float:
+        """Tip diameter. [m]"""
+        return _metres_of(self.diameter_in, self.diameter_mm, self.diameter_m_)
+
+    @property
+    def hub_diameter_m(self) -> float:
+        """Hub diameter. [m]"""
+        if self.hub_ratio is not None:
+            return self.hub_ratio * self.diameter_m
+        return _metres_of(self.hub_diameter_in, self.hub_diameter_mm)
+
+
+class SectionTable(Table):
+    """[blade.section]: one section, or one per r_over_R."""
+
+    naca: Texts = entry("text_or_texts")
+    dat: Texts = entry("text_or_texts")
+    camber: float | tuple[float, ...] = entry(
+        "scalar_or_list", "of the chord", -0.2, 0.2, suspect=_percent("camber", 0.9), default=0.0
+    )
+    camber_position: float | tuple[float, ...] = entry(
+        "scalar_or_list", "of the chord", 0.1, 0.8, suspect=_percent("camber_position"), default=0.4
+    )
+    thickness: Numbers = entry("scalar_or_list", "of the chord", 0.01, 0.5, suspect=_percent("thickness", 1.5))
+    camber_scale: float = entry(low=0, high=5, default=1.0)
+    thickness_scale: float = entry(low=0.1, high=5, default=1.0)
+    r_over_R: tuple[float, ...] | None = entry("numbers", low=0, high=1, suspect=_percent("r_over_R", 2.0))
+
+
+class BladeTable(Table):
+    """[blade]: pitch and chord by a law, or stations from a file."""
+
+    pitch_in: float | None = entry(key=_PITCH_IN)
+    pitch_mm: float | None = entry(unit="mm", low=2.5, high=3000, suspect=_metres("pitch_mm", 2.0))
+    pitch_ratio: float | None = entry(low=0.01, high=10)
+    pitch_law: Literal["helix", "tip_relieved"] = entry("choice", choices=("helix", "tip_relieved"), default="helix")
+    tip_relief: float | None = entry(low=0, high=0.6, suspect=_percent("tip_relief"))
+    chord_law: str | None = entry("choice", choices=CHORD_LAWS)
+    max_chord_over_R: float | None = entry(
+        unit="of the tip radius", low=0.005, high=2, suspect=_percent("max_chord_over_R", 3.0)
+    )
+    taper: float | None = entry(low=0.05, high=3)
+    chord_scale: float = entry(low=0.1, high=10, suspect=_percent("chord_scale", 20.0), default=1.0)
+    stations: str | None = entry("file")
+    uiuc: str | None = entry("file")
+    apc: str | None = entry("file")
+    beta_offset_deg: float = entry(unit="deg", low=-45, high=45, default=0.0)
+    section: SectionTable | None = None
+
+    def pitch_m(self, diameter_m: float) -> float:
+        """Advance per turn that the case states, NaN where it states none. [m]"""
+        if self.pitch_ratio is not None:
+            return self.pitch_ratio * diameter_m
+        return _metres_of(self.pitch_in, self.pitch_mm)
+
+
+class StatorTable(Table):
+    """[duct.stator]: vanes behind the rotor."""
+
+    blades: int = entry("integer", low=1, high=64, required=True)
+    chord_mm: float = entry(unit="mm", low=1, high=1000, required=True, suspect=_metres("chord_mm", 0.999))
+    recovery: float | None = entry(low=0, high=1, suspect=_percent("recovery", 1.5))
+
+
+class DuctTable(Table):
+    """[duct]: the wall around the rotor."""
+
+    inner_diameter_mm: float | None = entry(unit="mm", low=10, high=6000, suspect=_metres("inner_diameter_mm", 6.0))
+    inner_diameter_in: float | None = entry(unit="in", low=0.5, high=240)
+    tip_gap_mm: float | None = entry(key=_GAP)
+    length_mm: float = entry(unit="mm", low=1, high=10_000, required=True, suspect=_metres("length_mm", 0.999))
+    lip_radius_mm: float = entry(unit="mm", low=0, high=1000, default=0.0)
+    rotor_position_mm: float | None = entry(unit="mm", low=-1000, high=10_000)
+    exit_area_ratio: float | None = entry(low=0.3, high=3, suspect=_percent("exit_area_ratio", 20.0))
+    exit_diameter_mm: float | None = entry(unit="mm", low=5, high=6000, suspect=_metres("exit_diameter_mm", 4.9))
+    exit_hub_diameter_mm: float = entry(unit="mm", low=0, high=6000, default=0.0)
+    stator: StatorTable | None = None
+
+    @property
+    def inner_diameter_m(self) -> float:
+        """Bore, NaN where the gap is given. [m]"""
+        return _metres_of(self.inner_diameter_in, self.inner_diameter_mm)
+
+
+class OperatingTable(Table):
+    """[operating]: the case's own point."""
+
+    rpm: float = entry(key=RPM)
+    airspeed_m_s: float = entry(key=AIRSPEED, default=0.0)
+
+
+class AirTable(Table):
+    """[air]: density, or altitude, or pressure with temperature and humidity."""
+
+    density_kg_m3: float | None = entry(key=_DENSITY)
+    altitude_m: float | None = entry(key=_ALTITUDE)
+    pressure_hPa: float | None = entry(key=_PRESSURE)
+    temperature_C: float | None = entry(key=TEMPERATURE)
+    humidity_pct: float | None = entry(unit="%", low=0, high=100, suspect=_FRACTION_OF_HUMIDITY)
+
+
+class ModelTable(Table):
+    """[model]: physics that is on, section tables, blade elements."""
+
+    effects_on: tuple[str, ...] = entry("texts", default=())
+    effects_off: tuple[str, ...] = entry("texts", default=())
+    also_without: tuple[str, ...] = entry("texts", default=())
+    n_crit: float = entry(low=0.1, high=14, default=N_CRIT)
+    drag_level: float = entry(low=0.3, high=3, suspect=_percent("drag_level", 20.0), default=DRAG_LEVEL)
+    stations: int = entry("integer", low=5, high=1000, default=40)
+
+
+Axis = tuple[float, ...] | dict[str, float] | None
+
+
+def _axis(key: Key) -> Any:
+    return entry("axis", unit=key.unit, low=key.low, high=key.high, suspect=key.suspect)
+
+
+class SweepTable(Table):
+    """[sweep]: axes of a parameter grid, lists or {start, stop, num}."""
+
+    rpm: Axis = _axis(RPM)
+    airspeed_m_s: Axis = _axis(AIRSPEED)
+    altitude_m: Axis = _axis(_ALTITUDE)
+    density_kg_m3: Axis = _axis(_DENSITY)
+    temperature_C: Axis = _axis(TEMPERATURE)
+    pitch_in: Axis = _axis(_PITCH_IN)
+    diameter_in: Axis = _axis(_DIAMETER_IN)
+    tip_gap_mm: Axis = _axis(_GAP)
+
+    def axes(self) -> dict[str, NDArray[np.float64]]:
+        """Axes in the order of the file: name (with its unit) to values, (N,)."""
+        out: dict[str, NDArray[np.float64]] = {}
+        for name, axis in self.model_dump(exclude_unset=True).items():
+            if isinstance(axis, dict):
+                out[name] = np.linspace(axis["start"], axis["stop"], int(axis["num"]))
+            elif axis is not None:
+                out[name] = np.array(axis, dtype=float)
+        return out
+
+
+class AssumptionTable(Table):
+    """[[assumptions]]: a value that the source does not give, with its range."""
+
+    key: str = entry("text", required=True)
+    low: float | None = entry()
+    high: float | None = entry()
+    values: tuple[Any, ...] | None = entry("list")
+    why: str = entry("text", required=True)
+
+
+class PolarTable(Table):
+    """[[polars]]: a section table of the user's own."""
+
+    file: str = entry("file", required=True)
+    r_over_R: float = entry(low=0, high=1, required=True, suspect=_percent("r_over_R", 2.0))
+    format: Literal["csv", "xfoil", "c81", "aerodyn"] | None = entry(
+        "choice", choices=("csv", "xfoil", "c81", "aerodyn")
+    )
+
+
+class CaseFile(Table):
+    """A whole case file."""
+
+    schema_: Literal["bemt.case/1"] = entry("choice", choices=(SCHEMA_NAME,), required=True, alias="schema")
+    name: str = entry("text", required=True)
+    title: str = entry("text", default="")
+    notes: str = entry("text", default="")
+    references: str | None = entry("file")
+    rotor: RotorTable
+    blade: BladeTable
+    duct: DuctTable | None = None
+    operating: OperatingTable
+    air: AirTable
+    model: ModelTable = ModelTable()
+    sweep: SweepTable = SweepTable()
+    assumptions: tuple[AssumptionTable, ...] = ()
+    polars: tuple[PolarTable, ...] = ()
+
 
 AXES = {
     "rpm": "operating.rpm",
@@ -187,19 +321,3 @@ GROUPS: tuple[tuple[str, tuple[str, ...], bool], ...] = (
     ("air", ("density_kg_m3", "altitude_m", "pressure_hPa"), True),
 )
 """(table, keys, required): at most one of the keys may be given, exactly one when required."""
-
-DEFAULTS: dict[str, dict[str, Any]] = {
-    "": {"title": "", "notes": ""},
-    "rotor": {"rotation": "right"},
-    "blade": {"beta_offset_deg": 0.0, "chord_scale": 1.0, "pitch_law": "helix"},
-    "blade.section": {"camber": 0.0, "camber_position": 0.4, "camber_scale": 1.0, "thickness_scale": 1.0},
-    "operating": {"airspeed_m_s": 0.0},
-    "model": {
-        "effects_on": [],
-        "effects_off": [],
-        "also_without": [],
-        "n_crit": N_CRIT,
-        "drag_level": DRAG_LEVEL,
-        "stations": 40,
-    },
-}

@@ -196,7 +196,7 @@ def _rows(out: Collector, document: Mapping[str, Any]) -> list[tuple[str, dict[s
 def _point(out: Collector, where: str, row: dict[str, Any], case: Case, duct: Mapping[str, Any] | None) -> list[Point]:
     overrides: dict[str, Any] = {}
     if "pitch_offset_deg" in row:
-        overrides["blade.beta_offset_deg"] = case.get("blade.beta_offset_deg", 0.0) + row["pitch_offset_deg"]
+        overrides["blade.beta_offset_deg"] = case.file.blade.beta_offset_deg + row["pitch_offset_deg"]
     if "tip_gap_pct_R" in row:
         if duct is None and not case.ducted:
             out.add(f"{where}.tip_gap_pct_R", shown(row["tip_gap_pct_R"]), "a table [duct] or a case with a duct")

@@ -33,9 +33,9 @@ class _Bemt:
         turned = float(row["pitch_offset_deg"] or 0)
         overrides: dict[str, Any] = {}
         if turned:
-            overrides["blade.beta_offset_deg"] = case.get("blade.beta_offset_deg", 0.0) + turned
+            overrides["blade.beta_offset_deg"] = case.file.blade.beta_offset_deg + turned
         if row["solver"] == "incompressible":
-            overrides["model.effects_off"] = sorted({*case.get("model.effects_off", []), *MACH_EFFECTS})
+            overrides["model.effects_off"] = sorted({*case.file.model.effects_off, *MACH_EFFECTS})
         key = f"{case.path}|{sorted(overrides.items())}"
         if key not in self.ready:
             self.ready[key] = evaluate.prepare(case.replaced(overrides))

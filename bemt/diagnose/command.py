@@ -82,7 +82,7 @@ def load(path: str, case: Case) -> Record:
 
     imported = import_file(path)
     _same_rotor(imported, case, path)
-    ducted = bool(case.document.get("duct"))
+    ducted = case.ducted
     findings = check(imported, diameter_m=case.diameter_m, blades=int(case.get("rotor.blades")), ducted=ducted)
     found = tuple(f"{Path(path).name}: {f}" for f in findings if f.severity != "note")
     rows = view(imported)

@@ -197,7 +197,7 @@ def refinement(case: Case) -> dict[str, Any]:
             }
         except InputError:
             study = None
-    used = int(case.get("model.stations"))
+    used = case.file.model.stations
     finest = float(T[-1])
     near = REFINED.index(used) if used in REFINED else None
     change = math.nan if near is None or finest == 0.0 else float(T[near]) / finest - 1.0

@@ -68,7 +68,7 @@ def families(case: Case) -> dict[str, Any]:
 
     ready = prepare(case)
     D_in, p_in = case.diameter_m / INCH, ready.pitch_m / INCH
-    stated = case.length_m("blade", "pitch") / INCH
+    stated = case.stated_pitch_m / INCH
     p_in = stated if math.isfinite(stated) else p_in
     diameters, pitches = np.linspace(0.5, 2.0, N) * D_in, np.linspace(0.3, 2.2, N) * p_in
     rpm = np.linspace(0.1, 1.75, 2 * N) * case.rpm

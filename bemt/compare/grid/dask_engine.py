@@ -28,6 +28,7 @@ import numpy as np
 from bemt.base import cache
 from bemt.base.errors import Fault, InputError
 from bemt.case import Case
+from bemt.case.schema import CaseFile
 from bemt.compare.grid.identity import program_hash
 from bemt.compare.grid.run import Grid, Solved, Solver, solve_chunk
 
@@ -85,7 +86,8 @@ def _portable(case: Case) -> tuple[Case, dict[str, bytes]]:
             return [moved(item) for item in value]
         return place.get(case.folder / value, value) if isinstance(value, str) else value
 
-    there = replace(case, path=Path(case.path.name), document=moved(case.document))
+    written = moved(case.written)
+    there = replace(case, path=Path(case.path.name), written=written, file=CaseFile.model_validate(written), _built={})
     return there, {name: path.read_bytes() for path, name in place.items()}
 
 

@@ -25,6 +25,7 @@ from bemt.recordings import audit_remarks
 if TYPE_CHECKING:
     from bemt.air import Air
     from bemt.bem.evaluate import Points
+    from bemt.formula.k1k2 import Estimate
 
 __all__ = ["ROW_SOURCES", "solve_case", "spread"]
 
@@ -37,24 +38,24 @@ COMPARED = {
 PROPAGATED = ("thrust_N", "torque_Nm", "power_W", "CT", "CP", "exhaust_speed_m_s", "duct_share")
 
 Array = NDArray[np.float64]
-Overrides = Mapping[str, Any] | None
 Conditions = tuple[Array, Array, "Air"]
 
 
-def _conditions(
-    case: Case, refs: Sequence[reference_file.Reference]
-) -> tuple[list[tuple[float, float, float]], Conditions]:
-    """Distinct operating points: the case's own first, then those of its references."""
+def _points(case: Case, refs: Sequence[reference_file.Reference]) -> list[tuple[float, float, float]]:
+    """Distinct operating points (rpm, airspeed, density): the case's own first, then those of its references."""
+    own = (case.rpm, case.airspeed_m_s, case.air().rho)
+    return list(dict.fromkeys([own, *((r.rpm, r.airspeed_m_s, r.density_kg_m3) for r in refs)]))
+
+
+def _conditions(case: Case, points: Sequence[tuple[float, float, float]], changed: Case) -> Conditions:
+    """Conditions of the points in a changed case: what a point shares with the case follows the change."""
     from bemt.bem.evaluate import air_arrays
 
-    own = case.air()
-    wanted = dict.fromkeys(
-        [(case.rpm, case.airspeed_m_s, own.rho), *((r.rpm, r.airspeed_m_s, r.density_kg_m3) for r in refs)]
-    )
-    points = list(wanted)
-    airs = [own if rho == own.rho else case.air({"air.density_kg_m3": rho}) for _, _, rho in points]
-    rpm, speed = (np.array([p[i] for p in points]) for i in (0, 1))
-    return points, (rpm, speed, air_arrays(airs, np.arange(len(airs))))
+    own = (case.rpm, case.airspeed_m_s, case.air().rho)
+    now, air = (changed.rpm, changed.airspeed_m_s), changed.air()
+    rpm, speed = (np.array([now[i] if p[i] == own[i] else p[i] for p in points]) for i in (0, 1))
+    airs = [air if p[2] == own[2] else changed.air({"air.density_kg_m3": p[2]}) for p in points]
+    return rpm, speed, air_arrays(airs, np.arange(len(airs)))
 
 
 def _references(case: Case) -> list[reference_file.Reference]:
@@ -187,26 +188,27 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
     from bemt.bem.evaluate import evaluate, k1k2, prepare
 
     refs = _references(case)
-    points, (rpm, speed, air) = _conditions(case, refs)
+    points = _points(case, refs)
     steps = 3 + sum(len(a.values) for a in case.assumptions)
     done = 0
 
-    def run(overrides: Overrides, stations: int | None = None, what: str = "") -> tuple[Any, Points]:
+    def run(changed: Case, stations: int | None = None, what: str = "") -> tuple[Any, Points]:
         nonlocal done
-        ready = prepare(case, overrides, stations)
-        changed = air if not any(k.startswith("air.") for k in overrides or {}) else case.air(overrides)
-        w = rpm if "operating.rpm" not in (overrides or {}) else np.full_like(rpm, overrides["operating.rpm"])  # type: ignore[index]
-        result = evaluate(ready, w, speed, changed, threads)
+        ready = prepare(changed, None, stations)
+        result = evaluate(ready, *_conditions(case, points, changed), threads)
         done += 1
         if progress is not None:
             progress(done, steps, what)
         return ready, result
 
-    ready, nominal = run(None, what="nominal")
-    stations = int(case.get("model.stations"))
-    _, refined = run(None, 2 * stations, "twice the stations")
+    def formula(changed: Case) -> Estimate:
+        return k1k2(changed, None, *_conditions(case, points, changed))
+
+    ready, nominal = run(case, what="nominal")
+    stations = case.file.model.stations
+    _, refined = run(case, 2 * stations, "twice the stations")
     bemt = _Model(_channels(nominal), _channels(refined))
-    simple = k1k2(case, None, rpm, speed, air)
+    simple = formula(case)
     area = {"thrust_N": simple.thrust_N, "CT": simple.CT}
     fit = _Model(area, None)
     for assumption in case.assumptions:
@@ -217,14 +219,15 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
                 runs.append(None)
                 fits.append(None)
                 continue
-            overrides = {assumption.key: option}
-            runs.append(_channels(run(overrides, what=assumption.key)[1]))
-            other = k1k2(case, overrides, rpm, speed, air)
+            changed = case.replaced({assumption.key: option})
+            runs.append(_channels(run(changed, what=assumption.key)[1]))
+            other = formula(changed)
             fits.append({"thrust_N": other.thrust_N, "CT": other.CT})
         bemt.add(assumption, runs)
         fit.add(assumption, fits)
-    without = list(case.get("model.also_without"))
-    less = run({"model.effects_off": [*case.get("model.effects_off"), *without]})[1] if without else None
+    without = case.file.model.also_without
+    off = {"model.effects_off": (*case.file.model.effects_off, *without)}
+    less = run(case.replaced(off))[1] if without else None
 
     rows: list[dict[str, Any]] = []
     variants: list[dict[str, Any]] = []
@@ -252,10 +255,10 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
                 converged=bool(less.converged[i]),
                 flags=[f"variant without {', '.join(without)}", *less.flags[i]], **state,
             ))  # fmt: skip
-    recorded = _recorded_rows(case, refs, ready.diameter_m, air, points, nominal)
+    recorded = _recorded_rows(case, refs, ready.diameter_m, points, nominal)
     models = {"bemt": bemt, "k1k2": fit}
     if less is not None:
-        models["bemt variant"] = _Model(_channels(less), {k: np.full(rpm.shape, np.nan) for k in PROPAGATED})
+        models["bemt variant"] = _Model(_channels(less), {k: np.full(len(points), np.nan) for k in PROPAGATED})
     comparisons = _comparisons(recorded, models)
     return {
         "name": case.name, "title": case.title, "kind": case.kind, "version": __version__,
@@ -269,15 +272,18 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
         "references": [{"quantity": r.quantity, "kind": r.kind, "printed": r.printed, "value": r.value, "u": r.u,
                         "channel": r.channel, "source": r.source, "remark": r.remark} for r in refs],
         "fan": _fan(case, ready, nominal, bemt) if case.ducted else None,
-        "notes": [*([str(case.document["notes"]).strip()] if case.document["notes"] else []), *ready.notes],
+        "notes": [*([case.file.notes.strip()] if case.file.notes else []), *ready.notes],
         "faults": [],
     }  # fmt: skip
 
 
 def _recorded_rows(
-    case: Case, refs: list[reference_file.Reference], diameter: float, air: Air,
-    points: list[tuple[float, float, float]], nominal: Points,
-) -> list[dict[str, Any]]:  # fmt: skip
+    case: Case,
+    refs: list[reference_file.Reference],
+    diameter: float,
+    points: list[tuple[float, float, float]],
+    nominal: Points,
+) -> list[dict[str, Any]]:
     """Rows of all recorded values, coefficients derived."""
     rows = []
     printed = {r.where: r.printed for r in refs}
@@ -334,10 +340,10 @@ def _description(case: Case, ready: Any, stations: int) -> dict[str, Any]:
     return {
         "rpm": case.rpm, "airspeed_m_s": case.airspeed_m_s, "density_kg_m3": air.rho,
         "temperature_C": air.temperature_K - 273.15, "a_sound_m_s": air.a_sound, "air": air.source,
-        "diameter_m": ready.diameter_m, "hub_diameter_m": ready.hub_diameter_m, "blades": int(case.get("rotor.blades")),
+        "diameter_m": ready.diameter_m, "hub_diameter_m": ready.hub_diameter_m, "blades": case.file.rotor.blades,
         "pitch_075R_m": ready.pitch_m, "solidity": ready.solidity, "stations": stations,
-        "effects": [effects.to_text(effect) for effect in ready.effects], "n_crit": case.get("model.n_crit"),
-        "drag_level": case.get("model.drag_level"),
+        "effects": [effects.to_text(effect) for effect in ready.effects], "n_crit": case.file.model.n_crit,
+        "drag_level": case.file.model.drag_level,
         "convention": "CT = T/(rho n^2 D^4), CP = P/(rho n^3 D^5)",
     }  # fmt: skip
 

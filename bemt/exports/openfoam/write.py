@@ -17,7 +17,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.tables import write_atomic
 from bemt.base.toml import Collector, Key, check_value
 from bemt.case import Case
-from bemt.case.schema import SCHEMA
+from bemt.case.schema import AIRSPEED, RPM
 from bemt.exports.openfoam import Body, Settings, Sweep, case_files, sector_choice
 from bemt.exports.openfoam.settings import MACH_COMPRESSIBLE
 from geometry.common import GeometryError
@@ -35,8 +35,8 @@ __all__ = ["RANGES", "Run", "check_run", "settings_of", "write_openfoam"]
 
 FACETS = 96  # of the centre body
 RANGES: dict[str, Key] = {
-    "rpm": SCHEMA["operating"]["rpm"],
-    "airspeed_m_s": replace(SCHEMA["operating"]["airspeed_m_s"], low=0.0),  # backward flight has no inlet
+    "rpm": RPM,
+    "airspeed_m_s": replace(AIRSPEED, low=0.0),  # backward flight has no inlet
     "sideslip_deg": Key(unit="deg", low=0, high=90),
     "level": Key(low=4, high=9),
 }
