@@ -36,7 +36,7 @@ KINDS = ("bemt", "k1k2", "cfd", "bench", "vendor")
 
 ORIGINS = ("random", "session", "input", "model", "numerics")
 """Where an uncertainty comes from: scatter of points, what a session shares (gain, zero), inputs not known exactly, the
- model's own error on real rotors, discretisation."""
+model's own error on real rotors, discretisation."""
 
 DIMENSIONLESS = frozenset(
     {"CT", "CP", "CQ", "J", "eta", "FM", "Re", "M_tip", "M_tip_helical", "throttle", "duct_share", "run"}
@@ -473,7 +473,7 @@ def from_pandas(frame: pd.DataFrame, kind: str = "bench", name: str = "table", *
     ----------
     frame : pandas.DataFrame
         Columns ``rpm``, coefficients, or names that end in a unit (``thrust_N``, ``thrust_gf``, ``airspeed_km_h``);
-        they are converted to SI by that suffix. ``u_<column>`` is a standard uncertainty, ``flags`` words joined by "; ".
+        they are converted to SI by it. ``u_<column>`` is a standard uncertainty, ``flags`` words joined by "; ".
     kind, name : str
         As for :class:`Dataset`.
     **more
