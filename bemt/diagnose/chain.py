@@ -112,11 +112,7 @@ def diagnose(
     Diagnosis
         The answer.
     """
-    import scipy.linalg  # noqa: F401 - brings its own BLAS, which must be loaded before its threads can be limited
-    from threadpoolctl import threadpool_limits
-
-    # matrices of a few hundred rows: more threads only wait for each other, badly so on a busy machine
-    with threadpool_limits(1, "blas"):
+    with evidence.one_thread():
         return _diagnose(records, cases, only, progress or (lambda _: None), nulls, baseline)
 
 

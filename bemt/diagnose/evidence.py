@@ -7,7 +7,8 @@ done for all settings of the covariance and added up with their prior weights.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -31,6 +32,19 @@ Array = NDArray[np.float64]
 _DROP = 8.0
 _KEEP = 6
 _PAIR_LEADERS = 60
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Keep linear algebra to one thread: with a few hundred rows more only wait for each other, on a busy machine long.
+
+    scipy brings a BLAS of its own, which can only be limited once it is loaded.
+    """
+    import scipy.linalg  # noqa: F401
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1, "blas"):
+        yield
 
 
 def log_mean(log_values: Array, log_weights: Array, axis: int = -1) -> Array:
@@ -315,6 +329,8 @@ class _Table:
                 x = P[: forms.width[k]] @ rest[:, span]
                 out[span] += 0.5 * np.einsum("qg,qg->g", x, x) - forms.half_log_det[k]
         return out
+
+
 def _leading(log_z: dict[Hyper, dict[str, float]]) -> list[Hyper]:
     """Settings of the covariance under which some explanation is good."""
     hypers = list(log_z)
