@@ -112,10 +112,7 @@ def diagnose(
     Diagnosis
         The answer.
     """
-    from threadpoolctl import threadpool_limits
-
-    # matrices of a few hundred rows: more threads only wait for each other, badly so on a busy machine
-    with threadpool_limits(1, "blas"):
+    with evidence.one_thread():
         return _diagnose(records, cases, only, progress or (lambda _: None), nulls, baseline)
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.diagnose.form import Form, form_modes
+from bemt.diagnose.form import Form, Forms, form_modes
 
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence, State
@@ -78,12 +78,17 @@ def distance(state: State, s: Array, span: slice, form: Form | None = None) -> f
     float
         In standard deviations [1].
     """
-    d = s[:, None] - state.S[:, span]
+    square = _squares(s[:, None] - state.S[:, span], form)
+    return float(np.sqrt(max(float(np.min(square)), 0.0)))
+
+
+def _squares(d: Array, form: Form | None) -> Array:
+    """Squared lengths of whitened differences (M, n), less what the form of an effect may be, (n,)."""
     square = np.sum(d * d, axis=0)
     if form is not None:
         p = form.project(d)
         square = square - np.sum(p * p, axis=0)
-    return float(np.sqrt(max(float(np.min(square)), 0.0)))
+    return np.asarray(square)
 
 
 def confusion(found: Evidence, settings: dict[str, int] | None = None) -> Confusion:
@@ -105,12 +110,17 @@ def confusion(found: Evidence, settings: dict[str, int] | None = None) -> Confus
     ids = tuple(c.id for c in found.candidates)
     chosen = [state.S[:, found.spans[c.id].start + (settings or {}).get(c.id, c.middle)] for c in found.candidates]
     size = np.array([float(np.sqrt(s @ s)) for s in chosen])
-    modes = form_modes(found.problem, found.candidates)
     settings = settings or {}
-    forms = {c.id: Form.of(state.white, c, settings.get(c.id, c.middle), modes[c.id])
-             for c in found.candidates}  # fmt: skip
-    matrix = np.array([[0.0 if a == b else distance(state, s, found.spans[b], forms[a]) for b in ids]
-                       for a, s in zip(ids, chosen, strict=True)]).reshape(len(ids), len(ids))  # fmt: skip
+    modes = form_modes(found.problem, found.candidates)
+    at = [settings.get(c.id, c.middle) for c in found.candidates]
+    matrix = np.zeros((len(ids), len(ids)))
+    if ids:
+        forms = Forms.of(state.white, found.candidates, at, [modes[i] for i in ids])
+        starts = [found.spans[i].start for i in ids]
+        for k, s in enumerate(chosen):
+            square = _squares(s[:, None] - state.S, forms[k])
+            matrix[k] = np.sqrt(np.maximum(np.minimum.reduceat(square, starts), 0.0))
+        np.fill_diagonal(matrix, 0.0)
     return Confusion(ids, size, matrix)
 
 

@@ -7,7 +7,8 @@ done for all settings of the covariance and added up with their prior weights.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.diagnose import form, noise, prior
-from bemt.diagnose.form import Form
+from bemt.diagnose.form import Form, Forms
 from bemt.diagnose.prior import NONE, UNKNOWN
 
 if TYPE_CHECKING:
@@ -31,6 +32,19 @@ Array = NDArray[np.float64]
 _DROP = 8.0
 _KEEP = 6
 _PAIR_LEADERS = 60
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Keep linear algebra to one thread: with a few hundred rows more only wait for each other, on a busy machine long.
+
+    scipy brings a BLAS of its own, which can only be limited once it is loaded.
+    """
+    import scipy.linalg  # noqa: F401
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1, "blas"):
+        yield
 
 
 def log_mean(log_values: Array, log_weights: Array, axis: int = -1) -> Array:
@@ -185,17 +199,13 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
     """
     r = problem.residual
     spans, S, log_w = _stacked(problem, candidates)
-    some = _few(candidates)
-    few = {c.id: slice(*np.searchsorted(some, [spans[c.id].start, spans[c.id].stop])) for c in candidates}
     covariance = dict(noise.covariances(problem))
     modes = form.form_modes(problem, candidates)
-    every = np.arange(log_w.size)
     # a few settings of each effect are enough to see which covariances matter
-    coarse = [
-        _state(problem, h, C, S[:, some], few, log_w[some], modes, candidates, some) for h, C in covariance.items()
-    ]
-    kept = [s.hyper for s in _leading(coarse)]
-    states = [_state(problem, h, covariance[h], S, spans, log_w, modes, candidates, every) for h in kept]
+    coarse = _Table(problem, S, log_w, spans, candidates, modes, _few(candidates))
+    best = {h: coarse.state(h, C).log_z for h, C in covariance.items()}
+    fine = _Table(problem, S, log_w, spans, candidates, modes, None)
+    states = [fine.state(h, covariance[h]) for h in _leading(best)]
     kernels = noise.rivals(problem)
     for state in states:
         state.rivals = [(name, noise.whitener(covariance[state.hyper] + K, problem.u)) for name, K in kernels]
@@ -256,37 +266,81 @@ def _few(candidates: Sequence[Candidate], most: int = 9) -> NDArray[np.intp]:
     return np.concatenate([np.zeros(0, dtype=np.intp), *out])
 
 
-def _state(
-    problem: Problem, h: Hyper, C: Array, S: Array, spans: dict[str, slice], log_w: Array, modes: dict[str, Array],
-    candidates: Sequence[Candidate], columns: NDArray[np.intp],
-) -> State:  # fmt: skip
-    """Whitened readings and the evidence of none and of every single effect."""
-    white = noise.whitener(C, problem.u)
-    w = white(np.column_stack([problem.residual, S]))
-    rw, Sw = w[:, 0], w[:, 1:]
-    state = State(h, white, rw, Sw, 0.5 * np.sum(Sw * Sw, axis=0))
-    state.log_z[NONE] = none = -0.5 * float(rw @ rw) - white.log_det
-    R = rw[:, None]
-    first = 0
-    for c in candidates:
-        span = spans[c.id]
-        for _ in range(2):  # the form follows the size of the best setting, which depends on the form
-            best = span.start + int(np.argmax(state.gains(c.id, span, R)[:, 0] + log_w[span]))
-            state.forms[c.id] = Form.of(white, c, int(columns[best]) - first, modes[c.id], rw)
-        first += c.weight.size
-    for name, gain in singles(state, R, spans, log_w).items():
-        state.log_z[name] = none + float(gain[0])
-    return state
+class _Table:
+    """Settings of all candidates, or some of each, laid out so that one covariance weighs them in a few products."""
+
+    def __init__(
+        self, problem: Problem, S: Array, log_w: Array, spans: dict[str, slice], candidates: Sequence[Candidate],
+        modes: dict[str, Array], some: NDArray[np.intp] | None,
+    ) -> None:  # fmt: skip
+        self.problem, self.candidates = problem, candidates
+        self.modes = [modes[c.id] for c in candidates]
+        columns = np.arange(log_w.size) if some is None else some
+        self.vectors = np.column_stack([problem.residual, S[:, columns]])
+        self.log_w = log_w[columns]
+        self.starts = np.array([spans[c.id].start for c in candidates], dtype=np.intp)
+        ends = [[spans[c.id].start, spans[c.id].stop] for c in candidates]
+        self.spans = {c.id: slice(*np.searchsorted(columns, e)) for c, e in zip(candidates, ends, strict=True)}
+        self.columns = columns
+
+    def state(self, h: Hyper, C: Array) -> State:
+        """Whitened readings and the evidence of none and of every single effect."""
+        white = noise.whitener(C, self.problem.u)
+        w = white(self.vectors)
+        r, S = w[:, 0], w[:, 1:]
+        state = State(h, white, r, S, 0.5 * np.sum(S * S, axis=0))
+        state.log_z[NONE] = none = -0.5 * float(r @ r) - white.log_det
+        if not self.candidates:
+            return state
+        base = S.T @ r - state.half
+        # the form follows the size of the best setting, which depends on the form
+        best = self._best(base)
+        rest = r[:, None] - S
+        forms = self._forms(white, best, rest)
+        gain = self._gain(base, forms, rest)
+        again = self._best(gain)
+        moved = np.flatnonzero(again != best)
+        if moved.size:
+            forms = forms.replaced(moved, self._forms(white, again, rest, moved))
+            gain = self._gain(base, forms, rest)
+        for k, (name, span) in enumerate(self.spans.items()):
+            state.forms[name] = forms[k]
+            state.log_z[name] = none + float(log_mean(gain[span], self.log_w[span]))
+        return state
+
+    def _best(self, gain: Array) -> NDArray[np.intp]:
+        """Column of the best setting of each candidate."""
+        total = gain + self.log_w
+        return np.array([s.start + int(np.argmax(total[s])) for s in self.spans.values()], dtype=np.intp)
+
+    def _forms(self, white: Whitener, at: NDArray[np.intp], rest: Array, some: NDArray[np.intp] | None = None) -> Forms:
+        """Error of the form at the best settings of all candidates, or of some."""
+        which = range(len(self.candidates)) if some is None else some.tolist()
+        settings = [int(self.columns[at[k]] - self.starts[k]) for k in which]
+        columns = at if some is None else at[some]
+        return Forms.of(white, [self.candidates[k] for k in which], settings, [self.modes[k] for k in which],
+                        rest[:, columns])  # fmt: skip
+
+    def _gain(self, base: Array, forms: Forms, rest: Array) -> Array:
+        """Log likelihood over that of "none" of every setting, its form taken into account."""
+        out = base.copy()
+        for k, (P, span) in enumerate(zip(forms.projectors(), self.spans.values(), strict=True)):
+            if forms.width[k]:
+                x = P[: forms.width[k]] @ rest[:, span]
+                out[span] += 0.5 * np.einsum("qg,qg->g", x, x) - forms.half_log_det[k]
+        return out
 
 
-def _leading(states: list[State]) -> list[State]:
+def _leading(log_z: dict[Hyper, dict[str, float]]) -> list[Hyper]:
     """Settings of the covariance under which some explanation is good."""
-    score = np.array([max(s.log_z.values()) + np.log(s.hyper.weight) for s in states])
+    hypers = list(log_z)
+    weight = np.log([h.weight for h in hypers])
+    score = np.array([max(log_z[h].values()) for h in hypers]) + weight
     order = np.argsort(-score)[:_KEEP]
     chosen = [int(i) for i in order if score[i] > score[order[0]] - _DROP]
     # the best setting for "none" stays in, so that "none" is judged at its best
-    none = int(np.argmax([s.log_z[NONE] + np.log(s.hyper.weight) for s in states]))
-    return [states[i] for i in dict.fromkeys([*chosen, none])]
+    none = int(np.argmax(np.array([log_z[h][NONE] for h in hypers]) + weight))
+    return [hypers[i] for i in dict.fromkeys([*chosen, none])]
 
 
 def _pairs(state: State, spans: dict[str, slice], log_w: Array) -> None:

@@ -241,15 +241,26 @@ def refined(found: Evidence, best: Fit, share: float = 0.9) -> tuple[Fit, dict[s
 
 def _truncated(mean: Array, sigma: Array, low: Array, high: Array, share: float) -> tuple[Array, tuple[Array, Array]]:
     """Medians and ends of the interval of normal distributions that end at physical bounds."""
-    from scipy.stats import truncnorm
-
     if not mean.size:
         return mean, (mean, mean)
     sigma = np.clip(sigma, 1e-9 * (high - low), 1e3 * (high - low))
     # further out than this the distribution is an exponential at the bound, and its tail numbers underflow
     mean = np.clip(mean, low - 8.0 * sigma, high + 8.0 * sigma)
-    law = truncnorm((low - mean) / sigma, (high - mean) / sigma, loc=mean, scale=sigma)
-    return law.ppf(0.5), (law.ppf(0.5 - share / 2), law.ppf(0.5 + share / 2))
+    a, b = (low - mean) / sigma, (high - mean) / sigma
+    middle, first, last = (mean + sigma * _quantile(q, a, b) for q in (0.5, 0.5 - share / 2, 0.5 + share / 2))
+    return middle, (first, last)
+
+
+def _quantile(q: float, a: Array, b: Array) -> Array:
+    """Quantile of the standard normal distribution between a and b, from the side on which its tail is smaller."""
+    from scipy.special import log_ndtr, ndtri_exp
+
+    right = a > 0.0  # mirrored, so that the tail that counts is the left one
+    low, high, part = np.where(right, -b, a), np.where(right, -a, b), np.where(right, 1.0 - q, q)
+    below, above = log_ndtr(low), log_ndtr(high)
+    inside = above + np.log1p(-np.exp(below - above))
+    x = ndtri_exp(np.minimum(np.logaddexp(below, np.log(part) + inside), 0.0))
+    return np.asarray(np.clip(np.where(right, -x, x), a, b))
 
 
 def _continuous(id_: str, setting: dict[str, Any]) -> list[Any]:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from bemt.diagnose.problem import Problem
     from bemt.diagnose.signatures import Candidate
 
-__all__ = ["FORM", "Form", "form_modes"]
+__all__ = ["FORM", "Form", "Forms", "form_modes"]
 
 Array = NDArray[np.float64]
 
@@ -46,45 +46,6 @@ class Form:
     root: Array
     size: float = 0.0
 
-    @classmethod
-    def of(
-        cls, white: Whitener, candidate: Candidate, g: int, modes: Array, r: Array | None = None, size: float = 0.0
-    ) -> Form:
-        """Modes times the size of a signature, and what lies between it and its neighbours on the grid, whitened.
-
-        Parameters
-        ----------
-        white : Whitener
-            Covariance of the readings.
-        candidate : Candidate
-            Effect.
-        g : int
-            Its setting.
-        modes : (M, q) float
-            Of :func:`form_modes` [1].
-        r : (M,) float, optional
-            Whitened residual; the size of the form is then that which explains it best [1].
-        size : float
-            Standard deviation of the form without a residual, 0 for the smallest, share of the effect's size [1].
-
-        Returns
-        -------
-        Form
-            Whitened.
-        """
-        signature = candidate.signatures[:, g]
-        shape, between = white(signature[:, None] * modes), white(candidate.between(g))
-
-        def sized(f: float) -> Form:
-            B = np.column_stack([f * shape, between])
-            return cls(B, np.asarray(np.linalg.cholesky(np.eye(B.shape[1]) + B.T @ B), dtype=float), f)
-
-        if r is None or not shape.shape[1]:
-            return sized(size or min(FORM))
-        d = r - white(signature)
-        forms = [sized(f) for f in FORM]
-        return max(forms, key=lambda f: 0.5 * float(np.sum(f.project(d) ** 2)) - f.half_log_det)
-
     def project(self, x: Array) -> Array:
         """Part of whitened vectors (M,) or (M, n) that the form may explain, (q,) or (q, n)."""
         from scipy.linalg import solve_triangular
@@ -97,6 +58,125 @@ class Form:
     def half_log_det(self) -> float:
         """Half the logarithm of the determinant of 1 + B^T B, less that of the prior weight of the size."""
         return float(np.sum(np.log(np.diag(self.root)))) - float(np.log(FORM.get(self.size, 1.0)))
+
+
+@dataclass(frozen=True, eq=False)
+class Forms:
+    """Errors of the forms of several effects at a time, side by side: columns that an effect does not have are zero.
+
+    Attributes
+    ----------
+    B : (C, M, Q) float
+        Whitened modes of unit size, then what lies between a setting and its neighbours on the grid [1].
+    size : (C,) float
+        Standard deviation of each form, share of the effect's size [1].
+    scale : (C, Q) float
+        Size of each column: that of the form, 1 for what lies between settings and for columns that are not there [1].
+    gram : (C, Q, Q) float
+        1 + B^T B with the columns scaled [1].
+    width : (C,) int
+        Columns that each effect has.
+    half_log_det : (C,) float
+        As that of :class:`Form`, 0 where an effect has no column [1].
+    """
+
+    B: Array
+    size: Array
+    scale: Array
+    gram: Array
+    width: NDArray[np.intp]
+    half_log_det: Array
+
+    @classmethod
+    def of(
+        cls, white: Whitener, candidates: Sequence[Candidate], at: Sequence[int], modes: Sequence[Array],
+        d: Array | None = None,
+    ) -> Forms:  # fmt: skip
+        """Modes times the size of a signature, and what lies between it and its neighbours on the grid, whitened.
+
+        Parameters
+        ----------
+        white : Whitener
+            Covariance of the readings.
+        candidates : sequence of Candidate
+            C effects.
+        at : sequence of int
+            Setting of each.
+        modes : sequence of (M, q) float
+            Of :func:`form_modes`, for each [1].
+        d : (M, C) float, optional
+            Whitened residual less the signature of each: the size of a form is then that which explains it best,
+            else the smallest [1].
+
+        Returns
+        -------
+        Forms
+            Whitened.
+        """
+        shapes = [c.signatures[:, g, None] * m for c, g, m in zip(candidates, at, modes, strict=True)]
+        betweens = [c.between(g) for c, g in zip(candidates, at, strict=True)]
+        q = np.array([x.shape[1] for x in shapes], dtype=np.intp)
+        width = q + np.array([x.shape[1] for x in betweens], dtype=np.intp)
+        flat = white(np.concatenate([x for both in zip(shapes, betweens, strict=True) for x in both], axis=1))
+        C, Q = len(shapes), int(width.max(initial=0))
+        there = np.arange(Q) < width[:, None]
+        B = np.zeros((C, Q, flat.shape[0]))
+        B[there] = flat.T
+        plain = B @ B.transpose(0, 2, 1)
+        sizes, half, gram, scale = _sizes(plain, q, width)
+        if d is None:
+            best = np.zeros(C, dtype=np.intp)
+        else:
+            x = scale[..., None] * np.matmul(B, d.T[:, :, None])
+            gain = 0.5 * np.sum(x * np.linalg.solve(gram, x), axis=(2, 3)) - half
+            best = np.where(q > 0, np.argmax(gain, axis=0), 0)
+        k = np.arange(C)
+        return cls(B.transpose(0, 2, 1), sizes[best], scale[best, k], gram[best, k], width,
+                   np.where(width > 0, half[best, k], 0.0))  # fmt: skip
+
+    def projectors(self) -> Array:
+        """What takes whitened vectors to the part that each form may explain, (C, Q, M)."""
+        root = np.linalg.cholesky(self.gram)
+        return np.linalg.solve(root, self.scale[:, :, None] * self.B.transpose(0, 2, 1))
+
+    def replaced(self, where: NDArray[np.intp], other: Forms) -> Forms:
+        """The same with some effects taken from another one that has only these."""
+        Q, Qo = self.B.shape[2], other.B.shape[2]
+        if Qo < Q:
+            other = other._padded(Q)
+        mine = self._padded(Qo) if Qo > Q else self
+
+        def put(a: Array, b: Array) -> Array:
+            out = a.copy()
+            out[where] = b
+            return out
+
+        return Forms(*(put(getattr(mine, n), getattr(other, n)) for n in
+                       ("B", "size", "scale", "gram", "width", "half_log_det")))  # type: ignore[arg-type]  # fmt: skip
+
+    def _padded(self, Q: int) -> Forms:
+        C, M, q = self.B.shape
+        B, scale, gram = np.zeros((C, M, Q)), np.ones((C, Q)), np.tile(np.eye(Q), (C, 1, 1))
+        B[:, :, :q], scale[:, :q], gram[:, :q, :q] = self.B, self.scale, self.gram
+        return Forms(B, self.size, scale, gram, self.width, self.half_log_det)
+
+    def __getitem__(self, k: int) -> Form:
+        """Form of one effect."""
+        w = int(self.width[k])
+        B = self.B[k, :, :w] * self.scale[k, :w]
+        return Form(B, np.asarray(np.linalg.cholesky(self.gram[k, :w, :w]), dtype=float), float(self.size[k]))
+
+
+def _sizes(plain: Array, q: NDArray[np.intp], width: NDArray[np.intp]) -> tuple[Array, Array, Array, Array]:
+    """Sizes of a form, smallest first, and for each: half log determinant (F, C), 1 + B^T B, scale of the columns."""
+    sizes = np.array(sorted(FORM))
+    C, Q = plain.shape[:2]
+    shape = np.arange(Q) < q[:, None]
+    scale = np.where(shape, sizes[:, None, None], 1.0)
+    gram = np.eye(Q) + scale[..., None] * plain * scale[:, :, None, :]
+    root = np.linalg.cholesky(gram)
+    half = np.sum(np.log(np.diagonal(root, axis1=2, axis2=3)), axis=2)
+    return sizes, half - np.log([FORM[float(f)] for f in sizes])[:, None], gram, scale
 
 
 def form_modes(problem: Problem, candidates: Sequence[Candidate]) -> dict[str, Array]:

@@ -130,9 +130,7 @@ def plan(record: Record, case: Case, progress: Callable[[str], None] | None = No
     Plan
         Sizes, distances, a run to add.
     """
-    from threadpoolctl import threadpool_limits
-
-    with threadpool_limits(1, "blas"):
+    with evidence.one_thread():
         return _plan(record, case, progress)
 
 

@@ -7,7 +7,7 @@ fixed set of vectors, for the recording and for hundreds of bootstrapped nulls a
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import product
 from typing import TYPE_CHECKING, Any
@@ -54,6 +54,7 @@ class Candidate:
     signatures: Array
     weight: Array
     solved: NDArray[np.bool_]
+    _between: dict[int, Array] = field(default_factory=dict, repr=False)
 
     @property
     def kind(self) -> str:
@@ -73,6 +74,11 @@ class Candidate:
         (M, k) float
             For parameters that may take any value; what the grid leaves out, in the unit of each reading.
         """
+        if g not in self._between:
+            self._between[g] = self._steps(g)
+        return self._between[g]
+
+    def _steps(self, g: int) -> Array:
         discrete = effects.catalogue()[self.id].discrete
         columns = []
         for key, value in self.settings[g].items():

@@ -111,9 +111,8 @@ def _options(part: Part) -> list[_Option]:
     return out
 
 
-def _extended(problem: Problem, option: _Option) -> Problem:
-    """Plan with the option's points appended to the first recording; readings are those of the baseline."""
-    part = problem.parts[0]
+def _extended(part: Part, option: _Option) -> Problem:
+    """Plan with the option's points appended to a recording; readings are those of the baseline."""
     old = part.record
     air_now = {k: float(np.median(getattr(old.air, k))) for k in ("rho", "mu", "a_sound", "temperature_K")}
     air = {k: np.full(option.rpm.size, v * option.change.get(k, 1.0)) for k, v in air_now.items()}
@@ -193,9 +192,12 @@ def suggest(
     alone = assemble_alone(problem)
     now = _distance(alone, hyper, *signatures(alone))
     best: tuple[float, _Option | None] = (now, None)
-    for option in _options(problem.parts[0]):
+    # all runs are solved with the same few dozen rotors: each is prepared once
+    part = problem.parts[0]
+    part = replace(part, model=replace(part.model, _kept={}))
+    for option in _options(part):
         try:
-            extended = _extended(problem, option)
+            extended = _extended(part, option)
             a, b = signatures(extended)
         except (ValueError, FloatingPointError):
             continue
