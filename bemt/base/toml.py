@@ -2,7 +2,8 @@
 
 A file is a :class:`Table` (a pydantic model) whose fields say in a :class:`Key` what they may hold; :func:`validated`
 gives the model or every fault. Units live in the key names (``diameter_in``); a suspicious value (127 in a key that
-ends in ``_in``) is refused with a hint, never converted. Files that are not cases use tables of Keys (:func:`check_table`).
+ends in ``_in``) is refused with a hint, never converted. Files that are no cases use tables of Keys
+(:func:`check_table`).
 """
 
 from __future__ import annotations
