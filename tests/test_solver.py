@@ -81,7 +81,7 @@ def test_mass_flow_joins_its_neighbours_smoothly() -> None:
             assert 4.0 * run(y)[0] * a == pytest.approx(8 / 9 - 4 / 9 * a + 14 / 9 * a * a)
 
 
-def residual(ducted: bool, full: bool) -> Any:
+def residual_of(ducted: bool, full: bool) -> Any:
     """Compiled residual of station k: g, dg/dphi, cl, cd, ..."""
     element = R.ducted_rotor if ducted else R.open_rotor
     lookup = R.lookup_full if full else R.lookup_plain
@@ -119,7 +119,7 @@ def test_slope_of_the_residual(rotor: Rotor, ducted: bool, full: bool, off: str)
     prep = solver.prepare(rotor, [(0.7, polar)], effects, DUCT if ducted else None, n_stations=9)
     _, st, tab, par = prep.kernel
     assert (prep.tab.shape[1:3] == (1, 1)) != full
-    run, rng = residual(ducted, full), np.random.default_rng(2)
+    run, rng = residual_of(ducted, full), np.random.default_rng(2)
     zones = set()
     for _ in range(4000):
         k, Omega, V = int(rng.integers(9)), rng.uniform(100.0, 2500.0), rng.choice([0.0, rng.uniform(-30.0, 60.0)])
