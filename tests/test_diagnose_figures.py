@@ -14,6 +14,7 @@ from bemt.bem import evaluate
 from bemt.case import load_case
 from bemt.dataset import Dataset
 from bemt.diagnose import canvas, chain, confusion, figures, figures_effects, fit, record
+from bemt.diagnose.explanation import NONE, Explanation
 
 ALL = set(figures.NAMES)
 LEFT_OUT = "compressibility"
@@ -38,7 +39,7 @@ def named(project: Path) -> chain.Diagnosis:
 
 def seen_as(answer: chain.Diagnosis, verdict: str, effects: tuple[str, ...]) -> chain.Diagnosis:
     """The same readings with another answer."""
-    name = "+".join(effects[:2] if verdict == "named" else effects[:1]) or "none"
+    name = Explanation.of(*(effects[:2] if verdict == "named" else effects[:1]))
     best = fit.fit(answer.found, name)
     decision = replace(answer.decision, verdict=verdict, effects=effects, leading=name)
     parameters = fit.intervals(answer.found, name) if best.ids else {}
@@ -98,7 +99,8 @@ def test_labels_of_the_ranking_do_not_run_into_each_other(named: chain.Diagnosis
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    weights = dict(zip(("none", "untwist", "pitch_offset", "thrust_gain"), odds, strict=False))
+    what = (NONE, *map(Explanation.of, ("untwist", "pitch_offset", "thrust_gain")))
+    weights = dict(zip(what, odds, strict=False))
     found = SimpleNamespace(probability=dict.fromkeys(weights, 1 / len(weights)), log_bayes=weights.__getitem__)
     with matplotlib.rc_context(figures.STYLE):
         figure = figures_effects.ranking(SimpleNamespace(found=found, decision=named.decision, p_value=0.2))  # type: ignore[arg-type]
@@ -126,9 +128,10 @@ def test_the_loads_on_the_blade_add_up_to_the_signature(named: chain.Diagnosis) 
 
 @pytest.mark.parametrize("name", ["pitch_offset", "thrust_gain", "pitch_offset+thrust_gain"])
 def test_the_posterior_that_is_drawn_is_the_one_of_the_intervals(named: chain.Diagnosis, name: str) -> None:
-    weights = fit.weights(named.found, name)
-    intervals = fit.intervals(named.found, name)
-    assert set(weights) == set(intervals) == set(name.split("+"))
+    what = Explanation.of(*name.split("+"))
+    weights = fit.weights(named.found, what)
+    intervals = fit.intervals(named.found, what)
+    assert set(weights) == set(intervals) == what.ids
     for i, p in weights.items():
         assert p.sum() == pytest.approx(1.0)
         ((key, interval),) = intervals[i].items()

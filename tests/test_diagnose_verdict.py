@@ -13,6 +13,7 @@ from diagnosing import case, diagnose, left_out, points, recording
 from bemt import effects
 from bemt.bem import forward
 from bemt.diagnose import blocks, chain, confusion, fit, prior, verdict
+from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
 
 
 @pytest.fixture(scope="module")
@@ -20,9 +21,14 @@ def answer() -> chain.Diagnosis:
     return diagnose(recording(case(), points("grid")), left_out("compressibility", case()))
 
 
+def explained(words: str) -> Explanation:
+    return {"none": NONE, "unknown": UNKNOWN}.get(words, Explanation.of(*words.split("__")))
+
+
 def told(answer: chain.Diagnosis, **probability: float) -> verdict.Decision:
     """Decision if the explanations had these probabilities; "a__b" is a pair."""
-    share = dict.fromkeys(answer.found.probability, 0.0) | {k.replace("__", "+"): v for k, v in probability.items()}
+    given = {explained(k): v for k, v in probability.items()}
+    share = dict.fromkeys(answer.found.probability, 0.0) | given
     return verdict.decide(replace(answer.found, probability=share), 0.002)
 
 
@@ -47,7 +53,7 @@ def test_a_few_explanations_are_an_answer_and_many_are_not(answer: chain.Diagnos
 
 def test_what_is_on_already_is_not_what_was_left_out(answer: chain.Diagnosis) -> None:
     assert "tip_loss" in {e.id for e in answer.problem.baseline}
-    assert answer.found.log_bayes("tip_loss") < verdict.PROVEN
+    assert answer.found.log_bayes(Explanation.of("tip_loss")) < verdict.PROVEN
     assert told(answer, tip_loss=0.99).verdict in ("insufficient", "unknown")
 
 
@@ -62,24 +68,25 @@ def test_physics_that_is_on_is_wrong_at_the_end_of_its_range(
     """Not where the end of the range is "off", nor at the value that it is on with."""
     found: Any = SimpleNamespace(problem=SimpleNamespace(baseline=(effects.catalogue()["ground_effect"](),)))
     monkeypatch.setattr(fit, "fit", lambda *_: SimpleNamespace(settings=(setting,)))
-    assert verdict._leaves_its_range(found, "ground_effect") == beyond
+    asked: Any = SimpleNamespace(found=found, leading=Explanation.of("ground_effect"))
+    assert verdict._leaves_its_range(asked) == beyond
 
 
 @pytest.mark.parametrize(
     ("first", "adds", "rest", "left"),
-    [("unit_slip", 20.0, 3.9, "unit_slip+untwist"), ("unit_slip", 20.0, 4.1, "unit_slip"),
-     ("unit_slip", 60.0, 4.1, "unit_slip+untwist"), ("duct", 20.0, 4.1, "duct+untwist")],
+    [("unit_slip", 20.0, 3.9, "unit_slip__untwist"), ("unit_slip", 20.0, 4.1, "unit_slip"),
+     ("unit_slip", 60.0, 4.1, "unit_slip__untwist"), ("duct", 20.0, 4.1, "duct__untwist")],
 )  # fmt: skip
 def test_what_is_named_beside_a_slip_explains_its_own(
     first: str, adds: float, rest: float, left: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A slip explains so much that any rest is small beside it; the second effect may not hide behind that."""
-    pair = f"{first}+untwist"
-    weights = {first: 1000.0, "untwist": 5.0, pair: 1000.0 + adds}
+    pair = Explanation.of(first, "untwist")
+    weights = {Explanation.of(first): 1000.0, Explanation.of("untwist"): 5.0, pair: 1000.0 + adds}
     found: Any = SimpleNamespace(problem=None, log_bayes=weights.__getitem__)
     monkeypatch.setattr(prior, "prior_weights", lambda _, ids: dict.fromkeys(ids, 1.0))
     leading, share = verdict._earned(found, pair, {first: 1.0, "untwist": 0.99}, rest)
-    assert leading == left and share["untwist"] == (0.99 if left == pair else 0.0)
+    assert leading == explained(left) and share["untwist"] == (0.99 if leading == pair else 0.0)
 
 
 def test_the_nearest_signature_is_a_baseline_of_its_own(answer: chain.Diagnosis) -> None:
@@ -118,3 +125,46 @@ def test_a_wrong_airspeed_is_that_of_the_tunnel_not_of_the_wall(answer: chain.Di
         return forward.respond(part.model.prepared, (*part.baseline, *extra), still)[0].T
 
     assert np.array_equal(thrust(wall, slip), thrust(wall)) and np.all(thrust(wall) > thrust())
+
+
+def asked(**changed: Any) -> Any:
+    """What an outcome without a doubt would answer, one effect being sure, but for what is changed."""
+    lead = Explanation.of("reynolds")
+    plain = {
+        "first": lead, "leading": lead, "rest": 0.0, "odds": 100.0, "needed": 8.0, "p_value": 0.002, "on": False,
+        "expected": False, "paired": False, "sure": ("reynolds",), "group": ("reynolds",), "beside": (), "few": (),
+        "P": {NONE: 0.0, UNKNOWN: 0.0, lead: 1.0}, "share": {"reynolds": 1.0},
+    }  # fmt: skip
+    return SimpleNamespace(
+        **(plain | changed), found=SimpleNamespace(log_bayes=lambda _: 100.0, probability={lead: 1.0})
+    )
+
+
+ROWS: dict[str, dict[str, Any]] = {
+    "no effect can be seen": {"first": NONE},
+    "nulls look like it": {"p_value": 0.2},
+    "nulls nearly look like it": {"p_value": 0.03},
+    "nothing is likelier than anything": {"P": {NONE: 0.6, UNKNOWN: 0.0}},
+    "unknown is likelier than all": {"P": {NONE: 0.0, UNKNOWN: 0.6}},
+    "a smooth rest is left": {"rest": 10.5},
+    "not much better than nothing": {"odds": 7.0},
+    "twin faults": {"leading": Explanation.of("thrust_zero", "torque_drift")},
+    "several are sure": {"sure": ("reynolds", "duct")},
+    "one is sure": {},
+    "one is sure, another may be there": {"beside": ("duct",)},
+    "two at work": {"paired": True},
+    "look-alikes": {"sure": (), "group": ("reynolds", "torque_zero")},
+    "sure with its pairs": {"sure": ()},
+}
+
+
+@pytest.mark.parametrize("name", ROWS)
+def test_each_row_of_the_table_answers_when_it_alone_holds(name: str) -> None:
+    """The first row that holds is the one that was made to hold; take it away and a later one does."""
+    a = asked(**ROWS[name])
+    assert next(r.name for r in verdict.RULES if r.holds(a)) == name
+
+
+def test_the_table_says_where_each_row_comes_from_and_the_last_always_holds() -> None:
+    assert len({r.name for r in verdict.RULES}) == len(verdict.RULES) and all(r.source for r in verdict.RULES)
+    assert verdict.RULES[-1].holds(asked())

@@ -1,8 +1,7 @@
-"""Blocks of readings that are left out in turn, and what an explanation foretells of them."""
+"""Blocks of readings that are left out in turn, and what an explanation predicts of them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +12,7 @@ from bemt.diagnose.fit import fit, form_covariance
 
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence
+    from bemt.diagnose.explanation import Explanation
     from bemt.diagnose.problem import Problem
 
 __all__ = ["REFERENCE", "held_out", "partitions"]
@@ -73,14 +73,16 @@ def partitions(problem: Problem, most: int = 6) -> list[tuple[str, NDArray[np.in
     return [(f"intervals of {name}", whole(rank * min(4, count) // count))]
 
 
-def held_out(found: Evidence, name: str, split: tuple[str, NDArray[np.intp]] | None = None) -> tuple[str, Array, Array]:
+def held_out(
+    found: Evidence, what: Explanation, split: tuple[str, NDArray[np.intp]] | None = None
+) -> tuple[str, Array, Array]:
     """Predict every block from the others, with and without an explanation.
 
     Parameters
     ----------
     found : Evidence
         Outcome of the weighing.
-    name : str
+    what : Explanation
         Explanation.
     split : tuple, optional
         What the blocks are and the block of each point; the first of :func:`partitions` by default.
@@ -96,12 +98,11 @@ def held_out(found: Evidence, name: str, split: tuple[str, NDArray[np.intp]] | N
     hyper = found.states[0].hyper
     C = noise.covariance(problem, hyper)
     K = next((k for n, k in noise.rivals(problem) if n == found.states[0].best_rival), np.zeros_like(C))
-    ids = tuple(name.split("+")) if name not in ("none", "unknown") else ()
-    S, log_w = _columns(found, ids)
+    S, log_w = _columns(found, what)
     r = problem.residual
     after, smooth_part = np.array(problem.f0), np.array(problem.f0)
     systematic = C - hyper.scale**2 * noise.noise(problem, hyper.ar)
-    own = form_covariance(found, fit(found, name))
+    own = form_covariance(found, fit(found, what))
     for b in np.unique(member[member != REFERENCE]):
         test, train = member == b, member != b
         if not train.any():
@@ -118,15 +119,16 @@ def held_out(found: Evidence, name: str, split: tuple[str, NDArray[np.intp]] | N
     return words, after, smooth_part
 
 
-def _columns(found: Evidence, ids: Sequence[str]) -> tuple[Array, Array]:
+def _columns(found: Evidence, what: Explanation) -> tuple[Array, Array]:
     """Signatures of an explanation; of a pair the settings near the best one."""
     M = found.problem.y.size
+    ids = tuple(what)
     if not ids:
         return np.zeros((M, 0)), np.zeros(0)
     if len(ids) == 1:
         c = found.of(ids[0])
         return c.signatures, np.log(c.weight)
-    best = fit(found, "+".join(ids))
+    best = fit(found, what)
     a, b = (found.of(i) for i in ids)
     i, j = (col - found.spans[k].start for col, k in zip(best.columns, ids, strict=True))
     interaction = best.signature - a.signatures[:, i] - b.signatures[:, j]

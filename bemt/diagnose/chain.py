@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.diagnose import blocks, confusion, evidence, gate, prior, signatures, verdict
+from bemt.diagnose import blocks, confusion, evidence, gate, signatures, verdict
 from bemt.diagnose import fit as fitting
 from bemt.diagnose import locate as location
 from bemt.diagnose import suggest as suggestion
+from bemt.diagnose.explanation import NONE, Explanation
 from bemt.diagnose.problem import Problem, build
 from bemt.diagnose.record import CHANNELS
 
@@ -36,7 +37,7 @@ class Diagnosis:
     decision : Decision
         Verdict.
     best : Fit
-        Leading explanation at its best setting; no effects for "none".
+        Leading explanation at its best setting.
     parameters : dict
         Effect to parameter to value and 90 % interval, of the leading explanation.
     p_value : float
@@ -134,14 +135,13 @@ def _diagnose(
     decision = verdict.decide(found, p)
     best, parameters = fitting.refined(found, fitting.fit(found, decision.leading))
     say("held-out blocks")
-    words, held, gp_only = blocks.held_out(found, decision.leading if decision.verdict != "unknown" else "none")
-    if decision.verdict == "unknown":  # what is not in the library is foretold as what it is: something smooth
+    words, held, gp_only = blocks.held_out(found, decision.leading if decision.verdict != "unknown" else NONE)
+    if decision.verdict == "unknown":  # what is not in the library is predicted as what it is: something smooth
         held = gp_only
     smooth = fitting.smooth(found, best)
     after = problem.f0 + best.signature + smooth
     # without a verdict the likeliest explanation still says best which part of the mismatch is not calibration
-    listed = max((k for k in found.probability if k not in (prior.NONE, prior.UNKNOWN)),
-                 key=lambda k: found.probability[k], default=None)  # fmt: skip
+    listed = max((k for k in found.probability if k), key=lambda k: found.probability[k], default=None)
     where = location.locate(found, best if best.ids or listed is None else fitting.fit(found, listed))
     say("next measurement")
     return Diagnosis(
@@ -172,13 +172,14 @@ def _scores(found: evidence.Evidence, after: Array, held: Array, gp_only: Array)
 
 def _next(found: evidence.Evidence, decision: verdict.Decision, best: fitting.Fit) -> suggestion.Suggestion | None:
     """Run against the strongest rival of the leading explanation, "nothing" included where no name is given."""
-    singles = sorted((i for i in found.spans), key=lambda i: -found.probability[i])
+    single = {i: found.probability[Explanation.of(i)] for i in found.spans}
+    singles = sorted(single, key=lambda i: -single[i])
     if not singles:
         return None
     lead = best.ids[0] if best.ids else singles[0]
     rivals = [i for i in (*decision.effects, *(j for g in decision.classes for j in g), *singles) if i != lead]
-    first = (lead, fitting.fit(found, lead).settings[0])
-    likelier = bool(rivals) and found.probability[rivals[0]] > found.probability[prior.NONE]
+    first = (lead, fitting.fit(found, Explanation.of(lead)).settings[0])
+    likelier = bool(rivals) and single[rivals[0]] > found.probability[NONE]
     if not rivals or decision.verdict == "none" or (decision.verdict == "insufficient" and not likelier):
         return suggestion.suggest(found, first, None)
-    return suggestion.suggest(found, first, (rivals[0], fitting.fit(found, rivals[0]).settings[0]))
+    return suggestion.suggest(found, first, (rivals[0], fitting.fit(found, Explanation.of(rivals[0])).settings[0]))

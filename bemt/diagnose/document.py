@@ -10,8 +10,8 @@ import numpy as np
 from bemt import __version__, effects
 from bemt.base.tables import text_table
 from bemt.diagnose import fit as fitting
-from bemt.diagnose import prior
 from bemt.diagnose.confusion import nearest
+from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
 from bemt.diagnose.locate import bare
 from bemt.diagnose.verdict import inclusion
 
@@ -59,12 +59,11 @@ def document(d: Diagnosis) -> dict[str, Any]:
     found = d.found
     ranking = []
     for name, p in sorted(found.probability.items(), key=lambda kv: -kv[1])[:12]:
-        listed = name not in (prior.NONE, prior.UNKNOWN)
-        parameters = fitting.intervals(found, name) if listed and p > 1e-3 else {}
+        parameters = fitting.intervals(found, name) if name and p > 1e-3 else {}
         if name == d.decision.leading:
             parameters = d.parameters
-        flat = {(k if "+" not in name else f"{i}.{k}"): v for i, q in parameters.items() for k, v in q.items()}
-        ranking.append({"effect": name, "probability": p, "parameters": flat})
+        flat = {(f"{i}.{k}" if name.pair else k): v for i, q in parameters.items() for k, v in q.items()}
+        ranking.append({"effect": str(name), "probability": p, "parameters": flat})
     state = found.states[0]
     return {
         "schema": SCHEMA,
@@ -80,7 +79,7 @@ def document(d: Diagnosis) -> dict[str, Any]:
         "classes": [list(c) for c in d.decision.classes] or d.alike.classes(),
         "next_measurement": {"text": "", "points": [], "separates": []} if d.next is None else d.next.document(),
         "p_value": d.p_value,
-        "log_bayes": {i: found.log_bayes(i) for i in (*found.spans, prior.UNKNOWN)},
+        "log_bayes": {str(e): found.log_bayes(e) for e in (*map(Explanation.of, found.spans), UNKNOWN)},
         "nearest_signature": nearest(found),
         "visibility": {i: float(s) for i, s in zip(d.alike.ids, d.alike.size, strict=True)},
         "covariance": {"noise_scale": state.hyper.scale, "correlation": state.hyper.ar,
@@ -220,8 +219,8 @@ def text(d: Diagnosis) -> str:
     size = dict(zip(d.alike.ids, d.alike.size, strict=True))
     rows = []
     for name, p in sorted(found.probability.items(), key=lambda kv: -kv[1])[:_SHOWN]:
-        seen = f"{size[name]:.1f}" if name in size else "-"
-        rows.append([name, f"{p:.3f}", f"{found.log_bayes(name):.1f}" if name != prior.NONE else "0.0", seen])
+        seen = f"{size[str(name)]:.1f}" if str(name) in size else "-"
+        rows.append([str(name), f"{p:.3f}", f"{found.log_bayes(name):.1f}" if name != NONE else "0.0", seen])
     out += [
         "",
         text_table(

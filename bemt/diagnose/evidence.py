@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.diagnose import form, noise, prior
+from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
 from bemt.diagnose.form import Form, Forms
-from bemt.diagnose.prior import NONE, UNKNOWN
 
 if TYPE_CHECKING:
     from bemt.diagnose.noise import Hyper, Whitener
@@ -76,7 +76,7 @@ class State:
         Error of the form of each candidate, at its best setting.
     rivals : list of (str, Whitener)
         Factors for the unknown smooth effect.
-    log_z : dict of str to float
+    log_z : dict of Explanation to float
         Logarithm of the evidence per explanation.
     best_rival : str
         Unknown smooth effect of largest evidence.
@@ -89,7 +89,7 @@ class State:
     half: Array
     forms: dict[str, Form] = field(default_factory=dict)
     rivals: list[tuple[str, Whitener]] = field(default_factory=list)
-    log_z: dict[str, float] = field(default_factory=dict)
+    log_z: dict[Explanation, float] = field(default_factory=dict)
     best_rival: str = ""
 
     def gains(self, name: str, span: slice, R: Array) -> Array:
@@ -132,8 +132,8 @@ class Evidence:
         Effects.
     states : tuple of State
         Settings of the covariance that matter, best first.
-    probability : dict of str to float
-        Posterior probability: "none", "unknown", ids, pairs as "a+b" [1].
+    probability : dict of Explanation to float
+        Posterior probability [1].
     spans : dict of str to slice
         Columns of each candidate in ``State.S``.
     log_w : (G,) float
@@ -143,7 +143,7 @@ class Evidence:
     problem: Problem
     candidates: tuple[Candidate, ...]
     states: tuple[State, ...]
-    probability: dict[str, float]
+    probability: dict[Explanation, float]
     spans: dict[str, slice]
     log_w: Array
 
@@ -151,10 +151,10 @@ class Evidence:
         """Candidate by id."""
         return next(c for c in self.candidates if c.id == name)
 
-    def log_bayes(self, name: str) -> float:
+    def log_bayes(self, what: Explanation) -> float:
         """Natural logarithm of the odds of the readings under an explanation over "none"."""
         top = np.array([s.log_z[NONE] for s in self.states])
-        mine = np.array([s.log_z.get(name, -np.inf) for s in self.states])
+        mine = np.array([s.log_z.get(what, -np.inf) for s in self.states])
         w = np.log([s.hyper.weight for s in self.states])
         return float(log_mean(mine, w) - log_mean(top, w))
 
@@ -305,7 +305,7 @@ class _Table:
             gain = self._gain(base, forms, rest)
         for k, (name, span) in enumerate(self.spans.items()):
             state.forms[name] = forms[k]
-            state.log_z[name] = none + float(log_mean(gain[span], self.log_w[span]))
+            state.log_z[Explanation.of(name)] = none + float(log_mean(gain[span], self.log_w[span]))
         return state
 
     def _best(self, gain: Array) -> NDArray[np.intp]:
@@ -331,7 +331,7 @@ class _Table:
         return out
 
 
-def _leading(log_z: dict[Hyper, dict[str, float]]) -> list[Hyper]:
+def _leading(log_z: dict[Hyper, dict[Explanation, float]]) -> list[Hyper]:
     """Settings of the covariance under which some explanation is good."""
     hypers = list(log_z)
     weight = np.log([h.weight for h in hypers])
@@ -351,28 +351,29 @@ def _pairs(state: State, spans: dict[str, slice], log_w: Array) -> None:
     gain = state.S.T @ state.r - state.half + log_w
     none = state.log_z[NONE]
     names = list(spans)
-    best: dict[str, tuple[int, int]] = {}
+    best: dict[Explanation, tuple[int, int]] = {}
     for i, a in enumerate(names):
         for b in names[i + 1 :]:
             A, B = spans[a], spans[b]
             total = gain[A][:, None] + gain[B][None, :] - state.S[:, A].T @ state.S[:, B]
-            state.log_z[f"{a}+{b}"] = none + float(log_mean(total.ravel(), np.zeros(total.size)))
+            pair = Explanation.of(a, b)
+            state.log_z[pair] = none + float(log_mean(total.ravel(), np.zeros(total.size)))
             k, m = np.unravel_index(int(np.argmax(total)), total.shape)
-            best[f"{a}+{b}"] = A.start + int(k), B.start + int(m)
-    upper = {k: max(state.log_z[k], *(state.log_z[i] for i in k.split("+"))) for k in best}
-    for name in sorted(upper, key=lambda k: -upper[k])[:_PAIR_LEADERS]:
-        forms = [state.forms[i] for i in name.split("+")]
+            best[pair] = A.start + int(k), B.start + int(m)
+    upper = {k: max(state.log_z[k], *(state.log_z[Explanation.of(i)] for i in k)) for k in best}
+    for pair in sorted(upper, key=lambda k: -upper[k])[:_PAIR_LEADERS]:
+        forms = [state.forms[i] for i in pair]
         both = np.concatenate([f.B for f in forms], axis=1)
         if not both.shape[1]:
             continue
         joint = Form(both, np.linalg.cholesky(np.eye(both.shape[1]) + both.T @ both))
-        d = state.r - state.S[:, best[name][0]] - state.S[:, best[name][1]]
+        d = state.r - state.S[:, best[pair][0]] - state.S[:, best[pair][1]]
         p = joint.project(d)
         chosen = sum(float(np.log(form.FORM.get(f.size, 1.0))) for f in forms)
-        state.log_z[name] += 0.5 * float(p @ p) - joint.half_log_det + chosen
+        state.log_z[pair] += 0.5 * float(p @ p) - joint.half_log_det + chosen
 
 
-def _posterior(states: Sequence[State], before: dict[str, float]) -> dict[str, float]:
+def _posterior(states: Sequence[State], before: dict[Explanation, float]) -> dict[Explanation, float]:
     names = list(states[0].log_z)
     table = np.array([[s.log_z[name] + np.log(s.hyper.weight) for s in states] for name in names])
     log_post = log_mean(table, np.zeros_like(table), axis=1) + np.array([before[name] for name in names])

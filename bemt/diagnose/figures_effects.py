@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.bem import forward, solver
-from bemt.diagnose import confusion, prior
+from bemt.diagnose import confusion
 from bemt.diagnose.canvas import BLACK, BLUE, GREY, ORANGE, PURPLE, RED, SKY, blank
+from bemt.diagnose.explanation import NONE, Explanation
 from bemt.diagnose.record import CHANNELS
 from bemt.diagnose.signatures import effect_of
 
@@ -137,7 +138,9 @@ def matrix(answer: Diagnosis) -> Figure | None:
     seen = np.flatnonzero(alike.size >= confusion.ALIKE)
     if seen.size < 2:
         return None
-    strongest = sorted(seen, key=lambda i: (-round(share.get(alike.ids[i], 0.0), 3), -alike.size[i]))[:_MOST_EFFECTS]
+    strongest = sorted(seen, key=lambda i: (-round(share.get(Explanation.of(alike.ids[i]), 0.0), 3), -alike.size[i]))[
+        :_MOST_EFFECTS
+    ]
     rows = _neighbours(alike.distance, np.array(sorted(strongest)))
     D = alike.distance[np.ix_(rows, rows)]
     names, n = [alike.ids[i] for i in rows], rows.size
@@ -198,13 +201,13 @@ def ranking(answer: Diagnosis) -> Figure:
     """
     found = answer.found
     names = sorted(found.probability, key=lambda k: -found.probability[k])[:_MOST_BARS]
-    odds = [0.0 if k == prior.NONE else found.log_bayes(k) for k in names]
+    odds = [0.0 if k == NONE else found.log_bayes(k) for k in names]
     chosen = set(answer.decision.effects)
 
-    def colour(name: str) -> str:
-        if name in (prior.NONE, prior.UNKNOWN):
-            return GREY if name == prior.NONE else PURPLE
-        return BLUE if chosen and chosen & set(name.split("+")) else SKY
+    def colour(what: Explanation) -> str:
+        if not what:
+            return GREY if what == NONE else PURPLE
+        return BLUE if chosen & what.ids else SKY
 
     figure, axes = blank(1.1 + 0.3 * len(names), 1, 2, sharey=True)
     left, right = axes[0]
@@ -214,7 +217,9 @@ def ranking(answer: Diagnosis) -> Figure:
     for axis, sizes, digits in ((left, shares, 3), (right, odds, 1)):
         bars = axis.barh(rows, sizes, color=tint)
         axis.bar_label(bars, fmt=f"%.{digits}f", padding=3, fontsize=8)
-    left.set(xlim=(0, 1.15), xlabel="probability [1]", yticks=rows, yticklabels=[k.replace("+", " + ") for k in names])
+    left.set(
+        xlim=(0, 1.15), xlabel="probability [1]", yticks=rows, yticklabels=[" + ".join(k) or str(k) for k in names]
+    )
     left.set_xticks([0, 0.25, 0.5, 0.75, 1])
     left.invert_yaxis()
     right.axvline(0.0, color=BLACK, linewidth=0.8)

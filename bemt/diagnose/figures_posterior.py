@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from bemt.diagnose import fit
 from bemt.diagnose.canvas import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, RED, SKY, blank
+from bemt.diagnose.explanation import Explanation
 from bemt.diagnose.signatures import effect_of
 
 if TYPE_CHECKING:
@@ -82,7 +83,7 @@ def posterior(answer: Diagnosis) -> Figure | None:
     if not answer.best.ids:
         return None
     panels = []
-    for i, p in fit.weights(answer.found, "+".join(answer.best.ids)).items():
+    for i, p in fit.weights(answer.found, Explanation.of(*answer.best.ids)).items():
         panels += _panels(answer.found.of(i), p, answer.parameters.get(i, {}))
     panels = panels[:_MOST_PANELS]
     if not panels:

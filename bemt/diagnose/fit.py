@@ -15,6 +15,7 @@ from bemt.diagnose.signatures import effect_of
 
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence
+    from bemt.diagnose.explanation import Explanation
 
 __all__ = ["Fit", "fit", "form_covariance", "intervals", "left_over", "refined", "smooth", "weights"]
 
@@ -32,7 +33,7 @@ class Fit:
     Attributes
     ----------
     ids : tuple of str
-        Effects, none for "none".
+        Effects; of nothing none.
     settings : tuple of dict
         Parameters of each.
     columns : tuple of int
@@ -47,15 +48,15 @@ class Fit:
     signature: Array
 
 
-def fit(found: Evidence, name: str) -> Fit:
+def fit(found: Evidence, what: Explanation) -> Fit:
     """Best setting of an explanation under the preferred covariance.
 
     Parameters
     ----------
     found : Evidence
         Outcome of the weighing.
-    name : str
-        Id, or two joined by "+", or "none".
+    what : Explanation
+        None, one or two effects.
 
     Returns
     -------
@@ -63,7 +64,7 @@ def fit(found: Evidence, name: str) -> Fit:
         Setting of largest evidence; the signature is solved with all effects at once.
     """
     problem, state = found.problem, found.states[0]
-    ids = tuple(name.split("+")) if name in found.probability and name not in ("none", "unknown") else ()
+    ids = tuple(what)
     if not ids:
         return Fit((), (), (), np.zeros_like(problem.y))
     gain = state.S.T @ state.r - state.half + found.log_w
@@ -84,15 +85,15 @@ def fit(found: Evidence, name: str) -> Fit:
     return Fit(ids, settings, columns, signature)
 
 
-def intervals(found: Evidence, name: str, share: float = 0.9) -> dict[str, dict[str, dict[str, Any]]]:
+def intervals(found: Evidence, what: Explanation, share: float = 0.9) -> dict[str, dict[str, dict[str, Any]]]:
     """Posterior medians and intervals of the parameters of an explanation.
 
     Parameters
     ----------
     found : Evidence
         Outcome of the weighing.
-    name : str
-        Id, or two joined by "+".
+    what : Explanation
+        One or two effects.
     share : float
         Probability inside the interval [1].
 
@@ -101,27 +102,27 @@ def intervals(found: Evidence, name: str, share: float = 0.9) -> dict[str, dict[
     dict
         Effect to parameter to ``value``, ``low``, ``high``, ``unit``; words have equal ends.
     """
-    return {i: _marginals(found, i, p, share) for i, p in weights(found, name).items()}
+    return {i: _marginals(found, i, p, share) for i, p in weights(found, what).items()}
 
 
-def weights(found: Evidence, name: str) -> dict[str, Array]:
+def weights(found: Evidence, what: Explanation) -> dict[str, Array]:
     """Posterior probability of every setting of the effects of an explanation.
 
     Parameters
     ----------
     found : Evidence
         Outcome of the weighing.
-    name : str
-        Id, or two joined by "+".
+    what : Explanation
+        One or two effects.
 
     Returns
     -------
     dict
         Id to (G,) probabilities that add up to 1, over all settings of the covariance [1].
     """
-    ids = tuple(name.split("+"))
-    states = [s for s in found.states if name in s.log_z]
-    share = np.array([s.log_z[name] + np.log(s.hyper.weight) for s in states])
+    ids = tuple(what)
+    states = [s for s in found.states if what in s.log_z]
+    share = np.array([s.log_z[what] + np.log(s.hyper.weight) for s in states])
     share = np.exp(share - share.max())
     out = {i: np.zeros(found.of(i).weight.size) for i in ids}
     for s, w in zip(states, share / share.sum(), strict=True):
@@ -333,15 +334,15 @@ def smooth(found: Evidence, best: Fit) -> Array:
     return np.asarray(systematic @ noise.whitener(C, problem.u).solve(problem.residual - best.signature))
 
 
-def left_over(found: Evidence, name: str) -> float:
+def left_over(found: Evidence, what: Explanation) -> float:
     """Logarithm of the odds that something smooth is left when an explanation is taken away.
 
     Parameters
     ----------
     found : Evidence
         Outcome of the weighing.
-    name : str
-        Explanation.
+    what : Explanation
+        What is taken away.
 
     Returns
     -------
@@ -349,7 +350,7 @@ def left_over(found: Evidence, name: str) -> float:
         Natural logarithm, averaged over the rival kernels [1].
     """
     problem, hyper = found.problem, found.states[0].hyper
-    best = fit(found, name)
+    best = fit(found, what)
     rest = problem.residual - best.signature
     C = noise.covariance(problem, hyper) + form_covariance(found, best)
     white = noise.whitener(C, problem.u)

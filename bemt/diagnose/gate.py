@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from bemt.diagnose import evidence as ev
 from bemt.diagnose import prior
+from bemt.diagnose.explanation import UNKNOWN, Explanation
 
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence
@@ -61,11 +62,11 @@ def statistic(found: Evidence, residuals: Array) -> Array:
         r = s.white(residuals)
         base = 0.5 * np.sum(r * r, axis=0)
         w = np.log(s.hyper.weight) - s.white.log_det - base
-        gains = [g + before[name] for name, g in ev.singles(s, r, found.spans, found.log_w).items()]
+        gains = [g + before[Explanation.of(name)] for name, g in ev.singles(s, r, found.spans, found.log_w).items()]
         if s.rivals:
             rival = ev.unknown(r, s.rivals, s.white.log_det, residuals, base)
             share = np.full(rival.shape, -np.log(rival.shape[0]))
-            gains.append(ev.log_mean(rival, share, axis=0) + before[prior.UNKNOWN])
+            gains.append(ev.log_mean(rival, share, axis=0) + before[UNKNOWN])
         stack = np.array(gains)
         some.append(ev.log_mean(stack, np.zeros_like(stack), axis=0) + w)
         none.append(w)

@@ -73,7 +73,7 @@ def locate(found: Evidence, best: Fit) -> Location:
     found : Evidence
         Outcome of the weighing.
     best : Fit
-        Preferred explanation; "none" for a bare residual.
+        Preferred explanation; that of nothing for a bare residual.
 
     Returns
     -------

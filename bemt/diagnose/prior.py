@@ -8,19 +8,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemt import effects
+from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
 
 if TYPE_CHECKING:
     from bemt.diagnose.problem import Problem
 
-__all__ = ["LEFT_OUT", "NONE", "PRESENT", "PRIOR", "UNKNOWN", "log_priors", "prior_weights"]
+__all__ = ["LEFT_OUT", "PRESENT", "PRIOR", "log_priors", "prior_weights"]
 
 PRIOR = {"none": 0.35, "single": 0.55, "pair": 0.05, "unknown": 0.05}
 """Prior probability of the kinds of explanation; shared within a kind by the weights of the effects. [1]"""
 LEFT_OUT, PRESENT = 50.0, 0.2
 """Weight of an effect of every real rotor that the baseline leaves out, and of one that the baseline has, with other
 parameters, beside 1 for all others [1]."""
-
-NONE, UNKNOWN = "none", "unknown"
 
 
 def prior_weights(problem: Problem, ids: Sequence[str]) -> dict[str, float]:
@@ -43,7 +42,7 @@ def prior_weights(problem: Problem, ids: Sequence[str]) -> dict[str, float]:
     return {i: PRESENT if all(i in o for o in on) else LEFT_OUT if i in usual else 1.0 for i in ids}
 
 
-def log_priors(weights: dict[str, float], pairs: bool = True) -> dict[str, float]:
+def log_priors(weights: dict[str, float], pairs: bool = True) -> dict[Explanation, float]:
     """Logarithm of the prior probability of every explanation.
 
     Parameters
@@ -56,14 +55,14 @@ def log_priors(weights: dict[str, float], pairs: bool = True) -> dict[str, float
     Returns
     -------
     dict
-        "none", "unknown", ids, pairs as "a+b".
+        Of nothing, of something unknown, of every effect and of every pair.
     """
     total = sum(weights.values()) or 1.0
     out = {NONE: PRIOR["none"], UNKNOWN: PRIOR["unknown"]}
-    out |= {i: PRIOR["single"] * w / total for i, w in weights.items()}
+    out |= {Explanation.of(i): PRIOR["single"] * w / total for i, w in weights.items()}
     if pairs:
         names = list(weights)
-        both = {f"{a}+{b}": weights[a] * weights[b] for k, a in enumerate(names) for b in names[k + 1 :]}
+        both = {Explanation.of(a, b): weights[a] * weights[b] for k, a in enumerate(names) for b in names[k + 1 :]}
         total = sum(both.values()) or 1.0
         out |= {k: PRIOR["pair"] * w / total for k, w in both.items()}
     return {k: float(np.log(v)) for k, v in out.items()}

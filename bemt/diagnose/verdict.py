@@ -1,15 +1,16 @@
 """The decision: none, a named effect, a class of look-alikes, the stand, something unknown, or not enough data.
 
-The order of the questions is the order of caution.  Is there a mismatch that nulls do not show?  Does an unknown smooth
-effect explain it better, or is something smooth left after the best listed effect?  Which effects are in nearly all
-of the probability?  Are there look-alikes of these in this plan, or a second effect that may be there, too?  Only then
-is a name given; with a few explanations left, these.
+:data:`RULES` are asked in their order, which is that of caution; the first that holds answers.  Is there a mismatch
+that nulls do not show?  Does an unknown smooth effect explain it better, or is something smooth left after the best
+listed effect?  Which effects are in nearly all of the probability?  Are there look-alikes of these in this plan, or a
+second effect that may be there, too?  Only then is a name given; with a few explanations left, these.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,11 +20,12 @@ from bemt import effects
 from bemt.diagnose import blocks, prior
 from bemt.diagnose import confusion as look
 from bemt.diagnose import fit as fitting
+from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
 
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence
 
-__all__ = ["GATE", "Decision", "decide"]
+__all__ = ["GATE", "RULES", "Asked", "Decision", "Rule", "decide"]
 
 Array = NDArray[np.float64]
 
@@ -39,13 +41,17 @@ EARNED = 8.0
 """Log odds that each effect of a pair must add to the other alone: small model errors are not a second cause [1]."""
 ENOUGH, EXPECTED = 8.0, 2.5
 """Log odds over none from which a name is given at all (about 4 sigma); of physics known to be left out [1]."""
-PROVEN, FORETELLS = 20.0, 0.9
+PROVEN, PREDICTS = 20.0, 0.9
 """Below the first (log odds) an explanation must lower the error on left-out blocks to the second, a ratio; physics
 that is on already needs the first in any case, to be on differently [1]."""
 PARTNER, MOST = 0.1, 3
 """Probability from which a second effect beside a sure one is mentioned; most members of an open answer [1]."""
 NEAR = 5.0
 """Effects of a class may be this far (natural logarithm of the evidence) behind the best one [1]."""
+
+_BALANCE = ("thrust_N", "torque_Nm")
+# Faults of a cell that shift its reading: one stays, the other creeps.
+_SHIFTS = ("zero", "drift")
 
 
 @dataclass(frozen=True)
@@ -58,8 +64,8 @@ class Decision:
         none, named, class, sensor, unknown or insufficient.
     effects : tuple of str
         Effects of the verdict; of a class all members.
-    leading : str
-        Explanation that is shown: an id, a pair "a+b", or "none".
+    leading : Explanation
+        What is shown.
     probability : float
         Of the verdict [1].
     left_over : float
@@ -67,51 +73,159 @@ class Decision:
     classes : tuple of tuple of str
         Effects that this plan cannot tell from the leading ones.
     why : str
-        The rule that decided.
+        Reason, in words.
+    rule : str
+        Name of the rule that decided.
     """
 
     verdict: str
     effects: tuple[str, ...]
-    leading: str
+    leading: Explanation
     probability: float
     left_over: float
     classes: tuple[tuple[str, ...], ...]
     why: str
+    rule: str = ""
 
 
-def inclusion(found: Evidence) -> dict[str, float]:
-    """Probability that an effect is at work, alone or in a pair, by id.
+@dataclass(eq=False)
+class Asked:
+    """What the rules ask of an outcome, each worked out when it is first asked.
 
-    Parameters
+    Attributes
     ----------
     found : Evidence
         Outcome of the weighing.
-
-    Returns
-    -------
-    dict
-        Id to probability, largest first.
+    p_value : float
+        Of the gate [1].
     """
-    out = dict.fromkeys(found.spans, 0.0)
-    for name, p in found.probability.items():
-        if name not in (prior.NONE, prior.UNKNOWN):
-            for i in name.split("+"):
-                out[i] += p
-    return dict(sorted(out.items(), key=lambda kv: -kv[1]))
+
+    found: Evidence
+    p_value: float
+
+    @property
+    def P(self) -> Mapping[Explanation, float]:
+        """Probability of every explanation."""
+        return self.found.probability
+
+    @cached_property
+    def first(self) -> Explanation:
+        """Likeliest explanation that has effects; that of nothing where there is none."""
+        return max((k for k in self.P if k), key=lambda k: self.P[k], default=NONE)
+
+    @cached_property
+    def rest(self) -> float:
+        """Log odds of something smooth beside it."""
+        return fitting.left_over(self.found, self.first) if self.first else -np.inf
+
+    @cached_property
+    def _kept(self) -> tuple[Explanation, dict[str, float]]:
+        share = inclusion(self.found)
+        if not self.first.pair or twins(self.first):
+            return self.first, share
+        return _earned(self.found, self.first, share, self.rest)
+
+    @property
+    def leading(self) -> Explanation:
+        """The same without an effect that has not earned its place beside another one."""
+        return self._kept[0]
+
+    @property
+    def share(self) -> dict[str, float]:
+        """Probability that each effect is at work, largest first."""
+        return self._kept[1]
+
+    @cached_property
+    def odds(self) -> float:
+        """Log odds of the leading explanation over nothing."""
+        return self.found.log_bayes(self.leading)
+
+    @cached_property
+    def _weight(self) -> float:
+        return min(prior.prior_weights(self.found.problem, tuple(self.leading)).values(), default=1.0)
+
+    @property
+    def on(self) -> bool:
+        """Whether the leading explanation has physics that is on already."""
+        return self._weight < 1.0
+
+    @property
+    def expected(self) -> bool:
+        """Whether the leading explanation is physics that every rotor has and that is off."""
+        return self._weight > 1.0
+
+    @property
+    def needed(self) -> float:
+        """Log odds over nothing from which it counts."""
+        return PROVEN if self.on else EXPECTED if self.expected else ENOUGH
+
+    @cached_property
+    def paired(self) -> bool:
+        """Whether two effects are likelier to be at work than one."""
+        return self.leading.pair and sum(v for k, v in self.P.items() if k.pair) > 0.5
+
+    @cached_property
+    def sure(self) -> tuple[str, ...]:
+        """Effects that are in nearly all of the probability."""
+        return tuple(i for i, p in self.share.items() if p >= SURE)
+
+    @cached_property
+    def group(self) -> tuple[str, ...]:
+        """The surest effect, or the first of the leading ones, and its look-alikes."""
+        first = self.sure[0] if self.sure else next(iter(self.leading))
+        return _class(self.found, first, self.share)
+
+    @cached_property
+    def beside(self) -> tuple[str, ...]:
+        """Effects that may be at work beside the one that is sure."""
+        together = {i: self.P.get(Explanation.of(self.sure[0], i), 0.0) for i in inclusion(self.found)}
+        return tuple(i for i, p in together.items() if p >= PARTNER and i not in self.group)
+
+    @cached_property
+    def few(self) -> tuple[str, ...]:
+        """Fewest of the likeliest effects, at most :data:`MOST`, that hold nearly all of the probability."""
+        some = tuple(self.share)
+        return next((some[:n] for n in range(2, MOST + 1) if _mass(self.found, some[:n]) >= SURE), ())
+
+    def says(
+        self, verdict: str, why: str, effects: Sequence[str] = (), probability: float | None = None,
+        classes: tuple[tuple[str, ...], ...] = (), leading: Explanation | None = None,
+    ) -> Decision:  # fmt: skip
+        """Decision about the leading explanation."""
+        what = self.leading if leading is None else leading
+        p = self.P.get(what, 0.0) if probability is None else probability
+        return Decision(verdict, tuple(effects), what, p, self.rest if what else -np.inf, classes, why)
+
+    def names(self, ids: Sequence[str], probability: float) -> Decision:
+        """Decision that names effects."""
+        stand = all(effects.catalogue()[i].kind == "stand" for i in ids)
+        why = "nearly all of the probability is on " + ("it" if len(ids) == 1 else "both")
+        return self.says("sensor" if stand else "named", why, ids, probability, leading=Explanation.of(*ids))
 
 
-def alike(found: Evidence, name: str) -> tuple[str, ...]:
-    """Single effects that explain what an explanation explains, within noise and evidence, itself left out."""
-    state = found.states[0]
-    best = fitting.fit(found, name)
-    s = state.white(best.signature)
-    forms = [state.forms[i] for i in best.ids]
-    form = forms[0] if len(forms) == 1 else None
-    limit = found.log_bayes(name) - NEAR
-    return tuple(
-        i for i, span in found.spans.items()
-        if i not in best.ids and look.distance(state, s, span, form) < look.ALIKE and found.log_bayes(i) > limit
-    )  # fmt: skip
+@dataclass(frozen=True)
+class Rule:
+    """One row of the table.
+
+    Attributes
+    ----------
+    name : str
+        What it asks.
+    holds : callable
+        Whether it applies.
+    answer : callable
+        What is said then.
+    threshold : str
+        Names of the numbers it asks with.
+    source : str
+        Where it comes from.
+    """
+
+    name: str
+    holds: Callable[[Asked], bool]
+    answer: Callable[[Asked], Decision]
+    threshold: str
+    source: str
 
 
 def decide(found: Evidence, p_value: float) -> Decision:
@@ -129,146 +243,122 @@ def decide(found: Evidence, p_value: float) -> Decision:
     Decision
         What is said.
     """
-    P = found.probability
-    listed = {k: v for k, v in P.items() if k not in (prior.NONE, prior.UNKNOWN)}
-    if not listed:
-        return Decision("insufficient", (), prior.NONE, 1.0, -np.inf, (), "no effect can be seen in these readings")
-    leading = max(listed, key=lambda k: listed[k])
-    if p_value > GATE:
-        why = f"nulls of the same plan look as much like a cause in {p_value:.0%} of draws"
-        word = "none" if p_value > 5.0 * GATE or P[prior.NONE] > 0.5 else "insufficient"
-        return Decision(word, (), prior.NONE, P[prior.NONE], -np.inf, (), why)
-    if P[prior.NONE] > 0.5:
-        return Decision(
-            "none", (), prior.NONE, P[prior.NONE], -np.inf, (), "nothing explains the readings better than the noise"
-        )
-    rest = fitting.left_over(found, leading)
-    if P[prior.UNKNOWN] > 0.5 or rest > max(LEFT_OVER, SMALL * found.log_bayes(leading)):
-        why = "a smooth mismatch remains when the best listed effect is taken away"
-        if P[prior.UNKNOWN] > 0.5:
-            why = "a smooth effect that is not in the library explains the readings better than any that is"
-        return Decision("unknown", (), leading, max(P[prior.UNKNOWN], 1.0 - listed[leading]), rest, (), why)
-    share = inclusion(found)
-    if "+" in leading and not _twins(leading.split("+")):
-        leading, share = _earned(found, leading, share, rest)
-    weight = prior.prior_weights(found.problem, leading.split("+"))
-    expected = min(weight.values()) > 1.0
-    needed = PROVEN if min(weight.values()) < 1.0 else EXPECTED if expected else ENOUGH
-    if found.log_bayes(leading) < needed:
-        why = "the best explanation is not much better than none"
-        return Decision("insufficient", (), leading, listed[leading], rest, (), why)
-    if not expected and found.log_bayes(leading) < PROVEN and not _foretells(found, leading):
-        why = "the best explanation does not foretell what it has not seen"
-        return Decision("insufficient", (), leading, listed[leading], rest, (), why)
-    if needed == PROVEN and "+" not in leading and _leaves_its_range(found, leading):
-        why = f"{leading}, which is on, would have to leave its range: its law is off, not its parameter"
-        return Decision("unknown", (), leading, listed[leading], rest, (), why)
-    if _twins(leading.split("+")):
-        why = "two instruments with the same fault at once: one cause that is not in the library is likelier"
-        return Decision("unknown", (), leading, listed.get(leading, 0.0), rest, (), why)
-    in_pair = "+" in leading and sum(v for k, v in listed.items() if "+" in k) > 0.5
-    sure = tuple(i for i, p in share.items() if p >= SURE)
-    if len(sure) > 1:
-        return _named(found, sure, min(share[i] for i in sure), rest)
-    if sure and not in_pair:
-        group = _class(found, sure[0], share)
-        beside = tuple(i for i in inclusion(found) if _together(P, sure[0], i) >= PARTNER and i not in group)
-        if len(group) <= 1 and not beside:
-            return _named(found, sure, share[sure[0]], rest)
-        if len(group) <= 1:
-            why = f"{sure[0]} is at work; whether another effect is, too, is left open"
-            return Decision("class", (*sure, *beside[: MOST - 1]), leading, share[sure[0]], rest, (), why)
-    if in_pair:
-        return _pair(found, leading, share, rest)
-    group = _class(found, leading.split("+")[0], share)
-    total = _mass(found, group)
-    if len(group) > 1 and total >= SURE:
-        return Decision("class", group, leading, total, rest, (group,), "these look alike in this plan")
-    if total >= SURE:
-        return _named(found, group, total, rest)
-    some = tuple(share)
-    groups = (group,) if len(group) > 1 else ()
-    for n in range(2, MOST + 1):
-        total = _mass(found, some[:n])
-        if total >= SURE:
-            return Decision("class", some[:n], leading, total, rest, groups, "the readings leave these open")
-    why = "several explanations are left that are not alike"
-    return Decision("insufficient", (), leading, listed[leading], rest, groups, why)
+    asked = Asked(found, p_value)
+    for rule in RULES:
+        if rule.holds(asked):
+            decision = rule.answer(asked)
+            return Decision(**{**vars(decision), "rule": rule.name})
+    raise AssertionError("the last rule always holds")
 
 
-def _together(probability: Mapping[str, float], a: str, b: str) -> float:
-    """Probability that two effects are at work."""
-    return probability.get(f"{a}+{b}", 0.0) + probability.get(f"{b}+{a}", 0.0)
+def inclusion(found: Evidence) -> dict[str, float]:
+    """Probability that an effect is at work, alone or in a pair, by id.
+
+    Parameters
+    ----------
+    found : Evidence
+        Outcome of the weighing.
+
+    Returns
+    -------
+    dict
+        Id to probability, largest first.
+    """
+    out = dict.fromkeys(found.spans, 0.0)
+    for what, p in found.probability.items():
+        for i in what.ids:
+            out[i] += p
+    return dict(sorted(out.items(), key=lambda kv: -kv[1]))
+
+
+def alike(found: Evidence, name: str) -> tuple[str, ...]:
+    """Single effects that explain what an effect explains, within noise and evidence, itself left out."""
+    state, what = found.states[0], Explanation.of(name)
+    s = state.white(fitting.fit(found, what).signature)
+    limit = found.log_bayes(what) - NEAR
+    return tuple(
+        i
+        for i, span in found.spans.items()
+        if i != name
+        and look.distance(state, s, span, state.forms[name]) < look.ALIKE
+        and found.log_bayes(Explanation.of(i)) > limit
+    )
+
+
+def twins(what: Explanation) -> bool:
+    """Whether both cells of the balance are said to have the same fault: shifts, or gains."""
+    chosen = [effects.catalogue()[i] for i in what]
+    faults = {"shift" if e.fault in _SHIFTS else e.fault for e in chosen}
+    return len(chosen) > 1 and len(faults) == 1 and "" not in faults and all(e.sensor in _BALANCE for e in chosen)
 
 
 def _mass(found: Evidence, group: Sequence[str]) -> float:
     """Probability that at least one of some effects is at work."""
-    return sum(v for k, v in found.probability.items() if set(k.split("+")) & set(group))
+    return sum(v for k, v in found.probability.items() if k.ids & set(group))
 
 
-def _foretells(found: Evidence, leading: str) -> bool:
+def _predicts(a: Asked) -> bool:
     """Whether an explanation brings left-out blocks nearer than calibration alone does, along some variable.
 
     What does not change along a variable is learnt from the other lines of it without any cause.
     """
-    problem = found.problem
+    problem = a.found.problem
     u = problem.u[problem.free]
 
-    def error(name: str, split: tuple[str, NDArray[np.intp]]) -> float:
-        d = (problem.y - blocks.held_out(found, name, split)[1])[problem.free] / u
+    def error(what: Explanation, split: tuple[str, NDArray[np.intp]]) -> float:
+        d = (problem.y - blocks.held_out(a.found, what, split)[1])[problem.free] / u
         return float(np.sqrt(np.mean(d**2)))
 
-    return any(error(leading, s) < FORETELLS * error(prior.NONE, s) for s in blocks.partitions(problem))
+    return any(error(a.leading, s) < PREDICTS * error(NONE, s) for s in blocks.partitions(problem))
 
 
-def _earned(found: Evidence, pair: str, share: dict[str, float], rest: float) -> tuple[str, dict[str, float]]:
+def _earned(
+    found: Evidence, pair: Explanation, share: dict[str, float], rest: float
+) -> tuple[Explanation, dict[str, float]]:
     """Leading explanation without the effect that adds too little to the other one, and the probabilities to match."""
-    ids = pair.split("+")
+    ids = tuple(pair)
     weight = prior.prior_weights(found.problem, ids)
     for other, one in (ids, ids[::-1]):
         price = PROVEN if weight[other] < 1.0 else EARNED
-        adds = found.log_bayes(pair) - found.log_bayes(one)
+        adds = found.log_bayes(pair) - found.log_bayes(Explanation.of(one))
         # beside the thousands of a slip every rest is small: what is named next to it must explain its own
-        vague = one == "unit_slip" and rest > max(LEFT_OVER, SMALL * adds)
+        vague = effects.catalogue()[one].fault == "unit" and rest > max(LEFT_OVER, SMALL * adds)
         if (adds < price or vague) and share[one] >= share[other]:
-            return one, {i: (0.0 if i == other else p) for i, p in share.items()}
+            return Explanation.of(one), {i: (0.0 if i == other else p) for i, p in share.items()}
     return pair, share
 
 
-def _leaves_its_range(found: Evidence, leading: str) -> bool:
+def _leaves_its_range(a: Asked) -> bool:
     """Whether physics that is on explains the readings best at the end of the range of a parameter, not as it is on."""
-    on = {e.id: e for e in found.problem.baseline}
-    best = fitting.fit(found, leading).settings[0]
-    for p in effects.catalogue()[leading].parameters:
+    (name,) = a.leading
+    on = {e.id: e for e in a.found.problem.baseline}
+    best = fitting.fit(a.found, a.leading).settings[0]
+    for p in effects.catalogue()[name].parameters:
         value = best.get(p.name)
-        if value is not None and value not in (getattr(on[leading], p.name), p.off) and not p.low < value < p.high:
+        if value is not None and value not in (getattr(on[name], p.name), p.off) and not p.low < value < p.high:
             return True
     return False
 
 
-def _twins(ids: Sequence[str]) -> bool:
-    """Whether two instruments are said to have the same fault: offsets that stay or creep, or gains."""
-    faults = [("zero" if i.endswith("_drift") else i.partition("_")[2]) for i in ids]
-    return len(ids) > 1 and len(set(faults)) == 1 and all(effects.catalogue()[i].kind == "stand" for i in ids)
-
-
-def _class(found: Evidence, first: str, share: dict[str, float]) -> tuple[str, ...]:
-    others = [i for i in alike(found, first) if found.probability[i] > 0.02 * found.probability[first]]
+def _class(found: Evidence, first: str, share: Mapping[str, float]) -> tuple[str, ...]:
+    P = {i: found.probability[Explanation.of(i)] for i in found.spans}
+    others = [i for i in alike(found, first) if P[i] > 0.02 * P[first]]
     return (first, *sorted(others, key=lambda i: -share[i]))
 
 
-def _pair(found: Evidence, leading: str, share: dict[str, float], rest: float) -> Decision:
+def _pair(a: Asked) -> Decision:
     """Two effects at work: name those that are sure, and the look-alikes of the other."""
-    ids = list(leading.split("+")) if "+" in leading else [leading]
-    sure = [i for i in ids if share[i] >= SURE]
-    unsure = [i for i in ids if i not in sure]
-    pairs = {k: v for k, v in found.probability.items() if "+" in k and (not sure or set(k.split("+")) & set(sure))}
+    sure = [i for i in a.leading if a.share[i] >= SURE]
+    unsure = [i for i in a.leading if i not in sure]
+    if not unsure:
+        return a.names(sure, min(a.share[i] for i in sure))
+    pairs = {k: v for k, v in a.P.items() if k.pair and (not sure or k.ids & set(sure))}
     total = sum(pairs.values())
     members: list[str] = list(sure)
     for _ in unsure:
-        partner = {j: 0.0 for j in found.spans if j not in sure}
+        partner = {j: 0.0 for j in a.found.spans if j not in sure}
         for k, v in pairs.items():
-            for j in set(k.split("+")) & set(partner):
+            for j in k.ids & set(partner):
                 partner[j] += v
         near, mass = [], 0.0
         for j in sorted(partner, key=lambda j: -partner[j]):
@@ -277,18 +367,168 @@ def _pair(found: Evidence, leading: str, share: dict[str, float], rest: float) -
             if mass >= SURE * total:
                 break
         members += [j for j in near if j not in members][:5]
-    if not unsure:
-        return _named(found, tuple(sure), min(share[i] for i in sure), rest)
-    if len(sure) == len(ids) - 1 and len(members) <= 5:
-        return Decision("class", tuple(members), leading, total, rest, (tuple(m for m in members if m not in sure),),
-                        "two effects are at work; one of them has look-alikes")  # fmt: skip
-    return Decision(
-        "insufficient", (), leading, found.probability[leading], rest, (), "two effects or more, not told apart"
-    )
+    if len(sure) == len(a.leading) - 1 and len(members) <= 5:
+        look_alikes = tuple(m for m in members if m not in sure)
+        return a.says("class", "two effects are at work; one of them has look-alikes", members, total, (look_alikes,))
+    return a.says("insufficient", "two effects or more, not told apart")
 
 
-def _named(found: Evidence, ids: tuple[str, ...], probability: float, rest: float) -> Decision:
-    stand = all(effects.catalogue()[i].kind == "stand" for i in ids)
-    leading = "+".join(i for i in found.spans if i in ids)
-    why = "nearly all of the probability is on it" if len(ids) == 1 else "nearly all of the probability is on both"
-    return Decision("sensor" if stand else "named", ids, leading, probability, rest, (), why)
+def _nothing(a: Asked, why: str, verdict: str = "none") -> Decision:
+    return a.says(verdict, why, leading=NONE)
+
+
+def _by_chance(a: Asked) -> str:
+    return f"nulls of the same plan look as much like a cause in {a.p_value:.0%} of draws"
+
+
+def _left(a: Asked) -> Decision:
+    return a.says("unknown", "a smooth mismatch remains when the best listed effect is taken away",
+                  probability=max(a.P[UNKNOWN], 1.0 - a.P[a.first]), leading=a.first)  # fmt: skip
+
+
+RULES: tuple[Rule, ...] = (
+    Rule(
+        "no effect can be seen",
+        lambda a: not a.first,
+        lambda a: a.says("insufficient", "no effect can be seen in these readings", probability=1.0, leading=NONE),
+        "",
+        "by definition",
+    ),
+    Rule(
+        "nulls look like it",
+        lambda a: a.p_value > GATE and (a.p_value > 5.0 * GATE or a.P[NONE] > 0.5),
+        lambda a: _nothing(a, _by_chance(a)),
+        "GATE",
+        "DIAGNOSIS 2.3: p-value of the whole chain, 1 in 100",
+    ),
+    Rule(
+        "nulls nearly look like it",
+        lambda a: a.p_value > GATE,
+        lambda a: _nothing(a, _by_chance(a), "insufficient"),
+        "GATE",
+        "the same, between 1 and 5 in 100",
+    ),
+    Rule(
+        "nothing is likelier than anything",
+        lambda a: a.P[NONE] > 0.5,
+        lambda a: _nothing(a, "nothing explains the readings better than the noise"),
+        "0.5",
+        "posterior odds",
+    ),
+    Rule(
+        "unknown is likelier than all",
+        lambda a: a.P[UNKNOWN] > 0.5,
+        lambda a: a.says(
+            "unknown",
+            "a smooth effect that is not in the library explains the readings better than any that is",
+            probability=max(a.P[UNKNOWN], 1.0 - a.P[a.first]),
+            leading=a.first,
+        ),
+        "0.5",
+        "DIAGNOSIS 2.6: the second rival",
+    ),
+    Rule(
+        "a smooth rest is left",
+        lambda a: a.rest > max(LEFT_OVER, SMALL * a.found.log_bayes(a.first)),
+        _left,
+        "LEFT_OVER, SMALL",
+        "declared; the same rival beside the best effect",
+    ),
+    Rule(
+        "not much better than nothing",
+        lambda a: a.odds < a.needed,
+        lambda a: a.says("insufficient", "the best explanation is not much better than none"),
+        "ENOUGH, EXPECTED, PROVEN",
+        "declared; 8 nats are 4 sigma",
+    ),
+    Rule(
+        "does not predict",
+        lambda a: not a.expected and a.odds < PROVEN and not _predicts(a),
+        lambda a: a.says("insufficient", "the best explanation does not predict what it has not seen"),
+        "PROVEN, PREDICTS",
+        "declared; left-out blocks, DIAGNOSIS 2.9",
+    ),
+    Rule(
+        "on, and out of its range",
+        lambda a: a.on and not a.leading.pair and _leaves_its_range(a),
+        lambda a: a.says(
+            "unknown", f"{a.leading} is on and would have to leave its range, so the law itself does not fit"
+        ),
+        "range of the parameter",
+        "declared with the effect",
+    ),
+    Rule(
+        "twin faults",
+        lambda a: twins(a.leading),
+        lambda a: a.says(
+            "unknown", "two instruments with the same fault at once: one cause that is not in the library is likelier"
+        ),
+        "",
+        "declared: two independent faults of one kind are rare",
+    ),
+    Rule(
+        "several are sure",
+        lambda a: len(a.sure) > 1,
+        lambda a: a.names(a.sure, min(a.share[i] for i in a.sure)),
+        "SURE",
+        "declared",
+    ),
+    Rule(
+        "one is sure",
+        lambda a: bool(a.sure) and not a.paired and len(a.group) <= 1 and not a.beside,
+        lambda a: a.names(a.sure, a.share[a.sure[0]]),
+        "SURE, PARTNER",
+        "declared",
+    ),
+    Rule(
+        "one is sure, another may be there",
+        lambda a: bool(a.sure) and not a.paired and len(a.group) <= 1,
+        lambda a: a.says(
+            "class",
+            f"{a.sure[0]} is at work; whether another effect is, too, is left open",
+            (*a.sure, *a.beside[: MOST - 1]),
+            a.share[a.sure[0]],
+        ),
+        "SURE, PARTNER, MOST",
+        "declared",
+    ),
+    Rule("two at work", lambda a: a.paired, _pair, "SURE", "declared"),
+    Rule(
+        "look-alikes",
+        lambda a: len(a.group) > 1 and _mass(a.found, a.group) >= SURE,
+        lambda a: a.says("class", "these look alike in this plan", a.group, _mass(a.found, a.group), (a.group,)),
+        "SURE, NEAR, ALIKE",
+        "DIAGNOSIS 2.7: distance below 3 sigma",
+    ),
+    Rule(
+        "sure with its pairs",
+        lambda a: _mass(a.found, a.group) >= SURE,
+        lambda a: a.names(a.group, _mass(a.found, a.group)),
+        "SURE",
+        "declared",
+    ),
+    Rule(
+        "a few are left",
+        lambda a: bool(a.few),
+        lambda a: a.says(
+            "class",
+            "the readings leave these open",
+            a.few,
+            _mass(a.found, a.few),
+            (a.group,) if len(a.group) > 1 else (),
+        ),
+        "SURE, MOST",
+        "declared",
+    ),
+    Rule(
+        "many are left",
+        lambda a: True,
+        lambda a: a.says(
+            "insufficient",
+            "several explanations are left that are not alike",
+            classes=(a.group,) if len(a.group) > 1 else (),
+        ),
+        "",
+        "the rest",
+    ),
+)

@@ -18,7 +18,7 @@ from functools import lru_cache
 
 from bemt.effects.base import Baking, Effect, Parameter
 
-__all__ = ["Baking", "Effect", "Parameter", "catalogue", "from_text", "standard", "to_text", "without"]
+__all__ = ["Baking", "Effect", "Parameter", "catalogue", "from_text", "places", "standard", "to_text", "without"]
 
 
 @lru_cache(maxsize=1)
@@ -43,6 +43,12 @@ def catalogue() -> dict[str, type[Effect]]:
                     raise ValueError(f"two effects share the id {obj.id!r}")
                 found[obj.id] = obj
     return dict(sorted(found.items(), key=lambda kv: (kv[1].order, kv[0])))
+
+
+@lru_cache(maxsize=1)
+def places() -> dict[str, int]:
+    """Position of each effect in the catalogue, by id."""
+    return {name: k for k, name in enumerate(catalogue())}
 
 
 def standard() -> tuple[Effect, ...]:

@@ -25,6 +25,8 @@ class AirspeedOffset(Effect):
     title = "airspeed other than recorded"
     sign = "shift of J that fades as 1/n at high speed of rotation; a blade angle would shift every speed alike"
     kind = "stand"
+    fault = "zero"
+    sensor = "airspeed_m_s"
     parameters = (Parameter("offset_m_s", "m/s", -1.0, 1.0, "declared, pitot zero", 5, 0.0),)
     on_by_default = False
 

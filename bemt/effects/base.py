@@ -288,6 +288,10 @@ class Effect:
     sign: ClassVar[str] = ""
     # "air" (the flow), "stand" (instruments and what was written down) or "drive" (motor, battery).
     kind: ClassVar[str] = "air"
+    # What is wrong with an instrument ("gain", "zero", "drift", "unit", ...) and the channel that it gives; "" where
+    # the setting says which, or where nothing is wrong with one.
+    fault: ClassVar[str] = ""
+    sensor: ClassVar[str] = ""
     # Covariates along which it shows first, of those that a diagnosis knows (J, rpm, Re, M_tip, time_s, ...).
     along: ClassVar[tuple[str, ...]] = ()
     # Law of a flow without friction and compressibility: by similarity (Buckingham 1914) its dimensionless form may

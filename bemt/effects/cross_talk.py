@@ -28,6 +28,7 @@ class CrossTalk(Effect):
     title = "cross-talk between thrust and torque cell"
     sign = "one channel follows the other's load over advance ratio; a pair of opposite rotation turns its sign"
     kind = "stand"
+    fault = "cross-talk"
     parameters = (Parameter("k", "1", -0.05, 0.05, "declared, arm error of R/20", off=0.0),)
     on_by_default = False
 

@@ -36,6 +36,8 @@ class RpmScale(Effect):
         "blade counts; density leaves J alone"
     )
     kind = "stand"
+    fault = "scale"
+    sensor = "rpm"
     discrete = ("factor",)
     parameters = (
         Parameter("factor", "1", 1.0 / 24.0, 24.0, "pole pairs and blade counts", 0, 1.0),

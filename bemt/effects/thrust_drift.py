@@ -35,6 +35,8 @@ class ThrustDrift(Effect):
         "thrust follows clock or temperature, not the condition: the same point reads otherwise later; torque does not"
     )
     kind = "stand"
+    fault = "drift"
+    sensor = "thrust_N"
     parameters = (
         Parameter("zero", "1", -0.10, 0.10, "declared, share of full scale", 3, 0.0),
         Parameter("tau_s", "s", 60.0, 1800.0, "warm-up of strain-gauge cells, 1 to 30 min", 4),

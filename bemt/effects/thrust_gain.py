@@ -23,6 +23,8 @@ class ThrustGain(Effect):
     title = "calibration factor of the thrust cell"
     sign = "thrust off by one factor at every speed and airspeed while torque is right; air would move both"
     kind = "stand"
+    fault = "gain"
+    sensor = "thrust_N"
     parameters = (Parameter("gain", "1", -0.10, 0.10, "declared, workshop calibration", 3, 0.0),)
     on_by_default = False
 

@@ -23,6 +23,8 @@ class ThrustZero(Effect):
     title = "zero of the thrust cell"
     sign = "thrust off by a constant, which falls as 1/n^2 in the coefficient, whatever airspeed; torque is right"
     kind = "stand"
+    fault = "zero"
+    sensor = "thrust_N"
     parameters = (Parameter("zero", "1", -0.05, 0.05, "declared, share of full scale", 3, 0.0),)
     on_by_default = False
 

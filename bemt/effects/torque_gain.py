@@ -23,6 +23,8 @@ class TorqueGain(Effect):
     title = "calibration factor of the torque cell"
     sign = "torque off by one factor at every speed and airspeed while thrust is right; air would move both"
     kind = "stand"
+    fault = "gain"
+    sensor = "torque_Nm"
     parameters = (Parameter("gain", "1", -0.10, 0.10, "declared, workshop calibration", 3, 0.0),)
     on_by_default = False
 

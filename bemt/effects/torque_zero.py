@@ -23,6 +23,8 @@ class TorqueZero(Effect):
     title = "zero of the torque cell"
     sign = "torque off by a constant, which falls as 1/n^2 in the coefficient, whatever airspeed; thrust is right"
     kind = "stand"
+    fault = "zero"
+    sensor = "torque_Nm"
     parameters = (Parameter("zero", "1", -0.05, 0.05, "declared, share of full scale", 3, 0.0),)
     on_by_default = False
 

@@ -50,6 +50,7 @@ class UnitSlip(Effect):
     title = "number in another unit than its label, or with the other sign"
     sign = "one channel off by exactly the ratio of two units, or by -1, at every point; no physics keeps such a factor"
     kind = "stand"
+    fault = "unit"
     discrete = ("factor",)
     parameters = (Parameter("factor", "1", -1e5, 1e5, "ratios of units by definition; -1: the other sign", 0, 1.0),)
     on_by_default = False

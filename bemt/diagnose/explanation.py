@@ -1,0 +1,65 @@
+"""What may have been left out: nothing, a set of effects, or something smooth that no effect of the catalogue is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from bemt import effects
+
+__all__ = ["NONE", "UNKNOWN", "Explanation"]
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """A set of effects; false where it has none. Documents write it as ``str`` does: "none", "unknown", "a", "a+b".
+
+    Attributes
+    ----------
+    ids : frozenset of str
+        Effects at work.
+    smooth : bool
+        Whether something smooth is at work that no effect of the catalogue is.
+
+    Examples
+    --------
+    >>> str(Explanation.of("thrust_zero", "reynolds")), str(NONE), str(UNKNOWN)
+    ('reynolds+thrust_zero', 'none', 'unknown')
+    """
+
+    ids: frozenset[str] = frozenset()
+    smooth: bool = False
+
+    @classmethod
+    def of(cls, *ids: str) -> Explanation:
+        """Explanation by effects."""
+        return cls(frozenset(ids))
+
+    @property
+    def pair(self) -> bool:
+        """Whether two effects or more are at work."""
+        return len(self.ids) > 1
+
+    def without(self, effect: str) -> Explanation:
+        """The others of its effects."""
+        return Explanation(self.ids - {effect}, self.smooth)
+
+    def __iter__(self) -> Iterator[str]:
+        """Effects in the order of the catalogue."""
+        place = effects.places()
+        return iter(sorted(self.ids, key=lambda i: (place.get(i, len(place)), i)))
+
+    def __len__(self) -> int:
+        """How many effects."""
+        return len(self.ids)
+
+    def __contains__(self, effect: object) -> bool:
+        """Whether an effect is one of them."""
+        return effect in self.ids
+
+    def __str__(self) -> str:
+        """As documents write it."""
+        return "unknown" if self.smooth else "+".join(self) or "none"
+
+
+NONE, UNKNOWN = Explanation(), Explanation(smooth=True)
