@@ -1,6 +1,6 @@
 """The work that is timed: one two-bladed 10x5 in 30 elements, one section table, 60 operating points.
 
-The files in ``benchdata`` were made by `generate` and are read by `load`; `prepare` makes the rotor.
+The files in ``data`` were made by `generate` and are read by `load`; `prepare` makes the rotor.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from bemt.bem.solver import Prepared
 
 Array = NDArray[np.float64]
-DATA = Path(__file__).with_name("benchdata")
+DATA = Path(__file__).with_name("data")
 RPM = (3000.0, 5000.0, 6700.0)
 """Rotational speeds of the work [rev/min]."""
 J_VALUES = np.linspace(0.0, 0.8, 20)
