@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 from bemt.air import Air
 from bemt.bem import kernel, residual, solver, vecmath
 from bemt.bem.duct import DuctFlow
-from bemt.effects import standard, without
+from bemt.effects import Baking, Effect, standard, without
 from bemt.effects.lifting_surface import LiftingSurface
 from bemt.effects.swirl import Swirl
 from bemt.effects.tip_loss import TipLoss
@@ -82,7 +82,7 @@ def test_mass_flow_joins_its_neighbours_smoothly() -> None:
             assert 4.0 * run(y)[0] * a == pytest.approx(8 / 9 - 4 / 9 * a + 14 / 9 * a * a)
 
 
-def residual(ducted: bool, layout: str) -> Any:
+def compiled_residual(ducted: bool, layout: str) -> Any:
     """Compiled residual of station k: g, dg/dphi, cl, cd, ..."""
     element = R.ducted_rotor if ducted else R.open_rotor
     lookup = {"plain": R.lookup_plain, "full": R.lookup_full, "factored": R.lookup_factored}[layout]
@@ -122,7 +122,7 @@ def test_slope_of_the_residual(rotor: Rotor, ducted: bool, layout: str, off: str
     prep = solver.prepare(rotor, [(0.7, polar)], effects, DUCT if ducted else None, n_stations=9)
     _, st, tab, par = prep.kernel
     assert prep.layout == layout
-    run, rng = residual(ducted, prep.layout), np.random.default_rng(2)
+    run, rng = compiled_residual(ducted, prep.layout), np.random.default_rng(2)
     zones = set()
     for _ in range(4000):
         k, Omega, V = int(rng.integers(9)), rng.uniform(100.0, 2500.0), rng.choice([0.0, rng.uniform(-30.0, 60.0)])
@@ -175,6 +175,30 @@ def test_section_tables_are_read_as_they_are(rotor: Rotor, layout: str) -> None:
         over_re = np.array([[np.interp(x, np.log(DEFAULT_RE), row[:, c]) for c in (0, 1)] for row in over_alpha])
         for c in (0, 1):
             assert got[c] == pytest.approx(np.interp(m, np.arange(len(over_re)), over_re[:, c]), rel=1e-11, abs=1e-12)
+
+
+@dataclasses.dataclass(frozen=True)
+class Rougher(Effect):
+    """Drag of every section, a tenth more; behind the effects of Mach number."""
+
+    id = "rougher"
+    order = 60
+
+    def section(self, bake: Baking) -> None:
+        bake.cd *= 1.1
+
+
+class RougherByMach(Rougher):
+    uses_mach = True
+
+
+def test_what_comes_behind_mach_number_changes_all_of_the_tables(rotor: Rotor) -> None:
+    polars = [(0.7, reynolds_polar())]
+    plain, rough = (solver.prepare(rotor, polars, e, n_stations=5) for e in (standard(), (*standard(), Rougher())))
+    assert plain.layout == "factored"
+    np.testing.assert_allclose(rough.tables[..., 1], 1.1 * plain.tables[..., 1], rtol=1e-14)
+    with pytest.raises(ValueError, match="read-only"):  # it would act before the Mach number: add_drag does not
+        solver.prepare(rotor, polars, (*standard(), RougherByMach()), n_stations=5)
 
 
 # The equations ------------------------------------------------------------------------------------------------------

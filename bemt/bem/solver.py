@@ -106,7 +106,7 @@ class Prepared:
 
     @property
     def tables(self) -> Array:
-        """cl and cd over Mach number squared, Reynolds number and angle of attack, (N, Nm, Nr, Na, 2) [1]."""
+        """Coefficients cl, cd over squared Mach number, Reynolds number and angle, (N, Nm, Nr, Na, 2) [1]."""
         n, rows, n_a, _ = self.tab.shape
         if self.layout != "factored":
             return self.tab.reshape(n, *self.axes, n_a, 2)
@@ -247,9 +247,11 @@ def prepare(
         gap=duct.gap if duct is not None else float("nan"), ducted=duct is not None, level=level,
     )  # fmt: skip
     for hook in ("blade", "inflow", "section", "momentum"):
-        for e in eff:
-            if hook == "section" and bake.mach_apart and not e.uses_mach and type(e).section is not Effect.section:
+        for e in (e for e in eff if getattr(type(e), hook) is not getattr(Effect, hook)):
+            if hook == "section" and bake.mach_apart and not e.uses_mach:
                 bake.spread()
+            # behind a change of Mach number, one that is written into the tables would come before it
+            bake.cl.flags.writeable = bake.cd.flags.writeable = not bake.mach_apart
             getattr(e, hook)(bake)
     if Re.size == 1:
         bake.spread()  # nothing to save
