@@ -43,7 +43,7 @@ def rotor(pitch: float = 0.127) -> Rotor:
 def tab(*chosen: Effect, polar: Polar | None = None) -> np.ndarray:
     """Tables cl, cd of the middle station at Mach 0, (Na, 2)."""
     prep = solver.prepare(rotor(), [(0.7, polar or table())], chosen, n_stations=9)
-    return np.asarray(prep.tab[4, 0, 0])
+    return np.asarray(prep.tables[4, 0, 0])
 
 
 def loads(*more: Effect, rpm: float = 6000.0, V: float = 0.0, pitch: float = 0.127) -> tuple[float, float]:
@@ -166,7 +166,7 @@ def test_stall_delay_forms_at_published_strength() -> None:
 @pytest.mark.parametrize("form", stall_delay.FORMS)
 def test_stall_delay_lifts_stalled_sections_only(form: str) -> None:
     prep = [solver.prepare(rotor(), [(0.7, table())], e, n_stations=9) for e in ((StallDelay(form=form),), ())]
-    gain = prep[0].tab[:, 0, 0, :, 0] - prep[1].tab[:, 0, 0, :, 0]
+    gain = prep[0].tables[:, 0, 0, :, 0] - prep[1].tables[:, 0, 0, :, 0]
     stalled = (DEG > 14.0) & (DEG < 50.0)
     assert np.all(gain[0, stalled] > 0.0) and np.all(gain >= 0.0)
     assert np.max(np.abs(gain[:, np.abs(DEG) <= 13.0])) < 1e-9

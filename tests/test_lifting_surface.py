@@ -105,10 +105,10 @@ def _prepared(chord: float, *effects: LiftingSurface | TipLoss, duct: DuctFlow |
 def test_tables_are_those_of_the_smaller_angle() -> None:
     on, off = _prepared(0.2, LiftingSurface()), _prepared(0.2)
     r, small = on.stations.r, np.abs(ALPHA_GRID) < np.radians(5.0)
-    wanted = slope_ratio((1.0 - r) / 0.2)[:, None] * off.tab[:, 0, 0, small, 0]
-    np.testing.assert_allclose(on.tab[:, 0, 0, small, 0], wanted, atol=1e-9)
+    wanted = slope_ratio((1.0 - r) / 0.2)[:, None] * off.tables[:, 0, 0, small, 0]
+    np.testing.assert_allclose(on.tables[:, 0, 0, small, 0], wanted, atol=1e-9)
     far = np.abs(ALPHA_GRID) > np.radians(40.0)
-    np.testing.assert_allclose(on.tab[..., far, :], off.tab[..., far, :], rtol=1e-12)
+    np.testing.assert_allclose(on.tables[..., far, :], off.tables[..., far, :], rtol=1e-12)
 
 
 def test_stations_still_converge_in_second_order() -> None:

@@ -16,7 +16,8 @@ from scipy.optimize import brentq
 from bemt.air import Air
 from bemt.bem import kernel, residual, solver, vecmath
 from bemt.bem.duct import DuctFlow
-from bemt.effects import standard, without
+from bemt.effects import Baking, Effect, standard, without
+from bemt.effects.lifting_surface import LiftingSurface
 from bemt.effects.swirl import Swirl
 from bemt.effects.tip_loss import TipLoss
 from bemt.sections.polars import Polar, linear_polar
@@ -81,17 +82,17 @@ def test_mass_flow_joins_its_neighbours_smoothly() -> None:
             assert 4.0 * run(y)[0] * a == pytest.approx(8 / 9 - 4 / 9 * a + 14 / 9 * a * a)
 
 
-def residual_of(ducted: bool, full: bool) -> Any:
+def compiled_residual(ducted: bool, layout: str) -> Any:
     """Compiled residual of station k: g, dg/dphi, cl, cd, ..."""
     element = R.ducted_rotor if ducted else R.open_rotor
-    lookup = R.lookup_full if full else R.lookup_plain
+    lookup = {"plain": R.lookup_plain, "full": R.lookup_full, "factored": R.lookup_factored}[layout]
 
     @njit
     def run(phi: float, k: int, Omega: float, V: float, st: Any, tab: Any, par: Any) -> Any:
         fx = (par[0], par[1], par[2], par[3], par[4], par[5], par[6], par[7], par[8], par[9], par[10])
         o = R.N_NUM
         g = (par[o], par[o + 1], par[o + 2], par[o + 3], par[o + 4], par[o + 5], par[o + 6], par[o + 7], par[o + 8],
-             par[o + 9], par[o + 10] / 340.0**2, par[o + 11], par[o + 12], par[o + 13])  # fmt: skip
+             par[o + 9], par[o + 10] / 340.0**2, par[o + 11], par[o + 12], par[o + 13], par[o + 16])  # fmt: skip
         base = np.int32(par[o + 14] * k)
         return element(lookup, phi, Omega * st[k, 0], V, 1.0 / V if V != 0.0 else 0.0, st[k, 3], 0.25 * st[k, 4],
                        st[k, 5], st[k, 6], 11.0 + st[k, 7], base, tab, g, fx)  # fmt: skip
@@ -105,21 +106,23 @@ def reynolds_polar() -> Polar:
     return dataclasses.replace(thin, cl=thin.cl + ramp * (thick.cl - thin.cl), cd=thin.cd + ramp * (thick.cd - thin.cd))
 
 
-@pytest.mark.parametrize("full", [False, True], ids=["plain", "full"])
+@pytest.mark.parametrize("layout", ["plain", "full", "factored"])
 @pytest.mark.parametrize("ducted", [False, True], ids=["open", "ducted"])
 @pytest.mark.parametrize("off", ["", "swirl", "tip_loss", "high_induction", "far wake"])
-def test_slope_of_the_residual(rotor: Rotor, ducted: bool, full: bool, off: str) -> None:
+def test_slope_of_the_residual(rotor: Rotor, ducted: bool, layout: str, off: str) -> None:
     effects = without(standard(), [off] if off and off != "far wake" else [])
     if off == "far wake":
         effects = (*without(standard(), ["tip_loss"]), TipLoss(sheets="disk"))
     polar = reynolds_polar()
-    if not full:
+    if layout == "full":
+        effects = (*effects, LiftingSurface(0.0))
+    if layout == "plain":
         effects = without(effects, ["compressibility", "drag_divergence"])
         polar = dataclasses.replace(polar, Re=polar.Re[:1], cl=polar.cl[:, :1], cd=polar.cd[:, :1])
     prep = solver.prepare(rotor, [(0.7, polar)], effects, DUCT if ducted else None, n_stations=9)
     _, st, tab, par = prep.kernel
-    assert (prep.tab.shape[1:3] == (1, 1)) != full
-    run, rng = residual_of(ducted, full), np.random.default_rng(2)
+    assert prep.layout == layout
+    run, rng = compiled_residual(ducted, prep.layout), np.random.default_rng(2)
     zones = set()
     for _ in range(4000):
         k, Omega, V = int(rng.integers(9)), rng.uniform(100.0, 2500.0), rng.choice([0.0, rng.uniform(-30.0, 60.0)])
@@ -141,17 +144,22 @@ def test_slope_of_the_residual(rotor: Rotor, ducted: bool, full: bool, off: str)
     assert zones == {0, 1, 2}
 
 
-def test_section_tables_are_read_as_they_are(rotor: Rotor, polar: Polar) -> None:
+@pytest.mark.parametrize("layout", ["full", "factored"])
+def test_section_tables_are_read_as_they_are(rotor: Rotor, layout: str) -> None:
     """cl, cd at any turn of alpha, any Re and M, held at the ends, against plain interpolation of the same tables."""
-    prep = solver.prepare(rotor, [(0.7, reynolds_polar())], n_stations=5)
+    effects = (*standard(), LiftingSurface()) if layout == "full" else standard()
+    prep = solver.prepare(rotor, [(0.7, reynolds_polar())], effects, n_stations=5)
+    assert prep.layout == layout
+    lookup = R.lookup_full if layout == "full" else R.lookup_factored
     _, st, tab, par = prep.kernel
+    tables = prep.tables
 
     @njit
     def run(alpha: float, lre: float, W: float, base: int, tab: Any, par: Any) -> Any:
         o = R.N_NUM
         g = (par[o], par[o + 1], par[o + 2], par[o + 3], par[o + 4], par[o + 5], par[o + 6], par[o + 7], par[o + 8],
-             par[o + 9], par[o + 10] / 340.0**2, par[o + 11], par[o + 12], par[o + 13])  # fmt: skip
-        return R.lookup_full(alpha, lre, W * W, np.int32(base), tab, g)
+             par[o + 9], par[o + 10] / 340.0**2, par[o + 11], par[o + 12], par[o + 13], par[o + 16])  # fmt: skip
+        return lookup(alpha, lre, W * W, np.int32(base), tab, g)
 
     from bemt.sections.polars import ALPHA_GRID, DEFAULT_RE
 
@@ -161,12 +169,36 @@ def test_section_tables_are_read_as_they_are(rotor: Rotor, polar: Polar) -> None
         got = run(alpha, lre, W, int(par[R.N_NUM + 14]) * k, tab, par)
         a = math.remainder(alpha, 2.0 * math.pi)
         x = np.clip(lre + math.log(W), *np.log(DEFAULT_RE[[0, -1]]))
-        m = min((W / 340.0) ** 2 / 0.1, prep.tab.shape[1] - 1.0)
-        over_alpha = np.array([[[np.interp(a, ALPHA_GRID, prep.tab[k, i, j, :, c]) for c in (0, 1)]
-                                for j in range(prep.tab.shape[2])] for i in range(prep.tab.shape[1])])  # fmt: skip
+        m = min((W / 340.0) ** 2 / 0.1, tables.shape[1] - 1.0)
+        over_alpha = np.array([[[np.interp(a, ALPHA_GRID, tables[k, i, j, :, c]) for c in (0, 1)]
+                                for j in range(tables.shape[2])] for i in range(tables.shape[1])])  # fmt: skip
         over_re = np.array([[np.interp(x, np.log(DEFAULT_RE), row[:, c]) for c in (0, 1)] for row in over_alpha])
         for c in (0, 1):
             assert got[c] == pytest.approx(np.interp(m, np.arange(len(over_re)), over_re[:, c]), rel=1e-11, abs=1e-12)
+
+
+@dataclasses.dataclass(frozen=True)
+class Rougher(Effect):
+    """Drag of every section, a tenth more; behind the effects of Mach number."""
+
+    id = "rougher"
+    order = 60
+
+    def section(self, bake: Baking) -> None:
+        bake.cd *= 1.1
+
+
+class RougherByMach(Rougher):
+    uses_mach = True
+
+
+def test_what_comes_behind_mach_number_changes_all_of_the_tables(rotor: Rotor) -> None:
+    polars = [(0.7, reynolds_polar())]
+    plain, rough = (solver.prepare(rotor, polars, e, n_stations=5) for e in (standard(), (*standard(), Rougher())))
+    assert plain.layout == "factored"
+    np.testing.assert_allclose(rough.tables[..., 1], 1.1 * plain.tables[..., 1], rtol=1e-14)
+    with pytest.raises(ValueError, match="read-only"):  # it would act before the Mach number: add_drag does not
+        solver.prepare(rotor, polars, (*standard(), RougherByMach()), n_stations=5)
 
 
 # The equations ------------------------------------------------------------------------------------------------------
@@ -255,7 +287,7 @@ def test_import_compiles_nothing() -> None:
         "from numba.core import event\n"
         "with event.install_recorder('numba:compile') as record:\n"
         "    import bemt.bem.solver, bemt.bem.kernel as K\n"
-        "assert not record.buffer and not K.entry(False, True).signatures"
+        "assert not record.buffer and not K.entry(False, \"plain\").signatures"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
 
@@ -263,7 +295,7 @@ def test_import_compiles_nothing() -> None:
 def test_the_disk_cache_sees_changes_of_other_files() -> None:
     before = vecmath.fingerprint(residual, vecmath)
     assert before == vecmath.fingerprint(residual, vecmath)
-    assert before in [c.cell_contents for c in kernel.entry(True, False).py_func.__closure__]  # type: ignore[attr-defined]
+    assert before in [c.cell_contents for c in kernel.entry(True, "full").py_func.__closure__]  # type: ignore[attr-defined]
     kept = residual._EPS
     try:
         residual._EPS = 2.0 * kept

@@ -32,6 +32,7 @@ from bemt.bem.residual import (
     N_SWIRL,
     N_WAKE,
     ducted_rotor,
+    lookup_factored,
     lookup_full,
     lookup_plain,
     open_rotor,
@@ -52,8 +53,8 @@ N_RADIAL = 11
 
 # Grid numbers behind ``num`` in ``par``: two-zone angle grid lo, hi, 1/fine, 1/coarse, index of lo, of hi, last cell;
 # Reynolds grid ln Re_0, 1/step, last node; Mach number grid 1/step of M^2, last node; strides of the tables along M^2,
-# Re and station; blade count.
-N_GRID = 16
+# Re and station; blade count; start of the Mach tables behind the station's others, where they are apart.
+N_GRID = 17
 N_PAR = N_NUM + N_GRID
 
 # Newton's last step, along which the state is carried [rad].
@@ -213,7 +214,7 @@ def _point(element, guess, lookup, w, point, st, tab, par, out, radial):
     o = N_NUM
     mach2 = par[o + 10] / (point[P_SOUND] * point[P_SOUND])
     g = (par[o], par[o + 1], par[o + 2], par[o + 3], par[o + 4], par[o + 5], par[o + 6], par[o + 7], par[o + 8],
-         par[o + 9], mach2, par[o + 11], par[o + 12], par[o + 13])  # fmt: skip
+         par[o + 9], mach2, par[o + 11], par[o + 12], par[o + 13], par[o + 16])  # fmt: skip
     stride = par[o + 14]
     B = par[o + 15]
     n = st.shape[0]
@@ -331,7 +332,7 @@ def _point(element, guess, lookup, w, point, st, tab, par, out, radial):
     out[O_REVERSED] = reversed_
 
 
-def _entries(stamp: int) -> tuple[Any, Any, Any, Any]:
+def _entries(stamp: int) -> dict[tuple[bool, str], Any]:
     """Entry points of the kernel.
 
     Numba's disk cache sees changes of this file only.  A closure over ``stamp`` makes it see those of the functions
@@ -366,21 +367,38 @@ def _entries(stamp: int) -> tuple[Any, Any, Any, Any]:
         for p in range(points.shape[0]):
             _point(ducted_rotor, _guess_ducted, lookup_full, w, points[p], st, tab, par, out[p], radial[p])
 
-    return open_plain, open_full, ducted_plain, ducted_full
+    @njit
+    def open_factored(points, st, tab, par, out, radial):
+        wide()
+        w = carray(_stack(stamp), (_ROWS * LANES,), np.float64)
+        for p in range(points.shape[0]):
+            _point(open_rotor, _guess_open, lookup_factored, w, points[p], st, tab, par, out[p], radial[p])
+
+    @njit
+    def ducted_factored(points, st, tab, par, out, radial):
+        wide()
+        w = carray(_stack(stamp), (_ROWS * LANES,), np.float64)
+        for p in range(points.shape[0]):
+            _point(ducted_rotor, _guess_ducted, lookup_factored, w, points[p], st, tab, par, out[p], radial[p])
+
+    return {
+        (False, "plain"): open_plain, (False, "full"): open_full, (False, "factored"): open_factored,
+        (True, "plain"): ducted_plain, (True, "full"): ducted_full, (True, "factored"): ducted_factored,
+    }  # fmt: skip
 
 
-_OPEN_PLAIN, _OPEN_FULL, _DUCTED_PLAIN, _DUCTED_FULL = _entries(fingerprint(residual, vecmath))
+_ENTRIES = _entries(fingerprint(residual, vecmath))
 
 
-def entry(ducted: bool, plain: bool) -> Callable[..., None]:
+def entry(ducted: bool, tables: str) -> Callable[..., None]:
     """Entry point that solves a batch of operating points; compiled when first called.
 
     Parameters
     ----------
     ducted : bool
         Whether the rotor runs in a duct.
-    plain : bool
-        Whether the tables have neither a Reynolds nor a Mach axis.
+    tables : {"plain", "full", "factored"}
+        Neither a Reynolds nor a Mach axis; both; or tables over Reynolds number and, apart, over Mach number.
 
     Returns
     -------
@@ -394,8 +412,9 @@ def entry(ducted: bool, plain: bool) -> Callable[..., None]:
             ln(chord), zero-lift angle [rad] and lift slope [1/rad] for the first guess, added axial and tangential
             speed [m/s].
         tab : (L,)
-            Section tables, flat: station, Mach number squared, Reynolds number, angle, (cl, cd).
-        par : (27,)
+            Section tables, flat: station, Mach number squared, Reynolds number, angle, (cl, cd); factored: station,
+            the Reynolds numbers and then the squared Mach numbers, angle, (cl, cd) or (factor on cl, added cd).
+        par : (28,)
             The numbers ``num`` of :mod:`bemt.bem.residual`, then the grid (see the source).
         out : (P, 10)
             Filled: T, Q, mass flow, mass flow times disk speed, stator thrust, worst status, its station, number of
@@ -403,8 +422,5 @@ def entry(ducted: bool, plain: bool) -> Callable[..., None]:
         radial : (P, N, 11) or (P, 0, 11)
             Filled when it has rows: phi, alpha, cl, cd, W, w, v_t, F, dT, dQ, status.
     """
-    entries: dict[tuple[bool, bool], Callable[..., None]] = {
-        (False, True): _OPEN_PLAIN, (False, False): _OPEN_FULL,
-        (True, True): _DUCTED_PLAIN, (True, False): _DUCTED_FULL,
-    }  # fmt: skip
-    return entries[ducted, plain]
+    found: Callable[..., None] = _ENTRIES[ducted, tables]
+    return found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +20,8 @@ from bemt.sections.polars import (
     ALPHA_FINE_STEP,
     ALPHA_GRID,
     DEFAULT_RE,
+    RE_FIXED,
+    fixed_re,
 )
 
 if TYPE_CHECKING:
@@ -53,10 +56,20 @@ def common_grid(
     cl = np.empty((len(polars), M.size, re.size, ALPHA_GRID.size))
     cd = np.empty_like(cl)
     for i, p in enumerate(polars):
-        q = p.on_grid(ALPHA_GRID, re, M if p.M.size > 1 else p.M)
-        cl[i] = q.cl.transpose(2, 1, 0)
-        cd[i] = q.cd.transpose(2, 1, 0)
+        cl[i], cd[i] = _resampled(p, tuple(re), tuple(M) if p.M.size > 1 else ())
     return re, cl, cd
+
+
+@lru_cache(maxsize=64)
+def _resampled(polar: Polar, re: tuple[float, ...], M: tuple[float, ...]) -> tuple[Array, Array]:
+    q = polar.on_grid(ALPHA_GRID, np.array(re), np.array(M) if M else polar.M)
+    return q.cl.transpose(2, 1, 0), q.cd.transpose(2, 1, 0)
+
+
+@lru_cache(maxsize=64)
+def at_fixed_re(polar: Polar) -> Polar:
+    """Polar without Reynolds number; kept, for rotors that are prepared again and again."""
+    return fixed_re(polar, RE_FIXED)
 
 
 def zero_and_slope(alpha: Array, cl: Array) -> tuple[Array, Array]:
@@ -105,14 +118,30 @@ def pack_stations(bake: Baking, num: Array) -> Array:
     return st
 
 
+def pack_tables(bake: Baking) -> Array:
+    """Rows of (angle, (cl, cd)) per station: every Mach and Reynolds number, or these and, apart, those."""
+    n, n_t, n_r, n_a = bake.cl.shape
+    apart = n_t < bake.M2.size
+    out = np.empty((n, n_t * n_r + (bake.M2.size if apart else 0), n_a, 2))
+    tables = out[:, : n_t * n_r].reshape(n, n_t, n_r, n_a, 2)
+    tables[..., 0], tables[..., 1] = bake.cl, bake.cd
+    if apart:
+        out[:, n_r:, :, 0] = 1.0 if bake.mach_lift is None else bake.mach_lift[:, :, 0]
+        out[:, n_r:, :, 1] = 0.0 if bake.mach_drag is None else bake.mach_drag[:, :, 0]
+    return out
+
+
 def pack_grid(bake: Baking) -> Array:
-    """Grid numbers of the kernel in the order of its comment on ``par``; the last is the blade count."""
-    n_m, n_r, n_a = bake.cl.shape[1:]
+    """Grid numbers of the kernel in the order of its comment on ``par``."""
+    n_r, n_a = bake.cl.shape[2:]
+    n_m = bake.M2.size
+    apart = bake.cl.shape[1] < n_m
     log_re = np.log(bake.Re)
     return np.array([
         ALPHA_FINE_LO, ALPHA_FINE_HI, 1.0 / ALPHA_FINE_STEP, 1.0 / ALPHA_COARSE_STEP, _FINE_LO, _FINE_HI, n_a - 2,
         log_re[0], (n_r - 1) / (log_re[-1] - log_re[0]) if n_r > 1 else 0.0, max(n_r - 1, 1),
         1.0 / M2_STEP if n_m > 1 else 0.0, max(n_m - 1, 1),
         # an axis of one node has stride zero, so that its upper neighbour is itself
-        2 * n_r * n_a if n_m > 1 else 0, 2 * n_a if n_r > 1 else 0, 2 * n_m * n_r * n_a, bake.B,
+        2 * n_a * (1 if apart else n_r) if n_m > 1 else 0, 2 * n_a if n_r > 1 else 0,
+        2 * n_a * (n_m + n_r if apart else n_m * n_r), bake.B, 2 * n_a * n_r,
     ])  # fmt: skip

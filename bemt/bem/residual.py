@@ -178,6 +178,58 @@ def lookup_full(alpha, lre0, W2, base, tab, g):
 
 
 @inlined
+def lookup_factored(alpha, lre0, W2, base, tab, g):
+    """Like :func:`lookup_full`, from cl0(Re) times a factor of Mach number, and cd0(Re) plus an addition of it."""
+    i, wa, inv = _alpha_cell(alpha, g)
+    x = (lre0 + 0.5 * log(W2 if W2 > 1e-12 else 1e-12) - g[7]) * g[8]
+    r_slope = g[8] if (x > 0.0 and x < g[9]) else 0.0
+    x = x if x > 0.0 else 0.0
+    x = x if x < g[9] else g[9]
+    e = x if x < g[9] - 1.0 else g[9] - 1.0
+    j = np.int32(e)
+    wr = x - j
+    y = W2 * g[10]
+    m_slope = 2.0 * y if y < g[11] else 0.0
+    y = y if y < g[11] else g[11]
+    e = y if y < g[11] - 1.0 else g[11] - 1.0
+    m = np.int32(e)
+    wm = y - m
+    p0 = base + j * np.int32(g[13]) + 2 * i
+    q0 = base + np.int32(g[14]) + m * np.int32(g[12]) + 2 * i
+    a0, a1, d0, sd0 = _ends(tab, p0)
+    b0, b1, d1, sd1 = _ends(tab, p0 + np.int32(g[13]))
+    k0, k1, e0, se0 = _ends(tab, q0)
+    n0, n1, e1, se1 = _ends(tab, q0 + np.int32(g[12]))
+    # at either angle: a product of straight lines in ln Re and in the squared Mach number
+    dr0 = b0 - a0
+    dr1 = b1 - a1
+    dm0 = n0 - k0
+    dm1 = n1 - k1
+    r0 = a0 + wr * dr0
+    r1 = a1 + wr * dr1
+    m0 = k0 + wm * dm0
+    m1 = k1 + wm * dm1
+    l0 = r0 * m0
+    dl = r1 * m1 - l0
+    lr0 = dr0 * m0
+    lr = lr0 + wa * (dr1 * m1 - lr0)
+    lm0 = r0 * dm0
+    lm = lm0 + wa * (r1 * dm1 - lm0)
+    dr = d1 - d0 + wa * (sd1 - sd0)
+    dm = e1 - e0 + wa * (se1 - se0)
+    dd = sd0 + wr * (sd1 - sd0) + se0 + wm * (se1 - se0)
+    return (l0 + wa * dl, d0 + wa * sd0 + wr * dr + e0 + wa * se0 + wm * dm, dl * inv, dd * inv,
+            r_slope * lr + m_slope * lm, r_slope * dr + m_slope * dm)  # fmt: skip
+
+
+@inlined
+def _ends(tab, p0):
+    p = np.uint64(p0)
+    d0 = tab[p + np.uint64(1)]
+    return tab[p], tab[p + np.uint64(2)], d0, tab[p + np.uint64(3)] - d0
+
+
+@inlined
 def _cell(tab, p0, wa):
     p = np.uint64(p0)
     l0 = tab[p]
@@ -194,7 +246,7 @@ def open_rotor(lookup, phi, UT, UP, i_UP, beta, sg4, tip, hub, lre0, base, tab, 
     Parameters
     ----------
     lookup : function
-        :func:`lookup_plain` or :func:`lookup_full`.
+        :func:`lookup_plain`, :func:`lookup_full` or :func:`lookup_factored`.
     phi, UT, UP, i_UP, beta : float
         Inflow angle [rad], onset speeds [m/s], 1/UP or 0 at rest [s/m], blade angle [rad].
     sg4, tip, hub : float

@@ -23,7 +23,7 @@ from bemt.bem import residual as res
 from bemt.bem.packing import M2_STEP
 from bemt.effects import Effect, standard
 from bemt.effects.base import Baking
-from bemt.sections.polars import ALPHA_GRID, RE_FIXED, fixed_re
+from bemt.sections.polars import ALPHA_GRID
 
 if TYPE_CHECKING:
     from bemt.bem.duct import DuctFlow
@@ -67,9 +67,11 @@ class Prepared:
         Momentum numbers of the duct.
     st : (N, 12) float
         Columns ``S_*`` of :mod:`bemt.bem.kernel`, in SI units.
-    tab : (N, Nm, Nr, Na, 2) float
-        cl and cd over Mach number squared, Reynolds number and angle of attack [1].
-    num, grid : (11,), (16,) float
+    tab : (N, rows, Na, 2) float
+        Section tables as the kernel reads them, see :func:`bemt.bem.kernel.entry`; written out in ``tables`` [1].
+    axes : (int, int)
+        Mach and Reynolds numbers of the tables.
+    num, grid : (11,), (17,) float
         Numbers of the effects and of the table axes, see :mod:`bemt.bem.residual` and
         :mod:`bemt.bem.kernel` [SI units].
     """
@@ -80,6 +82,7 @@ class Prepared:
     duct: DuctFlow | None
     st: Array
     tab: Array
+    axes: tuple[int, int]
     num: Array
     grid: Array
 
@@ -91,14 +94,29 @@ class Prepared:
     @property
     def mach_top(self) -> float:
         """Largest tabulated Mach number; infinite when the tables do not depend on it [1]."""
-        n_m = self.tab.shape[1]
+        n_m = self.axes[0]
         return math.inf if n_m == 1 else math.sqrt((n_m - 1) * M2_STEP)
+
+    @property
+    def layout(self) -> str:
+        """How ``tab`` is laid out: the kernel's word for it."""
+        if self.axes == (1, 1):
+            return "plain"
+        return "factored" if self.grid[12] < 2 * self.tab.shape[2] * self.axes[1] and self.axes[0] > 1 else "full"
+
+    @property
+    def tables(self) -> Array:
+        """Coefficients cl, cd over squared Mach number, Reynolds number and angle, (N, Nm, Nr, Na, 2) [1]."""
+        n, rows, n_a, _ = self.tab.shape
+        if self.layout != "factored":
+            return self.tab.reshape(n, *self.axes, n_a, 2)
+        over_re, over_m = self.tab[:, None, : self.axes[1]], self.tab[:, self.axes[1] :, None]
+        return np.stack([over_re[..., 0] * over_m[..., 0], over_re[..., 1] + over_m[..., 1]], axis=-1)
 
     @cached_property
     def kernel(self) -> tuple[Callable[..., None], Array, Array, Array]:
         """Entry point of the kernel that fits the rotor, and its constant arguments."""
-        plain = self.tab.shape[1] == 1 and self.tab.shape[2] == 1
-        entry = K.entry(bool(self.num[res.N_DUCTED] > 0.0), plain)
+        entry = K.entry(bool(self.num[res.N_DUCTED] > 0.0), self.layout)
         st = np.array(self.st, dtype=np.float64, order="C")
         tab = np.ascontiguousarray(self.tab, dtype=np.float64).reshape(-1)
         return entry, st, tab, np.concatenate([self.num, self.grid])
@@ -195,14 +213,14 @@ def prepare(
     >>> from geometry.laws import helix
     >>> from geometry.rotor import Rotor
     >>> ready = prepare(Rotor(helix(0.254, 0.127), 2), [(0.75, linear_polar(cd=0.01))])
-    >>> ready.tab.shape[0], round(ready.mach_top, 3)
+    >>> ready.st.shape[0], round(ready.mach_top, 3)
     (40, 1.265)
     """
     if not polars:
         raise ValueError("polars: got none; expected at least one (r/R, Polar) pair")
     eff = standard() if effects is None else tuple(effects)
     if not any(e.id == "reynolds" for e in eff):
-        polars = [(x, fixed_re(p, RE_FIXED)) for x, p in polars]
+        polars = [(x, arrays.at_fixed_re(p)) for x, p in polars]
     for e in eff:
         duct = _enclosed(duct, e.duct(), rotor)
     blade = rotor.blade
@@ -214,7 +232,8 @@ def prepare(
         raise ValueError(f"polars: got r/R {x.tolist()}; expected ascending, distinct values")
     with_mach = any(p.M.size > 1 for _, p in polars) or any(e.uses_mach for e in eff)
     M2 = arrays.mach_grid(mach_max) if with_mach else np.zeros(1)
-    Re, cl, cd = arrays.common_grid([p for _, p in polars], np.sqrt(M2), re_range)
+    tabulated = np.sqrt(M2) if any(p.M.size > 1 for _, p in polars) else np.zeros(1)
+    Re, cl, cd = arrays.common_grid([p for _, p in polars], tabulated, re_range)
     rR = s.r / blade.R
     w = arrays.blend_weights(rR, x)
     alpha0, cla = arrays.zero_and_slope(ALPHA_GRID, cl[:, 0])
@@ -222,17 +241,30 @@ def prepare(
     bake = Baking(
         r=s.r, dr=s.dr, chord=s.chord, beta=s.beta.copy(), sigma=rotor.B * s.chord / (2.0 * np.pi * s.r),
         R=blade.R, Rhub=blade.Rhub, B=rotor.B, alpha=ALPHA_GRID, Re=Re, M2=M2,
-        cl=np.tensordot(w, cl, axes=1), cd=np.tensordot(w, cd, axes=1), alpha0=w @ alpha0, cla=w @ cla,
+        cl=_blended(w, cl), cd=_blended(w, cd), alpha0=w @ alpha0, cla=w @ cla,
         onset=np.zeros((s.r.size, 2)), thickness=np.interp(rR, [x for x, _ in shapes], [t for _, t in shapes]),
         own_mach=w @ np.array([float(p.M.size > 1) for _, p in polars]),
         gap=duct.gap if duct is not None else float("nan"), ducted=duct is not None, level=level,
     )  # fmt: skip
     for hook in ("blade", "inflow", "section", "momentum"):
-        for e in eff:
+        for e in (e for e in eff if getattr(type(e), hook) is not getattr(Effect, hook)):
+            if hook == "section" and bake.mach_apart and not e.uses_mach:
+                bake.spread()
+            # behind a change of Mach number, one that is written into the tables would come before it
+            bake.cl.flags.writeable = bake.cd.flags.writeable = not bake.mach_apart
             getattr(e, hook)(bake)
+    if Re.size == 1:
+        bake.spread()  # nothing to save
     num = _numbers(bake, duct)
-    tab = np.stack([bake.cl, bake.cd], axis=-1)
-    return Prepared(rotor, s, eff, duct, arrays.pack_stations(bake, num), tab, num, arrays.pack_grid(bake))
+    st, tab, grid = arrays.pack_stations(bake, num), arrays.pack_tables(bake), arrays.pack_grid(bake)
+    return Prepared(rotor, s, eff, duct, st, tab, (M2.size, Re.size), num, grid)
+
+
+def _blended(w: Array, tables: Array) -> Array:
+    """Tables of sections (P, Nm, Nr, Na) as those of stations (N, Nm, Nr, Na); one section needs no sum."""
+    if w.shape[1] == 1:
+        return np.repeat(tables, w.shape[0], axis=0)
+    return np.tensordot(w, tables, axes=1)
 
 
 def _enclosed(duct: DuctFlow | None, numbers: Mapping[str, float] | None, rotor: Rotor) -> DuctFlow | None:

@@ -86,8 +86,10 @@ class Baking:
         Reynolds grid [1].
     M2 : (Nm,) float
         Grid of the squared Mach number [1].
-    cl, cd : (N, Nm, Nr, Na) float
-        Section tables [1].
+    cl, cd : (N, Nm or 1, Nr, Na) float
+        Section tables; one Mach number until an effect tells them apart (:meth:`scale_lift`, :meth:`add_drag`) [1].
+    mach_lift, mach_drag : (N, Nm, 1, Na) float or None
+        Factor on cl and addition to cd that are kept apart from the tables; None: they are in them [1].
     alpha0, cla : (N, Nr) float
         Zero-lift angle [rad] and lift slope [1/rad] of the incompressible table.
     num : dict
@@ -129,6 +131,44 @@ class Baking:
     ducted: bool = False
     level: float = 1.0
     num: dict[str, float] = field(default_factory=dict)
+    mach_lift: Array | None = None
+    mach_drag: Array | None = None
+
+    def scale_lift(self, factor: Array) -> None:
+        """Multiply cl by a factor that may depend on Mach number, (N or 1, Nm or 1, Nr or 1, Na or 1) [1]."""
+        if self._apart(factor):
+            self.mach_lift = factor if self.mach_lift is None else self.mach_lift * factor
+        else:
+            self.cl *= factor
+
+    def add_drag(self, drag: Array) -> None:
+        """Add to cd what may depend on Mach number, (N or 1, Nm or 1, Nr or 1, Na or 1) [1]."""
+        if self._apart(drag):
+            self.mach_drag = drag if self.mach_drag is None else self.mach_drag + drag
+        else:
+            self.cd += drag
+
+    def spread(self) -> None:
+        """Write out the tables over every Mach number, for effects that change them in another way."""
+        shape = (self.cl.shape[0], self.M2.size, *self.cl.shape[2:])
+        if self.cl.shape != shape:
+            self.cl = np.multiply(self.cl, 1.0 if self.mach_lift is None else self.mach_lift, out=np.empty(shape))
+            self.cd = np.add(self.cd, 0.0 if self.mach_drag is None else self.mach_drag, out=np.empty(shape))
+        self.mach_lift = self.mach_drag = None
+
+    @property
+    def mach_apart(self) -> bool:
+        """Whether changes of Mach number wait beside the tables."""
+        return self.mach_lift is not None or self.mach_drag is not None
+
+    def _apart(self, values: Array) -> bool:
+        """Whether the change is of Mach number and not of Reynolds number, and the tables know neither."""
+        if self.cl.shape[1] == self.M2.size:
+            return False
+        if values.shape[2] > 1:
+            self.spread()
+            return False
+        return True
 
     @property
     def fast(self) -> slice:

@@ -63,7 +63,7 @@ class Compressibility(Effect):
         a = np.abs(bake.alpha_col)
         fade = np.clip((np.radians(40.0) - a) / np.radians(15.0), 0.0, 1.0)
         own = bake.own_mach[:, None, None, None]
-        bake.cl *= 1.0 + (self.factor(M, limit, growth) - 1.0) * fade * (1.0 - own)
+        bake.scale_lift(1.0 + (self.factor(M, limit, growth) - 1.0) * fade * (1.0 - own))
 
     def lift_divergence(self, thickness: ArrayLike, cl: ArrayLike) -> Array:
         """Mach number of the largest lift.

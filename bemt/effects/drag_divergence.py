@@ -51,7 +51,7 @@ class DragDivergence(Effect):
         a = bake.alpha_col
         small = np.abs(a) < np.radians(30.0)
         cap = 4.0 * (np.minimum(np.abs(a), 0.2) ** 2 + tc**2) / np.sqrt(np.maximum(M**2, 1.1025) - 1.0)
-        bake.cd += np.where(small, np.minimum(wave, cap), 0.0) * (1.0 - bake.own_mach[:, None, None, None])
+        bake.add_drag(np.where(small, np.minimum(wave, cap), 0.0) * (1.0 - bake.own_mach[:, None, None, None]))
 
     def rise(self, M: ArrayLike, M_dd: ArrayLike) -> Array:
         """Wave drag coefficient by the chosen law.
@@ -71,8 +71,10 @@ class DragDivergence(Effect):
         """
         above = np.asarray(M, dtype=float) - np.asarray(M_dd, dtype=float)
         if self.form == "lock":
-            return np.asarray(20.0 * np.maximum(above + (0.1 / 80.0) ** (1.0 / 3.0), 0.0) ** 4)
-        return np.asarray(10.0 * np.maximum(above + (0.002 / 10.0) ** (1.0 / 3.0), 0.0) ** 3)
+            square = np.maximum(above + (0.1 / 80.0) ** (1.0 / 3.0), 0.0) ** 2
+            return np.asarray(20.0 * square**2)
+        excess = np.maximum(above + (0.002 / 10.0) ** (1.0 / 3.0), 0.0)
+        return np.asarray(10.0 * excess * excess**2)
 
     def variants(self) -> tuple[dict[str, str | float], ...]:
         """Both laws at seven technology factors."""
