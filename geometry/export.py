@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from geometry.common import Array, Faults, GeometryError
 from geometry.duct import Duct
-from geometry.mesh import Model, Options, build
+from geometry.mesh import MeshModel, Options, build
 from geometry.rotor import Rotor
 from geometry.solid import Mesh
 
@@ -124,7 +124,7 @@ def _rounded(value: Any) -> Any:
     return float(f"{float(value):.9g}") if isinstance(value, (float, np.floating)) else value
 
 
-def _surfaces(model: Model) -> list[dict[str, Any]]:
+def _surfaces(model: MeshModel) -> list[dict[str, Any]]:
     return [{"name": name, "triangles": len(part.part(name)), "area_m2": part.area(name)}
             for part in model.parts for name in part.names]  # fmt: skip
 
@@ -159,7 +159,7 @@ def _weld(vertices: Array, faces: NDArray[np.int64]) -> tuple[Array, NDArray[np.
     return vertices[first], faces[keep]
 
 
-def _meshes(model: Model, work: Path, name: str, kind: str, unit: str) -> dict[str, Any]:
+def _meshes(model: MeshModel, work: Path, name: str, kind: str, unit: str) -> dict[str, Any]:
     """STL with one named solid per surface, or OBJ with one group per surface."""
     pieces = [f"# unit: {unit}\n# {FRAME}\n"] if kind == "obj" else []
     count = 0
@@ -182,7 +182,7 @@ def _meshes(model: Model, work: Path, name: str, kind: str, unit: str) -> dict[s
     return {"path": path.name, "format": kind, "unit": unit, "watertight": True, "surfaces": _surfaces(model)}
 
 
-def _openfoam(model: Model, work: Path) -> list[dict[str, Any]]:
+def _openfoam(model: MeshModel, work: Path) -> list[dict[str, Any]]:
     folder = work / "constant" / "triSurface"
     folder.mkdir(parents=True)
     out, paths = [], []

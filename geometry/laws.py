@@ -13,11 +13,11 @@ from geometry.airfoil import Airfoil
 from geometry.blade import Blade, from_stations
 from geometry.common import Array, Faults, GeometryError
 
-__all__ = ["CHORD_LAWS", "PITCH_LAWS", "Law", "Parameter", "chord_over_R", "from_laws", "helix"]
+__all__ = ["CHORD_LAWS", "PITCH_LAWS", "Law", "LawParameter", "chord_over_R", "from_laws", "helix"]
 
 
 @dataclass(frozen=True)
-class Parameter:
+class LawParameter:
     """A number of a law: its default and the range over which the default is uncertain (not a limit)."""
 
     default: float
@@ -34,7 +34,7 @@ class Law:
     name: str
     text: str
     source: str
-    parameters: Mapping[str, Parameter]
+    parameters: Mapping[str, LawParameter]
     function: Callable[..., Array]
 
 
@@ -53,8 +53,8 @@ def _fan(x: Array, hub: float) -> Array:
     return out
 
 
-def _max_chord(default: float, low: float, high: float) -> dict[str, Parameter]:
-    return {"max_chord": Parameter(default, low, high, "-", "greatest chord over R")}
+def _max_chord(default: float, low: float, high: float) -> dict[str, LawParameter]:
+    return {"max_chord": LawParameter(default, low, high, "-", "greatest chord over R")}
 
 
 _OURS = "declared assumption of this project"
@@ -68,7 +68,7 @@ CHORD_LAWS: Mapping[str, Law] = {
         Law("constant", "the same chord from hub to tip", "rectangular planform", _max_chord(0.15, 0.10, 0.20),
             lambda x, hub: np.ones_like(x)),
         Law("linear_taper", "straight from the hub to taper times the hub chord at the tip", "trapezoidal planform",
-            {**_max_chord(0.20, 0.15, 0.26), "taper": Parameter(0.5, 0.3, 1.0, "-", "tip chord over hub chord")},
+            {**_max_chord(0.20, 0.15, 0.26), "taper": LawParameter(0.5, 0.3, 1.0, "-", "tip chord over hub chord")},
             lambda x, hub, taper: 1 - (1 - taper) * (x - hub) / (1 - hub)),
         Law("fan", "ducted fan: nearly constant, 10 % less at hub and tip than at mid span", _OURS,
             _max_chord(0.45, 0.30, 0.60), _fan),
@@ -87,19 +87,19 @@ PITCH_LAWS: Mapping[str, Law] = {
     law.name: law
     for law in (
         Law("helix", "constant pitch: beta = atan(pitch / (2 pi r))", "true screw",
-            {"pitch": Parameter(math.nan, 0.0, math.inf, "m", "advance per turn")},
+            {"pitch": LawParameter(math.nan, 0.0, math.inf, "m", "advance per turn")},
             lambda x, R, hub, pitch: np.arctan(pitch / (2 * np.pi * x * R))),
         Law("linear_twist", "beta straight in r from hub to tip", "usual for rotors",
-            {"beta_root": Parameter(math.nan, 0.0, math.pi / 2, "rad", "blade angle at the hub"),
-             "beta_tip": Parameter(math.nan, 0.0, math.pi / 2, "rad", "blade angle at the tip")},
+            {"beta_root": LawParameter(math.nan, 0.0, math.pi / 2, "rad", "blade angle at the hub"),
+             "beta_tip": LawParameter(math.nan, 0.0, math.pi / 2, "rad", "blade angle at the tip")},
             lambda x, R, hub, beta_root, beta_tip: beta_root + (beta_tip - beta_root) * (x - hub) / (1 - hub)),
         Law("constant_beta", "untwisted blade (such as NASA TM-81232)", "untwisted",
-            {"beta": Parameter(math.nan, 0.0, math.pi / 2, "rad", "collective angle")},
+            {"beta": LawParameter(math.nan, 0.0, math.pi / 2, "rad", "collective angle")},
             lambda x, R, hub, beta: np.full_like(x, beta)),
         Law("tip_relieved", "constant pitch to r/R = start, then it falls quadratically by `relief` at the tip", _OURS,
-            {"pitch": Parameter(math.nan, 0.0, math.inf, "m", "advance per turn inboard"),
-             "relief": Parameter(0.15, 0.0, 0.4, "-", "fraction of the pitch lost at the tip"),
-             "start": Parameter(0.7, 0.5, 0.9, "-", "r/R where the relief begins")}, _tip_relieved),
+            {"pitch": LawParameter(math.nan, 0.0, math.inf, "m", "advance per turn inboard"),
+             "relief": LawParameter(0.15, 0.0, 0.4, "-", "fraction of the pitch lost at the tip"),
+             "start": LawParameter(0.7, 0.5, 0.9, "-", "r/R where the relief begins")}, _tip_relieved),
     )
 }  # fmt: skip
 """Pitch laws by name; each function gives beta [rad] at r/R for R [m] and a hub ratio."""

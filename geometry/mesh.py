@@ -22,13 +22,23 @@ from geometry.mesh_duct import duct_mesh, plan_stator
 from geometry.rotor import Rotor
 from geometry.solid import Mesh, Options, as_solid, check_closed, join, profile_volume, revolve, skin
 
-__all__ = ["Mesh", "Model", "Options", "blade_volume", "build", "hub_profile", "radii", "rotor_mesh", "wrapped_outline"]
+__all__ = [
+    "Mesh",
+    "MeshModel",
+    "Options",
+    "blade_volume",
+    "build",
+    "hub_profile",
+    "radii",
+    "rotor_mesh",
+    "wrapped_outline",
+]
 
 VOLUME_TOLERANCE = 5e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
+class MeshModel:
     """Everything that is exported: the turning solid and the standing one.
 
     Parameters
@@ -321,7 +331,7 @@ def _integral(blade: Blade, ring: Array, options: Options) -> float:
     return total
 
 
-def build(rotor: Rotor, duct: Duct | None = None, options: Options | None = None) -> Model:
+def build(rotor: Rotor, duct: Duct | None = None, options: Options | None = None) -> MeshModel:
     """Mesh a rotor and its duct and check how they fit.
 
     Parameters
@@ -335,7 +345,7 @@ def build(rotor: Rotor, duct: Duct | None = None, options: Options | None = None
 
     Returns
     -------
-    Model
+    MeshModel
         Closed meshes with named surfaces.
 
     Raises
@@ -354,7 +364,7 @@ def build(rotor: Rotor, duct: Duct | None = None, options: Options | None = None
     options = options or Options()
     mesh, checks = _rotor(rotor, options)
     if duct is None:
-        return Model(mesh, None, checks)
+        return MeshModel(mesh, None, checks)
     duct.check(rotor)
     rho, z = np.hypot(mesh.vertices[:, 0], mesh.vertices[:, 1]), mesh.vertices[:, 2]
     hub = np.unique(mesh.part("hub"))
@@ -379,4 +389,4 @@ def build(rotor: Rotor, duct: Duct | None = None, options: Options | None = None
         raise GeometryError([("duct.rotor_x", f"{duct._rotor * 1e3:.4g} mm, blade tips outside the duct",
                               "blade tips inside the duct", "Move the rotor or lengthen the duct")])  # fmt: skip
     checks["gap"] = gap
-    return Model(mesh, standing, checks)
+    return MeshModel(mesh, standing, checks)

@@ -20,13 +20,13 @@ from geometry.cylinder_cut import blades
 from geometry.rotor_axis import PROBES, frame, pick
 from geometry.section_fit import Cut, fit_section, nose_first
 
-__all__ = ["Found", "find_rotor"]
+__all__ = ["FoundRotor", "find_rotor"]
 
 Faces = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class FoundRotor:
     """A rotor found in a mesh; lengths in the mesh's own unit, angles in radians.
 
     Parameters
@@ -92,7 +92,7 @@ def _hub(points: Array, faces: Faces, tip: float, count: int) -> float:
 
 def find_rotor(
     vertices: Array, faces: Faces, stations: int = 28, at: Sequence[float] | None = None, n: int = 121
-) -> Found:
+) -> FoundRotor:
     """Find the rotor in a mesh and cut its blades.
 
     Parameters
@@ -110,7 +110,7 @@ def find_rotor(
 
     Returns
     -------
-    Found
+    FoundRotor
         Axis, blades, stations.
 
     Raises
@@ -152,7 +152,7 @@ def find_rotor(
     columns = np.array([[c.chord, c.beta, c.thickness, c.camber, c.camber_position] for c in rows]).T
     if spread > 0.05:
         notes.append(f"the blades differ from each other (spread {spread:.2g}): damaged, or no rotor of equal blades")
-    return Found(
+    return FoundRotor(
         count, rotation, tip, hub, origin, sign * axis / np.linalg.norm(axis), np.array(r), columns[0],
         columns[1], columns[2], columns[3], columns[4], tuple(c.section for c in rows), spread, tuple(notes),
     )  # fmt: skip

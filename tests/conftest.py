@@ -73,9 +73,11 @@ def polar() -> Polar:
     """Cambered section with a stall, from closed forms: no network, no Reynolds dependence."""
     import numpy as np
 
-    from bemt.sections.extrapolation import SectionTable, from_tables
+    from bemt.sections.extrapolation import ExtrapolatedTable, from_tables
 
     alpha = np.radians(np.arange(-20.0, 25.5, 0.5))
     linear = 5.9 * (alpha + np.radians(4.0))
     cl = np.clip(linear, -0.9, 1.3) - 0.8 * np.clip(np.abs(alpha) - np.radians(13.0), 0.0, None)
-    return from_tables([SectionTable(alpha, cl, 0.012 + 0.008 * cl**2)], name="closed form", source="made for tests")
+    return from_tables(
+        [ExtrapolatedTable(alpha, cl, 0.012 + 0.008 * cl**2)], name="closed form", source="made for tests"
+    )

@@ -14,14 +14,14 @@ from bemt.base.errors import InputError
 from bemt.commands import calibrate, cli
 from bemt.formula import compact, fit, gather, limit, refit, score
 from bemt.formula import points as reading
-from bemt.formula.points import Points, Propeller
+from bemt.formula.points import FitPoints, Propeller
 
 INCH = 0.0254
 SIZES = [(8, 4), (8, 6), (9, 4.5), (9, 7), (10, 5), (10, 7), (11, 5.5), (11, 8), (12, 6), (12, 10), (14, 5), (14, 8)]
 RPM = np.array([2000.0, 3500.0, 5000.0, 6500.0])
 
 
-def planted(K1=0.31, K2=1.4, spoil=()) -> Points:
+def planted(K1=0.31, K2=1.4, spoil=()) -> FitPoints:
     """Points at rest that follow K1/K2 exactly; propellers in `spoil` have thrice the thrust."""
     rows = []
     for i, (d, p) in enumerate(SIZES):
@@ -39,7 +39,7 @@ def test_planted_constants_come_back_and_two_wild_propellers_do_not_move_them():
     assert (wild.K1, wild.K2) == pytest.approx((0.31, 1.4), abs=0.01)
 
 
-def noisy(seed: int, scatter=0.1) -> Points:
+def noisy(seed: int, scatter=0.1) -> FitPoints:
     """Each propeller off by its own factor, as real ones are."""
     points = planted()
     factor = np.exp(scatter * np.random.default_rng(seed).standard_normal(len(points.propellers)))
@@ -56,7 +56,7 @@ def test_intervals_cover_the_truth():
 
 def test_more_rows_of_the_same_propellers_are_no_more_evidence():
     points = noisy(1)
-    many = Points(points.propellers, *(np.tile(getattr(points, n), 5) for n in ("index", "rpm", "J", "CT", "CP")))
+    many = FitPoints(points.propellers, *(np.tile(getattr(points, n), 5) for n in ("index", "rpm", "J", "CT", "CP")))
     a, b = fit.fit(points, draws=300), fit.fit(many, draws=300)
     assert (b.K1, b.K2) == pytest.approx((a.K1, a.K2), rel=1e-9)
     assert np.ptp(b.K1_95) == pytest.approx(np.ptp(a.K1_95), rel=1e-6)
@@ -65,7 +65,7 @@ def test_more_rows_of_the_same_propellers_are_no_more_evidence():
 def test_a_propeller_with_many_rows_does_not_rule():
     points = planted(spoil=(0,))
     own = points.index == 0
-    many = Points(points.propellers, *(np.concatenate([getattr(points, n), np.tile(getattr(points, n)[own], 50)])
+    many = FitPoints(points.propellers, *(np.concatenate([getattr(points, n), np.tile(getattr(points, n)[own], 50)])
                                        for n in ("index", "rpm", "J", "CT", "CP")))  # fmt: skip
     assert fit.fit(many, draws=0).K1 == pytest.approx(0.31, abs=0.01)
 
@@ -104,7 +104,7 @@ def test_too_little_to_fit_is_refused():
         fit.fit(points.select(np.isin(points.index, (0, 2, 4))))
 
 
-def from_formula(constants: compact.Constants) -> Points:
+def from_formula(constants: compact.Constants) -> FitPoints:
     rows = []
     for i, (d, p) in enumerate(SIZES * 2):
         D = (d + 0.25 * (i >= len(SIZES))) * INCH
@@ -245,14 +245,14 @@ def test_the_document_the_page_and_the_figure(tmp_path: Path, capsys: pytest.Cap
 
 
 @pytest.fixture(scope="module")
-def volume_1(shared_data: Path) -> Points:
+def volume_1(shared_data: Path) -> FitPoints:
     folder = shared_data / "uiuc" / "volume-1"
     if not folder.is_dir():
         pytest.skip(f"no UIUC data at {folder}")
     return gather.load([folder])
 
 
-def test_volume_1_against_the_thesis(volume_1: Points):
+def test_volume_1_against_the_thesis(volume_1: FitPoints):
     k = fit.fit(volume_1, draws=200)
     assert fit.goal_seek(volume_1).K1 == pytest.approx(0.2984, abs=1e-4)
     assert (k.K1, k.K2) == pytest.approx((0.3218, 1.647), abs=2e-3)

@@ -19,9 +19,9 @@ import pytest
 
 from bemt.base.errors import InputError
 from bemt.cfd.command import run_campaign
-from bemt.cfd.record import COLUMNS, Record, grid_studies, grid_uncertainty
+from bemt.cfd.record import COLUMNS, CampaignRecord, grid_studies, grid_uncertainty
 from bemt.cfd.schema import load_campaign
-from bemt.cfd.start import State, splice
+from bemt.cfd.start import StartField, splice
 from bemt.cfd.worker import point_key, radial_of
 from bemt.commands.cli import main
 from bemt.exports.openfoam.write import settings_of
@@ -351,10 +351,10 @@ def test_a_recording_that_is_not_ours_is_left_alone(project: Path, tmp_path: Pat
     path = write(tmp_path / "c", project, TWO)
     (path.parent / "recording.csv").write_text("rpm,thrust_N\n1,2\n")
     with pytest.raises(InputError, match="another header"):
-        Record(load_campaign(path))
+        CampaignRecord(load_campaign(path))
     (path.parent / "recording.csv").write_text(",".join(COLUMNS) + "\nabc,1\n")
     with pytest.raises(InputError, match="a line cut short"):
-        Record(load_campaign(path))
+        CampaignRecord(load_campaign(path))
 
 
 def test_a_run_that_a_campaign_beside_has_is_taken_over(project: Path, tmp_path: Path, programs: Path) -> None:
@@ -398,7 +398,7 @@ def test_a_flow_is_scaled_to_another_speed() -> None:
     head = b"FoamFile\n{\n    format binary;\n}\ninternalField   nonuniform List<"
     source = head + b"vector> \n2\n(" + U.tobytes() + b")\n;\nboundaryField {}"
     target = b"FoamFile\n{\n    format ascii;\n}\ninternalField uniform (0 0 -8);\nboundaryField {a}"
-    old, new = State(1000.0, (0.0, 0.0, -5.0), 0.0, False), State(2000.0, (0.0, 0.0, -8.0), 0.0, False)
+    old, new = StartField(1000.0, (0.0, 0.0, -5.0), 0.0, False), StartField(2000.0, (0.0, 0.0, -8.0), 0.0, False)
     made = splice("U", source, target, old, new)
     assert made is not None and made.endswith(b"boundaryField {a}") and b"format binary;" in made
     values = np.frombuffer(made.split(b"2\n(", 1)[1][: U.nbytes]).reshape(2, 3)
@@ -407,7 +407,7 @@ def test_a_flow_is_scaled_to_another_speed() -> None:
     source = head + b"scalar> \n2\n(" + p.tobytes() + b")\n;\n"
     made = splice("p", source, b"internalField uniform 0;\n", old, new)
     assert made is not None and np.frombuffer(made.split(b"2\n(", 1)[1][:16]) == pytest.approx(4 * p)
-    assert splice("p", source, target, old, State(2000.0, (0.0, 0.0, 0.0), 1e5, True)) is None
+    assert splice("p", source, target, old, StartField(2000.0, (0.0, 0.0, 0.0), 1e5, True)) is None
     assert splice("U", source[:-10], target, old, new) is None and splice("T", source, target, old, new) is None
 
 

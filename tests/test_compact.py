@@ -14,7 +14,7 @@ from bemt import coefficients as co
 from bemt.air import Air
 from bemt.base.errors import InputError
 from bemt.formula import compact, estimate, gather, refit, score
-from bemt.formula.points import Points
+from bemt.formula.points import FitPoints
 
 INCH = 0.0254
 QUICK = settings(deadline=None, max_examples=40)
@@ -181,14 +181,14 @@ def test_all_faults_at_once():
 
 
 @pytest.fixture(scope="module")
-def volumes(shared_data: Path) -> dict[int, Points]:
+def volumes(shared_data: Path) -> dict[int, FitPoints]:
     folder = shared_data / "uiuc"
     if not folder.is_dir():
         pytest.skip(f"no UIUC data at {folder}")
     return {v: gather.load([folder / f"volume-{v}"]) for v in (1, 2)}
 
 
-def shares(points: Points, CT: np.ndarray) -> dict[str, object]:
+def shares(points: FitPoints, CT: np.ndarray) -> dict[str, object]:
     found = score.score(points, {"m": CT})
     bands = [row["models"]["m"]["median"] for row in found["J/(P/D)"][:4]]
     return {"static": found["static"]["models"]["m"], "flight": bands}

@@ -116,7 +116,7 @@ def test_caradonna_tung_hover(shared_data: Path) -> None:
             angle, rpm, _, ct = map(float, row)
             rotor = truth.TruthRotor(
                 1.143, 2, (0.17, 1.0), (0.1905 / 1.143,) * 2, (np.radians(angle),) * 2,
-                truth_section.Section(0.0, 0.4, 0.12), panels=20,
+                truth_section.TrueSection(0.0, 0.4, 0.12), panels=20,
             )  # fmt: skip
             got = truth.solve(rotor, np.array([rpm]), np.zeros(1), np.array([15.0]), np.array([P_ROOM]))
             tip = rpm * np.pi / 30.0 * 1.143
@@ -134,7 +134,7 @@ def test_uiuc_propellers(shared_data: Path, name: str, camber: float) -> None:
     x, c, beta = np.loadtxt(folder / f"{name}_geom.txt", skiprows=1).T
     keep = x >= 0.15
     diameter = float(name.split("_")[1].split("x")[0]) * 0.0254
-    section = truth_section.Section(camber, 0.4, 0.09)
+    section = truth_section.TrueSection(camber, 0.4, 0.09)
     rotor = truth.TruthRotor(0.5 * diameter, 2, tuple(x[keep]), tuple(c[keep]), tuple(np.radians(beta[keep])), section)
     errors: dict[str, list[np.ndarray]] = {"static": [], "flight": []}
     for path in sorted(folder.glob(f"{name}_*.txt")):
@@ -231,7 +231,7 @@ def test_noise_has_the_covariance_that_the_yardstick_uses() -> None:
     ones = np.linspace(0.5, 1.0, n)
     empty = np.zeros((n, 1))
     still = truth.Answer(ones, ones, ones > 0, empty, empty, empty, ones, ones, ones, ones, ones)
-    loads = truth_world.Loads(ones, ones, ones, ones, still)
+    loads = truth_world.TrueLoads(ones, ones, ones, ones, still)
     stand = Stand(noise=0.01, session=0.01, step=1e-6)
     rng = np.random.default_rng(3)
     sample = np.array([record(loads, rows, 0.1, None, stand, rng)["thrust_N"] for _ in range(6000)])

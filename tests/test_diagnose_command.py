@@ -302,7 +302,7 @@ ODD_UNITS = [
 ]
 
 
-def _of(name: str, seed: int, plan: str = "grid", truth: str = "prop_8x5", **factors: float) -> record.Record:
+def _of(name: str, seed: int, plan: str = "grid", truth: str = "prop_8x5", **factors: float) -> record.CampaignRecord:
     own = case(truth)
     series = recording(own, points(plan, own.diameter_m), seed=seed)
     values = {k: v * factors.get(k, 1.0) for k, v in series.values.items()}

@@ -40,7 +40,7 @@ def conditions(name: str) -> dict[str, np.ndarray]:
     return points("air")
 
 
-def as_record(given: dict[str, np.ndarray], of: Case) -> record.Record:
+def as_record(given: dict[str, np.ndarray], of: Case) -> record.CampaignRecord:
     ones = np.ones_like(given["rpm"])
     return record.from_series(Dataset("bench", "points", {**given, "thrust_N": ones, "torque_Nm": ones}), of)
 

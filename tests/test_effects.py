@@ -22,7 +22,7 @@ from bemt.bem import duct as duct_model
 from bemt.bem import evaluate, forward
 from bemt.case import load_case
 from bemt.effects.base import Effect, Flow, Parameter, Reading
-from bemt.sections.extrapolation import SectionTable, from_tables
+from bemt.sections.extrapolation import ExtrapolatedTable, from_tables
 from bemt.sections.polars import Polar
 from geometry.airfoil import naca4
 from geometry.duct import Stator, around
@@ -79,7 +79,7 @@ def section_table() -> Polar:
     alpha = np.radians(np.arange(-20.0, 25.5, 0.5))
     cl = np.clip(5.9 * (alpha + np.radians(4.0)), -0.9, 1.3)
     cl = cl - 0.8 * np.clip(np.abs(alpha) - np.radians(13.0), 0.0, None)
-    tables = [SectionTable(alpha, cl * k, (0.012 + 0.008 * cl**2) / k, Re) for Re, k in ((3e4, 0.9), (3e5, 1.05))]
+    tables = [ExtrapolatedTable(alpha, cl * k, (0.012 + 0.008 * cl**2) / k, Re) for Re, k in ((3e4, 0.9), (3e5, 1.05))]
     return from_tables(tables, name="closed form", source="made for tests")
 
 

@@ -18,7 +18,7 @@ from bemt.effects.pitch_offset import PitchOffset
 from bemt.effects.post_stall import PostStall
 from bemt.effects.section import Section
 from bemt.effects.stall_delay import StallDelay
-from bemt.sections.extrapolation import SectionTable, from_tables
+from bemt.sections.extrapolation import ExtrapolatedTable, from_tables
 from bemt.sections.polars import ALPHA_GRID, Polar
 from geometry.laws import helix
 from geometry.rotor import Rotor
@@ -32,7 +32,7 @@ def table(cd_max: float = 1.3) -> Polar:
     """Section whose data end at its stall, 13 deg on both sides; Viterna beyond."""
     alpha = np.radians(np.linspace(-13.0, 13.0, 53))
     cl = 5.9 * (alpha + np.radians(2.0))
-    return from_tables([SectionTable(alpha, cl, 0.012 + 0.008 * cl**2)], cd_max=cd_max)
+    return from_tables([ExtrapolatedTable(alpha, cl, 0.012 + 0.008 * cl**2)], cd_max=cd_max)
 
 
 @cache

@@ -14,9 +14,9 @@ from geometry.common import GeometryError
 from geometry.cylinder_cut import blades
 from geometry.duct import Duct, Stator, around
 from geometry.laws import from_laws, helix
-from geometry.mesh import Model, Options, build, rotor_mesh
+from geometry.mesh import MeshModel, Options, build, rotor_mesh
 from geometry.rotor import Rotor
-from geometry.slicing import Found, find_rotor
+from geometry.slicing import FoundRotor, find_rotor
 from geometry.solid import check_closed
 
 CASES = ("ds30", "prop_8x5", "prop_10x5", "prop_12x6", "prop_14x8")
@@ -42,7 +42,7 @@ def random_rotor(rng: np.random.Generator) -> tuple[Rotor, Duct | None]:
     return rotor, duct
 
 
-def turned(model: Model, rng: np.random.Generator, scale: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def turned(model: MeshModel, rng: np.random.Generator, scale: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """All triangles somewhere else, somehow turned, in another unit; and where thrust points then."""
     start = np.cumsum([0, *(len(part.vertices) for part in model.parts)])
     faces = np.concatenate([part.faces + n for part, n in zip(model.parts, start, strict=False)])
@@ -52,7 +52,7 @@ def turned(model: Model, rng: np.random.Generator, scale: float) -> tuple[np.nda
     return (points @ q.T + rng.normal(size=3)) * scale, faces, q[:, 2]
 
 
-def errors(found: Found, rotor: Rotor, scale: float) -> tuple[float, float]:
+def errors(found: FoundRotor, rotor: Rotor, scale: float) -> tuple[float, float]:
     """Greatest error of chord (relative) and of beta (degrees) between 0.25 and 0.95 R."""
     x = found.r / found.R
     inside = (x > 0.25) & (x < 0.95)

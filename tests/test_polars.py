@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bemt.sections import polars as P
-from bemt.sections.extrapolation import SectionTable, from_tables
+from bemt.sections.extrapolation import ExtrapolatedTable, from_tables
 from bemt.sections.neuralfoil import neuralfoil_polar
 from bemt.sections.polars import ALPHA_GRID, DEFAULT_RE, Polar
 from geometry.airfoil import naca
@@ -65,7 +65,7 @@ def test_lookup_wraps_alpha_and_holds_re_and_mach() -> None:
 def test_derived_quantities_of_a_known_curve() -> None:
     a = np.deg2rad(np.arange(-20.0, 20.5, 0.5))
     rise = np.where(a < deg(12)[0], a, 2 * deg(12)[0] - a)
-    p = from_tables([SectionTable(a, 6.0 * (np.maximum(rise, deg(-11)[0]) + deg(3)[0]), 0.01 + a**2)])
+    p = from_tables([ExtrapolatedTable(a, 6.0 * (np.maximum(rise, deg(-11)[0]) + deg(3)[0]), 0.01 + a**2)])
     assert p.alpha0(1e5) == pytest.approx(deg(-3)[0], abs=1e-9)
     assert p.cl_alpha(1e5) == pytest.approx(6.0, abs=1e-6)
     assert p.stall(1e5) == pytest.approx((deg(12)[0], 6.0 * deg(15)[0]), abs=1e-6)

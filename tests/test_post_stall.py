@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from bemt.sections.extrapolation import METHODS, SectionTable, extend, from_tables, viterna_cd_max
+from bemt.sections.extrapolation import METHODS, ExtrapolatedTable, extend, from_tables, viterna_cd_max
 
 
 def deg(*angles: float) -> np.ndarray:
@@ -67,7 +67,7 @@ def test_viterna_cd_max_follows_the_aspect_ratio() -> None:
 
 def test_tables_keep_their_data_and_are_mirrored_where_none_are() -> None:
     a = np.deg2rad(np.arange(-2.0, 14.5, 1.0))
-    tables = [SectionTable(a, 5.5 * a + 0.3, 0.02 + a**2, Re) for Re in (1e5, 4e5)]
+    tables = [ExtrapolatedTable(a, 5.5 * a + 0.3, 0.02 + a**2, Re) for Re in (1e5, 4e5)]
     p = from_tables(tables, name="x", cd_max=1.3)
     for t in tables:
         np.testing.assert_allclose(p.lookup(a, t.Re), (t.cl, t.cd), atol=1e-9)
@@ -79,11 +79,11 @@ def test_tables_keep_their_data_and_are_mirrored_where_none_are() -> None:
 
 def test_tables_that_cannot_be_continued_are_refused() -> None:
     a = np.deg2rad(np.arange(-2.0, 14.5, 1.0))
-    good = SectionTable(a, 5.5 * a, 0.02 + a**2)
+    good = ExtrapolatedTable(a, 5.5 * a, 0.02 + a**2)
     for bad in (
-        [SectionTable(a[5:], good.cl[5:], good.cd[5:])], [SectionTable(a[:6], good.cl[:6], good.cd[:6])],
-        [SectionTable(a[::-1], good.cl, good.cd)], [good, good],
-        [good, SectionTable(a, good.cl, good.cd, 2e5, 0.5)],
+        [ExtrapolatedTable(a[5:], good.cl[5:], good.cd[5:])], [ExtrapolatedTable(a[:6], good.cl[:6], good.cd[:6])],
+        [ExtrapolatedTable(a[::-1], good.cl, good.cd)], [good, good],
+        [good, ExtrapolatedTable(a, good.cl, good.cd, 2e5, 0.5)],
     ):  # fmt: skip
         with pytest.raises(ValueError, match="expected"):
             from_tables(bad)

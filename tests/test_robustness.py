@@ -18,7 +18,7 @@ from bemt.air import Air
 from bemt.bem import solver
 from bemt.bem.duct import DuctFlow
 from bemt.effects import catalogue, standard, without
-from bemt.sections.extrapolation import SectionTable, from_tables
+from bemt.sections.extrapolation import ExtrapolatedTable, from_tables
 from bemt.sections.polars import Polar, linear_polar
 from geometry.blade import from_stations
 from geometry.rotor import Rotor
@@ -35,7 +35,7 @@ def rough() -> Polar:
         top = 0.7 + 0.18 * np.log10(re / 5e3)
         past = np.clip(np.abs(alpha) - np.radians(11.0), 0.0, None)
         cl = np.clip(5.9 * (alpha + np.radians(4.0)), -0.9, top) - 2.0 * np.sign(alpha) * past
-        tables.append(SectionTable(alpha, cl, 0.008 + 0.3 / np.sqrt(re) + 0.008 * cl**2, Re=re))
+        tables.append(ExtrapolatedTable(alpha, cl, 0.008 + 0.3 / np.sqrt(re) + 0.008 * cl**2, Re=re))
     return from_tables(tables, name="rough", source="made for tests")
 
 
@@ -117,7 +117,7 @@ def test_the_unstalled_root_is_taken() -> None:
     alpha = np.radians(np.arange(-20.0, 25.5, 0.5))
     cl = np.where(alpha < np.radians(12.0), 6.0 * alpha, 1.2566 - 6.0 * (alpha - np.radians(12.0)))
     cl = np.where(alpha > np.radians(17.0), 0.733, cl)  # a deep, sudden stall
-    polar = from_tables([SectionTable(alpha, cl, 0.01 + 0.0 * alpha)], name="sudden", source="made for tests")
+    polar = from_tables([ExtrapolatedTable(alpha, cl, 0.01 + 0.0 * alpha)], name="sudden", source="made for tests")
     R = 0.2
     r = np.linspace(0.05, R, 12)
     V = np.linspace(0.0, 20.0, 1001)

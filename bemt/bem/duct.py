@@ -121,7 +121,7 @@ def duct_flow(duct: Duct, rotor: Rotor) -> DuctFlow:
 
     Parameters
     ----------
-    duct : geometry.duct.Duct
+    duct : geometry.duct.DuctEffect
         Duct.
     rotor : geometry.rotor.Rotor
         Rotor inside it.

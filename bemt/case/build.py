@@ -190,7 +190,7 @@ def build_duct(case: Case) -> Duct | None:
 
     Returns
     -------
-    geometry.duct.Duct or None
+    geometry.duct.DuctEffect or None
         None when the case has no duct.
 
     Raises

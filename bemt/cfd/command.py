@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from bemt.base.errors import EXIT_INPUT, EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
 from bemt.base.tables import json_text, number_text, remove_stale, text_table
-from bemt.cfd.record import Record
+from bemt.cfd.record import CampaignRecord
 from bemt.cfd.schema import Campaign, load_campaign
 from bemt.cfd.worker import Worker, point_key
 
@@ -26,7 +26,7 @@ __all__ = ["run", "run_campaign"]
 
 def run_campaign(
     campaign: Campaign, work: Path, only: int | None = None, ranks: int = 2, quiet: bool = False, keep: bool = True
-) -> Record:
+) -> CampaignRecord:
     """Run the points of a campaign that are not recorded yet.
 
     Parameters
@@ -48,7 +48,7 @@ def run_campaign(
 
     Returns
     -------
-    Record
+    CampaignRecord
         What is recorded now; it is on the disk already.
 
     Raises
@@ -73,7 +73,7 @@ def run_campaign(
     if faults:
         raise InputError(faults)
     remove_stale(campaign.path.parent)
-    record = Record(campaign)
+    record = CampaignRecord(campaign)
     record.borrow(order if only is None else [])
     record.write(order)
     fresh = not work.exists()
@@ -112,7 +112,7 @@ def _remove_empty(folder: Path) -> None:
         folder.rmdir()
 
 
-def _table(record: Record) -> str:
+def _table(record: CampaignRecord) -> str:
     head = ["run", "rpm", "V [m/s]", "T [N]", "u [N]", "Q [N m]", "solver", "level", "cells", "drift T [%]", "y+", "s"]
     rows = []
     for r in record.rows:

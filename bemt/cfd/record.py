@@ -20,7 +20,7 @@ from bemt.cfd.worker import DRIFT_LIMIT, SCATTER_LIMIT, Outcome
 from bemt.readers import number
 from bemt.recordings.grid_study import grid_study, ratios
 
-__all__ = ["COLUMNS", "Record", "grid_studies", "grid_uncertainty"]
+__all__ = ["COLUMNS", "CampaignRecord", "grid_studies", "grid_uncertainty"]
 
 COLUMNS = (
     "run", "rpm", "airspeed_m_s", "J", "thrust_N", "torque_Nm", "u_thrust_N", "u_torque_Nm", "thrust_rotor_N",
@@ -149,7 +149,7 @@ def grid_uncertainty(studies: Sequence[Mapping[str, Any]], row: Mapping[str, Any
     return {key: max(float(study[key]["u_relative"][level]) for study in found) for key in ("thrust_N", "torque_Nm")}
 
 
-class Record:
+class CampaignRecord:
     """Files of one campaign; every change is written whole.
 
     Parameters

@@ -14,7 +14,7 @@ from bemt.case import Case, check_name, load_case
 from bemt.exports.openfoam.settings import DOMAINS, GASES, SECTORS, TURBULENCE
 from bemt.exports.openfoam.write import Run
 
-__all__ = ["SCHEMA_NAME", "Campaign", "Point", "load_campaign"]
+__all__ = ["SCHEMA_NAME", "Campaign", "CampaignPoint", "load_campaign"]
 
 SCHEMA_NAME = "bemt.cfd/1"
 STARTS = ("neighbour", "slipstream")
@@ -57,7 +57,7 @@ SCHEMA: dict[str, dict[str, Key]] = {
 
 
 @dataclass(frozen=True)
-class Point:
+class CampaignPoint:
     """One run of a campaign.
 
     Parameters
@@ -90,7 +90,7 @@ class Campaign:
         Names.
     case : Case
         The case, unchanged.
-    points : tuple of Point
+    points : tuple of CampaignPoint
         In the order in which they run.
     grid_study : Path or None
         Folder of the campaign whose grid study gives the numerical uncertainty.
@@ -100,7 +100,7 @@ class Campaign:
     name: str
     title: str
     case: Case
-    points: tuple[Point, ...]
+    points: tuple[CampaignPoint, ...]
     grid_study: Path | None
 
 
@@ -193,7 +193,9 @@ def _rows(out: Collector, document: Mapping[str, Any]) -> list[tuple[str, dict[s
     return found
 
 
-def _point(out: Collector, where: str, row: dict[str, Any], case: Case, duct: Mapping[str, Any] | None) -> list[Point]:
+def _point(
+    out: Collector, where: str, row: dict[str, Any], case: Case, duct: Mapping[str, Any] | None
+) -> list[CampaignPoint]:
     overrides: dict[str, Any] = {}
     if "pitch_offset_deg" in row:
         overrides["blade.beta_offset_deg"] = case.file.blade.beta_offset_deg + row["pitch_offset_deg"]
@@ -218,4 +220,4 @@ def _point(out: Collector, where: str, row: dict[str, Any], case: Case, duct: Ma
     except InputError as error:
         out.faults += [Fault(out.file, f"{where}: {f.where}", f.got, f.expected, f.hint) for f in error.faults]
         return []
-    return [Point(changed, run, row, row.get("start", "neighbour") == "neighbour")]
+    return [CampaignPoint(changed, run, row, row.get("start", "neighbour") == "neighbour")]

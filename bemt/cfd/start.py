@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["State", "splice"]
+__all__ = ["StartField", "splice"]
 
 _FIELD = re.compile(rb"internalField\s+nonuniform\s+List<(scalar|vector)>\s*(\d+)\s*\(")
 _UNIFORM = re.compile(rb"internalField\s+uniform[^;]*;")
@@ -19,7 +19,7 @@ POWERS = {"U": 1, "p": 2, "k": 2, "omega": 1, "epsilon": 3, "nut": 1}
 
 
 @dataclass(frozen=True)
-class State:
+class StartField:
     """What a flow was computed for.
 
     Parameters
@@ -40,7 +40,7 @@ class State:
     compressible: bool
 
 
-def splice(name: str, source: bytes, target: bytes, old: State, new: State) -> bytes | None:
+def splice(name: str, source: bytes, target: bytes, old: StartField, new: StartField) -> bytes | None:
     """Put the internal field of one file, scaled, into another.
 
     Parameters
@@ -51,7 +51,7 @@ def splice(name: str, source: bytes, target: bytes, old: State, new: State) -> b
         File of the finished run, binary format.
     target : bytes
         Initial file of the new run, uniform internal field.
-    old, new : State
+    old, new : StartField
         What they are for.
 
     Returns

@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from bemt.base.averaging import steady_average
 from bemt.base.errors import InputError
 from bemt.base.tables import write_atomic
-from bemt.cfd.schema import Point
-from bemt.cfd.start import State, splice
+from bemt.cfd.schema import CampaignPoint
+from bemt.cfd.start import StartField, splice
 from bemt.exports.openfoam import Settings, case_files
 from bemt.exports.openfoam.run import BINS
 from bemt.exports.openfoam.write import settings_of, write_openfoam
@@ -47,12 +47,12 @@ def _digest(*parts: str) -> str:
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 
 
-def point_key(point: Point) -> tuple[str, str, Settings]:
+def point_key(point: CampaignPoint) -> tuple[str, str, Settings]:
     """Name a run and its grid by all that decides them.
 
     Parameters
     ----------
-    point : Point
+    point : CampaignPoint
         The run.
 
     Returns
@@ -254,12 +254,12 @@ class Worker:
     def _places(self, folder: Path) -> list[Path]:
         return [folder] if self.ranks == 1 else sorted(folder.glob("processor*"))
 
-    def grid(self, point: Point, key: str) -> Path:
+    def grid(self, point: CampaignPoint, key: str) -> Path:
         """Make the grid of a point, or find it.
 
         Parameters
         ----------
-        point : Point
+        point : CampaignPoint
             The run.
         key : str
             Name of the grid.
@@ -291,7 +291,7 @@ class Worker:
         write_atomic(folder / "done", f"{time.monotonic() - begin:.1f}\n")
         return folder
 
-    def _prepare(self, point: Point, run: str, grid: str, settings: Settings) -> tuple[Path, str]:
+    def _prepare(self, point: CampaignPoint, run: str, grid: str, settings: Settings) -> tuple[Path, str]:
         """Case folder with its grid and, where there is one, the flow of a neighbour."""
         source = self.grid(point, grid)
         folder = self.work / f"run-{run}"
@@ -309,13 +309,13 @@ class Worker:
         started = self._warm(folder, grid, settings) if point.warm else ""
         return folder, started or "slipstream"
 
-    def _neighbour(self, grid: str, new: State) -> tuple[Path, State] | None:
+    def _neighbour(self, grid: str, new: StartField) -> tuple[Path, StartField] | None:
         """Nearest finished run on a grid: by advance ratio, then solver, then speed."""
         found = []
         for path in sorted(self.work.glob("run-*/state.json")):
             about = json.loads(path.read_text(encoding="utf-8"))
             if about.pop("grid") == grid and about.pop("ranks") == self.ranks:
-                old = State(about["rpm"], tuple(about["wind"]), about["pressure"], about["compressible"])
+                old = StartField(about["rpm"], tuple(about["wind"]), about["pressure"], about["compressible"])
                 gap = np.array(new.wind) / new.rpm - np.array(old.wind) / old.rpm
                 away = 1e3 * float(np.linalg.norm(gap)) + 2.0 * (old.compressible != new.compressible)
                 found.append((away + abs(math.log(new.rpm / old.rpm)), path.parent.name, old))
@@ -345,12 +345,12 @@ class Worker:
         os.chmod(folder / "start", 0o755)
         return before.name.removeprefix("run-")
 
-    def run(self, point: Point, keys: tuple[str, str, Settings] | None = None) -> Outcome:
+    def run(self, point: CampaignPoint, keys: tuple[str, str, Settings] | None = None) -> Outcome:
         """Run one point.
 
         Parameters
         ----------
-        point : Point
+        point : CampaignPoint
             The run.
         keys : tuple or None
             What :func:`point_key` gave.
@@ -386,11 +386,11 @@ class Worker:
         return Outcome(values, history, radial if values["converged"] else None)
 
 
-def _state(s: Settings) -> State:
-    return State(s.rpm, s.wind, s.pressure if s.compressible else 0.0, s.compressible)
+def _state(s: Settings) -> StartField:
+    return StartField(s.rpm, s.wind, s.pressure if s.compressible else 0.0, s.compressible)
 
 
-def _columns(point: Point, s: Settings, name: str) -> dict[str, Any]:
+def _columns(point: CampaignPoint, s: Settings, name: str) -> dict[str, Any]:
     """What is known of a run beforehand; results are NaN until they are there."""
     nan = math.nan
     return {

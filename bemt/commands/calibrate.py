@@ -29,7 +29,7 @@ from bemt.formula import compact, refit, score
 from bemt.formula import fit as fitting
 from bemt.formula.gather import files, load
 from bemt.formula.limit import limit
-from bemt.formula.points import Points
+from bemt.formula.points import FitPoints
 from bemt.formula.text import text
 
 Array = NDArray[np.float64]
@@ -41,7 +41,7 @@ MODELS = {"compact_pitch": "pitch", "compact": "chord", "compact_no_chord": "lab
 """Compact models by what they are given, of `bemt.formula.refit.GIVEN`."""
 
 
-def _counts(points: Points) -> dict[str, int]:
+def _counts(points: FitPoints) -> dict[str, int]:
     return {
         "propellers": len(points.propellers), "points": int(points.rpm.size),
         "static": int(np.count_nonzero(points.J == 0)),
@@ -50,7 +50,7 @@ def _counts(points: Points) -> dict[str, int]:
     }  # fmt: skip
 
 
-def _k1k2(points: Points, draws: int, notes: list[str]) -> dict[str, fitting.K1K2]:
+def _k1k2(points: FitPoints, draws: int, notes: list[str]) -> dict[str, fitting.K1K2]:
     """Constants by name; those that cannot be fitted are left out with a note."""
     found = {"thesis": fitting.THESIS}
     if np.any(fitting.usable(points)):
@@ -64,16 +64,16 @@ def _k1k2(points: Points, draws: int, notes: list[str]) -> dict[str, fitting.K1K
 
 
 def calibrate(
-    points: Points, test: Points | None = None, draws: int = fitting.DRAWS,
+    points: FitPoints, test: FitPoints | None = None, draws: int = fitting.DRAWS,
     progress: Callable[[str], None] | None = None,
-) -> tuple[dict[str, Any], dict[str, tuple[Points, dict[str, Array]]]]:  # fmt: skip
+) -> tuple[dict[str, Any], dict[str, tuple[FitPoints, dict[str, Array]]]]:  # fmt: skip
     """Fit, leave out, score.
 
     Parameters
     ----------
-    points : Points
+    points : FitPoints
         Measured points to fit.
-    test : Points, optional
+    test : FitPoints, optional
         Held out.
     draws : int
         Bootstrap samples of propellers.
@@ -108,7 +108,7 @@ def calibrate(
         },
     }  # fmt: skip
     sets = {"calibration": points} | ({"test": test} if test else {})
-    predictions: dict[str, tuple[Points, dict[str, Array]]] = {}
+    predictions: dict[str, tuple[FitPoints, dict[str, Array]]] = {}
     document["scores"] = {"calibration": None, "test": None}
     for name, which in sets.items():
         CT = {key: fitting.CT_k1k2(which, c.K1, c.K2) for key, c in k1k2.items()}
@@ -137,7 +137,7 @@ def calibrate(
 
 
 def _leave_out(
-    points: Points, fitted: refit.Fitted, CT: dict[str, Array], CP: dict[str, Array],
+    points: FitPoints, fitted: refit.Fitted, CT: dict[str, Array], CP: dict[str, Array],
     document: dict[str, Any], say: Callable[[str], None],
 ) -> None:  # fmt: skip
     """Replace the compact predictions by those without the propeller, add those without the maker, and the bands."""
@@ -177,7 +177,7 @@ def _twice(option: str, names: Iterable[str], seen: dict[Path, str]) -> list[Fau
     return faults
 
 
-def _read(given: list[str], test: list[str]) -> tuple[Points, Points | None]:
+def _read(given: list[str], test: list[str]) -> tuple[FitPoints, FitPoints | None]:
     """Points to fit, and held out; all faults of both at once."""
     seen: dict[Path, str] = {}
     faults = _twice("FILES", given, seen)
@@ -188,7 +188,7 @@ def _read(given: list[str], test: list[str]) -> tuple[Points, Points | None]:
     if held and held == found:
         faults.append(Fault("--test", "", "all of the data found", "less than all", "Or name other FILES to fit"))
         names = []
-    read: list[Points] = []
+    read: list[FitPoints] = []
     for which, without in ((names, held), (test, frozenset[Path]())):
         try:
             read += [load(map(_found, which), without)] if which else []

@@ -14,7 +14,7 @@ from bemt.base.errors import EXIT_OK, Fault, InputError
 from bemt.base.tables import json_text, number_text, text_table, write_atomic
 from geometry.common import GeometryError
 from geometry.export import UNITS, read_solid
-from geometry.slicing import Found, find_rotor
+from geometry.slicing import FoundRotor, find_rotor
 
 __all__ = ["case_files", "read_stations", "run"]
 
@@ -23,7 +23,7 @@ TIP_SPEED = 120.0  # of the rpm that is put into the case: geometry says nothing
 ANCHORS = (0.2, 0.35, 0.5, 0.65, 0.8, 0.95)
 
 
-def read_stations(path: Path, unit: str | None = None) -> tuple[Found, float, str]:
+def read_stations(path: Path, unit: str | None = None) -> tuple[FoundRotor, float, str]:
     """Find the rotor in a file.
 
     Parameters
@@ -35,7 +35,7 @@ def read_stations(path: Path, unit: str | None = None) -> tuple[Found, float, st
 
     Returns
     -------
-    found : Found
+    found : FoundRotor
         Axis, blades and stations, in the unit of the mesh.
     scale : float
         Length of that unit. [m]
@@ -73,12 +73,12 @@ def _csv(header: str, rows: list[list[str]]) -> str:
     return "".join(f"{line}\n" for line in [header, *(",".join(row) for row in rows)])
 
 
-def case_files(found: Found, scale: float, name: str, source: str) -> dict[str, str]:
+def case_files(found: FoundRotor, scale: float, name: str, source: str) -> dict[str, str]:
     """Write the found rotor as a case.
 
     Parameters
     ----------
-    found : Found
+    found : FoundRotor
         The rotor.
     scale : float
         Length of the mesh's unit. [m]
@@ -182,7 +182,7 @@ def _refuse_other(path: Path, text: str) -> None:
                                "Its case.toml would be replaced"))  # fmt: skip
 
 
-def _document(found: Found, scale: float, path: Path, words: str) -> dict[str, Any]:
+def _document(found: FoundRotor, scale: float, path: Path, words: str) -> dict[str, Any]:
     return {
         "schema": SCHEMA, "file": path.name, "unit": words, "blades": found.B,
         "rotation": "right" if found.rotation > 0 else "left", "diameter_m": 2 * found.R * scale,
@@ -193,7 +193,7 @@ def _document(found: Found, scale: float, path: Path, words: str) -> dict[str, A
     }  # fmt: skip
 
 
-def _text(found: Found, scale: float, path: Path, words: str, out: str | None) -> str:
+def _text(found: FoundRotor, scale: float, path: Path, words: str, out: str | None) -> str:
     rows = [[number_text(v) for v in row] for row in
             zip(found.r / found.R, found.r * scale * 1e3, found.chord * scale * 1e3, np.degrees(found.beta),
                 100 * found.thickness, 100 * found.camber, strict=True)]  # fmt: skip

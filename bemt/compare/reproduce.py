@@ -100,7 +100,7 @@ def uiuc_statistics(folder: Path) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _model(f: th.Facts, uiuc: dict[str, Any] | None) -> None:
+def _model(f: th.ThesisFacts, uiuc: dict[str, Any] | None) -> None:
     f.section = "1 K1/K2 model"
     f.given("density, fixed", "1.225", "kg/m3")
     f.check("K1 = 1/3.29546", "0.3034", k.K1)
@@ -140,7 +140,7 @@ def _model(f: th.Facts, uiuc: dict[str, Any] | None) -> None:
         part += " propellers"
     for name, stated, ours, unit in rows:
         if ours is None:
-            f.items.append(th.Item(f.section, name, stated, None, unit, th.ABSENT, "set BEMT_DATA"))
+            f.items.append(th.ThesisItem(f.section, name, stated, None, unit, th.ABSENT, "set BEMT_DATA"))
         else:
             f.check(name, stated, float(ours), unit, note=part, because=part)
 
@@ -159,7 +159,7 @@ def _wrong(defect: float) -> str:
     return "dimensionally wrong" if abs(defect) > 1e-9 else "homogeneous"
 
 
-def _cfd(f: th.Facts) -> None:
+def _cfd(f: th.ThesisFacts) -> None:
     f.section = "2 CFD against K1/K2, 20 000 rev/min, static"
     f.given("rotational speed", "20000", "rev/min")
     f.given("velocity nodes of the Fluent runs", "200", "", "no mesh count, no grid study; zone as wide as the disk")
@@ -192,7 +192,7 @@ def _cfd(f: th.Facts) -> None:
            note=f"CT from tip Mach 0.05 to 1.5 changes by {blind['CT_spread']:.0e}")  # fmt: skip
 
 
-def _fan(f: th.Facts) -> None:
+def _fan(f: th.ThesisFacts) -> None:
     f.section = "3 DS-30-AXI-HDS"
     s, D = th.DS30, th.DS30["diameter_m"]
     n, hub = s["rpm"] / 60, s["hub_m"]
@@ -243,7 +243,7 @@ def _fan(f: th.Facts) -> None:
     f.check("least pitch by the exhaust speed", "95", 1000 * s["exhaust_m_s"] / n, "mm")
 
 
-def _bench(f: th.Facts) -> None:
+def _bench(f: th.ThesisFacts) -> None:
     f.section = "4 Bench"
     T, arm = th.DS30["thrust_N"], 0.2
     for name, stated, unit in (
@@ -259,7 +259,7 @@ def _bench(f: th.Facts) -> None:
             note=f"two fans of 27 N give 54 N; 58.8 N over 6.5 kg is a thrust-to-weight of {6 / 6.5:.2f}")  # fmt: skip
 
 
-def _motor(f: th.Facts) -> None:
+def _motor(f: th.ThesisFacts) -> None:
     f.section = "5 Motor torque constant, MN4006 KV380"
     Kv = 380 * RPM
     clarke, per_q = th.clarke_factor()
@@ -279,7 +279,7 @@ def _motor(f: th.Facts) -> None:
             f"{0.0311 * Kv / per_q - 1:+.1%} against the data sheet route")  # fmt: skip
 
 
-def items(uiuc: dict[str, Any] | None = None) -> list[th.Item]:
+def items(uiuc: dict[str, Any] | None = None) -> list[th.ThesisItem]:
     """Give every number of the thesis with ours and its status.
 
     Parameters
@@ -297,7 +297,7 @@ def items(uiuc: dict[str, Any] | None = None) -> list[th.Item]:
     >>> [i.status for i in items() if i.quantity == "8x5: K1/K2 recomputed before"]
     ['reproduced']
     """
-    f = th.Facts()
+    f = th.ThesisFacts()
     _model(f, uiuc)
     for part in (_cfd, _fan, _bench, _motor):
         part(f)
@@ -325,7 +325,7 @@ def findings() -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    if isinstance(value, th.Reading):
+    if isinstance(value, th.PrintedValue):
         return asdict(value)
     return [_plain(v) for v in value] if isinstance(value, list) else value
 
@@ -349,7 +349,7 @@ def document(uiuc: dict[str, Any] | None = None) -> dict[str, Any]:
             "uiuc": uiuc}  # fmt: skip
 
 
-def table(rows: list[th.Item]) -> str:
+def table(rows: list[th.ThesisItem]) -> str:
     """Lay the items out in 100 columns.
 
     Parameters

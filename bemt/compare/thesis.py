@@ -43,7 +43,7 @@ _PITCH_D = tuple(1.0 / x for x in reversed(k.D_OVER_P_USABLE))
 
 
 @dataclass(frozen=True)
-class Item:
+class ThesisItem:
     """One stated number beside ours.
 
     Attributes
@@ -151,7 +151,7 @@ def mach_blindness() -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class Reading:
+class PrintedValue:
     """One way to reach the stated K1/K2 thrust of the fan.
 
     Attributes
@@ -179,12 +179,12 @@ class Reading:
     above_exhaust: bool
 
 
-def ds30_readings() -> list[Reading]:
+def ds30_readings() -> list[PrintedValue]:
     """Search for what gives 2.64: over formula, area, diameter and unit, solved for the pitch that is not given.
 
     Returns
     -------
-    list of Reading
+    list of PrintedValue
         All combinations; the sensible ones first, and there by |ln(pitch/D)|.
 
     Notes
@@ -205,7 +205,7 @@ def ds30_readings() -> list[Reading]:
         bare = at_D / k.K1**k.K2
         for formula, p in (("K1/K2", D * (F / at_D) ** 2), ("rho A v_p^2, no K1/K2 factor", D * (F / bare) ** 0.5)):
             ok = _PITCH_D[0] <= p / D <= _PITCH_D[1]
-            out.append(Reading(formula, area, unit, D, p, p / D, factor / KGF, ok, p > least))
+            out.append(PrintedValue(formula, area, unit, D, p, p / D, factor / KGF, ok, p > least))
     return sorted(out, key=lambda r: (not r.sensible, r.formula != "K1/K2", abs(math.log(r.pitch_over_D))))
 
 
@@ -293,15 +293,15 @@ def clarke_factor() -> tuple[float, float]:
 
 
 @dataclass
-class Facts:
+class ThesisFacts:
     """Collects items; `check` decides the status from the digits."""
 
-    items: list[Item] = field(default_factory=list)
+    items: list[ThesisItem] = field(default_factory=list)
     section: str = ""
 
     def given(self, quantity: str, stated: str, unit: str = "", note: str = "") -> None:
         """Add a number that nothing can be computed from."""
-        self.items.append(Item(self.section, quantity, stated, None, unit, INPUT, note))
+        self.items.append(ThesisItem(self.section, quantity, stated, None, unit, INPUT, note))
 
     def check(
         self, quantity: str, stated: str, ours: float, unit: str = "", note: str = "",
@@ -316,10 +316,10 @@ class Facts:
                     break
         if status is None:
             status, note = NOT, because or "no variant of the inputs gives it"
-        self.items.append(Item(self.section, quantity, stated, ours, unit, status, note))
+        self.items.append(ThesisItem(self.section, quantity, stated, ours, unit, status, note))
 
     def word(self, quantity: str, stated: str, ours: str, because: str = "", note: str = "") -> None:
         """Add a statement in words; equal or not."""
         same = stated == ours
-        self.items.append(Item(self.section, quantity, stated, ours, "", REPRODUCED if same else NOT,
+        self.items.append(ThesisItem(self.section, quantity, stated, ours, "", REPRODUCED if same else NOT,
                                note if same else because))  # fmt: skip

@@ -57,7 +57,7 @@ from typing import Any
 from bemt.base.errors import InputError
 from bemt.base.toml import Collector, Key, check_table, load_toml
 from bemt.drive.drive_model import LIPO_SOC, LIPO_V, Battery, Drive, Esc, Motor
-from bemt.drive.rotor_table import RotorTable
+from bemt.drive.rotor_table import RotorMap
 
 __all__ = ["SCHEMA", "DriveFile", "read"]
 
@@ -145,12 +145,12 @@ class DriveFile:
     max_temperature_C: float
     assumed: Mapping[str, str]
 
-    def drive(self, rotor: RotorTable) -> Drive:
+    def drive(self, rotor: RotorMap) -> Drive:
         """Put the drive of a rotor together.
 
         Parameters
         ----------
-        rotor : RotorTable
+        rotor : RotorMap
             The load.
 
         Returns

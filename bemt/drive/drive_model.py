@@ -38,7 +38,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bemt.drive.rotor_table import RotorTable
+from bemt.drive.rotor_table import RotorMap
 from bemt.effects.motor_heating import COPPER, MAGNET
 
 __all__ = ["EFFECTS", "Battery", "Drive", "Esc", "Motor", "Steady"]
@@ -254,7 +254,7 @@ class Drive:
         Controller.
     motor : Motor
         Machine.
-    rotor : RotorTable
+    rotor : RotorMap
         Load.
     off : frozenset of str
         Effects switched off, see `EFFECTS`.
@@ -263,7 +263,7 @@ class Drive:
     battery: Battery
     esc: Esc
     motor: Motor
-    rotor: RotorTable
+    rotor: RotorMap
     off: frozenset[str] = field(default_factory=frozenset)
 
     def without(self, *effects: str) -> Drive:

@@ -20,7 +20,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.drive import transient
 from bemt.drive.drive_model import Battery, Drive, Esc, Motor
 from bemt.drive.map_points import MapPoints
-from bemt.drive.rotor_table import RotorTable, quadratic
+from bemt.drive.rotor_table import RotorMap, quadratic
 
 __all__ = [
     "FREE",
@@ -297,7 +297,7 @@ def step_constant(
         Time constant. [s]
     """
     motor = replace(drive.motor, inertia_kg_m2=inertia_kg_m2)
-    rotor = RotorTable(**{**vars(drive.rotor), "inertia_kg_m2": 0.0})
+    rotor = RotorMap(**{**vars(drive.rotor), "inertia_kg_m2": 0.0})
     t = times_s - times_s[0]
     got = transient.simulate(replace(drive, motor=motor, rotor=rotor),
                              [(0.0, before_us), (step_s - float(times_s[0]), after_us)], float(t[-1]), t)  # fmt: skip

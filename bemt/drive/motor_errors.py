@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from bemt.drive.motor_constant import Line
 
-__all__ = ["ALPHA", "FACTORS", "METHODS", "Explanation", "Measured", "Verdict", "judge"]
+__all__ = ["ALPHA", "FACTORS", "METHODS", "ErrorSource", "Measured", "Verdict", "judge"]
 
 Array = NDArray[np.float64]
 METHODS = ("data_sheet", "back_emf", "torque")
@@ -71,7 +71,7 @@ class Measured:
 
 
 @dataclass(frozen=True)
-class Explanation:
+class ErrorSource:
     """One hypothesis fitted.
 
     Parameters
@@ -105,15 +105,15 @@ class Verdict:
     ----------
     agree : bool
         Whether no systematic error is needed.
-    explanations : tuple of Explanation
+    explanations : tuple of ErrorSource
         What explains a disagreement, best first; several: not told apart; empty: agreement, or nothing known does.
-    none : Explanation
+    none : ErrorSource
         The fit without any error.
     """
 
     agree: bool
-    explanations: tuple[Explanation, ...]
-    none: Explanation
+    explanations: tuple[ErrorSource, ...]
+    none: ErrorSource
 
     @property
     def named(self) -> tuple[str, ...]:
@@ -140,7 +140,7 @@ def _gains(m: Measured) -> list[tuple[str, float | None]]:
     return [(f"{method}.gain", None) for method in present] if len(present) > 1 else []
 
 
-def _fit(m: Measured, errors: Sequence[tuple[str, float | None]]) -> Explanation:
+def _fit(m: Measured, errors: Sequence[tuple[str, float | None]]) -> ErrorSource:
     """Generalised least squares of one hypothesis; Gauss-Newton, since a shunt multiplies ke."""
     from scipy.stats import chi2 as chi2_law
 
@@ -191,7 +191,7 @@ def _fit(m: Measured, errors: Sequence[tuple[str, float | None]]) -> Explanation
     p = float(chi2_law.sf(misfit, dof)) if dof > 0 else math.nan
     found = dict(zip(free, zip(theta[1:], spread[1:], strict=True), strict=True))
     sizes = [found.get(name, (fixed.get(name.split(" ")[0], math.nan), 0.0)) for name in names]
-    return Explanation(tuple(names), float(theta[0]), float(spread[0]), tuple(float(s) for s, _ in sizes),
+    return ErrorSource(tuple(names), float(theta[0]), float(spread[0]), tuple(float(s) for s, _ in sizes),
                        tuple(float(u) for _, u in sizes), misfit, p)  # fmt: skip
 
 
@@ -228,7 +228,7 @@ def _covariance(m: Measured, blocks: list[Array]) -> Array:
     return cov
 
 
-def _criterion(e: Explanation, errors: int) -> float:
+def _criterion(e: ErrorSource, errors: int) -> float:
     free = sum(u > 0.0 for u in e.u_sizes)
     return e.chi2 + math.log(5.0) * free + 2.0 * errors
 
@@ -253,7 +253,7 @@ def judge(m: Measured, alpha: float = ALPHA) -> Verdict:
         return Verdict(True, (), none)
     errors = _errors(m)
     for pool, how_many in ((errors, 1), (_gains(m), 1), (errors, 2)):
-        tried: list[Explanation] = []
+        tried: list[ErrorSource] = []
         for some in itertools.combinations(pool, how_many):
             methods = [name.split(" ")[0] for name, _ in some]
             if len(set(methods)) < how_many or (how_many == 2 and len(_data(m)[0]) - 1 - how_many < 1):

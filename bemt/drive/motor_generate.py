@@ -13,7 +13,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.drive import motor_constant as mc
 from bemt.drive.motor_errors import FACTORS
 
-__all__ = ["LABEL", "PLANTS", "Bench", "generate", "plants"]
+__all__ = ["LABEL", "PLANTS", "MotorBench", "generate", "plants"]
 
 Array = NDArray[np.float64]
 PLANTS = ("back_emf.offset", "torque.offset", "torque.shunt", "data_sheet.factor", "back_emf.factor", "torque.factor")
@@ -23,7 +23,7 @@ LABEL = "# generated, not measured"
 
 
 @dataclass(frozen=True)
-class Bench:
+class MotorBench:
     """What the generated trials pretend to be; defaults follow the thesis's joint motor.
 
     Parameters
@@ -94,7 +94,7 @@ def plants(words: list[str]) -> dict[str, float]:
     return out
 
 
-def generate(seed: int, planted: Mapping[str, float] | None = None, bench: Bench | None = None) -> dict[str, str]:
+def generate(seed: int, planted: Mapping[str, float] | None = None, bench: MotorBench | None = None) -> dict[str, str]:
     """Generate trials and the motor.toml that describes them.
 
     Parameters
@@ -103,7 +103,7 @@ def generate(seed: int, planted: Mapping[str, float] | None = None, bench: Bench
         Of the random numbers, 0 or more.
     planted : mapping of str to float, optional
         Errors by name, see `PLANTS`.
-    bench : Bench, optional
+    bench : MotorBench, optional
         The motor and its stand.
 
     Returns
@@ -123,7 +123,7 @@ def generate(seed: int, planted: Mapping[str, float] | None = None, bench: Bench
     """
     if seed < 0:
         raise InputError(Fault("", "--seed", str(seed), "a whole number of 0 or more"))
-    b, error = bench or Bench(), dict(planted or {})
+    b, error = bench or MotorBench(), dict(planted or {})
     rng = np.random.default_rng(seed)
     winding = "delta"
     ke = b.Kt / mc.ke_to_kt(1.0, "q_power_invariant", "phase", winding)

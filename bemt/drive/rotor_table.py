@@ -14,13 +14,13 @@ from bemt.base.errors import Fault, InputError
 from bemt.bem import evaluate
 from bemt.case import Case
 
-__all__ = ["RotorTable", "from_case", "from_coefficients", "quadratic"]
+__all__ = ["RotorMap", "from_case", "from_coefficients", "quadratic"]
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class RotorTable:
+class RotorMap:
     """Loads of a rotor over speed.
 
     Parameters
@@ -108,7 +108,7 @@ class RotorTable:
 def from_coefficients(
     CT: float, CQ: float, diameter_m: float, rho: float = 1.225, inertia_kg_m2: float = 0.0,
     solidity: float | None = None,
-) -> RotorTable:  # fmt: skip
+) -> RotorMap:  # fmt: skip
     """Rotor with constant coefficients.
 
     Parameters
@@ -126,7 +126,7 @@ def from_coefficients(
 
     Returns
     -------
-    RotorTable
+    RotorMap
         At rest in the air.
 
     Notes
@@ -142,7 +142,7 @@ def from_coefficients(
 def quadratic(
     kT: float, kQ: float, diameter_m: float, rho: float = 1.225, inertia_kg_m2: float = 0.0,
     solidity: float | None = None,
-) -> RotorTable:  # fmt: skip
+) -> RotorMap:  # fmt: skip
     """Rotor whose loads go with the square of the speed.
 
     Parameters
@@ -156,18 +156,18 @@ def quadratic(
 
     Returns
     -------
-    RotorTable
+    RotorMap
         At rest in the air.
     """
     R, A = 0.5 * diameter_m, math.pi * diameter_m**2 / 4.0
     slope = None if solidity is None else (lambda w: -0.25 * rho * solidity * 5.7 * A * R * w)
-    return RotorTable(math.inf, lambda w: kT * w**2, lambda w: kQ * w**2, slope, R, A, rho, 0.0, inertia_kg_m2)
+    return RotorMap(math.inf, lambda w: kT * w**2, lambda w: kQ * w**2, slope, R, A, rho, 0.0, inertia_kg_m2)
 
 
 def from_case(
     case: Case, rpm_max: float, airspeed_m_s: float = 0.0, air: Air | None = None, inertia_kg_m2: float = 0.0,
     points: int = 33,
-) -> RotorTable:  # fmt: skip
+) -> RotorMap:  # fmt: skip
     """Rotor of a case by BEMT.
 
     Parameters
@@ -187,7 +187,7 @@ def from_case(
 
     Returns
     -------
-    RotorTable
+    RotorMap
         At this airspeed.
 
     Raises
@@ -213,7 +213,7 @@ def from_case(
     rho = float(state.rho)
     T, Q = got.thrust_N[ok], got.torque_Nm[ok]
     tT, tQ = PchipInterpolator(omega, T / omega**2), PchipInterpolator(omega, Q / omega**2)
-    table = RotorTable(
+    table = RotorMap(
         float(omega[-1]), lambda w: tT(np.clip(w, omega[0], omega[-1])) * w**2,
         lambda w: tQ(np.clip(w, omega[0], omega[-1])) * w**2, None, 0.5 * ready.diameter_m, area, rho, airspeed_m_s,
         inertia_kg_m2, tuple(notes),
@@ -233,5 +233,5 @@ def from_case(
     return _with(table, lambda x: law(np.clip(x, w[0], w[-1])) * x, tuple(notes))
 
 
-def _with(table: RotorTable, slope: Callable[[Array], Array] | None, notes: tuple[str, ...]) -> RotorTable:
-    return RotorTable(**{**vars(table), "slope_law": slope, "notes": notes})
+def _with(table: RotorMap, slope: Callable[[Array], Array] | None, notes: tuple[str, ...]) -> RotorMap:
+    return RotorMap(**{**vars(table), "slope_law": slope, "notes": notes})

@@ -9,7 +9,7 @@ from bemt.effects.base import Effect, Parameter
 
 
 @dataclass(frozen=True)
-class Duct(Effect):
+class DuctEffect(Effect):
     """Jet that leaves through a duct of given exit area instead of contracting freely.
 
     Notes

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.formula.points import Points
+from bemt.formula.points import FitPoints
 from bemt.formula.score import FAR, NEAR, X_EDGES
 from bemt.formula.text import NAMES
 
@@ -17,12 +17,12 @@ Array = NDArray[np.float64]
 _COLOURS = {"thesis": "#b2182b", "compact_pitch": "#1b7837", "compact": "#2166ac", "compact_no_chord": "#67a9cf"}
 
 
-def draw(sets: Mapping[str, tuple[Points, Mapping[str, Array]]], path: Path) -> None:
+def draw(sets: Mapping[str, tuple[FitPoints, Mapping[str, Array]]], path: Path) -> None:
     """Draw and write a PNG.
 
     Parameters
     ----------
-    sets : mapping of str to (Points, mapping)
+    sets : mapping of str to (FitPoints, mapping)
         ``calibration`` and perhaps ``test``: measured points and CT of each model. [-]
     path : Path
         File; appears whole.

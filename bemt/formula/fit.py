@@ -1,7 +1,7 @@
 """K1 and K2 from measured points: robust regression in logarithms, bootstrap over propellers, the thesis's goal-seek.
 
 With F = (pi/4) rho n^2 D^4 ((P/D)^2 - J P/D) (K1 D/P)^K2, the logarithm of measured CT over (pi/4)((P/D)^2 - J P/D) is
-K2 ln K1 - K2 ln(P/D): a straight line in ln(P/D). Points of one propeller are no independent evidence, so each
+K2 ln K1 - K2 ln(P/D): a straight line in ln(P/D). FitPoints of one propeller are no independent evidence, so each
 propeller weighs one and the bootstrap draws propellers.
 """
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
 from bemt.formula import k1k2 as empirical
-from bemt.formula.points import Points
+from bemt.formula.points import FitPoints
 
 Array = NDArray[np.float64]
 
@@ -51,12 +51,12 @@ class K1K2:
 THESIS = K1K2(empirical.K1, empirical.K2)
 
 
-def CT_k1k2(points: Points, K1: float, K2: float) -> Array:
+def CT_k1k2(points: FitPoints, K1: float, K2: float) -> Array:
     """Thrust coefficient of the K1/K2 formula.
 
     Parameters
     ----------
-    points : Points
+    points : FitPoints
         Conditions.
     K1, K2 : float
         Constants. [-]
@@ -70,12 +70,12 @@ def CT_k1k2(points: Points, K1: float, K2: float) -> Array:
     return np.pi / 4.0 * (pd**2 - points.J * pd) * (K1 / pd) ** K2
 
 
-def usable(points: Points, flight: bool = False) -> NDArray[np.bool_]:
+def usable(points: FitPoints, flight: bool = False) -> NDArray[np.bool_]:
     """Which points the regression may use: open rotors with thrust, at rest (or up to `X_FLIGHT` as well).
 
     Parameters
     ----------
-    points : Points
+    points : FitPoints
         Measured points.
     flight : bool
         Whether points in flight may be used.
@@ -182,7 +182,7 @@ def robust_scale(e: Array, w: Array) -> float:
     return float(1.4826 * np.mean(e[order[at]]))
 
 
-def _line_data(points: Points) -> tuple[Array, Array]:
+def _line_data(points: FitPoints) -> tuple[Array, Array]:
     pd = points.P_D
     return np.log(pd), np.log(points.CT / (np.pi / 4.0 * (pd**2 - points.J * pd)))
 
@@ -193,12 +193,12 @@ def _constants(a: float, b: float) -> tuple[float, float]:
     return (float(np.exp(a / K2)), K2) if np.isfinite(K2) and abs(K2) > 1e-9 else (float("nan"), float("nan"))
 
 
-def fit(points: Points, flight: bool = False, draws: int = DRAWS) -> K1K2:
+def fit(points: FitPoints, flight: bool = False, draws: int = DRAWS) -> K1K2:
     """Fit both constants.
 
     Parameters
     ----------
-    points : Points
+    points : FitPoints
         Measured points; ducted rotors and points without thrust are left out.
     flight : bool
         Use points in flight below `X_FLIGHT` as well.
@@ -240,12 +240,12 @@ def fit(points: Points, flight: bool = False, draws: int = DRAWS) -> K1K2:
     return K1K2(K1, K2, (float(low[0]), float(high[0])), (float(low[1]), float(high[1])), out.points, out.propellers)
 
 
-def goal_seek(points: Points, K2: float = empirical.K2) -> K1K2:
+def goal_seek(points: FitPoints, K2: float = empirical.K2) -> K1K2:
     """K1 as the thesis's source found it: K2 fixed, mean relative error of the static points zero.
 
     Parameters
     ----------
-    points : Points
+    points : FitPoints
         Measured points.
     K2 : float
         Fixed exponent. [-]
@@ -260,12 +260,12 @@ def goal_seek(points: Points, K2: float = empirical.K2) -> K1K2:
     return K1K2(mean ** (-1.0 / K2), K2, points=used.rpm.size, propellers=np.unique(used.index).size)
 
 
-def left_out(points: Points, flight: bool = False) -> Array:
+def left_out(points: FitPoints, flight: bool = False) -> Array:
     """CT of every point by constants that were fitted without its propeller.
 
     Parameters
     ----------
-    points : Points
+    points : FitPoints
         Measured points.
     flight : bool
         As in `fit`.

@@ -22,7 +22,7 @@ from bemt import readers as importers
 from bemt.air import Air, isa_pressure
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH, ZERO_CELSIUS
-from bemt.formula.points import Points, Propeller, Rows, join
+from bemt.formula.points import FitPoints, Propeller, Rows, join
 from bemt.readers import apc, uiuc
 from bemt.readers._imported import Imported
 from bemt.readers._uiuc_names import parse_file_name
@@ -237,7 +237,7 @@ def _folder(path: Path, without: frozenset[Path]) -> tuple[list[Rows], list[str]
     return rows, refused, notes
 
 
-def load(paths: Iterable[str | os.PathLike[str]], without: frozenset[Path] = frozenset()) -> Points:
+def load(paths: Iterable[str | os.PathLike[str]], without: frozenset[Path] = frozenset()) -> FitPoints:
     """Gather the points of files and folders.
 
     Parameters
@@ -249,7 +249,7 @@ def load(paths: Iterable[str | os.PathLike[str]], without: frozenset[Path] = fro
 
     Returns
     -------
-    Points
+    FitPoints
         Rows with rpm > 0 and finite J and CT; what was left out is in ``refused``.
 
     Raises

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.formula.points import Points
+from bemt.formula.points import FitPoints
 from bemt.formula.refit import MIN_PROPELLERS, has
 from bemt.formula.score import FAR, NEAR
 
@@ -33,7 +33,7 @@ _PRIOR = 2.0
 _JITTER = 1e-6
 
 
-def _features(points: Points, given: str) -> Array:
+def _features(points: FitPoints, given: str) -> Array:
     D, B, chord = points.of("diameter_m"), points.of("blades"), points.of("chord_m")
     # without a chord Re is that of a chord in proportion to D
     Re = points.Re(D if given == "label" else chord)
@@ -58,7 +58,7 @@ def _covariance(X: Array, group: NDArray[np.intp], h: Array) -> Array:
     return np.asarray(_kernel(X, X, h) + own + (np.exp(2.0 * h[2]) + _JITTER) * np.eye(group.size))
 
 
-def _thinned(points: Points) -> NDArray[np.intp]:
+def _thinned(points: FitPoints) -> NDArray[np.intp]:
     rows = []
     for k in np.unique(points.index):
         own = np.flatnonzero(points.index == k)
@@ -67,12 +67,12 @@ def _thinned(points: Points) -> NDArray[np.intp]:
     return np.concatenate(rows)
 
 
-def limit(points: Points, given: str) -> dict[str, Any] | None:
+def limit(points: FitPoints, given: str) -> dict[str, Any] | None:
     """What the inputs carry at rest.
 
     Parameters
     ----------
-    points : Points
+    points : FitPoints
         Measured points; open propellers at rest are used, with chord (and measured pitch) where `given` says so.
     given : str
         ``label``, ``chord`` or ``pitch``: what a formula may know, see `bemt.formula.refit.GIVEN`.

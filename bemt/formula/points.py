@@ -48,7 +48,7 @@ class Propeller:
 
 
 @dataclass(frozen=True, eq=False)
-class Points:
+class FitPoints:
     """N measured points of K propellers.
 
     Attributes
@@ -152,17 +152,17 @@ class Points:
         """Rotational tip Mach number in standard air. [-]"""
         return np.asarray(co.M_tip(self.rpm / 60.0, self.of("diameter_m"), Air.from_density().a_sound))
 
-    def select(self, where: NDArray[np.bool_]) -> Points:
+    def select(self, where: NDArray[np.bool_]) -> FitPoints:
         """Part of the points, propellers kept.
 
         Parameters
         ----------
         where : (N,) bool
-            Points to keep.
+            FitPoints to keep.
 
         Returns
         -------
-        Points
+        FitPoints
             The part.
         """
         arrays = {name: getattr(self, name)[where] for name in ("index", "rpm", "J", "CT", "CP")}
@@ -172,7 +172,7 @@ class Points:
 Rows = tuple[Propeller, Array, Array, Array, Array]
 
 
-def join(rows: Sequence[Rows], refused: Sequence[str] = (), notes: Sequence[str] = ()) -> Points:
+def join(rows: Sequence[Rows], refused: Sequence[str] = (), notes: Sequence[str] = ()) -> FitPoints:
     """Make points of rows per propeller and run; rows of equal propellers are joined.
 
     Parameters
@@ -184,7 +184,7 @@ def join(rows: Sequence[Rows], refused: Sequence[str] = (), notes: Sequence[str]
 
     Returns
     -------
-    Points
+    FitPoints
         Without rows that are not finite.
 
     Raises
@@ -206,4 +206,4 @@ def join(rows: Sequence[Rows], refused: Sequence[str] = (), notes: Sequence[str]
     if joined[0].size == 0:
         raise InputError(Fault("", "", "no finite point", "rows with rpm, J and CT"))
     rpm, J, CT, CP = joined[1:]
-    return Points(tuple(unique), joined[0].astype(np.intp), rpm, J, CT, CP, tuple(refused), tuple(notes))
+    return FitPoints(tuple(unique), joined[0].astype(np.intp), rpm, J, CT, CP, tuple(refused), tuple(notes))

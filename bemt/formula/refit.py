@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.formula import compact
-from bemt.formula.points import Points
+from bemt.formula.points import FitPoints
 from bemt.readers._uiuc_names import FAMILIES
 
 Array = NDArray[np.float64]
@@ -54,16 +54,16 @@ PUBLISHED = Fitted(compact.CONSTANTS, compact.SERIES, 0, 0)
 """What :mod:`bemt.formula.compact` holds."""
 
 
-def _zero_lift(points: Points, series: Mapping[str, compact.MakerSeries]) -> Array:
+def _zero_lift(points: FitPoints, series: Mapping[str, compact.MakerSeries]) -> Array:
     return np.array([series.get(p.maker, compact.MakerSeries()).zero_lift for p in points.propellers])[points.index]
 
 
-def predict(points: Points, fitted: Fitted = PUBLISHED, given: str = "chord") -> tuple[Array, Array]:
+def predict(points: FitPoints, fitted: Fitted = PUBLISHED, given: str = "chord") -> tuple[Array, Array]:
     """CT and CP of the formula at measured conditions.
 
     Parameters
     ----------
-    points : Points
+    points : FitPoints
         Conditions, in standard air.
     fitted : Fitted
         Constants and series.
@@ -84,12 +84,12 @@ def predict(points: Points, fitted: Fitted = PUBLISHED, given: str = "chord") ->
     return compact.coefficients(pd, points.J, s, Re, fitted.constants, change)
 
 
-def has(points: Points, given: str) -> NDArray[np.bool_]:
+def has(points: FitPoints, given: str) -> NDArray[np.bool_]:
     """Points of propellers that have what a prediction may use.
 
     Parameters
     ----------
-    points : Points
+    points : FitPoints
         Measured points.
     given : str
         One of `GIVEN`.
@@ -103,12 +103,12 @@ def has(points: Points, given: str) -> NDArray[np.bool_]:
     return np.asarray(np.all([np.isfinite(points.of(name)) for name in ("diameter_m", *names)], axis=0))
 
 
-def fittable(points: Points) -> NDArray[np.bool_]:
+def fittable(points: FitPoints) -> NDArray[np.bool_]:
     """Points of open propellers with a known chord, in the range of the fit.
 
     Parameters
     ----------
-    points : Points
+    points : FitPoints
         Measured points.
 
     Returns
@@ -123,12 +123,12 @@ def _arsinh(y: Array, soft: float) -> Array:
     return np.arcsinh(y / (2.0 * soft))
 
 
-def _weights(points: Points) -> Array:
+def _weights(points: FitPoints) -> Array:
     group = 2 * points.index + (points.J == 0)
     return np.asarray(1.0 / np.sqrt(np.bincount(group)[group]))
 
 
-def _thrust_fit(points: Points, start: compact.Constants) -> tuple[compact.Constants, dict[str, float]]:
+def _thrust_fit(points: FitPoints, start: compact.Constants) -> tuple[compact.Constants, dict[str, float]]:
     """The four thrust constants and a0 of each series by the mixed model of the module."""
     from scipy.optimize import least_squares
     from scipy.sparse import lil_matrix
@@ -172,7 +172,7 @@ def _thrust_fit(points: Points, start: compact.Constants) -> tuple[compact.Const
     return make(found.x), {name: changes[name] for name in np.unique(makers[series])}
 
 
-def _power_fit(points: Points, fitted: Fitted) -> compact.Constants:
+def _power_fit(points: FitPoints, fitted: Fitted) -> compact.Constants:
     from scipy.optimize import least_squares
 
     used, start = points.select(np.isfinite(points.CP)), fitted.constants
@@ -189,12 +189,12 @@ def _power_fit(points: Points, fitted: Fitted) -> compact.Constants:
     return make(least_squares(residual, v0, loss="soft_l1", f_scale=LOSS_SCALE, x_scale=v0).x)
 
 
-def implied_chords(points: Points, fitted: Fitted) -> Array:
+def implied_chords(points: FitPoints, fitted: Fitted) -> Array:
     """Chord over radius that makes the formula's static CT the measured one, for propellers without a chord.
 
     Parameters
     ----------
-    points : Points
+    points : FitPoints
         Measured points.
     fitted : Fitted
         Constants and series; the chord law is not used.
@@ -222,7 +222,7 @@ def implied_chords(points: Points, fitted: Fitted) -> Array:
     return out
 
 
-def _chord_law(points: Points, fitted: Fitted) -> Fitted:
+def _chord_law(points: FitPoints, fitted: Fitted) -> Fitted:
     """Chord over diameter, and each series' factor on it: its mean over n propellers, shrunk by n/(n + 1)."""
     known = np.array([p.chord_m / (p.diameter_m / 2.0) if not p.ducted else np.nan for p in points.propellers])
     per_blade = np.where(np.isfinite(known), known, implied_chords(points, fitted))
@@ -245,12 +245,12 @@ def _chord_law(points: Points, fitted: Fitted) -> Fitted:
     return replace(fitted, constants=constants, series=series, chords=int(np.count_nonzero(have)))
 
 
-def fit(points: Points, start: compact.Constants = compact.CONSTANTS) -> Fitted | None:
+def fit(points: FitPoints, start: compact.Constants = compact.CONSTANTS) -> Fitted | None:
     """Fit the eight constants and the series.
 
     Parameters
     ----------
-    points : Points
+    points : FitPoints
         Measured points.
     start : compact.Constants
         Where the search begins.
@@ -270,13 +270,13 @@ def fit(points: Points, start: compact.Constants = compact.CONSTANTS) -> Fitted 
 
 
 def left_out(
-    points: Points, fitted: Fitted, groups: NDArray[np.intp], progress: Callable[[int, int], None] | None = None
+    points: FitPoints, fitted: Fitted, groups: NDArray[np.intp], progress: Callable[[int, int], None] | None = None
 ) -> dict[str, tuple[Array, Array]]:
     """CT and CP of every point by constants and series fitted without its group.
 
     Parameters
     ----------
-    points : Points
+    points : FitPoints
         Measured points.
     fitted : Fitted
         Fit on all of them, where each search begins.
@@ -303,12 +303,12 @@ def left_out(
     return out
 
 
-def bands(points: Points, CT: Array, CP: Array, fitted: Fitted, given: str) -> dict[str, tuple[float, ...]]:
+def bands(points: FitPoints, CT: Array, CP: Array, fitted: Fitted, given: str) -> dict[str, tuple[float, ...]]:
     """Half-widths of the error bands over `compact.BAND_X`.
 
     Parameters
     ----------
-    points : Points
+    points : FitPoints
         Measured points.
     CT, CP : (N,) float
         Predictions by fits without the maker. [-]

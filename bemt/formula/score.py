@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bemt.base.units import INCH
 from bemt.formula import compact
-from bemt.formula.points import Points
+from bemt.formula.points import FitPoints
 from bemt.formula.refit import Fitted, has, predict
 
 Array = NDArray[np.float64]
@@ -31,12 +31,12 @@ _EDGES: dict[str, tuple[float, ...]] = {
 }
 
 
-def flight(points: Points) -> Mask:
+def flight(points: FitPoints) -> Mask:
     """Points in flight whose relative error counts: forwards, below `X_MAX`.
 
     Parameters
     ----------
-    points : Points
+    points : FitPoints
         Measured points.
 
     Returns
@@ -82,12 +82,12 @@ def _labels(edges: tuple[float, ...]) -> list[str]:
             for a, b in zip(edges[:-1], edges[1:], strict=True)]  # fmt: skip
 
 
-def score(points: Points, models: Mapping[str, Array]) -> dict[str, Any]:
+def score(points: FitPoints, models: Mapping[str, Array]) -> dict[str, Any]:
     """Score models of CT over all points and in bands.
 
     Parameters
     ----------
-    points : Points
+    points : FitPoints
         Measured points.
     models : mapping of str to (N,) float
         CT of each model at the points; NaN counts as wrong. [-]
@@ -135,12 +135,12 @@ def score(points: Points, models: Mapping[str, Array]) -> dict[str, Any]:
     return out
 
 
-def power_score(points: Points, CP: Mapping[str, Array]) -> dict[str, Any]:
+def power_score(points: FitPoints, CP: Mapping[str, Array]) -> dict[str, Any]:
     """Score power in the same way: ``static`` and ``flight``, per model.
 
     Parameters
     ----------
-    points : Points
+    points : FitPoints
         Measured points.
     CP : mapping of str to (N,) float
         Power coefficient of each model. [-]
@@ -157,12 +157,12 @@ def power_score(points: Points, CP: Mapping[str, Array]) -> dict[str, Any]:
     return out
 
 
-def coverage(points: Points, fitted: Fitted, given: str) -> dict[str, float | None]:
+def coverage(points: FitPoints, fitted: Fitted, given: str) -> dict[str, float | None]:
     """Share of points inside the published bands of the compact formula.
 
     Parameters
     ----------
-    points : Points
+    points : FitPoints
         Measured points that took no part in the fit.
     fitted : Fitted
         Constants and series of the formula.

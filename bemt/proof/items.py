@@ -16,7 +16,7 @@ from bemt.proof.stand import Stand, record
 from bemt.proof.truth import Answer
 from bemt.proof.truth_ccblade import EXPRESSIBLE
 from bemt.proof.truth_section import SectionPhysics
-from bemt.proof.truth_world import Conditions, Loads, World, loads
+from bemt.proof.truth_world import Conditions, TrueLoads, World, loads
 
 __all__ = ["Bench", "Item", "case_text", "make_item", "recording_text", "stations_text"]
 
@@ -90,7 +90,7 @@ class Bench:
     def measure(
         self, world: World, stand: Stand, rng: np.random.Generator | None = None, ducted: bool = True,
         scales: tuple[float, float] | None = None,
-    ) -> tuple[Loads, dict[str, Array]]:  # fmt: skip
+    ) -> tuple[TrueLoads, dict[str, Array]]:  # fmt: skip
         """Real loads and what the stand reads.
 
         Parameters
@@ -108,7 +108,7 @@ class Bench:
 
         Returns
         -------
-        loads : Loads
+        loads : TrueLoads
             Real loads.
         columns : dict of str to (P,) float
             Readings.

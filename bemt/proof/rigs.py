@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.proof.stand import Motor
+from bemt.proof.stand import StandMotor
 from bemt.proof.truth import TruthRotor
 from bemt.proof.truth_duct import TruthDuct
-from bemt.proof.truth_section import Section
+from bemt.proof.truth_section import TrueSection
 from bemt.proof.truth_world import Conditions
 
 __all__ = ["DUCTED_PLANS", "OPEN_PLANS", "UNDERPOWERED", "Rig", "conditions", "draw_rig"]
@@ -40,7 +40,7 @@ class Rig:
         Geometric pitch over diameter. [-]
     tip_mach : float
         Rotational tip Mach number at the top of its speed range, 20 C. [-]
-    motor : Motor
+    motor : StandMotor
         Drive.
     """
 
@@ -49,7 +49,7 @@ class Rig:
     duct: TruthDuct | None
     pitch_ratio: float
     tip_mach: float
-    motor: Motor
+    motor: StandMotor
 
     @property
     def top_rpm(self) -> float:
@@ -89,7 +89,7 @@ def draw_rig(name: str, ducted: bool, rng: np.random.Generator, code: str = "vor
     else:
         inner = 0.55 + 0.45 * np.sin(0.5 * np.pi * np.clip((x - hub) / (peak - hub), 0.0, 1.0))
         chord = widest * np.where(x < peak, inner, np.sqrt(np.maximum(1.0 - ((x - peak) / (1.04 - peak)) ** 2, 0.05)))
-    section = Section(float(rng.uniform(0.02, 0.05)), 0.4, float(rng.uniform(0.07, 0.12)))
+    section = TrueSection(float(rng.uniform(0.02, 0.05)), 0.4, float(rng.uniform(0.07, 0.12)))
     beta = np.arctan(pitch / (np.pi * x))
     rotor = TruthRotor(
         radius, blades, tuple(map(float, x)), tuple(map(float, chord)), tuple(map(float, beta)), section,
@@ -106,7 +106,9 @@ def draw_rig(name: str, ducted: bool, rng: np.random.Generator, code: str = "vor
     volts = 22.2 if radius < 0.15 else 44.4
     kv = top / (0.75 * volts)
     amps = torque * 2.0 * np.pi * kv / 60.0
-    return Rig(name, rotor, duct, pitch, mach, Motor(kv, 0.06 * volts / amps, 0.02 * amps, volts, 0.03 * volts / amps))
+    return Rig(
+        name, rotor, duct, pitch, mach, StandMotor(kv, 0.06 * volts / amps, 0.02 * amps, volts, 0.03 * volts / amps)
+    )
 
 
 def conditions(plan: str, rig: Rig, rng: np.random.Generator) -> Conditions:

@@ -14,7 +14,7 @@ from bemt.proof.causes import CAUSES
 __all__ = [
     "VISIBLE",
     "Judged",
-    "Row",
+    "ScoreRow",
     "baselines",
     "confusion",
     "judge",
@@ -110,7 +110,7 @@ class Judged:
 
 
 @dataclass(frozen=True)
-class Row:
+class ScoreRow:
     """A row of the score table.
 
     Parameters
@@ -185,18 +185,18 @@ def _matches(said: Sequence[str], allowed: Sequence[set[str]]) -> bool:
     return (a in allowed[0] and b in allowed[1]) or (a in allowed[1] and b in allowed[0])
 
 
-def _share(what: str, flags: Iterable[bool], target: str, limit: float, low_is_good: bool = False) -> Row:
+def _share(what: str, flags: Iterable[bool], target: str, limit: float, low_is_good: bool = False) -> ScoreRow:
     values = list(flags)
     hits, n = sum(values), len(values)
     value = hits / n if n else math.nan
     met = None if not n else (value <= limit if low_is_good else value >= limit)
-    return Row(what, hits, n, value, *wilson(hits, n), target, met)
+    return ScoreRow(what, hits, n, value, *wilson(hits, n), target, met)
 
 
-def _median(what: str, values: Sequence[float], target: str, limit: float) -> Row:
+def _median(what: str, values: Sequence[float], target: str, limit: float) -> ScoreRow:
     good = [v for v in values if math.isfinite(v)]
     value = float(np.median(good)) if good else math.nan
-    return Row(what, len(good), len(good), value, math.nan, math.nan, target, value <= limit if good else None)
+    return ScoreRow(what, len(good), len(good), value, math.nan, math.nan, target, value <= limit if good else None)
 
 
 def _blamed(j: Judged) -> bool:
@@ -251,7 +251,7 @@ def _located(j: Judged) -> bool:
     return any(w == f or w.startswith(f"{f}_") or (len(f) > 2 and f in w) for w in words for f in families)
 
 
-def score(judged: Sequence[Judged], settled: Sequence[bool] = ()) -> list[Row]:
+def score(judged: Sequence[Judged], settled: Sequence[bool] = ()) -> list[ScoreRow]:
     """The table of DIAGNOSIS 5.
 
     Parameters
@@ -263,7 +263,7 @@ def score(judged: Sequence[Judged], settled: Sequence[bool] = ()) -> list[Row]:
 
     Returns
     -------
-    list of Row
+    list of ScoreRow
         Metrics with Wilson intervals and targets.
     """
 
@@ -309,7 +309,7 @@ def score(judged: Sequence[Judged], settled: Sequence[bool] = ()) -> list[Row]:
     ]  # fmt: skip
 
 
-def score_real(judged: Sequence[Judged]) -> list[Row]:
+def score_real(judged: Sequence[Judged]) -> list[ScoreRow]:
     """Score of published recordings: by set, what was found and what was claimed wrongly.
 
     Parameters
@@ -319,7 +319,7 @@ def score_real(judged: Sequence[Judged]) -> list[Row]:
 
     Returns
     -------
-    list of Row
+    list of ScoreRow
         Two rows for a set with a cause, one for a control; targets as in DIAGNOSIS 5 for real noise.
     """
     out = []
@@ -332,7 +332,7 @@ def score_real(judged: Sequence[Judged]) -> list[Row]:
     return [*out, _share("failed", (not j.answer for j in judged), "0", 0.0, True)]
 
 
-def baselines(judged: Sequence[Judged]) -> list[Row]:
+def baselines(judged: Sequence[Judged]) -> list[ScoreRow]:
     """What simpler rules would have said of the same data.
 
     Parameters
@@ -342,7 +342,7 @@ def baselines(judged: Sequence[Judged]) -> list[Row]:
 
     Returns
     -------
-    list of Row
+    list of ScoreRow
         Best single effect by its evidence whatever the rivals; nearest signature; a smooth curve without physics.
     """
     visible = [j for j in judged if j.entry["set"] in ("single", "sensor") and j.visible and j.answer]

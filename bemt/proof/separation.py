@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.proof.stand import Stand, covariance, full_scales
-from bemt.proof.truth_world import Loads, World
+from bemt.proof.truth_world import TrueLoads, World
 
 __all__ = ["FREEDOM", "Yardstick", "freedom", "yardstick"]
 
@@ -124,14 +124,14 @@ def freedom(world: World) -> dict[str, World]:
 
 
 def yardstick(
-    loads: Loads, run: NDArray[np.int64], stand: Stand, tangents: Sequence[Mapping[str, Array]],
+    loads: TrueLoads, run: NDArray[np.int64], stand: Stand, tangents: Sequence[Mapping[str, Array]],
     electric: Mapping[str, Array],
 ) -> Yardstick:  # fmt: skip
     """Build the yardstick of a recording.
 
     Parameters
     ----------
-    loads : Loads
+    loads : TrueLoads
         Real loads.
     run : (P,) int
         Run of each row.

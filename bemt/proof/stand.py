@@ -12,15 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.proof.truth_world import Conditions, Loads
+from bemt.proof.truth_world import Conditions, TrueLoads
 
-__all__ = ["Motor", "Stand", "covariance", "record"]
+__all__ = ["StandMotor", "Stand", "covariance", "record"]
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Motor:
+class StandMotor:
     """Motor, ESC and battery of the stand.
 
     Parameters
@@ -160,20 +160,20 @@ def _channel(
 
 
 def record(
-    loads: Loads, c: Conditions, radius: float, motor: Motor | None, stand: Stand,
+    loads: TrueLoads, c: Conditions, radius: float, motor: StandMotor | None, stand: Stand,
     rng: np.random.Generator | None, scales: tuple[float, float] | None = None,
 ) -> dict[str, Array]:  # fmt: skip
     """Readings of all instruments.
 
     Parameters
     ----------
-    loads : truth_world.Loads
+    loads : truth_world.TrueLoads
         Real loads.
     c : truth_world.Conditions
         Real conditions.
     radius : float
         Rotor radius, for cross talk. [m]
-    motor : Motor, optional
+    motor : StandMotor, optional
         Drive whose voltage, current and pulse width are recorded.
     stand : Stand
         Quality and faults.
@@ -219,12 +219,12 @@ def record(
     return out
 
 
-def full_scales(loads: Loads) -> tuple[float, float]:
+def full_scales(loads: TrueLoads) -> tuple[float, float]:
     """Full scales of the two load cells: 1.2 times the largest load.
 
     Parameters
     ----------
-    loads : truth_world.Loads
+    loads : truth_world.TrueLoads
         Real loads.
 
     Returns

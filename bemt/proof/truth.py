@@ -44,7 +44,7 @@ class TruthRotor:
         Count. [-]
     r_R, c_R, beta : (S,) float
         Stations: r/R, chord over R [-], blade angle [rad]; the first is the hub, the last the tip.
-    section : truth_section.Section
+    section : truth_section.TrueSection
         One section for the whole blade.
     panels : int
         Lifting-line panels. [-]
@@ -59,7 +59,7 @@ class TruthRotor:
     r_R: tuple[float, ...]
     c_R: tuple[float, ...]
     beta: tuple[float, ...]
-    section: ts.Section = field(default_factory=ts.Section)
+    section: ts.TrueSection = field(default_factory=ts.TrueSection)
     panels: int = 14
     wall: float = float("nan")
     code: str = "vortex"

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Section", "SectionPhysics", "loads", "zero_lift_angle"]
+__all__ = ["TrueSection", "SectionPhysics", "loads", "zero_lift_angle"]
 
 Array = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ _DD_M = np.array([0.835, 0.795, 0.76, 0.725, 0.67])
 
 
 @dataclass(frozen=True)
-class Section:
+class TrueSection:
     """Section of a blade, one value per panel or one for all.
 
     Parameters
@@ -137,7 +137,7 @@ def _step(x: Array) -> Array:
 
 
 def loads(
-    alpha: Array, re: Array, mach: Array, c_r: Array, speed_ratio: Array, aspect: float, section: Section,
+    alpha: Array, re: Array, mach: Array, c_r: Array, speed_ratio: Array, aspect: float, section: TrueSection,
     physics: SectionPhysics,
 ) -> tuple[Array, Array]:  # fmt: skip
     """Lift and drag coefficients.
@@ -150,7 +150,7 @@ def loads(
         Chord over radius; Omega R / sqrt(V^2 + (Omega R)^2), both for the stall delay. [-]
     aspect : float
         Aspect ratio of the blade, for the stalled plate. [-]
-    section : Section
+    section : TrueSection
         Shape.
     physics : SectionPhysics
         What is on.

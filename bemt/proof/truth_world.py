@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from bemt.proof import truth, truth_ccblade, truth_duct
 from bemt.proof.truth_section import SectionPhysics
 
-__all__ = ["Conditions", "Loads", "World", "loads"]
+__all__ = ["Conditions", "TrueLoads", "World", "loads"]
 
 Array = NDArray[np.float64]
 
@@ -117,7 +117,7 @@ class Conditions:
 
 
 @dataclass(frozen=True)
-class Loads:
+class TrueLoads:
     """Real loads of P rows.
 
     Attributes
@@ -181,7 +181,7 @@ def _solve(
 def loads(
     rotor: truth.TruthRotor, world: World, c: Conditions, duct: truth_duct.TruthDuct | None = None,
     start: truth.Answer | None = None,
-) -> Loads:  # fmt: skip
+) -> TrueLoads:  # fmt: skip
     """Thrust and torque of every row.
 
     Parameters
@@ -199,7 +199,7 @@ def loads(
 
     Returns
     -------
-    Loads
+    TrueLoads
         Real loads.
     """
     pressure = c.pressure_Pa * (1.0 + world.density_error)
@@ -267,7 +267,7 @@ def loads(
         torque = torque + world.bearing * (c.rpm / 1e4)
     if world.inertia and c.transient:
         torque = torque + world.inertia * np.gradient(omega, c.time)
-    return Loads(thrust, torque, answer.re75, answer.m_tip, answer)
+    return TrueLoads(thrust, torque, answer.re75, answer.m_tip, answer)
 
 
 def _two_stage_lag(time: Array, target: Array, lag: float) -> Array:

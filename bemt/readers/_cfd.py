@@ -24,8 +24,18 @@ from bemt.base.errors import Fault, InputError
 from bemt.readers import SourceText, number
 
 __all__ = [
-    "Column", "Row", "Table", "cells_of", "decode", "head_lines", "load", "numeric_table", "si_unit", "slug", "unique",
-]  # fmt: skip
+    "Column",
+    "ExportRow",
+    "ExportTable",
+    "cells_of",
+    "decode",
+    "head_lines",
+    "load",
+    "numeric_table",
+    "si_unit",
+    "slug",
+    "unique",
+]
 
 Array = NDArray[np.float64]
 
@@ -55,7 +65,7 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Row:
+class ExportRow:
     """Cells of one line."""
 
     line: int
@@ -63,7 +73,7 @@ class Row:
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class ExportTable:
     """Numbers of a table.
 
     Parameters
@@ -208,7 +218,7 @@ def _value(text: str, commas: bool) -> float | None:
     return value
 
 
-def _maybe_cut(source: SourceText, rows: Sequence[Row]) -> bool:
+def _maybe_cut(source: SourceText, rows: Sequence[ExportRow]) -> bool:
     """Whether the last row may have lost its end: no line end, and not of the fixed format of the rows before it."""
     if not rows or source.text.endswith(("\n", "\r")) or rows[-1].line != len(source.lines) or not rows[-1].cells:
         return False
@@ -218,7 +228,9 @@ def _maybe_cut(source: SourceText, rows: Sequence[Row]) -> bool:
     return not (fixed and _FIXED.fullmatch(last) and len(last) == len(before[0]))
 
 
-def numeric_table(source: SourceText, columns: Sequence[Column], rows: Sequence[Row], commas: bool = True) -> Table:
+def numeric_table(
+    source: SourceText, columns: Sequence[Column], rows: Sequence[ExportRow], commas: bool = True
+) -> ExportTable:
     """Turn the cells of a table into numbers, by its header.
 
     Parameters
@@ -227,14 +239,14 @@ def numeric_table(source: SourceText, columns: Sequence[Column], rows: Sequence[
         The file, for faults.
     columns : sequence of Column
         Header, K columns.
-    rows : sequence of Row
+    rows : sequence of ExportRow
         Data lines.
     commas : bool
         Whether a decimal comma is possible (not where commas separate).
 
     Returns
     -------
-    Table
+    ExportTable
         At least one row.
 
     Raises
@@ -292,7 +304,7 @@ def numeric_table(source: SourceText, columns: Sequence[Column], rows: Sequence[
         missing = int(np.count_nonzero(np.isnan(array[:, k])))
         if missing:
             warnings.append(f"{column.name}: {missing} of {len(array)} values are not finite numbers in the file")
-    return Table(array, tuple(lines), tuple(warnings))
+    return ExportTable(array, tuple(lines), tuple(warnings))
 
 
 def _more(name: str, count: int) -> list[Fault]:

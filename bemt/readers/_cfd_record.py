@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bemt.base.averaging import Average, keep_last, steady_average
 from bemt.readers import SourceText
-from bemt.readers._cfd import Column, Table, unique
+from bemt.readers._cfd import Column, ExportTable, unique
 from bemt.readers._imported import Channel, Imported
 
 __all__ = ["fields", "history"]
@@ -39,7 +39,7 @@ def history(
     format: str,  # noqa: A002 - field of the record
     source: SourceText,
     columns: Sequence[Column],
-    table: Table,
+    table: ExportTable,
     warnings: Sequence[str] = (),
     provenance: Mapping[str, str] | None = None,
 ) -> Imported:
@@ -56,7 +56,7 @@ def history(
         The file.
     columns : sequence of Column
         Columns of the table.
-    table : Table
+    table : ExportTable
         Its numbers.
     warnings : sequence of str
         Put first.
@@ -121,7 +121,7 @@ def fields(
     format: str,  # noqa: A002 - field of the record
     source: SourceText,
     columns: Sequence[Column],
-    table: Table,
+    table: ExportTable,
     warnings: Sequence[str] = (),
     provenance: Mapping[str, str] | None = None,
 ) -> Imported:

@@ -19,7 +19,7 @@ from bemt.readers import number
 from bemt.readers._clock import clock_seconds
 from bemt.readers._headings import Heading, slug
 from bemt.readers._imported import Channel, Imported
-from bemt.readers._split import Table, some
+from bemt.readers._split import SplitTable, some
 
 __all__ = ["Builder", "column_numbers", "slip", "spikes"]
 
@@ -117,7 +117,7 @@ def spikes(values: Array, half: int = 3, times: float = 2.0) -> NDArray[np.bool_
 class Builder:
     """Gathers the channels, texts, flags and warnings of one table and makes the `Imported`."""
 
-    table: Table
+    table: SplitTable
     format: str
     kind: str = "bench"
     channels: dict[str, Channel] = field(default_factory=dict)

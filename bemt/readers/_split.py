@@ -15,7 +15,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.readers import SourceText, number
 from bemt.readers._headings import unit_of
 
-__all__ = ["Table", "decimal_mark", "find_delimiter", "find_start", "some", "split_line", "split_table"]
+__all__ = ["SplitTable", "decimal_mark", "find_delimiter", "find_start", "some", "split_line", "split_table"]
 
 DELIMITERS = (";", "\t", ",", "|")
 MAX_FAULTS = 20
@@ -27,7 +27,7 @@ _EXCEL = re.compile(r'\s*"?sep=(.)"?\s*', re.IGNORECASE)
 
 
 @dataclass(frozen=True)
-class Table:
+class SplitTable:
     """Cells of a delimited file: headings (empty when it has none), rows of equal length with their line numbers."""
 
     source: SourceText
@@ -145,12 +145,12 @@ def find_start(lines: Sequence[str]) -> tuple[int, str]:
     return 0, find_delimiter(lines[:5])
 
 
-def decimal_mark(table: Table) -> str:
+def decimal_mark(table: SplitTable) -> str:
     """Decimal mark of a table: a comma only where it can be nothing else.
 
     Parameters
     ----------
-    table : Table
+    table : SplitTable
         Its cells.
 
     Returns
@@ -168,7 +168,7 @@ def decimal_mark(table: Table) -> str:
     return "," if plain and not pointed and any(not _THOUSANDS.fullmatch(cell) for cell in commas) else "."
 
 
-def split_table(source: SourceText, delimiter: str | None = None, header: bool | None = None) -> Table:
+def split_table(source: SourceText, delimiter: str | None = None, header: bool | None = None) -> SplitTable:
     """Split a file into rows of equal length.
 
     Parameters
@@ -182,7 +182,7 @@ def split_table(source: SourceText, delimiter: str | None = None, header: bool |
 
     Returns
     -------
-    Table
+    SplitTable
         Lines that are blank or begin with ``#`` or ``%`` are left out and counted in its warnings.
 
     Raises
@@ -254,5 +254,5 @@ def split_table(source: SourceText, delimiter: str | None = None, header: bool |
     if not rows:
         raise InputError(Fault(source.name, "", "no rows", "a heading line and rows of numbers"))
     names = tuple(first[:width]) if header else ()
-    return Table(source, mark, names, tuple(rows), tuple(i for i, _ in (split[1:] if header else split)),
+    return SplitTable(source, mark, names, tuple(rows), tuple(i for i, _ in (split[1:] if header else split)),
                  tuple(notes), cut, tuple(misfits))  # fmt: skip

@@ -17,7 +17,7 @@ import re
 
 from bemt.base.errors import Fault, InputError
 from bemt.readers import SourceText
-from bemt.readers._cfd import Column, Row, cells_of, head_lines, load, numeric_table, si_unit, slug
+from bemt.readers._cfd import Column, ExportRow, cells_of, head_lines, load, numeric_table, si_unit, slug
 from bemt.readers._cfd_record import fields, history
 from bemt.readers._imported import Channel, Imported
 
@@ -83,7 +83,7 @@ def read(path: str | os.PathLike[str]) -> Imported:
         When no block has data, or rows do not fit their header.
     """
     source = load(path)
-    data: list[tuple[str, list[Row]]] = []
+    data: list[tuple[str, list[ExportRow]]] = []
     section, name = "", ""
     skipped: set[str] = set()
     mark = ","
@@ -101,7 +101,7 @@ def read(path: str | os.PathLike[str]) -> Imported:
         elif section == "Data":
             if not data[-1][1]:
                 mark = ";" if ";" in text else "\t" if "\t" in text and "," not in text else ","
-            data[-1][1].append(Row(line, cells_of(text, mark)))
+            data[-1][1].append(ExportRow(line, cells_of(text, mark)))
         elif section:
             skipped.add(section)
         else:
@@ -123,7 +123,7 @@ def read(path: str | os.PathLike[str]) -> Imported:
     return Imported(KIND, "cfd", sum(r.rows for _, r in records), channels, tuple(notes), about)
 
 
-def _block(source: SourceText, rows: list[Row], commas: bool) -> Imported:
+def _block(source: SourceText, rows: list[ExportRow], commas: bool) -> Imported:
     columns = [_heading(cell) for cell in rows[0].cells]
     if all(re.fullmatch(r"[-+.\deE]+", cell) for cell in rows[0].cells):
         got = f"numbers ({', '.join(rows[0].cells[:4])})"

@@ -15,7 +15,7 @@ import os
 from dataclasses import replace
 
 from bemt.base.errors import Fault, InputError
-from bemt.readers._cfd import Column, Row, cells_of, head_lines, load, numeric_table
+from bemt.readers._cfd import Column, ExportRow, cells_of, head_lines, load, numeric_table
 from bemt.readers._cfd_record import fields
 from bemt.readers._imported import Imported
 
@@ -75,7 +75,7 @@ def read(path: str | os.PathLike[str]) -> Imported:
     names = cells_of(lines[0][1], mark)
     columns = [Column(name or "unnamed") for name in names]
     columns[0] = replace(columns[0], role="index")
-    rows = [Row(k, cells_of(text, mark)) for k, text in lines[1:]]
+    rows = [ExportRow(k, cells_of(text, mark)) for k, text in lines[1:]]
     repeated = sum(row.cells == names for row in rows)
     body = [row for row in rows if row.cells != names]
     table = numeric_table(source, columns, body, commas=mark != ",")

@@ -13,7 +13,7 @@ import os
 import re
 
 from bemt.base.errors import Fault, InputError
-from bemt.readers._cfd import Row, head_lines, load, numeric_table
+from bemt.readers._cfd import ExportRow, head_lines, load, numeric_table
 from bemt.readers._cfd_record import history
 from bemt.readers._imported import Imported
 from bemt.readers.fluent_report import column_of
@@ -75,7 +75,7 @@ def read(path: str | os.PathLike[str]) -> Imported:
     source = load(path)
     title: str | None = None
     names: list[str] | None = None
-    rows: list[Row] = []
+    rows: list[ExportRow] = []
     repeated = 0
     for line, raw in enumerate(source.lines, 1):
         text = raw.strip()
@@ -94,7 +94,7 @@ def read(path: str | os.PathLike[str]) -> Imported:
             expected = 'names such as "Flow Time" "cd"'
             raise InputError(Fault(source.name, str(line), repr(text[:60]), expected, "Is the header damaged?"))
         else:
-            rows.append(Row(line, tuple(text.split())))
+            rows.append(ExportRow(line, tuple(text.split())))
     if names is None:
         raise InputError(Fault(source.name, "", "no names", 'a second line such as "Flow Time" "cd"'))
     if any(name.rstrip().endswith("etc..") for name in names):

@@ -19,7 +19,7 @@ import os
 import re
 
 from bemt.base.errors import Fault, InputError
-from bemt.readers._cfd import Column, Row, head_lines, load, numeric_table, si_unit
+from bemt.readers._cfd import Column, ExportRow, head_lines, load, numeric_table, si_unit
 from bemt.readers._cfd_record import history
 from bemt.readers._imported import Imported
 
@@ -109,7 +109,7 @@ def read(path: str | os.PathLike[str]) -> Imported:
     source = load(path)
     title = ""
     names: list[str] | None = None
-    rows: list[Row] = []
+    rows: list[ExportRow] = []
     repeated: list[int] = []
     for line, raw in enumerate(source.lines, 1):
         text = raw.strip()
@@ -130,7 +130,7 @@ def read(path: str | os.PathLike[str]) -> Imported:
             expected = 'a header such as ("Time Step" "thrust" "flow-time")'
             raise InputError(Fault(source.name, str(line), repr(text[:60]), expected, hint))
         else:
-            rows.append(Row(line, tuple(text.split())))
+            rows.append(ExportRow(line, tuple(text.split())))
     if names is None:
         raise InputError(Fault(source.name, "", "no header", 'a line such as ("Time Step" "thrust" "flow-time")'))
     columns = [column_of(name) for name in names]

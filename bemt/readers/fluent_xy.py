@@ -18,7 +18,7 @@ from dataclasses import replace
 
 from bemt.base.errors import Fault, InputError
 from bemt.readers import SourceText
-from bemt.readers._cfd import Column, Row, head_lines, load, numeric_table, unique
+from bemt.readers._cfd import Column, ExportRow, head_lines, load, numeric_table, unique
 from bemt.readers._cfd_record import history
 from bemt.readers._imported import Channel, Imported
 from bemt.readers.fluent_report import column_of
@@ -75,7 +75,7 @@ def read(path: str | os.PathLike[str]) -> Imported:
     source = load(path)
     title = ""
     labels: list[str] = []
-    zones: list[tuple[str, list[Row]]] = []
+    zones: list[tuple[str, list[ExportRow]]] = []
     closed = True
     for line, raw in enumerate(source.lines, 1):
         text = raw.strip()
@@ -96,7 +96,7 @@ def read(path: str | os.PathLike[str]) -> Imported:
             expected = '(labels "x" "y") and lists that begin with ((xy/key/label "zone")'
             raise InputError(Fault(source.name, str(line), repr(text[:60]), expected, "Is the file damaged?"))
         else:
-            zones[-1][1].append(Row(line, tuple(text.split())))
+            zones[-1][1].append(ExportRow(line, tuple(text.split())))
     if not labels or not zones:
         got = "no (labels ...)" if not labels else "no list of points"
         raise InputError(Fault(source.name, "", got, 'labels and a list ((xy/key/label "zone") ... )'))
@@ -114,7 +114,7 @@ def _column(label: str) -> Column:
 
 
 def _record(
-    source: SourceText, title: str, labels: list[str], zones: list[tuple[str, list[Row]]], closed: bool
+    source: SourceText, title: str, labels: list[str], zones: list[tuple[str, list[ExportRow]]], closed: bool
 ) -> Imported:
     columns = [_column(label) for label in labels]
     counts = columns[0].role in ("step", "time")

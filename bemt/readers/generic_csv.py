@@ -19,7 +19,7 @@ from bemt.readers import SourceText, head_text, load_text, number
 from bemt.readers._headings import Heading, heading
 from bemt.readers._imported import Imported
 from bemt.readers._recording import Builder, spikes
-from bemt.readers._split import Table, decimal_mark, find_start, split_line, split_table
+from bemt.readers._split import SplitTable, decimal_mark, find_start, split_line, split_table
 
 __all__ = ["FALLBACK", "KIND", "convert", "read", "sniff"]
 
@@ -104,14 +104,14 @@ def read(path: str | os.PathLike[str]) -> Imported:
     return imported
 
 
-def convert(source: SourceText, table: Table, decimal: str = ".") -> Imported:
+def convert(source: SourceText, table: SplitTable, decimal: str = ".") -> Imported:
     """Make channels of a split table.
 
     Parameters
     ----------
     source : SourceText
         The file.
-    table : Table
+    table : SplitTable
         Its cells.
     decimal : str
         Decimal mark, ``.`` or ``,``.

@@ -26,7 +26,7 @@ import numpy as np
 
 from bemt.base.errors import Fault, InputError
 from bemt.readers import SourceText
-from bemt.readers._cfd import Column, Row, Table, head_lines, load, numeric_table
+from bemt.readers._cfd import Column, ExportRow, ExportTable, head_lines, load, numeric_table
 from bemt.readers._cfd_record import history
 from bemt.readers._imported import Channel, Imported
 
@@ -148,7 +148,9 @@ def read(path: str | os.PathLike[str]) -> Imported:
     return _record(source, columns, table, {"title": title, **about}, notes)
 
 
-def _rows(rows: Sequence[tuple[int, str]], layout: str, width: int, groups: list[tuple[str, list[str]]]) -> list[Row]:
+def _rows(
+    rows: Sequence[tuple[int, str]], layout: str, width: int, groups: list[tuple[str, list[str]]]
+) -> list[ExportRow]:
     """Cells of the rows; a row with other parentheses than its header has gets none, so that it is not shifted."""
     out = []
     wanted = "n" + "".join(f"({'(nnn)' * len(parts)})" for _, parts in groups)
@@ -158,11 +160,13 @@ def _rows(rows: Sequence[tuple[int, str]], layout: str, width: int, groups: list
         ok = shape == wanted if layout == "nested" else shape.replace("(nnn)", "nnn") == "n" * len(cells)
         if not ok and len(cells) == width:
             cells = (*cells[:-1], "damaged parentheses")
-        out.append(Row(line, cells))
+        out.append(ExportRow(line, cells))
     return out
 
 
-def _totals(columns: list[Column], table: Table, groups: list[tuple[str, list[str]]]) -> tuple[list[Column], Table]:
+def _totals(
+    columns: list[Column], table: ExportTable, groups: list[tuple[str, list[str]]]
+) -> tuple[list[Column], ExportTable]:
     """Add the totals that the old layout does not have."""
     new: list[Column] = []
     sums = []
@@ -180,7 +184,7 @@ def _totals(columns: list[Column], table: Table, groups: list[tuple[str, list[st
 
 
 def _record(
-    source: SourceText, columns: list[Column], table: Table, about: dict[str, str], notes: list[str]
+    source: SourceText, columns: list[Column], table: ExportTable, about: dict[str, str], notes: list[str]
 ) -> Imported:
     times = table.values[:, 0]
     known = times[np.isfinite(times)]
@@ -200,7 +204,7 @@ def _record(
     return history(KIND, source, columns, table, notes, about)
 
 
-def _balance(columns: list[Column], table: Table, axis: str) -> list[str]:
+def _balance(columns: list[Column], table: ExportTable, axis: str) -> list[str]:
     """Total against the sum of its parts, where all are recorded: shows swapped or damaged columns."""
     notes = []
     by_name = {c.name: table.values[:, k] for k, c in enumerate(columns)}
@@ -225,10 +229,10 @@ def _by_patch(
 ) -> Imported:
     """Table with a patch in the second column (yPlus): one channel for each patch and column."""
     columns = [Column("Time", "", "step"), *(Column(name) for name in names[1:])]
-    patches: dict[str, list[Row]] = {}
+    patches: dict[str, list[ExportRow]] = {}
     for line, text in rows:
         cells = text.split()
-        patches.setdefault(cells[1] if len(cells) > 1 else "?", []).append(Row(line, (cells[0], *cells[2:])))
+        patches.setdefault(cells[1] if len(cells) > 1 else "?", []).append(ExportRow(line, (cells[0], *cells[2:])))
     channels: dict[str, Channel] = {}
     last = 0
     prefix = "y_plus" if "y+" in about.get("title", "") else about.get("title", "").strip() or "value"
@@ -255,7 +259,7 @@ def _probes(source: SourceText, probes: dict[str, str], rows: Sequence[tuple[int
     cells = []
     for line, text in rows:
         row = tuple(text.replace("(", " ").replace(")", " ").split())
-        cells.append(Row(line, row if _shape(text) == wanted else (*row[:-1], "damaged parentheses")))
+        cells.append(ExportRow(line, row if _shape(text) == wanted else (*row[:-1], "damaged parentheses")))
     table = numeric_table(source, columns, cells, commas=False)
     where = "; ".join(f"probe {k} at ({at})" for k, at in probes.items())
     return _record(source, columns, table, {"title": "probes", "probes": where}, [*notes, "the file states no unit"])

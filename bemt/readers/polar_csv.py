@@ -18,7 +18,7 @@ import numpy as np
 
 from bemt.base.errors import Fault, InputError
 from bemt.readers import SourceText, head_text, load_text, number
-from bemt.sections.extrapolation import SectionTable, from_tables
+from bemt.sections.extrapolation import ExtrapolatedTable, from_tables
 from bemt.sections.polars import Polar
 
 __all__ = ["KIND", "PolarRow", "assemble", "read", "sniff"]
@@ -214,7 +214,7 @@ def assemble(
             faults.append(Fault(source.name, "", got, f"three or more that hold 0 and reach {MIN_SPAN_DEG:g} deg", ""))
         columns = np.array([(r.alpha, r.cl, r.cd) for r in used])
         columns[0, 0], columns[-1, 0] = (_snap(columns[k, 0]) for k in (0, -1))
-        tables.append(SectionTable(columns[:, 0], columns[:, 1], columns[:, 2], reynolds, mach))
+        tables.append(ExtrapolatedTable(columns[:, 0], columns[:, 1], columns[:, 2], reynolds, mach))
     if not rows and not faults:
         faults.append(Fault(source.name, "", "no rows", "rows of alpha, cl and cd", ""))
     sizes = len({r for r, _ in groups}), len({m for _, m in groups})

@@ -32,7 +32,7 @@ from bemt.readers import head_text, load_text, number
 from bemt.readers._headings import heading
 from bemt.readers._imported import Imported
 from bemt.readers._recording import Array, Builder, slip, spikes
-from bemt.readers._split import Table, split_table
+from bemt.readers._split import SplitTable, split_table
 
 __all__ = ["KIND", "read", "sniff"]
 
@@ -135,7 +135,7 @@ def _side(text: str) -> tuple[str, str]:
     return text, ""
 
 
-def _turned(table: Table, sides: Sequence[tuple[str, str]], side: str) -> bool:
+def _turned(table: SplitTable, sides: Sequence[tuple[str, str]], side: str) -> bool:
     """Whether a motor turned: its speed, or without one its thrust, was ever other than 0."""
     for words in ("speed", "thrust"):
         own = [k for k, (text, s) in enumerate(sides) if s == side and words in text.lower()]

@@ -17,7 +17,7 @@ import re
 import numpy as np
 
 from bemt.base.errors import Fault, InputError
-from bemt.readers._cfd import Column, Row, Table, cells_of, head_lines, load, numeric_table
+from bemt.readers._cfd import Column, ExportRow, ExportTable, cells_of, head_lines, load, numeric_table
 from bemt.readers._cfd_record import history
 from bemt.readers._imported import Imported
 
@@ -70,7 +70,7 @@ def read(path: str | os.PathLike[str]) -> Imported:
     """
     source = load(path)
     names: tuple[str, ...] | None = None
-    rows: list[Row] = []
+    rows: list[ExportRow] = []
     repeated = 0
     for line, raw in enumerate(source.lines, 1):
         text = raw.strip()
@@ -86,7 +86,7 @@ def read(path: str | os.PathLike[str]) -> Imported:
             expected = 'quoted names such as "Time_Iter","Inner_Iter","CD"'
             raise InputError(Fault(source.name, str(line), repr(text[:60]), expected, "Is the header damaged?"))
         else:
-            rows.append(Row(line, cells_of(text, ",")))
+            rows.append(ExportRow(line, cells_of(text, ",")))
     if names is None:
         raise InputError(Fault(source.name, "", "no header", 'quoted names such as "Time_Iter","Inner_Iter"'))
     columns = [_column(name) for name in names]
@@ -105,7 +105,7 @@ def _column(name: str) -> Column:
     return Column(name or "unnamed", "", "counter" if name in _STEPS else "value")
 
 
-def _count(columns: list[Column], table: Table, notes: list[str]) -> tuple[list[Column], Table]:
+def _count(columns: list[Column], table: ExportTable, notes: list[str]) -> tuple[list[Column], ExportTable]:
     """Let the outermost counter that counts be the step; rows of inner iterations of one time step repeat it."""
     counters = [k for k, c in enumerate(columns) if c.role == "counter"]
     counting = [k for k in counters if len(np.unique(table.values[:, k])) > 1]

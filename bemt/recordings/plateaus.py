@@ -29,7 +29,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.errors import Fault, InputError
 
-__all__ = ["Dropped", "Plateau", "Plateaus", "Settings", "find", "standard_error"]
+__all__ = ["Dropped", "Plateau", "Plateaus", "PlateauSettings", "find", "standard_error"]
 
 Array = NDArray[np.float64]
 OUTLIER = 6.0
@@ -39,7 +39,7 @@ LOCAL = 3.0
 
 
 @dataclass(frozen=True)
-class Settings:
+class PlateauSettings:
     """Rules of the detection.
 
     Parameters
@@ -199,7 +199,7 @@ def find(
     channels: Mapping[str, ArrayLike],
     signal: str,
     command: ArrayLike | None = None,
-    settings: Settings | None = None,
+    settings: PlateauSettings | None = None,
 ) -> Plateaus:
     """Find the plateaus of a recording.
 
@@ -213,7 +213,7 @@ def find(
         Channel that decides about steps (without a command) and settling.
     command : (N,) array or None
         Pulse width, throttle or similar, in any unit; steps are then where it changes.
-    settings : Settings or None
+    settings : PlateauSettings or None
         Rules; None takes the defaults.
 
     Returns
@@ -233,7 +233,7 @@ def find(
     >>> [(p.mean["thrust_N"], p.direction) for p in got.plateaus]
     [(1.0, 'first'), (2.0, 'up')]
     """
-    rules = settings or Settings()
+    rules = settings or PlateauSettings()
     data = {name: np.asarray(v, dtype=float) for name, v in channels.items()}
     t, faults = _checked(time_s, data, signal, command, rules)
     if faults:
@@ -272,7 +272,7 @@ def find(
 
 
 def _checked(
-    time_s: ArrayLike | None, data: Mapping[str, Array], signal: str, command: ArrayLike | None, rules: Settings
+    time_s: ArrayLike | None, data: Mapping[str, Array], signal: str, command: ArrayLike | None, rules: PlateauSettings
 ) -> tuple[Array, list[Fault]]:
     faults = []
     n = len(next(iter(data.values()))) if data else 0
@@ -303,7 +303,7 @@ def _backwards(t: Array) -> list[int]:
     return [int(row) for row in np.flatnonzero(t < np.maximum.accumulate(t))]
 
 
-def _by_command(command: Array, rules: Settings) -> tuple[list[tuple[int, int]], list[Dropped]]:
+def _by_command(command: Array, rules: PlateauSettings) -> tuple[list[tuple[int, int]], list[Dropped]]:
     """Stretches of constant command; those too short are ramps."""
     same = np.isclose(command[1:], command[:-1], rtol=1e-9, atol=0.0) | (np.isnan(command[1:]) & np.isnan(command[:-1]))
     edges = [0, *(np.flatnonzero(~same) + 1).tolist(), len(command)]
@@ -324,7 +324,7 @@ def _by_command(command: Array, rules: Settings) -> tuple[list[tuple[int, int]],
     return stretches, dropped
 
 
-def _by_signal(v: Array, rules: Settings) -> tuple[list[tuple[int, int]], list[Dropped]]:
+def _by_signal(v: Array, rules: PlateauSettings) -> tuple[list[tuple[int, int]], list[Dropped]]:
     """Stretches between jumps of the medians of neighbouring windows."""
     n, w = len(v), rules.window
     if n < 2 * w:
@@ -364,7 +364,7 @@ def _by_signal(v: Array, rules: Settings) -> tuple[list[tuple[int, int]], list[D
     return stretches, dropped
 
 
-def _settled(t: Array, v: Array, rules: Settings) -> tuple[int, bool]:
+def _settled(t: Array, v: Array, rules: PlateauSettings) -> tuple[int, bool]:
     """Samples to cut at the start of a stretch, and whether it settles at all."""
     n = len(v)
     if rules.settle_time_s is not None:
@@ -381,7 +381,7 @@ def _settled(t: Array, v: Array, rules: Settings) -> tuple[int, bool]:
     return cut, cut < n // 2
 
 
-def _leaving(v: Array, cut: int, rules: Settings) -> int:
+def _leaving(v: Array, cut: int, rules: PlateauSettings) -> int:
     """Samples at the end of a stretch that already follow the next step (at most a window)."""
     body = v[cut:]
     if len(body) < 3 * rules.window:
@@ -394,7 +394,13 @@ def _leaving(v: Array, cut: int, rules: Settings) -> int:
 
 
 def _reduce(
-    t: Array, data: Mapping[str, Array], signal: str, command: ArrayLike | None, start: int, stop: int, rules: Settings
+    t: Array,
+    data: Mapping[str, Array],
+    signal: str,
+    command: ArrayLike | None,
+    start: int,
+    stop: int,
+    rules: PlateauSettings,
 ) -> tuple[Plateau | None, list[Dropped]]:
     rows = start + np.flatnonzero(np.isfinite(data[signal][start:stop]))
     if len(rows) < rules.least_samples:

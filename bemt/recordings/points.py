@@ -80,7 +80,7 @@ def _note_rest(found: Found, rec: Recorded, rows: Sequence[int]) -> None:
     found.lost += [Lost(rec.lines[i], "", "at rest: a zero of the stand, no point") for i in rows]
 
 
-def from_samples(rec: Recorded, name: str, settings: plateaus.Settings | None) -> Found:
+def from_samples(rec: Recorded, name: str, settings: plateaus.PlateauSettings | None) -> Found:
     """Plateaus of every run.
 
     Parameters

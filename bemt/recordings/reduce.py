@@ -26,7 +26,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
 from bemt.readers._imported import Imported
 from bemt.recordings.channels import LOADS, Lost, Recorded, shaft_power, view
-from bemt.recordings.plateaus import Settings
+from bemt.recordings.plateaus import PlateauSettings
 from bemt.recordings.points import Found, Point, from_rows, from_samples
 from bemt.recordings.rows import command_of, is_samples
 from bemt.recordings.scatter import Hysteresis, hysteresis, repeats, session
@@ -80,7 +80,7 @@ class Reduced:
 def reduce(
     imported: Imported | Sequence[Imported], *, diameter_m: float | None = None, chord75_m: float | None = None,
     air: Air | None = None, isa_altitude_m: float | None = None, tare: Imported | Literal[False] | None = None,
-    steady: bool | None = None, speed: str | None = None, settings: Settings | None = None,
+    steady: bool | None = None, speed: str | None = None, settings: PlateauSettings | None = None,
 ) -> Reduced:  # fmt: skip
     """Reduce a recording to steady points.
 
@@ -103,7 +103,7 @@ def reduce(
         True: rows are points; False: samples; None decides (:mod:`bemt.recordings.rows`).
     speed : str or None
         Channel that is the speed of the rotor (``optical_rpm``, ``electrical_rpm``); None decides.
-    settings : Settings or None
+    settings : PlateauSettings or None
         Rules of the plateau search.
 
     Returns

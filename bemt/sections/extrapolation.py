@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bemt.sections.polars import ALPHA_GRID, Polar, first_stall
 
-__all__ = ["METHODS", "SectionTable", "extend", "from_tables", "viterna_cd_max"]
+__all__ = ["METHODS", "ExtrapolatedTable", "extend", "from_tables", "viterna_cd_max"]
 
 Array = NDArray[np.float64]
 
@@ -127,7 +127,7 @@ def extend(
 
 
 @dataclass(frozen=True, eq=False)
-class SectionTable:
+class ExtrapolatedTable:
     """One measured or computed polar at one Reynolds and Mach number, over any range of alpha.
 
     Parameters
@@ -148,14 +148,14 @@ class SectionTable:
 
 
 def from_tables(
-    tables: Sequence[SectionTable], *, name: str = "", source: str = "", ar: float = 10.0,
+    tables: Sequence[ExtrapolatedTable], *, name: str = "", source: str = "", ar: float = 10.0,
     cd_max: float | None = None, notes: Sequence[str] = (),
 ) -> Polar:  # fmt: skip
     """Polar from single-Re tables, each continued to +-180 deg where its data stop.
 
     Parameters
     ----------
-    tables : sequence of SectionTable
+    tables : sequence of ExtrapolatedTable
         One per (Re, M); together they fill a rectangle of Re x M.
     name, source : str, optional
         Labels of the Polar.
@@ -192,7 +192,7 @@ def from_tables(
     return Polar(alpha, re, mach, cl, cd, None, name, source, tuple(dict.fromkeys(said)))
 
 
-def _close(t: SectionTable, out: Array, cd_max: float) -> tuple[Array, Array, list[str]]:
+def _close(t: ExtrapolatedTable, out: Array, cd_max: float) -> tuple[Array, Array, list[str]]:
     """One table on the angles out, over all of +-pi, with notes on what was added."""
     a, cl, cd = (np.asarray(v, dtype=float) for v in (t.alpha, t.cl, t.cd))
     if a.size < 3 or np.any(np.diff(a) <= 0) or a[0] > 0.0 or a[-1] < np.deg2rad(5.0) or a[-1] > np.pi + 1e-9:

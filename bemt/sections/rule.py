@@ -5,7 +5,7 @@ gives every one of them the same answer unless its family is known to differ or 
 numbers were calibrated on UIUC volume 1 (51 propellers with stations, static and wind-tunnel data); UIUC volume 2 is
 what it is reported on (``reports/validation``): held out of every fit, though looked at on the way.
 
-* Section: NACA four-digit, camber 3.5 % at 40 % chord, thickness 9 %; six of the nine families of volume 1 with two
+* RuleSection: NACA four-digit, camber 3.5 % at 40 % chord, thickness 9 %; six of the nine families of volume 1 with two
   or more propellers come out at 3.0 to 3.5 %.  Families that do not are in :data:`FAMILIES`, and so are families whose
   section is published, with its coordinates.  APC publishes sections too (its PE0 files: E63 to NACA 4412, or Clark Y,
   scaled); with them static CT of volume 1 is off by 5.3 % in the median, with the rule by 3.7 %: not taken.
@@ -43,7 +43,7 @@ N_CRIT_LARGE = 9.0
 
 
 @dataclass(frozen=True)
-class Section:
+class RuleSection:
     """A section at one radius: NACA four-digit, or a published one.
 
     Attributes
@@ -63,15 +63,15 @@ class Section:
     shape: str = "naca4"
 
 
-def _one(camber: float, thickness: float = 0.09) -> tuple[Section, ...]:
-    return (Section(0.75, camber, 0.4, thickness),)
+def _one(camber: float, thickness: float = 0.09) -> tuple[RuleSection, ...]:
+    return (RuleSection(0.75, camber, 0.4, thickness),)
 
 
 DEFAULT = _one(0.035)
 
 # Deters, Ananda and Selig (2014), AIAA 2014-2151: SDA1075 over the whole blade of DA4002 and DA4022.  That DA4052, of
 # the same designers, has it too is an assumption.
-_SDA1075 = (Section(0.75, 0.0196, 0.4, 0.11996, "sda1075"),)
+_SDA1075 = (RuleSection(0.75, 0.0196, 0.4, 0.11996, "sda1075"),)
 
 # Clark Y thinned towards the tip: the standard propeller 5868-9 of NACA Report 640, which the UIUC family nr640 copies
 # at model scale.  The thickness law is from memory of that report, not checked; a thickness file replaces it.
@@ -79,7 +79,7 @@ _CLARK_Y_640 = (0.2, 0.3, 0.45, 0.6, 0.75, 0.95), (0.25, 0.20, 0.13, 0.10, 0.085
 # A root thicker than this is part of the hub, and no section.
 _THICKEST = 0.25
 
-FAMILIES: dict[str, tuple[Section, ...]] = {
+FAMILIES: dict[str, tuple[RuleSection, ...]] = {
     "apcsf": _one(0.065),  # slow flyers and old wooden-style blades: strongly cambered (calibrated on volume 1)
     "mae": _one(0.065),
     "apcsp": _one(0.050),
@@ -90,15 +90,17 @@ FAMILIES: dict[str, tuple[Section, ...]] = {
 }
 
 
-def _clark_y(r_R: ArrayLike, thickness: ArrayLike) -> tuple[Section, ...]:
+def _clark_y(r_R: ArrayLike, thickness: ArrayLike) -> tuple[RuleSection, ...]:
     """Clark Y at a few radii of a thickness law."""
     x, t = np.asarray(r_R, dtype=float), np.asarray(thickness, dtype=float)
     at = np.linspace(x[0], x[-1], 6)
     law = np.minimum(np.interp(at, x, t), _THICKEST)
-    return tuple(Section(float(a), 0.306 * float(b), 0.4, float(b), "clark_y") for a, b in zip(at, law, strict=True))
+    return tuple(
+        RuleSection(float(a), 0.306 * float(b), 0.4, float(b), "clark_y") for a, b in zip(at, law, strict=True)
+    )
 
 
-def sections(family: str | None = None, law: tuple[ArrayLike, ArrayLike] | None = None) -> tuple[Section, ...]:
+def sections(family: str | None = None, law: tuple[ArrayLike, ArrayLike] | None = None) -> tuple[RuleSection, ...]:
     """Sections of the rule.
 
     Parameters
@@ -110,7 +112,7 @@ def sections(family: str | None = None, law: tuple[ArrayLike, ArrayLike] | None 
 
     Returns
     -------
-    tuple of Section
+    tuple of RuleSection
         One for the whole blade, or several along it, root first.
 
     >>> sections("apcsf")[0].camber, sections("somebody")[0].camber
@@ -123,7 +125,7 @@ def sections(family: str | None = None, law: tuple[ArrayLike, ArrayLike] | None 
     return FAMILIES.get(family or "", DEFAULT)
 
 
-def section_at(r_R: float, family: str | None = None) -> Section:
+def section_at(r_R: float, family: str | None = None) -> RuleSection:
     """Section of the rule nearest to a radius.
 
     Parameters
@@ -135,19 +137,19 @@ def section_at(r_R: float, family: str | None = None) -> Section:
 
     Returns
     -------
-    Section
+    RuleSection
         For cases that take one section for the whole blade.
     """
     return min(sections(family), key=lambda s: abs(s.r_R - r_R))
 
 
 @lru_cache(maxsize=256)
-def airfoil(section: Section) -> Airfoil:
+def airfoil(section: RuleSection) -> Airfoil:
     """Coordinates of a section.
 
     Parameters
     ----------
-    section : Section
+    section : RuleSection
         Parameters.
 
     Returns
@@ -169,7 +171,7 @@ def polar(shape: Airfoil, n_crit: float = N_CRIT, drag_level: float = DRAG_LEVEL
     Parameters
     ----------
     shape : geometry.airfoil.Airfoil
-        Section.
+        RuleSection.
     n_crit : float
         Critical amplification factor at small Reynolds numbers [1].
     drag_level : float

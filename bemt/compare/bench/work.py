@@ -203,7 +203,7 @@ def prepare(work: Work, effects: tuple[str, ...] | None = PEER_EFFECTS) -> Prepa
     """
     from bemt.bem import solver
     from bemt.effects import standard
-    from bemt.sections.extrapolation import SectionTable, from_tables
+    from bemt.sections.extrapolation import ExtrapolatedTable, from_tables
     from geometry.airfoil import naca
     from geometry.blade import Stations, from_stations
     from geometry.rotor import Rotor
@@ -211,7 +211,7 @@ def prepare(work: Work, effects: tuple[str, ...] | None = PEER_EFFECTS) -> Prepa
     R = 0.5 * DIAMETER
     r, chord, beta = work.r_R * R, work.c_R * R, np.radians(work.beta_deg)
     blade = from_stations(r, chord, beta, R, float(work.edges[0]) * R, naca("4412"), name=work.name)
-    table = SectionTable(np.radians(work.alpha_deg), work.cl, work.cd, RE)
+    table = ExtrapolatedTable(np.radians(work.alpha_deg), work.cl, work.cd, RE)
     polar = from_tables([table], name="NACA 4412", source=work.name)
     on = standard() if effects is None else tuple(e for e in standard() if e.id in effects)
     stations = Stations(r, np.diff(work.edges) * R, chord, beta)

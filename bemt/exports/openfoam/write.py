@@ -28,7 +28,7 @@ from geometry.solid import revolve
 
 if TYPE_CHECKING:
     from geometry.duct import Duct
-    from geometry.mesh import Model
+    from geometry.mesh import MeshModel
     from geometry.rotor import Rotor
 
 __all__ = ["RANGES", "Run", "check_run", "settings_of", "write_openfoam"]
@@ -118,7 +118,7 @@ def _standing(duct: Duct | None, parts: int) -> tuple[Duct | None, bool]:
     return replace(duct, stator=None), True
 
 
-def _tail(rotor: Rotor, duct: Duct, model: Model) -> np.ndarray | None:
+def _tail(rotor: Rotor, duct: Duct, model: MeshModel) -> np.ndarray | None:
     """Outline of the centre body alone."""
     mesh = model.rotor
     back = float(mesh.vertices[np.unique(mesh.part("hub")), 2].min())
