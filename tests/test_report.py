@@ -24,7 +24,8 @@ import pytest
 from bemt.commands.cli import main
 from bemt.report import book_html
 from bemt.report.cfd import attach, cfd_runs
-from bemt.report.gather import attach_diagnoses, gather, safe_files
+from bemt.report.found_files import safe_files
+from bemt.report.gather import attach_diagnoses, gather
 from bemt.report.markup import esc
 from bemt.report.plot import Mark, Plot, Trace, figure, ticks
 from bemt.report.summary import summary

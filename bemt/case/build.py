@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from bemt.air import Air, isa_pressure
 from bemt.base.errors import Fault, InputError
-from bemt.base.toml import Collector
 from bemt.base.units import ZERO_CELSIUS
-from bemt.case.rules import check_shape
-from bemt.case.schema import AirTable
+from bemt.case.schema import AirTable, CaseFile
 from geometry.airfoil import Airfoil, naca, naca4
 from geometry.airfoil_file import parse_dat
 from geometry.blade import Blade, from_stations
@@ -23,10 +21,7 @@ from geometry.duct import Duct, Stator, around
 from geometry.laws import from_laws
 from geometry.rotor import Rotor
 
-if TYPE_CHECKING:
-    from bemt.case.load import Case
-
-__all__ = ["build_air", "build_duct", "build_rotor", "check_build"]
+__all__ = ["build_air", "build_duct", "build_rotor"]
 
 T = TypeVar("T")
 _STATION_COLUMNS = ("r_over_R", "chord_over_R", "beta_deg")
@@ -50,16 +45,16 @@ def _per_anchor(value: Any, count: int) -> list[Any]:
     return list(value) if isinstance(value, (list, tuple)) else [value] * count
 
 
-def _anchors(case: Case) -> list[tuple[float, Airfoil]]:
-    section = case.file.blade.section
+def _anchors(case: CaseFile, path: Path) -> list[tuple[float, Airfoil]]:
+    section = case.blade.section
     assert section is not None  # a rule of the file
     radii = section.r_over_R or (0.0,)
-    file = case.path.as_posix()
+    file = path.as_posix()
     if section.naca is not None:
         shapes = [_as_input(file, "blade.section.naca", lambda d=d: naca(d))  # type: ignore[misc]
                   for d in _per_anchor(section.naca, len(radii))]  # fmt: skip
     elif section.dat is not None:
-        shapes = [_dat(case.folder / name) for name in _per_anchor(section.dat, len(radii))]
+        shapes = [_dat(path.parent / name) for name in _per_anchor(section.dat, len(radii))]
     else:
         shape = (section.camber, section.camber_position, section.thickness)
         columns = [_per_anchor(value, len(radii)) for value in shape]
@@ -121,87 +116,54 @@ def _read_stations(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return np.minimum(x, 1.0), c, np.radians(beta)
 
 
-def _blade(case: Case) -> Blade:
-    blade = case.file.blade
-    R = 0.5 * case.diameter_m
-    hub = case.hub_diameter_m / case.diameter_m
-    anchors = _anchors(case)
+def _blade(case: CaseFile, path: Path) -> Blade:
+    blade = case.blade
+    R = 0.5 * case.rotor.diameter_m
+    hub = case.rotor.hub_diameter_m / case.rotor.diameter_m
+    anchors = _anchors(case, path)
     scale, turned = blade.chord_scale, math.radians(blade.beta_offset_deg)
     if blade.chord_law is not None:
         chord = {"max_chord": blade.max_chord_over_R, "taper": blade.taper}
-        laws = {"pitch": blade.pitch_m(case.diameter_m), "relief": blade.tip_relief}
+        laws = {"pitch": blade.pitch_m(case.rotor.diameter_m), "relief": blade.tip_relief}
         made = from_laws(
-            case.diameter_m, blade.chord_law, blade.pitch_law, hub, anchors=anchors,
+            case.rotor.diameter_m, blade.chord_law, blade.pitch_law, hub, anchors=anchors,
             chord={k: v for k, v in chord.items() if v is not None},
             pitch={k: v for k, v in laws.items() if v is not None},
         )  # fmt: skip
         return from_stations(made.r, made.chord * scale, made.beta + turned, R, hub * R, anchors, name=case.name)
-    x, c, beta = _stations(case)
+    x, c, beta = _stations(case, path)
     return from_stations(x * R, c * R * scale, beta + turned, R, hub * R, anchors, name=case.name)
 
 
-def _stations(case: Case) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _stations(case: CaseFile, path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Columns r/R, c/R and beta [rad] of whichever file of stations the case names."""
-    blade = case.file.blade
+    blade = case.blade
     if blade.stations is not None:
-        return _read_stations(case.folder / blade.stations)
+        return _read_stations(path.parent / blade.stations)
     if blade.uiuc is not None:
         from bemt.readers._uiuc_tables import read_geometry
 
-        table = read_geometry(case.folder / blade.uiuc)
+        table = read_geometry(path.parent / blade.uiuc)
         return table.r_R, table.c_R, np.radians(table.beta_deg)
     from bemt.readers.apc import read_pe0
 
     assert blade.apc is not None  # a rule of the file
-    apc = read_pe0(case.folder / blade.apc)
+    apc = read_pe0(path.parent / blade.apc)
     return apc.r_m / apc.radius_m, apc.chord_m / apc.radius_m, apc.beta_rad
 
 
-def build_rotor(case: Case) -> Rotor:
-    """Build the rotor of a case.
-
-    Parameters
-    ----------
-    case : Case
-        A checked case.
-
-    Returns
-    -------
-    geometry.rotor.Rotor
-        Blades, hub and rotation (right-handed is +1).
-
-    Raises
-    ------
-    InputError
-        When the values do not make a rotor.
-    """
-    rotor = case.file.rotor
+def build_rotor(case: CaseFile, path: Path) -> Rotor:
+    """Build the rotor of a case; right-handed rotation is +1. Raises InputError where the values make none."""
+    rotor = case.rotor
     sign = -1 if rotor.rotation == "left" else 1
-    return _as_input(case.path.as_posix(), "blade", lambda: Rotor(_blade(case), rotor.blades, sign, case.name))
+    return _as_input(path.as_posix(), "blade", lambda: Rotor(_blade(case, path), rotor.blades, sign, case.name))
 
 
-def build_duct(case: Case) -> Duct | None:
-    """Build the duct of a case.
-
-    Parameters
-    ----------
-    case : Case
-        A checked case.
-
-    Returns
-    -------
-    geometry.duct.DuctEffect or None
-        None when the case has no duct.
-
-    Raises
-    ------
-    InputError
-        When the values do not make a duct.
-    """
-    duct = case.file.duct
+def build_duct(case: CaseFile, path: Path, rotor: Rotor) -> Duct | None:
+    """Build the duct around a rotor, None when the case has none. Raises InputError where the values make none."""
+    duct = case.duct
     if duct is None:
         return None
-    rotor = case.rotor()
     inner, hub, x = duct.inner_diameter_m, 0.5e-3 * duct.exit_hub_diameter_mm, duct.rotor_position_mm
     gap = 1e-3 * (duct.tip_gap_mm or 0.0) if math.isnan(inner) else 0.5 * inner - rotor.R
     ratio = duct.exit_area_ratio
@@ -217,7 +179,7 @@ def build_duct(case: Case) -> Duct | None:
              rotor_x=None if x is None else x * 1e-3, stator=stator, name=case.name,
         )  # fmt: skip
 
-    return _as_input(case.path.as_posix(), "", make)
+    return _as_input(path.as_posix(), "", make)
 
 
 def build_air(air: AirTable) -> Air:
@@ -238,47 +200,3 @@ def build_air(air: AirTable) -> Air:
         return Air.isa(air.altitude_m, offset)
     assert air.pressure_hPa is not None and temperature is not None  # rules of the file
     return Air.from_state(100.0 * air.pressure_hPa, temperature, air.humidity_pct or 0.0)
-
-
-def check_build(case: Case) -> None:
-    """Build everything once, nominal and at the ends of geometric sweeps and assumptions.
-
-    Parameters
-    ----------
-    case : Case
-        A case whose document fits the schema.
-
-    Raises
-    ------
-    InputError
-        With all faults.
-    """
-    faults: list[Fault] = []
-
-    def attempt(overrides: Mapping[str, Any] | None, place: str) -> None:
-        found: Sequence[Fault] = ()
-        if overrides:
-            joined = Collector(case.path.as_posix())
-            check_shape(joined, case.replaced(overrides).file)
-            found = joined.faults
-        try:
-            if not found:
-                case.rotor(overrides)
-                case.duct(overrides)
-        except InputError as error:
-            found = error.faults
-        for fault in found:
-            where = f"{place}: {fault.where}" if place else fault.where
-            faults.append(Fault(fault.file, where, fault.got, fault.expected, fault.hint))
-
-    attempt(None, "")
-    if not faults:
-        for name, values in case.axes().items():
-            if name in ("pitch_in", "diameter_in", "tip_gap_mm"):
-                for value in (values.min(), values.max()):
-                    attempt({case.axis_key(name): float(value)}, f"sweep.{name} at {value:g}")
-        for i, item in enumerate(case.assumptions):
-            for option in item.values:
-                attempt({item.key: option}, f"assumptions[{i}] at {option}")
-    if faults:
-        raise InputError(faults)

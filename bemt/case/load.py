@@ -9,7 +9,7 @@ from __future__ import annotations
 import copy
 import hashlib
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.toml import Collector, load_toml, validated
-from bemt.case.build import build_air, build_duct, build_rotor, check_build
-from bemt.case.rules import check_case, value_at
+from bemt.case.build import build_air, build_duct, build_rotor
+from bemt.case.rules import check_case, check_shape, value_at
 from bemt.case.schema import AXES, GROUPS, CaseFile
 
 if TYPE_CHECKING:
@@ -204,12 +204,18 @@ class Case:
 
     def rotor(self, overrides: Mapping[str, Any] | None = None) -> Rotor:
         """Give the rotor, built once per geometry; overrides as in :meth:`replaced`."""
-        rotor: Rotor = self._once("rotor", ("rotor", "blade"), build_rotor, overrides)
+        rotor: Rotor = self._once(
+            "rotor", ("rotor", "blade"), lambda case: build_rotor(case.file, case.path), overrides
+        )
         return rotor
 
     def duct(self, overrides: Mapping[str, Any] | None = None) -> Duct | None:
         """Give the duct, None when the case has none; overrides as in :meth:`replaced`."""
-        duct: Duct | None = self._once("duct", ("rotor", "blade", "duct"), build_duct, overrides)
+
+        def make(case: Case) -> Duct | None:
+            return build_duct(case.file, case.path, case.rotor())
+
+        duct: Duct | None = self._once("duct", ("rotor", "blade", "duct"), make, overrides)
         return duct
 
     def air(self, overrides: Mapping[str, Any] | None = None) -> Air:
@@ -303,8 +309,41 @@ def load_case(path: str | Path) -> Case:
     if file is None or out.faults:
         raise InputError(out.faults)
     case = Case(path, document, file, _assumptions(file))
-    check_build(case)
+    _check_build(case)
     return case
+
+
+def _check_build(case: Case) -> None:
+    """Build everything once, nominal and at the ends of geometric sweeps and assumptions; raise all faults."""
+    faults: list[Fault] = []
+
+    def attempt(overrides: Mapping[str, Any] | None, place: str) -> None:
+        found: Sequence[Fault] = ()
+        if overrides:
+            joined = Collector(case.path.as_posix())
+            check_shape(joined, case.replaced(overrides).file)
+            found = joined.faults
+        try:
+            if not found:
+                case.rotor(overrides)
+                case.duct(overrides)
+        except InputError as error:
+            found = error.faults
+        for fault in found:
+            where = f"{place}: {fault.where}" if place else fault.where
+            faults.append(Fault(fault.file, where, fault.got, fault.expected, fault.hint))
+
+    attempt(None, "")
+    if not faults:
+        for name, values in case.axes().items():
+            if name in ("pitch_in", "diameter_in", "tip_gap_mm"):
+                for value in (values.min(), values.max()):
+                    attempt({case.axis_key(name): float(value)}, f"sweep.{name} at {value:g}")
+        for i, item in enumerate(case.assumptions):
+            for option in item.values:
+                attempt({item.key: option}, f"assumptions[{i}] at {option}")
+    if faults:
+        raise InputError(faults)
 
 
 def _natural(path: Path) -> list[tuple[int, str]]:

@@ -14,6 +14,7 @@ from typing import Any
 
 from bemt.readers import number
 from bemt.recordings.audit import CfdFacts, audit, audit_document
+from bemt.report.found_files import read_json, safe_files
 
 __all__ = ["attach", "cfd_runs", "is_plain", "operating_run", "radial_of"]
 
@@ -59,8 +60,6 @@ def cfd_runs(out: Path) -> list[dict[str, Any]]:
         ``name``, ``title``, ``case``, ``manifest``, ``runs``, ``radial`` (run to radius [m], dT/dr [N/m] and dQ/dr
         [N]), ``figures``. A run holds the columns of the recording, numbers as float with NaN where there is none.
     """
-    from bemt.report.gather import read_json, safe_files
-
     found = []
     for path in sorted(out.glob("cfd/*/manifest.json")):
         manifest = read_json(path)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
-import re
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
@@ -15,18 +13,16 @@ import bemt
 from bemt.base.errors import InputError
 from bemt.case import Case, find_cases, load_case
 from bemt.report import curves, trends
+from bemt.report.cfd import attach, cfd_runs
+from bemt.report.found_files import read_json, safe_files
 from geometry.common import GeometryError
 from geometry.picture import PictureError, Scene, blade_scene, cutaway_scene, render, rotor_scene
 
-__all__ = ["attach_diagnoses", "gather", "read_json", "safe_files"]
+__all__ = ["attach_diagnoses", "gather"]
 
 Progress = Callable[[str], None]
-FIGURE_BYTES = 600_000
-FIGURES = 12
 ALL_BYTES = 4_000_000
 """Of all figures of diagnoses together, so that the report stays below 8 MB."""
-JSON_BYTES = 20_000_000
-_FIGURE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,80}\.(png|svg)")
 
 
 def gather(paths: Sequence[str | Path], out: Path, progress: Progress | None = None) -> dict[str, Any]:
@@ -52,7 +48,6 @@ def gather(paths: Sequence[str | Path], out: Path, progress: Progress | None = N
         When a path holds no case.
     """
     from bemt.compare.sweep import sweep
-    from bemt.report.cfd import attach, cfd_runs
 
     tell = progress or (lambda line: None)
     document = sweep(paths, out, progress=tell)
@@ -148,55 +143,6 @@ def _reproduction() -> list[dict[str, Any]]:
     from bemt.compare import reproduce
 
     return [asdict(item) for item in reproduce.items(None) if not item.status.startswith("not checked")]
-
-
-def read_json(path: Path) -> Any:
-    """Read a JSON file that somebody else wrote.
-
-    Parameters
-    ----------
-    path : Path
-        File.
-
-    Returns
-    -------
-    object
-        Its content; None when it is not there, too large or no JSON.
-    """
-    try:
-        if path.stat().st_size > JSON_BYTES:
-            return None
-        return json.loads(path.read_text(encoding="utf-8"), parse_constant=lambda name: None)
-    except (OSError, ValueError, RecursionError):
-        return None
-
-
-def safe_files(folder: Path) -> list[tuple[str, bytes]]:
-    """Figures in a folder: plain names, no links, PNG or SVG by content, of a moderate size.
-
-    Of two pictures with one stem the smaller is taken.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder; nothing outside of it is read.
-
-    Returns
-    -------
-    list of (str, bytes)
-        Name and content, by name.
-    """
-    found: dict[str, tuple[str, bytes]] = {}
-    for path in sorted(folder.glob("*")):
-        if not _FIGURE.fullmatch(path.name) or path.is_symlink() or not path.is_file():
-            continue
-        if path.stat().st_size > FIGURE_BYTES:
-            continue
-        data = path.read_bytes()
-        good = data.startswith(b"\x89PNG\r\n") if path.suffix == ".png" else b"<svg" in data[:1000]
-        if good and (path.stem not in found or len(data) < len(found[path.stem][1])):
-            found[path.stem] = (path.name, data)
-    return list(found.values())[:FIGURES]
 
 
 def attach_diagnoses(book: dict[str, Any], out: Path) -> None:
