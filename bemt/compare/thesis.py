@@ -54,7 +54,7 @@ class Item:
         What it is.
     stated : str
         As printed, so that its rounding is known.
-    ours : float, str or None
+    ours : number, str or None
         Computed; None for an input.
     unit : str
         Unit of both.
