@@ -13,8 +13,8 @@ from pathlib import Path
 
 from bemt.bem import evaluate
 from bemt.case import Case, find_cases, load_case
-from bemt.commands import effects as effects_list
 from bemt.diagnose.nuisance import PRIORS
+from bemt.report import effects_list
 
 DOCS = Path(__file__).resolve().parent
 ROOT = DOCS.parent

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from geometry.common import Array, Faults, GeometryError
+from geometry.common import Array, Faults, GeometryError, needs
 from geometry.duct import Duct
 from geometry.mesh import Options, blade_volume, hub_profile, radii, wrapped_outline
 from geometry.mesh_duct import StatorPlan, centre_body, duct_profile, plan_stator
@@ -138,7 +138,7 @@ def _inner_plane(root: Array, hub: float) -> float:
 
 def _loft(sections: list[tuple[float, Array]]) -> Any:
     """Smooth loft of two splines per section and, where it is blunt, the trailing edge's line."""
-    import cadquery as cq
+    cq = needs("cadquery", "cad")
 
     blunt = all(np.linalg.norm(s[0] - s[-1]) > 1e-6 * float(np.ptp(s, axis=0).max()) for _, s in sections)
     # The same parameters for every section: otherwise the loft's surface takes the knots of all sections together.
@@ -162,7 +162,7 @@ def _loft(sections: list[tuple[float, Array]]) -> Any:
 
 def _turned(profile: Array) -> Any:
     """Solid of revolution of a closed profile of radius and z [m] round the z axis; straight where three points are."""
-    import cadquery as cq
+    cq = needs("cadquery", "cad")
 
     points = [cq.Vector(float(r) * MM, 0.0, float(z) * MM) for r, z in profile]
     edges, i, count = [], 0, len(points)
@@ -224,7 +224,7 @@ def blade_solid(rotor: Rotor, options: Options | None = None) -> tuple[Any, Arra
     GeometryError
         When the sections make no valid solid or its volume is off the integral of the sections.
     """
-    import cadquery as cq
+    cq = needs("cadquery", "cad")
 
     options = options or Options()
     if not rotor.blade.anchors:
@@ -252,7 +252,7 @@ def blade_solid(rotor: Rotor, options: Options | None = None) -> tuple[Any, Arra
 
 
 def _stator_solids(duct: Duct, plan: StatorPlan) -> list[tuple[str, str, Any]]:
-    import cadquery as cq
+    cq = needs("cadquery", "cad")
 
     body = _fixed(_turned(centre_body(duct, plan)))
     outline = plan.outline(41)
@@ -303,7 +303,7 @@ def solids(rotor: Rotor, duct: Duct | None = None, options: Options | None = Non
     GeometryError
         When the numbers make no sound solid, with the reason.
     """
-    import cadquery as cq
+    cq = needs("cadquery", "cad")
 
     options = options or Options()
     blade, profile = blade_solid(rotor, options)
@@ -347,7 +347,7 @@ def assembly(parts: Parts, name: str) -> Any:
     cadquery.Assembly
         In millimetres, coloured by surface.
     """
-    import cadquery as cq
+    cq = needs("cadquery", "cad")
 
     colours = {"blade": (0.2, 0.3, 0.6), "hub": (0.4, 0.4, 0.4), "duct": (0.8, 0.8, 0.8), "stator": (0.6, 0.6, 0.6)}
     out = cq.Assembly(name=name)
@@ -377,7 +377,7 @@ def tessellate(shape: Any, tolerance: float, angle: float = 0.1) -> Mesh:
     -----
     Older triangles are removed first: without that the CAD kernel returns them, whatever the tolerance.
     """
-    import cadquery as cq
+    cq = needs("cadquery", "cad")
     from OCP.BRepTools import BRepTools  # type: ignore[import-untyped]
     from OCP.TopLoc import TopLoc_Location  # type: ignore[import-untyped]
 

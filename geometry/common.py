@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Array", "Faults", "GeometryError", "frozen", "pchip", "pchip_slopes"]
+__all__ = ["Array", "Faults", "GeometryError", "frozen", "needs", "pchip", "pchip_slopes"]
 
 Array = NDArray[np.float64]
 
@@ -38,6 +40,35 @@ class GeometryError(ValueError):
     def __reduce__(self) -> tuple[type[GeometryError], tuple[tuple[tuple[str, str, str, str], ...]]]:
         """Pickle by the faults (worker processes send errors back)."""
         return (type(self), (self.faults,))
+
+
+def needs(module: str, extra: str) -> Any:
+    """Import a library that an extra brings, or say which extra is missing.
+
+    Parameters
+    ----------
+    module : str
+        Dotted name of the module.
+    extra : str
+        Extra of this project that installs it.
+
+    Returns
+    -------
+    module
+        The imported module.
+
+    Raises
+    ------
+    GeometryError
+        When it is not installed.
+    """
+    try:
+        return importlib.import_module(module)
+    except ModuleNotFoundError as error:
+        if error.name is None or not module.startswith(error.name):
+            raise
+        hint = f'Install it with python -m pip install "bemt[{extra}]"'
+        raise GeometryError([(module, "no such library", f"the extra [{extra}]", hint)]) from error
 
 
 class Faults:

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.common import Array, Faults, GeometryError
+from geometry.common import Array, Faults, GeometryError, needs
 from geometry.duct import Duct
 from geometry.mesh import MeshModel, Options, build
 from geometry.rotor import Rotor
@@ -201,7 +201,7 @@ def _openfoam(model: MeshModel, work: Path) -> list[dict[str, Any]]:
 
 def _check_file(paths: Sequence[Path], scale: float, volume: float, bodies: int) -> None:
     """Read files back; together they must be the closed solids that were meant."""
-    import trimesh
+    trimesh = needs("trimesh", "cad")
 
     read = [read_solid(path) for path in paths]
     start = np.cumsum([0, *(len(v) for v, _, _ in read)])
@@ -222,7 +222,7 @@ def _step(
     rotor: Rotor, duct: Duct | None, work: Path, name: str, unit: str, options: Options, volumes: dict[str, float]
 ) -> dict[str, Any]:
     """Named solids; read back, each must be valid and have the volume of the mesh within 0.5 %."""
-    import cadquery as cq
+    cq = needs("cadquery", "cad")
     from cadquery.occ_impl.exporters.assembly import exportAssembly
 
     from geometry.cad import assembly, solids
@@ -289,7 +289,7 @@ def read_solid(path: Path) -> tuple[Array, NDArray[np.int64], str | None]:
     try:
         if kind in (".step", ".stp"):
             return _read_step(path)
-        import trimesh
+        trimesh = needs("trimesh", "cad")
 
         with path.open("rb") as stream:
             loaded: Any = trimesh.load(stream, file_type=kind[1:], force="mesh", process=False)
@@ -307,7 +307,7 @@ def read_solid(path: Path) -> tuple[Array, NDArray[np.int64], str | None]:
 
 
 def _read_step(path: Path) -> tuple[Array, NDArray[np.int64], str | None]:
-    import cadquery as cq
+    cq = needs("cadquery", "cad")
 
     from geometry.cad import tessellate
 

@@ -7,6 +7,7 @@ transparent (solids) or white (CFD, which carries text), colours middle tones th
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import os
 import re
@@ -20,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from geometry.common import Array
+from geometry.common import Array, needs
 from geometry.duct import Duct
 from geometry.mesh import Options, build, rotor_mesh
 from geometry.picture_child import PictureError, times
@@ -90,6 +91,13 @@ class Scene:
     size: tuple[int, int] = (640, 480)
 
 
+def _fineness(options: Options | None) -> Options:
+    """Options of the mesh; refused where nothing could be drawn, which is found without loading VTK."""
+    if importlib.util.find_spec("pyvista") is None:
+        needs("pyvista", "pictures")
+    return options or COARSE
+
+
 def _layers(mesh: Mesh, colours: Mapping[str, str], cut: tuple[float, float, float] | None = None) -> list[Layer]:
     return [Layer(mesh.vertices, mesh.part(name), colours[name], cut) for name in mesh.names]
 
@@ -121,7 +129,7 @@ def rotor_scene(rotor: Rotor, options: Options | None = None) -> Scene:
     >>> len(rotor_scene(Rotor(helix(0.2032, 0.127, anchors=naca("4412")), 2)).layers)
     2
     """
-    mesh = rotor_mesh(rotor, options or COARSE)
+    mesh = rotor_mesh(rotor, _fineness(options))
     size = (720, 300) if rotor.B == 2 else (600, 460)
     return Scene(tuple(_layers(mesh, {"blade": BLADE, "hub": HUB})), (-0.12, -0.6, 0.8), (0.0, 0.0, 1.0), size)
 
@@ -148,7 +156,7 @@ def cutaway_scene(rotor: Rotor, duct: Duct, options: Options | None = None) -> S
     GeometryError
         When the numbers make no sound solid.
     """
-    model = build(rotor, duct, options or COARSE)
+    model = build(rotor, duct, _fineness(options))
     assert model.duct is not None
     # the whole standing part is one closed solid: cut as one, or the cut of the walls could not be closed
     standing = Layer(model.duct.vertices, model.duct.faces, DUCT, (0.0, -1.0, 0.0))
@@ -176,7 +184,7 @@ def blade_scene(rotor: Rotor, options: Options | None = None) -> Scene:
     GeometryError
         When the numbers make no sound solid.
     """
-    mesh = rotor_mesh(replace(rotor, B=1), options or COARSE)
+    mesh = rotor_mesh(replace(rotor, B=1), _fineness(options))
     blade = Layer(mesh.vertices, mesh.part("blade"), BLADE)
     return Scene((blade,), (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (720, 260))
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from geometry.common import Array
+from geometry.common import Array, GeometryError, needs
 from geometry.solid import Faces
 
 __all__ = ["PictureError", "draw", "times"]
@@ -44,9 +44,10 @@ def times(folder: Path) -> list[tuple[float, Path]]:
 
 
 def _pyvista() -> Any:
-    import pyvista
-
-    return pyvista
+    try:
+        return needs("pyvista", "pictures")
+    except GeometryError as error:
+        raise PictureError(str(error)) from error
 
 
 def draw(folder: str) -> None:

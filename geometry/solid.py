@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.common import Array, Faults, GeometryError
+from geometry.common import Array, Faults, GeometryError, needs
 
 __all__ = ["Mesh", "Options", "as_solid", "check_closed", "join", "profile_volume", "revolve", "skin"]
 
@@ -99,7 +99,7 @@ class Mesh:
 
     def trimesh(self) -> Any:
         """Return the mesh as a ``trimesh.Trimesh``, vertices untouched."""
-        import trimesh
+        trimesh = needs("trimesh", "cad")
 
         return trimesh.Trimesh(self.vertices, self.faces, process=False)
 
@@ -229,7 +229,7 @@ def as_solid(vertices: Array, faces: Faces, where: str) -> Any:
     GeometryError
         When the surface is not closed.
     """
-    import manifold3d
+    manifold3d = needs("manifold3d", "cad")
 
     data = manifold3d.Mesh64(np.ascontiguousarray(vertices, dtype=np.float64), faces.astype(np.uint64))
     solid = manifold3d.Manifold(data)
@@ -259,7 +259,7 @@ def join(parts: Sequence[tuple[str, Any]], where: str) -> Mesh:
     GeometryError
         When it is empty.
     """
-    import manifold3d
+    manifold3d = needs("manifold3d", "cad")
 
     total = manifold3d.Manifold.batch_boolean([solid for _, solid in parts], manifold3d.OpType.Add)
     if total.is_empty():

@@ -1,6 +1,5 @@
 """Benchmark: its work, its numbers, its document. Speed itself is not asserted here."""
 
-import argparse
 import json
 import math
 
@@ -163,4 +162,4 @@ def test_command(capsys, monkeypatch, doc):
     assert cli.main(["bench", "--json", "--quick"]) == 0
     assert json.loads(capsys.readouterr().out)["schema"] == "bemt.bench/1"
     monkeypatch.setattr(bench, "document", lambda work, quick: doc | {"converged": 59})
-    assert bench.run(argparse.Namespace(json=False, quick=True)) == 1
+    assert cli.main(["bench", "--quick"]) == 1

@@ -11,8 +11,8 @@ import pytest
 
 from bemt import coefficients as co
 from bemt.base.errors import InputError
-from bemt.commands import calibrate, cli
-from bemt.formula import compact, fit, gather, limit, refit, score
+from bemt.commands import cli
+from bemt.formula import calibrate, compact, fit, gather, limit, refit, score
 from bemt.formula import points as reading
 from bemt.formula.points import FitPoints, Propeller
 

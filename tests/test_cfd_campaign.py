@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from bemt.base.errors import InputError
-from bemt.cfd.command import run_campaign
+from bemt.cfd.campaign import run_campaign
 from bemt.cfd.record import COLUMNS, CampaignRecord, grid_studies, grid_uncertainty
 from bemt.cfd.schema import load_campaign
 from bemt.cfd.start import StartField, splice
@@ -116,10 +116,10 @@ def test_all_faults_of_a_file_are_reported(
 def test_points_that_cannot_be_stop_the_campaign_before_it_runs(project: Path, tmp_path: Path, programs: Path) -> None:
     path = write(tmp_path / "c", project, "[[points]]\nrpm = 9000\n[[points]]\nrpm = 9000\nsector = 'blade'\n")
     with pytest.raises(InputError, match="point 2: sector: got one of 2 blades"):
-        run_campaign(load_campaign(path), tmp_path / "w", ranks=1, quiet=True)
+        run_campaign(load_campaign(path), tmp_path / "w", ranks=1)
     path = write(tmp_path / "c", project, "[[points]]\nrpm = 9000\n[[points]]\nrpm = 9000\n")
     with pytest.raises(InputError, match="the same run twice"):
-        run_campaign(load_campaign(path), tmp_path / "w", ranks=1, quiet=True)
+        run_campaign(load_campaign(path), tmp_path / "w", ranks=1)
     assert calls(programs, "blockMesh") == 0
 
 
@@ -334,7 +334,7 @@ def test_a_run_that_drifts_is_nan_flagged_and_its_history_kept(project: Path, tm
     solver = tmp_path / "bin" / "simpleFoam"
     solver.write_text(f"#!/bin/sh\n{PROGRAMS['simpleFoam'].replace('DRIFT', '0.2')}\n")
     path = write(tmp_path / "c", project, TWO)
-    record = run_campaign(load_campaign(path), tmp_path / "w", only=1, ranks=1, quiet=True)
+    record = run_campaign(load_campaign(path), tmp_path / "w", only=1, ranks=1)
     (row,) = record.rows
     assert row["converged"] == 0 and math.isnan(row["thrust_N"]) and math.isnan(row["u_thrust_N"])
     assert row["drift_thrust"] == pytest.approx(0.18, abs=0.02)
@@ -343,7 +343,7 @@ def test_a_run_that_drifts_is_nan_flagged_and_its_history_kept(project: Path, tm
     manifest = json.loads((path.parent / "manifest.json").read_text())
     assert [item["run"] for item in manifest["not_converged"]] == [row["run"]]
     solver.write_text("#!/bin/sh\necho 'FOAM FATAL ERROR: negative' ; exit 1\n")
-    record = run_campaign(load_campaign(path), tmp_path / "w2", only=2, ranks=1, quiet=True)
+    record = run_campaign(load_campaign(path), tmp_path / "w2", only=2, ranks=1)
     assert [r["converged"] for r in record.rows] == [0, 0] and len(record.rows) == 2
 
 
@@ -360,8 +360,8 @@ def test_a_recording_that_is_not_ours_is_left_alone(project: Path, tmp_path: Pat
 def test_a_run_that_a_campaign_beside_has_is_taken_over(project: Path, tmp_path: Path, programs: Path) -> None:
     first = load_campaign(write(tmp_path / "all" / "a", project, TWO))
     second = load_campaign(write(tmp_path / "all" / "b", project, TWO.replace("[6000, 9000]", "[9000]")))
-    run_campaign(first, tmp_path / "w", ranks=1, quiet=True)
-    record = run_campaign(second, tmp_path / "w", ranks=1, quiet=True)
+    run_campaign(first, tmp_path / "w", ranks=1)
+    record = run_campaign(second, tmp_path / "w", ranks=1)
     assert calls(programs, "simpleFoam") == 2 and [row["rpm"] for row in record.rows] == [9000]
 
 

@@ -9,7 +9,6 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
@@ -56,13 +55,42 @@ def test_importing_the_command_line_imports_nothing_heavy() -> None:
     }
 
 
+def test_every_file_of_the_folder_is_a_command_with_an_example_that_parses() -> None:
+    files = {p.stem for p in (ROOT / "bemt" / "commands").glob("*.py") if not p.name.startswith("_")} - {"cli"}
+    found = cli.commands()
+    assert {module.__name__.rpartition(".")[2] for module in found.values()} == files
+    for name, module in found.items():
+        args = cli.build_parser().parse_args(module.EXAMPLE.split())
+        assert args.command == name and module.GROUP and module.HELP
+
+
+def test_a_bare_call_shows_the_commands_in_groups(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main([]) == 0
+    shown = capsys.readouterr().out
+    for module in cli.commands().values():
+        assert module.GROUP in shown and module.EXAMPLE in shown
+
+
+@pytest.mark.parametrize(
+    ("arguments", "meant"),
+    [(["swep", "cases"], "Did you mean sweep?"), (["sweep", "cases", "--tolerence", "3"], "Did you mean --tolerance?"),
+     (["export", "cases", "--out", "x", "--format", "stp"], "Did you mean")],
+)  # fmt: skip
+def test_what_was_meant_is_guessed_and_said_but_not_done(
+    arguments: list[str], meant: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        cli.main(arguments)
+    assert stopped.value.code == 2 and meant in capsys.readouterr().err
+
+
 def test_version() -> None:
     assert bemt("--version").stdout.strip() == f"bemt {__version__}"
 
 
 @pytest.mark.parametrize(
     "arguments",
-    [[], ["swep"], ["sweep"], ["sweep", "cases", "--jobs", "0"], ["sweep", "cases", "--jobs", "two"],
+    [["swep"], ["sweep"], ["sweep", "cases", "--jobs", "0"], ["sweep", "cases", "--jobs", "two"],
      ["validate"], ["validate", "x", "--polar", "100000"], ["validate", "x", "--polar", "fixed:many"], ["bench", "x"]],
 )  # fmt: skip
 def test_wrong_usage_is_2_and_says_so_on_stderr(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
@@ -108,7 +136,7 @@ def test_trouble_with_files_is_an_input_fault(
     def full(_: object) -> int:
         raise OSError(28, "No space left on device", "out/table.txt")
 
-    monkeypatch.setattr(cli.importlib, "import_module", lambda _: SimpleNamespace(run=full))
+    monkeypatch.setattr(f"bemt.commands.{command[0]}.run", full)
     assert cli.main(command) == 2
     assert capsys.readouterr().err == (
         "out/table.txt: got No space left on device; expected a file or folder that can be used.\n"
@@ -123,7 +151,7 @@ def test_a_library_that_fails_is_no_fault_of_the_input(
     def broken(_: object) -> int:
         raise OSError("libGL.so.1: cannot open shared object file")
 
-    monkeypatch.setattr(cli.importlib, "import_module", lambda _: SimpleNamespace(run=broken))
+    monkeypatch.setattr("bemt.commands.validate.run", broken)
     assert cli.main(["validate", "x"]) == 3
     assert "libGL.so.1: cannot open shared object file" in capsys.readouterr().err
 
@@ -159,7 +187,7 @@ def test_exit_code_follows_the_outcome(
             raise outcome
         return outcome
 
-    monkeypatch.setattr("importlib.import_module", lambda name: SimpleNamespace(run=run))
+    monkeypatch.setattr("bemt.commands.bench.run", run)
     assert cli.main(["bench"]) == code
     shown = capsys.readouterr()
     assert words in shown.err and shown.out == ""
@@ -202,7 +230,7 @@ def test_a_file_for_a_folder_is_refused_before_any_work(
     capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
     begun: list[str] = []
-    monkeypatch.setattr("importlib.import_module", lambda name: SimpleNamespace(run=lambda args: begun.append(name)))
+    monkeypatch.setattr(f"bemt.commands.{arguments[0]}.run", lambda args: begun.append(args.command))
     file = tmp_path / "file"
     file.write_text("")
     assert cli.main([*arguments, f"{file}{below}"]) == 2

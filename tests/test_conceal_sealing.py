@@ -121,7 +121,7 @@ def test_diagnosis_sees_recording_and_case_only(sealed: tuple[Path, str], monkey
 
 
 def test_the_key_is_sealed_before_any_diagnosis(
-    patched: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    patched: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out = tmp_path / "proof"
     order: list[bool] = []
@@ -132,11 +132,10 @@ def test_the_key_is_sealed_before_any_diagnosis(
         return None, "spy"
 
     monkeypatch.setattr(prove, "diagnose_folder", spy)
-    arguments = {"size": "tiny", "seed": 3, "out": str(out), "jobs": 1, "json": True, "quiet": False}
-    code = prove.run(type("Args", (), arguments)())
-    document = json.loads(capsys.readouterr().out)
+    document = prove.prove(str(out), "tiny", 3, 1)
     assert order and all(order)
-    assert code == 1 and document["schema"] == "bemt.proof/1"
+    assert any(row["met"] is False for row in document["score"])
+    assert document["schema"] == "bemt.proof/1"
     assert {r["what"]: r["hits"] for r in document["score"]}["failed"] == len(order)
     assert (out / "proof.html").read_text(encoding="utf-8").startswith("<!doctype html>")
     assert "Misses" in (out / "proof.txt").read_text(encoding="utf-8")
@@ -144,7 +143,7 @@ def test_the_key_is_sealed_before_any_diagnosis(
     sealed_key = (out / seal.KEY).read_bytes()
     (out / "answers" / "0002.json").unlink()
     order.clear()
-    prove.run(type("Args", (), {**arguments, "seed": None})())
+    prove.prove(str(out), "tiny", None, 1)
     assert (out / seal.KEY).read_bytes() == sealed_key
     assert order == [True]
 

@@ -18,7 +18,7 @@ from bemt.case import load_case
 from bemt.commands.cli import build_parser, main
 from bemt.dataset import Dataset
 from bemt.diagnose import chain, document, problem, record
-from bemt.diagnose.command import load
+from bemt.diagnose.load import load
 
 
 def _recorded(path: Path, noise_seed: int) -> str:

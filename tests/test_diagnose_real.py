@@ -16,7 +16,7 @@ from diagnosing import left_out
 from bemt.case import Case, load_case
 from bemt.dataset import Dataset
 from bemt.diagnose import chain, document, record
-from bemt.diagnose.command import load
+from bemt.diagnose.load import load
 from bemt.sections import rule as section_rule
 
 pytestmark = pytest.mark.slow

@@ -13,7 +13,7 @@ import pytest
 from bemt import effects
 from bemt.base.errors import InputError
 from bemt.commands.cli import main
-from bemt.drive import identify, mission, rotor_table, transient, validate_command
+from bemt.drive import identify, mission, rotor_table, transient, validation_folder
 from bemt.drive.drive_model import EFFECTS, Battery, Drive, Esc, Motor
 from bemt.drive.map_points import MapPoints
 
@@ -284,7 +284,7 @@ def test_one_motor_and_esc_with_two_propellers(shared_data: Path, tmp_path: Path
     """The recordings with 10 and 14 in, fitted apart, give one resistance and one ripple, and hold within 5 %."""
     name = "mit_copter_rcbenchmark"
     (tmp_path / name).symlink_to((shared_data / name).resolve())
-    ten, fourteen = validate_command.maps(tmp_path)
+    ten, fourteen = validation_folder.maps(tmp_path)
     assert ten.worst < 0.05 and fourteen.worst < 0.05
     for key in ("ripple_ohm", "resistance_ohm"):
         assert ten.fitted[key] == pytest.approx(fourteen.fitted[key], rel=0.1)
@@ -292,7 +292,7 @@ def test_one_motor_and_esc_with_two_propellers(shared_data: Path, tmp_path: Path
 
 @pytest.mark.slow
 def test_real_thrust_maps_within_five_percent(shared_data: Path) -> None:
-    found = {m.name: m.worst for m in validate_command.maps(shared_data)}
+    found = {m.name: m.worst for m in validation_folder.maps(shared_data)}
     for name in ("xNova steps (to 1600 us)", "xNova ramp (to 1800 us)", "MIT 10 in", "MIT 14 in"):
         assert found[name] < 0.05, name
     apart = [worst for name, worst in found.items() if name.startswith("jmajew")]
@@ -302,7 +302,7 @@ def test_real_thrust_maps_within_five_percent(shared_data: Path) -> None:
 @pytest.mark.slow
 def test_time_constants_of_real_steps(shared_data: Path) -> None:
     """All five within 20 %: rises, the falls to no throttle (softer brake) and the fall to idle (full brake)."""
-    checks, fitted = validate_command.steps(shared_data)
+    checks, fitted = validation_folder.steps(shared_data)
     assert [c.log[:4] for c in checks] == ["0500", "0500", "incr", "incr", "incr"] and all(c.resolved for c in checks)
     assert all(abs(c.ratio - 1.0) < 0.2 for c in checks)
     assert 0.6 < fitted.esc.brake_on_stop < 0.8

@@ -11,7 +11,7 @@ import pytest
 
 from bemt import effects
 from bemt.commands import cli
-from bemt.commands import effects as effects_list
+from bemt.report import effects_list
 
 NEW = '''
 from dataclasses import dataclass

@@ -13,8 +13,8 @@ import pytest
 from bemt.base.errors import InputError
 from bemt.case import load_case
 from bemt.commands.cli import main
-from bemt.exports.command import export_case
 from bemt.exports.openfoam.write import Run, settings_of
+from bemt.exports.solids import export_case
 from geometry import export as module
 from geometry.airfoil import naca4
 from geometry.common import GeometryError

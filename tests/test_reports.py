@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from bemt.compare.validate.command import validate
+from bemt.compare.validate.propellers import validate
 
 # Section tables come from a network whose releases differ in the last digits.
 TOLERANCE = 2e-3

@@ -1,6 +1,5 @@
 """Reproduction of the source thesis: every number, a status that follows from the digits, findings by search."""
 
-import argparse
 import json
 
 import pytest
@@ -214,7 +213,7 @@ def test_command_prints_table_and_json(capsys, monkeypatch):
     monkeypatch.setattr(reproduce, "find_uiuc", lambda: None)
     assert cli.main(["reproduce"]) == 0
     assert "reproduced within rounding" in capsys.readouterr().out
-    assert reproduce.run(argparse.Namespace(json=True)) == 0
+    assert cli.main(["reproduce", "--json"]) == 0
     doc = json.loads(capsys.readouterr().out)
     assert doc["schema"] == "bemt.reproduce/1"
     assert sum(doc["summary"].values()) == len(doc["items"])

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bemt.compare.validate.command import validate
+from bemt.compare.validate.propellers import validate
 from bemt.effects import catalogue, standard
 from bemt.sections import rule as section_rule
 from bemt.sections.neuralfoil import neuralfoil_polar

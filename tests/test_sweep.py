@@ -22,7 +22,7 @@ from bemt.base.tables import csv_block, json_text, number_text, plain
 from bemt.bem.evaluate import evaluate, prepare
 from bemt.case import load_case
 from bemt.compare.grid import run as grid_module
-from bemt.compare.sweep import command as sweep_module
+from bemt.compare.sweep import batch as sweep_module
 from bemt.compare.sweep import fingerprint, sweep
 from bemt.compare.sweep.case import solve_case
 
@@ -438,7 +438,7 @@ def test_unconverged_points_are_counted_and_never_zero(tmp_path: Path, monkeypat
     assert result["grid"]["unconverged"] == 2
     _, rows = read_grid(tmp_path / "out" / "one" / "grid.csv")
     assert np.isnan(rows[:, 1]).all() and (rows[:, -1] == 0).all()
-    assert sweep_module._off_tolerance(result, 1e9) == [
+    assert sweep_module.off_tolerance(result, 1e9) == [
         "one: unconverged at 6000 rev/min, 0 m/s", "one: unconverged at 5000 rev/min, 0 m/s",
         "one: 2 of 2 grid points unconverged",
     ]  # fmt: skip

@@ -19,7 +19,7 @@ from test_sweep import GRID, ROOT, make_case, tree
 
 from bemt.commands.cli import main
 from bemt.compare.grid import run as grid_module
-from bemt.compare.sweep import command, sweep
+from bemt.compare.sweep import batch, sweep
 
 AXES = "[sweep]\nrpm = {start = 3000, stop = 9000, num = 50}\n"
 needs_sigkill = pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs SIGKILL")
@@ -30,13 +30,13 @@ needs_parquet = pytest.mark.skipif(importlib.util.find_spec("pyarrow") is None, 
 def solved(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Names of the cases that are solved, as they are."""
     names: list[str] = []
-    real = command.solve_case
+    real = batch.solve_case
 
     def counting(case: Any, *args: Any) -> Any:
         names.append(case.name)
         return real(case, *args)
 
-    monkeypatch.setattr(command, "solve_case", counting)
+    monkeypatch.setattr(batch, "solve_case", counting)
     return names
 
 
@@ -282,7 +282,7 @@ def test_an_interrupted_sweep_leaves_no_result_of_an_earlier_one(
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(command, "solve_case", interrupted)
+        patch.setattr(batch, "solve_case", interrupted)
         with pytest.raises(KeyboardInterrupt):
             sweep([path], tmp_path / "out")
     assert tree(tmp_path / "out") == {}
@@ -293,13 +293,13 @@ def test_each_case_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
         make_case(tmp_path, name)
     broken_syntax(make_case(tmp_path, "c").parent)
     read: list[str] = []
-    real = command.load_case
+    real = batch.load_case
 
     def counting(path: Path) -> Any:
         read.append(path.parent.name)
         return real(path)
 
-    monkeypatch.setattr(command, "load_case", counting)
+    monkeypatch.setattr(batch, "load_case", counting)
     sweep([tmp_path])
     assert read == ["a", "b", "c"]
 
@@ -309,7 +309,7 @@ def test_a_case_that_changes_while_it_is_solved_is_no_result(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     path = make_case(tmp_path / "cases", extra=AXES)
-    real = command.solve_case
+    real = batch.solve_case
 
     def meanwhile(case: Any, *args: Any) -> Any:
         with (path.parent / name).open("a") as stream:
@@ -317,7 +317,7 @@ def test_a_case_that_changes_while_it_is_solved_is_no_result(
         return real(case, *args)
 
     with monkeypatch.context() as patch:
-        patch.setattr(command, "solve_case", meanwhile)
+        patch.setattr(batch, "solve_case", meanwhile)
         (found,) = sweep([path], tmp_path / "out")["cases"]
     assert found["exit_code"] == 2
     assert found["faults"] == [f"{path.as_posix()}: got files that changed while they were solved; expected files that "

@@ -13,7 +13,7 @@ import pytest
 from bemt import effects
 from bemt.base.errors import InputError
 from bemt.base.tables import json_text
-from bemt.compare.validate import command, match, points, text
+from bemt.compare.validate import match, points, propellers, text
 from bemt.readers import uiuc
 from bemt.sections import rule as section_rule
 
@@ -48,7 +48,7 @@ def _folder(path: Path, thrust: float = 1.0, power: float = 1.0, turned_deg: flo
 
 
 def test_planted_errors_come_out(tmp_path: Path) -> None:
-    doc = command.validate(_folder(tmp_path, thrust=1.10, power=0.95))
+    doc = propellers.validate(_folder(tmp_path, thrust=1.10, power=0.95))
     for kind in ("static", "forward"):
         assert doc[kind]["propellers"] == 1
         assert doc[kind]["CT"]["bias"] == pytest.approx(0.10, abs=1e-6)
@@ -61,7 +61,7 @@ def test_planted_errors_come_out(tmp_path: Path) -> None:
 
 def test_a_planted_blade_angle_is_found_and_kept_apart(tmp_path: Path) -> None:
     folder = _folder(tmp_path, power=0.95, turned_deg=-1.5)
-    plain, doc = command.validate(folder), command.validate(folder, match_J0=True)
+    plain, doc = propellers.validate(folder), propellers.validate(folder, match_J0=True)
     turned = doc.pop("matched_J0")
     assert turned["propellers"] == 1 and turned["shift_deg_p10_p50_p90"][1] == pytest.approx(-1.5, abs=0.02)
     for kind in ("static", "forward"):
@@ -81,7 +81,7 @@ def test_a_zero_thrust_J_that_no_blade_angle_gives_is_not_matched() -> None:
 
 
 def test_forward_points_stop_at_the_share_of_zero_thrust_J(tmp_path: Path) -> None:
-    doc = command.validate(_folder(tmp_path))
+    doc = propellers.validate(_folder(tmp_path))
     J0 = doc["propellers"][0]["J0"]
     J = np.linspace(0.1, 0.7, 13)
     assert doc["forward"]["points"] == np.count_nonzero(J <= points.J_SHARE * J0)
@@ -94,7 +94,7 @@ def test_unconverged_points_count_as_infinitely_wrong() -> None:
 
 
 def test_unconverged_points_are_never_shown_as_zero(tmp_path: Path) -> None:
-    doc = command.validate(_folder(tmp_path))
+    doc = propellers.validate(_folder(tmp_path))
     nothing = points.statistics(np.array([np.nan, np.nan]))
     doc["static"]["CT"] = nothing
     line = next(row for row in text.text(doc).splitlines() if row.startswith("all points"))
@@ -117,7 +117,7 @@ def test_a_file_for_the_folder_is_called_a_file(tmp_path: Path) -> None:
     (tmp_path / "file.txt").write_text("x")
     for name, got in (("file.txt", "a file"), ("absent", "nothing there")):
         with pytest.raises(InputError) as caught:
-            command.validate(tmp_path / name)
+            propellers.validate(tmp_path / name)
         assert str(caught.value) == f"{tmp_path / name}: got {got}; expected a folder in UIUC layout. Check the path."
 
 
@@ -139,7 +139,7 @@ def test_fixed_reynolds_number_removes_the_dependence_on_speed(tmp_path: Path) -
      ("volume-2", (0.085, 0.30, 0.125), (0.105, 0.42, 0.135))],
 )  # fmt: skip
 def test_uiuc(shared_data: Path, volume: str, static: tuple[float, ...], forward: tuple[float, ...]) -> None:
-    doc = command.validate(shared_data / "uiuc" / volume)
+    doc = propellers.validate(shared_data / "uiuc" / volume)
     assert doc["unconverged"] == 0 and not doc["faults"]
     for kind, bound in (("static", static), ("forward", forward)):
         assert doc[kind]["CT"]["median_abs"] < bound[0]

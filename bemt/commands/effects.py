@@ -3,166 +3,28 @@
 from __future__ import annotations
 
 import argparse
-import dataclasses
-import inspect
-import re
-import textwrap
-from typing import TYPE_CHECKING, Any
 
 from bemt.base.errors import EXIT_OK
-from bemt.base.tables import json_text, text_table
-from bemt.effects import catalogue
+from bemt.commands import _options
 
-if TYPE_CHECKING:
-    from bemt.effects import Effect
-
-__all__ = ["document", "markdown", "run", "text"]
-
-SCHEMA = "bemt.effects/1"
-KINDS = {
-    "air": "Air: what the flow does",
-    "stand": "Stand: instruments, and what was written down",
-    "drive": "Drive: motor and battery",
-}
+NAME = "effects"
+HELP = "list every physical effect: parameters, ranges, sources, signs"
+GROUP = "Models and checks"
+EXAMPLE = "effects"
 
 
-def document() -> dict[str, Any]:
-    """Give all effects, as ``--json`` prints them.
-
-    Returns
-    -------
-    dict
-        ``schema`` and ``effects``, in the order of kind and id.
-    """
-    order = list(KINDS)
-    known = sorted(catalogue().values(), key=lambda cls: (order.index(cls.kind), cls.id))
-    return {"schema": SCHEMA, "effects": [_entry(cls) for cls in known]}
-
-
-def _entry(cls: type[Effect]) -> dict[str, Any]:
-    effect = cls()
-    given = effect.variants() or ()
-    numbers = {p.name for p in cls.parameters}
-    words = {
-        f.name: list(dict.fromkeys([getattr(effect, f.name), *(v[f.name] for v in given if f.name in v)]))
-        for f in dataclasses.fields(cls)  # type: ignore[arg-type]
-        if f.name not in numbers
-    }
-    return {
-        "id": cls.id, "title": cls.title, "kind": cls.kind, "sign": cls.sign, "on_by_default": cls.on_by_default,
-        "diagnosed": cls.diagnosed, "needs": list(cls.needs), "source": _notes(cls),
-        "parameters": [
-            {"name": p.name, "unit": p.unit, "default": getattr(effect, p.name), "low": p.low, "high": p.high,
-             "off": p.off, "source": p.source}
-            for p in cls.parameters
-        ],
-        "choices": words,
-    }  # fmt: skip
-
-
-def _notes(cls: type[Effect]) -> str:
-    """Notes of the docstring, in one line."""
-    text = inspect.cleandoc(cls.__doc__ or "").partition("Notes\n-----\n")[2]
-    return re.sub(r":\w+:`([^`]+)`|``([^`]+)``", r"`\1\2`", " ".join(text.split()))
-
-
-def _range(p: dict[str, Any]) -> str:
-    unit = "" if p["unit"] == "1" else f" {p['unit']}"
-    return f"{p['low']:.4g} to {p['high']:.4g}{unit}"
-
-
-def text() -> str:
-    """Give all effects as a table for a terminal.
-
-    Returns
-    -------
-    str
-        One line per effect, its parameters below it.
-    """
-    lines = []
-    for kind, head in KINDS.items():
-        rows = []
-        for e in document()["effects"]:
-            if e["kind"] != kind:
-                continue
-            state = "on" if e["on_by_default"] else "off"
-            rows.append([e["id"], state, e["title"], "", ""])
-            rows += [["", "", "", p["name"], f"{_range(p)}, default {p['default']:.4g}"]
-                     for p in e["parameters"]]  # fmt: skip
-        if rows:
-            table = text_table(["effect", "default", "what", "parameter", "range"], rows, left=range(5))
-            lines += [head, "\n".join(line.rstrip() for line in table.splitlines()), ""]
-    return "\n".join(lines).rstrip()
-
-
-def markdown() -> str:
-    """Give all effects as the page docs/effects.md.
-
-    Returns
-    -------
-    str
-        Markdown, ends with a newline.
-    """
-    found = document()["effects"]
-    lines = [
-        "# Effects", "",
-        f"The {len(found)} effects of the catalogue `bemt/effects/`, one file each. This page is written by",
-        "`python -m bemt effects --markdown`; do not edit it.", "",
-        "A case names them in `model.effects_on` and `model.effects_off`, with parameters where they differ from the",
-        'defaults: `effects_on = ["tip_loss(strength=0.9)"]`.', "",
-    ]  # fmt: skip
-    for kind, head in KINDS.items():
-        mine = [e for e in found if e["kind"] == kind]
-        if not mine:
-            continue
-        lines += [f"## {head}", "", "| id | what | gives it away |", "|---|---|---|"]
-        lines += [f"| [`{e['id']}`](#{e['id']}) | {e['title']} | {e['sign']} |" for e in mine]
-        lines += [""]
-        for e in mine:
-            lines += _page(e)
-    return "\n".join(lines).rstrip() + "\n"
-
-
-def _page(e: dict[str, Any]) -> list[str]:
-    state = ["On unless turned off." if e["on_by_default"] else "Off unless turned on."]
-    if not e["diagnosed"]:
-        state.append("A diagnosis does not name it.")
-    if e["needs"]:
-        state.append(f"A recording shows it only with {', '.join(f'`{n}`' for n in e['needs'])}.")
-    lines = [f"### {e['id']}", "", *textwrap.wrap(" ".join(state), 118), ""]
-    if e["parameters"]:
-        lines += [
-            "| parameter | unit | default | range | nothing at | source of the range |",
-            "|---|---|---|---|---|---|",
-        ]
-        for p in e["parameters"]:
-            off = "" if p["off"] is None else f"{p['off']:.4g}"
-            number = f"{p['default']:.4g}"
-            cells = [f"`{p['name']}`", p["unit"], number, _range(p | {"unit": "1"}), off, p["source"]]
-            lines.append(f"| {' | '.join(cells)} |")
-        lines.append("")
-    for name, words in e["choices"].items():
-        lines += [*textwrap.wrap(f"`{name}`: " + ", ".join(f"`{w}`" for w in words), 118), ""]
-    return [*lines, *textwrap.wrap(e["source"], 118, break_on_hyphens=False), ""]
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    style = parser.add_mutually_exclusive_group()
+    style.add_argument("--markdown", action="store_true", help="as the page docs/effects.md")
+    _options.add_json(style, "bemt.effects/1")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Do what the command line asks.
+    """Print the catalogue."""
+    from bemt.base.tables import json_text
+    from bemt.report import effects_list
 
-    Parameters
-    ----------
-    args : argparse.Namespace
-        ``markdown``, ``json``.
-
-    Returns
-    -------
-    int
-        Exit code.
-    """
-    if args.json:
-        print(json_text(document()), end="")
-    elif args.markdown:
-        print(markdown(), end="")
-    else:
-        print(text())
+    made = json_text(effects_list.document()) if args.json else effects_list.markdown() if args.markdown else ""
+    print(made or effects_list.text() + "\n", end="")
     return EXIT_OK

@@ -3,143 +3,39 @@
 from __future__ import annotations
 
 import argparse
-import math
-from typing import Any
 
-import numpy as np
+from bemt.base.errors import EXIT_OK
+from bemt.commands import _options
 
-from bemt.air import Air
-from bemt.base.errors import EXIT_OK, Fault, InputError
-from bemt.base.tables import json_text, number_text, text_table
-from bemt.base.units import INCH
-from bemt.case.schema import AIRSPEED, RPM
-from bemt.formula import k1k2 as empirical
-from bemt.formula.estimate import POSSIBLE, estimate, length_faults
-from geometry.common import GeometryError
-from geometry.designation import parse_designation
-
-__all__ = ["SCHEMA", "document", "run"]
-
-SCHEMA = "bemt.estimate/1"
+NAME = "estimate"
+HELP = "thrust and power from a label such as 10x5, with bands, beside K1/K2"
+GROUP = "Propellers and fans"
+EXAMPLE = "estimate 10x5 --rpm 6000"
 
 
-def _label(text: str, faults: list[Fault]) -> tuple[float, float, int | None]:
-    """Diameter and pitch [in], blades if stated; NaN where the label cannot be read."""
-    try:
-        return parse_designation(text)
-    except GeometryError as error:
-        faults += [Fault("LABEL", *fault) for fault in error.faults]
-        return math.nan, math.nan, None
-
-
-def document(args: argparse.Namespace) -> dict[str, Any]:
-    """Estimate what the command line asks for.
-
-    Parameters
-    ----------
-    args : argparse.Namespace
-        ``label``, ``rpm`` and ``airspeed`` (lists), ``blades``, ``chord_mm``, ``measured_pitch_in``, ``series``,
-        ``density``, ``ducted``.
-
-    Returns
-    -------
-    dict
-        Schema ``bemt.estimate/1``: ``given``, and a row for every speed and airspeed; unknown numbers are null.
-
-    Raises
-    ------
-    InputError
-        For an unreadable label, impossible numbers, or an unknown series; all at once.
-    """
-    faults: list[Fault] = []
-    D, pitch, marked = _label(args.label, faults)
-    blades = args.blades or marked or 2
-    if args.blades and marked and args.blades != marked:
-        faults.append(Fault("--blades", "", str(args.blades), f"{marked}, as in {args.label}"))
-    if not 0.1 <= args.density <= 2.0:
-        faults.append(Fault("--density", "", f"{args.density:g}", "kg/m3 from 0.1 to 2 (1.225 at sea level)"))
-    lengths = (("--chord-mm", args.chord_mm, "mm", "chord"),
-               ("--measured-pitch-in", args.measured_pitch_in, "in", "pitch"))  # fmt: skip
-    for option, value, unit, name in lengths:
-        faults += [] if value is None else length_faults((option, ""), value, unit, D * INCH, POSSIBLE[name])
-    # what is no number, or turns backwards, the formula refuses itself
-    faults += [Fault("--rpm", "", f"{n:g}", f"0 to {RPM.high:g} rev/min") for n in args.rpm
-               if RPM.high < n < math.inf]  # fmt: skip
-    speeds = f"{AIRSPEED.low:g} to {AIRSPEED.high:g} m/s"
-    faults += [Fault("--airspeed", "", f"{v:g}", speeds) for v in args.airspeed or []
-               if math.isfinite(v) and not AIRSPEED.low <= v <= AIRSPEED.high]  # fmt: skip
-    rpm, V = (v.ravel() for v in np.meshgrid(args.rpm, args.airspeed or [0.0], indexing="ij"))
-    if faults:  # the rest is looked at beside a propeller that is right, so that all faults come at once
-        try:
-            estimate(0.254, 0.127, blades, rpm, V, series=args.series)
-        except InputError as error:
-            faults += error.faults
-        raise InputError(faults)
-    air = Air.from_density(args.density)
-    chord = None if args.chord_mm is None else args.chord_mm * 1e-3
-    measured = None if args.measured_pitch_in is None else args.measured_pitch_in * INCH
-    e = estimate(D * INCH, pitch * INCH, blades, rpm, V, air, chord, measured, args.series, args.ducted)
-    k = empirical.estimate(D * INCH, pitch * INCH, rpm, V, air, ducted=args.ducted)
-
-    def number(value: float) -> float | None:
-        return float(value) if math.isfinite(value) else None
-
-    columns = {
-        "rpm": e.rpm, "airspeed_m_s": e.airspeed_m_s, "thrust_N": e.thrust_N, "u_thrust_N": e.u_thrust_N,
-        "u95_thrust_N": e.u95_thrust_N, "power_W": e.power_W, "u_power_W": e.u_power_W, "u95_power_W": e.u95_power_W,
-        "J": e.J, "CT": e.CT, "CP": e.CP, "M_tip": e.M_tip, "Re75": e.Re, "k1k2_thrust_N": k.thrust_N,
-    }  # fmt: skip
-    rows = [{name: number(column[i]) for name, column in columns.items()} | {"flags": list(e.flags[i])}
-            for i in range(rpm.size)]  # fmt: skip
-    given = {"label": args.label, "diameter_in": D, "pitch_in": pitch, "blades": blades, "chord_mm": args.chord_mm,
-             "measured_pitch_in": args.measured_pitch_in, "series": args.series, "density_kg_m3": args.density,
-             "ducted": args.ducted}  # fmt: skip
-    return {"schema": SCHEMA, "given": given, "rows": rows}
-
-
-def text(doc: dict[str, Any]) -> str:
-    """Give the rows as a table, with what not to trust below.
-
-    Parameters
-    ----------
-    doc : dict
-        Schema ``bemt.estimate/1``.
-
-    Returns
-    -------
-    str
-        Lines.
-    """
-
-    def shown(value: float | None, digits: int = 4) -> str:
-        return number_text(math.nan if value is None else value, digits)
-
-    head = ["rpm", "V [m/s]", "T [N]", "+- 68 %", "+- 95 %", "P [W]", "+- 68 %", "+- 95 %", "K1/K2 [N]", "J", "M tip"]
-    keys = ("rpm", "airspeed_m_s", "thrust_N", "u_thrust_N", "u95_thrust_N", "power_W", "u_power_W", "u95_power_W",
-            "k1k2_thrust_N", "J", "M_tip")  # fmt: skip
-    table = [[shown(row[key], 2 if key.startswith("u") else 6 if key == "rpm" else 4) for key in keys]
-             for row in doc["rows"]]  # fmt: skip
-    words = {flag: None for row in doc["rows"] for flag in row["flags"]}
-    notes = [f"do not trust: {flag}" for flag in words]
-    more = [f"--{key.replace('_', '-')}" for key in ("chord_mm", "measured_pitch_in") if doc["given"][key] is None]
-    if more:
-        notes.append(f"narrower bands with {' and '.join(more)}, both at 0.75 R")
-    return "\n".join([text_table(head, table, left=()), *notes]) + "\n"
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument("label", metavar="LABEL", help="diameter x pitch in inches, blades if not 2: 10x4.7, 8x5x3")
+    speed = {"type": float, **_options.MANY}
+    parser.add_argument("--rpm", required=True, metavar="N", help="one or more [rev/min]", **speed)
+    parser.add_argument("--airspeed", metavar="V", help="one or more (default 0) [m/s]", **speed)
+    blades = "number (default: of the label, else 2)"
+    parser.add_argument("--blades", type=_options.positive, metavar="B", help=blades)
+    parser.add_argument("--chord-mm", type=float, metavar="C", help="at 0.75 R: by far the best fourth number")
+    twist = "2 pi r tan(blade angle) at r = 0.75 R: the fifth"
+    parser.add_argument("--measured-pitch-in", type=float, metavar="P", help=twist)
+    parser.add_argument("--series", metavar="NAME", help='maker and series, as "APC Thin Electric" or apce')
+    parser.add_argument("--density", type=float, default=1.225, metavar="RHO", help="of the air [kg/m3]")
+    parser.add_argument("--ducted", action="store_true", help="flagged only: neither formula knows a duct")
+    _options.add_json(parser, "bemt.estimate/1")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Do what the command line asks.
+    """Print the estimate."""
+    from bemt.base.tables import json_text
+    from bemt.compare.from_label import document, text
 
-    Parameters
-    ----------
-    args : argparse.Namespace
-        As `document`, and ``json``.
-
-    Returns
-    -------
-    int
-        Exit code.
-    """
-    doc = document(args)
-    print(json_text(doc) if args.json else text(doc), end="")
+    found = document(args.label, args.rpm, args.airspeed or (), args.blades, args.chord_mm, args.measured_pitch_in,
+                     args.series, args.density, args.ducted)  # fmt: skip
+    print(json_text(found) if args.json else text(found), end="")
     return EXIT_OK

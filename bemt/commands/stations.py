@@ -3,206 +3,37 @@
 from __future__ import annotations
 
 import argparse
-import math
-import re
-from pathlib import Path
-from typing import Any
 
-import numpy as np
+from bemt.base.errors import EXIT_OK
+from bemt.commands import _options
 
-from bemt.base.errors import EXIT_OK, Fault, InputError
-from bemt.base.tables import json_text, number_text, text_table, write_atomic
-from geometry.common import GeometryError
-from geometry.export import UNITS, read_solid
-from geometry.slicing import FoundRotor, find_rotor
-
-__all__ = ["case_files", "read_stations", "run"]
-
-SCHEMA = "bemt.stations/1"
-TIP_SPEED = 120.0  # of the rpm that is put into the case: geometry says nothing about it [m/s]
-ANCHORS = (0.2, 0.35, 0.5, 0.65, 0.8, 0.95)
+NAME = "stations"
+HELP = "find and cut the blades of a CAD model or scan: a case to solve"
+GROUP = "Solids and CFD"
+EXAMPLE = "stations rotor.stl --unit mm --out cases/mine"
 
 
-def read_stations(path: Path, unit: str | None = None) -> tuple[FoundRotor, float, str]:
-    """Find the rotor in a file.
-
-    Parameters
-    ----------
-    path : Path
-        STL, OBJ or STEP.
-    unit : str or None
-        ``mm``, ``m`` or ``in``; needed when the file does not say, wrong when it says otherwise.
-
-    Returns
-    -------
-    found : FoundRotor
-        Axis, blades and stations, in the unit of the mesh.
-    scale : float
-        Length of that unit. [m]
-    unit : str
-        Where the unit comes from, in words.
-
-    Raises
-    ------
-    InputError
-        When the file holds no readable rotor or its unit is not known.
-    """
-    file = path.as_posix()
-    try:
-        vertices, faces, said = read_solid(path)
-        kind = "STEP" if path.suffix.lower() in (".step", ".stp") else "the file"
-        if said is None and unit is None:
-            size = float(np.ptp(vertices, axis=0).max())
-            looks = f"The largest extent is {size:.4g}: as mm, in or m? Give --unit"
-            raise InputError(Fault(file, "unit", "none in the file", "--unit mm, m or in", looks))
-        if said is not None and unit is not None and said != unit and kind != "STEP":
-            raise InputError(Fault(file, "unit", f"--unit {unit}", f"{said}, which the file states", "Leave it out"))
-        found = find_rotor(vertices, faces)
-    except GeometryError as error:
-        raise InputError([Fault("" if at == file else file, at, *rest) for at, *rest in error.faults]) from error
-    name = said or unit or "m"
-    words = "STEP files carry their unit" if kind == "STEP" else f"{name}, {'as the file says' if said else 'as told'}"
-    scale = UNITS[name]
-    if not 0.005 <= found.R * scale <= 5:
-        raise InputError(Fault(file, "unit", f"{name}, which makes a rotor of {2 * found.R * scale:.4g} m diameter",
-                               "a diameter from 0.01 to 10 m", "Another --unit?"))  # fmt: skip
-    return found, scale, words
-
-
-def _csv(header: str, rows: list[list[str]]) -> str:
-    return "".join(f"{line}\n" for line in [header, *(",".join(row) for row in rows)])
-
-
-def case_files(found: FoundRotor, scale: float, name: str, source: str) -> dict[str, str]:
-    """Write the found rotor as a case.
-
-    Parameters
-    ----------
-    found : FoundRotor
-        The rotor.
-    scale : float
-        Length of the mesh's unit. [m]
-    name : str
-        Name of the case.
-    source : str
-        File that it comes from.
-
-    Returns
-    -------
-    dict of str to str
-        File name to content: ``case.toml``, ``stations.csv``, ``sections.csv`` and one section file per anchor.
-    """
-    x = found.r / found.R
-    files: dict[str, str] = {}
-    rows = [[f"{a:.6f}", f"{b:.6f}", f"{c:.5f}"] for a, b, c in
-            zip(x, found.chord / found.R, np.degrees(found.beta), strict=True)]  # fmt: skip
-    files["stations.csv"] = _csv("r_over_R,chord_over_R,beta_deg", rows)
-    files["sections.csv"] = _csv(
-        "r_m,chord_m,beta_deg,thickness,camber,camber_position",
-        [[f"{v:.7g}" for v in row] for row in
-         zip(found.r * scale, found.chord * scale, np.degrees(found.beta), found.thickness, found.camber,
-             found.camber_position, strict=True)],
-    )  # fmt: skip
-    hub = found.Rhub / found.R
-    anchors: dict[int, float] = {}
-    for want in ANCHORS:
-        k = int(np.argmin(np.abs(x - max(want, hub + 0.05 * (1 - hub)))))
-        anchors.setdefault(k, float(x[k]))
-    names = []
-    for k, at in anchors.items():
-        section = found.sections[k]
-        title = f"section_{round(1000 * at):04d}"
-        names.append(f"{title}.dat")
-        pairs = "".join(f"{a:.6f} {b:.6f}\n" for a, b in zip(section.x, section.y, strict=True))
-        files[f"{title}.dat"] = f"{title}\n{pairs}"
-    rpm = float(f"{TIP_SPEED / (found.R * scale) * 30 / math.pi:.2g}")
-    quoted = ", ".join(f'"{n}"' for n in names)
-    files["case.toml"] = f"""# Blade stations cut from {source}.
-# Not in the geometry, set here to be changed: operating.rpm (a tip speed near {TIP_SPEED:g} m/s), speed, air.
-schema = "bemt.case/1"
-name = "{name}"
-title = "{found.B} blades, {2e3 * found.R * scale:.4g} mm, from {source}"
-
-[rotor]
-kind = "propeller"
-blades = {found.B}
-diameter_mm = {2e3 * found.R * scale:.6g}
-hub_diameter_mm = {2e3 * found.Rhub * scale:.6g}
-rotation = "{"right" if found.rotation > 0 else "left"}"
-
-[blade]
-stations = "stations.csv"
-
-[blade.section]
-dat = [{quoted}]
-r_over_R = [{", ".join(f"{at:.4f}" for at in anchors.values())}]
-
-[operating]
-rpm = {rpm:.0f}
-airspeed_m_s = 0
-
-[air]
-density_kg_m3 = 1.225
-"""
-    return files
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument("file", metavar="FILE", help="STL, OBJ or STEP")
+    parser.add_argument("--unit", choices=("mm", "m", "in"), help="of an STL or OBJ that does not state it")
+    parser.add_argument("--out", metavar="DIR", help="write case.toml, stations.csv and section files there")
+    _options.add_json(parser, "bemt.stations/1")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Do what the command line asks.
+    """Cut, write, print."""
+    from pathlib import Path
 
-    Parameters
-    ----------
-    args : argparse.Namespace
-        ``file``, ``unit``, ``out``, ``json``.
+    from bemt.base.tables import json_text
+    from bemt.case import from_solid
 
-    Returns
-    -------
-    int
-        Exit code.
-    """
     path = Path(args.file)
-    found, scale, words = read_stations(path, args.unit)
-    stem = re.sub(r"[^A-Za-z0-9_.-]", "_", path.stem).lstrip("_.-") or "rotor"
+    found, scale, words = from_solid.read_stations(path, args.unit)
     if args.out is not None:
-        files = case_files(found, scale, stem, re.sub(r'["\\\n]', "_", path.name))
-        _refuse_other(Path(args.out) / "case.toml", files["case.toml"])
-        for name in sorted(files, key=lambda n: n == "case.toml"):  # the case last: what it names is there
-            write_atomic(Path(args.out) / name, files[name])
+        from_solid.write(found, scale, path, Path(args.out))
     if args.json:
-        print(json_text(_document(found, scale, path, words)), end="")
+        print(json_text(from_solid.document(found, scale, path, words)), end="")
     else:
-        print(_text(found, scale, path, words, args.out))
+        print(from_solid.text(found, scale, path, words, args.out))
     return EXIT_OK
-
-
-def _refuse_other(path: Path, text: str) -> None:
-    """Refuse to replace a case that somebody has changed or written."""
-    if path.is_file() and path.read_bytes() != text.encode():
-        raise InputError(Fault("--out", "", f"a folder with another case, {path.as_posix()}", "a folder without one",
-                               "Its case.toml would be replaced"))  # fmt: skip
-
-
-def _document(found: FoundRotor, scale: float, path: Path, words: str) -> dict[str, Any]:
-    return {
-        "schema": SCHEMA, "file": path.name, "unit": words, "blades": found.B,
-        "rotation": "right" if found.rotation > 0 else "left", "diameter_m": 2 * found.R * scale,
-        "hub_diameter_m": 2 * found.Rhub * scale, "axis": found.axis, "origin_m": found.origin * scale,
-        "spread": found.spread, "warnings": list(found.notes),
-        "stations": {"r_m": found.r * scale, "chord_m": found.chord * scale, "beta_deg": np.degrees(found.beta),
-                     "thickness": found.thickness, "camber": found.camber, "camber_position": found.camber_position},
-    }  # fmt: skip
-
-
-def _text(found: FoundRotor, scale: float, path: Path, words: str, out: str | None) -> str:
-    rows = [[number_text(v) for v in row] for row in
-            zip(found.r / found.R, found.r * scale * 1e3, found.chord * scale * 1e3, np.degrees(found.beta),
-                100 * found.thickness, 100 * found.camber, strict=True)]  # fmt: skip
-    hand = "right" if found.rotation > 0 else "left"
-    head = (f"{path.name}: {found.B} blades, {hand}-hand, diameter {number_text(2e3 * found.R * scale, 5)} mm, hub "
-            f"{number_text(2e3 * found.Rhub * scale)} mm ({words})")  # fmt: skip
-    axis = ", ".join(f"{v + 0.0:.4f}" for v in found.axis)
-    lines = [head, f"thrust along ({axis})", *(f"note: {note}" for note in found.notes)]
-    lines.append(text_table(["r/R", "r mm", "chord mm", "beta deg", "t/c %", "camber %"], rows, left=()).rstrip())
-    if out is not None:
-        lines.append(f"case in {Path(out) / 'case.toml'}: its rpm is not from the geometry, set it")
-    return "\n".join(lines)

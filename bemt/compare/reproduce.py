@@ -1,4 +1,4 @@
-"""Every number of the source thesis beside ours: ``python -m bemt reproduce [--json]``.
+"""Every number of the source thesis beside ours.
 
 Statuses: "reproduced" (rounds to the printed digits), "reproduced within rounding" (last digit cut off, or reached with
 an input rounded as the note says), "not reproduced, because ...", "input, not computed", "not checked: data absent".
@@ -7,7 +7,6 @@ JSON is one document of schema ``bemt.reproduce/1``.
 
 from __future__ import annotations
 
-import json
 import math
 import textwrap
 from collections import Counter
@@ -388,25 +387,3 @@ def _number(value: float, stated: str) -> str:
         return f"{value:.4e}"
     digits = len(stated.partition(".")[2])
     return f"{value:.0f}" if digits == 0 and value == round(value) else f"{value:.{digits + 1}f}"
-
-
-def run(args: Any) -> int:
-    """Print the reproduction.
-
-    Parameters
-    ----------
-    args : argparse.Namespace
-        ``json``: one document instead of the table.
-
-    Returns
-    -------
-    int
-        0: a number that is not reproduced is a finding, not a failure.
-    """
-    folder = find_uiuc()
-    uiuc = uiuc_statistics(folder) if folder else None
-    if getattr(args, "json", False):
-        print(json.dumps(document(uiuc), indent=1, allow_nan=False))
-    else:
-        print(table(items(uiuc)))
-    return 0

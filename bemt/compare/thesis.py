@@ -54,7 +54,7 @@ class ThesisItem:
         What it is.
     stated : str
         As printed, so that its rounding is known.
-    ours : float, str or None
+    ours : number, str or None
         Computed; None for an input.
     unit : str
         Unit of both.

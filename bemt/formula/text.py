@@ -80,7 +80,7 @@ def text(doc: Mapping[str, Any]) -> str:
     Parameters
     ----------
     doc : mapping
-        Document of schema ``bemt.calibration/1``, see :func:`bemt.commands.calibrate.calibrate`.
+        Document of schema ``bemt.calibration/1``, see :func:`bemt.formula.calibrate.calibrate`.
 
     Returns
     -------

@@ -1,8 +1,7 @@
-"""``python -m bemt prove``: conceal causes, seal the key, let the diagnosis run on its own, open the key, score."""
+"""Conceal causes, seal the key, let the diagnosis run on its own, open the key, score."""
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
 import os
@@ -12,7 +11,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -20,11 +19,11 @@ from typing import Any
 import numpy as np
 
 from bemt import __version__
-from bemt.base.errors import EXIT_OK, Fault, InputError
+from bemt.base.errors import Fault, InputError
 from bemt.base.tables import json_text, write_atomic
 from bemt.proof import draw, items, proof_text, real, resolve, score, seal
 
-__all__ = ["SCHEMA", "conceal", "diagnose_all", "diagnose_folder", "proof", "run"]
+__all__ = ["SCHEMA", "conceal", "diagnose_all", "diagnose_folder", "proof", "prove"]
 
 SCHEMA, KEY_SCHEMA = "bemt.proof/1", "bemt.key/1"
 REAL = "real"
@@ -33,7 +32,7 @@ _GIVEN = ("recording.csv", "case.toml", "stations.csv", "reference.csv")
 TIME_LIMIT_S = 900.0
 
 
-def conceal(out: Path, size: str, seed: int) -> str:
+def conceal(out: Path, size: str, seed: int, say: Callable[[str], None] | None = None) -> str:
     """Draw and write all items, and the sealed key.
 
     Parameters
@@ -44,6 +43,8 @@ def conceal(out: Path, size: str, seed: int) -> str:
         Of `draw.SIZES`, or ``real``.
     seed : int
         Of everything.
+    say : callable, optional
+        Takes a line of progress.
 
     Returns
     -------
@@ -64,7 +65,7 @@ def conceal(out: Path, size: str, seed: int) -> str:
     entries = []
     drawn: Iterable[items.Item] = (
         real.draw_real(np.random.default_rng(seed)) if size == REAL
-        else draw.draw_items(draw.SIZES[size], seed, known, standard, _teller("concealed"))
+        else draw.draw_items(draw.SIZES[size], seed, known, standard, _teller("concealed", say))
     )  # fmt: skip
     for k, item in enumerate(drawn):
         name = f"{k:04d}"
@@ -78,12 +79,8 @@ def conceal(out: Path, size: str, seed: int) -> str:
                            "items": entries})  # fmt: skip
 
 
-def _teller(what: str) -> Any:
-    def tell(done: int, n: int) -> None:
-        if sys.stderr.isatty():
-            print(f"\r\x1b[K{what} {done}/{n}", end="\n" if done == n else "", file=sys.stderr, flush=True)
-
-    return tell
+def _teller(what: str, say: Callable[[str], None] | None) -> Callable[[int, int], None]:
+    return lambda done, n: say(f"{what} {done}/{n}") if say else None
 
 
 def diagnose_folder(folder: Path) -> tuple[dict[str, Any] | None, str]:
@@ -124,7 +121,7 @@ def diagnose_folder(folder: Path) -> tuple[dict[str, Any] | None, str]:
             return None, ran.stderr.strip() or "no JSON document on the output"
 
 
-def diagnose_all(out: Path, jobs: int) -> None:
+def diagnose_all(out: Path, jobs: int, say: Callable[[str], None] | None = None) -> None:
     """Diagnose all items that have no answer yet; answers go to ``answers/<folder>.json``.
 
     Parameters
@@ -133,11 +130,13 @@ def diagnose_all(out: Path, jobs: int) -> None:
         Folder of the proof.
     jobs : int
         Processes at a time. [-]
+    say : callable, optional
+        Takes a line of progress.
     """
     answers = out / "answers"
     answers.mkdir(exist_ok=True)
     todo = [f for f in sorted((out / "items").iterdir()) if not (answers / f"{f.name}.json").exists()]
-    tell = _teller("diagnosed")
+    tell = _teller("diagnosed", say)
 
     def one(folder: Path) -> None:
         began = time.monotonic()
@@ -219,40 +218,31 @@ def _commit() -> str:
     return words[0] + ("+" if words[1] else "")
 
 
-def run(args: argparse.Namespace) -> int:
-    """Run the command.
+def prove(
+    out: str | None, size: str = "small", seed: int | None = None, jobs: int | None = None,
+    say: Callable[[str], None] | None = None, tell: Callable[[str], None] | None = None,
+) -> dict[str, Any]:  # fmt: skip
+    """Do the whole proof; with a folder and without a seed an interrupted one is resumed with its sealed key.
 
-    Parameters
-    ----------
-    args : argparse.Namespace
-        Parsed command line: size, seed, out, jobs, json, quiet.
-
-    Returns
-    -------
-    int
-        Exit code: 0 every target met, 1 some missed.
+    ``say`` takes passing lines of progress, ``tell`` the hash of the key, once it is sealed.
     """
-    seed = secrets.randbits(63) if args.seed is None else int(args.seed)
     with tempfile.TemporaryDirectory(prefix="bemt-proof-") as spare:
-        out = Path(args.out) if args.out else Path(spare)
+        folder = Path(out) if out else Path(spare)
         began = time.monotonic()
-        if args.seed is None and (out / seal.SEAL).exists():  # an interrupted run: its key stays as it is
-            digest = (out / seal.SEAL).read_text(encoding="utf-8").strip()
-            size = seal.unseal(out, digest)["size"]
-            print(f"going on with the sealed key of size {size}, SHA-256 {digest}", file=sys.stderr, flush=True)
+        if seed is None and (folder / seal.SEAL).exists():  # an interrupted run: its key stays as it is
+            digest = (folder / seal.SEAL).read_text(encoding="utf-8").strip()
+            words = f"going on with the sealed key of size {seal.unseal(folder, digest)['size']}, SHA-256 {digest}"
         else:
-            digest = conceal(out, args.size, seed)
-            print(f"key sealed, SHA-256 {digest}", file=sys.stderr, flush=True)
+            digest = conceal(folder, size, secrets.randbits(63) if seed is None else seed, say)
+            words = f"key sealed, SHA-256 {digest}"
+        if tell:
+            tell(words)
         sealed = time.monotonic()
-        diagnose_all(out, args.jobs or os.cpu_count() or 1)
-        document = proof(out, digest)
+        diagnose_all(folder, jobs or os.cpu_count() or 1, say)
+        document = proof(folder, digest)
         document["seconds"] = {"conceal": sealed - began, "diagnose": time.monotonic() - sealed}
-        if args.out:
-            write_atomic(out / "proof.json", json_text(document))
-            write_atomic(out / "proof.txt", proof_text.text(document) + "\n")
-            write_atomic(out / "proof.html", proof_text.html(document))
-    if args.json:
-        print(json_text(document), end="")
-    elif not args.quiet:
-        print(proof_text.text(document))
-    return EXIT_OK if all(row["met"] is not False for row in document["score"]) else 1
+        if out:
+            write_atomic(folder / "proof.json", json_text(document))
+            write_atomic(folder / "proof.txt", proof_text.text(document) + "\n")
+            write_atomic(folder / "proof.html", proof_text.html(document))
+    return document

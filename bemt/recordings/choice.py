@@ -13,7 +13,7 @@ from bemt.base.averaging import Average, keep_last, revolution_average
 from bemt.base.errors import Fault, InputError
 from bemt.readers._imported import Channel, Imported
 
-__all__ = ["Choice", "averaged", "chosen"]
+__all__ = ["Choice", "asked", "averaged", "chosen"]
 
 
 @dataclass(frozen=True)
@@ -181,3 +181,30 @@ def _zone_sums(record: Imported, zones: Sequence[str], file: str) -> dict[str, C
         values = np.sum([p.values for p in parts], axis=0)
         out[f"{base}({'+'.join(zones)})"] = Channel(values, parts[0].unit, mean, over, drift)
     return out
+
+
+def asked(
+    rpm: float | None = None, period: float | None = None, revolutions: int | None = None, sign: int = 1,
+    sector: int = 1, zones: Sequence[str] = (), loads: Sequence[str] = (),
+) -> Choice:  # fmt: skip
+    """Make a choice of options, or refuse them, all faults at once."""
+    faults = []
+    if rpm is not None and not (math.isfinite(rpm) and 0.01 <= rpm <= 1e6):
+        faults.append(Fault("", "--rpm", f"{rpm:g}", "a number from 0.01 to 1e6 rev/min"))
+    if period is not None and not (math.isfinite(period) and 6e-5 <= period <= 6e3):
+        faults.append(Fault("", "--period", f"{period:g}", "a time from 6e-5 to 6000 s"))
+    if rpm is not None and period is not None:
+        faults.append(Fault("", "--rpm, --period", "both", "one of them"))
+    if revolutions is not None and not 1 <= revolutions <= 10**6:
+        faults.append(Fault("", "--revolutions", str(revolutions), "a whole number of 1 or more"))
+    if revolutions is not None and rpm is None and period is None:
+        faults.append(Fault("", "--revolutions", "no speed", "--rpm or --period beside it"))
+    if sign not in (1, -1):
+        faults.append(Fault("", "--sign", str(sign), "+1 or -1"))
+    if not 1 <= sector <= 100:
+        faults.append(Fault("", "--sector", str(sector), "the number of equal sectors, 1 to 100"))
+    if loads and sign == sector == 1:
+        faults.append(Fault("", "--load", ", ".join(loads), "--sign -1 or --sector N beside it, which it belongs to"))
+    if faults:
+        raise InputError(faults)
+    return Choice(60.0 / rpm if rpm is not None else period, revolutions, sign, sector, tuple(zones), tuple(loads))

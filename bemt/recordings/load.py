@@ -1,4 +1,4 @@
-r"""``python -m bemt import``: what is in a file of results, with honest means, in one table or one JSON document.
+r"""What is in a file of results, with honest means.
 
 Nothing is guessed. A mean over revolutions needs the speed (``--rpm`` or ``--period``); the sign, the sector of a
 one-blade model and the zones that count are the user's (``--sign``, ``--sector``, ``--zones``, ``--load``), and
@@ -13,7 +13,6 @@ a recording has a mean only where the recording is one steady point.
 
 from __future__ import annotations
 
-import argparse
 import math
 import os
 import re
@@ -34,7 +33,7 @@ from bemt.recordings.choice import Choice, averaged, chosen
 from bemt.recordings.overview import findings, is_recording, points_text, reduction_document, reduction_of
 from bemt.recordings.reduce import Reduced
 
-__all__ = ["SCHEMA", "Choice", "averaged", "chosen", "document", "import_file", "run"]
+__all__ = ["SCHEMA", "Choice", "averaged", "chosen", "document", "exit_code", "import_file", "text"]
 
 SCHEMA = "bemt.import/1"
 SETTLED = 0.01
@@ -235,7 +234,7 @@ def _shown(channel: Channel) -> dict[str, Any]:
     return {"unit": channel.unit, "mean": mean, "averaged_over": over, "drift": channel.drift}
 
 
-def _text(file: Mapping[str, Any]) -> str:
+def _file_text(file: Mapping[str, Any]) -> str:
     if file["error"] is not None:
         return f"{file['path']}: refused\n  " + str(file["error"]).replace("\n", "\n  ")
     lines = [f"{file['path']}: {file['format']} ({file['kind']}), {file['rows']} rows"]
@@ -255,54 +254,17 @@ def _text(file: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _choice(args: argparse.Namespace) -> Choice:
-    faults = []
-    rpm, period = getattr(args, "rpm", None), getattr(args, "period", None)
-    if rpm is not None and not (math.isfinite(rpm) and 0.01 <= rpm <= 1e6):
-        faults.append(Fault("", "--rpm", f"{rpm:g}", "a number from 0.01 to 1e6 rev/min"))
-    if period is not None and not (math.isfinite(period) and 6e-5 <= period <= 6e3):
-        faults.append(Fault("", "--period", f"{period:g}", "a time from 6e-5 to 6000 s"))
-    if rpm is not None and period is not None:
-        faults.append(Fault("", "--rpm, --period", "both", "one of them"))
-    revolutions = getattr(args, "revolutions", None)
-    if revolutions is not None and not 1 <= revolutions <= 10**6:
-        faults.append(Fault("", "--revolutions", str(revolutions), "a whole number of 1 or more"))
-    if revolutions is not None and rpm is None and period is None:
-        faults.append(Fault("", "--revolutions", "no speed", "--rpm or --period beside it"))
-    sign, sector = getattr(args, "sign", 1), getattr(args, "sector", 1)
-    if sign not in (1, -1):
-        faults.append(Fault("", "--sign", str(sign), "+1 or -1"))
-    if not 1 <= sector <= 100:
-        faults.append(Fault("", "--sector", str(sector), "the number of equal sectors, 1 to 100"))
-    zones, loads = (tuple(getattr(args, key, None) or ()) for key in ("zones", "load"))
-    if loads and sign == sector == 1:
-        faults.append(Fault("", "--load", ", ".join(loads), "--sign -1 or --sector N beside it, which it belongs to"))
-    if faults:
-        raise InputError(faults)
-    return Choice(60.0 / rpm if rpm is not None else period, revolutions, sign, sector, zones, loads)
+def text(found: Mapping[str, Any]) -> str:
+    """Lay a document out for a terminal."""
+    return "\n\n".join(_file_text(file) for file in found["files"]) + "\n"
 
 
-def run(args: argparse.Namespace) -> int:
-    """Run the subcommand.
-
-    Parameters
-    ----------
-    args : argparse.Namespace
-        ``files``, ``json``, ``format``, ``rpm`` or ``period``, ``revolutions``, ``sign``, ``sector``, ``zones``,
-        ``load``.
-
-    Returns
-    -------
-    int
-        0 when every file was read, 2 when one was refused (the others are shown).
-    """
-    choice = _choice(args)
-    form = getattr(args, "format", None)
-    if form is not None and form not in importers.importers():
-        raise InputError(Fault("", "--format", repr(form), f"one of {', '.join(importers.importers())}"))
-    found = document(args.files, form, choice)
-    if args.json:
-        print(tables.json_text(found), end="")
-    else:
-        print("\n\n".join(_text(file) for file in found["files"]))
+def exit_code(found: Mapping[str, Any]) -> int:
+    """2 when a file was refused, else 0."""
     return EXIT_INPUT if any(file["error"] is not None for file in found["files"]) else EXIT_OK
+
+
+def check_format(name: str | None) -> None:
+    """Refuse a reader that there is none of."""
+    if name is not None and name not in importers.importers():
+        raise InputError(Fault("", "--format", repr(name), f"one of {', '.join(importers.importers())}"))

@@ -1,4 +1,4 @@
-"""``python -m bemt report CASES --out DIR``: the validation report as one self-contained HTML file and a summary.
+"""The validation report as one self-contained HTML file and a summary.
 
 What the pages show is gathered as plain values (:mod:`bemt.report.gather`), then written; no value of a file reaches a
 page unescaped, no file outside of DIR is written, and the HTML lets no script run but its own.
@@ -6,16 +6,14 @@ page unescaped, no file outside of DIR is written, and the HTML lets no script r
 
 from __future__ import annotations
 
-import argparse
 import re
-import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from bemt.base.errors import Fault, InputError
 
-__all__ = ["HTML_NAME", "MARKDOWN_NAME", "book_html", "run"]
+__all__ = ["HTML_NAME", "MARKDOWN_NAME", "book_html", "write"]
 
 HTML_NAME, MARKDOWN_NAME = "report.html", "report.md"
 
@@ -74,48 +72,20 @@ def book_html(book: Mapping[str, Any]) -> str:
     return document("Validation report", lead, [page for page in pages if page[2]], foot)
 
 
-def run(args: argparse.Namespace) -> int:
-    """Do what the command line asks.
-
-    Parameters
-    ----------
-    args : argparse.Namespace
-        ``paths``, ``out``, ``quiet``.
-
-    Returns
-    -------
-    int
-        Exit code: that of the sweep behind the report.
-    """
+def write(
+    paths: Sequence[str | Path], out: str | Path, progress: Callable[[str], None]
+) -> tuple[Mapping[str, Any], tuple[Path, Path]]:
+    """Sweep the cases into a folder and write the report beside; returns what it shows, and its two files."""
     from bemt.base.tables import write_atomic
     from bemt.report.gather import gather
     from bemt.report.summary import summary
 
-    show = sys.stderr.isatty() and not args.quiet
-
-    def progress(line: str) -> None:
-        if show:
-            sys.stderr.write(f"\r\x1b[2K{line[:110]}")
-            sys.stderr.flush()
-
-    out = Path(args.out)
+    folder = Path(out)
+    book = gather(paths, folder, progress)
+    files = folder / HTML_NAME, folder / MARKDOWN_NAME
     try:
-        book = gather(args.paths, out, progress)
-        text = book_html(book)
-        try:
-            write_atomic(out / HTML_NAME, text)
-            write_atomic(out / MARKDOWN_NAME, summary(book))
-        except OSError as error:
-            raise InputError(
-                Fault(str(out), "", error.strerror or "no file", "a folder that can be written")
-            ) from error
-    finally:
-        if show:
-            sys.stderr.write("\r\x1b[2K")
-    for page in book["cases"]:
-        for fault in page["result"]["faults"]:
-            print(fault, file=sys.stderr)
-    if not args.quiet:
-        print(f"{out / HTML_NAME}: {len(text.encode()) / 1e6:.2f} MB, {len(book['cases'])} cases")
-        print(f"{out / MARKDOWN_NAME}")
-    return int(book["exit_code"])
+        write_atomic(files[0], book_html(book))
+        write_atomic(files[1], summary(book))
+    except OSError as error:
+        raise InputError(Fault(str(out), "", error.strerror or "no file", "a folder that can be written")) from error
+    return book, files

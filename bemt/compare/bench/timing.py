@@ -1,4 +1,4 @@
-"""Time per operating point: ``python -m bemt bench [--json] [--quick]``.
+"""Time per operating point.
 
 The work: one two-bladed 10x5 in 30 elements with one NACA 4412 table of one Reynolds number, at 3000, 5000 and 6700
 rev/min and 20 advance ratios from 0 to 0.8.  See `bemt.compare.bench.work`; ``--work DIR`` times the same on other
@@ -10,11 +10,9 @@ loss, swirl; ``standard`` repeats the batch with every standard effect on.  JSON
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import platform
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -26,7 +24,7 @@ from numpy.typing import ArrayLike
 from bemt import __version__
 from bemt import coefficients as co
 from bemt.air import Air
-from bemt.compare.bench.work import BLADES, DIAMETER, RE, RPM, Work, load, prepare
+from bemt.compare.bench.work import BLADES, DIAMETER, RE, RPM, Work, prepare
 
 SCHEMA = "bemt.bench/1"
 
@@ -275,25 +273,3 @@ def table(doc: dict[str, Any]) -> str:
     for _, J, CT, CP in rows[::3]:
         out.append(f"{J:>6.3f} " + " ".join(f"{'-':>8}" if c is None else f"{c:>8.4f}" for c in (CT, CP)))
     return "\n".join(out)
-
-
-def run(args: Any) -> int:
-    """Print the benchmark.
-
-    Parameters
-    ----------
-    args : argparse.Namespace
-        ``json``, ``quick``; optionally ``work``, a folder with other files.
-
-    Returns
-    -------
-    int
-        0, or 1 when a point of the work did not converge.
-    """
-    work = load(getattr(args, "work", None))
-    doc = document(work, bool(getattr(args, "quick", False)))
-    print(json.dumps(doc, indent=1, allow_nan=False) if getattr(args, "json", False) else table(doc))
-    if doc["converged"] < doc["points"]:
-        print(f"{doc['points'] - doc['converged']} points did not converge", file=sys.stderr)
-        return 1
-    return 0

@@ -1,7 +1,7 @@
-"""Cases side by side with what was recorded: one case (`case`), its tables (`text`), all of them (`command`)."""
+"""Cases side by side with what was recorded: one case (`case`), its tables (`text`), all of them (`batch`)."""
 
 from __future__ import annotations
 
-from bemt.compare.sweep.command import SCHEMA, fingerprint, run, sweep
+from bemt.compare.sweep.batch import SCHEMA, fingerprint, sweep
 
-__all__ = ["SCHEMA", "fingerprint", "run", "sweep"]
+__all__ = ["SCHEMA", "fingerprint", "sweep"]

@@ -24,7 +24,7 @@ def text(doc: dict[str, Any]) -> str:
     Parameters
     ----------
     doc : dict
-        Document of schema ``bemt.validation/1``, see :func:`bemt.compare.validate.command.validate`.
+        Document of schema ``bemt.validation/1``, see :func:`bemt.compare.validate.propellers.validate`.
 
     Returns
     -------

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, needs
 from bemt.base.tables import write_atomic
 from bemt.base.toml import Collector, Key, check_value
 from bemt.case import Case
@@ -236,7 +236,7 @@ def write_openfoam(case: Case, out: Path, run: Run, options: Options | None = No
     settings, parts = settings_of(case, run, options)
     manifest = export(parts["rotor"], parts["duct"], out, ["openfoam"], name=case.name, options=options)
     if parts["tail"] is not None:
-        import trimesh
+        trimesh = needs("trimesh", "cad")
 
         solid = trimesh.Trimesh(*revolve(parts["tail"], FACETS), process=False)
         data = str(solid.export(file_type="stl_ascii")).encode()

@@ -1,4 +1,4 @@
-"""``python -m bemt thrusters``: share force and roll moment among the thrusters of a body.
+"""Share force and roll moment among the thrusters of a body.
 
 ::
 
@@ -25,7 +25,6 @@
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import math
 from pathlib import Path
@@ -33,13 +32,13 @@ from typing import Any
 
 import numpy as np
 
-from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
+from bemt.base.errors import Fault, InputError
 from bemt.base.tables import csv_text, json_text, number_text, text_table, write_atomic
 from bemt.base.toml import Collector, Key, check_table, load_toml
 from bemt.drive import outputs, picture
 from bemt.drive.thrusters import Allocation, Thruster, allocate, attainable, moment_at
 
-__all__ = ["run"]
+__all__ = ["share"]
 
 KGF = 9.80665
 RESULTS = ("thrusters.json", "mounting.csv", "thrusters.png")
@@ -64,29 +63,17 @@ TABLES: dict[str, dict[str, Key]] = {
 }  # fmt: skip
 
 
-def run(args: argparse.Namespace) -> int:
-    """Run the command.
 
-    Parameters
-    ----------
-    args : argparse.Namespace
-        Of the command line: file, force, moment, out, json.
 
-    Returns
-    -------
-    int
-        Exit code: 1 when the command is beyond the thrusters.
-
-    Raises
-    ------
-    InputError
-        With all faults of the options and of the file.
-    """
+def share(
+    path: str, wanted_N: float | None = None, wanted_Nm: float | None = None, out: str | None = None
+) -> tuple[dict[str, Any], str, bool]:
+    """Allocate what is wanted (by the file, unless said): ``bemt.thrusters.result/1``, its text, whether it is met."""
     wrong = [Fault("", option, f"{value:g}", f"a number from {-MOST:g} to {MOST:g} {unit}")
-             for option, value, unit in (("--force", args.force, "N"), ("--moment", args.moment, "N m"))
+             for option, value, unit in (("--force", wanted_N, "N"), ("--moment", wanted_Nm, "N m"))
              if value is not None and not -MOST <= value <= MOST]  # fmt: skip
     try:
-        doc = _read(Path(args.file))
+        doc = _read(Path(path))
     except InputError as error:
         raise InputError([*wrong, *error.faults]) from None
     if wrong:
@@ -97,8 +84,8 @@ def run(args: argparse.Namespace) -> int:
         for i, t in enumerate(doc["thruster"])
     ]  # fmt: skip
     command = doc.get("command", {"force_N": 0.0, "moment_Nm": 0.0})
-    force = float(command["force_N"] if args.force is None else args.force)
-    moment = float(command["moment_Nm"] if args.moment is None else args.moment)
+    force = float(command["force_N"] if wanted_N is None else wanted_N)
+    moment = float(command["moment_Nm"] if wanted_Nm is None else wanted_Nm)
     got = allocate(thrusters, force, moment, command.get("priority", "moment"))
     corners = attainable(thrusters)
     most = max(t.thrust_max_N for t in thrusters)
@@ -113,14 +100,13 @@ def run(args: argparse.Namespace) -> int:
         "allocation": {f.name: getattr(got, f.name) for f in dataclasses.fields(Allocation)},
         "attainable": corners, "mounting": rows,
     }  # fmt: skip
-    if args.out:
-        folder = Path(args.out)
-        outputs.check("--out", folder, RESULTS, [_toml(Path(args.file))])
+    if out:
+        folder = Path(out)
+        outputs.check("--out", folder, RESULTS, [_toml(Path(path))])
         write_atomic(folder / RESULTS[0], json_text(document))
         write_atomic(folder / RESULTS[1], csv_text(list(rows[0]), rows))
         write_atomic(folder / RESULTS[2], _picture(doc["body"]["name"], most, force, distance, corners, got))
-    print(json_text(document) if args.json else _text(doc["body"], thrusters, got, rows) + "\n", end="")
-    return EXIT_OK if got.met else EXIT_UNCONVERGED
+    return document, _text(doc["body"], thrusters, got, rows) + "\n", got.met
 
 
 def _toml(path: Path) -> Path:

@@ -1,4 +1,4 @@
-"""``python -m bemt sweep``: solve cases, print them beside their recorded values, write results that survive a kill.
+"""Many cases: solve them beside their recorded values, and write results that survive a kill.
 
 Every case is solved for itself: its faults go into its own result and the others go on. With ``--out`` each case gets
 a folder with ``result.json``, ``table.txt`` and, when it sweeps axes, ``grid.csv`` or ``grid.parquet``. A result is
@@ -9,11 +9,9 @@ otherwise it is removed before the case is solved. So a case that fails has no r
 
 from __future__ import annotations
 
-import argparse
 import os
 import re
 import signal
-import sys
 import threading
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -22,8 +20,8 @@ from pathlib import Path
 from typing import Any
 
 import bemt
-from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, EXIT_UNCONVERGED, Fault, InputError, system_fault
-from bemt.base.tables import json_text, plain, remove_stale
+from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError, system_fault
+from bemt.base.tables import plain, remove_stale
 from bemt.base.toml import Collector
 from bemt.case import Case, check_name, find_cases, load_case, repeated_names
 from bemt.compare.grid.formats import FORMATS, require_extra
@@ -31,9 +29,8 @@ from bemt.compare.grid.run import Engine, run_grid
 from bemt.compare.sweep import store
 from bemt.compare.sweep.case import solve_case
 from bemt.compare.sweep.store import SCHEMA, fingerprint
-from bemt.compare.sweep.text import case_text, overview_text
 
-__all__ = ["SCHEMA", "fingerprint", "run", "sweep"]
+__all__ = ["SCHEMA", "fingerprint", "off_tolerance", "sweep"]
 
 Progress = Callable[[str], None]
 _NAME = re.compile(r"""^name\s*=\s*["']([^"']+)["']""", re.M)
@@ -339,7 +336,7 @@ def _unfit_names(cases: Mapping[int, Case], kept: bool) -> dict[int, Fault]:
     return ours | repeated_names(cases)
 
 
-def _off_tolerance(result: Mapping[str, Any], tolerance: float) -> list[str]:
+def off_tolerance(result: Mapping[str, Any], tolerance: float) -> list[str]:
     """Why a case fails under --strict."""
     reasons = []
     for row in result["rows"]:
@@ -352,47 +349,3 @@ def _off_tolerance(result: Mapping[str, Any], tolerance: float) -> list[str]:
     if grid and grid["unconverged"]:
         reasons.append(f"{result['name']}: {grid['unconverged']} of {grid['points']} grid points unconverged")
     return reasons
-
-
-def run(args: argparse.Namespace) -> int:
-    """Run the subcommand.
-
-    Parameters
-    ----------
-    args : argparse.Namespace
-        As :func:`bemt.commands.cli.build_parser` makes it.
-
-    Returns
-    -------
-    int
-        Exit code.
-    """
-    show = sys.stderr.isatty() and not args.quiet
-
-    def progress(line: str) -> None:
-        if show:
-            sys.stderr.write(f"\r\x1b[2K{line[:110]}")
-            sys.stderr.flush()
-
-    try:
-        document = sweep(args.paths, args.out, jobs=args.jobs, resume=not args.no_resume, progress=progress,
-                         engine=args.engine, scheduler=args.scheduler, grid_format=args.grid_format)  # fmt: skip
-    finally:
-        if show:
-            sys.stderr.write("\r\x1b[2K")
-    code = int(document["exit_code"])
-    for result in document["cases"]:
-        for fault in result["faults"]:
-            print(fault, file=sys.stderr)
-    if args.json:
-        sys.stdout.write(json_text(document))
-    elif not args.quiet:
-        solved = [case_text(result) for result in document["cases"]]
-        print("\n\n".join([*solved, overview_text(document["cases"])]))
-    if args.strict:
-        reasons = [line for r in document["cases"] if r["rows"] for line in _off_tolerance(r, args.tolerance)]
-        for line in reasons:
-            print(line, file=sys.stderr)
-        if reasons:
-            code = max(code, EXIT_UNCONVERGED)
-    return code

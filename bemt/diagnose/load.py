@@ -1,14 +1,11 @@
-"""``python -m bemt diagnose`` and ``python -m bemt plan``: files in, answer out."""
+"""Files and cases of a diagnosis: recordings of any format, as points of a case."""
 
 from __future__ import annotations
 
-import argparse
-import json
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +13,9 @@ from numpy.typing import NDArray
 from bemt import effects
 from bemt.air import Air
 from bemt.base.errors import Fault, InputError
-from bemt.base.tables import json_text, write_atomic
 from bemt.base.units import ZERO_CELSIUS
 from bemt.bem import evaluate
-from bemt.case import find_cases, load_case, repeated_names
+from bemt.case import find_cases, load_case
 from bemt.dataset import Dataset
 from bemt.diagnose import record as records
 from bemt.recordings.channels import view
@@ -31,7 +27,7 @@ if TYPE_CHECKING:
     from bemt.readers._imported import Imported
     from bemt.recordings.channels import Recorded
 
-__all__ = ["load", "run"]
+__all__ = ["cases_of", "load", "load_all"]
 
 Array = NDArray[np.float64]
 
@@ -149,159 +145,30 @@ def _points(imported: Imported, rows: Recorded, path: str) -> Dataset:
     return Dataset("bench", Path(path).name, values, told, imported.flags, {"file": path})
 
 
-def _progress(args: argparse.Namespace) -> Callable[[str], None] | None:
-    if args.quiet or args.json or not sys.stderr.isatty():
-        return None
-
-    def say(what: str) -> None:
-        print(f"\r\x1b[K{what} ...", end="", file=sys.stderr, flush=True)
-
-    return say
-
-
-def run(args: argparse.Namespace) -> int:
-    """Run ``diagnose`` or ``plan``.
-
-    Parameters
-    ----------
-    args : argparse.Namespace
-        Parsed command line.
-
-    Returns
-    -------
-    int
-        Exit code.
-    """
-    return _plan(args) if args.command == "plan" else _diagnose(args)
-
-
-def _diagnose(args: argparse.Namespace) -> int:
-    from bemt.diagnose.chain import diagnose
-    from bemt.diagnose.document import document, text
-
-    _told_twice(args)
-    cases = cases_of(args.case, args.off, len(args.recordings))
-    if args.out:
-        _refuse_foreign(Path(args.out), cases)
-    for case in cases:
+def load_all(
+    recordings: Sequence[str], cases: Sequence[str], references: Sequence[str] = (), off: Sequence[str] = (),
+    only: Sequence[str] = (), before: Callable[[Sequence[Case]], None] | None = None,
+) -> tuple[list[Case], list[Record]]:  # fmt: skip
+    """Cases and recordings, the references last; ``before`` may refuse the cases before any recording is read."""
+    _told_twice([*recordings, *references], only)
+    found = cases_of(cases, off, len(recordings))
+    if before:
+        before(found)
+    for case in found:
         evaluate.prepare(case, None, 10)  # an unknown effect in the case is said before the work begins
-    chosen = cases * len(args.recordings) if len(cases) == 1 else cases
-    loaded = [load(p, c) for p, c in zip(args.recordings, chosen, strict=True)]
-    if args.reference and len(cases) > 1:
-        raise InputError(Fault("--reference", "", f"{len(cases)} cases", "one case for all when there are references"))
-    loaded += [replace(load(p, cases[0]), reference=True) for p in args.reference]
-    say = _progress(args)
-    answer = diagnose(loaded, cases, args.only or None, say, baseline=args.baseline)
-    if say:
-        print("\r\x1b[K", end="", file=sys.stderr)
-    doc = document(answer) | {"recordings": list(args.recordings), "cases": [c.name for c in cases]}
-    rendered = json_text(doc)
-    if args.out:
-        out = Path(args.out)
-        out.mkdir(parents=True, exist_ok=True)
-        _forget(out, cases)
-        write_atomic(out / "diagnosis.json", rendered)
-        write_atomic(out / "diagnosis.txt", text(answer) + "\n")
-        _improved(out, answer, cases)
-        if not args.no_figures:
-            from bemt.diagnose import figures
-
-            figures.draw(answer, out)
-    if args.json:
-        print(rendered, end="")
-    elif not args.quiet:
-        print(text(answer))
-    return 0
+    chosen = found * len(recordings) if len(found) == 1 else found
+    loaded = [load(p, c) for p, c in zip(recordings, chosen, strict=True)]
+    if references and len(found) > 1:
+        raise InputError(Fault("--reference", "", f"{len(found)} cases", "one case for all when there are references"))
+    return found, [*loaded, *(replace(load(p, found[0]), reference=True) for p in references)]
 
 
-def _told_twice(args: argparse.Namespace) -> None:
+def _told_twice(paths: Sequence[str], only: Sequence[str]) -> None:
     """Refuse recordings that count twice and effects that nobody knows."""
-    files = [Path(p).resolve() for p in (*args.recordings, *args.reference)]
+    files = [Path(p).resolve() for p in paths]
     faults = [Fault(p, "", "a recording given twice", "each once", "Its points would count twice")
-              for k, p in enumerate((*args.recordings, *args.reference)) if files[k] in files[:k]]  # fmt: skip
+              for k, p in enumerate(paths) if files[k] in files[:k]]  # fmt: skip
     known = effects.catalogue()
-    faults += [Fault("--only", i, "an unknown effect", f"one of {', '.join(known)}") for i in args.only or ()
-               if i not in known]  # fmt: skip
+    faults += [Fault("--only", i, "an unknown effect", f"one of {', '.join(known)}") for i in only if i not in known]
     if faults:
         raise InputError(faults)
-
-
-def _targets(out: Path, cases: Sequence[Case]) -> dict[Path, Case]:
-    """Folder of the improved case of each case: that of the answer, or one by name in it where there are several."""
-    own = list({c.path.resolve(): c for c in cases}.values())
-    if len(own) == 1:
-        return {out: own[0]}
-    repeated = repeated_names(dict(enumerate(own)))
-    if repeated:
-        raise InputError(list(repeated.values()))
-    return {out / c.name: c for c in own}
-
-
-def _written(file: Path) -> bool:
-    """Whether a case file is an improved one."""
-    from bemt.diagnose.improve import is_improved
-
-    return file.is_file() and is_improved(file.read_text(encoding="utf-8", errors="replace"))
-
-
-def _refuse_foreign(out: Path, cases: Sequence[Case]) -> None:
-    """Let nobody lose files of their own: an improved case goes where only its like has been."""
-    from bemt.diagnose.improve import beside
-
-    given, lost = {c.path.resolve() for c in cases}, []
-    for folder, case in _targets(out, cases).items():
-        target = folder / "case.toml"
-        mine = _written(target)
-        if target.is_file() and (not mine or target.resolve() in given):
-            lost.append(target)
-        for file in () if mine else beside(case):
-            copy = folder / file.relative_to(case.folder)
-            if copy.is_file() and copy.read_bytes() != file.read_bytes():
-                lost.append(copy)
-    if lost:
-        raise InputError([Fault("--out", "", f"a folder with a file of its own, {p.as_posix()}", "a folder without one",
-                                "The improved case would replace it") for p in lost])  # fmt: skip
-
-
-def _forget(out: Path, cases: Sequence[Case]) -> None:
-    """Take away the improved cases of the answer that stands in a folder: the next one may have none, or others."""
-    try:
-        earlier = [str(name) for name in json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))["cases"]]
-    except (OSError, ValueError, KeyError, TypeError):
-        earlier = []
-    given = {c.path.resolve() for c in cases}
-    for folder in {out, *(out / name for name in earlier if Path(name).name == name != "..")}:
-        file = folder / "case.toml"
-        if _written(file) and file.resolve() not in given:
-            file.unlink()
-
-
-def _improved(out: Path, answer: Any, cases: Sequence[Case]) -> None:
-    """Save the cases with what was found on, cases that `sweep` runs."""
-    from bemt.diagnose.improve import beside, improved_case
-
-    for folder, case in _targets(out, cases).items():
-        document = improved_case(answer, case, case.path.read_text(encoding="utf-8-sig"))
-        if document:
-            for file in beside(case):  # stations, sections and recorded values lie beside the case, as before
-                write_atomic(folder / file.relative_to(case.folder), file.read_bytes())
-            write_atomic(folder / "case.toml", document)
-
-
-def _plan(args: argparse.Namespace) -> int:
-    from bemt.diagnose import plan
-
-    cases = cases_of([args.case], args.off, 1)
-    say = _progress(args)
-    answer = plan.plan(plan.points(args.plan, cases[0]), cases[0], say)
-    if say:
-        print("\r\x1b[K", end="", file=sys.stderr)
-    if args.json:
-        print(json_text(plan.document(answer)), end="")
-    elif not args.quiet:
-        print(plan.text(answer))
-    if args.out:
-        out = Path(args.out)
-        out.mkdir(parents=True, exist_ok=True)
-        write_atomic(out / "plan.json", json_text(plan.document(answer)))
-    return 0

@@ -1,4 +1,4 @@
-"""``python -m bemt validate DIR``: BEMT against a folder of measured propellers, statistics per propeller and over all.
+"""BEMT against a folder of measured propellers, statistics per propeller and over all.
 
 The folder is in the layout of the UIUC database (geometry, static and advance-ratio files).  Nothing is fitted:
 sections and transition come from the declared rule of :mod:`bemt.sections.rule`.
@@ -6,9 +6,7 @@ sections and transition come from the declared rule of :mod:`bemt.sections.rule`
 
 from __future__ import annotations
 
-import argparse
-import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +14,7 @@ import numpy as np
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.folders import find_data
+from bemt.base.tables import json_text, write_atomic
 from bemt.compare.validate.folder import read_folder
 from bemt.compare.validate.match import matched
 from bemt.compare.validate.points import J_SHARE, Array, Rows, compare, errors, statistics
@@ -55,8 +54,8 @@ class _Pool:
 
 
 def validate(
-    folder: Path, effects: Sequence[Effect] | None = None, fixed_re: float | None = None, progress: bool = False,
-    match_J0: bool = False,
+    folder: Path, effects: Sequence[Effect] | None = None, fixed_re: float | None = None,
+    progress: Callable[[str], None] | None = None, match_J0: bool = False,
 ) -> dict[str, Any]:  # fmt: skip
     """Compare a folder.
 
@@ -68,8 +67,8 @@ def validate(
         Physics that is on; default all.
     fixed_re : float, optional
         One Reynolds number for all section tables [1].
-    progress : bool
-        Show a counter on stderr.
+    progress : callable, optional
+        Takes a line on what is being done.
     match_J0 : bool
         Also solve each propeller with its blades turned to the measured zero-thrust advance ratio.  An experiment that
         uses the measurement: it tells an error of blade angle or camber from others, and is kept apart from the rest.
@@ -95,7 +94,7 @@ def validate(
     unconverged = 0
     for i, (p, stations) in enumerate(found.propellers):
         if progress:
-            print(f"\r{i + 1}/{len(found.propellers)} {p.name:<28}", end="", file=sys.stderr, flush=True)
+            progress(f"{i + 1}/{len(found.propellers)} {p.name}")
         points = compare(p, eff, fixed_re, stations)
         unconverged += int(np.count_nonzero(~np.isfinite(points.CT_bemt)))
         row: dict[str, Any] = {
@@ -108,8 +107,6 @@ def validate(
             row["matched_J0"] = None if fit is None else {"shift_deg": fit[0], **turned.add(fit[1])}
             shifts.extend([] if fit is None else [fit[0]])
         rows.append(row)
-    if progress:
-        print("\r" + " " * 48 + "\r", end="", file=sys.stderr, flush=True)
     j0 = np.array([r["J0_bemt"] / r["J0"] - 1.0 for r in rows if r["J0"] and r["J0_bemt"]])
     doc: dict[str, Any] = {"schema": SCHEMA, "folder": folder.name, "J_share": J_SHARE, **pool.total()}
     doc["zero_thrust_J"] = {"propellers": int(j0.size), **statistics(j0)}
@@ -132,41 +129,24 @@ def _number(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def run(args: argparse.Namespace) -> int:
-    """Command ``validate``.
-
-    Parameters
-    ----------
-    args : argparse.Namespace
-        dir, json, polar (Reynolds number or None), off (list of effect ids), match_J0, out.
-
-    Returns
-    -------
-    int
-        0, or 1 when points did not converge.
-
-    Raises
-    ------
-    InputError
-        For a bad folder or an unknown effect.
-    """
+def effects_without(off: Sequence[str]) -> tuple[Effect, ...]:
+    """Standard effects but those named, singly or with commas; unknown names are refused."""
     from bemt import effects as registry
-    from bemt.base.tables import json_text, write_atomic
 
-    off = [name for item in (args.off or []) for name in str(item).split(",") if name]
-    unknown = [name for name in off if name not in registry.catalogue()]
+    names = [name for item in off for name in str(item).split(",") if name]
+    unknown = [name for name in names if name not in registry.catalogue()]
     if unknown:
         known = ", ".join(registry.catalogue())
         raise InputError([Fault("--off", n, "an unknown effect", f"one of {known}", "") for n in unknown])
-    eff = registry.without(registry.standard(), off)
-    fixed = args.polar
-    folder = Path(args.dir) if Path(args.dir).exists() else find_data(args.dir) or Path(args.dir)
-    doc = validate(folder, eff, fixed, progress=sys.stderr.isatty(), match_J0=args.match_J0)
-    rendered = json_text(doc)  # an infinite error (not converged) becomes null: JSON has no infinity
-    if args.out:
-        folder = Path(args.out)
-        folder.mkdir(parents=True, exist_ok=True)
-        write_atomic(folder / "validation.json", rendered)
-        write_atomic(folder / "validation.txt", text(doc) + "\n")
-    print(rendered.rstrip() if args.json else text(doc))
-    return 1 if doc["unconverged"] else 0
+    return registry.without(registry.standard(), names)
+
+
+def where(name: str) -> Path:
+    """Folder as named, or that of the database of this name."""
+    return Path(name) if Path(name).exists() else find_data(name) or Path(name)
+
+
+def write(document: dict[str, Any], folder: str | Path) -> None:
+    """Write validation.json and validation.txt."""
+    write_atomic(Path(folder) / "validation.json", json_text(document))
+    write_atomic(Path(folder) / "validation.txt", text(document) + "\n")

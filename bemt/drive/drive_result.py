@@ -1,23 +1,23 @@
-"""``python -m bemt drive``: thrust over pulse width, hover, endurance and response of a case with its drive."""
+"""Thrust over pulse width, hover, endurance and response of a case with its drive: document, files, text."""
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
+from bemt.base.errors import Fault, InputError
 from bemt.base.tables import csv_text, json_text, number_text, text_table, write_atomic
 from bemt.case import load_case
 from bemt.case.schema import AIRSPEED
-from bemt.drive import drive_file, mission, outputs, picture, rotor_table, validate_command
+from bemt.drive import drive_file, mission, outputs, picture, rotor_table
 from bemt.drive.drive_model import EFFECTS, Drive, Steady
 
-__all__ = ["run"]
+__all__ = ["DriveResult", "solve", "text"]
 
 COLUMNS = {"pulse_us": "pulse [us]", "rpm": "rpm", "thrust_N": "T [N]", "battery_A": "I [A]", "voltage_V": "V [V]",
            "power_W": "P [W]", "efficiency": "eta"}  # fmt: skip
@@ -26,46 +26,44 @@ LOW, HIGH = 0.2, 0.8
 """Shares of full thrust of the step."""
 
 
-def run(args: argparse.Namespace) -> int:
-    """Run the command.
 
-    Parameters
-    ----------
-    args : argparse.Namespace
-        Of the command line: case, drive, off, airspeed, out, json.
 
-    Returns
-    -------
-    int
-        Exit code: 1 when the wanted hover or the airspeed is beyond the drive, or a point is unconverged.
+@dataclasses.dataclass(frozen=True)
+class DriveResult:
+    """What came out; ``reached`` is False when hover or airspeed is beyond the drive, or a point is unconverged."""
 
-    Raises
-    ------
-    InputError
-        With the faults of the options and of the case or, where that is right, of drive.toml.
-    """
-    if args.validate:
-        return validate_command.run(args)
-    if not args.case:
+    document: dict[str, Any]
+    steady: Steady
+    drive: Drive
+    file: drive_file.DriveFile
+    reached: bool
+
+
+def solve(
+    case_path: str | None, drive_path: str | None = None, off: Sequence[str] = (), airspeed: float = 0.0,
+    out: str | None = None,
+) -> DriveResult:  # fmt: skip
+    """Solve a case with its drive, ``bemt.drive.result/1``; faults of options, case and drive.toml come at once."""
+    if not case_path:
         raise InputError(Fault("", "CASE", "nothing", "a case file or its folder", "Or --validate DIR"))
-    wrong = [Fault("", "--off", repr(n), f"one of {', '.join(EFFECTS)}") for n in args.off if n not in EFFECTS]
-    if not AIRSPEED.low <= args.airspeed <= AIRSPEED.high:
-        hint = "" if not AIRSPEED.high < args.airspeed < 3.6 * AIRSPEED.high else "km/h? Divide by 3.6"
+    wrong = [Fault("", "--off", repr(n), f"one of {', '.join(EFFECTS)}") for n in off if n not in EFFECTS]
+    if not AIRSPEED.low <= airspeed <= AIRSPEED.high:
+        hint = "" if not AIRSPEED.high < airspeed < 3.6 * AIRSPEED.high else "km/h? Divide by 3.6"
         expected = f"a number from {AIRSPEED.low:g} to {AIRSPEED.high:g} m/s"
-        wrong.append(Fault("", "--airspeed", f"{args.airspeed:g}", expected, hint))
-    path = Path(args.case)
+        wrong.append(Fault("", "--airspeed", f"{airspeed:g}", expected, hint))
+    path = Path(case_path)
     path = path / "case.toml" if path.is_dir() else path
     try:  # what is wrong with the files comes with what is wrong with the options
         case = load_case(path)
-        file = drive_file.read(Path(args.drive) if args.drive else case.folder / "drive.toml")
+        file = drive_file.read(Path(drive_path) if drive_path else case.folder / "drive.toml")
     except InputError as error:
         raise InputError([*wrong, *error.faults]) from None
     if wrong:
         raise InputError(wrong)
-    if args.out:
-        outputs.check("--out", Path(args.out), RESULTS, [*case.files(), file.path])
-    rotor = rotor_table.from_case(case, 1.02 * file.rpm_max, args.airspeed, case.air(), file.rotor_inertia_kg_m2)
-    drive = file.drive(rotor).without(*args.off)
+    if out:
+        outputs.check("--out", Path(out), RESULTS, [*case.files(), file.path])
+    rotor = rotor_table.from_case(case, 1.02 * file.rpm_max, airspeed, case.air(), file.rotor_inertia_kg_m2)
+    drive = file.drive(rotor).without(*off)
     pulse = np.linspace(drive.esc.pulse_min_us, drive.esc.pulse_max_us, 21)
     steady = drive.steady(pulse, file.soc)
     steps, course = mission.response(drive, LOW, HIGH, file.soc)
@@ -73,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
     if course is None:
         full = float(steady.thrust_N[-1])
         got = f"full pulse width gives {full:.2f} N" if math.isfinite(full) else "the air turns it beyond its table"
-        notes.append(f"at {args.airspeed:g} m/s {got}: the drive does not hold this airspeed, no step")
+        notes.append(f"at {airspeed:g} m/s {got}: the drive does not hold this airspeed, no step")
     hover = duration = None
     if math.isfinite(file.mass_kg):
         hover = mission.hover(drive, file.mass_kg, file.rotors, file.soc)
@@ -81,15 +79,15 @@ def run(args: argparse.Namespace) -> int:
     full_pulse = drive.esc.pulse_max_us
     document: dict[str, Any] = {
         "schema": "bemt.drive.result/1", "case": case.name, "drive": file.path.as_posix(), "off": sorted(drive.off),
-        "airspeed_m_s": args.airspeed, "soc": file.soc,
+        "airspeed_m_s": airspeed, "soc": file.soc,
         "steady": {f.name: getattr(steady, f.name) for f in dataclasses.fields(Steady)},
         "full_thrust_settled_temperature_C": mission.settled_temperature(drive, full_pulse, file.soc),
         "hover": dataclasses.asdict(hover) if hover else None,
         "endurance_s": duration[0] if duration else None, "soc_end": duration[1] if duration else None,
         "response": [dataclasses.asdict(s) for s in steps], "assumed": dict(file.assumed), "notes": notes,
     }  # fmt: skip
-    if args.out:
-        folder = Path(args.out)
+    if out:
+        folder = Path(out)
         rows = [{k: float(getattr(steady, k)[i]) for k in COLUMNS} for i in range(len(pulse))]
         write_atomic(folder / RESULTS[0], json_text(document))
         write_atomic(folder / RESULTS[1], csv_text(list(COLUMNS), rows))
@@ -101,13 +99,14 @@ def run(args: argparse.Namespace) -> int:
             series = [("", course.time_s, course.thrust_N, "-")]
             panels.append({"x": "time [s]", "y": "thrust [N]", "series": series})
         write_atomic(folder / RESULTS[2], picture.curves(panels, case.name))
-    print(json_text(document) if args.json else _text(document, steady, drive, file) + "\n", end="")
     reached = hover is None or math.isfinite(hover.pulse_us)
     settled = bool(np.all(steady.converged)) and course is not None and course.converged
-    return EXIT_OK if reached and settled else EXIT_UNCONVERGED
+    return DriveResult(document, steady, drive, file, reached and settled)
 
 
-def _text(doc: dict[str, Any], steady: Steady, drive: Drive, file: drive_file.DriveFile) -> str:
+def text(result: DriveResult) -> str:
+    """Lay a result out for a terminal."""
+    doc, steady, drive, file = result.document, result.steady, result.drive, result.file
     rows = [[number_text(float(getattr(steady, k)[i])) for k in COLUMNS] for i in range(len(steady.rpm))]
     lines = [
         f"{doc['case']}: {file.path.as_posix()}, charge {file.soc:.0%}",
@@ -131,4 +130,4 @@ def _text(doc: dict[str, Any], steady: Steady, drive: Drive, file: drive_file.Dr
     for s in doc["response"]:
         lines.append(f"thrust {s['before_N']:.2f} to {s['after_N']:.2f} N: 63 % after {1e3 * s['time63_s']:.1f} ms")
     lines += [f"! assumed: {key}: {why}" for key, why in file.assumed.items()] + [f"! {note}" for note in doc["notes"]]
-    return "\n".join(lines)
+    return "\n".join(lines) + "\n"

@@ -1,16 +1,14 @@
-"""``python -m bemt export CASE --out DIR``: the solids of a case as STL, STEP, OBJ or OpenFOAM surfaces."""
+"""The solids of a case as STL, STEP, OBJ or OpenFOAM surfaces."""
 
 from __future__ import annotations
 
-import argparse
 import json
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from bemt.base.errors import EXIT_INPUT, EXIT_OK, Fault, InputError
-from bemt.base.tables import file_hash, json_text, number_text, text_table, write_atomic
+from bemt.base.errors import Fault, InputError
+from bemt.base.tables import file_hash, number_text, text_table, write_atomic
 from bemt.base.toml import shown
 from bemt.case import Case, find_cases, load_case, repeated_names
 from bemt.exports.openfoam.write import Run, check_run, settings_of, write_openfoam
@@ -18,12 +16,13 @@ from geometry.common import GeometryError
 from geometry.export import MANIFEST, SCHEMA, export
 from geometry.mesh import Options
 
-__all__ = ["export_case", "run"]
+__all__ = ["export_case", "export_cases", "text"]
 
 NAMES = {"rpm": "--rpm", "airspeed_m_s": "--airspeed", "sideslip_deg": "--sideslip-deg", "level": "--level",
          "domain": "--domain", "sector": "--sector", "turbulence": "--turbulence",
          "solver": "--compressible"}  # fmt: skip
 """Options that say what the OpenFOAM case is to compute."""
+
 
 
 def export_case(
@@ -112,57 +111,41 @@ def _remove(out: Path, files: Mapping[str, str]) -> None:
             folder.rmdir()
 
 
-def run(args: argparse.Namespace) -> int:
-    """Do what the command line asks.
+def export_cases(
+    path: str, out: str, formats: list[str], unit: str = "mm", fillet_mm: float = 0.0, min_thickness_mm: float = 0.0,
+    flow: Run | None = None,
+) -> tuple[list[tuple[dict[str, Any], Path]], list[InputError]]:  # fmt: skip
+    """Write the solids of a case, or of all cases of a folder, each into a folder of its own.
 
-    Parameters
-    ----------
-    args : argparse.Namespace
-        ``case``, ``out``, ``format``, ``unit``, ``json``, ``fillet_mm``, ``min_thickness_mm``; for OpenFOAM ``rpm``,
-        ``airspeed``, ``sideslip_deg``, ``level``, ``domain``, ``sector``, ``turbulence``, ``solver``.
-
-    Returns
-    -------
-    int
-        Exit code.
+    Returns manifests with their folders, and why others were refused. Faults of the options are raised before anything
+    is written.
     """
-    flow = Run(rpm=args.rpm, airspeed_m_s=args.airspeed, sideslip_deg=args.sideslip_deg, level=args.level,
-               domain=args.domain, sector=args.sector, turbulence=args.turbulence, solver=args.solver)  # fmt: skip
-    formats = args.format or ["stl"]
+    flow = flow or Run()
     faults = check_run(flow, NAMES) if "openfoam" in formats else _unused(flow)
     try:
-        options = Options(fillet=args.fillet_mm * 1e-3, min_thickness=args.min_thickness_mm * 1e-3)
+        options = Options(fillet=fillet_mm * 1e-3, min_thickness=min_thickness_mm * 1e-3)
     except GeometryError as error:
         faults += [Fault("", *fault) for fault in error.faults]
     if faults:
         raise InputError(faults)
-    paths = find_cases([args.case])
-    cases, code = [], EXIT_OK
-    for path in paths:
+    paths = find_cases([path])
+    cases, refused, made = [], [], []
+    for file in paths:
         try:
-            cases.append(load_case(path))
+            cases.append(load_case(file))
         except InputError as error:
-            print(error, file=sys.stderr)
-            code = EXIT_INPUT
+            refused.append(error)
     if len(paths) > 1:
         repeated = repeated_names(dict(enumerate(cases)))
         if repeated:  # they would write into one folder
             raise InputError(list(repeated.values()))
-    manifests = []
     for case in cases:
-        out = Path(args.out) / case.name if len(paths) > 1 else Path(args.out)
+        folder = Path(out) / case.name if len(paths) > 1 else Path(out)
         try:
-            manifest = export_case(case, out, formats, args.unit, options, flow)
+            made.append((export_case(case, folder, formats, unit, options, flow), folder))
         except InputError as error:
-            print(error, file=sys.stderr)
-            code = EXIT_INPUT
-            continue
-        manifests.append(manifest)
-        if not args.json:
-            print(_text(manifest, out))
-    if args.json:
-        print(json_text({"schema": "bemt.export/1", "cases": manifests}), end="")
-    return code
+            refused.append(error)
+    return made, refused
 
 
 def _unused(flow: Run) -> list[Fault]:
@@ -176,7 +159,8 @@ def _unused(flow: Run) -> list[Fault]:
     return faults
 
 
-def _text(manifest: dict[str, Any], out: Path) -> str:
+def text(manifest: dict[str, Any], out: Path) -> str:
+    """Lay a manifest out for a terminal."""
     rows = [[item["path"], item["format"], item["unit"], f"{item['bytes'] / 1e6:.2f}",
              ", ".join(s["name"] for s in item["surfaces"]), item["sha256"][:12]] for item in manifest["files"]]  # fmt: skip  # noqa: E501
     volumes, checks = manifest["volumes_m3"], manifest["checks_m"]

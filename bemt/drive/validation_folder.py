@@ -1,4 +1,4 @@
-"""``python -m bemt drive --validate DIR``: the drive model against thrust maps and step logs of public stands.
+"""The drive model against thrust maps and step logs of public stands.
 
 DIR holds the folders ``jmajew``, ``thrust_map``, ``thrust_step``, ``mit_copter_rcbenchmark`` as their publishers laid
 them out (see README, Data). What a data sheet gives stays: K_v and I_0 of the MN2206 come from its run without
@@ -7,7 +7,6 @@ propeller. No data sheet of the other motors is known; there K_v and I_0 are fit
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 from pathlib import Path
 from typing import Any
@@ -16,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import readers as importers
-from bemt.base.errors import EXIT_OK, Fault, InputError
+from bemt.base.errors import Fault, InputError
 from bemt.base.tables import json_text, number_text, text_table, write_atomic
 from bemt.drive import identify, map_points, picture, validation
 from bemt.drive.drive_model import Drive
 from bemt.drive.map_points import MapPoints
 
-__all__ = ["maps", "run", "steps"]
+__all__ = ["compare", "maps", "steps"]
 
 Array = NDArray[np.float64]
 KGF = 9.80665
@@ -150,25 +149,16 @@ def steps(folder: Path) -> tuple[list[validation.StepCheck], Drive]:
     return validation.check_steps(VOLTS, levels, found)
 
 
-def run(args: argparse.Namespace) -> int:
-    """Run the validation.
 
-    Parameters
-    ----------
-    args : argparse.Namespace
-        Of the command line: validate, out, json.
 
-    Returns
-    -------
-    int
-        Exit code.
+def _sorted(x: Array, y: Array) -> tuple[Array, Array]:
+    order = np.argsort(x)
+    return x[order], y[order]
 
-    Raises
-    ------
-    InputError
-        When the folder holds none of the recordings.
-    """
-    folder = Path(args.validate)
+
+def compare(path: str, out: str | None = None) -> tuple[dict[str, Any], str]:
+    """Compare with all recordings of a folder: ``bemt.drive.validation/1``, and its text."""
+    folder = Path(path)
     found = maps(folder)
     checks, drive = steps(folder) if (folder / "thrust_step").is_dir() else ([], None)
     if not found and not checks:
@@ -190,10 +180,10 @@ def run(args: argparse.Namespace) -> int:
     if checks:
         lines += ["", text_table(head, rows, left=(0,)), f"samples every {1e3 * checks[0].sample_s:.0f} ms"]
     text = "\n".join(lines) + "\n"
-    if args.out:
-        out = Path(args.out)
-        write_atomic(out / "validation.json", json_text(document))
-        write_atomic(out / "validation.txt", text)
+    if out:
+        results = Path(out)
+        write_atomic(results / "validation.json", json_text(document))
+        write_atomic(results / "validation.txt", text)
         wanted = ("jmajew gemfan", "jmajew hqprop6x4x3", "xNova ramp", "MIT 10", "MIT 14")
         shown = [m for name in wanted for m in found if m.name.startswith(name)]
         panels = [
@@ -205,11 +195,5 @@ def run(args: argparse.Namespace) -> int:
             }
             for m in shown
         ]
-        write_atomic(out / "maps.png", picture.curves(panels))
-    print(json_text(document) if args.json else text, end="")
-    return EXIT_OK
-
-
-def _sorted(x: Array, y: Array) -> tuple[Array, Array]:
-    order = np.argsort(x)
-    return x[order], y[order]
+        write_atomic(results / "maps.png", picture.curves(panels))
+    return document, text

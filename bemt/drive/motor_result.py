@@ -1,100 +1,58 @@
-"""``python -m bemt motor``: the torque constant by three methods, whether they agree, and why not."""
+"""The torque constant by three methods, whether they agree, and why not."""
 
 from __future__ import annotations
 
-import argparse
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
+from bemt.base.errors import Fault, InputError
 from bemt.base.tables import csv_text, json_text, number_text, text_table, write_atomic
 from bemt.drive import motor_errors, motor_file, motor_generate, outputs, picture
 from bemt.drive.motor_constant import Line
 
-__all__ = ["document", "run", "verdict_text"]
+__all__ = ["check_options", "document", "generate", "generated_text", "judge", "text", "verdict_text"]
 
 Array = NDArray[np.float64]
 RESULTS = ("motor.json", "trials.csv", "motor.png")
 TITLES = {"data_sheet": "data sheet", "back_emf": "back-EMF", "torque": "torque sensor"}
 
 
-def run(args: argparse.Namespace) -> int:
-    """Run the command.
-
-    Parameters
-    ----------
-    args : argparse.Namespace
-        Of the command line: file, generate, seed, plant, out, json.
-
-    Returns
-    -------
-    int
-        Exit code: 1 when the methods disagree.
-
-    Raises
-    ------
-    InputError
-        With the faults of the options, of motor.toml and its recordings; for results that would replace what is read,
-        or generated trials what was measured. Nothing is written then.
-    """
-    _check_options(args)
-    if args.generate:
-        made_up = _generate(args)
-        if not args.file:
-            said = f"generated trials (seed {made_up['seed']}); now: python -m bemt motor {made_up['folder']}\n"
-            print(json_text(made_up) if args.json else said, end="")
-            return EXIT_OK
-    trials = motor_file.read(args.file)
-    if args.out:
-        outputs.check("--out", Path(args.out), RESULTS, trials.files)
-    verdict = motor_errors.judge(trials.measured)
-    made = document(trials, verdict)
-    values = {TITLES[m["method"]]: np.array(m["trials"] or [m["mean"]]) for m in made["methods"]}
-    if args.out:
-        folder = Path(args.out)
-        write_atomic(folder / "motor.json", json_text(made))
-        rows = [{"method": m["method"], "trial": t, "Kt_Nm_A": v} for m in made["methods"]
-                for t, v in enumerate(m["trials"] or [m["mean"]], 1)]  # fmt: skip
-        write_atomic(folder / "trials.csv", csv_text(["method", "trial", "Kt_Nm_A"], rows))
-        title = f"{trials.name}: {trials.data}" if trials.data else trials.name
-        png = picture.box_plot(values, trials.stated, "torque constant [N m/A]", title)
-        write_atomic(folder / "motor.png", png)
-    if args.json:
-        print(json_text(made), end="")
-    else:
-        print(_text(trials, made))
-    return EXIT_OK if verdict.agree else EXIT_UNCONVERGED
 
 
-def _check_options(args: argparse.Namespace) -> None:
+def check_options(
+    file: str | None, generate: str | None, seed: int | None, plant: Sequence[str], out: str | None
+) -> None:
     """Refuse options that would be ignored, all at once."""
     faults = []
-    if not args.generate:
-        given = [("--plant", " ".join(args.plant)), ("--seed", args.seed)]
+    if not generate:
+        given = [("--plant", " ".join(plant)), ("--seed", seed)]
         told = [(name, value) for name, value in given if value not in (None, "")]
         faults = [Fault("", name, str(value), "none without --generate DIR") for name, value in told]
-        if not args.file:
+        if not file:
             hint = "Or --generate DIR for an example"
             faults.append(Fault("", "FILE", "nothing", "motor.toml or its folder", hint))
-    elif args.out and not args.file:
+    elif out and not file:
         hint = "Name the generated folder as FILE too, to judge it at once"
-        faults.append(Fault("", "--out", args.out, "none with --generate DIR alone, which only writes to DIR", hint))
+        faults.append(Fault("", "--out", out, "none with --generate DIR alone, which only writes to DIR", hint))
     if faults:
         raise InputError(faults)
 
 
-def _generate(args: argparse.Namespace) -> dict[str, Any]:
+def generate(
+    target: str, seed: int | None, plant: Sequence[str], file: str | None = None, out: str | None = None
+) -> dict[str, Any]:
     """Write generated trials, over nothing but other generated ones."""
-    folder, seed = Path(args.generate), args.seed or 0
+    folder, seed = Path(target), seed or 0
     faults: list[Fault] = []
     planted: dict[str, float] = {}
     texts: dict[str, str] = {}
     try:
-        planted = motor_generate.plants(args.plant)
+        planted = motor_generate.plants(list(plant))
     except InputError as error:
         faults += error.faults
     try:
@@ -102,19 +60,19 @@ def _generate(args: argparse.Namespace) -> dict[str, Any]:
     except InputError as error:
         faults += error.faults
     inputs: tuple[Path, ...] = ()
-    if args.file and Path(args.file).resolve() not in (folder.resolve(), (folder / "motor.toml").resolve()):
-        inputs = motor_file.read(args.file).files  # before writing: its faults leave nothing behind
+    if file and Path(file).resolve() not in (folder.resolve(), (folder / "motor.toml").resolve()):
+        inputs = motor_file.read(file).files  # before writing: its faults leave nothing behind
     faults += outputs.faults("--generate", folder, texts, inputs)
-    if args.out:
-        faults += outputs.faults("--out", Path(args.out), RESULTS, [*inputs, *(folder / name for name in texts)])
+    if out:
+        faults += outputs.faults("--out", Path(out), RESULTS, [*inputs, *(folder / name for name in texts)])
     hint = "Name another folder: what was measured is not replaced by invented numbers"
     for name in texts:
         if (folder / name).exists() and not _generated(folder / name):
             faults.append(Fault((folder / name).as_posix(), "", "a file that was not generated", "none, or one", hint))
     if faults:
         raise InputError(faults)
-    for name, text in texts.items():
-        write_atomic(folder / name, text)
+    for name, content in texts.items():
+        write_atomic(folder / name, content)
     return {"schema": "bemt.motor.generated/1", "folder": folder.as_posix(), "files": list(texts), "seed": seed,
             "planted": planted}  # fmt: skip
 
@@ -222,7 +180,8 @@ def verdict_text(made: dict[str, Any]) -> list[str]:
     return lines
 
 
-def _text(trials: motor_file.MotorTrials, made: dict[str, Any]) -> str:
+def text(trials: motor_file.MotorTrials, made: dict[str, Any]) -> str:
+    """Lay the results out for a terminal."""
     rows = []
     for m in made["methods"]:
         low, high = m["interval95"]
@@ -237,4 +196,28 @@ def _text(trials: motor_file.MotorTrials, made: dict[str, Any]) -> str:
     lines += verdict_text(made)
     if made["Kt"] is not None:
         lines.append(f"K_t = {made['Kt']:.5f} ± {1.96 * made['u_Kt']:.2g} N m/A (95 %)")
-    return "\n".join(lines + [f"! {note}" for note in made["notes"]])
+    return "\n".join(lines + [f"! {note}" for note in made["notes"]]) + "\n"
+
+
+def generated_text(made: dict[str, Any]) -> str:
+    """Say what was generated and how to go on."""
+    return f"generated trials (seed {made['seed']}); now: python -m bemt motor {made['folder']}\n"
+
+
+def judge(file: str, out: str | None = None) -> tuple[motor_file.MotorTrials, dict[str, Any]]:
+    """Read trials and judge them: what was read, and ``bemt.motor.result/1``; written where told, over no input."""
+    trials = motor_file.read(file)
+    if out:
+        outputs.check("--out", Path(out), RESULTS, trials.files)
+    made = document(trials, motor_errors.judge(trials.measured))
+    if out:
+        folder = Path(out)
+        write_atomic(folder / "motor.json", json_text(made))
+        rows = [{"method": m["method"], "trial": t, "Kt_Nm_A": v} for m in made["methods"]
+                for t, v in enumerate(m["trials"] or [m["mean"]], 1)]  # fmt: skip
+        write_atomic(folder / "trials.csv", csv_text(["method", "trial", "Kt_Nm_A"], rows))
+        title = f"{trials.name}: {trials.data}" if trials.data else trials.name
+        values = {TITLES[m["method"]]: np.array(m["trials"] or [m["mean"]]) for m in made["methods"]}
+        png = picture.box_plot(values, trials.stated, "torque constant [N m/A]", title)
+        write_atomic(folder / "motor.png", png)
+    return trials, made

@@ -1,19 +1,19 @@
-"""``python -m bemt cfd CAMPAIGN.toml``: run a list of CFD cases, resume where it stopped, record what came out."""
+"""Run a list of CFD cases, resume where it stopped, record what came out."""
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import os
 import shutil
 import signal
 import sys
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bemt.base.errors import EXIT_INPUT, EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
-from bemt.base.tables import json_text, number_text, remove_stale, text_table
+from bemt.base.errors import Fault, InputError
+from bemt.base.tables import number_text, remove_stale, text_table
 from bemt.cfd.record import CampaignRecord
 from bemt.cfd.schema import Campaign, load_campaign
 from bemt.cfd.worker import Worker, point_key
@@ -21,11 +21,12 @@ from bemt.cfd.worker import Worker, point_key
 if TYPE_CHECKING:
     from bemt.exports.openfoam import Settings
 
-__all__ = ["run", "run_campaign"]
+__all__ = ["document", "is_folder_of_campaigns", "run", "run_campaign", "text"]
 
 
 def run_campaign(
-    campaign: Campaign, work: Path, only: int | None = None, ranks: int = 2, quiet: bool = False, keep: bool = True
+    campaign: Campaign, work: Path, only: int | None = None, ranks: int = 2,
+    tell: Callable[[str], None] | None = None, keep: bool = True,
 ) -> CampaignRecord:
     """Run the points of a campaign that are not recorded yet.
 
@@ -39,8 +40,8 @@ def run_campaign(
         Run this point alone, counted from 1, even if it is recorded.
     ranks : int
         Processes of a run.
-    quiet : bool
-        No progress.
+    tell : callable, optional
+        Takes lines of progress.
     keep : bool
         Leave the folders of grids and runs in `work`. Else those that this campaign made there (now, with `only`, or
         before it was stopped) go at the end, and `work` with them when it was made here and nothing else is in it;
@@ -79,25 +80,22 @@ def run_campaign(
     fresh = not work.exists()
     work.mkdir(parents=True, exist_ok=True)
 
-    def tell(text: str) -> None:
-        if not quiet:
-            print(text, file=sys.stderr, flush=True)
-
+    say = tell or (lambda line: None)
     worker = Worker(work, ranks, keep)
     for k, (point, key) in enumerate(zip(campaign.points, keys, strict=True), 1):
         if (only is not None and k != only) or (only is None and key[0] in record.done):
             continue
         said = ", ".join(f"{name} {value}" for name, value in point.values.items()
                          if name not in ("iterations", "average", "start"))  # fmt: skip
-        tell(f"{campaign.name} {k}/{len(campaign.points)}: {said}")
+        say(f"{campaign.name} {k}/{len(campaign.points)}: {said}")
         outcome = worker.run(point, key)
         record.add(outcome, order)
         v = outcome.values
         state = "" if v["converged"] else f"  NOT CONVERGED {v['note']}"
-        tell(f"  T {number_text(v['thrust_N'])} N, Q {number_text(v['torque_Nm'])} N m, {v['cells']} cells, "
+        say(f"  T {number_text(v['thrust_N'])} N, Q {number_text(v['torque_Nm'])} N m, {v['cells']} cells, "
              f"{v['seconds']:.0f} s{state}")  # fmt: skip
         if not v["iterations"]:
-            tell(f"  nothing was computed: it will be tried again; logs below {work}")
+            say(f"  nothing was computed: it will be tried again; logs below {work}")
     record.write(order)
     if not keep and only is None:  # a single point is tried again and again: its grid waits for the whole campaign
         worker.clear([key[:2] for key in keys])
@@ -112,7 +110,8 @@ def _remove_empty(folder: Path) -> None:
         folder.rmdir()
 
 
-def _table(record: CampaignRecord) -> str:
+def text(record: CampaignRecord) -> str:
+    """Lay a record out for a terminal."""
     head = ["run", "rpm", "V [m/s]", "T [N]", "u [N]", "Q [N m]", "solver", "level", "cells", "drift T [%]", "y+", "s"]
     rows = []
     for r in record.rows:
@@ -121,51 +120,36 @@ def _table(record: CampaignRecord) -> str:
                      number_text(r["u_thrust_N"], 2), number_text(r["torque_Nm"]), r["solver"], number_text(r["level"]),
                      f"{r['cells']:.0f}", number_text(drift, 2), number_text(r["yplus_avg"], 3),
                      number_text(r["seconds"], 3)])  # fmt: skip
-    return text_table(head, rows, left=(0, 6))
+    return f"{record.campaign.name}: {record.campaign.title}\n{text_table(head, rows, left=(0, 6))}"
 
 
-def run(args: argparse.Namespace) -> int:
-    """Do what the command line asks.
+def document(record: CampaignRecord) -> dict[str, Any]:
+    """Give a record as ``bemt.cfd-run/1``."""
+    return {"schema": "bemt.cfd-run/1", "campaign": record.campaign.name, "rows": record.rows}
 
-    Parameters
-    ----------
-    args : argparse.Namespace
-        ``campaign``, ``only``, ``ranks``, ``work``, ``keep``, ``json``, ``quiet``.
 
-    Returns
-    -------
-    int
-        1 when a point did not converge.
+def is_folder_of_campaigns(path: str | Path) -> bool:
+    """Whether a path is a folder without a campaign of its own: its campaigns are summed up, nothing runs."""
+    return Path(path).is_dir() and not (Path(path) / "campaign.toml").is_file()
 
-    Notes
-    -----
-    A folder of campaigns is summed up beside BEMT; nothing runs.
-    """
-    folder = Path(args.campaign)
-    if folder.is_dir() and not (folder / "campaign.toml").is_file():
-        from bemt.cfd.summary import summary, summary_text
 
-        found = summary(folder)
-        print(json_text(found) if args.json else summary_text(found), end="")
-        return EXIT_OK
-    campaign = load_campaign(args.campaign)
+def run(
+    path: str, only: int | None = None, ranks: int = 2, work: str | None = None, keep: bool = False,
+    tell: Callable[[str], None] | None = None,
+) -> CampaignRecord:  # fmt: skip
+    """Read a campaign and run it in a folder that goes afterwards unless it is named or kept."""
+    campaign = load_campaign(path)
     for program in ("blockMesh", "snappyHexMesh", "simpleFoam"):
         if shutil.which(program) is None:
-            fault = Fault("", "", f"no program {program}", "OpenFOAM", "Debian and Ubuntu: the package openfoam")
-            print(InputError(fault), file=sys.stderr)
-            return EXIT_INPUT
-    named = args.work or os.environ.get("BEMT_CFD_WORK")
-    work = Path(named) if named else Path(tempfile.gettempdir()) / f"bemt-cfd-{campaign.name}"
+            hint = "Debian and Ubuntu: the package openfoam"
+            raise InputError(Fault("", "", f"no program {program}", "OpenFOAM", hint))
+    named = work or os.environ.get("BEMT_CFD_WORK")
+    folder = Path(named) if named else Path(tempfile.gettempdir()) / f"bemt-cfd-{campaign.name}"
     before = signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))  # so that the solver ends with us
     try:
-        record = run_campaign(campaign, work, args.only, args.ranks, args.quiet, args.keep)
+        record = run_campaign(campaign, folder, only, ranks, tell, keep)
     finally:
         signal.signal(signal.SIGTERM, before)
-    if not named and not args.keep:
-        _remove_empty(work)  # made by us, now or before we were stopped
-    if args.json:
-        document: dict[str, Any] = {"schema": "bemt.cfd-run/1", "campaign": campaign.name, "rows": record.rows}
-        print(json_text(document), end="")
-    elif not args.quiet:
-        print(f"{campaign.name}: {campaign.title}\n{_table(record)}")
-    return EXIT_OK if all(row["converged"] == 1 for row in record.rows) else EXIT_UNCONVERGED
+    if not named and not keep:
+        _remove_empty(folder)  # made by us, now or before we were stopped
+    return record

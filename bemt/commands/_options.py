@@ -1,0 +1,50 @@
+"""Options that several subcommands share, and their types."""
+
+from __future__ import annotations
+
+import argparse
+from contextlib import suppress
+from typing import Any
+
+# Options of several words: `--case A B` and `--case A --case B` are the same, none is dropped without a word.
+MANY: dict[str, Any] = {"action": "extend", "nargs": "+"}
+REPEATABLE: dict[str, Any] = {"action": "append", "default": []}
+
+
+def not_negative(text: str) -> float:
+    """Finite number of 0 or more."""
+    with suppress(ValueError):
+        if 0.0 <= float(text) < float("inf"):
+            return float(text)
+    raise argparse.ArgumentTypeError(f"got {text}; expected a finite number of 0 or more")
+
+
+def seed(text: str) -> int:
+    """Whole number of 0 or more."""
+    with suppress(ValueError):
+        if int(text) >= 0:
+            return int(text)
+    raise argparse.ArgumentTypeError(f"got {text}; expected a whole number of 0 or more")
+
+
+def positive(text: str) -> int:
+    """Whole number of 1 or more."""
+    with suppress(ValueError):
+        if int(text) >= 1:
+            return int(text)
+    raise argparse.ArgumentTypeError(f"got {text}; expected a whole number of 1 or more")
+
+
+def add_json(parser: Any, schema: str) -> None:
+    """Add ``--json``, which prints one document."""
+    parser.add_argument("--json", action="store_true", help=f"print one JSON document ({schema})")
+
+
+def add_quiet(parser: argparse.ArgumentParser, what: str = "neither progress nor tables") -> None:
+    """Add ``--quiet``."""
+    parser.add_argument("--quiet", action="store_true", help=f"print {what}")
+
+
+def add_cases(parser: argparse.ArgumentParser) -> None:
+    """Add the cases to solve."""
+    parser.add_argument("paths", nargs="+", metavar="CASES", help="case files, or folders of <name>/case.toml")

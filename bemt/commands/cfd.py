@@ -1,0 +1,47 @@
+"""``python -m bemt cfd CAMPAIGN.toml``: run a list of CFD cases, resume where it stopped, record what came out."""
+
+from __future__ import annotations
+
+import argparse
+
+from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
+from bemt.commands import _options, _terminal
+
+NAME = "cfd"
+HELP = "run a campaign of OpenFOAM cases and record what comes out"
+GROUP = "Solids and CFD"
+EXAMPLE = "cfd campaign.toml --ranks 4"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    plans = "campaign.toml or its folder; a folder of campaigns is summed up"
+    parser.add_argument("campaign", metavar="CAMPAIGN", help=plans)
+    only = "run point N alone, even if it is recorded"
+    parser.add_argument("--only", type=_options.positive, metavar="N", help=only)
+    ranks = "processes of a run (default 2)"
+    parser.add_argument("--ranks", type=_options.positive, default=2, metavar="N", help=ranks)
+    parser.add_argument("--work", metavar="DIR", help="folder of grids and runs (default: a temporary one)")
+    parser.add_argument("--keep", action="store_true", help="keep the work folder")
+    _options.add_json(parser, "bemt.cfd-run/1; of a folder of campaigns bemt.cfd-summary/1")
+    _options.add_quiet(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run what is not recorded yet, or sum a folder of campaigns up; 1 when a point did not converge."""
+    from bemt.base.tables import json_text
+    from bemt.cfd import campaign as campaigns
+
+    if campaigns.is_folder_of_campaigns(args.campaign):
+        from bemt.cfd.summary import summary, summary_text
+
+        found = summary(args.campaign)
+        print(json_text(found) if args.json else summary_text(found), end="")
+        return EXIT_OK
+    record = campaigns.run(args.campaign, args.only, args.ranks, args.work, args.keep,
+                           None if args.quiet else _terminal.complain)  # fmt: skip
+    if args.json:
+        print(json_text(campaigns.document(record)), end="")
+    elif not args.quiet:
+        print(campaigns.text(record))
+    return EXIT_OK if all(row["converged"] == 1 for row in record.rows) else EXIT_UNCONVERGED

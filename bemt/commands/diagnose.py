@@ -1,0 +1,54 @@
+"""``python -m bemt diagnose``: recording and case in, the physics that was left out."""
+
+from __future__ import annotations
+
+import argparse
+
+from bemt.base.errors import EXIT_OK
+from bemt.commands import _options, _terminal
+
+NAME = "diagnose"
+HELP = "say what physics was left out when recording and simulation differ"
+GROUP = "Recordings"
+EXAMPLE = "diagnose log.csv --case cases/prop_8x5"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument("recordings", nargs="+", metavar="RECORDING", help="tables or logs, analysed together")
+    case = "case of all recordings, or one each"
+    parser.add_argument("--case", required=True, metavar="CASE", help=case, **_options.MANY)
+    off = "leave out of the baseline; repeatable"
+    parser.add_argument("--off", metavar="EFFECT", help=off, **_options.REPEATABLE)
+    known = "recordings without the cause: how far model and stand differ anyway"
+    parser.add_argument("--reference", default=[], metavar="RECORDING", help=known, **_options.MANY)
+    model = "model that is compared with the recordings (default bemt; k1k2: thrust only)"
+    parser.add_argument("--baseline", choices=("bemt", "k1k2"), default="bemt", help=model)
+    only = "consider these effects only (default: all)"
+    parser.add_argument("--only", metavar="EFFECT", help=only, **_options.MANY)
+    parser.add_argument("--out", metavar="DIR", help="write diagnosis.json, figures and the improved cases there")
+    parser.add_argument("--no-figures", action="store_true", help="with --out: no figures")
+    _options.add_json(parser, "bemt.diagnosis/1")
+    _options.add_quiet(parser, "neither progress nor answer")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Diagnose, write, print."""
+    from bemt.base.tables import json_text
+    from bemt.diagnose import folder
+    from bemt.diagnose.chain import diagnose
+    from bemt.diagnose.document import document, text
+    from bemt.diagnose.load import load_all
+
+    cases, recordings = load_all(args.recordings, args.case, args.reference, args.off, args.only or (),
+                                 before=lambda found: folder.check(args.out, found))  # fmt: skip
+    with _terminal.progress(args.quiet or args.json) as say:
+        answer = diagnose(recordings, cases, args.only or None, say, baseline=args.baseline)
+    found = document(answer) | {"recordings": list(args.recordings), "cases": [c.name for c in cases]}
+    if args.out:
+        folder.write(args.out, answer, found, cases, figures=not args.no_figures)
+    if args.json:
+        print(json_text(found), end="")
+    elif not args.quiet:
+        print(text(answer))
+    return EXIT_OK

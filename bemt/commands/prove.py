@@ -1,0 +1,41 @@
+"""``python -m bemt prove``: conceal causes, seal the key, let the diagnosis run on its own, open the key, score."""
+
+from __future__ import annotations
+
+import argparse
+
+from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
+from bemt.commands import _options, _terminal
+
+NAME = "prove"
+HELP = "conceal causes, let the diagnosis find them, score it"
+GROUP = "Models and checks"
+EXAMPLE = "prove --seed 1"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    size = "41 or 605 made cases (default small), 68 made by CCBlade (extra wisdem), published recordings as found"
+    parser.add_argument("--size", choices=("small", "full", "ccblade", "real"), default="small", help=size)
+    seed = "of everything (default: from the operating system)"
+    parser.add_argument("--seed", type=_options.seed, metavar="N", help=seed)
+    parser.add_argument("--out", metavar="DIR", help="keep items, key, answers and score there")
+    jobs = "diagnoses at a time (default: one per core)"
+    parser.add_argument("--jobs", type=_options.positive, metavar="N", help=jobs)
+    _options.add_json(parser, "bemt.proof/1")
+    _options.add_quiet(parser, "no tables")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Conceal, diagnose, score; 0 when every target is met, 1 when some are missed."""
+    from bemt.base.tables import json_text
+    from bemt.proof import proof_text
+    from bemt.proof.prove import prove
+
+    with _terminal.progress() as say:
+        found = prove(args.out, args.size, args.seed, args.jobs, say, _terminal.complain)
+    if args.json:
+        print(json_text(found), end="")
+    elif not args.quiet:
+        print(proof_text.text(found))
+    return EXIT_OK if all(row["met"] is not False for row in found["score"]) else EXIT_UNCONVERGED

@@ -1,0 +1,61 @@
+"""``python -m bemt sweep``: solve cases and print them beside their recorded values."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from bemt.base.errors import EXIT_UNCONVERGED
+from bemt.commands import _options, _terminal
+
+NAME = "sweep"
+HELP = "solve cases and print them beside their recorded values"
+GROUP = "Propellers and fans"
+EXAMPLE = "sweep cases/"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    _options.add_cases(parser)
+    parser.add_argument("--out", metavar="DIR", help="write tables, grids and sweep.json there, and resume from there")
+    parser.add_argument("--json", action="store_true", help="print one JSON document (bemt.sweep/1), no tables")
+    jobs = "solve N cases at a time in processes (default: one case, its grid on all cores); dask: N local workers"
+    parser.add_argument("--jobs", type=_options.positive, metavar="N", help=jobs)
+    _options.add_quiet(parser)
+    strict = "exit 1 when a point is unconverged or BEMT is off a reference by more than --tolerance"
+    parser.add_argument("--strict", action="store_true", help=strict)
+    tolerance = "tolerance of --strict on thrust, %% of the reference (default 15)"
+    parser.add_argument("--tolerance", type=_options.not_negative, default=15.0, metavar="PCT", help=tolerance)
+    parser.add_argument("--no-resume", action="store_true", help="do not reuse results found in --out")
+    engine = "where grids are solved: this machine, or a Dask cluster (default local); the answer is the same"
+    parser.add_argument("--engine", choices=("local", "dask"), default="local", help=engine)
+    address = "with --engine dask: an existing cluster, as in tcp://host:8786 (default: processes of this machine)"
+    parser.add_argument("--scheduler", metavar="ADDRESS", help=address)
+    form = "csv with 7 digits (default), or parquet with all"
+    parser.add_argument("--grid-format", choices=("csv", "parquet"), default="csv", help=form)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Solve, print, and with ``--strict`` hold BEMT against the recorded values."""
+    from bemt.base.tables import json_text
+    from bemt.compare.sweep.batch import off_tolerance, sweep
+    from bemt.compare.sweep.text import case_text, overview_text
+
+    with _terminal.progress(args.quiet) as say:
+        document = sweep(args.paths, args.out, jobs=args.jobs, resume=not args.no_resume, progress=say,
+                         engine=args.engine, scheduler=args.scheduler, grid_format=args.grid_format)  # fmt: skip
+    code = int(document["exit_code"])
+    for result in document["cases"]:
+        for fault in result["faults"]:
+            _terminal.complain(fault)
+    if args.json:
+        sys.stdout.write(json_text(document))
+    elif not args.quiet:
+        solved = [case_text(result) for result in document["cases"]]
+        print("\n\n".join([*solved, overview_text(document["cases"])]))
+    if args.strict:
+        reasons = [line for r in document["cases"] if r["rows"] for line in off_tolerance(r, args.tolerance)]
+        for line in reasons:
+            _terminal.complain(line)
+        code = max(code, EXIT_UNCONVERGED) if reasons else code
+    return code

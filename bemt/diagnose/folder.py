@@ -1,0 +1,92 @@
+"""Folder of an answer: diagnosis.json, its text, figures and the improved cases; nobody loses files of their own."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from bemt.base.errors import Fault, InputError
+from bemt.base.tables import json_text, write_atomic
+from bemt.case import repeated_names
+from bemt.diagnose.document import text
+from bemt.diagnose.improve import beside, improved_case, is_improved
+
+if TYPE_CHECKING:
+    from bemt.case import Case
+
+__all__ = ["check", "write"]
+
+
+def write(folder: str, answer: Any, document: dict[str, Any], cases: Sequence[Case], figures: bool = True) -> None:
+    """Write everything; improved cases of an earlier answer go."""
+    out = Path(folder)
+    out.mkdir(parents=True, exist_ok=True)
+    _forget(out, cases)
+    write_atomic(out / "diagnosis.json", json_text(document))
+    write_atomic(out / "diagnosis.txt", text(answer) + "\n")
+    _improved(out, answer, cases)
+    if figures:
+        from bemt.diagnose import figures as pictures
+
+        pictures.draw(answer, out)
+
+
+def _targets(out: Path, cases: Sequence[Case]) -> dict[Path, Case]:
+    """Folder of the improved case of each case: that of the answer, or one by name in it where there are several."""
+    own = list({c.path.resolve(): c for c in cases}.values())
+    if len(own) == 1:
+        return {out: own[0]}
+    repeated = repeated_names(dict(enumerate(own)))
+    if repeated:
+        raise InputError(list(repeated.values()))
+    return {out / c.name: c for c in own}
+
+
+def _written(file: Path) -> bool:
+    """Whether a case file is an improved one."""
+    return file.is_file() and is_improved(file.read_text(encoding="utf-8", errors="replace"))
+
+
+def check(folder: str | None, cases: Sequence[Case]) -> None:
+    """Let nobody lose files of their own: an improved case goes where only its like has been."""
+    if not folder:
+        return
+    out = Path(folder)
+    given, lost = {c.path.resolve() for c in cases}, []
+    for home, case in _targets(out, cases).items():
+        target = home / "case.toml"
+        mine = _written(target)
+        if target.is_file() and (not mine or target.resolve() in given):
+            lost.append(target)
+        for file in () if mine else beside(case):
+            copy = home / file.relative_to(case.folder)
+            if copy.is_file() and copy.read_bytes() != file.read_bytes():
+                lost.append(copy)
+    if lost:
+        raise InputError([Fault("--out", "", f"a folder with a file of its own, {p.as_posix()}", "a folder without one",
+                                "The improved case would replace it") for p in lost])  # fmt: skip
+
+
+def _forget(out: Path, cases: Sequence[Case]) -> None:
+    """Take away the improved cases of the answer that stands in a folder: the next one may have none, or others."""
+    try:
+        earlier = [str(name) for name in json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))["cases"]]
+    except (OSError, ValueError, KeyError, TypeError):
+        earlier = []
+    given = {c.path.resolve() for c in cases}
+    for folder in {out, *(out / name for name in earlier if Path(name).name == name != "..")}:
+        file = folder / "case.toml"
+        if _written(file) and file.resolve() not in given:
+            file.unlink()
+
+
+def _improved(out: Path, answer: Any, cases: Sequence[Case]) -> None:
+    """Save the cases with what was found on, cases that `sweep` runs."""
+    for folder, case in _targets(out, cases).items():
+        document = improved_case(answer, case, case.path.read_text(encoding="utf-8-sig"))
+        if document:
+            for file in beside(case):  # stations, sections and recorded values lie beside the case, as before
+                write_atomic(folder / file.relative_to(case.folder), file.read_bytes())
+            write_atomic(folder / "case.toml", document)
