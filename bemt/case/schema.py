@@ -286,6 +286,7 @@ class CaseFile(Table):
     name: str = entry("text", required=True)
     title: str = entry("text", default="")
     notes: str = entry("text", default="")
+    origin: str = entry("text", default="")
     references: str | None = entry("file")
     rotor: RotorTable
     blade: BladeTable

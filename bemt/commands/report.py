@@ -16,7 +16,25 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     _options.add_cases(parser)
     parser.add_argument("--out", required=True, metavar="DIR", help="folder of the report and of the sweep behind it")
+    parser.add_argument("--title", metavar="TEXT", help="title of the report (default: Validation report)")
+    parser.add_argument("--author", metavar="TEXT", help="who answers for it, shown under the title")
     _options.add_quiet(parser, "neither progress nor file names")
+
+
+def _about(args: argparse.Namespace) -> dict[str, str]:
+    """Title, author, date and, where the cases lie in a git checkout, its commit."""
+    import datetime
+    import subprocess
+    from pathlib import Path
+
+    about = {"title": args.title or "", "author": args.author or "", "date": datetime.date.today().isoformat()}
+    folder = Path(args.paths[0])
+    command = ["git", "-C", str(folder if folder.is_dir() else folder.parent), "describe", "--always", "--dirty"]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=10)
+    except (OSError, subprocess.TimeoutExpired):
+        return about
+    return about | ({"revision": f"commit {done.stdout.strip()}"} if done.returncode == 0 else {})
 
 
 def run(args: argparse.Namespace) -> int:
@@ -24,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     from bemt.report import HTML_NAME, write
 
     with _terminal.progress(args.quiet) as say:
-        book, files = write(args.paths, args.out, say)
+        book, files = write(args.paths, args.out, say, _about(args))
     for page in book["cases"]:
         for fault in page["result"]["faults"]:
             _terminal.complain(fault)

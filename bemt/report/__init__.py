@@ -50,6 +50,7 @@ def book_html(book: Mapping[str, Any]) -> str:
     told = "".join(section(item["name"], diagnosis_parts(item)) for item in book["diagnoses"])
     pages.append(("diagnoses", "Diagnoses", f"<h2>Diagnoses</h2>{told}" if told else ""))
     numbers = reproduction_table(book["reproduction"])
+    about = book.get("about", {})
     words = (
         "<p>T. Cahill, MS thesis, Northeastern University, April 2025. Statistics of the UIUC database are checked by "
         f"<code>{esc('python -m bemt reproduce')}</code> where those data are.</p>"
@@ -69,19 +70,27 @@ def book_html(book: Mapping[str, Any]) -> str:
         f"bemt {book['version']}. Thrust in newtons, CT = T/(ρ n² D⁴), CP = P/(ρ n³ D⁵). Colours after Okabe and Ito. "
         "This file loads nothing from the network."
     )
-    return document("Validation report", lead, [page for page in pages if page[2]], foot)
+    made = " · ".join(filter(None, (about.get("author"), about.get("date"), about.get("revision"))))
+    title = about.get("title") or "Validation report"
+    return document(title, " ".join(filter(None, (made + "." if made else "", lead))), [p for p in pages if p[2]], foot)
 
 
 def write(
-    paths: Sequence[str | Path], out: str | Path, progress: Callable[[str], None]
+    paths: Sequence[str | Path],
+    out: str | Path,
+    progress: Callable[[str], None],
+    about: Mapping[str, str] | None = None,
 ) -> tuple[Mapping[str, Any], tuple[Path, Path]]:
-    """Sweep the cases into a folder and write the report beside; returns what it shows, and its two files."""
+    """Sweep the cases into a folder and write the report beside; returns what it shows, and its two files.
+
+    ``about`` holds title, author, date and revision for the head of the page, each as far as wanted.
+    """
     from bemt.base.tables import write_atomic
     from bemt.report.gather import gather
     from bemt.report.summary import summary
 
     folder = Path(out)
-    book = gather(paths, folder, progress)
+    book = {**gather(paths, folder, progress), "about": dict(about or {})}
     files = folder / HTML_NAME, folder / MARKDOWN_NAME
     try:
         write_atomic(files[0], book_html(book))

@@ -17,8 +17,8 @@ from bemt.report.verdicts import headline, verdict
 
 __all__ = ["case_page", "reproduction_table"]
 
-LOOK = {"cfd": "bar", "bench": "cross", "vendor": "triangle", "openfoam": "star", "openfoam incompressible": "diamond",
-        "flight": "square"}  # fmt: skip
+LOOK = {"cfd": "diamond", "bench": "cross", "vendor": "triangle", "openfoam": "star",
+        "openfoam incompressible": "square", "flight": "square"}  # fmt: skip
 NAMES = {"cfd": "CFD, recorded", "openfoam": "CFD, own, compressible",
          "openfoam incompressible": "CFD, own, incompressible"}  # fmt: skip
 CHANNEL_UNITS = {

@@ -15,7 +15,7 @@ __all__ = ["front_page"]
 SOURCES = (
     ("bemt", "BEMT", "circle"),
     ("k1k2", "K1/K2", "square"),
-    ("cfd", "CFD, recorded", "bar"),
+    ("cfd", "CFD, recorded", "diamond"),
     ("openfoam", "CFD, own", "star"),
     ("bench", "bench", "cross"),
     ("vendor", "vendor", "triangle"),

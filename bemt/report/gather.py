@@ -12,6 +12,7 @@ from typing import Any
 import bemt
 from bemt.base.errors import InputError
 from bemt.case import Case, find_cases, load_case
+from bemt.compare.thesis import ORIGIN
 from bemt.report import curves, trends
 from bemt.report.cfd import attach, cfd_runs
 from bemt.report.found_files import read_json, safe_files
@@ -61,11 +62,12 @@ def gather(paths: Sequence[str | Path], out: Path, progress: Progress | None = N
     tell("report: pictures")
     _pictures(solved)
     tell("report: trends")
+    of_thesis = any(result.get("origin") == ORIGIN for result in document["cases"])
     book = {
         "version": bemt.__version__,
         "cases": pages,
         "trends": _trends(solved, document["cases"]),
-        "reproduction": _reproduction(),
+        "reproduction": _reproduction() if of_thesis else [],
         "exit_code": document["exit_code"],
         "cfd": cfd_runs(out),
     }
@@ -135,7 +137,8 @@ def _trends(solved: Sequence[tuple[Case, dict[str, Any]]], results: Sequence[Map
             family = trends.families(base)
         except (InputError, GeometryError, ValueError):
             family = {}
-    return {"family": family, "choice": trends.choice(results), "moments": trends.moments(results)}
+    thesis = [result for result in results if result.get("origin") == ORIGIN]  # the robot is that of the thesis
+    return {"family": family, "choice": trends.choice(thesis), "moments": trends.moments(thesis)}
 
 
 def _reproduction() -> list[dict[str, Any]]:

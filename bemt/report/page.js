@@ -84,6 +84,19 @@
       here.setAttribute("cy", best.y);
       here.style.opacity = 1;
     }
+    const save = figure.querySelector("button.csv");
+    if (save) {
+      save.hidden = false;
+      save.addEventListener("click", () => {
+        const quote = (s) => '"' + String(s).replace(/"/g, '""') + '"', cell = (v) => v === null || v === undefined ? "" : v;
+        const rows = [[quote("source"), quote(d.xl), quote(d.yl), quote("u")].join(",")];
+        d.t.forEach((t) => t.x.forEach((x, j) => rows.push([quote(t.n), cell(x), cell(t.y[j]), cell(t.u[j])].join(","))));
+        const link = document.createElement("a");
+        link.href = "data:text/csv;charset=utf-8," + encodeURIComponent(rows.join("\n") + "\n");
+        link.download = save.getAttribute("data-name") + ".csv";
+        link.click();
+      });
+    }
     svg.addEventListener("pointermove", point);
     svg.addEventListener("pointerdown", point);
     svg.addEventListener("pointerleave", leave);

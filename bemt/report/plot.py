@@ -8,6 +8,7 @@ from __future__ import annotations
 import html
 import json
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -29,7 +30,7 @@ COLOURS = {
 }
 SERIES = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#7f7f7f")
 DASHES = ("", "7 4", "2 3", "9 3 2 3", "12 4", "4 4", "1 4")
-SHAPES = ("circle", "square", "triangle", "diamond", "cross", "bar", "star")
+SHAPES = ("circle", "square", "triangle", "diamond", "cross", "star")
 WIDTH, HEIGHT, WIDE = 480, 320, 760
 LEFT, RIGHT, TOP, BOTTOM = 62, 12, 14, 46
 
@@ -223,8 +224,6 @@ def _marker(shape: str, x: float, y: float, colour: str) -> str:
         return f'<path d="M{x:.1f} {y - 6:.1f}l5.5 6l-5.5 6l-5.5 -6z" {fill}/>'
     if shape == "cross":
         return f'<path d="M{x - s:.1f} {y - s:.1f}l9 9m0 -9l-9 9" {line}/>'
-    if shape == "bar":
-        return f'<path d="M{x:.1f} {y - 8:.1f}v16" {line}/>'
     if shape == "star":
         return f'<path d="M{x:.1f} {y - 6:.1f}v12m-5.2 -9l10.4 6m0 -6l-10.4 6" {line}/>'
     return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4.5" {fill}/>'
@@ -424,11 +423,13 @@ def figure(plot: Plot) -> str:
     title = html.escape(plot.title)
     note = f"<p>{html.escape(plot.note)}</p>" if plot.note else ""
     kind = ' class="plot wide"' if plot.wide else ' class="plot"'
+    slug = re.sub(r"[^a-z0-9]+", "-", plot.title.lower()).strip("-")[:60]
+    save = f'<button type="button" class="csv" data-name="{slug}" hidden>CSV</button>'  # shown where scripts run
     return (
         f'<figure{kind}><figcaption>{title}</figcaption><div class="canvas"><svg viewBox="0 0 {width} {height}" '
         f'role="img" aria-label="{title}" data-plot="{blob}">{_axes(plot, f, width, height)}'
         f'<g class="marks">{_marks(plot, f)}</g>{drawn}<circle class="here" r="7"/></svg><div class="tip" hidden></div>'
-        f"</div>{keys}{note}{_values(plot, traces)}</figure>"
+        f"</div>{keys}{note}{save}{_values(plot, traces)}</figure>"
     )
 
 

@@ -31,7 +31,7 @@ def _recorded(results: Sequence[Mapping[str, Any]], x: Any, keep: Any) -> list[T
             None,
             COLOURS["cfd"],
             "",
-            "bar",
+            "diamond",
             True,
             [a[2] for a in rows],
         )
@@ -142,7 +142,7 @@ def _choice(rows: Sequence[Mapping[str, Any]]) -> str:
             True,
         )
     ]
-    for source, shape in (("cfd", "bar"), ("bench", "cross"), ("vendor", "triangle")):
+    for source, shape in (("cfd", "diamond"), ("bench", "cross"), ("vendor", "triangle")):
         points = [(ratio, at[str(r["name"])], label) for r in rows for label, s, ratio in r["rows"] if s == source]
         traces.append(
             Trace(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from bemt.base.tables import number_text
@@ -86,37 +86,40 @@ def verdict(result: Mapping[str, Any]) -> tuple[str, str, str]:
     parts = [f"{c['reference']} {c['E_pct']:+.1f} %" if _known(c.get("E_pct")) else str(c["reference"]) for c in lines]
     words.append(f"Difference from {'; '.join(parts)}.")
     judged = [c for c in lines if _known(c.get("u_val"))]
-    if not judged:
-        multiples = [
-            abs(c["E"]) / s
-            for c in lines
-            if (s := math.hypot(*(c[k] for k in ("u_num", "u_input") if _known(c.get(k))))) > 0
-        ]
-        words.append(
-            "No recording states its uncertainty, so validation after V&V 20 ends without a verdict"
-            + (
-                f"; the differences are {_range(multiples)} times the standard uncertainty of the inputs."
-                if multiples
-                else "."
-            )
-        )
-        return "unknown", f"{UNKNOWN}: u_D unknown", " ".join(words)
-    part = f" ({len(judged)} of {len(lines)} recordings)" if len(judged) < len(lines) else ""
     far = [c for c in judged if abs(c["E"]) > c["u_val"]]
     if far:
         names = ", ".join(f"{c['reference']} (|E| {_n(abs(c['E']))} N, u_val {_n(c['u_val'])} N)" for c in far)
         words.append(f"It differs by more than the validation uncertainty from {names}.")
-        return "differs", DIFFERS + part, " ".join(words)
-    words.append(
-        f"Not distinguishable from noise against {', '.join(str(c['reference']) for c in judged)}: |E| is within "
-        "the validation uncertainty, which says nothing about a smaller error."
-    )
-    return "same", SAME + part, " ".join(words)
+    near = [c for c in judged if c not in far]
+    if near:
+        names = ", ".join(str(c["reference"]) for c in near)
+        words.append(f"Not distinguishable from noise against {names}: |E| is within the validation uncertainty.")
+    open_ones = [c for c in lines if c not in judged]
+    if open_ones:
+        words.append(_needed(open_ones))
+    if not judged:
+        return "unknown", f"{UNKNOWN}: u_D unknown", " ".join(words)
+    part = f" ({len(judged)} of {len(lines)} recordings)" if open_ones else ""
+    return ("differs", DIFFERS + part, " ".join(words)) if far else ("same", SAME + part, " ".join(words))
 
 
-def _range(values: list[float]) -> str:
-    low, high = min(values), max(values)
-    return f"{low:.1f}" if high - low < 0.05 else f"{low:.1f} to {high:.1f}"
+def _needed(lines: Sequence[Mapping[str, Any]]) -> str:
+    """What uncertainty recordings that state none would have to have, for agreement after V&V 20."""
+    inside, wanted = [], []
+    for c in lines:
+        known = math.hypot(*(c[k] for k in ("u_num", "u_input", "u_model") if _known(c.get(k))))
+        if abs(c["E"]) <= known:
+            inside.append(str(c["reference"]))
+        else:
+            u = math.sqrt(c["E"] ** 2 - known**2)
+            share = f" ({100.0 * u / abs(c['D']):.2g} %)" if c.get("D") else ""
+            wanted.append(f"{c['reference']} to {_n(u, 2)} N{share}")
+    said = []
+    if inside:
+        said.append(f"{', '.join(inside)}: inside what BEMT's own inputs leave open, however good the recording is")
+    if wanted:
+        said.append(f"BEMT and the recording agree only if it is no better than this: {', '.join(wanted)}")
+    return "No uncertainty is stated for some recordings. " + "; ".join(said) + "."
 
 
 def headline(result: Mapping[str, Any]) -> str:

@@ -261,7 +261,7 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
         models["bemt variant"] = _Model(_channels(less), {k: np.full(len(points), np.nan) for k in PROPAGATED})
     comparisons = _comparisons(recorded, models)
     return {
-        "name": case.name, "title": case.title, "kind": case.kind, "version": __version__,
+        "name": case.name, "title": case.title, "kind": case.kind, "origin": case.file.origin, "version": __version__,
         "rows": rows + [r for r in recorded if r["source"] in ROW_SOURCES],
         "variants": variants,
         "other_rows": [r for r in recorded if r["source"] not in ROW_SOURCES],
