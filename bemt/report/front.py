@@ -8,7 +8,7 @@ from typing import Any
 
 from bemt.report.markup import Cell, badge, esc, image, num, section, table
 from bemt.report.plot import COLOURS, Mark, Plot, Trace, figure
-from bemt.report.verdicts import headline, verdict
+from bemt.report.verdicts import answer, headline, verdict
 
 __all__ = ["front_page"]
 
@@ -28,12 +28,12 @@ def _cards(book: Mapping[str, Any], ids: Mapping[int, str]) -> str:
     out = []
     for i, page in enumerate(book["cases"]):
         result = page["result"]
-        kind, word, sentence = verdict(result)
+        kind, word, _ = verdict(result)
         title = headline(result)
         picture = image(page["pictures"]["rotor"], f"{title}: rotor") if "rotor" in page["pictures"] else ""
         out.append(
             f'<article class="card"><h3><a href="#{ids[i]}">{esc(title)}</a></h3>{picture}{badge(kind, word)}'
-            f"<p>{esc(sentence)}</p></article>"
+            f"<p>{esc(answer(result))}</p></article>"
         )
     return f'<div class="cards">{"".join(out)}</div>'
 

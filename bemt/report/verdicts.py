@@ -8,7 +8,7 @@ from typing import Any
 
 from bemt.base.tables import number_text
 
-__all__ = ["headline", "recorded", "verdict"]
+__all__ = ["answer", "headline", "recorded", "verdict"]
 
 SAME, DIFFERS, UNKNOWN = "not distinguishable from noise", "differs", "no verdict"
 
@@ -103,11 +103,64 @@ def verdict(result: Mapping[str, Any]) -> tuple[str, str, str]:
     return ("differs", DIFFERS + part, " ".join(words)) if far else ("same", SAME + part, " ".join(words))
 
 
+NAMES = {"cfd": "CFD", "openfoam": "own CFD", "bench": "bench", "vendor": "vendor", "flight": "flight"}
+
+
+def answer(result: Mapping[str, Any]) -> str:
+    """Say in one sentence how BEMT and the recordings stand: both numbers, and what agreement would need.
+
+    Examples
+    --------
+    >>> row = {"source": "bemt", "thrust_N": 119.1, "u": 13.0}
+    >>> cfd = {"model": "bemt", "quantity": "thrust_N", "source": "cfd", "reference": "cfd", "D": 104.9, "E": 14.2,
+    ...        "E_pct": 13.5, "u_num": 0.1, "u_input": 13.0, "u_val": None}
+    >>> answer({"rows": [row], "comparisons": [cfd]})
+    'BEMT 119.1 ± 13 N, CFD 104.9 N (+13.5 %): they agree if the CFD is no better than 5.4 %.'
+    """
+    own = recorded(result, "bemt")
+    if not own or not _known(own[0].get("thrust_N")):
+        return verdict(result)[2]
+    band = f" ± {_n(own[0]['u'], 2)}" if _known(own[0].get("u")) else ""
+    head = f"BEMT {_n(own[0]['thrust_N'], 4)}{band} N"
+    said = []
+    for source, name in NAMES.items():
+        lines = [
+            c
+            for c in result.get("comparisons", [])
+            if c.get("model") == "bemt" and c.get("quantity") == "thrust_N" and c.get("source") == source
+        ]
+        if lines and _known(lines[0].get("E")):
+            c = lines[0]
+            share = f" ({c['E_pct']:+.1f} %)" if _known(c.get("E_pct")) else ""
+            said.append(f"{name} {_n(c['D'], 4)} N{share}: {_stand(c, name)}")
+    return f"{head}, " + "; ".join(said) + "." if said else f"{head}; nothing is recorded to compare it with."
+
+
+def _stand(c: Mapping[str, Any], name: str) -> str:
+    """How one comparison stands."""
+    if _known(c.get("u_val")):
+        return (
+            "they agree within u_val"
+            if abs(c["E"]) <= c["u_val"]
+            else f"they differ by {abs(c['E']) / c['u_val']:.1f} u_val"
+        )
+    known = _inputs(c)
+    if abs(c["E"]) <= known:
+        return "within what BEMT's inputs leave open"
+    u = math.sqrt(c["E"] ** 2 - known**2)
+    return f"they agree if the {name} is no better than {100.0 * u / abs(c['D']):.2g} %"
+
+
+def _inputs(c: Mapping[str, Any]) -> float:
+    """Standard uncertainty of BEMT in a comparison, the recording's left out, [N]."""
+    return math.hypot(*(c[k] for k in ("u_num", "u_input", "u_model") if _known(c.get(k))))
+
+
 def _needed(lines: Sequence[Mapping[str, Any]]) -> str:
     """What uncertainty recordings that state none would have to have, for agreement after V&V 20."""
     inside, wanted = [], []
     for c in lines:
-        known = math.hypot(*(c[k] for k in ("u_num", "u_input", "u_model") if _known(c.get(k))))
+        known = _inputs(c)
         if abs(c["E"]) <= known:
             inside.append(str(c["reference"]))
         else:
