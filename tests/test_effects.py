@@ -19,9 +19,10 @@ from bemt import effects
 from bemt.air import Air
 from bemt.base.errors import InputError
 from bemt.bem import duct as duct_model
-from bemt.bem import evaluate, forward
+from bemt.bem import evaluate, forward, solver
+from bemt.bem import kernel as K
 from bemt.case import load_case
-from bemt.effects.base import Effect, Flow, Parameter, Reading
+from bemt.effects.base import Array, Baking, Effect, Flow, Parameter, Reading
 from bemt.sections.extrapolation import ExtrapolatedTable, from_tables
 from bemt.sections.polars import Polar
 from geometry.airfoil import naca4
@@ -37,6 +38,7 @@ NO_OFF = {
     "cascade", "drag_divergence", "duct", "high_induction", "hub_loss", "post_stall", "reynolds", "swirl", "tip_gap",
     "tip_loss",
 }  # fmt: skip
+AIR = Air.from_density(1.225)
 each_effect = pytest.mark.parametrize("name", list(CATALOGUE))
 
 
@@ -290,6 +292,61 @@ def test_unknown_effects_are_refused(project: Path) -> None:
         evaluate.prepare(case, {"model.effects_off": ["tiploss"]})
     with pytest.raises(InputError, match=r"effects_on\[1\]: got 'swirl\(\)' after 'swirl'; expected each effect once"):
         evaluate.prepare(case, {"model.effects_on": ["swirl()", "swirl()"]})
+
+
+@dataclasses.dataclass(frozen=True)
+class Inflow(Effect):
+    """Factors and increments on both onset speeds, for the tests of the hook."""
+
+    fx: float = 1.0
+    fy: float = 1.0
+    dx: float = 0.0
+    dy: float = 0.0
+    id = "inflow_by_hand"
+
+    def inflow(self, bake: Baking) -> None:
+        """Change the onset speeds."""
+        bake.Vx_factor, bake.Vx_add = bake.Vx_factor * self.fx, bake.Vx_add + self.dx
+        bake.Vy_factor, bake.Vy_add = bake.Vy_factor * self.fy, bake.Vy_add + self.dy
+
+
+def test_inflow_scales_and_adds_to_the_onset_speeds() -> None:
+    rotor, n, V = trials()["static, cruise, transonic"].rotor, np.array([6000.0, 7000.0]), np.array([4.0, 9.0])
+
+    def loads(effect: Inflow, rpm: Array, speed: Array) -> Array:
+        prep = solver.prepare(rotor, [(0.7, section_table())], (*effects.standard(), effect))
+        found = solver.solve(prep, rpm, speed, AIR)
+        return np.stack([found.T, found.Q])
+
+    plain = Inflow()
+    np.testing.assert_allclose(loads(Inflow(fx=0.8, dx=1.5), n, V), loads(plain, n, 0.8 * V + 1.5), rtol=1e-10)
+    np.testing.assert_allclose(loads(Inflow(fy=0.9), n, V), loads(plain, 0.9 * n, V), rtol=1e-10)
+    assert np.all(loads(Inflow(dy=5.0), n, V) > loads(plain, n, V))
+
+
+def test_a_nacelle_slows_the_root_most() -> None:
+    rotor = trials()["static, cruise, transonic"].rotor
+    prep = [solver.prepare(rotor, [(0.7, section_table())], e) for e in ((), (effects.catalogue()["nacelle"](),))]
+    free, behind = (solver.solve(p, 6000.0, 8.0, AIR, radial=True) for p in prep)
+    lost = free.radial["w"][0] - behind.radial["w"][0]
+    assert np.all(np.diff(8.0 * (1.0 - prep[1].st[:, K.S_AXIAL_FACTOR])) < 0.0), "the deficit falls outboard"
+    assert lost[0] > 5.0 * lost[-2] and behind.T > free.T
+
+
+@dataclasses.dataclass(frozen=True)
+class Mistyped(Effect):
+    """Sets a number that the kernel does not have."""
+
+    id = "mistyped"
+
+    def momentum(self, bake: Baking) -> None:
+        """Mistype."""
+        bake.num.tipp = 1.0  # type: ignore[attr-defined]
+
+
+def test_a_mistyped_kernel_number_is_refused() -> None:
+    with pytest.raises(AttributeError, match="tipp"):
+        solver.prepare(trials()["stalled"].rotor, [(0.7, section_table())], (*effects.standard(), Mistyped()))
 
 
 NEW = '''
