@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib
 import inspect
 import re
 import sys
@@ -123,21 +122,19 @@ def with_(effect: Effect) -> tuple[Effect, ...]:
 
 def test_the_catalogue_is_the_folder() -> None:
     files = {path.stem for path in FOLDER.glob("*.py")} - {"__init__", "base"}
-    assert set(CATALOGUE) == files
+    assert {Path(inspect.getfile(cls)).stem for cls in CATALOGUE.values()} == files
     orders = [cls.order for cls in CATALOGUE.values()]
     assert orders == sorted(orders)
     assert [e.id for e in effects.standard()] == [name for name, cls in CATALOGUE.items() if cls.on_by_default]
 
 
 @each_effect
-def test_one_file_one_effect_of_its_name(name: str) -> None:
+def test_an_effect_stands_in_the_file_of_its_name_and_has_a_hook(name: str) -> None:
     cls = CATALOGUE[name]
     assert cls.id == name
-    assert Path(inspect.getfile(cls)).stem == name
-    module = importlib.import_module(cls.__module__)
-    here = [o for o in vars(module).values() if isinstance(o, type) and o.__module__ == module.__name__]
-    assert [o for o in here if issubclass(o, Effect)] == [cls]
-    assert any(hook in vars(cls) for hook in HOOKS), "an effect without a hook does nothing"
+    stem = Path(inspect.getfile(cls)).stem
+    assert name == stem or (name.endswith(f"_{stem}") and cls.fault == stem), "alone, or one channel of a stand fault"
+    assert any(getattr(cls, hook) is not getattr(Effect, hook) for hook in HOOKS), "without a hook it does nothing"
 
 
 @each_effect
@@ -391,11 +388,26 @@ def test_a_new_effect_is_one_new_file(extra: Path) -> None:
     assert np.all(on[1] > off[1])
 
 
+def test_several_effects_of_one_file(extra: Path) -> None:
+    (extra / "both.py").write_text(
+        NEW.format(cls="Common", id="")
+        + "\n".join(f"class {n.title()}(Common):\n    id = {n!r}\n" for n in ("this", "that"))
+    )
+    assert set(effects.catalogue()) == {*CATALOGUE, "this", "that"}
+    assert vars(effects.from_text("this(factor=1.5)")) == {"factor": 1.5}
+
+
+def test_an_effect_without_id_is_refused(extra: Path) -> None:
+    (extra / "nameless.py").write_text(NEW.format(cls="Nameless", id=""))
+    with pytest.raises(ValueError, match="Nameless: id '' is empty"):
+        effects.catalogue()
+
+
 def test_the_catalogue_forgets_the_new_effect() -> None:
     assert effects.catalogue() == CATALOGUE
 
 
 def test_two_effects_of_one_id_are_refused(extra: Path) -> None:
     (extra / "made_up_twice.py").write_text(NEW.format(cls="Twice", id="swirl"))
-    with pytest.raises(ValueError, match="two effects share the id 'swirl'"):
+    with pytest.raises(ValueError, match="id 'swirl' is empty or taken"):
         effects.catalogue()

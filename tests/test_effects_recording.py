@@ -17,6 +17,8 @@ from bemt.effects.airspeed_offset import AirspeedOffset
 from bemt.effects.base import Effect, Flow, Loads, Reading
 from bemt.effects.battery_sag import BatterySag
 from bemt.effects.cross_talk import CrossTalk
+from bemt.effects.drift import ThrustDrift
+from bemt.effects.gain import ThrustGain
 from bemt.effects.ground_effect import FORMS, GroundEffect
 from bemt.effects.inflow_lag import InflowLag
 from bemt.effects.lip_separation import LipSeparation
@@ -26,13 +28,11 @@ from bemt.effects.oblique_inflow import ObliqueInflow
 from bemt.effects.recirculation import Recirculation
 from bemt.effects.rotor_inertia import RotorInertia, slope
 from bemt.effects.rpm_scale import RpmScale
-from bemt.effects.thrust_drift import ThrustDrift
-from bemt.effects.thrust_gain import ThrustGain
-from bemt.effects.thrust_zero import ThrustZero
 from bemt.effects.tip_gap import TipGap
 from bemt.effects.tunnel_blockage import TunnelBlockage
 from bemt.effects.unit_slip import UnitSlip
 from bemt.effects.untwist import Untwist
+from bemt.effects.zero import ThrustZero
 from bemt.sections.polars import linear_polar
 from geometry.laws import helix
 from geometry.rotor import Rotor

@@ -17,7 +17,6 @@ from bemt.bem import solver
 from bemt.bem.duct import duct_flow
 from bemt.effects import Effect, standard
 from bemt.effects.lifting_surface import LiftingSurface
-from bemt.sections import rule as section_rule
 from bemt.sections.neuralfoil import neuralfoil_polar, tunnel_polar
 from geometry.airfoil import Airfoil, naca, naca4
 from geometry.airfoil_file import parse_dat

@@ -47,7 +47,7 @@ def _install(monkeypatch: pytest.MonkeyPatch, rule: dict[str, float]) -> tuple[A
 
     declared = section_rule.sections
 
-    def sections(family: str | None = None, law: Any = None) -> tuple[section_rule.Section, ...]:
+    def sections(family: str | None = None, law: Any = None) -> tuple[section_rule.RuleSection, ...]:
         own = declared(family, law)
         if own[0].shape != "naca4":  # published: no matter of choice
             return own

@@ -387,7 +387,10 @@ class Effect:
     on_by_default: ClassVar[bool] = True
 
     def __init_subclass__(cls) -> None:
-        """Refuse a parameter that would hide a hook."""
+        """Refuse a parameter that would hide a hook; an effect without notes has those of the one it comes from."""
+        if "    Notes\n" not in (cls.__doc__ or ""):
+            notes = next((n for b in cls.__mro__[1:] if (n := (b.__doc__ or "").partition("    Notes\n")[2])), "")
+            cls.__doc__ = (cls.__doc__ or "") + (f"\n\n    Notes\n{notes}" if notes else "")
         hidden = sorted(
             set(cls.__dict__.get("__annotations__", {})) & {n for n, v in vars(Effect).items() if callable(v)}
         )
