@@ -12,7 +12,7 @@ import pytest
 
 from bemt.base import cache
 from bemt.sections import neuralfoil as polars_neuralfoil
-from bemt.sections.neuralfoil import neuralfoil_polar
+from bemt.sections.neuralfoil import tunnel_polar
 from bemt.sections.polars import ALPHA_GRID, Polar
 from geometry.airfoil import naca
 
@@ -41,13 +41,13 @@ def bits(p: Polar) -> tuple[bytes, bytes, bytes]:
 
 
 def test_cache_hit_equals_cold_bit_for_bit(fresh: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    cold = neuralfoil_polar(SECTIONS["4412"])
+    cold = tunnel_polar(SECTIONS["4412"])
     assert not [f for f in (fresh / "polar").iterdir() if f.suffix != ".npz" or f.name.startswith(".")]
     cache.clear_memory()
     monkeypatch.setattr(polars_neuralfoil, "_make_neuralfoil", lambda *a: pytest.fail("the disk entry was not used"))
-    warm = neuralfoil_polar(SECTIONS["4412"])
+    warm = tunnel_polar(SECTIONS["4412"])
     assert bits(warm) == bits(cold) and warm.key == cold.key
-    assert bits(neuralfoil_polar(SECTIONS["4412"])) == bits(cold)
+    assert bits(tunnel_polar(SECTIONS["4412"])) == bits(cold)
 
 
 def test_every_setting_and_the_shape_make_another_entry(fresh: Path) -> None:
@@ -55,16 +55,16 @@ def test_every_setting_and_the_shape_make_another_entry(fresh: Path) -> None:
     settings = ({}, {"n_crit": 7.0}, {"xtr_upper": 0.5}, {"xtr_lower": 0.5}, {"ar": 5.0}, {"method": "normal"},
                 {"past_stall": 0.05}, {"lift_floor": 0.0}, {"model": "medium"})  # fmt: skip
     for kw in settings:
-        neuralfoil_polar(SECTIONS["4412"], re=re, **kw)
-    neuralfoil_polar(SECTIONS["0012"], re=re)
-    neuralfoil_polar(SECTIONS["4412"], re=np.array([1.1e5]))
+        tunnel_polar(SECTIONS["4412"], re=re, **kw)
+    tunnel_polar(SECTIONS["0012"], re=re)
+    tunnel_polar(SECTIONS["4412"], re=np.array([1.1e5]))
     assert len(list((fresh / "polar").glob("*.npz"))) == len(settings) + 2
 
 
 @pytest.mark.parametrize("damage", ["empty", "cut", "noise", "swapped"])
 def test_damaged_entry_is_made_again(damage: str, fresh: Path) -> None:
     re = np.array([1e5])
-    cold = neuralfoil_polar(SECTIONS["4412"], re=re)
+    cold = tunnel_polar(SECTIONS["4412"], re=re)
     path = entry(fresh)
     raw = path.read_bytes()
     if damage == "swapped":  # a valid archive whose content does not fit its checksum
@@ -76,7 +76,7 @@ def test_damaged_entry_is_made_again(damage: str, fresh: Path) -> None:
         middle = raw[: len(raw) // 2]
         path.write_bytes({"empty": b"", "cut": middle, "noise": middle + bytes(64) + raw[len(middle) + 64 :]}[damage])
     cache.clear_memory()
-    assert bits(neuralfoil_polar(SECTIONS["4412"], re=re)) == bits(cold)
+    assert bits(tunnel_polar(SECTIONS["4412"], re=re)) == bits(cold)
     cache.clear_memory()
     with np.load(entry(fresh)) as archive:
         assert np.array_equal(archive["cl"][:, 0], cold.cl[:, 0, 0])
@@ -86,7 +86,7 @@ def test_damaged_entry_is_made_again(damage: str, fresh: Path) -> None:
 def test_works_without_a_cache_folder(place: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("BEMT_CACHE", place)
     cache.clear_memory()
-    assert neuralfoil_polar(SECTIONS["0012"], re=np.array([1e5])).cl.shape == (ALPHA_GRID.size, 1, 1)
+    assert tunnel_polar(SECTIONS["0012"], re=np.array([1e5])).cl.shape == (ALPHA_GRID.size, 1, 1)
 
 
 def test_cache_folder_rule(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -109,12 +109,12 @@ def test_installed_version_is_that_of_the_metadata() -> None:
 
 
 def test_a_cache_hit_needs_no_neuralfoil(own_cache: Path) -> None:
-    neuralfoil_polar(SECTIONS["4412"])
+    tunnel_polar(SECTIONS["4412"])
     code = (
-        "import sys; from bemt.sections.neuralfoil import neuralfoil_polar as f; from geometry.airfoil import naca;"
+        "import sys; from bemt.sections.neuralfoil import tunnel_polar as f; from geometry.airfoil import naca;"
         "f(naca('4412')); print(sorted({'neuralfoil', 'aerosandbox', 'scipy', 'numba'} & set(sys.modules)))"
     )
-    root = Path(cache.__file__).parents[1]
+    root = Path(cache.__file__).parents[2]
     env = os.environ | {"BEMT_CACHE": str(own_cache), "PYTHONPATH": str(root)}
     done = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True, cwd=root)
     assert done.stdout.strip() == "[]"

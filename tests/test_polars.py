@@ -9,7 +9,7 @@ import pytest
 
 from bemt.sections import polars as P
 from bemt.sections.extrapolation import ExtrapolatedTable, from_tables
-from bemt.sections.neuralfoil import neuralfoil_polar
+from bemt.sections.neuralfoil import tunnel_polar
 from bemt.sections.polars import ALPHA_GRID, DEFAULT_RE, Polar
 from geometry.airfoil import naca
 
@@ -94,7 +94,7 @@ def test_on_grid_is_idempotent_and_announces_what_it_holds() -> None:
 
 
 def test_fixed_re_removes_reynolds_and_nothing_else() -> None:
-    p = neuralfoil_polar(naca("4412"))
+    p = tunnel_polar(naca("4412"))
     q = P.fixed_re(p, 1.3e5)
     a = np.linspace(-math.pi, math.pi, 199)
     want = np.array(p.lookup(p.alpha, 1.3e5))
@@ -105,7 +105,7 @@ def test_fixed_re_removes_reynolds_and_nothing_else() -> None:
 
 
 def test_blend_is_linear_and_meets_its_ends() -> None:
-    a, b = neuralfoil_polar(naca("4412")), neuralfoil_polar(naca("0012"))
+    a, b = tunnel_polar(naca("4412")), tunnel_polar(naca("0012"))
     assert P.blend(a, b, 0.0).key == a.key and P.blend(a, b, 1.0).key == b.key
     mid = P.blend(a, b, 0.25)
     np.testing.assert_allclose(mid.cl, 0.75 * a.cl + 0.25 * b.cl, atol=1e-15)

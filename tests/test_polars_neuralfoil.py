@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bemt.sections.extrapolation import METHODS
-from bemt.sections.neuralfoil import neuralfoil_polar
+from bemt.sections.neuralfoil import tunnel_polar
 from bemt.sections.polars import ALPHA_GRID, DEFAULT_RE, Polar
 from geometry.airfoil import Airfoil, naca, naca4
 
@@ -29,17 +29,17 @@ def deg(*angles: float) -> np.ndarray:
 def section(request: pytest.FixtureRequest, own_cache: Path) -> tuple[str, Airfoil, Polar]:
     """Name, shape and polar of one section."""
     shape = SECTIONS[request.param]
-    return request.param, shape, neuralfoil_polar(shape)
+    return request.param, shape, tunnel_polar(shape)
 
 
-def test_neuralfoil_polar_is_closed_and_positive(section: tuple[str, Airfoil, Polar]) -> None:
+def test_tunnel_polar_is_closed_and_positive(section: tuple[str, Airfoil, Polar]) -> None:
     _, shape, p = section
     assert p.is_shared and p.M.tolist() == [0.0]
     assert np.array_equal(p.cl[0], p.cl[-1]) and np.array_equal(p.cd[0], p.cd[-1])
     assert p.cd.min() > 0.0 and np.abs(p.cl).max() < 2.5
     assert p.confidence is not None and p.confidence.min() >= 0.0 and p.confidence.max() <= 1.0
     assert np.all(p.confidence[np.abs(p.alpha) > deg(22.01)[0]] == 0.0)
-    for polar, cd_max in ((p, 1.29), (neuralfoil_polar(shape, cd_max=1.8), 1.8)):
+    for polar, cd_max in ((p, 1.29), (tunnel_polar(shape, cd_max=1.8), 1.8)):
         np.testing.assert_allclose(polar.lookup(deg(-90, 90)[:, None], DEFAULT_RE)[1], cd_max, rtol=1e-9)
 
 
@@ -80,22 +80,22 @@ def test_drag_falls_with_reynolds_number_and_stays_above_blasius(section: tuple[
 def test_low_reynolds_lift_keeps_its_share(section: tuple[str, Airfoil, Polar]) -> None:
     _, shape, p = section
     at = deg(*np.arange(0.0, 5.1, 0.5))
-    reference = neuralfoil_polar(shape, re=np.array([3e5])).lookup(at, 3e5)[0]
+    reference = tunnel_polar(shape, re=np.array([3e5])).lookup(at, 3e5)[0]
     for Re in DEFAULT_RE[DEFAULT_RE < 3e5]:
         assert np.all(p.lookup(at, Re)[0] >= 0.5 * reference - 0.1 - 1e-9)
-    free = neuralfoil_polar(shape, lift_floor=0.0)
+    free = tunnel_polar(shape, lift_floor=0.0)
     same = DEFAULT_RE > 3e5
     assert np.array_equal(free.cl[:, same], p.cl[:, same])
 
 
 def test_bound_on_low_reynolds_lift_is_needed_and_can_be_switched_off() -> None:
-    free = neuralfoil_polar(SECTIONS["2415"], lift_floor=0.0)
-    assert free.lookup(0.0, 2e4)[0] < 0.0 < neuralfoil_polar(SECTIONS["2415"]).lookup(0.0, 2e4)[0]
+    free = tunnel_polar(SECTIONS["2415"], lift_floor=0.0)
+    assert free.lookup(0.0, 2e4)[0] < 0.0 < tunnel_polar(SECTIONS["2415"]).lookup(0.0, 2e4)[0]
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_symmetric_section_is_antisymmetric(method: str) -> None:
-    p = neuralfoil_polar(SECTIONS["0012"], method=method)
+    p = tunnel_polar(SECTIONS["0012"], method=method)
     angles = np.round(np.rad2deg(ALPHA_GRID), 6)
     both = ALPHA_GRID[np.isin(angles, -angles)][:, None]  # nodes of the grid on both sides
     assert both.size > 170
@@ -106,8 +106,8 @@ def test_symmetric_section_is_antisymmetric(method: str) -> None:
 
 
 def test_past_stall_limits_the_use_of_neuralfoil() -> None:
-    short = neuralfoil_polar(SECTIONS["4412"], past_stall=deg(1)[0])
-    long = neuralfoil_polar(SECTIONS["4412"])
+    short = tunnel_polar(SECTIONS["4412"], past_stall=deg(1)[0])
+    long = tunnel_polar(SECTIONS["4412"])
     assert short.confidence is not None and long.confidence is not None
     assert (short.confidence > 0).sum() < (long.confidence > 0).sum()
     stall, cl_max = short.stall(1e6)
@@ -117,7 +117,7 @@ def test_past_stall_limits_the_use_of_neuralfoil() -> None:
 def test_lower_n_crit_and_trips_bring_transition_forward() -> None:
     j = np.flatnonzero(DEFAULT_RE > 1e6)[0]
     free, early, tripped = (
-        neuralfoil_polar(SECTIONS["0012"], **kw).cd[:, j, 0].min()
+        tunnel_polar(SECTIONS["0012"], **kw).cd[:, j, 0].min()
         for kw in ({}, {"n_crit": 3.0}, {"xtr_upper": 0.05, "xtr_lower": 0.05})
     )
     assert free < early < tripped
@@ -126,12 +126,12 @@ def test_lower_n_crit_and_trips_bring_transition_forward() -> None:
 def test_bad_settings_are_refused() -> None:
     for kw, word in (({"method": "none"}, "viterna, normal"), ({"re": np.array([2e5, 1e5])}, "ascending")):
         with pytest.raises(ValueError, match=word):
-            neuralfoil_polar(SECTIONS["0012"], **kw)
+            tunnel_polar(SECTIONS["0012"], **kw)
 
 
 def test_below_the_network_lift_stays_and_friction_is_laminar() -> None:
     """From Re 1e4 down: cl as at 1e4, least cd as 1 / sqrt(Re), no friction across the flow at 90 deg."""
-    p = neuralfoil_polar(naca4(0.035, 0.4, 0.09), n_crit=3.0)
+    p = tunnel_polar(naca4(0.035, 0.4, 0.09), n_crit=3.0)
     edge = int(np.argmin(np.abs(DEFAULT_RE - 1e4)))
     assert DEFAULT_RE[edge] == pytest.approx(1e4, rel=1e-12) and edge == 3
     assert np.array_equal(p.cl[:, :edge], np.repeat(p.cl[:, edge : edge + 1], edge, axis=1))

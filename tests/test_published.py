@@ -17,8 +17,7 @@ from bemt.bem import solver
 from bemt.bem.duct import duct_flow
 from bemt.effects import Effect, standard
 from bemt.effects.lifting_surface import LiftingSurface
-from bemt.sections import rule as section_rule
-from bemt.sections.neuralfoil import neuralfoil_polar
+from bemt.sections.neuralfoil import neuralfoil_polar, tunnel_polar
 from geometry.airfoil import Airfoil, naca, naca4
 from geometry.airfoil_file import parse_dat
 from geometry.blade import from_stations
@@ -49,7 +48,7 @@ def test_caradonna_tung_hover(shared_data: Path, collective: int, more: tuple[Ef
     shape = naca("0012")
     R, x = 1.143, np.array([1 / 6, 0.5, 1.0])
     blade = from_stations(x * R, np.full(3, 0.1905), np.full(3, np.radians(collective)), R, x[0] * R, ((0.75, shape),))
-    prep = solver.prepare(Rotor(blade, 2), [(0.75, section_rule.polar(shape))], (*standard(), *more), mach_max=1.0)
+    prep = solver.prepare(Rotor(blade, 2), [(0.75, neuralfoil_polar(shape))], (*standard(), *more), mach_max=1.0)
     error = []
     for _, rpm, tip_mach, ct_rotor in rows:
         speed = rpm * np.pi / 30 * R
@@ -71,7 +70,7 @@ def test_tmotor_28_static_thrust(shared_data: Path, more: tuple[Effect, ...], bo
     goe450, goe408 = _database("goe450"), _database("goe408")
     shapes = ((0.2, naca("4412")), (0.3, goe450), (0.7, goe450), (0.8, goe408))
     blade = from_stations(r, chord, beta, 0.3556, 0.03, shapes)
-    tables = [(x, section_rule.polar(s)) for x, s in shapes]
+    tables = [(x, neuralfoil_polar(s)) for x, s in shapes]
     prep = solver.prepare(Rotor(blade, 2), tables, (*standard(), *more), mach_max=0.6)
     error = solver.solve(prep, rows[:, 0], 0.0, Air.from_density()).T / rows[:, 3] - 1
     assert abs(np.median(error)) < bound
@@ -86,7 +85,7 @@ def _x22a(folder: Path, beta75: float, J: np.ndarray, exit_ratio: float) -> solv
     gap = 0.4 * 0.0254
     area = np.pi * R**2 * (1 - hub**2) * exit_ratio
     duct = Duct(R + gap, 1.2446, 0.06 * 2 * R, gap, exit_radius=float(np.sqrt(area / np.pi)), rotor_x=0.3556)
-    prep = solver.prepare(rotor, [(0.75, neuralfoil_polar(shape))], duct=duct_flow(duct, rotor), mach_max=0.8)
+    prep = solver.prepare(rotor, [(0.75, tunnel_polar(shape))], duct=duct_flow(duct, rotor), mach_max=0.8)
     return solver.solve(prep, 1200.0, J * 20 * 2 * R, Air.from_density())
 
 
@@ -123,7 +122,7 @@ def test_ka_19a_duct_share_at_bollard(shared_data: Path, pitch_ratio: float) -> 
     L, gap = 0.5 * D, 0.001
     duct = Duct(D / 2 + gap, L, 0.1825 * L, gap, exit_radius=D / 2 + gap + 0.0236 * L, rotor_x=0.5 * L)
     incompressible = [e for e in standard() if not e.uses_mach]
-    tables = [(s, neuralfoil_polar(a)) for s, a in shapes]
+    tables = [(s, tunnel_polar(a)) for s, a in shapes]
     prep = solver.prepare(rotor, tables, incompressible, duct=duct_flow(duct, rotor))
     water = dataclasses.replace(Air.from_density(), rho=1000.0, mu=1e-3, a_sound=1500.0)
     sol = solver.solve(prep, 600.0, 0.0, water)
@@ -141,7 +140,7 @@ def test_naca_594_propeller_c(shared_data: Path) -> None:
     chord = np.array([0.18, 0.225, 0.225, 0.21, 0.1875, 0.1425, 0.12])
     shape = _database("clarky")
     blade = from_stations(r, chord, np.full(7, np.radians(17.0)), 1.527, 0.375, ((0.75, shape),))
-    prep = solver.prepare(Rotor(blade, 3), [(0.75, section_rule.polar(shape))], mach_max=0.9)
+    prep = solver.prepare(Rotor(blade, 3), [(0.75, neuralfoil_polar(shape))], mach_max=0.9)
     sol = solver.solve(prep, 1100.0, rows[:, 0] * 1100 / 60 * 3.054, Air.from_density())
     error = sol.CT / rows[:, 1] - 1
     assert np.max(np.abs(error)) < 0.13

@@ -9,12 +9,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bemt.bem import evaluate, solver
+from bemt.case import load_case
 from bemt.compare.validate.propellers import validate
 from bemt.effects import catalogue, standard
+from bemt.sections import neuralfoil
 from bemt.sections import rule as section_rule
-from bemt.sections.neuralfoil import neuralfoil_polar
+from bemt.sections.neuralfoil import tunnel_polar
 from bemt.sections.polars import DEFAULT_RE, Polar
-from geometry.airfoil import Airfoil
+from geometry.airfoil import Airfoil, naca
+from geometry.laws import helix
+from geometry.rotor import Rotor
 
 # What volume 2 is asked for: median and 90th percentile of the error of static CT.
 MEDIAN, P90 = 0.06, 0.20
@@ -34,22 +39,22 @@ def _install(monkeypatch: pytest.MonkeyPatch, rule: dict[str, float]) -> tuple[A
     """Put a rule in the place of the declared one; returns the effects to go with it."""
 
     def polar(shape: Airfoil, **_: Any) -> Polar:
-        small = neuralfoil_polar(shape, n_crit=rule["n_crit"], lift_floor=rule["lift_floor"])
-        large = neuralfoil_polar(shape)
+        small = tunnel_polar(shape, n_crit=rule["n_crit"], lift_floor=rule["lift_floor"])
+        large = tunnel_polar(shape)
         w = np.clip(np.log(DEFAULT_RE / section_rule.SMALL_RE) / np.log(2.0), 0.0, 1.0)[None, :, None]
         cd = (1.0 - w) * small.cd * rule["drag"] + w * large.cd
         return dataclasses.replace(small, cl=(1.0 - w) * small.cl + w * large.cl, cd=cd)
 
     declared = section_rule.sections
 
-    def sections(family: str | None = None, law: Any = None) -> tuple[section_rule.Section, ...]:
+    def sections(family: str | None = None, law: Any = None) -> tuple[section_rule.RuleSection, ...]:
         own = declared(family, law)
         if own[0].shape != "naca4":  # published: no matter of choice
             return own
         new = {"thickness": rule["thickness"], "position": rule["position"]}
         return tuple(dataclasses.replace(s, camber=round(s.camber + rule["camber"], 4), **new) for s in own)
 
-    monkeypatch.setattr(section_rule, "polar", polar)
+    monkeypatch.setattr(neuralfoil, "neuralfoil_polar", polar)
     monkeypatch.setattr(section_rule, "sections", sections)
     effects = [
         dataclasses.replace(e, coefficient=rule["stall_delay"], normal=rule["normal"]) if e.id == "stall_delay" else e
@@ -88,3 +93,37 @@ def test_no_rule_drawn_at_random_meets_the_aims_on_volume_2(shared_data: Path) -
     assert np.all((median > MEDIAN) & (p90 > P90))
     best = np.argsort(first)[:6]
     assert np.min(median[best]) > MEDIAN + 0.005
+
+
+CASE = """
+schema = "bemt.case/1"
+name = "as_scripted"
+[rotor]
+kind = "propeller"
+blades = 2
+diameter_in = 8
+hub_ratio = 0.15
+[blade]
+pitch_in = 5
+chord_law = "apc_like"
+[blade.section]
+naca = "4412"
+[operating]
+rpm = 5000
+airspeed_m_s = 0
+[air]
+density_kg_m3 = 1.225
+"""
+
+
+def test_a_script_gives_the_thrust_of_the_case(tmp_path: Path) -> None:
+    """The example of the README and a case of the same propeller: one section table, the rule's."""
+    path = tmp_path / "case.toml"
+    path.write_text(CASE, encoding="utf-8")
+    case = load_case(path)
+    section = naca("4412")
+    rotor = Rotor(helix(0.2032, 0.127, anchors=section), B=2)
+    prepared = solver.prepare(rotor, [(0.75, neuralfoil.neuralfoil_polar(section))])
+    thrust = solver.solve(prepared, 5000.0, 0.0, case.air()).T
+    wanted = evaluate.evaluate(evaluate.prepare(case), 5000.0, 0.0, case.air()).thrust_N
+    assert thrust == pytest.approx(wanted, rel=1e-9)

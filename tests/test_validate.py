@@ -148,13 +148,13 @@ def test_uiuc(shared_data: Path, volume: str, static: tuple[float, ...], forward
 
 
 def test_rule_is_one_table_for_small_and_one_for_large_reynolds_numbers() -> None:
-    from bemt.sections.neuralfoil import neuralfoil_polar
+    from bemt.sections.neuralfoil import neuralfoil_polar, tunnel_polar
     from bemt.sections.polars import DEFAULT_RE
 
     shape = section_rule.airfoil(section_rule.sections()[0])
-    rule = section_rule.polar(shape)
-    small = neuralfoil_polar(shape, n_crit=section_rule.N_CRIT, lift_floor=0.0)
-    large = neuralfoil_polar(shape, n_crit=section_rule.N_CRIT_LARGE)
+    rule = neuralfoil_polar(shape)
+    small = tunnel_polar(shape, n_crit=section_rule.N_CRIT, lift_floor=0.0)
+    large = tunnel_polar(shape, n_crit=section_rule.N_CRIT_LARGE)
     low, high = DEFAULT_RE < section_rule.SMALL_RE, DEFAULT_RE > 2 * section_rule.SMALL_RE
     np.testing.assert_allclose(rule.cd[:, low], section_rule.DRAG_LEVEL * small.cd[:, low])
     np.testing.assert_allclose(rule.cl[:, low], small.cl[:, low])

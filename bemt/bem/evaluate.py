@@ -19,7 +19,7 @@ from bemt.bem import duct as duct_model
 from bemt.bem import forward, solver
 from bemt.formula import k1k2 as empirical
 from bemt.sections import polars
-from bemt.sections import rule as section_rule
+from bemt.sections.neuralfoil import neuralfoil_polar
 
 if TYPE_CHECKING:
     from bemt.air import Air
@@ -148,7 +148,7 @@ def _polars(case: Case, anchors: Sequence[tuple[float, Any]]) -> list[tuple[floa
     if given:
         return _user_polars(case, given)
     rule = case.file.model.n_crit, case.file.model.drag_level
-    return [(x, section_rule.polar(section, *rule)) for x, section in anchors]
+    return [(x, neuralfoil_polar(section, *rule)) for x, section in anchors]
 
 
 def _user_polars(case: Case, given: Sequence[PolarTable]) -> list[tuple[float, polars.Polar]]:

@@ -43,8 +43,9 @@ from bemt.bem.vecmath import atan2, fingerprint, inlined, intrinsic, njit, wide
 OK, NOT_CONVERGED, JUMP, NOT_FINITE = range(4)
 
 # Columns of ``st``, of the packed points, of ``out`` and of ``radial``.
-S_R, S_DR, S_CHORD, S_BETA, S_SIGMA, S_TIP, S_HUB, S_LOGC, S_ALPHA0, S_CLA, S_AXIAL, S_TANG = range(12)
-N_STATION = 12
+(S_R, S_DR, S_CHORD, S_BETA, S_SIGMA, S_TIP, S_HUB, S_LOGC, S_ALPHA0, S_CLA, S_AXIAL, S_TANG, S_AXIAL_FACTOR,
+ S_TANG_FACTOR) = range(14)  # fmt: skip
+N_STATION = 14
 P_OMEGA, P_V, P_RHO, P_MU, P_SOUND = range(5)
 N_POINT = 5
 O_T, O_Q, O_MASS, O_JET, O_STATOR, O_STATUS, O_WHERE, O_BRIDGED, O_STAGNANT, O_REVERSED = range(10)
@@ -137,8 +138,8 @@ def _load(w, n_pad, first, st, Omega, V, log_rho_mu, stride):
     for k in range(n_pad):
         i = first + k
         i = i if i < last else last
-        w[_UT + k] = Omega * st[i, S_R] + st[i, S_TANG]
-        UP = V + st[i, S_AXIAL]
+        w[_UT + k] = Omega * st[i, S_R] * st[i, S_TANG_FACTOR] + st[i, S_TANG]
+        UP = V * st[i, S_AXIAL_FACTOR] + st[i, S_AXIAL]
         w[_UP + k] = UP
         w[_IUP + k] = 1.0 / UP if UP != 0.0 else 0.0
         w[_BETA + k] = st[i, S_BETA]
@@ -407,10 +408,10 @@ def entry(ducted: bool, tables: str) -> Callable[..., None]:
 
         points : (P, 5)
             Rotation speed [rad/s], axial onset speed [m/s], density [kg/m3], viscosity [Pa s], sound speed [m/s].
-        st : (N, 12)
+        st : (N, 14)
             r, dr, chord [m], beta [rad], local solidity, roots of the tip and hub loss exponents times sin(phi),
             ln(chord), zero-lift angle [rad] and lift slope [1/rad] for the first guess, added axial and tangential
-            speed [m/s].
+            speed [m/s], factors on both onset speeds [1].
         tab : (L,)
             Section tables, flat: station, Mach number squared, Reynolds number, angle, (cl, cd); factored: station,
             the Reynolds numbers and then the squared Mach numbers, angle, (cl, cd) or (factor on cl, added cd).

@@ -96,7 +96,7 @@ def blend_weights(rR: Array, x: Array) -> Array:
 
 
 def pack_stations(bake: Baking, num: Array) -> Array:
-    """Station columns of the kernel, (N, 12)."""
+    """Station columns of the kernel, (N, 14)."""
     st = np.empty((bake.r.size, K.N_STATION))
     st[:, K.S_R], st[:, K.S_DR], st[:, K.S_CHORD] = bake.r, bake.dr, bake.chord
     st[:, K.S_BETA], st[:, K.S_SIGMA] = bake.beta, bake.sigma
@@ -114,7 +114,8 @@ def pack_stations(bake: Baking, num: Array) -> Array:
     slope = np.clip((cl_b - cl_a) / (b - a), 1.0, 12.0)
     st[:, K.S_CLA] = slope
     st[:, K.S_ALPHA0] = 0.5 * (a + b) - 0.5 * (cl_a + cl_b) / slope
-    st[:, K.S_AXIAL : K.S_TANG + 1] = bake.onset
+    st[:, K.S_AXIAL], st[:, K.S_TANG] = bake.Vx_add, bake.Vy_add
+    st[:, K.S_AXIAL_FACTOR], st[:, K.S_TANG_FACTOR] = bake.Vx_factor, bake.Vy_factor
     return st
 
 

@@ -65,7 +65,7 @@ class Prepared:
         Physics that is on.
     duct : DuctFlow or None
         Momentum numbers of the duct.
-    st : (N, 12) float
+    st : (N, 14) float
         Columns ``S_*`` of :mod:`bemt.bem.kernel`, in SI units.
     tab : (N, rows, Na, 2) float
         Section tables as the kernel reads them, see :func:`bemt.bem.kernel.entry`; written out in ``tables`` [1].
@@ -242,7 +242,8 @@ def prepare(
         r=s.r, dr=s.dr, chord=s.chord, beta=s.beta.copy(), sigma=rotor.B * s.chord / (2.0 * np.pi * s.r),
         R=blade.R, Rhub=blade.Rhub, B=rotor.B, alpha=ALPHA_GRID, Re=Re, M2=M2,
         cl=_blended(w, cl), cd=_blended(w, cd), alpha0=w @ alpha0, cla=w @ cla,
-        onset=np.zeros((s.r.size, 2)), thickness=np.interp(rR, [x for x, _ in shapes], [t for _, t in shapes]),
+        Vx_factor=np.ones(s.r.size), Vy_factor=np.ones(s.r.size), Vx_add=np.zeros(s.r.size),
+        Vy_add=np.zeros(s.r.size), thickness=np.interp(rR, [x for x, _ in shapes], [t for _, t in shapes]),
         own_mach=w @ np.array([float(p.M.size > 1) for _, p in polars]),
         gap=duct.gap if duct is not None else float("nan"), ducted=duct is not None, level=level,
     )  # fmt: skip
@@ -280,18 +281,18 @@ def _numbers(bake: Baking, duct: DuctFlow | None) -> Array:
     """Numbers of effects and duct in the order of :mod:`bemt.bem.residual`."""
     n = bake.num
     num = np.zeros(res.N_NUM)
-    num[res.N_TIP] = n.get("tip", 0.0)
-    num[res.N_HUB] = n.get("hub", 0.0) if bake.Rhub > 0 else 0.0
-    num[res.N_FAR] = n.get("far_wake", 0.0)
-    num[res.N_SWIRL] = n.get("swirl", 0.0)
-    num[res.N_BRIDGE] = n.get("bridge", 0.0)
+    num[res.N_TIP] = n.tip
+    num[res.N_HUB] = n.hub if bake.Rhub > 0 else 0.0
+    num[res.N_FAR] = n.far_wake
+    num[res.N_SWIRL] = n.swirl
+    num[res.N_BRIDGE] = n.bridge
     if duct is not None:
         num[res.N_DUCTED] = 1.0
         num[res.N_WAKE] = 1.0 / duct.wake_ratio**2 + duct.wall_loss
         num[res.N_LIP] = duct.lip_loss
         num[res.N_STATOR] = duct.stator
-        num[res.N_GAP] = n.get("gap_share", 0.0)
-        num[res.N_LEAK] = n.get("gap_loss", 0.0)
+        num[res.N_GAP] = n.gap_share
+        num[res.N_LEAK] = n.gap_loss
     return num
 
 
@@ -475,8 +476,8 @@ def _radial(prep: Prepared, points: Array, rad: Array) -> dict[str, Array]:
     r = prep.st[:, K.S_R]
     res["r"] = np.broadcast_to(r, res["phi"].shape).copy()
     Omega, V, rho, mu, a_sound = (points[:, i, None] for i in range(K.N_POINT))
-    UT = Omega * r + prep.st[:, K.S_TANG]
-    UP = V + prep.st[:, K.S_AXIAL]
+    UT = Omega * r * prep.st[:, K.S_TANG_FACTOR] + prep.st[:, K.S_TANG]
+    UP = V * prep.st[:, K.S_AXIAL_FACTOR] + prep.st[:, K.S_AXIAL]
     with np.errstate(divide="ignore", invalid="ignore"):
         # induction factors relative to the onset speed; a is infinite at rest and reported as NaN
         res["a"] = np.where(UP != 0.0, res["w"] / UP - 1.0, np.nan)

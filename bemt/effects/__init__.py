@@ -35,13 +35,14 @@ def catalogue() -> dict[str, type[Effect]]:
         if info.name == "base":
             continue
         module = importlib.import_module(f"{__name__}.{info.name}")
-        for obj in vars(module).values():
-            if not (isinstance(obj, type) and issubclass(obj, Effect)):
-                continue
-            if obj is not Effect and obj.__module__ == module.__name__:
-                if obj.id in found:
-                    raise ValueError(f"two effects share the id {obj.id!r}")
-                found[obj.id] = obj
+        own = [obj for obj in vars(module).values() if isinstance(obj, type) and issubclass(obj, Effect)]
+        own = [obj for obj in own if obj.__module__ == module.__name__]
+        for obj in own:
+            if not obj.id and any(obj in other.__mro__[1:] for other in own):
+                continue  # what the effects of this file have in common
+            if not obj.id or obj.id in found:
+                raise ValueError(f"{obj.__module__}.{obj.__name__}: id {obj.id!r} is empty or taken; give it its own")
+            found[obj.id] = obj
     return dict(sorted(found.items(), key=lambda kv: (kv[1].order, kv[0])))
 
 

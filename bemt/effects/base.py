@@ -1,7 +1,7 @@
 """What an effect is, and the working records that effects change.
 
 An effect is a frozen dataclass with an ``id`` and hooks that are called in a fixed order.  The solver calls, once per
-rotor: ``blade`` (adds to beta) -> ``inflow`` (adds to the onset speeds) -> ``section`` (changes cl, cd tables) ->
+rotor: ``blade`` (adds to beta) -> ``inflow`` (scales and adds to Vx, Vy) -> ``section`` (changes cl, cd tables) ->
 ``momentum`` (sets the few numbers of the compiled kernel).  The model of a recording (:mod:`bemt.bem.forward`) calls,
 once per set of points: ``flow`` (what the rotor meets) before the solver, ``loads`` (thrust and torque) and ``reading``
 (what the instruments show) after it.  A hook that an effect does not have is not called.
@@ -68,7 +68,36 @@ def choice(name: str, value: str, lawful: tuple[str, ...]) -> None:
         raise ValueError(f"{name}={value!r}; expected {', '.join(lawful)}")
 
 
-@dataclass
+@dataclass(slots=True)
+class KernelNumbers:
+    """The numbers that effects may set for the compiled kernel; a name that is not here is an error.
+
+    Attributes
+    ----------
+    tip, hub : float
+        Factors on the exponents of the tip and hub losses; 0: no loss [1].
+    far_wake : float
+        1: the sheets of the tip loss follow the helix of the far wake, 0: that at the disk.
+    swirl : float
+        1: the swirl is taken up by the momentum balance, 0: it is left out.
+    bridge : float
+        1: an empirical curve where momentum theory fails, 0: momentum theory throughout.
+    gap_share : float
+        Ducted rotor: share of the open tip's loss, 0 sealed to 1 [1].
+    gap_loss : float
+        Ducted rotor: share of the blade force lost through the gap [1].
+    """
+
+    tip: float = 0.0
+    hub: float = 0.0
+    far_wake: float = 0.0
+    swirl: float = 0.0
+    bridge: float = 0.0
+    gap_share: float = 0.0
+    gap_loss: float = 0.0
+
+
+@dataclass(slots=True)
 class Baking:
     """Mutable record of one rotor while its effects are applied.
 
@@ -92,10 +121,12 @@ class Baking:
         Factor on cl and addition to cd that are kept apart from the tables; None: they are in them [1].
     alpha0, cla : (N, Nr) float
         Zero-lift angle [rad] and lift slope [1/rad] of the incompressible table.
-    num : dict
-        Numbers for the kernel (see :mod:`bemt.bem.solver`).
-    onset : (N, 2) float
-        Added axial and tangential speed [m/s].
+    num : KernelNumbers
+        Numbers for the kernel.
+    Vx_factor, Vy_factor : (N,) float
+        Factors on the axial and tangential onset speed of every point [1].
+    Vx_add, Vy_add : (N,) float
+        What is added to them then [m/s].
     thickness : (N,) float
         Largest thickness over chord [1].
     own_mach : (N,) float
@@ -124,13 +155,16 @@ class Baking:
     cd: Array
     alpha0: Array
     cla: Array
-    onset: Array
+    Vx_factor: Array
+    Vy_factor: Array
+    Vx_add: Array
+    Vy_add: Array
     thickness: Array
     own_mach: Array
     gap: float = float("nan")
     ducted: bool = False
     level: float = 1.0
-    num: dict[str, float] = field(default_factory=dict)
+    num: KernelNumbers = field(default_factory=KernelNumbers)
     mach_lift: Array | None = None
     mach_drag: Array | None = None
 
@@ -353,7 +387,10 @@ class Effect:
     on_by_default: ClassVar[bool] = True
 
     def __init_subclass__(cls) -> None:
-        """Refuse a parameter that would hide a hook."""
+        """Refuse a parameter that would hide a hook; an effect without notes has those of the one it comes from."""
+        if "    Notes\n" not in (cls.__doc__ or ""):
+            notes = next((n for b in cls.__mro__[1:] if (n := (b.__doc__ or "").partition("    Notes\n")[2])), "")
+            cls.__doc__ = (cls.__doc__ or "") + (f"\n\n    Notes\n{notes}" if notes else "")
         hidden = sorted(
             set(cls.__dict__.get("__annotations__", {})) & {n for n, v in vars(Effect).items() if callable(v)}
         )
@@ -366,7 +403,7 @@ class Effect:
         """Change blade angles; the base does nothing."""
 
     def inflow(self, bake: Baking) -> None:
-        """Add onset speeds; the base does nothing."""
+        """Scale and add to the onset speeds of the stations; the base does nothing."""
 
     def section(self, bake: Baking) -> None:
         """Change section tables; the base does nothing."""

@@ -25,4 +25,4 @@ class HighInduction(Effect):
 
     def momentum(self, bake: Baking) -> None:
         """Switch the bridge on."""
-        bake.num["bridge"] = 1.0
+        bake.num.bridge = 1.0

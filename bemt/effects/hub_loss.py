@@ -28,4 +28,4 @@ class HubLoss(Effect):
     def momentum(self, bake: Baking) -> None:
         """Switch the hub factor on."""
         if not bake.ducted:
-            bake.num["hub"] = self.strength
+            bake.num.hub = self.strength

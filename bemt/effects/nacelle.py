@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.effects.base import Effect, Flow, Loads, Parameter
+from bemt.effects.base import Baking, Effect, Flow, Loads, Parameter
 
 
 @dataclass(frozen=True)
@@ -18,10 +18,9 @@ class Nacelle(Effect):
     Half-body of radius a, that of the hub where ``body_over_R`` is smaller: a source of flux pi a^2 V one radius behind
     the disk slows the axial flow there by
     V deficit (1 + (r/a)^2)^-1.5, deficit 1/4 on the axis (Rankine 1871; Katz and Plotkin 2001, Low-Speed Aerodynamics,
-    sec. 3.10; not checked).  It scales with V, which a prepared rotor does not know, so the rotor meets its mean over
-    the disk with the weight r^2, the thrust of a blade of constant chord and lift coefficient.  The balance reads the
-    drag cd 1/2 rho V^2 pi a^2; 0.1 a spinner to 1.2 a bluff motor (Hoerner 1965, Fluid-Dynamic Drag, ch. 3; not
-    checked).  A rotor without hub counts a = R/10.  Motors, balances and fairings are often wider than the hub.
+    sec. 3.10; not checked), at each station its own.  The balance reads the drag cd 1/2 rho V^2 pi a^2; 0.1 a spinner
+    to 1.2 a bluff motor (Hoerner 1965, Fluid-Dynamic Drag, ch. 3; not checked).  A rotor without hub counts a = R/10.
+    Motors, balances and fairings are often wider than the hub.
     """
 
     deficit: float = 0.10
@@ -43,20 +42,17 @@ class Nacelle(Effect):
         """A body at rest in still air does nothing."""
         return "" if np.any(flow.V > 0.0) else "no point has airspeed"
 
-    def flow(self, flow: Flow) -> None:
-        """Slow the flow by the weighted mean deficit."""
-        a = self._radius(flow)
-        r = np.linspace(a, flow.R, 200)
-        mean = np.sum(r**2 * (1.0 + (r / a) ** 2) ** -1.5) / np.sum(r**2)
-        flow.V = flow.V * (1.0 - self.deficit * mean)
+    def inflow(self, bake: Baking) -> None:
+        """Slow the axial flow, most at the root."""
+        bake.Vx_factor = bake.Vx_factor * (1.0 - self.deficit * (1.0 + (bake.r / self._radius(bake)) ** 2) ** -1.5)
 
     def loads(self, loads: Loads, flow: Flow) -> None:
         """Take the drag of the body off the thrust."""
         area = np.pi * self._radius(flow) ** 2
         loads.T = loads.T - self.cd * 0.5 * flow.rho * flow.V * np.abs(flow.V) * area
 
-    def _radius(self, flow: Flow) -> float:
-        return max(flow.Rhub if flow.Rhub > 0.0 else 0.1 * flow.R, self.body_over_R * flow.R)
+    def _radius(self, rotor: Flow | Baking) -> float:
+        return max(rotor.Rhub if rotor.Rhub > 0.0 else 0.1 * rotor.R, self.body_over_R * rotor.R)
 
     def variants(self) -> tuple[dict[str, float], ...]:
         """Three bodies of three deficits, and six drags in ratio."""

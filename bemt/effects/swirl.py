@@ -24,4 +24,4 @@ class Swirl(Effect):
 
     def momentum(self, bake: Baking) -> None:
         """Switch the tangential balance on."""
-        bake.num["swirl"] = 1.0
+        bake.num.swirl = 1.0

@@ -42,8 +42,8 @@ class TipGap(Effect):
         if not bake.ducted:
             return
         gap, bake.level = bake.level * max(bake.gap, 0.0), 1.0
-        bake.num["gap_share"] = 1.0 - math.exp(-gap / (self.scale * bake.R))
-        bake.num["gap_loss"] = min(self.loss * gap / (bake.R - bake.Rhub), 0.5)
+        bake.num.gap_share = 1.0 - math.exp(-gap / (self.scale * bake.R))
+        bake.num.gap_loss = min(self.loss * gap / (bake.R - bake.Rhub), 0.5)
 
     def share(self, flow: Flow) -> Array | None:
         """Recorded gap over the largest recorded one."""

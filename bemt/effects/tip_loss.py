@@ -38,5 +38,5 @@ class TipLoss(Effect):
 
     def momentum(self, bake: Baking) -> None:
         """Switch the tip factor on."""
-        bake.num["tip"] = self.strength
-        bake.num["far_wake"] = float(self.sheets == "wake")
+        bake.num.tip = self.strength
+        bake.num.far_wake = float(self.sheets == "wake")

@@ -1,20 +1,26 @@
-"""Section tables from NeuralFoil: kept within what it knows, continued to +-180 degrees, cached by content."""
+"""Section tables from NeuralFoil: kept within what it knows, continued to +-180 degrees, cached by content.
+
+:func:`neuralfoil_polar` is what the section of a propeller gets (the rule of :mod:`bemt.sections.rule`),
+:func:`tunnel_polar` a smooth section in an ordinary wind tunnel.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base import cache
+from bemt.sections import rule
 from bemt.sections.extrapolation import METHODS, extend, viterna_cd_max
 from bemt.sections.polars import ALPHA_GRID, DEFAULT_RE, Polar, first_stall
 
 if TYPE_CHECKING:
     from geometry.airfoil import Airfoil
 
-__all__ = ["neuralfoil_polar"]
+__all__ = ["neuralfoil_polar", "tunnel_polar"]
 
 Array = NDArray[np.float64]
 
@@ -48,12 +54,40 @@ def _confident_range(alpha: Array, cl: Array, confidence: Array, past_stall: flo
     return -edge[1], edge[0]
 
 
-def neuralfoil_polar(
+def neuralfoil_polar(airfoil: Airfoil, n_crit: float = rule.N_CRIT, drag_level: float = rule.DRAG_LEVEL) -> Polar:
+    """Section table of a propeller blade by the general rule of :mod:`bemt.sections.rule`.
+
+    Parameters
+    ----------
+    airfoil : geometry.airfoil.Airfoil
+        Section in Selig order, unit chord.
+    n_crit : float
+        Critical amplification factor at small Reynolds numbers [1].
+    drag_level : float
+        Factor on the drag of the smooth section at small Reynolds numbers [1].
+
+    Returns
+    -------
+    Polar
+        On the shared grids; from Re 6e5 on the table of the smooth section at n_crit 9.
+    """
+    small = tunnel_polar(airfoil, n_crit=n_crit, lift_floor=0.0)
+    large = tunnel_polar(airfoil, n_crit=max(n_crit, rule.N_CRIT_LARGE))
+    w = np.clip(np.log(DEFAULT_RE / rule.SMALL_RE) / np.log(2.0), 0.0, 1.0)[None, :, None]
+    return dataclasses.replace(
+        small,
+        cl=(1.0 - w) * small.cl + w * large.cl,
+        cd=(1.0 - w) * small.cd * drag_level + w * large.cd,
+        source=f"{small.source}; general rule: n_crit {n_crit:g} and drag x{drag_level:g} below Re {rule.SMALL_RE:.0e}",
+    )
+
+
+def tunnel_polar(
     airfoil: Airfoil, *, re: Array = DEFAULT_RE, n_crit: float = 9.0, xtr_upper: float = 1.0,
     xtr_lower: float = 1.0, model: str = "xlarge", ar: float = 10.0, cd_max: float | None = None,
     method: str = "viterna", past_stall: float = np.pi, lift_floor: float = 0.5,
 ) -> Polar:  # fmt: skip
-    """Incompressible polar of a section from NeuralFoil, continued to +-180 deg, cached on disk by content.
+    """Incompressible polar of a smooth section in a wind tunnel, continued to +-180 deg, cached on disk by content.
 
     Parameters
     ----------

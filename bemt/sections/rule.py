@@ -11,7 +11,7 @@ what it is reported on (``reports/validation``): held out of every fit, though l
   scaled); with them static CT of volume 1 is off by 5.3 % in the median, with the rule by 3.7 %: not taken.
 * Transition: n_crit 3.  Rotating small blades keep their lift down to Re 20,000, which n_crit 9 does not (static CT
   at Re 20,000-30,000 relative to the same propellers' top speed: -14 to -16 % with n_crit 9, -3 to +3 % with 3).
-* Lift at small angles and Re below 20,000: as computed, without the bound of :func:`neuralfoil_polar` (``lift_floor``),
+* Lift at small angles and Re below 20,000: as computed, without the bound of :func:`tunnel_polar` (``lift_floor``),
   which is for n_crit 9.  Volume 1 cannot tell (static CT 3.6 with the bound, 3.7 % without; zero-thrust J 3.4, 3.3 %);
   it was taken out with volume 2 in view (8.8, 7.9 %).
 * Drag: 1.1 times the smooth section's, for moulded blades: static CP of volume 1 is then right in the median (-1.7 %
@@ -20,7 +20,6 @@ what it is reported on (``reports/validation``): held out of every fit, though l
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
@@ -29,7 +28,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 if TYPE_CHECKING:
-    from bemt.sections.polars import Polar
     from geometry.airfoil import Airfoil
 
 N_CRIT = 3.0
@@ -163,34 +161,3 @@ def airfoil(section: RuleSection) -> Airfoil:
     if section.shape == "naca4":
         return naca4(section.camber, section.position, section.thickness)
     return thickened(published(section.shape), section.thickness)
-
-
-def polar(shape: Airfoil, n_crit: float = N_CRIT, drag_level: float = DRAG_LEVEL) -> Polar:
-    """Section table of the rule: NeuralFoil with the rule's transition and drag level.
-
-    Parameters
-    ----------
-    shape : geometry.airfoil.Airfoil
-        RuleSection.
-    n_crit : float
-        Critical amplification factor at small Reynolds numbers [1].
-    drag_level : float
-        Factor on the drag of the smooth section at small Reynolds numbers [1].
-
-    Returns
-    -------
-    Polar
-        On the shared grids; from Re 6e5 on the table of the smooth section at n_crit 9.
-    """
-    from bemt.sections.neuralfoil import neuralfoil_polar
-    from bemt.sections.polars import DEFAULT_RE
-
-    small = neuralfoil_polar(shape, n_crit=n_crit, lift_floor=0.0)
-    large = neuralfoil_polar(shape, n_crit=max(n_crit, N_CRIT_LARGE))
-    w = np.clip(np.log(DEFAULT_RE / SMALL_RE) / np.log(2.0), 0.0, 1.0)[None, :, None]
-    return dataclasses.replace(
-        small,
-        cl=(1.0 - w) * small.cl + w * large.cl,
-        cd=(1.0 - w) * small.cd * drag_level + w * large.cd,
-        source=f"{small.source}; general rule: n_crit {n_crit:g} and drag x{drag_level:g} below Re {SMALL_RE:.0e}",
-    )

@@ -144,13 +144,13 @@ def compare(
     from bemt.air import Air
     from bemt.bem import solver
     from bemt.sections import polars
-    from bemt.sections import rule as section_rule
+    from bemt.sections.neuralfoil import neuralfoil_polar
 
     air = Air.from_density()
     rotor = build(propeller, stations)
     tables = []
     for x, shape in rotor.blade.anchors:
-        table = section_rule.polar(shape)
+        table = neuralfoil_polar(shape)
         tables.append((x, polars.fixed_re(table, fixed_re) if fixed_re else table))
     prep = solver.prepare(rotor, tables, effects, n_stations=N_STATIONS, mach_max=0.7)
     static: list[NDArray[np.bool_]] = []

@@ -1,4 +1,4 @@
-"""Drift of the torque cell."""
+"""Drift of a load cell."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ TARED = ("run", "once")
 
 
 @dataclass(frozen=True)
-class TorqueDrift(Effect):
+class Drift(Effect):
     """The zero of the cell creeps with time from the start of a run, and follows temperature.
 
     Notes
@@ -28,15 +28,9 @@ class TorqueDrift(Effect):
     thermal: float = 0.0
     tared: str = "run"
 
-    id = "torque_drift"
-    title = "drift of the torque cell"
     along = ("time_s",)
-    sign = (
-        "torque follows clock or temperature, not the condition: the same point reads otherwise later; thrust does not"
-    )
     kind = "stand"
     fault = "drift"
-    sensor = "torque_Nm"
     parameters = (
         Parameter("zero", "1", -0.10, 0.10, "declared, share of full scale", 3, 0.0),
         Parameter("tau_s", "s", 60.0, 1800.0, "warm-up of strain-gauge cells, 1 to 30 min", 4),
@@ -57,7 +51,7 @@ class TorqueDrift(Effect):
     def reading(self, reading: Reading, flow: Flow) -> None:
         """Shift the channel."""
         share = self.zero * -np.expm1(-self._elapsed(flow) / self.tau_s) + self.thermal * flow.warming
-        reading.values["torque_Nm"] = reading.values["torque_Nm"] + share * reading.full_scale["torque_Nm"]
+        reading.values[self.sensor] = reading.values[self.sensor] + share * reading.full_scale[self.sensor]
 
     def _elapsed(self, flow: Flow) -> Array:
         """Time since the cell was set to zero, (P,) [s]."""
@@ -78,3 +72,25 @@ class TorqueDrift(Effect):
             {"zero": 0.0, "tau_s": 300.0, "thermal": a / 4000.0, "tared": "run"} for a in range(-12, 13) if a
         ]
         return (*creep, *warm)
+
+
+class ThrustDrift(Drift):
+    """The zero of the thrust cell creeps with time from the start of a run, and follows temperature."""
+
+    id = "thrust_drift"
+    title = "drift of the thrust cell"
+    sign = (
+        "thrust follows clock or temperature, not the condition: the same point reads otherwise later; torque does not"
+    )
+    sensor = "thrust_N"
+
+
+class TorqueDrift(Drift):
+    """The zero of the torque cell creeps with time from the start of a run, and follows temperature."""
+
+    id = "torque_drift"
+    title = "drift of the torque cell"
+    sign = (
+        "torque follows clock or temperature, not the condition: the same point reads otherwise later; thrust does not"
+    )
+    sensor = "torque_Nm"

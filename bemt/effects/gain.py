@@ -1,0 +1,47 @@
+"""Calibration factor of a load cell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from bemt.effects.base import Effect, Flow, Parameter, Reading
+
+
+@dataclass(frozen=True)
+class Gain(Effect):
+    """The cell shows (1 + gain) times its load.
+
+    Notes
+    -----
+    Linear calibration error of a load cell (ISO 376:2011 states it as a relative error; not checked).  The range of
+    +-10 % is declared: wrong arm, wrong calibration mass or another cell's factor.
+    """
+
+    gain: float = 0.03
+
+    kind = "stand"
+    fault = "gain"
+    parameters = (Parameter("gain", "1", -0.10, 0.10, "declared, workshop calibration", 3, 0.0),)
+    on_by_default = False
+
+    def reading(self, reading: Reading, flow: Flow) -> None:
+        """Scale the channel."""
+        reading.values[self.sensor] = reading.values[self.sensor] * (1.0 + self.gain)
+
+
+class ThrustGain(Gain):
+    """The thrust cell shows (1 + gain) times the thrust."""
+
+    id = "thrust_gain"
+    title = "calibration factor of the thrust cell"
+    sign = "thrust off by one factor at every speed and airspeed while torque is right; air would move both"
+    sensor = "thrust_N"
+
+
+class TorqueGain(Gain):
+    """The torque cell shows (1 + gain) times the torque."""
+
+    id = "torque_gain"
+    title = "calibration factor of the torque cell"
+    sign = "torque off by one factor at every speed and airspeed while thrust is right; air would move both"
+    sensor = "torque_Nm"
