@@ -15,9 +15,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import G0, ZERO_CELSIUS
@@ -409,3 +411,23 @@ class Air:
         molar = _M_DRY * (1.0 - x) + _M_WATER * x
         a = math.sqrt(cp / (cp - 1.0) * _R_GAS * T / molar)
         return cls(rho, sutherland(T), a, T, f"{p:g} Pa, {t:g} degC, {humidity_pct:g} % (CIPM-2007)")
+
+
+def air_arrays(states: Sequence[Air], index: NDArray[np.intp]) -> Air:
+    """One state of the air per point.
+
+    Parameters
+    ----------
+    states : sequence of Air
+        Distinct states.
+    index : (P,) int
+        Which one holds at each point.
+
+    Returns
+    -------
+    Air
+        An object whose rho, mu, a_sound and temperature_K are (P,) arrays.
+    """
+    names = ("rho", "mu", "a_sound", "temperature_K")
+    fields = {name: np.array([getattr(s, name) for s in states], dtype=float)[index] for name in names}
+    return cast("Air", SimpleNamespace(**fields))

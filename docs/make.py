@@ -11,8 +11,8 @@ import re
 import sys
 from pathlib import Path
 
-from bemt.bem import evaluate
 from bemt.case import Case, load_case
+from bemt.case.prepare import prepare_case
 from bemt.diagnose.nuisance import PRIORS
 from bemt.report import effects_list
 
@@ -54,8 +54,8 @@ def gallery(cases: list[Case]) -> str:
         "[report](../reports/report.md).", "",
     ]  # fmt: skip
     for case in cases:
-        ready = evaluate.prepare(case)
-        row = evaluate.evaluate(ready, case.rpm, case.airspeed_m_s, case.air())
+        ready = prepare_case(case)
+        row = ready.solve(case.rpm, case.airspeed_m_s, case.air())
         kind = "duct cut open" if ready.ducted else "rotor"
         lines += [
             f"## {case.name}", "", case.title, "", f"![{case.title}: {kind}](img/{picture(case)})", "",

@@ -16,8 +16,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.lines import Line2D
 
-from bemt.bem import evaluate
 from bemt.case import load_case
+from bemt.case.prepare import k1k2_case, prepare_case
 from bemt.compare.sweep import sweep
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -75,13 +75,13 @@ def thrusts(ax: Any) -> dict[str, float]:
 def curves(ax: Any) -> None:
     """CT and CP of the 8x5 over advance ratio."""
     case = load_case(ROOT / "cases" / "prop_8x5" / "case.toml")
-    ready = evaluate.prepare(case)
+    ready = prepare_case(case)
     air = case.air()
     J = np.linspace(0.0, 1.0, 101)
     rpm = np.full(J.size, 20000.0)
     V = J * rpm / 60.0 * ready.diameter_m
-    points = evaluate.evaluate(ready, rpm, V, air)
-    formula = evaluate.k1k2(case, None, rpm, V, air)
+    points = ready.solve(rpm, V, air)
+    formula = k1k2_case(case, None, rpm, V, air)
     ax.plot(J, points.CT, color="#0072B2", lw=2, label="CT, BEMT")
     ax.plot(J, formula.CT, color="#E69F00", lw=2, ls="--", label="CT, K1/K2 formula")
     ax.plot(J, points.CP, color="#D55E00", lw=2, ls="-.", label="CP, BEMT")

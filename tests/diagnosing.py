@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from bemt import effects
-from bemt.bem import evaluate, forward
+from bemt.bem import model as bem
 from bemt.case import Case, load_case
+from bemt.case.prepare import prepare_case
 from bemt.dataset import Dataset
 from bemt.diagnose import chain, record
 from bemt.effects.base import Effect, Reading
@@ -45,14 +46,14 @@ def recording(
 ) -> Dataset:  # fmt: skip
     """What a stand would record of a case with effects on, instruments included."""
     rng = np.random.default_rng(seed)
-    ready = evaluate.prepare(truth)
+    ready = prepare_case(truth)
     ids = {e.id for e in extra}
     chosen = (*(e for e in ready.effects if e.id not in ids), *extra)
     ready = replace(ready, effects=chosen)
     base = record.from_series(Dataset("bench", "x", {**given, "thrust_N": np.ones_like(given["rpm"])}), truth)
-    plain = [e for e in chosen if not forward.acts_on_points(e)]
-    flow = forward.flow_of(ready.model.prepared(plain), base.rpm, base.V, base.air, base.extra)
-    loads, met, ok = forward.respond(ready.model.prepared, chosen, flow)
+    plain = [e for e in chosen if not bem.acts_on_points(e)]
+    flow = bem.flow_of(ready.prepared(plain), base.rpm, base.V, base.air, base.extra)
+    loads, met, ok = bem.respond(ready.prepared, chosen, flow)
     assert ok.all()
     top = {"thrust_N": float(np.abs(flow.T0).max()), "torque_Nm": float(np.abs(flow.Q0).max())}
     reading = Reading({"thrust_N": loads.T.copy(), "torque_Nm": loads.Q.copy()}, top)

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from diagnosing import CASES, case, points, recording
 
-from bemt.bem.evaluate import prepare
 from bemt.case import load_case
+from bemt.case.prepare import prepare_case
 from bemt.commands.cli import build_parser, main
 from bemt.dataset import Dataset
 from bemt.diagnose import chain, document, problem, record
@@ -37,7 +37,7 @@ def test_an_improved_case_stands_as_long_as_its_answer_does(tmp_path: Path) -> N
     assert main(["diagnose", file, "--case", str(CASES / "prop_8x5"), "--off", "compressibility", *plain]) == 0
     answer = json.loads((out / "diagnosis.json").read_text())
     assert (answer["verdict"], answer["effects"]) == ("named", ["compressibility"])
-    assert "compressibility" in [e.id for e in prepare(load_case(out)).effects]
+    assert "compressibility" in [e.id for e in prepare_case(load_case(out)).effects]
     assert main(["diagnose", file, "--case", str(CASES / "prop_8x5"), *plain]) == 0
     assert json.loads((out / "diagnosis.json").read_text())["verdict"] == "none"
     assert not (out / "case.toml").exists()
@@ -59,7 +59,7 @@ def test_each_case_has_its_improved_one(tmp_path: Path, capsys: pytest.CaptureFi
     assert not (out / "case.toml").exists()
     for name in names:
         improved = load_case(out / name)
-        assert improved.name == name and "compressibility" in [e.id for e in prepare(improved).effects]
+        assert improved.name == name and "compressibility" in [e.id for e in prepare_case(improved).effects]
         assert main(["sweep", str(out / name), "--quiet"]) == 0
     # the next answer is of one case: the folders of the two are no answer any more
     alone = ["diagnose", files[0], "--case", str(CASES / names[0]), "--off", "compressibility", *plain]
@@ -219,7 +219,7 @@ def test_the_improved_case_runs_however_the_case_is_written(tmp_path: Path, form
     run = ["diagnose", _recorded(tmp_path / "log.csv", 0), "--case", str(own), *off, "--out", str(out), "--no-figures"]
     assert main([*run, "--quiet"]) == 0
     improved = load_case(out)
-    assert "compressibility" in [e.id for e in prepare(improved).effects]
+    assert "compressibility" in [e.id for e in prepare_case(improved).effects]
     assert improved.get("model.drag_level") == 1.1
     assert {p.name for p in (tmp_path / "results").iterdir()} == {"out"}
     assert main(["sweep", str(out), "--quiet"]) == 0

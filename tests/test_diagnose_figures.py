@@ -10,8 +10,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bemt.bem import evaluate
 from bemt.case import load_case
+from bemt.case.prepare import prepare_case
 from bemt.dataset import Dataset
 from bemt.diagnose import canvas, chain, confusion, figures, figures_effects, fit, record
 from bemt.diagnose.explanation import NONE, Explanation
@@ -26,7 +26,7 @@ def named(project: Path) -> chain.Diagnosis:
     case = load_case(project / "cases" / "prop_8x5" / "case.toml")
     rpm, J = (a.ravel() for a in np.meshgrid([8000.0, 15000.0, 22000.0], [0.0, 0.2, 0.4, 0.6]))
     V = J * rpm / 60.0 * case.diameter_m
-    points = evaluate.evaluate(evaluate.prepare(case, None, 24), rpm, V, case.air())
+    points = prepare_case(case, None, 24).solve(rpm, V, case.air())
     noise = np.random.default_rng(1).standard_normal((2, rpm.size))
     u = {"thrust_N": 0.01 * points.thrust_N, "torque_Nm": 0.01 * points.torque_Nm}
     values = {"rpm": rpm, "airspeed_m_s": V, "density_kg_m3": np.full(rpm.size, 1.225),

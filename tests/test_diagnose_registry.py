@@ -11,7 +11,7 @@ import pytest
 from diagnosing import case, diagnose, left_out, points, recording
 
 from bemt import effects
-from bemt.bem import forward
+from bemt.bem import model as bem
 from bemt.case import Case
 from bemt.dataset import Dataset
 from bemt.diagnose import document, evidence, gate, plan, problem, record, signatures, verdict
@@ -59,7 +59,7 @@ def test_what_a_plan_sees_is_named_and_nothing_else(name: str) -> None:
         return
     extra: tuple[effects.Effect, ...] = (effect_of(name, found[0].settings[found[0].middle]),)  # as strong as planned
     if effects.catalogue()[name].kind == "drive":  # the same pulse width gives another speed
-        flow = forward.flow_of(problem.build([rec], [baseline]).parts[0].model.prepared([]), rec.rpm, rec.V, rec.air,
+        flow = bem.flow_of(problem.build([rec], [baseline]).parts[0].model.prepared([]), rec.rpm, rec.V, rec.air,
                                rec.extra)  # fmt: skip
         reading = Reading({"rpm": rec.rpm.copy()}, {"rpm": float(rec.rpm.max())})
         extra[0].reading(reading, flow)

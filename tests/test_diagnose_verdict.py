@@ -11,7 +11,7 @@ import pytest
 from diagnosing import case, diagnose, left_out, points, recording
 
 from bemt import effects
-from bemt.bem import forward
+from bemt.bem import model as bem
 from bemt.diagnose import blocks, chain, confusion, fit, prior, verdict
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
 
@@ -122,7 +122,7 @@ def test_a_wrong_airspeed_is_that_of_the_tunnel_not_of_the_wall(answer: chain.Di
     part = answer.problem.parts[0]
 
     def thrust(*extra: effects.Effect) -> np.ndarray:
-        return forward.respond(part.model.prepared, (*part.baseline, *extra), still)[0].T
+        return bem.respond(part.model.prepared, (*part.baseline, *extra), still)[0].T
 
     assert np.array_equal(thrust(wall, slip), thrust(wall)) and np.all(thrust(wall) > thrust())
 

@@ -329,15 +329,15 @@ def test_the_changelog_speaks_of_this_version(project: Path) -> None:
 
 
 def test_the_picture_shows_today_s_numbers(project: Path, maker: ModuleType) -> None:
-    from bemt.bem import evaluate
     from bemt.case import load_case
+    from bemt.case.prepare import prepare_case
 
     text = png_text((project / "docs" / "img" / "overview.png").read_bytes())
     drawn = json.loads(text["bemt"])["thrust_N"]
     assert set(drawn) == set(maker.CASES)
     for name, thrust in drawn.items():
         case = load_case(project / "cases" / name / "case.toml")
-        ours = evaluate.evaluate(evaluate.prepare(case), case.rpm, case.airspeed_m_s, case.air()).thrust_N[0]
+        ours = prepare_case(case).solve(case.rpm, case.airspeed_m_s, case.air()).thrust_N[0]
         assert thrust == pytest.approx(ours, rel=0.01), f"{name}: picture out of date; run python docs/overview.py"
 
 

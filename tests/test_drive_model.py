@@ -204,12 +204,12 @@ def test_a_planted_inertia_is_found_from_a_step() -> None:
 
 
 def test_the_rotor_of_a_case_is_the_solver_s(project: Path) -> None:
-    from bemt.bem import evaluate
     from bemt.case import load_case
+    from bemt.case.prepare import prepare_case
 
     case = load_case(project / "cases" / "prop_8x5" / "case.toml")
     rpm = np.array([4000.0, 9000.0, 20000.0])
-    points = evaluate.evaluate(evaluate.prepare(case), rpm, 0.0, case.air())
+    points = prepare_case(case).solve(rpm, 0.0, case.air())
     table = rotor_table.from_case(case, 20000.0, air=case.air(), points=17)
     assert np.allclose(table.thrust(rpm * math.pi / 30.0), points.thrust_N, rtol=5e-3)
     assert np.allclose(table.torque(rpm * math.pi / 30.0), points.torque_Nm, rtol=5e-3)

@@ -18,9 +18,11 @@ from bemt import effects
 from bemt.air import Air
 from bemt.base.errors import InputError
 from bemt.bem import duct as duct_model
-from bemt.bem import evaluate, forward, solver
 from bemt.bem import kernel as K
+from bemt.bem import model as bem
+from bemt.bem import solver
 from bemt.case import load_case
+from bemt.case.prepare import prepare_case
 from bemt.effects.base import Array, Baking, Effect, Flow, Parameter, Reading
 from bemt.sections.extrapolation import ExtrapolatedTable, from_tables
 from bemt.sections.polars import Polar
@@ -84,26 +86,26 @@ def section_table() -> Polar:
     return from_tables(tables, name="closed form", source="made for tests")
 
 
-def model(label: str) -> forward.Model:
+def model(label: str) -> bem.Model:
     trial, duct = trials()[label], None
     if trial.ducted:
         shape = around(trial.rotor, 0.06, 0.0004, 0.004, exit_area_ratio=0.95, stator=Stator(5, 0.02))
         duct = duct_model.duct_flow(shape, trial.rotor)
-    return forward.Model(trial.rotor, [(0.7, section_table())], duct, 12)
+    return bem.Model(trial.rotor, [(0.7, section_table())], duct, 12)
 
 
 @cache
-def kept(label: str) -> tuple[forward.Model, Flow]:
+def kept(label: str) -> tuple[bem.Model, Flow]:
     trial, ours = trials()[label], model(label)
     extra = {k: np.array(v) for k, v in trial.extra.items()}
     base = ours.prepared(effects.standard())
-    return ours, forward.flow_of(base, trial.rpm, trial.V, Air.from_density(1.225), extra)
+    return ours, bem.flow_of(base, trial.rpm, trial.V, Air.from_density(1.225), extra)
 
 
-def readings(label: str, chosen: Sequence[Effect], ours: forward.Model | None = None) -> np.ndarray:
+def readings(label: str, chosen: Sequence[Effect], ours: bem.Model | None = None) -> np.ndarray:
     """Thrust, torque, duct thrust and what the instruments show, (6, P)."""
     cached, flow = kept(label)
-    loads, met, ok = forward.respond((ours or cached).prepared, chosen, flow)
+    loads, met, ok = bem.respond((ours or cached).prepared, chosen, flow)
     nan = np.where(ok, 1.0, np.nan)
     shown = Reading({"thrust_N": loads.T * nan, "torque_Nm": loads.Q * nan, "rpm": flow.rpm.copy()},
                     {"thrust_N": 1.0, "torque_Nm": 0.1, "rpm": 9000.0})  # fmt: skip
@@ -232,7 +234,7 @@ def test_off_is_the_baseline_to_the_bit(name: str, label: str) -> None:
     }
     baseline = readings(label, rest(name))
     readings(label, with_(CATALOGUE[name]()))
-    again = model(label) if forward.acts_on_rotor(CATALOGUE[name]()) else None
+    again = model(label) if bem.acts_on_rotor(CATALOGUE[name]()) else None
     assert np.array_equal(readings(label, rest(name), again), baseline, equal_nan=True)
     # no hook has written into the rotor, the tables or the recording
     assert trial.rotor.key() == blade_before
@@ -256,7 +258,7 @@ def test_a_case_switches_an_effect(name: str, project: Path) -> None:
     case = load_case(project / "cases" / "prop_8x5" / "case.toml")
 
     def ids(key: str) -> list[str]:
-        return [e.id for e in evaluate.prepare(case, {key: [name], "model.stations": 10}).effects]
+        return [e.id for e in prepare_case(case, {key: [name], "model.stations": 10}).effects]
 
     assert name in ids("model.effects_on") and name not in ids("model.effects_off")
     assert {*ids("model.effects_off"), name} == {*ids("model.effects_on")}
@@ -286,9 +288,9 @@ def test_unknown_effects_are_refused(project: Path) -> None:
         effects.without(effects.standard(), ["tiploss"])
     case = load_case(project / "cases" / "prop_8x5" / "case.toml")
     with pytest.raises(InputError, match=r"'tiploss'; expected one of .*Did you mean tip_loss\?"):
-        evaluate.prepare(case, {"model.effects_off": ["tiploss"]})
+        prepare_case(case, {"model.effects_off": ["tiploss"]})
     with pytest.raises(InputError, match=r"effects_on\[1\]: got 'swirl\(\)' after 'swirl'; expected each effect once"):
-        evaluate.prepare(case, {"model.effects_on": ["swirl()", "swirl()"]})
+        prepare_case(case, {"model.effects_on": ["swirl()", "swirl()"]})
 
 
 @dataclasses.dataclass(frozen=True)

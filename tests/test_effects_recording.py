@@ -11,7 +11,7 @@ import pytest
 
 from bemt import effects
 from bemt.air import Air
-from bemt.bem import forward
+from bemt.bem import model as bem
 from bemt.effects.air_density import AirDensity
 from bemt.effects.airspeed_offset import AirspeedOffset
 from bemt.effects.base import Effect, Flow, Loads, Reading
@@ -42,16 +42,16 @@ FULL = {"thrust_N": 40.0, "torque_Nm": 0.8, "rpm": 9000.0}
 
 
 @cache
-def model() -> forward.Model:
-    return forward.Model(Rotor(helix(0.254, 0.127, hub=0.12), 2), [(0.7, linear_polar(cd=0.012))], None, 16)
+def model() -> bem.Model:
+    return bem.Model(Rotor(helix(0.254, 0.127, hub=0.12), 2), [(0.7, linear_polar(cd=0.012))], None, 16)
 
 
 def recorded(rpm: Array | list[float], V: Array | list[float] | float = 0.0, **extra: Array) -> Flow:
-    return forward.flow_of(model().prepared(effects.standard()), rpm, V, Air.from_density(1.2), extra)
+    return bem.flow_of(model().prepared(effects.standard()), rpm, V, Air.from_density(1.2), extra)
 
 
 def loads(flow: Flow, *more: Effect) -> tuple[Array, Array]:
-    found, _, ok = forward.respond(model().prepared, (*effects.standard(), *more), flow)
+    found, _, ok = bem.respond(model().prepared, (*effects.standard(), *more), flow)
     assert ok.all()
     return found.T, found.Q
 
@@ -247,7 +247,7 @@ def test_a_slip_touches_one_channel() -> None:
 )
 def test_a_stand_error_of_readings_leaves_the_air_alone(name: str) -> None:
     cls = effects.catalogue()[name]
-    assert not forward.acts_on_rotor(cls()) and "loads" not in vars(cls)
+    assert not bem.acts_on_rotor(cls()) and "loads" not in vars(cls)
     assert "flow" not in vars(cls) or name == "unit_slip"
 
 

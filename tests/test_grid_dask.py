@@ -20,8 +20,8 @@ from test_sweep import make_case, read_grid, tree
 
 from bemt.base.errors import InputError
 from bemt.base.tables import json_text
-from bemt.bem.evaluate import evaluate, prepare
 from bemt.case import load_case
+from bemt.case.prepare import prepare_case
 from bemt.commands.cli import main
 from bemt.compare.grid import run as grid_module
 from bemt.compare.grid.run import Grid, Solver
@@ -200,7 +200,7 @@ def test_parquet_keeps_every_bit_in_the_order_of_csv(tmp_path: Path) -> None:
     columns = {name: table[name].to_numpy() for name in names}
     for i, row in enumerate(rows):
         overrides = {"blade.pitch_in": columns["pitch_in"][i], "air.altitude_m": columns["altitude_m"][i]}
-        single = evaluate(prepare(case, overrides), columns["rpm"][i], columns["airspeed_m_s"][i], case.air(overrides))
+        single = prepare_case(case, overrides).solve(columns["rpm"][i], columns["airspeed_m_s"][i], case.air(overrides))
         for name, value in zip(names, row, strict=True):
             exact = columns[name][i]
             assert value == pytest.approx(float(exact), rel=1e-6, abs=1e-90, nan_ok=True), name

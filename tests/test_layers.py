@@ -48,9 +48,6 @@ ROOMS: tuple[str, ...] = (
     "commands|commands.*",
     "__main__",
 )
-# Files that stand higher than their room until they are parted.
-HIGHER = {"bem.evaluate": "case|case.*"}
-
 # What may touch the world outside, and how. What is not named touches nothing.
 MAY: dict[str, set[str]] = {
     "bemt.commands.*": {"print", "files", "environment"},  # and nothing else prints
@@ -58,7 +55,6 @@ MAY: dict[str, set[str]] = {
     "bemt.base.folders": {"environment"},
     "bemt.base.tables|bemt.base.toml": {"files"},
     "bemt.case|bemt.case.*": {"files"},
-    "bemt.bem.evaluate": {"files"},
     "bemt.readers|bemt.readers.*": {"files"},
     "bemt.recordings.adapt|bemt.recordings.archive|bemt.recordings.database|bemt.recordings.load": {"files"},
     "bemt.formula.gather": {"files"},
@@ -101,7 +97,7 @@ def match(name: str, room: str) -> bool:
 def place(module: str) -> tuple[int, str] | None:
     """Floor and room of a module of bemt."""
     name = module.removeprefix("bemt.")
-    room = HIGHER.get(name) or next((room for room in ROOMS if match(name, room)), None)
+    room = next((room for room in ROOMS if match(name, room)), None)
     return None if room is None else (ROOMS.index(room), room)
 
 
@@ -283,7 +279,7 @@ def test_the_tree_keeps_the_rules(tree: dict[str, str]) -> None:
         ("bemt.base.units", "from bemt.air import Air", "bemt.air is not below it"),
         ("bemt.base.units", "from bemt.bem import solver", "bemt.bem.solver is not below it"),
         ("bemt.sections.polars", "def f():\n    from bemt.bem.solver import solve", "bemt.bem.solver is not below it"),
-        ("bemt.bem.solver", "import bemt.bem.evaluate", "bemt.bem.evaluate is not below it"),
+        ("bemt.bem.model", "import bemt.case.prepare", "bemt.case.prepare is not below it"),
         ("bemt.effects.swirl", "import bemt.effects.tip_loss", "an effect is one file, got bemt.effects.tip_loss"),
         ("bemt.effects.swirl", "from bemt.readers import read", "bemt.readers is not below it"),
         ("bemt.compare.sweep.batch", "from bemt.cfd import worker", "bemt.cfd.worker is not below it"),
@@ -317,7 +313,7 @@ def test_the_tree_keeps_the_rules(tree: dict[str, str]) -> None:
         ("bemt.proof.truth_world", "def f():\n    from bemt.effects import standard", "must not see bemt.effects"),
         ("bemt.proof.truth_duct", "from bemt.bem import duct", "must not see bemt.bem.duct"),
         ("bemt.proof.stand", "from bemt.compare import sweep",
-         "must not see bemt.bem.evaluate through bemt.compare.sweep"),
+         "must not see bemt.bem.model through bemt.compare.sweep"),
         ("bemt.proof.truth_section", "from bemt import case", "must not see bemt.sections.rule through bemt.case"),
         ("bemt.base.tables", "def f():\n    import bemt.sections.polars", "bemt.sections.polars is not below it"),
     ],
@@ -355,7 +351,7 @@ def test_what_needs_it_may_import_and_touch() -> None:
             "bemt.bem.kernel": "import numba",
             "bemt.readers": "import os\ndef f(p: 'os.PathLike[str]'):\n    return open(p)",
             "bemt.bem.duct": "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import bemt.compare",
-            "bemt.bem.evaluate": "from bemt.bem import duct",
+            "bemt.bem.model": "from bemt.bem import duct",
         }
     )
 

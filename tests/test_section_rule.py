@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bemt.bem import evaluate, solver
+from bemt.bem import solver
 from bemt.case import load_case
+from bemt.case.prepare import prepare_case
 from bemt.compare.validate.propellers import validate
 from bemt.effects import catalogue, standard
 from bemt.sections import neuralfoil
@@ -125,5 +126,5 @@ def test_a_script_gives_the_thrust_of_the_case(tmp_path: Path) -> None:
     rotor = Rotor(helix(0.2032, 0.127, anchors=section), B=2)
     prepared = solver.prepare(rotor, [(0.75, neuralfoil.neuralfoil_polar(section))])
     thrust = solver.solve(prepared, 5000.0, 0.0, case.air()).T
-    wanted = evaluate.evaluate(evaluate.prepare(case), 5000.0, 0.0, case.air()).thrust_N
+    wanted = prepare_case(case).solve(5000.0, 0.0, case.air()).thrust_N
     assert thrust == pytest.approx(wanted, rel=1e-9)

@@ -19,8 +19,9 @@ import numpy as np
 import pytest
 
 from bemt.base.tables import csv_block, json_text, number_text, plain
-from bemt.bem.evaluate import evaluate, prepare
+from bemt.bem import Model
 from bemt.case import load_case
+from bemt.case.prepare import prepare_case
 from bemt.compare.grid import run as grid_module
 from bemt.compare.sweep import batch as sweep_module
 from bemt.compare.sweep import fingerprint, sweep
@@ -203,9 +204,9 @@ def test_input_uncertainty_is_that_of_the_uniform_ranges(tmp_path: Path, solved:
     case = load_case(make_case(tmp_path))
 
     def thrust(key: str, value: float) -> float:
-        return float(evaluate(prepare(case, {key: value}), case.rpm, 0.0, case.air()).thrust_N[0])
+        return float(prepare_case(case, {key: value}).solve(case.rpm, 0.0, case.air()).thrust_N[0])
 
-    nominal = float(evaluate(prepare(case), case.rpm, 0.0, case.air()).thrust_N[0])
+    nominal = float(prepare_case(case).solve(case.rpm, 0.0, case.air()).thrust_N[0])
     variance = 0.0
     ends = []
     for key, low, high in (("blade.max_chord_over_R", 0.18, 0.22), ("rotor.hub_ratio", 0.1, 0.2)):
@@ -218,7 +219,7 @@ def test_input_uncertainty_is_that_of_the_uniform_ranges(tmp_path: Path, solved:
     row = row_of(solved, "bemt")
     assert row["u_input"] == pytest.approx(math.sqrt(variance), rel=1e-6)
     assert row["thrust_N_range"] == pytest.approx([min([nominal, *ends]), max([nominal, *ends])], rel=1e-9)
-    refined = float(evaluate(prepare(case, None, 40), case.rpm, 0.0, case.air()).thrust_N[0])
+    refined = float(prepare_case(case, None, 40).solve(case.rpm, 0.0, case.air()).thrust_N[0])
     assert row["u_num"] == pytest.approx(abs(refined - nominal), rel=1e-6)
     assert row["u"] == pytest.approx(math.hypot(row["u_input"], row["u_num"]), rel=1e-9)
 
@@ -330,7 +331,7 @@ def test_grid_holds_every_combination_and_equals_single_points(tmp_path: Path) -
     for row in rows:
         pitch, altitude, rpm, speed = row[:4]
         overrides = {"blade.pitch_in": pitch, "air.altitude_m": altitude}
-        single = evaluate(prepare(case, overrides), rpm, speed, case.air(overrides))
+        single = prepare_case(case, overrides).solve(rpm, speed, case.air(overrides))
         for name, value in zip(names[4:-1], row[4:-1], strict=True):
             assert value == pytest.approx(float(getattr(single, name)[0]), rel=1e-6, abs=1e-90), name
         assert row[-1] == 1
@@ -421,16 +422,16 @@ def test_strict_turns_a_large_error_into_1(tmp_path: Path, capsys: pytest.Captur
 def test_unconverged_points_are_counted_and_never_zero(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import dataclasses
 
-    def failing(*args: Any, **kwargs: Any) -> Any:
-        points = evaluate(*args, **kwargs)
-        lost = np.full(points.thrust_N.shape, np.nan)
-        return dataclasses.replace(
-            points, thrust_N=lost, torque_Nm=lost, power_W=lost, CT=lost, CP=lost,
-            converged=np.zeros(lost.shape, dtype=bool), flags=(("not converged: planted",),) * lost.size,
-        )  # fmt: skip
+    solved = Model.solve
 
-    monkeypatch.setattr("bemt.bem.evaluate.evaluate", failing)
-    monkeypatch.setattr(grid_module, "evaluate", failing)
+    def failing(*args: Any, **kwargs: Any) -> Any:
+        points = solved(*args, **kwargs)
+        lost = dict.fromkeys(("thrust_N", "torque_Nm", "power_W", "CT", "CP"), np.full(len(points), np.nan))
+        return dataclasses.replace(
+            points, values={**points.values, **lost}, flags=(("not converged: planted",),) * len(points)
+        )
+
+    monkeypatch.setattr(Model, "solve", failing)
     path = make_case(tmp_path, extra="[sweep]\nrpm = [3000, 6000]\n")
     result = json.loads(json_text(sweep([path], tmp_path / "out")))["cases"][0]
     bemt = row_of(result, "bemt")
@@ -463,8 +464,8 @@ def test_numbers_for_people_and_for_json() -> None:
     ("name", "kgf"), [("prop_8x5", 2.456), ("prop_10x5", 5.363), ("prop_12x6", 11.121), ("prop_14x8", 22.025)]
 )
 def test_k1k2_of_the_shipped_cases(name: str, kgf: float) -> None:
-    from bemt.bem.evaluate import k1k2
+    from bemt.case.prepare import k1k2_case
 
     case = load_case(ROOT / "cases" / name)
-    made = k1k2(case, None, np.array([case.rpm]), np.array([0.0]), case.air())
-    assert made.thrust_kgf[0] == pytest.approx(kgf, abs=1e-3)
+    made = k1k2_case(case, None, np.array([case.rpm]), np.array([0.0]), case.air())
+    assert made.thrust_N[0] / KGF == pytest.approx(kgf, abs=1e-3)

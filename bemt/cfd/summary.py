@@ -12,8 +12,10 @@ import numpy as np
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_text, text_table
-from bemt.bem import evaluate, solver
+from bemt.bem import solver
+from bemt.bem.model import Model
 from bemt.case import Case, load_case
+from bemt.case.prepare import prepare_case
 from bemt.cfd.schema import Campaign, load_campaign
 
 __all__ = ["BANDS", "summary", "summary_text"]
@@ -27,7 +29,7 @@ class _Bemt:
     """BEMT of the cases of the runs; without effects of Mach number beside incompressible flow."""
 
     def __init__(self) -> None:
-        self.ready: dict[str, evaluate.Ready] = {}
+        self.ready: dict[str, Model] = {}
 
     def solve(self, case: Case, row: dict[str, str]) -> solver.Solution:
         turned = float(row["pitch_offset_deg"] or 0)
@@ -38,7 +40,7 @@ class _Bemt:
             overrides["model.effects_off"] = sorted({*case.file.model.effects_off, *MACH_EFFECTS})
         key = f"{case.path}|{sorted(overrides.items())}"
         if key not in self.ready:
-            self.ready[key] = evaluate.prepare(case.replaced(overrides))
+            self.ready[key] = prepare_case(case.replaced(overrides))
         V = float(row["airspeed_m_s"]) * math.cos(math.radians(float(row["sideslip_deg"] or 0)))
         return solver.solve(self.ready[key].prep, float(row["rpm"]), V, case.air(), radial=True)
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.bem import forward, solver
+from bemt.bem import model as bem
+from bemt.bem import solver
 from bemt.diagnose import confusion
 from bemt.diagnose.canvas import BLACK, BLUE, GREY, ORANGE, PURPLE, RED, SKY, blank
 from bemt.diagnose.explanation import NONE, Explanation
@@ -59,7 +60,7 @@ def blade_loads(answer: Diagnosis) -> tuple[int, Array, Array, Array] | None:
     """
     best, problem = answer.best, answer.problem
     extra = [effect_of(i, s) for i, s in zip(best.ids, best.settings, strict=True)]
-    extra = [e for e in extra if e.kind == "air" and forward.acts_on_rotor(e)]
+    extra = [e for e in extra if e.kind == "air" and bem.acts_on_rotor(e)]
     if not extra:
         return None
     reading = _representative(answer)

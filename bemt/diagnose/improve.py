@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import tomlkit
 
 from bemt import effects
-from bemt.bem import forward
+from bemt.bem import model as bem
 from bemt.diagnose.signatures import effect_of
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ def improved_case(answer: Diagnosis, case: Case, source: str) -> str:
     """
     named = answer.decision.verdict in ("named", "class")
     found = [effect_of(i, s) for i, s in zip(answer.best.ids, answer.best.settings, strict=True)]
-    found = [e for e in found if forward.acts_on_rotor(e) or (e.kind == "air" and not e.needs)]
+    found = [e for e in found if bem.acts_on_rotor(e) or (e.kind == "air" and not e.needs)]
     if not named or not found:
         return ""
     ids = {e.id for e in found}

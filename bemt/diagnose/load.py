@@ -14,8 +14,8 @@ from bemt import effects
 from bemt.air import Air
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
-from bemt.bem import evaluate
 from bemt.case import find_cases, load_case
+from bemt.case.prepare import prepare_case
 from bemt.dataset import Dataset
 from bemt.diagnose import record as records
 from bemt.recordings.channels import view
@@ -155,7 +155,7 @@ def load_all(
     if before:
         before(found)
     for case in found:
-        evaluate.prepare(case, None, 10)  # an unknown effect in the case is said before the work begins
+        prepare_case(case, None, 10)  # an unknown effect in the case is said before the work begins
     chosen = found * len(recordings) if len(found) == 1 else found
     loaded = [load(p, c) for p, c in zip(recordings, chosen, strict=True)]
     if references and len(found) > 1:

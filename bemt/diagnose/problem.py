@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
-from bemt.bem import evaluate, forward
+from bemt.bem import model as bem
+from bemt.case.prepare import k1k2_case, prepare_case
 from bemt.diagnose.nuisance import nuisances
 from bemt.diagnose.record import CHANNELS, Record, concatenated, merged, owners
 from bemt.effects.base import Effect, Flow, Reading
@@ -73,7 +74,7 @@ class Part:
     """
 
     record: Record
-    model: forward.Model
+    model: bem.Model
     baseline: tuple[Effect, ...]
     flow: Flow
     key: str = ""
@@ -114,9 +115,9 @@ class Part:
             Channels of :attr:`channels`, one after the other; NaN where not converged [N], [N m], [rev/min].
         """
         # instruments do not change the flow: what they show of the same flow needs no new solution
-        key = tuple(e for e in effects if not forward.only_reads(e))
+        key = tuple(e for e in effects if not bem.only_reads(e))
         if key not in self._solved:
-            loads, met, ok = forward.respond(self.model.prepared, key, self.flow)
+            loads, met, ok = bem.respond(self.model.prepared, key, self.flow)
             nan = np.where(ok, 1.0, np.nan)
             self._solved[key] = loads.T * nan, loads.Q * nan, met
         T, Q, met = self._solved[key]
@@ -273,8 +274,8 @@ class Problem:
 
 
 def _part(record: Record, case: Case, baseline: str) -> Part:
-    ready = evaluate.prepare(case, None, _STATIONS)
-    model, R = ready.model, ready.diameter_m / 2.0
+    model = prepare_case(case, None, _STATIONS)
+    R = model.rotor.R
     omega = record.rpm * np.pi / 30.0
     speed = np.hypot(omega * R, record.V)
     top = min(1.25, float(np.max(speed / record.air.a_sound)) * 1.12 + 0.03)
@@ -283,12 +284,12 @@ def _part(record: Record, case: Case, baseline: str) -> Part:
     re_low = 0.15 * float(np.min(speed * ratio)) * float(np.min(chord))
     re_high = 1.3 * float(np.max(speed * ratio)) * float(np.max(chord))
     model = replace(model, mach_max=top, re_range=(re_low, re_high), _kept=_Recent())
-    plain = [e for e in ready.effects if not forward.acts_on_points(e)]
-    flow = forward.flow_of(model.prepared(plain), record.rpm, record.V, record.air, record.extra, ready.chord75_m)
-    part = Part(record, model, ready.effects, flow, case.content_hash(), tuple(case.get("model.effects_off")))
+    plain = [e for e in model.effects if not bem.acts_on_points(e)]
+    flow = bem.flow_of(model.prepared(plain), record.rpm, record.V, record.air, record.extra, model.chord75_m)
+    part = Part(record, model, model.effects, flow, case.content_hash(), tuple(case.get("model.effects_off")))
     if baseline == "bemt":
         return part
-    thrust = evaluate.k1k2(case, None, record.rpm, record.V, record.air).thrust_N
+    thrust = k1k2_case(case, None, record.rpm, record.V, record.air).thrust_N
     nothing = np.full_like(thrust, np.nan)
     return replace(part, instead=np.concatenate([thrust if c == "thrust_N" else nothing for c in part.channels]))
 

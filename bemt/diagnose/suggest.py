@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bemt import effects
 from bemt.air import R_DRY
 from bemt.base.units import ZERO_CELSIUS
-from bemt.bem import forward
+from bemt.bem import model as bem
 from bemt.diagnose import noise
 from bemt.diagnose.nuisance import PRIORS
 from bemt.diagnose.problem import Part, Problem, assemble
@@ -124,8 +124,8 @@ def _extended(part: Part, option: _Option) -> Problem:
         extra["run"][-option.rpm.size :] = extra["run"].max() + 1.0
     rpm, V = join([old.rpm, option.rpm]), join([old.V, option.V])
     both = air_of({k: join([getattr(old.air, k), air[k]]) for k in air})
-    plain = [e for e in part.baseline if not forward.acts_on_points(e)]
-    flow = forward.flow_of(part.model.prepared(plain), rpm, V, both, extra, part.flow.chord)
+    plain = [e for e in part.baseline if not bem.acts_on_points(e)]
+    flow = bem.flow_of(part.model.prepared(plain), rpm, V, both, extra, part.flow.chord)
     ratio = {c: _relative(old.u[c], old.measured[c]) for c in old.u if c in old.measured}
     filled = {}
     for c, values in (("thrust_N", flow.T0), ("torque_Nm", flow.Q0)):

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from bemt.air import Air
 from bemt.base.errors import Fault, InputError
-from bemt.bem import evaluate
 from bemt.case import Case
+from bemt.case.prepare import prepare_case
 
 __all__ = ["RotorMap", "from_case", "from_coefficients", "quadratic"]
 
@@ -197,12 +197,12 @@ def from_case(
     """
     from scipy.interpolate import PchipInterpolator
 
-    ready = evaluate.prepare(case)
+    ready = prepare_case(case)
     state = air if air is not None else Air.isa(0.0)
     rpm = np.linspace(0.04, 1.0, points) * rpm_max
     step = 0.02 * math.pi * ready.diameter_m * rpm[-1] / 60.0
-    got = evaluate.evaluate(ready, rpm, airspeed_m_s, state)
-    fast = evaluate.evaluate(ready, rpm, airspeed_m_s + step, state)
+    got = ready.solve(rpm, airspeed_m_s, state)
+    fast = ready.solve(rpm, airspeed_m_s + step, state)
     ok = got.converged & np.isfinite(got.thrust_N) & np.isfinite(got.torque_Nm)
     if np.count_nonzero(ok) < max(4, points // 2):
         got_text = f"{np.count_nonzero(ok)} of {points} speeds up to {rpm_max:.0f} rev/min converge"

@@ -2,7 +2,7 @@
 
 An effect is a frozen dataclass with an ``id`` and hooks that are called in a fixed order.  The solver calls, once per
 rotor: ``blade`` (adds to beta) -> ``inflow`` (scales and adds to Vx, Vy) -> ``section`` (changes cl, cd tables) ->
-``momentum`` (sets the few numbers of the compiled kernel).  The model of a recording (:mod:`bemt.bem.forward`) calls,
+``momentum`` (sets the few numbers of the compiled kernel).  The model of a recording (:mod:`bemt.bem.model`) calls,
 once per set of points: ``flow`` (what the rotor meets) before the solver, ``loads`` (thrust and torque) and ``reading``
 (what the instruments show) after it.  A hook that an effect does not have is not called.
 Each file of this folder that defines a subclass of :class:`Effect` is found by :func:`bemt.effects.catalogue`.

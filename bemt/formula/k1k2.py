@@ -24,7 +24,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -33,7 +32,7 @@ from numpy.typing import ArrayLike, NDArray
 from bemt import coefficients as co
 from bemt.air import Air
 from bemt.base.errors import Fault, InputError
-from bemt.base.units import KGF
+from bemt.dataset import Dataset
 
 Array = NDArray[np.float64]
 
@@ -276,39 +275,6 @@ def thrust(
     return float(F) if np.ndim(F) == 0 else F
 
 
-@dataclass(frozen=True, eq=False)
-class Estimate:
-    """Outcome of the K1/K2 model over N points.
-
-    Attributes
-    ----------
-    thrust_N : (N,) float
-        Thrust. [N]
-    rpm, airspeed_m_s : (N,) float
-        Rotational speed [rev/min], airspeed [m/s].
-    CT, J, M_tip : (N,) float
-        Thrust coefficient (propeller convention, whole-disk diameter), advance ratio, rotational tip Mach number. [-]
-    u_thrust_N : (N,) float
-        Standard uncertainty: 0.196 of the thrust at rest (measured on UIUC data); NaN (unknown) otherwise. [N]
-    flags : tuple of tuple of str
-        Per point, why not to trust it; empty when inside every stated range.
-    """
-
-    thrust_N: Array
-    rpm: Array
-    airspeed_m_s: Array
-    CT: Array
-    J: Array
-    M_tip: Array
-    u_thrust_N: Array
-    flags: tuple[tuple[str, ...], ...]
-
-    @property
-    def thrust_kgf(self) -> Array:
-        """Thrust. [kgf]"""
-        return self.thrust_N / KGF
-
-
 def validity_flags(d_over_p: float, M_tip: float = 0.0, J: float = 0.0, ducted: bool = False) -> tuple[str, ...]:
     """Say why the model should not be trusted at a point.
 
@@ -363,7 +329,7 @@ def validity_flags(d_over_p: float, M_tip: float = 0.0, J: float = 0.0, ducted: 
 def estimate(
     diameter_m: ArrayLike, pitch_m: ArrayLike, rpm: ArrayLike, V: ArrayLike = 0.0, air: Air | None = None,
     hub_diameter_m: ArrayLike = 0.0, ducted: bool = False,
-) -> Estimate:  # fmt: skip
+) -> Dataset:  # fmt: skip
     """Thrust by the K1/K2 model with coefficients, uncertainty and flags.
 
     Parameters
@@ -383,8 +349,10 @@ def estimate(
 
     Returns
     -------
-    Estimate
-        Arguments broadcast against each other and raveled to N points.
+    Dataset
+        Of kind ``k1k2``, arguments broadcast against each other and raveled to N points: ``thrust_N``, ``rpm``,
+        ``airspeed_m_s``, ``density_kg_m3``, ``CT`` (whole-disk diameter), ``J``, ``M_tip``.  The standard uncertainty
+        of the thrust is 0.196 of it at rest (measured on UIUC data), unknown otherwise; flags say why not to trust it.
 
     Raises
     ------
@@ -393,8 +361,9 @@ def estimate(
 
     Examples
     --------
+    >>> from bemt.base.units import KGF
     >>> e = estimate(14 * 0.0254, 8 * 0.0254, 20000.0)
-    >>> e.thrust_kgf.round(3), e.flags[0]
+    >>> (e.thrust_N / KGF).round(3), e.flags[0]
     (array([22.025]), ('tip Mach 1.09 is supersonic: K1/K2 knows no Mach number',))
     """
     air = Air.from_density() if air is None else air
@@ -408,4 +377,6 @@ def estimate(
     J_flag = np.where(np.isnan(J), np.copysign(np.where(v == 0, 0.0, np.inf), v), J)
     flags = tuple(validity_flags(d, m, j, ducted) for d, m, j in zip(D / p, M, J_flag, strict=True))
     u = np.where((v == 0) & (not ducted), U_MEASURED * F, np.nan)
-    return Estimate(F, w, v, np.asarray(co.CT(F, rho, n, D)), J, M, u, flags)
+    values = {"thrust_N": F, "rpm": w, "airspeed_m_s": v, "density_kg_m3": rho, "CT": co.CT(F, rho, n, D), "J": J,
+              "M_tip": M}  # fmt: skip
+    return Dataset("k1k2", "K1/K2", values, {"thrust_N": np.abs(u)}, flags)

@@ -84,15 +84,15 @@ def case_curves(case: Case, threads: int = 1) -> dict[str, Any]:
         ``over_J`` and ``over_rpm``, each with the abscissa, the channels of BEMT, ``u_`` of each, the K1/K2 values and
         the tip Mach number, arrays with NaN where not converged.
     """
-    from bemt.bem.evaluate import evaluate, k1k2, prepare
+    from bemt.case.prepare import k1k2_case, prepare_case
     from bemt.compare.sweep.case import spread
 
-    ready = prepare(case)
+    ready = prepare_case(case)
     rpm, V, cut = _grids(case, ready.pitch_m / ready.diameter_m)
     air = case.air()
-    nominal = evaluate(ready, rpm, V, air, threads)
+    nominal = ready.solve(rpm, V, air, threads)
     values_of = {name: np.asarray(getattr(nominal, name), float) for name in CHANNELS}
-    rough = evaluate(prepare(case, None, COARSE), rpm, V, air, threads)
+    rough = prepare_case(case, None, COARSE).solve(rpm, V, air, threads)
     base = {name: np.asarray(getattr(rough, name), float) for name in CHANNELS}
     variance = {name: np.zeros_like(v) for name, v in base.items()}
     for assumption in case.assumptions:
@@ -103,11 +103,11 @@ def case_curves(case: Case, threads: int = 1) -> dict[str, Any]:
                 continue
             changes = {assumption.key: value}
             state = case.air(changes) if assumption.key.startswith("air.") else air
-            points = evaluate(prepare(case, changes, COARSE), rpm, V, state, threads)
+            points = prepare_case(case, changes, COARSE).solve(rpm, V, state, threads)
             runs.append({name: np.asarray(getattr(points, name), float) for name in CHANNELS})
         for name, values in base.items():
             variance[name] = variance[name] + spread(assumption.discrete, values, [run[name] for run in runs]) ** 2
-    simple = k1k2(case, None, rpm, V, air)
+    simple = k1k2_case(case, None, rpm, V, air)
     whole: dict[str, Array] = {
         **values_of,
         **{f"u_{name}": np.sqrt(v) for name, v in variance.items()},
@@ -146,9 +146,9 @@ def radial_curves(case: Case) -> dict[str, Any]:
         ``Re`` [1].
     """
     from bemt.bem import solver
-    from bemt.bem.evaluate import prepare
+    from bemt.case.prepare import prepare_case
 
-    prep = prepare(case).prep
+    prep = prepare_case(case).prep
     answer = solver.solve(prep, case.rpm, case.airspeed_m_s, case.air(), radial=True)
     stations = prep.stations
     radial = {name: values[0] for name, values in answer.radial.items()}
@@ -178,11 +178,11 @@ def refinement(case: Case) -> dict[str, Any]:
         ``stations`` (ascending), ``thrust_N`` [N], ``torque_Nm`` [N m], and ``grid_study`` of the thrust on the three
         finest as :class:`bemt.recordings.grid_study.GridStudy` has it, or None.
     """
-    from bemt.bem.evaluate import evaluate, prepare
+    from bemt.case.prepare import prepare_case
     from bemt.recordings.grid_study import grid_study
 
     air = case.air()
-    points = [evaluate(prepare(case, None, n), case.rpm, case.airspeed_m_s, air) for n in REFINED]
+    points = [prepare_case(case, None, n).solve(case.rpm, case.airspeed_m_s, air) for n in REFINED]
     T, Q = (np.array([float(getattr(p, name)[0]) for p in points]) for name in ("thrust_N", "torque_Nm"))
     study = None
     if np.all(np.isfinite(T[-3:])) and not np.any(T[-2:] == 0.0):

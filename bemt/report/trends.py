@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 def _line(case: Case, key: str, values: Array) -> dict[str, Any]:
     """Solve one point for each value of a key of the case."""
-    from bemt.bem.evaluate import evaluate, k1k2, prepare
+    from bemt.case.prepare import k1k2_case, prepare_case
 
     out: dict[str, list[float]] = {name: [] for name in ("thrust_N", "k1k2_thrust_N", "M_tip", "power_W")}
     for value in values:
@@ -40,8 +40,8 @@ def _line(case: Case, key: str, values: Array) -> dict[str, Any]:
         try:
             air = case.air()
             rpm, V = np.array([case.rpm]), np.array([case.airspeed_m_s])
-            points = evaluate(prepare(case, changes, COARSE), rpm, V, air)
-            simple = k1k2(case, changes, rpm, V, air)
+            points = prepare_case(case, changes, COARSE).solve(rpm, V, air)
+            simple = k1k2_case(case, changes, rpm, V, air)
             row = [float(a[0]) for a in (points.thrust_N, simple.thrust_N, points.M_tip, points.power_W)]
         except (InputError, GeometryError, ValueError):
             pass  # this value makes no rotor: a gap in the line
@@ -64,16 +64,16 @@ def families(case: Case) -> dict[str, Any]:
         ``name``, and ``diameter``, ``pitch``, ``rpm`` with their abscissa (``diameter_in``, ``pitch_in`` [in], ``rpm``
         [rev/min]), ``thrust_N``, ``k1k2_thrust_N`` [N], ``M_tip`` [1], ``power_W`` [W]; NaN where there is no answer.
     """
-    from bemt.bem.evaluate import evaluate, k1k2, prepare
+    from bemt.case.prepare import k1k2_case, prepare_case
 
-    ready = prepare(case)
+    ready = prepare_case(case)
     D_in, p_in = case.diameter_m / INCH, ready.pitch_m / INCH
     stated = case.stated_pitch_m / INCH
     p_in = stated if math.isfinite(stated) else p_in
     diameters, pitches = np.linspace(0.5, 2.0, N) * D_in, np.linspace(0.3, 2.2, N) * p_in
     rpm = np.linspace(0.1, 1.75, 2 * N) * case.rpm
     air, V = case.air(), np.full(2 * N, case.airspeed_m_s)
-    points, simple = evaluate(ready, rpm, V, air), k1k2(case, None, rpm, V, air)
+    points, simple = ready.solve(rpm, V, air), k1k2_case(case, None, rpm, V, air)
     return {
         "name": case.name,
         "title": case.title,

@@ -20,13 +20,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.air import air_arrays
 from bemt.base.tables import plain, write_atomic
-from bemt.bem.evaluate import Points, air_arrays, evaluate, prepare
 from bemt.case import Case
+from bemt.case.prepare import prepare_case
 from bemt.compare.grid.formats import Block, encode, join
 
 if TYPE_CHECKING:
     from bemt.air import Air
+    from bemt.dataset import Dataset
 
 __all__ = ["CHUNK", "Engine", "Grid", "Solver", "run_grid", "solve_chunk"]
 
@@ -135,7 +137,7 @@ class Solver:
 
     def _ready(self, geometry: int, overrides: Mapping[str, float]) -> Any:
         if self._last[0] != geometry:
-            self._last = (geometry, prepare(self.case, overrides))
+            self._last = (geometry, prepare_case(self.case, overrides))
         return self._last[1]
 
     def _state(self, flat: int) -> Air:
@@ -149,7 +151,7 @@ class Solver:
             self._airs[flat] = self.case.air({self.case.axis_key(name): value for name, value in values.items()})
         return self._airs[flat]
 
-    def _stretch(self, index: Mapping[str, NDArray[np.intp]], geometry: int) -> Points:
+    def _stretch(self, index: Mapping[str, NDArray[np.intp]], geometry: int) -> Dataset:
         """Points of one geometry; `index` holds the position on each axis."""
         axes = self._axes
         overrides = {self.case.axis_key(n): float(axes[n][index[n][0]]) for n in axes if n in GEOMETRY}
@@ -162,7 +164,8 @@ class Solver:
         distinct, here = np.unique(which, return_inverse=True)
         states = [self._state(flat) for flat in distinct.tolist()]
         air = states[0] if not self._air_names else air_arrays(states, here)
-        return evaluate(self._ready(geometry, overrides), flow[0], flow[1], air, self.threads)
+        found: Dataset = self._ready(geometry, overrides).solve(flow[0], flow[1], air, self.threads)
+        return found
 
     def block(self, flat: NDArray[np.intp]) -> Block:
         """Solve some points.
@@ -185,7 +188,7 @@ class Solver:
         for start, stop in zip(edges[:-1], edges[1:], strict=True):
             here = {name: i[start:stop] for name, i in index.items()}
             found.append(self._stretch(here, int(owner[start])))
-        columns = {name: np.concatenate([getattr(points, name) for points in found]) for name in self.columns}
+        columns = {name: np.concatenate([points[name] for points in found]) for name in self.columns}
         axes = {name: (self._axes[name], index[name]) for name in grid.names}
         return Block(axes, columns, np.concatenate([points.converged for points in found]))
 

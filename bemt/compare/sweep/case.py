@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import __version__, effects
+from bemt.air import air_arrays
 from bemt.base import units
 from bemt.case import Assumption, Case
 from bemt.readers import references as reference_file
@@ -24,8 +25,7 @@ from bemt.recordings import audit_remarks
 
 if TYPE_CHECKING:
     from bemt.air import Air
-    from bemt.bem.evaluate import Points
-    from bemt.formula.k1k2 import Estimate
+    from bemt.dataset import Dataset
 
 __all__ = ["ROW_SOURCES", "solve_case", "spread"]
 
@@ -49,8 +49,6 @@ def _points(case: Case, refs: Sequence[reference_file.Reference]) -> list[tuple[
 
 def _conditions(case: Case, points: Sequence[tuple[float, float, float]], changed: Case) -> Conditions:
     """Conditions of the points in a changed case: what a point shares with the case follows the change."""
-    from bemt.bem.evaluate import air_arrays
-
     own = (case.rpm, case.airspeed_m_s, case.air().rho)
     now, air = (changed.rpm, changed.airspeed_m_s), changed.air()
     rpm, speed = (np.array([now[i] if p[i] == own[i] else p[i] for p in points]) for i in (0, 1))
@@ -123,7 +121,7 @@ class _Model:
         return np.asarray(np.hypot(self.u_input(channel), self.u_num[channel]))
 
 
-def _channels(points: Points) -> dict[str, Array]:
+def _channels(points: Dataset) -> dict[str, Array]:
     return {name: np.asarray(getattr(points, name), dtype=float) for name in PROPAGATED}
 
 
@@ -185,24 +183,24 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
     InputError
         When the recorded values, polars or effects of the case are faulty.
     """
-    from bemt.bem.evaluate import evaluate, k1k2, prepare
+    from bemt.case.prepare import k1k2_case, prepare_case
 
     refs = _references(case)
     points = _points(case, refs)
     steps = 3 + sum(len(a.values) for a in case.assumptions)
     done = 0
 
-    def run(changed: Case, stations: int | None = None, what: str = "") -> tuple[Any, Points]:
+    def run(changed: Case, stations: int | None = None, what: str = "") -> tuple[Any, Dataset]:
         nonlocal done
-        ready = prepare(changed, None, stations)
-        result = evaluate(ready, *_conditions(case, points, changed), threads)
+        ready = prepare_case(changed, None, stations)
+        result = ready.solve(*_conditions(case, points, changed), threads)
         done += 1
         if progress is not None:
             progress(done, steps, what)
         return ready, result
 
-    def formula(changed: Case) -> Estimate:
-        return k1k2(changed, None, *_conditions(case, points, changed))
+    def formula(changed: Case) -> Dataset:
+        return k1k2_case(changed, None, *_conditions(case, points, changed))
 
     ready, nominal = run(case, what="nominal")
     stations = case.file.model.stations
@@ -245,7 +243,7 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
             J=nominal.J[i], flags=flags, **state,
         ))  # fmt: skip
         rows.append(_row(
-            "k1k2", "k1k2", simple.thrust_N[i], CT=simple.CT[i], u=simple.u_thrust_N[i], J=simple.J[i],
+            "k1k2", "k1k2", simple.thrust_N[i], CT=simple.CT[i], u=simple.u["thrust_N"][i], J=simple.J[i],
             u_input=fit.u_input("thrust_N")[i], flags=list(simple.flags[i]), **(state | {"Re": None}),
         ))  # fmt: skip
         if less is not None:
@@ -282,7 +280,7 @@ def _recorded_rows(
     refs: list[reference_file.Reference],
     diameter: float,
     points: list[tuple[float, float, float]],
-    nominal: Points,
+    nominal: Dataset,
 ) -> list[dict[str, Any]]:
     """Rows of all recorded values, coefficients derived."""
     rows = []
@@ -348,7 +346,7 @@ def _description(case: Case, ready: Any, stations: int) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _fan(case: Case, ready: Any, nominal: Points, bemt: _Model) -> dict[str, Any]:
+def _fan(case: Case, ready: Any, nominal: Dataset, bemt: _Model) -> dict[str, Any]:
     """What a duct adds, at the case's own operating point."""
     rho, v = float(nominal.density_kg_m3[0]), float(nominal.exhaust_speed_m_s[0])
     annulus = math.pi / 4.0 * (ready.diameter_m**2 - ready.hub_diameter_m**2)

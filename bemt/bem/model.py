@@ -1,0 +1,383 @@
+"""A rotor with its section tables, duct and effects: solved at operating points into a :class:`bemt.dataset.Dataset`.
+
+:mod:`bemt.bem.solver` knows effects that change a rotor; effects that change single points (a wall behind it, a lagging
+inflow, wrong density) act here, around it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bemt import coefficients as co
+from bemt.air import Air
+from bemt.bem import solver
+from bemt.bem.duct import DuctFlow, duct_flow
+from bemt.dataset import Dataset
+from bemt.effects import standard, to_text
+from bemt.effects.base import Effect, Flow, Loads
+from bemt.sections.neuralfoil import neuralfoil_polar
+from bemt.sections.polars import Polar
+
+if TYPE_CHECKING:
+    from geometry.duct import Duct
+    from geometry.rotor import Rotor
+
+__all__ = ["Model", "acts_on_points", "acts_on_rotor", "flow_of", "only_reads", "respond", "solve"]
+
+Array = NDArray[np.float64]
+
+# Slope of the loads with onset speed: central difference over this share of the tip speed.
+_SPEED_STEP = 2e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """Everything from which a rotor is solved with any set of effects; prepared rotors are kept.
+
+    Parameters
+    ----------
+    rotor : geometry.rotor.Rotor
+        Rotor.
+    polars : sequence of (float, Polar)
+        Section tables at r/R.
+    duct : DuctFlow or None
+        Duct.
+    n_stations : int
+        Blade elements [1].
+    mach_max : float
+        Largest section Mach number that occurs [1].
+    re_range : tuple of float or None
+        Section Reynolds numbers that occur; None: any [1].
+    effects : tuple of Effect
+        Physics that is on.
+    notes : tuple of str
+        Remarks of the section tables.
+    """
+
+    rotor: Rotor
+    polars: Sequence[tuple[float, Polar]]
+    duct: DuctFlow | None = None
+    n_stations: int = 40
+    mach_max: float = 1.25
+    re_range: tuple[float, float] | None = None
+    effects: tuple[Effect, ...] = field(default_factory=standard)
+    notes: tuple[str, ...] = ()
+    _kept: dict[Any, solver.Prepared] = field(default_factory=dict, repr=False)
+
+    @property
+    def diameter_m(self) -> float:
+        """Rotor diameter [m]."""
+        return self.rotor.D
+
+    @property
+    def hub_diameter_m(self) -> float:
+        """Hub diameter [m]."""
+        return 2.0 * self.rotor.Rhub
+
+    @property
+    def pitch_m(self) -> float:
+        """Geometric pitch at 0.75 R [m]."""
+        return self.rotor.blade.pitch_m()
+
+    @property
+    def chord75_m(self) -> float:
+        """Chord at 0.75 R [m]."""
+        return float(self.rotor.blade.at(0.75 * self.rotor.R)[0])
+
+    @property
+    def solidity(self) -> float:
+        """Blade area over disk area [1]."""
+        return self.rotor.solidity
+
+    @property
+    def ducted(self) -> bool:
+        """Whether there is a duct."""
+        return self.duct is not None
+
+    @property
+    def exit_area_m2(self) -> float:
+        """Exit area of the duct, NaN without one [m2]."""
+        return math.nan if self.duct is None else self.duct.wake_ratio * self.rotor.annulus_area
+
+    @property
+    def prep(self) -> solver.Prepared:
+        """Rotor with the effects that are on, as the solver consumes it."""
+        return self.prepared(self.effects)
+
+    def prepared(self, effects: Sequence[Effect], level: float = 1.0) -> solver.Prepared:
+        """Rotor with these effects (those of points left out), at a share of the ones that differ between points."""
+        chosen = tuple(sorted((e for e in effects if acts_on_rotor(e)), key=lambda e: (e.order, e.id)))
+        key = (chosen, level)
+        if key not in self._kept:
+            self._kept[key] = solver.prepare(
+                self.rotor, self.polars, chosen, self.duct, self.n_stations, mach_max=self.mach_max,
+                level=level, re_range=self.re_range,
+            )  # fmt: skip
+        return self._kept[key]
+
+    def solve(self, rpm: ArrayLike, V: ArrayLike = 0.0, air: Air | None = None, threads: int = 1) -> Dataset:
+        """Solve operating points.
+
+        Parameters
+        ----------
+        rpm, V : array_like
+            Speed of rotation [rev/min], axial onset speed [m/s]; broadcast against each other to P points.
+        air : Air, optional
+            One state, or arrays (:func:`bemt.air.air_arrays`); 1.225 kg/m3 at 15 degC by default.
+        threads : int
+            Threads of the kernel; the answer does not depend on it [1].
+
+        Returns
+        -------
+        Dataset
+            Of kind ``bemt``, as :func:`solve` gives it.
+
+        Raises
+        ------
+        ValueError
+            If a speed is not finite, rpm is not positive or a property of the air is not positive.
+        """
+        air = Air.from_density() if air is None else air
+        s = solver.solve(self.prep, rpm, V, air, threads=threads)
+        n, D = s.rpm / 60.0, self.diameter_m
+        rho, mu, a = (np.broadcast_to(np.asarray(getattr(air, k), float), n.shape) for k in ("rho", "mu", "a_sound"))
+        T, Q, T_duct, T_rotor, flags = s.T, s.Q, s.T_duct, s.T_rotor, s.flags
+        if any(acts_on_points(e) for e in self.effects):
+            base = self.prepared([e for e in self.effects if not acts_on_points(e)])
+            loads, _, ok = respond(self.prepared, self.effects, flow_of(base, s.rpm, s.V, air))
+            ok = ok & s.converged
+            T, Q, T_duct = (np.where(ok, v, np.nan) for v in (loads.T, loads.Q, loads.T_duct))
+            T_rotor = T - s.T_stator - T_duct
+            more = ((), ("unconverged with the effects that act on points",))
+            flags = tuple((*f, *more[int(not good)]) for f, good in zip(s.flags, ok, strict=True))
+        CT, CQ, J = co.CT(T, rho, n, D), co.CQ(Q, rho, n, D), s.J
+        CP = 2.0 * np.pi * np.asarray(CQ)
+        share = np.divide(T_duct, T, out=np.full_like(T, np.nan), where=T != 0.0)
+        values = {
+            "rpm": s.rpm, "airspeed_m_s": s.V, "density_kg_m3": rho, "thrust_N": T, "torque_Nm": Q,
+            "power_W": Q * (s.rpm * (math.pi / 30.0)), "CT": CT, "CP": CP, "J": J, "eta": co.eta(J, CT, CP),
+            "M_tip": co.M_tip(n, D, a), "Re75": co.Re75(self.chord75_m, n, D, s.V, rho, mu),
+            "rotor_thrust_N": T_rotor, "duct_thrust_N": T_duct, "stator_thrust_N": s.T_stator,
+            "exhaust_speed_m_s": s.V_exit, "duct_share": share,
+        }  # fmt: skip
+        provenance = {"source": "bemt", "effects": [to_text(e) for e in self.effects], "stations": self.n_stations}
+        name = self.rotor.name or "rotor"
+        return Dataset("bemt", name, values, flags=flags, provenance=provenance, notes=self.notes)
+
+
+def solve(
+    rotor: Rotor,
+    polars: Polar | Sequence[tuple[float, Polar]] | None = None,
+    effects: Sequence[Effect] | None = None,
+    duct: Duct | DuctFlow | None = None,
+    *,
+    rpm: ArrayLike,
+    V: ArrayLike = 0.0,
+    air: Air | None = None,
+    n_stations: int = 40,
+    threads: int = 1,
+) -> Dataset:
+    """Solve a rotor at operating points.
+
+    Parameters
+    ----------
+    rotor : geometry.rotor.Rotor
+        Blades, blade count, hub.
+    polars : Polar or sequence of (float, Polar), optional
+        Section table of the whole blade, or tables at r/R; by default those of the sections of the blade, by the rule
+        (:func:`bemt.sections.neuralfoil.neuralfoil_polar`).
+    effects : sequence of Effect, optional
+        Physics that is on; :func:`bemt.effects.standard` by default.
+    duct : geometry.duct.Duct or bemt.bem.duct.DuctFlow, optional
+        Duct round the rotor.
+    rpm, V : array_like
+        Speed of rotation [rev/min], axial onset speed [m/s]; broadcast against each other to P points.
+    air : Air, optional
+        State of the air; 1.225 kg/m3 at 15 degC by default.
+    n_stations : int
+        Blade elements, cosine spaced [1].
+    threads : int
+        Threads of the kernel; the answer does not depend on it [1].
+
+    Returns
+    -------
+    Dataset
+        Of kind ``bemt``, NaN and flagged where not converged: ``rpm``, ``airspeed_m_s``, ``density_kg_m3``,
+        ``thrust_N`` (with a duct, all of it), ``torque_Nm``, ``power_W``, ``CT``, ``CP``, ``J``, ``eta``, ``M_tip``
+        (rotational), ``Re75``, ``rotor_thrust_N``, ``duct_thrust_N``, ``stator_thrust_N``, ``exhaust_speed_m_s`` (exit
+        or far wake), ``duct_share``.  Coefficients in the propeller convention.
+
+    Raises
+    ------
+    ValueError
+        If the blade has no section and no table is given, or a speed or a property of the air is out of range.
+
+    Examples
+    --------
+    >>> from bemt.sections.polars import linear_polar
+    >>> from geometry.laws import helix
+    >>> from geometry.rotor import Rotor
+    >>> rotor = Rotor(helix(8 * 0.0254, 5 * 0.0254), B=2)
+    >>> found = solve(rotor, linear_polar(cd=0.01), rpm=[5000, 6000], V=8.0)
+    >>> bool(found.converged.all()), found.CT.round(3)
+    (True, array([0.083, 0.101]))
+    """
+    if polars is None:
+        polars = [(x, neuralfoil_polar(section)) for x, section in rotor.blade.anchors]
+        if not polars:
+            raise ValueError("polars: got none, and the blade has no section; expected one of them")
+    tables = [(0.75, polars)] if isinstance(polars, Polar) else polars
+    flow = duct if duct is None or isinstance(duct, DuctFlow) else duct_flow(duct, rotor)
+    on = standard() if effects is None else tuple(effects)
+    return Model(rotor, tables, flow, n_stations, effects=on).solve(rpm, V, air, threads)
+
+
+def _has(effect: Effect, *hooks: str) -> bool:
+    return any(getattr(type(effect), hook) is not getattr(Effect, hook) for hook in hooks)
+
+
+def acts_on_rotor(effect: Effect) -> bool:
+    """Whether an effect changes the prepared rotor (an effect without any hook is a switch of the solver).
+
+    Parameters
+    ----------
+    effect : Effect
+        Any effect.
+
+    Returns
+    -------
+    bool
+        True when it does.
+    """
+    return _has(effect, "blade", "inflow", "section", "momentum", "duct") or not acts_on_points(effect)
+
+
+def acts_on_points(effect: Effect) -> bool:
+    """Whether an effect has hooks around the solver.
+
+    Parameters
+    ----------
+    effect : Effect
+        Any effect.
+
+    Returns
+    -------
+    bool
+        True when it does.
+    """
+    return _has(effect, "flow", "loads", "reading")
+
+
+def only_reads(effect: Effect) -> bool:
+    """Whether an effect changes nothing but what instruments show.
+
+    Parameters
+    ----------
+    effect : Effect
+        Any effect.
+
+    Returns
+    -------
+    bool
+        True when it does.
+    """
+    return _has(effect, "reading") and not _has(
+        effect, "blade", "inflow", "section", "momentum", "duct", "flow", "loads", "share"
+    )
+
+
+def _solve(prep: solver.Prepared, flow: Flow) -> solver.Solution:
+    air = cast("Air", SimpleNamespace(rho=flow.rho, mu=flow.mu, a_sound=flow.a_sound))
+    return solver.solve(prep, flow.rpm, flow.V, air)
+
+
+def flow_of(
+    prep: solver.Prepared, rpm: ArrayLike, V: ArrayLike, air: Any, extra: Mapping[str, Array] | None = None,
+    chord: float | None = None,
+) -> Flow:  # fmt: skip
+    """Conditions at points, with the loads of a baseline there.
+
+    Parameters
+    ----------
+    prep : Prepared
+        Baseline.
+    rpm, V : array_like
+        Speed of rotation [rev/min], axial onset speed [m/s].
+    air : Air
+        State of the air, scalars or (P,) arrays.
+    extra : mapping, optional
+        Further covariates, see :class:`bemt.effects.base.Flow`.
+    chord : float, optional
+        Chord at 0.75 R [m]; the rotor's own by default.
+
+    Returns
+    -------
+    Flow
+        Fresh arrays of (P,).
+    """
+    arrays = np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in (rpm, V, air.rho, air.mu, air.a_sound)))
+    rpm_, V_, rho, mu, a_sound = (np.atleast_1d(a).astype(float) for a in arrays)
+    rotor = prep.rotor
+    flow = Flow(
+        rpm_, V_, rho, mu, a_sound, rotor.R, rotor.Rhub,
+        float(rotor.blade.at(0.75 * rotor.R)[0]) if chord is None else chord, rotor.B, prep.duct is not None,
+        np.zeros_like(rpm_), np.zeros_like(rpm_), np.zeros_like(rpm_), np.zeros_like(rpm_), dict(extra or {}),
+    )  # fmt: skip
+    base = _solve(prep, flow)
+    step = _SPEED_STEP * flow.omega * flow.R
+    up, down = (_solve(prep, replace(flow, V=flow.V + s)) for s in (step, -step))
+    flow.T0, flow.Q0 = base.T, base.Q
+    flow.dT_dV = (up.T - down.T) / (2.0 * step)
+    flow.dQ_dV = (up.Q - down.Q) / (2.0 * step)
+    return flow
+
+
+def respond(prepared: Callable[[Sequence[Effect], float], solver.Prepared], effects: Sequence[Effect], flow: Flow
+            ) -> tuple[Loads, Flow, NDArray[np.bool_]]:  # fmt: skip
+    """Loads at points with all effects on.
+
+    Parameters
+    ----------
+    prepared : callable
+        Gives a prepared rotor for effects and a level, see :meth:`Model.prepared`.
+    effects : sequence of Effect
+        Physics that is on.
+    flow : Flow
+        Recorded conditions and the baseline's loads there; left as it is.
+
+    Returns
+    -------
+    tuple
+        Loads, the flow that the rotor meets, (P,) bool converged.
+
+    Notes
+    -----
+    An effect of the solver whose size differs between points (:meth:`Effect.share`) is solved at levels 0, 1/2 and 1
+    and interpolated by the parabola through them; several of them add up.
+    """
+    met = replace(flow, **{k: getattr(flow, k).copy() for k in ("rpm", "V", "rho", "mu", "a_sound")})
+    # what instruments got wrong first: a wrong airspeed is that of the tunnel, not what a wall makes of it
+    for e in sorted(effects, key=lambda e: e.kind != "stand"):
+        e.flow(met)
+    shared = [(e, s) for e in effects if (s := e.share(met)) is not None]
+    varying = [e for e, _ in shared]
+    plain = [e for e in effects if e not in varying]
+    base = _solve(prepared(plain, 1.0), met)
+    T, Q, T_duct, ok = base.T, base.Q, base.T_duct, base.converged
+    for e, share in shared:
+        half, whole = (_solve(prepared([*plain, e], level), met) for level in (0.5, 1.0))
+        w_half, w_whole = 4.0 * share * (1.0 - share), share * (2.0 * share - 1.0)
+        T = T + w_half * (half.T - base.T) + w_whole * (whole.T - base.T)
+        Q = Q + w_half * (half.Q - base.Q) + w_whole * (whole.Q - base.Q)
+        ok = ok & half.converged & whole.converged
+    loads = Loads(T.copy(), Q.copy(), T_duct.copy())
+    for e in effects:
+        e.loads(loads, met)
+    return loads, met, ok

@@ -1,0 +1,159 @@
+"""A case becomes a model: its polars, effects and duct, for BEMT and for K1/K2."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt import effects
+from bemt.base.errors import Fault, InputError
+from bemt.bem.duct import DuctFlow, duct_flow
+from bemt.bem.model import Model
+from bemt.formula import k1k2
+from bemt.sections import polars
+from bemt.sections.neuralfoil import neuralfoil_polar
+
+if TYPE_CHECKING:
+    from bemt.air import Air
+    from bemt.case import Case
+    from bemt.case.schema import PolarTable
+    from bemt.dataset import Dataset
+    from geometry.rotor import Rotor
+
+__all__ = ["k1k2_case", "prepare_case"]
+
+Array = NDArray[np.float64]
+
+
+def _effects(case: Case) -> tuple[effects.Effect, ...]:
+    known = effects.catalogue()
+    faults = []
+    on: dict[str, effects.Effect] = {}
+    for key in ("effects_on", "effects_off", "also_without"):
+        for i, text in enumerate(getattr(case.file.model, key)):
+            name = text.partition("(")[0].strip()
+            where = f"model.{key}[{i}]"
+            if name not in known or (key != "effects_on" and name != text):
+                close = difflib.get_close_matches(name, known, n=1)
+                hint = f"Did you mean {close[0]}?" if close else ""
+                faults.append(Fault(case.path.as_posix(), where, repr(text), f"one of {', '.join(known)}", hint))
+            elif name in on and key == "effects_on":
+                got, hint = f"{text!r} after {effects.to_text(on[name])!r}", "The last one would win"
+                faults.append(Fault(case.path.as_posix(), where, got, "each effect once", hint))
+            elif key == "effects_on":
+                try:
+                    on[name] = effects.from_text(text)
+                except ValueError as error:
+                    got, _, expected = str(error).partition("; expected ")
+                    faults.append(Fault(case.path.as_posix(), where, got, expected))
+    if faults:
+        raise InputError(faults)
+    off = set(case.file.model.effects_off)
+    standard = {effect.id for effect in effects.standard()}
+    return tuple(on.get(name) or cls() for name, cls in known.items() if name in (standard | set(on)) - off)
+
+
+def _polars(case: Case, anchors: Sequence[tuple[float, Any]]) -> list[tuple[float, polars.Polar]]:
+    given = case.file.polars
+    if given:
+        return _user_polars(case, given)
+    rule = case.file.model.n_crit, case.file.model.drag_level
+    return [(x, neuralfoil_polar(section, *rule)) for x, section in anchors]
+
+
+def _user_polars(case: Case, given: Sequence[PolarTable]) -> list[tuple[float, polars.Polar]]:
+    """Read the tables of a case; several XFOIL files at one r/R are its Reynolds numbers."""
+    from bemt import readers as importers
+    from bemt.readers import polar_xfoil
+
+    groups: dict[float, list[PolarTable]] = {}
+    for item in given:
+        groups.setdefault(item.r_over_R, []).append(item)
+    out, faults = [], []
+    for x, items in sorted(groups.items()):
+        paths = [case.folder / item.file for item in items]
+        kind = items[0].format
+        if len(items) > 1:
+            out.append((x, polar_xfoil.read_many(paths)))
+            continue
+        read = importers.read(paths[0], None if kind is None else f"polar_{kind}")
+        if isinstance(read, polars.Polar):
+            out.append((x, read))
+        else:
+            got = f"a file of another kind ({type(read).__name__})"
+            faults.append(Fault(paths[0].as_posix(), "", got, "a polar: CSV, XFOIL, C81 or AeroDyn"))
+    if faults:
+        raise InputError(faults)
+    return out
+
+
+def _duct_flow(case: Case, rotor: Rotor) -> DuctFlow | None:
+    duct = case.duct()
+    if duct is None:
+        return None
+    flow = duct_flow(duct, rotor)
+    recovery = case.get("duct.stator.recovery")
+    return flow if recovery is None else dataclasses.replace(flow, stator=float(recovery))
+
+
+def prepare_case(case: Case, overrides: Mapping[str, Any] | None = None, n_stations: int | None = None) -> Model:
+    """Build geometry, section tables and effects of a case.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+    overrides : mapping, optional
+        Changed values, dotted key to value.
+    n_stations : int, optional
+        Blade elements; the case says by default.
+
+    Returns
+    -------
+    bemt.bem.model.Model
+        To solve at operating points.
+
+    Raises
+    ------
+    InputError
+        When the changed values do not make a rotor, or an effect is unknown.
+    """
+    case = case.replaced(overrides)
+    rotor = case.rotor()
+    tables = _polars(case, rotor.blade.anchors)
+    duct = None if "duct" in case.file.model.effects_off else _duct_flow(case, rotor)
+    n = case.file.model.stations if n_stations is None else n_stations
+    notes = tuple(dict.fromkeys(note for _, polar in tables for note in polar.notes))
+    return Model(rotor, tables, duct, n, effects=_effects(case), notes=notes)
+
+
+def k1k2_case(case: Case, overrides: Mapping[str, Any] | None, rpm: Array, airspeed_m_s: Array, air: Air) -> Dataset:
+    """K1/K2 model of a case; a ducted rotor counts its annulus only.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+    overrides : mapping or None
+        Changed values.
+    rpm, airspeed_m_s : (P,) float
+        Conditions. [rev/min], [m/s]
+    air : Air
+        One state, or arrays from :func:`bemt.air.air_arrays`.
+
+    Returns
+    -------
+    Dataset
+        Of kind ``k1k2``. The pitch is the one that the case states, else that of the blade at 0.75 R.
+    """
+    case = case.replaced(overrides)
+    pitch = case.stated_pitch_m
+    if np.isnan(pitch):
+        pitch = case.rotor().blade.pitch_m()
+    hub = case.hub_diameter_m if case.ducted else 0.0
+    return k1k2.estimate(case.diameter_m, pitch, rpm, airspeed_m_s, air, hub, case.ducted)
