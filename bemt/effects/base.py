@@ -77,11 +77,11 @@ class KernelNumbers:
     tip, hub : float
         Factors on the exponents of the tip and hub losses; 0: no loss [1].
     far_wake : float
-        1: the sheets of the tip loss follow the helix of the far wake, 0: that at the disk.
+        1: the sheets of the tip loss follow the helix of the far wake, 0: that at the disk [1].
     swirl : float
-        1: the swirl is taken up by the momentum balance, 0: it is left out.
+        1: the swirl is taken up by the momentum balance, 0: it is left out [1].
     bridge : float
-        1: an empirical curve where momentum theory fails, 0: momentum theory throughout.
+        1: an empirical curve where momentum theory fails, 0: momentum theory throughout [1].
     gap_share : float
         Ducted rotor: share of the open tip's loss, 0 sealed to 1 [1].
     gap_loss : float
