@@ -42,8 +42,8 @@ LABEL = {
 
 def thrusts(ax: Any) -> dict[str, float]:
     """Thrust of the five cases, each as a ratio to its recorded CFD value; returns ours in newtons."""
-    cases = {c["name"]: c for c in sweep([ROOT / "cases"])["cases"]}
     order = ["ds30", "prop_14x8", "prop_12x6", "prop_10x5", "prop_8x5"]
+    cases = {c["name"]: c for c in sweep([ROOT / "cases" / name for name in order])["cases"]}
     ours = {}
     for y, name in enumerate(order):
         rows: dict[str, Any] = {}

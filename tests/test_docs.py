@@ -15,6 +15,7 @@ import re
 import shlex
 import shutil
 import struct
+import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator
@@ -302,11 +303,9 @@ def test_the_diagnosis_page_says_what_the_code_does(project: Path, maker: Module
         assert told == {ast.literal_eval(key) for key in returned.keys} | more
 
 
-def test_the_gallery_shows_every_case(project: Path, maker: ModuleType) -> None:
-    from bemt.case import find_cases, load_case
-
+def test_the_gallery_shows_the_shipped_cases(project: Path, maker: ModuleType) -> None:
     text = (project / "docs" / "gallery.md").read_text(encoding="utf-8")
-    made = maker.gallery([load_case(path) for path in find_cases([str(project / "cases")])])
+    made = maker.gallery(maker.shipped())
     number = re.compile(r"\d+\.\d+")
     assert number.sub("", made) == number.sub("", text), "run python docs/make.py"
     assert [float(x) for x in number.findall(text)] == pytest.approx([float(x) for x in number.findall(made)], rel=0.01)
@@ -329,13 +328,13 @@ def test_the_changelog_speaks_of_this_version(project: Path) -> None:
     assert first is not None and first[1] == bemt.__version__
 
 
-def test_the_picture_shows_today_s_numbers(project: Path) -> None:
+def test_the_picture_shows_today_s_numbers(project: Path, maker: ModuleType) -> None:
     from bemt.bem import evaluate
     from bemt.case import load_case
 
     text = png_text((project / "docs" / "img" / "overview.png").read_bytes())
     drawn = json.loads(text["bemt"])["thrust_N"]
-    assert set(drawn) == {path.name for path in (project / "cases").iterdir() if path.is_dir()}
+    assert set(drawn) == set(maker.CASES)
     for name, thrust in drawn.items():
         case = load_case(project / "cases" / name / "case.toml")
         ours = evaluate.evaluate(evaluate.prepare(case), case.rpm, case.airspeed_m_s, case.air()).thrust_N[0]
@@ -388,7 +387,29 @@ def test_every_imported_library_is_declared(project: Path) -> None:
             names += [node.module or ""] if isinstance(node, ast.ImportFrom) and not node.level else []
             found |= {name.split(".")[0].lower() for name in names}
     # what comes with a declared library, and has no version of its own to ask for
-    comes_with = {"ocp": "cadquery", "distributed": "dask", "pil": "matplotlib", "psutil": "dask", "requests": "pooch"}
+    comes_with = {"ocp": "cadquery", "distributed": "dask", "pil": "matplotlib", "psutil": "dask", "requests": "pooch",
+                  "pydantic_core": "pydantic"}
     assert set(comes_with.values()) <= declared
     ours = {"bemt", "geometry", "conftest", "tests", "__future__", *(p.stem for p in (project / "tests").glob("*.py"))}
     assert found - {n.lower() for n in sys.stdlib_module_names} - ours - set(comes_with) <= declared
+
+
+def test_the_python_files_of_the_documents_keep_the_rules_of_the_tree(project: Path) -> None:
+    """Pasted where their headings say they are clean: rooms, lint and types."""
+    from test_layers import violations
+
+    tree = {
+        ".".join(path.relative_to(project).with_suffix("").parts).removesuffix(".__init__"): path.read_text("utf-8")
+        for top in PACKAGES for path in (project / top).rglob("*.py")
+    }  # fmt: skip
+    before, pasted = set(violations(tree)), {}
+    for page in (project / "docs").glob("*.md"):
+        text = page.read_text(encoding="utf-8")
+        pasted |= dict(re.findall(r"^`([\w/]+\.py)`:\n\n```python\n(.*?)^```", text, flags=re.M | re.S))
+    assert len(pasted) >= 2
+    for name, body in pasted.items():
+        module = name.removesuffix(".py").replace("/", ".")
+        assert set(violations({**tree, module: body})) <= before, name
+        lint = [sys.executable, "-m", "ruff", "check", "--stdin-filename", name, "-"]
+        done = subprocess.run(lint, cwd=project, input=body, capture_output=True, text=True)
+        assert done.returncode == 0, done.stdout

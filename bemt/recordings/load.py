@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 import os
 import re
+import traceback
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -26,7 +27,7 @@ import numpy as np
 from bemt import readers as importers
 from bemt.base import tables
 from bemt.base.averaging import relation
-from bemt.base.errors import EXIT_INPUT, EXIT_OK, Fault, InputError
+from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError, system_fault
 from bemt.readers._imported import Channel, Imported
 from bemt.recordings.adapt import adapt, damaged_export, recognised
 from bemt.recordings.choice import Choice, averaged, chosen
@@ -36,6 +37,8 @@ from bemt.recordings.reduce import Reduced
 __all__ = ["SCHEMA", "Choice", "averaged", "chosen", "document", "exit_code", "import_file", "text"]
 
 SCHEMA = "bemt.import/1"
+INTERNAL = "internal error of this program"
+"""How the error of a file begins that a reader failed on."""
 SETTLED = 0.01
 """Drift above which a mean is called unsettled."""
 _RESTART = re.compile(r"(.+?)((?:_\d+)+)(\.[^.]*)?(?:\.gz)?")
@@ -183,28 +186,45 @@ def document(
     for name in names:
         try:
             records[name] = import_file(name, format, choice)
-        except ValueError as error:  # InputError, or what a record refuses to hold
-            errors[name] = str(error) or type(error).__name__
+        except Exception as error:  # the other files are read all the same
+            errors[name] = _refusal(error)
     notes = _restart_notes(names, records)
     files = []
     for name in names:
-        record = records.get(name)
-        reduced = _reduced(record)
-        means = _means(record, reduced) if record else {}
-        files.append(
-            {
-                "path": name,
-                "format": record.format if record else format,
-                "kind": record.kind if record else None,
-                "rows": record.rows if record else 0,
-                "channels": {k: _shown(c) for k, c in means.items()},
-                "warnings": [*(record.warnings if record else ()), *notes.get(name, ())],
-                "error": errors.get(name),
-                "findings": [asdict(finding) for finding in findings(record)] if record else [],
-                "reduction": reduction_document(reduced),
-            }
-        )
+        try:
+            files.append(_entry(name, records.get(name), format, notes.get(name, []), errors.get(name)))
+        except Exception as error:
+            files.append(_entry(name, None, format, [], _refusal(error)))
     return {"schema": SCHEMA, "files": files}
+
+
+def _refusal(error: Exception) -> str:
+    """Why a file was not read: its faults, or where our reader failed on it."""
+    if isinstance(error, ValueError):  # InputError, or what a record refuses to hold
+        return str(error) or type(error).__name__
+    if isinstance(error, OSError) and error.strerror:
+        return str(system_fault(error))
+    at = traceback.extract_tb(error.__traceback__)[-1]
+    words = f"{type(error).__name__}: {error}, in {Path(at.filename).name} line {at.lineno}"
+    return f"{INTERNAL} ({words}). The file may be damaged; please report it with the file"
+
+
+def _entry(
+    name: str, record: Imported | None, format: str | None, notes: Sequence[str], error: str | None  # noqa: A002
+) -> dict[str, Any]:
+    reduced = _reduced(record)
+    means = _means(record, reduced) if record else {}
+    return {
+        "path": name,
+        "format": record.format if record else format,
+        "kind": record.kind if record else None,
+        "rows": record.rows if record else 0,
+        "channels": {k: _shown(c) for k, c in means.items()},
+        "warnings": [*(record.warnings if record else ()), *notes],
+        "error": error,
+        "findings": [asdict(finding) for finding in findings(record)] if record else [],
+        "reduction": reduction_document(reduced),
+    }
 
 
 def _reduced(record: Imported | None) -> Reduced | str | None:
@@ -260,8 +280,9 @@ def text(found: Mapping[str, Any]) -> str:
 
 
 def exit_code(found: Mapping[str, Any]) -> int:
-    """2 when a file was refused, else 0."""
-    return EXIT_INPUT if any(file["error"] is not None for file in found["files"]) else EXIT_OK
+    """Give the worst of all files: 3 when a reader failed, 2 when a file was refused, else 0."""
+    told = [str(file["error"]) for file in found["files"] if file["error"] is not None]
+    return EXIT_INTERNAL if any(text.startswith(INTERNAL) for text in told) else EXIT_INPUT if told else EXIT_OK
 
 
 def check_format(name: str | None) -> None:

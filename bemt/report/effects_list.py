@@ -6,6 +6,7 @@ import dataclasses
 import inspect
 import re
 import textwrap
+from collections.abc import Container
 from typing import TYPE_CHECKING, Any
 
 from bemt.base.tables import text_table
@@ -93,18 +94,23 @@ def text() -> str:
     return "\n".join(lines).rstrip()
 
 
-def markdown() -> str:
-    """Give all effects as the page docs/effects.md.
+def markdown(only: Container[str] | None = None) -> str:
+    """Give effects as the page docs/effects.md.
+
+    Parameters
+    ----------
+    only : container of str, optional
+        Effects to show; all by default.
 
     Returns
     -------
     str
         Markdown, ends with a newline.
     """
-    found = document()["effects"]
+    found = [e for e in document()["effects"] if only is None or e["id"] in only]
     lines = [
         "# Effects", "",
-        f"The {len(found)} effects of the catalogue `bemt/effects/`, one file each. This page is written by",
+        "The effects of the catalogue `bemt/effects/`, one file each. This page is written by",
         "`python -m bemt effects --markdown`; do not edit it.", "",
         "A case names them in `model.effects_on` and `model.effects_off`, with parameters where they differ from the",
         'defaults: `effects_on = ["tip_loss(strength=0.9)"]`.', "",
