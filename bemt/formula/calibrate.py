@@ -164,7 +164,7 @@ def _resolved(name: str) -> frozenset[Path]:
 def _twice(option: str, names: Iterable[str], seen: dict[Path, str]) -> list[Fault]:
     """Names that stand for files seen before; what they stand for is added to those."""
     faults = []
-    hint = "Held out is only what is not fitted" if option == "--test" else "Points that count twice weigh twice"
+    hint = "Held out is only what is not fitted" if option == "--test" else "FitPoints that count twice weigh twice"
     for name in names:
         own = _resolved(name)
         again = sorted(own & seen.keys())
@@ -177,7 +177,7 @@ def _twice(option: str, names: Iterable[str], seen: dict[Path, str]) -> list[Fau
 
 
 def _read(given: Sequence[str], test: Sequence[str]) -> tuple[FitPoints, FitPoints | None]:
-    """Points to fit, and held out; all faults of both at once."""
+    """FitPoints to fit, and held out; all faults of both at once."""
     seen: dict[Path, str] = {}
     faults = _twice("FILES", given, seen)
     faults += _twice("--test", test, seen)
@@ -203,7 +203,7 @@ def _read(given: Sequence[str], test: Sequence[str]) -> tuple[FitPoints, FitPoin
 
 
 def read(given: Sequence[str], test: Sequence[str] = ()) -> tuple[FitPoints, FitPoints | None]:
-    """Points to fit (of the data found when none are named) and held-out points; all faults of both at once."""
+    """FitPoints to fit (of the data found when none are named) and held-out points; all faults of both at once."""
     if not given and find_data("uiuc") is None:
         hint = "Name files, or fetch a database: python -m bemt data uiuc"
         raise InputError(Fault("FILES", "", "none, and no UIUC data found", "measured propellers", hint))
@@ -211,10 +211,7 @@ def read(given: Sequence[str], test: Sequence[str] = ()) -> tuple[FitPoints, Fit
 
 
 def document(
-    points: FitPoints,
-    test: FitPoints | None,
-    given: Sequence[str],
-    held: Sequence[str],
+    points: FitPoints, test: FitPoints | None, given: Sequence[str], held: Sequence[str],
     progress: Callable[[str], None],
 ) -> tuple[dict[str, Any], dict[str, tuple[FitPoints, dict[str, Array]]]]:
     """Do as `calibrate`, with the names of the files in the document."""
