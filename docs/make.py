@@ -16,7 +16,7 @@ from bemt.case.prepare import prepare_case
 from bemt.diagnose.nuisance import PRIORS
 from bemt.report import effects_list
 
-CASES = ("ds30", "prop_10x5", "prop_12x6", "prop_14x8", "prop_8x5")
+CASES = ("ds30", "prop_8x5", "prop_10x5", "prop_12x6", "prop_14x8")
 """Cases that the pages show: the shipped ones, whatever else somebody puts beside them."""
 DOCS = Path(__file__).resolve().parent
 ROOT = DOCS.parent
