@@ -50,7 +50,7 @@ ROOMS: tuple[str, ...] = (
 )
 # What may touch the world outside, and how. What is not named touches nothing.
 MAY: dict[str, set[str]] = {
-    "bemt.commands.*": {"print", "files", "environment"},  # and nothing else prints
+    "bemt.commands.*": {"print", "files", "environment", "clock"},  # and nothing else prints
     "bemt.base.cache": {"files", "environment"},
     "bemt.base.folders": {"environment"},
     "bemt.base.tables|bemt.base.toml": {"files"},
