@@ -387,7 +387,7 @@ def test_every_imported_library_is_declared(project: Path) -> None:
             names += [node.module or ""] if isinstance(node, ast.ImportFrom) and not node.level else []
             found |= {name.split(".")[0].lower() for name in names}
     # what comes with a declared library, and has no version of its own to ask for
-    comes_with = {"pydantic_core": "pydantic", "ocp": "cadquery", "distributed": "dask", "pil": "matplotlib", "psutil": "dask", "requests": "pooch",
+    comes_with = {"ocp": "cadquery", "distributed": "dask", "pil": "matplotlib", "psutil": "dask", "requests": "pooch",
                   "pydantic_core": "pydantic"}
     assert set(comes_with.values()) <= declared
     ours = {"bemt", "geometry", "conftest", "tests", "__future__", *(p.stem for p in (project / "tests").glob("*.py"))}

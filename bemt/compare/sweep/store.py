@@ -10,12 +10,10 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import file_hash, json_text, write_atomic
@@ -144,63 +142,21 @@ def keep_overview(folder: Path, document: Mapping[str, Any]) -> None:
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Hold a folder of results for one sweep.
+    """Hold a whole folder of results for one sweep; InputError when another one holds it.
 
-    The whole folder, not a case of it: the files over all cases belong to one sweep as well. The process that was
-    started holds it, for itself, its worker processes (which end with it) and a cluster (which writes nothing here).
-    The system keeps the lock on an open file, so that it goes with the process, however that ends; the file itself
-    means nothing.
-
-    Parameters
-    ----------
-    folder : Path
-        An existing folder.
-
-    Yields
-    ------
-    None
-        While it is held. Where the system or the disk has no locks, nothing is held and nothing refused.
-
-    Raises
-    ------
-    InputError
-        When another sweep holds it.
+    The lock is the system's, on an open file: it ends with the process, however that ends.
     """
-    path = folder / LOCK
-    while True:
-        stream = path.open("ab")
-        if not _lock(stream):
-            stream.close()
-            raise InputError(Fault(str(folder), "", "a folder in which another sweep is at work", "one for this sweep",
-                                   "Wait for the other one, or give another --out"))  # fmt: skip
-        with suppress(FileNotFoundError):
-            if os.path.samestat(os.fstat(stream.fileno()), path.stat()):
-                break
-        stream.close()  # its holder has just removed it: whoever comes now locks another file
+    from filelock import FileLock, Timeout
+
+    lock = FileLock(folder / LOCK, timeout=0)
+    try:
+        lock.acquire()
+    except Timeout:
+        got, hint = "a folder in which another sweep is at work", "Wait for the other one, or give another --out"
+        raise InputError(Fault(str(folder), "", got, "one for this sweep", hint)) from None
     try:
         yield
     finally:
         with suppress(OSError):  # Windows keeps open files: there it stays
-            path.unlink()
-        stream.close()
-
-
-def _lock(stream: IO[bytes]) -> bool:
-    """Lock an open file unless somebody else has."""
-    if sys.platform == "win32":
-        import msvcrt
-
-        try:
-            msvcrt.locking(stream.fileno(), msvcrt.LK_NBLCK, 1)
-        except OSError:
-            return False
-        return True
-    try:
-        import fcntl
-
-        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except (BlockingIOError, PermissionError):
-        return False
-    except (ImportError, OSError):  # no locks here
-        return True
-    return True
+            (folder / LOCK).unlink()
+        lock.release()
