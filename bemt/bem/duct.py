@@ -43,7 +43,21 @@ STATOR_RECOVERY = 0.8
 
 
 def lip_loss(radius_over_diameter: float) -> float:
-    """Inlet loss over 1/2 rho w^2 at rest of a lip of radius over inner diameter [1]; Idelchik 3-4, not checked.
+    """Inlet loss of a rounded duct lip at rest.
+
+    Parameters
+    ----------
+    radius_over_diameter : float
+        Lip radius over inner diameter [1].
+
+    Returns
+    -------
+    float
+        Loss of total pressure over 1/2 rho w^2 [1].
+
+    Notes
+    -----
+    Idelchik (2007), diagram 3-4 (not checked against the book).
 
     >>> lip_loss(0.05)
     0.22
@@ -80,7 +94,20 @@ class DuctFlow:
     drag_area: float = 0.0
 
     def total(self, rho: Array, V: Array, out: Array) -> tuple[Array, Array, Array]:
-        """Total thrust [N], stator thrust [N] and mass-averaged exit speed [m/s], (P,) each, of the kernel's output."""
+        """Thrust of rotor, stator and duct together.
+
+        Parameters
+        ----------
+        rho, V : (P,) float
+            Density [kg/m3], onset speed [m/s].
+        out : (P, 8) float
+            Kernel output [N, N m, kg/s, kg m/s2, ...], see :func:`bemt.bem.kernel.entry`.
+
+        Returns
+        -------
+        tuple of (P,) float
+            Total thrust [N], stator thrust [N], mass-averaged exit speed [m/s].
+        """
         mdot, mdot_w, stator = out[:, 2], out[:, 3], out[:, 4]
         jet = mdot_w / self.wake_ratio
         T = jet - mdot * V - 0.5 * rho * V * np.abs(V) * self.drag_area
@@ -90,7 +117,25 @@ class DuctFlow:
 
 
 def duct_flow(duct: Duct, rotor: Rotor) -> DuctFlow:
-    """Momentum numbers of a duct round a rotor; ValueError if it does not fit."""
+    """Momentum numbers of a duct around a rotor.
+
+    Parameters
+    ----------
+    duct : geometry.duct.DuctEffect
+        Duct.
+    rotor : geometry.rotor.Rotor
+        Rotor inside it.
+
+    Returns
+    -------
+    DuctFlow
+        For :func:`bemt.bem.solver.prepare`.
+
+    Raises
+    ------
+    ValueError
+        If the duct does not fit the rotor.
+    """
     duct.check(rotor)
     annulus = math.pi * (rotor.R**2 - rotor.Rhub**2)
     hydraulic = 2.0 * (duct.inner_radius - rotor.Rhub)
