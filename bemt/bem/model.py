@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, cast
 
@@ -86,10 +87,18 @@ class Model:
         """Geometric pitch at 0.75 R [m]."""
         return self.rotor.blade.pitch_m()
 
-    @property
+    @cached_property
     def chord75_m(self) -> float:
         """Chord at 0.75 R [m]."""
         return float(self.rotor.blade.at(0.75 * self.rotor.R)[0])
+
+    @cached_property
+    def _texts(self) -> tuple[str, ...]:
+        return tuple(to_text(e) for e in self.effects)
+
+    @cached_property
+    def _on_points(self) -> bool:
+        return any(acts_on_points(e) for e in self.effects)
 
     @property
     def solidity(self) -> float:
@@ -149,7 +158,7 @@ class Model:
         n, D = s.rpm / 60.0, self.diameter_m
         rho, mu, a = (np.broadcast_to(np.asarray(getattr(air, k), float), n.shape) for k in ("rho", "mu", "a_sound"))
         T, Q, T_duct, T_rotor, flags = s.T, s.Q, s.T_duct, s.T_rotor, s.flags
-        if any(acts_on_points(e) for e in self.effects):
+        if self._on_points:
             base = self.prepared([e for e in self.effects if not acts_on_points(e)])
             loads, _, ok = respond(self.prepared, self.effects, flow_of(base, s.rpm, s.V, air))
             ok = ok & s.converged
@@ -167,7 +176,7 @@ class Model:
             "rotor_thrust_N": T_rotor, "duct_thrust_N": T_duct, "stator_thrust_N": s.T_stator,
             "exhaust_speed_m_s": s.V_exit, "duct_share": share,
         }  # fmt: skip
-        provenance = {"source": "bemt", "effects": [to_text(e) for e in self.effects], "stations": self.n_stations}
+        provenance = {"source": "bemt", "effects": self._texts, "stations": self.n_stations}
         name = self.rotor.name or "rotor"
         return Dataset("bemt", name, values, flags=flags, provenance=provenance, notes=self.notes)
 
