@@ -414,20 +414,7 @@ class Air:
 
 
 def air_arrays(states: Sequence[Air], index: NDArray[np.intp]) -> Air:
-    """One state of the air per point.
-
-    Parameters
-    ----------
-    states : sequence of Air
-        Distinct states.
-    index : (P,) int
-        Which one holds at each point.
-
-    Returns
-    -------
-    Air
-        An object whose rho, mu, a_sound and temperature_K are (P,) arrays.
-    """
+    """One state of the air per point: an object whose fields are (P,) arrays; ``index`` (P,) says which state holds."""
     names = ("rho", "mu", "a_sound", "temperature_K")
     fields = {name: np.array([getattr(s, name) for s in states], dtype=float)[index] for name in names}
     return cast("Air", SimpleNamespace(**fields))

@@ -15,6 +15,7 @@ import math
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -47,6 +48,7 @@ Array = NDArray[np.float64]
 _KIND = re.compile(r"[a-z][a-z0-9_]*")
 
 
+@lru_cache(maxsize=1024)
 def _channel_fault(name: str) -> tuple[str, str, str] | None:
     """Reason why a channel name is refused: (got, expected, hint)."""
     if name == "rpm" or name in DIMENSIONLESS:

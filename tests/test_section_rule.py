@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bemt.bem import solver
+from bemt import bem
 from bemt.case import load_case
 from bemt.case.prepare import prepare_case
 from bemt.compare.validate.propellers import validate
@@ -122,9 +122,9 @@ def test_a_script_gives_the_thrust_of_the_case(tmp_path: Path) -> None:
     path = tmp_path / "case.toml"
     path.write_text(CASE, encoding="utf-8")
     case = load_case(path)
-    section = naca("4412")
-    rotor = Rotor(helix(0.2032, 0.127, anchors=section), B=2)
-    prepared = solver.prepare(rotor, [(0.75, neuralfoil.neuralfoil_polar(section))])
-    thrust = solver.solve(prepared, 5000.0, 0.0, case.air()).T
-    wanted = prepare_case(case).solve(5000.0, 0.0, case.air()).thrust_N
-    assert thrust == pytest.approx(wanted, rel=1e-9)
+    rotor = Rotor(helix(0.2032, 0.127, anchors=naca("4412")), B=2)
+    found = bem.solve(rotor, rpm=5000.0, air=case.air())
+    wanted = prepare_case(case).solve(5000.0, 0.0, case.air())
+    assert found.kind == wanted.kind == "bemt" and found.values.keys() == wanted.values.keys()
+    for channel in ("thrust_N", "torque_Nm", "CT", "Re75"):
+        assert found[channel] == pytest.approx(wanted[channel], rel=1e-9)

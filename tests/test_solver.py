@@ -13,6 +13,7 @@ import pytest
 from numba import njit
 from scipy.optimize import brentq
 
+from bemt import bem
 from bemt.air import Air
 from bemt.bem import kernel, residual, solver, vecmath
 from bemt.bem.duct import DuctFlow
@@ -404,3 +405,25 @@ def test_many_stations_and_few(rotor: Rotor, polar: Polar) -> None:
         t = solver.solve(solver.prepare(rotor, [(0.7, polar)], effects, stations=some), 6000.0, 4.0, AIR, radial=True)
         assert np.allclose(t.radial["dT"], s.radial["dT"][:, part], rtol=1e-9, atol=1e-12)
         assert t.T[0] == pytest.approx(s.radial["dT"][0, part].sum(), rel=1e-9)
+
+
+def test_the_face_takes_a_rotor_and_gives_a_dataset(rotor: Rotor, polar: Polar) -> None:
+    s = solver.solve(solver.prepare(rotor, [(0.75, polar)]), [4000.0, 6000.0], 5.0, AIR)
+    for tables in (polar, [(0.75, polar)]):
+        found = bem.solve(rotor, tables, rpm=[4000.0, 6000.0], V=5.0, air=AIR)
+        assert found.kind == "bemt" and found.converged.all() and found.flags == ((), ())
+        np.testing.assert_array_equal([found.thrust_N, found.torque_Nm], [s.T, s.Q])
+        np.testing.assert_allclose([found.CT, found.CP, found.J], [s.CT, s.CP, s.J], rtol=1e-14)
+    bare = dataclasses.replace(rotor, blade=dataclasses.replace(rotor.blade, anchors=()))
+    with pytest.raises(ValueError, match="no section"):
+        bem.solve(bare, rpm=5000.0)
+
+
+def test_shares_of_the_thrust_add_up(rotor: Rotor, polar: Polar) -> None:
+    d = bem.solve(rotor, polar, duct=DUCT, rpm=[4000.0, 6000.0], V=[0.0, 5.0], air=AIR)
+    np.testing.assert_allclose(d.rotor_thrust_N + d.duct_thrust_N + d.stator_thrust_N, d.thrust_N, rtol=1e-12)
+    np.testing.assert_allclose(d.duct_share * d.thrust_N, d.duct_thrust_N, rtol=1e-12)
+    unbalanced = bem.Model(rotor, [(0.75, polar)], dataclasses.replace(DUCT, wake_ratio=math.nan))
+    lost = unbalanced.solve([4000.0, 6000.0], air=AIR)
+    assert not lost.converged.any() and np.isnan([lost.thrust_N, lost.CT, lost.exhaust_speed_m_s]).all()
+    assert all(solver.REASONS[kernel.NOT_FINITE] in flags[0] for flags in lost.flags)

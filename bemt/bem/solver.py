@@ -297,24 +297,7 @@ def _numbers(bake: Baking, duct: DuctFlow | None) -> Array:
 
 
 def solve_point(prep: Prepared, rpm: float, V: float, air: Air) -> tuple[float, float, bool]:
-    """One operating point with as little around the kernel as possible.
-
-    Parameters
-    ----------
-    prep : Prepared
-        Rotor from :func:`prepare`.
-    rpm : float
-        Rotation speed [rev/min].
-    V : float
-        Axial onset speed [m/s].
-    air : Air
-        State of the air.
-
-    Returns
-    -------
-    tuple
-        Thrust of the rotor [N], torque [N m], converged.  NaN where not converged.
-    """
+    """Thrust [N], torque [N m] and convergence of one point, with as little around the kernel as possible."""
     entry, *constant = prep.kernel
     point = np.array([[rpm * _RAD_PER_RPM, V, air.rho, air.mu, air.a_sound]])
     out = np.empty((1, K.N_OUT))

@@ -102,27 +102,7 @@ def _duct_flow(case: Case, rotor: Rotor) -> DuctFlow | None:
 
 
 def prepare_case(case: Case, overrides: Mapping[str, Any] | None = None, n_stations: int | None = None) -> Model:
-    """Build geometry, section tables and effects of a case.
-
-    Parameters
-    ----------
-    case : Case
-        The case.
-    overrides : mapping, optional
-        Changed values, dotted key to value.
-    n_stations : int, optional
-        Blade elements; the case says by default.
-
-    Returns
-    -------
-    bemt.bem.model.Model
-        To solve at operating points.
-
-    Raises
-    ------
-    InputError
-        When the changed values do not make a rotor, or an effect is unknown.
-    """
+    """Rotor, section tables, duct and effects of a case; InputError if the changed values make none."""
     case = case.replaced(overrides)
     rotor = case.rotor()
     tables = _polars(case, rotor.blade.anchors)
@@ -133,24 +113,7 @@ def prepare_case(case: Case, overrides: Mapping[str, Any] | None = None, n_stati
 
 
 def k1k2_case(case: Case, overrides: Mapping[str, Any] | None, rpm: Array, airspeed_m_s: Array, air: Air) -> Dataset:
-    """K1/K2 model of a case; a ducted rotor counts its annulus only.
-
-    Parameters
-    ----------
-    case : Case
-        The case.
-    overrides : mapping or None
-        Changed values.
-    rpm, airspeed_m_s : (P,) float
-        Conditions. [rev/min], [m/s]
-    air : Air
-        One state, or arrays from :func:`bemt.air.air_arrays`.
-
-    Returns
-    -------
-    Dataset
-        Of kind ``k1k2``. The pitch is the one that the case states, else that of the blade at 0.75 R.
-    """
+    """K1/K2 at points [rev/min], [m/s], for the stated pitch, else that at 0.75 R; a duct counts its annulus only."""
     case = case.replaced(overrides)
     pitch = case.stated_pitch_m
     if np.isnan(pitch):

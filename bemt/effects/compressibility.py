@@ -57,13 +57,15 @@ class Compressibility(Effect):
             return
         M = np.sqrt(bake.M2)[None, :, None, None]
         # lift divergence hardly knows the Reynolds number: one of them, where Mach numbers matter, keeps this cheap
-        thickness, cl = bake.thickness[:, None, None, None], bake.cl[:, :1, bake.fast]
+        near = slice(*np.searchsorted(bake.alpha, np.radians([-40.0, 40.0])))  # where it does not fade to nothing
+        thickness, cl = bake.thickness[:, None, None, None], bake.cl[:, :1, bake.fast, near]
         limit = self.lift_divergence(thickness, cl)
         growth = self.growth(np.minimum(M, limit), cl, thickness)
-        a = np.abs(bake.alpha_col)
-        fade = np.clip((np.radians(40.0) - a) / np.radians(15.0), 0.0, 1.0)
+        fade = np.clip((np.radians(40.0) - np.abs(bake.alpha[near])) / np.radians(15.0), 0.0, 1.0)
         own = bake.own_mach[:, None, None, None]
-        bake.scale_lift(1.0 + (self.factor(M, limit, growth) - 1.0) * fade * (1.0 - own))
+        factor = np.ones((bake.r.size, bake.M2.size, 1, bake.alpha.size))
+        factor[..., near] += (self.factor(M, limit, growth) - 1.0) * fade * (1.0 - own)
+        bake.scale_lift(factor)
 
     def lift_divergence(self, thickness: ArrayLike, cl: ArrayLike) -> Array:
         """Mach number of the largest lift.

@@ -46,12 +46,14 @@ class DragDivergence(Effect):
             return
         M = np.sqrt(bake.M2)[None, :, None, None]
         tc = bake.thickness[:, None, None, None]
-        cl0 = np.clip(np.abs(bake.cl[:, :1, bake.fast]), 0.0, 1.2)
+        small = np.flatnonzero(np.abs(bake.alpha) < np.radians(30.0))
+        near = slice(int(small[0]), int(small[-1]) + 1)
+        cl0 = np.clip(np.abs(bake.cl[:, :1, bake.fast, near]), 0.0, 1.2)
         wave = self.rise(M, self.kappa - tc - 0.1 * cl0)
-        a = bake.alpha_col
-        small = np.abs(a) < np.radians(30.0)
-        cap = 4.0 * (np.minimum(np.abs(a), 0.2) ** 2 + tc**2) / np.sqrt(np.maximum(M**2, 1.1025) - 1.0)
-        bake.add_drag(np.where(small, np.minimum(wave, cap), 0.0) * (1.0 - bake.own_mach[:, None, None, None]))
+        cap = 4.0 * (np.minimum(np.abs(bake.alpha[near]), 0.2) ** 2 + tc**2) / np.sqrt(np.maximum(M**2, 1.1025) - 1.0)
+        drag = np.zeros((bake.r.size, bake.M2.size, 1, bake.alpha.size))
+        drag[..., near] = np.minimum(wave, cap) * (1.0 - bake.own_mach[:, None, None, None])
+        bake.add_drag(drag)
 
     def rise(self, M: ArrayLike, M_dd: ArrayLike) -> Array:
         """Wave drag coefficient by the chosen law.

@@ -25,24 +25,8 @@ MIRROR_LIMIT_DEG = 20.0
 
 
 def viterna_cd_max(ar: float) -> float:
-    """Drag coefficient at 90 deg of a blade of aspect ratio ar: 1.11 + 0.018 AR, held at 2.01 for AR > 50.
+    """Drag coefficient at 90 deg: 1.11 + 0.018 AR up to AR 50 (Viterna and Janetzke 1982, NASA TM-82944; not checked).
 
-    Parameters
-    ----------
-    ar : float
-        Aspect ratio. [-]
-
-    Returns
-    -------
-    float
-        Drag coefficient. [-]
-
-    Notes
-    -----
-    Viterna & Janetzke (1982), NASA TM-82944; equation numbers not checked against the paper.
-
-    Examples
-    --------
     >>> viterna_cd_max(10.0)
     1.29
     """

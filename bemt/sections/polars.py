@@ -162,18 +162,7 @@ class Polar:
         return out
 
     def alpha0(self, Re: float, M: float = 0.0) -> float:
-        """Angle of zero lift: the crossing of cl between -15 and 15 deg that lies nearest to the chord line.
-
-        Parameters
-        ----------
-        Re, M : float
-            Reynolds and Mach number. [-]
-
-        Returns
-        -------
-        float
-            The angle; without a crossing that of the least absolute cl. [rad]
-        """
+        """Angle of zero lift [rad]: the crossing within 15 deg nearest to the chord line, else the least |cl|."""
         a = self.alpha[np.abs(self.alpha) <= np.deg2rad(15.01)]
         cl, _ = self.lookup(a, Re, M)
         at = np.flatnonzero((cl[:-1] <= 0.0) & (cl[1:] > 0.0))
@@ -183,39 +172,14 @@ class Polar:
         return float(crossing[np.argmin(np.abs(crossing))])
 
     def cl_alpha(self, Re: float, M: float = 0.0) -> float:
-        """Lift-curve slope: least squares from 2 deg below to 6 deg above zero lift, or to the stall.
-
-        Parameters
-        ----------
-        Re, M : float
-            Reynolds and Mach number. [-]
-
-        Returns
-        -------
-        float
-            The slope. [1/rad]
-        """
+        """Lift-curve slope [1/rad]: least squares from 2 deg below to 6 deg above zero lift, or to the stall."""
         a0 = self.alpha0(Re, M)
         top = max(min(a0 + np.deg2rad(6.0), self.stall(Re, M)[0]), a0 + np.deg2rad(2.0))
         a = np.linspace(a0 - np.deg2rad(2.0), top, 33)
         return float(np.polyfit(a, self.lookup(a, Re, M)[0], 1)[0])
 
     def stall(self, Re: float, M: float = 0.0, side: int = 1) -> tuple[float, float]:
-        """First stall on one side of zero lift.
-
-        Parameters
-        ----------
-        Re, M : float
-            Reynolds and Mach number. [-]
-        side : {1, -1}
-            Positive or negative lift.
-
-        Returns
-        -------
-        alpha_stall, cl_max : float
-            Angle [rad] and lift coefficient [-] (negative for side -1) of the first extremum behind which cl falls
-            by 0.03; without one, those of the largest cl within 20 deg of zero lift.
-        """
+        """Angle [rad] and lift of the first extremum behind which cl falls by 0.03, else the largest within 20 deg."""
         a0 = self.alpha0(Re, M)
         step = np.arange(0.0, np.deg2rad(20.0) + 1e-9, ALPHA_FINE_STEP)
         cl = side * self.lookup(a0 + side * step, Re, M)[0]
@@ -223,20 +187,7 @@ class Polar:
         return float(a0 + side * step[i]), float(side * cl[i])
 
     def on_grid(self, alpha: Array = ALPHA_GRID, re: Array = DEFAULT_RE, m: Array | None = None) -> Polar:
-        """Resampled polar: linear in alpha, ln Re and M, held at the ends of Re and M (with a note).
-
-        Parameters
-        ----------
-        alpha, re : (Na,), (Nr,) float, optional
-            New axes; the shared grids by default. [rad], [-]
-        m : (Nm,) float, optional
-            New Mach numbers; the old ones by default. [-]
-
-        Returns
-        -------
-        Polar
-            Itself when nothing changes.
-        """
+        """Resampled: linear in alpha, ln Re and M, held at the ends of Re and M; itself if nothing changes."""
         m = self.M if m is None else np.asarray(m, dtype=float)
         if np.array_equal(alpha, self.alpha) and np.array_equal(re, self.Re) and np.array_equal(m, self.M):
             return self
@@ -262,20 +213,8 @@ def _cell(axis: Array, x: Array) -> tuple[NDArray[np.intp], Array]:
 
 
 def first_stall(cl: Array) -> NDArray[np.intp]:
-    """Index of the first maximum behind which cl falls by 0.03, else of the largest.
+    """Index along axis 0 of the first maximum behind which cl falls by 0.03, else of the largest.
 
-    Parameters
-    ----------
-    cl : (N, ...) float
-        Lift coefficients in the order of a rising angle of attack. [-]
-
-    Returns
-    -------
-    (...) int
-        Index along axis 0.
-
-    Examples
-    --------
     >>> int(first_stall(np.array([0.0, 1.0, 1.2, 1.1, 1.3])))
     2
     """
@@ -287,22 +226,8 @@ def first_stall(cl: Array) -> NDArray[np.intp]:
 
 
 def blend(a: Polar, b: Polar, w: float) -> Polar:
-    """Mix of two polars, (1 - w) a + w b, on the grids of a.
+    """Mix (1 - w) a + w b of two polars on the grids of a.
 
-    Parameters
-    ----------
-    a, b : Polar
-        Polars at both ends.
-    w : float
-        Share of b, 0 to 1. [-]
-
-    Returns
-    -------
-    Polar
-        Linear mix of cl, cd and confidence.
-
-    Examples
-    --------
     >>> p = blend(linear_polar(cd=0.01), linear_polar(cd=0.03), 0.5)
     >>> round(float(p.lookup(0.0, 1e5)[1]), 6)
     0.02
@@ -315,20 +240,7 @@ def blend(a: Polar, b: Polar, w: float) -> Polar:
 
 
 def fixed_re(polar: Polar, Re: float) -> Polar:
-    """Polar whose tables at every Reynolds number are those at one (Reynolds physics taken out).
-
-    Parameters
-    ----------
-    polar : Polar
-        Polar with Reynolds dependence.
-    Re : float
-        Reynolds number to keep. [-]
-
-    Returns
-    -------
-    Polar
-        Same axes as the given one.
-    """
+    """Polar whose tables at every Reynolds number are those at one."""
     one = polar.on_grid(polar.alpha, np.array([float(Re)]), polar.M)
     cl, cd = (np.repeat(v, polar.Re.size, axis=1) for v in (one.cl, one.cd))
     conf = None if one.confidence is None else np.repeat(one.confidence, polar.Re.size, axis=1)
@@ -336,22 +248,7 @@ def fixed_re(polar: Polar, Re: float) -> Polar:
 
 
 def linear_polar(cl_alpha: float = 2.0 * np.pi, alpha0: float = 0.0, cd: float = 1e-12) -> Polar:
-    """Ideal section for limits and tests: cl = cl_alpha (alpha - alpha0) without stall to 80 deg, constant cd.
-
-    Parameters
-    ----------
-    cl_alpha : float, optional
-        Lift slope. [1/rad]
-    alpha0 : float, optional
-        Angle of zero lift. [rad]
-    cd : float, optional
-        Drag coefficient, above 0. [-]
-
-    Returns
-    -------
-    Polar
-        On the shared grids; beyond 80 deg cl returns to 0 at 180 deg on a straight line.
-    """
+    """Ideal section: cl = cl_alpha (alpha - alpha0) to 80 deg, then straight to 0 at 180 deg; constant cd."""
     knee = np.deg2rad(80.0)
     cl_knee = cl_alpha * np.array([-knee - alpha0, knee - alpha0])
     cl = np.interp(ALPHA_GRID, [-np.pi, -knee, knee, np.pi], [0.0, *cl_knee, 0.0])

@@ -99,19 +99,7 @@ def _clark_y(r_R: ArrayLike, thickness: ArrayLike) -> tuple[RuleSection, ...]:
 
 
 def sections(family: str | None = None, law: tuple[ArrayLike, ArrayLike] | None = None) -> tuple[RuleSection, ...]:
-    """Sections of the rule.
-
-    Parameters
-    ----------
-    family : str, optional
-        Family in the naming of the UIUC database; unknown ones get the general section.
-    law : (N,) float, (N,) float, optional
-        r/R and thickness over chord of a thickness file [1]; used by families whose section is scaled along the blade.
-
-    Returns
-    -------
-    tuple of RuleSection
-        One for the whole blade, or several along it, root first.
+    """Sections of the rule, root first; ``law`` is a thickness file's r/R and t/c, for families that scale a section.
 
     >>> sections("apcsf")[0].camber, sections("somebody")[0].camber
     (0.065, 0.035)
@@ -124,37 +112,13 @@ def sections(family: str | None = None, law: tuple[ArrayLike, ArrayLike] | None 
 
 
 def section_at(r_R: float, family: str | None = None) -> RuleSection:
-    """Section of the rule nearest to a radius.
-
-    Parameters
-    ----------
-    r_R : float
-        r/R [1].
-    family : str, optional
-        As in :func:`sections`.
-
-    Returns
-    -------
-    RuleSection
-        For cases that take one section for the whole blade.
-    """
+    """Section of the rule nearest to r/R, for cases that take one section for the whole blade."""
     return min(sections(family), key=lambda s: abs(s.r_R - r_R))
 
 
 @lru_cache(maxsize=256)
 def airfoil(section: RuleSection) -> Airfoil:
-    """Coordinates of a section.
-
-    Parameters
-    ----------
-    section : RuleSection
-        Parameters.
-
-    Returns
-    -------
-    geometry.airfoil.Airfoil
-        Its shape.
-    """
+    """Coordinates of a section of the rule."""
     from geometry.airfoil import naca4
     from geometry.published import published, thickened
 
