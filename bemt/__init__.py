@@ -1,3 +1,3 @@
 """Propeller and ducted-fan aerodynamics: blade element momentum theory beside CFD, bench and empirical models."""
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
