@@ -192,7 +192,7 @@ def test_errors_and_validation_uncertainty_are_those_of_vv20(solved: dict[str, A
     line = lines["bemt", "bench", "thrust_N"]
     assert line["E"] == pytest.approx(S - 0.5 * KGF, rel=1e-8)
     assert line["E_pct"] == pytest.approx(100 * (S / (0.5 * KGF) - 1), rel=1e-8)
-    assert line["u_val"] == pytest.approx(math.sqrt(line["u_num"] ** 2 + line["u_input"] ** 2 + (0.01 * KGF) ** 2))
+    assert line["u_val"] == pytest.approx(math.hypot(line["u_num"], line["u_input"], line["u_model"], 0.01 * KGF))
     assert line["verdict"] == ("not distinguishable from noise" if abs(line["E"]) <= line["u_val"] else "differs")
     unknown = lines["bemt", "cfd", "thrust_N"]
     assert unknown["u_val"] is None and unknown["u_D"] is None and "u_D unknown" in unknown["verdict"]
@@ -221,7 +221,7 @@ def test_input_uncertainty_is_that_of_the_uniform_ranges(tmp_path: Path, solved:
     assert row["thrust_N_range"] == pytest.approx([min([nominal, *ends]), max([nominal, *ends])], rel=1e-9)
     refined = float(prepare_case(case, None, 40).solve(case.rpm, 0.0, case.air()).thrust_N[0])
     assert row["u_num"] == pytest.approx(abs(refined - nominal), rel=1e-6)
-    assert row["u"] == pytest.approx(math.hypot(row["u_input"], row["u_num"]), rel=1e-9)
+    assert row["u"] == pytest.approx(math.hypot(row["u_input"], row["u_num"], row["u_model"]), rel=1e-9)
 
 
 def test_assumptions_stand_in_every_output(tmp_path: Path) -> None:

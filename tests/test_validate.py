@@ -50,11 +50,11 @@ def _folder(path: Path, thrust: float = 1.0, power: float = 1.0, turned_deg: flo
 def test_planted_errors_come_out(tmp_path: Path) -> None:
     doc = propellers.validate(_folder(tmp_path, thrust=1.10, power=0.95))
     for kind in ("static", "forward"):
-        assert doc[kind]["propellers"] == 1
-        assert doc[kind]["CT"]["bias"] == pytest.approx(0.10, abs=1e-6)
-        assert doc[kind]["CT"]["median_abs"] == pytest.approx(0.10, abs=1e-6)
-        assert doc[kind]["CP"]["bias"] == pytest.approx(-0.05, abs=1e-6)
-        assert doc[kind]["CP"]["p90_abs"] == pytest.approx(0.05, abs=1e-6)
+        assert doc["as_drawn"][kind]["propellers"] == 1
+        assert doc["as_drawn"][kind]["CT"]["bias"] == pytest.approx(0.10, abs=1e-6)
+        assert doc["as_drawn"][kind]["CT"]["median_abs"] == pytest.approx(0.10, abs=1e-6)
+        assert doc["as_drawn"][kind]["CP"]["bias"] == pytest.approx(-0.05, abs=1e-6)
+        assert doc["as_drawn"][kind]["CP"]["p90_abs"] == pytest.approx(0.05, abs=1e-6)
     assert doc["zero_thrust_J"]["median_abs"] < 1e-6
     assert doc["schema"] == "bemt.validation/1" and doc["unconverged"] == 0
 
@@ -87,6 +87,20 @@ def test_forward_points_stop_at_the_share_of_zero_thrust_J(tmp_path: Path) -> No
     assert doc["forward"]["points"] == np.count_nonzero(J <= points.J_SHARE * J0)
 
 
+def test_rotors_as_built_come_with_what_their_intervals_hold(tmp_path: Path) -> None:
+    """A propeller that is exactly as the solver has it lies inside every interval; one far off lies outside."""
+    (tmp_path / "good").mkdir()
+    (tmp_path / "bad").mkdir()
+    good = propellers.validate(_folder(tmp_path / "good"))
+    bad = propellers.validate(_folder(tmp_path / "bad", thrust=1.6, power=1.6))
+    for kind in ("static", "forward"):
+        for q in ("CT", "CP"):
+            assert good[kind][q]["coverage"] == {"68": 1.0, "95": 1.0} and 0.01 < good[kind][q]["width68"] < 0.5
+            assert bad[kind][q]["coverage"]["68"] < 0.3
+    drawn = propellers.validate(tmp_path / "good", as_drawn=True)
+    assert "coverage" not in drawn["static"]["CT"] and "as_drawn" not in drawn
+
+
 def test_unconverged_points_count_as_infinitely_wrong() -> None:
     bad = points.statistics(np.array([0.01, np.nan, np.nan]))
     assert bad["median_abs"] == np.inf
@@ -96,7 +110,7 @@ def test_unconverged_points_count_as_infinitely_wrong() -> None:
 def test_unconverged_points_are_never_shown_as_zero(tmp_path: Path) -> None:
     doc = propellers.validate(_folder(tmp_path))
     nothing = points.statistics(np.array([np.nan, np.nan]))
-    doc["static"]["CT"] = nothing
+    doc["static"]["CT"] |= nothing
     line = next(row for row in text.text(doc).splitlines() if row.startswith("all points"))
     assert line.split("|")[1].split() == ["inf", "inf", "-"]
 

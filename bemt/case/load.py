@@ -19,12 +19,14 @@ from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.toml import Collector, load_toml, validated
+from bemt.case.as_built import CaseAsBuilt, as_built_of, stated_effects
 from bemt.case.build import build_air, build_duct, build_rotor
 from bemt.case.rules import check_case, check_shape, value_at
 from bemt.case.schema import AXES, GROUPS, CaseFile
 
 if TYPE_CHECKING:
     from bemt.air import Air
+    from bemt.asbuilt.latents import AsBuilt
     from geometry.duct import Duct
     from geometry.rotor import Rotor
 
@@ -218,6 +220,14 @@ class Case:
         duct: Duct | None = self._once("duct", ("rotor", "blade", "duct"), make, overrides)
         return duct
 
+    def stated_effects(self) -> tuple[AsBuilt, ...]:
+        """Give the effect of what the case states of the rotor as built, if anything."""
+        return stated_effects(self.file, self.folder)
+
+    def as_built(self, counting_assumptions: bool = True) -> CaseAsBuilt:
+        """Give what is known of the rotor as built, less what the declared assumptions move already."""
+        return as_built_of(self.file, self.folder, self.rotor(), counting_assumptions)
+
     def air(self, overrides: Mapping[str, Any] | None = None) -> Air:
         """Give the state of the air; overrides as in :meth:`replaced`."""
         return build_air(self.replaced(overrides).file.air)
@@ -238,6 +248,7 @@ class Case:
         names = [self.file.references, blade.stations, blade.uiuc, blade.apc]
         names += dat if isinstance(dat, tuple) else [dat]
         names += [polar.file for polar in self.file.polars]
+        names += [blade.as_built.file] if blade.as_built is not None else []
         return [self.path, *(self.folder / name for name in names if name)]
 
     def content_hash(self) -> str:

@@ -109,7 +109,7 @@ def prepare_case(case: Case, overrides: Mapping[str, Any] | None = None, n_stati
     duct = None if "duct" in case.file.model.effects_off else _duct_flow(case, rotor)
     n = case.file.model.stations if n_stations is None else n_stations
     notes = tuple(dict.fromkeys(note for _, polar in tables for note in polar.notes))
-    return Model(rotor, tables, duct, n, effects=_effects(case), notes=notes)
+    return Model(rotor, tables, duct, n, effects=(*_effects(case), *case.stated_effects()), notes=notes)
 
 
 def k1k2_case(case: Case, overrides: Mapping[str, Any] | None, rpm: Array, airspeed_m_s: Array, air: Air) -> Dataset:

@@ -96,7 +96,7 @@ def _check_groups(out: Collector, document: Mapping[str, Any]) -> None:
 
 def _check_files(out: Collector, document: Mapping[str, Any], folder: Path) -> None:
     places = [("references", document.get("references"))]
-    for name in ("blade.stations", "blade.uiuc", "blade.apc", "blade.section.dat"):
+    for name in ("blade.stations", "blade.uiuc", "blade.apc", "blade.section.dat", "blade.as_built.file"):
         table, key = name.rsplit(".", 1)
         value = (_inner(document, table) or {}).get(key)
         places += [(name, v) for v in (value if isinstance(value, list) else [value])]
@@ -143,6 +143,11 @@ def _check_blade(out: Collector, case: CaseFile) -> None:
         for key in (*pitches, *_given(blade, "max_chord_over_R", "taper", "pitch_law", "tip_relief")):
             hint = "Use beta_offset_deg to turn the blade" if key in pitches else ""
             out.add(f"blade.{key}", shown(getattr(blade, key)), f"nothing beside {source}, which gives it", hint)
+    posterior = blade.as_built is not None and blade.as_built.file is not None
+    if (blade.known_from == "reference") != posterior:
+        got = "known_from = \"reference\" without as_built.file" if not posterior else "as_built.file"
+        expected = "known_from = \"reference\" and blade.as_built.file together"
+        out.add("blade.known_from", got, expected, "python -m bemt calibrate-rotor writes both")
     if blade.section is None:
         hint = "Tables [[polars]] replace only its aerodynamics"
         out.add("blade.section", "nothing", "a table [blade.section]", hint)

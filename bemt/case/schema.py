@@ -13,6 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.asbuilt.latents import KNOWN_FROM
 from bemt.base.toml import Key, Table, entry
 from bemt.sections.rule import DRAG_LEVEL, N_CRIT
 from geometry.laws import CHORD_LAWS as GEOMETRY_CHORD_LAWS
@@ -25,6 +26,7 @@ __all__ = [
     "RPM",
     "TEMPERATURE",
     "AirTable",
+    "AsBuiltTable",
     "AssumptionTable",
     "BladeTable",
     "CaseFile",
@@ -90,6 +92,7 @@ _PRESSURE = Key(unit="hPa", low=50, high=1200, suspect=_looks(
     (25, 32, "inches of mercury", lambda v: v * 33.86389, "pressure_hPa")))  # fmt: skip
 _FRACTION_OF_HUMIDITY = _looks((1e-9, 0.999, "a fraction", lambda v: v * 100, "humidity_pct"))
 
+KnownFrom = Literal["cad", "scan", "stations", "label", "reference"]
 Rotations = Literal["right", "left"]
 Numbers = float | tuple[float, ...] | None
 Texts = str | tuple[str, ...] | None
@@ -146,8 +149,22 @@ class SectionTable(Table):
     r_over_R: tuple[float, ...] | None = entry("numbers", low=0, high=1, suspect=_percent("r_over_R", 2.0))
 
 
+class AsBuiltTable(Table):
+    """[blade.as_built]: what is known of this very rotor beyond its drawing, expectations and standard deviations."""
+
+    angle_deg: float | None = entry(unit="deg", low=-20, high=20)
+    angle_sd_deg: float | None = entry(unit="deg", low=0, high=20)
+    camber_deg: float | None = entry(unit="deg", low=-20, high=20)
+    camber_sd_deg: float | None = entry(unit="deg", low=0, high=20)
+    lift: float | None = entry(low=-1, high=1)
+    lift_sd: float | None = entry(low=0, high=1, suspect=_percent("lift_sd"))
+    drag: float | None = entry(low=-2, high=2)
+    drag_sd: float | None = entry(low=0, high=2, suspect=_percent("drag_sd", 2.0))
+    file: str | None = entry("file")
+
+
 class BladeTable(Table):
-    """[blade]: pitch and chord by a law, or stations from a file."""
+    """[blade]: pitch and chord by a law, or stations from a file; how well it is known."""
 
     pitch_in: float | None = entry(key=_PITCH_IN)
     pitch_mm: float | None = entry(unit="mm", low=2.5, high=3000, suspect=_metres("pitch_mm", 2.0))
@@ -164,6 +181,10 @@ class BladeTable(Table):
     uiuc: str | None = entry("file")
     apc: str | None = entry("file")
     beta_offset_deg: float = entry(unit="deg", low=-45, high=45, default=0.0)
+    known_from: KnownFrom | None = entry("choice", choices=KNOWN_FROM)
+    label_pitch_in: float | None = entry(unit="in", low=0.1, high=120, suspect=_inch("label_pitch_in", 120.1))
+    family: str | None = entry("text")
+    as_built: AsBuiltTable | None = None
     section: SectionTable | None = None
 
     def pitch_m(self, diameter_m: float) -> float:

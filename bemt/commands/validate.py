@@ -34,6 +34,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--off", metavar="EFFECT", help="switch an effect off; repeatable", **_options.REPEATABLE)
     turned = "also with each blade turned to the measured zero-thrust J: an experiment that uses the measurement"
     parser.add_argument("--match-J0", action="store_true", help=turned)
+    drawn = "solver on the stations as given, without the population of rotors as built"
+    parser.add_argument("--as-drawn", action="store_true", help=drawn)
+    fitted = "fit the population of rotors as built to the folder and write it"
+    parser.add_argument("--fit-population", metavar="FILE", help=fitted)
+    left = "predict each family by a population fitted without it"
+    parser.add_argument("--leave-family-out", action="store_true", help=left)
     parser.add_argument("--out", metavar="DIR", help="write the tables there as well")
 
 
@@ -44,10 +50,38 @@ def run(args: argparse.Namespace) -> int:
     from bemt.compare.validate.text import text
 
     effects = effects_without(args.off)
+    if args.fit_population or args.leave_family_out:
+        return _population(args)
     with _terminal.progress() as say:
-        document = validate(where(args.dir), effects, args.polar, say, match_J0=args.match_J0)
+        document = validate(where(args.dir), effects, args.polar, say, match_J0=args.match_J0, as_drawn=args.as_drawn)
     if args.out:
         write(document, args.out)
     # an infinite error (not converged) becomes null: JSON has no infinity
     print(json_text(document).rstrip() if args.json else text(document))
     return EXIT_UNCONVERGED if document["unconverged"] else EXIT_OK
+
+
+def _population(args: argparse.Namespace) -> int:
+    """Fit the population, or leave families out of it."""
+    from pathlib import Path
+
+    from bemt.base.tables import json_text, write_atomic
+    from bemt.compare.validate import left_out
+    from bemt.compare.validate.folder import read_folder
+    from bemt.compare.validate.propellers import effects_without, where
+
+    effects = effects_without(args.off)
+    folder = read_folder(where(args.dir))
+    with _terminal.progress() as say:
+        seen = left_out.watch(folder, effects, say)
+        if args.fit_population:
+            document = left_out.document_of(left_out.fit_population(seen, args.dir)[0])
+            write_atomic(Path(args.fit_population), json_text(document))
+        if args.leave_family_out:
+            document = left_out.leave_out(folder, seen, effects, args.dir, say)
+            if args.out:
+                write_atomic(Path(args.out) / "left_out.json", json_text(document))
+                write_atomic(Path(args.out) / "left_out.txt", left_out.table(document) + "\n")
+    shown = args.json or not args.leave_family_out
+    print(json_text(document).rstrip() if shown else left_out.table(document))
+    return EXIT_OK

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from bemt.case import Case
     from bemt.diagnose.chain import Diagnosis
 
-__all__ = ["beside", "improved_case", "is_improved"]
+__all__ = ["beside", "elsewhere", "improved_case", "is_improved"]
 
 _HEAD = "with what `python -m bemt diagnose` found: "
 
@@ -54,7 +54,7 @@ def improved_case(answer: Diagnosis, case: Case, source: str) -> str:
         text["model"] = tomlkit.table()
     model: Any = text["model"]
     model["effects_on"], model["effects_off"] = on, off
-    _elsewhere(text, case)
+    elsewhere(text, case)
     head = f"# {case.name} {_HEAD}{', '.join(effects.to_text(e) for e in found)}"
     return f"{head}\n{tomlkit.dumps(text).rstrip()}\n"
 
@@ -76,7 +76,7 @@ def beside(case: Case) -> list[Path]:
     return [f for f in case.files() if f != case.path and f.resolve().is_relative_to(folder)]
 
 
-def _elsewhere(node: Any, case: Case) -> None:
+def elsewhere(node: Any, case: Case) -> None:
     """Name files that lie elsewhere by their whole path: the improved case stands in another folder."""
     far = {f.resolve() for f in case.files()} - {case.path.resolve(), *(f.resolve() for f in beside(case))}
     keys = range(len(node)) if isinstance(node, list) else list(node)
@@ -86,7 +86,7 @@ def _elsewhere(node: Any, case: Case) -> None:
             if (case.folder / value).resolve() in far:
                 node[key] = (case.folder / value).resolve().as_posix()
         elif isinstance(value, (dict, list)):
-            _elsewhere(value, case)
+            elsewhere(value, case)
 
 
 def is_improved(source: str) -> bool:

@@ -283,6 +283,7 @@ def _validation(result: Mapping[str, Any]) -> str:
                 num(c["E_pct"], signed=True),
                 num(c["u_num"], 2),
                 num(c["u_input"], 2),
+                num(c.get("u_model"), 2),
                 num(c["u_D"], 2, none="unknown"),
                 num(c["u_val"], 2, none="unknown"),
                 c["verdict"],
@@ -291,10 +292,11 @@ def _validation(result: Mapping[str, Any]) -> str:
     if not rows:
         return ""
     words = (
-        "<p>After ASME V&amp;V 20: E = S − D, u_val² = u_num² + u_input² + u_D². |E| ≤ u_val reads “not "
+        "<p>After ASME V&amp;V 20: E = S − D, u_val² = u_num² + u_input² + u_model² + u_D². |E| ≤ u_val reads “not "
         "distinguishable from noise”. An uncertainty that nobody stated stays unknown, and so does the verdict.</p>"
     )
-    header = ["model", "against", "quantity", "S", "D", "E", "E %", "u_num", "u_input", "u_D", "u_val", "verdict"]
+    us = ["u_num", "u_input", "u_model", "u_D", "u_val"]
+    header = ["model", "against", "quantity", "S", "D", "E", "E %", *us, "verdict"]
     return section("Validation", words, table(header, rows))
 
 

@@ -240,11 +240,11 @@ def attach(book: dict[str, Any]) -> None:
             continue
         share = run["audit"]["u_relative"] if run["audit"] else math.nan
         S, D, u_D = bemt["thrust_N"], run["thrust_N"], abs(run["thrust_N"]) * share
-        u_num, u_input = (math.nan if bemt.get(k) is None else bemt[k] for k in ("u_num", "u_input"))
-        u_val = math.sqrt(u_num**2 + u_input**2 + u_D**2)
+        parts = {k: math.nan if bemt.get(k) is None else bemt[k] for k in ("u_num", "u_input", "u_model")}
+        u_val = math.hypot(*parts.values(), u_D)
         word = "u_D unknown" if math.isnan(u_val) else (
             "not distinguishable from noise" if abs(S - D) <= u_val else "differs")  # fmt: skip
         line = {"model": "bemt", "reference": f"own CFD, {run['solver']}", "source": "openfoam", "quantity": "thrust_N",
-                "unit": "N", "S": S, "D": D, "E": S - D, "E_pct": 100 * (S - D) / D if D else None, "u_num": u_num,
-                "u_input": u_input, "u_D": u_D, "u_val": u_val, "verdict": word}  # fmt: skip
+                "unit": "N", "S": S, "D": D, "E": S - D, "E_pct": 100 * (S - D) / D if D else None, **parts,
+                "u_D": u_D, "u_val": u_val, "verdict": word}  # fmt: skip
         page["result"] = {**result, "comparisons": [*result["comparisons"], line]}

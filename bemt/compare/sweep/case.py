@@ -1,9 +1,10 @@
 """One case of a sweep: BEMT and K1/K2 beside the recorded values, with uncertainties, as a plain document.
 
-Uncertainty after ASME V&V 20: E = S - D, u_val^2 = u_num^2 + u_input^2 + u_D^2. u_num is the change of the result
-when the blade elements are doubled. u_input moves one declared assumption at a time through its range, taken as
+Uncertainty after ASME V&V 20: E = S - D, u_val^2 = u_num^2 + u_input^2 + u_model^2 + u_D^2. u_num is the change of the
+result when the blade elements are doubled. u_input moves one declared assumption at a time through its range, taken as
 uniform: with the results at both ends and in the middle on a parabola, the variance is s^2/3 + 4 q^2/45 (half
-difference s, sagitta q), which is (high - low)/sqrt(12) times the slope when the response is straight.
+difference s, sagitta q), which is (high - low)/sqrt(12) times the slope when the response is straight. u_model is what
+measured propellers of such a description differ from the solver by (`bemt.asbuilt`).
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from bemt import __version__, effects
 from bemt.air import air_arrays
 from bemt.base import units
 from bemt.case import Assumption, Case
+from bemt.compare.sweep.model_error import u_model
 from bemt.readers import references as reference_file
 from bemt.recordings import audit_remarks
 
@@ -92,10 +94,13 @@ def spread(discrete: bool, nominal: Array, at: Sequence[Array]) -> Array:
 class _Model:
     """Nominal, refined and assumption runs of one model over all conditions."""
 
-    def __init__(self, nominal: dict[str, Array], refined: dict[str, Array] | None) -> None:
+    def __init__(
+        self, nominal: dict[str, Array], refined: dict[str, Array] | None, u_model: Mapping[str, Array] | None = None
+    ) -> None:
         self.nominal = nominal
         zero = {k: np.zeros_like(v) for k, v in nominal.items()}
         self.u_num = zero if refined is None else {k: np.abs(refined[k] - v) for k, v in nominal.items()}
+        self.u_model = {k: (u_model or {}).get(k, zero[k]) for k in nominal}
         self.low = {k: v.copy() for k, v in nominal.items()}
         self.high = {k: v.copy() for k, v in nominal.items()}
         self.variance = {k: np.zeros_like(v) for k, v in nominal.items()}
@@ -117,8 +122,8 @@ class _Model:
         return np.asarray(np.sqrt(self.variance[channel]))
 
     def u(self, channel: str) -> Array:
-        """Give the standard uncertainty of the result, without the model's own error."""
-        return np.asarray(np.hypot(self.u_input(channel), self.u_num[channel]))
+        """Give the standard uncertainty of the result: inputs, numerics, the model's own error."""
+        return np.asarray(np.sqrt(self.variance[channel] + self.u_num[channel] ** 2 + self.u_model[channel] ** 2))
 
 
 def _channels(points: Dataset) -> dict[str, Array]:
@@ -141,18 +146,19 @@ def _compare(
         return None
     S = float(values.nominal[channel][at])
     E, u_num, u_input = S - recorded, float(values.u_num[channel][at]), float(values.u_input(channel)[at])
-    u_val = math.sqrt(u_num**2 + u_input**2 + u_D**2)
+    u_model = float(values.u_model[channel][at])
+    u_val = math.sqrt(u_num**2 + u_input**2 + u_model**2 + u_D**2)
     if math.isnan(E):
         verdict = "no result"
     elif math.isnan(u_val):
-        known = math.hypot(u_num, u_input)
-        verdict = f"u_D unknown; |E| is {abs(E) / known:.1f} u of the model's inputs" if known > 0 else "u_D unknown"
+        known = math.hypot(u_num, u_input, u_model)
+        verdict = f"u_D unknown; |E| is {abs(E) / known:.1f} u of the model" if known > 0 else "u_D unknown"
     else:
         verdict = "not distinguishable from noise" if abs(E) <= u_val else "differs"
     return {
         "model": model, "reference": row["label"], "source": row["source"], "quantity": channel,
         "unit": COMPARED[channel], "S": S, "D": recorded, "E": E, "E_pct": 100.0 * E / recorded if recorded else None,
-        "u_num": u_num, "u_input": u_input, "u_D": u_D, "u_val": u_val, "verdict": verdict,
+        "u_num": u_num, "u_input": u_input, "u_model": u_model, "u_D": u_D, "u_val": u_val, "verdict": verdict,
     }  # fmt: skip
 
 
@@ -205,7 +211,8 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
     ready, nominal = run(case, what="nominal")
     stations = case.file.model.stations
     _, refined = run(case, 2 * stations, "twice the stations")
-    bemt = _Model(_channels(nominal), _channels(refined))
+    own_error = u_model(case, ready, nominal, _conditions(case, points, case)[2])
+    bemt = _Model(_channels(nominal), _channels(refined), own_error)
     simple = formula(case)
     area = {"thrust_N": simple.thrust_N, "CT": simple.CT}
     fit = _Model(area, None)
@@ -237,7 +244,8 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
         rows.append(_row(
             "bemt", "bemt", nominal.thrust_N[i], torque_Nm=nominal.torque_Nm[i], power_W=nominal.power_W[i],
             CT=nominal.CT[i], CP=nominal.CP[i], u=bemt.u("thrust_N")[i], u_num=bemt.u_num["thrust_N"][i],
-            u_input=bemt.u_input("thrust_N")[i], thrust_N_range=[bemt.low["thrust_N"][i], bemt.high["thrust_N"][i]],
+            u_input=bemt.u_input("thrust_N")[i], u_model=bemt.u_model["thrust_N"][i],
+            thrust_N_range=[bemt.low["thrust_N"][i], bemt.high["thrust_N"][i]],
             exhaust_speed_m_s=nominal.exhaust_speed_m_s[i] if case.ducted else None,
             duct_share=nominal.duct_share[i] if case.ducted else None, converged=bool(nominal.converged[i]),
             J=nominal.J[i], flags=flags, **state,

@@ -15,7 +15,7 @@ __all__ = ["case_text", "overview_text", "rows_csv"]
 WIDTH = 118
 CSV_COLUMNS = (
     "case", "source", "label", "rpm", "airspeed_m_s", "density_kg_m3", "thrust_N", "thrust_kgf", "u", "u_num",
-    "u_input", "torque_Nm", "power_W", "CT", "CP", "J", "M_tip", "Re", "exhaust_speed_m_s", "duct_share",
+    "u_input", "u_model", "torque_Nm", "power_W", "CT", "CP", "J", "M_tip", "Re", "exhaust_speed_m_s", "duct_share",
     "bemt_error_pct", "bemt_u_val", "k1k2_error_pct", "k1k2_u_val", "converged", "flags", "origin", "remark",
 )  # fmt: skip
 
@@ -90,13 +90,14 @@ def _comparison_lines(result: Mapping[str, Any]) -> list[str]:
     for c in result["comparisons"]:
         if c["model"] != "k1k2" and c["source"] in ROW_SOURCES:
             error = "-" if math.isnan(c["E"]) else f"{c['E']:+.4g}"
-            us = [_n(c["u_num"], 2), _n(c["u_input"], 2), _u(c["u_D"]), _u(c["u_val"])]
+            us = [_n(c["u_num"], 2), _n(c["u_input"], 2), _n(c["u_model"], 2), _u(c["u_D"]), _u(c["u_val"])]
             values = [_n(c["S"]), _n(c["D"]), error, _pct(c["E_pct"])]
             rows.append([c["model"], c["reference"], c["quantity"], *values, *us, c["verdict"]])
     if not rows:
         return []
-    header = ["E = S - D", "against", "quantity", "S", "D", "E", "E %", "u_num", "u_input", "u_D", "u_val", "verdict"]
-    return ["", text_table(header, rows, left=(0, 1, 2, 11), indent="  ")]
+    us = ["u_num", "u_input", "u_model", "u_D", "u_val"]
+    header = ["E = S - D", "against", "quantity", "S", "D", "E", "E %", *us, "verdict"]
+    return ["", text_table(header, rows, left=(0, 1, 2, 12), indent="  ")]
 
 
 def _audit_lines(result: Mapping[str, Any]) -> list[str]:
@@ -180,8 +181,8 @@ def case_text(result: Mapping[str, Any]) -> str:
         bemt = result["rows"][0]
         low, high = bemt["thrust_N_range"]
         lines += ["", _assumption_table(result)]
-        lines += [f"  together: u_input {_n(bemt['u_input'], 3)} N, u_num {_n(bemt['u_num'], 2)} N; one at a time the "
-                  f"thrust runs from {_n(low)} to {_n(high)} N"]  # fmt: skip
+        parts = ", ".join(f"{k} {_n(bemt[k], 3)} N" for k in ("u_input", "u_model", "u_num"))
+        lines += [f"  together: {parts}; one at a time the thrust runs from {_n(low)} to {_n(high)} N"]  # fmt: skip
     lines += _grid_lines(result.get("grid"))
     lines += [_wrap(note, "  ", "note: ") for note in result["notes"]]
     return "\n".join(lines)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ Stations = tuple[Array, Array, Array]
 # of CT says more about J0 than about the model.
 J_SHARE = 0.8
 N_STATIONS = 40
+KINDS = ("static", "forward")
 
 
 @dataclass(frozen=True)
@@ -117,6 +118,50 @@ def build(propeller: UiucPropeller, stations: Stations | None = None) -> Rotor:
     return Rotor(blade, propeller.blades, propeller.rotation, propeller.name)
 
 
+def measured(propeller: UiucPropeller) -> tuple[NDArray[np.bool_], Array, Array, Array, Array]:
+    """All points of a propeller: static or not, rpm, J, CT, CP; static runs first, then line by line."""
+    statics, lines = propeller.statics, propeller.lines
+    static = [*(np.ones(s.rpm.size, bool) for s in statics), *(np.zeros(line.J.size, bool) for line in lines)]
+    rpm = [*(s.rpm for s in statics), *(np.full(line.J.size, line.rpm) for line in lines)]
+    J = [*(np.zeros(s.rpm.size) for s in statics), *(line.J for line in lines)]
+    CT, CP = ([*(getattr(t, q) for t in (*statics, *lines))] for q in ("CT", "CP"))
+    found = [np.concatenate(v) for v in (rpm, J, CT, CP)]
+    return np.concatenate(static), found[0], found[1], found[2], found[3]
+
+
+class Solver:
+    """CT and CP of a propeller on its stations, with any latent numbers; the rotor of the last ones is kept."""
+
+    def __init__(
+        self, propeller: UiucPropeller, effects: Sequence[Effect], fixed_re: float | None, stations: Stations | None
+    ) -> None:
+        from bemt.air import Air
+        from bemt.sections import polars
+        from bemt.sections.neuralfoil import neuralfoil_polar
+
+        self.rotor = build(propeller, stations)
+        self.air = Air.from_density()
+        self.diameter_m = propeller.diameter_m
+        self._effects = tuple(effects)
+        tables = [(x, neuralfoil_polar(shape)) for x, shape in self.rotor.blade.anchors]
+        self._tables = [(x, polars.fixed_re(t, fixed_re) if fixed_re else t) for x, t in tables]
+        self._last: tuple[bytes, Any] = (b"", None)
+
+    def __call__(self, z: Array, rpm: Array, J: Array, which: Any = None) -> Array:
+        """(2, P) CT and CP, NaN where not converged."""
+        from bemt.asbuilt.latents import as_built
+        from bemt.bem import solver
+
+        key = z.tobytes()
+        if self._last[0] != key:
+            changed = [*self._effects, as_built(z)] if z.any() else self._effects
+            effects = sorted(changed, key=lambda e: (e.order, e.id))
+            prepared = solver.prepare(self.rotor, self._tables, effects, n_stations=N_STATIONS, mach_max=0.7)
+            self._last = (key, prepared)
+        found = solver.solve(self._last[1], rpm, J * rpm / 60.0 * self.diameter_m, self.air)
+        return np.array([found.CT, found.CP])
+
+
 def compare(
     propeller: UiucPropeller,
     effects: Sequence[Effect],
@@ -141,71 +186,42 @@ def compare(
     Rows
         Measured and computed values, point by point.
     """
-    from bemt.air import Air
-    from bemt.bem import solver
-    from bemt.sections import polars
-    from bemt.sections.neuralfoil import neuralfoil_polar
+    return rows(propeller, Solver(propeller, effects, fixed_re, stations))
 
-    air = Air.from_density()
-    rotor = build(propeller, stations)
-    tables = []
-    for x, shape in rotor.blade.anchors:
-        table = neuralfoil_polar(shape)
-        tables.append((x, polars.fixed_re(table, fixed_re) if fixed_re else table))
-    prep = solver.prepare(rotor, tables, effects, n_stations=N_STATIONS, mach_max=0.7)
-    static: list[NDArray[np.bool_]] = []
-    rpm: list[Array] = []
-    J: list[Array] = []
-    CT: list[Array] = []
-    CP: list[Array] = []
-    for s in propeller.statics:
-        static.append(np.ones(s.rpm.size, bool))
-        rpm.append(s.rpm)
-        J.append(np.zeros(s.rpm.size))
-        CT.append(s.CT)
-        CP.append(s.CP)
-    for line in propeller.lines:
-        static.append(np.zeros(line.J.size, bool))
-        rpm.append(np.full(line.J.size, line.rpm))
-        J.append(line.J)
-        CT.append(line.CT)
-        CP.append(line.CP)
-    rpm_, J_ = np.concatenate(rpm), np.concatenate(J)
-    sol = solver.solve(prep, rpm_, J_ * rpm_ / 60.0 * propeller.diameter_m, air)
+
+def rows(propeller: UiucPropeller, solve: Solver, z: Array | None = None) -> Rows:
+    """Measured points beside the solver with some latent numbers, those of the drawing by default."""
+    from bemt.asbuilt.latents import NAMES
+
+    static, rpm, J, CT, CP = measured(propeller)
+    CT_bemt, CP_bemt = solve(np.zeros(len(NAMES)) if z is None else z, rpm, J)
     ends, i = [], sum(s.rpm.size for s in propeller.statics)
     for line in propeller.lines:
-        ends.append((line.J, sol.CT[i : i + line.J.size]))
+        ends.append((line.J, CT_bemt[i : i + line.J.size]))
         i += line.J.size
     return Rows(
-        np.concatenate(static), rpm_, J_, np.concatenate(CT), np.concatenate(CP), sol.CT, sol.CP,
-        zero_thrust_J((line.J, line.CT) for line in propeller.lines),
+        static, rpm, J, CT, CP, CT_bemt, CP_bemt, zero_thrust_J((line.J, line.CT) for line in propeller.lines),
         zero_thrust_J((a, b) for a, b in ends if np.all(np.isfinite(b))),
     )  # fmt: skip
 
 
-def errors(rows: Rows) -> dict[str, dict[str, Array]]:
-    """Relative errors that count.
+def counted(rows: Rows) -> dict[str, NDArray[np.bool_]]:
+    """Points that count, (P,) of ``static`` and of ``forward``.
 
-    Parameters
-    ----------
-    rows : Rows
-        One propeller.
-
-    Returns
-    -------
-    dict
-        ``static`` and ``forward``, each ``CT`` and ``CP``: (bemt - measured) / measured [1].  Forward points lie
-        between 0 and 0.8 of the measured zero-thrust J; where that is unknown the largest measured J stands in.
+    Forward points lie between 0 and 0.8 of the measured zero-thrust J; where that is unknown the largest measured J
+    stands in.
     """
     limit = J_SHARE * (rows.J0 if np.isfinite(rows.J0) else float(np.max(rows.J, initial=0.0)))
-    out: dict[str, dict[str, Array]] = {}
-    for name, mask in (("static", rows.static), ("forward", ~rows.static & (rows.J <= limit) & (rows.J >= 0.0))):
-        usable = mask & (rows.CT > 0.0) & (rows.CP > 0.0)
-        out[name] = {
-            "CT": rows.CT_bemt[usable] / rows.CT[usable] - 1.0,
-            "CP": rows.CP_bemt[usable] / rows.CP[usable] - 1.0,
-        }
-    return out
+    usable = (rows.CT > 0.0) & (rows.CP > 0.0)
+    return {"static": rows.static & usable, "forward": ~rows.static & (rows.J <= limit) & (rows.J >= 0.0) & usable}
+
+
+def errors(rows: Rows) -> dict[str, dict[str, Array]]:
+    """Relative errors that count: ``static`` and ``forward``, each CT and CP, (bemt - measured) / measured [1]."""
+    return {
+        name: {"CT": rows.CT_bemt[mask] / rows.CT[mask] - 1.0, "CP": rows.CP_bemt[mask] / rows.CP[mask] - 1.0}
+        for name, mask in counted(rows).items()
+    }
 
 
 def statistics(error: Array) -> dict[str, float | None]:

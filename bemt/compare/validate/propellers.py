@@ -12,50 +12,26 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bemt.asbuilt.population import population
 from bemt.base.errors import Fault, InputError
 from bemt.base.folders import find_data
 from bemt.base.tables import json_text, write_atomic
+from bemt.compare.validate.built import expect, observe
 from bemt.compare.validate.folder import read_folder
 from bemt.compare.validate.match import matched
-from bemt.compare.validate.points import J_SHARE, Array, Rows, compare, errors, statistics
+from bemt.compare.validate.points import J_SHARE, compare, statistics
+from bemt.compare.validate.pool import Pool
 from bemt.compare.validate.text import text
 
 if TYPE_CHECKING:
     from bemt.effects import Effect
 
 SCHEMA = "bemt.validation/1"
-KINDS = ("static", "forward")
-
-
-class _Pool:
-    """Errors of many propellers, together."""
-
-    def __init__(self) -> None:
-        self._errors: dict[str, dict[str, list[Array]]] = {kind: {"CT": [], "CP": []} for kind in KINDS}
-
-    def add(self, rows: Rows) -> dict[str, Any]:
-        """Take the points of one propeller; returns its own statistics."""
-        out: dict[str, Any] = {}
-        for kind, found in errors(rows).items():
-            out[kind] = {"points": int(found["CT"].size)}
-            for q, e in found.items():
-                self._errors[kind][q].append(e)
-                out[kind][q] = statistics(e)
-        return out
-
-    def total(self) -> dict[str, Any]:
-        """Statistics over all points."""
-        out: dict[str, Any] = {}
-        for kind, found in self._errors.items():
-            sizes = [e.size for e in found["CT"]]
-            out[kind] = {"propellers": sum(size > 0 for size in sizes), "points": sum(sizes)}
-            out[kind].update({q: statistics(np.concatenate([*e, np.empty(0)])) for q, e in found.items()})
-        return out
 
 
 def validate(
     folder: Path, effects: Sequence[Effect] | None = None, fixed_re: float | None = None,
-    progress: Callable[[str], None] | None = None, match_J0: bool = False,
+    progress: Callable[[str], None] | None = None, match_J0: bool = False, as_drawn: bool = False,
 ) -> dict[str, Any]:  # fmt: skip
     """Compare a folder.
 
@@ -72,11 +48,15 @@ def validate(
     match_J0 : bool
         Also solve each propeller with its blades turned to the measured zero-thrust advance ratio.  An experiment that
         uses the measurement: it tells an error of blade angle or camber from others, and is kept apart from the rest.
+    as_drawn : bool
+        Leave out what the population expects of rotors as built, and its intervals; so does any change of the physics,
+        for which the population was not fitted.
 
     Returns
     -------
     dict
-        Document of schema ``bemt.validation/1``; errors are fractions.
+        Document of schema ``bemt.validation/1``; errors are fractions.  ``static`` and ``forward`` are the expectation
+        of the rotors as built, with ``coverage`` and ``width68``; ``as_drawn`` is the solver on the stations as given.
 
     Raises
     ------
@@ -88,19 +68,26 @@ def validate(
 
     found = read_folder(folder)
     eff = registry.standard() if effects is None else tuple(effects)
+    built = not as_drawn and fixed_re is None and {e.id for e in eff} == {e.id for e in registry.standard()}
     rows: list[dict[str, Any]] = []
-    pool, turned = _Pool(), _Pool()
+    pool, drawn, turned = Pool(), Pool(), Pool()
     shifts: list[float] = []
     unconverged = 0
     for i, (p, stations) in enumerate(found.propellers):
         if progress:
             progress(f"{i + 1}/{len(found.propellers)} {p.name}")
-        points = compare(p, eff, fixed_re, stations)
+        if built:
+            seen = observe(p, eff, stations)
+            expected = expect(seen, population())
+            points, statistic = seen.drawn, pool.add(expected.rows, expected) | {"as_drawn": drawn.add(seen.drawn)}
+        else:
+            points = compare(p, eff, fixed_re, stations)
+            statistic = pool.add(points)
         unconverged += int(np.count_nonzero(~np.isfinite(points.CT_bemt)))
         row: dict[str, Any] = {
             "name": p.name, "family": p.family, "diameter_in": p.diameter_in, "pitch_in": p.pitch_in,
             "blades": p.blades, "stations": p.geometry.origin if p.geometry is not None else "apc_pe0",
-            "J0": _number(points.J0), "J0_bemt": _number(points.J0_bemt), **pool.add(points),
+            "J0": _number(points.J0), "J0_bemt": _number(points.J0_bemt), **statistic,
         }  # fmt: skip
         if match_J0:
             fit = matched(p, eff, fixed_re, stations, points.J0)
@@ -109,6 +96,9 @@ def validate(
         rows.append(row)
     j0 = np.array([r["J0_bemt"] / r["J0"] - 1.0 for r in rows if r["J0"] and r["J0_bemt"]])
     doc: dict[str, Any] = {"schema": SCHEMA, "folder": folder.name, "J_share": J_SHARE, **pool.total()}
+    if built:
+        doc["as_drawn"] = drawn.total()
+        doc["population"] = dict(population().provenance)
     doc["zero_thrust_J"] = {"propellers": int(j0.size), **statistics(j0)}
     if match_J0:
         spread = np.quantile(shifts, (0.1, 0.5, 0.9)).tolist() if shifts else None

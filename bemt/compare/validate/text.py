@@ -18,6 +18,21 @@ def _totals(name: str, doc: dict[str, Any]) -> str:
     return f"{name:38}{cells}"
 
 
+def _coverage_lines(doc: dict[str, Any]) -> list[str]:
+    """What the intervals hold, and how wide they are."""
+    out = ["Rotors as built: expectation and intervals of the population (bemt.asbuilt), stations and labels weighed."]
+    for kind in ("static", "forward"):
+        for q in ("CT", "CP"):
+            s = doc[kind][q]
+            held = s["coverage"]
+            if held["68"] is not None:
+                out.append(
+                    f"  {kind} {q}: 68 % interval holds {100 * held['68']:.0f} %, 95 % one {100 * held['95']:.0f} %;"
+                    f" half width {100 * s['width68']:.1f} % in the median"
+                )
+    return out
+
+
 def text(doc: dict[str, Any]) -> str:
     """Table for people.
 
@@ -45,9 +60,14 @@ def text(doc: dict[str, Any]) -> str:
         )
     lines.append("-" * len(sub))
     lines.append(_totals("all points", doc))
+    drawn = doc.get("as_drawn")
+    if drawn:
+        lines.append(_totals("stations as they are", drawn))
     turned = doc.get("matched_J0")
     if turned and turned["propellers"]:
         lines.append(_totals(f"turned to measured J0, {turned['propellers']}", turned))
+    if drawn:
+        lines += ["", *_coverage_lines(doc)]
     z = doc["zero_thrust_J"]
     lines += [
         "",

@@ -1,0 +1,117 @@
+"""The few numbers in which a real rotor differs from its drawing, and how well they are known."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.effects.base import Effect
+
+if TYPE_CHECKING:
+    from bemt.effects.base import Baking
+
+Array = NDArray[np.float64]
+
+LOW_RE = 1.0e5
+"""Reynolds number below which the lift of a section is uncertain by a share of its own [1]."""
+KNOWN_FROM = ("cad", "scan", "stations", "label", "reference")
+"""How the blade of a case is known; ``reference``: from a run of this very rotor."""
+
+# A camber acts on attached flow only: whole up to 30 deg, gone at 60.
+_ATTACHED, _SEPARATED = math.radians(30.0), math.radians(60.0)
+
+
+@dataclass(frozen=True)
+class AsBuilt(Effect):
+    """What the rotor as built has and its drawing has not.
+
+    Parameters
+    ----------
+    angle_deg : float
+        Turn of the whole blade [deg].
+    lift, drag : float
+        Natural logarithm of the factor on cl and on cd [1].
+    low_re_lift : float
+        Further change of ln cl per unit of ln Re below `LOW_RE` [1].
+    camber_deg : float
+        Lowering of the zero-lift angle at the same drag [deg].
+    """
+
+    angle_deg: float = 0.0
+    lift: float = 0.0
+    drag: float = 0.0
+    low_re_lift: float = 0.0
+    camber_deg: float = 0.0
+
+    id = "as_built"
+    title = "Rotor as built"
+    order = 15
+    diagnosed = False
+
+    def blade(self, bake: Baking) -> None:
+        """Turn the blade."""
+        bake.beta += np.radians(self.angle_deg)
+
+    def section(self, bake: Baking) -> None:
+        """Shift and scale the section tables."""
+        if self.camber_deg:
+            whole = np.clip((_SEPARATED - np.abs(bake.alpha)) / (_SEPARATED - _ATTACHED), 0.0, 1.0)
+            at = bake.alpha + math.radians(self.camber_deg) * whole
+            rows = bake.cl.reshape(-1, bake.alpha.size)
+            bake.cl = np.stack([np.interp(at, bake.alpha, row) for row in rows]).reshape(bake.cl.shape)
+        low = np.maximum(np.log(LOW_RE / bake.Re), 0.0)[None, None, :, None]
+        bake.cl = bake.cl * np.exp(self.lift + self.low_re_lift * low)
+        bake.cd = bake.cd * math.exp(self.drag)
+
+
+NAMES: tuple[str, ...] = tuple(f.name for f in fields(AsBuilt))
+"""Latent numbers, in the order of every mean, covariance and tangent."""
+UNITS = {"angle_deg": "deg", "lift": "1", "drag": "1", "low_re_lift": "1", "camber_deg": "deg"}
+STEP = np.array([0.5, 0.05, 0.1, 0.1, 0.5])
+"""Half steps of the central differences, in the units of the numbers."""
+
+
+def as_built(z: Array) -> AsBuilt:
+    """Effect of a vector of latent numbers."""
+    return AsBuilt(*(float(v) for v in z))
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """What is known of the latent numbers of one rotor: a normal law whose size is itself uncertain.
+
+    Attributes
+    ----------
+    mean : (K,) float
+        Expectation, in the order and units of `NAMES`.
+    cov : (K, K) float
+        Covariance at size 1.
+    sizes, weights : (S,) float
+        Factors on all standard deviations of this rotor, and their probabilities: the heavy tail [1].
+    known_from : str
+        One of `KNOWN_FROM`.
+    """
+
+    mean: Array
+    cov: Array
+    sizes: Array
+    weights: Array
+    known_from: str = "stations"
+
+    @property
+    def sd(self) -> Array:
+        """Standard deviations at size 1, (K,)."""
+        return np.sqrt(np.diag(self.cov))
+
+    def scaled(self, sds: Mapping[str, float]) -> Prior:
+        """Prior with other standard deviations of some numbers; correlations stay."""
+        factor = np.ones(len(NAMES))
+        for name, sd in sds.items():
+            k = NAMES.index(name)
+            factor[k] = sd / max(float(self.sd[k]), 1e-12)
+        return replace(self, cov=self.cov * np.outer(factor, factor))

@@ -1,0 +1,161 @@
+"""What the solver says of a rotor as built: expectation and interval at operating points."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.asbuilt.conditioning import tangents
+from bemt.asbuilt.latents import NAMES, Prior
+from bemt.asbuilt.mixture import LEVELS, half_width
+from bemt.asbuilt.population import WEIGHTS, Population
+from bemt.asbuilt.reference import Reference
+
+Array = NDArray[np.float64]
+Solve = Callable[[Array, Array, Array, NDArray[np.intp]], Array]
+"""(K,) latent numbers, (P,) rpm, (P,) advance ratio and the points whose air holds, (P,), to (2, P) CT and CP."""
+
+_SCAN = np.linspace(0.05, 2.5, 50)
+
+
+@dataclass(frozen=True, eq=False)
+class Sensed:
+    """The solver at points of one rotor, with its slopes.
+
+    Attributes
+    ----------
+    diameter_m : float
+        Diameter [m].
+    x, Re : (P,) float
+        J over the solver's zero-thrust J; Reynolds number at 0.75 R [1].
+    f, top : (2, P) float
+        CT and CP, and those at rest at the same rpm [1].
+    T : (2, K, P) float
+        Slopes of CT and CP with the latent numbers.
+    """
+
+    diameter_m: float
+    x: Array
+    Re: Array
+    f: Array
+    top: Array
+    T: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """Expectation and scatter of CT and CP of a rotor as built.
+
+    Attributes
+    ----------
+    mean : (2, P) float
+        Expectation of CT and CP [1].
+    latent_sd, rest_sd, noise_sd : (2, P) float
+        Standard deviations from the latent numbers at size 1, from the solver's rest, from single readings [1].
+    sizes, weights, rest_sizes, rest_weights : (S,), (S,), (R,), (R,) float
+        Heavy tails of the latent part and of rest and readings.
+    """
+
+    mean: Array
+    latent_sd: Array
+    rest_sd: Array
+    noise_sd: Array
+    sizes: Array
+    weights: Array
+    rest_sizes: Array
+    rest_weights: Array
+
+    @property
+    def chances(self) -> Array:
+        """Probabilities of the pairs of sizes, in the order of `sds`."""
+        return np.outer(self.weights, self.rest_weights).reshape(-1)
+
+    def sds(self, noise: bool) -> Array:
+        """Standard deviations of the mixture, (2, P, all pairs of sizes)."""
+        still = self.rest_sd**2 + (self.noise_sd**2 if noise else 0.0)
+        latent = (self.sizes * self.latent_sd[..., None]) ** 2
+        pairs = latent[..., None] + (self.rest_sizes * np.sqrt(still)[..., None])[..., None, :] ** 2
+        return np.asarray(np.sqrt(pairs).reshape(*still.shape, -1))
+
+    def half_width(self, level: float = LEVELS[0], noise: bool = False) -> Array:
+        """Half width of the interval that holds the rotor's own coefficient (with noise: a reading), (2, P) [1]."""
+        return half_width(level, self.sds(noise), self.chances)
+
+
+def zero_thrust(solve: Solve, z: Array, rpm: float, which: int = 0) -> float:
+    """Advance ratio at which the solver's thrust vanishes; that of the largest one tried where it never does [1]."""
+    at = np.full(_SCAN.size, which, dtype=np.intp)
+    CT = solve(z, np.full(_SCAN.size, rpm), _SCAN, at)[0]
+    down = np.flatnonzero((CT[:-1] > 0.0) & (CT[1:] <= 0.0))
+    if not down.size:
+        return float(_SCAN[-1])
+    i = int(down[0])
+    return float(_SCAN[i] + (_SCAN[i + 1] - _SCAN[i]) * CT[i] / (CT[i] - CT[i + 1]))
+
+
+def sense(solve: Solve, diameter_m: float, rpm: Array, J: Array, Re: Array, z: Array | None = None) -> Sensed:
+    """Solve points and take the slopes there, 2 K + 3 calls.
+
+    Parameters
+    ----------
+    solve : callable
+        See `Solve`.
+    diameter_m : float
+        Diameter [m].
+    rpm, J, Re : (P,) float
+        Points [rev/min], [1], [1].
+    z : (K,) float, optional
+        Latent numbers of the slopes; the drawing's by default.
+
+    Returns
+    -------
+    Sensed
+        NaN where not converged.
+    """
+    z = np.zeros(len(NAMES)) if z is None else z
+    points = np.arange(rpm.size)
+    f = solve(z, rpm, J, points)
+    top = solve(z, rpm, np.zeros_like(J), points)
+    slopes = tangents(lambda at: solve(at, rpm, J, points).reshape(-1), z)
+    J0 = zero_thrust(solve, z, float(np.median(rpm)), int(np.argsort(rpm)[rpm.size // 2]))
+    T = slopes.reshape(2, rpm.size, -1).transpose(0, 2, 1)
+    return Sensed(diameter_m, J / J0, Re, f, top, T)
+
+
+def predict(
+    p: Population, prior: Prior, at: Sensed, mean: Array | None = None, reference: Reference | None = None
+) -> Prediction:
+    """Expectation and scatter at points.
+
+    Parameters
+    ----------
+    p : Population
+        For the rest.
+    prior : Prior
+        What is known of the latent numbers; after a reference run its posterior.
+    at : Sensed
+        The solver there.
+    mean : (2, P) float, optional
+        The real solver at ``prior.mean``; by default the linear one.
+    reference : Reference, optional
+        Run that the rotor's posterior comes from: it also tells of the rest nearby.
+
+    Returns
+    -------
+    Prediction
+        At the points.
+    """
+    T = at.T
+    if mean is None:
+        mean = at.f + np.einsum("ckp,k->cp", T, prior.mean)
+    mean = mean + p.bias(at.x, at.top)
+    rest = p.rest_sd(at.diameter_m, at.f, at.top)
+    if reference is not None:
+        shift, T, left = reference.near(p, at.x, at.Re, rest, T)
+        mean, rest = mean + shift, left * reference.size
+    latent = np.sqrt(np.maximum(np.einsum("ckp,kj,cjp->cp", T, prior.cov, T), 0.0))
+    tail = (p.rest_sizes, WEIGHTS) if reference is None else (np.ones(1), np.ones(1))
+    return Prediction(mean, latent, rest, p.noise_sd(at.f, at.top), prior.sizes, prior.weights, *tail)

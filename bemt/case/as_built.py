@@ -1,0 +1,125 @@
+"""What a case says of its rotor as built: how the blade is known, and what a reference run told."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.asbuilt.latents import NAMES, AsBuilt, Prior, as_built
+from bemt.asbuilt.population import label_angle_deg, population
+from bemt.asbuilt.reference import Reference
+from bemt.base.errors import Fault, InputError
+from bemt.base.units import INCH
+from bemt.sections import rule as section_rule
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from bemt.case.schema import AsBuiltTable, BladeTable, CaseFile
+    from geometry.rotor import Rotor
+
+Array = NDArray[np.float64]
+
+# Assumptions that move a latent number of their own accord.
+MOVED = {
+    "angle": ("blade.beta_offset_deg", "blade.pitch_in", "blade.pitch_mm", "blade.pitch_ratio"),
+    "chord": ("blade.max_chord_over_R", "blade.chord_scale", "blade.chord_law"),
+    "camber": ("blade.section.camber", "blade.section.camber_scale", "blade.section.naca", "blade.section.dat"),
+}
+_SCHEMA = "bemt.as_built/1"
+
+
+@dataclass(frozen=True, eq=False)
+class CaseAsBuilt:
+    """What is known of the rotor of a case.
+
+    Attributes
+    ----------
+    prior : Prior
+        Law of the latent numbers, after the reference run if there is one.
+    drawn : (K,) float
+        Latent numbers with which the case is solved: zero, or what the case states.
+    reference : Reference or None
+        The run's rows.
+    """
+
+    prior: Prior
+    drawn: Array
+    reference: Reference | None = None
+
+
+def stated_effects(file: CaseFile, folder: Path) -> tuple[AsBuilt, ...]:
+    """Effect of the latent numbers with which a case is solved, none where it states none."""
+    stated = file.blade.as_built
+    if stated is None:
+        return ()
+    drawn = _posterior(folder / stated.file).drawn if stated.file is not None else _stated(stated)
+    return (as_built(drawn),) if drawn.any() else ()
+
+
+def _stated(table: AsBuiltTable) -> Array:
+    """Expectations that a case states, zero elsewhere."""
+    return np.array([getattr(table, name, None) or 0.0 for name in NAMES])
+
+
+def known_from(blade: BladeTable) -> str:
+    """How the blade is known: as the case says, else by where its stations come from."""
+    if blade.known_from is not None:
+        return blade.known_from
+    return "label" if blade.chord_law is not None else "cad" if blade.apc is not None else "stations"
+
+
+def _gap_deg(blade: BladeTable, rotor: Rotor) -> float:
+    pitch = blade.pitch_m(rotor.D) if blade.label_pitch_in is None else blade.label_pitch_in * INCH
+    if math.isnan(pitch):
+        return math.nan
+    return math.degrees(float(rotor.blade.at(0.75 * rotor.R)[1])) - label_angle_deg(pitch, rotor.D)
+
+
+def as_built_of(file: CaseFile, folder: Path, rotor: Rotor, counting_assumptions: bool = True) -> CaseAsBuilt:
+    """Read what a case file says; faults as `InputError`."""
+    blade, stated = file.blade, file.blade.as_built
+    if stated is not None and stated.file is not None:
+        return _posterior(folder / stated.file)
+    moved = {item.key for item in file.assumptions} if counting_assumptions else set()
+    declared = {what for what, keys in MOVED.items() if moved & set(keys)}
+    source = known_from(blade)
+    drawn_section = blade.section is not None and blade.section.dat is not None
+    drawn_section = drawn_section or bool(file.polars) or source in ("cad", "scan")
+    section = "given" if drawn_section else section_rule.source(blade.family)
+    sds, drawn = {}, np.zeros(len(NAMES)) if stated is None else _stated(stated)
+    if stated is not None:
+        named = {"angle_deg": "angle_sd_deg", "camber_deg": "camber_sd_deg", "lift": "lift_sd", "drag": "drag_sd"}
+        for name, sd in named.items():
+            if getattr(stated, sd) is not None:
+                sds[name] = getattr(stated, sd)
+    prior = population().prior(source, rotor.D, _gap_deg(blade, rotor), blade.family, section, declared, sds)
+    stated_mean = np.where(drawn != 0.0, drawn, prior.mean)
+    return CaseAsBuilt(Prior(stated_mean, prior.cov, prior.sizes, prior.weights, source), drawn)
+
+
+def _posterior(path: Path) -> CaseAsBuilt:
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+        if document["schema"] != _SCHEMA or document["latents"] != list(NAMES):
+            raise ValueError(f"schema {document['schema']!r} of {document['latents']}")
+        mean, cov, sizes, weights = (np.array(document[k], float) for k in ("mean", "cov", "sizes", "weights"))
+        reference = Reference.of(document["reference"])
+    except (KeyError, ValueError, TypeError) as error:
+        expected = f"a file of {_SCHEMA} with the latent numbers {', '.join(NAMES)}"
+        raise InputError(Fault(path.as_posix(), "", str(error), expected, "calibrate-rotor writes it")) from error
+    return CaseAsBuilt(Prior(mean, cov, sizes, weights, "reference"), mean, reference)
+
+
+def posterior_document(prior: Prior, reference: Reference, provenance: dict[str, object]) -> dict[str, object]:
+    """Document that `blade.as_built.file` names."""
+    return {
+        "schema": _SCHEMA, "latents": list(NAMES), "mean": prior.mean.tolist(), "cov": prior.cov.tolist(),
+        "sizes": prior.sizes.tolist(), "weights": prior.weights.tolist(), "reference": reference.document(),
+        "provenance": provenance,
+    }  # fmt: skip

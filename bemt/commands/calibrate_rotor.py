@@ -1,0 +1,40 @@
+"""``python -m bemt calibrate-rotor REFERENCE --case CASE``: a case whose rotor is known from a run of its own."""
+
+from __future__ import annotations
+
+import argparse
+
+from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
+from bemt.commands import _options, _terminal
+
+NAME = "calibrate-rotor"
+HELP = "learn a rotor's blade as built from a reference run"
+GROUP = "Recordings"
+EXAMPLE = "calibrate-rotor static.csv --case cases/prop_10x5 --out measured_10x5"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    run = "recordings of this very rotor without anything else that may differ: a clean stand or tunnel"
+    parser.add_argument("reference", nargs="+", metavar="REFERENCE", help=run)
+    parser.add_argument("--case", required=True, metavar="CASE", help="case of the rotor")
+    parser.add_argument("--out", metavar="DIR", help="write the case with the rotor as measured there")
+    _options.add_json(parser, "bemt.rotor_calibration/1")
+    _options.add_quiet(parser, "neither progress nor answer")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Condition, write, print; 1 when the point did not stand still."""
+    from bemt.base.tables import json_text
+    from bemt.diagnose.rotor_calibration import calibrate, document, text, write
+
+    with _terminal.progress(args.quiet or args.json) as say:
+        case, found = calibrate(args.reference, args.case, say)
+    if args.out:
+        write(case, found, args.reference, args.out)
+    shown = document(case, found, args.reference)
+    if args.json:
+        print(json_text(shown), end="")
+    elif not args.quiet:
+        print(text(shown))
+    return EXIT_OK if found.found.converged else EXIT_UNCONVERGED

@@ -1,0 +1,129 @@
+"""A rotor from a run of its own: the case with what its recording tells of the rotor as built."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt import coefficients as co
+from bemt.asbuilt.conditioning import Conditioned, condition
+from bemt.asbuilt.latents import NAMES, Prior
+from bemt.asbuilt.model import air_fields, air_of_points, coefficients
+from bemt.asbuilt.population import WEIGHTS, population
+from bemt.asbuilt.predict import zero_thrust
+from bemt.asbuilt.reference import SESSION, Reference, noise_of_run
+
+if TYPE_CHECKING:
+    from bemt.air import Air
+    from bemt.case import Case
+
+Array = NDArray[np.float64]
+
+MOST_POINTS = 40
+"""Points beyond this number are averaged with their neighbours in (J, rpm) [1]."""
+
+
+@dataclass(frozen=True, eq=False)
+class AsMeasured:
+    """Outcome of `as_measured`.
+
+    Attributes
+    ----------
+    prior : Prior
+        What the case and the population said.
+    posterior : Prior
+        After the run; ``known_from`` is ``reference``.
+    reference : Reference
+        Rows of the run, for predictions near them.
+    found : Conditioned
+        Steps, convergence, evidence.
+    points : int
+        Points of the run that were used [1].
+    """
+
+    prior: Prior
+    posterior: Prior
+    reference: Reference
+    found: Conditioned
+    points: int
+
+
+def _groups(rpm: Array, J: Array) -> list[NDArray[np.intp]]:
+    """Points that are averaged together: runs of neighbours in (J, rpm)."""
+    order = np.lexsort((rpm, np.round(J, 2)))
+    return [np.sort(part) for part in np.array_split(order, min(rpm.size, MOST_POINTS)) if part.size]
+
+
+def as_measured(
+    case: Case, rpm: Array, airspeed_m_s: Array, air: Air, CT: Array, CP: Array,
+    u_CT: Array | float = 0.0, u_CP: Array | float = 0.0, gain: tuple[float, float] = (SESSION, SESSION),
+) -> AsMeasured:  # fmt: skip
+    """Posterior of a rotor's latent numbers from a reference run.
+
+    Parameters
+    ----------
+    case : Case
+        Rotor, physics, and how the blade is known.
+    rpm, airspeed_m_s : (P,) float
+        Points of the run [rev/min], [m/s].
+    air : Air
+        State of the air, one or one per point.
+    CT, CP : (P,) float
+        Readings in the propeller convention, NaN where not measured [1].
+    u_CT, u_CP : (P,) float or float
+        Standard uncertainty of single readings [1].
+    gain : tuple of float
+        Standard deviation of what all points of a channel share, of the reading [1].
+
+    Returns
+    -------
+    AsMeasured
+        Posterior and reference.
+
+    Raises
+    ------
+    ValueError
+        If no reading is usable.
+    """
+    from bemt.case.prepare import prepare_case
+
+    people, prior = population(), case.as_built().prior
+    if prior.known_from != "reference":
+        prior = case.as_built(counting_assumptions=False).prior
+    ready = prepare_case(case)
+    J = airspeed_m_s / (rpm / 60.0 * ready.diameter_m)
+    usable = np.isfinite(CT) | np.isfinite(CP)
+    if not usable.any():
+        raise ValueError("reference: got no thrust and no torque; expected at least one reading")
+    keep = np.flatnonzero(usable)
+    groups = [keep[g] for g in _groups(rpm[keep], J[keep])]
+
+    def mean(values: Array | float) -> Array:
+        full = np.broadcast_to(np.asarray(values, float), rpm.shape)
+        return np.array([full[g].mean() for g in groups])
+
+    share = np.array([1.0 / np.sqrt(g.size) for g in groups])
+    state = air_of_points({k: v if v.size == 1 else mean(v) for k, v in air_fields(air).items()})
+    rpm_, J_ = mean(rpm), mean(J)
+    solve = coefficients(ready, state)
+    points = np.arange(rpm_.size)
+    drawn = np.zeros(len(NAMES))
+    Re = np.asarray(co.Re75(ready.chord75_m, rpm_ / 60.0, ready.diameter_m, J_ * rpm_ / 60.0 * ready.diameter_m, state.rho, state.mu))
+    f = solve(drawn, rpm_, J_, points)
+    top = solve(drawn, rpm_, np.zeros_like(J_), points)
+    x = J_ / zero_thrust(solve, drawn, float(np.median(rpm_)), int(np.argsort(rpm_)[rpm_.size // 2]))
+    y = np.array([mean(CT), mean(CP)])
+    single = np.hypot(np.array([mean(u_CT), mean(u_CP)]), people.noise_sd(f, top)) * share
+    noise = noise_of_run(people, ready.diameter_m, (x, Re), f, top, y, single, gain)
+    target = y.reshape(-1)
+    bias = people.bias(x, top).reshape(-1)
+    found = condition(
+        lambda z: solve(z, rpm_, J_, points).reshape(-1) + bias, prior, target, noise, people.rest_sizes, WEIGHTS
+    )
+    posterior = Prior(found.mean, found.cov, np.ones(1), np.ones(1), "reference")
+    amplitude = people.rest_sd(ready.diameter_m, f, top).reshape(-1)
+    reference = Reference.given(x, Re, amplitude, noise, target, found)
+    return AsMeasured(prior, posterior, reference, found, int(keep.size))

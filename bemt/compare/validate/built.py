@@ -1,0 +1,143 @@
+"""Measured propellers as built: what the population expects of each, how wide, and what each tells the population."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.asbuilt.conditioning import condition
+from bemt.asbuilt.fit import Measured
+from bemt.asbuilt.latents import Prior
+from bemt.asbuilt.mixture import LEVELS, half_width, inside
+from bemt.asbuilt.population import WEIGHTS, Population, label_angle_deg
+from bemt.asbuilt.predict import predict, sense
+from bemt.asbuilt.reference import Reference, noise_of_run
+from bemt.compare.validate.points import Rows, Solver, Stations, counted, rows
+from bemt.sections import rule as section_rule
+
+if TYPE_CHECKING:
+    from bemt.effects import Effect
+    from bemt.readers.uiuc import UiucPropeller
+
+Array = NDArray[np.float64]
+GENERAL = "general rule"
+RUN_POINTS = 24
+"""Points of a run on which a rotor is conditioned [1]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Observed:
+    """One propeller of a folder: the solver as drawn at its points, and its sensitivities.
+
+    Attributes
+    ----------
+    propeller : UiucPropeller
+        As read.
+    solve : Solver
+        For other latent numbers.
+    drawn : Rows
+        All points, the solver on the stations.
+    record : Measured
+        The points that count, static ones first.
+    """
+
+    propeller: UiucPropeller
+    solve: Solver
+    drawn: Rows
+    record: Measured
+
+
+@dataclass(frozen=True, eq=False)
+class Expected:
+    """Expectation for one propeller and how the measured points lie in it, over the points that count.
+
+    Attributes
+    ----------
+    rows : Rows
+        As `Observed.drawn`, the computed coefficients being expectations.
+    probability : dict of str to dict of str to (P,) float
+        ``static`` and ``forward``, CT and CP: of an interval as wide as the error [1].
+    width : dict of str to dict of str to (P,) float
+        Half width of the 68 % interval over the expectation [1].
+    """
+
+    rows: Rows
+    probability: dict[str, dict[str, Array]]
+    width: dict[str, dict[str, Array]]
+
+
+def observe(propeller: UiucPropeller, effects: Sequence[Effect], stations: Stations, general: bool = False) -> Observed:
+    """Solve one propeller at its points with the slopes; ``general``: as if its family were unknown to the rule."""
+    family = GENERAL if general else propeller.family
+    solve = Solver(replace(propeller, family=family), effects, None, stations)
+    drawn = rows(propeller, solve)
+    here = np.logical_or.reduce(list(counted(drawn).values())) & np.isfinite(drawn.CT_bemt)
+    rotor = solve.rotor
+    chord, beta = (float(v) for v in rotor.blade.at(0.75 * rotor.R)[:2])
+    n, D = drawn.rpm[here] / 60.0, rotor.D
+    speed = n * D * np.hypot(0.75 * math.pi, drawn.J[here])
+    Re = solve.air.rho * speed * chord / solve.air.mu
+    at = sense(solve, D, drawn.rpm[here], drawn.J[here], Re)
+    gap = math.nan
+    if propeller.pitch_in:
+        gap = math.degrees(beta) - label_angle_deg(propeller.pitch_in, propeller.diameter_in)
+    y = np.array([drawn.CT[here], drawn.CP[here]])
+    source = section_rule.source(family)
+    record = Measured(**vars(at), name=propeller.name, family=propeller.family, section=source, gap_deg=gap,
+                      static=drawn.static[here], y=y)  # fmt: skip
+    return Observed(propeller, solve, drawn, record)
+
+
+def conditioned(seen: Observed, p: Population, on: str) -> Expected:
+    """Expectation after conditioning on the points of one kind, ``static`` or ``forward``; those of the other count."""
+    m, drawn = seen.record, seen.drawn
+    good = counted(drawn)
+    here = np.logical_or.reduce(list(good.values())) & np.isfinite(drawn.CT_bemt)
+    rpm, J = drawn.rpm[here], drawn.J[here]
+    run = np.flatnonzero(good[on][here])
+    run = run[np.unique(np.linspace(0, run.size - 1, min(run.size, RUN_POINTS)).round().astype(int))]
+    prior = p.prior("stations", m.diameter_m, m.gap_deg, m.family, m.section)
+    x, Re, f, top, y = m.x[run], m.Re[run], m.f[:, run], m.top[:, run], m.y[:, run]
+    noise = noise_of_run(p, m.diameter_m, (x, Re), f, top, y, p.noise_sd(f, top))
+    bias = p.bias(x, top).reshape(-1)
+    found = condition(
+        lambda z: seen.solve(z, rpm[run], J[run]).reshape(-1) + bias, prior, y.reshape(-1), noise, p.rest_sizes, WEIGHTS
+    )
+    amplitude = p.rest_sd(m.diameter_m, f, top).reshape(-1)
+    reference = Reference.given(x, Re, amplitude, noise, y.reshape(-1), found)
+    posterior = Prior(found.mean, found.cov, np.ones(1), np.ones(1), "reference")
+    return _lying(seen, p, posterior, reference)
+
+
+def expect(seen: Observed, p: Population) -> Expected:
+    """Expectation of a propeller and how its points lie in it."""
+    m = seen.record
+    return _lying(seen, p, p.prior("stations", m.diameter_m, m.gap_deg, m.family, m.section))
+
+
+def _lying(seen: Observed, p: Population, prior: Prior, reference: Reference | None = None) -> Expected:
+    """How the points lie in a prediction."""
+    m = seen.record
+    now = rows(seen.propeller, seen.solve, prior.mean)
+    good = counted(now)
+    here = np.logical_or.reduce(list(good.values())) & np.isfinite(seen.drawn.CT_bemt)
+    found = predict(p, prior, m, np.array([now.CT_bemt[here], now.CP_bemt[here]]), reference)
+    CT, CP = now.CT_bemt.copy(), now.CP_bemt.copy()
+    CT[here], CP[here] = found.mean
+    now = replace(now, CT_bemt=CT, CP_bemt=CP)
+    sds = found.sds(noise=True)
+    probability: dict[str, dict[str, Array]] = {}
+    width: dict[str, dict[str, Array]] = {}
+    for kind, mask in good.items():
+        k = mask[here]
+        probability[kind], width[kind] = {}, {}
+        for i, q in enumerate(("CT", "CP")):
+            mean, sd = found.mean[i][k], sds[i][k]
+            probability[kind][q] = inside(m.y[i][k] - mean, sd, found.chances)
+            width[kind][q] = half_width(LEVELS[0], sd, found.chances) / np.abs(mean)
+    return Expected(now, probability, width)

@@ -1,0 +1,121 @@
+"""The population fitted to folders of measured propellers, and how well it does for families left out of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+from bemt import __version__
+from bemt.asbuilt.fit import fit
+from bemt.asbuilt.population import Population
+from bemt.base.tables import plain
+from bemt.base.units import INCH
+from bemt.compare.validate.built import Observed, conditioned, expect, observe
+from bemt.compare.validate.points import KINDS
+from bemt.compare.validate.pool import Pool
+from bemt.sections import rule as section_rule
+
+if TYPE_CHECKING:
+    from bemt.compare.validate.folder import Folder
+    from bemt.effects import Effect
+
+SCHEMA = "bemt.left_out/1"
+LARGE_IN = 8.9
+"""Propellers of 9 in and more are reported beside all [in]."""
+# Steps of the search with a family left out, from the numbers of all families.
+_STEPS_LEFT_OUT = 15
+_WORDS = {
+    "as_drawn": "solver on the stations as given", "declared": "as built",
+    "general_section": "as built, calibrated sections taken for unknown",
+    "as_drawn_large": "solver, 9 in and more", "declared_large": "as built, 9 in and more",
+    "on_static": "conditioned on the rotor's static run", "on_forward": "conditioned on its forward runs",
+}  # fmt: skip
+Say = Callable[[str], None] | None
+
+
+def watch(folder: Folder, effects: Sequence[Effect], say: Say = None) -> list[Observed]:
+    """Solve every propeller of a folder with its slopes."""
+    out = []
+    for i, (p, stations) in enumerate(folder.propellers):
+        if say:
+            say(f"{i + 1}/{len(folder.propellers)} {p.name}")
+        out.append(observe(p, effects, stations))
+    return out
+
+
+def fit_population(seen: Sequence[Observed], name: str) -> tuple[Population, Any]:
+    """Population of measured propellers and the numbers of its search."""
+    provenance = {
+        "propellers": len(seen), "points": int(sum(s.record.x.size for s in seen)), "folder": name,
+        "families": sorted({s.record.family for s in seen}), "version": __version__,
+        "command": f"python -m bemt validate {name} --fit-population FILE",
+        "source": "UIUC Propeller Database (Brandt, Deters, Ananda, Dantsker, Selig)",
+    }  # fmt: skip
+    return fit([s.record for s in seen], provenance=provenance)
+
+
+def leave_out(
+    folder: Folder, seen: Sequence[Observed], effects: Sequence[Effect], name: str, say: Say = None
+) -> dict[str, Any]:
+    """Every family predicted by a population fitted without it.
+
+    ``declared`` keeps the section rule as it is, whose cambers of a few families were calibrated on volume 1;
+    ``general_section`` takes those families for unknown, which is what a new family meets.
+    """
+    _, numbers = fit_population(seen, name)
+    pools = {key: Pool() for key in _WORDS}
+    families = sorted({s.record.family for s in seen})
+    stations = {p.name: s for p, s in folder.propellers}
+    for i, family in enumerate(families):
+        if say:
+            say(f"{i + 1}/{len(families)} without {family}")
+        p, _ = fit([s.record for s in seen if s.record.family != family], numbers, _STEPS_LEFT_OUT)
+        for one in (s for s in seen if s.record.family == family):
+            found = expect(one, p)
+            for other_kind, on in (("forward", "static"), ("static", "forward")):
+                if one.record.static.any() and not one.record.static.all():
+                    pools[f"on_{on}"].add_kind(conditioned(one, p, on), other_kind)
+            large = one.record.diameter_m >= LARGE_IN * INCH
+            for key in ("declared", *(["declared_large"] if large else [])):
+                pools[key].add(found.rows, found)
+            for key in ("as_drawn", *(["as_drawn_large"] if large else [])):
+                pools[key].add(one.drawn)
+            if section_rule.source(family) == "published":
+                pools["general_section"].add(found.rows, found)
+            else:
+                other = observe(one.propeller, effects, stations[one.record.name], general=True)
+                found = expect(other, p)
+                pools["general_section"].add(found.rows, found)
+    return {"schema": SCHEMA, "folder": name, "families": families} | {k: pool.total() for k, pool in pools.items()}
+
+
+def table(document: dict[str, Any]) -> str:
+    """Document of `leave_out` for people."""
+    head = (
+        f"{'each family left out of the population':60} {'median':>7} {'p90':>6} {'68 %':>6} {'95 %':>6} {'width':>6}"
+    )
+    lines = [head]
+    for key, text in _WORDS.items():
+        for kind in KINDS:
+            for q in ("CT", "CP"):
+                s = document[key][kind][q]
+                if s["median_abs"] is None:
+                    continue
+                held = s.get("coverage", {"68": None, "95": None})
+                cells = [s["median_abs"], s["p90_abs"], held["68"], held["95"], s.get("width68")]
+                shown = [f"{'-':>6}" if v is None else f"{100 * v:6.1f}" for v in cells]
+                lines.append(f"{text + ', ' + kind + ' ' + q:60}  {' '.join(shown)}")
+    n = document["declared"]
+    lines += [
+        "",
+        f"Percent of the measured value; {len(document['families'])} families; static {n['static']['points']} points of"
+        f" {n['static']['propellers']} propellers, forward {n['forward']['points']} of {n['forward']['propellers']}.",
+        "68 %, 95 %: share of the points inside those intervals; width: half of the 68 % interval, median.",
+    ]
+    return "\n".join(lines)
+
+
+def document_of(p: Population) -> dict[str, Any]:
+    """Plain values of a population for its file."""
+    out: dict[str, Any] = plain(p.document(), 6)
+    return out

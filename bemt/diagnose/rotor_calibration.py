@@ -1,0 +1,142 @@
+"""Reference recordings of a rotor become a case with a smaller uncertainty, by `bemt.compare.as_measured`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomlkit
+
+from bemt import __version__
+from bemt.asbuilt.latents import NAMES, UNITS
+from bemt.asbuilt.reference import SESSION
+from bemt.base.errors import Fault, InputError
+from bemt.base.tables import json_text, plain, write_atomic
+from bemt.asbuilt.model import air_fields, air_of_points
+from bemt.case import Case
+from bemt.case.as_built import MOVED, posterior_document
+from bemt.compare.as_measured import AsMeasured, as_measured
+from bemt.diagnose.improve import beside, elsewhere
+from bemt.diagnose.load import cases_of, load
+
+SCHEMA = "bemt.rotor_calibration/1"
+POSTERIOR = "as_built.json"
+# Assumptions that a run of the rotor settles, besides those that move a latent number.
+_SETTLED = {"model.drag_level", "model.n_crit", "blade.section.thickness", "blade.section.thickness_scale"}
+
+
+def calibrate(
+    paths: Sequence[str], case_path: str, say: Callable[[str], None] | None = None
+) -> tuple[Case, AsMeasured]:
+    """Read recordings and condition the rotor of a case on them.
+
+    Parameters
+    ----------
+    paths : sequence of str
+        Recordings of any format that a diagnosis reads.
+    case_path : str
+        Case of the rotor.
+    say : callable, optional
+        Takes a line on what is being done.
+
+    Returns
+    -------
+    (Case, AsMeasured)
+        The case and what was learnt.
+
+    Raises
+    ------
+    InputError
+        If a file is no recording of thrust or torque of this rotor, or the case is faulty.
+    """
+    (case,) = cases_of([case_path], [], 1)
+    records = [load(path, case) for path in paths]
+    if say:
+        say(f"{sum(map(len, records))} points")
+    air = {k: np.concatenate([np.broadcast_to(air_fields(r.air)[k], r.rpm.shape) for r in records])
+           for k in ("rho", "mu", "a_sound", "temperature_K")}  # fmt: skip
+    rpm, V = (np.concatenate([getattr(r, k) for r in records]) for k in ("rpm", "V"))
+    scale = air["rho"] * (rpm / 60.0) ** 2 * case.diameter_m**4
+    unit = {"thrust_N": scale, "torque_Nm": scale * case.diameter_m / (2.0 * np.pi)}
+    none = [np.full(r.rpm.shape, np.nan) for r in records]
+
+    def column(table: str, channel: str) -> Any:
+        parts = [getattr(r, table).get(channel, n) for r, n in zip(records, none, strict=True)]
+        return np.concatenate(parts) / unit[channel]
+
+    y = [column("measured", c) for c in unit]
+    u = [np.nan_to_num(column("u", c)) for c in unit]
+    stated = [[g for r in records if (g := r.gain.get(c)) is not None and math.isfinite(g)] for c in unit]
+    gains = [max(g) if g else SESSION for g in stated]
+    if not any(np.isfinite(v).any() for v in y):
+        raise InputError(Fault(paths[0], "", "neither thrust nor torque", "one of them, or coefficients"))
+    found = as_measured(case, rpm, V, air_of_points(air), y[0], y[1], u[0], u[1], (gains[0], gains[1]))
+    return case, found
+
+
+def document(case: Case, found: AsMeasured, paths: Sequence[str]) -> dict[str, Any]:
+    """Plain values of schema ``bemt.rotor_calibration/1``."""
+    numbers = {
+        name: {"unit": UNITS[name], "before": float(found.prior.mean[k]), "u_before": float(found.prior.sd[k]),
+               "after": float(found.posterior.mean[k]), "u_after": float(found.posterior.sd[k])}
+        for k, name in enumerate(NAMES)
+    }  # fmt: skip
+    size = float(found.found.weights @ found.prior.sizes)
+    out: dict[str, Any] = plain({
+        "schema": SCHEMA, "case": case.name, "reference": [Path(p).name for p in paths], "points": found.points,
+        "converged": found.found.converged, "steps": found.found.steps, "log_evidence": found.found.log_evidence,
+        "size": size, "known_from": found.prior.known_from, "numbers": numbers,
+    })  # fmt: skip
+    return out
+
+
+def text(doc: dict[str, Any]) -> str:
+    """Document for people."""
+    words = {
+        "angle_deg": "blade angle", "lift": "lift (ln)", "drag": "drag (ln)",
+        "low_re_lift": "lift at low Reynolds number (ln per ln)", "camber_deg": "zero-lift angle lower by",
+    }  # fmt: skip
+    state = "stands still" if doc["converged"] else "DID NOT SETTLE"
+    lines = [f"{doc['case']}: {doc['points']} points of {', '.join(doc['reference'])}; {state}, steps: {doc['steps']}"]
+    lines.append(
+        f"{'rotor as built, beyond its ' + doc['known_from']:42} {'before':>8} {'u':>7}   {'after':>8} {'u':>7}"
+    )
+    for name, n in doc["numbers"].items():
+        unit = "" if n["unit"] == "1" else f" [{n['unit']}]"
+        cells = f"{n['before']:+8.3f} {n['u_before']:7.3f}   {n['after']:+8.3f} {n['u_after']:7.3f}"
+        lines.append(f"{words[name] + unit:42} {cells}")
+    if doc["size"] > 2.0:
+        lines.append(f"This rotor is {doc['size']:.1f} times as far from its description as is usual: check the case.")
+    return "\n".join(lines)
+
+
+def write(case: Case, found: AsMeasured, paths: Sequence[str], folder: str | Path) -> None:
+    """Write the case with the rotor as measured, and the files beside it."""
+    out = Path(folder)
+    if out.resolve() == case.folder.resolve():
+        raise InputError(Fault("--out", "", "the folder of the case itself", "another folder", "It would be replaced"))
+    source: Any = tomlkit.parse(case.path.read_text(encoding="utf-8-sig"))
+    blade: Any = source["blade"]
+    blade["known_from"] = "reference"
+    blade.pop("as_built", None)
+    blade["as_built"] = {"file": POSTERIOR}
+    settled = _SETTLED.union(*MOVED.values())
+    kept = [item for item in source.get("assumptions", []) if item["key"] not in settled]
+    source.pop("assumptions", None)
+    if kept:
+        array = tomlkit.aot()
+        for item in kept:
+            array.append(item)
+        source["assumptions"] = array
+    elsewhere(source, case)
+    names = ", ".join(Path(p).name for p in paths)
+    head = f"# {case.name} with its rotor as `python -m bemt calibrate-rotor` found it from {names}"
+    for file in beside(case):
+        write_atomic(out / file.relative_to(case.folder), file.read_bytes())
+    provenance = {"case": case.name, "reference": [Path(p).name for p in paths], "points": found.points,
+                  "version": __version__}  # fmt: skip
+    write_atomic(out / POSTERIOR, json_text(posterior_document(found.posterior, found.reference, provenance)))
+    write_atomic(out / "case.toml", f"{head}\n{tomlkit.dumps(source).rstrip()}\n")

@@ -1,0 +1,220 @@
+"""Rotors as built: the promises of priors, intervals and conditioning."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bemt.__main__ import main
+from bemt.asbuilt.conditioning import condition
+from bemt.asbuilt.fit import Measured, objective
+from bemt.asbuilt.latents import NAMES, Prior
+from bemt.asbuilt.mixture import LEVELS, half_width, inside
+from bemt.asbuilt.population import WEIGHTS, population
+from bemt.asbuilt.predict import Sensed, predict
+from bemt.base.errors import InputError
+from bemt.asbuilt.model import coefficients
+from bemt.case import load_case
+from bemt.case.prepare import prepare_case
+
+K = len(NAMES)
+CASE = """schema = "bemt.case/1"
+name = "some_10x5"
+[rotor]
+kind = "propeller"
+blades = 2
+diameter_in = 10
+hub_ratio = 0.15
+[blade]
+{blade}
+[blade.section]
+camber = 0.035
+thickness = 0.09
+[operating]
+rpm = 5000
+airspeed_m_s = 6
+[air]
+density_kg_m3 = 1.225
+"""
+LABEL = 'pitch_in = 5\nchord_law = "apc_like"\nmax_chord_over_R = 0.19'
+
+
+def _case(folder: Path, blade: str = LABEL) -> Path:
+    folder.mkdir(exist_ok=True)
+    (folder / "case.toml").write_text(CASE.format(blade=blade))
+    return folder
+
+
+def _sensed(n: int = 12, seed: int = 0) -> Sensed:
+    random = np.random.default_rng(seed)
+    x = np.linspace(0.0, 0.8, n)
+    f = np.array([0.10 * (1.0 - x), 0.04 * (1.0 - 0.5 * x)])
+    top = np.repeat(f[:, :1], n, axis=1)
+    T = random.normal(size=(2, K, n)) * top[:, None] * 0.1
+    return Sensed(0.254, x, np.full(n, 6e4), f, top, T)
+
+
+def test_half_width_is_the_inverse_of_inside() -> None:
+    sds = np.random.default_rng(1).uniform(0.1, 3.0, (40, 6))
+    for level in LEVELS:
+        assert inside(half_width(level, sds, WEIGHTS), sds, WEIGHTS) == pytest.approx(level, abs=1e-9)
+    with_equal = half_width(LEVELS[1], np.full((1, 6), 1.5), WEIGHTS)
+    assert with_equal == pytest.approx(3.0, abs=1e-6)  # one normal law: two standard deviations
+
+
+def test_better_knowledge_is_never_wider() -> None:
+    p = population()
+    sds = [p.prior(known, 0.254).sd[0] for known in ("cad", "scan", "stations", "label")]
+    assert sds == sorted(sds) and sds[0] < sds[-1]
+    assert np.all(p.prior("stations", 0.0762).sd >= p.prior("stations", 0.254).sd)  # small ones are known worse
+    assert np.all(p.prior("label", 0.254, declared=("angle", "chord")).sd <= p.prior("label", 0.254).sd)
+    # the label narrows the stations' angle and pulls it towards itself, by a share below one
+    alone, beside = p.prior("stations", 0.254), p.prior("stations", 0.254, gap_deg=p.offset_deg + 2.0)
+    assert beside.sd[0] < alone.sd[0] and -2.0 < beside.mean[0] < 0.0
+    assert p.prior("stations", 0.254, gap_deg=p.offset_deg).mean == pytest.approx(alone.mean)
+    stated = p.prior("stations", 0.254, sds={"angle_deg": 0.2})
+    assert stated.sd[0] == pytest.approx(0.2) and stated.sd[1:] == pytest.approx(alone.sd[1:])
+
+
+def test_intervals_hold_what_they_say_of_rotors_drawn_from_the_population() -> None:
+    p, at, random = population(), _sensed(), np.random.default_rng(2)
+    prior = p.prior("stations", at.diameter_m)
+    found = predict(p, prior, at)
+    rest = p.rest(at.diameter_m, at.x, at.Re, at.f, at.top) + np.diag(p.noise_sd(at.f, at.top).reshape(-1) ** 2)
+    root = np.linalg.cholesky(rest)
+    values, vectors = np.linalg.eigh(prior.cov)
+    half = vectors * np.sqrt(np.maximum(values, 0.0))
+    held = np.zeros(2)
+    n = 4000
+    for _ in range(n):
+        size, rough = random.choice(prior.sizes, p=prior.weights), random.choice(p.rest_sizes, p=WEIGHTS)
+        z = prior.mean + size * half @ random.normal(size=K)
+        y = at.f + p.bias(at.x, at.top) + np.einsum("ckp,k->cp", at.T, z)
+        y = y + (rough * root @ random.normal(size=root.shape[0])).reshape(2, -1)
+        held += [np.mean(np.abs(y - found.mean) <= found.half_width(level, noise=True)) for level in LEVELS]
+    assert held / n == pytest.approx(LEVELS, abs=0.015)
+
+
+def test_condition_is_exact_for_a_linear_solver() -> None:
+    random = np.random.default_rng(3)
+    T, noise = random.normal(size=(20, K)), np.diag(random.uniform(0.01, 0.1, 20))
+    root = random.normal(size=(K, K))
+    prior = Prior(random.normal(size=K), root @ root.T, np.ones(1), np.ones(1))
+    f = random.normal(size=20)
+    y = f + T @ (prior.mean + root @ random.normal(size=K)) + random.normal(size=20) * 0.2
+    found = condition(lambda z: f + T @ z, prior, y, noise)
+    precision = np.linalg.inv(prior.cov) + T.T @ np.linalg.inv(noise) @ T
+    mean = prior.mean + np.linalg.solve(precision, T.T @ np.linalg.inv(noise) @ (y - f - T @ prior.mean))
+    assert found.converged
+    assert found.mean == pytest.approx(mean, rel=1e-6, abs=1e-8)
+    assert found.cov == pytest.approx(np.linalg.inv(precision), rel=1e-6, abs=1e-9)
+    assert found.f0 == pytest.approx(f + T @ prior.mean, abs=1e-9)  # nothing counts twice
+    S = T @ prior.cov @ T.T + noise
+    r = y - f - T @ prior.mean
+    evidence = -0.5 * (r @ np.linalg.solve(S, r) + np.linalg.slogdet(S)[1] + r.size * math.log(2.0 * math.pi))
+    assert found.log_evidence == pytest.approx(evidence, rel=1e-9)
+
+
+def test_condition_leaves_exact_numbers_and_missing_rows_alone() -> None:
+    T = np.random.default_rng(4).normal(size=(8, K))
+    cov = np.eye(K)
+    cov[-1] = cov[:, -1] = 0.0
+    prior = Prior(np.full(K, 0.3), cov, np.array([1.0, 3.0]), np.array([0.8, 0.2]))
+    y = T @ np.arange(K)
+    y[2] = np.nan
+    found = condition(lambda z: T @ z, prior, y, 0.01 * np.eye(8))
+    assert found.mean[-1] == pytest.approx(0.3) and found.cov[-1] == pytest.approx(0.0, abs=1e-12)
+    assert np.isfinite(found.mean).all()
+
+
+def test_gradient_of_the_likelihood() -> None:
+    at = _sensed(10, 5)
+    y = at.f * 1.04
+    rotors = [
+        Measured(
+            **vars(at), name=f"a{i}", family="a", section="rule", gap_deg=gap, static=at.x == 0.0, y=y * (1 + 0.01 * i)
+        )
+        for i, gap in enumerate((0.3, 1.8, math.nan))
+    ]  # fmt: skip
+    from bemt.asbuilt import fit
+
+    theta = fit.START + 0.05 * np.random.default_rng(6).normal(size=fit.START.size)
+    _, gradient = objective(theta, rotors)
+    h = 1e-5
+    steps = h * np.eye(theta.size)
+    numeric = np.array([(objective(theta + e, rotors)[0] - objective(theta - e, rotors)[0]) / (2.0 * h) for e in steps])
+    assert gradient == pytest.approx(numeric, rel=1e-3, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("blade", "where"),
+    [
+        (LABEL + '\nknown_from = "hearsay"', "blade.known_from"),
+        (LABEL + '\nknown_from = "reference"', "blade.known_from"),
+        (LABEL + "\nlabel_pitch_in = 127", "blade.label_pitch_in"),
+    ],
+)
+def test_faults_of_a_case(tmp_path: Path, blade: str, where: str) -> None:
+    with pytest.raises(InputError) as caught:
+        load_case(_case(tmp_path / "case", blade))
+    assert [f.where for f in caught.value.faults] == [where]
+
+
+def test_a_stated_angle_turns_the_blade(tmp_path: Path) -> None:
+    plain = load_case(_case(tmp_path / "a"))
+    turned = load_case(_case(tmp_path / "b", LABEL + "\nas_built = {angle_deg = 1.5, angle_sd_deg = 0.1}"))
+    offset = load_case(_case(tmp_path / "c", LABEL + "\nbeta_offset_deg = 1.5"))
+    rpm, J, one = np.array([5000.0]), np.array([0.3]), np.zeros(1, dtype=np.intp)
+    CT = [
+        coefficients(prepare_case(c), c.air())(c.as_built().drawn, rpm, J, one)[0, 0]
+        for c in (plain, turned, offset)
+    ]
+    assert CT[1] == pytest.approx(CT[2], rel=1e-6) and CT[1] > CT[0]
+    assert turned.as_built().prior.sd[0] == pytest.approx(0.1) and plain.as_built().prior.known_from == "label"
+
+
+def test_calibrate_rotor_finds_a_turned_blade_and_narrows_what_follows(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    truth = load_case(_case(tmp_path / "truth", LABEL + "\nas_built = {angle_deg = 2.0}"))
+    rpm = np.repeat(np.linspace(3000.0, 7000.0, 6), 2)
+    J = np.tile([0.0, 0.3], 6)
+    solve = coefficients(prepare_case(truth), truth.air())
+    CT, CP = solve(truth.as_built().drawn, rpm, J, np.arange(12))
+    random = np.random.default_rng(7)
+    rows = [
+        f"{n:.0f},{V:.6f},{t:.6f},{q:.6f}"
+        for n, V, t, q in zip(
+            rpm, J * rpm / 60 * 0.254, CT * 1.225 * (rpm / 60) ** 2 * 0.254**4 * (1 + 0.003 * random.normal(size=12)),
+            CP / (2 * np.pi) * 1.225 * (rpm / 60) ** 2 * 0.254**5 * (1 + 0.003 * random.normal(size=12)), strict=True,
+        )
+    ]  # fmt: skip
+    run = tmp_path / "run.csv"
+    run.write_text("\n".join(["rpm,airspeed_m_s,thrust_N,torque_Nm", *rows]) + "\n")
+    drawn = _case(tmp_path / "drawn")
+    args = ["calibrate-rotor", str(run), "--case", str(drawn), "--out", str(tmp_path / "known"), "--json"]
+    assert main(args) == 0
+    found = json.loads(capsys.readouterr().out)["numbers"]["angle_deg"]
+    assert abs(found["after"] - 2.0) < 2.0 * found["u_after"] and found["u_after"] < found["u_before"]
+    known = load_case(tmp_path / "known")
+    assert known.as_built().prior.known_from == "reference"
+    u = {}
+    for name in ("drawn", "known"):
+        assert main(["sweep", str(tmp_path / name), "--out", str(tmp_path / "out" / name), "--json"]) == 0
+        row = json.loads(capsys.readouterr().out)["cases"][0]["rows"][0]
+        u[name] = row["u_model"] / row["thrust_N"]
+    assert u["known"] < 0.5 * u["drawn"]
+
+
+def test_population_says_where_it_comes_from() -> None:
+    p = population()
+    assert (
+        p.provenance["propellers"] > 50
+        and p.provenance["points"] > 1000
+        and "--fit-population" in p.provenance["command"]
+    )
+    assert np.all(np.linalg.eigvalsh(p.cov) > -1e-12) and p.mean == pytest.approx(np.zeros(K))
