@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from bemt.compare.stand_run import StandRun
 
-__all__ = ["DRIVE", "LOADS", "MatchedChannel", "Scatter", "covariance", "matched", "ratio_of", "scatter_of"]
+__all__ = ["DRIVE", "LOADS", "MatchedChannel", "Prepared", "Scatter", "covariance", "matched", "prepared", "ratio_of"]
 
 Array = NDArray[np.float64]
 
@@ -36,6 +36,8 @@ _COEFFICIENTS = ("CT", "CP", "CQ")
 
 # Readings below this share of the channel's largest say more of the zero than of the rotor.
 _SMALL = 0.04
+# A motor that has just set off, and a controller that idles, follow no law.
+_STARTED = {"speed": 0.3, "electrical": 0.1}
 # A coefficient below this share of its largest is near zero thrust: a ratio means nothing there.
 _NEAR_ZERO = 0.15
 MOST = 120
@@ -44,12 +46,14 @@ SESSION = {"thrust": 0.007, "torque": 0.010, "speed": 0.015, "electrical": 0.02,
 """Standard deviation of the level of one run where the recordings do not show it, share: two runs differ by 1.4 times
 this. Repeated runs of one stand that were set up anew differ by 1 % in thrust and 1.4 % in torque (runs of the UIUC
 Propeller Database and of J. Majewski's stand, seen here)."""
-_BEND, _ZERO = 0.7, 0.0015
+_BEND, _ZERO, _STEEP = 0.7, 0.0015, 0.15
 _LENGTH_SPEED, _LENGTH_ADVANCE = 0.5, 0.35
 _SHARES = (0.001, 0.002, 0.004, 0.008, 0.015, 0.03, 0.06, 0.1)
 _FLOORS = (0.0, 0.0007, 0.002, 0.005, 0.012)
+_WIGGLES = (0.0, 0.004, 0.01, 0.02)
 _BENDS = (0.02, 0.1, 0.3, 1.0)
-_FAR = 3.5
+_FAR, _MARGIN = 3.5, 0.06
+_LOCAL = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,10 +110,14 @@ class MatchedChannel:
 
 @dataclass(frozen=True)
 class Scatter:
-    """Of single readings: ``share`` of the reading, ``floor`` of full scale, ``bend`` of the common curve."""
+    """Of single readings: ``share`` of the reading, ``floor`` of full scale.
+
+    ``wiggle`` is what neighbours in speed share within a run, ``bend`` the size of the bends of the common curve.
+    """
 
     share: float
     floor: float
+    wiggle: float
     bend: float
 
 
@@ -141,7 +149,7 @@ def _readings(run: StandRun, name: str, channel: str, diameter: float) -> dict[s
     size = np.where(v * sign > 0.0, v * sign, np.nan)
     top = float(np.nanmax(size)) if np.isfinite(size).any() else math.nan
     scaled = size / speed ** _POWER.get(channel, 0.0)
-    good = np.isfinite(scaled) & np.isfinite(first) & (size > _SMALL * top) & (speed > 0.0)
+    good = np.isfinite(scaled) & np.isfinite(first) & (size > _STARTED.get(name, _SMALL) * top) & (speed > 0.0)
     if name in LOADS:
         level = np.nanpercentile(np.where(good, scaled, np.nan), 90) if good.any() else math.nan
         good &= scaled > _NEAR_ZERO * level
@@ -256,21 +264,24 @@ def covariance(c: MatchedChannel, s: Scatter) -> Array:
     z = unit_coordinates(c)
     K = smooth_kernel(c)
     same = (c.run[:, None] == c.run[None, :]).astype(float)
-    wide = 100.0 + 4.0 * np.outer(z[:, 0], z[:, 0]) + 4.0 * np.outer(z[:, 1], z[:, 1])
+    # a coefficient changes little with speed (Reynolds, Mach), anyhow with advance; the drive changes anyhow
+    steep = _STEEP**2 if c.name in LOADS else 4.0
+    wide = 100.0 + steep * np.outer(z[:, 0], z[:, 0]) + 4.0 * np.outer(z[:, 1], z[:, 1])
     wide += 4.0 * np.outer(z[:, 1] ** 2, z[:, 1] ** 2)
     side = (c.second[:, None] == c.second[None, :]).astype(float)
     # the level is the stand's, set up once per recording; half of its variance goes with the single run
     level = c.session**2 * (0.7 * side + 0.3 * same + _BEND**2 * same * K)
     zero = _ZERO**2 * same * np.outer(c.floor, c.floor) if c.name in LOADS else 0.0
     spread = s.share**2 + (s.floor * c.floor) ** 2 + c.u**2
-    return np.asarray(wide + s.bend**2 * K + level + zero + np.diag(spread))
+    local = s.wiggle**2 * same * smooth_kernel(c, _LOCAL) if s.wiggle else 0.0
+    return np.asarray(wide + s.bend**2 * K + level + zero + local + np.diag(spread))
 
 
 def change_of_any_kind(c: MatchedChannel) -> Array:
     """Prior covariance of a change d at all points, whichever recording they are of, (N, N)."""
     z = unit_coordinates(c)
     line = 0.3**2 + 0.2**2 * np.outer(z[:, 0], z[:, 0]) + 0.2**2 * np.outer(z[:, 1], z[:, 1])
-    return np.asarray(line + 0.1**2 * smooth_kernel(c) + 0.06**2 * smooth_kernel(c, 3.0))
+    return np.asarray(line + 0.1**2 * smooth_kernel(c) + 0.06**2 * smooth_kernel(c, _LOCAL))
 
 
 def free_change(c: MatchedChannel) -> Array:
@@ -288,21 +299,38 @@ def log_likelihood(K: Array, y: Array) -> float:
     return float(-0.5 * y @ alpha - np.log(np.diag(L)).sum() - 0.5 * y.size * math.log(2.0 * math.pi))
 
 
-def scatter_of(c: MatchedChannel) -> Scatter:
-    """Scatter and bend that make the readings likeliest, whatever changed between the recordings."""
-    free, y = free_change(c), c.y - c.y.mean()
-    shares = _SHARES if not c.u.any() else (0.0005, *_SHARES)
-    return max(
-        (Scatter(a, b, g) for a in shares for b in (_FLOORS if c.name in LOADS else (0.0,)) for g in _BENDS),
-        key=lambda s: log_likelihood(covariance(c, s) + free, y),
-    )
+def steady_change(c: MatchedChannel) -> Array:
+    """Covariance of a change by one factor, or nearly so, between the recordings, (N, N)."""
+    z, b = unit_coordinates(c), c.second.astype(float)
+    line = 0.3**2 + 0.03**2 * (np.outer(z[:, 0], z[:, 0]) + np.outer(z[:, 1], z[:, 1]))
+    return np.asarray(line * np.outer(b, b))
+
+
+def scatter_of(c: MatchedChannel, change: Array | None = None) -> tuple[Scatter, float]:
+    """Scatter and bend that make the readings likeliest with such a change, and the logarithm of that likelihood."""
+    change, y = free_change(c) if change is None else change, c.y - c.y.mean()
+    ways = {
+        "share": _SHARES if not c.u.any() else (0.0005, *_SHARES),
+        "bend": _BENDS,
+        "wiggle": _WIGGLES,
+        "floor": _FLOORS if c.name in LOADS else (0.0,),
+    }
+    best, score = Scatter(0.008, 0.0, 0.0, 0.1), -math.inf
+    for _ in range(2):
+        for name, values in ways.items():
+            for value in values:
+                tried = replace(best, **{name: value})
+                z = log_likelihood(covariance(c, tried) + change, y)
+                if z > score:
+                    best, score = tried, z
+    return best, score
 
 
 def without_strays(c: MatchedChannel) -> tuple[MatchedChannel, int]:
     """Leave out readings that all others contradict (left-one-out, Rasmussen and Williams, eq. 5.12)."""
     n = 0
     for _ in range(3):
-        s = scatter_of(c)
+        s, _ = scatter_of(c)
         y = c.y - c.y.mean()
         inverse = np.linalg.inv(covariance(c, s) + free_change(c))
         z = (inverse @ y) / np.sqrt(np.diag(inverse))
@@ -319,18 +347,8 @@ def without_strays(c: MatchedChannel) -> tuple[MatchedChannel, int]:
 
 def taken(c: MatchedChannel, keep: NDArray[np.bool_]) -> MatchedChannel:
     """Some of the points."""
-    return MatchedChannel(
-        c.name,
-        c.channel,
-        c.y[keep],
-        c.x[keep],
-        c.second[keep],
-        c.run[keep],
-        c.floor[keep],
-        c.u[keep],
-        c.log_density,
-        c.session,
-        c.notes,
+    return replace(
+        c, y=c.y[keep], x=c.x[keep], second=c.second[keep], run=c.run[keep], floor=c.floor[keep], u=c.u[keep]
     )
 
 
@@ -405,18 +423,52 @@ def _slopes(c: MatchedChannel, at: NDArray[np.intp], d: Array, cov: Array) -> di
     return out
 
 
-def prepared(
-    a: StandRun, b: StandRun, names: Sequence[str], diameter: float
-) -> tuple[dict[str, MatchedChannel], dict[str, Scatter], Mapping[str, int]]:
-    """Channels of a kind that both recordings have, their scatter, and the strays that were left out."""
+def in_common(c: MatchedChannel) -> MatchedChannel:
+    """Points where both recordings were, with a margin; all where they have no range in common."""
+    low, high = c.common()
+    margin = _MARGIN if c.name not in ("speed", "voltage") else _MARGIN * float(np.ptp(c.x[:, 0]))
+    keep = (c.x[:, 0] >= low - margin) & (c.x[:, 0] <= high + margin)
+    enough = min(keep[c.second].sum(), keep[~c.second].sum()) >= 2
+    return taken(c, keep) if low <= high and enough else c
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """Channels of one kind that both recordings have.
+
+    Parameters
+    ----------
+    channels : mapping of str to MatchedChannel
+        By name.
+    free, steady : mapping of str to Scatter
+        Likeliest scatter if anything smooth, or one factor, changed between the recordings.
+    likelier : mapping of str to Scatter
+        The better of the two.
+    strays : mapping of str to int
+        Readings that were left out.
+    """
+
+    channels: Mapping[str, MatchedChannel]
+    free: Mapping[str, Scatter]
+    steady: Mapping[str, Scatter]
+    likelier: Mapping[str, Scatter]
+    strays: Mapping[str, int]
+
+
+def prepared(a: StandRun, b: StandRun, names: Sequence[str], diameter: float) -> Prepared:
+    """Match channels, and find their scatter."""
     channels: dict[str, MatchedChannel] = {}
-    scatter: dict[str, Scatter] = {}
+    free: dict[str, Scatter] = {}
+    steady: dict[str, Scatter] = {}
+    likelier: dict[str, Scatter] = {}
     strays: dict[str, int] = {}
     for name in names:
         found = matched(a, b, name, diameter)
         if found is not None:
-            channels[name], n = without_strays(found)
-            scatter[name] = scatter_of(channels[name])
+            channels[name], n = without_strays(in_common(found))
+            free[name], loose = scatter_of(channels[name])
+            steady[name], stiff = scatter_of(channels[name], steady_change(channels[name]))
+            likelier[name] = free[name] if loose > stiff else steady[name]
             if n:
                 strays[name] = n
-    return channels, scatter, strays
+    return Prepared(channels, free, steady, likelier, strays)

@@ -21,7 +21,7 @@ __all__ = ["SCHEMA", "Change", "changed", "document"]
 SCHEMA = "bemt.comparison/1"
 _TOLD_DENSITY = 0.012
 _NO_TALK = Judgement("insufficient", (), {}, {}, "not recorded in both")
-_MOVED = 2.5
+_MOVED, _WIDE = 2.5, 1.4
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,8 +89,8 @@ def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> Change:
     """
     told = [d for d in (diameter_m, a.diameter_m, b.diameter_m) if math.isfinite(d)]
     diameter = told[0] if told else math.nan
-    loads, scatter, strays = fits.prepared(a, b, tuple(fits.LOADS), diameter)
-    drive, drive_scatter, more = fits.prepared(a, b, tuple(fits.DRIVE), diameter)
+    rotor, behind = (fits.prepared(a, b, tuple(kind), diameter) for kind in (fits.LOADS, fits.DRIVE))
+    loads, drive = rotor.channels, behind.channels
     if not loads and not drive:
         got = f"{_told(a)} in A, {_told(b)} in B"
         raise InputError(
@@ -103,15 +103,17 @@ def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> Change:
             )
         )
     known = math.isfinite(a.density) and math.isfinite(b.density)
-    ratios = {c.channel: _ratio(c, {**scatter, **drive_scatter}[n]) for n, c in {**loads, **drive}.items()}
+    scatter = {**rotor.likelier, **behind.likelier}
+    ratios = {c.channel: _ratio(c, scatter[n]) for n, c in {**loads, **drive}.items()}
     verdict = _NO_TALK
     if loads:
-        verdict = _with_density(judge(*weigh(loads, scatter, ("air", "stand"), known)), a, b, loads)
-    behind = _NO_TALK
-    if drive and verdict.verdict in ("none", "insufficient"):
-        behind = judge(*weigh(drive, drive_scatter, ("drive",)))
+        verdict = judge(*weigh(loads, (rotor.free, rotor.steady), ("air", "stand"), known))
+        verdict = _far_apart(_with_density(verdict, a, b, loads), ratios)
+    motor = _NO_TALK
+    if drive and verdict.verdict == "none":
+        motor = judge(*weigh(drive, (behind.free, behind.steady), ("drive",)))
     elif drive:
-        behind = Judgement("insufficient", (), {}, {}, "the load changed, and the drive follows it")
+        motor = Judgement("insufficient", (), {}, {}, "the load changed or may have, and the drive follows it")
     return Change(
         a,
         b,
@@ -119,9 +121,20 @@ def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> Change:
         {**loads, **drive},
         ratios,
         verdict,
-        behind,
+        motor,
         tuple(_assumed(a, b, diameter, loads)),
-        tuple(_notes(a, b, {**loads, **drive}, {**strays, **more})),
+        tuple(_notes(a, b, {**loads, **drive}, {**rotor.strays, **behind.strays})),
+    )
+
+
+def _far_apart(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> Judgement:
+    """No answer where the speeds have nothing in common, unless a ratio of pole pairs explains that very thing."""
+    loads = [r for r in ratios.values() if r["kind"] in fits.LOADS]
+    wide = all(r["extrapolated"] and r["high95"] / r["low95"] > _WIDE for r in loads)
+    if not loads or not wide or said.effects == ("rpm_scale",):
+        return said
+    return Judgement(
+        "insufficient", (), said.probability, said.size, "the two runs have no speed and advance in common"
     )
 
 

@@ -9,7 +9,7 @@ its own. What a blade would do in detail is not known here; with a case, :mod:`b
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -29,10 +29,14 @@ _ZEROS = (0.004, 0.015, 0.05)
 _UNKNOWN_SIZES = (0.1, 0.35, 1.0)
 SURE = 0.85
 """Probability from which one effect is named."""
+FORM = {0.15: 0.7, 0.45: 0.3}
+"""What a change by air or blade may rise or bow with speed or advance, share of the change, with its prior weight: the
+sizes by which published laws of one effect differ (:mod:`bemt.diagnose.form`)."""
+_EXACT = {1.0: 1.0}
 CREDIBLE, MOST = 0.9, 5
 """A class holds this much of the probability of the listed effects, with at most so many members."""
-RIVAL = 0.1
-"""An effect beside which the unknown keeps more than this is not named."""
+RIVAL, DOUBT = 0.1, 0.3
+"""An effect beside which the unknown keeps more than the first is not named; a class beside the second is not given."""
 # Recorded densities are this good: a barometer, a thermometer and nobody's humidity, share.
 _DENSITY = 0.004
 
@@ -53,7 +57,7 @@ class ScalingLaw:
     terms : tuple of (float, mapping)
         Size relative to the first term, and channel to basis to weight. Bases: ``all`` 1; ``zero`` full scale over
         reading; ``still`` 1 at rest, fading to 0 at the largest advance; ``slope`` the channel's own derivative with
-        respect to ln J; ``slip`` that over V; ``drag`` V^2 over thrust; ``n2`` square of the speed; ``ramp`` the
+        respect to ln J; ``slip`` that over V; ``volts`` ln of the voltage ratio at equal command, or 1; ``drag`` V^2 over thrust; ``n2`` square of the speed; ``ramp`` the
         command.
     sizes : tuple of float
         Standard deviations of the first term, share; they share the prior.
@@ -262,16 +266,12 @@ LAWS: tuple[ScalingLaw, ...] = (
     ScalingLaw(
         "battery_sag",
         "supply or battery voltage",
-        (
-            (1.0, {"voltage": {"all": 1.0}, "speed": {"all": 0.75}}),
-            (0.3, {"speed": {"all": 1.0}}),
-            (0.5, {"voltage": {"ramp": 1.0}, "speed": {"ramp": 0.75}}),
-            (0.15, {"speed": {"ramp": 1.0}}),
-        ),
+        ((1.0, {"speed": {"volts": 1.0}}), (0.5, {"electrical": {"volts": 1.0}})),
         "speed at one command goes with the voltage; loads at the measured speed stay",
         "log voltage at the controller",
         "n ~ command x V less I R",
         "drive",
+        (*_SIZES, 0.8),
     ),
     ScalingLaw(
         "motor_heating",
@@ -331,7 +331,7 @@ def law(name: str) -> ScalingLaw | None:
     return next((row for row in LAWS if row.id == name), None)
 
 
-def _bases(c: MatchedChannel) -> dict[str, Array]:
+def _bases(c: MatchedChannel, volts: float | Array = 1.0) -> dict[str, Array]:
     """Columns that a law may use, for the points of B."""
     b = c.second.astype(float)
     advance = c.x[:, 1]
@@ -346,6 +346,7 @@ def _bases(c: MatchedChannel) -> dict[str, Array]:
     square = np.exp(2.0 * (c.x[:, 0] - c.x[:, 0].max())) if c.name in fits.LOADS else np.ones(b.size)
     load = np.exp(c.y - c.y.max())
     ramp = fits.unit_coordinates(c)[:, 0]
+    ramp = ramp / max(float(np.abs(ramp).max()), 1e-12)
     return {
         "all": b,
         "zero": b * c.floor,
@@ -354,21 +355,56 @@ def _bases(c: MatchedChannel) -> dict[str, Array]:
         "slip": b * np.divide(slope, J, out=np.zeros_like(J), where=np.abs(J) > 1e-9),
         "drag": b * J**2 / load,
         "n2": b * square,
-        "ramp": b * ramp / max(float(np.abs(ramp).max()), 1e-12),
+        "ramp": b * ramp,
+        "bow": b * (ramp**2 - 0.5),
+        "advance": b * (J - J.mean()),
+        "volts": b * volts,
     }
 
 
-def _columns(row: ScalingLaw, channels: Mapping[str, MatchedChannel]) -> Array | None:
-    """Columns of a law over all channels, (M, terms), each of unit size; None where nothing moves."""
+def _volts(channels: Mapping[str, MatchedChannel]) -> dict[str, float | Array]:
+    """ln of B's voltage over A's at the command of every point of the drive; empty without voltages."""
+    v = channels.get("voltage")
+    if v is None:
+        return {}
+    order = np.argsort(v.x[:, 0], kind="stable")
+    at, y, second = v.x[order, 0], v.y[order], v.second[order]
+    out: dict[str, float | Array] = {}
+    for name, c in channels.items():
+        if name == "speed":
+            out[name] = np.asarray(
+                np.interp(c.x[:, 0], at[second], y[second]) - np.interp(c.x[:, 0], at[~second], y[~second])
+            )
+        elif name == "electrical":
+            out[name] = float(y[second].mean() - y[~second].mean())
+    return out
+
+
+def _columns(
+    row: ScalingLaw, channels: Mapping[str, MatchedChannel], form: float, volts: Mapping[str, float | Array]
+) -> Array | None:
+    """Columns of a law over all channels, (M, terms and form), each of unit size; None where nothing moves.
+
+    Instruments are exact. Air and blades follow their law roughly: what they change may rise or bow with speed.
+    """
+    shapes = () if row.kind == "stand" else ("ramp", "bow", "advance")
     parts = []
     for name, c in channels.items():
-        basis = _bases(c)
+        basis = _bases(c, volts.get(name, 1.0))
         columns = [
             w * sum((f * basis[k] for k, f in term.get(name, {}).items()), np.zeros(c.y.size)) for w, term in row.terms
         ]
+        moved = sum((np.abs(v) for v in columns), np.zeros(c.y.size))
+        scale = form * min(float(moved.max()), 1.0)
+        for other in channels:
+            columns += [scale * (other == name) * basis[k] for k in shapes]
         parts.append(np.column_stack(columns))
     joined = np.vstack(parts)
-    return joined if np.abs(joined[:, 0]).max() > 1e-9 else None
+    if np.abs(joined[:, 0]).max() <= 1e-9:
+        return None
+    used = np.abs(joined).max(axis=0) > 1e-12
+    used[: len(row.terms)] = True
+    return joined[:, used]
 
 
 def _slips(channels: Mapping[str, MatchedChannel]) -> list[tuple[str, Array]]:
@@ -388,9 +424,17 @@ def _slips(channels: Mapping[str, MatchedChannel]) -> list[tuple[str, Array]]:
     return out
 
 
+def _pole_slips(channels: Mapping[str, MatchedChannel]) -> list[Array]:
+    """Changes by a ratio of pole pairs: loads go with its square, (M,) means."""
+    pairs = [(p, 1) for p in range(2, 15)] + [(p + 1, p) for p in range(2, 9)]
+    ratios = [f for p, q in pairs for f in (p / q, q / p)]
+    second = np.concatenate([c.second.astype(float) for c in channels.values()])
+    return [2.0 * math.log(f) * second for f in ratios]
+
+
 def weigh(
     channels: Mapping[str, MatchedChannel],
-    scatter: Mapping[str, Scatter],
+    scatters: Sequence[Mapping[str, Scatter]],
     kinds: Sequence[str],
     density_known: bool = False,
 ) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
@@ -400,8 +444,8 @@ def weigh(
     ----------
     channels : mapping of str to MatchedChannel
         Of one sub-system.
-    scatter : mapping of str to Scatter
-        Of each.
+    scatters : sequence of mapping of str to Scatter
+        Settings of the scatter of each, which share the prior.
     kinds : sequence of str
         Kinds of laws that are asked.
     density_known : bool
@@ -414,37 +458,10 @@ def weigh(
     size : dict
         Effect to size of its first term and standard error.
     """
-    from scipy.linalg import block_diag, cholesky, solve_triangular
-
-    base = {k: fits.covariance(c, scatter[k]) for k, c in channels.items()}
-    y = np.concatenate([c.y - c.y.mean() for c in channels.values()])
-    L = cholesky(block_diag(*base.values()), lower=True)
-
-    def white(v: Array) -> Array:
-        return np.asarray(solve_triangular(L, v, lower=True, check_finite=False))
-
-    r = white(y)
-    score: dict[str, float] = {NONE: -0.5 * float(r @ r)}
-    size: dict[str, tuple[float, float]] = {}
-    rows = [row for row in LAWS if row.kind in kinds]
-    moving = any(c.advance_moves() for c in channels.values())
-    for row in rows:
-        columns = _columns(row, channels)
-        if columns is None or (row.flow and not moving):
-            continue
-        A = white(columns)
-        sizes = (_DENSITY,) if row.id == "air_density" and density_known else row.sizes
-        found = [_linear(A, r, s) for s in sizes]
-        score[row.id] = float(np.logaddexp.reduce([z for z, _, _ in found])) - math.log(len(found))
-        best = max(found, key=lambda f: f[0])
-        size[row.id] = best[1], best[2]
-    slips = _slips(channels) if "stand" in kinds else []
-    if slips:
-        terms = [-0.5 * float(np.sum((r - white(m)) ** 2)) for _, m in slips]
-        score["unit_slip"] = float(np.logaddexp.reduce(terms)) - math.log(len(slips))
-        mean = slips[int(np.argmax(terms))][1]
-        size["unit_slip"] = float(mean[np.argmax(np.abs(mean))]), 0.0
-    score[UNKNOWN] = _unknown(channels, base, score[NONE], r)
+    found = [_weighed(channels, scatter, kinds, density_known) for scatter in scatters]
+    names = list(found[0][0])
+    score = {k: float(np.logaddexp.reduce([z[k] for z, _ in found])) for k in names}
+    size = {k: max(found, key=lambda f: f[0][k])[1][k] for k in names if k in found[0][1]}
     listed = [k for k in score if k not in _PRIOR]
     log_prior = {k: math.log(_PRIOR.get(k, (1.0 - sum(_PRIOR.values())) / max(len(listed), 1))) for k in score}
     top = max(score[k] + log_prior[k] for k in score)
@@ -453,17 +470,85 @@ def weigh(
     return dict(sorted(((k, w / total) for k, w in weight.items()), key=lambda kv: -kv[1])), size
 
 
-def _linear(A: Array, r: Array, sd: float) -> tuple[float, float, float]:
-    """Log evidence, first coefficient and its error, of r = A b + e with b ~ N(0, sd^2), e ~ N(0, 1)."""
-    q = A.shape[1]
-    G = A.T @ A + np.eye(q) / sd**2
-    b = np.linalg.solve(G, A.T @ r)
+def _weighed(
+    channels: Mapping[str, MatchedChannel], scatter: Mapping[str, Scatter], kinds: Sequence[str], density_known: bool
+) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
+    """Log evidence of every explanation at one setting of the scatter, and sizes."""
+    from scipy.linalg import block_diag, cholesky, solve_triangular
+
+    volts = _volts(channels)
+    if volts:  # a condition then, no answer
+        channels = {k: c for k, c in channels.items() if k != "voltage"}
+    base = {k: fits.covariance(c, scatter[k]) for k, c in channels.items()}
+    y = np.concatenate([c.y - c.y.mean() for c in channels.values()])
+    L = cholesky(block_diag(*base.values()), lower=True)
+
+    def white(v: Array) -> Array:
+        return np.asarray(solve_triangular(L, v, lower=True, check_finite=False))
+
+    r = white(y)
+    none = -0.5 * float(r @ r) - float(np.log(np.diag(L)).sum())
+    score: dict[str, float] = {NONE: none}
+    size: dict[str, tuple[float, float]] = {}
+    moving = any(c.advance_moves() for c in channels.values())
+    for row in (row for row in LAWS if row.kind in kinds and (moving or not row.flow)):
+        sizes = (_DENSITY,) if row.id == "air_density" and density_known else row.sizes
+        found = []
+        for form, prior in (FORM if row.kind != "stand" else _EXACT).items():
+            columns = _columns(row, channels, form, volts)
+            if columns is not None:
+                A, weight = white(columns), math.log(prior / len(sizes))
+                for s in sizes:
+                    z, value, error = _evidence(row, A, r, s)
+                    found.append((z + weight, value, error))
+        if found:
+            score[row.id] = none + float(np.logaddexp.reduce([z for z, _, _ in found])) + 0.5 * float(r @ r)
+            best = max(found, key=lambda f: f[0])
+            size[row.id] = best[1], best[2]
+    if "rpm_scale" in score:
+        means = _pole_slips(channels)
+        z, mean = _shifted(means, white, r, none)
+        if z > score["rpm_scale"]:
+            size["rpm_scale"] = mean / 2.0, 0.0
+        score["rpm_scale"] = float(np.logaddexp(score["rpm_scale"], z)) - math.log(2.0)
+    slips = _slips(channels) if "stand" in kinds else []
+    if slips:
+        z, mean = _shifted([m for _, m in slips], white, r, none)
+        score["unit_slip"], size["unit_slip"] = z, (mean, 0.0)
+    score[UNKNOWN] = _unknown(channels, base, none)
+    return score, size
+
+
+def _shifted(means: Sequence[Array], white: Callable[[Array], Array], r: Array, none: float) -> tuple[float, float]:
+    """Log evidence of known changes that share the prior, and the likeliest one."""
+    terms = [0.5 * float(r @ r) - 0.5 * float(np.sum((r - white(m)) ** 2)) for m in means]
+    mean = means[int(np.argmax(terms))]
+    return none + float(np.logaddexp.reduce(terms)) - math.log(len(terms)), float(mean[np.argmax(np.abs(mean))])
+
+
+def _evidence(row: ScalingLaw, A: Array, r: Array, size: float) -> tuple[float, float, float]:
+    """Log evidence, first coefficient and its error.
+
+    Terms of weight 1 or more stand on their own; the others are shares of what these turn out to be.
+    """
+    free = np.array([w >= 1.0 for w, _ in row.terms] + [False] * (A.shape[1] - len(row.terms)))
+    b = np.where(free, size, 0.0)
+    for _ in range(3):
+        sd = np.where(free, size, np.maximum(float(np.abs(b[free]).max()), 1e-5))
+        z, b, error = _linear(A, r, sd)
+    return z, float(b[0]), error
+
+
+def _linear(A: Array, r: Array, sd: Array) -> tuple[float, Array, float]:
+    """Log evidence, coefficients and the error of the first, of r = A b + e with b ~ N(0, sd^2), e ~ N(0, 1)."""
+    G = A.T @ A + np.diag(1.0 / sd**2)
+    b = np.asarray(np.linalg.solve(G, A.T @ r), dtype=float)
     _, log_det = np.linalg.slogdet(G)
-    z = -0.5 * float(r @ r) + 0.5 * float(b @ (A.T @ r)) - 0.5 * float(log_det) - q * math.log(sd)
-    return z, float(b[0]), math.sqrt(float(np.linalg.inv(G)[0, 0]))
+    z = -0.5 * float(r @ r) + 0.5 * float(b @ (A.T @ r)) - 0.5 * float(log_det) - float(np.log(sd).sum())
+    return z, b, math.sqrt(float(np.linalg.inv(G)[0, 0]))
 
 
-def _unknown(channels: Mapping[str, MatchedChannel], base: Mapping[str, Array], none: float, r: Array) -> float:
+def _unknown(channels: Mapping[str, MatchedChannel], base: Mapping[str, Array], none: float) -> float:
     """Log evidence of a smooth change of every channel on its own, on the scale of the others."""
     found = []
     for size in _UNKNOWN_SIZES:
@@ -500,6 +585,6 @@ def judge(probability: Mapping[str, float], size: Mapping[str, tuple[float, floa
         row = law(first)
         kind = "sensor" if first == "unit_slip" or (row is not None and row.kind == "stand") else "named"
         return answer(kind, (first,), f"{first} ({listed[first]:.2f})")
-    if len(credible) <= MOST and 1.0 - mass <= 1.0 - SURE:
+    if len(credible) <= MOST and unknown <= DOUBT and probability[NONE] <= RIVAL:
         return answer("class", credible, f"these scale alike ({mass:.2f})")
     return answer("insufficient", (), f"{len(credible)} causes scale like that in these channels")

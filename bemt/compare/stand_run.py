@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
-from bemt.base.units import ZERO_CELSIUS
 from bemt.readers._imported import Channel, Imported
-from bemt.recordings.reduce import reduce
+from bemt.recordings.channels import view
+from bemt.recordings.reduce import Reduced, reduce
 
 __all__ = ["StandRun", "selected", "stand_run"]
 
@@ -38,6 +38,8 @@ _RANGE = re.compile(r"([-+.\deE]+):([-+.\deE]+)")
 _ROTOR = "rotor"
 # Two numbers of a table that differ by less are the same number.
 _SAME_NUMBER = 1e-6
+# A ramp instead of plateaus: fewest points and rows, rows that must agree, ln of a misreading, 1/s of a slow ramp.
+_ENOUGH, _ROWS, _WINDOW, _JUMP, _RATE = 8, 20, 7, 0.03, 0.25
 _ROTOR_WORDS = ("left", "right", "upper", "lower", "front", "rear", "A", "B", "C", "D", "1", "2", "3", "4")
 
 
@@ -168,7 +170,11 @@ def selected(imported: Imported, conditions: Sequence[str], where: str) -> Impor
         return imported
     if not keep.any():
         raise InputError(Fault(where, ", ".join(conditions), "no row that meets all", "one or more"))
-    index = np.flatnonzero(keep)
+    return _cut(imported, np.flatnonzero(keep))
+
+
+def _cut(imported: Imported, index: NDArray[np.intp]) -> Imported:
+    """Some of the rows."""
 
     def cut(cells: tuple[Any, ...]) -> tuple[Any, ...]:
         return tuple(cells[i] for i in index) if len(cells) == imported.rows else cells
@@ -214,7 +220,7 @@ def stand_run(
         When there is no steady point, or nothing to compare.
     """
     imported = selected(imported, conditions, name)
-    reduced = reduce(imported, diameter_m=diameter_m)
+    reduced, ramp = _reduced(imported, diameter_m)
     series = reduced.series
     values = {k: np.asarray(series.values[k], dtype=float) for k in _WANTED if k in series.values}
     if not {"thrust_N", "torque_Nm", "power_W"} & values.keys() and "rpm" not in values and "J" not in values:
@@ -233,16 +239,56 @@ def stand_run(
     told = f"{name} ({', '.join(conditions)})" if conditions else name
     session = {k: float(v["session"]) for k, v in reduced.correlated.items() if v.get("session")}
     diameter = diameter_m if diameter_m is not None else float(constants.get("diameter_m", math.nan))
-    notes = tuple(n for n in reduced.notes if "no density" not in n)
+    notes = (*ramp, *(n for n in reduced.notes if "no density" not in n))
     return StandRun(told, values, u, session, command, density, notes, diameter)
+
+
+def _reduced(imported: Imported, diameter_m: float | None) -> tuple[Reduced, tuple[str, ...]]:
+    """Steady points; of a ramp without any to speak of, its rows."""
+    try:
+        steady = reduce(imported, diameter_m=diameter_m)
+    except InputError:
+        steady = None
+    if steady is not None and (steady.mode == "points" or _useful(steady) >= _ENOUGH):
+        return steady, ()
+    slow = _ramp(imported)
+    if slow is not None:
+        rows = reduce(slow, diameter_m=diameter_m, steady=True)
+        if steady is None or _useful(rows) > 2 * _useful(steady):
+            words = f"few steady points: {slow.rows} of {imported.rows} rows of a slow ramp are used as they are"
+            return rows, (words,)
+    return steady or reduce(imported, diameter_m=diameter_m), ()
+
+
+def _useful(reduced: Reduced) -> int:
+    """Points with a speed and a load."""
+    v = reduced.series.values
+    loads = [np.isfinite(v[k]) for k in _LOADS if k in v]
+    speed = np.isfinite(v["rpm"]) & (v["rpm"] > 0.0) if "rpm" in v else np.ones(len(reduced.series), dtype=bool)
+    return int(np.sum(np.any(loads, axis=0) & speed)) if loads else 0
+
+
+def _ramp(imported: Imported) -> Imported | None:
+    """Rows of a record of samples at which the speed changes slowly and reads what its neighbours read."""
+    seen = view(imported).values
+    t, rpm = seen.get("time_s"), seen.get("rpm")
+    if t is None or rpm is None or imported.rows < _ROWS:
+        return None
+    speed = np.where(rpm > 0.0, np.log(np.where(rpm > 0.0, rpm, 1.0)), np.nan)
+    half = _WINDOW // 2
+    padded = np.pad(speed, half, constant_values=np.nan)
+    windows = np.lib.stride_tricks.sliding_window_view(padded, _WINDOW)
+    with np.errstate(all="ignore"):
+        full = np.isfinite(windows).sum(axis=1) > half
+        middle = np.array([np.nanmedian(w) if ok else np.nan for w, ok in zip(windows, full, strict=True)])
+        far = np.array(
+            [np.nanmedian(np.abs(w - m)) if ok else np.nan for w, m, ok in zip(windows, middle, full, strict=True)]
+        )
+        rate = np.abs(np.gradient(middle, t))
+    keep = np.isfinite(middle) & (np.abs(speed - middle) < _JUMP) & (far < _JUMP) & (rate < _RATE)
+    return _cut(imported, np.flatnonzero(keep)) if keep.sum() >= _ROWS else None
 
 
 def _moves(v: Array) -> bool:
     finite = v[np.isfinite(v)]
     return finite.size > 1 and float(np.ptp(finite)) > 0.0
-
-
-def temperature_C(run: StandRun) -> float:
-    """Mean recorded temperature [C]; NaN: not recorded."""
-    t = run.values.get("temperature_K")
-    return float(np.nanmean(t)) - ZERO_CELSIUS if t is not None and np.isfinite(t).any() else math.nan
