@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from bemt.base.errors import EXIT_OK
 from bemt.commands import _options, _terminal
+
+if TYPE_CHECKING:
+    from bemt.diagnose.contrast import Contrast
 
 NAME = "compare"
 HELP = "say what changed between two recordings of one stand"
@@ -34,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
     """Compare, write, print."""
     from bemt.base.tables import json_text
     from bemt.compare.contrast_text import text
-    from bemt.diagnose.contrast import compare, label_diameter, write
+    from bemt.diagnose.contrast import compare, label_diameter
 
     diameter = label_diameter(args.label)
     with _terminal.progress(args.quiet or args.json) as say:
@@ -42,9 +47,23 @@ def run(args: argparse.Namespace) -> int:
             args.a, args.b, args.case, diameter_m=diameter, rows_a=args.rows_a, rows_b=args.rows_b, progress=say
         )
     if args.out:
-        write(args.out, answer, figures=not args.no_figures)
+        _write(Path(args.out), answer, figures=not args.no_figures)
     if args.json:
         print(json_text(answer.document), end="")
     elif not args.quiet:
         print(text(answer.document, details=args.details))
     return EXIT_OK
+
+
+def _write(out: Path, answer: Contrast, figures: bool) -> None:
+    """Write comparison.json, its text and a picture."""
+    from bemt.base.tables import json_text, write_atomic
+    from bemt.compare.contrast_text import text
+
+    out.mkdir(parents=True, exist_ok=True)
+    write_atomic(out / "comparison.json", json_text(answer.document))
+    write_atomic(out / "comparison.txt", text(answer.document, details=True) + "\n")
+    if figures:
+        from bemt.compare.contrast_figure import picture
+
+        write_atomic(out / "comparison.png", picture(answer.change, answer.document))

@@ -33,8 +33,9 @@ FORM = {0.15: 0.7, 0.45: 0.3}
 """What a change by air or blade may rise or bow with speed or advance, share of the change, with its prior weight: the
 sizes by which published laws of one effect differ (:mod:`bemt.diagnose.form`)."""
 _EXACT = {1.0: 1.0}
-CREDIBLE, MOST = 0.9, 5
-"""A class holds this much of the probability of the listed effects, with at most so many members."""
+NEAR, MOST = 20.0, 6
+"""An effect this many times less likely than the leading one is still in its class, which has at most so many members:
+a law is rougher than its evidence."""
 RIVAL, DOUBT = 0.1, 0.3
 """An effect beside which the unknown keeps more than the first is not named; a class beside the second is not given."""
 # Recorded densities are this good: a barometer, a thermometer and nobody's humidity, share.
@@ -57,8 +58,8 @@ class ScalingLaw:
     terms : tuple of (float, mapping)
         Size relative to the first term, and channel to basis to weight. Bases: ``all`` 1; ``zero`` full scale over
         reading; ``still`` 1 at rest, fading to 0 at the largest advance; ``slope`` the channel's own derivative with
-        respect to ln J; ``slip`` that over V; ``volts`` ln of the voltage ratio at equal command, or 1; ``drag`` V^2 over thrust; ``n2`` square of the speed; ``ramp`` the
-        command.
+        respect to ln J; ``slip`` that over V; ``drag`` V^2 over thrust; ``n2`` square of the speed; ``volts`` ln of
+        the voltage ratio at equal command, or 1 where it is not recorded.
     sizes : tuple of float
         Standard deviations of the first term, share; they share the prior.
     says : str
@@ -71,6 +72,8 @@ class ScalingLaw:
         air, stand or drive.
     flow : bool
         Only with airspeed.
+    exact : bool
+        Whether nothing but the law is moved, as by instruments.
     """
 
     id: str
@@ -82,6 +85,7 @@ class ScalingLaw:
     kind: str = "air"
     sizes: tuple[float, ...] = _SIZES
     flow: bool = False
+    exact: bool = False
 
 
 _T, _Q = "thrust", "torque"
@@ -93,6 +97,7 @@ LAWS: tuple[ScalingLaw, ...] = (
         "thrust and torque change by the same share at every speed",
         "read barometer and thermometer in both runs",
         "T = CT rho n^2 D^4, Q = CQ rho n^2 D^5",
+        exact=True,
     ),
     ScalingLaw(
         "rpm_scale",
@@ -363,7 +368,7 @@ def _bases(c: MatchedChannel, volts: float | Array = 1.0) -> dict[str, Array]:
 
 
 def _volts(channels: Mapping[str, MatchedChannel]) -> dict[str, float | Array]:
-    """ln of B's voltage over A's at the command of every point of the drive; empty without voltages."""
+    """Logarithm of B's voltage over A's at the command of every point of the drive; empty without voltages."""
     v = channels.get("voltage")
     if v is None:
         return {}
@@ -387,15 +392,15 @@ def _columns(
 
     Instruments are exact. Air and blades follow their law roughly: what they change may rise or bow with speed.
     """
-    shapes = () if row.kind == "stand" else ("ramp", "bow", "advance")
+    shapes = () if row.kind == "stand" or row.exact else ("ramp", "bow", "advance")
     parts = []
     for name, c in channels.items():
         basis = _bases(c, volts.get(name, 1.0))
         columns = [
             w * sum((f * basis[k] for k, f in term.get(name, {}).items()), np.zeros(c.y.size)) for w, term in row.terms
         ]
-        moved = sum((np.abs(v) for v in columns), np.zeros(c.y.size))
-        scale = form * min(float(moved.max()), 1.0)
+        moved = sum((np.abs(v) for v, (w, _) in zip(columns, row.terms, strict=True) if w >= 1.0), np.zeros(c.y.size))
+        scale = form * float(moved.max())
         for other in channels:
             columns += [scale * (other == name) * basis[k] for k in shapes]
         parts.append(np.column_stack(columns))
@@ -494,7 +499,7 @@ def _weighed(
     for row in (row for row in LAWS if row.kind in kinds and (moving or not row.flow)):
         sizes = (_DENSITY,) if row.id == "air_density" and density_known else row.sizes
         found = []
-        for form, prior in (FORM if row.kind != "stand" else _EXACT).items():
+        for form, prior in (_EXACT if row.kind == "stand" or row.exact else FORM).items():
             columns = _columns(row, channels, form, volts)
             if columns is not None:
                 A, weight = white(columns), math.log(prior / len(sizes))
@@ -574,17 +579,15 @@ def judge(probability: Mapping[str, float], size: Mapping[str, tuple[float, floa
         return answer("unknown", (), f"no listed cause moves these channels like that ({unknown:.2f})")
     if not listed or mass <= 0.5:
         return answer("insufficient", (), "the change is too small to be told from none")
-    credible, total = [], 0.0
-    for k, p in sorted(listed.items(), key=lambda kv: -kv[1]):
-        credible.append(k)
-        total += p
-        if total >= CREDIBLE * mass:
-            break
+    best = max(listed.values())
+    credible = [k for k, p in sorted(listed.items(), key=lambda kv: -kv[1]) if p >= best / NEAR]
     first = credible[0]
-    if listed[first] >= SURE and unknown <= RIVAL:
+    if len(credible) == 1 and listed[first] >= SURE and unknown <= RIVAL:
         row = law(first)
         kind = "sensor" if first == "unit_slip" or (row is not None and row.kind == "stand") else "named"
         return answer(kind, (first,), f"{first} ({listed[first]:.2f})")
-    if len(credible) <= MOST and unknown <= DOUBT and probability[NONE] <= RIVAL:
+    if 1 < len(credible) <= MOST and unknown <= DOUBT and probability[NONE] <= RIVAL:
         return answer("class", credible, f"these scale alike ({mass:.2f})")
+    if len(credible) == 1:
+        return answer("insufficient", (), f"{first} ({listed[first]:.2f}) leads, but unknown keeps {unknown:.2f}")
     return answer("insufficient", (), f"{len(credible)} causes scale like that in these channels")

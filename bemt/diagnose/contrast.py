@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from bemt.case import Case
     from bemt.readers._imported import Imported
 
-__all__ = ["Contrast", "compare"]
+__all__ = ["Contrast", "compare", "label_diameter"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ class Contrast:
 def compare(
     a: str | os.PathLike[str],
     b: str | os.PathLike[str],
-    case: Case | None = None,
+    case: Case | str | os.PathLike[str] | None = None,
     *,
     diameter_m: float | None = None,
     rows_a: Sequence[str] = (),
@@ -69,7 +69,7 @@ def compare(
     ----------
     a, b : str or path
         Recordings of any known format: before and after, or without and with.
-    case : Case, optional
+    case : Case or path, optional
         The rotor. With it, B is diagnosed with A as its reference: what the model lacks in A is no finding in B.
         Without it, the causes are those that scale like the ratios do.
     diameter_m : float, optional
@@ -98,6 +98,8 @@ def compare(
     """
     from bemt.recordings.load import import_file
 
+    if isinstance(case, str | os.PathLike):
+        case = _case(os.fspath(case))
     names = [os.fspath(a), os.fspath(b)]
     conditions = [list(rows_a), list(rows_b)]
     if Path(names[0]).resolve() == Path(names[1]).resolve() and sorted(rows_a) == sorted(rows_b):
@@ -137,13 +139,23 @@ def compare(
     return Contrast(found, doc)
 
 
+def _case(path: str) -> Case:
+    """Read the one case at a path."""
+    from bemt.case import find_cases, load_case
+
+    found = find_cases([path])
+    if len(found) != 1:
+        raise InputError(Fault("--case", "", f"{len(found)} cases", "one case"))
+    return load_case(found[0])
+
+
 def _diagnosed(
     names: Sequence[str], read: Sequence[Imported], case: Case, progress: Callable[[str], None] | None
 ) -> dict[str, Any]:
     """Verdict of the diagnosis of B with A as reference."""
     from bemt.diagnose.chain import diagnose
-    from bemt.diagnose.command import load
     from bemt.diagnose.document import document as diagnosis
+    from bemt.diagnose.load import load
 
     a, b = (load(name, case, imported) for name, imported in zip(names, read, strict=True))
     answer = diagnose([b, replace(a, reference=True)], [case], None, progress)
@@ -157,3 +169,17 @@ def _next(found: Change, doc: dict[str, Any], names: Sequence[str], with_case: b
     if told.get("text"):
         return {**told, "command": f"python -m bemt compare {names[0]} {names[1]} --case CASE"}
     return next_step(found, with_case, names)
+
+
+def label_diameter(label: str | None) -> float | None:
+    """Diameter of a label such as 10x5 [m]."""
+    from bemt.base.units import INCH
+    from geometry.common import GeometryError
+    from geometry.designation import parse_designation
+
+    if label is None:
+        return None
+    try:
+        return float(parse_designation(label)[0]) * INCH
+    except GeometryError as error:
+        raise InputError([Fault("--label", *fault) for fault in error.faults]) from error
