@@ -40,7 +40,7 @@ _SMALL = 0.04
 _STARTED = {"speed": 0.3, "electrical": 0.1}
 # A coefficient below this share of its largest is near zero thrust: a ratio means nothing there.
 _NEAR_ZERO = 0.15
-MOST = 120
+MOST = 60
 """Points of a recording in the fit; more are averaged with their neighbours in speed. [1]"""
 SESSION = {"thrust": 0.007, "torque": 0.010, "speed": 0.015, "electrical": 0.02, "voltage": 0.02}
 """Standard deviation of the level of one run where the recordings do not show it, share: two runs differ by 1.4 times
