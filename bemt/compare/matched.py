@@ -27,8 +27,8 @@ __all__ = ["DRIVE", "LOADS", "MatchedChannel", "Prepared", "Scatter", "covarianc
 
 Array = NDArray[np.float64]
 
-LOADS = {"thrust": ("thrust_N", "CT"), "torque": ("torque_Nm", "power_W", "CP", "CQ")}
-"""Loads of the rotor: first what a cell reads, then what stands for it."""
+LOADS = {"thrust": ("thrust_N", "CT"), "torque": ("torque_Nm", "power_W", "CP", "CQ", "electrical_power_W")}
+"""Loads of the rotor: first what a cell reads, then what stands for it; electrical power only at like voltage."""
 DRIVE = {"speed": ("rpm",), "electrical": ("electrical_power_W",), "voltage": ("voltage_V",)}
 """Drive behind the rotor: speed and voltage at equal command, electrical power at equal speed."""
 _POWER = {"thrust_N": 2.0, "torque_Nm": 2.0, "power_W": 3.0, "electrical_power_W": 3.0}
@@ -37,7 +37,7 @@ _COEFFICIENTS = ("CT", "CP", "CQ")
 # Readings below this share of the channel's largest say more of the zero than of the rotor.
 _SMALL = 0.04
 # A motor that has just set off, and a controller that idles, follow no law.
-_STARTED = {"speed": 0.3, "electrical": 0.1}
+_STARTED = {"rpm": 0.3, "electrical_power_W": 0.1}
 # A coefficient below this share of its largest is near zero thrust: a ratio means nothing there.
 _NEAR_ZERO = 0.15
 MOST = 60
@@ -46,13 +46,15 @@ SESSION = {"thrust": 0.007, "torque": 0.010, "speed": 0.015, "electrical": 0.02,
 """Standard deviation of the level of one run where the recordings do not show it, share: two runs differ by 1.4 times
 this. Repeated runs of one stand that were set up anew differ by 1 % in thrust and 1.4 % in torque (runs of the UIUC
 Propeller Database and of J. Majewski's stand, seen here)."""
+# Electrical power for torque: efficiency of a drive that is warm or cold; speed where the voltage is known.
+_BY_POWER, _AT_KNOWN_VOLTAGE = 0.03, 0.01
 _BEND, _ZERO, _STEEP = 0.7, 0.0015, 0.15
 _LENGTH_SPEED, _LENGTH_ADVANCE = 0.5, 0.35
 _SHARES = (0.001, 0.002, 0.004, 0.008, 0.015, 0.03, 0.06, 0.1)
 _FLOORS = (0.0, 0.0007, 0.002, 0.005, 0.012)
 _WIGGLES = (0.0, 0.004, 0.01, 0.02)
 _BENDS = (0.02, 0.1, 0.3, 1.0)
-_FAR, _MARGIN = 3.5, 0.06
+_FAR, _MARGIN, _LIKE = 3.5, 0.06, 0.1
 _LOCAL = 3.0
 
 
@@ -121,6 +123,12 @@ class Scatter:
     bend: float
 
 
+def _like_voltage(a: StandRun, b: StandRun) -> bool:
+    """Whether motor and controller work at like voltages, so that electrical power may stand for torque."""
+    v = [np.nanmedian(r.values["voltage_V"]) if "voltage_V" in r.values else math.nan for r in (a, b)]
+    return bool(abs(math.log(v[1] / v[0])) < _LIKE) if all(x > 0.0 for x in v) else False
+
+
 def _advance(run: StandRun, diameter: float) -> Array:
     """V/(n D), or V/n [m] without a diameter; zero where no airspeed was recorded."""
     n = len(run)
@@ -149,7 +157,7 @@ def _readings(run: StandRun, name: str, channel: str, diameter: float) -> dict[s
     size = np.where(v * sign > 0.0, v * sign, np.nan)
     top = float(np.nanmax(size)) if np.isfinite(size).any() else math.nan
     scaled = size / speed ** _POWER.get(channel, 0.0)
-    good = np.isfinite(scaled) & np.isfinite(first) & (size > _STARTED.get(name, _SMALL) * top) & (speed > 0.0)
+    good = np.isfinite(scaled) & np.isfinite(first) & (size > _STARTED.get(channel, _SMALL) * top) & (speed > 0.0)
     if name in LOADS:
         level = np.nanpercentile(np.where(good, scaled, np.nan), 90) if good.any() else math.nan
         good &= scaled > _NEAR_ZERO * level
@@ -208,6 +216,8 @@ def matched(a: StandRun, b: StandRun, name: str, diameter: float = math.nan) -> 
     if name in ("speed", "voltage") and (a.command != b.command or not a.command):
         return None
     for channel in choices:
+        if name in LOADS and channel == "electrical_power_W" and not _like_voltage(a, b):
+            continue
         one, two = _readings(a, name, channel, diameter), _readings(b, name, channel, diameter)
         if one is not None and two is not None:
             break
@@ -237,9 +247,18 @@ def matched(a: StandRun, b: StandRun, name: str, diameter: float = math.nan) -> 
         np.concatenate([p["floor"] for p in parts]),
         np.concatenate([p["u"] for p in parts]),
         log_density,
-        max(SESSION[name], *seen),
+        max(_set_up(name, channel, a, b), *seen),
         tuple(notes),
     )
+
+
+def _set_up(name: str, channel: str, a: StandRun, b: StandRun) -> float:
+    """Standard deviation of the level of one run where the recordings do not show it."""
+    if name in LOADS and channel == "electrical_power_W":
+        return _BY_POWER
+    if name == "speed" and all("voltage_V" in r.values for r in (a, b)):
+        return _AT_KNOWN_VOLTAGE
+    return SESSION[name]
 
 
 def _lengths(c: MatchedChannel) -> Array:

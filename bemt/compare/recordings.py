@@ -89,8 +89,11 @@ def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> Change:
     """
     told = [d for d in (diameter_m, a.diameter_m, b.diameter_m) if math.isfinite(d)]
     diameter = told[0] if told else math.nan
-    rotor, behind = (fits.prepared(a, b, tuple(kind), diameter) for kind in (fits.LOADS, fits.DRIVE))
-    loads, drive = rotor.channels, behind.channels
+    rotor = fits.prepared(a, b, tuple(fits.LOADS), diameter)
+    loads = rotor.channels
+    spoken = {c.channel for c in loads.values()}
+    behind = fits.prepared(a, b, [k for k, names in fits.DRIVE.items() if not spoken & set(names)], diameter)
+    drive = behind.channels
     if not loads and not drive:
         got = f"{_told(a)} in A, {_told(b)} in B"
         raise InputError(
@@ -107,7 +110,7 @@ def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> Change:
     ratios = {c.channel: _ratio(c, scatter[n]) for n, c in {**loads, **drive}.items()}
     verdict = _NO_TALK
     if loads:
-        verdict = judge(*weigh(loads, (rotor.free, rotor.steady), ("air", "stand"), known))
+        verdict = judge(*weigh(loads, (rotor.free, rotor.steady), ("air", "stand"), known, _speed_ratio(ratios)))
         verdict = _far_apart(_with_density(verdict, a, b, loads), ratios)
     motor = _NO_TALK
     if drive and verdict.verdict == "none":
@@ -136,6 +139,11 @@ def _far_apart(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> Judg
     return Judgement(
         "insufficient", (), said.probability, said.size, "the two runs have no speed and advance in common"
     )
+
+
+def _speed_ratio(ratios: Mapping[str, Mapping[str, Any]]) -> float:
+    """Speed of B over A at equal command; NaN: no command."""
+    return float(next((r["ratio"] for r in ratios.values() if r["kind"] == "speed"), math.nan))
 
 
 def _told(run: StandRun) -> str:
@@ -176,6 +184,8 @@ def _assumed(a: StandRun, b: StandRun, diameter: float, loads: Mapping[str, Matc
         out.append(f"airspeed is not recorded in {' and '.join(still)}: taken as still air")
     if "torque" not in loads and "thrust" in loads:
         out.append("torque is not recorded in both: gain, air and blade scale alike in thrust alone")
+    if "torque" in loads and loads["torque"].channel == "electrical_power_W":
+        out.append("torque is not recorded: electrical power stands for it, with one motor and controller in both")
     if not math.isfinite(diameter) and any(c.advance_moves() for c in loads.values()):
         out.append("no diameter: compared at equal advance per turn, V/n; --label 10x5 gives J")
     return out

@@ -40,6 +40,8 @@ RIVAL, DOUBT = 0.1, 0.3
 """An effect beside which the unknown keeps more than the first is not named; a class beside the second is not given."""
 # Recorded densities are this good: a barometer, a thermometer and nobody's humidity, share.
 _DENSITY = 0.004
+# Speed at equal command of one motor, in ln: battery and load change it by no more.
+_SAME_DRIVE = 0.25
 
 Basis = Mapping[str, float]
 Term = tuple[float, Mapping[str, Basis]]
@@ -107,6 +109,7 @@ LAWS: tuple[ScalingLaw, ...] = (
         "check the speed with an optical tachometer",
         "T and Q go with n^2 at fixed CT, CQ; J with 1/n",
         "stand",
+        (0.01, 0.04),
     ),
     ScalingLaw(
         "diameter",
@@ -155,7 +158,7 @@ LAWS: tuple[ScalingLaw, ...] = (
         "both loads change by large shares of their own: pitch, blades, chord and section at once",
         "compare label, blade count and weight",
         "CT and CP of another blade",
-        sizes=(0.2, 0.6),
+        sizes=(0.2, 0.6, 1.5),
     ),
     ScalingLaw(
         "untwist",
@@ -344,10 +347,9 @@ def _bases(c: MatchedChannel, volts: float | Array = 1.0) -> dict[str, Array]:
     J = advance / top if top > 0.0 else advance
     slope = np.zeros(b.size)
     if c.advance_moves():
-        z = fits.unit_coordinates(c)
-        X = np.column_stack([np.ones(b.size), b, z[:, 0], J, J**2])
+        X = np.column_stack([np.ones(b.size), b, J, J**2])  # at one airspeed J and n are one coordinate
         fit = np.linalg.lstsq(X, c.y, rcond=None)[0]
-        slope = J * (fit[3] + 2.0 * fit[4] * J)
+        slope = J * (fit[2] + 2.0 * fit[3] * J)
     square = np.exp(2.0 * (c.x[:, 0] - c.x[:, 0].max())) if c.name in fits.LOADS else np.ones(b.size)
     load = np.exp(c.y - c.y.max())
     ramp = fits.unit_coordinates(c)[:, 0]
@@ -429,11 +431,13 @@ def _slips(channels: Mapping[str, MatchedChannel]) -> list[tuple[str, Array]]:
     return out
 
 
-def _pole_slips(channels: Mapping[str, MatchedChannel]) -> list[Array]:
+def _pole_slips(channels: Mapping[str, MatchedChannel], speed_ratio: float) -> list[Array]:
     """Changes by a ratio of pole pairs: loads go with its square, (M,) means."""
     pairs = [(p, 1) for p in range(2, 15)] + [(p + 1, p) for p in range(2, 9)]
     ratios = [f for p, q in pairs for f in (p / q, q / p)]
     second = np.concatenate([c.second.astype(float) for c in channels.values()])
+    if math.isfinite(speed_ratio):  # one motor at one command: what is indicated changes by the same ratio
+        ratios = [f for f in ratios if abs(math.log(f * speed_ratio)) < _SAME_DRIVE]
     return [2.0 * math.log(f) * second for f in ratios]
 
 
@@ -442,6 +446,7 @@ def weigh(
     scatters: Sequence[Mapping[str, Scatter]],
     kinds: Sequence[str],
     density_known: bool = False,
+    speed_ratio: float = math.nan,
 ) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
     """Evidence of every explanation.
 
@@ -455,6 +460,8 @@ def weigh(
         Kinds of laws that are asked.
     density_known : bool
         Whether both recordings tell their density, which is out of the readings already.
+    speed_ratio : float
+        Indicated speed of B over A at equal command [1]; NaN: unknown. Other pole pairs would show there, too.
 
     Returns
     -------
@@ -463,7 +470,7 @@ def weigh(
     size : dict
         Effect to size of its first term and standard error.
     """
-    found = [_weighed(channels, scatter, kinds, density_known) for scatter in scatters]
+    found = [_weighed(channels, scatter, kinds, density_known, speed_ratio) for scatter in scatters]
     names = list(found[0][0])
     score = {k: float(np.logaddexp.reduce([z[k] for z, _ in found])) for k in names}
     size = {k: max(found, key=lambda f: f[0][k])[1][k] for k in names if k in found[0][1]}
@@ -476,7 +483,11 @@ def weigh(
 
 
 def _weighed(
-    channels: Mapping[str, MatchedChannel], scatter: Mapping[str, Scatter], kinds: Sequence[str], density_known: bool
+    channels: Mapping[str, MatchedChannel],
+    scatter: Mapping[str, Scatter],
+    kinds: Sequence[str],
+    density_known: bool,
+    speed_ratio: float,
 ) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
     """Log evidence of every explanation at one setting of the scatter, and sizes."""
     from scipy.linalg import block_diag, cholesky, solve_triangular
@@ -511,11 +522,12 @@ def _weighed(
             best = max(found, key=lambda f: f[0])
             size[row.id] = best[1], best[2]
     if "rpm_scale" in score:
-        means = _pole_slips(channels)
-        z, mean = _shifted(means, white, r, none)
-        if z > score["rpm_scale"]:
-            size["rpm_scale"] = mean / 2.0, 0.0
-        score["rpm_scale"] = float(np.logaddexp(score["rpm_scale"], z)) - math.log(2.0)
+        means = _pole_slips(channels, speed_ratio)
+        if means:
+            z, mean = _shifted(means, white, r, none)
+            if z > score["rpm_scale"]:
+                size["rpm_scale"] = mean / 2.0, 0.0
+            score["rpm_scale"] = float(np.logaddexp(score["rpm_scale"], z)) - math.log(2.0)
     slips = _slips(channels) if "stand" in kinds else []
     if slips:
         z, mean = _shifted([m for _, m in slips], white, r, none)

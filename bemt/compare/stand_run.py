@@ -272,8 +272,10 @@ def _ramp(imported: Imported) -> Imported | None:
     """Rows of a record of samples at which the speed changes slowly and reads what its neighbours read."""
     seen = view(imported).values
     t, rpm = seen.get("time_s"), seen.get("rpm")
-    if t is None or rpm is None or imported.rows < _ROWS:
+    if rpm is None or imported.rows < _ROWS:
         return None
+    if t is None:
+        return imported
     speed = np.where(rpm > 0.0, np.log(np.where(rpm > 0.0, rpm, 1.0)), np.nan)
     half = _WINDOW // 2
     padded = np.pad(speed, half, constant_values=np.nan)

@@ -1,7 +1,7 @@
 """Flight logs of a Crazyflie: the binary files of its micro-SD card (``.usdlog``).
 
 Magic 0xBC, version, number of event types, their names and variables with a type letter, then records: id (u16), time
-(version 1: u32 in us; version 2: u64 in us/1000), packed little-endian values; the last four bytes are a CRC32 of all
+(us; version 1: u32, version 2: u64), packed little-endian values; the last four bytes are a CRC32 of all
 before (Bitcraze, crazyflie-firmware, tools/usdlog/cfusdlog.py). The four speeds are joined to their root mean square,
 since thrust goes with the square. No thrust is measured in flight: accelerations are kept, the mass is the user's.
 """
@@ -123,7 +123,7 @@ def _tables(data: bytes) -> dict[str, dict[str, NDArray[np.float64]]]:
             form += variable[-2]
         known[number] = (name, names, struct.Struct(form))
     rows: dict[int, list[tuple[float, ...]]] = {k: [] for k in known}
-    stamp, scale = _TIMES[version], 1e-6 if version == 1 else 1e-9
+    stamp, scale = _TIMES[version], 1e-6
     while at < len(data):
         number, time = stamp.unpack_from(data, at)
         at += stamp.size
