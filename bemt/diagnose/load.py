@@ -53,7 +53,7 @@ def cases_of(paths: Sequence[str], off: Sequence[str], n: int) -> list[Case]:
     return found
 
 
-def load(path: str, case: Case) -> Record:
+def load(path: str, case: Case, imported: Imported | None = None) -> Record:
     """Read one recording, whatever its format.
 
     Parameters
@@ -62,6 +62,8 @@ def load(path: str, case: Case) -> Record:
         File.
     case : Case
         Diameter, and what the recording does not say.
+    imported : Imported, optional
+        The file as read already, or some of its rows.
 
     Returns
     -------
@@ -76,7 +78,7 @@ def load(path: str, case: Case) -> Record:
     from bemt.recordings import reduce as reduction
     from bemt.recordings.load import import_file
 
-    imported = import_file(path)
+    imported = imported or import_file(path)
     _same_rotor(imported, case, path)
     ducted = case.ducted
     findings = check(imported, diameter_m=case.diameter_m, blades=int(case.get("rotor.blades")), ducted=ducted)

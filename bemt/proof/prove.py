@@ -29,6 +29,8 @@ SCHEMA, KEY_SCHEMA = "bemt.proof/1", "bemt.key/1"
 REAL = "real"
 """Size of the run on published recordings."""
 _GIVEN = ("recording.csv", "case.toml", "stations.csv", "reference.csv")
+COMPARE = "compare"
+"""File of an item that asks what changed between reference.csv and recording.csv."""
 TIME_LIMIT_S = 900.0
 
 
@@ -102,8 +104,7 @@ def diagnose_folder(folder: Path) -> tuple[dict[str, Any] | None, str]:
         given = [name for name in _GIVEN if (folder / name).exists()]
         for name in given:
             shutil.copy(folder / name, box)
-        command = [sys.executable, "-m", "bemt", "diagnose", "recording.csv", "--case", "case.toml", "--json"]
-        command += ["--reference", "reference.csv"] if "reference.csv" in given else []
+        command = [sys.executable, "-m", "bemt", *_question(folder), "--json"]
         # the numerical libraries' own threads would fight over the cores that --jobs shares out
         one = {
             name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -119,6 +120,15 @@ def diagnose_folder(folder: Path) -> tuple[dict[str, Any] | None, str]:
             return None, f"no answer within {TIME_LIMIT_S:g} s"
         except ValueError:
             return None, ran.stderr.strip() or "no JSON document on the output"
+
+
+def _question(folder: Path) -> list[str]:
+    """Subcommand and files that are asked."""
+    case = ["--case", "case.toml"] if (folder / "case.toml").exists() else []
+    if (folder / COMPARE).exists():
+        return ["compare", "reference.csv", "recording.csv", *case]
+    known = ["--reference", "reference.csv"] if (folder / "reference.csv").exists() else []
+    return ["diagnose", "recording.csv", *case, *known]
 
 
 def diagnose_all(out: Path, jobs: int, say: Callable[[str], None] | None = None) -> None:

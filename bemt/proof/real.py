@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from bemt.base.errors import Fault, InputError
 from bemt.base.folders import data_roots, find_data
 from bemt.proof.items import Item, recording_text
+from bemt.proof.pairs import draw_pairs
 from bemt.sections import rule as section_rule
 
 if TYPE_CHECKING:
@@ -302,7 +303,7 @@ def draw_real(rng: np.random.Generator) -> list[Item]:
     InputError
         When none of the recordings is found.
     """
-    items = [*_uiuc(rng), *_x22a(), *_fan(), *_caradonna_tung(), *_tmotor()]
+    items = [*_uiuc(rng), *_x22a(), *_fan(), *_caradonna_tung(), *_tmotor(), *draw_pairs()]
     if not items:
         roots = ", ".join(r.as_posix() for r in data_roots())
         hint = "`python -m bemt data uiuc` fetches the largest; BEMT_DATA names a folder of them"

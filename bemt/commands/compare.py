@@ -1,0 +1,69 @@
+"""``python -m bemt compare A B``: what changed between two recordings of one stand."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bemt.base.errors import EXIT_OK
+from bemt.commands import _options, _terminal
+
+if TYPE_CHECKING:
+    from bemt.diagnose.contrast import Contrast
+
+NAME = "compare"
+HELP = "say what changed between two recordings of one stand"
+GROUP = "Recordings"
+EXAMPLE = "compare monday.csv tuesday.csv --case cases/prop_8x5"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument("a", metavar="A", help="recording before, or without")
+    parser.add_argument("b", metavar="B", help="recording after, or with")
+    known = "the rotor: B is diagnosed with A as its reference (default: causes that scale like the ratios)"
+    parser.add_argument("--case", metavar="CASE", help=known)
+    parser.add_argument("--label", metavar="LABEL", help="label such as 10x5: the diameter, for the advance ratio")
+    rows = "rows of {} that are meant: column=text, column=number, column=low:high, rotor=left; repeatable"
+    parser.add_argument("--rows-a", metavar="CONDITION", help=rows.format("A"), **_options.REPEATABLE)
+    parser.add_argument("--rows-b", metavar="CONDITION", help=rows.format("B"), **_options.REPEATABLE)
+    parser.add_argument("--out", metavar="DIR", help="write comparison.json, its text and a picture there")
+    parser.add_argument("--no-figures", action="store_true", help="with --out: no picture")
+    parser.add_argument("--details", action="store_true", help="print ranking, sub-systems and all notes")
+    _options.add_json(parser, "bemt.comparison/1")
+    _options.add_quiet(parser, "neither progress nor answer")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Compare, write, print."""
+    from bemt.base.tables import json_text
+    from bemt.compare.contrast_text import text
+    from bemt.diagnose.contrast import compare, label_diameter
+
+    diameter = label_diameter(args.label)
+    with _terminal.progress(args.quiet or args.json) as say:
+        answer = compare(
+            args.a, args.b, args.case, diameter_m=diameter, rows_a=args.rows_a, rows_b=args.rows_b, progress=say
+        )
+    if args.out:
+        _write(Path(args.out), answer, figures=not args.no_figures)
+    if args.json:
+        print(json_text(answer.document), end="")
+    elif not args.quiet:
+        print(text(answer.document, details=args.details))
+    return EXIT_OK
+
+
+def _write(out: Path, answer: Contrast, figures: bool) -> None:
+    """Write comparison.json, its text and a picture."""
+    from bemt.base.tables import json_text, write_atomic
+    from bemt.compare.contrast_text import text
+
+    out.mkdir(parents=True, exist_ok=True)
+    write_atomic(out / "comparison.json", json_text(answer.document))
+    write_atomic(out / "comparison.txt", text(answer.document, details=True) + "\n")
+    if figures:
+        from bemt.compare.contrast_figure import picture
+
+        write_atomic(out / "comparison.png", picture(answer.change, answer.document))

@@ -1,0 +1,162 @@
+"""A comparison of two recordings in the lines an engineer would say."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Mapping
+from typing import Any
+
+from bemt.base.tables import text_table
+from bemt.compare.scaling import law
+
+__all__ = ["text"]
+
+_WORD = {
+    "thrust_N": "thrust",
+    "torque_Nm": "torque",
+    "power_W": "shaft power",
+    "CT": "CT",
+    "CP": "CP",
+    "CQ": "CQ",
+    "electrical_power_W": "electrical power",
+    "rpm": "speed at equal command",
+    "voltage_V": "voltage at equal command",
+}
+_ROWS, _NOTES = 8, 4
+
+
+def _share(x: float) -> str:
+    return f"{x - 1.0:+.1%}" if 0.4 < x < 2.5 else f"x{x:.3g}"
+
+
+def _title(name: str) -> str:
+    row = law(name)
+    return f"{name} ({row.title})" if row else name
+
+
+def _range(entry: Mapping[str, Any]) -> str:
+    low, high = entry["range"]
+    if entry["kind"] in ("speed", "voltage"):
+        return ""
+    return f"{math.exp(low):.0f} to {math.exp(high):.0f} rev/min"
+
+
+def text(doc: Mapping[str, Any], details: bool = False) -> str:
+    """Lines of a comparison.
+
+    Parameters
+    ----------
+    doc : mapping
+        ``bemt.comparison/1``.
+    details : bool
+        With the ranking, the sub-systems and all notes.
+
+    Returns
+    -------
+    str
+        For a terminal.
+    """
+    lines = [f"verdict: {doc['verdict']}" + (f" {', '.join(doc['effects'])}" if doc["effects"] else "")]
+    lines += _said(doc)
+    rows = []
+    for channel, r in doc["ratios"].items():
+        raw = r["ratio"] * r["density_ratio"]
+        slope = "-"
+        if "slope" in r and r["kind"] not in ("speed", "voltage"):
+            slope = f"{r['slope']:+.1%} +- {r['slope_error']:.1%}"
+        more = [slope, f"{r['scatter']:.1%}", "{}, {}".format(*r["points"])]
+        rows.append([_WORD.get(channel, channel), f"{raw:.4f}", *_ends(r, r["density_ratio"]), *more])
+        if abs(r["density_ratio"] - 1.0) > 1e-6:
+            coefficient = "CT" if channel == "thrust_N" else "CP"
+            rows.append([f"  {coefficient} (density taken out)", f"{r['ratio']:.4f}", *_ends(r), "", "", ""])
+    header = ["B over A", "ratio", "68 %", "95 %", "change per doubling of n", "scatter", "points"]
+    lines += ["", text_table(header, rows, left=(0,), indent="  ")]
+    if details:
+        lines += _tables(doc)
+    lines += [f"  assumed: {a}" for a in doc["assumed"]]
+    notes = doc["notes"] if details else [n for n in doc["notes"] if not n.startswith(("A: ", "B: "))][:_NOTES]
+    lines += [f"  note: {n}" for n in notes]
+    return "\n".join(lines)
+
+
+def _ends(r: Mapping[str, Any], factor: float = 1.0) -> list[str]:
+    return [f"{r[f'low{p}'] * factor:.4f} to {r[f'high{p}'] * factor:.4f}" for p in (68, 95)]
+
+
+def _said(doc: Mapping[str, Any]) -> list[str]:
+    words = []
+    for channel, r in doc["ratios"].items():
+        if r["kind"] in ("thrust", "torque"):
+            f = r["density_ratio"]
+            ends = f"{_share(r['low95'] * f)} to {_share(r['high95'] * f)}"
+            words.append(f"{_WORD[channel]} {_share(r['ratio'] * f)} ({ends})")
+    first = next((r for r in doc["ratios"].values() if r["kind"] in ("thrust", "torque")), None)
+    out = []
+    if first is not None:
+        where = "carried over to one speed" if first["extrapolated"] else _range(first)
+        out.append(f"B against A at equal speed, {where}: {', '.join(words)}; 95 % in brackets.")
+        grows = [_WORD[c] for c, r in doc["ratios"].items() if r["kind"] in ("thrust", "torque") and r["depends_on"]]
+        if grows:
+            out.append(f"The ratio of {' and '.join(grows)} changes with speed or advance.")
+    density = doc["density"]["ratio"]
+    if density and abs(density - 1.0) > 0.003:
+        ends = f"{doc['density']['A']:.4g} to {doc['density']['B']:.4g} kg/m3"
+        out.append(f"Recorded density: {ends} ({density - 1:+.1%}).")
+    out.append(_verdict(doc))
+    drive = (doc.get("subsystems") or {}).get("drive")
+    if drive and drive["effects"] and drive["effects"] != doc["effects"]:
+        out.append(f"Drive: {drive['verdict']}: {', '.join(_title(k) for k in drive['effects'])}.")
+    elif drive and doc["verdict"] != "none" and drive["verdict"] == "none":
+        out.append("Drive: nothing beyond scatter.")
+    step = doc.get("next_measurement") or {}
+    if step.get("text"):
+        out.append(f"Next: {step['text']}.")
+    out = [textwrap.fill(line, 110, initial_indent="  ", subsequent_indent="    ") for line in out]
+    if step.get("command"):
+        out.append(f"    {step['command']}")
+    return out
+
+
+def _verdict(doc: Mapping[str, Any]) -> str:
+    names = [_title(k) for k in doc["effects"]]
+    p = doc.get("probability")
+    sure = f" ({p:.2f})" if p else ""
+    if "diagnosis" in doc:
+        told = " ".join(str(doc["diagnosis"].get("explanation", "")).split())
+        return f"The case {doc['case']} with A as reference: {told}"
+    if doc["verdict"] == "none":
+        return f"Nothing changed: {doc['rule']}."
+    if doc["verdict"] in ("named", "sensor"):
+        row = law(doc["effects"][0])
+        lead = "The stand" if doc["verdict"] == "sensor" else "What changed"
+        return f"{lead}: {names[0]}{sure}. {doc['rule'][:1].upper()}{doc['rule'][1:]}." + (
+            f" Sign: {row.says}." if row else ""
+        )
+    if doc["verdict"] == "class":
+        return f"One of these, which scale alike here{sure}: {', '.join(names)}."
+    if doc["verdict"] == "unknown":
+        return f"Something else: {doc['rule']}."
+    first = [r["effect"] for r in doc["ranking"] if r["effect"] not in ("none", "unknown")][:4]
+    return f"There is a change, but {doc['rule']}" + (f": {', '.join(first)} ..." if first else "") + "."
+
+
+def _tables(doc: Mapping[str, Any]) -> list[str]:
+    out = []
+    parts = {"": {"ranking": doc["ranking"]}} if "diagnosis" in doc else doc["subsystems"]
+    for name, part in parts.items():
+        rows = [
+            [
+                r["effect"],
+                f"{r['probability']:.3f}",
+                ", ".join(
+                    f"{k} {v['value']:.4g}"
+                    for k, v in r["parameters"].items()
+                    if isinstance(v.get("value"), (int, float))
+                ),
+            ]
+            for r in part["ranking"][:_ROWS]
+        ]
+        if rows:
+            out += ["", text_table([name or "explanation", "probability", "size"], rows, left=(0, 2), indent="  ")]
+    return out

@@ -1,0 +1,493 @@
+"""Two recordings of one stand, channel by channel at equal speed: a smooth fit and what it leaves between them.
+
+A load divided by its own power of the speed (thrust by n^2, torque by n^2, power by n^3) hardly changes with speed,
+so that its logarithm is a smooth curve g over ln n and advance ratio. Both recordings follow the same curve; the second
+lies ``d`` above it. All of it is one Gaussian model,
+
+    y = g(x) + [second] d(x) + s(run, x) + e,
+
+with a wide prior for g (linear, plus a Gaussian process), a session term s (level, slow bend and a shift of the zero
+of every run), and scatter e of a share and a part of full scale, which is as large as the readings make likeliest
+(Rasmussen and Williams, Gaussian Processes for Machine Learning, MIT Press 2006, eq. 2.30 and 2.37 to 2.42).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.compare.stand_run import StandRun
+
+__all__ = ["DRIVE", "LOADS", "MatchedChannel", "Prepared", "Scatter", "covariance", "matched", "prepared", "ratio_of"]
+
+Array = NDArray[np.float64]
+
+LOADS = {"thrust": ("thrust_N", "CT"), "torque": ("torque_Nm", "power_W", "CP", "CQ", "electrical_power_W")}
+"""Loads of the rotor: first what a cell reads, then what stands for it; electrical power only at like voltage."""
+DRIVE = {"speed": ("rpm",), "electrical": ("electrical_power_W",), "voltage": ("voltage_V",)}
+"""Drive behind the rotor: speed and voltage at equal command, electrical power at equal speed."""
+_POWER = {"thrust_N": 2.0, "torque_Nm": 2.0, "power_W": 3.0, "electrical_power_W": 3.0}
+_COEFFICIENTS = ("CT", "CP", "CQ")
+
+# Readings below this share of the channel's largest say more of the zero than of the rotor.
+_SMALL = 0.04
+# A motor that has just set off, and a controller that idles, follow no law.
+_STARTED = {"rpm": 0.3, "electrical_power_W": 0.1}
+# A coefficient below this share of its largest is near zero thrust: a ratio means nothing there.
+_NEAR_ZERO = 0.15
+MOST = 60
+"""Points of a recording in the fit; more are averaged with their neighbours in speed. [1]"""
+SESSION = {"thrust": 0.007, "torque": 0.010, "speed": 0.015, "electrical": 0.02, "voltage": 0.02}
+"""Standard deviation of the level of one run where the recordings do not show it, share: two runs differ by 1.4 times
+this. Repeated runs of one stand that were set up anew differ by 1 % in thrust and 1.4 % in torque (runs of the UIUC
+Propeller Database and of J. Majewski's stand, seen here)."""
+# Electrical power for torque: efficiency of a drive that is warm or cold; speed where the voltage is known.
+_BY_POWER, _AT_KNOWN_VOLTAGE = 0.03, 0.01
+_BEND, _ZERO, _STEEP = 0.7, 0.0015, 0.15
+_LENGTH_SPEED, _LENGTH_ADVANCE = 0.5, 0.35
+_SHARES = (0.001, 0.002, 0.004, 0.008, 0.015, 0.03, 0.06, 0.1)
+_FLOORS = (0.0, 0.0007, 0.002, 0.005, 0.012)
+_WIGGLES = (0.0, 0.004, 0.01, 0.02)
+_BENDS = (0.02, 0.1, 0.3, 1.0)
+_FAR, _MARGIN, _LIKE = 3.5, 0.06, 0.1
+_LOCAL = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class MatchedChannel:
+    """One channel of both recordings.
+
+    Parameters
+    ----------
+    name : str
+        thrust, torque, speed, electrical or voltage.
+    channel : str
+        Name of the reading.
+    y : (N,) float
+        Logarithm of the reading over its power of the speed, and over the density where both recordings tell it.
+    x : (N, 2) float
+        ln rpm or the command, and advance ratio or advance per turn [m].
+    second : (N,) bool
+        Whether a point is of B.
+    run : (N,) int
+        Runs, numbered through.
+    floor : (N,) float
+        Largest reading over this one [1].
+    u : (N,) float
+        Stated relative uncertainty [1]; 0: none.
+    log_density : float
+        ln of B's density over A's that was taken out of y.
+    session : float
+        Standard deviation of the level of a run, share.
+    notes : tuple of str
+        What was left out.
+    """
+
+    name: str
+    channel: str
+    y: Array
+    x: Array
+    second: NDArray[np.bool_]
+    run: NDArray[np.intp]
+    floor: Array
+    u: Array
+    log_density: float
+    session: float
+    notes: tuple[str, ...] = ()
+
+    def common(self) -> tuple[float, float]:
+        """Range of the first coordinate that both recordings have; low above high: none."""
+        a, b = self.x[~self.second, 0], self.x[self.second, 0]
+        return max(float(a.min()), float(b.min())), min(float(a.max()), float(b.max()))
+
+    def advance_moves(self) -> bool:
+        """Whether advance ratio differs between points."""
+        return bool(np.ptp(self.x[:, 1]) > 1e-9)
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Of single readings: ``share`` of the reading, ``floor`` of full scale.
+
+    ``wiggle`` is what neighbours in speed share within a run, ``bend`` the size of the bends of the common curve.
+    """
+
+    share: float
+    floor: float
+    wiggle: float
+    bend: float
+
+
+def _like_voltage(a: StandRun, b: StandRun) -> bool:
+    """Whether motor and controller work at like voltages, so that electrical power may stand for torque."""
+    v = [np.nanmedian(r.values["voltage_V"]) if "voltage_V" in r.values else math.nan for r in (a, b)]
+    return bool(abs(math.log(v[1] / v[0])) < _LIKE) if all(x > 0.0 for x in v) else False
+
+
+def _advance(run: StandRun, diameter: float) -> Array:
+    """V/(n D), or V/n [m] without a diameter; zero where no airspeed was recorded."""
+    n = len(run)
+    if "J" in run.values:
+        return np.nan_to_num(run.values["J"])
+    V = np.nan_to_num(run.values.get("airspeed_m_s", np.zeros(n)))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        turn = V / (run.values["rpm"] / 60.0)
+    return np.nan_to_num(turn / (diameter if math.isfinite(diameter) else 1.0))
+
+
+def _readings(run: StandRun, name: str, channel: str, diameter: float) -> dict[str, Array] | None:
+    """Points of one channel in one recording."""
+    v = run.values.get(channel)
+    if v is None or np.isfinite(v).sum() < 2:
+        return None
+    rpm = run.values.get("rpm")
+    over_command = name in ("speed", "voltage")
+    if over_command and "command" not in run.values:
+        return None
+    if rpm is None and (name not in LOADS or channel not in _COEFFICIENTS):
+        return None
+    speed = rpm if rpm is not None else np.ones(len(run))
+    first = run.values["command"] if over_command else np.log(np.where(speed > 0.0, speed, np.nan))
+    sign = float(np.sign(np.nansum(v)))
+    size = np.where(v * sign > 0.0, v * sign, np.nan)
+    top = float(np.nanmax(size)) if np.isfinite(size).any() else math.nan
+    scaled = size / speed ** _POWER.get(channel, 0.0)
+    good = np.isfinite(scaled) & np.isfinite(first) & (size > _STARTED.get(channel, _SMALL) * top) & (speed > 0.0)
+    if name in LOADS:
+        level = np.nanpercentile(np.where(good, scaled, np.nan), 90) if good.any() else math.nan
+        good &= scaled > _NEAR_ZERO * level
+    if good.sum() < 2:
+        return None
+    stated = run.u.get(channel, np.full(len(run), np.nan)) / size
+    return {
+        "y": np.log(scaled[good]),
+        "x": np.column_stack([first, _advance(run, diameter) if not over_command else np.zeros(len(run))])[good],
+        "floor": top / size[good],
+        "u": np.nan_to_num(stated[good]),
+        "sign": np.full(int(good.sum()), sign),
+        "run": run.values.get("run", np.zeros(len(run)))[good],
+        "lost": np.full(int(good.sum()), float((~good).sum())),
+    }
+
+
+def _averaged(part: dict[str, Array]) -> dict[str, Array]:
+    """Fewer points where there are many: means of neighbours in speed within a run."""
+    n = part["y"].size
+    if n <= MOST:
+        return part
+    order = np.lexsort((part["x"][:, 0], np.round(part["x"][:, 1], 2), part["run"]))
+    block = np.empty(n, dtype=np.intp)
+    block[order] = np.arange(n) * MOST // n
+    starts = np.r_[True, np.diff(part["run"][order]) != 0]
+    block[order] += np.cumsum(starts)
+    _, block = np.unique(block, return_inverse=True)
+    count = np.bincount(block)
+
+    def mean(v: Array) -> Array:
+        return np.asarray(np.bincount(block, v) / count)
+
+    out = {k: mean(v) for k, v in part.items() if v.ndim == 1}
+    return {**out, "x": np.column_stack([mean(part["x"][:, k]) for k in (0, 1)])}
+
+
+def matched(a: StandRun, b: StandRun, name: str, diameter: float = math.nan) -> MatchedChannel | None:
+    """Bring one channel of two recordings together.
+
+    Parameters
+    ----------
+    a, b : StandRun
+        Recordings.
+    name : str
+        Of :data:`LOADS` or :data:`DRIVE`.
+    diameter : float
+        For the advance ratio [m]; NaN: advance per turn is used instead.
+
+    Returns
+    -------
+    MatchedChannel or None
+        None when one of them lacks the channel, or both have a command of another kind.
+    """
+    choices = {**LOADS, **DRIVE}[name]
+    if name in ("speed", "voltage") and (a.command != b.command or not a.command):
+        return None
+    for channel in choices:
+        if name in LOADS and channel == "electrical_power_W" and not _like_voltage(a, b):
+            continue
+        one, two = _readings(a, name, channel, diameter), _readings(b, name, channel, diameter)
+        if one is not None and two is not None:
+            break
+    else:
+        return None
+    notes = []
+    if one["sign"][0] != two["sign"][0]:
+        notes.append(f"{channel}: the sign turned between A and B; sizes are compared")
+    parts = [_averaged(one), _averaged(two)]
+    for part, run in zip(parts, (a, b), strict=True):
+        if part["lost"][0] > 0.5 * len(run):
+            notes.append(f"{channel}: {part['lost'][0]:.0f} of {len(run)} points of {run.name} are near zero")
+    log_density = 0.0
+    if name in LOADS and channel not in _COEFFICIENTS and math.isfinite(a.density) and math.isfinite(b.density):
+        log_density = math.log(b.density / a.density)
+    shift = [0.0, log_density]
+    codes = [np.unique(p["run"], return_inverse=True)[1] for p in parts]
+    codes[1] = codes[1] + codes[0].max() + 1
+    seen = [r.session.get(channel, 0.0) for r in (a, b)]
+    return MatchedChannel(
+        name,
+        channel,
+        np.concatenate([p["y"] - s for p, s in zip(parts, shift, strict=True)]),
+        np.concatenate([p["x"] for p in parts]),
+        np.repeat([False, True], [p["y"].size for p in parts]),
+        np.concatenate(codes),
+        np.concatenate([p["floor"] for p in parts]),
+        np.concatenate([p["u"] for p in parts]),
+        log_density,
+        max(_set_up(name, channel, a, b), *seen),
+        tuple(notes),
+    )
+
+
+def _set_up(name: str, channel: str, a: StandRun, b: StandRun) -> float:
+    """Standard deviation of the level of one run where the recordings do not show it."""
+    if name in LOADS and channel == "electrical_power_W":
+        return _BY_POWER
+    if name == "speed" and all("voltage_V" in r.values for r in (a, b)):
+        return _AT_KNOWN_VOLTAGE
+    return SESSION[name]
+
+
+def _lengths(c: MatchedChannel) -> Array:
+    """Length scales of the curve, in the coordinates of the channel."""
+    first = _LENGTH_SPEED if c.name not in ("speed", "voltage") else 0.4 * max(float(np.ptp(c.x[:, 0])), 1e-12)
+    return np.array([first, _LENGTH_ADVANCE * max(float(np.ptp(c.x[:, 1])), 1e-9)])
+
+
+def unit_coordinates(c: MatchedChannel) -> Array:
+    """First and second coordinate from their means, in length scales, (N, 2)."""
+    return np.asarray((c.x - c.x.mean(axis=0)) / _lengths(c))
+
+
+def smooth_kernel(c: MatchedChannel, shorter: float = 1.0) -> Array:
+    """Squared-exponential kernel of unit variance over the coordinates, (N, N)."""
+    z = unit_coordinates(c) * shorter
+    return np.asarray(np.exp(-0.5 * ((z[:, None, :] - z[None, :, :]) ** 2).sum(axis=2)))
+
+
+def covariance(c: MatchedChannel, s: Scatter) -> Array:
+    """Covariance of y where nothing was changed: curve, sessions, zeros, scatter, (N, N)."""
+    z = unit_coordinates(c)
+    K = smooth_kernel(c)
+    same = (c.run[:, None] == c.run[None, :]).astype(float)
+    # a coefficient changes little with speed (Reynolds, Mach), anyhow with advance; the drive changes anyhow
+    steep = _STEEP**2 if c.name in LOADS else 4.0
+    wide = 100.0 + steep * np.outer(z[:, 0], z[:, 0]) + 4.0 * np.outer(z[:, 1], z[:, 1])
+    wide += 4.0 * np.outer(z[:, 1] ** 2, z[:, 1] ** 2)
+    side = (c.second[:, None] == c.second[None, :]).astype(float)
+    # the level is the stand's, set up once per recording; half of its variance goes with the single run
+    level = c.session**2 * (0.7 * side + 0.3 * same + _BEND**2 * same * K)
+    zero = _ZERO**2 * same * np.outer(c.floor, c.floor) if c.name in LOADS else 0.0
+    spread = s.share**2 + (s.floor * c.floor) ** 2 + c.u**2
+    local = s.wiggle**2 * same * smooth_kernel(c, _LOCAL) if s.wiggle else 0.0
+    return np.asarray(wide + s.bend**2 * K + level + zero + local + np.diag(spread))
+
+
+def change_of_any_kind(c: MatchedChannel) -> Array:
+    """Prior covariance of a change d at all points, whichever recording they are of, (N, N)."""
+    z = unit_coordinates(c)
+    line = 0.3**2 + 0.2**2 * np.outer(z[:, 0], z[:, 0]) + 0.2**2 * np.outer(z[:, 1], z[:, 1])
+    return np.asarray(line + 0.1**2 * smooth_kernel(c) + 0.06**2 * smooth_kernel(c, _LOCAL))
+
+
+def free_change(c: MatchedChannel) -> Array:
+    """Covariance of a change of any smooth kind between the recordings, (N, N)."""
+    b = c.second.astype(float)
+    return np.asarray(change_of_any_kind(c) * np.outer(b, b))
+
+
+def log_likelihood(K: Array, y: Array) -> float:
+    """Logarithm of the Gaussian density (Rasmussen and Williams, eq. 2.30)."""
+    from scipy.linalg import cho_solve, cholesky
+
+    L = cholesky(K, lower=True, check_finite=False)
+    alpha = cho_solve((L, True), y, check_finite=False)
+    return float(-0.5 * y @ alpha - np.log(np.diag(L)).sum() - 0.5 * y.size * math.log(2.0 * math.pi))
+
+
+def steady_change(c: MatchedChannel) -> Array:
+    """Covariance of a change by one factor, or nearly so, between the recordings, (N, N)."""
+    z, b = unit_coordinates(c), c.second.astype(float)
+    line = 0.3**2 + 0.03**2 * (np.outer(z[:, 0], z[:, 0]) + np.outer(z[:, 1], z[:, 1]))
+    return np.asarray(line * np.outer(b, b))
+
+
+def scatter_of(c: MatchedChannel, change: Array | None = None) -> tuple[Scatter, float]:
+    """Scatter and bend that make the readings likeliest with such a change, and the logarithm of that likelihood."""
+    change, y = free_change(c) if change is None else change, c.y - c.y.mean()
+    ways = {
+        "share": _SHARES if not c.u.any() else (0.0005, *_SHARES),
+        "bend": _BENDS,
+        "wiggle": _WIGGLES,
+        "floor": _FLOORS if c.name in LOADS else (0.0,),
+    }
+    best, score = Scatter(0.008, 0.0, 0.0, 0.1), -math.inf
+    for _ in range(2):
+        for name, values in ways.items():
+            for value in values:
+                tried = replace(best, **{name: value})
+                z = log_likelihood(covariance(c, tried) + change, y)
+                if z > score:
+                    best, score = tried, z
+    return best, score
+
+
+def without_strays(c: MatchedChannel) -> tuple[MatchedChannel, int]:
+    """Leave out readings that all others contradict (left-one-out, Rasmussen and Williams, eq. 5.12)."""
+    n = 0
+    for _ in range(3):
+        s, _ = scatter_of(c)
+        y = c.y - c.y.mean()
+        inverse = np.linalg.inv(covariance(c, s) + free_change(c))
+        z = (inverse @ y) / np.sqrt(np.diag(inverse))
+        worst = np.abs(z) > _FAR
+        if not worst.any() or worst.sum() > max(1, 0.1 * y.size) or y.size - worst.sum() < 6:
+            break
+        n += int(worst.sum())
+        keep = ~worst
+        if min(keep[c.second].sum(), keep[~c.second].sum()) < 2:
+            break
+        c = taken(c, keep)
+    return c, n
+
+
+def taken(c: MatchedChannel, keep: NDArray[np.bool_]) -> MatchedChannel:
+    """Some of the points."""
+    return replace(
+        c, y=c.y[keep], x=c.x[keep], second=c.second[keep], run=c.run[keep], floor=c.floor[keep], u=c.u[keep]
+    )
+
+
+def ratio_of(c: MatchedChannel, s: Scatter) -> dict[str, Any]:
+    """Ratio of B to A at equal speed.
+
+    Parameters
+    ----------
+    c : MatchedChannel
+        Channel.
+    s : Scatter
+        Of :func:`scatter_of`.
+
+    Returns
+    -------
+    dict
+        ``ratio``, ``low68`` ... ``high95`` over the common range, ``curve`` (coordinate, ratio, low95, high95),
+        ``slope`` per doubling of the speed (or over the range of the command), its error, ``advance_slope``;
+        ``extrapolated`` where the ranges do not overlap.
+    """
+    from scipy.linalg import cho_factor, cho_solve
+
+    free, y = free_change(c), c.y - c.y.mean()
+    C = covariance(c, s) + free
+    factor = cho_factor(C, lower=True)
+    low, high = c.common()
+    apart = low > high
+    if apart:
+        low, high = high, low
+    inside = (c.x[:, 0] >= low - 0.01) & (c.x[:, 0] <= high + 0.01)
+    at = np.flatnonzero(inside) if inside.any() else np.arange(y.size)
+    b = c.second.astype(float)
+    shape = change_of_any_kind(c)
+    cross = shape[at] * b[None, :]
+    d = cross @ cho_solve(factor, y)
+    cov = shape[np.ix_(at, at)] - cross @ cho_solve(factor, cross.T)
+    n = at.size
+    weight = np.full(n, 1.0 / n)
+    mean, sd = float(weight @ d), math.sqrt(max(float(weight @ cov @ weight), 0.0))
+    out: dict[str, Any] = {"ratio": math.exp(mean)}
+    for name, q in (("68", 1.0), ("95", 1.96)):
+        out[f"low{name}"], out[f"high{name}"] = math.exp(mean - q * sd), math.exp(mean + q * sd)
+    out |= _slopes(c, at, d, cov)
+    order = at[np.argsort(c.x[at, 0])]
+    back = {int(i): k for k, i in enumerate(at)}
+    keep = order[np.unique(np.linspace(0, n - 1, min(n, 25)).round().astype(int))]
+    e = np.sqrt(np.maximum(np.diag(cov), 0.0))
+    rows = [back[int(i)] for i in keep]
+    ends = [np.exp(d[rows] + q * e[rows]) for q in (0.0, -1.96, 1.96)]
+    out["curve"] = np.column_stack([c.x[keep], *ends]).tolist()
+    out["extrapolated"] = bool(apart)
+    out["range"] = [low, high]
+    out["scatter"] = s.share
+    out["points"] = [int((~c.second).sum()), int(c.second.sum())]
+    return out
+
+
+def _slopes(c: MatchedChannel, at: NDArray[np.intp], d: Array, cov: Array) -> dict[str, float]:
+    """Least-squares slopes of d over ln n (per doubling) or the command, and over advance, with their errors."""
+    out: dict[str, float] = {}
+    names = ("slope", "advance_slope")
+    unit = (
+        math.log(2.0) if c.name not in ("speed", "voltage") else max(float(np.ptp(c.x[at, 0])), 1e-12),
+        max(float(np.ptp(c.x[at, 1])), 1e-12),
+    )
+    columns = [k for k in (0, 1) if np.ptp(c.x[at, k]) > 1e-6]
+    X = np.column_stack([np.ones(at.size), *((c.x[at, k] - c.x[at, k].mean()) / unit[k] for k in columns)])
+    back = np.linalg.pinv(X)
+    for j, k in enumerate(columns, 1):
+        out[names[k]] = float(back[j] @ d)
+        out[f"{names[k]}_error"] = math.sqrt(max(float(back[j] @ cov @ back[j]), 0.0))
+    return out
+
+
+def in_common(c: MatchedChannel) -> MatchedChannel:
+    """Points where both recordings were, with a margin; all where they have no range in common."""
+    low, high = c.common()
+    margin = _MARGIN if c.name not in ("speed", "voltage") else _MARGIN * float(np.ptp(c.x[:, 0]))
+    keep = (c.x[:, 0] >= low - margin) & (c.x[:, 0] <= high + margin)
+    enough = min(keep[c.second].sum(), keep[~c.second].sum()) >= 2
+    return taken(c, keep) if low <= high and enough else c
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """Channels of one kind that both recordings have.
+
+    Parameters
+    ----------
+    channels : mapping of str to MatchedChannel
+        By name.
+    free, steady : mapping of str to Scatter
+        Likeliest scatter if anything smooth, or one factor, changed between the recordings.
+    likelier : mapping of str to Scatter
+        The better of the two.
+    strays : mapping of str to int
+        Readings that were left out.
+    """
+
+    channels: Mapping[str, MatchedChannel]
+    free: Mapping[str, Scatter]
+    steady: Mapping[str, Scatter]
+    likelier: Mapping[str, Scatter]
+    strays: Mapping[str, int]
+
+
+def prepared(a: StandRun, b: StandRun, names: Sequence[str], diameter: float) -> Prepared:
+    """Match channels, and find their scatter."""
+    channels: dict[str, MatchedChannel] = {}
+    free: dict[str, Scatter] = {}
+    steady: dict[str, Scatter] = {}
+    likelier: dict[str, Scatter] = {}
+    strays: dict[str, int] = {}
+    for name in names:
+        found = matched(a, b, name, diameter)
+        if found is not None:
+            channels[name], n = without_strays(in_common(found))
+            free[name], loose = scatter_of(channels[name])
+            steady[name], stiff = scatter_of(channels[name], steady_change(channels[name]))
+            likelier[name] = free[name] if loose > stiff else steady[name]
+            if n:
+                strays[name] = n
+    return Prepared(channels, free, steady, likelier, strays)

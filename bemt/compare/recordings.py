@@ -1,0 +1,287 @@
+"""What changed between two recordings of one stand: ratios at equal speed, and the causes that scale like that.
+
+No case and no blade is needed. What is not recorded is assumed to be equal in both, and said.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from bemt.base.errors import Fault, InputError
+from bemt.compare import matched as fits
+from bemt.compare.matched import MatchedChannel, Scatter
+from bemt.compare.scaling import Judgement, judge, law, weigh
+from bemt.compare.stand_run import StandRun
+
+__all__ = ["SCHEMA", "Change", "changed", "document"]
+
+SCHEMA = "bemt.comparison/1"
+_TOLD_DENSITY = 0.012
+_NO_TALK = Judgement("insufficient", (), {}, {}, "not recorded in both")
+_MOVED, _WIDE = 2.5, 1.4
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """Outcome of a comparison of two recordings.
+
+    Parameters
+    ----------
+    a, b : StandRun
+        Recordings.
+    diameter_m : float
+        Of the rotor [m]; NaN: unknown.
+    channels : mapping of str to MatchedChannel
+        What both recorded.
+    ratios : mapping of str to mapping
+        B over A by channel: of :func:`bemt.compare.matched.ratio_of`, and ``density_ratio``.
+    loads, drive : Judgement
+        Verdict on what acts on the rotor, and on motor, controller and battery.
+    assumed : tuple of str
+        What neither recording says.
+    notes : tuple of str
+        What was left out.
+    """
+
+    a: StandRun
+    b: StandRun
+    diameter_m: float
+    channels: Mapping[str, MatchedChannel]
+    ratios: Mapping[str, Mapping[str, Any]]
+    loads: Judgement
+    drive: Judgement
+    assumed: tuple[str, ...] = ()
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def density_ratio(self) -> float:
+        """Recorded density of B over that of A; NaN unless both are known."""
+        return self.b.density / self.a.density
+
+    @property
+    def leading(self) -> Judgement:
+        """Verdict on the loads; that on the drive where the loads agree and the drive does not."""
+        return self.drive if self.loads.verdict == "none" and self.drive.effects else self.loads
+
+
+def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> Change:
+    """Compare two recordings.
+
+    Parameters
+    ----------
+    a, b : StandRun
+        Before and after, or with and without.
+    diameter_m : float
+        Diameter [m]; NaN takes that of the recordings, if they tell.
+
+    Returns
+    -------
+    Change
+        Ratios and verdicts.
+
+    Raises
+    ------
+    InputError
+        When they share no channel.
+    """
+    told = [d for d in (diameter_m, a.diameter_m, b.diameter_m) if math.isfinite(d)]
+    diameter = told[0] if told else math.nan
+    rotor = fits.prepared(a, b, tuple(fits.LOADS), diameter)
+    loads = rotor.channels
+    spoken = {c.channel for c in loads.values()}
+    behind = fits.prepared(a, b, [k for k, names in fits.DRIVE.items() if not spoken & set(names)], diameter)
+    drive = behind.channels
+    if not loads and not drive:
+        got = f"{_told(a)} in A, {_told(b)} in B"
+        raise InputError(
+            Fault(
+                f"{a.name}, {b.name}",
+                "",
+                got,
+                "one load that both recorded, at a speed of rotation",
+                "Name units in the headings, or use a recording.toml",
+            )
+        )
+    known = math.isfinite(a.density) and math.isfinite(b.density)
+    scatter = {**rotor.likelier, **behind.likelier}
+    ratios = {c.channel: _ratio(c, scatter[n]) for n, c in {**loads, **drive}.items()}
+    verdict = _NO_TALK
+    if loads:
+        verdict = judge(*weigh(loads, (rotor.free, rotor.steady), ("air", "stand"), known, _speed_ratio(ratios)))
+        verdict = _far_apart(_with_density(verdict, a, b, loads), ratios)
+    motor = _NO_TALK
+    if drive and verdict.verdict == "none":
+        motor = judge(*weigh(drive, (behind.free, behind.steady), ("drive",)))
+    elif drive:
+        motor = Judgement("insufficient", (), {}, {}, "the load changed or may have, and the drive follows it")
+    return Change(
+        a,
+        b,
+        diameter,
+        {**loads, **drive},
+        ratios,
+        verdict,
+        motor,
+        tuple(_assumed(a, b, diameter, loads)),
+        tuple(_notes(a, b, {**loads, **drive}, {**rotor.strays, **behind.strays})),
+    )
+
+
+def _far_apart(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> Judgement:
+    """No answer where the speeds have nothing in common, unless a ratio of pole pairs explains that very thing."""
+    loads = [r for r in ratios.values() if r["kind"] in fits.LOADS]
+    wide = all(r["extrapolated"] and r["high95"] / r["low95"] > _WIDE for r in loads)
+    if not loads or not wide or said.effects == ("rpm_scale",):
+        return said
+    return Judgement(
+        "insufficient", (), said.probability, said.size, "the two runs have no speed and advance in common"
+    )
+
+
+def _speed_ratio(ratios: Mapping[str, Mapping[str, Any]]) -> float:
+    """Speed of B over A at equal command; NaN: no command."""
+    return float(next((r["ratio"] for r in ratios.values() if r["kind"] == "speed"), math.nan))
+
+
+def _told(run: StandRun) -> str:
+    return ", ".join(k for k in run.values if k not in ("run", "command")) or "nothing"
+
+
+def _ratio(c: MatchedChannel, s: Scatter) -> dict[str, Any]:
+    out = dict(fits.ratio_of(c, s))
+    out["kind"] = c.name
+    out["density_ratio"] = math.exp(c.log_density)
+    moved = abs(float(out.get("slope", 0.0))) / max(float(out.get("slope_error", math.inf)), 1e-9)
+    along = abs(float(out.get("advance_slope", 0.0))) / max(float(out.get("advance_slope_error", math.inf)), 1e-9)
+    out["depends_on"] = [n for n, z in (("speed", moved), ("advance", along)) if z > _MOVED]
+    return out
+
+
+def _with_density(said: Judgement, a: StandRun, b: StandRun, loads: Mapping[str, MatchedChannel]) -> Judgement:
+    """The recorded densities as the cause, where nothing else is left."""
+    size = max((abs(c.log_density) for c in loads.values()), default=0.0)
+    if said.verdict != "none" or size < _TOLD_DENSITY:
+        return said
+    why = f"density as recorded, {a.density:.4g} to {b.density:.4g} kg/m3; the coefficients agree"
+    probability = {
+        "air_density": said.probability["none"],
+        **{k: p for k, p in said.probability.items() if k not in ("none", "air_density")},
+    }
+    sizes = {"air_density": (math.log(b.density / a.density), 0.0)}
+    return Judgement("named", ("air_density",), probability, sizes, why)
+
+
+def _assumed(a: StandRun, b: StandRun, diameter: float, loads: Mapping[str, MatchedChannel]) -> list[str]:
+    out = []
+    unknown = [n for n, r in (("A", a), ("B", b)) if not math.isfinite(r.density)]
+    if unknown and any(c.channel in ("thrust_N", "torque_Nm", "power_W") for c in loads.values()):
+        out.append(f"air density is not recorded in {' and '.join(unknown)}: taken as equal")
+    still = [n for n, r in (("A", a), ("B", b)) if not {"airspeed_m_s", "J"} & r.values.keys()]
+    if still:
+        out.append(f"airspeed is not recorded in {' and '.join(still)}: taken as still air")
+    if "torque" not in loads and "thrust" in loads:
+        out.append("torque is not recorded in both: gain, air and blade scale alike in thrust alone")
+    if "torque" in loads and loads["torque"].channel == "electrical_power_W":
+        out.append("torque is not recorded: electrical power stands for it, with one motor and controller in both")
+    if not math.isfinite(diameter) and any(c.advance_moves() for c in loads.values()):
+        out.append("no diameter: compared at equal advance per turn, V/n; --label 10x5 gives J")
+    return out
+
+
+def _notes(a: StandRun, b: StandRun, channels: Mapping[str, MatchedChannel], strays: Mapping[str, int]) -> list[str]:
+    out = [note for c in channels.values() for note in c.notes]
+    out += [
+        f"{n} reading{'s' if n > 1 else ''} of {channels[k].channel} far from all others left out"
+        for k, n in strays.items()
+    ]
+    for c in channels.values():
+        low, high = c.common()
+        if low > high and c.name in fits.LOADS:
+            gap = math.exp(low - high) - 1.0
+            out.append(f"{c.channel}: no speed that both have, {gap:.0%} apart; carried over by the law of the speed")
+    if a.command and b.command and a.command != b.command:
+        out.append(f"commands differ in kind ({a.command}, {b.command}): the drive is not compared")
+    return list(dict.fromkeys([*out, *(f"A: {n}" for n in a.notes), *(f"B: {n}" for n in b.notes)]))
+
+
+def next_step(change: Change, case: bool, files: Sequence[str]) -> dict[str, str]:
+    """Run or reading that would settle the answer, and the command to give then."""
+    said = change.leading
+    torque = "torque" in {c.name for c in change.channels.values()}
+    rows = [row for k in said.effects[:3] if (row := law(k)) is not None]
+    command = "python -m bemt compare " + " ".join(files) + ("" if case else " --case CASE")
+    if said.verdict == "none":
+        return {"text": "to see smaller changes, repeat each run once after taking the propeller off", "command": ""}
+    if said.verdict in ("named", "sensor"):
+        text = rows[0].settles if rows else "read the label of the channel"
+        return {"text": f"to be sure, {text}", "command": "" if case else command}
+    if not torque and change.loads is said:
+        text = "record torque in both runs: in thrust alone gain, air and blade look alike"
+    elif rows:
+        text = "; or ".join(row.settles for row in rows)
+    else:
+        text = "repeat the run of A and compare it with A: what they differ by is no cause"
+    return {"text": text, "command": command if not case else f"python -m bemt compare {files[0]} REPEAT_OF_A"}
+
+
+def document(change: Change) -> dict[str, Any]:
+    """The document ``bemt.comparison/1`` without a case.
+
+    Parameters
+    ----------
+    change : Change
+        Outcome.
+
+    Returns
+    -------
+    dict
+        ``verdict``, ``effects``, ``probability``, ``ranking`` as in a diagnosis; ``subsystems`` (air and stand in one:
+        loads, and drive); ``ratios`` per channel; ``assumed``, ``notes``.
+    """
+    said = change.leading
+    return {
+        "schema": SCHEMA,
+        "verdict": said.verdict,
+        "effects": list(said.effects),
+        "probability": sum(said.probability.get(k, 0.0) for k in said.effects) or said.probability.get(said.verdict),
+        "rule": said.why,
+        "ranking": _ranking(said),
+        "subsystems": {
+            name: {"verdict": j.verdict, "effects": list(j.effects), "rule": j.why, "ranking": _ranking(j)}
+            for name, j in (("loads", change.loads), ("drive", change.drive))
+        },
+        "ratios": {k: dict(v) for k, v in change.ratios.items()},
+        "density": {
+            "A": _finite(change.a.density),
+            "B": _finite(change.b.density),
+            "ratio": _finite(change.density_ratio),
+        },
+        "diameter_m": _finite(change.diameter_m),
+        "points": {"A": len(change.a), "B": len(change.b)},
+        "assumed": list(change.assumed),
+        "notes": list(change.notes),
+    }
+
+
+def _finite(x: float) -> float | None:
+    return float(x) if math.isfinite(x) else None
+
+
+def _ranking(said: Judgement) -> list[dict[str, Any]]:
+    out = []
+    for name, p in list(said.probability.items())[:12]:
+        parameters = {}
+        if name in said.size and p > 1e-3:
+            value, error = said.size[name]
+            unit = "of full scale" if name.endswith("_zero") or name == "nacelle" else "1"
+            ends = [value + k * 1.645 * error for k in (-1.0, 1.0)]
+            if unit == "1":
+                value, ends = math.exp(value), [math.exp(e) for e in ends]
+            parameters = {
+                "ratio" if unit == "1" else "share": {"value": value, "low": ends[0], "high": ends[1], "unit": unit}
+            }
+        out.append({"effect": name, "probability": p, "parameters": parameters})
+    return out

@@ -1,0 +1,605 @@
+"""Which change can make the ratios of two recordings, without any blade: how loads scale, weighed by their evidence.
+
+Every row of :data:`LAWS` says how thrust, torque or the drive move together and with what they grow. A row is a linear
+Gaussian model on top of :func:`bemt.compare.matched.covariance`, so its evidence has a closed form (Rasmussen and
+Williams 2006, eq. 2.30 and 2.40 to 2.43). Two rivals always compete: nothing, and a smooth change of every channel on
+its own. What a blade would do in detail is not known here; with a case, :mod:`bemt.diagnose.contrast` asks the solver.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.compare import matched as fits
+from bemt.compare.matched import MatchedChannel, Scatter
+
+__all__ = ["LAWS", "NONE", "UNKNOWN", "Judgement", "ScalingLaw", "judge", "weigh"]
+
+Array = NDArray[np.float64]
+
+NONE, UNKNOWN = "none", "unknown"
+_PRIOR = {NONE: 0.5, UNKNOWN: 0.1}
+_SIZES = (0.02, 0.07, 0.25)
+_ZEROS = (0.004, 0.015, 0.05)
+_UNKNOWN_SIZES = (0.1, 0.35, 1.0)
+SURE = 0.85
+"""Probability from which one effect is named."""
+FORM = {0.15: 0.7, 0.45: 0.3}
+"""What a change by air or blade may rise or bow with speed or advance, share of the change, with its prior weight: the
+sizes by which published laws of one effect differ (:mod:`bemt.diagnose.form`)."""
+_EXACT = {1.0: 1.0}
+NEAR, MOST = 20.0, 6
+"""An effect this many times less likely than the leading one is still in its class, which has at most so many members:
+a law is rougher than its evidence."""
+RIVAL, DOUBT = 0.1, 0.3
+"""An effect beside which the unknown keeps more than the first is not named; a class beside the second is not given."""
+# Recorded densities are this good: a barometer, a thermometer and nobody's humidity, share.
+_DENSITY = 0.004
+# Speed at equal command of one motor, in ln: battery and load change it by no more.
+_SAME_DRIVE = 0.25
+
+Basis = Mapping[str, float]
+Term = tuple[float, Mapping[str, Basis]]
+
+
+@dataclass(frozen=True)
+class ScalingLaw:
+    """How one cause moves the channels.
+
+    Parameters
+    ----------
+    id : str
+        Of the effect, as in the catalogue of effects where it is there.
+    title : str
+        In words.
+    terms : tuple of (float, mapping)
+        Size relative to the first term, and channel to basis to weight. Bases: ``all`` 1; ``zero`` full scale over
+        reading; ``still`` 1 at rest, fading to 0 at the largest advance; ``slope`` the channel's own derivative with
+        respect to ln J; ``slip`` that over V; ``drag`` V^2 over thrust; ``n2`` square of the speed; ``volts`` ln of
+        the voltage ratio at equal command, or 1 where it is not recorded.
+    sizes : tuple of float
+        Standard deviations of the first term, share; they share the prior.
+    says : str
+        Why this cause, in a sentence.
+    settles : str
+        Measurement that tells it from others.
+    source : str
+        Of the scaling.
+    kind : str
+        air, stand or drive.
+    flow : bool
+        Only with airspeed.
+    exact : bool
+        Whether nothing but the law is moved, as by instruments.
+    """
+
+    id: str
+    title: str
+    terms: tuple[Term, ...]
+    says: str
+    settles: str
+    source: str
+    kind: str = "air"
+    sizes: tuple[float, ...] = _SIZES
+    flow: bool = False
+    exact: bool = False
+
+
+_T, _Q = "thrust", "torque"
+LAWS: tuple[ScalingLaw, ...] = (
+    ScalingLaw(
+        "air_density",
+        "density of the air",
+        ((1.0, {_T: {"all": 1.0}, _Q: {"all": 1.0}}),),
+        "thrust and torque change by the same share at every speed",
+        "read barometer and thermometer in both runs",
+        "T = CT rho n^2 D^4, Q = CQ rho n^2 D^5",
+        exact=True,
+    ),
+    ScalingLaw(
+        "rpm_scale",
+        "speed of rotation other than indicated",
+        ((1.0, {_T: {"all": 2.0, "slope": -1.0}, _Q: {"all": 2.0, "slope": -1.0}}),),
+        "thrust and torque change by the same square, whatever the speed",
+        "check the speed with an optical tachometer",
+        "T and Q go with n^2 at fixed CT, CQ; J with 1/n",
+        "stand",
+        (0.01, 0.04),
+    ),
+    ScalingLaw(
+        "diameter",
+        "another diameter, or a cut tip",
+        (
+            (1.0, {_T: {"all": 4.0, "slope": -1.0}, _Q: {"all": 5.0, "slope": -1.0}}),
+            (0.5, {_T: {"all": 1.0}}),
+            (0.5, {_Q: {"all": 1.0}}),
+        ),
+        "torque changes a little more than thrust, both at every speed",
+        "measure the diameter",
+        "T ~ D^4, Q ~ D^5 at fixed CT, CQ; the shape of another blade adds some per cent",
+        sizes=(0.01, 0.03, 0.1),
+    ),
+    ScalingLaw(
+        "pitch_offset",
+        "another pitch or blade angle",
+        (
+            (1.0, {_T: {"all": 1.0, "slope": -1.0}, _Q: {"all": 1.5, "slope": -1.0}}),
+            (0.4, {_Q: {"all": 1.0}}),
+            (0.15, {_T: {"slope": 1.0}, _Q: {"slope": 1.0}}),
+        ),
+        "torque changes more than thrust, at every speed, and the advance ratio of zero thrust moves",
+        "measure the blade angle; record a run with airspeed",
+        "momentum theory: P ~ T^1.5 at equal figure of merit",
+        sizes=(*_SIZES, 0.5),
+    ),
+    ScalingLaw(
+        "section",
+        "another blade section or surface",
+        ((1.0, {_T: {"all": 0.5}}), (1.0, {_Q: {"all": 1.0}})),
+        "torque and thrust change by constant shares of their own",
+        "compare the blades by weight and shape",
+        "lift and drag of the section move CT and CP apart",
+    ),
+    ScalingLaw(
+        "propeller",
+        "another propeller",
+        (
+            (1.0, {_T: {"all": 1.0}}),
+            (1.0, {_Q: {"all": 1.0}}),
+            (0.15, {_T: {"n2": 1.0}}),
+            (0.15, {_Q: {"n2": 1.0}}),
+            (0.5, {_T: {"slope": 1.0}, _Q: {"slope": 1.0}}),
+        ),
+        "both loads change by large shares of their own: pitch, blades, chord and section at once",
+        "compare label, blade count and weight",
+        "CT and CP of another blade",
+        sizes=(0.2, 0.6, 1.5),
+    ),
+    ScalingLaw(
+        "untwist",
+        "elastic twist of the blades",
+        ((1.0, {_T: {"n2": 1.0}, _Q: {"n2": 1.3}}),),
+        "the change grows with the square of the speed",
+        "run a stiffer blade of the same shape",
+        "twist goes with rho Omega^2; P ~ T^1.5",
+        sizes=(0.03, 0.1),
+    ),
+    ScalingLaw(
+        "duct",
+        "a duct, or none",
+        ((1.0, {_T: {"still": 1.0}, _Q: {"still": -0.7}}), (0.7, {_Q: {"still": 1.0}})),
+        "thrust rises at the same speed while torque falls or stays, fading with airspeed",
+        "weigh rotor and duct apart",
+        "momentum theory of the ducted fan: T/T_rotor = 2 sigma at rest",
+    ),
+    ScalingLaw(
+        "ground_effect",
+        "a wall behind or before the propeller",
+        ((1.0, {_T: {"still": 1.0}}), (0.2, {_Q: {"still": 1.0}})),
+        "thrust changes at the same speed while torque stays, fading with airspeed",
+        "measure at twice the distance",
+        "Cheeseman and Bennett, ARC R&M 3021, 1955",
+    ),
+    ScalingLaw(
+        "coaxial_neighbour",
+        "slipstream of another rotor",
+        ((1.0, {_T: {"all": -1.0}, _Q: {"all": -0.3}}), (0.35, {_Q: {"all": 1.0}}), (0.3, {_T: {"n2": 1.0}})),
+        "thrust falls at the same speed and torque far less",
+        "run the rotor alone",
+        "a rotor in a slipstream climbs: thrust falls, power hardly",
+        sizes=(*_SIZES, 0.5),
+    ),
+    ScalingLaw(
+        "recirculation",
+        "slipstream that returns through the room",
+        ((1.0, {_T: {"still": -1.0}, _Q: {"still": -0.2}}), (0.3, {_Q: {"still": 1.0}})),
+        "thrust falls at low advance ratio, torque less",
+        "run in the open, or watch the first seconds of a start",
+        "onset flow lowers the angle of attack as a climb does",
+        sizes=(0.02, 0.07),
+    ),
+    ScalingLaw(
+        "airspeed_offset",
+        "airspeed other than recorded",
+        ((1.0, {_T: {"slip": 1.0}, _Q: {"slip": 1.0}}),),
+        "both loads move as if J were another, most at low airspeed",
+        "use a second pitot tube",
+        "J = V/(n D)",
+        "stand",
+        flow=True,
+    ),
+    ScalingLaw(
+        "airspeed_gain",
+        "airspeed by another factor",
+        ((1.0, {_T: {"slope": 1.0}, _Q: {"slope": 1.0}}),),
+        "both loads move as if J were another by one factor",
+        "use a second pitot tube",
+        "J = V/(n D)",
+        "stand",
+        flow=True,
+    ),
+    ScalingLaw(
+        "nacelle",
+        "drag of what hangs in the stream",
+        ((1.0, {_T: {"drag": 1.0}}),),
+        "thrust changes with V^2, whatever the speed, torque stays",
+        "run the stand without propeller in the stream",
+        "D = q S CD",
+        flow=True,
+        sizes=_ZEROS,
+    ),
+    ScalingLaw(
+        "thrust_gain",
+        "calibration of the thrust cell",
+        ((1.0, {_T: {"all": 1.0}}),),
+        "thrust changes by one factor and torque does not",
+        "hang dead weights on the cell",
+        "T' = g T",
+        "stand",
+    ),
+    ScalingLaw(
+        "torque_gain",
+        "calibration of the torque cell",
+        ((1.0, {_Q: {"all": 1.0}}),),
+        "torque changes by one factor and thrust does not",
+        "hang a known lever and weight",
+        "Q' = g Q",
+        "stand",
+    ),
+    ScalingLaw(
+        "thrust_zero",
+        "zero of the thrust cell",
+        ((1.0, {_T: {"zero": 1.0}}),),
+        "thrust is off by a constant, which falls as 1/n^2",
+        "note the zero before and after the run",
+        "T' = T + z",
+        "stand",
+        _ZEROS,
+    ),
+    ScalingLaw(
+        "torque_zero",
+        "zero of the torque cell",
+        ((1.0, {_Q: {"zero": 1.0}}),),
+        "torque is off by a constant, which falls as 1/n^2",
+        "note the zero before and after the run",
+        "Q' = Q + z",
+        "stand",
+        _ZEROS,
+    ),
+    ScalingLaw(
+        "battery_sag",
+        "supply or battery voltage",
+        ((1.0, {"speed": {"volts": 1.0}}), (0.5, {"electrical": {"volts": 1.0}})),
+        "speed at one command goes with the voltage; loads at the measured speed stay",
+        "log voltage at the controller",
+        "n ~ command x V less I R",
+        "drive",
+        (*_SIZES, 0.8),
+    ),
+    ScalingLaw(
+        "motor_heating",
+        "winding and magnets of the motor get warm",
+        ((1.0, {"speed": {"all": -0.5}, "electrical": {"all": 1.0}}), (0.4, {"electrical": {"all": 1.0}})),
+        "more electrical power for the same speed and load, and less speed at one command",
+        "repeat after a pause",
+        "R = R0 (1 + 0.0039 dT)",
+        "drive",
+        sizes=(0.03, 0.1),
+    ),
+    ScalingLaw(
+        "motor",
+        "another motor, controller or setting",
+        (
+            (1.0, {"speed": {"all": 1.0}}),
+            (1.0, {"electrical": {"all": 1.0}}),
+            (0.5, {"speed": {"ramp": 1.0}}),
+            (0.5, {"electrical": {"ramp": 1.0}}),
+        ),
+        "speed at one command and electrical power change, loads at the measured speed stay",
+        "compare motor, controller and its settings",
+        "shares of their own",
+        "drive",
+    ),
+)
+"""Causes that are weighed without a blade."""
+
+
+@dataclass(frozen=True, eq=False)
+class Judgement:
+    """What is said of one sub-system.
+
+    Parameters
+    ----------
+    verdict : str
+        none, named, sensor, class, unknown or insufficient.
+    effects : tuple of str
+        Of the verdict.
+    probability : mapping of str to float
+        Of every explanation, the likeliest first.
+    size : mapping of str to (value, error)
+        Of the first term of each effect: ln ratio, or share of full scale.
+    why : str
+        The rule that decided.
+    """
+
+    verdict: str
+    effects: tuple[str, ...]
+    probability: Mapping[str, float]
+    size: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    why: str = ""
+
+
+def law(name: str) -> ScalingLaw | None:
+    """Row of an effect; None for unit slips and rivals."""
+    return next((row for row in LAWS if row.id == name), None)
+
+
+def _bases(c: MatchedChannel, volts: float | Array = 1.0) -> dict[str, Array]:
+    """Columns that a law may use, for the points of B."""
+    b = c.second.astype(float)
+    advance = c.x[:, 1]
+    top = float(np.max(np.abs(advance)))
+    J = advance / top if top > 0.0 else advance
+    slope = np.zeros(b.size)
+    if c.advance_moves():
+        X = np.column_stack([np.ones(b.size), b, J, J**2])  # at one airspeed J and n are one coordinate
+        fit = np.linalg.lstsq(X, c.y, rcond=None)[0]
+        slope = J * (fit[2] + 2.0 * fit[3] * J)
+    square = np.exp(2.0 * (c.x[:, 0] - c.x[:, 0].max())) if c.name in fits.LOADS else np.ones(b.size)
+    load = np.exp(c.y - c.y.max())
+    ramp = fits.unit_coordinates(c)[:, 0]
+    ramp = ramp / max(float(np.abs(ramp).max()), 1e-12)
+    return {
+        "all": b,
+        "zero": b * c.floor,
+        "still": b * (1.0 - np.abs(J)),
+        "slope": b * slope,
+        "slip": b * np.divide(slope, J, out=np.zeros_like(J), where=np.abs(J) > 1e-9),
+        "drag": b * J**2 / load,
+        "n2": b * square,
+        "ramp": b * ramp,
+        "bow": b * (ramp**2 - 0.5),
+        "advance": b * (J - J.mean()),
+        "volts": b * volts,
+    }
+
+
+def _volts(channels: Mapping[str, MatchedChannel]) -> dict[str, float | Array]:
+    """Logarithm of B's voltage over A's at the command of every point of the drive; empty without voltages."""
+    v = channels.get("voltage")
+    if v is None:
+        return {}
+    order = np.argsort(v.x[:, 0], kind="stable")
+    at, y, second = v.x[order, 0], v.y[order], v.second[order]
+    out: dict[str, float | Array] = {}
+    for name, c in channels.items():
+        if name == "speed":
+            out[name] = np.asarray(
+                np.interp(c.x[:, 0], at[second], y[second]) - np.interp(c.x[:, 0], at[~second], y[~second])
+            )
+        elif name == "electrical":
+            out[name] = float(y[second].mean() - y[~second].mean())
+    return out
+
+
+def _columns(
+    row: ScalingLaw, channels: Mapping[str, MatchedChannel], form: float, volts: Mapping[str, float | Array]
+) -> Array | None:
+    """Columns of a law over all channels, (M, terms and form), each of unit size; None where nothing moves.
+
+    Instruments are exact. Air and blades follow their law roughly: what they change may rise or bow with speed.
+    """
+    shapes = () if row.kind == "stand" or row.exact else ("ramp", "bow", "advance")
+    parts = []
+    for name, c in channels.items():
+        basis = _bases(c, volts.get(name, 1.0))
+        columns = [
+            w * sum((f * basis[k] for k, f in term.get(name, {}).items()), np.zeros(c.y.size)) for w, term in row.terms
+        ]
+        moved = sum((np.abs(v) for v, (w, _) in zip(columns, row.terms, strict=True) if w >= 1.0), np.zeros(c.y.size))
+        scale = form * float(moved.max())
+        for other in channels:
+            columns += [scale * (other == name) * basis[k] for k in shapes]
+        parts.append(np.column_stack(columns))
+    joined = np.vstack(parts)
+    if np.abs(joined[:, 0]).max() <= 1e-9:
+        return None
+    used = np.abs(joined).max(axis=0) > 1e-12
+    used[: len(row.terms)] = True
+    return joined[:, used]
+
+
+def _slips(channels: Mapping[str, MatchedChannel]) -> list[tuple[str, Array]]:
+    """Changes by ratios of units, (unit, (M,) mean)."""
+    from bemt.effects.unit_slip import UnitSlip
+
+    start, out = 0, []
+    total = sum(c.y.size for c in channels.values())
+    for c in channels.values():
+        for way in UnitSlip().variants():
+            factor = float(way["factor"])
+            if way["channel"] == c.channel and factor > 0.0:
+                mean = np.zeros(total)
+                mean[start : start + c.y.size] = math.log(factor) * c.second
+                out.append((str(way["unit"]), mean))
+        start += c.y.size
+    return out
+
+
+def _pole_slips(channels: Mapping[str, MatchedChannel], speed_ratio: float) -> list[Array]:
+    """Changes by a ratio of pole pairs: loads go with its square, (M,) means."""
+    pairs = [(p, 1) for p in range(2, 15)] + [(p + 1, p) for p in range(2, 9)]
+    ratios = [f for p, q in pairs for f in (p / q, q / p)]
+    second = np.concatenate([c.second.astype(float) for c in channels.values()])
+    if math.isfinite(speed_ratio):  # one motor at one command: what is indicated changes by the same ratio
+        ratios = [f for f in ratios if abs(math.log(f * speed_ratio)) < _SAME_DRIVE]
+    return [2.0 * math.log(f) * second for f in ratios]
+
+
+def weigh(
+    channels: Mapping[str, MatchedChannel],
+    scatters: Sequence[Mapping[str, Scatter]],
+    kinds: Sequence[str],
+    density_known: bool = False,
+    speed_ratio: float = math.nan,
+) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
+    """Evidence of every explanation.
+
+    Parameters
+    ----------
+    channels : mapping of str to MatchedChannel
+        Of one sub-system.
+    scatters : sequence of mapping of str to Scatter
+        Settings of the scatter of each, which share the prior.
+    kinds : sequence of str
+        Kinds of laws that are asked.
+    density_known : bool
+        Whether both recordings tell their density, which is out of the readings already.
+    speed_ratio : float
+        Indicated speed of B over A at equal command [1]; NaN: unknown. Other pole pairs would show there, too.
+
+    Returns
+    -------
+    probability : dict
+        Explanation to probability, the likeliest first.
+    size : dict
+        Effect to size of its first term and standard error.
+    """
+    found = [_weighed(channels, scatter, kinds, density_known, speed_ratio) for scatter in scatters]
+    names = list(found[0][0])
+    score = {k: float(np.logaddexp.reduce([z[k] for z, _ in found])) for k in names}
+    size = {k: max(found, key=lambda f: f[0][k])[1][k] for k in names if k in found[0][1]}
+    listed = [k for k in score if k not in _PRIOR]
+    log_prior = {k: math.log(_PRIOR.get(k, (1.0 - sum(_PRIOR.values())) / max(len(listed), 1))) for k in score}
+    top = max(score[k] + log_prior[k] for k in score)
+    weight = {k: math.exp(score[k] + log_prior[k] - top) for k in score}
+    total = sum(weight.values())
+    return dict(sorted(((k, w / total) for k, w in weight.items()), key=lambda kv: -kv[1])), size
+
+
+def _weighed(
+    channels: Mapping[str, MatchedChannel],
+    scatter: Mapping[str, Scatter],
+    kinds: Sequence[str],
+    density_known: bool,
+    speed_ratio: float,
+) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
+    """Log evidence of every explanation at one setting of the scatter, and sizes."""
+    from scipy.linalg import block_diag, cholesky, solve_triangular
+
+    volts = _volts(channels)
+    if volts:  # a condition then, no answer
+        channels = {k: c for k, c in channels.items() if k != "voltage"}
+    base = {k: fits.covariance(c, scatter[k]) for k, c in channels.items()}
+    y = np.concatenate([c.y - c.y.mean() for c in channels.values()])
+    L = cholesky(block_diag(*base.values()), lower=True)
+
+    def white(v: Array) -> Array:
+        return np.asarray(solve_triangular(L, v, lower=True, check_finite=False))
+
+    r = white(y)
+    none = -0.5 * float(r @ r) - float(np.log(np.diag(L)).sum())
+    score: dict[str, float] = {NONE: none}
+    size: dict[str, tuple[float, float]] = {}
+    moving = any(c.advance_moves() for c in channels.values())
+    for row in (row for row in LAWS if row.kind in kinds and (moving or not row.flow)):
+        sizes = (_DENSITY,) if row.id == "air_density" and density_known else row.sizes
+        found = []
+        for form, prior in (_EXACT if row.kind == "stand" or row.exact else FORM).items():
+            columns = _columns(row, channels, form, volts)
+            if columns is not None:
+                A, weight = white(columns), math.log(prior / len(sizes))
+                for s in sizes:
+                    z, value, error = _evidence(row, A, r, s)
+                    found.append((z + weight, value, error))
+        if found:
+            score[row.id] = none + float(np.logaddexp.reduce([z for z, _, _ in found])) + 0.5 * float(r @ r)
+            best = max(found, key=lambda f: f[0])
+            size[row.id] = best[1], best[2]
+    if "rpm_scale" in score:
+        means = _pole_slips(channels, speed_ratio)
+        if means:
+            z, mean = _shifted(means, white, r, none)
+            if z > score["rpm_scale"]:
+                size["rpm_scale"] = mean / 2.0, 0.0
+            score["rpm_scale"] = float(np.logaddexp(score["rpm_scale"], z)) - math.log(2.0)
+    slips = _slips(channels) if "stand" in kinds else []
+    if slips:
+        z, mean = _shifted([m for _, m in slips], white, r, none)
+        score["unit_slip"], size["unit_slip"] = z, (mean, 0.0)
+    score[UNKNOWN] = _unknown(channels, base, none)
+    return score, size
+
+
+def _shifted(means: Sequence[Array], white: Callable[[Array], Array], r: Array, none: float) -> tuple[float, float]:
+    """Log evidence of known changes that share the prior, and the likeliest one."""
+    terms = [0.5 * float(r @ r) - 0.5 * float(np.sum((r - white(m)) ** 2)) for m in means]
+    mean = means[int(np.argmax(terms))]
+    return none + float(np.logaddexp.reduce(terms)) - math.log(len(terms)), float(mean[np.argmax(np.abs(mean))])
+
+
+def _evidence(row: ScalingLaw, A: Array, r: Array, size: float) -> tuple[float, float, float]:
+    """Log evidence, first coefficient and its error.
+
+    Terms of weight 1 or more stand on their own; the others are shares of what these turn out to be.
+    """
+    free = np.array([w >= 1.0 for w, _ in row.terms] + [False] * (A.shape[1] - len(row.terms)))
+    b = np.where(free, size, 0.0)
+    for _ in range(3):
+        sd = np.where(free, size, np.maximum(float(np.abs(b[free]).max()), 1e-5))
+        z, b, error = _linear(A, r, sd)
+    return z, float(b[0]), error
+
+
+def _linear(A: Array, r: Array, sd: Array) -> tuple[float, Array, float]:
+    """Log evidence, coefficients and the error of the first, of r = A b + e with b ~ N(0, sd^2), e ~ N(0, 1)."""
+    G = A.T @ A + np.diag(1.0 / sd**2)
+    b = np.asarray(np.linalg.solve(G, A.T @ r), dtype=float)
+    _, log_det = np.linalg.slogdet(G)
+    z = -0.5 * float(r @ r) + 0.5 * float(b @ (A.T @ r)) - 0.5 * float(log_det) - float(np.log(sd).sum())
+    return z, b, math.sqrt(float(np.linalg.inv(G)[0, 0]))
+
+
+def _unknown(channels: Mapping[str, MatchedChannel], base: Mapping[str, Array], none: float) -> float:
+    """Log evidence of a smooth change of every channel on its own, on the scale of the others."""
+    found = []
+    for size in _UNKNOWN_SIZES:
+        total = none
+        for name, c in channels.items():
+            y, free = c.y - c.y.mean(), size**2 * fits.free_change(c)
+            total += fits.log_likelihood(base[name] + free, y) - fits.log_likelihood(base[name], y)
+        found.append(total)
+    return float(np.logaddexp.reduce(found)) - math.log(len(found))
+
+
+def judge(probability: Mapping[str, float], size: Mapping[str, tuple[float, float]]) -> Judgement:
+    """Say what the evidence allows: the order of the questions is the order of caution."""
+
+    def answer(verdict: str, effects: Sequence[str], why: str) -> Judgement:
+        return Judgement(verdict, tuple(effects), probability, size, why)
+
+    if probability[NONE] >= 0.5:
+        return answer("none", (), f"no change beyond scatter and set-up ({probability[NONE]:.2f})")
+    listed = {k: p for k, p in probability.items() if k not in _PRIOR}
+    mass, unknown = sum(listed.values()), probability[UNKNOWN]
+    if unknown > 0.5:
+        return answer("unknown", (), f"no listed cause moves these channels like that ({unknown:.2f})")
+    if not listed or mass <= 0.5:
+        return answer("insufficient", (), "the change is too small to be told from none")
+    best = max(listed.values())
+    credible = [k for k, p in sorted(listed.items(), key=lambda kv: -kv[1]) if p >= best / NEAR]
+    first = credible[0]
+    if len(credible) == 1 and listed[first] >= SURE and unknown <= RIVAL:
+        row = law(first)
+        kind = "sensor" if first == "unit_slip" or (row is not None and row.kind == "stand") else "named"
+        return answer(kind, (first,), f"{first} ({listed[first]:.2f})")
+    if 1 < len(credible) <= MOST and unknown <= DOUBT and probability[NONE] <= RIVAL:
+        return answer("class", credible, f"these scale alike ({mass:.2f})")
+    if len(credible) == 1:
+        return answer("insufficient", (), f"{first} ({listed[first]:.2f}) leads, but unknown keeps {unknown:.2f}")
+    return answer("insufficient", (), f"{len(credible)} causes scale like that in these channels")

@@ -1,0 +1,296 @@
+"""One recording as the points that a comparison needs: steady loads over speed, and the drive over its command."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.base.errors import Fault, InputError
+from bemt.readers._imported import Channel, Imported
+from bemt.recordings.channels import view
+from bemt.recordings.reduce import Reduced, reduce
+
+__all__ = ["StandRun", "selected", "stand_run"]
+
+Array = NDArray[np.float64]
+
+_LOADS = ("thrust_N", "torque_Nm", "power_W", "CT", "CP", "CQ")
+_WANTED = (
+    *_LOADS,
+    "rpm",
+    "airspeed_m_s",
+    "J",
+    "density_kg_m3",
+    "electrical_power_W",
+    "voltage_V",
+    "throttle",
+    "run",
+    "temperature_K",
+)
+_CONDITION = re.compile(r"\s*([^=]+?)\s*=\s*(.+?)\s*")
+_RANGE = re.compile(r"([-+.\deE]+):([-+.\deE]+)")
+_ROTOR = "rotor"
+# Two numbers of a table that differ by less are the same number.
+_SAME_NUMBER = 1e-6
+# A ramp instead of plateaus: fewest points and rows, rows that must agree, ln of a misreading, 1/s of a slow ramp.
+_ENOUGH, _ROWS, _WINDOW, _JUMP, _RATE = 8, 20, 7, 0.03, 0.25
+_ROTOR_WORDS = ("left", "right", "upper", "lower", "front", "rear", "A", "B", "C", "D", "1", "2", "3", "4")
+
+
+@dataclass(frozen=True, eq=False)
+class StandRun:
+    """Steady points of one recording.
+
+    Parameters
+    ----------
+    name : str
+        File, and the rows that were chosen.
+    values : mapping of str to (N,) float
+        Channels in SI, rpm in rev/min; ``command`` is the pulse width [s] or the throttle [1].
+    u : mapping of str to (N,) float
+        Standard uncertainty of each, uncorrelated part; NaN: unknown.
+    session : mapping of str to float
+        Scatter between the runs of this recording at equal speed, share, where it shows.
+    command : str
+        ``pwm_s``, ``throttle`` or "" without one.
+    density : float
+        Mean recorded density, or that of recorded pressure and temperature [kg/m3]; NaN: not recorded.
+    notes : tuple of str
+        What the reduction decided.
+    diameter_m : float
+        As the recording or the label says; NaN: unknown.
+    """
+
+    name: str
+    values: Mapping[str, Array]
+    u: Mapping[str, Array]
+    session: Mapping[str, float]
+    command: str
+    density: float
+    notes: tuple[str, ...]
+    diameter_m: float
+
+    def __len__(self) -> int:
+        """Give the number of points."""
+        return int(next(iter(self.values.values())).size)
+
+
+def _kept(imported: Imported, column: str, wanted: str, where: str) -> NDArray[np.bool_]:
+    """Rows of one condition: a text, a number, or a range of numbers."""
+    names = {h: k for k, h in imported.headings.items()}
+    name = column if column in imported.channels or column in imported.texts else names.get(column, column)
+    if name in imported.texts:
+        found = np.array([cell.strip() == wanted for cell in imported.texts[name]])
+        if not found.any():
+            known = ", ".join(list(dict.fromkeys(c.strip() for c in imported.texts[name]))[:8])
+            raise InputError(Fault(where, column, f"no row with {wanted}", f"one of {known}"))
+        return found
+    channel = imported.channels.get(name)
+    if channel is None or channel.values.shape != (imported.rows,):
+        known = ", ".join([*imported.texts, *imported.channels][:12])
+        raise InputError(Fault(where, column, "no such column", f"one of {known}"))
+    span = _RANGE.fullmatch(wanted)
+    try:
+        low, high = (float(span[1]), float(span[2])) if span else (float(wanted), float(wanted))
+    except ValueError:
+        raise InputError(Fault(where, column, wanted, "a number, or a range such as 0.9:1.1")) from None
+    slack = _SAME_NUMBER * max(abs(low), abs(high), 1e-12)
+    kept = (channel.values >= low - slack) & (channel.values <= high + slack)
+    if not kept.any():
+        v = channel.values[np.isfinite(channel.values)]
+        told = f"{v.min():g} to {v.max():g} in SI" if v.size else "a number"
+        raise InputError(Fault(where, column, f"no row with {wanted}", told))
+    return np.asarray(kept)
+
+
+def _of_rotor(imported: Imported, word: str, where: str) -> Imported:
+    """Columns of one of several rotors under their plain names; columns of the others go."""
+
+    def parts(name: str) -> list[str]:
+        return name.split("_")
+
+    known = [w for w in _ROTOR_WORDS if any(w in parts(name) for name in imported.channels)]
+    if word not in known:
+        raise InputError(Fault(where, _ROTOR, word, f"one of {', '.join(known)}" if known else "a file of one rotor"))
+    others = set(known) - {word}
+    channels = {}
+    for name, channel in imported.channels.items():
+        own = parts(name)
+        if word in own:
+            channels["_".join(p for p in own if p != word)] = channel
+        elif not others & set(own):
+            channels.setdefault(name, channel)
+    return replace(imported, channels=channels)
+
+
+def selected(imported: Imported, conditions: Sequence[str], where: str) -> Imported:
+    """Keep the rows, or the rotor, that a user means.
+
+    Parameters
+    ----------
+    imported : Imported
+        As read.
+    conditions : sequence of str
+        ``column=text``, ``column=number``, ``column=low:high`` (in the unit of the channel), or ``rotor=left``.
+    where : str
+        File, for faults.
+
+    Returns
+    -------
+    Imported
+        With these rows only.
+
+    Raises
+    ------
+    InputError
+        When a column or a value does not exist, or no row is left.
+
+    Examples
+    --------
+    >>> made = Imported("table", "bench", 2, {"rpm": Channel(np.array([4e3, 5e3]), "rpm")}, lines=(2, 3))
+    >>> selected(made, ["rpm=4500:6000"], "a.csv").lines
+    (3,)
+    """
+    keep = np.ones(imported.rows, dtype=bool)
+    for text in conditions:
+        found = _CONDITION.fullmatch(text)
+        if not found:
+            raise InputError(Fault(where, text, "no condition", "COLUMN=VALUE, COLUMN=LOW:HIGH or rotor=NAME"))
+        if found[1] == _ROTOR and _ROTOR not in imported.channels:
+            imported = _of_rotor(imported, found[2], where)
+        else:
+            keep &= _kept(imported, found[1], found[2], where)
+    if keep.all():
+        return imported
+    if not keep.any():
+        raise InputError(Fault(where, ", ".join(conditions), "no row that meets all", "one or more"))
+    return _cut(imported, np.flatnonzero(keep))
+
+
+def _cut(imported: Imported, index: NDArray[np.intp]) -> Imported:
+    """Some of the rows."""
+
+    def cut(cells: tuple[Any, ...]) -> tuple[Any, ...]:
+        return tuple(cells[i] for i in index) if len(cells) == imported.rows else cells
+
+    channels = {
+        k: Channel(c.values[index], c.unit) if c.values.shape == (imported.rows,) else c
+        for k, c in imported.channels.items()
+    }
+    return replace(
+        imported,
+        rows=int(index.size),
+        channels=channels,
+        flags=cut(imported.flags),
+        lines=cut(imported.lines),
+        texts={k: cut(v) for k, v in imported.texts.items()},
+    )
+
+
+def stand_run(
+    imported: Imported, name: str, diameter_m: float | None = None, conditions: Sequence[str] = ()
+) -> StandRun:
+    """Reduce one recording for a comparison.
+
+    Parameters
+    ----------
+    imported : Imported
+        As read.
+    name : str
+        File, for faults and the answer.
+    diameter_m : float, optional
+        Diameter [m], where it is known.
+    conditions : sequence of str
+        Of :func:`selected`.
+
+    Returns
+    -------
+    StandRun
+        With a load, or with a speed and a command.
+
+    Raises
+    ------
+    InputError
+        When there is no steady point, or nothing to compare.
+    """
+    imported = selected(imported, conditions, name)
+    reduced, ramp = _reduced(imported, diameter_m)
+    series = reduced.series
+    values = {k: np.asarray(series.values[k], dtype=float) for k in _WANTED if k in series.values}
+    if not {"thrust_N", "torque_Nm", "power_W"} & values.keys() and "rpm" not in values and "J" not in values:
+        raise InputError(Fault(name, "", "no speed", "rpm, or J with coefficients", "Nothing to compare at"))
+    u = {k: np.asarray(series.u[k], dtype=float) for k in values if k in series.u}
+    command = next((k for k in ("pwm_s", "throttle") if k in series.values and _moves(series.values[k])), "")
+    if command:
+        values["command"] = np.asarray(series.values[command], dtype=float)
+    if "power_W" in values and "torque_Nm" in values:
+        del values["power_W"]
+    rho = values.get("density_kg_m3", np.full(1, np.nan))
+    density = float(np.nanmean(rho)) if np.isfinite(rho).any() else math.nan
+    constants = dict(imported.constants)
+    if not math.isfinite(density):
+        density = float(constants.get("density_kg_m3", math.nan))
+    told = f"{name} ({', '.join(conditions)})" if conditions else name
+    session = {k: float(v["session"]) for k, v in reduced.correlated.items() if v.get("session")}
+    diameter = diameter_m if diameter_m is not None else float(constants.get("diameter_m", math.nan))
+    notes = (*ramp, *(n for n in reduced.notes if "no density" not in n))
+    return StandRun(told, values, u, session, command, density, notes, diameter)
+
+
+def _reduced(imported: Imported, diameter_m: float | None) -> tuple[Reduced, tuple[str, ...]]:
+    """Steady points; of a ramp without any to speak of, its rows."""
+    try:
+        steady = reduce(imported, diameter_m=diameter_m)
+    except InputError:
+        steady = None
+    if steady is not None and (steady.mode == "points" or _useful(steady) >= _ENOUGH):
+        return steady, ()
+    slow = _ramp(imported)
+    if slow is not None:
+        rows = reduce(slow, diameter_m=diameter_m, steady=True)
+        if steady is None or _useful(rows) > 2 * _useful(steady):
+            words = f"few steady points: {slow.rows} of {imported.rows} rows of a slow ramp are used as they are"
+            return rows, (words,)
+    return steady or reduce(imported, diameter_m=diameter_m), ()
+
+
+def _useful(reduced: Reduced) -> int:
+    """Points with a speed and a load."""
+    v = reduced.series.values
+    loads = [np.isfinite(v[k]) for k in _LOADS if k in v]
+    speed = np.isfinite(v["rpm"]) & (v["rpm"] > 0.0) if "rpm" in v else np.ones(len(reduced.series), dtype=bool)
+    return int(np.sum(np.any(loads, axis=0) & speed)) if loads else 0
+
+
+def _ramp(imported: Imported) -> Imported | None:
+    """Rows of a record of samples at which the speed changes slowly and reads what its neighbours read."""
+    seen = view(imported).values
+    t, rpm = seen.get("time_s"), seen.get("rpm")
+    if rpm is None or imported.rows < _ROWS:
+        return None
+    if t is None:
+        return imported
+    speed = np.where(rpm > 0.0, np.log(np.where(rpm > 0.0, rpm, 1.0)), np.nan)
+    half = _WINDOW // 2
+    padded = np.pad(speed, half, constant_values=np.nan)
+    windows = np.lib.stride_tricks.sliding_window_view(padded, _WINDOW)
+    with np.errstate(all="ignore"):
+        full = np.isfinite(windows).sum(axis=1) > half
+        middle = np.array([np.nanmedian(w) if ok else np.nan for w, ok in zip(windows, full, strict=True)])
+        far = np.array(
+            [np.nanmedian(np.abs(w - m)) if ok else np.nan for w, m, ok in zip(windows, middle, full, strict=True)]
+        )
+        rate = np.abs(np.gradient(middle, t))
+    keep = np.isfinite(middle) & (np.abs(speed - middle) < _JUMP) & (far < _JUMP) & (rate < _RATE)
+    return _cut(imported, np.flatnonzero(keep)) if keep.sum() >= _ROWS else None
+
+
+def _moves(v: Array) -> bool:
+    finite = v[np.isfinite(v)]
+    return finite.size > 1 and float(np.ptp(finite)) > 0.0

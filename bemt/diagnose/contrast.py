@@ -1,0 +1,185 @@
+"""Recording against recording: what changed, from the ratios alone or through the solver with A as reference of B."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from bemt import __version__
+from bemt.base.errors import Fault, InputError
+from bemt.compare.recordings import Change, changed, document, next_step
+from bemt.compare.stand_run import selected, stand_run
+
+if TYPE_CHECKING:
+    from bemt.case import Case
+    from bemt.readers._imported import Imported
+
+__all__ = ["Contrast", "compare", "label_diameter"]
+
+
+@dataclass(frozen=True, eq=False)
+class Contrast:
+    """What changed between two recordings.
+
+    Attributes
+    ----------
+    change : Change
+        Ratios and scaling.
+    document : dict
+        ``bemt.comparison/1``.
+    """
+
+    change: Change
+    document: dict[str, Any]
+
+    @property
+    def verdict(self) -> str:
+        """none, named, sensor, class, unknown or insufficient."""
+        return str(self.document["verdict"])
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Effects of the verdict; of a class all members."""
+        return tuple(self.document["effects"])
+
+    def __str__(self) -> str:
+        """The answer on one screen."""
+        from bemt.compare.contrast_text import text
+
+        return text(self.document)
+
+
+def compare(
+    a: str | os.PathLike[str],
+    b: str | os.PathLike[str],
+    case: Case | str | os.PathLike[str] | None = None,
+    *,
+    diameter_m: float | None = None,
+    rows_a: Sequence[str] = (),
+    rows_b: Sequence[str] = (),
+    progress: Callable[[str], None] | None = None,
+) -> Contrast:
+    """Say what changed between two recordings of one stand.
+
+    Parameters
+    ----------
+    a, b : str or path
+        Recordings of any known format: before and after, or without and with.
+    case : Case or path, optional
+        The rotor. With it, B is diagnosed with A as its reference: what the model lacks in A is no finding in B.
+        Without it, the causes are those that scale like the ratios do.
+    diameter_m : float, optional
+        Diameter [m], for the advance ratio; that of the case or the recordings by default.
+    rows_a, rows_b : sequence of str
+        Rows that are meant: ``column=text``, ``column=number``, ``column=low:high``, or ``rotor=left`` for a file of
+        several rotors. Units as in the channels that `import` shows.
+    progress : callable, optional
+        Told what is being done.
+
+    Returns
+    -------
+    Contrast
+        ``verdict``, ``effects``, and ``document`` (``bemt.comparison/1``) with ``ratios`` per channel: ratio, 68 and
+        95 % intervals from scatter and set-up, slopes over speed and advance.
+
+    Raises
+    ------
+    InputError
+        When a file is no recording, the two share no channel, or they are the same file and rows.
+
+    Notes
+    -----
+    Loads are compared as load / (rho n^2) on a smooth curve over ln n and V/(n D), by Gaussian processes (Rasmussen and
+    Williams 2006, eq. 2.23 to 2.24 and 2.37 to 2.42). Density counts where both recordings tell it.
+    """
+    from bemt.recordings.load import import_file
+
+    if isinstance(case, str | os.PathLike):
+        case = _case(os.fspath(case))
+    names = [os.fspath(a), os.fspath(b)]
+    conditions = [list(rows_a), list(rows_b)]
+    if Path(names[0]).resolve() == Path(names[1]).resolve() and sorted(rows_a) == sorted(rows_b):
+        raise InputError(
+            Fault(
+                names[0],
+                "",
+                "the same recording twice",
+                "two recordings, or two choices of rows",
+                "Its scatter would count as agreement",
+            )
+        )
+    read: list[Imported] = []
+    faults: list[Fault] = []
+    for name, rows in zip(names, conditions, strict=True):
+        try:
+            read.append(selected(import_file(name), rows, name))
+        except InputError as error:
+            faults += error.faults
+    if faults:
+        raise InputError(faults)
+    D = case.diameter_m if case is not None and diameter_m is None else diameter_m
+    runs = []
+    for name, rows, imported in zip(names, conditions, read, strict=True):
+        try:
+            run = stand_run(imported, name, D)
+            runs.append(replace(run, name=f"{name} ({', '.join(rows)})" if rows else name))
+        except InputError as error:
+            faults += error.faults
+    if faults:
+        raise InputError(faults)
+    found = changed(runs[0], runs[1], math.nan if D is None else D)
+    doc = document(found) | {"version": __version__, "recordings": names, "rows": {"A": rows_a, "B": rows_b}}
+    if case is not None:
+        doc |= _diagnosed(names, read, case, progress)
+    doc["next_measurement"] = _next(found, doc, names, case is not None)
+    return Contrast(found, doc)
+
+
+def _case(path: str) -> Case:
+    """Read the one case at a path."""
+    from bemt.case import find_cases, load_case
+
+    found = find_cases([path])
+    if len(found) != 1:
+        raise InputError(Fault("--case", "", f"{len(found)} cases", "one case"))
+    return load_case(found[0])
+
+
+def _diagnosed(
+    names: Sequence[str], read: Sequence[Imported], case: Case, progress: Callable[[str], None] | None
+) -> dict[str, Any]:
+    """Verdict of the diagnosis of B with A as reference."""
+    from bemt.diagnose.chain import diagnose
+    from bemt.diagnose.document import document as diagnosis
+    from bemt.diagnose.load import load
+
+    a, b = (load(name, case, imported) for name, imported in zip(names, read, strict=True))
+    answer = diagnose([b, replace(a, reference=True)], [case], None, progress)
+    said = diagnosis(answer)
+    keys = ("verdict", "effects", "probability", "ranking", "rule")
+    return {k: said[k] for k in keys} | {"diagnosis": said, "case": case.name}
+
+
+def _next(found: Change, doc: dict[str, Any], names: Sequence[str], with_case: bool) -> dict[str, Any]:
+    told = (doc.get("diagnosis") or {}).get("next_measurement") or {}
+    if told.get("text"):
+        return {**told, "command": f"python -m bemt compare {names[0]} {names[1]} --case CASE"}
+    return next_step(found, with_case, names)
+
+
+def label_diameter(label: str | None) -> float | None:
+    """Diameter of a label such as 10x5 [m]."""
+    from bemt.base.units import INCH
+    from geometry.common import GeometryError
+    from geometry.designation import parse_designation
+
+    if label is None:
+        return None
+    try:
+        return float(parse_designation(label)[0]) * INCH
+    except GeometryError as error:
+        raise InputError([Fault("--label", *fault) for fault in error.faults]) from error

@@ -1,0 +1,231 @@
+"""Pairs of published recordings that differ by one documented thing, prepared as ``pairs.toml`` says.
+
+A pair becomes two tables of steady points, ``reference.csv`` (A) and ``recording.csv`` (B), which the answering process
+compares without a case, or with a case made of the label.
+"""
+
+from __future__ import annotations
+
+import csv
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.base.folders import data_roots
+from bemt.proof.items import Item, recording_text
+
+__all__ = ["PairOf", "draw_pairs", "pairs"]
+
+Array = NDArray[np.float64]
+
+_KEPT = ("rpm", "airspeed_m_s", "thrust_N", "torque_Nm", "density_kg_m3", "electrical_power_W", "voltage_V", "run")
+_PROPELLERS = 4
+
+
+@dataclass(frozen=True)
+class PairOf:
+    """Two recordings of the manifest.
+
+    Parameters
+    ----------
+    kind : str
+        Set.
+    a, b : str
+        Names of the recordings.
+    causes, alike : tuple of str
+        What was changed, and what cannot be told from it there.
+    reason : str
+        Where that is documented.
+    case : mapping or None
+        Label of the rotor, for a case.
+    """
+
+    kind: str
+    a: str
+    b: str
+    causes: tuple[str, ...]
+    alike: tuple[str, ...]
+    reason: str
+    case: Mapping[str, Any] | None = None
+
+
+@cache
+def _manifest() -> Mapping[str, Any]:
+    return tomllib.loads(Path(__file__).with_name("pairs.toml").read_text(encoding="utf-8"))
+
+
+@cache
+def _recordings() -> Mapping[str, Mapping[str, Any]]:
+    """Name of a recording to how it is read."""
+    out = {}
+    for group in _manifest()["recordings"]:
+        conditions = group.get("where", [{}])
+        for k, name in enumerate(group["names"]):
+            where = conditions[min(k, len(conditions) - 1)]
+            out[str(group.get("as", "{}")).format(name)] = {**group, "path": group["file"].format(name), "cells": where}
+    return out
+
+
+@cache
+def pairs() -> tuple[PairOf, ...]:
+    """All pairs of the manifest, those with a label twice.
+
+    Returns
+    -------
+    tuple of PairOf
+        In the order of the manifest.
+    """
+    out = []
+    for group in _manifest()["pair"]:
+        for a, b in group["ab"]:
+            one = PairOf(
+                group["set"], a, b, tuple(group["causes"]), tuple(group.get("alike", ())), str(group["reason"])
+            )
+            out.append(one)
+            out += [
+                PairOf(f"{one.kind}, case", a, b, one.causes, one.alike, one.reason, told["case"])
+                for told in _manifest()["labelled"]
+                if one.kind in told["sets"] and told["only"] in a
+            ]
+    return tuple(out)
+
+
+def _plain(path: Path, how: Mapping[str, Any]) -> dict[str, Array]:
+    """Columns of a plain table, by heading or by number."""
+    if "numbered" in how:
+        rows = np.loadtxt(path)
+        columns = {name: rows[:, k - 1] for name, k in how["numbered"].items()}
+    else:
+        with path.open(encoding="utf-8-sig", newline="") as stream:
+            read = [row for row in csv.DictReader(stream) if all(row[k] == v for k, v in how["cells"].items())]
+        scale = how.get("scale", {})
+        columns = {
+            name: np.array([float(row[head]) for row in read]) / scale.get(name, 1.0)
+            for name, head in how["table"].items()
+        }
+    if "half" in how:
+        command = next(iter(columns.values()))
+        drop = np.flatnonzero(np.diff(command) < 0.0)
+        top = int(drop[0]) + 1 if drop.size else command.size
+        part = slice(0, top) if how["half"] == "up" else slice(top, None)
+        columns = {k: v[part] for k, v in columns.items()}
+    if "rpm" in columns:
+        good = columns["rpm"] > 0.0
+        columns = {k: v[good] for k, v in columns.items()}
+    return columns
+
+
+def _flight(path: Path, mass_kg: float) -> dict[str, Array]:
+    """Thrust per propeller of a flight: mass times acceleration along the rotors, averaged over a tenth of a second."""
+    from bemt.recordings.load import import_file
+
+    v = {k: c.values for k, c in import_file(path).channels.items()}
+    flying = (v["rpm"] > 0.5 * np.median(v["rpm"])) & (v["height_m"] > 0.3)
+    block = np.floor(v["time_s"][flying] * 10.0).astype(int)
+    _, block = np.unique(block, return_inverse=True)
+    count = np.bincount(block)
+
+    def mean(x: Array) -> Array:
+        return np.asarray(np.bincount(block, x[flying]) / count)
+
+    thrust = mass_kg * mean(v["acceleration_z_m_s2"]) / _PROPELLERS
+    return {"rpm": np.sqrt(mean(v["rpm"] ** 2)), "thrust_N": thrust, "voltage_V": mean(v["voltage_V"])}
+
+
+def _read(path: Path, how: Mapping[str, Any]) -> dict[str, Array]:
+    """Steady points of one recording, in SI."""
+    from bemt.compare.stand_run import stand_run
+    from bemt.recordings.load import import_file
+
+    if "mass_kg" in how:
+        columns = _flight(path, float(how["mass_kg"]))
+    elif "table" in how or "numbered" in how:
+        columns = _plain(path, how)
+    else:
+        run = stand_run(import_file(path), path.name, None, how.get("rows", ()))
+        columns = {k: run.values[k] for k in _KEPT if k in run.values}
+        if run.command:
+            columns["pulse_width_s" if run.command == "pwm_s" else run.command] = run.values["command"]
+    n = next(iter(columns.values())).size
+    columns |= {k: np.full(n, float(v)) for k, v in how.get("constant", {}).items()}
+    load = [np.isfinite(columns[k]) for k in ("thrust_N", "torque_Nm") if k in columns]
+    good = np.any(load, axis=0) & np.isfinite(columns.get("rpm", np.ones(n)))
+    return {k: v[good] for k, v in columns.items() if np.isfinite(v[good]).any()}
+
+
+def _find(path: str) -> Path | None:
+    return next((root / path for root in data_roots() if (root / path).is_file()), None)
+
+
+def _case(label: Mapping[str, Any]) -> str:
+    blade = {k: label[k] for k in ("pitch_in", "pitch_mm", "chord_law") if k in label}
+    blade |= {"max_chord_over_R": 0.35} if "chord_law" in label else {}
+    rotor = {"kind": "propeller", "blades": label["blades"]}
+    rotor |= {k: label[k] for k in ("diameter_in", "diameter_mm", "hub_ratio") if k in label}
+
+    def table(name: str, rows: Mapping[str, Any]) -> list[str]:
+        return [f"[{name}]", *(f'{k} = "{v}"' if isinstance(v, str) else f"{k} = {v:g}" for k, v in rows.items()), ""]
+
+    lines = ['schema = "bemt.case/1"', 'name = "label"', "", *table("rotor", rotor), *table("blade", blade)]
+    lines += table("operating", {"rpm": label["rpm"], "airspeed_m_s": 0.0}) + table("air", {"density_kg_m3": 1.2})
+    return "\n".join(lines)
+
+
+def draw_pairs() -> Iterator[Item]:
+    """Make an item of every pair whose recordings are found.
+
+    Yields
+    ------
+    Item
+        ``reference.csv`` is A, ``recording.csv`` B; ``case.toml`` only for a label. The key says ``compare``.
+    """
+    for pair in pairs():
+        parts = []
+        for name in (pair.a, pair.b):
+            how = _recordings()[name]
+            path = _find(how["path"])
+            parts.append(None if path is None else _text(path, name))
+        if any(part is None for part in parts):
+            continue
+        files = {
+            "reference.csv": str(parts[0]),
+            "recording.csv": str(parts[1]),
+            "compare": "A reference, B recording\n",
+        }
+        files |= {} if pair.case is None else {"case.toml": _case(pair.case)}
+        n = len(pair.causes)
+        yield Item(
+            files,
+            {
+                "set": pair.kind,
+                "causes": list(pair.causes),
+                "kinds": [],
+                "strengths": [1.0] * n,
+                "parameters": {},
+                "separation": [99.0] * n,
+                "separation_noise": [],
+                "alike": [list(pair.alike)] * n,
+                "variables": [[]] * n,
+                "plan": "pair",
+                "rig": f"{pair.a} | {pair.b}",
+                "ducted": False,
+                "seed": 0,
+                "rows": str(parts[1]).count("\n") - 1,
+                "stand": {},
+                "reason": pair.reason,
+            },
+        )
+
+
+@cache
+def _text(path: Path, name: str) -> str:
+    columns = _read(path, _recordings()[name])
+    if "run" in columns and np.ptp(columns["run"]) == 0.0:
+        del columns["run"]
+    return recording_text(columns)

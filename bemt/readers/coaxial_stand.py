@@ -1,0 +1,157 @@
+"""Tables of the New Dexterity coaxial stand: two rotors, ``Left`` upstream and ``Right`` downstream, a row per setting.
+
+PWM [us], thrust [g: gram-force], torque [Nm, its sign is the sense of rotation], voltage, current and optical speed per
+side (IEEE 9720993, An Open-Source Benchmarking Platform for Coaxial Rotor Systems). If only one side turned, its
+columns get the plain names; two that turned keep ``left`` and ``right``. The first row is read before the tare: its
+loads are left out.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from bemt.base import units
+from bemt.base.errors import Fault, InputError
+from bemt.readers import head_text, load_text
+from bemt.readers._headings import Heading
+from bemt.readers._imported import Channel, Imported
+from bemt.readers._recording import Builder
+from bemt.readers._split import split_table
+
+__all__ = ["KIND", "read", "sniff"]
+
+KIND = "coaxial_stand"
+_SIDES = ("left", "right")
+_COLUMNS = {
+    "PWM": ("pulse_width", "us"),
+    "Thrust": ("thrust", "gf"),
+    "Torque": ("torque", "Nm"),
+    "Voltage": ("voltage", "V"),
+    "Current": ("current", "A"),
+    "Speed": ("", "rpm"),
+}
+_HEAD = re.compile(r"(PWM|Thrust|Torque|Voltage|Current|Speed) (Left|Right)(?: \[[^\]]*\])?")
+_DIAMETER = re.compile(r"(?:^|_)(\d+(?:\.\d+)?)in_")
+
+
+def sniff(head: bytes | str) -> bool:
+    r"""Tell whether the first line names both sides of this stand.
+
+    Parameters
+    ----------
+    head : bytes or str
+        First bytes of a file.
+
+    Returns
+    -------
+    bool
+        True for thrust, speed and PWM of both sides.
+
+    Examples
+    --------
+    >>> sniff("PWM Left,PWM Right,Thrust Left [g],Thrust Right [g],Speed Left [rpm],Speed Right [rpm]\n")
+    True
+    """
+    text = head_text(head)
+    cells = [c.strip() for c in text.splitlines()[0].split(",")] if text.strip() else []
+    found = {m.groups() for c in cells if (m := _HEAD.fullmatch(c))}
+    return {(what, side) for what in ("PWM", "Thrust", "Speed") for side in ("Left", "Right")} <= found
+
+
+def read(path: str | os.PathLike[str]) -> Imported:
+    """Read a table.
+
+    Parameters
+    ----------
+    path : str or path
+        File.
+
+    Returns
+    -------
+    Imported
+        SI channels; torque is positive for the sense in which its rotor turned.
+
+    Raises
+    ------
+    InputError
+        With all faults.
+    """
+    source = load_text(path)
+    table = split_table(source, header=True)
+    build = Builder(table, KIND)
+    twice = sorted({h for h in table.headings if h and table.headings.count(h) > 1})
+    build.faults += [Fault(source.name, "1", f"a second column {name!r}", "each column once") for name in twice]
+    for k, text in enumerate(table.headings):
+        found = _HEAD.fullmatch(text.strip())
+        if found:
+            name, unit = _COLUMNS[found[1]]
+            u = units.UNITS[unit]
+            end = "rpm" if unit == "rpm" else units.suffixes(u.dimension)[0]
+            parts = [name, found[2].lower(), end]
+            build.add(k, Heading(text, "_".join(p for p in parts if p), u))
+        elif text.strip() == "Time [s]":
+            build.add(k, Heading(text, "time_s", units.UNITS["s"]))
+    if build.faults:
+        raise InputError(build.faults)
+    _tare_row(build)
+    for side in _SIDES:
+        _turned_positive(build, side)
+    turned = [s for s in _SIDES if np.nan_to_num(build.channels[f"{s}_rpm"].values).max(initial=0.0) > 0.0]
+    if len(turned) == 2:
+        left, right = (build.channels[f"{s}_rpm"].values for s in _SIDES)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = np.where(left > 0.0, right / left, np.nan)
+        build.channels["speed_ratio"] = Channel(ratio, "-")
+    if len(turned) == 1:
+        _plain(build, turned[0])
+        build.warnings.append(f"only the {turned[0]} rotor turned: its columns have the plain names")
+    else:
+        build.warnings.append("both rotors turned: choose one with rotor=left (upstream) or rotor=right (downstream)")
+    build.warnings.append("air density is not in the file")
+    build.flag_time()
+    build.check_magnitudes()
+    made = build.finish({"stand": "New Dexterity coaxial platform"})
+    told = _DIAMETER.search(Path(source.name).name)
+    return replace(made, constants={"diameter_m": float(told[1]) * units.INCH}) if told else made
+
+
+def _tare_row(build: Builder) -> None:
+    """Leave out the loads of the first row, which is read before the zero is taken."""
+    pulses = [build.channels[f"pulse_width_{s}_s"].values for s in _SIDES]
+    if not all(p.size > 2 and p[0] <= 1.0005e-3 for p in pulses):
+        return
+    for name, channel in list(build.channels.items()):
+        if name.startswith(("thrust_", "torque_")) or name.endswith("_rpm"):
+            values = channel.values.copy()
+            values[0] = np.nan
+            build.channels[name] = Channel(values, channel.unit)
+    build.flag([0], "read before the tare", "; its loads and speeds are left out")
+
+
+def _turned_positive(build: Builder, side: str) -> None:
+    """Torque of the sense in which a rotor turned, positive."""
+    name = f"torque_{side}_Nm"
+    channel = build.channels.get(name)
+    if channel is not None and np.nansum(channel.values) < 0.0:
+        build.channels[name] = Channel(-channel.values, channel.unit)
+        build.warnings.append(f"{name}: the sign, which is the sense of rotation here, was turned")
+
+
+def _plain(build: Builder, side: str) -> None:
+    """Columns of the rotor that turned under plain names."""
+    other = next(s for s in _SIDES if s != side)
+    for name in list(build.channels):
+        parts = name.split("_")
+        if other in parts:
+            del build.channels[name]
+            build.headings.pop(name, None)
+        elif side in parts:
+            new = "_".join(p for p in parts if p != side)
+            build.channels[new] = build.channels.pop(name)
+            if name in build.headings:
+                build.headings[new] = build.headings.pop(name)

@@ -1,0 +1,166 @@
+"""Flight logs of a Crazyflie: the binary files of its micro-SD card (``.usdlog``).
+
+Magic 0xBC, version, number of event types, their names and variables with a type letter, then records: id (u16), time
+(us; version 1: u32, version 2: u64), packed little-endian values; the last four bytes are a CRC32 of all
+before (Bitcraze, crazyflie-firmware, tools/usdlog/cfusdlog.py). The four speeds are joined to their root mean square,
+since thrust goes with the square. No thrust is measured in flight: accelerations are kept, the mass is the user's.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import struct
+import zlib
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.base.errors import Fault, InputError
+from bemt.base.units import G0
+from bemt.readers._imported import Channel, Imported
+
+__all__ = ["KIND", "read", "sniff"]
+
+KIND = "crazyflie_log"
+MAGIC = 0xBC
+_TIMES = {1: struct.Struct("<HI"), 2: struct.Struct("<HQ")}
+_LETTERS = "bBhHiIlLqQefd"
+_UNITS = {
+    "stateEstimate.x": ("x_m", 1.0),
+    "stateEstimate.y": ("y_m", 1.0),
+    "stateEstimate.z": ("height_m", 1.0),
+    "stateEstimate.vx": ("velocity_x_m_s", 1.0),
+    "stateEstimate.vy": ("velocity_y_m_s", 1.0),
+    "stateEstimate.vz": ("velocity_z_m_s", 1.0),
+    "acc.x": ("acceleration_x_m_s2", G0),
+    "acc.y": ("acceleration_y_m_s2", G0),
+    "acc.z": ("acceleration_z_m_s2", G0),
+    "pm.vbatMV": ("voltage_V", 1e-3),
+    "pm.vbat": ("voltage_V", 1.0),
+}
+_SPEED, _COMMAND = re.compile(r"rpm\.m[1-4]"), re.compile(r"pwm\.m[1-4]_pwm|motor\.m[1-4]")
+
+
+def sniff(head: bytes | str) -> bool:
+    """Tell whether the first bytes are those of such a log.
+
+    Parameters
+    ----------
+    head : bytes or str
+        First bytes of a file.
+
+    Returns
+    -------
+    bool
+        True for the magic number, a known version and a few event types.
+    """
+    if isinstance(head, str) or len(head) < 5 or head[0] != MAGIC:
+        return False
+    version, events = struct.unpack_from("<HH", head, 1)
+    return version in _TIMES and 0 < events < 1000
+
+
+def read(path: str | os.PathLike[str]) -> Imported:
+    """Read a log.
+
+    Parameters
+    ----------
+    path : str or path
+        File.
+
+    Returns
+    -------
+    Imported
+        Channels of the event with most records; others interpolated to its times.
+
+    Raises
+    ------
+    InputError
+        When it is cut off, its checksum is wrong, or it has no records.
+    """
+    name = os.fspath(path)
+    try:
+        data = Path(path).read_bytes()
+    except OSError as error:
+        raise InputError(Fault(name, "", error.strerror or str(error), "a readable file", "Check the path")) from error
+    if not sniff(data):
+        raise InputError(Fault(name, "", "other first bytes", "a Crazyflie log, which begins with 0xBC"))
+    if zlib.crc32(data[:-4]) != struct.unpack("<I", data[-4:])[0]:
+        raise InputError(Fault(name, "", "a wrong checksum", "the CRC32 of all bytes before it", "Copy the file again"))
+    try:
+        tables = _tables(data[:-4])
+    except (struct.error, KeyError, ValueError, UnicodeDecodeError) as error:
+        raise InputError(Fault(name, "", f"a damaged log ({error})", "whole records", "Copy the file again")) from error
+    tables = {k: v for k, v in tables.items() if v["time_s"].size > 1}
+    if not tables:
+        raise InputError(Fault(name, "", "no records", "two or more"))
+    return _imported(name, hashlib.sha256(data).hexdigest(), tables)
+
+
+def _text(data: bytes, at: int) -> tuple[str, int]:
+    end = data.index(b"\0", at)
+    return data[at:end].decode("utf-8"), end + 1
+
+
+def _tables(data: bytes) -> dict[str, dict[str, NDArray[np.float64]]]:
+    """Variables by event; times in s from the first record."""
+    version, events = struct.unpack_from("<HH", data, 1)
+    at, known = 5, {}
+    for _ in range(events):
+        (number,) = struct.unpack_from("<H", data, at)
+        name, at = _text(data, at + 2)
+        (count,) = struct.unpack_from("<H", data, at)
+        at += 2
+        names, form = [], "<"
+        for _ in range(count):
+            variable, at = _text(data, at)
+            if variable[-2] not in _LETTERS:
+                raise ValueError(f"type {variable[-2]!r}")
+            names.append(variable[:-3])
+            form += variable[-2]
+        known[number] = (name, names, struct.Struct(form))
+    rows: dict[int, list[tuple[float, ...]]] = {k: [] for k in known}
+    stamp, scale = _TIMES[version], 1e-6
+    while at < len(data):
+        number, time = stamp.unpack_from(data, at)
+        at += stamp.size
+        record = known[number][2]
+        rows[number].append((time * scale, *record.unpack_from(data, at)))
+        at += record.size
+    out = {}
+    for number, (name, names, _) in known.items():
+        table = np.array(rows[number], dtype=float).reshape(-1, len(names) + 1)
+        out[name] = {"time_s": table[:, 0]} | {n: table[:, k + 1] for k, n in enumerate(names)}
+    return out
+
+
+def _imported(name: str, sha256: str, tables: dict[str, dict[str, NDArray[np.float64]]]) -> Imported:
+    main = max(tables, key=lambda k: tables[k]["time_s"].size)
+    t = tables[main]["time_s"]
+    columns: dict[str, NDArray[np.float64]] = {}
+    for table in tables.values():
+        for key, v in table.items():
+            if key != "time_s":
+                columns.setdefault(key, v if table is tables[main] else np.interp(t, table["time_s"], v))
+    channels = {"time_s": Channel(t - t[0], "s")}
+    for key, v in columns.items():
+        if key in _UNITS:
+            label, factor = _UNITS[key]
+            unit = "m/s2" if label.endswith("_s2") else "m/s" if label.endswith("_s") else label.rsplit("_", 1)[1]
+            channels[label] = Channel(v * factor, unit)
+    warnings = [f"event {main} with {t.size} records; others are interpolated to its times"] if len(tables) > 1 else []
+    speeds = [v for key, v in columns.items() if _SPEED.fullmatch(key)]
+    if len(speeds) == 4:
+        channels["rpm"] = Channel(np.sqrt(np.mean(np.square(speeds), axis=0)), "rpm")
+        warnings.append("rpm is the root mean square of four propellers")
+    commands = [v for key, v in columns.items() if _COMMAND.fullmatch(key)][:4]
+    if len(commands) == 4:
+        channels["throttle"] = Channel(np.mean(commands, axis=0) / 65535.0, "-")
+    warnings.append(
+        "a flight: no thrust is measured; mass times acceleration gives it, and the mass is not in the file"
+    )
+    said = {"file": name, "sha256": sha256}
+    return Imported(KIND, "flight", t.size, channels, tuple(warnings), said)

@@ -1,0 +1,199 @@
+"""The promise of `compare`: ratios with intervals that hold, causes by how they scale, and no cause where none is."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from bemt.base.errors import InputError
+from bemt.commands.cli import main
+from bemt.compare.scaling import LAWS
+from bemt.diagnose.contrast import compare
+from bemt.effects import catalogue
+
+Array = NDArray[np.float64]
+D = 0.254
+
+
+def stand(
+    seed: int,
+    change: Callable[[dict[str, Array]], None] = lambda _: None,
+    session: float = 0.007,
+    airspeed: Array | None = None,
+) -> dict[str, Array]:
+    """Static or tunnel sweep of a 10 in propeller with scatter and a set-up of its own."""
+    rng = np.random.default_rng(seed)
+    n = np.linspace(50.0, 130.0, 17) + rng.uniform(-1.0, 1.0, 17)
+    V = np.zeros(17) if airspeed is None else airspeed
+    J = V / (n * D)
+    CT, CQ = 0.11 * (n / 100.0) ** 0.04 * (1.0 - 0.9 * J - 0.4 * J**2), 0.008 * (1.0 - 0.1 * J - 0.7 * J**2)
+    table = {
+        "rpm": n * 60.0,
+        "airspeed_m_s": V,
+        "thrust_N": CT * 1.2 * n**2 * D**4,
+        "torque_Nm": CQ * 1.2 * n**2 * D**5,
+    }
+    change(table)
+    for name in ("thrust_N", "torque_Nm"):
+        table[name] = table[name] * (1.0 + session * rng.standard_normal() + 0.004 * rng.standard_normal(17))
+    return table
+
+
+def written(path: Path, table: Mapping[str, Array]) -> str:
+    rows = zip(*table.values(), strict=True)
+    path.write_text(",".join(table) + "\n" + "".join(",".join(f"{v:.8g}" for v in row) + "\n" for row in rows), "utf-8")
+    return str(path)
+
+
+def scaled(**factors: float) -> Callable[[dict[str, Array]], None]:
+    def change(table: dict[str, Array]) -> None:
+        for name, f in factors.items():
+            table[name] = table[name] * f
+
+    return change
+
+
+def pair(tmp_path: Path, change: Callable[[dict[str, Array]], None], seed: int = 1, **more: Array) -> tuple[str, str]:
+    V = more.get("airspeed")
+    a, b = stand(seed, airspeed=V), stand(seed + 1000, change, airspeed=V)
+    return written(tmp_path / "a.csv", a), written(tmp_path / "b.csv", b)
+
+
+def test_intervals_hold_the_true_ratio_as_often_as_they_say(tmp_path: Path) -> None:
+    inside = 0
+    for seed in range(24):
+        ratios = compare(*pair(tmp_path, scaled(thrust_N=1.08), seed)).document["ratios"]
+        inside += ratios["thrust_N"]["low95"] <= 1.08 <= ratios["thrust_N"]["high95"]
+        inside += ratios["torque_Nm"]["low95"] <= 1.0 <= ratios["torque_Nm"]["high95"]
+    assert 42 <= inside <= 48
+
+
+def test_nothing_is_claimed_where_only_the_set_up_differs(tmp_path: Path) -> None:
+    said = [compare(*pair(tmp_path, scaled(), seed)).verdict for seed in range(24)]
+    assert said.count("none") >= 22
+    assert set(said) <= {"none", "insufficient", "unknown"}
+
+
+def test_exchanged_recordings_give_the_inverse_ratio(tmp_path: Path) -> None:
+    a, b = pair(tmp_path, scaled(thrust_N=1.2))
+    there, back = compare(a, b).document["ratios"], compare(b, a).document["ratios"]
+    for channel in ("thrust_N", "torque_Nm"):
+        assert there[channel]["ratio"] * back[channel]["ratio"] == pytest.approx(1.0, abs=0.004)
+
+
+def _zero(table: dict[str, Array]) -> None:
+    table["thrust_N"] = table["thrust_N"] + 0.03 * table["thrust_N"].max()
+
+
+@pytest.mark.parametrize(
+    ("change", "cause"),
+    [
+        (scaled(thrust_N=1.12, torque_Nm=1.12), "air_density"),
+        (scaled(thrust_N=1.12), "thrust_gain"),
+        (scaled(torque_Nm=0.88), "torque_gain"),
+        (_zero, "thrust_zero"),
+        (scaled(thrust_N=1.0 / 4.4482216152605), "unit_slip"),
+        (scaled(thrust_N=1.25, torque_Nm=1.25**1.5), "pitch_offset"),
+    ],
+)
+def test_the_cause_is_named_or_in_the_class(
+    tmp_path: Path, change: Callable[[dict[str, Array]], None], cause: str
+) -> None:
+    answer = compare(*pair(tmp_path, change))
+    assert answer.verdict in ("named", "sensor", "class")
+    assert cause in answer.effects
+    assert answer.document["next_measurement"]["text"]
+
+
+def test_what_scales_alike_is_a_class_and_never_one_name(tmp_path: Path) -> None:
+    for seed in range(6):
+        answer = compare(*pair(tmp_path, scaled(thrust_N=1.1, torque_Nm=1.1), seed))
+        assert {"air_density", "rpm_scale"} <= set(answer.effects) or answer.verdict == "insufficient"
+
+
+def test_a_change_that_no_cause_makes_is_not_named(tmp_path: Path) -> None:
+    def wave(table: dict[str, Array]) -> None:
+        table["torque_Nm"] = table["torque_Nm"] * (1.0 + 0.25 * np.sin(table["rpm"] / 700.0))
+
+    assert compare(*pair(tmp_path, wave)).verdict in ("unknown", "insufficient")
+
+
+def test_recorded_density_is_the_cause_when_the_coefficients_agree(tmp_path: Path) -> None:
+    a, b = stand(1), stand(2, scaled(thrust_N=1.1, torque_Nm=1.1))
+    files = [
+        written(tmp_path / f"{k}.csv", t | {"density_kg_m3": np.full(17, rho)})
+        for k, t, rho in (("a", a, 1.1), ("b", b, 1.21))
+    ]
+    answer = compare(files[0], files[1])
+    assert (answer.verdict, answer.effects) == ("named", ("air_density",))
+    thrust = answer.document["ratios"]["thrust_N"]
+    assert thrust["ratio"] == pytest.approx(1.0, abs=0.03) and thrust["density_ratio"] == pytest.approx(1.1)
+
+
+def test_the_ratio_is_taken_at_equal_advance_ratio(tmp_path: Path) -> None:
+    """Another airspeed in B changes J, not the rotor."""
+    n = np.linspace(50.0, 130.0, 17)
+    a = stand(3, airspeed=0.2 * n * D)
+    b = stand(4, airspeed=np.linspace(0.1, 0.35, 17) * n * D)
+    answer = compare(written(tmp_path / "a.csv", a), written(tmp_path / "b.csv", b), diameter_m=D)
+    assert answer.verdict == "none"
+
+
+def test_battery_voltage_is_a_matter_of_the_drive(tmp_path: Path) -> None:
+    def driven(seed: int, volts: float) -> dict[str, Array]:
+        table = stand(seed)
+        table["pulse_width_us"] = 1100.0 + 800.0 * (table["rpm"] - 3000.0) / 5000.0 / (volts / 12.0) ** 0.75
+        return table | {"voltage_V": np.full(17, volts) - np.linspace(0.0, 0.4, 17)}
+
+    files = [written(tmp_path / f"{k}.csv", driven(s, v)) for k, s, v in (("a", 5, 12.0), ("b", 6, 9.0))]
+    doc = compare(files[0], files[1]).document
+    assert doc["subsystems"]["loads"]["verdict"] == "none"
+    assert "battery_sag" in doc["subsystems"]["drive"]["effects"] and "battery_sag" in doc["effects"]
+
+
+def test_rows_of_one_file_are_two_recordings(tmp_path: Path) -> None:
+    a, b = stand(7), stand(8, scaled(thrust_N=1.5))
+    both = {k: np.concatenate([a[k], b[k]]) for k in a} | {"throttle_setting": np.repeat([1.0, 2.0], 17)}
+    file = written(tmp_path / "both.csv", both)
+    answer = compare(file, file, rows_a=["throttle_setting=1"], rows_b=["throttle_setting=2"])
+    assert answer.document["ratios"]["thrust_N"]["ratio"] == pytest.approx(1.5, rel=0.03)
+    with pytest.raises(InputError, match="the same recording twice"):
+        compare(file, file)
+    with pytest.raises(InputError) as told:
+        compare(file, file, rows_a=["no_such=1"], rows_b=["throttle_setting=3"])
+    assert len(told.value.faults) == 2
+
+
+def test_the_laws_are_known_effects_or_say_what_they_are() -> None:
+    assert len({row.id for row in LAWS}) == len(LAWS)
+    for row in LAWS:
+        assert row.title and row.says and row.settles and row.source
+        if row.id in catalogue() and row.kind == "stand":
+            assert catalogue()[row.id].kind == "stand"
+
+
+def test_the_command_writes_its_document_and_refuses_bad_input(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    a, b = pair(tmp_path, scaled(thrust_N=1.12))
+    assert main(["compare", a, b, "--out", str(tmp_path / "out"), "--json"]) == 0
+    doc = json.loads(capsys.readouterr().out)
+    assert doc["schema"] == "bemt.comparison/1" and {"verdict", "effects", "ranking", "ratios"} <= doc.keys()
+    assert math.isclose(sum(r["probability"] for r in doc["subsystems"]["loads"]["ranking"]), 1.0, abs_tol=0.1)
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [
+        "comparison.json",
+        "comparison.png",
+        "comparison.txt",
+    ]
+    assert main(["compare", a, b]) == 0
+    assert len(capsys.readouterr().out.splitlines()) <= 30
+    (tmp_path / "c.csv").write_text("x;y\n1;2\n3;4\n", "utf-8")
+    assert main(["compare", a, str(tmp_path / "c.csv")]) == 2
+    assert main(["compare", a, str(tmp_path / "missing.csv")]) == 2
+    assert main(["compare", a, b, "--label", "nonsense"]) == 2
