@@ -17,7 +17,7 @@ from bemt.recordings.load import import_file
 
 @pytest.fixture(scope="module")
 def drawn(shared_data: Path) -> list[Item]:
-    return real.draw_real(np.random.default_rng(3))
+    return [item for item in real.draw_real(np.random.default_rng(3)) if item.entry["plan"] == "real"]
 
 
 def test_the_manifest_says_what_is_concealed_and_where_it_is_known_from() -> None:
@@ -63,6 +63,7 @@ def test_the_slip_and_the_wrong_density_are_in_the_files(drawn: list[Item]) -> N
 
 def test_without_data_it_says_where_they_come_from(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(real, "find_data", lambda kind: None)
+    monkeypatch.setattr(real, "draw_pairs", lambda: iter(()))
     with pytest.raises(InputError, match="BEMT_DATA"):
         prove.conceal(tmp_path / "p", prove.REAL, 1)
     assert not (tmp_path / "p").exists()

@@ -64,7 +64,7 @@ MAY: dict[str, set[str]] = {
     "bemt.compare.bench.*": {"files", "clock", "environment"},
     "bemt.diagnose.figures|bemt.diagnose.folder|bemt.diagnose.rotor_calibration": {"files"},
     "bemt.proof.prove": {"files", "clock", "environment"},
-    "bemt.proof.real|bemt.proof.seal": {"files"},
+    "bemt.proof.pairs|bemt.proof.real|bemt.proof.seal": {"files"},
     "bemt.exports.*": {"files"},
     "bemt.cfd.*": {"files", "clock", "environment"},
     "bemt.drive.*_file|bemt.drive.*_folder|bemt.drive.*_result": {"files"},

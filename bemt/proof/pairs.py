@@ -164,17 +164,20 @@ def _find(path: str) -> Path | None:
 
 
 def _case(label: Mapping[str, Any]) -> str:
-    blade = {k: label[k] for k in ("pitch_in", "pitch_mm", "chord_law") if k in label}
-    blade |= {"max_chord_over_R": 0.35} if "chord_law" in label else {}
-    rotor = {"kind": "propeller", "blades": label["blades"]}
-    rotor |= {k: label[k] for k in ("diameter_in", "diameter_mm", "hub_ratio") if k in label}
+    """Case of a label: an APC-like blade where nothing more is known."""
+    fan = "chord_law" in label
+    rotor = {"kind": "propeller", "blades": label["blades"], "hub_ratio": label.get("hub_ratio", 0.1)}
+    rotor |= {k: label[k] for k in ("diameter_in", "diameter_mm") if k in label}
+    blade = {k: label[k] for k in ("pitch_in", "pitch_mm") if k in label}
+    blade |= {"chord_law": label.get("chord_law", "apc_like")} | ({"max_chord_over_R": 0.35} if fan else {})
+    section = {"camber": 0.05, "thickness": 0.09} if fan else {"camber": 0.04, "thickness": 0.10}
 
     def table(name: str, rows: Mapping[str, Any]) -> list[str]:
         return [f"[{name}]", *(f'{k} = "{v}"' if isinstance(v, str) else f"{k} = {v:g}" for k, v in rows.items()), ""]
 
     lines = ['schema = "bemt.case/1"', 'name = "label"', "", *table("rotor", rotor), *table("blade", blade)]
-    lines += table("operating", {"rpm": label["rpm"], "airspeed_m_s": 0.0}) + table("air", {"density_kg_m3": 1.2})
-    return "\n".join(lines)
+    lines += table("blade.section", section) + table("operating", {"rpm": label["rpm"], "airspeed_m_s": 0.0})
+    return "\n".join([*lines, *table("air", {"density_kg_m3": 1.2})])
 
 
 def draw_pairs() -> Iterator[Item]:

@@ -39,6 +39,8 @@ def _tables(document: Mapping[str, Any]) -> list[tuple[str, list[str], list[list
             for r in document["risk_coverage"]]  # fmt: skip
     confusion = [[there, ", ".join(f"{said} {n}" for said, n in sorted(row.items(), key=lambda kv: -kv[1]))]
                  for there, row in document["confusion"].items()]  # fmt: skip
+    kinds = ("found", "class", "none", "unknown", "insufficient", "wrong", "failed")
+    answers = [[kind, *(str(row.get(k, 0)) for k in kinds)] for kind, row in document.get("answers", {}).items()]
     misses = [
         [m["folder"], m["set"], "+".join(m["causes"]) or "-", m["plan"], f"{m['separation']:.1f}",
          "class: " + ", ".join(m["effects"]) if m["verdict"] == "class" else m["said"]]
@@ -46,6 +48,7 @@ def _tables(document: Mapping[str, Any]) -> list[tuple[str, list[str], list[list
     ]  # fmt: skip
     return [
         ("Score", _HEADER, _rows(document["score"])),
+        ("Answers by set", ["set", *kinds], answers),
         ("Simpler rules on the same data", _HEADER, _rows(document["baselines"])),
         ("Single causes by separation", ["sigma", "items", "top 1", "claims", "right claims"], strata),
         ("Wrong claims against claims listened to", ["share", "claims", "wrong", "down to probability"], risk),

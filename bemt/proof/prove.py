@@ -211,7 +211,7 @@ def proof(out: Path, digest: str | None = None) -> dict[str, Any]:
         "key_sha256": digest or (out / seal.SEAL).read_text(encoding="utf-8").strip(), "items": len(judged),
         "score": [vars(r) for r in rows], "baselines": [vars(r) for r in score.baselines(judged)] if made else [],
         "strata": score.strata(judged) if made else [], "risk_coverage": score.risk_coverage(judged),
-        "confusion": score.confusion(judged), "misses": misses,
+        "confusion": score.confusion(judged), "answers": {} if made else score.answers(judged), "misses": misses,
         "seconds_median": sorted(seconds)[len(seconds) // 2] if seconds else math.nan,
     }  # fmt: skip
 

@@ -14,6 +14,7 @@ from bemt.proof.causes import CAUSES
 __all__ = [
     "VISIBLE",
     "Judged",
+    "answers",
     "ScoreRow",
     "baselines",
     "confusion",
@@ -330,6 +331,38 @@ def score_real(judged: Sequence[Judged]) -> list[ScoreRow]:
             out.append(_share(f"{kind}: found", (j.claims and j.right for j in some), ">= 80 %", 0.80))
         out.append(_share(f"{kind}: wrong claims", wrong, "<= 2 %", 0.02, True))
     return [*out, _share("failed", (not j.answer for j in judged), "0", 0.0, True)]
+
+
+def answers(judged: Sequence[Judged]) -> dict[str, dict[str, int]]:
+    """How often each set was answered how.
+
+    Parameters
+    ----------
+    judged : sequence of Judged
+        All items.
+
+    Returns
+    -------
+    dict of str to dict
+        Set to counts of ``found`` (named and right), ``class`` (right, one of several), ``none``, ``unknown``,
+        ``insufficient``, ``wrong`` and ``failed``.
+    """
+    out: dict[str, dict[str, int]] = {}
+    for j in judged:
+        row = out.setdefault(str(j.entry["set"]), {})
+        row[answered(j)] = row.get(answered(j), 0) + 1
+    return dict(sorted(out.items()))
+
+
+def answered(j: Judged) -> str:
+    """Answer to one item in a word of :func:`answers`."""
+    if not j.answer:
+        return "failed"
+    if not j.claims:
+        return str(j.answer["verdict"])
+    if not j.right:
+        return "wrong"
+    return "class" if j.answer["verdict"] == "class" else "found"
 
 
 def baselines(judged: Sequence[Judged]) -> list[ScoreRow]:
