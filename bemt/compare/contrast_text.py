@@ -103,7 +103,9 @@ def _said(doc: Mapping[str, Any]) -> list[str]:
     if density and abs(density - 1.0) > 0.003:
         ends = f"{doc['density']['A']:.4g} to {doc['density']['B']:.4g} kg/m3"
         out.append(f"Recorded density: {ends} ({density - 1:+.1%}).")
-    out.append(_verdict(doc))
+    out += (
+        [_verdict(doc)] if "diagnosis" not in doc else [f"The case {doc['case']}, with A as reference:", *doc["told"]]
+    )
     drive = (doc.get("subsystems") or {}).get("drive")
     if drive and drive["effects"] and drive["effects"] != doc["effects"]:
         out.append(f"Drive: {drive['verdict']}: {', '.join(_title(k) for k in drive['effects'])}.")
@@ -122,17 +124,11 @@ def _verdict(doc: Mapping[str, Any]) -> str:
     names = [_title(k) for k in doc["effects"]]
     p = doc.get("probability")
     sure = f" ({p:.2f})" if p else ""
-    if "diagnosis" in doc:
-        told = " ".join(str(doc["diagnosis"].get("explanation", "")).split())
-        return f"The case {doc['case']} with A as reference: {told}"
     if doc["verdict"] == "none":
         return f"Nothing changed: {doc['rule']}."
     if doc["verdict"] in ("named", "sensor"):
-        row = law(doc["effects"][0])
         lead = "The stand" if doc["verdict"] == "sensor" else "What changed"
-        return f"{lead}: {names[0]}{sure}. {doc['rule'][:1].upper()}{doc['rule'][1:]}." + (
-            f" Sign: {row.says}." if row else ""
-        )
+        return f"{lead}: {names[0]}{sure}: {doc['rule']}."
     if doc["verdict"] == "class":
         return f"One of these, which scale alike here{sure}: {', '.join(names)}."
     if doc["verdict"] == "unknown":

@@ -207,24 +207,26 @@ def _notes(a: StandRun, b: StandRun, channels: Mapping[str, MatchedChannel], str
     return list(dict.fromkeys([*out, *(f"A: {n}" for n in a.notes), *(f"B: {n}" for n in b.notes)]))
 
 
-def next_step(change: Change, case: bool, files: Sequence[str]) -> dict[str, str]:
+def next_step(change: Change, files: Sequence[str]) -> dict[str, str]:
     """Run or reading that would settle the answer, and the command to give then."""
     said = change.leading
     torque = "torque" in {c.name for c in change.channels.values()}
     rows = [row for k in said.effects[:3] if (row := law(k)) is not None]
-    command = "python -m bemt compare " + " ".join(files) + ("" if case else " --case CASE")
+    command = "python -m bemt compare " + " ".join(files) + " --case CASE"
     if said.verdict == "none":
         return {"text": "to see smaller changes, repeat each run once after taking the propeller off", "command": ""}
+    if said.verdict == "named" and said.effects == ("air_density",) and math.isfinite(change.density_ratio):
+        return {"text": "", "command": ""}
     if said.verdict in ("named", "sensor"):
         text = rows[0].settles if rows else "read the label of the channel"
-        return {"text": f"to be sure, {text}", "command": "" if case else command}
+        return {"text": f"to be sure, {text}", "command": command}
     if not torque and change.loads is said:
         text = "record torque in both runs: in thrust alone gain, air and blade look alike"
     elif rows:
         text = "; or ".join(row.settles for row in rows)
     else:
         text = "repeat the run of A and compare it with A: what they differ by is no cause"
-    return {"text": text, "command": command if not case else f"python -m bemt compare {files[0]} REPEAT_OF_A"}
+    return {"text": text, "command": command}
 
 
 def document(change: Change) -> dict[str, Any]:

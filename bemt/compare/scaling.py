@@ -597,7 +597,7 @@ def judge(probability: Mapping[str, float], size: Mapping[str, tuple[float, floa
     if len(credible) == 1 and listed[first] >= SURE and unknown <= RIVAL:
         row = law(first)
         kind = "sensor" if first == "unit_slip" or (row is not None and row.kind == "stand") else "named"
-        return answer(kind, (first,), f"{first} ({listed[first]:.2f})")
+        return answer(kind, (first,), row.says if row is not None else "the ratio is exactly that of two units")
     if 1 < len(credible) <= MOST and unknown <= DOUBT and probability[NONE] <= RIVAL:
         return answer("class", credible, f"these scale alike ({mass:.2f})")
     if len(credible) == 1:

@@ -18,6 +18,11 @@ if TYPE_CHECKING:
     from bemt.case import Case
     from bemt.readers._imported import Imported
 
+# Remarks on the files come first in an explanation; `import` shows them.
+_REMARK = "Before any physics"
+# An effect whose scaling is so much less likely than the best cannot have made the ratios.
+_IMPOSSIBLE = 1e-4
+
 __all__ = ["Contrast", "compare", "label_diameter"]
 
 
@@ -134,8 +139,8 @@ def compare(
     found = changed(runs[0], runs[1], math.nan if D is None else D)
     doc = document(found) | {"version": __version__, "recordings": names, "rows": {"A": rows_a, "B": rows_b}}
     if case is not None:
-        doc |= _diagnosed(names, read, case, progress)
-    doc["next_measurement"] = _next(found, doc, names, case is not None)
+        doc |= _agreed(_diagnosed(names, read, case, progress), doc, found)
+    doc["next_measurement"] = next_step(found, names) if case is None else _after(doc, names, case)
     return Contrast(found, doc)
 
 
@@ -155,20 +160,48 @@ def _diagnosed(
     """Verdict of the diagnosis of B with A as reference."""
     from bemt.diagnose.chain import diagnose
     from bemt.diagnose.document import document as diagnosis
+    from bemt.diagnose.document import explanation
     from bemt.diagnose.load import load
 
     a, b = (load(name, case, imported) for name, imported in zip(names, read, strict=True))
     answer = diagnose([b, replace(a, reference=True)], [case], None, progress)
     said = diagnosis(answer)
     keys = ("verdict", "effects", "probability", "ranking", "rule")
-    return {k: said[k] for k in keys} | {"diagnosis": said, "case": case.name}
+    told = [line for line in explanation(answer) if not line.startswith(_REMARK)]
+    return {k: said[k] for k in keys} | {"diagnosis": said, "case": case.name, "told": told}
 
 
-def _next(found: Change, doc: dict[str, Any], names: Sequence[str], with_case: bool) -> dict[str, Any]:
-    told = (doc.get("diagnosis") or {}).get("next_measurement") or {}
-    if told.get("text"):
-        return {**told, "command": f"python -m bemt compare {names[0]} {names[1]} --case CASE"}
-    return next_step(found, with_case, names)
+def _agreed(said: dict[str, Any], ratios: dict[str, Any], found: Change) -> dict[str, Any]:
+    """The diagnosis where the ratios bear it out.
+
+    The ratios know no blade and cannot be misled by one. An effect that cannot make them is struck; where they agree
+    within scatter and set-up there is nothing unknown either; a density that both recordings tell is the answer.
+    """
+    by_ratio = found.loads
+    keys = ("verdict", "effects", "probability", "ranking", "rule")
+    mine = {k: ratios[k] for k in keys}
+    if by_ratio.verdict == "none" and said["verdict"] == "unknown":
+        return said | mine | {"rule": f"{by_ratio.why}; the model misses the same in both"}
+    if said["verdict"] == "none" and by_ratio.verdict == "named" and "air_density" in by_ratio.effects:
+        return said | mine
+    if said["verdict"] not in ("named", "sensor", "class") or not by_ratio.probability:
+        return said
+    least = _IMPOSSIBLE * max(by_ratio.probability.values())
+    struck = [k for k in said["effects"] if by_ratio.probability.get(k, 1.0) < least]
+    left = [k for k in said["effects"] if k not in struck]
+    if not struck:
+        return said
+    why = f"{' and '.join(struck)} cannot make these ratios of thrust and torque"
+    if left and said["verdict"] == "class":
+        return said | {"effects": left, "rule": f"{said['rule']}; {why}"}
+    return said | mine | {"rule": f"{ratios['rule']}; {why}", "told": [f"The ratios say: {ratios['rule']}; {why}."]}
+
+
+def _after(doc: dict[str, Any], names: Sequence[str], case: Case) -> dict[str, Any]:
+    """Run that the diagnosis recommends, and the command that takes it in."""
+    told = dict(doc["diagnosis"].get("next_measurement") or {})
+    command = f"python -m bemt diagnose {names[1]} NEW.csv --reference {names[0]} --case {case.path.as_posix()}"
+    return {**told, "command": command if told.get("text") else ""}
 
 
 def label_diameter(label: str | None) -> float | None:
