@@ -110,7 +110,7 @@ def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> Change:
     ratios = {c.channel: _ratio(c, scatter[n]) for n, c in {**loads, **drive}.items()}
     verdict = _NO_TALK
     if loads:
-        verdict = judge(*weigh(loads, (rotor.free, rotor.steady), ("air", "stand"), known, _speed_ratio(ratios)))
+        verdict = judge(*weigh(loads, (rotor.free, rotor.steady), ("air", "stand"), known, _speeds(ratios)))
         verdict = _far_apart(_with_density(verdict, a, b, loads), ratios)
     motor = _NO_TALK
     if drive and verdict.verdict == "none":
@@ -141,9 +141,10 @@ def _far_apart(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> Judg
     )
 
 
-def _speed_ratio(ratios: Mapping[str, Mapping[str, Any]]) -> float:
-    """Speed of B over A at equal command; NaN: no command."""
-    return float(next((r["ratio"] for r in ratios.values() if r["kind"] == "speed"), math.nan))
+def _speeds(ratios: Mapping[str, Mapping[str, Any]]) -> tuple[float, float] | None:
+    """Logarithm of the speed of B over A at equal command, and its 95 % error."""
+    found = next((r for r in ratios.values() if r["kind"] == "speed"), None)
+    return None if found is None else (math.log(found["ratio"]), math.log(found["high95"] / found["ratio"]))
 
 
 def _told(run: StandRun) -> str:

@@ -41,7 +41,7 @@ RIVAL, DOUBT = 0.1, 0.3
 # Recorded densities are this good: a barometer, a thermometer and nobody's humidity, share.
 _DENSITY = 0.004
 # Speed at equal command of one motor, in ln: battery and load change it by no more.
-_SAME_DRIVE = 0.25
+_SAME_DRIVE = 0.06
 
 Basis = Mapping[str, float]
 Term = tuple[float, Mapping[str, Basis]]
@@ -431,13 +431,13 @@ def _slips(channels: Mapping[str, MatchedChannel]) -> list[tuple[str, Array]]:
     return out
 
 
-def _pole_slips(channels: Mapping[str, MatchedChannel], speed_ratio: float) -> list[Array]:
+def _pole_slips(channels: Mapping[str, MatchedChannel], speeds: tuple[float, float] | None) -> list[Array]:
     """Changes by a ratio of pole pairs: loads go with its square, (M,) means."""
     pairs = [(p, 1) for p in range(2, 15)] + [(p + 1, p) for p in range(2, 9)]
     ratios = [f for p, q in pairs for f in (p / q, q / p)]
     second = np.concatenate([c.second.astype(float) for c in channels.values()])
-    if math.isfinite(speed_ratio):  # one motor at one command: what is indicated changes by the same ratio
-        ratios = [f for f in ratios if abs(math.log(f * speed_ratio)) < _SAME_DRIVE]
+    if speeds is not None:  # one motor at one command: what is indicated changes by the same ratio
+        ratios = [f for f in ratios if abs(math.log(f) + speeds[0]) < _SAME_DRIVE + speeds[1]]
     return [2.0 * math.log(f) * second for f in ratios]
 
 
@@ -446,7 +446,7 @@ def weigh(
     scatters: Sequence[Mapping[str, Scatter]],
     kinds: Sequence[str],
     density_known: bool = False,
-    speed_ratio: float = math.nan,
+    speeds: tuple[float, float] | None = None,
 ) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
     """Evidence of every explanation.
 
@@ -460,8 +460,8 @@ def weigh(
         Kinds of laws that are asked.
     density_known : bool
         Whether both recordings tell their density, which is out of the readings already.
-    speed_ratio : float
-        Indicated speed of B over A at equal command [1]; NaN: unknown. Other pole pairs would show there, too.
+    speeds : (float, float), optional
+        ln of the indicated speed of B over A at equal command, and its 95 % error. Other pole pairs show there, too.
 
     Returns
     -------
@@ -470,7 +470,7 @@ def weigh(
     size : dict
         Effect to size of its first term and standard error.
     """
-    found = [_weighed(channels, scatter, kinds, density_known, speed_ratio) for scatter in scatters]
+    found = [_weighed(channels, scatter, kinds, density_known, speeds) for scatter in scatters]
     names = list(found[0][0])
     score = {k: float(np.logaddexp.reduce([z[k] for z, _ in found])) for k in names}
     size = {k: max(found, key=lambda f: f[0][k])[1][k] for k in names if k in found[0][1]}
@@ -487,7 +487,7 @@ def _weighed(
     scatter: Mapping[str, Scatter],
     kinds: Sequence[str],
     density_known: bool,
-    speed_ratio: float,
+    speeds: tuple[float, float] | None,
 ) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
     """Log evidence of every explanation at one setting of the scatter, and sizes."""
     from scipy.linalg import block_diag, cholesky, solve_triangular
@@ -522,7 +522,7 @@ def _weighed(
             best = max(found, key=lambda f: f[0])
             size[row.id] = best[1], best[2]
     if "rpm_scale" in score:
-        means = _pole_slips(channels, speed_ratio)
+        means = _pole_slips(channels, speeds)
         if means:
             z, mean = _shifted(means, white, r, none)
             if z > score["rpm_scale"]:
