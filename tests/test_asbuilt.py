@@ -14,10 +14,10 @@ from bemt.asbuilt.conditioning import condition
 from bemt.asbuilt.fit import Measured, objective
 from bemt.asbuilt.latents import NAMES, Prior
 from bemt.asbuilt.mixture import LEVELS, half_width, inside
+from bemt.asbuilt.model import coefficients
 from bemt.asbuilt.population import WEIGHTS, population
 from bemt.asbuilt.predict import Sensed, predict
 from bemt.base.errors import InputError
-from bemt.asbuilt.model import coefficients
 from bemt.case import load_case
 from bemt.case.prepare import prepare_case
 

@@ -12,10 +12,10 @@ import tomlkit
 
 from bemt import __version__
 from bemt.asbuilt.latents import NAMES, UNITS
+from bemt.asbuilt.model import air_fields, air_of_points
 from bemt.asbuilt.reference import SESSION
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import json_text, plain, write_atomic
-from bemt.asbuilt.model import air_fields, air_of_points
 from bemt.case import Case
 from bemt.case.as_built import MOVED, posterior_document
 from bemt.compare.as_measured import AsMeasured, as_measured
