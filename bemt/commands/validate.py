@@ -40,6 +40,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--fit-population", metavar="FILE", help=fitted)
     left = "predict each family by a population fitted without it"
     parser.add_argument("--leave-family-out", action="store_true", help=left)
+    beside = "run another solver on the same propellers, paired: ccblade"
+    parser.add_argument("--peer", metavar="NAME", help=beside)
     parser.add_argument("--out", metavar="DIR", help="write the tables there as well")
 
 
@@ -50,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
     from bemt.compare.validate.text import text
 
     effects = effects_without(args.off)
-    if args.fit_population or args.leave_family_out:
+    if args.fit_population or args.leave_family_out or args.peer:
         return _population(args)
     with _terminal.progress() as say:
         document = validate(where(args.dir), effects, args.polar, say, match_J0=args.match_J0, as_drawn=args.as_drawn)
@@ -62,15 +64,17 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _population(args: argparse.Namespace) -> int:
-    """Fit the population, or leave families out of it."""
+    """Fit the population, leave families out of it, or run a peer."""
     from pathlib import Path
 
     from bemt.base.tables import json_text, write_atomic
-    from bemt.compare.validate import left_out
+    from bemt.compare.validate import left_out, paired, peers
     from bemt.compare.validate.folder import read_folder
     from bemt.compare.validate.propellers import effects_without, where
 
     effects = effects_without(args.off)
+    if args.peer:
+        peers.peer(args.peer)
     folder = read_folder(where(args.dir))
     with _terminal.progress() as say:
         seen = left_out.watch(folder, effects, say)
@@ -82,6 +86,11 @@ def _population(args: argparse.Namespace) -> int:
             if args.out:
                 write_atomic(Path(args.out) / "left_out.json", json_text(document))
                 write_atomic(Path(args.out) / "left_out.txt", left_out.table(document) + "\n")
-    shown = args.json or not args.leave_family_out
-    print(json_text(document).rstrip() if shown else left_out.table(document))
+        if args.peer:
+            document = paired.paired(seen, args.peer, say)
+            if args.out:
+                write_atomic(Path(args.out) / f"paired_{args.peer}.json", json_text(document))
+                write_atomic(Path(args.out) / f"paired_{args.peer}.txt", paired.text(document) + "\n")
+    table = paired.text if args.peer else left_out.table if args.leave_family_out else None
+    print(json_text(document).rstrip() if args.json or table is None else table(document))
     return EXIT_OK

@@ -111,11 +111,8 @@ def as_measured(
     solve = coefficients(ready, state)
     points = np.arange(rpm_.size)
     drawn = np.zeros(len(NAMES))
-    Re = np.asarray(
-        co.Re75(
-            ready.chord75_m, rpm_ / 60.0, ready.diameter_m, J_ * rpm_ / 60.0 * ready.diameter_m, state.rho, state.mu
-        )
-    )
+    speed = J_ * rpm_ / 60.0 * ready.diameter_m
+    Re = np.asarray(co.Re75(ready.chord75_m, rpm_ / 60.0, ready.diameter_m, speed, state.rho, state.mu))
     f = solve(drawn, rpm_, J_, points)
     top = solve(drawn, rpm_, np.zeros_like(J_), points)
     x = J_ / zero_thrust(solve, drawn, float(np.median(rpm_)), int(np.argsort(rpm_)[rpm_.size // 2]))
