@@ -86,6 +86,7 @@ def limit(points: FitPoints, given: str) -> dict[str, Any] | None:
     """
     from scipy.optimize import minimize
     from scipy.special import erf
+    from threadpoolctl import threadpool_limits
 
     used = points.select((points.J == 0) & (points.CT > 0) & ~points.ducted & has(points, given))
     K = np.unique(used.index).size
@@ -106,7 +107,8 @@ def limit(points: FitPoints, given: str) -> dict[str, Any] | None:
         return float(0.5 * z @ z + np.sum(np.log(np.diag(L))) + 0.5 * np.sum((h / _PRIOR) ** 2))
 
     start = np.concatenate([_START, np.full(X.shape[1], np.log(2.0))])
-    h = np.asarray(minimize(cost, start, method="L-BFGS-B", options={"maxiter": 40}).x)
+    with threadpool_limits(1):  # small matrices: threads only wait for each other
+        h = np.asarray(minimize(cost, start, method="L-BFGS-B", options={"maxiter": 40}).x)
 
     def left_out(part: NDArray[np.intp]) -> Array:
         made = np.full_like(y, np.nan)
