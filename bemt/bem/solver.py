@@ -246,6 +246,7 @@ def prepare(
         Vy_add=np.zeros(s.r.size), thickness=np.interp(rR, [x for x, _ in shapes], [t for _, t in shapes]),
         own_mach=w @ np.array([float(p.M.size > 1) for _, p in polars]),
         gap=duct.gap if duct is not None else float("nan"), ducted=duct is not None, level=level,
+        sections=blade.anchors,
     )  # fmt: skip
     for hook in ("blade", "inflow", "section", "momentum"):
         for e in (e for e in eff if getattr(type(e), hook) is not getattr(Effect, hook)):
