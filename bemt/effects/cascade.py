@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bemt.effects.base import Array, Baking, Effect, Parameter, choice
 from bemt.sections.row import row_shift, weinig_factor
@@ -77,13 +78,17 @@ class Cascade(Effect):
         if self.form == "carter":
             K, shift = _carter(bake, stagger, K, shift)
         _read_at(bake, K, self.zero_lift * shift)
-        tight = np.clip((bake.sigma - LOOSE) / (TIGHT - LOOSE), 0.0, 1.0)[:, None, None, None]
-        if np.any(tight > 0.0):
-            bake.cd += tight * np.maximum(_diffusion_drag(bake, stagger) - bake.cd, 0.0)
-        if bake.ducted:
-            pitch_over_height = 2.0 * np.pi * bake.r / bake.B / (bake.R - bake.Rhub)
-            wall = self.annulus * pitch_over_height[:, None, None, None]
-            bake.cd += tight * (self.secondary * bake.cl**2 + wall)
+        tight = np.clip((bake.sigma - LOOSE) / (TIGHT - LOOSE), 0.0, 1.0)
+        k = np.flatnonzero(tight > 0.0)
+        if k.size:
+            tight = tight[k, None, None, None]
+            near = slice(*np.searchsorted(bake.alpha, [-_ATTACHED, _ATTACHED]))
+            cd = bake.cd[k, :, :, near]
+            bake.cd[k, :, :, near] += tight * np.maximum(_diffusion_drag(bake, stagger, k, near) - cd, 0.0)
+            if bake.ducted:
+                pitch_over_height = 2.0 * np.pi * bake.r[k] / bake.B / (bake.R - bake.Rhub)
+                wall = self.annulus * pitch_over_height[:, None, None, None]
+                bake.cd[k] += tight * (self.secondary * bake.cl[k] ** 2 + wall)
 
 
 def _row(bake: Baking, stagger: Array) -> tuple[Array, Array]:
@@ -137,25 +142,30 @@ def _read_at(bake: Baking, K: Array, shift: Array) -> None:
     x = a - zero - shift[:, :, None]
     fade = np.clip((_BROADSIDE - np.abs(x)) / (_BROADSIDE - _ATTACHED), 0.0, 1.0)
     fade = fade * fade * (3.0 - 2.0 * fade)
-    seen = (a + fade * (zero + K[:, None, None] * x - a))[:, None]
-    i = np.clip(np.searchsorted(a, seen, side="right") - 1, 0, a.size - 2)
-    weight = (seen - a[i]) / (a[i + 1] - a[i])
+    seen = a + fade * (zero + K[:, None, None] * x - a)
+    place = np.interp(seen, a, np.arange(float(a.size)))
+    i = np.minimum(place.astype(np.intp), a.size - 2)
+    weight = place - i
+    n, n_m, n_r, n_a = bake.cl.shape
+    i += near.start + n_a * (np.arange(n_r)[:, None] + n_m * n_r * np.arange(n)[:, None, None])
     for table in (bake.cl, bake.cd):
-        low, high = (np.take_along_axis(table[..., near], j, -1) for j in (i, i + 1))
-        table[..., near] = low + weight * (high - low)
+        flat = np.ascontiguousarray(table).reshape(-1).copy()
+        for m in range(n_m):
+            low = flat.take(i + m * n_r * n_a)
+            table[:, m, :, near] = low + weight * (flat.take(i + (m * n_r * n_a + 1)) - low)
     bake.alpha0 = bake.alpha0 + shift
     bake.cla = bake.cla * K[:, None]
 
 
-def _diffusion_drag(bake: Baking, stagger: Array) -> Array:
+def _diffusion_drag(bake: Baking, stagger: Array, k: NDArray[np.intp], near: slice) -> Array:
     """Drag by Lieblein's momentum thickness at the diffusion of each lift, zero where the row does not pump."""
-    side = np.where(bake.beta < 0.0, -1.0, 1.0)[:, None, None, None]
-    bm = np.clip(stagger[:, None, None, None] + side * bake.alpha_col, -_STEEPEST, _STEEPEST)
-    half = 0.25 * bake.sigma[:, None, None, None] * np.maximum(side * bake.cl, 0.0) / np.cos(bm)
+    side = np.where(bake.beta[k] < 0.0, -1.0, 1.0)[:, None, None, None]
+    sigma = np.maximum(bake.sigma[k], LOOSE)[:, None, None, None]
+    bm = np.clip(stagger[k, None, None, None] + side * bake.alpha_col[..., near], -_STEEPEST, _STEEPEST)
+    cl = side * bake.cl[k, :, :, near]
+    half = 0.25 * sigma * np.maximum(cl, 0.0) / np.cos(bm)
     t1, t2 = np.tan(bm) + half, np.tan(bm) - half
-    ratio = np.sqrt((1.0 + t1**2) / (1.0 + t2**2))  # cos(b2) / cos(b1)
-    sigma = np.maximum(bake.sigma, LOOSE)[:, None, None, None]
-    D_eq = np.clip(ratio * (1.12 + 0.61 / (1.0 + t1**2) / sigma * (t1 - t2)), 1.0, _D_EQ_MAX)
-    theta = 0.004 / (1.0 - 1.17 * np.log(D_eq))
-    cd = 2.0 * theta * np.cos(bm) ** 3 * (1.0 + t2**2) ** 1.5
-    return np.where((side * bake.cl > 0.0) & (np.abs(bake.alpha_col) < _ATTACHED), np.minimum(cd, 0.2), 0.0)
+    c1, c2 = 1.0 + t1 * t1, 1.0 + t2 * t2
+    D_eq = np.sqrt(c1 / c2) * (1.12 + 1.22 / c1 / sigma * half)
+    theta = 0.004 / (1.0 - 1.17 * np.log(np.clip(D_eq, 1.0, _D_EQ_MAX)))
+    return np.where(cl > 0.0, np.minimum(2.0 * theta * np.cos(bm) ** 3 * c2 * np.sqrt(c2), 0.2), 0.0)
