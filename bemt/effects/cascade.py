@@ -45,14 +45,16 @@ class Cascade(Effect):
 
     Losses of compressor rows, faded in likewise: drag is at least that of Lieblein's wake momentum thickness
     theta/c = 0.004 / (1 - 1.17 ln D_eq), D_eq = cos(b2) / cos(b1) (1.12 + 0.61 cos^2(b1) / sigma (tan(b1) - tan(b2)))
-    (Lieblein 1959, J. Basic Eng. 81:387; not checked).  A ducted row also pays for the walls: Howell (1945), Proc.
-    IMechE 153:441, secondary loss 0.018 cl^2 and annulus loss 0.020 s/h, with spacing s and blade height h (as quoted
-    in Cohen, Rogers and Saravanamuttoo; not checked against the paper).
+    (Lieblein 1959, J. Basic Eng. 81:387; not checked).  A ducted row also pays for the walls: secondary
+    loss 0.018 cl^2 (Howell 1945, Proc. IMechE 153:441) and annulus loss 0.010 s/h with spacing s and blade height h:
+    friction of both walls, 2 cf s/h with the cf of the duct's own walls.  Howell's 0.020 s/h is that of compressors of
+    many stages, with thick layers on their walls (as quoted in Cohen, Rogers and Saravanamuttoo; not checked against
+    the paper); with it four wide blades in nozzle 19A take up to twice the torque they are known to.
     """
 
     zero_lift: float = 1.0
     secondary: float = 0.018
-    annulus: float = 0.020
+    annulus: float = 0.010
     form: str = "potential"
 
     id = "cascade"
@@ -63,7 +65,7 @@ class Cascade(Effect):
     parameters = (
         Parameter("zero_lift", "1", 0.0, 1.0, "1: the row's zero-lift angle; 0: the single section's", steps=0),
         Parameter("secondary", "1", 0.010, 0.030, "Howell 1945: 0.018", steps=0),
-        Parameter("annulus", "1", 0.010, 0.030, "Howell 1945: 0.020", steps=0),
+        Parameter("annulus", "1", 0.0, 0.030, "wall friction: 0.010; Howell 1945: 0.020", steps=0),
     )
     order = 30
 
