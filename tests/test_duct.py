@@ -122,7 +122,7 @@ def f1(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Model:
 def test_f1_under_the_conditions_of_dfdc(
     f1: Model, shared_data: Path, friction: bool, limits: tuple[float, float, float]
 ) -> None:
-    """No gap and no lip loss; DFDC has no friction either, which is 2 points of the duct's share at rest, 5 in flight."""
+    """No gap and no lip loss; DFDC has no friction either, which is 2 points of share at rest, 5 in flight."""
     found = [
         r
         for r in rows(shared_data / "dfdc" / "reference.csv")
