@@ -134,9 +134,9 @@ def test_mirror_in_the_disk(off: list[str]) -> None:
     s, t = solver.solve(a, 5000.0, V, AIR), solver.solve(b, 5000.0, -V, AIR)
     assert s.converged.all()
     # the grid of angles is no mirror image of itself, and separated flow is read between its nodes
-    assert np.allclose(t.T, -s.T, rtol=1e-10, atol=1e-7 * np.abs(s.T).max())
-    assert np.allclose(t.Q, s.Q, rtol=1e-10, atol=1e-7 * np.abs(s.Q).max())
-    assert np.allclose(t.V_exit, -s.V_exit, rtol=1e-9, atol=1e-6)
+    assert np.allclose(t.T, -s.T, rtol=1e-10, atol=1e-5 * np.abs(s.T).max())
+    assert np.allclose(t.Q, s.Q, rtol=1e-10, atol=1e-5 * np.abs(s.Q).max())
+    assert np.allclose(t.V_exit, -s.V_exit, rtol=1e-9, atol=1e-4)
 
 
 def test_blade_count_matters_only_through_solidity_without_blade_losses(rotor: Rotor, polar: Polar) -> None:

@@ -68,7 +68,7 @@ def bake(solidity: float, stagger: float, polar: Polar, sections: tuple[tuple[fl
     one = np.ones(1)
     return Baking(
         r=one, dr=one, chord=one, beta=one * (0.5 * np.pi - stagger), sigma=one * solidity, R=1.0, Rhub=0.2, B=8,
-        alpha=ALPHA_GRID, Re=Re, M2=np.zeros(1), cl=cl, cd=cd, alpha0=zero, cla=slope, onset=np.zeros((1, 2)),
+        alpha=ALPHA_GRID, Re=Re, M2=np.zeros(1), cl=cl, cd=cd, alpha0=zero, cla=slope, Vx_factor=one, Vy_factor=one, Vx_add=0.0 * one, Vy_add=0.0 * one,
         thickness=one * 0.1, own_mach=0.0 * one, sections=sections,
     )  # fmt: skip
 
