@@ -65,12 +65,31 @@ def bake(solidity: float, stagger: float, polar: Polar, sections: tuple[tuple[fl
     q = polar.on_grid(ALPHA_GRID, Re, polar.M[:1])
     cl, cd = (v.transpose(2, 1, 0)[None].copy() for v in (q.cl, q.cd))
     zero, slope = zero_and_slope(ALPHA_GRID, cl[:, 0])
-    one = np.ones(1)
+    one, none = np.ones(1), np.zeros(1)
     return Baking(
-        r=one, dr=one, chord=one, beta=one * (0.5 * np.pi - stagger), sigma=one * solidity, R=1.0, Rhub=0.2, B=8,
-        alpha=ALPHA_GRID, Re=Re, M2=np.zeros(1), cl=cl, cd=cd, alpha0=zero, cla=slope, Vx_factor=one, Vy_factor=one, Vx_add=0.0 * one, Vy_add=0.0 * one,
-        thickness=one * 0.1, own_mach=0.0 * one, sections=sections,
-    )  # fmt: skip
+        r=one,
+        dr=one,
+        chord=one,
+        beta=one * (0.5 * np.pi - stagger),
+        sigma=one * solidity,
+        R=1.0,
+        Rhub=0.2,
+        B=8,
+        alpha=ALPHA_GRID,
+        Re=Re,
+        M2=none,
+        cl=cl,
+        cd=cd,
+        alpha0=zero,
+        cla=slope,
+        Vx_factor=one,
+        Vy_factor=one,
+        Vx_add=none,
+        Vy_add=none,
+        thickness=one * 0.1,
+        own_mach=none,
+        sections=sections,
+    )
 
 
 def lift_ahead(

@@ -18,7 +18,8 @@ from geometry.duct import Duct
 
 Array = NDArray[np.float64]
 
-WALL_PANELS, BODY_PANELS = 30, 12
+# Fewer than a hundred unknowns: beyond it a linear solver starts threads, which cost more than they save.
+WALL_PANELS, BODY_PANELS = 26, 7
 # Jet: panels grow by this ratio up to so many exit radii, beyond which a tube does nothing at the exit.
 _GROWTH, _REACH = 1.18, 40.0
 # Noses of hubs over their radius, tails beyond the exit over the radius there: declared.
