@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.effects.base import Array, Baking, Effect, Parameter, choice
+from bemt.effects.base import Array, Baking, Effect, Flow, Parameter, choice
 from bemt.sections.row import row_shift, weinig_factor
 
 if TYPE_CHECKING:
@@ -60,8 +60,7 @@ class Cascade(Effect):
     id = "cascade"
     inviscid = True
     title = "interference between blades at high solidity"
-    sign = "less lift where blades overlap; only rotors of solidity above about 0.3 show it"
-    diagnosed = False
+    sign = "less thrust and less torque by shares that grow with solidity and hardly know the speed; rotors above 0.3"
     parameters = (
         Parameter("zero_lift", "1", 0.0, 1.0, "1: the row's zero-lift angle; 0: the single section's", steps=0),
         Parameter("secondary", "1", 0.010, 0.030, "Howell 1945: 0.018", steps=0),
@@ -72,6 +71,15 @@ class Cascade(Effect):
     def __post_init__(self) -> None:
         """Refuse unknown forms."""
         choice("form", self.form, FORMS)
+
+    def applies(self, flow: Flow) -> str:
+        """Blades far apart are single ones."""
+        solidity = flow.B * flow.chord / (2.0 * np.pi * 0.75 * flow.R)
+        return "" if solidity > LOOSE else f"solidity {solidity:.2f} at 0.75 R: the blades are far apart"
+
+    def variants(self) -> tuple[dict[str, str | float], ...]:
+        """Both forms, and the row with the single section's zero-lift angle."""
+        return {"form": "potential"}, {"form": "carter"}, {"zero_lift": 0.0}
 
     def section(self, bake: Baking) -> None:
         """Read the tables at the angle that the row leaves of the incidence; add the losses of rows."""
