@@ -1,26 +1,36 @@
 """Duct correction: what a duct, its lip, its exit and a stator do to the momentum balance of a rotor.
 
 Control volume (McCormick 1967, "Aerodynamics of V/STOL Flight", ch. 9; Pereira 2008, PhD thesis Univ. of Maryland,
-sec. 2.2, eq. 2.20-2.40; notation ours).  The jet leaves at the exit with free-stream pressure and does not contract
-further, so with ``w`` the axial speed at the disk and ``sigma_w = A_exit / A_disk``::
+sec. 2.2, eq. 2.20-2.40; notation ours).  With ``w`` the mean axial speed of an annulus of the disk, ``sigma_w =
+A_exit / A_disk`` and the jet far behind, at the pressure of the stream, at ``V_j``::
 
-    V_j = w / sigma_w                                     continuity
+    w = sigma_w (c_V V + c_0 (V_j - V))                   continuity
     dT_rotor + dT_stator = 1/2 rho (V_j^2 - V^2) dA       Bernoulli on both sides of the disk
     dT_total = rho w (V_j - V) dA                         momentum of the whole system
 
-At rest T_rotor / T_total = 1 / (2 sigma_w); sigma_w = 1/2 gives back the open rotor.  Losses enter Bernoulli as
-``1/2 rho (K_wall w^2 + K_lip (w - V)^2)``.  A stator turns the swirl ``2 v_t`` behind the rotor back into pressure,
-``dT_stator = eta_s 1/2 rho (2 v_t)^2 dA``.  The annuli are independent of each other, as in the open rotor.
+The jet's area is ``c_0 A_exit`` at rest and comes to ``c_V A_exit`` where the rotor adds nothing to the stream; both
+are 1 for a long straight pipe and follow from the walls else (:mod:`bemt.bem.duct_stream`).  At rest T_rotor / T_total
+= 1 / (2 sigma_w c_0); 1/2 gives back the open rotor.  Losses enter Bernoulli as ``1/2 rho (K_wall w^2 + K_lip (w -
+V)^2)``.  A stator turns the swirl ``2 v_t`` behind the rotor back into pressure, ``dT_stator = eta_s 1/2 rho (2 v_t)^2
+dA``.  The annuli are independent of each other, as in the open rotor.  Swirl that is left on the body keeps its angular
+momentum ``k = r 2 v_t`` as the body tapers from Rhub to r_e at the exit, and its suction on the taper is no thrust::
+
+    D_swirl = (1 - eta_s) pi rho k^2 (ln(Rhub / r_e) - 1/2 (1 - r_e^2 / Rhub^2))
+
+(radial equilibrium of a free vortex; Horlock 1958, Axial Flow Compressors, ch. 6), r_e at least Rhub / 5, about the
+core of the vortex behind a hub (declared).
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from bemt.bem.duct_stream import jet_area
 
 if TYPE_CHECKING:
     from geometry.duct import Duct
@@ -28,10 +38,22 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Bellmouth in an end wall, loss over 1/2 rho w^2 against lip radius / diameter: Idelchik (2007), Handbook of Hydraulic
-# Resistance, 4th ed., diagram 3-4 (values from memory of the diagram, not checked against the book).
-_LIP_R_D = np.array([0.0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.08, 0.12, 0.16, 0.20])
-_LIP_K = np.array([0.50, 0.43, 0.36, 0.31, 0.26, 0.22, 0.20, 0.15, 0.09, 0.06, 0.03])
+# Rounded entrance, loss over 1/2 rho w^2 against lip radius / hydraulic diameter.  Nominal: Crane TP-410, p. A-29;
+# upper end: Idelchik (2007), Handbook of Hydraulic Resistance, 4th ed., diagram 3-4 (both from memory, not checked);
+# lower end: friction alone of a lip that does not separate, 0.03, from r/D 0.05 on.
+_LIP_R_D = np.array([0.0, 0.02, 0.04, 0.06, 0.10, 0.15])
+_LIP_K = np.array([0.50, 0.28, 0.24, 0.15, 0.09, 0.04])
+_LIP_R_D_HIGH = np.array([0.0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.08, 0.12, 0.16, 0.20])
+_LIP_K_HIGH = np.array([0.50, 0.43, 0.36, 0.31, 0.26, 0.22, 0.20, 0.15, 0.09, 0.06, 0.03])
+
+# Outer wall behind its widest place: the stream follows it up to the first angle and has left it at the second, where
+# it neither squeezes the jet nor gives its pressure back: base pressure (Hoerner 1965, Fluid-Dynamic Drag, ch. 3; not
+# checked; the two angles are declared).
+_BOATTAIL = math.radians(18.0), math.radians(24.0)
+BASE_PRESSURE = 0.15
+
+# A swirling jet's core over the hub radius; see the head of this file.
+CORE = 0.2
 
 # Turbulent skin friction of duct walls at Re of 1e5 to 1e7, Prandtl's 0.455/log10(Re)^2.58 between 0.007 and 0.003.
 WALL_FRICTION = 0.005
@@ -42,27 +64,38 @@ FORM_FACTOR = 1.25
 STATOR_RECOVERY = 0.8
 
 
-def lip_loss(radius_over_diameter: float) -> float:
+class LipLoss(NamedTuple):
+    """Loss over 1/2 rho w^2 and the range that sources give."""
+
+    nominal: float
+    low: float
+    high: float
+
+
+def lip_loss(radius_over_diameter: float) -> LipLoss:
     """Inlet loss of a rounded duct lip at rest.
 
     Parameters
     ----------
     radius_over_diameter : float
-        Lip radius over inner diameter [1].
+        Lip radius over the hydraulic diameter of the passage [1].
 
     Returns
     -------
-    float
-        Loss of total pressure over 1/2 rho w^2 [1].
+    LipLoss
+        Loss of total pressure over 1/2 rho w^2, and its range [1].
 
     Notes
     -----
-    Idelchik (2007), diagram 3-4 (not checked against the book).
+    Crane TP-410; Idelchik (2007), diagram 3-4 (not checked against the books).
 
-    >>> lip_loss(0.05)
-    0.22
+    >>> lip_loss(0.1)
+    LipLoss(nominal=0.09, low=0.03, high=0.12)
     """
-    return float(np.interp(max(radius_over_diameter, 0.0), _LIP_R_D, _LIP_K))
+    x = max(radius_over_diameter, 0.0)
+    low = float(np.interp(x, [0.0, 0.05], [0.50, 0.03]))
+    nominal, high = (float(np.interp(x, *table)) for table in ((_LIP_R_D, _LIP_K), (_LIP_R_D_HIGH, _LIP_K_HIGH)))
+    return LipLoss(nominal, min(low, nominal), max(high, nominal))
 
 
 @dataclass(frozen=True)
@@ -83,6 +116,12 @@ class DuctFlow:
         Blade height, R - Rhub [m].
     drag_area : float
         Drag of the outer wall over 1/2 rho V^2 [m2].
+    contraction, capture : float
+        Area of the jet over the exit's, at rest (c_0) and where the rotor adds nothing to the stream (c_V) [1].
+    area : float
+        Swept annulus, pi (R^2 - Rhub^2) [m2].
+    taper : float
+        Factor of rho k^2 in the suction of the swirl on the body behind the rotor, without a stator [1].
     """
 
     wake_ratio: float
@@ -92,6 +131,10 @@ class DuctFlow:
     gap: float = 0.0
     span: float = 1.0
     drag_area: float = 0.0
+    contraction: float = 1.0
+    capture: float = 1.0
+    area: float = float("nan")
+    taper: float = 0.0
 
     def total(self, rho: Array, V: Array, out: Array) -> tuple[Array, Array, Array]:
         """Thrust of rotor, stator and duct together.
@@ -100,20 +143,19 @@ class DuctFlow:
         ----------
         rho, V : (P,) float
             Density [kg/m3], onset speed [m/s].
-        out : (P, 8) float
+        out : (P, 11) float
             Kernel output [N, N m, kg/s, kg m/s2, ...], see :func:`bemt.bem.kernel.entry`.
 
         Returns
         -------
         tuple of (P,) float
-            Total thrust [N], stator thrust [N], mass-averaged exit speed [m/s].
+            Total thrust [N], stator thrust [N], mean speed in the exit plane, mass flow / (rho A_exit) [m/s].
         """
-        mdot, mdot_w, stator = out[:, 2], out[:, 3], out[:, 4]
-        jet = mdot_w / self.wake_ratio
+        mdot, jet, stator, spin = out[:, 2], out[:, 3], out[:, 4], out[:, 10]
         T = jet - mdot * V - 0.5 * rho * V * np.abs(V) * self.drag_area
         with np.errstate(divide="ignore", invalid="ignore"):
-            v_exit = np.where(mdot > 0, jet / mdot, np.nan)
-        return T, stator, v_exit
+            v_exit = np.where(mdot > 0.0, np.copysign(mdot / (rho * self.area * self.wake_ratio), jet), np.nan)
+        return T - (1.0 - self.stator) * self.taper * rho * spin**2, stator, v_exit
 
 
 def duct_flow(duct: Duct, rotor: Rotor) -> DuctFlow:
@@ -137,15 +179,38 @@ def duct_flow(duct: Duct, rotor: Rotor) -> DuctFlow:
         If the duct does not fit the rotor.
     """
     duct.check(rotor)
-    annulus = math.pi * (rotor.R**2 - rotor.Rhub**2)
     hydraulic = 2.0 * (duct.inner_radius - rotor.Rhub)
     outer = duct.inner_radius + duct.lip_radius
+    jet = jet_area(duct, rotor.Rhub)
+    left, base = _boattail(duct)
     return DuctFlow(
-        wake_ratio=duct.exit_area / annulus,
+        wake_ratio=duct.exit_area / rotor.annulus_area,
         wall_loss=WALL_FRICTION * 4.0 * duct.length / hydraulic,
-        lip_loss=lip_loss(duct.lip_radius / (2.0 * duct.inner_radius)),
+        lip_loss=lip_loss(duct.lip_radius / hydraulic).nominal,
         stator=STATOR_RECOVERY if duct.stator is not None else 0.0,
         gap=duct.gap,
         span=rotor.R - rotor.Rhub,
-        drag_area=WALL_FRICTION * FORM_FACTOR * 2.0 * math.pi * outer * duct.length,
+        drag_area=WALL_FRICTION * FORM_FACTOR * 2.0 * math.pi * outer * duct.length + left * BASE_PRESSURE * base,
+        contraction=jet.at_rest,
+        capture=jet.in_stream + left * (jet.at_rest - jet.in_stream),
+        area=rotor.annulus_area,
+        taper=_taper(duct.exit_hub_radius, rotor.Rhub),
     )
+
+
+def _boattail(duct: Duct) -> tuple[float, float]:
+    """Share of the stream that has left the outer wall behind its widest place, and the area facing back [m2]."""
+    x = np.linspace(0.0, duct.length, 201)
+    r = duct.outer(x)
+    widest = int(np.argmax(r))
+    angle = math.atan2(float(r[widest] - r[-1]), max(float(x[-1] - x[widest]), 1e-9))
+    left = (angle - _BOATTAIL[0]) / (_BOATTAIL[1] - _BOATTAIL[0])
+    return min(max(left, 0.0), 1.0), math.pi * float(r[widest] ** 2 - r[-1] ** 2)
+
+
+def _taper(exit_radius: float, hub: float) -> float:
+    """Suction of a free vortex on a body that tapers, over rho k^2."""
+    if not exit_radius < hub:
+        return 0.0
+    ratio = max(exit_radius / hub, CORE)
+    return math.pi * (-math.log(ratio) - 0.5 * (1.0 - ratio**2))

@@ -29,12 +29,15 @@ from bemt.bem.residual import (
     N_LEAK,
     N_NUM,
     N_STATOR,
+    N_STREAM,
     N_SWIRL,
     N_WAKE,
     ducted_rotor,
     lookup_factored,
     lookup_full,
     lookup_plain,
+    mass_share,
+    mean_share,
     open_rotor,
 )
 from bemt.bem.vecmath import atan2, fingerprint, inlined, intrinsic, njit, wide
@@ -48,8 +51,8 @@ OK, NOT_CONVERGED, JUMP, NOT_FINITE = range(4)
 N_STATION = 14
 P_OMEGA, P_V, P_RHO, P_MU, P_SOUND = range(5)
 N_POINT = 5
-O_T, O_Q, O_MASS, O_JET, O_STATOR, O_STATUS, O_WHERE, O_BRIDGED, O_STAGNANT, O_REVERSED = range(10)
-N_OUT = 10
+O_T, O_Q, O_MASS, O_JET, O_STATOR, O_STATUS, O_WHERE, O_BRIDGED, O_STAGNANT, O_REVERSED, O_SPIN = range(11)
+N_OUT = 11
 N_RADIAL = 11
 
 # Grid numbers behind ``num`` in ``par``: two-zone angle grid lo, hi, 1/fine, 1/coarse, index of lo, of hi, last cell;
@@ -197,7 +200,7 @@ def _guess_ducted(w, n_pad, fx):
         lift = A * (w[_BETA + k] - w[_CL + k])
         # with the onset from behind, begin where the rotor still drives the flow its own way
         e = lift if (lift > 0.0 and lam < 0.0) else lift + lam * abs(lam)
-        phi = 2.0 * e / (A + math.sqrt(A * A + 4.0 * fx[N_WAKE] * abs(e)) + 1e-12)
+        phi = 2.0 * e / (A + math.sqrt(A * A + 4.0 * fx[N_WAKE] * fx[N_WAKE] * abs(e)) + 1e-12)
         phi = phi if phi < 1.4 else 1.4
         phi = phi if phi > -1.4 else -1.4
         bare = w[_SG4 + k] == 0.0 and lam == 0.0
@@ -211,7 +214,8 @@ def _guess_ducted(w, n_pad, fx):
 def _point(element, guess, lookup, w, point, st, tab, par, out, radial):
     """Solve every station of one operating point and integrate."""
     wide()
-    fx = (par[0], par[1], par[2], par[3], par[4], par[5], par[6], par[7], par[8], par[9], par[10])
+    fx = (par[0], par[1], par[2], par[3], par[4], par[5], par[6], par[7], par[8], par[9], par[10],
+          par[11], par[12])  # fmt: skip
     o = N_NUM
     mach2 = par[o + 10] / (point[P_SOUND] * point[P_SOUND])
     g = (par[o], par[o + 1], par[o + 2], par[o + 3], par[o + 4], par[o + 5], par[o + 6], par[o + 7], par[o + 8],
@@ -227,6 +231,7 @@ def _point(element, guess, lookup, w, point, st, tab, par, out, radial):
     mass = 0.0
     jet = 0.0
     stator = 0.0
+    spin = 0.0
     worst = OK
     where = -1
     bridged = 0
@@ -279,26 +284,35 @@ def _point(element, guess, lookup, w, point, st, tab, par, out, radial):
             area = 2.0 * math.pi * st[i, S_R] * st[i, S_DR]
             if ducted:
                 W = UT / X
-                flow = F * W * abs(s)
+                flow = 0.0
             else:
                 drag = 1.0 + w[_SG4 + k] * cd / max(X, 1e-12)
                 W = (UT * c + UP * s) / drag if swirl else UT / c
                 flow = X * W
             axial = W * s
             v_t = UT - W * c if swirl else 0.0
+            leaves = axial
             dT = 0.5 * rho * W * W * st[i, S_CHORD] * B * st[i, S_DR] * (cl * c - cd * s)
             dQ = 0.5 * rho * W * W * st[i, S_CHORD] * B * st[i, S_DR] * (cl * s + cd * c) * st[i, S_R]
             if ducted:
                 dT *= 1.0 - fx[N_LEAK]
+                # means of the annulus
+                G, _ = mean_share(F, fx[N_WAKE])
+                mean = G * axial + (1.0 - G) * (1.0 + fx[N_STREAM]) / fx[N_WAKE] * UP
+                v_t *= F * mass_share(axial, mean)
+                axial = mean
+                flow = abs(axial)
+                leaves = fx[N_WAKE] * axial - fx[N_STREAM] * UP
             lost = w[_BAD + k] > 0.0
+            spin = 2.0 * v_t * st[i, S_R] if i == 0 else spin
             if not lost:
                 T += dT
                 Q += dQ
                 mass += rho * flow * area
-                jet += rho * flow * axial * area
+                jet += rho * flow * leaves * area
                 if ducted:
                     turned = max(v_t, 0.0)
-                    stator += fx[N_STATOR] * 2.0 * rho * F * turned * turned * area
+                    stator += fx[N_STATOR] * 2.0 * rho * turned * turned * area
                     reversed_ += 1 if axial < 0.0 else 0
                 elif fx[N_BRIDGE] > 0.0 and UP != 0.0:
                     y = s * (UT * c + UP * s) / UP
@@ -331,6 +345,7 @@ def _point(element, guess, lookup, w, point, st, tab, par, out, radial):
     out[O_BRIDGED] = bridged
     out[O_STAGNANT] = stagnant
     out[O_REVERSED] = reversed_
+    out[O_SPIN] = spin
 
 
 def _entries(stamp: int) -> dict[tuple[bool, str], Any]:
@@ -415,11 +430,12 @@ def entry(ducted: bool, tables: str) -> Callable[..., None]:
         tab : (L,)
             Section tables, flat: station, Mach number squared, Reynolds number, angle, (cl, cd); factored: station,
             the Reynolds numbers and then the squared Mach numbers, angle, (cl, cd) or (factor on cl, added cd).
-        par : (28,)
+        par : (30,)
             The numbers ``num`` of :mod:`bemt.bem.residual`, then the grid (see the source).
-        out : (P, 10)
-            Filled: T, Q, mass flow, mass flow times disk speed, stator thrust, worst status, its station, number of
-            stations in the turbulent windmill or vortex-ring state, where drag more than halves W, with reversed flow.
+        out : (P, 11)
+            Filled: T, Q, mass flow, mass flow times disk speed (ducted: jet speed), stator thrust, worst status, its
+            station, number of stations in the turbulent windmill or vortex-ring state, where drag more than halves W,
+            with reversed flow; r times the swirl behind the innermost station [m2/s].
         radial : (P, N, 11) or (P, 0, 11)
             Filled when it has rows: phi, alpha, cl, cd, W, w, v_t, F, dT, dQ, status.
     """

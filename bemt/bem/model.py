@@ -174,7 +174,7 @@ class Model:
             "power_W": Q * (s.rpm * (math.pi / 30.0)), "CT": CT, "CP": CP, "J": J, "eta": co.eta(J, CT, CP),
             "M_tip": co.M_tip(n, D, a), "Re75": co.Re75(self.chord75_m, n, D, s.V, rho, mu),
             "rotor_thrust_N": T_rotor, "duct_thrust_N": T_duct, "stator_thrust_N": s.T_stator,
-            "exhaust_speed_m_s": s.V_exit, "duct_share": share,
+            "exhaust_speed_m_s": s.V_exit, "mass_flow_kg_s": s.mass_flow, "duct_share": share,
         }  # fmt: skip
         provenance = {"source": "bemt", "effects": self._texts, "stations": self.n_stations}
         name = self.rotor.name or "rotor"
@@ -221,7 +221,7 @@ def solve(
         Of kind ``bemt``, NaN and flagged where not converged: ``rpm``, ``airspeed_m_s``, ``density_kg_m3``,
         ``thrust_N`` (with a duct, all of it), ``torque_Nm``, ``power_W``, ``CT``, ``CP``, ``J``, ``eta``, ``M_tip``
         (rotational), ``Re75``, ``rotor_thrust_N``, ``duct_thrust_N``, ``stator_thrust_N``, ``exhaust_speed_m_s`` (exit
-        or far wake), ``duct_share``.  Coefficients in the propeller convention.
+        or far wake), ``mass_flow_kg_s``, ``duct_share``.  Coefficients in the propeller convention.
 
     Raises
     ------

@@ -25,14 +25,23 @@ Re, Mach number and the mass flow of the bridge take ``W0 = U cos(psi)``, which 
 
 Without swirl v_t = 0, W = UT / cos(phi), and the terms of ``ct`` drop; the bracket is -90 to 90 deg of phi.
 
-Ducted rotor (:mod:`bemt.bem.duct` derives it).  With ``x = sigma ct / (4 F |sin(phi)|)`` the torque balance reads
-``W t = UT, t = cos(phi) + x, v_t = W x``, and Bernoulli's equation across the disk, times t^2, becomes::
+Ducted rotor (:mod:`bemt.bem.duct` derives it).  With ``x = sigma ct / (4 F |s|)``, s = sin(phi), the torque balance
+reads ``W t = UT, t = cos(phi) + x, v_t = W x``.  Speeds times t / UT, lam = V / UT: the mean of the annulus ``w = G s +
+(1 - G) w_V lam t``, w_V = (1 + k_V) / k_w, the jet ``j = k_w w - k_V lam t``; and Bernoulli's equation across the disk,
+times (t / UT)^2, becomes::
 
-    g = UT^2 (F K s |s| - sigma cn (1 - leak) - 4 eta F max(x, 0)^2) + F (K_lip max(UT s - V t, 0)^2 - V |V| t^2)
+    g = j |j| + K_wall w |w| + K_lip max(w - lam t, 0)^2 - lam |lam| t^2 - 4 eta (F max(x, 0) s / w)^2
+        - sigma cn (1 - leak)
 
-with ``s = sin(phi)`` and ``K = 1/sigma_w^2 + K_wall``.  The stator's vanes are set for the swirl of a driving rotor and
-turn no other.  t > 0 around phi = 0; where it reaches zero (W grows without bound) g is positive for phi > 0 and
-negative for phi < 0, so here too a root always exists; a negative one is flow reversed through the duct.
+F is the wake's: the mean of the speed that its sheets induce over that on them.  A blade is where they begin and sees
+half of the difference, in a duct as in the open, and the speed that walls induce as it is::
+
+    w_b - w = (1/F - 1) (V_j - V) / 2,   so   w - w_V V = G (w_b - w_V V),   1/G = 1 + (1/F - 1) k_w / 2
+
+which is F for the open rotor (k_w = 2, k_V = 1) and 2 F / (1 + F) in a pipe.
+The stator's vanes are set for the swirl of a driving rotor and turn no other.  t > 0 around phi = 0; where it reaches
+zero (W grows without bound) g is positive for phi > 0 and negative for phi < 0, so here too a root always exists; a
+negative one is flow reversed through the duct.
 """
 
 # mypy: allow-untyped-defs, allow-untyped-calls, allow-untyped-decorators, disable-error-code="attr-defined"
@@ -48,8 +57,8 @@ import numpy as np
 from bemt.bem.vecmath import inlined, log, sincos
 
 # Indices of the numbers that effects and duct may set (array ``num``).
-N_TIP, N_HUB, N_SWIRL, N_BRIDGE, N_DUCTED, N_WAKE, N_LIP, N_STATOR, N_GAP, N_LEAK, N_FAR = range(11)
-N_NUM = 11
+N_TIP, N_HUB, N_SWIRL, N_BRIDGE, N_DUCTED, N_WAKE, N_LIP, N_STATOR, N_GAP, N_LEAK, N_FAR, N_WALL, N_STREAM = range(13)
+N_NUM = 13
 
 _EPS = 1e-9
 _TWO_PI = 2.0 * math.pi
@@ -240,6 +249,20 @@ def _cell(tab, p0, wa):
 
 
 @inlined
+def mean_share(F, k_w):
+    """Share G of the rotor's own axial speed at the blade that is the mean of the annulus, and dG/dF."""
+    i_G = 1.0 + 0.5 * (1.0 / F - 1.0) * k_w
+    return 1.0 / i_G, 0.5 * k_w / (F * F * i_G * i_G)
+
+
+@inlined
+def mass_share(s, w):
+    """Axial speed at the blade over the mean of the annulus, held between 0 and 3."""
+    q = s / w if s * w > 0.0 else 0.0
+    return q if q < 3.0 else 3.0
+
+
+@inlined
 def open_rotor(lookup, phi, UT, UP, i_UP, beta, sg4, tip, hub, lre0, base, tab, g, fx):
     """Residual of an open rotor at one element.
 
@@ -342,6 +365,10 @@ def ducted_rotor(lookup, phi, UT, UP, i_UP, beta, sg4, tip, hub, lre0, base, tab
     dFh = slope * u * dln if u < _U_MAX else 0.0
     F = Ft * Fh
     dF = dFt * Fh + Ft * dFh
+    # an annulus that the blades leave alone has no speed of its own
+    free = F > 1e-3
+    F = F if free else 1e-3
+    dF = dF if free else 0.0
     load = fx[N_SWIRL] * sg4 / F * i_s
     dload = -load * (dF / F + c * sign * i_s)
     # Re and Mach number need W, which needs ct: once without swirl, then with it
@@ -369,17 +396,27 @@ def ducted_rotor(lookup, phi, UT, UP, i_UP, beta, sg4, tip, hub, lre0, base, tab
     dt = dx - s
     xp = x if x > 0.0 else 0.0
     lam = UP / UT
-    suck = s - lam * t
+    idle = (1.0 + fx[N_STREAM]) / fx[N_WAKE] * lam
+    G, dG = mean_share(F, fx[N_WAKE])
+    w = G * s + (1.0 - G) * idle * t
+    dw = dG * dF * (s - idle * t) + G * c + (1.0 - G) * idle * dt
+    suck = w - lam * t
     suck = suck if suck > 0.0 else 0.0
-    K = fx[N_WAKE]
+    jet = fx[N_WAKE] * w - fx[N_STREAM] * lam * t
+    wall = fx[N_WALL]
     lip = fx[N_LIP]
     eta = 4.0 * fx[N_STATOR]
     keep = 4.0 * sg4 * (1.0 - fx[N_LEAK])
     ram = lam * abs(lam)
-    bernoulli = K * s * sa - eta * xp * xp + lip * suck * suck - ram * t * t
-    res = F * bernoulli - keep * cn
-    slope = dF * bernoulli - keep * dcn
-    slope += F * (2.0 * K * sa * c - 2.0 * eta * xp * dx + 2.0 * lip * suck * (c - lam * dt) - 2.0 * ram * t * dt)
+    # mean swirl behind the blades, which carries their torque with the mean flow
+    q = mass_share(s, w)
+    free = q > 0.0 and q < 3.0
+    dq = (c - q * dw) / w if free else 0.0
+    turned = F * xp * q
+    dturned = (F * dx + dF * xp) * q + F * xp * dq
+    res = jet * abs(jet) + wall * w * abs(w) - eta * turned * turned + lip * suck * suck - ram * t * t - keep * cn
+    slope = abs(jet) * (fx[N_WAKE] * dw - fx[N_STREAM] * lam * dt) + wall * abs(w) * dw - eta * turned * dturned
+    slope = 2.0 * (slope + lip * suck * (dw - lam * dt) - ram * t * dt) - keep * dcn
     low = t < 1e-3
     res = sign if low else res
     slope = 0.0 if low else slope

@@ -71,7 +71,7 @@ class Prepared:
         Section tables as the kernel reads them, see :func:`bemt.bem.kernel.entry`; written out in ``tables`` [1].
     axes : (int, int)
         Mach and Reynolds numbers of the tables.
-    num, grid : (11,), (17,) float
+    num, grid : (13,), (17,) float
         Numbers of the effects and of the table axes, see :mod:`bemt.bem.residual` and
         :mod:`bemt.bem.kernel` [SI units].
     """
@@ -135,7 +135,10 @@ class Solution:
     CT, CQ, CP, J : (P,) float
         Propeller convention, CT = T/(rho n^2 D^4) [1].
     T_rotor, T_duct, T_stator, V_exit : (P,) float
-        Thrust shares [N]; exhaust speed [m/s] (ducted) or far-wake speed (open), averaged over the mass flow.
+        Thrust shares [N]; speed in the exit plane, mass flow / (rho A_exit) (ducted), or in the far wake, averaged
+        over the mass flow (open) [m/s].
+    mass_flow : (P,) float
+        Mass flow through the disk [kg/s].
     converged : (P,) bool
         False where any blade element failed.
     flags : tuple of tuple of str
@@ -157,6 +160,7 @@ class Solution:
     T_duct: Array
     T_stator: Array
     V_exit: Array
+    mass_flow: Array
     converged: NDArray[np.bool_]
     flags: tuple[tuple[str, ...], ...]
     radial: dict[str, Array] = field(default_factory=dict)
@@ -222,7 +226,9 @@ def prepare(
     if not any(e.id == "reynolds" for e in eff):
         polars = [(x, arrays.at_fixed_re(p)) for x, p in polars]
     for e in eff:
-        duct = _enclosed(duct, e.duct(), rotor)
+        duct = _enclosed(duct, e.duct())
+    if duct is not None:
+        duct = replace(duct, area=rotor.annulus_area, span=rotor.R - rotor.Rhub)
     blade = rotor.blade
     s = stations if stations is not None else blade.midpoints(n_stations, spacing="cosine")
     if not np.all(np.isfinite([s.r, s.dr, s.chord, s.beta])) or np.any(s.r <= 0) or np.any(s.chord < 0):
@@ -246,6 +252,7 @@ def prepare(
         Vy_add=np.zeros(s.r.size), thickness=np.interp(rR, [x for x, _ in shapes], [t for _, t in shapes]),
         own_mach=w @ np.array([float(p.M.size > 1) for _, p in polars]),
         gap=duct.gap if duct is not None else float("nan"), ducted=duct is not None, level=level,
+        sections=blade.anchors,
     )  # fmt: skip
     for hook in ("blade", "inflow", "section", "momentum"):
         for e in (e for e in eff if getattr(type(e), hook) is not getattr(Effect, hook)):
@@ -268,13 +275,13 @@ def _blended(w: Array, tables: Array) -> Array:
     return np.tensordot(w, tables, axes=1)
 
 
-def _enclosed(duct: DuctFlow | None, numbers: Mapping[str, float] | None, rotor: Rotor) -> DuctFlow | None:
+def _enclosed(duct: DuctFlow | None, numbers: Mapping[str, float] | None) -> DuctFlow | None:
     """Duct with the numbers that an effect sets; an open rotor gets a duct of its own."""
     if numbers is None:
         return duct
     from bemt.bem.duct import DuctFlow
 
-    return replace(duct or DuctFlow(1.0, span=rotor.R - rotor.Rhub), **numbers)
+    return replace(duct or DuctFlow(1.0), **numbers)
 
 
 def _numbers(bake: Baking, duct: DuctFlow | None) -> Array:
@@ -288,7 +295,9 @@ def _numbers(bake: Baking, duct: DuctFlow | None) -> Array:
     num[res.N_BRIDGE] = n.bridge
     if duct is not None:
         num[res.N_DUCTED] = 1.0
-        num[res.N_WAKE] = 1.0 / duct.wake_ratio**2 + duct.wall_loss
+        num[res.N_WAKE] = 1.0 / (duct.wake_ratio * duct.contraction)
+        num[res.N_STREAM] = duct.capture / duct.contraction - 1.0
+        num[res.N_WALL] = duct.wall_loss
         num[res.N_LIP] = duct.lip_loss
         num[res.N_STATOR] = duct.stator
         num[res.N_GAP] = n.gap_share
@@ -391,6 +400,7 @@ def _collect(prep: Prepared, rpm: Array, points: Array, out: Array, rad: Array) 
     if prep.duct is not None:
         T, T_stator, V_exit = (v * nan for v in prep.duct.total(rho, V, out))
         T_duct = T - T_rotor - T_stator
+        mass = out[:, K.O_MASS] * nan
     else:
         T, T_stator, T_duct = T_rotor, np.zeros_like(T_rotor), np.zeros_like(T_rotor)
         mass = out[:, K.O_MASS] * nan
@@ -401,7 +411,7 @@ def _collect(prep: Prepared, rpm: Array, points: Array, out: Array, rad: Array) 
     radial = _radial(prep, points, rad) if rad.shape[1] else {}
     return Solution(
         rpm, V, T, Q, Q * points[:, K.P_OMEGA], CT, CQ, 2.0 * np.pi * CQ, V / (n * D), T_rotor, T_duct, T_stator,
-        V_exit, ok, _flags(prep, points, out, ok), radial,
+        V_exit, mass, ok, _flags(prep, points, out, ok), radial,
     )  # fmt: skip
 
 

@@ -97,8 +97,8 @@ def _duct_flow(case: Case, rotor: Rotor) -> DuctFlow | None:
     if duct is None:
         return None
     flow = duct_flow(duct, rotor)
-    recovery = case.get("duct.stator.recovery")
-    return flow if recovery is None else dataclasses.replace(flow, stator=float(recovery))
+    given = {"stator": case.get("duct.stator.recovery"), "lip_loss": case.get("duct.lip_loss")}
+    return dataclasses.replace(flow, **{k: float(v) for k, v in given.items() if v is not None})
 
 
 def prepare_case(case: Case, overrides: Mapping[str, Any] | None = None, n_stations: int | None = None) -> Model:

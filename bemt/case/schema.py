@@ -210,6 +210,7 @@ class DuctTable(Table):
     tip_gap_mm: float | None = entry(key=_GAP)
     length_mm: float = entry(unit="mm", low=1, high=10_000, required=True, suspect=_metres("length_mm", 0.999))
     lip_radius_mm: float = entry(unit="mm", low=0, high=1000, default=0.0)
+    lip_loss: float | None = entry(low=0, high=1, suspect=_percent("lip_loss", 1.5))
     rotor_position_mm: float | None = entry(unit="mm", low=-1000, high=10_000)
     exit_area_ratio: float | None = entry(low=0.3, high=3, suspect=_percent("exit_area_ratio", 20.0))
     exit_diameter_mm: float | None = entry(unit="mm", low=5, high=6000, suspect=_metres("exit_diameter_mm", 4.9))

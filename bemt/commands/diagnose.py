@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from bemt.base.errors import EXIT_OK
 from bemt.commands import _options, _terminal
@@ -26,6 +27,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--baseline", choices=("bemt", "k1k2"), default="bemt", help=model)
     only = "consider these effects only (default: all)"
     parser.add_argument("--only", metavar="EFFECT", help=only, **_options.MANY)
+    blade = "loads along the blade (radial.csv of a campaign) beside those of the first case"
+    parser.add_argument("--along", metavar="FILE", help=blade)
     parser.add_argument("--out", metavar="DIR", help="write diagnosis.json, figures and the improved cases there")
     parser.add_argument("--no-figures", action="store_true", help="with --out: no figures")
     _options.add_json(parser, "bemt.diagnosis/1")
@@ -36,6 +39,7 @@ def run(args: argparse.Namespace) -> int:
     """Diagnose, write, print."""
     from bemt.base.tables import json_text
     from bemt.diagnose import folder
+    from bemt.diagnose.along_blade import along
     from bemt.diagnose.chain import diagnose
     from bemt.diagnose.document import document, text
     from bemt.diagnose.load import load_all
@@ -44,11 +48,14 @@ def run(args: argparse.Namespace) -> int:
                                  before=lambda found: folder.check(args.out, found))  # fmt: skip
     with _terminal.progress(args.quiet or args.json) as say:
         answer = diagnose(recordings, cases, args.only or None, say, baseline=args.baseline)
+    blade = along(cases[0], Path(args.along)) if args.along else {}
     found = document(answer) | {"recordings": list(args.recordings), "cases": [c.name for c in cases]}
+    if blade:
+        found["along_blade"] = {run: c.document() for run, c in blade.items()}
     if args.out:
         folder.write(args.out, answer, found, cases, figures=not args.no_figures)
     if args.json:
         print(json_text(found), end="")
     elif not args.quiet:
-        print(text(answer))
+        print("\n\n".join([text(answer), *(c.text() for c in blade.values())]))
     return EXIT_OK

@@ -13,10 +13,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from geometry.airfoil import Airfoil
 
 Array = NDArray[np.float64]
 
@@ -138,6 +141,8 @@ class Baking:
     level : float
         Share of an effect whose size differs from point to point, see :meth:`Effect.share`; the effect that uses it
         sets it back to 1 [1].
+    sections : tuple of (float, geometry.airfoil.Airfoil)
+        Shapes at r/R, ascending; empty where they are not known.
     """
 
     r: Array
@@ -164,6 +169,7 @@ class Baking:
     gap: float = float("nan")
     ducted: bool = False
     level: float = 1.0
+    sections: tuple[tuple[float, Airfoil], ...] = ()
     num: KernelNumbers = field(default_factory=KernelNumbers)
     mach_lift: Array | None = None
     mach_drag: Array | None = None

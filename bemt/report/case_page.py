@@ -224,6 +224,7 @@ def _fan(result: Mapping[str, Any]) -> str:
         ["thrust of the duct", num(fan["duct_thrust_N"]), "N"],
         ["thrust of the stator", num(fan["stator_thrust_N"]), "N"],
         ["share of the duct", num(fan["duct_share"], 3), "-"],
+        ["mass flow", num(fan.get("mass_flow_kg_s")), "kg/s"],
         ["exhaust speed", num(fan["exhaust_speed_m_s"]), "m/s"],
         ["u of the exhaust speed", num(fan["u_exhaust_speed_m_s"], 2, none="unknown"), "m/s"],
         ["momentum through the exit", num(fan["exit_momentum_N"]), "N"],

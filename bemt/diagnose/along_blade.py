@@ -1,0 +1,187 @@
+"""Loads along the blade beside those of a rotor: where they part, and which one effect brings them together."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.air import Air
+from bemt.base.errors import Fault, InputError
+from bemt.bem import solver
+from bemt.bem.model import Model, acts_on_points, acts_on_rotor
+from bemt.case.prepare import prepare_case
+from bemt.effects import catalogue, to_text
+from bemt.effects.base import Effect
+
+if TYPE_CHECKING:
+    from bemt.case import Case
+
+__all__ = ["BladeLoads", "Comparison", "along", "compare_along", "read_blade_loads"]
+
+Array = NDArray[np.float64]
+
+COLUMNS = ("r_m", "thrust_per_radius_N_m", "torque_per_radius_Nm_m")
+# Root and tip are left out: hubs are not modelled, and what the last percents of a blade carry no two codes agree on.
+BANDS = np.linspace(0.40, 0.95, 6)
+# An effect explains when it leaves at most this share of the squared misfit; those within this factor of the best are
+# not told apart.
+EXPLAINED, ALIKE = 0.3, 1.5
+# Loads that agree this well on the average need no explanation: grids of such CFD are no better.
+FINE = 0.10
+
+
+@dataclass(frozen=True)
+class BladeLoads:
+    """Thrust and torque per radius of the whole rotor at radii of one run [m], [N/m], [N m/m], and where it ran."""
+
+    run: str
+    r: Array
+    thrust: Array
+    torque: Array
+    rpm: float | None = None
+    V: float | None = None
+    density: float | None = None
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Rotor over recording in each band, and what is left of the squared misfit with each single effect.
+
+    Attributes
+    ----------
+    bands : (N + 1,) float
+        Edges over the tip radius [1].
+    thrust, torque : (N,) float
+        Load of the rotor over the recorded one [1].
+    left : dict of str to float
+        Effect as a case writes it to the share of the squared misfit that is left with it, best first [1].
+    named : tuple of str
+        Effects that explain and are not told apart; empty: none does, or nothing needs to.
+    """
+
+    bands: Array
+    thrust: Array
+    torque: Array
+    left: dict[str, float]
+    named: tuple[str, ...]
+
+    def text(self) -> str:
+        """Lines for people."""
+        rms = float(np.sqrt(np.mean(np.log(np.stack([self.thrust, self.torque])) ** 2)))
+        rows = [f"Along the blade the loads differ by {100 * rms:.0f} % on the average."]
+        for name, ratio in (("thrust", self.thrust), ("torque", self.torque)):
+            cells = (f"{a:.2f}-{b:.2f} R {100 * (v - 1):+.0f} %"
+                     for a, b, v in zip(self.bands[:-1], self.bands[1:], ratio, strict=True))  # fmt: skip
+            rows.append(f"  {name}: {', '.join(cells)}")
+        if self.named:
+            best = next(iter(self.left))
+            rows.append(
+                f"  {' or '.join(self.named)}: {best} leaves {100 * self.left[best]:.0f} % of the squared misfit."
+            )
+        elif rms > FINE:
+            rows.append("  No single effect explains it.")
+        return "\n".join(rows)
+
+    def document(self) -> dict[str, Any]:
+        """As JSON takes it."""
+        return {"bands": self.bands.tolist(), "thrust_ratio": self.thrust.tolist(),
+                "torque_ratio": self.torque.tolist(), "left": self.left, "named": list(self.named)}  # fmt: skip
+
+
+def read_blade_loads(path: Path) -> dict[str, BladeLoads]:
+    """Read ``radial.csv`` of a campaign: columns run, r_m, thrust_per_radius_N_m, torque_per_radius_Nm_m.
+
+    Speeds and density of each run come from ``recording.csv`` beside it, where there is one.
+    """
+    from bemt.readers import load_text, number
+
+    rows = list(csv.DictReader(load_text(path).lines))
+    needed = ("run", *COLUMNS)
+    missing = [name for name in needed if rows and name not in rows[0]]
+    if missing or not rows:
+        got = f"no column {', '.join(missing)}" if rows else "no rows"
+        raise InputError(Fault(path.as_posix(), "", got, ", ".join(needed)))
+    faults = [Fault(path.as_posix(), f"{i}: {c}", repr(row[c]), "a number")
+              for i, row in enumerate(rows, 2) for c in COLUMNS if number(row[c] or "") is None]  # fmt: skip
+    if faults:
+        raise InputError(faults)
+    runs = dict.fromkeys(str(row["run"]) for row in rows)
+    table = {run: np.array([[number(row[c]) for c in COLUMNS] for row in rows if row["run"] == run], float).T
+             for run in runs}  # fmt: skip
+    beside = path.with_name("recording.csv")
+    points = {row["run"]: row for row in csv.DictReader(load_text(beside).lines)} if beside.is_file() else {}
+
+    def at(run: str) -> tuple[float | None, ...]:
+        row = points.get(run, {})
+        return tuple(number(row.get(c) or "") for c in ("rpm", "airspeed_m_s", "density_kg_m3"))
+
+    return {run: BladeLoads(run, *columns, *at(run)) for run, columns in table.items()}
+
+
+def along(case: Case, path: Path) -> dict[str, Comparison]:
+    """Compare every run of a file of radial loads with a case, at the run's own speeds or the case's."""
+    model = prepare_case(case)
+    out = {}
+    for run, loads in read_blade_loads(path).items():
+        air = case.air() if loads.density is None else Air.from_density(loads.density)
+        rpm = case.rpm if loads.rpm is None else loads.rpm
+        out[run] = compare_along(model, loads, rpm, case.airspeed_m_s if loads.V is None else loads.V, air)
+    return out
+
+
+def compare_along(model: Model, loads: BladeLoads, rpm: float, V: float, air: Air) -> Comparison:
+    """Compare loads in bands along the blade, then with each effect changed alone."""
+    recorded = _banded(loads.r / model.rotor.R, np.stack([loads.thrust, loads.torque]))
+
+    def ratio(effects: Sequence[Effect]) -> Array:
+        prep = model.prepared([e for e in effects if not acts_on_points(e)])
+        s = solver.solve(prep, rpm, V, air, radial=True)
+        found = np.stack([s.radial[k][0] / prep.st[:, 1] for k in ("dT", "dQ")])
+        return _banded(np.broadcast_to(s.radial["r"], (1, prep.st.shape[0]))[0] / model.rotor.R, found) / recorded
+
+    def misfit(r: Array) -> float:
+        return float(np.sum(np.log(r) ** 2)) if np.all(r > 0.0) else np.inf
+
+    base = ratio(model.effects)
+    whole = misfit(base)
+    left = {}
+    for effect in _candidates(model):
+        others = [e for e in model.effects if e.id != effect.id]
+        left[to_text(effect)] = misfit(ratio([*others, effect])) / max(whole, 1e-12)
+    left = dict(sorted(left.items(), key=lambda item: item[1]))
+    best = next(iter(left.values()), np.inf)
+    named: tuple[str, ...] = ()
+    if whole / base.size > FINE**2 and best < EXPLAINED:
+        good = [text for text, share in left.items() if share <= max(ALIKE * best, 0.02)]
+        named = tuple(dict.fromkeys(text.partition("(")[0] for text in good))
+    return Comparison(BANDS, base[0], base[1], left, named)
+
+
+def _banded(x: Array, values: Array) -> Array:
+    """(2, N) mean of the values in each band, linear between radii."""
+    fine = np.linspace(BANDS[0], BANDS[-1], 10 * (BANDS.size - 1), endpoint=False) + 0.05 * (BANDS[1] - BANDS[0])
+    at = np.stack([np.interp(fine, x, v) for v in values])
+    return np.asarray(at.reshape(2, BANDS.size - 1, 10).mean(axis=2))
+
+
+def _candidates(model: Model) -> list[Effect]:
+    """Every diagnosed effect of the rotor, at each of its settings that the model does not have."""
+    out: list[Effect] = []
+    on = {e.id: e for e in model.effects}
+    for cls in catalogue().values():
+        plain = cls()
+        if not cls.diagnosed or not acts_on_rotor(plain):
+            continue
+        ranged = [(p.name, v) for p in cls.parameters if p.steps > 1 for v in np.linspace(p.low, p.high, p.steps)]
+        settings = [{}, *(plain.variants() or ({name: float(v)} for name, v in ranged))]
+        for setting in settings:
+            effect = replace(plain, **setting)  # type: ignore[type-var]
+            if on.get(effect.id) != effect and effect not in out:
+                out.append(effect)
+    return out

@@ -1,0 +1,68 @@
+"""Loads along the blade say where a rotor parts from its recording, and which effect brings it back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bemt.air import Air
+from bemt.bem import solver
+from bemt.bem.model import Model
+from bemt.case import Case, load_case
+from bemt.case.prepare import prepare_case
+from bemt.diagnose.along_blade import BladeLoads, along, compare_along, read_blade_loads
+
+AIR = Air.from_density(1.225)
+
+
+def fan(project: Path, folder: Path, model: str = "") -> Case:
+    """DS-30 without its stator, as our CFD has it."""
+    text = (project / "cases" / "ds30" / "case.toml").read_text()
+    text = text[: text.index("[[assumptions]]")].replace('references = "references.csv"\n', "")
+    text = text[: text.index("[duct.stator]")] + text[text.index("[operating]") :]
+    folder.mkdir(exist_ok=True)
+    (folder / "case.toml").write_text(text.replace("[model]", f"[model]\n{model}"))
+    return load_case(folder / "case.toml")
+
+
+def loads(model: Model, noise: float = 0.0) -> BladeLoads:
+    """What a rotor carries, as a recording."""
+    s = solver.solve(model.prep, 55000.0, 0.0, AIR, radial=True)
+    dr = model.prep.st[:, 1]
+    r = np.broadcast_to(s.radial["r"], (1, dr.size))[0]
+    wobble = 1.0 + noise * np.random.default_rng(3).standard_normal((2, dr.size))
+    return BladeLoads("made", r, s.radial["dT"][0] / dr * wobble[0], s.radial["dQ"][0] / dr * wobble[1])
+
+
+def test_a_rotor_beside_itself_needs_no_explanation(project: Path, tmp_path: Path) -> None:
+    model = prepare_case(fan(project, tmp_path))
+    found = compare_along(model, loads(model), 55000.0, 0.0, AIR)
+    assert found.thrust == pytest.approx(1.0, abs=1e-9) and found.torque == pytest.approx(1.0, abs=1e-9)
+    assert found.named == ()
+
+
+def test_the_row_is_found_along_the_blade(project: Path, tmp_path: Path) -> None:
+    truth = loads(prepare_case(fan(project, tmp_path / "whole")), noise=0.02)
+    bare = prepare_case(fan(project, tmp_path / "bare", 'effects_off = ["cascade"]'))
+    found = compare_along(bare, truth, 55000.0, 0.0, AIR)
+    assert found.named[0] == "cascade"
+    assert next(iter(found.left.values())) < 0.05
+
+
+@pytest.mark.parametrize("old", ['effects_on = ["cascade(zero_lift=0.0)"]', 'effects_off = ["cascade"]'])
+def test_our_cfd_names_a_class_with_the_row(project: Path, tmp_path: Path, old: str) -> None:
+    path = project / "reports" / "cfd" / "ds30" / "radial.csv"
+    (found,) = along(fan(project, tmp_path, old), path).values()
+    assert "cascade" in found.named, found.text()
+    (now,) = along(fan(project, tmp_path), path).values()
+    assert now.named == ()
+
+
+def test_a_file_without_its_columns_is_refused(tmp_path: Path) -> None:
+    from bemt.base.errors import InputError
+
+    (tmp_path / "radial.csv").write_text("run,r_m\na,0.1\n")
+    with pytest.raises(InputError, match="thrust_per_radius_N_m"):
+        read_blade_loads(tmp_path / "radial.csv")
