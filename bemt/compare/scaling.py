@@ -42,6 +42,8 @@ RIVAL, DOUBT = 0.1, 0.3
 _DENSITY = 0.004
 # Speed at equal command of one motor, in ln: battery and load change it by no more.
 _SAME_DRIVE = 0.06
+# No battery changes the speed at equal command by more than this, in ln.
+_ODD_SPEED = 0.4
 # Pole pairs left out, and one more or less than set.
 _POLE_PAIRS = (*((p, 1) for p in range(2, 15)), *((p + 1, p) for p in range(2, 9)))
 
@@ -525,7 +527,8 @@ def _weighed(
     if "rpm_scale" in score:
         means = _pole_slips(channels, speeds)
         if means:
-            z, mean = _shifted(means, white, r, none, 2 * len(_POLE_PAIRS))
+            odd = speeds is not None and abs(speeds[0]) > _ODD_SPEED
+            z, mean = _shifted(means, white, r, none, len(means) if odd else 2 * len(_POLE_PAIRS))
             if z > score["rpm_scale"]:
                 size["rpm_scale"] = mean / 2.0, 0.0
             score["rpm_scale"] = float(np.logaddexp(score["rpm_scale"], z)) - math.log(2.0)
