@@ -105,6 +105,11 @@ class MatchedChannel:
         a, b = self.x[~self.second, 0], self.x[self.second, 0]
         return max(float(a.min()), float(b.min())), min(float(a.max()), float(b.max()))
 
+    def common_advance(self) -> tuple[float, float]:
+        """Range of the second coordinate that both recordings have; low above high: none."""
+        a, b = self.x[~self.second, 1], self.x[self.second, 1]
+        return max(float(a.min()), float(b.min())), min(float(a.max()), float(b.max()))
+
     def advance_moves(self) -> bool:
         """Whether advance ratio differs between points."""
         return bool(np.ptp(self.x[:, 1]) > 1e-9)
@@ -418,8 +423,10 @@ def ratio_of(c: MatchedChannel, s: Scatter) -> dict[str, Any]:
     rows = [back[int(i)] for i in keep]
     ends = [np.exp(d[rows] + q * e[rows]) for q in (0.0, -1.96, 1.96)]
     out["curve"] = np.column_stack([c.x[keep], *ends]).tolist()
-    out["extrapolated"] = bool(apart)
+    slow, fast = c.common_advance()
+    out["extrapolated"] = bool(apart or slow > fast + _MARGIN * float(np.ptp(c.x[:, 1])))
     out["range"] = [low, high]
+    out["advance_range"] = [slow, fast]
     out["scatter"] = s.share
     out["points"] = [int((~c.second).sum()), int(c.second.sum())]
     return out
@@ -447,6 +454,10 @@ def in_common(c: MatchedChannel) -> MatchedChannel:
     low, high = c.common()
     margin = _MARGIN if c.name not in ("speed", "voltage") else _MARGIN * float(np.ptp(c.x[:, 0]))
     keep = (c.x[:, 0] >= low - margin) & (c.x[:, 0] <= high + margin)
+    slow, fast = c.common_advance()
+    if slow < fast:
+        margin = _MARGIN * float(np.ptp(c.x[:, 1]))
+        keep &= (c.x[:, 1] >= slow - margin) & (c.x[:, 1] <= fast + margin)
     enough = min(keep[c.second].sum(), keep[~c.second].sum()) >= 2
     return taken(c, keep) if low <= high and enough else c
 

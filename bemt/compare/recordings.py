@@ -187,7 +187,8 @@ def _assumed(a: StandRun, b: StandRun, diameter: float, loads: Mapping[str, Matc
         out.append("torque is not recorded in both: gain, air and blade scale alike in thrust alone")
     if "torque" in loads and loads["torque"].channel == "electrical_power_W":
         out.append("torque is not recorded: electrical power stands for it, with one motor and controller in both")
-    if not math.isfinite(diameter) and any(c.advance_moves() for c in loads.values()):
+    told = all("J" in r.values for r in (a, b))
+    if not told and not math.isfinite(diameter) and any(c.advance_moves() for c in loads.values()):
         out.append("no diameter: compared at equal advance per turn, V/n; --label 10x5 gives J")
     return out
 

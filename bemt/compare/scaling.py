@@ -133,12 +133,12 @@ LAWS: tuple[ScalingLaw, ...] = (
         "another pitch or blade angle",
         (
             (1.0, {_T: {"all": 1.0, "slope": -1.0}, _Q: {"all": 1.5, "slope": -1.0}}),
-            (0.4, {_Q: {"all": 1.0}}),
+            (0.8, {_Q: {"all": 1.0}}),
             (0.15, {_T: {"slope": 1.0}, _Q: {"slope": 1.0}}),
         ),
         "torque changes more than thrust, at every speed, and the advance ratio of zero thrust moves",
         "measure the blade angle; record a run with airspeed",
-        "momentum theory: P ~ T^1.5 at equal figure of merit",
+        "momentum theory: P ~ T^1.5 at equal figure of merit; blades near stall add torque and no thrust",
         sizes=(*_SIZES, 0.5),
     ),
     ScalingLaw(
