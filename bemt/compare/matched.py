@@ -23,7 +23,17 @@ from numpy.typing import NDArray
 
 from bemt.compare.stand_run import StandRun
 
-__all__ = ["DRIVE", "LOADS", "MatchedChannel", "Prepared", "Scatter", "covariance", "matched", "prepared", "ratio_of"]
+__all__ = [
+    "DRIVE",
+    "LOADS",
+    "MatchedChannel",
+    "MatchedRuns",
+    "Scatter",
+    "covariance",
+    "matched",
+    "prepared",
+    "ratio_of",
+]
 
 Array = NDArray[np.float64]
 
@@ -69,7 +79,7 @@ class MatchedChannel:
     channel : str
         Name of the reading.
     y : (N,) float
-        Logarithm of the reading over its power of the speed, and over the density where both recordings tell it.
+        Logarithm of the reading over its power of the speed, and over the density where both recordings tell it. [1]
     x : (N, 2) float
         ln rpm or the command, and advance ratio or advance per turn [m].
     second : (N,) bool
@@ -81,9 +91,9 @@ class MatchedChannel:
     u : (N,) float
         Stated relative uncertainty [1]; 0: none.
     log_density : float
-        ln of B's density over A's that was taken out of y.
+        ln of B's density over A's that was taken out of y. [1]
     session : float
-        Standard deviation of the level of a run, share.
+        Standard deviation of the level of a run, share. [1]
     notes : tuple of str
         What was left out.
     """
@@ -463,7 +473,7 @@ def in_common(c: MatchedChannel) -> MatchedChannel:
 
 
 @dataclass(frozen=True, eq=False)
-class Prepared:
+class MatchedRuns:
     """Channels of one kind that both recordings have.
 
     Parameters
@@ -485,7 +495,7 @@ class Prepared:
     strays: Mapping[str, int]
 
 
-def prepared(a: StandRun, b: StandRun, names: Sequence[str], diameter: float) -> Prepared:
+def prepared(a: StandRun, b: StandRun, names: Sequence[str], diameter: float) -> MatchedRuns:
     """Match channels, and find their scatter."""
     channels: dict[str, MatchedChannel] = {}
     free: dict[str, Scatter] = {}
@@ -501,4 +511,4 @@ def prepared(a: StandRun, b: StandRun, names: Sequence[str], diameter: float) ->
             likelier[name] = free[name] if loose > stiff else steady[name]
             if n:
                 strays[name] = n
-    return Prepared(channels, free, steady, likelier, strays)
+    return MatchedRuns(channels, free, steady, likelier, strays)

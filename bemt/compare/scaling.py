@@ -67,7 +67,7 @@ class ScalingLaw:
         respect to ln J; ``slip`` that over V; ``drag`` V^2 over thrust; ``n2`` square of the speed; ``volts`` ln of
         the voltage ratio at equal command, or 1 where it is not recorded.
     sizes : tuple of float
-        Standard deviations of the first term, share; they share the prior.
+        Standard deviations of the first term, share; they share the prior. [1]
     says : str
         Why this cause, in a sentence.
     settles : str

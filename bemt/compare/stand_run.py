@@ -65,7 +65,7 @@ class StandRun:
     notes : tuple of str
         What the reduction decided.
     diameter_m : float
-        As the recording or the label says; NaN: unknown.
+        As the recording or the label says; NaN: unknown. [m]
     """
 
     name: str
