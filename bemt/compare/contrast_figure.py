@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from bemt.compare.recordings import Change
+    from bemt.compare.recordings import RunChange
 
 __all__ = ["picture"]
 
@@ -35,12 +35,12 @@ _STYLE: dict[Any, Any] = {
 }
 
 
-def picture(change: Change, doc: Mapping[str, Any]) -> bytes:
+def picture(change: RunChange, doc: Mapping[str, Any]) -> bytes:
     """Draw it as PNG.
 
     Parameters
     ----------
-    change : Change
+    change : RunChange
         Outcome.
     doc : mapping
         ``bemt.comparison/1``, for the verdict.
@@ -80,7 +80,7 @@ def _abscissa(c: Any) -> Any:
     return c.x[:, 0] if c.name in ("speed", "voltage") else np.exp(c.x[:, 0])
 
 
-def _readings(axis: Any, change: Change, c: Any) -> None:
+def _readings(axis: Any, change: RunChange, c: Any) -> None:
     shift = np.where(c.second, c.log_density, 0.0)
     power = {"thrust_N": 2, "torque_Nm": 2, "power_W": 3, "electrical_power_W": 3}.get(c.channel, 0)
     density = change.a.density if math.isfinite(change.a.density) and c.log_density else 1.0

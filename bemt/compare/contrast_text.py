@@ -39,6 +39,8 @@ def _range(entry: Mapping[str, Any]) -> str:
     low, high = entry["range"]
     if entry["kind"] in ("speed", "voltage"):
         return ""
+    if high - low < 1e-9:
+        return "advance ratio {:.2f} to {:.2f}".format(*entry["advance_range"])
     return f"{math.exp(low):.0f} to {math.exp(high):.0f} rev/min"
 
 

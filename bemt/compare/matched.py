@@ -23,7 +23,17 @@ from numpy.typing import NDArray
 
 from bemt.compare.stand_run import StandRun
 
-__all__ = ["DRIVE", "LOADS", "MatchedChannel", "Prepared", "Scatter", "covariance", "matched", "prepared", "ratio_of"]
+__all__ = [
+    "DRIVE",
+    "LOADS",
+    "MatchedChannel",
+    "MatchedRuns",
+    "Scatter",
+    "covariance",
+    "matched",
+    "prepared",
+    "ratio_of",
+]
 
 Array = NDArray[np.float64]
 
@@ -69,7 +79,7 @@ class MatchedChannel:
     channel : str
         Name of the reading.
     y : (N,) float
-        Logarithm of the reading over its power of the speed, and over the density where both recordings tell it.
+        Logarithm of the reading over its power of the speed, and over the density where both recordings tell it. [1]
     x : (N, 2) float
         ln rpm or the command, and advance ratio or advance per turn [m].
     second : (N,) bool
@@ -81,9 +91,9 @@ class MatchedChannel:
     u : (N,) float
         Stated relative uncertainty [1]; 0: none.
     log_density : float
-        ln of B's density over A's that was taken out of y.
+        ln of B's density over A's that was taken out of y. [1]
     session : float
-        Standard deviation of the level of a run, share.
+        Standard deviation of the level of a run, share. [1]
     notes : tuple of str
         What was left out.
     """
@@ -103,6 +113,11 @@ class MatchedChannel:
     def common(self) -> tuple[float, float]:
         """Range of the first coordinate that both recordings have; low above high: none."""
         a, b = self.x[~self.second, 0], self.x[self.second, 0]
+        return max(float(a.min()), float(b.min())), min(float(a.max()), float(b.max()))
+
+    def common_advance(self) -> tuple[float, float]:
+        """Range of the second coordinate that both recordings have; low above high: none."""
+        a, b = self.x[~self.second, 1], self.x[self.second, 1]
         return max(float(a.min()), float(b.min())), min(float(a.max()), float(b.max()))
 
     def advance_moves(self) -> bool:
@@ -418,8 +433,10 @@ def ratio_of(c: MatchedChannel, s: Scatter) -> dict[str, Any]:
     rows = [back[int(i)] for i in keep]
     ends = [np.exp(d[rows] + q * e[rows]) for q in (0.0, -1.96, 1.96)]
     out["curve"] = np.column_stack([c.x[keep], *ends]).tolist()
-    out["extrapolated"] = bool(apart)
+    slow, fast = c.common_advance()
+    out["extrapolated"] = bool(apart or slow > fast + _MARGIN * float(np.ptp(c.x[:, 1])))
     out["range"] = [low, high]
+    out["advance_range"] = [slow, fast]
     out["scatter"] = s.share
     out["points"] = [int((~c.second).sum()), int(c.second.sum())]
     return out
@@ -447,12 +464,16 @@ def in_common(c: MatchedChannel) -> MatchedChannel:
     low, high = c.common()
     margin = _MARGIN if c.name not in ("speed", "voltage") else _MARGIN * float(np.ptp(c.x[:, 0]))
     keep = (c.x[:, 0] >= low - margin) & (c.x[:, 0] <= high + margin)
+    slow, fast = c.common_advance()
+    if slow < fast:
+        margin = _MARGIN * float(np.ptp(c.x[:, 1]))
+        keep &= (c.x[:, 1] >= slow - margin) & (c.x[:, 1] <= fast + margin)
     enough = min(keep[c.second].sum(), keep[~c.second].sum()) >= 2
     return taken(c, keep) if low <= high and enough else c
 
 
 @dataclass(frozen=True, eq=False)
-class Prepared:
+class MatchedRuns:
     """Channels of one kind that both recordings have.
 
     Parameters
@@ -474,7 +495,7 @@ class Prepared:
     strays: Mapping[str, int]
 
 
-def prepared(a: StandRun, b: StandRun, names: Sequence[str], diameter: float) -> Prepared:
+def prepared(a: StandRun, b: StandRun, names: Sequence[str], diameter: float) -> MatchedRuns:
     """Match channels, and find their scatter."""
     channels: dict[str, MatchedChannel] = {}
     free: dict[str, Scatter] = {}
@@ -490,4 +511,4 @@ def prepared(a: StandRun, b: StandRun, names: Sequence[str], diameter: float) ->
             likelier[name] = free[name] if loose > stiff else steady[name]
             if n:
                 strays[name] = n
-    return Prepared(channels, free, steady, likelier, strays)
+    return MatchedRuns(channels, free, steady, likelier, strays)

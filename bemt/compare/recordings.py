@@ -16,7 +16,7 @@ from bemt.compare.matched import MatchedChannel, Scatter
 from bemt.compare.scaling import Judgement, judge, law, weigh
 from bemt.compare.stand_run import StandRun
 
-__all__ = ["SCHEMA", "Change", "changed", "document"]
+__all__ = ["SCHEMA", "RunChange", "changed", "document"]
 
 SCHEMA = "bemt.comparison/1"
 _TOLD_DENSITY = 0.012
@@ -25,7 +25,7 @@ _MOVED, _WIDE = 2.5, 1.4
 
 
 @dataclass(frozen=True, eq=False)
-class Change:
+class RunChange:
     """Outcome of a comparison of two recordings.
 
     Parameters
@@ -67,7 +67,7 @@ class Change:
         return self.drive if self.loads.verdict == "none" and self.drive.effects else self.loads
 
 
-def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> Change:
+def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> RunChange:
     """Compare two recordings.
 
     Parameters
@@ -79,7 +79,7 @@ def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> Change:
 
     Returns
     -------
-    Change
+    RunChange
         Ratios and verdicts.
 
     Raises
@@ -117,7 +117,7 @@ def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> Change:
         motor = judge(*weigh(drive, (behind.free, behind.steady), ("drive",)))
     elif drive:
         motor = Judgement("insufficient", (), {}, {}, "the load changed or may have, and the drive follows it")
-    return Change(
+    return RunChange(
         a,
         b,
         diameter,
@@ -187,7 +187,8 @@ def _assumed(a: StandRun, b: StandRun, diameter: float, loads: Mapping[str, Matc
         out.append("torque is not recorded in both: gain, air and blade scale alike in thrust alone")
     if "torque" in loads and loads["torque"].channel == "electrical_power_W":
         out.append("torque is not recorded: electrical power stands for it, with one motor and controller in both")
-    if not math.isfinite(diameter) and any(c.advance_moves() for c in loads.values()):
+    told = all("J" in r.values for r in (a, b))
+    if not told and not math.isfinite(diameter) and any(c.advance_moves() for c in loads.values()):
         out.append("no diameter: compared at equal advance per turn, V/n; --label 10x5 gives J")
     return out
 
@@ -208,7 +209,7 @@ def _notes(a: StandRun, b: StandRun, channels: Mapping[str, MatchedChannel], str
     return list(dict.fromkeys([*out, *(f"A: {n}" for n in a.notes), *(f"B: {n}" for n in b.notes)]))
 
 
-def next_step(change: Change, files: Sequence[str]) -> dict[str, str]:
+def next_step(change: RunChange, files: Sequence[str]) -> dict[str, str]:
     """Run or reading that would settle the answer, and the command to give then."""
     said = change.leading
     torque = "torque" in {c.name for c in change.channels.values()}
@@ -230,12 +231,12 @@ def next_step(change: Change, files: Sequence[str]) -> dict[str, str]:
     return {"text": text, "command": command}
 
 
-def document(change: Change) -> dict[str, Any]:
+def document(change: RunChange) -> dict[str, Any]:
     """The document ``bemt.comparison/1`` without a case.
 
     Parameters
     ----------
-    change : Change
+    change : RunChange
         Outcome.
 
     Returns

@@ -42,6 +42,10 @@ RIVAL, DOUBT = 0.1, 0.3
 _DENSITY = 0.004
 # Speed at equal command of one motor, in ln: battery and load change it by no more.
 _SAME_DRIVE = 0.06
+# No battery changes the speed at equal command by more than this, in ln.
+_ODD_SPEED = 0.4
+# Pole pairs left out, and one more or less than set.
+_POLE_PAIRS = (*((p, 1) for p in range(2, 15)), *((p + 1, p) for p in range(2, 9)))
 
 Basis = Mapping[str, float]
 Term = tuple[float, Mapping[str, Basis]]
@@ -63,7 +67,7 @@ class ScalingLaw:
         respect to ln J; ``slip`` that over V; ``drag`` V^2 over thrust; ``n2`` square of the speed; ``volts`` ln of
         the voltage ratio at equal command, or 1 where it is not recorded.
     sizes : tuple of float
-        Standard deviations of the first term, share; they share the prior.
+        Standard deviations of the first term, share; they share the prior. [1]
     says : str
         Why this cause, in a sentence.
     settles : str
@@ -129,12 +133,12 @@ LAWS: tuple[ScalingLaw, ...] = (
         "another pitch or blade angle",
         (
             (1.0, {_T: {"all": 1.0, "slope": -1.0}, _Q: {"all": 1.5, "slope": -1.0}}),
-            (0.4, {_Q: {"all": 1.0}}),
+            (0.8, {_Q: {"all": 1.0}}),
             (0.15, {_T: {"slope": 1.0}, _Q: {"slope": 1.0}}),
         ),
         "torque changes more than thrust, at every speed, and the advance ratio of zero thrust moves",
         "measure the blade angle; record a run with airspeed",
-        "momentum theory: P ~ T^1.5 at equal figure of merit",
+        "momentum theory: P ~ T^1.5 at equal figure of merit; blades near stall add torque and no thrust",
         sizes=(*_SIZES, 0.5),
     ),
     ScalingLaw(
@@ -433,8 +437,7 @@ def _slips(channels: Mapping[str, MatchedChannel]) -> list[tuple[str, Array]]:
 
 def _pole_slips(channels: Mapping[str, MatchedChannel], speeds: tuple[float, float] | None) -> list[Array]:
     """Changes by a ratio of pole pairs: loads go with its square, (M,) means."""
-    pairs = [(p, 1) for p in range(2, 15)] + [(p + 1, p) for p in range(2, 9)]
-    ratios = [f for p, q in pairs for f in (p / q, q / p)]
+    ratios = [f for p, q in _POLE_PAIRS for f in (p / q, q / p)]
     second = np.concatenate([c.second.astype(float) for c in channels.values()])
     if speeds is not None:  # one motor at one command: what is indicated changes by the same ratio
         ratios = [f for f in ratios if abs(math.log(f) + speeds[0]) < _SAME_DRIVE + speeds[1]]
@@ -524,23 +527,26 @@ def _weighed(
     if "rpm_scale" in score:
         means = _pole_slips(channels, speeds)
         if means:
-            z, mean = _shifted(means, white, r, none)
+            odd = speeds is not None and abs(speeds[0]) > _ODD_SPEED
+            z, mean = _shifted(means, white, r, none, len(means) if odd else 2 * len(_POLE_PAIRS))
             if z > score["rpm_scale"]:
                 size["rpm_scale"] = mean / 2.0, 0.0
             score["rpm_scale"] = float(np.logaddexp(score["rpm_scale"], z)) - math.log(2.0)
     slips = _slips(channels) if "stand" in kinds else []
     if slips:
-        z, mean = _shifted([m for _, m in slips], white, r, none)
+        z, mean = _shifted([m for _, m in slips], white, r, none, len(slips))
         score["unit_slip"], size["unit_slip"] = z, (mean, 0.0)
     score[UNKNOWN] = _unknown(channels, base, none)
     return score, size
 
 
-def _shifted(means: Sequence[Array], white: Callable[[Array], Array], r: Array, none: float) -> tuple[float, float]:
-    """Log evidence of known changes that share the prior, and the likeliest one."""
+def _shifted(
+    means: Sequence[Array], white: Callable[[Array], Array], r: Array, none: float, ways: int
+) -> tuple[float, float]:
+    """Log evidence of known changes, of so many that share the prior, and the likeliest one."""
     terms = [0.5 * float(r @ r) - 0.5 * float(np.sum((r - white(m)) ** 2)) for m in means]
     mean = means[int(np.argmax(terms))]
-    return none + float(np.logaddexp.reduce(terms)) - math.log(len(terms)), float(mean[np.argmax(np.abs(mean))])
+    return none + float(np.logaddexp.reduce(terms)) - math.log(ways), float(mean[np.argmax(np.abs(mean))])
 
 
 def _evidence(row: ScalingLaw, A: Array, r: Array, size: float) -> tuple[float, float, float]:

@@ -20,6 +20,7 @@ __all__ = ["StandRun", "selected", "stand_run"]
 
 Array = NDArray[np.float64]
 
+_PURE = ("CT", "CP", "CQ", "J", "eta")
 _LOADS = ("thrust_N", "torque_Nm", "power_W", "CT", "CP", "CQ")
 _WANTED = (
     *_LOADS,
@@ -64,7 +65,7 @@ class StandRun:
     notes : tuple of str
         What the reduction decided.
     diameter_m : float
-        As the recording or the label says; NaN: unknown.
+        As the recording or the label says; NaN: unknown. [m]
     """
 
     name: str
@@ -219,7 +220,7 @@ def stand_run(
     InputError
         When there is no steady point, or nothing to compare.
     """
-    imported = selected(imported, conditions, name)
+    imported = _with_units(selected(imported, conditions, name))
     reduced, ramp = _reduced(imported, diameter_m)
     series = reduced.series
     values = {k: np.asarray(series.values[k], dtype=float) for k in _WANTED if k in series.values}
@@ -241,6 +242,15 @@ def stand_run(
     diameter = diameter_m if diameter_m is not None else float(constants.get("diameter_m", math.nan))
     notes = (*ramp, *(n for n in reduced.notes if "no density" not in n))
     return StandRun(told, values, u, session, command, density, notes, diameter)
+
+
+def _with_units(imported: Imported) -> Imported:
+    """Published coefficients have none; without this they would count as columns of unknown unit."""
+    channels = {
+        k: replace(c, unit="-") if not c.unit and (k in _PURE or k == "throttle") else c
+        for k, c in imported.channels.items()
+    }
+    return replace(imported, channels=channels)
 
 
 def _reduced(imported: Imported, diameter_m: float | None) -> tuple[Reduced, tuple[str, ...]]:

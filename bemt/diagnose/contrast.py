@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from bemt import __version__
 from bemt.base.errors import Fault, InputError
-from bemt.compare.recordings import Change, changed, document, next_step
+from bemt.compare.recordings import RunChange, changed, document, next_step
 from bemt.compare.stand_run import selected, stand_run
 
 if TYPE_CHECKING:
@@ -32,13 +32,13 @@ class Contrast:
 
     Attributes
     ----------
-    change : Change
+    change : RunChange
         Ratios and scaling.
     document : dict
         ``bemt.comparison/1``.
     """
 
-    change: Change
+    change: RunChange
     document: dict[str, Any]
 
     @property
@@ -171,7 +171,7 @@ def _diagnosed(
     return {k: said[k] for k in keys} | {"diagnosis": said, "case": case.name, "told": told}
 
 
-def _agreed(said: dict[str, Any], ratios: dict[str, Any], found: Change) -> dict[str, Any]:
+def _agreed(said: dict[str, Any], ratios: dict[str, Any], found: RunChange) -> dict[str, Any]:
     """The diagnosis where the ratios bear it out.
 
     The ratios know no blade and cannot be misled by one. An effect that cannot make them is struck; where they agree
