@@ -70,7 +70,7 @@ class Population:
     mean : (K,) float
         Expectation of the latent numbers for a blade whose stations are right, in the order and units of `NAMES`.
     cov : (K, K) float
-        Their covariance at size 1, blade angle as stated: what remains of the solver's own errors.
+        Their covariance at size 1 with the angle as stated: the solver's own errors [their units, squared].
     stations_deg, label_deg, family_deg, offset_deg : float
         Error of the stations' angle, of the label's, scatter of the offset between families, and the offset: blade
         angle at 0.75 R over the label's [deg].
