@@ -170,8 +170,7 @@ def test_a_stated_angle_turns_the_blade(tmp_path: Path) -> None:
     offset = load_case(_case(tmp_path / "c", LABEL + "\nbeta_offset_deg = 1.5"))
     rpm, J, one = np.array([5000.0]), np.array([0.3]), np.zeros(1, dtype=np.intp)
     CT = [
-        coefficients(prepare_case(c), c.air())(c.as_built().drawn, rpm, J, one)[0, 0]
-        for c in (plain, turned, offset)
+        coefficients(prepare_case(c), c.air())(c.as_built().drawn, rpm, J, one)[0, 0] for c in (plain, turned, offset)
     ]
     assert CT[1] == pytest.approx(CT[2], rel=1e-6) and CT[1] > CT[0]
     assert turned.as_built().prior.sd[0] == pytest.approx(0.1) and plain.as_built().prior.known_from == "label"

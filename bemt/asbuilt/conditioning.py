@@ -33,7 +33,7 @@ class Conditioned:
     f, T : (M,), (M, K) float
         The solver and its tangents there [unit of the readings].
     f0 : (M,) float
-        ``f - T (at - prior mean)``: the baseline for which a prior centred at the case counts nothing twice [unit of the
+        ``f - T (at - prior mean)``: the baseline for which a prior centred at the case counts nothing twice [of the
         readings].
     sizes, weights : (S,) float
         Heavy tail: factors on the prior's standard deviations and their posterior probabilities [1].
