@@ -170,8 +170,7 @@ def test_a_stated_angle_turns_the_blade(tmp_path: Path) -> None:
     offset = load_case(_case(tmp_path / "c", LABEL + "\nbeta_offset_deg = 1.5"))
     rpm, J, one = np.array([5000.0]), np.array([0.3]), np.zeros(1, dtype=np.intp)
     CT = [
-        coefficients(prepare_case(c), c.air())(c.as_built().drawn, rpm, J, one)[0, 0]
-        for c in (plain, turned, offset)
+        coefficients(prepare_case(c), c.air())(c.as_built().drawn, rpm, J, one)[0, 0] for c in (plain, turned, offset)
     ]
     assert CT[1] == pytest.approx(CT[2], rel=1e-6) and CT[1] > CT[0]
     assert turned.as_built().prior.sd[0] == pytest.approx(0.1) and plain.as_built().prior.known_from == "label"
@@ -218,3 +217,37 @@ def test_population_says_where_it_comes_from() -> None:
         and "--fit-population" in p.provenance["command"]
     )
     assert np.all(np.linalg.eigvalsh(p.cov) > -1e-12) and p.mean == pytest.approx(np.zeros(K))
+
+
+def test_paired_difference_knows_its_chance() -> None:
+    from bemt.compare.validate.paired import difference
+
+    random = np.random.default_rng(8)
+    theirs = random.uniform(0.05, 0.2, 60)
+    better = difference(list(zip(theirs - 0.03, theirs, strict=True)))
+    assert better["won"] == 60 and better["difference"] == pytest.approx(-0.03)
+    assert better["interval95"] == pytest.approx([-0.03, -0.03])
+    alike = difference(list(zip(theirs + 0.02 * random.normal(size=60), theirs, strict=True)))
+    low, high = alike["interval95"]
+    assert low < 0.0 < high
+
+
+def test_peer_agrees_with_the_solver_on_the_same_physics() -> None:
+    """CCBlade on a light propeller, same stations, tables and physics: thrust and power within a few percent."""
+    pytest.importorskip("wisdem", reason="the optional package wisdem is not installed")
+    from bemt import effects
+    from bemt.air import Air
+    from bemt.bem.model import Model
+    from bemt.compare.validate.peers import peer
+    from bemt.sections.neuralfoil import neuralfoil_polar
+    from geometry.airfoil import naca
+    from geometry.laws import from_laws
+    from geometry.rotor import Rotor
+
+    blade = from_laws(0.254, "apc_like", "helix", 0.15, pitch={"pitch": 0.15}, anchors=((0.75, naca("4412")),))
+    rotor, tables = Rotor(blade, 2), [(0.75, neuralfoil_polar(naca("4412")))]
+    physics = tuple(e for e in effects.standard() if e.id in ("tip_loss", "hub_loss", "swirl", "reynolds"))
+    J, rpm = np.array([0.2, 0.4, 0.5]), np.full(3, 6000.0)
+    ours = Model(rotor, tables, effects=physics).solve(rpm, J * rpm / 60.0 * rotor.D)
+    theirs = peer("ccblade").solve(rotor, tables, rpm, J, Air.from_density())
+    assert theirs[0] == pytest.approx(ours.CT, rel=0.04) and theirs[1] == pytest.approx(ours.CP, rel=0.04)

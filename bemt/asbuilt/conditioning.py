@@ -29,11 +29,12 @@ class Conditioned:
     mean, cov : (K,), (K, K) float
         Posterior of the latent numbers, in the units of the prior.
     at : (K,) float
-        Where the tangents were taken, within `TOLERANCE` of the mean when converged.
+        Where the tangents were taken, within `TOLERANCE` of the mean when converged [units of the prior].
     f, T : (M,), (M, K) float
-        The solver and its tangents there.
+        The solver and its tangents there [unit of the readings].
     f0 : (M,) float
-        ``f - T (at - prior mean)``: the baseline for which a prior centred at the case counts nothing twice.
+        ``f - T (at - prior mean)``: the baseline for which a prior centred at the case counts nothing twice [of the
+        readings].
     sizes, weights : (S,) float
         Heavy tail: factors on the prior's standard deviations and their posterior probabilities [1].
     steps : int

@@ -29,19 +29,7 @@ STATIC_BINS = 3
 
 @dataclass(frozen=True, eq=False)
 class Measured(Sensed):
-    """One measured propeller beside the solver, P rows of points or bins; the rest as in `Sensed`.
-
-    Attributes
-    ----------
-    name, family, section : str
-        What it is; section one of `bemt.asbuilt.population.SECTIONS`.
-    gap_deg : float
-        Blade angle at 0.75 R of the stations less that of the label, NaN without one [deg].
-    static : (P,) bool
-        Points at rest.
-    y : (2, P) float
-        CT and CP measured [1].
-    """
+    """One measured propeller beside the solver, P rows of points or bins; ``y`` (2, P) are CT and CP measured [1]."""
 
     name: str
     family: str
@@ -262,7 +250,7 @@ def fit(
     rotors : sequence of Measured
         Rows of points; they are binned here.
     start : (P,) float, optional
-        Numbers of an earlier search.
+        Numbers of an earlier search [1].
     most : int
         Largest number of steps of the search [1].
     provenance : mapping, optional

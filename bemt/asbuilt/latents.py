@@ -90,7 +90,7 @@ class Prior:
     mean : (K,) float
         Expectation, in the order and units of `NAMES`.
     cov : (K, K) float
-        Covariance at size 1.
+        Covariance at size 1 [units of `NAMES`, squared].
     sizes, weights : (S,) float
         Factors on all standard deviations of this rotor, and their probabilities: the heavy tail [1].
     known_from : str

@@ -39,6 +39,9 @@ CAMBER_SD = 1.2
 """Zero-lift angle of a section that nobody published, around the rule's [deg]: the ten families whose camber was
 calibrated lie at 3.5 to 6.5 % of the chord (rms 1.5 % from the rule's 3.5, less without slow flyers), 1.04 deg per
 percent in thin-airfoil theory (NACA four-digit mean line, largest camber at 40 % chord)."""
+SECTION_DRAG_SD = 0.2
+"""Scatter of ln(drag) of a section that nobody published, declared: its thickness may be 6 to 12 % and its surface is
+unknown."""
 SECTIONS = ("published", "calibrated", "rule", "given")
 """What a section may be: coordinates of the maker, camber calibrated on its family, the general rule, or declared."""
 _QUANTILES = np.array([0.02, 0.1, 0.3, 0.5, 0.7, 0.9])
@@ -70,7 +73,7 @@ class Population:
     mean : (K,) float
         Expectation of the latent numbers for a blade whose stations are right, in the order and units of `NAMES`.
     cov : (K, K) float
-        Their covariance at size 1, blade angle as stated: what remains of the solver's own errors.
+        Their covariance at size 1 with the angle as stated: the solver's own errors [their units, squared].
     stations_deg, label_deg, family_deg, offset_deg : float
         Error of the stations' angle, of the label's, scatter of the offset between families, and the offset: blade
         angle at 0.75 R over the label's [deg].
@@ -186,13 +189,14 @@ class Population:
             raise ValueError(f"got {known_from!r}, {section!r}; expected one of {KNOWN_FROM[:-1]} and of {SECTIONS}")
         growth = self.growth(diameter_m)
         mean, cov = self.mean.copy(), self.cov * growth**2
-        i, camber = NAMES.index("angle_deg"), NAMES.index("camber_deg")
+        i, drag, camber = (NAMES.index(name) for name in ("angle_deg", "drag", "camber_deg"))
         if "angle" not in declared:
             shift, variance = self.angle(known_from, growth, gap_deg, family)
             mean[i] += shift
             cov[i, i] += variance
         if section == "rule" and "camber" not in declared:
             cov[camber, camber] += CAMBER_SD**2
+            cov[drag, drag] += SECTION_DRAG_SD**2
         if known_from == "label" and "chord" not in declared:
             # a wider blade is more lift and more drag by the same share
             both = [NAMES.index("lift"), NAMES.index("drag")]

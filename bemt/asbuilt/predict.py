@@ -34,7 +34,7 @@ class Sensed:
     f, top : (2, P) float
         CT and CP, and those at rest at the same rpm [1].
     T : (2, K, P) float
-        Slopes of CT and CP with the latent numbers.
+        Slopes of CT and CP with the latent numbers [1 over their units].
     """
 
     diameter_m: float
@@ -108,7 +108,7 @@ def sense(solve: Solve, diameter_m: float, rpm: Array, J: Array, Re: Array, z: A
     rpm, J, Re : (P,) float
         Points [rev/min], [1], [1].
     z : (K,) float, optional
-        Latent numbers of the slopes; the drawing's by default.
+        Latent numbers of the slopes; the drawing's by default [units of `NAMES`].
 
     Returns
     -------
@@ -139,7 +139,7 @@ def predict(
     at : Sensed
         The solver there.
     mean : (2, P) float, optional
-        The real solver at ``prior.mean``; by default the linear one.
+        The real solver at ``prior.mean``; by default the linear one [1].
     reference : Reference, optional
         Run that the rotor's posterior comes from: it also tells of the rest nearby.
 

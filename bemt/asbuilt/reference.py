@@ -55,7 +55,7 @@ class Reference:
     noise : (2 M, 2 M) float
         Covariance without the latent numbers: rest, instrument [1].
     T : (2 M, K) float
-        Slopes with the latent numbers.
+        Slopes with the latent numbers [1 over their units].
     size : float
         How much larger the rest of this rotor is than usual [1].
     """

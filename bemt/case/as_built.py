@@ -43,7 +43,7 @@ class CaseAsBuilt:
     prior : Prior
         Law of the latent numbers, after the reference run if there is one.
     drawn : (K,) float
-        Latent numbers with which the case is solved: zero, or what the case states.
+        Latent numbers with which the case is solved: zero, or what the case states [units of `NAMES`].
     reference : Reference or None
         The run's rows.
     """
