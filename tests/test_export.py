@@ -13,8 +13,8 @@ import pytest
 from bemt.base.errors import InputError
 from bemt.case import load_case
 from bemt.commands.cli import main
+from bemt.exports.folder import export_case
 from bemt.exports.openfoam.write import Run, settings_of
-from bemt.exports.solids import export_case
 from geometry import export as module
 from geometry.airfoil import naca4
 from geometry.common import GeometryError
@@ -252,7 +252,7 @@ def test_all_faults_of_the_options_are_told_at_once(
     assert [line.split(":")[0] for line in told.splitlines()] == [
         "--rpm", "--airspeed", "--sideslip-deg", "--level", "--domain", "--sector", "--turbulence", "--incompressible",
         "fillet"]  # fmt: skip
-    assert told.count("expected nothing without the format openfoam. Add --format openfoam.") == 8
+    assert told.count("expected nothing with the format stl, obj. Formats that read it: ") == 8
     assert not (tmp_path / "o").exists()
 
 

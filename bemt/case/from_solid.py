@@ -15,7 +15,7 @@ from geometry.common import GeometryError
 from geometry.export import UNITS, read_solid
 from geometry.slicing import FoundRotor, find_rotor
 
-__all__ = ["case_files", "document", "read_stations", "text", "write"]
+__all__ = ["case_files", "document", "read_stations", "refuse_other", "text", "write"]
 
 SCHEMA = "bemt.stations/1"
 TIP_SPEED = 120.0  # of the rpm that is put into the case: geometry says nothing about it [m/s]
@@ -148,7 +148,7 @@ density_kg_m3 = 1.225
 
 
 
-def _refuse_other(path: Path, content: str) -> None:
+def refuse_other(path: Path, content: str) -> None:
     """Refuse to replace a case that somebody has changed or written."""
     if path.is_file() and path.read_bytes() != content.encode():
         raise InputError(Fault("--out", "", f"a folder with another case, {path.as_posix()}", "a folder without one",
@@ -187,6 +187,6 @@ def write(found: FoundRotor, scale: float, path: Path, out: Path) -> None:
     """Write the case; refused where it would replace another one."""
     stem = re.sub(r"[^A-Za-z0-9_.-]", "_", path.stem).lstrip("_.-") or "rotor"
     files = case_files(found, scale, stem, re.sub(r'["\\\n]', "_", path.name))
-    _refuse_other(out / "case.toml", files["case.toml"])
+    refuse_other(out / "case.toml", files["case.toml"])
     for name in sorted(files, key=lambda n: n == "case.toml"):  # the case last: what it names is there
         write_atomic(out / name, files[name])

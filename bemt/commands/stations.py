@@ -1,4 +1,4 @@
-"""``python -m bemt stations FILE``: stations of somebody's CAD model or scan, as a case that can be solved."""
+"""``python -m bemt stations FILE``: stations of a CAD model, a scan or a design tool's file, as a case to solve."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from bemt.base.errors import EXIT_OK
 from bemt.commands import _options
 
 NAME = "stations"
-HELP = "find and cut the blades of a CAD model or scan: a case to solve"
+HELP = "blades of a CAD model, a scan or a design tool's file: a case to solve"
 GROUP = "Solids and CFD"
 EXAMPLE = "stations rotor.stl --unit mm --out cases/mine"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument("file", metavar="FILE", help="STL, OBJ or STEP")
+    parser.add_argument("file", metavar="FILE", help="STL, OBJ, STEP; XROTOR, QPROP or DFDC")
     parser.add_argument("--unit", choices=("mm", "m", "in"), help="of an STL or OBJ that does not state it")
     parser.add_argument("--out", metavar="DIR", help="write case.toml, stations.csv and section files there")
     _options.add_json(parser, "bemt.stations/1")
@@ -26,9 +26,16 @@ def run(args: argparse.Namespace) -> int:
     from pathlib import Path
 
     from bemt.base.tables import json_text
-    from bemt.case import from_solid
+    from bemt.case import from_blade_file, from_solid
 
     path = Path(args.file)
+    blade = from_blade_file.read_blade(path, args.unit)
+    if blade is not None:
+        if args.out is not None:
+            from_blade_file.write(blade, path, Path(args.out))
+        document = from_blade_file.document(blade, path)
+        print(json_text(document) if args.json else from_blade_file.text(blade, path, args.out), end="")
+        return EXIT_OK
     found, scale, words = from_solid.read_stations(path, args.unit)
     if args.out is not None:
         from_solid.write(found, scale, path, Path(args.out))

@@ -1,1 +1,67 @@
-"""Command ``export``: a case as solids, surfaces and OpenFOAM cases (`command` joins them)."""
+"""Exports of a case, one file per target, found by scanning this folder: the file ``rotor_disk.py`` is ``rotor-disk``.
+
+An export is a class of :class:`bemt.exports.base.Export` whose ``id`` is the name of its file with ``-`` for ``_``.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from collections.abc import Mapping
+from functools import cache
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from bemt.exports.base import Export
+
+__all__ = ["exports", "target_ids"]
+
+_SHARED = {"base", "blades", "folder", "parts", "performance"}
+"""Files of this folder that are no targets."""
+
+
+def target_ids() -> list[str]:
+    """Words of ``--format``; imports no target.
+
+    Returns
+    -------
+    list of str
+        Sorted.
+
+    Examples
+    --------
+    >>> {"stl", "openfoam", "jsbsim"} <= set(target_ids())
+    True
+    """
+    return sorted(i.name.replace("_", "-") for i in pkgutil.iter_modules(__path__) if i.name not in _SHARED)
+
+
+@cache
+def exports() -> Mapping[str, Export]:
+    """Find the targets of this folder.
+
+    Returns
+    -------
+    mapping of str to Export
+        By id, sorted; read-only.
+
+    Raises
+    ------
+    TypeError
+        When a file holds no export of its own name (a bug, not an input error).
+    """
+    from bemt.exports.base import Export
+
+    found = {}
+    for word in target_ids():
+        module = importlib.import_module(f"{__name__}.{word.replace('-', '_')}")
+        own = [
+            c
+            for c in vars(module).values()
+            if isinstance(c, type) and issubclass(c, Export) and getattr(c, "id", None) == word
+        ]
+        if len(own) != 1:
+            raise TypeError(f"{module.__name__} is no export: it needs one class of Export with id = {word!r}")
+        found[word] = own[0]()
+    return MappingProxyType(found)

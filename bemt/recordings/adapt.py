@@ -23,7 +23,7 @@ from bemt.sections.polars import Polar
 __all__ = ["adapt", "damaged_export", "recognised"]
 
 _KIND = {"apc": "vendor", "uiuc": "bench", "references": "table"}
-_GEOMETRY = ("ApcBlade", "UiucGeometry", "UiucThickness")
+_GEOMETRY = ("ApcBlade", "BladeFile", "UiucGeometry", "UiucThickness")
 _EXPORT = "Export report files, monitors, force reports or CSV"
 _MARKS: tuple[tuple[bytes, str, str], ...] = (
     (b"\x89HDF", "HDF5 data (a case, mesh or field file)", _EXPORT),

@@ -6,5 +6,6 @@ thrust, blade 1 on the x axis.
 
 from bemt.exports.openfoam.case import case_files
 from bemt.exports.openfoam.settings import Body, Settings, Sweep, sector_choice
+from bemt.exports.openfoam.target import OpenfoamExport
 
-__all__ = ["Body", "Settings", "Sweep", "case_files", "sector_choice"]
+__all__ = ["Body", "OpenfoamExport", "Settings", "Sweep", "case_files", "sector_choice"]

@@ -1,0 +1,479 @@
+"""What an export is: one target in one file of this folder, a class of :class:`Export`."""
+
+from __future__ import annotations
+
+import hashlib
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.base.errors import Fault, InputError
+from bemt.exports.performance import Band, Loading, Performance, band_of, loading_of, performance_of, solve_points
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from bemt.case import Case
+
+__all__ = [
+    "FEATURES",
+    "BladeExport",
+    "DiskExport",
+    "Export",
+    "Files",
+    "Job",
+    "LoadsExport",
+    "SolidExport",
+    "entry",
+    "refuse",
+]
+
+Array = NDArray[np.float64]
+Files = Mapping[str, str | bytes]
+"""Content by path below the folder of the export."""
+
+FEATURES = {
+    "torque": "shaft torque beside thrust",
+    "airspeed": "thrust that falls with axial airspeed",
+    "windmill": "thrust below zero beyond the advance ratio of zero thrust",
+    "reynolds": "coefficients that change with speed of rotation (Reynolds number)",
+    "mach": "coefficients that change with tip Mach number",
+    "density": "loads that follow the air density of the simulation",
+    "rest": "the rotor at rest in the air (J = 0)",
+    "duct": "thrust of a duct beside that of the rotor",
+    "sections": "section polars, so that the target solves the inflow itself",
+}
+"""What a user may ask a target to hold (``--hold``), in words."""
+
+CONVENTION = "CT = T/(rho n^2 D^4), CP = P/(rho n^3 D^5), J = V/(n D), n in rev/s (propeller convention); SI units"
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is asked of an export.
+
+    Parameters
+    ----------
+    case : Case
+        The case, changes included.
+    rpm : float or None
+        Greatest speed of the tables and fits, speed of a disk; None is the case's. [rev/min]
+    airspeed_m_s : float or None
+        Axial speed of a disk and of frozen polars; None is the case's. [m/s]
+    hold : tuple of str
+        Keys of :data:`FEATURES` that the target must hold.
+    """
+
+    case: Case
+    rpm: float | None = None
+    airspeed_m_s: float | None = None
+    hold: tuple[str, ...] = ()
+
+    @property
+    def rpm_top(self) -> float:
+        """Greatest speed. [rev/min]"""
+        return self.case.rpm if self.rpm is None else float(self.rpm)
+
+    @property
+    def airspeed(self) -> float:
+        """Axial speed of the single point. [m/s]"""
+        return self.case.airspeed_m_s if self.airspeed_m_s is None else float(self.airspeed_m_s)
+
+    @property
+    def file(self) -> str:
+        """Name of the case file, for faults."""
+        return self.case.path.as_posix()
+
+    @cached_property
+    def performance(self) -> Performance:
+        """Thrust and torque over rpm and advance ratio; solved once."""
+        return performance_of(self.case, self.rpm_top)
+
+    @cached_property
+    def band(self) -> Band:
+        """Standard uncertainty of the prediction."""
+        return band_of(self.case, self.performance)
+
+    @cached_property
+    def loading(self) -> Loading:
+        """Loads along the blade at the single point."""
+        return loading_of(self.case, self.rpm_top, self.airspeed)
+
+
+class Export(ABC):
+    """A target: a simulator, a disk of a flow solver, a design tool, a solid.
+
+    A subclass in a module of ``bemt/exports/`` is found by scanning; its ``id`` is the word of ``--format``.
+
+    Attributes
+    ----------
+    id, title : str
+        Word of the command line; one line for people.
+    kind : str
+        ``solid``, ``loads`` (thrust and torque of a simulator), ``disk`` (a flow solver) or ``blade`` (a design tool).
+    holds : str
+        Model class of the target, as a formula where there is one.
+    features : frozenset of str
+        Keys of :data:`FEATURES` that the target holds.
+    conventions : str
+        Signs, axes and units of the written numbers.
+    source : str
+        Where format and formula come from.
+    needs : tuple of str
+        Python packages that writing needs beyond the standard installation.
+    uses : frozenset of str
+        Fields of `bemt.exports.openfoam.write.Run` that the target reads.
+    """
+
+    id: ClassVar[str]
+    title: ClassVar[str]
+    kind: ClassVar[str]
+    holds: ClassVar[str]
+    features: ClassVar[frozenset[str]] = frozenset()
+    conventions: ClassVar[str] = CONVENTION
+    source: ClassVar[str]
+    needs: ClassVar[tuple[str, ...]] = ()
+    uses: ClassVar[frozenset[str]] = frozenset()
+
+    def faults(self, job: Job) -> list[Fault]:
+        """What is asked and cannot be held; overriding methods add to this list.
+
+        Parameters
+        ----------
+        job : Job
+            What is asked.
+
+        Returns
+        -------
+        list of Fault
+            All faults.
+        """
+        import importlib.util
+
+        out = []
+        for word in job.hold:
+            if word not in self.features:
+                others = f"It holds {', '.join(sorted(self.features)) or 'shape only'}"
+                out.append(
+                    Fault(
+                        job.file,
+                        f"--hold {word}",
+                        f"the target {self.id}: {self.holds}",
+                        f"a target that holds {FEATURES[word]}",
+                        others,
+                    )
+                )
+        if job.case.ducted and self.kind != "loads" and "duct" not in self.features:
+            out.append(
+                Fault(
+                    job.file,
+                    f"--format {self.id}",
+                    "a rotor in a duct",
+                    "an open rotor",
+                    f"The target holds {self.holds}",
+                )
+            )
+        for name in self.needs:
+            if importlib.util.find_spec(name) is None:
+                out.append(
+                    Fault(
+                        "",
+                        f"--format {self.id}",
+                        f"no package {name}",
+                        "the extra of this target",
+                        "pip install 'bemt[simulators]'",
+                    )
+                )
+        return out
+
+    @abstractmethod
+    def write(self, job: Job) -> Files:
+        """Make the files.
+
+        Parameters
+        ----------
+        job : Job
+            What is asked; its `faults` are none.
+
+        Returns
+        -------
+        mapping of str to str or bytes
+            Content by path below the folder of the export.
+
+        Raises
+        ------
+        InputError
+            When the case cannot be solved there.
+        """
+
+    def notes(self, job: Job) -> list[str]:
+        """What a user of the files must know.
+
+        Parameters
+        ----------
+        job : Job
+            What was asked.
+
+        Returns
+        -------
+        list of str
+            Sentences.
+        """
+        return []
+
+    def checked(self, job: Job, files: Files) -> dict[str, Any]:
+        """Fit error, band and range for the manifest.
+
+        Parameters
+        ----------
+        job : Job
+            What was asked.
+        files : mapping
+            What :meth:`write` gave.
+
+        Returns
+        -------
+        dict
+            ``fit_error_pct``, ``band``, ``range``.
+        """
+        return {}
+
+
+class LoadsExport(Export):
+    """A target that holds thrust and torque: its fit is checked on the written files against fresh solves."""
+
+    kind = "loads"
+    uses = frozenset({"rpm"})
+
+    @abstractmethod
+    def loads(self, files: Files, rpm: Array, airspeed_m_s: Array) -> tuple[Array, Array]:
+        """The target's published formula, evaluated on the written files.
+
+        Parameters
+        ----------
+        files : mapping
+            What :meth:`write` gave.
+        rpm, airspeed_m_s : (P,) float
+            Points. [rev/min], [m/s]
+
+        Returns
+        -------
+        thrust, torque : (P,) float
+            Loads [N], [N m]; NaN where the target does not hold them.
+        """
+
+    def checked(self, job: Job, files: Files) -> dict[str, Any]:
+        """Errors at points that are no nodes of the table, at rest and over the flight range."""
+        table = job.performance
+        rpm, J = table.check_points()
+        V = J * rpm / 60.0 * table.diameter_m
+        truth = solve_points(job.case, rpm, V)
+        got = self.loads(files, rpm, V)
+        static = J == 0.0
+        top: dict[float, tuple[float, float]] = {
+            n: (float(np.max(truth.thrust_N[rpm == n])), float(np.max(truth.torque_Nm[rpm == n]))) for n in set(rpm)
+        }
+        errors: dict[str, Any] = {}
+        for i, (name, value, exact) in enumerate(
+            (("thrust", got[0], truth.thrust_N), ("torque", got[1], truth.torque_Nm))
+        ):
+            share = 100.0 * np.abs(value - exact) / np.array([top[n][i] for n in rpm])
+            errors[name] = {
+                "at_rest": _worst(share[static]),
+                "flight": _worst(share),
+                "flight_rms": None if np.isnan(share).any() else float(np.sqrt(np.mean(share**2))),
+            }
+        return {
+            "fit_error_pct": errors | {"of": "the greatest load at the same rpm", "points": int(rpm.size)},
+            "band": job.band.document(),
+            "range": table.range_document(),
+        }
+
+
+def _worst(share: Array) -> float | None:
+    """Greatest error; None where the target holds no such load."""
+    return None if share.size == 0 or np.isnan(share).any() else float(share.max())
+
+
+class DiskExport(Export):
+    """A target that holds the loads of a disk at one operating point."""
+
+    kind = "disk"
+    uses = frozenset({"rpm", "airspeed_m_s"})
+    at_rest: ClassVar[bool] = True
+
+    def faults(self, job: Job) -> list[Fault]:
+        """Refuse a point at rest where the target cannot hold it, and a rotor that is no propeller there."""
+        out = super().faults(job)
+        if not self.at_rest and not job.airspeed > 0.0:
+            out.append(
+                Fault(
+                    job.file,
+                    f"--format {self.id}",
+                    f"an airspeed of {job.airspeed:g} m/s",
+                    "a speed above 0",
+                    f"{self.holds}; give --airspeed",
+                )
+            )
+        return out
+
+    def checked(self, job: Job, files: Files) -> dict[str, Any]:
+        """Loads of the point, and what the written numbers integrate to."""
+        point = job.loading
+        T, Q = self.totals(job, files)
+        return {
+            "point": point.document(),
+            "fit_error_pct": {
+                "thrust": None if T is None else 100.0 * abs(T / point.thrust_N - 1.0),
+                "torque": None if Q is None else 100.0 * abs(Q / point.torque_Nm - 1.0),
+                "of": "the loads of the rotor at this point; null: the target solves the inflow itself",
+            },
+            "band": job.band.document(),
+            "range": {"rpm": point.rpm, "airspeed_m_s": point.airspeed_m_s, "density_kg_m3": point.rho},
+        }
+
+    def totals(self, job: Job, files: Files) -> tuple[float | None, float | None]:
+        """Thrust [N] and torque [N m] that the written numbers integrate to by the target's rule, or None."""
+        return None, None
+
+
+class SolidExport(Export):
+    """A solid; several in one folder share a manifest, which `bemt.exports.folder` sees to."""
+
+    kind = "solid"
+    holds = "shape"
+    conventions = "z along the shaft towards thrust, x the pitch axis of blade 1; unit in the manifest"
+
+    def write(self, job: Job) -> Files:
+        """The files that `geometry.export` makes, in millimetres."""
+        import tempfile
+        from pathlib import Path
+
+        from geometry.export import export
+
+        with tempfile.TemporaryDirectory() as folder:
+            made = export(job.case.rotor(), job.case.duct(), Path(folder), [self.id], name=job.case.name)
+            return {item["path"]: (Path(folder) / item["path"]).read_bytes() for item in made["files"]}
+
+    def faults(self, job: Job) -> list[Fault]:
+        """Nothing of a case is too much for a solid; loads are."""
+        return [
+            Fault(job.file, f"--hold {word}", f"the target {self.id}: shape", f"a target that holds {FEATURES[word]}")
+            for word in job.hold
+        ]
+
+
+class BladeExport(Export):
+    """A target that holds a blade and its sections, and solves itself: its file is read back and solved here."""
+
+    kind = "blade"
+    uses = frozenset({"rpm", "airspeed_m_s"})
+
+    def read_back(self, job: Job, files: Files, folder: Path) -> Case:
+        """The written file as a case, by the reader of the same name.
+
+        Parameters
+        ----------
+        job : Job
+            What was asked.
+        files : mapping
+            What :meth:`write` gave.
+        folder : Path
+            An empty folder.
+
+        Returns
+        -------
+        Case
+            The case, open rotor.
+        """
+        import importlib
+
+        from bemt.base.tables import write_atomic
+        from bemt.case import load_case
+        from bemt.readers._blade import case_text
+
+        name, data = next(iter(files.items()))
+        write_atomic(folder / name, data)
+        blade = importlib.import_module(f"bemt.readers.{self.id.replace('-', '_')}").read(folder / name)
+        for path, text in case_text(blade, "read_back", name).items():
+            write_atomic(folder / path, text)
+        return load_case(folder / "case.toml")
+
+    def compared(self, job: Job) -> Case:
+        """The case that what is read back is compared with."""
+        return job.case
+
+    def checked(self, job: Job, files: Files) -> dict[str, Any]:
+        """Loads of the file read back, at the operating point and over J at its speed, beside those of the case."""
+        import tempfile
+        from pathlib import Path
+
+        p = job.loading
+        zero = float(job.performance.J_zero[-1])
+        J = np.concatenate([[p.J], zero * np.array([0.0, 0.25, 0.5, 0.75, 0.95])])
+        V = J * p.rpm / 60.0 * 2.0 * p.R
+        truth = solve_points(self.compared(job), p.rpm, V)
+        with tempfile.TemporaryDirectory() as folder:
+            back = self.read_back(job, files, Path(folder))
+            got = solve_points(back, p.rpm, V)
+        errors: dict[str, Any] = {}
+        for name, x, y in (("thrust", got.thrust_N, truth.thrust_N), ("torque", got.torque_Nm, truth.torque_Nm)):
+            share = 100.0 * np.abs(x - y) / np.abs(y).max()
+            errors[name] = {"at_point": float(share[0]), "flight": float(share.max())}
+        return {
+            "point": p.document(),
+            "fit_error_pct": errors | {"of": "the greatest load at this rpm, read back and solved by this project"},
+            "band": job.band.document(),
+            "range": {
+                "rpm": p.rpm,
+                "airspeed_m_s": p.airspeed_m_s,
+                "density_kg_m3": p.rho,
+                "flight": "J from 0 to zero thrust at this rpm",
+            },
+        }
+
+
+def entry(export: Export, job: Job, files: Files) -> dict[str, Any]:
+    """Manifest entry of one target.
+
+    Parameters
+    ----------
+    export : Export
+        The target.
+    job : Job
+        What was asked.
+    files : mapping
+        What it wrote.
+
+    Returns
+    -------
+    dict
+        What a reader of the files must know, and a hash of each.
+    """
+    found: dict[str, Any] = {
+        "target": export.id,
+        "title": export.title,
+        "kind": export.kind,
+        "holds": export.holds,
+        "features": sorted(export.features),
+        "conventions": export.conventions,
+        "source": export.source,
+    }
+    found |= export.checked(job, files)
+    found["notes"] = export.notes(job)
+    found["files"] = [
+        {"path": name, "bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
+        for name, data in ((n, d.encode() if isinstance(d, str) else d) for n, d in files.items())
+    ]
+    return found
+
+
+def refuse(faults: list[Fault]) -> None:
+    """Raise all faults at once, if there are any."""
+    if faults:
+        raise InputError(faults)

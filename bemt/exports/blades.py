@@ -1,0 +1,126 @@
+"""Blade and sections as design tools and disks take them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.sections.polars import Polar
+
+if TYPE_CHECKING:
+    from bemt.exports.base import Job
+    from geometry.rotor import Rotor
+
+__all__ = ["MOST_STATIONS", "Frozen", "anchors_of", "baked", "stations"]
+
+Array = NDArray[np.float64]
+MOST_STATIONS = 60
+"""Stations that the tools take: QPROP 81, XROTOR and DFDC 60 to 100 by compilation."""
+
+
+def stations(rotor: Rotor) -> tuple[Array, Array, Array, bool]:
+    """Radius [m], chord [m] and blade angle [rad] of the stations as given, and whether they had to be thinned."""
+    blade = rotor.blade
+    if blade.r.size <= MOST_STATIONS:
+        return blade.r, blade.chord, blade.beta, False
+    r = np.linspace(blade.r[0], blade.r[-1], MOST_STATIONS)
+    return r, *blade.at(r), True
+
+
+def anchors_of(job: Job) -> list[tuple[float, Polar, float]]:
+    """Section tables of the case: r/R, table, Reynolds number there at the operating point."""
+    from bemt.bem import evaluate
+
+    point = job.loading
+    found = evaluate.prepare(job.case).model.polars
+    many = len(found) > 1
+    at = [np.clip(x, point.r[0] / point.R, point.r[-1] / point.R) if many else 0.75 for x, _ in found]
+    return [
+        (x, polar, float(np.interp(where, point.r / point.R, point.Re)))
+        for (x, polar), where in zip(found, at, strict=True)
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class Frozen:
+    """Tables at radii with Reynolds number held at that of the operating point.
+
+    Attributes
+    ----------
+    r, chord, beta : (S,) float
+        Stations. [m], [rad]
+    alpha : (Na,) float
+        Angles of attack. [rad]
+    M : (Nm,) float
+        Mach numbers.
+    cl, cd : (S, Na, Nm) float
+        Coefficients.
+    Re : (S,) float
+        Reynolds numbers that were held.
+    at_alpha, at_M : (S,) float
+        Angle of attack [rad] and Mach number of the operating point.
+    """
+
+    r: Array
+    chord: Array
+    beta: Array
+    alpha: Array
+    M: Array
+    cl: Array
+    cd: Array
+    Re: Array
+    at_alpha: Array
+    at_M: Array
+
+    def at_mach(self) -> tuple[Array, Array]:
+        """Coefficients (S, Na) at the Mach number of the operating point, linear in its square as in the solver."""
+        out = []
+        for table in (self.cl, self.cd):
+            rows = [[np.interp(m * m, self.M**2, row) for row in one] for m, one in zip(self.at_M, table, strict=True)]
+            out.append(np.array(rows))
+        return out[0], out[1]
+
+
+def baked(job: Job, count: int = 20) -> Frozen:
+    """Section tables as the solver uses them, all effects on sections included, at some of its stations."""
+    from bemt.bem import evaluate
+    from bemt.bem.packing import M2_STEP
+    from bemt.sections.polars import ALPHA_GRID
+
+    point = job.loading
+    prep = evaluate.prepare(job.case).prep
+    keep = np.unique(np.round(np.linspace(0, point.r.size - 1, min(count, point.r.size))).astype(int))
+    tab = prep.tab[keep]  # (S, Nm, Nr, Na, 2)
+    Re_axis = _re_axis(prep.grid, tab.shape[2])
+    mixed = np.empty((keep.size, tab.shape[1], tab.shape[3], 2))
+    for k, Re in enumerate(point.Re[keep]):
+        if tab.shape[2] == 1:
+            mixed[k] = tab[k, :, 0]
+            continue
+        x = np.log(np.clip(Re, Re_axis[0], Re_axis[-1]))
+        j = int(np.clip(np.searchsorted(np.log(Re_axis), x, side="right") - 1, 0, Re_axis.size - 2))
+        w = (x - np.log(Re_axis[j])) / np.log(Re_axis[j + 1] / Re_axis[j])
+        mixed[k] = (1.0 - w) * tab[k, :, j] + w * tab[k, :, j + 1]
+    M = np.sqrt(M2_STEP * np.arange(tab.shape[1]))
+    cl, cd = (np.swapaxes(mixed[..., i], 1, 2) for i in (0, 1))
+    return Frozen(
+        point.r[keep],
+        point.chord[keep],
+        point.beta[keep],
+        np.asarray(ALPHA_GRID),
+        M,
+        cl,
+        cd,
+        point.Re[keep],
+        point.alpha[keep],
+        point.M[keep],
+    )
+
+
+def _re_axis(grid: Array, count: int) -> Array:
+    """Reynolds numbers of the solver's tables (see `bemt.bem.packing.pack_grid`): uniform in the logarithm."""
+    first, inverse = float(grid[7]), float(grid[8])
+    return np.asarray(np.exp(first + np.arange(count) / (inverse or 1.0)))

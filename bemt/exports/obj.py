@@ -1,0 +1,13 @@
+"""OBJ solids."""
+
+from __future__ import annotations
+
+from bemt.exports.base import SolidExport
+
+
+class ObjExport(SolidExport):
+    """OBJ, triangles."""
+
+    id = "obj"
+    title = "OBJ, triangles"
+    source = "geometry.export"

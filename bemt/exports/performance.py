@@ -1,0 +1,395 @@
+"""Loads of a case for the exports: a table over rpm and advance ratio, one loaded blade, and the band of both."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bemt.base.errors import Fault, InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from bemt.bem.evaluate import Ready
+    from bemt.case import Case
+
+__all__ = ["Band", "Loading", "Performance", "PointLoads", "band_of", "loading_of", "performance_of", "solve_points"]
+
+Array = NDArray[np.float64]
+
+LOWEST = 0.25
+"""Lowest speed of a table over its greatest."""
+N_RPM = 16
+N_J = 25
+"""Steps from J = 0 to the greatest J of zero thrust."""
+BELOW, BEYOND = 3, 5
+"""Steps below J = 0 and beyond zero thrust: simulators hold the end of a table."""
+
+
+@dataclass(frozen=True, eq=False)
+class PointLoads:
+    """Thrust [N] and torque [N m] at (P,) points."""
+
+    thrust_N: Array
+    torque_Nm: Array
+
+
+def _prepared(case: Case, overrides: Mapping[str, Any] | None = None) -> Ready:
+    from bemt.bem import evaluate
+
+    return evaluate.prepare(case, overrides)
+
+
+def solve_points(
+    case: Case,
+    rpm: ArrayLike,
+    airspeed_m_s: ArrayLike,
+    overrides: Mapping[str, Any] | None = None,
+    ready: Ready | None = None,
+) -> PointLoads:
+    """Solve points of a case; the one place of the exports that asks the solver for loads."""
+    from bemt.bem import evaluate
+
+    rpm, V = np.broadcast_arrays(np.asarray(rpm, dtype=float), np.asarray(airspeed_m_s, dtype=float))
+    found = evaluate.evaluate(ready or _prepared(case, overrides), rpm.ravel(), V.ravel(), case.air(overrides))
+    if not found.converged.all():
+        bad = int(np.flatnonzero(~found.converged)[0])
+        where = f"{found.rpm[bad]:g} rev/min, {found.airspeed_m_s[bad]:g} m/s"
+        words = "; ".join(found.flags[bad]) or "not converged"
+        raise InputError(Fault(case.path.as_posix(), where, words, "a converged point", "Nothing was written"))
+    return PointLoads(found.thrust_N, found.torque_Nm)
+
+
+@dataclass(frozen=True, eq=False)
+class Performance:
+    """Loads over speed of rotation and advance ratio.
+
+    Attributes
+    ----------
+    name : str
+        Of the case.
+    rpm : (R,) float
+        Ascending. [rev/min]
+    J : (K,) float
+        Ascending, from below 0 to beyond zero thrust; holds 0. [-]
+    thrust_N, torque_Nm, CT, CP : (R, K) float
+        Loads [N], [N m]; propeller convention. [-]
+    J_zero : (R,) float
+        Where thrust vanishes. [-]
+    diameter_m, rho, a_sound, mu : float
+        Of rotor and air. [m], [kg/m3], [m/s], [Pa s]
+    blades, sense : int
+        Number; +1 right-handed, seen from behind clockwise.
+    """
+
+    name: str
+    rpm: Array
+    J: Array
+    thrust_N: Array
+    torque_Nm: Array
+    CT: Array
+    CP: Array
+    J_zero: Array
+    diameter_m: float
+    rho: float
+    a_sound: float
+    mu: float
+    blades: int
+    sense: int
+
+    @property
+    def at_rest(self) -> int:
+        """Index of J = 0."""
+        return int(np.flatnonzero(self.J == 0.0)[0])
+
+    def check_points(self) -> tuple[Array, Array]:
+        """Speeds and advance ratios between the nodes, from rest to zero thrust, (P,) each."""
+        rpm = np.sqrt(self.rpm[1:] * self.rpm[:-1])
+        last = np.interp(rpm, self.rpm, self.J_zero)
+        share = np.array([0.0, 0.031, 0.13, 0.27, 0.39, 0.52, 0.63, 0.77, 0.89, 0.97])
+        return np.repeat(rpm, share.size), (last[:, None] * share).ravel()
+
+    def flight_nodes(self) -> tuple[Array, Array, Array, Array]:
+        """Speed, J, CT and CP at nodes from rest to zero thrust, (N,) each: what fits of few numbers are made to."""
+        rpm, J = np.meshgrid(self.rpm, self.J, indexing="ij")
+        inside = (J >= 0.0) & (J <= self.J_zero[:, None])
+        return rpm[inside], J[inside], self.CT[inside], self.CP[inside]
+
+    def lookup(self, rpm: ArrayLike, airspeed_m_s: ArrayLike) -> tuple[Array, Array]:
+        """Thrust [N] and torque [N m] from CT and CP linear in rpm and J, held at the ends."""
+        rpm_, V = np.asarray(rpm, dtype=float), np.asarray(airspeed_m_s, dtype=float)
+        return table_loads(self.rpm, self.J, self.CT, self.CP, self.rho, self.diameter_m, rpm_, V)
+
+    def range_document(self) -> dict[str, Any]:
+        """Where the table holds, for the manifest."""
+        n = self.rpm / 60.0
+        return {
+            "rpm": [float(self.rpm[0]), float(self.rpm[-1])],
+            "J": [float(self.J[0]), float(self.J[-1])],
+            "J_zero_thrust": [float(self.J_zero[0]), float(self.J_zero[-1])],
+            "airspeed_m_s_of_zero_thrust_at_greatest_rpm": float(self.J_zero[-1] * n[-1] * self.diameter_m),
+            "tip_mach_greatest": float(np.pi * n[-1] * self.diameter_m / self.a_sound),
+            "density_kg_m3": self.rho,
+            "diameter_m": self.diameter_m,
+            "flight": "J from 0 to zero thrust; axial flow, steady; beyond it the momentum theory is doubtful",
+        }
+
+
+def table_loads(
+    rpm_axis: Array, J_axis: Array, CT: Array, CP: Array, rho: float, D: float, rpm: Array, V: Array
+) -> tuple[Array, Array]:
+    """Thrust [N] and torque [N m] of a table of coefficients (R, K), bilinear in rpm and J, held at the ends."""
+    n = rpm / 60.0
+    J = V / np.where(n > 0.0, n * D, np.inf)
+
+    def cell(axis: Array, x: Array) -> tuple[NDArray[np.intp], Array]:
+        i = np.clip(np.searchsorted(axis, x, side="right") - 1, 0, axis.size - 2)
+        return i, np.clip((x - axis[i]) / (axis[i + 1] - axis[i]), 0.0, 1.0)
+
+    (i, a), (j, b) = cell(rpm_axis, rpm), cell(J_axis, J)
+    ct, cp = (
+        (1 - a) * ((1 - b) * C[i, j] + b * C[i, j + 1]) + a * ((1 - b) * C[i + 1, j] + b * C[i + 1, j + 1])
+        for C in (CT, CP)
+    )
+    scale = rho * n**2 * D**4
+    return np.asarray(ct * scale), np.asarray(cp * scale * D / (2.0 * np.pi))
+
+
+def _zero_thrust(J: Array, CT: Array) -> float:
+    """First J above 0 where CT falls through zero, NaN without one."""
+    ahead = J >= 0.0
+    j, c = J[ahead], CT[ahead]
+    down = np.flatnonzero((c[:-1] > 0.0) & (c[1:] <= 0.0))
+    if down.size == 0:
+        return float("nan")
+    k = int(down[0])
+    return float(j[k] + c[k] * (j[k + 1] - j[k]) / (c[k] - c[k + 1]))
+
+
+def performance_of(case: Case, rpm_top: float) -> Performance:
+    """Tabulate a case from a quarter of a speed up to it, from below J = 0 to beyond zero thrust."""
+    ready = _prepared(case)
+    D, air = ready.diameter_m, case.air()
+    rpm = np.asarray(
+        rpm_top * np.linspace(LOWEST, 1.0, N_RPM), dtype=float
+    )  # equal steps: Mach number matters at the upper end
+
+    def solve(J: Array, speeds: Array) -> tuple[Array, Array]:
+        n, j = np.meshgrid(speeds, J, indexing="ij")
+        found = solve_points(case, n, j * n / 60.0 * D, ready=ready)
+        return found.thrust_N.reshape(n.shape), found.torque_Nm.reshape(n.shape)
+
+    def zeros(J: Array) -> Array:
+        T, _ = solve(J, rpm)
+        return np.array([_zero_thrust(J, row) for row in T])
+
+    wide = np.linspace(0.0, 4.0, 81)
+    first = zeros(wide)
+    if np.isnan(first).any():
+        got = f"no zero of thrust below J = {wide[-1]:g} at {rpm[int(np.flatnonzero(np.isnan(first))[0])]:.0f} rev/min"
+        raise InputError(
+            Fault(
+                case.path.as_posix(),
+                "operating",
+                got,
+                "a rotor that makes thrust at rest and none at speed",
+                "A table over J has no end without it",
+            )
+        )
+    step = float(first.max()) / N_J
+    J = np.asarray(step * np.arange(-BELOW, N_J + BEYOND + 1), dtype=float)
+    J[BELOW] = 0.0
+    T, Q = solve(J, rpm)
+    fine = np.linspace(0.0, 1.02 * float(first.max()), 409)
+    scale = air.rho * (rpm[:, None] / 60.0) ** 2 * D**4
+    return Performance(
+        name=case.name,
+        rpm=rpm,
+        J=J,
+        thrust_N=T,
+        torque_Nm=Q,
+        CT=T / scale,
+        CP=2.0 * np.pi * Q / (scale * D),
+        J_zero=zeros(fine),
+        diameter_m=D,
+        rho=float(air.rho),
+        a_sound=float(air.a_sound),
+        mu=float(air.mu),
+        blades=int(case.rotor().B),
+        sense=int(case.rotor().rotation),
+    )
+
+
+@dataclass(frozen=True)
+class Band:
+    """Relative standard uncertainty of thrust and torque at rest and at half the J of zero thrust. [-]"""
+
+    thrust: tuple[float, float]
+    torque: tuple[float, float]
+    rpm: float
+    origin: str
+
+    def document(self) -> dict[str, Any]:
+        """For the manifest, in per cent."""
+        return {
+            "thrust_pct": {"at_rest": 100.0 * self.thrust[0], "half_J_zero": 100.0 * self.thrust[1]},
+            "torque_pct": {"at_rest": 100.0 * self.torque[0], "half_J_zero": 100.0 * self.torque[1]},
+            "rpm": self.rpm,
+            "level": "one standard uncertainty",
+            "origin": self.origin,
+        }
+
+
+def band_of(case: Case, table: Performance) -> Band:
+    """Spread of the loads over the declared assumptions of a case (`bemt.compare.sweep.case.spread`)."""
+    from bemt.compare.sweep.case import spread
+
+    rpm = np.full(2, table.rpm[-1])
+    V = np.array([0.0, 0.5 * table.J_zero[-1]]) * rpm / 60.0 * table.diameter_m
+    base = solve_points(case, rpm, V)
+    variance = np.zeros((2, 2))
+    for assumption in case.assumptions:
+        runs = [solve_points(case, rpm, V, {assumption.key: value}) for value in assumption.values]
+        for k, name in enumerate(("thrust_N", "torque_Nm")):
+            nominal = getattr(base, name)
+            variance[k] += spread(assumption.discrete, nominal, [getattr(run, name) for run in runs]) ** 2
+    u = np.sqrt(variance) / np.abs([base.thrust_N, base.torque_Nm])
+    origin = (
+        f"{len(case.assumptions)} declared assumptions of the case; the model's own error is not in it"
+        if case.assumptions
+        else "no assumptions are declared: 0 is not an uncertainty"
+    )
+    return Band((float(u[0, 0]), float(u[0, 1])), (float(u[1, 0]), float(u[1, 1])), float(rpm[0]), origin)
+
+
+@dataclass(frozen=True, eq=False)
+class Loading:
+    """Loads along the blade at one point; all blades together.
+
+    Attributes
+    ----------
+    rpm, airspeed_m_s, rho, mu, a_sound : float
+        The point. [rev/min], [m/s], SI
+    r, dr, chord, beta : (N,) float
+        Elements. [m], [rad]
+    dT, dQ : (N,) float
+        Thrust [N] and torque [N m] of each element, of all blades.
+    alpha, Re, M : (N,) float
+        Angle of attack [rad], chord Reynolds and Mach number at which the section tables are read.
+    R, Rhub : float
+        Tip and hub radius. [m]
+    blades, sense : int
+        Number; +1 right-handed.
+    thrust_N, torque_Nm : float
+        Sums over the elements.
+    duct_thrust_N : float
+        Thrust of duct and stator beside the rotor's. [N]
+    """
+
+    rpm: float
+    airspeed_m_s: float
+    rho: float
+    mu: float
+    a_sound: float
+    r: Array
+    dr: Array
+    chord: Array
+    beta: Array
+    dT: Array
+    dQ: Array
+    alpha: Array
+    Re: Array
+    M: Array
+    R: float
+    Rhub: float
+    blades: int
+    sense: int
+    thrust_N: float
+    torque_Nm: float
+    duct_thrust_N: float
+
+    @property
+    def omega(self) -> float:
+        """Speed. [rad/s]"""
+        return self.rpm * np.pi / 30.0
+
+    @property
+    def J(self) -> float:
+        """Advance ratio. [-]"""
+        return self.airspeed_m_s / (self.rpm / 60.0 * 2.0 * self.R)
+
+    def document(self) -> dict[str, Any]:
+        """For the manifest."""
+        n, D = self.rpm / 60.0, 2.0 * self.R
+        scale = self.rho * n**2 * D**4
+        return {
+            "rpm": self.rpm,
+            "airspeed_m_s": self.airspeed_m_s,
+            "J": self.J,
+            "rotor_thrust_N": self.thrust_N,
+            "torque_Nm": self.torque_Nm,
+            "CT": self.thrust_N / scale,
+            "CP": 2.0 * np.pi * self.torque_Nm / (scale * D),
+            "duct_thrust_N": self.duct_thrust_N,
+        }
+
+
+def loading_of(case: Case, rpm: float, airspeed_m_s: float) -> Loading:
+    """Solve one point with its radial distributions."""
+    from bemt.bem import solver
+
+    ready, air = _prepared(case), case.air()
+    prep = ready.prep
+    s = solver.solve(prep, rpm, airspeed_m_s, air, radial=True)
+    if not s.converged[0]:
+        got = "; ".join(s.flags[0]) or "not converged"
+        raise InputError(
+            Fault(case.path.as_posix(), f"{rpm:g} rev/min, {airspeed_m_s:g} m/s", got, "a converged point")
+        )
+    around = [e.id for e in ready.effects if e not in prep.effects]
+    if around:
+        raise InputError(
+            Fault(
+                case.path.as_posix(),
+                "model.effects_on",
+                ", ".join(around),
+                "effects that have a radial distribution",
+                "Switch them off for a disk",
+            )
+        )
+    rotor = prep.rotor
+    rad = {k: v[0] for k, v in s.radial.items()}
+    W = rad["W"]
+    if prep.duct is None:  # an open rotor looks its tables up at the speed without the share of drag, see bem.residual
+        W = rpm * np.pi / 30.0 * rad["r"] * np.cos(rad["phi"]) + airspeed_m_s * np.sin(rad["phi"])
+    Re, M = air.rho * np.abs(W) * prep.stations.chord / air.mu, np.abs(W) / air.a_sound
+    dT, dQ = rad["dT"], rad["dQ"]
+    scale = float(s.T_rotor[0]) / float(dT.sum()), float(s.Q[0]) / float(dQ.sum())
+    if abs(scale[0] - 1.0) > 1e-9 or abs(scale[1] - 1.0) > 1e-9:  # pragma: no cover - a bug
+        raise AssertionError(f"radial loads do not sum to the totals: {scale}")
+    return Loading(
+        float(rpm),
+        float(airspeed_m_s),
+        float(air.rho),
+        float(air.mu),
+        float(air.a_sound),
+        rad["r"],
+        prep.stations.dr,
+        prep.stations.chord,
+        prep.stations.beta,
+        dT,
+        dQ,
+        rad["alpha"],
+        Re,
+        M,
+        rotor.R,
+        rotor.Rhub,
+        int(rotor.B),
+        int(rotor.rotation),
+        float(dT.sum()),
+        float(dQ.sum()),
+        float(s.T_duct[0] + s.T_stator[0]),
+    )

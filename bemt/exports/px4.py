@@ -1,0 +1,98 @@
+"""PX4: parameters of the simulator in hardware (SIH), of control allocation and of the thrust curve."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.exports.base import Files, Job, LoadsExport
+from bemt.exports.parts import header, plain_name, static_fit
+
+Array = NDArray[np.float64]
+INCH = 0.0254
+
+
+class Px4Export(LoadsExport):
+    """Quadratics of CT and CP for a forward propeller, constants for a lifting rotor."""
+
+    id = "px4"
+    title = "PX4 parameters (SIH, control allocation)"
+    holds = "forward propeller: CT(J), CP(J) quadratic, concave (CT2, CP2 <= 0); lifting rotor: T_MAX u, Q_MAX u"
+    features = frozenset({"torque", "airspeed", "windmill", "density", "rest"})
+    conventions = "CT = T/(rho n^2 D^4), CP = P/(rho n^3 D^5), J = V/(n D); diameter in inches, RPM_MAX in rev/min"
+    source = "PX4 1.17 simulator_sih: sih_params.yaml (ranges), documentation of the SIH propeller model"
+
+    def write(self, job: Job) -> Files:
+        """Parameter lines as QGroundControl and airframe scripts take them."""
+        t, name = job.performance, plain_name(job.case.name)
+        ct, cp = fits(job)
+        kT, kQ = static_fit(t)
+        W = t.rpm[-1] * np.pi / 30.0
+        f = thrust_factor(t.rpm, t.thrust_N[:, t.at_rest])
+        lines = [f"# {line}" for line in header(job, "PX4 parameters")]
+        lines += ["# Forward propeller of the SIH (fixed wing, tailsitter, pusher)"]
+        lines += [
+            f"param set-default SIH_F_DIA_INCH {t.diameter_m / INCH:.9g}",
+            f"param set-default SIH_F_RPM_MAX {t.rpm[-1]:.9g}",
+        ]
+        lines += [
+            f"param set-default SIH_F_C{word}{k} {value:.9g}"
+            for word, fit in (("T", ct), ("P", cp))
+            for k, value in enumerate(fit)
+        ]
+        lines += [
+            "# Lifting rotor of the SIH: greatest thrust [N] and torque [N m] at rest",
+            f"param set-default SIH_T_MAX {kT * W**2:.9g}",
+            f"param set-default SIH_Q_MAX {kQ * W**2:.9g}",
+            "# Control allocation, rotor 0: T = CT u^2 [N], Q = KM T; u is the share of full speed",
+            f"param set-default CA_ROTOR0_CT {kT * W**2:.9g}",
+            f"param set-default CA_ROTOR0_KM {t.sense * kQ / kT:.9g}",
+            "# Thrust curve T/T_max = f u^2 + (1 - f) u",
+            f"param set-default THR_MDL_FAC {f:.6g}",
+        ]
+        return {f"{name}.params": "\n".join(lines) + "\n"}
+
+    def notes(self, job: Job) -> list[str]:
+        """Ranges and what u means."""
+        return [
+            "PX4 admits CT2 and CP2 up to 0 only: where the best quadratic bends upwards, a straight line is written",
+            "u of THR_MDL_FAC and CA_ROTOR0_CT is the share of full speed (an ESC that controls speed); for an ESC "
+            "that controls duty fit THR_MDL_FAC to a bench map (`map`)",
+            "the sign of KM is for a rotor that turns as the case says; PX4 counts ccw from above as positive",
+            "one quadratic for all speeds: Reynolds and Mach number are averaged over the table",
+        ]
+
+    def loads(self, files: Files, rpm: Array, airspeed_m_s: Array) -> tuple[Array, Array]:
+        """Forward propeller of the SIH at the density of the table."""
+        text = str(next(iter(files.values())))
+        p = {w[2]: float(w[3]) for w in (line.split() for line in text.splitlines()) if w[:1] == ["param"]}
+        rho = float(text.split("density ")[1].split()[0])
+        n, D = rpm / 60.0, p["SIH_F_DIA_INCH"] * INCH
+        J = airspeed_m_s / (n * D)
+        ct, cp = (sum(p[f"SIH_F_C{word}{k}"] * J**k for k in range(3)) for word in "TP")
+        return ct * rho * n**2 * D**4, cp * rho * n**2 * D**5 / (2.0 * np.pi)
+
+
+def fits(job: Job) -> tuple[Array, Array]:
+    """Quadratics of CT and CP over J from rest to zero thrust, concave, relative to the coefficient at rest."""
+    from scipy.optimize import lsq_linear
+
+    t = job.performance
+    rpm, J, CT, CP = t.flight_nodes()
+    found = []
+    for C, table in ((CT, t.CT), (CP, t.CP)):
+        w = 1.0 / np.interp(rpm, t.rpm, table[:, t.at_rest])
+        A = np.stack([w, J * w, J**2 * w], axis=1)
+        fit = lsq_linear(A, C * w, bounds=([0.0, -np.inf, -np.inf], [np.inf, np.inf, 0.0])).x
+        fit[2] = min(float(fit[2]), 0.0)
+        if fit[2] > -1e-12:  # on the bound: the straight line exactly
+            fit = np.append(np.linalg.lstsq(A[:, :2], C * w, rcond=None)[0], 0.0)
+        found.append(np.asarray(fit, dtype=float))
+    return found[0], found[1]
+
+
+def thrust_factor(rpm: Array, thrust_N: Array) -> float:
+    """Share f of the square in T/T_max = f u^2 + (1 - f) u with u = rpm/rpm_max, held to 0 .. 1 [-]."""
+    u, y = rpm / rpm[-1], thrust_N / thrust_N[-1]
+    a, b = u**2 - u, y - u
+    return float(np.clip(np.sum(a * b) / np.sum(a * a), 0.0, 1.0))

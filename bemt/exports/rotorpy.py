@@ -1,0 +1,71 @@
+"""RotorPy: the rotor's entries of a vehicle's parameters."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.exports.base import Files, Job, LoadsExport
+from bemt.exports.parts import header, plain_name
+
+Array = NDArray[np.float64]
+
+
+class RotorpyExport(LoadsExport):
+    """Three constants: thrust, torque and the loss of thrust with axial speed."""
+
+    id = "rotorpy"
+    title = "RotorPy rotor parameters"
+    holds = "T = k_eta W^2 - k_z W V (CT linear in J, needs aero=True), Q = k_m W^2; density baked in"
+    features = frozenset({"torque", "airspeed", "rest"})
+    conventions = "N/(rad/s)^2, N m/(rad/s)^2, N/(rad/s)/(m/s); speeds in rad/s; V along the body's z"
+    source = "rotorpy 3.0 vehicles/multirotor.py, compute_body_wrench"
+
+    def write(self, job: Job) -> Files:
+        """Parameters from least squares of T and Q, from rest to zero thrust, each relative to the load at rest."""
+        t = job.performance
+        k_eta, k_z, k_m = _fit(job)
+        name = plain_name(job.case.name)
+        head = "\n".join(f"# {line}" for line in header(job, "RotorPy rotor"))
+        text = f"""{head}
+# Update quad_params of a vehicle with this; k_d, k_h, k_flap (flow across the shaft) and tau_m are not in the case.
+# Multirotor(..., aero=True), else k_z is not used.
+rotor_params = {{
+    "k_eta": {k_eta:.12e},  # T = k_eta W^2 - k_z W V  [N/(rad/s)^2]
+    "k_z": {k_z:.12e},  # [N/(rad/s)/(m/s)]
+    "k_m": {k_m:.12e},  # Q = k_m W^2  [N m/(rad/s)^2]
+    "rotor_speed_max": {t.rpm[-1] * np.pi / 30.0:.9g},  # end of the table [rad/s]
+}}
+"""
+        return {f"{name}_rotor_params.py": text}
+
+    def notes(self, job: Job) -> list[str]:
+        """What this model class leaves out."""
+        return [
+            "torque does not change with airspeed in this model; no Reynolds or Mach number",
+            f"density {job.performance.rho:g} kg/m3 is in all three constants: scale them with yours",
+            "k_eta weighs all speeds of the table alike; export with --rpm near the speed that you fly",
+        ]
+
+    def loads(self, files: Files, rpm: Array, airspeed_m_s: Array) -> tuple[Array, Array]:
+        """Compute_body_wrench of one rotor along its axis."""
+        space: dict[str, dict[str, float]] = {}
+        exec(str(next(iter(files.values()))), {}, space)
+        k, W = space["rotor_params"], rpm * np.pi / 30.0
+        return k["k_eta"] * W**2 - k["k_z"] * W * airspeed_m_s, k["k_m"] * W**2
+
+
+def _fit(job: Job) -> tuple[float, float, float]:
+    t = job.performance
+    rpm, J, CT, CP = t.flight_nodes()
+    # relative to the load at rest at the same speed, so that no speed dominates
+    ct0, cp0 = (np.interp(rpm, t.rpm, C[:, t.at_rest]) for C in (t.CT, t.CP))
+    a, b = np.linalg.lstsq(np.stack([1.0 / ct0, -J / ct0], axis=1), CT / ct0, rcond=None)[0]
+    c = float(np.sum(CP / cp0**2) / np.sum(1.0 / cp0**2))
+    scale = t.rho * t.diameter_m**4 / (2.0 * np.pi) ** 2
+    # CT = a - b J: T = scale (a W^2 - b 2 pi / D W V)
+    return (
+        float(scale * a),
+        float(scale * b * 2.0 * np.pi / t.diameter_m),
+        float(scale * c * t.diameter_m / (2 * np.pi)),
+    )

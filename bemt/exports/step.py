@@ -1,0 +1,13 @@
+"""STEP solids."""
+
+from __future__ import annotations
+
+from bemt.exports.base import SolidExport
+
+
+class StepExport(SolidExport):
+    """STEP, surfaces of CAD."""
+
+    id = "step"
+    title = "STEP, surfaces of CAD"
+    source = "geometry.export"

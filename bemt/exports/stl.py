@@ -1,0 +1,13 @@
+"""STL solids."""
+
+from __future__ import annotations
+
+from bemt.exports.base import SolidExport
+
+
+class StlExport(SolidExport):
+    """STL, triangles."""
+
+    id = "stl"
+    title = "STL, triangles"
+    source = "geometry.export"

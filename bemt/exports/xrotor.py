@@ -1,0 +1,112 @@
+"""XROTOR: a saved rotor with sections of few numbers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from bemt import __version__
+from bemt.exports.base import BladeExport, Files, Job
+from bemt.exports.blades import MOST_STATIONS, anchors_of, stations
+from bemt.exports.parts import plain_name
+from bemt.sections.parametric import XrotorSection, fit_xrotor
+
+__all__ = ["XrotorExport", "section_lines", "sections_of"]
+
+
+class XrotorExport(BladeExport):
+    """File for XROTOR's LOAD."""
+
+    id = "xrotor"
+    title = "XROTOR rotor"
+    holds = "stations; per section: linear lift with smooth stall, parabolic drag, one exponent of Reynolds number"
+    features = frozenset({"torque", "airspeed", "windmill", "reynolds", "mach", "density", "sections"})
+    conventions = "r/R, c/R, beta in degrees from the plane of rotation; Adv = V/(Omega R); SI"
+    source = "XROTOR 7.55 xio.f LOAD (read), xaero.f CLCDCM (section)"
+
+    def write(self, job: Job) -> Files:
+        """The rotor at the operating point; at rest XROTOR gets a small speed."""
+        p, rotor = job.loading, job.case.rotor()
+        r, c, b, _ = stations(rotor)
+        V = max(p.airspeed_m_s, 0.01 * p.omega * p.R)
+        rows = ["XROTOR VERSION:  7.55", f"{job.case.name}, bemt {__version__}"[:80]]
+        rows += [
+            "!         Rho          Vso          Rmu           Alt",
+            f" {p.rho:.9g} {p.a_sound:.9g} {p.mu:.9g} 999.0",
+        ]
+        rows += [
+            "!         Rad          Vel          Adv          Rake",
+            f" {p.R:.10g} {V:.10g} {V / (p.omega * p.R):.10g} 0.0",
+        ]
+        rows += ["!         XI0          XIW", f" {p.Rhub / p.R:.10g} {p.Rhub / p.R:.10g}", "!  Naero"]
+        found = sections_of(job)
+        rows += [f" {len(found)}", *(line for x, s in found for line in section_lines(x, s))]
+        rows += [
+            "!LVDuct  LDuct   LWind",
+            "  T       F       F",
+            "!   II Nblds",
+            f" {r.size} {p.blades}",
+            "!         r/R          C/R     Beta0deg         Ubody",
+        ]
+        rows += [f" {x / p.R:.10g} {y / p.R:.10g} {np.degrees(z):.10g} 0.0" for x, y, z in zip(r, c, b, strict=True)]
+        rows += ["!      URDuct", " 1.0"]
+        return {f"{plain_name(job.case.name)}.xrotor": "\n".join(rows) + "\n"}
+
+    def notes(self, job: Job) -> list[str]:
+        """How well the sections hold."""
+        return [
+            *section_notes(job, section_errors(job, [s for _, s in sections_of(job)])),
+            "tip loss, swirl and wake are XROTOR's own; stall delay is not in the file",
+            *(["at rest: Vel is 1 % of the tip speed, XROTOR has no rest"] if job.airspeed <= 0.0 else []),
+        ]
+
+
+def sections_of(job: Job) -> list[tuple[float, XrotorSection]]:
+    """Sections fitted at the anchors of the case, at the Reynolds number of the operating point."""
+    return [(x, fit_xrotor(polar, Re)) for x, polar, Re in anchors_of(job)]
+
+
+def section_lines(x: float, s: XrotorSection) -> list[str]:
+    """Lines of one section, as XROTOR and DFDC write them."""
+    return [
+        "!   Xisection",
+        f" {x:.10g}",
+        "!       A0deg        dCLdA        CLmax         CLmin",
+        f" {np.degrees(s.a0):.12g} {s.dclda:.12g} {s.clmax:.12g} {s.clmin:.12g}",
+        "!  dCLdAstall     dCLstall      Cmconst         Mcrit",
+        f" {s.dclda_stall:.12g} {s.dcl_stall:.12g} {s.cmcon:.6g} {s.mcrit:.6g}",
+        "!       CDmin      CLCDmin     dCDdCL^2",
+        f" {s.cdmin:.12g} {s.clcdmin:.12g} {s.dcdcl2:.12g}",
+        "!       REref        REexp",
+        f" {s.reref:.12g} {s.reexp:.12g}",
+    ]
+
+
+def section_errors(job: Job, sections: list[Any]) -> list[dict[str, float]]:
+    """Greatest error of cl and of cd relative to cd, from the negative to the positive stall, per anchor."""
+    out = []
+    for (x, polar, Re), s in zip(anchors_of(job), sections, strict=True):
+        a = polar.alpha[(polar.alpha >= polar.stall(Re, side=-1)[0]) & (polar.alpha <= polar.stall(Re)[0])]
+        cl, cd = polar.lookup(a, Re)
+        got_l, got_d = s.cl_cd(a, Re)
+        out.append(
+            {
+                "r_over_R": float(x),
+                "Re": Re,
+                "cl": float(np.abs(got_l - cl).max()),
+                "cd_pct": float(100.0 * np.abs(got_d / cd - 1.0).max()),
+            }
+        )
+    return out
+
+
+def section_notes(job: Job, errors: list[dict[str, float]]) -> list[str]:
+    """What a fit of sections leaves out."""
+    thin = stations(job.case.rotor())[3]
+    worst = ", ".join(f"r/R {e['r_over_R']:.2f}: cl {e['cl']:.3f}, cd {e['cd_pct']:.0f} %" for e in errors)
+    return [
+        f"sections are fits at the Reynolds numbers of the operating point; worst between the stalls: {worst}",
+        "mcrit 0.8 and the pitching moment 0 are not from the case",
+        *([f"{MOST_STATIONS} stations instead of {job.case.rotor().blade.r.size}"] if thin else []),
+    ]

@@ -1,0 +1,177 @@
+"""A blade from the file of another program: stations, sections of few numbers, an operating point; and as a case."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.base.errors import Fault, InputError
+from bemt.readers import SourceText, number
+from bemt.sections.parametric import QpropSection, XrotorSection
+from bemt.sections.polars import DEFAULT_RE
+
+__all__ = ["BladeFile", "case_text", "checked", "lines_of", "values"]
+
+Array = NDArray[np.float64]
+SPAN_DEG = (-20.0, 25.0)
+"""Angles of the written tables; beyond them flat-plate laws continue."""
+RE_RANGE = (5e3, 3e6)
+
+
+@dataclass(frozen=True, eq=False)
+class BladeFile:
+    """One rotor of a file.
+
+    Attributes
+    ----------
+    name, source : str
+        Title in the file; program.
+    blades : int
+        Number.
+    R_m, Rhub_m : float
+        Tip and hub radius. [m]
+    r_m, chord_m, beta_rad : (N,) float
+        Stations. [m], [rad]
+    sections : sequence of (float, XrotorSection or QpropSection)
+        At r/R, ascending; linear between, held outside.
+    rpm, airspeed_m_s, rho : float or None
+        Operating point, where the file states one.
+    notes : tuple of str
+        What was left out.
+    """
+
+    name: str
+    source: str
+    blades: int
+    R_m: float
+    Rhub_m: float
+    r_m: Array
+    chord_m: Array
+    beta_rad: Array
+    sections: Sequence[tuple[float, XrotorSection | QpropSection]]
+    rpm: float | None = None
+    airspeed_m_s: float | None = None
+    rho: float | None = None
+    notes: tuple[str, ...] = ()
+
+
+def lines_of(source: SourceText, comment: str) -> list[tuple[int, str]]:
+    """Numbered lines that are neither blank nor begin with one of these characters."""
+    return [(i, t) for i, t in enumerate(source.lines, 1) if t.strip() and t.lstrip()[0] not in comment]
+
+
+def values(
+    source: SourceText, line: int, text: str, count: int, what: str, faults: list[Fault], most: int | None = None
+) -> list[float]:
+    """Numbers of a line in list-directed form (blanks or commas); NaN and a fault for what is none."""
+    words = [w for w in re.split(r"[\s,]+", text.split("!")[0].strip()) if w]
+    out: list[float] = []
+    for k, word in enumerate(words[: most or count]):
+        value = number(word)
+        if value is None:
+            faults.append(Fault(source.name, f"{line}:{k + 1}", repr(word[:30]), f"a number for {what}"))
+        out.append(math.nan if value is None else value)
+    if len(out) < count:
+        faults.append(Fault(source.name, str(line), f"{len(out)} numbers", f"{count} for {what}"))
+        out += [math.nan] * (count - len(out))
+    return out
+
+
+def checked(source: SourceText, blade: BladeFile, faults: list[Fault]) -> BladeFile:
+    """The blade, if its numbers can be one; lengths in other units are refused, not converted."""
+    r, c, b = blade.r_m, blade.chord_m, np.degrees(blade.beta_rad)
+    if not 1 <= blade.blades <= 64:
+        faults.append(Fault(source.name, "blades", f"{blade.blades}", "1 to 64"))
+    if not 0.002 <= blade.R_m <= 50.0:
+        faults.append(Fault(source.name, "radius", f"{blade.R_m:g} m", "0.002 to 50 m", "Other units?"))
+    if r.size < 2 or np.any(np.diff(r) <= 0.0):
+        faults.append(Fault(source.name, "stations", f"{r.size} radii that do not rise", "two or more rising radii"))
+    elif r[-1] > blade.R_m * (1.0 + 1e-6):
+        faults.append(Fault(source.name, "stations", f"a radius of {r[-1]:g} m", f"radii up to R = {blade.R_m:g} m"))
+    if np.any(c <= 0.0) or np.any(c > 2.0 * blade.R_m):
+        faults.append(
+            Fault(
+                source.name,
+                "stations",
+                f"chords from {np.min(c):g} to {np.max(c):g} m",
+                "chords above 0, below the diameter",
+            )
+        )
+    if np.any(np.abs(b) > 90.0):
+        faults.append(Fault(source.name, "stations", f"blade angles up to {np.abs(b).max():g}", "within 90 degrees"))
+    elif np.all(np.abs(b) < 1.6) and np.any(b != 0.0):
+        faults.append(
+            Fault(
+                source.name,
+                "stations",
+                f"blade angles up to {np.abs(b).max():g}",
+                "degrees",
+                "Radians? They are not converted",
+            )
+        )
+    if faults:
+        raise InputError(faults)
+    return blade
+
+
+def _polar_csv(section: XrotorSection | QpropSection) -> str:
+    alpha = np.arange(SPAN_DEG[0], SPAN_DEG[1] + 0.25, 0.5)
+    Re = DEFAULT_RE[(DEFAULT_RE >= RE_RANGE[0]) & (DEFAULT_RE <= RE_RANGE[1])]
+    Re = Re if section.reexp != 0.0 else Re[:1]
+    lines = ["alpha_deg,cl,cd,Re"]
+    for one in Re:
+        cl, cd = section.cl_cd(np.radians(alpha), one)
+        lines += [f"{a:.1f},{x:.12g},{max(y, 1e-6):.12g},{one:.12g}" for a, x, y in zip(alpha, cl, cd, strict=True)]
+    return "\n".join(lines) + "\n"
+
+
+def case_text(blade: BladeFile, name: str, file: str) -> dict[str, str]:
+    """The blade as a case: ``case.toml``, ``stations.csv`` and a table per section."""
+    rows = [
+        f"{a:.12g},{b:.12g},{c:.12g}"
+        for a, b, c in zip(blade.r_m / blade.R_m, blade.chord_m / blade.R_m, np.degrees(blade.beta_rad), strict=True)
+    ]
+    files = {"stations.csv": "r_over_R,chord_over_R,beta_deg\n" + "\n".join(rows) + "\n"}
+    tables = []
+    for k, (x, section) in enumerate(blade.sections):
+        files[f"section_{k}.csv"] = _polar_csv(section)
+        tables.append(f'[[polars]]\nfile = "section_{k}.csv"\nr_over_R = {x:.12g}\nformat = "csv"\n')
+    title = re.sub(r'["\\\x00-\x1f]', " ", blade.name).strip() or name
+    rpm = blade.rpm if blade.rpm is not None else float(f"{120.0 / blade.R_m * 30 / math.pi:.2g}")
+    remark = "" if blade.rpm is not None else "  # not in the file: a tip speed near 120 m/s, set yours"
+    rho = blade.rho if blade.rho is not None and blade.rho > 0.0 else 1.225
+    notes = "".join(f"# {note}\n" for note in blade.notes)
+    files["case.toml"] = f"""# From {blade.source}, {re.sub(r"[^ -~]", "_", file)}.
+{notes}schema = "bemt.case/1"
+name = "{name}"
+title = "{title}"
+
+[rotor]
+kind = "propeller"
+blades = {blade.blades}
+diameter_m = {2.0 * blade.R_m:.12g}
+hub_diameter_mm = {2e3 * blade.Rhub_m:.12g}
+
+[blade]
+stations = "stations.csv"
+
+[blade.section]
+thickness = 0.12  # not in the file; only wave drag looks at it
+
+[operating]
+rpm = {rpm:.12g}{remark}
+airspeed_m_s = {blade.airspeed_m_s or 0.0:.12g}
+
+[air]
+density_kg_m3 = {rho:.9g}
+
+[model]
+effects_off = ["stall_delay", "cascade"]  # the sections of the file are taken as the blade has them
+
+{chr(10).join(tables)}"""
+    return files

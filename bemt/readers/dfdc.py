@@ -1,0 +1,134 @@
+"""DFDC: case files with a bladed rotor (duct and centre body stay behind)."""
+
+from __future__ import annotations
+
+import os
+import re
+
+import numpy as np
+
+from bemt.base.errors import Fault, InputError
+from bemt.readers import SourceText, head_text, load_text
+from bemt.readers._blade import BladeFile, checked, lines_of, values
+from bemt.readers.xrotor import read_section
+
+__all__ = ["BLADE", "KIND", "read", "sniff"]
+
+KIND = "dfdc"
+BLADE = True
+_HEAD = re.compile(r"\s*DFDC\s+Version", re.I)
+
+
+def sniff(head: bytes | str) -> bool:
+    r"""Tell whether a file begins as a DFDC case.
+
+    Parameters
+    ----------
+    head : bytes or str
+        First bytes of a file.
+
+    Returns
+    -------
+    bool
+        True for its first words.
+
+    Examples
+    --------
+    >>> sniff("DFDC Version 0.55\nduct\n"), sniff("XROTOR VERSION: 7.55\n")
+    (True, False)
+    """
+    return _HEAD.match(head_text(head)) is not None
+
+
+def read(path: str | os.PathLike[str]) -> BladeFile:
+    """Read the rotor of one case.
+
+    Parameters
+    ----------
+    path : str or path
+        File.
+
+    Returns
+    -------
+    BladeFile
+        First bladed rotor, its sections, speed and air.
+
+    Raises
+    ------
+    InputError
+        With all faults; also for a case whose only disk is an actuator disk without blades.
+    """
+    source = load_text(path)
+    rows = lines_of(source, "!#")
+    faults: list[Fault] = []
+    words = [text.split()[0].split("!")[0].upper() for _, text in rows]
+    if "ROTOR" not in words:
+        got = "an actuator disk without blades" if "ACTDISK" in words else "no ROTOR"
+        raise InputError(Fault(source.name, "", got, "a case with a ROTOR block", "A disk has no blade to read"))
+    notes = ["duct and centre body of the file are left out: declare a [duct] in the case"]
+    name = rows[1][1].strip() if len(rows) > 1 else ""
+    V = rpm = rho = None
+    if "OPER" in words:
+        at = words.index("OPER") + 1
+        speeds = values(source, *rows[at], 3, "Vinf Vref RPM", faults)
+        air = values(source, *rows[at + 1], 4, "Rho Vso Rmu Alt", faults)
+        V, rpm = speeds[0], abs(speeds[2]) or None
+        rho = air[0] if 0.01 < air[0] < 10.0 else None
+    sections = []
+    if "AERO" in words:
+        at = words.index("AERO") + 1
+        count = int(values(source, *rows[at], 1, "#sections", faults)[0])
+        for k in range(count):
+            sections.append(read_section(source, rows, at + 1 + 5 * k, faults))
+    else:
+        faults.append(Fault(source.name, "AERO", "nothing", "sections of the blade"))
+    at = words.index("ROTOR") + 1
+    if words.count("ROTOR") > 1:
+        notes.append("the file has several rotors: the first is read")
+    x_disk, blades, _ = values(source, *rows[at], 3, "Xdisk Nblds NRsta", faults)
+    n = int(values(source, *rows[at + 1], 1, "#stations", faults)[0])
+    body = np.array([values(source, *row, 3, "r chord beta", faults) for row in rows[at + 2 : at + 2 + n]]).reshape(
+        -1, 3
+    )
+    if len(body) < n:
+        faults.append(Fault(source.name, "ROTOR", f"{len(body)} stations", f"{n}"))
+    if faults:
+        raise InputError(faults)
+    r, c, b = body.T
+    hub, tip = _walls(source, rows, words, x_disk, faults)
+    if hub is None or not 0.0 < hub <= r[0]:
+        hub = float(r[0])
+        notes.append("no centre body at the rotor: the hub is that of the first station")
+    if tip is None or tip < r[-1]:
+        tip = float(r[-1])
+        notes.append("no duct at the rotor: the tip is that of the last station")
+    blade = BladeFile(
+        name, "DFDC", int(blades), tip, hub, r, c, np.radians(b), sections, rpm, V, rho, tuple(notes)
+    )
+    return checked(source, blade, faults)
+
+
+def _walls(
+    source: SourceText, rows: list[tuple[int, str]], words: list[str], x: float, faults: list[Fault]
+) -> tuple[float | None, float | None]:
+    """Radius of centre body and of the duct's bore at an axial position, None where the outline is not there."""
+    if "GEOM" not in words or "ENDGEOM" not in words:
+        return None, None
+    parts: list[list[list[float]]] = [[]]
+    for line, text in rows[words.index("GEOM") + 2 : words.index("ENDGEOM")]:
+        pair = values(source, line, text, 2, "x r", faults)
+        if pair[0] > 900.0:
+            parts.append([])
+        else:
+            parts[-1].append(pair)
+    radii = []
+    for part in parts[:2]:
+        a = np.array(part).reshape(-1, 2)
+        cross = []
+        for (x0, r0), (x1, r1) in zip(a[:-1], a[1:], strict=True):
+            if min(x0, x1) <= x <= max(x0, x1) and x0 != x1:
+                cross.append(abs(r0 + (x - x0) / (x1 - x0) * (r1 - r0)))
+        radii.append(cross)
+    body = max(radii[0]) if radii and radii[0] else None
+    bore = min(radii[1]) if len(radii) > 1 and radii[1] else None
+    return body, bore
