@@ -93,7 +93,7 @@ def baked(job: Job, count: int = 20) -> Frozen:
     point = job.loading
     prep = evaluate.prepare(job.case).prep
     keep = np.unique(np.round(np.linspace(0, point.r.size - 1, min(count, point.r.size))).astype(int))
-    tab = prep.tab[keep]  # (S, Nm, Nr, Na, 2)
+    tab = prep.tables[keep]  # (S, Nm, Nr, Na, 2)
     Re_axis = _re_axis(prep.grid, tab.shape[2])
     mixed = np.empty((keep.size, tab.shape[1], tab.shape[3], 2))
     for k, Re in enumerate(point.Re[keep]):

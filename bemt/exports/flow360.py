@@ -20,9 +20,7 @@ class Flow360Export(DiskExport):
     id = "flow360"
     title = "Flow360 BET disk"
     holds = "stations and cl, cd over angle of attack, Reynolds and Mach number"
-    features = frozenset(
-        {"torque", "airspeed", "windmill", "reynolds", "mach", "density", "rest", "sections", "duct"}
-    )
+    features = frozenset({"torque", "airspeed", "windmill", "reynolds", "mach", "density", "rest", "sections", "duct"})
     conventions = (
         "grid unit 1 m: lengths in m, omega = Omega (1 m)/a; twist in degrees from the plane of rotation; axis "
         "along the thrust; polars [Mach][Re][alpha], alpha from -180 to 180"
@@ -76,11 +74,9 @@ class Flow360Export(DiskExport):
 
     def notes(self, job: Job) -> list[str]:
         """What the disk has of the case."""
+        tip = "set tipGap to your duct's gap" if job.case.ducted else "tip loss is Flow360's (tipGap inf: an open tip)"
         return [
-            "stall delay, cascade and Mach effects of the case are inside the polars; tip loss is "
-            "Flow360's (tipGap inf: an open tip)"
-            if not job.case.ducted
-            else "stall delay, cascade and Mach effects of the case are inside the polars; set tipGap to your duct's gap",
+            f"stall delay, cascade and Mach effects of the case are inside the polars; {tip}",
             "omega and lengths are for a mesh in metres: divide by your grid unit",
             "not run: the solver is a service; the JSON is built into a BETDisk by the flow360 package in the tests",
         ]
@@ -96,7 +92,7 @@ def _tables(job: Job) -> tuple[Any, Array, list[Array], list[Array]]:
     f = baked(job, count=10)
     p = job.loading
     prep = evaluate.prepare(job.case).prep
-    axis = _re_axis(prep.grid, prep.tab.shape[2])
+    axis = _re_axis(prep.grid, prep.tables.shape[2])
     low, high = np.searchsorted(axis, [0.4 * p.Re.min(), 2.5 * p.Re.max()])
     use = np.arange(max(int(low) - 1, 0), min(int(high) + 1, axis.size))
     tip = 1.15 * float(p.M.max())
@@ -104,7 +100,7 @@ def _tables(job: Job) -> tuple[Any, Array, list[Array], list[Array]]:
     cl, cd = [], []
     for r in f.r:
         k = int(np.argmin(np.abs(p.r - r)))
-        table = prep.tab[k][mach][:, use]
+        table = prep.tables[k][mach][:, use]
         cl.append(table[..., 0])
         cd.append(table[..., 1])
     return replace(f, M=f.M[mach]), axis[use], cl, cd

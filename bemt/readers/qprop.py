@@ -125,8 +125,8 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
                 )
             )
     if math.isfinite(R) and R > 1.5 * r[-1]:
-        got = f"R = {R:g} m beside a last radius of {r[-1]:g} m"
-        faults.append(Fault(source.name, str(rows[1][0]), got, "a tip near it", "R takes no Rfac: metres"))
+        beside = f"R = {R:g} m beside a last radius of {r[-1]:g} m"
+        faults.append(Fault(source.name, str(rows[1][0]), beside, "a tip near it", "R takes no Rfac: metres"))
     if blades != int(blades):
         faults.append(Fault(source.name, str(rows[1][0]), f"{blades:g} blades", "a whole number"))
     if math.isfinite(R) and not R * (1 + 1e-9) >= r[-1]:

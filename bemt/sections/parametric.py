@@ -167,9 +167,8 @@ def fit_xrotor(polar: Polar, Re: float) -> XrotorSection:
     got, limiter = make(*p, 0.01, 0.0, 0.0, Re, 0.0).lift(alpha[used])
     stall = 2.0 * ((1.0 - p[4] / p[1]) * limiter / p[1]) ** 2
     least_share = 0.1  # of drag that stays attached, where the stall of the fit takes more than there is
-    attached, reexp = _power(
-        *(np.maximum(cd[used] - stall, least_share * cd[used]) for cd in (below, above)), low, high, Re
-    )
+    kept = [np.maximum(cd[used] - stall, least_share * cd[used]) for cd in (below, above)]
+    attached, reexp = _power(kept[0], kept[1], low, high, Re)
     weight = 1.0 / attached
     A = np.stack([np.ones(got.size), got, got**2], axis=1) * weight[:, None]
     c = np.linalg.lstsq(A, attached * weight, rcond=None)[0]
@@ -178,7 +177,8 @@ def fit_xrotor(polar: Polar, Re: float) -> XrotorSection:
         least, bend = float(c[0] - c[2] * middle**2), float(c[2])
     else:
         middle, least, bend = 0.0, float(np.mean(attached)), 0.0
-    return XrotorSection(*(float(v) for v in p), max(least, 1e-5), middle, bend, float(Re), reexp)
+    a = [float(v) for v in p]
+    return XrotorSection(a[0], a[1], a[2], a[3], a[4], a[5], max(least, 1e-5), middle, bend, float(Re), reexp)
 
 
 def fit_qprop(polar: Polar, Re: float) -> QpropSection:
@@ -218,7 +218,8 @@ def fit_qprop(polar: Polar, Re: float) -> QpropSection:
 
     p = _solve(drag, [float(cd[free].min()), 0.02, 0.02, start], [1e-5, 0.0, 0.0, -1.5], [0.5, 3.0, 3.0, 2.0])
     reexp = _power(below[free], above[free], low, high, Re)[1]
-    return QpropSection(zero, slope, bottom, top, *(float(v) for v in p), float(Re), reexp)
+    d = [float(v) for v in p]
+    return QpropSection(zero, slope, bottom, top, d[0], d[1], d[2], d[3], float(Re), reexp)
 
 
 def numbers(section: XrotorSection | QpropSection) -> dict[str, float]:
