@@ -286,7 +286,7 @@ class LoadsExport(Export):
             errors[name] = {
                 "at_rest": _worst(share[static]),
                 "flight": _worst(share),
-                "flight_rms": None if np.isnan(share).any() else float(np.sqrt(np.mean(share**2))),
+                "flight_upper_half_of_rpm": _worst(share[rpm >= 0.5 * table.rpm[-1]]),
             }
         return {
             "fit_error_pct": errors | {"of": "the greatest load at the same rpm", "points": int(rpm.size)},
