@@ -1,7 +1,7 @@
 """A quadrotor hovers in MuJoCo on an exported 10x5, at the speed that `drive` predicts: ``python docs/hover.py``.
 
-Four rotors turn at the predicted speed, nothing controls them: what the vehicle then climbs or sinks is the error of the
-whole chain, from the blade to the simulator. Needs ``pip install 'bemt[simulators]'``.
+Four rotors turn at the predicted speed, nothing controls them: what the vehicle then climbs or sinks is the error of
+the whole chain, from the blade to the simulator. Needs ``pip install 'bemt[simulators]'``.
 """
 
 from __future__ import annotations
@@ -54,7 +54,8 @@ def vehicle(one: str, name: str) -> str:
     for k, (x, y) in enumerate(((1, 1), (-1, 1), (1, -1), (-1, -1))):
         sites.append(f'{site.replace(name, f"{name}_{k}")} pos="{0.16 * x} {0.16 * y} 0" size="0.01"/>')
         motors.append(actuators.replace(name, f"{name}_{k}"))
-    return f"""<mujoco><option timestep="0.002" gravity="0 0 -9.80665"/><worldbody><body name="quad" pos="0 0 10"><freejoint/>
+    return f"""<mujoco><option timestep="0.002" gravity="0 0 -9.80665"/><worldbody>
+<body name="quad" pos="0 0 10"><freejoint/>
 <inertial pos="0 0 0" mass="{MASS}" diaginertia="0.02 0.02 0.035"/>{"".join(sites)}</body></worldbody>
 <actuator>{"".join(motors)}</actuator></mujoco>"""
 

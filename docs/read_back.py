@@ -224,23 +224,28 @@ def page() -> str:
     head = "| target | holds | thrust | torque | read back by | its error |\n|---|---|---|---|---|---|"
     return f"""# Exports: one propeller for simulators, disks and design tools
 
-Written by `python docs/read_back.py`; do not edit. `python -m bemt export CASE --out DIR --format TARGET ...` writes each
-target into a folder of its name, and beside it `manifest.json`: what the target holds, the error of the fit, the band of the
-prediction, conventions, the range in which it holds. `--hold reynolds` (or torque, airspeed, windmill, mach, density, rest,
-duct, sections) refuses targets that cannot.
+Written by `python docs/read_back.py`; do not edit.
 
-Errors are of the 10x5 of `cases/` up to 10,000 rev/min, from rest to zero thrust, in per cent of the greatest load at the
-same speed; the check points are none of the nodes. The error of reading back is relative. `dfdc` is the ducted fan `ds30`.
+    python -m bemt export CASE --out DIR --format TARGET [TARGET ...]
+
+writes each target into a folder of its name and beside it `manifest.json`: what the target holds, the error of the fit,
+the band of the prediction, conventions, the range in which it holds. `--hold reynolds` (or torque, airspeed, windmill,
+mach, density, rest, duct, sections) refuses targets that cannot.
+
+Errors are of the 10x5 of `cases/` up to 10,000 rev/min, from rest to zero thrust, in per cent of the greatest load at
+the same speed; no check point is a node of a table. The error of reading back is relative. `dfdc` is the fan `ds30`.
 
 ## Thrust and torque for simulators
 
 {head}
 {chr(10).join(kinds["loads"])}
 
-Where a target takes a table, what is left is linear interpolation. A constant (`gazebo`) is right at rest and wrong by all
-of the thrust in flight: that is the model, not the fit. Two scripts fly the exported 10x5 with nobody at the controls:
-[hover.py](hover.py) (MuJoCo, at the speed that `drive` predicts) and [zero_thrust.py](zero_thrust.py) (JSBSim, at the
-airspeed where BEMT says that thrust vanishes).
+Where a target takes a table, what is left is linear interpolation. One number or three for all speeds carry the change
+of the coefficients from 2,500 to 10,000 rev/min (Reynolds number) in their error: give `--rpm` near the speed you fly.
+A constant (`gazebo`) is right at rest and wrong by all of the thrust in flight: that is the model, not the fit.
+
+Two scripts fly the exported 10x5 with nobody at the controls: [hover.py](hover.py) (MuJoCo, at the speed that `drive`
+predicts) and [zero_thrust.py](zero_thrust.py) (JSBSim, at the airspeed where BEMT says that thrust vanishes).
 
 ## Disks for flow solvers
 

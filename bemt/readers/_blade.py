@@ -15,7 +15,7 @@ from bemt.readers import SourceText, number
 from bemt.sections.parametric import QpropSection, XrotorSection
 from bemt.sections.polars import DEFAULT_RE
 
-__all__ = ["BladeFile", "case_text", "checked", "lines_of", "values"]
+__all__ = ["BladeFile", "case_text", "checked", "lines_of", "values", "whole"]
 
 Array = NDArray[np.float64]
 SPAN_DEG = (-20.0, 25.0)
@@ -80,6 +80,11 @@ def values(
         faults.append(Fault(source.name, str(line), f"{len(out)} numbers", f"{count} for {what}"))
         out += [math.nan] * (count - len(out))
     return out
+
+
+def whole(value: float) -> int:
+    """A count; 0 for what is none (its fault is told already)."""
+    return int(value) if value == value and 0.0 <= value <= 1e4 else 0
 
 
 def checked(source: SourceText, blade: BladeFile, faults: list[Fault]) -> BladeFile:

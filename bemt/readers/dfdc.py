@@ -9,7 +9,7 @@ import numpy as np
 
 from bemt.base.errors import Fault, InputError
 from bemt.readers import SourceText, head_text, load_text
-from bemt.readers._blade import BladeFile, checked, lines_of, values
+from bemt.readers._blade import BladeFile, checked, lines_of, values, whole
 from bemt.readers.xrotor import read_section
 
 __all__ = ["BLADE", "KIND", "read", "sniff"]
@@ -70,14 +70,14 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
     V = rpm = rho = None
     if "OPER" in words:
         at = words.index("OPER") + 1
-        speeds = values(source, *rows[at], 3, "Vinf Vref RPM", faults)
-        air = values(source, *rows[at + 1], 4, "Rho Vso Rmu Alt", faults)
+        speeds = _line(source, rows, at, 3, "Vinf Vref RPM", faults)
+        air = _line(source, rows, at + 1, 4, "Rho Vso Rmu Alt", faults)
         V, rpm = speeds[0], abs(speeds[2]) or None
         rho = air[0] if 0.01 < air[0] < 10.0 else None
     sections = []
     if "AERO" in words:
         at = words.index("AERO") + 1
-        count = int(values(source, *rows[at], 1, "#sections", faults)[0])
+        count = whole(_line(source, rows, at, 1, "#sections", faults)[0])
         for k in range(count):
             sections.append(read_section(source, rows, at + 1 + 5 * k, faults))
     else:
@@ -85,8 +85,8 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
     at = words.index("ROTOR") + 1
     if words.count("ROTOR") > 1:
         notes.append("the file has several rotors: the first is read")
-    x_disk, blades, _ = values(source, *rows[at], 3, "Xdisk Nblds NRsta", faults)
-    n = int(values(source, *rows[at + 1], 1, "#stations", faults)[0])
+    x_disk, blades, _ = _line(source, rows, at, 3, "Xdisk Nblds NRsta", faults)
+    n = whole(_line(source, rows, at + 1, 1, "#stations", faults)[0])
     body = np.array([values(source, *row, 3, "r chord beta", faults) for row in rows[at + 2 : at + 2 + n]]).reshape(
         -1, 3
     )
@@ -102,9 +102,7 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
     if tip is None or tip < r[-1]:
         tip = float(r[-1])
         notes.append("no duct at the rotor: the tip is that of the last station")
-    blade = BladeFile(
-        name, "DFDC", int(blades), tip, hub, r, c, np.radians(b), sections, rpm, V, rho, tuple(notes)
-    )
+    blade = BladeFile(name, "DFDC", whole(blades), tip, hub, r, c, np.radians(b), sections, rpm, V, rho, tuple(notes))
     return checked(source, blade, faults)
 
 
@@ -132,3 +130,12 @@ def _walls(
     body = max(radii[0]) if radii and radii[0] else None
     bore = min(radii[1]) if len(radii) > 1 and radii[1] else None
     return body, bore
+
+
+def _line(
+    source: SourceText, rows: list[tuple[int, str]], at: int, count: int, what: str, faults: list[Fault]
+) -> list[float]:
+    """Numbers of a line that must be there."""
+    if at >= len(rows):
+        raise InputError([*faults, Fault(source.name, str(len(source.lines)), "the end of the file", what)])
+    return values(source, *rows[at], count, what, faults)

@@ -9,7 +9,7 @@ import numpy as np
 
 from bemt.base.errors import Fault, InputError
 from bemt.readers import head_text, load_text
-from bemt.readers._blade import BladeFile, checked, lines_of, values
+from bemt.readers._blade import BladeFile, checked, lines_of, values, whole
 from bemt.sections.parametric import QpropSection
 
 __all__ = ["BLADE", "KIND", "read", "sniff"]
@@ -127,7 +127,7 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
     if math.isfinite(R) and R > 1.5 * r[-1]:
         beside = f"R = {R:g} m beside a last radius of {r[-1]:g} m"
         faults.append(Fault(source.name, str(rows[1][0]), beside, "a tip near it", "R takes no Rfac: metres"))
-    if blades != int(blades):
+    if blades != whole(blades):
         faults.append(Fault(source.name, str(rows[1][0]), f"{blades:g} blades", "a whole number"))
     if math.isfinite(R) and not R * (1 + 1e-9) >= r[-1]:
         faults.append(
@@ -140,6 +140,6 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
             )
         )
     blade = BladeFile(
-        rows[0][1].strip(), "QPROP", int(blades), R, float(r[0]), r, c, np.radians(b), sections, notes=tuple(notes)
+        rows[0][1].strip(), "QPROP", whole(blades), R, float(r[0]), r, c, np.radians(b), sections, notes=tuple(notes)
     )
     return checked(source, blade, faults)

@@ -10,7 +10,7 @@ import numpy as np
 
 from bemt.base.errors import Fault, InputError
 from bemt.readers import SourceText, head_text, load_text
-from bemt.readers._blade import BladeFile, checked, lines_of, values
+from bemt.readers._blade import BladeFile, checked, lines_of, values, whole
 from bemt.sections.parametric import XrotorSection
 
 __all__ = ["BLADE", "KIND", "read", "read_section", "sniff"]
@@ -102,14 +102,14 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
     if faults or not 1 <= count <= 50:
         raise InputError(faults or [Fault(source.name, str(rows[5][0]), f"{count:g} sections", "1 to 50")])
     at, sections = 6, []
-    for _ in range(int(count)):
+    for _ in range(whole(count)):
         sections.append(read_section(source, rows, at, faults))
         at += 5
     if at + 1 >= len(rows):
         raise InputError([*faults, Fault(source.name, "", "the end of the file", "flags, stations")])
     flags = rows[at][1].split()
     n, blades = values(source, *rows[at + 1], 2, "II Nblds", faults)
-    body = rows[at + 2 : at + 2 + int(n)] if n == n else []
+    body = rows[at + 2 : at + 2 + whole(n)]
     if len(body) < n:
         faults.append(Fault(source.name, str(rows[-1][0]), f"{len(body)} stations", f"{n:g}"))
     table = np.array([values(source, *row, 4, "r/R C/R Beta0deg Ubody", faults) for row in body]).reshape(-1, 4)
@@ -130,7 +130,7 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
     blade = BladeFile(
         name,
         "XROTOR",
-        int(blades),
+        whole(blades),
         R,
         hub * R,
         table[:, 0] * R,

@@ -1,0 +1,89 @@
+"""The promise of the derivatives: those of whole solves, station by station, in an open rotor and in a duct."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bemt.base.errors import InputError
+from bemt.bem import evaluate, solver
+from bemt.bem.gradient import Gradient, gradient
+from bemt.case import load_case
+from bemt.effects import from_text
+
+STEP = 1e-6
+POINTS = (("prop_10x5", 12_000.0, 8.0), ("prop_14x8", 16_000.0, 0.0), ("ds30", 40_000.0, 20.0))
+
+
+def _solved(ready: evaluate.Ready, rpm: float, V: float, air: object, stations: object) -> np.ndarray:
+    model = ready.model
+    prep = solver.prepare(model.rotor, model.polars, ready.effects, model.duct, stations=stations)  # type: ignore[arg-type]
+    s = solver.solve(prep, rpm, V, air)  # type: ignore[arg-type]
+    return np.array([s.T_rotor[0], s.Q[0]])
+
+
+@pytest.mark.parametrize(("name", "rpm", "V"), POINTS)
+def test_derivatives_are_those_of_whole_solves(project: Path, name: str, rpm: float, V: float) -> None:
+    case = load_case(project / f"cases/{name}/case.toml")
+    ready, air = evaluate.prepare(case), case.air()
+    found: Gradient = gradient(ready.model, ready.effects, rpm, V, air)
+    s = found.stations
+    assert _solved(ready, rpm, V, air, s) == pytest.approx([found.thrust_N, found.torque_Nm], rel=1e-12)
+    for key in ("chord", "beta"):
+        scale = np.abs(getattr(found, key)).max(axis=1)
+        for i in (1, 9, 20, 31, 38):
+            values = getattr(s, key)
+            d = STEP * (values[i] if key == "chord" else 1.0)
+            moved = [s._replace(**{key: values + sign * d * (np.arange(values.size) == i)}) for sign in (-1.0, 1.0)]
+            low, high = (_solved(ready, rpm, V, air, one) for one in moved)
+            assert (high - low) / (2 * d) / scale == pytest.approx(getattr(found, key)[:, i] / scale, abs=1e-6), (key, i)
+    turned = [s._replace(beta=s.beta + sign * STEP) for sign in (-1.0, 1.0)]
+    low, high = (_solved(ready, rpm, V, air, one) for one in turned)
+    assert (high - low) / (2 * STEP) == pytest.approx(found.pitch, rel=1e-6)
+    for key, d, points in (
+        ("rpm", 1e-6 * rpm, lambda d: (rpm + d, V, air)),
+        ("airspeed", 1e-4, lambda d: (rpm, V + d, air)),
+        ("density", 1e-6, lambda d: (rpm, V, replace(air, rho=air.rho + d))),
+    ):
+        low, high = (_solved(ready, *points(sign * d), s) for sign in (-1.0, 1.0))
+        assert (high - low) / (2 * d) == pytest.approx(getattr(found, key), rel=1e-6), key
+
+
+def test_what_they_say_is_what_a_propeller_does(project: Path) -> None:
+    case = load_case(project / "cases/prop_10x5/case.toml")
+    ready, air = evaluate.prepare(case), case.air()
+    g = gradient(ready.model, ready.effects, 10_000.0, 8.0, air)
+    assert g.rpm[0] > 0 and g.airspeed[0] < 0 and g.pitch[0] > 0 and g.pitch[1] > 0
+    # without Reynolds number loads go with density
+    dry = tuple(e for e in ready.effects if e.id not in ("reynolds",))
+    g = gradient(ready.model, dry, 10_000.0, 8.0, air)
+    assert g.density * air.rho == pytest.approx([g.thrust_N, g.torque_Nm], rel=1e-6)
+
+
+def test_effects_around_the_rotor_are_refused(project: Path) -> None:
+    case = load_case(project / "cases/prop_10x5/case.toml")
+    ready = evaluate.prepare(case)
+    with pytest.raises(InputError, match="ground_effect"):
+        gradient(ready.model, (*ready.effects, from_text("ground_effect")), 8000.0, 0.0, case.air())
+
+
+def test_openmdao_component(project: Path) -> None:
+    om = pytest.importorskip("openmdao.api")
+    from bemt.bem.openmdao import rotor_component
+
+    case = load_case(project / "cases/prop_10x5/case.toml")
+    ready = evaluate.prepare(case)
+    problem = om.Problem(reports=False)
+    problem.model.add_subsystem("rotor", rotor_component(ready.model, ready.effects, case.air()), promotes=["*"])
+    problem.setup()
+    problem.set_val("rpm", 9000.0)
+    problem.set_val("airspeed", 6.0)
+    problem.run_model()
+    T, Q = problem.get_val("thrust")[0], problem.get_val("torque")[0]
+    points = evaluate.evaluate(ready, 9000.0, 6.0, case.air())
+    assert (T, Q) == pytest.approx((points.thrust_N[0], points.torque_Nm[0]), rel=1e-9)
+    total = problem.compute_totals(of=["thrust"], wrt=["chord", "rpm", "beta"])
+    assert total["thrust", "beta"].shape == (1, 40) and total["thrust", "rpm"][0, 0] > 0
