@@ -252,8 +252,8 @@ predicts) and [zero_thrust.py](zero_thrust.py) (JSBSim, at the airspeed where BE
 {head}
 {chr(10).join(kinds["disk"])}
 
-`rotor-disk` and `su2-disk` prescribe BEMT's load; the other two solve the inflow themselves, so that there is nothing to
-compare before they run. OpenFOAM's `rotorDisk` with ordinary section tables is wrong for propellers: lift acts along the
+`rotor-disk` and `su2-disk` prescribe BEMT's load; the other two solve the inflow themselves: nothing to compare
+before they run. OpenFOAM's `rotorDisk` with ordinary section tables is wrong for propellers: lift acts along the
 axis and the torque lacks cl sin(phi). The run is in [reports/disk](../reports/disk/README.md).
 
 ## Blades for design tools

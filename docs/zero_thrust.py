@@ -1,4 +1,4 @@
-"""A JSBSim aircraft at the airspeed where BEMT says that the thrust of its 10x5 vanishes: ``python docs/zero_thrust.py``.
+"""A JSBSim aircraft where BEMT says that the thrust of its 10x5 vanishes: ``python docs/zero_thrust.py``.
 
 JSBSim gets the airspeed and the shaft power that BEMT gives for that point; speed and thrust are its own answer. Needs
 ``pip install 'bemt[simulators]'``.
@@ -63,5 +63,6 @@ def main() -> dict[str, float]:
 if __name__ == "__main__":
     found = main()
     print(f"BEMT: no thrust at J {found['J']:.4f}, {found['airspeed_m_s']:.2f} m/s at {RPM:.0f} rev/min")
-    print(f"JSBSim there, with BEMT's shaft power: {found['rpm']:.0f} rev/min, thrust {found['thrust_N']:+.4f} N "
-          f"({100 * found['thrust_N'] / found['thrust_at_rest_N']:+.2f} % of {found['thrust_at_rest_N']:.2f} N at rest)")  # fmt: skip
+    share = 100 * found["thrust_N"] / found["thrust_at_rest_N"]
+    print(f"JSBSim there, with BEMT's shaft power: {found['rpm']:.0f} rev/min, thrust {found['thrust_N']:+.4f} N")
+    print(f"which is {share:+.2f} % of the {found['thrust_at_rest_N']:.2f} N at rest")

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from bemt.base.errors import InputError
-from bemt.bem import evaluate
 from bemt.case import load_case
+from bemt.case.prepare import prepare_case
 from bemt.commands.cli import main
 from bemt.readers import detect, dfdc, qprop, xrotor
 from bemt.sections.parametric import QpropSection, XrotorSection, fit_qprop, fit_xrotor
@@ -134,7 +134,7 @@ def test_a_file_is_known_by_its_content_and_becomes_a_case(
     assert main(["stations", str(files[word]), "--out", str(out)]) == 0
     capsys.readouterr()
     case = load_case(out / "case.toml")
-    points = evaluate.evaluate(evaluate.prepare(case), case.rpm, [0.0, 5.0], case.air())
+    points = prepare_case(case).solve(case.rpm, [0.0, 5.0], case.air())
     assert points.converged.all() and (points.thrust_N > 0).all() and points.thrust_N[1] < points.thrust_N[0]
 
 

@@ -9,18 +9,19 @@ import numpy as np
 import pytest
 
 from bemt.base.errors import InputError
-from bemt.bem import evaluate, solver
+from bemt.bem import solver
 from bemt.bem.gradient import Gradient, gradient
+from bemt.bem.model import Model
 from bemt.case import load_case
+from bemt.case.prepare import prepare_case
 from bemt.effects import from_text
 
 STEP = 1e-6
 POINTS = (("prop_10x5", 12_000.0, 8.0), ("prop_14x8", 16_000.0, 0.0), ("ds30", 40_000.0, 20.0))
 
 
-def _solved(ready: evaluate.Ready, rpm: float, V: float, air: object, stations: object) -> np.ndarray:
-    model = ready.model
-    prep = solver.prepare(model.rotor, model.polars, ready.effects, model.duct, stations=stations)  # type: ignore[arg-type]
+def _solved(ready: Model, rpm: float, V: float, air: object, stations: object) -> np.ndarray:
+    prep = solver.prepare(ready.rotor, ready.polars, ready.effects, ready.duct, stations=stations)  # type: ignore[arg-type]
     s = solver.solve(prep, rpm, V, air)  # type: ignore[arg-type]
     return np.array([s.T_rotor[0], s.Q[0]])
 
@@ -28,8 +29,8 @@ def _solved(ready: evaluate.Ready, rpm: float, V: float, air: object, stations: 
 @pytest.mark.parametrize(("name", "rpm", "V"), POINTS)
 def test_derivatives_are_those_of_whole_solves(project: Path, name: str, rpm: float, V: float) -> None:
     case = load_case(project / f"cases/{name}/case.toml")
-    ready, air = evaluate.prepare(case), case.air()
-    found: Gradient = gradient(ready.model, ready.effects, rpm, V, air)
+    ready, air = prepare_case(case), case.air()
+    found: Gradient = ready.gradient(rpm, V, air)
     s = found.stations
     assert _solved(ready, rpm, V, air, s) == pytest.approx([found.thrust_N, found.torque_Nm], rel=1e-12)
     for key in ("chord", "beta"):
@@ -37,7 +38,8 @@ def test_derivatives_are_those_of_whole_solves(project: Path, name: str, rpm: fl
         for i in (1, 9, 20, 31, 38):
             values = getattr(s, key)
             d = STEP * (values[i] if key == "chord" else 1.0)
-            moved = [s._replace(**{key: values + sign * d * (np.arange(values.size) == i)}) for sign in (-1.0, 1.0)]
+            one = np.arange(values.size) == i
+            moved = [s._replace(**{key: values + sign * d * one}) for sign in (-1.0, 1.0)]
             low, high = (_solved(ready, rpm, V, air, one) for one in moved)
             assert (high - low) / (2 * d) / scale == pytest.approx(getattr(found, key)[:, i] / scale, abs=1e-6), (key, i)
     turned = [s._replace(beta=s.beta + sign * STEP) for sign in (-1.0, 1.0)]
@@ -54,20 +56,20 @@ def test_derivatives_are_those_of_whole_solves(project: Path, name: str, rpm: fl
 
 def test_what_they_say_is_what_a_propeller_does(project: Path) -> None:
     case = load_case(project / "cases/prop_10x5/case.toml")
-    ready, air = evaluate.prepare(case), case.air()
-    g = gradient(ready.model, ready.effects, 10_000.0, 8.0, air)
+    ready, air = prepare_case(case), case.air()
+    g = gradient(ready, ready.effects, 10_000.0, 8.0, air)
     assert g.rpm[0] > 0 and g.airspeed[0] < 0 and g.pitch[0] > 0 and g.pitch[1] > 0
     # without Reynolds number loads go with density
     dry = tuple(e for e in ready.effects if e.id not in ("reynolds",))
-    g = gradient(ready.model, dry, 10_000.0, 8.0, air)
+    g = gradient(ready, dry, 10_000.0, 8.0, air)
     assert g.density * air.rho == pytest.approx([g.thrust_N, g.torque_Nm], rel=1e-6)
 
 
 def test_effects_around_the_rotor_are_refused(project: Path) -> None:
     case = load_case(project / "cases/prop_10x5/case.toml")
-    ready = evaluate.prepare(case)
+    ready = prepare_case(case)
     with pytest.raises(InputError, match="ground_effect"):
-        gradient(ready.model, (*ready.effects, from_text("ground_effect")), 8000.0, 0.0, case.air())
+        gradient(ready, (*ready.effects, from_text("ground_effect")), 8000.0, 0.0, case.air())
 
 
 def test_openmdao_component(project: Path) -> None:
@@ -75,15 +77,15 @@ def test_openmdao_component(project: Path) -> None:
     from bemt.bem.openmdao import rotor_component
 
     case = load_case(project / "cases/prop_10x5/case.toml")
-    ready = evaluate.prepare(case)
+    ready = prepare_case(case)
     problem = om.Problem(reports=False)
-    problem.model.add_subsystem("rotor", rotor_component(ready.model, ready.effects, case.air()), promotes=["*"])
+    problem.model.add_subsystem("rotor", rotor_component(ready, ready.effects, case.air()), promotes=["*"])
     problem.setup()
     problem.set_val("rpm", 9000.0)
     problem.set_val("airspeed", 6.0)
     problem.run_model()
     T, Q = problem.get_val("thrust")[0], problem.get_val("torque")[0]
-    points = evaluate.evaluate(ready, 9000.0, 6.0, case.air())
+    points = ready.solve(9000.0, 6.0, case.air())
     assert (T, Q) == pytest.approx((points.thrust_N[0], points.torque_Nm[0]), rel=1e-9)
     total = problem.compute_totals(of=["thrust"], wrt=["chord", "rpm", "beta"])
     assert total["thrust", "beta"].shape == (1, 40) and total["thrust", "rpm"][0, 0] > 0

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
 from bemt.bem import solver
-from bemt.bem.forward import Model, acts_on_points, acts_on_rotor
+from bemt.bem.model import Model, acts_on_points, acts_on_rotor
 
 if TYPE_CHECKING:
     from bemt.air import Air
@@ -76,7 +76,7 @@ def gradient(
 
     Parameters
     ----------
-    model : bemt.bem.forward.Model
+    model : bemt.bem.model.Model
         Rotor, section tables, duct.
     effects : sequence of Effect
         Physics that is on; effects around the solver (walls, lags) have no elements and are refused.

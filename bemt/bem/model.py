@@ -27,6 +27,7 @@ from bemt.sections.neuralfoil import neuralfoil_polar
 from bemt.sections.polars import Polar
 
 if TYPE_CHECKING:
+    from bemt.bem.gradient import Gradient
     from geometry.duct import Duct
     from geometry.rotor import Rotor
 
@@ -179,6 +180,25 @@ class Model:
         provenance = {"source": "bemt", "effects": self._texts, "stations": self.n_stations}
         name = self.rotor.name or "rotor"
         return Dataset("bemt", name, values, flags=flags, provenance=provenance, notes=self.notes)
+
+    def gradient(self, rpm: float, V: float = 0.0, air: Air | None = None) -> Gradient:
+        """Differentiate rotor thrust and torque at one point by every element's chord and angle, rpm, V, density.
+
+        Parameters
+        ----------
+        rpm, V : float
+            Speed of rotation [rev/min], axial onset speed [m/s].
+        air : Air, optional
+            State of the air; 1.225 kg/m3 at 15 degC by default.
+
+        Returns
+        -------
+        bemt.bem.gradient.Gradient
+            Loads and derivatives, see :func:`bemt.bem.gradient.gradient`.
+        """
+        from bemt.bem.gradient import gradient
+
+        return gradient(self, self.effects, rpm, V, Air.from_density() if air is None else air)
 
 
 def solve(

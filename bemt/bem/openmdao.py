@@ -12,7 +12,7 @@ from bemt.bem.gradient import gradient
 
 if TYPE_CHECKING:
     from bemt.air import Air
-    from bemt.bem.forward import Model
+    from bemt.bem.model import Model
     from bemt.effects import Effect
 
 __all__ = ["rotor_component"]
@@ -23,7 +23,7 @@ def rotor_component(model: Model, effects: Sequence[Effect], air: Air) -> Any:
 
     Parameters
     ----------
-    model : bemt.bem.forward.Model
+    model : bemt.bem.model.Model
         Rotor, section tables, duct; its blade elements are the first values of the inputs.
     effects : sequence of Effect
         Physics that is on.

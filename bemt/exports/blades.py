@@ -32,10 +32,10 @@ def stations(rotor: Rotor) -> tuple[Array, Array, Array, bool]:
 
 def anchors_of(job: Job) -> list[tuple[float, Polar, float]]:
     """Section tables of the case: r/R, table, Reynolds number there at the operating point."""
-    from bemt.bem import evaluate
+    from bemt.case.prepare import prepare_case
 
     point = job.loading
-    found = evaluate.prepare(job.case).model.polars
+    found = prepare_case(job.case).polars
     many = len(found) > 1
     at = [np.clip(x, point.r[0] / point.R, point.r[-1] / point.R) if many else 0.75 for x, _ in found]
     return [
@@ -86,12 +86,12 @@ class Frozen:
 
 def baked(job: Job, count: int = 20) -> Frozen:
     """Section tables as the solver uses them, all effects on sections included, at some of its stations."""
-    from bemt.bem import evaluate
     from bemt.bem.packing import M2_STEP
+    from bemt.case.prepare import prepare_case
     from bemt.sections.polars import ALPHA_GRID
 
     point = job.loading
-    prep = evaluate.prepare(job.case).prep
+    prep = prepare_case(job.case).prep
     keep = np.unique(np.round(np.linspace(0, point.r.size - 1, min(count, point.r.size))).astype(int))
     tab = prep.tables[keep]  # (S, Nm, Nr, Na, 2)
     Re_axis = _re_axis(prep.grid, tab.shape[2])

@@ -86,12 +86,12 @@ def _tables(job: Job) -> tuple[Any, Array, list[Array], list[Array]]:
     """Sections, Reynolds numbers, and per section cl and cd as (Nm, Nr, Na)."""
     from dataclasses import replace
 
-    from bemt.bem import evaluate
+    from bemt.case.prepare import prepare_case
     from bemt.exports.blades import _re_axis
 
     f = baked(job, count=10)
     p = job.loading
-    prep = evaluate.prepare(job.case).prep
+    prep = prepare_case(job.case).prep
     axis = _re_axis(prep.grid, prep.tables.shape[2])
     low, high = np.searchsorted(axis, [0.4 * p.Re.min(), 2.5 * p.Re.max()])
     use = np.arange(max(int(low) - 1, 0), min(int(high) + 1, axis.size))

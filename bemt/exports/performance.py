@@ -13,7 +13,7 @@ from bemt.base.errors import Fault, InputError
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from bemt.bem.evaluate import Ready
+    from bemt.bem.model import Model
     from bemt.case import Case
 
 __all__ = ["Band", "Loading", "Performance", "PointLoads", "band_of", "loading_of", "performance_of", "solve_points"]
@@ -37,10 +37,10 @@ class PointLoads:
     torque_Nm: Array
 
 
-def _prepared(case: Case, overrides: Mapping[str, Any] | None = None) -> Ready:
-    from bemt.bem import evaluate
+def _prepared(case: Case, overrides: Mapping[str, Any] | None = None) -> Model:
+    from bemt.case.prepare import prepare_case
 
-    return evaluate.prepare(case, overrides)
+    return prepare_case(case, overrides)
 
 
 def solve_points(
@@ -48,13 +48,11 @@ def solve_points(
     rpm: ArrayLike,
     airspeed_m_s: ArrayLike,
     overrides: Mapping[str, Any] | None = None,
-    ready: Ready | None = None,
+    ready: Model | None = None,
 ) -> PointLoads:
     """Solve points of a case; the one place of the exports that asks the solver for loads."""
-    from bemt.bem import evaluate
-
     rpm, V = np.broadcast_arrays(np.asarray(rpm, dtype=float), np.asarray(airspeed_m_s, dtype=float))
-    found = evaluate.evaluate(ready or _prepared(case, overrides), rpm.ravel(), V.ravel(), case.air(overrides))
+    found = (ready or _prepared(case, overrides)).solve(rpm.ravel(), V.ravel(), case.air(overrides))
     if not found.converged.all():
         bad = int(np.flatnonzero(~found.converged)[0])
         where = f"{found.rpm[bad]:g} rev/min, {found.airspeed_m_s[bad]:g} m/s"
