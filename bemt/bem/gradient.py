@@ -40,12 +40,11 @@ class Gradient:
     stations : Stations
         Blade elements. [m], [rad]
     thrust_N, torque_Nm : float
-        Rotor thrust (without duct and stator) and shaft torque.
+        Rotor thrust (without duct and stator) [N] and shaft torque [N m].
     chord, beta : (2, N) float
         Derivatives of thrust and torque by each element's chord [N/m], [N m/m] and blade angle [N/rad], [N m/rad].
-    rpm, airspeed, density, pitch : (2,) float
-        Derivatives of thrust and torque by rev/min, m/s, kg/m3 (viscosity and speed of sound held) and by an angle that
-        all elements turn [rad].
+    rpm, airspeed, density : (2,) float
+        Derivatives of thrust and torque by rev/min, m/s, kg/m3 (viscosity, speed of sound held) [N/unit], [N m/unit].
     """
 
     stations: Stations
@@ -59,7 +58,7 @@ class Gradient:
 
     @property
     def pitch(self) -> Array:
-        """Derivatives by an angle that the whole blade turns."""
+        """Derivatives by an angle that the whole blade turns [N/rad], [N m/rad]."""
         return np.asarray(self.beta.sum(axis=1))
 
 
@@ -87,7 +86,7 @@ def gradient(
     stations : Stations, optional
         Blade elements; those of the model by default.
     step : float
-        Relative step of the central differences.
+        Relative step of the central differences [1].
 
     Returns
     -------

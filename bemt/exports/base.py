@@ -110,24 +110,11 @@ class Export(ABC):
 
     A subclass in a module of ``bemt/exports/`` is found by scanning; its ``id`` is the word of ``--format``.
 
-    Attributes
-    ----------
-    id, title : str
-        Word of the command line; one line for people.
-    kind : str
-        ``solid``, ``loads`` (thrust and torque of a simulator), ``disk`` (a flow solver) or ``blade`` (a design tool).
-    holds : str
-        Model class of the target, as a formula where there is one.
-    features : frozenset of str
-        Keys of :data:`FEATURES` that the target holds.
-    conventions : str
-        Signs, axes and units of the written numbers.
-    source : str
-        Where format and formula come from.
-    needs : tuple of str
-        Python packages that writing needs beyond the standard installation.
-    uses : frozenset of str
-        Fields of `bemt.exports.openfoam.write.Run` that the target reads.
+    What a class states: ``id`` (word of the command line) and ``title``; ``kind``: ``solid``, ``loads`` (thrust and
+    torque of a simulator), ``disk`` (a flow solver) or ``blade`` (a design tool); ``holds``: the model class, as a
+    formula where there is one; ``features``: keys of :data:`FEATURES`; ``conventions``: signs, axes and units of the written numbers;
+    ``source`` of format and formula; ``needs``: Python packages beyond the installation; ``uses``: fields of
+    `bemt.exports.openfoam.write.Run` that it reads.
     """
 
     id: ClassVar[str]

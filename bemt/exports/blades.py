@@ -55,11 +55,11 @@ class Frozen:
     alpha : (Na,) float
         Angles of attack. [rad]
     M : (Nm,) float
-        Mach numbers.
+        Mach numbers [1].
     cl, cd : (S, Na, Nm) float
-        Coefficients.
+        Coefficients [1].
     Re : (S,) float
-        Reynolds numbers that were held.
+        Reynolds numbers that were held [1].
     at_alpha, at_M : (S,) float
         Angle of attack [rad] and Mach number of the operating point.
     """

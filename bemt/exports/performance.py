@@ -282,7 +282,7 @@ class Loading:
     blades, sense : int
         Number; +1 right-handed.
     thrust_N, torque_Nm : float
-        Sums over the elements.
+        Sums over the elements. [N], [N m]
     duct_thrust_N : float
         Thrust of duct and stator beside the rotor's. [N]
     """
