@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -206,8 +207,6 @@ def test_a_prescribed_load_integrates_to_the_loads(word: str, job: Job, fan: Job
 
 def test_rotor_disk_by_its_own_formula_at_rest_and_in_flight(job: Job) -> None:
     """f = q c B A/(2 pi r), force (0, -f Cd, f Cl), from the written text."""
-    import re
-
     for V in (0.0, 8.0):
         asked = Job(job.case, job.rpm, V)
         text = str(written("rotor-disk", asked)["system/fvOptions"])
@@ -235,10 +234,33 @@ def test_rotor_disk_in_openfoam(project: Path, tmp_path: Path, speed: float) -> 
     control = tmp_path / "system/controlDict"
     control.write_text(control.read_text().replace("400;", "2;"))
     subprocess.run(["sh", "Allrun"], cwd=tmp_path, check=True)
-    subprocess.run(["postProcess", "-latestTime", "-func", "writeCellCentres"], cwd=tmp_path, check=True,
-                   capture_output=True)  # fmt: skip
+    for made in ("writeCellCentres", "writeCellVolumes"):
+        subprocess.run(["postProcess", "-latestTime", "-func", made], cwd=tmp_path, check=True, capture_output=True)
     lift = float((tmp_path / "log.simpleFoam").read_text().split("Effective lift =")[-1].split()[0])
+    force, centre, volume = (_field(tmp_path / "2" / name) for name in ("disk:rotorForce", "C", "V"))
+    load = job.loading.rho * force * volume
+    torque = float(np.sum(centre[:, 0] * load[:, 1] - centre[:, 1] * load[:, 0]))
     assert lift == pytest.approx(job.loading.thrust_N, rel=1e-3)
+    assert load[:, 2].sum() == pytest.approx(job.loading.thrust_N, rel=1e-3)
+    assert -torque == pytest.approx(job.loading.torque_Nm, rel=5e-3)
+
+
+def _field(path: Path) -> np.ndarray:
+    """Cells of an ASCII field."""
+    text = path.read_text()
+    head = re.search(r"internalField\s+nonuniform List<\w+>\s*(\d+)\s*\(", text)
+    assert head is not None
+    body = text[head.end() : text.index("\n)\n", head.end())]
+    return np.array(body.replace("(", "").replace(")", "").split(), dtype=float).reshape(int(head[1]), -1)
+
+
+@pytest.mark.parametrize("name", ["prop_8x5", "prop_10x5", "prop_12x6", "prop_14x8", "ds30"])
+def test_every_case_becomes_every_disk(project: Path, name: str) -> None:
+    asked = Job(load_case(project / f"cases/{name}/case.toml"), airspeed_m_s=25.0)
+    for word in ("rotor-disk", "su2-disk", "su2-bem", "flow360"):
+        files = written(word, asked)
+        assert files and all(len(data) > 50 for data in files.values())
+        assert "nan" not in " ".join(str(data).lower() for data in files.values() if isinstance(data, str))
 
 
 # ---------------------------------------------------------------- blades, there and back

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault
 from bemt.exports.performance import Band, Loading, Performance, band_of, loading_of, performance_of, solve_points
 
 if TYPE_CHECKING:
@@ -30,7 +30,6 @@ __all__ = [
     "LoadsExport",
     "SolidExport",
     "entry",
-    "refuse",
 ]
 
 Array = NDArray[np.float64]
@@ -112,9 +111,9 @@ class Export(ABC):
 
     What a class states: ``id`` (word of the command line) and ``title``; ``kind``: ``solid``, ``loads`` (thrust and
     torque of a simulator), ``disk`` (a flow solver) or ``blade`` (a design tool); ``holds``: the model class, as a
-    formula where there is one; ``features``: keys of :data:`FEATURES`; ``conventions``: signs, axes and units of the written numbers;
-    ``source`` of format and formula; ``needs``: Python packages beyond the installation; ``uses``: fields of
-    `bemt.exports.openfoam.write.Run` that it reads.
+    formula where there is one; ``features``: keys of :data:`FEATURES`; ``conventions``: signs, axes and units of the
+    written numbers; ``source`` of format and formula; ``needs``: Python packages beyond the installation; ``uses``:
+    fields of `bemt.exports.openfoam.write.Run` that it reads.
     """
 
     id: ClassVar[str]
@@ -458,9 +457,3 @@ def entry(export: Export, job: Job, files: Files) -> dict[str, Any]:
         for name, data in ((n, d.encode() if isinstance(d, str) else d) for n, d in files.items())
     ]
     return found
-
-
-def refuse(faults: list[Fault]) -> None:
-    """Raise all faults at once, if there are any."""
-    if faults:
-        raise InputError(faults)

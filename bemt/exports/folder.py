@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -97,6 +98,8 @@ def export_case(
         (out / MANIFEST).unlink(missing_ok=True)  # a manifest never speaks of files that are being replaced
         for name, data in contents.items():
             write_atomic(out / name, data)
+            if str(data)[:2] == "#!":
+                os.chmod(out / name, 0o755)
         write_atomic(out / MANIFEST, json.dumps(manifest, indent=1) + "\n")
     if manifest:
         now = _hashes(manifest)

@@ -32,6 +32,15 @@ TIP_CELL = 0.05
 """Last over first cell from hub to tip: the load falls to zero within the last hundredths of R."""
 INTENSITY = 0.01
 
+_SCRIPT = """#!/bin/sh
+# Mesh and run; the load stands in log.simpleFoam from the first step: "Effective lift" is the thrust [N].
+set -e
+cd "$(dirname "$0")"
+if [ -z "$WM_PROJECT_DIR" ] && [ -d /usr/share/openfoam ]; then export WM_PROJECT_DIR=/usr/share/openfoam; fi
+blockMesh > log.blockMesh
+simpleFoam > log.simpleFoam
+"""
+
 
 class RotorDiskExport(DiskExport):
     """A case of simpleFoam whose fvOptions carry the loads of one operating point."""
@@ -68,8 +77,7 @@ class RotorDiskExport(DiskExport):
                 {"simulationType": "RAS", "RAS": {"RASModel": "kOmegaSST", "turbulence": "on", "printCoeffs": "off"}},
             ),
             **{f"0/{name}": text for name, text in _fields(p, levels).items()},
-            "Allrun": '#!/bin/sh\nset -e\ncd "$(dirname "$0")"\nblockMesh > log.blockMesh\n'
-            "simpleFoam > log.simpleFoam\n",
+            "Allrun": _SCRIPT,
         }
 
     def notes(self, job: Job) -> list[str]:
