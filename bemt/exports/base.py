@@ -95,8 +95,15 @@ class Job:
 
     @cached_property
     def band(self) -> Band:
-        """Standard uncertainty of the prediction."""
-        return band_of(self.case, self.performance)
+        """Standard uncertainty of the prediction at rest and at half the speed of zero thrust."""
+        t = self.performance
+        top = float(t.rpm[-1])
+        return band_of(self.case, top, (0.0, 0.5 * float(t.J_zero[-1]) * top / 60.0 * t.diameter_m))
+
+    @cached_property
+    def band_at_point(self) -> Band:
+        """Standard uncertainty of the prediction at rest and at the single point."""
+        return band_of(self.case, self.rpm_top, (0.0, self.airspeed))
 
     @cached_property
     def loading(self) -> Loading:
@@ -319,7 +326,7 @@ class DiskExport(Export):
                 "torque": None if Q is None else 100.0 * abs(Q / point.torque_Nm - 1.0),
                 "of": "the loads of the rotor at this point; null: the target solves the inflow itself",
             },
-            "band": job.band.document(),
+            "band": job.band_at_point.document(),
             "range": {"rpm": point.rpm, "airspeed_m_s": point.airspeed_m_s, "density_kg_m3": point.rho},
         }
 
@@ -414,7 +421,7 @@ class BladeExport(Export):
         return {
             "point": p.document(),
             "fit_error_pct": errors | {"of": "the greatest load at this rpm, read back and solved by this project"},
-            "band": job.band.document(),
+            "band": job.band_at_point.document(),
             "range": {
                 "rpm": p.rpm,
                 "airspeed_m_s": p.airspeed_m_s,

@@ -246,11 +246,12 @@ def _targets_text(manifest: dict[str, Any], out: Path) -> list[str]:
             lines.append(f"  greatest error {', '.join(shown_errors)} (of {error['of']})")
         if "band" in item:
             band = item["band"]
-            lines.append(
-                f"  standard uncertainty of the prediction at rest: thrust "
-                f"{number_text(band['thrust_pct']['at_rest'], 3)} %, torque "
-                f"{number_text(band['torque_pct']['at_rest'], 3)} % ({band['origin']})"
+            speeds = dict.fromkeys(zip(band["airspeed_m_s"], band["thrust_pct"], band["torque_pct"], strict=True))
+            words = ", ".join(
+                f"{number_text(t, 3)} % of thrust, {number_text(q, 3)} % of torque at {number_text(v, 3)} m/s"
+                for v, t, q in speeds
             )
+            lines.append(f"  standard uncertainty of the prediction: {words} ({band['origin']})")
         lines += [f"  note: {note}" for note in item["notes"]]
     return lines
 

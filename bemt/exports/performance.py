@@ -184,8 +184,11 @@ def performance_of(case: Case, rpm_top: float) -> Performance:
         T, _ = solve(J, rpm)
         return np.array([_zero_thrust(J, row) for row in T])
 
-    wide = np.linspace(0.0, 4.0, 81)
-    first = zeros(wide)
+    for reach in (4.0, 16.0):  # blades that are all but feathered lose their thrust late
+        wide = np.linspace(0.0, reach, 161)
+        first = zeros(wide)
+        if not np.isnan(first).any():
+            break
     if np.isnan(first).any():
         got = f"no zero of thrust below J = {wide[-1]:g} at {rpm[int(np.flatnonzero(np.isnan(first))[0])]:.0f} rev/min"
         raise InputError(
@@ -223,44 +226,45 @@ def performance_of(case: Case, rpm_top: float) -> Performance:
 
 @dataclass(frozen=True)
 class Band:
-    """Relative standard uncertainty of thrust and torque at rest and at half the J of zero thrust. [-]"""
+    """Relative standard uncertainty of thrust and torque at two airspeeds. [-]"""
 
     thrust: tuple[float, float]
     torque: tuple[float, float]
     rpm: float
+    airspeed_m_s: tuple[float, float]
     origin: str
 
     def document(self) -> dict[str, Any]:
         """For the manifest, in per cent."""
         return {
-            "thrust_pct": {"at_rest": 100.0 * self.thrust[0], "half_J_zero": 100.0 * self.thrust[1]},
-            "torque_pct": {"at_rest": 100.0 * self.torque[0], "half_J_zero": 100.0 * self.torque[1]},
             "rpm": self.rpm,
+            "airspeed_m_s": list(self.airspeed_m_s),
+            "thrust_pct": [100.0 * u for u in self.thrust],
+            "torque_pct": [100.0 * u for u in self.torque],
             "level": "one standard uncertainty",
             "origin": self.origin,
         }
 
 
-def band_of(case: Case, table: Performance) -> Band:
+def band_of(case: Case, rpm: float, airspeed_m_s: tuple[float, float]) -> Band:
     """Spread of the loads over the declared assumptions of a case (`bemt.compare.sweep.case.spread`)."""
     from bemt.compare.sweep.case import spread
 
-    rpm = np.full(2, table.rpm[-1])
-    V = np.array([0.0, 0.5 * table.J_zero[-1]]) * rpm / 60.0 * table.diameter_m
-    base = solve_points(case, rpm, V)
+    n, V = np.full(2, float(rpm)), np.array(airspeed_m_s, dtype=float)
+    base = solve_points(case, n, V)
     variance = np.zeros((2, 2))
     for assumption in case.assumptions:
-        runs = [solve_points(case, rpm, V, {assumption.key: value}) for value in assumption.values]
+        runs = [solve_points(case, n, V, {assumption.key: value}) for value in assumption.values]
         for k, name in enumerate(("thrust_N", "torque_Nm")):
             nominal = getattr(base, name)
             variance[k] += spread(assumption.discrete, nominal, [getattr(run, name) for run in runs]) ** 2
-    u = np.sqrt(variance) / np.abs([base.thrust_N, base.torque_Nm])
-    origin = (
-        f"{len(case.assumptions)} declared assumptions of the case; the model's own error is not in it"
-        if case.assumptions
-        else "no assumptions are declared: 0 is not an uncertainty"
-    )
-    return Band((float(u[0, 0]), float(u[0, 1])), (float(u[1, 0]), float(u[1, 1])), float(rpm[0]), origin)
+    with np.errstate(divide="ignore"):
+        u = np.sqrt(variance) / np.abs([base.thrust_N, base.torque_Nm])
+    origin = "no assumptions are declared: 0 is not an uncertainty"
+    if case.assumptions:
+        origin = f"{len(case.assumptions)} declared assumptions of the case; the model's own error is not in it"
+    (T0, T1), (Q0, Q1) = u.tolist()
+    return Band((T0, T1), (Q0, Q1), float(rpm), (float(V[0]), float(V[1])), origin)
 
 
 @dataclass(frozen=True, eq=False)
