@@ -1,7 +1,7 @@
 """Axial speed behind a rotor from runs of OpenFOAM, averaged over azimuth: ``python docs/wake.py R RUN ...``.
 
 A run is a folder of fields in ASCII (``foamFormatConvert`` makes them so), whole or in ``processor*``, to which
-``postProcess -latestTime -func writeCellCentres`` and ``writeCellVolumes`` were applied. Prints CSV: run, z/R, r/R, speed.
+``postProcess -latestTime -func writeCellCentres`` and ``writeCellVolumes`` were applied. Prints CSV.
 """
 
 from __future__ import annotations

@@ -114,7 +114,7 @@ def test_the_band_grows_with_what_is_not_known(job: Job, project: Path) -> None:
     assert 0.02 < job.band.thrust[0] < 0.5
     sure = job.case.replaced({})
     known = Job(Case(sure.path, sure.written, sure.file), job.rpm)
-    assert known.band.thrust == (0.0, 0.0) and "not an uncertainty" in known.band.origin
+    assert 0.0 < known.band.thrust[0] < job.band.thrust[0] and known.band.torque[1] < job.band.torque[1]
 
 
 # ---------------------------------------------------------------- refused, not dropped

@@ -12,7 +12,6 @@ from bemt.sections.polars import Polar
 
 if TYPE_CHECKING:
     from bemt.exports.base import Job
-    from geometry.rotor import Rotor
 
 __all__ = ["MOST_STATIONS", "Frozen", "anchors_of", "baked", "stations"]
 
@@ -21,13 +20,15 @@ MOST_STATIONS = 60
 """Stations that the tools take: QPROP 81, XROTOR and DFDC 60 to 100 by compilation."""
 
 
-def stations(rotor: Rotor) -> tuple[Array, Array, Array, bool]:
-    """Radius [m], chord [m] and blade angle [rad] of the stations as given, and whether they had to be thinned."""
-    blade = rotor.blade
-    if blade.r.size <= MOST_STATIONS:
-        return blade.r, blade.chord, blade.beta, False
-    r = np.linspace(blade.r[0], blade.r[-1], MOST_STATIONS)
-    return r, *blade.at(r), True
+def stations(job: Job) -> tuple[Array, Array, Array, bool]:
+    """Radius [m], chord [m] and angle [rad] of the stations, with what effects do to the blade; whether thinned."""
+    blade, p = job.case.rotor().blade, job.loading
+    r, thin = blade.r, blade.r.size > MOST_STATIONS
+    if thin:
+        r = np.linspace(blade.r[0], blade.r[-1], MOST_STATIONS)
+    chord, beta = blade.at(r)
+    turned = p.beta - blade.at(p.r)[1]  # by effects such as pitch_offset
+    return r, chord, beta + np.interp(r, p.r, turned), thin
 
 
 def anchors_of(job: Job) -> list[tuple[float, Polar, float]]:

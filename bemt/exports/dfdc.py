@@ -43,7 +43,7 @@ class DfdcExport(BladeExport):
         """OPER, AERO, ROTOR and GEOM."""
         p, rotor, duct = job.loading, job.case.rotor(), job.case.duct()
         assert duct is not None
-        r, c, b, _ = stations(rotor)
+        r, c, b, _ = stations(job)
         x = duct.rotor_x if duct.rotor_x is not None else duct.length / 3.0
         found = sections_of(job)
         V_ref = max(p.airspeed_m_s, 0.2 * p.omega * p.R)

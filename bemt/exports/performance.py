@@ -247,22 +247,25 @@ class Band:
 
 
 def band_of(case: Case, rpm: float, airspeed_m_s: tuple[float, float]) -> Band:
-    """Spread of the loads over the declared assumptions of a case (`bemt.compare.sweep.case.spread`)."""
+    """Spread of the loads over the assumptions of a case, and of rotors as built around what is known of them."""
     from bemt.compare.sweep.case import spread
+    from bemt.compare.sweep.model_error import u_model
 
     n, V = np.full(2, float(rpm)), np.array(airspeed_m_s, dtype=float)
-    base = solve_points(case, n, V)
-    variance = np.zeros((2, 2))
+    names = ("thrust_N", "torque_Nm")
+    model, air = _prepared(case), case.air()
+    points = model.solve(n, V, air)
+    base = solve_points(case, n, V, ready=model)
+    own = u_model(case, model, points, air)
+    variance = np.array([own[name] for name in names]) ** 2
     for assumption in case.assumptions:
         runs = [solve_points(case, n, V, {assumption.key: value}) for value in assumption.values]
-        for k, name in enumerate(("thrust_N", "torque_Nm")):
+        for k, name in enumerate(names):
             nominal = getattr(base, name)
             variance[k] += spread(assumption.discrete, nominal, [getattr(run, name) for run in runs]) ** 2
     with np.errstate(divide="ignore"):
         u = np.sqrt(variance) / np.abs([base.thrust_N, base.torque_Nm])
-    origin = "no assumptions are declared: 0 is not an uncertainty"
-    if case.assumptions:
-        origin = f"{len(case.assumptions)} declared assumptions of the case; the model's own error is not in it"
+    origin = f"{len(case.assumptions)} declared assumptions of the case and the spread of rotors as built"
     (T0, T1), (Q0, Q1) = u.tolist()
     return Band((T0, T1), (Q0, Q1), float(rpm), (float(V[0]), float(V[1])), origin)
 
@@ -276,7 +279,7 @@ class Loading:
     rpm, airspeed_m_s, rho, mu, a_sound : float
         The point. [rev/min], [m/s], SI
     r, dr, chord, beta : (N,) float
-        Elements. [m], [rad]
+        Elements, with what effects do to the blade. [m], [rad]
     dT, dQ : (N,) float
         Thrust [N] and torque [N m] of each element, of all blades.
     alpha, Re, M : (N,) float
@@ -341,6 +344,7 @@ class Loading:
 
 def loading_of(case: Case, rpm: float, airspeed_m_s: float) -> Loading:
     """Solve one point with its radial distributions."""
+    from bemt.bem import kernel as K
     from bemt.bem import solver
 
     ready, air = _prepared(case), case.air()
@@ -364,10 +368,10 @@ def loading_of(case: Case, rpm: float, airspeed_m_s: float) -> Loading:
         )
     rotor = prep.rotor
     rad = {k: v[0] for k, v in s.radial.items()}
-    W = rad["W"]
+    W, chord = rad["W"], prep.st[:, K.S_CHORD]
     if prep.duct is None:  # an open rotor looks its tables up at the speed without the share of drag, see bem.residual
         W = rpm * np.pi / 30.0 * rad["r"] * np.cos(rad["phi"]) + airspeed_m_s * np.sin(rad["phi"])
-    Re, M = air.rho * np.abs(W) * prep.stations.chord / air.mu, np.abs(W) / air.a_sound
+    Re, M = air.rho * np.abs(W) * chord / air.mu, np.abs(W) / air.a_sound
     dT, dQ = rad["dT"], rad["dQ"]
     scale = float(s.T_rotor[0]) / float(dT.sum()), float(s.Q[0]) / float(dQ.sum())
     if abs(scale[0] - 1.0) > 1e-9 or abs(scale[1] - 1.0) > 1e-9:  # pragma: no cover - a bug
@@ -380,8 +384,8 @@ def loading_of(case: Case, rpm: float, airspeed_m_s: float) -> Loading:
         float(air.a_sound),
         rad["r"],
         prep.stations.dr,
-        prep.stations.chord,
-        prep.stations.beta,
+        chord,
+        prep.st[:, K.S_BETA],
         dT,
         dQ,
         rad["alpha"],

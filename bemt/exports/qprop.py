@@ -27,7 +27,7 @@ class QpropExport(BladeExport):
     def write(self, job: Job) -> Files:
         """The file; sections between anchors are interpolated in their numbers."""
         p = job.loading
-        r, c, b, _ = stations(job.case.rotor())
+        r, c, b, _ = stations(job)
         found = _sections(job)
         first = found[0][1]
         rows = [f"{job.case.name}, bemt {__version__}", "", f" {p.blades} {p.R:.10g}  ! Nblades [ R ]", ""]

@@ -27,8 +27,8 @@ class XrotorExport(BladeExport):
 
     def write(self, job: Job) -> Files:
         """The rotor at the operating point; at rest XROTOR gets a small speed."""
-        p, rotor = job.loading, job.case.rotor()
-        r, c, b, _ = stations(rotor)
+        p = job.loading
+        r, c, b, _ = stations(job)
         V = max(p.airspeed_m_s, 0.01 * p.omega * p.R)
         rows = ["XROTOR VERSION:  7.55", f"{job.case.name}, bemt {__version__}"[:80]]
         rows += [
@@ -103,7 +103,7 @@ def section_errors(job: Job, sections: list[Any]) -> list[dict[str, float]]:
 
 def section_notes(job: Job, errors: list[dict[str, float]]) -> list[str]:
     """What a fit of sections leaves out."""
-    thin = stations(job.case.rotor())[3]
+    thin = stations(job)[3]
     worst = ", ".join(f"r/R {e['r_over_R']:.2f}: cl {e['cl']:.3f}, cd {e['cd_pct']:.0f} %" for e in errors)
     return [
         f"sections are fits at the Reynolds numbers of the operating point; worst between the stalls: {worst}",
