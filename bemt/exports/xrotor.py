@@ -57,7 +57,7 @@ class XrotorExport(BladeExport):
         """How well the sections hold."""
         return [
             *section_notes(job, section_errors(job, [s for _, s in sections_of(job)])),
-            "tip loss, swirl and wake are XROTOR's own; stall delay is not in the file",
+            "tip loss, swirl and wake are XROTOR's own; stall delay and cascade are not in the file",
             *(["at rest: Vel is 1 % of the tip speed, XROTOR has no rest"] if job.airspeed <= 0.0 else []),
         ]
 
@@ -107,6 +107,6 @@ def section_notes(job: Job, errors: list[dict[str, float]]) -> list[str]:
     worst = ", ".join(f"r/R {e['r_over_R']:.2f}: cl {e['cl']:.3f}, cd {e['cd_pct']:.0f} %" for e in errors)
     return [
         f"sections are fits at the Reynolds numbers of the operating point; worst between the stalls: {worst}",
-        "mcrit 0.8 and the pitching moment 0 are not from the case",
+        "mcrit 0.8 and the pitching moment 0 are not from the case; what is read back gets this project's own effects",
         *([f"{MOST_STATIONS} stations instead of {job.case.rotor().blade.r.size}"] if thin else []),
     ]

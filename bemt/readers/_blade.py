@@ -175,8 +175,5 @@ airspeed_m_s = {blade.airspeed_m_s or 0.0:.12g}
 [air]
 density_kg_m3 = {rho:.9g}
 
-[model]
-effects_off = ["stall_delay", "cascade"]  # the sections of the file are taken as the blade has them
-
 {chr(10).join(tables)}"""
     return files
