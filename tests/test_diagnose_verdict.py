@@ -29,7 +29,7 @@ def told(answer: chain.Diagnosis, **probability: float) -> verdict.Decision:
     """Decision if the explanations had these probabilities; "a__b" is a pair."""
     given = {explained(k): v for k, v in probability.items()}
     share = dict.fromkeys(answer.found.probability, 0.0) | given
-    return verdict.decide(replace(answer.found, probability=share), 0.002)
+    return verdict.decide(verdict.Asked(replace(answer.found, probability=share), 0.002))
 
 
 def test_a_sure_effect_is_named(answer: chain.Diagnosis) -> None:
@@ -133,7 +133,8 @@ def asked(**changed: Any) -> Any:
     plain = {
         "first": lead, "leading": lead, "rest": 0.0, "odds": 100.0, "needed": 8.0, "p_value": 0.002, "on": False,
         "expected": False, "paired": False, "sure": ("reynolds",), "group": ("reynolds",), "beside": (), "few": (),
-        "P": {NONE: 0.0, UNKNOWN: 0.0, lead: 1.0}, "share": {"reynolds": 1.0},
+        "P": {NONE: 0.0, UNKNOWN: 0.0, lead: 1.0}, "share": {"reynolds": 1.0}, "unlisted": 0.0, "roughness": 1.0,
+        "parameters": {"reynolds": {}},
     }  # fmt: skip
     return SimpleNamespace(
         **(plain | changed), found=SimpleNamespace(log_bayes=lambda _: 100.0, probability={lead: 1.0})
@@ -149,6 +150,16 @@ ROWS: dict[str, dict[str, Any]] = {
     "a smooth rest is left": {"rest": 10.5},
     "not much better than nothing": {"odds": 7.0},
     "twin faults": {"leading": Explanation.of("thrust_zero", "torque_drift")},
+    "unknown is nearly as likely": {"unlisted": 0.2},
+    "far rougher than stated": {"roughness": 5.0},
+    "may as well be absent": {
+        "leading": Explanation.of("untwist"),
+        "parameters": {"untwist": {"tip_deg": {"low": -0.1, "high": 0.5}}},
+    },
+    "a partner at the end of its range": {
+        "leading": Explanation.of("untwist", "duct"),
+        "parameters": {"untwist": {"tip_deg": {"value": 4.0, "low": 3.0, "high": 4.0}}},
+    },
     "several are sure": {"sure": ("reynolds", "duct")},
     "one is sure": {},
     "one is sure, another may be there": {"beside": ("duct",)},

@@ -132,8 +132,9 @@ def _diagnose(
     found = evidence.weigh(problem, candidates)
     say("bootstrapped nulls")
     p = gate.p_value(found, nulls)
-    decision = verdict.decide(found, p)
-    best, parameters = fitting.refined(found, fitting.fit(found, decision.leading))
+    asked = verdict.Asked(found, p)
+    decision = verdict.decide(asked)
+    best, parameters = asked.refined(decision.leading)
     say("held-out blocks")
     words, held, gp_only = blocks.held_out(found, decision.leading if decision.verdict != "unknown" else NONE)
     if decision.verdict == "unknown":  # what is not in the library is predicted as what it is: something smooth

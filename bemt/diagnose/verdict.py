@@ -9,9 +9,9 @@ second effect that may be there, too?  Only then is a name given; with a few exp
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +48,13 @@ PARTNER, MOST = 0.1, 3
 """Probability from which a second effect beside a sure one is mentioned; most members of an open answer [1]."""
 NEAR = 5.0
 """Effects of a class may be this far (natural logarithm of the evidence) behind the best one [1]."""
+
+BESIDE = 0.1
+"""Share of an effect's probability that "unknown" may keep beside it and the effect still be named [1]."""
+ROUGH = 3.0
+"""Noise over what the recording states from which on something else is at work than any effect explains [1]."""
+END = 0.01
+"""As near to an end of its range, a share of it, a parameter of a pair is at the end [1]."""
 
 _BALANCE = ("thrust_N", "torque_Nm")
 # Faults of a cell that shift its reading: one stays, the other creeps.
@@ -102,6 +109,7 @@ class Asked:
 
     found: Evidence
     p_value: float
+    _refined: dict[Explanation, tuple[fitting.Fit, dict[str, dict[str, dict[str, Any]]]]] = field(default_factory=dict)
 
     @property
     def P(self) -> Mapping[Explanation, float]:
@@ -123,7 +131,25 @@ class Asked:
         share = inclusion(self.found)
         if not self.first.pair or twins(self.first):
             return self.first, share
-        return _earned(self.found, self.first, share, self.rest)
+        leading, share = _earned(self.found, self.first, share, self.rest)
+        idle = [i for i in leading if leading.pair and holds_off(i, self._parameters(leading)[i])]
+        if len(idle) == 1:
+            leading, share = leading.without(idle[0]), {i: (0.0 if i in idle else p) for i, p in share.items()}
+        return leading, share
+
+    def _parameters(self, what: Explanation) -> Mapping[str, Mapping[str, Mapping[str, Any]]]:
+        return self.refined(what)[1]
+
+    def refined(self, what: Explanation) -> tuple[fitting.Fit, dict[str, dict[str, dict[str, Any]]]]:
+        """An explanation at its best setting, and what its parameters may be."""
+        if what not in self._refined:
+            self._refined[what] = fitting.refined(self.found, fitting.fit(self.found, what))
+        return self._refined[what]
+
+    @property
+    def parameters(self) -> Mapping[str, Mapping[str, Mapping[str, Any]]]:
+        """What the parameters of the leading explanation may be."""
+        return self._parameters(self.leading)
 
     @property
     def leading(self) -> Explanation:
@@ -158,6 +184,16 @@ class Asked:
     def needed(self) -> float:
         """Log odds over nothing from which it counts."""
         return PROVEN if self.on else EXPECTED if self.expected else ENOUGH
+
+    @cached_property
+    def unlisted(self) -> float:
+        """Probability that the cause is not in the library: two cells with one fault are one cause, too."""
+        return self.P[UNKNOWN] + sum(v for k, v in self.P.items() if k.pair and twins(k))
+
+    @cached_property
+    def roughness(self) -> float:
+        """Noise over what the recording states, where it does [1]."""
+        return self.found.states[0].hyper.scale if self.found.problem.u_known else 1.0
 
     @cached_property
     def paired(self) -> bool:
@@ -228,26 +264,22 @@ class Rule:
     source: str
 
 
-def decide(found: Evidence, p_value: float) -> Decision:
+def decide(asked: Asked) -> Decision:
     """Decide.
 
     Parameters
     ----------
-    found : Evidence
-        Outcome of the weighing.
-    p_value : float
-        Of the gate [1].
+    asked : Asked
+        Outcome of the weighing, and the p-value of the gate.
 
     Returns
     -------
     Decision
         What is said.
     """
-    asked = Asked(found, p_value)
     for rule in RULES:
         if rule.holds(asked):
-            decision = rule.answer(asked)
-            return Decision(**{**vars(decision), "rule": rule.name})
+            return replace(rule.answer(asked), rule=rule.name)
     raise AssertionError("the last rule always holds")
 
 
@@ -290,6 +322,25 @@ def twins(what: Explanation) -> bool:
     chosen = [effects.catalogue()[i] for i in what]
     faults = {"shift" if e.fault in _SHIFTS else e.fault for e in chosen}
     return len(chosen) > 1 and len(faults) == 1 and "" not in faults and all(e.sensor in _BALANCE for e in chosen)
+
+
+def holds_off(name: str, told: Mapping[str, Mapping[str, Any]]) -> bool:
+    """Whether an effect may as well be absent: its intervals hold all values at which it is."""
+    sizes = [p for p in effects.catalogue()[name].parameters if p.off is not None and p.name in told]
+    return bool(sizes) and all(told[p.name]["low"] <= p.off <= told[p.name]["high"] for p in sizes if p.off is not None)
+
+
+def at_end(name: str, told: Mapping[str, Mapping[str, Any]]) -> bool:
+    """Whether the size of an effect, or the first number of one without a size, is at an end of its range."""
+    cls = effects.catalogue()[name]
+    numbers = [p for p in cls.parameters if p.name in told and p.name not in cls.discrete and p.steps > 0]
+    sizes = [p for p in numbers if p.off is not None] or numbers[:1]
+    for p in sizes:
+        near = END * (p.high - p.low)
+        ends = [e for e in (p.low, p.high) if e != p.off]
+        if any(abs(float(told[p.name]["value"]) - e) < near for e in ends):
+            return True
+    return False
 
 
 def _mass(found: Evidence, group: Sequence[str]) -> float:
@@ -465,6 +516,39 @@ RULES: tuple[Rule, ...] = (
         ),
         "",
         "declared: two independent faults of one kind are rare",
+    ),
+    Rule(
+        "unknown is nearly as likely",
+        lambda a: a.unlisted > BESIDE * _mass(a.found, (*a.group, *a.leading)),
+        lambda a: a.says("insufficient", "something that is not in the library explains the readings nearly as well"),
+        "BESIDE",
+        "DIAGNOSIS 7: lost no right name and stopped the wrong ones",
+    ),
+    Rule(
+        "far rougher than stated",
+        lambda a: a.roughness > ROUGH,
+        lambda a: a.says(
+            "insufficient",
+            f"the readings scatter {a.roughness:g} times as much as the recording states; no effect does that",
+        ),
+        "ROUGH",
+        "declared: end of the prior; hysteresis and resonance show so",
+    ),
+    Rule(
+        "may as well be absent",
+        lambda a: not a.leading.pair and len(a.group) <= 1 and holds_off(*next(iter(a.parameters.items()))),
+        lambda a: a.says("insufficient", f"{a.leading} leads, but what the readings say of its size includes none"),
+        "90 % interval",
+        "DIAGNOSIS 7: 4 of 5 wrong names, 0 of 42 right ones",
+    ),
+    Rule(
+        "a partner at the end of its range",
+        lambda a: a.leading.pair and any(at_end(i, told) for i, told in a.parameters.items()),
+        lambda a: a.says(
+            "insufficient", f"{' and '.join(a.leading)} fit only with one of them at the end of its physical range"
+        ),
+        "END",
+        "issue K 5; declared",
     ),
     Rule(
         "several are sure",

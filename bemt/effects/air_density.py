@@ -27,6 +27,11 @@ class AirDensity(Effect):
     )
     on_by_default = False
 
+    def plausible(self, flow: Flow) -> bool:
+        """Whether there is such air: 0.66 kg/m3 at 6000 m (U.S. Standard Atmosphere), 1.42 at sea level and -25 C."""
+        rho = flow.rho * (1.0 + self.change)
+        return bool(rho.min() > 0.66 and rho.max() < 1.42)
+
     def flow(self, flow: Flow) -> None:
         """Change the density."""
         flow.rho = flow.rho * (1.0 + self.change)

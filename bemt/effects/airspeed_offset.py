@@ -27,7 +27,7 @@ class AirspeedOffset(Effect):
     kind = "stand"
     fault = "zero"
     sensor = "airspeed_m_s"
-    parameters = (Parameter("offset_m_s", "m/s", -1.0, 1.0, "declared, pitot zero", 5, 0.0),)
+    parameters = (Parameter("offset_m_s", "m/s", -3.0, 3.0, "declared, pitot zero", 7, 0.0, 0.5),)
     on_by_default = False
 
     def applies(self, flow: Flow) -> str:
