@@ -179,3 +179,12 @@ def test_each_row_of_the_table_answers_when_it_alone_holds(name: str) -> None:
 def test_the_table_says_where_each_row_comes_from_and_the_last_always_holds() -> None:
     assert len({r.name for r in verdict.RULES}) == len(verdict.RULES) and all(r.source for r in verdict.RULES)
     assert verdict.RULES[-1].holds(asked())
+
+
+def test_a_pair_has_one_set_for_each_cause() -> None:
+    """Look-alikes of one cause share its set, whatever stands beside them."""
+    one, two = {"air_density": 0.6, "rpm_scale": 0.4}, {"thrust_zero": 0.9, "thrust_drift": 0.06, "nacelle": 0.04}
+    share = {Explanation.of(a, b): p * q for a, p in one.items() for b, q in two.items()}
+    share |= {Explanation.of("air_density"): 0.2, NONE: 0.1, Explanation.of("air_density", "rpm_scale"): 1e-3}
+    sets = verdict.credible_sets(share, Explanation.of("air_density", "thrust_zero"))
+    assert {frozenset(s) for s in sets} == {frozenset(one), frozenset({"thrust_zero"})}

@@ -53,8 +53,13 @@ BESIDE = 0.1
 """Share of an effect's probability that "unknown" may keep beside it and the effect still be named [1]."""
 ROUGH = 3.0
 """Noise over what the recording states from which on something else is at work than any effect explains [1]."""
+IN_SET, LARGEST = 0.85, 6
+"""Share of the probability of one cause that its set holds; most effects of the sets of a pair together [1]."""
 END = 0.01
 """As near to an end of its range, a share of it, a parameter of a pair is at the end [1]."""
+
+# Turns of two sets that follow each other; they settle in two or three.
+_TURNS = 20
 
 _BALANCE = ("thrust_N", "torque_Nm")
 # Faults of a cell that shift its reading: one stays, the other creeps.
@@ -83,6 +88,8 @@ class Decision:
         Reason, in words.
     rule : str
         Name of the rule that decided.
+    sets : tuple of tuple of str
+        One set of effects per cause: one of each is at work.
     """
 
     verdict: str
@@ -93,6 +100,7 @@ class Decision:
     classes: tuple[tuple[str, ...], ...]
     why: str
     rule: str = ""
+    sets: tuple[tuple[str, ...], ...] = ()
 
 
 @dataclass(eq=False)
@@ -218,6 +226,16 @@ class Asked:
         return tuple(i for i, p in together.items() if p >= PARTNER and i not in self.group)
 
     @cached_property
+    def known_sets(self) -> tuple[tuple[str, ...], ...]:
+        """One set of effects per cause of the leading pair; a sure effect is a set of its own."""
+        sets = credible_sets(self.P, self.leading)
+        for i in self.leading:
+            if self.share[i] >= SURE:
+                other = next((s for s in sets if i not in s), tuple(self.leading.without(i)))
+                return (i,), other
+        return sets
+
+    @cached_property
     def few(self) -> tuple[str, ...]:
         """Fewest of the likeliest effects, at most :data:`MOST`, that hold nearly all of the probability."""
         some = tuple(self.share)
@@ -236,7 +254,8 @@ class Asked:
         """Decision that names effects."""
         stand = all(effects.catalogue()[i].kind == "stand" for i in ids)
         why = "nearly all of the probability is on " + ("it" if len(ids) == 1 else "both")
-        return self.says("sensor" if stand else "named", why, ids, probability, leading=Explanation.of(*ids))
+        said = self.says("sensor" if stand else "named", why, ids, probability, leading=Explanation.of(*ids))
+        return replace(said, sets=tuple((i,) for i in ids))
 
 
 @dataclass(frozen=True)
@@ -397,30 +416,62 @@ def _class(found: Evidence, first: str, share: Mapping[str, float]) -> tuple[str
     return (first, *sorted(others, key=lambda i: -share[i]))
 
 
+def credible_sets(probability: Mapping[Explanation, float], pair: Explanation) -> tuple[tuple[str, ...], ...]:
+    """One set of effects per cause of a pair, likeliest first: with one effect of each set nearly all pairs are there.
+
+    A sum of single effects (Wang, Sarkar, Carbonetto and Stephens 2020, J. R. Statist. Soc. B 82:1273): what may stand
+    for one cause, given the other set, in turns until it stays. What could be in both sets is where it is likelier.
+    """
+    pairs = {k: v for k, v in probability.items() if k.pair}
+    weight: dict[str, dict[str, float]] = {}
+    for k, v in pairs.items():
+        a, b = k
+        weight.setdefault(a, {})[b] = v
+        weight.setdefault(b, {})[a] = v
+    first, second = ({i: 1.0} for i in pair)
+    for _ in range(_TURNS):
+        second = _given(weight, first)
+        first = _given(weight, second)
+    both = set(first) & set(second)
+    for i in both:
+        (first if first[i] < second[i] else second).pop(i)
+    return _to_mass(first), _to_mass(second)
+
+
+def _given(weight: Mapping[str, Mapping[str, float]], other: Mapping[str, float]) -> dict[str, float]:
+    """Probability of each effect to be the one beside a set."""
+    out: dict[str, float] = {}
+    for i, p in other.items():
+        for k, v in weight.get(i, {}).items():
+            if k not in other:
+                out[k] = out.get(k, 0.0) + p * v
+    total = sum(out.values()) or 1.0
+    # what hardly ever stands there is not carried along
+    return {k: v / total for k, v in out.items() if v > 0.01 * total}
+
+
+def _to_mass(share: Mapping[str, float]) -> tuple[str, ...]:
+    """Fewest effects that hold nearly all of a set."""
+    ranked = sorted(share, key=lambda i: -share[i])
+    mass = np.cumsum([share[i] for i in ranked])
+    return tuple(ranked[: int(np.searchsorted(mass, IN_SET * mass[-1])) + 1]) if ranked else ()
+
+
 def _pair(a: Asked) -> Decision:
-    """Two effects at work: name those that are sure, and the look-alikes of the other."""
+    """Two effects at work: a set for each cause; names where the sets have one member."""
     sure = [i for i in a.leading if a.share[i] >= SURE]
-    unsure = [i for i in a.leading if i not in sure]
-    if not unsure:
+    if len(sure) == len(a.leading):
         return a.names(sure, min(a.share[i] for i in sure))
-    pairs = {k: v for k, v in a.P.items() if k.pair and (not sure or k.ids & set(sure))}
-    total = sum(pairs.values())
-    members: list[str] = list(sure)
-    for _ in unsure:
-        partner = {j: 0.0 for j in a.found.spans if j not in sure}
-        for k, v in pairs.items():
-            for j in k.ids & set(partner):
-                partner[j] += v
-        near, mass = [], 0.0
-        for j in sorted(partner, key=lambda j: -partner[j]):
-            near.append(j)
-            mass += partner[j]
-            if mass >= SURE * total:
-                break
-        members += [j for j in near if j not in members][:5]
-    if len(sure) == len(a.leading) - 1 and len(members) <= 5:
-        look_alikes = tuple(m for m in members if m not in sure)
-        return a.says("class", "two effects are at work; one of them has look-alikes", members, total, (look_alikes,))
+    known = a.known_sets
+    total = sum(v for k, v in a.P.items() if k.pair)
+    inside = sum(a.P.get(Explanation.of(i, j), 0.0) for i in known[0] for j in known[-1])
+    members = tuple(dict.fromkeys(i for s in known for i in s))
+    if len(members) <= LARGEST and inside >= SURE * total:
+        why = (
+            "two effects are at work; one of them has look-alikes" if sure else "two are at work, each has look-alikes"
+        )
+        open_sets = tuple(s for s in known if len(s) > 1)
+        return replace(a.says("class", why, members, inside, open_sets), sets=known)
     return a.says("insufficient", "two effects or more, not told apart")
 
 
@@ -580,7 +631,10 @@ RULES: tuple[Rule, ...] = (
     Rule(
         "look-alikes",
         lambda a: len(a.group) > 1 and _mass(a.found, a.group) >= SURE,
-        lambda a: a.says("class", "these look alike in this plan", a.group, _mass(a.found, a.group), (a.group,)),
+        lambda a: replace(
+            a.says("class", "these look alike in this plan", a.group, _mass(a.found, a.group), (a.group,)),
+            sets=(a.group,),
+        ),
         "SURE, NEAR, ALIKE",
         "DIAGNOSIS 2.7: distance below 3 sigma",
     ),
