@@ -158,7 +158,7 @@ ROWS: dict[str, dict[str, Any]] = {
     },
     "a partner at the end of its range": {
         "leading": Explanation.of("untwist", "duct"),
-        "parameters": {"untwist": {"tip_deg": {"value": 4.0, "low": 3.0, "high": 4.0}}},
+        "parameters": {"untwist": {"tip_deg": {"value": 3.0, "low": 2.0, "high": 3.0}}},
     },
     "several are sure": {"sure": ("reynolds", "duct")},
     "one is sure": {},
