@@ -49,6 +49,8 @@ PARTNER, MOST = 0.1, 3
 NEAR = 5.0
 """Effects of a class may be this far (natural logarithm of the evidence) behind the best one [1]."""
 
+VAGUE = 2.5
+"""Log odds of something unknown over nothing from which an explanation must predict, too [1]."""
 BESIDE = 0.1
 """Share of an effect's probability that "unknown" may keep beside it and the effect still be named [1]."""
 ROUGH = 3.0
@@ -173,6 +175,11 @@ class Asked:
     def odds(self) -> float:
         """Log odds of the leading explanation over nothing."""
         return self.found.log_bayes(self.leading)
+
+    @cached_property
+    def vague(self) -> float:
+        """Log odds of something unknown over nothing."""
+        return self.found.log_bayes(UNKNOWN)
 
     @cached_property
     def _weight(self) -> float:
@@ -344,9 +351,16 @@ def twins(what: Explanation) -> bool:
 
 
 def holds_off(name: str, told: Mapping[str, Mapping[str, Any]]) -> bool:
-    """Whether an effect may as well be absent: its intervals hold all values at which it is."""
+    """Whether an effect may as well be absent: the interval of its size holds the value at which it is.
+
+    Of several sizes that stand for each other (zero and temperature of a drift) each may hold it and all together not.
+    """
     sizes = [p for p in effects.catalogue()[name].parameters if p.off is not None and p.name in told]
-    return bool(sizes) and all(told[p.name]["low"] <= p.off <= told[p.name]["high"] for p in sizes if p.off is not None)
+    discrete = effects.catalogue()[name].discrete
+    free = [p for p in sizes if p.name not in discrete]
+    if len(free) != 1:
+        return False
+    return all(told[p.name]["low"] <= p.off <= told[p.name]["high"] for p in sizes if p.off is not None)
 
 
 def at_end(name: str, told: Mapping[str, Mapping[str, Any]]) -> bool:
@@ -545,10 +559,10 @@ RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "does not predict",
-        lambda a: not a.expected and a.odds < PROVEN and not _predicts(a),
+        lambda a: not a.expected and a.odds < PROVEN and a.vague > VAGUE and not _predicts(a),
         lambda a: a.says("insufficient", "the best explanation does not predict what it has not seen"),
-        "PROVEN, PREDICTS",
-        "declared; left-out blocks, DIAGNOSIS 2.9",
+        "PROVEN, VAGUE, PREDICTS",
+        "declared; left-out blocks, DIAGNOSIS 2.9; in any case it cost right names (7)",
     ),
     Rule(
         "on, and out of its range",
