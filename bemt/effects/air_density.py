@@ -21,6 +21,7 @@ class AirDensity(Effect):
 
     id = "air_density"
     title = "density of the air"
+    check = "read barometer and thermometer beside the stand and work the density out"
     sign = "thrust and torque off by the same share at every speed and advance ratio; one cell's gain moves one of them"
     parameters = (
         Parameter("change", "1", -0.35, 0.5, "weather +-3 %; altitude to 3500 m, forgotten or wrongly stated", 7, 0.0),

@@ -23,6 +23,7 @@ class AirspeedOffset(Effect):
 
     id = "airspeed_offset"
     title = "airspeed other than recorded"
+    check = "read the pitot with the fan of the tunnel off, and beside a second one"
     sign = "shift of J that fades as 1/n at high speed of rotation; a blade angle would shift every speed alike"
     kind = "stand"
     fault = "zero"

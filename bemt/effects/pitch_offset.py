@@ -23,6 +23,7 @@ class PitchOffset(Effect):
 
     id = "pitch_offset"
     title = "blade angle other than stated"
+    check = "measure the blade angle at 0.75 R against the plane of rotation"
     sign = "moves the advance ratio of zero thrust, the same at every speed; a gain or density leaves it where it is"
     parameters = (Parameter("offset_deg", "deg", -8.0, 8.0, "declared: workshop, or another label", 9, 0.0, 1.0),)
     on_by_default = False
