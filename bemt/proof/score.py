@@ -189,6 +189,8 @@ def _matches(said: Sequence[str], allowed: Sequence[set[str]]) -> bool:
 
 def in_sets(j: Judged) -> bool:
     """Whether there is one set for each cause, with the cause in it or one that the plan cannot tell from it."""
+    if j.right and j.answer["verdict"] != "class":
+        return True
     sets = [set(s) for s in j.answer.get("sets", ())]
     allowed = [{c, *a} for c, a in zip(j.entry["causes"], j.entry["alike"], strict=True)]
     if len(sets) != len(allowed):
