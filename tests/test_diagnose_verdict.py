@@ -134,7 +134,7 @@ def asked(**changed: Any) -> Any:
         "first": lead, "leading": lead, "rest": 0.0, "odds": 100.0, "needed": 8.0, "p_value": 0.002, "on": False,
         "expected": False, "paired": False, "sure": ("reynolds",), "group": ("reynolds",), "beside": (), "few": (),
         "P": {NONE: 0.0, UNKNOWN: 0.0, lead: 1.0}, "share": {"reynolds": 1.0}, "unlisted": 0.0, "roughness": 1.0,
-        "vague": 0.0,
+        "vague": 0.0, "level": 0.0,
         "parameters": {"reynolds": {}},
     }  # fmt: skip
     return SimpleNamespace(
@@ -165,6 +165,12 @@ ROWS: dict[str, dict[str, Any]] = {
     "one is sure": {},
     "one is sure, another may be there": {"beside": ("duct",)},
     "two at work": {"paired": True},
+    "on already, among others": {
+        "sure": (),
+        "on": True,
+        "leading": Explanation.of("reynolds", "duct"),
+        "parameters": {},
+    },
     "look-alikes": {"sure": (), "group": ("reynolds", "torque_zero")},
     "sure with its pairs": {"sure": ()},
 }

@@ -14,6 +14,7 @@ from bemt.diagnose import fit as fitting
 from bemt.diagnose.confusion import nearest
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
 from bemt.diagnose.locate import bare
+from bemt.diagnose.suggest import LEVEL
 from bemt.diagnose.verdict import inclusion
 
 if TYPE_CHECKING:
@@ -248,6 +249,8 @@ def headline(d: Diagnosis) -> str:
     said, catalogue = d.decision, effects.catalogue()
     titles = [catalogue[i].title for i in said.effects]
     off = " and ".join(f"{_CHANNEL[c].lower()} {_share(v)}" for c, v in d.off.items())
+    if said.verdict == "none" and max((abs(v) for v in d.problem.level.values()), default=0.0) > LEVEL:
+        return f"Recording and model differ ({off}), no more than calibration, blade and solver may; no cause shows."
     if said.verdict == "none":
         return "Recording and model agree within noise, calibration and what the model may be off anyway."
     if said.verdict == "named":

@@ -22,7 +22,7 @@ from bemt.diagnose.signatures import effect_of
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence
 
-__all__ = ["REFERENCE", "Given", "Suggestion", "nothing_called_for", "suggest"]
+__all__ = ["LEVEL", "REFERENCE", "Given", "Suggestion", "nothing_called_for", "suggest"]
 
 Array = NDArray[np.float64]
 
@@ -31,6 +31,9 @@ REFERENCE = (
     "or another rotor of the kind that is known to be right)"
 )
 """The run that settles most: it shows how far model and stand differ anyway."""
+
+LEVEL = 0.1
+"""A load off the case by more than this, at usual, is no agreement, even if calibration may be that far off [1]."""
 
 _POINTS = 4
 _ENOUGH = 3.0
@@ -208,10 +211,14 @@ def _distance(problem: Problem, covariance_of: noise.Hyper, a: Array, b: Array) 
 
 def nothing_called_for(found: Evidence) -> Suggestion:
     """What is left to say after "none": nothing to do, and what would show fainter causes."""
-    text = "no further run is called for"
-    if not _referenced(found):
-        text += "; a reference, the same rotor before the change in question, would show fainter causes than this plan"
-    return Suggestion(text, (), (), 0.0, 0.0, "" if _referenced(found) else "reference")
+    if _referenced(found):
+        return Suggestion("no further run is called for", (), (), 0.0, 0.0, "")
+    level = max((abs(v) for v in found.problem.level.values()), default=0.0)
+    if level > LEVEL:
+        text = f"{REFERENCE}; it says whether the level is the blade's, the stand's or the model's"
+        return Suggestion(text, (), (), 0.0, 0.0, "reference")
+    text = "no further run is called for; with a reference (the same rotor before the change) fainter causes would show"
+    return Suggestion(text, (), (), 0.0, 0.0, "reference")
 
 
 def _referenced(found: Evidence) -> bool:

@@ -21,6 +21,7 @@ from bemt.diagnose import blocks, prior
 from bemt.diagnose import confusion as look
 from bemt.diagnose import fit as fitting
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
+from bemt.diagnose.suggest import LEVEL
 
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence
@@ -175,6 +176,11 @@ class Asked:
     def odds(self) -> float:
         """Log odds of the leading explanation over nothing."""
         return self.found.log_bayes(self.leading)
+
+    @cached_property
+    def level(self) -> float:
+        """Largest median of a load over what the case gives, less 1, either way [1]."""
+        return max((abs(v) for v in self.found.problem.level.values()), default=0.0)
 
     @cached_property
     def vague(self) -> float:
@@ -512,9 +518,9 @@ RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "nulls look like it",
-        lambda a: a.p_value > GATE and (a.p_value > 5.0 * GATE or a.P[NONE] > 0.5),
+        lambda a: a.p_value > GATE and (a.P[NONE] > 0.5 or (a.p_value > 5.0 * GATE and a.level < LEVEL)),
         lambda a: _nothing(a, _by_chance(a)),
-        "GATE",
+        "GATE, LEVEL",
         "DIAGNOSIS 2.3: p-value of the whole chain, 1 in 100",
     ),
     Rule(
@@ -522,7 +528,7 @@ RULES: tuple[Rule, ...] = (
         lambda a: a.p_value > GATE,
         lambda a: _nothing(a, _by_chance(a), "insufficient"),
         "GATE",
-        "the same, between 1 and 5 in 100",
+        "the same, between 1 and 5 in 100, or where all loads are far off the case",
     ),
     Rule(
         "nothing is likelier than anything",
@@ -642,6 +648,16 @@ RULES: tuple[Rule, ...] = (
         "declared",
     ),
     Rule("two at work", lambda a: a.paired, _pair, "SURE", "declared"),
+    Rule(
+        "on already, among others",
+        lambda a: a.on and not a.sure,
+        lambda a: a.says(
+            "insufficient",
+            f"{a.leading} leads, which is on: its law may be off for this blade, or another cause looks so",
+        ),
+        "PRESENT, SURE",
+        "declared: what is on is a cause only where nothing else is left",
+    ),
     Rule(
         "look-alikes",
         lambda a: len(a.group) > 1 and _mass(a.found, a.group) >= SURE,
