@@ -157,7 +157,7 @@ ROWS: dict[str, dict[str, Any]] = {
         "leading": Explanation.of("untwist"),
         "parameters": {"untwist": {"tip_deg": {"low": -0.1, "high": 0.5}}},
     },
-    "a partner at the end of its range": {
+    "at the end of its range": {
         "leading": Explanation.of("untwist", "duct"),
         "parameters": {"untwist": {"tip_deg": {"value": 3.0, "low": 2.0, "high": 3.0}}},
     },

@@ -370,16 +370,22 @@ def holds_off(name: str, told: Mapping[str, Mapping[str, Any]]) -> bool:
 
 
 def at_end(name: str, told: Mapping[str, Mapping[str, Any]]) -> bool:
-    """Whether the size of an effect, or the first number of one without a size, is at an end of its range."""
+    """Whether the size of an effect, or the first number of one without a size, is pinned to an end of its range."""
     cls = effects.catalogue()[name]
     numbers = [p for p in cls.parameters if p.name in told and p.name not in cls.discrete and p.steps > 0]
     sizes = [p for p in numbers if p.off is not None] or numbers[:1]
     for p in sizes:
         near = END * (p.high - p.low)
+        if told[p.name]["high"] - told[p.name]["low"] > 0.5 * (p.high - p.low):
+            continue  # the readings do not say where it is
         ends = [e for e in (p.low, p.high) if e != p.off]
         if any(abs(float(told[p.name]["value"]) - e) < near for e in ends):
             return True
     return False
+
+
+def _sizes(name: str, told: Mapping[str, Mapping[str, Any]]) -> int:
+    return sum(p.off is not None and p.name in told for p in effects.catalogue()[name].parameters)
 
 
 def _mass(found: Evidence, group: Sequence[str]) -> float:
@@ -613,13 +619,13 @@ RULES: tuple[Rule, ...] = (
         "DIAGNOSIS 7: 4 of 5 wrong names, 0 of 42 right ones",
     ),
     Rule(
-        "a partner at the end of its range",
-        lambda a: a.leading.pair and any(at_end(i, told) for i, told in a.parameters.items()),
+        "at the end of its range",
+        lambda a: any(at_end(i, told) and (a.leading.pair or _sizes(i, told) > 1) for i, told in a.parameters.items()),
         lambda a: a.says(
-            "insufficient", f"{' and '.join(a.leading)} fit only with one of them at the end of its physical range"
+            "insufficient", f"{' and '.join(a.leading)}: fits only with a number at the end of its physical range"
         ),
         "END",
-        "issue K 5; declared",
+        "declared: where one number cannot go further, another makes up for something else",
     ),
     Rule(
         "several are sure",
