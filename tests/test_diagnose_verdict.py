@@ -134,7 +134,7 @@ def asked(**changed: Any) -> Any:
         "first": lead, "leading": lead, "rest": 0.0, "odds": 100.0, "needed": 8.0, "p_value": 0.002, "on": False,
         "expected": False, "paired": False, "sure": ("reynolds",), "group": ("reynolds",), "beside": (), "few": (),
         "P": {NONE: 0.0, UNKNOWN: 0.0, lead: 1.0}, "share": {"reynolds": 1.0}, "unlisted": 0.0, "roughness": 1.0,
-        "vague": 0.0, "level": 0.0,
+        "vague": 0.0, "level": 0.0, "another_blade": False,
         "parameters": {"reynolds": {}},
     }  # fmt: skip
     return SimpleNamespace(
@@ -157,6 +157,7 @@ ROWS: dict[str, dict[str, Any]] = {
         "leading": Explanation.of("untwist"),
         "parameters": {"untwist": {"tip_deg": {"low": -0.1, "high": 0.5}}},
     },
+    "another blade, or anything that scales all loads": {"another_blade": True},
     "at the end of its range": {
         "leading": Explanation.of("untwist", "duct"),
         "parameters": {"untwist": {"tip_deg": {"value": 3.0, "low": 2.0, "high": 3.0}}},

@@ -22,6 +22,7 @@ from bemt.diagnose import confusion as look
 from bemt.diagnose import fit as fitting
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
 from bemt.diagnose.suggest import LEVEL
+from bemt.effects.base import Effect
 
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence
@@ -50,6 +51,8 @@ PARTNER, MOST = 0.1, 3
 NEAR = 5.0
 """Effects of a class may be this far (natural logarithm of the evidence) behind the best one [1]."""
 
+ANOTHER = 0.25
+"""All loads off the case by more than this, at usual: pitch, section, density, speed or diameter may each be it [1]."""
 VAGUE = 2.5
 """Log odds of something unknown over nothing from which an explanation must predict, too [1]."""
 BESIDE = 0.1
@@ -181,6 +184,16 @@ class Asked:
     def level(self) -> float:
         """Largest median of a load over what the case gives, less 1, either way [1]."""
         return max((abs(v) for v in self.found.problem.level.values()), default=0.0)
+
+    @cached_property
+    def another_blade(self) -> bool:
+        """Whether another shape of the blade leads, all loads are far off, and there is no reference."""
+        problem = self.found.problem
+        classes = [effects.catalogue()[i] for i in self.leading]
+        shape = all(not c.on_by_default and (c.blade is not Effect.blade or c.section is not Effect.section)
+                    for c in classes)  # fmt: skip
+        shown = any(p.record.reference for p in problem.parts)
+        return shape and not shown and min((abs(v) for v in problem.level.values()), default=0.0) > ANOTHER
 
     @cached_property
     def vague(self) -> float:
@@ -617,6 +630,17 @@ RULES: tuple[Rule, ...] = (
         lambda a: a.says("insufficient", f"{a.leading} leads, but what the readings say of its size includes none"),
         "90 % interval",
         "DIAGNOSIS 7: 4 of 5 wrong names, 0 of 42 right ones",
+    ),
+    Rule(
+        "another blade, or anything that scales all loads",
+        lambda a: a.another_blade and len(a.group) <= 1,
+        lambda a: a.says(
+            "insufficient",
+            f"all loads are far off, which {a.leading} would explain, and density, speed of rotation or "
+            "diameter nearly as well",
+        ),
+        "ANOTHER",
+        "declared: real recordings at another density than the case's were named section",
     ),
     Rule(
         "at the end of its range",
