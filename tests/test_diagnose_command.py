@@ -257,11 +257,13 @@ def test_without_an_explanation_the_first_sentence_is_what_the_recording_shows(c
     made = record.from_series(Dataset("bench", "log", values, dict(series.u)), case())
     answer = chain.diagnose([made], [case()], nulls=20)
     assert answer.decision.verdict in ("unknown", "insufficient")
-    first, second = document.explanation(answer)[:2]
+    first, second = document.explanation(answer)[1:3]
     word = {"thrust_N": "Thrust", "torque_Nm": "Torque"}[channel]
     told = re.match(rf"{word} is high by (\d+\.\d)% .* at tip Mach number (\d\.\d+) to (\d\.\d+)\.$", first)
     assert told is not None, first
-    assert float(told[1]) == pytest.approx(15.0, abs=1.5)
+    p = answer.problem
+    up = (p.channel == record.CHANNELS.index(channel)) & (p.covariates["rpm"][p.point] > 13000.0)
+    assert float(told[1]) == pytest.approx(15.0 * float(np.mean((p.f0 / p.scale)[up])), abs=1.5)
     assert (float(told[2]), float(told[3])) == pytest.approx((0.41, 0.69), abs=0.1)
     where = answer.where
     assert second.startswith("Beyond what gains") == ((where.channel, where.size > 0) != (channel, True))
@@ -379,7 +381,9 @@ def test_findings_of_several_files_name_their_file_first(tmp_path: Path, capsys:
     assert odd.startswith("2.csv: error: thrust_unit (thrust_N): ") and "lbf taken for N" in odd
     assert "2.csv: warning: sign_flipped (thrust_N): " in " ".join(own)
     assert all(f.startswith("2.csv: ") for f in own)
-    assert answer["explanation"].startswith(f"Before any physics: {odd} Before any physics: {own[0]} ")
+    assert answer["explanation"].startswith(
+        f"{answer['headline']} Before any physics: {odd} Before any physics: {own[0]} "
+    )
 
 
 def test_real_recordings_of_one_propeller_have_one_unit(shared_data: Path, tmp_path: Path) -> None:

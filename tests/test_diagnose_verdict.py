@@ -29,7 +29,7 @@ def told(answer: chain.Diagnosis, **probability: float) -> verdict.Decision:
     """Decision if the explanations had these probabilities; "a__b" is a pair."""
     given = {explained(k): v for k, v in probability.items()}
     share = dict.fromkeys(answer.found.probability, 0.0) | given
-    return verdict.decide(replace(answer.found, probability=share), 0.002)
+    return verdict.decide(verdict.Asked(replace(answer.found, probability=share), 0.002))
 
 
 def test_a_sure_effect_is_named(answer: chain.Diagnosis) -> None:
@@ -133,7 +133,9 @@ def asked(**changed: Any) -> Any:
     plain = {
         "first": lead, "leading": lead, "rest": 0.0, "odds": 100.0, "needed": 8.0, "p_value": 0.002, "on": False,
         "expected": False, "paired": False, "sure": ("reynolds",), "group": ("reynolds",), "beside": (), "few": (),
-        "P": {NONE: 0.0, UNKNOWN: 0.0, lead: 1.0}, "share": {"reynolds": 1.0},
+        "P": {NONE: 0.0, UNKNOWN: 0.0, lead: 1.0}, "share": {"reynolds": 1.0}, "unlisted": 0.0, "roughness": 1.0,
+        "vague": 0.0, "level": 0.0, "another_blade": False,
+        "parameters": {"reynolds": {}},
     }  # fmt: skip
     return SimpleNamespace(
         **(plain | changed), found=SimpleNamespace(log_bayes=lambda _: 100.0, probability={lead: 1.0})
@@ -149,10 +151,27 @@ ROWS: dict[str, dict[str, Any]] = {
     "a smooth rest is left": {"rest": 10.5},
     "not much better than nothing": {"odds": 7.0},
     "twin faults": {"leading": Explanation.of("thrust_zero", "torque_drift")},
+    "unknown is nearly as likely": {"unlisted": 0.2},
+    "far rougher than stated": {"roughness": 5.0},
+    "may as well be absent": {
+        "leading": Explanation.of("untwist"),
+        "parameters": {"untwist": {"tip_deg": {"low": -0.1, "high": 0.5}}},
+    },
+    "another blade, or anything that scales all loads": {"another_blade": True},
+    "at the end of its range": {
+        "leading": Explanation.of("untwist", "duct"),
+        "parameters": {"untwist": {"tip_deg": {"value": 3.0, "low": 2.0, "high": 3.0}}},
+    },
     "several are sure": {"sure": ("reynolds", "duct")},
     "one is sure": {},
     "one is sure, another may be there": {"beside": ("duct",)},
     "two at work": {"paired": True},
+    "on already, among others": {
+        "sure": (),
+        "on": True,
+        "leading": Explanation.of("reynolds", "duct"),
+        "parameters": {},
+    },
     "look-alikes": {"sure": (), "group": ("reynolds", "torque_zero")},
     "sure with its pairs": {"sure": ()},
 }
@@ -168,3 +187,12 @@ def test_each_row_of_the_table_answers_when_it_alone_holds(name: str) -> None:
 def test_the_table_says_where_each_row_comes_from_and_the_last_always_holds() -> None:
     assert len({r.name for r in verdict.RULES}) == len(verdict.RULES) and all(r.source for r in verdict.RULES)
     assert verdict.RULES[-1].holds(asked())
+
+
+def test_a_pair_has_one_set_for_each_cause() -> None:
+    """Look-alikes of one cause share its set, whatever stands beside them."""
+    one, two = {"air_density": 0.6, "rpm_scale": 0.4}, {"thrust_zero": 0.9, "thrust_drift": 0.06, "nacelle": 0.04}
+    share = {Explanation.of(a, b): p * q for a, p in one.items() for b, q in two.items()}
+    share |= {Explanation.of("air_density"): 0.2, NONE: 0.1, Explanation.of("air_density", "rpm_scale"): 1e-3}
+    sets = verdict.credible_sets(share, Explanation.of("air_density", "thrust_zero"))
+    assert {frozenset(s) for s in sets} == {frozenset(one), frozenset({"thrust_zero"})}

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from bemt.base.errors import EXIT_OK
 from bemt.commands import _options, _terminal
+
+if TYPE_CHECKING:
+    from bemt.diagnose.suggest import Given
 
 NAME = "diagnose"
 HELP = "say what physics was left out when recording and simulation differ"
@@ -47,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
     cases, recordings = load_all(args.recordings, args.case, args.reference, args.off, args.only or (),
                                  before=lambda found: folder.check(args.out, found))  # fmt: skip
     with _terminal.progress(args.quiet or args.json) as say:
-        answer = diagnose(recordings, cases, args.only or None, say, baseline=args.baseline)
+        answer = diagnose(recordings, cases, args.only or None, say, baseline=args.baseline, given=_given(args))
     blade = along(cases[0], Path(args.along)) if args.along else {}
     found = document(answer) | {"recordings": list(args.recordings), "cases": [c.name for c in cases]}
     if blade:
@@ -59,3 +64,15 @@ def run(args: argparse.Namespace) -> int:
     elif not args.quiet:
         print("\n\n".join([text(answer), *(c.text() for c in blade.values())]))
     return EXIT_OK
+
+
+def _given(args: argparse.Namespace) -> Given:
+    """What was asked, for the command of the next step."""
+    from bemt.diagnose.suggest import Given
+
+    words = ["--case", *args.case]
+    for option, values in (("--off", args.off), ("--only", args.only or ())):
+        words += [w for v in values for w in (option, v)] if option == "--off" else [option, *values] if values else []
+    if args.baseline != "bemt":
+        words += ["--baseline", args.baseline]
+    return Given(tuple(map(shlex.quote, args.recordings)), tuple(map(shlex.quote, args.reference)), shlex.join(words))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -45,13 +45,14 @@ class Diagnosis:
     where : Location
         Of the mismatch; of the largest scatter when the verdict is none.
     scores : dict
-        Channel to RMSE in its unit: before, after, noise, gp_only, holdout_before, holdout_after.
+        Channel to RMSE in its unit: before, after, noise, gp_only, holdout_before, holdout_after; mean and largest
+        magnitude of the readings.
     blocks : str
         What was left out in turn for the held-out scores.
     after, held : (M,) float
         Readings as the improved model gives them: fitted, and each block from the others [units of the readings].
-    next : Suggestion or None
-        Run that would decide.
+    next : Suggestion
+        What would decide.
     alike : Confusion
         Distances of effects in this plan.
     absent : dict of str to str
@@ -68,7 +69,7 @@ class Diagnosis:
     blocks: str
     after: Array
     held: Array
-    next: suggestion.Suggestion | None
+    next: suggestion.Suggestion
     alike: confusion.Confusion
     absent: dict[str, str]
 
@@ -76,6 +77,14 @@ class Diagnosis:
     def problem(self) -> Problem:
         """Readings, baseline, nuisances."""
         return self.found.problem
+
+    @property
+    def off(self) -> dict[str, float]:
+        """Mean mismatch of each channel, share of the largest value at that speed [1]."""
+        p = self.problem
+        share = p.residual / p.scale
+        rows = {name: (p.channel == c) & p.free for c, name in enumerate(CHANNELS)}
+        return {name: float(np.mean(share[here])) for name, here in rows.items() if here.any()}
 
     @property
     def marked(self) -> location.Location | None:
@@ -90,6 +99,7 @@ def diagnose(
     progress: Callable[[str], None] | None = None,
     nulls: int = gate.NULLS,
     baseline: str = "bemt",
+    given: suggestion.Given | None = None,
 ) -> Diagnosis:
     """Say what was left out.
 
@@ -107,6 +117,8 @@ def diagnose(
         Bootstrapped nulls of the gate [1].
     baseline : str
         Model that is compared: "bemt", or "k1k2" for its thrust.
+    given : Given, optional
+        What was asked on the command line, for the commands of the next step.
 
     Returns
     -------
@@ -114,7 +126,8 @@ def diagnose(
         The answer.
     """
     with evidence.one_thread():
-        return _diagnose(records, cases, only, progress or (lambda _: None), nulls, baseline)
+        told = progress or (lambda _: None)
+        return _diagnose(records, cases, only, told, nulls, baseline, given or suggestion.Given())
 
 
 def _diagnose(
@@ -124,6 +137,7 @@ def _diagnose(
     say: Callable[[str], None],
     nulls: int,
     baseline: str,
+    given: suggestion.Given,
 ) -> Diagnosis:
     say("baseline and nuisances")
     problem = build(records, cases, baseline)
@@ -132,8 +146,9 @@ def _diagnose(
     found = evidence.weigh(problem, candidates)
     say("bootstrapped nulls")
     p = gate.p_value(found, nulls)
-    decision = verdict.decide(found, p)
-    best, parameters = fitting.refined(found, fitting.fit(found, decision.leading))
+    asked = verdict.Asked(found, p)
+    decision = verdict.decide(asked)
+    best, parameters = asked.refined(decision.leading)
     say("held-out blocks")
     words, held, gp_only = blocks.held_out(found, decision.leading if decision.verdict != "unknown" else NONE)
     if decision.verdict == "unknown":  # what is not in the library is predicted as what it is: something smooth
@@ -146,7 +161,7 @@ def _diagnose(
     say("next measurement")
     return Diagnosis(
         found, decision, best, parameters, p, where, _scores(found, after, held, gp_only), words, after, held,
-        _next(found, decision, best), confusion.confusion(found), absent,
+        _next(found, decision, best, given), confusion.confusion(found), absent,
     )  # fmt: skip
 
 
@@ -166,20 +181,40 @@ def _scores(found: evidence.Evidence, after: Array, held: Array, gp_only: Array)
             "noise": float(np.sqrt(np.mean((scale * problem.u[here]) ** 2))),
             "gp_only": rmse(gp_only), "holdout_before": rmse(problem.f0), "holdout_after": rmse(held),
             "mean": float(np.mean(np.abs(problem.y[here]))),
+            "largest": float(np.max(np.abs(problem.y[here]))),
         }  # fmt: skip
     return out
 
 
-def _next(found: evidence.Evidence, decision: verdict.Decision, best: fitting.Fit) -> suggestion.Suggestion | None:
+def _next(
+    found: evidence.Evidence, decision: verdict.Decision, best: fitting.Fit, given: suggestion.Given
+) -> suggestion.Suggestion:
+    """What settles the question, and what to type then."""
+    chosen = _settling(found, decision, best)
+    file = "reference.csv" if chosen.kind == "reference" else "new_run.csv"
+    if chosen.kind == "reference":
+        commands: tuple[str, ...] = (given.command(reference=file), given.comparison(file))
+    elif chosen.kind == "run":
+        commands = (given.command(run=file),)
+    else:
+        commands = ()
+    return replace(chosen, commands=commands)
+
+
+def _settling(found: evidence.Evidence, decision: verdict.Decision, best: fitting.Fit) -> suggestion.Suggestion:
     """Run against the strongest rival of the leading explanation, "nothing" included where no name is given."""
     single = {i: found.probability[Explanation.of(i)] for i in found.spans}
     singles = sorted(single, key=lambda i: -single[i])
+    if decision.verdict == "none":
+        return suggestion.nothing_called_for(found)
     if not singles:
-        return None
+        return suggestion.Suggestion(suggestion.REFERENCE, (), (), 0.0, 0.0, "reference")
     lead = best.ids[0] if best.ids else singles[0]
     rivals = [i for i in (*decision.effects, *(j for g in decision.classes for j in g), *singles) if i != lead]
     first = (lead, fitting.fit(found, Explanation.of(lead)).settings[0])
     likelier = bool(rivals) and single[rivals[0]] > found.probability[NONE]
-    if not rivals or decision.verdict == "none" or (decision.verdict == "insufficient" and not likelier):
-        return suggestion.suggest(found, first, None)
-    return suggestion.suggest(found, first, (rivals[0], fitting.fit(found, Explanation.of(rivals[0])).settings[0]))
+    open_ = decision.verdict in ("class", "unknown", "insufficient")
+    second = None
+    if rivals and (decision.verdict != "insufficient" or likelier):
+        second = (rivals[0], fitting.fit(found, Explanation.of(rivals[0])).settings[0])
+    return suggestion.suggest(found, first, second, reference=open_)

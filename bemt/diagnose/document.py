@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,13 +14,14 @@ from bemt.diagnose import fit as fitting
 from bemt.diagnose.confusion import nearest
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
 from bemt.diagnose.locate import bare
+from bemt.diagnose.suggest import LEVEL
 from bemt.diagnose.verdict import inclusion
 
 if TYPE_CHECKING:
     from bemt.diagnose.chain import Diagnosis
     from bemt.diagnose.locate import Location
 
-__all__ = ["SCHEMA", "document", "explanation", "text"]
+__all__ = ["SCHEMA", "document", "explanation", "headline", "text"]
 
 SCHEMA = "bemt.diagnosis/1"
 
@@ -76,8 +78,9 @@ def document(d: Diagnosis) -> dict[str, Any]:
         "location": d.where.document(),
         "fit": {c: {k: _number(v) for k, v in s.items()} for c, s in d.scores.items()},
         "blocks": d.blocks,
+        "sets": [list(s) for s in d.decision.sets],
         "classes": [list(c) for c in d.decision.classes] or d.alike.classes(),
-        "next_measurement": {"text": "", "points": [], "separates": []} if d.next is None else d.next.document(),
+        "next_measurement": d.next.document(),
         "p_value": d.p_value,
         "log_bayes": {str(e): found.log_bayes(e) for e in (*map(Explanation.of, found.spans), UNKNOWN)},
         "nearest_signature": nearest(found),
@@ -87,11 +90,13 @@ def document(d: Diagnosis) -> dict[str, Any]:
         "baseline": [effects.to_text(e) for e in d.problem.baseline],
         "not_tried": dict(d.absent),
         "rule": d.decision.why,
+        "rule_name": d.decision.rule,
+        "headline": headline(d),
         "left_over": _number(d.decision.left_over),
         "findings": list(d.problem.findings),
         "notes": list(d.problem.notes),
         "readings": int(d.problem.y.size),
-        "explanation": " ".join(explanation(d)),
+        "explanation": " ".join(line.strip() for line in explanation(d)),
     }  # fmt: skip
 
 
@@ -101,7 +106,8 @@ def _where(w: Location) -> str:
     both = f"{w.low:.{digits}f} to {w.high:.{digits}f}{unit}" if w.high > w.low else f"{w.low:.{digits}f}{unit}"
     error = abs(w.size / w.z) if w.z else float("nan")
     spread = "" if not np.isfinite(error) else f" +- {max(error, 1e-4):.1%}"
-    return f"{_CHANNEL[w.channel]} is {sign} by {abs(w.size):.1%}{spread} of the model's mean at {name} {both}."
+    most = "of its largest value" if w.variable == "rpm" and w.high > w.low else "of its largest value at that speed"
+    return f"{_CHANNEL[w.channel]} is {sign} by {abs(w.size):.1%}{spread} {most}, at {name} {both}."
 
 
 def _unexplained(d: Diagnosis) -> list[str]:
@@ -121,12 +127,12 @@ def _unexplained(d: Diagnosis) -> list[str]:
 def _gain(d: Diagnosis) -> str:
     words = []
     for channel, s in d.scores.items():
-        mean = s["mean"] or 1.0
+        most = s["largest"] or 1.0
         words.append(
-            f"{_CHANNEL[channel].lower()} {s['holdout_before'] / mean:.1%} to {s['holdout_after'] / mean:.1%} "
-            f"(noise {s['noise'] / mean:.1%}, smooth curve without physics {s['gp_only'] / mean:.1%})"
+            f"{_CHANNEL[channel].lower()} {s['holdout_before'] / most:.1%} to {s['holdout_after'] / most:.1%} "
+            f"(noise {s['noise'] / most:.1%}, smooth curve without physics {s['gp_only'] / most:.1%})"
         )
-    return f"Error on held-out {d.blocks}: " + "; ".join(words) + "."
+    return f"Error on held-out {d.blocks}, of the largest value: " + "; ".join(words) + "."
 
 
 def _parameters(d: Diagnosis) -> str:
@@ -135,10 +141,18 @@ def _parameters(d: Diagnosis) -> str:
         for k, v in found.items():
             if isinstance(v["value"], float):
                 unit = "" if v["unit"] in ("1", "") else f" {v['unit']}"
-                words.append(f"{i} {k} {v['value']:.3g} ({v['low']:.3g} to {v['high']:.3g}){unit}")
+                words.append(f"{i} {k} {v['value']:.3g} ({v['low']:.3g} to {v['high']:.3g}){unit}{_odds(v)}")
             elif v["value"] is not None:
-                words.append(f"{i} {k} {v['value']}")
+                words.append(f"{i} {k} {v['value']}{_odds(v)}")
     return ", ".join(words)
+
+
+def _odds(told: dict[str, Any]) -> str:
+    """Probabilities of the values of a discrete parameter, where more than one is left."""
+    odds = [(v, p) for v, p in told.get("odds", ()) if p >= 0.05]
+    if len(odds) < 2:
+        return ""
+    return " [" + ", ".join(f"{v if isinstance(v, str) else f'{v:.3g}'} {p:.2f}" for v, p in odds) + "]"
 
 
 def explanation(d: Diagnosis) -> list[str]:
@@ -155,49 +169,114 @@ def explanation(d: Diagnosis) -> list[str]:
         About five lines.
     """
     decision, catalogue = d.decision, effects.catalogue()
-    lines = [f"Before any physics: {f}" for f in d.problem.findings[:_FINDINGS]]
+    lines = [headline(d)]
+    lines += [f"Before any physics: {f}" for f in d.problem.findings[:_FINDINGS]]
     level = d.problem.level
     off = " and ".join(f"{_CHANNEL[c].lower()} by {v:+.0%}" for c, v in level.items())
-    if not lines and level and min(abs(v) for v in level.values()) > _ANOTHER_ROTOR:
+    if not d.problem.findings and level and min(abs(v) for v in level.values()) > _ANOTHER_ROTOR:
         lines.append(f"Before any physics: off the case {off}. Are diameter, pitch and blades those of this rotor?")
     if len(d.problem.findings) > _FINDINGS:
         lines[-1] += f" And {len(d.problem.findings) - _FINDINGS} more; `import` shows all."
     if decision.verdict == "none":
-        lines.append(f"No mismatch beyond noise and calibration: {decision.why} (p = {d.p_value:.2g}).")
+        lines.append(f"Why: {decision.why} (p = {d.p_value:.2g}).")
         if max((abs(v) for v in level.values()), default=0.0) > _WORTH_SAYING:
             lines.append(f"The level is off ({off}), which gains, blade angles and the solver may be; no cause shows.")
-        return [*lines, _gain(d), *_next(d, "To see more")]
+        return [*lines, _gain(d), *_next(d), *_not_tried(d)]
     lines += _unexplained(d) if decision.verdict in ("unknown", "insufficient") else [_where(d.where)]
-    names = " and ".join(catalogue[i].title for i in decision.effects)
     if decision.verdict in ("named", "sensor"):
-        lead = "Not the air but the stand" if decision.verdict == "sensor" else "Left out"
         told = _parameters(d)
-        lines.append(f"{lead}: {names} ({decision.probability:.2f})." + (f" {told}." if told else ""))
+        lines.append(
+            f"Named: {', '.join(decision.effects)} ({decision.probability:.2f})." + (f" {told}." if told else "")
+        )
         signs = [catalogue[i].sign for i in decision.effects if catalogue[i].sign]
         if signs:
             lines.append("Because: " + "; ".join(signs) + ".")
     elif decision.verdict == "class":
         lead = "One of these, which this plan cannot tell apart" if decision.classes else decision.why.capitalize()
+        if len(decision.sets) > 1:
+            sets = " and ".join("{" + " or ".join(s) + "}" for s in decision.sets)
+            lines.append(f"One of each ({decision.probability:.2f}): {sets}.")
         lines.append(f"{lead} ({decision.probability:.2f}): "
                      + ", ".join(f"{i} ({catalogue[i].title})" for i in decision.effects) + ".")  # fmt: skip
     elif decision.verdict == "unknown":
         kernel = d.found.states[0].best_rival
         lines.append(f"Something that is not in the library: {decision.why}. It looks like {kernel}.")
     else:
-        lines.append(f"There is a mismatch (p = {d.p_value:.2g}), but {decision.why}.")
+        lines.append(f"No name is given (p = {d.p_value:.2g}): {decision.why}.")
     lines.append(_gain(d))
     others = [i for group in decision.classes for i in group if i not in decision.effects]
     if others:
         lines.append(f"Cannot be told from: {', '.join(others)}.")
-    lines += _next(d, "To be sure")
+    lines += [*_next(d), *_not_tried(d)]
     return [line for line in lines if line]
 
 
-def _next(d: Diagnosis, lead: str) -> list[str]:
-    if d.next is None or not d.next.text:
+def _next(d: Diagnosis) -> list[str]:
+    """The next step, and what to type then."""
+    step = d.next
+    if not step.text:
         return []
-    return [f"{lead}: {d.next.text} (separates {' from '.join(d.next.separates)}: {d.next.before:.1f} to "
-            f"{d.next.after:.1f} standard deviations)."]  # fmt: skip
+    gain = ""
+    if step.separates:
+        gain = (
+            f" (separates {' from '.join(step.separates)}: {step.before:.1f} to {step.after:.1f} standard deviations)"
+        )
+    return [f"Next: {step.text}{gain}.", *(f"  {command}" for command in step.commands)]
+
+
+def _not_tried(d: Diagnosis) -> list[str]:
+    """Effects that could not be tried, by reason, in one line."""
+    reasons: dict[str, list[str]] = {}
+    for name, why in d.absent.items():
+        reasons.setdefault(why, []).append(name)
+    words = [f"{', '.join(names)} ({why})" for why, names in reasons.items()]
+    return [f"Not tried: {'; '.join(words)}."] if words else []
+
+
+def headline(d: Diagnosis) -> str:
+    """What an engineer would say first.
+
+    Parameters
+    ----------
+    d : Diagnosis
+        The answer.
+
+    Returns
+    -------
+    str
+        One sentence.
+    """
+    said, catalogue = d.decision, effects.catalogue()
+    titles = [catalogue[i].title for i in said.effects]
+    off = " and ".join(f"{_CHANNEL[c].lower()} {_share(v)}" for c, v in d.off.items())
+    if said.verdict == "none" and max((abs(v) for v in d.problem.level.values()), default=0.0) > LEVEL:
+        return f"Recording and model differ ({off}), no more than calibration, blade and solver may; no cause shows."
+    if said.verdict == "none":
+        return "Recording and model agree within noise, calibration and what the model may be off anyway."
+    if said.verdict == "named":
+        return f"The model leaves something out: {' and '.join(titles)}."
+    if said.verdict == "sensor":
+        return f"The stand is at fault, not the air: {' and '.join(titles)}."
+    if said.verdict == "class":
+        if len(said.sets) > 1:
+            return f"Two things are at work: {' and '.join(_one_of(s) for s in said.sets)}."
+        if said.rule == "one is sure, another may be there":
+            return f"{titles[0].capitalize()} is at work; whether {' or '.join(titles[1:])} is, too, is left open."
+        return f"It is {' or '.join(titles)}; these readings do not say which."
+    if said.verdict == "unknown":
+        return f"Recording and model differ ({off}), and no effect of the library explains it."
+    best = next((catalogue[i].title for i in d.best.ids), "")
+    guess = f"; the best guess is {best}" if best else ""
+    return f"Recording and model differ ({off}), and these readings do not show why{guess}."
+
+
+def _one_of(ids: Sequence[str]) -> str:
+    titles = [effects.catalogue()[i].title for i in ids]
+    return titles[0] if len(titles) == 1 else f"one of ({' / '.join(titles)})"
+
+
+def _share(v: float) -> str:
+    return f"{v:+.1%}".replace("%", " %")
 
 
 def text(d: Diagnosis) -> str:
@@ -214,8 +293,12 @@ def text(d: Diagnosis) -> str:
         For a terminal.
     """
     found = d.found
-    out = [f"verdict: {d.decision.verdict}" + (f" {', '.join(d.decision.effects)}" if d.decision.effects else "")]
-    out += [textwrap.fill(line, 110, initial_indent="  ", subsequent_indent="    ") for line in explanation(d)]
+    first, *rest = explanation(d)
+    named = f" {', '.join(d.decision.effects)}" if d.decision.effects else ""
+    out = [textwrap.fill(first, 110), f"verdict: {d.decision.verdict}{named}"]
+    # a command stays in one line, to be copied
+    out += [f"  {line}" if line.startswith("  ") else
+            textwrap.fill(line, 110, initial_indent="  ", subsequent_indent="    ") for line in rest]  # fmt: skip
     size = dict(zip(d.alike.ids, d.alike.size, strict=True))
     rows = []
     for name, p in sorted(found.probability.items(), key=lambda kv: -kv[1])[:_SHOWN]:
@@ -228,8 +311,8 @@ def text(d: Diagnosis) -> str:
         ),
     ]
     kinds = ("before", "after", "noise", "holdout_before", "holdout_after", "gp_only")
-    rows = [[c, *(f"{s[k] / s['mean']:.2%}" for k in kinds)] for c, s in d.scores.items()]
-    header = ["RMSE over mean reading", "before", "after", "noise", "held out: before", "after", "smooth curve only"]
+    rows = [[c, *(f"{s[k] / s['largest']:.2%}" for k in kinds)] for c, s in d.scores.items()]
+    header = ["RMSE over largest reading", "before", "after", "noise", "held out: before", "after", "smooth curve only"]
     out += ["", text_table(header, rows, left=(0,), indent="  ")]
     h = found.states[0].hyper
     out.append(f"\n  p = {d.p_value:.3g}; noise x{h.scale:g} of stated, correlation {h.ar:g}, "

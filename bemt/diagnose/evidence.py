@@ -257,11 +257,20 @@ def bare(problem: Problem, candidates: Sequence[Candidate], hyper: Hyper) -> Evi
 
 
 def _few(candidates: Sequence[Candidate], most: int = 9) -> NDArray[np.intp]:
-    """Columns that stand for each candidate: some of the settings that were solved, evenly chosen."""
+    """Columns that stand for each candidate: some of the settings that were solved, evenly chosen.
+
+    Where settings are not alike beforehand, ends and quantiles of their prior.
+    """
     out, start = [], 0
     for c in candidates:
         solved = np.flatnonzero(c.solved)
-        out.append(start + solved[np.unique(np.linspace(0, solved.size - 1, most).round().astype(int))])
+        if np.ptp(c.weight) < 1e-12:
+            chosen = solved[np.unique(np.linspace(0, solved.size - 1, most).round().astype(int))]
+        else:
+            before = np.cumsum(c.weight) - 0.5 * c.weight
+            inner = np.searchsorted(before, (np.arange(most - 2) + 0.5) / (most - 2))
+            chosen = np.unique(np.clip([0, *inner, before.size - 1], 0, before.size - 1))
+        out.append(start + chosen)
         start += c.weight.size
     return np.concatenate([np.zeros(0, dtype=np.intp), *out])
 

@@ -184,7 +184,7 @@ def _located(answer: Diagnosis, c: int, name: str) -> tuple[float, float] | None
 def _heading(answer: Diagnosis, c: int, region: bool) -> str:
     text, where = _CHANNEL[CHANNELS[c]], answer.marked
     if region and where is not None:
-        text += f": {_percent(np.asarray(where.size))} of the mean in the marked region"
+        text += f": {_percent(np.asarray(where.size))} of the largest, in the marked region"
     return text
 
 

@@ -141,8 +141,9 @@ def _curve(axis: Axes, panel: _Panel) -> None:
         density = np.array([panel.p[(x == g) & (words == name)].sum() for g in grid]) / width
         peak = max(peak, float(density.max()))
         axis.plot(grid, density, style, color=colour, label=name or "posterior", marker="o" if grid.size < 12 else "")
-    flat = 1.0 / (high - low) / len(set(words))
-    axis.plot([low, low, high, high], [0.0, flat, flat, 0.0], ":", color=BLACK, linewidth=1.0, label="prior")
+    before = np.array([panel.candidate.weight[x == g].sum() for g in grid]) / width / len(set(words))
+    flat = float(before.max())
+    axis.plot([low, *grid, high], [0.0, *before, 0.0], ":", color=BLACK, linewidth=1.0, label="prior")
     axis.set_xlim(low - 0.04 * (high - low), high + 0.04 * (high - low))
     axis.set_ylim(0.0, 1.35 * max(peak, flat))
     unit = panel.label(key).rpartition("[")[2].rstrip("]")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,18 +11,21 @@ from numpy.typing import NDArray
 
 from bemt.diagnose import noise
 from bemt.diagnose.evidence import log_mean
+from bemt.diagnose.explanation import Explanation
 from bemt.diagnose.form import FORM, form_modes
 from bemt.diagnose.signatures import effect_of
 
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence
-    from bemt.diagnose.explanation import Explanation
+    from bemt.effects import Parameter
 
 __all__ = ["Fit", "fit", "form_covariance", "intervals", "left_over", "refined", "smooth", "weights"]
 
 Array = NDArray[np.float64]
 
 _STEPS = 5
+# Values of a discrete parameter that are told with their odds.
+_SHOWN = 6
 # Root mean square of the prior sizes of a form's error.
 _FORM_SIZE = float(np.sqrt(sum(w * f**2 for f, w in FORM.items())))
 
@@ -141,7 +145,8 @@ def weights(found: Evidence, what: Explanation) -> dict[str, Array]:
 
 def _marginals(found: Evidence, id_: str, p: Array, share: float) -> dict[str, dict[str, Any]]:
     candidate = found.of(id_)
-    units = {q.name: q.unit for q in type(effect_of(id_, candidate.settings[0])).parameters}
+    cls = type(effect_of(id_, candidate.settings[0]))
+    units, discrete = {q.name: q.unit for q in cls.parameters}, cls.discrete
     out: dict[str, dict[str, Any]] = {}
     for key in dict.fromkeys(k for s in candidate.settings for k in s):
         values = [s.get(key) for s in candidate.settings]
@@ -150,6 +155,9 @@ def _marginals(found: Evidence, id_: str, p: Array, share: float) -> dict[str, d
             x, q = np.array([float(v) for v in values if v is not None]), p[have]
             if q.sum() <= 0:
                 continue
+            if key in discrete:
+                out[key] = _discrete(values, p, units.get(key, "1"), share)
+                continue
             order = np.argsort(x, kind="stable")
             cumulative = np.cumsum(q[order]) / q.sum()
             middle = cumulative - 0.5 * q[order] / q.sum()
@@ -157,9 +165,23 @@ def _marginals(found: Evidence, id_: str, p: Array, share: float) -> dict[str, d
             at = [float(np.interp(t, middle, x[order])) for t in (0.5, 0.5 - share / 2, 0.5 + share / 2)]
             out[key] = {"value": at[0], "low": at[1], "high": at[2], "unit": units.get(key, "1")}
         else:
-            best = candidate.settings[int(np.argmax(p))].get(key)
-            out[key] = {"value": best, "low": best, "high": best, "unit": ""}
+            out[key] = _discrete(values, p, "", share)
     return out
+
+
+def _discrete(values: Sequence[Any], p: Array, unit: str, share: float) -> dict[str, Any]:
+    """Posterior of a parameter that takes a few values: the likeliest, the ends of those it may be, and their odds."""
+    odds: dict[Any, float] = {}
+    for v, q in zip(values, p, strict=True):
+        if v is not None:
+            odds[v] = odds.get(v, 0.0) + float(q)
+    total = sum(odds.values()) or 1.0
+    ranked = sorted(odds, key=lambda v: -odds[v])
+    mass = np.cumsum([odds[v] / total for v in ranked])
+    kept = ranked[: int(np.searchsorted(mass, share)) + 1]
+    ends = sorted(kept) if all(isinstance(v, (int, float)) for v in kept) else [kept[0]]
+    return {"value": kept[0], "low": ends[0], "high": ends[-1], "unit": unit,
+            "odds": [[v, odds[v] / total] for v in kept[:_SHOWN]]}  # fmt: skip
 
 
 def refined(found: Evidence, best: Fit, share: float = 0.9) -> tuple[Fit, dict[str, dict[str, dict[str, Any]]]]:
@@ -186,7 +208,10 @@ def refined(found: Evidence, best: Fit, share: float = 0.9) -> tuple[Fit, dict[s
     C = C + form_covariance(found, best, _FORM_SIZE) + _scale(found, best)
     white = noise.whitener(C, problem.u)
     settings = [dict(s) for s in best.settings]
-    low, high = (np.array([getattr(p, e) for _, p in where]) for e in ("low", "high"))
+    low, high = np.array([_ends(found, best.ids[k], p) for k, p in where]).reshape(-1, 2).T
+    # as wide as the prior: uniform, or heavy-tailed, whose standard deviation is root 3 of its scale
+    usual = np.array([np.inf if p.usual is None else 3.0 * p.usual**2 for _, p in where])
+    spread = np.minimum((high - low) ** 2 / 12.0, usual)
     x = np.array([float(settings[k][p.name]) for k, p in where])
 
     def solve(values: Array) -> Array:
@@ -210,7 +235,7 @@ def refined(found: Evidence, best: Fit, share: float = 0.9) -> tuple[Fit, dict[s
         # of the readings alone, but for a prior so wide that it only keeps directions that they do not see finite
         wide = H + np.diag(0.1 / (high - low) ** 2)
         mean, sigma = x + np.linalg.solve(wide, g), np.sqrt(np.diag(np.linalg.inv(wide)))
-        move = np.linalg.solve(H + np.diag(12.0 / (high - low) ** 2), g)  # as wide as the uniform prior
+        move = np.linalg.solve(H + np.diag(1.0 / spread), g)
         for shrink in (1.0, 0.3):
             new = np.clip(x + shrink * move, low, high)
             trial = solve(new)
@@ -227,11 +252,12 @@ def refined(found: Evidence, best: Fit, share: float = 0.9) -> tuple[Fit, dict[s
     if np.isfinite(trial).all() and misfit(trial) < misfit(s) + 1.0:
         x = middle
     s = solve(x)
-    out: dict[str, dict[str, dict[str, Any]]] = {i: {} for i in best.ids}
+    told = intervals(found, Explanation.of(*best.ids), share) if best.ids else {}
+    out: dict[str, dict[str, dict[str, Any]]] = {}
     for k, i in enumerate(best.ids):
         units = {p.name: p.unit for p in type(effect_of(i, settings[k])).parameters}
-        for key, v in settings[k].items():
-            out[i][key] = {"value": v, "low": v, "high": v, "unit": units.get(key, "")}
+        # what is not refined is as sure as the grid says it is
+        out[i] = {key: _told(told[i].get(key, {}), v, units.get(key, "")) for key, v in settings[k].items()}
     for (k, p), v, a, b in zip(where, x, *ends, strict=True):
         out[best.ids[k]][p.name] = {
             "value": float(v), "low": float(min(a, v)), "high": float(max(b, v)), "unit": p.unit
@@ -262,6 +288,22 @@ def _quantile(q: float, a: Array, b: Array) -> Array:
     inside = above + np.log1p(-np.exp(below - above))
     x = ndtri_exp(np.minimum(np.logaddexp(below, np.log(part) + inside), 0.0))
     return np.asarray(np.clip(np.where(right, -x, x), a, b))
+
+
+def _told(grid: dict[str, Any], value: Any, unit: str) -> dict[str, Any]:
+    """What a fit says of a parameter that it took from the grid."""
+    ends = {"low": value, "high": value}
+    if isinstance(value, (int, float)) and grid:
+        ends = {"low": min(grid["low"], value), "high": max(grid["high"], value)}
+    odds = {"odds": grid["odds"]} if "odds" in grid else {}
+    return {"value": value, **ends, "unit": unit, **odds}
+
+
+def _ends(found: Evidence, id_: str, p: Parameter) -> tuple[float, float]:
+    """Range of a parameter, as far as the world has it at these points."""
+    values = [float(s[p.name]) for s in found.of(id_).settings if p.name in s]
+    inside = [max(min(values), p.low), min(max(values), p.high)] if values else [p.low, p.high]
+    return (inside[0], inside[1]) if inside[1] > inside[0] else (p.low, p.high)
 
 
 def _continuous(id_: str, setting: dict[str, Any]) -> list[Any]:

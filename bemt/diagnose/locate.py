@@ -40,7 +40,7 @@ class Location:
     low, high : float
         Interval of the covariate, in its unit.
     size : float
-        Mean mismatch in the interval over the mean reading there [1].
+        Mean mismatch in the interval, share of the largest value of the channel at the speeds there [1].
     z : float
         Sum of the standardised mismatch over the root of the number of readings [1].
     ties : tuple of str
@@ -125,7 +125,7 @@ def _largest(found: Evidence, d: Array, natural: tuple[str, ...]) -> Location:
     x = problem.covariates[name][problem.point][here]
     low, high, z = _scan(x, e[here])
     inside = (x >= low) & (x <= high)
-    size = float(np.mean(d[here][inside]) / max(float(np.mean(np.abs(problem.f0[here][inside]))), 1e-12))
+    size = float(np.mean((d / problem.scale)[here][inside]))
     return Location(CHANNELS[int(channel)], name, low, high, size, z, ties)
 
 

@@ -19,7 +19,7 @@ from bemt import effects
 
 if TYPE_CHECKING:
     from bemt.diagnose.problem import Problem
-    from bemt.effects import Effect
+    from bemt.effects import Effect, Parameter
 
 __all__ = ["Candidate", "candidates", "effect_of"]
 
@@ -107,12 +107,15 @@ class Candidate:
 
     @property
     def middle(self) -> int:
-        """Setting that stands for the effect at ordinary strength: the one of median size."""
+        """Setting that stands for the effect at ordinary strength: the one of median size in the prior."""
         size = np.sqrt(np.sum(self.signatures**2, axis=0))
-        size = np.where(size > 0, size, np.nan)
-        if not np.isfinite(size).any():
+        order = np.argsort(size, kind="stable")
+        order = order[(size[order] > 0) & np.isfinite(size[order])]
+        if not order.size:
             return 0
-        return int(np.nanargmin(np.abs(size - np.nanmedian(size))))
+        w = self.weight[order]
+        median = float(np.interp(0.5, (np.cumsum(w) - 0.5 * w) / w.sum(), size[order]))
+        return int(np.nanargmin(np.where(size > 0, np.abs(size - median), np.nan)))
 
 
 def _rest(setting: dict[str, Any], key: str) -> tuple[tuple[str, Any], ...]:
@@ -180,8 +183,10 @@ def _candidate(problem: Problem, name: str, cls: type[Effect]) -> Candidate | No
     given = cls().variants()
     columns: list[_Column] = []
     if given is not None:
+        sizes = {p.name: p for p in cls.parameters if p.usual is not None}
         for setting in given:
-            columns.append((dict(setting), problem.signature((cls(**setting),)), True, 1.0 / len(given)))
+            share = float(np.prod([p.density(float(setting[k])) for k, p in sizes.items()])) / len(given)
+            columns.append((dict(setting), problem.signature((cls(**setting),)), True, share))
     else:
         axes = [p for p in cls.parameters if p.steps > 0]
         if not axes:
@@ -190,7 +195,8 @@ def _candidate(problem: Problem, name: str, cls: type[Effect]) -> Candidate | No
         else:
             columns.extend(_grid(problem, cls, axes))
     floor = 1e-3 * problem.u
-    kept = _merged([c for c in columns if np.isfinite(c[1]).all()])
+    lawful = [c for c in columns if all(cls(**c[0]).plausible(p.flow) for p in problem.parts if not p.record.reference)]
+    kept = _merged([c for c in lawful if np.isfinite(c[1]).all()])
     if not any(np.any(np.abs(c[1]) > floor) for c in kept):
         return None
     weight = np.array([c[3] for c in kept])
@@ -214,7 +220,10 @@ def _merged(columns: Sequence[_Column]) -> list[_Column]:
 
 
 def _grid(problem: Problem, cls: type[Effect], axes: Sequence[Any]) -> Iterator[_Column]:
-    """Solve at the nodes of all parameters and interpolate between them by cubic splines."""
+    """Solve at the nodes of all parameters and interpolate between them by cubic splines.
+
+    Where a parameter has a usual size, settings are denser about "off": equal steps of the inverse hyperbolic sine.
+    """
     from scipy.interpolate import CubicSpline
 
     nodes = [np.linspace(p.low, p.high, p.steps) for p in axes]
@@ -226,10 +235,13 @@ def _grid(problem: Problem, cls: type[Effect], axes: Sequence[Any]) -> Iterator[
         # where a corner does not converge, the nodes stand for themselves
         flat = table.reshape(table.shape[0], -1)
         for k, v in enumerate(product(*nodes)):
-            yield dict(zip(names, map(float, v), strict=True)), flat[:, k], True, 1.0
+            share = float(np.prod([p.density(x) for p, x in zip(axes, v, strict=True)]))
+            yield dict(zip(names, map(float, v), strict=True)), flat[:, k], True, share
         return
     count = _FINE.get(len(axes), 5)
-    fine = [np.linspace(n[0], n[-1], count) if n.size > 2 else n for n in nodes]
+    fine = [_spread(p, n, count) if n.size > 2 else n for p, n in zip(axes, nodes, strict=True)]
+    shares = [np.array([p.density(x) for x in f]) * (1.0 if p.usual is None else np.gradient(f))
+              for p, f in zip(axes, fine, strict=True)]  # fmt: skip
     for k, (n, f) in enumerate(zip(nodes, fine, strict=True)):
         if n.size > 2:
             matrix = CubicSpline(n, np.eye(n.size), bc_type="natural" if n.size < 4 else "not-a-knot")(f)
@@ -238,5 +250,14 @@ def _grid(problem: Problem, cls: type[Effect], axes: Sequence[Any]) -> Iterator[
     on_node: list[Any] = [np.isclose(f[:, None], n[None, :], rtol=0, atol=1e-9 * max(1.0, abs(n[-1]))).any(axis=1)
                for n, f in zip(nodes, fine, strict=True)]  # fmt: skip
     solved = np.array([all(s) for s in product(*on_node)])
-    for k, v in enumerate(product(*fine)):
-        yield dict(zip(names, map(float, v), strict=True)), flat[:, k], bool(solved[k]), 1.0
+    for k, (v, w) in enumerate(zip(product(*fine), product(*shares), strict=True)):
+        yield dict(zip(names, map(float, v), strict=True)), flat[:, k], bool(solved[k]), float(np.prod(w))
+
+
+def _spread(p: Parameter, nodes: Array, count: int) -> Array:
+    """Values of a parameter between the nodes, these among them where it has a usual size."""
+    if p.usual is None or p.off is None:
+        return np.asarray(np.linspace(float(nodes[0]), float(nodes[-1]), count))
+    ends = np.arcsinh((nodes[[0, -1]] - p.off) / p.usual)
+    inner = p.off + p.usual * np.sinh(np.linspace(float(ends[0]), float(ends[1]), count))
+    return np.asarray(np.union1d(np.round(inner, 12), nodes))

@@ -22,12 +22,51 @@ from bemt.diagnose.signatures import effect_of
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence
 
-__all__ = ["Suggestion", "suggest"]
+__all__ = ["LEVEL", "REFERENCE", "Given", "Suggestion", "nothing_called_for", "suggest"]
 
 Array = NDArray[np.float64]
 
+REFERENCE = (
+    "a reference: the same rotor on the same stand at the same points, without what is suspected (before the change, "
+    "or another rotor of the kind that is known to be right)"
+)
+"""The run that settles most: it shows how far model and stand differ anyway."""
+
+LEVEL = 0.1
+"""A load off the case by more than this, at usual, is no agreement, even if calibration may be that far off [1]."""
+
 _POINTS = 4
 _ENOUGH = 3.0
+# A reference does more than to separate two explanations: it is chosen unless a run separates them this much better.
+_BETTER = 1.5
+
+
+@dataclass(frozen=True)
+class Given:
+    """What was asked, as a command line has it.
+
+    Attributes
+    ----------
+    recordings, references : tuple of str
+        Files.
+    rest : str
+        Options.
+    """
+
+    recordings: tuple[str, ...] = ("RECORDING",)
+    references: tuple[str, ...] = ()
+    rest: str = "--case CASE"
+
+    def command(self, run: str = "", reference: str = "") -> str:
+        """Command that diagnoses the same with one more file."""
+        files = [*self.recordings, *([run] if run else [])]
+        known = [*self.references, *([reference] if reference else [])]
+        words = ["python -m bemt diagnose", *files, *(["--reference", *known] if known else []), self.rest]
+        return " ".join(words)
+
+    def comparison(self, reference: str) -> str:
+        """Command that sets the first recording beside a reference."""
+        return f"python -m bemt compare {reference} {self.recordings[0]}"
 
 
 @dataclass(frozen=True)
@@ -44,6 +83,10 @@ class Suggestion:
         The two explanations.
     before, after : float
         Distance of the two in standard deviations, now and with the run [1].
+    kind : str
+        "run", "reference" (a run without the cause), "look" (without a run), or "" when nothing is called for.
+    commands : tuple of str
+        What to type then.
     """
 
     text: str
@@ -51,11 +94,14 @@ class Suggestion:
     separates: tuple[str, ...]
     before: float
     after: float
+    kind: str = "run"
+    commands: tuple[str, ...] = ()
 
     def document(self) -> dict[str, Any]:
         """Plain values for JSON."""
         return {"text": self.text, "points": [dict(p) for p in self.points], "separates": list(self.separates),
-                "distance_before": self.before, "distance_after": self.after}  # fmt: skip
+                "distance_before": self.before, "distance_after": self.after, "kind": self.kind,
+                "commands": list(self.commands)}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -163,9 +209,34 @@ def _distance(problem: Problem, covariance_of: noise.Hyper, a: Array, b: Array) 
     return float(np.sqrt(d @ d))
 
 
+def nothing_called_for(found: Evidence) -> Suggestion:
+    """What is left to say after "none": nothing to do, and what would show fainter causes."""
+    if _referenced(found):
+        return Suggestion("no further run is called for", (), (), 0.0, 0.0, "")
+    level = max((abs(v) for v in found.problem.level.values()), default=0.0)
+    if level > LEVEL:
+        text = f"{REFERENCE}; it says whether the level is the blade's, the stand's or the model's"
+        return Suggestion(text, (), (), 0.0, 0.0, "reference")
+    text = "no further run is called for; with a reference (the same rotor before the change) fainter causes would show"
+    return Suggestion(text, (), (), 0.0, 0.0, "reference")
+
+
+def _referenced(found: Evidence) -> bool:
+    return any(p.record.reference for p in found.problem.parts)
+
+
+def _with_reference(part: Part) -> Problem:
+    """Plan with the same points measured once more without the cause; readings are those of the baseline."""
+    f = part.flow
+    own = {"thrust_N": f.T0, "torque_Nm": f.Q0}
+    measured = {k: own.get(k, v) for k, v in part.record.measured.items()}
+    return assemble((part, replace(part, record=replace(part.record, measured=measured, reference=True))))
+
+
 def suggest(
-    found: Evidence, first: tuple[str, dict[str, Any]], second: tuple[str, dict[str, Any]] | None
-) -> Suggestion:
+    found: Evidence, first: tuple[str, dict[str, Any]], second: tuple[str, dict[str, Any]] | None,
+    reference: bool = False,
+) -> Suggestion:  # fmt: skip
     """Choose the run that separates two explanations best.
 
     Parameters
@@ -174,6 +245,8 @@ def suggest(
         Outcome of the weighing.
     first, second : tuple of (str, dict) or None
         Effects and their settings; None stands for "nothing is left out".
+    reference : bool
+        Whether a run without the cause would do, too, where there is none yet.
 
     Returns
     -------
@@ -206,10 +279,16 @@ def suggest(
         gained = _distance(extended, hyper, a, b)
         if gained > best[0]:
             best = (gained, option)
+    if reference and not _referenced(found):
+        known = _with_reference(part)
+        a, b = signatures(known)
+        gained = _distance(known, hyper, a, b) if np.isfinite(a).all() and np.isfinite(b).all() else now
+        if best[0] < _BETTER * max(gained, now) or best[0] < _ENOUGH:
+            return Suggestion(REFERENCE, (), names, now, max(gained, now), "reference")
     look = _look(names, found)
     if best[1] is None or (best[0] < _ENOUGH and look) or (best[0] < now + 0.5 and look):
         text = look or "more repeats of the same points: no other affordable run separates them better"
-        return Suggestion(text, (), names, now, max(best[0], _ENOUGH) if look else best[0])
+        return Suggestion(text, (), names, now, max(best[0], _ENOUGH) if look else best[0], "look" if look else "run")
     return Suggestion(best[1].text, _points(problem.parts[0].record, best[1]), names, now, best[0])
 
 

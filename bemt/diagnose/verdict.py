@@ -9,9 +9,9 @@ second effect that may be there, too?  Only then is a name given; with a few exp
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,8 @@ from bemt.diagnose import blocks, prior
 from bemt.diagnose import confusion as look
 from bemt.diagnose import fit as fitting
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
+from bemt.diagnose.suggest import LEVEL
+from bemt.effects.base import Effect
 
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence
@@ -49,6 +51,22 @@ PARTNER, MOST = 0.1, 3
 NEAR = 5.0
 """Effects of a class may be this far (natural logarithm of the evidence) behind the best one [1]."""
 
+ANOTHER = 0.25
+"""All loads off the case by more than this, at usual: pitch, section, density, speed or diameter may each be it [1]."""
+VAGUE = 2.5
+"""Log odds of something unknown over nothing from which an explanation must predict, too [1]."""
+BESIDE = 0.1
+"""Share of an effect's probability that "unknown" may keep beside it and the effect still be named [1]."""
+ROUGH = 3.0
+"""Noise over what the recording states from which on something else is at work than any effect explains [1]."""
+IN_SET, LARGEST = 0.85, 6
+"""Share of the probability of one cause that its set holds; most effects of the sets of a pair together [1]."""
+END = 0.01
+"""As near to an end of its range, a share of it, a parameter of a pair is at the end [1]."""
+
+# Turns of two sets that follow each other; they settle in two or three.
+_TURNS = 20
+
 _BALANCE = ("thrust_N", "torque_Nm")
 # Faults of a cell that shift its reading: one stays, the other creeps.
 _SHIFTS = ("zero", "drift")
@@ -76,6 +94,8 @@ class Decision:
         Reason, in words.
     rule : str
         Name of the rule that decided.
+    sets : tuple of tuple of str
+        One set of effects per cause: one of each is at work.
     """
 
     verdict: str
@@ -86,6 +106,7 @@ class Decision:
     classes: tuple[tuple[str, ...], ...]
     why: str
     rule: str = ""
+    sets: tuple[tuple[str, ...], ...] = ()
 
 
 @dataclass(eq=False)
@@ -102,6 +123,7 @@ class Asked:
 
     found: Evidence
     p_value: float
+    _refined: dict[Explanation, tuple[fitting.Fit, dict[str, dict[str, dict[str, Any]]]]] = field(default_factory=dict)
 
     @property
     def P(self) -> Mapping[Explanation, float]:
@@ -123,7 +145,25 @@ class Asked:
         share = inclusion(self.found)
         if not self.first.pair or twins(self.first):
             return self.first, share
-        return _earned(self.found, self.first, share, self.rest)
+        leading, share = _earned(self.found, self.first, share, self.rest)
+        idle = [i for i in leading if leading.pair and holds_off(i, self._parameters(leading)[i])]
+        if len(idle) == 1:
+            leading, share = leading.without(idle[0]), {i: (0.0 if i in idle else p) for i, p in share.items()}
+        return leading, share
+
+    def _parameters(self, what: Explanation) -> Mapping[str, Mapping[str, Mapping[str, Any]]]:
+        return self.refined(what)[1]
+
+    def refined(self, what: Explanation) -> tuple[fitting.Fit, dict[str, dict[str, dict[str, Any]]]]:
+        """An explanation at its best setting, and what its parameters may be."""
+        if what not in self._refined:
+            self._refined[what] = fitting.refined(self.found, fitting.fit(self.found, what))
+        return self._refined[what]
+
+    @property
+    def parameters(self) -> Mapping[str, Mapping[str, Mapping[str, Any]]]:
+        """What the parameters of the leading explanation may be."""
+        return self._parameters(self.leading)
 
     @property
     def leading(self) -> Explanation:
@@ -139,6 +179,26 @@ class Asked:
     def odds(self) -> float:
         """Log odds of the leading explanation over nothing."""
         return self.found.log_bayes(self.leading)
+
+    @cached_property
+    def level(self) -> float:
+        """Largest median of a load over what the case gives, less 1, either way [1]."""
+        return max((abs(v) for v in self.found.problem.level.values()), default=0.0)
+
+    @cached_property
+    def another_blade(self) -> bool:
+        """Whether another shape of the blade leads, all loads are far off, and there is no reference."""
+        problem = self.found.problem
+        classes = [effects.catalogue()[i] for i in self.leading]
+        shape = all(not c.on_by_default and (c.blade is not Effect.blade or c.section is not Effect.section)
+                    for c in classes)  # fmt: skip
+        shown = any(p.record.reference for p in problem.parts)
+        return shape and not shown and min((abs(v) for v in problem.level.values()), default=0.0) > ANOTHER
+
+    @cached_property
+    def vague(self) -> float:
+        """Log odds of something unknown over nothing."""
+        return self.found.log_bayes(UNKNOWN)
 
     @cached_property
     def _weight(self) -> float:
@@ -158,6 +218,16 @@ class Asked:
     def needed(self) -> float:
         """Log odds over nothing from which it counts."""
         return PROVEN if self.on else EXPECTED if self.expected else ENOUGH
+
+    @cached_property
+    def unlisted(self) -> float:
+        """Probability that the cause is not in the library: two cells with one fault are one cause, too."""
+        return self.P[UNKNOWN] + sum(v for k, v in self.P.items() if k.pair and twins(k))
+
+    @cached_property
+    def roughness(self) -> float:
+        """Noise over what the recording states, where it does [1]."""
+        return self.found.states[0].hyper.scale if self.found.problem.u_known else 1.0
 
     @cached_property
     def paired(self) -> bool:
@@ -182,6 +252,16 @@ class Asked:
         return tuple(i for i, p in together.items() if p >= PARTNER and i not in self.group)
 
     @cached_property
+    def known_sets(self) -> tuple[tuple[str, ...], ...]:
+        """One set of effects per cause of the leading pair; a sure effect is a set of its own."""
+        sets = credible_sets(self.P, self.leading)
+        for i in self.leading:
+            if self.share[i] >= SURE:
+                other = next((s for s in sets if i not in s), tuple(self.leading.without(i)))
+                return (i,), other
+        return sets
+
+    @cached_property
     def few(self) -> tuple[str, ...]:
         """Fewest of the likeliest effects, at most :data:`MOST`, that hold nearly all of the probability."""
         some = tuple(self.share)
@@ -200,7 +280,8 @@ class Asked:
         """Decision that names effects."""
         stand = all(effects.catalogue()[i].kind == "stand" for i in ids)
         why = "nearly all of the probability is on " + ("it" if len(ids) == 1 else "both")
-        return self.says("sensor" if stand else "named", why, ids, probability, leading=Explanation.of(*ids))
+        said = self.says("sensor" if stand else "named", why, ids, probability, leading=Explanation.of(*ids))
+        return replace(said, sets=tuple((i,) for i in ids))
 
 
 @dataclass(frozen=True)
@@ -228,26 +309,22 @@ class Rule:
     source: str
 
 
-def decide(found: Evidence, p_value: float) -> Decision:
+def decide(asked: Asked) -> Decision:
     """Decide.
 
     Parameters
     ----------
-    found : Evidence
-        Outcome of the weighing.
-    p_value : float
-        Of the gate [1].
+    asked : Asked
+        Outcome of the weighing, and the p-value of the gate.
 
     Returns
     -------
     Decision
         What is said.
     """
-    asked = Asked(found, p_value)
     for rule in RULES:
         if rule.holds(asked):
-            decision = rule.answer(asked)
-            return Decision(**{**vars(decision), "rule": rule.name})
+            return replace(rule.answer(asked), rule=rule.name)
     raise AssertionError("the last rule always holds")
 
 
@@ -290,6 +367,38 @@ def twins(what: Explanation) -> bool:
     chosen = [effects.catalogue()[i] for i in what]
     faults = {"shift" if e.fault in _SHIFTS else e.fault for e in chosen}
     return len(chosen) > 1 and len(faults) == 1 and "" not in faults and all(e.sensor in _BALANCE for e in chosen)
+
+
+def holds_off(name: str, told: Mapping[str, Mapping[str, Any]]) -> bool:
+    """Whether an effect may as well be absent: the interval of its size holds the value at which it is.
+
+    Of several sizes that stand for each other (zero and temperature of a drift) each may hold it and all together not.
+    """
+    sizes = [p for p in effects.catalogue()[name].parameters if p.off is not None and p.name in told]
+    discrete = effects.catalogue()[name].discrete
+    free = [p for p in sizes if p.name not in discrete]
+    if len(free) != 1:
+        return False
+    return all(told[p.name]["low"] <= p.off <= told[p.name]["high"] for p in sizes if p.off is not None)
+
+
+def at_end(name: str, told: Mapping[str, Mapping[str, Any]]) -> bool:
+    """Whether the size of an effect, or the first number of one without a size, is pinned to an end of its range."""
+    cls = effects.catalogue()[name]
+    numbers = [p for p in cls.parameters if p.name in told and p.name not in cls.discrete and p.steps > 0]
+    sizes = [p for p in numbers if p.off is not None] or numbers[:1]
+    for p in sizes:
+        near = END * (p.high - p.low)
+        if told[p.name]["high"] - told[p.name]["low"] > 0.5 * (p.high - p.low):
+            continue  # the readings do not say where it is
+        ends = [e for e in (p.low, p.high) if e != p.off]
+        if any(abs(float(told[p.name]["value"]) - e) < near for e in ends):
+            return True
+    return False
+
+
+def _sizes(name: str, told: Mapping[str, Mapping[str, Any]]) -> int:
+    return sum(p.off is not None and p.name in told for p in effects.catalogue()[name].parameters)
 
 
 def _mass(found: Evidence, group: Sequence[str]) -> float:
@@ -346,30 +455,62 @@ def _class(found: Evidence, first: str, share: Mapping[str, float]) -> tuple[str
     return (first, *sorted(others, key=lambda i: -share[i]))
 
 
+def credible_sets(probability: Mapping[Explanation, float], pair: Explanation) -> tuple[tuple[str, ...], ...]:
+    """One set of effects per cause of a pair, likeliest first: with one effect of each set nearly all pairs are there.
+
+    A sum of single effects (Wang, Sarkar, Carbonetto and Stephens 2020, J. R. Statist. Soc. B 82:1273): what may stand
+    for one cause, given the other set, in turns until it stays. What could be in both sets is where it is likelier.
+    """
+    pairs = {k: v for k, v in probability.items() if k.pair}
+    weight: dict[str, dict[str, float]] = {}
+    for k, v in pairs.items():
+        a, b = k
+        weight.setdefault(a, {})[b] = v
+        weight.setdefault(b, {})[a] = v
+    first, second = ({i: 1.0} for i in pair)
+    for _ in range(_TURNS):
+        second = _given(weight, first)
+        first = _given(weight, second)
+    both = set(first) & set(second)
+    for i in both:
+        (first if first[i] < second[i] else second).pop(i)
+    return _to_mass(first), _to_mass(second)
+
+
+def _given(weight: Mapping[str, Mapping[str, float]], other: Mapping[str, float]) -> dict[str, float]:
+    """Probability of each effect to be the one beside a set."""
+    out: dict[str, float] = {}
+    for i, p in other.items():
+        for k, v in weight.get(i, {}).items():
+            if k not in other:
+                out[k] = out.get(k, 0.0) + p * v
+    total = sum(out.values()) or 1.0
+    # what hardly ever stands there is not carried along
+    return {k: v / total for k, v in out.items() if v > 0.01 * total}
+
+
+def _to_mass(share: Mapping[str, float]) -> tuple[str, ...]:
+    """Fewest effects that hold nearly all of a set."""
+    ranked = sorted(share, key=lambda i: -share[i])
+    mass = np.cumsum([share[i] for i in ranked])
+    return tuple(ranked[: int(np.searchsorted(mass, IN_SET * mass[-1])) + 1]) if ranked else ()
+
+
 def _pair(a: Asked) -> Decision:
-    """Two effects at work: name those that are sure, and the look-alikes of the other."""
+    """Two effects at work: a set for each cause; names where the sets have one member."""
     sure = [i for i in a.leading if a.share[i] >= SURE]
-    unsure = [i for i in a.leading if i not in sure]
-    if not unsure:
+    if len(sure) == len(a.leading):
         return a.names(sure, min(a.share[i] for i in sure))
-    pairs = {k: v for k, v in a.P.items() if k.pair and (not sure or k.ids & set(sure))}
-    total = sum(pairs.values())
-    members: list[str] = list(sure)
-    for _ in unsure:
-        partner = {j: 0.0 for j in a.found.spans if j not in sure}
-        for k, v in pairs.items():
-            for j in k.ids & set(partner):
-                partner[j] += v
-        near, mass = [], 0.0
-        for j in sorted(partner, key=lambda j: -partner[j]):
-            near.append(j)
-            mass += partner[j]
-            if mass >= SURE * total:
-                break
-        members += [j for j in near if j not in members][:5]
-    if len(sure) == len(a.leading) - 1 and len(members) <= 5:
-        look_alikes = tuple(m for m in members if m not in sure)
-        return a.says("class", "two effects are at work; one of them has look-alikes", members, total, (look_alikes,))
+    known = a.known_sets
+    total = sum(v for k, v in a.P.items() if k.pair)
+    inside = sum(a.P.get(Explanation.of(i, j), 0.0) for i in known[0] for j in known[-1])
+    members = tuple(dict.fromkeys(i for s in known for i in s))
+    if len(members) <= LARGEST and inside >= SURE * total:
+        why = (
+            "two effects are at work; one of them has look-alikes" if sure else "two are at work, each has look-alikes"
+        )
+        open_sets = tuple(s for s in known if len(s) > 1)
+        return replace(a.says("class", why, members, inside, open_sets), sets=known)
     return a.says("insufficient", "two effects or more, not told apart")
 
 
@@ -396,9 +537,9 @@ RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "nulls look like it",
-        lambda a: a.p_value > GATE and (a.p_value > 5.0 * GATE or a.P[NONE] > 0.5),
+        lambda a: a.p_value > GATE and (a.P[NONE] > 0.5 or (a.p_value > 5.0 * GATE and a.level < LEVEL)),
         lambda a: _nothing(a, _by_chance(a)),
-        "GATE",
+        "GATE, LEVEL",
         "DIAGNOSIS 2.3: p-value of the whole chain, 1 in 100",
     ),
     Rule(
@@ -406,7 +547,7 @@ RULES: tuple[Rule, ...] = (
         lambda a: a.p_value > GATE,
         lambda a: _nothing(a, _by_chance(a), "insufficient"),
         "GATE",
-        "the same, between 1 and 5 in 100",
+        "the same, between 1 and 5 in 100, or where all loads are far off the case",
     ),
     Rule(
         "nothing is likelier than anything",
@@ -443,10 +584,10 @@ RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "does not predict",
-        lambda a: not a.expected and a.odds < PROVEN and not _predicts(a),
+        lambda a: not a.expected and a.odds < PROVEN and a.vague > VAGUE and not _predicts(a),
         lambda a: a.says("insufficient", "the best explanation does not predict what it has not seen"),
-        "PROVEN, PREDICTS",
-        "declared; left-out blocks, DIAGNOSIS 2.9",
+        "PROVEN, VAGUE, PREDICTS",
+        "declared; left-out blocks, DIAGNOSIS 2.9; in any case it cost right names (7)",
     ),
     Rule(
         "on, and out of its range",
@@ -465,6 +606,50 @@ RULES: tuple[Rule, ...] = (
         ),
         "",
         "declared: two independent faults of one kind are rare",
+    ),
+    Rule(
+        "unknown is nearly as likely",
+        lambda a: a.unlisted > BESIDE * _mass(a.found, (*a.group, *a.leading)),
+        lambda a: a.says("insufficient", "something that is not in the library explains the readings nearly as well"),
+        "BESIDE",
+        "DIAGNOSIS 7: lost no right name and stopped the wrong ones",
+    ),
+    Rule(
+        "far rougher than stated",
+        lambda a: a.roughness > ROUGH,
+        lambda a: a.says(
+            "insufficient",
+            f"the readings scatter {a.roughness:g} times as much as the recording states; no effect does that",
+        ),
+        "ROUGH",
+        "declared: end of the prior; hysteresis and resonance show so",
+    ),
+    Rule(
+        "may as well be absent",
+        lambda a: not a.leading.pair and len(a.group) <= 1 and holds_off(*next(iter(a.parameters.items()))),
+        lambda a: a.says("insufficient", f"{a.leading} leads, but what the readings say of its size includes none"),
+        "90 % interval",
+        "DIAGNOSIS 7: 4 of 5 wrong names, 0 of 42 right ones",
+    ),
+    Rule(
+        "another blade, or anything that scales all loads",
+        lambda a: a.another_blade and len(a.group) <= 1,
+        lambda a: a.says(
+            "insufficient",
+            f"all loads are far off, which {a.leading} would explain, and density, speed of rotation or "
+            "diameter nearly as well",
+        ),
+        "ANOTHER",
+        "declared: real recordings at another density than the case's were named section",
+    ),
+    Rule(
+        "at the end of its range",
+        lambda a: any(at_end(i, told) and (a.leading.pair or _sizes(i, told) > 1) for i, told in a.parameters.items()),
+        lambda a: a.says(
+            "insufficient", f"{' and '.join(a.leading)}: fits only with a number at the end of its physical range"
+        ),
+        "END",
+        "declared: where one number cannot go further, another makes up for something else",
     ),
     Rule(
         "several are sure",
@@ -494,9 +679,22 @@ RULES: tuple[Rule, ...] = (
     ),
     Rule("two at work", lambda a: a.paired, _pair, "SURE", "declared"),
     Rule(
+        "on already, among others",
+        lambda a: a.on and not a.sure,
+        lambda a: a.says(
+            "insufficient",
+            f"{a.leading} leads, which is on: its law may be off for this blade, or another cause looks so",
+        ),
+        "PRESENT, SURE",
+        "declared: what is on is a cause only where nothing else is left",
+    ),
+    Rule(
         "look-alikes",
         lambda a: len(a.group) > 1 and _mass(a.found, a.group) >= SURE,
-        lambda a: a.says("class", "these look alike in this plan", a.group, _mass(a.found, a.group), (a.group,)),
+        lambda a: replace(
+            a.says("class", "these look alike in this plan", a.group, _mass(a.found, a.group), (a.group,)),
+            sets=(a.group,),
+        ),
         "SURE, NEAR, ALIKE",
         "DIAGNOSIS 2.7: distance below 3 sigma",
     ),

@@ -21,11 +21,17 @@ class AirDensity(Effect):
 
     id = "air_density"
     title = "density of the air"
+    check = "read barometer and thermometer beside the stand and work the density out"
     sign = "thrust and torque off by the same share at every speed and advance ratio; one cell's gain moves one of them"
     parameters = (
         Parameter("change", "1", -0.35, 0.5, "weather +-3 %; altitude to 3500 m, forgotten or wrongly stated", 7, 0.0),
     )
     on_by_default = False
+
+    def plausible(self, flow: Flow) -> bool:
+        """Whether there is such air: 0.66 kg/m3 at 6000 m (U.S. Standard Atmosphere), 1.42 at sea level and -25 C."""
+        rho = flow.rho * (1.0 + self.change)
+        return bool(rho.min() > 0.66 and rho.max() < 1.42)
 
     def flow(self, flow: Flow) -> None:
         """Change the density."""

@@ -23,11 +23,12 @@ class AirspeedOffset(Effect):
 
     id = "airspeed_offset"
     title = "airspeed other than recorded"
+    check = "read the pitot with the fan of the tunnel off, and beside a second one"
     sign = "shift of J that fades as 1/n at high speed of rotation; a blade angle would shift every speed alike"
     kind = "stand"
     fault = "zero"
     sensor = "airspeed_m_s"
-    parameters = (Parameter("offset_m_s", "m/s", -1.0, 1.0, "declared, pitot zero", 5, 0.0),)
+    parameters = (Parameter("offset_m_s", "m/s", -3.0, 3.0, "declared, pitot zero", 7, 0.0, 0.5),)
     on_by_default = False
 
     def applies(self, flow: Flow) -> str:

@@ -41,6 +41,8 @@ class Parameter:
     off : float, optional
         Value at which nothing is changed; an effect with several such parameters is nothing at all of them together,
         in the unit of the parameter.
+    usual : float, optional
+        Size that is usual, where the range goes far beyond it; None: all values are alike (unit of the parameter).
     """
 
     name: str
@@ -50,6 +52,16 @@ class Parameter:
     source: str
     steps: int = 5
     off: float | None = None
+    usual: float | None = None
+
+    def density(self, value: float) -> float:
+        """Prior density of a value, of any scale: the same over the range, or heavy-tailed about "off".
+
+        Student's t with three degrees of freedom: most faults are of the usual size, some are many times that.
+        """
+        if self.usual is None or self.off is None:
+            return 1.0
+        return float((1.0 + ((value - self.off) / self.usual) ** 2 / 3.0) ** -2)
 
 
 def choice(name: str, value: str, lawful: tuple[str, ...]) -> None:
@@ -480,6 +492,10 @@ class Effect:
     def variants(self) -> tuple[dict[str, Any], ...] | None:
         """Discrete settings that a diagnosis tries instead of the ranges of ``parameters``; None: the ranges."""
         return None
+
+    def plausible(self, flow: Flow) -> bool:
+        """Whether the world has such a thing at these points, however the effect came about; the base says yes."""
+        return True
 
     def describe(self) -> dict[str, Any]:
         """Id and every field, for provenance."""

@@ -26,6 +26,7 @@ class CrossTalk(Effect):
 
     id = "cross_talk"
     title = "cross-talk between thrust and torque cell"
+    check = "hang a dead weight on each cell alone and read both"
     sign = "one channel follows the other's load over advance ratio; a pair of opposite rotation turns its sign"
     kind = "stand"
     fault = "cross-talk"

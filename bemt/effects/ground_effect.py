@@ -39,6 +39,7 @@ class GroundEffect(Effect):
     id = "ground_effect"
     inviscid = True
     title = "wall behind the propeller"
+    check = "measure the distance of the nearest wall behind the propeller"
     along = ("wall_distance_m",)
     sign = (
         "more thrust at the same speed and torque; with airspeed it fades, as no load-cell gain does, unless the wall "

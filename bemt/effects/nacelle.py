@@ -30,6 +30,7 @@ class Nacelle(Effect):
     id = "nacelle"
     inviscid = True
     title = "body behind the propeller"
+    check = "run without the propeller at the same airspeeds and take that drag off"
     sign = "thrust lacks an amount that grows with V^2 whatever the rotor's speed, torque hardly moves; none at rest"
     parameters = (
         Parameter("deficit", "1", 0.0, 0.25, "0.25 on the axis of a half-body", 3, 0.0),

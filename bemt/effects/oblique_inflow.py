@@ -28,6 +28,7 @@ class ObliqueInflow(Effect):
     id = "oblique_inflow"
     inviscid = True
     title = "airspeed at an angle to the shaft"
+    check = "check with a laser that shaft and tunnel axis are parallel"
     along = ("sideslip_rad",)
     sign = (
         "thrust and torque up with airspeed as if J were lower, and a force in the plane of the disk; none at rest; a "

@@ -26,6 +26,7 @@ class Recirculation(Effect):
 
     id = "recirculation"
     title = "slipstream that returns through the room"
+    check = "let smoke out behind the propeller, or repeat with a door open and after a pause"
     along = ("time_s",)
     sign = "thrust decays within seconds of each start and at low advance ratio only; a drifting cell knows no speed"
     needs = ("time_s",)

@@ -31,6 +31,7 @@ class RpmScale(Effect):
 
     id = "rpm_scale"
     title = "speed of rotation other than indicated"
+    check = "count the turns with an optical tachometer, and the pole pairs or blades set in the counter"
     sign = (
         "thrust and torque off by the same square and airspeed effects come at another J: a rational ratio of pole or "
         "blade counts; density leaves J alone"

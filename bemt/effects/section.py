@@ -27,6 +27,10 @@ class Section(Effect):
 
     id = "section"
     title = "camber and drag level of the blade section"
+    check = (
+        "take the section at 0.75 R from the blade (a cast, or a cut through a broken one) and"
+        " compare it with that of the case"
+    )
     sign = (
         "lift moves by the same amount at every advance ratio and drag by one factor, whatever the speed; neither "
         "follows Reynolds number, Mach number or time"

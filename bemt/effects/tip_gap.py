@@ -30,6 +30,7 @@ class TipGap(Effect):
     id = "tip_gap"
     inviscid = True
     title = "leakage through the tip gap of a ducted rotor"
+    check = "measure the gap with a feeler gauge, hot and at speed if it can be"
     along = ("tip_gap_m",)
     sign = "thrust and pressure rise fall in proportion to gap over span; an open rotor has none"
     parameters = (

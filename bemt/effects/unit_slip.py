@@ -48,6 +48,7 @@ class UnitSlip(Effect):
 
     id = "unit_slip"
     title = "number in another unit than its label, or with the other sign"
+    check = "look at the unit in the settings of the stand and in the heading of the file"
     sign = "one channel off by exactly the ratio of two units, or by -1, at every point; no physics keeps such a factor"
     kind = "stand"
     fault = "unit"

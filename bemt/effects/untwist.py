@@ -26,6 +26,7 @@ class Untwist(Effect):
 
     id = "untwist"
     title = "elastic twist of the blades"
+    check = "film the tip from the side, standing still and at full speed"
     sign = (
         "thrust coefficient falls (or rises) with rho Omega^2 and not with Mach number: another density at the same "
         "speed moves it, another air temperature does not"

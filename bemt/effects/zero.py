@@ -14,14 +14,15 @@ class Zero(Effect):
     Notes
     -----
     Zero error of a load cell (ISO 376:2011; not checked): falls as 1/n^2 in the coefficient.  Full scale is the largest
-    reading of the recording.  The range of +-5 % is declared: no tare, cable pull, weight of the motor.
+    reading of the recording.  No tare, cable pull, weight of the motor: some percent as a rule, far more at times,
+    a heavy-tailed prior; declared.
     """
 
     zero: float = 0.01
 
     kind = "stand"
     fault = "zero"
-    parameters = (Parameter("zero", "1", -0.05, 0.05, "declared, share of full scale", 3, 0.0),)
+    parameters = (Parameter("zero", "1", -0.25, 0.25, "declared, of full scale; a weight not tared", 3, 0.0, 0.02),)
     on_by_default = False
 
     def reading(self, reading: Reading, flow: Flow) -> None:

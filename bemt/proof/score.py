@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import permutations
 from typing import Any
 
 import numpy as np
@@ -186,6 +187,17 @@ def _matches(said: Sequence[str], allowed: Sequence[set[str]]) -> bool:
     return (a in allowed[0] and b in allowed[1]) or (a in allowed[1] and b in allowed[0])
 
 
+def in_sets(j: Judged) -> bool:
+    """Whether there is one set for each cause, with the cause in it or one that the plan cannot tell from it."""
+    if j.right and j.answer["verdict"] != "class":
+        return True
+    sets = [set(s) for s in j.answer.get("sets", ())]
+    allowed = [{c, *a} for c, a in zip(j.entry["causes"], j.entry["alike"], strict=True)]
+    if len(sets) != len(allowed):
+        return False
+    return any(all(s & a for s, a in zip(order, allowed, strict=True)) for order in permutations(sets))
+
+
 def _share(what: str, flags: Iterable[bool], target: str, limit: float, low_is_good: bool = False) -> ScoreRow:
     values = list(flags)
     hits, n = sum(values), len(values)
@@ -296,6 +308,7 @@ def score(judged: Sequence[Judged], settled: Sequence[bool] = ()) -> list[ScoreR
                True),
         _share("pairs named exactly, rpm x J", (j.right and j.answer["verdict"] != "class" for j in pairs), ">= 75 %",
                0.75),
+        _share("pairs named, or one of each in its set, rpm x J", (in_sets(j) for j in pairs), ">= 75 %", 0.75),
         _share("unlisted given a listed name", (j.claims for j in unlisted), "<= 5 %", 0.05, True),
         _share("unlisted at 10 sigma called unknown", (j.answer.get("verdict") == "unknown" for j in clear), ">= 80 %",
                0.80),
