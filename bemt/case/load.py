@@ -9,6 +9,7 @@ from __future__ import annotations
 import copy
 import hashlib
 import re
+import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -255,7 +256,8 @@ class Case:
         """SHA-256 over the content of all files of the case; it does not depend on where the case lies."""
         digest = hashlib.sha256()
         for path in self.files():
-            data = path.read_bytes()
+            made_here = path == self.path and not path.exists()  # of a text, never a file
+            data = repr(self.written).encode() if made_here else path.read_bytes()
             digest.update(f"{path.name}\0{len(data)}\0".encode() + data)
         return digest.hexdigest()
 
@@ -315,6 +317,16 @@ def load_case(path: str | Path) -> Case:
     document = load_toml(path, out)
     if document is None:
         raise InputError(out.faults)
+    return _checked(path, document, out)
+
+
+def case_of(text: str, folder: str | Path = ".") -> Case:
+    """Case of the text of a case file; files that it names are looked for in the folder. Raises as `load_case`."""
+    path = Path(folder) / FILE_NAME
+    return _checked(path, tomllib.loads(text), Collector(path.as_posix()))
+
+
+def _checked(path: Path, document: dict[str, Any], out: Collector) -> Case:
     file = check_case(out, document, path.parent)
     check_name(out, document.get("name"))
     if file is None or out.faults:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from bemt.readers._imported import Imported
     from bemt.recordings.channels import Recorded
 
-__all__ = ["cases_of", "load", "load_all"]
+__all__ = ["cases_of", "check_effects", "load", "load_all"]
 
 Array = NDArray[np.float64]
 
@@ -170,7 +171,19 @@ def _told_twice(paths: Sequence[str], only: Sequence[str]) -> None:
     files = [Path(p).resolve() for p in paths]
     faults = [Fault(p, "", "a recording given twice", "each once", "Its points would count twice")
               for k, p in enumerate(paths) if files[k] in files[:k]]  # fmt: skip
+    if faults:
+        raise InputError(faults)
+    check_effects(only)
+
+
+def check_effects(only: Sequence[str]) -> None:
+    """Refuse effects that nobody knows."""
     known = effects.catalogue()
-    faults += [Fault("--only", i, "an unknown effect", f"one of {', '.join(known)}") for i in only if i not in known]
+    faults = []
+    for name in only:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, 1)
+            hint = f"Did you mean {near[0]}?" if near else ""
+            faults.append(Fault("--only", name, "an unknown effect", f"one of {', '.join(known)}", hint))
     if faults:
         raise InputError(faults)
