@@ -34,6 +34,7 @@ Array = NDArray[np.float64]
 CHANNELS = (
     "rpm", "airspeed_m_s", "density_kg_m3", "J", "thrust_N", "torque_Nm", "power_W", "CT", "CP", "eta", "M_tip",
 )  # fmt: skip
+DUCTED = ("rotor_thrust_N", "duct_thrust_N", "stator_thrust_N", "exhaust_speed_m_s", "duct_share")
 BANDED = ("thrust_N", "torque_Nm", "power_W", "CT", "CP", "eta")
 
 
@@ -242,10 +243,11 @@ class Propeller:
 
 def _solved(case: Case, rpm: Array, V: Array, air: Air) -> tuple[dict[str, Array], tuple[tuple[str, ...], ...]]:
     """Channels and flags of points: the one place where this face meets the solver."""
-    from bemt.bem import evaluate
+    from bemt.case.prepare import prepare_case
 
-    found = evaluate.evaluate(evaluate.prepare(case), rpm, V, air)
-    return {key: np.asarray(getattr(found, key), dtype=float) for key in CHANNELS}, found.flags
+    found = prepare_case(case).solve(rpm, V, air)
+    more = DUCTED if case.ducted else ()
+    return {key: np.asarray(found[key], dtype=float) for key in (*CHANNELS, *more)}, found.flags
 
 
 def propeller(
@@ -287,7 +289,7 @@ def propeller(
     >>> propeller("10 by 5")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
         ...
-    bemt.base.errors.InputError: LABEL: got '10 by 5'; expected ...
+    bemt.base.errors.InputError: LABEL: '10 by 5': got unreadable text; expected ...
     """
     faults = []
     if (label is None) == (stations is None):

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import bemt
-from bemt.bem import evaluate
 from bemt.case import load_case
+from bemt.case.prepare import prepare_case
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -36,9 +36,9 @@ def test_rooms_of_the_same_name_are_called_like_functions() -> None:
 def test_a_case_gives_what_the_solver_gives() -> None:
     case = load_case(ROOT / "cases" / "prop_8x5")
     ours = bemt.load(ROOT / "cases" / "prop_8x5").solve([8000.0, 20000.0], [0.0, 10.0])
-    raw = evaluate.evaluate(evaluate.prepare(case), [8000.0, 20000.0], [0.0, 10.0], case.air())
-    np.testing.assert_allclose(ours["thrust_N"], raw.thrust_N, rtol=1e-12)
-    np.testing.assert_allclose(ours["torque_Nm"], raw.torque_Nm, rtol=1e-12)
+    raw = prepare_case(case).solve([8000.0, 20000.0], [0.0, 10.0], case.air())
+    np.testing.assert_allclose(ours["thrust_N"], raw["thrust_N"], rtol=1e-12)
+    np.testing.assert_allclose(ours["torque_Nm"], raw["torque_Nm"], rtol=1e-12)
 
 
 def test_bands_come_from_the_declared_unknowns() -> None:

@@ -1,4 +1,4 @@
-"""The promise of `new`: a folder that runs at once, with every unknown declared; and of `drive LABEL`: no file needed."""
+"""The promise of `new`: a folder that runs at once, every unknown declared; and of `drive LABEL`: no file needed."""
 
 from __future__ import annotations
 
@@ -49,7 +49,8 @@ def test_a_new_folder_runs_at_once(words: list[str], name: str, capsys: pytest.C
     ("words", "said"),
     [
         (["10by5"], "LABEL"), ([], "LABEL, --stations"), (["10x5", "--kv", "900"], "--cells together"),
-        (["--stations", "blade.csv"], "--diameter-mm"), (["--stations", "absent.csv", "--diameter-mm", "254"], "absent"),
+        (["--stations", "blade.csv"], "--diameter-mm"),
+        (["--stations", "absent.csv", "--diameter-mm", "254"], "absent"),
         (["--stations", "blade.csv", "--diameter-mm", "0.254"], "Times 1000"), (["seventy", "--fan"], "70mm"),
     ],
 )  # fmt: skip
