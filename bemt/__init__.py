@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from bemt.dataset import Dataset as Dataset
     from bemt.library import Answer as Answer
     from bemt.library import Propeller as Propeller
+    from bemt.library import compare as compare
     from bemt.library import diagnose as diagnose
     from bemt.library import drive as drive
     from bemt.library import load as load
@@ -26,8 +27,11 @@ if TYPE_CHECKING:
     from bemt.library import validate as validate
 
 _HOMES = {"InputError": "bemt.base.errors", "Dataset": "bemt.dataset"}
-_ROOMS = ("diagnose", "drive")  # rooms that are called like functions
-_NAMES = ("Answer", "Dataset", "InputError", "Propeller", "diagnose", "drive", "load", "propeller", "read", "validate")
+_ROOMS = ("compare", "diagnose", "drive")  # rooms that are called like functions
+_NAMES = (
+    "Answer", "Dataset", "InputError", "Propeller", "compare", "diagnose", "drive", "load", "propeller", "read",
+    "validate",
+)  # fmt: skip
 __all__ = ["__version__", *_NAMES]
 
 

@@ -25,10 +25,11 @@ if TYPE_CHECKING:
 
     from bemt.air import Air
     from bemt.diagnose.chain import Diagnosis
+    from bemt.diagnose.contrast import Contrast
     from bemt.diagnose.record import Record
     from bemt.drive.from_label import DriveEstimate
 
-__all__ = ["Answer", "Propeller", "diagnose", "drive", "load", "propeller", "read", "validate"]
+__all__ = ["Answer", "Propeller", "compare", "diagnose", "drive", "load", "propeller", "read", "validate"]
 
 Array = NDArray[np.float64]
 CHANNELS = (
@@ -441,9 +442,6 @@ class Answer:
         return figures.draw(self.diagnosis, Path(folder))
 
 
-Recording = "str | os.PathLike[str] | Dataset | pd.DataFrame"
-
-
 def diagnose(
     recording: str | os.PathLike[str] | Dataset | pd.DataFrame | Sequence[Any], propeller: Propeller | str, *,
     reference: str | os.PathLike[str] | Dataset | pd.DataFrame | Sequence[Any] | None = None,
@@ -547,6 +545,37 @@ def drive(
     from bemt.drive import from_label
 
     return from_label.estimate(_propeller(propeller).case, kv, cells, mass_kg, rotors, capacity_Ah, airspeed_m_s)
+
+
+def compare(
+    a: str | os.PathLike[str], b: str | os.PathLike[str], *, case: str | os.PathLike[str] | None = None,
+    diameter_m: float | None = None,
+) -> Contrast:  # fmt: skip
+    """Say what changed between two recordings of one stand.
+
+    Parameters
+    ----------
+    a, b : str or path
+        Recordings before and after, or without and with.
+    case : str or path, optional
+        The rotor: `b` is then diagnosed with `a` as its reference.
+    diameter_m : float, optional
+        Of the rotor where there is no case, for the advance ratio. [m]
+
+    Returns
+    -------
+    bemt.diagnose.contrast.Contrast
+        ``.document`` is the answer as ``bemt.comparison/1``.
+
+    Raises
+    ------
+    InputError
+        For files that are no recordings, or have no point in common.
+    """
+    from bemt.diagnose import contrast
+
+    known = contrast.label_diameter(None) if diameter_m is None else diameter_m
+    return contrast.compare(os.fspath(a), os.fspath(b), None if case is None else os.fspath(case), diameter_m=known)
 
 
 def validate(folder: str | os.PathLike[str]) -> dict[str, Any]:

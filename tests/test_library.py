@@ -28,7 +28,7 @@ def test_importing_it_loads_nothing() -> None:
 def test_rooms_of_the_same_name_are_called_like_functions() -> None:
     from bemt.diagnose import plan  # noqa: F401 - the room stays a package
 
-    assert callable(bemt.diagnose) and callable(bemt.drive)
+    assert callable(bemt.diagnose) and callable(bemt.drive) and callable(bemt.compare)
     with pytest.raises(bemt.InputError, match="--kv"):
         bemt.drive("10x5", kv=1.0, cells=3)
 
