@@ -79,7 +79,9 @@ def load(path: str, case: Case, imported: Imported | None = None) -> Record:
     from bemt.recordings import reduce as reduction
     from bemt.recordings.load import import_file
 
-    imported = imported or import_file(path)
+    if imported is None:
+        imported = import_file(path)
+        _one_setup(imported, path)
     _same_rotor(imported, case, path)
     ducted = case.ducted
     findings = check(imported, diameter_m=case.diameter_m, blades=int(case.get("rotor.blades")), ducted=ducted)
@@ -187,3 +189,13 @@ def check_effects(only: Sequence[str]) -> None:
             faults.append(Fault("--only", name, "an unknown effect", f"one of {', '.join(known)}", hint))
     if faults:
         raise InputError(faults)
+
+
+def _one_setup(imported: Imported, path: str) -> None:
+    """Refuse a table of several propellers or motors: their points are no one curve."""
+    from bemt.readers.generic_csv import setups
+
+    for name, kinds in setups(imported.texts).items():
+        got = f"{len(kinds)} set-ups: {', '.join(kinds[:4])}" + (", ..." if len(kinds) > 4 else "")
+        hint = "Put the rows of each into a file of its own"
+        raise InputError(Fault(path, name, got, "one propeller with one motor", hint))
