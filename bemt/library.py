@@ -117,7 +117,7 @@ class Propeller:
         """
         n, V = self._conditions(rpm, airspeed_m_s, J)
         air = self.case.air(None if density_kg_m3 is None else {"air.density_kg_m3": float(density_kg_m3)})
-        values, flags = _solved(self.case, n, V, air)
+        values, flags, u_model = _solved(self.case, n, V, air, bands)
         variance = {key: np.zeros(n.size) for key in BANDED}
         if bands:
             from bemt.compare.sweep.case import spread
@@ -127,12 +127,13 @@ class Propeller:
                       for v in item.values]  # fmt: skip
                 for key in BANDED:
                     variance[key] += spread(item.discrete, values[key], [run[key] for run in at]) ** 2
-        known = bands and bool(self.case.assumptions)
-        parts = {"input": {key: np.sqrt(v) for key, v in variance.items()}} if known else {}
-        notes = ("bands: declared unknowns of the case, one standard deviation; the model's own error is not in them",)
+        parts: dict[str, dict[str, Array]] = {"model": u_model} if bands else {}
+        if bands and self.case.assumptions:
+            parts["input"] = {key: np.sqrt(v) for key, v in variance.items() if key in u_model}
+        notes = ("bands, one standard deviation: declared unknowns (input), real rotors against BEMT (model)",)
         about = {"source": "bemt", "file": self.case.path.as_posix()}
         return Dataset("bemt", self.name, values, flags=flags, provenance=about, u_by=parts,
-                       notes=notes if known else ())  # fmt: skip
+                       notes=notes if bands else ())  # fmt: skip
 
     def curve(
         self, rpm: ArrayLike | None = None, J: ArrayLike | None = None, *, airspeed_m_s: ArrayLike | None = None,
@@ -242,13 +243,21 @@ class Propeller:
         return np.atleast_1d(n).astype(float).ravel(), np.atleast_1d(V).astype(float).ravel()
 
 
-def _solved(case: Case, rpm: Array, V: Array, air: Air) -> tuple[dict[str, Array], tuple[tuple[str, ...], ...]]:
-    """Channels and flags of points: the one place where this face meets the solver."""
+def _solved(
+    case: Case, rpm: Array, V: Array, air: Air, bands: bool = False
+) -> tuple[dict[str, Array], tuple[tuple[str, ...], ...], dict[str, Array]]:
+    """Channels, flags and the model's own uncertainty of points: the one place where this face meets the solver."""
     from bemt.case.prepare import prepare_case
 
-    found = prepare_case(case).solve(rpm, V, air)
+    model = prepare_case(case)
+    found = model.solve(rpm, V, air)
     more = DUCTED if case.ducted else ()
-    return {key: np.asarray(found[key], dtype=float) for key in (*CHANNELS, *more)}, found.flags
+    u: dict[str, Array] = {}
+    if bands:
+        from bemt.compare.sweep.model_error import u_model
+
+        u = {key: value for key, value in u_model(case, model, found, air).items() if key in BANDED}
+    return {key: np.asarray(found[key], dtype=float) for key in (*CHANNELS, *more)}, found.flags, u
 
 
 def propeller(
