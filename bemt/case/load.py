@@ -402,8 +402,13 @@ def find_cases(paths: Iterable[str | Path]) -> list[Path]:
                 else sorted(item.glob(f"*/{FILE_NAME}"), key=_natural)
             )
             if not here:
-                faults.append(Fault(item.as_posix(), "", "no case", f"a folder with <name>/{FILE_NAME}"))
+                hint = "`bemt new 10x5` writes one; stations.csv alone is no case"
+                faults.append(Fault(item.as_posix(), "", "no case", f"a folder with <name>/{FILE_NAME}", hint))
             found += here
+        elif item.is_file() and item.suffix.lower() in (".csv", ".txt", ".dat", ".xlsx", ".stl", ".step", ".out"):
+            solid = item.suffix.lower() in (".stl", ".step")
+            hint = "`bemt stations` cuts one from a solid" if solid else "`bemt import` reads recordings"
+            faults.append(Fault(item.as_posix(), "", f"a {item.suffix} file", "a case, case.toml or its folder", hint))
         elif item.is_file():
             found.append(item)
         else:

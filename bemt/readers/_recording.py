@@ -305,7 +305,7 @@ _MEANINGS = ("rpm", "thrust", "torque", "voltage", "current", "power", "time", "
 
 
 def _nearest(headings: Sequence[str]) -> str:
-    r"""What headings without a unit may mean, and the line of a recording.toml that says so; empty when nothing is near.
+    r"""What headings without a unit may mean, and the line of a recording.toml that says so; empty: nothing is near.
 
     Examples
     --------

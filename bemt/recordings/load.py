@@ -69,6 +69,8 @@ def import_file(path: str | os.PathLike[str], format: str | None = None, choice:
     """
     choice = choice or Choice()
     name = os.fspath(path)
+    if (Path(path) / "case.toml").is_file():
+        raise InputError(Fault(name, "", "a folder with a case", "a recording", "`bemt sweep` solves cases"))
     try:
         kind = importers.detect(path) if format is None else format
     except InputError as error:

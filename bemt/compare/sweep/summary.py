@@ -39,12 +39,13 @@ def summary(results: Sequence[Mapping[str, Any]], called: str = "python -m bemt"
     if solved:
         lines += _table(solved, found)
     for result in failed[:6]:
-        lines.append(_short(f"{result['name']}: not solved: {str((result['faults'] or ['?'])[0])}"))
+        n = len(result["faults"])
+        lines.append(_short(f"{result['name']}: not solved, {n} {'fault' if n == 1 else 'faults'} (see the messages)"))
     if len(failed) > 6:
         lines.append(f"and {len(failed) - 6} more that were not solved")
     for words in (_worst(found), _unknowns(solved), _flags(solved), _grids(solved)):
         lines += ["", *words] if words else []
-    return "\n".join([*lines, "", *_next(called, bool(found))])
+    return "\n".join([*lines, "", *_next(called, bool(found))] if solved else lines)
 
 
 def _compared(result: Mapping[str, Any]) -> list[dict[str, Any]]:
