@@ -245,11 +245,12 @@ def test_the_commands_of_the_documents_exist(project: Path, document: str) -> No
 @pytest.fixture
 def pages(project: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A folder with the cases, whose bemt/effects and bemt/importers are scanned like the project's own."""
-    from bemt import effects
+    from bemt import commands, effects
     from bemt import readers as importers
 
     shutil.copytree(project / "cases", tmp_path / "cases")
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(commands, "__path__", [*commands.__path__, str(tmp_path / "bemt" / "commands")])
     for package, known in ((effects, effects.catalogue), (importers, importers.importers)):
         folder = tmp_path.joinpath(*package.__name__.split("."))
         monkeypatch.setattr(package, "__path__", [*package.__path__, str(folder)])
