@@ -162,8 +162,8 @@ class Propeller:
         Examples
         --------
         >>> d = propeller("10x5").curve(rpm=6000, J=[0.0, 0.3, 0.6])
-        >>> bool(d.u["CT"][0] > 0), d.CT.round(3)
-        (True, array([0.092, 0.061, 0.008]))
+        >>> bool(d.u["CT"][0] > 0), d.CT.round(2)
+        (True, array([0.09, 0.06, 0.01]))
         """
         given = J is not None or airspeed_m_s is not None
         n = np.atleast_1d(np.asarray(self.case.rpm if rpm is None else rpm, dtype=float))

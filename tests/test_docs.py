@@ -112,12 +112,13 @@ def docstring_faults(name: str, item: object, face: bool = True) -> list[str]:
     optional = not face or inspect.isclass(item) or (method and not said and (len(given) <= 1 or overrides(item)))
     # fields may be grouped by unit, arguments keep their order
     agree = sorted(said) == sorted(given) if inspect.isclass(item) else said == given
+    agree = agree or (not face and inspect.isclass(item) and set(said) <= set(given))  # the base class says the rest
     if not agree and not (optional and not said):
         faults.append(f"{name}: documents {said}, takes {given}")
     for heading in ("Parameters", "Returns", "Attributes", "Yields"):
         for names, kind, body in entries(doc.get(heading, "")):
             what = kind or ", ".join(names)  # Returns may give the type alone
-            if NUMERIC.search(what) and not UNIT.search(kind + body):
+            if face and NUMERIC.search(what) and not UNIT.search(kind + body):
                 faults.append(f"{name}: {heading}: {', '.join(names)} without a unit in brackets")
     return faults
 

@@ -173,22 +173,26 @@ def _told_twice(paths: Sequence[str], only: Sequence[str]) -> None:
     files = [Path(p).resolve() for p in paths]
     faults = [Fault(p, "", "a recording given twice", "each once", "Its points would count twice")
               for k, p in enumerate(paths) if files[k] in files[:k]]  # fmt: skip
+    faults += _unknown(only)
     if faults:
         raise InputError(faults)
-    check_effects(only)
 
 
 def check_effects(only: Sequence[str]) -> None:
     """Refuse effects that nobody knows."""
-    known = effects.catalogue()
-    faults = []
+    if faults := _unknown(only):
+        raise InputError(faults)
+
+
+def _unknown(only: Sequence[str]) -> list[Fault]:
+    known, faults = effects.catalogue(), []
     for name in only:
         if name not in known:
             near = difflib.get_close_matches(name, known, 1)
             hint = f"Did you mean {near[0]}?" if near else ""
             faults.append(Fault("--only", name, "an unknown effect", f"one of {', '.join(known)}", hint))
-    if faults:
-        raise InputError(faults)
+    return faults
+
 
 
 def _one_setup(imported: Imported, path: str) -> None:
