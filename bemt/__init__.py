@@ -1,3 +1,50 @@
-"""Propeller and ducted-fan aerodynamics: blade element momentum theory beside CFD, bench and empirical models."""
+"""Propeller and ducted-fan aerodynamics: blade element momentum theory beside CFD, bench and empirical models.
+
+>>> import bemt
+>>> bemt.propeller("10x5").solve(rpm=6000).thrust_N.round(1)
+array([4.7])
+
+Everything is loaded when it is first used.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
 
 __version__ = "0.2.0"
+
+if TYPE_CHECKING:
+    from bemt.base.errors import InputError as InputError
+    from bemt.dataset import Dataset as Dataset
+    from bemt.library import Answer as Answer
+    from bemt.library import Propeller as Propeller
+    from bemt.library import compare as compare
+    from bemt.library import diagnose as diagnose
+    from bemt.library import drive as drive
+    from bemt.library import load as load
+    from bemt.library import propeller as propeller
+    from bemt.library import read as read
+    from bemt.library import validate as validate
+
+_HOMES = {"InputError": "bemt.base.errors", "Dataset": "bemt.dataset"}
+_ROOMS = ("compare", "diagnose", "drive")  # rooms that are called like functions
+_NAMES = (
+    "Answer", "Dataset", "InputError", "Propeller", "compare", "diagnose", "drive", "load", "propeller", "read",
+    "validate",
+)  # fmt: skip
+__all__ = ["__version__", *_NAMES]
+
+
+def __getattr__(name: str) -> Any:
+    """Load a name of the public face when it is first used."""
+    if name not in _NAMES:
+        raise AttributeError(f"module 'bemt' has no attribute {name!r}; it offers {', '.join(_NAMES)}")
+    import importlib
+
+    if name in _ROOMS:
+        return importlib.import_module(f"bemt.{name}")
+    return getattr(importlib.import_module(_HOMES.get(name, "bemt.library")), name)
+
+
+def __dir__() -> list[str]:
+    return [*globals(), *_NAMES]

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from types import MappingProxyType
@@ -389,6 +389,45 @@ class Dataset:
             _, unit = units.split_suffix(str(key))
             out[key].attrs["units"] = "1" if unit is None else unit.suffix
         return out
+
+    def plot(self, x: str | None = None, y: Sequence[str] = (), ax: Any = None) -> Any:
+        """Draw channels over another one, with bands where uncertainties are known.
+
+        Parameters
+        ----------
+        x : str, optional
+            Channel of the abscissa; what varies of J, airspeed and rpm by default.
+        y : sequence of str
+            Channels to draw; CT and CP, or thrust, by default.
+        ax : matplotlib axes, optional
+            Where to draw; a new figure by default.
+
+        Returns
+        -------
+        matplotlib axes
+            With a line for each channel, and for each speed of rotation where J or airspeed is the abscissa.
+        """
+        import matplotlib.pyplot as plt
+
+        ways = [k for k in ("J", "airspeed_m_s", "rpm") if k in self and np.unique(self[k].round(9)).size > 1]
+        x = x or (ways[0] if ways else "rpm")
+        wanted = list(y) or [k for k in ("CT", "CP") if k in self and x == "J"] or ["thrust_N"]
+        ax = plt.subplots(layout="constrained")[1] if ax is None else ax
+        speeds = np.unique(self["rpm"]) if "rpm" in self and x != "rpm" else np.array([np.nan])
+        for channel in wanted:
+            for speed in speeds:
+                rows = np.flatnonzero(self["rpm"] == speed) if np.isfinite(speed) else np.arange(len(self))
+                rows = rows[np.argsort(self[x][rows], kind="stable")]
+                name = f"{channel}, {speed:.0f} rev/min" if len(speeds) > 1 else channel
+                at, value, u = self[x][rows], self[channel][rows], self.u[channel][rows]
+                (line,) = ax.plot(at, value, marker="." if self.kind in ("bench", "cfd") else "", label=name)
+                if np.any(u > 0.0):
+                    ax.fill_between(at, value - u, value + u, alpha=0.2, color=line.get_color(), lw=0)
+        ax.set_xlabel(x)
+        ax.set_ylabel(", ".join(wanted))
+        ax.set_title(self.name, fontsize=10)
+        ax.legend(fontsize=8, frameon=False)
+        return ax
 
     def to_rows(self) -> list[dict[str, Any]]:
         """Give one plain dictionary per point, fit for JSON.

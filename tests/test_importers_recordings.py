@@ -135,7 +135,7 @@ def test_a_heading_says_name_and_unit(text: str, name: str, unit: str) -> None:
     assert (got.name, got.unit_name) == (name, unit)
 
 
-@pytest.mark.parametrize("text", ["Thrust (g)", "Thrust (kg)", "thrust_g", "Thrust (lb)", "Torque (kg·cm)", "T [G]"])
+@pytest.mark.parametrize("text", ["Thrust (kg)", "thrust_g", "Thrust (lb)", "Torque (kg·cm)", "T [G]"])
 def test_a_mass_is_no_force(text: str, write: Write) -> None:
     got = importers.read(write(f"Time (s),{text},RPM\n" + "".join(f"{k},{k + 1},{3000 + k}\n" for k in range(5))))
     channel = next(c for name, c in got.channels.items() if name not in ("time_s", "rpm"))
@@ -557,3 +557,56 @@ def test_the_published_logs_show_their_known_faults(shared_data: Path) -> None:
     raw = importers.read(shared_data / "jmajew" / "raw" / "curr_cal.csv")
     assert said(raw, "over 7 pole pairs, not a sensor of its own")
     assert [k for k, f in enumerate(raw.flags) if "spike of torque_Nm" in f] == [831]
+
+
+GRAMS = ["Thrust (g)", "thrust [g]", "Schub (g)", "Poussée (g)", "Empuje [g]", "Motor thrust (grams)"]
+
+
+@pytest.mark.parametrize("text", GRAMS)
+def test_grams_of_thrust_are_gram_force_and_said_to_be(text: str, write: Write) -> None:
+    got = importers.read(write(f"RPM,{text}\n" + "".join(f"{3000 + k},{k + 1}\n" for k in range(5))))
+    name = next(n for n in got.channels if n.endswith("thrust_N"))
+    assert np.allclose(got.channels[name].values, 9.80665e-3 * np.arange(1.0, 6.0))
+    assert said(got, "gram-force")
+
+
+@pytest.mark.parametrize(
+    "heads",
+    ["Drehzahl [1/min];Schub [N];Drehmoment [Nm];Spannung [V];Strom [A]",
+     "Régime (tr/min);Poussée (N);Couple (N.m);Tension (V);Courant (A)",
+     "Velocidad (rpm);Empuje (N);Par (Nm);Tensión (V);Corriente (A)"],
+)  # fmt: skip
+def test_stands_speak_german_french_and_spanish(heads: str, write: Write) -> None:
+    got = importers.read(write(f"{heads}\n4000;3,1;0,04;11,8;2,1\n6000;7,2;0,09;11,6;6,1\n"))
+    assert list(got.channels) == ["rpm", "thrust_N", "torque_Nm", "voltage_V", "current_A"]
+    assert got.channels["thrust_N"].values.tolist() == [3.1, 7.2]
+
+
+def test_power_that_is_volts_times_amps_is_electrical(write: Write) -> None:
+    rows = "4000,3.1,24.78,11.8,2.1\n6000,7.2,70.76,11.6,6.1\n8000,12.6,158.2,11.3,14.0\n"
+    got = importers.read(write(f"rpm,thrust_N,power_W,voltage_V,current_A\n{rows}"))
+    assert "electrical_power_W" in got.channels and "power_W" not in got.channels and said(got, "electrical power")
+    shaft = importers.read(write("rpm,power_W,voltage_V,current_A\n4000,18,11.8,2.1\n6000,54,11.6,6.1\n", "b.csv"))
+    assert "power_W" in shaft.channels
+
+
+def test_several_set_ups_in_one_file_are_said_and_not_diagnosed_together(write: Write, project: Path) -> None:
+    from bemt.case import load_case
+    from bemt.diagnose.load import load
+
+    rows = "".join(f"{name},{rpm},{rpm / 1000}\n" for name in ("APC 10x5", "APC 11x5.5") for rpm in (4000, 6000, 8000))
+    file = write(f"Propeller,rpm,thrust_N\n{rows}")
+    assert said(importers.read(file), "2 set-ups in one file")
+    with pytest.raises(InputError, match="one propeller with one motor"):
+        load(str(file), load_case(project / "cases" / "prop_10x5"))
+
+
+def test_a_heading_that_is_not_understood_gets_its_nearest_meaning_and_the_line_to_write(write: Write) -> None:
+    got = importers.read(write("rpm,Trust,wibble\n4000,3,1\n6000,7,2\n"))
+    assert said(got, "'Trust' thrust") and said(got, '[columns] thrust = { column = "Trust", unit = "N" }')
+
+
+def test_electrical_rpm_is_asked_about_only_where_the_numbers_leave_doubt(write: Write) -> None:
+    text = "rpm,thrust_N\n{},1\n{},4\n"
+    slow, fast = (importers.read(write(text.format(top / 2, top), f"{top}.csv")) for top in (9000, 60000))
+    assert not said(slow, "electrical") and said(fast, "electrical")

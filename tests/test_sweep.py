@@ -469,3 +469,46 @@ def test_k1k2_of_the_shipped_cases(name: str, kgf: float) -> None:
     case = load_case(ROOT / "cases" / name)
     made = k1k2_case(case, None, np.array([case.rpm]), np.array([0.0]), case.air())
     assert made.thrust_N[0] / KGF == pytest.approx(kgf, abs=1e-3)
+
+
+def test_one_screen_says_what_differs_most(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from bemt.commands.cli import main
+
+    assert main(["sweep", str(project / "cases")]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) <= 45 and max(map(len, lines)) <= 80
+    text = "\n".join(lines)
+    assert all(name.name in text for name in (project / "cases").iterdir() if (name / "case.toml").exists())
+    assert "Differs most: ds30" in text and "--details" in text and "diagnose" in text
+    assert main(["sweep", str(project / "cases" / "ds30"), "--details"]) == 0
+    assert "assumed, because the source does not give it" in capsys.readouterr().out
+
+
+def test_a_difference_near_zero_thrust_is_a_share_of_the_largest_and_no_thousand_percent() -> None:
+    from bemt.compare.sweep.summary import summary
+
+    row = {"source": "bemt", "label": "bemt", "u": 0.5, "airspeed_m_s": 12.0, "flags": []}
+    known = {"u_num": 0.0, "u_input": 0.5, "u_D": math.nan, "u_val": math.nan, "model": "bemt", "quantity": "thrust_N"}
+    result = {
+        "name": "near", "faults": [], "assumptions": [], "audit": [], "grid": None,
+        "rows": [{**row, "rpm": 6000.0, "thrust_N": 2.0}, {**row, "rpm": 9000.0, "thrust_N": 40.0},
+                 {**row, "source": "bench", "label": "bench 1", "rpm": 6000.0, "thrust_N": 0.01},
+                 {**row, "source": "bench", "label": "bench 2", "rpm": 9000.0, "thrust_N": 41.0}],
+        "comparisons": [
+            {**known, "reference": "bench 1", "source": "bench", "S": 2.0, "D": 0.01, "E": 1.99, "E_pct": 19900.0},
+            {**known, "reference": "bench 2", "source": "bench", "S": 40.0, "D": 41.0, "E": -1.0, "E_pct": -2.4}],
+    }  # fmt: skip
+    text = summary([result])
+    assert "+1.99 (5 %)" in text and "-1 (2 %)" in text and "00 %" not in text
+
+
+def test_a_screen_of_many_cases_is_still_one_screen() -> None:
+    from bemt.compare.sweep.summary import summary
+
+    row = {"source": "bemt", "label": "bemt", "u": 0.5, "airspeed_m_s": 0.0, "flags": ["a flag"], "rpm": 6000.0}
+    one = {"faults": [], "assumptions": [], "audit": [], "grid": None, "comparisons": []}
+    many = [{**one, "name": f"case_{k}", "rows": [{**row, "thrust_N": float(k)}]} for k in range(100)]
+    lost = [{**one, "name": f"bad_{k}", "rows": [], "faults": ["x" * 200]} for k in range(30)]
+    lines = summary([*many, *lost]).splitlines()
+    assert len(lines) <= 45 and max(map(len, lines)) <= 80
+    assert any("more" in line for line in lines)

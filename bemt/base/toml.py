@@ -146,6 +146,15 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
+def _slip_of_length(where: str, value: float, key: Key) -> str:
+    """Hint for a length in m or mm that would be possible in the other unit."""
+    if key.unit == "m" and where.endswith("_m") and key.low <= value / 1e3 <= key.high:
+        return f"In mm? Divide by 1000, or write {where.rpartition('.')[2].removesuffix('_m')}_mm"
+    if key.unit == "mm" and where.endswith("_mm") and key.low <= value * 1e3 <= key.high and value < 1.0:
+        return "In m? Times 1000"
+    return ""
+
+
 def _check_number(out: Collector, where: str, value: Any, key: Key) -> bool:
     if not _is_number(value) or not math.isfinite(value):
         out.add(where, shown(value), key.expected, "Drop the quotes" if _quoted_number(value) else "")
@@ -155,7 +164,7 @@ def _check_number(out: Collector, where: str, value: Any, key: Key) -> bool:
         return False
     hint = key.suspect(float(value)) if key.suspect else ""
     if hint or not key.low <= value <= key.high:
-        out.add(where, shown(value), key.expected, hint)
+        out.add(where, shown(value), key.expected, hint or _slip_of_length(where, float(value), key))
         return False
     return True
 
@@ -508,8 +517,11 @@ def _faults_of(model: type[Table], error: Any) -> Iterable[tuple[str, str, str, 
     loc = tuple(error["loc"])
     where = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in loc).removeprefix(".")
     if error["type"] == _FAULTS:
+        owner, value = _model_at(model, loc[:-1]), error["input"]
+        held = owner.declared(str(loc[-1])) if loc and str(loc[-1]) in owner.named() else None
+        slip = _slip_of_length(where, float(value), held) if held is not None and _is_number(value) else ""
         for at, got, expected, hint in error["ctx"]["faults"]:
-            yield where + at, got, expected, hint
+            yield where + at, got, expected, hint or slip
         return
     owner = _model_at(model, loc[:-1])
     name = str(loc[-1]) if loc else ""

@@ -48,6 +48,9 @@ def read_stations(path: Path, unit: str | None = None) -> tuple[FoundRotor, floa
     """
     file = path.as_posix()
     try:
+        if path.suffix.lower() in (".txt", ".csv", ".dat", ".pe0"):
+            hint = "A table of stations becomes a case with: bemt new --stations FILE --diameter-mm D"
+            raise InputError(Fault(file, "", f"a {path.suffix} file", "a solid: STL, OBJ or STEP", hint))
         vertices, faces, said = read_solid(path)
         kind = "STEP" if path.suffix.lower() in (".step", ".stp") else "the file"
         if said is None and unit is None:

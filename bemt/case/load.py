@@ -9,6 +9,7 @@ from __future__ import annotations
 import copy
 import hashlib
 import re
+import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -255,7 +256,8 @@ class Case:
         """SHA-256 over the content of all files of the case; it does not depend on where the case lies."""
         digest = hashlib.sha256()
         for path in self.files():
-            data = path.read_bytes()
+            made_here = path == self.path and not path.exists()  # of a text, never a file
+            data = repr(self.written).encode() if made_here else path.read_bytes()
             digest.update(f"{path.name}\0{len(data)}\0".encode() + data)
         return digest.hexdigest()
 
@@ -315,6 +317,16 @@ def load_case(path: str | Path) -> Case:
     document = load_toml(path, out)
     if document is None:
         raise InputError(out.faults)
+    return _checked(path, document, out)
+
+
+def case_of(text: str, folder: str | Path = ".") -> Case:
+    """Case of the text of a case file; files that it names are looked for in the folder. Raises as `load_case`."""
+    path = Path(folder) / FILE_NAME
+    return _checked(path, tomllib.loads(text), Collector(path.as_posix()))
+
+
+def _checked(path: Path, document: dict[str, Any], out: Collector) -> Case:
     file = check_case(out, document, path.parent)
     check_name(out, document.get("name"))
     if file is None or out.faults:
@@ -390,8 +402,13 @@ def find_cases(paths: Iterable[str | Path]) -> list[Path]:
                 else sorted(item.glob(f"*/{FILE_NAME}"), key=_natural)
             )
             if not here:
-                faults.append(Fault(item.as_posix(), "", "no case", f"a folder with <name>/{FILE_NAME}"))
+                hint = "`bemt new 10x5` writes one; stations.csv alone is no case"
+                faults.append(Fault(item.as_posix(), "", "no case", f"a folder with <name>/{FILE_NAME}", hint))
             found += here
+        elif item.is_file() and item.suffix.lower() in (".csv", ".txt", ".dat", ".xlsx", ".stl", ".step", ".out"):
+            solid = item.suffix.lower() in (".stl", ".step")
+            hint = "`bemt stations` cuts one from a solid" if solid else "`bemt import` reads recordings"
+            faults.append(Fault(item.as_posix(), "", f"a {item.suffix} file", "a case, case.toml or its folder", hint))
         elif item.is_file():
             found.append(item)
         else:

@@ -119,6 +119,11 @@ def _check_rotor(out: Collector, case: CaseFile) -> None:
     if rotor.hub_diameter_m >= rotor.diameter_m:
         (key,) = _given(rotor, "hub_diameter_mm", "hub_diameter_in", "hub_ratio")
         out.add(f"rotor.{key}", shown(getattr(rotor, key)), f"less than the diameter, {rotor.diameter_m * 1e3:.6g} mm")
+    label = re.search(r"(?<![\d.])(\d{1,2}(?:\.\d+)?)x\d{1,2}(?:\.\d+)?(?![\d.])", case.name)
+    told = float(label[1]) * INCH / rotor.diameter_m if label else 0.0
+    if abs(told - 2.0) < 0.01:
+        got = f"a diameter of {rotor.diameter_m * 1e3:.5g} mm in the case {case.name}"
+        out.add("rotor", got, f"{told * rotor.diameter_m * 1e3:.5g} mm, as its name says", "Is that the radius?")
     mach = math.pi * rotor.diameter_m * case.operating.rpm / 60 / A_SOUND
     if mach > MAX_TIP_MACH:
         rpm = shown(case.operating.rpm)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -30,3 +31,9 @@ def progress(quiet: bool = False) -> Iterator[Callable[[str], None]]:
 def complain(what: object) -> None:
     """Print one line of trouble on stderr."""
     print(what, file=sys.stderr, flush=True)
+
+
+def called() -> str:
+    """How the user called this program."""
+    name = os.path.basename(sys.argv[0] if sys.argv else "").removesuffix(".exe")
+    return "bemt" if name == "bemt" else "python -m bemt"

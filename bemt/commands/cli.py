@@ -19,6 +19,7 @@ from typing import Any
 import bemt.commands
 from bemt import __version__
 from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError, system_fault
+from bemt.commands._terminal import called
 
 __all__ = ["build_parser", "commands", "main"]
 
@@ -107,12 +108,6 @@ def commands() -> dict[str, ModuleType]:
     return {file.NAME: file for file in files if hasattr(file, "NAME")}
 
 
-def _called() -> str:
-    """What the user typed to get here."""
-    name = os.path.basename(sys.argv[0] if sys.argv else "").removesuffix(".exe")
-    return "bemt" if name == "bemt" else "python -m bemt"
-
-
 def build_parser() -> argparse.ArgumentParser:
     """Make the parser of the whole command line.
 
@@ -128,7 +123,7 @@ def build_parser() -> argparse.ArgumentParser:
     ('sweep', ['cases/'], 2)
     """
     what = "Propeller and ducted-fan aerodynamics: BEMT beside the K1/K2 model, CFD and bench recordings."
-    parser = _Top(prog=_called(), description=what)
+    parser = _Top(prog=called(), description=what)
     parser.add_argument("--version", action="version", version=f"bemt {__version__}")
     adder = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=_Parser)
     parser.found, parser.parsers = commands(), {}

@@ -8,14 +8,21 @@ from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
 from bemt.commands import _options
 
 NAME = "drive"
-HELP = "battery, ESC, motor and the rotor of a case: thrust over pulse width"
+HELP = "thrust, current and hover of a rotor with its motor: from a label, or a case with its drive.toml"
 GROUP = "Drive"
-EXAMPLE = "drive cases/ds30"
+EXAMPLE = "drive 10x4.5 --kv 900 --cells 3"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument("case", nargs="?", metavar="CASE", help="case file or its folder")
+    what = "case file, its folder, or with --kv a label such as 10x5"
+    parser.add_argument("case", nargs="?", metavar="CASE", help=what)
+    parser.add_argument("--kv", type=float, metavar="KV", help="motor of which no more is known [rev/min/V]")
+    parser.add_argument("--cells", type=_options.positive, metavar="S", help="with --kv: LiPo cells in series")
+    parser.add_argument("--mass", type=float, metavar="KG", help="with --kv: of the vehicle, for hover [kg]")
+    many = "with --kv: rotors that carry it (default 1)"
+    parser.add_argument("--rotors", type=_options.positive, default=1, metavar="N", help=many)
+    parser.add_argument("--capacity", type=float, metavar="AH", help="with --kv: of the battery [A h]")
     parser.add_argument("--drive", metavar="FILE", help="drive.toml (default: beside the case)")
     off = "battery_sag, motor_heating, rotor_inertia or inflow_lag; repeatable"
     parser.add_argument("--off", metavar="EFFECT", help=off, **_options.REPEATABLE)
@@ -23,7 +30,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     recorded = "compare the model with the recordings in this folder instead"
     parser.add_argument("--validate", metavar="DIR", help=recorded)
     parser.add_argument("--out", metavar="DIR", help="write JSON, CSV and a picture there")
-    _options.add_json(parser, "bemt.drive.result/1; with --validate bemt.drive.validation/1")
+    _options.add_json(parser, "bemt.drive.result/1; --kv: bemt.drive.estimate/1; --validate: bemt.drive.validation/1")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -36,6 +43,13 @@ def run(args: argparse.Namespace) -> int:
         found, shown = validation_folder.compare(args.validate, args.out)
         print(json_text(found) if args.json else shown, end="")
         return EXIT_OK
+    if args.kv is not None or args.cells is not None:
+        from bemt.drive import new_folder
+
+        estimate = new_folder.estimate_of(args.case, args.kv, args.cells, args.mass, args.rotors, args.capacity,
+                                          args.airspeed)  # fmt: skip
+        print(json_text(estimate.to_dict()) if args.json else estimate.text, end="")
+        return EXIT_OK if estimate.reached else EXIT_UNCONVERGED
     from bemt.drive import drive_result
 
     result = drive_result.solve(args.case, args.drive, args.off, args.airspeed, args.out)

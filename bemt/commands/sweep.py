@@ -21,6 +21,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print one JSON document (bemt.sweep/1), no tables")
     jobs = "solve N cases at a time in processes (default: one case, its grid on all cores); dask: N local workers"
     parser.add_argument("--jobs", type=_options.positive, metavar="N", help=jobs)
+    parser.add_argument("--details", action="store_true", help="print every case in full, not one screen")
     _options.add_quiet(parser)
     strict = "exit 1 when a point is unconverged or BEMT is off a reference by more than --tolerance"
     parser.add_argument("--strict", action="store_true", help=strict)
@@ -39,6 +40,7 @@ def run(args: argparse.Namespace) -> int:
     """Solve, print, and with ``--strict`` hold BEMT against the recorded values."""
     from bemt.base.tables import json_text
     from bemt.compare.sweep.batch import off_tolerance, sweep
+    from bemt.compare.sweep.summary import summary
     from bemt.compare.sweep.text import case_text, overview_text
 
     with _terminal.progress(args.quiet) as say:
@@ -50,6 +52,8 @@ def run(args: argparse.Namespace) -> int:
             _terminal.complain(fault)
     if args.json:
         sys.stdout.write(json_text(document))
+    elif not args.quiet and not args.details:
+        print(summary(document["cases"], _terminal.called()))
     elif not args.quiet:
         solved = [case_text(result) for result in document["cases"]]
         print("\n\n".join([*solved, overview_text(document["cases"])]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from bemt.readers._imported import Imported
     from bemt.recordings.channels import Recorded
 
-__all__ = ["cases_of", "load", "load_all"]
+__all__ = ["cases_of", "check_effects", "load", "load_all"]
 
 Array = NDArray[np.float64]
 
@@ -78,7 +79,9 @@ def load(path: str, case: Case, imported: Imported | None = None) -> Record:
     from bemt.recordings import reduce as reduction
     from bemt.recordings.load import import_file
 
-    imported = imported or import_file(path)
+    if imported is None:
+        imported = import_file(path)
+        _one_setup(imported, path)
     _same_rotor(imported, case, path)
     ducted = case.ducted
     findings = check(imported, diameter_m=case.diameter_m, blades=int(case.get("rotor.blades")), ducted=ducted)
@@ -170,7 +173,33 @@ def _told_twice(paths: Sequence[str], only: Sequence[str]) -> None:
     files = [Path(p).resolve() for p in paths]
     faults = [Fault(p, "", "a recording given twice", "each once", "Its points would count twice")
               for k, p in enumerate(paths) if files[k] in files[:k]]  # fmt: skip
-    known = effects.catalogue()
-    faults += [Fault("--only", i, "an unknown effect", f"one of {', '.join(known)}") for i in only if i not in known]
+    faults += _unknown(only)
     if faults:
         raise InputError(faults)
+
+
+def check_effects(only: Sequence[str]) -> None:
+    """Refuse effects that nobody knows."""
+    if faults := _unknown(only):
+        raise InputError(faults)
+
+
+def _unknown(only: Sequence[str]) -> list[Fault]:
+    known, faults = effects.catalogue(), []
+    for name in only:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, 1)
+            hint = f"Did you mean {near[0]}?" if near else ""
+            faults.append(Fault("--only", name, "an unknown effect", f"one of {', '.join(known)}", hint))
+    return faults
+
+
+
+def _one_setup(imported: Imported, path: str) -> None:
+    """Refuse a table of several propellers or motors: their points are no one curve."""
+    from bemt.readers.generic_csv import setups
+
+    for name, kinds in setups(imported.texts).items():
+        got = f"{len(kinds)} set-ups: {', '.join(kinds[:4])}" + (", ..." if len(kinds) > 4 else "")
+        hint = "Put the rows of each into a file of its own"
+        raise InputError(Fault(path, name, got, "one propeller with one motor", hint))

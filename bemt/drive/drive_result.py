@@ -55,7 +55,11 @@ def solve(
     path = path / "case.toml" if path.is_dir() else path
     try:  # what is wrong with the files comes with what is wrong with the options
         case = load_case(path)
-        file = drive_file.read(Path(drive_path) if drive_path else case.folder / "drive.toml")
+        beside = Path(drive_path) if drive_path else case.folder / "drive.toml"
+        if not beside.is_file():
+            hint = "Without one: --kv and --cells, as in drive 10x5 --kv 900 --cells 3"
+            raise InputError(Fault(beside.as_posix(), "", "no such file", "a drive.toml", hint))
+        file = drive_file.read(beside)
     except InputError as error:
         raise InputError([*wrong, *error.faults]) from None
     if wrong:

@@ -6,7 +6,8 @@ A heading without a unit, or with one that has two meanings (``g``), gives unit 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+import unicodedata
+from dataclasses import dataclass, replace
 
 from bemt.base import units
 
@@ -23,7 +24,8 @@ _SAME = {
     "in ozf": "ozf_in", "kgf m": "kgf_m", "microseconds": "us", "rpm": "rpm", "volt": "V", "watt": "W", "amp": "A",
     "newton": "N", "newtons": "N", "newton metre": "Nm", "newton meter": "Nm", "gram force": "gf", "milliseconds": "ms",
     "kilogram force": "kgf", "pound force": "lbf", "g f": "gf", "kg f": "kgf", "second": "s", "ampere": "A",
-    "amperes": "A", "rad/sec": "rad_s", "m/sec": "m_s", "rev/sec": "rev_s", "percent": "pct",
+    "amperes": "A", "rad/sec": "rad_s", "m/sec": "m_s", "rev/sec": "rev_s", "percent": "pct", "tr/min": "rpm",
+    "t/min": "rpm", "rad/seg": "rad_s", "vueltas/min": "rpm", "umdr/min": "rpm", "upm": "rpm", "tr mn": "rpm",
 }  # fmt: skip
 _TWO_MEANINGS = {
     "g": "gram-force, gram or standard gravity: write gf, or say it in recording.toml",
@@ -65,6 +67,7 @@ _WORDS = {  # heading in lower case -> name and dimension it must have
     "motor optical speed": ("optical", "angular_speed"), "motor electrical speed": ("electrical", "angular_speed"),
     "elapsed": ("time", "time"), "elapsed time": ("time", "time"), "time since start": ("time", "time"),
     "timestamp": ("time", "time"), "air speed": ("airspeed", "speed"), "throttle input": ("throttle", "fraction"),
+    "power": ("power", "power"), "pressure": ("pressure", "pressure"), "temperature": ("temperature", "temperature"),
     "rotation speed": ("speed", "angular_speed"), "rotational speed": ("speed", "angular_speed"),
     "motor speed": ("speed", "angular_speed"), "rotor speed": ("speed", "angular_speed"),
     "propeller speed": ("speed", "angular_speed"), "force fz (thrust)": ("thrust", "force"),
@@ -73,6 +76,26 @@ _WORDS = {  # heading in lower case -> name and dimension it must have
     "accx": ("acceleration_x", "acceleration"),
     "accy": ("acceleration_y", "acceleration"), "accz": ("acceleration_z", "acceleration"),
 }  # fmt: skip
+_TONGUES = {  # German, French, Spanish: what stands before the unit, without accents, as English says it
+    "drehzahl": "rotation speed", "motordrehzahl": "motor speed", "propellerdrehzahl": "propeller speed",
+    "schub": "thrust", "schubkraft": "thrust", "standschub": "thrust", "zugkraft": "thrust", "drehmoment": "torque",
+    "moment": "torque", "spannung": "voltage", "akkuspannung": "voltage", "strom": "current",
+    "stromstarke": "current", "leistung": "power", "elektrische leistung": "electrical power",
+    "wellenleistung": "mechanical power", "eingangsleistung": "electrical power", "zeit": "time",
+    "fluggeschwindigkeit": "airspeed", "luftdruck": "pressure", "temperatur": "temperature",
+    "lufttemperatur": "temperature", "gas": "throttle", "gasstellung": "throttle",
+    "poussee": "thrust", "traction": "thrust", "couple": "torque", "regime": "rotation speed",
+    "vitesse de rotation": "rotation speed", "vitesse": "speed", "vitesse air": "airspeed", "tension": "voltage",
+    "courant": "current", "intensite": "current", "puissance": "power", "puissance electrique": "electrical power",
+    "puissance mecanique": "mechanical power", "temps": "time", "pression": "pressure", "commande": "throttle",
+    "empuje": "thrust", "par": "torque", "par motor": "torque", "momento": "torque", "velocidad": "speed",
+    "velocidad de giro": "rotation speed", "velocidad del motor": "motor speed", "velocidad del aire": "airspeed",
+    "voltaje": "voltage", "corriente": "current", "potencia": "power", "potencia electrica": "electrical power",
+    "potencia mecanica": "mechanical power", "tiempo": "time", "presion": "pressure", "acelerador": "throttle",
+}  # fmt: skip
+_OF_A_STAND = {"g": "gf", "G": "gf", "grams": "gf", "gram": "gf", "gr": "gf", "gramm": "gf"}
+"""Mass units that a thrust has on many stands: the force that this mass weighs, gram-force."""
+_THRUSTS = re.compile(r"(motor |propeller |prop |static |max )?(thrust|lift|pull|force)( static)?")
 _GOES: dict[str, tuple[str, ...]] = {  # what a suffix may be: T_A is rotor A's thrust, not a current
     "thrust": ("force",), "lift": ("force",), "torque": ("torque",), "power": ("power",), "rpm": ("angular_speed",),
     "voltage": ("voltage",), "current": ("current",), "T": ("force", "temperature", "time"), "F": ("force",),
@@ -88,12 +111,17 @@ _GRAVITY = units.Unit("m_s2", "acceleration", units.G0)
 
 @dataclass(frozen=True)
 class Heading:
-    """What a heading says: ``text``, ``name`` of the channel, ``unit`` (None: unknown), ``doubt`` about the unit."""
+    """What a heading says.
+
+    ``text``, ``name`` of the channel, ``unit`` (None: unknown), ``doubt`` about the unit, ``told`` what was taken for
+    granted.
+    """
 
     text: str
     name: str
     unit: units.Unit | None
     doubt: str = ""
+    told: str = ""
 
     @property
     def unit_name(self) -> str:
@@ -183,8 +211,14 @@ def slug(text: str) -> str:
     return re.sub(r"_+", "_", re.sub(r"[^\w/]+", "_", text.strip())).strip("_")
 
 
+def _plain(text: str) -> str:
+    """Lower case without accents; blanks for underscores."""
+    bare = "".join(c for c in unicodedata.normalize("NFKD", text) if not unicodedata.combining(c))
+    return " ".join(bare.lower().replace("_", " ").split())
+
+
 def heading(text: str) -> Heading:
-    """Read one heading.
+    """Read one heading, in English, German, French or Spanish.
 
     Parameters
     ----------
@@ -202,8 +236,23 @@ def heading(text: str) -> Heading:
     ('thrust_N', 'Q_Nm', 'rpm', 'chord_m')
     >>> heading("omega").name, heading("omega").unit is None
     ('omega', True)
+    >>> heading("Drehzahl [1/min]").name, heading("Poussée (N)").name, heading("Thrust (g)").name
+    ('rpm', 'thrust_N', 'thrust_N')
     """
     text = " ".join(text.split())
+    parts = re.fullmatch(r"(.*?)\s*[\(\[]\s*([^()\[\]]*?)\s*[\)\]]\s*", text)
+    english = _TONGUES.get(_plain(parts[1] if parts else text), "")
+    if english:
+        found = heading(f"{english} ({parts[2]})" if parts else english)
+        return replace(found, text=text, told=found.told.replace(found.text, text))
+    unit = _OF_A_STAND.get(parts[2]) if parts else None
+    if parts and unit and _THRUSTS.fullmatch(_plain(parts[1])):
+        found = heading(f"{parts[1]} ({unit})")
+        return replace(found, text=text, told=f"{text!r} is read as gram-force, as stands mean it: 1 g is 0.00981 N")
+    return _heading(text)
+
+
+def _heading(text: str) -> Heading:
     base, unit, doubt = text, None, ""
     found = re.fullmatch(r"(.*?)\s*[\(\[]\s*([^()\[\]]*?)\s*[\)\]]\s*", text)
     if found:

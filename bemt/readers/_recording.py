@@ -6,6 +6,7 @@ number, a text, or NaN with a flag on its row. Headings are read in :mod:`bemt.r
 
 from __future__ import annotations
 
+import difflib
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -197,6 +198,8 @@ class Builder:
         if bad:
             words = some((f"{cells[i][:20]!r} at {self.line(i)}:{index + 1}" for i in bad), 3)
             self.flag(bad, f"{name}: no number", f": {words}; NaN there")
+        if head.told:
+            self.warnings.append(head.told)
         if head.unit is None:
             self.unitless.append(f"{label!r}" + (f" ({head.doubt})" if head.doubt else ""))
         elif head.unit.suffix != "rpm":
@@ -268,7 +271,7 @@ class Builder:
         if self.words:
             self.warnings.append(f"text, kept as such, in {len(self.words)} columns: {some(self.words, 8)}")
         if self.unitless:
-            hint = "Name units in the headings or in a recording.toml"
+            hint = "Name units in the headings or in a recording.toml" + _nearest(self.unitless)
             self.warnings.append(f"no unit known, none assumed, for {some(self.unitless, 8)}. {hint}")
         said = {"file": self.table.source.name, "sha256": self.table.source.sha256, **(provenance or {})}
         return Imported(
@@ -295,3 +298,31 @@ def slip(ratio: float, within: float = 0.02) -> str:
             if abs(abs(ratio) / value - 1.0) < within:
                 return f" (the factor of {name})"
     return " (the sign differs)" if abs(ratio + 1.0) < within else ""
+
+
+_MEANINGS = ("rpm", "thrust", "torque", "voltage", "current", "power", "time", "airspeed", "throttle", "pressure",
+             "temperature", "density", "humidity")  # fmt: skip
+
+
+def _nearest(headings: Sequence[str]) -> str:
+    r"""What headings without a unit may mean, and the line of a recording.toml that says so; empty: nothing is near.
+
+    Examples
+    --------
+    >>> _nearest(["'Trust'", "'x'"])
+    '; nearest meaning: \'Trust\' thrust. The line: [columns] thrust = { column = "Trust", unit = "N" }'
+    """
+    units = {"rpm": "rpm", "thrust": "N", "torque": "Nm", "voltage": "V", "current": "A", "power": "W", "time": "s",
+             "airspeed": "m/s", "throttle": "pct"}  # fmt: skip
+    near = {}
+    for label in headings:
+        name = label.split("'")[1] if "'" in label else label
+        word = re.split(r"[\s_(\[]", name.strip().lower())[0]
+        found = difflib.get_close_matches(word, _MEANINGS, 1, 0.75)
+        if found:
+            near[name] = found[0]
+    if not near:
+        return ""
+    name, meaning = next(iter(near.items()))
+    line = f'[columns] {meaning} = {{ column = "{name}", unit = "{units.get(meaning, "...")}" }}'
+    return f"; nearest meaning: {', '.join(f'{k!r} {v}' for k, v in near.items())}. The line: {line}"

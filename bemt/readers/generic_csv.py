@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,6 +26,10 @@ __all__ = ["FALLBACK", "KIND", "convert", "read", "sniff"]
 
 KIND = "table"
 FALLBACK = True
+SETUP = re.compile(r"prop|motor|combination|setup|set-up|config|rotor|luftschraube|helice|h[ée]lice")
+"""Headings of text that name what was on the stand."""
+DOUBTFUL_RPM = 20000.0
+"""Speed above which a column called rpm may count electrical revolutions."""
 
 
 def sniff(head: bytes | str) -> bool:
@@ -142,14 +147,48 @@ def convert(source: SourceText, table: SplitTable, decimal: str = ".") -> Import
     for name in speeds:
         build.flag(np.flatnonzero(build.channels[name].values == 0.0), f"{name} is 0")
         build.flag(np.flatnonzero(build.channels[name].values < 0.0), f"{name} is negative")
-    if "rpm" in speeds:
+    if "rpm" in speeds and np.nanmax(build.channels["rpm"].values, initial=0.0) > DOUBTFUL_RPM:
         build.warnings.append("rpm: the file does not say whether mechanical or electrical; taken as written")
     if "time_s" in build.channels:
         for name, channel in build.channels.items():
             if name != "time_s" and channel.unit not in ("", "-"):
                 build.flag(np.flatnonzero(spikes(channel.values)), f"spike of {name}")
+    _electrical(build)
+    _several(build)
     build.check_magnitudes()
     loads = {"thrust_N", "torque_Nm"} & build.channels.keys()
     if loads and (speeds or {"time_s", "pulse_width_s", "throttle"} & build.channels.keys()):
         build.kind = "bench"
     return build.finish()
+
+
+def _electrical(build: Builder) -> None:
+    """Call a power that is voltage times current electrical: that of the shaft is less."""
+    have = build.channels
+    name = next((n for n in ("power_W", "P_W") if n in have), None)
+    if name is None or not {"voltage_V", "current_A"} <= have.keys() or "electrical_power_W" in have:
+        return
+    product = have["voltage_V"].values * have["current_A"].values
+    with np.errstate(divide="ignore", invalid="ignore"):
+        off = np.abs(have[name].values / product - 1.0)[product > 0.0]
+    if off.size and np.nanmedian(off) < 0.01 and np.nanmax(off) < 0.05:
+        build.channels = {("electrical_power_W" if n == name else n): c for n, c in have.items()}
+        build.headings = {("electrical_power_W" if n == name else n): t for n, t in build.headings.items()}
+        build.warnings.append(f"{name} is voltage times current: electrical power, not that of the shaft")
+
+
+def setups(texts: Mapping[str, Sequence[str]]) -> dict[str, list[str]]:
+    """Columns of text that tell several propellers or motors apart, and what they name."""
+    found = {}
+    for name, cells in texts.items():
+        kinds = list(dict.fromkeys(c.strip() for c in cells if c.strip()))
+        if SETUP.search(name.lower()) and 1 < len(kinds) <= max(2, len(cells) // 2):
+            found[name] = kinds
+    return found
+
+
+def _several(build: Builder) -> None:
+    """Say that a table holds several propellers or motors."""
+    for name, kinds in setups(build.texts).items():
+        shown = ", ".join(kinds[:4]) + (", ..." if len(kinds) > 4 else "")
+        build.warnings.append(f"{len(kinds)} set-ups in one file, told apart by {name!r}: {shown}")

@@ -28,13 +28,14 @@ from bemt import readers as importers
 from bemt.base import tables
 from bemt.base.averaging import relation
 from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError, system_fault
+from bemt.dataset import Dataset
 from bemt.readers._imported import Channel, Imported
 from bemt.recordings.adapt import adapt, damaged_export, recognised
 from bemt.recordings.choice import Choice, averaged, chosen
 from bemt.recordings.overview import findings, is_recording, points_text, reduction_document, reduction_of
 from bemt.recordings.reduce import Reduced
 
-__all__ = ["SCHEMA", "Choice", "averaged", "chosen", "document", "exit_code", "import_file", "text"]
+__all__ = ["SCHEMA", "Choice", "as_dataset", "averaged", "chosen", "document", "exit_code", "import_file", "text"]
 
 SCHEMA = "bemt.import/1"
 INTERNAL = "internal error of this program"
@@ -68,6 +69,8 @@ def import_file(path: str | os.PathLike[str], format: str | None = None, choice:
     """
     choice = choice or Choice()
     name = os.fspath(path)
+    if (Path(path) / "case.toml").is_file():
+        raise InputError(Fault(name, "", "a folder with a case", "a recording", "`bemt sweep` solves cases"))
     try:
         kind = importers.detect(path) if format is None else format
     except InputError as error:
@@ -289,3 +292,34 @@ def check_format(name: str | None) -> None:
     """Refuse a reader that there is none of."""
     if name is not None and name not in importers.importers():
         raise InputError(Fault("", "--format", repr(name), f"one of {', '.join(importers.importers())}"))
+
+
+def as_dataset(record: Imported) -> Dataset:
+    """Points of what was read: steady points of a recording, rows of a table, else one point of means."""
+    notes = [*record.warnings, *(f"{f.severity}: {f.id} in {f.channel}: {f.evidence}" for f in findings(record))]
+    reduced = _reduced(record)
+    if isinstance(reduced, Reduced):
+        return replace(reduced.series, notes=(*reduced.series.notes, *reduced.notes, *notes))
+    if isinstance(reduced, str):
+        notes.append(reduced)
+    told = {"file": record.provenance.get("file", ""), "format": record.format}
+    kind = record.kind if re.fullmatch(r"[a-z][a-z0-9_]*", record.kind) else "bench"
+    rows = {k: c.values for k, c in record.channels.items() if _fit(k) and c.values.shape == (record.rows,)}
+    means = {k: np.array([c.mean]) for k, c in record.channels.items() if _fit(k) and c.mean is not None}
+    history = record.provenance.get("clock") in ("time", "iteration")
+    values = means if history and means else rows
+    left = [name for name in record.channels if name not in values]
+    notes += [f"left out, no quantity in a known unit: {', '.join(left)}"] if left else []
+    if not values:
+        got = f"channels {', '.join(list(record.channels)[:8])}"
+        raise InputError(Fault(told["file"], "", got, "a quantity in a known unit", "Name units, as in thrust_N"))
+    return Dataset(kind, Path(told["file"]).stem or record.format, values, provenance=told, notes=tuple(notes))
+
+
+def _fit(name: str) -> bool:
+    """Whether a channel may stand in a dataset."""
+    try:
+        Dataset("bench", "x", {name: np.zeros(1)})
+    except InputError:
+        return False
+    return True

@@ -10,7 +10,7 @@ from typing import Any
 from bemt.base.tables import csv_text, number_text, text_table
 from bemt.compare.sweep.case import ROW_SOURCES
 
-__all__ = ["case_text", "overview_text", "rows_csv"]
+__all__ = ["case_text", "overview_text", "rows_csv", "with_nan"]
 
 WIDTH = 118
 CSV_COLUMNS = (
@@ -164,7 +164,7 @@ def case_text(result: Mapping[str, Any]) -> str:
     """
     if not result["rows"]:
         return "\n".join([f"{result['name']}: not solved", *(f"  {fault}" for fault in result["faults"])])
-    result = _with_nan(result)
+    result = with_nan(result)
     c = result["conditions"]
     head = (
         f"D {_n(c['diameter_m'])} m, hub {_n(c['hub_diameter_m'])} m, {c['blades']} blades, pitch at 0.75 R "
@@ -189,12 +189,12 @@ def case_text(result: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _with_nan(value: Any, key: str = "") -> Any:
+def with_nan(value: Any, key: str = "") -> Any:
     """Numbers that JSON holds as null become NaN again, so that a reused result prints like a fresh one."""
     if isinstance(value, Mapping):
-        return {k: _with_nan(v, k) for k, v in value.items()}
+        return {k: with_nan(v, k) for k, v in value.items()}
     if isinstance(value, list):
-        return [_with_nan(v, key) for v in value]
+        return [with_nan(v, key) for v in value]
     numeric = key.startswith(
         ("thrust", "u_", "torque", "E", "S", "D", "exhaust", "rotor_", "duct_", "stator_", "exit_")
     )
@@ -216,7 +216,7 @@ def overview_text(results: Sequence[Mapping[str, Any]]) -> str:
     """
     header = ["case", "source", "T kgf", "T N", "CT", "CP", "M_tip", "Re75", "BEMT err %", "K1K2 err %", "flags"]
     body = []
-    for result in map(_with_nan, results):
+    for result in map(with_nan, results):
         if not result["rows"]:
             body.append([result["name"], "not solved", *[""] * 8, f"{len(result['faults'])} faults"])
         for row in [*result["rows"], *result["variants"], *result["other_rows"]]:

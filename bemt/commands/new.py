@@ -1,0 +1,44 @@
+"""``python -m bemt new 10x5``: a commented case folder that runs at once, unknowns as assumptions with ranges."""
+
+from __future__ import annotations
+
+import argparse
+
+from bemt.base.errors import EXIT_OK
+from bemt.commands import _options
+
+NAME = "new"
+HELP = "write a case folder from a label, a file of stations or a fan's diameter"
+GROUP = "Propellers and fans"
+EXAMPLE = "new 10x5 --kv 1000 --cells 3"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    label = "diameter x pitch in inches, blades if not 2: 10x5, 8x4.5x3; with --fan the diameter alone: 70mm"
+    parser.add_argument("label", nargs="?", metavar="LABEL", help=label)
+    table = "blade in a file: CSV r_over_R,chord_over_R,beta_deg; UIUC geometry; APC PE0"
+    parser.add_argument("--stations", metavar="FILE", help=table)
+    parser.add_argument("--diameter-mm", type=float, metavar="D", help="with --stations: diameter [mm]")
+    parser.add_argument("--fan", action="store_true", help="a ducted fan")
+    parser.add_argument("--blades", type=_options.positive, metavar="B", help="number (default: of the label, else 2)")
+    parser.add_argument("--rpm", type=float, metavar="N", help="operating point (default: a usual tip speed) [rev/min]")
+    parser.add_argument("--airspeed", type=float, default=0.0, metavar="V", help="operating point [m/s] (default 0)")
+    parser.add_argument("--kv", type=float, metavar="KV", help="motor: also write drive.toml [rev/min/V]")
+    parser.add_argument("--cells", type=_options.positive, metavar="S", help="LiPo cells in series, with --kv")
+    parser.add_argument("--out", metavar="DIR", help="folder (default: the label's name, here)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the folder and say how to go on."""
+    from bemt.drive import new_folder
+
+    folder, files = new_folder.write(
+        args.label, args.stations, args.diameter_mm, args.fan, args.blades, args.rpm, args.airspeed, args.kv,
+        args.cells, args.out,
+    )  # fmt: skip
+    print(f"{folder.as_posix()}: {', '.join(files)}")
+    print(f"next: python -m bemt sweep {folder.as_posix()}")
+    if "drive.toml" in files:
+        print(f"      python -m bemt drive {folder.as_posix()}")
+    return EXIT_OK

@@ -1,0 +1,178 @@
+"""One screen of a sweep: thrust beside what was recorded, what differs most and why, and where to read on."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from bemt.base.tables import number_text, text_table
+from bemt.compare.sweep.case import ROW_SOURCES
+from bemt.compare.sweep.text import with_nan
+
+__all__ = ["summary"]
+
+WIDTH, ROWS = 80, 22
+"""Columns of the screen, and rows of the table: the rest is counted."""
+
+
+def summary(results: Sequence[Mapping[str, Any]], called: str = "python -m bemt") -> str:
+    """Summary of all cases, at most 45 lines of 80 columns.
+
+    Parameters
+    ----------
+    results : sequence of mapping
+        Results of the cases, see :func:`bemt.compare.sweep.case.solve_case`.
+    called : str
+        How the command line is called.
+
+    Returns
+    -------
+    str
+        Lines, without a newline at the end.
+    """
+    solved = [with_nan(r) for r in results if r["rows"]]
+    failed = [r for r in results if not r["rows"]]
+    lines: list[str] = []
+    found = sorted((c for r in solved for c in _compared(r)), key=lambda c: -c["rank"])
+    if solved:
+        lines += _table(solved, found)
+    for result in failed[:6]:
+        n = len(result["faults"])
+        lines.append(_short(f"{result['name']}: not solved, {n} {'fault' if n == 1 else 'faults'} (see the messages)"))
+    if len(failed) > 6:
+        lines.append(f"and {len(failed) - 6} more that were not solved")
+    for words in (_worst(found), _unknowns(solved), _flags(solved), _grids(solved)):
+        lines += ["", *words] if words else []
+    return "\n".join([*lines, "", *_next(called, bool(found))] if solved else lines)
+
+
+def _compared(result: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """BEMT against each recorded thrust of a case; equal values of one kind count once."""
+    rows = [c for c in result["comparisons"]
+            if c["model"] == "bemt" and c["quantity"] == "thrust_N" and c["source"] in ROW_SOURCES]  # fmt: skip
+    largest = max((abs(c["D"]) for c in rows), default=0.0)
+    out: dict[tuple[str, str, float], dict[str, Any]] = {}
+    for c in rows:
+        known = math.hypot(c["u_num"], c["u_input"])
+        u = math.hypot(known, c["u_D"]) if math.isfinite(c["u_D"]) else known
+        far = abs(c["E"]) / u if u > 0.0 else math.inf
+        share = abs(c["E"]) / largest if largest > 0.0 else 0.0
+        row = next(r for r in result["rows"] if r["label"] == c["reference"])
+        out.setdefault((c["source"], number_text(c["D"], 3), row["rpm"]), {
+            **c, "case": result, "known": known, "share": share, "rank": share if math.isfinite(share) else 9e9,
+            "far": far, "rpm": row["rpm"], "airspeed_m_s": row["airspeed_m_s"],
+        })  # fmt: skip
+    return list(out.values())
+
+
+def _agreement(c: Mapping[str, Any]) -> str:
+    """Whether model and recording agree, or how good the recording would have to be."""
+    if not math.isfinite(c["E"]):
+        return "no result"
+    if abs(c["E"]) <= c["known"]:
+        return "agrees"
+    if math.isfinite(c["u_D"]):
+        return "agrees" if abs(c["E"]) <= math.hypot(c["known"], c["u_D"]) else "differs"
+    return f"u > {number_text(math.sqrt(c['E'] ** 2 - c['known'] ** 2), 2)}"
+
+
+def _table(solved: Sequence[Mapping[str, Any]], found: Sequence[Mapping[str, Any]]) -> list[str]:
+    moving = any(r["airspeed_m_s"] for result in solved for r in result["rows"] if r["source"] == "bemt")
+    header = ["thrust [N]", "rpm", *(["V"] if moving else []), "BEMT", "K1/K2", "recorded", "difference", "agree?"]
+    keep = {id(c) for c in found[: max(ROWS - len(solved), 4)]}
+    body: list[list[str]] = []
+    for result in solved:
+        points = [r for r in result["rows"] if r["source"] == "bemt"]
+        formula = {(r["rpm"], r["airspeed_m_s"]): r for r in result["rows"] if r["source"] == "k1k2"}
+        first = True
+        for k, row in enumerate(points):
+            own = [c for c in found if c["case"] is result and c["rpm"] == row["rpm"]
+                   and c["airspeed_m_s"] == row["airspeed_m_s"] and id(c) in keep]  # fmt: skip
+            if k and not own:
+                continue
+            u = "" if not math.isfinite(row["u"]) else f" ± {number_text(row['u'], 2)}"
+            simple = formula.get((row["rpm"], row["airspeed_m_s"]), {}).get("thrust_N")
+            at = [f"{row['rpm']:.0f}", *([f"{row['airspeed_m_s']:g}"] if moving else [])]
+            cells = [*at, f"{number_text(row['thrust_N'], 3)}{u}",
+                     number_text(simple, 3)]  # fmt: skip
+            some: list[Mapping[str, Any] | None] = [*own] if own else [None]
+            for c in some:
+                told = ["-", "", ""] if c is None else [
+                    f"{number_text(c['D'], 3)} {c['source']}", f"{c['E']:+.3g} ({100 * c['share']:.0f} %)",
+                    _agreement(c)]  # fmt: skip
+                body.append([result["name"][:16] if first else "", *cells, *told])
+                cells, first = [""] * len(cells), False
+    shown = body[:ROWS]
+    lines = [line.rstrip() for line in text_table(header, shown, left=(0, len(header) - 1)).splitlines()]
+    left = len({id(c) for c in found}) - sum(1 for row in shown if row[-3] != "-")
+    if left > 0 or len(body) > len(shown):
+        lines.append(f"and {max(left, len(body) - len(shown))} more, nearer to what was recorded or further down")
+    if found:
+        lines.append("±, u: one standard deviation (BEMT: of its declared unknowns); %: of the largest")
+        lines.append("recording of the case; agree? u > X: if the recording is no better than X N")
+    return lines
+
+
+def _worst(found: Sequence[Mapping[str, Any]]) -> list[str]:
+    if not found:
+        return []
+    c = found[0]
+    case = c["case"]
+    words = f"Differs most: {case['name']}, BEMT {number_text(c['S'], 3)} N against {c['reference']}: {c['E']:+.3g} N."
+    if abs(c["E"]) <= c["known"]:
+        words += " The declared unknowns of the case explain as much."
+    elif not math.isfinite(c["u_D"]):
+        words += f" Nobody states how good the recording is: they agree if no better than {_agreement(c)[4:]} N."
+    audit = next((a for a in case.get("audit", []) if a["reference"] == c["reference"]), None)
+    faults = [line["finding"] for line in (audit or {"lines": []})["lines"] if line["status"] == "fault"]
+    if faults:
+        words += f" Set-up of the recording: {'; '.join(faults)}."
+    return textwrap.wrap(words, WIDTH)
+
+
+def _unknowns(solved: Sequence[Mapping[str, Any]]) -> list[str]:
+    lines = []
+    for result in solved[:8]:
+        first = sorted((a for a in result["assumptions"] if math.isfinite(a["u_thrust_N"])),
+                       key=lambda a: -a["u_thrust_N"])[:3]  # fmt: skip
+        if first:
+            told = [f"{a['key'].rpartition('.')[2]} {number_text(a['u_thrust_N'], 2)} N" for a in first]
+            while len(", ".join(told)) > WIDTH - 20:
+                told.pop()
+            lines.append(f"  {result['name'][:16]:<18}{', '.join(told)}")
+    return ["What would narrow BEMT most (u of the thrust from it):", *lines] if lines else []
+
+
+def _flags(solved: Sequence[Mapping[str, Any]]) -> list[str]:
+    told: dict[str, list[str]] = {}
+    for result in solved:
+        for row in result["rows"]:
+            if row["source"] == "bemt":
+                for flag in row["flags"]:
+                    told.setdefault(flag, []).append(result["name"])
+    return [_short(f"! {', '.join(dict.fromkeys(names))}: {flag}") for flag, names in list(told.items())[:4]]
+
+
+def _grids(solved: Sequence[Mapping[str, Any]]) -> list[str]:
+    lines = []
+    for result in solved:
+        if grid := result.get("grid"):
+            where = f", {grid['file']}" if grid["file"] else ", kept with --out DIR"
+            told = f"grid of {result['name']}: {grid['points']} points, {grid['unconverged']} unconverged{where}"
+            lines.append(_short(told))
+    return lines[:4]
+
+
+def _next(called: str, compared: bool) -> list[str]:
+    lines = ["Read on: --details (every case in full), --out DIR (tables), --json,",
+             f"  {called} report CASES --out DIR (figures)"]  # fmt: skip
+    if compared:
+        lines[-1] += ","
+        lines.append(f"  {called} diagnose LOG --case CASE (what physics is missing)")
+    return lines
+
+
+def _short(line: str) -> str:
+    return line if len(line) <= WIDTH else line[: WIDTH - 3] + "..."

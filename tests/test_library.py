@@ -1,0 +1,113 @@
+"""The promise of `import bemt`: a library of plain things in and out, loaded when it is used."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import bemt
+from bemt.case import load_case
+from bemt.case.prepare import prepare_case
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def test_importing_it_loads_nothing() -> None:
+    code = "import sys, bemt; print(*sorted({m.partition('.')[0] for m in sys.modules} & {'numpy', 'scipy', 'numba'}))"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == ""
+    assert (ROOT / "bemt" / "py.typed").exists()
+    with pytest.raises(AttributeError, match="it offers"):
+        _ = bemt.nothing_of_the_kind  # type: ignore[attr-defined]
+
+
+def test_rooms_of_the_same_name_are_called_like_functions() -> None:
+    from bemt.diagnose import plan  # noqa: F401 - the room stays a package
+
+    assert callable(bemt.diagnose) and callable(bemt.drive) and callable(bemt.compare)
+    with pytest.raises(bemt.InputError, match="--kv"):
+        bemt.drive("10x5", kv=1.0, cells=3)
+
+
+def test_a_case_gives_what_the_solver_gives() -> None:
+    case = load_case(ROOT / "cases" / "prop_8x5")
+    ours = bemt.load(ROOT / "cases" / "prop_8x5").solve([8000.0, 20000.0], [0.0, 10.0])
+    raw = prepare_case(case).solve([8000.0, 20000.0], [0.0, 10.0], case.air())
+    np.testing.assert_allclose(ours["thrust_N"], raw["thrust_N"], rtol=1e-12)
+    np.testing.assert_allclose(ours["torque_Nm"], raw["torque_Nm"], rtol=1e-12)
+
+
+def test_bands_come_from_the_declared_unknowns() -> None:
+    wide, told = bemt.propeller("10x5"), bemt.propeller("10x5").replaced({"blade.max_chord_over_R": 0.2})
+    assert set(wide.unknowns) - set(told.unknowns) == {"blade.max_chord_over_R"}
+    d = wide.solve(6000)
+    assert 0.03 < d.u["thrust_N"][0] / d["thrust_N"][0] < 0.3
+    np.testing.assert_allclose(d.u["CT"] / d["CT"], d.u["thrust_N"] / d["thrust_N"])
+    assert told.solve(6000).u["thrust_N"][0] < d.u["thrust_N"][0]
+    assert np.isnan(wide.solve(6000, bands=False).u["thrust_N"][0])
+
+
+def test_a_curve_is_every_speed_with_every_advance_ratio() -> None:
+    d = bemt.propeller("10x5").curve(rpm=[4000, 8000], J=[0.0, 0.3, 0.5], bands=False)
+    assert d["rpm"].tolist() == [4000.0] * 3 + [8000.0] * 3
+    np.testing.assert_allclose(d["J"], [0.0, 0.3, 0.5] * 2)
+    assert np.all(np.diff(d["CT"].reshape(2, 3)) < 0)
+    frame = d.to_pandas()
+    assert list(frame["rpm"]) == d["rpm"].tolist()
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: bemt.propeller("ten by five"), "diameter x pitch"),
+        (lambda: bemt.propeller(), "label, stations"),
+        (lambda: bemt.propeller(stations="absent.csv"), "diameter_m"),
+        (lambda: bemt.propeller(stations="x.csv", diameter_m=254.0), "Divide by 1000"),
+        (lambda: bemt.propeller("10x5").solve(-6000), "Drop the sign"),
+        (lambda: bemt.propeller("10x5").solve(6000, 3.0, J=0.2), "one of them"),
+        (lambda: bemt.propeller("10x5").solve(float("nan")), "finite"),
+        (lambda: bemt.load("no/such/case"), "no/such/case"),
+        (lambda: bemt.read("no/such/log.csv"), "no/such/log.csv"),
+        (lambda: bemt.drive("10x5", kv=1000, cells=3, mass_kg=1500), "Divide by 1000"),
+        (lambda: bemt.diagnose("x.csv", "10x5", only=["tip_los"]), "Did you mean tip_loss"),
+    ],
+)
+def test_bad_input_says_what_would_have_been_right(call: object, words: str) -> None:
+    with pytest.raises(bemt.InputError, match=words):
+        call()  # type: ignore[operator]
+
+
+def test_a_log_is_read_and_diagnosed_from_a_frame(tmp_path: Path) -> None:
+    pd = pytest.importorskip("pandas")
+    prop = bemt.propeller("10x5")
+    truth = prop.solve(np.repeat(np.linspace(4000, 9000, 8), 3), bands=False)
+    frame = pd.DataFrame({"rpm": truth["rpm"], "thrust_gf": 1000 / 9.80665 * truth["thrust_N"],
+                          "torque_Nm": truth["torque_Nm"]})  # fmt: skip
+    frame.to_csv(tmp_path / "log.csv", index=False)
+    read = bemt.read(tmp_path / "log.csv")
+    assert read["thrust_N"].max() == pytest.approx(truth["thrust_N"].max(), rel=0.01)
+    answer = bemt.diagnose(frame, prop)
+    assert answer.verdict in ("none", "insufficient") and answer.text
+    assert answer.improved is None and answer.to_dict()["schema"] == "bemt.diagnosis/1"
+
+
+def test_a_written_case_is_one_that_the_command_line_runs(tmp_path: Path) -> None:
+    prop = bemt.propeller("9x4.5x3")
+    file = prop.write(tmp_path / "mine")
+    assert bemt.load(file).solve(bands=False)["thrust_N"] == prop.solve(bands=False)["thrust_N"]
+    with pytest.raises(bemt.InputError):
+        prop.write(tmp_path / "mine")
+
+
+def test_a_drive_of_a_label_stays_near_what_such_drives_do() -> None:
+    """Thrust rises with cells; a motor sheet narrows; the numbers are within reach of the hobby's."""
+    three, four = (bemt.drive("10x4.5", kv=900, cells=n) for n in (3, 4))
+    assert four.full["thrust_N"].value > three.full["thrust_N"].value
+    assert three.full["battery_A"].u_with_sheet < three.full["battery_A"].u
+    assert 6.0 < three.full["thrust_N"].value < 12.0 and 8.0 < three.full["battery_A"].value < 25.0
+    heavy = bemt.drive("10x4.5", kv=900, cells=3, mass_kg=20.0)
+    assert not heavy.reached and "no hover" in heavy.text

@@ -1,0 +1,88 @@
+"""The promise of `new`: a folder that runs at once, every unknown declared; and of `drive LABEL`: no file needed."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import bemt
+from bemt.case import load_case
+from bemt.commands.cli import main
+
+STATIONS = "r_over_R,chord_over_R,beta_deg\n0.2,0.14,35\n0.5,0.19,22\n0.75,0.16,15\n1.0,0.06,10\n"
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "blade.csv").write_text(STATIONS)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("words", "name"),
+    [
+        (["10x5"], "prop_10x5"),
+        (["8x4.5x3", "--rpm", "9000", "--airspeed", "5"], "prop_8x4.5x3"),
+        (["10x4.5", "--kv", "900", "--cells", "3"], "prop_10x4.5"),
+        (["70mm", "--fan"], "fan_70"),
+        (["--stations", "blade.csv", "--diameter-mm", "254"], "blade"),
+    ],
+)
+def test_a_new_folder_runs_at_once(words: list[str], name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["new", *words]) == 0
+    assert name in capsys.readouterr().out
+    case = load_case(name)
+    assert case.assumptions and all(item.why for item in case.assumptions)
+    assert main(["sweep", name, "--json"]) == 0
+    row = json.loads(capsys.readouterr().out)["cases"][0]["rows"][0]
+    assert row["converged"] and row["thrust_N"] > 0 and row["u_input"] > 0
+    if "--kv" in words:
+        assert main(["drive", name, "--json"]) == 0
+        found = json.loads(capsys.readouterr().out)
+        assert found["assumed"] and found["steady"]["thrust_N"][-1] > 1.0
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["10by5"], "LABEL"), ([], "LABEL, --stations"), (["10x5", "--kv", "900"], "--cells together"),
+        (["--stations", "blade.csv"], "--diameter-mm"),
+        (["--stations", "absent.csv", "--diameter-mm", "254"], "absent"),
+        (["--stations", "blade.csv", "--diameter-mm", "0.254"], "Times 1000"), (["seventy", "--fan"], "70mm"),
+    ],
+)  # fmt: skip
+def test_what_is_no_propeller_is_refused_and_nothing_is_written(
+    words: list[str], said: str, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["new", *words]) == 2
+    assert said in capsys.readouterr().err
+    assert [p.name for p in here.iterdir()] == ["blade.csv"]
+
+
+def test_nobody_loses_a_case(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["new", "10x5"]) == 0
+    before = Path("prop_10x5/case.toml").read_bytes()
+    assert main(["new", "10x5"]) == 2
+    assert Path("prop_10x5/case.toml").read_bytes() == before
+
+
+def test_a_label_with_its_motor_needs_no_file(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["drive", "10x4.5", "--kv", "900", "--cells", "3", "--mass", "1.4", "--rotors", "4", "--capacity", "3"]
+    assert main(words) == 0
+    shown = capsys.readouterr().out
+    assert all(word in shown for word in ("thrust", "current", "gf/W", "throttle", "time aloft", "motor's sheet", "±"))
+    assert max(map(len, shown.splitlines())) <= 120 and len(shown.splitlines()) <= 30
+    assert main([*words, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["schema"] == "bemt.drive.estimate/1" and found["hover"]["minutes"]["u"] > 0
+    assert main(["drive", "10x4.5", "--kv", "900", "--cells", "3", "--mass", "30"]) == 1
+    assert "no hover" in capsys.readouterr().out
+
+
+def test_a_motor_for_a_smaller_propeller_is_called_one(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["drive", "10x5", "--kv", "2300", "--cells", "4"]) == 0
+    assert "suits propellers of" in capsys.readouterr().out
+    assert bemt.drive("10x5", kv=900, cells=3).notes == ()
