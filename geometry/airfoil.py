@@ -100,18 +100,7 @@ class Airfoil:
         return x[0] + span * s, pchip(theta, y, np.arccos(1.0 - 2.0 * s))
 
     def surfaces(self, x: ArrayLike) -> tuple[Array, Array]:
-        """Interpolate both sides.
-
-        Parameters
-        ----------
-        x : (...) float
-            Chord fractions. [-]
-
-        Returns
-        -------
-        upper, lower : (...) float
-            Ordinates over the chord. [-]
-        """
+        """Interpolate both sides. [-]"""
         x = np.asarray(x, dtype=np.float64)
         out = []
         for which in (0, 1):
@@ -158,18 +147,7 @@ class Airfoil:
         return hashlib.sha256(points.tobytes()).hexdigest()
 
     def repanel(self, n: int = 161) -> Airfoil:
-        """Resample both sides with cosine spacing.
-
-        Parameters
-        ----------
-        n : int
-            Number of points, odd, 21 or more; the leading edge is point ``n // 2``.
-
-        Returns
-        -------
-        Airfoil
-            Same shape and trailing edge gap, new points.
-        """
+        """Resample both sides with cosine spacing."""
         s = _spaced(_half(n))
         (xu, yu), (xl, yl) = self._side(0, s), self._side(1, s)
         return Airfoil(self.name, _join(xu, xl), _join(yu, yl))
@@ -206,29 +184,6 @@ def _naca_half(x: Array, thickness: float, te_gap: float | None) -> Array:
 
 def naca4(camber: float, position: float, thickness: float, n: int = 161, te_gap: float | None = None) -> Airfoil:
     """Make a NACA four-digit section from real numbers.
-
-    Parameters
-    ----------
-    camber : float
-        Greatest camber over chord, -0.25 to 0.25. [-]
-    position : float
-        Chord fraction of the greatest camber, 0.05 to 0.95; ignored without camber. [-]
-    thickness : float
-        Greatest thickness over chord, 0.005 to 0.6. [-]
-    n : int
-        Number of points, odd.
-    te_gap : float or None
-        Trailing edge thickness over chord; None keeps the family's own (0.021 times the thickness). [-]
-
-    Returns
-    -------
-    Airfoil
-        Named ``naca4:camber,position,thickness``.
-
-    Raises
-    ------
-    GeometryError
-        For numbers outside these ranges (4 for 4 % is refused).
 
     References
     ----------
@@ -268,23 +223,6 @@ _REFLEX = {2: (0.1300, 51.99, 0.000764), 3: (0.2170, 15.793, 0.00677), 4: (0.318
 
 def naca(digits: str, n: int = 161, te_gap: float | None = None) -> Airfoil:
     """Make a NACA four- or five-digit section from its designation.
-
-    Parameters
-    ----------
-    digits : str
-        ``"4412"``, ``"NACA 23012"``, ``"naca0012"``; five-digit reflexed lines such as ``"23112"`` too.
-    n, te_gap
-        As in :func:`naca4`.
-
-    Returns
-    -------
-    Airfoil
-        Named ``naca4412`` and so on.
-
-    Raises
-    ------
-    GeometryError
-        For anything that is not such a designation.
 
     References
     ----------
@@ -330,20 +268,6 @@ def naca(digits: str, n: int = 161, te_gap: float | None = None) -> Airfoil:
 def plate(camber: float, thickness: float, n: int = 161) -> Airfoil:
     """Make a flat or circular-arc plate of constant thickness with rounded edges.
 
-    Parameters
-    ----------
-    camber : float
-        Rise of the arc over chord, -0.25 to 0.25. [-]
-    thickness : float
-        Plate thickness over chord, 0.002 to 0.3. [-]
-    n : int
-        Number of points, odd.
-
-    Returns
-    -------
-    Airfoil
-        Named ``plate:camber,thickness``; edges are half circles, so the trailing edge is closed.
-
     Examples
     --------
     >>> section = plate(0.05, 0.02)
@@ -372,18 +296,6 @@ def plate(camber: float, thickness: float, n: int = 161) -> Airfoil:
 
 def blend(a: Airfoil, b: Airfoil, w: float) -> Airfoil:
     """Blend two sections linearly, side by side at equal chord fractions.
-
-    Parameters
-    ----------
-    a, b : Airfoil
-        The sections at w = 0 and w = 1.
-    w : float
-        Weight of `b`, 0 to 1. [-]
-
-    Returns
-    -------
-    Airfoil
-        `a` or `b` itself at the ends.
 
     Examples
     --------

@@ -40,24 +40,6 @@ def _numbers(text: str, faults: Faults) -> tuple[str, list[tuple[int, float, flo
 def parse_dat(text: str, name: str = "") -> Airfoil:
     r"""Read a section file in Selig or Lednicer form.
 
-    Parameters
-    ----------
-    text : str
-        The file's content: a title line (optional), then x y pairs. Selig: one loop from the trailing edge.
-        Lednicer: the two point counts, then upper and lower side, both from the leading edge.
-    name : str
-        Overrides the title.
-
-    Returns
-    -------
-    Airfoil
-        Points as given (up to 2 % off unit chord), repeated ones dropped, lower-first loops turned round.
-
-    Raises
-    ------
-    GeometryError
-        With every faulty line, or what is wrong with the shape. Percent and millimetres are refused, not converted.
-
     Examples
     --------
     >>> from geometry.airfoil import naca

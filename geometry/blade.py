@@ -120,36 +120,12 @@ class Blade:
         return out
 
     def at(self, r: ArrayLike) -> tuple[Array, Array]:
-        """Interpolate chord and blade angle; outside the stations the end values are held.
-
-        Parameters
-        ----------
-        r : (...) float
-            Radius. [m]
-
-        Returns
-        -------
-        chord : (...) float
-            Chord. [m]
-        beta : (...) float
-            Blade angle. [rad]
-        """
+        """Interpolate chord and blade angle; outside the stations the end values are held."""
         columns = self._at(r)
         return columns[..., 0], columns[..., 1]
 
     def elements(self, edges: ArrayLike) -> Stations:
-        """Cut the blade at given edges.
-
-        Parameters
-        ----------
-        edges : (n + 1,) float
-            Ascending element edges. [m]
-
-        Returns
-        -------
-        Stations
-            Element centres r, widths dr, and chord and beta at the centres. [m, rad]
-        """
+        """Cut the blade at given edges. [m, rad]"""
         edges = np.asarray(edges, dtype=np.float64)
         if edges.ndim != 1 or edges.size < 2 or not (np.diff(edges) > 0).all():
             raise GeometryError([("edges", f"shape {edges.shape}", "two or more ascending radii in metres", "")])
@@ -157,19 +133,7 @@ class Blade:
         return Stations(r, np.diff(edges), *self.at(r))
 
     def midpoints(self, n: int, spacing: str = "uniform") -> Stations:
-        """Cut the blade into n elements between Rhub and R: what the solver consumes.
-
-        Parameters
-        ----------
-        n : int
-            Number of elements, 1 or more.
-        spacing : {"uniform", "cosine"}
-            Equal widths, or widths that shrink towards hub and tip.
-
-        Returns
-        -------
-        Stations
-            Element centres r, widths dr, and chord and beta at the centres. [m, rad]
+        """Cut the blade into n elements between Rhub and R: what the solver consumes. [m, rad]
 
         Notes
         -----
@@ -199,18 +163,7 @@ class Blade:
         return Stations(r, np.diff(steps), *self.at(r))
 
     def resample(self, r: ArrayLike) -> Blade:
-        """Return the blade with stations at other radii, everything interpolated.
-
-        Parameters
-        ----------
-        r : (M,) float
-            New station radii, strictly ascending. [m]
-
-        Returns
-        -------
-        Blade
-            Same R, Rhub and anchors.
-        """
+        """Return the blade with stations at other radii, everything interpolated."""
         columns = self._at(r)
         return replace(
             self, r=np.asarray(r, dtype=np.float64), chord=columns[..., 0], beta=columns[..., 1],
@@ -235,23 +188,7 @@ class Blade:
         return float(2 * math.pi * r * np.tan(self.at(r)[1]))
 
     def section(self, r: float) -> Airfoil:
-        """Return the section at a radius.
-
-        Parameters
-        ----------
-        r : float
-            Radius. [m]
-
-        Returns
-        -------
-        Airfoil
-            Unit chord; a linear blend of the anchors on either side.
-
-        Raises
-        ------
-        GeometryError
-            If the blade has no anchors.
-        """
+        """Return the section at a radius."""
         if not self.anchors:
             raise GeometryError([("anchors", "none", "one section or more", "Give the blade anchors=[(r/R, Airfoil)]")])
         x = r / self.R
@@ -263,20 +200,7 @@ class Blade:
         return blend(first, second, w)
 
     def section_curve(self, r: float, n: int | None = None) -> Array:
-        """Return the true section outline at a radius: chord, blade angle, sweep and rake applied.
-
-        Parameters
-        ----------
-        r : float
-            Radius. [m]
-        n : int or None
-            Number of points (odd); None keeps those of the section.
-
-        Returns
-        -------
-        (n, 2) float
-            Tangential coordinate (positive in the direction the blade moves) and axial coordinate (positive upstream,
-            the direction of thrust), in Selig order. [m]
+        """Return the true section outline at a radius: chord, blade angle, sweep and rake applied. [m]
 
         Notes
         -----
@@ -364,27 +288,6 @@ def from_stations(
     name: str = "",
 ) -> Blade:  # fmt: skip
     """Make a blade from tabulated stations.
-
-    Parameters
-    ----------
-    r, chord, beta : (N,) float
-        Radius [m], chord [m] and blade angle [rad].
-    R, Rhub : float
-        Tip and hub radius. [m]
-    anchors : Airfoil, sequence of (r/R, Airfoil), or None
-        One section for the whole blade, several to blend, or none.
-    sweep, rake, axis, interpolation, name
-        As in :class:`Blade`.
-
-    Returns
-    -------
-    Blade
-        The blade.
-
-    Raises
-    ------
-    GeometryError
-        All faults at once; angles beyond +-pi/2 are taken for degrees and refused.
 
     Examples
     --------

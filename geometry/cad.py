@@ -49,24 +49,7 @@ class Parts:
 
 
 def planar_sections(rotor: Rotor, options: Options | None = None) -> list[tuple[float, Array]]:
-    """Cut the wrapped blade by planes across its pitch axis.
-
-    Parameters
-    ----------
-    rotor : Rotor
-        The rotor.
-    options : Options or None
-        Fillet and tolerance; the number of points is the module's own.
-
-    Returns
-    -------
-    list of (float, (n, 2) float)
-        Distance of the plane from the shaft; y and z of the section's points in Selig order. [m]
-
-    Raises
-    ------
-    GeometryError
-        When a blade is so wide that no plane within the hub holds its root.
+    """Cut the wrapped blade by planes across its pitch axis. [m]
 
     Notes
     -----
@@ -203,27 +186,7 @@ def _fixed(solid: Any) -> Any:
 
 
 def blade_solid(rotor: Rotor, options: Options | None = None) -> tuple[Any, Array]:
-    """Make blade 1 as a CAD solid that ends exactly at hub and tip cylinder.
-
-    Parameters
-    ----------
-    rotor : Rotor
-        The rotor.
-    options : Options or None
-        Fillet and tolerance.
-
-    Returns
-    -------
-    solid : cadquery.Solid
-        The blade, in millimetres.
-    hub : (k, 2) float
-        Profile of the hub that fits it. [m]
-
-    Raises
-    ------
-    GeometryError
-        When the sections make no valid solid or its volume is off the integral of the sections.
-    """
+    """Make blade 1 as a CAD solid that ends exactly at hub and tip cylinder."""
     cq = needs("cadquery", "cad")
 
     options = options or Options()
@@ -282,27 +245,7 @@ def _thin(points: Array) -> Array:
 
 
 def solids(rotor: Rotor, duct: Duct | None = None, options: Options | None = None) -> Parts:
-    """Make the CAD solids of a rotor and its duct: parts that touch, none that overlap.
-
-    Parameters
-    ----------
-    rotor : Rotor
-        The rotor.
-    duct : Duct or None
-        The duct.
-    options : Options or None
-        Fillet and tolerance.
-
-    Returns
-    -------
-    Parts
-        Named solids and their volumes.
-
-    Raises
-    ------
-    GeometryError
-        When the numbers make no sound solid, with the reason.
-    """
+    """Make the CAD solids of a rotor and its duct: parts that touch, none that overlap."""
     cq = needs("cadquery", "cad")
 
     options = options or Options()
@@ -333,20 +276,7 @@ def solids(rotor: Rotor, duct: Duct | None = None, options: Options | None = Non
 
 
 def assembly(parts: Parts, name: str) -> Any:
-    """Gather the solids in a named ``cadquery.Assembly`` for STEP.
-
-    Parameters
-    ----------
-    parts : Parts
-        The solids.
-    name : str
-        Name of the assembly.
-
-    Returns
-    -------
-    cadquery.Assembly
-        In millimetres, coloured by surface.
-    """
+    """Gather the solids in a named ``cadquery.Assembly`` for STEP."""
     cq = needs("cadquery", "cad")
 
     colours = {"blade": (0.2, 0.3, 0.6), "hub": (0.4, 0.4, 0.4), "duct": (0.8, 0.8, 0.8), "stator": (0.6, 0.6, 0.6)}
@@ -357,21 +287,7 @@ def assembly(parts: Parts, name: str) -> Any:
 
 
 def tessellate(shape: Any, tolerance: float, angle: float = 0.1) -> Mesh:
-    """Mesh CAD solids; each stays a body of its own.
-
-    Parameters
-    ----------
-    shape : cadquery.Shape
-        Solid or compound, in millimetres.
-    tolerance : float
-        Greatest distance of mesh and surface. [m]
-    angle : float
-        Greatest turn between neighbouring faces. [rad]
-
-    Returns
-    -------
-    Mesh
-        One surface, ``solid``. [m]
+    """Mesh CAD solids; each stays a body of its own. [m]
 
     Notes
     -----

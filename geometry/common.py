@@ -43,25 +43,7 @@ class GeometryError(ValueError):
 
 
 def needs(module: str, extra: str) -> Any:
-    """Import a library that an extra brings, or say which extra is missing.
-
-    Parameters
-    ----------
-    module : str
-        Dotted name of the module.
-    extra : str
-        Extra of this project that installs it.
-
-    Returns
-    -------
-    module
-        The imported module.
-
-    Raises
-    ------
-    GeometryError
-        When it is not installed.
-    """
+    """Import a library that an extra brings, or say which extra is missing."""
     try:
         return importlib.import_module(module)
     except ModuleNotFoundError as error:
@@ -86,27 +68,11 @@ class Faults:
         self.found: list[tuple[str, str, str, str]] = []
 
     def add(self, where: str, got: str, expected: str, hint: str = "") -> None:
-        """Note one fault.
-
-        Parameters
-        ----------
-        where, got, expected, hint : str
-            The parts of its message; the hint may be empty.
-        """
+        """Note one fault."""
         self.found.append((where, got, expected, hint))
 
     def number(self, where: str, value: float, low: float, high: float, unit: str = "", hint: str = "") -> None:
-        """Note a fault unless ``low <= value <= high``; infinite bounds are open, NaN always fails.
-
-        Parameters
-        ----------
-        where : str
-            Name of the number.
-        value, low, high : float
-            The number and its bounds, in one unit.
-        unit, hint : str
-            For the message; both may be empty.
-        """
+        """Note a fault unless ``low <= value <= high``; infinite bounds are open, NaN always fails."""
         if low <= value <= high and math.isfinite(value):
             return
         unit = f" {unit}" if unit else ""
@@ -120,38 +86,14 @@ class Faults:
 
 
 def frozen(values: ArrayLike) -> Array:
-    """Return a read-only float copy.
-
-    Parameters
-    ----------
-    values : array_like
-        Numbers of any unit.
-
-    Returns
-    -------
-    (...) float
-        The same numbers, in the same unit.
-    """
+    """Return a read-only float copy."""
     out = np.array(values, dtype=np.float64)
     out.flags.writeable = False
     return out
 
 
 def pchip_slopes(x: Array, y: Array) -> Array:
-    """Find the slopes that :func:`pchip` gives the nodes.
-
-    Parameters
-    ----------
-    x : (N,) float
-        Strictly ascending abscissae of any unit, N >= 2.
-    y : (N, k) float
-        Columns of ordinates of any unit.
-
-    Returns
-    -------
-    (N, k) float
-        Slopes, in the unit of y per unit of x.
-    """
+    """Find the slopes that :func:`pchip` gives the nodes, (N, k)."""
     h = np.diff(x)[:, None]
     d = np.diff(y, axis=0) / h
     if len(x) == 2:
@@ -171,22 +113,6 @@ def pchip_slopes(x: Array, y: Array) -> Array:
 
 def pchip(x: Array, y: Array, xq: ArrayLike, slopes: Array | None = None) -> Array:
     """Interpolate monotone-preserving (PCHIP), clamped to the end values outside the data.
-
-    Parameters
-    ----------
-    x : (N,) float
-        Strictly ascending abscissae of any unit, N >= 2.
-    y : (N,) or (N, k) float
-        Ordinates of any unit; columns are interpolated independently.
-    xq : (...) float
-        Where to interpolate, in the unit of x.
-    slopes : (N, k) float or None
-        Result of :func:`pchip_slopes`, to save its time, in the unit of y per unit of x.
-
-    Returns
-    -------
-    (...) or (..., k) float
-        Interpolated values, in the unit of y.
 
     Notes
     -----

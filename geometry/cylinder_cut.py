@@ -19,22 +19,6 @@ Faces = NDArray[np.int64]
 def loops(points: Array, faces: Faces, r: float) -> tuple[list[Array], int]:
     """Cut a mesh by the cylinder of radius r round the z axis.
 
-    Parameters
-    ----------
-    points : (N, 3) float
-        Vertices. [any unit]
-    faces : (M, 3) int
-        Triangles.
-    r : float
-        Radius. [the same unit]
-
-    Returns
-    -------
-    closed : list of (K, 2) float
-        Outlines that do not go round the axis: unrolled arc r theta and z. [the same unit]
-    others : int
-        How many lines go round the axis or end openly.
-
     Notes
     -----
     Every edge is met exactly; lines are joined by the edges that faces share, not by nearness.
@@ -99,22 +83,7 @@ def _trace(hit: Array, pairs: Faces, r: float) -> tuple[list[Array], int]:
 
 
 def blades(points: Array, faces: Faces, r: float) -> list[Array] | None:
-    """Cut the blades at a radius.
-
-    Parameters
-    ----------
-    points : (N, 3) float
-        Vertices, the shaft along z. [any unit]
-    faces : (M, 3) int
-        Triangles.
-    r : float
-        Radius. [the same unit]
-
-    Returns
-    -------
-    list of (K, 2) float, or None
-        Unrolled outlines [the same unit]; None unless two or more stand free.
-    """
+    """Cut the blades at a radius. [the same unit]"""
     found, others = loops(points, faces, r)
     if others or len(found) < 2:
         return None

@@ -13,23 +13,6 @@ __all__ = ["parse_designation"]
 def parse_designation(text: str) -> tuple[float, float, int | None]:
     """Read a propeller designation: diameter x pitch in inches, with an optional blade count.
 
-    Parameters
-    ----------
-    text : str
-        ``"8x5"``, ``"10x4.7"``, ``"13.4x13.5"``, ``"8x5x3"`` or ``"8x5-3"`` (three blades).
-
-    Returns
-    -------
-    diameter_in, pitch_in : float
-        Diameter and pitch. [in]
-    blades : int or None
-        Blade count where given.
-
-    Raises
-    ------
-    GeometryError
-        For other text and for absurd values, such as a lost decimal point (10x47).
-
     Examples
     --------
     >>> parse_designation("10x4.7"), parse_designation("8x5x3")

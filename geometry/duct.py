@@ -223,18 +223,7 @@ class Duct:
         faults.check()
 
     def inner(self, x: ArrayLike) -> Array:
-        """Radius of the inner wall.
-
-        Parameters
-        ----------
-        x : (...) float
-            Axial position behind the lip, 0 to length. [m]
-
-        Returns
-        -------
-        (...) float
-            Radius: quarter ellipse, straight bore, straight cone. [m]
-        """
+        """Radius of the inner wall. [m]"""
         x = np.clip(np.asarray(x, dtype=np.float64), 0.0, self.length)
         cone = self._exit - self.inner_radius
         t = np.clip((x - self.bore_end) / max(self.length - self.bore_end, 1e-12), 0.0, 1.0)
@@ -261,19 +250,7 @@ class Duct:
         return out
 
     def profile(self, n: int = 61) -> tuple[Array, Array]:
-        """Return both walls as points for a solid of revolution.
-
-        Parameters
-        ----------
-        n : int
-            Points per wall, about half of them on the lip; 10 or more.
-
-        Returns
-        -------
-        inner, outer : (m, 2) float
-            x and radius from the lip to the exit; the walls share the nose point unless lip_radius is 0, where the
-            face is flat; corners are points. [m]
-        """
+        """Return both walls as points for a solid of revolution. [m]"""
         m = max(n // 2, 5)
         nose = self.lip_length * (1 - np.cos(np.linspace(0, np.pi / 2, m)))
         body = np.linspace(self.lip_length, self.length, max(n - m, 5))
@@ -301,22 +278,6 @@ def around(rotor: Rotor, length: float, gap: float, lip_radius: float = 0.0, *, 
            exit_hub_radius: float = 0.0, rotor_x: float | None = None, stator: Stator | None = None,
            name: str = "") -> Duct:  # fmt: skip
     """Fit a duct round a rotor.
-
-    Parameters
-    ----------
-    rotor : Rotor
-        The rotor.
-    length, gap, lip_radius : float
-        As in :class:`Duct`. [m]
-    exit_area_ratio : float or None
-        Exit area over swept annulus area; None keeps the bore to the exit. [-]
-    exit_hub_radius, rotor_x, stator, name
-        As in :class:`Duct`.
-
-    Returns
-    -------
-    Duct
-        With inner_radius = R + gap.
 
     Examples
     --------

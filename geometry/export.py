@@ -39,35 +39,7 @@ def export(
     rotor: Rotor, duct: Duct | None, out: Path, formats: Sequence[str], *, name: str = "rotor", unit: str = "mm",
     options: Options | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """Write the solids of a rotor and its duct.
-
-    Parameters
-    ----------
-    rotor : Rotor
-        The rotor.
-    duct : Duct or None
-        The duct.
-    out : Path
-        Folder; it is made.
-    formats : sequence of str
-        Some of ``stl``, ``step``, ``obj``, ``openfoam``.
-    name : str
-        Stem of the files.
-    unit : str
-        ``mm`` or ``m``; OpenFOAM surfaces are in metres whatever it is.
-    options : Options or None
-        How fine.
-
-    Returns
-    -------
-    dict
-        The manifest as written.
-
-    Raises
-    ------
-    GeometryError
-        When there is no sound solid, or a file is not sound when read back; nothing is left behind then.
-    """
+    """Write the solids of a rotor and its duct."""
     faults = Faults()
     for word in formats:
         if word not in FORMATS:
@@ -259,27 +231,7 @@ def _said_unit(path: Path) -> str | None:
 
 
 def read_solid(path: Path) -> tuple[Array, NDArray[np.int64], str | None]:
-    """Read the triangles of an STL, OBJ or STEP file.
-
-    Parameters
-    ----------
-    path : Path
-        The file; its ending names the format.
-
-    Returns
-    -------
-    vertices : (N, 3) float
-        Corners in the file's unit, equal ones merged; STEP in metres. [unit of the file]
-    faces : (M, 3) int
-        Triangles.
-    unit : str or None
-        ``mm``, ``m`` or ``in`` when the file states it, else None.
-
-    Raises
-    ------
-    GeometryError
-        When the file is none of these, or cannot be read.
-    """
+    """Read the triangles of an STL, OBJ or STEP file."""
     kind = path.suffix.lower()
     where = path.as_posix()
     if kind not in (".stl", ".obj", ".step", ".stp"):

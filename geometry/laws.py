@@ -131,23 +131,7 @@ def _arguments(kind: str, laws: Mapping[str, Law], name: str, given: Mapping[str
 
 
 def chord_over_R(law: str, x: ArrayLike, hub: float = 0.15, **parameters: float | None) -> Array:
-    """Evaluate a chord law.
-
-    Parameters
-    ----------
-    law : str
-        Name in :data:`CHORD_LAWS`.
-    x : (...) float
-        r/R. [-]
-    hub : float
-        Rhub/R. [-]
-    **parameters : float
-        ``max_chord`` (greatest chord over R) and the law's others; defaults from the law. [-]
-
-    Returns
-    -------
-    (...) float
-        Chord over R. [-]
+    """Evaluate a chord law. [-]
 
     Examples
     --------
@@ -166,28 +150,6 @@ def from_laws(
     anchors: Airfoil | Sequence[tuple[float, Airfoil]] | None = None, n: int = 61, name: str = "",
 ) -> Blade:  # fmt: skip
     """Make a blade from a chord law and a pitch law.
-
-    Parameters
-    ----------
-    diameter : float
-        Tip diameter. [m]
-    chord_law, pitch_law : str
-        Names in :data:`CHORD_LAWS` and :data:`PITCH_LAWS`.
-    hub : float
-        Rhub/R, 0.01 to 0.95. [-]
-    chord, pitch : mapping or None
-        Parameters of the two laws (chord over R; pitch in m, angles in rad); a missing or None entry takes its default.
-    anchors : Airfoil, sequence of (r/R, Airfoil), or None
-        Sections.
-    n : int
-        Stations, cosine spaced from hub to tip; 5 or more.
-    name : str
-        For people.
-
-    Returns
-    -------
-    Blade
-        The blade.
 
     Examples
     --------
@@ -219,26 +181,6 @@ def helix(
     dbeta: float = 0.0, anchors: Airfoil | Sequence[tuple[float, Airfoil]] | None = None, n: int = 61, name: str = "",
 ) -> Blade:  # fmt: skip
     """Make a constant-pitch blade: beta = atan(pitch / (2 pi r)).
-
-    Parameters
-    ----------
-    diameter, pitch : float
-        Diameter and advance per turn. [m]
-    chord_law : str
-        Name in :data:`CHORD_LAWS`.
-    hub : float
-        Rhub/R. [-]
-    max_chord : float or None
-        Greatest chord over R; None takes the law's default. [-]
-    dbeta : float
-        Added to beta everywhere; makers quote pitch on the flat underside rather than on the chord line. [rad]
-    anchors, n, name
-        As in :func:`from_laws`.
-
-    Returns
-    -------
-    Blade
-        The blade.
 
     Examples
     --------

@@ -76,23 +76,7 @@ def _offset(outline: Array, distance: float) -> Array:
 
 
 def wrapped_outline(blade: Blade, r: float, options: Options) -> Array:
-    """Give the outline of the solid blade at a radius, unrolled from its cylinder, fillet included.
-
-    Parameters
-    ----------
-    blade : Blade
-        The blade.
-    r : float
-        Radius; below the hub radius the section there is kept. [m]
-    options : Options
-        Points and fillet.
-
-    Returns
-    -------
-    (n, 2) float
-        Arc (positive in the direction the blade moves) and axial coordinate, in Selig order; a sharp trailing edge is
-        the first and the last point. [m]
-    """
+    """Give the outline of the solid blade at a radius, unrolled from its cylinder, fillet included. [m]"""
     at = min(max(r, blade.Rhub), blade.R)
     curve = blade.section_curve(at, options.n)
     height = max(r - blade.Rhub, 0.0)
@@ -115,19 +99,7 @@ def _area(curve: Array) -> float:
 
 
 def radii(blade: Blade, options: Options | None = None) -> Array:
-    """Choose the radii of the rings so that straight lines between them keep chord and blade angle.
-
-    Parameters
-    ----------
-    blade : Blade
-        The blade.
-    options : Options or None
-        Tolerance and fillet.
-
-    Returns
-    -------
-    (N,) float
-        Ascending from Rhub to R. [m]
+    """Choose the radii of the rings so that straight lines between them keep chord and blade angle, (N,) [m].
 
     Examples
     --------
@@ -174,25 +146,7 @@ def _rings(blade: Blade, r: Array, options: Options) -> Array:
 
 
 def hub_profile(rotor: Rotor, root: Array) -> Array:
-    """Radius and z of the hub and spinner, from the back on the axis to the nose on the axis.
-
-    Parameters
-    ----------
-    rotor : Rotor
-        The rotor.
-    root : (n, 2) float
-        Outline at the hub; the hub covers its axial extent. [m]
-
-    Returns
-    -------
-    (k, 2) float
-        Radius and z. [m]
-
-    Raises
-    ------
-    GeometryError
-        When a given hub length does not cover the blade's root.
-    """
+    """Radius and z of the hub and spinner, from the back on the axis to the nose on the axis. [m]"""
     low, high = float(root[:, 1].min()), float(root[:, 1].max())
     need, middle = high - low, 0.5 * (low + high)
     length = (
@@ -213,25 +167,7 @@ def hub_profile(rotor: Rotor, root: Array) -> Array:
 
 
 def rotor_mesh(rotor: Rotor, options: Options | None = None) -> Mesh:
-    """Mesh the blades and the hub as one solid.
-
-    Parameters
-    ----------
-    rotor : Rotor
-        The rotor; its blade has sections.
-    options : Options or None
-        How fine.
-
-    Returns
-    -------
-    Mesh
-        Surfaces ``blade`` and ``hub``; checked.
-
-    Raises
-    ------
-    GeometryError
-        When the numbers make no sound solid, with the reason.
-    """
+    """Mesh the blades and the hub as one solid."""
     return _rotor(rotor, options or Options())[0]
 
 
@@ -302,20 +238,7 @@ def _check_sections(rotor: Rotor, r: Array, curves: Array, options: Options) -> 
 
 
 def blade_volume(blade: Blade, options: Options | None = None) -> float:
-    """Integrate the section areas of one blade from hub to tip, fillet included.
-
-    Parameters
-    ----------
-    blade : Blade
-        The blade.
-    options : Options or None
-        Fillet.
-
-    Returns
-    -------
-    float
-        Volume. [m^3]
-    """
+    """Integrate the section areas of one blade from hub to tip, fillet included. [m^3]"""
     options = options or Options()
     return _integral(blade, radii(blade, options), options)
 
@@ -333,25 +256,6 @@ def _integral(blade: Blade, ring: Array, options: Options) -> float:
 
 def build(rotor: Rotor, duct: Duct | None = None, options: Options | None = None) -> MeshModel:
     """Mesh a rotor and its duct and check how they fit.
-
-    Parameters
-    ----------
-    rotor : Rotor
-        The rotor.
-    duct : Duct or None
-        The duct.
-    options : Options or None
-        How fine.
-
-    Returns
-    -------
-    MeshModel
-        Closed meshes with named surfaces.
-
-    Raises
-    ------
-    GeometryError
-        When the numbers make no sound solid, with the reason; nothing half made is returned.
 
     Examples
     --------

@@ -53,25 +53,7 @@ class StatorPlan:
 
 
 def duct_profile(duct: Duct, n: int = 81) -> Array:
-    """Closed outline of the duct's wall.
-
-    Parameters
-    ----------
-    duct : Duct
-        The duct.
-    n : int
-        Points per wall.
-
-    Returns
-    -------
-    (k, 2) float
-        Radius and z: bore from exit to lip, then outside from lip to exit. [m]
-
-    Raises
-    ------
-    GeometryError
-        When the wall has no thickness somewhere.
-    """
+    """Closed outline of the duct's wall. [m]"""
     inner, outer = duct.profile(n)
     wall = outer[:, 1] - inner[:, 1]
     shared = wall[0] < 1e-9 * duct.inner_radius
@@ -87,27 +69,7 @@ def duct_profile(duct: Duct, n: int = 81) -> Array:
 
 
 def plan_stator(duct: Duct, hub_back: float, hub_radius: float) -> StatorPlan | None:
-    """Place vanes and centre body behind the rotor.
-
-    Parameters
-    ----------
-    duct : Duct
-        The duct; without stator and without exit body there is nothing to place.
-    hub_back : float
-        z of the hub's rear face. [m]
-    hub_radius : float
-        Radius of the hub, kept by the centre body. [m]
-
-    Returns
-    -------
-    StatorPlan or None
-        None without a stator.
-
-    Raises
-    ------
-    GeometryError
-        When vanes or body do not fit between hub and exit.
-    """
+    """Place vanes and centre body behind the rotor."""
     if duct.stator is None:
         return None
     stator = duct.stator
@@ -126,27 +88,7 @@ def plan_stator(duct: Duct, hub_back: float, hub_radius: float) -> StatorPlan | 
 
 
 def centre_body(duct: Duct, plan: StatorPlan, n: int = 33) -> Array:
-    """Outline of the body that carries the vanes: a cylinder, then an ellipse to the exit.
-
-    Parameters
-    ----------
-    duct : Duct
-        The duct.
-    plan : StatorPlan
-        Where it lies.
-    n : int
-        Points of the tail.
-
-    Returns
-    -------
-    (k, 2) float
-        Radius and z, from the front on the axis to the back on the axis. [m]
-
-    Raises
-    ------
-    GeometryError
-        When the body at the exit is wider than the body that carries the vanes' feet.
-    """
+    """Outline of the body that carries the vanes: a cylinder, then an ellipse to the exit. [m]"""
     end, radius = duct.exit_hub_radius, plan.body_radius
     start = max(plan.body_front, 0.5 * (plan.front + plan.back))
     t = np.linspace(0.0, np.pi / 2, n)[1:]
@@ -163,27 +105,6 @@ def centre_body(duct: Duct, plan: StatorPlan, n: int = 33) -> Array:
 
 def duct_mesh(duct: Duct, plan: StatorPlan | None, options: Options | None = None) -> tuple[Mesh, float]:
     """Mesh the duct, with vanes and centre body when there is a stator.
-
-    Parameters
-    ----------
-    duct : Duct
-        The duct.
-    plan : StatorPlan or None
-        From :func:`plan_stator`.
-    options : Options or None
-        How fine.
-
-    Returns
-    -------
-    mesh : Mesh
-        Surfaces ``duct`` and ``stator``; one body, checked.
-    volume : float
-        Exact volume of the duct's wall alone. [m^3]
-
-    Raises
-    ------
-    GeometryError
-        When the numbers make no sound solid, with the reason.
 
     Examples
     --------

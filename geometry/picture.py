@@ -105,23 +105,6 @@ def _layers(mesh: Mesh, colours: Mapping[str, str], cut: tuple[float, float, flo
 def rotor_scene(rotor: Rotor, options: Options | None = None) -> Scene:
     """Show a rotor from the front and a little from the side.
 
-    Parameters
-    ----------
-    rotor : Rotor
-        The rotor.
-    options : Options or None
-        How fine the mesh is.
-
-    Returns
-    -------
-    Scene
-        For :func:`render`.
-
-    Raises
-    ------
-    GeometryError
-        When the numbers make no sound solid.
-
     Examples
     --------
     >>> from geometry.airfoil import naca
@@ -135,27 +118,7 @@ def rotor_scene(rotor: Rotor, options: Options | None = None) -> Scene:
 
 
 def cutaway_scene(rotor: Rotor, duct: Duct, options: Options | None = None) -> Scene:
-    """Show a ducted rotor, the duct cut open along the shaft.
-
-    Parameters
-    ----------
-    rotor : Rotor
-        The rotor.
-    duct : Duct
-        The duct, with its stator if there is one.
-    options : Options or None
-        How fine the mesh is.
-
-    Returns
-    -------
-    Scene
-        For :func:`render`.
-
-    Raises
-    ------
-    GeometryError
-        When the numbers make no sound solid.
-    """
+    """Show a ducted rotor, the duct cut open along the shaft."""
     model = build(rotor, duct, _fineness(options))
     assert model.duct is not None
     # the whole standing part is one closed solid: cut as one, or the cut of the walls could not be closed
@@ -165,43 +128,14 @@ def cutaway_scene(rotor: Rotor, duct: Duct, options: Options | None = None) -> S
 
 
 def blade_scene(rotor: Rotor, options: Options | None = None) -> Scene:
-    """Show one blade, root to the left, seen along the shaft from the front.
-
-    Parameters
-    ----------
-    rotor : Rotor
-        The rotor.
-    options : Options or None
-        How fine the mesh is.
-
-    Returns
-    -------
-    Scene
-        For :func:`render`.
-
-    Raises
-    ------
-    GeometryError
-        When the numbers make no sound solid.
-    """
+    """Show one blade, root to the left, seen along the shaft from the front."""
     mesh = rotor_mesh(replace(rotor, B=1), _fineness(options))
     blade = Layer(mesh.vertices, mesh.part("blade"), BLADE)
     return Scene((blade,), (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (720, 260))
 
 
 def render(pictures: Sequence[tuple[Scene, str | os.PathLike[str]]]) -> None:
-    """Draw scenes into PNG files, all in one child process.
-
-    Parameters
-    ----------
-    pictures : sequence of (Scene, path)
-        What to draw and where to.
-
-    Raises
-    ------
-    PictureError
-        When the child failed; no file is written then.
-    """
+    """Draw scenes into PNG files, all in one child process."""
     with tempfile.TemporaryDirectory() as folder:
         arrays: dict[str, Any] = {}
         jobs = []
@@ -223,22 +157,6 @@ def pressure_picture(
 ) -> None:
     """Draw the pressure on the blades of an OpenFOAM result, from the front and from behind.
 
-    Parameters
-    ----------
-    case_dir : str or path
-        Folder of the case, reconstructed or still in ``processor*`` folders; its last time is shown.
-    path : str or path
-        PNG to write.
-    density : float
-        Of an incompressible result, whose pressure is divided by it. [kg/m3]
-    patches : sequence of str
-        Beginnings of the names of the patches to show.
-
-    Raises
-    ------
-    PictureError
-        When the folder holds no result, no such patch, or cannot be drawn.
-
     Notes
     -----
     Colours show pressure less that of the largest cell, which lies in the far field; 2 % of the area at either end of
@@ -256,24 +174,7 @@ def mesh_picture(
     radius: float,
     patches: Sequence[str] = ("blade", "hub"),
 ) -> None:
-    """Draw the cells of an OpenFOAM case in a plane through the shaft, and the mesh on the blades.
-
-    Parameters
-    ----------
-    case_dir : str or path
-        Folder of the case, reconstructed or decomposed.
-    path : str or path
-        PNG to write.
-    radius : float
-        Tip radius; the picture shows two of it round the rotor. [m]
-    patches : sequence of str
-        Beginnings of the names of the patches to show.
-
-    Raises
-    ------
-    PictureError
-        When the folder holds no mesh, no such patch, or cannot be drawn.
-    """
+    """Draw the cells of an OpenFOAM case in a plane through the shaft, and the mesh on the blades."""
     job = {"task": "mesh", "case": os.fspath(case_dir), "radius": radius, "patches": list(patches)}
     with tempfile.TemporaryDirectory() as folder:
         _child(folder, job, [Path(path)])

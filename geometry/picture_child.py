@@ -24,18 +24,7 @@ class PictureError(RuntimeError):
 
 
 def times(folder: Path) -> list[tuple[float, Path]]:
-    """Find the folders of times of an OpenFOAM case.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of the case or of a processor.
-
-    Returns
-    -------
-    list of (float, Path)
-        Time [s, or iterations], and folder, ascending.
-    """
+    """Find the folders of times of an OpenFOAM case. [s, or iterations]"""
     found = []
     for item in folder.glob("[0-9]*"):
         if re.fullmatch(r"[0-9.]+(e[-+]?[0-9]+)?", item.name) and item.is_dir():
@@ -51,18 +40,7 @@ def _pyvista() -> Any:
 
 
 def draw(folder: str) -> None:
-    """Do one job file.
-
-    Parameters
-    ----------
-    folder : str
-        Holds ``job.json`` and ``arrays.npz``; the pictures 0.png, 1.png ... go there.
-
-    Raises
-    ------
-    PictureError
-        When there is nothing to draw.
-    """
+    """Do one job file."""
     here = Path(folder)
     job = json.loads((here / "job.json").read_text(encoding="utf-8"))
     if job["task"] == "scenes":

@@ -43,22 +43,6 @@ PUBLISHED = ("sda1075", "clark_y")
 def published(name: str) -> Airfoil:
     """Make a published section.
 
-    Parameters
-    ----------
-    name : str
-        One of :data:`PUBLISHED`.
-
-    Returns
-    -------
-    Airfoil
-        Chord from nose to the middle of the trailing edge: the Clark Y, which is tabulated above its flat bottom, is
-        turned by 2 deg.
-
-    Raises
-    ------
-    GeometryError
-        For another name.
-
     Examples
     --------
     >>> for name in PUBLISHED:
@@ -91,18 +75,6 @@ def _on_chord(x: Array, y: Array, nose: Array, tail: Array) -> tuple[Array, Arra
 
 def thickened(section: Airfoil, thickness: float) -> Airfoil:
     """Scale the ordinates of a section to a thickness; its camber goes along.
-
-    Parameters
-    ----------
-    section : Airfoil
-        Any section.
-    thickness : float
-        Thickness over chord, 0.002 to 0.6. [-]
-
-    Returns
-    -------
-    Airfoil
-        The way in which NACA propellers of one section are thinned towards the tip.
 
     Examples
     --------

@@ -103,18 +103,7 @@ class Rotor:
         return float(chord * abs(np.sin(beta)))
 
     def sigma(self, r: ArrayLike) -> Array:
-        """Local solidity B c / (2 pi r).
-
-        Parameters
-        ----------
-        r : (...) float
-            Radius, positive. [m]
-
-        Returns
-        -------
-        (...) float
-            Local solidity. [-]
-        """
+        """Local solidity B c / (2 pi r). [-]"""
         r = np.asarray(r, dtype=np.float64)
         out: Array = self.B * self.blade.at(r)[0] / (2 * np.pi * r)
         return out

@@ -83,18 +83,7 @@ def _inertia(points: Array, faces: Faces) -> tuple[Array, Array]:
 
 
 def frame(axis: Array) -> Array:
-    """Make a rotation matrix whose rows are two directions across the axis, and the axis.
-
-    Parameters
-    ----------
-    axis : (3,) float
-        A direction. [-]
-
-    Returns
-    -------
-    (3, 3) float
-        Right-handed. [-]
-    """
+    """Make a rotation matrix whose rows are two directions across the axis, and the axis. [-]"""
     axis = axis / np.linalg.norm(axis)
     other = np.eye(3)[int(np.argmin(np.abs(axis)))]
     first = np.cross(other, axis)
@@ -180,35 +169,7 @@ def _refined(points: Array, faces: Faces, centre: Array, axis: Array) -> tuple[A
 
 
 def pick(points: Array, faces: Faces) -> tuple[Faces, int, float, Array, Array, list[str]]:
-    """Separate the rotor from what stands beside it and find its axis.
-
-    Parameters
-    ----------
-    points : (N, 3) float
-        Vertices. [any unit]
-    faces : (M, 3) int
-        Triangles.
-
-    Returns
-    -------
-    faces : (K, 3) int
-        Those of the rotor.
-    count : int
-        Blades.
-    spread : float
-        How far the blades differ from each other, relative. [-]
-    centre : (3,) float
-        A point on the shaft. [the unit of the points]
-    axis : (3,) float
-        Its direction. [-]
-    notes : list of str
-        What was left out.
-
-    Raises
-    ------
-    GeometryError
-        When there is no rotor.
-    """
+    """Separate the rotor from what stands beside it and find its axis."""
     parts = _bodies(points, faces)
     large = [p for p in parts if len(p) >= 20]
     options: list[tuple[Faces, str]] = [(faces, "")]

@@ -25,18 +25,7 @@ class Cut(NamedTuple):
 
 
 def loop_area(loop: Array) -> float:
-    """Signed area of an outline.
-
-    Parameters
-    ----------
-    loop : (N, 2) float
-        Outline. [any unit]
-
-    Returns
-    -------
-    float
-        Positive when counter-clockwise. [that unit squared]
-    """
+    """Signed area of an outline. [that unit squared]"""
     x, y = (loop - loop.mean(axis=0)).T
     return 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
 
@@ -80,20 +69,7 @@ def _along(loop: Array, nose: Array, tail: Array) -> Array:
 
 
 def nose_first(loop: Array) -> tuple[Array, Array, float]:
-    """Tell the leading from the trailing edge: the greater thickness lies nearer to the leading edge.
-
-    Parameters
-    ----------
-    loop : (N, 2) float
-        Outline. [any unit]
-
-    Returns
-    -------
-    nose, tail : (2,) float
-        Ends of the section. [that unit]
-    clear : float
-        How far the middle of the area lies ahead of mid chord; near 0 says nothing. [-]
-    """
+    """Tell the leading from the trailing edge: the greater thickness lies nearer to the leading edge."""
     i, j = _farthest(loop)
     nose, tail = loop[i], loop[j]
     x = np.linspace(0.02, 0.98, 97)
@@ -129,18 +105,6 @@ def _refine(loop: Array, nose: Array, tail: Array) -> tuple[Array, Array]:
 
 def fit_section(loop: Array, n: int = 121) -> Cut | None:
     """Measure a section.
-
-    Parameters
-    ----------
-    loop : (N, 2) float
-        Outline: arc in the direction of motion, axial coordinate towards thrust. [any unit]
-    n : int
-        Points of the shape that is returned.
-
-    Returns
-    -------
-    Cut or None
-        None when the outline is no section.
 
     Examples
     --------

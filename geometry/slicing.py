@@ -95,29 +95,6 @@ def find_rotor(
 ) -> FoundRotor:
     """Find the rotor in a mesh and cut its blades.
 
-    Parameters
-    ----------
-    vertices : (N, 3) float
-        Corners, equal ones merged. [any unit]
-    faces : (M, 3) int
-        Triangles.
-    stations : int
-        Number of radii between hub and tip.
-    at : sequence of float or None
-        r/R of the stations instead. [-]
-    n : int
-        Points of the sections that are returned.
-
-    Returns
-    -------
-    FoundRotor
-        Axis, blades, stations.
-
-    Raises
-    ------
-    GeometryError
-        When no rotor is found, with the reason.
-
     Notes
     -----
     The shaft is the principal direction of inertia about which the cuts of all blades are alike to third moments. The

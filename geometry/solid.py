@@ -105,22 +105,7 @@ class Mesh:
 
 
 def skin(points: Array, closed_ends: bool = True) -> tuple[Array, Faces]:
-    """Mesh rings of one topology, with caps at both ends; the result is oriented outwards.
-
-    Parameters
-    ----------
-    points : (N, m, 3) float
-        Rings; m is odd for a blunt trailing edge, even for a sharp one. [m]
-    closed_ends : bool
-        Whether the first and the last ring are capped.
-
-    Returns
-    -------
-    vertices : (N m, 3) float
-        Corners. [m]
-    faces : (K, 3) int
-        Triangles.
-    """
+    """Mesh rings of one topology, with caps at both ends; the result is oriented outwards."""
     rows, m = points.shape[:2]
     index = np.arange(rows * m).reshape(rows, m)
     a, b = index[:-1], index[1:]
@@ -143,22 +128,7 @@ def skin(points: Array, closed_ends: bool = True) -> tuple[Array, Faces]:
 
 
 def revolve(profile: Array, segments: int) -> tuple[Array, Faces]:
-    """Mesh the solid of revolution of a closed profile; points on the axis become poles.
-
-    Parameters
-    ----------
-    profile : (k, 2) float
-        Radius and z. [m]
-    segments : int
-        Facets; their corners stand out so far that areas, hence volumes, are those of circles.
-
-    Returns
-    -------
-    vertices : (N, 3) float
-        Corners. [m]
-    faces : (M, 3) int
-        Triangles.
-    """
+    """Mesh the solid of revolution of a closed profile; points on the axis become poles."""
     scale = math.sqrt((2 * math.pi / segments) / math.sin(2 * math.pi / segments))  # keeps areas, hence volumes
     angle = 2 * math.pi * np.arange(segments) / segments
     ids, vertices = [], []
@@ -185,17 +155,7 @@ def revolve(profile: Array, segments: int) -> tuple[Array, Faces]:
 
 
 def profile_volume(profile: Array) -> float:
-    """Exact volume of revolution of a closed profile, a sum of cone frusta.
-
-    Parameters
-    ----------
-    profile : (k, 2) float
-        Radius and z. [m]
-
-    Returns
-    -------
-    float
-        Volume. [m^3]
+    """Exact volume of revolution of a closed profile, a sum of cone frusta. [m^3]
 
     Examples
     --------
@@ -208,27 +168,7 @@ def profile_volume(profile: Array) -> float:
 
 
 def as_solid(vertices: Array, faces: Faces, where: str) -> Any:
-    """Make a ``manifold3d.Manifold`` of a closed surface.
-
-    Parameters
-    ----------
-    vertices : (N, 3) float
-        Corners. [m]
-    faces : (M, 3) int
-        Triangles, counter-clockwise seen from outside.
-    where : str
-        Name for messages.
-
-    Returns
-    -------
-    manifold3d.Manifold
-        The solid, with an identity that its faces keep in unions.
-
-    Raises
-    ------
-    GeometryError
-        When the surface is not closed.
-    """
+    """Make a ``manifold3d.Manifold`` of a closed surface."""
     manifold3d = needs("manifold3d", "cad")
 
     data = manifold3d.Mesh64(np.ascontiguousarray(vertices, dtype=np.float64), faces.astype(np.uint64))
@@ -240,25 +180,7 @@ def as_solid(vertices: Array, faces: Faces, where: str) -> Any:
 
 
 def join(parts: Sequence[tuple[str, Any]], where: str) -> Mesh:
-    """Join named solids; every face keeps the name of the solid that it comes from.
-
-    Parameters
-    ----------
-    parts : sequence of (str, manifold3d.Manifold)
-        Surface names and solids.
-    where : str
-        Name for messages.
-
-    Returns
-    -------
-    Mesh
-        The union.
-
-    Raises
-    ------
-    GeometryError
-        When it is empty.
-    """
+    """Join named solids; every face keeps the name of the solid that it comes from."""
     manifold3d = needs("manifold3d", "cad")
 
     total = manifold3d.Manifold.batch_boolean([solid for _, solid in parts], manifold3d.OpType.Add)
@@ -284,22 +206,7 @@ def join(parts: Sequence[tuple[str, Any]], where: str) -> Mesh:
 
 
 def check_closed(mesh: Mesh, where: str, bodies: int | None = None) -> None:
-    """Check with trimesh that a mesh is a solid.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        The mesh.
-    where : str
-        Name for messages.
-    bodies : int or None
-        How many separate bodies there must be; None does not ask.
-
-    Raises
-    ------
-    GeometryError
-        With everything that is wrong.
-    """
+    """Check with trimesh that a mesh is a solid."""
     solid = mesh.trimesh()
     faults = Faults()
     if not np.isfinite(mesh.vertices).all():

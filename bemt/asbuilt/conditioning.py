@@ -67,37 +67,6 @@ def condition(
 ) -> Conditioned:  # fmt: skip
     """Posterior of a rotor's latent numbers from readings of a reference run.
 
-    Parameters
-    ----------
-    solve : callable
-        (K,) latent numbers to (M,) readings of the real solver with everything else of the case on, in any unit
-        (thrust and torque one after the other, coefficients, ...).  Called 2 K + 1 times per step; not finite where it
-        did not converge, and then the row is left out.
-    prior : Prior
-        What is known without the run.
-    y : (M,) float
-        Readings, same unit as ``solve`` gives.
-    noise : (M, M) float
-        Covariance of the readings without the latent numbers: instrument, session, and the smooth rest of the solver
-        (`bemt.asbuilt.population.Population.rest`), same unit squared.
-    noise_sizes, noise_weights : (R,) float, optional
-        Factors on the standard deviations of the noise and their probabilities: its heavy tail, one size for the run
-        (`Population.rest_sizes`, `WEIGHTS`); none by default [1].
-    tolerance : float
-        Share of a posterior standard deviation [1].
-    most : int
-        Largest number of steps [1].
-
-    Returns
-    -------
-    Conditioned
-        Posterior; ``converged`` False if it did not stand still.
-
-    Raises
-    ------
-    ValueError
-        If no row is finite or the shapes do not fit.
-
     Notes
     -----
     DIAGNOSIS section 7.  With L L^T = noise, A = L^-1 T and the prior whitened, z+ = (I + A^T A)^-1 A^T L^-1 (y - f0),

@@ -243,24 +243,7 @@ _GAPS = tuple(_NAMES.index(n) for n in ("ln_stations", "ln_label", "ln_family", 
 def fit(
     rotors: Sequence[Measured], start: Array | None = None, most: int = 80, provenance: Mapping[str, Any] | None = None
 ) -> tuple[Population, Array]:
-    """Fit a population.
-
-    Parameters
-    ----------
-    rotors : sequence of Measured
-        Rows of points; they are binned here.
-    start : (P,) float, optional
-        Numbers of an earlier search [1].
-    most : int
-        Largest number of steps of the search [1].
-    provenance : mapping, optional
-        Goes into the file.
-
-    Returns
-    -------
-    (Population, (P,) float)
-        Population with the offsets of the families at hand, and the numbers of the search.
-    """
+    """Fit a population, (Population, (P,)."""
     from scipy.optimize import minimize
 
     rows = [binned(m) for m in rotors]

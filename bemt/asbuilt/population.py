@@ -156,35 +156,7 @@ class Population:
         self, known_from: str, diameter_m: float, gap_deg: float = math.nan, family: str | None = None,
         section: str = "given", declared: Collection[str] = (), sds: Mapping[str, float] | None = None,
     ) -> Prior:  # fmt: skip
-        """What is known of one rotor.
-
-        Parameters
-        ----------
-        known_from : str
-            One of `KNOWN_FROM` but ``reference``.
-        diameter_m : float
-            Diameter [m].
-        gap_deg : float
-            Blade angle at 0.75 R as stated less that of the label, see `label_angle_deg`; NaN without a label [deg].
-        family : str, optional
-            Family in the naming of the UIUC database.
-        section : str
-            One of `SECTIONS`.
-        declared : collection of str
-            Of ``angle``, ``chord``, ``camber``: what the case moves by assumptions of its own and must not count twice.
-        sds : mapping, optional
-            Standard deviations by who knows better, by the names of `NAMES`.
-
-        Returns
-        -------
-        Prior
-            For `bemt.asbuilt.predict` and `bemt.asbuilt.conditioning`.
-
-        Raises
-        ------
-        ValueError
-            For an unknown word.
-        """
+        """What is known of one rotor."""
         if known_from not in KNOWN_FROM or known_from == "reference" or section not in SECTIONS:
             raise ValueError(f"got {known_from!r}, {section!r}; expected one of {KNOWN_FROM[:-1]} and of {SECTIONS}")
         growth = self.growth(diameter_m)
@@ -228,24 +200,7 @@ class Population:
         return np.asarray((end * x**2 + 4.0 * middle * x * (1.0 - x)) * np.abs(top))
 
     def rest(self, diameter_m: float, x: Array, Re: Array, f: Array, top: Array) -> Array:
-        """Covariance of the smooth rest.
-
-        Parameters
-        ----------
-        diameter_m : float
-            Diameter [m].
-        x : (P,) float
-            J over the solver's zero-thrust J [1].
-        Re : (P,) float
-            At 0.75 R [1].
-        f, top : (2, P) float
-            The solver's CT and CP, and those at rest at the same rpm [1].
-
-        Returns
-        -------
-        (2 P, 2 P) float
-            CT rows first, in the unit of the coefficients, squared [1].
-        """
+        """Covariance of the smooth rest. [1]"""
         amplitude = self.rest_sd(diameter_m, f, top).reshape(-1)
         return np.asarray(self.nearness(x, Re, x, Re) * np.outer(amplitude, amplitude))
 
@@ -258,13 +213,7 @@ class Population:
 
     @staticmethod
     def of(document: Mapping[str, Any]) -> Population:
-        """Population of a file.
-
-        Raises
-        ------
-        ValueError
-            If the file holds other latent numbers.
-        """
+        """Population of a file."""
         plain = dict(document)
         if tuple(plain.pop("latents")) != NAMES:
             raise ValueError(f"got latent numbers {document['latents']}; expected {NAMES}")

@@ -97,24 +97,7 @@ def zero_thrust(solve: Solve, z: Array, rpm: float, which: int = 0) -> float:
 
 
 def sense(solve: Solve, diameter_m: float, rpm: Array, J: Array, Re: Array, z: Array | None = None) -> Sensed:
-    """Solve points and take the slopes there, 2 K + 3 calls.
-
-    Parameters
-    ----------
-    solve : callable
-        See `Solve`.
-    diameter_m : float
-        Diameter [m].
-    rpm, J, Re : (P,) float
-        Points [rev/min], [1], [1].
-    z : (K,) float, optional
-        Latent numbers of the slopes; the drawing's by default [units of `NAMES`].
-
-    Returns
-    -------
-    Sensed
-        NaN where not converged.
-    """
+    """Solve points and take the slopes there, 2 K + 3 calls."""
     z = np.zeros(len(NAMES)) if z is None else z
     points = np.arange(rpm.size)
     f = solve(z, rpm, J, points)
@@ -128,26 +111,7 @@ def sense(solve: Solve, diameter_m: float, rpm: Array, J: Array, Re: Array, z: A
 def predict(
     p: Population, prior: Prior, at: Sensed, mean: Array | None = None, reference: Reference | None = None
 ) -> Prediction:
-    """Expectation and scatter at points.
-
-    Parameters
-    ----------
-    p : Population
-        For the rest.
-    prior : Prior
-        What is known of the latent numbers; after a reference run its posterior.
-    at : Sensed
-        The solver there.
-    mean : (2, P) float, optional
-        The real solver at ``prior.mean``; by default the linear one [1].
-    reference : Reference, optional
-        Run that the rotor's posterior comes from: it also tells of the rest nearby.
-
-    Returns
-    -------
-    Prediction
-        At the points.
-    """
+    """Expectation and scatter at points."""
     T = at.T
     if mean is None:
         mean = at.f + np.einsum("ckp,k->cp", T, prior.mean)

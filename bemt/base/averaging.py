@@ -93,17 +93,7 @@ def _spread(values: Array, mean: float | None) -> float | None:
 
 
 def time_steps(time: ArrayLike) -> Array:
-    """Give the time step that each row stands for.
-
-    Parameters
-    ----------
-    time : (N,) array
-        Times at the ends of the steps, ascending. [s]
-
-    Returns
-    -------
-    (N,) array
-        Steps [s]; the first row, whose step is not recorded, gets that of the second, or none at time zero.
+    """Give the time step that each row stands for, (N,) [s].
 
     Examples
     --------
@@ -119,28 +109,6 @@ def time_steps(time: ArrayLike) -> Array:
 
 def revolution_average(time: ArrayLike, values: ArrayLike, period: float, revolutions: int | None = None) -> Average:
     """Average over the last whole revolutions, by time.
-
-    Parameters
-    ----------
-    time : (N,) array
-        Times at the ends of the steps, strictly ascending; the step may change. [s]
-    values : (N,) array
-        What is averaged.
-    period : float
-        Duration of a revolution. [s]
-    revolutions : int or None
-        How many, counted back from the end; None takes 4, or half of the whole revolutions if that is fewer.
-
-    Returns
-    -------
-    Average
-        With ``problem`` and no mean when the run is shorter than asked for, when it has a gap or a NaN in the averaged
-        part, or when it has fewer than 12 rows in a revolution.
-
-    Raises
-    ------
-    InputError
-        When the period is not a positive number, the count is below 1, lengths differ or time does not ascend.
 
     Examples
     --------
@@ -201,18 +169,6 @@ def revolution_average(time: ArrayLike, values: ArrayLike, period: float, revolu
 def steady_average(values: ArrayLike, share: float = STEADY_SHARE) -> Average:
     """Average over the last part of a run that has no time.
 
-    Parameters
-    ----------
-    values : (N,) array
-        History by iterations.
-    share : float
-        Part averaged, from the end; at least 10 rows where there are. [1]
-
-    Returns
-    -------
-    Average
-        ``drift`` is that of the line of least squares through the part; None below 3 rows.
-
     Examples
     --------
     >>> import numpy as np
@@ -240,22 +196,8 @@ def keep_last(clock: ArrayLike, name: str = "step") -> tuple[NDArray[np.intp], t
     """Find the rows that hold when a history repeats or goes back: the later one wins.
 
     A run that was restarted from an earlier state writes its steps again; everything that was recorded from that step
-    on belongs to an abandoned branch and is dropped. A single row out of order is damage, not a restart: it is dropped
-    itself.
-
-    Parameters
-    ----------
-    clock : (N,) array
-        Step numbers or times as recorded; NaN rows are dropped.
-    name : str
-        For the notes.
-
-    Returns
-    -------
-    index : (M,) array of int
-        Rows to keep; their clock ascends strictly.
-    notes : tuple of str
-        What was dropped and why.
+    on belongs to an abandoned branch and is dropped. A single row out of order is damage, not a restart: it is
+    dropped itself.
 
     Examples
     --------
@@ -311,17 +253,6 @@ def _ascending(c: Array, order: NDArray[np.intp], name: str) -> tuple[NDArray[np
 
 def relation(first: Sequence[ArrayLike], second: Sequence[ArrayLike]) -> str:
     """Tell how the history of a restart file relates to that of the file before it.
-
-    Parameters
-    ----------
-    first, second : pair of (N,) arrays
-        Steps and times [s] of each; times may be empty.
-
-    Returns
-    -------
-    str
-        ``continues`` (steps and time go on), ``overlaps`` (same clock, some steps twice) or ``other clock`` (the same
-        steps at other times, or a start anew): never to be joined.
 
     Examples
     --------

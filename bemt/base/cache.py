@@ -36,11 +36,6 @@ _watched: list[dict[tuple[str, str], Arrays]] = []
 def cache_dir() -> Path | None:
     """Folder of the disk cache, or None when it is switched off.
 
-    Returns
-    -------
-    Path or None
-        The folder; it need not exist yet.
-
     Notes
     -----
     A home folder that cannot be found counts as switched off.
@@ -59,16 +54,6 @@ def cache_dir() -> Path | None:
 
 def content_key(*parts: object) -> str:
     """Hash of everything that decides a result.
-
-    Parameters
-    ----------
-    *parts : object
-        Numbers, strings, None, tuples, lists or dicts of them, and numpy arrays. Floats are taken exactly.
-
-    Returns
-    -------
-    str
-        SHA-256 as 64 hexadecimal digits.
 
     Examples
     --------
@@ -97,20 +82,6 @@ def _plain(value: object) -> object:
 
 def cached_arrays(kind: str, key: str, make: Callable[[], Arrays]) -> Arrays:
     """Arrays of a cache entry, made and kept when absent.
-
-    Parameters
-    ----------
-    kind : str
-        Sub-folder, for example ``"polar"``.
-    key : str
-        Name of the entry, from `content_key`.
-    make : callable
-        Makes the named arrays when neither memory nor disk has them.
-
-    Returns
-    -------
-    dict of str to ndarray
-        Read-only arrays, the same bits whether made now or read back.
 
     Notes
     -----
@@ -150,11 +121,6 @@ def cached_arrays(kind: str, key: str, make: Callable[[], Arrays]) -> Arrays:
 def used() -> Iterator[dict[tuple[str, str], Arrays]]:
     """Collect the entries that are asked for, so that another process can be given them.
 
-    Yields
-    ------
-    dict of (str, str) to dict
-        (kind, key) to arrays; it fills while the context is open.
-
     Examples
     --------
     >>> with used() as entries:
@@ -173,21 +139,6 @@ def used() -> Iterator[dict[tuple[str, str], Arrays]]:
 @lru_cache(maxsize=16)
 def installed_version(package: str) -> str:
     """Version of an installed package, found without importing it.
-
-    Parameters
-    ----------
-    package : str
-        Name of the package as it is imported; its distribution bears the same name.
-
-    Returns
-    -------
-    str
-        Version.
-
-    Raises
-    ------
-    importlib.metadata.PackageNotFoundError
-        When it is not installed.
 
     Notes
     -----

@@ -11,14 +11,7 @@ __all__ = ["data_roots", "find_data"]
 
 
 def data_roots() -> list[Path]:
-    """Folders that may hold databases, first to last.
-
-    Returns
-    -------
-    list of Path
-        ``$BEMT_DATA``, without that variable ``../shared/data`` beside the project; then ``data`` in the cache (filled
-        by ``python -m bemt data``). They need not exist.
-    """
+    """Folders that may hold databases, first to last."""
     named = os.environ.get("BEMT_DATA")
     first = Path(named).expanduser() if named else Path(__file__).resolve().parents[3] / "shared" / "data"
     cache = cache_dir()
@@ -27,16 +20,6 @@ def data_roots() -> list[Path]:
 
 def find_data(kind: str) -> Path | None:
     """Folder of one database.
-
-    Parameters
-    ----------
-    kind : str
-        Name of its folder: ``uiuc``, ``apc``, ...
-
-    Returns
-    -------
-    Path or None
-        The first that exists; None when there is none.
 
     Examples
     --------

@@ -27,20 +27,6 @@ _POWERS = 10.0 ** np.arange(0, 23)
 def number_text(value: float | None, digits: int = 4, none: str = "-") -> str:
     """Show a number with some significant digits, without exponent where that is short.
 
-    Parameters
-    ----------
-    value : float or None
-        Number in the unit of its column; None and NaN give `none`.
-    digits : int
-        Significant digits.
-    none : str
-        Text for a missing value.
-
-    Returns
-    -------
-    str
-        The number.
-
     Examples
     --------
     >>> number_text(24.0851), number_text(0.110419), number_text(123456.0), number_text(None), number_text(0.0)
@@ -59,18 +45,6 @@ def number_text(value: float | None, digits: int = 4, none: str = "-") -> str:
 
 def plain(value: Any, digits: int = 10) -> Any:
     """Make a value fit for JSON: NaN and infinities become None, floats keep some significant digits.
-
-    Parameters
-    ----------
-    value : object
-        Numbers, texts, mappings, sequences, numpy scalars and arrays of them.
-    digits : int
-        Significant digits.
-
-    Returns
-    -------
-    object
-        Dictionaries, lists, texts, numbers, booleans, None.
 
     Examples
     --------
@@ -91,18 +65,7 @@ def plain(value: Any, digits: int = 10) -> Any:
 
 
 def json_text(document: Any) -> str:
-    """Give a JSON text that depends on nothing but the document.
-
-    Parameters
-    ----------
-    document : object
-        As `plain` takes it.
-
-    Returns
-    -------
-    str
-        Indented, keys in their order, ends with a newline.
-    """
+    """Give a JSON text that depends on nothing but the document."""
     return json.dumps(plain(document), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
@@ -110,22 +73,6 @@ def text_table(
     header: Sequence[str], rows: Iterable[Sequence[str]], left: Iterable[int] = (0,), indent: str = ""
 ) -> str:
     """Align columns.
-
-    Parameters
-    ----------
-    header : sequence of str
-        Column names.
-    rows : iterable of sequence of str
-        Cells.
-    left : iterable of int
-        Columns to align left; the others go right.
-    indent : str
-        Put before every line.
-
-    Returns
-    -------
-    str
-        Lines without a newline at the end.
 
     Examples
     --------
@@ -145,20 +92,7 @@ def text_table(
 
 
 def csv_text(columns: Sequence[str], rows: Iterable[Mapping[str, Any]]) -> str:
-    """Give rows as CSV; lists are joined by "; ", missing values are empty.
-
-    Parameters
-    ----------
-    columns : sequence of str
-        Header.
-    rows : iterable of mapping
-        Rows; further keys are left out.
-
-    Returns
-    -------
-    str
-        Text with LF line ends.
-    """
+    """Give rows as CSV; lists are joined by "; ", missing values are empty."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(columns)
@@ -221,17 +155,6 @@ def _value_cells(values: NDArray[np.float64]) -> NDArray[np.uint8]:
 def csv_block(columns: Sequence[NDArray[Any] | tuple[NDArray[np.float64], NDArray[np.intp]]]) -> bytes:
     """Format many rows of numbers as CSV, about ten times faster than a loop.
 
-    Parameters
-    ----------
-    columns : sequence
-        Each a float (n,) array (7 significant digits), a bool (n,) array (0 or 1), or a pair (values, index) for a
-        column that takes few values (shortest form).
-
-    Returns
-    -------
-    bytes
-        n lines without a header.
-
     Examples
     --------
     >>> axis = (np.array([5000.0, 20000.0]), np.array([0, 1]))
@@ -254,20 +177,7 @@ def csv_block(columns: Sequence[NDArray[Any] | tuple[NDArray[np.float64], NDArra
 
 
 def write_atomic(path: Path, data: bytes | str) -> None:
-    """Write a file under a temporary name and rename it, so that no half file is ever seen.
-
-    Parameters
-    ----------
-    path : Path
-        Target; its folder is made.
-    data : bytes or str
-        Content; text is written as UTF-8.
-
-    Raises
-    ------
-    OSError
-        When it cannot be written; its `filename` is the target.
-    """
+    """Write a file under a temporary name and rename it, so that no half file is ever seen."""
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
@@ -282,29 +192,12 @@ def write_atomic(path: Path, data: bytes | str) -> None:
 
 
 def remove_stale(folder: Path) -> None:
-    """Remove what an interrupted run left behind.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of results; it need not exist.
-    """
+    """Remove what an interrupted run left behind."""
     for leftover in folder.glob(".*.tmp"):
         leftover.unlink(missing_ok=True)
 
 
 def file_hash(path: Path) -> str:
-    """SHA-256 of a file of any size.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    str
-        Hexadecimal.
-    """
+    """SHA-256 of a file of any size."""
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()

@@ -103,28 +103,12 @@ class Collector:
         self.faults: list[Fault] = []
 
     def add(self, where: str, got: str, expected: str, hint: str = "") -> None:
-        """Add one fault.
-
-        Parameters
-        ----------
-        where, got, expected, hint : str
-            As in :class:`bemt.base.errors.Fault`.
-        """
+        """Add one fault."""
         self.faults.append(Fault(self.file, where, got, expected, hint))
 
 
 def shown(value: Any) -> str:
     """Show a TOML value shortly, as a user wrote it.
-
-    Parameters
-    ----------
-    value : object
-        Anything that tomllib returns.
-
-    Returns
-    -------
-    str
-        At most about 60 characters.
 
     Examples
     --------
@@ -206,22 +190,6 @@ def _check_axis(out: Collector, where: str, value: Any, key: Key) -> bool:
 def check_value(out: Collector, where: str, value: Any, key: Key) -> bool:
     """Check one value; add what is wrong to the collector.
 
-    Parameters
-    ----------
-    out : Collector
-        Receives the faults.
-    where : str
-        Dotted key.
-    value : object
-        Value as tomllib returned it.
-    key : Key
-        What it must be.
-
-    Returns
-    -------
-    bool
-        True when nothing was wrong.
-
     Examples
     --------
     >>> out = Collector("case.toml")
@@ -284,23 +252,6 @@ def check_table(
 ) -> None:
     """Check one table against its schema: unknown keys, missing keys, each value.
 
-    Parameters
-    ----------
-    out : Collector
-        Receives the faults.
-    table : str
-        Name of the table in the schema ("" for the top of the file).
-    value : object
-        The table as tomllib returned it.
-    schema : mapping
-        Table name to (key name to Key).
-    where : str, optional
-        Dotted place for messages; the table's name by default.
-    subtables : iterable of str
-        Names of tables inside this one that are checked elsewhere.
-    homes : mapping, optional
-        Tables that "belongs in" hints may name; the whole schema by default.
-
     Examples
     --------
     >>> out = Collector("case.toml")
@@ -329,20 +280,7 @@ def check_table(
 
 
 def load_toml(path: str | Path, out: Collector) -> dict[str, Any] | None:
-    """Read a TOML file; faults carry line and column.
-
-    Parameters
-    ----------
-    path : str or Path
-        File to read (UTF-8, a byte-order mark is accepted).
-    out : Collector
-        Receives the faults.
-
-    Returns
-    -------
-    dict or None
-        The document, or None when it could not be read.
-    """
+    """Read a TOML file; faults carry line and column."""
     try:
         raw = Path(path).read_bytes()
     except FileNotFoundError:
@@ -464,20 +402,6 @@ T = TypeVar("T", bound=Table)
 
 def validated(model: type[T], document: Mapping[str, Any], out: Collector) -> T | None:
     """Make a typed model of a document; add what is wrong to the collector.
-
-    Parameters
-    ----------
-    model : subclass of Table
-        What the document should be.
-    document : mapping
-        As tomllib returned it.
-    out : Collector
-        Receives every fault, in the order of the file; missing keys come last.
-
-    Returns
-    -------
-    Table or None
-        The model, or None when something is wrong.
 
     Examples
     --------

@@ -140,23 +140,6 @@ def _get(unit: str) -> Unit:
 def to_si(value: Numeric, unit: str) -> Numeric:
     """Convert a value to SI.
 
-    Parameters
-    ----------
-    value : float or (N,) ndarray
-        Value in `unit`.
-    unit : str
-        A suffix of `UNITS`.
-
-    Returns
-    -------
-    float or (N,) ndarray
-        Value in SI units and radians (K for temperatures).
-
-    Raises
-    ------
-    InputError
-        If the unit is unknown.
-
     Examples
     --------
     >>> to_si(10.0, "in")
@@ -171,23 +154,6 @@ def to_si(value: Numeric, unit: str) -> Numeric:
 def from_si(value: Numeric, unit: str) -> Numeric:
     """Convert an SI value to a unit.
 
-    Parameters
-    ----------
-    value : float or (N,) ndarray
-        Value in SI units.
-    unit : str
-        A suffix of `UNITS`.
-
-    Returns
-    -------
-    float or (N,) ndarray
-        Value in `unit`.
-
-    Raises
-    ------
-    InputError
-        If the unit is unknown.
-
     Examples
     --------
     >>> round(from_si(27.0, "kgf"), 4)
@@ -198,24 +164,7 @@ def from_si(value: Numeric, unit: str) -> Numeric:
 
 
 def convert(value: Numeric, unit: str, to: str) -> Numeric:
-    """Convert between two units of the same dimension.
-
-    Parameters
-    ----------
-    value : float or (N,) ndarray
-        Value in the unit `unit`. [unit]
-    unit, to : str
-        Suffixes of `UNITS`.
-
-    Returns
-    -------
-    float or (N,) ndarray
-        Value in the unit `to`. [to]
-
-    Raises
-    ------
-    InputError
-        If a unit is unknown or the dimensions differ.
+    """Convert between two units of the same dimension. [to]
 
     Examples
     --------
@@ -238,18 +187,6 @@ def split_suffix(key: str) -> tuple[str, Unit | None]:
 
     The longest suffix wins, so ``speed_m_s`` is metres per second and not seconds.
 
-    Parameters
-    ----------
-    key : str
-        Such as ``diameter_in``.
-
-    Returns
-    -------
-    name : str
-        Key without its suffix.
-    unit : Unit or None
-        None when no known suffix ends the key.
-
     Examples
     --------
     >>> name, unit = split_suffix("airspeed_m_s")
@@ -268,16 +205,6 @@ def split_suffix(key: str) -> tuple[str, Unit | None]:
 
 def suffixes(dimension: str) -> tuple[str, ...]:
     """List the suffixes of a dimension, SI first.
-
-    Parameters
-    ----------
-    dimension : str
-        Such as ``length``.
-
-    Returns
-    -------
-    tuple of str
-        Empty when the dimension is unknown.
 
     Examples
     --------

@@ -73,17 +73,7 @@ class LipLoss(NamedTuple):
 
 
 def lip_loss(radius_over_diameter: float) -> LipLoss:
-    """Inlet loss of a rounded duct lip at rest.
-
-    Parameters
-    ----------
-    radius_over_diameter : float
-        Lip radius over the hydraulic diameter of the passage [1].
-
-    Returns
-    -------
-    LipLoss
-        Loss of total pressure over 1/2 rho w^2, and its range [1].
+    """Inlet loss of a rounded duct lip at rest. [1]
 
     Notes
     -----
@@ -137,20 +127,7 @@ class DuctFlow:
     taper: float = 0.0
 
     def total(self, rho: Array, V: Array, out: Array) -> tuple[Array, Array, Array]:
-        """Thrust of rotor, stator and duct together.
-
-        Parameters
-        ----------
-        rho, V : (P,) float
-            Density [kg/m3], onset speed [m/s].
-        out : (P, 11) float
-            Kernel output [N, N m, kg/s, kg m/s2, ...], see :func:`bemt.bem.kernel.entry`.
-
-        Returns
-        -------
-        tuple of (P,) float
-            Total thrust [N], stator thrust [N], mean speed in the exit plane, mass flow / (rho A_exit) [m/s].
-        """
+        """Thrust of rotor, stator and duct together."""
         mdot, jet, stator, spin = out[:, 2], out[:, 3], out[:, 4], out[:, 10]
         T = jet - mdot * V - 0.5 * rho * V * np.abs(V) * self.drag_area
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -159,25 +136,7 @@ class DuctFlow:
 
 
 def duct_flow(duct: Duct, rotor: Rotor) -> DuctFlow:
-    """Momentum numbers of a duct around a rotor.
-
-    Parameters
-    ----------
-    duct : geometry.duct.DuctEffect
-        Duct.
-    rotor : geometry.rotor.Rotor
-        Rotor inside it.
-
-    Returns
-    -------
-    DuctFlow
-        For :func:`bemt.bem.solver.prepare`.
-
-    Raises
-    ------
-    ValueError
-        If the duct does not fit the rotor.
-    """
+    """Momentum numbers of a duct around a rotor."""
     duct.check(rotor)
     hydraulic = 2.0 * (duct.inner_radius - rotor.Rhub)
     outer = duct.inner_radius + duct.lip_radius

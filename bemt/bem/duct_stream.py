@@ -38,20 +38,7 @@ class JetArea(NamedTuple):
 
 
 def jet_area(duct: Duct, hub_radius: float) -> JetArea:
-    """Jet area over exit area; flow through the exit = exit area x (in_stream V + at_rest (Vj - V)).
-
-    Parameters
-    ----------
-    duct : geometry.duct.Duct
-        Duct; an open trailing edge is closed in its middle.
-    hub_radius : float
-        Radius of the body at the rotor [m].
-
-    Returns
-    -------
-    JetArea
-        Ratios [1].
-    """
+    """Jet area over exit area; flow through the exit = exit area x (in_stream V + at_rest (Vj - V)). [1]"""
     walls = (duct.length, duct.lip_radius, duct.lip_length, duct.exit_radius, duct.exit_hub_radius, duct.rotor_x,
              duct.bore_end, duct.te_thickness, hub_radius)  # fmt: skip
     over_bore = tuple(round(float(v or 0.0) / duct.inner_radius, 9) for v in walls)

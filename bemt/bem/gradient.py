@@ -73,31 +73,6 @@ def gradient(
 ) -> Gradient:
     """Differentiate the rotor's thrust and torque at one point.
 
-    Parameters
-    ----------
-    model : bemt.bem.model.Model
-        Rotor, section tables, duct.
-    effects : sequence of Effect
-        Physics that is on; effects around the solver (walls, lags) have no elements and are refused.
-    rpm, airspeed_m_s : float
-        The point. [rev/min], [m/s]
-    air : Air
-        State of the air.
-    stations : Stations, optional
-        Blade elements; those of the model by default.
-    step : float
-        Relative step of the central differences [1].
-
-    Returns
-    -------
-    Gradient
-        Loads and derivatives.
-
-    Raises
-    ------
-    InputError
-        When a point is not converged, or an effect acts around the solver.
-
     Notes
     -----
     Section tables are linear between their nodes: a derivative is that of the cell in which the element works and jumps

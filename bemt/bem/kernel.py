@@ -407,37 +407,6 @@ _ENTRIES = _entries(fingerprint(residual, vecmath))
 
 
 def entry(ducted: bool, tables: str) -> Callable[..., None]:
-    """Entry point that solves a batch of operating points; compiled when first called.
-
-    Parameters
-    ----------
-    ducted : bool
-        Whether the rotor runs in a duct.
-    tables : {"plain", "full", "factored"}
-        Neither a Reynolds nor a Mach axis; both; or tables over Reynolds number and, apart, over Mach number.
-
-    Returns
-    -------
-    function
-        ``f(points, st, tab, par, out, radial)``, all of float:
-
-        points : (P, 5)
-            Rotation speed [rad/s], axial onset speed [m/s], density [kg/m3], viscosity [Pa s], sound speed [m/s].
-        st : (N, 14)
-            r, dr, chord [m], beta [rad], local solidity, roots of the tip and hub loss exponents times sin(phi),
-            ln(chord), zero-lift angle [rad] and lift slope [1/rad] for the first guess, added axial and tangential
-            speed [m/s], factors on both onset speeds [1].
-        tab : (L,)
-            Section tables, flat: station, Mach number squared, Reynolds number, angle, (cl, cd); factored: station,
-            the Reynolds numbers and then the squared Mach numbers, angle, (cl, cd) or (factor on cl, added cd).
-        par : (30,)
-            The numbers ``num`` of :mod:`bemt.bem.residual`, then the grid (see the source).
-        out : (P, 11)
-            Filled: T, Q, mass flow, mass flow times disk speed (ducted: jet speed), stator thrust, worst status, its
-            station, number of stations in the turbulent windmill or vortex-ring state, where drag more than halves W,
-            with reversed flow; r times the swirl behind the innermost station [m2/s].
-        radial : (P, N, 11) or (P, 0, 11)
-            Filled when it has rows: phi, alpha, cl, cd, W, w, v_t, F, dT, dQ, status.
-    """
+    """Entry point that solves a batch of operating points; compiled when first called."""
     found: Callable[..., None] = _ENTRIES[ducted, tables]
     return found

@@ -133,27 +133,7 @@ class Model:
         return self._kept[key]
 
     def solve(self, rpm: ArrayLike, V: ArrayLike = 0.0, air: Air | None = None, threads: int = 1) -> Dataset:
-        """Solve operating points.
-
-        Parameters
-        ----------
-        rpm, V : array_like
-            Speed of rotation [rev/min], axial onset speed [m/s]; broadcast against each other to P points.
-        air : Air, optional
-            One state, or arrays (:func:`bemt.air.air_arrays`); 1.225 kg/m3 at 15 degC by default.
-        threads : int
-            Threads of the kernel; the answer does not depend on it [1].
-
-        Returns
-        -------
-        Dataset
-            Of kind ``bemt``, as :func:`solve` gives it.
-
-        Raises
-        ------
-        ValueError
-            If a speed is not finite, rpm is not positive or a property of the air is not positive.
-        """
+        """Solve operating points."""
         air = Air.from_density() if air is None else air
         s = solver.solve(self.prep, rpm, V, air, threads=threads)
         n, D = s.rpm / 60.0, self.diameter_m
@@ -182,20 +162,7 @@ class Model:
         return Dataset("bemt", name, values, flags=flags, provenance=provenance, notes=self.notes)
 
     def gradient(self, rpm: float, V: float = 0.0, air: Air | None = None) -> Gradient:
-        """Differentiate rotor thrust and torque at one point by every element's chord and angle, rpm, V, density.
-
-        Parameters
-        ----------
-        rpm, V : float
-            Speed of rotation [rev/min], axial onset speed [m/s].
-        air : Air, optional
-            State of the air; 1.225 kg/m3 at 15 degC by default.
-
-        Returns
-        -------
-        bemt.bem.gradient.Gradient
-            Loads and derivatives, see :func:`bemt.bem.gradient.gradient`.
-        """
+        """Differentiate rotor thrust and torque at one point by every element's chord and angle, rpm, V, density."""
         from bemt.bem.gradient import gradient
 
         return gradient(self, self.effects, rpm, V, Air.from_density() if air is None else air)
@@ -214,39 +181,6 @@ def solve(
     threads: int = 1,
 ) -> Dataset:
     """Solve a rotor at operating points.
-
-    Parameters
-    ----------
-    rotor : geometry.rotor.Rotor
-        Blades, blade count, hub.
-    polars : Polar or sequence of (float, Polar), optional
-        Section table of the whole blade, or tables at r/R; by default those of the sections of the blade, by the rule
-        (:func:`bemt.sections.neuralfoil.neuralfoil_polar`).
-    effects : sequence of Effect, optional
-        Physics that is on; :func:`bemt.effects.standard` by default.
-    duct : geometry.duct.Duct or bemt.bem.duct.DuctFlow, optional
-        Duct round the rotor.
-    rpm, V : array_like
-        Speed of rotation [rev/min], axial onset speed [m/s]; broadcast against each other to P points.
-    air : Air, optional
-        State of the air; 1.225 kg/m3 at 15 degC by default.
-    n_stations : int
-        Blade elements, cosine spaced [1].
-    threads : int
-        Threads of the kernel; the answer does not depend on it [1].
-
-    Returns
-    -------
-    Dataset
-        Of kind ``bemt``, NaN and flagged where not converged: ``rpm``, ``airspeed_m_s``, ``density_kg_m3``,
-        ``thrust_N`` (with a duct, all of it), ``torque_Nm``, ``power_W``, ``CT``, ``CP``, ``J``, ``eta``, ``M_tip``
-        (rotational), ``Re75``, ``rotor_thrust_N``, ``duct_thrust_N``, ``stator_thrust_N``, ``exhaust_speed_m_s`` (exit
-        or far wake), ``mass_flow_kg_s``, ``duct_share``.  Coefficients in the propeller convention.
-
-    Raises
-    ------
-    ValueError
-        If the blade has no section and no table is given, or a speed or a property of the air is out of range.
 
     Examples
     --------

@@ -19,23 +19,7 @@ __all__ = ["rotor_component"]
 
 
 def rotor_component(model: Model, effects: Sequence[Effect], air: Air) -> Any:
-    """Make a component of one rotor.
-
-    Parameters
-    ----------
-    model : bemt.bem.model.Model
-        Rotor, section tables, duct; its blade elements are the first values of the inputs.
-    effects : sequence of Effect
-        Physics that is on.
-    air : Air
-        State of the air; the input ``density`` replaces its density.
-
-    Returns
-    -------
-    openmdao.api.ExplicitComponent
-        Inputs ``chord`` [m], ``beta`` [rad] (N,), ``rpm`` [rev/min], ``airspeed`` [m/s], ``density`` [kg/m3]; outputs
-        ``thrust`` [N] (of the rotor) and ``torque`` [N m].
-    """
+    """Make a component of one rotor."""
     import openmdao.api as om
 
     start = model.rotor.blade.midpoints(model.n_stations, spacing="cosine")

@@ -264,26 +264,7 @@ def mass_share(s, w):
 
 @inlined
 def open_rotor(lookup, phi, UT, UP, i_UP, beta, sg4, tip, hub, lre0, base, tab, g, fx):
-    """Residual of an open rotor at one element.
-
-    Parameters
-    ----------
-    lookup : function
-        :func:`lookup_plain`, :func:`lookup_full` or :func:`lookup_factored`.
-    phi, UT, UP, i_UP, beta : float
-        Inflow angle [rad], onset speeds [m/s], 1/UP or 0 at rest [s/m], blade angle [rad].
-    sg4, tip, hub : float
-        sigma / 4, roots of Prandtl's exponents of tip and hub times sin(phi) (large where off).
-    lre0, base, tab, g : float, int, (L,) float, tuple
-        See :func:`lookup_plain`.
-    fx : tuple of float
-        The array ``num``.
-
-    Returns
-    -------
-    tuple of float
-        g, dg/dphi [m/s], cl, cd and their derivatives with phi, F and its, F M and its, sin(phi), cos(phi).
-    """
+    """Residual of an open rotor at one element. [m/s]"""
     s, c = sincos(phi)
     sa = abs(s)
     swirl = fx[N_SWIRL]

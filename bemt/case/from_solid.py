@@ -23,29 +23,7 @@ ANCHORS = (0.2, 0.35, 0.5, 0.65, 0.8, 0.95)
 
 
 def read_stations(path: Path, unit: str | None = None) -> tuple[FoundRotor, float, str]:
-    """Find the rotor in a file.
-
-    Parameters
-    ----------
-    path : Path
-        STL, OBJ or STEP.
-    unit : str or None
-        ``mm``, ``m`` or ``in``; needed when the file does not say, wrong when it says otherwise.
-
-    Returns
-    -------
-    found : FoundRotor
-        Axis, blades and stations, in the unit of the mesh.
-    scale : float
-        Length of that unit. [m]
-    unit : str
-        Where the unit comes from, in words.
-
-    Raises
-    ------
-    InputError
-        When the file holds no readable rotor or its unit is not known.
-    """
+    """Find the rotor in a file."""
     file = path.as_posix()
     try:
         if path.suffix.lower() in (".txt", ".csv", ".dat", ".pe0"):
@@ -76,24 +54,7 @@ def _csv(header: str, rows: list[list[str]]) -> str:
 
 
 def case_files(found: FoundRotor, scale: float, name: str, source: str) -> dict[str, str]:
-    """Write the found rotor as a case.
-
-    Parameters
-    ----------
-    found : FoundRotor
-        The rotor.
-    scale : float
-        Length of the mesh's unit. [m]
-    name : str
-        Name of the case.
-    source : str
-        File that it comes from.
-
-    Returns
-    -------
-    dict of str to str
-        File name to content: ``case.toml``, ``stations.csv``, ``sections.csv`` and one section file per anchor.
-    """
+    """Write the found rotor as a case."""
     x = found.r / found.R
     files: dict[str, str] = {}
     rows = [[f"{a:.6f}", f"{b:.6f}", f"{c:.5f}"] for a, b, c in

@@ -21,20 +21,6 @@ MAX_GRID = 50_000_000
 def check_case(out: Collector, document: Mapping[str, Any], folder: Path) -> CaseFile | None:
     """Check a whole case document; add every fault to the collector.
 
-    Parameters
-    ----------
-    out : Collector
-        Receives the faults.
-    document : mapping
-        The document as tomllib returned it.
-    folder : Path
-        Folder of the case file; named files are looked for there.
-
-    Returns
-    -------
-    CaseFile or None
-        The typed document, None when something is wrong.
-
     Examples
     --------
     >>> out = Collector("case.toml")

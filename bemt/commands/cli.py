@@ -111,11 +111,6 @@ def commands() -> dict[str, ModuleType]:
 def build_parser() -> argparse.ArgumentParser:
     """Make the parser of the whole command line.
 
-    Returns
-    -------
-    argparse.ArgumentParser
-        With one sub-parser per command.
-
     Examples
     --------
     >>> args = build_parser().parse_args(["sweep", "cases/", "--jobs", "2"])
@@ -150,18 +145,7 @@ def _check_folders(args: argparse.Namespace) -> None:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line.
-
-    Parameters
-    ----------
-    argv : sequence of str, optional
-        Arguments; those of the process by default.
-
-    Returns
-    -------
-    int
-        Exit code.
-    """
+    """Run the command line."""
     for stream in (sys.stdout, sys.stderr):  # a terminal that is not UTF-8 must not end a run
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")

@@ -61,33 +61,7 @@ def as_measured(
     case: Case, rpm: Array, airspeed_m_s: Array, air: Air, CT: Array, CP: Array,
     u_CT: Array | float = 0.0, u_CP: Array | float = 0.0, gain: tuple[float, float] = (SESSION, SESSION),
 ) -> AsMeasured:  # fmt: skip
-    """Posterior of a rotor's latent numbers from a reference run.
-
-    Parameters
-    ----------
-    case : Case
-        Rotor, physics, and how the blade is known.
-    rpm, airspeed_m_s : (P,) float
-        Points of the run [rev/min], [m/s].
-    air : Air
-        State of the air, one or one per point.
-    CT, CP : (P,) float
-        Readings in the propeller convention, NaN where not measured [1].
-    u_CT, u_CP : (P,) float or float
-        Standard uncertainty of single readings [1].
-    gain : tuple of float
-        Standard deviation of what all points of a channel share, of the reading [1].
-
-    Returns
-    -------
-    AsMeasured
-        Posterior and reference.
-
-    Raises
-    ------
-    ValueError
-        If no reading is usable.
-    """
+    """Posterior of a rotor's latent numbers from a reference run."""
     from bemt.case.prepare import prepare_case
 
     people, prior = population(), case.as_built().prior

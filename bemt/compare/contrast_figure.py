@@ -36,20 +36,7 @@ _STYLE: dict[Any, Any] = {
 
 
 def picture(change: RunChange, doc: Mapping[str, Any]) -> bytes:
-    """Draw it as PNG.
-
-    Parameters
-    ----------
-    change : RunChange
-        Outcome.
-    doc : mapping
-        ``bemt.comparison/1``, for the verdict.
-
-    Returns
-    -------
-    bytes
-        PNG of 8 inch width.
-    """
+    """Draw it as PNG."""
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

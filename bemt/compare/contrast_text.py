@@ -45,20 +45,7 @@ def _range(entry: Mapping[str, Any]) -> str:
 
 
 def text(doc: Mapping[str, Any], details: bool = False) -> str:
-    """Lines of a comparison.
-
-    Parameters
-    ----------
-    doc : mapping
-        ``bemt.comparison/1``.
-    details : bool
-        With the ranking, the sub-systems and all notes.
-
-    Returns
-    -------
-    str
-        For a terminal.
-    """
+    """Lines of a comparison."""
     lines = [f"verdict: {doc['verdict']}" + (f" {', '.join(doc['effects'])}" if doc["effects"] else "")]
     lines += _said(doc)
     rows = []

@@ -88,18 +88,7 @@ def document(
 
 
 def text(doc: dict[str, Any]) -> str:
-    """Give the rows as a table, with what not to trust below.
-
-    Parameters
-    ----------
-    doc : dict
-        Schema ``bemt.estimate/1``.
-
-    Returns
-    -------
-    str
-        Lines.
-    """
+    """Give the rows as a table, with what not to trust below."""
 
     def shown(value: float | None, digits: int = 4) -> str:
         return number_text(math.nan if value is None else value, digits)

@@ -211,22 +211,7 @@ def _averaged(part: dict[str, Array]) -> dict[str, Array]:
 
 
 def matched(a: StandRun, b: StandRun, name: str, diameter: float = math.nan) -> MatchedChannel | None:
-    """Bring one channel of two recordings together.
-
-    Parameters
-    ----------
-    a, b : StandRun
-        Recordings.
-    name : str
-        Of :data:`LOADS` or :data:`DRIVE`.
-    diameter : float
-        For the advance ratio [m]; NaN: advance per turn is used instead.
-
-    Returns
-    -------
-    MatchedChannel or None
-        None when one of them lacks the channel, or both have a command of another kind.
-    """
+    """Bring one channel of two recordings together."""
     choices = {**LOADS, **DRIVE}[name]
     if name in ("speed", "voltage") and (a.command != b.command or not a.command):
         return None
@@ -387,22 +372,7 @@ def taken(c: MatchedChannel, keep: NDArray[np.bool_]) -> MatchedChannel:
 
 
 def ratio_of(c: MatchedChannel, s: Scatter) -> dict[str, Any]:
-    """Ratio of B to A at equal speed.
-
-    Parameters
-    ----------
-    c : MatchedChannel
-        Channel.
-    s : Scatter
-        Of :func:`scatter_of`.
-
-    Returns
-    -------
-    dict
-        ``ratio``, ``low68`` ... ``high95`` over the common range, ``curve`` (coordinate, ratio, low95, high95),
-        ``slope`` per doubling of the speed (or over the range of the command), its error, ``advance_slope``;
-        ``extrapolated`` where the ranges do not overlap.
-    """
+    """Ratio of B to A at equal speed."""
     from scipy.linalg import cho_factor, cho_solve
 
     free, y = free_change(c), c.y - c.y.mean()

@@ -68,25 +68,7 @@ class RunChange:
 
 
 def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> RunChange:
-    """Compare two recordings.
-
-    Parameters
-    ----------
-    a, b : StandRun
-        Before and after, or with and without.
-    diameter_m : float
-        Diameter [m]; NaN takes that of the recordings, if they tell.
-
-    Returns
-    -------
-    RunChange
-        Ratios and verdicts.
-
-    Raises
-    ------
-    InputError
-        When they share no channel.
-    """
+    """Compare two recordings."""
     told = [d for d in (diameter_m, a.diameter_m, b.diameter_m) if math.isfinite(d)]
     diameter = told[0] if told else math.nan
     rotor = fits.prepared(a, b, tuple(fits.LOADS), diameter)
@@ -232,19 +214,7 @@ def next_step(change: RunChange, files: Sequence[str]) -> dict[str, str]:
 
 
 def document(change: RunChange) -> dict[str, Any]:
-    """The document ``bemt.comparison/1`` without a case.
-
-    Parameters
-    ----------
-    change : RunChange
-        Outcome.
-
-    Returns
-    -------
-    dict
-        ``verdict``, ``effects``, ``probability``, ``ranking`` as in a diagnosis; ``subsystems`` (air and stand in one:
-        loads, and drive); ``ratios`` per channel; ``assumed``, ``notes``.
-    """
+    """The document ``bemt.comparison/1`` without a case."""
     said = change.leading
     return {
         "schema": SCHEMA,

@@ -30,30 +30,12 @@ UIUC_POINTS, UIUC_PROPELLERS = 4122, 248
 
 
 def find_uiuc() -> Path | None:
-    """Folder of the UIUC data, see :func:`bemt.base.folders.find_data`.
-
-    Returns
-    -------
-    Path or None
-        None when there is none.
-    """
+    """Folder of the UIUC data, see :func:`bemt.base.folders.find_data`."""
     return find_data("uiuc")
 
 
 def uiuc_statistics(folder: Path) -> dict[str, Any]:
-    """Hold the K1/K2 model against measured propellers: nominal diameter and pitch, nothing fitted.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder in UIUC layout; sub-folders (volumes) are read too.
-
-    Returns
-    -------
-    dict
-        ``points`` and ``propellers`` at rest, ``median`` and ``sd`` of F/measured, ``within_13`` and ``within_26``
-        (fractions); in flight ``flight``: median F/measured per fifth of J/(P/D) below 1, ``flight_points``, and
-        ``zero_thrust``: mean measured zero-thrust J over P/D with ``zero_thrust_lines``. [-]
+    """Hold the K1/K2 model against measured propellers: nominal diameter and pitch, nothing fitted. [-]
 
     Notes
     -----
@@ -281,16 +263,6 @@ def _motor(f: th.ThesisFacts) -> None:
 def items(uiuc: dict[str, Any] | None = None) -> list[th.ThesisItem]:
     """Give every number of the thesis with ours and its status.
 
-    Parameters
-    ----------
-    uiuc : dict, optional
-        Outcome of `uiuc_statistics`; without it the UIUC numbers are "not checked: data absent".
-
-    Returns
-    -------
-    list of Item
-        In the order of the thesis.
-
     Examples
     --------
     >>> [i.status for i in items() if i.quantity == "8x5: K1/K2 recomputed before"]
@@ -304,14 +276,7 @@ def items(uiuc: dict[str, Any] | None = None) -> list[th.ThesisItem]:
 
 
 def findings() -> dict[str, Any]:
-    """Give what the searches found.
-
-    Returns
-    -------
-    dict
-        ``ds30`` (readings of 2.64), ``mach`` (supersonic tips, blindness), ``k1k2_print`` (roundings that give all four
-        printed values), ``printed_equation`` (relative change of thrust by a change of the unit of length).
-    """
+    """Give what the searches found."""
     ds30 = th.ds30_finding()
     plain = {key: _plain(value) for key, value in ds30.items()}
     return {
@@ -330,18 +295,7 @@ def _plain(value: Any) -> Any:
 
 
 def document(uiuc: dict[str, Any] | None = None) -> dict[str, Any]:
-    """Make the JSON document.
-
-    Parameters
-    ----------
-    uiuc : dict, optional
-        Outcome of `uiuc_statistics`.
-
-    Returns
-    -------
-    dict
-        Schema ``bemt.reproduce/1``.
-    """
+    """Make the JSON document."""
     rows = items(uiuc)
     return {"schema": SCHEMA, "version": __version__, "items": [asdict(i) for i in rows],
             "summary": {s: Counter(i.status for i in rows)[s] for s in th.STATUSES}, "findings": findings(),
@@ -349,18 +303,7 @@ def document(uiuc: dict[str, Any] | None = None) -> dict[str, Any]:
 
 
 def table(rows: list[th.ThesisItem]) -> str:
-    """Lay the items out in 100 columns.
-
-    Parameters
-    ----------
-    rows : list of Item
-        From `items`.
-
-    Returns
-    -------
-    str
-        Lines of at most 100 characters.
-    """
+    """Lay the items out in 100 columns."""
     out = [f"{'quantity':<41}{'stated':>10} {'ours':>10} {'unit':<8} status"]
     section = ""
     for i in rows:

@@ -451,28 +451,7 @@ def weigh(
     density_known: bool = False,
     speeds: tuple[float, float] | None = None,
 ) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
-    """Evidence of every explanation.
-
-    Parameters
-    ----------
-    channels : mapping of str to MatchedChannel
-        Of one sub-system.
-    scatters : sequence of mapping of str to Scatter
-        Settings of the scatter of each, which share the prior.
-    kinds : sequence of str
-        Kinds of laws that are asked.
-    density_known : bool
-        Whether both recordings tell their density, which is out of the readings already.
-    speeds : (float, float), optional
-        ln of the indicated speed of B over A at equal command, and its 95 % error. Other pole pairs show there, too.
-
-    Returns
-    -------
-    probability : dict
-        Explanation to probability, the likeliest first.
-    size : dict
-        Effect to size of its first term and standard error.
-    """
+    """Evidence of every explanation."""
     found = [_weighed(channels, scatter, kinds, density_known, speeds) for scatter in scatters]
     names = list(found[0][0])
     score = {k: float(np.logaddexp.reduce([z[k] for z, _ in found])) for k in names}

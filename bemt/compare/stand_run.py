@@ -133,25 +133,6 @@ def _of_rotor(imported: Imported, word: str, where: str) -> Imported:
 def selected(imported: Imported, conditions: Sequence[str], where: str) -> Imported:
     """Keep the rows, or the rotor, that a user means.
 
-    Parameters
-    ----------
-    imported : Imported
-        As read.
-    conditions : sequence of str
-        ``column=text``, ``column=number``, ``column=low:high`` (in the unit of the channel), or ``rotor=left``.
-    where : str
-        File, for faults.
-
-    Returns
-    -------
-    Imported
-        With these rows only.
-
-    Raises
-    ------
-    InputError
-        When a column or a value does not exist, or no row is left.
-
     Examples
     --------
     >>> made = Imported("table", "bench", 2, {"rpm": Channel(np.array([4e3, 5e3]), "rpm")}, lines=(2, 3))
@@ -197,29 +178,7 @@ def _cut(imported: Imported, index: NDArray[np.intp]) -> Imported:
 def stand_run(
     imported: Imported, name: str, diameter_m: float | None = None, conditions: Sequence[str] = ()
 ) -> StandRun:
-    """Reduce one recording for a comparison.
-
-    Parameters
-    ----------
-    imported : Imported
-        As read.
-    name : str
-        File, for faults and the answer.
-    diameter_m : float, optional
-        Diameter [m], where it is known.
-    conditions : sequence of str
-        Of :func:`selected`.
-
-    Returns
-    -------
-    StandRun
-        With a load, or with a speed and a command.
-
-    Raises
-    ------
-    InputError
-        When there is no steady point, or nothing to compare.
-    """
+    """Reduce one recording for a comparison."""
     imported = _with_units(selected(imported, conditions, name))
     reduced, ramp = _reduced(imported, diameter_m)
     series = reduced.series

@@ -79,19 +79,6 @@ class ThesisItem:
 def matches(stated: str, value: float) -> str | None:
     """Compare a computed number with a printed one, at the digits that were printed.
 
-    Parameters
-    ----------
-    stated : str
-        Printed number, such as "22.017" or "3.233e-3".
-    value : float
-        Computed number, same unit.
-
-    Returns
-    -------
-    str or None
-        `REPRODUCED` when it rounds to the printed digits, `ROUNDING` when it differs by less than one unit of the last
-        digit (cut off instead of rounded), None otherwise.
-
     Examples
     --------
     >>> matches("0.0308", 0.030779), matches("0.0307", 0.030779), matches("0.0306", 0.030779)
@@ -107,13 +94,7 @@ def matches(stated: str, value: float) -> str | None:
 
 
 def k1k2_variants() -> list[tuple[str, tuple[float, ...]]]:
-    """Search for the rounding of inputs that gives all four printed K1/K2 values.
-
-    Returns
-    -------
-    list of (str, (4,) tuple of float)
-        Variants, fewest changes first, whose four values agree with print to less than one unit of the last digit.
-        [kgf]
+    """Search for the rounding of inputs that gives all four printed K1/K2 values. [kgf]
 
     Notes
     -----
@@ -135,15 +116,7 @@ def k1k2_variants() -> list[tuple[str, tuple[float, ...]]]:
 
 
 def mach_blindness() -> dict[str, Any]:
-    """Find the supersonic tips, and whether the formula notices.
-
-    Returns
-    -------
-    dict
-        ``M_tip`` of the four propellers at 20 000 rev/min, ``supersonic`` (their names), and ``CT_spread``: largest
-        relative change of CT when rpm goes from tip Mach 0.05 to 1.5. A model that knows the Mach number changes; zero
-        means blind. [-]
-    """
+    """Find the supersonic tips, and whether the formula notices. [-]"""
     M = {f"{d}x{p}": float(co.M_tip(RPM_PROPS / 60, d * INCH, A_THESIS)) for d, p, *_ in PROPS}
     spread = 0.0
     for d, p, *_ in PROPS:
@@ -185,11 +158,6 @@ class PrintedValue:
 def ds30_readings() -> list[PrintedValue]:
     """Search for what gives 2.64: over formula, area, diameter and unit, solved for the pitch that is not given.
 
-    Returns
-    -------
-    list of PrintedValue
-        All combinations; the sensible ones first, and there by |ln(pitch/D)|.
-
     Notes
     -----
     K1/K2 at rest is F = rho A n^2 K1^1.5 D^1.5 p^0.5, so p = D (F/F(p = D))^2; without the factor (K1 D/p)^K2 it is
@@ -215,22 +183,6 @@ def ds30_readings() -> list[PrintedValue]:
 def nearest_slip(ratio: float, factors: Mapping[str, float] = SLIP_FACTORS) -> tuple[str, float, float]:
     """Name the slip of units nearest to a ratio.
 
-    Parameters
-    ----------
-    ratio : float
-        Claimed over computed, either way up. [-]
-    factors : mapping of str to float
-        Named factors. [-]
-
-    Returns
-    -------
-    name : str
-        The nearest.
-    factor : float
-        Its value, above 1. [-]
-    miss : float
-        Ratio over factor, minus 1. [-]
-
     Examples
     --------
     >>> name, factor, miss = nearest_slip(9.78)
@@ -243,15 +195,7 @@ def nearest_slip(ratio: float, factors: Mapping[str, float] = SLIP_FACTORS) -> t
 
 
 def ds30_finding() -> dict[str, Any]:
-    """Conclude on the stated 2.64 kgf from the search.
-
-    Returns
-    -------
-    dict
-        ``units`` in which the K1/K2 equation gives 2.64 at a sensible pitch, the ``best`` reading, the ``claimed``
-        reading (kgf, annulus, 69 mm) with the pitch that it would need, ``ratio`` of the claim to K1/K2 at pitch =
-        diameter with the ``slip`` nearest to it, and ``other_formulas`` that give 2.64 kgf at a sensible pitch.
-    """
+    """Conclude on the stated 2.64 kgf from the search."""
     readings = ds30_readings()
     own = [r for r in readings if r.formula == "K1/K2"]
     best = next(r for r in own if r.sensible)
@@ -274,13 +218,6 @@ def ds30_finding() -> dict[str, Any]:
 
 def clarke_factor() -> tuple[float, float]:
     """Power-invariant Clarke transform of a balanced three-phase machine, by numbers.
-
-    Returns
-    -------
-    current : float
-        |i_alpha,beta| over the phase amplitude; sqrt(3/2). [-]
-    torque : float
-        Torque over (K_b I_q), from the instantaneous power sum e i = tau omega; sqrt(3/2). [-]
 
     Examples
     --------

@@ -56,18 +56,7 @@ class Curve:
     smoothness: float = 0.0
 
     def at(self, pulse_us: ArrayLike) -> Array:
-        """Evaluate at the reference voltage; NaN outside the recorded pulse widths.
-
-        Parameters
-        ----------
-        pulse_us : array_like
-            Pulse widths. [us]
-
-        Returns
-        -------
-        (N,) float
-            In the unit of the quantity.
-        """
+        """Evaluate at the reference voltage; NaN outside the recorded pulse widths, (N,)."""
         return np.asarray(self._cubic(np.asarray(pulse_us, dtype=float)))
 
     @cached_property
@@ -122,43 +111,12 @@ class BenchMap:
         return float(self.curves["thrust"].values[-1])
 
     def voltage_at(self, pulse_us: ArrayLike) -> Array:
-        """Voltage recorded with a pulse width (battery sag); NaN without a record.
-
-        Parameters
-        ----------
-        pulse_us : array_like
-            Pulse widths. [us]
-
-        Returns
-        -------
-        (N,) float
-            Voltage. [V]
-        """
+        """Voltage recorded with a pulse width (battery sag); NaN without a record, (N,) [V]."""
         pulse = np.asarray(pulse_us, dtype=float)
         return np.full(pulse.shape, np.nan) if self.voltage is None else -self.voltage.at(pulse)
 
     def at(self, quantity: str, pulse_us: ArrayLike, voltage_V: ArrayLike | None = None) -> Array:
-        """Read the map.
-
-        Parameters
-        ----------
-        quantity : str
-            thrust, rpm, current or power.
-        pulse_us : array_like
-            Pulse widths [us]; NaN comes back outside the recorded ones.
-        voltage_V : array_like or None
-            Voltage at the ESC [V]; None: V_ref.
-
-        Returns
-        -------
-        (N,) float
-            In the unit of the quantity.
-
-        Raises
-        ------
-        InputError
-            When the map does not hold the quantity, or a voltage is asked of a map that has none as a parameter.
-        """
+        """Read the map, (N,)."""
         if quantity not in self.curves:
             raise InputError(Fault("", "quantity", repr(quantity), f"one of {', '.join(self.curves)}"))
         curve = self.curves[quantity]
@@ -173,20 +131,7 @@ class BenchMap:
         return np.asarray((v / self.voltage_ref) ** curve.exponent)
 
     def pulse_for(self, thrust_N: ArrayLike, voltage_V: ArrayLike | None = None) -> Array:
-        """Inverse map: the least pulse width that gives a thrust.
-
-        Parameters
-        ----------
-        thrust_N : array_like
-            Wanted thrust. [N]
-        voltage_V : array_like or None
-            Voltage at the ESC [V]; None: V_ref.
-
-        Returns
-        -------
-        (N,) float
-            Pulse width [us]; NaN for more than the drive gives, the least pulse width for no more than its thrust.
-        """
+        """Inverse map: the least pulse width that gives a thrust, (N,) [us]."""
         curve = self.curves["thrust"]
         wanted = np.atleast_1d(np.asarray(thrust_N, dtype=float))
         scale = np.ones(wanted.shape)
@@ -278,29 +223,7 @@ def fit(
     nodes: int = NODES,
     quantities: Iterable[str] = tuple(QUANTITIES),
 ) -> BenchMap:
-    """Fit the map of one drive.
-
-    Parameters
-    ----------
-    points : MapPoints
-        Steady points.
-    smoothness : float or None
-        Penalty [-]; None: chosen by leaving levels out.
-    nodes : int
-        Nodes of the curves.
-    quantities : iterable of str
-        What to fit, of `QUANTITIES`.
-
-    Returns
-    -------
-    BenchMap
-        The map.
-
-    Raises
-    ------
-    InputError
-        With fewer than four points.
-    """
+    """Fit the map of one drive."""
     if len(points) < 4:
         raise InputError(Fault("", "points", f"{len(points)}", "4 or more"))
     pulse, w = points.pulse_us, points.weight
@@ -376,41 +299,14 @@ class HeldOut:
 
 
 def misfit(points: MapPoints, chart: BenchMap) -> float:
-    """How far the points lie from a map that may not fall.
-
-    Parameters
-    ----------
-    points : MapPoints
-        What the map was fitted to.
-    chart : BenchMap
-        The map.
-
-    Returns
-    -------
-    float
-        Root mean square of thrust, over full thrust [1]; large where thrust does not follow the pulse width.
-    """
+    """How far the points lie from a map that may not fall. [1]"""
     volts = points.values["voltage"] if chart.with_voltage else None
     rest = chart.at("thrust", points.pulse_us, volts) - points.values["thrust"]
     return float(np.sqrt(np.nanmean(rest**2))) / float(np.nanmax(np.abs(points.values["thrust"])))
 
 
 def repeat_spread(points: MapPoints, chart: BenchMap) -> float:
-    """How far the recording itself differs at one pulse width: a map of pulse width alone cannot be nearer.
-
-    Parameters
-    ----------
-    points : MapPoints
-        Steady points.
-    chart : BenchMap
-        Their map; where it knows the voltage, the points are taken to its reference.
-
-    Returns
-    -------
-    float
-        Greatest range of thrust within a level of equal pulse widths, over the greatest thrust [1]; NaN without
-        repeats.
-    """
+    """How far the recording itself differs at one pulse width: a map of pulse width alone cannot be nearer. [1]"""
     near, thrust = np.round(points.pulse_us), points.values["thrust"]
     if chart.with_voltage:
         thrust = thrust / (points.values["voltage"] / chart.voltage_ref) ** chart.curves["thrust"].exponent
@@ -420,20 +316,6 @@ def repeat_spread(points: MapPoints, chart: BenchMap) -> float:
 
 def held_out(points: MapPoints, folds: int = 5, smoothness: float | None = None) -> HeldOut:
     """Leave levels out in turn, fit to the rest, and make the round trip on what was left out.
-
-    Parameters
-    ----------
-    points : MapPoints
-        Steady points; the least and the greatest pulse width always stay in, a map does not extrapolate.
-    folds : int
-        Groups of levels.
-    smoothness : float or None
-        As in `fit`. [-]
-
-    Returns
-    -------
-    HeldOut
-        One entry per point that was left out.
 
     Notes
     -----

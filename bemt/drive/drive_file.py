@@ -146,18 +146,7 @@ class DriveFile:
     assumed: Mapping[str, str]
 
     def drive(self, rotor: RotorMap) -> Drive:
-        """Put the drive of a rotor together.
-
-        Parameters
-        ----------
-        rotor : RotorMap
-            The load.
-
-        Returns
-        -------
-        Drive
-            The drive.
-        """
+        """Put the drive of a rotor together."""
         return Drive(self.battery, self.esc, self.motor, rotor)
 
     @property
@@ -167,23 +156,7 @@ class DriveFile:
 
 
 def read(path: Path) -> DriveFile:
-    """Read a drive.toml.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    DriveFile
-        What it says.
-
-    Raises
-    ------
-    InputError
-        With all faults.
-    """
+    """Read a drive.toml."""
     out = Collector(path.as_posix())
     doc = load_toml(path, out)
     if doc is None:

@@ -75,18 +75,7 @@ class Battery:
     ocv_V: tuple[float, ...] = LIPO_V
 
     def voc(self, soc: ArrayLike) -> Array:
-        """Open-circuit voltage of the pack.
-
-        Parameters
-        ----------
-        soc : array_like
-            State of charge. [1]
-
-        Returns
-        -------
-        (N,) float
-            Voltage. [V]
-        """
+        """Open-circuit voltage of the pack, (N,) [V]."""
         return np.asarray(self.cells * np.interp(np.asarray(soc, dtype=float), self.soc_table, self.ocv_V))
 
 
@@ -126,18 +115,7 @@ class Esc:
     ripple_ohm: float = math.inf
 
     def duty(self, pulse_us: ArrayLike) -> Array:
-        """Duty of a pulse width.
-
-        Parameters
-        ----------
-        pulse_us : array_like
-            Pulse width. [us]
-
-        Returns
-        -------
-        (N,) float
-            From 0 to 1. [1]
-        """
+        """Duty of a pulse width, (N,) [1]."""
         share = (np.asarray(pulse_us, dtype=float) - self.pulse_min_us) / (self.pulse_max_us - self.pulse_min_us)
         return np.clip(share, 0.0, 1.0) ** self.exponent
 
@@ -174,34 +152,12 @@ class Motor:
     reactance_ohm_s: float = 0.0
 
     def k(self, temperature_C: ArrayLike = REFERENCE_C) -> Array:
-        """EMF per speed and torque per current.
-
-        Parameters
-        ----------
-        temperature_C : array_like
-            Of the motor. [C]
-
-        Returns
-        -------
-        (N,) float
-            k. [V s/rad]
-        """
+        """EMF per speed and torque per current, (N,) [V s/rad]."""
         warm = np.asarray(temperature_C, dtype=float) - REFERENCE_C
         return 60.0 / (2.0 * math.pi * self.kv_rpm_V) * (1.0 - MAGNET * warm)
 
     def resistance(self, temperature_C: ArrayLike = REFERENCE_C) -> Array:
-        """Resistance of the winding.
-
-        Parameters
-        ----------
-        temperature_C : array_like
-            Of the motor. [C]
-
-        Returns
-        -------
-        (N,) float
-            R. [ohm]
-        """
+        """Resistance of the winding, (N,) [ohm]."""
         warm = np.asarray(temperature_C, dtype=float) - REFERENCE_C
         return self.resistance_ohm * (1.0 + COPPER * warm)
 
@@ -267,23 +223,7 @@ class Drive:
     off: frozenset[str] = field(default_factory=frozenset)
 
     def without(self, *effects: str) -> Drive:
-        """The drive with some effects off.
-
-        Parameters
-        ----------
-        *effects : str
-            Ids of `EFFECTS`.
-
-        Returns
-        -------
-        Drive
-            Another one.
-
-        Raises
-        ------
-        ValueError
-            On an unknown id.
-        """
+        """The drive with some effects off."""
         for name in effects:
             if name not in EFFECTS:
                 raise ValueError(f"effect {name!r}; expected {', '.join(EFFECTS)}")
@@ -295,18 +235,7 @@ class Drive:
         return 0.0 if "battery_sag" in self.off else self.battery.resistance_ohm
 
     def currents(self, duty: Array, omega: Array, voc: Array, temperature_C: Array) -> tuple[Array, Array, Array]:
-        """Motor current at a speed, with the limits of the ESC.
-
-        Parameters
-        ----------
-        duty, omega, voc, temperature_C : (N,) float
-            Duty [1], speed [rad/s], open-circuit voltage [V], motor temperature [C].
-
-        Returns
-        -------
-        motor_A, battery_A, duty : (N,) float
-            Currents [A] and duty in effect [1].
-        """
+        """Motor current at a speed, with the limits of the ESC."""
         emf, rb = self.motor.k(temperature_C) * omega, self.battery_ohm
         rt = self.motor.resistance(temperature_C) + self.esc.resistance_ohm
         if self.motor.reactance_ohm_s > 0.0:
@@ -348,20 +277,6 @@ class Drive:
     def steady(self, pulse_us: ArrayLike, soc: ArrayLike = 1.0, temperature_C: ArrayLike | None = None) -> Steady:
         """Solve for the speed at which motor and rotor agree.
 
-        Parameters
-        ----------
-        pulse_us : array_like
-            Pulse widths. [us]
-        soc : array_like
-            State of charge. [1]
-        temperature_C : array_like or None
-            Of the motor [C]; None: the air's.
-
-        Returns
-        -------
-        Steady
-            One entry per pulse width.
-
         Notes
         -----
         Motor torque falls with speed and rotor torque rises: one root, found by bisection between rest and twice the
@@ -401,22 +316,7 @@ class Drive:
                       kept(volts), kept(power), kept(eta), used < duty, inside)  # fmt: skip
 
     def pulse_for(self, thrust_N: float, soc: float = 1.0, temperature_C: float | None = None) -> float:
-        """Pulse width that gives a thrust.
-
-        Parameters
-        ----------
-        thrust_N : float
-            Wanted. [N]
-        soc : float
-            State of charge. [1]
-        temperature_C : float or None
-            Of the motor [C]; None: the air's.
-
-        Returns
-        -------
-        float
-            Pulse width [us]; NaN when the drive does not reach it.
-        """
+        """Pulse width that gives a thrust. [us]"""
         lo, hi = self.esc.pulse_min_us, self.esc.pulse_max_us
         for _ in range(6):  # thrust rises with pulse width: 40 parts at a time
             grid = np.linspace(lo, hi, 41)

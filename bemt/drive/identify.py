@@ -66,18 +66,7 @@ class MapFit:
 
 
 def no_load(points: MapPoints) -> tuple[float, float]:
-    """K_v and I_0 of a run without propeller at full pulse width, as data sheets define them.
-
-    Parameters
-    ----------
-    points : MapPoints
-        Steady points with rpm [rev/min], current [A] and voltage [V].
-
-    Returns
-    -------
-    kv_rpm_V, no_load_A : float
-        Speed over voltage at the greatest pulse width [rev/min/V], its resistive drop not taken off; current there [A].
-    """
+    """K_v and I_0 of a run without propeller at full pulse width, as data sheets define them."""
     top = points.pulse_us >= np.max(points.pulse_us) - 1.0
     v = points.values
     return float(np.mean(v["rpm"][top] / v["voltage"][top])), float(np.mean(v["current"][top]))
@@ -92,30 +81,7 @@ def fit_map(
     points: MapPoints, known: Mapping[str, float] | None = None, torque_Nm: ArrayLike | None = None,
     diameter_m: float = 0.2,
 ) -> MapFit:  # fmt: skip
-    """Fit a drive to a thrust map.
-
-    Parameters
-    ----------
-    points : MapPoints
-        Steady points of one battery: thrust, rpm, current; voltage where recorded, else ``voltage_V`` in `known`.
-    known : mapping of str to float, optional
-        What a data sheet states, by the names of `FREE` (kv_rpm_V, no_load_A, resistance_ohm ...); the rest is fitted.
-        exponent is 1 unless given; a ripple_ohm of infinity says complementary switching.
-    torque_Nm : array_like or None
-        Torque of the points; None: kQ is fitted with the current. [N m]
-    diameter_m : float
-        Of the rotor; only the lag of the inflow needs it. [m]
-
-    Returns
-    -------
-    MapFit
-        The drive.
-
-    Raises
-    ------
-    InputError
-        Without rpm or current, or without a voltage.
-    """
+    """Fit a drive to a thrust map."""
     from scipy.optimize import least_squares
 
     known = dict(known or {})
@@ -187,23 +153,7 @@ def _battery(current: Array, voltage: Array, known: Mapping[str, float]) -> tupl
 
 
 def battery_of(points: MapPoints) -> tuple[float, float]:
-    """Voltage at rest and resistance of the battery of a recording.
-
-    Parameters
-    ----------
-    points : MapPoints
-        Steady points with voltage and current.
-
-    Returns
-    -------
-    voltage_V, resistance_ohm : float
-        Straight line of voltage over current. [V], [ohm]
-
-    Raises
-    ------
-    InputError
-        Without voltage and current.
-    """
+    """Voltage at rest and resistance of the battery of a recording."""
     current, voltage = points.values["current"], points.values["voltage"]
     if np.count_nonzero(np.isfinite(current) & np.isfinite(voltage)) < 4:
         raise InputError(Fault("", "voltage", "no values", "recorded voltage and current"))
@@ -211,50 +161,14 @@ def battery_of(points: MapPoints) -> tuple[float, float]:
 
 
 def thrust_error(drive: Drive, points: MapPoints, full_thrust_N: float) -> Array:
-    """Thrust over pulse width, model minus recording.
-
-    Parameters
-    ----------
-    drive : Drive
-        The drive.
-    points : MapPoints
-        Steady points.
-    full_thrust_N : float
-        Full scale. [N]
-
-    Returns
-    -------
-    (N,) float
-        Over full scale. [1]
-    """
+    """Thrust over pulse width, model minus recording, (N,) [1]."""
     return np.asarray((drive.steady(points.pulse_us).thrust_N - points.values["thrust"]) / full_thrust_N)
 
 
 def fit_inertia(
     drive: Drive, time_s: ArrayLike, thrust_N: ArrayLike, before_us: float, after_us: float
 ) -> tuple[float, float]:
-    """Inertia of motor and rotor together from a recorded step.
-
-    Parameters
-    ----------
-    drive : Drive
-        The drive; its inertias are replaced.
-    time_s, thrust_N : array_like
-        Samples around one step, settled at both ends: time [s], thrust [N].
-    before_us, after_us : float
-        Pulse widths before and after. [us]
-
-    Returns
-    -------
-    inertia_kg_m2, tau_s : float
-        Inertia for which the model's thrust, sampled at the same times, has the first-order time constant of the
-        recording [kg m2]; that time constant [s].
-
-    Raises
-    ------
-    InputError
-        When no inertia gives the time constant: the air or the limits of the ESC are slower.
-    """
+    """Inertia of motor and rotor together from a recorded step."""
     from scipy.optimize import brentq
 
     step = transient.first_order(time_s, thrust_N)
@@ -276,26 +190,7 @@ def fit_inertia(
 def step_constant(
     drive: Drive, inertia_kg_m2: float, times_s: Array, step_s: float, before_us: float, after_us: float
 ) -> float:
-    """First-order time constant of the model's thrust, sampled and read as the recording is.
-
-    Parameters
-    ----------
-    drive : Drive
-        The drive.
-    inertia_kg_m2 : float
-        Of motor and rotor together. [kg m2]
-    times_s : (N,) float
-        Times of the samples. [s]
-    step_s : float
-        Time of the step. [s]
-    before_us, after_us : float
-        Pulse widths. [us]
-
-    Returns
-    -------
-    float
-        Time constant. [s]
-    """
+    """First-order time constant of the model's thrust, sampled and read as the recording is. [s]"""
     motor = replace(drive.motor, inertia_kg_m2=inertia_kg_m2)
     rotor = RotorMap(**{**vars(drive.rotor), "inertia_kg_m2": 0.0})
     t = times_s - times_s[0]

@@ -18,22 +18,7 @@ COLUMNS = {"thrust": "thrust_N", "rpm": "rpm", "current": "current_A", "power": 
 
 
 def tables(chart: BenchMap, nodes: int = 41) -> tuple[dict[str, Array], dict[str, Array]]:
-    """Sample the map and its inverse.
-
-    Parameters
-    ----------
-    chart : BenchMap
-        The map.
-    nodes : int
-        Rows of each table.
-
-    Returns
-    -------
-    forward : mapping of str to (nodes,) float
-        pulse_us [us] and what the map holds there, by name with unit.
-    inverse : mapping of str to (nodes,) float
-        thrust_N [N] and pulse_us [us].
-    """
+    """Sample the map and its inverse."""
     pulse = np.linspace(*chart.pulse_range_us, nodes)
     forward = {"pulse_us": pulse}
     forward |= {COLUMNS[name]: chart.at(name, pulse) for name in COLUMNS if name in chart.curves}
@@ -45,37 +30,13 @@ def tables(chart: BenchMap, nodes: int = 41) -> tuple[dict[str, Array], dict[str
 
 
 def table_csv(table: dict[str, Array]) -> str:
-    """One table as CSV.
-
-    Parameters
-    ----------
-    table : mapping of str to (N,) float
-        Columns; their names carry the unit.
-
-    Returns
-    -------
-    str
-        Text with a heading line.
-    """
+    """One table as CSV."""
     rows = [{name: float(v[i]) for name, v in table.items()} for i in range(len(next(iter(table.values()))))]
     return csv_text(list(table), rows)
 
 
 def document(chart: BenchMap, nodes: int = 41) -> dict[str, Any]:
-    """The map as a JSON document.
-
-    Parameters
-    ----------
-    chart : BenchMap
-        The map.
-    nodes : int
-        Rows of each table.
-
-    Returns
-    -------
-    dict
-        Tables, exponents of the voltage, ranges, notes.
-    """
+    """The map as a JSON document."""
     forward, inverse = tables(chart, nodes)
     return {
         "full_thrust_N": chart.full_thrust_N,
@@ -99,22 +60,7 @@ def _array(name: str, values: Array, comment: str) -> str:
 
 
 def c_header(chart: BenchMap, name: str = "drive", nodes: int = 41) -> str:
-    """The map as a C99 header: tables at equal steps, and two functions that interpolate between them.
-
-    Parameters
-    ----------
-    chart : BenchMap
-        The map.
-    name : str
-        Prefix of all names; characters that C does not know become ``_``.
-    nodes : int
-        Rows of each table.
-
-    Returns
-    -------
-    str
-        Text of the header.
-    """
+    """The map as a C99 header: tables at equal steps, and two functions that interpolate between them."""
     p = re.sub(r"\W", "_", name.strip()).lower() or "drive"
     p = f"m_{p}" if p[0].isdigit() else p
     guard = f"{p.upper()}_MAP_H"

@@ -52,18 +52,7 @@ class MapPoints:
         return len(self.pulse_us)
 
     def take(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> MapPoints:
-        """Some of the points.
-
-        Parameters
-        ----------
-        rows : (M,) int or (N,) bool
-            Which.
-
-        Returns
-        -------
-        MapPoints
-            Those.
-        """
+        """Some of the points."""
         values = {name: v[rows] for name, v in self.values.items()}
         return MapPoints(self.pulse_us[rows], values, self.weight[rows], self.run[rows], self.notes, self.ramp)
 
@@ -89,29 +78,7 @@ def _command(got: Imported, name: str, notes: list[str]) -> Array:
 
 
 def points(got: Imported, name: str = "", sign: int = 1, run: int = 0) -> MapPoints:
-    """Find the steady points of one recording.
-
-    Parameters
-    ----------
-    got : Imported
-        The recording, read.
-    name : str
-        Its name, for faults.
-    sign : int
-        -1 turns the thrust round.
-    run : int
-        Number of the recording.
-
-    Returns
-    -------
-    MapPoints
-        Plateaus of a time series, the rows of a table of steps, or all samples of a ramp.
-
-    Raises
-    ------
-    InputError
-        Without command or thrust, with negative thrust at the greatest command, or with fewer than four points.
-    """
+    """Find the steady points of one recording."""
     notes: list[str] = []
     command = _command(got, name, notes)
     thrust = _channel(got, "thrust_N")
@@ -171,18 +138,7 @@ def _reduced(got: Imported, command: Array, data: dict[str, Array], notes: list[
 
 
 def join(parts: Sequence[MapPoints]) -> MapPoints:
-    """Put recordings of one drive together.
-
-    Parameters
-    ----------
-    parts : sequence of MapPoints
-        One or more.
-
-    Returns
-    -------
-    MapPoints
-        All points; the notes once.
-    """
+    """Put recordings of one drive together."""
     keys = list(parts[0].values)
     notes = tuple(dict.fromkeys(note for part in parts for note in part.notes))
     return MapPoints(

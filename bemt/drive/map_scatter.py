@@ -17,21 +17,11 @@ LEAST_THRUST = 0.05
 
 
 def speed_known(points: MapPoints) -> Array:
-    """Errors of the same held-out levels if their speed were known: what is left is not the map's.
+    """Errors of the same held-out levels if their speed were known: what is left is not the map's, (M,) [1].
 
     A propeller at rest has thrust = k rpm^2, with k almost constant (Reynolds number). Each level's k is read between
     the nearest levels below and above in speed; its thrust then misses by this much. It holds the scatter of the
     readings of thrust and speed, whatever ESC and battery do.
-
-    Parameters
-    ----------
-    points : MapPoints
-        Steady points of one or more recordings; levels are compared within a recording.
-
-    Returns
-    -------
-    (M,) float
-        k between the neighbours times rpm^2 minus the thrust recorded, over the greatest thrust [1]; empty without rpm.
     """
     thrust, rpm = points.values["thrust"], points.values["rpm"]
     usable = np.isfinite(thrust) & np.isfinite(rpm) & (rpm > 0.0)
@@ -54,18 +44,7 @@ def speed_known(points: MapPoints) -> Array:
 
 
 def document(points: MapPoints) -> dict[str, Any]:
-    """Summary of `speed_known`.
-
-    Parameters
-    ----------
-    points : MapPoints
-        Steady points.
-
-    Returns
-    -------
-    dict
-        ``points``, ``worst_of_full_thrust``, ``rms_of_full_thrust``; None without rpm. [1]
-    """
+    """Summary of `speed_known`. [1]"""
     e = speed_known(points)
     worst, rms = (float(np.max(np.abs(e))), float(np.sqrt(np.mean(e**2)))) if e.size else (None, None)
     return {"points": int(e.size), "worst_of_full_thrust": worst, "rms_of_full_thrust": rms}

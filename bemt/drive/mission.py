@@ -44,22 +44,7 @@ class Hover:
 
 
 def settled_temperature(drive: Drive, pulse_us: float, soc: float) -> float:
-    """Temperature at which copper loss and cooling agree.
-
-    Parameters
-    ----------
-    drive : Drive
-        The drive.
-    pulse_us : float
-        Command. [us]
-    soc : float
-        State of charge. [1]
-
-    Returns
-    -------
-    float
-        Temperature [C]; the air's when the motor has no thermal data, NaN when it runs away.
-    """
+    """Temperature at which copper loss and cooling agree. [C]"""
     motor = drive.motor
     warm = motor.ambient_C
     if "motor_heating" in drive.off or motor.thermal_K_W <= 0.0:
@@ -76,24 +61,7 @@ def settled_temperature(drive: Drive, pulse_us: float, soc: float) -> float:
 
 
 def hover(drive: Drive, mass_kg: float, rotors: int, soc: float) -> Hover:
-    """Find the hover point.
-
-    Parameters
-    ----------
-    drive : Drive
-        Of one rotor.
-    mass_kg : float
-        Of the vehicle. [kg]
-    rotors : int
-        That carry it.
-    soc : float
-        State of charge. [1]
-
-    Returns
-    -------
-    Hover
-        With a cold motor; the temperature is where it would settle.
-    """
+    """Find the hover point."""
     wanted = mass_kg * G0 / rotors
     full = float(drive.steady(drive.esc.pulse_max_us, soc).thrust_N[0])
     pulse = drive.pulse_for(wanted, soc)
@@ -108,26 +76,7 @@ def hover(drive: Drive, mass_kg: float, rotors: int, soc: float) -> Hover:
 def endurance(
     drive: Drive, mass_kg: float, rotors: int, soc: float, soc_min: float, points: int = 21
 ) -> tuple[float, float]:
-    """Time in hover until the charge is used, or the drive no longer carries the weight.
-
-    Parameters
-    ----------
-    drive : Drive
-        Of one rotor.
-    mass_kg : float
-        Of the vehicle. [kg]
-    rotors : int
-        That carry it.
-    soc, soc_min : float
-        State of charge at start and end. [1]
-    points : int
-        Charges at which the hover point is solved.
-
-    Returns
-    -------
-    time_s, soc_end : float
-        Time [s], NaN when it does not hover at all; charge at the end [1].
-    """
+    """Time in hover until the charge is used, or the drive no longer carries the weight."""
     wanted = mass_kg * G0 / rotors
 
     def drawn(c: float) -> float:
@@ -174,24 +123,7 @@ class Response:
 
 
 def response(drive: Drive, low: float, high: float, soc: float) -> tuple[list[Response], transient.History | None]:
-    """Step between two shares of full thrust, up and down.
-
-    Parameters
-    ----------
-    drive : Drive
-        The drive.
-    low, high : float
-        Shares of full thrust. [1]
-    soc : float
-        State of charge. [1]
-
-    Returns
-    -------
-    list of Response
-        Up, down; none where the drive gives no thrust at the airspeed of its rotor, so that there is no step.
-    bemt.drive.transient.History or None
-        Course of both.
-    """
+    """Step between two shares of full thrust, up and down."""
     full = float(drive.steady(drive.esc.pulse_max_us, soc).thrust_N[0])
     if not full > 0.0:  # NaN too: turned by the wind beyond the rotor's table
         return [], None

@@ -49,26 +49,7 @@ def _known(where: str, value: str, known: tuple[str, ...]) -> None:
 
 
 def voltage_factor(measure: str, between: str, winding: str) -> float:
-    """Measured voltage over the peak voltage of a winding.
-
-    Parameters
-    ----------
-    measure : str
-        peak, peak_to_peak or rms.
-    between : str
-        line or phase (across one winding).
-    winding : str
-        wye or delta.
-
-    Returns
-    -------
-    float
-        Factor. [1]
-
-    Raises
-    ------
-    InputError
-        On an unknown word.
+    """Measured voltage over the peak voltage of a winding. [1]
 
     Examples
     --------
@@ -82,26 +63,7 @@ def voltage_factor(measure: str, between: str, winding: str) -> float:
 
 
 def current_factor(measure: str, between: str, winding: str) -> float:
-    """Measured current over the peak current of a winding.
-
-    Parameters
-    ----------
-    measure : str
-        peak, rms, q_power_invariant or q_amplitude_invariant.
-    between : str
-        line or phase (in one winding).
-    winding : str
-        wye or delta.
-
-    Returns
-    -------
-    float
-        Factor. [1]
-
-    Raises
-    ------
-    InputError
-        On an unknown word.
+    """Measured current over the peak current of a winding. [1]
 
     Examples
     --------
@@ -115,39 +77,12 @@ def current_factor(measure: str, between: str, winding: str) -> float:
 
 
 def ke_to_kt(ke: float, measure: str = "q_power_invariant", between: str = "phase", winding: str = "wye") -> float:
-    """Torque per measured current.
-
-    Parameters
-    ----------
-    ke : float
-        Peak EMF of a winding per speed. [V s/rad]
-    measure, between, winding : str
-        Convention of the current, see `current_factor`.
-
-    Returns
-    -------
-    float
-        K_t. [N m/A]
-    """
+    """Torque per measured current. [N m/A]"""
     return 1.5 * ke / current_factor(measure, between, winding)
 
 
 def from_kv(kv_rpm_V: float, winding: str, measure: str = "peak", between: str = "line") -> float:
-    """Give ke of the speed constant in a data sheet.
-
-    Parameters
-    ----------
-    kv_rpm_V : float
-        K_v. [rev/min/V]
-    winding : str
-        wye or delta.
-    measure, between : str
-        Which volt is meant; hobby data sheets mean the peak between lines.
-
-    Returns
-    -------
-    float
-        Peak EMF of a winding per speed. [V s/rad]
+    """Give ke of the speed constant in a data sheet. [V s/rad]
 
     Examples
     --------
@@ -189,17 +124,7 @@ class TorqueLoop:
         return self.low_mA * self.Nm_per_mA - self.torque_low_Nm
 
     def torque(self, shunt_V: ArrayLike) -> Array:
-        """Torque of a reading.
-
-        Parameters
-        ----------
-        shunt_V : array_like
-            Volts over the resistor. [V]
-
-        Returns
-        -------
-        (N,) float
-            Torque. [N m]
+        """Torque of a reading, (N,) [N m].
 
         Examples
         --------
@@ -239,18 +164,7 @@ class Line:
         return float(np.std(self.slopes, ddof=1)) if len(self.slopes) > 1 else math.nan
 
     def scaled(self, factor: float) -> Line:
-        """The line with its slope in another unit.
-
-        Parameters
-        ----------
-        factor : float
-            Slope in the other unit over slope in this unit.
-
-        Returns
-        -------
-        Line
-            With slopes times the factor; intercepts unchanged.
-        """
+        """The line with its slope in another unit."""
         to = np.diag([factor, 1.0])
         return Line(self.slope * factor, self.intercept, to @ self.cov @ to, self.slopes * factor, self.intercepts,
                     self.names)  # fmt: skip
@@ -263,26 +177,7 @@ def _widened(n: int, parameters: int) -> float:
 
 
 def line(x: ArrayLike, y: ArrayLike, trial: ArrayLike) -> Line:
-    """Fit a straight line to every trial and take the mean of the lines.
-
-    Parameters
-    ----------
-    x, y : array_like
-        Samples of all trials, in any units.
-    trial : array_like
-        Number of the trial of each sample. [-]
-
-    Returns
-    -------
-    Line
-        Where trials hold fewer than three different x, each gives y/x, and slope and intercept come from one line
-        through all samples.
-
-    Raises
-    ------
-    InputError
-        With fewer than three trials, or x that do not differ.
-    """
+    """Fit a straight line to every trial and take the mean of the lines."""
     xs, ys, which = (np.asarray(v, dtype=float) for v in (x, y, trial))
     names = np.unique(which)
     if len(names) < 3:
@@ -324,42 +219,13 @@ class Waveform:
     residual_V: float
 
     def ke(self, pole_pairs: int, between: str, winding: str) -> float:
-        """Peak EMF of a winding per mechanical speed.
-
-        Parameters
-        ----------
-        pole_pairs : int
-            Of the motor.
-        between, winding : str
-            Convention of the voltage.
-
-        Returns
-        -------
-        float
-            ke. [V s/rad]
-        """
+        """Peak EMF of a winding per mechanical speed. [V s/rad]"""
         omega = 2.0 * math.pi * self.frequency_Hz / pole_pairs
         return self.amplitude_V / omega / voltage_factor("peak", between, winding)
 
 
 def fit_waveform(time_s: ArrayLike, volts: ArrayLike) -> Waveform:
-    """Fit fundamental, third and fifth harmonic to a waveform.
-
-    Parameters
-    ----------
-    time_s, volts : array_like
-        Samples: time [s], rising, and voltage [V].
-
-    Returns
-    -------
-    Waveform
-        The fundamental makes the torque of sinusoidal currents; peaks of the raw trace hold harmonics and noise.
-
-    Raises
-    ------
-    InputError
-        With fewer than 16 samples, time that does not rise, or less than one and a half periods.
-    """
+    """Fit fundamental, third and fifth harmonic to a waveform."""
     from scipy.optimize import minimize_scalar
 
     t, v = np.asarray(time_s, dtype=float), np.asarray(volts, dtype=float)

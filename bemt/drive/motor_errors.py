@@ -234,20 +234,7 @@ def _criterion(e: ErrorSource, errors: int) -> float:
 
 
 def judge(m: Measured, alpha: float = ALPHA) -> Verdict:
-    """Judge the agreement of the methods.
-
-    Parameters
-    ----------
-    m : Measured
-        Results of the methods; two or more, or one with an intercept.
-    alpha : float
-        Probability at which agreement is rejected. [1]
-
-    Returns
-    -------
-    Verdict
-        With the explanations of a disagreement.
-    """
+    """Judge the agreement of the methods."""
     none = _fit(m, [])
     if not none.p < alpha:
         return Verdict(True, (), none)

@@ -125,23 +125,7 @@ class MotorTrials:
 
 
 def read(path: str | Path) -> MotorTrials:
-    """Read a motor.toml and its recordings.
-
-    Parameters
-    ----------
-    path : str or Path
-        File, or a folder that holds motor.toml.
-
-    Returns
-    -------
-    MotorTrials
-        For `bemt.drive.motor_errors.judge`.
-
-    Raises
-    ------
-    InputError
-        With all faults of the file and its recordings.
-    """
+    """Read a motor.toml and its recordings."""
     file = Path(path) / "motor.toml" if Path(path).is_dir() else Path(path)
     out = Collector(file.as_posix())
     doc = load_toml(file, out)
@@ -274,24 +258,7 @@ def _torque(file: Path, table: Mapping[str, Any], winding: str) -> tuple[mc.Line
 
 
 def read_waveform(path: Path) -> tuple[Array, Array]:
-    """Read an oscilloscope's CSV.
-
-    Parameters
-    ----------
-    path : Path
-        A table with headings that name units, a file of Keysight's kind (a line ``second,Volt`` above the data) or of
-        Tektronix's (metadata in the first three columns, ``Vertical Units,V``, data in the fourth and fifth).
-
-    Returns
-    -------
-    time_s, volts : (N,) float
-        Samples. [s], [V]
-
-    Raises
-    ------
-    InputError
-        When units are not stated or there are no two columns of numbers.
-    """
+    """Read an oscilloscope's CSV."""
     source = importers.load_text(path)
     split = [[c.strip().strip('"') for c in re.split(r"[,;\t]", line)] for line in source.lines if line.strip()]
     start = next((i for i, c in enumerate(split) if _pair(c, 0)), None)

@@ -62,23 +62,7 @@ class MotorBench:
 
 
 def plants(words: list[str]) -> dict[str, float]:
-    """Read ``NAME=SIZE``; a factor may be written as in the verdict, ``back_emf.factor=sqrt(3)``.
-
-    Parameters
-    ----------
-    words : list of str
-        As on the command line.
-
-    Returns
-    -------
-    dict of str to float
-        Sizes by name: V, N m or 1.
-
-    Raises
-    ------
-    InputError
-        With all words that are not understood.
-    """
+    """Read ``NAME=SIZE``; a factor may be written as in the verdict, ``back_emf.factor=sqrt(3)``."""
     out, faults = {}, []
     for word in words:
         name, _, size = word.partition("=")
@@ -96,25 +80,6 @@ def plants(words: list[str]) -> dict[str, float]:
 
 def generate(seed: int, planted: Mapping[str, float] | None = None, bench: MotorBench | None = None) -> dict[str, str]:
     """Generate trials and the motor.toml that describes them.
-
-    Parameters
-    ----------
-    seed : int
-        Of the random numbers, 0 or more.
-    planted : mapping of str to float, optional
-        Errors by name, see `PLANTS`.
-    bench : MotorBench, optional
-        The motor and its stand.
-
-    Returns
-    -------
-    dict of str to str
-        Text of motor.toml, back_emf.csv and torque.csv, all labelled as generated.
-
-    Raises
-    ------
-    InputError
-        For a negative seed.
 
     Notes
     -----

@@ -96,20 +96,7 @@ def _method(name: str, line: Line, u_gain: float, to_kt: float) -> dict[str, Any
 
 
 def document(trials: motor_file.MotorTrials, verdict: motor_errors.Verdict) -> dict[str, Any]:
-    """All results as a JSON document.
-
-    Parameters
-    ----------
-    trials : MotorTrials
-        What was read.
-    verdict : Verdict
-        What was judged.
-
-    Returns
-    -------
-    dict
-        Schema bemt.motor.result/1; constants in N m/A.
-    """
+    """All results as a JSON document."""
     m, to = trials.measured, trials.to_kt
     methods: list[dict[str, Any]] = []
     if m.data_sheet is not None:
@@ -146,18 +133,7 @@ _UNITS = {
 
 
 def verdict_text(made: dict[str, Any]) -> list[str]:
-    """The verdict in words.
-
-    Parameters
-    ----------
-    made : dict
-        Of `document`.
-
-    Returns
-    -------
-    list of str
-        Lines.
-    """
+    """The verdict in words."""
     if made["agree"]:
         return [f"the methods agree (p = {made['p_of_agreement']:.2g}); this does not exclude an error common to all"]
     lines = [f"the methods do not agree (p = {made['p_of_agreement']:.1g})"]

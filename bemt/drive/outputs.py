@@ -11,24 +11,7 @@ __all__ = ["check", "faults"]
 
 
 def faults(option: str, folder: Path, names: Iterable[str], inputs: Iterable[Path]) -> list[Fault]:
-    """Say which results must not be written.
-
-    Parameters
-    ----------
-    option : str
-        That names the folder, for the faults.
-    folder : Path
-        Of the results; it need not exist.
-    names : iterable of str
-        Of the files to be written there.
-    inputs : iterable of Path
-        All files that the command reads.
-
-    Returns
-    -------
-    list of Fault
-        Empty when all may be written.
-    """
+    """Say which results must not be written."""
     near = next((path for path in (folder, *folder.parents) if path.exists()), None)
     if near is not None and not near.is_dir():
         return [Fault(option, "", f"{near.as_posix()}, a file", "a folder")]
@@ -43,18 +26,7 @@ def faults(option: str, folder: Path, names: Iterable[str], inputs: Iterable[Pat
 
 
 def check(option: str, folder: Path, names: Iterable[str], inputs: Iterable[Path]) -> None:
-    """Refuse to write over what is read; to be called before anything is written.
-
-    Parameters
-    ----------
-    option, folder, names, inputs
-        As in `faults`.
-
-    Raises
-    ------
-    InputError
-        With all faults.
-    """
+    """Refuse to write over what is read; to be called before anything is written."""
     found = faults(option, folder, names, inputs)
     if found:
         raise InputError(found)

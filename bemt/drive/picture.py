@@ -40,20 +40,7 @@ def _png(figure: Any) -> bytes:
 
 
 def bench_map(chart: BenchMap, name: str) -> bytes:
-    """Draw a bench map with the points it was fitted to.
-
-    Parameters
-    ----------
-    chart : BenchMap
-        The map.
-    name : str
-        Title.
-
-    Returns
-    -------
-    bytes
-        PNG.
-    """
+    """Draw a bench map with the points it was fitted to."""
     label = {"thrust": "thrust [N]", "rpm": "speed [rev/min]", "current": "current [A]", "power": "power [W]"}
     figure, axes = _figure(len(chart.curves), 4.0, 3.6)
     pulse = np.linspace(*chart.pulse_range_us, 400)
@@ -75,22 +62,7 @@ def bench_map(chart: BenchMap, name: str) -> bytes:
 
 
 def box_plot(values: Mapping[str, Array], marks: Mapping[str, float], ylabel: str, title: str) -> bytes:
-    """Draw trials by method as boxes, with single values beside them.
-
-    Parameters
-    ----------
-    values : mapping of str to (N,) float
-        Trials by method, in the unit of `ylabel`; a single value becomes a diamond.
-    marks : mapping of str to float
-        Further values, as dashed lines with a label, in the unit of `ylabel`.
-    ylabel, title : str
-        Words.
-
-    Returns
-    -------
-    bytes
-        PNG.
-    """
+    """Draw trials by method as boxes, with single values beside them."""
     figure, (ax,) = _figure(1, 8.5, 4.6)
     names = list(values)
     for i, name in enumerate(names):
@@ -112,21 +84,7 @@ def box_plot(values: Mapping[str, Array], marks: Mapping[str, float], ylabel: st
 
 
 def curves(panels: Sequence[Mapping[str, Any]], title: str = "") -> bytes:
-    """Draw panels of lines and points.
-
-    Parameters
-    ----------
-    panels : sequence of mapping
-        Each with ``x`` and ``y`` (labels with units) and ``series``: (label, x, y, style) with a style of matplotlib;
-        ``title`` where one is wanted.
-    title : str
-        Above all.
-
-    Returns
-    -------
-    bytes
-        PNG.
-    """
+    """Draw panels of lines and points."""
     figure, axes = _figure(len(panels), 5.0, 3.9)
     for ax, panel in zip(axes, panels, strict=True):
         for k, (label, x, y, style) in enumerate(panel["series"]):

@@ -53,48 +53,15 @@ class RotorMap:
     notes: tuple[str, ...] = ()
 
     def thrust(self, omega: ArrayLike) -> Array:
-        """Steady thrust.
-
-        Parameters
-        ----------
-        omega : array_like
-            Speed. [rad/s]
-
-        Returns
-        -------
-        (N,) float
-            Thrust. [N]
-        """
+        """Steady thrust, (N,) [N]."""
         return np.asarray(self.thrust_law(np.maximum(np.asarray(omega, dtype=float), 0.0)))
 
     def torque(self, omega: ArrayLike) -> Array:
-        """Steady shaft torque.
-
-        Parameters
-        ----------
-        omega : array_like
-            Speed. [rad/s]
-
-        Returns
-        -------
-        (N,) float
-            Torque. [N m]
-        """
+        """Steady shaft torque, (N,) [N m]."""
         return np.asarray(self.torque_law(np.maximum(np.asarray(omega, dtype=float), 0.0)))
 
     def induced(self, thrust_N: ArrayLike) -> Array:
-        """Induced speed of momentum theory, 2 rho A v (V + v) = T.
-
-        Parameters
-        ----------
-        thrust_N : array_like
-            Thrust. [N]
-
-        Returns
-        -------
-        (N,) float
-            Speed. [m/s]
-        """
+        """Induced speed of momentum theory, 2 rho A v (V + v) = T, (N,) [m/s]."""
         load = np.maximum(np.asarray(thrust_N, dtype=float), 0.0) / (2.0 * self.rho * self.area_m2)
         half = 0.5 * self.airspeed_m_s
         return np.asarray(np.sqrt(half**2 + load) - half)
@@ -111,24 +78,6 @@ def from_coefficients(
 ) -> RotorMap:  # fmt: skip
     """Rotor with constant coefficients.
 
-    Parameters
-    ----------
-    CT, CQ : float
-        T/(rho n^2 D^4), Q/(rho n^2 D^5). [-]
-    diameter_m : float
-        D. [m]
-    rho : float
-        Density. [kg/m3]
-    inertia_kg_m2 : float
-        Of the rotor. [kg m2]
-    solidity : float or None
-        Blade area over disk area [-]; None: no lag of the inflow can be given.
-
-    Returns
-    -------
-    RotorMap
-        At rest in the air.
-
     Notes
     -----
     With a lift slope a of 5.7 per radian, dT/dw = -rho sigma a A Omega R / 4 (blade element, uniform inflow; J. G.
@@ -143,22 +92,7 @@ def quadratic(
     kT: float, kQ: float, diameter_m: float, rho: float = 1.225, inertia_kg_m2: float = 0.0,
     solidity: float | None = None,
 ) -> RotorMap:  # fmt: skip
-    """Rotor whose loads go with the square of the speed.
-
-    Parameters
-    ----------
-    kT, kQ : float
-        Thrust and torque over speed squared. [N s2/rad2], [N m s2/rad2]
-    diameter_m, rho, inertia_kg_m2 : float
-        As in `from_coefficients`. [m], [kg/m3], [kg m2]
-    solidity : float or None
-        As in `from_coefficients`. [-]
-
-    Returns
-    -------
-    RotorMap
-        At rest in the air.
-    """
+    """Rotor whose loads go with the square of the speed."""
     R, A = 0.5 * diameter_m, math.pi * diameter_m**2 / 4.0
     slope = None if solidity is None else (lambda w: -0.25 * rho * solidity * 5.7 * A * R * w)
     return RotorMap(math.inf, lambda w: kT * w**2, lambda w: kQ * w**2, slope, R, A, rho, 0.0, inertia_kg_m2)
@@ -168,33 +102,7 @@ def from_case(
     case: Case, rpm_max: float, airspeed_m_s: float = 0.0, air: Air | None = None, inertia_kg_m2: float = 0.0,
     points: int = 33,
 ) -> RotorMap:  # fmt: skip
-    """Rotor of a case by BEMT.
-
-    Parameters
-    ----------
-    case : Case
-        The case.
-    rpm_max : float
-        Greatest speed of the table. [rev/min]
-    airspeed_m_s : float
-        Speed of flight. [m/s]
-    air : Air or None
-        State of the air; None: the case's first.
-    inertia_kg_m2 : float
-        Of the rotor. [kg m2]
-    points : int
-        Speeds solved; between them T/Omega^2 and Q/Omega^2 are monotone cubics, below the first they are constant.
-
-    Returns
-    -------
-    RotorMap
-        At this airspeed.
-
-    Raises
-    ------
-    InputError
-        When fewer than half of the speeds converge.
-    """
+    """Rotor of a case by BEMT."""
     from scipy.interpolate import PchipInterpolator
 
     ready = prepare_case(case)

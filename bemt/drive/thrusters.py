@@ -82,18 +82,7 @@ class Allocation:
 
 
 def effectiveness(thrusters: Sequence[Thruster]) -> Array:
-    """Force and moment per thrust.
-
-    Parameters
-    ----------
-    thrusters : sequence of Thruster
-        One or more.
-
-    Returns
-    -------
-    (2, N) float
-        Force [N/N] and roll moment [N m/N].
-    """
+    """Force and moment per thrust."""
     c = np.cos([t.cant_rad for t in thrusters])
     s = np.sin([t.cant_rad for t in thrusters])
     y, z = np.array([t.y_m for t in thrusters]), np.array([t.z_m for t in thrusters])
@@ -104,25 +93,6 @@ def allocate(
     thrusters: Sequence[Thruster], force_N: float, moment_Nm: float, priority: str = "moment"
 ) -> Allocation:  # fmt: skip
     """Share a command among thrusters.
-
-    Parameters
-    ----------
-    thrusters : sequence of Thruster
-        One or more.
-    force_N, moment_Nm : float
-        Wanted. [N], [N m]
-    priority : str
-        moment or force: what is met first when both together are beyond the limits.
-
-    Returns
-    -------
-    Allocation
-        The nearest thrusts.
-
-    Raises
-    ------
-    InputError
-        Without thrusters, with limits that cross, or an unknown priority.
 
     Examples
     --------
@@ -177,18 +147,7 @@ def allocate(
 
 
 def attainable(thrusters: Sequence[Thruster]) -> Array:
-    """Corner points of what force and moment can be together.
-
-    Parameters
-    ----------
-    thrusters : sequence of Thruster
-        One or more.
-
-    Returns
-    -------
-    (M, 2) float
-        Force [N] and moment [N m] of the corners of the convex hull, in order round it, the first again at the end.
-    """
+    """Corner points of what force and moment can be together, (M, 2)."""
     b = effectiveness(thrusters)
     at = b @ np.array([t.thrust_min_N for t in thrusters])
     # a zonogon: its edges are the thrusters' vectors, sorted by angle, once forward and once back
@@ -201,21 +160,7 @@ def attainable(thrusters: Sequence[Thruster]) -> Array:
 
 
 def moment_at(distance_m: ArrayLike, thrust_N: float, total_force_N: float | None = None) -> Array:
-    """Roll moment of a pair of thrusters over the distance at which they are mounted.
-
-    Parameters
-    ----------
-    distance_m : array_like
-        From the centre of mass, on both sides. [m]
-    thrust_N : float
-        The most that one gives. [N]
-    total_force_N : float or None
-        Force that both must give together [N]; None: no force is asked for, one thruster alone makes the moment.
-
-    Returns
-    -------
-    (N,) float
-        Greatest moment [N m]; NaN when the force is beyond both.
+    """Roll moment of a pair of thrusters over the distance at which they are mounted, (N,) [N m].
 
     Examples
     --------

@@ -60,35 +60,7 @@ def simulate(
     drive: Drive, steps: Sequence[tuple[float, float]], end_s: float, times_s: ArrayLike | None = None,
     soc: float = 1.0, temperature_C: float | None = None, omega0: float | None = None,
 ) -> History:  # fmt: skip
-    """Integrate the drive through steps of the command.
-
-    Parameters
-    ----------
-    drive : Drive
-        The drive.
-    steps : sequence of tuple of float
-        (time [s], pulse width [us]) from which a command holds; the first also before.
-    end_s : float
-        End. [s]
-    times_s : array_like or None
-        Times of the answer, from 0 to the end [s]; None: 400 of them.
-    soc : float
-        State of charge at the start. [1]
-    temperature_C : float or None
-        Of the motor at the start [C]; None: the air's.
-    omega0 : float or None
-        Speed at the start [rad/s]; None: steady at the first command.
-
-    Returns
-    -------
-    History
-        At the times asked for.
-
-    Raises
-    ------
-    InputError
-        When there is nothing that turns, or the times are not in order.
-    """
+    """Integrate the drive through steps of the command."""
     from scipy.integrate import solve_ivp
 
     inertia = drive.motor.inertia_kg_m2 + drive.rotor.inertia_kg_m2
@@ -161,21 +133,7 @@ def _rates(t: float, y: Array, drive: Drive, duty: Array, inertia: float) -> lis
 
 
 def time_to(time_s: Array, values: Array, start_s: float, share: float = 1.0 - math.exp(-1.0)) -> float:
-    """Time from a step until a share of the change is reached.
-
-    Parameters
-    ----------
-    time_s, values : (N,) float
-        Course: time [s] and, in any unit, what changes from its value at the step to its last value.
-    start_s : float
-        Time of the step. [s]
-    share : float
-        Of the change. [1]
-
-    Returns
-    -------
-    float
-        Time [s]; NaN when it is not reached.
+    """Time from a step until a share of the change is reached. [s]
 
     Examples
     --------
@@ -217,16 +175,6 @@ class FirstOrder:
 
 def first_order(time_s: ArrayLike, values: ArrayLike) -> FirstOrder:
     """Fit a delayed first-order step, as load-cell logs are usually read.
-
-    Parameters
-    ----------
-    time_s, values : array_like
-        Samples around one step, from before it until it has settled: time [s], values in any unit.
-
-    Returns
-    -------
-    FirstOrder
-        Time constant, its uncertainty, time of the step, levels.
 
     Notes
     -----

@@ -45,24 +45,7 @@ class MapCheck:
 
 
 def check_map(name: str, how: str, drive: Drive, points: MapPoints, fitted: Mapping[str, float]) -> MapCheck:
-    """Compare a drive with a thrust map.
-
-    Parameters
-    ----------
-    name, how : str
-        Words for the result.
-    drive : Drive
-        The drive.
-    points : MapPoints
-        The recording.
-    fitted : mapping of str to float
-        What was fitted, in the unit of its name.
-
-    Returns
-    -------
-    MapCheck
-        Full scale is the greatest thrust recorded.
-    """
+    """Compare a drive with a thrust map."""
     thrust = points.values["thrust"]
     model = drive.steady(points.pulse_us).thrust_N
     error = np.abs(model - thrust) / float(np.nanmax(thrust))
@@ -71,20 +54,7 @@ def check_map(name: str, how: str, drive: Drive, points: MapPoints, fitted: Mapp
 
 
 def other_battery(drive: Drive, points: MapPoints) -> Drive:
-    """The drive on the battery of another recording.
-
-    Parameters
-    ----------
-    drive : Drive
-        The drive.
-    points : MapPoints
-        The recording, with voltage and current.
-
-    Returns
-    -------
-    Drive
-        Same ESC, motor and rotor; voltage at rest and resistance from the recording.
-    """
+    """The drive on the battery of another recording."""
     voc, rb = identify.battery_of(points)
     return replace(drive, battery=Battery(1, rb, soc_table=(0.0, 1.0), ocv_V=(voc, voc)))
 
@@ -153,31 +123,7 @@ def step_drive(
     voltage_V: float, full_thrust_N: float, drop: float, skew: float, inertia_kg_m2: float = 0.0,
     diameter_m: float = 0.127, tip_m_s: float = 170.0, brake_on_stop: float = 1.0,
 ) -> Drive:  # fmt: skip
-    """Drive of logs that state neither motor nor propeller, by what their thrust over duty says of it.
-
-    Parameters
-    ----------
-    voltage_V : float
-        Of the battery. [V]
-    full_thrust_N : float
-        Thrust at full duty. [N]
-    drop : float
-        Share of the voltage that the resistance takes at full duty. [1]
-    skew : float
-        X/R of the winding at full duty. [1]
-    inertia_kg_m2 : float
-        Of motor and rotor. [kg m2]
-    diameter_m, tip_m_s : float
-        Assumed: diameter [m] and tip speed at full thrust [m/s]. With Q/(T D) = 0.1 they set units, which the inertia
-        takes up, and the small lag of the inflow.
-    brake_on_stop : float
-        Brake force of the ESC at no throttle. [1]
-
-    Returns
-    -------
-    Drive
-        Linear duty, complementary switching, no friction.
-    """
+    """Drive of logs that state neither motor nor propeller, by what their thrust over duty says of it."""
     omega = tip_m_s / (0.5 * diameter_m)
     kT = full_thrust_N / omega**2
     kQ = 0.1 * diameter_m * kT
@@ -192,28 +138,7 @@ def check_steps(
     voltage_V: float, levels: tuple[Array, Array], steps: Sequence[Step], u_level: float = 0.02,
     u_tau: float = 0.1,
 ) -> tuple[list[StepCheck], Drive]:  # fmt: skip
-    """Fit drop, reactance, inertia and brake force to levels and steps of logs, and compare the time constants.
-
-    Parameters
-    ----------
-    voltage_V : float
-        Of the battery. [V]
-    levels : (pulse_us, thrust_N)
-        Steady levels of a log. [us], [N]
-    steps : sequence of Step
-        Of all logs.
-    u_level : float
-        Uncertainty of a level as duty: the battery's sag during the log was not recorded. [1]
-    u_tau : float
-        Least relative uncertainty of a time constant: like falls of these logs differ by more than their scatter. [1]
-
-    Returns
-    -------
-    list of StepCheck
-        All steps.
-    Drive
-        The drive, with its inertia.
-    """
+    """Fit drop, reactance, inertia and brake force to levels and steps of logs, and compare the time constants."""
     from scipy.optimize import least_squares
     from scipy.special import expit
 

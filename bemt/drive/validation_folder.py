@@ -56,18 +56,7 @@ def _mit(path: Path) -> tuple[MapPoints, Array]:
 
 
 def maps(folder: Path) -> list[validation.MapCheck]:
-    """Fit and predict the thrust maps of a folder.
-
-    Parameters
-    ----------
-    folder : Path
-        With the publishers' folders; those that are missing are left out.
-
-    Returns
-    -------
-    list of MapCheck
-        One per map.
-    """
+    """Fit and predict the thrust maps of a folder."""
     out = []
     bare = folder / "jmajew" / "grp01__mn2206_noprop_3s.csv"
     if bare.is_file():
@@ -113,20 +102,7 @@ def maps(folder: Path) -> list[validation.MapCheck]:
 
 
 def steps(folder: Path) -> tuple[list[validation.StepCheck], Drive]:
-    """Compare the steps of the logs of ``thrust_step``.
-
-    Parameters
-    ----------
-    folder : Path
-        With ``thrust_step``.
-
-    Returns
-    -------
-    list of StepCheck
-        All steps.
-    Drive
-        The drive that was fitted to them.
-    """
+    """Compare the steps of the logs of ``thrust_step``."""
     found, levels = [], (np.array([]), np.array([]))
     for name, orders in COMMANDS.items():
         t, scale = (

@@ -43,37 +43,7 @@ def export_case(
     flow: Run | None = None,
     hold: tuple[str, ...] = (),
 ) -> dict[str, Any]:
-    """Write one case for one or more targets.
-
-    Parameters
-    ----------
-    case : Case
-        The case.
-    out : Path
-        Folder. What an earlier export wrote there and this one does not goes: the files that the earlier manifest lists
-        and that are as they were written; no others.
-    formats : list of str
-        Words of :func:`bemt.exports.target_ids`. Solids go to the folder itself, others each to one of their name.
-    unit : str
-        ``mm`` or ``m``.
-    options : Options or None
-        How fine; None is fine enough for chord and twist errors below 0.2 %.
-    flow : Run or None
-        What the OpenFOAM case is to compute; its speed and airspeed hold for the other targets too. None is the case's
-        own point.
-    hold : tuple of str
-        What every target that is no solid must hold, keys of `bemt.exports.base.FEATURES`.
-
-    Returns
-    -------
-    dict
-        The manifest: ``files`` of the solids, ``targets`` with fit error, band, range and files of the others.
-
-    Raises
-    ------
-    InputError
-        When the case makes no sound solid, or a target cannot hold what is asked; nothing is written then.
-    """
+    """Write one case for one or more targets."""
     earlier = _listed(out)
     run = flow or Run()
     targets, contents = _targets(case, formats, run, hold)

@@ -66,26 +66,7 @@ def calibrate(
     points: FitPoints, test: FitPoints | None = None, draws: int = fitting.DRAWS,
     progress: Callable[[str], None] | None = None,
 ) -> tuple[dict[str, Any], dict[str, tuple[FitPoints, dict[str, Array]]]]:  # fmt: skip
-    """Fit, leave out, score.
-
-    Parameters
-    ----------
-    points : FitPoints
-        Measured points to fit.
-    test : FitPoints, optional
-        Held out.
-    draws : int
-        Bootstrap samples of propellers.
-    progress : callable, optional
-        Takes a line on what is being done.
-
-    Returns
-    -------
-    document : dict
-        Schema ``bemt.calibration/1``, without the names of the files.
-    predictions : dict
-        ``calibration`` and ``test``: points and the CT of each model, for the figure. [-]
-    """
+    """Fit, leave out, score."""
     say = progress or (lambda _: None)
     notes = [*points.notes, *(test.notes if test else ())]
     say("K1 and K2")

@@ -181,21 +181,6 @@ the maker is left out of the fit, over `BAND_X`; given label, chord, chord and m
 def find_series(name: str) -> MakerSeries:
     """Maker series by UIUC family (``gwsdd``) or name (``GWS Direct Drive``).
 
-    Parameters
-    ----------
-    name : str
-        In any case.
-
-    Returns
-    -------
-    MakerSeries
-        Of `SERIES`.
-
-    Raises
-    ------
-    InputError
-        For an unknown one.
-
     Examples
     --------
     >>> find_series("GWS Direct Drive") is SERIES["gwsdd"]
@@ -209,19 +194,7 @@ def find_series(name: str) -> MakerSeries:
 
 
 def default_chord(diameter_m: ArrayLike, constants: Constants = CONSTANTS) -> Any:
-    """Typical chord at 0.75 R of one blade of a two-bladed small propeller.
-
-    Parameters
-    ----------
-    diameter_m : float or array
-        Diameter. [m]
-    constants : Constants
-        Its law.
-
-    Returns
-    -------
-    float or array
-        Chord; times the factor of the series; single propellers scatter about it. [m]
+    """Typical chord at 0.75 R of one blade of a two-bladed small propeller. [m]
 
     Examples
     --------
@@ -234,18 +207,7 @@ def default_chord(diameter_m: ArrayLike, constants: Constants = CONSTANTS) -> An
 
 
 def effective_pitch(label: ArrayLike, measured: ArrayLike) -> Array:
-    """Pitch that the formula takes.
-
-    Parameters
-    ----------
-    label, measured : float or array
-        Of the label; at 0.75 R, NaN when unknown. [m] or over the diameter [-]
-
-    Returns
-    -------
-    array
-        Mean of both, or the label. [m] or [-]
-    """
+    """Pitch that the formula takes."""
     a, b = np.asarray(label, dtype=float), np.asarray(measured, dtype=float)
     return np.asarray(np.where(np.isfinite(b), 0.5 * (a + b), a))
 
@@ -254,27 +216,7 @@ def coefficients(
     P_D: ArrayLike, J: ArrayLike, solidity: ArrayLike, Re: ArrayLike, constants: Constants = CONSTANTS,
     zero_lift: ArrayLike = 0.0, level: ArrayLike = 1.0,
 ) -> tuple[Array, Array]:  # fmt: skip
-    """Thrust and power coefficient by the formula of the module.
-
-    Parameters
-    ----------
-    P_D, J : float or array
-        Pitch over diameter; advance ratio. [-]
-    solidity : float or array
-        B c/(pi R) with the chord at 0.75 R. [-]
-    Re : float or array
-        Reynolds number of the section at 0.75 R. [-]
-    constants : Constants
-        Fitted constants.
-    zero_lift : float or array
-        Of the series, added to a0. [rad]
-    level : float or array
-        Factor on r. [-]
-
-    Returns
-    -------
-    CT, CP : array
-        Propeller convention. [-]
+    """Thrust and power coefficient by the formula of the module. [-]
 
     Notes
     -----

@@ -83,28 +83,6 @@ def validity_flags(
 ) -> tuple[str, ...]:  # fmt: skip
     """Say where a point leaves the data of the calibration.
 
-    Parameters
-    ----------
-    diameter_m : float
-        Diameter. [m]
-    P_D : float
-        Pitch over diameter. [-]
-    blades : float
-        Number of blades. [-]
-    Re, M_tip : float
-        Reynolds number at 0.75 R, rotational tip Mach number. [-]
-    x : float
-        J/(P/D). [-]
-    chord_known : bool
-        Whether the chord was given.
-    ducted : bool
-        Whether the rotor runs in a duct.
-
-    Returns
-    -------
-    tuple of str
-        Empty inside the data.
-
     Examples
     --------
     >>> validity_flags(0.254, 0.5, 2, 5e4, 0.2, 0.3)
@@ -143,24 +121,6 @@ def length_faults(
     where: tuple[str, str], value: float, unit: str, diameter_m: float, limits: tuple[float, float]
 ) -> list[Fault]:
     """Say whether a length fits the diameter, and in which unit it would.
-
-    Parameters
-    ----------
-    where : tuple of str
-        File or option, and key, for the fault.
-    value : float
-        Length. [unit]
-    unit : str
-        One of `UNITS`.
-    diameter_m : float
-        Of the propeller; NaN when it is not known. [m]
-    limits : tuple of float
-        Least and greatest length over the diameter, both possible. [1]
-
-    Returns
-    -------
-    list of Fault
-        One or none.
 
     Examples
     --------
@@ -213,38 +173,6 @@ def estimate(
     series: str | None = None, ducted: bool = False,
 ) -> Estimate:  # fmt: skip
     """Thrust and power with their bands and flags.
-
-    Parameters
-    ----------
-    diameter_m, pitch_m : float or array
-        Diameter; pitch of the label, advance per turn. [m]
-    blades : int or array
-        Number of blades. [-]
-    rpm : float or array
-        Rotational speed. [rev/min]
-    airspeed_m_s : float or array
-        Airspeed along the axis. [m/s]
-    air : Air, optional
-        State of the air; 1.225 kg/m3 at 15 degC by default.
-    chord_m : float or array, optional
-        Chord of a blade at 0.75 R, by far the best fourth number; a typical one by default. [m]
-    measured_pitch_m : float or array, optional
-        2 pi 0.75 R tan(blade angle there); the fifth. [m]
-    series : str, optional
-        Maker and series, as in `bemt.formula.compact.SERIES`.
-    ducted : bool
-        Whether the rotor runs in a duct; only flagged, the formula has no duct.
-
-    Returns
-    -------
-    Estimate
-        Arguments broadcast against each other and raveled to N points; NaN without rotation in moving air.
-
-    Raises
-    ------
-    InputError
-        For lengths that are not positive, a pitch or chord that no propeller of this diameter has (`POSSIBLE`), a blade
-        count that is not whole, negative rpm, numbers that are not finite, or an unknown series; all at once.
 
     Examples
     --------

@@ -18,15 +18,7 @@ _COLOURS = {"thesis": "#b2182b", "compact_pitch": "#1b7837", "compact": "#2166ac
 
 
 def draw(sets: Mapping[str, tuple[FitPoints, Mapping[str, Array]]], path: Path) -> None:
-    """Draw and write a PNG.
-
-    Parameters
-    ----------
-    sets : mapping of str to (FitPoints, mapping)
-        ``calibration`` and perhaps ``test``: measured points and CT of each model. [-]
-    path : Path
-        File; appears whole.
-    """
+    """Draw and write a PNG."""
     import io
 
     from matplotlib.backends.backend_agg import FigureCanvasAgg

@@ -52,76 +52,25 @@ THESIS = K1K2(empirical.K1, empirical.K2)
 
 
 def CT_k1k2(points: FitPoints, K1: float, K2: float) -> Array:
-    """Thrust coefficient of the K1/K2 formula.
-
-    Parameters
-    ----------
-    points : FitPoints
-        Conditions.
-    K1, K2 : float
-        Constants. [-]
-
-    Returns
-    -------
-    (N,) float
-        Propeller convention. [-]
-    """
+    """Thrust coefficient of the K1/K2 formula, (N,) [-]."""
     pd = points.P_D
     return np.pi / 4.0 * (pd**2 - points.J * pd) * (K1 / pd) ** K2
 
 
 def usable(points: FitPoints, flight: bool = False) -> NDArray[np.bool_]:
-    """Which points the regression may use: open rotors with thrust, at rest (or up to `X_FLIGHT` as well).
-
-    Parameters
-    ----------
-    points : FitPoints
-        Measured points.
-    flight : bool
-        Whether points in flight may be used.
-
-    Returns
-    -------
-    (N,) bool
-        True where it holds.
-    """
+    """Which points the regression may use: open rotors with thrust, at rest (or up to `X_FLIGHT` as well), (N,)."""
     x = points.x
     moving = (x > 0) & (x < X_FLIGHT) & flight
     return np.asarray((points.CT > 0) & ~points.ducted & ((points.J == 0) | moving))
 
 
 def weights(index: NDArray[np.intp]) -> Array:
-    """Weights that make each propeller count once.
-
-    Parameters
-    ----------
-    index : (N,) int
-        Propeller of each row.
-
-    Returns
-    -------
-    (N,) float
-        One over the number of rows of that propeller. [-]
-    """
+    """Weights that make each propeller count once, (N,) [-]."""
     return 1.0 / np.bincount(index)[index]
 
 
 def huber_line(t: Array, y: Array, w: Array, scale: float | None = None) -> tuple[float, float]:
-    """Weighted robust straight line y = a + b t.
-
-    Parameters
-    ----------
-    t, y : (N,) float
-        Abscissa and ordinate. [-]
-    w : (N,) float
-        Weights. [-]
-    scale : float, optional
-        Robust standard deviation to keep; by default 1.4826 times the median deviation, found along the way. [-]
-
-    Returns
-    -------
-    a, b : float
-        By iteratively reweighted least squares with Huber's weights; b is NaN when all t are equal. [-]
+    """Weighted robust straight line y = a + b t. [-]
 
     References
     ----------
@@ -158,17 +107,7 @@ def huber_line(t: Array, y: Array, w: Array, scale: float | None = None) -> tupl
 
 
 def robust_scale(e: Array, w: Array) -> float:
-    """Standard deviation by the weighted median of deviations, as if they were normal.
-
-    Parameters
-    ----------
-    e, w : (N,) float
-        Absolute deviations and weights. [-]
-
-    Returns
-    -------
-    float
-        1.4826 times the median. [-]
+    """Standard deviation by the weighted median of deviations, as if they were normal. [-]
 
     Examples
     --------
@@ -194,27 +133,7 @@ def _constants(a: float, b: float) -> tuple[float, float]:
 
 
 def fit(points: FitPoints, flight: bool = False, draws: int = DRAWS) -> K1K2:
-    """Fit both constants.
-
-    Parameters
-    ----------
-    points : FitPoints
-        Measured points; ducted rotors and points without thrust are left out.
-    flight : bool
-        Use points in flight below `X_FLIGHT` as well.
-    draws : int
-        Bootstrap samples of propellers; 0 for none.
-
-    Returns
-    -------
-    K1K2
-        Constants and intervals.
-
-    Raises
-    ------
-    InputError
-        With fewer than three propellers, or with only one pitch ratio (K2 is its exponent).
-    """
+    """Fit both constants."""
     used = points.select(usable(points, flight))
     present = np.unique(used.index)
     if present.size < 3 or np.ptp(np.log(used.P_D)) < 0.05:
@@ -241,40 +160,14 @@ def fit(points: FitPoints, flight: bool = False, draws: int = DRAWS) -> K1K2:
 
 
 def goal_seek(points: FitPoints, K2: float = empirical.K2) -> K1K2:
-    """K1 as the thesis's source found it: K2 fixed, mean relative error of the static points zero.
-
-    Parameters
-    ----------
-    points : FitPoints
-        Measured points.
-    K2 : float
-        Fixed exponent. [-]
-
-    Returns
-    -------
-    K1K2
-        Constants without intervals.
-    """
+    """K1 as the thesis's source found it: K2 fixed, mean relative error of the static points zero."""
     used = points.select(usable(points))
     mean = float(np.mean(CT_k1k2(used, 1.0, K2) / used.CT))
     return K1K2(mean ** (-1.0 / K2), K2, points=used.rpm.size, propellers=np.unique(used.index).size)
 
 
 def left_out(points: FitPoints, flight: bool = False) -> Array:
-    """CT of every point by constants that were fitted without its propeller.
-
-    Parameters
-    ----------
-    points : FitPoints
-        Measured points.
-    flight : bool
-        As in `fit`.
-
-    Returns
-    -------
-    (N,) float
-        Propeller convention. [-]
-    """
+    """CT of every point by constants that were fitted without its propeller, (N,) [-]."""
     mask = usable(points, flight)
     out = np.full(points.rpm.size, np.nan)
     used = points.select(mask)

@@ -193,18 +193,7 @@ def _file(path: Path) -> tuple[list[Rows], list[str], list[str]]:
 
 
 def files(path: Path) -> list[Path]:
-    """All files that a name stands for.
-
-    Parameters
-    ----------
-    path : Path
-        File or folder.
-
-    Returns
-    -------
-    list of Path
-        The file itself, or those below the folder, hidden ones left out; empty when nothing is there.
-    """
+    """All files that a name stands for."""
     if not path.is_dir():
         return [path] if path.exists() else []
     return [f for f in sorted(path.rglob("*")) if f.is_file() and not f.name.startswith(".")]
@@ -238,25 +227,7 @@ def _folder(path: Path, without: frozenset[Path]) -> tuple[list[Rows], list[str]
 
 
 def load(paths: Iterable[str | os.PathLike[str]], without: frozenset[Path] = frozenset()) -> FitPoints:
-    """Gather the points of files and folders.
-
-    Parameters
-    ----------
-    paths : iterable of path
-        Files or folders.
-    without : frozenset of Path
-        Files to leave out of the folders, resolved; of UIUC data with all other runs of their propellers.
-
-    Returns
-    -------
-    FitPoints
-        Rows with rpm > 0 and finite J and CT; what was left out is in ``refused``.
-
-    Raises
-    ------
-    InputError
-        For paths that do not exist, named files that give no point, or no point at all; all at once.
-    """
+    """Gather the points of files and folders."""
     rows: list[Rows] = []
     refused: list[str] = []
     notes: list[str] = []

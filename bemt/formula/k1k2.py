@@ -61,25 +61,7 @@ nominal D and p; `bemt.compare.reproduce` recomputes it where the data are."""
 
 
 def corrected_equation(rho: Any, area: Any, v_pitch: Any, V: Any, d_over_p: Any) -> Any:
-    """K1/K2 equation in its right form, every term inside the bracket.
-
-    Parameters
-    ----------
-    rho : float or array
-        Density. [kg/m3]
-    area : float or array
-        Disk or annulus area. [m2]
-    v_pitch : float or array
-        Pitch speed n p. [m/s]
-    V : float or array
-        Airspeed. [m/s]
-    d_over_p : float or array
-        Diameter over pitch. [-]
-
-    Returns
-    -------
-    float or array
-        Thrust. [N]
+    """K1/K2 equation in its right form, every term inside the bracket. [N]
 
     Examples
     --------
@@ -91,24 +73,6 @@ def corrected_equation(rho: Any, area: Any, v_pitch: Any, V: Any, d_over_p: Any)
 
 def printed_equation(rho: Any, area: Any, v_pitch: Any, V: Any, d_over_p: Any) -> Any:
     """K1/K2 equation as printed in the thesis, kept ONLY to show that it cannot be right.  Never use it.
-
-    Parameters
-    ----------
-    rho : float or array
-        Density. [kg/m3]
-    area : float or array
-        Disk area. [m2]
-    v_pitch : float or array
-        Pitch speed n p. [m/s]
-    V : float or array
-        Airspeed. [m/s]
-    d_over_p : float or array
-        Diameter over pitch. [-]
-
-    Returns
-    -------
-    float or array
-        A number without consistent unit: newtons minus (m/s)^2.
 
     Notes
     -----
@@ -125,19 +89,7 @@ def printed_equation(rho: Any, area: Any, v_pitch: Any, V: Any, d_over_p: Any) -
 
 
 def unit_defect(formula: Callable[..., float], mass: float = 1.0, length: float = 1.0, time: float = 1.0) -> float:
-    """Relative error that a mere change of units makes in a thrust formula; zero for a right one.
-
-    Parameters
-    ----------
-    formula : callable
-        f(rho, area, v_pitch, V, d_over_p), such as `corrected_equation`.
-    mass, length, time : float
-        New base units, in kilograms, metres and seconds. [kg], [m], [s]
-
-    Returns
-    -------
-    float
-        (Thrust computed in the new units and converted back)/(thrust computed in SI) - 1. [-]
+    """Relative error that a mere change of units makes in a thrust formula; zero for a right one. [-]
 
     Notes
     -----
@@ -179,19 +131,7 @@ def _check(D: Array, pitch: Array, rpm: Array, V: Array, rho: Array, hub: Array)
 
 
 def pitch_speed(rpm: ArrayLike, pitch_m: ArrayLike) -> Any:
-    """Advance of a screw in still air.
-
-    Parameters
-    ----------
-    rpm : float or array
-        Rotational speed. [rev/min]
-    pitch_m : float or array
-        Geometric pitch, advance per turn. [m]
-
-    Returns
-    -------
-    float or array
-        v_p = rpm/60 pitch. [m/s]
+    """Advance of a screw in still air. [m/s]
 
     Examples
     --------
@@ -202,17 +142,7 @@ def pitch_speed(rpm: ArrayLike, pitch_m: ArrayLike) -> Any:
 
 
 def zero_thrust_J(diameter_m: ArrayLike, pitch_m: ArrayLike) -> Any:
-    """Advance ratio at which the formula gives no thrust.
-
-    Parameters
-    ----------
-    diameter_m, pitch_m : float or array
-        Diameter and pitch. [m]
-
-    Returns
-    -------
-    float or array
-        P/D. [-]
+    """Advance ratio at which the formula gives no thrust. [-]
 
     Notes
     -----
@@ -231,32 +161,7 @@ def thrust(
     diameter_m: ArrayLike, pitch_m: ArrayLike, rpm: ArrayLike, V: ArrayLike = 0.0, rho: ArrayLike = RHO_FIXED,
     hub_diameter_m: ArrayLike = 0.0,
 ) -> Any:  # fmt: skip
-    """Thrust by the K1/K2 model.
-
-    Parameters
-    ----------
-    diameter_m : float or array
-        Diameter. [m]
-    pitch_m : float or array
-        Geometric pitch, advance per turn. [m]
-    rpm : float or array
-        Rotational speed. [rev/min]
-    V : float or array
-        Airspeed along the axis. [m/s]
-    rho : float or array
-        Density. [kg/m3]
-    hub_diameter_m : float or array
-        Hub diameter: only the annulus outside it makes thrust; 0 for the whole disk as in the sources. [m]
-
-    Returns
-    -------
-    float or array
-        Thrust, negative above the pitch speed. [N]
-
-    Raises
-    ------
-    InputError
-        For lengths or densities that are not positive, negative rpm, or a hub as large as the disk; all at once.
+    """Thrust by the K1/K2 model. [N]
 
     Notes
     -----
@@ -277,22 +182,6 @@ def thrust(
 
 def validity_flags(d_over_p: float, M_tip: float = 0.0, J: float = 0.0, ducted: bool = False) -> tuple[str, ...]:
     """Say why the model should not be trusted at a point.
-
-    Parameters
-    ----------
-    d_over_p : float
-        Diameter over pitch. [-]
-    M_tip : float
-        Rotational tip Mach number. [-]
-    J : float
-        Advance ratio. [-]
-    ducted : bool
-        Whether the rotor runs in a duct.
-
-    Returns
-    -------
-    tuple of str
-        Empty when inside every stated range.
 
     Examples
     --------
@@ -331,33 +220,6 @@ def estimate(
     hub_diameter_m: ArrayLike = 0.0, ducted: bool = False,
 ) -> Dataset:  # fmt: skip
     """Thrust by the K1/K2 model with coefficients, uncertainty and flags.
-
-    Parameters
-    ----------
-    diameter_m, pitch_m : float or array
-        Diameter; geometric pitch. [m]
-    rpm : float or array
-        Rotational speed. [rev/min]
-    V : float or array
-        Airspeed along the axis. [m/s]
-    air : Air, optional
-        State of the air; 1.225 kg/m3 at 15 degC by default, as the sources fix it.
-    hub_diameter_m : float or array
-        Hub diameter, for the annulus. [m]
-    ducted : bool
-        Whether the rotor runs in a duct; only flagged, the model has no duct.
-
-    Returns
-    -------
-    Dataset
-        Of kind ``k1k2``, arguments broadcast against each other and raveled to N points: ``thrust_N``, ``rpm``,
-        ``airspeed_m_s``, ``density_kg_m3``, ``CT`` (whole-disk diameter), ``J``, ``M_tip``.  The standard uncertainty
-        of the thrust is 0.196 of it at rest (measured on UIUC data), unknown otherwise; flags say why not to trust it.
-
-    Raises
-    ------
-    InputError
-        As `thrust`.
 
     Examples
     --------

@@ -68,22 +68,7 @@ def _thinned(points: FitPoints) -> NDArray[np.intp]:
 
 
 def limit(points: FitPoints, given: str) -> dict[str, Any] | None:
-    """What the inputs carry at rest.
-
-    Parameters
-    ----------
-    points : FitPoints
-        Measured points; open propellers at rest are used, with chord (and measured pitch) where `given` says so.
-    given : str
-        ``label``, ``chord`` or ``pitch``: what a formula may know, see `bemt.formula.refit.GIVEN`.
-
-    Returns
-    -------
-    dict or None
-        ``propellers``; ``within_13``, ``within_26``: shares with the propeller left out; ``maker_out_13``,
-        ``maker_out_26``: with its maker; ``scatter``: of ln CT between propellers alike in all inputs; ``ideal_13``,
-        ``ideal_26``: shares that it leaves. [-] None with fewer than `bemt.formula.refit.MIN_PROPELLERS`.
-    """
+    """What the inputs carry at rest. [-]"""
     from scipy.optimize import minimize
     from scipy.special import erf
     from threadpoolctl import threadpool_limits

@@ -77,18 +77,7 @@ class FitPoints:
     notes: tuple[str, ...] = ()
 
     def of(self, name: str) -> Array:
-        """Number of the propeller at each point, by field name.
-
-        Parameters
-        ----------
-        name : str
-            ``diameter_m``, ``pitch_m``, ``blades``, ``chord_m`` or ``measured_pitch_m``.
-
-        Returns
-        -------
-        (N,) float
-            In the unit of the field.
-        """
+        """Number of the propeller at each point, by field name, (N,)."""
         return np.array([float(getattr(p, name)) for p in self.propellers])[self.index]
 
     @property
@@ -110,40 +99,14 @@ class FitPoints:
         self, constants: compact.Constants = compact.CONSTANTS, known: bool = True,
         series: Mapping[str, compact.MakerSeries] = compact.SERIES,
     ) -> Array:  # fmt: skip
-        """Chord at 0.75 R.
-
-        Parameters
-        ----------
-        constants : compact.Constants
-            For the typical chord.
-        known : bool
-            Use measured chords where there are any.
-        series : mapping of str to MakerSeries
-            By maker.
-
-        Returns
-        -------
-        (N,) float
-            Measured or typical. [m]
-        """
+        """Chord at 0.75 R, (N,) [m]."""
         c = self.of("chord_m")
         own = np.array([series.get(p.maker, compact.MakerSeries()).chord for p in self.propellers])[self.index]
         typical = own * np.asarray(compact.default_chord(self.of("diameter_m"), constants))
         return np.where(np.isfinite(c) & known, c, typical)
 
     def Re(self, chord_m: Array) -> Array:
-        """Reynolds number at 0.75 R in standard air.
-
-        Parameters
-        ----------
-        chord_m : (N,) float
-            Chord there. [m]
-
-        Returns
-        -------
-        (N,) float
-            Without induced velocity. [-]
-        """
+        """Reynolds number at 0.75 R in standard air, (N,) [-]."""
         air, n, D = Air.from_density(), self.rpm / 60.0, self.of("diameter_m")
         return np.asarray(co.Re75(chord_m, n, D, self.J * n * D, air.rho, air.mu))
 
@@ -153,18 +116,7 @@ class FitPoints:
         return np.asarray(co.M_tip(self.rpm / 60.0, self.of("diameter_m"), Air.from_density().a_sound))
 
     def select(self, where: NDArray[np.bool_]) -> FitPoints:
-        """Part of the points, propellers kept.
-
-        Parameters
-        ----------
-        where : (N,) bool
-            FitPoints to keep.
-
-        Returns
-        -------
-        FitPoints
-            The part.
-        """
+        """Part of the points, propellers kept."""
         arrays = {name: getattr(self, name)[where] for name in ("index", "rpm", "J", "CT", "CP")}
         return replace(self, **arrays)
 
@@ -173,25 +125,7 @@ Rows = tuple[Propeller, Array, Array, Array, Array]
 
 
 def join(rows: Sequence[Rows], refused: Sequence[str] = (), notes: Sequence[str] = ()) -> FitPoints:
-    """Make points of rows per propeller and run; rows of equal propellers are joined.
-
-    Parameters
-    ----------
-    rows : sequence of (Propeller, rpm, J, CT, CP)
-        Arrays of one run each. [rev/min], [-]
-    refused, notes : sequence of str
-        Passed on.
-
-    Returns
-    -------
-    FitPoints
-        Without rows that are not finite.
-
-    Raises
-    ------
-    InputError
-        When nothing is left.
-    """
+    """Make points of rows per propeller and run; rows of equal propellers are joined."""
     numbers: dict[str, int] = {}
     unique: list[Propeller] = []
     parts: list[tuple[Array, ...]] = []

@@ -59,22 +59,7 @@ def _zero_lift(points: FitPoints, series: Mapping[str, compact.MakerSeries]) -> 
 
 
 def predict(points: FitPoints, fitted: Fitted = PUBLISHED, given: str = "chord") -> tuple[Array, Array]:
-    """CT and CP of the formula at measured conditions.
-
-    Parameters
-    ----------
-    points : FitPoints
-        Conditions, in standard air.
-    fitted : Fitted
-        Constants and series.
-    given : str
-        One of `GIVEN`: what is used where the propeller has it.
-
-    Returns
-    -------
-    CT, CP : (N,) float
-        Propeller convention. [-]
-    """
+    """CT and CP of the formula at measured conditions. [-]"""
     chord = points.chord(fitted.constants, given != "label", fitted.series)
     s = 2.0 * points.of("blades") * chord / (np.pi * points.of("diameter_m"))
     pd = points.P_D
@@ -85,37 +70,13 @@ def predict(points: FitPoints, fitted: Fitted = PUBLISHED, given: str = "chord")
 
 
 def has(points: FitPoints, given: str) -> NDArray[np.bool_]:
-    """Points of propellers that have what a prediction may use.
-
-    Parameters
-    ----------
-    points : FitPoints
-        Measured points.
-    given : str
-        One of `GIVEN`.
-
-    Returns
-    -------
-    (N,) bool
-        True where they have.
-    """
+    """Points of propellers that have what a prediction may use, (N,)."""
     names = GIVEN_FIELDS[given]
     return np.asarray(np.all([np.isfinite(points.of(name)) for name in ("diameter_m", *names)], axis=0))
 
 
 def fittable(points: FitPoints) -> NDArray[np.bool_]:
-    """Points of open propellers with a known chord, in the range of the fit.
-
-    Parameters
-    ----------
-    points : FitPoints
-        Measured points.
-
-    Returns
-    -------
-    (N,) bool
-        True where it holds.
-    """
+    """Points of open propellers with a known chord, in the range of the fit, (N,)."""
     return np.isfinite(points.of("chord_m")) & ~points.ducted & (points.x >= 0) & (points.x < X_POWER)
 
 
@@ -190,20 +151,7 @@ def _power_fit(points: FitPoints, fitted: Fitted) -> compact.Constants:
 
 
 def implied_chords(points: FitPoints, fitted: Fitted) -> Array:
-    """Chord over radius that makes the formula's static CT the measured one, for propellers without a chord.
-
-    Parameters
-    ----------
-    points : FitPoints
-        Measured points.
-    fitted : Fitted
-        Constants and series; the chord law is not used.
-
-    Returns
-    -------
-    (K,) float
-        NaN for propellers with a chord, without static points, or whose thrust no chord of 0.05 to 0.4 R explains. [-]
-    """
+    """Chord over radius that makes the formula's static CT the measured one, where no chord is known, (K,) [-]."""
     out = np.full(len(points.propellers), np.nan)
     change = fitted.series
     for k, propeller in enumerate(points.propellers):
@@ -246,20 +194,7 @@ def _chord_law(points: FitPoints, fitted: Fitted) -> Fitted:
 
 
 def fit(points: FitPoints, start: compact.Constants = compact.CONSTANTS) -> Fitted | None:
-    """Fit the eight constants and the series.
-
-    Parameters
-    ----------
-    points : FitPoints
-        Measured points.
-    start : compact.Constants
-        Where the search begins.
-
-    Returns
-    -------
-    Fitted or None
-        None when fewer than `MIN_PROPELLERS` propellers have chord and power.
-    """
+    """Fit the eight constants and the series."""
     used = points.select(fittable(points))
     if np.unique(used.index[np.isfinite(used.CP)]).size < MIN_PROPELLERS or not np.any(used.J == 0):
         return None
@@ -272,24 +207,7 @@ def fit(points: FitPoints, start: compact.Constants = compact.CONSTANTS) -> Fitt
 def left_out(
     points: FitPoints, fitted: Fitted, groups: NDArray[np.intp], progress: Callable[[int, int], None] | None = None
 ) -> dict[str, tuple[Array, Array]]:
-    """CT and CP of every point by constants and series fitted without its group.
-
-    Parameters
-    ----------
-    points : FitPoints
-        Measured points.
-    fitted : Fitted
-        Fit on all of them, where each search begins.
-    groups : (N,) int
-        Group of each point: its propeller, or its maker.
-    progress : callable, optional
-        Called with what is done and how much there is.
-
-    Returns
-    -------
-    dict
-        By what is `GIVEN`: CT and CP; NaN where too few propellers are left to fit. [-]
-    """
+    """CT and CP of every point by constants and series fitted without its group. [-]"""
     out = {given: (np.full(points.rpm.size, np.nan), np.full(points.rpm.size, np.nan)) for given in GIVEN}
     all_groups = np.unique(groups)
     for done, g in enumerate(all_groups):
@@ -304,25 +222,7 @@ def left_out(
 
 
 def bands(points: FitPoints, CT: Array, CP: Array, fitted: Fitted, given: str) -> dict[str, tuple[float, ...]]:
-    """Half-widths of the error bands over `compact.BAND_X`.
-
-    Parameters
-    ----------
-    points : FitPoints
-        Measured points.
-    CT, CP : (N,) float
-        Predictions by fits without the maker. [-]
-    fitted : Fitted
-        For the model's own static values.
-    given : str
-        As in the predictions, of `GIVEN`.
-
-    Returns
-    -------
-    dict
-        ``CT68``, ``CT95``, ``CP68``, ``CP95``: quantiles of |error| over the static value of the model at the same rpm;
-        NaN for bands with fewer than 20 points. [-]
-    """
+    """Half-widths of the error bands over `compact.BAND_X`. [-]"""
     own = replace(points, J=np.zeros_like(points.J))
     CT0, CP0 = predict(own, fitted, given)
     x = points.x

@@ -32,33 +32,12 @@ _EDGES: dict[str, tuple[float, ...]] = {
 
 
 def flight(points: FitPoints) -> Mask:
-    """Points in flight whose relative error counts: forwards, below `X_MAX`.
-
-    Parameters
-    ----------
-    points : FitPoints
-        Measured points.
-
-    Returns
-    -------
-    (N,) bool
-        True where it holds.
-    """
+    """Points in flight whose relative error counts: forwards, below `X_MAX`, (N,)."""
     return (points.J > 0) & (points.x < X_MAX)
 
 
 def ratios(ratio: Array) -> dict[str, Any]:
-    """Count ratios of made to measured values.
-
-    Parameters
-    ----------
-    ratio : (N,) float
-        Made over measured; NaN counts as wrong. [-]
-
-    Returns
-    -------
-    dict
-        ``points``, ``median``, ``within_13``, ``within_26`` (shares); None without points. [-]
+    """Count ratios of made to measured values. [-]
 
     Examples
     --------
@@ -83,22 +62,7 @@ def _labels(edges: tuple[float, ...]) -> list[str]:
 
 
 def score(points: FitPoints, models: Mapping[str, Array]) -> dict[str, Any]:
-    """Score models of CT over all points and in bands.
-
-    Parameters
-    ----------
-    points : FitPoints
-        Measured points.
-    models : mapping of str to (N,) float
-        CT of each model at the points; NaN counts as wrong. [-]
-
-    Returns
-    -------
-    dict
-        ``static`` and ``flight`` (open rotors), ``J/(P/D)``: list of bands in flight, ``bands``: list of rows with
-        ``quantity``, ``band``, ``motion`` (static or flight). Each has ``propellers``, ``points`` and, per model, what
-        `ratios` gives.
-    """
+    """Score models of CT over all points and in bands."""
     open_rotors, positive = ~points.ducted, points.CT > 0
     still, moving = points.J == 0, flight(points)
 
@@ -136,20 +100,7 @@ def score(points: FitPoints, models: Mapping[str, Array]) -> dict[str, Any]:
 
 
 def power_score(points: FitPoints, CP: Mapping[str, Array]) -> dict[str, Any]:
-    """Score power in the same way: ``static`` and ``flight``, per model.
-
-    Parameters
-    ----------
-    points : FitPoints
-        Measured points.
-    CP : mapping of str to (N,) float
-        Power coefficient of each model. [-]
-
-    Returns
-    -------
-    dict
-        What `ratios` gives, of open rotors with a measured power.
-    """
+    """Score power in the same way: ``static`` and ``flight``, per model."""
     out: dict[str, Any] = {}
     for motion, where in (("static", points.J == 0), ("flight", flight(points))):
         m = where & ~points.ducted & np.isfinite(points.CP) & (points.CP > 0)
@@ -158,22 +109,7 @@ def power_score(points: FitPoints, CP: Mapping[str, Array]) -> dict[str, Any]:
 
 
 def coverage(points: FitPoints, fitted: Fitted, given: str) -> dict[str, float | None]:
-    """Share of points inside the published bands of the compact formula.
-
-    Parameters
-    ----------
-    points : FitPoints
-        Measured points that took no part in the fit.
-    fitted : Fitted
-        Constants and series of the formula.
-    given : str
-        Of `bemt.formula.refit.GIVEN`; only propellers that have it are counted.
-
-    Returns
-    -------
-    dict
-        ``CT68``, ``CT95``, ``CP68``, ``CP95``, at rest and in flight below `X_MAX` together; None without points. [-]
-    """
+    """Share of points inside the published bands of the compact formula. [-]"""
     m = ~points.ducted & ((points.J == 0) | flight(points))
     used = points.select(m & has(points, given))
     still = replace(used, J=np.zeros_like(used.J))

@@ -75,18 +75,7 @@ def _set(name: str, found: Mapping[str, Any]) -> list[str]:
 
 
 def text(doc: Mapping[str, Any]) -> str:
-    """Tables for people.
-
-    Parameters
-    ----------
-    doc : mapping
-        Document of schema ``bemt.calibration/1``, see :func:`bemt.formula.calibrate.calibrate`.
-
-    Returns
-    -------
-    str
-        Lines without a newline at the end.
-    """
+    """Tables for people."""
     rows = []
     for key, c in doc["k1k2"].items():
         spans = [f"{c[k][0]:.4f} to {c[k][1]:.4f}" if c[k][0] == c[k][0] else "-" for k in ("K1_95", "K2_95")]

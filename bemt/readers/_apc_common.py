@@ -22,16 +22,6 @@ def _readings(token: str, low: float, high: float) -> float | None:
 def parse_designation(text: str) -> tuple[float, float, int] | None:
     """Read diameter, pitch and blade number from an APC designation.
 
-    Parameters
-    ----------
-    text : str
-        Such as ``10x4.7SF``, ``11x7E-3`` or, without decimal points, ``134x135-3``.
-
-    Returns
-    -------
-    (diameter_in, pitch_in, blades) or None
-        In inches; None when there is no plausible reading.
-
     Examples
     --------
     >>> parse_designation("134x135-3"), parse_designation("10x47SF"), parse_designation("525x475")

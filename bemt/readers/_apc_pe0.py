@@ -131,23 +131,7 @@ def _pe0_rows(source: SourceText, at: int, names: list[str], faults: list[Fault]
 
 
 def read_pe0(path: str | os.PathLike[str]) -> ApcBlade:
-    """Read a blade geometry file.
-
-    Parameters
-    ----------
-    path : str or path
-        PE0 file, of 13 columns or with more.
-
-    Returns
-    -------
-    ApcBlade
-        In SI units and radians.
-
-    Raises
-    ------
-    InputError
-        With all faults found.
-    """
+    """Read a blade geometry file."""
     source = load_text(path)
     faults: list[Fault] = []
     name, (diameter_in, pitch_in, blades_named) = designation(source, faults)

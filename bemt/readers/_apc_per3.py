@@ -86,23 +86,7 @@ def _per3_rows(source: SourceText, faults: list[Fault]) -> tuple[list[tuple[floa
 
 
 def read_per3(path: str | os.PathLike[str]) -> ApcPerformance:
-    """Read a performance file.
-
-    Parameters
-    ----------
-    path : str or path
-        PER3 file, of 8 or 15 columns.
-
-    Returns
-    -------
-    ApcPerformance
-        All rpm blocks in one series.
-
-    Raises
-    ------
-    InputError
-        With all faults found; also when the rows contradict the diameter in the name by more than 3 %.
-    """
+    """Read a performance file."""
     source = load_text(path)
     faults: list[Fault] = []
     name, (diameter_in, pitch_in, blades) = designation(source, faults)

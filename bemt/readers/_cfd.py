@@ -132,13 +132,7 @@ def head_lines(head: bytes | str, count: int = 40) -> list[str]:
 
 
 def load(path: str | os.PathLike[str]) -> SourceText:
-    """Read one file whole, unpacking gzip; the hash is that of the file as it lies there.
-
-    Raises
-    ------
-    InputError
-        When it cannot be read, is damaged gzip, binary or larger than 1 GiB.
-    """
+    """Read one file whole, unpacking gzip; the hash is that of the file as it lies there."""
     name = os.fspath(path)
     try:
         raw = Path(path).read_bytes()
@@ -231,29 +225,7 @@ def _maybe_cut(source: SourceText, rows: Sequence[ExportRow]) -> bool:
 def numeric_table(
     source: SourceText, columns: Sequence[Column], rows: Sequence[ExportRow], commas: bool = True
 ) -> ExportTable:
-    """Turn the cells of a table into numbers, by its header.
-
-    Parameters
-    ----------
-    source : SourceText
-        The file, for faults.
-    columns : sequence of Column
-        Header, K columns.
-    rows : sequence of ExportRow
-        Data lines.
-    commas : bool
-        Whether a decimal comma is possible (not where commas separate).
-
-    Returns
-    -------
-    ExportTable
-        At least one row.
-
-    Raises
-    ------
-    InputError
-        When no row, or more than 5 % (and more than two) of the rows do not fit the header.
-    """
+    """Turn the cells of a table into numbers, by its header."""
     width = len(columns)
     warnings: list[str] = []
     cut = _maybe_cut(source, rows)

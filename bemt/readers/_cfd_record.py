@@ -45,28 +45,8 @@ def history(
 ) -> Imported:
     """Make the record of a history: repeated rows resolved, means of the channels with what they were taken over.
 
-    A history by time gets the mean of all rows (whole revolutions need the speed, which the file does not say), one by
-    iterations that of its last fifth.
-
-    Parameters
-    ----------
-    format : str
-        KIND of the importer.
-    source : SourceText
-        The file.
-    columns : sequence of Column
-        Columns of the table.
-    table : ExportTable
-        Its numbers.
-    warnings : sequence of str
-        Put first.
-    provenance : mapping or None
-        What the file says of itself.
-
-    Returns
-    -------
-    Imported
-        ``provenance`` tells ``clock`` (time, iteration or none), ``time_channel`` and ``clock_channels``.
+    A history by time gets the mean of all rows (whole revolutions need the speed, which the file does not say), one
+    by iterations that of its last fifth.
     """
     roles = [column.role for column in columns]
     time = _clock(table.values, roles, "time")

@@ -17,18 +17,8 @@ DAY = 86400.0
 
 
 def clock_seconds(cells: Sequence[str]) -> Array | None:
-    """Read ``12:30:05.25`` or ``2024-05-01T12:30:05``; other orders of day and month are ambiguous and stay text.
-
-    Parameters
-    ----------
-    cells : sequence of str
-        A column; empty cells have no time.
-
-    Returns
-    -------
-    (N,) array or None
-        Seconds since the first one [s], NaN where a cell is empty; None when a cell is no such time. A clock without a
-        date that falls by more than half a day has passed midnight.
+    """Read ``12:30:05.25`` or ``2024-05-01T12:30:05``; other orders of day and month are ambiguous and stay text, (N,)
+    [s].
 
     Examples
     --------

@@ -144,16 +144,6 @@ def _si_name(unit: units.Unit) -> str:
 def unit_of(text: str) -> units.Unit | str:
     """Unit that a text states.
 
-    Parameters
-    ----------
-    text : str
-        As written in a heading, without brackets.
-
-    Returns
-    -------
-    Unit or str
-        The unit; else why none is taken ("" when the text is no unit at all).
-
     Examples
     --------
     >>> unit_of("N·m").suffix, unit_of("µs").suffix, unit_of("1/min").suffix
@@ -219,16 +209,6 @@ def _plain(text: str) -> str:
 
 def heading(text: str) -> Heading:
     """Read one heading, in English, German, French or Spanish.
-
-    Parameters
-    ----------
-    text : str
-        Such as ``Thrust (gf)``, ``torque_Nm`` or ``RPM``.
-
-    Returns
-    -------
-    Heading
-        With the channel's name, which ends in the SI unit where the unit is known.
 
     Examples
     --------

@@ -34,24 +34,7 @@ _THOUSANDS = re.compile(r"[+-]?\d{1,3}(,\d{3})+(\.\d*)?")
 
 
 def column_numbers(cells: Sequence[str], decimal: str = ".") -> tuple[Array, list[int], int]:
-    """Numbers of a column.
-
-    Parameters
-    ----------
-    cells : sequence of str
-        Its cells.
-    decimal : str
-        Decimal mark, ``.`` or ``,``.
-
-    Returns
-    -------
-    values : (N,) float
-        NaN where a cell is empty or no number.
-    bad : list of int
-        Rows whose cell is neither a number nor empty.
-    empty : int
-        How many cells say "no value".
-    """
+    """Numbers of a column."""
     values = np.full(len(cells), np.nan)
     bad: list[int] = []
     empty = 0
@@ -67,21 +50,7 @@ def column_numbers(cells: Sequence[str], decimal: str = ".") -> tuple[Array, lis
 
 
 def spikes(values: Array, half: int = 3, times: float = 2.0) -> NDArray[np.bool_]:
-    """Single samples that jump away from all their neighbours and back.
-
-    Parameters
-    ----------
-    values : (N,) float
-        One channel in order of time, NaN where it has no value.
-    half : int
-        Neighbours on each side that count.
-    times : float
-        How many times the spread of the whole channel (5 % to 95 %) a jump must be, after the spread of the neighbours.
-
-    Returns
-    -------
-    (N,) bool
-        True at spikes.
+    """Single samples that jump away from all their neighbours and back, (N,).
 
     Notes
     -----

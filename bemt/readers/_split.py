@@ -58,18 +58,6 @@ def _is_units(cells: Sequence[str]) -> bool:
 def some(items: Iterable[object], limit: int = 5) -> str:
     """First few of many, in words.
 
-    Parameters
-    ----------
-    items : iterable
-        Things to name.
-    limit : int
-        How many to name.
-
-    Returns
-    -------
-    str
-        Such as ``3, 4, 7 and 12 more``.
-
     Examples
     --------
     >>> some([1, 2]), some(range(9), 3)
@@ -82,16 +70,6 @@ def some(items: Iterable[object], limit: int = 5) -> str:
 
 def find_delimiter(lines: Sequence[str]) -> str:
     """Delimiter of some lines: the first of ``; tab , |`` that all of them have, else blanks.
-
-    Parameters
-    ----------
-    lines : sequence of str
-        The first lines of a table.
-
-    Returns
-    -------
-    str
-        One character.
 
     Examples
     --------
@@ -106,20 +84,8 @@ def find_delimiter(lines: Sequence[str]) -> str:
 def find_start(lines: Sequence[str]) -> tuple[int, str]:
     """Line of the headings and delimiter of a table that may have lines of text above it.
 
-    Lines above count as such only when they have fewer cells than the rows, and a line of headings without numbers, as
-    long as the rows, follows: a damaged line of headings is none.
-
-    Parameters
-    ----------
-    lines : sequence of str
-        The first lines that are neither blank nor comments.
-
-    Returns
-    -------
-    start : int
-        Index of the first line of the table.
-    mark : str
-        Delimiter.
+    Lines above count as such only when they have fewer cells than the rows, and a line of headings without numbers,
+    as long as the rows, follows: a damaged line of headings is none.
 
     Examples
     --------
@@ -146,19 +112,7 @@ def find_start(lines: Sequence[str]) -> tuple[int, str]:
 
 
 def decimal_mark(table: SplitTable) -> str:
-    """Decimal mark of a table: a comma only where it can be nothing else.
-
-    Parameters
-    ----------
-    table : SplitTable
-        Its cells.
-
-    Returns
-    -------
-    str
-        ``,`` when columns are named and commas do not separate them, no number has a point, every comma is in a number
-        as people write them and some comma is not between thousands; else ``.``.
-    """
+    """Decimal mark of a table: a comma only where it can be nothing else."""
     if table.delimiter == "," or not table.headings:
         return "."
     cells = [cell for row in table.rows for cell in row]
@@ -169,28 +123,7 @@ def decimal_mark(table: SplitTable) -> str:
 
 
 def split_table(source: SourceText, delimiter: str | None = None, header: bool | None = None) -> SplitTable:
-    """Split a file into rows of equal length.
-
-    Parameters
-    ----------
-    source : SourceText
-        The file.
-    delimiter : str or None
-        One of ``; tab , |`` or a blank; None finds it in the first line.
-    header : bool or None
-        Whether the first line names the columns; None: it does when no cell of it is a number.
-
-    Returns
-    -------
-    SplitTable
-        Lines that are blank or begin with ``#`` or ``%`` are left out and counted in its warnings.
-
-    Raises
-    ------
-    InputError
-        With the lines whose number of cells differs from the first one's. A last line that is cut off is kept, and so
-        are, without values, lines of another length that are fewer than 5 %.
-    """
+    """Split a file into rows of equal length."""
     lines = source.text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     used = [(i, t) for i, t in enumerate(lines, 1) if t.strip() and not t.lstrip().startswith(("#", "%"))]
     comments = sum(1 for t in lines if t.lstrip().startswith(("#", "%")))

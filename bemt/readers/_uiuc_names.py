@@ -170,16 +170,6 @@ def _propeller(family: str, middle: list[str]) -> UiucName:
 def parse_file_name(stem: str) -> UiucFile | None:
     """Read a file name of the archive.
 
-    Parameters
-    ----------
-    stem : str
-        File name without folder and extension.
-
-    Returns
-    -------
-    UiucFile or None
-        None when the name is not of the archive's form.
-
     Examples
     --------
     >>> file = parse_file_name("nr640_9_15deg_3b_0725rd_3025")

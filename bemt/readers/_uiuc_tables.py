@@ -106,16 +106,6 @@ def _header(text: str) -> tuple[int, str | None]:
 def role_of(head: bytes | str) -> str | None:
     r"""Tell which table the head of a file announces.
 
-    Parameters
-    ----------
-    head : bytes or str
-        First bytes of a file.
-
-    Returns
-    -------
-    str or None
-        ``geom``, ``static``, ``line``, ``thick``, or None.
-
     Examples
     --------
     >>> role_of("RPM    CT       CP\n")
@@ -126,16 +116,6 @@ def role_of(head: bytes | str) -> str | None:
 
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether the head of a file is a table of this archive.
-
-    Parameters
-    ----------
-    head : bytes or str
-        First bytes of a file.
-
-    Returns
-    -------
-    bool
-        True when the first line names the columns of one of its tables.
 
     Examples
     --------
@@ -196,23 +176,7 @@ def _order_flags(x: Array, name: str) -> tuple[tuple[str, ...], ...]:
 
 
 def read_geometry(path: str | os.PathLike[str]) -> UiucGeometry:
-    """Read one geometry file.
-
-    Parameters
-    ----------
-    path : str or path
-        File with the header ``r/R c/R beta``.
-
-    Returns
-    -------
-    UiucGeometry
-        Stations, ascending in r/R.
-
-    Raises
-    ------
-    InputError
-        With every faulty row; also when r/R does not ascend or ends before 0.9.
-    """
+    """Read one geometry file."""
     source = load_text(path)
     table, rows = _parse(source, "geom")
     r_R, c_R, beta = table["r/R"], table["c/R"], table["beta"]
@@ -232,23 +196,7 @@ def read_geometry(path: str | os.PathLike[str]) -> UiucGeometry:
 
 
 def read_static(path: str | os.PathLike[str]) -> UiucStatic:
-    """Read one static run (header ``RPM CT CP``); rows stay in the recorded order, flagged where rpm goes back.
-
-    Parameters
-    ----------
-    path : str or path
-        File to read.
-
-    Returns
-    -------
-    UiucStatic
-        The run.
-
-    Raises
-    ------
-    InputError
-        With every faulty row.
-    """
+    """Read one static run (header ``RPM CT CP``); rows stay in the recorded order, flagged where rpm goes back."""
     source = load_text(path)
     table, rows = _parse(source, "static")
     name = parse_file_name(Path(path).stem)
@@ -258,25 +206,7 @@ def read_static(path: str | os.PathLike[str]) -> UiucStatic:
 
 
 def read_line(path: str | os.PathLike[str], rpm: float | None = None) -> UiucLine:
-    """Read one advance-ratio run (header ``J CT CP eta``).
-
-    Parameters
-    ----------
-    path : str or path
-        File to read.
-    rpm : float or None
-        Rotational speed [rev/min]; None takes it from the file name.
-
-    Returns
-    -------
-    UiucLine
-        The run; rows whose eta disagrees with J CT/CP by more than rounding are flagged.
-
-    Raises
-    ------
-    InputError
-        With every faulty row, or when the rpm is unknown.
-    """
+    """Read one advance-ratio run (header ``J CT CP eta``)."""
     source = load_text(path)
     name = parse_file_name(Path(path).stem)
     faults: list[Fault] = []
@@ -310,23 +240,7 @@ def read_line(path: str | os.PathLike[str], rpm: float | None = None) -> UiucLin
 
 
 def read_thickness(path: str | os.PathLike[str]) -> UiucThickness:
-    """Read one thickness file (header ``r/R t/c``).
-
-    Parameters
-    ----------
-    path : str or path
-        File to read.
-
-    Returns
-    -------
-    UiucThickness
-        Thickness ratio over r/R.
-
-    Raises
-    ------
-    InputError
-        With every faulty row.
-    """
+    """Read one thickness file (header ``r/R t/c``)."""
     source = load_text(path)
     table, rows = _parse(source, "thick")
     r_R = table["r/R"]

@@ -33,16 +33,6 @@ KIND = "apc"
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether the head of a file is an APC PE0 or PER3 file.
 
-    Parameters
-    ----------
-    head : bytes or str
-        First bytes of a file.
-
-    Returns
-    -------
-    bool
-        True for either.
-
     Examples
     --------
     >>> sniff("10x5E (10x5E.dat)\n ----- AIRFOIL SUMMARY DATA -----"), sniff("RPM CT CP")
@@ -58,23 +48,7 @@ def _form(text: str) -> str | None:
 
 
 def read(path: str | os.PathLike[str]) -> ApcBlade | ApcPerformance:
-    """Read either APC file by its content.
-
-    Parameters
-    ----------
-    path : str or path
-        PE0 or PER3 file.
-
-    Returns
-    -------
-    ApcBlade or ApcPerformance
-        What it holds.
-
-    Raises
-    ------
-    InputError
-        With all faults found.
-    """
+    """Read either APC file by its content."""
     source = load_text(path)
     form = _form(source.text)
     if form is None:

@@ -32,16 +32,6 @@ _HEADING = re.compile(r"(.*?)\s*\[([^\]]*)\]\s*")
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether the file begins with the section Name or Data.
 
-    Parameters
-    ----------
-    head : bytes or str
-        First bytes of a file.
-
-    Returns
-    -------
-    bool
-        True when it is for this reader, damaged or not.
-
     Examples
     --------
     >>> sniff("[Name]\nBlade\n\n[Data]\nX [ m ], Y [ m ]"), sniff("[propeller]\nname = 1")
@@ -64,24 +54,7 @@ def _heading(text: str) -> Column:
 
 
 def read(path: str | os.PathLike[str]) -> Imported:
-    """Read a CSV of CFD-Post.
-
-    Parameters
-    ----------
-    path : str or path
-        File to read; gzip is unpacked.
-
-    Returns
-    -------
-    Imported
-        ``wall_shear_Pa``; with several blocks ``wall_shear_Pa(Blade)``. Values at points have no mean; charts over
-        time do.
-
-    Raises
-    ------
-    InputError
-        When no block has data, or rows do not fit their header.
-    """
+    """Read a CSV of CFD-Post."""
     source = load(path)
     data: list[tuple[str, list[ExportRow]]] = []
     section, name = "", ""

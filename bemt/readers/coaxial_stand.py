@@ -42,16 +42,6 @@ _DIAMETER = re.compile(r"(?:^|_)(\d+(?:\.\d+)?)in_")
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether the first line names both sides of this stand.
 
-    Parameters
-    ----------
-    head : bytes or str
-        First bytes of a file.
-
-    Returns
-    -------
-    bool
-        True for thrust, speed and PWM of both sides.
-
     Examples
     --------
     >>> sniff("PWM Left,PWM Right,Thrust Left [g],Thrust Right [g],Speed Left [rpm],Speed Right [rpm]\n")
@@ -64,23 +54,7 @@ def sniff(head: bytes | str) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> Imported:
-    """Read a table.
-
-    Parameters
-    ----------
-    path : str or path
-        File.
-
-    Returns
-    -------
-    Imported
-        SI channels; torque is positive for the sense in which its rotor turned.
-
-    Raises
-    ------
-    InputError
-        With all faults.
-    """
+    """Read a table."""
     source = load_text(path)
     table = split_table(source, header=True)
     build = Builder(table, KIND)

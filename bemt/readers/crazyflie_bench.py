@@ -33,16 +33,6 @@ _MORE = {"vbat[V]": ("voltage", "V"), "v[V]": ("supply_voltage", "V"), "i[A]": (
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether the first line has a command, four speeds and a total thrust.
 
-    Parameters
-    ----------
-    head : bytes or str
-        First bytes of a file.
-
-    Returns
-    -------
-    bool
-        True for such a table.
-
     Examples
     --------
     >>> sniff("pwm,vbat[V],rpm1,rpm2,rpm3,rpm4,thrust[g]\n"), sniff("pwm,rpm,thrust[g]\n")
@@ -54,23 +44,7 @@ def sniff(head: bytes | str) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> Imported:
-    """Read a table.
-
-    Parameters
-    ----------
-    path : str or path
-        File.
-
-    Returns
-    -------
-    Imported
-        ``rpm``, ``thrust_N`` and ``electrical_power_W`` per propeller, ``throttle``, ``voltage_V``.
-
-    Raises
-    ------
-    InputError
-        With all faults.
-    """
+    """Read a table."""
     source = load_text(path)
     table = split_table(source, header=True)
     build = Builder(table, KIND)

@@ -45,18 +45,7 @@ _SPEED, _COMMAND = re.compile(r"rpm\.m[1-4]"), re.compile(r"pwm\.m[1-4]_pwm|moto
 
 
 def sniff(head: bytes | str) -> bool:
-    """Tell whether the first bytes are those of such a log.
-
-    Parameters
-    ----------
-    head : bytes or str
-        First bytes of a file.
-
-    Returns
-    -------
-    bool
-        True for the magic number, a known version and a few event types.
-    """
+    """Tell whether the first bytes are those of such a log."""
     if isinstance(head, str) or len(head) < 5 or head[0] != MAGIC:
         return False
     version, events = struct.unpack_from("<HH", head, 1)
@@ -64,23 +53,7 @@ def sniff(head: bytes | str) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> Imported:
-    """Read a log.
-
-    Parameters
-    ----------
-    path : str or path
-        File.
-
-    Returns
-    -------
-    Imported
-        Channels of the event with most records; others interpolated to its times.
-
-    Raises
-    ------
-    InputError
-        When it is cut off, its checksum is wrong, or it has no records.
-    """
+    """Read a log."""
     name = os.fspath(path)
     try:
         data = Path(path).read_bytes()

@@ -22,16 +22,6 @@ _HEAD = re.compile(r"\s*DFDC\s+Version", re.I)
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a file begins as a DFDC case.
 
-    Parameters
-    ----------
-    head : bytes or str
-        First bytes of a file.
-
-    Returns
-    -------
-    bool
-        True for its first words.
-
     Examples
     --------
     >>> sniff("DFDC Version 0.55\nduct\n"), sniff("XROTOR VERSION: 7.55\n")
@@ -41,23 +31,7 @@ def sniff(head: bytes | str) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> BladeFile:
-    """Read the rotor of one case.
-
-    Parameters
-    ----------
-    path : str or path
-        File.
-
-    Returns
-    -------
-    BladeFile
-        First bladed rotor, its sections, speed and air.
-
-    Raises
-    ------
-    InputError
-        With all faults; also for a case whose only disk is an actuator disk without blades.
-    """
+    """Read the rotor of one case."""
     source = load_text(path)
     rows = lines_of(source, "!#")
     faults: list[Fault] = []

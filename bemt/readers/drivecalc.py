@@ -37,16 +37,6 @@ _KNOWN = {
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether the first line has the headings of one of the two tables.
 
-    Parameters
-    ----------
-    head : bytes or str
-        First bytes of a file.
-
-    Returns
-    -------
-    bool
-        True for propellers or motor points.
-
     Examples
     --------
     >>> sniff("myid,tbs,Name,Dia,Pitch,a,b,c,d,n10N,n100W\n"), sniff("Name,Dia,Pitch\n")
@@ -58,23 +48,7 @@ def sniff(head: bytes | str) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> Imported:
-    """Read one of the two tables.
-
-    Parameters
-    ----------
-    path : str or path
-        File.
-
-    Returns
-    -------
-    Imported
-        kind "table". For propellers, ``thrust_law_N`` and ``power_law_W`` are the laws at 1000 rev/min.
-
-    Raises
-    ------
-    InputError
-        With all faults.
-    """
+    """Read one of the two tables."""
     source = load_text(path)
     table = split_table(source, header=True)
     build = Builder(table, KIND, kind="table")

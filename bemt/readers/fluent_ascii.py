@@ -29,16 +29,6 @@ _FIRST = ("nodenumber", "cellnumber")
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether the first line names node or cell numbers and a coordinate.
 
-    Parameters
-    ----------
-    head : bytes or str
-        First bytes of a file.
-
-    Returns
-    -------
-    bool
-        True when it is for this reader, damaged or not.
-
     Examples
     --------
     >>> sniff("nodenumber,  x-coordinate, pressure\n 1, 0.1, 3"), sniff("node,x\n1,2")
@@ -49,23 +39,7 @@ def sniff(head: bytes | str) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> Imported:
-    """Read an ASCII export.
-
-    Parameters
-    ----------
-    path : str or path
-        File to read; gzip is unpacked.
-
-    Returns
-    -------
-    Imported
-        Channels by their own names, without means.
-
-    Raises
-    ------
-    InputError
-        When rows do not fit the header.
-    """
+    """Read an ASCII export."""
     source = load(path)
     lines = [(k, text.strip()) for k, text in enumerate(source.lines, 1) if text.strip()]
     if not lines or not lines[0][1].lower().lstrip('"').startswith(_FIRST):

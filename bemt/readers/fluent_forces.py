@@ -52,16 +52,6 @@ class Entry:
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a title of forces is followed by a line of zones, and this is no transcript.
 
-    Parameters
-    ----------
-    head : bytes or str
-        First bytes of a file.
-
-    Returns
-    -------
-    bool
-        True when it is for this reader, damaged or not.
-
     Examples
     --------
     >>> sniff("Forces\n      Forces (n)\nZone  Pressure  Viscous  Total\n"), sniff("Zone,Pressure")
@@ -110,24 +100,7 @@ def _names(title: str, rest: str, groups_line: str, zone_line: str) -> list[tupl
 
 
 def blocks(source: SourceText) -> Iterator[tuple[int, list[Entry], list[str], list[Fault]]]:
-    """Find the force tables of a text.
-
-    Parameters
-    ----------
-    source : SourceText
-        A force report, or any text that holds some.
-
-    Yields
-    ------
-    line : int
-        Where the table begins.
-    entries : list of Entry
-        Its numbers.
-    warnings : list of str
-        Sums that do not fit.
-    faults : list of Fault
-        Rows that do not fit the header.
-    """
+    """Find the force tables of a text."""
     lines = source.lines
     k = 0
     while k < len(lines):
@@ -212,23 +185,7 @@ def channels_of(entries: Sequence[Entry]) -> dict[str, Channel]:
 
 
 def read(path: str | os.PathLike[str]) -> Imported:
-    """Read a force report.
-
-    Parameters
-    ----------
-    path : str or path
-        File to read; gzip is unpacked.
-
-    Returns
-    -------
-    Imported
-        One channel for each quantity and zone; rows counts zones, over all tables.
-
-    Raises
-    ------
-    InputError
-        When there is no table, or rows do not fit their header.
-    """
+    """Read a force report."""
     source = load(path)
     entries: list[Entry] = []
     notes: list[str] = []

@@ -29,16 +29,6 @@ _NAMES = re.compile(r'"[^"]*"(?:\s+"[^"]*")+')
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a quoted title is followed by a line of quoted names and then by a number.
 
-    Parameters
-    ----------
-    head : bytes or str
-        First bytes of a file.
-
-    Returns
-    -------
-    bool
-        True when it is for this reader, damaged or not.
-
     Examples
     --------
     >>> sniff('"Drag Convergence"\r\n"Flow Time" "cd"\r\n5e-03 7e-02'), sniff('"a","b"\n1,2')
@@ -55,23 +45,7 @@ def sniff(head: bytes | str) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> Imported:
-    """Read a monitor.
-
-    Parameters
-    ----------
-    path : str or path
-        File to read; gzip is unpacked.
-
-    Returns
-    -------
-    Imported
-        Channels by the names of line 2; "Flow Time" is ``time_s``.
-
-    Raises
-    ------
-    InputError
-        When the names are absent or abbreviated, or when rows do not fit them.
-    """
+    """Read a monitor."""
     source = load(path)
     title: str | None = None
     names: list[str] | None = None

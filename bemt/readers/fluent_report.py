@@ -37,16 +37,6 @@ _TIMES = {"flow time", "flow-time", "physical-time", "time"}
 def column_of(name: str) -> Column:
     """Make the column of a name in Fluent's words; times are in seconds.
 
-    Parameters
-    ----------
-    name : str
-        As the file has it.
-
-    Returns
-    -------
-    Column
-        ``time_s`` for the flow time; other names stay.
-
     Examples
     --------
     >>> column_of("flow-time").name, column_of("Iteration").role, column_of("thrust(blade:1)").role
@@ -67,16 +57,6 @@ def column_of(name: str) -> Column:
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether one of the first lines is a parenthesised list of quoted names under a quoted title.
 
-    Parameters
-    ----------
-    head : bytes or str
-        First bytes of a file.
-
-    Returns
-    -------
-    bool
-        True when it is for this reader, damaged or not.
-
     Examples
     --------
     >>> sniff('"t-rfile"\n"Iteration" "t"\n("Iteration" "t")\n1 0.3'), sniff('(title "a")\n(labels "x" "y")')
@@ -89,23 +69,7 @@ def sniff(head: bytes | str) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> Imported:
-    """Read a report file.
-
-    Parameters
-    ----------
-    path : str or path
-        File to read; gzip is unpacked.
-
-    Returns
-    -------
-    Imported
-        Channels by the names of line 3; flow-time is ``time_s``.
-
-    Raises
-    ------
-    InputError
-        When line 3 is absent or unreadable, or when rows do not fit it.
-    """
+    """Read a report file."""
     source = load(path)
     title = ""
     names: list[str] | None = None

@@ -51,16 +51,6 @@ _AVERAGE = re.compile(r"\(Average Over\)\"?\s+(\d+)")
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a text shows marks of a Fluent console.
 
-    Parameters
-    ----------
-    head : bytes or str
-        First bytes of a file.
-
-    Returns
-    -------
-    bool
-        True when it is for this reader, damaged or not.
-
     Examples
     --------
     >>> sniff("  iter  continuity  x-velocity  time/iter\n 1 1.0 1.0 0:00:01 9"), sniff("iteration,continuity")
@@ -139,24 +129,7 @@ def _history(columns: Mapping[str, list[float]], steps: list[float]) -> dict[str
 
 
 def read(path: str | os.PathLike[str]) -> Imported:
-    """Read a transcript.
-
-    Parameters
-    ----------
-    path : str or path
-        File to read; gzip is unpacked.
-
-    Returns
-    -------
-    Imported
-        ``moment_Nm(zone)`` and other computed numbers, ``force_total_x_N(zone)``, residuals and report definitions by
-        their own names, ``time_s``.
-
-    Raises
-    ------
-    InputError
-        When the text holds no numbers of a run.
-    """
+    """Read a transcript."""
     source = load(path)
     notes: list[str] = []
     channels: dict[str, Channel] = {}

@@ -35,16 +35,6 @@ _UNIT = re.compile(r"\s*[\[(]\s*([^\])]*?)\s*[\])]\s*$")
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether the file begins with a title and labels in parentheses.
 
-    Parameters
-    ----------
-    head : bytes or str
-        First bytes of a file.
-
-    Returns
-    -------
-    bool
-        True when it is for this reader, damaged or not.
-
     Examples
     --------
     >>> sniff('(title "a")\n(labels "x" "y")\n'), sniff('("Iteration" "drag")')
@@ -55,23 +45,7 @@ def sniff(head: bytes | str) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> Imported:
-    """Read an XY plot.
-
-    Parameters
-    ----------
-    path : str or path
-        File to read; gzip is unpacked.
-
-    Returns
-    -------
-    Imported
-        Two channels for each zone, ``label(zone)``; means only when x counts iterations or time.
-
-    Raises
-    ------
-    InputError
-        When labels are absent, a list is not opened or rows are no pairs.
-    """
+    """Read an XY plot."""
     source = load(path)
     title = ""
     labels: list[str] = []

@@ -35,16 +35,6 @@ DOUBTFUL_RPM = 20000.0
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a text is a table with a column of numbers.
 
-    Parameters
-    ----------
-    head : bytes or str
-        First bytes of a file.
-
-    Returns
-    -------
-    bool
-        True when its first lines have equal numbers of cells, two or more, some of which are numbers.
-
     Examples
     --------
     >>> sniff("time;thrust_N\n0.0;1.2\n0.1;1.3\n"), sniff("A text, with commas,\nand no numbers.\n")
@@ -82,23 +72,7 @@ def _blank_numbers(line: str) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> Imported:
-    """Read a table.
-
-    Parameters
-    ----------
-    path : str or path
-        File.
-
-    Returns
-    -------
-    Imported
-        ``kind`` is "bench" when it has a thrust or torque over time, a speed or a pulse width, else "table".
-
-    Raises
-    ------
-    InputError
-        With all faults.
-    """
+    """Read a table."""
     source = load_text(path)
     table = split_table(source)
     imported = convert(source, table, decimal_mark(table))
@@ -110,27 +84,7 @@ def read(path: str | os.PathLike[str]) -> Imported:
 
 
 def convert(source: SourceText, table: SplitTable, decimal: str = ".") -> Imported:
-    """Make channels of a split table.
-
-    Parameters
-    ----------
-    source : SourceText
-        The file.
-    table : SplitTable
-        Its cells.
-    decimal : str
-        Decimal mark, ``.`` or ``,``.
-
-    Returns
-    -------
-    Imported
-        One channel per column of numbers, one text per other column.
-
-    Raises
-    ------
-    InputError
-        With all faults.
-    """
+    """Make channels of a split table."""
     build = Builder(table, KIND, kind="table")
     heads = [heading(t) if t else Heading("", f"column_{k + 1}", None) for k, t in enumerate(table.headings)]
     heads = heads or [Heading("", f"column_{k + 1}", None) for k in range(len(table.rows[0]))]

@@ -48,16 +48,6 @@ _RAW_KEYS = {"Motor Output", "ESCT RPM", "Thrust [G]", "Torque [G cm]"}
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether the first line has this stand's headings.
 
-    Parameters
-    ----------
-    head : bytes or str
-        First bytes of a file.
-
-    Returns
-    -------
-    bool
-        True for a table or a raw record.
-
     Examples
     --------
     >>> sniff("out,th,th_err,tq,tq_err,rpm,rpm_err,v,v_err,a,a_err,pin,theff\n"), sniff("th,tq,rpm\n")
@@ -69,23 +59,7 @@ def sniff(head: bytes | str) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> Imported:
-    """Read a table or a raw record.
-
-    Parameters
-    ----------
-    path : str or path
-        File.
-
-    Returns
-    -------
-    Imported
-        SI channels; stated errors as ``thrust_err_N``. ``provenance["form"]`` is ``table`` or ``raw``.
-
-    Raises
-    ------
-    InputError
-        With all faults.
-    """
+    """Read a table or a raw record. ["form"]"""
     source = load_text(path)
     table = split_table(source, header=True)
     raw = set(table.headings) >= _RAW_KEYS

@@ -44,16 +44,6 @@ _VECTOR = re.compile(r"\(\s*((?:\w+_[xyz]\s*){3})\)")
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a comment line begins with Time and names columns.
 
-    Parameters
-    ----------
-    head : bytes or str
-        First bytes of a file.
-
-    Returns
-    -------
-    bool
-        True when it is for this reader, damaged or not.
-
     Examples
     --------
     >>> sniff("# Force\n# Time  total_x total_y\n1 2 3"), sniff("# Time\n"), sniff("#  Time  forces(pressure viscous)")
@@ -83,23 +73,7 @@ def _columns(header: str, title: str) -> tuple[list[Column], str, list[tuple[str
 
 
 def read(path: str | os.PathLike[str]) -> Imported:
-    """Read a table of ``postProcessing``.
-
-    Parameters
-    ----------
-    path : str or path
-        File to read; gzip is unpacked.
-
-    Returns
-    -------
-    Imported
-        ``force_total_x_N``, ``moment_pressure_z_Nm``...; coefficients by their own names; y+ by patch.
-
-    Raises
-    ------
-    InputError
-        When the header is absent or rows do not fit it.
-    """
+    """Read a table of ``postProcessing``."""
     source = load(path)
     title = ""
     about: dict[str, str] = {}

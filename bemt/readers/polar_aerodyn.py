@@ -31,16 +31,6 @@ _MILLION = 1e6
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a file is an AeroDyn airfoil file of version 13 to 15.
 
-    Parameters
-    ----------
-    head : bytes or str
-        First bytes of a file.
-
-    Returns
-    -------
-    bool
-        True when it gives the number of tables in either version's words.
-
     Examples
     --------
     >>> sniff("! AirfoilInfo v1.01.x Input File\n  1  NumTabs  ! Number of tables\n"), sniff("alpha,cl,cd")
@@ -51,23 +41,7 @@ def sniff(head: bytes | str) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> Polar:
-    """Read an AeroDyn airfoil file with one or several Reynolds numbers.
-
-    Parameters
-    ----------
-    path : str or path
-        File to read.
-
-    Returns
-    -------
-    Polar
-        Continued to +-180 deg where the data stop.
-
-    Raises
-    ------
-    InputError
-        With every fault: counts that do not fit, tables that differ by a control setting, text for numbers.
-    """
+    """Read an AeroDyn airfoil file with one or several Reynolds numbers."""
     source = load_text(path)
     faults: list[Fault] = []
     if _V15.search(source.text):

@@ -35,16 +35,6 @@ _HINT = "C81 fields are 7 characters wide, nine values after the first field"
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a file begins with a name, six counts of two digits and a line of Mach numbers.
 
-    Parameters
-    ----------
-    head : bytes or str
-        First bytes of a file.
-
-    Returns
-    -------
-    bool
-        True when both lines fit.
-
     Examples
     --------
     >>> sniff("NACA 0012".ljust(30) + " 2 3 2 3 0 0\n" + 7 * " " + "   0.00   0.50\n"), sniff("alpha,cl,cd")
@@ -58,42 +48,14 @@ def sniff(head: bytes | str) -> bool:
 
 
 def resembles(text: str) -> bool:
-    """Whether a text begins as a C81 table does and goes on in columns of another width.
-
-    Parameters
-    ----------
-    text : str
-        Head of a file that is no C81 table.
-
-    Returns
-    -------
-    bool
-        True for six counts and a line of Mach numbers below, wherever they stand.
-    """
+    """Whether a text begins as a C81 table does and goes on in columns of another width."""
     lines = text.splitlines()
     mach = [number(cell) for cell in lines[1].split()] if len(lines) > 1 else []
     return bool(lines) and _counts(lines[0]) is not None and len(mach) > 1 and None not in mach
 
 
 def read(path: str | os.PathLike[str]) -> Polar:
-    """Read a C81 table.
-
-    Parameters
-    ----------
-    path : str or path
-        File to read.
-
-    Returns
-    -------
-    Polar
-        One Reynolds number (the format states none), the Mach numbers of both tables; where lift and drag have other
-        angles or Mach numbers, both are interpolated linearly to the union (held at the ends of Mach).
-
-    Raises
-    ------
-    InputError
-        With every fault: counts, fields that are no numbers, axes that do not ascend, a file that ends early.
-    """
+    """Read a C81 table."""
     source = load_text(path)
     lines = source.lines
     counts = _counts(lines[0]) if lines else None

@@ -60,16 +60,6 @@ class PolarRow:
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether the first line that is no comment is a header of alpha, cl and cd.
 
-    Parameters
-    ----------
-    head : bytes or str
-        First bytes of a file.
-
-    Returns
-    -------
-    bool
-        True also for a header without units, which `read` then refuses with a hint.
-
     Examples
     --------
     >>> sniff("alpha_deg,cl,cd"), sniff("# polar\nRe;alpha;CL;CD"), sniff("rpm,thrust_N")
@@ -83,23 +73,7 @@ def sniff(head: bytes | str) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> Polar:
-    """Read a delimited polar file.
-
-    Parameters
-    ----------
-    path : str or path
-        File to read.
-
-    Returns
-    -------
-    Polar
-        Continued to +-180 deg where the data stop (see `bemt.sections.extrapolation.from_tables`); its notes say so.
-
-    Raises
-    ------
-    InputError
-        With every fault of the file: missing or unknown units, text for numbers, doubtful magnitudes.
-    """
+    """Read a delimited polar file."""
     source = load_text(path)
     lines = [(i, text) for i, text in enumerate(source.lines, 1) if text.strip() and not text.lstrip().startswith("#")]
     if not lines:
@@ -164,35 +138,7 @@ def assemble(
     source: SourceText, rows: Sequence[PolarRow], faults: list[Fault], *, name: str = "", kind: str = "CSV",
     radians: bool = False, notes: Sequence[str] = (),
 ) -> Polar:  # fmt: skip
-    """Check rows of any polar format and make the Polar.
-
-    Parameters
-    ----------
-    source : SourceText
-        File that the rows come from.
-    rows : sequence of PolarRow
-        Data, in any order.
-    faults : list of Fault
-        Faults found so far; those found here are added.
-    name : str, optional
-        Name of the section; the file's own name by default.
-    kind : str, optional
-        Name of the format, for `Polar.source`.
-    radians : bool, optional
-        Whether the file states angles in radians (for the doubt about units).
-    notes : sequence of str, optional
-        Notes to begin with.
-
-    Returns
-    -------
-    Polar
-        Continued to +-180 deg.
-
-    Raises
-    ------
-    InputError
-        With all faults, old and new.
-    """
+    """Check rows of any polar format and make the Polar."""
     said = list(notes)
     faults += _doubts(source.name, rows, radians)
     groups: dict[tuple[float, float], dict[float, PolarRow]] = {}

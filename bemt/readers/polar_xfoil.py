@@ -49,16 +49,6 @@ _TRIP = re.compile(r"xtrf\s*=\s*(\S+)\s*\(top\)\s*(\S+)\s*\(bottom\)")
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a file begins like an XFOIL polar.
 
-    Parameters
-    ----------
-    head : bytes or str
-        First bytes of a file.
-
-    Returns
-    -------
-    bool
-        True when it says "Calculated polar for:" or begins as the CSV of airfoiltools does.
-
     Examples
     --------
     >>> sniff("       XFOIL         Version 6.99\n\n Calculated polar for: NACA 4412\n"), sniff("alpha,cl,cd")
@@ -69,44 +59,12 @@ def sniff(head: bytes | str) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> Polar:
-    """Read one XFOIL polar file.
-
-    Parameters
-    ----------
-    path : str or path
-        File to read.
-
-    Returns
-    -------
-    Polar
-        One Reynolds and one Mach number, continued to +-180 deg; its notes hold Ncrit and the trips.
-
-    Raises
-    ------
-    InputError
-        With every fault: no Re line, varying Re (types 2 and 3), text for numbers.
-    """
+    """Read one XFOIL polar file."""
     return read_many([path])
 
 
 def read_many(paths: Iterable[str | os.PathLike[str]]) -> Polar:
-    """Read XFOIL polar files of one section at several Reynolds numbers.
-
-    Parameters
-    ----------
-    paths : iterable of str or path
-        Files, one per Reynolds number (or per pair of Reynolds and Mach number).
-
-    Returns
-    -------
-    Polar
-        All of them in one, continued to +-180 deg.
-
-    Raises
-    ------
-    InputError
-        With every fault of every file.
-    """
+    """Read XFOIL polar files of one section at several Reynolds numbers."""
     rows: list[PolarRow] = []
     faults: list[Fault] = []
     notes: list[str] = []

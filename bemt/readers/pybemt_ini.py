@@ -32,17 +32,7 @@ _SCALARS: dict[str, dict[str, tuple[str, float, float]]] = {  # section -> key -
 
 
 def sniff(head: bytes | str) -> bool:
-    r"""Tell whether a text is an ini file with a rotor of this format.
-
-    Parameters
-    ----------
-    head : bytes or str
-        First bytes of a file.
-
-    Returns
-    -------
-    bool
-        True with a section ``[rotor]`` and the keys nblades and radius.
+    r"""Tell whether a text is an ini file with a rotor of this format. [rotor]
 
     Examples
     --------
@@ -55,23 +45,7 @@ def sniff(head: bytes | str) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> Imported:
-    """Read one description.
-
-    Parameters
-    ----------
-    path : str or path
-        File.
-
-    Returns
-    -------
-    Imported
-        kind "geometry": channels r_m, chord_m, beta_rad, rotor; constants of the file by name with unit.
-
-    Raises
-    ------
-    InputError
-        With all faults: keys missing, lists of different length, radii outside the rotor, lengths in millimetres.
-    """
+    """Read one description."""
     source = load_text(path)
     parser = configparser.ConfigParser(interpolation=None, strict=True, inline_comment_prefixes=("#", ";"))
     try:

@@ -30,16 +30,6 @@ HEAD = (
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a file has a title and the seven lines of numbers of a propeller file, then stations.
 
-    Parameters
-    ----------
-    head : bytes or str
-        First bytes of a file.
-
-    Returns
-    -------
-    bool
-        True when the counts fit.
-
     Examples
     --------
     >>> head = "6x3\n 2 .0762\n0.5 5.8\n-0.4 1.2\n.028 .05 .05 .5\n70000 -.7\n.0254 .0254 1\n0 0 0\n"
@@ -65,23 +55,7 @@ def sniff(head: bytes | str) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> BladeFile:
-    """Read one propeller file.
-
-    Parameters
-    ----------
-    path : str or path
-        File.
-
-    Returns
-    -------
-    BladeFile
-        Stations after the factors of the file; one section, or one per station where stations state their own.
-
-    Raises
-    ------
-    InputError
-        With all faults of the file.
-    """
+    """Read one propeller file."""
     source = load_text(path)
     rows = lines_of(source, "#!")
     faults: list[Fault] = []

@@ -49,16 +49,6 @@ _HEAD = re.compile(r"(ESC( signal)?( [A-D])?|Motor (Electrical|Optical) Speed( [
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether the first line names time and the stand's own channels.
 
-    Parameters
-    ----------
-    head : bytes or str
-        First bytes of a file.
-
-    Returns
-    -------
-    bool
-        True for headings with ``Time (``, an ESC signal or motor speed, and units in parentheses.
-
     Examples
     --------
     >>> sniff("Time (s),ESC signal (µs),Thrust (gf),Motor Optical Speed (RPM)\n"), sniff("Time (s),Thrust (gf)\n")
@@ -74,23 +64,7 @@ def sniff(head: bytes | str) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> Imported:
-    """Read one log.
-
-    Parameters
-    ----------
-    path : str or path
-        File.
-
-    Returns
-    -------
-    Imported
-        SI channels; ``provenance["mode"]`` is ``steps`` or ``continuous``.
-
-    Raises
-    ------
-    InputError
-        With all faults.
-    """
+    """Read one log. ["mode"]"""
     source = load_text(path)
     table = split_table(source, header=True)
     twice = sorted({h for h in table.headings if h and table.headings.count(h) > 1})

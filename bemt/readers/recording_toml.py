@@ -98,17 +98,7 @@ SCHEMA: dict[str, dict[str, Key]] = {
 
 
 def sniff(head: bytes | str) -> bool:
-    r"""Tell whether a text has the tables of a recording.toml.
-
-    Parameters
-    ----------
-    head : bytes or str
-        First bytes of a file.
-
-    Returns
-    -------
-    bool
-        True when a line is ``[recording]``.
+    r"""Tell whether a text has the tables of a recording.toml. [recording]
 
     Examples
     --------
@@ -119,24 +109,7 @@ def sniff(head: bytes | str) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> Imported:
-    """Read a recording.toml and the tables that it names.
-
-    Parameters
-    ----------
-    path : str or path
-        The TOML file; the tables lie beside it.
-
-    Returns
-    -------
-    Imported
-        ``constants`` hold density_kg_m3, diameter_m, gap_m, wall_distance_m, pole_pairs as far as given;
-        ``instrument`` the uncertainties; several runs are joined with a channel ``run`` (1, 2, ...).
-
-    Raises
-    ------
-    InputError
-        With all faults of the TOML file, else with all faults of the tables.
-    """
+    """Read a recording.toml and the tables that it names."""
     out = Collector(os.fspath(path))
     document = load_toml(Path(path), out)
     if document is None:

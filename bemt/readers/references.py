@@ -120,16 +120,6 @@ class Reference:
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether the head of a file is a table of references.
 
-    Parameters
-    ----------
-    head : bytes or str
-        First bytes of a file.
-
-    Returns
-    -------
-    bool
-        True when its first line that is no comment names quantity, value and unit.
-
     Examples
     --------
     >>> sniff("# case 8x5\nquantity,value,unit,uncertainty,kind,source,remark\n"), sniff("J CT CP eta\n")
@@ -254,23 +244,7 @@ def _pair_faults(file: str, references: list[Reference]) -> Iterable[Fault]:
 
 
 def read(path: str | os.PathLike[str]) -> list[Reference]:
-    """Read a table of references.
-
-    Parameters
-    ----------
-    path : str or path
-        CSV file.
-
-    Returns
-    -------
-    list of Reference
-        In the order of the file.
-
-    Raises
-    ------
-    InputError
-        With all faults of the file.
-    """
+    """Read a table of references."""
     source = load_text(path)
     file = source.name
     if not source.text.strip():
@@ -317,21 +291,7 @@ def read(path: str | os.PathLike[str]) -> list[Reference]:
 
 
 def to_series(references: Iterable[Reference], name: str) -> list[Dataset]:
-    """Group references into series, one per kind and source.
-
-    Parameters
-    ----------
-    references : iterable of Reference
-        As read.
-    name : str
-        Name of the case.
-
-    Returns
-    -------
-    list of Dataset
-        Each point is one condition; conditions that the file leaves open stay NaN. Two values of one quantity at one
-        condition make two points.
-    """
+    """Group references into series, one per kind and source."""
     groups: dict[tuple[str, str], list[dict[str, Reference]]] = {}
     for ref in references:
         points = groups.setdefault((ref.kind, ref.source), [])

@@ -32,16 +32,6 @@ _START = re.compile(r'(VARIABLES\s*=\s*)?"\s*(Time_Iter|Outer_Iter|Inner_Iter|It
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether one of the first lines is a list of quoted names that begins with an iteration.
 
-    Parameters
-    ----------
-    head : bytes or str
-        First bytes of a file.
-
-    Returns
-    -------
-    bool
-        True when it is for this reader, damaged or not.
-
     Examples
     --------
     >>> sniff('"Time_Iter","Inner_Iter", "CD"\n0,0,0.2'), sniff('"Iteration" "drag"')
@@ -51,23 +41,7 @@ def sniff(head: bytes | str) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> Imported:
-    """Read a history.
-
-    Parameters
-    ----------
-    path : str or path
-        File to read; gzip is unpacked.
-
-    Returns
-    -------
-    Imported
-        Channels by their own names; ``Cur_Time`` is ``time_s``.
-
-    Raises
-    ------
-    InputError
-        When the header is absent or rows do not fit it.
-    """
+    """Read a history."""
     source = load(path)
     names: tuple[str, ...] | None = None
     rows: list[ExportRow] = []

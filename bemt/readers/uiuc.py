@@ -151,18 +151,7 @@ def _head(file: Path) -> bytes:
 
 
 def sniff_folder(path: Path) -> bool:
-    """Tell whether a folder, or one below it, holds a table of this archive.
-
-    Parameters
-    ----------
-    path : path
-        Folder.
-
-    Returns
-    -------
-    bool
-        True from the first such file on.
-    """
+    """Tell whether a folder, or one below it, holds a table of this archive."""
     return any(sniff(_head(file)) for file in _files(path))
 
 
@@ -238,23 +227,7 @@ def _collect(files: list[tuple[Path, UiucFile]], faults: list[Fault]) -> Iterato
 
 
 def scan_folder(path: str | os.PathLike[str]) -> UiucFolder:
-    """Import a folder in the archive's layout, keeping what is sound and naming what is not.
-
-    Parameters
-    ----------
-    path : str or path
-        Folder; folders below it are read too, each for itself (``volume-1/data`` and ``volume-2/data`` share nothing).
-
-    Returns
-    -------
-    UiucFolder
-        Propellers by folder and name, faults, ignored files. Every file ends in one of the three.
-
-    Raises
-    ------
-    InputError
-        When the folder does not exist.
-    """
+    """Import a folder in the archive's layout, keeping what is sound and naming what is not."""
     root = Path(path)
     if not root.is_dir():
         raise InputError(Fault(os.fspath(path), "", "no folder", "a folder in UIUC layout", "Check the path"))
@@ -278,23 +251,7 @@ def scan_folder(path: str | os.PathLike[str]) -> UiucFolder:
 
 
 def read_folder(path: str | os.PathLike[str]) -> list[UiucPropeller]:
-    """Import a folder in the archive's layout; refuse it whole when a file of it is faulty.
-
-    Parameters
-    ----------
-    path : str or path
-        Folder, see :func:`scan_folder`, which keeps the sound part instead.
-
-    Returns
-    -------
-    list of UiucPropeller
-        By folder and name.
-
-    Raises
-    ------
-    InputError
-        With all faults of all files, or when there is no propeller.
-    """
+    """Import a folder in the archive's layout; refuse it whole when a file of it is faulty."""
     folder = scan_folder(path)
     if folder.faults:
         raise InputError(folder.faults)
@@ -305,23 +262,7 @@ def read_folder(path: str | os.PathLike[str]) -> list[UiucPropeller]:
 
 
 def read(path: str | os.PathLike[str]) -> Any:
-    """Read a folder (list of propellers) or one table of the archive, by its header.
-
-    Parameters
-    ----------
-    path : str or path
-        File or folder.
-
-    Returns
-    -------
-    list of UiucPropeller, UiucGeometry, UiucStatic, UiucLine or UiucThickness
-        What is there.
-
-    Raises
-    ------
-    InputError
-        With all faults.
-    """
+    """Read a folder (list of propellers) or one table of the archive, by its header."""
     target = Path(path)
     if target.is_dir():
         return read_folder(target)
@@ -336,24 +277,7 @@ def read(path: str | os.PathLike[str]) -> Any:
 
 
 def to_series(propeller: UiucPropeller) -> Dataset:
-    """All measured points of one propeller as a series of kind ``bench``.
-
-    Parameters
-    ----------
-    propeller : UiucPropeller
-        A propeller with static or advance-ratio runs.
-
-    Returns
-    -------
-    Dataset
-        Channels rpm, J, CT, CP, eta; static points have J = 0 and eta = 0. The archive states no uncertainty per point:
-        ``u`` is NaN (unknown). ``labels`` are ``file:row``.
-
-    Raises
-    ------
-    InputError
-        When the propeller has geometry only.
-    """
+    """All measured points of one propeller as a series of kind ``bench``."""
     columns: dict[str, list[Any]] = {"rpm": [], "J": [], "CT": [], "CP": [], "eta": []}
     flags: list[tuple[str, ...]] = []
     labels: list[str] = []

@@ -23,16 +23,6 @@ _HEAD = re.compile(r"\s*XROTOR\s+VERSION", re.I)
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a file begins as XROTOR's SAVE writes it.
 
-    Parameters
-    ----------
-    head : bytes or str
-        First bytes of a file.
-
-    Returns
-    -------
-    bool
-        True for its first words.
-
     Examples
     --------
     >>> sniff("XROTOR VERSION:  7.55\nblade\n"), sniff("DFDC Version 0.55\n")
@@ -72,23 +62,7 @@ def read_section(
 
 
 def read(path: str | os.PathLike[str]) -> BladeFile:
-    """Read one saved rotor.
-
-    Parameters
-    ----------
-    path : str or path
-        File.
-
-    Returns
-    -------
-    BladeFile
-        Stations, sections, and the operating point that V/(Omega R) makes of the file's speed.
-
-    Raises
-    ------
-    InputError
-        With all faults of the file.
-    """
+    """Read one saved rotor."""
     source = load_text(path)
     rows = lines_of(source, "!#")
     faults: list[Fault] = []

@@ -50,18 +50,7 @@ _INSIDE: tuple[tuple[re.Pattern[bytes], str, str], ...] = (
 
 
 def recognised(path: str | os.PathLike[str]) -> tuple[str, str] | None:
-    """Say what a file is that no reader takes.
-
-    Parameters
-    ----------
-    path : str or path
-        File.
-
-    Returns
-    -------
-    (got, hint) or None
-        For the message of the refusal; None when the file cannot be read or is not known either.
-    """
+    """Say what a file is that no reader takes."""
     try:
         with Path(path).open("rb") as stream:
             head = stream.read(16384)
@@ -109,18 +98,7 @@ _DAMAGED = (
 
 
 def damaged_export(path: str | os.PathLike[str]) -> str | None:
-    """Say which export a file was, when its body shows it and its head no longer does.
-
-    Parameters
-    ----------
-    path : str or path
-        File that no reader of a particular format takes.
-
-    Returns
-    -------
-    str or None
-        In words; None when it shows no such marks.
-    """
+    """Say which export a file was, when its body shows it and its head no longer does."""
     with Path(path).open("rb") as stream:
         head = stream.read(16384)
     return next((name for mark, name in _DAMAGED if mark.search(head)), None)
@@ -145,25 +123,6 @@ def _channel(name: str, values: Any) -> Channel:
 
 def adapt(found: Any, form: str, name: str) -> Imported:
     """Make the record of whatever an importer returned.
-
-    Parameters
-    ----------
-    found : object
-        Imported, Dataset, Polar, list of Reference or UiucPropeller, or a record of arrays.
-    form : str
-        KIND of the importer.
-    name : str
-        File, for faults.
-
-    Returns
-    -------
-    Imported
-        Means only for single values: a mean over operating points or stations says nothing.
-
-    Raises
-    ------
-    InputError
-        When there is nothing that can be shown.
 
     Examples
     --------

@@ -76,29 +76,7 @@ def _limit(url: str, size: int) -> None:
 
 
 def download(url: str, target: Path, known_sha256: str | None = None, progress: Progress | None = None) -> str:
-    """Fetch a file with pooch; what was fetched before an interruption is kept and completed.
-
-    Parameters
-    ----------
-    url : str
-        Address.
-    target : Path
-        File; appears whole. Beside it, ``.part`` holds what an interrupted run has fetched.
-    known_sha256 : str, optional
-        Hash that the file must have.
-    progress : callable, optional
-        Called with bytes had and bytes in all (0: unknown).
-
-    Returns
-    -------
-    str
-        SHA-256 of the file.
-
-    Raises
-    ------
-    InputError
-        When the address cannot be reached, the file is too large or cut off, or its hash is another one.
-    """
+    """Fetch a file with pooch; what was fetched before an interruption is kept and completed."""
     import logging
 
     import pooch
@@ -164,25 +142,7 @@ def _members(archive: zipfile.ZipFile, name: str) -> list[tuple[zipfile.ZipInfo,
 
 @contextmanager
 def unpacked(archive: Path, folder: Path) -> Iterator[Path]:
-    """Unpack beside a folder, for a look; put in place of the folder when the block ends well.
-
-    Parameters
-    ----------
-    archive : Path
-        Zip file.
-    folder : Path
-        Target; replaced in one step, untouched when anything fails.
-
-    Yields
-    ------
-    Path
-        The unpacked files under a temporary name; further files may be added.
-
-    Raises
-    ------
-    InputError
-        For what is no sound zip file, paths that leave the folder, links, encrypted or doubled files, or too much.
-    """
+    """Unpack beside a folder, for a look; put in place of the folder when the block ends well."""
     name = os.fspath(archive)
     folder.parent.mkdir(parents=True, exist_ok=True)
     fresh = folder.with_name(f".{folder.name}.{os.getpid()}.tmp")

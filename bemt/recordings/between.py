@@ -51,17 +51,6 @@ class Level:
 def odd_ones(levels: Sequence[Level]) -> list[tuple[Level, Finding]]:
     """Name recordings whose level differs from that of most others by the factor of a usual slip.
 
-    Parameters
-    ----------
-    levels : sequence of Level
-        Of any channels; channels are compared one by one. The level that most recordings share is right; of two such,
-        the one nearer the model.
-
-    Returns
-    -------
-    list of (Level, Finding)
-        In the order of the levels.
-
     Examples
     --------
     >>> files = [("a", 0.02), ("b", -0.05), ("c", 4.6), ("d", 0.8)]  # c reads 102 times, d 2.3 times what others do

@@ -104,19 +104,6 @@ def _base_of_u(name: str) -> str | None:
 def view(imported: Imported, speed: str | None = None) -> Recorded:
     """Name the channels of a recording.
 
-    Parameters
-    ----------
-    imported : Imported
-        As read.
-    speed : str or None
-        Channel that is the speed of the rotor; None: ``rpm`` if the file has it, else the optical, else the
-        electrical one, whichever saw the rotor turn.
-
-    Returns
-    -------
-    Recorded
-        Only channels whose unit is known, and what was decided.
-
     Examples
     --------
     >>> from bemt.readers._imported import Channel
@@ -184,18 +171,7 @@ def _speed(values: dict[str, Array], names: dict[str, str], notes: list[str], sp
 
 
 def shaft_power(values: Mapping[str, Array]) -> Array | None:
-    """Shaft power, torque times speed.
-
-    Parameters
-    ----------
-    values : mapping of str to (N,) array
-        Channels; ``torque_Nm`` [N m] and ``rpm`` [rev/min] are used.
-
-    Returns
-    -------
-    (N,) array or None
-        Power [W]; None without both.
-    """
+    """Shaft power, torque times speed, (N,) [W]."""
     if "torque_Nm" not in values or "rpm" not in values:
         return None
     return values["torque_Nm"] * values["rpm"] * units.RPM

@@ -26,22 +26,6 @@ def check(
 ) -> tuple[Finding, ...]:  # fmt: skip
     """Look for faults in a recording.
 
-    Parameters
-    ----------
-    source : Imported or Dataset
-        The recording as read, or points.
-    diameter_m, pitch_m : float or None
-        Diameter and pitch [m], as far as known; None takes what the recording states.
-    blades : int or None
-        Number of blades.
-    ducted : bool
-        Rotor in a duct: its bounds of CT, CP and figure of merit are wider.
-
-    Returns
-    -------
-    tuple of Finding
-        Worst first; empty when nothing looks wrong, or nothing can be known.
-
     Examples
     --------
     >>> rpm = [4000.0, 5000.0, 6000.0, 7000.0]

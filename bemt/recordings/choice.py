@@ -47,20 +47,6 @@ class Choice:
 def averaged(record: Imported, period: float, revolutions: int | None = None) -> Imported:
     """Replace the means of a history by those over its last whole revolutions.
 
-    Parameters
-    ----------
-    record : Imported
-        A history by time; others are returned with a warning.
-    period : float
-        Duration of a revolution. [s]
-    revolutions : int or None
-        How many, from the end; None takes 4, or half of the run.
-
-    Returns
-    -------
-    Imported
-        Means over revolutions; None with a warning where there cannot be one.
-
     Examples
     --------
     >>> t = np.arange(1, 401) * 0.01
@@ -108,25 +94,7 @@ def _channel(channel: Channel, average: Average) -> Channel:
 
 
 def chosen(record: Imported, choice: Choice) -> Imported:
-    """Apply zones, sector and sign, in this order.
-
-    Parameters
-    ----------
-    record : Imported
-        A record whose zones are in the names of its channels, ``name(zone)``.
-    choice : Choice
-        What the user said.
-
-    Returns
-    -------
-    Imported
-        With channels ``name(zone+zone)`` for the sums, and loads times sector and sign.
-
-    Raises
-    ------
-    InputError
-        When a zone or a load does not exist, or when sign or sector find no load.
-    """
+    """Apply zones, sector and sign, in this order."""
     channels = dict(record.channels)
     notes = list(record.warnings)
     file = record.provenance.get("file", "")

@@ -70,35 +70,7 @@ def get(
     kind: str, folder: Path, source: str | Path | None = None, url: str | None = None, refresh: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """Put a database into a folder.
-
-    Parameters
-    ----------
-    kind : str
-        One of `URLS`.
-    folder : Path
-        Its folder; made, or replaced in one step when an earlier run made it.
-    source : str or Path, optional
-        Local archive to take instead of fetching one.
-    url : str, optional
-        Mirror to fetch from; not with `source`.
-    refresh : bool
-        Fetch again what is there already; it must have the recorded hash.
-    progress : callable, optional
-        Called with bytes had and bytes in all (0: unknown).
-
-    Returns
-    -------
-    dict
-        Document of schema ``bemt.data/1``.
-
-    Raises
-    ------
-    InputError
-        When the folder holds something else, also beside the data of an earlier run, `source` and `url` are both given,
-        the archive cannot be had, is not sound, or holds no propeller; the folder
-        is as before then.
-    """
+    """Put a database into a folder."""
     from bemt.readers.uiuc import scan_folder
 
     if source is not None and url is not None:

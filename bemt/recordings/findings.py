@@ -161,18 +161,7 @@ CHECKS: dict[str, Check] = {}
 
 
 def check_for(name: str) -> Callable[[Check], Check]:
-    """Register a check.
-
-    Parameters
-    ----------
-    name : str
-        Its name; taken once.
-
-    Returns
-    -------
-    callable
-        Decorator that leaves the function as it is.
-    """
+    """Register a check."""
 
     def register(check: Check) -> Check:
         if name in CHECKS:
@@ -186,24 +175,7 @@ def check_for(name: str) -> Callable[[Check], Check]:
 def facts_of(
     source: Imported | Dataset, diameter_m: float | None, pitch_m: float | None, blades: int | None, ducted: bool
 ) -> Facts:
-    """Gather the facts of a recording or a series.
-
-    Parameters
-    ----------
-    source : Imported or Dataset
-        What is looked at.
-    diameter_m, pitch_m : float or None
-        Diameter, pitch [m]; None takes what the recording states.
-    blades : int or None
-        Blades.
-    ducted : bool
-        Rotor in a duct.
-
-    Returns
-    -------
-    Facts
-        Without readings that are no physical magnitude.
-    """
+    """Gather the facts of a recording or a series."""
     if isinstance(source, Dataset):
         raw = {k: np.asarray(v, dtype=float) for k, v in source.values.items()}
         told = {k: units.split_suffix(k)[1] for k in raw}

@@ -83,21 +83,7 @@ class GridStudy:
 
 
 def cell_size(cells: float, volume: float = 1.0, dimensions: int = 3) -> float:
-    """Give the representative cell size (V/N)^(1/d).
-
-    Parameters
-    ----------
-    cells : float
-        Number of cells. [1]
-    volume : float
-        Size of the domain [m3, or m2 in two dimensions]; only ratios matter.
-    dimensions : int
-        2 or 3.
-
-    Returns
-    -------
-    float
-        Cell size. [m]
+    """Give the representative cell size (V/N)^(1/d). [m]
 
     Examples
     --------
@@ -111,19 +97,7 @@ def cell_size(cells: float, volume: float = 1.0, dimensions: int = 3) -> float:
 
 
 def ratios(cells: Sequence[float], dimensions: int = 3) -> tuple[float, ...]:
-    """Give refinement ratios from cell counts, finest grid first.
-
-    Parameters
-    ----------
-    cells : sequence of float
-        Cell counts, descending.
-    dimensions : int
-        2 or 3.
-
-    Returns
-    -------
-    tuple of float
-        r21 (, r32). [1]
+    """Give refinement ratios from cell counts, finest grid first. [1]
 
     Examples
     --------
@@ -158,27 +132,6 @@ def grid_study(
     values: Sequence[float], ratios: Sequence[float], formal_order: float = 2.0, safety: float | None = None
 ) -> GridStudy:
     """Estimate what a value still owes to the grid.
-
-    Parameters
-    ----------
-    values : sequence of float
-        The same quantity on two or three grids, FINEST FIRST.
-    ratios : sequence of float
-        Refinement ratios r21 (, r32), above 1; 1.3 or more is wanted. [1]
-    formal_order : float
-        Order of the scheme; assumed when there are two grids. [1]
-    safety : float or None
-        Fs; None takes 1.25 with three grids and 3.0 with two. [1]
-
-    Returns
-    -------
-    GridStudy
-        With flags; nothing is hidden by an exception.
-
-    Raises
-    ------
-    InputError
-        When counts do not fit, a value is not finite or zero on the fine grids, or a ratio is not above 1.
 
     Examples
     --------

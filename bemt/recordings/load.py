@@ -46,27 +46,7 @@ _RESTART = re.compile(r"(.+?)((?:_\d+)+)(\.[^.]*)?(?:\.gz)?")
 
 
 def import_file(path: str | os.PathLike[str], format: str | None = None, choice: Choice | None = None) -> Imported:  # noqa: A002
-    """Read one file or folder of any known format.
-
-    Parameters
-    ----------
-    path : str or path
-        File or folder.
-    format : str or None
-        Kind of the importer; None finds it by content.
-    choice : Choice or None
-        Speed, sign, sector, zones.
-
-    Returns
-    -------
-    Imported
-        The record.
-
-    Raises
-    ------
-    InputError
-        When it is refused, with the reason.
-    """
+    """Read one file or folder of any known format."""
     choice = choice or Choice()
     name = os.fspath(path)
     if (Path(path) / "case.toml").is_file():
@@ -167,22 +147,7 @@ def document(
     format: str | None = None,
     choice: Choice | None = None,  # noqa: A002
 ) -> dict[str, Any]:
-    """Read files and give the document ``bemt.import/1``.
-
-    Parameters
-    ----------
-    paths : iterable of str or path
-        Files or folders; each is read for itself.
-    format : str or None
-        Kind of the importer for all; None finds each by content.
-    choice : Choice or None
-        Speed, sign, sector, zones.
-
-    Returns
-    -------
-    dict
-        Fit for JSON; a refused file has ``error`` and no channels.
-    """
+    """Read files and give the document ``bemt.import/1``."""
     names = [os.fspath(path) for path in paths]
     records: dict[str, Imported] = {}
     errors: dict[str, str] = {}

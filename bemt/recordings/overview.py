@@ -23,20 +23,7 @@ MOST = 40
 
 
 def is_recording(record: Imported, adapted: bool) -> bool:
-    """Whether a record is a table of measurements as a stand wrote it: to be checked and reduced.
-
-    Parameters
-    ----------
-    record : Imported
-        As read.
-    adapted : bool
-        Made from another kind of record (a series of published coefficients is reduced already).
-
-    Returns
-    -------
-    bool
-        True for recordings, and for plain tables with a load or a speed in a known unit.
-    """
+    """Whether a record is a table of measurements as a stand wrote it: to be checked and reduced."""
     if adapted:
         return False
     known = {name for name, c in record.channels.items() if c.unit}
@@ -45,34 +32,12 @@ def is_recording(record: Imported, adapted: bool) -> bool:
 
 
 def findings(record: Imported) -> tuple[Finding, ...]:
-    """Faults of a recording.
-
-    Parameters
-    ----------
-    record : Imported
-        As read; only measurements are looked at.
-
-    Returns
-    -------
-    tuple of Finding
-        Empty for other kinds.
-    """
+    """Faults of a recording."""
     return check(record) if record.kind in ("bench", "table") else ()
 
 
 def reduction_of(record: Imported) -> Reduced | str:
-    """Reduce, or say why not.
-
-    Parameters
-    ----------
-    record : Imported
-        A recording.
-
-    Returns
-    -------
-    Reduced or str
-        The points, or the reason.
-    """
+    """Reduce, or say why not."""
     try:
         return reduce(record)
     except InputError as error:
@@ -82,19 +47,7 @@ def reduction_of(record: Imported) -> Reduced | str:
 
 
 def reduction_document(reduced: Reduced | str | None) -> dict[str, Any] | None:
-    """The part of the JSON document that holds the steady points.
-
-    Parameters
-    ----------
-    reduced : Reduced, str or None
-        The points, why there are none, or None for no recording.
-
-    Returns
-    -------
-    dict or None
-        ``mode``, ``points`` (rows of a series with ``direction``), ``correlated``, ``dropped`` (every row and value),
-        ``notes``, ``error``.
-    """
+    """The part of the JSON document that holds the steady points."""
     if reduced is None:
         return None
     if isinstance(reduced, str):
@@ -108,16 +61,6 @@ def reduction_document(reduced: Reduced | str | None) -> dict[str, Any] | None:
 
 def ranges(lines: Iterable[int]) -> str:
     """Lines as ranges.
-
-    Parameters
-    ----------
-    lines : iterable of int
-        Line numbers.
-
-    Returns
-    -------
-    str
-        In order.
 
     Examples
     --------
@@ -134,20 +77,7 @@ def ranges(lines: Iterable[int]) -> str:
 
 
 def points_text(found: Mapping[str, Any], indent: str = "  ") -> list[str]:
-    """Steady points, what was dropped and the notes, as lines of text.
-
-    Parameters
-    ----------
-    found : mapping
-        As `reduction_document` gives it.
-    indent : str
-        Before each line.
-
-    Returns
-    -------
-    list of str
-        Empty lines never.
-    """
+    """Steady points, what was dropped and the notes, as lines of text."""
     if found["error"] is not None:
         return [f"{indent}not reduced: {found['error']}"]
     points = found["points"]

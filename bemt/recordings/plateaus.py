@@ -140,18 +140,7 @@ class Plateaus:
 
 
 def standard_error(values: ArrayLike) -> float:
-    """Standard error of the mean of samples that may follow each other closely.
-
-    Parameters
-    ----------
-    values : (N,) array
-        Samples in order, without NaN.
-
-    Returns
-    -------
-    float
-        sd / sqrt(n_eff) [unit of the samples] with n_eff = n (1 - r) / (1 + r), r the correlation of neighbours, not
-        below 0 and n_eff not below 1; NaN for fewer than two samples.
+    """Standard error of the mean of samples that may follow each other closely. [unit of the samples]
 
     Notes
     -----
@@ -202,29 +191,6 @@ def find(
     settings: PlateauSettings | None = None,
 ) -> Plateaus:
     """Find the plateaus of a recording.
-
-    Parameters
-    ----------
-    time_s : (N,) array or None
-        Time, not falling; None: rows count. [s]
-    channels : mapping of str to (N,) array
-        What to average; NaN where a row has no value.
-    signal : str
-        Channel that decides about steps (without a command) and settling.
-    command : (N,) array or None
-        Pulse width, throttle or similar, in any unit; steps are then where it changes.
-    settings : PlateauSettings or None
-        Rules; None takes the defaults.
-
-    Returns
-    -------
-    Plateaus
-        In order of time.
-
-    Raises
-    ------
-    InputError
-        When lengths differ, the signal is missing or has no values, or time falls.
 
     Examples
     --------

@@ -81,27 +81,7 @@ def _note_rest(found: Found, rec: Recorded, rows: Sequence[int]) -> None:
 
 
 def from_samples(rec: Recorded, name: str, settings: plateaus.PlateauSettings | None) -> Found:
-    """Plateaus of every run.
-
-    Parameters
-    ----------
-    rec : Recorded
-        A record of samples.
-    name : str
-        File, for faults.
-    settings : Settings or None
-        Rules of the plateau search.
-
-    Returns
-    -------
-    Found
-        In order of time.
-
-    Raises
-    ------
-    InputError
-        When there is nothing to reduce, or time falls too often.
-    """
+    """Plateaus of every run."""
     found = Found()
     signal = next((s for s in SIGNALS if s in rec.values and _moves(rec.values[s])), None)
     if signal is None:
@@ -185,18 +165,7 @@ def _clock(rec: Recorded, rows: NDArray[np.intp], found: Found) -> tuple[NDArray
 
 
 def from_rows(rec: Recorded) -> Found:
-    """Each row a point.
-
-    Parameters
-    ----------
-    rec : Recorded
-        A table of steady points.
-
-    Returns
-    -------
-    Found
-        In the order of the file.
-    """
+    """Each row a point."""
     found = Found()
     rest = at_rest(rec)
     data = _clean(rec, rest, found)

@@ -84,38 +84,6 @@ def reduce(
 ) -> Reduced:  # fmt: skip
     """Reduce a recording to steady points.
 
-    Parameters
-    ----------
-    imported : Imported, or sequence of Imported
-        One recording, or runs of one stand in the order in which they were made.
-    diameter_m : float or None
-        Diameter [m]; None takes that of the recording, if it states one.
-    chord75_m : float or None
-        Chord at 0.75 R [m], for the Reynolds number.
-    air : Air or None
-        Air state for a recording that tells none.
-    isa_altitude_m : float or None
-        Declares the standard atmosphere at this altitude [m] for a recording that tells no air; points are flagged.
-    tare : Imported, False or None
-        Run without propeller to subtract at equal speed; False subtracts nothing; None subtracts what rows at rest
-        show, where there are any.
-    steady : bool or None
-        True: rows are points; False: samples; None decides (:mod:`bemt.recordings.rows`).
-    speed : str or None
-        Channel that is the speed of the rotor (``optical_rpm``, ``electrical_rpm``); None decides.
-    settings : PlateauSettings or None
-        Rules of the plateau search.
-
-    Returns
-    -------
-    Reduced
-        With one point or more.
-
-    Raises
-    ------
-    InputError
-        When no point is left, or the recording cannot be cut.
-
     Examples
     --------
     >>> from bemt.readers._imported import Channel

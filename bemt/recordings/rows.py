@@ -34,18 +34,7 @@ IDLE_S = 1.0005e-3
 
 
 def command_of(rec: Recorded) -> tuple[str, Array] | None:
-    """Find the command.
-
-    Parameters
-    ----------
-    rec : Recorded
-        One recording.
-
-    Returns
-    -------
-    (name, values) or None
-        ``pwm_s`` [s] before ``throttle`` [1]; None when there is none.
-    """
+    """Find the command."""
     for name in ("pwm_s", "throttle"):
         v = rec.values.get(name)
         if v is not None and np.any(np.isfinite(v)):
@@ -73,20 +62,7 @@ def _unlike(rec: Recorded) -> bool:
 
 
 def is_samples(rec: Recorded) -> tuple[bool, str]:
-    """Decide what the rows are.
-
-    Parameters
-    ----------
-    rec : Recorded
-        One recording.
-
-    Returns
-    -------
-    samples : bool
-        True: rows follow each other in time and have to be averaged.
-    reason : str
-        Why, in words.
-    """
+    """Decide what the rows are."""
     if rec.u:
         return False, "rows are points: they have uncertainties of their own"
     if len(rec) < FEWEST:
@@ -112,18 +88,7 @@ def is_samples(rec: Recorded) -> tuple[bool, str]:
 
 
 def at_rest(rec: Recorded) -> NDArray[np.bool_]:
-    """Rows at which nothing turns, (N,).
-
-    Parameters
-    ----------
-    rec : Recorded
-        One recording.
-
-    Returns
-    -------
-    (N,) bool
-        True at rest.
-    """
+    """Rows at which nothing turns, (N,)."""
     n = len(rec)
     found = command_of(rec)
     idle = np.zeros(n, dtype=bool)

@@ -62,20 +62,6 @@ def _scaled(load: Array, rpm: Array) -> Array:
 def repeats(load: Array, rpm: Array, group: Array, flow: Array | None = None) -> Repeats:
     """Scatter among points of one speed (and advance) within one run.
 
-    Parameters
-    ----------
-    load, rpm : (N,) float
-        Load [N or N m], speed [rev/min].
-    group : (N,) float
-        Run; points of different runs are no repeats. [-]
-    flow : (N,) float or None
-        Airspeed over speed, or None at rest. [any]
-
-    Returns
-    -------
-    Repeats
-        NaN scatter without repeats.
-
     Examples
     --------
     >>> rng = np.random.default_rng(0)
@@ -123,19 +109,6 @@ def _same(flow: Array | None, i: int | np.intp, j: int | np.intp) -> bool:
 
 def session(load: Array, rpm: Array, run: Array, flow: Array | None = None) -> Session:
     """Scatter between runs of the same conditions: what a gain or a set-up changes from run to run.
-
-    Parameters
-    ----------
-    load, rpm, run : (N,) float
-        Load, speed [rev/min], run.
-    flow : (N,) float or None
-        Airspeed over speed; points compare only where it is equal. [any]
-
-    Returns
-    -------
-    Session
-        Standard deviation of the runs' mean log load / rpm^2 at common speeds, less the scatter of their points;
-        NaN when runs do not overlap.
 
     Notes
     -----
@@ -189,20 +162,6 @@ def _differences(k: Array, rpm: Array, one: Array, two: Array, flow: Array | Non
 
 def hysteresis(load: Array, x: Array, up: Mask, down: Mask, power: float = 2.0) -> Hysteresis | None:
     """Compare the branch reached from above with the one reached from below.
-
-    Parameters
-    ----------
-    load, x : (N,) float
-        Load [N or N m]; speed [rev/min] or command [any].
-    up, down : (N,) bool
-        Points of the two branches.
-    power : float
-        Exponent by which the load goes with `x` (2 for speeds, 0 for commands). [1]
-
-    Returns
-    -------
-    Hysteresis or None
-        None when fewer than three points of a branch overlap the other over a third of the range.
 
     Examples
     --------

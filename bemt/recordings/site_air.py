@@ -36,26 +36,7 @@ class AirOfPoints:
 def air_of(
     values: Mapping[str, Array], n: int, constants: Mapping[str, float], air: Air | None, isa_altitude_m: float | None
 ) -> AirOfPoints:
-    """Find the air of every point.
-
-    Parameters
-    ----------
-    values : mapping of str to (N,) float
-        Channels of the points, ``humidity`` as a fraction.
-    n : int
-        Points.
-    constants : mapping of str to float
-        ``density_kg_m3``, ``temperature_K`` of the whole recording.
-    air : Air or None
-        Declared by the caller.
-    isa_altitude_m : float or None
-        Altitude at which the standard atmosphere is declared. [m]
-
-    Returns
-    -------
-    AirOfPoints
-        NaN where nothing is known.
-    """
+    """Find the air of every point."""
     nan = np.full(n, np.nan)
     temperature = values.get("temperature_K", np.full(n, constants.get("temperature_K", np.nan)))
     notes: list[str] = []

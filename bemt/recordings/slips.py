@@ -116,11 +116,6 @@ def _both_ways(id_: str, q: str, table: Mapping[str, tuple[float, float]]) -> li
 def slips() -> tuple[Slip, ...]:
     """List the usual slips.
 
-    Returns
-    -------
-    tuple of Slip
-        Both directions of each.
-
     Examples
     --------
     >>> next(s.words for s in slips() if s.quantity == "T")
@@ -189,18 +184,7 @@ def _quantities(facts: Facts) -> dict[str, Array]:
 
 
 def relations(facts: Facts) -> list[Relation]:
-    """Relations that the recorded channels allow.
-
-    Parameters
-    ----------
-    facts : Facts
-        Of a recording.
-
-    Returns
-    -------
-    list of Relation
-        With their values; only those with three rows under load or more.
-    """
+    """Relations that the recorded channels allow."""
     q = _quantities(facts)
     out: list[Relation] = []
     rho = facts.rho
@@ -311,18 +295,7 @@ def _told(q: str, facts: Facts) -> str:
 
 @check_for("slips")
 def find_slips(facts: Facts) -> Iterator[Finding]:
-    """Name the slip of a unit that repairs what does not fit together.
-
-    Parameters
-    ----------
-    facts : Facts
-        Of a recording.
-
-    Yields
-    ------
-    Finding
-        One, or none when everything fits or nothing can be known.
-    """
+    """Name the slip of a unit that repairs what does not fit together."""
     known = relations(facts) if not facts.bare else []
     broken = [r for r in known if r.broken]
     share = _electrical(facts, broken) if not facts.bare else None

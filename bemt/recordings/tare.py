@@ -41,21 +41,6 @@ class Zero:
 def from_rest(when: Array, rests: Sequence[Rest], full_scale: Mapping[str, float]) -> Zero:
     """Zero of every point from the stretches at rest, linear in time between them and held outside.
 
-    Parameters
-    ----------
-    when : (N,) float
-        Times of the points, or their rows. [s]
-    rests : sequence of Rest
-        One or more.
-    full_scale : mapping of str to float
-        Largest magnitude of each channel, for the words. [N or N m]
-
-    Returns
-    -------
-    Zero
-        Its uncertainty is the standard error at rest and, for the drift, a twelfth of its square (linear drift is a
-        model, not a fact).
-
     Examples
     --------
     >>> rests = [Rest(0.0, {"thrust_N": 0.1}, {}), Rest(10.0, {"thrust_N": 0.3}, {})]
@@ -96,24 +81,7 @@ def from_rest(when: Array, rests: Sequence[Rest], full_scale: Mapping[str, float
 def from_table(
     rpm: Array, table_rpm: Array, table: Mapping[str, Array], u_table: Mapping[str, Array] | None = None
 ) -> Zero:
-    """Zero of every point from a run without propeller, linear in speed and held outside its range.
-
-    Parameters
-    ----------
-    rpm : (N,) float
-        Speeds of the points. [rev/min]
-    table_rpm : (M,) float
-        Speeds of the run without propeller. [rev/min]
-    table : mapping of str to (M,) float
-        Its loads.
-    u_table : mapping of str to (M,) float or None
-        Their standard uncertainties.
-
-    Returns
-    -------
-    Zero
-        Uncertainty: that of the table, else the spread of the table about its mean.
-    """
+    """Zero of every point from a run without propeller, linear in speed and held outside its range."""
     value: dict[str, Array] = {}
     u: dict[str, float] = {}
     notes = []

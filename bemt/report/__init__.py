@@ -19,18 +19,7 @@ HTML_NAME, MARKDOWN_NAME = "report.html", "report.md"
 
 
 def book_html(book: Mapping[str, Any]) -> str:
-    """Write the HTML of a report.
-
-    Parameters
-    ----------
-    book : mapping
-        From :func:`bemt.report.gather.gather`.
-
-    Returns
-    -------
-    str
-        The whole file.
-    """
+    """Write the HTML of a report."""
     from bemt.report.case_page import case_page, reproduction_table
     from bemt.report.cfd_page import cfd_page
     from bemt.report.diagnosis_block import diagnosis_parts

@@ -17,18 +17,7 @@ def _share(value: Any) -> str:
 
 
 def audit_table(audit: Mapping[str, Any]) -> str:
-    """Make the table of one audit.
-
-    Parameters
-    ----------
-    audit : mapping
-        As :func:`bemt.recordings.audit.audit_document` makes it.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """Make the table of one audit."""
     rows = []
     for line in audit["lines"]:
         u = line["u_relative"]
@@ -53,16 +42,5 @@ def audit_table(audit: Mapping[str, Any]) -> str:
 
 
 def audit_block(audits: Sequence[Mapping[str, Any]]) -> str:
-    """Make the section of the audits of a case.
-
-    Parameters
-    ----------
-    audits : sequence of mapping
-        As a sweep gives them.
-
-    Returns
-    -------
-    str
-        HTML; empty without audits.
-    """
+    """Make the section of the audits of a case."""
     return section("Audit of the CFD", *(audit_table(audit) for audit in audits))

@@ -310,18 +310,7 @@ def _quantity(c: Mapping[str, Any]) -> str:
 
 
 def reproduction_table(items: Sequence[Mapping[str, Any]]) -> str:
-    """Make the table of numbers of the thesis beside ours.
-
-    Parameters
-    ----------
-    items : sequence of mapping
-        From :mod:`bemt.compare.reproduce`.
-
-    Returns
-    -------
-    str
-        HTML; empty without items.
-    """
+    """Make the table of numbers of the thesis beside ours."""
     rows = []
     for item in items:
         status = str(item["status"])
@@ -378,20 +367,7 @@ def _limits(page: Mapping[str, Any]) -> str:
 
 
 def case_page(page: Mapping[str, Any], reproduction: Sequence[Mapping[str, Any]]) -> str:
-    """Write the page of one case.
-
-    Parameters
-    ----------
-    page : mapping
-        As :func:`bemt.report.gather.gather` makes it.
-    reproduction : sequence of mapping
-        All numbers of the thesis; those of this case are shown.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """Write the page of one case."""
     result = page["result"]
     kind, word, sentence = verdict(result)
     head = f"<h2>{esc(headline(result))}</h2><p>{badge(kind, word)} {esc(sentence)}</p>"

@@ -47,19 +47,7 @@ def _value(text: str | None) -> float:
 
 
 def cfd_runs(out: Path) -> list[dict[str, Any]]:
-    """Read the recordings of CFD campaigns.
-
-    Parameters
-    ----------
-    out : Path
-        Folder of the results; ``cfd/*/manifest.json`` with a ``recording.csv`` beside it are read.
-
-    Returns
-    -------
-    list of dict
-        ``name``, ``title``, ``case``, ``manifest``, ``runs``, ``radial`` (run to radius [m], dT/dr [N/m] and dQ/dr
-        [N]), ``figures``. A run holds the columns of the recording, numbers as float with NaN where there is none.
-    """
+    """Read the recordings of CFD campaigns."""
     found = []
     for path in sorted(out.glob("cfd/*/manifest.json")):
         manifest = read_json(path)
@@ -83,38 +71,14 @@ def cfd_runs(out: Path) -> list[dict[str, Any]]:
 
 
 def is_plain(run: Mapping[str, Any]) -> bool:
-    """Tell whether a run is the bare case: free domain, axial flow, no plate, blades as they are, settled.
-
-    Parameters
-    ----------
-    run : mapping
-        From :func:`cfd_runs`.
-
-    Returns
-    -------
-    bool
-        True for such a run.
-    """
+    """Tell whether a run is the bare case: free domain, axial flow, no plate, blades as they are, settled."""
     apart = [run["sideslip_deg"], run["pitch_offset_deg"]]
     return (run["domain"] == "free" and run["converged"] == 1 and math.isnan(run["wall_distance_m"])
             and all(not abs(v) > 1e-9 for v in apart))  # fmt: skip
 
 
 def operating_run(found: Sequence[Mapping[str, Any]], result: Mapping[str, Any]) -> dict[str, Any] | None:
-    """Choose the run that stands for a case at its operating point: compressible before not, then the finest grid.
-
-    Parameters
-    ----------
-    found : sequence of mapping
-        From :func:`cfd_runs`.
-    result : mapping
-        Result of the case.
-
-    Returns
-    -------
-    dict or None
-        The run, with ``campaign``; None when there is none.
-    """
+    """Choose the run that stands for a case at its operating point: compressible before not, then the finest grid."""
     c = result.get("conditions")
     if not c:
         return None
@@ -135,20 +99,7 @@ def operating_run(found: Sequence[Mapping[str, Any]], result: Mapping[str, Any])
 
 
 def radial_of(found: Sequence[Mapping[str, Any]], run: Mapping[str, Any]) -> list[tuple[float, float, float]]:
-    """Loads along the radius of a run, ascending.
-
-    Parameters
-    ----------
-    found : sequence of mapping
-        From :func:`cfd_runs`.
-    run : mapping
-        A run.
-
-    Returns
-    -------
-    list of (float, float, float)
-        Radius [m], dT/dr [N/m], dQ/dr [N]; empty when nothing was recorded.
-    """
+    """Loads along the radius of a run, ascending."""
     return next((sorted(item["radial"][run["run"]]) for item in found if run["run"] in item["radial"]), [])
 
 
@@ -209,11 +160,6 @@ def _plain_rows(found: Sequence[Mapping[str, Any]], result: Mapping[str, Any]) -
 
 def attach(book: dict[str, Any]) -> None:
     """Audit every run, and compare the run at a case's operating point with its BEMT.
-
-    Parameters
-    ----------
-    book : dict
-        From :func:`bemt.report.gather.gather`; runs get ``audit``, pages get ``own_cfd``, their results a comparison.
 
     Notes
     -----

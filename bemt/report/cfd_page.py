@@ -66,18 +66,7 @@ def _runs_table(item: Mapping[str, Any]) -> str:
 
 
 def cfd_page(found: Sequence[Mapping[str, Any]]) -> str:
-    """Write the page of this project's own CFD.
-
-    Parameters
-    ----------
-    found : sequence of mapping
-        From :func:`bemt.report.cfd.cfd_runs`, audited.
-
-    Returns
-    -------
-    str
-        HTML; empty when there is none.
-    """
+    """Write the page of this project's own CFD."""
     if not found:
         return ""
     words = ("<h2>Own CFD</h2><p>OpenFOAM runs on the solids of the cases: rotating frame, wall functions, forces "

@@ -27,20 +27,7 @@ CHANNELS = ("CT", "CP", "eta", "thrust_N", "torque_Nm", "power_W")
 
 
 def geometry_curves(case: Case, n: int = 41) -> dict[str, Any]:
-    """Chord, blade angle and thickness over the radius.
-
-    Parameters
-    ----------
-    case : Case
-        The case.
-    n : int
-        Points.
-
-    Returns
-    -------
-    dict
-        ``r_over_R``, ``chord_over_R`` [1], ``beta_deg`` [deg], ``thickness`` [of the chord], ``chord_mm`` [mm].
-    """
+    """Chord, blade angle and thickness over the radius."""
     rotor = case.rotor()
     blade = rotor.blade
     r = np.linspace(blade.Rhub, blade.R, n)
@@ -69,21 +56,7 @@ def _grids(case: Case, pitch_over_D: float) -> tuple[Array, Array, int]:
 
 
 def case_curves(case: Case, threads: int = 1) -> dict[str, Any]:
-    """Performance over J and over rpm, BEMT with bands and K1/K2.
-
-    Parameters
-    ----------
-    case : Case
-        The case.
-    threads : int
-        Threads of the solver.
-
-    Returns
-    -------
-    dict
-        ``over_J`` and ``over_rpm``, each with the abscissa, the channels of BEMT, ``u_`` of each, the K1/K2 values and
-        the tip Mach number, arrays with NaN where not converged.
-    """
+    """Performance over J and over rpm, BEMT with bands and K1/K2."""
     from bemt.case.prepare import k1k2_case, prepare_case
     from bemt.compare.sweep.case import spread
 
@@ -132,19 +105,7 @@ def _until_windmill(CT: Array) -> int:
 
 
 def radial_curves(case: Case) -> dict[str, Any]:
-    """Loading along the blade at the case's own operating point.
-
-    Parameters
-    ----------
-    case : Case
-        The case.
-
-    Returns
-    -------
-    dict
-        ``r_over_R`` [1], ``dT_dr`` [N/m] and ``dQ_dr`` [N] of all blades, ``alpha_deg`` [deg], ``cl`` [1], ``M`` [1],
-        ``Re`` [1].
-    """
+    """Loading along the blade at the case's own operating point."""
     from bemt.bem import solver
     from bemt.case.prepare import prepare_case
 
@@ -165,19 +126,7 @@ def radial_curves(case: Case) -> dict[str, Any]:
 
 
 def refinement(case: Case) -> dict[str, Any]:
-    """Thrust and torque against the number of blade elements.
-
-    Parameters
-    ----------
-    case : Case
-        The case.
-
-    Returns
-    -------
-    dict
-        ``stations`` (ascending), ``thrust_N`` [N], ``torque_Nm`` [N m], and ``grid_study`` of the thrust on the three
-        finest as :class:`bemt.recordings.grid_study.GridStudy` has it, or None.
-    """
+    """Thrust and torque against the number of blade elements."""
     from bemt.case.prepare import prepare_case
     from bemt.recordings.grid_study import grid_study
 

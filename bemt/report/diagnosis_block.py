@@ -44,38 +44,14 @@ def _parameters(value: Any) -> str:
 
 
 def figure_of(name: str, data: bytes) -> str:
-    """Show a picture with its file name in words below.
-
-    Parameters
-    ----------
-    name : str
-        File name, ending in png or svg.
-    data : bytes
-        Content.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """Show a picture with its file name in words below."""
     words = name.rpartition(".")[0].replace("_", " ")
     picture = image(data, words, "png" if name.endswith(".png") else "svg+xml")
     return f'<figure class="picture">{picture}<figcaption>{esc(words)}</figcaption></figure>'
 
 
 def diagnosis_parts(item: Mapping[str, Any]) -> str:
-    """Write one diagnosis.
-
-    Parameters
-    ----------
-    item : mapping
-        ``document`` (the JSON) and ``figures`` (name and content).
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """Write one diagnosis."""
     d = _mapping(item.get("document"))
     verdict = str(d.get("verdict") or "unknown")
     effects = ", ".join(str(e) for e in _list(d.get("effects")))
@@ -132,16 +108,5 @@ def diagnosis_parts(item: Mapping[str, Any]) -> str:
 
 
 def diagnosis_block(item: Mapping[str, Any] | None) -> str:
-    """Write the diagnosis of a case.
-
-    Parameters
-    ----------
-    item : mapping or None
-        From :func:`bemt.report.gather.attach_diagnoses`; None when there is none.
-
-    Returns
-    -------
-    str
-        HTML; empty when there is none.
-    """
+    """Write the diagnosis of a case."""
     return "" if not item else section("Diagnosis: what physics was left out", diagnosis_parts(item))

@@ -26,13 +26,7 @@ KINDS = {
 
 
 def document() -> dict[str, Any]:
-    """Give all effects, as ``--json`` prints them.
-
-    Returns
-    -------
-    dict
-        ``schema`` and ``effects``, in the order of kind and id.
-    """
+    """Give all effects, as ``--json`` prints them."""
     order = list(KINDS)
     known = sorted(catalogue().values(), key=lambda cls: (order.index(cls.kind), cls.id))
     return {"schema": SCHEMA, "effects": [_entry(cls) for cls in known]}
@@ -71,13 +65,7 @@ def _range(p: dict[str, Any]) -> str:
 
 
 def text() -> str:
-    """Give all effects as a table for a terminal.
-
-    Returns
-    -------
-    str
-        One line per effect, its parameters below it.
-    """
+    """Give all effects as a table for a terminal."""
     lines = []
     for kind, head in KINDS.items():
         rows = []
@@ -95,18 +83,7 @@ def text() -> str:
 
 
 def markdown(only: Container[str] | None = None) -> str:
-    """Give effects as the page docs/effects.md.
-
-    Parameters
-    ----------
-    only : container of str, optional
-        Effects to show; all by default.
-
-    Returns
-    -------
-    str
-        Markdown, ends with a newline.
-    """
+    """Give effects as the page docs/effects.md."""
     found = [e for e in document()["effects"] if only is None or e["id"] in only]
     lines = [
         "# Effects", "",

@@ -16,18 +16,7 @@ _FIGURE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,80}\.(png|svg)")
 
 
 def read_json(path: Path) -> Any:
-    """Read a JSON file that somebody else wrote.
-
-    Parameters
-    ----------
-    path : Path
-        File.
-
-    Returns
-    -------
-    object
-        Its content; None when it is not there, too large or no JSON.
-    """
+    """Read a JSON file that somebody else wrote."""
     try:
         if path.stat().st_size > JSON_BYTES:
             return None
@@ -40,16 +29,6 @@ def safe_files(folder: Path) -> list[tuple[str, bytes]]:
     """Figures in a folder: plain names, no links, PNG or SVG by content, of a moderate size.
 
     Of two pictures with one stem the smaller is taken.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder; nothing outside of it is read.
-
-    Returns
-    -------
-    list of (str, bytes)
-        Name and content, by name.
     """
     found: dict[str, tuple[str, bytes]] = {}
     for path in sorted(folder.glob("*")):

@@ -166,36 +166,12 @@ def _comparison_table(book: Mapping[str, Any], ids: Mapping[int, str]) -> str:
 
 
 def badge_cell(kind: str, words: str) -> Cell:
-    """Make a cell of a badge.
-
-    Parameters
-    ----------
-    kind, words : str
-        As :func:`bemt.report.markup.badge` takes them.
-
-    Returns
-    -------
-    Cell
-        For a table.
-    """
+    """Make a cell of a badge."""
     return Cell(words, markup=badge(kind, words))
 
 
 def front_page(book: Mapping[str, Any], ids: Mapping[int, str]) -> str:
-    """Write the front page.
-
-    Parameters
-    ----------
-    book : mapping
-        From :func:`bemt.report.gather.gather`.
-    ids : mapping of int to str
-        Address of each case's page.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """Write the front page."""
     plot = _comparison_plot(book)
     return "".join(
         [

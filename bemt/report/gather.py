@@ -27,27 +27,7 @@ ALL_BYTES = 4_000_000
 
 
 def gather(paths: Sequence[str | Path], out: Path, progress: Progress | None = None) -> dict[str, Any]:
-    """Solve the cases (or take up the results of a sweep in `out`) and compute what the report plots.
-
-    Parameters
-    ----------
-    paths : sequence of str or Path
-        Case files, or folders of cases.
-    out : Path
-        Folder of the results.
-    progress : callable, optional
-        Called with a line of text.
-
-    Returns
-    -------
-    dict
-        ``version``, ``cases``, ``trends``, ``reproduction``, ``diagnoses``, ``cfd``, ``exit_code``.
-
-    Raises
-    ------
-    InputError
-        When a path holds no case.
-    """
+    """Solve the cases (or take up the results of a sweep in `out`) and compute what the report plots."""
     from bemt.compare.sweep import sweep
 
     tell = progress or (lambda line: None)
@@ -149,15 +129,7 @@ def _reproduction() -> list[dict[str, Any]]:
 
 
 def attach_diagnoses(book: dict[str, Any], out: Path) -> None:
-    """Put diagnoses found in the folder of results to their cases, the others on a page of their own.
-
-    Parameters
-    ----------
-    book : dict
-        From :func:`gather`; changed.
-    out : Path
-        Folder of the results.
-    """
+    """Put diagnoses found in the folder of results to their cases, the others on a page of their own."""
     others, room = [], ALL_BYTES
     named = {page["result"]["name"]: page for page in book["cases"]}
     files = [*sorted(out.glob("*/diagnosis/diagnosis.json")), *sorted(out.glob("diagnosis/*/diagnosis.json"))]

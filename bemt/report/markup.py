@@ -23,16 +23,6 @@ LONG = 600
 def esc(value: Any) -> str:
     """Escape a text for HTML, in elements and in attributes.
 
-    Parameters
-    ----------
-    value : object
-        Any value; None is empty.
-
-    Returns
-    -------
-    str
-        Safe text, without control characters.
-
     Examples
     --------
     >>> esc("<script>alert('1')</script>")
@@ -76,24 +66,7 @@ class Cell:
 
 
 def num(value: Any, digits: int = 4, signed: bool = False, none: str = "-") -> Cell:
-    """Make a cell of a number.
-
-    Parameters
-    ----------
-    value : float or None
-        The number, in the unit of its column; None and NaN show as `none`.
-    digits : int
-        Significant digits.
-    signed : bool
-        One decimal and a sign, as for percentages.
-    none : str
-        Shown when there is no number.
-
-    Returns
-    -------
-    Cell
-        For :func:`table`.
-    """
+    """Make a cell of a number."""
     good = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
     if not good:
         return Cell(none, None, True)
@@ -103,20 +76,7 @@ def num(value: Any, digits: int = 4, signed: bool = False, none: str = "-") -> C
 
 
 def badge(kind: str, words: str) -> str:
-    """Make a short coloured word; the colour says nothing that the word does not.
-
-    Parameters
-    ----------
-    kind : str
-        ``same``, ``differs``, ``unknown``, ``fine``, ``doubtful`` or ``fault``.
-    words : str
-        The word.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """Make a short coloured word; the colour says nothing that the word does not."""
     size = " wrap" if len(words) > 24 else ""
     return f'<span class="badge {esc(kind)}{size}">{esc(words)}</span>'
 
@@ -126,22 +86,7 @@ def _long(text: str) -> str:
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[object]], sortable: bool = True) -> str:
-    """Make a table; a heading sorts it.
-
-    Parameters
-    ----------
-    header : sequence of str
-        Column names with their units.
-    rows : iterable of sequences
-        Cells, or plain texts.
-    sortable : bool
-        Whether headings are buttons.
-
-    Returns
-    -------
-    str
-        HTML; empty without rows.
-    """
+    """Make a table; a heading sorts it."""
     body = [[cell if isinstance(cell, Cell) else Cell(str(cell)) for cell in row] for row in rows]
     if not body:
         return ""
@@ -171,62 +116,19 @@ def table(header: Sequence[str], rows: Iterable[Sequence[object]], sortable: boo
 
 
 def section(title: str, *parts: str) -> str:
-    """Join parts under a heading.
-
-    Parameters
-    ----------
-    title : str
-        Heading, not yet escaped.
-    *parts : str
-        HTML.
-
-    Returns
-    -------
-    str
-        HTML; empty when all parts are, so that no empty panel is ever shown.
-    """
+    """Join parts under a heading."""
     inside = "".join(parts)
     return f"<h3>{esc(title)}</h3>{inside}" if inside else ""
 
 
 def image(data: bytes, alt: str, kind: str = "png") -> str:
-    """Embed a picture.
-
-    Parameters
-    ----------
-    data : bytes
-        The file.
-    alt : str
-        What it shows.
-    kind : str
-        ``png`` or ``svg+xml``; an SVG inside ``img`` runs no script.
-
-    Returns
-    -------
-    str
-        ``<img>`` with a data address.
-    """
+    """Embed a picture."""
     assert kind in ("png", "svg+xml")
     return f'<img alt="{esc(alt)}" src="data:image/{kind};base64,{base64.b64encode(data).decode()}">'
 
 
 def document(title: str, lead: str, pages: Sequence[tuple[str, str, str]], foot: str) -> str:
-    """Put pages into one self-contained file.
-
-    Parameters
-    ----------
-    title, lead : str
-        Texts, not yet escaped.
-    pages : sequence of (id, name, HTML)
-        Pages in the order of the menu.
-    foot : str
-        Text, not yet escaped.
-
-    Returns
-    -------
-    str
-        HTML whose policy lets nothing be loaded and no script run but its own, by hash.
-    """
+    """Put pages into one self-contained file."""
     here = Path(__file__).parent
     css = (here / "page.css").read_text(encoding="utf-8")
     js = (here / "page.js").read_text(encoding="utf-8")

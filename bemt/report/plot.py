@@ -148,18 +148,6 @@ def _number(value: Any) -> float:
 def ticks(low: float, high: float, n: int = 6) -> list[float]:
     """Round numbers between two ends.
 
-    Parameters
-    ----------
-    low, high : float
-        Ends, in the unit of the axis.
-    n : int
-        About how many.
-
-    Returns
-    -------
-    list of float
-        Ascending, same unit.
-
     Examples
     --------
     >>> ticks(0.0, 1.0)
@@ -363,17 +351,6 @@ def _key(i: int, trace: Trace) -> str:
 
 def figure(plot: Plot) -> str:
     """Draw a plot.
-
-    Parameters
-    ----------
-    plot : Plot
-        What to draw.
-
-    Returns
-    -------
-    str
-        ``<figure>`` with SVG, key and a table of the values; empty when no trace has a finite point, so that no empty
-        panel is ever shown.
 
     Examples
     --------

@@ -16,18 +16,6 @@ __all__ = ["plain_markdown", "summary"]
 def plain_markdown(value: Any, limit: int = 500) -> str:
     r"""Make a text that Markdown shows as it is, on one line.
 
-    Parameters
-    ----------
-    value : object
-        Any text.
-    limit : int
-        Characters kept.
-
-    Returns
-    -------
-    str
-        Without markup of Markdown or HTML.
-
     Examples
     --------
     >>> plain_markdown("a|b <script> [x](y)")
@@ -45,18 +33,7 @@ def _n(value: Any, digits: int = 4) -> str:
 
 
 def summary(book: Mapping[str, Any]) -> str:
-    """Write the summary.
-
-    Parameters
-    ----------
-    book : mapping
-        From :func:`bemt.report.gather.gather`.
-
-    Returns
-    -------
-    str
-        Markdown.
-    """
+    """Write the summary."""
     out = ["# Validation report", "", f"bemt {plain_markdown(book['version'])}. Figures and tables: `report.html`.", ""]
     out += [
         "| case | BEMT T [N] | u [N] | K1/K2 T [N] | CFD T [N] | bench T [N] | vendor T [N] | verdict |",

@@ -254,18 +254,7 @@ def _moments(d: Mapping[str, Any]) -> str:
 
 
 def trend_page(book: Mapping[str, Any]) -> str:
-    """Write the trend page.
-
-    Parameters
-    ----------
-    book : mapping
-        From :func:`bemt.report.gather.gather`.
-
-    Returns
-    -------
-    str
-        HTML; empty when nothing was solved.
-    """
+    """Write the trend page."""
     results = [page["result"] for page in book["cases"]]
     t = book["trends"]
     inner = _families(t["family"], results) + _choice(t["choice"]) + _moments(t["moments"])

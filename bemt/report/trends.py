@@ -51,19 +51,7 @@ def _line(case: Case, key: str, values: Array) -> dict[str, Any]:
 
 
 def families(case: Case) -> dict[str, Any]:
-    """Vary diameter, pitch and rpm of one propeller.
-
-    Parameters
-    ----------
-    case : Case
-        A propeller.
-
-    Returns
-    -------
-    dict
-        ``name``, and ``diameter``, ``pitch``, ``rpm`` with their abscissa (``diameter_in``, ``pitch_in`` [in], ``rpm``
-        [rev/min]), ``thrust_N``, ``k1k2_thrust_N`` [N], ``M_tip`` [1], ``power_W`` [W]; NaN where there is no answer.
-    """
+    """Vary diameter, pitch and rpm of one propeller."""
     from bemt.case.prepare import k1k2_case, prepare_case
 
     ready = prepare_case(case)
@@ -96,20 +84,7 @@ def families(case: Case) -> dict[str, Any]:
 
 
 def choice(results: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Compare drives on the robot by thrust over weight.
-
-    Parameters
-    ----------
-    results : sequence of mapping
-        Results of the cases.
-
-    Returns
-    -------
-    list of dict
-        Per solved case: ``thrust_N``, ``u`` [N], ``power_W`` [W], ``disk_loading`` [N/m2], ``g_per_W`` [gf/W],
-        ``robot_ratio`` and ``u_ratio`` (thrust of two over the robot's weight) [1], ``needed`` (drives for the wanted
-        6 kgf), ``rows`` of the recorded thrusts as (label, source, ratio).
-    """
+    """Compare drives on the robot by thrust over weight."""
     weight = ROBOT["mass_kg"] * G0
     out = []
     for result in results:
@@ -142,18 +117,7 @@ def choice(results: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 
 def moments(results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Roll moment of one drive of a pair about the middle, over its mounting distance.
-
-    Parameters
-    ----------
-    results : sequence of mapping
-        Results of the cases; the first with a duct is taken, else the first solved.
-
-    Returns
-    -------
-    dict
-        ``name``, ``distance_m`` [m], ``lines``: (label, source, thrust [N], standard uncertainty [N]).
-    """
+    """Roll moment of one drive of a pair about the middle, over its mounting distance."""
     solved = [r for r in results if r.get("rows")]
     chosen = next((r for r in solved if r.get("kind") == "fan"), solved[0] if solved else None)
     if chosen is None:

@@ -23,35 +23,12 @@ def _known(value: Any) -> bool:
 
 
 def recorded(result: Mapping[str, Any], source: str) -> list[Mapping[str, Any]]:
-    """Rows of one source.
-
-    Parameters
-    ----------
-    result : mapping
-        Result of a case, as a sweep gives it.
-    source : str
-        Such as ``cfd``.
-
-    Returns
-    -------
-    list of mapping
-        Rows in their order.
-    """
+    """Rows of one source."""
     return [row for row in result.get("rows", []) if row.get("source") == source]
 
 
 def verdict(result: Mapping[str, Any]) -> tuple[str, str, str]:
     """Say in a sentence how BEMT and the recordings of a case stand.
-
-    Parameters
-    ----------
-    result : mapping
-        Result of a case.
-
-    Returns
-    -------
-    tuple of str
-        Kind (``same``, ``differs``, ``unknown``, ``fault``), a word or two, and the sentence.
 
     Examples
     --------
@@ -176,18 +153,7 @@ def _needed(lines: Sequence[Mapping[str, Any]]) -> str:
 
 
 def headline(result: Mapping[str, Any]) -> str:
-    """Name a case for people.
-
-    Parameters
-    ----------
-    result : mapping
-        Result of a case.
-
-    Returns
-    -------
-    str
-        Its title, else its name, cut to one line.
-    """
+    """Name a case for people."""
     words = str(result.get("title") or result.get("name") or "case").split()
     text = " ".join(words)
     return text if len(text) <= 140 else text[:139] + "…"

@@ -53,27 +53,7 @@ def extend(
     half: float = 0.0, method: str = "viterna",
 ) -> tuple[Array, Array]:  # fmt: skip
     """One section's cl and cd continued to +-pi: data between lo and hi, Viterna-Corrigan and reversed flow outside.
-
-    Parameters
-    ----------
-    alpha, cl, cd : (N,) float
-        Data, ascending in alpha, covering lo - half to hi + half. [rad], [-]
-    lo, hi : float
-        Matching angles, lo < 0 < hi < pi/2. [rad]
-    cd_max : float
-        Drag coefficient at 90 deg. [-]
-    out : (M,) float, optional
-        Angles wanted, within +-pi. [rad]
-    half : float, optional
-        Half-width of the smooth blend around lo and hi (the data are then needed there); 0 joins at the point. [rad]
-    method : {"viterna", "normal"}, optional
-        "normal" is Viterna-Corrigan with a suction force along the chord that fades past the stall, so that the drag
-        tends to cl tan(alpha) (separated flow: force normal to the chord).
-
-    Returns
-    -------
-    cl, cd : (M,) float
-        Continuous in alpha and across +-pi. [-]
+    [-]
 
     Notes
     -----
@@ -135,29 +115,7 @@ def from_tables(
     tables: Sequence[ExtrapolatedTable], *, name: str = "", source: str = "", ar: float = 10.0,
     cd_max: float | None = None, notes: Sequence[str] = (),
 ) -> Polar:  # fmt: skip
-    """Polar from single-Re tables, each continued to +-180 deg where its data stop.
-
-    Parameters
-    ----------
-    tables : sequence of ExtrapolatedTable
-        One per (Re, M); together they fill a rectangle of Re x M.
-    name, source : str, optional
-        Labels of the Polar.
-    ar, cd_max : float, optional
-        Blade aspect ratio; drag coefficient at 90 deg, by default 1.11 + 0.018 ar. [-]
-    notes : sequence of str, optional
-        Notes to begin with.
-
-    Returns
-    -------
-    Polar
-        On the union of all angles of the data and ALPHA_GRID.
-
-    Raises
-    ------
-    ValueError
-        When data are too short in alpha (they must hold 0 and reach 5 deg), disordered, or fill no rectangle.
-    """
+    """Polar from single-Re tables, each continued to +-180 deg where its data stop."""
     top = viterna_cd_max(ar) if cd_max is None else float(cd_max)
     re, mach = (np.unique([getattr(t, k) for t in tables]) for k in ("Re", "M"))
     if len(tables) != re.size * mach.size or len({(t.Re, t.M) for t in tables}) != len(tables):

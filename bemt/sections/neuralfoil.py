@@ -55,22 +55,7 @@ def _confident_range(alpha: Array, cl: Array, confidence: Array, past_stall: flo
 
 
 def neuralfoil_polar(airfoil: Airfoil, n_crit: float = rule.N_CRIT, drag_level: float = rule.DRAG_LEVEL) -> Polar:
-    """Section table of a propeller blade by the general rule of :mod:`bemt.sections.rule`.
-
-    Parameters
-    ----------
-    airfoil : geometry.airfoil.Airfoil
-        Section in Selig order, unit chord.
-    n_crit : float
-        Critical amplification factor at small Reynolds numbers [1].
-    drag_level : float
-        Factor on the drag of the smooth section at small Reynolds numbers [1].
-
-    Returns
-    -------
-    Polar
-        On the shared grids; from Re 6e5 on the table of the smooth section at n_crit 9.
-    """
+    """Section table of a propeller blade by the general rule of :mod:`bemt.sections.rule`."""
     small = tunnel_polar(airfoil, n_crit=n_crit, lift_floor=0.0)
     large = tunnel_polar(airfoil, n_crit=max(n_crit, rule.N_CRIT_LARGE))
     w = np.clip(np.log(DEFAULT_RE / rule.SMALL_RE) / np.log(2.0), 0.0, 1.0)[None, :, None]
@@ -87,40 +72,7 @@ def tunnel_polar(
     xtr_lower: float = 1.0, model: str = "xlarge", ar: float = 10.0, cd_max: float | None = None,
     method: str = "viterna", past_stall: float = np.pi, lift_floor: float = 0.5,
 ) -> Polar:  # fmt: skip
-    """Incompressible polar of a smooth section in a wind tunnel, continued to +-180 deg, cached on disk by content.
-
-    Parameters
-    ----------
-    airfoil : geometry.airfoil.Airfoil
-        Section in Selig order, unit chord.
-    re : (Nr,) float, optional
-        Chord Reynolds numbers, ascending. [-]
-    n_crit : float, optional
-        Critical amplification factor of transition (9: average wind tunnel; lower: more disturbed flow). [-]
-    xtr_upper, xtr_lower : float, optional
-        Forced transition as fraction of chord; 1 is free transition. [-]
-    model : str, optional
-        NeuralFoil network: "medium", "large", "xlarge", "xxlarge" or "xxxlarge".
-    ar : float, optional
-        Blade aspect ratio, for the drag at 90 deg. [-]
-    cd_max : float, optional
-        Drag coefficient at 90 deg; by default 1.11 + 0.018 ar. [-]
-    method : {"viterna", "normal"}, optional
-        Post-stall model, see `bemt.sections.extrapolation.extend`.
-    past_stall : float, optional
-        How far past its first stall NeuralFoil is used at most (20 deg of alpha and its confidence bound it too). [rad]
-    lift_floor : float, optional
-        Least share of the lift at Re 3e5, less 0.1 in cl, that lower Reynolds numbers keep; 0: no bound. [-]
-
-    Returns
-    -------
-    Polar
-        On ALPHA_GRID, re and M = [0]; compressibility belongs to `bemt.effects`.
-
-    Raises
-    ------
-    ValueError
-        For a method or a network that is not known, or Reynolds numbers that do not ascend from above 0.
+    """Incompressible polar of a smooth section in a wind tunnel, continued to +-180 deg, cached on disk by content. [0]
 
     Notes
     -----

@@ -138,20 +138,7 @@ def _solve(residual: Callable[[Array], Array], start: list[float], low: list[flo
 
 
 def fit_xrotor(polar: Polar, Re: float) -> XrotorSection:
-    """Fit a section of XROTOR to a table at one Reynolds number; least squares of cl, then of cd before stall.
-
-    Parameters
-    ----------
-    polar : Polar
-        Table; its lowest Mach number counts.
-    Re : float
-        Chord Reynolds number at which the section works [-].
-
-    Returns
-    -------
-    XrotorSection
-        With ``reref`` = `Re` and the exponent of the drag around it.
-    """
+    """Fit a section of XROTOR to a table at one Reynolds number; least squares of cl, then of cd before stall."""
     alpha, cl, below, above, low, high = _samples(polar, Re)
     slope, a0, up, down = _linear(polar, alpha, cl, Re)
     top, bottom = float(cl[up]), float(cl[down])
@@ -182,20 +169,7 @@ def fit_xrotor(polar: Polar, Re: float) -> XrotorSection:
 
 
 def fit_qprop(polar: Polar, Re: float) -> QpropSection:
-    """Fit a section of QPROP to a table at one Reynolds number.
-
-    Parameters
-    ----------
-    polar : Polar
-        Table; its lowest Mach number counts.
-    Re : float
-        Chord Reynolds number at which the section works [-].
-
-    Returns
-    -------
-    QpropSection
-        With ``reref`` = `Re` and the exponent of the drag around it.
-    """
+    """Fit a section of QPROP to a table at one Reynolds number."""
     alpha, cl, below, above, low, high = _samples(polar, Re)
     cd, _ = _power(below, above, low, high, Re)
     slope, a0, up, down = _linear(polar, alpha, cl, Re)

@@ -29,19 +29,7 @@ class RowLift(NamedTuple):
 
 
 def weinig_factor(solidity: Array, stagger: Array) -> Array:
-    """Lift-slope ratio of an infinite row of flat plates to a single one.
-
-    Parameters
-    ----------
-    solidity : (N,) float
-        Chord over spacing [1].
-    stagger : (N,) float
-        Angle between chord and the normal of the row (the rotor axis) [rad].
-
-    Returns
-    -------
-    (N,) float
-        K in cl = 2 pi K sin(alpha), alpha against the mean of the velocities before and behind the row [1].
+    """Lift-slope ratio of an infinite row of flat plates to a single one, (N,) [1].
 
     Notes
     -----
@@ -163,22 +151,6 @@ def _solve(shape: _Shape, solidity: float, stagger: float) -> RowLift:
 
 def row_lift(section: Airfoil, solidity: float, stagger: float) -> RowLift:
     """Lift of a section in a row, in potential flow.
-
-    Parameters
-    ----------
-    section : geometry.airfoil.Airfoil
-        Shape; an open trailing edge is closed.
-    solidity : float
-        Chord over spacing; 0 is the section alone [1].
-    stagger : float
-        Angle from the rotor axis to the chord, positive where the suction side looks upstream; negative is the row of
-        the section upside down, seen from below [rad].
-
-    Returns
-    -------
-    RowLift
-        ``slope`` over 2 pi [1] and zero-lift angle ``zero`` [rad], both against the mean of the velocities ahead and
-        behind.
 
     Notes
     -----

@@ -30,24 +30,7 @@ SCHEMA = "bemt.bench/1"
 
 
 def cpu_us(call: Callable[[], Any], points: int, repeats: int, seconds: float = 0.05) -> float:
-    """CPU time per point of a call, best of several repeats.
-
-    Parameters
-    ----------
-    call : callable
-        Without arguments; called once more beforehand, to find how often it fits into `seconds`.
-    points : int
-        Operating points in one call.
-    repeats : int
-        Repeats, the best of which counts.
-    seconds : float
-        Least CPU time of one repeat. [s]
-
-    Returns
-    -------
-    float
-        Time per point. [us]
-    """
+    """CPU time per point of a call, best of several repeats. [us]"""
     start = time.process_time()
     call()
     number = max(1, math.ceil(seconds / max(time.process_time() - start, 1e-6)))
@@ -61,24 +44,7 @@ def cpu_us(call: Callable[[], Any], points: int, repeats: int, seconds: float = 
 
 
 def measure(work: Work, quick: bool = False) -> dict[str, Any]:
-    """Time our solver on the work.
-
-    Parameters
-    ----------
-    work : Work
-        From `load`.
-    quick : bool
-        Fewer repeats.
-
-    Returns
-    -------
-    dict
-        ``us_per_point``: ``batch`` (one `solve` of all points), ``single_warm`` (`solve_point`, point after point),
-        ``single_cold`` (first `solve_point` of a freshly prepared rotor after the caches were swept, compilation
-        excluded), ``single_solve`` (`solve` with one point), ``batch_large`` (one `solve` of 1000 times the points; 100
-        when quick), ``standard`` (batch with all standard effects) [us]; ``CT``, ``CP``, ``J``, ``rpm`` and
-        ``converged`` of the work; ``prepare_ms`` and ``compile_s``.
-    """
+    """Time our solver on the work. [us]"""
     from bemt.bem import solver
 
     air = Air.from_density()
@@ -131,19 +97,7 @@ def _numbers(values: ArrayLike) -> list[float | None]:
 
 
 def ccblade(work: Work, quick: bool = False) -> dict[str, Any]:
-    """Time CCBlade of WISDEM on the work, if it is installed.
-
-    Parameters
-    ----------
-    work : Work
-        From `load`.
-    quick : bool
-        Fewer repeats.
-
-    Returns
-    -------
-    dict
-        ``us_per_point`` (None when absent) [us], ``note``, and ``CT``, ``CP`` when it ran.
+    """Time CCBlade of WISDEM on the work, if it is installed. [us]
 
     Notes
     -----
@@ -182,13 +136,7 @@ PEERS: dict[str, Callable[[Work, bool], dict[str, Any]]] = {"wisdem CCBlade": cc
 
 
 def machine() -> dict[str, Any]:
-    """Describe the machine and the libraries that decide the times.
-
-    Returns
-    -------
-    dict
-        Processor, cores, system, versions.
-    """
+    """Describe the machine and the libraries that decide the times."""
     from importlib.metadata import PackageNotFoundError, version
 
     cpu = platform.processor()
@@ -208,20 +156,7 @@ def machine() -> dict[str, Any]:
 
 
 def document(work: Work, quick: bool = False) -> dict[str, Any]:
-    """Measure everything.
-
-    Parameters
-    ----------
-    work : Work
-        From `load`.
-    quick : bool
-        Fewer repeats.
-
-    Returns
-    -------
-    dict
-        Schema ``bemt.bench/1``; ``peers`` gives microseconds per point by name, None when ``peer_notes`` says why.
-    """
+    """Measure everything."""
     ours = measure(work, quick)
     peers = {name: run_peer(work, quick) for name, run_peer in PEERS.items()}
     return {
@@ -242,18 +177,7 @@ _LABELS = {
 
 
 def table(doc: dict[str, Any]) -> str:
-    """Lay the document out for a terminal.
-
-    Parameters
-    ----------
-    doc : dict
-        From `document`.
-
-    Returns
-    -------
-    str
-        Lines.
-    """
+    """Lay the document out for a terminal."""
     m = doc["machine"]
     out = [
         f"work {doc['work']}: {doc['points']} points, {doc['elements']} elements, 1 thread, CPU time, best of repeats",

@@ -98,23 +98,6 @@ def _columns(path: Path, names: tuple[str, ...]) -> list[Array]:
 def load(folder: Path | str | None = None, name: str | None = None) -> Work:
     """Read the work.
 
-    Parameters
-    ----------
-    folder : path, optional
-        Folder with the three files; the generated copy that ships with the package by default.
-    name : str, optional
-        Blade name before ``_edges31.csv``; the first in alphabetical order by default.
-
-    Returns
-    -------
-    Work
-        Ready to `prepare`.
-
-    Raises
-    ------
-    InputError
-        If files are missing or faulty.
-
     Examples
     --------
     >>> work = load()
@@ -141,16 +124,6 @@ def load(folder: Path | str | None = None, name: str | None = None) -> Work:
 
 def generate(folder: Path | str) -> list[Path]:
     """Make the files of the work: stations by a documented law, table by NeuralFoil.
-
-    Parameters
-    ----------
-    folder : path
-        Folder to write to; it is made when absent.
-
-    Returns
-    -------
-    list of Path
-        The three files.
 
     Notes
     -----
@@ -187,20 +160,7 @@ def generate(folder: Path | str) -> list[Path]:
 
 
 def prepare(work: Work, effects: tuple[str, ...] | None = PEER_EFFECTS) -> Prepared:
-    """Prepare the rotor of the work.
-
-    Parameters
-    ----------
-    work : Work
-        From `load`.
-    effects : tuple of str, optional
-        Ids of the effects that are on; None for the standard ones.
-
-    Returns
-    -------
-    Prepared
-        For `bemt.bem.solver`.
-    """
+    """Prepare the rotor of the work."""
     from bemt.bem import solver
     from bemt.effects import standard
     from bemt.sections.extrapolation import ExtrapolatedTable, from_tables

@@ -195,29 +195,7 @@ class Cluster:
         return self._client
 
     def __call__(self, case: Case, grid: Grid, numbers: Sequence[int], form: str | None) -> Generator[Solved]:
-        """Solve chunks; few are out at a time.
-
-        Parameters
-        ----------
-        case : Case
-            The case.
-        grid : Grid
-            Its grid.
-        numbers : sequence of int
-            Chunks to solve.
-        form : str or None
-            Format of the chunks.
-
-        Yields
-        ------
-        (int, bytes, dict)
-            Number, bytes and statistics, as they come.
-
-        Raises
-        ------
-        InputError
-            When a worker cannot give the same numbers, or the cluster is lost.
-        """
+        """Solve chunks; few are out at a time."""
         if not numbers:
             return
         packed = _packed(case, grid, form)

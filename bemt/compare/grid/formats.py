@@ -27,20 +27,7 @@ ROW_GROUP = 50_000
 
 
 def require_extra(option: str, *modules: str) -> None:
-    """Refuse an option whose optional packages are not installed.
-
-    Parameters
-    ----------
-    option : str
-        What the user asked for.
-    *modules : str
-        Modules that it needs.
-
-    Raises
-    ------
-    InputError
-        When one is missing.
-    """
+    """Refuse an option whose optional packages are not installed."""
     missing = [name for name in modules if importlib.util.find_spec(name) is None]
     if missing:
         expected = "the optional packages of the extra 'dask'"
@@ -68,18 +55,6 @@ class Block:
 
 def encode(block: Block, form: str) -> bytes:
     """Bytes of a block.
-
-    Parameters
-    ----------
-    block : Block
-        Rows.
-    form : str
-        One of `FORMATS`.
-
-    Returns
-    -------
-    bytes
-        CSV lines without a header, or a Parquet file.
 
     Examples
     --------
@@ -113,31 +88,7 @@ def _options(axes: list[str], columns: list[str]) -> dict[str, Any]:
 
 
 def join(target: Path, names: Sequence[str], axes: Sequence[str], parts: Sequence[Path], form: str) -> str:
-    """Put blocks together under a temporary name, in order, and rename.
-
-    Parameters
-    ----------
-    target : Path
-        The file to be.
-    names : sequence of str
-        All columns.
-    axes : sequence of str
-        Those that are axes.
-    parts : sequence of Path
-        Files of the blocks, as `encode` makes their content.
-    form : str
-        One of `FORMATS`.
-
-    Returns
-    -------
-    str
-        SHA-256 of the file, hexadecimal.
-
-    Raises
-    ------
-    OSError
-        When it cannot be written; its `filename` is the target.
-    """
+    """Put blocks together under a temporary name, in order, and rename."""
     temporary = target.with_name(f".{target.name}.tmp")
     try:
         if form == "csv":

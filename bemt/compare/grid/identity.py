@@ -14,13 +14,7 @@ __all__ = ["program_hash"]
 
 @lru_cache(maxsize=1)
 def program_hash() -> str:
-    """Hash of the program text and of the libraries that decide numbers.
-
-    Returns
-    -------
-    str
-        SHA-256, hexadecimal; taken once per process.
-    """
+    """Hash of the program text and of the libraries that decide numbers."""
     digest = hashlib.sha256(bemt.__version__.encode())
     here = Path(bemt.__file__).parent
     for folder in (here, here.parent / "geometry"):

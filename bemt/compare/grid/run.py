@@ -70,18 +70,7 @@ class Grid:
 
     @classmethod
     def of(cls, case: Case) -> Grid | None:
-        """Grid of a case.
-
-        Parameters
-        ----------
-        case : Case
-            The case.
-
-        Returns
-        -------
-        Grid or None
-            None when the case sweeps nothing.
-        """
+        """Grid of a case."""
         axes = case.axes()
         if not axes:
             return None
@@ -168,18 +157,7 @@ class Solver:
         return found
 
     def block(self, flat: NDArray[np.intp]) -> Block:
-        """Solve some points.
-
-        Parameters
-        ----------
-        flat : (N,) int
-            Positions in the grid, ascending.
-
-        Returns
-        -------
-        Block
-            Their rows.
-        """
+        """Solve some points."""
         grid = self.grid
         index = dict(zip(grid.names, np.unravel_index(flat, grid.shape), strict=True))
         owner = flat // (grid.size // grid.geometries)
@@ -194,22 +172,7 @@ class Solver:
 
 
 def solve_chunk(solver: Solver, number: int) -> tuple[bytes, dict[str, Any]]:
-    """Bytes and statistics of one chunk.
-
-    Parameters
-    ----------
-    solver : Solver
-        Of the grid.
-    number : int
-        Which chunk.
-
-    Returns
-    -------
-    bytes
-        As `bemt.compare.grid.formats.encode` gives them; none without a format.
-    dict
-        Points, unconverged points, ranges.
-    """
+    """Bytes and statistics of one chunk."""
     grid = solver.grid
     block = solver.block(np.arange(number * grid.chunk, min((number + 1) * grid.chunk, grid.size)))
     fine = block.converged
@@ -250,32 +213,7 @@ def run_grid(
     form: str = "csv",
     engine: Engine | None = None,
 ) -> dict[str, Any] | None:
-    """Solve the grid of a case.
-
-    Parameters
-    ----------
-    case : Case
-        The case.
-    folder : Path or None
-        Where ``grid.csv`` or ``grid.parquet`` is written; None keeps only the statistics.
-    fingerprint : str
-        Identity of everything that decides the result; chunks of another one are thrown away.
-    threads : int
-        Threads of the solver in this process.
-    progress : callable, optional
-        Called with (points done, points).
-    resume : bool
-        Whether finished chunks are reused.
-    form : str
-        Format of the file.
-    engine : Engine, optional
-        Who solves the chunks; this process by default.
-
-    Returns
-    -------
-    dict or None
-        Axes, points, unconverged points, ranges, name and SHA-256 of the file; None when the case sweeps nothing.
-    """
+    """Solve the grid of a case."""
     grid = Grid.of(case)
     if grid is None:
         return None

@@ -79,30 +79,7 @@ def run_case(
     form: str = "csv",
     engine: Engine | None = None,
 ) -> dict[str, Any]:
-    """Do everything for one case; never raises but for an interrupt.
-
-    Parameters
-    ----------
-    ready : (Case, str)
-        The case, and its fingerprint when it was read.
-    out : Path or None
-        Folder of results.
-    resume : bool
-        Whether an earlier result or finished parts of a grid are reused.
-    threads : int
-        Threads of the solver.
-    progress : callable, optional
-        Called with (share done, what).
-    form : str
-        Format of the grid.
-    engine : Engine, optional
-        Who solves the grid; this process by default.
-
-    Returns
-    -------
-    dict
-        Plain result; ``faults`` and ``exit_code`` tell what went wrong.
-    """
+    """Do everything for one case; never raises but for an interrupt."""
     tell = progress or (lambda share, what: None)
     case, mark = ready
     try:
@@ -224,38 +201,7 @@ def sweep(
     paths: Sequence[str | Path], out: str | Path | None = None, *, jobs: int | None = None, resume: bool = True,
     progress: Progress | None = None, engine: str = "local", scheduler: str | None = None, grid_format: str = "csv",
 ) -> dict[str, Any]:  # fmt: skip
-    """Solve cases.
-
-    Parameters
-    ----------
-    paths : sequence of str or Path
-        Case files, or folders of cases.
-    out : str or Path, optional
-        Folder of results. It is this sweep's alone until it has ended; results of cases that fail are removed from it.
-    jobs : int, optional
-        Cases at a time; by default one, with all cores for its grid. With Dask: workers of the local cluster.
-    resume : bool
-        Whether earlier results are reused.
-    progress : callable, optional
-        Called with a line of text.
-    engine : str
-        ``local`` solves grids on this machine, ``dask`` on a Dask cluster; the answer is the same.
-    scheduler : str, optional
-        Address of an existing Dask cluster; without it Dask runs on processes of this machine.
-    grid_format : str
-        ``csv``, or ``parquet``, which keeps all digits.
-
-    Returns
-    -------
-    dict
-        Document ``bemt.sweep/1``: ``cases`` in the order found, ``exit_code`` (highest of all).
-
-    Raises
-    ------
-    InputError
-        When a path holds no case, the folder of results cannot be made, another sweep is at work in it, options
-        contradict each other or need what is not installed, or the scheduler does not answer.
-    """
+    """Solve cases."""
     _check_options(engine, scheduler, grid_format, jobs)
     files = find_cases(paths)
     folder = None if out is None else Path(out)

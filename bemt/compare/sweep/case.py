@@ -68,22 +68,7 @@ def _references(case: Case) -> list[reference_file.Reference]:
 
 
 def spread(discrete: bool, nominal: Array, at: Sequence[Array]) -> Array:
-    """Give the standard uncertainty from one assumption.
-
-    Parameters
-    ----------
-    discrete : bool
-        Whether `at` holds all values; otherwise the two ends of a range.
-    nominal : (P,) float
-        Results at the nominal value, in the unit of the quantity.
-    at : sequence of (P,) float
-        Results at each value of the assumption, same unit.
-
-    Returns
-    -------
-    (P,) float
-        Standard uncertainty per point, same unit.
-    """
+    """Give the standard uncertainty from one assumption, (P,)."""
     if discrete:
         return np.asarray(np.std(at, axis=0))
     low, high = at
@@ -167,28 +152,7 @@ def _tip_flags(mach: float) -> list[str]:
 
 
 def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str], None] | None = None) -> dict[str, Any]:
-    """Solve one case at its operating points and put everything recorded beside it.
-
-    Parameters
-    ----------
-    case : Case
-        The case.
-    threads : int
-        Threads of the solver.
-    progress : callable, optional
-        Called with (steps done, steps, what).
-
-    Returns
-    -------
-    dict
-        ``rows``, ``comparisons``, ``assumptions``, ``references``, ``conditions``, ``fan`` and more; plain values, NaN
-        where there is none.
-
-    Raises
-    ------
-    InputError
-        When the recorded values, polars or effects of the case are faulty.
-    """
+    """Solve one case at its operating points and put everything recorded beside it."""
     from bemt.case.prepare import k1k2_case, prepare_case
 
     refs = _references(case)

@@ -32,18 +32,7 @@ RESULT, TABLE, LOCK = "result.json", "table.txt", ".sweep.lock"
 
 
 def fingerprint(content: str) -> str:
-    """Identity of everything that decides a result.
-
-    Parameters
-    ----------
-    content : str
-        Hash of the files of the case.
-
-    Returns
-    -------
-    str
-        SHA-256, hexadecimal.
-    """
+    """Identity of everything that decides a result."""
     return hashlib.sha256(f"{SCHEMA} {program_hash()} {content}".encode()).hexdigest()
 
 
@@ -52,22 +41,7 @@ def _seal(stored: Mapping[str, Any]) -> str:
 
 
 def reuse(folder: Path, mark: str, form: str) -> dict[str, Any] | None:
-    """Take up the result of an earlier sweep; its table is written anew.
-
-    Parameters
-    ----------
-    folder : Path
-        Results of the case.
-    mark : str
-        Fingerprint of the case as it is now.
-    form : str
-        Format of the grid.
-
-    Returns
-    -------
-    dict or None
-        The result, or None when there is none, it has another fingerprint, or it or its grid was changed.
-    """
+    """Take up the result of an earlier sweep; its table is written anew."""
     try:
         stored = json.loads((folder / RESULT).read_text(encoding="utf-8"))
         seal = stored.pop("sha256")
@@ -84,57 +58,27 @@ def reuse(folder: Path, mark: str, form: str) -> dict[str, Any] | None:
 
 
 def keep(folder: Path, mark: str, result: Mapping[str, Any]) -> None:
-    """Write table and result; the result comes last, for it says that all is there.
-
-    Parameters
-    ----------
-    folder : Path
-        Results of the case; its grid is there already.
-    mark : str
-        Fingerprint of the case.
-    result : mapping
-        Plain result.
-    """
+    """Write table and result; the result comes last, for it says that all is there."""
     stored = {"fingerprint": mark, "result": result}
     write_atomic(folder / TABLE, case_text(result) + "\n")
     write_atomic(folder / RESULT, json_text({**stored, "sha256": _seal(stored)}))
 
 
 def remove_result(folder: Path) -> None:
-    """Remove the result of a case; finished chunks of its grid, which only their fingerprint makes a result, stay.
-
-    Parameters
-    ----------
-    folder : Path
-        Results of the case; it need not exist.
-    """
+    """Remove the result of a case; finished chunks of its grid, which only their fingerprint makes a result, stay."""
     for name in (RESULT, TABLE, *(f"grid.{form}" for form in FORMATS)):
         with suppress(FileNotFoundError, NotADirectoryError):
             (folder / name).unlink()
 
 
 def clear_overview(folder: Path) -> None:
-    """Remove the files over all cases, and what a kill left of them: they stand there only when a sweep has ended.
-
-    Parameters
-    ----------
-    folder : Path
-        Results of the sweep.
-    """
+    """Remove the files over all cases, and what a kill left of them: they stand there only when a sweep has ended."""
     for path in (*(folder / name for name in OVERVIEW), *folder.glob(".sweep.*.tmp")):
         path.unlink(missing_ok=True)
 
 
 def keep_overview(folder: Path, document: Mapping[str, Any]) -> None:
-    """Write the files over all cases.
-
-    Parameters
-    ----------
-    folder : Path
-        Results of the sweep.
-    document : mapping
-        ``bemt.sweep/1``.
-    """
+    """Write the files over all cases."""
     texts = (rows_csv(document["cases"]), overview_text(document["cases"]) + "\n", json_text(document))
     for name, text in zip(OVERVIEW, texts, strict=True):
         write_atomic(folder / name, text)

@@ -18,20 +18,7 @@ WIDTH, ROWS = 80, 22
 
 
 def summary(results: Sequence[Mapping[str, Any]], called: str = "python -m bemt") -> str:
-    """Summary of all cases, at most 45 lines of 80 columns.
-
-    Parameters
-    ----------
-    results : sequence of mapping
-        Results of the cases, see :func:`bemt.compare.sweep.case.solve_case`.
-    called : str
-        How the command line is called.
-
-    Returns
-    -------
-    str
-        Lines, without a newline at the end.
-    """
+    """Summary of all cases, at most 45 lines of 80 columns."""
     solved = [with_nan(r) for r in results if r["rows"]]
     failed = [r for r in results if not r["rows"]]
     lines: list[str] = []

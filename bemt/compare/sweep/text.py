@@ -150,18 +150,7 @@ def _grid_lines(grid: Mapping[str, Any] | None) -> list[str]:
 
 
 def case_text(result: Mapping[str, Any]) -> str:
-    """Table of one case.
-
-    Parameters
-    ----------
-    result : mapping
-        As :func:`bemt.compare.sweep.case.solve_case` gives it, plain or not.
-
-    Returns
-    -------
-    str
-        Lines for a terminal, without a newline at the end.
-    """
+    """Table of one case."""
     if not result["rows"]:
         return "\n".join([f"{result['name']}: not solved", *(f"  {fault}" for fault in result["faults"])])
     result = with_nan(result)
@@ -202,18 +191,7 @@ def with_nan(value: Any, key: str = "") -> Any:
 
 
 def overview_text(results: Sequence[Mapping[str, Any]]) -> str:
-    """Table over all cases.
-
-    Parameters
-    ----------
-    results : sequence of mapping
-        Results of the cases.
-
-    Returns
-    -------
-    str
-        One line per source and case.
-    """
+    """Table over all cases."""
     header = ["case", "source", "T kgf", "T N", "CT", "CP", "M_tip", "Re75", "BEMT err %", "K1K2 err %", "flags"]
     body = []
     for result in map(with_nan, results):
@@ -231,17 +209,6 @@ def overview_text(results: Sequence[Mapping[str, Any]]) -> str:
 
 
 def rows_csv(results: Sequence[Mapping[str, Any]]) -> str:
-    """All rows of all cases as CSV.
-
-    Parameters
-    ----------
-    results : sequence of mapping
-        Results of the cases.
-
-    Returns
-    -------
-    str
-        CSV text with a header.
-    """
+    """All rows of all cases as CSV."""
     rows = [{"case": r["name"], **row} for r in results for row in [*r["rows"], *r["variants"], *r["other_rows"]]]
     return csv_text(CSV_COLUMNS, rows)

@@ -39,23 +39,7 @@ class Folder:
 
 
 def read_folder(folder: Path) -> Folder:
-    """Read a folder in UIUC layout; APC PE0 files in it supply stations for propellers without their own.
-
-    Parameters
-    ----------
-    folder : Path
-        Where.
-
-    Returns
-    -------
-    Folder
-        At least one propeller.
-
-    Raises
-    ------
-    InputError
-        If the folder is missing or holds no propeller that can be compared.
-    """
+    """Read a folder in UIUC layout; APC PE0 files in it supply stations for propellers without their own."""
     from bemt.readers import uiuc
 
     if not folder.is_dir():

@@ -20,27 +20,7 @@ _CLOSE = 1e-4
 
 
 def shift_to(J0: float, J0_of: Callable[[float], float], reach: float = REACH_DEG) -> float:
-    """Blade angle shift that brings the zero-thrust advance ratio to the measured one.
-
-    Parameters
-    ----------
-    J0 : float
-        Measured [1].
-    J0_of : callable
-        Computed at a shift in degrees [1]; NaN where thrust does not get near zero.
-    reach : float
-        Largest shift tried [deg].
-
-    Returns
-    -------
-    float
-        Shift to within 1e-4 in J [deg]; NaN if either is unknown or the measured one is out of reach.
-
-    >>> round(shift_to(0.70, lambda d: 0.8 + 0.05 * d), 3)
-    -2.0
-    >>> shift_to(0.70, lambda d: 1.2 + 0.05 * d)
-    nan
-    """
+    """Blade angle shift that brings the zero-thrust advance ratio to the measured one."""
     from scipy.optimize import brentq
 
     last, at = J0_of(0.0) - J0, 0.0
@@ -60,26 +40,7 @@ def shift_to(J0: float, J0_of: Callable[[float], float], reach: float = REACH_DE
 def matched(
     propeller: UiucPropeller, effects: Sequence[Effect], fixed_re: float | None, stations: Stations, J0: float
 ) -> tuple[float, Rows] | None:
-    """Solve one propeller with its blades turned to the measured zero-thrust advance ratio.
-
-    Parameters
-    ----------
-    propeller : UiucPropeller
-        With advance-ratio lines.
-    effects : sequence of Effect
-        Physics that is on.
-    fixed_re : float or None
-        One Reynolds number for all section tables [1].
-    stations : tuple of (N,) float
-        r/R [1], c/R [1] and beta [rad].
-    J0 : float
-        Measured zero-thrust advance ratio [1].
-
-    Returns
-    -------
-    (float, Rows) or None
-        Shift [deg] and points; None where there is no such shift.
-    """
+    """Solve one propeller with its blades turned to the measured zero-thrust advance ratio. [deg]"""
     x, c, beta = stations
 
     def at(shift_deg: float) -> Rows:

@@ -52,23 +52,7 @@ class Rows:
 
 
 def zero_thrust_J(lines: Iterable[tuple[Array, Array]]) -> float:
-    """Advance ratio where thrust vanishes, median over rpm lines.
-
-    Parameters
-    ----------
-    lines : iterable of ((N,) float, (N,) float)
-        J and CT of each line [1].
-
-    Returns
-    -------
-    float
-        Interpolated at the change of sign, or extrapolated along the last third of the thrust when the line ends above
-        zero but below 35 % of its largest CT; NaN if no line gets that far [1].
-
-    >>> J = np.linspace(0.1, 0.7, 13)
-    >>> round(zero_thrust_J([(J, 0.1 * (0.6 - J))]), 6)
-    0.6
-    """
+    """Advance ratio where thrust vanishes, median over rpm lines."""
     found = []
     for J, CT in lines:
         order = np.argsort(J)
@@ -85,20 +69,7 @@ def zero_thrust_J(lines: Iterable[tuple[Array, Array]]) -> float:
 
 
 def build(propeller: UiucPropeller, stations: Stations | None = None) -> Rotor:
-    """Rotor of a measured propeller with the rule's sections.
-
-    Parameters
-    ----------
-    propeller : UiucPropeller
-        Names, diameter, blade count, stations.
-    stations : tuple of (N,) float, optional
-        r/R [1], c/R [1] and beta [rad] to use instead of the propeller's own.
-
-    Returns
-    -------
-    geometry.rotor.Rotor
-        At the nominal diameter.
-    """
+    """Rotor of a measured propeller with the rule's sections."""
     from bemt.sections.rule import airfoil, sections
     from geometry.blade import from_stations
     from geometry.rotor import Rotor
@@ -168,24 +139,7 @@ def compare(
     fixed_re: float | None = None,
     stations: Stations | None = None,
 ) -> Rows:
-    """Solve every measured point of one propeller.
-
-    Parameters
-    ----------
-    propeller : UiucPropeller
-        With stations and at least one measured table.
-    effects : sequence of Effect
-        Physics that is on.
-    fixed_re : float, optional
-        One Reynolds number for all section tables [1].
-    stations : tuple of (N,) float, optional
-        r/R [1], c/R [1] and beta [rad] from elsewhere, see :func:`build`.
-
-    Returns
-    -------
-    Rows
-        Measured and computed values, point by point.
-    """
+    """Solve every measured point of one propeller."""
     return rows(propeller, Solver(propeller, effects, fixed_re, stations))
 
 
@@ -225,21 +179,7 @@ def errors(rows: Rows) -> dict[str, dict[str, Array]]:
 
 
 def statistics(error: Array) -> dict[str, float | None]:
-    """Median and 90th percentile of the absolute error and median error.
-
-    Parameters
-    ----------
-    error : (N,) float
-        Relative errors; NaN (not converged) counts as infinitely wrong [1].
-
-    Returns
-    -------
-    dict
-        ``median_abs``, ``p90_abs``, ``bias`` [1]; None without points.
-
-    >>> statistics(np.array([-0.1, 0.0, 0.2]))["median_abs"]
-    0.1
-    """
+    """Median and 90th percentile of the absolute error and median error."""
     if error.size == 0:
         return {"median_abs": None, "p90_abs": None, "bias": None}
     size = np.where(np.isfinite(error), np.abs(error), np.inf)

@@ -33,36 +33,7 @@ def validate(
     folder: Path, effects: Sequence[Effect] | None = None, fixed_re: float | None = None,
     progress: Callable[[str], None] | None = None, match_J0: bool = False, as_drawn: bool = False,
 ) -> dict[str, Any]:  # fmt: skip
-    """Compare a folder.
-
-    Parameters
-    ----------
-    folder : Path
-        UIUC layout, with APC PE0 files if any.
-    effects : sequence of Effect, optional
-        Physics that is on; default all.
-    fixed_re : float, optional
-        One Reynolds number for all section tables [1].
-    progress : callable, optional
-        Takes a line on what is being done.
-    match_J0 : bool
-        Also solve each propeller with its blades turned to the measured zero-thrust advance ratio.  An experiment that
-        uses the measurement: it tells an error of blade angle or camber from others, and is kept apart from the rest.
-    as_drawn : bool
-        Leave out what the population expects of rotors as built, and its intervals; so does any change of the physics,
-        for which the population was not fitted.
-
-    Returns
-    -------
-    dict
-        Document of schema ``bemt.validation/1``; errors are fractions.  ``static`` and ``forward`` are the expectation
-        of the rotors as built, with ``coverage`` and ``width68``; ``as_drawn`` is the solver on the stations as given.
-
-    Raises
-    ------
-    InputError
-        If the folder is missing or holds no propeller that can be compared.
-    """
+    """Compare a folder."""
     from bemt import effects as registry
     from bemt.sections import rule as section_rule
 

@@ -34,18 +34,7 @@ def _coverage_lines(doc: dict[str, Any]) -> list[str]:
 
 
 def text(doc: dict[str, Any]) -> str:
-    """Table for people.
-
-    Parameters
-    ----------
-    doc : dict
-        Document of schema ``bemt.validation/1``, see :func:`bemt.compare.validate.propellers.validate`.
-
-    Returns
-    -------
-    str
-        Percent, one line per propeller, totals last.
-    """
+    """Table for people."""
     head = f"{'':24} {'J0':>6} {'bemt':>6}"
     for kind in ("static", "forward"):
         for q in ("CT", "CP"):
