@@ -240,7 +240,7 @@ def _tangents(problem: Problem) -> tuple[Array, Array]:
 
 
 def rivals(problem: Problem) -> tuple[tuple[str, Array], ...]:
-    """Covariances of an unknown smooth effect: along each recorded variable, and pairs of them.
+    """Covariances of an unknown smooth effect of the test: along each recorded variable, and pairs of them.
 
     Parameters
     ----------
@@ -264,7 +264,9 @@ def rivals(problem: Problem) -> tuple[tuple[str, Array], ...]:
     if {"rpm", "J"} <= set(X):
         sets.append(("rpm", "J"))
     p, c = problem.point, problem.channel
-    same = c[:, None] == c[None, :]
+    # a cause of the test is not in the reference, whether it is in the library or not
+    free = problem.free
+    same = (c[:, None] == c[None, :]) & free[:, None] & free[None, :]
     S = problem.scale[:, None] * problem.scale[None, :]
     present = [k for k in (0, 1, 2) if np.any(c == k)]
     words = ("thrust", "torque", "speed")
