@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from bemt.diagnose.record import Record
     from bemt.readers._imported import Imported
     from bemt.recordings.channels import Recorded
+    from bemt.recordings.reduce import Reduced
 
 __all__ = ["cases_of", "load", "load_all"]
 
@@ -90,11 +91,24 @@ def load(path: str, case: Case, imported: Imported | None = None) -> Record:
         reduced = reduction.reduce(imported, diameter_m=case.diameter_m)
         if reduced.mode == "points" and imported.format == "table":
             # somebody's own table of points: every row counts, a jump from row to row may be what it shows
-            made = records.from_series(_points(imported, rows, path), case, reduced.correlated)
+            series = _points(imported, rows, path)
+            made = records.from_series(_scattered(series, reduced), case, reduced.correlated)
         else:
             made = records.from_series(reduced.series, case, reduced.correlated)
     notes = (*made.notes, *imported.warnings, *rows.notes, *_unused(imported, rows, case))
     return replace(made, findings=found, notes=notes)
+
+
+def _scattered(series: Series, reduced: Reduced) -> Series:
+    """Rows that state no uncertainty with that which the repeats of the reduction showed."""
+    u, floor = {k: np.array(v) for k, v in series.u.items()}, 1e-3
+    for name, seen in reduced.series.u.items():
+        if name not in ("thrust_N", "torque_Nm") or name not in series or np.isfinite(u[name]).any():
+            continue
+        full = float(np.nanmax(np.abs(series[name])))
+        for rows, value in zip(reduced.rows, seen, strict=True):
+            u[name][list(rows)] = np.hypot(value, floor * full)
+    return replace(series, u=u)
 
 
 def _same_rotor(imported: Imported, case: Case, path: str) -> None:

@@ -1,4 +1,4 @@
-"""What may differ without being a cause: calibration of stand and blade, sessions, errors of the solver itself.
+"""What may differ without being a cause: calibration of stand and blade, errors of the solver itself.
 
 Nuisances enter as tangents with stated priors and are marginalised together with any effect, never fitted first:
 fitting them first would absorb the physics.
@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 PRIORS = {
     "section drag": 0.10, "lift slope": 0.03, "pitch": 0.3, "thrust gain": 0.01, "torque gain": 0.01,
     "thrust zero": 0.002, "torque zero": 0.002, "speed of rotation": 0.003, "density": 0.005,
-    "density not recorded": 0.015, "airspeed": 0.005, "session": 0.01, "parameter of the model": 0.25,
+    "density not recorded": 0.015, "airspeed": 0.005, "parameter of the model": 0.25,
     "level of thrust": 0.06, "level of torque": 0.08, "slope over J": 0.05, "bend over J": 0.02,
     "form of the model": 0.2, "form in a variable of its own": 0.45,
 }  # fmt: skip
@@ -117,15 +117,14 @@ def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...], NDArray[np.bool
     calibrated("lift slope", lift=PRIORS["lift slope"])
     rows = [(i, p) for i, p in enumerate(problem.parts)]
     for c, name in ((0, "thrust"), (1, "torque")):
-        here = channel == c
+        here, key = channel == c, CHANNELS[c]
+        # one stand, one gain: what it differs by from run to run is that of the runs, and the readings show it
+        gain = max((p.record.gain[key] for p in problem.parts if key in p.record.gain), default=PRIORS[f"{name} gain"])
+        add(f"{name} gain", np.where(here, gain * y, 0.0), of_reading=True)
         for i, p in rows:
-            mine = here & (problem.part == i)
-            key = CHANNELS[c]
-            gain = p.record.gain.get(key, PRIORS[f"{name} gain"])
             zero = p.record.zero.get(key, PRIORS[f"{name} zero"] * p.full_scale.get(key, 0.0))
             tag = f" ({p.record.name})" if len(rows) > 1 else ""
-            add(f"{name} gain{tag}", np.where(mine, gain * y, 0.0), of_reading=True)
-            add(f"{name} zero{tag}", np.where(mine, zero, 0.0))
+            add(f"{name} zero{tag}", np.where(here & (problem.part == i), zero, 0.0))
     load = channel < 2
     slope_V = np.concatenate([np.concatenate([_slope(p, c) for c in p.channels]) for p in problem.parts])[problem.kept]
     V = np.concatenate([p.flow.V for p in problem.parts])[problem.point]
@@ -149,13 +148,6 @@ def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...], NDArray[np.bool
     recorded = all(p.record.air_recorded for p in problem.parts)
     add("density", np.where(load, PRIORS["density" if recorded else "density not recorded"] * f0, 0.0))
     add("airspeed", np.where(load, PRIORS["airspeed"] * V * slope_V, 0.0))
-    run = problem.covariates["run"][problem.point]
-    labels = np.unique(run)
-    if 1 < labels.size <= 20:
-        for label in labels:
-            for c, name in ((0, "thrust"), (1, "torque")):
-                mine = (run == label) & (channel == c)
-                add(f"session {label:g} {name}", np.where(mine, PRIORS["session"] * y, 0.0), of_reading=True)
     for i, p in rows:
         if "rpm" in p.channels:
             x = p.record.extra["pwm_s"]

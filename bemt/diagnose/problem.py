@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 from bemt.base.errors import Fault, InputError
 from bemt.bem import model as bem
 from bemt.case.prepare import k1k2_case, prepare_case
+from bemt.diagnose import repeats
+from bemt.diagnose.noise import in_time
 from bemt.diagnose.nuisance import nuisances
-from bemt.diagnose.record import CHANNELS, Record, concatenated, merged, owners
+from bemt.diagnose.record import CHANNELS, Record, concatenated, dense, merged, owners
 from bemt.effects.base import Effect, Flow, Reading
 from bemt.recordings.between import Level, odd_ones
 
@@ -393,16 +395,52 @@ def assemble(parts: tuple[Part, ...]) -> Problem:
     if lost:
         notes.append(f"{lost} readings left out: the baseline does not converge there")
     scale = np.concatenate([_scale(p) for p in parts])
-    known = np.isfinite(u[kept])
-    share = np.where(channel == CHANNELS.index("rpm"), _U_RPM, _U_DEFAULT)
-    fallback = np.maximum(share * np.abs(y), np.minimum(share, _U_FLOOR) * scale)
-    sigma = np.where(np.isfinite(u) & (u > 0), u, fallback)
     problem = Problem(
-        parts, y[kept], f0[kept], sigma[kept], scale[kept], bool(known.mean() > 0.5), channel[kept], point[kept],
+        parts, y[kept], f0[kept], u[kept], scale[kept], False, channel[kept], point[kept],
         part[kept], kept, _covariates(parts), np.zeros((int(kept.sum()), 0)), (), np.zeros(0, dtype=bool), tuple(notes),
     )  # fmt: skip
+    problem = _with_noise(problem)
     columns, names, own = nuisances(problem)
     return replace(problem, tangents=columns, names=names, own=own)
+
+
+def _with_noise(problem: Problem) -> Problem:
+    """Uncertainty of every reading: what is stated, what repeats show, else what stands usually have."""
+    stated = np.where(np.isfinite(problem.u) & (problem.u > 0.0), problem.u, np.nan)
+    full = np.zeros_like(problem.y)
+    for i, p in enumerate(problem.parts):
+        for c, name in enumerate(CHANNELS):
+            full[(problem.part == i) & (problem.channel == c)] = p.full_scale.get(name, 0.0)
+    tachometer = problem.channel == CHANNELS.index("rpm")
+    usual = np.where(tachometer, _U_RPM * problem.y, np.hypot(_U_DEFAULT * problem.y, _U_FLOOR * full))
+    sigma, known, notes = np.where(np.isfinite(stated), stated, usual), np.isfinite(stated), list(problem.notes)
+    X, rows = problem.covariates, np.arange(problem.y.size)
+    owner = np.concatenate([np.full(len(p.record), i) for i, p in enumerate(problem.parts)])
+    lengths = [X[k] for k in ("tip_gap_m", "wall_distance_m") if k in X] + [
+        np.exp(X[k]) for k in ("sideslip_rad",) if k in X
+    ]
+    label = repeats.conditions(X["rpm"], X["J"], X["density_kg_m3"], lengths, owner.astype(float))
+    label[np.array([dense(p.record) for p in problem.parts])[owner]] = -1
+    run, place = in_time(X)
+    for c, name in enumerate(CHANNELS[:2]):
+        mine = rows[(problem.channel == c) & (label[problem.point] >= 0)]
+        # readings that are those of the model to the last digit are a plan, not a measurement
+        if not np.any(np.abs(problem.residual[mine]) > 1e-9 * full[mine]):
+            continue
+        points, size = problem.point[mine], np.where(problem.y[mine] < 0, -1.0, 1.0) * problem.scale[mine]
+        fixed = repeats.projected_out(label[points], size, problem.f0[mine], full[mine], run[points], place[points])
+        told = np.where(known[mine], sigma[mine], 0.0) if known[mine].any() else None
+        found = repeats.noise_sizes(problem.residual[mine], problem.y[mine], full[mine], fixed, told)
+        if found is None or not any(found[:2]):
+            continue
+        a, b, dof = found
+        every = problem.channel == c
+        seen = np.hypot(a * problem.y[every], b * full[every])
+        sigma[every] = np.where(known[every], np.hypot(sigma[every], seen), seen)
+        known = known | every
+        beside = " beside what is stated" if told is not None else ""
+        notes.append(f"{name}: {dof} repeats scatter by {a:.2%} of the reading and {b:.2%} of full scale{beside}")
+    return replace(problem, u=sigma, u_known=bool(known.mean() > 0.5), notes=tuple(notes))
 
 
 def _scale(part: Part) -> Array:

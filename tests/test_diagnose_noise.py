@@ -1,0 +1,85 @@
+"""Noise, gains and sessions of a recording come from the recording."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosing import case, points, recording
+
+from bemt.diagnose import chain
+from bemt.diagnose.problem import build
+from bemt.diagnose.record import from_series
+from bemt.diagnose.repeats import conditions, noise_sizes, projected_out, spread_sizes
+from bemt.series import Series
+
+
+@pytest.mark.parametrize(("a", "b"), [(0.01, 0.0), (0.0, 0.004), (0.006, 0.003)])
+def test_repeats_give_the_noise_beside_gain_zero_and_drift(a: float, b: float) -> None:
+    rng = np.random.default_rng(1)
+    rpm = np.tile(np.repeat(np.linspace(3000.0, 9000.0, 7), 4), 2)
+    run, place = np.repeat([0.0, 1.0], 28), np.tile(np.arange(28.0), 2)
+    true = 1e-7 * rpm**2
+    full = np.full_like(true, true.max())
+    shown = true * np.where(run == 0, 1.03, 0.98) + full * (0.01 * run + 0.02 * place / 28.0)
+    sd = np.hypot(a * true, b * full)
+    found = []
+    for _ in range(20):
+        y = shown + sd * rng.standard_normal(sd.size)
+        label = conditions(rpm, np.zeros_like(rpm), np.full_like(rpm, 1.2))
+        assert np.unique(label).size == 7
+        sizes = noise_sizes(y - true, y, full, projected_out(label, true, true, full, run, place))
+        assert sizes is not None
+        found.append(np.sqrt(np.mean(np.hypot(sizes[0] * true, sizes[1] * full) ** 2) / np.mean(sd**2)))
+    assert np.mean(found) == pytest.approx(1.0, abs=0.15)
+
+
+def test_points_averaged_in_blocks_give_the_same_sizes() -> None:
+    rng = np.random.default_rng(2)
+    block = np.repeat(np.arange(60), 10)
+    unit = np.linspace(1.0, 9.0, 60)[block]
+    y = 0.1 * unit + np.hypot(0.02 * 0.1 * unit, 0.005 * 0.9) * rng.standard_normal(unit.size)
+    sizes = spread_sizes(y, unit, block)
+    assert sizes is not None
+    assert sizes[0] == pytest.approx(0.02, rel=0.25) and sizes[1] == pytest.approx(0.005, rel=0.35)
+
+
+def test_what_is_stated_stays_where_the_repeats_agree() -> None:
+    rng = np.random.default_rng(3)
+    u = np.full(60, 0.01)
+    e = u * rng.standard_normal(60)
+    label = np.repeat(np.arange(6), 10)
+    one = np.ones(60)
+    fixed = projected_out(label, one, one, one, np.zeros(60), np.arange(60.0))
+    assert noise_sizes(e, one, one, fixed, u)[:2] == (0.0, 0.0)  # type: ignore[index]
+    doubled = noise_sizes(3.0 * e, one, one, fixed, u)
+    assert doubled is not None and np.hypot(*doubled[:2]) == pytest.approx(0.028, rel=0.3)
+
+
+def repeated(series: Series, gain: float, run: float, seed: int) -> Series:
+    """Every point three times without stated uncertainties, thrust by another gain."""
+    rng = np.random.default_rng(seed)
+    values = {k: np.tile(v, 3) for k, v in series.values.items() if k != "time_s"}
+    for k in ("thrust_N", "torque_Nm"):
+        values[k] = values[k] * (1.0 + 0.004 * rng.standard_normal(values[k].size))
+    values["thrust_N"] = values["thrust_N"] * (1.0 + gain)
+    values["run"] = np.repeat(run + np.arange(3.0), len(series))
+    return Series("bench", "stand", values)
+
+
+def test_a_gain_of_seven_percent_is_seen_beside_a_reference() -> None:
+    base = case()
+    plain = recording(base, points("grid"), noise=0.0)
+    records = [
+        from_series(repeated(plain, 0.07, 0.0, 1), base),
+        replace(from_series(repeated(plain, 0.0, 3.0, 2), base), reference=True),
+    ]
+    problem = build(records, [base])
+    assert problem.u_known and sum("repeats scatter" in note for note in problem.notes) == 2
+    share = problem.u / problem.scale
+    assert 0.001 < np.median(share) < 0.006
+    answer = chain.diagnose(records, [base], nulls=200)
+    assert answer.decision.effects == ("thrust_gain",)
+    found = answer.parameters["thrust_gain"]["gain"]
+    assert found["low"] <= 0.07 <= found["high"]
