@@ -360,7 +360,8 @@ def _scatter(record: Record, channel: str, unit: Array, block: NDArray[np.intp])
         return None
     good = good[:: -(-good.size // _MOST_COMPARED)]
     advance = record.V[good] / record.rpm[good]
-    at = conditions(record.rpm[good], advance / max(float(np.max(np.abs(advance))), 1e-12), np.asarray(record.air.rho)[good])
+    size = max(float(np.max(np.abs(advance))), 1e-12)
+    at = conditions(record.rpm[good], advance / size, np.asarray(record.air.rho)[good])
     together = np.unique(np.column_stack([block[good], at]), axis=0, return_inverse=True)[1].ravel()
     sizes = spread_sizes(y[good], unit[good], together)
     return None if sizes is None else np.hypot(sizes[0] * y, sizes[1] * float(np.max(np.abs(y[good]))))
