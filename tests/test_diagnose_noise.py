@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from diagnosing import case, points, recording
 
+from bemt.dataset import Dataset
 from bemt.diagnose import chain
 from bemt.diagnose.problem import build
 from bemt.diagnose.record import from_series
 from bemt.diagnose.repeats import conditions, noise_sizes, projected_out, spread_sizes
-from bemt.series import Series
 
 
 @pytest.mark.parametrize(("a", "b"), [(0.01, 0.0), (0.0, 0.004), (0.006, 0.003)])
@@ -57,7 +57,7 @@ def test_what_is_stated_stays_where_the_repeats_agree() -> None:
     assert doubled is not None and np.hypot(*doubled[:2]) == pytest.approx(0.028, rel=0.3)
 
 
-def repeated(series: Series, gain: float, run: float, seed: int) -> Series:
+def repeated(series: Dataset, gain: float, run: float, seed: int) -> Dataset:
     """Every point three times without stated uncertainties, thrust by another gain."""
     rng = np.random.default_rng(seed)
     values = {k: np.tile(v, 3) for k, v in series.values.items() if k != "time_s"}
@@ -65,7 +65,7 @@ def repeated(series: Series, gain: float, run: float, seed: int) -> Series:
         values[k] = values[k] * (1.0 + 0.004 * rng.standard_normal(values[k].size))
     values["thrust_N"] = values["thrust_N"] * (1.0 + gain)
     values["run"] = np.repeat(run + np.arange(3.0), len(series))
-    return Series("bench", "stand", values)
+    return Dataset("bench", "stand", values)
 
 
 def test_a_gain_of_seven_percent_is_seen_beside_a_reference() -> None:

@@ -154,7 +154,7 @@ def _diagnose(
     if decision.verdict == "unknown":  # what is not in the library is predicted as what it is: something smooth
         held = gp_only
     smooth = fitting.smooth(found, best)
-    after = problem.f0 + best.signature + smooth
+    after = problem.centre + best.signature + smooth
     # without a verdict the likeliest explanation still says best which part of the mismatch is not calibration
     listed = max((k for k in found.probability if k), key=lambda k: found.probability[k], default=None)
     where = location.locate(found, best if best.ids or listed is None else fitting.fit(found, listed))

@@ -99,7 +99,7 @@ def load(path: str, case: Case, imported: Imported | None = None) -> Record:
     return replace(made, findings=found, notes=notes)
 
 
-def _scattered(series: Series, reduced: Reduced) -> Series:
+def _scattered(series: Dataset, reduced: Reduced) -> Dataset:
     """Rows that state no uncertainty with that which the repeats of the reduction showed."""
     u, floor = {k: np.array(v) for k, v in series.u.items()}, 1e-3
     for name, seen in reduced.series.u.items():

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.asbuilt.latents import as_built
 from bemt.base.errors import Fault, InputError
 from bemt.bem import model as bem
 from bemt.case.prepare import k1k2_case, prepare_case
 from bemt.diagnose import repeats
+from bemt.diagnose.blade import PLAIN, Blade, calibrated, prior_of, turned
 from bemt.diagnose.noise import in_time
 from bemt.diagnose.nuisance import nuisances
 from bemt.diagnose.record import CHANNELS, Record, concatenated, dense, merged, owners
@@ -189,6 +191,10 @@ class Problem:
         What was assumed or left out.
     between : tuple of str
         What looks wrong in a recording beside the others, its file named in front.
+    blade : Blade
+        What is believed of the rotor's blade, and the point of its tangents.
+    offset : (M,) float
+        Change of the readings from the centre of the blade's prior to that point [units of the readings].
     predicted : dict
         Readings that were solved already, by the effects added.
     """
@@ -209,6 +215,8 @@ class Problem:
     own: NDArray[np.bool_]
     notes: tuple[str, ...] = ()
     between: tuple[str, ...] = ()
+    blade: Blade = PLAIN
+    offset: Array = field(default_factory=lambda: np.zeros(0))
     predicted: dict[Any, Array] = field(default_factory=dict, repr=False)
 
     @property
@@ -238,9 +246,19 @@ class Problem:
         return np.array([keys.index(p.key) for p in self.parts])[self.part]
 
     @property
+    def centre(self) -> Array:
+        """Baseline for the blade at the centre of its prior, to which all nuisances refer, (M,)."""
+        return self.f0 - self.offset
+
+    @property
     def residual(self) -> Array:
-        """Recording minus baseline, (M,)."""
-        return self.y - self.f0
+        """Recording minus baseline at the centre of all nuisances, (M,)."""
+        return self.y - self.centre
+
+    def with_tangents(self, keep: NDArray[np.bool_]) -> Problem:
+        """Problem with some of the nuisances only."""
+        names = tuple(n for n, k in zip(self.names, keep, strict=True) if k)
+        return replace(self, tangents=self.tangents[:, keep], names=names, own=self.own[keep])
 
     @property
     def baseline(self) -> tuple[Effect, ...]:
@@ -334,7 +352,32 @@ def build(records: Sequence[Record], cases: Sequence[Case], baseline: str = "bem
         if not 1.0 / _FARTHEST < ratio < _FARTHEST:
             raise InputError(Fault(records[0].name, name, f"{ratio:.2g} times what the case gives",
                                    "readings of this rotor", "Another unit, or another case?"))  # fmt: skip
-    return replace(problem, between=_between(problem, [groups[k][1] for k in order], records))
+    odd = _between(problem, [groups[k][1] for k in order], records)
+    problem, found = _calibrated(problem, [groups[k][0] for k in order])
+    return replace(problem, between=(*odd, *found))
+
+
+def _calibrated(problem: Problem, cases: Sequence[Case]) -> tuple[Problem, tuple[str, ...]]:
+    """Problem with the blade as its references show it, and findings."""
+    refers = [p for p in problem.parts if p.record.reference]
+    if not refers or len({p.key for p in problem.parts}) > 1 or any(p.instead is not None for p in problem.parts):
+        return problem, ()
+    blade, note, finding = calibrated(problem, prior_of(cases[0]))
+    notes, found = (note,) if note else (), (f"{refers[0].record.name}: {finding}",) if finding else ()
+    if blade is None:
+        return replace(problem, notes=(*problem.notes, *notes)), found
+    whole = assemble(tuple(_with_blade(p, as_built(blade.at)) for p in problem.parts), blade)
+    return replace(whole, notes=(*whole.notes, *notes)), found
+
+
+def _with_blade(part: Part, blade: Effect) -> Part:
+    """Part whose baseline has another blade."""
+    baseline, old = turned(part, blade), part.flow
+    plain = [e for e in baseline if not forward.acts_on_points(e)]
+    flow = forward.flow_of(
+        part.model.prepared(plain), part.record.rpm, part.record.V, part.record.air, part.record.extra, old.chord
+    )
+    return replace(part, baseline=baseline, flow=flow, _solved={})
 
 
 def _between(problem: Problem, joined: Sequence[Sequence[Record]], records: Sequence[Record]) -> tuple[str, ...]:
@@ -363,13 +406,15 @@ def _between(problem: Problem, joined: Sequence[Sequence[Record]], records: Sequ
     return tuple(f"{level.name}: {finding}" for level, finding in odd_ones(levels))
 
 
-def assemble(parts: tuple[Part, ...]) -> Problem:
+def assemble(parts: tuple[Part, ...], blade: Blade = PLAIN) -> Problem:
     """Stack the readings of parts and add the nuisances.
 
     Parameters
     ----------
     parts : tuple of Part
         Recordings with their rotors.
+    blade : Blade
+        What is believed of the blade.
 
     Returns
     -------
@@ -398,10 +443,11 @@ def assemble(parts: tuple[Part, ...]) -> Problem:
     problem = Problem(
         parts, y[kept], f0[kept], u[kept], scale[kept], False, channel[kept], point[kept],
         part[kept], kept, _covariates(parts), np.zeros((int(kept.sum()), 0)), (), np.zeros(0, dtype=bool), tuple(notes),
+        blade=blade, offset=np.zeros(int(kept.sum())),
     )  # fmt: skip
     problem = _with_noise(problem)
-    columns, names, own = nuisances(problem)
-    return replace(problem, tangents=columns, names=names, own=own)
+    columns, names, own, offset = nuisances(problem)
+    return replace(problem, tangents=columns, names=names, own=own, offset=offset)
 
 
 def _with_noise(problem: Problem) -> Problem:

@@ -18,8 +18,9 @@ Array = NDArray[np.float64]
 
 FEWEST = 10
 """Repeats, less what is projected out, from which on they give the noise [1]."""
-# Same condition: largest difference of ln rpm, J, ln density, and of ln distances.
-_NEAR_SPEED, _NEAR_J, _NEAR_AIR, _NEAR_LENGTH = 0.02, 0.02, 0.01, 0.01
+# Same condition: largest difference of ln rpm, J, ln density, and of ln distances.  Loads are compared with the model at
+# their own speeds, so that what changes within a condition is only how far the model is off.
+_NEAR_SPEED, _NEAR_J, _NEAR_AIR, _NEAR_LENGTH = 0.04, 0.02, 0.01, 0.01
 # Where the repeats cannot tell a share of the reading from a share of full scale: 0.5 % and 0.1 %, each within a factor
 # of about four.  Declared; load cells and torque cells of hobby stands.
 _USUAL, _SPREAD = np.log([5e-3, 1e-3]), 1.5
@@ -38,8 +39,8 @@ def conditions(
     label = np.full(rpm.size, -1, dtype=np.intp)
     free = np.ones(rpm.size, dtype=bool)
     for i in np.argsort(rpm, kind="stable"):
-        group = free & (np.abs(X - X[i]).max(axis=1) <= 1.0)
-        if free[i] and group.sum() > 1:
+        group = free & free[i] & (np.abs(X - X[i]).max(axis=1) <= 1.0)
+        if group.sum() > 1:
             label[group] = label.max() + 1
         free[group] = False
     return label
