@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 from diagnosing import case, points, recording
 
+from bemt.asbuilt.latents import AsBuilt
 from bemt.dataset import Dataset
 from bemt.diagnose import chain
 from bemt.diagnose.problem import build
 from bemt.diagnose.record import from_series
 from bemt.diagnose.repeats import conditions, noise_sizes, projected_out, spread_sizes
+from bemt.effects.ground_effect import GroundEffect
 
 
 @pytest.mark.parametrize(("a", "b"), [(0.01, 0.0), (0.0, 0.004), (0.006, 0.003)])
@@ -83,3 +85,30 @@ def test_a_gain_of_seven_percent_is_seen_beside_a_reference() -> None:
     assert answer.decision.effects == ("thrust_gain",)
     found = answer.parameters["thrust_gain"]["gain"]
     assert found["low"] <= 0.07 <= found["high"]
+
+
+@pytest.mark.parametrize("off", [-3.0, 2.0])
+def test_a_reference_finds_the_blade_whatever_the_case_says_of_it(off: float) -> None:
+    """The blade is turned, its lift lower and its drag higher than in the case; the test has a wall behind it, too."""
+    guess, given = case(), points("grid")
+    real = (AsBuilt(angle_deg=off, lift=-0.04, drag=0.1),)
+    both = (*real, GroundEffect(z_over_R=0.5))
+    plain, changed = (recording(guess, given, extra, noise=0.004, seed=k) for k, extra in ((1, real), (2, both)))
+    records = [from_series(changed, guess), replace(from_series(plain, guess), reference=True)]
+    problem = build(records, [guess])
+    assert problem.blade.at[0] == pytest.approx(off, abs=0.4)
+    # the prior stays at the case: the residuals refer to it, the signatures to the blade that was found
+    refer = ~problem.free
+    assert np.median(np.abs(problem.y / problem.f0 - 1.0)[refer]) < 0.02
+    exact = recording(guess, given, real, noise=0.0).values["thrust_N"]
+    mine = refer & (problem.channel == 0)
+    np.testing.assert_allclose(problem.f0[mine], exact, atol=0.02 * exact.max())
+    answer = chain.diagnose(records, [guess], nulls=200)
+    assert answer.decision.effects == ("ground_effect",), answer.decision
+
+
+def test_a_blade_that_runs_away_is_said_and_not_used() -> None:
+    guess, given = case(), points("grid")
+    plain = recording(guess, given, (AsBuilt(angle_deg=14.0),), noise=0.004)
+    problem = build([from_series(plain, guess), replace(from_series(plain, guess), reference=True)], [guess])
+    assert not problem.blade.at.any() and any("another rotor" in f for f in problem.findings)

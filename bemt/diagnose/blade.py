@@ -35,10 +35,10 @@ _PLAIN = (0.3, 0.03, 0.10, 0.0, 0.0)
 # advance ratios of UIUC volumes 1 and 2); a label leaves the section and the law of the blade angle open as well.
 _SD = {
     "cad": (0.1, 0.02, 0.05, 0.02, 0.1), "scan": (0.5, 0.05, 0.12, 0.1, 0.5), "stations": (1.0, 0.06, 0.15, 0.1, 0.7),
-    "label": (3.0, 0.08, 0.25, 0.15, 1.0), "reference": (0.3, 0.03, 0.10, 0.05, 0.3),
+    "label": (3.5, 0.08, 0.25, 0.15, 1.0), "reference": (0.3, 0.03, 0.10, 0.05, 0.3),
 }  # fmt: skip
 # Heavy tail: factors on all of them, with their probabilities.
-_SIZES, _WEIGHTS = (1.0, 2.0, 4.0), (0.75, 0.20, 0.05)
+_SIZES, _WEIGHTS = (0.8, 1.2, 2.2), (0.5, 0.4, 0.1)
 # With more error of the solver than this it would take what belongs to the blade; every reading has this noise more,
 # shares of the largest coefficient, so that no detail of a curve drives the blade anywhere.
 _SMALL, _ROUGH = 0.03, 0.01
@@ -155,7 +155,8 @@ def calibrated(problem: Problem, prior: Prior) -> tuple[Blade | None, str, str]:
     y = problem.y[rows]
     whole = problem.with_tangents(np.array([not name.startswith("blade ") for name in problem.names]))
     tables = [C[np.ix_(rows, rows)] for C in _covariances(whole)]
-    root, at, chosen = np.linalg.cholesky(prior.cov), prior.mean, -1
+    root = np.asarray(np.linalg.cholesky(prior.cov), dtype=float)
+    at, chosen = prior.mean, -1
     for _ in range(_ROUNDS):
         best = _likeliest(tables, y - solve(at), tangents(solve, at) @ root)
         if best == chosen:
@@ -177,4 +178,4 @@ def calibrated(problem: Problem, prior: Prior) -> tuple[Blade | None, str, str]:
         return None, "no blade fits the reference better than that of the case, which was left as it is", ""
     size = float(np.sqrt(found.weights @ found.sizes**2))
     note = f"blade calibrated on the reference (known from {prior.known_from}): {words or 'as the case has it'}"
-    return Blade(found.mean, prior.mean, size * np.linalg.cholesky(prior.cov)), note, ""
+    return Blade(found.mean, prior.mean, size * root), note, ""

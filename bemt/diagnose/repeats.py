@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 FEWEST = 10
 """Repeats, less what is projected out, from which on they give the noise [1]."""
-# Same condition: largest difference of ln rpm, J, ln density, and of ln distances.  Loads are compared with the model at
+# Same condition: largest difference of ln rpm, J, ln density and ln distances.  Loads are compared with the model at
 # their own speeds, so that what changes within a condition is only how far the model is off.
 _NEAR_SPEED, _NEAR_J, _NEAR_AIR, _NEAR_LENGTH = 0.04, 0.02, 0.01, 0.01
 # Where the repeats cannot tell a share of the reading from a share of full scale: 0.5 % and 0.1 %, each within a factor
