@@ -6,6 +6,7 @@ f(c) - T (c - mean of the prior), signatures of effects to f(c) itself, and noth
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -14,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.asbuilt.conditioning import condition, tangents
-from bemt.asbuilt.latents import NAMES, STEP, UNITS, Prior, as_built
+from bemt.asbuilt.latents import NAMES, STEP, UNITS, AsBuilt, Prior
 from bemt.diagnose import noise
 
 if TYPE_CHECKING:
     from bemt.case import Case
     from bemt.diagnose.problem import Part, Problem
-    from bemt.effects.base import Effect
+    from bemt.effects.base import Baking, Effect
 
 __all__ = ["FARTHEST_DEG", "PLAIN", "Blade", "calibrated", "known_from", "prior_of", "turned"]
 
@@ -42,6 +43,8 @@ _SIZES, _WEIGHTS = (0.8, 1.2, 2.2), (0.5, 0.4, 0.1)
 # With more error of the solver than this it would take what belongs to the blade; every reading has this noise more,
 # shares of the largest coefficient, so that no detail of a curve drives the blade anywhere.
 _SMALL, _ROUGH = 0.03, 0.01
+# Blade angles within which a pitch means something [rad].
+_FLAT, _STEEP = 0.02, 1.45
 # Rounds of choosing covariance and point.
 _ROUNDS = 3
 _WORTH_SAYING = 0.5
@@ -68,6 +71,18 @@ def _likeliest(tables: Sequence[Array], r: Array, B: Array) -> int:
     return int(np.argmax(scores))
 
 
+@dataclass(frozen=True)
+class AsLabelled(AsBuilt):
+    """Rotor whose pitch is what the label may have wrong: the angle holds at 0.75 R, the twist is that of the pitch."""
+
+    def blade(self, bake: Baking) -> None:
+        """Change the pitch, beta = atan(pitch / (2 pi r)) at every station."""
+        at75 = float(np.interp(0.75 * bake.R, bake.r, bake.beta))
+        steeper = math.tan(np.clip(at75 + math.radians(self.angle_deg), _FLAT, _STEEP)) / math.tan(max(at75, _FLAT))
+        lawful = np.clip(bake.beta, _FLAT, _STEEP)
+        bake.beta = bake.beta + np.arctan(steeper * np.tan(lawful)) - lawful
+
+
 @dataclass(frozen=True, eq=False)
 class Blade:
     """What is believed of the rotor's blade.
@@ -80,11 +95,19 @@ class Blade:
         Centre of the prior.
     root : (K, K) float
         Square root of the prior's covariance: its columns are one standard deviation each.
+    kind : type of AsBuilt
+        What an angle means: a turn, or another pitch.
     """
 
     at: Array
     mean: Array
     root: Array
+    kind: type[AsBuilt] = AsBuilt
+
+    @property
+    def effect(self) -> AsBuilt:
+        """Blade at the point of the tangents."""
+        return self.kind(*map(float, self.at))
 
     @property
     def used(self) -> NDArray[np.intp]:
@@ -100,7 +123,7 @@ class Blade:
         """Blade with one latent number changed."""
         z = self.at.copy()
         z[k] += step
-        return as_built(z)
+        return self.kind(*map(float, z))
 
 
 PLAIN = Blade(np.zeros(len(NAMES)), np.zeros(len(NAMES)), np.diag(_PLAIN))
@@ -144,12 +167,13 @@ def calibrated(problem: Problem, prior: Prior) -> tuple[Blade | None, str, str]:
     rows = ~problem.free
     if rows.sum() < 3:
         return None, "", ""
+    kind = AsLabelled if prior.known_from == "label" else AsBuilt
     parts = [p for p in problem.parts if p.record.reference]
     ends = np.cumsum([0, *(len(p.channels) * len(p.record) for p in problem.parts)])
     kept = [problem.kept[a:b] for p, a, b in zip(problem.parts, ends, ends[1:], strict=False) if p.record.reference]
 
     def solve(z: Array) -> Array:
-        blade = as_built(z)
+        blade = kind(*map(float, z))
         return np.concatenate([p.predict(turned(p, blade))[k] for p, k in zip(parts, kept, strict=True)])
 
     y = problem.y[rows]
@@ -178,4 +202,4 @@ def calibrated(problem: Problem, prior: Prior) -> tuple[Blade | None, str, str]:
         return None, "no blade fits the reference better than that of the case, which was left as it is", ""
     size = float(np.sqrt(found.weights @ found.sizes**2))
     note = f"blade calibrated on the reference (known from {prior.known_from}): {words or 'as the case has it'}"
-    return Blade(found.mean, prior.mean, size * root), note, ""
+    return Blade(found.mean, prior.mean, size * root, kind), note, ""

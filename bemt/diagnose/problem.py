@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.asbuilt.latents import as_built
 from bemt.base.errors import Fault, InputError
 from bemt.bem import model as bem
 from bemt.case.prepare import k1k2_case, prepare_case
@@ -366,7 +365,7 @@ def _calibrated(problem: Problem, cases: Sequence[Case]) -> tuple[Problem, tuple
     notes, found = (note,) if note else (), (f"{refers[0].record.name}: {finding}",) if finding else ()
     if blade is None:
         return replace(problem, notes=(*problem.notes, *notes)), found
-    whole = assemble(tuple(_with_blade(p, as_built(blade.at)) for p in problem.parts), blade)
+    whole = assemble(tuple(_with_blade(p, blade.effect) for p in problem.parts), blade)
     return replace(whole, notes=(*whole.notes, *notes)), found
 
 
