@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosing import case, points, recording
+from diagnosing import case, left_out, points, recording
 
 from bemt.asbuilt.latents import AsBuilt
 from bemt.dataset import Dataset
@@ -112,3 +112,18 @@ def test_a_blade_that_runs_away_is_said_and_not_used() -> None:
     plain = recording(guess, given, (AsBuilt(angle_deg=14.0),), noise=0.004)
     problem = build([from_series(plain, guess), replace(from_series(plain, guess), reference=True)], [guess])
     assert not problem.blade.at.any() and any("another rotor" in f for f in problem.findings)
+
+
+def test_a_motor_that_does_not_do_as_told_keeps_its_misfit_to_itself() -> None:
+    """Speed over pulse width wobbles as nothing in the library does; the loads show what was left out all the same."""
+    base, given = case(), points("grid")
+    wobble = 1.0 + 0.06 * np.sin(0.9 * np.arange(given["rpm"].size))
+    series = recording(base, given | {"pwm_s": 1e-3 + given["rpm"] * wobble / 26e6}, noise=0.004)
+    record = from_series(series, left_out("compressibility", base))
+    assert "rpm" in record.measured
+    answer = chain.diagnose([record], [left_out("compressibility", base)], nulls=200)
+    assert (answer.decision.verdict, answer.decision.effects) == ("named", ("compressibility",))
+    assert answer.systems["air"]["effects"] == ["compressibility"]
+    assert answer.systems["drive"]["verdict"] in ("unknown", "insufficient")
+    loads = chain.diagnose([record], [left_out("compressibility", base)], nulls=200, channels=["torque_Nm"])
+    assert set(loads.scores) == {"torque_Nm"} and loads.systems["drive"]["verdict"] == "not recorded"

@@ -122,6 +122,12 @@ class Record:
         )  # fmt: skip
 
 
+    def only(self, channels: Sequence[str]) -> Record:
+        """Record with some of its channels, as far as they were measured."""
+        kept = [c for c in self.measured if c in channels]
+        return replace(self, measured={c: self.measured[c] for c in kept}, u={c: self.u[c] for c in kept})
+
+
 _AIR = ("rho", "mu", "a_sound", "temperature_K")
 
 
