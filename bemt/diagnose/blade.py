@@ -45,6 +45,8 @@ _SIZES, _WEIGHTS = (0.8, 1.2, 2.2), (0.5, 0.4, 0.1)
 _SMALL, _ROUGH = 0.03, 0.01
 # Blade angles within which a pitch means something [rad].
 _FLAT, _STEEP = 0.02, 1.45
+# Loads that a blade is sought on.
+_FEWEST = 3
 # Rounds of choosing covariance and point.
 _ROUNDS = 3
 _WORTH_SAYING = 0.5
@@ -165,7 +167,7 @@ def calibrated(problem: Problem, prior: Prior) -> tuple[Blade | None, str, str]:
         The blade, None where none was found; a note of what was done; a finding, "" without one.
     """
     rows = ~problem.free
-    if rows.sum() < 3:
+    if np.count_nonzero(problem.channel[rows] < 2) < _FEWEST:
         return None, "", ""
     kind = AsLabelled if prior.known_from == "label" else AsBuilt
     parts = [p for p in problem.parts if p.record.reference]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import effects
-from bemt.diagnose import blocks, confusion, evidence, gate, signatures, verdict
+from bemt.diagnose import another_rotor, blocks, confusion, evidence, gate, signatures, verdict
 from bemt.diagnose import fit as fitting
 from bemt.diagnose import locate as location
 from bemt.diagnose import suggest as suggestion
@@ -201,13 +201,15 @@ def _diagnose(
 ) -> Diagnosis:
     say("baseline and nuisances")
     problem = build(records, cases, baseline)
+    if question := another_rotor.finding(problem):
+        problem = replace(problem, between=(question, *problem.between))
     candidates, absent = signatures.candidates(problem, only, lambda name: say(f"solving with {name}"))
     say("weighing explanations")
     found = evidence.weigh(problem, candidates)
     say("bootstrapped nulls")
     p = gate.p_value(found, nulls)
     asked = verdict.Asked(found, p)
-    decision = verdict.decide(asked)
+    decision = another_rotor.judged(problem, verdict.decide(asked))
     best, parameters = asked.refined(decision.leading)
     say("held-out blocks")
     words, held, gp_only = blocks.held_out(found, decision.leading if decision.verdict != "unknown" else NONE)

@@ -372,8 +372,8 @@ def _calibrated(problem: Problem, cases: Sequence[Case]) -> tuple[Problem, tuple
 def _with_blade(part: Part, blade: Effect) -> Part:
     """Part whose baseline has another blade."""
     baseline, old = turned(part, blade), part.flow
-    plain = [e for e in baseline if not forward.acts_on_points(e)]
-    flow = forward.flow_of(
+    plain = [e for e in baseline if not bem.acts_on_points(e)]
+    flow = bem.flow_of(
         part.model.prepared(plain), part.record.rpm, part.record.V, part.record.air, part.record.extra, old.chord
     )
     return replace(part, baseline=baseline, flow=flow, _solved={})
