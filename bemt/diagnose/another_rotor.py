@@ -141,7 +141,8 @@ def finding(problem: Problem) -> str:
 
 def judged(problem: Problem, decision: Decision) -> Decision:
     """Decision that names no physics for loads that cannot be those of the case's rotor."""
-    if not _suspicious(levels(problem)) or set(decision.effects) & set(_SLIPS):
+    slip = decision.verdict in ("named", "sensor") and set(decision.effects) & set(_SLIPS)
+    if slip or not _suspicious(levels(problem)):
         return decision
     why = f"the loads are off by more than a factor of {FACTOR:g}: first make sure that the case is this rotor"
     return replace(decision, verdict="insufficient", effects=(), classes=(), why=why)
