@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 from bemt.asbuilt.conditioning import condition, tangents
 from bemt.asbuilt.latents import NAMES, STEP, UNITS, AsBuilt, Prior
+from bemt.case.as_built import as_built_of, known_from
+from bemt.case.prepare import prepare_case
 from bemt.diagnose import noise
 
 if TYPE_CHECKING:
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
     from bemt.diagnose.problem import Part, Problem
     from bemt.effects.base import Baking, Effect
 
-__all__ = ["FARTHEST_DEG", "PLAIN", "Blade", "calibrated", "known_from", "prior_of", "turned"]
+__all__ = ["FARTHEST_DEG", "PLAIN", "Blade", "calibrated", "prior_of", "turned"]
 
 Array = NDArray[np.float64]
 
@@ -132,18 +134,18 @@ PLAIN = Blade(np.zeros(len(NAMES)), np.zeros(len(NAMES)), np.diag(_PLAIN))
 """Blade of the case as it is written."""
 
 
-def known_from(case: Case) -> str:
-    """How the blade of a case is known: as it says, else from what it is made of."""
-    told = case.get("blade.known_from") if "known_from" in case.written.get("blade", {}) else None
-    if told:
-        return str(told)
-    return "stations" if any(case.get(f"blade.{k}") for k in ("stations", "uiuc", "apc")) else "label"
-
-
 def prior_of(case: Case) -> Prior:
-    """What is known of the blade of a case before a run of it."""
-    sd = np.array(_SD[known_from(case)])
-    return Prior(np.zeros(sd.size), np.diag(sd**2), np.array(_SIZES), np.array(_WEIGHTS), known_from(case))
+    """What is known of the blade of a case before a run of it, wide enough for a label that was guessed."""
+    blade, told = case.file.blade, case.file.blade.as_built
+    source = known_from(blade)
+    if source == "reference" and told is not None and told.file is not None:
+        return as_built_of(case.file, case.folder, prepare_case(case, None, 10).rotor).prior
+    sd, mean = dict(zip(NAMES, _SD[source], strict=True)), np.zeros(len(NAMES))
+    for k, name in enumerate(NAMES):
+        mean[k] = getattr(told, name, None) or 0.0
+        stated = getattr(told, f"{name.removesuffix('_deg')}_sd{'_deg' if name.endswith('_deg') else ''}", None)
+        sd[name] = sd[name] if stated is None else max(float(stated), 1e-3)
+    return Prior(mean, np.diag(np.array(list(sd.values())) ** 2), np.array(_SIZES), np.array(_WEIGHTS), source)
 
 
 def turned(part: Part, blade: Effect) -> tuple[Effect, ...]:
