@@ -37,6 +37,10 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--along", metavar="FILE", help=blade)
     seen = "look at these only (default: all that were measured)"
     parser.add_argument("--channels", choices=tuple(_CHANNELS), help=seen, **_options.MANY)
+    speed = "speed of force files of CFD, one for all or one each [rev/min]"
+    parser.add_argument("--rpm", type=float, default=[], metavar="N", help=speed, **_options.MANY)
+    wind = "airspeed of force files of CFD, one for all or one each [m/s] (default: the case's)"
+    parser.add_argument("--airspeed", type=float, default=[], metavar="V", help=wind, **_options.MANY)
     parser.add_argument("--out", metavar="DIR", help="write diagnosis.json, figures and the improved cases there")
     parser.add_argument("--no-figures", action="store_true", help="with --out: no figures")
     _options.add_json(parser, "bemt.diagnosis/1")
@@ -53,7 +57,8 @@ def run(args: argparse.Namespace) -> int:
     from bemt.diagnose.load import load_all
 
     cases, recordings = load_all(args.recordings, args.case, args.reference, args.off, args.only or (),
-                                 before=lambda found: folder.check(args.out, found))  # fmt: skip
+                                 before=lambda found: folder.check(args.out, found), rpm=args.rpm,
+                                 airspeed_m_s=args.airspeed)  # fmt: skip
     with _terminal.progress(args.quiet or args.json) as say:
         channels = [_CHANNELS[c] for c in args.channels or ()] or None
         answer = diagnose(recordings, cases, args.only or None, say, baseline=args.baseline, given=_given(args),

@@ -17,6 +17,7 @@ from bemt.base.units import ZERO_CELSIUS
 from bemt.case import find_cases, load_case
 from bemt.case.prepare import prepare_case
 from bemt.dataset import Dataset
+from bemt.diagnose import cfd_points
 from bemt.diagnose import record as records
 from bemt.recordings.channels import view
 from bemt.recordings.check import check
@@ -54,7 +55,10 @@ def cases_of(paths: Sequence[str], off: Sequence[str], n: int) -> list[Case]:
     return found
 
 
-def load(path: str, case: Case, imported: Imported | None = None) -> Record:
+def load(
+    path: str, case: Case, imported: Imported | None = None, rpm: float | None = None,
+    airspeed_m_s: float | None = None,
+) -> Record:  # fmt: skip
     """Read one recording, whatever its format.
 
     Parameters
@@ -65,6 +69,8 @@ def load(path: str, case: Case, imported: Imported | None = None) -> Record:
         Diameter, and what the recording does not say.
     imported : Imported, optional
         The file as read already, or some of its rows.
+    rpm, airspeed_m_s : float, optional
+        Speed of rotation [rev/min] and axial onset speed [m/s] of a force file of CFD, which states neither.
 
     Returns
     -------
@@ -80,6 +86,9 @@ def load(path: str, case: Case, imported: Imported | None = None) -> Record:
     from bemt.recordings.load import import_file
 
     imported = imported or import_file(path)
+    if cfd_points.has_forces(imported):
+        made = records.from_series(cfd_points.point_of(imported, path, rpm, airspeed_m_s), case)
+        return replace(made, notes=(*made.notes, *imported.warnings))
     _same_rotor(imported, case, path)
     ducted = case.ducted
     findings = check(imported, diameter_m=case.diameter_m, blades=int(case.get("rotor.blades")), ducted=ducted)
@@ -164,6 +173,7 @@ def _points(imported: Imported, rows: Recorded, path: str) -> Dataset:
 def load_all(
     recordings: Sequence[str], cases: Sequence[str], references: Sequence[str] = (), off: Sequence[str] = (),
     only: Sequence[str] = (), before: Callable[[Sequence[Case]], None] | None = None,
+    rpm: Sequence[float] = (), airspeed_m_s: Sequence[float] = (),
 ) -> tuple[list[Case], list[Record]]:  # fmt: skip
     """Cases and recordings, the references last; ``before`` may refuse the cases before any recording is read."""
     _told_twice([*recordings, *references], only)
@@ -173,10 +183,18 @@ def load_all(
     for case in found:
         prepare_case(case, None, 10)  # an unknown effect in the case is said before the work begins
     chosen = found * len(recordings) if len(found) == 1 else found
-    loaded = [load(p, c) for p, c in zip(recordings, chosen, strict=True)]
+    speeds, winds = _each("--rpm", rpm, len(recordings)), _each("--airspeed", airspeed_m_s, len(recordings))
+    loaded = [load(p, c, None, n, v) for p, c, n, v in zip(recordings, chosen, speeds, winds, strict=True)]
     if references and len(found) > 1:
         raise InputError(Fault("--reference", "", f"{len(found)} cases", "one case for all when there are references"))
     return found, [*loaded, *(replace(load(p, found[0]), reference=True) for p in references)]
+
+
+def _each(option: str, given: Sequence[float], n: int) -> list[float | None]:
+    """One number for each of n files: the same for all, or as given."""
+    if len(given) not in (0, 1, n):
+        raise InputError(Fault(option, "", f"{len(given)} numbers for {n} files", "one for all, or one each"))
+    return [None] * n if not given else [float(given[0])] * n if len(given) == 1 else [float(v) for v in given]
 
 
 def _told_twice(paths: Sequence[str], only: Sequence[str]) -> None:
