@@ -410,7 +410,7 @@ def test_force_files_of_cfd_go_straight_in(tmp_path: Path, capsys: pytest.Captur
     for k, n in enumerate(rpm):
         folder = tmp_path / f"{n:.0f}"
         folder.mkdir()
-        for name, word, value in (("force", "N", -exact["thrust_N"][k]), ("moment", "Nm", exact["torque_Nm"][k])):
+        for name, value in (("force", -exact["thrust_N"][k]), ("moment", exact["torque_Nm"][k])):
             head = f"# {name.capitalize()}\n# CofR : (0 0 0)\n#\n# Time total_x total_y total_z\n"
             rows = "".join(f"{0.01 * i:g}\t{value:.8g}\t{1e-4 * value:.8g}\t0\n" for i in range(1, 60))
             (folder / f"{name}.dat").write_text(head + rows, encoding="utf-8")

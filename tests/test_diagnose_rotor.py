@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from diagnosing import case, points, recording
@@ -45,3 +47,15 @@ def test_one_channel_in_another_unit_stays_a_finding_of_its_own() -> None:
 
 def test_a_rotor_that_is_the_case_is_not_asked_for() -> None:
     assert another_rotor.finding(build([from_series(recording(case(), points("grid")), case())], [case()])) == ""
+
+
+def test_repeats_that_differ_as_no_stand_does_name_nothing() -> None:
+    """The neighbour's speed changes from row to row and is not recorded: its mean is no density and no gain."""
+    base, given = case(), points("static")
+    plain, rng = recording(base, given, noise=0.0), np.random.default_rng(1)
+    values = {k: np.tile(v, 6) for k, v in plain.values.items() if k != "time_s"}
+    values["thrust_N"] = values["thrust_N"] * rng.uniform(0.3, 1.0, values["rpm"].size)
+    test = from_series(Dataset("bench", "map", values), base)
+    reference = replace(from_series(plain, base), reference=True)
+    answer = chain.diagnose([test, reference], [base], nulls=200)
+    assert answer.decision.effects == () and any("not recorded" in f for f in answer.problem.findings)

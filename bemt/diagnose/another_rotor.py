@@ -23,11 +23,13 @@ if TYPE_CHECKING:
     from bemt.diagnose.problem import Problem
     from bemt.diagnose.verdict import Decision
 
-__all__ = ["FACTOR", "Suspect", "finding", "judged", "levels", "suspects"]
+__all__ = ["FACTOR", "RESTLESS", "Suspect", "finding", "judged", "levels", "suspects"]
 
 FACTOR = 3.0
 """Thrust (torque, where no thrust was measured) over that of the case, or under it, from which on the question comes
 first [1]."""
+RESTLESS = 0.10
+"""Scatter of repeats, share of the reading, that no stand has: something that is not recorded changes [1]."""
 # What loads of the right rotor may be off by, natural logarithm; how unusual a slip is adds to its square.
 _OFF = 0.25
 _SHOWN = 3
@@ -128,12 +130,17 @@ def _slips(problem: Problem, found: dict[str, float]) -> Iterator[tuple[str, str
             yield kind, words, {c: math.log(ratio[c]) for c in found}, rarity
 
 
+def _restless(problem: Problem) -> dict[str, float]:
+    """Channels whose repeats differ by more than any stand's, with their scatter [1]."""
+    return {c: s for c, s in problem.scatter.items() if s > RESTLESS}
+
+
 def finding(problem: Problem) -> str:
-    """Question to the user, "" where the loads may be those of the case's rotor."""
-    found = levels(problem)
+    """Question to the user, "" where the loads may be those of the case's rotor, at rest but for what is recorded."""
+    found, names = levels(problem), {"thrust_N": "thrust", "torque_Nm": "torque"}
     if not _suspicious(found):
-        return ""
-    names = {"thrust_N": "thrust", "torque_Nm": "torque"}
+        told = " and ".join(f"{names[c]} by {s:.0%}" for c, s in _restless(problem).items())
+        return f"at one speed the readings differ, {told}: what changes between them is not recorded" if told else ""
     off = " and ".join(f"{names[c]} is {v:.3g} times" for c, v in found.items())
     ranked = "; ".join(f"{k}. {s.words}" for k, s in enumerate(suspects(problem)[:_SHOWN], 1))
     return f"{off} what the case gives. Is it this rotor? Likeliest: {ranked}"
@@ -141,6 +148,9 @@ def finding(problem: Problem) -> str:
 
 def judged(problem: Problem, decision: Decision) -> Decision:
     """Decision that names no physics for loads that cannot be those of the case's rotor."""
+    if _restless(problem) and decision.verdict not in ("none", "unknown"):
+        why = "repeats at one condition differ by more than any stand's: what changes between them is not recorded"
+        return replace(decision, verdict="insufficient", effects=(), classes=(), why=why)
     slip = decision.verdict in ("named", "sensor") and set(decision.effects) & set(_SLIPS)
     if slip or not _suspicious(levels(problem)):
         return decision

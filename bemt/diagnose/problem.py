@@ -190,6 +190,8 @@ class Problem:
         What was assumed or left out.
     between : tuple of str
         What looks wrong in a recording beside the others, its file named in front.
+    scatter : dict of str to float
+        Scatter of repeats as a share of the median reading, by channel, where there are enough of them [1].
     blade : Blade
         What is believed of the rotor's blade, and the point of its tangents.
     offset : (M,) float
@@ -214,6 +216,7 @@ class Problem:
     own: NDArray[np.bool_]
     notes: tuple[str, ...] = ()
     between: tuple[str, ...] = ()
+    scatter: dict[str, float] = field(default_factory=dict)
     blade: Blade = PLAIN
     offset: Array = field(default_factory=lambda: np.zeros(0))
     predicted: dict[Any, Array] = field(default_factory=dict, repr=False)
@@ -467,6 +470,7 @@ def _with_noise(problem: Problem) -> Problem:
     label = repeats.conditions(X["rpm"], X["J"], X["density_kg_m3"], lengths, owner.astype(float))
     label[np.array([dense(p.record) for p in problem.parts])[owner]] = -1
     run, place = in_time(X)
+    shares: dict[str, float] = {}
     for c, name in enumerate(CHANNELS[:2]):
         mine = rows[(problem.channel == c) & (label[problem.point] >= 0)]
         # readings that are those of the model to the last digit are a plan, not a measurement
@@ -483,9 +487,10 @@ def _with_noise(problem: Problem) -> Problem:
         seen = np.hypot(a * problem.y[every], b * full[every])
         sigma[every] = np.where(known[every], np.hypot(sigma[every], seen), seen)
         known = known | every
+        shares[name] = float(np.median(seen / np.maximum(np.abs(problem.y[every]), 1e-12)))
         beside = " beside what is stated" if told is not None else ""
         notes.append(f"{name}: {dof} repeats scatter by {a:.2%} of the reading and {b:.2%} of full scale{beside}")
-    return replace(problem, u=sigma, u_known=bool(known.mean() > 0.5), notes=tuple(notes))
+    return replace(problem, u=sigma, u_known=bool(known.mean() > 0.5), notes=tuple(notes), scatter=shares)
 
 
 def _scale(part: Part) -> Array:

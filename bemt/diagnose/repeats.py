@@ -24,6 +24,8 @@ _NEAR_SPEED, _NEAR_J, _NEAR_AIR, _NEAR_LENGTH = 0.04, 0.02, 0.01, 0.01
 # Where the repeats cannot tell a share of the reading from a share of full scale: 0.5 % and 0.1 %, each within a factor
 # of about four.  Declared; load cells and torque cells of hobby stands.
 _USUAL, _SPREAD = np.log([5e-3, 1e-3]), 1.5
+# No stand is better than this, whatever digits repeat.
+_BEST = np.array([2e-4, 1e-4])
 # The data must be this much likelier (natural logarithm) before stated uncertainties are enlarged.
 _DOUBT = 3.0
 
@@ -130,5 +132,5 @@ def _likeliest(misfit: Callable[[float, float], float]) -> tuple[float, float]:
 
     starts = (_USUAL, _USUAL + np.array([0.0, 1.5]), _USUAL + np.array([1.5, 0.0]))
     found = [minimize(total, s, method="Nelder-Mead", options={"xatol": 0.02, "fatol": 0.01}) for s in starts]
-    a, b = np.exp(min(found, key=lambda m: float(m.fun)).x)
+    a, b = np.maximum(np.exp(min(found, key=lambda m: float(m.fun)).x), _BEST)
     return float(a), float(b)
