@@ -96,9 +96,9 @@ class Blade:
     at : (K,) float
         Point of the tangents, in the order and units of `NAMES`.
     mean : (K,) float
-        Centre of the prior.
+        Centre of the prior, in the units of `NAMES`.
     root : (K, K) float
-        Square root of the prior's covariance: its columns are one standard deviation each.
+        Square root of the prior's covariance: its columns are one standard deviation each, in the units of `NAMES`.
     kind : type of AsBuilt
         What an angle means: a turn, or another pitch.
     """
