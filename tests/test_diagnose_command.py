@@ -400,3 +400,25 @@ def test_real_recordings_of_one_propeller_have_one_unit(shared_data: Path, tmp_p
         pounds = static.measured | {"thrust_N": static.measured["thrust_N"] / 4.4482216}
         (found,) = problem.build([*records[:-1], replace(static, measured=pounds)], [own]).findings
         assert found.startswith(f"{static.name}: error: thrust_unit") and "lbf taken for N" in found
+
+
+def test_force_files_of_cfd_go_straight_in(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Forces and moments as OpenFOAM writes them, one folder a speed; the speeds come with the command."""
+    rpm = [8000.0, 12000.0, 16000.0]
+    exact = recording(case(), {"rpm": np.array(rpm), "airspeed_m_s": np.zeros(3)}, noise=0.0)
+    files = []
+    for k, n in enumerate(rpm):
+        folder = tmp_path / f"{n:.0f}"
+        folder.mkdir()
+        for name, value in (("force", -exact["thrust_N"][k]), ("moment", exact["torque_Nm"][k])):
+            head = f"# {name.capitalize()}\n# CofR : (0 0 0)\n#\n# Time total_x total_y total_z\n"
+            rows = "".join(f"{0.01 * i:g}\t{value:.8g}\t{1e-4 * value:.8g}\t0\n" for i in range(1, 60))
+            (folder / f"{name}.dat").write_text(head + rows, encoding="utf-8")
+        files.append(str(folder / "force.dat"))
+    base = ["diagnose", *files, "--case", str(CASES / "prop_8x5"), "--json", "--quiet"]
+    assert main(base) == 2
+    assert "--rpm" in capsys.readouterr().err
+    assert main([*base, "--rpm", *(f"{n:g}" for n in rpm), "--airspeed", "0"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert (said["verdict"], said["readings"]) == ("none", 6)
+    assert max(abs(s["before"] / said["fit"][c]["mean"]) for c, s in said["fit"].items()) < 0.01

@@ -12,8 +12,10 @@ from diagnosing import case, diagnose, left_out, points, recording
 
 from bemt import effects
 from bemt.bem import model as bem
-from bemt.diagnose import blocks, chain, confusion, fit, prior, verdict
+from bemt.diagnose import blocks, chain, confusion, fit, noise, prior, verdict
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
+from bemt.diagnose.problem import build
+from bemt.diagnose.record import from_series
 
 
 @pytest.fixture(scope="module")
@@ -102,6 +104,18 @@ def test_references_are_in_no_block() -> None:
     for _, block in blocks.partitions(problem):
         assert np.array_equal(block == blocks.REFERENCE, rpm < 5000)
         assert np.unique(block[block >= 0]).size == 3
+
+
+def test_an_unknown_effect_is_in_the_test_not_in_the_reference() -> None:
+    given = points("grid")
+    truth = case()
+    series = recording(truth, given)
+    records = [from_series(series, truth), replace(from_series(series, truth), reference=True)]
+    problem = build(records, [truth])
+    kernels = noise.rivals(problem)
+    assert kernels and 0 < problem.free.sum() < problem.free.size
+    for _, K in kernels:
+        assert not K[~problem.free].any() and (np.diag(K)[problem.free] >= 0.0).all() and K[problem.free].any()
 
 
 def test_intervals_end_at_the_physical_bounds() -> None:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 NAME = "diagnose"
 HELP = "say what physics was left out when recording and simulation differ"
 GROUP = "Recordings"
+_CHANNELS = {"thrust": "thrust_N", "torque": "torque_Nm", "speed": "rpm"}
 EXAMPLE = "diagnose log.csv --case cases/prop_8x5"
 
 
@@ -34,6 +35,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--only", metavar="EFFECT", help=only, **_options.MANY)
     blade = "loads along the blade (radial.csv of a campaign) beside those of the first case"
     parser.add_argument("--along", metavar="FILE", help=blade)
+    seen = "look at these only (default: all that were measured)"
+    parser.add_argument("--channels", choices=tuple(_CHANNELS), help=seen, **_options.MANY)
+    speed = "speed of force files of CFD, one for all or one each [rev/min]"
+    parser.add_argument("--rpm", type=float, default=[], metavar="N", help=speed, **_options.MANY)
+    wind = "airspeed of force files of CFD, one for all or one each [m/s] (default: the case's)"
+    parser.add_argument("--airspeed", type=float, default=[], metavar="V", help=wind, **_options.MANY)
     parser.add_argument("--out", metavar="DIR", help="write diagnosis.json, figures and the improved cases there")
     parser.add_argument("--no-figures", action="store_true", help="with --out: no figures")
     _options.add_json(parser, "bemt.diagnosis/1")
@@ -50,9 +57,12 @@ def run(args: argparse.Namespace) -> int:
     from bemt.diagnose.load import load_all
 
     cases, recordings = load_all(args.recordings, args.case, args.reference, args.off, args.only or (),
-                                 before=lambda found: folder.check(args.out, found))  # fmt: skip
+                                 before=lambda found: folder.check(args.out, found), rpm=args.rpm,
+                                 airspeed_m_s=args.airspeed)  # fmt: skip
     with _terminal.progress(args.quiet or args.json) as say:
-        answer = diagnose(recordings, cases, args.only or None, say, baseline=args.baseline, given=_given(args))
+        channels = [_CHANNELS[c] for c in args.channels or ()] or None
+        answer = diagnose(recordings, cases, args.only or None, say, baseline=args.baseline, given=_given(args),
+                          channels=channels)  # fmt: skip
     blade = along(cases[0], Path(args.along)) if args.along else {}
     found = document(answer) | {"recordings": list(args.recordings), "cases": [c.name for c in cases]}
     if blade:

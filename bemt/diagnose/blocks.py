@@ -100,7 +100,7 @@ def held_out(
     K = next((k for n, k in noise.rivals(problem) if n == found.states[0].best_rival), np.zeros_like(C))
     S, log_w = _columns(found, what)
     r = problem.residual
-    after, smooth_part = np.array(problem.f0), np.array(problem.f0)
+    after, smooth_part = np.array(problem.centre), np.array(problem.centre)
     systematic = C - hyper.scale**2 * noise.noise(problem, hyper.ar)
     own = form_covariance(found, fit(found, what))
     for b in np.unique(member[member != REFERENCE]):

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.diagnose import blocks, confusion, evidence, gate, signatures, verdict
+from bemt import effects
+from bemt.diagnose import another_rotor, blocks, confusion, evidence, gate, signatures, verdict
 from bemt.diagnose import fit as fitting
 from bemt.diagnose import locate as location
 from bemt.diagnose import suggest as suggestion
@@ -57,6 +58,8 @@ class Diagnosis:
         Distances of effects in this plan.
     absent : dict of str to str
         Effects that could not be tried, and why.
+    drive : Diagnosis or None
+        Of the motor's speed over pulse width, a problem of its own; None where it was not recorded.
     """
 
     found: evidence.Evidence
@@ -72,6 +75,24 @@ class Diagnosis:
     next: suggestion.Suggestion
     alike: confusion.Confusion
     absent: dict[str, str]
+    drive: Diagnosis | None = None
+
+    @property
+    def systems(self) -> dict[str, dict[str, Any]]:
+        """Verdict and effects of air, stand and drive, each for itself."""
+        said = self.decision
+        listed = said.verdict in ("named", "class", "sensor")
+        kinds = {i: effects.catalogue()[i].kind for i in said.effects}
+        out: dict[str, dict[str, Any]] = {}
+        for system in ("air", "stand", "drive"):
+            mine = [i for i, kind in kinds.items() if kind == system]
+            word = ("none" if not mine else said.verdict) if listed else said.verdict
+            out[system] = {"verdict": word, "effects": mine}
+        if self.drive is not None and self.drive is not self:
+            out["drive"] = {"verdict": self.drive.decision.verdict, "effects": list(self.drive.decision.effects)}
+        elif not any("rpm" in p.channels for p in self.problem.parts):
+            out["drive"] = {"verdict": "not recorded", "effects": []}
+        return out
 
     @property
     def problem(self) -> Problem:
@@ -100,6 +121,7 @@ def diagnose(
     nulls: int = gate.NULLS,
     baseline: str = "bemt",
     given: suggestion.Given | None = None,
+    channels: Sequence[str] | None = None,
 ) -> Diagnosis:
     """Say what was left out.
 
@@ -119,15 +141,53 @@ def diagnose(
         Model that is compared: "bemt", or "k1k2" for its thrust.
     given : Given, optional
         What was asked on the command line, for the commands of the next step.
+    channels : sequence of str, optional
+        Of `CHANNELS`; all that were measured by default.
 
     Returns
     -------
     Diagnosis
         The answer.
     """
+    say = progress or (lambda _: None)
+    speed = CHANNELS[2]
+    each = list(cases) * len(records) if len(cases) == 1 else list(cases)
+    told = [(r.only(channels) if channels else r, c) for r, c in zip(records, each, strict=True)]
+    loads = [(r.only(CHANNELS[:2]), c) for r, c in told if set(r.measured) - {speed}]
+    turns = [(r.only((speed,)), c) for r, c in told if speed in r.measured]
+
+    def chain(some: Sequence[tuple[Record, Case]], ids: Sequence[str] | None) -> Diagnosis:
+        return _diagnose([r for r, _ in some], [c for _, c in some], ids, say, nulls, baseline,
+                         given or suggestion.Given())  # fmt: skip
+
+    def tested(some: Sequence[tuple[Record, Case]]) -> bool:
+        return any(not r.reference for r, _ in some)
+
     with evidence.one_thread():
-        told = progress or (lambda _: None)
-        return _diagnose(records, cases, only, told, nulls, baseline, given or suggestion.Given())
+        if not turns:
+            return chain(told, only)
+        ids = [i for i in effects.catalogue() if only is None or i in only]
+        # what drives the rotor cannot be seen in the loads at the measured speed, nor loads in the speed of a motor
+        drives = [i for i in ids if effects.catalogue()[i].kind == "drive"]
+        motor = chain(turns, drives) if drives and tested(turns) else None
+        if not tested(loads):
+            return motor or chain(told, only)
+        rotor = chain(loads, [i for i in ids if i not in drives])
+    return rotor if motor is None else _together(rotor, motor)
+
+
+def _together(rotor: Diagnosis, motor: Diagnosis) -> Diagnosis:
+    """One answer: what the loads say, and what the motor says where the loads say nothing or name a cause."""
+    if rotor.decision.verdict == "none" and motor.decision.verdict in ("named", "class"):
+        return replace(motor, drive=motor, absent=rotor.absent)
+    both = rotor.decision.verdict in ("named", "sensor") and motor.decision.verdict == "named"
+    decision = rotor.decision
+    if both:
+        chance = min(decision.probability, motor.decision.probability)
+        decision = replace(decision, verdict="named", effects=(*decision.effects, *motor.decision.effects),
+                           probability=chance)  # fmt: skip
+    parameters = rotor.parameters | (motor.parameters if both else {})
+    return replace(rotor, decision=decision, parameters=parameters, drive=motor)
 
 
 def _diagnose(
@@ -141,20 +201,22 @@ def _diagnose(
 ) -> Diagnosis:
     say("baseline and nuisances")
     problem = build(records, cases, baseline)
+    if question := another_rotor.finding(problem):
+        problem = replace(problem, between=(question, *problem.between))
     candidates, absent = signatures.candidates(problem, only, lambda name: say(f"solving with {name}"))
     say("weighing explanations")
     found = evidence.weigh(problem, candidates)
     say("bootstrapped nulls")
     p = gate.p_value(found, nulls)
     asked = verdict.Asked(found, p)
-    decision = verdict.decide(asked)
+    decision = another_rotor.judged(problem, verdict.decide(asked))
     best, parameters = asked.refined(decision.leading)
     say("held-out blocks")
     words, held, gp_only = blocks.held_out(found, decision.leading if decision.verdict != "unknown" else NONE)
     if decision.verdict == "unknown":  # what is not in the library is predicted as what it is: something smooth
         held = gp_only
     smooth = fitting.smooth(found, best)
-    after = problem.f0 + best.signature + smooth
+    after = problem.centre + best.signature + smooth
     # without a verdict the likeliest explanation still says best which part of the mismatch is not calibration
     listed = max((k for k in found.probability if k), key=lambda k: found.probability[k], default=None)
     where = location.locate(found, best if best.ids or listed is None else fitting.fit(found, listed))

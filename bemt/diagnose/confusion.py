@@ -139,7 +139,7 @@ def nearest(found: Evidence) -> str:
         candidates.
     """
     problem = found.problem
-    r = problem.residual / problem.u
+    r = (problem.y - problem.f0) / problem.u
 
     def cosine(signatures: Array) -> float:
         s = signatures / problem.u[:, None]

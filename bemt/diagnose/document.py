@@ -73,6 +73,7 @@ def document(d: Diagnosis) -> dict[str, Any]:
         "verdict": d.decision.verdict,
         "effects": list(d.decision.effects),
         "probability": d.decision.probability,
+        "systems": d.systems,
         "ranking": ranking,
         "inclusion": {k: v for k, v in inclusion(found).items() if v > 1e-3},
         "location": d.where.document(),

@@ -164,7 +164,7 @@ def _residual(answer: Diagnosis) -> Figure:
 
 def _shares(answer: Diagnosis, c: int) -> tuple[NDArray[np.bool_], Array]:
     here = answer.problem.channel == c
-    return here, 100.0 * (answer.problem.residual / answer.problem.scale)[here]
+    return here, 100.0 * ((answer.problem.y - answer.problem.f0) / answer.problem.scale)[here]
 
 
 def _located(answer: Diagnosis, c: int, name: str) -> tuple[float, float] | None:

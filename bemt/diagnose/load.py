@@ -18,6 +18,7 @@ from bemt.base.units import ZERO_CELSIUS
 from bemt.case import find_cases, load_case
 from bemt.case.prepare import prepare_case
 from bemt.dataset import Dataset
+from bemt.diagnose import cfd_points
 from bemt.diagnose import record as records
 from bemt.recordings.channels import view
 from bemt.recordings.check import check
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from bemt.diagnose.record import Record
     from bemt.readers._imported import Imported
     from bemt.recordings.channels import Recorded
+    from bemt.recordings.reduce import Reduced
 
 __all__ = ["cases_of", "check_effects", "load", "load_all"]
 
@@ -54,7 +56,10 @@ def cases_of(paths: Sequence[str], off: Sequence[str], n: int) -> list[Case]:
     return found
 
 
-def load(path: str, case: Case, imported: Imported | None = None) -> Record:
+def load(
+    path: str, case: Case, imported: Imported | None = None, rpm: float | None = None,
+    airspeed_m_s: float | None = None,
+) -> Record:  # fmt: skip
     """Read one recording, whatever its format.
 
     Parameters
@@ -65,6 +70,8 @@ def load(path: str, case: Case, imported: Imported | None = None) -> Record:
         Diameter, and what the recording does not say.
     imported : Imported, optional
         The file as read already, or some of its rows.
+    rpm, airspeed_m_s : float, optional
+        Speed of rotation [rev/min] and axial onset speed [m/s] of a force file of CFD, which states neither.
 
     Returns
     -------
@@ -82,6 +89,9 @@ def load(path: str, case: Case, imported: Imported | None = None) -> Record:
     if imported is None:
         imported = import_file(path)
         _one_setup(imported, path)
+    if cfd_points.has_forces(imported):
+        made = records.from_series(cfd_points.point_of(imported, path, rpm, airspeed_m_s), case)
+        return replace(made, notes=(*made.notes, *imported.warnings))
     _same_rotor(imported, case, path)
     ducted = case.ducted
     findings = check(imported, diameter_m=case.diameter_m, blades=int(case.get("rotor.blades")), ducted=ducted)
@@ -93,11 +103,24 @@ def load(path: str, case: Case, imported: Imported | None = None) -> Record:
         reduced = reduction.reduce(imported, diameter_m=case.diameter_m)
         if reduced.mode == "points" and imported.format == "table":
             # somebody's own table of points: every row counts, a jump from row to row may be what it shows
-            made = records.from_series(_points(imported, rows, path), case, reduced.correlated)
+            series = _points(imported, rows, path)
+            made = records.from_series(_scattered(series, reduced), case, reduced.correlated)
         else:
             made = records.from_series(reduced.series, case, reduced.correlated)
     notes = (*made.notes, *imported.warnings, *rows.notes, *_unused(imported, rows, case))
     return replace(made, findings=found, notes=notes)
+
+
+def _scattered(series: Dataset, reduced: Reduced) -> Dataset:
+    """Rows that state no uncertainty with that which the repeats of the reduction showed."""
+    u, floor = {k: np.array(v) for k, v in series.u.items()}, 1e-3
+    for name, seen in reduced.series.u.items():
+        if name not in ("thrust_N", "torque_Nm") or name not in series or np.isfinite(u[name]).any():
+            continue
+        full = float(np.nanmax(np.abs(series[name])))
+        for rows, value in zip(reduced.rows, seen, strict=True):
+            u[name][list(rows)] = np.hypot(value, floor * full)
+    return replace(series, u=u)
 
 
 def _same_rotor(imported: Imported, case: Case, path: str) -> None:
@@ -153,6 +176,7 @@ def _points(imported: Imported, rows: Recorded, path: str) -> Dataset:
 def load_all(
     recordings: Sequence[str], cases: Sequence[str], references: Sequence[str] = (), off: Sequence[str] = (),
     only: Sequence[str] = (), before: Callable[[Sequence[Case]], None] | None = None,
+    rpm: Sequence[float] = (), airspeed_m_s: Sequence[float] = (),
 ) -> tuple[list[Case], list[Record]]:  # fmt: skip
     """Cases and recordings, the references last; ``before`` may refuse the cases before any recording is read."""
     _told_twice([*recordings, *references], only)
@@ -162,10 +186,18 @@ def load_all(
     for case in found:
         prepare_case(case, None, 10)  # an unknown effect in the case is said before the work begins
     chosen = found * len(recordings) if len(found) == 1 else found
-    loaded = [load(p, c) for p, c in zip(recordings, chosen, strict=True)]
+    speeds, winds = _each("--rpm", rpm, len(recordings)), _each("--airspeed", airspeed_m_s, len(recordings))
+    loaded = [load(p, c, None, n, v) for p, c, n, v in zip(recordings, chosen, speeds, winds, strict=True)]
     if references and len(found) > 1:
         raise InputError(Fault("--reference", "", f"{len(found)} cases", "one case for all when there are references"))
     return found, [*loaded, *(replace(load(p, found[0]), reference=True) for p in references)]
+
+
+def _each(option: str, given: Sequence[float], n: int) -> list[float | None]:
+    """One number for each of n files: the same for all, or as given."""
+    if len(given) not in (0, 1, n):
+        raise InputError(Fault(option, "", f"{len(given)} numbers for {n} files", "one for all, or one each"))
+    return [None] * n if not given else [float(given[0])] * n if len(given) == 1 else [float(v) for v in given]
 
 
 def _told_twice(paths: Sequence[str], only: Sequence[str]) -> None:

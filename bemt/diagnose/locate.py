@@ -97,7 +97,7 @@ def bare(found: Evidence) -> Location:
     Location
         Nothing taken away: what the figures of recording and case show to the eye.
     """
-    return _largest(found, found.problem.residual, ())
+    return _largest(found, found.problem.y - found.problem.f0, ())
 
 
 def _largest(found: Evidence, d: Array, natural: tuple[str, ...]) -> Location:

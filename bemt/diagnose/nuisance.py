@@ -1,4 +1,4 @@
-"""What may differ without being a cause: calibration of stand and blade, sessions, errors of the solver itself.
+"""What may differ without being a cause: calibration of stand and blade, errors of the solver itself.
 
 Nuisances enter as tangents with stated priors and are marginalised together with any effect, never fitted first:
 fitting them first would absorb the physics.
@@ -6,15 +6,16 @@ fitting them first would absorb the physics.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.asbuilt.latents import NAMES, AsBuilt
 from bemt.diagnose.noise import law_of, smooth_modes
 from bemt.diagnose.record import CHANNELS
-from bemt.effects.base import Baking, Effect
+from bemt.effects.base import Effect
 
 if TYPE_CHECKING:
     from bemt.diagnose.problem import Part, Problem
@@ -24,15 +25,15 @@ __all__ = ["PRIORS", "PULSE_POWERS", "nuisances"]
 Array = NDArray[np.float64]
 
 PRIORS = {
-    "section drag": 0.10, "lift slope": 0.03, "pitch": 0.3, "thrust gain": 0.01, "torque gain": 0.01,
+    "thrust gain": 0.01, "torque gain": 0.01,
     "thrust zero": 0.002, "torque zero": 0.002, "speed of rotation": 0.003, "density": 0.005,
-    "density not recorded": 0.015, "airspeed": 0.005, "session": 0.01, "parameter of the model": 0.25,
+    "density not recorded": 0.015, "airspeed": 0.005, "parameter of the model": 0.25,
     "level of thrust": 0.06, "level of torque": 0.08, "slope over J": 0.05, "bend over J": 0.02,
     "form of the model": 0.2, "form in a variable of its own": 0.45,
 }  # fmt: skip
-"""Standard deviations: shares [1], pitch in [deg], zeros of full scale [1], parameters of active effects as a share of
-their published range [1].  Drag, lift, pitch, gains and zeros are working calibrations; level, slope
-and bend are errors of the solver itself, declared after volume 1 of the UIUC database; the rest is declared."""
+"""Standard deviations: shares [1], zeros of full scale [1], parameters of active effects as a share of their published
+range [1].  Gains and zeros are working calibrations; level, slope and bend are errors of the solver itself, declared
+after volume 1 of the UIUC database; the rest is declared."""
 
 # Readings further than this factor from the baseline are in other units.
 _SLIPPED = 3.0
@@ -40,27 +41,6 @@ _SLIPPED = 3.0
 PULSE_POWERS = 6
 # Effects whose whole size is below this share of the largest coefficient need no error of their form.
 _FORM_FLOOR = 0.005
-
-
-@dataclass(frozen=True)
-class _Calibration(Effect):
-    """Small changes of blade and section that stand for what nobody measured."""
-
-    pitch_deg: float = 0.0
-    drag: float = 0.0
-    lift: float = 0.0
-
-    id = "calibration"
-    order = 15
-
-    def blade(self, bake: Baking) -> None:
-        """Turn the blade."""
-        bake.beta += np.radians(self.pitch_deg)
-
-    def section(self, bake: Baking) -> None:
-        """Scale drag and lift."""
-        bake.cd *= 1.0 + self.drag
-        bake.cl *= 1.0 + self.lift
 
 
 def _stretch(problem: Problem) -> Array:
@@ -75,7 +55,7 @@ def _stretch(problem: Problem) -> Array:
     return out
 
 
-def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...], NDArray[np.bool_]]:
+def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...], NDArray[np.bool_], Array]:
     """Tangents of everything that may differ without being a cause.
 
     Parameters
@@ -86,8 +66,8 @@ def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...], NDArray[np.bool
     Returns
     -------
     tuple
-        (M, K) change of the readings for one standard deviation of each nuisance, their names, and (K,) whether each
-        is an error of the solver itself.
+        (M, K) change of the readings for one standard deviation of each nuisance, their names, (K,) whether each is an
+        error of the solver itself, and (M,) what the blade's point differs by from the centre of its prior.
     """
     columns: list[Array] = []
     names: list[str] = []
@@ -108,24 +88,25 @@ def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...], NDArray[np.bool
         full = [p.predict((*(e for e in p.baseline if e.id != extra.id), extra)) for p in problem.parts]
         return np.concatenate(full)[problem.kept]
 
-    def calibrated(name: str, **change: float) -> None:
-        up, down = (everywhere(_Calibration(**{k: s * v for k, v in change.items()})) for s in (1.0, -1.0))
-        add(name, 0.5 * (up - down))
-
-    calibrated("pitch", pitch_deg=PRIORS["pitch"])
-    calibrated("section drag", drag=PRIORS["section drag"])
-    calibrated("lift slope", lift=PRIORS["lift slope"])
+    blade, offset = problem.blade, np.zeros_like(y)
+    tangents = np.zeros((y.size, blade.at.size))
+    for k in blade.used:
+        up, down = (everywhere(blade.changed(int(k), s * blade.steps[k])) for s in (1.0, -1.0))
+        tangents[:, k] = (up - down) / (2.0 * blade.steps[k]) * stretch
+    if np.isfinite(tangents).all():
+        offset = tangents @ (blade.at - blade.mean)
+        for j in range(blade.root.shape[1]):
+            add(f"blade {NAMES[j]}", tangents @ blade.root[:, j], of_reading=True)
     rows = [(i, p) for i, p in enumerate(problem.parts)]
     for c, name in ((0, "thrust"), (1, "torque")):
-        here = channel == c
+        here, key = channel == c, CHANNELS[c]
+        # one stand, one gain: what it differs by from run to run is that of the runs, and the readings show it
+        gain = max((p.record.gain[key] for p in problem.parts if key in p.record.gain), default=PRIORS[f"{name} gain"])
+        add(f"{name} gain", np.where(here, gain * y, 0.0), of_reading=True)
         for i, p in rows:
-            mine = here & (problem.part == i)
-            key = CHANNELS[c]
-            gain = p.record.gain.get(key, PRIORS[f"{name} gain"])
             zero = p.record.zero.get(key, PRIORS[f"{name} zero"] * p.full_scale.get(key, 0.0))
             tag = f" ({p.record.name})" if len(rows) > 1 else ""
-            add(f"{name} gain{tag}", np.where(mine, gain * y, 0.0), of_reading=True)
-            add(f"{name} zero{tag}", np.where(mine, zero, 0.0))
+            add(f"{name} zero{tag}", np.where(here & (problem.part == i), zero, 0.0))
     load = channel < 2
     slope_V = np.concatenate([np.concatenate([_slope(p, c) for c in p.channels]) for p in problem.parts])[problem.kept]
     V = np.concatenate([p.flow.V for p in problem.parts])[problem.point]
@@ -149,13 +130,6 @@ def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...], NDArray[np.bool
     recorded = all(p.record.air_recorded for p in problem.parts)
     add("density", np.where(load, PRIORS["density" if recorded else "density not recorded"] * f0, 0.0))
     add("airspeed", np.where(load, PRIORS["airspeed"] * V * slope_V, 0.0))
-    run = problem.covariates["run"][problem.point]
-    labels = np.unique(run)
-    if 1 < labels.size <= 20:
-        for label in labels:
-            for c, name in ((0, "thrust"), (1, "torque")):
-                mine = (run == label) & (channel == c)
-                add(f"session {label:g} {name}", np.where(mine, PRIORS["session"] * y, 0.0), of_reading=True)
     for i, p in rows:
         if "rpm" in p.channels:
             x = p.record.extra["pwm_s"]
@@ -176,7 +150,7 @@ def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...], NDArray[np.bool
             value = value + step if value + step <= parameter.high else value - step
             changed = everywhere(replace(e, **{parameter.name: value})) - f0  # type: ignore[type-var]
             add(f"{e.id} {parameter.name}", changed, own=True)
-    for e in problem.baseline:
+    for e in (e for e in problem.baseline if e.id != AsBuilt.id):
         without = [p.predict([b for b in p.baseline if b.id != e.id]) for p in problem.parts]
         share = f0 - np.concatenate(without)[problem.kept]
         # the published law of an effect that is on is no better known than that of one that is left out
@@ -187,7 +161,7 @@ def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...], NDArray[np.bool
             for k in range(modes.shape[1]):
                 add(f"form of {e.id}", share * modes[:, k], own=not alone)
     matrix = np.stack(columns, axis=1) if columns else np.zeros((y.size, 0))
-    return matrix, tuple(names), np.array(solver, dtype=bool)
+    return matrix, tuple(names), np.array(solver, dtype=bool), offset
 
 
 def _slope(part: Part, channel: str) -> Array:

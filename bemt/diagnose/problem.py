@@ -13,8 +13,11 @@ from numpy.typing import NDArray
 from bemt.base.errors import Fault, InputError
 from bemt.bem import model as bem
 from bemt.case.prepare import k1k2_case, prepare_case
+from bemt.diagnose import repeats
+from bemt.diagnose.blade import PLAIN, Blade, calibrated, prior_of, turned
+from bemt.diagnose.noise import in_time
 from bemt.diagnose.nuisance import nuisances
-from bemt.diagnose.record import CHANNELS, Record, concatenated, merged, owners
+from bemt.diagnose.record import CHANNELS, Record, concatenated, dense, merged, owners
 from bemt.effects.base import Effect, Flow, Reading
 from bemt.recordings.between import Level, odd_ones
 
@@ -187,6 +190,12 @@ class Problem:
         What was assumed or left out.
     between : tuple of str
         What looks wrong in a recording beside the others, its file named in front.
+    scatter : dict of str to float
+        Scatter of repeats as a share of the median reading, by channel, where there are enough of them [1].
+    blade : Blade
+        What is believed of the rotor's blade, and the point of its tangents.
+    offset : (M,) float
+        Change of the readings from the centre of the blade's prior to that point [units of the readings].
     predicted : dict
         Readings that were solved already, by the effects added.
     """
@@ -207,6 +216,9 @@ class Problem:
     own: NDArray[np.bool_]
     notes: tuple[str, ...] = ()
     between: tuple[str, ...] = ()
+    scatter: dict[str, float] = field(default_factory=dict)
+    blade: Blade = PLAIN
+    offset: Array = field(default_factory=lambda: np.zeros(0))
     predicted: dict[Any, Array] = field(default_factory=dict, repr=False)
 
     @property
@@ -236,9 +248,19 @@ class Problem:
         return np.array([keys.index(p.key) for p in self.parts])[self.part]
 
     @property
+    def centre(self) -> Array:
+        """Baseline for the blade at the centre of its prior, to which all nuisances refer, (M,)."""
+        return self.f0 - self.offset
+
+    @property
     def residual(self) -> Array:
-        """Recording minus baseline, (M,)."""
-        return self.y - self.f0
+        """Recording minus baseline at the centre of all nuisances, (M,)."""
+        return self.y - self.centre
+
+    def with_tangents(self, keep: NDArray[np.bool_]) -> Problem:
+        """Problem with some of the nuisances only."""
+        names = tuple(n for n, k in zip(self.names, keep, strict=True) if k)
+        return replace(self, tangents=self.tangents[:, keep], names=names, own=self.own[keep])
 
     @property
     def baseline(self) -> tuple[Effect, ...]:
@@ -332,7 +354,32 @@ def build(records: Sequence[Record], cases: Sequence[Case], baseline: str = "bem
         if not 1.0 / _FARTHEST < ratio < _FARTHEST:
             raise InputError(Fault(records[0].name, name, f"{ratio:.2g} times what the case gives",
                                    "readings of this rotor", "Another unit, or another case?"))  # fmt: skip
-    return replace(problem, between=_between(problem, [groups[k][1] for k in order], records))
+    odd = _between(problem, [groups[k][1] for k in order], records)
+    problem, found = _calibrated(problem, [groups[k][0] for k in order])
+    return replace(problem, between=(*odd, *found))
+
+
+def _calibrated(problem: Problem, cases: Sequence[Case]) -> tuple[Problem, tuple[str, ...]]:
+    """Problem with the blade as its references show it, and findings."""
+    refers = [p for p in problem.parts if p.record.reference]
+    if not refers or len({p.key for p in problem.parts}) > 1 or any(p.instead is not None for p in problem.parts):
+        return problem, ()
+    blade, note, finding = calibrated(problem, prior_of(cases[0]))
+    notes, found = (note,) if note else (), (f"{refers[0].record.name}: {finding}",) if finding else ()
+    if blade is None:
+        return replace(problem, notes=(*problem.notes, *notes)), found
+    whole = assemble(tuple(_with_blade(p, blade.effect) for p in problem.parts), blade)
+    return replace(whole, notes=(*whole.notes, *notes)), found
+
+
+def _with_blade(part: Part, blade: Effect) -> Part:
+    """Part whose baseline has another blade."""
+    baseline, old = turned(part, blade), part.flow
+    plain = [e for e in baseline if not bem.acts_on_points(e)]
+    flow = bem.flow_of(
+        part.model.prepared(plain), part.record.rpm, part.record.V, part.record.air, part.record.extra, old.chord
+    )
+    return replace(part, baseline=baseline, flow=flow, _solved={})
 
 
 def _between(problem: Problem, joined: Sequence[Sequence[Record]], records: Sequence[Record]) -> tuple[str, ...]:
@@ -361,13 +408,15 @@ def _between(problem: Problem, joined: Sequence[Sequence[Record]], records: Sequ
     return tuple(f"{level.name}: {finding}" for level, finding in odd_ones(levels))
 
 
-def assemble(parts: tuple[Part, ...]) -> Problem:
+def assemble(parts: tuple[Part, ...], blade: Blade = PLAIN) -> Problem:
     """Stack the readings of parts and add the nuisances.
 
     Parameters
     ----------
     parts : tuple of Part
         Recordings with their rotors.
+    blade : Blade
+        What is believed of the blade.
 
     Returns
     -------
@@ -393,16 +442,55 @@ def assemble(parts: tuple[Part, ...]) -> Problem:
     if lost:
         notes.append(f"{lost} readings left out: the baseline does not converge there")
     scale = np.concatenate([_scale(p) for p in parts])
-    known = np.isfinite(u[kept])
-    share = np.where(channel == CHANNELS.index("rpm"), _U_RPM, _U_DEFAULT)
-    fallback = np.maximum(share * np.abs(y), np.minimum(share, _U_FLOOR) * scale)
-    sigma = np.where(np.isfinite(u) & (u > 0), u, fallback)
     problem = Problem(
-        parts, y[kept], f0[kept], sigma[kept], scale[kept], bool(known.mean() > 0.5), channel[kept], point[kept],
+        parts, y[kept], f0[kept], u[kept], scale[kept], False, channel[kept], point[kept],
         part[kept], kept, _covariates(parts), np.zeros((int(kept.sum()), 0)), (), np.zeros(0, dtype=bool), tuple(notes),
+        blade=blade, offset=np.zeros(int(kept.sum())),
     )  # fmt: skip
-    columns, names, own = nuisances(problem)
-    return replace(problem, tangents=columns, names=names, own=own)
+    problem = _with_noise(problem)
+    columns, names, own, offset = nuisances(problem)
+    return replace(problem, tangents=columns, names=names, own=own, offset=offset)
+
+
+def _with_noise(problem: Problem) -> Problem:
+    """Uncertainty of every reading: what is stated, what repeats show, else what stands usually have."""
+    stated = np.where(np.isfinite(problem.u) & (problem.u > 0.0), problem.u, np.nan)
+    full = np.zeros_like(problem.y)
+    for i, p in enumerate(problem.parts):
+        for c, name in enumerate(CHANNELS):
+            full[(problem.part == i) & (problem.channel == c)] = p.full_scale.get(name, 0.0)
+    tachometer = problem.channel == CHANNELS.index("rpm")
+    usual = np.where(tachometer, _U_RPM * problem.y, np.hypot(_U_DEFAULT * problem.y, _U_FLOOR * full))
+    sigma, known, notes = np.where(np.isfinite(stated), stated, usual), np.isfinite(stated), list(problem.notes)
+    X, rows = problem.covariates, np.arange(problem.y.size)
+    owner = np.concatenate([np.full(len(p.record), i) for i, p in enumerate(problem.parts)])
+    lengths = [X[k] for k in ("tip_gap_m", "wall_distance_m") if k in X] + [
+        np.exp(X[k]) for k in ("sideslip_rad",) if k in X
+    ]
+    label = repeats.conditions(X["rpm"], X["J"], X["density_kg_m3"], lengths, owner.astype(float))
+    label[np.array([dense(p.record) for p in problem.parts])[owner]] = -1
+    run, place = in_time(X)
+    shares: dict[str, float] = {}
+    for c, name in enumerate(CHANNELS[:2]):
+        mine = rows[(problem.channel == c) & (label[problem.point] >= 0)]
+        # readings that are those of the model to the last digit are a plan, not a measurement
+        if not np.any(np.abs(problem.residual[mine]) > 1e-9 * full[mine]):
+            continue
+        points, size = problem.point[mine], np.where(problem.y[mine] < 0, -1.0, 1.0) * problem.scale[mine]
+        fixed = repeats.projected_out(label[points], size, problem.f0[mine], full[mine], run[points], place[points])
+        told = np.where(known[mine], sigma[mine], 0.0) if known[mine].any() else None
+        found = repeats.noise_sizes(problem.residual[mine], problem.y[mine], full[mine], fixed, told)
+        if found is None or not any(found[:2]):
+            continue
+        a, b, dof = found
+        every = problem.channel == c
+        seen = np.hypot(a * problem.y[every], b * full[every])
+        sigma[every] = np.where(known[every], np.hypot(sigma[every], seen), seen)
+        known = known | every
+        shares[name] = float(np.median(seen / np.maximum(np.abs(problem.y[every]), 1e-12)))
+        beside = " beside what is stated" if told is not None else ""
+        notes.append(f"{name}: {dof} repeats scatter by {a:.2%} of the reading and {b:.2%} of full scale{beside}")
+    return replace(problem, u=sigma, u_known=bool(known.mean() > 0.5), notes=tuple(notes), scatter=shares)
 
 
 def _scale(part: Part) -> Array:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from bemt.air import Air
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
+from bemt.diagnose.repeats import conditions, spread_sizes
 
 if TYPE_CHECKING:
     from bemt.case import Case
@@ -44,6 +45,8 @@ _AIR_LIMITS = (
     ("temperature_K", 150.0, 400.0, "Celsius under a heading in kelvin, or a sensor that was not there?"),
     ("pressure_Pa", 1e3, 2.5e6, "Another unit than the heading says?"),
 )
+# More points than this tell no more of their scatter.
+_MOST_COMPARED = 2000
 MAX_POINTS = 160
 """Points beyond this number are averaged with alike ones: they would cost time and add nothing. [1]"""
 
@@ -117,6 +120,12 @@ class Record:
             self, rpm=self.rpm[index], V=self.V[index], air=air_of({k: getattr(self.air, k)[index] for k in _AIR}),
             measured=cut(self.measured), u=cut(self.u), extra=cut(self.extra),
         )  # fmt: skip
+
+
+    def only(self, channels: Sequence[str]) -> Record:
+        """Record with some of its channels, as far as they were measured."""
+        kept = [c for c in self.measured if c in channels]
+        return replace(self, measured={c: self.measured[c] for c in kept}, u={c: self.u[c] for c in kept})
 
 
 _AIR = ("rho", "mu", "a_sound", "temperature_K")
@@ -314,7 +323,7 @@ def _thinned(record: Record) -> Record:
         return record
     size = -(-P // MAX_POINTS)
     run = record.extra.get("run", np.zeros(P))
-    if _dense(record, run):
+    if dense(record):
         block = _blocks(np.arange(P), record.rpm, run, size, np.inf)
     else:
         order = _alike(record, run)
@@ -337,6 +346,8 @@ def _thinned(record: Record) -> Record:
     density = np.asarray(record.air.rho, dtype=float)
     rpm, rho = mean(record.rpm), mean(density)
     unit = {c: density * record.rpm**2 for c in ("thrust_N", "torque_Nm")}
+    seen = {} if dense(record) else {c: _scatter(record, c, unit[c], block) for c in unit if c in record.measured}
+    record = replace(record, u=dict(record.u) | {c: v for c, v in seen.items() if v is not None})
     # neighbours share slow errors: their mean is taken to be no better than one of them
     note = f"{P} points averaged to {rpm.size} of like conditions"
     return replace(
@@ -345,6 +356,21 @@ def _thinned(record: Record) -> Record:
         u={k: mean(v) for k, v in record.u.items()}, extra={k: mean(v) for k, v in record.extra.items()},
         notes=(*record.notes, note),
     )  # fmt: skip
+
+
+def _scatter(record: Record, channel: str, unit: Array, block: NDArray[np.intp]) -> Array | None:
+    """Uncertainty of points that state none, from their scatter within blocks of one condition."""
+    y, u = record.measured[channel], record.u[channel]
+    good = np.flatnonzero(np.isfinite(y))
+    if not good.size or np.isfinite(u[good]).any():
+        return None
+    good = good[:: -(-good.size // _MOST_COMPARED)]
+    advance = record.V[good] / record.rpm[good]
+    size = max(float(np.max(np.abs(advance))), 1e-12)
+    at = conditions(record.rpm[good], advance / size, np.asarray(record.air.rho)[good])
+    together = np.unique(np.column_stack([block[good], at]), axis=0, return_inverse=True)[1].ravel()
+    sizes = spread_sizes(y[good], unit[good], together)
+    return None if sizes is None else np.hypot(sizes[0] * y, sizes[1] * float(np.max(np.abs(y[good]))))
 
 
 def _blocks(order: NDArray[np.intp], rpm: Array, run: Array, size: int, same: float) -> NDArray[np.intp]:
@@ -359,9 +385,9 @@ def _blocks(order: NDArray[np.intp], rpm: Array, run: Array, size: int, same: fl
     return block
 
 
-def _dense(record: Record, run: Array) -> bool:
+def dense(record: Record) -> bool:
     """Whether most samples follow each other closely enough to show how loads follow the speed."""
-    time = record.extra.get("time_s")
+    time, run = record.extra.get("time_s"), record.extra.get("run", np.zeros(len(record)))
     if time is None:
         return False
     step = np.diff(time)[np.diff(run) == 0]

@@ -228,6 +228,7 @@ _ALL: tuple[Cause, ...] = (
     Cause("rpm_scale", _stand("rpm_scale", 0.012, "eps"), "stand", _ANY, variables=(*_SPEED, *_FLOW)),
     Cause("airspeed_offset", _stand("airspeed_offset", 0.45, "offset_m_s", "m/s", scale=-1.0), "stand", _FLIGHT,
           variables=_FLOW),
+    Cause("airspeed_gain", _stand("airspeed_gain", 0.08, "gain"), "stand", _FLIGHT, variables=_FLOW),
     Cause("thrust_gain", _stand("thrust_gain", 0.05, "gain"), "stand", _ANY),
     Cause("torque_gain", _stand("torque_gain", 0.05, "gain"), "stand", _ANY),
     Cause("thrust_zero", _stand("thrust_zero", 0.02, "zero", scale=1.2), "stand", _ANY, variables=_SPEED),

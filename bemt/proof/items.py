@@ -145,7 +145,7 @@ class Bench:
         _, with_it = self.measure(world, stand, scales=scales)
         out = {name: with_it[name] - base[name] for name in base if name not in ("rpm", "airspeed_m_s", "time_s")}
         # a wrong speed or airspeed is seen through what the model says there
-        if stand.rpm_scale or stand.airspeed_offset:
+        if stand.rpm_scale or stand.airspeed_offset or stand.airspeed_gain:
             shifted = replace(self.rows, rpm=with_it["rpm"], airspeed=with_it["airspeed_m_s"])
             there = Bench(self.rig, self.plan, shifted, _starts=self._starts).measure(world, quiet)[1]
             for name in ("thrust_N", "torque_Nm"):

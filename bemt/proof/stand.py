@@ -64,8 +64,8 @@ class Stand:
         Zero that grows in time, over full scale [-]; time to half of it [s].
     hysteresis : float
         Reading that stays behind when the load falls, over full scale. [-]
-    rpm_scale, airspeed_offset : float
-        Tachometer reading over the truth, less 1 [-]; pitot error [m/s].
+    rpm_scale, airspeed_offset, airspeed_gain : float
+        Tachometer reading over the truth, less 1 [-]; pitot error [m/s]; pitot reading over the truth, less 1 [-].
     unit_slip : float
         Factor of the slipped unit on ``unit_channel``. [-]
     unit_channel : str
@@ -95,6 +95,7 @@ class Stand:
     hysteresis: float = 0.0
     rpm_scale: float = 0.0
     airspeed_offset: float = 0.0
+    airspeed_gain: float = 0.0
     unit_slip: float = 1.0
     unit_channel: str = "thrust"
     motor_heating: float = 0.0
@@ -199,7 +200,8 @@ def record(
     flying = bool(np.any(c.airspeed > 0.0))  # a static stand has no pitot
     out = {
         "rpm": c.rpm * (1.0 + stand.rpm_scale) * (1.0 + stand.rpm_noise * draw[0]),
-        "airspeed_m_s": c.airspeed + (stand.airspeed_offset + stand.airspeed_noise * draw[1]) * flying,
+        "airspeed_m_s": c.airspeed * (1.0 + stand.airspeed_gain)
+        + (stand.airspeed_offset + stand.airspeed_noise * draw[1]) * flying,
         "thrust_N": thrust,
         "torque_Nm": torque,
         "time_s": c.time,

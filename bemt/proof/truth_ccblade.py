@@ -28,8 +28,9 @@ Array = NDArray[np.float64]
 
 EXPRESSIBLE = frozenset({
     "reynolds", "compressibility", "drag_divergence", "stall_delay", "section", "pitch_offset", "untwist",
-    "air_density", "rpm_scale", "airspeed_offset", "thrust_gain", "torque_gain", "thrust_zero", "torque_zero",
-    "cross_talk", "thrust_drift", "torque_drift", "unit_slip", "resonance", "bearing_drag", "hysteresis", "bubble_step",
+    "air_density", "rpm_scale", "airspeed_offset", "airspeed_gain", "thrust_gain", "torque_gain", "thrust_zero",
+    "torque_zero", "cross_talk", "thrust_drift", "torque_drift", "unit_slip", "resonance", "bearing_drag", "hysteresis",
+    "bubble_step",
 })  # fmt: skip
 """Causes that act on sections, blade angle, air or stand."""
 LEAST_J = 0.02

@@ -1,0 +1,158 @@
+"""Is it this rotor at all: loads that no rotor of the case's values can have, and which slip would explain them.
+
+A recording that is off by a factor of three in thrust is not one whose physics was left out: diameter, pitch, number of
+blades, a unit or the speed is another one.  The question comes before the physics, with the likely slips in order.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bemt.base.units import INCH
+from bemt.diagnose.blade import AsLabelled, turned
+from bemt.diagnose.record import CHANNELS
+from bemt.effects import catalogue
+from bemt.effects.base import Baking, Effect
+
+if TYPE_CHECKING:
+    from bemt.diagnose.problem import Problem
+    from bemt.diagnose.verdict import Decision
+
+__all__ = ["FACTOR", "RESTLESS", "Suspect", "finding", "judged", "levels", "suspects"]
+
+FACTOR = 3.0
+"""Thrust (torque, where no thrust was measured) over that of the case, or under it, from which on the question comes
+first [1]."""
+RESTLESS = 0.10
+"""Scatter of repeats, share of the reading, that no stand has: something that is not recorded changes [1]."""
+# What loads of the right rotor may be off by, natural logarithm; how unusual a slip is adds to its square.
+_OFF = 0.25
+_SHOWN = 3
+_POLE_PAIRS = (2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 14, 16, 18, 20, 21)
+_ANGLES_DEG = (-12.0, -9.0, -6.0, -3.0, 3.0, 6.0, 9.0, 12.0, 16.0)
+_BLADES = (1, 2, 3, 4, 5, 6, 8, 12)
+# Effects that are such a slip themselves.
+_SLIPS = ("unit_slip", "rpm_scale")
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """A slip in words, and how far it leaves the loads (root of a chi-square) [1]."""
+
+    words: str
+    distance: float
+
+
+@dataclass(frozen=True)
+class _Blades(Effect):
+    """The same blades in another number."""
+
+    count: int = 2
+
+    id = "blades"
+
+    def blade(self, bake: Baking) -> None:
+        """Change the solidity."""
+        bake.sigma = bake.sigma * self.count / bake.B
+        bake.B = self.count
+
+
+def levels(problem: Problem) -> dict[str, float]:
+    """Median of each load of the test over that of the case [1]."""
+    return {channel: 1.0 + level for channel, level in problem.level.items()}
+
+
+def _suspicious(found: dict[str, float]) -> bool:
+    level = next((found[c] for c in CHANNELS[:2] if c in found), 1.0)
+    return not 1.0 / FACTOR < abs(level) < FACTOR
+
+
+def suspects(problem: Problem) -> list[Suspect]:
+    """Rank the slips that would explain the level of the loads.
+
+    Parameters
+    ----------
+    problem : Problem
+        Readings and the baseline of the case.
+
+    Returns
+    -------
+    list of Suspect
+        Nearest first.
+    """
+    found = {c: math.log(abs(v)) for c, v in levels(problem).items() if v}
+    out: dict[str, Suspect] = {}
+    for kind, words, shift, rarity in _slips(problem, found):
+        square = sum((found[c] - shift.get(c, 0.0)) ** 2 for c in found) / _OFF**2 + rarity
+        if kind not in out or square < out[kind].distance ** 2:
+            out[kind] = Suspect(words, math.sqrt(square))
+    return sorted(out.values(), key=lambda s: s.distance)
+
+
+def _slips(problem: Problem, found: dict[str, float]) -> Iterator[tuple[str, str, dict[str, float], float]]:
+    """Kind, words, logarithm of the loads over those of the case, rarity of each slip."""
+    T, Q = CHANNELS[:2]
+    part = next(p for p in problem.parts if not p.record.reference)
+    D = 2.0 * part.flow.R
+    # loads go with D^4 and D^5 (coefficients stay): least squares over what was measured
+    powers = {c: p for c, p in ((T, 4.0), (Q, 5.0)) if c in found}
+    k = sum(p * found[c] for c, p in powers.items()) / sum(p * p for p in powers.values())
+    off = abs(k - math.log(2.0)) < 0.1, abs(k + math.log(2.0)) < 0.1
+    hint = ", a radius taken for the diameter" if any(off) else ""
+    size = math.exp(k) * D
+    yield "diameter", f"diameter {size:.3g} m ({size / INCH:.3g} in){hint}", {c: p * k for c, p in powers.items()}, 0.5
+    for pairs in _POLE_PAIRS:
+        both = dict.fromkeys(found, -2.0 * math.log(pairs))
+        yield "poles", f"electrical revolutions for mechanical, {pairs} pole pairs", both, 0.5
+    for factor, words in ((60.0 / (2.0 * math.pi), "rad/s"), (60.0, "rev/s")):
+        yield "speed", f"speed in {words} for rev/min", dict.fromkeys(found, 2.0 * math.log(factor)), 1.0
+    for setting in catalogue()["unit_slip"]().variants() or ():
+        channel, factor = str(setting["channel"]), float(setting["factor"])
+        if channel in found and factor > 0.0:
+            yield channel, f"{channel} in another unit ({setting['unit']})", {channel: math.log(factor)}, 1.0
+    changes: list[tuple[str, str, Effect, float]] = [
+        ("pitch", f"blade angle {a:+.0f} deg (another pitch)", AsLabelled(angle_deg=a), 0.5) for a in _ANGLES_DEG
+    ]
+    blades = part.flow.B
+    changes += [("blades", f"{n} blades for {blades}", _Blades(n), 0.5 + math.log(n / blades) ** 2)
+                for n in _BLADES if n != blades]  # fmt: skip
+    f0 = part.predict(part.baseline).reshape(len(part.channels), -1)
+    for kind, words, change, rarity in changes:
+        f = part.predict(turned(part, change)).reshape(len(part.channels), -1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = dict(zip(part.channels, np.nanmedian(f / f0, axis=1), strict=True))
+        if all(ratio.get(c, np.nan) > 0.0 for c in found):
+            yield kind, words, {c: math.log(ratio[c]) for c in found}, rarity
+
+
+def _restless(problem: Problem) -> dict[str, float]:
+    """Channels whose repeats differ by more than any stand's, with their scatter [1]."""
+    return {c: s for c, s in problem.scatter.items() if s > RESTLESS}
+
+
+def finding(problem: Problem) -> str:
+    """Question to the user, "" where the loads may be those of the case's rotor, at rest but for what is recorded."""
+    found, names = levels(problem), {"thrust_N": "thrust", "torque_Nm": "torque"}
+    if not _suspicious(found):
+        told = " and ".join(f"{names[c]} by {s:.0%}" for c, s in _restless(problem).items())
+        return f"at one speed the readings differ, {told}: what changes between them is not recorded" if told else ""
+    off = " and ".join(f"{names[c]} is {v:.3g} times" for c, v in found.items())
+    ranked = "; ".join(f"{k}. {s.words}" for k, s in enumerate(suspects(problem)[:_SHOWN], 1))
+    return f"{off} what the case gives. Is it this rotor? Likeliest: {ranked}"
+
+
+def judged(problem: Problem, decision: Decision) -> Decision:
+    """Decision that names no physics for loads that cannot be those of the case's rotor."""
+    if _restless(problem) and decision.verdict not in ("none", "unknown"):
+        why = "repeats at one condition differ by more than any stand's: what changes between them is not recorded"
+        return replace(decision, verdict="insufficient", effects=(), classes=(), why=why)
+    slip = decision.verdict in ("named", "sensor") and set(decision.effects) & set(_SLIPS)
+    if slip or not _suspicious(levels(problem)):
+        return decision
+    why = f"the loads are off by more than a factor of {FACTOR:g}: first make sure that the case is this rotor"
+    return replace(decision, verdict="insufficient", effects=(), classes=(), why=why)

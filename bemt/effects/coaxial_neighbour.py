@@ -1,0 +1,78 @@
+"""Second rotor on the same axis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemt.effects.base import Array, Effect, Flow, Parameter, choice
+
+_SIDES = ("upstream", "downstream")
+
+
+@dataclass(frozen=True)
+class CoaxialNeighbour(Effect):
+    """A rotor ahead of or behind this one, whose wake or suction it works in.
+
+    Notes
+    -----
+    On the axis of a semi-infinite vortex cylinder the induced speed is v (1 + s / sqrt(1 + s^2)), s = z/R counted
+    downstream (McCormick 1967, Aerodynamics of V/STOL Flight; not checked against the book).  Continuity contracts the
+    wake to the share a^2 = 1 / (1 + s / sqrt(1 + s^2)) of the disk.  A rotor downstream meets that speed inside the
+    wake and none outside; its loads are taken at the mean weighted as blade loads are, by r^2 (declared): v a.  A rotor
+    upstream meets v (1 - s / sqrt(1 + s^2)).  ``load`` is the neighbour's thrust over that of this rotor; its v
+    follows from momentum theory of the open disk, `Flow.induced`.  Swirl of the neighbour is left out: a
+    contra-rotating pair has gains of a few per cent from it.
+    """
+
+    side: str = "upstream"
+    z_over_R: float = 1.0
+    load: float = 1.0
+
+    id = "coaxial_neighbour"
+    inviscid = True
+    title = "second rotor on the same axis"
+    sign = (
+        "less thrust at the same speed, as if the rotor flew into its neighbour's wake; most at rest, fading with "
+        "airspeed; the neighbour stopped, it is gone"
+    )
+    check = "stop the other rotor"
+    parameters = (
+        Parameter("z_over_R", "1", 0.1, 4.0, "coaxial stands, 0.1 to 1 diameters apart"),
+        Parameter("load", "1", 0.0, 2.0, "declared; thrust of the neighbour over that of this rotor", 0, 0.0),
+    )
+    on_by_default = False
+
+    def __post_init__(self) -> None:
+        """Refuse unknown sides."""
+        choice("side", self.side, _SIDES)
+
+    def flow(self, flow: Flow) -> None:
+        """Add what the neighbour induces."""
+        flow.V = flow.V + self.mean() * self._speed(flow)
+
+    def mean(self) -> float:
+        """Mean onset speed over the neighbour's own induced speed [1].
+
+        >>> CoaxialNeighbour("downstream", 1e9).mean(), round(CoaxialNeighbour("downstream", 1e-9).mean(), 3)
+        (0.0, 1.0)
+        """
+        s = self.z_over_R / np.sqrt(1.0 + self.z_over_R**2)
+        if self.side == "downstream":
+            return float(1.0 - s)
+        # speed (1 + s) v inside the radius a R of the wake, weighted by r^2: (1 + s) a^3 = a
+        return float(1.0 / np.sqrt(1.0 + s))
+
+    def _speed(self, flow: Flow) -> Array:
+        """Induced speed of the neighbour, (P,) [m/s]."""
+        disk = self.load * np.maximum(flow.T0, 0.0) / (2.0 * flow.rho * flow.area)
+        half = 0.5 * np.abs(flow.V)
+        return np.asarray(np.sqrt(half**2 + disk) - half)
+
+    def variants(self) -> tuple[dict[str, str | float], ...]:
+        """Both sides, six distances and four loads in ratio."""
+        return tuple(
+            {"side": side, "z_over_R": z, "load": k}
+            for side in _SIDES for z in (0.2, 0.4, 0.7, 1.2, 2.0, 4.0) for k in (0.5, 0.8, 1.0, 1.4)
+        )  # fmt: skip

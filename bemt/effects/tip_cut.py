@@ -1,0 +1,41 @@
+"""Blades that end before the stated radius."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemt.effects.base import Baking, Effect, Parameter
+
+
+@dataclass(frozen=True)
+class TipCut(Effect):
+    """Tips cut, broken or worn: the blades end at (1 - cut) R.
+
+    Notes
+    -----
+    Geometry only: beyond the new radius there is no blade, and the tip vortex leaves there (Prandtl's F takes the new
+    radius).  Blade elements are those of the shorter blade, each with the section of the element whose place it takes.
+    Thrust falls faster than any section drag or gain explains, about as the fourth power of the radius, torque
+    as the fifth (Buckingham 1914 for similar blades; a cut blade keeps its chord at the new tip and loses less).  Up to
+    15 % is declared: to fit a duct, after a strike.
+    """
+
+    cut: float = 0.05
+
+    id = "tip_cut"
+    title = "blades shorter than stated"
+    sign = "less thrust and still less torque at every speed, the advance ratio of zero thrust nearly where it was"
+    check = "measure the diameter"
+    parameters = (Parameter("cut", "1", 0.0, 0.15, "declared, share of the radius", 4, 0.0),)
+    on_by_default = False
+
+    def blade(self, bake: Baking) -> None:
+        """End the blades at the new radius."""
+        R = (1.0 - self.cut) * bake.R
+        share = (R - bake.Rhub) / (bake.R - bake.Rhub)
+        r = bake.Rhub + (bake.r - bake.Rhub) * share
+        chord, beta = (np.interp(r, bake.r, values) for values in (bake.chord, bake.beta))
+        bake.sigma = bake.B * chord / (2.0 * np.pi * r)
+        bake.r, bake.dr, bake.chord, bake.beta, bake.R = r, bake.dr * share, chord, beta, R

@@ -1,0 +1,129 @@
+"""Noise, gains and sessions of a recording come from the recording."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosing import case, left_out, points, recording
+
+from bemt.asbuilt.latents import AsBuilt
+from bemt.dataset import Dataset
+from bemt.diagnose import chain
+from bemt.diagnose.problem import build
+from bemt.diagnose.record import from_series
+from bemt.diagnose.repeats import conditions, noise_sizes, projected_out, spread_sizes
+from bemt.effects.ground_effect import GroundEffect
+
+
+@pytest.mark.parametrize(("a", "b"), [(0.01, 0.0), (0.0, 0.004), (0.006, 0.003)])
+def test_repeats_give_the_noise_beside_gain_zero_and_drift(a: float, b: float) -> None:
+    rng = np.random.default_rng(1)
+    rpm = np.tile(np.repeat(np.linspace(3000.0, 9000.0, 7), 4), 2)
+    run, place = np.repeat([0.0, 1.0], 28), np.tile(np.arange(28.0), 2)
+    true = 1e-7 * rpm**2
+    full = np.full_like(true, true.max())
+    shown = true * np.where(run == 0, 1.03, 0.98) + full * (0.01 * run + 0.02 * place / 28.0)
+    sd = np.hypot(a * true, b * full)
+    found = []
+    for _ in range(20):
+        y = shown + sd * rng.standard_normal(sd.size)
+        label = conditions(rpm, np.zeros_like(rpm), np.full_like(rpm, 1.2))
+        assert np.unique(label).size == 7
+        sizes = noise_sizes(y - true, y, full, projected_out(label, true, true, full, run, place))
+        assert sizes is not None
+        found.append(np.sqrt(np.mean(np.hypot(sizes[0] * true, sizes[1] * full) ** 2) / np.mean(sd**2)))
+    assert np.mean(found) == pytest.approx(1.0, abs=0.15)
+
+
+def test_points_averaged_in_blocks_give_the_same_sizes() -> None:
+    rng = np.random.default_rng(2)
+    block = np.repeat(np.arange(60), 10)
+    unit = np.linspace(1.0, 9.0, 60)[block]
+    y = 0.1 * unit + np.hypot(0.02 * 0.1 * unit, 0.005 * 0.9) * rng.standard_normal(unit.size)
+    sizes = spread_sizes(y, unit, block)
+    assert sizes is not None
+    assert sizes[0] == pytest.approx(0.02, rel=0.25) and sizes[1] == pytest.approx(0.005, rel=0.35)
+
+
+def test_what_is_stated_stays_where_the_repeats_agree() -> None:
+    rng = np.random.default_rng(3)
+    u = np.full(60, 0.01)
+    e = u * rng.standard_normal(60)
+    label = np.repeat(np.arange(6), 10)
+    one = np.ones(60)
+    fixed = projected_out(label, one, one, one, np.zeros(60), np.arange(60.0))
+    assert noise_sizes(e, one, one, fixed, u)[:2] == (0.0, 0.0)  # type: ignore[index]
+    doubled = noise_sizes(3.0 * e, one, one, fixed, u)
+    assert doubled is not None and np.hypot(*doubled[:2]) == pytest.approx(0.028, rel=0.3)
+
+
+def repeated(series: Dataset, gain: float, run: float, seed: int) -> Dataset:
+    """Every point three times without stated uncertainties, thrust by another gain."""
+    rng = np.random.default_rng(seed)
+    values = {k: np.tile(v, 3) for k, v in series.values.items() if k != "time_s"}
+    for k in ("thrust_N", "torque_Nm"):
+        values[k] = values[k] * (1.0 + 0.004 * rng.standard_normal(values[k].size))
+    values["thrust_N"] = values["thrust_N"] * (1.0 + gain)
+    values["run"] = np.repeat(run + np.arange(3.0), len(series))
+    return Dataset("bench", "stand", values)
+
+
+def test_a_gain_of_seven_percent_is_seen_beside_a_reference() -> None:
+    base = case()
+    plain = recording(base, points("grid"), noise=0.0)
+    records = [
+        from_series(repeated(plain, 0.07, 0.0, 1), base),
+        replace(from_series(repeated(plain, 0.0, 3.0, 2), base), reference=True),
+    ]
+    problem = build(records, [base])
+    assert problem.u_known and sum("repeats scatter" in note for note in problem.notes) == 2
+    share = problem.u / problem.scale
+    assert 0.001 < np.median(share) < 0.006
+    answer = chain.diagnose(records, [base], nulls=200)
+    assert answer.decision.effects == ("thrust_gain",)
+    found = answer.parameters["thrust_gain"]["gain"]
+    assert found["low"] <= 0.07 <= found["high"]
+
+
+@pytest.mark.parametrize("off", [-3.0, 2.0])
+def test_a_reference_finds_the_blade_whatever_the_case_says_of_it(off: float) -> None:
+    """The blade is turned, its lift lower and its drag higher than in the case; the test has a wall behind it, too."""
+    guess, given = case(), points("grid")
+    real = (AsBuilt(angle_deg=off, lift=-0.04, drag=0.1),)
+    both = (*real, GroundEffect(z_over_R=0.5))
+    plain, changed = (recording(guess, given, extra, noise=0.004, seed=k) for k, extra in ((1, real), (2, both)))
+    records = [from_series(changed, guess), replace(from_series(plain, guess), reference=True)]
+    problem = build(records, [guess])
+    assert problem.blade.at[0] == pytest.approx(off, abs=0.4)
+    # the prior stays at the case: the residuals refer to it, the signatures to the blade that was found
+    refer = ~problem.free
+    assert np.median(np.abs(problem.y / problem.f0 - 1.0)[refer]) < 0.02
+    exact = recording(guess, given, real, noise=0.0).values["thrust_N"]
+    mine = refer & (problem.channel == 0)
+    np.testing.assert_allclose(problem.f0[mine], exact, atol=0.02 * exact.max())
+    answer = chain.diagnose(records, [guess], nulls=200)
+    assert answer.decision.effects == ("ground_effect",), answer.decision
+
+
+def test_a_blade_that_runs_away_is_said_and_not_used() -> None:
+    guess, given = case(), points("grid")
+    plain = recording(guess, given, (AsBuilt(angle_deg=15.0),), noise=0.004)
+    problem = build([from_series(plain, guess), replace(from_series(plain, guess), reference=True)], [guess])
+    assert not problem.blade.at.any() and any("another rotor" in f for f in problem.findings)
+
+
+def test_a_motor_that_does_not_do_as_told_keeps_its_misfit_to_itself() -> None:
+    """Speed over pulse width wobbles as nothing in the library does; the loads show what was left out all the same."""
+    base, given = case(), points("grid")
+    wobble = 1.0 + 0.06 * np.sin(0.9 * np.arange(given["rpm"].size))
+    series = recording(base, given | {"pwm_s": 1e-3 + given["rpm"] * wobble / 26e6}, noise=0.004)
+    record = from_series(series, left_out("compressibility", base))
+    assert "rpm" in record.measured
+    answer = chain.diagnose([record], [left_out("compressibility", base)], nulls=200)
+    assert (answer.decision.verdict, answer.decision.effects) == ("named", ("compressibility",))
+    assert answer.systems["air"]["effects"] == ["compressibility"]
+    assert answer.systems["drive"]["verdict"] in ("unknown", "insufficient")
+    loads = chain.diagnose([record], [left_out("compressibility", base)], nulls=200, channels=["torque_Nm"])
+    assert set(loads.scores) == {"torque_Nm"} and loads.systems["drive"]["verdict"] == "not recorded"

@@ -1,0 +1,61 @@
+"""Loads that cannot be those of the case's rotor are a question, not missing physics."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosing import case, points, recording
+
+from bemt.dataset import Dataset
+from bemt.diagnose import another_rotor, chain
+from bemt.diagnose.problem import build
+from bemt.diagnose.record import from_series
+
+
+def slipped(what: str) -> Dataset:
+    guess, given = case(), points("static")
+    if what == "diameter":
+        return recording(guess.replaced({"rotor.diameter_in": 12.0}), given, noise=0.005)
+    if what == "radius":
+        return recording(guess.replaced({"rotor.diameter_in": 4.0}), given, noise=0.005)
+    series = recording(guess, given, noise=0.005)
+    if what == "poles":
+        return Dataset("bench", "log", {**series.values, "rpm": series.values["rpm"] * 7.0}, dict(series.u))
+    return Dataset("bench", "log", {**series.values, "thrust_N": series.values["thrust_N"] / 9.80665}, {})
+
+
+@pytest.mark.parametrize(
+    ("what", "words"), [("diameter", "diameter 0.2"), ("radius", "radius taken for the diameter"), ("poles", "7 pole")]
+)
+def test_a_rotor_off_by_a_factor_is_a_question_with_the_likely_slip(what: str, words: str) -> None:
+    problem = build([from_series(slipped(what), case())], [case()])
+    ranked = another_rotor.suspects(problem)
+    assert any(words in s.words for s in ranked[:3]), ranked[:5]
+    assert np.all(np.diff([s.distance for s in ranked]) >= 0.0)
+    answer = chain.diagnose([from_series(slipped(what), case())], [case()], nulls=200)
+    assert answer.problem.findings[0] == another_rotor.finding(problem)
+    if what != "poles":  # a ratio of pole pairs is a cause of its own, and may be named
+        assert (answer.decision.verdict, answer.decision.effects) == ("insufficient", ())
+
+
+def test_one_channel_in_another_unit_stays_a_finding_of_its_own() -> None:
+    answer = chain.diagnose([from_series(slipped("unit"), case())], [case()], nulls=200)
+    assert answer.decision.effects == ("unit_slip",)
+
+
+def test_a_rotor_that_is_the_case_is_not_asked_for() -> None:
+    assert another_rotor.finding(build([from_series(recording(case(), points("grid")), case())], [case()])) == ""
+
+
+def test_repeats_that_differ_as_no_stand_does_name_nothing() -> None:
+    """The neighbour's speed changes from row to row and is not recorded: its mean is no density and no gain."""
+    base, given = case(), points("static")
+    plain, rng = recording(base, given, noise=0.0), np.random.default_rng(1)
+    values = {k: np.tile(v, 6) for k, v in plain.values.items() if k != "time_s"}
+    values["thrust_N"] = values["thrust_N"] * rng.uniform(0.3, 1.0, values["rpm"].size)
+    test = from_series(Dataset("bench", "map", values), base)
+    reference = replace(from_series(plain, base), reference=True)
+    answer = chain.diagnose([test, reference], [base], nulls=200)
+    assert answer.decision.effects == () and any("not recorded" in f for f in answer.problem.findings)
