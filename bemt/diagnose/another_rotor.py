@@ -73,18 +73,7 @@ def _suspicious(found: dict[str, float]) -> bool:
 
 
 def suspects(problem: Problem) -> list[Suspect]:
-    """Rank the slips that would explain the level of the loads.
-
-    Parameters
-    ----------
-    problem : Problem
-        Readings and the baseline of the case.
-
-    Returns
-    -------
-    list of Suspect
-        Nearest first.
-    """
+    """Rank the slips that would explain the level of the loads."""
     found = {c: math.log(abs(v)) for c, v in levels(problem).items() if v}
     out: dict[str, Suspect] = {}
     for kind, words, shift, rarity in _slips(problem, found):

@@ -154,20 +154,7 @@ def turned(part: Part, blade: Effect) -> tuple[Effect, ...]:
 
 
 def calibrated(problem: Problem, prior: Prior) -> tuple[Blade | None, str, str]:
-    """Find the blade on the reference readings.
-
-    Parameters
-    ----------
-    problem : Problem
-        With references of one rotor.
-    prior : Prior
-        Of its blade.
-
-    Returns
-    -------
-    tuple
-        The blade, None where none was found; a note of what was done; a finding, "" without one.
-    """
+    """Find the blade on the reference readings."""
     rows = ~problem.free
     if np.count_nonzero(problem.channel[rows] < 2) < _FEWEST:
         return None, "", ""

@@ -24,20 +24,7 @@ REFERENCE = -1
 
 
 def partitions(problem: Problem, most: int = 6) -> list[tuple[str, NDArray[np.intp]]]:
-    """All ways to leave out whole blocks, never random rows: recordings, lines of rpm or J; else intervals.
-
-    Parameters
-    ----------
-    problem : Problem
-        Readings.
-    most : int
-        Largest number of blocks [1].
-
-    Returns
-    -------
-    list of tuple
-        What the blocks are, and the block of each of P points, `REFERENCE` for those of references; at least one.
-    """
+    """All ways to leave out whole blocks, never random rows: recordings, lines of rpm or J; else intervals."""
     P = problem.covariates["rpm"].size
     mine = np.zeros(P, dtype=bool)
     mine[problem.point[problem.free]] = True
@@ -76,22 +63,7 @@ def partitions(problem: Problem, most: int = 6) -> list[tuple[str, NDArray[np.in
 def held_out(
     found: Evidence, what: Explanation, split: tuple[str, NDArray[np.intp]] | None = None
 ) -> tuple[str, Array, Array]:
-    """Predict every block from the others, with and without an explanation.
-
-    Parameters
-    ----------
-    found : Evidence
-        Outcome of the weighing.
-    what : Explanation
-        Explanation.
-    split : tuple, optional
-        What the blocks are and the block of each point; the first of :func:`partitions` by default.
-
-    Returns
-    -------
-    tuple
-        What the blocks are, (M,) prediction of the explanation and (M,) of a physics-free smooth error.
-    """
+    """Predict every block from the others, with and without an explanation."""
     problem = found.problem
     words, block = split or partitions(problem)[0]
     member = block[problem.point]

@@ -26,22 +26,7 @@ STYLE: dict[Any, Any] = {
 
 
 def blank(height: float, rows: int, columns: int, **options: Any) -> tuple[Figure, NDArray[Any]]:
-    """Give a figure that no window knows of, so that nothing stays open.
-
-    Parameters
-    ----------
-    height : float
-        Height [inch].
-    rows, columns : int
-        Panels.
-    **options
-        For ``Figure.subplots``.
-
-    Returns
-    -------
-    tuple
-        Figure and (rows, columns) axes.
-    """
+    """Give a figure that no window knows of, so that nothing stays open."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -58,29 +58,7 @@ def _components(channels: Mapping[str, Channel], pattern: re.Pattern[str], path:
 
 
 def point_of(imported: Imported, path: str, rpm: float | None, airspeed_m_s: float | None) -> Dataset:
-    """One point of a force file, and of the moment file that OpenFOAM writes beside it.
-
-    Parameters
-    ----------
-    imported : Imported
-        Forces, moments, or both.
-    path : str
-        Its file.
-    rpm : float or None
-        Speed of rotation [rev/min].
-    airspeed_m_s : float or None
-        Axial onset speed [m/s]; None: that of the case.
-
-    Returns
-    -------
-    Dataset
-        One row with thrust and torque, as far as they are there, as magnitudes.
-
-    Raises
-    ------
-    InputError
-        Without a speed, with several zones, or when no axis is that of the shaft.
-    """
+    """One point of a force file, and of the moment file that OpenFOAM writes beside it."""
     from bemt.recordings.load import import_file
 
     if rpm is None:

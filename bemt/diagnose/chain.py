@@ -123,32 +123,7 @@ def diagnose(
     given: suggestion.Given | None = None,
     channels: Sequence[str] | None = None,
 ) -> Diagnosis:
-    """Say what was left out.
-
-    Parameters
-    ----------
-    records : sequence of Record
-        Recordings, analysed together.
-    cases : sequence of Case
-        One for all recordings, or one each.
-    only : sequence of str, optional
-        Effects to consider; all by default.
-    progress : callable, optional
-        Told what is being done.
-    nulls : int
-        Bootstrapped nulls of the gate [1].
-    baseline : str
-        Model that is compared: "bemt", or "k1k2" for its thrust.
-    given : Given, optional
-        What was asked on the command line, for the commands of the next step.
-    channels : sequence of str, optional
-        Of `CHANNELS`; all that were measured by default.
-
-    Returns
-    -------
-    Diagnosis
-        The answer.
-    """
+    """Say what was left out."""
     say = progress or (lambda _: None)
     speed = CHANNELS[2]
     each = list(cases) * len(records) if len(cases) == 1 else list(cases)

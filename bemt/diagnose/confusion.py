@@ -60,24 +60,7 @@ class Confusion:
 
 
 def distance(state: State, s: Array, span: slice, form: Form | None = None) -> float:
-    """Distance of a whitened signature from a candidate, over its settings.
-
-    Parameters
-    ----------
-    state : State
-        Whitened signatures.
-    s : (M,) float
-        Whitened signature [1].
-    span : slice
-        Columns of the candidate.
-    form : Form, optional
-        Error of the form of the effect that the signature belongs to.
-
-    Returns
-    -------
-    float
-        In standard deviations [1].
-    """
+    """Distance of a whitened signature from a candidate, over its settings. [1]"""
     square = _squares(s[:, None] - state.S[:, span], form)
     return float(np.sqrt(max(float(np.min(square)), 0.0)))
 
@@ -92,20 +75,7 @@ def _squares(d: Array, form: Form | None) -> Array:
 
 
 def confusion(found: Evidence, settings: dict[str, int] | None = None) -> Confusion:
-    """Distances between all candidates.
-
-    Parameters
-    ----------
-    found : Evidence
-        Whitened signatures.
-    settings : dict of str to int, optional
-        Setting (column within the candidate) that stands for an effect; its ordinary strength by default.
-
-    Returns
-    -------
-    Confusion
-        Matrix over all candidates.
-    """
+    """Distances between all candidates."""
     state = found.states[0]
     ids = tuple(c.id for c in found.candidates)
     chosen = [state.S[:, found.spans[c.id].start + (settings or {}).get(c.id, c.middle)] for c in found.candidates]
@@ -125,19 +95,7 @@ def confusion(found: Evidence, settings: dict[str, int] | None = None) -> Confus
 
 
 def nearest(found: Evidence) -> str:
-    """Effect whose signature is most nearly parallel to the mismatch: what a look at the curves would say.
-
-    Parameters
-    ----------
-    found : Evidence
-        Signatures and readings.
-
-    Returns
-    -------
-    str
-        Id; neither nuisances nor sizes count, so it is a baseline and nothing that the diagnosis uses. Empty without
-        candidates.
-    """
+    """Effect whose signature is most nearly parallel to the mismatch: what a look at the curves would say."""
     problem = found.problem
     r = (problem.y - problem.f0) / problem.u
 

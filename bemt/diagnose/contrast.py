@@ -70,32 +70,6 @@ def compare(
 ) -> Contrast:
     """Say what changed between two recordings of one stand.
 
-    Parameters
-    ----------
-    a, b : str or path
-        Recordings of any known format: before and after, or without and with.
-    case : Case or path, optional
-        The rotor. With it, B is diagnosed with A as its reference: what the model lacks in A is no finding in B.
-        Without it, the causes are those that scale like the ratios do.
-    diameter_m : float, optional
-        Diameter [m], for the advance ratio; that of the case or the recordings by default.
-    rows_a, rows_b : sequence of str
-        Rows that are meant: ``column=text``, ``column=number``, ``column=low:high``, or ``rotor=left`` for a file of
-        several rotors. Units as in the channels that `import` shows.
-    progress : callable, optional
-        Told what is being done.
-
-    Returns
-    -------
-    Contrast
-        ``verdict``, ``effects``, and ``document`` (``bemt.comparison/1``) with ``ratios`` per channel: ratio, 68 and
-        95 % intervals from scatter and set-up, slopes over speed and advance.
-
-    Raises
-    ------
-    InputError
-        When a file is no recording, the two share no channel, or they are the same file and rows.
-
     Notes
     -----
     Loads are compared as load / (rho n^2) on a smooth curve over ln n and V/(n D), by Gaussian processes (Rasmussen and

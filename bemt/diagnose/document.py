@@ -46,18 +46,7 @@ def _number(x: float) -> float | None:
 
 
 def document(d: Diagnosis) -> dict[str, Any]:
-    """Give the document.
-
-    Parameters
-    ----------
-    d : Diagnosis
-        The answer.
-
-    Returns
-    -------
-    dict
-        Fit for JSON, schema ``bemt.diagnosis/1``.
-    """
+    """Give the document."""
     found = d.found
     ranking = []
     for name, p in sorted(found.probability.items(), key=lambda kv: -kv[1])[:12]:
@@ -157,18 +146,7 @@ def _odds(told: dict[str, Any]) -> str:
 
 
 def explanation(d: Diagnosis) -> list[str]:
-    """Say the answer in a few sentences.
-
-    Parameters
-    ----------
-    d : Diagnosis
-        The answer.
-
-    Returns
-    -------
-    list of str
-        About five lines.
-    """
+    """Say the answer in a few sentences."""
     decision, catalogue = d.decision, effects.catalogue()
     lines = [headline(d)]
     lines += [f"Before any physics: {f}" for f in d.problem.findings[:_FINDINGS]]
@@ -235,18 +213,7 @@ def _not_tried(d: Diagnosis) -> list[str]:
 
 
 def headline(d: Diagnosis) -> str:
-    """What an engineer would say first.
-
-    Parameters
-    ----------
-    d : Diagnosis
-        The answer.
-
-    Returns
-    -------
-    str
-        One sentence.
-    """
+    """What an engineer would say first."""
     said, catalogue = d.decision, effects.catalogue()
     titles = [catalogue[i].title for i in said.effects]
     off = " and ".join(f"{_CHANNEL[c].lower()} {_share(v)}" for c, v in d.off.items())
@@ -281,18 +248,7 @@ def _share(v: float) -> str:
 
 
 def text(d: Diagnosis) -> str:
-    """Lines, and the tables behind them.
-
-    Parameters
-    ----------
-    d : Diagnosis
-        The answer.
-
-    Returns
-    -------
-    str
-        For a terminal.
-    """
+    """Lines, and the tables behind them."""
     found = d.found
     first, *rest = explanation(d)
     named = f" {', '.join(d.decision.effects)}" if d.decision.effects else ""

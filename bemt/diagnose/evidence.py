@@ -93,22 +93,7 @@ class State:
     best_rival: str = ""
 
     def gains(self, name: str, span: slice, R: Array) -> Array:
-        """Log likelihood over that of "none" of every setting of a candidate for whitened residuals.
-
-        Parameters
-        ----------
-        name : str
-            Candidate.
-        span : slice
-            Its columns of S.
-        R : (M, n) float
-            Whitened residuals [1].
-
-        Returns
-        -------
-        (g, n) float
-            Settings by residuals [1].
-        """
+        """Log likelihood over that of "none" of every setting of a candidate for whitened residuals. [1]"""
         S = self.S[:, span]
         out = S.T @ R - self.half[span][:, None]
         form = self.forms.get(name)
@@ -181,22 +166,7 @@ def unknown(r: Array, rivals: Sequence[tuple[str, Whitener]], log_det: float, ba
 
 
 def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True) -> Evidence:
-    """Weigh all explanations.
-
-    Parameters
-    ----------
-    problem : Problem
-        Readings, baseline, nuisances.
-    candidates : sequence of Candidate
-        Effects over their ranges.
-    pairs : bool
-        Also two effects at a time.
-
-    Returns
-    -------
-    Evidence
-        Posterior probabilities and what they follow from.
-    """
+    """Weigh all explanations."""
     r = problem.residual
     spans, S, log_w = _stacked(problem, candidates)
     covariance = dict(noise.covariances(problem))
@@ -233,22 +203,7 @@ def _stacked(problem: Problem, candidates: Sequence[Candidate]) -> tuple[dict[st
 
 
 def bare(problem: Problem, candidates: Sequence[Candidate], hyper: Hyper) -> Evidence:
-    """Whitened signatures under one covariance, without weighing: all that a plan needs.
-
-    Parameters
-    ----------
-    problem : Problem
-        Points and baseline.
-    candidates : sequence of Candidate
-        Effects over their ranges.
-    hyper : Hyper
-        The covariance.
-
-    Returns
-    -------
-    Evidence
-        One state, no probabilities.
-    """
+    """Whitened signatures under one covariance, without weighing: all that a plan needs."""
     spans, S, log_w = _stacked(problem, candidates)
     white = noise.whitener(noise.covariance(problem, hyper), problem.u)
     Sw = white(S)

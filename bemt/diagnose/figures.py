@@ -49,20 +49,7 @@ _MOST_LINES = 4
 
 
 def draw(answer: Diagnosis, out: Path) -> list[Path]:
-    """Draw all figures that have something to show.
-
-    Parameters
-    ----------
-    answer : Diagnosis
-        The answer.
-    out : Path
-        Folder; it is made.  Figures of an earlier answer go away.
-
-    Returns
-    -------
-    list of Path
-        Files written, each stem of :data:`NAMES` as PNG and, where that is small, as SVG.
-    """
+    """Draw all figures that have something to show."""
     import matplotlib
 
     makers: dict[str, Callable[[Diagnosis], Figure | None]] = {

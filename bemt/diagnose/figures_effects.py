@@ -45,19 +45,7 @@ def _representative(answer: Diagnosis) -> int:
 
 
 def blade_loads(answer: Diagnosis) -> tuple[int, Array, Array, Array] | None:
-    """Loads along the blade without and with what was found, where the effect acts on the rotor.
-
-    Parameters
-    ----------
-    answer : Diagnosis
-        The answer.
-
-    Returns
-    -------
-    tuple or None
-        Reading that stands for the rest; (N,) radius and width of the blade elements [m]; (2, 2, N): without and with,
-        dT/dr [N/m] and dQ/dr [N] of all blades.  None if nothing changes on the rotor.
-    """
+    """Loads along the blade without and with what was found, where the effect acts on the rotor."""
     best, problem = answer.best, answer.problem
     extra = [effect_of(i, s) for i, s in zip(best.ids, best.settings, strict=True)]
     extra = [e for e in extra if e.kind == "air" and bem.acts_on_rotor(e)]
@@ -83,18 +71,7 @@ def blade_loads(answer: Diagnosis) -> tuple[int, Array, Array, Array] | None:
 
 
 def radius(answer: Diagnosis) -> Figure | None:
-    """Draw what the effect changes along the blade.
-
-    Parameters
-    ----------
-    answer : Diagnosis
-        The answer.
-
-    Returns
-    -------
-    Figure or None
-        None when nothing changes on the rotor.
-    """
+    """Draw what the effect changes along the blade."""
     found = blade_loads(answer)
     if found is None:
         return None
@@ -120,18 +97,7 @@ def radius(answer: Diagnosis) -> Figure | None:
 
 
 def matrix(answer: Diagnosis) -> Figure | None:
-    """Draw which effects look alike in this plan.
-
-    Parameters
-    ----------
-    answer : Diagnosis
-        The answer.
-
-    Returns
-    -------
-    Figure or None
-        None when fewer than two effects can be seen.
-    """
+    """Draw which effects look alike in this plan."""
     from matplotlib.colors import LinearSegmentedColormap, TwoSlopeNorm
     from matplotlib.patches import Rectangle
 
@@ -188,18 +154,7 @@ def _neighbours(distance: Array, rows: Index) -> Index:
 
 
 def ranking(answer: Diagnosis) -> Figure:
-    """Draw the explanations by their probability.
-
-    Parameters
-    ----------
-    answer : Diagnosis
-        The answer.
-
-    Returns
-    -------
-    Figure
-        Bars.
-    """
+    """Draw the explanations by their probability."""
     found = answer.found
     names = sorted(found.probability, key=lambda k: -found.probability[k])[:_MOST_BARS]
     odds = [0.0 if k == NONE else found.log_bayes(k) for k in names]

@@ -68,18 +68,7 @@ def _words(setting: dict[str, Any]) -> str:
 
 
 def posterior(answer: Diagnosis) -> Figure | None:
-    """Draw one panel per parameter, or a map of two.
-
-    Parameters
-    ----------
-    answer : Diagnosis
-        The answer.
-
-    Returns
-    -------
-    Figure or None
-        None when the leading explanation has nothing to choose.
-    """
+    """Draw one panel per parameter, or a map of two."""
     if not answer.best.ids:
         return None
     panels = []

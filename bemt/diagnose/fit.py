@@ -53,20 +53,7 @@ class Fit:
 
 
 def fit(found: Evidence, what: Explanation) -> Fit:
-    """Best setting of an explanation under the preferred covariance.
-
-    Parameters
-    ----------
-    found : Evidence
-        Outcome of the weighing.
-    what : Explanation
-        None, one or two effects.
-
-    Returns
-    -------
-    Fit
-        Setting of largest evidence; the signature is solved with all effects at once.
-    """
+    """Best setting of an explanation under the preferred covariance."""
     problem, state = found.problem, found.states[0]
     ids = tuple(what)
     if not ids:
@@ -90,40 +77,12 @@ def fit(found: Evidence, what: Explanation) -> Fit:
 
 
 def intervals(found: Evidence, what: Explanation, share: float = 0.9) -> dict[str, dict[str, dict[str, Any]]]:
-    """Posterior medians and intervals of the parameters of an explanation.
-
-    Parameters
-    ----------
-    found : Evidence
-        Outcome of the weighing.
-    what : Explanation
-        One or two effects.
-    share : float
-        Probability inside the interval [1].
-
-    Returns
-    -------
-    dict
-        Effect to parameter to ``value``, ``low``, ``high``, ``unit``; words have equal ends.
-    """
+    """Posterior medians and intervals of the parameters of an explanation."""
     return {i: _marginals(found, i, p, share) for i, p in weights(found, what).items()}
 
 
 def weights(found: Evidence, what: Explanation) -> dict[str, Array]:
-    """Posterior probability of every setting of the effects of an explanation.
-
-    Parameters
-    ----------
-    found : Evidence
-        Outcome of the weighing.
-    what : Explanation
-        One or two effects.
-
-    Returns
-    -------
-    dict
-        Id to (G,) probabilities that add up to 1, over all settings of the covariance [1].
-    """
+    """Posterior probability of every setting of the effects of an explanation. [1]"""
     ids = tuple(what)
     states = [s for s in found.states if what in s.log_z]
     share = np.array([s.log_z[what] + np.log(s.hyper.weight) for s in states])
@@ -185,22 +144,7 @@ def _discrete(values: Sequence[Any], p: Array, unit: str, share: float) -> dict[
 
 
 def refined(found: Evidence, best: Fit, share: float = 0.9) -> tuple[Fit, dict[str, dict[str, dict[str, Any]]]]:
-    """Parameters between the grid's settings: Gauss-Newton on the solved model, Laplace within the physical ranges.
-
-    Parameters
-    ----------
-    found : Evidence
-        Outcome of the weighing.
-    best : Fit
-        Explanation at its best setting of the grid.
-    share : float
-        Probability inside the intervals [1].
-
-    Returns
-    -------
-    tuple
-        The explanation at the refined setting, and effect to parameter to ``value``, ``low``, ``high``, ``unit``.
-    """
+    """Parameters between the grid's settings: Gauss-Newton on the solved model, Laplace within the physical ranges."""
     problem = found.problem
     where = [(k, p) for k, i in enumerate(best.ids) for p in _continuous(i, best.settings[k])]
     # what the form does to the scale of a law looks like its parameter: no fit shows it, so its prior size holds
@@ -313,22 +257,7 @@ def _continuous(id_: str, setting: dict[str, Any]) -> list[Any]:
 
 
 def form_covariance(found: Evidence, best: Fit, size: float | None = None) -> Array:
-    """Covariance of the forms of an explanation and of what lies between settings of the grid.
-
-    Parameters
-    ----------
-    found : Evidence
-        Outcome of the weighing.
-    best : Fit
-        The explanation.
-    size : float, optional
-        Standard deviation of the forms, share of the effect's size; what explains the readings best by default [1].
-
-    Returns
-    -------
-    (M, M) float
-        Covariance [units of the readings, squared].
-    """
+    """Covariance of the forms of an explanation and of what lies between settings of the grid, (M, M)."""
     M = found.problem.y.size
     modes = form_modes(found.problem, found.candidates)
     out = np.zeros((M, M))
@@ -356,20 +285,7 @@ def _scale(found: Evidence, best: Fit) -> Array:
 
 
 def smooth(found: Evidence, best: Fit) -> Array:
-    """What nuisances, the solver's own error and that of the effect's form add to an explanation, posterior mean.
-
-    Parameters
-    ----------
-    found : Evidence
-        Outcome of the weighing.
-    best : Fit
-        The explanation.
-
-    Returns
-    -------
-    (M,) float
-        Systematic part of the rest, in the unit of each reading.
-    """
+    """What nuisances, the solver's own error and that of the effect's form add to an explanation, posterior mean."""
     problem, hyper = found.problem, found.states[0].hyper
     C = noise.covariance(problem, hyper) + form_covariance(found, best)
     systematic = C - hyper.scale**2 * noise.noise(problem, hyper.ar)
@@ -377,20 +293,7 @@ def smooth(found: Evidence, best: Fit) -> Array:
 
 
 def left_over(found: Evidence, what: Explanation) -> float:
-    """Logarithm of the odds that something smooth is left when an explanation is taken away.
-
-    Parameters
-    ----------
-    found : Evidence
-        Outcome of the weighing.
-    what : Explanation
-        What is taken away.
-
-    Returns
-    -------
-    float
-        Natural logarithm, averaged over the rival kernels [1].
-    """
+    """Logarithm of the odds that something smooth is left when an explanation is taken away. [1]"""
     problem, hyper = found.problem, found.states[0].hyper
     best = fit(found, what)
     rest = problem.residual - best.signature

@@ -92,27 +92,7 @@ class Forms:
         cls, white: Whitener, candidates: Sequence[Candidate], at: Sequence[int], modes: Sequence[Array],
         d: Array | None = None,
     ) -> Forms:  # fmt: skip
-        """Modes times the size of a signature, and what lies between it and its neighbours on the grid, whitened.
-
-        Parameters
-        ----------
-        white : Whitener
-            Covariance of the readings.
-        candidates : sequence of Candidate
-            C effects.
-        at : sequence of int
-            Setting of each.
-        modes : sequence of (M, q) float
-            Of :func:`form_modes`, for each [1].
-        d : (M, C) float, optional
-            Whitened residual less the signature of each: the size of a form is then that which explains it best,
-            else the smallest [1].
-
-        Returns
-        -------
-        Forms
-            Whitened.
-        """
+        """Modes times the size of a signature, and what lies between it and its neighbours on the grid, whitened."""
         shapes = [c.signatures[:, g, None] * m for c, g, m in zip(candidates, at, modes, strict=True)]
         betweens = [c.between(g) for c, g in zip(candidates, at, strict=True)]
         q = np.array([x.shape[1] for x in shapes], dtype=np.intp)
@@ -180,20 +160,7 @@ def _sizes(plain: Array, q: NDArray[np.intp], width: NDArray[np.intp]) -> tuple[
 
 
 def form_modes(problem: Problem, candidates: Sequence[Candidate]) -> dict[str, Array]:
-    """Modes of the error of each effect's form: smooth ones for physics, none for instruments.
-
-    Parameters
-    ----------
-    problem : Problem
-        Readings.
-    candidates : sequence of Candidate
-        Effects.
-
-    Returns
-    -------
-    dict
-        Id to (M, q), to be multiplied by the effect's signature [1].
-    """
+    """Modes of the error of each effect's form: smooth ones for physics, none for instruments. [1]"""
     out: dict[tuple[tuple[str, ...], tuple[str, ...]], Array] = {}
     laws = {}
     for c in candidates:

@@ -30,22 +30,7 @@ _STATES = 3
 
 
 def p_value(found: Evidence, nulls: int = NULLS, seed: int = 0) -> float:
-    """Share of nulls that look at least as much like a cause as the recording does.
-
-    Parameters
-    ----------
-    found : Evidence
-        Outcome for the recording.
-    nulls : int
-        How many to draw [1].
-    seed : int
-        Of the draws: the same recording gives the same answer.
-
-    Returns
-    -------
-    float
-        (1 + number of such nulls) / (1 + number of nulls) [1].
-    """
+    """Share of nulls that look at least as much like a cause as the recording does. [1]"""
     rng = np.random.default_rng(seed)
     M = found.problem.y.size
     source = found.states[0]

@@ -21,22 +21,7 @@ _HEAD = "with what `python -m bemt diagnose` found: "
 
 
 def improved_case(answer: Diagnosis, case: Case, source: str) -> str:
-    """Text of a case file with the effects of the verdict on.
-
-    Parameters
-    ----------
-    answer : Diagnosis
-        The answer.
-    case : Case
-        The case that was diagnosed.
-    source : str
-        Text of its file.
-
-    Returns
-    -------
-    str
-        TOML, or "" when the verdict names nothing that a simulation can have (faults of a stand are not simulated).
-    """
+    """Text of a case file with the effects of the verdict on."""
     named = answer.decision.verdict in ("named", "class")
     found = [effect_of(i, s) for i, s in zip(answer.best.ids, answer.best.settings, strict=True)]
     found = [e for e in found if bem.acts_on_rotor(e) or (e.kind == "air" and not e.needs)]
@@ -60,18 +45,7 @@ def improved_case(answer: Diagnosis, case: Case, source: str) -> str:
 
 
 def beside(case: Case) -> list[Path]:
-    """Files of a case that lie in its folder, and so go with it.
-
-    Parameters
-    ----------
-    case : Case
-        The case.
-
-    Returns
-    -------
-    list of Path
-        Without the case file.
-    """
+    """Files of a case that lie in its folder, and so go with it."""
     folder = case.folder.resolve()
     return [f for f in case.files() if f != case.path and f.resolve().is_relative_to(folder)]
 
@@ -90,20 +64,6 @@ def elsewhere(node: Any, case: Case) -> None:
 
 
 def is_improved(source: str) -> bool:
-    """Whether a case file was written here, not by hand.
-
-    Parameters
-    ----------
-    source : str
-        Text of the file.
-
-    Returns
-    -------
-    bool
-        True if its first line says so.
-
-    >>> is_improved("# mine with what `python -m bemt diagnose` found: swirl()"), is_improved("# mine")
-    (True, False)
-    """
+    """Whether a case file was written here, not by hand."""
     first = source.partition("\n")[0]
     return first.startswith("#") and _HEAD in first

@@ -60,29 +60,7 @@ def load(
     path: str, case: Case, imported: Imported | None = None, rpm: float | None = None,
     airspeed_m_s: float | None = None,
 ) -> Record:  # fmt: skip
-    """Read one recording, whatever its format.
-
-    Parameters
-    ----------
-    path : str
-        File.
-    case : Case
-        Diameter, and what the recording does not say.
-    imported : Imported, optional
-        The file as read already, or some of its rows.
-    rpm, airspeed_m_s : float, optional
-        Speed of rotation [rev/min] and axial onset speed [m/s] of a force file of CFD, which states neither.
-
-    Returns
-    -------
-    Record
-        Points.
-
-    Raises
-    ------
-    InputError
-        If the file is not a recording.
-    """
+    """Read one recording, whatever its format."""
     from bemt.recordings import reduce as reduction
     from bemt.recordings.load import import_file
 

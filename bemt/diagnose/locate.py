@@ -66,37 +66,13 @@ def mismatch(found: Evidence, best: Fit) -> Array:
 
 
 def locate(found: Evidence, best: Fit) -> Location:
-    """Find channel, variable and interval of the mismatch.
-
-    Parameters
-    ----------
-    found : Evidence
-        Outcome of the weighing.
-    best : Fit
-        Preferred explanation; that of nothing for a bare residual.
-
-    Returns
-    -------
-    Location
-        Largest scan statistic; among variables that tie, the one along which the effect acts by its nature.
-    """
+    """Find channel, variable and interval of the mismatch."""
     natural = tuple(v for i in best.ids for v in effects.catalogue()[i].along)
     return _largest(found, mismatch(found, best), natural)
 
 
 def bare(found: Evidence) -> Location:
-    """Find channel, variable and interval in which the recording itself is farthest from the case.
-
-    Parameters
-    ----------
-    found : Evidence
-        Outcome of the weighing.
-
-    Returns
-    -------
-    Location
-        Nothing taken away: what the figures of recording and case show to the eye.
-    """
+    """Find channel, variable and interval in which the recording itself is farthest from the case."""
     return _largest(found, found.problem.y - found.problem.f0, ())
 
 

@@ -93,18 +93,7 @@ class Hyper:
 
 
 def hypers(problem: Problem) -> tuple[Hyper, ...]:
-    """All settings, with prior weights that add up to 1.
-
-    Parameters
-    ----------
-    problem : Problem
-        Says whether uncertainties are stated.
-
-    Returns
-    -------
-    tuple of Hyper
-        The grid.
-    """
+    """All settings, with prior weights that add up to 1."""
     scales = _SCALES[problem.u_known]
     each = 1.0 / (len(scales) * len(_AR))
     model = _MODEL if problem.free.all() else _MODEL_SHOWN
@@ -137,18 +126,7 @@ def noise(problem: Problem, ar: float) -> Array:
 
 
 def discrepancy(problem: Problem) -> Array:
-    """Covariance of the solver's own error of relative size 1: smooth in J, nearly constant in speed.
-
-    Parameters
-    ----------
-    problem : Problem
-        Readings.
-
-    Returns
-    -------
-    (M, M) float
-        Covariance [units of the readings, squared].
-    """
+    """Covariance of the solver's own error of relative size 1: smooth in J, nearly constant in speed, (M, M)."""
     J = problem.covariates["J"][problem.point]
     n = np.log(problem.covariates["rpm"][problem.point])
     spread = max(float(np.ptp(J)), 0.6)
@@ -191,20 +169,7 @@ class Whitener:
 
 
 def whitener(covariance: Array, u: Array) -> Whitener:
-    """Factor a covariance.
-
-    Parameters
-    ----------
-    covariance : (M, M) float
-        Symmetric, positive [units of the readings, squared].
-    u : (M,) float
-        Size of the readings' noise, to keep rounding away [units of the readings].
-
-    Returns
-    -------
-    Whitener
-        Its factor.
-    """
+    """Factor a covariance."""
     jitter = np.diag((1e-4 * u) ** 2)
     factor = np.asarray(np.linalg.cholesky(covariance + jitter), dtype=float)
     return Whitener(factor, float(np.sum(np.log(np.diag(factor)))))
@@ -251,18 +216,7 @@ def _tangents(problem: Problem) -> tuple[Array, Array]:
 
 
 def rivals(problem: Problem) -> tuple[tuple[str, Array], ...]:
-    """Covariances of an unknown smooth effect of the test: along each recorded variable, and pairs of them.
-
-    Parameters
-    ----------
-    problem : Problem
-        Readings.
-
-    Returns
-    -------
-    tuple of (str, (M, M) float)
-        Name ("thrust and torque over J, M_tip: 10 %") and covariance.
-    """
+    """Covariances of an unknown smooth effect of the test: along each recorded variable, and pairs of them."""
     X: dict[str, Array] = {}
     for name, values in problem.covariates.items():
         if name in ("run", "Re", "M_tip", "pressure_Pa"):
@@ -299,38 +253,12 @@ def rivals(problem: Problem) -> tuple[tuple[str, Array], ...]:
 
 
 def law_of(effect: Effect | type[Effect]) -> tuple[str, ...]:
-    """What the law of an effect depends on, of speed, advance ratio and density.
-
-    Parameters
-    ----------
-    effect : Effect
-        The effect, or its class.
-
-    Returns
-    -------
-    tuple of str
-        Nothing for instruments; advance ratio alone for a flow without friction and compressibility; else all.
-    """
+    """What the law of an effect depends on, of speed, advance ratio and density."""
     return () if effect.kind == "stand" else ("J",) if effect.inviscid else tuple(_FLOW)
 
 
 def smooth_modes(problem: Problem, besides: Sequence[str] = (), flow: Sequence[str] = tuple(_FLOW)) -> Array:
-    """Modes of a smooth function of unit variance, each channel for itself.
-
-    Parameters
-    ----------
-    problem : Problem
-        Readings.
-    besides : sequence of str
-        Covariates that it depends on besides those of the flow.
-    flow : sequence of str
-        Which of speed, advance ratio and density it depends on.
-
-    Returns
-    -------
-    (M, q) float
-        Columns whose products add up to the covariance, but for small modes [1].
-    """
+    """Modes of a smooth function of unit variance, each channel for itself, (M, q) [1]."""
     P = problem.covariates["rpm"].size
     apart = np.zeros((P, P))
     for name, least in (_FLOW | _BESIDES).items():

@@ -56,19 +56,7 @@ def _stretch(problem: Problem) -> Array:
 
 
 def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...], NDArray[np.bool_], Array]:
-    """Tangents of everything that may differ without being a cause.
-
-    Parameters
-    ----------
-    problem : Problem
-        Readings and baseline.
-
-    Returns
-    -------
-    tuple
-        (M, K) change of the readings for one standard deviation of each nuisance, their names, (K,) whether each is an
-        error of the solver itself, and (M,) what the blade's point differs by from the centre of its prior.
-    """
+    """Tangents of everything that may differ without being a cause."""
     columns: list[Array] = []
     names: list[str] = []
     solver: list[bool] = []

@@ -79,20 +79,7 @@ class Plan:
 
 
 def points(path: str, case: Case) -> Record:
-    """Read the points of a plan: a recording whose loads are not there yet.
-
-    Parameters
-    ----------
-    path : str
-        Table with rpm, airspeed_m_s and what else is planned; loads are ignored.
-    case : Case
-        The case.
-
-    Returns
-    -------
-    Record
-        With loads that mean nothing.
-    """
+    """Read the points of a plan: a recording whose loads are not there yet."""
     from bemt.base.errors import Fault, InputError
     from bemt.dataset import Dataset
     from bemt.diagnose.record import from_series
@@ -114,22 +101,7 @@ def points(path: str, case: Case) -> Record:
 
 
 def plan(record: Record, case: Case, progress: Callable[[str], None] | None = None) -> Plan:
-    """Say what a plan can see.
-
-    Parameters
-    ----------
-    record : Record
-        Points; their loads are replaced by those of the baseline.
-    case : Case
-        The case.
-    progress : callable, optional
-        Told what is being done.
-
-    Returns
-    -------
-    Plan
-        Sizes, distances, a run to add.
-    """
+    """Say what a plan can see."""
     with evidence.one_thread():
         return _plan(record, case, progress)
 
@@ -184,18 +156,7 @@ def _sizes(
 
 
 def document(answer: Plan) -> dict[str, Any]:
-    """Give the document ``bemt.plan/1``.
-
-    Parameters
-    ----------
-    answer : Plan
-        The answer.
-
-    Returns
-    -------
-    dict
-        Fit for JSON.
-    """
+    """Give the document ``bemt.plan/1``."""
     c = answer.confusion
     return {
         "schema": SCHEMA, "points": answer.points, "sight": answer.sight,
@@ -210,18 +171,7 @@ def document(answer: Plan) -> dict[str, Any]:
 
 
 def text(answer: Plan) -> str:
-    """Tables for a terminal.
-
-    Parameters
-    ----------
-    answer : Plan
-        The answer.
-
-    Returns
-    -------
-    str
-        Sight of each effect, classes, the run to add.
-    """
+    """Tables for a terminal."""
     c = answer.confusion
     order = np.argsort(-answer.size)
     rows = []

@@ -23,40 +23,14 @@ parameters, beside 1 for all others [1]."""
 
 
 def prior_weights(problem: Problem, ids: Sequence[str]) -> dict[str, float]:
-    """Weight of each effect: physics that every rotor has is likelier to be missing than a fault is to be there.
-
-    Parameters
-    ----------
-    problem : Problem
-        Its baselines say what is off.
-    ids : sequence of str
-        Effects.
-
-    Returns
-    -------
-    dict
-        Id to weight [1].
-    """
+    """Weight of each effect: physics that every rotor has is likelier to be missing than a fault is to be there. [1]"""
     usual = {e.id for e in effects.standard()} | {i for p in problem.parts for i in p.left_out}
     on = [{e.id for e in p.baseline} for p in problem.parts]
     return {i: PRESENT if all(i in o for o in on) else LEFT_OUT if i in usual else 1.0 for i in ids}
 
 
 def log_priors(weights: dict[str, float], pairs: bool = True) -> dict[Explanation, float]:
-    """Logarithm of the prior probability of every explanation.
-
-    Parameters
-    ----------
-    weights : dict of str to float
-        Weight of each effect [1].
-    pairs : bool
-        Also of every pair.
-
-    Returns
-    -------
-    dict
-        Of nothing, of something unknown, of every effect and of every pair.
-    """
+    """Logarithm of the prior probability of every explanation."""
     total = sum(weights.values()) or 1.0
     out = {NONE: PRIOR["none"], UNKNOWN: PRIOR["unknown"]}
     out |= {Explanation.of(i): PRIOR["single"] * w / total for i, w in weights.items()}

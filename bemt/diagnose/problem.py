@@ -86,18 +86,7 @@ class Part:
     _solved: dict[tuple[Effect, ...], tuple[Array, Array, Flow]] = field(default_factory=dict, repr=False)
 
     def predict(self, effects: Sequence[Effect]) -> Array:
-        """Readings with a set of effects, around the baseline of another model where there is one.
-
-        Parameters
-        ----------
-        effects : sequence of Effect
-            All physics that is on.
-
-        Returns
-        -------
-        (C P,) float
-            Channels of :attr:`channels`, one after the other; NaN where not converged [N], [N m], [rev/min].
-        """
+        """Readings with a set of effects, around the baseline of another model where there is one, (C P,)."""
         ours = self._ours(effects)
         if self.instead is None:
             return ours
@@ -105,18 +94,7 @@ class Part:
         return self.instead * (ours / base)
 
     def _ours(self, effects: Sequence[Effect]) -> Array:
-        """Readings of the blade element model with a set of effects.
-
-        Parameters
-        ----------
-        effects : sequence of Effect
-            All physics that is on.
-
-        Returns
-        -------
-        (C P,) float
-            Channels of :attr:`channels`, one after the other; NaN where not converged [N], [N m], [rev/min].
-        """
+        """Readings of the blade element model with a set of effects, (C P,)."""
         # instruments do not change the flow: what they show of the same flow needs no new solution
         key = tuple(e for e in effects if not bem.only_reads(e))
         if key not in self._solved:
@@ -268,18 +246,7 @@ class Problem:
         return self.parts[0].baseline
 
     def predict(self, extra: Sequence[Effect]) -> Array:
-        """Readings with effects added to the baseline, in place of those of the same id.
-
-        Parameters
-        ----------
-        extra : sequence of Effect
-            Effects.
-
-        Returns
-        -------
-        (M,) float
-            Kept readings; NaN where not converged [units of the readings].
-        """
+        """Readings with effects added to the baseline, in place of those of the same id."""
         key = tuple(extra)
         if key not in self.predicted:
             ids = {e.id for e in extra}
@@ -317,27 +284,7 @@ def _part(record: Record, case: Case, baseline: str) -> Part:
 
 
 def build(records: Sequence[Record], cases: Sequence[Case], baseline: str = "bemt") -> Problem:
-    """Put recordings beside the baselines of their cases.
-
-    Parameters
-    ----------
-    records : sequence of Record
-        One or more.
-    cases : sequence of Case
-        One for all, or one each.
-    baseline : str
-        Model that is compared: "bemt", or "k1k2" for its thrust.
-
-    Returns
-    -------
-    Problem
-        Everything that follows needs no case any more.
-
-    Raises
-    ------
-    InputError
-        If there are fewer than three readings.
-    """
+    """Put recordings beside the baselines of their cases."""
     chosen = list(cases) * len(records) if len(cases) == 1 else list(cases)
     # recordings of one case share the errors of its model
     groups: dict[tuple[bool, str], tuple[Case, list[Record]]] = {}
@@ -409,20 +356,7 @@ def _between(problem: Problem, joined: Sequence[Sequence[Record]], records: Sequ
 
 
 def assemble(parts: tuple[Part, ...], blade: Blade = PLAIN) -> Problem:
-    """Stack the readings of parts and add the nuisances.
-
-    Parameters
-    ----------
-    parts : tuple of Part
-        Recordings with their rotors.
-    blade : Blade
-        What is believed of the blade.
-
-    Returns
-    -------
-    Problem
-        Everything that follows needs no case any more.
-    """
+    """Stack the readings of parts and add the nuisances."""
     full = [p.predict(p.baseline) for p in parts]
     y = np.concatenate([np.concatenate([p.record.measured[c] for c in p.channels]) for p in parts])
     u = np.concatenate([np.concatenate([p.record.u[c] for c in p.channels]) for p in parts])

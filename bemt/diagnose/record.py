@@ -100,18 +100,7 @@ class Record:
         return int(self.rpm.size)
 
     def take(self, index: NDArray[Any]) -> Record:
-        """Give some of the points.
-
-        Parameters
-        ----------
-        index : (K,) int or (P,) bool
-            Points to keep.
-
-        Returns
-        -------
-        Record
-            In that order.
-        """
+        """Give some of the points."""
 
         def cut(values: Mapping[str, Array]) -> dict[str, Array]:
             return {key: v[index] for key, v in values.items()}
@@ -132,43 +121,12 @@ _AIR = ("rho", "mu", "a_sound", "temperature_K")
 
 
 def air_of(fields: Mapping[str, Array]) -> Air:
-    """State of the air of many points.
-
-    Parameters
-    ----------
-    fields : mapping of str to (P,) float
-        rho [kg/m3], mu [Pa s], a_sound [m/s], temperature_K [K].
-
-    Returns
-    -------
-    Air
-        With arrays as fields.
-    """
+    """State of the air of many points."""
     return cast("Air", SimpleNamespace(**fields))
 
 
 def from_series(series: Dataset, case: Case, correlated: Mapping[str, Mapping[str, float]] | None = None) -> Record:
-    """Points of a series with the conditions that the case adds.
-
-    Parameters
-    ----------
-    series : Dataset
-        Any kind.  Thrust and torque may be given as coefficients, torque as shaft power.
-    case : Case
-        Diameter, speed and air where the series has none.
-    correlated : mapping, optional
-        Uncertainty that all points of a channel share: ``gain`` [1], ``zero`` [unit of the channel].
-
-    Returns
-    -------
-    Record
-        Points with a speed and at least one load.
-
-    Raises
-    ------
-    InputError
-        If there is no load, or no point with one.
-    """
+    """Points of a series with the conditions that the case adds."""
     notes: list[str] = []
     n = len(series)
     values = {key: np.asarray(v, dtype=float) for key, v in series.values.items()}
@@ -401,18 +359,7 @@ def _alike(record: Record, run: Array) -> NDArray[np.intp]:
 
 
 def merged(records: Sequence[Record]) -> Record:
-    """Join recordings of one rotor into one, with their runs numbered through.
-
-    Parameters
-    ----------
-    records : sequence of Record
-        One or more of the same case.
-
-    Returns
-    -------
-    Record
-        Channels of all, NaN where a part has none; covariates that all have.
-    """
+    """Join recordings of one rotor into one, with their runs numbered through."""
     if len(records) == 1:
         return records[0]
     join = np.concatenate
@@ -434,20 +381,7 @@ def merged(records: Sequence[Record]) -> Record:
 
 
 def owners(records: Sequence[Record], whole: Record) -> NDArray[np.intp]:
-    """Tell which of the recordings that were joined each point comes from.
-
-    Parameters
-    ----------
-    records : sequence of Record
-        What was joined.
-    whole : Record
-        What :func:`merged` made of them.
-
-    Returns
-    -------
-    (P,) int
-        Index into the recordings.  Points of two runs are never averaged, so that each has one.
-    """
+    """Tell which of the recordings that were joined each point comes from, (P,)."""
     if len(records) == 1:
         return np.zeros(len(whole), dtype=np.intp)
     runs = [np.unique(r.extra.get("run", np.zeros(1))).size for r in records]
@@ -455,18 +389,7 @@ def owners(records: Sequence[Record], whole: Record) -> NDArray[np.intp]:
 
 
 def concatenated(records: Sequence[Record]) -> dict[str, Array]:
-    """Covariates that all records share, joined, with runs numbered through.
-
-    Parameters
-    ----------
-    records : sequence of Record
-        One or more.
-
-    Returns
-    -------
-    dict
-        Name to (P,) over all points.
-    """
+    """Covariates that all records share, joined, with runs numbered through."""
     names = [n for n in COVARIATES if all(n in r.extra for r in records)]
     joined = {n: np.concatenate([r.extra[n] for r in records]) for n in names}
     runs, offset = [], 0.0

@@ -63,23 +63,7 @@ def projected_out(
 def noise_sizes(
     e: Array, y: Array, full: Array, fixed: Array, stated: Array | None = None
 ) -> tuple[float, float, int] | None:
-    """Find a and b beside what is stated.
-
-    Parameters
-    ----------
-    e, y, full : (N,) float
-        Reading less model, reading, and full scale of its recording [unit of the channel].
-    fixed : (N, k) float
-        What is projected out [unit of the channel].
-    stated : (N,) float, optional
-        Standard uncertainties that the recording states [unit of the channel].
-
-    Returns
-    -------
-    tuple or None
-        a [1], b [1], and the repeats that they rest on; None with fewer than `FEWEST`; 0, 0 where what is stated
-        explains the repeats.
-    """
+    """Find a and b beside what is stated. [1]"""
     # columns of one length: what is projected out has no size
     norm = np.linalg.norm(fixed, axis=0)
     q, s, _ = np.linalg.svd(fixed[:, norm > 0] / norm[norm > 0], full_matrices=True)

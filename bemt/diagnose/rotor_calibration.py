@@ -31,27 +31,7 @@ _SETTLED = {"model.drag_level", "model.n_crit", "blade.section.thickness", "blad
 def calibrate(
     paths: Sequence[str], case_path: str, say: Callable[[str], None] | None = None
 ) -> tuple[Case, AsMeasured]:
-    """Read recordings and condition the rotor of a case on them.
-
-    Parameters
-    ----------
-    paths : sequence of str
-        Recordings of any format that a diagnosis reads.
-    case_path : str
-        Case of the rotor.
-    say : callable, optional
-        Takes a line on what is being done.
-
-    Returns
-    -------
-    (Case, AsMeasured)
-        The case and what was learnt.
-
-    Raises
-    ------
-    InputError
-        If a file is no recording of thrust or torque of this rotor, or the case is faulty.
-    """
+    """Read recordings and condition the rotor of a case on them, (Case, AsMeasured)."""
     (case,) = cases_of([case_path], [], 1)
     records = [load(path, case) for path in paths]
     if say:

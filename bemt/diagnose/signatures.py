@@ -62,18 +62,7 @@ class Candidate:
         return effects.catalogue()[self.id].kind
 
     def between(self, g: int) -> Array:
-        """Change of the signature within half the way to the neighbouring settings, one column per parameter.
-
-        Parameters
-        ----------
-        g : int
-            Setting.
-
-        Returns
-        -------
-        (M, k) float
-            For parameters that may take any value; what the grid leaves out, in the unit of each reading.
-        """
+        """Change of the signature within half the way to the neighbouring settings, one column per parameter."""
         if g not in self._between:
             self._between[g] = self._steps(g)
         return self._between[g]
@@ -123,42 +112,14 @@ def _rest(setting: dict[str, Any], key: str) -> tuple[tuple[str, Any], ...]:
 
 
 def effect_of(id: str, setting: dict[str, Any]) -> Effect:  # noqa: A002
-    """Effect with a setting of its parameters.
-
-    Parameters
-    ----------
-    id : str
-        Effect.
-    setting : dict
-        Fields.
-
-    Returns
-    -------
-    Effect
-        The effect.
-    """
+    """Effect with a setting of its parameters."""
     return effects.catalogue()[id](**setting)
 
 
 def candidates(
     problem: Problem, only: Sequence[str] | None = None, progress: Callable[[str], None] | None = None
 ) -> tuple[tuple[Candidate, ...], dict[str, str]]:
-    """Signatures of all effects that can be at work.
-
-    Parameters
-    ----------
-    problem : Problem
-        Readings and baseline.
-    only : sequence of str, optional
-        Effects to try; all by default.
-    progress : callable, optional
-        Told the id of each effect before it is solved.
-
-    Returns
-    -------
-    tuple
-        Candidates in the order of the catalogue, and why others cannot be seen, by id.
-    """
+    """Signatures of all effects that can be at work."""
     found: list[Candidate] = []
     absent: dict[str, str] = {}
     for name, cls in effects.catalogue().items():

@@ -237,22 +237,7 @@ def suggest(
     found: Evidence, first: tuple[str, dict[str, Any]], second: tuple[str, dict[str, Any]] | None,
     reference: bool = False,
 ) -> Suggestion:  # fmt: skip
-    """Choose the run that separates two explanations best.
-
-    Parameters
-    ----------
-    found : Evidence
-        Outcome of the weighing.
-    first, second : tuple of (str, dict) or None
-        Effects and their settings; None stands for "nothing is left out".
-    reference : bool
-        Whether a run without the cause would do, too, where there is none yet.
-
-    Returns
-    -------
-    Suggestion
-        The best run, or a look at the part in question where no run separates them.
-    """
+    """Choose the run that separates two explanations best."""
     pair = [effect_of(*first)] + ([effect_of(*second)] if second else [])
     names = (first[0], second[0] if second else "nothing")
     hyper = found.states[0].hyper

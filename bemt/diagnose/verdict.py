@@ -310,18 +310,7 @@ class Rule:
 
 
 def decide(asked: Asked) -> Decision:
-    """Decide.
-
-    Parameters
-    ----------
-    asked : Asked
-        Outcome of the weighing, and the p-value of the gate.
-
-    Returns
-    -------
-    Decision
-        What is said.
-    """
+    """Decide."""
     for rule in RULES:
         if rule.holds(asked):
             return replace(rule.answer(asked), rule=rule.name)
@@ -329,18 +318,7 @@ def decide(asked: Asked) -> Decision:
 
 
 def inclusion(found: Evidence) -> dict[str, float]:
-    """Probability that an effect is at work, alone or in a pair, by id.
-
-    Parameters
-    ----------
-    found : Evidence
-        Outcome of the weighing.
-
-    Returns
-    -------
-    dict
-        Id to probability, largest first.
-    """
+    """Probability that an effect is at work, alone or in a pair, by id."""
     out = dict.fromkeys(found.spans, 0.0)
     for what, p in found.probability.items():
         for i in what.ids:

@@ -83,22 +83,7 @@ class Cause:
 
 
 def applied(world: World, stand: Stand, change: Change) -> tuple[World, Stand]:
-    """World and stand with a change.
-
-    Parameters
-    ----------
-    world : World
-        Before.
-    stand : Stand
-        Before.
-    change : Change
-        The change.
-
-    Returns
-    -------
-    world, stand : World, Stand
-        After.
-    """
+    """World and stand with a change."""
     section = replace(world.section, **dict(change.section)) if change.section else world.section
     return replace(world, section=section, **dict(change.world)), replace(stand, **dict(change.stand))
 

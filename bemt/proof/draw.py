@@ -64,20 +64,7 @@ SIZES = {
 
 
 def benches(size: Size, seeds: np.random.SeedSequence) -> list[Bench]:
-    """Draw rigs and their plans.
-
-    Parameters
-    ----------
-    size : Size
-        What to draw.
-    seeds : numpy SeedSequence
-        Source.
-
-    Returns
-    -------
-    list of Bench
-        One per rig and plan.
-    """
+    """Draw rigs and their plans."""
     out = []
     for k, ((ducted, plans), seed) in enumerate(zip(size.plans, seeds.spawn(len(size.plans)), strict=True)):
         rng = np.random.default_rng(seed)
@@ -103,24 +90,7 @@ def draw_items(
     size: Size, seed: int, known: Collection[str], standard: Collection[str],
     tell: Callable[[int, int], None] = lambda i, n: None,
 ) -> Iterator[Item]:  # fmt: skip
-    """Draw and measure all items of a run, in mixed order.
-
-    Parameters
-    ----------
-    size : Size
-        Counts.
-    seed : int
-        Of everything.
-    known, standard : collection of str
-        Effects that a case file may name, and those on by default.
-    tell : callable
-        Called with the number of items done and to do.
-
-    Yields
-    ------
-    Item
-        Files and key entry.
-    """
+    """Draw and measure all items of a run, in mixed order."""
     first, second = np.random.SeedSequence(seed).spawn(2)
     found = benches(size, first)
     rng = np.random.default_rng(second)

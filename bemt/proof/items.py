@@ -47,72 +47,24 @@ class Bench:
 
     @classmethod
     def draw(cls, rig: Rig, plan: str, rng: np.random.Generator) -> Bench:
-        """Draw weather and order of a plan.
-
-        Parameters
-        ----------
-        rig : Rig
-            What is tested.
-        plan : str
-            Name of the plan.
-        rng : numpy Generator
-            Source.
-
-        Returns
-        -------
-        Bench
-            The bench.
-        """
+        """Draw weather and order of a plan."""
         return cls(rig, plan, conditions(plan, rig, rng))
 
     def allowed(self) -> list[Cause]:
-        """Causes that can be at work here.
-
-        Returns
-        -------
-        list of Cause
-            Of `CAUSES`.
-        """
+        """Causes that can be at work here."""
         ducted = self.rig.duct is not None
         able = EXPRESSIBLE if self.rig.rotor.code == "ccblade" else CAUSES
         return [c for c in CAUSES.values() if self.plan in c.plans and c.ducted in (None, ducted) and c.id in able]
 
     def plain(self) -> World:
-        """World without any cause: with a wall behind the rotor in plans that have one.
-
-        Returns
-        -------
-        World
-            The plain world.
-        """
+        """World without any cause: with a wall behind the rotor in plans that have one."""
         return World(ground=1.0 if self.plan == "wall" else 0.0)
 
     def measure(
         self, world: World, stand: Stand, rng: np.random.Generator | None = None, ducted: bool = True,
         scales: tuple[float, float] | None = None,
     ) -> tuple[TrueLoads, dict[str, Array]]:  # fmt: skip
-        """Real loads and what the stand reads.
-
-        Parameters
-        ----------
-        world : World
-            What is there.
-        stand : Stand
-            Quality and faults.
-        rng : numpy Generator, optional
-            Source of noise; none: exact readings.
-        ducted : bool
-            False takes the duct away.
-        scales : (thrust, torque), optional
-            Full scales. [N], [N m]
-
-        Returns
-        -------
-        loads : TrueLoads
-            Real loads.
-        columns : dict of str to (P,) float
-            Readings.
-        """
+        """Real loads and what the stand reads."""
         duct = self.rig.duct if ducted else None
         rotor = self.rig.rotor if duct is not None else replace(self.rig.rotor, wall=float("nan"))
         real = loads(rotor, world, self.rows, duct, self._starts.get(duct is not None))
@@ -121,20 +73,7 @@ class Bench:
         return real, record(real, self.rows, self.rig.rotor.radius, motor, stand, rng, scales)
 
     def signature(self, change: Change, cause: Cause) -> dict[str, Array]:
-        """Readings with a cause less those without it, noise apart.
-
-        Parameters
-        ----------
-        change : Change
-            The cause at its strength.
-        cause : Cause
-            What is taken away for the comparison.
-
-        Returns
-        -------
-        dict of str to (P,) float
-            Differences, at the recorded conditions.
-        """
+        """Readings with a cause less those without it, noise apart."""
         quiet = Stand()
         without_world, without_stand = applied(self.plain(), quiet, cause.without)
         if cause.id == "ground_effect":
@@ -153,13 +92,7 @@ class Bench:
         return out
 
     def signatures(self) -> dict[str, dict[str, Array]]:
-        """Signatures of all listed causes at ordinary strength; kept.
-
-        Returns
-        -------
-        dict of str to dict
-            Id to differences of the readings.
-        """
+        """Signatures of all listed causes at ordinary strength; kept."""
         if not self._signatures:
             rng = np.random.default_rng(0)
             for cause in self.allowed():
@@ -168,13 +101,7 @@ class Bench:
         return self._signatures
 
     def tangents(self) -> list[dict[str, Array]]:
-        """Differences of the readings for one standard deviation of each nuisance; kept.
-
-        Returns
-        -------
-        list of dict
-            Of thrust, torque and what is recorded of the drive. [units of the channels]
-        """
+        """Differences of the readings for one standard deviation of each nuisance; kept. [units of the channels]"""
         if not self._tangents:
             quiet, world = Stand(), self.plain()
             base = self.measure(world, quiet)[1]
@@ -217,33 +144,7 @@ def make_item(
     bench: Bench, ids: tuple[str, ...], strengths: tuple[float, ...], seed: int, kind: str,
     known: Collection[str] = (), standard: Collection[str] = (),
 ) -> Item:  # fmt: skip
-    """Measure a truth with concealed causes.
-
-    Parameters
-    ----------
-    bench : Bench
-        Rig and plan.
-    ids : tuple of str
-        Concealed causes; none for a null.
-    strengths : tuple of float
-        Relative strength of each. [1]
-    seed : int
-        Of everything random in the item.
-    kind : str
-        Set: single, pair, null, mismatch, unlisted, sensor, underpowered.
-    known, standard : collection of str
-        Effects that a case file may name, and those that are on by default.
-
-    Returns
-    -------
-    Item
-        Files and entry of the key.
-
-    Raises
-    ------
-    ValueError
-        When the truth has no solution at most of the rows.
-    """
+    """Measure a truth with concealed causes."""
     rng = np.random.default_rng(seed)
     causes = [CAUSES[i] for i in ids]
     changes = [c.make(f, bench.rig, bench.rows, rng) for c, f in zip(causes, strengths, strict=True)]
@@ -346,18 +247,7 @@ def _judge(rule: Yardstick, bench: Bench, cause: Cause, signature: Mapping[str, 
 
 
 def recording_text(columns: Mapping[str, Array]) -> str:
-    """Recording as CSV.
-
-    Parameters
-    ----------
-    columns : mapping of str to (P,) float
-        Name with unit suffix to values, in that unit.
-
-    Returns
-    -------
-    str
-        The file.
-    """
+    """Recording as CSV."""
     head = ["# concealed recording", ",".join(columns)]
     body = zip(*([f"{float(v):.{_DIGITS}g}" if n != "run" else str(int(v)) for v in column]
                  for n, column in columns.items()), strict=True)  # fmt: skip
@@ -365,39 +255,13 @@ def recording_text(columns: Mapping[str, Array]) -> str:
 
 
 def stations_text(rig: Rig) -> str:
-    """Stations of a blade as CSV.
-
-    Parameters
-    ----------
-    rig : Rig
-        Whose blade.
-
-    Returns
-    -------
-    str
-        The file.
-    """
+    """Stations of a blade as CSV."""
     rows = zip(rig.rotor.r_R, rig.rotor.c_R, np.degrees(rig.rotor.beta), strict=True)
     return "r_over_R,chord_over_R,beta_deg\n" + "".join(f"{x:.5f},{c:.6f},{b:.4f}\n" for x, c, b in rows)
 
 
 def case_text(bench: Bench, off: Collection[str], on: Collection[str], with_duct: bool = True) -> str:
-    """Case file of a rig: its geometry, its laboratory's air, and what the baseline leaves out.
-
-    Parameters
-    ----------
-    bench : Bench
-        Rig and plan.
-    off, on : collection of str
-        Effects switched off and on.
-    with_duct : bool
-        Whether the case knows of the duct.
-
-    Returns
-    -------
-    str
-        TOML, schema bemt.case/1.
-    """
+    """Case file of a rig: its geometry, its laboratory's air, and what the baseline leaves out."""
     rig, rows = bench.rig, bench.rows
     rotor, section = rig.rotor, rig.rotor.section
     duct = rig.duct if with_duct else None

@@ -74,13 +74,7 @@ def _recordings() -> Mapping[str, Mapping[str, Any]]:
 
 @cache
 def pairs() -> tuple[PairOf, ...]:
-    """All pairs of the manifest, those with a label twice.
-
-    Returns
-    -------
-    tuple of PairOf
-        In the order of the manifest.
-    """
+    """All pairs of the manifest, those with a label twice."""
     out = []
     for group in _manifest()["pair"]:
         for a, b in group["ab"]:
@@ -181,13 +175,7 @@ def _case(label: Mapping[str, Any]) -> str:
 
 
 def draw_pairs() -> Iterator[Item]:
-    """Make an item of every pair whose recordings are found.
-
-    Yields
-    ------
-    Item
-        ``reference.csv`` is A, ``recording.csv`` B; ``case.toml`` only for a label. The key says ``compare``.
-    """
+    """Make an item of every pair whose recordings are found."""
     for pair in pairs():
         parts = []
         for name in (pair.a, pair.b):

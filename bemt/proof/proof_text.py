@@ -58,18 +58,7 @@ def _tables(document: Mapping[str, Any]) -> list[tuple[str, list[str], list[list
 
 
 def text(document: Mapping[str, Any]) -> str:
-    """Give the tables for a terminal.
-
-    Parameters
-    ----------
-    document : mapping
-        ``bemt.proof/1``.
-
-    Returns
-    -------
-    str
-        Lines.
-    """
+    """Give the tables for a terminal."""
     parts = [f"{document['items']} concealed items ({document['size']}), seed {document['seed']}, "
              f"commit {document['commit'] or 'unknown'}\nkey SHA-256 {document['key_sha256']}"]  # fmt: skip
     for title, header, rows in _tables(document):
@@ -85,18 +74,7 @@ th{border-bottom:2px solid #8a94a6}td.NO{color:#b3261e;font-weight:600}code{word
 
 
 def html(document: Mapping[str, Any]) -> str:
-    """Give one HTML file with the same tables.
-
-    Parameters
-    ----------
-    document : mapping
-        ``bemt.proof/1``.
-
-    Returns
-    -------
-    str
-        The file.
-    """
+    """Give one HTML file with the same tables."""
     out = ["<!doctype html><html lang=en><meta charset=utf-8><title>Proof</title>", f"<style>{_STYLE}</style>",
            "<h1>Proof on concealed causes</h1>",
            f"<p>{document['items']} items ({document['size']}), seed {document['seed']}, commit "

@@ -35,29 +35,7 @@ TIME_LIMIT_S = 900.0
 
 
 def conceal(out: Path, size: str, seed: int, say: Callable[[str], None] | None = None) -> str:
-    """Draw and write all items, and the sealed key.
-
-    Parameters
-    ----------
-    out : Path
-        Folder of the proof; must not hold one yet.
-    size : str
-        Of `draw.SIZES`, or ``real``.
-    seed : int
-        Of everything.
-    say : callable, optional
-        Takes a line of progress.
-
-    Returns
-    -------
-    str
-        SHA-256 of the key.
-
-    Raises
-    ------
-    InputError
-        If the folder holds a proof already, or published recordings are asked for and there are none.
-    """
+    """Draw and write all items, and the sealed key."""
     from bemt import effects
 
     if (out / "items").exists() or (out / seal.KEY).exists():
@@ -86,20 +64,7 @@ def _teller(what: str, say: Callable[[str], None] | None) -> Callable[[int, int]
 
 
 def diagnose_folder(folder: Path) -> tuple[dict[str, Any] | None, str]:
-    """Run the diagnosis on one folder, as a process of its own that sees a copy of recording and case only.
-
-    Parameters
-    ----------
-    folder : Path
-        Holds recording.csv, case.toml, stations.csv; reference.csv if there is a reference.
-
-    Returns
-    -------
-    answer : dict or None
-        ``bemt.diagnosis/1``; None when it failed.
-    words : str
-        What the process said on the error stream.
-    """
+    """Run the diagnosis on one folder, as a process of its own that sees a copy of recording and case only."""
     with tempfile.TemporaryDirectory(prefix="bemt-") as box:
         given = [name for name in _GIVEN if (folder / name).exists()]
         for name in given:
@@ -132,17 +97,7 @@ def _question(folder: Path) -> list[str]:
 
 
 def diagnose_all(out: Path, jobs: int, say: Callable[[str], None] | None = None) -> None:
-    """Diagnose all items that have no answer yet; answers go to ``answers/<folder>.json``.
-
-    Parameters
-    ----------
-    out : Path
-        Folder of the proof.
-    jobs : int
-        Processes at a time. [-]
-    say : callable, optional
-        Takes a line of progress.
-    """
+    """Diagnose all items that have no answer yet; answers go to ``answers/<folder>.json``."""
     answers = out / "answers"
     answers.mkdir(exist_ok=True)
     todo = [f for f in sorted((out / "items").iterdir()) if not (answers / f"{f.name}.json").exists()]
@@ -162,25 +117,7 @@ def diagnose_all(out: Path, jobs: int, say: Callable[[str], None] | None = None)
 
 
 def proof(out: Path, digest: str | None = None) -> dict[str, Any]:
-    """Open the key and score the answers.
-
-    Parameters
-    ----------
-    out : Path
-        Folder of the proof.
-    digest : str, optional
-        SHA-256 of the key as printed before the diagnosis.
-
-    Returns
-    -------
-    dict
-        ``bemt.proof/1``.
-
-    Raises
-    ------
-    InputError
-        When key, recordings or cases were changed.
-    """
+    """Open the key and score the answers."""
     key = seal.unseal(out, digest)
     judged, seconds, errors = [], [], {}
     settled: list[bool] = []

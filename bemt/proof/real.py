@@ -40,13 +40,7 @@ MAX_POINTS = 90
 
 @cache
 def manifest() -> Mapping[str, Mapping[str, Any]]:
-    """Registered sets.
-
-    Returns
-    -------
-    mapping of str to mapping
-        Name of the set to causes, alike (what cannot be told from them), how, source.
-    """
+    """Registered sets."""
     text = Path(__file__).with_name("real.toml").read_text(encoding="utf-8")
     return {entry["set"]: entry for entry in tomllib.loads(text)["concealed"]}
 
@@ -91,19 +85,7 @@ def _stations(r_R: Array, c_R: Array, beta_deg: Array) -> str:
 
 
 def change_over_speed(rpm: Array, coefficient: Array) -> float:
-    """Change of a coefficient over the speeds of rotation, noise smoothed away.
-
-    Parameters
-    ----------
-    rpm : (N,) float
-        Speeds. [rev/min]
-    coefficient : (N,) float
-        CT or CP. [1]
-
-    Returns
-    -------
-    float
-        Largest less smallest value of a parabola in log rpm, of their mean. [1]
+    """Change of a coefficient over the speeds of rotation, noise smoothed away. [1]
 
     Examples
     --------
@@ -286,23 +268,7 @@ def _fan() -> Iterator[Item]:
 
 
 def draw_real(rng: np.random.Generator) -> list[Item]:
-    """Make all real items, in mixed order.
-
-    Parameters
-    ----------
-    rng : numpy Generator
-        Source of the shuffles.
-
-    Returns
-    -------
-    list of Item
-        Files and key entries.
-
-    Raises
-    ------
-    InputError
-        When none of the recordings is found.
-    """
+    """Make all real items, in mixed order."""
     items = [*_uiuc(rng), *_x22a(), *_fan(), *_caradonna_tung(), *_tmotor(), *draw_pairs()]
     if not items:
         roots = ", ".join(r.as_posix() for r in data_roots())

@@ -19,21 +19,7 @@ _ENOUGH = 3.0
 
 
 def extended(rows: Conditions, points: Sequence[Mapping[str, float]]) -> Conditions:
-    """Rows of a plan with recommended points behind them, as a run of its own.
-
-    Parameters
-    ----------
-    rows : Conditions
-        The plan.
-    points : sequence of mapping
-        rpm, and airspeed_m_s, temperature_C, pressure_Pa, time_s, wall_distance_m, tip_gap_mm where they are set; what
-        is not set stays at its median, airspeed at zero.
-
-    Returns
-    -------
-    Conditions
-        All rows.
-    """
+    """Rows of a plan with recommended points behind them, as a run of its own."""
 
     def column(name: str, key: str, usual: float, scale: float = 1.0) -> np.ndarray[Any, np.dtype[np.float64]]:
         new = [float(p[key]) * scale if key in p else usual for p in points]
@@ -53,22 +39,7 @@ def extended(rows: Conditions, points: Sequence[Mapping[str, float]]) -> Conditi
 
 
 def resolves(bench: Bench, entry: Mapping[str, Any], answer: Mapping[str, Any]) -> bool | None:
-    """Whether the recommended points separate the concealed cause from what it was confused with.
-
-    Parameters
-    ----------
-    bench : Bench
-        Rig and plan of the item.
-    entry : mapping
-        Of the key; one concealed cause.
-    answer : mapping
-        ``bemt.diagnosis/1``.
-
-    Returns
-    -------
-    bool or None
-        None where there is no tie, no recommended point, or no rival of the cause.
-    """
+    """Whether the recommended points separate the concealed cause from what it was confused with."""
     points = (answer.get("next_measurement") or {}).get("points") or []
     if len(entry["causes"]) != 1 or not points or answer.get("verdict") not in ("class", "insufficient"):
         return None

@@ -58,24 +58,7 @@ class Rig:
 
 
 def draw_rig(name: str, ducted: bool, rng: np.random.Generator, code: str = "vortex") -> Rig:
-    """Draw a rotor from the ranges of small propellers and fans.
-
-    Parameters
-    ----------
-    name : str
-        Its name.
-    ducted : bool
-        Whether it runs in a duct.
-    rng : numpy Generator
-        Source.
-    code : str
-        Code of the truth.
-
-    Returns
-    -------
-    Rig
-        A rig.
-    """
+    """Draw a rotor from the ranges of small propellers and fans."""
     hub = HUB_DUCTED if ducted else HUB_OPEN
     blades = int(rng.choice((3, 4, 5, 6) if ducted else (2, 2, 2, 3, 4)))
     radius = float(rng.uniform(0.035, 0.12) if ducted else rng.uniform(0.09, 0.22))
@@ -112,27 +95,7 @@ def draw_rig(name: str, ducted: bool, rng: np.random.Generator, code: str = "vor
 
 
 def conditions(plan: str, rig: Rig, rng: np.random.Generator) -> Conditions:
-    """Rows of a test plan, in the order in which they are taken.
-
-    Parameters
-    ----------
-    plan : str
-        One of `OPEN_PLANS`, `DUCTED_PLANS`, `UNDERPOWERED`.
-    rig : Rig
-        What is tested.
-    rng : numpy Generator
-        Source of weather and order.
-
-    Returns
-    -------
-    Conditions
-        Real conditions.
-
-    Raises
-    ------
-    ValueError
-        For an unknown plan.
-    """
+    """Rows of a test plan, in the order in which they are taken."""
     top, R = rig.top_rpm, rig.rotor.radius
     T0, p0 = float(rng.uniform(12.0, 26.0)), float(rng.uniform(97e3, 102.5e3))
     jmax = (0.9 if rig.duct is None else 0.6) * rig.pitch_ratio

@@ -35,19 +35,7 @@ _NOTHING = ("none", "unknown")
 
 
 def wilson(hits: int, n: int, z: float = 1.96) -> tuple[float, float]:
-    """Wilson interval of a share.
-
-    Parameters
-    ----------
-    hits, n : int
-        Count, of how many. [-]
-    z : float
-        Normal quantile. [-]
-
-    Returns
-    -------
-    low, high : float
-        Ends; 0 to 1 when there is nothing to count. [-]
+    """Wilson interval of a share. [-]
 
     Notes
     -----
@@ -140,20 +128,7 @@ class ScoreRow:
 
 
 def judge(entry: Mapping[str, Any], answer: Mapping[str, Any] | None) -> Judged:
-    """Judge one answer.
-
-    Parameters
-    ----------
-    entry : mapping
-        Of the key.
-    answer : mapping or None
-        ``bemt.diagnosis/1``; None when the diagnosis failed.
-
-    Returns
-    -------
-    Judged
-        With the answer.
-    """
+    """Judge one answer."""
     if not answer:
         return Judged(entry, {}, False, False, False, False)
     causes = list(entry["causes"])
@@ -265,20 +240,7 @@ def _located(j: Judged) -> bool:
 
 
 def score(judged: Sequence[Judged], settled: Sequence[bool] = ()) -> list[ScoreRow]:
-    """The table of DIAGNOSIS 5.
-
-    Parameters
-    ----------
-    judged : sequence of Judged
-        All items.
-    settled : sequence of bool
-        Whether the recommended run settles the tie, for every item with one.
-
-    Returns
-    -------
-    list of ScoreRow
-        Metrics with Wilson intervals and targets.
-    """
+    """The table of DIAGNOSIS 5."""
 
     def of(*sets: str) -> list[Judged]:
         return [j for j in judged if j.entry["set"] in sets]
@@ -324,18 +286,7 @@ def score(judged: Sequence[Judged], settled: Sequence[bool] = ()) -> list[ScoreR
 
 
 def score_real(judged: Sequence[Judged]) -> list[ScoreRow]:
-    """Score of published recordings: by set, what was found and what was claimed wrongly.
-
-    Parameters
-    ----------
-    judged : sequence of Judged
-        All items.
-
-    Returns
-    -------
-    list of ScoreRow
-        Two rows for a set with a cause, one for a control; targets as in DIAGNOSIS 5 for real noise.
-    """
+    """Score of published recordings: by set, what was found and what was claimed wrongly."""
     out = []
     for kind in sorted({str(j.entry["set"]) for j in judged}):
         some = [j for j in judged if j.entry["set"] == kind and j.answer]
@@ -347,19 +298,7 @@ def score_real(judged: Sequence[Judged]) -> list[ScoreRow]:
 
 
 def answers(judged: Sequence[Judged]) -> dict[str, dict[str, int]]:
-    """How often each set was answered how.
-
-    Parameters
-    ----------
-    judged : sequence of Judged
-        All items.
-
-    Returns
-    -------
-    dict of str to dict
-        Set to counts of ``found`` (named and right), ``class`` (right, one of several), ``none``, ``unknown``,
-        ``insufficient``, ``wrong`` and ``failed``.
-    """
+    """How often each set was answered how."""
     out: dict[str, dict[str, int]] = {}
     for j in judged:
         row = out.setdefault(str(j.entry["set"]), {})
@@ -379,18 +318,7 @@ def answered(j: Judged) -> str:
 
 
 def baselines(judged: Sequence[Judged]) -> list[ScoreRow]:
-    """What simpler rules would have said of the same data.
-
-    Parameters
-    ----------
-    judged : sequence of Judged
-        All items.
-
-    Returns
-    -------
-    list of ScoreRow
-        Best single effect by its evidence whatever the rivals; nearest signature; a smooth curve without physics.
-    """
+    """What simpler rules would have said of the same data."""
     visible = [j for j in judged if j.entry["set"] in ("single", "sensor") and j.visible and j.answer]
     nothing = [j for j in judged if j.entry["set"] in ("null", "mismatch", "unlisted") and j.answer]
 
@@ -418,20 +346,7 @@ def baselines(judged: Sequence[Judged]) -> list[ScoreRow]:
 def risk_coverage(
     judged: Sequence[Judged], points: Sequence[float] = (0.25, 0.5, 0.75, 0.9, 1.0)
 ) -> list[dict[str, float]]:
-    """Share of wrong claims against the share of claims that one listens to, the surest first.
-
-    Parameters
-    ----------
-    judged : sequence of Judged
-        All items.
-    points : sequence of float
-        Shares of the claims. [-]
-
-    Returns
-    -------
-    list of dict
-        coverage, risk, n and the probability down to which one listens.
-    """
+    """Share of wrong claims against the share of claims that one listens to, the surest first."""
     claims = sorted((j for j in judged if j.claims), key=lambda j: -float(j.answer.get("probability") or 0.0))
     out = []
     for share in points:
@@ -446,20 +361,7 @@ def risk_coverage(
 def strata(
     judged: Sequence[Judged], edges: Sequence[float] = (0.0, 3.0, 5.0, 10.0, 20.0, math.inf)
 ) -> list[dict[str, Any]]:
-    """Single causes by separation.
-
-    Parameters
-    ----------
-    judged : sequence of Judged
-        All items.
-    edges : sequence of float
-        Ends of the strata. [1]
-
-    Returns
-    -------
-    list of dict
-        low, high, n, top1, claims, right per stratum.
-    """
+    """Single causes by separation."""
     single = [j for j in judged if j.entry["set"] in ("single", "sensor", "underpowered")]
     out: list[dict[str, Any]] = []
     for low, high in zip(edges[:-1], edges[1:], strict=True):
@@ -471,20 +373,7 @@ def strata(
 
 
 def confusion(judged: Sequence[Judged], key: Callable[[Judged], str] | None = None) -> dict[str, dict[str, int]]:
-    """How often what was there was called what.
-
-    Parameters
-    ----------
-    judged : sequence of Judged
-        All items.
-    key : callable, optional
-        Word for what was there.
-
-    Returns
-    -------
-    dict of str to dict
-        Cause to answer to count.
-    """
+    """How often what was there was called what."""
     out: dict[str, dict[str, int]] = {}
     for j in judged:
         there = key(j) if key else "+".join(j.entry["causes"]) or str(j.entry["set"])

@@ -19,16 +19,6 @@ KEY, SEAL = "key.json", "key.sha256"
 def sha256(text: str) -> str:
     """Hash of a text.
 
-    Parameters
-    ----------
-    text : str
-        The text.
-
-    Returns
-    -------
-    str
-        SHA-256, hexadecimal.
-
     Examples
     --------
     >>> sha256("")[:8]
@@ -38,20 +28,7 @@ def sha256(text: str) -> str:
 
 
 def seal(folder: Path, key: Mapping[str, Any]) -> str:
-    """Write a key and its hash.
-
-    Parameters
-    ----------
-    folder : Path
-        Where to.
-    key : mapping
-        The key; each of its ``items`` holds ``files``, name to hash.
-
-    Returns
-    -------
-    str
-        SHA-256 of the key file.
-    """
+    """Write a key and its hash."""
     text = json_text(key)
     folder.mkdir(parents=True, exist_ok=True)
     write_atomic(folder / KEY, text)
@@ -61,25 +38,7 @@ def seal(folder: Path, key: Mapping[str, Any]) -> str:
 
 
 def unseal(folder: Path, digest: str | None = None) -> dict[str, Any]:
-    """Read a key after checking it and every file that it vouches for.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of the key, with the items in ``items/<folder>``.
-    digest : str, optional
-        SHA-256 that was printed before the diagnosis; the one in the folder by default.
-
-    Returns
-    -------
-    dict
-        The key.
-
-    Raises
-    ------
-    InputError
-        When key, seal or a file are missing or were changed; all faults at once.
-    """
+    """Read a key after checking it and every file that it vouches for."""
     path = folder / KEY
     try:
         text = path.read_text(encoding="utf-8")

@@ -43,52 +43,15 @@ class Yardstick:
     whole: Array
 
     def stack(self, columns: Mapping[str, Array]) -> Array:
-        """Signature as one vector, (M,).
-
-        Parameters
-        ----------
-        columns : mapping of str to (P,) float
-            Differences of the readings, in the units of the channels.
-
-        Returns
-        -------
-        (M,) float
-            Stacked values; rows without a solution count as no difference. [unit]
-        """
+        """Signature as one vector, (M,)."""
         return np.asarray(np.nan_to_num(np.concatenate([columns[name] for name in self.channels])))
 
     def separation(self, signature: Array) -> tuple[float, float]:
-        """Length of a signature over noise, and over noise and nuisances.
-
-        Parameters
-        ----------
-        signature : (M,) float
-            Stacked difference. [unit]
-
-        Returns
-        -------
-        noise, whole : float
-            Standard deviations. [1]
-        """
+        """Length of a signature over noise, and over noise and nuisances. [1]"""
         return float(np.linalg.norm(self.noise @ signature)), float(np.linalg.norm(self.whole @ signature))
 
     def alike(self, own: Array, others: Mapping[str, Array], limit: float = 3.0) -> list[str]:
-        """Causes whose signature this one cannot be told from: its part across theirs is shorter than ``limit``.
-
-        Parameters
-        ----------
-        own : (M,) float
-            Signature of the concealed cause. [unit]
-        others : mapping of str to (M,) float
-            Signatures of the others. [unit]
-        limit : float
-            Standard deviations. [1]
-
-        Returns
-        -------
-        list of str
-            Ids, without the cause itself.
-        """
+        """Causes whose signature this one cannot be told from: its part across theirs is shorter than ``limit``."""
         a = self.whole @ own
         found = []
         for name, signature in others.items():
@@ -102,18 +65,7 @@ class Yardstick:
 
 
 def freedom(world: World) -> dict[str, World]:
-    """Worlds with one thing off by a standard deviation of what nobody knows.
-
-    Parameters
-    ----------
-    world : World
-        The truth.
-
-    Returns
-    -------
-    dict of str to World
-        Pitch, drag level, lift slope and density off.
-    """
+    """Worlds with one thing off by a standard deviation of what nobody knows."""
     section = world.section
     return {
         "pitch": replace(world, pitch_offset=world.pitch_offset + FREEDOM["pitch"]),
@@ -127,26 +79,7 @@ def yardstick(
     loads: TrueLoads, run: NDArray[np.int64], stand: Stand, tangents: Sequence[Mapping[str, Array]],
     electric: Mapping[str, Array],
 ) -> Yardstick:  # fmt: skip
-    """Build the yardstick of a recording.
-
-    Parameters
-    ----------
-    loads : TrueLoads
-        Real loads.
-    run : (P,) int
-        Run of each row.
-    stand : Stand
-        Quality.
-    tangents : sequence of mapping
-        Differences of the readings for one standard deviation of each nuisance. [units of the channels]
-    electric : mapping of str to (P,) float
-        Voltage, current and pulse width, if recorded. [V], [A], [us]
-
-    Returns
-    -------
-    Yardstick
-        For signatures of the same rows.
-    """
+    """Build the yardstick of a recording."""
     n = loads.thrust.size
     scales = full_scales(loads)
     channels = ("thrust_N", "torque_Nm", *electric)

@@ -107,24 +107,7 @@ def _sigma(true: Array, scale: float, stand: Stand) -> Array:
 
 
 def covariance(true: Array, run: NDArray[np.int64], scale: float, stand: Stand) -> Array:
-    """Covariance of the readings of one channel.
-
-    Parameters
-    ----------
-    true : (P,) float
-        Real values. [N] or [N m]
-    run : (P,) int
-        Run of each row.
-    scale : float
-        Full scale, in the unit of the values.
-    stand : Stand
-        Quality.
-
-    Returns
-    -------
-    (P, P) float
-        Covariance, in the squared unit of the values.
-    """
+    """Covariance of the readings of one channel, (P, P)."""
     s = _sigma(true, scale, stand)
     i = np.arange(true.size)
     same = run[:, None] == run[None, :]
@@ -164,30 +147,7 @@ def record(
     loads: TrueLoads, c: Conditions, radius: float, motor: StandMotor | None, stand: Stand,
     rng: np.random.Generator | None, scales: tuple[float, float] | None = None,
 ) -> dict[str, Array]:  # fmt: skip
-    """Readings of all instruments.
-
-    Parameters
-    ----------
-    loads : truth_world.TrueLoads
-        Real loads.
-    c : truth_world.Conditions
-        Real conditions.
-    radius : float
-        Rotor radius, for cross talk. [m]
-    motor : StandMotor, optional
-        Drive whose voltage, current and pulse width are recorded.
-    stand : Stand
-        Quality and faults.
-    rng : numpy Generator, optional
-        Source of noise; without one the readings are exact but for the faults.
-    scales : (thrust, torque), optional
-        Full scales; 1.2 times the largest load by default. [N], [N m]
-
-    Returns
-    -------
-    dict of str to (P,) float
-        Columns of a recording.
-    """
+    """Readings of all instruments."""
     full = scales or full_scales(loads)
     thrust = _channel(loads.thrust, c, full[0], stand, stand.thrust_drift, stand.thrust_gain, stand.thrust_zero, rng)
     thrust = thrust + stand.cross_talk * loads.torque / radius
@@ -222,16 +182,5 @@ def record(
 
 
 def full_scales(loads: TrueLoads) -> tuple[float, float]:
-    """Full scales of the two load cells: 1.2 times the largest load.
-
-    Parameters
-    ----------
-    loads : truth_world.TrueLoads
-        Real loads.
-
-    Returns
-    -------
-    thrust, torque : float
-        [N], [N m]
-    """
+    """Full scales of the two load cells: 1.2 times the largest load."""
     return 1.2 * float(np.nanmax(np.abs(loads.thrust))), 1.2 * float(np.nanmax(np.abs(loads.torque)))

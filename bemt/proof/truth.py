@@ -131,16 +131,6 @@ class Answer:
 def air(temperature_C: Array, pressure_Pa: Array) -> tuple[Array, Array, Array]:
     """Density, viscosity and speed of sound of dry air.
 
-    Parameters
-    ----------
-    temperature_C, pressure_Pa : (P,) float
-        State. [C], [Pa]
-
-    Returns
-    -------
-    rho, mu, a : (P,) float
-        [kg/m3], [Pa s], [m/s]
-
     Notes
     -----
     Ideal gas; viscosity 1.716e-5 (T / 273.15)^0.7 (power law, within 1 % of Sutherland's from -20 to 50 C).
@@ -154,28 +144,7 @@ def solve(
     rotor: TruthRotor, rpm: Array, airspeed: Array, temperature_C: Array, pressure_Pa: Array,
     physics: ts.SectionPhysics | None = None, extra: Mapping[str, Any] | None = None, start: Answer | None = None,
 ) -> Answer:  # fmt: skip
-    """Find circulations and loads at P points at once.
-
-    Parameters
-    ----------
-    rotor : TruthRotor
-        Blades.
-    rpm, airspeed, temperature_C, pressure_Pa : (P,) float
-        Conditions. [rev/min], [m/s], [C], [Pa]
-    physics : truth_section.SectionPhysics, optional
-        What the sections feel.
-    extra : mapping, optional
-        ``axial``, ``tangential`` : (P, N) added onset speeds [m/s]; ``twist`` : (P, N) added blade angle [rad];
-        ``induction`` : (P, N) factor on the axial induced speed; ``duct`` : (N,) axial speed at the disk of a
-        duct's wall and jet over the jet's excess speed [-]; ``seal`` : (P,) strength of the image in the duct wall [-].
-    start : Answer, optional
-        A solution of the same rotor at P points nearby, to begin from.
-
-    Returns
-    -------
-    Answer
-        Loads and circulations.
-    """
+    """Find circulations and loads at P points at once."""
     rpm, airspeed, temperature, pressure = (
         np.atleast_1d(v)
         for v in np.broadcast_arrays(*(np.asarray(v, float) for v in (rpm, airspeed, temperature_C, pressure_Pa)))

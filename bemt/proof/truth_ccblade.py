@@ -61,31 +61,7 @@ def solve(
     rotor: truth.TruthRotor, rpm: Array, airspeed: Array, temperature_C: Array, pressure_Pa: Array,
     physics: ts.SectionPhysics, extra: Mapping[str, Any],
 ) -> truth.Answer:  # fmt: skip
-    """Loads of an open rotor in axial flow.
-
-    Parameters
-    ----------
-    rotor : TruthRotor
-        Blades.
-    rpm, airspeed, temperature_C, pressure_Pa : (P,) float
-        Conditions. [rev/min], [m/s], [C], [Pa]
-    physics : truth_section.SectionPhysics
-        What the sections feel.
-    extra : mapping
-        ``twist`` : (P, N) added blade angle [rad].
-
-    Returns
-    -------
-    truth.Answer
-        Loads; NaN at rest, and where CCBlade gives none.
-
-    Raises
-    ------
-    InputError
-        When the extra is not installed.
-    ValueError
-        For a duct, a wall or any other flow that CCBlade does not know.
-    """
+    """Loads of an open rotor in axial flow."""
     try:
         from wisdem.ccblade.ccblade import CCBlade
     except ImportError as error:

@@ -48,20 +48,7 @@ class TruthDuct:
 
 
 def ring_speed(x: Array, z: Array, a: Array) -> tuple[Array, Array]:
-    """Axial and radial speed of unit ring vortices.
-
-    Parameters
-    ----------
-    x, z : array
-        Radius of the point, and its axial way behind the ring. [-]
-    a : array
-        Ring radius. [-]
-
-    Returns
-    -------
-    axial, radial : array
-        Speed per circulation; downstream inside the ring is positive. [-]
-    """
+    """Axial and radial speed of unit ring vortices. [-]"""
     x, z, a = np.broadcast_arrays(x, z, a)
     cos = np.cos(_PHI)
     s2 = (a**2 + x**2 + z**2)[..., None] - 2.0 * (a * x)[..., None] * cos
@@ -70,20 +57,7 @@ def ring_speed(x: Array, z: Array, a: Array) -> tuple[Array, Array]:
 
 
 def tube_speed(x: Array, z: Array, a: float) -> tuple[Array, Array]:
-    """Axial and radial speed of a semi-infinite vortex tube of unit strength that begins at z = 0 and goes to +z.
-
-    Parameters
-    ----------
-    x, z : array
-        Radius of the point and its axial way behind the beginning. [-]
-    a : float
-        Tube radius. [-]
-
-    Returns
-    -------
-    axial, radial : array
-        Speed per strength. [-]
-    """
+    """Axial and radial speed of a semi-infinite vortex tube of unit strength that begins at z = 0 and goes to +z."""
     x, z = np.broadcast_arrays(np.asarray(x, float), np.asarray(z, float))
     cos = np.cos(_PHI)
     s2 = np.maximum((a**2 + x**2)[..., None] - 2.0 * a * x[..., None] * cos, 1e-8)
@@ -95,22 +69,7 @@ def tube_speed(x: Array, z: Array, a: float) -> tuple[Array, Array]:
 
 @lru_cache(maxsize=64)
 def disk_speeds(duct: TruthDuct, hub: float, x: tuple[float, ...]) -> tuple[Array, Array]:
-    """Axial speed at the rotor disk per jet excess w and per speed of flight.
-
-    Parameters
-    ----------
-    duct : TruthDuct
-        Shape.
-    hub : float
-        Hub over tip radius. [-]
-    x : tuple of float
-        Radii r/R where it is wanted. [-]
-
-    Returns
-    -------
-    per_w, per_v : (N,) float
-        Added axial speed over w, and over V. [-]
-    """
+    """Axial speed at the rotor disk per jet excess w and per speed of flight. [-]"""
     wall = 1.0 + duct.gap
     # the hub ends behind the rotor: the jet fills a circle of the exit's area
     leave = np.sqrt(duct.exit_ratio * (wall**2 - hub**2) + hub**2)
@@ -144,19 +103,7 @@ def disk_speeds(duct: TruthDuct, hub: float, x: tuple[float, ...]) -> tuple[Arra
 
 
 def seal(gap_over_span: Array, scale: float) -> Array:
-    """Strength of the images of the tip vortices in the wall behind a gap.
-
-    Parameters
-    ----------
-    gap_over_span : array
-        Clearance over blade length. [-]
-    scale : float
-        1 is the declared law; 0 a wall without leakage. [-]
-
-    Returns
-    -------
-    array
-        1 sealed to 0 open. [-]
+    """Strength of the images of the tip vortices in the wall behind a gap. [-]
 
     Notes
     -----

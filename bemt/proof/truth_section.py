@@ -95,17 +95,7 @@ class SectionPhysics:
 
 
 def zero_lift_angle(camber: Array, position: Array) -> Array:
-    """Zero-lift angle of a NACA four-digit mean line by thin-aerofoil theory.
-
-    Parameters
-    ----------
-    camber, position : array
-        Camber and its position over the chord. [-]
-
-    Returns
-    -------
-    array
-        Angle. [rad]
+    """Zero-lift angle of a NACA four-digit mean line by thin-aerofoil theory. [rad]
 
     Notes
     -----
@@ -140,26 +130,7 @@ def loads(
     alpha: Array, re: Array, mach: Array, c_r: Array, speed_ratio: Array, aspect: float, section: TrueSection,
     physics: SectionPhysics,
 ) -> tuple[Array, Array]:  # fmt: skip
-    """Lift and drag coefficients.
-
-    Parameters
-    ----------
-    alpha, re, mach : (P, N) float
-        Angle of attack [rad], Reynolds and Mach number [-].
-    c_r, speed_ratio : (P, N) float
-        Chord over radius; Omega R / sqrt(V^2 + (Omega R)^2), both for the stall delay. [-]
-    aspect : float
-        Aspect ratio of the blade, for the stalled plate. [-]
-    section : TrueSection
-        Shape.
-    physics : SectionPhysics
-        What is on.
-
-    Returns
-    -------
-    cl, cd : (P, N) float
-        Coefficients. [-]
-    """
+    """Lift and drag coefficients. [-]"""
     camber = np.asarray(section.camber) + physics.camber
     thick = np.asarray(section.thickness)
     ref = physics.reference_re

@@ -42,22 +42,7 @@ _CORE = 0.01  # viscous core over tip radius
 
 
 def edges_and_centres(hub: float, panels: int) -> tuple[Array, Array]:
-    """Panel edges and control radii from hub to tip, finer at both ends.
-
-    Parameters
-    ----------
-    hub : float
-        Hub over tip radius. [-]
-    panels : int
-        Number of panels. [-]
-
-    Returns
-    -------
-    edges : (N + 1,) float
-        r/R. [-]
-    centres : (N,) float
-        r/R between them, in the same cosine spacing. [-]
-    """
+    """Panel edges and control radii from hub to tip, finer at both ends."""
     half = np.arange(2 * panels + 1) * (np.pi / (2 * panels))
     x = hub + (1.0 - hub) * 0.5 * (1.0 - np.cos(half))
     return x[::2], x[1::2]
@@ -119,23 +104,7 @@ def _horseshoe(filament: Array) -> Array:
 
 @lru_cache(maxsize=64)
 def wake_tables(hub: float, panels: int, blades: int, hovers: bool) -> tuple[Array, Array]:
-    """Influence of the panels on each other over wake advance and load.
-
-    Parameters
-    ----------
-    hub : float
-        Hub over tip radius. [-]
-    panels, blades : int
-        Counts. [-]
-    hovers : bool
-        Whether the wake contracts and speeds up under load (open rotors).
-
-    Returns
-    -------
-    axial, tangential : (H, C, N, N) float
-        Downstream and in the direction of rotation: speed times R over circulation, times h (which is what makes the
-        table smooth). [-]
-    """
+    """Influence of the panels on each other over wake advance and load. [-]"""
     edges, x = edges_and_centres(hub, panels)
     loads = LOADS if hovers else np.array([0.0])
     out = np.empty((2, H_GRID.size, loads.size, panels, panels))
@@ -149,20 +118,6 @@ def wake_tables(hub: float, panels: int, blades: int, hovers: bool) -> tuple[Arr
 @lru_cache(maxsize=32)
 def image_tables(hub: float, panels: int, blades: int, wall: float) -> tuple[Array, Array]:
     """Influence of the image of the wake in a coaxial wall, without its mean axial flow.
-
-    Parameters
-    ----------
-    hub : float
-        Hub over tip radius. [-]
-    panels, blades : int
-        Counts. [-]
-    wall : float
-        Radius of the wall over tip radius. [-]
-
-    Returns
-    -------
-    axial, tangential : (H, 1, N, N) float
-        As from `wake_tables`.
 
     Notes
     -----
@@ -180,20 +135,7 @@ def image_tables(hub: float, panels: int, blades: int, wall: float) -> tuple[Arr
 
 
 def interpolate(table: Array, h: Array, load: Array) -> Array:
-    """Influence matrices at the wakes of P points.
-
-    Parameters
-    ----------
-    table : (H, C, N, N) float
-        From `wake_tables` or `image_tables`. [-]
-    h, load : (P,) float
-        Wake advance per radian over R, and share of the induced speed in it; held within the table. [-]
-
-    Returns
-    -------
-    (P, N, N) float
-        Speed times R over circulation. [-]
-    """
+    """Influence matrices at the wakes of P points, (P, N, N) [-]."""
     u = np.clip(np.log(h / H_GRID[0]) / np.log(H_GRID[1] / H_GRID[0]), 0.0, H_GRID.size - 1.0001)
     i = u.astype(np.intp)
     f = (u - i)[:, None, None]

@@ -182,26 +182,7 @@ def loads(
     rotor: truth.TruthRotor, world: World, c: Conditions, duct: truth_duct.TruthDuct | None = None,
     start: truth.Answer | None = None,
 ) -> TrueLoads:  # fmt: skip
-    """Thrust and torque of every row.
-
-    Parameters
-    ----------
-    rotor : truth.TruthRotor
-        Blades; ``wall`` must be set with a duct.
-    world : World
-        What is there.
-    c : Conditions
-        Rows.
-    duct : truth_duct.TruthDuct, optional
-        Duct around the rotor.
-    start : truth.Answer, optional
-        Solution of the same rows in a world nearby.
-
-    Returns
-    -------
-    TrueLoads
-        Real loads.
-    """
+    """Thrust and torque of every row."""
     pressure = c.pressure_Pa * (1.0 + world.density_error)
     rho = truth.air(c.temperature_C, pressure)[0]
     omega = c.rpm * (2.0 * np.pi / 60.0)
