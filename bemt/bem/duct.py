@@ -79,8 +79,8 @@ def lip_loss(radius_over_diameter: float) -> LipLoss:
     -----
     Crane TP-410; Idelchik (2007), diagram 3-4 (not checked against the books).
 
-    >>> lip_loss(0.1)
-    LipLoss(nominal=0.09, low=0.03, high=0.12)
+    >>> tuple(round(k, 2) for k in lip_loss(0.1))
+    (0.09, 0.03, 0.12)
     """
     x = max(radius_over_diameter, 0.0)
     low = float(np.interp(x, [0.0, 0.05], [0.50, 0.03]))

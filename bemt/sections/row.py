@@ -167,7 +167,7 @@ def row_lift(section: Airfoil, solidity: float, stagger: float) -> RowLift:
     ...     slope, zero = row_lift(section, solidity, np.radians(58.0))
     ...     print(round(slope, 2), round(float(np.degrees(zero)), 1))
     1.08 -5.5
-    1.01 -3.9
+    1.02 -3.8
     """
     return _solve(_Shape(section), float(solidity), float(stagger))
 
