@@ -16,6 +16,7 @@ TOPICS = [
     "compressibility against tip Mach",
     "grid study",
     "iterative drift",
+    "balance of mass and momentum",
     "wall treatment against y+",
     "turbulence model",
     "where the thrust was read",
@@ -32,6 +33,8 @@ GOOD = CfdFacts(
     u_grid=0.012,
     cells=847e3,
     drift=0.002,
+    mass_balance=-0.001,
+    momentum_balance=0.003,
     wall="automatic",
     y_plus=51.0,
     turbulence="k-omega SST",
@@ -135,14 +138,30 @@ def test_no_number_is_made_up_where_the_correction_does_not_hold(size: float) ->
     ],
 )
 def test_wall_treatment_goes_with_its_first_cell(wall: str, y_plus: float, status: str) -> None:
-    assert line(replace(GOOD, wall=wall, y_plus=y_plus), TOPICS[4]).status == status
+    assert line(replace(GOOD, wall=wall, y_plus=y_plus), TOPICS[5]).status == status
 
 
 @pytest.mark.parametrize(
     ("skew", "steady", "status"), [(0.0, True, "fine"), (30.0, True, "fault"), (30.0, False, "fine")]
 )
 def test_a_frozen_rotor_does_not_see_skewed_inflow(skew: float, steady: bool, status: str) -> None:
-    assert line(replace(GOOD, skew_deg=skew, steady_mrf=steady), TOPICS[7]).status == status
+    assert line(replace(GOOD, skew_deg=skew, steady_mrf=steady), TOPICS[8]).status == status
+
+
+@pytest.mark.parametrize(
+    ("mass", "momentum", "status", "u"),
+    [
+        (0.001, -0.004, "fine", 0.004),
+        (0.11, 0.001, "fault", math.nan),
+        (0.001, -0.13, "fault", math.nan),
+        (math.nan, 0.13, "fault", math.nan),
+        (0.001, math.nan, "not stated", math.nan),
+        (math.nan, math.nan, "not stated", math.nan),
+    ],
+)
+def test_a_flow_that_does_not_balance_is_a_fault(mass: float, momentum: float, status: str, u: float) -> None:
+    item = line(replace(GOOD, mass_balance=mass, momentum_balance=momentum), TOPICS[4])
+    assert item.status == status and item.u_relative == pytest.approx(u, nan_ok=True)
 
 
 def test_drift_and_grid_are_taken_as_they_are() -> None:
@@ -156,7 +175,7 @@ def test_drift_and_grid_are_taken_as_they_are() -> None:
 
 def test_rules_of_an_open_propeller_are_not_used_for_a_duct() -> None:
     ducted = replace(GOOD, ducted=True, compressible=False, y_plus=12.0)
-    for topic in (TOPICS[0], TOPICS[1], TOPICS[4], TOPICS[5]):
+    for topic in (TOPICS[0], TOPICS[1], TOPICS[5], TOPICS[6]):
         assert math.isnan(line(ducted, topic).u_relative), topic
 
 
@@ -166,6 +185,8 @@ def test_rules_of_an_open_propeller_are_not_used_for_a_duct() -> None:
         ("incompressible", "compressible", False),
         ("compressible", "compressible", True),
         ("drift 0.4 %", "drift", 0.004),
+        ("mass balance 0.2 %", "mass_balance", 0.002),
+        ("forces and momentum balance 12 %", "momentum_balance", 0.12),
         ("GCI 2.3 %", "u_grid", 0.02),
         ("domain 10 D", "domain_over_D", 10.0),
         ("249000 cells", "cells", 249000.0),

@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 from bemt.base.errors import InputError
+from bemt.cfd.balance import BALANCE_LIMIT, balance_of
 from bemt.cfd.campaign import run_campaign
 from bemt.cfd.record import COLUMNS, CampaignRecord, grid_studies, grid_uncertainty
 from bemt.cfd.schema import load_campaign
@@ -48,6 +49,29 @@ awk -v w=$w 'BEGIN {
         printf "%d (0 0 %.9g) (0 0 %.9g) (0 0 0)\\n", i, -0.02 * t, -0.02 * t > m
     }
 }'
+w=$(awk "BEGIN {print 1e-5 * $w * $w}")
+""" + """
+surface() {  # function object, field, patch, columns of one face, at every iteration that is balanced
+    for t in 21 22 23 24 25 26 27 28 29 30; do
+        mkdir -p postProcessing/$1_$3/surface/$t postProcessing/$1_$3/0
+        printf '# %s  FACE_DATA 1\\n# x y z\\n%s\\n' "$2" "$4" > postProcessing/$1_$3/surface/$t/$2_patch_$3.raw
+        echo "$t 0" >> postProcessing/$1_$3/0/surfaceFieldValue.dat
+    done
+}
+load() {  # function object: nothing on it
+    mkdir -p postProcessing/$1/0
+    for t in 21 22 23 24 25 26 27 28 29 30; do
+        echo "$t (0 0 0) (0 0 0) (0 0 0)" | tee -a postProcessing/$1/0/force.dat >> postProcessing/$1/0/moment.dat
+    done
+}
+# a flow of 1 m3/s comes in at rest and leaves with the momentum of the thrust, LEAK of it made at the sides
+jet=$(awk "BEGIN {print -$w / 1.225 / (1 + LEAK)}")
+surface mass phi inlet "0 0 1 -1"; surface momentum U inlet "0 0 1 0 0 0"
+surface mass phi outlet "0 0 -1 $(awk 'BEGIN {print 1 + LEAK}')"; surface momentum U outlet "0 0 -1 0 0 $jet"
+surface mass phi side "1 0 0 0"; surface momentum U side "1 0 0 0 0 0"
+surface mass phi side1 "0 -1 0 -0.5"; surface momentum U side1 "0 -1 0 0 0 0"
+surface mass phi side2 "0 1 0 $(awk 'BEGIN {print 0.5 - LEAK}')"; surface momentum U side2 "0 1 0 0 0 0"
+load open; load sides
 """,
 }  # fmt: skip
 
@@ -58,7 +82,7 @@ def programs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder, log = tmp_path / "bin", tmp_path / "calls"
     folder.mkdir()
     for name, text in PROGRAMS.items():
-        body = text.replace("DRIFT", "0")
+        body = text.replace("DRIFT", "0").replace("LEAK", "0")
         (folder / name).write_text(f"#!/bin/sh\necho {name} >> {log}\n{body}\n")
         (folder / name).chmod(0o755)
     monkeypatch.setenv("PATH", f"{folder}:{os.environ['PATH']}")
@@ -192,6 +216,9 @@ def test_a_campaign_is_recorded(
     assert calls(programs, "blockMesh") == 1, "one grid serves both speeds"
     manifest = json.loads((path.parent / "manifest.json").read_text())
     assert (manifest["points"], manifest["recorded"], manifest["converged"], manifest["missing"]) == (2, 2, 2, [])
+    assert manifest["balance_reason"] is None and set(manifest["balance"]) == {row["run"] for row in rows}
+    for found in manifest["balance"].values():
+        assert all(abs(found[key]) < 1e-5 for key in ("mass", "momentum", "angular_momentum"))
     assert main(["cfd", str(path), "--ranks", "1", "--work", work, "--quiet"]) == 0
     assert calls(programs, "simpleFoam") == 2, "finished points are not run again"
     write(path.parent, project, TWO.replace("[6000, 9000]", "[6000, 9000, 12000]"))
@@ -332,7 +359,7 @@ def test_a_run_that_never_began_says_why_and_is_tried_again(
 
 def test_a_run_that_drifts_is_nan_flagged_and_its_history_kept(project: Path, tmp_path: Path, programs: Path) -> None:
     solver = tmp_path / "bin" / "simpleFoam"
-    solver.write_text(f"#!/bin/sh\n{PROGRAMS['simpleFoam'].replace('DRIFT', '0.2')}\n")
+    solver.write_text(f"#!/bin/sh\n{PROGRAMS['simpleFoam'].replace('DRIFT', '0.2').replace('LEAK', '0')}\n")
     path = write(tmp_path / "c", project, TWO)
     record = run_campaign(load_campaign(path), tmp_path / "w", only=1, ranks=1)
     (row,) = record.rows
@@ -345,6 +372,30 @@ def test_a_run_that_drifts_is_nan_flagged_and_its_history_kept(project: Path, tm
     solver.write_text("#!/bin/sh\necho 'FOAM FATAL ERROR: negative' ; exit 1\n")
     record = run_campaign(load_campaign(path), tmp_path / "w2", only=2, ranks=1)
     assert [r["converged"] for r in record.rows] == [0, 0] and len(record.rows) == 2
+
+
+def test_a_run_that_leaks_is_nan_flagged_and_says_where(project: Path, tmp_path: Path, programs: Path) -> None:
+    """The planted leak: mass made where the periodic sides are cut differently."""
+    solver = tmp_path / "bin" / "simpleFoam"
+    sound = solver.read_text()
+    solver.write_text(f"#!/bin/sh\n{PROGRAMS['simpleFoam'].replace('DRIFT', '0').replace('LEAK', '0.11')}\n")
+    path, work = write(tmp_path / "c", project, TWO.replace("[6000, 9000]", "[6000]")), tmp_path / "w"
+    command = ["cfd", str(path), "--ranks", "1", "--work", str(work), "--quiet"]
+    assert main(command) == 1
+    (row,) = rows_of(path.parent)
+    assert (row["converged"], row["thrust_N"], row["u_thrust_N"]) == ("0", "", "")
+    assert float(row["balance_mass"]) > 0.1 and "side1 and side2" in row["note"]
+    manifest = json.loads((path.parent / "manifest.json").read_text())
+    assert manifest["balance"][row["run"]]["mass"] == pytest.approx(float(row["balance_mass"]))
+    assert [item["run"] for item in manifest["not_converged"]] == [row["run"]]
+    assert main(command) == 1 and calls(programs, "simpleFoam") == 0, "it has been run: it will leak again"
+    (path.parent / "recording.csv").unlink()
+    solver.write_text(sound.replace("surface momentum U side2", ": # "))  # a function object that wrote nothing
+    assert main(command) == 1
+    (row,) = rows_of(path.parent)
+    assert (row["converged"], row["thrust_N"], row["balance_mass"]) == ("0", "", "")
+    assert "U_patch_side2.raw" in row["note"]
+    assert json.loads((path.parent / "manifest.json").read_text())["balance"] is None
 
 
 def test_a_recording_that_is_not_ours_is_left_alone(project: Path, tmp_path: Path) -> None:
@@ -440,9 +491,97 @@ def test_the_committed_campaigns_are_whole(project: Path) -> None:
         rows = {row["run"]: row for row in rows_of(path.parent)}
         assert set(rows) <= set(order), f"{path.parent.name}: runs of other settings"
         assert set(manifest["missing"]) == set(order) - set(rows)
+        balances = manifest["balance"] or {}
+        assert manifest["balance_reason"] or set(balances) == set(rows), f"{path.parent.name}: nothing said why"
+        for run, found in balances.items():
+            residuals = [found[key] for key in ("mass", "momentum", "angular_momentum")] if found else []
+            if rows[run]["converged"] == "1":
+                assert all(value is None or abs(value) <= BALANCE_LIMIT for value in residuals), run
         for run, values in rows.items():
             assert (values["converged"] == "1") == bool(re.match(r"\d", values["thrust_N"])), run
             if values["converged"] != "1":
                 assert (path.parent / "histories" / f"{run}.csv").is_file() or values["iterations"] == "0"
     total = sum(p.stat().st_size for p in (project / "reports" / "cfd").rglob("*") if p.is_file())
     assert total < 2e6
+
+
+RHO, OMEGA = 1.225, 600.0
+
+
+def planted(folder: Path, leak: float = 0.0, twist: float = 0.0, push: float = 0.0) -> dict[str, float]:
+    """Function objects of half a rotor in a flow that balances, but for what is planted (shares of flow and loads).
+
+    `leak` is made at side2 near z = -0.05 m, `twist` is swirl that side2 gives and side1 does not take, `push` is force
+    that no momentum answers.
+    """
+    post = folder / "postProcessing"
+    thrust, torque, flow, radius = 5.0, 0.1, 0.3, 0.05  # of half the rotor
+    jet, swirl = thrust / (RHO * flow), torque / (RHO * flow * radius)
+    out, near = flow * (1 + leak), -0.05
+    faces = {
+        "inlet": [((radius, 0, 1), -flow, (0, 0, 0))],
+        "outlet": [((radius, 0, -1), 0.25 * out, (0, swirl, -jet / (1 + leak))),
+                   ((0, radius, -1), 0.75 * out, (-swirl, 0, -jet / (1 + leak)))],
+        "side": [((1, 0, 0), 0.0, (3, 2, 1))],
+        "side1": [((0, -radius, near), -0.5, (swirl, 0, -jet)), ((0, -1, 0.9), -0.2, (0, 0, 0))],
+        "side2": [((0, radius, near), 0.5 - leak * flow, (-swirl * (1 + twist), 0, -jet)),
+                  ((0, 1, 0.9), 0.2, (0, 0, 0))],
+    }  # fmt: skip
+    times = range(310, 401, 10)
+
+    def put(name: str, file: str, lines: list[str]) -> None:
+        (post / name / file).parent.mkdir(parents=True, exist_ok=True)
+        (post / name / file).write_text("\n".join(["# head", *lines]) + "\n")
+
+    for patch, rows in faces.items():
+        for kind, field in (("mass", "phi"), ("momentum", "U")):
+            put(f"{kind}_{patch}", "0/surfaceFieldValue.dat", [f"{t} 0" for t in times])
+            lines = [" ".join(map(str, (*x, *((flux,) if field == "phi" else U)))) for x, flux, U in rows]
+            for t in times:
+                put(f"{kind}_{patch}", f"surface/{t}/{field}_patch_{patch}.raw", lines)
+    for name, force, moment, at in (("forces", thrust * (1 + push), -torque, range(1, 401)), ("open", 0.0, 0.0, times),
+                                    ("sides", 0.0, 0.0, times)):  # fmt: skip
+        for file, value in (("force.dat", force), ("moment.dat", moment)):
+            put(name, f"0/{file}", [f"{t} (0 0 {value}) (0 0 {value}) (0 0 0)" for t in at])
+    disk = RHO * math.pi * 0.1016**2 * math.sqrt(2 * thrust / (2 * RHO * math.pi * 0.1016**2))
+    return {"mass": 2 * RHO * leak * flow / disk, "angular_momentum": -0.5 / flow * twist, "momentum": push}
+
+
+def half_rotor(project: Path, tmp_path: Path) -> Any:
+    text = "[[points]]\nrpm = 20000\nsolver = 'incompressible'\n"
+    return point_key(load_campaign(write(tmp_path / "c", project, text)).points[0])[2]
+
+
+@pytest.mark.parametrize("size", [0.0, 0.004, -0.05, 0.11])
+@pytest.mark.parametrize("kind", ["leak", "twist", "push"])
+def test_a_planted_leak_is_found_with_its_size_and_place(project: Path, tmp_path: Path, kind: str, size: float) -> None:
+    s = half_rotor(project, tmp_path)
+    expected = planted(tmp_path, **{kind: size})
+    found = balance_of(tmp_path, s)
+    assert found.mass == pytest.approx(expected["mass"], abs=1e-9)
+    if kind == "push":
+        assert found.momentum == pytest.approx(size / (1 + size), abs=1e-9)
+    if kind == "twist":
+        assert found.angular_momentum == pytest.approx(s.rotation * expected["angular_momentum"], abs=1e-9)
+    assert found.closes is (abs(size) < 0.005)
+    if not found.closes:
+        where = "inside" if kind == "push" else "side1 and side2, most at z = -0.5 to -0.4 R"
+        assert any(where in leak for leak in found.leaks), found.leaks
+
+
+def test_files_of_a_balance_that_are_absent_or_cut_short_are_all_named(project: Path, tmp_path: Path) -> None:
+    s = half_rotor(project, tmp_path)
+    planted(tmp_path)
+    post = tmp_path / "postProcessing"
+    (post / "mass_side1" / "surface" / "350" / "phi_patch_side1.raw").unlink()
+    (post / "momentum_outlet" / "surface" / "400" / "U_patch_outlet.raw").write_text("# U\n0.05 0 -1 0 nan 2\n")
+    (post / "sides" / "0" / "moment.dat").unlink()
+    lines = (post / "open" / "0" / "force.dat").read_text().splitlines()
+    (post / "open" / "0" / "force.dat").write_text("\n".join(lines[:4]) + "\n")
+    with pytest.raises(InputError) as error:
+        balance_of(tmp_path, s)
+    told = str(error.value)
+    for words in ("phi_patch_side1.raw", "U_patch_outlet.raw", "sides/0/moment.dat", "3 of 10 iterations"):
+        assert words in told
+    with pytest.raises(InputError, match="mass_inlet"):
+        balance_of(tmp_path / "nothing", s)

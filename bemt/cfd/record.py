@@ -15,8 +15,9 @@ import numpy as np
 from bemt import __version__
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import csv_text, plain, write_atomic
+from bemt.cfd.balance import BALANCE_LIMIT
 from bemt.cfd.schema import Campaign
-from bemt.cfd.worker import DRIFT_LIMIT, SCATTER_LIMIT, Outcome
+from bemt.cfd.worker import DRIFT_LIMIT, RESIDUALS, SCATTER_LIMIT, Outcome
 from bemt.readers import number
 from bemt.recordings.grid_study import grid_study, ratios
 
@@ -26,14 +27,16 @@ COLUMNS = (
     "run", "rpm", "airspeed_m_s", "J", "thrust_N", "torque_Nm", "u_thrust_N", "u_torque_Nm", "thrust_rotor_N",
     "thrust_standing_N", "density_kg_m3", "temperature_C", "pressure_Pa", "wall_distance_m", "tip_gap_mm",
     "sideslip_deg", "pitch_offset_deg", "solver", "gas", "domain", "sector", "turbulence", "level", "cells",
-    "iterations", "averaged", "drift_thrust", "drift_torque", "scatter_thrust", "scatter_torque", "yplus_avg",
-    "seconds", "start", "converged", "note",
+    "iterations", "averaged", "drift_thrust", "drift_torque", "scatter_thrust", "scatter_torque", *RESIDUALS,
+    "yplus_avg", "seconds", "start", "converged", "note",
 )  # fmt: skip
 TEXTS = {"run", "solver", "gas", "domain", "sector", "turbulence", "start", "note"}
 RADIAL = ("run", "r_m", "thrust_per_radius_N_m", "torque_per_radius_Nm_m")
 SAME = ("rpm", "airspeed_m_s", "wall_distance_m", "tip_gap_mm", "sideslip_deg", "pitch_offset_deg", "solver", "gas",
         "domain", "sector", "turbulence")  # fmt: skip
 HISTORY_ROWS = 400
+NO_BALANCE = "not recorded by the run; made before the check"
+NOT_ENDED = "not recorded by the run; it did not come to its end"
 FORMAL_ORDER = 2.0
 
 
@@ -269,12 +272,25 @@ class CampaignRecord:
             "missing": [run for run in order if run not in {row["run"] for row in self.rows}],
             "not_converged": [{"run": r["run"], "note": r["note"]} for r in done if not r["converged"]],
             "older": [row["run"] for row in self.rows if row["run"] not in names],
-            "rule": {"drift_limit": DRIFT_LIMIT, "scatter_limit": SCATTER_LIMIT,
+            **_balances(done),
+            "rule": {"drift_limit": DRIFT_LIMIT, "scatter_limit": SCATTER_LIMIT, "balance_limit": BALANCE_LIMIT,
                      "u": "hypot of standard deviation and drift over the averaged iterations, and the grid study",
                      "grid_study": bool(studies)},
             "grid_studies": grid_studies(self.rows), "seconds": float(np.nansum([r["seconds"] for r in self.rows])),
         }  # fmt: skip
         write_atomic(self.folder / "manifest.json", json.dumps(plain(manifest), indent=1) + "\n")
+
+
+def _balances(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Balance of every run, null where its run did not write one down, and why."""
+    each = {
+        row["run"]: None if math.isnan(row["balance_mass"])
+        else {name.removeprefix("balance_"): row[name] for name in RESIDUALS}
+        for row in rows
+    }  # fmt: skip
+    missing = [row for row in rows if each[row["run"]] is None]
+    why = None if not missing else NO_BALANCE if any(row["converged"] == 1 for row in missing) else NOT_ENDED
+    return {"balance": each if len(missing) < len(each) else None, "balance_reason": why}
 
 
 def _lines(path: Path) -> list[dict[str, str]]:

@@ -11,7 +11,7 @@ from typing import Any
 from bemt.base.errors import Fault, InputError
 from bemt.base.toml import Collector, Key, check_table, load_toml, shown
 from bemt.case import Case, check_name, load_case
-from bemt.exports.openfoam.settings import DOMAINS, GASES, SECTORS, TURBULENCE
+from bemt.exports.openfoam.settings import DOMAINS, GASES, SECTORS, TURBULENCE, ZONES
 from bemt.exports.openfoam.write import Run
 
 __all__ = ["SCHEMA_NAME", "Campaign", "CampaignPoint", "load_campaign"]
@@ -36,6 +36,7 @@ POINT: dict[str, Key] = {
     "iterations": Key("integer", low=20, high=100_000),
     "average": Key("integer", low=10, high=100_000),
     "start": Key("choice", choices=STARTS),
+    "zone": Key("choice", choices=ZONES),
 }
 SCHEMA: dict[str, dict[str, Key]] = {
     "": {
@@ -208,7 +209,7 @@ def _point(
     rpm = float(row.get("rpm", case.rpm))
     speed = row.get("airspeed_m_s", row["J"] * rpm / 60 * case.diameter_m if "J" in row else case.airspeed_m_s)
     same = ("sideslip_deg", "solver", "gas", "sector", "domain", "turbulence", "level", "wall_distance_over_R",
-            "plate_radius_over_R", "iterations", "average")  # fmt: skip
+            "plate_radius_over_R", "iterations", "average", "zone")  # fmt: skip
     run = Run(rpm=rpm, airspeed_m_s=float(speed), **{k: row[k] for k in same if k in row})
     if run.average > run.iterations:
         out.add(where, f"average = {run.average} of {run.iterations} iterations", "no more than all")

@@ -22,18 +22,21 @@ from numpy.typing import NDArray
 from bemt.base.averaging import steady_average
 from bemt.base.errors import InputError
 from bemt.base.tables import write_atomic
+from bemt.cfd.balance import balance_of
 from bemt.cfd.schema import CampaignPoint
 from bemt.cfd.start import StartField, splice
 from bemt.exports.openfoam import Settings, case_files
-from bemt.exports.openfoam.run import BINS
+from bemt.exports.openfoam.run import BINS, control
 from bemt.exports.openfoam.write import settings_of, write_openfoam
 
-__all__ = ["DRIFT_LIMIT", "SCATTER_LIMIT", "Outcome", "Worker", "history_of", "point_key", "radial_of"]
+__all__ = ["DRIFT_LIMIT", "RESIDUALS", "SCATTER_LIMIT", "Outcome", "Worker", "history_of", "point_key", "radial_of"]
 
 DRIFT_LIMIT = 0.03
 """Change over the averaged iterations, of the mean, above which a run counts as not converged."""
 SCATTER_LIMIT = 0.05
 """Standard deviation over the averaged iterations, of the mean, above which it counts as not converged."""
+RESIDUALS = ("balance_mass", "balance_momentum", "balance_angular_momentum", "swirl_out")
+"""Columns of what :class:`bemt.cfd.balance.Balance` holds."""
 TEMPORARY = "temporary"
 """File in a folder of grid or run that may go when its campaign has ended."""
 NOTE_LENGTH = 800
@@ -64,10 +67,10 @@ def point_key(point: CampaignPoint) -> tuple[str, str, Settings]:
 
     Notes
     -----
-    The number of ranks and the place of the files do not count.
+    The number of ranks, the place of the files and what is written down for the balance do not count.
     """
     settings, parts = settings_of(point.case, point.run)
-    files = case_files(settings)
+    files = case_files(settings) | {"system/controlDict": control(settings, balance=False)}
     shape = (
         f"{parts['rotor'].key()}|{parts['duct']!r}|{None if parts['tail'] is None else parts['tail'].round(9).tolist()}"
     )
@@ -358,8 +361,9 @@ class Worker:
         Returns
         -------
         Outcome
-            NaN and ``converged`` 0 when the run failed, diverged or kept drifting; its history is there, unless a
-            program failed before the first iteration: then the note ends with that program's words.
+            NaN and ``converged`` 0 when the run failed, diverged, kept drifting or does not balance (the note says
+            where it leaks); its history is there, unless a program failed before the first iteration: then the note
+            ends with that program's words.
         """
         name, grid, settings = keys or point_key(point)
         begin = time.monotonic()
@@ -372,7 +376,9 @@ class Worker:
             if code != 0:  # said before the loads are read: there may be none
                 failed = _last_words(folder / "out.solve")
             history = history_of(folder, settings)
-            _means(values, history, settings, code)
+            said = _balanced(values, folder, settings, len(history))
+            failed = " ".join(words for words in (failed, said) if words)
+            _means(values, history, settings, code, not said)
             values["yplus_avg"] = _y_plus(folder)
             radial = radial_of(folder, settings, settings.average)
             if code == 0:
@@ -403,18 +409,32 @@ def _columns(point: CampaignPoint, s: Settings, name: str) -> dict[str, Any]:
         "solver": "compressible" if s.compressible else "incompressible", "gas": s.gas if s.compressible else "",
         "domain": s.domain, "sector": s.sector, "turbulence": s.turbulence, "level": s.level, "cells": 0,
         "iterations": 0, "averaged": s.average, "drift_thrust": nan, "drift_torque": nan, "scatter_thrust": nan,
-        "scatter_torque": nan, "yplus_avg": nan, "seconds": nan, "start": "", "converged": 0, "note": "",
+        "scatter_torque": nan, **dict.fromkeys(RESIDUALS, nan),
+        "yplus_avg": nan, "seconds": nan, "start": "", "converged": 0, "note": "",
     }  # fmt: skip
 
 
-def _means(values: dict[str, Any], history: Array, s: Settings, code: int) -> None:
-    """Fill in means, drift and scatter; the means stay NaN unless the run converged."""
+def _balanced(values: dict[str, Any], folder: Path, s: Settings, done: int) -> str:
+    """Fill in the residuals; say what keeps the run from balancing, empty when it does."""
+    if done < s.iterations:
+        return f"stopped after {done} of {s.iterations} iterations"
+    try:
+        found = balance_of(folder, s)
+    except InputError as error:
+        return f"not balanced: {str(error)[:NOTE_LENGTH]}"
+    residuals = (found.mass, found.momentum, found.angular_momentum, found.swirl)
+    values |= dict(zip(RESIDUALS, residuals, strict=True))
+    return f"does not balance: {'; '.join(found.leaks)}" if found.leaks else ""
+
+
+def _means(values: dict[str, Any], history: Array, s: Settings, code: int, balanced: bool) -> None:
+    """Fill in means, drift and scatter; the means stay NaN unless the run converged and balances."""
     values["iterations"] = len(history)
     if len(history) < s.average:
         return
     share = s.average / len(history)
     total = history[:, 1] + history[:, 3]
-    fine = code == 0 and len(history) >= s.iterations
+    fine = code == 0 and balanced
     means = {}
     for key, series in (("thrust", total), ("torque", history[:, 2])):
         average = steady_average(series, share)

@@ -54,6 +54,8 @@ M_TIP_KNOWN = 0.75
 BLOCKAGE_KNOWN = 0.25
 DOMAIN_WIDE = 5.0
 """Domain diameter over disk diameter that counts as a free field (blockage 4 %). [1]"""
+BALANCE_LIMIT = 0.01
+"""Residual of mass or momentum above which a number is that of no flow; own runs are refused above it too. [1]"""
 SKEW_LIMIT = 5.0
 """Inflow angle below which a frozen rotor is taken as fine. [deg]"""
 
@@ -90,6 +92,8 @@ class CfdFacts:
         Whether the rotor was frozen in a rotating frame.
     skew_deg : float
         Angle of the inflow against the shaft. [deg]
+    mass_balance, momentum_balance : float
+        Residual of mass over what passes the disk, and of axial momentum over the thrust. [1]
     ducted : bool
         Whether the rotor runs in a duct; the rules that were measured on an open propeller are not used then.
     """
@@ -110,6 +114,8 @@ class CfdFacts:
     thrust_from: str = ""
     steady_mrf: bool | None = None
     skew_deg: float = 0.0
+    mass_balance: float = math.nan
+    momentum_balance: float = math.nan
     ducted: bool = False
 
 
@@ -317,6 +323,23 @@ def _thrust(f: CfdFacts) -> AuditLine:
     return AuditLine(topic, *table.get(f.thrust_from, ("not stated", "not stated", "unknown", math.nan)))
 
 
+def _balance(f: CfdFacts) -> AuditLine:
+    topic = "balance of mass and momentum"
+    parts = {"mass": f.mass_balance, "momentum": f.momentum_balance}
+    known = {name: abs(value) for name, value in parts.items() if math.isfinite(value)}
+    words = ", ".join(
+        f"{name} {parts[name]:+.2%}" if name in known else f"balance of {name} not stated" for name in parts
+    )
+    open_ones = [name for name, size in known.items() if size > BALANCE_LIMIT]
+    if open_ones:
+        consequence = f"{' and '.join(open_ones)} made or lost in the domain: the loads are those of another flow"
+        return AuditLine(topic, "fault", words, consequence, math.nan)
+    if len(known) < len(parts):
+        return AuditLine(topic, "not stated", words, "a leak is not excluded: one of 11 % went unseen here", math.nan)
+    u = max(known.values())
+    return AuditLine(topic, "fine", words, "the larger taken whole as a standard uncertainty", u)
+
+
 def _frame(f: CfdFacts) -> AuditLine:
     topic = "frozen rotor against inflow"
     if f.steady_mrf is None:
@@ -359,7 +382,7 @@ def audit(facts: CfdFacts) -> tuple[AuditLine, ...]:
     >>> [line.topic for line in lines if line.status == "fault"]
     ['domain against disk', 'grid study', 'where the thrust was read']
     """
-    judges = (_domain, _compressibility, _grid, _drift, _wall, _turbulence, _thrust, _frame)
+    judges = (_domain, _compressibility, _grid, _drift, _balance, _wall, _turbulence, _thrust, _frame)
     return tuple(judge(facts) for judge in judges)
 
 

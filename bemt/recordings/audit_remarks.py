@@ -36,6 +36,8 @@ _NUMBERS: tuple[tuple[str, str, float], ...] = (
     (rf"\bGCI {_NUMBER} ?%", "u_grid", 0.01 / 1.15),
     (rf"\bdrift {_NUMBER} ?%", "drift", 0.01),
     (rf"\bskew {_NUMBER} deg\b", "skew_deg", 1.0),
+    (rf"\bmass balance {_NUMBER} ?%", "mass_balance", 0.01),
+    (rf"\bmomentum balance {_NUMBER} ?%", "momentum_balance", 0.01),
     (rf"\b{_NUMBER} cells\b", "cells", 1.0),
 )
 

@@ -25,7 +25,8 @@ DOMAIN_OVER_D = {"free": 5.0, "pipe": 1.0}
 TURBULENCE = {"kOmegaSST": "k-omega SST", "realizableKE": "realizable k-epsilon"}
 NUMBERS = ("rpm", "airspeed_m_s", "J", "thrust_N", "torque_Nm", "u_thrust_N", "u_torque_Nm", "density_kg_m3",
            "wall_distance_m", "tip_gap_mm", "sideslip_deg", "pitch_offset_deg", "level", "cells", "iterations",
-           "drift_thrust", "drift_torque", "scatter_thrust", "yplus_avg", "seconds", "converged")  # fmt: skip
+           "drift_thrust", "drift_torque", "scatter_thrust", "balance_mass", "balance_momentum", "yplus_avg", "seconds",
+           "converged")  # fmt: skip
 WORDS = ("run", "solver", "gas", "domain", "sector", "turbulence", "note")
 
 
@@ -115,7 +116,7 @@ def _facts(run: Mapping[str, Any], conditions: Mapping[str, Any], levels: int) -
         grids=levels, u_grid=grid if grid > 0 else math.nan, drift=run["drift_thrust"], wall="function",
         y_plus=run["yplus_avg"], turbulence=TURBULENCE.get(run["turbulence"], run["turbulence"]), thrust_from="forces",
         steady_mrf=True, skew_deg=0.0 if math.isnan(run["sideslip_deg"]) else run["sideslip_deg"],
-        ducted=conditions["ducted"],
+        mass_balance=run["balance_mass"], momentum_balance=run["balance_momentum"], ducted=conditions["ducted"],
     )  # fmt: skip
 
 

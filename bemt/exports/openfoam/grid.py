@@ -3,10 +3,15 @@
 The base grid is made of kites round the shaft (sectors of at most 120 deg, so that no corner is flat) and rings of
 hexahedra outside. With many blades the kites shrink into the hub. Sectors are periodic by ``cyclicAMI``; parallel
 snappyHexMesh aborts with such patches present, therefore they are plain at first and made by createPatch afterwards.
+
+The rotating zone ends on planes of the base grid and, at the periodic sides, on one of its radii. Its cells are chosen
+by their centres, and only there are they chosen alike on both sides however each is refined. Ends elsewhere made 11 %
+of the mass flow of an eleven-bladed fan.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
@@ -19,6 +24,8 @@ SURFACE_LEVEL = 6
 LINES = "lines.obj"
 LINE_LEVEL = 4
 GROWTH = 1.25
+KITES = 1.3
+"""Radius of the kites round the shaft over R; the rotating zone of an open rotor ends there too."""
 
 
 def extent(s: Settings) -> tuple[float, float, float]:
@@ -80,26 +87,41 @@ def block_mesh(s: Settings) -> str:
     step = angle / parts
     shift, across = _narrow(s)
     cell = s.base_cell / 2**shift
-    inner = 0.6 * radius if s.domain == "pipe" else 1.3 * s.R
+    turning, zone_low, zone_high = mrf_zone(s)
+    planes = s.zone == "grid"
+    inner = 0.6 * radius if s.domain == "pipe" else turning if planes else KITES * s.R
     if across:
         inner = 0.6 * s.Rhub
     mid = inner * (0.75 * math.sqrt(2.0) if step > 1.3 else 1 / math.cos(0.5 * step))
-    n = across or max(2, round(inner / cell), math.ceil(0.5 * step * (s.R if inner < s.R else inner) / cell))
+    fitting = math.ceil(inner / cell - 1e-9) if planes else round(inner / cell)
+    n = across or max(2, fitting, math.ceil(0.5 * step * (s.R if inner < s.R else inner) / cell))
     if s.domain == "pipe":
-        rings, out = max(2, round((radius - inner) / cell)), 1.0
+        rings, out = max(2, round((radius - inner) / cell)), "1"
+    elif across and planes:
+        near_rings, near_ratio = _graded(turning - inner, cell)
+        far_rings, far_ratio = _graded(radius - turning, cell * near_ratio * GROWTH)
+        rings = near_rings + far_rings
+        out = (f"(({turning - inner:.17g} {near_rings} {near_ratio:.6g}) "
+               f"({radius - turning:.17g} {far_rings} {far_ratio:.6g}))")  # fmt: skip
     else:
-        rings, out = _graded(radius - inner, cell)
+        rings, ratio = _graded(radius - inner, cell)
+        out = f"{ratio:.6g}"
     others = [body for body in (s.duct, s.body) if body is not None]
     near = [min([s.rotor.low, -1.5 * s.R, *(b.low - 0.3 * s.R for b in others)]),
             max([s.rotor.high, 0.75 * s.R, *(b.high + 0.3 * s.R for b in others)])]  # fmt: skip
     if s.plate_z is not None:
         near[0] = min(near[0], s.plate_z - 0.5 * s.R)
-    below, ratio_below = _graded(near[0] - low, cell)
-    middle = round((near[1] - near[0]) / cell)
-    above, ratio_above = _graded(high - near[1], cell)
-    layers = below + middle + above
-    z_grading = (f"(({near[0] - low:.6g} {below} {1 / ratio_below:.6g}) ({near[1] - near[0]:.6g} {middle} 1) "
-                 f"({high - near[1]:.6g} {above} {ratio_above:.6g}))")  # fmt: skip
+    stops, digits = [near[0], near[1]], 6
+    if planes:
+        low, high = _written(low), _written(high)
+        stops = [min(near[0], zone_low - 0.1 * s.R), zone_low, zone_high, max(near[1], zone_high + 0.1 * s.R)]
+        digits = 17
+    below, ratio_below = _graded(stops[0] - low, cell)
+    above, ratio_above = _graded(high - stops[-1], cell)
+    even = [(b - a, max(1, round((b - a) / cell)), 1.0) for a, b in itertools.pairwise(stops)]
+    z_parts = [(stops[0] - low, below, 1 / ratio_below), *even, (high - stops[-1], above, ratio_above)]
+    layers = sum(cells for _, cells, _ in z_parts)
+    z_grading = f"({' '.join(f'({length:.{digits}g} {cells} {ratio:.6g})' for length, cells, ratio in z_parts)})"
     turns = [-0.5 * angle + k * step for k in range(parts + (s.sectors > 1))]
     points: list[tuple[float, float]] = [(0.0, 0.0)]
     for r, at in ((inner, turns), (mid, [t + 0.5 * step for t in turns[:parts]]),
@@ -111,14 +133,14 @@ def block_mesh(s: Settings) -> str:
     P = [1 + ends + parts + k % ends for k in range(parts + 1)]
     Q = [1 + 2 * ends + parts + k for k in range(parts)]
 
-    def hexa(ids: tuple[int, ...], cells: tuple[int, int], grading: float) -> str:
+    def hexa(ids: tuple[int, ...], cells: tuple[int, int], grading: str) -> str:
         corners = " ".join(str(i) for i in (*ids, *(i + count for i in ids)))
-        return f"    hex ({corners}) ({cells[0]} {cells[1]} {layers}) simpleGrading ({grading:.6g} 1 {z_grading})\n"
+        return f"    hex ({corners}) ({cells[0]} {cells[1]} {layers}) simpleGrading ({grading} 1 {z_grading})\n"
 
     blocks, arcs, side, ends_faces = "", "", "", []
     for k in range(parts):
         kite, first, second = (0, A[k], M[k], A[k + 1]), (A[k], P[k], Q[k], M[k]), (M[k], Q[k], P[k + 1], A[k + 1])
-        for ids, cells, grading in ((kite, (n, n), 1.0), (first, (rings, n), out), (second, (rings, n), out)):
+        for ids, cells, grading in ((kite, (n, n), "1"), (first, (rings, n), out), (second, (rings, n), out)):
             blocks += hexa(ids, cells, grading)
             ends_faces.append(ids)
         for a, b, t in ((P[k], Q[k], turns[0] + (k + 0.25) * step), (Q[k], P[k + 1], turns[0] + (k + 0.75) * step)):
@@ -126,7 +148,8 @@ def block_mesh(s: Settings) -> str:
             for shift, z in ((0, low), (count, high)):
                 on_arc = vector(radius * math.cos(t), radius * math.sin(t), z)
                 arcs += f"    arc {a + shift} {b + shift} {on_arc}\n"
-    vertices = "".join(f"    {vector(x, y, z)}\n" for z in (low, high) for x, y in points)
+    spelled = _whole if planes else vector
+    vertices = "".join(f"    {spelled(x, y, z)}\n" for z in (low, high) for x, y in points)
     bottom = "".join(f"            ({' '.join(map(str, ids))})\n" for ids in ends_faces)
     top = "".join(f"            ({' '.join(str(i + count) for i in ids)})\n" for ids in ends_faces)
     patches = [("inlet", "patch", top), ("outlet", "patch", bottom), ("side", "patch", side)]
@@ -156,7 +179,8 @@ def mrf_zone(s: Settings) -> tuple[float, float, float]:
 
     Notes
     -----
-    It may reach into a duct's wall, which does not turn with it, but never beyond one.
+    It may reach into a duct's wall, which does not turn with it, but never beyond one. Its ends are planes of the base
+    grid unless the settings say ``margin``, and are numbers of nine digits: the text of a case holds them whole.
     """
     margin = 0.15 * s.R
     low, high = s.rotor.low - margin, s.rotor.high + margin
@@ -165,8 +189,20 @@ def mrf_zone(s: Settings) -> tuple[float, float, float]:
     if s.plate_z is not None:
         low = max(low, 0.5 * (s.rotor.low + s.plate_z))
     if s.duct is not None:
-        return 0.5 * (s.R + s.gap + s.duct.radius), low, high
-    return (1.1 if s.domain == "free" else 1.5) * s.R, low, high
+        radius = 0.5 * (s.R + s.gap + s.duct.radius)
+    else:
+        radius = (1.5 if s.domain == "pipe" else KITES if s.zone == "grid" else 1.1) * s.R
+    return (_written(radius), _written(low), _written(high)) if s.zone == "grid" else (radius, low, high)
+
+
+def _whole(*components: float) -> str:
+    """A vector with all its digits."""
+    return f"({' '.join(f'{c + 0.0:.17g}' for c in components)})"
+
+
+def _written(value: float) -> float:
+    """The number that nine digits of text say."""
+    return float(f"{value:.9g}")
 
 
 def lines(s: Settings) -> str:

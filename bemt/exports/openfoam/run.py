@@ -7,10 +7,16 @@ from typing import Any
 from bemt.exports.openfoam.settings import Settings
 from bemt.exports.openfoam.text import dictionary, vector
 
-__all__ = ["BINS", "all_run", "control"]
+__all__ = ["BALANCE", "BINS", "OPEN", "SIDES", "all_run", "control", "through"]
 
 BINS = 24
 """Bins along the radius in which the blade's loads are recorded."""
+OPEN = ("inlet", "outlet", "side")
+"""Patches at the ends of the domain."""
+SIDES = ("side1", "side2")
+"""Periodic sides of a sector."""
+BALANCE = 10
+"""How often the averaged iterations are balanced."""
 
 
 def _forces(s: Settings, patches: list[str], **more: Any) -> dict[str, Any]:
@@ -19,13 +25,37 @@ def _forces(s: Settings, patches: list[str], **more: Any) -> dict[str, Any]:
     return out | ({"pRef": s.pressure} if s.compressible else {"rho": "rhoInf", "rhoInf": s.rho, "pRef": 0}) | more
 
 
-def control(s: Settings) -> str:
+def through(s: Settings) -> tuple[str, ...]:
+    """Patches that air passes."""
+    return (*OPEN, *(SIDES if s.sectors > 1 else ()))
+
+
+def _balance(s: Settings) -> dict[str, Any]:
+    """Function objects of the balance: flux and momentum through every patch, pressure and shear on it."""
+    step = max(1, s.average // BALANCE)
+    when = {"timeStart": s.iterations - s.average + 1, "executeControl": "timeStep", "executeInterval": step,
+            "writeControl": "timeStep", "writeInterval": step}  # fmt: skip
+    out: dict[str, Any] = {}
+    for patch in through(s):
+        common = {"type": "surfaceFieldValue", "libs": '("libfieldFunctionObjects.so")', "log": False,
+                  "regionType": "patch", "name": patch, "surfaceFormat": "raw", "writeFields": True} | when  # fmt: skip
+        out[f"mass_{patch}"] = {**common, "operation": "sum", "fields": ["phi"]}
+        out[f"momentum_{patch}"] = {**common, "operation": "weightedSum", "weightField": "phi", "fields": ["U"]}
+    out["open"] = _forces(s, list(OPEN)) | when
+    if s.sectors > 1:
+        out["sides"] = _forces(s, list(SIDES)) | when
+    return out
+
+
+def control(s: Settings, balance: bool = True) -> str:
     """Write ``controlDict``.
 
     Parameters
     ----------
     s : Settings
         The case.
+    balance : bool
+        Whether what the balance needs is written down too; it changes nothing in the flow.
 
     Returns
     -------
@@ -35,7 +65,8 @@ def control(s: Settings) -> str:
     Notes
     -----
     ``forces`` holds blade and hub of the sector that is solved; ``standing`` duct, stator and centre body; ``plate``
-    the plate; ``radial`` the blade in bins along x, which blade 1 lies on (no bins for the whole rotor).
+    the plate; ``radial`` the blade in bins along x, which blade 1 lies on (no bins for the whole rotor). ``mass_...``,
+    ``momentum_...``, ``open`` and ``sides`` are for :mod:`bemt.cfd.balance`.
     """
     functions: dict[str, Any] = {"forces": _forces(s, ["blade", "hub"])}
     standing = [name for name in s.walls if name != "plate"]
@@ -51,6 +82,8 @@ def control(s: Settings) -> str:
     functions["yPlus"] = {"type": "yPlus", "libs": '("libfieldFunctionObjects.so")', "log": False,
                           "executeControl": "timeStep", "executeInterval": s.iterations,
                           "writeControl": "timeStep", "writeInterval": s.iterations}  # fmt: skip
+    if balance:
+        functions |= _balance(s)
     return dictionary("controlDict", {
         "application": "rhoSimpleFoam" if s.compressible else "simpleFoam", "startFrom": "startTime", "startTime": 0,
         "stopAt": "endTime", "endTime": s.iterations, "deltaT": 1, "writeControl": "timeStep",

@@ -13,6 +13,7 @@ __all__ = [
     "MACH_COMPRESSIBLE",
     "SECTORS",
     "TURBULENCE",
+    "ZONES",
     "Body",
     "Settings",
     "Sweep",
@@ -23,6 +24,7 @@ DOMAINS = ("free", "pipe")
 SECTORS = ("half", "blade", "full")
 TURBULENCE = ("kOmegaSST", "realizableKE")
 GASES = ("isentropic", "perfect")
+ZONES = ("grid", "margin")
 MACH_COMPRESSIBLE = 0.5
 """Helical tip Mach number above which the compressible solver is taken when nothing is said."""
 PIPE_RADIUS = 0.998
@@ -142,6 +144,9 @@ class Settings:
         Iterations, and how many of the last are averaged.
     ranks : int
         Processes when nothing else is said at run time.
+    zone : str
+        ``grid``: the rotating zone ends on planes of the base grid, so that both periodic sides are cut alike;
+        ``margin``: wherever a margin of 0.15 R ends, as runs before that rule have it (their grids can be made again).
     surfaces : tuple of str
         Surfaces in ``constant/triSurface``; blade and hub among them.
     """
@@ -174,6 +179,7 @@ class Settings:
     iterations: int = 400
     average: int = 100
     ranks: int = 2
+    zone: str = "grid"
     surfaces: tuple[str, ...] = field(default=("blade", "hub"))
 
     def __post_init__(self) -> None:
@@ -187,6 +193,7 @@ class Settings:
         check(self.domain in DOMAINS, "domain", repr(self.domain), f"one of {', '.join(DOMAINS)}")
         check(self.turbulence in TURBULENCE, "turbulence", repr(self.turbulence), f"one of {', '.join(TURBULENCE)}")
         check(self.gas in GASES, "gas", repr(self.gas), f"one of {', '.join(GASES)}")
+        check(self.zone in ZONES, "zone", repr(self.zone), f"one of {', '.join(ZONES)}")
         check(self.sector != "half" or self.B % 2 == 0, "sector", f"half of {self.B} blades", "an even number",
               "Take blade or full")  # fmt: skip
         check(self.sector != "blade" or self.B >= 3, "sector", f"one of {self.B} blades", "three blades or more",

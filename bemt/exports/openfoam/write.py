@@ -58,7 +58,7 @@ class Run:
         ``incompressible`` or ``compressible``; None decides by the helical tip Mach number, compressible above 0.5.
     gas : str
         As in :class:`bemt.exports.openfoam.settings.Settings`.
-    sector, domain, turbulence, level, iterations, average, ranks
+    sector, domain, turbulence, level, iterations, average, ranks, zone
         As there; `sector` None is the smallest that fits.
     wall_distance_over_R, plate_radius_over_R : float or None
         Where a round plate stands behind the rotor, and its radius. [R]
@@ -78,6 +78,7 @@ class Run:
     iterations: int = 400
     average: int = 100
     ranks: int = 2
+    zone: str = "grid"
 
 
 def check_run(run: Run, names: Mapping[str, str] | None = None, file: str = "") -> list[Fault]:
@@ -195,7 +196,8 @@ def settings_of(case: Case, run: Run, options: Options | None = None) -> tuple[S
             level=run.level, turbulence=run.turbulence, compressible=compressible, gas=run.gas, duct=around, body=inner,
             gap=0.0 if duct is None else duct.gap, plate_z=plate, plate_radius=run.plate_radius_over_R * rotor.R,
             pitch=2 * math.pi * 0.75 * rotor.R * math.tan(float(rotor.blade.at(0.75 * rotor.R)[1])),
-            iterations=run.iterations, average=run.average, ranks=run.ranks, surfaces=tuple(surfaces),
+            iterations=run.iterations, average=run.average, ranks=run.ranks, zone=run.zone,
+            surfaces=tuple(surfaces),
         )  # fmt: skip
     except InputError as error:
         raise InputError([replace(fault, file=fault.file or file) for fault in error.faults]) from error
