@@ -219,6 +219,8 @@ def test_a_campaign_is_recorded(
     assert manifest["balance_reason"] is None and set(manifest["balance"]) == {row["run"] for row in rows}
     for found in manifest["balance"].values():
         assert all(abs(found[key]) < 1e-5 for key in ("mass", "momentum", "angular_momentum"))
+    assert main(["cfd", str(tmp_path)]) == 0, "a folder of campaigns is summed up"
+    assert rows[0]["run"][:6] in capsys.readouterr().out
     assert main(["cfd", str(path), "--ranks", "1", "--work", work, "--quiet"]) == 0
     assert calls(programs, "simpleFoam") == 2, "finished points are not run again"
     write(path.parent, project, TWO.replace("[6000, 9000]", "[6000, 9000, 12000]"))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -84,12 +85,12 @@ def _radial(campaign: Campaign, run: str, found: solver.Solution) -> dict[str, A
     return out
 
 
-def summary(folder: Path) -> dict[str, Any]:
+def summary(folder: str | Path) -> dict[str, Any]:
     """Collect the recordings of all campaigns in a folder and solve their points by BEMT.
 
     Parameters
     ----------
-    folder : Path
+    folder : str or Path
         Holds ``<name>/campaign.toml``.
 
     Returns
@@ -104,6 +105,7 @@ def summary(folder: Path) -> dict[str, Any]:
     InputError
         When there is no campaign, or one has faults.
     """
+    folder = Path(folder)
     paths = sorted(folder.glob("*/campaign.toml"))
     if not paths:
         raise InputError(Fault(folder.as_posix(), "", "no campaign", "campaign.toml, or folders with one each"))
@@ -121,6 +123,12 @@ def summary(folder: Path) -> dict[str, Any]:
                     "recorded": len(rows), "converged": sum(row["converged"] == "1" for row in rows),
                     "grid_studies": manifest.get("grid_studies", []), "rows": rows})  # fmt: skip
     return {"schema": "bemt.cfd-summary/1", "campaigns": out}
+
+
+def _leak(row: Mapping[str, str]) -> str:
+    sizes = [abs(_number(row[f"balance_{name}"])) for name in ("mass", "momentum", "angular_momentum")]
+    known = [size for size in sizes if not math.isnan(size)]
+    return number_text(100 * max(known), 2) if known else "-"
 
 
 def _number(text: str) -> float:
@@ -146,7 +154,8 @@ def summary_text(document: dict[str, Any], radial: bool = True) -> str:
     counts = [[c["name"], str(c["points"]), str(c["recorded"]), str(c["converged"])] for c in document["campaigns"]]
     counts.append(["all", *(str(sum(int(row[k]) for row in counts)) for k in (1, 2, 3))])
     lines.append(text_table(["campaign", "points", "run", "converged"], counts))
-    head = ["run", "solver", "level", "cells", "rpm", "J", "other", "T [N]", "u", "BEMT", "Q [N m]", "u", "BEMT", "y+"]
+    head = ["run", "solver", "level", "cells", "rpm", "J", "other", "T [N]", "u", "BEMT", "Q [N m]", "u", "BEMT", "y+",
+            "leak [%]"]  # the largest residual of mass, momentum and angular momentum; empty where none was written
     for campaign in document["campaigns"]:
         rows = []
         for row in campaign["rows"]:
@@ -161,7 +170,7 @@ def summary_text(document: dict[str, Any], radial: bool = True) -> str:
             rows.append([row["run"][:6], row["solver"], row["level"], row["cells"], row["rpm"],
                          number_text(_number(row["J"]), 3), ", ".join(other), values[0], us[0],
                          number_text(row["bemt_thrust_N"]), values[1], us[1], number_text(row["bemt_torque_Nm"]),
-                         number_text(_number(row["yplus_avg"]), 3)])  # fmt: skip
+                         number_text(_number(row["yplus_avg"]), 3), _leak(row)])  # fmt: skip
         lines += ["", f"{campaign['name']}: {campaign['title']}"]
         lines.append(text_table(head, rows, left=(0, 1, 6)) if rows else "  nothing has run yet")
         for study in campaign["grid_studies"]:
