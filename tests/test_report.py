@@ -381,7 +381,16 @@ def cfd_folder(root: Path, manifest: object, recording: str) -> Path:
 
 def test_own_cfd_stands_beside_bemt_with_its_audit(made: tuple[dict[str, Any], Path], tmp_path: Path) -> None:
     book = copy.deepcopy(made[0])
-    book["cfd"] = cfd_runs(cfd_folder(tmp_path, STUDY, RECORDING))
+    book["cfd"] = cfd_runs(cfd_folder(tmp_path / "before the check", STUDY, RECORDING))
+    attach(book)
+    line = book["cases"][0]["result"]["comparisons"][-1]
+    assert math.isnan(line["u_D"]) and line["verdict"] == "u_D unknown", "nobody has shown that it balances"
+    book = copy.deepcopy(made[0])
+    balanced = "\n".join(
+        f"{row}{',0.001,-0.002' if k else ',balance_mass,balance_momentum'}"
+        for k, row in enumerate(RECORDING.splitlines())
+    )
+    book["cfd"] = cfd_runs(cfd_folder(tmp_path, STUDY, balanced))
     attach(book)
     page = book["cases"][0]
     assert page["own_cfd"]["run"] == "fine", "settled, free, bare, compressible, finest"
