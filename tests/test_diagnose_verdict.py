@@ -166,7 +166,7 @@ ROWS: dict[str, dict[str, Any]] = {
     "not much better than nothing": {"odds": 7.0},
     "twin faults": {"leading": Explanation.of("thrust_zero", "torque_drift")},
     "unknown is nearly as likely": {"unlisted": 0.2},
-    "far rougher than stated": {"roughness": 5.0},
+    "far rougher than stated": {"roughness": 5.0, "alone": True},
     "may as well be absent": {
         "leading": Explanation.of("untwist"),
         "parameters": {"untwist": {"tip_deg": {"low": -0.1, "high": 0.5}}},

@@ -150,23 +150,6 @@ def _load(folder: Path, name: str, times: Array, faults: list[Fault]) -> tuple[f
 def balance_of(run: Path, settings: Settings) -> Balance:
     """Balance a run by what its function objects wrote during the averaged iterations.
 
-    Parameters
-    ----------
-    run : Path
-        The case's folder.
-    settings : Settings
-        Its settings.
-
-    Returns
-    -------
-    Balance
-        Residuals, and where those beyond the limit come from.
-
-    Raises
-    ------
-    InputError
-        When a file is absent or damaged; all faults at once.
-
     Notes
     -----
     See the head of this module for the equations and what each residual is relative to. Loads are means over the same

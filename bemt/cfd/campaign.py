@@ -28,35 +28,7 @@ def run_campaign(
     campaign: Campaign, work: Path, only: int | None = None, ranks: int = 2,
     tell: Callable[[str], None] | None = None, keep: bool = True,
 ) -> CampaignRecord:
-    """Run the points of a campaign that are not recorded yet.
-
-    Parameters
-    ----------
-    campaign : Campaign
-        The campaign.
-    work : Path
-        Folder of grids and runs; grids are reused from there.
-    only : int or None
-        Run this point alone, counted from 1, even if it is recorded.
-    ranks : int
-        Processes of a run.
-    tell : callable, optional
-        Takes lines of progress.
-    keep : bool
-        Leave the folders of grids and runs in `work`. Else those that this campaign made there (now, with `only`, or
-        before it was stopped) go at the end, and `work` with them when it was made here and nothing else is in it;
-        what was kept once stays, and so do the logs of a program that failed before the first iteration.
-
-    Returns
-    -------
-    CampaignRecord
-        What is recorded now; it is on the disk already.
-
-    Raises
-    ------
-    InputError
-        When a point cannot be, before anything runs.
-    """
+    """Run the points of a campaign that are not recorded yet."""
     keys: list[tuple[str, str, Settings]] = []
     faults: list[Fault] = []
     for k, point in enumerate(campaign.points, 1):

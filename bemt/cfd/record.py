@@ -76,20 +76,7 @@ def _tried(row: Mapping[str, Any]) -> bool:
 
 
 def grid_studies(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Find the points that differ in their grid alone and do a grid study of each.
-
-    Parameters
-    ----------
-    rows : sequence of mapping
-        Rows of a recording.
-
-    Returns
-    -------
-    list of dict
-        Per point: its columns, ``levels`` and ``cells`` (finest first), per quantity the values, observed order,
-        extrapolated value, GCI of fine and coarse grid (of the three finest levels), flags, and the standard
-        uncertainty of every level.
-    """
+    """Find the points that differ in their grid alone and do a grid study of each."""
     groups: list[list[Mapping[str, Any]]] = []
     for row in rows:
         home = next((g for g in groups if all(_same(g[0].get(k), row.get(k)) for k in SAME)), None)
@@ -130,21 +117,7 @@ def grid_studies(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 
 def grid_uncertainty(studies: Sequence[Mapping[str, Any]], row: Mapping[str, Any]) -> dict[str, float]:
-    """Look up the standard uncertainty by the grid, of a row's level and solver.
-
-    Parameters
-    ----------
-    studies : sequence of mapping
-        From :func:`grid_studies`.
-    row : mapping
-        A row.
-
-    Returns
-    -------
-    dict
-        ``thrust_N`` and ``torque_Nm`` to the relative uncertainty [1]; empty without a study of that level. The largest
-        counts, whichever solver it was made with: two grids of one know less than three of the other.
-    """
+    """Look up the standard uncertainty by the grid, of a row's level and solver. [1]"""
     level = f"{row['level']:g}"
     found = [study for study in studies if level in study["thrust_N"]["u_relative"]]
     if not found:
@@ -178,13 +151,7 @@ class CampaignRecord:
         return {row["run"] for row in self.rows if _tried(row)}
 
     def borrow(self, names: Sequence[str]) -> None:
-        """Take over runs that a campaign beside this one has recorded already.
-
-        Parameters
-        ----------
-        names : sequence of str
-            Runs of this campaign; a name stands for all that decides a run.
-        """
+        """Take over runs that a campaign beside this one has recorded already."""
         for path in sorted(self.folder.parent.glob("*/recording.csv")):
             if path != self.path and not set(names) <= self.done:
                 wanted = set(names) - self.done
@@ -197,15 +164,7 @@ class CampaignRecord:
         self.rows = [row for row in self.rows if row["run"] not in new] + list(new.values())
 
     def add(self, outcome: Outcome, order: Sequence[str]) -> None:
-        """Add a run and write everything.
-
-        Parameters
-        ----------
-        outcome : Outcome
-            What it gave.
-        order : sequence of str
-            Runs of the campaign in their order.
-        """
+        """Add a run and write everything."""
         name = outcome.values["run"]
         self._take(row for row in _read(self.path) if row["run"] not in self.done)  # by another process, meanwhile
         self._take([outcome.values])
@@ -241,13 +200,7 @@ class CampaignRecord:
         return list(found)
 
     def write(self, order: Sequence[str]) -> None:
-        """Write recording and manifest, uncertainties from what is known now.
-
-        Parameters
-        ----------
-        order : sequence of str
-            Runs of the campaign in their order.
-        """
+        """Write recording and manifest, uncertainties from what is known now."""
         # a run that did not converge and is no longer asked for says nothing any more
         gone = {row["run"] for row in self.rows if not row["converged"] and row["run"] not in order}
         self.rows = [row for row in self.rows if row["run"] not in gone]

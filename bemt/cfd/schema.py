@@ -106,23 +106,7 @@ class Campaign:
 
 
 def load_campaign(path: str | Path) -> Campaign:
-    """Read and check a campaign file.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file, or its folder with ``campaign.toml``.
-
-    Returns
-    -------
-    Campaign
-        With the points of ``[[points]]``, then those of ``[axes]`` (all combinations, the last axis fastest).
-
-    Raises
-    ------
-    InputError
-        With every fault.
-    """
+    """Read and check a campaign file."""
     path = Path(path)
     if path.is_dir():
         path = path / "campaign.toml"

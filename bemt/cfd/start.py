@@ -41,24 +41,7 @@ class StartField:
 
 
 def splice(name: str, source: bytes, target: bytes, old: StartField, new: StartField) -> bytes | None:
-    """Put the internal field of one file, scaled, into another.
-
-    Parameters
-    ----------
-    name : str
-        Name of the field.
-    source : bytes
-        File of the finished run, binary format.
-    target : bytes
-        Initial file of the new run, uniform internal field.
-    old, new : StartField
-        What they are for.
-
-    Returns
-    -------
-    bytes or None
-        The new file, binary format; None when the field cannot be taken over.
-    """
+    """Put the internal field of one file, scaled, into another."""
     found, place = _FIELD.search(source), _UNIFORM.search(target)
     power = POWERS.get(name)
     if found is None or place is None or power is None or (name == "p" and old.compressible != new.compressible):

@@ -86,25 +86,7 @@ def _radial(campaign: Campaign, run: str, found: solver.Solution) -> dict[str, A
 
 
 def summary(folder: str | Path) -> dict[str, Any]:
-    """Collect the recordings of all campaigns in a folder and solve their points by BEMT.
-
-    Parameters
-    ----------
-    folder : str or Path
-        Holds ``<name>/campaign.toml``.
-
-    Returns
-    -------
-    dict
-        ``campaigns``: per campaign its counts and rows; the rows carry ``bemt_thrust_N`` and ``bemt_torque_Nm`` (of the
-        open rotor in axial flow: a plate, a pipe and a duct that the case itself does not have are not in it), and
-        ``radial`` where loads along the radius were recorded.
-
-    Raises
-    ------
-    InputError
-        When there is no campaign, or one has faults.
-    """
+    """Collect the recordings of all campaigns in a folder and solve their points by BEMT."""
     folder = Path(folder)
     paths = sorted(folder.glob("*/campaign.toml"))
     if not paths:
@@ -136,20 +118,7 @@ def _number(text: str) -> float:
 
 
 def summary_text(document: dict[str, Any], radial: bool = True) -> str:
-    """Give the summary as tables.
-
-    Parameters
-    ----------
-    document : dict
-        From :func:`summary`.
-    radial : bool
-        Whether the loads in bands are shown.
-
-    Returns
-    -------
-    str
-        Lines.
-    """
+    """Give the summary as tables."""
     lines = []
     counts = [[c["name"], str(c["points"]), str(c["recorded"]), str(c["converged"])] for c in document["campaigns"]]
     counts.append(["all", *(str(sum(int(row[k]) for row in counts)) for k in (1, 2, 3))])

@@ -53,18 +53,6 @@ def _digest(*parts: str) -> str:
 def point_key(point: CampaignPoint) -> tuple[str, str, Settings]:
     """Name a run and its grid by all that decides them.
 
-    Parameters
-    ----------
-    point : CampaignPoint
-        The run.
-
-    Returns
-    -------
-    run, grid : str
-        Twelve hexadecimal digits each.
-    settings : Settings
-        The run's settings.
-
     Notes
     -----
     The number of ranks, the place of the files and what is written down for the balance do not count.
@@ -99,25 +87,7 @@ class Outcome:
 
 
 def history_of(folder: Path, settings: Settings) -> Array:
-    """Read the loads of a run: rotor, and all that stands on the same mount.
-
-    Parameters
-    ----------
-    folder : Path
-        The case's folder.
-    settings : Settings
-        Its settings.
-
-    Returns
-    -------
-    (N, 4) array
-        Iteration, rotor thrust [N], shaft torque [N m], thrust of duct, stator and body [N]; whole rotor.
-
-    Raises
-    ------
-    InputError
-        When a file is absent or damaged.
-    """
+    """Read the loads of a run: rotor, and all that stands on the same mount, (N, 4)."""
     from bemt.readers.openfoam_forces import read
 
     def column(name: str, file: str, channel: str) -> Array:
@@ -137,21 +107,7 @@ def history_of(folder: Path, settings: Settings) -> Array:
 
 
 def radial_of(folder: Path, settings: Settings, last: int) -> Array | None:
-    """Read the loads of the blades along the radius.
-
-    Parameters
-    ----------
-    folder : Path
-        The case's folder.
-    settings : Settings
-        Its settings.
-    last : int
-        Iterations that are averaged.
-
-    Returns
-    -------
-    (M, 3) array or None
-        Radius [m], dT/dr [N/m], dQ/dr [N m/m] of all blades; None where nothing was recorded.
+    """Read the loads of the blades along the radius, (M, 3).
 
     Notes
     -----
@@ -230,13 +186,7 @@ class Worker:
             write_atomic(folder / TEMPORARY, "")
 
     def clear(self, keys: Iterable[tuple[str, str]]) -> None:
-        """Remove the folders of some runs that were made here without `keep`, and nothing else.
-
-        Parameters
-        ----------
-        keys : iterable of (str, str)
-            Run and grid, as :func:`point_key` names them.
-        """
+        """Remove the folders of some runs that were made here without `keep`, and nothing else."""
         for run, grid in keys:
             for folder in [self.work / f"run-{run}", *self.work.glob(f"grid-{grid}-*")]:
                 if (folder / TEMPORARY).is_file():
@@ -258,27 +208,7 @@ class Worker:
         return [folder] if self.ranks == 1 else sorted(folder.glob("processor*"))
 
     def grid(self, point: CampaignPoint, key: str) -> Path:
-        """Make the grid of a point, or find it.
-
-        Parameters
-        ----------
-        point : CampaignPoint
-            The run.
-        key : str
-            Name of the grid.
-
-        Returns
-        -------
-        Path
-            Folder with the grid.
-
-        Raises
-        ------
-        InputError
-            When the case makes no sound solid.
-        RuntimeError
-            When a program failed; the message ends with its words.
-        """
+        """Make the grid of a point, or find it."""
         folder = self.work / f"grid-{key}-{self.ranks}"
         if (folder / "done").is_file():
             if self.keep:
@@ -349,22 +279,7 @@ class Worker:
         return before.name.removeprefix("run-")
 
     def run(self, point: CampaignPoint, keys: tuple[str, str, Settings] | None = None) -> Outcome:
-        """Run one point.
-
-        Parameters
-        ----------
-        point : CampaignPoint
-            The run.
-        keys : tuple or None
-            What :func:`point_key` gave.
-
-        Returns
-        -------
-        Outcome
-            NaN and ``converged`` 0 when the run failed, diverged, kept drifting or does not balance (the note says
-            where it leaks); its history is there, unless a program failed before the first iteration: then the note
-            ends with that program's words.
-        """
+        """Run one point."""
         name, grid, settings = keys or point_key(point)
         begin = time.monotonic()
         values = _columns(point, settings, name)

@@ -594,13 +594,13 @@ RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "far rougher than stated",
-        lambda a: a.roughness > ROUGH,
+        lambda a: a.roughness > ROUGH and a.alone,
         lambda a: a.says(
             "insufficient",
             f"the readings scatter {a.roughness:g} times as much as the recording states; no effect does that",
         ),
         "ROUGH",
-        "declared: end of the prior; hysteresis and resonance show so",
+        "declared: end of the prior; hysteresis and resonance show so, and beside a reference they would be in both",
     ),
     Rule(
         "may as well be absent",

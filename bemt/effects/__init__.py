@@ -23,13 +23,7 @@ __all__ = ["Baking", "Effect", "Parameter", "catalogue", "from_text", "places", 
 
 @lru_cache(maxsize=1)
 def catalogue() -> dict[str, type[Effect]]:
-    """All effects by id, found by scanning this folder.
-
-    Returns
-    -------
-    dict
-        Id to effect class, in the order of the section hooks, then of the ids.
-    """
+    """All effects by id, found by scanning this folder."""
     found: dict[str, type[Effect]] = {}
     for info in pkgutil.iter_modules(__path__):
         if info.name == "base":
@@ -53,36 +47,12 @@ def places() -> dict[str, int]:
 
 
 def standard() -> tuple[Effect, ...]:
-    """The physics that is on unless somebody turns it off.
-
-    Returns
-    -------
-    tuple of Effect
-        Effects with their default parameters, in the order in which they are applied.
-    """
+    """The physics that is on unless somebody turns it off."""
     return tuple(cls() for cls in catalogue().values() if cls.on_by_default)
 
 
 def without(effects: Iterable[Effect], ids: Iterable[str]) -> tuple[Effect, ...]:
-    """Effects less those named.
-
-    Parameters
-    ----------
-    effects : iterable of Effect
-        What is on.
-    ids : iterable of str
-        Ids to take out.
-
-    Returns
-    -------
-    tuple of Effect
-        The rest, in the same order.
-
-    Raises
-    ------
-    ValueError
-        If an id is not in the catalogue.
-    """
+    """Effects less those named."""
     ids = tuple(ids)
     unknown = [i for i in ids if i not in catalogue()]
     if unknown:
@@ -91,26 +61,7 @@ def without(effects: Iterable[Effect], ids: Iterable[str]) -> tuple[Effect, ...]
 
 
 def from_text(text: str) -> Effect:
-    """Effect as a case file writes it: its id, with parameters in brackets where they are not the default.
-
-    Parameters
-    ----------
-    text : str
-        Such as ``"tip_loss"`` or ``"tip_loss(strength=0.9)"``.
-
-    Returns
-    -------
-    Effect
-        The effect.
-
-    Raises
-    ------
-    ValueError
-        With what was got and what would be lawful.
-
-    >>> from_text("tip_loss(strength=0.9)").strength
-    0.9
-    """
+    """Effect as a case file writes it: its id, with parameters in brackets where they are not the default."""
     name, _, rest = text.partition("(")
     cls = catalogue().get(name.strip())
     if cls is None:
@@ -143,21 +94,7 @@ def from_text(text: str) -> Effect:
 
 
 def to_text(effect: Effect) -> str:
-    """Write an effect as :func:`from_text` reads it.
-
-    Parameters
-    ----------
-    effect : Effect
-        Any effect of the catalogue.
-
-    Returns
-    -------
-    str
-        Id, and the parameters that differ from their defaults.
-
-    >>> to_text(from_text("tip_loss(strength=0.9)")), to_text(from_text("swirl()"))
-    ('tip_loss(strength=0.9)', 'swirl')
-    """
+    """Write an effect as :func:`from_text` reads it."""
     given = [
         f"{f.name}={getattr(effect, f.name)!r}"
         for f in dataclasses.fields(effect)  # type: ignore[arg-type]

@@ -68,42 +68,12 @@ class Compressibility(Effect):
         bake.scale_lift(factor)
 
     def lift_divergence(self, thickness: ArrayLike, cl: ArrayLike) -> Array:
-        """Mach number of the largest lift.
-
-        Parameters
-        ----------
-        thickness : float or array
-            Thickness over chord [1].
-        cl : float or array
-            Incompressible lift coefficient [1].
-
-        Returns
-        -------
-        array
-            Mach number, 0.4 to 0.95 [1].
-        """
+        """Mach number of the largest lift. [1]"""
         m_dd = self.kappa - np.asarray(thickness) - 0.1 * np.minimum(np.abs(np.asarray(cl)), 1.2)
         return np.asarray(np.clip(m_dd + _AFTER_DIVERGENCE, 0.4, 0.95))
 
     def growth(self, M: ArrayLike, cl: ArrayLike = 0.0, thickness: ArrayLike = 0.0) -> Array:
-        """Lift ratio cl(M) / cl(0) of subsonic flow by the chosen form.
-
-        Parameters
-        ----------
-        M : float or array
-            Mach number below 1 [1].
-        cl, thickness : float or array
-            Incompressible lift coefficient, thickness over chord [1].
-
-        Returns
-        -------
-        array
-            Ratio; Karman-Tsien is held at 1.5 times Prandtl-Glauert, where the local flow is supersonic [1].
-
-        >>> e = Compressibility(form="karman_tsien")
-        >>> [round(float(e.growth(0.6, cl, t)), 3) for cl, t in ((0.0, 0.0), (0.8, 0.0), (0.8, 0.12))]
-        [1.25, 1.253, 1.332]
-        """
+        """Lift ratio cl(M) / cl(0) of subsonic flow by the chosen form."""
         M = np.asarray(M, dtype=float)
         b = np.sqrt(1.0 - M**2)
         if self.form == "prandtl_glauert":
@@ -115,26 +85,7 @@ class Compressibility(Effect):
         return np.asarray(np.minimum(b / (np.maximum(upper, 0.1 * b) * np.maximum(lower, 0.1 * b)), 1.5 / b))
 
     def factor(self, M: ArrayLike, limit: ArrayLike, growth: ArrayLike | None = None) -> Array:
-        """Lift ratio cl(M) / cl(0).
-
-        Parameters
-        ----------
-        M : float or array
-            Mach number [1].
-        limit : float or array
-            Lift-divergence Mach number, see :meth:`lift_divergence` [1].
-        growth : float or array, optional
-            Ratio at the smaller of M and limit, see :meth:`growth`; Prandtl-Glauert by default [1].
-
-        Returns
-        -------
-        array
-            Ratio [1].
-
-        >>> e = Compressibility()
-        >>> [round(float(e.factor(m, 0.75)), 3) for m in (0.0, 0.6, 0.9, 1.2)]
-        [1.0, 1.25, 0.75, 0.96]
-        """
+        """Lift ratio cl(M) / cl(0)."""
         M, limit = np.asarray(M, dtype=float), np.asarray(limit, dtype=float)
         pg = 1.0 / np.sqrt(1.0 - np.minimum(M, limit) ** 2) if growth is None else np.asarray(growth)
         fall = np.clip((M - limit) / _STALL_SPAN, 0.0, 1.0)

@@ -56,21 +56,7 @@ class DragDivergence(Effect):
         bake.add_drag(drag)
 
     def rise(self, M: ArrayLike, M_dd: ArrayLike) -> Array:
-        """Wave drag coefficient by the chosen law.
-
-        Parameters
-        ----------
-        M, M_dd : array_like
-            Mach number and drag-divergence Mach number [1].
-
-        Returns
-        -------
-        array
-            Drag coefficient [1].
-
-        >>> [round(float(DragDivergence(form=f).rise(0.75, 0.75)), 4) for f in FORMS]
-        [0.0027, 0.002]
-        """
+        """Wave drag coefficient by the chosen law."""
         above = np.asarray(M, dtype=float) - np.asarray(M_dd, dtype=float)
         if self.form == "lock":
             square = np.maximum(above + (0.1 / 80.0) ** (1.0 / 3.0), 0.0) ** 2

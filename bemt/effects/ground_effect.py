@@ -65,21 +65,7 @@ class GroundEffect(Effect):
         flow.V = flow.V - wind - self.strength * self.relief(z) * v * fade
 
     def dammed(self, z_over_R: Array) -> Array:
-        """Share of the wind that the plate takes off at the rotor.
-
-        Parameters
-        ----------
-        z_over_R : (P,) float
-            Distance of the plate over tip radius [1]; NaN: no plate.
-
-        Returns
-        -------
-        (P,) float
-            Share [1].
-
-        >>> GroundEffect(plate_radius_over_R=1.0).dammed(np.array([1e-9, 1.0, 1e9])).round(3).tolist()
-        [1.0, 0.182, 0.0]
-        """
+        """Share of the wind that the plate takes off at the rotor."""
         if self.plate_radius_over_R <= 0.0:
             return np.zeros_like(z_over_R)
         zeta = np.where(np.isnan(z_over_R), np.inf, z_over_R) / self.plate_radius_over_R
@@ -88,21 +74,7 @@ class GroundEffect(Effect):
         return np.asarray(2.0 / np.pi * np.where(np.isinf(zeta), 0.0, share))
 
     def relief(self, z_over_R: Array) -> Array:
-        """Share of the induced speed that the wall takes off.
-
-        Parameters
-        ----------
-        z_over_R : (P,) float
-            Distance of the wall over tip radius [1]; NaN: no wall.
-
-        Returns
-        -------
-        (P,) float
-            Share [1].
-
-        >>> round(float(GroundEffect().relief(np.array(1.0))), 4)
-        0.0923
-        """
+        """Share of the induced speed that the wall takes off."""
         z = np.maximum(np.where(np.isnan(z_over_R), np.inf, z_over_R), 0.5)
         if self.form == "hayden":
             return np.asarray(np.maximum(1.0 - 1.0 / (0.9926 + 0.0379 * (2.0 / z) ** 2), 0.0))

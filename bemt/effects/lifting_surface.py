@@ -14,21 +14,7 @@ RATE = 1.36
 
 
 def slope_ratio(distance: ArrayLike) -> Array:
-    """Lift slope of a section of a flat blade over that of the same section in a lifting line.
-
-    Parameters
-    ----------
-    distance : array_like
-        Distance from the tip over the local chord, in compressible flow times sqrt(1 - M^2) [1].
-
-    Returns
-    -------
-    array
-        Ratio sqrt(1 - exp(-1.36 distance)), 0 at the tip, 1 far from it [1].
-
-    >>> [round(float(slope_ratio(d)), 2) for d in (0.0, 0.1, 0.5, 1.0, 4.0)]
-    [0.0, 0.36, 0.7, 0.86, 1.0]
-    """
+    """Lift slope of a section of a flat blade over that of the same section in a lifting line."""
     return np.asarray(np.sqrt(-np.expm1(-RATE * np.maximum(np.asarray(distance, dtype=float), 0.0))))
 
 

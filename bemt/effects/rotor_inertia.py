@@ -48,18 +48,7 @@ class RotorInertia(Effect):
 
 
 def slope(flow: Flow) -> Array:
-    """Angular acceleration, zero where the points are too far apart to show one.
-
-    Parameters
-    ----------
-    flow : Flow
-        Points with time.
-
-    Returns
-    -------
-    (P,) float
-        dOmega/dt [rad/s2].
-    """
+    """Angular acceleration, zero where the points are too far apart to show one, (P,) [rad/s2]."""
     out = np.zeros_like(flow.rpm)
     for run in flow.runs:
         t, omega = flow.extra["time_s"][run], flow.omega[run]

@@ -65,24 +65,7 @@ class StallDelay(Effect):
         bake.cd[..., some] += self.normal * gain * np.tan(np.clip(a, 0.0, np.radians(60.0)))
 
     def weight(self, chord_over_r: Array, r_over_R: Array, beta: Array) -> Array:
-        """Share of the way to potential-flow lift, before it is held between 0 and 1.
-
-        Parameters
-        ----------
-        chord_over_r, r_over_R : (N,) float
-            Chord over radius, radius over tip radius [1].
-        beta : (N,) float
-            Blade angle [rad].
-
-        Returns
-        -------
-        (N,) float
-            Share [1].
-
-        >>> x = np.array([0.5])
-        >>> [round(float(StallDelay(form=f).weight(x, x, 0.0 * x)[0]), 3) for f in FORMS]
-        [1.1, 0.75, 0.444]
-        """
+        """Share of the way to potential-flow lift, before it is held between 0 and 1."""
         if self.form == "chaviaropoulos":
             return np.asarray(self.coefficient / 3.0 * 2.2 * chord_over_r * np.cos(beta) ** 4)
         if self.form == "snel":

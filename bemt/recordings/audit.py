@@ -366,16 +366,6 @@ def _frame(f: CfdFacts) -> AuditLine:
 def audit(facts: CfdFacts) -> tuple[AuditLine, ...]:
     """Judge the set-up of a CFD run.
 
-    Parameters
-    ----------
-    facts : CfdFacts
-        What is known.
-
-    Returns
-    -------
-    tuple of AuditLine
-        Always the same topics, so that an omission shows.
-
     Examples
     --------
     >>> lines = audit(CfdFacts(M_tip=0.63, domain_over_D=1.0, grids=0, thrust_from="node", pitch_over_D=0.625, CT=0.11))
@@ -387,17 +377,7 @@ def audit(facts: CfdFacts) -> tuple[AuditLine, ...]:
 
 
 def combined(lines: Iterable[AuditLine]) -> tuple[float, float]:
-    """Put the parts together as a root of squares.
-
-    Parameters
-    ----------
-    lines : iterable of AuditLine
-        From :func:`audit`.
-
-    Returns
-    -------
-    tuple of float
-        Standard uncertainty of the thrust, relative, NaN when a part is unknown; and that of the known parts. [1]
+    """Put the parts together as a root of squares. [1]
 
     Examples
     --------
@@ -410,20 +390,7 @@ def combined(lines: Iterable[AuditLine]) -> tuple[float, float]:
 
 
 def audit_document(reference: str, lines: Sequence[AuditLine]) -> dict[str, Any]:
-    """Give an audit as plain values.
-
-    Parameters
-    ----------
-    reference : str
-        Which number was audited.
-    lines : sequence of AuditLine
-        From :func:`audit`.
-
-    Returns
-    -------
-    dict
-        ``reference``, ``lines``, ``u_relative`` and ``u_relative_known``.
-    """
+    """Give an audit as plain values."""
     u, known = combined(lines)
     return {
         "reference": reference,

@@ -45,18 +45,6 @@ _NUMBERS: tuple[tuple[str, str, float], ...] = (
 def facts_from_remark(remark: str, known: CfdFacts | None = None) -> CfdFacts:
     """Read set phrases of a remark in ``references.csv``; other words say nothing.
 
-    Parameters
-    ----------
-    remark : str
-        Such as "MRF, incompressible, domain 5 D, y+ 51, no grid study".
-    known : CfdFacts or None
-        What is known otherwise.
-
-    Returns
-    -------
-    CfdFacts
-        With what the remark states put in.
-
     Examples
     --------
     >>> f = facts_from_remark("MRF; k-omega SST with automatic wall functions; domain 5 D, y+ 51, GCI 2.3 %")
@@ -77,22 +65,7 @@ def facts_from_remark(remark: str, known: CfdFacts | None = None) -> CfdFacts:
 def audit_rows(
     rows: Iterable[Mapping[str, Any]], diameter_m: float, pitch_m: float, ducted: bool
 ) -> list[dict[str, Any]]:
-    """Audit the recorded CFD values of a case by their remarks.
-
-    Parameters
-    ----------
-    rows : iterable of mapping
-        Rows of a sweep; those of source ``cfd`` are taken.
-    diameter_m, pitch_m : float
-        Of the rotor. [m]
-    ducted : bool
-        Whether there is a duct.
-
-    Returns
-    -------
-    list of dict
-        ``reference``, ``lines`` (as :class:`AuditLine`), ``u_relative`` and ``u_relative_known``.
-    """
+    """Audit the recorded CFD values of a case by their remarks."""
     out = []
     for row in rows:
         if row["source"] != "cfd":

@@ -11,20 +11,7 @@ __all__ = ["case_files"]
 
 
 def case_files(s: Settings, title: str = "") -> dict[str, str]:
-    """Write every file of a case, the surfaces in ``constant/triSurface`` aside.
-
-    Parameters
-    ----------
-    s : Settings
-        The case.
-    title : str
-        One line for people.
-
-    Returns
-    -------
-    dict of str to str
-        Path in the case's folder to content; ``Allrun`` is to be made executable.
-    """
+    """Write every file of a case, the surfaces in ``constant/triSurface`` aside."""
     title = title or f"rotor of {2e3 * s.R:g} mm, {s.B} blades, {s.rpm:g} rev/min, {s.V:g} m/s"
     out = {
         "system/blockMeshDict": block_mesh(s), "system/snappyHexMeshDict": snappy(s), "system/topoSetDict": topo_set(s),

@@ -58,18 +58,7 @@ def _levels(s: Settings) -> dict[str, float]:
 
 
 def fields(s: Settings) -> dict[str, str]:
-    """Write the initial fields.
-
-    Parameters
-    ----------
-    s : Settings
-        The case.
-
-    Returns
-    -------
-    dict of str to str
-        Name of the field to its file.
-    """
+    """Write the initial fields."""
     outer, level = _outer(s), _levels(s)
     scalar = "omega" if s.turbulence == "kOmegaSST" else "epsilon"
     names = ["U", "p", "k", scalar, "nut", *(["T", "alphat"] if s.compressible else [])]
@@ -108,18 +97,7 @@ def fields(s: Settings) -> dict[str, str]:
 
 
 def constants(s: Settings) -> dict[str, str]:
-    """Write the files of ``constant``.
-
-    Parameters
-    ----------
-    s : Settings
-        The case.
-
-    Returns
-    -------
-    dict of str to str
-        Name to file.
-    """
+    """Write the files of ``constant``."""
     # Periodic sides too: cyclicAMI does not count as coupled here, and the flow through it would be set to zero
     standing = [*s.walls, *(["side"] if s.domain == "pipe" else []), *(["side1", "side2"] if s.sectors > 1 else [])]
     zone = {"cellZone": "turning", "active": True, "nonRotatingPatches": standing, "origin": vector(0, 0, 0),
@@ -152,18 +130,7 @@ def constants(s: Settings) -> dict[str, str]:
 
 
 def schemes(s: Settings) -> str:
-    """Write ``fvSchemes``: second order for momentum, first for turbulence.
-
-    Parameters
-    ----------
-    s : Settings
-        The case.
-
-    Returns
-    -------
-    str
-        The file.
-    """
+    """Write ``fvSchemes``: second order for momentum, first for turbulence."""
     upwind = "bounded Gauss upwind"
     div: dict[str, Any] = {"default": "none", "div(phi,U)": "bounded Gauss linearUpwind limited",
                            **{f"div(phi,{name})": upwind for name in ("k", "omega", "epsilon")}}  # fmt: skip
@@ -183,18 +150,7 @@ def schemes(s: Settings) -> str:
 
 
 def solution(s: Settings) -> str:
-    """Write ``fvSolution``: SIMPLE with p 0.3 and U 0.6; SIMPLEC diverged.
-
-    Parameters
-    ----------
-    s : Settings
-        The case.
-
-    Returns
-    -------
-    str
-        The file.
-    """
+    """Write ``fvSolution``: SIMPLE with p 0.3 and U 0.6; SIMPLEC diverged."""
     smooth = {"solver": "smoothSolver", "smoother": "symGaussSeidel", "tolerance": 1e-9, "relTol": 0.1}
     simple: dict[str, Any] = {"nNonOrthogonalCorrectors": 0, "consistent": False}
     relax: dict[str, Any] = {"p": 0.3}

@@ -29,18 +29,7 @@ KITES = 1.3
 
 
 def extent(s: Settings) -> tuple[float, float, float]:
-    """Size of the domain.
-
-    Parameters
-    ----------
-    s : Settings
-        The case.
-
-    Returns
-    -------
-    radius, low, high : float
-        Radius, z of the ends. [m]
-    """
+    """Size of the domain. [m]"""
     if s.domain == "pipe":
         return PIPE_RADIUS * s.R, -8 * s.R, 5 * s.R
     size = max([s.R, *([s.duct.radius] if s.duct else []), 0.4 * s.plate_radius])
@@ -69,18 +58,7 @@ def _narrow(s: Settings) -> tuple[int, int]:
 
 
 def block_mesh(s: Settings) -> str:
-    """Write ``blockMeshDict``.
-
-    Parameters
-    ----------
-    s : Settings
-        The case.
-
-    Returns
-    -------
-    str
-        The file.
-    """
+    """Write ``blockMeshDict``."""
     radius, low, high = extent(s)
     angle = 2 * math.pi / s.sectors
     parts = math.ceil(angle / math.radians(120) - 1e-9) if s.sectors > 2 else 4 // s.sectors
@@ -165,17 +143,7 @@ def block_mesh(s: Settings) -> str:
 
 
 def mrf_zone(s: Settings) -> tuple[float, float, float]:
-    """Cylinder that turns with the rotor.
-
-    Parameters
-    ----------
-    s : Settings
-        The case.
-
-    Returns
-    -------
-    radius, low, high : float
-        Radius, z of the ends. [m]
+    """Cylinder that turns with the rotor. [m]
 
     Notes
     -----
@@ -207,16 +175,6 @@ def _written(value: float) -> float:
 
 def lines(s: Settings) -> str:
     """Write lines along the blades' pitch axes and in the duct's wall, from which refinement starts.
-
-    Parameters
-    ----------
-    s : Settings
-        The case.
-
-    Returns
-    -------
-    str
-        An OBJ file of lines.
 
     Notes
     -----
@@ -266,18 +224,7 @@ def _tips(s: Settings) -> dict[str, dict[str, Any]]:
 
 
 def snappy(s: Settings) -> str:
-    """Write ``snappyHexMeshDict``.
-
-    Parameters
-    ----------
-    s : Settings
-        The case.
-
-    Returns
-    -------
-    str
-        The file.
-    """
+    """Write ``snappyHexMeshDict``."""
     R, cell = s.R, s.base_cell
     geometry: dict[str, Any] = {f"{name}.stl": {"type": "triSurfaceMesh", "name": name} for name in s.surfaces}
     thick = 0.12 * R
@@ -339,18 +286,7 @@ def snappy(s: Settings) -> str:
 
 
 def topo_set(s: Settings) -> str:
-    """Write ``topoSetDict``: the cells that turn.
-
-    Parameters
-    ----------
-    s : Settings
-        The case.
-
-    Returns
-    -------
-    str
-        The file.
-    """
+    """Write ``topoSetDict``: the cells that turn."""
     radius, low, high = mrf_zone(s)
     where = {"p1": vector(0, 0, low), "p2": vector(0, 0, high), "radius": radius}
     actions: list[dict[str, Any]] = [
@@ -363,18 +299,7 @@ def topo_set(s: Settings) -> str:
 
 
 def create_patch(s: Settings) -> str:
-    """Write ``createPatchDict``: the periodic sides.
-
-    Parameters
-    ----------
-    s : Settings
-        The case.
-
-    Returns
-    -------
-    str
-        The file; empty of patches for the whole rotor.
-    """
+    """Write ``createPatchDict``: the periodic sides."""
     rows = ""
     pairs = (("side1", "side2", "periodic1"), ("side2", "side1", "periodic2")) if s.sectors > 1 else ()
     for name, other, source in pairs:
@@ -390,18 +315,7 @@ def create_patch(s: Settings) -> str:
 
 
 def set_fields(s: Settings) -> str:
-    """Write ``setFieldsDict``: the run starts with a slipstream behind the disk.
-
-    Parameters
-    ----------
-    s : Settings
-        The case.
-
-    Returns
-    -------
-    str
-        The file.
-    """
+    """Write ``setFieldsDict``: the run starts with a slipstream behind the disk."""
     tail = -5 * s.R if s.plate_z is None else s.plate_z
     front, radius = (0.1 * s.R, 0.85 * s.R) if s.duct is None else (s.duct.high, s.R)
     body = (f"defaultFieldValues\n(\n);\n\nregions\n(\n    cylinderToCell\n    {{\n        p1 {vector(0, 0, tail)};\n"

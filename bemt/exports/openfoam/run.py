@@ -50,18 +50,6 @@ def _balance(s: Settings) -> dict[str, Any]:
 def control(s: Settings, balance: bool = True) -> str:
     """Write ``controlDict``.
 
-    Parameters
-    ----------
-    s : Settings
-        The case.
-    balance : bool
-        Whether what the balance needs is written down too; it changes nothing in the flow.
-
-    Returns
-    -------
-    str
-        The file.
-
     Notes
     -----
     ``forces`` holds blade and hub of the sector that is solved; ``standing`` duct, stator and centre body; ``plate``
@@ -194,20 +182,7 @@ fi
 
 
 def all_run(s: Settings, title: str) -> str:
-    """Write ``Allrun``: bash and OpenFOAM are all that it needs.
-
-    Parameters
-    ----------
-    s : Settings
-        The case.
-    title : str
-        One line for its head.
-
-    Returns
-    -------
-    str
-        The script.
-    """
+    """Write ``Allrun``: bash and OpenFOAM are all that it needs."""
     limit = 100 * s.rho * (s.rpm / 60) ** 2 * (2 * s.R) ** 4
     words = {"TITLE": " ".join(title.split()), "RANKS": s.ranks,
              "SOLVER": "rhoSimpleFoam" if s.compressible else "simpleFoam",

@@ -72,18 +72,6 @@ class Sweep:
 def sector_choice(blades: int, sideslip: float = 0.0) -> str:
     """Choose the smallest periodic part: one blade from three up, else half, all of it in oblique flow.
 
-    Parameters
-    ----------
-    blades : int
-        Number of blades.
-    sideslip : float
-        Angle between shaft and wind. [rad]
-
-    Returns
-    -------
-    str
-        ``half``, ``blade`` or ``full``.
-
     Examples
     --------
     >>> sector_choice(2), sector_choice(3), sector_choice(2, 0.3), sector_choice(1)

@@ -13,16 +13,6 @@ Entries = Mapping[str, Any]
 def vector(*components: float) -> str:
     """Give a vector or a list of numbers in parentheses.
 
-    Parameters
-    ----------
-    *components : float
-        Numbers, in any unit.
-
-    Returns
-    -------
-    str
-        Text.
-
     Examples
     --------
     >>> vector(0, 0, -1.5)
@@ -33,16 +23,6 @@ def vector(*components: float) -> str:
 
 def value_text(value: Any) -> str:
     """Give one value: numbers with nine digits, booleans as words, sequences in parentheses, texts as they are.
-
-    Parameters
-    ----------
-    value : object
-        Number, bool, text or sequence of these.
-
-    Returns
-    -------
-    str
-        Text.
 
     Examples
     --------
@@ -60,18 +40,6 @@ def value_text(value: Any) -> str:
 
 def block(entries: Entries, depth: int = 0) -> str:
     """Give the entries of a dictionary, nested ones in braces.
-
-    Parameters
-    ----------
-    entries : mapping
-        Keyword to value or mapping; a keyword that starts with ``#`` is a directive with its argument.
-    depth : int
-        Depth of indentation.
-
-    Returns
-    -------
-    str
-        Lines.
 
     Examples
     --------
@@ -95,23 +63,6 @@ def block(entries: Entries, depth: int = 0) -> str:
 
 
 def dictionary(name: str, entries: Entries, kind: str = "dictionary", note: str = "") -> str:
-    """Give a whole file with its header.
-
-    Parameters
-    ----------
-    name : str
-        Name of the object.
-    entries : mapping
-        As :func:`block` takes them.
-    kind : str
-        Class of the object.
-    note : str
-        One line of comment.
-
-    Returns
-    -------
-    str
-        The file.
-    """
+    """Give a whole file with its header."""
     head = block({"FoamFile": {"version": "2.0", "format": "ascii", "class": kind, "object": name}})
     return head + (f"// {note}\n" if note else "") + "\n" + block(entries)

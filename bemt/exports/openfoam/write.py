@@ -84,20 +84,6 @@ class Run:
 def check_run(run: Run, names: Mapping[str, str] | None = None, file: str = "") -> list[Fault]:
     """Find the numbers of a run that are not finite or out of range.
 
-    Parameters
-    ----------
-    run : Run
-        What is asked.
-    names : mapping or None
-        Name of each number for the messages; None is that of :class:`Run`.
-    file : str
-        What every fault starts with.
-
-    Returns
-    -------
-    list of Fault
-        All faults.
-
     Examples
     --------
     >>> for fault in check_run(Run(rpm=float("nan"), level=20.0)): print(fault)
@@ -128,29 +114,7 @@ def _tail(rotor: Rotor, duct: Duct, model: MeshModel) -> np.ndarray | None:
 
 
 def settings_of(case: Case, run: Run, options: Options | None = None) -> tuple[Settings, dict[str, Any]]:
-    """Work out the settings of a run.
-
-    Parameters
-    ----------
-    case : Case
-        The case, changes included.
-    run : Run
-        What is asked.
-    options : Options or None
-        How fine the surfaces are.
-
-    Returns
-    -------
-    Settings
-        For :func:`bemt.exports.openfoam.case_files`.
-    dict
-        ``rotor``, ``duct`` as exported, ``tail`` (outline of the centre body, or None), ``notes``.
-
-    Raises
-    ------
-    InputError
-        When the case makes no sound solid or the run cannot be.
-    """
+    """Work out the settings of a run."""
     file = case.path.as_posix()
     faults = check_run(run, file=file)
     if faults:
@@ -212,29 +176,7 @@ def settings_of(case: Case, run: Run, options: Options | None = None) -> tuple[S
 
 
 def write_openfoam(case: Case, out: Path, run: Run, options: Options | None = None) -> dict[str, Any]:
-    """Write a whole case: ``cd OUT && ./Allrun`` runs it.
-
-    Parameters
-    ----------
-    case : Case
-        The case, changes included.
-    out : Path
-        Folder; it is made.
-    run : Run
-        What is asked.
-    options : Options or None
-        How fine the surfaces are.
-
-    Returns
-    -------
-    dict
-        The manifest of the surfaces with a section ``openfoam``.
-
-    Raises
-    ------
-    InputError
-        As :func:`settings_of`; nothing is written then.
-    """
+    """Write a whole case: ``cd OUT && ./Allrun`` runs it."""
     settings, parts = settings_of(case, run, options)
     manifest = export(parts["rotor"], parts["duct"], out, ["openfoam"], name=case.name, options=options)
     if parts["tail"] is not None:
