@@ -105,7 +105,7 @@ def _check_rotor(out: Collector, case: CaseFile) -> None:
     if rotor.hub_diameter_m >= rotor.diameter_m:
         (key,) = _given(rotor, "hub_diameter_mm", "hub_diameter_in", "hub_ratio")
         out.add(f"rotor.{key}", shown(getattr(rotor, key)), f"less than the diameter, {rotor.diameter_m * 1e3:.6g} mm")
-    label = re.search(r"(?<![\d.])(\d{1,2}(?:\.\d+)?)x\d{1,2}(?:\.\d+)?(?![\d.])", case.name)
+    label = re.search(r"(?<![A-Za-z\d.])(\d{1,2}(?:\.\d+)?)x\d{1,2}(?:\.\d+)?(?![\dp.])", case.name)
     told = float(label[1]) * INCH / rotor.diameter_m if label else 0.0
     if abs(told - 2.0) < 0.01:
         got = f"a diameter of {rotor.diameter_m * 1e3:.5g} mm in the case {case.name}"

@@ -79,7 +79,7 @@ class Cascade(Effect):
 
     def variants(self) -> tuple[dict[str, str | float], ...]:
         """Both forms, and the row with the single section's zero-lift angle."""
-        return {"form": "potential"}, {"form": "carter"}, {"zero_lift": 0.0}
+        return {"form": "potential"}, {"form": "carter"}, {"form": "potential", "zero_lift": 0.0}
 
     def section(self, bake: Baking) -> None:
         """Read the tables at the angle that the row leaves of the incidence; add the losses of rows."""
