@@ -224,6 +224,11 @@ class Asked:
         """Probability that the cause is not in the library: two cells with one fault are one cause, too."""
         return self.P[UNKNOWN] + sum(v for k, v in self.P.items() if k.pair and twins(k))
 
+    @property
+    def alone(self) -> bool:
+        """Whether there is no reference."""
+        return bool(self.found.problem.free.all())
+
     @cached_property
     def roughness(self) -> float:
         """Noise over what the recording states, where it does [1]."""
