@@ -75,7 +75,7 @@ class _Top(_Parser):
         for name, modules in groups.items():
             lines += ["", name] if modules else []
             for module in modules:
-                lines += [f"  {module.NAME:<11}{module.HELP}", f"{'':<13}{self.prog} {module.EXAMPLE}"]
+                lines += [f"  {module.NAME:<16}{module.HELP}", f"{'':<18}{self.prog} {module.EXAMPLE}"]
         return "\n".join([*lines, "", f"{self.prog} COMMAND --help lists the options. {CODES}", ""])
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
