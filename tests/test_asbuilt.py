@@ -11,7 +11,7 @@ import pytest
 
 from bemt.__main__ import main
 from bemt.asbuilt.conditioning import condition
-from bemt.asbuilt.fit import Measured, objective
+from bemt.asbuilt.fit import MeasuredRotor, objective
 from bemt.asbuilt.latents import NAMES, Prior
 from bemt.asbuilt.mixture import LEVELS, half_width, inside
 from bemt.asbuilt.model import coefficients
@@ -135,7 +135,7 @@ def test_gradient_of_the_likelihood() -> None:
     at = _sensed(10, 5)
     y = at.f * 1.04
     rotors = [
-        Measured(
+        MeasuredRotor(
             **vars(at), name=f"a{i}", family="a", section="rule", gap_deg=gap, static=at.x == 0.0, y=y * (1 + 0.01 * i)
         )
         for i, gap in enumerate((0.3, 1.8, math.nan))

@@ -14,7 +14,7 @@ from bemt.base.errors import InputError
 from bemt.commands import cli
 from bemt.formula import calibrate, compact, fit, gather, limit, refit, score
 from bemt.formula import points as reading
-from bemt.formula.points import FitPoints, Propeller
+from bemt.formula.points import FitPoints, MeasuredPropeller
 
 INCH = 0.0254
 SIZES = [(8, 4), (8, 6), (9, 4.5), (9, 7), (10, 5), (10, 7), (11, 5.5), (11, 8), (12, 6), (12, 10), (14, 5), (14, 8)]
@@ -25,7 +25,7 @@ def planted(K1=0.31, K2=1.4, spoil=()) -> FitPoints:
     """Points at rest that follow K1/K2 exactly; propellers in `spoil` have thrice the thrust."""
     rows = []
     for i, (d, p) in enumerate(SIZES):
-        made = Propeller(f"{d}x{p}", f"maker{i % 4}", "made", d * INCH, p * INCH, chord_m=0.075 * d * INCH)
+        made = MeasuredPropeller(f"{d}x{p}", f"maker{i % 4}", "made", d * INCH, p * INCH, chord_m=0.075 * d * INCH)
         pd = p / d
         CT = np.full(4, np.pi / 4 * pd**2 * (K1 / pd) ** K2) * (3.0 if i in spoil else 1.0)
         rows.append((made, RPM, np.zeros(4), CT, 0.4 * CT))
@@ -109,7 +109,7 @@ def from_formula(constants: compact.Constants) -> FitPoints:
     for i, (d, p) in enumerate(SIZES * 2):
         D = (d + 0.25 * (i >= len(SIZES))) * INCH
         c = 0.5 * D * constants.chord_R * (D / compact.D_CHORD) ** constants.chord_exponent
-        made = Propeller(f"{i}", f"maker{i % 5}", "made", D, p * INCH, chord_m=c * (1.3 if i % 2 else 0.7))
+        made = MeasuredPropeller(f"{i}", f"maker{i % 5}", "made", D, p * INCH, chord_m=c * (1.3 if i % 2 else 0.7))
         for rpm in RPM:
             for x in (0.0, 0.2, 0.4, 0.6, 0.8):
                 J = np.array([x * p * INCH / D])
@@ -297,7 +297,7 @@ def test_what_the_inputs_carry_is_the_scatter_that_was_planted():
     rows = []
     for i in range(60):
         d, p = rng.uniform(5, 15), rng.uniform(0.4, 1.0)
-        made = Propeller(
+        made = MeasuredPropeller(
             f"{i}", f"maker{i % 6}", "made", d * INCH, p * d * INCH, chord_m=rng.uniform(0.04, 0.1) * d * INCH
         )
         rows.append((made, RPM[::3], np.zeros(2), np.zeros(2), np.full(2, np.nan)))

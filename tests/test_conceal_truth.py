@@ -230,7 +230,7 @@ def test_noise_has_the_covariance_that_the_yardstick_uses() -> None:
     rows = settled([5000.0] * n, [0.0] * n, run=np.repeat([0, 1], n // 2))
     ones = np.linspace(0.5, 1.0, n)
     empty = np.zeros((n, 1))
-    still = truth.Answer(ones, ones, ones > 0, empty, empty, empty, ones, ones, ones, ones, ones)
+    still = truth.TrueAnswer(ones, ones, ones > 0, empty, empty, empty, ones, ones, ones, ones, ones)
     loads = truth_world.TrueLoads(ones, ones, ones, ones, still)
     stand = Stand(noise=0.01, session=0.01, step=1e-6)
     rng = np.random.default_rng(3)

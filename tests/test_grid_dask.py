@@ -24,7 +24,7 @@ from bemt.case import load_case
 from bemt.case.prepare import prepare_case
 from bemt.commands.cli import main
 from bemt.compare.grid import run as grid_module
-from bemt.compare.grid.run import Grid, Solver
+from bemt.compare.grid.run import Grid, GridSolver
 from bemt.compare.sweep import sweep
 
 needs_dask = pytest.mark.skipif(
@@ -174,14 +174,14 @@ def test_a_worker_needs_no_file_of_this_machine(tmp_path: Path) -> None:
     grid = Grid.of(case)
     assert grid is not None
     flat = np.arange(0, grid.size, 331)
-    here = Solver(case, grid).block(flat)
+    here = GridSolver(case, grid).block(flat)
     moved, files = _portable(case)
     shutil.rmtree(tmp_path / "cases")
     shutil.rmtree(tmp_path / "shared")
     for name, data in files.items():
         (tmp_path / "worker" / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / "worker" / name).write_bytes(data)
-    there = Solver(dataclasses.replace(moved, path=tmp_path / "worker" / moved.path), grid).block(flat)
+    there = GridSolver(dataclasses.replace(moved, path=tmp_path / "worker" / moved.path), grid).block(flat)
     for name, column in here.columns.items():
         assert np.array_equal(column, there.columns[name], equal_nan=True), name
 
@@ -229,9 +229,9 @@ def test_states_of_the_air_are_forgotten_and_made_again(tmp_path: Path, monkeypa
     case = load_case(make_case(tmp_path / "cases", extra=extra))
     grid = Grid.of(case)
     assert grid is not None
-    whole = grid_module.solve_chunk(Solver(case, grid), 0)
+    whole = grid_module.solve_chunk(GridSolver(case, grid), 0)
     monkeypatch.setattr(grid_module, "MAX_AIRS", 7)
-    few = Solver(case, grid)
+    few = GridSolver(case, grid)
     assert grid_module.solve_chunk(few, 0) == whole
     assert 0 < len(few._airs) <= 7
 

@@ -28,7 +28,7 @@ STATIC_BINS = 3
 
 
 @dataclass(frozen=True, eq=False)
-class Measured(Sensed):
+class MeasuredRotor(Sensed):
     """One measured propeller beside the solver, P rows of points or bins; ``y`` (2, P) are CT and CP measured [1]."""
 
     name: str
@@ -39,7 +39,7 @@ class Measured(Sensed):
     y: Array
 
 
-def binned(m: Measured) -> Measured:
+def binned(m: MeasuredRotor) -> MeasuredRotor:
     """Averages over bins of (static or J/J0, Re)."""
     key = np.full(m.x.size, -1)
     rest = np.flatnonzero(m.static)
@@ -118,22 +118,22 @@ def _population(theta: Array) -> Population:
     )  # fmt: skip
 
 
-def law(p: Population, m: Measured) -> tuple[Array, Array]:
+def law(p: Population, m: MeasuredRotor) -> tuple[Array, Array]:
     """Mean and covariance of the latent numbers of a propeller that was measured, stations given."""
     prior = p.prior("stations", m.diameter_m, m.gap_deg, m.family, m.section)
     return prior.mean, prior.cov
 
 
-def _noise(p: Population, m: Measured) -> Array:
+def _noise(p: Population, m: MeasuredRotor) -> Array:
     """Covariance without the latent numbers, over the coefficients at rest."""
     both = np.outer(np.abs(m.top).reshape(-1), np.abs(m.top).reshape(-1))
     K = p.rest(m.diameter_m, m.x, m.Re, m.f, m.top)
     return np.asarray((K + np.diag(p.noise_sd(m.f, m.top).reshape(-1) ** 2)) / both)
 
 
-def _gaps(p: Population, rotors: Sequence[Measured]) -> float:
+def _gaps(p: Population, rotors: Sequence[MeasuredRotor]) -> float:
     """Logarithm of the probability of the labels' gaps, families together, Student's t."""
-    families: dict[str, list[Measured]] = {}
+    families: dict[str, list[MeasuredRotor]] = {}
     for m in rotors:
         if math.isfinite(m.gap_deg):
             families.setdefault(m.family, []).append(m)
@@ -147,7 +147,7 @@ def _gaps(p: Population, rotors: Sequence[Measured]) -> float:
     return float(total)
 
 
-def _rotor(m: Measured, mean: Array, cov: Array, noise: Array, bias: Array, s2: Array, t2: Array) -> _Slopes:
+def _rotor(m: MeasuredRotor, mean: Array, cov: Array, noise: Array, bias: Array, s2: Array, t2: Array) -> _Slopes:
     """Log-likelihood of one rotor and its slopes; s2, t2 the squared sizes of latent numbers and rest, all pairs."""
     top = np.abs(m.top).reshape(-1)
     T = np.moveaxis(m.T, 1, 2).reshape(top.size, -1) / top[:, None]
@@ -209,7 +209,7 @@ def _pairs(p: Population) -> tuple[Array, Array]:
     return s2.reshape(-1), t2.reshape(-1)
 
 
-def objective(theta: Array, rotors: Sequence[Measured]) -> tuple[float, Array]:
+def objective(theta: Array, rotors: Sequence[MeasuredRotor]) -> tuple[float, Array]:
     """Negative log-likelihood with priors, and its gradient."""
     p = _population(theta)
     steps = [_population(theta + _STEP * e) for e in np.eye(theta.size)]
@@ -241,9 +241,12 @@ _GAPS = tuple(_NAMES.index(n) for n in ("ln_stations", "ln_label", "ln_family", 
 
 
 def fit(
-    rotors: Sequence[Measured], start: Array | None = None, most: int = 80, provenance: Mapping[str, Any] | None = None
+    rotors: Sequence[MeasuredRotor],
+    start: Array | None = None,
+    most: int = 80,
+    provenance: Mapping[str, Any] | None = None,
 ) -> tuple[Population, Array]:
-    """Fit a population, (Population, (P,)."""
+    """Fit a population; gives it with its parameters, (P,)."""
     from scipy.optimize import minimize
 
     rows = [binned(m) for m in rotors]
@@ -255,7 +258,7 @@ def fit(
     return replace(p, offsets=offsets(p, rows), provenance=dict(provenance or {})), np.asarray(found.x)
 
 
-def offsets(p: Population, rows: Sequence[Measured]) -> dict[str, tuple[float, float]]:
+def offsets(p: Population, rows: Sequence[MeasuredRotor]) -> dict[str, tuple[float, float]]:
     """Offset over the label usual for each family at hand and its standard deviation [deg]: the blades as measured."""
     seen: dict[str, list[tuple[float, float]]] = {}
     i = NAMES.index("angle_deg")
@@ -278,7 +281,7 @@ def offsets(p: Population, rows: Sequence[Measured]) -> dict[str, tuple[float, f
     return out
 
 
-def posterior(p: Population, m: Measured, mean: Array, cov: Array) -> tuple[Array, Array]:
+def posterior(p: Population, m: MeasuredRotor, mean: Array, cov: Array) -> tuple[Array, Array]:
     """Mean and covariance of the latent numbers of a measured rotor, solver taken as linear."""
     top = np.abs(m.top).reshape(-1)
     T = np.moveaxis(m.T, 1, 2).reshape(top.size, -1) / top[:, None]

@@ -16,7 +16,7 @@ from bemt.asbuilt.predict import Prediction, Solve, predict, sense
 
 if TYPE_CHECKING:
     from bemt.air import Air
-    from bemt.asbuilt.reference import Reference
+    from bemt.asbuilt.reference import ReferenceRun
     from bemt.bem.model import Model
     from bemt.dataset import Dataset
 
@@ -49,7 +49,7 @@ def coefficients(model: Model, air: Air) -> Solve:
 
 
 def predict_model(
-    model: Model, prior: Prior, points: Dataset, air: Air, drawn: Array, reference: Reference | None = None
+    model: Model, prior: Prior, points: Dataset, air: Air, drawn: Array, reference: ReferenceRun | None = None
 ) -> Prediction:
     """Expectation and scatter of CT and CP of a rotor as built at points that were solved as ``drawn``."""
     solve = coefficients(model, air)

@@ -12,7 +12,7 @@ from bemt.asbuilt.conditioning import tangents
 from bemt.asbuilt.latents import NAMES, Prior
 from bemt.asbuilt.mixture import LEVELS, half_width
 from bemt.asbuilt.population import WEIGHTS, Population
-from bemt.asbuilt.reference import Reference
+from bemt.asbuilt.reference import ReferenceRun
 
 Array = NDArray[np.float64]
 Solve = Callable[[Array, Array, Array, NDArray[np.intp]], Array]
@@ -109,7 +109,7 @@ def sense(solve: Solve, diameter_m: float, rpm: Array, J: Array, Re: Array, z: A
 
 
 def predict(
-    p: Population, prior: Prior, at: Sensed, mean: Array | None = None, reference: Reference | None = None
+    p: Population, prior: Prior, at: Sensed, mean: Array | None = None, reference: ReferenceRun | None = None
 ) -> Prediction:
     """Expectation and scatter at points."""
     T = at.T

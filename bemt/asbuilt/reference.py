@@ -41,7 +41,7 @@ def noise_of_run(
 
 
 @dataclass(frozen=True, eq=False)
-class Reference:
+class ReferenceRun:
     """Rows of a reference run after conditioning, M points (or bins), CT rows first.
 
     Attributes
@@ -83,20 +83,20 @@ class Reference:
         return shift, slopes, np.sqrt(np.maximum(variance, 0.0)).reshape(2, P)
 
     @staticmethod
-    def given(x: Array, Re: Array, amplitude: Array, noise: Array, y: Array, found: Conditioned) -> Reference:
+    def given(x: Array, Re: Array, amplitude: Array, noise: Array, y: Array, found: Conditioned) -> ReferenceRun:
         """Reference of a conditioned rotor; rows that are not finite tell nothing."""
         good = np.isfinite(y) & np.isfinite(found.f)
         left = np.where(good, y - found.f - found.T @ (found.mean - found.at), 0.0)
         slopes = np.where(good[:, None], found.T, 0.0)
-        return Reference(x, Re, np.where(good, amplitude, 0.0), left, noise, slopes, found.noise_size)
+        return ReferenceRun(x, Re, np.where(good, amplitude, 0.0), left, noise, slopes, found.noise_size)
 
     def document(self) -> dict[str, Any]:
         """Plain values for the file."""
         return {name: np.asarray(getattr(self, name)).tolist() for name in self.__dataclass_fields__}
 
     @staticmethod
-    def of(document: Mapping[str, Any]) -> Reference:
+    def of(document: Mapping[str, Any]) -> ReferenceRun:
         """Reference of a file."""
-        names = [name for name in Reference.__dataclass_fields__ if name != "size"]
+        names = [name for name in ReferenceRun.__dataclass_fields__ if name != "size"]
         arrays = {name: np.array(document[name], dtype=float) for name in names}
-        return Reference(**arrays, size=float(document["size"]))
+        return ReferenceRun(**arrays, size=float(document["size"]))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from bemt.asbuilt.latents import NAMES, AsBuilt, Prior, as_built
 from bemt.asbuilt.population import label_angle_deg, population
-from bemt.asbuilt.reference import Reference
+from bemt.asbuilt.reference import ReferenceRun
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
 from bemt.sections import rule as section_rule
@@ -44,13 +44,13 @@ class CaseAsBuilt:
         Law of the latent numbers, after the reference run if there is one.
     drawn : (K,) float
         Latent numbers with which the case is solved: zero, or what the case states [units of `NAMES`].
-    reference : Reference or None
+    reference : ReferenceRun or None
         The run's rows.
     """
 
     prior: Prior
     drawn: Array
-    reference: Reference | None = None
+    reference: ReferenceRun | None = None
 
 
 def stated_effects(file: CaseFile, folder: Path) -> tuple[AsBuilt, ...]:
@@ -109,14 +109,14 @@ def _posterior(path: Path) -> CaseAsBuilt:
         if document["schema"] != _SCHEMA or document["latents"] != list(NAMES):
             raise ValueError(f"schema {document['schema']!r} of {document['latents']}")
         mean, cov, sizes, weights = (np.array(document[k], float) for k in ("mean", "cov", "sizes", "weights"))
-        reference = Reference.of(document["reference"])
+        reference = ReferenceRun.of(document["reference"])
     except (KeyError, ValueError, TypeError) as error:
         expected = f"a file of {_SCHEMA} with the latent numbers {', '.join(NAMES)}"
         raise InputError(Fault(path.as_posix(), "", str(error), expected, "calibrate-rotor writes it")) from error
     return CaseAsBuilt(Prior(mean, cov, sizes, weights, "reference"), mean, reference)
 
 
-def posterior_document(prior: Prior, reference: Reference, provenance: dict[str, object]) -> dict[str, object]:
+def posterior_document(prior: Prior, reference: ReferenceRun, provenance: dict[str, object]) -> dict[str, object]:
     """Document that `blade.as_built.file` names."""
     return {
         "schema": _SCHEMA, "latents": list(NAMES), "mean": prior.mean.tolist(), "cov": prior.cov.tolist(),

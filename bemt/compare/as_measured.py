@@ -14,7 +14,7 @@ from bemt.asbuilt.latents import NAMES, Prior
 from bemt.asbuilt.model import air_fields, air_of_points, coefficients
 from bemt.asbuilt.population import WEIGHTS, population
 from bemt.asbuilt.predict import zero_thrust
-from bemt.asbuilt.reference import SESSION, Reference, noise_of_run
+from bemt.asbuilt.reference import SESSION, ReferenceRun, noise_of_run
 
 if TYPE_CHECKING:
     from bemt.air import Air
@@ -36,7 +36,7 @@ class AsMeasured:
         What the case and the population said.
     posterior : Prior
         After the run; ``known_from`` is ``reference``.
-    reference : Reference
+    reference : ReferenceRun
         Rows of the run, for predictions near them.
     found : Conditioned
         Steps, convergence, evidence.
@@ -46,7 +46,7 @@ class AsMeasured:
 
     prior: Prior
     posterior: Prior
-    reference: Reference
+    reference: ReferenceRun
     found: Conditioned
     points: int
 
@@ -100,5 +100,5 @@ def as_measured(
     )
     posterior = Prior(found.mean, found.cov, np.ones(1), np.ones(1), "reference")
     amplitude = people.rest_sd(ready.diameter_m, f, top).reshape(-1)
-    reference = Reference.given(x, Re, amplitude, noise, target, found)
+    reference = ReferenceRun.given(x, Re, amplitude, noise, target, found)
     return AsMeasured(prior, posterior, reference, found, int(keep.size))

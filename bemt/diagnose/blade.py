@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from bemt.diagnose.problem import Part, Problem
     from bemt.effects.base import Baking, Effect
 
-__all__ = ["FARTHEST_DEG", "PLAIN", "Blade", "calibrated", "prior_of", "turned"]
+__all__ = ["FARTHEST_DEG", "PLAIN", "CalibratedBlade", "calibrated", "prior_of", "turned"]
 
 Array = NDArray[np.float64]
 
@@ -45,7 +45,7 @@ _SIZES, _WEIGHTS = (0.8, 1.2, 2.2), (0.5, 0.4, 0.1)
 # With more error of the solver than this it would take what belongs to the blade; every reading has this noise more,
 # shares of the largest coefficient, so that no detail of a curve drives the blade anywhere.
 _SMALL, _ROUGH = 0.03, 0.01
-# Blade angles within which a pitch means something [rad].
+# CalibratedBlade angles within which a pitch means something [rad].
 _FLAT, _STEEP = 0.02, 1.45
 # Loads that a blade is sought on.
 _FEWEST = 3
@@ -88,7 +88,7 @@ class AsLabelled(AsBuilt):
 
 
 @dataclass(frozen=True, eq=False)
-class Blade:
+class CalibratedBlade:
     """What is believed of the rotor's blade.
 
     Attributes
@@ -130,7 +130,7 @@ class Blade:
         return self.kind(*map(float, z))
 
 
-PLAIN = Blade(np.zeros(len(NAMES)), np.zeros(len(NAMES)), np.diag(_PLAIN))
+PLAIN = CalibratedBlade(np.zeros(len(NAMES)), np.zeros(len(NAMES)), np.diag(_PLAIN))
 """Blade of the case as it is written."""
 
 
@@ -153,7 +153,7 @@ def turned(part: Part, blade: Effect) -> tuple[Effect, ...]:
     return (*(e for e in part.baseline if e.id != blade.id), blade)
 
 
-def calibrated(problem: Problem, prior: Prior) -> tuple[Blade | None, str, str]:
+def calibrated(problem: Problem, prior: Prior) -> tuple[CalibratedBlade | None, str, str]:
     """Find the blade on the reference readings."""
     rows = ~problem.free
     if np.count_nonzero(problem.channel[rows] < 2) < _FEWEST:
@@ -193,4 +193,4 @@ def calibrated(problem: Problem, prior: Prior) -> tuple[Blade | None, str, str]:
         return None, "no blade fits the reference better than that of the case, which was left as it is", ""
     size = float(np.sqrt(found.weights @ found.sizes**2))
     note = f"blade calibrated on the reference (known from {prior.known_from}): {words or 'as the case has it'}"
-    return Blade(found.mean, prior.mean, size * root, kind), note, ""
+    return CalibratedBlade(found.mean, prior.mean, size * root, kind), note, ""

@@ -14,7 +14,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.bem import model as bem
 from bemt.case.prepare import k1k2_case, prepare_case
 from bemt.diagnose import repeats
-from bemt.diagnose.blade import PLAIN, Blade, calibrated, prior_of, turned
+from bemt.diagnose.blade import PLAIN, CalibratedBlade, calibrated, prior_of, turned
 from bemt.diagnose.noise import in_time
 from bemt.diagnose.nuisance import nuisances
 from bemt.diagnose.record import CHANNELS, Record, concatenated, dense, merged, owners
@@ -170,7 +170,7 @@ class Problem:
         What looks wrong in a recording beside the others, its file named in front.
     scatter : dict of str to float
         Scatter of repeats as a share of the median reading, by channel, where there are enough of them [1].
-    blade : Blade
+    blade : CalibratedBlade
         What is believed of the rotor's blade, and the point of its tangents.
     offset : (M,) float
         Change of the readings from the centre of the blade's prior to that point [units of the readings].
@@ -195,7 +195,7 @@ class Problem:
     notes: tuple[str, ...] = ()
     between: tuple[str, ...] = ()
     scatter: dict[str, float] = field(default_factory=dict)
-    blade: Blade = PLAIN
+    blade: CalibratedBlade = PLAIN
     offset: Array = field(default_factory=lambda: np.zeros(0))
     predicted: dict[Any, Array] = field(default_factory=dict, repr=False)
 
@@ -355,7 +355,7 @@ def _between(problem: Problem, joined: Sequence[Sequence[Record]], records: Sequ
     return tuple(f"{level.name}: {finding}" for level, finding in odd_ones(levels))
 
 
-def assemble(parts: tuple[Part, ...], blade: Blade = PLAIN) -> Problem:
+def assemble(parts: tuple[Part, ...], blade: CalibratedBlade = PLAIN) -> Problem:
     """Stack the readings of parts and add the nuisances."""
     full = [p.predict(p.baseline) for p in parts]
     y = np.concatenate([np.concatenate([p.record.measured[c] for c in p.channels]) for p in parts])

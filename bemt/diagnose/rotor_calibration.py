@@ -31,7 +31,7 @@ _SETTLED = {"model.drag_level", "model.n_crit", "blade.section.thickness", "blad
 def calibrate(
     paths: Sequence[str], case_path: str, say: Callable[[str], None] | None = None
 ) -> tuple[Case, AsMeasured]:
-    """Read recordings and condition the rotor of a case on them, (Case, AsMeasured)."""
+    """Read recordings and condition the rotor of a case on them; gives the new case and what was learnt."""
     (case,) = cases_of([case_path], [], 1)
     records = [load(path, case) for path in paths]
     if say:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.errors import Fault
-from bemt.exports.performance import Band, Loading, Performance, band_of, loading_of, performance_of, solve_points
+from bemt.exports.performance import Loading, Performance, StatedBand, band_of, loading_of, performance_of, solve_points
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -94,14 +94,14 @@ class Job:
         return performance_of(self.case, self.rpm_top)
 
     @cached_property
-    def band(self) -> Band:
+    def band(self) -> StatedBand:
         """Standard uncertainty of the prediction at rest and at half the speed of zero thrust."""
         t = self.performance
         top = float(t.rpm[-1])
         return band_of(self.case, top, (0.0, 0.5 * float(t.J_zero[-1]) * top / 60.0 * t.diameter_m))
 
     @cached_property
-    def band_at_point(self) -> Band:
+    def band_at_point(self) -> StatedBand:
         """Standard uncertainty of the prediction at rest and at the single point."""
         return band_of(self.case, self.rpm_top, (0.0, self.airspeed))
 

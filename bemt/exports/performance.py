@@ -16,7 +16,16 @@ if TYPE_CHECKING:
     from bemt.bem.model import Model
     from bemt.case import Case
 
-__all__ = ["Band", "Loading", "Performance", "PointLoads", "band_of", "loading_of", "performance_of", "solve_points"]
+__all__ = [
+    "StatedBand",
+    "Loading",
+    "Performance",
+    "PointLoads",
+    "band_of",
+    "loading_of",
+    "performance_of",
+    "solve_points",
+]
 
 Array = NDArray[np.float64]
 
@@ -225,7 +234,7 @@ def performance_of(case: Case, rpm_top: float) -> Performance:
 
 
 @dataclass(frozen=True)
-class Band:
+class StatedBand:
     """Relative standard uncertainty of thrust and torque at two airspeeds. [-]"""
 
     thrust: tuple[float, float]
@@ -246,7 +255,7 @@ class Band:
         }
 
 
-def band_of(case: Case, rpm: float, airspeed_m_s: tuple[float, float]) -> Band:
+def band_of(case: Case, rpm: float, airspeed_m_s: tuple[float, float]) -> StatedBand:
     """Spread of the loads over the assumptions of a case, and of rotors as built around what is known of them."""
     from bemt.compare.sweep.case import spread
     from bemt.compare.sweep.model_error import u_model
@@ -267,7 +276,7 @@ def band_of(case: Case, rpm: float, airspeed_m_s: tuple[float, float]) -> Band:
         u = np.sqrt(variance) / np.abs([base.thrust_N, base.torque_Nm])
     origin = f"{len(case.assumptions)} declared assumptions of the case and the spread of rotors as built"
     (T0, T1), (Q0, Q1) = u.tolist()
-    return Band((T0, T1), (Q0, Q1), float(rpm), (float(V[0]), float(V[1])), origin)
+    return StatedBand((T0, T1), (Q0, Q1), float(rpm), (float(V[0]), float(V[1])), origin)
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,7 +22,7 @@ from bemt import readers as importers
 from bemt.air import Air, isa_pressure
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH, ZERO_CELSIUS
-from bemt.formula.points import FitPoints, Propeller, Rows, join
+from bemt.formula.points import FitPoints, MeasuredPropeller, Rows, join
 from bemt.readers import apc, uiuc
 from bemt.readers._imported import Imported
 from bemt.readers._uiuc_names import parse_file_name
@@ -47,7 +47,7 @@ def _from_uiuc(p: uiuc.UiucPropeller) -> tuple[list[Rows], list[str]]:
         chord = float(np.interp(0.75, p.geometry.r_R, p.geometry.c_R)) * p.diameter_m / 2.0
         beta = np.radians(np.interp(0.75, p.geometry.r_R, p.geometry.beta_deg))
         pitch = 0.75 * np.pi * p.diameter_m * float(np.tan(beta))
-    made = Propeller(p.name, p.family, "UIUC", p.diameter_m, p.pitch_in * INCH, p.blades, chord,
+    made = MeasuredPropeller(p.name, p.family, "UIUC", p.diameter_m, p.pitch_in * INCH, p.blades, chord,
                      measured_pitch_m=pitch)  # fmt: skip
     rows: list[Rows] = [(made, s.rpm, np.zeros_like(s.rpm), s.CT, s.CP) for s in p.statics]
     rows += [(made, np.full_like(line.J, line.rpm), line.J, line.CT, line.CP) for line in p.lines]
@@ -60,7 +60,7 @@ def _from_uiuc_table(path: Path, table: Any) -> tuple[list[Rows], list[str]]:
         return [], [f"{path}: the name says no diameter and pitch"]
     name = told.propeller
     assert name.diameter_in is not None and name.pitch_in is not None
-    made = Propeller(name.name, name.family, "UIUC", name.diameter_in * INCH, name.pitch_in * INCH, name.blades)
+    made = MeasuredPropeller(name.name, name.family, "UIUC", name.diameter_in * INCH, name.pitch_in * INCH, name.blades)
     if isinstance(table, uiuc.UiucStatic):
         return [(made, table.rpm, np.zeros_like(table.rpm), table.CT, table.CP)], []
     if isinstance(table, uiuc.UiucLine):
@@ -70,7 +70,7 @@ def _from_uiuc_table(path: Path, table: Any) -> tuple[list[Rows], list[str]]:
 
 def _from_apc(found: apc.ApcPerformance) -> list[Rows]:
     s = found.series
-    made = Propeller(found.name, "APC", "APC, computed", found.diameter_m, found.pitch_m, found.blades)
+    made = MeasuredPropeller(found.name, "APC", "APC, computed", found.diameter_m, found.pitch_m, found.blades)
     return [(made, s["rpm"], s["J"], s["CT"], s["CP"])]
 
 
@@ -86,7 +86,7 @@ def _from_drivecalc(path: Path, found: Imported) -> list[Rows]:
         if not (D > 0 and pitch > 0 and a > 0 and b > 1.0):
             continue
         blades = _BLADES.search(name)
-        made = Propeller(
+        made = MeasuredPropeller(
             f"{name} {D / INCH:.3g}x{pitch / INCH:.3g}", name.split()[0] if name.split() else "?", "Drive Calculator",
             D, pitch, int(blades[1]) if blades else 2, ducted=_DUCTED.search(name) is not None,
         )  # fmt: skip
@@ -169,8 +169,9 @@ def _from_table(path: Path, found: Imported) -> tuple[list[Rows], list[str], lis
         groups.setdefault(key, []).append(i)
     rows: list[Rows] = []
     for (name, d, p, b, c, q, inside), at in groups.items():
-        made = Propeller(str(name), str(name).split("_")[0].split(" ")[0], path.name, float(d), float(p), int(b),
-                         float("nan") if c is None else c, inside, float("nan") if q is None else q)  # fmt: skip
+        maker = str(name).split("_")[0].split(" ")[0]
+        chord, pitch = (float("nan") if v is None else v for v in (c, q))
+        made = MeasuredPropeller(str(name), maker, path.name, float(d), float(p), int(b), chord, inside, pitch)
         rows.append((made, rpm[at], J[at], CT[at], CP[at]))
     return rows, [f"{path}: {bad} rows without a positive diameter, pitch and blade count"] if bad else [], notes
 

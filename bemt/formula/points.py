@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Propeller:
+class MeasuredPropeller:
     """One propeller of the data.
 
     Attributes
@@ -53,21 +53,21 @@ class FitPoints:
 
     Attributes
     ----------
-    propellers : tuple of Propeller
+    propellers : tuple of MeasuredPropeller
         K propellers.
     index : (N,) int
-        Propeller of each point.
+        MeasuredPropeller of each point.
     rpm : (N,) float
         Rotational speed. [rev/min]
     J, CT, CP : (N,) float
-        Propeller convention; CP is NaN where no power was measured. [-]
+        MeasuredPropeller convention; CP is NaN where no power was measured. [-]
     refused : tuple of str
         Files or propellers left out, with the reason.
     notes : tuple of str
         What a user has to know of the sources.
     """
 
-    propellers: tuple[Propeller, ...]
+    propellers: tuple[MeasuredPropeller, ...]
     index: NDArray[np.intp]
     rpm: Array
     J: Array
@@ -121,13 +121,13 @@ class FitPoints:
         return replace(self, **arrays)
 
 
-Rows = tuple[Propeller, Array, Array, Array, Array]
+Rows = tuple[MeasuredPropeller, Array, Array, Array, Array]
 
 
 def join(rows: Sequence[Rows], refused: Sequence[str] = (), notes: Sequence[str] = ()) -> FitPoints:
     """Make points of rows per propeller and run; rows of equal propellers are joined."""
     numbers: dict[str, int] = {}
-    unique: list[Propeller] = []
+    unique: list[MeasuredPropeller] = []
     parts: list[tuple[Array, ...]] = []
     for made, *arrays in rows:
         k = numbers.setdefault(repr(made), len(unique))

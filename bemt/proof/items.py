@@ -13,7 +13,7 @@ from bemt.proof.causes import CAUSES, LISTED, Cause, Change, applied
 from bemt.proof.rigs import Rig, conditions
 from bemt.proof.separation import FREEDOM, Yardstick, freedom, yardstick
 from bemt.proof.stand import Stand, record
-from bemt.proof.truth import Answer
+from bemt.proof.truth import TrueAnswer
 from bemt.proof.truth_ccblade import EXPRESSIBLE
 from bemt.proof.truth_section import SectionPhysics
 from bemt.proof.truth_world import Conditions, TrueLoads, World, loads
@@ -43,7 +43,7 @@ class Bench:
     rows: Conditions
     _signatures: dict[str, dict[str, Array]] = field(default_factory=dict)
     _tangents: list[dict[str, Array]] = field(default_factory=list)
-    _starts: dict[bool, Answer] = field(default_factory=dict)
+    _starts: dict[bool, TrueAnswer] = field(default_factory=dict)
 
     @classmethod
     def draw(cls, rig: Rig, plan: str, rng: np.random.Generator) -> Bench:

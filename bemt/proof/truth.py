@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from bemt.proof import truth_section as ts
 from bemt.proof import truth_wake as tw
 
-__all__ = ["Answer", "TruthRotor", "air", "solve"]
+__all__ = ["TrueAnswer", "TruthRotor", "air", "solve"]
 
 Array = NDArray[np.float64]
 # rounds and largest Newton step, each for the points that the one before left; stalled panels need small steps
@@ -96,7 +96,7 @@ class TruthRotor:
 
 
 @dataclass(frozen=True)
-class Answer:
+class TrueAnswer:
     """Loads of P points.
 
     Attributes
@@ -142,8 +142,8 @@ def air(temperature_C: Array, pressure_Pa: Array) -> tuple[Array, Array, Array]:
 
 def solve(
     rotor: TruthRotor, rpm: Array, airspeed: Array, temperature_C: Array, pressure_Pa: Array,
-    physics: ts.SectionPhysics | None = None, extra: Mapping[str, Any] | None = None, start: Answer | None = None,
-) -> Answer:  # fmt: skip
+    physics: ts.SectionPhysics | None = None, extra: Mapping[str, Any] | None = None, start: TrueAnswer | None = None,
+) -> TrueAnswer:  # fmt: skip
     """Find circulations and loads at P points at once."""
     rpm, airspeed, temperature, pressure = (
         np.atleast_1d(v)
@@ -176,8 +176,8 @@ def _solve(
     extra: Mapping[str, Any],
     rounds: int,
     most: float,
-    start: Answer | None,
-) -> Answer:
+    start: TrueAnswer | None,
+) -> TrueAnswer:
     """Iterate circulations, wake and jet of all points; ``most`` is the largest Newton step."""
     rpm, airspeed, rho, mu, sound = state
     R, B, n = rotor.radius, rotor.blades, rotor.x.size
@@ -263,7 +263,7 @@ def _solve(
     residual = np.maximum(change, drift)
     good = residual < _GOOD
     at75 = int(np.argmin(np.abs(rotor.x - 0.75)))
-    return Answer(
+    return TrueAnswer(
         np.where(good, thrust, np.nan), np.where(good, torque, np.nan), good, gamma, ua, ut, induced,
         jet if ducted else np.full_like(jet, np.nan),
         rho * w[:, at75] * rotor.chord[at75] / mu, omega * R / sound, residual,

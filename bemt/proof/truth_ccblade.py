@@ -60,7 +60,7 @@ class _Foil:
 def solve(
     rotor: truth.TruthRotor, rpm: Array, airspeed: Array, temperature_C: Array, pressure_Pa: Array,
     physics: ts.SectionPhysics, extra: Mapping[str, Any],
-) -> truth.Answer:  # fmt: skip
+) -> truth.TrueAnswer:  # fmt: skip
     """Loads of an open rotor in axial flow."""
     try:
         from wisdem.ccblade.ccblade import CCBlade
@@ -96,7 +96,7 @@ def solve(
     area = np.pi * R**2 * (1.0 - rotor.hub**2)
     # mean induced speed by momentum, for what is derived from it
     induced = -0.5 * airspeed + np.sqrt(0.25 * airspeed**2 + np.maximum(np.nan_to_num(thrust), 0.0) / (2 * rho * area))
-    return truth.Answer(
+    return truth.TrueAnswer(
         thrust, torque, good, none, none, none, induced, np.full(P, np.nan),
         rho * W[:, at75] * rotor.chord[at75] / mu, omega * R / sound, np.where(good, 0.0, np.inf),
     )  # fmt: skip

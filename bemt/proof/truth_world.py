@@ -126,7 +126,7 @@ class TrueLoads:
         On the shaft and the duct together [N], on the shaft [N m]; NaN where the rotor has no solution.
     re75, m_tip : (P,) float
         Reynolds number at 0.75 R; tip Mach number. [-]
-    answer : truth.Answer
+    answer : truth.TrueAnswer
         What the rotor does, to begin another solution from.
     """
 
@@ -134,7 +134,7 @@ class TrueLoads:
     torque: Array
     re75: Array
     m_tip: Array
-    answer: truth.Answer
+    answer: truth.TrueAnswer
 
 
 def _torsion(rotor: truth.TruthRotor) -> Array:
@@ -170,8 +170,8 @@ def _solve(
     pressure: Array,
     world: World,
     extra: dict[str, Any],
-    start: truth.Answer | None,
-) -> truth.Answer:
+    start: truth.TrueAnswer | None,
+) -> truth.TrueAnswer:
     v = c.airspeed * np.cos(np.radians(world.oblique))
     if rotor.code == "ccblade":
         return truth_ccblade.solve(rotor, c.rpm, v, c.temperature_C, pressure, world.section, extra)
@@ -180,7 +180,7 @@ def _solve(
 
 def loads(
     rotor: truth.TruthRotor, world: World, c: Conditions, duct: truth_duct.TruthDuct | None = None,
-    start: truth.Answer | None = None,
+    start: truth.TrueAnswer | None = None,
 ) -> TrueLoads:  # fmt: skip
     """Thrust and torque of every row."""
     pressure = c.pressure_Pa * (1.0 + world.density_error)
@@ -269,8 +269,8 @@ def _round(
     pressure: Array,
     world: World,
     extra: dict[str, Any],
-    start: truth.Answer | None,
-) -> truth.Answer:
+    start: truth.TrueAnswer | None,
+) -> truth.TrueAnswer:
     """Mean of eight azimuths of a blade in a stream across the disk.
 
     Induced speed is skewed by 15 pi / 32 tan(chi / 2) r/R cos psi (D. M. Pitt and D. A. Peters, Vertica 5, 1981).

@@ -31,7 +31,7 @@ from bemt.recordings.points import Found, Point, from_rows, from_samples
 from bemt.recordings.rows import command_of, is_samples
 from bemt.recordings.scatter import Hysteresis, hysteresis, repeats, session
 from bemt.recordings.site_air import AirOfPoints, air_of
-from bemt.recordings.tare import TARED, Zero, from_rest, from_table
+from bemt.recordings.tare import TARED, TareZero, from_rest, from_table
 
 __all__ = ["Reduced", "reduce"]
 
@@ -245,7 +245,7 @@ def _subtract(
         return drift
     top = {name: float(np.nanmax(np.abs(values[name]))) for name in loads}
 
-    def take(zero: Zero, rows: NDArray[np.intp]) -> None:
+    def take(zero: TareZero, rows: NDArray[np.intp]) -> None:
         for name in loads:
             if name in zero.value:
                 values[name] = values[name].copy()

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["TARED", "Rest", "Zero", "from_rest", "from_table"]
+__all__ = ["TARED", "Rest", "TareZero", "from_rest", "from_table"]
 
 Array = NDArray[np.float64]
 TARED = ("thrust_N", "duct_thrust_N", "torque_Nm")
@@ -29,7 +29,7 @@ class Rest:
 
 
 @dataclass(frozen=True, eq=False)
-class Zero:
+class TareZero:
     """What to subtract: (N,) by channel; its uncertainty, shared by the points; drift over the rests; notes."""
 
     value: Mapping[str, Array]
@@ -38,7 +38,7 @@ class Zero:
     notes: tuple[str, ...]
 
 
-def from_rest(when: Array, rests: Sequence[Rest], full_scale: Mapping[str, float]) -> Zero:
+def from_rest(when: Array, rests: Sequence[Rest], full_scale: Mapping[str, float]) -> TareZero:
     """Zero of every point from the stretches at rest, linear in time between them and held outside.
 
     Examples
@@ -75,12 +75,12 @@ def from_rest(when: Array, rests: Sequence[Rest], full_scale: Mapping[str, float
             )
         else:
             notes.append(f"{name}: zero {means[0]:.4g} {unit} at rest{share} subtracted; drift unknown (one rest only)")
-    return Zero(value, u, drift, tuple(notes))
+    return TareZero(value, u, drift, tuple(notes))
 
 
 def from_table(
     rpm: Array, table_rpm: Array, table: Mapping[str, Array], u_table: Mapping[str, Array] | None = None
-) -> Zero:
+) -> TareZero:
     """Zero of every point from a run without propeller, linear in speed and held outside its range."""
     value: dict[str, Array] = {}
     u: dict[str, float] = {}
@@ -102,4 +102,4 @@ def from_table(
         unit = name.rsplit("_", 1)[1]
         beyond = f"; its end value at {outside} points outside {x[0]:.0f} to {x[-1]:.0f} rpm" if outside else ""
         notes.append(f"{name}: tare without propeller, {y.min():.4g} to {y.max():.4g} {unit}, subtracted{beyond}")
-    return Zero(value, u, {}, tuple(notes))
+    return TareZero(value, u, {}, tuple(notes))

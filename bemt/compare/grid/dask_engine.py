@@ -30,7 +30,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.case import Case
 from bemt.case.schema import CaseFile
 from bemt.compare.grid.identity import program_hash
-from bemt.compare.grid.run import Grid, Solved, Solver, solve_chunk
+from bemt.compare.grid.run import Grid, GridSolver, Solved, solve_chunk
 
 __all__ = ["Cluster"]
 
@@ -57,7 +57,7 @@ class _Work:
     proof: str
 
 
-def _proof(solver: Solver) -> str:
+def _proof(solver: GridSolver) -> str:
     """Hash of the exact numbers at points spread over the first geometry."""
     per_geometry = solver.grid.size // solver.grid.geometries
     block = solver.block(np.unique(np.linspace(0, per_geometry - 1, SAMPLE).astype(np.intp)))
@@ -70,7 +70,7 @@ def _proof(solver: Solver) -> str:
 def _packed(case: Case, grid: Grid, form: str | None) -> bytes:
     """Work as bytes, with the numbers of this machine as its proof."""
     with cache.used() as tables:
-        proof = _proof(Solver(case, grid))
+        proof = _proof(GridSolver(case, grid))
     moved, files = _portable(case)
     return pickle.dumps(_Work(moved, grid, files, dict(tables), form, program_hash(), proof))
 
@@ -99,7 +99,7 @@ def _carry(work: bytes) -> bytes:
     return work
 
 
-def _solver(token: str, packed: bytes) -> Solver:
+def _solver(token: str, packed: bytes) -> GridSolver:
     """Solver of this thread of a worker, proved."""
     held = getattr(_own, "held", None)
     if held is not None and held[0] == token:
@@ -117,7 +117,7 @@ def _solver(token: str, packed: bytes) -> Solver:
         (folder / name).write_bytes(data)
     for (kind, key), arrays in work.tables.items():
         cache.cached_arrays(kind, key, lambda arrays=arrays: arrays)  # type: ignore[misc]
-    solver = Solver(replace(work.case, path=folder / work.case.path), work.grid, 1, work.form)
+    solver = GridSolver(replace(work.case, path=folder / work.case.path), work.grid, 1, work.form)
     _check(worker.address, "sample of the grid", _proof(solver), work.proof, "Use workers with the same processor")
     _own.held = (token, solver, folder)
     return solver

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from bemt.air import Air
     from bemt.dataset import Dataset
 
-__all__ = ["CHUNK", "Engine", "Grid", "Solver", "run_grid", "solve_chunk"]
+__all__ = ["CHUNK", "Engine", "Grid", "GridSolver", "run_grid", "solve_chunk"]
 
 CHUNK = 50_000
 """Points per chunk, at most."""
@@ -101,7 +101,7 @@ Engine = Callable[[Case, Grid, Sequence[int], str | None], Generator[Solved]]
 """Solves chunks: (case, grid, numbers, format) to (number, bytes, statistics) in whatever order."""
 
 
-class Solver:
+class GridSolver:
     """Evaluates stretches of a grid; remembers the last geometry and states of the air.
 
     Parameters
@@ -171,7 +171,7 @@ class Solver:
         return Block(axes, columns, np.concatenate([points.converged for points in found]))
 
 
-def solve_chunk(solver: Solver, number: int) -> tuple[bytes, dict[str, Any]]:
+def solve_chunk(solver: GridSolver, number: int) -> tuple[bytes, dict[str, Any]]:
     """Bytes and statistics of one chunk."""
     grid = solver.grid
     block = solver.block(np.arange(number * grid.chunk, min((number + 1) * grid.chunk, grid.size)))
@@ -187,7 +187,7 @@ def _here(threads: int) -> Engine:
     """Engine in this process."""
 
     def solve(case: Case, grid: Grid, numbers: Sequence[int], form: str | None) -> Generator[Solved]:
-        solver = Solver(case, grid, threads, form) if numbers else None
+        solver = GridSolver(case, grid, threads, form) if numbers else None
         for number in numbers:
             assert solver is not None
             yield number, *solve_chunk(solver, number)

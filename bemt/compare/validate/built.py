@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.asbuilt.conditioning import condition
-from bemt.asbuilt.fit import Measured
+from bemt.asbuilt.fit import MeasuredRotor
 from bemt.asbuilt.latents import Prior
 from bemt.asbuilt.mixture import LEVELS, half_width, inside
 from bemt.asbuilt.population import WEIGHTS, Population, label_angle_deg
 from bemt.asbuilt.predict import predict, sense
-from bemt.asbuilt.reference import Reference, noise_of_run
+from bemt.asbuilt.reference import ReferenceRun, noise_of_run
 from bemt.compare.validate.points import Rows, Solver, Stations, counted, rows
 from bemt.sections import rule as section_rule
 
@@ -42,14 +42,14 @@ class Observed:
         For other latent numbers.
     drawn : Rows
         All points, the solver on the stations.
-    record : Measured
+    record : MeasuredRotor
         The points that count, static ones first.
     """
 
     propeller: UiucPropeller
     solve: Solver
     drawn: Rows
-    record: Measured
+    record: MeasuredRotor
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +88,7 @@ def observe(propeller: UiucPropeller, effects: Sequence[Effect], stations: Stati
         gap = math.degrees(beta) - label_angle_deg(propeller.pitch_in, propeller.diameter_in)
     y = np.array([drawn.CT[here], drawn.CP[here]])
     source = section_rule.source(family)
-    record = Measured(**vars(at), name=propeller.name, family=propeller.family, section=source, gap_deg=gap,
+    record = MeasuredRotor(**vars(at), name=propeller.name, family=propeller.family, section=source, gap_deg=gap,
                       static=drawn.static[here], y=y)  # fmt: skip
     return Observed(propeller, solve, drawn, record)
 
@@ -109,7 +109,7 @@ def conditioned(seen: Observed, p: Population, on: str) -> Expected:
         lambda z: seen.solve(z, rpm[run], J[run]).reshape(-1) + bias, prior, y.reshape(-1), noise, p.rest_sizes, WEIGHTS
     )
     amplitude = p.rest_sd(m.diameter_m, f, top).reshape(-1)
-    reference = Reference.given(x, Re, amplitude, noise, y.reshape(-1), found)
+    reference = ReferenceRun.given(x, Re, amplitude, noise, y.reshape(-1), found)
     posterior = Prior(found.mean, found.cov, np.ones(1), np.ones(1), "reference")
     return _lying(seen, p, posterior, reference)
 
@@ -120,7 +120,7 @@ def expect(seen: Observed, p: Population) -> Expected:
     return _lying(seen, p, p.prior("stations", m.diameter_m, m.gap_deg, m.family, m.section))
 
 
-def _lying(seen: Observed, p: Population, prior: Prior, reference: Reference | None = None) -> Expected:
+def _lying(seen: Observed, p: Population, prior: Prior, reference: ReferenceRun | None = None) -> Expected:
     """How the points lie in a prediction."""
     m = seen.record
     now = rows(seen.propeller, seen.solve, prior.mean)
