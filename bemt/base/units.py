@@ -164,7 +164,7 @@ def from_si(value: Numeric, unit: str) -> Numeric:
 
 
 def convert(value: Numeric, unit: str, to: str) -> Numeric:
-    """Convert between two units of the same dimension. [to]
+    """Convert between two units of the same dimension.
 
     Examples
     --------

@@ -94,7 +94,7 @@ def matches(stated: str, value: float) -> str | None:
 
 
 def k1k2_variants() -> list[tuple[str, tuple[float, ...]]]:
-    """Search for the rounding of inputs that gives all four printed K1/K2 values. [kgf]
+    """Search for the rounding of inputs that gives all four printed K1/K2 values.
 
     Notes
     -----

@@ -170,8 +170,8 @@ def _from_table(path: Path, found: Imported) -> tuple[list[Rows], list[str], lis
     rows: list[Rows] = []
     for (name, d, p, b, c, q, inside), at in groups.items():
         maker = str(name).split("_")[0].split(" ")[0]
-        chord, pitch = (float("nan") if v is None else v for v in (c, q))
-        made = MeasuredPropeller(str(name), maker, path.name, float(d), float(p), int(b), chord, inside, pitch)
+        own_chord, own_pitch = (float("nan") if v is None else v for v in (c, q))
+        made = MeasuredPropeller(str(name), maker, path.name, float(d), float(p), int(b), own_chord, inside, own_pitch)
         rows.append((made, rpm[at], J[at], CT[at], CP[at]))
     return rows, [f"{path}: {bad} rows without a positive diameter, pitch and blade count"] if bad else [], notes
 
