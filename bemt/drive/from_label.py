@@ -122,6 +122,9 @@ def _check(
     faults = [Fault("", name, f"{value:g}", f"{low:g} to {high:g} {unit}", hint)
               for name, value, low, high, unit, hint in rows
               if value is not None and not low <= value <= high]  # fmt: skip
+    for name, count in (("--cells", cells), ("--rotors", rotors)):
+        if math.isfinite(count) and count != int(count):
+            faults.append(Fault("", name, f"{count:g}", "a whole number"))
     if faults:
         raise InputError(faults)
 
