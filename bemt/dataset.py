@@ -419,7 +419,8 @@ class Dataset:
         wanted = [y] if isinstance(y, str) else wanted
         unknown = [key for key in (x, *wanted) if key not in self]
         if unknown:
-            raise InputError(Fault(self.name, ", ".join(unknown), "no such channel", f"one of {', '.join(self.values)}"))
+            known = ", ".join(self.values)
+            raise InputError(Fault(self.name, ", ".join(unknown), "no such channel", f"one of {known}"))
         ax = plt.subplots(layout="constrained")[1] if ax is None else ax
         speeds = np.unique(self["rpm"]) if "rpm" in self and x != "rpm" else np.array([np.nan])
         for channel in wanted:

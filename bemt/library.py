@@ -200,7 +200,8 @@ class Propeller:
         """
         import tomlkit
 
-        if not isinstance(changes, Mapping):
+        given: object = changes
+        if not isinstance(given, Mapping):
             expected = "a mapping of dotted keys to values"
             raise InputError(Fault("", "changes", repr(changes), expected, 'As in {"blade.pitch_in": 6}'))
         written = dict(self.case.replaced(changes).written)
@@ -355,7 +356,8 @@ def propeller(
         faults.append(Fault("", "label, stations", got, "one of them", 'As in propeller("10x5")'))
     if stations is not None and diameter_m is None:
         faults.append(Fault("", "diameter_m", "nothing", "the diameter [m] beside stations"))
-    if label is not None and not isinstance(label, str):
+    name: object = label
+    if name is not None and not isinstance(name, str):
         faults.append(Fault("", "label", repr(label), "a text: diameter x pitch in inches", 'As in propeller("10x5")'))
     if blades is not None and not (isinstance(blades, (int, np.integer)) and blades >= 1):
         faults.append(Fault("", "blades", repr(blades), "a whole number of 1 or more"))
@@ -572,7 +574,8 @@ def _propeller(given: Propeller | str | os.PathLike[str]) -> Propeller:
     """Propeller as it is, of a case, or of a label."""
     if isinstance(given, Propeller):
         return given
-    if not isinstance(given, (str, os.PathLike)):
+    what: object = given
+    if not isinstance(what, (str, os.PathLike)):
         expected = "a Propeller, a case or a label"
         raise InputError(Fault("", "propeller", f"{type(given).__name__} {given!r:.40}", expected))
     text = os.fspath(given)
@@ -656,10 +659,11 @@ def compare(
     """
     from bemt.diagnose import contrast
 
-    known = contrast.label_diameter(None) if diameter_m is None else float(_numbers("diameter_m", diameter_m))
-    if diameter_m is not None and not 0.01 <= known <= 10.0:
-        raise InputError(Fault("", "diameter_m", f"{known:g}", "0.01 to 10 m", "Is that in mm? Divide by 1000"))
-    return contrast.compare(_path("a", a), _path("b", b), None if case is None else _path("case", case), diameter_m=known)
+    diameter = contrast.label_diameter(None) if diameter_m is None else float(_numbers("diameter_m", diameter_m))
+    if diameter_m is not None and not 0.01 <= diameter_m <= 10.0:
+        raise InputError(Fault("", "diameter_m", f"{diameter_m:g}", "0.01 to 10 m", "Is that in mm? Divide by 1000"))
+    known = None if case is None else _path("case", case)
+    return contrast.compare(_path("a", a), _path("b", b), known, diameter_m=diameter)
 
 
 def validate(folder: str | os.PathLike[str]) -> dict[str, Any]:

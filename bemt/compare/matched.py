@@ -297,7 +297,7 @@ def covariance(c: MatchedChannel, s: Scatter) -> Array:
 
 
 def _level(c: MatchedChannel) -> float:
-    """Prior standard deviation of ln B/A: wider where the levels differ by more, or a large ratio would pass for scatter."""
+    """Prior standard deviation of ln B/A: wider where levels are far apart, or a large ratio would pass for scatter."""
     return max(0.3, 0.5 * abs(float(c.y[c.second].mean() - c.y[~c.second].mean())))
 
 

@@ -18,14 +18,15 @@ from bemt.compare.matched import MatchedChannel, Scatter
 from bemt.compare.scaling import Judgement, judge, law, weigh
 from bemt.compare.stand_run import StandRun
 
-__all__ = ["SCHEMA", "RunChange", "changed", "document"]
+__all__ = ["OTHER_STAND", "SCHEMA", "RunChange", "changed", "document"]
 
 SCHEMA = "bemt.comparison/1"
 _TOLD_DENSITY = 0.012
 _NO_TALK = Judgement("insufficient", (), {}, {}, "not recorded in both")
 _MOVED, _WIDE = 2.5, 1.4
 # Thrust of a propeller of 2.3 times the diameter at one speed: no stand takes both. [1]
-_OTHER_STAND = 30.0
+_FAR_OFF = 30.0
+OTHER_STAND = "no change on one stand moves every load by so much: look at the units and the speeds of both files"
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,10 +131,9 @@ def _far_apart(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> Judg
 def _far_off(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> Judgement:
     """No answer where every load is so many times the other that one stand cannot have measured both."""
     loads = [abs(math.log(r["ratio"])) for r in ratios.values() if r["kind"] in fits.LOADS]
-    if min(loads) < math.log(_OTHER_STAND) or said.effects in (("rpm_scale",), ("unit_slip",)):
+    if min(loads) < math.log(_FAR_OFF) or said.effects in (("rpm_scale",), ("unit_slip",)):
         return said
-    why = "no change on one stand moves every load by so much: look at the units and the speeds of both files"
-    return Judgement("insufficient", (), said.probability, said.size, why)
+    return Judgement("insufficient", (), said.probability, said.size, OTHER_STAND)
 
 
 def _speeds(ratios: Mapping[str, Mapping[str, Any]]) -> tuple[float, float] | None:

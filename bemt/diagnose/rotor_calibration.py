@@ -16,10 +16,10 @@ from bemt.asbuilt.latents import NAMES, UNITS
 from bemt.asbuilt.model import air_fields, air_of_points
 from bemt.asbuilt.reference import SESSION
 from bemt.base.errors import Fault, InputError
-from bemt.base.tables import json_text, plain, write_atomic
+from bemt.base.tables import json_text, number_text, plain, write_atomic
 from bemt.case import Case
-from bemt.case.prepare import prepare_case
 from bemt.case.as_built import MOVED, posterior_document
+from bemt.case.prepare import prepare_case
 from bemt.compare.as_measured import AsMeasured, as_measured
 from bemt.diagnose.another_rotor import FACTOR
 from bemt.diagnose.improve import beside, elsewhere
@@ -71,9 +71,10 @@ def _this_rotor(case: Case, paths: Sequence[str], y: Sequence[Any], rpm: Any, V:
         if size > 0.0:
             ratios[word] = float(np.abs(measured[both]).sum()) / size
     if ratios and not 1.0 / FACTOR < next(iter(ratios.values())) < FACTOR:
-        got = " and ".join(f"{word} {ratio:.3g} times" for word, ratio in ratios.items()) + " what the case gives"
+        told = " and ".join(f"{word} {number_text(ratio, 3)} times" for word, ratio in ratios.items())
         hint = "Look at units, diameter, pitch and speed; `bemt diagnose` ranks what explains it"
-        raise InputError(Fault(", ".join(paths), "", got, f"loads of this rotor, within a factor of {FACTOR:g}", hint))
+        raise InputError(Fault(", ".join(paths), "", f"{told} what the case gives",
+                               f"loads of this rotor, within a factor of {FACTOR:g}", hint))  # fmt: skip
 
 
 def document(case: Case, found: AsMeasured, paths: Sequence[str]) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from bemt.base.errors import Fault, InputError
+from bemt.base.tables import number_text
 from bemt.base.units import INCH, KGF
 from bemt.case import Case
 from bemt.compare.sweep.case import spread
@@ -246,7 +247,7 @@ def _shown(band: Band, unit: str, scale: float = 1.0) -> str:
     if not math.isfinite(value):
         return "-"
     if u == 0.0:
-        return f"{value:.4g} {unit}"
+        return f"{number_text(value)} {unit}"
     digits = max(0, 1 - math.floor(math.log10(u)))
     digits = min(digits, 2)
     if u >= 100.0:

@@ -12,9 +12,6 @@ CHANNELS = ("thrust_N", "torque_Nm", "rpm", "airspeed_m_s", "density_kg_m3")
 _G, _LB, _INCH = 9.80665, 0.45359237, 0.0254
 _LBF, _OZF = _G * _LB, _G * _LB / 16.0
 
-# Air as in air_density; a medium above the other number is a liquid. [kg/m3]
-_AIR, _WATER = (0.66, 1.42), 100.0
-
 # What one SI unit is in each of the units that get mixed up with it; the slip may go either way.
 # A ratio nearer to 1 than this (natural logarithm) is a gain, not a slip.
 _LARGE = 0.25
@@ -76,13 +73,6 @@ class UnitSlip(Effect):
         """Show the slip in what was measured."""
         if self.channel in ("thrust_N", "torque_Nm"):
             reading.values[self.channel] = reading.values[self.channel] * self.factor
-
-    def plausible(self, flow: Flow) -> bool:
-        """Whether the true density, recorded value over the factor, is one of air; of water nothing is said."""
-        if self.channel != "density_kg_m3" or flow.rho.min() > _WATER:
-            return True
-        rho = flow.rho / self.factor
-        return bool(rho.min() > _AIR[0] and rho.max() < _AIR[1])
 
     def variants(self) -> tuple[dict[str, str | float], ...]:
         """Every pair of units of every channel, both ways, and the sign of what a stand may count the other way."""
