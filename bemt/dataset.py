@@ -180,6 +180,8 @@ class Dataset:
 
     def __getitem__(self, channel: str) -> Array:
         """Give one channel, (N,), read-only."""
+        if channel not in self.values:
+            raise KeyError(f"no channel {channel!r}; there are {', '.join(self.values)}")
         channel_values: Array = self.values[channel]
         return channel_values
 

@@ -61,6 +61,11 @@ class Propeller:
     case: Case
     text: str
 
+    def __repr__(self) -> str:
+        """Say what it is in a line."""
+        kind = "fan" if self.case.ducted else "propeller"
+        return f"<{kind} {self.name}: {self.diameter_m:.4g} m, {self.blades} blades, {len(self.unknowns)} unknowns>"
+
     @property
     def name(self) -> str:
         """Name of its case."""
@@ -455,6 +460,10 @@ class Answer:
     diagnosis: Diagnosis
     propeller: Propeller
 
+    def __repr__(self) -> str:
+        """Say the verdict in a line."""
+        return f"<answer on {self.propeller.name}: {' '.join((self.verdict, ', '.join(self.effects))).strip()}>"
+
     @property
     def verdict(self) -> str:
         """One of none, named, class, sensor, unknown, insufficient."""
@@ -505,9 +514,13 @@ class Answer:
         list of Path
             The files.
         """
+        from bemt.base.errors import system_fault
         from bemt.diagnose import figures
 
-        return figures.draw(self.diagnosis, Path(folder))
+        try:
+            return figures.draw(self.diagnosis, Path(_path("folder", folder)))
+        except OSError as error:
+            raise InputError(system_fault(error)) from error
 
 
 def diagnose(

@@ -142,6 +142,12 @@ def test_what_is_handed_over_wrongly_is_named_and_never_a_traceback(call: object
         call(bemt.propeller("10x5"))  # type: ignore[operator]
 
 
+def test_what_a_notebook_shows_is_a_line() -> None:
+    p = bemt.propeller("10x5")
+    shown = [repr(x) for x in (p, p.solve(6000, bands=False), bemt.drive(p, kv=900, cells=3))]
+    assert all(len(words) < 200 and "10x5" in words for words in shown), shown
+
+
 def test_a_case_cannot_be_written_into_a_file(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("", encoding="utf-8")
     with pytest.raises(bemt.InputError, match="file"):

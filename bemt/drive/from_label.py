@@ -92,6 +92,11 @@ class DriveEstimate:
     unknowns: Mapping[str, str]
     notes: tuple[str, ...]
 
+    def __repr__(self) -> str:
+        """Say what is known in a line."""
+        given, thrust = self.given, self.full["thrust_N"]
+        return f"<drive of {self.label}: {given['kv_rpm_V']:g} rev/min/V, {given['cells']}S, {_shown(thrust, 'N')}>"
+
     @property
     def text(self) -> str:
         """The estimate for a terminal."""
