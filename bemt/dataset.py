@@ -180,12 +180,18 @@ class Dataset:
 
     def __getitem__(self, channel: str) -> Array:
         """Give one channel, (N,), read-only."""
+        if channel not in self.values:
+            raise KeyError(f"no channel {channel!r}; there are {', '.join(self.values)}")
         channel_values: Array = self.values[channel]
         return channel_values
 
     def __contains__(self, channel: object) -> bool:
         """Tell whether a channel is there."""
         return channel in self.values
+
+    def __repr__(self) -> str:
+        """Say what it holds in a line; to_pandas() shows the numbers."""
+        return f"Dataset({self.kind!r}, {self.name!r}, {len(self)} points: {', '.join(self.values)})"
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle as plain dictionaries (worker processes send series back)."""
@@ -412,6 +418,11 @@ class Dataset:
         ways = [k for k in ("J", "airspeed_m_s", "rpm") if k in self and np.unique(self[k].round(9)).size > 1]
         x = x or (ways[0] if ways else "rpm")
         wanted = list(y) or [k for k in ("CT", "CP") if k in self and x == "J"] or ["thrust_N"]
+        wanted = [y] if isinstance(y, str) else wanted
+        unknown = [key for key in (x, *wanted) if key not in self]
+        if unknown:
+            known = ", ".join(self.values)
+            raise InputError(Fault(self.name, ", ".join(unknown), "no such channel", f"one of {known}"))
         ax = plt.subplots(layout="constrained")[1] if ax is None else ax
         speeds = np.unique(self["rpm"]) if "rpm" in self and x != "rpm" else np.array([np.nan])
         for channel in wanted:

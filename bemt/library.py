@@ -36,6 +36,7 @@ CHANNELS = (
     "rpm", "airspeed_m_s", "density_kg_m3", "J", "thrust_N", "torque_Nm", "power_W", "CT", "CP", "eta", "M_tip",
 )  # fmt: skip
 DUCTED = ("rotor_thrust_N", "duct_thrust_N", "stator_thrust_N", "exhaust_speed_m_s", "duct_share")
+RPM_MAX, AIRSPEED_MAX = 300000.0, 300.0  # as in a case file [rev/min], [m/s]
 BANDED = ("thrust_N", "torque_Nm", "power_W", "CT", "CP", "eta")
 
 
@@ -59,6 +60,11 @@ class Propeller:
 
     case: Case
     text: str
+
+    def __repr__(self) -> str:
+        """Say what it is in a line."""
+        kind = "fan" if self.case.ducted else "propeller"
+        return f"<{kind} {self.name}: {self.diameter_m:.4g} m, {self.blades} blades, {len(self.unknowns)} unknowns>"
 
     @property
     def name(self) -> str:
@@ -116,7 +122,8 @@ class Propeller:
         (array([ 4.7, 10.8]), array([ 45., 152.]))
         """
         n, V = self._conditions(rpm, airspeed_m_s, J)
-        air = self.case.air(None if density_kg_m3 is None else {"air.density_kg_m3": float(density_kg_m3)})
+        density = None if density_kg_m3 is None else float(_numbers("density_kg_m3", density_kg_m3))
+        air = self.case.air(None if density is None else {"air.density_kg_m3": density})
         values, flags, u_model = _solved(self.case, n, V, air, bands)
         variance = {key: np.zeros(n.size) for key in BANDED}
         if bands:
@@ -166,9 +173,10 @@ class Propeller:
         (True, array([0.09, 0.06, 0.01]))
         """
         given = J is not None or airspeed_m_s is not None
-        n = np.atleast_1d(np.asarray(self.case.rpm if rpm is None else rpm, dtype=float))
-        x = np.atleast_1d(np.asarray(np.linspace(0.0, 0.9, 19) if not given else J if J is not None else airspeed_m_s,
-                                     dtype=float))  # fmt: skip
+        n = np.atleast_1d(_numbers("rpm", self.case.rpm if rpm is None else rpm))
+        x = np.linspace(0.0, 0.9, 19)
+        if given:
+            x = np.atleast_1d(_numbers("airspeed_m_s", airspeed_m_s) if J is None else _numbers("J", J))
         a, b = (v.ravel() for v in np.meshgrid(n, x, indexing="ij"))
         speed: dict[str, Any] = {"airspeed_m_s": b} if airspeed_m_s is not None and J is None else {"J": b}
         if J is not None and airspeed_m_s is not None:
@@ -197,6 +205,10 @@ class Propeller:
         """
         import tomlkit
 
+        given: object = changes
+        if not isinstance(given, Mapping):
+            expected = "a mapping of dotted keys to values"
+            raise InputError(Fault("", "changes", repr(changes), expected, 'As in {"blade.pitch_in": 6}'))
         written = dict(self.case.replaced(changes).written)
         unknowns = [item for item in written.pop("assumptions", []) if item["key"] not in changes]
         text = tomlkit.dumps(written | ({"assumptions": unknowns} if unknowns else {}))
@@ -215,32 +227,74 @@ class Propeller:
         Path
             The file.
         """
+        from bemt.base.errors import system_fault
         from bemt.base.tables import write_atomic
 
-        file = Path(folder) / "case.toml"
+        file = Path(_path("folder", folder)) / "case.toml"
         if file.exists():
             raise InputError(Fault(file.as_posix(), "", "a file that is there", "a new folder"))
-        write_atomic(file, self.text)
+        try:
+            write_atomic(file, self.text)
+        except OSError as error:
+            raise InputError(system_fault(error)) from error
         return file
 
     def _conditions(self, rpm: Any, airspeed_m_s: Any, J: Any) -> tuple[Array, Array]:
         faults = []
         if J is not None and airspeed_m_s is not None:
             faults.append(Fault("", "J, airspeed_m_s", "both", "one of them"))
-        for name, value in (("rpm", rpm), ("airspeed_m_s", airspeed_m_s), ("J", J)):
-            if value is not None and not np.all(np.isfinite(np.asarray(value, dtype=float))):
-                faults.append(Fault("", name, "a number that is not finite", "finite numbers"))
-        if rpm is not None and np.any(np.asarray(rpm, dtype=float) <= 0.0):
-            faults.append(Fault("", "rpm", f"{np.min(rpm):g}", "speeds above 0 rev/min", "Drop the sign?"))
+        given = {"rpm": rpm, "airspeed_m_s": airspeed_m_s, "J": J}
+        numbers: dict[str, Array] = {}
+        for name, value in given.items():
+            if value is None:
+                continue
+            try:
+                numbers[name] = _numbers(name, value)
+            except InputError as error:
+                faults += error.faults
+        if "rpm" in numbers and np.any(numbers["rpm"] <= 0.0):
+            faults.append(Fault("", "rpm", f"{np.min(numbers['rpm']):g}", "speeds above 0 rev/min", "Drop the sign?"))
+        elif "rpm" in numbers and np.any(numbers["rpm"] > RPM_MAX):
+            faults.append(Fault("", "rpm", f"{np.max(numbers['rpm']):g}", f"up to {RPM_MAX:g} rev/min"))
+        fast = np.max(np.abs(numbers.get("airspeed_m_s", np.zeros(1))))
+        if fast > AIRSPEED_MAX:
+            hint = "km/h? Divide by 3.6"
+            faults.append(Fault("", "airspeed_m_s", f"{fast:g}", f"up to {AIRSPEED_MAX:g} m/s", hint))
+        shapes = {name: value.shape for name, value in numbers.items()}
+        try:
+            np.broadcast_shapes(*shapes.values())
+        except ValueError:
+            got = ", ".join(f"{value.size} of {name}" for name, value in numbers.items())
+            faults.append(Fault("", ", ".join(shapes), got, "as many of each, or one", "curve() takes every pair"))
         if faults:
             raise InputError(faults)
-        n = np.asarray(self.case.rpm if rpm is None else rpm, dtype=float)
+        n = numbers.get("rpm", np.asarray(self.case.rpm, dtype=float))
         if J is not None:
-            V = np.asarray(J, dtype=float) * n / 60.0 * self.diameter_m
+            V = numbers["J"] * n / 60.0 * self.diameter_m
         else:
-            V = np.asarray(self.case.airspeed_m_s if airspeed_m_s is None else airspeed_m_s, dtype=float)
+            V = numbers.get("airspeed_m_s", np.asarray(self.case.airspeed_m_s, dtype=float))
         n, V = np.broadcast_arrays(n, V)
         return np.atleast_1d(n).astype(float).ravel(), np.atleast_1d(V).astype(float).ravel()
+
+
+def _numbers(name: str, value: Any) -> Array:
+    """Finite numbers, one or more, of what somebody hands over."""
+    try:
+        found = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(Fault("", name, repr(value), "a number, or several")) from None
+    if not found.size:
+        raise InputError(Fault("", name, "no number", "one or more"))
+    if not np.all(np.isfinite(found)):
+        raise InputError(Fault("", name, "a number that is not finite", "finite numbers"))
+    return found
+
+
+def _path(name: str, value: Any) -> str:
+    """Path as text; anything else is refused."""
+    if isinstance(value, (str, os.PathLike)) and os.fspath(value):
+        return os.fspath(value)
+    raise InputError(Fault("", name, f"{type(value).__name__} {value!r:.40}", "the path of a file or folder"))
 
 
 def _solved(
@@ -307,6 +361,16 @@ def propeller(
         faults.append(Fault("", "label, stations", got, "one of them", 'As in propeller("10x5")'))
     if stations is not None and diameter_m is None:
         faults.append(Fault("", "diameter_m", "nothing", "the diameter [m] beside stations"))
+    name: object = label
+    if name is not None and not isinstance(name, str):
+        faults.append(Fault("", "label", repr(label), "a text: diameter x pitch in inches", 'As in propeller("10x5")'))
+    if blades is not None and not (isinstance(blades, (int, np.integer)) and blades >= 1):
+        faults.append(Fault("", "blades", repr(blades), "a whole number of 1 or more"))
+    if stations is not None:
+        stations = _path("stations", stations)
+    rpm = None if rpm is None else float(_numbers("rpm", rpm))
+    airspeed_m_s = float(_numbers("airspeed_m_s", airspeed_m_s))
+    diameter_m = None if diameter_m is None else float(_numbers("diameter_m", diameter_m))
     if diameter_m is not None and not 0.01 <= diameter_m <= 10.0:
         hint = "Is that in mm? Divide by 1000" if 10.0 < diameter_m <= 1e4 else ""
         faults.append(Fault("", "diameter_m", f"{diameter_m:g}", "0.01 to 10 m", hint))
@@ -348,7 +412,7 @@ def load(path: str | os.PathLike[str]) -> Propeller:
         ...
     bemt.base.errors.InputError: no/such/folder: got nothing there; expected ...
     """
-    files = find_cases([os.fspath(path)])
+    files = find_cases([_path("path", path)])
     if len(files) != 1:
         raise InputError(Fault(os.fspath(path), "", f"{len(files)} cases", "one case", "Name its folder"))
     case = load_case(files[0])
@@ -378,7 +442,7 @@ def read(path: str | os.PathLike[str], format: str | None = None) -> Dataset:  #
     """
     from bemt.recordings.load import as_dataset, import_file
 
-    return as_dataset(import_file(path, format))
+    return as_dataset(import_file(_path("path", path), format))
 
 
 @dataclass(frozen=True, eq=False)
@@ -395,6 +459,10 @@ class Answer:
 
     diagnosis: Diagnosis
     propeller: Propeller
+
+    def __repr__(self) -> str:
+        """Say the verdict in a line."""
+        return f"<answer on {self.propeller.name}: {' '.join((self.verdict, ', '.join(self.effects))).strip()}>"
 
     @property
     def verdict(self) -> str:
@@ -446,9 +514,13 @@ class Answer:
         list of Path
             The files.
         """
+        from bemt.base.errors import system_fault
         from bemt.diagnose import figures
 
-        return figures.draw(self.diagnosis, Path(folder))
+        try:
+            return figures.draw(self.diagnosis, Path(_path("folder", folder)))
+        except OSError as error:
+            raise InputError(system_fault(error)) from error
 
 
 def diagnose(
@@ -492,10 +564,16 @@ def diagnose(
     def record(given: Any) -> Record:
         if isinstance(given, (str, os.PathLike)):
             return loading.load(os.fspath(given), rotor.case)
+        if not isinstance(given, Dataset) and not hasattr(given, "columns"):
+            expected = "a path, a Dataset or a DataFrame"
+            raise InputError(Fault("", "recording", f"{type(given).__name__} {given!r:.40}", expected))
         table = given if isinstance(given, Dataset) else from_pandas(given)
         return records.from_series(table, rotor.case)
 
+    only = [only] if isinstance(only, str) else only
     loading.check_effects(only or ())
+    if not _several(recording):
+        raise InputError(Fault("", "recording", "none", "one or more"))
     loaded = [record(given) for given in _several(recording)]
     loaded += [replace(record(given), reference=True) for given in _several(reference)]
     return Answer(run(loaded, [rotor.case], list(only) if only else None, progress), rotor)
@@ -509,7 +587,14 @@ def _propeller(given: Propeller | str | os.PathLike[str]) -> Propeller:
     """Propeller as it is, of a case, or of a label."""
     if isinstance(given, Propeller):
         return given
-    return load(given) if Path(given).exists() else propeller(os.fspath(given))
+    what: object = given
+    if not isinstance(what, (str, os.PathLike)):
+        expected = "a Propeller, a case or a label"
+        raise InputError(Fault("", "propeller", f"{type(given).__name__} {given!r:.40}", expected))
+    text = os.fspath(given)
+    if Path(text).exists() or text.endswith(".toml") or "/" in text:
+        return load(text)
+    return propeller(text)
 
 
 def drive(
@@ -553,6 +638,10 @@ def drive(
     """
     from bemt.drive import from_label
 
+    for name, value in (("kv", kv), ("cells", cells), ("mass_kg", mass_kg), ("rotors", rotors),
+                        ("capacity_Ah", capacity_Ah), ("airspeed_m_s", airspeed_m_s)):  # fmt: skip
+        if value is not None and (isinstance(value, bool) or not isinstance(value, (int, float, np.number))):
+            raise InputError(Fault("", name, repr(value), "a number"))
     return from_label.estimate(_propeller(propeller).case, kv, cells, mass_kg, rotors, capacity_Ah, airspeed_m_s)
 
 
@@ -583,8 +672,11 @@ def compare(
     """
     from bemt.diagnose import contrast
 
-    known = contrast.label_diameter(None) if diameter_m is None else diameter_m
-    return contrast.compare(os.fspath(a), os.fspath(b), None if case is None else os.fspath(case), diameter_m=known)
+    diameter = contrast.label_diameter(None) if diameter_m is None else float(_numbers("diameter_m", diameter_m))
+    if diameter_m is not None and not 0.01 <= diameter_m <= 10.0:
+        raise InputError(Fault("", "diameter_m", f"{diameter_m:g}", "0.01 to 10 m", "Is that in mm? Divide by 1000"))
+    known = None if case is None else _path("case", case)
+    return contrast.compare(_path("a", a), _path("b", b), known, diameter_m=diameter)
 
 
 def validate(folder: str | os.PathLike[str]) -> dict[str, Any]:
@@ -607,4 +699,4 @@ def validate(folder: str | os.PathLike[str]) -> dict[str, Any]:
     """
     from bemt.compare.validate import propellers
 
-    return propellers.validate(propellers.where(os.fspath(folder)))
+    return propellers.validate(propellers.where(_path("folder", folder)))

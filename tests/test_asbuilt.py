@@ -209,6 +209,17 @@ def test_calibrate_rotor_finds_a_turned_blade_and_narrows_what_follows(
     assert u["known"] < 0.5 * u["drawn"]
 
 
+def test_calibrate_rotor_refuses_a_run_of_another_rotor_or_unit(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Loads in mN moved nothing and were written down as the blade of this rotor."""
+    run = tmp_path / "run.csv"
+    run.write_text("rpm,thrust_N,torque_Nm\n5000,2500,50\n6000,3700,70\n7000,5100,100\n")
+    drawn, known = _case(tmp_path / "drawn"), tmp_path / "known"
+    assert main(["calibrate-rotor", str(run), "--case", str(drawn), "--out", str(known)]) == 2
+    assert "loads of this rotor" in capsys.readouterr().err and not known.exists()
+
+
 def test_population_says_where_it_comes_from() -> None:
     p = population()
     assert (

@@ -117,6 +117,13 @@ def test_what_scales_alike_is_a_class_and_never_one_name(tmp_path: Path) -> None
         assert {"air_density", "rpm_scale"} <= set(answer.effects) or answer.verdict == "insufficient"
 
 
+def test_a_thousandfold_is_measured_as_such_and_no_propeller(tmp_path: Path) -> None:
+    answer = compare(*pair(tmp_path, scaled(thrust_N=1000.0, torque_Nm=1000.0)))
+    assert answer.verdict == "insufficient"
+    for channel in ("thrust_N", "torque_Nm"):
+        assert answer.document["ratios"][channel]["ratio"] == pytest.approx(1000.0, rel=0.03)
+
+
 def test_a_change_that_no_cause_makes_is_not_named(tmp_path: Path) -> None:
     def wave(table: dict[str, Array]) -> None:
         table["torque_Nm"] = table["torque_Nm"] * (1.0 + 0.25 * np.sin(table["rpm"] / 700.0))

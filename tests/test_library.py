@@ -111,3 +111,44 @@ def test_a_drive_of_a_label_stays_near_what_such_drives_do() -> None:
     assert 6.0 < three.full["thrust_N"].value < 12.0 and 8.0 < three.full["battery_A"].value < 25.0
     heavy = bemt.drive("10x4.5", kv=900, cells=3, mass_kg=20.0)
     assert not heavy.reached and "no hover" in heavy.text
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda p: bemt.propeller(10), "^label: "),  # type: ignore[arg-type]
+        (lambda p: bemt.propeller("10x5", blades=0), "^blades: "),
+        (lambda p: p.solve("fast"), "^rpm: "),
+        (lambda p: p.solve([]), "^rpm: "),
+        (lambda p: p.solve([5000, 6000], [1, 2, 3]), "2 of rpm, 3 of airspeed_m_s"),
+        (lambda p: p.solve(1e7), "^rpm: "),
+        (lambda p: p.solve(6000, density_kg_m3="thin"), "^density_kg_m3: "),
+        (lambda p: p.curve(6000, "x"), "^J: "),
+        (lambda p: p.curve(6000, [0.0, 0.1], bands=False).plot("nope"), "no such channel"),
+        (lambda p: p.replaced("blade"), "^changes: "),
+        (lambda p: bemt.load(None), "^path: "),  # type: ignore[arg-type]
+        (lambda p: bemt.load("no/such/case.toml"), "no/such/case.toml"),
+        (lambda p: bemt.read({"rpm": [1]}), "^path: "),  # type: ignore[arg-type]
+        (lambda p: bemt.drive(p, kv="900", cells=3), "^kv: "),  # type: ignore[arg-type]
+        (lambda p: bemt.drive(p, kv=900, cells=3.5), "whole number"),  # type: ignore[arg-type]
+        (lambda p: bemt.drive("no/such/case", kv=900, cells=3), "no/such/case"),
+        (lambda p: bemt.diagnose([], p), "^recording: "),
+        (lambda p: bemt.diagnose({"rpm": [5000]}, p), "^recording: "),
+        (lambda p: bemt.compare("a.csv", "b.csv", diameter_m=254), "Divide by 1000"),
+    ],
+)
+def test_what_is_handed_over_wrongly_is_named_and_never_a_traceback(call: object, words: str) -> None:
+    with pytest.raises(bemt.InputError, match=words):
+        call(bemt.propeller("10x5"))  # type: ignore[operator]
+
+
+def test_what_a_notebook_shows_is_a_line() -> None:
+    p = bemt.propeller("10x5")
+    shown = [repr(x) for x in (p, p.solve(6000, bands=False), bemt.drive(p, kv=900, cells=3))]
+    assert all(len(words) < 200 and "10x5" in words for words in shown), shown
+
+
+def test_a_case_cannot_be_written_into_a_file(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    with pytest.raises(bemt.InputError, match="file"):
+        bemt.propeller("10x5").write(tmp_path / "file")

@@ -86,3 +86,8 @@ def test_a_motor_for_a_smaller_propeller_is_called_one(capsys: pytest.CaptureFix
     assert main(["drive", "10x5", "--kv", "2300", "--cells", "4"]) == 0
     assert "suits propellers of" in capsys.readouterr().out
     assert bemt.drive("10x5", kv=900, cells=3).notes == ()
+
+
+def test_an_estimate_of_the_drive_is_written_where_it_is_told(tmp_path: Path) -> None:
+    assert main(["drive", "10x5", "--kv", "900", "--cells", "3", "--out", str(tmp_path / "out")]) == 0
+    assert json.loads((tmp_path / "out" / "drive.json").read_text())["schema"] == "bemt.drive.estimate/1"

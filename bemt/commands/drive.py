@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
 from bemt.commands import _options
@@ -29,13 +30,13 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--airspeed", type=float, default=0.0, metavar="V", help="speed of flight [m/s] (default 0)")
     recorded = "compare the model with the recordings in this folder instead"
     parser.add_argument("--validate", metavar="DIR", help=recorded)
-    parser.add_argument("--out", metavar="DIR", help="write JSON, CSV and a picture there")
+    parser.add_argument("--out", metavar="DIR", help="write JSON, CSV and a picture there; --kv: JSON and text")
     _options.add_json(parser, "bemt.drive.result/1; --kv: bemt.drive.estimate/1; --validate: bemt.drive.validation/1")
 
 
 def run(args: argparse.Namespace) -> int:
     """Solve the drive; 1 when hover or airspeed is beyond it, or a point is unconverged."""
-    from bemt.base.tables import json_text
+    from bemt.base.tables import json_text, write_atomic
 
     if args.validate:
         from bemt.drive import validation_folder
@@ -48,6 +49,9 @@ def run(args: argparse.Namespace) -> int:
 
         estimate = new_folder.estimate_of(args.case, args.kv, args.cells, args.mass, args.rotors, args.capacity,
                                           args.airspeed)  # fmt: skip
+        if args.out:
+            for name, content in (("drive.json", json_text(estimate.to_dict())), ("drive.txt", estimate.text)):
+                write_atomic(Path(args.out) / name, content)
         print(json_text(estimate.to_dict()) if args.json else estimate.text, end="")
         return EXIT_OK if estimate.reached else EXIT_UNCONVERGED
     from bemt.drive import drive_result

@@ -31,6 +31,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the folder and say how to go on."""
+    import shlex
+
     from bemt.drive import new_folder
 
     folder, files = new_folder.write(
@@ -38,7 +40,8 @@ def run(args: argparse.Namespace) -> int:
         args.cells, args.out,
     )  # fmt: skip
     print(f"{folder.as_posix()}: {', '.join(files)}")
-    print(f"next: python -m bemt sweep {folder.as_posix()}")
+    typed = shlex.quote(folder.as_posix())
+    print(f"next: python -m bemt sweep {typed}")
     if "drive.toml" in files:
-        print(f"      python -m bemt drive {folder.as_posix()}")
+        print(f"      python -m bemt drive {typed}")
     return EXIT_OK

@@ -7,7 +7,8 @@ import textwrap
 from collections.abc import Mapping
 from typing import Any
 
-from bemt.base.tables import text_table
+from bemt.base.tables import number_text, text_table
+from bemt.compare.recordings import OTHER_STAND
 from bemt.compare.scaling import law
 
 __all__ = ["text"]
@@ -27,7 +28,7 @@ _ROWS, _NOTES = 8, 4
 
 
 def _share(x: float) -> str:
-    return f"{x - 1.0:+.1%}" if 0.4 < x < 2.5 else f"x{x:.3g}"
+    return f"{x - 1.0:+.1%}" if 0.4 < x < 2.5 else f"x{number_text(x, 3)}"
 
 
 def _title(name: str) -> str:
@@ -123,6 +124,8 @@ def _verdict(doc: Mapping[str, Any]) -> str:
     if doc["verdict"] == "unknown":
         return f"Something else: {doc['rule']}."
     first = [r["effect"] for r in doc["ranking"] if r["effect"] not in ("none", "unknown")][:4]
+    if doc["rule"] == OTHER_STAND:  # no cause of the list is meant
+        first = []
     return f"There is a change, but {doc['rule']}" + (f": {', '.join(first)} ..." if first else "") + "."
 
 

@@ -296,10 +296,15 @@ def covariance(c: MatchedChannel, s: Scatter) -> Array:
     return np.asarray(wide + s.bend**2 * K + level + zero + local + np.diag(spread))
 
 
+def _level(c: MatchedChannel) -> float:
+    """Prior standard deviation of ln B/A: wider where levels are far apart, or a large ratio would pass for scatter."""
+    return max(0.3, 0.5 * abs(float(c.y[c.second].mean() - c.y[~c.second].mean())))
+
+
 def change_of_any_kind(c: MatchedChannel) -> Array:
     """Prior covariance of a change d at all points, whichever recording they are of, (N, N)."""
     z = unit_coordinates(c)
-    line = 0.3**2 + 0.2**2 * np.outer(z[:, 0], z[:, 0]) + 0.2**2 * np.outer(z[:, 1], z[:, 1])
+    line = _level(c) ** 2 + 0.2**2 * np.outer(z[:, 0], z[:, 0]) + 0.2**2 * np.outer(z[:, 1], z[:, 1])
     return np.asarray(line + 0.1**2 * smooth_kernel(c) + 0.06**2 * smooth_kernel(c, _LOCAL))
 
 
@@ -321,7 +326,7 @@ def log_likelihood(K: Array, y: Array) -> float:
 def steady_change(c: MatchedChannel) -> Array:
     """Covariance of a change by one factor, or nearly so, between the recordings, (N, N)."""
     z, b = unit_coordinates(c), c.second.astype(float)
-    line = 0.3**2 + 0.03**2 * (np.outer(z[:, 0], z[:, 0]) + np.outer(z[:, 1], z[:, 1]))
+    line = _level(c) ** 2 + 0.03**2 * (np.outer(z[:, 0], z[:, 0]) + np.outer(z[:, 1], z[:, 1]))
     return np.asarray(line * np.outer(b, b))
 
 

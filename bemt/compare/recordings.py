@@ -10,18 +10,23 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from bemt.base.errors import Fault, InputError
 from bemt.compare import matched as fits
 from bemt.compare.matched import MatchedChannel, Scatter
 from bemt.compare.scaling import Judgement, judge, law, weigh
 from bemt.compare.stand_run import StandRun
 
-__all__ = ["SCHEMA", "RunChange", "changed", "document"]
+__all__ = ["OTHER_STAND", "SCHEMA", "RunChange", "changed", "document"]
 
 SCHEMA = "bemt.comparison/1"
 _TOLD_DENSITY = 0.012
 _NO_TALK = Judgement("insufficient", (), {}, {}, "not recorded in both")
 _MOVED, _WIDE = 2.5, 1.4
+# Thrust of a propeller of 2.3 times the diameter at one speed: no stand takes both. [1]
+_FAR_OFF = 30.0
+OTHER_STAND = "no change on one stand moves every load by so much: look at the units and the speeds of both files"
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +88,7 @@ def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> RunChange
                 f"{a.name}, {b.name}",
                 "",
                 got,
-                "one load that both recorded, at a speed of rotation",
+                "one load that both recorded at two or more speeds of rotation, above zero",
                 "Name units in the headings, or use a recording.toml",
             )
         )
@@ -93,7 +98,7 @@ def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> RunChange
     verdict = _NO_TALK
     if loads:
         verdict = judge(*weigh(loads, (rotor.free, rotor.steady), ("air", "stand"), known, _speeds(ratios)))
-        verdict = _far_apart(_with_density(verdict, a, b, loads), ratios)
+        verdict = _far_off(_far_apart(_with_density(verdict, a, b, loads), ratios), ratios)
     motor = _NO_TALK
     if drive and verdict.verdict == "none":
         motor = judge(*weigh(drive, (behind.free, behind.steady), ("drive",)))
@@ -123,6 +128,14 @@ def _far_apart(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> Judg
     )
 
 
+def _far_off(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> Judgement:
+    """No answer where every load is so many times the other that one stand cannot have measured both."""
+    loads = [abs(math.log(r["ratio"])) for r in ratios.values() if r["kind"] in fits.LOADS]
+    if min(loads) < math.log(_FAR_OFF) or said.effects in (("rpm_scale",), ("unit_slip",)):
+        return said
+    return Judgement("insufficient", (), said.probability, said.size, OTHER_STAND)
+
+
 def _speeds(ratios: Mapping[str, Mapping[str, Any]]) -> tuple[float, float] | None:
     """Logarithm of the speed of B over A at equal command, and its 95 % error."""
     found = next((r for r in ratios.values() if r["kind"] == "speed"), None)
@@ -130,7 +143,10 @@ def _speeds(ratios: Mapping[str, Mapping[str, Any]]) -> tuple[float, float] | No
 
 
 def _told(run: StandRun) -> str:
-    return ", ".join(k for k in run.values if k not in ("run", "command")) or "nothing"
+    """Channels of a recording, how many points, and which of them are no measurement."""
+    told = [k + ("" if np.nan_to_num(v).any() else " (all 0)")
+            for k, v in run.values.items() if k not in ("run", "command")]  # fmt: skip
+    return f"{', '.join(told) or 'nothing'} at {len(run)} point{'s' if len(run) != 1 else ''}"
 
 
 def _ratio(c: MatchedChannel, s: Scatter) -> dict[str, Any]:

@@ -7,12 +7,13 @@ blades, a unit or the speed is another one.  The question comes before the physi
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bemt.base.tables import number_text
 from bemt.base.units import INCH
 from bemt.diagnose.blade import AsLabelled, turned
 from bemt.diagnose.record import CHANNELS
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from bemt.diagnose.problem import Problem
     from bemt.diagnose.verdict import Decision
 
-__all__ = ["FACTOR", "RESTLESS", "Suspect", "finding", "judged", "levels", "suspects"]
+__all__ = ["FACTOR", "RESTLESS", "Suspect", "finding", "judged", "levels", "of_recorded", "suspects"]
 
 FACTOR = 3.0
 """Thrust (torque, where no thrust was measured) over that of the case, or under it, from which on the question comes
@@ -130,7 +131,7 @@ def finding(problem: Problem) -> str:
     if not _suspicious(found):
         told = " and ".join(f"{names[c]} by {s:.0%}" for c, s in _restless(problem).items())
         return f"at one speed the readings differ, {told}: what changes between them is not recorded" if told else ""
-    off = " and ".join(f"{names[c]} is {v:.3g} times" for c, v in found.items())
+    off = " and ".join(f"{names[c]} is {number_text(v, 3)} times" for c, v in found.items())
     ranked = "; ".join(f"{k}. {s.words}" for k, s in enumerate(suspects(problem)[:_SHOWN], 1))
     return f"{off} what the case gives. Is it this rotor? Likeliest: {ranked}"
 
@@ -144,4 +145,16 @@ def judged(problem: Problem, decision: Decision) -> Decision:
     if slip or not _suspicious(levels(problem)):
         return decision
     why = f"the loads are off by more than a factor of {FACTOR:g}: first make sure that the case is this rotor"
+    return replace(decision, verdict="insufficient", effects=(), classes=(), why=why)
+
+
+def of_recorded(
+    problem: Problem, decision: Decision, parameters: Mapping[str, Mapping[str, Mapping[str, Any]]]
+) -> Decision:
+    """Decision that names no slip of a density that nobody wrote down: it only stands for loads off alike."""
+    channel = parameters.get("unit_slip", {}).get("channel", {}).get("value")
+    told = any(p.record.air_recorded for p in problem.parts if not p.record.reference)
+    if decision.effects != ("unit_slip",) or channel != "density_kg_m3" or told:
+        return decision
+    why = "every load is off alike, as by a slip of the density, which is not recorded: look at units, speed and size"
     return replace(decision, verdict="insufficient", effects=(), classes=(), why=why)

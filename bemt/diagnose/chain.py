@@ -186,6 +186,7 @@ def _diagnose(
     asked = verdict.Asked(found, p)
     decision = another_rotor.judged(problem, verdict.decide(asked))
     best, parameters = asked.refined(decision.leading)
+    decision = another_rotor.of_recorded(problem, decision, parameters)
     say("held-out blocks")
     words, held, gp_only = blocks.held_out(found, decision.leading if decision.verdict != "unknown" else NONE)
     if decision.verdict == "unknown":  # what is not in the library is predicted as what it is: something smooth

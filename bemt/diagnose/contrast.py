@@ -51,11 +51,21 @@ class Contrast:
         """Effects of the verdict; of a class all members."""
         return tuple(self.document["effects"])
 
-    def __str__(self) -> str:
+    @property
+    def text(self) -> str:
         """The answer on one screen."""
         from bemt.compare.contrast_text import text
 
         return text(self.document)
+
+    def __str__(self) -> str:
+        """The answer on one screen."""
+        return self.text
+
+    def __repr__(self) -> str:
+        """Say the verdict in a line."""
+        runs = f"{self.change.a.name}, {self.change.b.name}"
+        return f"<contrast of {runs}: {' '.join((self.verdict, ', '.join(self.effects))).strip()}>"
 
 
 def compare(

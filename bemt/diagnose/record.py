@@ -145,7 +145,7 @@ def from_series(series: Dataset, case: Case, correlated: Mapping[str, Mapping[st
                 continue
             measured[name], u[name] = got[name].copy(), np.asarray(filled.u[name], dtype=float).copy()
     if not measured:
-        channels = ", ".join(series.values)
+        channels = ", ".join(series.values) + "".join(f"; {n}" for n in notes if n.endswith("left out"))
         raise InputError(
             Fault(series.name, "", f"channels {channels}", "a thrust, a torque or a power, or coefficients")
         )

@@ -11,14 +11,17 @@ import numpy as np
 import tomlkit
 
 from bemt import __version__
+from bemt.air import Air
 from bemt.asbuilt.latents import NAMES, UNITS
 from bemt.asbuilt.model import air_fields, air_of_points
 from bemt.asbuilt.reference import SESSION
 from bemt.base.errors import Fault, InputError
-from bemt.base.tables import json_text, plain, write_atomic
+from bemt.base.tables import json_text, number_text, plain, write_atomic
 from bemt.case import Case
 from bemt.case.as_built import MOVED, posterior_document
+from bemt.case.prepare import prepare_case
 from bemt.compare.as_measured import AsMeasured, as_measured
+from bemt.diagnose.another_rotor import FACTOR
 from bemt.diagnose.improve import beside, elsewhere
 from bemt.diagnose.load import cases_of, load
 
@@ -53,8 +56,25 @@ def calibrate(
     gains = [max(g) if g else SESSION for g in stated]
     if not any(np.isfinite(v).any() for v in y):
         raise InputError(Fault(paths[0], "", "neither thrust nor torque", "one of them, or coefficients"))
+    _this_rotor(case, paths, y, rpm, V, air_of_points(air))
     found = as_measured(case, rpm, V, air_of_points(air), y[0], y[1], u[0], u[1], (gains[0], gains[1]))
     return case, found
+
+
+def _this_rotor(case: Case, paths: Sequence[str], y: Sequence[Any], rpm: Any, V: Any, air: Air) -> None:
+    """Refuse loads that no blade of the case's label has: they would move nothing, as if they agreed."""
+    model = prepare_case(case).solve(rpm, V, air)
+    ratios = {}
+    for word, key, measured in zip(("thrust", "torque"), ("CT", "CP"), y, strict=True):
+        both = np.isfinite(measured) & np.isfinite(model[key])
+        size = float(np.abs(model[key][both]).sum())
+        if size > 0.0:
+            ratios[word] = float(np.abs(measured[both]).sum()) / size
+    if ratios and not 1.0 / FACTOR < next(iter(ratios.values())) < FACTOR:
+        told = " and ".join(f"{word} {number_text(ratio, 3)} times" for word, ratio in ratios.items())
+        hint = "Look at units, diameter, pitch and speed; `bemt diagnose` ranks what explains it"
+        raise InputError(Fault(", ".join(paths), "", f"{told} what the case gives",
+                               f"loads of this rotor, within a factor of {FACTOR:g}", hint))  # fmt: skip
 
 
 def document(case: Case, found: AsMeasured, paths: Sequence[str]) -> dict[str, Any]:

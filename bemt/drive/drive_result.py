@@ -52,6 +52,9 @@ def solve(
         expected = f"a number from {AIRSPEED.low:g} to {AIRSPEED.high:g} m/s"
         wrong.append(Fault("", "--airspeed", f"{airspeed:g}", expected, hint))
     path = Path(case_path)
+    if not path.exists():
+        hint = "Check the path; a label needs its motor: drive 10x5 --kv 900 --cells 3"
+        raise InputError([*wrong, Fault(case_path, "", "nothing there", "a case file or its folder", hint)])
     path = path / "case.toml" if path.is_dir() else path
     try:  # what is wrong with the files comes with what is wrong with the options
         case = load_case(path)

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from bemt.base.errors import Fault, InputError
+from bemt.base.tables import number_text
 from bemt.base.units import INCH, KGF
 from bemt.case import Case
 from bemt.compare.sweep.case import spread
@@ -91,6 +92,11 @@ class DriveEstimate:
     unknowns: Mapping[str, str]
     notes: tuple[str, ...]
 
+    def __repr__(self) -> str:
+        """Say what is known in a line."""
+        given, thrust = self.given, self.full["thrust_N"]
+        return f"<drive of {self.label}: {given['kv_rpm_V']:g} rev/min/V, {given['cells']}S, {_shown(thrust, 'N')}>"
+
     @property
     def text(self) -> str:
         """The estimate for a terminal."""
@@ -122,6 +128,9 @@ def _check(
     faults = [Fault("", name, f"{value:g}", f"{low:g} to {high:g} {unit}", hint)
               for name, value, low, high, unit, hint in rows
               if value is not None and not low <= value <= high]  # fmt: skip
+    for name, count in (("--cells", cells), ("--rotors", rotors)):
+        if math.isfinite(count) and count != int(count):
+            faults.append(Fault("", name, f"{count:g}", "a whole number"))
     if faults:
         raise InputError(faults)
 
@@ -243,7 +252,7 @@ def _shown(band: Band, unit: str, scale: float = 1.0) -> str:
     if not math.isfinite(value):
         return "-"
     if u == 0.0:
-        return f"{value:.4g} {unit}"
+        return f"{number_text(value)} {unit}"
     digits = max(0, 1 - math.floor(math.log10(u)))
     digits = min(digits, 2)
     if u >= 100.0:

@@ -216,6 +216,9 @@ def detect(path: str | os.PathLike[str]) -> str:
         except OSError as error:
             fault = Fault(name, "", error.strerror or str(error), "a readable file or folder", "Check the path")
             raise InputError(fault) from error
+        if not head.strip():
+            fault = Fault(name, "", "an empty file", "results as a table of text", "Did the export finish?")
+            raise InputError(fault)
         kinds = [k for k, m in known.items() if m.sniff(head)]
         particular = [k for k in kinds if not getattr(known[k], "FALLBACK", False)]
         kinds = particular or kinds
@@ -224,8 +227,12 @@ def detect(path: str | os.PathLike[str]) -> str:
             raise InputError(fault)
     if len(kinds) == 1:
         return kinds[0]
+    if not kinds and target.is_dir():
+        whole = ", ".join(k for k, m in known.items() if hasattr(m, "sniff_folder"))
+        expected = f"a file, or a folder that a reader takes whole ({whole})"
+        raise InputError(Fault(name, "", "a folder", expected, "Name the files in it"))
     if not kinds:
-        hint = "Give --format (format = in a case) if its head is unusual" if target.is_file() else "Name a single file"
+        hint = "Give --format (format = in a case) if its head is unusual"
         raise InputError(Fault(name, "", "content of no known format", f"one of {', '.join(known)}", hint))
     hint = " or ".join(f'format = "{kind}"' for kind in kinds)
     raise InputError(Fault(name, "", f"content claimed by {', '.join(kinds)}", "one format", f"Give {hint}"))
