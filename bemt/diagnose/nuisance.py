@@ -35,7 +35,7 @@ PRIORS = {
 }  # fmt: skip
 """Standard deviations: shares [1], zeros of full scale [1], parameters of active effects as a share of their published
 range [1].  Gains and zeros are working calibrations; level, slope and bend are errors of the solver itself, declared
-after volume 1 of the UIUC database; the jet area of a duct after DFDC, from whose thrust ours differs by 6 %, which is a
+after volume 1 of the UIUC database; the jet area of a duct after DFDC, from whose thrust ours differs by 6 %, a
 sixth of the area; the rest is declared."""
 
 # Readings further than this factor from the baseline are in other units.
