@@ -32,7 +32,7 @@ LOOK: dict[str, dict[str, Any]] = {
     "vendor": dict(color="#CC79A7", marker="^", markersize=8),
 }
 LABEL = {
-    "bemt": "BEMT (bar: ±u of declared assumptions)",
+    "bemt": "BEMT (bar: ±u: assumptions and model)",
     "k1k2": "K1/K2 formula",
     "cfd": "CFD (Fluent)",
     "bench": "bench",

@@ -44,7 +44,9 @@ def verdict(result: Mapping[str, Any]) -> tuple[str, str, str]:
     row = own[0]
     words = [f"BEMT gives {_n(row['thrust_N'], 4)} N"]
     if _known(row.get("u")):
-        words[0] += f" ± {_n(row['u'], 2)} N (one standard uncertainty of what the source does not state)"
+        words[0] += (
+            f" ± {_n(row['u'], 2)} N (one standard uncertainty: inputs that the source does not state, and the model)"
+        )
     words[0] += "."
     lines = [
         c
@@ -123,7 +125,7 @@ def _stand(c: Mapping[str, Any], name: str) -> str:
         )
     known = _inputs(c)
     if abs(c["E"]) <= known:
-        return "within what BEMT's inputs leave open"
+        return "within BEMT's own band"
     u = math.sqrt(c["E"] ** 2 - known**2)
     return f"they agree if the {name} is no better than {100.0 * u / abs(c['D']):.2g} %"
 
@@ -146,7 +148,7 @@ def _needed(lines: Sequence[Mapping[str, Any]]) -> str:
             wanted.append(f"{c['reference']} to {_n(u, 2)} N{share}")
     said = []
     if inside:
-        said.append(f"{', '.join(inside)}: inside what BEMT's own inputs leave open, however good the recording is")
+        said.append(f"{', '.join(inside)}: inside BEMT's own band, however good the recording is")
     if wanted:
         said.append(f"BEMT and the recording agree only if it is no better than this: {', '.join(wanted)}")
     return "No uncertainty is stated for some recordings. " + "; ".join(said) + "."
