@@ -88,8 +88,8 @@ def _comparison_plot(book: Mapping[str, Any]) -> str:
             )
         )
     note = (
-        "Bars: one standard uncertainty where one is known; of BEMT that of the declared inputs, of K1/K2 that found "
-        "against the UIUC database. Reference is the first recorded CFD value, else bench, else vendor."
+        "Bars: one standard uncertainty where one is known; of BEMT that of its inputs and of the model, of K1/K2 that "
+        "found against the UIUC database. Reference is the first recorded CFD value, else bench, else vendor."
     )
     return figure(
         Plot(
