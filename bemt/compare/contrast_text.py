@@ -91,8 +91,9 @@ def _said(doc: Mapping[str, Any]) -> list[str]:
             out.append(f"The ratio of {' and '.join(grows)} changes with speed or advance.")
     density = doc["density"]["ratio"]
     if density and abs(density - 1.0) > 0.003:
-        ends = f"{doc['density']['A']:.4g} to {doc['density']['B']:.4g} kg/m3"
-        out.append(f"Recorded density: {ends} ({density - 1:+.1%}).")
+        a, b = doc["density"]["A"], doc["density"]["B"]
+        ends = f"Recorded density: {a:.4g} to {b:.4g} kg/m3" if a and b else "Density by the recorded temperatures"
+        out.append(f"{ends} ({density - 1:+.1%}).")
     out += (
         [_verdict(doc)] if "diagnosis" not in doc else [f"The case {doc['case']}, with A as reference:", *doc["told"]]
     )

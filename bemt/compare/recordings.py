@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from bemt.base.errors import Fault, InputError
+from bemt.base.units import ZERO_CELSIUS
 from bemt.compare import matched as fits
 from bemt.compare.matched import MatchedChannel, Scatter
 from bemt.compare.scaling import Judgement, judge, law, weigh
@@ -21,7 +22,10 @@ from bemt.compare.stand_run import StandRun
 __all__ = ["OTHER_STAND", "SCHEMA", "RunChange", "changed", "document"]
 
 SCHEMA = "bemt.comparison/1"
-_TOLD_DENSITY = 0.012
+# Recorded densities are this good: a barometer, a thermometer and nobody's humidity, share.
+_TOLD_DENSITY, _BAROMETER, _SURE = 0.012, 0.004, 2.0
+# A battery or supply: voltage that was read apart by more than this at equal command, share; loads that do not matter.
+_TOLD_VOLTAGE, _FOLLOWS, _SAME_LOAD = 0.03, 0.3, 0.1
 _NO_TALK = Judgement("insufficient", (), {}, {}, "not recorded in both")
 _MOVED, _WIDE = 2.5, 1.4
 # Thrust of a propeller of 2.3 times the diameter at one speed: no stand takes both. [1]
@@ -63,13 +67,21 @@ class RunChange:
 
     @property
     def density_ratio(self) -> float:
-        """Recorded density of B over that of A; NaN unless both are known."""
-        return self.b.density / self.a.density
+        """Recorded density of B over that of A, by thermometers alone if need be; NaN unless both tell."""
+        log_ratio, unsure = fits.density_change(self.a, self.b)
+        return math.exp(log_ratio) if unsure else self.b.density / self.a.density
 
     @property
     def leading(self) -> Judgement:
-        """Verdict on the loads; that on the drive where the loads agree and the drive does not."""
-        return self.drive if self.loads.verdict == "none" and self.drive.effects else self.loads
+        """Verdict on the loads; that on the drive where the loads agree, or nearly, and the drive does not."""
+        open_ = self.loads.verdict == "none" or (self.loads.verdict == "insufficient" and self.near)
+        return self.drive if open_ and self.drive.effects else self.loads
+
+    @property
+    def near(self) -> bool:
+        """Whether no load differs so much that the drive would follow it."""
+        loads = [abs(math.log(r["ratio"])) for r in self.ratios.values() if r["kind"] in fits.LOADS]
+        return bool(loads) and max(loads) < _SAME_LOAD
 
 
 def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> RunChange:
@@ -92,29 +104,45 @@ def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> RunChange
                 "Name units in the headings, or use a recording.toml",
             )
         )
-    known = math.isfinite(a.density) and math.isfinite(b.density)
+    told_density, unsure = fits.density_change(a, b)
+    known = math.hypot(_BAROMETER, unsure) if told_density or math.isfinite(a.density + b.density) else None
     scatter = {**rotor.likelier, **behind.likelier}
     ratios = {c.channel: _ratio(c, scatter[n]) for n, c in {**loads, **drive}.items()}
     verdict = _NO_TALK
     if loads:
         verdict = judge(*weigh(loads, (rotor.free, rotor.steady), ("air", "stand"), known, _speeds(ratios)))
         verdict = _far_off(_far_apart(_with_density(verdict, a, b, loads), ratios), ratios)
-    motor = _NO_TALK
-    if drive and verdict.verdict == "none":
-        motor = judge(*weigh(drive, (behind.free, behind.steady), ("drive",)))
-    elif drive:
-        motor = Judgement("insufficient", (), {}, {}, "the load changed or may have, and the drive follows it")
-    return RunChange(
+    found = RunChange(
         a,
         b,
         diameter,
         {**loads, **drive},
         ratios,
         verdict,
-        motor,
+        _NO_TALK,
         tuple(_assumed(a, b, diameter, loads)),
         tuple(_notes(a, b, {**loads, **drive}, {**rotor.strays, **behind.strays})),
     )
+    if drive and (verdict.verdict == "none" or found.near):
+        motor = judge(*weigh(drive, (behind.free, behind.steady), ("drive",)))
+        found = replace(found, drive=_with_voltage(motor, ratios))
+    elif drive:
+        found = replace(found, drive=replace(_NO_TALK, why="the load changed or may have, and the drive follows it"))
+    return found
+
+
+def _with_voltage(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> Judgement:
+    """The recorded voltages as the cause, where the speed at equal command goes with them and nothing else is left."""
+    volts, speed = (
+        next((math.log(r["ratio"]) for r in ratios.values() if r["kind"] == k), 0.0) for k in ("voltage", "speed")
+    )
+    follows = volts * speed > 0.0 and abs(speed) > _FOLLOWS * abs(volts)
+    if said.verdict not in ("none", "insufficient") or abs(volts) < _TOLD_VOLTAGE or not follows:
+        return said
+    why = f"voltage as recorded, {math.expm1(volts):+.1%} at equal command; the speed goes with it"
+    probability = {"battery_sag": 1.0 - said.probability.get("unknown", 0.0)}
+    left = {k: p for k, p in said.probability.items() if k not in ("none", "battery_sag")}
+    return Judgement("named", ("battery_sag",), probability | left, {"battery_sag": (volts, 0.0)}, why)
 
 
 def _far_apart(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> Judgement:
@@ -162,21 +190,29 @@ def _ratio(c: MatchedChannel, s: Scatter) -> dict[str, Any]:
 def _with_density(said: Judgement, a: StandRun, b: StandRun, loads: Mapping[str, MatchedChannel]) -> Judgement:
     """The recorded densities as the cause, where nothing else is left."""
     size = max((abs(c.log_density) for c in loads.values()), default=0.0)
-    if said.verdict != "none" or size < _TOLD_DENSITY:
+    log_ratio, unsure = fits.density_change(a, b)
+    if said.verdict != "none" or size < max(_TOLD_DENSITY, _SURE * unsure):
         return said
     why = f"density as recorded, {a.density:.4g} to {b.density:.4g} kg/m3; the coefficients agree"
+    if unsure:
+        why = (
+            f"by the thermometers, {a.temperature_K - ZERO_CELSIUS:.1f} to {b.temperature_K - ZERO_CELSIUS:.1f} C, and "
+            "one pressure; the coefficients agree"
+        )
     probability = {
         "air_density": said.probability["none"],
         **{k: p for k, p in said.probability.items() if k not in ("none", "air_density")},
     }
-    sizes = {"air_density": (math.log(b.density / a.density), 0.0)}
+    sizes = {"air_density": (log_ratio, unsure)}
     return Judgement("named", ("air_density",), probability, sizes, why)
 
 
 def _assumed(a: StandRun, b: StandRun, diameter: float, loads: Mapping[str, MatchedChannel]) -> list[str]:
     out = []
     unknown = [n for n, r in (("A", a), ("B", b)) if not math.isfinite(r.density)]
-    if unknown and any(c.channel in ("thrust_N", "torque_Nm", "power_W") for c in loads.values()):
+    if unknown and fits.density_change(a, b)[1]:
+        out.append("air pressure is not recorded in both: taken as equal within 1 %")
+    elif unknown and any(c.channel in ("thrust_N", "torque_Nm", "power_W") for c in loads.values()):
         out.append(f"air density is not recorded in {' and '.join(unknown)}: taken as equal")
     still = [n for n, r in (("A", a), ("B", b)) if not {"airspeed_m_s", "J"} & r.values.keys()]
     if still:

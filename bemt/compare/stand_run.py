@@ -41,6 +41,8 @@ _ROTOR = "rotor"
 _SAME_NUMBER = 1e-6
 # A ramp instead of plateaus: fewest points and rows, rows that must agree, ln of a misreading, 1/s of a slow ramp.
 _ENOUGH, _ROWS, _WINDOW, _JUMP, _RATE = 8, 20, 7, 0.03, 0.25
+# Temperatures that air of a stand can have [K].
+_COLD, _HOT = 230.0, 330.0
 _ROTOR_WORDS = ("left", "right", "upper", "lower", "front", "rear", "A", "B", "C", "D", "1", "2", "3", "4")
 
 
@@ -66,6 +68,10 @@ class StandRun:
         What the reduction decided.
     diameter_m : float
         As the recording or the label says; NaN: unknown. [m]
+    temperature_K : float
+        Mean of the air [K]; NaN: not recorded.
+    ramp : bool
+        Whether rows of a slow ramp stand for steady points: thrust lags the speed there.
     """
 
     name: str
@@ -76,6 +82,8 @@ class StandRun:
     density: float
     notes: tuple[str, ...]
     diameter_m: float
+    temperature_K: float = math.nan
+    ramp: bool = False
 
     def __len__(self) -> int:
         """Give the number of points."""
@@ -200,7 +208,10 @@ def stand_run(
     session = {k: float(v["session"]) for k, v in reduced.correlated.items() if v.get("session")}
     diameter = diameter_m if diameter_m is not None else float(constants.get("diameter_m", math.nan))
     notes = (*ramp, *(n for n in reduced.notes if "no density" not in n))
-    return StandRun(told, values, u, session, command, density, notes, diameter)
+    warm = values.get("temperature_K", np.array([constants.get("temperature_K", math.nan)]))
+    warm = warm[(warm > _COLD) & (warm < _HOT)]
+    temperature = float(warm.mean()) if warm.size else math.nan
+    return StandRun(told, values, u, session, command, density, notes, diameter, temperature, bool(ramp))
 
 
 def _with_units(imported: Imported) -> Imported:
