@@ -59,8 +59,6 @@ Propeller Database and of J. Majewski's stand, seen here)."""
 # Electrical power for torque: efficiency of a drive that is warm or cold; speed where the voltage is known.
 _BY_POWER, _AT_KNOWN_VOLTAGE = 0.03, 0.01
 _BEND, _ZERO, _STEEP = 0.7, 0.0015, 0.15
-# Load of a ramp over full scale that a lag of 0.2 s leaves when it takes ten seconds.
-_LAG = 0.02
 BY_THERMOMETER = 0.012
 """Standard deviation of the density ratio of two days at one site where temperatures alone are known: pressures of days
 differ by 8 hPa. [1]"""
@@ -101,8 +99,8 @@ class MatchedChannel:
         Standard deviation of the level of a run, share. [1]
     notes : tuple of str
         What was left out.
-    ramp : (N,) bool or None
-        Whether a point is of a ramp.
+    shift : (N,) float or None
+        Standard deviation of the shift of a run by lag or hysteresis, share of full scale. [1]
     """
 
     name: str
@@ -116,7 +114,7 @@ class MatchedChannel:
     log_density: float
     session: float
     notes: tuple[str, ...] = ()
-    ramp: NDArray[np.bool_] | None = None
+    shift: Array | None = None
 
     def common(self) -> tuple[float, float]:
         """Range of the first coordinate that both recordings have; low above high: none."""
@@ -255,7 +253,7 @@ def matched(a: StandRun, b: StandRun, name: str, diameter: float = math.nan) -> 
         log_density,
         math.hypot(max(_set_up(name, channel, a, b), *seen), unsure),
         tuple(notes),
-        np.repeat([a.ramp, b.ramp], [p["y"].size for p in parts]),
+        np.repeat([a.shift.get(channel, 0.0), b.shift.get(channel, 0.0)], [p["y"].size for p in parts]),
     )
 
 
@@ -314,7 +312,7 @@ def covariance(c: MatchedChannel, s: Scatter) -> Array:
     side = (c.second[:, None] == c.second[None, :]).astype(float)
     # the level is the stand's, set up once per recording; half of its variance goes with the single run
     level = c.session**2 * (0.7 * side + 0.3 * same + _BEND**2 * same * K)
-    shift = c.floor * (_ZERO if c.ramp is None else np.where(c.ramp, _LAG, _ZERO))
+    shift = c.floor * (_ZERO if c.shift is None else np.maximum(c.shift, _ZERO))
     zero = same * np.outer(shift, shift) if c.name in LOADS else 0.0
     spread = s.share**2 + (s.floor * c.floor) ** 2 + c.u**2
     local = s.wiggle**2 * same * smooth_kernel(c, _LOCAL) if s.wiggle else 0.0
@@ -396,7 +394,7 @@ def without_strays(c: MatchedChannel) -> tuple[MatchedChannel, int]:
 
 def taken(c: MatchedChannel, keep: NDArray[np.bool_]) -> MatchedChannel:
     """Some of the points."""
-    columns = ("y", "x", "second", "run", "floor", "u", "ramp")
+    columns = ("y", "x", "second", "run", "floor", "u", "shift")
     return replace(c, **{k: v[keep] for k in columns if (v := getattr(c, k)) is not None})
 
 

@@ -137,6 +137,11 @@ def _with_voltage(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> J
         next((math.log(r["ratio"]) for r in ratios.values() if r["kind"] == k), 0.0) for k in ("voltage", "speed")
     )
     follows = volts * speed > 0.0 and abs(speed) > _FOLLOWS * abs(volts)
+    if not volts:
+        return said
+    if abs(volts) < _TOLD_VOLTAGE and said.effects == ("battery_sag",):
+        why = f"speeds go with the recorded voltages, which are {math.expm1(volts):+.1%} apart"
+        return replace(said, verdict="none", effects=(), why=why)
     if said.verdict not in ("none", "insufficient") or abs(volts) < _TOLD_VOLTAGE or not follows:
         return said
     why = f"voltage as recorded, {math.expm1(volts):+.1%} at equal command; the speed goes with it"

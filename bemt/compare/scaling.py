@@ -641,6 +641,9 @@ def judge(probability: Mapping[str, float], size: Mapping[str, tuple[float, floa
         row = law(first)
         kind = "sensor" if first == "unit_slip" or (row is not None and row.kind == "stand") else "named"
         return answer(kind, (first,), row.says if row is not None else "the ratio is exactly that of two units")
+    if 1 < len(credible) and {FAMILY.get(k) for k in credible} == {"blade"}:  # which of them is hard to say
+        least = best / (NEAR * _FURTHER)
+        credible += [k for k, p in listed.items() if FAMILY.get(k) == "blade" and p >= least and k not in credible]
     families = {FAMILY.get(k, k) for k in credible}
     few = len(credible) <= MOST or len(families) <= FAMILIES
     if len(credible) > 1 and few and unknown <= DOUBT and probability[NONE] <= RIVAL:

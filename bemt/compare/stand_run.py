@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -41,6 +41,8 @@ _ROTOR = "rotor"
 _SAME_NUMBER = 1e-6
 # A ramp instead of plateaus: fewest points and rows, rows that must agree, ln of a misreading, 1/s of a slow ramp.
 _ENOUGH, _ROWS, _WINDOW, _JUMP, _RATE = 8, 20, 7, 0.03, 0.25
+# Load of a ramp over full scale that a lag of 0.2 s leaves when it takes ten seconds.
+_LAG = 0.02
 # Temperatures that air of a stand can have [K].
 _COLD, _HOT = 230.0, 330.0
 _ROTOR_WORDS = ("left", "right", "upper", "lower", "front", "rear", "A", "B", "C", "D", "1", "2", "3", "4")
@@ -70,8 +72,8 @@ class StandRun:
         As the recording or the label says; NaN: unknown. [m]
     temperature_K : float
         Mean of the air [K]; NaN: not recorded.
-    ramp : bool
-        Whether rows of a slow ramp stand for steady points: thrust lags the speed there.
+    shift : mapping of str to float
+        What lag or hysteresis shifts a load by, standard deviation as a share of its largest value [1].
     """
 
     name: str
@@ -83,7 +85,7 @@ class StandRun:
     notes: tuple[str, ...]
     diameter_m: float
     temperature_K: float = math.nan
-    ramp: bool = False
+    shift: Mapping[str, float] = field(default_factory=dict)
 
     def __len__(self) -> int:
         """Give the number of points."""
@@ -211,7 +213,18 @@ def stand_run(
     warm = values.get("temperature_K", np.array([constants.get("temperature_K", math.nan)]))
     warm = warm[(warm > _COLD) & (warm < _HOT)]
     temperature = float(warm.mean()) if warm.size else math.nan
-    return StandRun(told, values, u, session, command, density, notes, diameter, temperature, bool(ramp))
+    return StandRun(
+        told, values, u, session, command, density, notes, diameter, temperature, _shifts(reduced, bool(ramp))
+    )
+
+
+def _shifts(reduced: Reduced, ramp: bool) -> dict[str, float]:
+    """Half of what a load differs by on the way up and down, and the lag of a ramp, over its largest value."""
+    out = dict.fromkeys(_LOADS, _LAG) if ramp else {}
+    for name, loop in reduced.hysteresis.items():
+        top = float(np.nanmax(np.abs(reduced.series.values[name])))
+        out[name] = max(out.get(name, 0.0), 0.5 * abs(loop.difference) / top if top > 0.0 else 0.0)
+    return out
 
 
 def _with_units(imported: Imported) -> Imported:
