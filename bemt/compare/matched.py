@@ -324,17 +324,18 @@ def _level(c: MatchedChannel) -> float:
     return max(0.3, 0.5 * abs(float(c.y[c.second].mean() - c.y[~c.second].mean())))
 
 
-def change_of_any_kind(c: MatchedChannel) -> Array:
+def change_of_any_kind(c: MatchedChannel, level: float = 1.0, bend: float = 0.1, local: float = 0.06) -> Array:
     """Prior covariance of a change d at all points, whichever recording they are of, (N, N)."""
     z = unit_coordinates(c)
-    line = _level(c) ** 2 + 0.2**2 * np.outer(z[:, 0], z[:, 0]) + 0.2**2 * np.outer(z[:, 1], z[:, 1])
-    return np.asarray(line + 0.1**2 * smooth_kernel(c) + 0.06**2 * smooth_kernel(c, _LOCAL))
+    line = (level * _level(c)) ** 2 + 0.2**2 * (np.outer(z[:, 0], z[:, 0]) + np.outer(z[:, 1], z[:, 1]))
+    wave = local**2 * smooth_kernel(c, _LOCAL) if local else 0.0
+    return np.asarray(line + bend**2 * smooth_kernel(c) + wave)
 
 
-def free_change(c: MatchedChannel) -> Array:
+def free_change(c: MatchedChannel, level: float = 1.0, bend: float = 0.1, local: float = 0.06) -> Array:
     """Covariance of a change of any smooth kind between the recordings, (N, N)."""
     b = c.second.astype(float)
-    return np.asarray(change_of_any_kind(c) * np.outer(b, b))
+    return np.asarray(change_of_any_kind(c, level, bend, local) * np.outer(b, b))
 
 
 def log_likelihood(K: Array, y: Array) -> float:

@@ -32,8 +32,11 @@ _GAINS = (0.01, 0.03, 0.1)
 # Cheeseman and Bennett at half a radius from the wall: 1.33, at one radius 1.07.
 _WALLS = (0.02, 0.07, 0.15)
 _ZEROS = (0.004, 0.015, 0.05)
-# A smooth change of each load on its own: up to a tenth nobody knows what it is, beyond that it is another blade's.
-_UNKNOWN_SIZES, _BLADE_SIZES = (0.1, 0.35), (0.35, 1.0)
+# Smooth changes of each load on its own, as (size, and its level, bend and local shape over it): nobody knows what
+# makes them; beyond a tenth of level it is rather another blade, whose coefficients are other lines with a slight bend.
+_UNKNOWN_KINDS = ((0.1, 1.0, 0.1, 0.06), (0.35, 1.0, 0.1, 0.06), (1.0, 0.35, 0.1, 0.06))
+_WITHOUT_BLADES = (*_UNKNOWN_KINDS[:2], (1.0, 1.0, 0.1, 0.06))
+_BLADE_KINDS = ((0.35, 1.0, 0.03, 0.0), (1.0, 1.0, 0.03, 0.0))
 SURE = 0.85
 """Probability from which one effect is named."""
 FORM = {0.15: 0.7, 0.45: 0.3}
@@ -565,10 +568,10 @@ def _weighed(
     if slips:
         z, mean = _shifted([m for _, m in slips], white, r, none, len(slips))
         score["unit_slip"], size["unit_slip"] = z, (mean, 0.0)
-    rough = _UNKNOWN_SIZES if _OWN_SHAPE in score else (*_UNKNOWN_SIZES, *_BLADE_SIZES[1:])
-    score[UNKNOWN] = _any_change(channels, base, none, rough)
-    if _OWN_SHAPE in score:
-        own = _any_change(channels, base, none, _BLADE_SIZES)
+    blades = _OWN_SHAPE in score
+    score[UNKNOWN] = _any_change(channels, base, none, _UNKNOWN_KINDS if blades else _WITHOUT_BLADES)
+    if blades:
+        own = _any_change(channels, base, none, _BLADE_KINDS)
         score[_OWN_SHAPE] = float(np.logaddexp(score[_OWN_SHAPE], own)) - math.log(2.0)
     return score, size
 
@@ -605,14 +608,17 @@ def _linear(A: Array, r: Array, sd: Array) -> tuple[float, Array, float]:
 
 
 def _any_change(
-    channels: Mapping[str, MatchedChannel], base: Mapping[str, Array], none: float, sizes: Sequence[float]
+    channels: Mapping[str, MatchedChannel],
+    base: Mapping[str, Array],
+    none: float,
+    kinds: Sequence[tuple[float, float, float, float]],
 ) -> float:
     """Log evidence of a smooth change of every channel on its own, on the scale of the others."""
     found = []
-    for size in sizes:
+    for size, level, bend, local in kinds:
         total = none
         for name, c in channels.items():
-            y, free = c.y - c.y.mean(), size**2 * fits.free_change(c)
+            y, free = c.y - c.y.mean(), size**2 * fits.free_change(c, level, bend, local)
             total += fits.log_likelihood(base[name] + free, y) - fits.log_likelihood(base[name], y)
         found.append(total)
     return float(np.logaddexp.reduce(found)) - math.log(len(found))
