@@ -6,6 +6,7 @@ No case and no blade is needed. What is not recorded is assumed to be equal in b
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -16,7 +17,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
 from bemt.compare import matched as fits
 from bemt.compare.matched import MatchedChannel, Scatter
-from bemt.compare.scaling import Judgement, judge, law, weigh
+from bemt.compare.scaling import FAMILY, NEAR, Judgement, judge, law, weigh
 from bemt.compare.stand_run import StandRun
 
 __all__ = ["OTHER_STAND", "SCHEMA", "RunChange", "changed", "document"]
@@ -27,6 +28,10 @@ _TOLD_DENSITY, _BAROMETER, _SURE = 0.012, 0.004, 2.0
 # A battery or supply: voltage that was read apart by more than this at equal command, share; loads that do not matter.
 _TOLD_VOLTAGE, _FOLLOWS, _SAME_LOAD = 0.03, 0.3, 0.1
 _NO_TALK = Judgement("insufficient", (), {}, {}, "not recorded in both")
+# Change of a load that days of one site can make, in ln.
+_DAY = 0.12
+# How a verdict begins that both recordings tell by themselves.
+_TOLD = ("density as recorded", "by the thermometers", "voltage as recorded")
 _MOVED, _WIDE = 2.5, 1.4
 # Thrust of a propeller of 2.3 times the diameter at one speed: no stand takes both. [1]
 _FAR_OFF = 30.0
@@ -251,23 +256,39 @@ def _notes(a: StandRun, b: StandRun, channels: Mapping[str, MatchedChannel], str
 def next_step(change: RunChange, files: Sequence[str]) -> dict[str, str]:
     """Run or reading that would settle the answer, and the command to give then."""
     said = change.leading
-    torque = "torque" in {c.name for c in change.channels.values()}
-    rows = [row for k in said.effects[:3] if (row := law(k)) is not None]
-    command = "python -m bemt compare " + " ".join(files) + " --case CASE"
+    a, b = (shlex.quote(f) for f in files)
+    ask = "python -m bemt compare"
+    rows = [row for k in said.effects if (row := law(k)) is not None]
+    loads = [r for r in change.ratios.values() if r["kind"] in fits.LOADS]
     if said.verdict == "none":
-        return {"text": "to see smaller changes, repeat each run once after taking the propeller off", "command": ""}
-    if said.verdict == "named" and said.effects == ("air_density",) and math.isfinite(change.density_ratio):
+        text = "to see smaller changes, repeat each run once after taking the propeller off"
+        return {"text": text, "command": ""}
+    if said.why.startswith(_TOLD):
         return {"text": "", "command": ""}
     if said.verdict in ("named", "sensor"):
         text = rows[0].settles if rows else "read the label of the channel"
-        return {"text": f"to be sure, {text}", "command": command}
-    if not torque and change.loads is said:
+        return {"text": f"to be sure, {text}", "command": f"{ask} {a} {b} --case CASE"}
+    if loads and all(r["extrapolated"] for r in loads):
+        v = change.a.values
+        where = "where A was measured"
+        if "rpm" in v:
+            where = f"at the speeds of A, {np.nanmin(v['rpm']):.0f} to {np.nanmax(v['rpm']):.0f} rev/min"
+        return {"text": f"run B again {where}, and at its airspeeds", "command": f"{ask} {a} B_AGAIN.csv"}
+    likely = {k: p for k, p in said.probability.items() if law(k) is not None}
+    density = likely.get("air_density", 0.0) * NEAR >= max(likely.values(), default=1.0)
+    small = max((abs(math.log(r["ratio"])) for r in loads), default=1.0) < _DAY
+    if density and small and math.isnan(change.density_ratio):
+        text = "note temperature and pressure of both days; density is the first thing that differs between days"
+        return {"text": text, "command": f"{ask} {a} {b} --air-a 20C,1013hPa --air-b 20C,1013hPa"}
+    if "torque" not in {c.name for c in change.channels.values()} and change.loads is said:
         text = "record torque in both runs: in thrust alone gain, air and blade look alike"
-    elif rows:
-        text = "; or ".join(row.settles for row in rows)
-    else:
-        text = "repeat the run of A and compare it with A: what they differ by is no cause"
-    return {"text": text, "command": command}
+        return {"text": text, "command": f"{ask} A_WITH_TORQUE.csv B_WITH_TORQUE.csv"}
+    if rows:
+        firsts = {FAMILY.get(row.id, row.id): row.settles for row in reversed(rows)}
+        text = "; or ".join(reversed(firsts.values()))
+        return {"text": text, "command": f"{ask} {a} {b} --case CASE"}
+    text = "repeat the run of A and compare it with A: what they differ by is no cause"
+    return {"text": text, "command": f"{ask} {a} A_AGAIN.csv"}
 
 
 def document(change: RunChange) -> dict[str, Any]:

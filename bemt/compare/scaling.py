@@ -654,6 +654,8 @@ def judge(probability: Mapping[str, float], size: Mapping[str, tuple[float, floa
     few = len(credible) <= MOST or len(families) <= FAMILIES
     if len(credible) > 1 and few and unknown <= DOUBT and probability[NONE] <= RIVAL:
         return answer("class", credible, f"these scale alike ({mass:.2f})")
+    if len(credible) == 1 and listed[first] < SURE:
+        return answer("insufficient", (), f"{first} is likely ({listed[first]:.2f}) but not sure")
     if len(credible) == 1:
         return answer("insufficient", (), f"{first} ({listed[first]:.2f}) leads, but unknown keeps {unknown:.2f}")
     return answer("insufficient", (), f"{len(credible)} causes scale like that in these channels")

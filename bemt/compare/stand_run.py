@@ -11,12 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.air import Air
 from bemt.base.errors import Fault, InputError
+from bemt.base.units import ZERO_CELSIUS
 from bemt.readers._imported import Channel, Imported
 from bemt.recordings.channels import view
 from bemt.recordings.reduce import Reduced, reduce
 
-__all__ = ["StandRun", "selected", "stand_run"]
+__all__ = ["StandRun", "selected", "stand_run", "with_air"]
 
 Array = NDArray[np.float64]
 
@@ -34,6 +36,7 @@ _WANTED = (
     "run",
     "temperature_K",
 )
+_AIR = re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(C|K|hPa|Pa|kg/m3)")
 _CONDITION = re.compile(r"\s*([^=]+?)\s*=\s*(.+?)\s*")
 _RANGE = re.compile(r"([-+.\deE]+):([-+.\deE]+)")
 _ROTOR = "rotor"
@@ -183,6 +186,46 @@ def _cut(imported: Imported, index: NDArray[np.intp]) -> Imported:
         lines=cut(imported.lines),
         texts={k: cut(v) for k, v in imported.texts.items()},
     )
+
+
+_AIR_UNITS = {
+    "C": ("temperature_K", 1.0, ZERO_CELSIUS), "K": ("temperature_K", 1.0, 0.0), "hPa": ("pressure_Pa", 100.0, 0.0),
+    "Pa": ("pressure_Pa", 1.0, 0.0), "kg/m3": ("density_kg_m3", 1.0, 0.0),
+}  # fmt: skip
+_AIR_RANGES = {"temperature_K": (_COLD, _HOT), "pressure_Pa": (4e4, 1.1e5), "density_kg_m3": (0.4, 1.6)}
+
+
+def with_air(imported: Imported, told: str | None, where: str) -> Imported:
+    """Add the air of the day that a user tells, such as ``22C,1013hPa``, in place of what is recorded.
+
+    Examples
+    --------
+    >>> with_air(Imported("table", "bench", 1, {}), "22C, 1013hPa", "--air-a").constants
+    {'temperature_K': 295.15, 'pressure_Pa': 101300.0}
+    """
+    if told is None:
+        return imported
+    known, faults = {}, []
+    for part in told.split(","):
+        found = _AIR.fullmatch(part.strip())
+        name, factor, offset = _AIR_UNITS[found[2]] if found else ("", 1.0, 0.0)
+        value = float(found[1]) * factor + offset if found else math.nan
+        low, high = _AIR_RANGES.get(name, (0.0, 0.0))
+        if not low <= value <= high:
+            hint = "A temperature alone takes one pressure for both runs"
+            faults.append(
+                Fault(where, "", repr(part), "a number with C, K, hPa, Pa or kg/m3, such as 22C,1013hPa", hint)
+            )
+        known[name] = value
+    if set(known) == {"pressure_Pa"}:
+        faults.append(Fault(where, "", repr(told), "a temperature too, or a density"))
+    if faults:
+        raise InputError(faults)
+    if known.keys() >= {"temperature_K", "pressure_Pa"}:
+        known["density_kg_m3"] = Air.from_state(known["pressure_Pa"], known["temperature_K"] - ZERO_CELSIUS).rho
+    left = {k: c for k, c in imported.channels.items() if k not in _AIR_RANGES}
+    constants = {k: v for k, v in imported.constants.items() if k not in _AIR_RANGES}
+    return replace(imported, channels=left, constants=constants | known)
 
 
 def stand_run(

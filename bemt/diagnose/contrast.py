@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from bemt import __version__
 from bemt.base.errors import Fault, InputError
 from bemt.compare.recordings import RunChange, changed, document, next_step
-from bemt.compare.stand_run import selected, stand_run
+from bemt.compare.stand_run import selected, stand_run, with_air
 from bemt.effects import catalogue
 
 if TYPE_CHECKING:
@@ -80,9 +80,13 @@ def compare(
     diameter_m: float | None = None,
     rows_a: Sequence[str] = (),
     rows_b: Sequence[str] = (),
+    air_a: str | None = None,
+    air_b: str | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Contrast:
     """Say what changed between two recordings of one stand.
+
+    ``air_a`` and ``air_b`` say what the files do not: ``"22C,1013hPa"``, ``"22C"`` or ``"1.19kg/m3"``.
 
     Notes
     -----
@@ -107,9 +111,9 @@ def compare(
         )
     read: list[Imported] = []
     faults: list[Fault] = []
-    for name, rows in zip(names, conditions, strict=True):
+    for name, rows, air, option in zip(names, conditions, (air_a, air_b), ("--air-a", "--air-b"), strict=True):
         try:
-            read.append(selected(import_file(name), rows, name))
+            read.append(with_air(selected(import_file(name), rows, name), air, option))
         except InputError as error:
             faults += error.faults
     if faults:
