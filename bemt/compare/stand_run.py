@@ -200,8 +200,9 @@ def with_air(imported: Imported, told: str | None, where: str) -> Imported:
 
     Examples
     --------
-    >>> with_air(Imported("table", "bench", 1, {}), "22C, 1013hPa", "--air-a").constants
-    {'temperature_K': 295.15, 'pressure_Pa': 101300.0}
+    >>> told = with_air(Imported("table", "bench", 1, {}), "22C, 1013hPa", "--air-a").constants
+    >>> round(told["density_kg_m3"], 3)
+    1.196
     """
     if told is None:
         return imported
