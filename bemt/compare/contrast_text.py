@@ -90,7 +90,7 @@ def headline(doc: Mapping[str, Any]) -> str:
         return f"Something changed ({moved}) that none of the listed causes makes."
     if verdict == "insufficient":
         return f"These recordings cannot say what changed ({moved})."
-    titles = {FAMILY.get(k, k): [] for k in effects} if effects else {}
+    titles: dict[str, list[str]] = {FAMILY.get(k, k): [] for k in effects}
     for k in effects:
         titles[FAMILY.get(k, k)].append(k)
     if len(effects) == 1:

@@ -17,7 +17,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
 from bemt.compare import matched as fits
 from bemt.compare.matched import MatchedChannel, Scatter
-from bemt.compare.scaling import FAMILY, NEAR, Judgement, judge, law, weigh
+from bemt.compare.scaling import FAMILY, Judgement, judge, law, weigh
 from bemt.compare.stand_run import StandRun
 
 __all__ = ["OTHER_STAND", "SCHEMA", "RunChange", "changed", "document"]
@@ -28,6 +28,9 @@ _TOLD_DENSITY, _BAROMETER, _SURE = 0.012, 0.004, 2.0
 # A battery or supply: voltage that was read apart by more than this at equal command, share; loads that do not matter.
 _TOLD_VOLTAGE, _FOLLOWS, _SAME_LOAD = 0.03, 0.3, 0.1
 _NO_TALK = Judgement("insufficient", (), {}, {}, "not recorded in both")
+_TORQUES = {"torque_Nm", "power_W", "CP", "CQ"}
+# Density is asked for where it is not so many times less likely than the likeliest cause.
+_FIRST = 5.0
 # Change of a load that days of one site can make, in ln.
 _DAY = 0.12
 # How a verdict begins that both recordings tell by themselves.
@@ -275,13 +278,13 @@ def next_step(change: RunChange, files: Sequence[str]) -> dict[str, str]:
             where = f"at the speeds of A, {np.nanmin(v['rpm']):.0f} to {np.nanmax(v['rpm']):.0f} rev/min"
         return {"text": f"run B again {where}, and at its airspeeds", "command": f"{ask} {a} B_AGAIN.csv"}
     likely = {k: p for k, p in said.probability.items() if law(k) is not None}
-    density = likely.get("air_density", 0.0) * NEAR >= max(likely.values(), default=1.0)
+    density = likely.get("air_density", 0.0) * _FIRST >= max(likely.values(), default=1.0)
     small = max((abs(math.log(r["ratio"])) for r in loads), default=1.0) < _DAY
     if density and small and math.isnan(change.density_ratio):
         text = "note temperature and pressure of both days; density is the first thing that differs between days"
         return {"text": text, "command": f"{ask} {a} {b} --air-a 20C,1013hPa --air-b 20C,1013hPa"}
-    if "torque" not in {c.name for c in change.channels.values()} and change.loads is said:
-        text = "record torque in both runs: in thrust alone gain, air and blade look alike"
+    if not _TORQUES & change.ratios.keys() and change.loads is said:
+        text = "record torque in both runs: without it gain, air and blade look alike"
         return {"text": text, "command": f"{ask} A_WITH_TORQUE.csv B_WITH_TORQUE.csv"}
     if rows:
         firsts = {FAMILY.get(row.id, row.id): row.settles for row in reversed(rows)}

@@ -84,14 +84,14 @@ class LipSeparation(Effect):
     def variants(self) -> tuple[dict[str, str | float], ...]:
         """Seven onsets and six losses in ratio, at once and bit by bit, with and without hysteresis; four by V/(nD)."""
         losses = (0.1, 0.2, 0.35, 0.5, 0.7, 1.0)
-        by_load = tuple(
+        by_load: tuple[dict[str, str | float], ...] = tuple(
             {"onset": o, "loss": k, "hysteresis": h, "width": w, "by": "load"}
             for o in (0.02, 0.04, 0.08, 0.16, 0.32, 0.6, 0.85)
             for k in losses
             for h in (0.0, 0.2)
             for w in (0.0, 1.0)
         )
-        by_advance = tuple(
+        by_advance: tuple[dict[str, str | float], ...] = tuple(
             {"onset": o, "loss": k, "hysteresis": 0.0, "width": 0.0, "by": "advance"}
             for o in (0.1, 0.35, 0.6, 0.85) for k in losses
         )  # fmt: skip
