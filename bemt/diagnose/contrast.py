@@ -173,6 +173,8 @@ def _agreed(said: dict[str, Any], ratios: dict[str, Any], found: RunChange) -> d
     by_ratio = found.loads
     mine = {k: ratios[k] for k in ("verdict", "effects", "probability", "ranking", "rule")}
     decided = by_ratio.verdict in _CLAIMS
+    if by_ratio.verdict == said["verdict"] == "none" and found.leading is found.drive:
+        return said | mine | {"told": [f"The loads agree; the drive does not: {ratios['rule']}."]}
     if by_ratio.verdict == "none" and said["verdict"] == "unknown":
         return said | mine | {"rule": f"{by_ratio.why}; the model misses the same in both"}
     if said["verdict"] not in _CLAIMS:
