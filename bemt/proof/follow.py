@@ -22,7 +22,7 @@ from bemt.proof.items import recording_text
 from bemt.proof.pairs import followed, pair_files
 from bemt.proof.real import DENSITY, POUND, WRONG_DENSITY
 
-__all__ = ["SCHEMA", "follow", "text"]
+__all__ = ["SCHEMA", "follow", "text", "with_reference"]
 
 SCHEMA = "bemt.followed/1"
 _SILENT = ("none", "unknown", "insufficient")
@@ -33,7 +33,7 @@ _UNDONE = {
 }
 
 
-def _with_reference(folder: Path, undone: Mapping[str, float]) -> dict[str, str]:
+def with_reference(folder: Path, undone: Mapping[str, float]) -> dict[str, str]:
     """Files of an item with every other point as a reference without the cause."""
     given = {n: (folder / n).read_text("utf-8") for n in ("recording.csv", "case.toml", "stations.csv")}
     rows = list(csv.DictReader(io.StringIO(given["recording.csv"])))
@@ -46,7 +46,7 @@ def _with_reference(folder: Path, undone: Mapping[str, float]) -> dict[str, str]
 def _asked_again(out: Path, entry: Mapping[str, Any]) -> tuple[str, dict[str, str]] | None:
     """Step and files of an item that was silent; None where nobody took the step."""
     if entry["set"] in _UNDONE:
-        return "a reference without the cause", _with_reference(out / "items" / entry["folder"], _UNDONE[entry["set"]])
+        return "a reference without the cause", with_reference(out / "items" / entry["folder"], _UNDONE[entry["set"]])
     if entry["plan"] == "pair" and not entry["set"].endswith("case"):
         for way in followed():
             if " | ".join(way.of) == entry["rig"]:
