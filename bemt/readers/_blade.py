@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from bemt.base.errors import Fault, InputError
 from bemt.readers import SourceText, number
 from bemt.sections.parametric import QpropSection, XrotorSection
-from bemt.sections.polars import DEFAULT_RE
+from bemt.sections.polars import DEFAULT_RE, Polar
 
 __all__ = ["BladeFile", "case_text", "checked", "lines_of", "values", "whole"]
 
@@ -37,7 +37,7 @@ class BladeFile:
         Tip and hub radius. [m]
     r_m, chord_m, beta_rad : (N,) float
         Stations. [m], [rad]
-    sections : sequence of (float, XrotorSection or QpropSection)
+    sections : sequence of (float, XrotorSection, QpropSection or Polar)
         At r/R, ascending; linear between, held outside.
     rpm, airspeed_m_s, rho : float or None
         Operating point, where the file states one.
@@ -53,7 +53,7 @@ class BladeFile:
     r_m: Array
     chord_m: Array
     beta_rad: Array
-    sections: Sequence[tuple[float, XrotorSection | QpropSection]]
+    sections: Sequence[tuple[float, XrotorSection | QpropSection | Polar]]
     rpm: float | None = None
     airspeed_m_s: float | None = None
     rho: float | None = None
@@ -124,7 +124,14 @@ def checked(source: SourceText, blade: BladeFile, faults: list[Fault]) -> BladeF
     return blade
 
 
-def _polar_csv(section: XrotorSection | QpropSection) -> str:
+def _polar_csv(section: XrotorSection | QpropSection | Polar) -> str:
+    if isinstance(section, Polar):
+        rows = [
+            f"{math.degrees(a):.9g},{section.cl[i, j, 0]:.9g},{section.cd[i, j, 0]:.9g},{Re:.9g}"
+            for j, Re in enumerate(section.Re)
+            for i, a in enumerate(section.alpha)
+        ]
+        return "\n".join(["alpha_deg,cl,cd,Re", *rows]) + "\n"
     alpha = np.arange(SPAN_DEG[0], SPAN_DEG[1] + 0.25, 0.5)
     Re = DEFAULT_RE[(DEFAULT_RE >= RE_RANGE[0]) & (DEFAULT_RE <= RE_RANGE[1])]
     Re = Re if section.reexp != 0.0 else Re[:1]
