@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,6 +43,8 @@ class BladeFile:
         Operating point, where the file states one.
     notes : tuple of str
         What was left out.
+    duct : dict of float or None
+        Keys of a case's ``[duct]``; None: an open rotor.
     """
 
     name: str
@@ -58,6 +60,7 @@ class BladeFile:
     airspeed_m_s: float | None = None
     rho: float | None = None
     notes: tuple[str, ...] = ()
+    duct: Mapping[str, float] | None = None
 
 
 def lines_of(source: SourceText, comment: str) -> list[tuple[int, str]]:
@@ -158,13 +161,15 @@ def case_text(blade: BladeFile, name: str, file: str) -> dict[str, str]:
     remark = "" if blade.rpm is not None else "  # not in the file: a tip speed near 120 m/s, set yours"
     rho = blade.rho if blade.rho is not None and blade.rho > 0.0 else 1.225
     notes = "".join(f"# {note}\n" for note in blade.notes)
+    walls = "".join(f"{key} = {value:.9g}\n" for key, value in (blade.duct or {}).items())
+    walls = f"\n[duct]\n{walls}" if walls else ""
     files["case.toml"] = f"""# From {blade.source}, {re.sub(r"[^ -~]", "_", file)}.
 {notes}schema = "bemt.case/1"
 name = "{name}"
 title = "{title}"
 
 [rotor]
-kind = "propeller"
+kind = "{"propeller" if blade.duct is None else "fan"}"
 blades = {blade.blades}
 diameter_m = {2.0 * blade.R_m:.12g}
 hub_diameter_mm = {2e3 * blade.Rhub_m:.12g}
@@ -174,7 +179,7 @@ stations = "stations.csv"
 
 [blade.section]
 thickness = 0.12  # not in the file; only wave drag looks at it
-
+{walls}
 [operating]
 rpm = {rpm:.12g}{remark}
 airspeed_m_s = {blade.airspeed_m_s or 0.0:.12g}
