@@ -248,8 +248,8 @@ BlSpn BlCrvAC BlSwpAC BlCrvAng BlTwist BlChord BlAFID
 def _airfoil(slope: float) -> str:
     rows = [f"{a:.1f} {slope * np.sin(2 * np.radians(a)):.5f} {0.02 + np.sin(np.radians(a)) ** 2:.5f} 0.0"
             for a in np.arange(-180.0, 180.1, 5.0)]  # fmt: skip
-    return "! AirfoilInfo v1.01.x Input File\n1 NumTabs\n0.2 Re\n0 UserProp\nFalse InclUAdata\n%d NumAlf\n%s\n" % (
-        len(rows), "\n".join(rows))  # fmt: skip
+    head = ["! AirfoilInfo v1.01.x Input File", "1 NumTabs", "0.2 Re", "0 UserProp", "False InclUAdata"]
+    return "\n".join([*head, f"{len(rows)} NumAlf", *rows]) + "\n"
 
 
 @pytest.fixture
