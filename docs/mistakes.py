@@ -19,8 +19,8 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 HEAD = """# Mistakes, and what is answered
 
-Each row is run by the tests in an empty folder with one sound case, `mine`. Exit code 0: the file is read, and what looks
-wrong in it is said. Written by `python docs/mistakes.py`; do not edit.
+Each row is run by the tests in an empty folder with one sound case, `mine`. Exit code 0: the file is read, and what
+looks wrong in it is said. Written by `python docs/mistakes.py`; do not edit.
 
 | mistake | typed | exit code | answer |
 |---|---|---|---|
