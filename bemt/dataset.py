@@ -11,6 +11,7 @@ known they are split by :data:`ORIGINS`, and the total is the root of the sum of
 
 from __future__ import annotations
 
+import html
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -192,6 +193,31 @@ class Dataset:
     def __repr__(self) -> str:
         """Say what it holds in a line; to_pandas() shows the numbers."""
         return f"Dataset({self.kind!r}, {self.name!r}, {len(self)} points: {', '.join(self.values)})"
+
+    def _repr_html_(self) -> str:
+        """Show the points in a notebook: each value with its standard uncertainty, where one is known."""
+        columns = [*self.values, *(["flags"] if any(self.flags) else [])]
+        shown = list(range(len(self))) if len(self) <= 12 else [*range(8), None, *range(len(self) - 3, len(self))]
+
+        def cell(name: str, i: int) -> str:
+            if name == "flags":
+                return ", ".join(self.flags[i])
+            value, u = self.values[name][i], self.u[name][i]
+            if not np.isfinite(value):
+                return "-"
+            if not u > 0.0:
+                return f"{value:.4g}"
+            digits = max(0, 1 - math.floor(math.log10(u)))  # two digits of the uncertainty
+            return f"{value:.{digits}f} &plusmn; {u:.{digits}f}"
+
+        head = "".join(f"<th>{html.escape(name)}</th>" for name in columns)
+        rows = "".join(
+            "<tr>" + "".join(f"<td>{'&#8942;' if i is None else cell(name, i)}</td>" for name in columns) + "</tr>"
+            for i in shown
+        )
+        notes = "".join(f"<br><small>{html.escape(note)}</small>" for note in self.notes)
+        what = f"<strong>{html.escape(f'{self.kind}: {self.name}, {len(self)} points')}</strong>"
+        return f'{what}<div style="overflow-x:auto"><table><tr>{head}</tr>{rows}</table></div>{notes}'
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle as plain dictionaries (worker processes send series back)."""
@@ -412,6 +438,17 @@ class Dataset:
         -------
         matplotlib axes
             With a line for each channel, and for each speed of rotation where J or airspeed is the abscissa.
+
+        Raises
+        ------
+        InputError
+            For a channel that is not there.
+
+        Examples
+        --------
+        >>> d = Dataset("bench", "stand", {"rpm": [4000.0, 6000.0], "thrust_N": [2.1, 4.7]}, {"thrust_N": 0.1})
+        >>> d.plot().get_xlabel()
+        'rpm'
         """
         import matplotlib.pyplot as plt
 

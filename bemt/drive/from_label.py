@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from bemt.base.errors import Fault, InputError
+from bemt.base.face import as_html
 from bemt.base.tables import number_text
 from bemt.base.units import INCH, KGF
 from bemt.case import Case
@@ -96,6 +97,10 @@ class DriveEstimate:
         """Say what is known in a line."""
         given, thrust = self.given, self.full["thrust_N"]
         return f"<drive of {self.label}: {given['kv_rpm_V']:g} rev/min/V, {given['cells']}S, {_shown(thrust, 'N')}>"
+
+    def _repr_html_(self) -> str:
+        """Show the estimate in a notebook."""
+        return as_html(repr(self)[1:-1], self.text)
 
     @property
     def text(self) -> str:
