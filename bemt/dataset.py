@@ -206,7 +206,7 @@ class Dataset:
             if not np.isfinite(value):
                 return "-"
             if not u > 0.0:
-                return f"{value:.4g}"
+                return f"{value:.5g}"
             digits = max(0, 1 - math.floor(math.log10(u)))  # two digits of the uncertainty
             return f"{value:.{digits}f} &plusmn; {u:.{digits}f}"
 
@@ -432,7 +432,7 @@ class Dataset:
         y : sequence of str
             Channels to draw; CT and CP, or thrust, by default.
         ax : matplotlib axes, optional
-            Where to draw; a new figure by default.
+            Where to draw, beside what is there: a channel keeps its colour. A new figure by default.
 
         Returns
         -------
@@ -460,20 +460,29 @@ class Dataset:
         if unknown:
             known = ", ".join(self.values)
             raise InputError(Fault(self.name, ", ".join(unknown), "no such channel", f"one of {known}"))
-        ax = plt.subplots(layout="constrained")[1] if ax is None else ax
+        beside, points = ax is not None, self.kind in ("bench", "cfd", "vendor")
+        ax = ax if beside else plt.subplots(layout="constrained")[1]
+        drawn = [line.get_gid() for line in ax.lines]
+        colours = {line.get_gid(): line.get_color() for line in ax.lines if drawn.count(line.get_gid()) == 1}
         speeds = np.unique(self["rpm"]) if "rpm" in self and x != "rpm" else np.array([np.nan])
         for channel in wanted:
             for speed in speeds:
                 rows = np.flatnonzero(self["rpm"] == speed) if np.isfinite(speed) else np.arange(len(self))
                 rows = rows[np.argsort(self[x][rows], kind="stable")]
                 name = f"{channel}, {speed:.0f} rev/min" if len(speeds) > 1 else channel
+                name = f"{name}, {self.name}" if beside else name
+                style = {"marker": "o", "ls": ""} if points else {}
+                style |= {"color": colours[channel]} if channel in colours and len(speeds) == 1 else {}
                 at, value, u = self[x][rows], self[channel][rows], self.u[channel][rows]
-                (line,) = ax.plot(at, value, marker="." if self.kind in ("bench", "cfd") else "", label=name)
-                if np.any(u > 0.0):
+                (line,) = ax.plot(at, value, label=name, gid=channel, **style)
+                if np.any(u > 0.0) and points:
+                    ax.errorbar(at, value, np.nan_to_num(u), fmt="none", ecolor=line.get_color(), lw=1)
+                elif np.any(u > 0.0):
                     ax.fill_between(at, value - u, value + u, alpha=0.2, color=line.get_color(), lw=0)
         ax.set_xlabel(x)
         ax.set_ylabel(", ".join(wanted))
-        ax.set_title(self.name, fontsize=10)
+        if not beside:
+            ax.set_title(self.name, fontsize=10)
         ax.legend(fontsize=8, frameon=False)
         return ax
 

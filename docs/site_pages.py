@@ -43,7 +43,7 @@ PARTS = {  # navigation; a name ending in * stands for all pages of that name
 
 def place(path: Path) -> str:
     """Address of a file of the tree within the site."""
-    name = path.relative_to(ROOT).as_posix()
+    name = path.relative_to(ROOT).as_posix().replace(".ipynb", ".md")
     return PLACES.get(name, name.removeprefix("docs/"))
 
 
@@ -54,7 +54,9 @@ def linked(path: Path, found: dict[str, Path]) -> None:
         return
     for target, _ in LINK.findall(path.read_text(encoding="utf-8")):
         there = Path(os.path.normpath(path.parent / target))
-        if "://" not in target and there.is_file() and there.is_relative_to(ROOT) and place(there) not in found:
+        if "://" in target or there.suffix == ".ipynb" or place(there) in found:
+            continue
+        if there.is_file() and there.is_relative_to(ROOT):
             linked(there, found)
 
 
@@ -139,6 +141,7 @@ def on_files(files: Any, config: Any) -> Any:
         made[name] = "\n\n".join([f"# {title}", text, *(f"::: {n}" for n in names)])
     for book in sorted((DOCS / "notebooks").glob("*.ipynb")):
         text, pictures = notebook(book)
+        text = relinked(text, book)
         made[f"notebooks/{book.stem}.md"] = text
         made |= {f"notebooks/{name}": raw for name, raw in pictures.items()}
     for name, path in found.items():
@@ -158,7 +161,8 @@ def navigation(pages: list[str]) -> list[Any]:
         chosen: list[str] = []
         for name in names:
             chosen += sorted(p for p in pages if p.startswith(name[:-1])) if name.endswith("*") else [name]
-        nav.append({title: [name for name in chosen if name in pages]})
+        known = [{"Overview": name} if name == "index.md" else name for name in chosen if name in pages]
+        nav.append({title: known})
     return nav
 
 
@@ -169,6 +173,5 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
 
 
 def on_page_content(content: str, **_: Any) -> str:
-    """Roles of docstrings as code; wide tables in boxes of their own."""
-    content = re.sub(r":(?:class|func|meth|data|attr|mod):<code>~?(?:bemt\.\w+\.)?([\w.]+)</code>", r"<code>\1</code>", content)
-    return content
+    """Show the roles of docstrings as code."""
+    return re.sub(r":(?:class|func|meth|data|attr|mod):<code>~?([\w.]+)</code>", r"<code>\1</code>", content)

@@ -18,6 +18,8 @@ from bemt.dataset import Dataset
 from bemt.library.given import numbers, path_text
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from bemt.air import Air
 
 __all__ = ["Propeller", "load", "propeller", "rotor_of"]
@@ -205,6 +207,68 @@ class Propeller:
         if J is not None and airspeed_m_s is not None:
             speed = {"J": b, "airspeed_m_s": airspeed_m_s}  # refused below
         return self.solve(a, density_kg_m3=density_kg_m3, bands=bands, **speed)
+
+    def along_blade(
+        self, rpm: float | None = None, airspeed_m_s: float | None = None, *, J: float | None = None,
+        density_kg_m3: float | None = None,
+    ) -> pd.DataFrame:  # fmt: skip
+        """Solve one operating point and show it along the blade.
+
+        Parameters
+        ----------
+        rpm : float, optional
+            Speed of rotation; the case's by default. [rev/min]
+        airspeed_m_s : float, optional
+            Axial speed; the case's by default. [m/s]
+        J : float, optional
+            Advance ratio instead. [-]
+        density_kg_m3 : float, optional
+            Of the air. [kg/m3]
+
+        Returns
+        -------
+        pandas.DataFrame
+            A row per blade element, from hub to tip: ``r_m``, ``chord_m``, ``beta_deg``, ``alpha_deg``, ``cl``, ``cd``,
+            ``Re``, ``M``, ``axial_m_s`` and ``swirl_m_s`` (speeds of the air at the disk), ``thrust_per_radius_N_m``,
+            ``torque_per_radius_Nm_m`` (all blades together). NaN where the point does not converge.
+
+        Raises
+        ------
+        InputError
+            For more than one point, and as for :meth:`solve`.
+
+        Notes
+        -----
+        Effects that act on points (a wall behind, the body of the vehicle) change the whole rotor's loads in
+        :meth:`solve` and are not distributed here.
+
+        Examples
+        --------
+        >>> p = propeller("10x5")
+        >>> blade = p.along_blade(rpm=6000)
+        >>> bool(abs(np.trapezoid(blade.thrust_per_radius_N_m, blade.r_m) / p.solve(6000).thrust_N[0] - 1) < 0.02)
+        True
+        """
+        import pandas as pd
+
+        from bemt.bem import kernel as K
+        from bemt.bem import solver
+        from bemt.case.prepare import prepare_case
+
+        n, V = self._conditions(rpm, airspeed_m_s, J)
+        if n.size != 1:
+            raise InputError(Fault("", "rpm, airspeed_m_s, J", f"{n.size} points", "one operating point"))
+        density = None if density_kg_m3 is None else float(numbers("density_kg_m3", density_kg_m3))
+        air = self.case.air(None if density is None else {"air.density_kg_m3": density})
+        prep = prepare_case(self.case).prep
+        at = {key: value[0] for key, value in solver.solve(prep, n, V, air, radial=True).radial.items()}
+        width, chord = prep.st[:, K.S_DR], prep.st[:, K.S_CHORD]
+        return pd.DataFrame({
+            "r_m": at["r"], "chord_m": chord, "beta_deg": np.degrees(prep.st[:, K.S_BETA]),
+            "alpha_deg": np.degrees(at["alpha"]), "cl": at["cl"], "cd": at["cd"], "Re": at["Re"], "M": at["M"],
+            "axial_m_s": at["w"], "swirl_m_s": at["v_t"], "thrust_per_radius_N_m": at["dT"] / width,
+            "torque_per_radius_Nm_m": at["dQ"] / width,
+        })  # fmt: skip
 
     def replaced(self, changes: Mapping[str, Any]) -> Propeller:
         """Set values of the case; one that was a declared unknown is known then.
