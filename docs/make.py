@@ -1,7 +1,8 @@
 """Rewrite what the documents take from code and cases: ``.venv/bin/python docs/make.py``.
 
 Numbers of docs/diagnosis.md, the page docs/effects.md, docs/gallery.md with its pictures (``--no-pictures``: without).
-``--notebooks`` executes docs/notebooks/ and nothing else. The picture of the README has a script of its own, docs/overview.py.
+``--notebooks`` executes docs/notebooks/ and nothing else.
+The picture of the README has a script of its own, docs/overview.py.
 """
 
 from __future__ import annotations
@@ -86,7 +87,8 @@ def run_notebook(path: Path) -> None:
     book = nbformat.read(path, 4)
     for cell in book.cells:
         cell.setdefault("metadata", {}).pop("execution", None)
-    client = NotebookClient(book, timeout=300, record_timing=False, resources={"metadata": {"path": str(DOCS / "notebooks")}})
+    here = {"metadata": {"path": str(path.parent)}}
+    client = NotebookClient(book, timeout=300, record_timing=False, resources=here)
     client.execute(env={**os.environ, "PYTHONPATH": str(ROOT)})
     nbformat.write(book, path)
 

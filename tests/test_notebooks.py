@@ -34,7 +34,9 @@ def test_a_notebook_says_what_it_was_committed_with(book: Path) -> None:
     nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
     committed, again = nbformat.read(book, 4), nbformat.read(book, 4)
     client = nbclient.NotebookClient(again, timeout=300, resources={"metadata": {"path": str(book.parent)}})
-    client.execute(env={**os.environ, "PYTHONPATH": str(ROOT), "MPLBACKEND": "module://matplotlib_inline.backend_inline"})
+    client.execute(
+        env={**os.environ, "PYTHONPATH": str(ROOT), "MPLBACKEND": "module://matplotlib_inline.backend_inline"}
+    )
     for before, after in zip(committed.cells, again.cells, strict=True):
         words, numbers, pictures = said(before)
         words_now, numbers_now, pictures_now = said(after)

@@ -29,7 +29,7 @@ __all__ = ["Answer", "compare", "diagnose", "drive", "read", "validate"]
 
 
 def read(path: str | os.PathLike[str], format: str | None = None) -> Dataset:  # noqa: A002
-    """Read a recording: a bench log, a table, an export of CFD, a vendor's file.
+    r"""Read a recording: a bench log, a table, an export of CFD, a vendor's file.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def read(path: str | os.PathLike[str], format: str | None = None) -> Dataset:  #
     --------
     >>> import tempfile
     >>> file = Path(tempfile.mkdtemp()) / "bench.csv"
-    >>> _ = file.write_text("rpm,thrust_gf,torque_Nm\\n5000,340,0.05\\n6000,490,0.07\\n")
+    >>> _ = file.write_text("rpm,thrust_gf,torque_Nm\n5000,340,0.05\n6000,490,0.07\n")
     >>> read(file).thrust_N.round(2)
     array([3.33, 4.81])
     """
@@ -290,7 +290,7 @@ def compare(
     a: str | os.PathLike[str], b: str | os.PathLike[str], *, case: str | os.PathLike[str] | None = None,
     diameter_m: float | None = None,
 ) -> Contrast:  # fmt: skip
-    """Say what changed between two recordings of one stand.
+    r"""Say what changed between two recordings of one stand.
 
     Parameters
     ----------
@@ -319,7 +319,7 @@ def compare(
     >>> rows = [(n, 1e-7 * n**2, 2e-9 * n**2) for n in range(4000, 9001, 500)]
     >>> for file, gain in ((a, 1.0), (b, 0.9)):
     ...     lines = ["rpm,thrust_N,torque_Nm"] + [f"{n},{gain * T:.4f},{Q:.5f}" for n, T, Q in rows]
-    ...     _ = file.write_text("\\n".join(lines))
+    ...     _ = file.write_text("\n".join(lines))
     >>> found = bemt.compare(a, b)
     >>> found.verdict, found.effects
     ('sensor', ('thrust_gain',))
