@@ -206,7 +206,7 @@ class Dataset:
             if not np.isfinite(value):
                 return "-"
             if not u > 0.0:
-                return f"{value:.5g}"
+                return f"{value:.6g}"
             digits = max(0, 1 - math.floor(math.log10(u)))  # two digits of the uncertainty
             return f"{value:.{digits}f} &plusmn; {u:.{digits}f}"
 

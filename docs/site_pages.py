@@ -49,8 +49,9 @@ def place(path: Path) -> str:
 
 def linked(path: Path, found: dict[str, Path]) -> None:
     """Collect a page and every file that it links to, at whatever depth."""
-    found[place(path)] = path
-    if path.suffix != ".md":
+    if path.suffix != ".ipynb":
+        found[place(path)] = path
+    if path.suffix not in (".md", ".ipynb"):
         return
     for target, _ in LINK.findall(path.read_text(encoding="utf-8")):
         there = Path(os.path.normpath(path.parent / target))
@@ -133,7 +134,8 @@ def notebook(path: Path) -> tuple[str, dict[str, bytes]]:
 def on_files(files: Any, config: Any) -> Any:
     """Add what is not a file of docs/, and what is made."""
     found: dict[str, Path] = {}
-    for page in (*DOCS.glob("*.md"), *(ROOT / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md"))):
+    top = [ROOT / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")]
+    for page in (*DOCS.glob("*.md"), *DOCS.glob("notebooks/*.ipynb"), *top):
         if page.exists():
             linked(page, found)
     made: dict[str, str | bytes] = {"commands.md": commands()}

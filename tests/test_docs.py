@@ -334,6 +334,7 @@ def test_links_lead_somewhere(project: Path, document: str) -> None:
 def test_the_changelog_speaks_of_this_version(project: Path) -> None:
     first = re.search(r"^## (\S+)", (project / "CHANGELOG.md").read_text(encoding="utf-8"), flags=re.MULTILINE)
     assert first is not None and first[1] == bemt.__version__
+    assert f"\nversion: {bemt.__version__}\n" in (project / "CITATION.cff").read_text(encoding="utf-8")
 
 
 def test_the_picture_shows_today_s_numbers(project: Path, maker: ModuleType) -> None:

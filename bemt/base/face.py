@@ -13,7 +13,7 @@ __all__ = ["CallableRoom", "as_html", "table_html"]
 
 
 class CallableRoom(ModuleType):
-    """Package whose call, signature and help are those of the function of its name in ``bemt.library``.
+    """Package whose call and signature are those of the function of its name in ``bemt.library``.
 
     So ``bemt.diagnose(...)`` and ``from bemt.diagnose import plan`` both work.
     """
@@ -28,10 +28,6 @@ class CallableRoom(ModuleType):
     @property
     def __signature__(self) -> inspect.Signature:
         return inspect.signature(self._function())
-
-    @property
-    def __doc__(self) -> str:  # type: ignore[override]
-        return str(self._function().__doc__)
 
 
 def as_html(head: str, text: str) -> str:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from bemt.air import Air
 
-__all__ = ["Propeller", "load", "propeller", "rotor_of"]
+__all__ = ["Propeller", "load", "propeller"]
 
 Array = NDArray[np.float64]
 CHANNELS = (
