@@ -227,7 +227,13 @@ class Dataset:
 
     @property
     def converged(self) -> NDArray[np.bool_]:
-        """Points whose channels that were computed are all numbers, (N,)."""
+        """Points whose channels that were computed are all numbers, (N,).
+
+        Examples
+        --------
+        >>> Dataset("bemt", "p", {"rpm": [4000.0, 6000.0], "thrust_N": [2.1, math.nan]}).converged
+        array([ True, False])
+        """
         loads = [v for key, v in self.values.items() if key in ("thrust_N", "torque_Nm", "CT", "CP")]
         return np.asarray(np.all(np.isfinite(loads or list(self.values.values())), axis=0))
 
@@ -411,6 +417,12 @@ class Dataset:
         ------
         InputError
             When xarray is not installed.
+
+        Examples
+        --------
+        >>> x = Dataset("bench", "stand", {"rpm": [6000.0], "thrust_N": [10.0]}).to_xarray()
+        >>> x["thrust_N"].attrs["units"], x.sizes["point"]
+        ('N', 1)
         """
         from bemt.base.errors import needs
 

@@ -135,6 +135,19 @@ def test_docstrings_agree_with_the_code_and_name_units(module: str) -> None:
     assert not faults, "\n".join(faults)
 
 
+@pytest.mark.parametrize("module", ["bemt.library.answers", "bemt.library.rotors", "bemt.dataset"])
+def test_everything_of_the_face_has_an_example_that_runs(module: str) -> None:
+    """Its own, or a line of its class's; pytest runs them."""
+    without = []
+    found = dict(public_objects(importlib.import_module(module)))
+    for name, item in found.items():
+        home, _, last = name.rpartition(".")
+        shown = [row for row in (getattr(found.get(home), "__doc__", "") or "").splitlines() if ">>>" in row]
+        if ">>>" not in (item.__doc__ or "") and not any(f".{last}" in row for row in shown):
+            without.append(name)
+    assert without == []
+
+
 HEAD = "Parameters\n----------\n"
 BLADES = "B : int\n    Blades.\n"
 

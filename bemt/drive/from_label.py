@@ -84,6 +84,15 @@ class DriveEstimate:
         What was varied, and how far.
     notes : tuple of str
         What does not fit.
+
+    Examples
+    --------
+    >>> import bemt
+    >>> found = bemt.drive("10x5", kv=1000, cells=3, mass_kg=1.2, rotors=4)
+    >>> found.reached, 0.3 < found.hover["throttle"].value < 0.8, found.to_dict()["schema"]
+    (True, True, 'bemt.drive.estimate/1')
+    >>> print(found.text.splitlines()[0])
+    prop_10x5, 1000 rev/min/V, 3S at 50% charge, ± one standard deviation
     """
 
     label: str

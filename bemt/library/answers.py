@@ -323,6 +323,8 @@ def compare(
     >>> found = bemt.compare(a, b)
     >>> found.verdict, found.effects
     ('sensor', ('thrust_gain',))
+    >>> print(found.text.splitlines()[0])
+    verdict: sensor thrust_gain
     """
     from bemt.diagnose import contrast
 
