@@ -217,7 +217,7 @@ class Dataset:
         )
         notes = "".join(f"<br><small>{html.escape(note)}</small>" for note in self.notes)
         what = f"<strong>{html.escape(f'{self.kind}: {self.name}, {len(self)} points')}</strong>"
-        return f'{what}<div style="overflow-x:auto"><table><tr>{head}</tr>{rows}</table></div>{notes}'
+        return f'{what}<div style="overflow-x:auto"><table class="bemt"><tr>{head}</tr>{rows}</table></div>{notes}'
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle as plain dictionaries (worker processes send series back)."""

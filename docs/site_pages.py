@@ -140,7 +140,8 @@ def on_files(files: Any, config: Any) -> Any:
             linked(page, found)
     made: dict[str, str | bytes] = {"commands.md": commands()}
     for name, (title, text, names) in API.items():
-        made[name] = "\n\n".join([f"# {title}", text, *(f"::: {n}" for n in names)])
+        whole = "\n    options:\n      show_root_full_path: true" if name == "api_contracts.md" else ""
+        made[name] = "\n\n".join([f"# {title}", text, *(f"::: {n}{whole}" for n in names)])
     for book in sorted((DOCS / "notebooks").glob("*.ipynb")):
         text, pictures = notebook(book)
         text = relinked(text, book)
@@ -177,3 +178,10 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
 def on_page_content(content: str, **_: Any) -> str:
     """Show the roles of docstrings as code."""
     return re.sub(r":(?:class|func|meth|data|attr|mod):<code>~?([\w.]+)</code>", r"<code>\1</code>", content)
+
+
+def on_post_page(output: str, **_: Any) -> str:
+    """Name the search for screen readers; what scrolls can be reached by keyboard."""
+    dialog = 'data-md-component="search" role="dialog"'
+    output = output.replace(dialog, f'{dialog} aria-label="Search"')
+    return output.replace('<div style="overflow-x:auto">', '<div style="overflow-x:auto" tabindex="0">')

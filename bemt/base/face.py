@@ -47,8 +47,8 @@ def table_html(head: str, rows: Mapping[str, str], note: str = "") -> str:
     Examples
     --------
     >>> table_html("10x5", {"blades": "2"})
-    '<strong>10x5</strong><table><tr><th>blades</th><td>2</td></tr></table>'
+    '<strong>10x5</strong><table class="bemt"><tr><th>blades</th><td>2</td></tr></table>'
     """
     cells = "".join(f"<tr><th>{html.escape(k)}</th><td>{html.escape(v)}</td></tr>" for k, v in rows.items())
     tail = f"<small>{html.escape(note)}</small>" if note else ""
-    return f"<strong>{html.escape(head)}</strong><table>{cells}</table>{tail}"
+    return f'<strong>{html.escape(head)}</strong><table class="bemt">{cells}</table>{tail}'

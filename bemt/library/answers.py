@@ -52,6 +52,7 @@ def read(path: str | os.PathLike[str], format: str | None = None) -> Dataset:  #
     Examples
     --------
     >>> import tempfile
+    >>> from pathlib import Path
     >>> file = Path(tempfile.mkdtemp()) / "bench.csv"
     >>> _ = file.write_text("rpm,thrust_gf,torque_Nm\n5000,340,0.05\n6000,490,0.07\n")
     >>> read(file).thrust_N.round(2)
@@ -199,7 +200,7 @@ def diagnose(
 
     Examples
     --------
-    A line of points at rest and no reference: the answer is that these readings cannot tell.
+    Points at rest that the model itself made: nothing is left out.
 
     >>> import bemt
     >>> p = bemt.propeller("10x5")
