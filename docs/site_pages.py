@@ -35,7 +35,7 @@ PARTS = {  # navigation; a name ending in * stands for all pages of that name
     "Start": ("index.md", "quickstart.md", "people.md", "gallery.md"),
     "How to": ("notebooks/*", "exports.md", "adding.md", "scaling.md"),
     "Python": tuple(API),
-    "Commands and files": ("commands.md", "reference_*", "nomenclature.md"),
+    "Commands and files": ("commands.md", "reference_*", "mistakes.md", "nomenclature.md"),
     "Theory": ("theory.md", "effects.md", "diagnosis.md"),
     "Project": ("reports/README.md", "reports/report.md", "CONTRIBUTING.md", "CHANGELOG.md"),
 }
@@ -160,13 +160,15 @@ def on_files(files: Any, config: Any) -> Any:
 def navigation(pages: list[str]) -> list[Any]:
     """The parts of the site, with those of their pages that exist."""
     nav: list[Any] = []
+    left = {name for name in pages if "/" not in name}
     for title, names in PARTS.items():
         chosen: list[str] = []
         for name in names:
             chosen += sorted(p for p in pages if p.startswith(name[:-1])) if name.endswith("*") else [name]
         known = [{"Overview": name} if name == "index.md" else name for name in chosen if name in pages]
         nav.append({title: known})
-    return nav
+        left -= set(chosen)
+    return [*nav, *([{"More": sorted(left)}] if left else [])]
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:

@@ -93,7 +93,7 @@ def test_version() -> None:
 
 @pytest.mark.parametrize(
     "arguments",
-    [["swep"], ["sweep"], ["sweep", "cases", "--jobs", "0"], ["sweep", "cases", "--jobs", "two"],
+    [["swep"], ["sweep", "cases", "--jobs", "0"], ["sweep", "cases", "--jobs", "two"],
      ["validate"], ["validate", "x", "--polar", "100000"], ["validate", "x", "--polar", "fixed:many"], ["bench", "x"]],
 )  # fmt: skip
 def test_wrong_usage_is_2_and_says_so_on_stderr(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
@@ -144,6 +144,15 @@ def test_trouble_with_files_is_an_input_fault(
     assert capsys.readouterr().err == (
         "out/table.txt: got No space left on device; expected a file or folder that can be used.\n"
     )
+
+
+def test_a_sweep_without_cases_takes_those_of_this_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["sweep"]) == 2 and "no case" in capsys.readouterr().err
+    assert cli.main(["new", "10x5"]) == 0 and cli.main(["sweep"]) == 0
+    assert "prop_10x5" in capsys.readouterr().out
 
 
 def test_another_package_of_the_name_geometry_is_named(tmp_path: Path) -> None:
