@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
+from pathlib import Path
 
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
 from bemt.commands import _options, _terminal
@@ -22,6 +24,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="DIR", help="keep items, key, answers and score there")
     jobs = "diagnoses at a time (default: one per core)"
     parser.add_argument("--jobs", type=_options.positive, metavar="N", help=jobs)
+    kept = "folders of kept proofs: write factors on the intervals of parameters to --out instead"
+    parser.add_argument("--calibrate-intervals", metavar="DIR", help=kept, **_options.MANY)
     _options.add_json(parser, "bemt.proof/1")
     _options.add_quiet(parser, "no tables")
 
@@ -33,9 +37,22 @@ def run(args: argparse.Namespace) -> int:
     from bemt.proof.prove import prove
 
     with _terminal.progress() as say:
+        if args.calibrate_intervals:
+            return _intervals(args.calibrate_intervals, args.out, say)
         found = prove(args.out, args.size, args.seed, args.jobs, say, _terminal.complain)
     if args.json:
         print(json_text(found), end="")
     elif not args.quiet:
         print(proof_text.text(found))
     return EXIT_OK if all(row["met"] is not False for row in found["score"]) else EXIT_UNCONVERGED
+
+
+def _intervals(folders: list[str], out: str | None, say: Callable[[str], None]) -> int:
+    """Write the factors on the intervals."""
+    from bemt.base.tables import json_text, write_atomic
+    from bemt.diagnose.interval_scales import FILE
+    from bemt.proof.intervals import calibrate, misses
+
+    sets, found = zip(*(misses(Path(folder), say) for folder in folders), strict=True)
+    write_atomic(Path(out or ".") / FILE, json_text(calibrate([m for some in found for m in some], sets)))
+    return EXIT_OK
