@@ -305,13 +305,16 @@ def _solved(
 
     model = prepare_case(case)
     found = model.solve(rpm, V, air)
+    flags = found.flags
     more = DUCTED if case.ducted else ()
     u: dict[str, Array] = {}
     if bands:
-        from bemt.compare.sweep.model_error import u_model
+        from bemt.compare.sweep.model_error import beyond, u_model
 
         u = {key: value for key, value in u_model(case, model, found, air).items() if key in BANDED}
-    return {key: np.asarray(found[key], dtype=float) for key in (*CHANNELS, *more)}, found.flags, u
+        wider = beyond(case, found)[1]
+        flags = tuple((*f, *filter(None, [w])) for f, w in zip(flags, wider, strict=True))
+    return {key: np.asarray(found[key], dtype=float) for key in (*CHANNELS, *more)}, flags, u
 
 
 def propeller(
