@@ -126,6 +126,15 @@ def test_a_measured_pitch_counts_as_much_as_the_label():
     assert same.u_thrust_N[0] < label.u_thrust_N[0]
 
 
+def test_a_series_changes_thrust_in_flight_and_power_everywhere():
+    """At rest a0 of a series made thrust worse than without it."""
+    at = (0.5, np.array([0.0, 0.1, 0.25, 0.5]), 0.1, 5e4)
+    plain, own = compact.coefficients(*at), compact.series_coefficients(*at, 0.05)
+    whole = compact.coefficients(*at, zero_lift=0.05)
+    assert own[0][0] == plain[0][0] and own[0][2:] == pytest.approx(whole[0][2:])
+    assert np.all(own[1] == whole[1])
+
+
 def test_a_series_shifts_zero_thrust_and_the_typical_chord():
     kwargs = {"diameter_m": 0.254, "pitch_m": 0.127, "blades": 2, "rpm": 6000.0}
     plain, slow = estimate.estimate(**kwargs), estimate.estimate(**kwargs, series="APC slow flyer")

@@ -83,9 +83,11 @@ class Prediction:
 
     def log_density(self, y: Array) -> Array:
         """Logarithm of the probability density of readings, (2, P)."""
+        from scipy.special import logsumexp
+
         sds = self.sds(noise=True)
-        away = ((y - self.mean)[..., None] / sds) ** 2
-        return np.asarray(np.log((np.exp(-0.5 * away) / sds) @ self.chances) - 0.5 * math.log(2.0 * math.pi))
+        logs = -0.5 * ((y - self.mean)[..., None] / sds) ** 2 - np.log(sds) - 0.5 * math.log(2.0 * math.pi)
+        return np.asarray(logsumexp(logs, axis=-1, b=self.chances))
 
     def half_width(self, level: float = LEVELS[0], noise: bool = False) -> Array:
         """Half width of the interval that holds the rotor's own coefficient (with noise: a reading), (2, P) [1]."""

@@ -25,7 +25,7 @@ _FEWEST = 5
 def scatter(values: Array, order: Array) -> float:
     """Scatter of single readings along a smooth run: root mean square of second differences over the square root of 6.
 
-    Zero with fewer than five. A smooth curve leaves none, so that what differs from reading to reading is not taken for
+    Zero with fewer than five. A smooth curve leaves next to none, so that what differs from reading to reading is not taken for
     the solver's rest (von Neumann et al., Annals of Mathematical Statistics 12, 1941, for first differences; not checked).
     """
     along = values[np.argsort(order)]
@@ -100,7 +100,7 @@ class ReferenceRun:
         good = np.isfinite(y) & np.isfinite(found.f)
         left = np.where(good, y - found.f - found.T @ (found.mean - found.at), 0.0)
         slopes = np.where(good[:, None], found.T, 0.0)
-        return ReferenceRun(x, Re, np.where(good, amplitude, 0.0), left, noise, slopes, found.noise_size)
+        return ReferenceRun(x, Re, np.where(good, amplitude, 0.0), left, found.excess * noise, slopes, found.noise_size)
 
     def document(self) -> dict[str, Any]:
         """Plain values for the file."""

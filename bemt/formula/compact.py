@@ -247,3 +247,23 @@ def coefficients(
         Cp = C * (lc + INDUCED_FACTOR * induced) + s * c.cd0 * np.sqrt(RE_DRAG / Re) / 8.0
         Cp = Cp + c.stall_drag * lost * pd / np.pi
     return np.asarray(C * co.CT_PER_ROTOR), np.asarray(Cp * co.CP_PER_ROTOR)
+
+
+SERIES_WHOLE = 0.5
+"""J/(P/D) from which a0 of a series acts on thrust as a whole; at rest it does not [-]."""
+
+
+def series_coefficients(
+    P_D: ArrayLike, J: ArrayLike, solidity: ArrayLike, Re: ArrayLike, zero_lift: ArrayLike,
+    constants: Constants = CONSTANTS,
+) -> tuple[Array, Array]:  # fmt: skip
+    """Thrust and power coefficient of a propeller of a known series. [-]
+
+    a0 of a series is learnt at rest and in flight together. In flight it helps thrust (given the chord, 9.7 to
+    7.9 % in the median), at rest it makes some series worse (Master Airscrew Scimitar 4.9 to 7.9 %, given the chord): there it acts on power
+    alone. Chosen on UIUC volumes 1 and 2.
+    """
+    pd, J = np.asarray(P_D, dtype=float), np.asarray(J, dtype=float)
+    share = np.clip(np.nan_to_num(J / pd) / SERIES_WHOLE, 0.0, 1.0)
+    CT = coefficients(pd, J, solidity, Re, constants, share * zero_lift)[0]
+    return CT, coefficients(pd, J, solidity, Re, constants, zero_lift)[1]
