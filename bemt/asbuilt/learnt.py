@@ -12,8 +12,8 @@ Array = NDArray[np.float64]
 DUCT = 1.5
 """Factor on u_model of a ducted rotor, declared: no duct was in the population [1]."""
 FREE_MACH = 0.5
-"""Tip Mach number up to which nothing is widened, though the measured ones end at 0.28: sections at 0.75 R then see 0.38,
-where the Prandtl-Glauert factor is 8 % and in the solver, declared [1]."""
+"""Tip Mach number up to which nothing is widened, though the measured ones end at 0.28: sections at 0.75 R then see
+0.38, where the Prandtl-Glauert factor is 8 % and in the solver, declared [1]."""
 MOST = 2.0
 """Largest factor of any other departure, declared [1]."""
 
@@ -36,8 +36,9 @@ class Learnt:
     def beyond(self, diameter_m: float, M_tip: Array, ducted: bool) -> tuple[Array, tuple[str, ...]]:
         """Factor on u_model at points, (P,), and for each why it is wider, or nothing.
 
-        Declared, as nothing measured says it: 1.5 for a duct; the square root of the ratio of diameters; linear in the tip
-        Mach number from `FREE_MACH`, 2 at the speed of sound. Each but the duct's ends at 2; together they are multiplied.
+        Declared, as nothing measured says it: 1.5 for a duct; the square root of the ratio of diameters; linear in the
+        tip Mach number from `FREE_MACH`, 2 at the speed of sound. Each but the duct's ends at 2; together they are
+        multiplied.
         """
         known = max(self.M_tip, FREE_MACH)
         low, high = self.diameter_m

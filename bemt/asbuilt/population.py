@@ -35,12 +35,13 @@ ANGLE_SD = {"cad": 0.1, "scan": 0.5}
 """Standard deviation of the blade angle where the blade was drawn or scanned [deg], declared: CAD as meshed; scans half
 as far off as optical stations.  Those of stations and labels are part of the fit."""
 CHORD_SD, CHORD_SD_SMALL = 0.21, 0.45
-"""Scatter of ln(lift) and ln(drag) for a chord that only the label tells, from 7 in up and below, calibrated: of 87 propellers
-of UIUC the chord itself scatters by 0.17 and 0.25 around the law of `bemt.case.fresh` (each family left out of it), but from
-the label alone these widths predict them better (log score -0.09 a point for -0.12), as the blade's law is unknown too [1]."""
+"""Scatter of ln(lift) and ln(drag) for a chord that only the label tells, from 7 in up and below, calibrated: of 87
+propellers of UIUC the chord itself scatters by 0.17 and 0.25 around the law of `bemt.case.fresh` (each family left out
+of it), but from the label alone these widths predict them better (log score -0.09 a point for -0.12), as the blade's
+law is unknown too [1]."""
 LABEL_NU = 2.9
-"""Degrees of freedom of Student's t fitted to the differences of stations and labels of 87 propellers of UIUC (scale 1.02 deg,
-centre 0.68): a label is now and then wrong by six degrees [1]."""
+"""Degrees of freedom of Student's t fitted to the differences of stations and labels of 87 propellers of UIUC (scale
+1.02 deg, centre 0.68): a label is now and then wrong by six degrees [1]."""
 CAMBER_SD = 1.2
 """Zero-lift angle of a section that nobody published, around the rule's [deg]: the ten families whose camber was
 calibrated lie at 3.5 to 6.5 % of the chord (rms 1.5 % from the rule's 3.5, less without slow flyers), 1.04 deg per
@@ -101,7 +102,7 @@ class Population:
         Lengths of the rest in J/J0 and in ln Re and exponent of its rational quadratic covariance, (1 + d^2 / 2 a)^-a
         (Rasmussen and Williams 2006, eq. 4.19): the smaller, the more lengths it has at once [1].
     bias_CT, bias_CP, bow_CT, bow_CP : float
-        Expectation of the rest at zero thrust, and of its bow at half of that J, over the coefficient at rest [1].
+        Expectation of the rest over the coefficient at rest: parts that grow with (J/J0)^4 and with (J/J0)^2 [1].
     rest_correlation : float
         Of the rest between CT and CP [1].
     noise : float
@@ -218,10 +219,10 @@ class Population:
         return np.asarray(np.kron(both, (1.0 + far / (2.0 * self.reach)) ** -self.reach))
 
     def bias(self, x: Array, top: Array) -> Array:
-        """Expectation of the rest, (2, P): zero at rest, a parabola in J/J0 [1]."""
+        """Expectation of the rest, (2, P): zero at rest and level there [1]."""
         x = np.clip(x, 0.0, 1.0)
-        end, middle = np.array([[self.bias_CT], [self.bias_CP]]), np.array([[self.bow_CT], [self.bow_CP]])
-        return np.asarray((end * x**2 + 4.0 * middle * x * (1.0 - x)) * np.abs(top))
+        late, early = np.array([[self.bias_CT], [self.bias_CP]]), np.array([[self.bow_CT], [self.bow_CP]])
+        return np.asarray((late * x**4 + early * x**2) * np.abs(top))
 
     def rest(self, diameter_m: float, x: Array, Re: Array, f: Array, top: Array) -> Array:
         """Covariance of the smooth rest. [1]"""

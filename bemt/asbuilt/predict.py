@@ -128,7 +128,8 @@ def predict(
     rest = p.rest_sd(at.diameter_m, at.f, at.top)
     if reference is not None:
         shift, T, left = reference.near(p, at.x, at.Re, rest, T)
-        # near the run the rest is as large as it was there, if that is more than usual; far from it, as large as is usual
+        # near the run the rest is as large as it was there, if that is more than usual; far from it, as large as is
+        # usual
         usual = float(np.sqrt(WEIGHTS @ p.rest_sizes**2))
         told = 1.0 - np.divide(left, rest, out=np.ones_like(rest), where=rest > 0.0) ** 2
         mean, rest = mean + shift, left * np.sqrt(told * max(reference.size / usual, 1.0) ** 2 + 1.0 - told)

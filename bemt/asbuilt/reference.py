@@ -25,8 +25,9 @@ _FEWEST = 5
 def scatter(values: Array, order: Array) -> float:
     """Scatter of single readings along a smooth run: root mean square of second differences over the square root of 6.
 
-    Zero with fewer than five. A smooth curve leaves next to none, so that what differs from reading to reading is not taken for
-    the solver's rest (von Neumann et al., Annals of Mathematical Statistics 12, 1941, for first differences; not checked).
+    Zero with fewer than five. A smooth curve leaves next to none, so that what differs from reading to reading is not
+    taken for the solver's rest (von Neumann et al., Annals of Mathematical Statistics 12, 1941, for first differences;
+    not checked).
     """
     along = values[np.argsort(order)]
     along = along[np.isfinite(along)]

@@ -30,9 +30,9 @@ def beyond(case: Case, points: Dataset) -> tuple[Array, tuple[str, ...]]:
 def u_model(case: Case, model: Model, points: Dataset, air: Air) -> dict[str, Array]:
     """Standard uncertainty of each channel from the model itself: 68 % half width, about the nominal result.
 
-    Beyond the population it is wider by `beyond`. What the population expects beside the nominal result counts too, as a root sum of squares.  Exhaust speed follows
-    thrust by momentum, T = m V_e - m V, so that dV_e/V_e = (V_e - V)/(2 V_e - V) dT/T.  The duct's share has none: no
-    population tells of it.
+    Beyond the population it is wider by `beyond`. What the population expects beside the nominal result counts too, as
+    a root sum of squares.  Exhaust speed follows thrust by momentum, T = m V_e - m V, so that dV_e/V_e = (V_e - V)/(2
+    V_e - V) dT/T.  The duct's share has none: no population tells of it.
     """
     known = case.as_built()
     found = predict_model(model, known.prior, points, air, known.drawn, known.reference)

@@ -99,7 +99,8 @@ def observe(propeller: UiucPropeller, effects: Sequence[Effect], stations: Stati
 def conditioned(seen: Observed, p: Population, on: str) -> Expected:
     """Expectation after conditioning on points of one kind; those of the other count.
 
-    ``on`` is ``static``, ``forward``, or ``static_and_one``: the forward point nearest to half of the zero-thrust J too.
+    ``on`` is ``static``, ``forward``, or ``static_and_one``: the forward point nearest to half of the zero-thrust J
+    too.
     """
     m, drawn = seen.record, seen.drawn
     good = counted(drawn)

@@ -43,7 +43,9 @@ class Pool:
                 self._found.setdefault(key, []).extend(values)
 
     def total(self) -> dict[str, Any]:
-        """Statistics over all points; ``log_score`` is a mean over propellers of the mean log density of their points."""
+        """Statistics over all points; ``log_score`` is a mean over propellers of the mean log density of their
+        points.
+        """
         out: dict[str, Any] = {}
         for kind in KINDS:
             sizes = [e.size for e in self._found.get((kind, "CT", "error"), [])]

@@ -1,9 +1,9 @@
 """What a rotor's static run can tell of its thrust in flight at best: a yardstick for conditioning.
 
-The error of the solver over measured CT in flight is written as a sum of nine terms: 1, J/J0 and its square, times 1, the
-rotor's mean error of static CT and that of static CP, all over CT / CT at rest.  The coefficients minimise the sum of absolute
-errors (iteratively reweighted least squares) over the very points they are judged on: a rule that knows the answers.
-Beside it the same rule with each rotor left out of it.
+The error of the solver over measured CT in flight is written as a sum of nine terms: 1, J/J0 and its square, times 1,
+the rotor's mean error of static CT and that of static CP, all over CT / CT at rest.  The coefficients minimise the sum
+of absolute errors (iteratively reweighted least squares) over the very points they are judged on: a rule that knows
+the answers. Beside it the same rule with each rotor left out of it.
 """
 
 from __future__ import annotations
