@@ -117,7 +117,7 @@ def transfer(seen: Sequence[Observed], say: Say = None) -> dict[str, Any]:
 
 def log_score(total: dict[str, Any]) -> float:
     """Mean log score over CT and CP, static and forward."""
-    return sum(total[kind][q]["log_score"] for kind in KINDS for q in ("CT", "CP")) / 4.0
+    return float(sum(total[kind][q]["log_score"] for kind in KINDS for q in ("CT", "CP")) / 4.0)
 
 
 def table(document: dict[str, Any]) -> str:
@@ -140,8 +140,8 @@ def table(document: dict[str, Any]) -> str:
                 lines.append(f"{text + ', ' + kind + ' ' + q:60}  {' '.join(shown)}")
     limit = document["static_limit"]
     for key, text in (("seen", "answers known to it"), ("left_out", "rotor left out")):
-        cells = f"{100 * limit[key]['median_abs']:6.1f} {100 * limit[key]['p90_abs']:6.1f}"
-        lines.append(f"{'best line from static to forward CT, ' + text:60}  {cells}")
+        errors = f"{100 * limit[key]['median_abs']:6.1f} {100 * limit[key]['p90_abs']:6.1f}"
+        lines.append(f"{'best line from static to forward CT, ' + text:60}  {errors}")
     n = document["declared"]
     scores = [log_score(total) for total in (n, *document["transfer"].values())]
     lines += [
