@@ -112,7 +112,7 @@ def text(doc: dict[str, Any]) -> str:
         lines.append(f"This rotor is {doc['size']:.1f} times as far from its description as is usual: check the case.")
     if doc["excess"] > 1.0:
         times = number_text(math.sqrt(doc["excess"]), 2)
-        lines.append(f"No such rotor gives these readings: they count as if {times} times as rough. Check the recording.")
+        lines.append(f"No such rotor gives these readings: they count as {times} times as rough. Check the recording.")
     return "\n".join(lines)
 
 
