@@ -110,7 +110,7 @@ class Propeller:
         Examples
         --------
         >>> propeller("10x5").unknowns["blade.max_chord_over_R"]
-        '0.15 .. 0.24'
+        '0.15 .. 0.31'
         """
         return {item.key: item.range_text for item in self.case.assumptions}
 
