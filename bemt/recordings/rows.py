@@ -21,7 +21,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.recordings.channels import Recorded
+from bemt.dataset import Dataset
+from bemt.recordings.channels import stated
 
 __all__ = ["at_rest", "command_of", "is_samples"]
 
@@ -33,7 +34,7 @@ HELD = 5
 IDLE_S = 1.0005e-3
 
 
-def command_of(rec: Recorded) -> tuple[str, Array] | None:
+def command_of(rec: Dataset) -> tuple[str, Array] | None:
     """Find the command."""
     for name in ("pwm_s", "throttle"):
         v = rec.values.get(name)
@@ -49,7 +50,7 @@ def _held(command: Array) -> bool:
     return bool(lengths[lengths >= HELD].sum() > 0.5 * len(command))
 
 
-def _unlike(rec: Recorded) -> bool:
+def _unlike(rec: Dataset) -> bool:
     """Whether neighbouring rows differ in everything that was measured."""
     steps = []
     for name in ("rpm", "thrust_N", "torque_Nm", "power_W", "current_A"):
@@ -61,9 +62,9 @@ def _unlike(rec: Recorded) -> bool:
     return bool(steps) and min(steps) > UNLIKE
 
 
-def is_samples(rec: Recorded) -> tuple[bool, str]:
+def is_samples(rec: Dataset) -> tuple[bool, str]:
     """Decide what the rows are."""
-    if rec.u:
+    if stated(rec):
         return False, "rows are points: they have uncertainties of their own"
     if len(rec) < FEWEST:
         return False, f"rows are points: fewer than {FEWEST}"
@@ -87,7 +88,7 @@ def is_samples(rec: Recorded) -> tuple[bool, str]:
     return False, "rows are points: no time, and no command that is held"
 
 
-def at_rest(rec: Recorded) -> NDArray[np.bool_]:
+def at_rest(rec: Dataset) -> NDArray[np.bool_]:
     """Rows at which nothing turns, (N,)."""
     n = len(rec)
     found = command_of(rec)
