@@ -214,6 +214,13 @@ def test_means_are_over_time_when_the_step_changes(put: Callable[..., Path]) -> 
     assert any("means of single revolutions differ" in w for w in record.notes)
 
 
+def test_a_table_with_a_column_of_time_is_averaged_over_revolutions(put: Callable[..., Path]) -> None:
+    t = 0.001 * np.arange(1, 401)
+    rows = "".join(f"{x:.3f},{2.0 + np.sin(2.0 * np.pi * x / 0.05):.9f}\n" for x in t)
+    mean = import_file(put("t.csv", "time_s,force_N\n" + rows), choice=Choice(0.05, 2)).provenance["means"]["force_N"]
+    assert mean.value == pytest.approx(2.0) and mean.over.startswith("last 2 revolutions")
+
+
 def test_the_published_screw(shared_data: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = shared_data / "cfd_exports" / "screw" / "report-def-0-rfile_1_1.out"
     for args, mean in (

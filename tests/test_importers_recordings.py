@@ -15,9 +15,10 @@ from bemt import readers as importers
 from bemt.base import units
 from bemt.base.errors import InputError
 from bemt.dataset import Dataset
-from bemt.readers import generic_csv, jmajew, pybemt_ini, rcbenchmark
+from bemt.readers import _large, generic_csv, jmajew, pybemt_ini, rcbenchmark
 from bemt.readers._headings import heading
 from bemt.readers._split import NO_VALUE
+from bemt.recordings.reduce import reduce, reduction
 
 RC_HEAD = (
     "Time (s),ESC signal (µs),Servo 1 (µs),AccX (g),Torque (N·m),Thrust (gf),Voltage (V),Current (A),"
@@ -135,7 +136,7 @@ def test_a_heading_says_name_and_unit(text: str, name: str, unit: str) -> None:
     assert (got.name, got.unit_name) == (name, unit)
 
 
-@pytest.mark.parametrize("text", ["Thrust (kg)", "thrust_g", "Thrust (lb)", "Torque (kg·cm)", "T [G]"])
+@pytest.mark.parametrize("text", ["Thrust (kg)", "load_g", "Thrust (lb)", "Torque (kg·cm)", "T [G]"])
 def test_a_mass_is_no_force(text: str, write: Write) -> None:
     got = importers.read(write(f"Time (s),{text},RPM\n" + "".join(f"{k},{k + 1},{3000 + k}\n" for k in range(5))))
     name = next(name for name in got.values if name not in ("time_s", "rpm"))
@@ -558,7 +559,8 @@ def test_the_published_logs_show_their_known_faults(shared_data: Path) -> None:
     assert [k for k, f in enumerate(raw.flags) if "spike of torque_Nm" in f] == [831]
 
 
-GRAMS = ["Thrust (g)", "thrust [g]", "Schub (g)", "Poussée (g)", "Empuje [g]", "Motor thrust (grams)"]
+GRAMS = ["Thrust (g)", "thrust_g", "Schub_g", "Thrust g", "thrust [g]", "Schub (g)", "Poussée (g)", "Empuje [g]",
+         "Motor thrust (grams)"]  # fmt: skip
 
 
 @pytest.mark.parametrize("text", GRAMS)
@@ -609,3 +611,66 @@ def test_electrical_rpm_is_asked_about_only_where_the_numbers_leave_doubt(write:
     text = "rpm,thrust_N\n{},1\n{},4\n"
     slow, fast = (importers.read(write(text.format(top / 2, top), f"{top}.csv")) for top in (9000, 60000))
     assert not said(slow, "electrical") and said(fast, "electrical")
+
+
+def _with_odd_cells(text: str, mark: str = ",") -> str:
+    """A word, an empty cell, a number in quotes and one without end, each in a row of its own."""
+    lines = [line.split(mark) for line in text.splitlines()]
+    for row, column, cell in ((60, 1, "ERR"), (75, 2, ""), (90, 3, '"1.25"'), (130, 1, "inf"), (150, 2, "n/a")):
+        lines[row][column] = cell
+    return "\n".join(mark.join(cells) for cells in lines) + "\n"
+
+
+def _log(mark: str = ",", rows: int = 300) -> str:
+    columns = (
+        (f"{0.01 * k:.2f}", f"{3000 + k * 7 % 13}", f"{0.5 + k * 5 % 11 / 100}", f"0.0{k % 9}") for k in range(rows)
+    )
+    heads = mark.join(["time_s", "rpm", "thrust_kgf", "Q_Nm" if mark == " " else "Q (Nm)"])
+    return "\n".join([heads, *map(mark.join, columns)]) + "\n"
+
+
+LARGE_LOGS = {
+    "plain": _log(), "semicolons": _log(";"), "decimal commas": _log(";").replace(".", ","), "blanks": _log(" "),
+    "tabs and a comment": "# stand 7\n" + _log("\t"), "windows": _log().replace("\n", "\r\n"),
+    "odd cells": _with_odd_cells(_log()), "cut": _log()[:-9], "no end": _log()[:-1],
+    "short line": _log() + "3.0,3000\n",
+    "long line": _log().replace("\n1.00,", "\n9,1.00,"), "comment below": _log().replace("\n1.00,", "\n# x\n1.00,"),
+    "empty line": _log().replace("\n1.00,", "\n\n1.00,"), "spaces": _log().replace(",", " , "),
+    "heads above": "Stand 7\n3 May\n" + _log(), "units below": _log().replace("Q (Nm)\n", "Q\n(s),(rpm),(kgf),(Nm)\n"),
+    "a column of words": _log().replace("\n", ",ok\n"), "late words": _log().replace("\n2.", "\nx2."),
+}  # fmt: skip
+
+
+CELL_BY_CELL = ("short line", "long line", "comment below", "empty line", "a column of words", "late words")
+
+
+@pytest.mark.parametrize("name", LARGE_LOGS)
+def test_a_large_log_reads_as_a_small_one(name: str, write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Blocks of a few lines, so that every kind of block is met."""
+    path = write(LARGE_LOGS[name])
+
+    def read() -> Dataset | str:
+        try:
+            return importers.read(path, "table")
+        except InputError as error:
+            return str(error)
+
+    small = read()
+    monkeypatch.setattr(_large, "LARGE", 0)
+    monkeypatch.setattr(_large, "BLOCK", 700)
+    monkeypatch.setattr(_large, "HEAD", 1000)
+    assert (_large.large_table(path) is None) == (name in CELL_BY_CELL)
+    large = read()
+    if isinstance(small, str) or isinstance(large, str):
+        assert large == small
+        return
+    assert list(large.values) == list(small.values) and large.notes == small.notes and large.flags == small.flags
+    assert tuple(large.lines) == tuple(small.lines) and large.provenance == small.provenance
+    for key, v in small.values.items():
+        np.testing.assert_allclose(large[key], v, rtol=1e-14, err_msg=key)
+
+
+def test_a_clock_may_count_from_1970(write: Write) -> None:
+    body = "".join(f"{1.7e9 + 0.02 * k:.2f},{3000 + k % 3},{2.0 + 0.01 * (k % 5)}\n" for k in range(500))
+    got = reduction(reduce(importers.read(write("time_s,rpm,thrust_N\n" + body))))
+    assert got.mode == "samples" and not any(lost.channel == "time_s" for lost in got.dropped)

@@ -67,6 +67,7 @@ def load(
     if cfd_points.has_forces(imported):
         made = records.from_series(cfd_points.point_of(imported, path, rpm, airspeed_m_s), case)
         return replace(made, notes=(*made.notes, *imported.notes))
+    imported = _filled(imported, rpm, airspeed_m_s)
     _same_rotor(imported, case, path)
     ducted = case.ducted
     findings = check(imported, diameter_m=case.diameter_m, blades=int(case.get("rotor.blades")), ducted=ducted)
@@ -83,6 +84,22 @@ def load(
         made = records.from_series(points, case, shared)
     notes = (*made.notes, *imported.notes, *rows.notes, *_unused(imported, rows, case))
     return replace(made, findings=found, notes=notes)
+
+
+def _filled(imported: Dataset, rpm: float | None, airspeed_m_s: float | None) -> Dataset:
+    """Recording with the speed and the airspeed that the user states where it has no column of them."""
+    known = named(imported).values
+    told, notes = {}, []
+    for name, value, same in (("rpm", rpm, ("rpm",)), ("airspeed_m_s", airspeed_m_s, ("airspeed_m_s", "J"))):
+        if value is None:
+            continue
+        own = next((k for k in same if k in known), None)
+        if own is None:
+            told[name] = np.full(len(imported), float(value))
+        notes.append(f"{name}: {value:g} as told" if own is None else f"{name}: not as told, the file has {own}")
+    values = {**imported.values, **told}
+    units = {k: unit for k, unit in imported.units.items() if k not in told}
+    return replace(imported, values=values, units=units, notes=(*imported.notes, *notes)) if notes else imported
 
 
 def _scattered(series: Dataset, reduced: Dataset) -> Dataset:
@@ -161,18 +178,23 @@ def load_all(
     for case in found:
         prepare_case(case, None, 10)  # an unknown effect in the case is said before the work begins
     chosen = found * len(recordings) if len(found) == 1 else found
-    speeds, winds = _each("--rpm", rpm, len(recordings)), _each("--airspeed", airspeed_m_s, len(recordings))
-    loaded = [load(p, c, None, n, v) for p, c, n, v in zip(recordings, chosen, speeds, winds, strict=True)]
+    counts = (len(recordings), len(recordings) + len(references))
+    speeds, winds = _each("--rpm", rpm, *counts), _each("--airspeed", airspeed_m_s, *counts)
+    files = list(zip([*recordings, *references], [*chosen, *found[:1] * len(references)], speeds, winds, strict=True))
+    loaded = [load(p, c, None, n, v) for p, c, n, v in files[: len(recordings)]]
     if references and len(found) > 1:
         raise InputError(Fault("--reference", "", f"{len(found)} cases", "one case for all when there are references"))
-    return found, [*loaded, *(replace(load(p, found[0]), reference=True) for p in references)]
+    known = (load(p, c, None, n, v) for p, c, n, v in files[len(recordings) :])
+    return found, [*loaded, *(replace(r, reference=True) for r in known)]
 
 
-def _each(option: str, given: Sequence[float], n: int) -> list[float | None]:
-    """One number for each of n files: the same for all, or as given."""
-    if len(given) not in (0, 1, n):
+def _each(option: str, given: Sequence[float], recordings: int, n: int) -> list[float | None]:
+    """One number for each of n files, the references last: the same for all, or as given."""
+    if len(given) not in (0, 1, recordings, n):
         raise InputError(Fault(option, "", f"{len(given)} numbers for {n} files", "one for all, or one each"))
-    return [None] * n if not given else [float(given[0])] * n if len(given) == 1 else [float(v) for v in given]
+    if len(given) == 1:
+        return [float(given[0])] * n
+    return [*map(float, given), *[None] * (n - len(given))]
 
 
 def _told_twice(paths: Sequence[str], only: Sequence[str]) -> None:

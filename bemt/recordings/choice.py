@@ -59,8 +59,8 @@ def averaged(record: Dataset, period: float, revolutions: int | None = None) -> 
     >>> round(mean.value, 9), mean.over
     (2.0, 'last 2 revolutions (2 to 4 s, 200 rows)')
     """
-    name = record.provenance.get("time_channel", "")
-    own = set(record.provenance.get("clock_channels", "").split("\t"))
+    name = record.provenance.get("time_channel", "time_s")
+    own = {name, *record.provenance.get("clock_channels", "").split("\t")}
     if name not in record:
         note = "no column of time: the speed of rotation is not used"
         return replace(record, notes=(*record.notes, note))
