@@ -317,6 +317,13 @@ def test_the_parts_of_the_instrument_are_kept_apart() -> None:
     assert np.allclose(got.u["thrust_N"], 0.05) and np.all(np.isnan(got.u["torque_Nm"]))
 
 
+def test_a_log_without_a_clock_is_no_list_of_points() -> None:
+    rng = np.random.default_rng(3)
+    rpm = np.repeat([3000.0, 6000.0, 4500.0], 20000) + rng.normal(0.0, 5.0, 60000)
+    got = reduce(recording({"rpm": rpm, "thrust_N": K_T * rpm**2}))
+    assert reduction(got).mode == "samples" and np.allclose(got["rpm"], [3000.0, 6000.0, 4500.0], rtol=1e-3)
+
+
 def test_repeats_give_the_scatter_and_only_they_show_outliers() -> None:
     rng = np.random.default_rng(5)
     rpm = np.tile([4000.0, 6000.0, 8000.0], 8)

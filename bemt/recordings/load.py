@@ -7,8 +7,9 @@ appear in ``averaged_over`` and in the warnings. Files are never joined: a resta
 Schema ``bemt.import/1``: ``files`` is a list of ``path``, ``format``, ``kind``, ``rows``, ``channels`` (name to
 ``unit``, ``mean``, ``averaged_over``, ``drift``), ``warnings``, ``error`` (null when the file was read), ``findings``
 (``id``, ``channel``, ``evidence``, ``correction``, ``rows``, ``severity``; nothing is corrected) and ``reduction``
-(null unless it is a recording: ``mode``, ``points``, ``correlated``, ``dropped``, ``notes``, ``error``). A channel of
-a recording has a mean only where the recording is one steady point.
+(null unless it is a recording: ``mode``, ``points``, ``correlated``, ``dropped`` with first ``line`` and ``last``,
+``channel`` and ``reason``, ``notes``, ``error``). A channel of a recording has a mean only where the recording is one
+steady point.
 """
 
 from __future__ import annotations

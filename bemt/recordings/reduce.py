@@ -6,7 +6,7 @@ is found; coefficients follow where diameter and density are known; ``scatter`` 
 repeats.
 
 The uncertainties of the series are the UNCORRELATED part, independent from point to point. What all points share is in
-`Reduced.correlated`: ``gain`` [1], ``zero`` [unit of the channel], ``session`` [1] (between runs of one condition).
+`Reduction.correlated`: ``gain`` [1], ``zero`` [unit of the channel], ``session`` [1] (between runs of one condition).
 Nothing is corrected but the zero, and that is said.
 """
 
