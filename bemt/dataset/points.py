@@ -70,13 +70,26 @@ def unit_in(name: str) -> str:
     return "" if unit is None else unit.suffix or "-"
 
 
+def _still(array: NDArray[Any]) -> bool:
+    """Whether nobody can write to an array, nor to what it is a view of."""
+    part = array.base
+    while part is not None:
+        if not isinstance(part, np.ndarray) or part.flags.writeable:
+            return False
+        part = part.base
+    return not array.flags.writeable
+
+
 def _frozen(array: ArrayLike) -> Array:
-    """Read-only array; one that is read-only already is shared, since a log may have millions of rows."""
-    if isinstance(array, np.ndarray) and array.dtype == np.float64 and not array.flags.writeable:
+    """Read-only array; one that nobody can write to is shared, since a log may have millions of rows."""
+    if isinstance(array, np.ndarray) and array.dtype == np.float64 and _still(array):
         return array
     out = np.array(array, dtype=float)
     out.setflags(write=False)
     return out
+
+
+_UNKNOWN = _frozen(np.nan)
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +181,7 @@ class Dataset:
         if found:
             file = str(self.provenance.get("file", "")) or self.name
             raise InputError([Fault(file, *fault) for fault in found])
-        unknown = np.broadcast_to(np.nan, (n,))
+        unknown = np.broadcast_to(_UNKNOWN, (n,))
         object.__setattr__(self, "values", MappingProxyType(values))
         object.__setattr__(self, "u", MappingProxyType({key: u.get(key, unknown) for key in values}))
         flags = self.flags if {*map(type, self.flags)} <= {tuple} else (tuple(f) for f in self.flags)

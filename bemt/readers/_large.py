@@ -112,6 +112,7 @@ def _read(file: Path, head: SplitTable, decimal: str, start: int, marks: int) ->
             return None
         columns[:, at : at + n] = values
         at += n
+    columns.setflags(write=False)
     lines = range(head.lines[0], head.lines[0] + rows)
     source = SourceText(head.source.name, "", sha256)
     return NumberTable(source, head.headings, columns, odd, lines, head.warnings, cut), decimal
