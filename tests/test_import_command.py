@@ -125,10 +125,9 @@ def test_sign_and_sector_are_applied_only_where_told(put: Callable[..., Path]) -
     with pytest.raises(InputError, match="names of channels"):
         import_file(path, choice=Choice(sector=4, loads=("thrust",)))
     record = import_file(path, choice=Choice(PERIOD, sign=-1, sector=4, loads=("torque",)))
-    assert record.provenance["means"]["torque"].value == pytest.approx(0.8) and record.provenance["means"]["volume"].value == pytest.approx(
-        0.25
-    )
-    assert record.provenance["means"]["torque"].over.endswith(", times -4")
+    means = record.provenance["means"]
+    assert (means["torque"].value, means["volume"].value) == pytest.approx((0.8, 0.25))
+    assert means["torque"].over.endswith(", times -4")
     assert any("holds only for axisymmetric flow" in w for w in record.notes)
 
 

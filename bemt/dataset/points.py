@@ -11,6 +11,7 @@ known they are split by :data:`ORIGINS`, and the total is the root of the sum of
 
 from __future__ import annotations
 
+import html
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-__all__ = ["DIMENSIONLESS", "KINDS", "ORIGINS", "Dataset", "channel_fault", "concat"]
+__all__ = ["DIMENSIONLESS", "KINDS", "ORIGINS", "Dataset", "concat"]
 
 KINDS = ("bemt", "k1k2", "cfd", "bench", "vendor")
 """Kinds that comparisons know; others (``k1k2_printed``, ``flight``) are allowed and kept apart."""
@@ -231,6 +232,31 @@ class Dataset:
         """Say what it holds in a line; to_pandas() shows the numbers."""
         return f"Dataset({self.kind!r}, {self.name!r}, {len(self)} points: {', '.join(self.values)})"
 
+    def _repr_html_(self) -> str:
+        """Show the points in a notebook: each value with its standard uncertainty, where one is known."""
+        columns = [*self.values, *(["flags"] if any(self.flags) else [])]
+        shown = list(range(len(self))) if len(self) <= 12 else [*range(8), None, *range(len(self) - 3, len(self))]
+
+        def cell(name: str, i: int) -> str:
+            if name == "flags":
+                return ", ".join(self.flags[i])
+            value, u = self.values[name][i], self.u[name][i]
+            if not np.isfinite(value):
+                return "-"
+            if not u > 0.0:
+                return f"{value:.6g}"
+            digits = max(0, 1 - math.floor(math.log10(u)))  # two digits of the uncertainty
+            return f"{value:.{digits}f} &plusmn; {u:.{digits}f}"
+
+        head = "".join(f"<th>{html.escape(name)}</th>" for name in columns)
+        rows = "".join(
+            "<tr>" + "".join(f"<td>{'&#8942;' if i is None else cell(name, i)}</td>" for name in columns) + "</tr>"
+            for i in shown
+        )
+        notes = "".join(f"<br><small>{html.escape(note)}</small>" for note in self.notes)
+        what = f"<strong>{html.escape(f'{self.kind}: {self.name}, {len(self)} points')}</strong>"
+        return f'{what}<div style="overflow-x:auto"><table class="bemt"><tr>{head}</tr>{rows}</table></div>{notes}'
+
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle as plain dictionaries (worker processes send series back)."""
         by = {origin: dict(parts) for origin, parts in self.u_by.items()}
@@ -240,7 +266,13 @@ class Dataset:
 
     @property
     def converged(self) -> NDArray[np.bool_]:
-        """Points whose channels that were computed are all numbers, (N,)."""
+        """Points whose channels that were computed are all numbers, (N,).
+
+        Examples
+        --------
+        >>> Dataset("bemt", "p", {"rpm": [4000.0, 6000.0], "thrust_N": [2.1, math.nan]}).converged
+        array([ True, False])
+        """
         loads = [v for key, v in self.values.items() if key in ("thrust_N", "torque_Nm", "CT", "CP")]
         return np.asarray(np.all(np.isfinite(loads or list(self.values.values())), axis=0))
 
@@ -441,6 +473,12 @@ class Dataset:
         ------
         InputError
             When xarray is not installed.
+
+        Examples
+        --------
+        >>> x = Dataset("bench", "stand", {"rpm": [6000.0], "thrust_N": [10.0]}).to_xarray()
+        >>> x["thrust_N"].attrs["units"], x.sizes["point"]
+        ('N', 1)
         """
         from bemt.dataset import tables
 
@@ -456,12 +494,23 @@ class Dataset:
         y : sequence of str
             Channels to draw; CT and CP, or thrust, by default.
         ax : matplotlib axes, optional
-            Where to draw; a new figure by default.
+            Where to draw, beside what is there: a channel keeps its colour. A new figure by default.
 
         Returns
         -------
         matplotlib axes
             With a line for each channel, and for each speed of rotation where J or airspeed is the abscissa.
+
+        Raises
+        ------
+        InputError
+            For a channel that is not there.
+
+        Examples
+        --------
+        >>> d = Dataset("bench", "stand", {"rpm": [4000.0, 6000.0], "thrust_N": [2.1, 4.7]}, {"thrust_N": 0.1})
+        >>> d.plot().get_xlabel()
+        'rpm'
         """
         from bemt.dataset.plot import plot
 

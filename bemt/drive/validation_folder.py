@@ -104,9 +104,7 @@ def steps(folder: Path) -> tuple[list[validation.StepCheck], Drive]:
     """Compare the steps of the logs of ``thrust_step``."""
     found, levels = [], (np.array([]), np.array([]))
     for name, orders in COMMANDS.items():
-        t, scale = (
-            v for v in importers.read(folder / "thrust_step" / f"{name}.csv").values.values()
-        )
+        t, scale = importers.read(folder / "thrust_step" / f"{name}.csv").values.values()
         thrust = (np.median(scale[:50]) - scale) * KGF  # the scale carries the motor, thrust lifts it [kgf]
         hold = np.array([seconds for _, seconds in orders])
         pulse = 1000.0 + (np.array([48, *(order for order, _ in orders), 48]) - 48.0) / 1.999  # DShot has 48 to 2047
