@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from bemt.air import Air
+    from bemt.bem.gradient import Gradient
+    from bemt.bem.model import Model
 
 __all__ = ["Propeller", "load", "propeller"]
 
@@ -253,14 +256,13 @@ class Propeller:
 
         from bemt.bem import kernel as K
         from bemt.bem import solver
-        from bemt.case.prepare import prepare_case
 
         n, V = self._conditions(rpm, airspeed_m_s, J)
         if n.size != 1:
             raise InputError(Fault("", "rpm, airspeed_m_s, J", f"{n.size} points", "one operating point"))
         density = None if density_kg_m3 is None else float(numbers("density_kg_m3", density_kg_m3))
         air = self.case.air(None if density is None else {"air.density_kg_m3": density})
-        prep = prepare_case(self.case).prep
+        prep = self._model.prep
         at = {key: value[0] for key, value in solver.solve(prep, n, V, air, radial=True).radial.items()}
         width, chord = prep.st[:, K.S_DR], prep.st[:, K.S_CHORD]
         return pd.DataFrame({
@@ -269,6 +271,52 @@ class Propeller:
             "axial_m_s": at["w"], "swirl_m_s": at["v_t"], "thrust_per_radius_N_m": at["dT"] / width,
             "torque_per_radius_Nm_m": at["dQ"] / width,
         })  # fmt: skip
+
+    def gradient(
+        self, rpm: float | None = None, airspeed_m_s: float | None = None, *, J: float | None = None
+    ) -> Gradient:
+        """Differentiate rotor thrust and torque at one operating point.
+
+        Parameters
+        ----------
+        rpm : float, optional
+            Speed of rotation; the case's by default. [rev/min]
+        airspeed_m_s : float, optional
+            Axial speed; the case's by default. [m/s]
+        J : float, optional
+            Advance ratio instead. [-]
+
+        Returns
+        -------
+        Gradient
+            ``thrust_N``, ``torque_Nm`` and the derivatives of both by every element's ``chord`` [1/m] and ``beta``
+            [1/rad], (2, N), and by ``pitch`` [1/rad], ``rpm``, ``airspeed`` and ``density``, (2,). Thrust of the rotor
+            alone, without duct and stator.
+
+        Raises
+        ------
+        InputError
+            For more than one point, one that does not converge, or effects that act around the rotor.
+
+        Examples
+        --------
+        >>> g = propeller("10x5").gradient(rpm=6000, airspeed_m_s=5)
+        >>> g.beta.shape, bool(g.pitch[0] > 0), bool(g.airspeed[0] < 0)
+        ((2, 40), True, True)
+        """
+        from bemt.bem.gradient import gradient
+
+        one, V = self._conditions(rpm, airspeed_m_s, J)
+        if one.size != 1:
+            raise InputError(Fault("", "rpm", f"{one.size} points", "one operating point"))
+        return gradient(self._model, self._model.effects, float(one[0]), float(V[0]), self.case.air())
+
+    @cached_property
+    def _model(self) -> Model:
+        """The rotor prepared once."""
+        from bemt.case.prepare import prepare_case
+
+        return prepare_case(self.case)
 
     def replaced(self, changes: Mapping[str, Any]) -> Propeller:
         """Set values of the case; one that was a declared unknown is known then.
