@@ -11,7 +11,6 @@ known they are split by :data:`ORIGINS`, and the total is the root of the sum of
 
 from __future__ import annotations
 
-import html
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -234,28 +233,9 @@ class Dataset:
 
     def _repr_html_(self) -> str:
         """Show the points in a notebook: each value with its standard uncertainty, where one is known."""
-        columns = [*self.values, *(["flags"] if any(self.flags) else [])]
-        shown = list(range(len(self))) if len(self) <= 12 else [*range(8), None, *range(len(self) - 3, len(self))]
+        from bemt.dataset import tables
 
-        def cell(name: str, i: int) -> str:
-            if name == "flags":
-                return ", ".join(self.flags[i])
-            value, u = self.values[name][i], self.u[name][i]
-            if not np.isfinite(value):
-                return "-"
-            if not u > 0.0:
-                return f"{value:.6g}"
-            digits = max(0, 1 - math.floor(math.log10(u)))  # two digits of the uncertainty
-            return f"{value:.{digits}f} &plusmn; {u:.{digits}f}"
-
-        head = "".join(f"<th>{html.escape(name)}</th>" for name in columns)
-        rows = "".join(
-            "<tr>" + "".join(f"<td>{'&#8942;' if i is None else cell(name, i)}</td>" for name in columns) + "</tr>"
-            for i in shown
-        )
-        notes = "".join(f"<br><small>{html.escape(note)}</small>" for note in self.notes)
-        what = f"<strong>{html.escape(f'{self.kind}: {self.name}, {len(self)} points')}</strong>"
-        return f'{what}<div style="overflow-x:auto"><table class="bemt"><tr>{head}</tr>{rows}</table></div>{notes}'
+        return tables.to_html(self)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle as plain dictionaries (worker processes send series back)."""

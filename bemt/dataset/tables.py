@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import html
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +16,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-__all__ = ["from_pandas", "to_pandas", "to_xarray"]
+__all__ = ["from_pandas", "to_html", "to_pandas", "to_xarray"]
 
 
 def to_pandas(d: Dataset) -> pd.DataFrame:
@@ -112,3 +114,29 @@ def from_pandas(frame: pd.DataFrame, kind: str = "bench", name: str = "table", *
     counted = isinstance(frame.index, pd.RangeIndex)
     labels = () if counted else tuple(map(str, frame.index))
     return Dataset(kind, name, values, u, flags, more.pop("provenance", {}), labels, u_by, more.pop("notes", ()))
+
+
+def to_html(d: Dataset) -> str:
+    """Give the points as a table of a notebook: each value with its standard uncertainty, where one is known."""
+    columns = [*d.values, *(["flags"] if any(d.flags) else [])]
+    shown = list(range(len(d))) if len(d) <= 12 else [*range(8), None, *range(len(d) - 3, len(d))]
+
+    def cell(name: str, i: int) -> str:
+        if name == "flags":
+            return ", ".join(d.flags[i])
+        value, u = d.values[name][i], d.u[name][i]
+        if not np.isfinite(value):
+            return "-"
+        if not u > 0.0:
+            return f"{value:.6g}"
+        digits = max(0, 1 - math.floor(math.log10(u)))  # two digits of the uncertainty
+        return f"{value:.{digits}f} &plusmn; {u:.{digits}f}"
+
+    head = "".join(f"<th>{html.escape(name)}</th>" for name in columns)
+    rows = "".join(
+        "<tr>" + "".join(f"<td>{'&#8942;' if i is None else cell(name, i)}</td>" for name in columns) + "</tr>"
+        for i in shown
+    )
+    notes = "".join(f"<br><small>{html.escape(note)}</small>" for note in d.notes)
+    what = f"<strong>{html.escape(f'{d.kind}: {d.name}, {len(d)} points')}</strong>"
+    return f'{what}<div style="overflow-x:auto"><table class="bemt"><tr>{head}</tr>{rows}</table></div>{notes}'
