@@ -216,7 +216,7 @@ def test_a_campaign_is_recorded(
     assert calls(programs, "blockMesh") == 1, "one grid serves both speeds"
     manifest = json.loads((path.parent / "manifest.json").read_text())
     assert (manifest["points"], manifest["recorded"], manifest["converged"], manifest["missing"]) == (2, 2, 2, [])
-    assert manifest["balance_reason"] is None and set(manifest["balance"]) == {row["run"] for row in rows}
+    assert set(manifest["balance"]) == {row["run"] for row in rows}
     for found in manifest["balance"].values():
         assert all(abs(found[key]) < 1e-5 for key in ("mass", "momentum", "angular_momentum"))
     assert main(["cfd", str(tmp_path)]) == 0, "a folder of campaigns is summed up"
@@ -397,7 +397,8 @@ def test_a_run_that_leaks_is_nan_flagged_and_says_where(project: Path, tmp_path:
     (row,) = rows_of(path.parent)
     assert (row["converged"], row["thrust_N"], row["balance_mass"]) == ("0", "", "")
     assert "U_patch_side2.raw" in row["note"]
-    assert json.loads((path.parent / "manifest.json").read_text())["balance"] is None
+    manifest = json.loads((path.parent / "manifest.json").read_text())
+    assert manifest["balanced"] == 0 and manifest["balance"][row["run"]].startswith("not recorded")
 
 
 def test_a_recording_that_is_not_ours_is_left_alone(project: Path, tmp_path: Path) -> None:
@@ -493,12 +494,14 @@ def test_the_committed_campaigns_are_whole(project: Path) -> None:
         rows = {row["run"]: row for row in rows_of(path.parent)}
         assert set(rows) <= set(order), f"{path.parent.name}: runs of other settings"
         assert set(manifest["missing"]) == set(order) - set(rows)
-        balances = manifest["balance"] or {}
-        assert manifest["balance_reason"] or set(balances) == set(rows), f"{path.parent.name}: nothing said why"
-        for run, found in balances.items():
-            residuals = [found[key] for key in ("mass", "momentum", "angular_momentum")] if found else []
-            if rows[run]["converged"] == "1":
+        assert set(manifest["balance"]) == set(rows), f"{path.parent.name}: neither a balance nor why there is none"
+        shown = 0
+        for run, found in manifest["balance"].items():
+            if rows[run]["converged"] == "1" and not isinstance(found, str):
+                residuals = [found[key] for key in ("mass", "momentum", "angular_momentum")]
                 assert all(value is None or abs(value) <= BALANCE_LIMIT for value in residuals), run
+                shown += 1
+        assert manifest["balanced"] == shown
         for run, values in rows.items():
             assert (values["converged"] == "1") == bool(re.match(r"\d", values["thrust_N"])), run
             if values["converged"] != "1":

@@ -152,16 +152,56 @@ def test_mass_flow_speed_and_area_are_one(f1: Model) -> None:
     assert np.allclose(s.Q, 2.0 * np.pi * 1.225 * spin, rtol=1e-9)
 
 
-def test_swirl_sucks_on_a_body_that_tapers_and_a_stator_ends_it(f1: Model) -> None:
+def test_a_stator_ends_what_swirl_takes_from_the_jet(f1: Model) -> None:
 
     def thrust(**numbers: float) -> float:
         duct = dataclasses.replace(f1.duct, **numbers)  # type: ignore[type-var]
         prep = solver.prepare(f1.rotor, f1.polars, f1.effects, duct)
         return float(solver.solve(prep, 4898.98, 0.0, Air.from_density(1.225)).T[0])
 
-    assert f1.duct is not None and f1.duct.taper == 0.0  # a cylinder to the exit
-    assert thrust(taper=3.0) < thrust()
-    assert thrust(taper=3.0, stator=1.0) == pytest.approx(thrust(stator=1.0), rel=1e-12)
+    assert thrust(exit_hub=0.0) < thrust(exit_hub=math.nan)
+    assert thrust(exit_hub=0.0, stator=1.0) == pytest.approx(thrust(exit_hub=math.nan, stator=1.0), rel=1e-12)
+
+
+R, RHUB, RHO, V_JET = 0.3, 0.1, 1.2, 50.0
+ANNULUS = math.pi * (R**2 - RHUB**2)
+
+
+def swirl_drag(swirl: float, ratio: float, exit_hub: float) -> float:
+    """What a uniform swirl behind a rotor takes from the jet of a duct."""
+    duct = duct_model.DuctFlow(ratio, span=R - RHUB, area=ANNULUS, exit_hub=exit_hub)
+    mdot = RHO * ratio * ANNULUS * V_JET
+    given = (np.array([v]) for v in (RHO, mdot, mdot * V_JET, swirl**2 * math.log(R / RHUB), mdot * swirl**2))
+    return float(duct._swirl_drag(*given)[0])
+
+
+def test_swirl_costs_nothing_where_body_and_wall_stay_as_they_are() -> None:
+    assert swirl_drag(5.0, 1.0, RHUB) == pytest.approx(0.0, abs=1e-9)
+    assert swirl_drag(5.0, 1.0, 0.5 * RHUB) > 0.0
+
+
+@pytest.mark.parametrize("swirl", [3.0, 6.0])
+def test_a_swirling_jet_agrees_with_its_stream_tubes_followed_one_by_one(swirl: float) -> None:
+    """Momentum of 2,000 tubes in radial equilibrium, none of it to first order."""
+    sigma = 0.8
+    mdot = RHO * sigma * ANNULUS * V_JET
+    n = 2000
+    r2 = RHUB**2 + (np.arange(n) + 0.5) / n * (R**2 - RHUB**2)
+    y, p, T = sigma * ANNULUS / math.pi, 0.0, 0.0
+    for r2_k in r2[::-1]:  # from the edge, at ambient pressure, inwards
+        step = mdot / n / (RHO * math.pi * V_JET)
+        for _ in range(20):
+            middle = y - 0.5 * step
+            v_t2 = swirl**2 * r2_k / middle
+            half = 0.25 * RHO * v_t2 * step / middle
+            w = math.sqrt(V_JET**2 - 2.0 * (p - half) / RHO + swirl**2 - v_t2)
+            step = mdot / n / (RHO * math.pi * w)
+        T += mdot / n * w + (p - half) * math.pi * step
+        p -= 2.0 * half
+        y -= step
+    exact = mdot * V_JET - T - p * math.pi * y
+    assert y > 0.0
+    assert swirl_drag(swirl, sigma, 0.0) == pytest.approx(exact, rel=0.12 * (swirl / 6.0) ** 2)
 
 
 def test_x22a(shared_data: Path, tmp_path: Path) -> None:
@@ -243,4 +283,4 @@ density_kg_m3 = 1.225
     p = fan.solve(9000.0, J * 150.0 * D, Air.from_density(1.225))
     some = K > 0.15 * K[0]
     assert np.median(np.abs(p.CT / K - 1.0)[some]) < 0.05
-    assert np.median(np.abs(p.duct_share - N / K)[some]) < 0.035
+    assert np.median(np.abs(p.duct_share - N / K)[some]) < 0.038  # the swirl sucks on the hub: not on the nozzle

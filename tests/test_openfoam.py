@@ -25,6 +25,7 @@ from bemt.exports.openfoam import Body, Settings, Sweep, case_files
 from bemt.exports.openfoam.grid import extent, mrf_zone
 from bemt.exports.openfoam.write import Run, settings_of, write_openfoam
 from geometry.mesh import Options
+from geometry.mesh_duct import plan_stator
 
 COARSE = Options(n=41, segments=48)
 TOKEN = re.compile(r'"[^"]*"|[{}();]|[^\s{}();"]+(?:\([^\s;]*\))?')
@@ -357,6 +358,26 @@ def test_a_sector_leaves_out_vanes_that_do_not_fit(project: Path, tmp_path: Path
     assert set(s.surfaces) == stl
     whole, _ = settings_of(case, Run(sector="full"), COARSE)
     assert "stator" in whole.surfaces
+
+
+@pytest.mark.parametrize("rotation", ["right", "left"])
+def test_vanes_of_a_sector_stand_still_and_turn_their_tails_with_the_swirl(project: Path, rotation: str) -> None:
+    vanes = {"duct.stator.blades": 11, "duct.stator.chord_mm": 9.0, "rotor.rotation": rotation}
+    case = load_case(project / "cases" / "ds30").replaced(vanes)
+    s, parts = settings_of(case, Run(), COARSE)
+    turned, _ = settings_of(case.replaced({"duct.stator.angle_deg": 13.0, "rotor.spinner_mm": 19.0}), Run(), COARSE)
+    assert "stator" in s.surfaces and parts["tail"] is None and s.body is not None
+    for each in (s, turned):
+        assert each.body is not None and mrf_zone(each)[1] > each.body.high
+    assert turned.rotor.high == pytest.approx(s.rotor.high + 0.019)
+    assert turned.blades.high < mrf_zone(turned)[2] < turned.rotor.high + 0.15 * s.R
+    duct = case.replaced({"duct.stator.angle_deg": 13.0}).duct()
+    assert duct is not None
+    plan = plan_stator(duct, -0.01, s.Rhub)
+    assert plan is not None
+    tangential, downstream = plan.outline(41).T
+    tail, nose = tangential[np.argmax(downstream)], tangential[np.argmin(downstream)]
+    assert np.sign(tail - nose) == s.rotation
 
 
 def test_export_command_writes_a_case_beside_other_formats(project: Path, tmp_path: Path) -> None:

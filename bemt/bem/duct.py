@@ -12,13 +12,28 @@ The jet's area is ``c_0 A_exit`` at rest and comes to ``c_V A_exit`` where the r
 are 1 for a long straight pipe and follow from the walls else (:mod:`bemt.bem.duct_stream`).  At rest T_rotor / T_total
 = 1 / (2 sigma_w c_0); 1/2 gives back the open rotor.  Losses enter Bernoulli as ``1/2 rho (K_wall w^2 + K_lip (w -
 V)^2)``.  A stator turns the swirl ``2 v_t`` behind the rotor back into pressure, ``dT_stator = eta_s 1/2 rho (2 v_t)^2
-dA``.  The annuli are independent of each other, as in the open rotor.  Swirl that is left on the body keeps its angular
-momentum ``k = r 2 v_t`` as the body tapers from Rhub to r_e at the exit, and its suction on the taper is no thrust::
+dA``.  The annuli are independent of each other, as in the open rotor.
 
-    D_swirl = (1 - eta_s) pi rho k^2 (ln(Rhub / r_e) - 1/2 (1 - r_e^2 / Rhub^2))
+Swirl that is left lowers the pressure in the jet.  A stream tube keeps r v_t on its way from the rotor's annulus to
+the jet, where radial equilibrium gives the pressure (H. Glauert in W.F. Durand ed., Aerodynamic Theory IV, div. L,
+ch. VII, 1935; J.H. Horlock 1958, Axial Flow Compressors, ch. 4; neither checked).  Take a uniform swirl s behind the
+rotor and radii r -> sqrt(y) by equal shares of area, y_c < y < Y.  With s^2 E the rise of the swirl's energy and s^2 P
+the fall of p / rho below the stream's::
 
-(radial equilibrium of a free vortex; Horlock 1958, Axial Flow Compressors, ch. 6), r_e at least Rhub / 5, about the
-core of the vortex behind a hub (declared).
+    E(y) = 1/2 (r^2 / y - 1)       P(y) = 1/2 int_y^Y r^2 / y'^2 dy'       w_e^2 = V_j^2 + 2 s^2 (P - E)
+    T = int rho (w_e^2 - V w_e - s^2 P) dA - rho s^2 P(y_c) pi (y_c - y_body)
+
+The swirl is not quite uniform: with E goes the s^2 that has its energy, with P the one that has its fall of pressure
+from tip to hub, s^2 ln(R / Rhub) = int (2 v_t)^2 dr / r.
+To first order in s^2 and with the mass flow of a stream without swirl, the jet needs less area by its greater speed,
+and what it leaves is a core of dead air, y_c = (A_jet / pi) (s / V_j)^2 mean(P - E), unless the body in the exit is
+wider.  Then swirl takes ::
+
+    D_swirl = (1 - eta_s) rho s^2 (A_jet mean(E) + pi (y_c - y_body) P(y_c))
+
+the energy of the spin-up where the body closes and the jet contracts, and the suction on the core.  A body that
+reaches the exit (y_body > 0) goes on behind it, and its tail is not known.  What a diffuser gives back by slowing the
+swirl down is not counted (mean(E) at least 0: declared).
 """
 
 from __future__ import annotations
@@ -52,8 +67,8 @@ _LIP_K_HIGH = np.array([0.50, 0.43, 0.36, 0.31, 0.26, 0.22, 0.20, 0.15, 0.09, 0.
 _BOATTAIL = math.radians(18.0), math.radians(24.0)
 BASE_PRESSURE = 0.15
 
-# A swirling jet's core over the hub radius; see the head of this file.
-CORE = 0.2
+# Steps in which the core of a swirling jet settles; each takes off most of what is left.
+_CORE_STEPS = 12
 
 # Turbulent skin friction of duct walls at Re of 1e5 to 1e7, Prandtl's 0.455/log10(Re)^2.58 between 0.007 and 0.003.
 WALL_FRICTION = 0.005
@@ -110,8 +125,8 @@ class DuctFlow:
         Area of the jet over the exit's, at rest (c_0) and where the rotor adds nothing to the stream (c_V) [1].
     area : float
         Swept annulus, pi (R^2 - Rhub^2) [m2].
-    taper : float
-        Factor of rho k^2 in the suction of the swirl on the body behind the rotor, without a stator [1].
+    exit_hub : float
+        Radius of the body in the exit plane; NaN leaves out what swirl does to the jet [m].
     """
 
     wake_ratio: float
@@ -124,15 +139,43 @@ class DuctFlow:
     contraction: float = 1.0
     capture: float = 1.0
     area: float = float("nan")
-    taper: float = 0.0
+    exit_hub: float = float("nan")
 
     def total(self, rho: Array, V: Array, out: Array) -> tuple[Array, Array, Array]:
         """Thrust of rotor, stator and duct together."""
-        mdot, jet, stator, spin = out[:, 2], out[:, 3], out[:, 4], out[:, 10]
+        mdot, jet, stator = out[:, 2], out[:, 3], out[:, 4]
         T = jet - mdot * V - 0.5 * rho * V * np.abs(V) * self.drag_area
         with np.errstate(divide="ignore", invalid="ignore"):
             v_exit = np.where(mdot > 0.0, np.copysign(mdot / (rho * self.area * self.wake_ratio), jet), np.nan)
-        return T - (1.0 - self.stator) * self.taper * rho * spin**2, stator, v_exit
+        return T - self._swirl_drag(rho, mdot, jet, out[:, 10], out[:, 11]), stator, v_exit
+
+    def _swirl_drag(self, rho: Array, mdot: Array, jet: Array, spin: Array, whirl: Array) -> Array:
+        """Thrust that the swirl left in the jet takes; the head of this module has the formula. [N]"""
+        if math.isnan(self.exit_hub):
+            return np.zeros_like(mdot)
+        tip2 = (0.5 * (self.area / (math.pi * self.span) + self.span)) ** 2
+        hub2 = tip2 - self.area / math.pi
+        runs = (mdot > 0.0) & (jet > 0.0)
+        m = np.where(runs, mdot, 1.0)
+        Vj = np.where(runs, jet / m, 1.0)
+        left = np.where(runs, 1.0 - self.stator, 0.0)
+        s2_E, s2_P = left * whirl / m, left * spin / (0.5 * math.log(tip2 / hub2))
+        y_jet = m / (np.pi * rho * Vj)
+        body = self.exit_hub**2 * np.pi * y_jet / (self.wake_ratio * self.area)
+        edge, core = body + y_jet, np.maximum(body, 1e-6 * y_jet)
+        for last in (*([False] * _CORE_STEPS), True):
+            wide = edge - core
+            slope = (tip2 - hub2) / wide
+            foot = hub2 - core * slope
+            ln = np.log(edge / core)
+            E = 0.5 * (foot * ln / wide + slope - 1.0)
+            P = 0.5 * (foot * (ln / wide - 1.0 / edge) + slope * (1.0 - core * ln / wide))
+            if not last:
+                gain = (s2_P * P - s2_E * E) / Vj**2
+                core = np.maximum(body, np.clip(gain, 1e-6, 0.5) * y_jet)
+        suction = 0.5 * (foot * (1.0 / core - 1.0 / edge) + slope * ln)
+        D = y_jet * s2_E * np.maximum(E, 0.0) + (core - body) * s2_P * suction
+        return np.asarray(np.pi * rho * D)
 
 
 def duct_flow(duct: Duct, rotor: Rotor) -> DuctFlow:
@@ -153,7 +196,7 @@ def duct_flow(duct: Duct, rotor: Rotor) -> DuctFlow:
         contraction=jet.at_rest,
         capture=jet.in_stream + left * (jet.at_rest - jet.in_stream),
         area=rotor.annulus_area,
-        taper=_taper(duct.exit_hub_radius, rotor.Rhub),
+        exit_hub=duct.exit_hub_radius,
     )
 
 
@@ -165,11 +208,3 @@ def _boattail(duct: Duct) -> tuple[float, float]:
     angle = math.atan2(float(r[widest] - r[-1]), max(float(x[-1] - x[widest]), 1e-9))
     left = (angle - _BOATTAIL[0]) / (_BOATTAIL[1] - _BOATTAIL[0])
     return min(max(left, 0.0), 1.0), math.pi * float(r[widest] ** 2 - r[-1] ** 2)
-
-
-def _taper(exit_radius: float, hub: float) -> float:
-    """Suction of a free vortex on a body that tapers, over rho k^2."""
-    if not exit_radius < hub:
-        return 0.0
-    ratio = max(exit_radius / hub, CORE)
-    return math.pi * (-math.log(ratio) - 0.5 * (1.0 - ratio**2))

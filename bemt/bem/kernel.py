@@ -51,8 +51,8 @@ OK, NOT_CONVERGED, JUMP, NOT_FINITE = range(4)
 N_STATION = 14
 P_OMEGA, P_V, P_RHO, P_MU, P_SOUND = range(5)
 N_POINT = 5
-O_T, O_Q, O_MASS, O_JET, O_STATOR, O_STATUS, O_WHERE, O_BRIDGED, O_STAGNANT, O_REVERSED, O_SPIN = range(11)
-N_OUT = 11
+O_T, O_Q, O_MASS, O_JET, O_STATOR, O_STATUS, O_WHERE, O_BRIDGED, O_STAGNANT, O_REVERSED, O_SPIN, O_WHIRL = range(12)
+N_OUT = 12
 N_RADIAL = 11
 
 # Grid numbers behind ``num`` in ``par``: two-zone angle grid lo, hi, 1/fine, 1/coarse, index of lo, of hi, last cell;
@@ -232,6 +232,7 @@ def _point(element, guess, lookup, w, point, st, tab, par, out, radial):
     jet = 0.0
     stator = 0.0
     spin = 0.0
+    whirl = 0.0
     worst = OK
     where = -1
     bridged = 0
@@ -304,13 +305,14 @@ def _point(element, guess, lookup, w, point, st, tab, par, out, radial):
                 flow = abs(axial)
                 leaves = fx[N_WAKE] * axial - fx[N_STREAM] * UP
             lost = w[_BAD + k] > 0.0
-            spin = 2.0 * v_t * st[i, S_R] if i == 0 else spin
             if not lost:
                 T += dT
                 Q += dQ
                 mass += rho * flow * area
                 jet += rho * flow * leaves * area
                 if ducted:
+                    spin += 4.0 * v_t * v_t * st[i, S_DR] / st[i, S_R]
+                    whirl += 4.0 * rho * flow * v_t * v_t * area
                     turned = max(v_t, 0.0)
                     stator += fx[N_STATOR] * 2.0 * rho * turned * turned * area
                     reversed_ += 1 if axial < 0.0 else 0
@@ -346,6 +348,7 @@ def _point(element, guess, lookup, w, point, st, tab, par, out, radial):
     out[O_STAGNANT] = stagnant
     out[O_REVERSED] = reversed_
     out[O_SPIN] = spin
+    out[O_WHIRL] = whirl
 
 
 def _entries(stamp: int) -> dict[tuple[bool, str], Any]:

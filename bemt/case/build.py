@@ -156,7 +156,12 @@ def build_rotor(case: CaseFile, path: Path) -> Rotor:
     """Build the rotor of a case; right-handed rotation is +1. Raises InputError where the values make none."""
     rotor = case.rotor
     sign = -1 if rotor.rotation == "left" else 1
-    return _as_input(path.as_posix(), "blade", lambda: Rotor(_blade(case, path), rotor.blades, sign, case.name))
+    spinner = 1e-3 * rotor.spinner_mm
+
+    def make() -> Rotor:
+        return Rotor(_blade(case, path), rotor.blades, sign, case.name, spinner_length=spinner)
+
+    return _as_input(path.as_posix(), "blade", make)
 
 
 def build_duct(case: CaseFile, path: Path, rotor: Rotor) -> Duct | None:
@@ -173,7 +178,8 @@ def build_duct(case: CaseFile, path: Path, rotor: Rotor) -> Duct | None:
 
     def make() -> Duct:
         vanes = duct.stator
-        stator = None if vanes is None else Stator(vanes.blades, vanes.chord_mm * 1e-3)
+        turned = 0.0 if vanes is None else math.radians(rotor.rotation * vanes.angle_deg)  # their tails with the swirl
+        stator = None if vanes is None else Stator(vanes.blades, vanes.chord_mm * 1e-3, beta=0.5 * math.pi + turned)
         return around(
             rotor, duct.length_mm * 1e-3, gap, duct.lip_radius_mm * 1e-3, exit_area_ratio=ratio, exit_hub_radius=hub,
              rotor_x=None if x is None else x * 1e-3, stator=stator, name=case.name,

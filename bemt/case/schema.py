@@ -118,6 +118,7 @@ class RotorTable(Table):
     hub_ratio: float | None = entry(low=0.01, high=0.95, suspect=_percent("hub_ratio"))
     hub_diameter_mm: float | None = entry(unit="mm", low=0.5, high=3000, suspect=_metres("hub_diameter_mm", 0.499))
     hub_diameter_in: float | None = entry(unit="in", low=0.02, high=120)
+    spinner_mm: float = entry(unit="mm", low=0, high=3000, default=0.0)
     rotation: Rotations = entry("choice", choices=("right", "left"), default="right")
 
     @property
@@ -200,6 +201,7 @@ class StatorTable(Table):
 
     blades: int = entry("integer", low=1, high=64, required=True)
     chord_mm: float = entry(unit="mm", low=1, high=1000, required=True, suspect=_metres("chord_mm", 0.999))
+    angle_deg: float = entry(unit="deg", low=0, high=60, default=0.0)
     recovery: float | None = entry(low=0, high=1, suspect=_percent("recovery", 1.5))
 
 

@@ -35,8 +35,8 @@ RADIAL = ("run", "r_m", "thrust_per_radius_N_m", "torque_per_radius_Nm_m")
 SAME = ("rpm", "airspeed_m_s", "wall_distance_m", "tip_gap_mm", "sideslip_deg", "pitch_offset_deg", "solver", "gas",
         "domain", "sector", "turbulence")  # fmt: skip
 HISTORY_ROWS = 400
-NO_BALANCE = "not recorded by the run; made before the check"
-NOT_ENDED = "not recorded by the run; it did not come to its end"
+NO_BALANCE = "not recorded: made before the balance check"
+NOT_ENDED = "not recorded: the run did not come to its end"
 FORMAL_ORDER = 2.0
 
 
@@ -235,15 +235,15 @@ class CampaignRecord:
 
 
 def _balances(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Balance of every run, null where its run did not write one down, and why."""
-    each = {
-        row["run"]: None if math.isnan(row["balance_mass"])
-        else {name.removeprefix("balance_"): row[name] for name in RESIDUALS}
-        for row in rows
-    }  # fmt: skip
-    missing = [row for row in rows if each[row["run"]] is None]
-    why = None if not missing else NO_BALANCE if any(row["converged"] == 1 for row in missing) else NOT_ENDED
-    return {"balance": each if len(missing) < len(each) else None, "balance_reason": why}
+    """Balance of every run, or why there is none; only runs that balance count as evidence."""
+    each: dict[str, Any] = {}
+    for row in rows:
+        if not math.isnan(row["balance_mass"]):
+            each[row["run"]] = {name.removeprefix("balance_"): row[name] for name in RESIDUALS}
+        else:
+            each[row["run"]] = NO_BALANCE if row["converged"] == 1 else NOT_ENDED
+    shown = sum(int(row["converged"]) for row in rows if isinstance(each[row["run"]], dict))
+    return {"balanced": shown, "balance": each}
 
 
 def _lines(path: Path) -> list[dict[str, str]]:

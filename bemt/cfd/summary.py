@@ -103,6 +103,7 @@ def summary(folder: str | Path) -> dict[str, Any]:
                          "radial": _radial(campaign, row["run"], found)})  # fmt: skip
         out.append({"name": campaign.name, "title": campaign.title, "points": len(campaign.points),
                     "recorded": len(rows), "converged": sum(row["converged"] == "1" for row in rows),
+                    "balanced": sum(row["converged"] == "1" and row["balance_mass"] != "" for row in rows),
                     "grid_studies": manifest.get("grid_studies", []), "rows": rows})  # fmt: skip
     return {"schema": "bemt.cfd-summary/1", "campaigns": out}
 
@@ -120,9 +121,10 @@ def _number(text: str) -> float:
 def summary_text(document: dict[str, Any], radial: bool = True) -> str:
     """Give the summary as tables."""
     lines = []
-    counts = [[c["name"], str(c["points"]), str(c["recorded"]), str(c["converged"])] for c in document["campaigns"]]
-    counts.append(["all", *(str(sum(int(row[k]) for row in counts)) for k in (1, 2, 3))])
-    lines.append(text_table(["campaign", "points", "run", "converged"], counts))
+    keys = ("points", "recorded", "converged", "balanced")
+    counts = [[c["name"], *(str(c[key]) for key in keys)] for c in document["campaigns"]]
+    counts.append(["all", *(str(sum(int(row[k]) for row in counts)) for k in (1, 2, 3, 4))])
+    lines.append(text_table(["campaign", "points", "run", "converged", "and balanced"], counts))
     head = ["run", "solver", "level", "cells", "rpm", "J", "other", "T [N]", "u", "BEMT", "Q [N m]", "u", "BEMT", "y+",
             "leak [%]"]  # the largest residual of mass, momentum and angular momentum; empty where none was written
     for campaign in document["campaigns"]:

@@ -149,9 +149,10 @@ def mrf_zone(s: Settings) -> tuple[float, float, float]:
     -----
     It may reach into a duct's wall, which does not turn with it, but never beyond one. Its ends are planes of the base
     grid unless the settings say ``margin``, and are numbers of nine digits: the text of a case holds them whole.
+    The tip of a long nose stays outside and at rest: what a zone leaks at the facets of its walls goes with its length.
     """
     margin = 0.15 * s.R
-    low, high = s.rotor.low - margin, s.rotor.high + margin
+    low, high = s.rotor.low - margin, min(s.rotor.high, s.blades.high + margin) + margin
     if s.body is not None:
         low = max(low, 0.5 * (s.rotor.low + s.body.high))
     if s.plate_z is not None:

@@ -105,8 +105,8 @@ def _standing(duct: Duct | None, parts: int) -> tuple[Duct | None, bool]:
     return replace(duct, stator=None), True
 
 
-def _tail(rotor: Rotor, duct: Duct, model: MeshModel) -> np.ndarray | None:
-    """Outline of the centre body alone."""
+def _outline(rotor: Rotor, duct: Duct, model: MeshModel) -> np.ndarray | None:
+    """Outline of the centre body that carries the vanes."""
     mesh = model.rotor
     back = float(mesh.vertices[np.unique(mesh.part("hub")), 2].min())
     plan = plan_stator(duct, back, rotor.Rhub)
@@ -128,7 +128,7 @@ def settings_of(case: Case, run: Run, options: Options | None = None) -> tuple[S
     duct, left_out = _standing(whole, parts)
     try:
         model = build(rotor, duct, options)
-        tail = _tail(rotor, whole, model) if whole is not None and left_out else None
+        body = None if whole is None else _outline(rotor, whole, model)
     except GeometryError as error:
         raise InputError([Fault(file, *fault) for fault in error.faults]) from error
     points = model.rotor.vertices
@@ -144,9 +144,11 @@ def settings_of(case: Case, run: Run, options: Options | None = None) -> tuple[S
         z = model.duct.vertices[:, 2]
         around = Body(float(z.min()), float(z.max()), float(np.hypot(*model.duct.vertices[:, :2].T).max()))
     inner = None
+    if body is not None:
+        inner = Body(float(body[:, 1].min()), float(body[:, 1].max()), float(body[:, 0].max()))
+    tail = body if left_out else None  # else it is of one piece with vanes and duct
     if tail is not None:
         surfaces.append("centrebody")
-        inner = Body(float(tail[:, 1].min()), float(tail[:, 1].max()), float(tail[:, 0].max()))
     rho, mu, a = float(air.rho), float(air.mu), float(air.a_sound)
     temperature = a * a / (1.4 * 287.05)
     mach = math.hypot(rpm * math.pi / 30 * rotor.R, V) / a
