@@ -1,0 +1,75 @@
+"""A rotor for the page: grids of points that a viewer turns, and a still picture of the same for paper and cards."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.surface import Surface
+
+__all__ = ["mesh_values", "still"]
+
+Array = NDArray[np.float64]
+
+COLOURS = {"blade": "#4f93c4", "hub": "#8d99a6", "duct": "#c9973f", "cut": "#e3c58c", "stator": "#b58a4a"}
+OPEN, CUT_OPEN = (-0.25, 0.95), (0.45, 1.05)
+"""How the rotor first stands: turned about its shaft, then tipped towards the eye. [rad]"""
+LIGHT = np.array([0.35, 0.45, 0.82])
+
+
+def mesh_values(surfaces: Sequence[Surface]) -> list[dict[str, Any]]:
+    """Pack the grids as 16-bit integers of the farthest point, which keeps 1/32767 of the radius."""
+    size = max(float(np.abs(s.points).max()) for s in surfaces)
+    return [
+        {
+            "rows": s.points.shape[0],
+            "columns": s.points.shape[1],
+            "copies": s.copies,
+            "colour": COLOURS[s.name],
+            "data": base64.b64encode(np.round(s.points / size * 32767).astype("<i2").tobytes()).decode(),
+        }
+        for s in surfaces
+    ]
+
+
+def _turned(points: Array, angle: float, axis: int) -> Array:
+    c, s = np.cos(angle), np.sin(angle)
+    i, j = [(1, 2), (2, 0), (0, 1)][axis]
+    out = points.copy()
+    out[..., i], out[..., j] = c * points[..., i] - s * points[..., j], s * points[..., i] + c * points[..., j]
+    return out
+
+
+def still(surfaces: Sequence[Surface], width: int = 560) -> bytes:
+    """Draw the surfaces as PNG, facets from back to front, in parallel projection on nothing."""
+    from PIL import Image, ImageDraw
+
+    yaw, pitch = CUT_OPEN if any(s.name == "duct" for s in surfaces) else OPEN
+    facets, colours = [], []
+    for s in surfaces:
+        colour = np.array([int(COLOURS[s.name][i : i + 2], 16) for i in (1, 3, 5)], float)
+        for k in range(s.copies):
+            p = _turned(_turned(s.points, yaw + 2 * np.pi * k / s.copies, 2), -pitch, 0)
+            quads = np.stack([p[:-1, :-1], p[1:, :-1], p[1:, 1:], p[:-1, 1:]], axis=2).reshape(-1, 4, 3)
+            normal = np.cross(quads[:, 2] - quads[:, 0], quads[:, 3] - quads[:, 1])
+            normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+            facets.append(quads)
+            colours.append(colour * (0.38 + 0.62 * np.abs(normal @ LIGHT)[:, None]))
+    quads, tones = np.concatenate(facets), np.concatenate(colours).clip(0, 255).astype(int)
+    low, high = quads[..., :2].min(axis=(0, 1)), quads[..., :2].max(axis=(0, 1))
+    scale = (2 * width - 8) / (high[0] - low[0])
+    page = Image.new("RGBA", (2 * width, int(scale * (high[1] - low[1])) + 8))
+    draw = ImageDraw.Draw(page)
+    at = 4 + scale * (quads[..., :2] - low)
+    at[..., 1] = page.height - at[..., 1]
+    for i in np.argsort(quads[..., 2].mean(axis=1), kind="stable"):
+        tone = (*tones[i].tolist(), 255)
+        draw.polygon([tuple(corner) for corner in at[i].tolist()], fill=tone, outline=tone)
+    out = io.BytesIO()
+    page.resize((width, page.height // 2), Image.Resampling.BOX).quantize(256).save(out, "png", optimize=True)
+    return out.getvalue()
