@@ -8,14 +8,16 @@ from typing import Any
 
 import numpy as np
 
+from bemt.base.page import Cell, num, table
 from bemt.base.tables import number_text
-from bemt.report.audit_block import audit_block
-from bemt.report.diagnosis_block import diagnosis_block
-from bemt.report.markup import Cell, badge, esc, image, num, section, table
+from bemt.report.audit_block import audit_parts
+from bemt.report.diagnosis_block import diagnosis_parts
 from bemt.report.plot import COLOURS, Plot, Trace, figure
-from bemt.report.verdicts import headline, verdict
+from bemt.report.rotor_view import viewer
+from bemt.report.values import Section, sections, uri
+from bemt.report.verdicts import headline, stand
 
-__all__ = ["case_page", "reproduction_table"]
+__all__ = ["case_sections", "reproduction_table"]
 
 LOOK = {"cfd": "diamond", "bench": "cross", "vendor": "triangle", "openfoam": "star",
         "openfoam incompressible": "square", "flight": "square"}  # fmt: skip
@@ -29,6 +31,9 @@ CHANNEL_UNITS = {
     "power_W": "shaft power [W]",
     "eta": "efficiency η [-]",
 }
+
+MODELS = {"bemt": "BEMT", "k1k2": "K1/K2", "bemt variant": "BEMT, variant"}
+US = ("u_num", "u_input", "u_model", "u_D", "u_val")
 
 
 def _points(page: Mapping[str, Any], x: str, y: str, keep: Any) -> list[Trace]:
@@ -58,33 +63,20 @@ def _points(page: Mapping[str, Any], x: str, y: str, keep: Any) -> list[Trace]:
     return out
 
 
-def _geometry(page: Mapping[str, Any]) -> str:
-    g, parts = page["geometry"], []
-    title = headline(page["result"])
-    for name, words in (("rotor", "rotor"), ("blade", "one blade, root left, seen from the front")):
-        if name in page["pictures"]:
-            parts.append(
-                f"<figure><figcaption>{esc(words.capitalize())}</figcaption>"
-                f"{image(page['pictures'][name], f'{title}: {words}')}</figure>"
-            )
+def _geometry(page: Mapping[str, Any]) -> Section:
+    g, plots = page["geometry"], []
+    if page["surfaces"]:
+        alt = f"{headline(page['result'])}: rotor"
+        plots.append({"kind": "rotor", "alt": alt, "src": uri(page["pictures"]["rotor"]), **viewer(page["surfaces"])})
     if g:
         r = g["r_over_R"]
-        parts.append(figure(Plot("Chord", "r/R [-]", "chord [mm]", [Trace("chord", r, g["chord_mm"])])))
-        parts.append(
-            figure(
-                Plot(
-                    "Blade angle and twist",
-                    "r/R [-]",
-                    "blade angle β [deg]",
-                    [Trace("β", r, g["beta_deg"], colour=COLOURS["bench"])],
-                )
-            )
-        )
-    inner = "".join(parts)
-    return section("Geometry", f'<div class="figures">{inner}</div>' if inner else "")
+        beta = [Trace("β", r, g["beta_deg"], colour=COLOURS["bench"])]
+        plots.append(figure(Plot("Chord", "r/R [-]", "chord [mm]", [Trace("chord", r, g["chord_mm"])])))
+        plots.append(figure(Plot("Blade angle and twist", "r/R [-]", "blade angle β [deg]", beta)))
+    return "Geometry", [("figures", plots)]
 
 
-def _inputs(page: Mapping[str, Any]) -> str:
+def _inputs(page: Mapping[str, Any]) -> Section:
     result = page["result"]
     c = result["conditions"]
     rows: list[Sequence[Cell | str]] = [
@@ -101,42 +93,33 @@ def _inputs(page: Mapping[str, Any]) -> str:
         ["n_crit of the section tables", num(c["n_crit"], 3), "-"],
         ["section drag level", num(c["drag_level"], 3), "-"],
     ]
-    out = [table(["input", "value", "unit"], rows, sortable=False)]
-    out.append(
-        f"<p>Effects on: {esc(', '.join(map(str, c['effects'])))}. Convention: {esc(c['convention'])}. Air: "
-        f"{esc(c['air'])}. Program version {esc(result.get('version', 'unknown'))}.</p>"
+    words = (
+        f"Effects on: {', '.join(map(str, c['effects']))}. Convention: {c['convention']}. Air: {c['air']}. "
+        f"Program version {result.get('version', 'unknown')}."
     )
-    files = [[f["name"], Cell(markup=f"<code>{esc(f['sha256'])}</code>")] for f in page["files"]]
-    out.append(table(["file", "SHA-256"], files, sortable=False))
-    if result["assumptions"]:
-        out.append(
-            "<p>The source does not give the following. Each is declared as a range; the last columns show what "
-            "the range does to the thrust when it alone is changed.</p>"
-        )
-        lines = []
-        for a in result["assumptions"]:
-            at = [v for v in a["thrust_N"] if v is not None]
-            spread = f"{number_text(min(at))} – {number_text(max(at))}" if at else "unknown"
-            nominal = a["nominal"]
-            shown = num(nominal) if isinstance(nominal, int | float) else Cell(str(nominal))
-            lines.append(
-                [
-                    Cell(markup=f"<code>{esc(a['key'])}</code>"),
-                    shown,
-                    a["range"],
-                    spread,
-                    num(a["u_thrust_N"], 2),
-                    a["why"],
-                ]
-            )
-        out.append(table(["assumed", "value", "range", "thrust over the range [N]", "u [N]", "why"], lines))
-    return section("Inputs and assumptions", *out)
+    files = [[f["name"], Cell(f["sha256"], code=True)] for f in page["files"]]
+    told = (
+        "The source does not give the following. Each is declared as a range; the last columns show what the range "
+        "does to the thrust when it alone is changed."
+    )
+    lines: list[Sequence[Cell | str]] = []
+    for a in result["assumptions"]:
+        at = [v for v in a["thrust_N"] if v is not None]
+        spread = f"{number_text(min(at))} – {number_text(max(at))}" if at else "unknown"
+        shown = num(a["nominal"]) if isinstance(a["nominal"], int | float) else Cell(str(a["nominal"]))
+        lines.append([Cell(a["key"], code=True), shown, a["range"], spread, num(a["u_thrust_N"], 2), a["why"]])
+    head = ["assumed", "value", "range", "thrust over the range [N]", "u [N]", "why"]
+    return "Inputs and assumptions", [
+        ("table", table(["input", "value", "unit"], rows, sort=False)), ("words", words),
+        ("words", told if lines else ""), ("table", table(head, lines)),
+        ("more", ("Files and their SHA-256", [("table", table(["file", "SHA-256"], files, sort=False))])),
+    ]  # fmt: skip
 
 
-def _performance(page: Mapping[str, Any]) -> str:
+def _performance(page: Mapping[str, Any]) -> Section:
     result, c = page["result"], page["curves"]
     if not c:
-        return ""
+        return "", []
     own, j, w = result["conditions"], c["over_J"], c["over_rpm"]
     plots = []
 
@@ -185,18 +168,17 @@ def _performance(page: Mapping[str, Any]) -> str:
             x_zero=True,
         )
     )
-    drawn = "".join(figure(p) for p in plots)
     words = (
-        "<p>Bands: one standard uncertainty from the declared assumptions. They do not hold the error of the theory. "
-        "Points: recorded values; a value without a bar states no uncertainty.</p>"
+        "Bands: one standard uncertainty from the declared assumptions. They do not hold the error of the theory. "
+        "Points: recorded values; a value without a bar states no uncertainty."
     )
-    return section("Performance", words + f'<div class="figures">{drawn}</div>' if drawn else "")
+    return "Performance", [("words", words), ("figures", [figure(p) for p in plots])]
 
 
-def _radial(page: Mapping[str, Any]) -> str:
+def _radial(page: Mapping[str, Any]) -> Section:
     d = page["radial"]
     if not d:
-        return ""
+        return "", []
     r = d["r_over_R"]
     R = 0.5 * page["result"]["conditions"]["diameter_m"]
     own = page.get("own_radial") or []
@@ -211,15 +193,14 @@ def _radial(page: Mapping[str, Any]) -> str:
         Plot("Angle of attack", "r/R [-]", "α [deg]", [Trace("BEMT", r, d["alpha_deg"])]),
         Plot("Section Mach number", "r/R [-]", "M [-]", [Trace("BEMT", r, d["M"])]),
     )
-    drawn = "".join(figure(p) for p in plots)
-    return section("Radial loading", f'<div class="figures">{drawn}</div>' if drawn else "")
+    return "Radial loading", [("figures", [figure(p) for p in plots])]
 
 
-def _fan(result: Mapping[str, Any]) -> str:
+def _fan(result: Mapping[str, Any]) -> Section:
     fan = result.get("fan")
     if not fan:
-        return ""
-    rows = [
+        return "", []
+    rows: list[Sequence[Cell | str]] = [
         ["thrust of the rotor", num(fan["rotor_thrust_N"]), "N"],
         ["thrust of the duct", num(fan["duct_thrust_N"]), "N"],
         ["thrust of the stator", num(fan["stator_thrust_N"]), "N"],
@@ -230,27 +211,18 @@ def _fan(result: Mapping[str, Any]) -> str:
         ["momentum through the exit", num(fan["exit_momentum_N"]), "N"],
         ["pitch speed", num(fan["geometric_pitch_speed_m_s"]), "m/s"],
     ]
-    return section("Duct and fan", table(["part", "value", "unit"], rows, sortable=False))
+    return "Duct and fan", [("table", table(["part", "value", "unit"], rows, sort=False))]
 
 
-def _verification(page: Mapping[str, Any]) -> str:
+def _verification(page: Mapping[str, Any]) -> Section:
     v = page["refinement"]
     if not v:
-        return ""
-    plot = figure(
-        Plot(
-            "Thrust against blade elements",
-            "blade elements [-]",
-            "thrust [N]",
-            [Trace("BEMT", v["stations"], v["thrust_N"], colour=COLOURS["bemt"])],
-            log_x=True,
-            zero=False,
-        )
-    )
-    rows = [
-        [num(n), num(T, 7), num(Q, 6)]
-        for n, T, Q in zip(v["stations"], v["thrust_N"].tolist(), v["torque_Nm"].tolist(), strict=True)
-    ]  # noqa: E501
+        return "", []
+    line = Trace("BEMT", v["stations"], v["thrust_N"], colour=COLOURS["bemt"])
+    plot = figure(Plot("Thrust against blade elements", "blade elements [-]", "thrust [N]", [line], log_x=True,
+                       zero=False))  # fmt: skip
+    rows = [[num(n), num(T, 7), num(Q, 6)]
+            for n, T, Q in zip(v["stations"], v["thrust_N"].tolist(), v["torque_Nm"].tolist(), strict=True)]  # fmt: skip
     words, study = [], v.get("grid_study")
     if math.isfinite(v["change_to_finest"]):
         words.append(
@@ -261,44 +233,27 @@ def _verification(page: Mapping[str, Any]) -> str:
         words.append(f"Observed order {study['order']:.2f}; grid convergence index {100 * study['gci_fine']:.4f} %.")
     if study and study["flags"]:
         words.append("Remarks: " + "; ".join(study["flags"]) + ".")
-    text = f"<p>{esc(' '.join(words))}</p>" if words else ""
-    if not (plot or text):
-        return ""
-    side = f"<div>{table(['elements', 'thrust [N]', 'torque [N m]'], rows)}{text}</div>"
-    return section("Verification", f'<div class="figures">{plot}{side}</div>')
+    found = table(["elements", "thrust [N]", "torque [N m]"], rows) if plot else None
+    side = {"kind": "block", "parts": [("table", found), ("words", " ".join(words))]} if plot or words else None
+    return "Verification", [("figures", [plot, side])]
 
 
-def _validation(result: Mapping[str, Any]) -> str:
-    rows = []
-    for c in result["comparisons"]:
-        if c["source"] == "k1k2_printed" and c["model"] != "k1k2":
-            continue
-        rows.append(
-            [
-                c["model"],
-                c["reference"],
-                _quantity(c),
-                num(c["S"]),
-                num(c["D"]),
-                num(c["E"], 3),
-                num(c["E_pct"], signed=True),
-                num(c["u_num"], 2),
-                num(c["u_input"], 2),
-                num(c.get("u_model"), 2),
-                num(c["u_D"], 2, none="unknown"),
-                num(c["u_val"], 2, none="unknown"),
-                c["verdict"],
-            ]
-        )
-    if not rows:
-        return ""
+def _validation(result: Mapping[str, Any]) -> Section:
+    """Every comparison, BEMT's first; a column of uncertainties that nobody knows is left out."""
+    found = [c for c in result["comparisons"] if c["source"] != "k1k2_printed" or c["model"] == "k1k2"]
+    us = [u for u in US if any(c.get(u) is not None and math.isfinite(c[u]) for c in found)]
+    rows: list[Sequence[Cell | str]] = []
+    for c in sorted(found, key=lambda c: list(MODELS).index(c["model"]) if c["model"] in MODELS else len(MODELS)):
+        kind, word = stand(c)
+        rows.append([MODELS.get(c["model"], c["model"]), c["reference"], _quantity(c), num(c["S"]), num(c["D"]),
+                     num(c["E_pct"], signed=True), *(num(c.get(u), 2, none="unknown") for u in us),
+                     Cell(word, badge=kind)])  # fmt: skip
     words = (
-        "<p>After ASME V&amp;V 20: E = S − D, u_val² = u_num² + u_input² + u_model² + u_D². |E| ≤ u_val reads “not "
-        "distinguishable from noise”. An uncertainty that nobody stated stays unknown, and so does the verdict.</p>"
+        "After ASME V&V 20: E = S − D, u_val² = u_num² + u_input² + u_model² + u_D². The two agree where |E| ≤ u_val. "
+        "Where nobody states u_D, the last column gives the least u_D with which they would, as a share of D."
     )
-    us = ["u_num", "u_input", "u_model", "u_D", "u_val"]
-    header = ["model", "against", "quantity", "S", "D", "E", "E %", *us, "verdict"]
-    return section("Validation", words, table(header, rows))
+    head = ["model", "against", "quantity", "S", "D", "E %", *us, "agreement"]
+    return "Validation", [("words", words), ("table", table(head, rows))]
 
 
 def _quantity(c: Mapping[str, Any]) -> str:
@@ -309,7 +264,7 @@ def _quantity(c: Mapping[str, Any]) -> str:
     return f"{name.replace('_', ' ')} [{unit}]"
 
 
-def reproduction_table(items: Sequence[Mapping[str, Any]]) -> str:
+def reproduction_table(items: Sequence[Mapping[str, Any]]) -> dict[str, Any] | None:
     """Make the table of numbers of the thesis beside ours."""
     rows = []
     for item in items:
@@ -318,21 +273,11 @@ def reproduction_table(items: Sequence[Mapping[str, Any]]) -> str:
         ours = item["ours"]
         shown = num(ours, 5) if isinstance(ours, int | float) else Cell("" if ours is None else str(ours))
         try:
-            stated = num(float(item["stated"]))
-            stated = Cell(str(item["stated"]), stated.value, True)
+            stated = Cell(str(item["stated"]), num(float(item["stated"])).value, True)
         except ValueError:
             stated = Cell(str(item["stated"]))
-        words = status.removesuffix(", because")
-        rows.append(
-            [
-                str(item["quantity"]),
-                stated,
-                shown,
-                str(item["unit"]),
-                Cell(words, markup=badge(kind, words)),
-                str(item["note"]),
-            ]
-        )
+        words = Cell(status.removesuffix(", because"), badge=kind)
+        rows.append([str(item["quantity"]), stated, shown, str(item["unit"]), words, str(item["note"])])
     return table(["quantity", "stated", "ours", "unit", "status", "note"], rows)
 
 
@@ -348,45 +293,32 @@ def _of_case(items: Sequence[Mapping[str, Any]], name: str) -> list[Mapping[str,
     return [item for item in items if about(item)]
 
 
-def _limits(page: Mapping[str, Any]) -> str:
+def _limits(page: Mapping[str, Any]) -> Section:
     result = page["result"]
     flags: dict[str, None] = {}
     for row in [*result["rows"], *result["variants"]]:
         for flag in row["flags"]:
             flags.setdefault(f"{row['label']}: {flag}")
-    notes = [*flags, *result["notes"], *page["problems"]]
     general = [
         "Blade elements are independent: no sweep, no radial flow, no blade-vortex interaction, no unsteady loads.",
         "Section tables come from a network trained on XFOIL, weak near stall at low Reynolds numbers; beyond stall "
         "they continue as a flat plate.",
     ]
-    items = "".join(
-        f"<li>{'<span class=long>' + esc(n) + '</span>' if len(n) > 600 else esc(n)}</li>" for n in [*notes, *general]
-    )
-    return section("Limits", f"<ul>{items}</ul>")
+    return "Limits", [("list", [*flags, *result["notes"], *page["problems"], *general])]
 
 
-def case_page(page: Mapping[str, Any], reproduction: Sequence[Mapping[str, Any]]) -> str:
-    """Write the page of one case."""
+def case_sections(page: Mapping[str, Any], reproduction: Sequence[Mapping[str, Any]]) -> list[Section]:
+    """Give the sections of one case."""
     result = page["result"]
-    kind, word, sentence = verdict(result)
-    head = f"<h2>{esc(headline(result))}</h2><p>{badge(kind, word)} {esc(sentence)}</p>"
     if not result.get("rows"):
-        faults = "".join(f'<li><span class="long">{esc(fault)}</span></li>' for fault in result.get("faults", []))
-        return head + f"<ul>{faults}</ul>"
-    return "".join(
-        [
-            head,
-            _geometry(page),
-            _performance(page),
-            _radial(page),
-            _fan(result),
-            _validation(result),
-            audit_block(result.get("audit", [])),
-            _verification(page),
-            diagnosis_block(page.get("diagnosis")),
-            _inputs(page),
-            section("Reproduction of the thesis", reproduction_table(_of_case(reproduction, str(result["name"])))),
-            _limits(page),
-        ]
-    )
+        return sections(("Faults", [("list", [str(fault) for fault in result.get("faults", [])])]))
+    audits = [part for audit in result.get("audit", []) for part in audit_parts(audit)]
+    told = page.get("diagnosis")
+    items = reproduction_table(_of_case(reproduction, str(result["name"])))
+    return sections(
+        _validation(result), _geometry(page), _performance(page), _radial(page), _fan(result),
+        ("Audit of the CFD", audits), _verification(page),
+        ("Diagnosis: what physics was left out", diagnosis_parts(told) if told else []),
+        _inputs(page), _limits(page),
+        ("Reproduction of the thesis", [("more", ("Its numbers for this case", [("table", items)]))] if items else []),
+    )  # fmt: skip

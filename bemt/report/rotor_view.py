@@ -4,37 +4,36 @@ from __future__ import annotations
 
 import base64
 import io
+import json
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.surface import Surface
 
-__all__ = ["mesh_values", "still"]
+__all__ = ["still", "viewer"]
 
 Array = NDArray[np.float64]
 
 COLOURS = {"blade": "#4f93c4", "hub": "#8d99a6", "duct": "#c9973f", "cut": "#e3c58c", "stator": "#b58a4a"}
-OPEN, CUT_OPEN = (-0.25, 0.95), (0.45, 1.05)
-"""How the rotor first stands: turned about its shaft, then tipped towards the eye. [rad]"""
+OPEN, CUT_OPEN = (-0.25, 0.95, 1.25), (0.45, 1.05, 0.95)
+"""How the rotor first stands: turned about its shaft, then tipped towards the eye [rad]; its size in the viewer. [-]"""
 LIGHT = np.array([0.35, 0.45, 0.82])
 
 
-def mesh_values(surfaces: Sequence[Surface]) -> list[dict[str, Any]]:
-    """Pack the grids as 16-bit integers of the farthest point, which keeps 1/32767 of the radius."""
+def _view(surfaces: Sequence[Surface]) -> tuple[float, float, float]:
+    return CUT_OPEN if any(s.name == "duct" for s in surfaces) else OPEN
+
+
+def viewer(surfaces: Sequence[Surface]) -> dict[str, str]:
+    """Pack the grids for the viewer as 16-bit integers of the farthest point, which keeps 1/32767 of the radius."""
     size = max(float(np.abs(s.points).max()) for s in surfaces)
-    return [
-        {
-            "rows": s.points.shape[0],
-            "columns": s.points.shape[1],
-            "copies": s.copies,
-            "colour": COLOURS[s.name],
-            "data": base64.b64encode(np.round(s.points / size * 32767).astype("<i2").tobytes()).decode(),
-        }
-        for s in surfaces
-    ]
+    mesh = [{
+        "rows": s.points.shape[0], "columns": s.points.shape[1], "copies": s.copies, "colour": COLOURS[s.name],
+        "data": base64.b64encode(np.round(s.points / size * 32767).astype("<i2").tobytes()).decode(),
+    } for s in surfaces]  # fmt: skip
+    return {"mesh": json.dumps(mesh), "view": json.dumps(_view(surfaces))}
 
 
 def _turned(points: Array, angle: float, axis: int) -> Array:
@@ -49,7 +48,7 @@ def still(surfaces: Sequence[Surface], width: int = 560) -> bytes:
     """Draw the surfaces as PNG, facets from back to front, in parallel projection on nothing."""
     from PIL import Image, ImageDraw
 
-    yaw, pitch = CUT_OPEN if any(s.name == "duct" for s in surfaces) else OPEN
+    yaw, pitch, _ = _view(surfaces)
     facets, colours = [], []
     for s in surfaces:
         colour = np.array([int(COLOURS[s.name][i : i + 2], 16) for i in (1, 3, 5)], float)
@@ -71,5 +70,5 @@ def still(surfaces: Sequence[Surface], width: int = 560) -> bytes:
         tone = (*tones[i].tolist(), 255)
         draw.polygon([tuple(corner) for corner in at[i].tolist()], fill=tone, outline=tone)
     out = io.BytesIO()
-    page.resize((width, page.height // 2), Image.Resampling.BOX).quantize(256).save(out, "png", optimize=True)
+    page.resize((width, page.height // 2), Image.Resampling.BOX).save(out, "png", optimize=True)
     return out.getvalue()

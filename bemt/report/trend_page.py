@@ -6,12 +6,13 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from bemt.base.page import num, table
 from bemt.formula.k1k2 import D_OVER_P_USABLE, M_TIP_LIMIT
-from bemt.report.markup import esc, num, section, table
 from bemt.report.plot import COLOURS, DASHES, Mark, Plot, Trace, figure
 from bemt.report.trends import ROBOT
+from bemt.report.values import Section, sections
 
-__all__ = ["trend_page"]
+__all__ = ["trend_sections"]
 
 NAMES = {"bemt": "BEMT", "cfd": "CFD, recorded"}
 
@@ -45,9 +46,9 @@ def _pair(x: Any, line: Mapping[str, Any]) -> list[Trace]:
     ]
 
 
-def _families(f: Mapping[str, Any], results: Sequence[Mapping[str, Any]]) -> str:
+def _families(f: Mapping[str, Any], results: Sequence[Mapping[str, Any]]) -> Section:
     if not f:
-        return ""
+        return "", []
     D, p, rpm = f["D_in"], f["pitch_in"], f["rpm_case"]
     per_inch, per_rpm = f["mach_per_inch"], f["mach_per_rpm"]
     low, high = D_OVER_P_USABLE
@@ -114,17 +115,14 @@ def _families(f: Mapping[str, Any], results: Sequence[Mapping[str, Any]]) -> str
             "One propeller by speed, against the recorded propellers, which differ in size.",
         ),
     ]
-    drawn = "".join(figure(plot) for plot in plots)
-    return section(
-        f"Thrust against size, pitch and speed ({f['name']})",
-        f"<p>One quantity changes, all else stays as in {esc(f['title'])}.</p>",
-        f'<div class="figures">{drawn}</div>',
-    )
+    words = f"One quantity changes, all else stays as in {f['title']}."
+    title = f"Thrust against size, pitch and speed ({f['name']})"
+    return title, [("words", words), ("figures", [figure(plot) for plot in plots])]
 
 
-def _choice(rows: Sequence[Mapping[str, Any]]) -> str:
+def _choice(rows: Sequence[Mapping[str, Any]]) -> Section:
     if not rows:
-        return ""
+        return "", []
     m, n = ROBOT["mass_kg"], ROBOT["drives"]
     names = [str(r["name"]) for r in reversed(rows)]
     at = {name: i for i, name in enumerate(names)}
@@ -196,18 +194,17 @@ def _choice(rows: Sequence[Mapping[str, Any]]) -> str:
     ]
     fan = ROBOT["fan_mass_kg"]
     words = (
-        f"<p>A ducted fan buys its small diameter with power: compare thrust per watt and disk loading. Masses are "
+        f"A ducted fan buys its small diameter with power: compare thrust per watt and disk loading. Masses are "
         f"given for the DS-30 only ({fan:g} kg with motor: 27 N is {27 / (fan * 9.80665):.1f} times its weight); for "
-        f"the propellers none is, so the choice is made on the robot's weight.</p>"
+        f"the propellers none is, so the choice is made on the robot's weight."
     )
-    return section(
-        "Choice of a drive by thrust to weight", words, f'<div class="figures">{plot}</div>', table(header, lines)
-    )
+    return "Choice of a drive by thrust to weight", [("words", words), ("figures", [plot]),
+                                                     ("table", table(header, lines))]  # fmt: skip
 
 
-def _moments(d: Mapping[str, Any]) -> str:
+def _moments(d: Mapping[str, Any]) -> Section:
     if not d or not d["lines"]:
-        return ""
+        return "", []
     x, arm = d["distance_m"], ROBOT["arm_m"]
     traces = []
     used: dict[str, int] = {}
@@ -235,27 +232,13 @@ def _moments(d: Mapping[str, Any]) -> str:
         + "; ".join(f"{label} {arm * T:.3g} N m" for label, _, T, _ in d["lines"])
         + "."
     )
-    return section(
-        "Moment of two drives against mounting distance",
-        '<div class="figures">'
-        + figure(
-            Plot(
-                f"Roll moment about the middle ({d['name']})",
-                "distance from the centre of mass [m]",
-                "roll moment [N m]",
-                traces,
-                [Mark(arm, f"arm {arm:g} m")],
-                note,
-                wide=True,
-            )
-        )
-        + "</div>",
-    )
+    plot = Plot(f"Roll moment about the middle ({d['name']})", "distance from the centre of mass [m]",
+                "roll moment [N m]", traces, [Mark(arm, f"arm {arm:g} m")], note, wide=True)  # fmt: skip
+    return "Moment of two drives against mounting distance", [("figures", [figure(plot)])]
 
 
-def trend_page(book: Mapping[str, Any]) -> str:
-    """Write the trend page."""
-    results = [page["result"] for page in book["cases"]]
+def trend_sections(book: Mapping[str, Any]) -> list[Section]:
+    """Give how thrust moves, and what that means for the robot of the thesis."""
     t = book["trends"]
-    inner = _families(t["family"], results) + _choice(t["choice"]) + _moments(t["moments"])
-    return f"<h2>Trends</h2>{inner}" if inner else ""
+    return sections(_families(t["family"], [page["result"] for page in book["cases"]]), _choice(t["choice"]),
+                    _moments(t["moments"]))  # fmt: skip

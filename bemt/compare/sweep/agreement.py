@@ -12,7 +12,8 @@ __all__ = ["agreement", "known", "needed"]
 
 
 def _u(c: Mapping[str, Any], name: str) -> float:
-    return math.nan if c.get(name) is None else float(c[name])
+    value = c.get(name, 0.0)
+    return math.nan if value is None else float(value)
 
 
 def known(c: Mapping[str, Any]) -> float:

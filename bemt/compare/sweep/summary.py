@@ -122,7 +122,7 @@ def _ducts(solved: Sequence[Mapping[str, Any]]) -> list[str]:
     told = []
     for result in solved:
         own, simple = (next((r for r in result["rows"] if r["source"] == s), None) for s in ("bemt", "k1k2"))
-        if result["kind"] == "fan" and own and simple and own["thrust_N"] > 0.0:
+        if result.get("kind") == "fan" and own and simple and own["thrust_N"] > 0.0:
             told.append(f"{number_text(simple['thrust_N'] / own['thrust_N'], 2)} of BEMT on {result['name'][:30]}")
     words = (
         f"K1/K2 gives {', '.join(told[:3])}: it is a fit to open propellers, knows their diameter and pitch only, and "
