@@ -68,6 +68,9 @@ def _frozen(array: ArrayLike) -> Array:
     return out
 
 
+OKABE_ITO = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#000000")
+"""Colours that colour-blind readers tell apart (Okabe and Ito 2008)."""
+
 @dataclass(frozen=True, eq=False)
 class Dataset:
     """N points of one source: channels, uncertainties by origin, provenance.
@@ -423,7 +426,9 @@ class Dataset:
         if unknown:
             known = ", ".join(self.values)
             raise InputError(Fault(self.name, ", ".join(unknown), "no such channel", f"one of {known}"))
-        ax = plt.subplots(layout="constrained")[1] if ax is None else ax
+        if ax is None:
+            ax = plt.subplots(layout="constrained")[1]
+            ax.set_prop_cycle(color=OKABE_ITO)
         speeds = np.unique(self["rpm"]) if "rpm" in self and x != "rpm" else np.array([np.nan])
         for channel in wanted:
             for speed in speeds:
