@@ -1,6 +1,7 @@
-"""Rewrite this folder: ``.venv/bin/python reports/make.py``; ``--data DIR`` adds what needs the UIUC volumes in DIR/uiuc.
+"""Rewrite this folder: ``.venv/bin/python reports/make.py``; ``--data DIR`` adds what needs DIR/uiuc/volume-1 and 2.
 
-Campaigns of CFD, the proof (its page alone is written again) and the drive's validation take hours or data of other people; their READMEs say how.
+Campaigns of CFD, the proof (its page alone is written again) and the drive's validation take hours, or data of other
+people; their READMEs say how.
 """
 
 from __future__ import annotations
@@ -16,7 +17,9 @@ from bemt.proof import proof_text
 ROOT = Path(__file__).resolve().parents[1]
 SIZES = ("8x5", "10x5", "12x6", "14x8")
 FLUENT = [*(f"reports/diagnosis/fluent_{s}.csv" for s in SIZES), "--case", *(f"cases/prop_{s}" for s in SIZES)]
-REFERENCE = "--reference reports/diagnosis/cfd_reference.csv --case cases/prop_8x5 --off compressibility --off drag_divergence"
+REFERENCE = (
+    "--reference reports/diagnosis/cfd_reference.csv --case cases/prop_8x5 --off compressibility --off drag_divergence"  # noqa: E501
+)
 DIAGNOSES = {
     "bemt_fluent": FLUENT,
     "k1k2_fluent": [*FLUENT, "--baseline", "k1k2"],

@@ -55,7 +55,7 @@ def num(value: Any, digits: int = 4, signed: bool = False, none: str = "-") -> C
     return Cell(text, float(value), True)
 
 
-def table(head: Sequence[str], rows: Iterable[Sequence[Cell | str]], sort: bool = True) -> dict[str, Any] | None:
+def table(head: Sequence[str], rows: Iterable[Sequence[object]], sort: bool = True) -> dict[str, Any] | None:
     """Make the values of a table; None without rows."""
     body = [[cell if isinstance(cell, Cell) else Cell(str(cell)) for cell in row] for row in rows]
     if not body:

@@ -137,7 +137,8 @@ def residual(answer: Diagnosis) -> Figure:
     X, where = answer.problem.covariates, answer.marked
     x = _across(answer)
     y = where.variable if where is not None and where.variable in ("M_tip", "Re") else "rpm"
-    if x == "J" and _varies(X["rpm"]):
+    judged = np.unique(answer.problem.point[answer.problem.free])
+    if x == "J" and judged.size and _varies(X["rpm"][judged]):
         return _map(answer, x, y)
     return _strip(answer, y if x in ("rpm", "M_tip", "Re") else x)
 

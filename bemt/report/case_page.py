@@ -64,7 +64,8 @@ def _points(page: Mapping[str, Any], x: str, y: str, keep: Any) -> list[Trace]:
 
 
 def _geometry(page: Mapping[str, Any]) -> Section:
-    g, plots = page["geometry"], []
+    g = page["geometry"]
+    plots: list[dict[str, Any] | None] = []
     if page["surfaces"]:
         alt = f"{headline(page['result'])}: rotor"
         plots.append({"kind": "rotor", "alt": alt, "src": uri(page["pictures"]["rotor"]), **viewer(page["surfaces"])})
@@ -79,7 +80,7 @@ def _geometry(page: Mapping[str, Any]) -> Section:
 def _inputs(page: Mapping[str, Any]) -> Section:
     result = page["result"]
     c = result["conditions"]
-    rows: list[Sequence[Cell | str]] = [
+    rows: list[Sequence[object]] = [
         ["rotational speed", num(c["rpm"], 6), "rev/min"],
         ["airspeed", num(c["airspeed_m_s"]), "m/s"],
         ["density", num(c["density_kg_m3"]), "kg/m³"],
@@ -102,7 +103,7 @@ def _inputs(page: Mapping[str, Any]) -> Section:
         "The source does not give the following. Each is declared as a range; the last columns show what the range "
         "does to the thrust when it alone is changed."
     )
-    lines: list[Sequence[Cell | str]] = []
+    lines: list[Sequence[object]] = []
     for a in result["assumptions"]:
         at = [v for v in a["thrust_N"] if v is not None]
         spread = f"{number_text(min(at))} – {number_text(max(at))}" if at else "unknown"
@@ -200,7 +201,7 @@ def _fan(result: Mapping[str, Any]) -> Section:
     fan = result.get("fan")
     if not fan:
         return "", []
-    rows: list[Sequence[Cell | str]] = [
+    rows: list[Sequence[object]] = [
         ["thrust of the rotor", num(fan["rotor_thrust_N"]), "N"],
         ["thrust of the duct", num(fan["duct_thrust_N"]), "N"],
         ["thrust of the stator", num(fan["stator_thrust_N"]), "N"],
@@ -221,8 +222,8 @@ def _verification(page: Mapping[str, Any]) -> Section:
     line = Trace("BEMT", v["stations"], v["thrust_N"], colour=COLOURS["bemt"])
     plot = figure(Plot("Thrust against blade elements", "blade elements [-]", "thrust [N]", [line], log_x=True,
                        zero=False))  # fmt: skip
-    rows = [[num(n), num(T, 7), num(Q, 6)]
-            for n, T, Q in zip(v["stations"], v["thrust_N"].tolist(), v["torque_Nm"].tolist(), strict=True)]  # fmt: skip
+    solved = zip(v["stations"], v["thrust_N"].tolist(), v["torque_Nm"].tolist(), strict=True)
+    rows = [[num(n), num(T, 7), num(Q, 6)] for n, T, Q in solved]
     words, study = [], v.get("grid_study")
     if math.isfinite(v["change_to_finest"]):
         words.append(
@@ -242,7 +243,7 @@ def _validation(result: Mapping[str, Any]) -> Section:
     """Every comparison, BEMT's first; a column of uncertainties that nobody knows is left out."""
     found = [c for c in result["comparisons"] if c["source"] != "k1k2_printed" or c["model"] == "k1k2"]
     us = [u for u in US if any(c.get(u) is not None and math.isfinite(c[u]) for c in found)]
-    rows: list[Sequence[Cell | str]] = []
+    rows: list[Sequence[object]] = []
     for c in sorted(found, key=lambda c: list(MODELS).index(c["model"]) if c["model"] in MODELS else len(MODELS)):
         kind, word = stand(c)
         rows.append([MODELS.get(c["model"], c["model"]), c["reference"], _quantity(c), num(c["S"]), num(c["D"]),

@@ -53,7 +53,9 @@ def diagnosis_parts(item: Mapping[str, Any]) -> list[Part]:
     if place.get("channel") and said != "none":
         low, high, size, z = (num(place.get(k), 3).text for k in ("low", "high", "size", "z"))
         variable = place.get("variable") or "?"
-        out.append(("words", f"Located in {place['channel']} where {variable} is {low} to {high} (size {size}, z {z})."))
+        out.append(
+            ("words", f"Located in {place['channel']} where {variable} is {low} to {high} (size {size}, z {z}).")
+        )
     ranking = [_mapping(r) for r in _list(d.get("ranking"))[:RANKED]]
     rows = [[str(r.get("effect", "")), p, _parameters(r.get("parameters"))] for r in ranking
             if (p := num(r.get("probability"), 3)).value is None or p.value >= LEAST]  # fmt: skip

@@ -77,8 +77,10 @@ def _comparison_plot(book: Mapping[str, Any]) -> dict[str, Any] | None:
             for label, T, u in values.get(source, []):
                 points[source].append((T / base, len(names) + lane, u / base, f"{label}: {T:.4g} N"))
         names.append(str(page["result"]["name"]))
-    traces = [Trace(word, *([p[k] for p in points[source]] for k in range(3)), COLOURS[source], "", shape, True,
-                    [p[3] for p in points[source]], True) for source, (word, shape, _) in SOURCES.items()]  # fmt: skip
+    traces = []
+    for source, (word, shape, _) in SOURCES.items():
+        ratios, lanes, us, labels = ([p[k] for p in points[source]] for k in range(4))
+        traces.append(Trace(word, ratios, lanes, us, COLOURS[source], "", shape, True, list(map(str, labels)), True))
     return figure(Plot("Thrust of all sources over the recorded value", "thrust / recorded thrust [-]", "", traces,
                        [Mark(1.0, "recorded")], NOTE, names, wide=True, x_limits=SHOWN))  # fmt: skip
 
@@ -93,7 +95,7 @@ def _comparison_table(book: Mapping[str, Any], ids: Sequence[str]) -> dict[str, 
         result = page["result"]
         kind, word, _ = verdict(result)
         v = {source: items[0][1:] for source, items in _values(page).items()}
-        own = next((r for r in result.get("rows", []) if r["source"] == "bemt"), {})
+        own: Mapping[str, Any] = next((r for r in result.get("rows", []) if r["source"] == "bemt"), {})
         T, simple, cfd = (v.get(source, (None,))[0] for source in ("bemt", "k1k2", "cfd"))
         off = [100 * (x / cfd - 1) if x is not None and cfd else None for x in (T, simple)]
         rows.append([

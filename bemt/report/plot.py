@@ -192,7 +192,9 @@ class _Frame:
                 xs.append(x)
                 ys.append(y)
                 if not math.isnan(u):
-                    (xs if t.trace.horizontal else ys).extend([(x if t.trace.horizontal else y) + s * u for s in (-1, 1)])
+                    (xs if t.trace.horizontal else ys).extend(
+                        [(x if t.trace.horizontal else y) + s * u for s in (-1, 1)]
+                    )
         xs = [min(max(x, low), high) for x in xs]
         self.log = plot.log_x and all(x > 0 for x in xs)
         xs = [math.log10(x) for x in xs] if self.log else xs
@@ -299,7 +301,7 @@ def _axes(plot: Plot, f: _Frame, width: int, height: int) -> tuple[list[tuple[st
     for v in marks:
         lines.append(("grid", f"M{f.x(v):.1f} {f.top}V{f.bottom}"))
         words.append(_text(f.x(v), f.bottom + 16, _tick(v)))
-    rows = [(i, n if len(n) <= 18 else n[:17] + "…") for i, n in enumerate(plot.y_names)]
+    rows: list[tuple[float, str]] = [(i, n if len(n) <= 18 else n[:17] + "…") for i, n in enumerate(plot.y_names)]
     for v, name in rows or [(v, _tick(v)) for v in ticks(f.y0, f.y1)]:
         y = f.y(v) if not rows else f.y(v - 0.5)
         lines += [("grid", f"M{f.left} {y:.1f}H{f.right}")] if not rows or v else []

@@ -45,8 +45,13 @@ def stand(c: Mapping[str, Any]) -> tuple[str, str]:
         return "unknown", "model's u unknown"
     if needed(c) == 0.0:
         return "same", "inside the model's band"
-    share = f"{100.0 * needed(c) / abs(c['D']):.2g} %" if c.get("D") else _n(needed(c), 2)
+    share = f"{_share(c)} %" if c.get("D") else _n(needed(c), 2)
     return "unknown", f"needs u_D ≥ {share}"
+
+
+def _share(c: Mapping[str, Any]) -> str:
+    """Uncertainty of the recording that agreement needs, in per cent of it."""
+    return f"{100.0 * needed(c) / abs(c['D']):.2g}"
 
 
 def _thrusts(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
@@ -79,7 +84,9 @@ def verdict(result: Mapping[str, Any]) -> tuple[str, str, str]:
     row = recorded(result, "bemt")[0]
     words = f"BEMT gives {_n(row['thrust_N'], 4)} N"
     if _finite(row.get("u")):
-        words += f" ± {_n(row['u'], 2)} N (one standard uncertainty: inputs that the source does not state, and the model)"
+        words += (
+            f" ± {_n(row['u'], 2)} N (one standard uncertainty: inputs that the source does not state, and the model)"
+        )
     lines = _thrusts(result)
     if not lines:
         return "unknown", "nothing recorded", f"{words}. There is no recorded thrust to compare it with."
@@ -101,8 +108,11 @@ def verdict(result: Mapping[str, Any]) -> tuple[str, str, str]:
 def _open(lines: Sequence[Mapping[str, Any]]) -> list[str]:
     """What recordings that state no uncertainty would need for agreement."""
     inside = [str(c["reference"]) for c in lines if needed(c) == 0.0]
-    wanted = [f"{c['reference']} {_n(needed(c), 2)} N" + (f" ({100.0 * needed(c) / abs(c['D']):.2g} %)" if c.get("D") else "")
-              for c in lines if needed(c) > 0.0]  # fmt: skip
+    wanted = [
+        f"{c['reference']} {_n(needed(c), 2)} N" + (f" ({_share(c)} %)" if c.get("D") else "")
+        for c in lines
+        if needed(c) > 0.0
+    ]
     told = []
     if inside:
         told.append(f"Inside BEMT's own band, whatever the recording's uncertainty: {', '.join(inside)}.")
@@ -154,13 +164,13 @@ def _hangs(c: Mapping[str, Any], name: str) -> str:
         return "BEMT's own uncertainty is unknown here"
     if needed(c) == 0.0:
         return "they agree within BEMT's own band"
-    return f"they agree if the {name} is uncertain by {100.0 * needed(c) / abs(c['D']):.2g} % or more"
+    return f"they agree if the {name} is uncertain by {_share(c)} % or more"
 
 
 def _audited(result: Mapping[str, Any], c: Mapping[str, Any]) -> str:
     """What the audit of a recorded CFD value knows of its uncertainty."""
     audit = next((a for a in result.get("audit", []) if a.get("reference") == c.get("reference")), None)
-    share = audit.get("u_relative_known") if audit else None
+    share: Any = audit.get("u_relative_known") if audit else None
     return f"; the audit of the CFD finds {100.0 * share:.2g} % at least" if _finite(share) and share > 0 else ""
 
 
