@@ -12,7 +12,7 @@ from bemt.base.page import Cell, num, table
 from bemt.base.tables import number_text
 from bemt.report.audit_block import audit_parts
 from bemt.report.diagnosis_block import diagnosis_parts
-from bemt.report.plot import COLOURS, Plot, Trace, figure
+from bemt.report.plot import COLOURS, Plot, Trace, figure, points
 from bemt.report.rotor_view import viewer
 from bemt.report.values import Section, sections, uri
 from bemt.report.verdicts import headline, stand
@@ -23,14 +23,7 @@ LOOK = {"cfd": "diamond", "bench": "cross", "vendor": "triangle", "openfoam": "s
         "openfoam incompressible": "square", "flight": "square"}  # fmt: skip
 NAMES = {"cfd": "CFD, recorded", "openfoam": "CFD, own, compressible",
          "openfoam incompressible": "CFD, own, incompressible"}  # fmt: skip
-CHANNEL_UNITS = {
-    "CT": "CT [-]",
-    "CP": "CP [-]",
-    "thrust_N": "thrust [N]",
-    "torque_Nm": "torque [N m]",
-    "power_W": "shaft power [W]",
-    "eta": "efficiency η [-]",
-}
+LABELS = {"CT": "CT", "CP": "CP", "eta": "efficiency η"}
 
 MODELS = {"bemt": "BEMT", "k1k2": "K1/K2", "bemt variant": "BEMT, variant"}
 US = ("u_num", "u_input", "u_model", "u_D", "u_val")
@@ -42,24 +35,18 @@ def _points(page: Mapping[str, Any], x: str, y: str, keep: Any) -> list[Trace]:
     everything = [*result["rows"], *page.get("own_rows", [])]
     D = result["conditions"]["diameter_m"]
     for source, shape in LOOK.items():
-        rows = [r for r in everything if r["source"] == source and r.get(y) is not None and keep(r)]
-        if not rows:
-            continue
-        xs = [r["airspeed_m_s"] / (r["rpm"] / 60.0 * D) if x == "J" else r[x] for r in rows]
-        u = [r.get("u") if y == "thrust_N" else None for r in rows]
-        out.append(
-            Trace(
-                NAMES.get(source, source),
-                xs,
-                [r[y] for r in rows],
-                u,
-                COLOURS.get(source, COLOURS["other"]),
-                "",
-                shape,
-                True,
-                [r["label"] for r in rows],
+        rows = [
+            (
+                r["airspeed_m_s"] / (r["rpm"] / 60.0 * D) if x == "J" else r[x],
+                r[y],
+                r.get("u") if y == "thrust_N" else None,
+                r["label"],
             )
-        )
+            for r in everything
+            if r["source"] == source and r.get(y) is not None and keep(r)
+        ]
+        if rows:
+            out.append(points(NAMES.get(source, source), rows, source, shape))
     return out
 
 
@@ -127,8 +114,8 @@ def _performance(page: Mapping[str, Any]) -> Section:
     def near(row: Mapping[str, Any], key: str) -> bool:
         return bool(abs(row[key] - own[key]) <= 0.02 * max(abs(own[key]), 1.0))
 
-    for name in ("CT", "CP", "eta"):
-        y, label = j[name], CHANNEL_UNITS[name]
+    for name, label in LABELS.items():
+        y = j[name]
         if name == "eta":  # a ratio of two small numbers where thrust ends
             y = np.where(j["CT"] > 0.1 * np.nanmax(np.append(j["CT"], 0.0)), y, np.nan)
         traces = [Trace("BEMT", j["J"], y, j[f"u_{name}"], COLOURS["bemt"])]
@@ -136,39 +123,20 @@ def _performance(page: Mapping[str, Any]) -> Section:
             traces.append(Trace("K1/K2", j["J"], j["k1k2_CT"], None, COLOURS["k1k2"], "7 4"))
         if name != "eta":
             traces += _points(page, "J", name, lambda r: near(r, "rpm"))
-        plots.append(
-            Plot(
-                f"{label.split(' [')[0]} over advance ratio at {own['rpm']:g} rev/min",
-                "J = V / (n D) [-]",
-                label,
-                traces,
-            )
-        )
-    T = [
-        Trace("BEMT", w["rpm"], w["thrust_N"], w["u_thrust_N"], COLOURS["bemt"]),
-        Trace("K1/K2", w["rpm"], w["k1k2_thrust_N"], None, COLOURS["k1k2"], "7 4"),
-        *_points(page, "rpm", "thrust_N", lambda r: near(r, "airspeed_m_s")),
-    ]
-    at = f" at {own['airspeed_m_s']:g} m/s"
-    plots.append(Plot("Thrust over rotational speed" + at, "rotational speed [rev/min]", "thrust [N]", T, x_zero=True))
-    P = [
-        Trace("BEMT", w["rpm"], w["power_W"], w["u_power_W"], COLOURS["bemt"]),
-        *_points(page, "rpm", "power_W", lambda r: near(r, "airspeed_m_s")),
-    ]
-    plots.append(
-        Plot("Shaft power over rotational speed" + at, "rotational speed [rev/min]", "shaft power [W]", P, x_zero=True)
-    )
+        title = f"{label} over advance ratio at {own['rpm']:g} rev/min"
+        plots.append(Plot(title, "J = V / (n D) [-]", f"{label} [-]", traces))
     with np.errstate(divide="ignore", invalid="ignore"):
         per_kW = np.where(w["power_W"] > 0, 1e3 * w["thrust_N"] / w["power_W"], np.nan)
-    plots.append(
-        Plot(
-            "Thrust per shaft power" + at,
-            "rotational speed [rev/min]",
-            "thrust per power [N/kW]",
-            [Trace("BEMT", w["rpm"], per_kW.tolist(), None, COLOURS["bemt"])],
-            x_zero=True,
-        )
-    )
+    simple = Trace("K1/K2", w["rpm"], w["k1k2_thrust_N"], None, COLOURS["k1k2"], "7 4")
+    for title, label, y, u, more, channel in (
+        ("Thrust over rotational speed", "thrust [N]", w["thrust_N"], w["u_thrust_N"], [simple], "thrust_N"),
+        ("Shaft power over rotational speed", "shaft power [W]", w["power_W"], w["u_power_W"], [], "power_W"),
+        ("Thrust per shaft power", "thrust per power [N/kW]", per_kW, None, [], ""),
+    ):
+        seen = _points(page, "rpm", channel, lambda r: near(r, "airspeed_m_s")) if channel else []
+        traces = [Trace("BEMT", w["rpm"], y, u, COLOURS["bemt"]), *more, *seen]
+        title = f"{title} at {own['airspeed_m_s']:g} m/s"
+        plots.append(Plot(title, "rotational speed [rev/min]", label, traces, x_zero=True))
     words = (
         "Bands: one standard uncertainty from the declared assumptions. They do not hold the error of the theory. "
         "Points: recorded values; a value without a bar states no uncertainty."

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from bemt.base.page import Cell, num, table
-from bemt.report.plot import COLOURS, Mark, Plot, Trace, figure
+from bemt.report.plot import Mark, Plot, figure, points
 from bemt.report.values import Part, uri
 from bemt.report.verdicts import answer, headline, verdict
 
@@ -67,7 +67,7 @@ def _values(page: Mapping[str, Any]) -> dict[str, list[tuple[str, float, float]]
 def _comparison_plot(book: Mapping[str, Any]) -> dict[str, Any] | None:
     """Thrust of every case and source over that of the first recording."""
     names: list[str] = []
-    points: dict[str, list[tuple[float, float, float, str]]] = {source: [] for source in SOURCES}
+    found: dict[str, list[tuple[float, float, float, str]]] = {source: [] for source in SOURCES}
     for page in reversed(book["cases"]):
         values = _values(page)
         base = next((values[s][0][1] for s in ("cfd", "bench", "vendor", "openfoam") if values.get(s)), math.nan)
@@ -75,12 +75,9 @@ def _comparison_plot(book: Mapping[str, Any]) -> dict[str, Any] | None:
             continue
         for source, (_, _, lane) in SOURCES.items():
             for label, T, u in values.get(source, []):
-                points[source].append((T / base, len(names) + lane, u / base, f"{label}: {T:.4g} N"))
+                found[source].append((T / base, len(names) + lane, u / base, f"{label}: {T:.4g} N"))
         names.append(str(page["result"]["name"]))
-    traces = []
-    for source, (word, shape, _) in SOURCES.items():
-        ratios, lanes, us, labels = ([p[k] for p in points[source]] for k in range(4))
-        traces.append(Trace(word, ratios, lanes, us, COLOURS[source], "", shape, True, list(map(str, labels)), True))
+    traces = [points(word, found[source], source, shape, True) for source, (word, shape, _) in SOURCES.items()]
     return figure(Plot("Thrust of all sources over the recorded value", "thrust / recorded thrust [-]", "", traces,
                        [Mark(1.0, "recorded")], NOTE, names, wide=True, x_limits=SHOWN))  # fmt: skip
 

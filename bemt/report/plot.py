@@ -14,7 +14,7 @@ from urllib.parse import quote
 
 from bemt.base.tables import number_text
 
-__all__ = ["COLOURS", "Mark", "Plot", "Trace", "figure", "ticks"]
+__all__ = ["COLOURS", "Mark", "Plot", "Trace", "figure", "points", "ticks"]
 
 COLOURS = {
     "bemt": "#0072B2",
@@ -72,6 +72,16 @@ class Trace:
     points: bool = False
     labels: Sequence[str] = ()
     horizontal: bool = False
+
+
+def points(
+    name: str, rows: Sequence[tuple[Any, Any, Any, str]], source: str, shape: str, horizontal: bool = False
+) -> Trace:
+    """Make a trace of points from rows of x, y, standard uncertainty, words."""
+    x, y, u, words = ([row[k] for row in rows] for k in range(4))
+    return Trace(
+        name, x, y, u, COLOURS.get(source, COLOURS["other"]), "", shape, True, list(map(str, words)), horizontal
+    )
 
 
 @dataclass(frozen=True)
