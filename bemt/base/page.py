@@ -78,12 +78,11 @@ def render(package: str, template: str, scripts: Sequence[str] = (), **values: A
     True
     """
     from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
-    from markupsafe import Markup
 
     loader = ChoiceLoader([PackageLoader(name) for name in dict.fromkeys((package, "bemt.base"))])
     pages = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True,
                         lstrip_blocks=True, finalize=_clean)  # fmt: skip
     script = "".join(loader.get_source(pages, name)[0] for name in scripts)
     mark = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-    style = Markup(loader.get_source(pages, "page.css")[0])
-    return pages.get_template(template).render(style=style, script=Markup(script), mark=mark, **values)
+    style = loader.get_source(pages, "page.css")[0]
+    return pages.get_template(template).render(style=style, script=script, mark=mark, **values)

@@ -126,7 +126,7 @@ def _performance(page: Mapping[str, Any]) -> Section:
         title = f"{label} over advance ratio at {own['rpm']:g} rev/min"
         plots.append(Plot(title, "J = V / (n D) [-]", f"{label} [-]", traces))
     with np.errstate(divide="ignore", invalid="ignore"):
-        per_kW = np.where(w["power_W"] > 0, 1e3 * w["thrust_N"] / w["power_W"], np.nan)
+        per_kW: Any = np.where(w["power_W"] > 0, 1e3 * w["thrust_N"] / w["power_W"], np.nan)
     simple = Trace("K1/K2", w["rpm"], w["k1k2_thrust_N"], None, COLOURS["k1k2"], "7 4")
     for title, label, y, u, more, channel in (
         ("Thrust over rotational speed", "thrust [N]", w["thrust_N"], w["u_thrust_N"], [simple], "thrust_N"),
