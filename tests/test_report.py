@@ -560,9 +560,10 @@ def test_a_report_of_one_case_made_from_its_label_holds_no_word_of_the_thesis(
     monkeypatch.chdir(tmp_path)
     assert main(["new", "10x5"]) == 0
     case = next(path.parent for path in tmp_path.rglob("case.toml"))
-    assert main(["report", str(case), "--out", "r", "--title", "Mine", "--quiet"]) == 0
+    about = ["--title", "Mine", "--author", "A. Body", "--date", "1 May", "--commit", "rev 7"]
+    assert main(["report", str(case), "--out", "r", *about, "--quiet"]) == 0
     page = (tmp_path / "r" / "report.html").read_text(encoding="utf-8")
-    assert "<h1>Mine</h1>" in page
+    assert "<h1>Mine</h1><p>A. Body · 1 May · commit rev 7." in page
     reader = read(page)
     said = [w for tag, words in reader.words.items() if tag not in ("style", "script") for w in words]
     words = " ".join([*said, *(unquote(v or "") for _, a in reader.found for v in a.values())]).lower()

@@ -58,8 +58,9 @@ def _pages(book: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
 def book_html(book: Mapping[str, Any]) -> str:
     """Write the HTML of a report."""
     from bemt.base.page import render
+    from bemt.report.verdicts import headline
 
-    about = book.get("about", {})
+    about, only = book.get("about", {}), book["cases"]
     made = " · ".join(filter(None, (about.get("author"), about.get("date"), about.get("revision"))))
     lead = (
         "Propellers and ducted fans: blade element momentum theory beside the K1/K2 formula, CFD, bench and vendor. "
@@ -69,9 +70,10 @@ def book_html(book: Mapping[str, Any]) -> str:
         f"bemt {book['version']}. Thrust in newtons, CT = T/(ρ n² D⁴), CP = P/(ρ n³ D⁵). Colours after Okabe and Ito. "
         "This file loads nothing from the network."
     )
+    title = about.get("title") or (headline(only[0]["result"]) if len(only) == 1 else "Validation report")
     return render(
         "bemt.report", "report.html", ["page.js", "plot.js", "rotor.js"], pages=list(_pages(book)), foot=foot,
-        title=about.get("title") or "Validation report", lead=f"{made}. {lead}" if made else lead,
+        title=title, lead=f"{made}. {lead}" if made else lead,
     )  # fmt: skip
 
 

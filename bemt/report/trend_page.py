@@ -53,11 +53,12 @@ def _families(f: Mapping[str, Any], results: Sequence[Mapping[str, Any]]) -> Sec
     by_pitch = [Mark(D / high, wide, beyond="below"), Mark(D / low, narrow, beyond="above")]
     by_speed = [Mark(M_TIP_LIMIT / per_rpm, over), Mark(1.0 / per_rpm, sonic, beyond="above")]
     by_mach = [Mark(M_TIP_LIMIT, over), Mark(1.0, sonic, beyond="above")]
+    note = "The recorded propellers have pitches of their own. " if size.x else ""
     T, label = "thrust [N]", f"{D:.3g}x{p:.3g} in"
     plots = [
         Plot(f"Thrust over diameter, pitch {p:.3g} in, {rpm:g} rev/min", "diameter [in]", T,
              [*_pair(f["diameter"]["diameter_in"], f["diameter"]), size], by_size,
-             "The recorded propellers have pitches of their own. Shaded: outside of section theory."),
+             note + "Shaded: outside of section theory."),
         Plot(f"Thrust over pitch, {D:.3g} in, {rpm:g} rev/min", "pitch [in]", T,
              _pair(f["pitch"]["pitch_in"], f["pitch"]), by_pitch,
              "BEMT sees the blades stall where the formula goes on. Shaded: outside of the formula's range."),
@@ -65,7 +66,7 @@ def _families(f: Mapping[str, Any], results: Sequence[Mapping[str, Any]]) -> Sec
              _pair(f["rpm"]["rpm"], f["rpm"]), by_speed),
         Plot(f"Thrust over tip Mach number, {label}", "tip Mach number [-]", T,
              [*_pair(f["rpm"]["M_tip"], f["rpm"]), mach], by_mach,
-             "One propeller by speed, against the recorded propellers, which differ in size."),
+             "One propeller by speed, against the recorded propellers, which differ in size." if mach.x else ""),
     ]  # fmt: skip
     words = f"One quantity changes, all else stays as in {f['title']}."
     title = f"Thrust against size, pitch and speed ({f['name']})"

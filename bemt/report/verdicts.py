@@ -140,7 +140,8 @@ def answer(result: Mapping[str, Any]) -> str:
     head = f"BEMT {_n(own['thrust_N'], 4)}{band} N"
     lines = _thrusts(result)
     if not lines:
-        return f"{head}; nothing is recorded to compare it with."
+        power = f", {_n(own['power_W'])} W at the shaft" if _finite(own.get("power_W")) else ""
+        return f"{head}{power}; nothing is recorded to compare it with."
     c = lines[0]
     name = NAMES[c["source"]]
     share = f" (BEMT {c['E_pct']:+.1f} %)" if _finite(c.get("E_pct")) else ""
