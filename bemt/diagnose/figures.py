@@ -153,7 +153,7 @@ def _shares(answer: Diagnosis, c: int) -> tuple[NDArray[np.bool_], Array]:
 
 def _shown(answer: Diagnosis) -> str:
     calibration = "" if answer.marked is None else " − calibration"
-    return f"recording − baseline{calibration} [% of the largest]"
+    return f"recording − baseline{calibration}\n[% of the largest]"
 
 
 def _located(answer: Diagnosis, c: int, name: str) -> tuple[float, float] | None:

@@ -56,6 +56,8 @@ def _agreement(c: Mapping[str, Any]) -> str:
     """Whether model and recording agree, or how good the recording would have to be."""
     if not math.isfinite(c["E"]):
         return "no result"
+    if not math.isfinite(c["known"]):
+        return "BEMT's u unknown"
     if abs(c["E"]) <= c["known"]:
         return "agrees"
     if math.isfinite(c["u_D"]):
@@ -108,8 +110,8 @@ def _worst(found: Sequence[Mapping[str, Any]]) -> list[str]:
     words = f"Differs most: {case['name']}, BEMT {number_text(c['S'], 3)} N against {c['reference']}: {c['E']:+.3g} N."
     if abs(c["E"]) <= c["known"]:
         words += " BEMT's own uncertainty explains as much."
-    elif not math.isfinite(c["u_D"]):
-        words += f" Nobody states how good the recording is: they agree if its u is above {_agreement(c)[4:]} N."
+    elif not math.isfinite(c["u_D"]) and math.isfinite(needed(c)):
+        words += f" Nobody states its u: the two agree if that is above {number_text(needed(c), 2)} N."
     audit = next((a for a in case.get("audit", []) if a["reference"] == c["reference"]), None)
     faults = [line["finding"] for line in (audit or {"lines": []})["lines"] if line["status"] == "fault"]
     if faults:
