@@ -11,8 +11,10 @@
     const page = (target && target.closest("section.page")) || pages[0];
     pages.forEach((p) => p.classList.toggle("shown", p === page));
     all("nav a").forEach((a) => {
-      if (a.getAttribute("href") === "#" + page.id) { a.setAttribute("aria-current", "page"); }
-      else { a.removeAttribute("aria-current"); }
+      if (a.getAttribute("href") === "#" + page.id) {
+        a.setAttribute("aria-current", "page");
+        a.scrollIntoView({ block: "nearest", inline: "center" });
+      } else { a.removeAttribute("aria-current"); }
     });
     if (target && target !== page) { target.scrollIntoView(); } else { window.scrollTo(0, 0); }
     page.dispatchEvent(new Event("shown"));
