@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geometry.common import Array
+from geometry.common import Array, GeometryError
 from geometry.duct import Duct
 from geometry.mesh import hub_profile, rings
 from geometry.mesh_duct import centre_body, duct_profile, plan_stator, vane_rows
@@ -77,7 +77,10 @@ def surfaces(rotor: Rotor, duct: Duct | None = None) -> list[Surface]:
     ([('blade', 2), ('hub', 1)], 0.1016)
     """
     blade = rotor.blade
-    r = np.concatenate([[0.9 * blade.Rhub], blade.Rhub + rotor.span * np.sin(np.linspace(0, np.pi / 2, RINGS))])
+    if not blade.anchors:
+        raise GeometryError([("anchors", "none", "one section or more", "A surface needs sections")])
+    root = max(blade.Rhub, 0.02 * blade.R)
+    r = np.concatenate([[0.9 * root], root + (blade.R - root) * np.sin(np.linspace(0, np.pi / 2, RINGS))])
     r[-1] = blade.R
     curves = rings(blade, r, COARSE)
     turn = rotor.rotation * curves[..., 0] / r[:, None]

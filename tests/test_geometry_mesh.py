@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -234,3 +235,10 @@ def test_surfaces_to_look_at_are_those_of_the_solid(name: str, project: Path) ->
     if duct is not None:
         assert found["duct"].points[..., 1].min() > -1e-9, "cut open"
         assert np.hypot(*found["stator"].points[..., :2].reshape(-1, 2).T).max() < duct.outer(0.5 * duct.length) * 1.2
+
+
+@pytest.mark.parametrize(("hub", "blades"), [(0.0, 2), (0.05, 1), (0.6, 40)])
+def test_what_cannot_be_made_can_be_looked_at(hub: float, blades: int) -> None:
+    blade = replace(helix(0.2, 0.15, anchors=naca4(0.04, 0.4, 0.12)), Rhub=hub * 0.1)
+    for s in surfaces(Rotor(blade, blades)):
+        assert np.isfinite(s.points).all() and np.hypot(s.points[..., 0], s.points[..., 1]).max() <= 0.1 * (1 + 1e-9)

@@ -78,11 +78,14 @@ def _case(path: Path, result: Mapping[str, Any]) -> tuple[dict[str, Any], Case |
         page["curves"] = curves.case_curves(case)
         page["radial"] = curves.radial_curves(case)
         page["refinement"] = curves.refinement(case)
-        page["surfaces"] = surfaces(case.rotor(), case.duct())
-        page["pictures"] = {"rotor": still(page["surfaces"])}
     except (InputError, GeometryError, ValueError) as error:
         page["problems"].append(f"some figures could not be computed: {error}")
         return page, None
+    try:
+        page["surfaces"] = surfaces(case.rotor(), case.duct())
+        page["pictures"] = {"rotor": still(page["surfaces"])}
+    except GeometryError as error:
+        page["problems"].append(f"no picture: {error}")
     return page, case
 
 
