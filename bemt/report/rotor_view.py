@@ -27,12 +27,15 @@ def _view(surfaces: Sequence[Surface]) -> tuple[float, float, float]:
 
 
 def viewer(surfaces: Sequence[Surface]) -> dict[str, str]:
-    """Pack the grids for the viewer as 16-bit integers of the farthest point, which keeps 1/32767 of the radius."""
-    size = max(float(np.abs(s.points).max()) for s in surfaces)
-    mesh = [{
-        "rows": s.points.shape[0], "columns": s.points.shape[1], "copies": s.copies, "colour": COLOURS[s.name],
-        "data": base64.b64encode(np.round(s.points / size * 32767).astype("<i2").tobytes()).decode(),
-    } for s in surfaces]  # fmt: skip
+    """Pack the grids for the viewer: 16-bit integers round their middle, which keeps 1/32767 of the farthest point."""
+    everything = np.concatenate([s.points.reshape(-1, 3) for s in surfaces])
+    middle = np.array([0.0, 0.0, 0.5 * (everything[:, 2].max() + everything[:, 2].min())])
+    size = float(np.linalg.norm(everything - middle, axis=1).max())
+    mesh = []
+    for s in surfaces:
+        data = np.round((s.points - middle) / size * 32767).astype("<i2").tobytes()
+        mesh.append({"rows": s.points.shape[0], "columns": s.points.shape[1], "copies": s.copies,
+                     "colour": COLOURS[s.name], "data": base64.b64encode(data).decode()})  # fmt: skip
     return {"mesh": json.dumps(mesh), "view": json.dumps(_view(surfaces))}
 
 
