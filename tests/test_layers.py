@@ -45,7 +45,7 @@ ROOMS: tuple[str, ...] = (
     "cfd|cfd.*",
     "drive|drive.*",
     "report|report.*",
-    "library",
+    "library|library.*",
     "commands|commands.*",
     "__main__",
 )
@@ -68,7 +68,7 @@ MAY: dict[str, set[str]] = {
     "bemt.proof.pairs|bemt.proof.real|bemt.proof.seal": {"files"},
     "bemt.exports.*": {"files"},
     "bemt.cfd.*": {"files", "clock", "environment"},
-    "bemt.library": {"files"},
+    "bemt.library.*": {"files"},
     "bemt.drive.*_file|bemt.drive.*_folder|bemt.drive.*_result": {"files"},
     "bemt.report|bemt.report.*": {"files"},
     "geometry.export|geometry.picture*": {"files"},

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from bemt import __version__
 from bemt.base.errors import Fault, InputError
+from bemt.base.face import as_html
 from bemt.compare.recordings import RunChange, changed, document, next_step
 from bemt.compare.stand_run import selected, stand_run
 
@@ -61,6 +62,10 @@ class Contrast:
     def __str__(self) -> str:
         """The answer on one screen."""
         return self.text
+
+    def _repr_html_(self) -> str:
+        """Show the answer in a notebook."""
+        return as_html(repr(self)[1:-1], self.text)
 
     def __repr__(self) -> str:
         """Say the verdict in a line."""
