@@ -743,6 +743,14 @@ def test_plots_answer_the_pointer_and_their_keys(opened: Browser) -> None:
     assert opened.run(state) == ["inline", "true"]
 
 
+def test_the_values_of_a_plot_are_those_of_its_csv(opened: Browser, text: str) -> None:
+    opened.run("location.hash = '#front'; 0")
+    at = "document.querySelector('#front details.values')"
+    opened.run(f"{at}.open = true; {at}.dispatchEvent(new Event('toggle')); 0")
+    shown = opened.run(f"Array.from({at}.querySelectorAll('tr')).map(r => Array.from(r.cells).map(c => c.textContent))")
+    assert shown == tables(text)[0]
+
+
 def test_the_rotor_turns_by_keys_and_stays_still_without_webgl(opened: Browser) -> None:
     opened.run("location.hash = '#case-1-plain'; 0")
     opened.run("window.dispatchEvent(new HashChangeEvent('hashchange')); 0")

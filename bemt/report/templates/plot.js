@@ -3,8 +3,8 @@
 
   // Lines of a table of comma-separated values, in which quotes hold text.
   function lines(text) {
-    return text.trim().split(/\r?\n/).map((line) => (line.match(/("([^"]|"")*"|[^,]*)(,|$)/g) || []).map((cell) =>
-      cell.replace(/,$/, "").replace(/^"(.*)"$/, "$1").replace(/""/g, '"')));
+    return text.trim().split("\n").map((line) => line.match(/("([^"]|"")*"|[^,]*)(,|$)/g).slice(0, -1).map((cell) =>
+      cell.replace(/,$/, "").replace(/^"(.*)"$/, "$1").replace(/""/g, '"'))); // the last match is the end of the line
   }
 
   // Plots: the nearest point of the visible sources under the pointer; keys switch sources on and off. The numbers
