@@ -65,7 +65,7 @@ MAY: dict[str, set[str]] = {
     "bemt.compare.bench.*": {"files", "clock", "environment"},
     "bemt.diagnose.figures|bemt.diagnose.folder|bemt.diagnose.rotor_calibration": {"files"},
     "bemt.proof.prove": {"files", "clock", "environment"},
-    "bemt.proof.pairs|bemt.proof.real|bemt.proof.seal": {"files"},
+    "bemt.proof.follow|bemt.proof.pairs|bemt.proof.real|bemt.proof.seal": {"files"},
     "bemt.exports.*": {"files"},
     "bemt.cfd.*": {"files", "clock", "environment"},
     "bemt.library.*": {"files"},

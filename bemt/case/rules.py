@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from bemt.air import LIQUID
 from bemt.base.toml import Collector, Key, Table, check_value, shown, validated
 from bemt.case.schema import GROUPS, INCH, TEMPERATURE, CaseFile, SectionTable
 
@@ -15,6 +16,7 @@ __all__ = ["check_case", "check_shape", "table_at", "value_at"]
 
 A_SOUND = 340.3  # only to refuse impossible tip speeds
 MAX_TIP_MACH = 2.0
+_HEAVIEST = 10.0  # kg/m3, of a gas
 MAX_GRID = 50_000_000
 
 
@@ -67,6 +69,7 @@ def _inner(document: Mapping[str, Any], name: str) -> Mapping[str, Any] | None:
     for part in name.split("."):
         value = value.get(part) if isinstance(value, Mapping) else None
     return value if isinstance(value, Mapping) else None
+
 
 def _check_groups(out: Collector, document: Mapping[str, Any]) -> None:
     for name, keys, required in GROUPS:
@@ -136,8 +139,8 @@ def _check_blade(out: Collector, case: CaseFile) -> None:
             out.add(f"blade.{key}", shown(getattr(blade, key)), f"nothing beside {source}, which gives it", hint)
     posterior = blade.as_built is not None and blade.as_built.file is not None
     if (blade.known_from == "reference") != posterior:
-        got = "known_from = \"reference\" without as_built.file" if not posterior else "as_built.file"
-        expected = "known_from = \"reference\" and blade.as_built.file together"
+        got = 'known_from = "reference" without as_built.file' if not posterior else "as_built.file"
+        expected = 'known_from = "reference" and blade.as_built.file together'
         out.add("blade.known_from", got, expected, "python -m bemt calibrate-rotor writes both")
     if blade.section is None:
         hint = "Tables [[polars]] replace only its aerodynamics"
@@ -202,6 +205,13 @@ def _check_air(out: Collector, case: CaseFile) -> None:
     air = case.air
     if air.pressure_hPa is not None and air.temperature_C is None:
         out.add("air.temperature_C", "nothing", f"{TEMPERATURE.expected}, because pressure_hPa is given")
+    if air.salinity_g_kg is not None and air.fluid is None:
+        out.add("air.salinity_g_kg", shown(air.salinity_g_kg), 'nothing without fluid = "water"')
+    rho = air.density_kg_m3
+    if rho is not None and _HEAVIEST < rho < LIQUID[0]:
+        out.add("air.density_kg_m3", shown(rho), "0.01 to 10 kg/m3, or 900 to 1100 for water")
+    if air.fluid is not None and (air.temperature_C or 0.0) < 0.0:
+        out.add("air.temperature_C", shown(air.temperature_C), "0 to 60 C, water")
     if air.humidity_pct is not None and air.pressure_hPa is None:
         out.add("air.humidity_pct", shown(air.humidity_pct), "nothing without pressure_hPa")
 

@@ -13,6 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.air import LIQUID
 from bemt.asbuilt.latents import KNOWN_FROM
 from bemt.base.toml import Key, Table, entry
 from bemt.sections.rule import DRAG_LEVEL, N_CRIT
@@ -73,8 +74,8 @@ def _percent(key: str, low: float = 1.0) -> Suspect:
 RPM = Key(unit="rev/min", low=10, high=300_000, required=True,
            suspect=_looks((1e-9, 9.999, "rev/s", lambda v: v * 60, "rpm")))  # fmt: skip
 AIRSPEED = Key(unit="m/s", low=-100, high=300, suspect=_looks((300.1, 1100, "km/h", lambda v: v / 3.6, "airspeed_m_s")))
-_DENSITY = Key(unit="kg/m3", low=0.01, high=10, suspect=_looks(
-    (800, 1500, "g/m3", lambda v: v / 1000, "density_kg_m3"),
+_DENSITY = Key(unit="kg/m3", low=0.01, high=LIQUID[1], suspect=_looks(
+    (1100.01, 1500, "g/m3", lambda v: v / 1000, "density_kg_m3"),
     (0.0755, 0.0775, "lb/ft3", lambda v: v * 16.018463, "density_kg_m3"),
     (0.00235, 0.0024, "slug/ft3", lambda v: v * 515.37882, "density_kg_m3")))  # fmt: skip
 _ALTITUDE = Key(unit="m", low=-500, high=20_000,
@@ -231,13 +232,15 @@ class OperatingTable(Table):
 
 
 class AirTable(Table):
-    """[air]: density, or altitude, or pressure with temperature and humidity."""
+    """[air]: density, or altitude, or pressure with temperature and humidity; or water."""
 
     density_kg_m3: float | None = entry(key=_DENSITY)
     altitude_m: float | None = entry(key=_ALTITUDE)
     pressure_hPa: float | None = entry(key=_PRESSURE)
     temperature_C: float | None = entry(key=TEMPERATURE)
     humidity_pct: float | None = entry(unit="%", low=0, high=100, suspect=_FRACTION_OF_HUMIDITY)
+    fluid: Literal["water"] | None = entry("choice", choices=("water",))
+    salinity_g_kg: float | None = entry(unit="g/kg", low=0, high=45)
 
 
 class ModelTable(Table):
@@ -341,6 +344,6 @@ GROUPS: tuple[tuple[str, tuple[str, ...], bool], ...] = (
     ("blade.section", ("naca", "dat", "thickness"), True),
     ("duct", ("tip_gap_mm", "inner_diameter_mm", "inner_diameter_in"), True),
     ("duct", ("exit_area_ratio", "exit_diameter_mm"), True),
-    ("air", ("density_kg_m3", "altitude_m", "pressure_hPa"), True),
+    ("air", ("density_kg_m3", "altitude_m", "pressure_hPa", "fluid"), True),
 )
 """(table, keys, required): at most one of the keys may be given, exactly one when required."""
