@@ -6,6 +6,7 @@ import math
 import re
 from pathlib import Path
 
+from bemt.asbuilt.population import chord_sd
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
 from geometry.common import GeometryError
@@ -13,8 +14,14 @@ from geometry.designation import parse_designation
 
 __all__ = ["case_name", "fan_text", "label_parts", "label_text", "of_stations", "stations_text"]
 
+CHORD, CHORD_EXPONENT = 0.218, -0.4
+"""Largest chord over tip radius of the usual 10 in propeller and its exponent over the diameter: 87 propellers of UIUC
+volumes 1 and 2 with stations, families alike in weight (chord at 0.75 R 0.145 R; law `apc_like`) [1]."""
 TIP_SPEED = 120.0
 """Speed of the blade tips at the operating point of a new case, for want of a better one. [m/s]"""
+
+# Chords over the radius that a propeller may have.
+_CHORD_LAW = (0.05, 1.0)
 
 SECTION = """
 [[assumptions]]
@@ -57,9 +64,9 @@ why = "a label's pitch is that of the chord line (0) or of the flat underside (u
 
 [[assumptions]]
 key = "blade.max_chord_over_R"
-low = 0.15
-high = 0.24
-why = "chord not known; measured two-blade propellers of 8 to 14 in. Measure it at 0.75 R: nothing narrows more"
+low = {low:.2g}
+high = {high:.2g}
+why = "chord not known; 87 measured propellers of 2.2 to 19 in. Measure it at 0.75 R: nothing narrows more"
 """
 FAN = """
 [[assumptions]]
@@ -136,6 +143,10 @@ def label_text(label: str, blades: int | None = None, rpm: float | None = None, 
     """Write the case of a label such as ``10x5``."""
     D, pitch, B = label_parts(label, blades)
     name = case_name(f"prop_{D:g}x{pitch:g}" + (f"x{B}" if B != 2 else ""))
+    chord, far = CHORD * (D / 10.0) ** CHORD_EXPONENT, math.exp(math.sqrt(3.0) * chord_sd(D * INCH))
+    lowest, highest = _CHORD_LAW
+    chord = min(max(chord, lowest), highest)
+    blade = BLADE.format(low=max(chord / far, lowest), high=min(chord * far, highest))
     return f"""# A {D:g}x{pitch:g} propeller, known by its label. [[assumptions]] are declared unknowns with ranges:
 # `bemt sweep` says what each does to the thrust. Put in what you measure and delete its assumption.
 schema = "bemt.case/1"
@@ -153,12 +164,12 @@ hub_ratio = 0.15
 pitch_in = {pitch:g}
 beta_offset_deg = 0.7
 chord_law = "apc_like"
-max_chord_over_R = 0.195
+max_chord_over_R = {chord:.3g}
 
 [blade.section]
 camber = 0.035
 thickness = 0.09
-{_operating(_rpm(D * INCH, rpm), airspeed_m_s, rpm is not None)}{BLADE}{SECTION}{SURFACE}"""
+{_operating(_rpm(D * INCH, rpm), airspeed_m_s, rpm is not None)}{blade}{SECTION}{SURFACE}"""
 
 
 def stations_text(

@@ -148,7 +148,7 @@ def _shares(answer: Diagnosis, c: int) -> tuple[NDArray[np.bool_], Array]:
     problem, where = answer.problem, answer.marked
     here = (problem.channel == c) & problem.free
     d = problem.y - problem.f0 if where is None else where.mismatch
-    return here, 100.0 * (d / problem.scale)[here]
+    return here, 100.0 * (d / problem.largest)[here]
 
 
 def _shown(answer: Diagnosis) -> str:
@@ -216,7 +216,7 @@ def _strip(answer: Diagnosis, name: str) -> Figure:
         if span is not None:
             axis.axvspan(*span, facecolor=ORANGE, alpha=0.25, edgecolor="none")
         axis.axhline(0.0, color=GREY, linewidth=0.8)
-        u = 100.0 * factor * (problem.u / problem.scale)[here]
+        u = 100.0 * factor * (problem.u / problem.largest)[here]
         axis.errorbar(x, e, u, fmt="o", color=BLUE, markersize=4, elinewidth=1.0)
         axis.set(title=_title(_heading(answer, c, span is not None), len(channels)), xlabel=_AXIS.get(name, name))
     axes[0, 0].set_ylabel(_shown(answer))
