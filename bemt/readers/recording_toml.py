@@ -46,9 +46,11 @@ from bemt.air import Air
 from bemt.base import units
 from bemt.base.errors import Fault, InputError
 from bemt.base.toml import Collector, Key, check_table, load_toml, shown
+from bemt.dataset import Dataset
 from bemt.readers import head_text, load_text
+from bemt.readers._columns import Channel, dataset
 from bemt.readers._headings import Heading, heading
-from bemt.readers._imported import Channel, Imported
+from bemt.readers._large import large_table
 from bemt.readers._recording import Builder, spikes
 from bemt.readers._split import some, split_table
 
@@ -108,7 +110,7 @@ def sniff(head: bytes | str) -> bool:
     return any(line.split("#")[0].strip() == "[recording]" for line in head_text(head).splitlines())
 
 
-def read(path: str | os.PathLike[str]) -> Imported:
+def read(path: str | os.PathLike[str]) -> Dataset:
     """Read a recording.toml and the tables that it names."""
     out = Collector(os.fspath(path))
     document = load_toml(Path(path), out)
@@ -120,7 +122,7 @@ def read(path: str | os.PathLike[str]) -> Imported:
         raise InputError(out.faults)
     head = document["recording"]
     files = [head["file"]] if isinstance(head["file"], str) else list(head["file"])
-    runs: list[Imported] = []
+    runs: list[Dataset] = []
     faults: list[Fault] = []
     for name in files:
         try:
@@ -130,14 +132,15 @@ def read(path: str | os.PathLike[str]) -> Imported:
     if faults:
         raise InputError(faults)
     joined = _join(runs, files)
-    warnings = list(joined.warnings)
-    if "density_kg_m3" not in constants and "density_kg_m3" not in joined.channels:
+    warnings = list(joined.notes)
+    if "density_kg_m3" not in constants and "density_kg_m3" not in joined:
         warnings.append("no air state: coefficients need a density ([air] in the recording)")
     said = {"recording": out.file, **{k: str(v) for k, v in head.items() if isinstance(v, str) and k != "file"}}
     for table in ("rotor", "stand"):
         said |= {f"{table}_{k}": v for k, v in document.get(table, {}).items() if isinstance(v, str)}
-    return replace(joined, format=KIND, kind="bench", warnings=tuple(dict.fromkeys(warnings)), constants=constants,
-                   provenance={**joined.provenance, **said}, instrument=_instrument(document["columns"]))  # fmt: skip
+    told = {"constants": constants, "instrument": _instrument(document["columns"])}
+    about = {**joined.provenance, **said, **{k: v for k, v in told.items() if v}, "format": KIND}
+    return replace(joined, kind="bench", notes=tuple(dict.fromkeys(warnings)), provenance=about)
 
 
 def _check(out: Collector, document: Mapping[str, Any]) -> None:
@@ -272,12 +275,13 @@ def _heading(name: str, unit: str, text: str) -> Heading:
     return Heading(text, heading(f"{name}_{unit}").name, units.UNITS[unit])
 
 
-def _run(file: str, path: Path, document: Mapping[str, Any]) -> Imported:
+def _run(file: str, path: Path, document: Mapping[str, Any]) -> Dataset:
     """One table with the map applied."""
     head, columns = document["recording"], document["columns"]
-    source = load_text(path)
-    table = split_table(source, head.get("delimiter"), head.get("header"))
-    width = len(table.rows[0])
+    large = large_table(path) if not {"delimiter", "header", "decimal"} & head.keys() else None
+    told = (head.get("delimiter"), head.get("header"))
+    table = large[0] if large is not None and large[1] == "." else split_table(load_text(path), *told)
+    source, width = table.source, table.width
     places: dict[int, str] = {}
     faults = []
     for name, column in columns.items():
@@ -336,21 +340,21 @@ def _derive(build: Builder, document: Mapping[str, Any]) -> None:
     build.check_magnitudes()
 
 
-def _join(runs: list[Imported], files: list[str]) -> Imported:
+def _join(runs: list[Dataset], files: list[str]) -> Dataset:
     """Runs in their order; a channel that a run lacks is NaN there."""
     if len(runs) == 1:
         return runs[0]
-    names = list(dict.fromkeys(name for run in runs for name in run.channels))
+    names = list(dict.fromkeys(name for run in runs for name in run.values))
     channels = {}
     for name in names:
-        found = [run.channels[name].unit for run in runs if name in run.channels]
-        parts = [run.channels[name].values if name in run.channels else np.full(run.rows, np.nan) for run in runs]
-        channels[name] = Channel(np.concatenate(parts), found[0] if len(set(found)) == 1 else "")
-    channels["run"] = Channel(np.concatenate([np.full(run.rows, k, dtype=float) for k, run in enumerate(runs, 1)]), "-")
-    texts = {name: sum((run.texts.get(name, ("",) * run.rows) for run in runs), ())
+        found = {run.unit(name) for run in runs if name in run}
+        parts = [run.values.get(name, np.full(len(run), np.nan)) for run in runs]
+        channels[name] = Channel(np.concatenate(parts), found.pop() if len(found) == 1 else "")
+    channels["run"] = Channel(np.concatenate([np.full(len(run), float(k)) for k, run in enumerate(runs, 1)]), "-")
+    texts = {name: sum((run.texts.get(name, ("",) * len(run)) for run in runs), ())
              for name in dict.fromkeys(n for run in runs for n in run.texts)}  # fmt: skip
-    warnings = tuple(f"{file}: {text}" for file, run in zip(files, runs, strict=True) for text in run.warnings)
+    warnings = [f"{file}: {text}" for file, run in zip(files, runs, strict=True) for text in run.notes]
     said = {"file": "+".join(files), "sha256": "+".join(run.provenance["sha256"] for run in runs)}
-    return Imported(KIND, "bench", sum(run.rows for run in runs), channels, warnings, said,
-                    flags=sum((run.flags for run in runs), ()), lines=sum((run.lines for run in runs), ()), texts=texts,
-                    headings={k: v for run in runs for k, v in run.headings.items()})  # fmt: skip
+    return dataset(KIND, "bench", channels, warnings, said, flags=sum((run.flags for run in runs), ()),
+                   lines=sum((tuple(run.lines) for run in runs), ()), texts=texts,
+                   headings={k: v for run in runs for k, v in run.provenance.get("headings", {}).items()})  # fmt: skip
