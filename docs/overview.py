@@ -27,17 +27,20 @@ TARGET = ROOT / "docs" / "img" / "overview.png"
 LOOK: dict[str, dict[str, Any]] = {
     "bemt": dict(color="#0072B2", marker="o", markersize=8),
     "k1k2": dict(color="#E69F00", marker="s", markersize=7),
-    "cfd": dict(color="#000000", marker="|", markersize=15, markeredgewidth=2.5),
+    "cfd": dict(color="#D55E00", marker="D", markersize=7),
     "bench": dict(color="#009E73", marker="x", markersize=8, markeredgewidth=2.5),
     "vendor": dict(color="#CC79A7", marker="^", markersize=8),
 }
 LABEL = {
-    "bemt": "BEMT (bar: ±u: assumptions and model)",
+    "bemt": "BEMT",
     "k1k2": "K1/K2 formula",
-    "cfd": "CFD (Fluent)",
+    "cfd": "CFD (Fluent), no u stated",
     "bench": "bench",
     "vendor": "vendor",
 }
+LANE = {"bemt": 0.2, "k1k2": -0.2}
+"""Of bars, in the row of a case, so that none lies under another source's mark."""
+LIMITS = (0.7, 1.5)
 
 
 def thrusts(ax: Any) -> dict[str, float]:
@@ -51,19 +54,25 @@ def thrusts(ax: Any) -> dict[str, float]:
             rows.setdefault(row["source"], row)
         base = rows["cfd"]["thrust_N"]
         ours[name] = rows["bemt"]["thrust_N"]
-        spread = rows["bemt"].get("u")
-        if isinstance(spread, float):
-            ax.plot([(ours[name] - spread) / base, (ours[name] + spread) / base], [y, y], lw=6, alpha=0.3,
-                    color=LOOK["bemt"]["color"], solid_capstyle="butt")  # fmt: skip
         for source in ("cfd", "vendor", "bench", "k1k2", "bemt"):
-            if source in rows:
-                ax.plot(rows[source]["thrust_N"] / base, y, ls="none", **LOOK[source])
+            if source not in rows:
+                continue
+            at, u, look = rows[source]["thrust_N"] / base, rows[source].get("u"), LOOK[source]
+            lane = y + LANE.get(source, 0.0)
+            if at < LIMITS[0]:  # stands at the edge with its value: one outlier does not flatten the rest
+                ax.plot(LIMITS[0] + 0.015, lane, ls="none", **{**look, "marker": "<"})
+                ax.text(LIMITS[0] + 0.035, lane, f"{at:.2f}", va="center", fontsize=8)
+                continue
+            if isinstance(u, float):
+                ax.plot([at - u / base, at + u / base], [lane, lane], lw=6, alpha=0.3, color=look["color"],
+                        solid_capstyle="butt")  # fmt: skip
+            ax.plot(at, lane, ls="none", **look)
     ax.axvline(1.0, color="0.75", lw=1, zorder=0)
     names = [f"{n.replace('prop_', '').replace('ds30', 'DS-30 fan')}\n{ours[n]:.1f} N" for n in order]
     ax.set_yticks(range(len(order)), names)
     ax.set_ylim(-0.6, len(order) - 0.4)
-    ax.set_xlim(0.0, 1.7)
-    ax.set_xlabel("thrust / recorded CFD thrust [-]")
+    ax.set_xlim(*LIMITS)
+    ax.set_xlabel("thrust / recorded CFD thrust [-]; bars: one standard uncertainty")
     ax.set_title("Static thrust, five cases (BEMT value beside the name)", fontsize=10)
     handles = [Line2D([], [], ls="none", **look) for look in LOOK.values()]
     ax.legend(handles, [LABEL[k] for k in LOOK], fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncol=3,

@@ -29,6 +29,7 @@ __all__ = [
     "blade_volume",
     "build",
     "hub_profile",
+    "rings",
     "radii",
     "rotor_mesh",
     "wrapped_outline",
@@ -129,7 +130,7 @@ def radii(blade: Blade, options: Options | None = None) -> Array:
     return ring
 
 
-def _rings(blade: Blade, r: Array, options: Options) -> Array:
+def rings(blade: Blade, r: Array, options: Options) -> Array:
     """Outlines (N, m, 2) at radii, one topology: all sharp (last point dropped) or all blunt."""
     curves = np.stack([wrapped_outline(blade, float(x), options) for x in r])
     sharp = np.array([_sharp(curve) for curve in curves])
@@ -184,7 +185,7 @@ def _rotor(rotor: Rotor, options: Options) -> tuple[Mesh, dict[str, float]]:
     outer = radii(blade, options)
     depth = min(0.12 * blade.Rhub, 0.5 * blade.Rhub)
     ring = np.concatenate([[blade.Rhub - depth], outer])
-    curves = _rings(blade, ring, options)
+    curves = rings(blade, ring, options)
     _check_sections(rotor, outer, curves[1:], options)
     turn = rotor.rotation * curves[..., 0] / ring[:, None]
     points = np.stack([ring[:, None] * np.cos(turn), ring[:, None] * np.sin(turn), curves[..., 1]], axis=-1)

@@ -14,7 +14,7 @@ from geometry.common import Array, GeometryError
 from geometry.duct import Duct, Stator
 from geometry.solid import Mesh, Options, as_solid, check_closed, join, profile_volume, revolve, skin
 
-__all__ = ["StatorPlan", "centre_body", "duct_mesh", "duct_profile", "plan_stator"]
+__all__ = ["StatorPlan", "centre_body", "duct_mesh", "duct_profile", "plan_stator", "vane_rows"]
 
 CLEARANCE = 0.04  # axial distance of hub and centre body over the bore radius
 THICKNESS = 0.10  # symmetric NACA section of vanes that have none: an assumption
@@ -124,7 +124,7 @@ def duct_mesh(duct: Duct, plan: StatorPlan | None, options: Options | None = Non
         check_closed(mesh, "duct", bodies=1)
         return mesh, volume
     wall = as_solid(vertices, faces, "duct")
-    vane = as_solid(*_vane(duct, plan, options), "stator")
+    vane = as_solid(*skin(vane_rows(duct, plan, options)), "stator")
     body = as_solid(*revolve(centre_body(duct, plan), count // 2), "stator")
     copies = [("stator", vane.rotate([0.0, 0.0, 360.0 * k / plan.stator.B])) for k in range(plan.stator.B)]
     mesh = join([("duct", wall), *copies, ("stator", body)], "duct")
@@ -140,8 +140,8 @@ def _body_radius(duct: Duct, plan: StatorPlan, x: Array) -> Array:
     return out
 
 
-def _vane(duct: Duct, plan: StatorPlan, options: Options) -> tuple[Array, np.ndarray]:
-    """Skin of one vane, from inside the body to the middle of the wall at every point."""
+def vane_rows(duct: Duct, plan: StatorPlan, options: Options) -> Array:
+    """Outlines of one vane, (3, m, 3): inside the body, between, and in the middle of the wall. [m]"""
     section = plan.outline(options.n)
     if np.linalg.norm(section[0] - section[-1]) < 1e-6 * plan.stator.chord:
         section = section[:-1]
@@ -157,4 +157,4 @@ def _vane(duct: Duct, plan: StatorPlan, options: Options) -> tuple[Array, np.nda
     for w in (0.0, 0.5, 1.0):
         rho = (1 - w) * foot + w * tip
         rows.append(np.stack([np.sqrt(rho**2 - t**2), t, duct._rotor - x], axis=1))
-    return skin(np.stack(rows))
+    return np.stack(rows)

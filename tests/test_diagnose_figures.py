@@ -83,6 +83,25 @@ def test_what_there_is_to_show_is_written(
                 assert image.convert("RGB").getpixel((0, 0)) == (255, 255, 255)
 
 
+def test_the_colours_of_the_residual_are_what_its_heading_says(named: chain.Diagnosis) -> None:
+    figure, where = figures.residual(named), named.marked
+    assert where is not None
+    axis = next(a for a in figure.axes if "marked region" in a.get_title().replace("\n", " "))
+    drawn = axis.collections[0]
+    at = np.asarray(drawn.get_offsets())[:, 0 if where.variable == "J" else 1]
+    inside = np.asarray(drawn.get_array())[(at >= where.low) & (at <= where.high)]
+    assert inside.mean() == pytest.approx(100.0 * where.size)
+
+
+def test_the_residual_shows_the_run_and_not_its_reference(
+    named: chain.Diagnosis, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    free = np.arange(named.problem.y.size) % 2 == 0
+    monkeypatch.setattr(type(named.problem), "free", property(lambda self: free))
+    drawn = sum(len(np.asarray(a.collections[0].get_offsets())) for a in figures.residual(named).axes[:2])
+    assert drawn == free.sum() < free.size
+
+
 def test_the_same_answer_gives_the_same_files_and_leaves_no_figure_open(named: chain.Diagnosis, tmp_path: Path) -> None:
     from matplotlib import pyplot as plt
 

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from bemt.base.errors import InputError
 from bemt.commands.cli import main
 from bemt.drive import motor_constant as mc
-from bemt.drive import motor_errors, motor_file, motor_generate
+from bemt.drive import motor_errors, motor_file, motor_generate, picture
 
 S32, S3 = math.sqrt(1.5), math.sqrt(3.0)
 
@@ -279,3 +281,11 @@ def test_results_never_replace_trials(tmp_path: Path, capsys: pytest.CaptureFixt
     assert main(["motor", str(path), "--out", str(path / "out")]) == 0
     assert main(["motor", str(path), "--out", str(path / "motor.toml" / "deep")]) == 2
     assert "motor.toml, a file; expected a folder" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("title", ["Motor", "Motor MN4006 KV380: generated trials, seed 0: nobody measured them, " * 3])
+def test_no_title_is_cut(title: str) -> None:
+    trials = {"data sheet": np.array([0.0308]), "torque sensor": np.linspace(0.03, 0.032, 5)}
+    with Image.open(io.BytesIO(picture.box_plot(trials, {"adopted": 0.031}, "constant [N m/A]", title))) as page:
+        edges = np.asarray(page.convert("L"))[:, [0, -1]]
+    assert edges.min() == 255, "ink on the edge"

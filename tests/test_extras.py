@@ -62,4 +62,4 @@ def test_the_base_install_answers(bare: dict[str, str], tmp_path: Path, project:
         done = bemt(bare, tmp_path, *words)
         assert done.returncode == 0, done.stderr
     page = (tmp_path / "r" / "report.html").read_text(encoding="utf-8")
-    assert "no picture" in page and "bemt[pictures]" in page
+    assert "data-mesh=" in page and "data:image/png" in page, "the rotor is shown without the extras"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from geometry.mesh import MeshModel, Options, build, rotor_mesh
 from geometry.rotor import Rotor
 from geometry.slicing import FoundRotor, find_rotor
 from geometry.solid import check_closed
+from geometry.surface import surfaces
 
 CASES = ("ds30", "prop_8x5", "prop_10x5", "prop_12x6", "prop_14x8")
 
@@ -209,3 +211,34 @@ def test_a_lump_and_a_single_blade_are_no_rotor() -> None:
 
 def test_all_cases_were_tried(project: Path) -> None:
     assert {path.parent.name for path in find_cases([project / "cases"])} == set(CASES)
+
+
+@pytest.mark.parametrize("name", ["prop_8x5", "ds30"])
+def test_surfaces_to_look_at_are_those_of_the_solid(name: str, project: Path) -> None:
+    case = load_case(project / "cases" / name / "case.toml")
+    rotor, duct = case.rotor(), case.duct()
+    found = {s.name: s for s in reversed(surfaces(rotor, duct))}
+    assert found["blade"].copies == rotor.B
+    solid = rotor_mesh(rotor).vertices
+    for s in (found["blade"], found["hub"]):
+        assert np.all(s.points.reshape(-1, 3).max(axis=0) <= solid.max(axis=0) + 1e-3 * rotor.R)
+    blade = found["blade"].points
+    assert np.hypot(blade[..., 0], blade[..., 1]).max() == pytest.approx(rotor.R, rel=1e-6)
+    for r in (0.4, 0.7, 0.95):  # chord and blade angle are those of the law
+        row = blade[np.argmin(np.abs(np.hypot(blade[:, 0, 0], blade[:, 0, 1]) - r * rotor.R))]
+        at = float(np.hypot(row[0, 0], row[0, 1]))
+        chord, beta = (float(v) for v in rotor.blade.at(at))
+        flat = np.stack([at * np.unwrap(np.arctan2(row[:, 1], row[:, 0])), row[:, 2]], axis=1)
+        far = flat[np.argmax(np.linalg.norm(flat - flat[0], axis=1))] - flat[0]
+        assert np.linalg.norm(far) == pytest.approx(chord, rel=0.02)
+        assert abs(math.atan2(abs(far[1]), abs(far[0])) - beta) < math.radians(1.0)
+    if duct is not None:
+        assert found["duct"].points[..., 1].min() > -1e-9, "cut open"
+        assert np.hypot(*found["stator"].points[..., :2].reshape(-1, 2).T).max() < duct.outer(0.5 * duct.length) * 1.2
+
+
+@pytest.mark.parametrize(("hub", "blades"), [(0.0, 2), (0.05, 1), (0.6, 40)])
+def test_what_cannot_be_made_can_be_looked_at(hub: float, blades: int) -> None:
+    blade = replace(helix(0.2, 0.15, anchors=naca4(0.04, 0.4, 0.12)), Rhub=hub * 0.1)
+    for s in surfaces(Rotor(blade, blades)):
+        assert np.isfinite(s.points).all() and np.hypot(s.points[..., 0], s.points[..., 1]).max() <= 0.1 * (1 + 1e-9)

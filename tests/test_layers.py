@@ -80,8 +80,8 @@ BLIND = "bemt.proof.truth*|bemt.proof.stand*|bemt.proof.rigs|bemt.proof.causes|b
 UNSEEN = "bemt.bem|bemt.bem.*|bemt.effects|bemt.effects.*|bemt.sections|bemt.sections.*|bemt.diagnose|bemt.diagnose.*"
 
 HEAVY = {
-    "OCP", "aerosandbox", "cadquery", "casadi", "dask", "distributed", "manifold3d", "matplotlib", "neuralfoil",
-    "pandas", "pyarrow", "pyvista", "scipy", "sklearn", "trimesh", "vtk", "vtkmodules", "wisdem",
+    "OCP", "aerosandbox", "cadquery", "casadi", "dask", "distributed", "jinja2", "manifold3d", "matplotlib",
+    "neuralfoil", "pandas", "pyarrow", "pyvista", "scipy", "sklearn", "trimesh", "vtk", "vtkmodules", "wisdem",
 }  # fmt: skip
 LIGHT = "bemt|bemt.__main__|bemt.commands|bemt.commands.*|bemt.base.errors"  # imported by --help: standard library only
 

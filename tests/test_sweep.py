@@ -25,7 +25,10 @@ from bemt.case.prepare import prepare_case
 from bemt.compare.grid import run as grid_module
 from bemt.compare.sweep import batch as sweep_module
 from bemt.compare.sweep import fingerprint, sweep
+from bemt.compare.sweep.agreement import agreement, known, needed
 from bemt.compare.sweep.case import solve_case
+from bemt.compare.sweep.summary import summary
+from bemt.formula.k1k2 import U_MEASURED
 
 ROOT = Path(__file__).resolve().parents[1]
 KGF = 9.80665
@@ -512,3 +515,22 @@ def test_a_screen_of_many_cases_is_still_one_screen() -> None:
     lines = summary([*many, *lost]).splitlines()
     assert len(lines) <= 45 and max(map(len, lines)) <= 80
     assert any("more" in line for line in lines)
+
+
+@pytest.mark.parametrize("E", [-7.0, 0.3, 4.0])
+def test_agreement_hangs_on_the_uncertainty_that_is_needed(E: float) -> None:
+    c = {"E": E, "D": 20.0, "unit": "N", "u_num": 0.1, "u_input": 0.8, "u_model": 1.5, "u_D": None}
+    least = needed(c)
+    assert math.hypot(known(c), least) >= abs(E) * (1 - 1e-12)
+    assert "u_D unknown" in agreement(c)
+    assert agreement({**c, "u_D": 1.001 * least}) == "not distinguishable from noise"
+    if least:
+        assert agreement({**c, "u_D": 0.999 * least}) == "differs"
+    assert math.isnan(needed({**c, "u_model": None})), "a model without an uncertainty decides nothing"
+
+
+def test_the_formula_has_its_measured_error_and_none_where_nobody_measured_it(solved: dict[str, Any]) -> None:
+    line = next(c for c in solved["comparisons"] if c["model"] == "k1k2" and c["quantity"] == "thrust_N")
+    assert line["u_model"] == pytest.approx(U_MEASURED * line["S"])
+    ducted = {**solved, "kind": "fan"}
+    assert "knows their" in " ".join(summary([ducted]).split()) and "K1/K2 gives" not in summary([solved])

@@ -16,8 +16,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     _options.add_cases(parser)
     parser.add_argument("--out", required=True, metavar="DIR", help="folder of the report and of the sweep behind it")
-    parser.add_argument("--title", metavar="TEXT", help="title of the report (default: Validation report)")
+    parser.add_argument(
+        "--title", metavar="TEXT", help="title (default: that of the only case, else Validation report)"
+    )
     parser.add_argument("--author", metavar="TEXT", help="who answers for it, shown under the title")
+    parser.add_argument("--date", metavar="TEXT", help="date under the title (default: today)")
+    parser.add_argument("--commit", metavar="TEXT", help="revision under the title (default: of the cases' checkout)")
     _options.add_quiet(parser, "neither progress nor file names")
 
 
@@ -27,14 +31,18 @@ def _about(args: argparse.Namespace) -> dict[str, str]:
     import subprocess
     from pathlib import Path
 
-    about = {"title": args.title or "", "author": args.author or "", "date": datetime.date.today().isoformat()}
+    about = {"title": args.title or "", "author": args.author or ""}
+    about["date"] = args.date if args.date is not None else datetime.date.today().isoformat()
     folder = Path(args.paths[0])
     command = ["git", "-C", str(folder if folder.is_dir() else folder.parent), "describe", "--always", "--dirty"]
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=10)
-    except (OSError, subprocess.TimeoutExpired):
-        return about
-    return about | ({"revision": f"commit {done.stdout.strip()}"} if done.returncode == 0 else {})
+    commit = args.commit
+    if commit is None:
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, timeout=10)
+            commit = done.stdout.strip() if done.returncode == 0 else ""
+        except (OSError, subprocess.TimeoutExpired):
+            commit = ""
+    return about | ({"revision": f"commit {commit}"} if commit else {})
 
 
 def run(args: argparse.Namespace) -> int:

@@ -12,6 +12,9 @@ from bemt.dataset.points import Dataset
 
 __all__ = ["plot"]
 
+OKABE_ITO = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#000000")
+"""Colours that colour-blind readers tell apart (Okabe and Ito 2008)."""
+
 
 def plot(d: Dataset, x: str | None = None, y: Sequence[str] = (), ax: Any = None) -> Any:
     """Draw channels over another one, with bands where uncertainties are known: :meth:`Dataset.plot`."""
@@ -26,7 +29,9 @@ def plot(d: Dataset, x: str | None = None, y: Sequence[str] = (), ax: Any = None
         known = ", ".join(d.values)
         raise InputError(Fault(d.name, ", ".join(unknown), "no such channel", f"one of {known}"))
     beside, points = ax is not None, d.kind in ("bench", "cfd", "vendor")
-    ax = ax if beside else plt.subplots(layout="constrained")[1]
+    if ax is None:
+        ax = plt.subplots(layout="constrained")[1]
+        ax.set_prop_cycle(color=OKABE_ITO)
     drawn = [line.get_gid() for line in ax.lines]
     colours = {line.get_gid(): line.get_color() for line in ax.lines if drawn.count(line.get_gid()) == 1}
     speeds = np.unique(d["rpm"]) if "rpm" in d and x != "rpm" else np.array([np.nan])

@@ -20,7 +20,7 @@ DPI = 150
 STYLE: dict[Any, Any] = {
     "font.size": 9.0, "axes.titlesize": 9.0, "axes.spines.top": False, "axes.spines.right": False,
     "figure.facecolor": "white", "savefig.facecolor": "white", "legend.frameon": False, "legend.fontsize": 8.0,
-    "svg.hashsalt": "bemt", "lines.linewidth": 1.5,
+    "lines.linewidth": 1.5,
 }  # fmt: skip
 """Settings of matplotlib."""
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from bemt.diagnose.chain import Diagnosis
 
-__all__ = ["NAMES", "draw"]
+__all__ = ["NAMES", "draw", "residual"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -30,7 +30,7 @@ NAMES = ("residual", "before_after", "posterior", "radius", "confusion", "rankin
 """Stems of the files."""
 
 LARGEST = 120_000
-"""Largest file that is written [B]; a larger SVG is left out, a larger PNG loses colours."""
+"""Largest file that is written [B]; a larger one loses colours."""
 
 _CHANNEL = {"thrust_N": "thrust", "torque_Nm": "torque", "rpm": "speed of rotation"}
 _COEFFICIENT = {
@@ -53,34 +53,26 @@ def draw(answer: Diagnosis, out: Path) -> list[Path]:
     import matplotlib
 
     makers: dict[str, Callable[[Diagnosis], Figure | None]] = {
-        "residual": _residual, "before_after": _before_after, "posterior": figures_posterior.posterior,
+        "residual": residual, "before_after": _before_after, "posterior": figures_posterior.posterior,
         "radius": figures_effects.radius, "confusion": figures_effects.matrix, "ranking": figures_effects.ranking,
     }  # fmt: skip
     written = []
     with matplotlib.rc_context(STYLE):
         for name in NAMES:
             figure = makers[name](answer)
-            pages = {} if figure is None else _pages(figure)
-            for kind in ("png", "svg"):
-                path = out / f"{name}.{kind}"
-                if kind in pages:
-                    write_atomic(path, pages[kind])
-                    written.append(path)
-                else:
-                    path.unlink(missing_ok=True)
+            for kind in ("png", "svg"):  # earlier versions wrote both
+                (out / f"{name}.{kind}").unlink(missing_ok=True)
+            if figure is not None:
+                written.append(out / f"{name}.png")
+                write_atomic(written[-1], _page(figure))
     return written
 
 
-def _pages(figure: Figure) -> dict[str, bytes]:
-    """Files of a figure; the same figure gives the same bytes."""
-    png, svg = io.BytesIO(), io.BytesIO()
+def _page(figure: Figure) -> bytes:
+    """PNG of a figure; the same figure gives the same bytes."""
+    png = io.BytesIO()
     figure.savefig(png, format="png", dpi=DPI, metadata={"Software": None}, pil_kwargs={"optimize": True})
-    figure.set_layout_engine("none")  # as it is laid out already
-    figure.savefig(svg, format="svg", metadata={"Date": None})
-    pages = {"png": _slim(png.getvalue())}
-    if len(svg.getvalue()) <= LARGEST:
-        pages["svg"] = svg.getvalue()
-    return pages
+    return _slim(png.getvalue())
 
 
 def _slim(png: bytes) -> bytes:
@@ -140,18 +132,28 @@ def _percent(d: Array) -> str:
 # Residual
 
 
-def _residual(answer: Diagnosis) -> Figure:
+def residual(answer: Diagnosis) -> Figure:
+    """Draw where recording and baseline differ, as a map or along one variable."""
     X, where = answer.problem.covariates, answer.marked
     x = _across(answer)
     y = where.variable if where is not None and where.variable in ("M_tip", "Re") else "rpm"
-    if x == "J" and _varies(X["rpm"]):
+    judged = np.unique(answer.problem.point[answer.problem.free])
+    if x == "J" and judged.size and _varies(X["rpm"][judged]):
         return _map(answer, x, y)
     return _strip(answer, y if x in ("rpm", "M_tip", "Re") else x)
 
 
 def _shares(answer: Diagnosis, c: int) -> tuple[NDArray[np.bool_], Array]:
-    here = answer.problem.channel == c
-    return here, 100.0 * ((answer.problem.y - answer.problem.f0) / answer.problem.scale)[here]
+    """Readings of a channel that are judged, and what the heading is the mean of: the located mismatch, if any."""
+    problem, where = answer.problem, answer.marked
+    here = (problem.channel == c) & problem.free
+    d = problem.y - problem.f0 if where is None else where.mismatch
+    return here, 100.0 * (d / problem.largest)[here]
+
+
+def _shown(answer: Diagnosis) -> str:
+    calibration = "" if answer.marked is None else " − calibration"
+    return f"recording − baseline{calibration}\n[% of the largest]"
 
 
 def _located(answer: Diagnosis, c: int, name: str) -> tuple[float, float] | None:
@@ -171,7 +173,7 @@ def _located(answer: Diagnosis, c: int, name: str) -> tuple[float, float] | None
 def _heading(answer: Diagnosis, c: int, region: bool) -> str:
     text, where = _CHANNEL[CHANNELS[c]], answer.marked
     if region and where is not None:
-        text += f": {_percent(np.asarray(where.size))} of the largest, in the marked region"
+        text += f": mean {_percent(np.asarray(where.size))} of the largest, in the marked region"
     return text
 
 
@@ -199,7 +201,7 @@ def _map(answer: Diagnosis, x: str, y: str) -> Figure:
         axis.set(title=_title(_heading(answer, c, span is not None), len(channels)), xlabel=_AXIS.get(x, x))
         axis.margins(0.09)
     axes[0, 0].set_ylabel(_AXIS.get(y, y))
-    figure.colorbar(drawn, ax=axes, label="recording − baseline [% of scale]", extend="both", pad=0.02)
+    figure.colorbar(drawn, ax=axes, label=_shown(answer), extend="both", pad=0.02)
     return figure
 
 
@@ -214,10 +216,10 @@ def _strip(answer: Diagnosis, name: str) -> Figure:
         if span is not None:
             axis.axvspan(*span, facecolor=ORANGE, alpha=0.25, edgecolor="none")
         axis.axhline(0.0, color=GREY, linewidth=0.8)
-        u = 100.0 * factor * (problem.u / problem.scale)[here]
+        u = 100.0 * factor * (problem.u / problem.largest)[here]
         axis.errorbar(x, e, u, fmt="o", color=BLUE, markersize=4, elinewidth=1.0)
         axis.set(title=_title(_heading(answer, c, span is not None), len(channels)), xlabel=_AXIS.get(name, name))
-    axes[0, 0].set_ylabel("recording − baseline [% of scale]")
+    axes[0, 0].set_ylabel(_shown(answer))
     return figure
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -45,6 +45,8 @@ class Location:
         Sum of the standardised mismatch over the root of the number of readings [1].
     ties : tuple of str
         Other variables that explain it as well in this plan.
+    mismatch : (M,) float
+        Of every reading, in its unit; what `size` is the mean of.
     """
 
     channel: str
@@ -53,11 +55,12 @@ class Location:
     high: float
     size: float
     z: float
-    ties: tuple[str, ...] = ()
+    ties: tuple[str, ...]
+    mismatch: Array = field(repr=False, compare=False)
 
     def document(self) -> dict[str, Any]:
         """Plain values for JSON."""
-        return {k: (list(v) if isinstance(v, tuple) else v) for k, v in vars(self).items()}
+        return {k: (list(v) if isinstance(v, tuple) else v) for k, v in vars(self).items() if k != "mismatch"}
 
 
 def mismatch(found: Evidence, best: Fit) -> Array:
@@ -102,7 +105,7 @@ def _largest(found: Evidence, d: Array, natural: tuple[str, ...]) -> Location:
     low, high, z = _scan(x, e[here])
     inside = (x >= low) & (x <= high)
     size = float(np.mean((d / problem.largest)[here][inside]))
-    return Location(CHANNELS[int(channel)], name, low, high, size, z, ties)
+    return Location(CHANNELS[int(channel)], name, low, high, size, z, ties, d)
 
 
 def _groups(x: Array) -> NDArray[np.intp]:

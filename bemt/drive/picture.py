@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import textwrap
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -33,7 +34,9 @@ def _figure(columns: int = 1, width: float = 6.0, height: float = 4.0) -> tuple[
     return figure, axes
 
 
-def _png(figure: Any) -> bytes:
+def _png(figure: Any, title: str) -> bytes:
+    """PNG with a title that is wrapped where it is wider than the figure."""
+    figure.suptitle(textwrap.fill(title, int(10 * figure.get_figwidth())))
     out = io.BytesIO()
     figure.savefig(out, format="png", dpi=110, metadata={"Software": None})
     return out.getvalue()
@@ -57,8 +60,7 @@ def bench_map(chart: BenchMap, name: str) -> bytes:
         ax.set_xlabel("pulse width [µs]")
         ax.set_ylabel(label[quantity])
     axes[0].legend(frameon=False)
-    figure.suptitle(name)
-    return _png(figure)
+    return _png(figure, name)
 
 
 def box_plot(values: Mapping[str, Array], marks: Mapping[str, float], ylabel: str, title: str) -> bytes:
@@ -77,10 +79,9 @@ def box_plot(values: Mapping[str, Array], marks: Mapping[str, float], ylabel: st
     ax.set_xticks(range(len(names)), [f"{n}\n(n = {len(values[n])})" for n in names])
     ax.set_xlim(-0.6, len(names) - 0.4)
     ax.set_ylabel(ylabel)
-    figure.suptitle(title)
     if marks:
-        ax.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
-    return _png(figure)
+        figure.legend(frameon=False, loc="outside lower center", ncols=len(marks))
+    return _png(figure, title)
 
 
 def curves(panels: Sequence[Mapping[str, Any]], title: str = "") -> bytes:
@@ -94,5 +95,4 @@ def curves(panels: Sequence[Mapping[str, Any]], title: str = "") -> bytes:
         ax.set_title(panel.get("title", ""), fontsize=10)
         if any(label for label, *_ in panel["series"]):
             ax.legend(frameon=False, fontsize=8)
-    figure.suptitle(title)
-    return _png(figure)
+    return _png(figure, title)

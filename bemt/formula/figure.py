@@ -14,7 +14,9 @@ from bemt.formula.text import NAMES
 
 Array = NDArray[np.float64]
 
-_COLOURS = {"thesis": "#b2182b", "compact_pitch": "#1b7837", "compact": "#2166ac", "compact_no_chord": "#67a9cf"}
+# Okabe and Ito (2008); dash and marker tell the same
+_LOOK = {"thesis": ("#D55E00", "--", "s"), "compact_pitch": ("#E69F00", "-.", "^"), "compact": ("#0072B2", "-", "o"),
+         "compact_no_chord": ("#56B4E9", ":", "D")}  # fmt: skip
 
 
 def draw(sets: Mapping[str, tuple[FitPoints, Mapping[str, Array]]], path: Path) -> None:
@@ -33,12 +35,13 @@ def draw(sets: Mapping[str, tuple[FitPoints, Mapping[str, Array]]], path: Path) 
     for (name, (points, models)), (left, right) in zip(sets.items(), axes, strict=True):
         still = (points.J == 0) & (points.CT > 0) & ~points.ducted
         moving = (points.J > 0) & (points.CT > 0) & ~points.ducted
-        shown = [k for k in _COLOURS if k in models]
+        shown = [k for k in _LOOK if k in models]
         for key in shown:
+            colour, dash, marker = _LOOK[key]
             if np.any(still):
                 e = np.sort(np.abs(models[key][still] / points.CT[still] - 1.0))
                 label = f"{NAMES[key]} ({100 * np.mean(e <= NEAR):.0f} %)"
-                left.plot(100 * e, 100 * np.arange(1, e.size + 1) / e.size, color=_COLOURS[key], label=label)
+                left.plot(100 * e, 100 * np.arange(1, e.size + 1) / e.size, color=colour, linestyle=dash, label=label)
             centre: list[float] = []
             spread: list[Array] = []
             for a, b in zip(X_EDGES[:-2], X_EDGES[1:-1], strict=True):
@@ -50,9 +53,9 @@ def draw(sets: Mapping[str, tuple[FitPoints, Mapping[str, Array]]], path: Path) 
             if not centre:
                 continue
             low, middle, high = np.array(spread).T
-            right.plot(centre, middle, "o-", color=_COLOURS[key], label=NAMES[key])
+            right.plot(centre, middle, marker=marker, linestyle=dash, color=colour, label=NAMES[key])
             if key in ("thesis", "compact"):
-                right.fill_between(centre, low, high, color=_COLOURS[key], alpha=0.15, linewidth=0)
+                right.fill_between(centre, low, high, color=colour, alpha=0.15, linewidth=0)
         for limit in (NEAR, FAR):
             left.axvline(100 * limit, color="0.6", linewidth=0.8)
         left.set(xlim=(0, 60), ylim=(0, 100), xlabel="error of static thrust, not above [%]", ylabel="points [%]")

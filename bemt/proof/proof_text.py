@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import html as markup
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from bemt.base.page import Cell, render, table
 from bemt.base.tables import text_table
 
 __all__ = ["html", "text"]
@@ -29,6 +29,7 @@ def _rows(rows: Sequence[Mapping[str, Any]]) -> list[list[str]]:
     return out
 
 
+MET = {"yes": "fine", "NO": "fault", "no data": "unknown"}
 _HEADER = ["metric", "count", "value", "95 % (Wilson)", "target", "met"]
 
 
@@ -67,27 +68,14 @@ def text(document: Mapping[str, Any]) -> str:
     return "\n\n".join(parts)
 
 
-_STYLE = """body{font:15px/1.5 system-ui,sans-serif;max-width:68rem;margin:2rem auto;padding:0 1rem;color:#1c2330}
-table{border-collapse:collapse;margin:.6rem 0 1.6rem}th,td{padding:.25rem .7rem;text-align:left;border-bottom:1px solid
-#d9dee7;vertical-align:top}
-th{border-bottom:2px solid #8a94a6}td.NO{color:#b3261e;font-weight:600}code{word-break:break-all}"""
-
-
 def html(document: Mapping[str, Any]) -> str:
     """Give one HTML file with the same tables."""
-    out = ["<!doctype html><html lang=en><meta charset=utf-8><title>Proof</title>", f"<style>{_STYLE}</style>",
-           "<h1>Proof on concealed causes</h1>",
-           f"<p>{document['items']} items ({document['size']}), seed {document['seed']}, commit "
-           f"{markup.escape(document['commit'] or 'unknown')}. Key SHA-256 <code>{document['key_sha256']}</code>, "
-           "sealed before the diagnosis began.</p>"]  # fmt: skip
-    for title, header, rows in _tables(document):
-        out.append(f"<h2>{title}</h2>")
-        if not rows:
-            out.append("<p>none</p>")
-            continue
-        out.append("<table><tr>" + "".join(f"<th>{h}</th>" for h in header) + "</tr>")
-        for row in rows:
-            cells = (f"<td{' class=NO' if cell == 'NO' else ''}>{markup.escape(cell)}</td>" for cell in row)
-            out.append("<tr>" + "".join(cells) + "</tr>")
-        out.append("</table>")
-    return "\n".join(out) + "</html>\n"
+    tables = [(title, table(header, [[Cell(c, badge=MET[c]) if c in MET else c for c in row] for row in rows]))
+              for title, header, rows in _tables(document)]  # fmt: skip
+    lead = (
+        f"{document['items']} items ({document['size']}), seed {document['seed']}, commit "
+        f"{document['commit'] or 'unknown'}."
+    )
+    title = "Proof on concealed causes"
+    return render("bemt.proof", "proof.html", ["page.js"], title=title, lead=lead, key=document["key_sha256"],
+                  tables=tables)  # fmt: skip

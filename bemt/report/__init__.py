@@ -7,7 +7,7 @@ page unescaped, no file outside of DIR is written, and the HTML lets no script r
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,39 +18,50 @@ __all__ = ["HTML_NAME", "MARKDOWN_NAME", "book_html", "write"]
 HTML_NAME, MARKDOWN_NAME = "report.html", "report.md"
 
 
+def _pages(book: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    """Pages in the order of the menu: id, name in the menu, title, what stands above the sections, sections."""
+    from bemt.report.case_page import case_sections, reproduction_table
+    from bemt.report.cfd_page import CFD_WORDS, cfd_sections
+    from bemt.report.diagnosis_block import diagnosis_parts
+    from bemt.report.front import answers, front_parts
+    from bemt.report.trend_page import trend_sections
+    from bemt.report.values import sections
+    from bemt.report.verdicts import headline, verdict
+
+    names = [str(page["result"]["name"]) for page in book["cases"]]
+    ids = [f"case-{i + 1}-" + re.sub(r"[^A-Za-z0-9_-]+", "-", name)[:60] for i, name in enumerate(names)]
+    yield {"id": "front", "name": "Answers", "title": "Answers", "answers": answers(book, ids),
+           "top": front_parts(book, ids), "sections": []}  # fmt: skip
+    for page, name, key in zip(book["cases"], names, ids, strict=True):
+        yield {"id": key, "name": name[:40], "title": headline(page["result"]),
+               "top": [("verdict", verdict(page["result"]))],
+               "sections": case_sections(page, book["reproduction"])}  # fmt: skip
+    given = [item for item in book["reproduction"] if str(item["status"]).startswith("input")]
+    numbers = reproduction_table([item for item in book["reproduction"] if item not in given])
+    inputs = f"{len(given)} inputs, not computed", [("table", reproduction_table(given))]
+    thesis = (
+        "T. Cahill, MS thesis, Northeastern University, April 2025. Statistics of the UIUC database are checked by "
+        "python -m bemt reproduce where those data are."
+    )
+    told = sections(*((item["name"], diagnosis_parts(item)) for item in book["diagnoses"]))
+    for key, title, top, found in (
+        ("trends", "Trends", [], trend_sections(book)),
+        ("cfd", "Own CFD", [("words", CFD_WORDS)], cfd_sections(book["cfd"])),
+        ("diagnoses", "Diagnoses", [], told),
+        ("reproduction", "Reproduction", [("words", thesis), ("table", numbers), ("more", inputs)], []),
+    ):
+        if found or (key == "reproduction" and numbers):
+            title_of = "Every number of the source thesis" if key == "reproduction" else title
+            yield {"id": key, "name": title, "title": title_of, "top": top, "sections": found}
+
+
 def book_html(book: Mapping[str, Any]) -> str:
     """Write the HTML of a report."""
-    from bemt.report.case_page import case_page, reproduction_table
-    from bemt.report.cfd_page import cfd_page
-    from bemt.report.diagnosis_block import diagnosis_parts
-    from bemt.report.front import front_page
-    from bemt.report.markup import document, esc, section
-    from bemt.report.trend_page import trend_page
+    from bemt.base.page import render
+    from bemt.report.verdicts import headline
 
-    ids = {
-        i: f"case-{i + 1}-" + re.sub(r"[^A-Za-z0-9_-]+", "-", str(page["result"]["name"]))[:60]
-        for i, page in enumerate(book["cases"])
-    }
-    pages = [("front", "Front page", front_page(book, ids))]
-    for i, page in enumerate(book["cases"]):
-        pages.append((ids[i], str(page["result"]["name"])[:40], case_page(page, book["reproduction"])))
-    pages.append(("trends", "Trends", trend_page(book)))
-    pages.append(("cfd", "Own CFD", cfd_page(book["cfd"])))
-    told = "".join(section(item["name"], diagnosis_parts(item)) for item in book["diagnoses"])
-    pages.append(("diagnoses", "Diagnoses", f"<h2>Diagnoses</h2>{told}" if told else ""))
-    numbers = reproduction_table(book["reproduction"])
-    about = book.get("about", {})
-    words = (
-        "<p>T. Cahill, MS thesis, Northeastern University, April 2025. Statistics of the UIUC database are checked by "
-        f"<code>{esc('python -m bemt reproduce')}</code> where those data are.</p>"
-    )
-    pages.append(
-        (
-            "reproduction",
-            "Reproduction",
-            f"<h2>Every number of the source thesis</h2>{words}{numbers}" if numbers else "",
-        )
-    )
+    about, only = book.get("about", {}), book["cases"]
+    made = " · ".join(filter(None, (about.get("author"), about.get("date"), about.get("revision"))))
     lead = (
         "Propellers and ducted fans: blade element momentum theory beside the K1/K2 formula, CFD, bench and vendor. "
         "Nothing here is fitted to the value it is compared with."
@@ -59,9 +70,11 @@ def book_html(book: Mapping[str, Any]) -> str:
         f"bemt {book['version']}. Thrust in newtons, CT = T/(ρ n² D⁴), CP = P/(ρ n³ D⁵). Colours after Okabe and Ito. "
         "This file loads nothing from the network."
     )
-    made = " · ".join(filter(None, (about.get("author"), about.get("date"), about.get("revision"))))
-    title = about.get("title") or "Validation report"
-    return document(title, " ".join(filter(None, (made + "." if made else "", lead))), [p for p in pages if p[2]], foot)
+    title = about.get("title") or (headline(only[0]["result"]) if len(only) == 1 else "Validation report")
+    return render(
+        "bemt.report", "report.html", ["page.js", "plot.js", "rotor.js"], pages=list(_pages(book)), foot=foot,
+        title=title, lead=f"{made}. {lead}" if made else lead,
+    )  # fmt: skip
 
 
 def write(

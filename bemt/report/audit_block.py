@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
-from bemt.report.markup import Cell, badge, esc, num, section, table
+from bemt.base.page import Cell, num, table
+from bemt.report.values import Part
 
-__all__ = ["audit_block", "audit_table"]
+__all__ = ["audit_parts"]
 
 KIND = {"fine": "fine", "doubtful": "doubtful", "fault": "fault", "not stated": "unknown"}
 
@@ -16,31 +17,15 @@ def _share(value: Any) -> str:
     return "unknown" if value is None or value != value else f"{100 * value:.1f} %"
 
 
-def audit_table(audit: Mapping[str, Any]) -> str:
-    """Make the table of one audit."""
+def audit_parts(audit: Mapping[str, Any]) -> list[Part]:
+    """Say what an audit comes to, and give its lines."""
     rows = []
     for line in audit["lines"]:
-        u = line["u_relative"]
-        share = num(None if u is None else 100 * u, 2, none="unknown")
-        status = str(line["status"])
-        rows.append(
-            [
-                str(line["topic"]),
-                Cell(status, markup=badge(KIND.get(status, "unknown"), status)),
-                str(line["finding"]),
-                str(line["consequence"]),
-                share,
-            ]
-        )
+        u, status = line["u_relative"], str(line["status"])
+        rows.append([str(line["topic"]), Cell(status, badge=KIND.get(status, "unknown")), str(line["finding"]),
+                     str(line["consequence"]), num(None if u is None else 100 * u, 2, none="unknown")])  # fmt: skip
     known = audit["u_relative_known"]
     rest = f"the parts that are known make {_share(known)} together" if known else "no part of it is known"
-    words = (
-        f"<p><strong>{esc(audit['reference'])}</strong>: uncertainty of the thrust {_share(audit['u_relative'])};"
-        f" {rest}.</p>"
-    )
-    return words + table(["setting", "status", "what is known", "consequence for the thrust", "u %"], rows)
-
-
-def audit_block(audits: Sequence[Mapping[str, Any]]) -> str:
-    """Make the section of the audits of a case."""
-    return section("Audit of the CFD", *(audit_table(audit) for audit in audits))
+    words = f"{audit['reference']}: uncertainty of the thrust {_share(audit['u_relative'])}; {rest}."
+    head = ["setting", "status", "what is known", "consequence for the thrust", "u %"]
+    return [("words", words), ("table", table(head, rows))]

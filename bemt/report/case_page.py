@@ -8,27 +8,25 @@ from typing import Any
 
 import numpy as np
 
+from bemt.base.page import Cell, num, table
 from bemt.base.tables import number_text
-from bemt.report.audit_block import audit_block
-from bemt.report.diagnosis_block import diagnosis_block
-from bemt.report.markup import Cell, badge, esc, image, num, section, table
-from bemt.report.plot import COLOURS, Plot, Trace, figure
-from bemt.report.verdicts import headline, verdict
+from bemt.report.audit_block import audit_parts
+from bemt.report.diagnosis_block import diagnosis_parts
+from bemt.report.plot import COLOURS, Plot, Trace, figure, points
+from bemt.report.rotor_view import viewer
+from bemt.report.values import Section, sections, uri
+from bemt.report.verdicts import headline, stand
 
-__all__ = ["case_page", "reproduction_table"]
+__all__ = ["case_sections", "reproduction_table"]
 
 LOOK = {"cfd": "diamond", "bench": "cross", "vendor": "triangle", "openfoam": "star",
         "openfoam incompressible": "square", "flight": "square"}  # fmt: skip
 NAMES = {"cfd": "CFD, recorded", "openfoam": "CFD, own, compressible",
          "openfoam incompressible": "CFD, own, incompressible"}  # fmt: skip
-CHANNEL_UNITS = {
-    "CT": "CT [-]",
-    "CP": "CP [-]",
-    "thrust_N": "thrust [N]",
-    "torque_Nm": "torque [N m]",
-    "power_W": "shaft power [W]",
-    "eta": "efficiency η [-]",
-}
+LABELS = {"CT": "CT", "CP": "CP", "eta": "efficiency η"}
+
+MODELS = {"bemt": "BEMT", "k1k2": "K1/K2", "bemt variant": "BEMT, variant"}
+US = ("u_num", "u_input", "u_model", "u_D", "u_val")
 
 
 def _points(page: Mapping[str, Any], x: str, y: str, keep: Any) -> list[Trace]:
@@ -37,57 +35,39 @@ def _points(page: Mapping[str, Any], x: str, y: str, keep: Any) -> list[Trace]:
     everything = [*result["rows"], *page.get("own_rows", [])]
     D = result["conditions"]["diameter_m"]
     for source, shape in LOOK.items():
-        rows = [r for r in everything if r["source"] == source and r.get(y) is not None and keep(r)]
-        if not rows:
-            continue
-        xs = [r["airspeed_m_s"] / (r["rpm"] / 60.0 * D) if x == "J" else r[x] for r in rows]
-        u = [r.get("u") if y == "thrust_N" else None for r in rows]
-        out.append(
-            Trace(
-                NAMES.get(source, source),
-                xs,
-                [r[y] for r in rows],
-                u,
-                COLOURS.get(source, COLOURS["other"]),
-                "",
-                shape,
-                True,
-                [r["label"] for r in rows],
+        rows = [
+            (
+                r["airspeed_m_s"] / (r["rpm"] / 60.0 * D) if x == "J" else r[x],
+                r[y],
+                r.get("u") if y == "thrust_N" else None,
+                r["label"],
             )
-        )
+            for r in everything
+            if r["source"] == source and r.get(y) is not None and keep(r)
+        ]
+        if rows:
+            out.append(points(NAMES.get(source, source), rows, source, shape))
     return out
 
 
-def _geometry(page: Mapping[str, Any]) -> str:
-    g, parts = page["geometry"], []
-    title = headline(page["result"])
-    for name, words in (("rotor", "rotor"), ("blade", "one blade, root left, seen from the front")):
-        if name in page["pictures"]:
-            parts.append(
-                f"<figure><figcaption>{esc(words.capitalize())}</figcaption>"
-                f"{image(page['pictures'][name], f'{title}: {words}')}</figure>"
-            )
+def _geometry(page: Mapping[str, Any]) -> Section:
+    g = page["geometry"]
+    plots: list[dict[str, Any] | None] = []
+    if page["surfaces"]:
+        alt = f"{headline(page['result'])}: rotor"
+        plots.append({"kind": "rotor", "alt": alt, "src": uri(page["pictures"]["rotor"]), **viewer(page["surfaces"])})
     if g:
         r = g["r_over_R"]
-        parts.append(figure(Plot("Chord", "r/R [-]", "chord [mm]", [Trace("chord", r, g["chord_mm"])])))
-        parts.append(
-            figure(
-                Plot(
-                    "Blade angle and twist",
-                    "r/R [-]",
-                    "blade angle β [deg]",
-                    [Trace("β", r, g["beta_deg"], colour=COLOURS["bench"])],
-                )
-            )
-        )
-    inner = "".join(parts)
-    return section("Geometry", f'<div class="figures">{inner}</div>' if inner else "")
+        beta = [Trace("β", r, g["beta_deg"], colour=COLOURS["bench"])]
+        plots.append(figure(Plot("Chord", "r/R [-]", "chord [mm]", [Trace("chord", r, g["chord_mm"])])))
+        plots.append(figure(Plot("Blade angle and twist", "r/R [-]", "blade angle β [deg]", beta)))
+    return "Geometry", [("figures", plots)]
 
 
-def _inputs(page: Mapping[str, Any]) -> str:
+def _inputs(page: Mapping[str, Any]) -> Section:
     result = page["result"]
     c = result["conditions"]
-    rows: list[Sequence[Cell | str]] = [
+    rows: list[Sequence[object]] = [
         ["rotational speed", num(c["rpm"], 6), "rev/min"],
         ["airspeed", num(c["airspeed_m_s"]), "m/s"],
         ["density", num(c["density_kg_m3"]), "kg/m³"],
@@ -101,50 +81,41 @@ def _inputs(page: Mapping[str, Any]) -> str:
         ["n_crit of the section tables", num(c["n_crit"], 3), "-"],
         ["section drag level", num(c["drag_level"], 3), "-"],
     ]
-    out = [table(["input", "value", "unit"], rows, sortable=False)]
-    out.append(
-        f"<p>Effects on: {esc(', '.join(map(str, c['effects'])))}. Convention: {esc(c['convention'])}. Air: "
-        f"{esc(c['air'])}. Program version {esc(result.get('version', 'unknown'))}.</p>"
+    words = (
+        f"Effects on: {', '.join(map(str, c['effects']))}. Convention: {c['convention']}. Air: {c['air']}. "
+        f"Program version {result.get('version', 'unknown')}."
     )
-    files = [[f["name"], Cell(markup=f"<code>{esc(f['sha256'])}</code>")] for f in page["files"]]
-    out.append(table(["file", "SHA-256"], files, sortable=False))
-    if result["assumptions"]:
-        out.append(
-            "<p>The source does not give the following. Each is declared as a range; the last columns show what "
-            "the range does to the thrust when it alone is changed.</p>"
-        )
-        lines = []
-        for a in result["assumptions"]:
-            at = [v for v in a["thrust_N"] if v is not None]
-            spread = f"{number_text(min(at))} – {number_text(max(at))}" if at else "unknown"
-            nominal = a["nominal"]
-            shown = num(nominal) if isinstance(nominal, int | float) else Cell(str(nominal))
-            lines.append(
-                [
-                    Cell(markup=f"<code>{esc(a['key'])}</code>"),
-                    shown,
-                    a["range"],
-                    spread,
-                    num(a["u_thrust_N"], 2),
-                    a["why"],
-                ]
-            )
-        out.append(table(["assumed", "value", "range", "thrust over the range [N]", "u [N]", "why"], lines))
-    return section("Inputs and assumptions", *out)
+    files = [[f["name"], Cell(f["sha256"], code=True)] for f in page["files"]]
+    told = (
+        "The source does not give the following. Each is declared as a range; the last columns show what the range "
+        "does to the thrust when it alone is changed."
+    )
+    lines: list[Sequence[object]] = []
+    for a in result["assumptions"]:
+        at = [v for v in a["thrust_N"] if v is not None]
+        spread = f"{number_text(min(at))} – {number_text(max(at))}" if at else "unknown"
+        shown = num(a["nominal"]) if isinstance(a["nominal"], int | float) else Cell(str(a["nominal"]))
+        lines.append([Cell(a["key"], code=True), shown, a["range"], spread, num(a["u_thrust_N"], 2), a["why"]])
+    head = ["assumed", "value", "range", "thrust over the range [N]", "u [N]", "why"]
+    return "Inputs and assumptions", [
+        ("table", table(["input", "value", "unit"], rows, sort=False)), ("words", words),
+        ("words", told if lines else ""), ("table", table(head, lines)),
+        ("more", ("Files and their SHA-256", [("table", table(["file", "SHA-256"], files, sort=False))])),
+    ]  # fmt: skip
 
 
-def _performance(page: Mapping[str, Any]) -> str:
+def _performance(page: Mapping[str, Any]) -> Section:
     result, c = page["result"], page["curves"]
     if not c:
-        return ""
+        return "", []
     own, j, w = result["conditions"], c["over_J"], c["over_rpm"]
     plots = []
 
     def near(row: Mapping[str, Any], key: str) -> bool:
         return bool(abs(row[key] - own[key]) <= 0.02 * max(abs(own[key]), 1.0))
 
-    for name in ("CT", "CP", "eta"):
-        y, label = j[name], CHANNEL_UNITS[name]
+    for name, label in LABELS.items():
+        y = j[name]
         if name == "eta":  # a ratio of two small numbers where thrust ends
             y = np.where(j["CT"] > 0.1 * np.nanmax(np.append(j["CT"], 0.0)), y, np.nan)
         traces = [Trace("BEMT", j["J"], y, j[f"u_{name}"], COLOURS["bemt"])]
@@ -152,51 +123,31 @@ def _performance(page: Mapping[str, Any]) -> str:
             traces.append(Trace("K1/K2", j["J"], j["k1k2_CT"], None, COLOURS["k1k2"], "7 4"))
         if name != "eta":
             traces += _points(page, "J", name, lambda r: near(r, "rpm"))
-        plots.append(
-            Plot(
-                f"{label.split(' [')[0]} over advance ratio at {own['rpm']:g} rev/min",
-                "J = V / (n D) [-]",
-                label,
-                traces,
-            )
-        )
-    T = [
-        Trace("BEMT", w["rpm"], w["thrust_N"], w["u_thrust_N"], COLOURS["bemt"]),
-        Trace("K1/K2", w["rpm"], w["k1k2_thrust_N"], None, COLOURS["k1k2"], "7 4"),
-        *_points(page, "rpm", "thrust_N", lambda r: near(r, "airspeed_m_s")),
-    ]
-    at = f" at {own['airspeed_m_s']:g} m/s"
-    plots.append(Plot("Thrust over rotational speed" + at, "rotational speed [rev/min]", "thrust [N]", T, x_zero=True))
-    P = [
-        Trace("BEMT", w["rpm"], w["power_W"], w["u_power_W"], COLOURS["bemt"]),
-        *_points(page, "rpm", "power_W", lambda r: near(r, "airspeed_m_s")),
-    ]
-    plots.append(
-        Plot("Shaft power over rotational speed" + at, "rotational speed [rev/min]", "shaft power [W]", P, x_zero=True)
-    )
+        title = f"{label} over advance ratio at {own['rpm']:g} rev/min"
+        plots.append(Plot(title, "J = V / (n D) [-]", f"{label} [-]", traces))
     with np.errstate(divide="ignore", invalid="ignore"):
-        per_kW = np.where(w["power_W"] > 0, 1e3 * w["thrust_N"] / w["power_W"], np.nan)
-    plots.append(
-        Plot(
-            "Thrust per shaft power" + at,
-            "rotational speed [rev/min]",
-            "thrust per power [N/kW]",
-            [Trace("BEMT", w["rpm"], per_kW.tolist(), None, COLOURS["bemt"])],
-            x_zero=True,
-        )
-    )
-    drawn = "".join(figure(p) for p in plots)
+        per_kW: Any = np.where(w["power_W"] > 0, 1e3 * w["thrust_N"] / w["power_W"], np.nan)
+    simple = Trace("K1/K2", w["rpm"], w["k1k2_thrust_N"], None, COLOURS["k1k2"], "7 4")
+    for title, label, y, u, more, channel in (
+        ("Thrust over rotational speed", "thrust [N]", w["thrust_N"], w["u_thrust_N"], [simple], "thrust_N"),
+        ("Shaft power over rotational speed", "shaft power [W]", w["power_W"], w["u_power_W"], [], "power_W"),
+        ("Thrust per shaft power", "thrust per power [N/kW]", per_kW, None, [], ""),
+    ):
+        seen = _points(page, "rpm", channel, lambda r: near(r, "airspeed_m_s")) if channel else []
+        traces = [Trace("BEMT", w["rpm"], y, u, COLOURS["bemt"]), *more, *seen]
+        title = f"{title} at {own['airspeed_m_s']:g} m/s"
+        plots.append(Plot(title, "rotational speed [rev/min]", label, traces, x_zero=True))
     words = (
-        "<p>Bands: one standard uncertainty from the declared assumptions. They do not hold the error of the theory. "
-        "Points: recorded values; a value without a bar states no uncertainty.</p>"
+        "Bands: one standard uncertainty from the declared assumptions. They do not hold the error of the theory. "
+        "Points: recorded values; a value without a bar states no uncertainty."
     )
-    return section("Performance", words + f'<div class="figures">{drawn}</div>' if drawn else "")
+    return "Performance", [("words", words), ("figures", [figure(p) for p in plots])]
 
 
-def _radial(page: Mapping[str, Any]) -> str:
+def _radial(page: Mapping[str, Any]) -> Section:
     d = page["radial"]
     if not d:
-        return ""
+        return "", []
     r = d["r_over_R"]
     R = 0.5 * page["result"]["conditions"]["diameter_m"]
     own = page.get("own_radial") or []
@@ -211,15 +162,14 @@ def _radial(page: Mapping[str, Any]) -> str:
         Plot("Angle of attack", "r/R [-]", "α [deg]", [Trace("BEMT", r, d["alpha_deg"])]),
         Plot("Section Mach number", "r/R [-]", "M [-]", [Trace("BEMT", r, d["M"])]),
     )
-    drawn = "".join(figure(p) for p in plots)
-    return section("Radial loading", f'<div class="figures">{drawn}</div>' if drawn else "")
+    return "Radial loading", [("figures", [figure(p) for p in plots])]
 
 
-def _fan(result: Mapping[str, Any]) -> str:
+def _fan(result: Mapping[str, Any]) -> Section:
     fan = result.get("fan")
     if not fan:
-        return ""
-    rows = [
+        return "", []
+    rows: list[Sequence[object]] = [
         ["thrust of the rotor", num(fan["rotor_thrust_N"]), "N"],
         ["thrust of the duct", num(fan["duct_thrust_N"]), "N"],
         ["thrust of the stator", num(fan["stator_thrust_N"]), "N"],
@@ -230,27 +180,18 @@ def _fan(result: Mapping[str, Any]) -> str:
         ["momentum through the exit", num(fan["exit_momentum_N"]), "N"],
         ["pitch speed", num(fan["geometric_pitch_speed_m_s"]), "m/s"],
     ]
-    return section("Duct and fan", table(["part", "value", "unit"], rows, sortable=False))
+    return "Duct and fan", [("table", table(["part", "value", "unit"], rows, sort=False))]
 
 
-def _verification(page: Mapping[str, Any]) -> str:
+def _verification(page: Mapping[str, Any]) -> Section:
     v = page["refinement"]
     if not v:
-        return ""
-    plot = figure(
-        Plot(
-            "Thrust against blade elements",
-            "blade elements [-]",
-            "thrust [N]",
-            [Trace("BEMT", v["stations"], v["thrust_N"], colour=COLOURS["bemt"])],
-            log_x=True,
-            zero=False,
-        )
-    )
-    rows = [
-        [num(n), num(T, 7), num(Q, 6)]
-        for n, T, Q in zip(v["stations"], v["thrust_N"].tolist(), v["torque_Nm"].tolist(), strict=True)
-    ]  # noqa: E501
+        return "", []
+    line = Trace("BEMT", v["stations"], v["thrust_N"], colour=COLOURS["bemt"])
+    plot = figure(Plot("Thrust against blade elements", "blade elements [-]", "thrust [N]", [line], log_x=True,
+                       zero=False))  # fmt: skip
+    solved = zip(v["stations"], v["thrust_N"].tolist(), v["torque_Nm"].tolist(), strict=True)
+    rows = [[num(n), num(T, 7), num(Q, 6)] for n, T, Q in solved]
     words, study = [], v.get("grid_study")
     if math.isfinite(v["change_to_finest"]):
         words.append(
@@ -261,44 +202,27 @@ def _verification(page: Mapping[str, Any]) -> str:
         words.append(f"Observed order {study['order']:.2f}; grid convergence index {100 * study['gci_fine']:.4f} %.")
     if study and study["flags"]:
         words.append("Remarks: " + "; ".join(study["flags"]) + ".")
-    text = f"<p>{esc(' '.join(words))}</p>" if words else ""
-    if not (plot or text):
-        return ""
-    side = f"<div>{table(['elements', 'thrust [N]', 'torque [N m]'], rows)}{text}</div>"
-    return section("Verification", f'<div class="figures">{plot}{side}</div>')
+    found = table(["elements", "thrust [N]", "torque [N m]"], rows) if plot else None
+    side = {"kind": "block", "parts": [("table", found), ("words", " ".join(words))]} if plot or words else None
+    return "Verification", [("figures", [plot, side])]
 
 
-def _validation(result: Mapping[str, Any]) -> str:
-    rows = []
-    for c in result["comparisons"]:
-        if c["source"] == "k1k2_printed" and c["model"] != "k1k2":
-            continue
-        rows.append(
-            [
-                c["model"],
-                c["reference"],
-                _quantity(c),
-                num(c["S"]),
-                num(c["D"]),
-                num(c["E"], 3),
-                num(c["E_pct"], signed=True),
-                num(c["u_num"], 2),
-                num(c["u_input"], 2),
-                num(c.get("u_model"), 2),
-                num(c["u_D"], 2, none="unknown"),
-                num(c["u_val"], 2, none="unknown"),
-                c["verdict"],
-            ]
-        )
-    if not rows:
-        return ""
+def _validation(result: Mapping[str, Any]) -> Section:
+    """Every comparison, BEMT's first; a column of uncertainties that nobody knows is left out."""
+    found = [c for c in result["comparisons"] if c["source"] != "k1k2_printed" or c["model"] == "k1k2"]
+    us = [u for u in US if any(c.get(u) is not None and math.isfinite(c[u]) for c in found)]
+    rows: list[Sequence[object]] = []
+    for c in sorted(found, key=lambda c: list(MODELS).index(c["model"]) if c["model"] in MODELS else len(MODELS)):
+        kind, word = stand(c)
+        rows.append([MODELS.get(c["model"], c["model"]), c["reference"], _quantity(c), num(c["S"]), num(c["D"]),
+                     num(c["E_pct"], signed=True), *(num(c.get(u), 2, none="unknown") for u in us),
+                     Cell(word, badge=kind)])  # fmt: skip
     words = (
-        "<p>After ASME V&amp;V 20: E = S − D, u_val² = u_num² + u_input² + u_model² + u_D². |E| ≤ u_val reads “not "
-        "distinguishable from noise”. An uncertainty that nobody stated stays unknown, and so does the verdict.</p>"
+        "After ASME V&V 20: E = S − D, u_val² = u_num² + u_input² + u_model² + u_D². The two agree where |E| ≤ u_val. "
+        "Where nobody states u_D, the last column gives the least u_D with which they would, as a share of D."
     )
-    us = ["u_num", "u_input", "u_model", "u_D", "u_val"]
-    header = ["model", "against", "quantity", "S", "D", "E", "E %", *us, "verdict"]
-    return section("Validation", words, table(header, rows))
+    head = ["model", "against", "quantity", "S", "D", "E %", *us, "agreement"]
+    return "Validation", [("words", words), ("table", table(head, rows))]
 
 
 def _quantity(c: Mapping[str, Any]) -> str:
@@ -309,7 +233,7 @@ def _quantity(c: Mapping[str, Any]) -> str:
     return f"{name.replace('_', ' ')} [{unit}]"
 
 
-def reproduction_table(items: Sequence[Mapping[str, Any]]) -> str:
+def reproduction_table(items: Sequence[Mapping[str, Any]]) -> dict[str, Any] | None:
     """Make the table of numbers of the thesis beside ours."""
     rows = []
     for item in items:
@@ -318,21 +242,11 @@ def reproduction_table(items: Sequence[Mapping[str, Any]]) -> str:
         ours = item["ours"]
         shown = num(ours, 5) if isinstance(ours, int | float) else Cell("" if ours is None else str(ours))
         try:
-            stated = num(float(item["stated"]))
-            stated = Cell(str(item["stated"]), stated.value, True)
+            stated = Cell(str(item["stated"]), num(float(item["stated"])).value, True)
         except ValueError:
             stated = Cell(str(item["stated"]))
-        words = status.removesuffix(", because")
-        rows.append(
-            [
-                str(item["quantity"]),
-                stated,
-                shown,
-                str(item["unit"]),
-                Cell(words, markup=badge(kind, words)),
-                str(item["note"]),
-            ]
-        )
+        words = Cell(status.removesuffix(", because"), badge=kind)
+        rows.append([str(item["quantity"]), stated, shown, str(item["unit"]), words, str(item["note"])])
     return table(["quantity", "stated", "ours", "unit", "status", "note"], rows)
 
 
@@ -348,45 +262,32 @@ def _of_case(items: Sequence[Mapping[str, Any]], name: str) -> list[Mapping[str,
     return [item for item in items if about(item)]
 
 
-def _limits(page: Mapping[str, Any]) -> str:
+def _limits(page: Mapping[str, Any]) -> Section:
     result = page["result"]
     flags: dict[str, None] = {}
     for row in [*result["rows"], *result["variants"]]:
         for flag in row["flags"]:
             flags.setdefault(f"{row['label']}: {flag}")
-    notes = [*flags, *result["notes"], *page["problems"]]
     general = [
         "Blade elements are independent: no sweep, no radial flow, no blade-vortex interaction, no unsteady loads.",
         "Section tables come from a network trained on XFOIL, weak near stall at low Reynolds numbers; beyond stall "
         "they continue as a flat plate.",
     ]
-    items = "".join(
-        f"<li>{'<span class=long>' + esc(n) + '</span>' if len(n) > 600 else esc(n)}</li>" for n in [*notes, *general]
-    )
-    return section("Limits", f"<ul>{items}</ul>")
+    return "Limits", [("list", [*flags, *result["notes"], *page["problems"], *general])]
 
 
-def case_page(page: Mapping[str, Any], reproduction: Sequence[Mapping[str, Any]]) -> str:
-    """Write the page of one case."""
+def case_sections(page: Mapping[str, Any], reproduction: Sequence[Mapping[str, Any]]) -> list[Section]:
+    """Give the sections of one case."""
     result = page["result"]
-    kind, word, sentence = verdict(result)
-    head = f"<h2>{esc(headline(result))}</h2><p>{badge(kind, word)} {esc(sentence)}</p>"
     if not result.get("rows"):
-        faults = "".join(f'<li><span class="long">{esc(fault)}</span></li>' for fault in result.get("faults", []))
-        return head + f"<ul>{faults}</ul>"
-    return "".join(
-        [
-            head,
-            _geometry(page),
-            _performance(page),
-            _radial(page),
-            _fan(result),
-            _validation(result),
-            audit_block(result.get("audit", [])),
-            _verification(page),
-            diagnosis_block(page.get("diagnosis")),
-            _inputs(page),
-            section("Reproduction of the thesis", reproduction_table(_of_case(reproduction, str(result["name"])))),
-            _limits(page),
-        ]
-    )
+        return sections(("Faults", [("list", [str(fault) for fault in result.get("faults", [])])]))
+    audits = [part for audit in result.get("audit", []) for part in audit_parts(audit)]
+    told = page.get("diagnosis")
+    items = reproduction_table(_of_case(reproduction, str(result["name"])))
+    return sections(
+        _validation(result), _geometry(page), _performance(page), _radial(page), _fan(result),
+        ("Audit of the CFD", audits), _verification(page),
+        ("Diagnosis: what physics was left out", diagnosis_parts(told) if told else []),
+        _inputs(page), _limits(page),
+        ("Reproduction of the thesis", [("more", ("Its numbers for this case", [("table", items)]))] if items else []),
+    )  # fmt: skip

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from bemt.compare.sweep.agreement import agreement
 from bemt.readers import number
 from bemt.recordings.audit import CfdFacts, audit, audit_document
 from bemt.report.found_files import read_json, safe_files
@@ -188,10 +189,8 @@ def attach(book: dict[str, Any]) -> None:
         share = run["audit"]["u_relative"] if run["audit"] else math.nan
         S, D, u_D = bemt["thrust_N"], run["thrust_N"], abs(run["thrust_N"]) * share
         parts = {k: math.nan if bemt.get(k) is None else bemt[k] for k in ("u_num", "u_input", "u_model")}
-        u_val = math.hypot(*parts.values(), u_D)
-        word = "u_D unknown" if math.isnan(u_val) else (
-            "not distinguishable from noise" if abs(S - D) <= u_val else "differs")  # fmt: skip
         line = {"model": "bemt", "reference": f"own CFD, {run['solver']}", "source": "openfoam", "quantity": "thrust_N",
                 "unit": "N", "S": S, "D": D, "E": S - D, "E_pct": 100 * (S - D) / D if D else None, **parts,
-                "u_D": u_D, "u_val": u_val, "verdict": word}  # fmt: skip
+                "u_D": u_D, "u_val": math.hypot(*parts.values(), u_D)}  # fmt: skip
+        line["verdict"] = agreement(line)
         page["result"] = {**result, "comparisons": [*result["comparisons"], line]}

@@ -6,12 +6,17 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from bemt.report.audit_block import audit_table
-from bemt.report.diagnosis_block import figure_of
-from bemt.report.markup import num, section, table
+from bemt.base.page import num, table
+from bemt.report.audit_block import audit_parts
 from bemt.report.plot import DASHES, SERIES, SHAPES, Plot, Trace, figure
+from bemt.report.values import Section, picture, sections
 
-__all__ = ["cfd_page"]
+__all__ = ["CFD_WORDS", "cfd_sections"]
+
+CFD_WORDS = (
+    "OpenFOAM runs on the solids of the cases: rotating frame, wall functions, forces integrated over the blades. "
+    "Each run is audited like anybody else's."
+)
 
 VARIED = (("J", "J [-]"), ("wall_distance_m", "distance of the plate [m]"), ("tip_gap_mm", "tip gap [mm]"),
           ("sideslip_deg", "angle of the inflow [deg]"), ("pitch_offset_deg", "offset of the blade angle [deg]"),
@@ -22,7 +27,7 @@ COLUMNS = (("rpm", "rpm", 6), ("airspeed_m_s", "V [m/s]", 4), ("J", "J", 3), ("t
            ("cells", "cells", 6), ("yplus_avg", "y+", 3), ("drift_thrust", "drift", 2))  # fmt: skip
 
 
-def _plots(item: Mapping[str, Any]) -> str:
+def _plots(item: Mapping[str, Any]) -> list[dict[str, Any] | None]:
     """Thrust and torque over the quantity that was varied most, one line per group of the others."""
     runs = [r for r in item["runs"] if r["converged"] == 1]
 
@@ -31,7 +36,7 @@ def _plots(item: Mapping[str, Any]) -> str:
 
     name, label = max(VARIED, key=lambda v: (len(values(v[0])), -VARIED.index(v)))
     if len(values(name)) < 2:
-        return ""
+        return []
     groups: dict[str, list[Mapping[str, Any]]] = {}
     for run in runs:
         words = [run["solver"], run["domain"], f"{run['rpm']:g} rev/min"]
@@ -40,6 +45,8 @@ def _plots(item: Mapping[str, Any]) -> str:
         if len({r["turbulence"] for r in runs}) > 1:
             words.append(run["turbulence"])
         groups.setdefault(", ".join(words), []).append(run)
+    if name == "cells" and len(values(name)) < 3:
+        return []
     plots = []
     for key, word in (("thrust_N", "thrust [N]"), ("torque_Nm", "torque [N m]")):
         traces = []
@@ -48,11 +55,11 @@ def _plots(item: Mapping[str, Any]) -> str:
             x, y, u = [r[name] for r in rows], [r[key] for r in rows], [r[f"u_{key}"] for r in rows]
             look = SERIES[i % len(SERIES)], DASHES[i % len(DASHES)], SHAPES[i % len(SHAPES)]
             traces.append(Trace(group, x, y, u, *look, points=len(rows) == 1))
-        plots.append(figure(Plot(f"{word.split(' [')[0].capitalize()}, {item['name']}", label, word, traces)))
-    return f'<div class="figures">{"".join(plots)}</div>'
+        plots.append(figure(Plot(f"{word.split(' [')[0].capitalize()}: {item['title']}", label, word, traces)))
+    return plots
 
 
-def _runs_table(item: Mapping[str, Any]) -> str:
+def _runs(item: Mapping[str, Any]) -> dict[str, Any] | None:
     used = [c for c in COLUMNS if any(math.isfinite(r[c[0]]) and (r[c[0]] != 0 or c[0] in ("J", "airspeed_m_s"))
                                       for r in item["runs"])]  # fmt: skip
     rows = []
@@ -60,23 +67,17 @@ def _runs_table(item: Mapping[str, Any]) -> str:
         audit = run.get("audit")
         u = None if not audit or audit["u_relative"] is None else 100 * audit["u_relative"]
         state = "settled" if run["converged"] == 1 else "did not settle"
-        rows.append([run["run"][:16], run["solver"], run["domain"], *(num(run[key], digits) for key, _, digits in used),
+        rows.append([run["run"][:6], run["solver"], run["domain"], *(num(run[key], digits) for key, _, digits in used),
                      num(u, 2, none="unknown"), state])  # fmt: skip
     return table(["run", "flow", "domain", *(label for _, label, _ in used), "u of T by audit [%]", "state"], rows)
 
 
-def cfd_page(found: Sequence[Mapping[str, Any]]) -> str:
-    """Write the page of this project's own CFD."""
-    if not found:
-        return ""
-    words = ("<h2>Own CFD</h2><p>OpenFOAM runs on the solids of the cases: rotating frame, wall functions, forces "
-             "integrated over the blades. Each run is audited like anybody else's; the audit of the first run of each "
-             "campaign is shown.</p>")  # fmt: skip
-    out = [words]
+def cfd_sections(found: Sequence[Mapping[str, Any]]) -> list[Section]:
+    """Give the figures of all campaigns of this project's own CFD, then the runs and an audit of each."""
+    figures, tables = [], []
     for item in found:
-        pictures = "".join(figure_of(name, data) for name, data in item["figures"])
+        figures += [*_plots(item), *(picture(name, data) for name, data in item["figures"])]
         first = next((run["audit"] for run in item["runs"] if run.get("audit")), None)
-        out.append(section(item["title"], _plots(item), _runs_table(item),
-                           f'<div class="figures">{pictures}</div>' if pictures else "",
-                           audit_table(first) if first else ""))  # fmt: skip
-    return "".join(out)
+        parts = [("table", _runs(item)), *(audit_parts(first) if first else [])]
+        tables.append(("more", (f"{item['title']}: {len(item['runs'])} runs, audit of the first", parts)))
+    return sections(("Figures", [("figures", figures)]), ("Campaigns", tables))

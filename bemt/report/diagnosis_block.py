@@ -5,19 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from bemt.report.markup import badge, esc, image, num, section, table
+from bemt.base.page import num, table
+from bemt.report.values import Part, picture
 
-__all__ = ["diagnosis_block", "diagnosis_parts", "figure_of"]
+__all__ = ["diagnosis_parts"]
 
-KIND = {
-    "none": "same",
-    "named": "differs",
-    "class": "doubtful",
-    "sensor": "differs",
-    "unknown": "unknown",
-    "insufficient": "unknown",
-}
-RANKED = 8
+KIND = {"none": "same", "named": "differs", "class": "doubtful", "sensor": "differs", "unknown": "unknown",
+        "insufficient": "unknown"}  # fmt: skip
+RANKED, LEAST = 8, 1e-3
+"""Most effects of the ranking that are shown, and the probability below which none is."""
+FIT = ("before", "after", "noise", "gp_only", "holdout_before", "holdout_after")
+FIT_HEAD = ("channel", "RMSE before", "after", "noise", "smooth unknown effect only", "held out, before",
+            "held out, after")  # fmt: skip
 
 
 def _mapping(value: Any) -> Mapping[str, Any]:
@@ -43,70 +42,35 @@ def _parameters(value: Any) -> str:
     return "; ".join(words)
 
 
-def figure_of(name: str, data: bytes) -> str:
-    """Show a picture with its file name in words below."""
-    words = name.rpartition(".")[0].replace("_", " ")
-    picture = image(data, words, "png" if name.endswith(".png") else "svg+xml")
-    return f'<figure class="picture">{picture}<figcaption>{esc(words)}</figcaption></figure>'
-
-
-def diagnosis_parts(item: Mapping[str, Any]) -> str:
-    """Write one diagnosis."""
+def diagnosis_parts(item: Mapping[str, Any]) -> list[Part]:
+    """Give one diagnosis: verdict, place, ranking, errors before and after, what to measure, figures."""
     d = _mapping(item.get("document"))
-    verdict = str(d.get("verdict") or "unknown")
+    said = str(d.get("verdict") or "unknown")
     effects = ", ".join(str(e) for e in _list(d.get("effects")))
-    words = f"{verdict}: {effects}" if effects else verdict
-    out = [f"<p>{badge(KIND.get(verdict, 'unknown'), words)} {esc(d.get('explanation') or '')}</p>"]
+    why = str(d.get("explanation") or "").partition(" Not tried: ")[0]
+    head = (KIND.get(said, "unknown"), f"{said}: {effects}" if effects else said, why)
+    out: list[Part] = [("verdict", head)]
     place = _mapping(d.get("location"))
-    if place.get("channel") and verdict != "none":
-        low, high = num(place.get("low"), 3).text, num(place.get("high"), 3).text
+    if place.get("channel") and said != "none":
+        low, high, size, z = (num(place.get(k), 3).text for k in ("low", "high", "size", "z"))
+        variable = place.get("variable") or "?"
         out.append(
-            f"<p>Located in {esc(place['channel'])} where {esc(place.get('variable') or '?')} is {esc(low)} "
-            f"to {esc(high)} "
-            f"(size {esc(num(place.get('size'), 3).text)}, z {esc(num(place.get('z'), 3).text)}).</p>"
+            ("words", f"Located in {place['channel']} where {variable} is {low} to {high} (size {size}, z {z}).")
         )
     ranking = [_mapping(r) for r in _list(d.get("ranking"))[:RANKED]]
-    rows = [[str(r.get("effect", "")), num(r.get("probability"), 3), _parameters(r.get("parameters"))] for r in ranking]
-    out.append(table(["effect", "probability [-]", "parameters (90 % interval)"], rows))
-    fits = []
-    for channel, fit in _mapping(d.get("fit")).items():
-        fit = _mapping(fit)
-        fits.append(
-            [
-                str(channel),
-                *(
-                    num(fit.get(k), 3)
-                    for k in ("before", "after", "noise", "gp_only", "holdout_before", "holdout_after")
-                ),
-            ]
-        )
-    out.append(
-        table(
-            [
-                "channel",
-                "RMSE before",
-                "after",
-                "noise",
-                "smooth unknown effect only",
-                "held out, before",
-                "held out, after",
-            ],
-            fits,
-        )
-    )
+    rows = [[str(r.get("effect", "")), p, _parameters(r.get("parameters"))] for r in ranking
+            if (p := num(r.get("probability"), 3)).value is None or p.value >= LEAST]  # fmt: skip
+    out.append(("table", table(["effect", "probability [-]", "parameters (90 % interval)"], rows)))
+    fits = [[str(channel), *(num(_mapping(fit).get(k), 3) for k in FIT)]
+            for channel, fit in _mapping(d.get("fit")).items()]  # fmt: skip
+    out.append(("table", table(FIT_HEAD, fits)))
     classes = [c for c in _list(d.get("classes")) if isinstance(c, list) and len(c) > 1]
     if classes:
         told = "; ".join(" = ".join(str(e) for e in c) for c in classes[:12])
-        out.append(f"<p>Not told apart by these data: {esc(told)}.</p>")
+        out.append(("words", f"Not told apart by these data: {told}."))
     step = _mapping(d.get("next_measurement"))
     if step.get("text"):
-        out.append(f"<p>Next measurement: {esc(step['text'])}</p>")
-    figures = "".join(figure_of(name, data) for name, data in item.get("figures", []))
-    if figures:
-        out.append(f'<div class="figures">{figures}</div>')
-    return "".join(out)
-
-
-def diagnosis_block(item: Mapping[str, Any] | None) -> str:
-    """Write the diagnosis of a case."""
-    return "" if not item else section("Diagnosis: what physics was left out", diagnosis_parts(item))
+        out.append(("words", f"Next measurement: {step['text']}"))
+    absent = [f"{effect}: {reason}" for effect, reason in _mapping(d.get("not_tried")).items()]
+    out.append(("more", (f"{len(absent)} effects not tried, and why", [("list", absent)])) if absent else ("list", []))
+    return [*out, ("figures", [picture(name, data) for name, data in item.get("figures", [])])]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -16,8 +15,9 @@ from bemt.compare.thesis import ORIGIN
 from bemt.report import curves, trends
 from bemt.report.cfd import attach, cfd_runs
 from bemt.report.found_files import read_json, safe_files
+from bemt.report.rotor_view import still
 from geometry.common import GeometryError
-from geometry.picture import PictureError, Scene, blade_scene, cutaway_scene, render, rotor_scene
+from geometry.surface import surfaces
 
 __all__ = ["attach_diagnoses", "gather"]
 
@@ -39,8 +39,6 @@ def gather(paths: Sequence[str | Path], out: Path, progress: Progress | None = N
         pages.append(page)
         if case is not None and result["rows"]:
             solved.append((case, page))
-    tell("report: pictures")
-    _pictures(solved)
     tell("report: trends")
     of_thesis = any(result.get("origin") == ORIGIN for result in document["cases"])
     book = {
@@ -63,6 +61,7 @@ def _case(path: Path, result: Mapping[str, Any]) -> tuple[dict[str, Any], Case |
         "files": [],
         "problems": [],
         "pictures": {},
+        "surfaces": [],
         "geometry": {},
         "curves": {},
         "radial": {},
@@ -82,31 +81,12 @@ def _case(path: Path, result: Mapping[str, Any]) -> tuple[dict[str, Any], Case |
     except (InputError, GeometryError, ValueError) as error:
         page["problems"].append(f"some figures could not be computed: {error}")
         return page, None
+    try:
+        page["surfaces"] = surfaces(case.rotor(), case.duct())
+        page["pictures"] = {"rotor": still(page["surfaces"])}
+    except GeometryError as error:
+        page["problems"].append(f"no picture: {error}")
     return page, case
-
-
-def _pictures(solved: Sequence[tuple[Case, dict[str, Any]]]) -> None:
-    """Rotor and blade of every case, drawn in one child process; on failure the reason instead."""
-    jobs: list[tuple[Scene, dict[str, Any], str]] = []
-    for case, page in solved:
-        try:
-            rotor, duct = case.rotor(), case.duct()
-            first = rotor_scene(rotor) if duct is None else cutaway_scene(rotor, duct)
-            jobs += [(first, page, "rotor"), (blade_scene(rotor), page, "blade")]
-        except GeometryError as error:
-            page["problems"].append(f"no picture: {error}")
-    if not jobs:
-        return
-    with tempfile.TemporaryDirectory() as folder:
-        files = [Path(folder) / f"{i}.png" for i in range(len(jobs))]
-        try:
-            render([(job[0], file) for job, file in zip(jobs, files, strict=True)])
-        except PictureError as error:
-            for _, page in solved:
-                page["problems"].append(f"no picture: {error}")
-            return
-        for (_, page, name), file in zip(jobs, files, strict=True):
-            page["pictures"][name] = file.read_bytes()
 
 
 def _trends(solved: Sequence[tuple[Case, dict[str, Any]]], results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

@@ -1,21 +1,20 @@
-"""Plots as inline SVG: small, self-contained, readable in light and dark; numbers travel with the picture for hovering.
+"""Plots as values of a small SVG that is readable in light and dark; its numbers travel with it as CSV.
 
 Colours are those of Okabe and Ito (2008), which colour-blind readers tell apart; marker shape and dash tell the same.
 """
 
 from __future__ import annotations
 
-import html
-import json
 import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
+from urllib.parse import quote
 
-from bemt.base.tables import number_text, plain
+from bemt.base.tables import number_text
 
-__all__ = ["COLOURS", "Mark", "Plot", "Trace", "figure", "ticks"]
+__all__ = ["COLOURS", "Mark", "Plot", "Trace", "figure", "points", "ticks"]
 
 COLOURS = {
     "bemt": "#0072B2",
@@ -33,6 +32,8 @@ DASHES = ("", "7 4", "2 3", "9 3 2 3", "12 4", "4 4", "1 4")
 SHAPES = ("circle", "square", "triangle", "diamond", "cross", "star")
 WIDTH, HEIGHT, WIDE = 480, 320, 760
 LEFT, RIGHT, TOP, BOTTOM = 62, 12, 14, 46
+ROW = 56
+"""Height of a row of categories."""
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,16 @@ class Trace:
     points: bool = False
     labels: Sequence[str] = ()
     horizontal: bool = False
+
+
+def points(
+    name: str, rows: Sequence[tuple[Any, Any, Any, str]], source: str, shape: str, horizontal: bool = False
+) -> Trace:
+    """Make a trace of points from rows of x, y, standard uncertainty, words."""
+    x, y, u, words = ([row[k] for row in rows] for k in range(4))
+    return Trace(
+        name, x, y, u, COLOURS.get(source, COLOURS["other"]), "", shape, True, list(map(str, words)), horizontal
+    )
 
 
 @dataclass(frozen=True)
@@ -119,6 +130,8 @@ class Plot:
         Whether the x axis is logarithmic.
     wide : bool
         Whether it takes the width of the page.
+    x_limits : tuple of float or None
+        Points beyond stand at the edge as an arrow with their value, so that one of them does not flatten the rest.
     """
 
     title: str
@@ -132,6 +145,7 @@ class Plot:
     x_zero: bool = False
     log_x: bool = False
     wide: bool = False
+    x_limits: tuple[float, float] | None = None
 
 
 def _number(value: Any) -> float:
@@ -177,20 +191,27 @@ def _fit(values: list[float], zero: bool) -> tuple[float, float]:
 class _Frame:
     """Where numbers land on the paper."""
 
-    def __init__(self, plot: Plot, traces: Sequence[dict[str, Any]], width: int, left: int, height: int) -> None:
-        xs = [v for t in traces for v, w in zip(t["x"], t["y"], strict=True) if not math.isnan(v + w)]
-        ys = [w for t in traces for v, w in zip(t["x"], t["y"], strict=True) if not math.isnan(v + w)]
+    def __init__(self, plot: Plot, traces: Sequence[_Numbers], width: int, left: int, height: int) -> None:
+        low, high = plot.x_limits or (-math.inf, math.inf)
+        xs: list[float] = []
+        ys: list[float] = []
         for t in traces:
-            for v, w, e in zip(t["x"], t["y"], t["u"], strict=True):
-                if not math.isnan(v + w + e):
-                    (xs if t["horizontal"] else ys).extend([(v if t["horizontal"] else w) + s * e for s in (-1, 1)])
+            for x, y, u in t.points:
+                if not low <= x <= high:
+                    continue
+                xs.append(x)
+                ys.append(y)
+                if not math.isnan(u):
+                    (xs if t.trace.horizontal else ys).extend(
+                        [(x if t.trace.horizontal else y) + s * u for s in (-1, 1)]
+                    )
+        xs = [min(max(x, low), high) for x in xs]
         self.log = plot.log_x and all(x > 0 for x in xs)
         xs = [math.log10(x) for x in xs] if self.log else xs
         self.x0, self.x1 = _fit(xs, plot.x_zero and not self.log)
         self.y0, self.y1 = (-0.6, len(plot.y_names) - 0.4) if plot.y_names else _fit(ys, plot.zero)
         above = 14 * sum(m.axis == "x" for m in plot.marks) if plot.y_names else 0  # words clear of the rows
         self.left, self.right, self.top, self.bottom = left, width - RIGHT, TOP + above, height - BOTTOM
-        self.words = TOP
 
     def x(self, v: float) -> float:
         v = math.log10(v) if self.log else v
@@ -199,235 +220,185 @@ class _Frame:
     def y(self, v: float) -> float:
         return self.bottom - (v - self.y0) / (self.y1 - self.y0) * (self.bottom - self.top)
 
-
-def _marker(shape: str, x: float, y: float, colour: str) -> str:
-    s = 4.5
-    fill = f'fill="{colour}"'
-    line = f'fill="none" stroke="{colour}" stroke-width="2.4"'
-    if shape == "square":
-        return f'<rect x="{x - s:.1f}" y="{y - s:.1f}" width="{2 * s}" height="{2 * s}" {fill}/>'
-    if shape == "triangle":
-        return f'<path d="M{x - 5.5:.1f} {y + 4.5:.1f}h11l-5.5 -10z" {fill}/>'
-    if shape == "diamond":
-        return f'<path d="M{x:.1f} {y - 6:.1f}l5.5 6l-5.5 6l-5.5 -6z" {fill}/>'
-    if shape == "cross":
-        return f'<path d="M{x - s:.1f} {y - s:.1f}l9 9m0 -9l-9 9" {line}/>'
-    if shape == "star":
-        return f'<path d="M{x:.1f} {y - 6:.1f}v12m-5.2 -9l10.4 6m0 -6l-10.4 6" {line}/>'
-    return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4.5" {fill}/>'
+    def inside(self, x: float) -> float:
+        return min(max(x, self.left), self.right)
 
 
-def _draw(t: dict[str, Any], f: _Frame) -> str:
-    """Band, line or points of one trace."""
-    trace: Trace = t["trace"]
-    colour, out = trace.colour, []
-    good = [not math.isnan(a + b) for a, b in zip(t["x"], t["y"], strict=True)]
-    if trace.points:
-        for a, b, e, ok in zip(t["x"], t["y"], t["u"], good, strict=True):
-            if not ok:
-                continue
-            x, y = f.x(a), f.y(b)
-            if not math.isnan(e):
-                ends = (f.x(a - e), y, f.x(a + e), y) if trace.horizontal else (x, f.y(b - e), x, f.y(b + e))
-                out.append(
-                    '<path d="M{:.1f} {:.1f}L{:.1f} {:.1f}" '.format(*ends)
-                    + f'stroke="{colour}" stroke-width="7" class="bar"/>'
-                )
-            out.append(_marker(trace.shape, x, y, colour))
-        return "".join(out)
-    runs: list[list[int]] = [[]]
-    for i, ok in enumerate(good):
-        if ok:
-            runs[-1].append(i)
+@dataclass(frozen=True)
+class _Numbers:
+    """Finite points of a trace, and the runs between its gaps."""
+
+    trace: Trace
+    points: list[tuple[float, float, float]]
+    runs: list[list[int]]
+    labels: list[str]
+
+
+def _numbers(trace: Trace) -> _Numbers:
+    points, runs, labels = [], [[]], []  # type: ignore[var-annotated]
+    for i, (x, y) in enumerate(zip(trace.x, trace.y, strict=False)):
+        p = _number(x), _number(y), _number(trace.u[i]) if trace.u is not None and i < len(trace.u) else math.nan
+        if not math.isnan(p[0] + p[1]):
+            runs[-1].append(len(points))
+            points.append(p)
+            labels.append(str(trace.labels[i])[:200] if i < len(trace.labels) else "")
         elif runs[-1]:
             runs.append([])
-    for run in filter(None, runs):
-        band = [i for i in run if not math.isnan(t["u"][i])]
+    return _Numbers(trace, points, [run for run in runs if run], labels)
+
+
+def _marker(shape: str, x: float, y: float) -> tuple[str, str]:
+    """Kind and path of a marker."""
+    at = f"{x:.1f} {y:.1f}"
+    return {
+        "square": ("dot", f"M{at}m-4.5 -4.5h9v9h-9z"),
+        "triangle": ("dot", f"M{at}m-5.5 4.5h11l-5.5 -10z"),
+        "diamond": ("dot", f"M{at}m0 -6l5.5 6l-5.5 6l-5.5 -6z"),
+        "cross": ("line", f"M{at}m-4.5 -4.5l9 9m0 -9l-9 9"),
+        "star": ("line", f"M{at}m0 -6v12m-5.2 -9l10.4 6m0 -6l-10.4 6"),
+        "small": ("dot", f"M{at}m-3 0a3 3 0 1 0 6 0a3 3 0 1 0 -6 0z"),
+        "left": ("dot", f"M{at}l9 -5v10z"),
+        "right": ("dot", f"M{at}l-9 -5v10z"),
+    }.get(shape, ("dot", f"M{at}m-4.5 0a4.5 4.5 0 1 0 9 0a4.5 4.5 0 1 0 -9 0z"))
+
+
+def _path(points: Sequence[tuple[float, float]]) -> str:
+    return "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in points)
+
+
+def _draw(t: _Numbers, f: _Frame) -> tuple[list[tuple[str, str]], list[dict[str, Any]]]:
+    """Paths of one trace: bands and lines, or bars and markers; words where a point lies beyond the edge."""
+    trace, out, words = t.trace, [], []
+    if trace.points:
+        for x, y, u in t.points:
+            px, py = f.x(x), f.y(y)
+            if px != f.inside(px):
+                left = px < f.left
+                out.append(_marker("left" if left else "right", f.inside(px), py))
+                words.append(_text(f.left + 13 if left else f.right - 13, py + 4, number_text(x, 2),
+                                   "start" if left else "end", "edge"))  # fmt: skip
+                continue
+            if not math.isnan(u):
+                ends = [(f.inside(f.x(x + s * u)), py) if trace.horizontal else (px, f.y(y + s * u)) for s in (-1, 1)]
+                out.append(("bar", _path(ends)))
+            out.append(_marker(trace.shape, px, py))
+        return out, words
+    for run in t.runs:
+        at = [t.points[i] for i in run]
+        band = [p for p in at if not math.isnan(p[2])]
         if len(band) > 1:
-            up = [f"{f.x(t['x'][i]):.1f} {f.y(t['y'][i] + t['u'][i]):.1f}" for i in band]
-            down = [f"{f.x(t['x'][i]):.1f} {f.y(t['y'][i] - t['u'][i]):.1f}" for i in reversed(band)]
-            out.append(f'<path d="M{"L".join(up + down)}z" fill="{colour}" class="band"/>')
-        path = "L".join(f"{f.x(t['x'][i]):.1f} {f.y(t['y'][i]):.1f}" for i in run)
-        dash = f' stroke-dasharray="{trace.dash}"' if trace.dash else ""
-        out.append(
-            _marker("circle", f.x(t["x"][run[0]]), f.y(t["y"][run[0]]), colour)
-            if len(run) == 1
-            else f'<path d="M{path}" fill="none" stroke="{colour}" stroke-width="2"{dash}/>'
-        )
-        if 1 < len(run) <= 8:
-            out += [f'<circle cx="{f.x(t["x"][i]):.1f}" cy="{f.y(t["y"][i]):.1f}" r="3" fill="{colour}"/>' for i in run]
-    return "".join(out)
+            edge = [(f.x(x), f.y(y + u)) for x, y, u in band] + [(f.x(x), f.y(y - u)) for x, y, u in reversed(band)]
+            out.append(("band", _path(edge) + "z"))
+        if len(at) > 1:
+            out.append(("line", _path([(f.x(x), f.y(y)) for x, y, _ in at])))
+        if len(at) <= 8:
+            out += [_marker("circle" if len(at) == 1 else "small", f.x(x), f.y(y)) for x, y, _ in at]
+    return out, words
 
 
-def _text(x: float, y: float, words: str, anchor: str = "middle", extra: str = "") -> str:
-    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}"{extra}>{html.escape(words)}</text>'
+def _text(x: float, y: float, words: str, anchor: str = "middle", kind: str = "", turn: bool = False) -> dict[str, Any]:
+    return {"x": f"{x:.1f}", "y": f"{y:.1f}", "words": words, "anchor": anchor, "kind": kind, "turn": turn}
 
 
-def _axes(plot: Plot, f: _Frame, width: int, height: int) -> str:
-    out = []
+def _axes(plot: Plot, f: _Frame, width: int, height: int) -> tuple[list[tuple[str, str]], list[dict[str, Any]]]:
+    """Grid, axes and their words."""
+    lines, words = [], []
     if f.log:
         marks = sorted({10.0**k * m for k in range(math.floor(f.x0), math.ceil(f.x1) + 1) for m in (1, 2, 5)})
         marks = [v for v in marks if f.x0 - 1e-9 <= math.log10(v) <= f.x1 + 1e-9]
     else:
         marks = ticks(f.x0, f.x1, 6 if width == WIDTH else 8)
     for v in marks:
-        x = f.x(v)
-        out.append(f'<path class="grid" d="M{x:.1f} {f.top}V{f.bottom}"/>' + _text(x, f.bottom + 16, _tick(v)))
-    if plot.y_names:
-        for i, name in enumerate(plot.y_names):
-            short = name if len(name) <= 18 else name[:17] + "…"
-            out.append(
-                f'<path class="grid" d="M{f.left} {f.y(i):.1f}H{f.right}"/>'
-                + _text(f.left - 7, f.y(i) + 4, short, "end")
-            )
-    else:
-        for v in ticks(f.y0, f.y1):
-            y = f.y(v)
-            out.append(
-                f'<path class="grid" d="M{f.left} {y:.1f}H{f.right}"/>' + _text(f.left - 7, y + 4, _tick(v), "end")
-            )
-    out.append(f'<path class="axis" d="M{f.left} {f.top}V{f.bottom}H{f.right}"/>')
-    middle = 0.5 * (f.top + f.bottom)
-    out.append(_text(0.5 * (f.left + f.right), height - 8, plot.x_label, "middle", ' class="label"'))
+        lines.append(("grid", f"M{f.x(v):.1f} {f.top}V{f.bottom}"))
+        words.append(_text(f.x(v), f.bottom + 16, _tick(v)))
+    rows: list[tuple[float, str]] = [(i, n if len(n) <= 18 else n[:17] + "…") for i, n in enumerate(plot.y_names)]
+    for v, name in rows or [(v, _tick(v)) for v in ticks(f.y0, f.y1)]:
+        y = f.y(v) if not rows else f.y(v - 0.5)
+        lines += [("grid", f"M{f.left} {y:.1f}H{f.right}")] if not rows or v else []
+        words.append(_text(f.left - 7, f.y(v) + 4, name, "end"))
+    lines.append(("axis", f"M{f.left} {f.top}V{f.bottom}H{f.right}"))
+    words.append(_text(0.5 * (f.left + f.right), height - 8, plot.x_label, kind="label"))
     if plot.y_label:
-        turn = f' class="label" transform="rotate(-90 14 {middle:.0f})"'
-        out.append(_text(14, middle, plot.y_label, "middle", turn))
-    return "".join(out)
+        words.append(_text(14, round(0.5 * (f.top + f.bottom)), plot.y_label, kind="label", turn=True))
+    return lines, words
 
 
 def _tick(value: float) -> str:
     return f"{value:,.10g}".replace(",", " ") if abs(value) >= 1e4 else f"{value:.10g}"
 
 
-def _marks(plot: Plot, f: _Frame) -> str:
-    out, shown = [], 0
+def _marks(plot: Plot, f: _Frame) -> tuple[list[tuple[str, str]], list[dict[str, Any]]]:
+    """Places on the axes: lines, shaded ranges, words."""
+    lines: list[tuple[str, str]] = []
+    words: list[dict[str, Any]] = []
     for mark in plot.marks:
         v = _number(mark.at)
         if math.isnan(v) or (mark.axis == "x" and f.log and v <= 0):
             continue
         p = f.x(v) if mark.axis == "x" else f.y(v)
-        if mark.axis == "x":
-            inside = f.left <= p <= f.right
-            start, end = (p, f.right) if mark.beyond == "above" else (f.left, p)
-            start, end = max(start, f.left), min(end, f.right)
-            if mark.beyond and end > start:
-                out.append(
-                    f'<rect class="beyond" x="{start:.1f}" y="{f.top}" width="{end - start:.1f}" '
-                    f'height="{f.bottom - f.top}"/>'
-                )
-            if inside:
-                start = f.words if plot.y_names else f.top
-                out.append(f'<path class="mark" d="M{p:.1f} {start}V{f.bottom}"/>')
-                late = p > 0.62 * f.right
-                out.append(
-                    _text(
-                        p + (-4 if late else 4),
-                        f.words + 12 + 14 * (shown % 4),
-                        mark.words,
-                        "end" if late else "start",
-                        ' class="note"',
-                    )
-                )
-                shown += 1
-        elif f.top <= p <= f.bottom:
-            out.append(
-                f'<path class="mark" d="M{f.left} {p:.1f}H{f.right}"/>'
-                + _text(f.right - 4, p - 4, mark.words, "end", ' class="note"')
-            )
-    return "".join(out)
+        if mark.axis == "y":
+            if f.top <= p <= f.bottom:
+                lines.append(("mark", f"M{f.left} {p:.1f}H{f.right}"))
+                words.append(_text(f.right - 4, p - 4, mark.words, "end", "note"))
+            continue
+        ends = (f.inside(p), f.right) if mark.beyond == "above" else (f.left, f.inside(p))
+        if mark.beyond and ends[1] > ends[0]:
+            lines.insert(0, ("beyond", f"M{ends[0]:.1f} {f.top}H{ends[1]:.1f}V{f.bottom}H{ends[0]:.1f}z"))
+        if f.left <= p <= f.right:
+            lines.append(("mark", f"M{p:.1f} {TOP if plot.y_names else f.top}V{f.bottom}"))
+            late = p > 0.62 * f.right
+            row = 12 + 14 * (len(words) % 4)
+            words.append(_text(p + (-4 if late else 4), TOP + row, mark.words, "end" if late else "start", "note"))
+    return lines, words
 
 
-def _key(i: int, trace: Trace) -> str:
-    if trace.points:
-        swatch = _marker(trace.shape, 12, 9, trace.colour)
-    else:
-        dash = f' stroke-dasharray="{trace.dash}"' if trace.dash else ""
-        swatch = f'<path d="M1 9H23" stroke="{trace.colour}" stroke-width="2.6"{dash}/>'
-    return (
-        f'<button type="button" class="key" data-t="{i}" aria-pressed="true"><svg width="24" height="18" '
-        f'aria-hidden="true">{swatch}</svg>{html.escape(trace.name[:60])}</button>'
-    )
+def _csv(plot: Plot, traces: Sequence[_Numbers]) -> str:
+    """Every number of a plot as a data URI; no cell that a spreadsheet would run as a formula."""
+
+    def cell(value: Any) -> str:
+        if isinstance(value, float):
+            return "" if math.isnan(value) else f"{value:.6g}"
+        text = " ".join(str(value).split())
+        return '"' + ("'" if text[:1] in "=+-@" and text else "") + text.replace('"', '""') + '"'
+
+    lines = [["source", plot.x_label, plot.y_label or "row", "standard uncertainty", "point"]]
+    for t in traces:
+        for (x, y, u), label in zip(t.points, t.labels, strict=True):
+            k = round(y)
+            row = plot.y_names[k] if 0 <= k < len(plot.y_names) else y
+            lines.append([t.trace.name, x, row, u, label])  # type: ignore[list-item]
+    text = "\n".join(",".join(map(cell, line)) for line in lines) + "\n"
+    return "data:text/csv;charset=utf-8," + quote(text.encode("utf-8", "replace"), safe=",.-_ ()[]:/")
 
 
-def figure(plot: Plot) -> str:
-    """Draw a plot.
+def figure(plot: Plot) -> dict[str, Any] | None:
+    """Make the values of a plot for its template; None where nothing is finite.
 
     Examples
     --------
     >>> figure(Plot("t", "x [m]", "y [N]", [Trace("a", [1.0], [float("nan")])]))
-    ''
-    >>> "</svg>" in figure(Plot("t", "x [m]", "y [N]", [Trace("a", [1.0, 2.0], [3.0, 4.0])]))
-    True
+    >>> figure(Plot("t", "x [m]", "y [N]", [Trace("a", [1.0, 2.0], [3.0, 4.0])]))["traces"][0]["paths"][0][0]
+    'line'
     """
-    traces: list[dict[str, Any]] = []
-    for trace in plot.traces:
-        n = min(len(trace.x), len(trace.y))
-        x, y = [_number(v) for v in trace.x[:n]], [_number(v) for v in trace.y[:n]]
-        u = [_number(v) for v in trace.u[:n]] if trace.u is not None else []
-        u += [math.nan] * (n - len(u))
-        if any(not math.isnan(a + b) for a, b in zip(x, y, strict=True)):
-            traces.append({"trace": trace, "x": x, "y": y, "u": u, "horizontal": trace.horizontal})
+    traces = [t for t in map(_numbers, plot.traces) if t.points]
     if not traces:
-        return ""
+        return None
     width = WIDE if plot.wide else WIDTH
-    height = 76 + 40 * len(plot.y_names) + 14 * len(plot.marks) if plot.y_names else HEIGHT
+    height = 76 + ROW * len(plot.y_names) + 14 * len(plot.marks) if plot.y_names else HEIGHT
     f = _Frame(plot, traces, width, 120 if plot.y_names else LEFT, height)
     if not plot.y_names:  # room for long numbers
         f.left = max(LEFT, 34 + 8 * max(len(_tick(v)) for v in ticks(f.y0, f.y1)))
-    drawn = "".join(f'<g class="trace" data-t="{i}">{_draw(t, f)}</g>' for i, t in enumerate(traces))
-    data = {
-        "x": [f.x0, f.x1, f.left, f.right],
-        "y": [f.y0, f.y1, f.bottom, f.top],
-        "log": f.log,
-        "xl": plot.x_label,
-        "yl": plot.y_label,
-        "rows": list(plot.y_names),
-        "t": [
-            {
-                "n": t["trace"].name,
-                "x": _short(t["x"]),
-                "y": _short(t["y"]),
-                "u": _short(t["u"]) if any(not math.isnan(v) for v in t["u"]) else [],
-                "l": [str(w)[:200] for w in t["trace"].labels],
-                "h": t["horizontal"],
-            }
-            for t in traces
-        ],
-    }
-    blob = html.escape(json.dumps(plain(data), ensure_ascii=True, allow_nan=False, separators=(",", ":")))
-    keys = "".join(_key(i, t["trace"]) for i, t in enumerate(traces)) if len(traces) > 1 else ""
-    keys = f'<div class="keys">{keys}</div>' if keys else ""
-    title = html.escape(plot.title)
-    note = f"<p>{html.escape(plot.note)}</p>" if plot.note else ""
-    kind = ' class="plot wide"' if plot.wide else ' class="plot"'
-    slug = re.sub(r"[^a-z0-9]+", "-", plot.title.lower()).strip("-")[:60]
-    save = f'<button type="button" class="csv" data-name="{slug}" hidden>CSV</button>'  # shown where scripts run
-    return (
-        f'<figure{kind}><figcaption>{title}</figcaption><div class="canvas"><svg viewBox="0 0 {width} {height}" '
-        f'role="img" aria-label="{title}" data-plot="{blob}">{_axes(plot, f, width, height)}'
-        f'<g class="marks">{_marks(plot, f)}</g>{drawn}<circle class="here" r="7"/></svg><div class="tip" hidden></div>'
-        f"</div>{keys}{note}{save}{_values(plot, traces)}</figure>"
-    )
-
-
-def _short(values: Sequence[float]) -> list[Any]:
-    return [None if math.isnan(v) else float(f"{v:.6g}") for v in values]
-
-
-def _values(plot: Plot, traces: Sequence[dict[str, Any]]) -> str:
-    """Give the same numbers as a table, for readers without a pointer."""
-    rows = []
+    (lines, words), (more, notes) = _axes(plot, f, width, height), _marks(plot, f)
+    drawn = []
     for t in traces:
-        for i, (x, y, u) in enumerate(zip(t["x"], t["y"], t["u"], strict=True)):
-            if math.isnan(x + y):
-                continue
-            k = round(y)
-            row = plot.y_names[k] if plot.y_names and 0 <= k < len(plot.y_names) else number_text(y, 5)
-            word = str(t["trace"].labels[i])[:200] if i < len(t["trace"].labels) else ""
-            cells = (t["trace"].name[:60], number_text(x, 5), row, number_text(u, 3), word)
-            rows.append("<tr>" + "".join(f"<td>{html.escape(c)}</td>" for c in cells) + "</tr>")
-    head = "".join(f"<th>{html.escape(w)}</th>" for w in ("source", plot.x_label, plot.y_label or "row", "± u", ""))
-    return (
-        f'<details class="values"><summary>Values</summary><div class="scroll"><table><thead><tr>{head}</tr></thead>'
-        f"<tbody>{''.join(rows)}</tbody></table></div></details>"
-    )
+        paths, beyond = _draw(t, f)
+        look = t.trace
+        key = _marker(look.shape, 12, 9) if look.points else ("line", "M1 9H23")
+        drawn.append({"name": look.name[:60], "colour": look.colour, "dash": look.dash, "paths": paths,
+                      "words": beyond, "key": key})  # fmt: skip
+    at = " ".join(f"{i},{f.inside(f.x(x)):.0f},{f.y(y):.0f}" for i, t in enumerate(traces) for x, y, _ in t.points)
+    return {
+        "kind": "plot", "title": plot.title, "note": plot.note, "wide": plot.wide, "width": width, "height": height,
+        "frame": [*lines, *more], "words": [*words, *notes], "traces": drawn, "at": at, "csv": _csv(plot, traces),
+        "slug": re.sub(r"[^a-z0-9]+", "-", plot.title.lower()).strip("-")[:60],
+    }  # fmt: skip

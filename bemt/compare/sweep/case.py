@@ -21,6 +21,7 @@ from bemt import __version__, effects
 from bemt.air import air_arrays
 from bemt.base import units
 from bemt.case import Assumption, Case
+from bemt.compare.sweep.agreement import agreement
 from bemt.compare.sweep.model_error import beyond, u_model
 from bemt.readers import references as reference_file
 from bemt.recordings import audit_remarks
@@ -133,18 +134,12 @@ def _compare(
     E, u_num, u_input = S - recorded, float(values.u_num[channel][at]), float(values.u_input(channel)[at])
     u_model = float(values.u_model[channel][at])
     u_val = math.sqrt(u_num**2 + u_input**2 + u_model**2 + u_D**2)
-    if math.isnan(E):
-        verdict = "no result"
-    elif math.isnan(u_val):
-        known = math.hypot(u_num, u_input, u_model)
-        verdict = f"u_D unknown; |E| is {abs(E) / known:.1f} u of the model" if known > 0 else "u_D unknown"
-    else:
-        verdict = "not distinguishable from noise" if abs(E) <= u_val else "differs"
-    return {
+    line = {
         "model": model, "reference": row["label"], "source": row["source"], "quantity": channel,
         "unit": COMPARED[channel], "S": S, "D": recorded, "E": E, "E_pct": 100.0 * E / recorded if recorded else None,
-        "u_num": u_num, "u_input": u_input, "u_model": u_model, "u_D": u_D, "u_val": u_val, "verdict": verdict,
+        "u_num": u_num, "u_input": u_input, "u_model": u_model, "u_D": u_D, "u_val": u_val,
     }  # fmt: skip
+    return line | {"verdict": agreement(line)}
 
 
 def _tip_flags(mach: float) -> list[str]:
@@ -180,7 +175,8 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
     bemt = _Model(_channels(nominal), _channels(refined), own_error)
     simple = formula(case)
     area = {"thrust_N": simple.thrust_N, "CT": simple.CT}
-    fit = _Model(area, None)
+    u = simple.u["thrust_N"]  # unknown in flight and in a duct
+    fit = _Model(area, None, {"thrust_N": u, "CT": u * simple.CT / simple.thrust_N})
     for assumption in case.assumptions:
         runs: list[dict[str, Array] | None] = []
         fits: list[dict[str, Array] | None] = []

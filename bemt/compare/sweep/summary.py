@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from bemt.base.tables import number_text, text_table
+from bemt.compare.sweep.agreement import known, needed
 from bemt.compare.sweep.case import ROW_SOURCES
 from bemt.compare.sweep.text import with_nan
 
@@ -30,7 +31,7 @@ def summary(results: Sequence[Mapping[str, Any]], called: str = "python -m bemt"
         lines.append(_short(f"{result['name']}: not solved, {n} {'fault' if n == 1 else 'faults'} (see the messages)"))
     if len(failed) > 6:
         lines.append(f"and {len(failed) - 6} more that were not solved")
-    for words in (_worst(found), _unknowns(solved), _flags(solved), _grids(solved)):
+    for words in (_worst(found), _ducts(solved), _unknowns(solved), _flags(solved), _grids(solved)):
         lines += ["", *words] if words else []
     return "\n".join([*lines, "", *_next(called, bool(found))] if solved else lines)
 
@@ -42,14 +43,11 @@ def _compared(result: Mapping[str, Any]) -> list[dict[str, Any]]:
     largest = max((abs(c["D"]) for c in rows), default=0.0)
     out: dict[tuple[str, str, float], dict[str, Any]] = {}
     for c in rows:
-        known = math.hypot(c["u_num"], c["u_input"])
-        u = math.hypot(known, c["u_D"]) if math.isfinite(c["u_D"]) else known
-        far = abs(c["E"]) / u if u > 0.0 else math.inf
         share = abs(c["E"]) / largest if largest > 0.0 else 0.0
         row = next(r for r in result["rows"] if r["label"] == c["reference"])
         out.setdefault((c["source"], number_text(c["D"], 3), row["rpm"]), {
-            **c, "case": result, "known": known, "share": share, "rank": share if math.isfinite(share) else 9e9,
-            "far": far, "rpm": row["rpm"], "airspeed_m_s": row["airspeed_m_s"],
+            **c, "case": result, "known": known(c), "share": share, "rank": share if math.isfinite(share) else 9e9,
+            "rpm": row["rpm"], "airspeed_m_s": row["airspeed_m_s"],
         })  # fmt: skip
     return list(out.values())
 
@@ -58,11 +56,13 @@ def _agreement(c: Mapping[str, Any]) -> str:
     """Whether model and recording agree, or how good the recording would have to be."""
     if not math.isfinite(c["E"]):
         return "no result"
+    if not math.isfinite(c["known"]):
+        return "BEMT's u unknown"
     if abs(c["E"]) <= c["known"]:
         return "agrees"
     if math.isfinite(c["u_D"]):
         return "agrees" if abs(c["E"]) <= math.hypot(c["known"], c["u_D"]) else "differs"
-    return f"u > {number_text(math.sqrt(c['E'] ** 2 - c['known'] ** 2), 2)}"
+    return f"u > {number_text(needed(c), 2)}"
 
 
 def _table(solved: Sequence[Mapping[str, Any]], found: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -97,8 +97,8 @@ def _table(solved: Sequence[Mapping[str, Any]], found: Sequence[Mapping[str, Any
     if left > 0 or len(body) > len(shown):
         lines.append(f"and {max(left, len(body) - len(shown))} more, nearer to what was recorded or further down")
     if found:
-        lines.append("±, u: one standard deviation (BEMT: of its declared unknowns); %: of the largest")
-        lines.append("recording of the case; agree? u > X: if the recording is no better than X N")
+        lines.append("±, u: one standard uncertainty (BEMT: of inputs and of the model); %: of the")
+        lines.append("largest recording; u > X: they agree if the recording's u is above X N")
     return lines
 
 
@@ -109,14 +109,28 @@ def _worst(found: Sequence[Mapping[str, Any]]) -> list[str]:
     case = c["case"]
     words = f"Differs most: {case['name']}, BEMT {number_text(c['S'], 3)} N against {c['reference']}: {c['E']:+.3g} N."
     if abs(c["E"]) <= c["known"]:
-        words += " The declared unknowns of the case explain as much."
-    elif not math.isfinite(c["u_D"]):
-        words += f" Nobody states how good the recording is: they agree if no better than {_agreement(c)[4:]} N."
+        words += " BEMT's own uncertainty explains as much."
+    elif not math.isfinite(c["u_D"]) and math.isfinite(needed(c)):
+        words += f" Nobody states its u: the two agree if that is above {number_text(needed(c), 2)} N."
     audit = next((a for a in case.get("audit", []) if a["reference"] == c["reference"]), None)
     faults = [line["finding"] for line in (audit or {"lines": []})["lines"] if line["status"] == "fault"]
     if faults:
         words += f" Set-up of the recording: {'; '.join(faults)}."
     return textwrap.wrap(words, WIDTH)
+
+
+def _ducts(solved: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Why K1/K2 is far off beside a ducted fan."""
+    told = []
+    for result in solved:
+        own, simple = (next((r for r in result["rows"] if r["source"] == s), None) for s in ("bemt", "k1k2"))
+        if result.get("kind") == "fan" and own and simple and own["thrust_N"] > 0.0:
+            told.append(f"{number_text(simple['thrust_N'] / own['thrust_N'], 2)} of BEMT on {result['name'][:30]}")
+    words = (
+        f"K1/K2 gives {', '.join(told[:3])}: it is a fit to open propellers, knows their diameter and pitch only, and "
+        "leaves out what lifts a fan: many blades and the duct."
+    )
+    return textwrap.wrap(words, WIDTH) if told else []
 
 
 def _unknowns(solved: Sequence[Mapping[str, Any]]) -> list[str]:
