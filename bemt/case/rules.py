@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from bemt.base.toml import Collector, Key, Table, check_value, shown, validated
-from bemt.case.schema import GROUPS, INCH, TEMPERATURE, CaseFile, SectionTable
+from bemt.base.toml import Collector, Table, check_field, shown, validated
+from bemt.case.schema import GROUPS, INCH, CaseFile, SectionTable
 
 __all__ = ["check_case", "check_shape", "table_at", "value_at"]
 
@@ -32,7 +32,7 @@ def check_case(out: Collector, document: Mapping[str, Any], folder: Path) -> Cas
     _check_groups(out, document)
     _check_files(out, document, folder)
     if case is not None and not out.faults:  # the rules below need sound values
-        for rule in (check_shape, _check_blade, _check_air, _check_sweep, _check_assumptions):
+        for rule in (check_shape, _check_blade, _check_sweep, _check_assumptions):
             rule(out, case)
     return None if out.faults else case
 
@@ -67,6 +67,7 @@ def _inner(document: Mapping[str, Any], name: str) -> Mapping[str, Any] | None:
     for part in name.split("."):
         value = value.get(part) if isinstance(value, Mapping) else None
     return value if isinstance(value, Mapping) else None
+
 
 def _check_groups(out: Collector, document: Mapping[str, Any]) -> None:
     for name, keys, required in GROUPS:
@@ -136,8 +137,8 @@ def _check_blade(out: Collector, case: CaseFile) -> None:
             out.add(f"blade.{key}", shown(getattr(blade, key)), f"nothing beside {source}, which gives it", hint)
     posterior = blade.as_built is not None and blade.as_built.file is not None
     if (blade.known_from == "reference") != posterior:
-        got = "known_from = \"reference\" without as_built.file" if not posterior else "as_built.file"
-        expected = "known_from = \"reference\" and blade.as_built.file together"
+        got = 'known_from = "reference" without as_built.file' if not posterior else "as_built.file"
+        expected = 'known_from = "reference" and blade.as_built.file together'
         out.add("blade.known_from", got, expected, "python -m bemt calibrate-rotor writes both")
     if blade.section is None:
         hint = "Tables [[polars]] replace only its aerodynamics"
@@ -198,14 +199,6 @@ def _check_duct(out: Collector, case: CaseFile) -> None:
             out.add(f"duct.{key}", shown(value), f"at most length_mm, {duct.length_mm:g}")
 
 
-def _check_air(out: Collector, case: CaseFile) -> None:
-    air = case.air
-    if air.pressure_hPa is not None and air.temperature_C is None:
-        out.add("air.temperature_C", "nothing", f"{TEMPERATURE.expected}, because pressure_hPa is given")
-    if air.humidity_pct is not None and air.pressure_hPa is None:
-        out.add("air.humidity_pct", shown(air.humidity_pct), "nothing without pressure_hPa")
-
-
 def _check_sweep(out: Collector, case: CaseFile) -> None:
     sweep = case.sweep.axes()
     if "density_kg_m3" in sweep and ("altitude_m" in sweep or "temperature_C" in sweep):
@@ -229,19 +222,19 @@ def _check_assumptions(out: Collector, case: CaseFile) -> None:
         where, key = f"assumptions[{i}]", item.key
         home, _, name = key.rpartition(".")
         table, nominal = table_at(case, home), value_at(case, key)
-        if not home or table is None or nominal is None or table.declared(name) is None:
+        if not home or table is None or nominal is None or table.inner(name) is not None:
             out.add(f"{where}.key", repr(key), "the dotted key of a value in this file")
             continue
         if key in seen:
             out.add(f"{where}.key", f"{key!r} again", "each key once")
         seen.add(key)
         stated = {k: list(v) if isinstance(v, tuple) else v for k, v in item.model_dump(exclude_unset=True).items()}
-        what = table.declared(name)
-        assert what is not None
-        _check_assumption(out, where, stated, nominal, what)
+        _check_assumption(out, where, stated, nominal, type(table), name)
 
 
-def _check_assumption(out: Collector, where: str, item: Mapping[str, Any], nominal: Any, key: Key) -> None:
+def _check_assumption(
+    out: Collector, where: str, item: Mapping[str, Any], nominal: Any, table: type[Table], name: str
+) -> None:
     if "values" in item:
         if "low" in item or "high" in item:
             out.add(where, "values beside low or high", "values, or low and high")
@@ -249,13 +242,13 @@ def _check_assumption(out: Collector, where: str, item: Mapping[str, Any], nomin
             out.add(f"{where}.values", shown(item["values"]), f"two or more values, one of them {shown(nominal)}")
             return
         for i, value in enumerate(item["values"]):
-            check_value(out, f"{where}.values[{i}]", value, key)
+            check_field(out, f"{where}.values[{i}]", table, name, value)
         return
     lacking = [end for end in ("low", "high") if end not in item]
     if lacking:
         out.add(where, f"no {' and no '.join(lacking)}", "low and high, or values")
         return
-    ends = [check_value(out, f"{where}.{end}", item[end], key) for end in ("low", "high")]
+    ends = [check_field(out, f"{where}.{end}", table, name, item[end]) for end in ("low", "high")]
     if not all(ends):
         return
     if isinstance(nominal, (str, list)):
