@@ -8,6 +8,7 @@ from pathlib import Path
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
+from bemt.case.unknowns import AIR, FAN, HUB, LABEL, SECTION, SURFACE, Unknown
 from geometry.common import GeometryError
 from geometry.designation import parse_designation
 
@@ -16,52 +17,7 @@ __all__ = ["case_name", "fan_text", "label_parts", "label_text", "of_stations", 
 TIP_SPEED = 120.0
 """Speed of the blade tips at the operating point of a new case, for want of a better one. [m/s]"""
 
-SECTION = """
-[[assumptions]]
-key = "blade.section.camber"
-low = 0.02
-high = 0.05
-why = "section not known; measured families of propellers have 3 to 5 %, slow flyers more"
-
-[[assumptions]]
-key = "blade.section.thickness"
-low = 0.06
-high = 0.12
-why = "section not known"
-"""
-SURFACE = """
-[[assumptions]]
-key = "model.n_crit"
-low = 1.0
-high = 5.0
-why = "transition not known; 3 is the rule for disturbed flow"
-
-[[assumptions]]
-key = "model.drag_level"
-low = 1.0
-high = 1.2
-why = "surface not known; smooth (1.0) to twice the excess of moulded blades (1.1)"
-"""
-BLADE = """
-[[assumptions]]
-key = "rotor.hub_ratio"
-low = 0.10
-high = 0.20
-why = "hub not known; hubs and spinners of small propellers"
-
-[[assumptions]]
-key = "blade.beta_offset_deg"
-low = 0.0
-high = 1.4
-why = "a label's pitch is that of the chord line (0) or of the flat underside (up to 1.4 deg more)"
-
-[[assumptions]]
-key = "blade.max_chord_over_R"
-low = 0.15
-high = 0.24
-why = "chord not known; measured two-blade propellers of 8 to 14 in. Measure it at 0.75 R: nothing narrows more"
-"""
-FAN = """
+FAN_RANGES = """
 [[assumptions]]
 key = "rotor.blades"
 values = [{blades_low}, {blades}, {blades_high}]
@@ -72,18 +28,6 @@ key = "blade.pitch_in"
 low = {pitch_low:.4g}
 high = {pitch_high:.4g}
 why = "pitch not known; fans of this kind have about 1.2 to 1.7 diameters per turn"
-
-[[assumptions]]
-key = "blade.max_chord_over_R"
-low = 0.30
-high = 0.60
-why = "chord not known; range of the chord law"
-
-[[assumptions]]
-key = "blade.section.camber"
-low = 0.03
-high = 0.07
-why = "section not known; cambered compressor-like sections"
 
 [[assumptions]]
 key = "duct.tip_gap_mm"
@@ -97,6 +41,10 @@ low = 0.85
 high = 1.0
 why = "nozzle not known; 85 % of the swept annulus to all of it"
 """
+
+
+def _blocks(*unknowns: Unknown) -> str:
+    return "".join(item.block() for item in unknowns)
 
 
 def label_parts(label: str, blades: int | None = None) -> tuple[float, float, int]:
@@ -158,7 +106,7 @@ max_chord_over_R = 0.195
 [blade.section]
 camber = 0.035
 thickness = 0.09
-{_operating(_rpm(D * INCH, rpm), airspeed_m_s, rpm is not None)}{BLADE}{SECTION}{SURFACE}"""
+{_operating(_rpm(D * INCH, rpm), airspeed_m_s, rpm is not None)}{_blocks(HUB, *LABEL, *SECTION, *SURFACE, AIR)}"""
 
 
 def stations_text(
@@ -183,7 +131,7 @@ hub_ratio = {hub_ratio:.4g}
 [blade.section]
 camber = 0.035
 thickness = 0.09
-{_operating(_rpm(diameter_m, rpm), airspeed_m_s, rpm is not None)}{SECTION}{SURFACE}"""
+{_operating(_rpm(diameter_m, rpm), airspeed_m_s, rpm is not None)}{_blocks(*SECTION, *SURFACE, AIR)}"""
 
 
 def fan_text(
@@ -193,7 +141,7 @@ def fan_text(
     D, B = diameter_m / INCH, blades or 11
     P = pitch_in or 1.45 * D
     mm = 1e3 * diameter_m
-    ranges = FAN.format(
+    ranges = FAN_RANGES.format(
         blades=B, blades_low=max(B - 2, 2), blades_high=B + 2, pitch_low=0.85 * P, pitch_high=1.15 * P,
         gap_low=3e-3 * mm, gap_high=1e-2 * mm,
     )  # fmt: skip
@@ -230,7 +178,7 @@ exit_area_ratio = 0.925
 blades = 5
 chord_mm = {0.29 * mm:.3g}
 recovery = 0.8
-{_operating(told, 0.0, rpm is not None).replace("120", "180")}{ranges}{SURFACE}"""
+{_operating(told, 0.0, rpm is not None).replace("120", "180")}{ranges}{_blocks(*FAN, *SURFACE, AIR)}"""
 
 
 def of_stations(file: Path) -> tuple[float, str]:

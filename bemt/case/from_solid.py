@@ -110,8 +110,6 @@ density_kg_m3 = 1.225
     return files
 
 
-
-
 def refuse_other(path: Path, content: str) -> None:
     """Refuse to replace a case that somebody has changed or written."""
     if path.is_file() and path.read_bytes() != content.encode():

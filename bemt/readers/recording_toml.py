@@ -77,8 +77,10 @@ class RecordingHead(Table):
     file: str | tuple[str, ...] = entry("table beside this file, or tables in the order of their runs", required=True)
     session: str | None = entry("runs of one session share their zero and gain")
     remark: str | None = entry("anything")
-    decimal: Literal[".", ","] = entry("mark of decimals", default=".")
-    delimiter: Literal[",", ";", "\t", "|", " "] | None = entry("between cells; found if left out")
+    decimal: Literal[".", ","] = entry("mark of decimals", default=".", words='"." or ","')
+    delimiter: Literal[",", ";", "\t", "|", " "] | None = entry(
+        "between cells; found if left out", words='one of ",", ";", "|", tab, space'
+    )
     header: bool | None = entry("false: the first line is data; found if left out")
     uncertainty_source: str | None = entry("where the uncertainties come from")
 
