@@ -86,6 +86,8 @@ def test_what_a_short_case_states_is_no_assumption(here: Path) -> None:
         (["--stations", "blade.csv"], "--diameter-mm"),
         (["--stations", "absent.csv", "--diameter-mm", "254"], "absent"),
         (["--stations", "blade.csv", "--diameter-mm", "0.254"], "Times 1000"), (["seventy", "--fan"], "70mm"),
+        (["mine", "--scan", "absent.stl"], "absent.stl"), (["mine", "--scan", "blade.csv"], "a solid"),
+        (["10x5", "--unit", "mm"], "--scan"), (["mine", "--scan", "a.stl", "--blades", "2"], "--blades"),
     ],
 )  # fmt: skip
 def test_what_is_no_propeller_is_refused_and_nothing_is_written(

@@ -11,6 +11,7 @@ import numpy as np
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_text, text_table, write_atomic
+from bemt.case.unknowns import AIR, SURFACE
 from geometry.common import GeometryError
 from geometry.export import UNITS, read_solid
 from geometry.slicing import FoundRotor, find_rotor
@@ -53,7 +54,15 @@ def _csv(header: str, rows: list[list[str]]) -> str:
     return "".join(f"{line}\n" for line in [header, *(",".join(row) for row in rows)])
 
 
-def case_files(found: FoundRotor, scale: float, name: str, source: str) -> dict[str, str]:
+def case_files(
+    found: FoundRotor,
+    scale: float,
+    name: str,
+    source: str,
+    known_from: str | None = None,
+    rpm: float | None = None,
+    airspeed_m_s: float = 0.0,
+) -> dict[str, str]:
     """Write the found rotor as a case."""
     x = found.r / found.R
     files: dict[str, str] = {}
@@ -78,10 +87,11 @@ def case_files(found: FoundRotor, scale: float, name: str, source: str) -> dict[
         names.append(f"{title}.dat")
         pairs = "".join(f"{a:.6f} {b:.6f}\n" for a, b in zip(section.x, section.y, strict=True))
         files[f"{title}.dat"] = f"{title}\n{pairs}"
-    rpm = float(f"{TIP_SPEED / (found.R * scale) * 30 / math.pi:.2g}")
+    told = float(f"{TIP_SPEED / (found.R * scale) * 30 / math.pi:.2g}") if rpm is None else rpm
+    known = f'\nknown_from = "{known_from}"' if known_from else ""
     quoted = ", ".join(f'"{n}"' for n in names)
     files["case.toml"] = f"""# Blade stations cut from {source}.
-# Not in the geometry, set here to be changed: operating.rpm (a tip speed near {TIP_SPEED:g} m/s), speed, air.
+# Not in the geometry: rpm (a tip speed near {TIP_SPEED:g} m/s unless told), speed, and what [[assumptions]] declare.
 schema = "bemt.case/1"
 name = "{name}"
 title = "{found.B} blades, {2e3 * found.R * scale:.4g} mm, from {source}"
@@ -94,19 +104,19 @@ hub_diameter_mm = {2e3 * found.Rhub * scale:.6g}
 rotation = "{"right" if found.rotation > 0 else "left"}"
 
 [blade]
-stations = "stations.csv"
+stations = "stations.csv"{known}
 
 [blade.section]
 dat = [{quoted}]
 r_over_R = [{", ".join(f"{at:.4f}" for at in anchors.values())}]
 
 [operating]
-rpm = {rpm:.0f}
-airspeed_m_s = 0
+rpm = {told:.6g}
+airspeed_m_s = {airspeed_m_s:g}
 
 [air]
-density_kg_m3 = 1.225
-"""
+density_kg_m3 = {AIR.value}
+{"".join(unknown.block() for unknown in (*SURFACE, AIR))}"""
     return files
 
 
