@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import shutil
@@ -267,3 +268,37 @@ def test_json_of_a_bad_case_is_still_a_document() -> None:
     assert document["cases"][0]["faults"] == [
         "number_is_nan.toml: operating.rpm: got nan; expected a number from 10 to 300000 rev/min."
     ]
+
+
+class Terminal(io.StringIO):
+    """A stream that somebody watches."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.mark.parametrize(
+    ("stream", "variables", "coloured"),
+    [
+        (Terminal, {}, True), (Terminal, {"NO_COLOR": "1"}, False), (Terminal, {"TERM": "dumb"}, False),
+        (io.StringIO, {}, False),
+    ],
+)  # fmt: skip
+def test_colour_is_for_terminals_and_verdicts(
+    stream: type[io.StringIO], variables: dict[str, str], coloured: bool, tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    for name in ("NO_COLOR", "TERM"):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in variables.items():
+        monkeypatch.setenv(name, value)
+    out, err = stream(), stream()
+    monkeypatch.setattr(sys, "stdout", out)
+    monkeypatch.setattr(sys, "stderr", err)
+    log = tmp_path / "l.csv"
+    log.write_text("rpm,thrust_N\n4000,-1.1\n6000,2.4\n8000,4.3\n9000,5.4\n")
+    assert cli.main(["import", str(log)]) == 0 and cli.main(["sweep", str(tmp_path / "none")]) == 2
+    assert (sys.stdout, sys.stderr) == (out, err)
+    for text in (out.getvalue(), err.getvalue()):
+        assert ("\x1b[3" in text) is coloured
+    assert "\x1b[31m  ! error:\x1b[0m" in out.getvalue() or not coloured

@@ -19,7 +19,7 @@ from typing import Any
 import bemt.commands
 from bemt import __version__
 from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError, system_fault
-from bemt.commands._terminal import called
+from bemt.commands._terminal import called, coloured
 
 __all__ = ["build_parser", "commands", "main"]
 
@@ -145,12 +145,17 @@ def _check_folders(args: argparse.Namespace) -> None:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line."""
+    """Run the command line; colour where a terminal has it."""
+    with coloured():
+        return _main(sys.argv[1:] if argv is None else list(argv))
+
+
+def _main(argv: list[str]) -> int:
     for stream in (sys.stdout, sys.stderr):  # a terminal that is not UTF-8 must not end a run
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
     parser = build_parser()
-    if not (sys.argv[1:] if argv is None else argv):
+    if not argv:
         parser.print_help()
         return EXIT_OK
     args = parser.parse_args(argv)
