@@ -124,14 +124,6 @@ class Blade:
         columns = self._at(r)
         return columns[..., 0], columns[..., 1]
 
-    def elements(self, edges: ArrayLike) -> Stations:
-        """Cut the blade at given edges. [m, rad]"""
-        edges = np.asarray(edges, dtype=np.float64)
-        if edges.ndim != 1 or edges.size < 2 or not (np.diff(edges) > 0).all():
-            raise GeometryError([("edges", f"shape {edges.shape}", "two or more ascending radii in metres", "")])
-        r = 0.5 * (edges[1:] + edges[:-1])
-        return Stations(r, np.diff(edges), *self.at(r))
-
     def midpoints(self, n: int, spacing: str = "uniform") -> Stations:
         """Cut the blade into n elements between Rhub and R: what the solver consumes. [m, rad]
 
@@ -161,14 +153,6 @@ class Blade:
         steps = np.rint(span * s / unit) * unit
         r = self.Rhub + 0.5 * (steps[1:] + steps[:-1])
         return Stations(r, np.diff(steps), *self.at(r))
-
-    def resample(self, r: ArrayLike) -> Blade:
-        """Return the blade with stations at other radii, everything interpolated."""
-        columns = self._at(r)
-        return replace(
-            self, r=np.asarray(r, dtype=np.float64), chord=columns[..., 0], beta=columns[..., 1],
-            sweep=None if self.sweep is None else columns[..., 2], rake=None if self.rake is None else columns[..., 3],
-        )  # fmt: skip
 
     def with_pitch_offset(self, dbeta: float) -> Blade:
         """Return the blade turned as a whole by `dbeta` [rad]."""

@@ -254,11 +254,6 @@ class Collector:
         """Add one fault."""
         self.faults.append(Fault(self.file, where, got, expected, hint))
 
-    def refuse(self) -> None:
-        """Raise all faults, if there are any."""
-        if self.faults:
-            raise InputError(self.faults)
-
 
 def shown(value: Any) -> str:
     """Show a TOML value shortly, as a user wrote it.
