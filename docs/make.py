@@ -60,11 +60,14 @@ def picture(case: Case) -> str:
 def gallery(cases: list[Case]) -> str:
     """Page of all cases."""
     lines = [
-        "# Gallery", "",
-        "The shipped cases, as the solver sees them. Written by `python docs/make.py`; do not edit.", "",
+        "# Gallery",
+        "",
+        "The shipped cases, as the solver sees them. Written by `python docs/make.py`; do not edit.",
+        "",
         "Thrust and torque are those of BEMT at the case's point; what was recorded stands in the",
-        "[report](../reports/report.md).", "",
-    ]  # fmt: skip
+        "[report](../reports/report.md).",
+        "",
+    ]
     for case in cases:
         ready = prepare_case(case)
         row = ready.solve(case.rpm, case.airspeed_m_s, case.air())
@@ -134,8 +137,11 @@ def rows(name: str, model: type[Table], case: bool) -> Iterator[list[str]]:
             default = ""
         elif isinstance(default, tuple):
             default = ", ".join(f"{v:g}" for v in default)
-        span = f"{limits.low:.6g} to {limits.high:.6g}" if limits.low > Limits.low and limits.high < Limits.high else (
-            f"{limits.low:g} or more" if limits.low > Limits.low else "")  # fmt: skip
+        span = (
+            f"{limits.low:.6g} to {limits.high:.6g}"
+            if limits.low > Limits.low and limits.high < Limits.high
+            else (f"{limits.low:g} or more" if limits.low > Limits.low else "")
+        )
         meaning = (field.description or "").replace("|", "\\|")
         yield [f"`{key}`", kind.replace("|", "\\|"), limits.unit, str(default), span, meaning]
 
@@ -143,12 +149,15 @@ def rows(name: str, model: type[Table], case: bool) -> Iterator[list[str]]:
 def files() -> str:
     """Page of the references."""
     lines = [
-        "# TOML files", "",
-        "Every key of the files that commands read. Written by `python docs/make.py`; do not edit.", "",
+        "# TOML files",
+        "",
+        "Every key of the files that commands read. Written by `python docs/make.py`; do not edit.",
+        "",
         "Units stand in the key names. An unknown key is refused with a hint, and all faults of a file come at once. "
-        "`(assumed)`: taken when the file says nothing of hub, chord, section or air, with the range that then counts as "
-        "an uncertainty; `sweep --details` says what each does to the thrust. Fans have ranges of their own.", "",
-    ]  # fmt: skip
+        "`(assumed)`: taken when the file says nothing of hub, chord, section or air, with the range that then counts "
+        "as an uncertainty; `sweep --details` says what each does to the thrust. Fans have ranges of their own.",
+        "",
+    ]
     for name, (model, words) in FILES.items():
         example = (DOCS / "files" / f"{name}.toml").read_text(encoding="utf-8")
         lines += [f"## {name}.toml", "", words, "", "```toml", example.rstrip(), "```", ""]

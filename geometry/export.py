@@ -97,8 +97,11 @@ def _rounded(value: Any) -> Any:
 
 
 def _surfaces(model: MeshModel) -> list[dict[str, Any]]:
-    return [{"name": name, "triangles": len(part.part(name)), "area_m2": part.area(name)}
-            for part in model.parts for name in part.names]  # fmt: skip
+    return [
+        {"name": name, "triangles": len(part.part(name)), "area_m2": part.area(name)}
+        for part in model.parts
+        for name in part.names
+    ]
 
 
 def _stl(vertices: Array, faces: NDArray[np.int64], title: str) -> str:

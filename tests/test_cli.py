@@ -74,9 +74,12 @@ def test_a_bare_call_shows_the_commands_in_groups(capsys: pytest.CaptureFixture[
 
 @pytest.mark.parametrize(
     ("arguments", "meant"),
-    [(["swep", "cases"], "Did you mean sweep?"), (["sweep", "cases", "--tolerence", "3"], "Did you mean --tolerance?"),
-     (["export", "cases", "--out", "x", "--format", "stp"], "Did you mean")],
-)  # fmt: skip
+    [
+        (["swep", "cases"], "Did you mean sweep?"),
+        (["sweep", "cases", "--tolerence", "3"], "Did you mean --tolerance?"),
+        (["export", "cases", "--out", "x", "--format", "stp"], "Did you mean"),
+    ],
+)
 def test_what_was_meant_is_guessed_and_said_but_not_done(
     arguments: list[str], meant: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -179,7 +182,7 @@ def test_polar_option_is_a_reynolds_number() -> None:
         (ZeroDivisionError("boom"), 3, "internal error"),
         (KeyboardInterrupt(), 130, "interrupted"),
     ],
-)  # fmt: skip
+)
 def test_exit_code_follows_the_outcome(
     outcome: object, code: int, words: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -227,9 +230,12 @@ def test_folder_of_results_that_is_a_file_is_2(tmp_path: Path) -> None:
 )  # fmt: skip
 @pytest.mark.parametrize("below", ["", "/deeper/still"])
 def test_a_file_for_a_folder_is_refused_before_any_work(
-    arguments: list[str], below: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+    below: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
+) -> None:
     begun: list[str] = []
     monkeypatch.setattr(f"bemt.commands.{arguments[0]}.run", lambda args: begun.append(args.command))
     file = tmp_path / "file"
@@ -280,14 +286,19 @@ class Terminal(io.StringIO):
 @pytest.mark.parametrize(
     ("stream", "variables", "coloured"),
     [
-        (Terminal, {}, True), (Terminal, {"NO_COLOR": "1"}, False), (Terminal, {"TERM": "dumb"}, False),
+        (Terminal, {}, True),
+        (Terminal, {"NO_COLOR": "1"}, False),
+        (Terminal, {"TERM": "dumb"}, False),
         (io.StringIO, {}, False),
     ],
-)  # fmt: skip
+)
 def test_colour_is_for_terminals_and_verdicts(
-    stream: type[io.StringIO], variables: dict[str, str], coloured: bool, tmp_path: Path,
+    stream: type[io.StringIO],
+    variables: dict[str, str],
+    coloured: bool,
+    tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
-) -> None:  # fmt: skip
+) -> None:
     for name in ("NO_COLOR", "TERM"):
         monkeypatch.delenv(name, raising=False)
     for name, value in variables.items():

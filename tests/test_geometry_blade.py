@@ -21,9 +21,11 @@ from geometry.rotor import Rotor
 
 INCH = 0.0254
 PITCH = {
-    "helix": {"pitch": 0.127}, "linear_twist": {"beta_root": 0.6, "beta_tip": 0.2}, "constant_beta": {"beta": 0.14},
+    "helix": {"pitch": 0.127},
+    "linear_twist": {"beta_root": 0.6, "beta_tip": 0.2},
+    "constant_beta": {"beta": 0.14},
     "tip_relieved": {"pitch": 0.127},
-}  # fmt: skip
+}
 chord_laws = pytest.mark.parametrize("law", CHORD_LAWS)
 pitch_laws = pytest.mark.parametrize("law", PITCH_LAWS)
 
@@ -47,7 +49,7 @@ def test_every_pitch_law_is_covered_here() -> None:
 @settings(max_examples=200, deadline=None)
 @given(
     st.floats(0.01, 50), st.floats(0.01, 0.9), st.integers(1, 300), st.sampled_from(["uniform", "cosine"]), st.randoms()
-)  # fmt: skip
+)
 def test_widths_add_up_exactly_in_any_order(D: float, hub: float, n: int, spacing: str, random: Random) -> None:
     blade = from_laws(D, "constant", "constant_beta", hub, pitch={"beta": 0.2}, n=5)
     r, dr, chord, beta = blade.midpoints(n, spacing)
@@ -303,15 +305,17 @@ def test_all_faults_at_once() -> None:
         ({"r": [-0.01, 0.05, 0.1]}, "r: got -0.01 m; expected radii of 0 or more."),
         ({"r": ["a", 0.05, 0.1]}, "r: got ['a', 0.05, 0.1]; expected numbers."),
         ({"r": [0.1]}, "r: got an array of shape (1,); expected two stations or more."),
-        ({"chord": [10, 12, 8]}, "chord[1]: got 12 m; expected up to five tip radii (0.5 m). Given in millimetres or "
-         "inches?"),
+        (
+            {"chord": [10, 12, 8]},
+            "chord[1]: got 12 m; expected up to five tip radii (0.5 m). Given in millimetres or inches?",
+        ),
         ({"chord": [0.01, math.inf, 0.01]}, "chord[1]: got inf; expected a finite number."),
         ({"beta": [0.5, 0.4, -1.58]}, "beta[2]: got -1.58 rad; expected radians from -pi/2 to pi/2."),
         ({"R": math.nan}, "R: got nan m; expected a positive tip radius in metres."),
         ({"R": 101.6}, "R: got 101.6 m; expected a tip radius in metres, up to 100 m. Given in millimetres or inches?"),
         ({"Rhub": -0.01}, "Rhub: got -0.01 m; expected a hub radius from 0 to below R = 0.1 m."),
     ],
-)  # fmt: skip
+)
 def test_single_faults(change: dict[str, object], message: str) -> None:
     good: dict[str, object] = {"r": [0.02, 0.05, 0.1], "chord": [0.01] * 3, "beta": [0.5, 0.4, 0.3], "R": 0.1}
     good["Rhub"] = 0.01

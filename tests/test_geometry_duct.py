@@ -44,9 +44,14 @@ ducts = st.builds(
     lambda k, length, lip, cone, te, x, aspect: Duct(
         k, length * k, lip * k, 0.01 * k, cone * k, 0.1 * k, x * length * k, lip_aspect=aspect, te_thickness=te * k
     ),
-    st.floats(0.01, 2), st.floats(0.6, 5), st.just(0.0) | st.floats(0.005, 0.25), st.floats(0.5, 1.6),
-    st.floats(0.001, 0.2), st.floats(0.1, 0.9), st.floats(0.3, 2.0),
-)  # fmt: skip
+    st.floats(0.01, 2),
+    st.floats(0.6, 5),
+    st.just(0.0) | st.floats(0.005, 0.25),
+    st.floats(0.5, 1.6),
+    st.floats(0.001, 0.2),
+    st.floats(0.1, 0.9),
+    st.floats(0.3, 2.0),
+)
 
 
 @settings(max_examples=100, deadline=None)

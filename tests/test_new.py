@@ -76,20 +76,27 @@ def test_what_a_short_case_states_is_no_assumption(here: Path) -> None:
     case = load_case("case.toml")
     assert case.hub_diameter_m == 0.03 and case.air().rho < 1.18
     assert {a.key: a.values for a in case.assumptions} == {
-        "blade.max_chord_over_R": (0.19, 0.20), "blade.beta_offset_deg": (0.0, 1.4)}  # fmt: skip
+        "blade.max_chord_over_R": (0.19, 0.20),
+        "blade.beta_offset_deg": (0.0, 1.4),
+    }
 
 
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["10by5"], "LABEL"), ([], "LABEL, --stations"), (["10x5", "--kv", "900"], "--cells together"),
+        (["10by5"], "LABEL"),
+        ([], "LABEL, --stations"),
+        (["10x5", "--kv", "900"], "--cells together"),
         (["--stations", "blade.csv"], "--diameter-mm"),
         (["--stations", "absent.csv", "--diameter-mm", "254"], "absent"),
-        (["--stations", "blade.csv", "--diameter-mm", "0.254"], "Times 1000"), (["seventy", "--fan"], "70mm"),
-        (["mine", "--scan", "absent.stl"], "absent.stl"), (["mine", "--scan", "blade.csv"], "a solid"),
-        (["10x5", "--unit", "mm"], "--scan"), (["mine", "--scan", "a.stl", "--blades", "2"], "--blades"),
+        (["--stations", "blade.csv", "--diameter-mm", "0.254"], "Times 1000"),
+        (["seventy", "--fan"], "70mm"),
+        (["mine", "--scan", "absent.stl"], "absent.stl"),
+        (["mine", "--scan", "blade.csv"], "a solid"),
+        (["10x5", "--unit", "mm"], "--scan"),
+        (["mine", "--scan", "a.stl", "--blades", "2"], "--blades"),
     ],
-)  # fmt: skip
+)
 def test_what_is_no_propeller_is_refused_and_nothing_is_written(
     words: list[str], said: str, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -535,8 +535,11 @@ def _stray_hint(name: str, owner: type[Table], root: type[Table]) -> str:
     if same:
         return f"State the unit in the name: {' or '.join(same)}"
     tables = dict(_tables(root))
-    homes = [where for where, other in tables.items()
-             if other is not owner and name in other.named() and other.inner(name) is None]  # fmt: skip
+    homes = [
+        where
+        for where, other in tables.items()
+        if other is not owner and name in other.named() and other.inner(name) is None
+    ]
     if homes and owner in tables.values() and not name.startswith("_"):
         home = f"[{homes[0]}]" if homes[0] else "the top of the file"
         return f"{name} belongs in {home}"

@@ -110,9 +110,14 @@ thickness = 0.09
 
 
 def stations_text(
-    file: str, diameter_m: float, blades: int, rpm: float | None = None, airspeed_m_s: float = 0.0,
-    hub_ratio: float = 0.15, key: str = "stations",
-) -> str:  # fmt: skip
+    file: str,
+    diameter_m: float,
+    blades: int,
+    rpm: float | None = None,
+    airspeed_m_s: float = 0.0,
+    hub_ratio: float = 0.15,
+    key: str = "stations",
+) -> str:
     """Write the case of a blade whose chord and angle stand in a file beside it."""
     return f"""# A propeller with the stations of {file}. What is not known is an assumption with its range.
 schema = "bemt.case/1"
@@ -142,9 +147,14 @@ def fan_text(
     P = pitch_in or 1.45 * D
     mm = 1e3 * diameter_m
     ranges = FAN_RANGES.format(
-        blades=B, blades_low=max(B - 2, 2), blades_high=B + 2, pitch_low=0.85 * P, pitch_high=1.15 * P,
-        gap_low=3e-3 * mm, gap_high=1e-2 * mm,
-    )  # fmt: skip
+        blades=B,
+        blades_low=max(B - 2, 2),
+        blades_high=B + 2,
+        pitch_low=0.85 * P,
+        pitch_high=1.15 * P,
+        gap_low=3e-3 * mm,
+        gap_high=1e-2 * mm,
+    )
     if blades:  # counted: no assumption
         ranges = "\n[[assumptions]]" + ranges.split("[[assumptions]]", 2)[2]
     told = _rpm(diameter_m, rpm, 180.0)

@@ -66,8 +66,10 @@ def case_files(
     """Write the found rotor as a case."""
     x = found.r / found.R
     files: dict[str, str] = {}
-    rows = [[f"{a:.6f}", f"{b:.6f}", f"{c:.5f}"] for a, b, c in
-            zip(x, found.chord / found.R, np.degrees(found.beta), strict=True)]  # fmt: skip
+    rows = [
+        [f"{a:.6f}", f"{b:.6f}", f"{c:.5f}"]
+        for a, b, c in zip(x, found.chord / found.R, np.degrees(found.beta), strict=True)
+    ]
     files["stations.csv"] = _csv("r_over_R,chord_over_R,beta_deg", rows)
     files["sections.csv"] = _csv(
         "r_m,chord_m,beta_deg,thickness,camber,camber_position",
@@ -145,8 +147,10 @@ def text(found: FoundRotor, scale: float, path: Path, words: str, out: str | Non
             zip(found.r / found.R, found.r * scale * 1e3, found.chord * scale * 1e3, np.degrees(found.beta),
                 100 * found.thickness, 100 * found.camber, strict=True)]  # fmt: skip
     hand = "right" if found.rotation > 0 else "left"
-    head = (f"{path.name}: {found.B} blades, {hand}-hand, diameter {number_text(2e3 * found.R * scale, 5)} mm, hub "
-            f"{number_text(2e3 * found.Rhub * scale)} mm ({words})")  # fmt: skip
+    head = (
+        f"{path.name}: {found.B} blades, {hand}-hand, diameter {number_text(2e3 * found.R * scale, 5)} mm, hub "
+        f"{number_text(2e3 * found.Rhub * scale)} mm ({words})"
+    )
     axis = ", ".join(f"{v + 0.0:.4f}" for v in found.axis)
     lines = [head, f"thrust along ({axis})", *(f"note: {note}" for note in found.notes)]
     lines.append(text_table(["r/R", "r mm", "chord mm", "beta deg", "t/c %", "camber %"], rows, left=()).rstrip())

@@ -177,8 +177,11 @@ def _check_section(out: Collector, section: SectionTable) -> None:
     for key in ("camber", "camber_position"):
         if key in stated and "thickness" not in stated:
             value = stated[key]
-            out.add(f"blade.section.{key}", shown(list(value) if isinstance(value, tuple) else value),
-                    "nothing without thickness")  # fmt: skip
+            out.add(
+                f"blade.section.{key}",
+                shown(list(value) if isinstance(value, tuple) else value),
+                "nothing without thickness",
+            )
 
 
 def _check_duct(out: Collector, case: CaseFile) -> None:
@@ -202,8 +205,12 @@ def _check_sweep(out: Collector, case: CaseFile) -> None:
         other = "altitude_m" if "altitude_m" in sweep else "temperature_C"
         out.add("sweep.density_kg_m3", f"an axis beside {other}", f"density_kg_m3 or {other}, not both")
     if "temperature_C" in sweep and case.air.density_kg_m3 is not None and "altitude_m" not in sweep:
-        out.add("sweep.temperature_C", "an axis with air.density_kg_m3", "air.altitude_m or air.pressure_hPa",
-                "Temperature changes nothing when the density is fixed")  # fmt: skip
+        out.add(
+            "sweep.temperature_C",
+            "an axis with air.density_kg_m3",
+            "air.altitude_m or air.pressure_hPa",
+            "Temperature changes nothing when the density is fixed",
+        )
     if "pitch_in" in sweep and case.blade.chord_law is None:
         out.add("sweep.pitch_in", "an axis", "nothing, because the blade comes from stations")
     if "tip_gap_mm" in sweep and case.duct is None:

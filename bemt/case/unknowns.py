@@ -38,15 +38,25 @@ LABEL = (
 )  # fmt: skip
 THICKNESS = Unknown("blade.section.thickness", 0.09, 0.06, 0.12, "section not known")
 SECTION = (
-    Unknown("blade.section.camber", 0.035, 0.02, 0.05,
-            "section not known; measured families of propellers have 3 to 5 %, slow flyers more"),
+    Unknown(
+        "blade.section.camber",
+        0.035,
+        0.02,
+        0.05,
+        "section not known; measured families of propellers have 3 to 5 %, slow flyers more",
+    ),
     THICKNESS,
-)  # fmt: skip
+)
 SURFACE = (
     Unknown("model.n_crit", N_CRIT, 1.0, 5.0, "transition not known; 3 is the rule for disturbed flow"),
-    Unknown("model.drag_level", DRAG_LEVEL, 1.0, 1.2,
-            "surface not known; smooth (1.0) to twice the excess of moulded blades (1.1)"),
-)  # fmt: skip
+    Unknown(
+        "model.drag_level",
+        DRAG_LEVEL,
+        1.0,
+        1.2,
+        "surface not known; smooth (1.0) to twice the excess of moulded blades (1.1)",
+    ),
+)
 AIR = Unknown("air.density_kg_m3", 1.225, 1.16, 1.29, "air not stated; 30 to 0 C at sea level")
 FAN = (
     Unknown("rotor.hub_ratio", 0.37, 0.30, 0.45, "hub not known; hubs of ducted fans"),

@@ -124,8 +124,12 @@ def build_parser() -> argparse.ArgumentParser:
     parser.found, parser.parsers = commands(), {}
     for name, module in parser.found.items():
         # a percent sign in help is argparse's own
-        one = adder.add_parser(name, help=module.HELP, description=f"{module.HELP[0].upper()}{module.HELP[1:]}.",
-                               epilog=f"example: {parser.prog} {module.EXAMPLE}")  # fmt: skip
+        one = adder.add_parser(
+            name,
+            help=module.HELP,
+            description=f"{module.HELP[0].upper()}{module.HELP[1:]}.",
+            epilog=f"example: {parser.prog} {module.EXAMPLE}",
+        )
         module.arguments(one)
         parser.parsers[name] = one
     return parser

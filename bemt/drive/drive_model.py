@@ -283,9 +283,10 @@ class Drive:
         speed at no load.
         """
         pulse, charge, warm = np.broadcast_arrays(
-            np.atleast_1d(np.asarray(pulse_us, dtype=float)), np.asarray(soc, dtype=float),
+            np.atleast_1d(np.asarray(pulse_us, dtype=float)),
+            np.asarray(soc, dtype=float),
             np.asarray(self.motor.ambient_C if temperature_C is None else temperature_C, dtype=float),
-        )  # fmt: skip
+        )
         voc, duty = self.battery.voc(charge), self.esc.duty(pulse)
         k = self.motor.k(warm)
 

@@ -144,6 +144,8 @@ def join(parts: Sequence[MapPoints]) -> MapPoints:
     return MapPoints(
         np.concatenate([p.pulse_us for p in parts]),
         {key: np.concatenate([p.values[key] for p in parts]) for key in keys},
-        np.concatenate([p.weight for p in parts]), np.concatenate([p.run for p in parts]),
-        notes, any(p.ramp for p in parts),
-    )  # fmt: skip
+        np.concatenate([p.weight for p in parts]),
+        np.concatenate([p.run for p in parts]),
+        notes,
+        any(p.ramp for p in parts),
+    )

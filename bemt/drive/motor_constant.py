@@ -166,8 +166,9 @@ class Line:
     def scaled(self, factor: float) -> Line:
         """The line with its slope in another unit."""
         to = np.diag([factor, 1.0])
-        return Line(self.slope * factor, self.intercept, to @ self.cov @ to, self.slopes * factor, self.intercepts,
-                    self.names)  # fmt: skip
+        return Line(
+            self.slope * factor, self.intercept, to @ self.cov @ to, self.slopes * factor, self.intercepts, self.names
+        )
 
 
 def _widened(n: int, parameters: int) -> float:
@@ -251,8 +252,12 @@ def fit_waveform(time_s: ArrayLike, volts: ArrayLike) -> Waveform:
         return c, v - basis @ c
 
     span = 0.5 / t[-1]
-    best = minimize_scalar(lambda f: float(np.sum(solve(f)[1] ** 2)), bounds=(max(coarse - span, 0.1 * coarse),
-                           coarse + span), method="bounded", options={"xatol": 1e-9 * coarse})  # fmt: skip
+    best = minimize_scalar(
+        lambda f: float(np.sum(solve(f)[1] ** 2)),
+        bounds=(max(coarse - span, 0.1 * coarse), coarse + span),
+        method="bounded",
+        options={"xatol": 1e-9 * coarse},
+    )
     f = float(best.x)
     c, rest = solve(f)
     sizes = [math.hypot(c[1 + 2 * k], c[2 + 2 * k]) for k in range(3)]

@@ -34,9 +34,13 @@ METHODS = ("data_sheet", "back_emf", "torque")
 ALPHA = 0.001
 """Probability at which agreement is rejected."""
 FACTORS = {
-    "sqrt(3/2)": math.sqrt(1.5), "sqrt(3)": math.sqrt(3.0), "2": 2.0,
-    "1/sqrt(3/2)": 1.0 / math.sqrt(1.5), "1/sqrt(3)": 1.0 / math.sqrt(3.0), "1/2": 0.5,
-}  # fmt: skip
+    "sqrt(3/2)": math.sqrt(1.5),
+    "sqrt(3)": math.sqrt(3.0),
+    "2": 2.0,
+    "1/sqrt(3/2)": 1.0 / math.sqrt(1.5),
+    "1/sqrt(3)": 1.0 / math.sqrt(3.0),
+    "1/2": 0.5,
+}
 """Convention factors: what a method's value may be too large by."""
 NEAR = 6.0
 """Difference of the criterion below which two explanations are not told apart."""

@@ -72,8 +72,9 @@ class TorqueTable(Table):
     """[torque]: trials with a torque sensor that drives a current loop."""
 
     file: str = entry("columns trial, one in A, one in V", required=True)
-    shunt_ohm: float = entry("resistance that turns the loop's current into the column in V", "ohm", 0.01, 1e5,
-                             required=True)  # fmt: skip
+    shunt_ohm: float = entry(
+        "resistance that turns the loop's current into the column in V", "ohm", 0.01, 1e5, required=True
+    )
     u_shunt_pct: float = entry("its standard uncertainty", _PCT, default=0.0)
     low_mA: float = entry("current at torque_low_Nm", "mA", 0.0, 100.0, default=4.0)
     high_mA: float = entry("current at torque_high_Nm", "mA", 0.1, 100.0, default=20.0)
@@ -181,8 +182,10 @@ def read(path: str | Path) -> MotorTrials:
     where = "a winding" if result.between == "phase" else "a line"
     convention = f"torque per {result.current.replace('_', ' ')} current in {where}, {winding}"
     stated = {item.name: item.Kt_Nm_A for item in made.stated}
-    names = [*((emf_table.file, *(emf_table.waveforms or ())) if emf_table else ()),
-             torque_table.file if torque_table else None]  # fmt: skip
+    names = [
+        *((emf_table.file, *(emf_table.waveforms or ())) if emf_table else ()),
+        torque_table.file if torque_table else None,
+    ]
     to_kt = mc.ke_to_kt(1.0, result.current, result.between, winding)
     files = (file, *(file.parent / name for name in names if name))
     return MotorTrials(motor.name, motor.data, measured, to_kt, convention, stated, tuple(notes), files)

@@ -117,11 +117,13 @@ def _drive_text(case: Case, kv: float, cells: int) -> str:
     given = from_label.estimate(case, kv, cells).given
     typical = "not known: typical of measured motors under a propeller; take it from the motor's sheet"
     assumed = {
-        "motor.resistance_mohm": typical, "motor.no_load_A": typical,
+        "motor.resistance_mohm": typical,
+        "motor.no_load_A": typical,
         "motor.inertia_kg_mm2": "not known; it only decides how fast thrust follows the throttle",
         "rotor.inertia_kg_mm2": "not known; blades of plastic, 0.06 kg per m2 of diameter squared",
-        "battery.capacity_Ah": "yours?", "battery.resistance_mohm": "not known: 6 % of the voltage at full throttle",
-    }  # fmt: skip
+        "battery.capacity_Ah": "yours?",
+        "battery.resistance_mohm": "not known: 6 % of the voltage at full throttle",
+    }
     # two slender blades: m R^2 / 3, their mass nearer to the hub than that: a third of it
     inertia = 0.06 * case.diameter_m**2 * (0.5 * case.diameter_m) ** 2 / 9.0 * 1e6 * case.file.rotor.blades
     rows = "".join(f'\n[[assumed]]\nkey = "{key}"\nwhy = "{text}"\n' for key, text in assumed.items())
@@ -153,9 +155,14 @@ inertia_kg_mm2 = {inertia:.3g}
 
 
 def estimate_of(
-    what: str | None, kv: float | None, cells: int | None, mass_kg: float | None = None, rotors: int = 1,
-    capacity_Ah: float | None = None, airspeed_m_s: float = 0.0,
-) -> from_label.DriveEstimate:  # fmt: skip
+    what: str | None,
+    kv: float | None,
+    cells: int | None,
+    mass_kg: float | None = None,
+    rotors: int = 1,
+    capacity_Ah: float | None = None,
+    airspeed_m_s: float = 0.0,
+) -> from_label.DriveEstimate:
     """Estimate of a label, or of a case, as the command line names it."""
     faults = []
     if what is None:

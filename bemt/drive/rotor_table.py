@@ -73,9 +73,13 @@ class RotorMap:
 
 
 def from_coefficients(
-    CT: float, CQ: float, diameter_m: float, rho: float = 1.225, inertia_kg_m2: float = 0.0,
+    CT: float,
+    CQ: float,
+    diameter_m: float,
+    rho: float = 1.225,
+    inertia_kg_m2: float = 0.0,
     solidity: float | None = None,
-) -> RotorMap:  # fmt: skip
+) -> RotorMap:
     """Rotor with constant coefficients.
 
     Notes
@@ -89,9 +93,13 @@ def from_coefficients(
 
 
 def quadratic(
-    kT: float, kQ: float, diameter_m: float, rho: float = 1.225, inertia_kg_m2: float = 0.0,
+    kT: float,
+    kQ: float,
+    diameter_m: float,
+    rho: float = 1.225,
+    inertia_kg_m2: float = 0.0,
     solidity: float | None = None,
-) -> RotorMap:  # fmt: skip
+) -> RotorMap:
     """Rotor whose loads go with the square of the speed."""
     R, A = 0.5 * diameter_m, math.pi * diameter_m**2 / 4.0
     slope = None if solidity is None else (lambda w: -0.25 * rho * solidity * 5.7 * A * R * w)
@@ -99,9 +107,13 @@ def quadratic(
 
 
 def from_case(
-    case: Case, rpm_max: float, airspeed_m_s: float = 0.0, air: Air | None = None, inertia_kg_m2: float = 0.0,
+    case: Case,
+    rpm_max: float,
+    airspeed_m_s: float = 0.0,
+    air: Air | None = None,
+    inertia_kg_m2: float = 0.0,
     points: int = 33,
-) -> RotorMap:  # fmt: skip
+) -> RotorMap:
     """Rotor of a case by BEMT."""
     from scipy.interpolate import PchipInterpolator
 

@@ -89,9 +89,7 @@ def effectiveness(thrusters: Sequence[Thruster]) -> Array:
     return np.vstack([c, y * c - z * s])
 
 
-def allocate(
-    thrusters: Sequence[Thruster], force_N: float, moment_Nm: float, priority: str = "moment"
-) -> Allocation:  # fmt: skip
+def allocate(thrusters: Sequence[Thruster], force_N: float, moment_Nm: float, priority: str = "moment") -> Allocation:
     """Share a command among thrusters.
 
     Examples
@@ -104,8 +102,11 @@ def allocate(
     from scipy.optimize import linprog, lsq_linear
 
     faults = [] if thrusters else [Fault("", "thrusters", "none", "one or more")]
-    faults += [Fault("", t.name or f"thruster {i + 1}", f"{t.thrust_min_N:g} to {t.thrust_max_N:g} N", "min below max")
-               for i, t in enumerate(thrusters) if not t.thrust_min_N < t.thrust_max_N]  # fmt: skip
+    faults += [
+        Fault("", t.name or f"thruster {i + 1}", f"{t.thrust_min_N:g} to {t.thrust_max_N:g} N", "min below max")
+        for i, t in enumerate(thrusters)
+        if not t.thrust_min_N < t.thrust_max_N
+    ]
     wishes = {"force_N": force_N, "moment_Nm": moment_Nm}
     faults += [Fault("", name, f"{v}", "a finite number") for name, v in wishes.items() if not math.isfinite(v)]
     if priority not in ("moment", "force"):

@@ -78,9 +78,11 @@ def share(
     path: str, wanted_N: float | None = None, wanted_Nm: float | None = None, out: str | None = None
 ) -> tuple[dict[str, Any], str, bool]:
     """Allocate what is wanted (by the file, unless said): ``bemt.thrusters.result/1``, its text, whether it is met."""
-    wrong = [Fault("", option, f"{value:g}", f"a number from {-MOST:g} to {MOST:g} {unit}")
-             for option, value, unit in (("--force", wanted_N, "N"), ("--moment", wanted_Nm, "N m"))
-             if value is not None and not -MOST <= value <= MOST]  # fmt: skip
+    wrong = [
+        Fault("", option, f"{value:g}", f"a number from {-MOST:g} to {MOST:g} {unit}")
+        for option, value, unit in (("--force", wanted_N, "N"), ("--moment", wanted_Nm, "N m"))
+        if value is not None and not -MOST <= value <= MOST
+    ]
     try:
         file = read_model(ThrustersFile, _toml(Path(path)))
     except InputError as error:
@@ -99,16 +101,24 @@ def share(
     most = max(t.thrust_max_N for t in thrusters)
     assert file.mounting.distance_m is not None
     distance = axis_values(file.mounting.distance_m)
-    rows = [{"distance_m": float(d), "moment_one_Nm": float(moment_at(d, most)),
-             "moment_one_kgf_m": float(moment_at(d, most)) / KGF,
-             "moment_at_force_Nm": float(moment_at(d, most, force)) if force > 0.0 else math.nan}
-            for d in distance]  # fmt: skip
+    rows = [
+        {
+            "distance_m": float(d),
+            "moment_one_Nm": float(moment_at(d, most)),
+            "moment_one_kgf_m": float(moment_at(d, most)) / KGF,
+            "moment_at_force_Nm": float(moment_at(d, most, force)) if force > 0.0 else math.nan,
+        }
+        for d in distance
+    ]
     document = {
-        "schema": "bemt.thrusters.result/1", "body": file.body.name, "thrusters": [vars(t) for t in thrusters],
+        "schema": "bemt.thrusters.result/1",
+        "body": file.body.name,
+        "thrusters": [vars(t) for t in thrusters],
         "command": {"force_N": force, "moment_Nm": moment, "priority": priority},
         "allocation": {f.name: getattr(got, f.name) for f in dataclasses.fields(Allocation)},
-        "attainable": corners, "mounting": rows,
-    }  # fmt: skip
+        "attainable": corners,
+        "mounting": rows,
+    }
     if out:
         folder = Path(out)
         outputs.check("--out", folder, RESULTS, [_toml(Path(path))])
@@ -124,12 +134,16 @@ def _toml(path: Path) -> Path:
 
 
 def _text(body: BodyTable, thrusters: list[Thruster], got: Allocation, rows: list[dict[str, float]]) -> str:
-    table = [[t.name, number_text(t.y_m), number_text(t.thrust_max_N), number_text(float(v)), "at limit" if s else ""]
-             for t, v, s in zip(thrusters, got.thrust_N, got.saturated, strict=True)]  # fmt: skip
+    table = [
+        [t.name, number_text(t.y_m), number_text(t.thrust_max_N), number_text(float(v)), "at limit" if s else ""]
+        for t, v, s in zip(thrusters, got.thrust_N, got.saturated, strict=True)
+    ]
     lines = [body.name, text_table(["thruster", "y [m]", "limit [N]", "thrust [N]", ""], table, left=(0, 4))]
     words = "met" if got.met else "beyond the thrusters"
-    lines.append(f"wanted {got.wanted_force_N:g} N and {got.wanted_moment_Nm:g} N m: {words}; "
-                 f"given {number_text(got.force_N)} N and {number_text(got.moment_Nm)} N m")  # fmt: skip
+    lines.append(
+        f"wanted {got.wanted_force_N:g} N and {got.wanted_moment_Nm:g} N m: {words}; "
+        f"given {number_text(got.force_N)} N and {number_text(got.moment_Nm)} N m"
+    )
     if body.mass_kg is not None:
         total, weight = sum(t.thrust_max_N * math.cos(t.cant_rad) for t in thrusters), body.mass_kg * KGF
         lines.append(f"all together {total:.1f} N on a weight of {weight:.1f} N: {total / weight:.2f}")

@@ -57,9 +57,14 @@ class History:
 
 
 def simulate(
-    drive: Drive, steps: Sequence[tuple[float, float]], end_s: float, times_s: ArrayLike | None = None,
-    soc: float = 1.0, temperature_C: float | None = None, omega0: float | None = None,
-) -> History:  # fmt: skip
+    drive: Drive,
+    steps: Sequence[tuple[float, float]],
+    end_s: float,
+    times_s: ArrayLike | None = None,
+    soc: float = 1.0,
+    temperature_C: float | None = None,
+    omega0: float | None = None,
+) -> History:
     """Integrate the drive through steps of the command."""
     from scipy.integrate import solve_ivp
 

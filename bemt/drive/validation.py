@@ -135,9 +135,8 @@ def step_drive(
 
 
 def check_steps(
-    voltage_V: float, levels: tuple[Array, Array], steps: Sequence[Step], u_level: float = 0.02,
-    u_tau: float = 0.1,
-) -> tuple[list[StepCheck], Drive]:  # fmt: skip
+    voltage_V: float, levels: tuple[Array, Array], steps: Sequence[Step], u_level: float = 0.02, u_tau: float = 0.1
+) -> tuple[list[StepCheck], Drive]:
     """Fit drop, reactance, inertia and brake force to levels and steps of logs, and compare the time constants."""
     from scipy.optimize import least_squares
     from scipy.special import expit
@@ -162,8 +161,10 @@ def check_steps(
         k, ohm = drive.motor.k(), drive.motor.resistance_ohm
         ohms = ohm + (drive.motor.reactance_ohm_s * omega) ** 2 / ohm
         duty = (k * omega + ohms * drive.rotor.torque(omega) / k) / voltage_V
-        gaps = [np.log(m / seen[i].tau_s) / np.hypot(u_tau, seen[i].u_tau_s / seen[i].tau_s)
-                for i, m in zip(held, constants(drive), strict=True)]  # fmt: skip
+        gaps = [
+            np.log(m / seen[i].tau_s) / np.hypot(u_tau, seen[i].u_tau_s / seen[i].tau_s)
+            for i, m in zip(held, constants(drive), strict=True)
+        ]
         return np.concatenate([(duty - drive.esc.duty(pulse)) / u_level, gaps])
 
     start = np.append(np.log([1.05 * float(np.max(thrust)), 0.5, 1.0, 4e-6]), 1.0)

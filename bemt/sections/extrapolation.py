@@ -112,9 +112,14 @@ class ExtrapolatedTable:
 
 
 def from_tables(
-    tables: Sequence[ExtrapolatedTable], *, name: str = "", source: str = "", ar: float = 10.0,
-    cd_max: float | None = None, notes: Sequence[str] = (),
-) -> Polar:  # fmt: skip
+    tables: Sequence[ExtrapolatedTable],
+    *,
+    name: str = "",
+    source: str = "",
+    ar: float = 10.0,
+    cd_max: float | None = None,
+    notes: Sequence[str] = (),
+) -> Polar:
     """Polar from single-Re tables, each continued to +-180 deg where its data stop."""
     top = viterna_cd_max(ar) if cd_max is None else float(cd_max)
     re, mach = (np.unique([getattr(t, k) for t in tables]) for k in ("Re", "M"))

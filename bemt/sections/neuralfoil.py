@@ -115,9 +115,14 @@ def _make_neuralfoil(airfoil: Airfoil, wanted: Array, settings: dict[str, Any]) 
     raw_deg = np.arange(-2 * reach, 2 * reach + 1) / 2.0
     a, r = np.meshgrid(raw_deg, np.append(re, RE_REFERENCE), indexing="ij")
     aero = nf.get_aero_from_coordinates(
-        np.column_stack([airfoil.x, airfoil.y]), a.ravel(), r.ravel(), n_crit=settings["n_crit"],
-        xtr_upper=settings["xtr"][0], xtr_lower=settings["xtr"][1], model_size=settings["model"],
-    )  # fmt: skip
+        np.column_stack([airfoil.x, airfoil.y]),
+        a.ravel(),
+        r.ravel(),
+        n_crit=settings["n_crit"],
+        xtr_upper=settings["xtr"][0],
+        xtr_lower=settings["xtr"][1],
+        model_size=settings["model"],
+    )
     cl, cd, conf = (np.asarray(aero[k], dtype=float).reshape(a.shape) for k in ("CL", "CD", "analysis_confidence"))
     if settings["lift_floor"] > 0.0:
         up, down, keep = np.maximum(cl[:, -1:], 0.0), np.minimum(cl[:, -1:], 0.0), settings["lift_floor"]
