@@ -274,11 +274,19 @@ def _check_stations(r: Array, R: float, faults: Faults) -> None:
 
 
 def from_stations(
-    r: ArrayLike, chord: ArrayLike, beta: ArrayLike, R: float, Rhub: float,
-    anchors: Airfoil | Sequence[tuple[float, Airfoil]] | None = None, *,
-    sweep: ArrayLike | None = None, rake: ArrayLike | None = None, axis: float = 0.25, interpolation: str = "pchip",
+    r: ArrayLike,
+    chord: ArrayLike,
+    beta: ArrayLike,
+    R: float,
+    Rhub: float,
+    anchors: Airfoil | Sequence[tuple[float, Airfoil]] | None = None,
+    *,
+    sweep: ArrayLike | None = None,
+    rake: ArrayLike | None = None,
+    axis: float = 0.25,
+    interpolation: str = "pchip",
     name: str = "",
-) -> Blade:  # fmt: skip
+) -> Blade:
     """Make a blade from tabulated stations.
 
     Examples

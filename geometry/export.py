@@ -36,9 +36,15 @@ READ_TOLERANCE = 2e-6  # of the size of the part, when CAD surfaces are meshed
 
 
 def export(
-    rotor: Rotor, duct: Duct | None, out: Path, formats: Sequence[str], *, name: str = "rotor", unit: str = "mm",
+    rotor: Rotor,
+    duct: Duct | None,
+    out: Path,
+    formats: Sequence[str],
+    *,
+    name: str = "rotor",
+    unit: str = "mm",
     options: Options | None = None,
-) -> dict[str, Any]:  # fmt: skip
+) -> dict[str, Any]:
     """Write the solids of a rotor and its duct."""
     faults = Faults()
     for word in formats:

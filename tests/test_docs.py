@@ -328,15 +328,9 @@ def test_the_page_of_files_holds_every_key(project: Path, maker: ModuleType) -> 
     assert sum(map(len, written.values())) > 150
 
 
-def test_the_examples_of_files_are_sound(project: Path, maker: ModuleType) -> None:
-    for name, (model, _) in maker.FILES.items():
-        text = (project / "docs" / "files" / f"{name}.toml").read_text(encoding="utf-8")
-        document = tomllib.loads(text)
-        if name == "case":
-            assert len(text.splitlines()) == 6
-            assert case_of(text).assumptions
-        else:
-            assert model.model_validate(document)
+def test_the_shortest_case_has_six_lines(project: Path) -> None:
+    text = (project / "docs" / "files" / "case.toml").read_text(encoding="utf-8")
+    assert len(text.splitlines()) == 6 and case_of(text).assumptions
 
 
 def test_the_gallery_shows_the_shipped_cases(project: Path, maker: ModuleType) -> None:

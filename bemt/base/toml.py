@@ -151,7 +151,7 @@ def entry(
 class Table(BaseModel):
     """A TOML table with typed keys; frozen, unknown keys refused. Fields are declared by :func:`entry`."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+    model_config = ConfigDict(extra="forbid", frozen=True)
 
     @model_validator(mode="after")
     def _ruled(self) -> Self:

@@ -120,9 +120,15 @@ class StepCheck:
 
 
 def step_drive(
-    voltage_V: float, full_thrust_N: float, drop: float, skew: float, inertia_kg_m2: float = 0.0,
-    diameter_m: float = 0.127, tip_m_s: float = 170.0, brake_on_stop: float = 1.0,
-) -> Drive:  # fmt: skip
+    voltage_V: float,
+    full_thrust_N: float,
+    drop: float,
+    skew: float,
+    inertia_kg_m2: float = 0.0,
+    diameter_m: float = 0.127,
+    tip_m_s: float = 170.0,
+    brake_on_stop: float = 1.0,
+) -> Drive:
     """Drive of logs that state neither motor nor propeller, by what their thrust over duty says of it."""
     omega = tip_m_s / (0.5 * diameter_m)
     kT = full_thrust_N / omega**2

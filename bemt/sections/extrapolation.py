@@ -49,9 +49,17 @@ def _viterna(a: Array, a_s: float, cl_s: float, cd_s: float, cd_max: float, meth
 
 
 def extend(
-    alpha: Array, cl: Array, cd: Array, *, lo: float, hi: float, cd_max: float, out: Array = ALPHA_GRID,
-    half: float = 0.0, method: str = "viterna",
-) -> tuple[Array, Array]:  # fmt: skip
+    alpha: Array,
+    cl: Array,
+    cd: Array,
+    *,
+    lo: float,
+    hi: float,
+    cd_max: float,
+    out: Array = ALPHA_GRID,
+    half: float = 0.0,
+    method: str = "viterna",
+) -> tuple[Array, Array]:
     """One section's cl and cd continued to +-pi: data between lo and hi, Viterna-Corrigan and reversed flow outside.
     [-]
 

@@ -68,10 +68,19 @@ def neuralfoil_polar(airfoil: Airfoil, n_crit: float = rule.N_CRIT, drag_level: 
 
 
 def tunnel_polar(
-    airfoil: Airfoil, *, re: Array = DEFAULT_RE, n_crit: float = 9.0, xtr_upper: float = 1.0,
-    xtr_lower: float = 1.0, model: str = "xlarge", ar: float = 10.0, cd_max: float | None = None,
-    method: str = "viterna", past_stall: float = np.pi, lift_floor: float = 0.5,
-) -> Polar:  # fmt: skip
+    airfoil: Airfoil,
+    *,
+    re: Array = DEFAULT_RE,
+    n_crit: float = 9.0,
+    xtr_upper: float = 1.0,
+    xtr_lower: float = 1.0,
+    model: str = "xlarge",
+    ar: float = 10.0,
+    cd_max: float | None = None,
+    method: str = "viterna",
+    past_stall: float = np.pi,
+    lift_floor: float = 0.5,
+) -> Polar:
     """Incompressible polar of a smooth section in a wind tunnel, continued to +-180 deg, cached on disk by content. [0]
 
     Notes
