@@ -78,9 +78,9 @@ def coloured() -> Iterator[None]:
     before = sys.stdout, sys.stderr
     try:
         if not plain and sys.stdout.isatty():
-            sys.stdout = _Painted(sys.stdout, SAID)  # type: ignore[assignment]
+            sys.stdout = _Painted(sys.stdout, SAID)
         if not plain and sys.stderr.isatty():
-            sys.stderr = _Painted(sys.stderr, REFUSED)  # type: ignore[assignment]
+            sys.stderr = _Painted(sys.stderr, REFUSED)
         yield
     finally:
         sys.stdout, sys.stderr = before
