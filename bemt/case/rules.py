@@ -125,7 +125,7 @@ def _check_blade(out: Collector, case: CaseFile) -> None:
     pitches = _given(blade, "pitch_in", "pitch_mm", "pitch_ratio")
     if blade.chord_law is not None:
         if not pitches:
-            out.add("blade", "chord_law without a pitch", "one of pitch_in, pitch_mm, pitch_ratio")
+            out.add("blade", "no pitch", "one of pitch_in, pitch_mm, pitch_ratio")
         if blade.taper is not None and blade.chord_law != "linear_taper":
             out.add("blade.taper", shown(blade.taper), "nothing, because chord_law is not linear_taper")
         if blade.tip_relief is not None and blade.pitch_law != "tip_relieved":

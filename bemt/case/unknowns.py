@@ -79,22 +79,23 @@ def completed(document: Mapping[str, Any]) -> dict[str, Any]:
     ('propeller', 0.15, 'apc_like', 1.225)
     """
     made: dict[str, Any] = copy.deepcopy(dict(document))
-    rotor, blade = made.get("rotor"), made.get("blade")
-    declared = made.get("assumptions", [])
-    if not isinstance(rotor, dict) or not isinstance(blade, dict) or not isinstance(declared, list):
-        return made
-    rotor.setdefault("kind", "fan" if "duct" in made else "propeller")
-    fan = rotor["kind"] == "fan"
+    rotor, blade, declared = made.get("rotor"), made.get("blade"), made.get("assumptions", [])
+    fan = "duct" in made
     unknowns: list[Unknown] = []
-    if not any(key in rotor for key in HUBS):
-        unknowns.append(FAN[0] if fan else HUB)
-    if not any(key in blade for key in CHORDS):
-        blade["chord_law"] = "fan" if fan else "apc_like"
-        unknowns += FAN[1:2] if fan else LABEL
-    if "section" not in blade:
-        unknowns += [*(FAN[2:] if fan else SECTION), *SURFACE]
+    if isinstance(rotor, dict):
+        fan = rotor.setdefault("kind", "fan" if fan else "propeller") == "fan"
+        if not any(key in rotor for key in HUBS):
+            unknowns.append(FAN[0] if fan else HUB)
+    if isinstance(blade, dict):
+        if not any(key in blade for key in CHORDS):
+            blade["chord_law"] = "fan" if fan else "apc_like"
+            unknowns += FAN[1:2] if fan else LABEL
+        if "section" not in blade:
+            unknowns += [*(FAN[2:] if fan else SECTION), *SURFACE]
     if "air" not in made:
         unknowns.append(AIR)
+    if not isinstance(declared, list):
+        return made
     named = {item.get("key") for item in declared if isinstance(item, dict)}
     for unknown in unknowns:
         home, _, name = unknown.key.rpartition(".")
