@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from bemt.base.errors import InputError
@@ -61,6 +61,7 @@ bodies = st.lists(st.tuples(finite, st.floats(0.5, 50.0), st.floats(-0.9, 0.4)),
 
 @settings(max_examples=60, deadline=None)
 @given(bodies, st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.sampled_from(["moment", "force"]))
+@example([(3.6e-20, 1.0, 0.0)], 0.0, 0.0, "moment")  # an arm that is rounding
 def test_any_body_stays_within_its_limits_and_meets_what_is_attainable(
     body: list[tuple[float, float, float]], f: float, m: float, priority: str
 ) -> None:

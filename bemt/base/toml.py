@@ -50,28 +50,14 @@ _NOT_EMPTY = StringConstraints(pattern=r"\S")
 
 @dataclass(frozen=True)
 class Limits:
-    """What the numbers or texts of a field may be; as metadata of the field it builds pydantic's own checks.
+    """What the numbers or texts of a field may be; as metadata of the field it builds pydantic's own checks."""
 
-    Parameters
-    ----------
-    unit : str
-        Unit, for messages.
-    low, high : float
-        Closed range of every number, in the unit of the key.
-    suspect : callable, optional
-        ``suspect(value) -> hint`` (empty when the value is plausible).
-    choices : tuple of str
-        Lawful texts, where the annotation is not a ``Literal``.
-    words : str
-        What a value must be, where type and range do not say it.
-    """
-
-    unit: str = ""
-    low: float = -math.inf
+    unit: str = ""  # for messages
+    low: float = -math.inf  # closed range of every number, in the unit of the key
     high: float = math.inf
-    suspect: Callable[[Any], str] | None = None
-    choices: tuple[str, ...] = ()
-    words: str = ""
+    suspect: Callable[[Any], str] | None = None  # hint for a value that is not plausible, else empty
+    choices: tuple[str, ...] = ()  # lawful texts, where the annotation is not a Literal
+    words: str = ""  # what a value must be, where type and range do not say it
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
         """Check every number and text that an annotation holds."""
@@ -238,13 +224,7 @@ def expected(kind: Any, limits: Limits, name: str = "") -> str:
 
 
 class Collector:
-    """Gathers the faults of one file.
-
-    Parameters
-    ----------
-    file : str
-        Name that every fault starts with.
-    """
+    """Gathers the faults of one file."""
 
     def __init__(self, file: str) -> None:
         self.file = file

@@ -75,50 +75,24 @@ class CampaignFile(Table):
 
 @dataclass(frozen=True)
 class CampaignPoint:
-    """One run of a campaign.
+    """One run of a campaign."""
 
-    Parameters
-    ----------
-    case : Case
-        The case with the changes of this point.
-    run : Run
-        Operating point, domain, grid and models.
-    values : mapping
-        What the file says for this point, defaults included.
-    warm : bool
-        Whether it may start from the flow of a run on the same grid.
-    """
-
-    case: Case
+    case: Case  # with the changes of this point
     run: Run
-    values: Mapping[str, Any]
-    warm: bool
+    values: Mapping[str, Any]  # what the file says for this point, defaults included
+    warm: bool  # whether it may start from the flow of a run on the same grid
 
 
 @dataclass(frozen=True)
 class Campaign:
-    """A checked campaign.
-
-    Parameters
-    ----------
-    path : Path
-        Its file; recording and manifest stand beside it.
-    name, title : str
-        Names.
-    case : Case
-        The case, unchanged.
-    points : tuple of CampaignPoint
-        In the order in which they run.
-    grid_study : Path or None
-        Folder of the campaign whose grid study gives the numerical uncertainty.
-    """
+    """A checked campaign; recording and manifest stand beside its file."""
 
     path: Path
     name: str
     title: str
     case: Case
     points: tuple[CampaignPoint, ...]
-    grid_study: Path | None
+    grid_study: Path | None  # folder of the campaign that gives the numerical uncertainty
 
 
 def load_campaign(path: str | Path) -> Campaign:

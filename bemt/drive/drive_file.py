@@ -133,43 +133,19 @@ class DriveToml(Table):
 
 @dataclass(frozen=True, eq=False)
 class DriveFile:
-    """A drive.toml, read.
-
-    Parameters
-    ----------
-    path : Path
-        Of the file.
-    battery : Battery
-        Share of one rotor: its capacity over the rotors, its resistance times them.
-    esc : Esc
-        Controller.
-    motor : Motor
-        Machine.
-    rotor_inertia_kg_m2 : float
-        Of the rotor. [kg m2]
-    soc, soc_min : float
-        State of charge at start and end. [1]
-    mass_kg : float
-        Of the vehicle, NaN without one. [kg]
-    rotors : int
-        That share the battery.
-    max_temperature_C : float
-        Of the winding, NaN when not stated. [C]
-    assumed : mapping of str to str
-        Values that no source states, with the reason.
-    """
+    """A drive.toml as the drive is solved: battery and its resistance are the share of one rotor."""
 
     path: Path
     battery: Battery
     esc: Esc
     motor: Motor
     rotor_inertia_kg_m2: float
-    soc: float
-    soc_min: float
-    mass_kg: float
-    rotors: int
-    max_temperature_C: float
-    assumed: Mapping[str, str]
+    soc: float  # at the start
+    soc_min: float  # where a flight ends
+    mass_kg: float  # of the vehicle, NaN without one
+    rotors: int  # that share the battery
+    max_temperature_C: float  # of the winding, NaN when not stated
+    assumed: Mapping[str, str]  # key to reason
 
     def drive(self, rotor: RotorMap) -> Drive:
         """Put the drive of a rotor together."""

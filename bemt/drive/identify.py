@@ -48,25 +48,14 @@ FREE: dict[str, tuple[float, float, float]] = {
 
 @dataclass(frozen=True, eq=False)
 class MapFit:
-    """Drive fitted to a thrust map.
+    """Drive fitted to a thrust map."""
 
-    Parameters
-    ----------
-    drive : Drive
-        The drive, with a battery whose voltage at rest is that of the recording.
-    fitted : mapping of str to float
-        What was fitted, in the unit of its name.
-    kT, kQ : float
-        Rotor constants. [N s2/rad2], [N m s2/rad2]
-    full_thrust_N : float
-        Greatest thrust recorded. [N]
-    """
-
-    drive: Drive
-    fitted: Mapping[str, float]
+    drive: Drive  # the drive, with a battery whose voltage at rest is that of the recording
+    fitted: Mapping[str, float]  # what was fitted, in the unit of its name
+    # rotor constants. [N s2/rad2], [N m s2/rad2]
     kT: float
     kQ: float
-    full_thrust_N: float
+    full_thrust_N: float  # greatest thrust recorded. [N]
 
 
 def no_load(points: MapPoints) -> tuple[float, float]:

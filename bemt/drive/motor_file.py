@@ -117,34 +117,16 @@ class MotorToml(Table):
 
 @dataclass(frozen=True, eq=False)
 class MotorTrials:
-    """All that was recorded of one motor.
-
-    Parameters
-    ----------
-    name, data : str
-        Of the motor; what the trials are.
-    measured : Measured
-        Results of the methods as ke.
-    to_kt : float
-        K_t in the convention asked for, over ke. [N m/A per V s/rad]
-    convention : str
-        Of K_t, in words.
-    stated : mapping of str to float
-        Values of others. [N m/A]
-    notes : tuple of str
-        What a reader has to know.
-    files : tuple of Path
-        All that was read: motor.toml and its recordings.
-    """
+    """All that was recorded of one motor."""
 
     name: str
-    data: str
-    measured: Measured
-    to_kt: float
-    convention: str
-    stated: Mapping[str, float]
-    notes: tuple[str, ...] = ()
-    files: tuple[Path, ...] = ()
+    data: str  # what the trials are
+    measured: Measured  # results of the methods as ke
+    to_kt: float  # K_t in the convention asked for, over ke [N m/A per V s/rad]
+    convention: str  # of K_t, in words
+    stated: Mapping[str, float]  # values of others [N m/A]
+    notes: tuple[str, ...] = ()  # what a reader has to know
+    files: tuple[Path, ...] = ()  # all that was read, motor.toml first
 
 
 def read(path: str | Path) -> MotorTrials:

@@ -21,36 +21,20 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class RotorMap:
-    """Loads of a rotor over speed.
+    """Loads of a rotor over speed."""
 
-    Parameters
-    ----------
-    omega_max : float
-        Greatest speed of the table. [rad/s]
-    thrust_law, torque_law, slope_law : callable
-        Speed [rad/s] to thrust [N], torque [N m] and thrust per induced speed at fixed rotation [N s/m].
-    radius_m, area_m2 : float
-        Of the rotor [m]; swept area that carries the thrust [m2].
-    rho : float
-        Density of the air. [kg/m3]
-    airspeed_m_s : float
-        Of flight. [m/s]
-    inertia_kg_m2 : float
-        Of the rotor alone. [kg m2]
-    notes : tuple of str
-        What was left out.
-    """
-
-    omega_max: float
+    omega_max: float  # greatest speed of the table. [rad/s]
+    # speed [rad/s] to thrust [N], torque [N m] and thrust per induced speed at fixed rotation [N s/m]
     thrust_law: Callable[[Array], Array]
     torque_law: Callable[[Array], Array]
     slope_law: Callable[[Array], Array] | None
+    # of the rotor [m]; swept area that carries the thrust [m2]
     radius_m: float
     area_m2: float
-    rho: float
-    airspeed_m_s: float = 0.0
-    inertia_kg_m2: float = 0.0
-    notes: tuple[str, ...] = ()
+    rho: float  # density of the air. [kg/m3]
+    airspeed_m_s: float = 0.0  # of flight. [m/s]
+    inertia_kg_m2: float = 0.0  # of the rotor alone. [kg m2]
+    notes: tuple[str, ...] = ()  # what was left out
 
     def thrust(self, omega: ArrayLike) -> Array:
         """Steady thrust, (N,) [N]."""

@@ -20,28 +20,19 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class MapCheck:
-    """Thrust over pulse width, model beside recording.
+    """Thrust over pulse width, model beside recording."""
 
-    Attributes
-    ----------
-    name, how : str
-        Recording; what of the model was fitted to it.
-    pulse_us, thrust_N, model_N : (N,) float
-        Pulse width [us]; thrust recorded and of the model [N].
-    worst, rms : float
-        Error over full scale. [1]
-    fitted : mapping of str to float
-        Constants fitted, in the unit of their names.
-    """
-
+    # recording; what of the model was fitted to it
     name: str
     how: str
+    # (N,) pulse width [us]; thrust recorded and of the model [N]
     pulse_us: Array
     thrust_N: Array
     model_N: Array
+    # error over full scale. [1]
     worst: float
     rms: float
-    fitted: Mapping[str, float]
+    fitted: Mapping[str, float]  # constants fitted, in the unit of their names
 
 
 def check_map(name: str, how: str, drive: Drive, points: MapPoints, fitted: Mapping[str, float]) -> MapCheck:
@@ -61,52 +52,32 @@ def other_battery(drive: Drive, points: MapPoints) -> Drive:
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One step of a log.
+    """One step of a log."""
 
-    Parameters
-    ----------
-    log : str
-        Which log.
-    pulse_us : (float, float)
-        Commands before and after. [us]
-    time_s, thrust_N : (N,) float
-        Samples from before the step until it has settled: time [s], thrust [N].
-    """
-
-    log: str
-    pulse_us: tuple[float, float]
+    log: str  # which log
+    pulse_us: tuple[float, float]  # commands before and after. [us]
+    # (N,) samples from before the step until it has settled: time [s], thrust [N]
     time_s: Array
     thrust_N: Array
 
 
 @dataclass(frozen=True)
 class StepCheck:
-    """One step of a log, model beside recording.
+    """One step of a log, model beside recording."""
 
-    Attributes
-    ----------
-    log : str
-        Which log.
-    from_us, to_us : float
-        Commands. [us]
-    at_s, before_N, after_N : float
-        Time of the step [s], levels [N].
-    tau_s, u_tau_s, model_s : float
-        Time constant recorded, its standard uncertainty, and of the model. [s]
-    sample_s : float
-        Between samples: what is faster than two of them is not resolved. [s]
-    """
-
-    log: str
+    log: str  # which log
+    # commands. [us]
     from_us: float
     to_us: float
+    # time of the step [s], levels [N]
     at_s: float
     before_N: float
     after_N: float
+    # time constant recorded, its standard uncertainty, and of the model. [s]
     tau_s: float
     u_tau_s: float
     model_s: float
-    sample_s: float
+    sample_s: float  # between samples: what is faster than two of them is not resolved. [s]
 
     @property
     def resolved(self) -> bool:
