@@ -8,6 +8,11 @@ References
 .. [2] A. Picard, R. S. Davis, M. Glaeser, K. Fujii, "Revised formula for the density of moist air (CIPM-2007)",
        Metrologia 45 (2008) 149-155, doi:10.1088/0026-1394/45/2/004; eq. 1 and appendix A
        (coefficients checked against a public implementation, not against the paper).
+.. [3] Water. Density: Kell, J. Chem. Eng. Data 20 (1975) 97, eq. 16; viscosity: Kestin, Sokolov and Wakeham, J. Phys.
+       Chem. Ref. Data 7 (1978) 941, eq. 15; sound: Marczak, J. Acoust. Soc. Am. 102 (1997) 2776, eq. 3, and the salt
+       term of Medwin, ibid. 58 (1975) 1318; salt in density and viscosity: Sharqawy, Lienhard and Zubair, Desalination
+       and Water Treatment 16 (2010) 354, eqs. 8, 22 and 23 (not checked; ITTC 7.5-02-01-03 tabulates for 15 degC
+       999.10 kg/m3 and 1.1386e-6 m2/s fresh, 1026.02 and 1.1892e-6 at 35.165 g/kg: within 0.1 %).
 """
 
 from __future__ import annotations
@@ -36,6 +41,10 @@ T0 = 288.15
 # Base geopotential altitude [m], temperature [K], lapse rate [K/m] of [1], table 4.
 _LAYERS = ((-5000.0, 320.65, -0.0065), (11000.0, 216.65, 0.0), (20000.0, 216.65, 0.001))
 _TOP = 32000.0
+
+LIQUID = (900.0, 1100.0)
+"""Densities that are those of water, not of air [kg/m3]."""
+_SALT = 45.0
 
 # CIPM-2007, [2] appendix A.1: T in K, t in degC, p in Pa.
 _R_GAS = 8.314472
@@ -277,7 +286,7 @@ class Air:
 
     @classmethod
     def from_density(cls, rho: float = 1.225, temperature_C: float = 15.0) -> Air:
-        """Air of a given density; viscosity and sound speed of dry air at the given temperature.
+        """Air of a given density; viscosity and sound speed of dry air, or of water where it is as dense as water.
 
         Parameters
         ----------
@@ -302,9 +311,68 @@ class Air:
         >>> air.rho, round(air.a_sound, 1)
         (1.225, 340.3)
         """
+        if LIQUID[0] <= rho <= LIQUID[1]:
+            water = cls.water(temperature_C)
+            source = f"water, {rho:g} kg/m3 at {temperature_C:g} degC; cavitation is not modelled"
+            return cls(rho, water.mu, water.a_sound, water.temperature_K, source)
         T = temperature_C + ZERO_CELSIUS
         mu = sutherland(T)
         return cls(rho, mu, math.sqrt(GAMMA * R_DRY * T), T, f"density {rho:g} kg/m3 at {temperature_C:g} degC")
+
+    @classmethod
+    def water(cls, temperature_C: float = 15.0, salinity_g_kg: float = 0.0) -> Air:
+        """Fresh water or sea water at one atmosphere; a propeller does not know that it is not air.
+
+        Parameters
+        ----------
+        temperature_C : float
+            0 to 60. [degC]
+        salinity_g_kg : float
+            0 to 45; the oceans have 35. [g/kg]
+
+        Returns
+        -------
+        Air
+            The state; cavitation is not modelled.
+
+        Raises
+        ------
+        InputError
+            Outside of the ranges.
+
+        Notes
+        -----
+        Reference [3] of the module.
+
+        Examples
+        --------
+        >>> fresh, sea = Air.water(15.0), Air.water(15.0, 35.0)
+        >>> round(fresh.rho, 1), round(fresh.nu * 1e6, 3), round(fresh.a_sound)
+        (999.1, 1.139, 1466)
+        >>> round(sea.rho, 1), round(sea.nu * 1e6, 3)
+        (1026.2, 1.189)
+        """
+        faults = [
+            Fault("", f"air.{name}", f"{value:g}", f"0 to {high:g} {unit}", hint)
+            for name, value, high, unit, hint in (
+                ("temperature_C", temperature_C, 60.0, "degC", "Kelvin given?"),
+                ("salinity_g_kg", salinity_g_kg, _SALT, "g/kg", "The oceans have 35"),
+            )
+            if not 0.0 <= value <= high
+        ]
+        if faults:
+            raise InputError(faults)
+        t, S = temperature_C, 1e-3 * salinity_g_kg
+        kell = (999.83952, 16.945176, -7.9870401e-3, -46.170461e-6, 105.56302e-9, -280.54253e-12)
+        rho = sum(a * t**k for k, a in enumerate(kell)) / (1.0 + 16.879850e-3 * t)
+        rho += S * (802.0 - 2.001 * t + 1.677e-2 * t**2 - 3.060e-5 * t**3) - 1.613e-5 * S**2 * t**2
+        d = 20.0 - t
+        mu = 1.002e-3 * 10.0 ** (d / (t + 96.0) * (1.2364 - 1.37e-3 * d + 5.7e-6 * d**2))
+        mu *= 1.0 + (1.541 + 1.998e-2 * t - 9.52e-5 * t**2) * S + (7.974 - 7.561e-2 * t + 4.724e-4 * t**2) * S**2
+        marczak = (1402.385, 5.038813, -5.799136e-2, 3.287156e-4, -1.398845e-6, 2.787860e-9)
+        a = sum(c * t**k for k, c in enumerate(marczak)) + (1.34 - 0.01 * t) * salinity_g_kg
+        kind = f"sea water, {salinity_g_kg:g} g/kg" if S else "fresh water"
+        return cls(rho, mu, a, t + ZERO_CELSIUS, f"{kind}, {t:g} degC; cavitation is not modelled")
 
     @classmethod
     def isa(cls, altitude_m: float = 0.0, dT: float = 0.0) -> Air:

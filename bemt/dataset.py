@@ -11,6 +11,7 @@ known they are split by :data:`ORIGINS`, and the total is the root of the sum of
 
 from __future__ import annotations
 
+import html
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -193,6 +194,31 @@ class Dataset:
         """Say what it holds in a line; to_pandas() shows the numbers."""
         return f"Dataset({self.kind!r}, {self.name!r}, {len(self)} points: {', '.join(self.values)})"
 
+    def _repr_html_(self) -> str:
+        """Show the points in a notebook: each value with its standard uncertainty, where one is known."""
+        columns = [*self.values, *(["flags"] if any(self.flags) else [])]
+        shown = list(range(len(self))) if len(self) <= 12 else [*range(8), None, *range(len(self) - 3, len(self))]
+
+        def cell(name: str, i: int) -> str:
+            if name == "flags":
+                return ", ".join(self.flags[i])
+            value, u = self.values[name][i], self.u[name][i]
+            if not np.isfinite(value):
+                return "-"
+            if not u > 0.0:
+                return f"{value:.6g}"
+            digits = max(0, 1 - math.floor(math.log10(u)))  # two digits of the uncertainty
+            return f"{value:.{digits}f} &plusmn; {u:.{digits}f}"
+
+        head = "".join(f"<th>{html.escape(name)}</th>" for name in columns)
+        rows = "".join(
+            "<tr>" + "".join(f"<td>{'&#8942;' if i is None else cell(name, i)}</td>" for name in columns) + "</tr>"
+            for i in shown
+        )
+        notes = "".join(f"<br><small>{html.escape(note)}</small>" for note in self.notes)
+        what = f"<strong>{html.escape(f'{self.kind}: {self.name}, {len(self)} points')}</strong>"
+        return f'{what}<div style="overflow-x:auto"><table class="bemt"><tr>{head}</tr>{rows}</table></div>{notes}'
+
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle as plain dictionaries (worker processes send series back)."""
         by = {origin: dict(parts) for origin, parts in self.u_by.items()}
@@ -201,7 +227,13 @@ class Dataset:
 
     @property
     def converged(self) -> NDArray[np.bool_]:
-        """Points whose channels that were computed are all numbers, (N,)."""
+        """Points whose channels that were computed are all numbers, (N,).
+
+        Examples
+        --------
+        >>> Dataset("bemt", "p", {"rpm": [4000.0, 6000.0], "thrust_N": [2.1, math.nan]}).converged
+        array([ True, False])
+        """
         loads = [v for key, v in self.values.items() if key in ("thrust_N", "torque_Nm", "CT", "CP")]
         return np.asarray(np.all(np.isfinite(loads or list(self.values.values())), axis=0))
 
@@ -385,6 +417,12 @@ class Dataset:
         ------
         InputError
             When xarray is not installed.
+
+        Examples
+        --------
+        >>> x = Dataset("bench", "stand", {"rpm": [6000.0], "thrust_N": [10.0]}).to_xarray()
+        >>> x["thrust_N"].attrs["units"], x.sizes["point"]
+        ('N', 1)
         """
         from bemt.base.errors import needs
 
@@ -406,12 +444,23 @@ class Dataset:
         y : sequence of str
             Channels to draw; CT and CP, or thrust, by default.
         ax : matplotlib axes, optional
-            Where to draw; a new figure by default.
+            Where to draw, beside what is there: a channel keeps its colour. A new figure by default.
 
         Returns
         -------
         matplotlib axes
             With a line for each channel, and for each speed of rotation where J or airspeed is the abscissa.
+
+        Raises
+        ------
+        InputError
+            For a channel that is not there.
+
+        Examples
+        --------
+        >>> d = Dataset("bench", "stand", {"rpm": [4000.0, 6000.0], "thrust_N": [2.1, 4.7]}, {"thrust_N": 0.1})
+        >>> d.plot().get_xlabel()
+        'rpm'
         """
         import matplotlib.pyplot as plt
 
@@ -423,20 +472,29 @@ class Dataset:
         if unknown:
             known = ", ".join(self.values)
             raise InputError(Fault(self.name, ", ".join(unknown), "no such channel", f"one of {known}"))
-        ax = plt.subplots(layout="constrained")[1] if ax is None else ax
+        beside, points = ax is not None, self.kind in ("bench", "cfd", "vendor")
+        ax = ax if beside else plt.subplots(layout="constrained")[1]
+        drawn = [line.get_gid() for line in ax.lines]
+        colours = {line.get_gid(): line.get_color() for line in ax.lines if drawn.count(line.get_gid()) == 1}
         speeds = np.unique(self["rpm"]) if "rpm" in self and x != "rpm" else np.array([np.nan])
         for channel in wanted:
             for speed in speeds:
                 rows = np.flatnonzero(self["rpm"] == speed) if np.isfinite(speed) else np.arange(len(self))
                 rows = rows[np.argsort(self[x][rows], kind="stable")]
                 name = f"{channel}, {speed:.0f} rev/min" if len(speeds) > 1 else channel
+                name = f"{name}, {self.name}" if beside else name
+                style = {"marker": "o", "ls": ""} if points else {}
+                style |= {"color": colours[channel]} if channel in colours and len(speeds) == 1 else {}
                 at, value, u = self[x][rows], self[channel][rows], self.u[channel][rows]
-                (line,) = ax.plot(at, value, marker="." if self.kind in ("bench", "cfd") else "", label=name)
-                if np.any(u > 0.0):
+                (line,) = ax.plot(at, value, label=name, gid=channel, **style)
+                if np.any(u > 0.0) and points:
+                    ax.errorbar(at, value, np.nan_to_num(u), fmt="none", ecolor=line.get_color(), lw=1)
+                elif np.any(u > 0.0):
                     ax.fill_between(at, value - u, value + u, alpha=0.2, color=line.get_color(), lw=0)
         ax.set_xlabel(x)
         ax.set_ylabel(", ".join(wanted))
-        ax.set_title(self.name, fontsize=10)
+        if not beside:
+            ax.set_title(self.name, fontsize=10)
         ax.legend(fontsize=8, frameon=False)
         return ax
 

@@ -2,6 +2,7 @@
 
 Numbers of docs/diagnosis.md, the pages docs/effects.md and docs/files.md, docs/gallery.md with its pictures
 (``--no-pictures``: without).
+``--notebooks`` executes docs/notebooks/ and nothing else.
 The picture of the README has a script of its own, docs/overview.py.
 """
 
@@ -181,8 +182,28 @@ def files() -> str:
     return "\n".join(lines)
 
 
+def run_notebook(path: Path) -> None:
+    """Execute a notebook and write its outputs into it."""
+    import os
+
+    import nbformat
+    from nbclient import NotebookClient
+
+    book = nbformat.read(path, 4)
+    for cell in book.cells:
+        cell.setdefault("metadata", {}).pop("execution", None)
+    here = {"metadata": {"path": str(path.parent)}}
+    client = NotebookClient(book, timeout=300, record_timing=False, resources=here)
+    client.execute(env={**os.environ, "PYTHONPATH": str(ROOT)})
+    nbformat.write(book, path)
+
+
 def main() -> None:
     """Rewrite everything."""
+    if "--notebooks" in sys.argv:
+        for path in sorted((DOCS / "notebooks").glob("*.ipynb")):
+            run_notebook(path)
+        return
     from geometry.picture import cutaway_scene, render, rotor_scene
 
     page = DOCS / "diagnosis.md"

@@ -134,3 +134,15 @@ def test_stack_joins_states():
     assert np.array_equal(both.temperature, [288.15, Air.isa(3000.0).temperature_K])
     with pytest.raises(InputError):
         Air.stack([])
+
+
+def test_water_is_as_dense_and_viscous_as_tabulated() -> None:
+    """ITTC 7.5-02-01-03: fresh 999.10, 997.05 kg/m3; 1.1386, 0.8927 mm2/s at 15, 25 C; sea 1026.02, 1.1892 at 15 C."""
+    for t, salt, rho, nu in ((15.0, 0.0, 999.10, 1.1386e-6), (25.0, 0.0, 997.05, 0.8927e-6),
+                             (15.0, 35.165, 1026.02, 1.1892e-6)):  # fmt: skip
+        water = Air.water(t, salt)
+        assert water.rho == pytest.approx(rho, rel=1e-3) and water.nu == pytest.approx(nu, rel=1e-3)
+    assert Air.from_density(998.2, 20.0).mu == pytest.approx(Air.water(20.0).mu)
+    with pytest.raises(InputError) as told:
+        Air.water(290.0, 60.0)
+    assert len(told.value.faults) == 2

@@ -204,3 +204,55 @@ def test_the_command_writes_its_document_and_refuses_bad_input(
     assert main(["compare", a, str(tmp_path / "c.csv")]) == 2
     assert main(["compare", a, str(tmp_path / "missing.csv")]) == 2
     assert main(["compare", a, b, "--label", "nonsense"]) == 2
+
+
+def test_thermometers_give_the_density_at_one_pressure(tmp_path: Path) -> None:
+    warm, cold = stand(21), stand(22, scaled(thrust_N=1.07, torque_Nm=1.07))
+    files = [
+        written(tmp_path / f"{k}.csv", t | {"temperature_C": np.full(17, T)})
+        for k, t, T in (("a", warm, 26.85), ("b", cold, 7.22))
+    ]
+    answer = compare(files[0], files[1])
+    assert (answer.verdict, answer.effects) == ("named", ("air_density",))
+    plain = [written(tmp_path / f"{k}.csv", t) for k, t in (("c", warm), ("d", cold))]
+    told = compare(plain[0], plain[1], air_a="26.85C", air_b="7.22C")
+    assert told.effects == ("air_density",)
+    same = compare(plain[0], plain[1], air_a="20C", air_b="20C")
+    assert "air_density" not in same.effects
+    with pytest.raises(InputError) as faults:
+        compare(plain[0], plain[1], air_a="80F", air_b="1013hPa")
+    assert len(faults.value.faults) == 2
+
+
+def test_a_wrong_pole_count_moves_the_points_along_the_speed(tmp_path: Path) -> None:
+    a = stand(23)
+    b = stand(24) | {"rpm": stand(24)["rpm"] / 6.0}
+    answer = compare(written(tmp_path / "a.csv", a), written(tmp_path / "b.csv", b))
+    assert answer.effects == ("rpm_scale",)
+    row = next(r for r in answer.document["subsystems"]["loads"]["ranking"] if r["effect"] == "rpm_scale")
+    assert row["parameters"]["ratio"]["value"] == pytest.approx(6.0, rel=0.01)
+
+
+def test_what_lags_on_the_way_up_and_down_is_no_zero(tmp_path: Path) -> None:
+    def both_ways(seed: int, lag: float) -> dict[str, Array]:
+        up, down = stand(seed), stand(seed + 1)
+        table = {k: np.concatenate([up[k], down[k][::-1]]) for k in up}
+        shift = lag * table["thrust_N"].max() * np.repeat([-0.5, 0.5], 17)
+        return table | {"thrust_N": table["thrust_N"] + shift}
+
+    a = written(tmp_path / "a.csv", both_ways(31, 0.05))
+    b = written(tmp_path / "b.csv", {k: v[17:] for k, v in both_ways(35, 0.05).items()})
+    answer = compare(a, b)
+    assert "thrust_zero" not in answer.effects or answer.verdict == "class"
+
+
+def test_every_answer_that_is_not_sure_has_a_step_and_its_command(tmp_path: Path) -> None:
+    changes = [scaled(thrust_N=1.06, torque_Nm=1.05), scaled(thrust_N=1.2), scaled(thrust_N=1.25, torque_Nm=1.4)]
+    for k, change in enumerate(changes):
+        a, b = pair(tmp_path, change, seed=41 + k)
+        answer = compare(a, b)
+        step = answer.document["next_measurement"]
+        if answer.verdict not in ("none", "named", "sensor"):
+            assert step["text"] and step["command"].startswith("python -m bemt compare ")
+        first = answer.text.splitlines()[0]
+        assert not first.startswith("verdict") and "thrust" in first

@@ -31,7 +31,10 @@ from bemt.case.load import case_of
 PACKAGES = ("bemt", "geometry")
 # What users call and plug-ins implement: here every parameter is documented. Elsewhere one line will do, and what a
 # docstring does say must be right.
-FACE = "bemt|bemt.library|bemt.dataset|bemt.effects.base|bemt.readers|bemt.exports|bemt.base.errors"
+FACE = (
+    "bemt|bemt.library.answers|bemt.library.rotors|bemt.dataset|bemt.effects.base|bemt.readers|bemt.exports"
+    "|bemt.base.errors"
+)
 # Types of numbers that have a dimension: float, array_like, (N,) float, tuple of float; not counts, masks or records.
 NUMERIC = re.compile(r"^(tuple of )?(\([^()]*\) )*(float|array_like|ndarray)\b(?! of (int|bool|str))")
 UNIT = re.compile(r"\[[^\[\]]+\]|\bunits?\b")  # "[m]", or words such as "in the unit of x"
@@ -131,6 +134,19 @@ def test_docstrings_agree_with_the_code_and_name_units(module: str) -> None:
     face = module in FACE.split("|")
     faults = [fault for name, item in public_objects(loaded) for fault in docstring_faults(name, item, face)]
     assert not faults, "\n".join(faults)
+
+
+@pytest.mark.parametrize("module", ["bemt.library.answers", "bemt.library.rotors", "bemt.dataset"])
+def test_everything_of_the_face_has_an_example_that_runs(module: str) -> None:
+    """Its own, or a line of its class's; pytest runs them."""
+    without = []
+    found = dict(public_objects(importlib.import_module(module)))
+    for name, item in found.items():
+        home, _, last = name.rpartition(".")
+        shown = [row for row in (getattr(found.get(home), "__doc__", "") or "").splitlines() if ">>>" in row]
+        if ">>>" not in (item.__doc__ or "") and not any(f".{last}" in row for row in shown):
+            without.append(name)
+    assert without == []
 
 
 HEAD = "Parameters\n----------\n"
@@ -356,6 +372,7 @@ def test_links_lead_somewhere(project: Path, document: str) -> None:
 def test_the_changelog_speaks_of_this_version(project: Path) -> None:
     first = re.search(r"^## (\S+)", (project / "CHANGELOG.md").read_text(encoding="utf-8"), flags=re.MULTILINE)
     assert first is not None and first[1] == bemt.__version__
+    assert f"\nversion: {bemt.__version__}\n" in (project / "CITATION.cff").read_text(encoding="utf-8")
 
 
 def test_the_picture_shows_today_s_numbers(project: Path, maker: ModuleType) -> None:

@@ -28,6 +28,7 @@ from bemt.effects.oblique_inflow import ObliqueInflow
 from bemt.effects.recirculation import Recirculation
 from bemt.effects.rotor_inertia import RotorInertia, slope
 from bemt.effects.rpm_scale import RpmScale
+from bemt.effects.supply_voltage import SupplyVoltage
 from bemt.effects.tip_gap import TipGap
 from bemt.effects.tunnel_blockage import TunnelBlockage
 from bemt.effects.unit_slip import UnitSlip
@@ -343,6 +344,18 @@ def test_the_lip_separates_above_its_limit_only() -> None:
     np.testing.assert_allclose(T0 - found.T, [0.0, 0.25 * 3.0, 0.5 * 4.0, 0.5 * 10.0], atol=1e-12)
 
 
+def test_the_lip_by_advance_separates_at_rest_first() -> None:
+    flow, found = ducted([4.0, 4.0, 4.0], V=[0.0, 10.0, 20.0])
+    T0 = found.T.copy()
+    LipSeparation(onset=0.25, loss=0.4, by="advance").loads(found, flow)
+    lost = T0 - found.T
+    assert lost[0] == pytest.approx(0.4 * 4.0) and 0.0 < lost[1] < lost[0] and lost[2] == 0.0
+    flow, found = ducted([4.0, 8.0])  # all at rest: nothing to tell by
+    T0 = found.T.copy()
+    LipSeparation(by="advance").loads(found, flow)
+    assert np.array_equal(found.T, T0)
+
+
 def test_the_lip_remembers() -> None:
     up_down = [2.0, 5.5, 8.0, 10.0, 8.0, 5.5, 2.0]
     flow, found = ducted(up_down, time_s=np.arange(7.0))
@@ -376,7 +389,7 @@ def test_gaps_of_a_recording_are_in_proportion_to_the_largest() -> None:
 def test_the_drive_never_shows_in_thrust() -> None:
     t = np.array([0.0, 50.0, 500.0])
     flow = recorded([5000.0, 7000.0, 9000.0], time_s=t, pwm_s=np.array([1.3e-3, 1.5e-3, 1.8e-3]))
-    for e in (MotorHeating(), BatterySag()):
+    for e in (MotorHeating(), BatterySag(), SupplyVoltage()):
         values = shown(flow, e)
         assert np.array_equal(values["thrust_N"], flow.T0) and np.array_equal(values["torque_Nm"], flow.Q0)
         assert not np.array_equal(values["rpm"], flow.rpm)
@@ -404,6 +417,32 @@ def test_a_motor_that_stands_cools_and_a_new_clock_starts_cold() -> None:
     again = shown(recorded([9000.0] * 4, time_s=np.array([0.0, 200.0, 0.0, 200.0]), run=np.array([1.0, 1.0, 2.0, 2.0])),
                   MotorHeating(60.0, 100.0, 0.05))["rpm"]  # fmt: skip
     assert again[0] == again[2] < again[1] == again[3]
+
+
+@pytest.mark.parametrize("change", [-0.3, 0.0, 0.5])
+def test_a_supply_obeys_its_voltage_balance(change: float) -> None:
+    flow = recorded([4500.0, 9000.0], pwm_s=np.full(2, 1.8e-3))
+    y = shown(flow, SupplyVoltage(change, 0.2))["rpm"] / flow.rpm
+    lever = flow.Q0 / flow.omega
+    u = 0.2 * lever / lever.max()
+    np.testing.assert_allclose(y + u * y**2, (1.0 + change) * (1.0 + u), rtol=1e-12)
+
+
+def test_a_wider_gap_costs_what_the_gap_of_another_case_costs() -> None:
+    from bemt.case import load_case
+    from bemt.case.prepare import prepare_case
+
+    def thrust(changed: dict[str, object]) -> float:
+        case = load_case("cases/ds30/case.toml").replaced(changed)
+        return float(prepare_case(case).solve(case.rpm, case.airspeed_m_s, case.air()).thrust_N[0])
+
+    own = thrust({})
+    wider = thrust({"model.effects_on": ["wider_gap(extra_mm=0.4)"]})
+    assert wider < own
+    # the wall itself moves in the other case, by a hundredth of the bore
+    assert wider / own == pytest.approx(thrust({"duct.tip_gap_mm": 0.8}) / own, abs=0.02)
+    sealed = thrust({"model.effects_on": ["wider_gap(extra_mm=-1.0)"]})
+    assert own < sealed == thrust({"model.effects_on": ["wider_gap(extra_mm=-0.4)"]})
 
 
 def test_a_recorded_voltage_is_taken_as_it_is() -> None:

@@ -81,6 +81,32 @@ def test_bad_input_says_what_would_have_been_right(call: object, words: str) -> 
         call()  # type: ignore[operator]
 
 
+@pytest.mark.parametrize("J", [0.0, 0.3, 0.55])
+def test_loads_along_the_blade_add_up_to_those_of_the_rotor(J: float) -> None:
+    rotor = bemt.load(ROOT / "cases" / "prop_8x5")
+    blade, whole = rotor.along_blade(rpm=9000, J=J), rotor.solve(9000, J=J, bands=False)
+    width = np.diff(np.r_[blade.r_m[0] - (blade.r_m[1] - blade.r_m[0]) / 2, (blade.r_m[:-1] + np.diff(blade.r_m) / 2),
+                          rotor.diameter_m / 2])  # fmt: skip
+    for load, total in (("thrust_per_radius_N_m", "thrust_N"), ("torque_per_radius_Nm_m", "torque_Nm")):
+        assert np.sum(blade[load] * width) == pytest.approx(whole[total][0], rel=0.02)
+    np.testing.assert_allclose(blade.alpha_deg, blade.beta_deg - np.degrees(np.arctan2(
+        blade.axial_m_s, 9000 / 60 * 2 * np.pi * blade.r_m - blade.swirl_m_s)), atol=0.5)  # fmt: skip
+    with pytest.raises(bemt.InputError, match="one operating point"):
+        rotor.along_blade(rpm=[5000, 6000])  # type: ignore[arg-type]
+
+
+def test_a_recording_is_drawn_beside_a_curve_in_its_colours() -> None:
+    pytest.importorskip("matplotlib").use("Agg")
+    curve = bemt.propeller("10x5").curve(rpm=6000, J=[0.0, 0.3, 0.5], bands=False)
+    axes = curve.plot("J", ["CT", "CP"])
+    bench = bemt.Dataset("bench", "stand", {key: curve[key] for key in ("J", "CT", "CP", "rpm")})
+    bench.plot("J", ["CT", "CP"], axes)
+    lines = axes.lines
+    assert [line.get_color() for line in lines[2:]] == [line.get_color() for line in lines[:2]]
+    assert lines[2].get_linestyle() == "None" and axes.get_title() == curve.name
+    assert "<td>" in curve._repr_html_() and "prop_10x5" in bemt.propeller("10x5")._repr_html_()
+
+
 def test_a_log_is_read_and_diagnosed_from_a_frame(tmp_path: Path) -> None:
     pd = pytest.importorskip("pandas")
     prop = bemt.propeller("10x5")

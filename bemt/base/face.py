@@ -1,17 +1,54 @@
-"""Rooms that are also functions of the public face: ``bemt.diagnose(...)`` and ``from bemt.diagnose import plan``."""
+"""How the public face looks: rooms that are also functions, and answers as a notebook shows them."""
 
 from __future__ import annotations
 
+import html
 import importlib
+import inspect
+from collections.abc import Mapping
 from types import ModuleType
 from typing import Any
 
-__all__ = ["CallableRoom"]
+__all__ = ["CallableRoom", "as_html", "table_html"]
 
 
 class CallableRoom(ModuleType):
-    """Package whose call is that of the function of its name in ``bemt.library``."""
+    """Package whose call and signature are those of the function of its name in ``bemt.library``.
+
+    So ``bemt.diagnose(...)`` and ``from bemt.diagnose import plan`` both work.
+    """
 
     def __call__(self, *args: Any, **more: Any) -> Any:
         """Call the function of the public face."""
-        return getattr(importlib.import_module("bemt.library"), self.__name__.rpartition(".")[2])(*args, **more)
+        return self._function()(*args, **more)
+
+    def _function(self) -> Any:
+        return getattr(importlib.import_module("bemt.library"), self.__name__.rpartition(".")[2])
+
+    @property
+    def __signature__(self) -> inspect.Signature:
+        return inspect.signature(self._function())
+
+
+def as_html(head: str, text: str) -> str:
+    """A heading and a text of fixed width, for notebooks.
+
+    Examples
+    --------
+    >>> as_html("a < b", "text")
+    '<strong>a &lt; b</strong><pre style="line-height:1.35">text</pre>'
+    """
+    return f'<strong>{html.escape(head)}</strong><pre style="line-height:1.35">{html.escape(text)}</pre>'
+
+
+def table_html(head: str, rows: Mapping[str, str], note: str = "") -> str:
+    """A heading and names with their values, for notebooks.
+
+    Examples
+    --------
+    >>> table_html("10x5", {"blades": "2"})
+    '<strong>10x5</strong><table class="bemt"><tr><th>blades</th><td>2</td></tr></table>'
+    """
+    cells = "".join(f"<tr><th>{html.escape(k)}</th><td>{html.escape(v)}</td></tr>" for k, v in rows.items())
+    tail = f"<small>{html.escape(note)}</small>" if note else ""
+    return f'<strong>{html.escape(head)}</strong><table class="bemt">{cells}</table>{tail}'

@@ -129,7 +129,8 @@ class Model:
                 self.rotor, self.polars, chosen, self.duct, self.n_stations, mach_max=self.mach_max,
                 level=level, re_range=self.re_range,
             )  # fmt: skip
-        return self._kept[key]
+        kept: solver.Prepared = self._kept[key]
+        return kept
 
     def solve(self, rpm: ArrayLike, V: ArrayLike = 0.0, air: Air | None = None, threads: int = 1) -> Dataset:
         """Solve operating points."""

@@ -201,6 +201,8 @@ def build_air(air: AirTable) -> Air:
     1.1644
     """
     temperature = air.temperature_C
+    if air.fluid == "water":
+        return Air.water(15.0 if temperature is None else temperature, air.salinity_g_kg or 0.0)
     if air.density_kg_m3 is not None:
         return Air.from_density(air.density_kg_m3, 15.0 if temperature is None else temperature)
     if air.altitude_m is not None:

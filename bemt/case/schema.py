@@ -13,6 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.air import LIQUID
 from bemt.asbuilt.latents import KNOWN_FROM
 from bemt.base.toml import Axis, Limits, Table, axis_values, entry, expected, shown
 from bemt.sections.rule import DRAG_LEVEL, N_CRIT
@@ -41,6 +42,7 @@ __all__ = [
 
 CHORD_LAWS = tuple(GEOMETRY_CHORD_LAWS)
 INCH = 0.0254
+_HEAVIEST = 10.0  # of a gas [kg/m3]
 Suspect = Callable[[float], str]
 
 
@@ -70,8 +72,8 @@ def _percent(key: str, low: float = 1.0) -> Suspect:
 
 RPM = Limits("rev/min", 10, 300_000, _looks((1e-9, 9.999, "rev/s", lambda v: v * 60, "rpm")))
 AIRSPEED = Limits("m/s", -100, 300, _looks((300.1, 1100, "km/h", lambda v: v / 3.6, "airspeed_m_s")))
-_DENSITY = Limits("kg/m3", 0.01, 10, _looks(
-    (800, 1500, "g/m3", lambda v: v / 1000, "density_kg_m3"),
+_DENSITY = Limits("kg/m3", 0.01, LIQUID[1], _looks(
+    (1100.01, 1500, "g/m3", lambda v: v / 1000, "density_kg_m3"),
     (0.0755, 0.0775, "lb/ft3", lambda v: v * 16.018463, "density_kg_m3"),
     (0.00235, 0.0024, "slug/ft3", lambda v: v * 515.37882, "density_kg_m3")))  # fmt: skip
 _ALTITUDE = Limits("m", -500, 20_000, _looks((20_000.1, 70_000, "feet", lambda v: v * 0.3048, "altitude_m")))
@@ -229,18 +231,26 @@ class OperatingTable(Table):
 
 
 class AirTable(Table):
-    """[air]: density, or altitude, or pressure with temperature and humidity."""
+    """[air]: density, or altitude, or pressure with temperature and humidity; or water."""
 
     density_kg_m3: float | None = entry("density", _DENSITY)
     altitude_m: float | None = entry("altitude in the standard atmosphere", _ALTITUDE)
     pressure_hPa: float | None = entry("static pressure", _PRESSURE)
     temperature_C: float | None = entry("temperature", _TEMPERATURE)
     humidity_pct: float | None = entry("relative humidity, with pressure", "%", 0, 100, _FRACTION_OF_HUMIDITY)
+    fluid: Literal["water"] | None = entry("a liquid instead of air; with temperature_C")
+    salinity_g_kg: float | None = entry("salt, with fluid", "g/kg", 0, 45)
 
     def rules(self) -> Iterable[tuple[str, ...]]:
-        """Pressure goes with temperature, humidity with pressure."""
+        """Pressure goes with temperature, humidity with pressure, salt with water."""
         if self.pressure_hPa is not None and self.temperature_C is None:
             yield "temperature_C", "nothing", f"{expected(float, _TEMPERATURE)}, because pressure_hPa is given"
+        if self.salinity_g_kg is not None and self.fluid is None:
+            yield "salinity_g_kg", shown(self.salinity_g_kg), 'nothing without fluid = "water"'
+        if self.density_kg_m3 is not None and _HEAVIEST < self.density_kg_m3 < LIQUID[0]:
+            yield "density_kg_m3", shown(self.density_kg_m3), "0.01 to 10 kg/m3, or 900 to 1100 for water"
+        if self.fluid is not None and (self.temperature_C or 0.0) < 0.0:
+            yield "temperature_C", shown(self.temperature_C), "0 to 60 C, water"
         if self.humidity_pct is not None and self.pressure_hPa is None:
             yield "humidity_pct", shown(self.humidity_pct), "nothing without pressure_hPa"
 
@@ -333,6 +343,6 @@ GROUPS: tuple[tuple[str, tuple[str, ...], bool], ...] = (
     ("blade.section", ("naca", "dat", "thickness"), True),
     ("duct", ("tip_gap_mm", "inner_diameter_mm", "inner_diameter_in"), True),
     ("duct", ("exit_area_ratio", "exit_diameter_mm"), True),
-    ("air", ("density_kg_m3", "altitude_m", "pressure_hPa"), True),
+    ("air", ("density_kg_m3", "altitude_m", "pressure_hPa", "fluid"), True),
 )
 """(table, keys, required): at most one of the keys may be given, exactly one when required."""

@@ -47,4 +47,5 @@ def add_quiet(parser: argparse.ArgumentParser, what: str = "neither progress nor
 
 def add_cases(parser: argparse.ArgumentParser) -> None:
     """Add the cases to solve."""
-    parser.add_argument("paths", nargs="+", metavar="CASES", help="case files, or folders of <name>/case.toml")
+    what = "case files, or folders of <name>/case.toml (default: this folder)"
+    parser.add_argument("paths", nargs="*", default=["."], metavar="CASES", help=what)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import difflib
 import importlib
+import importlib.util
 import os
 import pkgutil
 import re
@@ -182,6 +183,12 @@ def _main(argv: list[str]) -> int:
     except Exception as error:
         if isinstance(error, OSError) and error.strerror:  # the system's word; others come from libraries
             print(system_fault(error), file=sys.stderr)
+            return EXIT_INPUT
+        if isinstance(error, ImportError) and (error.name or "").partition(".")[0] == "geometry":
+            found = importlib.util.find_spec("geometry")
+            where = found.origin if found else "none"
+            hint = "Install bemt into an environment of its own"
+            print(Fault("geometry", "", f"another package, {where}", "the one of bemt", hint), file=sys.stderr)
             return EXIT_INPUT
         import traceback
 

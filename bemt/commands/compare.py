@@ -28,6 +28,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     rows = "rows of {} that are meant: column=text, column=number, column=low:high, rotor=left; repeatable"
     parser.add_argument("--rows-a", metavar="CONDITION", help=rows.format("A"), **_options.REPEATABLE)
     parser.add_argument("--rows-b", metavar="CONDITION", help=rows.format("B"), **_options.REPEATABLE)
+    air = "air of {}, in place of what it records: 22C,1013hPa, or 22C alone, or 1.19kg/m3"
+    parser.add_argument("--air-a", metavar="AIR", help=air.format("A"))
+    parser.add_argument("--air-b", metavar="AIR", help=air.format("B"))
     parser.add_argument("--out", metavar="DIR", help="write comparison.json, its text and a picture there")
     parser.add_argument("--no-figures", action="store_true", help="with --out: no picture")
     parser.add_argument("--details", action="store_true", help="print ranking, sub-systems and all notes")
@@ -44,8 +47,9 @@ def run(args: argparse.Namespace) -> int:
     diameter = label_diameter(args.label)
     with _terminal.progress(args.quiet or args.json) as say:
         answer = compare(
-            args.a, args.b, args.case, diameter_m=diameter, rows_a=args.rows_a, rows_b=args.rows_b, progress=say
-        )
+            args.a, args.b, args.case, diameter_m=diameter, rows_a=args.rows_a, rows_b=args.rows_b, air_a=args.air_a,
+            air_b=args.air_b, progress=say,
+        )  # fmt: skip
     if args.out:
         _write(Path(args.out), answer, figures=not args.no_figures)
     if args.json:

@@ -6,6 +6,7 @@ import argparse
 
 from bemt.base.errors import EXIT_OK
 from bemt.commands import _options
+from bemt.commands._terminal import called
 
 NAME = "new"
 HELP = "write a case folder from a label, stations, a scan or a fan's diameter"
@@ -42,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
     folder, files = new_folder.write(new_folder.Wanted(**told, airspeed_m_s=args.airspeed), args.out)
     print(f"{folder.as_posix()}: {', '.join(files)}")
     typed = shlex.quote(folder.as_posix())
-    print(f"next: python -m bemt sweep {typed}")
+    print(f"next: {called()} sweep {typed}")
     if "drive.toml" in files:
-        print(f"      python -m bemt drive {typed}")
+        print(f"      {called()} drive {typed}")
     return EXIT_OK

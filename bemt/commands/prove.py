@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import os
+from pathlib import Path
 
-from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
+from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
 from bemt.commands import _options, _terminal
 
 NAME = "prove"
@@ -22,6 +24,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="DIR", help="keep items, key, answers and score there")
     jobs = "diagnoses at a time (default: one per core)"
     parser.add_argument("--jobs", type=_options.positive, metavar="N", help=jobs)
+    steps = "with --size real and --out: take the steps that silent answers recommend, where the data have them"
+    parser.add_argument("--follow", action="store_true", help=steps)
     _options.add_json(parser, "bemt.proof/1")
     _options.add_quiet(parser, "no tables")
 
@@ -29,13 +33,19 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Conceal, diagnose, score; 0 when every target is met, 1 when some are missed."""
     from bemt.base.tables import json_text
-    from bemt.proof import proof_text
+    from bemt.proof import follow, proof_text
     from bemt.proof.prove import prove
 
+    if args.follow and not (args.out and args.size == "real"):
+        got = f"--size {args.size}" + ("" if args.out else " without --out")
+        raise InputError(Fault("--follow", "", got, "--size real and --out DIR"))
+    taken = ""
     with _terminal.progress() as say:
         found = prove(args.out, args.size, args.seed, args.jobs, say, _terminal.complain)
+        if args.follow:
+            taken = follow.text(follow.follow(Path(args.out), args.jobs or os.cpu_count() or 1, say))
     if args.json:
         print(json_text(found), end="")
     elif not args.quiet:
-        print(proof_text.text(found))
+        print("\n\n".join([proof_text.text(found), *([taken] if taken else [])]))
     return EXIT_OK if all(row["met"] is not False for row in found["score"]) else EXIT_UNCONVERGED

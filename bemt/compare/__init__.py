@@ -1,4 +1,7 @@
-"""Models beside recordings: sweep, validation, grids, the thesis, benchmark."""
+"""Models beside recordings: sweep, validation, grids, the thesis, benchmark.
+
+``bemt.compare(a, b)`` says what changed between two recordings: ``help(bemt.library.compare)``.
+"""
 
 from __future__ import annotations
 

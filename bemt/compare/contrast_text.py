@@ -9,9 +9,9 @@ from typing import Any
 
 from bemt.base.tables import number_text, text_table
 from bemt.compare.recordings import OTHER_STAND
-from bemt.compare.scaling import law
+from bemt.compare.scaling import FAMILY, law
 
-__all__ = ["text"]
+__all__ = ["headline", "text"]
 
 _WORD = {
     "thrust_N": "thrust",
@@ -47,7 +47,8 @@ def _range(entry: Mapping[str, Any]) -> str:
 
 def text(doc: Mapping[str, Any], details: bool = False) -> str:
     """Lines of a comparison."""
-    lines = [f"verdict: {doc['verdict']}" + (f" {', '.join(doc['effects'])}" if doc["effects"] else "")]
+    lines = textwrap.wrap(headline(doc), 110)
+    lines += [f"verdict: {doc['verdict']}" + (f" {', '.join(doc['effects'])}" if doc["effects"] else "")]
     lines += _said(doc)
     rows = []
     for channel, r in doc["ratios"].items():
@@ -68,6 +69,41 @@ def text(doc: Mapping[str, Any], details: bool = False) -> str:
     notes = doc["notes"] if details else [n for n in doc["notes"] if not n.startswith(("A: ", "B: "))][:_NOTES]
     lines += [f"  note: {n}" for n in notes]
     return "\n".join(lines)
+
+
+_FAMILY_WORD = {
+    "blade": "another blade, pitch or diameter", "surroundings": "what stands around the rotor",
+    "airspeed": "the airspeed", "load cell": "a load cell", "drive": "the drive", "air_density": "the density",
+    "rpm_scale": "the speed reading", "unit_slip": "a unit",
+}  # fmt: skip
+
+
+def headline(doc: Mapping[str, Any]) -> str:
+    """What an engineer would say first."""
+    shares = [(_WORD[c], math.log(r["ratio"] * r["density_ratio"])) for c, r in doc["ratios"].items()
+              if r["kind"] in ("thrust", "torque")]  # fmt: skip
+    moved = " and ".join(f"{word} {_share(math.exp(x))}" for word, x in shares)
+    effects, verdict = list(doc["effects"]), doc["verdict"]
+    if verdict == "none":
+        return f"Nothing changed beyond what two set-ups differ by ({moved or 'drive alone'})."
+    if verdict == "unknown":
+        return f"Something changed ({moved}) that none of the listed causes makes."
+    if verdict == "insufficient":
+        return f"These recordings cannot say what changed ({moved})."
+    titles: dict[str, list[str]] = {FAMILY.get(k, k): [] for k in effects}
+    for k in effects:
+        titles[FAMILY.get(k, k)].append(k)
+    if len(effects) == 1:
+        row = law(effects[0])
+        lead = "The stand, not the rotor" if verdict == "sensor" else "What changed"
+        return f"{lead}: {row.title if row else effects[0]} ({moved or 'drive alone'})."
+    words = [_FAMILY_WORD.get(k, k) if len(v) > 1 else _plain(v[0]) for k, v in titles.items()]
+    return f"{' or '.join(words)} ({moved or 'drive alone'}).".capitalize()
+
+
+def _plain(name: str) -> str:
+    row = law(name)
+    return row.title if row else name
 
 
 def _ends(r: Mapping[str, Any], factor: float = 1.0) -> list[str]:
@@ -91,8 +127,9 @@ def _said(doc: Mapping[str, Any]) -> list[str]:
             out.append(f"The ratio of {' and '.join(grows)} changes with speed or advance.")
     density = doc["density"]["ratio"]
     if density and abs(density - 1.0) > 0.003:
-        ends = f"{doc['density']['A']:.4g} to {doc['density']['B']:.4g} kg/m3"
-        out.append(f"Recorded density: {ends} ({density - 1:+.1%}).")
+        a, b = doc["density"]["A"], doc["density"]["B"]
+        ends = f"Recorded density: {a:.4g} to {b:.4g} kg/m3" if a and b else "Density by the recorded temperatures"
+        out.append(f"{ends} ({density - 1:+.1%}).")
     out += (
         [_verdict(doc)] if "diagnosis" not in doc else [f"The case {doc['case']}, with A as reference:", *doc["told"]]
     )

@@ -41,7 +41,7 @@ LOADS = {"thrust": ("thrust_N", "CT"), "torque": ("torque_Nm", "power_W", "CP", 
 """Loads of the rotor: first what a cell reads, then what stands for it; electrical power only at like voltage."""
 DRIVE = {"speed": ("rpm",), "electrical": ("electrical_power_W",), "voltage": ("voltage_V",)}
 """Drive behind the rotor: speed and voltage at equal command, electrical power at equal speed."""
-_POWER = {"thrust_N": 2.0, "torque_Nm": 2.0, "power_W": 3.0, "electrical_power_W": 3.0}
+POWER_OF_SPEED = {"thrust_N": 2.0, "torque_Nm": 2.0, "power_W": 3.0, "electrical_power_W": 3.0}
 _COEFFICIENTS = ("CT", "CP", "CQ")
 
 # Readings below this share of the channel's largest say more of the zero than of the rotor.
@@ -59,6 +59,9 @@ Propeller Database and of J. Majewski's stand, seen here)."""
 # Electrical power for torque: efficiency of a drive that is warm or cold; speed where the voltage is known.
 _BY_POWER, _AT_KNOWN_VOLTAGE = 0.03, 0.01
 _BEND, _ZERO, _STEEP = 0.7, 0.0015, 0.15
+BY_THERMOMETER = 0.012
+"""Standard deviation of the density ratio of two days at one site where temperatures alone are known: pressures of days
+differ by 8 hPa. [1]"""
 _LENGTH_SPEED, _LENGTH_ADVANCE = 0.5, 0.35
 _SHARES = (0.001, 0.002, 0.004, 0.008, 0.015, 0.03, 0.06, 0.1)
 _FLOORS = (0.0, 0.0007, 0.002, 0.005, 0.012)
@@ -96,6 +99,8 @@ class MatchedChannel:
         Standard deviation of the level of a run, share. [1]
     notes : tuple of str
         What was left out.
+    shift : (N,) float or None
+        Standard deviation of the shift of a run by lag or hysteresis, share of full scale. [1]
     """
 
     name: str
@@ -109,6 +114,7 @@ class MatchedChannel:
     log_density: float
     session: float
     notes: tuple[str, ...] = ()
+    shift: Array | None = None
 
     def common(self) -> tuple[float, float]:
         """Range of the first coordinate that both recordings have; low above high: none."""
@@ -171,7 +177,7 @@ def _readings(run: StandRun, name: str, channel: str, diameter: float) -> dict[s
     sign = float(np.sign(np.nansum(v)))
     size = np.where(v * sign > 0.0, v * sign, np.nan)
     top = float(np.nanmax(size)) if np.isfinite(size).any() else math.nan
-    scaled = size / speed ** _POWER.get(channel, 0.0)
+    scaled = size / speed ** POWER_OF_SPEED.get(channel, 0.0)
     good = np.isfinite(scaled) & np.isfinite(first) & (size > _STARTED.get(channel, _SMALL) * top) & (speed > 0.0)
     if name in LOADS:
         level = np.nanpercentile(np.where(good, scaled, np.nan), 90) if good.any() else math.nan
@@ -230,9 +236,7 @@ def matched(a: StandRun, b: StandRun, name: str, diameter: float = math.nan) -> 
     for part, run in zip(parts, (a, b), strict=True):
         if part["lost"][0] > 0.5 * len(run):
             notes.append(f"{channel}: {part['lost'][0]:.0f} of {len(run)} points of {run.name} are near zero")
-    log_density = 0.0
-    if name in LOADS and channel not in _COEFFICIENTS and math.isfinite(a.density) and math.isfinite(b.density):
-        log_density = math.log(b.density / a.density)
+    log_density, unsure = density_change(a, b) if name in LOADS and channel not in _COEFFICIENTS else (0.0, 0.0)
     shift = [0.0, log_density]
     codes = [np.unique(p["run"], return_inverse=True)[1] for p in parts]
     codes[1] = codes[1] + codes[0].max() + 1
@@ -247,9 +251,27 @@ def matched(a: StandRun, b: StandRun, name: str, diameter: float = math.nan) -> 
         np.concatenate([p["floor"] for p in parts]),
         np.concatenate([p["u"] for p in parts]),
         log_density,
-        max(_set_up(name, channel, a, b), *seen),
+        math.hypot(max(_set_up(name, channel, a, b), *seen), unsure),
         tuple(notes),
+        np.repeat([a.shift.get(channel, 0.0), b.shift.get(channel, 0.0)], [p["y"].size for p in parts]),
     )
+
+
+def density_change(a: StandRun, b: StandRun) -> tuple[float, float]:
+    """Logarithm of the density of B over that of A as recorded, and what a thermometer alone leaves open.
+
+    Examples
+    --------
+    >>> from bemt.compare.stand_run import StandRun
+    >>> warm, cold = (StandRun("", {}, {}, {}, "", math.nan, (), math.nan, T) for T in (300.0, 285.0))
+    >>> round(density_change(warm, cold)[0], 3)
+    0.051
+    """
+    if math.isfinite(a.density) and math.isfinite(b.density):
+        return math.log(b.density / a.density), 0.0
+    if math.isfinite(a.temperature_K) and math.isfinite(b.temperature_K):
+        return math.log(a.temperature_K / b.temperature_K), BY_THERMOMETER
+    return 0.0, 0.0
 
 
 def _set_up(name: str, channel: str, a: StandRun, b: StandRun) -> float:
@@ -290,7 +312,8 @@ def covariance(c: MatchedChannel, s: Scatter) -> Array:
     side = (c.second[:, None] == c.second[None, :]).astype(float)
     # the level is the stand's, set up once per recording; half of its variance goes with the single run
     level = c.session**2 * (0.7 * side + 0.3 * same + _BEND**2 * same * K)
-    zero = _ZERO**2 * same * np.outer(c.floor, c.floor) if c.name in LOADS else 0.0
+    shift = c.floor * (_ZERO if c.shift is None else np.maximum(c.shift, _ZERO))
+    zero = same * np.outer(shift, shift) if c.name in LOADS else 0.0
     spread = s.share**2 + (s.floor * c.floor) ** 2 + c.u**2
     local = s.wiggle**2 * same * smooth_kernel(c, _LOCAL) if s.wiggle else 0.0
     return np.asarray(wide + s.bend**2 * K + level + zero + local + np.diag(spread))
@@ -301,17 +324,18 @@ def _level(c: MatchedChannel) -> float:
     return max(0.3, 0.5 * abs(float(c.y[c.second].mean() - c.y[~c.second].mean())))
 
 
-def change_of_any_kind(c: MatchedChannel) -> Array:
+def change_of_any_kind(c: MatchedChannel, level: float = 1.0, bend: float = 0.1, local: float = 0.06) -> Array:
     """Prior covariance of a change d at all points, whichever recording they are of, (N, N)."""
     z = unit_coordinates(c)
-    line = _level(c) ** 2 + 0.2**2 * np.outer(z[:, 0], z[:, 0]) + 0.2**2 * np.outer(z[:, 1], z[:, 1])
-    return np.asarray(line + 0.1**2 * smooth_kernel(c) + 0.06**2 * smooth_kernel(c, _LOCAL))
+    line = (level * _level(c)) ** 2 + 0.2**2 * (np.outer(z[:, 0], z[:, 0]) + np.outer(z[:, 1], z[:, 1]))
+    wave = local**2 * smooth_kernel(c, _LOCAL) if local else 0.0
+    return np.asarray(line + bend**2 * smooth_kernel(c) + wave)
 
 
-def free_change(c: MatchedChannel) -> Array:
+def free_change(c: MatchedChannel, level: float = 1.0, bend: float = 0.1, local: float = 0.06) -> Array:
     """Covariance of a change of any smooth kind between the recordings, (N, N)."""
     b = c.second.astype(float)
-    return np.asarray(change_of_any_kind(c) * np.outer(b, b))
+    return np.asarray(change_of_any_kind(c, level, bend, local) * np.outer(b, b))
 
 
 def log_likelihood(K: Array, y: Array) -> float:
@@ -371,9 +395,8 @@ def without_strays(c: MatchedChannel) -> tuple[MatchedChannel, int]:
 
 def taken(c: MatchedChannel, keep: NDArray[np.bool_]) -> MatchedChannel:
     """Some of the points."""
-    return replace(
-        c, y=c.y[keep], x=c.x[keep], second=c.second[keep], run=c.run[keep], floor=c.floor[keep], u=c.u[keep]
-    )
+    columns = ("y", "x", "second", "run", "floor", "u", "shift")
+    return replace(c, **{k: v[keep] for k in columns if (v := getattr(c, k)) is not None})
 
 
 def ratio_of(c: MatchedChannel, s: Scatter) -> dict[str, Any]:

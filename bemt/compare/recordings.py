@@ -6,23 +6,35 @@ No case and no blade is needed. What is not recorded is assumed to be equal in b
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from bemt.base.errors import Fault, InputError
+from bemt.base.units import ZERO_CELSIUS
 from bemt.compare import matched as fits
 from bemt.compare.matched import MatchedChannel, Scatter
-from bemt.compare.scaling import Judgement, judge, law, weigh
+from bemt.compare.scaling import FAMILY, Judgement, judge, law, weigh
 from bemt.compare.stand_run import StandRun
 
 __all__ = ["OTHER_STAND", "SCHEMA", "RunChange", "changed", "document"]
 
 SCHEMA = "bemt.comparison/1"
-_TOLD_DENSITY = 0.012
+# Recorded densities are this good: a barometer, a thermometer and nobody's humidity, share.
+_TOLD_DENSITY, _BAROMETER, _SURE = 0.012, 0.004, 2.0
+# A battery or supply: voltage that was read apart by more than this at equal command, share; loads that do not matter.
+_TOLD_VOLTAGE, _FOLLOWS, _SAME_LOAD = 0.03, 0.3, 0.1
 _NO_TALK = Judgement("insufficient", (), {}, {}, "not recorded in both")
+_TORQUES = {"torque_Nm", "power_W", "CP", "CQ"}
+# Density is asked for where it is not so many times less likely than the likeliest cause.
+_FIRST = 5.0
+# Change of a load that days of one site can make, in ln.
+_DAY = 0.12
+# How a verdict begins that both recordings tell by themselves.
+_TOLD = ("density as recorded", "by the thermometers", "voltage as recorded")
 _MOVED, _WIDE = 2.5, 1.4
 # Thrust of a propeller of 2.3 times the diameter at one speed: no stand takes both. [1]
 _FAR_OFF = 30.0
@@ -63,13 +75,21 @@ class RunChange:
 
     @property
     def density_ratio(self) -> float:
-        """Recorded density of B over that of A; NaN unless both are known."""
-        return self.b.density / self.a.density
+        """Recorded density of B over that of A, by thermometers alone if need be; NaN unless both tell."""
+        log_ratio, unsure = fits.density_change(self.a, self.b)
+        return math.exp(log_ratio) if unsure else self.b.density / self.a.density
 
     @property
     def leading(self) -> Judgement:
-        """Verdict on the loads; that on the drive where the loads agree and the drive does not."""
-        return self.drive if self.loads.verdict == "none" and self.drive.effects else self.loads
+        """Verdict on the loads; that on the drive where the loads agree, or nearly, and the drive does not."""
+        open_ = self.loads.verdict == "none" or (self.loads.verdict == "insufficient" and self.near)
+        return self.drive if open_ and self.drive.effects else self.loads
+
+    @property
+    def near(self) -> bool:
+        """Whether no load differs so much that the drive would follow it."""
+        loads = [abs(math.log(r["ratio"])) for r in self.ratios.values() if r["kind"] in fits.LOADS]
+        return bool(loads) and max(loads) < _SAME_LOAD
 
 
 def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> RunChange:
@@ -92,29 +112,50 @@ def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> RunChange
                 "Name units in the headings, or use a recording.toml",
             )
         )
-    known = math.isfinite(a.density) and math.isfinite(b.density)
+    told_density, unsure = fits.density_change(a, b)
+    known = math.hypot(_BAROMETER, unsure) if told_density or math.isfinite(a.density + b.density) else None
     scatter = {**rotor.likelier, **behind.likelier}
     ratios = {c.channel: _ratio(c, scatter[n]) for n, c in {**loads, **drive}.items()}
     verdict = _NO_TALK
     if loads:
         verdict = judge(*weigh(loads, (rotor.free, rotor.steady), ("air", "stand"), known, _speeds(ratios)))
         verdict = _far_off(_far_apart(_with_density(verdict, a, b, loads), ratios), ratios)
-    motor = _NO_TALK
-    if drive and verdict.verdict == "none":
-        motor = judge(*weigh(drive, (behind.free, behind.steady), ("drive",)))
-    elif drive:
-        motor = Judgement("insufficient", (), {}, {}, "the load changed or may have, and the drive follows it")
-    return RunChange(
+    found = RunChange(
         a,
         b,
         diameter,
         {**loads, **drive},
         ratios,
         verdict,
-        motor,
+        _NO_TALK,
         tuple(_assumed(a, b, diameter, loads)),
         tuple(_notes(a, b, {**loads, **drive}, {**rotor.strays, **behind.strays})),
     )
+    if drive and (verdict.verdict == "none" or found.near):
+        motor = judge(*weigh(drive, (behind.free, behind.steady), ("drive",)))
+        found = replace(found, drive=_with_voltage(motor, ratios))
+    elif drive:
+        found = replace(found, drive=replace(_NO_TALK, why="the load changed or may have, and the drive follows it"))
+    return found
+
+
+def _with_voltage(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> Judgement:
+    """The recorded voltages as the cause, where the speed at equal command goes with them and nothing else is left."""
+    volts, speed = (
+        next((math.log(r["ratio"]) for r in ratios.values() if r["kind"] == k), 0.0) for k in ("voltage", "speed")
+    )
+    follows = volts * speed > 0.0 and abs(speed) > _FOLLOWS * abs(volts)
+    if not volts:
+        return said
+    if abs(volts) < _TOLD_VOLTAGE and said.effects == ("battery_sag",):
+        why = f"speeds go with the recorded voltages, which are {math.expm1(volts):+.1%} apart"
+        return replace(said, verdict="none", effects=(), why=why)
+    if said.verdict not in ("none", "insufficient") or abs(volts) < _TOLD_VOLTAGE or not follows:
+        return said
+    why = f"voltage as recorded, {math.expm1(volts):+.1%} at equal command; the speed goes with it"
+    probability = {"battery_sag": 1.0 - said.probability.get("unknown", 0.0)}
+    left = {k: p for k, p in said.probability.items() if k not in ("none", "battery_sag")}
+    return Judgement("named", ("battery_sag",), probability | left, {"battery_sag": (volts, 0.0)}, why)
 
 
 def _far_apart(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> Judgement:
@@ -162,21 +203,29 @@ def _ratio(c: MatchedChannel, s: Scatter) -> dict[str, Any]:
 def _with_density(said: Judgement, a: StandRun, b: StandRun, loads: Mapping[str, MatchedChannel]) -> Judgement:
     """The recorded densities as the cause, where nothing else is left."""
     size = max((abs(c.log_density) for c in loads.values()), default=0.0)
-    if said.verdict != "none" or size < _TOLD_DENSITY:
+    log_ratio, unsure = fits.density_change(a, b)
+    if said.verdict != "none" or size < max(_TOLD_DENSITY, _SURE * unsure):
         return said
     why = f"density as recorded, {a.density:.4g} to {b.density:.4g} kg/m3; the coefficients agree"
+    if unsure:
+        why = (
+            f"by the thermometers, {a.temperature_K - ZERO_CELSIUS:.1f} to {b.temperature_K - ZERO_CELSIUS:.1f} C, and "
+            "one pressure; the coefficients agree"
+        )
     probability = {
         "air_density": said.probability["none"],
         **{k: p for k, p in said.probability.items() if k not in ("none", "air_density")},
     }
-    sizes = {"air_density": (math.log(b.density / a.density), 0.0)}
+    sizes = {"air_density": (log_ratio, unsure)}
     return Judgement("named", ("air_density",), probability, sizes, why)
 
 
 def _assumed(a: StandRun, b: StandRun, diameter: float, loads: Mapping[str, MatchedChannel]) -> list[str]:
     out = []
     unknown = [n for n, r in (("A", a), ("B", b)) if not math.isfinite(r.density)]
-    if unknown and any(c.channel in ("thrust_N", "torque_Nm", "power_W") for c in loads.values()):
+    if unknown and fits.density_change(a, b)[1]:
+        out.append("air pressure is not recorded in both: taken as equal within 1 %")
+    elif unknown and any(c.channel in ("thrust_N", "torque_Nm", "power_W") for c in loads.values()):
         out.append(f"air density is not recorded in {' and '.join(unknown)}: taken as equal")
     still = [n for n, r in (("A", a), ("B", b)) if not {"airspeed_m_s", "J"} & r.values.keys()]
     if still:
@@ -210,23 +259,39 @@ def _notes(a: StandRun, b: StandRun, channels: Mapping[str, MatchedChannel], str
 def next_step(change: RunChange, files: Sequence[str]) -> dict[str, str]:
     """Run or reading that would settle the answer, and the command to give then."""
     said = change.leading
-    torque = "torque" in {c.name for c in change.channels.values()}
-    rows = [row for k in said.effects[:3] if (row := law(k)) is not None]
-    command = "python -m bemt compare " + " ".join(files) + " --case CASE"
+    a, b = (shlex.quote(f) for f in files)
+    ask = "python -m bemt compare"
+    rows = [row for k in said.effects if (row := law(k)) is not None]
+    loads = [r for r in change.ratios.values() if r["kind"] in fits.LOADS]
     if said.verdict == "none":
-        return {"text": "to see smaller changes, repeat each run once after taking the propeller off", "command": ""}
-    if said.verdict == "named" and said.effects == ("air_density",) and math.isfinite(change.density_ratio):
+        text = "to see smaller changes, repeat each run once after taking the propeller off"
+        return {"text": text, "command": ""}
+    if said.why.startswith(_TOLD):
         return {"text": "", "command": ""}
     if said.verdict in ("named", "sensor"):
         text = rows[0].settles if rows else "read the label of the channel"
-        return {"text": f"to be sure, {text}", "command": command}
-    if not torque and change.loads is said:
-        text = "record torque in both runs: in thrust alone gain, air and blade look alike"
-    elif rows:
-        text = "; or ".join(row.settles for row in rows)
-    else:
-        text = "repeat the run of A and compare it with A: what they differ by is no cause"
-    return {"text": text, "command": command}
+        return {"text": f"to be sure, {text}", "command": f"{ask} {a} {b} --case CASE"}
+    if loads and all(r["extrapolated"] for r in loads):
+        v = change.a.values
+        where = "where A was measured"
+        if "rpm" in v:
+            where = f"at the speeds of A, {np.nanmin(v['rpm']):.0f} to {np.nanmax(v['rpm']):.0f} rev/min"
+        return {"text": f"run B again {where}, and at its airspeeds", "command": f"{ask} {a} B_AGAIN.csv"}
+    likely = {k: p for k, p in said.probability.items() if law(k) is not None}
+    density = likely.get("air_density", 0.0) * _FIRST >= max(likely.values(), default=1.0)
+    small = max((abs(math.log(r["ratio"])) for r in loads), default=1.0) < _DAY
+    if density and small and math.isnan(change.density_ratio):
+        text = "note temperature and pressure of both days; density is the first thing that differs between days"
+        return {"text": text, "command": f"{ask} {a} {b} --air-a 20C,1013hPa --air-b 20C,1013hPa"}
+    if not _TORQUES & change.ratios.keys() and change.loads is said:
+        text = "record torque in both runs: without it gain, air and blade look alike"
+        return {"text": text, "command": f"{ask} A_WITH_TORQUE.csv B_WITH_TORQUE.csv"}
+    if rows:
+        firsts = {FAMILY.get(row.id, row.id): row.settles for row in reversed(rows)}
+        text = "; or ".join(reversed(firsts.values()))
+        return {"text": text, "command": f"{ask} {a} {b} --case CASE"}
+    text = "repeat the run of A and compare it with A: what they differ by is no cause"
+    return {"text": text, "command": f"{ask} {a} A_AGAIN.csv"}
 
 
 def document(change: RunChange) -> dict[str, Any]:

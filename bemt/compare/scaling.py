@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,21 +25,38 @@ Array = NDArray[np.float64]
 NONE, UNKNOWN = "none", "unknown"
 _PRIOR = {NONE: 0.5, UNKNOWN: 0.1}
 _SIZES = (0.02, 0.07, 0.25)
+# Barometers read 970 to 1040 hPa and rooms 0 to 35 C (5 %); 1,000 m are 10 %.
+_AIRS = (0.02, 0.05, 0.1)
+# Cells keep their calibration within some per cent; a lever that was measured wrongly is 10 to 16 % off.
+_GAINS = (0.01, 0.03, 0.1)
+# Cheeseman and Bennett at half a radius from the wall: 1.33, at one radius 1.07.
+_WALLS = (0.02, 0.07, 0.15)
 _ZEROS = (0.004, 0.015, 0.05)
-_UNKNOWN_SIZES = (0.1, 0.35, 1.0)
+# Smooth changes of each load on its own, as (size, and its level, bend and local shape over it): nobody knows what
+# makes them; beyond a tenth of level it is rather another blade, whose coefficients are other lines with a slight bend.
+_UNKNOWN_KINDS = ((0.1, 1.0, 0.1, 0.06), (0.35, 1.0, 0.1, 0.06), (1.0, 0.35, 0.1, 0.06))
+_WITHOUT_BLADES = (*_UNKNOWN_KINDS[:2], (1.0, 1.0, 0.1, 0.06))
+_BLADE_KINDS = ((0.35, 1.0, 0.03, 0.0), (1.0, 1.0, 0.03, 0.0))
 SURE = 0.85
 """Probability from which one effect is named."""
 FORM = {0.15: 0.7, 0.45: 0.3}
 """What a change by air or blade may rise or bow with speed or advance, share of the change, with its prior weight: the
 sizes by which published laws of one effect differ (:mod:`bemt.diagnose.form`)."""
 _EXACT = {1.0: 1.0}
-NEAR, MOST = 20.0, 6
-"""An effect this many times less likely than the leading one is still in its class, which has at most so many members:
-a law is rougher than its evidence."""
+NEAR, MOST, FAMILIES = 20.0, 6, 3
+"""An effect this many times less likely than the leading one is still in its class, which has at most so many members,
+or members of at most so many families: a law is rougher than its evidence."""
+FAMILY = {
+    **dict.fromkeys(("diameter", "pitch_offset", "section", "propeller", "untwist"), "blade"),
+    **dict.fromkeys(("duct", "ground_effect", "coaxial_neighbour", "recirculation"), "surroundings"),
+    **dict.fromkeys(("airspeed_offset", "airspeed_gain", "nacelle"), "airspeed"),
+    **dict.fromkeys(("thrust_gain", "torque_gain", "thrust_zero", "torque_zero"), "load cell"),
+    **dict.fromkeys(("battery_sag", "motor_heating", "motor"), "drive"),
+}
+"""What an engineer would look at, at once; an effect that is not listed is a family of its own."""
+_OWN_SHAPE, _FURTHER = "propeller", 20.0
 RIVAL, DOUBT = 0.1, 0.3
 """An effect beside which the unknown keeps more than the first is not named; a class beside the second is not given."""
-# Recorded densities are this good: a barometer, a thermometer and nobody's humidity, share.
-_DENSITY = 0.004
 # Speed at equal command of one motor, in ln: battery and load change it by no more.
 _SAME_DRIVE = 0.06
 # No battery changes the speed at equal command by more than this, in ln.
@@ -103,6 +120,7 @@ LAWS: tuple[ScalingLaw, ...] = (
         "thrust and torque change by the same share at every speed",
         "read barometer and thermometer in both runs",
         "T = CT rho n^2 D^4, Q = CQ rho n^2 D^5",
+        sizes=_AIRS,
         exact=True,
     ),
     ScalingLaw(
@@ -162,7 +180,7 @@ LAWS: tuple[ScalingLaw, ...] = (
         "both loads change by large shares of their own: pitch, blades, chord and section at once",
         "compare label, blade count and weight",
         "CT and CP of another blade",
-        sizes=(0.2, 0.6, 1.5),
+        sizes=(0.07, 0.2, 0.6, 1.5),
     ),
     ScalingLaw(
         "untwist",
@@ -188,6 +206,7 @@ LAWS: tuple[ScalingLaw, ...] = (
         "thrust changes at the same speed while torque stays, fading with airspeed",
         "measure at twice the distance",
         "Cheeseman and Bennett, ARC R&M 3021, 1955",
+        sizes=_WALLS,
     ),
     ScalingLaw(
         "coaxial_neighbour",
@@ -245,6 +264,7 @@ LAWS: tuple[ScalingLaw, ...] = (
         "hang dead weights on the cell",
         "T' = g T",
         "stand",
+        _GAINS,
     ),
     ScalingLaw(
         "torque_gain",
@@ -254,6 +274,7 @@ LAWS: tuple[ScalingLaw, ...] = (
         "hang a known lever and weight",
         "Q' = g Q",
         "stand",
+        _GAINS,
     ),
     ScalingLaw(
         "thrust_zero",
@@ -392,7 +413,10 @@ def _volts(channels: Mapping[str, MatchedChannel]) -> dict[str, float | Array]:
 
 
 def _columns(
-    row: ScalingLaw, channels: Mapping[str, MatchedChannel], form: float, volts: Mapping[str, float | Array]
+    row: ScalingLaw,
+    channels: Mapping[str, MatchedChannel],
+    form: float,
+    volts: Mapping[str, float | Array],
 ) -> Array | None:
     """Columns of a law over all channels, (M, terms and form), each of unit size; None where nothing moves.
 
@@ -435,24 +459,55 @@ def _slips(channels: Mapping[str, MatchedChannel]) -> list[tuple[str, Array]]:
     return out
 
 
-def _pole_slips(channels: Mapping[str, MatchedChannel], speeds: tuple[float, float] | None) -> list[Array]:
-    """Changes by a ratio of pole pairs: loads go with its square, (M,) means."""
+def _pole_slips(speeds: tuple[float, float] | None) -> list[float]:
+    """Ratios of pole pairs that may have been set, as the true speed of B over the indicated one."""
     ratios = [f for p, q in _POLE_PAIRS for f in (p / q, q / p)]
-    second = np.concatenate([c.second.astype(float) for c in channels.values()])
     if speeds is not None:  # one motor at one command: what is indicated changes by the same ratio
         ratios = [f for f in ratios if abs(math.log(f) + speeds[0]) < _SAME_DRIVE + speeds[1]]
-    return [2.0 * math.log(f) * second for f in ratios]
+    return ratios
+
+
+def _at_speed(c: MatchedChannel, factor: float) -> MatchedChannel:
+    """The channel with the true speed of B so many times the indicated one.
+
+    With airspeed the points stay where they are: what a shift of J does there, a pitch does as well.
+    """
+    x = c.x.copy()
+    if not c.advance_moves():
+        x[c.second, 0] += math.log(factor)
+    return replace(c, x=x, y=c.y - fits.POWER_OF_SPEED.get(c.channel, 2.0) * math.log(factor) * c.second)
+
+
+def _by_poles(
+    channels: Mapping[str, MatchedChannel], scatter: Mapping[str, Scatter], speeds: tuple[float, float] | None
+) -> tuple[float, float] | None:
+    """Log evidence of a wrong number of poles, and the logarithm of the likeliest ratio."""
+    ratios = _pole_slips(speeds)
+    if not ratios:
+        return None
+    terms = []
+    for factor in ratios:
+        there = {k: _at_speed(c, factor) for k, c in channels.items()}
+        terms.append(sum(_likelihood(fits.covariance(c, scatter[k]), c.y) for k, c in there.items()))
+    odd = speeds is not None and abs(speeds[0]) > _ODD_SPEED
+    ways = len(ratios) if odd else 2 * len(_POLE_PAIRS)
+    return float(np.logaddexp.reduce(terms)) - math.log(ways), math.log(ratios[int(np.argmax(terms))])
+
+
+def _likelihood(K: Array, y: Array) -> float:
+    """Log likelihood but for the constant that all explanations share."""
+    return fits.log_likelihood(K, y - y.mean()) + 0.5 * y.size * math.log(2.0 * math.pi)
 
 
 def weigh(
     channels: Mapping[str, MatchedChannel],
     scatters: Sequence[Mapping[str, Scatter]],
     kinds: Sequence[str],
-    density_known: bool = False,
+    density: float | None = None,
     speeds: tuple[float, float] | None = None,
 ) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
-    """Evidence of every explanation."""
-    found = [_weighed(channels, scatter, kinds, density_known, speeds) for scatter in scatters]
+    """Evidence of every explanation; ``density``: how well the ratio of the densities is known [1]."""
+    found = [_weighed(channels, scatter, kinds, density, speeds) for scatter in scatters]
     names = list(found[0][0])
     score = {k: float(np.logaddexp.reduce([z[k] for z, _ in found])) for k in names}
     size = {k: max(found, key=lambda f: f[0][k])[1][k] for k in names if k in found[0][1]}
@@ -468,7 +523,7 @@ def _weighed(
     channels: Mapping[str, MatchedChannel],
     scatter: Mapping[str, Scatter],
     kinds: Sequence[str],
-    density_known: bool,
+    density: float | None,
     speeds: tuple[float, float] | None,
 ) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
     """Log evidence of every explanation at one setting of the scatter, and sizes."""
@@ -490,7 +545,7 @@ def _weighed(
     size: dict[str, tuple[float, float]] = {}
     moving = any(c.advance_moves() for c in channels.values())
     for row in (row for row in LAWS if row.kind in kinds and (moving or not row.flow)):
-        sizes = (_DENSITY,) if row.id == "air_density" and density_known else row.sizes
+        sizes = (density,) if row.id == "air_density" and density is not None else row.sizes
         found = []
         for form, prior in (_EXACT if row.kind == "stand" or row.exact else FORM).items():
             columns = _columns(row, channels, form, volts)
@@ -504,18 +559,20 @@ def _weighed(
             best = max(found, key=lambda f: f[0])
             size[row.id] = best[1], best[2]
     if "rpm_scale" in score:
-        means = _pole_slips(channels, speeds)
-        if means:
-            odd = speeds is not None and abs(speeds[0]) > _ODD_SPEED
-            z, mean = _shifted(means, white, r, none, len(means) if odd else 2 * len(_POLE_PAIRS))
-            if z > score["rpm_scale"]:
-                size["rpm_scale"] = mean / 2.0, 0.0
-            score["rpm_scale"] = float(np.logaddexp(score["rpm_scale"], z)) - math.log(2.0)
+        poles = _by_poles(channels, scatter, speeds)
+        if poles is not None:
+            if poles[0] > score["rpm_scale"]:
+                size["rpm_scale"] = poles[1], 0.0
+            score["rpm_scale"] = float(np.logaddexp(score["rpm_scale"], poles[0])) - math.log(2.0)
     slips = _slips(channels) if "stand" in kinds else []
     if slips:
         z, mean = _shifted([m for _, m in slips], white, r, none, len(slips))
         score["unit_slip"], size["unit_slip"] = z, (mean, 0.0)
-    score[UNKNOWN] = _unknown(channels, base, none)
+    blades = _OWN_SHAPE in score
+    score[UNKNOWN] = _any_change(channels, base, none, _UNKNOWN_KINDS if blades else _WITHOUT_BLADES)
+    if blades:
+        own = _any_change(channels, base, none, _BLADE_KINDS)
+        score[_OWN_SHAPE] = float(np.logaddexp(score[_OWN_SHAPE], own)) - math.log(2.0)
     return score, size
 
 
@@ -550,13 +607,18 @@ def _linear(A: Array, r: Array, sd: Array) -> tuple[float, Array, float]:
     return z, b, math.sqrt(float(np.linalg.inv(G)[0, 0]))
 
 
-def _unknown(channels: Mapping[str, MatchedChannel], base: Mapping[str, Array], none: float) -> float:
+def _any_change(
+    channels: Mapping[str, MatchedChannel],
+    base: Mapping[str, Array],
+    none: float,
+    kinds: Sequence[tuple[float, float, float, float]],
+) -> float:
     """Log evidence of a smooth change of every channel on its own, on the scale of the others."""
     found = []
-    for size in _UNKNOWN_SIZES:
+    for size, level, bend, local in kinds:
         total = none
         for name, c in channels.items():
-            y, free = c.y - c.y.mean(), size**2 * fits.free_change(c)
+            y, free = c.y - c.y.mean(), size**2 * fits.free_change(c, level, bend, local)
             total += fits.log_likelihood(base[name] + free, y) - fits.log_likelihood(base[name], y)
         found.append(total)
     return float(np.logaddexp.reduce(found)) - math.log(len(found))
@@ -579,12 +641,21 @@ def judge(probability: Mapping[str, float], size: Mapping[str, tuple[float, floa
     best = max(listed.values())
     credible = [k for k, p in sorted(listed.items(), key=lambda kv: -kv[1]) if p >= best / NEAR]
     first = credible[0]
+    if credible == [_OWN_SHAPE]:  # curves of its own fit anything: what comes near is not ruled out
+        credible = [k for k, p in sorted(listed.items(), key=lambda kv: -kv[1]) if p >= best / (NEAR * _FURTHER)]
     if len(credible) == 1 and listed[first] >= SURE and unknown <= RIVAL:
         row = law(first)
         kind = "sensor" if first == "unit_slip" or (row is not None and row.kind == "stand") else "named"
         return answer(kind, (first,), row.says if row is not None else "the ratio is exactly that of two units")
-    if 1 < len(credible) <= MOST and unknown <= DOUBT and probability[NONE] <= RIVAL:
+    if 1 < len(credible) and {FAMILY.get(k) for k in credible} == {"blade"}:  # which of them is hard to say
+        least = best / (NEAR * _FURTHER)
+        credible += [k for k, p in listed.items() if FAMILY.get(k) == "blade" and p >= least and k not in credible]
+    families = {FAMILY.get(k, k) for k in credible}
+    few = len(credible) <= MOST or len(families) <= FAMILIES
+    if len(credible) > 1 and few and unknown <= DOUBT and probability[NONE] <= RIVAL:
         return answer("class", credible, f"these scale alike ({mass:.2f})")
+    if len(credible) == 1 and listed[first] < SURE:
+        return answer("insufficient", (), f"{first} is likely ({listed[first]:.2f}) but not sure")
     if len(credible) == 1:
         return answer("insufficient", (), f"{first} ({listed[first]:.2f}) leads, but unknown keeps {unknown:.2f}")
     return answer("insufficient", (), f"{len(credible)} causes scale like that in these channels")

@@ -5,18 +5,20 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.air import Air
 from bemt.base.errors import Fault, InputError
+from bemt.base.units import ZERO_CELSIUS
 from bemt.readers._imported import Channel, Imported
 from bemt.recordings.channels import view
 from bemt.recordings.reduce import Reduced, reduce
 
-__all__ = ["StandRun", "selected", "stand_run"]
+__all__ = ["StandRun", "selected", "stand_run", "with_air"]
 
 Array = NDArray[np.float64]
 
@@ -34,6 +36,7 @@ _WANTED = (
     "run",
     "temperature_K",
 )
+_AIR = re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(C|K|hPa|Pa|kg/m3)")
 _CONDITION = re.compile(r"\s*([^=]+?)\s*=\s*(.+?)\s*")
 _RANGE = re.compile(r"([-+.\deE]+):([-+.\deE]+)")
 _ROTOR = "rotor"
@@ -41,6 +44,10 @@ _ROTOR = "rotor"
 _SAME_NUMBER = 1e-6
 # A ramp instead of plateaus: fewest points and rows, rows that must agree, ln of a misreading, 1/s of a slow ramp.
 _ENOUGH, _ROWS, _WINDOW, _JUMP, _RATE = 8, 20, 7, 0.03, 0.25
+# Load of a ramp over full scale that a lag of 0.2 s leaves when it takes ten seconds.
+_LAG = 0.02
+# Temperatures that air of a stand can have [K].
+_COLD, _HOT = 230.0, 330.0
 _ROTOR_WORDS = ("left", "right", "upper", "lower", "front", "rear", "A", "B", "C", "D", "1", "2", "3", "4")
 
 
@@ -66,6 +73,10 @@ class StandRun:
         What the reduction decided.
     diameter_m : float
         As the recording or the label says; NaN: unknown. [m]
+    temperature_K : float
+        Mean of the air [K]; NaN: not recorded.
+    shift : mapping of str to float
+        What lag or hysteresis shifts a load by, standard deviation as a share of its largest value [1].
     """
 
     name: str
@@ -76,6 +87,8 @@ class StandRun:
     density: float
     notes: tuple[str, ...]
     diameter_m: float
+    temperature_K: float = math.nan
+    shift: Mapping[str, float] = field(default_factory=dict)
 
     def __len__(self) -> int:
         """Give the number of points."""
@@ -175,6 +188,47 @@ def _cut(imported: Imported, index: NDArray[np.intp]) -> Imported:
     )
 
 
+_AIR_UNITS = {
+    "C": ("temperature_K", 1.0, ZERO_CELSIUS), "K": ("temperature_K", 1.0, 0.0), "hPa": ("pressure_Pa", 100.0, 0.0),
+    "Pa": ("pressure_Pa", 1.0, 0.0), "kg/m3": ("density_kg_m3", 1.0, 0.0),
+}  # fmt: skip
+_AIR_RANGES = {"temperature_K": (_COLD, _HOT), "pressure_Pa": (4e4, 1.1e5), "density_kg_m3": (0.4, 1.6)}
+
+
+def with_air(imported: Imported, told: str | None, where: str) -> Imported:
+    """Add the air of the day that a user tells, such as ``22C,1013hPa``, in place of what is recorded.
+
+    Examples
+    --------
+    >>> told = with_air(Imported("table", "bench", 1, {}), "22C, 1013hPa", "--air-a").constants
+    >>> round(told["density_kg_m3"], 3)
+    1.196
+    """
+    if told is None:
+        return imported
+    known, faults = {}, []
+    for part in told.split(","):
+        found = _AIR.fullmatch(part.strip())
+        name, factor, offset = _AIR_UNITS[found[2]] if found else ("", 1.0, 0.0)
+        value = float(found[1]) * factor + offset if found else math.nan
+        low, high = _AIR_RANGES.get(name, (0.0, 0.0))
+        if not low <= value <= high:
+            hint = "A temperature alone takes one pressure for both runs"
+            faults.append(
+                Fault(where, "", repr(part), "a number with C, K, hPa, Pa or kg/m3, such as 22C,1013hPa", hint)
+            )
+        known[name] = value
+    if set(known) == {"pressure_Pa"}:
+        faults.append(Fault(where, "", repr(told), "a temperature too, or a density"))
+    if faults:
+        raise InputError(faults)
+    if known.keys() >= {"temperature_K", "pressure_Pa"}:
+        known["density_kg_m3"] = Air.from_state(known["pressure_Pa"], known["temperature_K"] - ZERO_CELSIUS).rho
+    left = {k: c for k, c in imported.channels.items() if k not in _AIR_RANGES}
+    constants = {k: v for k, v in imported.constants.items() if k not in _AIR_RANGES}
+    return replace(imported, channels=left, constants=constants | known)
+
+
 def stand_run(
     imported: Imported, name: str, diameter_m: float | None = None, conditions: Sequence[str] = ()
 ) -> StandRun:
@@ -200,7 +254,21 @@ def stand_run(
     session = {k: float(v["session"]) for k, v in reduced.correlated.items() if v.get("session")}
     diameter = diameter_m if diameter_m is not None else float(constants.get("diameter_m", math.nan))
     notes = (*ramp, *(n for n in reduced.notes if "no density" not in n))
-    return StandRun(told, values, u, session, command, density, notes, diameter)
+    warm = values.get("temperature_K", np.array([constants.get("temperature_K", math.nan)]))
+    warm = warm[(warm > _COLD) & (warm < _HOT)]
+    temperature = float(warm.mean()) if warm.size else math.nan
+    return StandRun(
+        told, values, u, session, command, density, notes, diameter, temperature, _shifts(reduced, bool(ramp))
+    )
+
+
+def _shifts(reduced: Reduced, ramp: bool) -> dict[str, float]:
+    """Half of what a load differs by on the way up and down, and the lag of a ramp, over its largest value."""
+    out = dict.fromkeys(_LOADS, _LAG) if ramp else {}
+    for name, loop in reduced.hysteresis.items():
+        top = float(np.nanmax(np.abs(reduced.series.values[name])))
+        out[name] = max(out.get(name, 0.0), 0.5 * abs(loop.difference) / top if top > 0.0 else 0.0)
+    return out
 
 
 def _with_units(imported: Imported) -> Imported:

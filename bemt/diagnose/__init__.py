@@ -4,6 +4,8 @@ The way of the data: ``record`` (points and covariates) -> ``problem`` (baseline
 ``signatures`` (every effect solved over its ranges) -> ``evidence`` (none, each effect, pairs, an unknown smooth
 effect) -> ``gate``, ``verdict`` (with ``confusion``) -> ``fit`` (parameters, held-out blocks), ``locate``, ``suggest``
 -> document (``bemt.diagnosis/1``), text, figures.
+
+``bemt.diagnose(recording, propeller)`` goes all the way: ``help(bemt.library.diagnose)``.
 """
 
 from __future__ import annotations

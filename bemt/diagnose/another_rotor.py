@@ -27,8 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["FACTOR", "RESTLESS", "Suspect", "finding", "judged", "levels", "of_recorded", "suspects"]
 
 FACTOR = 3.0
-"""Thrust (torque, where no thrust was measured) over that of the case, or under it, from which on the question comes
-first [1]."""
+"""Thrust or torque over that of the case, or under it, from which on the question comes first [1]."""
 RESTLESS = 0.10
 """Scatter of repeats, share of the reading, that no stand has: something that is not recorded changes [1]."""
 # What loads of the right rotor may be off by, natural logarithm; how unusual a slip is adds to its square.
@@ -69,8 +68,7 @@ def levels(problem: Problem) -> dict[str, float]:
 
 
 def _suspicious(found: dict[str, float]) -> bool:
-    level = next((found[c] for c in CHANNELS[:2] if c in found), 1.0)
-    return not 1.0 / FACTOR < abs(level) < FACTOR
+    return any(not 1.0 / FACTOR < abs(found[c]) < FACTOR for c in CHANNELS[:2] if c in found)
 
 
 def suspects(problem: Problem) -> list[Suspect]:

@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 from bemt import __version__
 from bemt.base.errors import Fault, InputError
+from bemt.base.face import as_html
 from bemt.compare.recordings import RunChange, changed, document, next_step
-from bemt.compare.stand_run import selected, stand_run
+from bemt.compare.stand_run import selected, stand_run, with_air
+from bemt.effects import catalogue
 
 if TYPE_CHECKING:
     from bemt.case import Case
@@ -22,6 +24,9 @@ if TYPE_CHECKING:
 _REMARK = "Before any physics"
 # An effect whose scaling is so much less likely than the best cannot have made the ratios.
 _IMPOSSIBLE = 1e-4
+# "None" in the ratios less likely than this is no answer of the diagnosis either.
+_UNLIKELY = 0.15
+_CLAIMS = ("named", "sensor", "class")
 
 __all__ = ["Contrast", "compare", "label_diameter"]
 
@@ -62,6 +67,10 @@ class Contrast:
         """The answer on one screen."""
         return self.text
 
+    def _repr_html_(self) -> str:
+        """Show the answer in a notebook."""
+        return as_html(repr(self)[1:-1], self.text)
+
     def __repr__(self) -> str:
         """Say the verdict in a line."""
         runs = f"{self.change.a.name}, {self.change.b.name}"
@@ -76,9 +85,13 @@ def compare(
     diameter_m: float | None = None,
     rows_a: Sequence[str] = (),
     rows_b: Sequence[str] = (),
+    air_a: str | None = None,
+    air_b: str | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Contrast:
     """Say what changed between two recordings of one stand.
+
+    ``air_a`` and ``air_b`` say what the files do not: ``"22C,1013hPa"``, ``"22C"`` or ``"1.19kg/m3"``.
 
     Notes
     -----
@@ -103,9 +116,9 @@ def compare(
         )
     read: list[Imported] = []
     faults: list[Fault] = []
-    for name, rows in zip(names, conditions, strict=True):
+    for name, rows, air, option in zip(names, conditions, (air_a, air_b), ("--air-a", "--air-b"), strict=True):
         try:
-            read.append(selected(import_file(name), rows, name))
+            read.append(with_air(selected(import_file(name), rows, name), air, option))
         except InputError as error:
             faults += error.faults
     if faults:
@@ -156,29 +169,54 @@ def _diagnosed(
 
 
 def _agreed(said: dict[str, Any], ratios: dict[str, Any], found: RunChange) -> dict[str, Any]:
-    """The diagnosis where the ratios bear it out.
+    """One answer of the diagnosis and of the ratios.
 
-    The ratios know no blade and cannot be misled by one. An effect that cannot make them is struck; where they agree
-    within scatter and set-up there is nothing unknown either; a density that both recordings tell is the answer.
+    The ratios know no blade and cannot be misled by one; the diagnosis knows what this blade does. Where one cannot
+    judge an effect the other's word stands: the diagnosis knows no other propeller, the ratios no skewed inflow. An
+    effect that cannot make the ratios is struck; where they agree within scatter and set-up there is nothing unknown.
     """
     by_ratio = found.loads
-    keys = ("verdict", "effects", "probability", "ranking", "rule")
-    mine = {k: ratios[k] for k in keys}
+    mine = {k: ratios[k] for k in ("verdict", "effects", "probability", "ranking", "rule")}
+    decided = by_ratio.verdict in _CLAIMS
+    if by_ratio.verdict == said["verdict"] == "none" and found.leading is found.drive:
+        return said | mine | {"told": [f"The loads agree; the drive does not: {ratios['rule']}."]}
     if by_ratio.verdict == "none" and said["verdict"] == "unknown":
         return said | mine | {"rule": f"{by_ratio.why}; the model misses the same in both"}
-    if said["verdict"] == "none" and by_ratio.verdict == "named" and "air_density" in by_ratio.effects:
-        return said | mine
-    if said["verdict"] not in ("named", "sensor", "class") or not by_ratio.probability:
+    if said["verdict"] not in _CLAIMS:
+        sees = decided or (said["verdict"] == "none" and by_ratio.probability.get("none", 1.0) < _UNLIKELY)
+        return _by_ratios(said, mine, "errors of the model that cannot be told from it") if sees else said
+    if not by_ratio.probability:
         return said
     least = _IMPOSSIBLE * max(by_ratio.probability.values())
     struck = [k for k in said["effects"] if by_ratio.probability.get(k, 1.0) < least]
-    left = [k for k in said["effects"] if k not in struck]
-    if not struck:
-        return said
     why = f"{' and '.join(struck)} cannot make these ratios of thrust and torque"
-    if left and said["verdict"] == "class":
-        return said | {"effects": left, "rule": f"{said['rule']}; {why}"}
-    return said | mine | {"rule": f"{ratios['rule']}; {why}", "told": [f"The ratios say: {ratios['rule']}; {why}."]}
+    left = [k for k in said["effects"] if k not in struck]
+    if not decided:
+        if not struck:
+            return said
+        if left and said["verdict"] == "class":
+            return said | {"effects": left, "rule": f"{said['rule']}; {why}"}
+        return _by_ratios(said, mine, why)
+    both = [k for k in left if k in by_ratio.effects]
+    lone = [k for k in left if k not in by_ratio.probability]
+    other = [k for k in by_ratio.effects if k not in catalogue()]
+    if said["verdict"] != "class" and both == list(said["effects"]):
+        rank = by_ratio.probability
+        if len(both) > 1 or not other or rank[both[0]] >= max(rank[k] for k in other):
+            return said
+    if not both and not lone:
+        return _by_ratios(said, mine, why if struck else f"{', '.join(left)} would scale otherwise")
+    effects = [*both, *lone, *(other if both else by_ratio.effects)]
+    if len(effects) == 1:
+        return said | {"effects": effects}
+    rule = f"{said['rule']}; {ratios['rule']}" + (f"; {why}" if struck else "")
+    return said | {"verdict": "class", "effects": effects, "rule": rule}
+
+
+def _by_ratios(said: dict[str, Any], mine: dict[str, Any], why: str) -> dict[str, Any]:
+    """The answer of the ratios in place of that of the diagnosis."""
+    told = [f"The ratios say: {mine['rule']}. The diagnosis said {said['verdict']}: {why}."]
+    return said | mine | {"told": told}
 
 
 def _after(doc: dict[str, Any], names: Sequence[str], case: Case) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from bemt.base.errors import Fault, InputError
+from bemt.base.face import as_html
 from bemt.base.tables import number_text
 from bemt.base.units import INCH, KGF
 from bemt.case import Case
@@ -83,6 +84,15 @@ class DriveEstimate:
         What was varied, and how far.
     notes : tuple of str
         What does not fit.
+
+    Examples
+    --------
+    >>> import bemt
+    >>> found = bemt.drive("10x5", kv=1000, cells=3, mass_kg=1.2, rotors=4)
+    >>> found.reached, 0.3 < found.hover["throttle"].value < 0.8, found.to_dict()["schema"]
+    (True, True, 'bemt.drive.estimate/1')
+    >>> print(found.text.splitlines()[0])
+    prop_10x5, 1000 rev/min/V, 3S at 50% charge, ± one standard deviation
     """
 
     label: str
@@ -96,6 +106,10 @@ class DriveEstimate:
         """Say what is known in a line."""
         given, thrust = self.given, self.full["thrust_N"]
         return f"<drive of {self.label}: {given['kv_rpm_V']:g} rev/min/V, {given['cells']}S, {_shown(thrust, 'N')}>"
+
+    def _repr_html_(self) -> str:
+        """Show the estimate in a notebook."""
+        return as_html(repr(self)[1:-1], self.text)
 
     @property
     def text(self) -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.effects.base import Array, Effect, Flow, Loads, Parameter
+from bemt.effects.base import Array, Effect, Flow, Loads, Parameter, choice
 
 
 @dataclass(frozen=True)
@@ -22,12 +22,18 @@ class LipSeparation(Effect):
     AHS Forum; Pereira (2008), PhD thesis Univ. of Maryland, ch. 4 (not checked).  Proportion and hysteresis are
     declared: once separated, the flow attaches again below onset (1 - hysteresis), seen only when the recording has
     time.
+
+    A lip also stalls by the direction of the stream, whatever the load: the stagnation point wanders outside as V/(nD)
+    falls, and the suction peak is sharpest at rest (Kuchemann and Weber 1953, Aerodynamics of Propulsion, ch. 4; not
+    checked).  ``by`` = "advance" takes 1 - J / Jmax in place of the load: ``onset`` is then that share of the way from
+    the largest J of the recording to rest.
     """
 
     onset: float = 0.7
     loss: float = 0.3
     hysteresis: float = 0.0
     width: float = 0.0
+    by: str = "load"
 
     id = "lip_separation"
     title = "separation at the lip of the duct"
@@ -40,6 +46,10 @@ class LipSeparation(Effect):
     )
     on_by_default = False
 
+    def __post_init__(self) -> None:
+        """Refuse unknown measures."""
+        choice("by", self.by, ("load", "advance"))
+
     def applies(self, flow: Flow) -> str:
         """An open rotor has no lip."""
         return "" if flow.ducted else "the rotor has no duct"
@@ -50,6 +60,11 @@ class LipSeparation(Effect):
         if not (flow.ducted and top > 0.0):
             return
         load = np.maximum(loads.T_duct / top, 0.0)
+        if self.by == "advance":
+            fastest = float(np.max(flow.J, initial=0.0))
+            if not fastest > 0.0:
+                return
+            load = 1.0 - np.clip(flow.J / fastest, 0.0, 1.0)
         low = np.where(self._separated(load, flow), self.onset * (1.0 - self.hysteresis), self.onset)
         span = self.width * low if self.width > 0.0 else 1.0 - low
         lost = self.loss * np.clip((load - low) / span, 0.0, 1.0) * np.maximum(loads.T_duct, 0.0)
@@ -66,12 +81,18 @@ class LipSeparation(Effect):
             state[run] = gone > back
         return state
 
-    def variants(self) -> tuple[dict[str, float], ...]:
-        """Seven onsets and six losses in ratio, at once and bit by bit, with and without hysteresis."""
-        return tuple(
-            {"onset": o, "loss": k, "hysteresis": h, "width": w}
+    def variants(self) -> tuple[dict[str, str | float], ...]:
+        """Seven onsets and six losses in ratio, at once and bit by bit, with and without hysteresis; four by V/(nD)."""
+        losses = (0.1, 0.2, 0.35, 0.5, 0.7, 1.0)
+        by_load: tuple[dict[str, str | float], ...] = tuple(
+            {"onset": o, "loss": k, "hysteresis": h, "width": w, "by": "load"}
             for o in (0.02, 0.04, 0.08, 0.16, 0.32, 0.6, 0.85)
-            for k in (0.1, 0.2, 0.35, 0.5, 0.7, 1.0)
+            for k in losses
             for h in (0.0, 0.2)
             for w in (0.0, 1.0)
         )
+        by_advance: tuple[dict[str, str | float], ...] = tuple(
+            {"onset": o, "loss": k, "hysteresis": 0.0, "width": 0.0, "by": "advance"}
+            for o in (0.1, 0.35, 0.6, 0.85) for k in losses
+        )  # fmt: skip
+        return by_load + by_advance

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from bemt.base.folders import data_roots
 from bemt.proof.items import Item, recording_text
 
-__all__ = ["PairOf", "draw_pairs", "pairs"]
+__all__ = ["Followed", "PairOf", "draw_pairs", "followed", "pair_files", "pairs"]
 
 Array = NDArray[np.float64]
 
@@ -88,6 +88,31 @@ def pairs() -> tuple[PairOf, ...]:
                 if one.kind in told["sets"] and told["only"] in a
             ]
     return tuple(out)
+
+
+@dataclass(frozen=True)
+class Followed:
+    """A silent pair, the step that was recommended, and the recordings that took it."""
+
+    of: tuple[str, str]
+    step: str
+    ab: tuple[str, str]
+
+
+def followed() -> tuple[Followed, ...]:
+    """Steps of the manifest that somebody took."""
+    return tuple(
+        Followed((r["of"][0], r["of"][1]), r["step"], (r["ab"][0], r["ab"][1])) for r in _manifest()["followed"]
+    )
+
+
+def pair_files(a: str, b: str) -> dict[str, str] | None:
+    """Files of an item that compares two recordings; None where one of them is not found."""
+    paths = [_find(_recordings()[name]["path"]) for name in (a, b)]
+    if None in paths:
+        return None
+    texts = [_text(path, name) for path, name in zip(paths, (a, b), strict=True) if path is not None]
+    return {"reference.csv": texts[0], "recording.csv": texts[1], "compare": "A reference, B recording\n"}
 
 
 def _plain(path: Path, how: Mapping[str, Any]) -> dict[str, Array]:
@@ -177,18 +202,9 @@ def _case(label: Mapping[str, Any]) -> str:
 def draw_pairs() -> Iterator[Item]:
     """Make an item of every pair whose recordings are found."""
     for pair in pairs():
-        parts = []
-        for name in (pair.a, pair.b):
-            how = _recordings()[name]
-            path = _find(how["path"])
-            parts.append(None if path is None else _text(path, name))
-        if any(part is None for part in parts):
+        files = pair_files(pair.a, pair.b)
+        if files is None:
             continue
-        files = {
-            "reference.csv": str(parts[0]),
-            "recording.csv": str(parts[1]),
-            "compare": "A reference, B recording\n",
-        }
         files |= {} if pair.case is None else {"case.toml": _case(pair.case)}
         n = len(pair.causes)
         yield Item(
@@ -207,7 +223,7 @@ def draw_pairs() -> Iterator[Item]:
                 "rig": f"{pair.a} | {pair.b}",
                 "ducted": False,
                 "seed": 0,
-                "rows": str(parts[1]).count("\n") - 1,
+                "rows": files["recording.csv"].count("\n") - 1,
                 "stand": {},
                 "reason": pair.reason,
             },

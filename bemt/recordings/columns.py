@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.air import LIQUID
 from bemt.recordings.findings import Facts, Finding, check_for
 
 __all__: list[str] = []
@@ -218,7 +219,7 @@ def air_units(facts: Facts) -> Iterator[Finding]:
         if v is None:
             continue
         value = float(np.nanmedian(v))
-        if low <= value <= high:
+        if low <= value <= high or (name == "density_kg_m3" and LIQUID[0] <= value <= LIQUID[1]):
             continue
         fits = [words for factor, offset, words in ways if low <= value * factor + offset <= high]
         text = f"median {value:.5g} is outside {low:g} to {high:g}"

@@ -1,15 +1,11 @@
-"""What `import bemt` offers: propellers and fans, their curves, recordings, diagnoses, drives.
-
-Every function here takes and gives plain things: a label or a file, numbers in the unit of their name, a
-:class:`bemt.dataset.Dataset` out. Nothing prints; bad input raises :class:`bemt.base.errors.InputError`, which says
-file, place and remedy.
-"""
+"""Propellers and fans of the public face: made of a label, of stations or of a case; solved into Datasets."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,19 +13,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.errors import Fault, InputError
+from bemt.base.face import table_html
 from bemt.case import Case, case_of, find_cases, fresh, load_case
-from bemt.dataset import Dataset, from_pandas
+from bemt.dataset import Dataset
+from bemt.library.given import numbers, path_text
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from bemt.air import Air
-    from bemt.diagnose.chain import Diagnosis
-    from bemt.diagnose.contrast import Contrast
-    from bemt.diagnose.record import Record
-    from bemt.drive.from_label import DriveEstimate
+    from bemt.bem.gradient import Gradient
+    from bemt.bem.model import Model
 
-__all__ = ["Answer", "Propeller", "compare", "diagnose", "drive", "load", "propeller", "read", "validate"]
+__all__ = ["Propeller", "load", "propeller"]
 
 Array = NDArray[np.float64]
 CHANNELS = (
@@ -54,8 +50,8 @@ class Propeller:
     Examples
     --------
     >>> p = propeller("10x5")
-    >>> p.diameter_m, p.blades
-    (0.254, 2)
+    >>> p
+    <propeller prop_10x5: 0.254 m, 2 blades, 7 unknowns>
     """
 
     case: Case
@@ -66,24 +62,56 @@ class Propeller:
         kind = "fan" if self.case.ducted else "propeller"
         return f"<{kind} {self.name}: {self.diameter_m:.4g} m, {self.blades} blades, {len(self.unknowns)} unknowns>"
 
+    def _repr_html_(self) -> str:
+        """Show it in a notebook: size, point of operation, declared unknowns."""
+        head = f"{'fan' if self.case.ducted else 'propeller'} {self.name}"
+        size = {"diameter": f"{self.diameter_m:.4g} m", "blades": f"{self.blades}"}
+        point = f"{self.case.rpm:g} rev/min, {self.case.airspeed_m_s:g} m/s"
+        unknowns = {f"unknown {key}": text for key, text in self.unknowns.items()}
+        return table_html(head, {**size, "solved at, unless told": point, **unknowns})
+
     @property
     def name(self) -> str:
-        """Name of its case."""
+        """Name of its case.
+
+        Examples
+        --------
+        >>> propeller("10x5").name
+        'prop_10x5'
+        """
         return self.case.name
 
     @property
     def diameter_m(self) -> float:
-        """Diameter. [m]"""
+        """Diameter. [m]
+
+        Examples
+        --------
+        >>> propeller("10x5").diameter_m
+        0.254
+        """
         return self.case.diameter_m
 
     @property
     def blades(self) -> int:
-        """Number of blades."""
+        """Number of blades.
+
+        Examples
+        --------
+        >>> propeller("9x4.5x3").blades
+        3
+        """
         return int(self.case.file.rotor.blades)
 
     @property
     def unknowns(self) -> dict[str, str]:
-        """Declared unknowns and their ranges; bands come from these."""
+        """Declared unknowns and their ranges; bands come from these.
+
+        Examples
+        --------
+        >>> propeller("10x5").unknowns["blade.max_chord_over_R"]
+        '0.15 .. 0.24'
+        """
         return {item.key: item.range_text for item in self.case.assumptions}
 
     def solve(
@@ -122,7 +150,7 @@ class Propeller:
         (array([ 4.7, 10.8]), array([ 45., 152.]))
         """
         n, V = self._conditions(rpm, airspeed_m_s, J)
-        density = None if density_kg_m3 is None else float(_numbers("density_kg_m3", density_kg_m3))
+        density = None if density_kg_m3 is None else float(numbers("density_kg_m3", density_kg_m3))
         air = self.case.air(None if density is None else {"air.density_kg_m3": density})
         values, flags, u_model = _solved(self.case, n, V, air, bands)
         variance = {key: np.zeros(n.size) for key in BANDED}
@@ -173,15 +201,122 @@ class Propeller:
         (True, array([0.09, 0.06, 0.01]))
         """
         given = J is not None or airspeed_m_s is not None
-        n = np.atleast_1d(_numbers("rpm", self.case.rpm if rpm is None else rpm))
+        n = np.atleast_1d(numbers("rpm", self.case.rpm if rpm is None else rpm))
         x = np.linspace(0.0, 0.9, 19)
         if given:
-            x = np.atleast_1d(_numbers("airspeed_m_s", airspeed_m_s) if J is None else _numbers("J", J))
+            x = np.atleast_1d(numbers("airspeed_m_s", airspeed_m_s) if J is None else numbers("J", J))
         a, b = (v.ravel() for v in np.meshgrid(n, x, indexing="ij"))
         speed: dict[str, Any] = {"airspeed_m_s": b} if airspeed_m_s is not None and J is None else {"J": b}
         if J is not None and airspeed_m_s is not None:
             speed = {"J": b, "airspeed_m_s": airspeed_m_s}  # refused below
         return self.solve(a, density_kg_m3=density_kg_m3, bands=bands, **speed)
+
+    def along_blade(
+        self, rpm: float | None = None, airspeed_m_s: float | None = None, *, J: float | None = None,
+        density_kg_m3: float | None = None,
+    ) -> pd.DataFrame:  # fmt: skip
+        """Solve one operating point and show it along the blade.
+
+        Parameters
+        ----------
+        rpm : float, optional
+            Speed of rotation; the case's by default. [rev/min]
+        airspeed_m_s : float, optional
+            Axial speed; the case's by default. [m/s]
+        J : float, optional
+            Advance ratio instead. [-]
+        density_kg_m3 : float, optional
+            Of the air. [kg/m3]
+
+        Returns
+        -------
+        pandas.DataFrame
+            A row per blade element, from hub to tip: ``r_m``, ``chord_m``, ``beta_deg``, ``alpha_deg``, ``cl``, ``cd``,
+            ``Re``, ``M``, ``axial_m_s`` and ``swirl_m_s`` (speeds of the air at the disk), ``thrust_per_radius_N_m``,
+            ``torque_per_radius_Nm_m`` (all blades together). NaN where the point does not converge.
+
+        Raises
+        ------
+        InputError
+            For more than one point, and as for :meth:`solve`.
+
+        Notes
+        -----
+        Effects that act on points (a wall behind, the body of the vehicle) change the whole rotor's loads in
+        :meth:`solve` and are not distributed here.
+
+        Examples
+        --------
+        >>> p = propeller("10x5")
+        >>> blade = p.along_blade(rpm=6000)
+        >>> bool(abs(np.trapezoid(blade.thrust_per_radius_N_m, blade.r_m) / p.solve(6000).thrust_N[0] - 1) < 0.02)
+        True
+        """
+        import pandas as pd
+
+        from bemt.bem import kernel as K
+        from bemt.bem import solver
+
+        n, V = self._conditions(rpm, airspeed_m_s, J)
+        if n.size != 1:
+            raise InputError(Fault("", "rpm, airspeed_m_s, J", f"{n.size} points", "one operating point"))
+        density = None if density_kg_m3 is None else float(numbers("density_kg_m3", density_kg_m3))
+        air = self.case.air(None if density is None else {"air.density_kg_m3": density})
+        prep = self._model.prep
+        at = {key: value[0] for key, value in solver.solve(prep, n, V, air, radial=True).radial.items()}
+        width, chord = prep.st[:, K.S_DR], prep.st[:, K.S_CHORD]
+        return pd.DataFrame({
+            "r_m": at["r"], "chord_m": chord, "beta_deg": np.degrees(prep.st[:, K.S_BETA]),
+            "alpha_deg": np.degrees(at["alpha"]), "cl": at["cl"], "cd": at["cd"], "Re": at["Re"], "M": at["M"],
+            "axial_m_s": at["w"], "swirl_m_s": at["v_t"], "thrust_per_radius_N_m": at["dT"] / width,
+            "torque_per_radius_Nm_m": at["dQ"] / width,
+        })  # fmt: skip
+
+    def gradient(
+        self, rpm: float | None = None, airspeed_m_s: float | None = None, *, J: float | None = None
+    ) -> Gradient:
+        """Differentiate rotor thrust and torque at one operating point.
+
+        Parameters
+        ----------
+        rpm : float, optional
+            Speed of rotation; the case's by default. [rev/min]
+        airspeed_m_s : float, optional
+            Axial speed; the case's by default. [m/s]
+        J : float, optional
+            Advance ratio instead. [-]
+
+        Returns
+        -------
+        Gradient
+            ``thrust_N``, ``torque_Nm`` and the derivatives of both by every element's ``chord`` [1/m] and ``beta``
+            [1/rad], (2, N), and by ``pitch`` [1/rad], ``rpm``, ``airspeed`` and ``density``, (2,). Thrust of the rotor
+            alone, without duct and stator.
+
+        Raises
+        ------
+        InputError
+            For more than one point, one that does not converge, or effects that act around the rotor.
+
+        Examples
+        --------
+        >>> g = propeller("10x5").gradient(rpm=6000, airspeed_m_s=5)
+        >>> g.beta.shape, bool(g.pitch[0] > 0), bool(g.airspeed[0] < 0)
+        ((2, 40), True, True)
+        """
+        from bemt.bem.gradient import gradient
+
+        one, V = self._conditions(rpm, airspeed_m_s, J)
+        if one.size != 1:
+            raise InputError(Fault("", "rpm", f"{one.size} points", "one operating point"))
+        return gradient(self._model, self._model.effects, float(one[0]), float(V[0]), self.case.air())
+
+    @cached_property
+    def _model(self) -> Model:
+        """The rotor prepared once."""
+        from bemt.case.prepare import prepare_case
+
+        return prepare_case(self.case)
 
     def replaced(self, changes: Mapping[str, Any]) -> Propeller:
         """Set values of the case; one that was a declared unknown is known then.
@@ -226,11 +361,23 @@ class Propeller:
         -------
         Path
             The file.
+
+        Raises
+        ------
+        InputError
+            When there is a case already, or the folder cannot be written.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> file = propeller("10x5").write(Path(tempfile.mkdtemp()) / "mine")
+        >>> load(file).name
+        'prop_10x5'
         """
         from bemt.base.errors import system_fault
         from bemt.base.tables import write_atomic
 
-        file = Path(_path("folder", folder)) / "case.toml"
+        file = Path(path_text("folder", folder)) / "case.toml"
         if file.exists():
             raise InputError(Fault(file.as_posix(), "", "a file that is there", "a new folder"))
         try:
@@ -244,57 +391,37 @@ class Propeller:
         if J is not None and airspeed_m_s is not None:
             faults.append(Fault("", "J, airspeed_m_s", "both", "one of them"))
         given = {"rpm": rpm, "airspeed_m_s": airspeed_m_s, "J": J}
-        numbers: dict[str, Array] = {}
+        found: dict[str, Array] = {}
         for name, value in given.items():
             if value is None:
                 continue
             try:
-                numbers[name] = _numbers(name, value)
+                found[name] = numbers(name, value)
             except InputError as error:
                 faults += error.faults
-        if "rpm" in numbers and np.any(numbers["rpm"] <= 0.0):
-            faults.append(Fault("", "rpm", f"{np.min(numbers['rpm']):g}", "speeds above 0 rev/min", "Drop the sign?"))
-        elif "rpm" in numbers and np.any(numbers["rpm"] > RPM_MAX):
-            faults.append(Fault("", "rpm", f"{np.max(numbers['rpm']):g}", f"up to {RPM_MAX:g} rev/min"))
-        fast = np.max(np.abs(numbers.get("airspeed_m_s", np.zeros(1))))
+        if "rpm" in found and np.any(found["rpm"] <= 0.0):
+            faults.append(Fault("", "rpm", f"{np.min(found['rpm']):g}", "speeds above 0 rev/min", "Drop the sign?"))
+        elif "rpm" in found and np.any(found["rpm"] > RPM_MAX):
+            faults.append(Fault("", "rpm", f"{np.max(found['rpm']):g}", f"up to {RPM_MAX:g} rev/min"))
+        fast = np.max(np.abs(found.get("airspeed_m_s", np.zeros(1))))
         if fast > AIRSPEED_MAX:
             hint = "km/h? Divide by 3.6"
             faults.append(Fault("", "airspeed_m_s", f"{fast:g}", f"up to {AIRSPEED_MAX:g} m/s", hint))
-        shapes = {name: value.shape for name, value in numbers.items()}
+        shapes = {name: value.shape for name, value in found.items()}
         try:
             np.broadcast_shapes(*shapes.values())
         except ValueError:
-            got = ", ".join(f"{value.size} of {name}" for name, value in numbers.items())
+            got = ", ".join(f"{value.size} of {name}" for name, value in found.items())
             faults.append(Fault("", ", ".join(shapes), got, "as many of each, or one", "curve() takes every pair"))
         if faults:
             raise InputError(faults)
-        n = numbers.get("rpm", np.asarray(self.case.rpm, dtype=float))
+        n = found.get("rpm", np.asarray(self.case.rpm, dtype=float))
         if J is not None:
-            V = numbers["J"] * n / 60.0 * self.diameter_m
+            V = found["J"] * n / 60.0 * self.diameter_m
         else:
-            V = numbers.get("airspeed_m_s", np.asarray(self.case.airspeed_m_s, dtype=float))
+            V = found.get("airspeed_m_s", np.asarray(self.case.airspeed_m_s, dtype=float))
         n, V = np.broadcast_arrays(n, V)
         return np.atleast_1d(n).astype(float).ravel(), np.atleast_1d(V).astype(float).ravel()
-
-
-def _numbers(name: str, value: Any) -> Array:
-    """Finite numbers, one or more, of what somebody hands over."""
-    try:
-        found = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError(Fault("", name, repr(value), "a number, or several")) from None
-    if not found.size:
-        raise InputError(Fault("", name, "no number", "one or more"))
-    if not np.all(np.isfinite(found)):
-        raise InputError(Fault("", name, "a number that is not finite", "finite numbers"))
-    return found
-
-
-def _path(name: str, value: Any) -> str:
-    """Path as text; anything else is refused."""
-    if isinstance(value, (str, os.PathLike)) and os.fspath(value):
-        return os.fspath(value)
-    raise InputError(Fault("", name, f"{type(value).__name__} {value!r:.40}", "the path of a file or folder"))
 
 
 def _solved(
@@ -367,10 +494,10 @@ def propeller(
     if blades is not None and not (isinstance(blades, (int, np.integer)) and blades >= 1):
         faults.append(Fault("", "blades", repr(blades), "a whole number of 1 or more"))
     if stations is not None:
-        stations = _path("stations", stations)
-    rpm = None if rpm is None else float(_numbers("rpm", rpm))
-    airspeed_m_s = float(_numbers("airspeed_m_s", airspeed_m_s))
-    diameter_m = None if diameter_m is None else float(_numbers("diameter_m", diameter_m))
+        stations = path_text("stations", stations)
+    rpm = None if rpm is None else float(numbers("rpm", rpm))
+    airspeed_m_s = float(numbers("airspeed_m_s", airspeed_m_s))
+    diameter_m = None if diameter_m is None else float(numbers("diameter_m", diameter_m))
     if diameter_m is not None and not 0.01 <= diameter_m <= 10.0:
         hint = "Is that in mm? Divide by 1000" if 10.0 < diameter_m <= 1e4 else ""
         faults.append(Fault("", "diameter_m", f"{diameter_m:g}", "0.01 to 10 m", hint))
@@ -407,183 +534,21 @@ def load(path: str | os.PathLike[str]) -> Propeller:
 
     Examples
     --------
+    >>> load("cases/prop_8x5").solve(rpm=8000, bands=False).thrust_N.round(1)
+    array([3.9])
     >>> load("no/such/folder")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
         ...
     bemt.base.errors.InputError: no/such/folder: got nothing there; expected ...
     """
-    files = find_cases([_path("path", path)])
+    files = find_cases([path_text("path", path)])
     if len(files) != 1:
         raise InputError(Fault(os.fspath(path), "", f"{len(files)} cases", "one case", "Name its folder"))
     case = load_case(files[0])
     return Propeller(case, case.path.read_text(encoding="utf-8-sig"))
 
 
-def read(path: str | os.PathLike[str], format: str | None = None) -> Dataset:  # noqa: A002
-    """Read a recording: a bench log, a table, an export of CFD, a vendor's file.
-
-    Parameters
-    ----------
-    path : str or path
-        The file.
-    format : str, optional
-        Name of the reader; found by content by default.
-
-    Returns
-    -------
-    Dataset
-        Steady points of a log; the rows of a table of points; one point of means of a CFD history. ``notes`` say what
-        was decided on the way and what looks wrong; nothing suspicious is corrected.
-
-    Raises
-    ------
-    InputError
-        When the file is not understood, with the line to write.
-    """
-    from bemt.recordings.load import as_dataset, import_file
-
-    return as_dataset(import_file(_path("path", path), format))
-
-
-@dataclass(frozen=True, eq=False)
-class Answer:
-    """What a diagnosis says; :func:`diagnose` makes one.
-
-    Parameters
-    ----------
-    diagnosis : bemt.diagnose.chain.Diagnosis
-        All of it.
-    propeller : Propeller
-        What was compared with the recording.
-    """
-
-    diagnosis: Diagnosis
-    propeller: Propeller
-
-    def __repr__(self) -> str:
-        """Say the verdict in a line."""
-        return f"<answer on {self.propeller.name}: {' '.join((self.verdict, ', '.join(self.effects))).strip()}>"
-
-    @property
-    def verdict(self) -> str:
-        """One of none, named, class, sensor, unknown, insufficient."""
-        return self.diagnosis.decision.verdict
-
-    @property
-    def effects(self) -> tuple[str, ...]:
-        """Effects of the verdict; of a class all members."""
-        return self.diagnosis.decision.effects
-
-    @property
-    def text(self) -> str:
-        """The answer in words, as the command line prints it."""
-        from bemt.diagnose.document import text
-
-        return text(self.diagnosis)
-
-    @property
-    def improved(self) -> Propeller | None:
-        """The propeller with what was found switched on; None when nothing that can be simulated was named."""
-        from bemt.diagnose.improve import improved_case
-
-        text = improved_case(self.diagnosis, self.propeller.case, self.propeller.text)
-        return Propeller(case_of(text, self.propeller.case.folder), text) if text else None
-
-    def to_dict(self) -> dict[str, Any]:
-        """Give the answer as plain values.
-
-        Returns
-        -------
-        dict
-            Schema ``bemt.diagnosis/1``.
-        """
-        from bemt.diagnose.document import document
-
-        return document(self.diagnosis)
-
-    def plot(self, folder: str | os.PathLike[str]) -> list[Path]:
-        """Draw the figures of the answer.
-
-        Parameters
-        ----------
-        folder : str or path
-            Where the PNG files go.
-
-        Returns
-        -------
-        list of Path
-            The files.
-        """
-        from bemt.base.errors import system_fault
-        from bemt.diagnose import figures
-
-        try:
-            return figures.draw(self.diagnosis, Path(_path("folder", folder)))
-        except OSError as error:
-            raise InputError(system_fault(error)) from error
-
-
-def diagnose(
-    recording: str | os.PathLike[str] | Dataset | pd.DataFrame | Sequence[Any], propeller: Propeller | str, *,
-    reference: str | os.PathLike[str] | Dataset | pd.DataFrame | Sequence[Any] | None = None,
-    only: Sequence[str] | None = None, progress: Callable[[str], None] | None = None,
-) -> Answer:  # fmt: skip
-    """Say what physics was left out where a recording and the simulation differ.
-
-    Parameters
-    ----------
-    recording : path, Dataset, DataFrame, or sequence of these
-        What was measured; columns of a frame carry units (``thrust_N``, ``thrust_gf``, ``torque_Nm``).
-    propeller : Propeller or str
-        What it was measured on; a label or a case will do.
-    reference : path, Dataset, DataFrame, or sequence of these, optional
-        Recordings of the same stand without the cause in question: how far model and stand differ anyway.
-    only : sequence of str, optional
-        Consider these effects only.
-    progress : callable, optional
-        Called with a line of text.
-
-    Returns
-    -------
-    Answer
-        ``.verdict``, ``.effects``, ``.text``, ``.plot(folder)``, ``.improved``.
-
-    Raises
-    ------
-    InputError
-        For recordings without a load, and effects that nobody knows.
-    """
-    from dataclasses import replace
-
-    from bemt.diagnose import load as loading
-    from bemt.diagnose import record as records
-    from bemt.diagnose.chain import diagnose as run
-
-    rotor = _propeller(propeller)
-
-    def record(given: Any) -> Record:
-        if isinstance(given, (str, os.PathLike)):
-            return loading.load(os.fspath(given), rotor.case)
-        if not isinstance(given, Dataset) and not hasattr(given, "columns"):
-            expected = "a path, a Dataset or a DataFrame"
-            raise InputError(Fault("", "recording", f"{type(given).__name__} {given!r:.40}", expected))
-        table = given if isinstance(given, Dataset) else from_pandas(given)
-        return records.from_series(table, rotor.case)
-
-    only = [only] if isinstance(only, str) else only
-    loading.check_effects(only or ())
-    if not _several(recording):
-        raise InputError(Fault("", "recording", "none", "one or more"))
-    loaded = [record(given) for given in _several(recording)]
-    loaded += [replace(record(given), reference=True) for given in _several(reference)]
-    return Answer(run(loaded, [rotor.case], list(only) if only else None, progress), rotor)
-
-
-def _several(given: Any) -> list[Any]:
-    return [] if given is None else list(given) if isinstance(given, (list, tuple)) else [given]
-
-
-def _propeller(given: Propeller | str | os.PathLike[str]) -> Propeller:
+def rotor_of(given: Propeller | str | os.PathLike[str]) -> Propeller:
     """Propeller as it is, of a case, or of a label."""
     if isinstance(given, Propeller):
         return given
@@ -595,108 +560,3 @@ def _propeller(given: Propeller | str | os.PathLike[str]) -> Propeller:
     if Path(text).exists() or text.endswith(".toml") or "/" in text:
         return load(text)
     return propeller(text)
-
-
-def drive(
-    propeller: Propeller | str, *, kv: float, cells: int, mass_kg: float | None = None, rotors: int = 1,
-    capacity_Ah: float | None = None, airspeed_m_s: float = 0.0,
-) -> DriveEstimate:  # fmt: skip
-    """Estimate what a motor makes of a propeller when its K_v and the battery are all that is known.
-
-    Parameters
-    ----------
-    propeller : Propeller or str
-        Propeller, case or label.
-    kv : float
-        Speed constant of the motor. [rev/min/V]
-    cells : int
-        LiPo cells in series.
-    mass_kg : float, optional
-        Of the vehicle, for the hover point. [kg]
-    rotors : int
-        That carry it and share the battery.
-    capacity_Ah : float, optional
-        Of the battery, for the time aloft. [A h]
-    airspeed_m_s : float
-        Speed of flight. [m/s]
-
-    Returns
-    -------
-    bemt.drive.from_label.DriveEstimate
-        ``.full``, ``.hover``, ``.text``, ``.to_dict()``; every number with its band.
-
-    Raises
-    ------
-    InputError
-        For impossible numbers.
-
-    Examples
-    --------
-    >>> d = drive("10x5", kv=1000, cells=3)
-    >>> bool(7.0 < d.full["thrust_N"].value < 13.0)
-    True
-    """
-    from bemt.drive import from_label
-
-    for name, value in (("kv", kv), ("cells", cells), ("mass_kg", mass_kg), ("rotors", rotors),
-                        ("capacity_Ah", capacity_Ah), ("airspeed_m_s", airspeed_m_s)):  # fmt: skip
-        if value is not None and (isinstance(value, bool) or not isinstance(value, (int, float, np.number))):
-            raise InputError(Fault("", name, repr(value), "a number"))
-    return from_label.estimate(_propeller(propeller).case, kv, cells, mass_kg, rotors, capacity_Ah, airspeed_m_s)
-
-
-def compare(
-    a: str | os.PathLike[str], b: str | os.PathLike[str], *, case: str | os.PathLike[str] | None = None,
-    diameter_m: float | None = None,
-) -> Contrast:  # fmt: skip
-    """Say what changed between two recordings of one stand.
-
-    Parameters
-    ----------
-    a, b : str or path
-        Recordings before and after, or without and with.
-    case : str or path, optional
-        The rotor: `b` is then diagnosed with `a` as its reference.
-    diameter_m : float, optional
-        Of the rotor where there is no case, for the advance ratio. [m]
-
-    Returns
-    -------
-    bemt.diagnose.contrast.Contrast
-        ``.document`` is the answer as ``bemt.comparison/1``.
-
-    Raises
-    ------
-    InputError
-        For files that are no recordings, or have no point in common.
-    """
-    from bemt.diagnose import contrast
-
-    diameter = contrast.label_diameter(None) if diameter_m is None else float(_numbers("diameter_m", diameter_m))
-    if diameter_m is not None and not 0.01 <= diameter_m <= 10.0:
-        raise InputError(Fault("", "diameter_m", f"{diameter_m:g}", "0.01 to 10 m", "Is that in mm? Divide by 1000"))
-    known = None if case is None else _path("case", case)
-    return contrast.compare(_path("a", a), _path("b", b), known, diameter_m=diameter)
-
-
-def validate(folder: str | os.PathLike[str]) -> dict[str, Any]:
-    """Compare BEMT with a folder of measured propellers in the layout of the UIUC database.
-
-    Parameters
-    ----------
-    folder : str or path
-        The folder, or ``"uiuc"`` for the data found.
-
-    Returns
-    -------
-    dict
-        Schema ``bemt.validation/1``.
-
-    Raises
-    ------
-    InputError
-        When it holds no propeller that can be compared.
-    """
-    from bemt.compare.validate import propellers
-
-    return propellers.validate(propellers.where(_path("folder", folder)))

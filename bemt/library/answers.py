@@ -1,0 +1,366 @@
+"""Questions of the public face: read, diagnose, compare, drive, validate."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bemt.base.errors import Fault, InputError
+from bemt.base.face import as_html
+from bemt.case import case_of
+from bemt.dataset import Dataset, from_pandas
+from bemt.library.given import numbers, path_text
+from bemt.library.rotors import Propeller, rotor_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from bemt.diagnose.chain import Diagnosis
+    from bemt.diagnose.contrast import Contrast
+    from bemt.diagnose.record import Record
+    from bemt.drive.from_label import DriveEstimate
+
+__all__ = ["Answer", "compare", "diagnose", "drive", "read", "validate"]
+
+
+def read(path: str | os.PathLike[str], format: str | None = None) -> Dataset:  # noqa: A002
+    r"""Read a recording: a bench log, a table, an export of CFD, a vendor's file.
+
+    Parameters
+    ----------
+    path : str or path
+        The file.
+    format : str, optional
+        Name of the reader; found by content by default.
+
+    Returns
+    -------
+    Dataset
+        Steady points of a log; the rows of a table of points; one point of means of a CFD history. ``notes`` say what
+        was decided on the way and what looks wrong; nothing suspicious is corrected.
+
+    Raises
+    ------
+    InputError
+        When the file is not understood, with the line to write.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> file = Path(tempfile.mkdtemp()) / "bench.csv"
+    >>> _ = file.write_text("rpm,thrust_gf,torque_Nm\n5000,340,0.05\n6000,490,0.07\n")
+    >>> read(file).thrust_N.round(2)
+    array([3.33, 4.81])
+    """
+    from bemt.recordings.load import as_dataset, import_file
+
+    return as_dataset(import_file(path_text("path", path), format))
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What a diagnosis says; :func:`diagnose` makes one.
+
+    Parameters
+    ----------
+    diagnosis : bemt.diagnose.chain.Diagnosis
+        All of it.
+    propeller : Propeller
+        What was compared with the recording.
+
+    Examples
+    --------
+    The blades of this recording stand 1.5 deg steeper than those of its reference:
+
+    >>> import numpy as np
+    >>> from bemt.library import propeller
+    >>> p = propeller("10x5")
+    >>> rpm, J = np.repeat([5000.0, 10000.0, 15000.0], 6), np.tile(np.linspace(0.0, 0.5, 6), 3)
+    >>> turned = p.replaced({"blade.beta_offset_deg": 2.2}).solve(rpm, J=J, bands=False)
+    >>> answer = diagnose(turned, p, reference=p.solve(rpm, J=J, bands=False), only=["pitch_offset", "torque_gain"])
+    >>> answer
+    <answer on prop_10x5: named pitch_offset>
+    >>> answer.verdict, answer.effects, answer.to_dict()["schema"]
+    ('named', ('pitch_offset',), 'bemt.diagnosis/1')
+    >>> print(answer.text.splitlines()[0])
+    The model leaves something out: blade angle other than stated.
+    >>> improved = answer.improved.solve(rpm, J=J, bands=False)
+    >>> bool(np.max(np.abs(improved.thrust_N / turned.thrust_N - 1)) < 0.02)
+    True
+    >>> import tempfile
+    >>> "before_after.png" in {file.name for file in answer.plot(tempfile.mkdtemp())}
+    True
+    """
+
+    diagnosis: Diagnosis
+    propeller: Propeller
+
+    def __repr__(self) -> str:
+        """Say the verdict in a line."""
+        return f"<answer on {self.propeller.name}: {' '.join((self.verdict, ', '.join(self.effects))).strip()}>"
+
+    def _repr_html_(self) -> str:
+        """Show the answer in a notebook."""
+        return as_html(f"{self.propeller.name}: {' '.join((self.verdict, ', '.join(self.effects)))}", self.text)
+
+    @property
+    def verdict(self) -> str:
+        """One of none, named, class, sensor, unknown, insufficient."""
+        return self.diagnosis.decision.verdict
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Effects of the verdict; of a class all members."""
+        return self.diagnosis.decision.effects
+
+    @property
+    def text(self) -> str:
+        """The answer in words, as the command line prints it."""
+        from bemt.diagnose.document import text
+
+        return text(self.diagnosis)
+
+    @property
+    def improved(self) -> Propeller | None:
+        """The propeller with what was found switched on; None when nothing that can be simulated was named."""
+        from bemt.diagnose.improve import improved_case
+
+        text = improved_case(self.diagnosis, self.propeller.case, self.propeller.text)
+        return Propeller(case_of(text, self.propeller.case.folder), text) if text else None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Give the answer as plain values.
+
+        Returns
+        -------
+        dict
+            Schema ``bemt.diagnosis/1``.
+        """
+        from bemt.diagnose.document import document
+
+        return document(self.diagnosis)
+
+    def plot(self, folder: str | os.PathLike[str]) -> list[Path]:
+        """Draw the figures of the answer.
+
+        Parameters
+        ----------
+        folder : str or path
+            Where the PNG files go.
+
+        Returns
+        -------
+        list of Path
+            The files.
+        """
+        from bemt.base.errors import system_fault
+        from bemt.diagnose import figures
+
+        try:
+            return figures.draw(self.diagnosis, Path(path_text("folder", folder)))
+        except OSError as error:
+            raise InputError(system_fault(error)) from error
+
+
+def diagnose(
+    recording: str | os.PathLike[str] | Dataset | pd.DataFrame | Sequence[Any], propeller: Propeller | str, *,
+    reference: str | os.PathLike[str] | Dataset | pd.DataFrame | Sequence[Any] | None = None,
+    only: Sequence[str] | None = None, progress: Callable[[str], None] | None = None,
+) -> Answer:  # fmt: skip
+    """Say what physics was left out where a recording and the simulation differ.
+
+    Parameters
+    ----------
+    recording : path, Dataset, DataFrame, or sequence of these
+        What was measured; columns of a frame carry units (``thrust_N``, ``thrust_gf``, ``torque_Nm``).
+    propeller : Propeller or str
+        What it was measured on; a label or a case will do.
+    reference : path, Dataset, DataFrame, or sequence of these, optional
+        Recordings of the same stand without the cause in question: how far model and stand differ anyway.
+    only : sequence of str, optional
+        Consider these effects only.
+    progress : callable, optional
+        Called with a line of text.
+
+    Returns
+    -------
+    Answer
+        ``.verdict``, ``.effects``, ``.text``, ``.plot(folder)``, ``.improved``.
+
+    Raises
+    ------
+    InputError
+        For recordings without a load, and effects that nobody knows.
+
+    Examples
+    --------
+    Points at rest that the model itself made: nothing is left out.
+
+    >>> import bemt
+    >>> p = bemt.propeller("10x5")
+    >>> points = p.solve(rpm=[4000, 6000, 8000], bands=False)
+    >>> bemt.diagnose(points, p, only=["pitch_offset", "thrust_gain"]).verdict
+    'none'
+    """
+    from dataclasses import replace
+
+    from bemt.diagnose import load as loading
+    from bemt.diagnose import record as records
+    from bemt.diagnose.chain import diagnose as run
+
+    rotor = rotor_of(propeller)
+
+    def record(given: Any) -> Record:
+        if isinstance(given, (str, os.PathLike)):
+            return loading.load(os.fspath(given), rotor.case)
+        if not isinstance(given, Dataset) and not hasattr(given, "columns"):
+            expected = "a path, a Dataset or a DataFrame"
+            raise InputError(Fault("", "recording", f"{type(given).__name__} {given!r:.40}", expected))
+        table = given if isinstance(given, Dataset) else from_pandas(given)
+        return records.from_series(table, rotor.case)
+
+    only = [only] if isinstance(only, str) else only
+    loading.check_effects(only or ())
+    if not _several(recording):
+        raise InputError(Fault("", "recording", "none", "one or more"))
+    loaded = [record(given) for given in _several(recording)]
+    loaded += [replace(record(given), reference=True) for given in _several(reference)]
+    return Answer(run(loaded, [rotor.case], list(only) if only else None, progress), rotor)
+
+
+def _several(given: Any) -> list[Any]:
+    return [] if given is None else list(given) if isinstance(given, (list, tuple)) else [given]
+
+
+def drive(
+    propeller: Propeller | str, *, kv: float, cells: int, mass_kg: float | None = None, rotors: int = 1,
+    capacity_Ah: float | None = None, airspeed_m_s: float = 0.0,
+) -> DriveEstimate:  # fmt: skip
+    """Estimate what a motor makes of a propeller when its K_v and the battery are all that is known.
+
+    Parameters
+    ----------
+    propeller : Propeller or str
+        Propeller, case or label.
+    kv : float
+        Speed constant of the motor. [rev/min/V]
+    cells : int
+        LiPo cells in series.
+    mass_kg : float, optional
+        Of the vehicle, for the hover point. [kg]
+    rotors : int
+        That carry it and share the battery.
+    capacity_Ah : float, optional
+        Of the battery, for the time aloft. [A h]
+    airspeed_m_s : float
+        Speed of flight. [m/s]
+
+    Returns
+    -------
+    bemt.drive.from_label.DriveEstimate
+        ``.full``, ``.hover``, ``.text``, ``.to_dict()``; every number with its band.
+
+    Raises
+    ------
+    InputError
+        For impossible numbers.
+
+    Examples
+    --------
+    >>> import bemt
+    >>> d = bemt.drive("10x5", kv=1000, cells=3)
+    >>> bool(7.0 < d.full["thrust_N"].value < 13.0)
+    True
+    """
+    from bemt.drive import from_label
+
+    for name, value in (("kv", kv), ("cells", cells), ("mass_kg", mass_kg), ("rotors", rotors),
+                        ("capacity_Ah", capacity_Ah), ("airspeed_m_s", airspeed_m_s)):  # fmt: skip
+        if value is not None and (isinstance(value, bool) or not isinstance(value, (int, float, np.number))):
+            raise InputError(Fault("", name, repr(value), "a number"))
+    return from_label.estimate(rotor_of(propeller).case, kv, cells, mass_kg, rotors, capacity_Ah, airspeed_m_s)
+
+
+def compare(
+    a: str | os.PathLike[str], b: str | os.PathLike[str], *, case: str | os.PathLike[str] | None = None,
+    diameter_m: float | None = None,
+) -> Contrast:  # fmt: skip
+    r"""Say what changed between two recordings of one stand.
+
+    Parameters
+    ----------
+    a, b : str or path
+        Recordings before and after, or without and with.
+    case : str or path, optional
+        The rotor: `b` is then diagnosed with `a` as its reference.
+    diameter_m : float, optional
+        Of the rotor where there is no case, for the advance ratio. [m]
+
+    Returns
+    -------
+    bemt.diagnose.contrast.Contrast
+        ``.document`` is the answer as ``bemt.comparison/1``.
+
+    Raises
+    ------
+    InputError
+        For files that are no recordings, or have no point in common.
+
+    Examples
+    --------
+    >>> import bemt, tempfile
+    >>> from pathlib import Path
+    >>> a, b = (Path(tempfile.mkdtemp()) / name for name in ("a.csv", "b.csv"))
+    >>> rows = [(n, 1e-7 * n**2, 2e-9 * n**2) for n in range(4000, 9001, 500)]
+    >>> for file, gain in ((a, 1.0), (b, 0.9)):
+    ...     lines = ["rpm,thrust_N,torque_Nm"] + [f"{n},{gain * T:.4f},{Q:.5f}" for n, T, Q in rows]
+    ...     _ = file.write_text("\n".join(lines))
+    >>> found = bemt.compare(a, b)
+    >>> found.verdict, found.effects
+    ('sensor', ('thrust_gain',))
+    >>> print(found.text.splitlines()[0])
+    verdict: sensor thrust_gain
+    """
+    from bemt.diagnose import contrast
+
+    diameter = contrast.label_diameter(None) if diameter_m is None else float(numbers("diameter_m", diameter_m))
+    if diameter_m is not None and not 0.01 <= diameter_m <= 10.0:
+        raise InputError(Fault("", "diameter_m", f"{diameter_m:g}", "0.01 to 10 m", "Is that in mm? Divide by 1000"))
+    known = None if case is None else path_text("case", case)
+    return contrast.compare(path_text("a", a), path_text("b", b), known, diameter_m=diameter)
+
+
+def validate(folder: str | os.PathLike[str]) -> dict[str, Any]:
+    """Compare BEMT with a folder of measured propellers in the layout of the UIUC database.
+
+    Parameters
+    ----------
+    folder : str or path
+        The folder, or ``"uiuc"`` for the data found.
+
+    Returns
+    -------
+    dict
+        Schema ``bemt.validation/1``.
+
+    Raises
+    ------
+    InputError
+        When it holds no propeller that can be compared.
+
+    Examples
+    --------
+    >>> validate("no/such/folder")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    bemt.base.errors.InputError: no/such/folder: got ...
+    """
+    from bemt.compare.validate import propellers
+
+    return propellers.validate(propellers.where(path_text("folder", folder)))

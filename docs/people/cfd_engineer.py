@@ -1,0 +1,14 @@
+"""Loads along the blade of the 8x5 beside those of a CFD run, and what two CFD campaigns differ by."""
+
+import pandas as pd
+
+import bemt
+
+rotor = bemt.load("cases/prop_8x5")
+blade = rotor.along_blade(rpm=20000)
+cfd = pd.read_csv("reports/cfd/prop_8x5_incompressible/radial.csv").query("run == 'fa87cb032619'")
+for load in ("thrust_per_radius_N_m", "torque_per_radius_Nm_m"):
+    axes = blade.plot(x="r_m", y=load, label="BEMT")
+    cfd.plot(x="r_m", y=load, style="o", ax=axes, label="CFD", ylabel=load).figure.savefig(f"{load}.png")
+campaigns = [f"reports/diagnosis/cfd_{name}.csv" for name in ("reference", "pitch")]
+print(bemt.compare(*campaigns, case="cases/prop_8x5").text)

@@ -1,0 +1,79 @@
+"""The promise of docs/people and of the quick start: what is printed runs, in the lines that are claimed."""
+
+from __future__ import annotations
+
+import ast
+import re
+import runpy
+import shlex
+import shutil
+from pathlib import Path
+
+import pytest
+
+from bemt.commands.cli import main
+
+ROOT = Path(__file__).resolve().parents[1]
+SCRIPTS = sorted((ROOT / "docs" / "people").glob("*.py"))
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """What the scripts need of the project, in a folder that may be written to."""
+    for part in ("cases", "reports/diagnosis", "reports/cfd/prop_8x5_incompressible"):
+        shutil.copytree(ROOT / part, tmp_path / part)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    return tmp_path
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.stem)
+def test_a_script_answers_and_draws(script: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    import matplotlib.pyplot as plt
+
+    runpy.run_path(str(script), run_name="__main__")
+    plt.close("all")
+    drawn = [path for path in folder.glob("*.png") if path.stat().st_size > 5000]
+    assert len(drawn) == 2 and capsys.readouterr().out.strip()
+
+
+def code_lines(text: str) -> int:
+    """Lines without blank ones, comments and docstrings."""
+    tree, skipped = ast.parse(text), set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.FunctionDef) and ast.get_docstring(node):
+            skipped |= set(range(node.body[0].lineno, (node.body[0].end_lineno or 0) + 1))
+    rows = enumerate(text.splitlines(), 1)
+    return sum(bool(row.strip()) and not row.lstrip().startswith("#") and k not in skipped for k, row in rows)
+
+
+def test_the_lines_that_are_claimed_are_those_of_the_scripts() -> None:
+    page = (ROOT / "docs" / "people.md").read_text(encoding="utf-8")
+    claimed: dict[str, int] = {}
+    for name, lines in re.findall(r"^\| [^|]+ \| `(\w+)\.py`,? [^|\d]*(\d+)[^|]* \|", page, flags=re.M):
+        claimed[name] = claimed.get(name, 0) + int(lines)
+    assert claimed == {path.stem: code_lines(path.read_text(encoding="utf-8")) for path in SCRIPTS}
+
+
+def test_the_quick_start_runs_as_printed(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Every command from section 2 on, in one folder; the truth of section 3 is found in section 4 and not without."""
+    text = (ROOT / "docs" / "quickstart.md").read_text(encoding="utf-8").partition("\n## 2.")[2]
+    blocks = re.findall(r"^```sh\n(.*?)^```", text, flags=re.M | re.S)
+    commands = [line for block in blocks for line in block.splitlines()]
+    assert len(commands) >= 7
+    shown = ""
+    for command in commands:
+        words = shlex.split(command)
+        if words[:3] == ["python", "-m", "bemt"]:
+            assert main(words[3:]) == 0, command
+        else:
+            assert words[0] == "python" and words[1].startswith("docs/"), command
+            runpy.run_path(str(ROOT / words[1]), run_name="__main__")
+        shown += capsys.readouterr().out
+    verdict = re.search(r"offset_deg ([\d.]+)", shown)
+    assert verdict is not None and abs(float(verdict[1]) - 1.5) < 0.3
+    assert re.search(r"pitch_offset .* invisible", shown)
+    assert main(["diagnose", "after.csv", "--case", "prop_10x5"]) == 0
+    assert "verdict: insufficient" in capsys.readouterr().out
