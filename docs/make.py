@@ -1,6 +1,6 @@
 """Rewrite what the documents take from code and cases: ``.venv/bin/python docs/make.py``.
 
-Numbers of docs/diagnosis.md, the pages docs/effects.md and docs/files.md, docs/gallery.md with its pictures
+Numbers of docs/diagnosis.md, the pages docs/effects.md and docs/reference_files.md, docs/gallery.md with its pictures
 (``--no-pictures``: without).
 ``--notebooks`` executes docs/notebooks/ and nothing else.
 The picture of the README has a script of its own, docs/overview.py.
@@ -208,7 +208,7 @@ def main() -> None:
 
     page = DOCS / "diagnosis.md"
     page.write_text(numbers(page.read_text(encoding="utf-8")), encoding="utf-8")
-    (DOCS / "files.md").write_text(files(), encoding="utf-8")
+    (DOCS / "reference_files.md").write_text(files(), encoding="utf-8")
     (DOCS / "effects.md").write_text(effects_list.markdown(), encoding="utf-8")
     cases = shipped()
     if "--no-pictures" not in sys.argv:

@@ -339,7 +339,7 @@ def test_the_page_of_files_holds_every_key(project: Path, maker: ModuleType) -> 
                 found.setdefault(f"{file} {head}", set()).add(tuple(cells[k].strip() for k in (1, 3, 4, 5)))
         return found
 
-    written = keys((project / "docs" / "files.md").read_text(encoding="utf-8"))
+    written = keys((project / "docs" / "reference_files.md").read_text(encoding="utf-8"))
     assert written == keys(maker.files()), "run python docs/make.py"
     assert sum(map(len, written.values())) > 150
 
