@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,10 +17,12 @@ from bemt.asbuilt.latents import NAMES, Prior
 from bemt.asbuilt.mixture import LEVELS, half_width, inside
 from bemt.asbuilt.model import coefficients
 from bemt.asbuilt.population import WEIGHTS, population
-from bemt.asbuilt.predict import Sensed, predict
+from bemt.asbuilt.predict import Prediction, Sensed, predict
+from bemt.asbuilt.reference import ReferenceRun, noise_of_run, scatter
 from bemt.base.errors import InputError
 from bemt.case import load_case
 from bemt.case.prepare import prepare_case
+from bemt.compare.validate.static_limit import from_static
 
 K = len(NAMES)
 CASE = """schema = "bemt.case/1"
@@ -97,6 +100,103 @@ def test_intervals_hold_what_they_say_of_rotors_drawn_from_the_population() -> N
         y = y + (rough * root @ random.normal(size=root.shape[0])).reshape(2, -1)
         held += [np.mean(np.abs(y - found.mean) <= found.half_width(level, noise=True)) for level in LEVELS]
     assert held / n == pytest.approx(LEVELS, abs=0.015)
+
+
+def _after_a_run(y: np.ndarray, at: Sensed, run: np.ndarray) -> tuple[Prediction, Prediction]:
+    """Prediction before and after a run at some points of a linear solver."""
+    p = population()
+    prior = p.prior("stations", at.diameter_m)
+    x, Re, f, top = at.x[run], at.Re[run], at.f[:, run], at.top[:, run]
+    T = np.moveaxis(at.T[:, :, run], 1, 2).reshape(2 * run.size, K)
+    noise = noise_of_run(p, at.diameter_m, (x, Re), f, top, y, p.noise_sd(f, top))
+    bias = p.bias(x, top).reshape(-1)
+    found = condition(
+        lambda z: f.reshape(-1) + T @ z + bias, prior, y.reshape(-1), noise, p.rest_sizes, WEIGHTS, most=1
+    )
+    reference = ReferenceRun.given(x, Re, p.rest_sd(at.diameter_m, f, top).reshape(-1), noise, y.reshape(-1), found)
+    posterior = Prior(found.mean, found.cov, np.ones(1), np.ones(1), "reference")
+    return predict(p, prior, at), predict(p, posterior, at, reference=reference)
+
+
+def test_a_run_that_fits_narrows_and_one_that_no_rotor_could_make_does_not() -> None:
+    at, p = _sensed(), population()
+    run = np.arange(5)
+    fair = (at.f + p.bias(at.x, at.top))[:, run]
+    before, after = _after_a_run(fair, at, run)
+    assert np.all(after.half_width()[:, 6:] < before.half_width()[:, 6:])
+    wild = fair * np.array([1.25, 0.8, 1.3, 0.75, 1.2])  # up and down from point to point
+    _, misled = _after_a_run(wild, at, run)
+    assert np.all(misled.half_width()[:, run] > after.half_width()[:, run])
+    assert np.median(misled.half_width()[:, 6:] / after.half_width()[:, 6:]) > 1.0
+    held = np.abs(misled.mean - (at.f + p.bias(at.x, at.top))) <= misled.half_width(LEVELS[1])
+    assert held[:, 6:].mean() > 0.9
+
+
+def test_a_run_says_nothing_of_the_rest_far_from_it() -> None:
+    at, p = _sensed(), population()
+    far = replace(at, Re=at.Re * np.where(np.arange(at.x.size) > 8, 1e12, 1.0))
+    _, after = _after_a_run((at.f * 1.02)[:, :5], far, np.arange(5))
+    usual = p.rest_sd(at.diameter_m, at.f, at.top)
+    assert after.rest_sd[:, 9:] == pytest.approx(usual[:, 9:], rel=1e-2)
+    assert np.all(after.rest_sd[:, :5] < 0.8 * usual[:, :5])
+
+
+def test_scatter_is_that_of_readings_not_of_the_curve() -> None:
+    random, t = np.random.default_rng(9), np.linspace(3e4, 9e4, 4000)
+    assert scatter(0.1 + 1e-6 * t, t) == pytest.approx(0.0, abs=1e-12) and scatter(t[:4] ** 2, t[:4]) == 0.0
+    order = random.permutation(t.size)
+    noisy = 0.1 + 0.05 * np.sin(t / 3e4) + 0.002 * random.normal(size=t.size)
+    assert scatter(noisy[order], t[order]) == pytest.approx(0.002, rel=0.05)
+
+
+def test_density_integrates_to_one_and_agrees_with_the_intervals() -> None:
+    at = _sensed(2)
+    found = predict(population(), population().prior("stations", at.diameter_m), at)
+    y = np.linspace(found.mean[0, 0] - 0.2, found.mean[0, 0] + 0.2, 20001)
+    log = np.array([found.log_density(np.full((2, 2), v))[0, 0] for v in y[::20]])
+    density, step = np.exp(log), y[20] - y[0]
+    assert density.sum() * step == pytest.approx(1.0, abs=1e-4)
+    inner = np.abs(y[::20] - found.mean[0, 0]) <= found.half_width(LEVELS[0], noise=True)[0, 0]
+    assert density[inner].sum() * step == pytest.approx(LEVELS[0], abs=0.02)
+
+
+def test_beyond_measured_propellers_is_wider_and_said() -> None:
+    learnt = population().learnt
+    assert learnt is not None
+    inside_, words = learnt.beyond(0.254, np.array([0.1, 0.3]), False)
+    assert inside_ == pytest.approx(1.0) and not any(words)
+    M = np.linspace(0.5, 1.2, 30)
+    fast, told = learnt.beyond(0.254, M, False)
+    assert np.all(np.diff(fast) >= 0.0) and fast[0] == 1.0 and fast[-1] == 2.0 and "tip Mach" in told[-1]
+    ducted, told = learnt.beyond(2.0 * learnt.diameter_m[1], M, True)
+    assert np.all(ducted > 1.4 * fast) and all("duct" in w and "diameter" in w for w in told)
+
+
+def test_widths_are_those_of_the_prior() -> None:
+    p = population()
+    for known in ("cad", "scan", "stations", "label"):
+        sd, nu = p.widths(known, 0.076)
+        assert sd == pytest.approx(p.prior(known, 0.076, section="rule").sd) and np.all(nu > 1.0)
+    assert p.widths("label", 0.254)[1][0] < p.widths("stations", 0.254)[1][0]  # labels err more heavily
+
+
+def test_best_line_from_static_finds_a_rule_that_is_one() -> None:
+    random = np.random.default_rng(10)
+    rotors = []
+    for i in range(12):
+        at = _sensed(14, i)
+        a = random.normal(0.0, 0.1)
+        y = at.f.copy()
+        y[0] = at.f[0] / (1.0 - a * (1.0 + 0.5 * at.x) * np.where(at.x > 0.0, 1.0, 1.0 / (1.0 + 0.5 * at.x)))
+        rotors.append(
+            MeasuredRotor(**vars(at), name=f"r{i}", family="a", section="rule", gap_deg=0.0, static=at.x == 0.0, y=y)
+        )
+    found = from_static(rotors)
+    for m in rotors:
+        assert m.static.sum() == 1
+    assert found["rotors"] == 12 and found["seen"]["median_abs"] < 0.03
+    plain = np.median(np.abs(np.concatenate([(m.y[0] - m.f[0])[~m.static] / m.y[0][~m.static] for m in rotors])))
+    assert found["left_out"]["median_abs"] < 0.6 * plain
 
 
 def test_condition_is_exact_for_a_linear_solver() -> None:

@@ -126,6 +126,15 @@ def test_a_measured_pitch_counts_as_much_as_the_label():
     assert same.u_thrust_N[0] < label.u_thrust_N[0]
 
 
+def test_a_series_changes_thrust_less_at_rest_and_power_everywhere():
+    """At rest the whole of a0 made thrust of some series worse than without it."""
+    at = (0.5, np.array([0.0, 0.1, 0.25, 0.5]), 0.1, 5e4)
+    plain, own = compact.coefficients(*at), compact.series_coefficients(*at, 0.05)
+    whole = compact.coefficients(*at, zero_lift=0.05)
+    assert plain[0][0] < own[0][0] < whole[0][0] and own[0][2:] == pytest.approx(whole[0][2:])
+    assert np.all(own[1] == whole[1])
+
+
 def test_a_series_shifts_zero_thrust_and_the_typical_chord():
     kwargs = {"diameter_m": 0.254, "pitch_m": 0.127, "blades": 2, "rpm": 6000.0}
     plain, slow = estimate.estimate(**kwargs), estimate.estimate(**kwargs, series="APC slow flyer")
@@ -226,13 +235,13 @@ def test_volume_2_held_out(volumes):
     # test_calibrate; half of the propellers are 2-5 in, below Re 30,000.
     points = volumes[2]
     held = shares(points, refit.predict(points)[0])
-    assert held["static"]["within_13"] == pytest.approx(0.595, abs=0.01)
-    assert held["static"]["within_26"] == pytest.approx(0.86, abs=0.01)
+    assert held["static"]["within_13"] == pytest.approx(0.578, abs=0.01)
+    assert held["static"]["within_26"] == pytest.approx(0.835, abs=0.01)
     assert held["flight"] == pytest.approx([1.01, 1.05, 1.07, 1.10], abs=0.01)
     assert all(0.9 < median < 1.1 for median in held["flight"])
     held = shares(points, refit.predict(points, given="pitch")[0])
-    assert held["static"]["within_13"] == pytest.approx(0.65, abs=0.01)
-    assert held["static"]["within_26"] == pytest.approx(0.90, abs=0.01)
+    assert held["static"]["within_13"] == pytest.approx(0.64, abs=0.01)
+    assert held["static"]["within_26"] == pytest.approx(0.886, abs=0.01)
     large = points.select(points.of("diameter_m") > compact.DIAMETER_RANGE[0])
     held = shares(large, refit.predict(large)[0])
     assert held["static"]["within_13"] > 0.66 and held["static"]["within_26"] > 0.92

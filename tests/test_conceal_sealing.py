@@ -44,11 +44,16 @@ def entries(folder: Path) -> list[dict[str, Any]]:
     return list(json.loads((folder / seal.KEY).read_text(encoding="utf-8"))["items"])
 
 
+def _shown(entry: dict[str, Any]) -> set[str]:
+    return {"recording.csv", "case.toml", "stations.csv"} | ({"reference.csv"} if entry["referenced"] else set())
+
+
 def test_items_are_sound_and_say_nothing_of_their_cause(sealed: tuple[Path, str]) -> None:
     out, _ = sealed
     for entry in entries(out):
         folder = out / "items" / entry["folder"]
-        assert {p.name for p in folder.iterdir()} == {"recording.csv", "case.toml", "stations.csv"}
+        assert {p.name for p in folder.iterdir()} == _shown(entry)
+        assert ("u_thrust_N" in (folder / "recording.csv").read_text(encoding="utf-8")) == entry["stated"]
         case = load_case(folder / "case.toml")
         case.rotor()
         imported = import_file(str(folder / "recording.csv"))
@@ -115,14 +120,12 @@ def test_diagnosis_sees_recording_and_case_only(sealed: tuple[Path, str], monkey
     answer, _ = prove.diagnose_folder(out / "items" / "0000")
     assert answer == {"verdict": "none"}
     (command, files, inside) = seen[0]
-    assert files == {"recording.csv", "case.toml", "stations.csv"}
+    assert files == _shown(entries(out)[0])
     assert not inside
     assert not any(str(out) in word for word in command)
 
 
-def test_the_key_is_sealed_before_any_diagnosis(
-    patched: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_key_is_sealed_before_any_diagnosis(patched: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out = tmp_path / "proof"
     order: list[bool] = []
 
@@ -146,6 +149,43 @@ def test_the_key_is_sealed_before_any_diagnosis(
     prove.prove(str(out), "tiny", None, 1)
     assert (out / seal.KEY).read_bytes() == sealed_key
     assert order == [True]
+
+
+def test_a_reference_is_given_when_it_was_asked_for_and_not_before(
+    patched: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out, seen = tmp_path / "proof", []
+    open_ = {"verdict": "insufficient", "effects": [], "ranking": [], "next_measurement": {"kind": "reference"}}
+
+    def spy(folder: Path) -> tuple[dict[str, Any] | None, str]:
+        seen.append((folder.parent.name, folder.name))
+        return open_ if folder.name != "0001" else {**open_, "verdict": "none"}, ""
+
+    monkeypatch.setattr(prove, "diagnose_folder", spy)
+    monkeypatch.setattr(items, "_REFERENCED", 0.0)
+    document = prove.prove(str(out), "tiny", 3, 1)
+    first = [name for kind, name in seen if kind == "items"]
+    again = [name for kind, name in seen if kind == prove.ASKED]
+    assert seen == [("items", n) for n in first] + [(prove.ASKED, n) for n in again]
+    assert again and "0001" not in again and set(again) <= set(first)
+    for name in again:
+        folder = out / prove.ASKED / name
+        assert (folder / "reference.csv").exists() and not (out / "items" / name / "reference.csv").exists()
+    assert any("with a reference" in row["what"] for row in document["score"])
+
+
+def test_the_reference_lacks_the_cause_and_nothing_else(patched: Any) -> None:
+    """A thrust cell 10 % off: the same rotor reads a tenth less in the reference, torque and points are the same."""
+    bench = draw.benches(TINY, np.random.SeedSequence(3))[0]
+    item = items.make_item(bench, ("thrust_gain",), (2.0,), 5, "sensor")
+    off = item.entry["parameters"]["thrust_gain"]["gain"]["value"]
+    here, there = (
+        np.genfromtxt(text.splitlines(), delimiter=",", names=True)
+        for text in (item.files["recording.csv"], item.reference)
+    )
+    assert np.median(here["thrust_N"] / there["thrust_N"]) == pytest.approx(1.0 + off, abs=0.02)
+    assert np.median(here["torque_Nm"] / there["torque_Nm"]) == pytest.approx(1.0, abs=0.02)
+    assert abs(off) > 0.05
 
 
 def entry(kind: str, *ids: str, separation: float = 12.0, alike: tuple[str, ...] = (), **more: Any) -> dict[str, Any]:
@@ -177,7 +217,8 @@ SCENES = [
 def test_an_oracle_meets_every_target() -> None:
     rows = score.score([score.judge(e, a) for e, a in SCENES], [True])
     assert [r.what for r in rows if r.met is False] == []
-    assert {r.what for r in rows if r.met is None} == {"parameter error, median", "90 % interval holds the truth"}
+    without = {r.what for r in rows if r.met is None and "with a reference" not in r.what}
+    assert without == {"parameter error, median", "90 % interval holds the truth"}
 
 
 def test_a_tool_that_always_names_something_fails_where_it_matters() -> None:

@@ -10,7 +10,7 @@ from diagnosing import case, diagnose, left_out, points, recording
 
 from bemt import effects
 from bemt.dataset import Dataset
-from bemt.diagnose import document, noise, plan, problem, record, signatures
+from bemt.diagnose import assemble, document, noise, plan, record, signatures
 
 GRID = points("grid")
 
@@ -42,7 +42,7 @@ def test_compressibility_left_out_is_named_located_and_mended() -> None:
 def test_an_inviscid_law_errs_over_advance_ratio_only() -> None:
     """Similarity: at one advance ratio the error of such a law is the same at every speed and density."""
     given = points("air")
-    built = problem.build([record.from_series(recording(case(), given), case())], [case()])
+    built = assemble.build([record.from_series(recording(case(), given), case())], [case()])
     J = np.round(built.covariates["J"][built.point], 6)
     for name, free in (("tip_loss", False), ("ground_effect", False), ("duct", False), ("reynolds", True)):
         modes = noise.smooth_modes(built, (), noise.law_of(effects.catalogue()[name]))
@@ -59,7 +59,7 @@ def test_a_parameter_that_the_recording_replaces_is_no_parameter(walls: tuple[fl
     given = dict(points("static"))
     if walls:
         given["wall_distance_m"] = np.linspace(*walls, given["rpm"].size)
-    built = problem.build([record.from_series(recording(case(), given), case())], [case()])
+    built = assemble.build([record.from_series(recording(case(), given), case())], [case()])
     (wall,) = signatures.candidates(built, ["ground_effect"])[0]
     assert wall.weight.sum() == pytest.approx(1.0)
     assert any("z_over_R" in s for s in wall.settings) == (walls is None)

@@ -17,7 +17,7 @@ from bemt.case import load_case
 from bemt.case.prepare import prepare_case
 from bemt.commands.cli import build_parser, main
 from bemt.dataset import Dataset
-from bemt.diagnose import chain, document, problem, record
+from bemt.diagnose import assemble, chain, document, record
 from bemt.diagnose.load import load
 
 
@@ -320,7 +320,7 @@ def test_the_one_recording_in_other_units_is_said(channel: str, factor: float, w
     alone = [_of(f"{k}.csv", k, plans[k], **odd[k]) for k in range(3)]
     others = [_of(f"{k}.csv", k, "static", ("prop_8x5", "prop_10x5", "prop_12x6")[k], **odd[k]) for k in range(3)]
     for records, cases in ((alone, [case()]), (others, [case(n) for n in ("prop_8x5", "prop_10x5", "prop_12x6")])):
-        (found,) = problem.build(records, cases).findings
+        (found,) = assemble.build(records, cases).findings
         assert found.startswith(f"{place}.csv: error: {channel.split('_')[0]}_unit ({channel}): readings over what")
         assert f"Correction: {words}" in found
         assert all(f"{k}.csv" in found for k in range(3)), "and beside which others"
@@ -332,7 +332,7 @@ def test_both_loads_off_by_one_factor_are_a_matter_of_the_speed() -> None:
     series = recording(case(), points("static"), seed=2)
     low = {k: v / 49.0 if k in ("thrust_N", "torque_Nm") else v for k, v in series.values.items()}
     records.append(record.from_series(Dataset("bench", "2.csv", low), case()))
-    (found,) = problem.build(records, [case()]).findings
+    (found,) = assemble.build(records, [case()]).findings
     assert found.startswith("2.csv: error: rpm_electrical (rpm): readings over what the case gives are 0.02")
     assert "taken for mechanical: divide by 7 pole pairs" in found
 
@@ -340,7 +340,7 @@ def test_both_loads_off_by_one_factor_are_a_matter_of_the_speed() -> None:
 def test_of_two_recordings_the_one_nearer_the_case_is_taken_to_be_right() -> None:
     for odd in (0, 1):
         records = [_of(f"{k}.csv", k, thrust_N=1 / 4.4482216 if k == odd else 1.0) for k in range(2)]
-        (found,) = problem.build(records, [case()]).findings
+        (found,) = assemble.build(records, [case()]).findings
         assert found.startswith(f"{odd}.csv: ") and found.endswith(f"Or {1 - odd}.csv is the one in another unit")
 
 
@@ -355,7 +355,7 @@ def test_of_two_recordings_the_one_nearer_the_case_is_taken_to_be_right() -> Non
 )
 def test_recordings_that_differ_otherwise_are_left_in_peace(other: dict[str, float]) -> None:
     records = [_of("a.csv", 0, "static"), _of("b.csv", 1), _of("c.csv", 2, **other)]
-    assert problem.build(records, [case()]).findings == ()
+    assert assemble.build(records, [case()]).findings == ()
 
 
 def test_a_recording_without_load_has_no_level() -> None:
@@ -365,7 +365,7 @@ def test_a_recording_without_load_has_no_level() -> None:
     fading = {"rpm": rpm, "airspeed_m_s": J * rpm / 60 * 0.2032, "thrust_N": np.full(6, 0.5)}
     last = record.from_series(Dataset("bench", "c.csv", fading), case())
     records = [_of("a.csv", 0, "static"), _of("b.csv", 1), last]
-    assert problem.build(records, [case()]).findings == ()
+    assert assemble.build(records, [case()]).findings == ()
 
 
 def test_findings_of_several_files_name_their_file_first(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -395,10 +395,10 @@ def test_real_recordings_of_one_propeller_have_one_unit(shared_data: Path, tmp_p
         own = uiuc(tmp_path, folder, name)
         files = [f for f in sorted(folder.glob(f"{name}_*.txt")) if not f.stem.endswith("geom")]
         records = [load(str(f), own) for f in files]
-        assert problem.build(records, [own]).findings == ()
+        assert assemble.build(records, [own]).findings == ()
         static = records[-1]
         pounds = static.measured | {"thrust_N": static.measured["thrust_N"] / 4.4482216}
-        (found,) = problem.build([*records[:-1], replace(static, measured=pounds)], [own]).findings
+        (found,) = assemble.build([*records[:-1], replace(static, measured=pounds)], [own]).findings
         assert found.startswith(f"{static.name}: error: thrust_unit") and "lbf taken for N" in found
 
 

@@ -11,7 +11,7 @@ from diagnosing import case, left_out, points, recording
 from bemt.asbuilt.latents import AsBuilt
 from bemt.dataset import Dataset
 from bemt.diagnose import chain
-from bemt.diagnose.problem import build
+from bemt.diagnose.assemble import build
 from bemt.diagnose.record import from_series
 from bemt.diagnose.repeats import conditions, noise_sizes, projected_out, spread_sizes
 from bemt.effects.ground_effect import GroundEffect

@@ -14,7 +14,7 @@ from bemt import effects
 from bemt.bem import model as bem
 from bemt.case import Case
 from bemt.dataset import Dataset
-from bemt.diagnose import document, evidence, gate, plan, problem, record, signatures, verdict
+from bemt.diagnose import assemble, document, evidence, gate, plan, record, rules, signatures, verdict
 from bemt.diagnose.signatures import effect_of
 from bemt.effects.base import Reading
 
@@ -53,13 +53,13 @@ def test_what_a_plan_sees_is_named_and_nothing_else(name: str) -> None:
     baseline = left_out(name, truth) if on else truth
     rec = as_record(given, baseline)
     sight = plan.plan(rec, baseline).sight.get(name, "invisible")
-    found, absent = signatures.candidates(problem.build([rec], [baseline]), [name])
+    found, absent = signatures.candidates(assemble.build([rec], [baseline]), [name])
     if not found:
         assert sight == "invisible" and name in absent
         return
     extra: tuple[effects.Effect, ...] = (effect_of(name, found[0].settings[found[0].middle]),)  # as strong as planned
     if effects.catalogue()[name].kind == "drive":  # the same pulse width gives another speed
-        flow = bem.flow_of(problem.build([rec], [baseline]).parts[0].model.prepared([]), rec.rpm, rec.V, rec.air,
+        flow = bem.flow_of(assemble.build([rec], [baseline]).parts[0].model.prepared([]), rec.rpm, rec.V, rec.air,
                                rec.extra)  # fmt: skip
         reading = Reading({"rpm": rec.rpm.copy()}, {"rpm": float(rec.rpm.max())})
         extra[0].reading(reading, flow)
@@ -78,7 +78,7 @@ def test_correlated_noise_and_a_stand_within_its_calibration_name_nothing() -> N
     n, J = np.meshgrid(np.linspace(8000.0, 20000.0, 4), np.linspace(0.0, 0.5, 4))
     given = {"rpm": n.ravel(), "airspeed_m_s": (J * n / 60.0 * case().diameter_m).ravel(),
              "density_kg_m3": np.full(n.size, 1.225), "time_s": 20.0 * np.arange(n.size)}  # fmt: skip
-    plain = problem.build([record.from_series(recording(case(), given), case())], [case()])
+    plain = assemble.build([record.from_series(recording(case(), given), case())], [case()])
     candidates, _ = signatures.candidates(plain)
     rng = np.random.default_rng(2026)
     stand = plain.tangents[:, ~plain.own]
@@ -89,6 +89,6 @@ def test_correlated_noise_and_a_stand_within_its_calibration_name_nothing() -> N
             e[:, i] = 0.8 * e[:, i - 1] + 0.6 * e[:, i]
         y = plain.f0 + plain.u * e[plain.channel, plain.point] + stand @ rng.standard_normal(stand.shape[1])
         found = evidence.weigh(replace(plain, y=y), candidates)
-        said = verdict.decide(verdict.Asked(found, gate.p_value(found, 200)))
+        said = rules.decide(verdict.Asked(found, gate.p_value(found, 200)))
         named += [said.effects] if said.effects else []
     assert len(named) <= SHARE * NULLS, named

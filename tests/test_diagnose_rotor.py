@@ -10,7 +10,7 @@ from diagnosing import case, points, recording
 
 from bemt.dataset import Dataset
 from bemt.diagnose import another_rotor, chain
-from bemt.diagnose.problem import build
+from bemt.diagnose.assemble import build
 from bemt.diagnose.record import from_series
 
 
@@ -43,6 +43,19 @@ def test_a_rotor_off_by_a_factor_is_a_question_with_the_likely_slip(what: str, w
 def test_one_channel_in_another_unit_stays_a_finding_of_its_own() -> None:
     answer = chain.diagnose([from_series(slipped("unit"), case())], [case()], nulls=200)
     assert answer.decision.effects == ("unit_slip",)
+    # a tenth of the load is low by nine tenths of the largest value, not by 900 %
+    assert all(abs(share) <= 1.0 for share in answer.off.values()) and abs(answer.where.size) <= 1.0
+
+
+@pytest.mark.parametrize(("thrust", "torque", "said"), [(0.78, 0.78, ("air_density",)), (0.815, 0.676, ())])
+def test_density_moves_thrust_and_torque_by_the_same_share(thrust: float, torque: float, said: tuple[str, ...]) -> None:
+    """Another propeller than that of the reference moves them by two shares: no density does, and nothing is named."""
+    base, given = case(), points("grid")
+    plain, other = recording(base, given, noise=0.005), recording(base, given, noise=0.005, seed=1)
+    moved = {"thrust_N": other.values["thrust_N"] * thrust, "torque_Nm": other.values["torque_Nm"] * torque}
+    test = from_series(Dataset("bench", "other", {**other.values, **moved}, dict(other.u)), base)
+    answer = chain.diagnose([test, replace(from_series(plain, base), reference=True)], [base], nulls=200)
+    assert answer.decision.effects == said
 
 
 def test_a_rotor_that_is_the_case_is_not_asked_for() -> None:

@@ -12,10 +12,11 @@ from diagnosing import case, diagnose, left_out, points, recording
 
 from bemt import effects
 from bemt.bem import model as bem
-from bemt.diagnose import blocks, chain, confusion, fit, noise, prior, verdict
+from bemt.diagnose import blocks, chain, confusion, fit, interval_scales, noise, prior, rules, verdict
+from bemt.diagnose.assemble import build
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
-from bemt.diagnose.problem import build
 from bemt.diagnose.record import from_series
+from bemt.proof.intervals import calibrate
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +32,7 @@ def told(answer: chain.Diagnosis, **probability: float) -> verdict.Decision:
     """Decision if the explanations had these probabilities; "a__b" is a pair."""
     given = {explained(k): v for k, v in probability.items()}
     share = dict.fromkeys(answer.found.probability, 0.0) | given
-    return verdict.decide(verdict.Asked(replace(answer.found, probability=share), 0.002))
+    return rules.decide(verdict.Asked(replace(answer.found, probability=share), 0.002))
 
 
 def test_a_sure_effect_is_named(answer: chain.Diagnosis) -> None:
@@ -71,7 +72,7 @@ def test_physics_that_is_on_is_wrong_at_the_end_of_its_range(
     found: Any = SimpleNamespace(problem=SimpleNamespace(baseline=(effects.catalogue()["ground_effect"](),)))
     monkeypatch.setattr(fit, "fit", lambda *_: SimpleNamespace(settings=(setting,)))
     asked: Any = SimpleNamespace(found=found, leading=Explanation.of("ground_effect"))
-    assert verdict._leaves_its_range(asked) == beyond
+    assert rules._leaves_its_range(asked) == beyond
 
 
 @pytest.mark.parametrize(
@@ -86,7 +87,7 @@ def test_what_is_named_beside_a_slip_explains_its_own(
     pair = Explanation.of(first, "untwist")
     weights = {Explanation.of(first): 1000.0, Explanation.of("untwist"): 5.0, pair: 1000.0 + adds}
     found: Any = SimpleNamespace(problem=None, log_bayes=weights.__getitem__)
-    monkeypatch.setattr(prior, "prior_weights", lambda _, ids: dict.fromkeys(ids, 1.0))
+    monkeypatch.setattr(prior, "present", lambda _: set())
     leading, share = verdict._earned(found, pair, {first: 1.0, "untwist": 0.99}, rest)
     assert leading == explained(left) and share["untwist"] == (0.99 if leading == pair else 0.0)
 
@@ -120,7 +121,7 @@ def test_an_unknown_effect_is_in_the_test_not_in_the_reference() -> None:
 
 def test_intervals_end_at_the_physical_bounds() -> None:
     low, high = np.zeros(3), np.ones(3)
-    middle, (a, b) = fit._truncated(np.array([0.4, 3.0, -5.0]), np.array([0.05, np.inf, 0.1]), low, high, 0.9)
+    middle, (a, b) = fit._truncated([(1.0, np.array([0.4, 3.0, -5.0]), np.array([0.05, np.inf, 0.1]))], low, high, 0.9)
     assert middle[0] == pytest.approx(0.4) and b[0] - a[0] == pytest.approx(2 * 1.6449 * 0.05, rel=1e-3)
     # readings that do not see it leave the uniform prior; readings that want it outside leave it at the bound
     np.testing.assert_allclose((a[1], middle[1], b[1]), (0.05, 0.5, 0.95), atol=2e-3)
@@ -148,7 +149,7 @@ def asked(**changed: Any) -> Any:
         "first": lead, "leading": lead, "rest": 0.0, "odds": 100.0, "needed": 8.0, "p_value": 0.002, "on": False,
         "expected": False, "paired": False, "sure": ("reynolds",), "group": ("reynolds",), "beside": (), "few": (),
         "P": {NONE: 0.0, UNKNOWN: 0.0, lead: 1.0}, "share": {"reynolds": 1.0}, "unlisted": 0.0, "roughness": 1.0,
-        "vague": 0.0, "level": 0.0, "another_blade": False,
+        "vague": 0.0, "alone": True, "level": 0.0, "another_blade": False,
         "parameters": {"reynolds": {}},
     }  # fmt: skip
     return SimpleNamespace(
@@ -165,6 +166,7 @@ ROWS: dict[str, dict[str, Any]] = {
     "a smooth rest is left": {"rest": 10.5},
     "not much better than nothing": {"odds": 7.0},
     "twin faults": {"leading": Explanation.of("thrust_zero", "torque_drift")},
+    "two levels": {"leading": Explanation.of("air_density", "torque_gain")},
     "unknown is nearly as likely": {"unlisted": 0.2},
     "far rougher than stated": {"roughness": 5.0, "alone": True},
     "may as well be absent": {
@@ -174,7 +176,7 @@ ROWS: dict[str, dict[str, Any]] = {
     "another blade, or anything that scales all loads": {"another_blade": True},
     "at the end of its range": {
         "leading": Explanation.of("untwist", "duct"),
-        "parameters": {"untwist": {"tip_deg": {"value": 3.0, "low": 2.0, "high": 3.0}}},
+        "parameters": {"untwist": {"tip_deg": {"value": 5.0, "low": 4.0, "high": 5.0}}},
     },
     "several are sure": {"sure": ("reynolds", "duct")},
     "one is sure": {},
@@ -195,12 +197,12 @@ ROWS: dict[str, dict[str, Any]] = {
 def test_each_row_of_the_table_answers_when_it_alone_holds(name: str) -> None:
     """The first row that holds is the one that was made to hold; take it away and a later one does."""
     a = asked(**ROWS[name])
-    assert next(r.name for r in verdict.RULES if r.holds(a)) == name
+    assert next(r.name for r in rules.RULES if r.holds(a)) == name
 
 
 def test_the_table_says_where_each_row_comes_from_and_the_last_always_holds() -> None:
-    assert len({r.name for r in verdict.RULES}) == len(verdict.RULES) and all(r.source for r in verdict.RULES)
-    assert verdict.RULES[-1].holds(asked())
+    assert len({r.name for r in rules.RULES}) == len(rules.RULES) and all(r.source for r in rules.RULES)
+    assert rules.RULES[-1].holds(asked())
 
 
 def test_a_pair_has_one_set_for_each_cause() -> None:
@@ -210,3 +212,51 @@ def test_a_pair_has_one_set_for_each_cause() -> None:
     share |= {Explanation.of("air_density"): 0.2, NONE: 0.1, Explanation.of("air_density", "rpm_scale"): 1e-3}
     sets = verdict.credible_sets(share, Explanation.of("air_density", "thrust_zero"))
     assert {frozenset(s) for s in sets} == {frozenset(one), frozenset({"thrust_zero"})}
+
+
+def _said(word: str, *ids: str) -> chain.Diagnosis:
+    """Outcome of which only the decision is looked at."""
+    nothing: Any = None
+    decision = verdict.Decision(word, ids, Explanation.of(*ids), 0.95, 0.0, (), "")
+    return chain.Diagnosis(
+        nothing, decision, nothing, {}, 0.002, nothing, {}, "", nothing, nothing, nothing, nothing, {}
+    )
+
+
+def test_loads_that_stay_open_do_not_veto_the_drive() -> None:
+    answer = chain._together(_said("insufficient"), _said("named", "battery_sag"))
+    assert (answer.decision.verdict, answer.decision.effects) == ("named", ("battery_sag",))
+    assert answer.systems["air"]["verdict"] == "insufficient" and answer.systems["drive"]["verdict"] == "named"
+
+
+def test_air_that_changes_with_time_moves_the_motor_too() -> None:
+    """Recirculation takes load off the motor: what its speed then does is no second cause."""
+    both = chain._together(_said("named", "recirculation"), _said("named", "motor_heating"))
+    apart = chain._together(_said("named", "pitch_offset"), _said("named", "motor_heating"))
+    assert both.decision.effects == ("recirculation",) and apart.decision.effects == ("pitch_offset", "motor_heating")
+
+
+def test_intervals_are_widened_by_their_factor_and_end_at_the_range() -> None:
+    told = {"untwist": {"tip_deg": {"value": 1.0, "low": 0.8, "high": 1.3, "unit": "deg"}},
+            "rpm_scale": {"factor": {"value": 2.0, "low": 2.0, "high": 2.0, "unit": "1"}}}  # fmt: skip
+    s = interval_scales.scale_of("untwist", "tip_deg")
+    wide = interval_scales.widened(told)
+    assert wide["untwist"]["tip_deg"]["low"] == pytest.approx(1.0 - 0.2 * s)
+    assert wide["untwist"]["tip_deg"]["high"] == pytest.approx(1.0 + 0.3 * s)
+    assert wide["rpm_scale"] == told["rpm_scale"]  # a ratio has odds, no half-width
+    far = {"untwist": {"tip_deg": {"value": 4.9, "low": 4.0, "high": 5.0, "unit": "deg"}}}
+    assert interval_scales.widened(far)["untwist"]["tip_deg"]["high"] == 5.0
+
+
+def test_factors_hold_as_often_as_they_say() -> None:
+    rng = np.random.default_rng(0)
+    scores = np.abs(rng.standard_normal(400)) / 1.0
+    found = [{"effect": "untwist", "parameter": "tip_deg", "score": float(v)} for v in scores[:200]]
+    factor = calibrate(found, [])["parameters"]["untwist.tip_deg"]["scale"]
+    assert np.mean(scores[200:] <= factor) == pytest.approx(0.9, abs=0.06)
+
+
+def test_a_number_that_may_as_well_be_off_is_not_pinned_to_its_end() -> None:
+    low = {"value": 0.7, "low": 0.7, "high": 1.1}
+    assert not rules.at_end("section", {"drag": low})
+    assert rules.at_end("section", {"drag": {**low, "high": 0.9}})

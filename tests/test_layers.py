@@ -64,6 +64,7 @@ MAY: dict[str, set[str]] = {
     "bemt.compare.sweep.batch": {"files", "environment"},
     "bemt.compare.bench.*": {"files", "clock", "environment"},
     "bemt.diagnose.figures|bemt.diagnose.folder|bemt.diagnose.rotor_calibration": {"files"},
+    "bemt.diagnose.interval_scales": {"files"},
     "bemt.proof.prove": {"files", "clock", "environment"},
     "bemt.proof.follow|bemt.proof.pairs|bemt.proof.real|bemt.proof.seal": {"files"},
     "bemt.exports.*": {"files"},

@@ -75,6 +75,7 @@ def test_what_a_short_case_states_is_no_assumption(here: Path) -> None:
     (here / "case.toml").write_text(text)
     case = load_case("case.toml")
     assert case.hub_diameter_m == 0.03 and case.air().rho < 1.18
+    assert case.file.blade.max_chord_over_R == pytest.approx(0.195)  # the middle of the range that the user gives
     assert {a.key: a.values for a in case.assumptions} == {
         "blade.max_chord_over_R": (0.19, 0.20),
         "blade.beta_offset_deg": (0.0, 1.4),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,8 @@ Readings = Callable[[Array], Array]
 
 TOLERANCE = 0.25
 """Steps shorter than this share of a posterior standard deviation end the search [1]."""
+BIRGE = 1.5
+"""Mean square of the residuals, over that of the roughest noise, beyond which the noise is taken for larger [1]."""
 MOST_STEPS = 8
 """Tangents are taken so often at most [1]."""
 _SLACK = 1e-6
@@ -45,6 +47,8 @@ class Conditioned:
         Root mean square of the factor on the noise, posterior [1].
     log_evidence : float
         Laplace's logarithm of the evidence of the reference [1].
+    excess : float
+        Factor on the covariance of the noise, above 1 for readings that no rotor of the prior could give [1].
     """
 
     mean: Array
@@ -59,6 +63,7 @@ class Conditioned:
     converged: bool
     noise_size: float
     log_evidence: float
+    excess: float = 1.0
 
 
 def condition(
@@ -72,7 +77,9 @@ def condition(
     DIAGNOSIS section 7.  With L L^T = noise, A = L^-1 T and the prior whitened, z+ = (I + A^T A)^-1 A^T L^-1 (y - f0),
     f0 = f(c) - T (c - prior mean); a step is accepted by the misfit plus the log-determinant at every size of the heavy
     tail, else halved.  The heavy tail is a mixture of sizes: the posterior weights take the place of
-    s^2 = (nu s0^2 + x^2)/(nu + 1).
+    s^2 = (nu s0^2 + x^2)/(nu + 1).  Readings that lie further off than the largest of the noise's sizes bears are
+    believed less, by Birge's ratio (R. T. Birge, Physical Review 40, 1932, p. 207, not checked): a run that fits no
+    rotor moves none.
     """
     z = np.array(prior.mean, dtype=float)
     f = np.asarray(solve(z), dtype=float)
@@ -105,6 +112,12 @@ def condition(
             break
         z, f, T, here = at, f_new, T_new, there
         converged = bool(np.all(np.abs(here.mean - z) <= tolerance * np.sqrt(np.diag(here.cov))))
+    if noise_sizes is not None:
+        left = np.linalg.solve(white, target - f[kept] - T[kept] @ (here.mean - z))
+        excess = float(left @ left) / (left.size * float(noise_sizes.max()) ** 2)
+        if excess > BIRGE:
+            again = condition(solve, prior, y, excess * noise, noise_sizes, noise_weights, tolerance, most)
+            return replace(again, excess=excess * again.excess)
     return Conditioned(
         here.mean, here.cov, z, f, T, f - T @ (z - prior.mean), prior.sizes, here.weights, steps, converged,
         here.noise_size, here.log_evidence,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -80,6 +81,14 @@ class Prediction:
         pairs = latent[..., None] + (self.rest_sizes * np.sqrt(still)[..., None])[..., None, :] ** 2
         return np.asarray(np.sqrt(pairs).reshape(*still.shape, -1))
 
+    def log_density(self, y: Array) -> Array:
+        """Logarithm of the probability density of readings, (2, P)."""
+        from scipy.special import logsumexp
+
+        sds = self.sds(noise=True)
+        logs = -0.5 * ((y - self.mean)[..., None] / sds) ** 2 - np.log(sds) - 0.5 * math.log(2.0 * math.pi)
+        return np.asarray(logsumexp(logs, axis=-1, b=self.chances))
+
     def half_width(self, level: float = LEVELS[0], noise: bool = False) -> Array:
         """Half width of the interval that holds the rotor's own coefficient (with noise: a reading), (2, P) [1]."""
         return half_width(level, self.sds(noise), self.chances)
@@ -119,7 +128,11 @@ def predict(
     rest = p.rest_sd(at.diameter_m, at.f, at.top)
     if reference is not None:
         shift, T, left = reference.near(p, at.x, at.Re, rest, T)
-        mean, rest = mean + shift, left * reference.size
+        # near the run the rest is as large as it was there, if that is more than usual; far from it, as large as is
+        # usual
+        usual = float(np.sqrt(WEIGHTS @ p.rest_sizes**2))
+        told = 1.0 - np.divide(left, rest, out=np.ones_like(rest), where=rest > 0.0) ** 2
+        mean, rest = mean + shift, left * np.sqrt(told * max(reference.size / usual, 1.0) ** 2 + 1.0 - told)
     latent = np.sqrt(np.maximum(np.einsum("ckp,kj,cjp->cp", T, prior.cov, T), 0.0))
-    tail = (p.rest_sizes, WEIGHTS) if reference is None else (np.ones(1), np.ones(1))
-    return Prediction(mean, latent, rest, p.noise_sd(at.f, at.top), prior.sizes, prior.weights, *tail)
+    noise = p.noise_sd(at.f, at.top)
+    return Prediction(mean, latent, rest, noise, prior.sizes, prior.weights, p.rest_sizes, WEIGHTS)

@@ -19,6 +19,19 @@ SESSION = 0.01
 """Gain of a stand that all points of a run share, where the recording does not state it: retests of a propeller in one
 tunnel repeat CT to about a percent (Brandt and Selig 2011, AIAA 2011-1255, not checked) [1]."""
 _BLIND = 1e6
+_FEWEST = 5
+
+
+def scatter(values: Array, order: Array) -> float:
+    """Scatter of single readings along a smooth run: root mean square of second differences over the square root of 6.
+
+    Zero with fewer than five. A smooth curve leaves next to none, so that what differs from reading to reading is not
+    taken for the solver's rest (von Neumann et al., Annals of Mathematical Statistics 12, 1941, for first differences;
+    not checked).
+    """
+    along = values[np.argsort(order)]
+    along = along[np.isfinite(along)]
+    return 0.0 if along.size < _FEWEST else float(np.sqrt(np.mean(np.diff(along, 2) ** 2) / 6.0))
 
 
 def noise_of_run(
@@ -57,7 +70,7 @@ class ReferenceRun:
     T : (2 M, K) float
         Slopes with the latent numbers [1 over their units].
     size : float
-        How much larger the rest of this rotor is than usual [1].
+        Size of the rest of this rotor, as `Population.rest_sizes` count it; predictions are never narrower for it [1].
     """
 
     x: Array
@@ -88,7 +101,7 @@ class ReferenceRun:
         good = np.isfinite(y) & np.isfinite(found.f)
         left = np.where(good, y - found.f - found.T @ (found.mean - found.at), 0.0)
         slopes = np.where(good[:, None], found.T, 0.0)
-        return ReferenceRun(x, Re, np.where(good, amplitude, 0.0), left, noise, slopes, found.noise_size)
+        return ReferenceRun(x, Re, np.where(good, amplitude, 0.0), left, found.excess * noise, slopes, found.noise_size)
 
     def document(self) -> dict[str, Any]:
         """Plain values for the file."""

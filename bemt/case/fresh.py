@@ -8,7 +8,7 @@ from pathlib import Path
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
-from bemt.case.unknowns import AIR, FAN, HUB, LABEL, SECTION, SURFACE, Unknown
+from bemt.case.unknowns import AIR, FAN, HUB, OFFSET, SECTION, SURFACE, Unknown, label_chord
 from geometry.common import GeometryError
 from geometry.designation import parse_designation
 
@@ -84,6 +84,8 @@ def label_text(label: str, blades: int | None = None, rpm: float | None = None, 
     """Write the case of a label such as ``10x5``."""
     D, pitch, B = label_parts(label, blades)
     name = case_name(f"prop_{D:g}x{pitch:g}" + (f"x{B}" if B != 2 else ""))
+    chord = label_chord(D * INCH)
+    unknowns = _blocks(HUB, OFFSET, chord, *SECTION, *SURFACE, AIR)
     return f"""# A {D:g}x{pitch:g} propeller, known by its label. [[assumptions]] are declared unknowns with ranges:
 # `bemt sweep` says what each does to the thrust. Put in what you measure and delete its assumption.
 schema = "bemt.case/1"
@@ -101,12 +103,12 @@ hub_ratio = 0.15
 pitch_in = {pitch:g}
 beta_offset_deg = 0.7
 chord_law = "apc_like"
-max_chord_over_R = 0.195
+max_chord_over_R = {chord.value:.3g}
 
 [blade.section]
 camber = 0.035
 thickness = 0.09
-{_operating(_rpm(D * INCH, rpm), airspeed_m_s, rpm is not None)}{_blocks(HUB, *LABEL, *SECTION, *SURFACE, AIR)}"""
+{_operating(_rpm(D * INCH, rpm), airspeed_m_s, rpm is not None)}{unknowns}"""
 
 
 def stations_text(

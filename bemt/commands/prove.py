@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
@@ -26,6 +27,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--jobs", type=_options.positive, metavar="N", help=jobs)
     steps = "with --size real and --out: take the steps that silent answers recommend, where the data have them"
     parser.add_argument("--follow", action="store_true", help=steps)
+    kept = "folders of kept proofs: write factors on the intervals of parameters to --out instead"
+    parser.add_argument("--calibrate-intervals", metavar="DIR", help=kept, **_options.MANY)
     _options.add_json(parser, "bemt.proof/1")
     _options.add_quiet(parser, "no tables")
 
@@ -41,6 +44,8 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(Fault("--follow", "", got, "--size real and --out DIR"))
     taken = ""
     with _terminal.progress() as say:
+        if args.calibrate_intervals:
+            return _intervals(args.calibrate_intervals, args.out, say)
         found = prove(args.out, args.size, args.seed, args.jobs, say, _terminal.complain)
         if args.follow:
             taken = follow.text(follow.follow(Path(args.out), args.jobs or os.cpu_count() or 1, say))
@@ -49,3 +54,14 @@ def run(args: argparse.Namespace) -> int:
     elif not args.quiet:
         print("\n\n".join([proof_text.text(found), *([taken] if taken else [])]))
     return EXIT_OK if all(row["met"] is not False for row in found["score"]) else EXIT_UNCONVERGED
+
+
+def _intervals(folders: list[str], out: str | None, say: Callable[[str], None]) -> int:
+    """Write the factors on the intervals."""
+    from bemt.base.tables import json_text, write_atomic
+    from bemt.diagnose.interval_scales import FILE
+    from bemt.proof.intervals import calibrate, misses
+
+    sets, found = zip(*(misses(Path(folder), say) for folder in folders), strict=True)
+    write_atomic(Path(out or ".") / FILE, json_text(calibrate([m for some in found for m in some], sets)))
+    return EXIT_OK

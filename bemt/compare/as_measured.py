@@ -14,7 +14,7 @@ from bemt.asbuilt.latents import NAMES, Prior
 from bemt.asbuilt.model import air_fields, air_of_points, coefficients
 from bemt.asbuilt.population import WEIGHTS, population
 from bemt.asbuilt.predict import zero_thrust
-from bemt.asbuilt.reference import SESSION, ReferenceRun, noise_of_run
+from bemt.asbuilt.reference import SESSION, ReferenceRun, noise_of_run, scatter
 
 if TYPE_CHECKING:
     from bemt.air import Air
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+# Advance ratio below which a point is at rest [1].
+_STILL = 0.01
 MOST_POINTS = 40
 """Points beyond this number are averaged with their neighbours in (J, rpm) [1]."""
 
@@ -91,7 +93,9 @@ def as_measured(
     top = solve(drawn, rpm_, np.zeros_like(J_), points)
     x = J_ / zero_thrust(solve, drawn, float(np.median(rpm_)), int(np.argsort(rpm_)[rpm_.size // 2]))
     y = np.array([mean(CT), mean(CP)])
-    single = np.hypot(np.array([mean(u_CT), mean(u_CP)]), people.noise_sd(f, top)) * share
+    still = np.abs(J_) < _STILL
+    rough = np.array([[scatter(a, Re[still])] for a in (y - f)[:, still]]) * still
+    single = np.maximum(np.hypot(np.array([mean(u_CT), mean(u_CP)]), people.noise_sd(f, top)) * share, rough)
     noise = noise_of_run(people, ready.diameter_m, (x, Re), f, top, y, single, gain)
     target = y.reshape(-1)
     bias = people.bias(x, top).reshape(-1)

@@ -15,7 +15,7 @@ import numpy as np
 
 from bemt.base.tables import number_text
 from bemt.base.units import INCH
-from bemt.diagnose.blade import AsLabelled, turned
+from bemt.diagnose.blade import AsLabelled
 from bemt.diagnose.record import CHANNELS
 from bemt.effects import catalogue
 from bemt.effects.base import Baking, Effect
@@ -111,7 +111,7 @@ def _slips(problem: Problem, found: dict[str, float]) -> Iterator[tuple[str, str
                 for n in _BLADES if n != blades]  # fmt: skip
     f0 = part.predict(part.baseline).reshape(len(part.channels), -1)
     for kind, words, change, rarity in changes:
-        f = part.predict(turned(part, change)).reshape(len(part.channels), -1)
+        f = part.predict(part.turned(change)).reshape(len(part.channels), -1)
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = dict(zip(part.channels, np.nanmedian(f / f0, axis=1), strict=True))
         if all(ratio.get(c, np.nan) > 0.0 for c in found):

@@ -7,30 +7,24 @@ f(c) - T (c - mean of the prior), signatures of effects to f(c) itself, and noth
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.asbuilt.conditioning import condition, tangents
-from bemt.asbuilt.latents import NAMES, STEP, UNITS, AsBuilt, Prior
+from bemt.asbuilt.latents import NAMES, STEP, AsBuilt, Prior
 from bemt.case.as_built import as_built_of, known_from
 from bemt.case.prepare import prepare_case
-from bemt.diagnose import noise
 
 if TYPE_CHECKING:
     from bemt.case import Case
-    from bemt.diagnose.problem import Part, Problem
     from bemt.effects.base import Baking, Effect
 
-__all__ = ["FARTHEST_DEG", "PLAIN", "CalibratedBlade", "calibrated", "prior_of", "turned"]
+__all__ = ["PLAIN", "AsLabelled", "CalibratedBlade", "prior_of"]
 
 Array = NDArray[np.float64]
 
-FARTHEST_DEG = 11.0
-"""A blade that a reference turns further than this is another rotor, or the recording is wrong [deg]."""
 # Standard deviations without a reference, in the order of NAMES: angle [deg], lift, drag, low-Reynolds lift [1], camber
 # [deg].  Working calibrations; a wide blade without a reference would swallow slips of speed and unit.
 _PLAIN = (0.3, 0.03, 0.10, 0.0, 0.0)
@@ -42,37 +36,8 @@ _SD = {
 }  # fmt: skip
 # Heavy tail: factors on all of them, with their probabilities.
 _SIZES, _WEIGHTS = (0.8, 1.2, 2.2), (0.5, 0.4, 0.1)
-# With more error of the solver than this it would take what belongs to the blade; every reading has this noise more,
-# shares of the largest coefficient, so that no detail of a curve drives the blade anywhere.
-_SMALL, _ROUGH = 0.03, 0.01
 # CalibratedBlade angles within which a pitch means something [rad].
 _FLAT, _STEEP = 0.02, 1.45
-# Loads that a blade is sought on.
-_FEWEST = 3
-# Rounds of choosing covariance and point.
-_ROUNDS = 3
-_WORTH_SAYING = 0.5
-
-
-def _covariances(problem: Problem) -> Iterator[Array]:
-    """Covariances without the blade under which it may be chosen: solver errors of 3 % or less."""
-    for h, C in noise.covariances(problem):
-        if h.model <= _SMALL:
-            yield C + np.diag((_ROUGH * problem.scale) ** 2)
-
-
-def _misfit(C: Array, r: Array) -> float:
-    return float(r @ np.linalg.solve(C, r))
-
-
-def _likeliest(tables: Sequence[Array], r: Array, B: Array) -> int:
-    """Covariance under which a residual is likeliest when the blade is free."""
-    scores = []
-    for C in tables:
-        L = np.linalg.cholesky(C + B @ B.T)
-        w = np.linalg.solve(L, r)
-        scores.append(-0.5 * float(w @ w) - float(np.sum(np.log(np.diag(L)))))
-    return int(np.argmax(scores))
 
 
 @dataclass(frozen=True)
@@ -146,51 +111,3 @@ def prior_of(case: Case) -> Prior:
         stated = getattr(told, f"{name.removesuffix('_deg')}_sd{'_deg' if name.endswith('_deg') else ''}", None)
         sd[name] = sd[name] if stated is None else max(float(stated), 1e-3)
     return Prior(mean, np.diag(np.array(list(sd.values())) ** 2), np.array(_SIZES), np.array(_WEIGHTS), source)
-
-
-def turned(part: Part, blade: Effect) -> tuple[Effect, ...]:
-    """Baseline of a part with another blade."""
-    return (*(e for e in part.baseline if e.id != blade.id), blade)
-
-
-def calibrated(problem: Problem, prior: Prior) -> tuple[CalibratedBlade | None, str, str]:
-    """Find the blade on the reference readings."""
-    rows = ~problem.free
-    if np.count_nonzero(problem.channel[rows] < 2) < _FEWEST:
-        return None, "", ""
-    kind = AsLabelled if prior.known_from == "label" else AsBuilt
-    parts = [p for p in problem.parts if p.record.reference]
-    ends = np.cumsum([0, *(len(p.channels) * len(p.record) for p in problem.parts)])
-    kept = [problem.kept[a:b] for p, a, b in zip(problem.parts, ends, ends[1:], strict=False) if p.record.reference]
-
-    def solve(z: Array) -> Array:
-        blade = kind(*map(float, z))
-        return np.concatenate([p.predict(turned(p, blade))[k] for p, k in zip(parts, kept, strict=True)])
-
-    y = problem.y[rows]
-    whole = problem.with_tangents(np.array([not name.startswith("blade ") for name in problem.names]))
-    tables = [C[np.ix_(rows, rows)] for C in _covariances(whole)]
-    root = np.asarray(np.linalg.cholesky(prior.cov), dtype=float)
-    at, chosen = prior.mean, -1
-    for _ in range(_ROUNDS):
-        best = _likeliest(tables, y - solve(at), tangents(solve, at) @ root)
-        if best == chosen:
-            break
-        chosen, found = best, condition(solve, prior, y, tables[best])
-        at = found.mean
-    words = ", ".join(
-        f"{name.removesuffix('_deg').replace('_', ' ')} {value:+.2g}{' deg' if UNITS[name] == 'deg' else ''}"
-        for name, value, sd in zip(NAMES, found.mean, np.sqrt(np.diag(prior.cov)), strict=True)
-        if abs(value) > _WORTH_SAYING * sd
-    )
-    if abs(found.mean[0]) > FARTHEST_DEG:
-        return None, "", (
-            f"the reference asks for a blade turned by {found.mean[0]:+.0f} deg: another rotor than the case's, or "
-            "another diameter, number of blades or unit. The blade was left as the case has it"
-        )  # fmt: skip
-    rest, start = y - solve(found.mean), y - solve(prior.mean)
-    if not np.isfinite(rest).all() or _misfit(tables[chosen], rest) > _misfit(tables[chosen], start):
-        return None, "no blade fits the reference better than that of the case, which was left as it is", ""
-    size = float(np.sqrt(found.weights @ found.sizes**2))
-    note = f"blade calibrated on the reference (known from {prior.known_from}): {words or 'as the case has it'}"
-    return CalibratedBlade(found.mean, prior.mean, size * root, kind), note, ""

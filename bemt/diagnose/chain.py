@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import effects
-from bemt.diagnose import another_rotor, blocks, confusion, evidence, gate, signatures, verdict
+from bemt.diagnose import another_rotor, blocks, confusion, evidence, gate, interval_scales, rules, signatures, verdict
 from bemt.diagnose import fit as fitting
 from bemt.diagnose import locate as location
 from bemt.diagnose import suggest as suggestion
+from bemt.diagnose.assemble import build
 from bemt.diagnose.explanation import NONE, Explanation
-from bemt.diagnose.problem import Problem, build
+from bemt.diagnose.problem import Problem
 from bemt.diagnose.record import CHANNELS
 
 if TYPE_CHECKING:
@@ -60,6 +61,8 @@ class Diagnosis:
         Effects that could not be tried, and why.
     drive : Diagnosis or None
         Of the motor's speed over pulse width, a problem of its own; None where it was not recorded.
+    loads : Diagnosis or None
+        Of thrust and torque, where they name nothing and the answer is that of the drive.
     """
 
     found: evidence.Evidence
@@ -76,6 +79,7 @@ class Diagnosis:
     alike: confusion.Confusion
     absent: dict[str, str]
     drive: Diagnosis | None = None
+    loads: Diagnosis | None = None
 
     @property
     def systems(self) -> dict[str, dict[str, Any]]:
@@ -87,6 +91,8 @@ class Diagnosis:
         for system in ("air", "stand", "drive"):
             mine = [i for i, kind in kinds.items() if kind == system]
             word = ("none" if not mine else said.verdict) if listed else said.verdict
+            if self.loads is not None and system != "drive":
+                word = self.loads.decision.verdict
             out[system] = {"verdict": word, "effects": mine}
         if self.drive is not None and self.drive is not self:
             out["drive"] = {"verdict": self.drive.decision.verdict, "effects": list(self.drive.decision.effects)}
@@ -103,7 +109,7 @@ class Diagnosis:
     def off(self) -> dict[str, float]:
         """Mean mismatch of each channel, share of the largest value at that speed [1]."""
         p = self.problem
-        share = p.residual / p.scale
+        share = p.residual / p.largest
         rows = {name: (p.channel == c) & p.free for c, name in enumerate(CHANNELS)}
         return {name: float(np.mean(share[here])) for name, here in rows.items() if here.any()}
 
@@ -152,10 +158,13 @@ def diagnose(
 
 
 def _together(rotor: Diagnosis, motor: Diagnosis) -> Diagnosis:
-    """One answer: what the loads say, and what the motor says where the loads say nothing or name a cause."""
-    if rotor.decision.verdict == "none" and motor.decision.verdict in ("named", "class"):
-        return replace(motor, drive=motor, absent=rotor.absent)
-    both = rotor.decision.verdict in ("named", "sensor") and motor.decision.verdict == "named"
+    """One answer: what the loads say, and what the motor says where they name nothing or name a cause, too."""
+    if not rotor.decision.effects and motor.decision.verdict in ("named", "class"):
+        return replace(motor, drive=motor, loads=rotor, absent=rotor.absent)
+    # air that changes with time changes the load, and with it the speed at a pulse width
+    moved = any("time_s" in effects.catalogue()[i].along and effects.catalogue()[i].kind == "air"
+                for i in rotor.decision.effects)  # fmt: skip
+    both = rotor.decision.verdict in ("named", "sensor") and motor.decision.verdict == "named" and not moved
     decision = rotor.decision
     if both:
         chance = min(decision.probability, motor.decision.probability)
@@ -184,9 +193,10 @@ def _diagnose(
     say("bootstrapped nulls")
     p = gate.p_value(found, nulls)
     asked = verdict.Asked(found, p)
-    decision = another_rotor.judged(problem, verdict.decide(asked))
+    decision = another_rotor.judged(problem, rules.decide(asked))
     best, parameters = asked.refined(decision.leading)
     decision = another_rotor.of_recorded(problem, decision, parameters)
+    parameters = interval_scales.widened(parameters)
     say("held-out blocks")
     words, held, gp_only = blocks.held_out(found, decision.leading if decision.verdict != "unknown" else NONE)
     if decision.verdict == "unknown":  # what is not in the library is predicted as what it is: something smooth
@@ -232,7 +242,7 @@ def _next(
     file = "reference.csv" if chosen.kind == "reference" else "new_run.csv"
     if chosen.kind == "reference":
         commands: tuple[str, ...] = (given.command(reference=file), given.comparison(file))
-    elif chosen.kind == "run":
+    elif chosen.kind in ("run", "look"):
         commands = (given.command(run=file),)
     else:
         commands = ()

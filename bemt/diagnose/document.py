@@ -14,6 +14,7 @@ from bemt.diagnose import fit as fitting
 from bemt.diagnose.confusion import nearest
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
 from bemt.diagnose.locate import bare
+from bemt.diagnose.rules import BESIDE_IT
 from bemt.diagnose.suggest import LEVEL
 from bemt.diagnose.verdict import inclusion
 
@@ -172,7 +173,7 @@ def explanation(d: Diagnosis) -> list[str]:
             lines.append("Because: " + "; ".join(signs) + ".")
     elif decision.verdict == "class":
         lead = "One of these, which this plan cannot tell apart" if decision.classes else decision.why.capitalize()
-        if len(decision.sets) > 1:
+        if len(decision.sets) > 1 and decision.rule != BESIDE_IT:
             sets = " and ".join("{" + " or ".join(s) + "}" for s in decision.sets)
             lines.append(f"One of each ({decision.probability:.2f}): {sets}.")
         lines.append(f"{lead} ({decision.probability:.2f}): "
@@ -186,6 +187,8 @@ def explanation(d: Diagnosis) -> list[str]:
     others = [i for group in decision.classes for i in group if i not in decision.effects]
     if others:
         lines.append(f"Cannot be told from: {', '.join(others)}.")
+    if d.loads is not None and d.loads.decision.verdict != "none":
+        lines.append(f"Thrust and torque at the measured speed are a question of their own: {headline(d.loads)}")
     lines += [*_next(d), *_not_tried(d)]
     return [line for line in lines if line]
 
@@ -226,10 +229,10 @@ def headline(d: Diagnosis) -> str:
     if said.verdict == "sensor":
         return f"The stand is at fault, not the air: {' and '.join(titles)}."
     if said.verdict == "class":
+        if said.rule == BESIDE_IT:
+            return f"{titles[0].capitalize()} is at work; whether {' or '.join(titles[1:])} is, too, is left open."
         if len(said.sets) > 1:
             return f"Two things are at work: {' and '.join(_one_of(s) for s in said.sets)}."
-        if said.rule == "one is sure, another may be there":
-            return f"{titles[0].capitalize()} is at work; whether {' or '.join(titles[1:])} is, too, is left open."
         return f"It is {' or '.join(titles)}; these readings do not say which."
     if said.verdict == "unknown":
         return f"Recording and model differ ({off}), and no effect of the library explains it."
@@ -272,7 +275,8 @@ def text(d: Diagnosis) -> str:
     header = ["RMSE over largest reading", "before", "after", "noise", "held out: before", "after", "smooth curve only"]
     out += ["", text_table(header, rows, left=(0,), indent="  ")]
     h = found.states[0].hyper
-    out.append(f"\n  p = {d.p_value:.3g}; noise x{h.scale:g} of stated, correlation {h.ar:g}, "
+    beside = "of what is stated or seen" if d.problem.u_known else "of a usual stand's (none is stated)"
+    out.append(f"\n  p = {d.p_value:.3g}; noise x{h.scale:g} {beside}, correlation {h.ar:g}, "
                f"solver error {h.model:.0%}; {d.problem.y.size} readings")  # fmt: skip
     out += [f"  note: {note}" for note in d.problem.notes]
     return "\n".join(out)

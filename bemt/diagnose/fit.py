@@ -26,6 +26,10 @@ Array = NDArray[np.float64]
 _STEPS = 5
 # Values of a discrete parameter that are told with their odds.
 _SHOWN = 6
+# Settings of the covariance that are less likely than this beside the best one add nothing to an interval.
+_RARE = 0.01
+# Quantiles that stand for a distribution.
+_QUANTILES = 199
 # Root mean square of the prior sizes of a form's error.
 _FORM_SIZE = float(np.sqrt(sum(w * f**2 for f, w in FORM.items())))
 
@@ -168,17 +172,15 @@ def refined(found: Evidence, best: Fit, share: float = 0.9) -> tuple[Fit, dict[s
         return float(w @ w)
 
     s = solve(x)
-    mean, sigma = x, np.full(x.size, np.inf)
+    tangent: Array | None = None
     for _ in range(_STEPS if x.size and np.isfinite(s).all() else 0):
         step = np.where(x + 0.02 * (high - low) <= high, 0.02, -0.02) * (high - low)
-        tangent = np.stack([(solve(x + d) - s) / d[k] for k, d in enumerate(np.diag(step))], axis=1)
-        if not np.isfinite(tangent).all():
+        slope = np.stack([(solve(x + d) - s) / d[k] for k, d in enumerate(np.diag(step))], axis=1)
+        if not np.isfinite(slope).all():
             break
+        tangent = slope
         J = white(tangent)
         H, g = J.T @ J, J.T @ white(problem.residual - s)
-        # of the readings alone, but for a prior so wide that it only keeps directions that they do not see finite
-        wide = H + np.diag(0.1 / (high - low) ** 2)
-        mean, sigma = x + np.linalg.solve(wide, g), np.sqrt(np.diag(np.linalg.inv(wide)))
         move = np.linalg.solve(H + np.diag(1.0 / spread), g)
         for shrink in (1.0, 0.3):
             new = np.clip(x + shrink * move, low, high)
@@ -191,7 +193,10 @@ def refined(found: Evidence, best: Fit, share: float = 0.9) -> tuple[Fit, dict[s
         x, s = new, trial
         if settled:
             break
-    middle, ends = _truncated(mean, sigma, low, high, share)
+    mixed = [(1.0, x, np.full(x.size, np.inf))]
+    if tangent is not None:
+        mixed = _by_state(found, best, x, s, tangent, high - low)
+    middle, ends = _truncated(mixed, low, high, share)
     trial = solve(middle)
     if np.isfinite(trial).all() and misfit(trial) < misfit(s) + 1.0:
         x = middle
@@ -210,16 +215,49 @@ def refined(found: Evidence, best: Fit, share: float = 0.9) -> tuple[Fit, dict[s
     return (Fit(best.ids, final, best.columns, s) if np.isfinite(s).all() else best), out
 
 
-def _truncated(mean: Array, sigma: Array, low: Array, high: Array, share: float) -> tuple[Array, tuple[Array, Array]]:
-    """Medians and ends of the interval of normal distributions that end at physical bounds."""
-    if not mean.size:
-        return mean, (mean, mean)
-    sigma = np.clip(sigma, 1e-9 * (high - low), 1e3 * (high - low))
-    # further out than this the distribution is an exponential at the bound, and its tail numbers underflow
-    mean = np.clip(mean, low - 8.0 * sigma, high + 8.0 * sigma)
-    a, b = (low - mean) / sigma, (high - mean) / sigma
-    middle, first, last = (mean + sigma * _quantile(q, a, b) for q in (0.5, 0.5 - share / 2, 0.5 + share / 2))
-    return middle, (first, last)
+def _by_state(
+    found: Evidence, best: Fit, x: Array, s: Array, tangent: Array, span: Array
+) -> list[tuple[float, Array, Array]]:
+    """Weight, mean and standard deviation of the parameters under every setting of the covariance, by Laplace at x."""
+    what = Explanation.of(*best.ids)
+    states = [q for q in found.states if what in q.log_z]
+    log_w = np.array([q.log_z[what] + np.log(q.hyper.weight) for q in states])
+    extra = form_covariance(found, best, _FORM_SIZE) + _scale(found, best)
+    out = []
+    for q, w in zip(states, np.exp(log_w - log_w.max()), strict=True):
+        if w < _RARE:
+            continue
+        white = noise.whitener(noise.covariance(found.problem, q.hyper) + extra, found.problem.u)
+        J = white(tangent)
+        # of the readings alone, but for a prior so wide that it only keeps directions that they do not see finite
+        H = J.T @ J + np.diag(0.1 / span**2)
+        mean = x + np.linalg.solve(H, J.T @ white(found.problem.residual - s))
+        out.append((float(w), mean, np.sqrt(np.diag(np.linalg.inv(H)))))
+    return out
+
+
+def _truncated(
+    mixed: Sequence[tuple[float, Array, Array]], low: Array, high: Array, share: float
+) -> tuple[Array, tuple[Array, Array]]:
+    """Medians and ends of the interval of a mixture of normal distributions that end at physical bounds."""
+    if not low.size:
+        return low, (low, low)
+    grid = np.linspace(0.0, 1.0, 2 * _QUANTILES + 1)[1::2]
+    values, weight = [], []
+    for w, mean, sigma in mixed:
+        sigma = np.clip(sigma, 1e-9 * (high - low), 1e3 * (high - low))
+        # further out than this the distribution is an exponential at the bound, and its tail numbers underflow
+        mean = np.clip(mean, low - 8.0 * sigma, high + 8.0 * sigma)
+        a, b = (low - mean) / sigma, (high - mean) / sigma
+        values.append(np.stack([mean + sigma * _quantile(float(q), a, b) for q in grid]))
+        weight.append(np.full(grid.size, w))
+    x, w = np.concatenate(values), np.concatenate(weight) / np.sum(weight)
+    ends = np.empty((3, low.size))
+    for k in range(low.size):
+        order = np.argsort(x[:, k], kind="stable")
+        below = np.cumsum(w[order]) - 0.5 * w[order]
+        ends[:, k] = np.interp([0.5, 0.5 - share / 2, 0.5 + share / 2], below, x[order, k])
+    return ends[0], (ends[1], ends[2])
 
 
 def _quantile(q: float, a: Array, b: Array) -> Array:

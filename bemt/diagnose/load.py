@@ -204,7 +204,6 @@ def _unknown(only: Sequence[str]) -> list[Fault]:
     return faults
 
 
-
 def _one_setup(imported: Imported, path: str) -> None:
     """Refuse a table of several propellers or motors: their points are no one curve."""
     from bemt.readers.generic_csv import setups

@@ -101,7 +101,7 @@ def _largest(found: Evidence, d: Array, natural: tuple[str, ...]) -> Location:
     x = problem.covariates[name][problem.point][here]
     low, high, z = _scan(x, e[here])
     inside = (x >= low) & (x <= high)
-    size = float(np.mean((d / problem.scale)[here][inside]))
+    size = float(np.mean((d / problem.largest)[here][inside]))
     return Location(CHANNELS[int(channel)], name, low, high, size, z, ties)
 
 

@@ -254,7 +254,7 @@ def rivals(problem: Problem) -> tuple[tuple[str, Array], ...]:
 
 def law_of(effect: Effect | type[Effect]) -> tuple[str, ...]:
     """What the law of an effect depends on, of speed, advance ratio and density."""
-    return () if effect.kind == "stand" else ("J",) if effect.inviscid else tuple(_FLOW)
+    return () if effect.kind == "stand" or effect.exact else ("J",) if effect.inviscid else tuple(_FLOW)
 
 
 def smooth_modes(problem: Problem, besides: Sequence[str] = (), flow: Sequence[str] = tuple(_FLOW)) -> Array:

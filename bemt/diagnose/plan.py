@@ -14,6 +14,7 @@ from bemt.base.tables import text_table
 from bemt.diagnose import confusion as look
 from bemt.diagnose import evidence, noise, prior, problem, signatures, verdict
 from bemt.diagnose import suggest as suggestion
+from bemt.diagnose.assemble import assemble, build
 from bemt.diagnose.record import Record
 
 if TYPE_CHECKING:
@@ -107,11 +108,11 @@ def plan(record: Record, case: Case, progress: Callable[[str], None] | None = No
 
 
 def _plan(record: Record, case: Case, progress: Callable[[str], None] | None) -> Plan:
-    first = problem.build([record], [case])
+    first = build([record], [case])
     flow = first.parts[0].flow
     own = {"thrust_N": flow.T0, "torque_Nm": flow.Q0, "rpm": record.rpm}
     measured = {k: own[k] for k in record.measured if k in own}
-    whole = problem.assemble((replace(first.parts[0], record=replace(record, measured=measured), _solved={}),))
+    whole = assemble((replace(first.parts[0], record=replace(record, measured=measured), _solved={}),))
     candidates, absent = signatures.candidates(
         whole, None, (lambda n: progress(f"solving with {n}")) if progress else None
     )

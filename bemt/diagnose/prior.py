@@ -13,20 +13,28 @@ from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
 if TYPE_CHECKING:
     from bemt.diagnose.problem import Problem
 
-__all__ = ["LEFT_OUT", "PRESENT", "PRIOR", "log_priors", "prior_weights"]
+__all__ = ["EVIDENT", "LEFT_OUT", "PRESENT", "PRIOR", "log_priors", "present", "prior_weights"]
 
 PRIOR = {"none": 0.35, "single": 0.55, "pair": 0.05, "unknown": 0.05}
 """Prior probability of the kinds of explanation; shared within a kind by the weights of the effects. [1]"""
 LEFT_OUT, PRESENT = 50.0, 0.2
 """Weight of an effect of every real rotor that the baseline leaves out, and of one that the baseline has, with other
 parameters, beside 1 for all others [1]."""
+EVIDENT = 0.2
+"""The same of what anybody at the stand would see: a second rotor is seldom overlooked [1]."""
 
 
 def prior_weights(problem: Problem, ids: Sequence[str]) -> dict[str, float]:
     """Weight of each effect: physics that every rotor has is likelier to be missing than a fault is to be there. [1]"""
     usual = {e.id for e in effects.standard()} | {i for p in problem.parts for i in p.left_out}
-    on = [{e.id for e in p.baseline} for p in problem.parts]
-    return {i: PRESENT if all(i in o for o in on) else LEFT_OUT if i in usual else 1.0 for i in ids}
+    on = present(problem)
+    rest = {i: EVIDENT if effects.catalogue()[i].evident else 1.0 for i in ids}
+    return {i: PRESENT if i in on else LEFT_OUT if i in usual else rest[i] for i in ids}
+
+
+def present(problem: Problem) -> set[str]:
+    """Effects that the baseline of every recording has."""
+    return set.intersection(*({e.id for e in p.baseline} for p in problem.parts))
 
 
 def log_priors(weights: dict[str, float], pairs: bool = True) -> dict[Explanation, float]:

@@ -110,7 +110,6 @@ class Record:
             measured=cut(self.measured), u=cut(self.u), extra=cut(self.extra),
         )  # fmt: skip
 
-
     def only(self, channels: Sequence[str]) -> Record:
         """Record with some of its channels, as far as they were measured."""
         kept = [c for c in self.measured if c in channels]

@@ -88,7 +88,7 @@ def document(case: Case, found: AsMeasured, paths: Sequence[str]) -> dict[str, A
     out: dict[str, Any] = plain({
         "schema": SCHEMA, "case": case.name, "reference": [Path(p).name for p in paths], "points": found.points,
         "converged": found.found.converged, "steps": found.found.steps, "log_evidence": found.found.log_evidence,
-        "size": size, "known_from": found.prior.known_from, "numbers": numbers,
+        "size": size, "excess": found.found.excess, "known_from": found.prior.known_from, "numbers": numbers,
     })  # fmt: skip
     return out
 
@@ -110,6 +110,9 @@ def text(doc: dict[str, Any]) -> str:
         lines.append(f"{words[name] + unit:42} {cells}")
     if doc["size"] > 2.0:
         lines.append(f"This rotor is {doc['size']:.1f} times as far from its description as is usual: check the case.")
+    if doc["excess"] > 1.0:
+        times = number_text(math.sqrt(doc["excess"]), 2)
+        lines.append(f"No such rotor gives these readings: they count as {times} times as rough. Check the recording.")
     return "\n".join(lines)
 
 

@@ -14,8 +14,9 @@ from bemt.air import R_DRY
 from bemt.base.units import ZERO_CELSIUS
 from bemt.bem import model as bem
 from bemt.diagnose import noise
+from bemt.diagnose.assemble import assemble
 from bemt.diagnose.nuisance import PRIORS
-from bemt.diagnose.problem import Part, Problem, assemble
+from bemt.diagnose.problem import Part, Problem
 from bemt.diagnose.record import Record, air_of
 from bemt.diagnose.signatures import effect_of
 

@@ -1,14 +1,14 @@
 """The decision: none, a named effect, a class of look-alikes, the stand, something unknown, or not enough data.
 
-:data:`RULES` are asked in their order, which is that of caution; the first that holds answers.  Is there a mismatch
-that nulls do not show?  Does an unknown smooth effect explain it better, or is something smooth left after the best
-listed effect?  Which effects are in nearly all of the probability?  Are there look-alikes of these in this plan, or a
-second effect that may be there, too?  Only then is a name given; with a few explanations left, these.
+The rules (:mod:`bemt.diagnose.rules`) are asked in the order of caution; the first that holds answers.  Is there a
+mismatch that nulls do not show?  Does an unknown smooth effect explain it better, or is something smooth left after
+the best listed effect?  Which effects are in nearly all of the probability?  Are there look-alikes of these in this
+plan, or a second effect that may be there, too?  Only then is a name given; with a few explanations left, these.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -17,17 +17,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import effects
-from bemt.diagnose import blocks, prior
 from bemt.diagnose import confusion as look
 from bemt.diagnose import fit as fitting
+from bemt.diagnose import prior
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
-from bemt.diagnose.suggest import LEVEL
 from bemt.effects.base import Effect
 
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence
 
-__all__ = ["GATE", "RULES", "Asked", "Decision", "Rule", "decide"]
+__all__ = ["GATE", "Asked", "Decision"]
 
 Array = NDArray[np.float64]
 
@@ -70,6 +69,8 @@ _TURNS = 20
 _BALANCE = ("thrust_N", "torque_Nm")
 # Faults of a cell that shift its reading: one stays, the other creeps.
 _SHIFTS = ("zero", "drift")
+# Faults of a cell that multiply its reading.
+_SHARES = ("gain", "cross-talk")
 
 
 @dataclass(frozen=True)
@@ -204,10 +205,14 @@ class Asked:
     def _weight(self) -> float:
         return min(prior.prior_weights(self.found.problem, tuple(self.leading)).values(), default=1.0)
 
+    @cached_property
+    def _present(self) -> set[str]:
+        return prior.present(self.found.problem)
+
     @property
     def on(self) -> bool:
         """Whether the leading explanation has physics that is on already."""
-        return self._weight < 1.0
+        return any(i in self._present for i in self.leading)
 
     @property
     def expected(self) -> bool:
@@ -223,6 +228,11 @@ class Asked:
     def unlisted(self) -> float:
         """Probability that the cause is not in the library: two cells with one fault are one cause, too."""
         return self.P[UNKNOWN] + sum(v for k, v in self.P.items() if k.pair and twins(k))
+
+    @property
+    def likeliest_none(self) -> bool:
+        """Whether no explanation is likelier than nothing at all."""
+        return self.P[NONE] >= max(self.P.values())
 
     @property
     def alone(self) -> bool:
@@ -270,7 +280,7 @@ class Asked:
     def few(self) -> tuple[str, ...]:
         """Fewest of the likeliest effects, at most :data:`MOST`, that hold nearly all of the probability."""
         some = tuple(self.share)
-        return next((some[:n] for n in range(2, MOST + 1) if _mass(self.found, some[:n]) >= SURE), ())
+        return next((some[:n] for n in range(2, MOST + 1) if mass(self.found, some[:n]) >= SURE), ())
 
     def says(
         self, verdict: str, why: str, effects: Sequence[str] = (), probability: float | None = None,
@@ -287,39 +297,6 @@ class Asked:
         why = "nearly all of the probability is on " + ("it" if len(ids) == 1 else "both")
         said = self.says("sensor" if stand else "named", why, ids, probability, leading=Explanation.of(*ids))
         return replace(said, sets=tuple((i,) for i in ids))
-
-
-@dataclass(frozen=True)
-class Rule:
-    """One row of the table.
-
-    Attributes
-    ----------
-    name : str
-        What it asks.
-    holds : callable
-        Whether it applies.
-    answer : callable
-        What is said then.
-    threshold : str
-        Names of the numbers it asks with.
-    source : str
-        Where it comes from.
-    """
-
-    name: str
-    holds: Callable[[Asked], bool]
-    answer: Callable[[Asked], Decision]
-    threshold: str
-    source: str
-
-
-def decide(asked: Asked) -> Decision:
-    """Decide."""
-    for rule in RULES:
-        if rule.holds(asked):
-            return replace(rule.answer(asked), rule=rule.name)
-    raise AssertionError("the last rule always holds")
 
 
 def inclusion(found: Evidence) -> dict[str, float]:
@@ -352,6 +329,12 @@ def twins(what: Explanation) -> bool:
     return len(chosen) > 1 and len(faults) == 1 and "" not in faults and all(e.sensor in _BALANCE for e in chosen)
 
 
+def levels_only(what: Explanation) -> bool:
+    """Whether two effects each move whole channels by one share: together they fit any two levels."""
+    chosen = [effects.catalogue()[i] for i in what]
+    return len(chosen) > 1 and all(e.exact or e.fault in _SHARES for e in chosen)
+
+
 def holds_off(name: str, told: Mapping[str, Mapping[str, Any]]) -> bool:
     """Whether an effect may as well be absent: the interval of its size holds the value at which it is.
 
@@ -365,43 +348,9 @@ def holds_off(name: str, told: Mapping[str, Mapping[str, Any]]) -> bool:
     return all(told[p.name]["low"] <= p.off <= told[p.name]["high"] for p in sizes if p.off is not None)
 
 
-def at_end(name: str, told: Mapping[str, Mapping[str, Any]]) -> bool:
-    """Whether the size of an effect, or the first number of one without a size, is pinned to an end of its range."""
-    cls = effects.catalogue()[name]
-    numbers = [p for p in cls.parameters if p.name in told and p.name not in cls.discrete and p.steps > 0]
-    sizes = [p for p in numbers if p.off is not None] or numbers[:1]
-    for p in sizes:
-        near = END * (p.high - p.low)
-        if told[p.name]["high"] - told[p.name]["low"] > 0.5 * (p.high - p.low):
-            continue  # the readings do not say where it is
-        ends = [e for e in (p.low, p.high) if e != p.off]
-        if any(abs(float(told[p.name]["value"]) - e) < near for e in ends):
-            return True
-    return False
-
-
-def _sizes(name: str, told: Mapping[str, Mapping[str, Any]]) -> int:
-    return sum(p.off is not None and p.name in told for p in effects.catalogue()[name].parameters)
-
-
-def _mass(found: Evidence, group: Sequence[str]) -> float:
+def mass(found: Evidence, group: Sequence[str]) -> float:
     """Probability that at least one of some effects is at work."""
     return sum(v for k, v in found.probability.items() if k.ids & set(group))
-
-
-def _predicts(a: Asked) -> bool:
-    """Whether an explanation brings left-out blocks nearer than calibration alone does, along some variable.
-
-    What does not change along a variable is learnt from the other lines of it without any cause.
-    """
-    problem = a.found.problem
-    u = problem.u[problem.free]
-
-    def error(what: Explanation, split: tuple[str, NDArray[np.intp]]) -> float:
-        d = (problem.y - blocks.held_out(a.found, what, split)[1])[problem.free] / u
-        return float(np.sqrt(np.mean(d**2)))
-
-    return any(error(a.leading, s) < PREDICTS * error(NONE, s) for s in blocks.partitions(problem))
 
 
 def _earned(
@@ -409,27 +358,15 @@ def _earned(
 ) -> tuple[Explanation, dict[str, float]]:
     """Leading explanation without the effect that adds too little to the other one, and the probabilities to match."""
     ids = tuple(pair)
-    weight = prior.prior_weights(found.problem, ids)
+    on = prior.present(found.problem)
     for other, one in (ids, ids[::-1]):
-        price = PROVEN if weight[other] < 1.0 else EARNED
+        price = PROVEN if other in on else EARNED
         adds = found.log_bayes(pair) - found.log_bayes(Explanation.of(one))
         # beside the thousands of a slip every rest is small: what is named next to it must explain its own
         vague = effects.catalogue()[one].fault == "unit" and rest > max(LEFT_OVER, SMALL * adds)
         if (adds < price or vague) and share[one] >= share[other]:
             return Explanation.of(one), {i: (0.0 if i == other else p) for i, p in share.items()}
     return pair, share
-
-
-def _leaves_its_range(a: Asked) -> bool:
-    """Whether physics that is on explains the readings best at the end of the range of a parameter, not as it is on."""
-    (name,) = a.leading
-    on = {e.id: e for e in a.found.problem.baseline}
-    best = fitting.fit(a.found, a.leading).settings[0]
-    for p in effects.catalogue()[name].parameters:
-        value = best.get(p.name)
-        if value is not None and value not in (getattr(on[name], p.name), p.off) and not p.low < value < p.high:
-            return True
-    return False
 
 
 def _class(found: Evidence, first: str, share: Mapping[str, float]) -> tuple[str, ...]:
@@ -457,7 +394,7 @@ def credible_sets(probability: Mapping[Explanation, float], pair: Explanation) -
     both = set(first) & set(second)
     for i in both:
         (first if first[i] < second[i] else second).pop(i)
-    return _to_mass(first), _to_mass(second)
+    return _tomass(first), _tomass(second)
 
 
 def _given(weight: Mapping[str, Mapping[str, float]], other: Mapping[str, float]) -> dict[str, float]:
@@ -472,244 +409,8 @@ def _given(weight: Mapping[str, Mapping[str, float]], other: Mapping[str, float]
     return {k: v / total for k, v in out.items() if v > 0.01 * total}
 
 
-def _to_mass(share: Mapping[str, float]) -> tuple[str, ...]:
+def _tomass(share: Mapping[str, float]) -> tuple[str, ...]:
     """Fewest effects that hold nearly all of a set."""
     ranked = sorted(share, key=lambda i: -share[i])
     mass = np.cumsum([share[i] for i in ranked])
     return tuple(ranked[: int(np.searchsorted(mass, IN_SET * mass[-1])) + 1]) if ranked else ()
-
-
-def _pair(a: Asked) -> Decision:
-    """Two effects at work: a set for each cause; names where the sets have one member."""
-    sure = [i for i in a.leading if a.share[i] >= SURE]
-    if len(sure) == len(a.leading):
-        return a.names(sure, min(a.share[i] for i in sure))
-    known = a.known_sets
-    total = sum(v for k, v in a.P.items() if k.pair)
-    inside = sum(a.P.get(Explanation.of(i, j), 0.0) for i in known[0] for j in known[-1])
-    members = tuple(dict.fromkeys(i for s in known for i in s))
-    if len(members) <= LARGEST and inside >= SURE * total:
-        why = (
-            "two effects are at work; one of them has look-alikes" if sure else "two are at work, each has look-alikes"
-        )
-        open_sets = tuple(s for s in known if len(s) > 1)
-        return replace(a.says("class", why, members, inside, open_sets), sets=known)
-    return a.says("insufficient", "two effects or more, not told apart")
-
-
-def _nothing(a: Asked, why: str, verdict: str = "none") -> Decision:
-    return a.says(verdict, why, leading=NONE)
-
-
-def _by_chance(a: Asked) -> str:
-    return f"nulls of the same plan look as much like a cause in {a.p_value:.0%} of draws"
-
-
-def _left(a: Asked) -> Decision:
-    return a.says("unknown", "a smooth mismatch remains when the best listed effect is taken away",
-                  probability=max(a.P[UNKNOWN], 1.0 - a.P[a.first]), leading=a.first)  # fmt: skip
-
-
-RULES: tuple[Rule, ...] = (
-    Rule(
-        "no effect can be seen",
-        lambda a: not a.first,
-        lambda a: a.says("insufficient", "no effect can be seen in these readings", probability=1.0, leading=NONE),
-        "",
-        "by definition",
-    ),
-    Rule(
-        "nulls look like it",
-        lambda a: a.p_value > GATE and (a.P[NONE] > 0.5 or (a.p_value > 5.0 * GATE and a.level < LEVEL)),
-        lambda a: _nothing(a, _by_chance(a)),
-        "GATE, LEVEL",
-        "DIAGNOSIS 2.3: p-value of the whole chain, 1 in 100",
-    ),
-    Rule(
-        "nulls nearly look like it",
-        lambda a: a.p_value > GATE,
-        lambda a: _nothing(a, _by_chance(a), "insufficient"),
-        "GATE",
-        "the same, between 1 and 5 in 100, or where all loads are far off the case",
-    ),
-    Rule(
-        "nothing is likelier than anything",
-        lambda a: a.P[NONE] > 0.5,
-        lambda a: _nothing(a, "nothing explains the readings better than the noise"),
-        "0.5",
-        "posterior odds",
-    ),
-    Rule(
-        "unknown is likelier than all",
-        lambda a: a.P[UNKNOWN] > 0.5,
-        lambda a: a.says(
-            "unknown",
-            "a smooth effect that is not in the library explains the readings better than any that is",
-            probability=max(a.P[UNKNOWN], 1.0 - a.P[a.first]),
-            leading=a.first,
-        ),
-        "0.5",
-        "DIAGNOSIS 2.6: the second rival",
-    ),
-    Rule(
-        "a smooth rest is left",
-        lambda a: a.rest > max(LEFT_OVER, SMALL * a.found.log_bayes(a.first)),
-        _left,
-        "LEFT_OVER, SMALL",
-        "declared; the same rival beside the best effect",
-    ),
-    Rule(
-        "not much better than nothing",
-        lambda a: a.odds < a.needed,
-        lambda a: a.says("insufficient", "the best explanation is not much better than none"),
-        "ENOUGH, EXPECTED, PROVEN",
-        "declared; 8 nats are 4 sigma",
-    ),
-    Rule(
-        "does not predict",
-        lambda a: not a.expected and a.odds < PROVEN and a.vague > VAGUE and not _predicts(a),
-        lambda a: a.says("insufficient", "the best explanation does not predict what it has not seen"),
-        "PROVEN, VAGUE, PREDICTS",
-        "declared; left-out blocks, DIAGNOSIS 2.9; in any case it cost right names (7)",
-    ),
-    Rule(
-        "on, and out of its range",
-        lambda a: a.on and not a.leading.pair and _leaves_its_range(a),
-        lambda a: a.says(
-            "unknown", f"{a.leading} is on and would have to leave its range, so the law itself does not fit"
-        ),
-        "range of the parameter",
-        "declared with the effect",
-    ),
-    Rule(
-        "twin faults",
-        lambda a: twins(a.leading),
-        lambda a: a.says(
-            "unknown", "two instruments with the same fault at once: one cause that is not in the library is likelier"
-        ),
-        "",
-        "declared: two independent faults of one kind are rare",
-    ),
-    Rule(
-        "unknown is nearly as likely",
-        lambda a: a.unlisted > BESIDE * _mass(a.found, (*a.group, *a.leading)),
-        lambda a: a.says("insufficient", "something that is not in the library explains the readings nearly as well"),
-        "BESIDE",
-        "DIAGNOSIS 7: lost no right name and stopped the wrong ones",
-    ),
-    Rule(
-        "far rougher than stated",
-        lambda a: a.roughness > ROUGH and a.alone,
-        lambda a: a.says(
-            "insufficient",
-            f"the readings scatter {a.roughness:g} times as much as the recording states; no effect does that",
-        ),
-        "ROUGH",
-        "declared: end of the prior; hysteresis and resonance show so, and beside a reference they would be in both",
-    ),
-    Rule(
-        "may as well be absent",
-        lambda a: not a.leading.pair and len(a.group) <= 1 and holds_off(*next(iter(a.parameters.items()))),
-        lambda a: a.says("insufficient", f"{a.leading} leads, but what the readings say of its size includes none"),
-        "90 % interval",
-        "DIAGNOSIS 7: 4 of 5 wrong names, 0 of 42 right ones",
-    ),
-    Rule(
-        "another blade, or anything that scales all loads",
-        lambda a: a.another_blade and len(a.group) <= 1,
-        lambda a: a.says(
-            "insufficient",
-            f"all loads are far off, which {a.leading} would explain, and density, speed of rotation or "
-            "diameter nearly as well",
-        ),
-        "ANOTHER",
-        "declared: real recordings at another density than the case's were named section",
-    ),
-    Rule(
-        "at the end of its range",
-        lambda a: any(at_end(i, told) and (a.leading.pair or _sizes(i, told) > 1) for i, told in a.parameters.items()),
-        lambda a: a.says(
-            "insufficient", f"{' and '.join(a.leading)}: fits only with a number at the end of its physical range"
-        ),
-        "END",
-        "declared: where one number cannot go further, another makes up for something else",
-    ),
-    Rule(
-        "several are sure",
-        lambda a: len(a.sure) > 1,
-        lambda a: a.names(a.sure, min(a.share[i] for i in a.sure)),
-        "SURE",
-        "declared",
-    ),
-    Rule(
-        "one is sure",
-        lambda a: bool(a.sure) and not a.paired and len(a.group) <= 1 and not a.beside,
-        lambda a: a.names(a.sure, a.share[a.sure[0]]),
-        "SURE, PARTNER",
-        "declared",
-    ),
-    Rule(
-        "one is sure, another may be there",
-        lambda a: bool(a.sure) and not a.paired and len(a.group) <= 1,
-        lambda a: a.says(
-            "class",
-            f"{a.sure[0]} is at work; whether another effect is, too, is left open",
-            (*a.sure, *a.beside[: MOST - 1]),
-            a.share[a.sure[0]],
-        ),
-        "SURE, PARTNER, MOST",
-        "declared",
-    ),
-    Rule("two at work", lambda a: a.paired, _pair, "SURE", "declared"),
-    Rule(
-        "on already, among others",
-        lambda a: a.on and not a.sure,
-        lambda a: a.says(
-            "insufficient",
-            f"{a.leading} leads, which is on: its law may be off for this blade, or another cause looks so",
-        ),
-        "PRESENT, SURE",
-        "declared: what is on is a cause only where nothing else is left",
-    ),
-    Rule(
-        "look-alikes",
-        lambda a: len(a.group) > 1 and _mass(a.found, a.group) >= SURE,
-        lambda a: replace(
-            a.says("class", "these look alike in this plan", a.group, _mass(a.found, a.group), (a.group,)),
-            sets=(a.group,),
-        ),
-        "SURE, NEAR, ALIKE",
-        "DIAGNOSIS 2.7: distance below 3 sigma",
-    ),
-    Rule(
-        "sure with its pairs",
-        lambda a: _mass(a.found, a.group) >= SURE,
-        lambda a: a.names(a.group, _mass(a.found, a.group)),
-        "SURE",
-        "declared",
-    ),
-    Rule(
-        "a few are left",
-        lambda a: bool(a.few),
-        lambda a: a.says(
-            "class",
-            "the readings leave these open",
-            a.few,
-            _mass(a.found, a.few),
-            (a.group,) if len(a.group) > 1 else (),
-        ),
-        "SURE, MOST",
-        "declared",
-    ),
-    Rule(
-        "many are left",
-        lambda a: True,
-        lambda a: a.says(
-            "insufficient",
-            "several explanations are left that are not alike",
-            classes=(a.group,) if len(a.group) > 1 else (),
-        ),
-        "",
-        "the rest",
-    ),
-)

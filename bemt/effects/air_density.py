@@ -20,6 +20,7 @@ class AirDensity(Effect):
     change: float = -0.10
 
     id = "air_density"
+    exact = True
     title = "density of the air"
     check = "read barometer and thermometer beside the stand and work the density out"
     sign = "thrust and torque off by the same share at every speed and advance ratio; one cell's gain moves one of them"

@@ -389,6 +389,10 @@ class Effect:
     # Law of a flow without friction and compressibility: by similarity (Buckingham 1914) its dimensionless form may
     # depend on the advance ratio and on `along`, not on speed or density.
     inviscid: ClassVar[bool] = False
+    # Something that anybody at the stand would see.
+    evident: ClassVar[bool] = False
+    # A number that was written down wrongly: what it changes follows from the definition, and no law can be off.
+    exact: ClassVar[bool] = False
     # What one would look at to be sure, without a run.
     check: ClassVar[str] = ""
     # Parameters that take a few values only (a ratio of units), nothing between them.

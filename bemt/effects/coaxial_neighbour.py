@@ -31,6 +31,7 @@ class CoaxialNeighbour(Effect):
     load: float = 1.0
 
     id = "coaxial_neighbour"
+    evident = True
     inviscid = True
     title = "second rotor on the same axis"
     sign = (

@@ -40,7 +40,7 @@ class Compressibility(Effect):
     title = "compressible lift"
     sign = "thrust coefficient grows as 1 + M^2/2 of the tip; colder air at the same speed moves it, density does not"
     parameters = (
-        Parameter("amplitude", "1", 0.8, 1.2, "1 is the published form", 5, 0.0),
+        Parameter("amplitude", "1", 0.6, 1.4, "1 is the published form; those differ by a fifth", 5, 0.0),
         Parameter("kappa", "1", 0.80, 0.95, "0.87 NACA sections, 0.95 supercritical (Mason 1990)", 0),
         Parameter("shock_stall", "1", 0.6, 0.9, "declared; NACA 0012 tables at M 0.85-0.95", 0),
     )
@@ -96,7 +96,6 @@ class Compressibility(Effect):
         return np.asarray(1.0 + self.amplitude * (ratio - 1.0))
 
     def variants(self) -> tuple[dict[str, str | float], ...]:
-        """Both forms at nine amplitudes."""
-        return tuple(
-            {"form": f, "amplitude": a} for f in FORMS for a in (0.8, 0.85, 0.9, 0.95, 1.0, 1.05, 1.1, 1.15, 1.2)
-        )
+        """Both forms at eleven amplitudes."""
+        sizes = (0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 1.0, 1.1, 1.2, 1.3, 1.4)
+        return tuple({"form": f, "amplitude": a} for f in FORMS for a in sizes)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from bemt.effects.base import Effect, Flow, Parameter, Reading, choice
 
 FORMS = ("torque_in_thrust", "thrust_in_torque")
-_SIZES = tuple(k / 200.0 for k in range(-10, 11) if k)
+_SIZES = tuple(k / 100.0 for k in range(-20, 21) if k)
 
 
 @dataclass(frozen=True)
@@ -17,8 +17,8 @@ class CrossTalk(Effect):
     Notes
     -----
     Off-diagonal term of a balance's calibration matrix (AIAA R-091A-2020; Barlow, Rae and Pope 1999, Low-Speed Wind
-    Tunnel Testing, ch. 7; not checked).  The lever R makes k a pure number; +-5 % is declared: an axis that misses the
-    cell by R/20.  Its sign turns with the direction of rotation.
+    Tunnel Testing, ch. 7; not checked).  The lever R makes k a pure number; 5 % is declared: an axis that misses the
+    cell by R/20; seldom far more.  Its sign turns with the direction of rotation.
     """
 
     form: str = "torque_in_thrust"
@@ -30,7 +30,7 @@ class CrossTalk(Effect):
     sign = "one channel follows the other's load over advance ratio; a pair of opposite rotation turns its sign"
     kind = "stand"
     fault = "cross-talk"
-    parameters = (Parameter("k", "1", -0.05, 0.05, "declared, arm error of R/20", off=0.0),)
+    parameters = (Parameter("k", "1", -0.2, 0.2, "declared, arm error of R/20, seldom R/5", off=0.0, usual=0.05),)
     on_by_default = False
 
     def __post_init__(self) -> None:
@@ -46,5 +46,5 @@ class CrossTalk(Effect):
             reading.values["torque_Nm"] = Q + self.k * T * flow.R
 
     def variants(self) -> tuple[dict[str, str | float], ...]:
-        """Both directions at twenty sizes."""
+        """Both directions at forty sizes."""
         return tuple({"form": f, "k": k} for f in FORMS for k in _SIZES)

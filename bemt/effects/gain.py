@@ -13,15 +13,16 @@ class Gain(Effect):
 
     Notes
     -----
-    Linear calibration error of a load cell (ISO 376:2011 states it as a relative error; not checked).  The range of
-    +-10 % is declared: wrong arm, wrong calibration mass or another cell's factor.
+    Linear calibration error of a load cell (ISO 376:2011 states it as a relative error; not checked).  Some
+    percent as a rule, far more at times (wrong arm, wrong calibration mass, another cell's factor), a heavy-tailed
+    prior; declared.
     """
 
     gain: float = 0.03
 
     kind = "stand"
     fault = "gain"
-    parameters = (Parameter("gain", "1", -0.10, 0.10, "declared, workshop calibration", 3, 0.0),)
+    parameters = (Parameter("gain", "1", -0.4, 0.4, "declared, workshop calibration; seldom far more", 3, 0.0, 0.05),)
     on_by_default = False
 
     def reading(self, reading: Reading, flow: Flow) -> None:

@@ -37,7 +37,7 @@ class MotorHeating(Effect):
     kind = "drive"
     needs = ("pwm_s", "time_s")
     parameters = (
-        Parameter("rise_K", "K", 0.0, 80.0, "insulation class B, IEC 60034-1", 3, 0.0),
+        Parameter("rise_K", "K", 0.0, 120.0, "insulation class H, IEC 60034-1", 3, 0.0),
         Parameter("tau_s", "s", 20.0, 1800.0, "declared, small outrunner to large", 4),
         Parameter("copper", "1", 0.03, 0.4, "declared, share of the back-EMF at full load", 0),
     )
@@ -71,9 +71,9 @@ class MotorHeating(Effect):
         return np.asarray(out / max(float(np.max(out)), 1e-30))
 
     def variants(self) -> tuple[dict[str, float], ...]:
-        """Eight temperatures at six times, the times in ratio, for motors from efficient to hard-driven."""
+        """Ten temperatures at six times, the times in ratio, for motors from efficient to hard-driven."""
         times = (20.0, 50.0, 120.0, 300.0, 750.0, 1800.0)
-        rises = tuple(10.0 * k for k in range(1, 9))
+        rises = (10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 75.0, 90.0, 105.0, 120.0)
         return tuple(
             {"rise_K": k, "tau_s": t, "copper": c} for c in (0.05, 0.1, 0.2, 0.35) for k in rises for t in times
         )

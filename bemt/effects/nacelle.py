@@ -18,25 +18,29 @@ class Nacelle(Effect):
     Half-body of radius a, that of the hub where ``body_over_R`` is smaller: a source of flux pi a^2 V one radius behind
     the disk slows the axial flow there by
     V deficit (1 + (r/a)^2)^-1.5, deficit 1/4 on the axis (Rankine 1871; Katz and Plotkin 2001, Low-Speed Aerodynamics,
-    sec. 3.10; not checked), at each station its own.  The balance reads the drag cd 1/2 rho V^2 pi a^2; 0.1 a spinner
-    to 1.2 a bluff motor (Hoerner 1965, Fluid-Dynamic Drag, ch. 3; not checked).  A rotor without hub counts a = R/10.
-    Motors, balances and fairings are often wider than the hub.
+    sec. 3.10; not checked), at each station its own.  The balance reads the drag cd 1/2 rho W^2 pi a^2; 0.1 a spinner
+    to 1.2 a bluff motor (Hoerner 1965, Fluid-Dynamic Drag, ch. 3; not checked).  W = V + wash v: a body behind the disk
+    stands in the slipstream, whose induced speed is v at the disk and 2 v in the far wake (Glauert 1935, ch. VII).  A
+    rotor without hub counts a = R/10.  Motors, balances and fairings are often wider than the hub.
     """
 
     deficit: float = 0.10
     cd: float = 0.5
     body_over_R: float = 0.0
+    wash: float = 0.0
 
     id = "nacelle"
     inviscid = True
     title = "body behind the propeller"
     check = "run without the propeller at the same airspeeds and take that drag off"
-    sign = "thrust lacks an amount that grows with V^2 whatever the rotor's speed, torque hardly moves; none at rest"
+    sign = "thrust lacks an amount that grows with V^2 (in the slipstream with the load, too), torque hardly moves"
     parameters = (
-        Parameter("deficit", "1", 0.0, 0.25, "0.25 on the axis of a half-body", 3, 0.0),
+        Parameter("deficit", "1", 0.0, 0.6, "0.25 on the axis of a half-body, more of a blunt one", 4, 0.0),
         Parameter("cd", "1", 0.0, 1.2, "spinner to bluff motor, on hub area, Hoerner 1965", 4, 0.0),
         Parameter("body_over_R", "1", 0.0, 0.5, "declared, hub to a wide balance", 3),
+        Parameter("wash", "1", 0.0, 2.0, "0: ahead of the disk; 1 to 2: in the slipstream, momentum theory", 0),
     )
+    discrete = ("wash",)
     on_by_default = False
 
     def applies(self, flow: Flow) -> str:
@@ -50,17 +54,19 @@ class Nacelle(Effect):
     def loads(self, loads: Loads, flow: Flow) -> None:
         """Take the drag of the body off the thrust."""
         area = np.pi * self._radius(flow) ** 2
-        loads.T = loads.T - self.cd * 0.5 * flow.rho * flow.V * np.abs(flow.V) * area
+        W = flow.V + self.wash * flow.induced
+        loads.T = loads.T - self.cd * 0.5 * flow.rho * W * np.abs(W) * area
 
     def _radius(self, rotor: Flow | Baking) -> float:
         return max(rotor.Rhub if rotor.Rhub > 0.0 else 0.1 * rotor.R, self.body_over_R * rotor.R)
 
     def variants(self) -> tuple[dict[str, float], ...]:
-        """Three bodies of three deficits, and six drags in ratio."""
+        """Three bodies of three deficits and four drags in ratio, ahead of the disk and behind it."""
         return tuple(
-            {"deficit": d, "cd": c, "body_over_R": b}
+            {"deficit": d, "cd": c, "body_over_R": b, "wash": w}
             for b in (0.0, 0.3, 0.5)
-            for d in (0.0, 0.12, 0.25)
-            for c in (0.0, 0.08, 0.16, 0.32, 0.64, 1.2)
+            for d in (0.0, 0.2, 0.5)
+            for c in (0.0, 0.1, 0.3, 1.0)
+            for w in ((0.0, 1.5) if c else (0.0,))
             if d + c > 0.0
         )

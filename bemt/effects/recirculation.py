@@ -15,14 +15,15 @@ class Recirculation(Effect):
 
     Notes
     -----
-    First-order growth from the start of each run, v the induced speed of the baseline; ventilated by airspeed as
-    1 / (1 + (V/v)^2).  That small rotors in closed rooms change within seconds of the start: Stephenson, Weitsman and
-    Zawodny (2019), J. Acoust. Soc. Am. 145:1153 (not checked); form and ranges are declared.  Needs time: recirculation
-    that is always there cannot be told from a smaller thrust.
+    First-order growth from the start of each run, ``before_s`` before its first point, v the induced speed of the
+    baseline; ventilated by airspeed as 1 / (1 + (V/v)^2).  That small rotors in closed rooms change within seconds
+    of the start: Stephenson, Weitsman and Zawodny (2019), J. Acoust. Soc. Am. 145:1153 (not checked); form and
+    ranges are declared.  Needs time: recirculation that is always there cannot be told from a smaller thrust.
     """
 
     k: float = 0.05
     tau_s: float = 10.0
+    before_s: float = 0.0
 
     id = "recirculation"
     title = "slipstream that returns through the room"
@@ -31,17 +32,23 @@ class Recirculation(Effect):
     sign = "thrust decays within seconds of each start and at low advance ratio only; a drifting cell knows no speed"
     needs = ("time_s",)
     parameters = (
-        Parameter("k", "1", 0.0, 0.15, "declared; share of the induced speed", 4, 0.0),
+        Parameter("k", "1", 0.0, 0.25, "declared; share of the induced speed", 4, 0.0),
         Parameter("tau_s", "s", 1.0, 60.0, "declared; room length over jet speed", 4),
+        Parameter("before_s", "s", 0.0, 600.0, "declared; the rotor ran before the recording began", 0),
     )
+    discrete = ("before_s",)
     on_by_default = False
 
     def flow(self, flow: Flow) -> None:
         """Add the returning flow."""
         v = flow.induced
         fade = v**2 / np.maximum(v**2 + flow.V**2, 1e-12)
-        flow.V = flow.V + self.k * v * fade * -np.expm1(-flow.clock / self.tau_s)
+        flow.V = flow.V + self.k * v * fade * -np.expm1(-(flow.clock + self.before_s) / self.tau_s)
 
     def variants(self) -> tuple[dict[str, float], ...]:
-        """Fifteen sizes at seven times, the times in ratio."""
-        return tuple({"k": k / 100.0, "tau_s": t} for k in range(1, 16) for t in (1.0, 2.0, 4.0, 8.0, 16.0, 31.0, 60.0))
+        """Eleven sizes at six times, the times in ratio, from the start; and sizes of a room long stirred up."""
+        sizes = (0.01, 0.02, 0.03, 0.045, 0.06, 0.08, 0.1, 0.125, 0.15, 0.2, 0.25)
+        times = (1.0, 2.5, 6.0, 13.0, 28.0, 60.0)
+        grown = tuple({"k": k, "tau_s": t, "before_s": 0.0} for k in sizes for t in times)
+        late = tuple({"k": k, "tau_s": 60.0, "before_s": 20.0} for k in sizes)
+        return (*grown, *late, *({"k": k, "tau_s": 1.0, "before_s": 600.0} for k in sizes))

@@ -10,7 +10,7 @@ from bemt.effects.base import Effect, Flow, Parameter
 # Magnet pole pairs of outrunners and in-runners; blade or mark counts set on an optical tachometer.
 _POLE_PAIRS = (2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 14, 16, 18, 20, 21)
 _COUNTS = (1, 2, 3, 4, 5, 6)
-_EPS = tuple(e / 400.0 for e in range(-8, 9) if e)
+_EPS = tuple(e / 400.0 for e in range(-16, 17) if e)
 # Nearer ratios (11 : 12) are within what the level of a model may be off.
 _NEIGHBOURS = ((6, 7), (7, 8), (12, 14))
 
@@ -42,7 +42,7 @@ class RpmScale(Effect):
     discrete = ("factor",)
     parameters = (
         Parameter("factor", "1", 1.0 / 24.0, 24.0, "pole pairs and blade counts", 0, 1.0),
-        Parameter("eps", "1", -0.02, 0.02, "declared, clock of a counter", 0, 0.0),
+        Parameter("eps", "1", -0.04, 0.04, "declared, clock of a counter", 0, 0.0, 0.01),
     )
     on_by_default = False
 

@@ -32,7 +32,7 @@ class Untwist(Effect):
         "speed moves it, another air temperature does not"
     )
     parameters = (
-        Parameter("tip_deg", "deg", -1.0, 3.0, "declared; plastic blades 1 to 3 deg, seldom nose up", 5, 0.0),
+        Parameter("tip_deg", "deg", -4.0, 5.0, "declared; plastic blades 1 to 3 deg either way", 7, 0.0, 1.5),
     )
     on_by_default = False
 

@@ -382,7 +382,7 @@ class BladeExport(Export):
         Returns
         -------
         Case
-            The case.
+            The case, open rotor.
         """
         import importlib
 

@@ -21,10 +21,10 @@ from bemt.formula.compact import (
     RE_RANGE,
     X_LIMIT,
     MakerSeries,
-    coefficients,
     default_chord,
     effective_pitch,
     find_series,
+    series_coefficients,
 )  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -203,8 +203,8 @@ def estimate(
     pd, s = p / D, 2.0 * B * c / (np.pi * D)
     turning = np.where(n > 0, Re, np.nan)  # without rotation there is no coefficient
     effective = effective_pitch(p, q) / D
-    CT, CP = coefficients(effective, J, s, turning, zero_lift=own.zero_lift)
-    CT0, CP0 = coefficients(effective, np.zeros_like(pd), s, turning, zero_lift=own.zero_lift)
+    CT, CP = series_coefficients(effective, J, s, turning, own.zero_lift)
+    CT0, CP0 = series_coefficients(effective, np.zeros_like(pd), s, turning, own.zero_lift)
     still = (n == 0) & (V == 0)
     T = np.where(still, 0.0, co.thrust(CT, rho, n, D))
     P = np.where(still, 0.0, co.power(CP, rho, n, D))

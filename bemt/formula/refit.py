@@ -66,7 +66,7 @@ def predict(points: FitPoints, fitted: Fitted = PUBLISHED, given: str = "chord")
     if given == "pitch":
         pd = compact.effective_pitch(pd, points.of("measured_pitch_m") / points.of("diameter_m"))
     Re, change = points.Re(chord), _zero_lift(points, fitted.series)
-    return compact.coefficients(pd, points.J, s, Re, fitted.constants, change)
+    return compact.series_coefficients(pd, points.J, s, Re, change, fitted.constants)
 
 
 def has(points: FitPoints, given: str) -> NDArray[np.bool_]:

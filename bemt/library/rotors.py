@@ -110,7 +110,7 @@ class Propeller:
         Examples
         --------
         >>> propeller("10x5").unknowns["blade.max_chord_over_R"]
-        '0.15 .. 0.24'
+        '0.15 .. 0.31'
         """
         return {item.key: item.range_text for item in self.case.assumptions}
 
@@ -147,7 +147,7 @@ class Propeller:
         --------
         >>> d = propeller("10x5").solve(rpm=[6000, 9000])
         >>> d.thrust_N.round(1), d.power_W.round(0)
-        (array([ 4.7, 10.8]), array([ 45., 152.]))
+        (array([ 5.1, 11.7]), array([ 49., 169.]))
         """
         n, V = self._conditions(rpm, airspeed_m_s, J)
         density = None if density_kg_m3 is None else float(numbers("density_kg_m3", density_kg_m3))
@@ -198,7 +198,7 @@ class Propeller:
         --------
         >>> d = propeller("10x5").curve(rpm=6000, J=[0.0, 0.3, 0.6])
         >>> bool(d.u["CT"][0] > 0), d.CT.round(2)
-        (True, array([0.09, 0.06, 0.01]))
+        (True, array([0.1 , 0.07, 0.01]))
         """
         given = J is not None or airspeed_m_s is not None
         n = np.atleast_1d(numbers("rpm", self.case.rpm if rpm is None else rpm))
@@ -432,13 +432,16 @@ def _solved(
 
     model = prepare_case(case)
     found = model.solve(rpm, V, air)
+    flags = found.flags
     more = DUCTED if case.ducted else ()
     u: dict[str, Array] = {}
     if bands:
-        from bemt.compare.sweep.model_error import u_model
+        from bemt.compare.sweep.model_error import beyond, u_model
 
         u = {key: value for key, value in u_model(case, model, found, air).items() if key in BANDED}
-    return {key: np.asarray(found[key], dtype=float) for key in (*CHANNELS, *more)}, found.flags, u
+        wider = beyond(case, found)[1]
+        flags = tuple((*f, *filter(None, [w])) for f, w in zip(flags, wider, strict=True))
+    return {key: np.asarray(found[key], dtype=float) for key in (*CHANNELS, *more)}, flags, u
 
 
 def propeller(

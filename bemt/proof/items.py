@@ -22,6 +22,10 @@ __all__ = ["Bench", "Item", "case_text", "make_item", "recording_text", "station
 
 Array = NDArray[np.float64]
 _DIGITS = 6
+# Share of the items that state the uncertainty of their readings, and that come with a run without the cause.
+_STATED, _REFERENCED = 0.75, 0.5
+# Standard deviation of a blade that only its reference shows: angle [deg] and camber [1], beside the freedom of all.
+_BLADE_OFF, _CAMBER_OFF = 0.8, 0.003
 
 
 @dataclass
@@ -124,10 +128,13 @@ class Item:
         Name to text: recording.csv, case.toml, stations.csv.
     entry : dict
         What the key says of it.
+    reference : str
+        Run without the causes, given when the diagnosis asks for one; "" where there can be none.
     """
 
     files: Mapping[str, str]
     entry: Mapping[str, Any]
+    reference: str = ""
 
 
 def _quality(rng: np.random.Generator, quiet: bool) -> Stand:
@@ -157,11 +164,21 @@ def make_item(
     world = replace(bench.plain(), section=section, pitch_offset=0.5 * FREEDOM["pitch"] * float(rng.standard_normal()))
     if kind == "mismatch":
         world = bench.plain()
+    more = np.random.default_rng((seed, 1))
+    stated = bool(more.random() < _STATED) or kind == "mismatch"
+    referenced = bool(more.random() < _REFERENCED) and kind != "mismatch" and _removable(causes)
+    if referenced:  # a blade that is not the case's, as a reference shows it
+        turn, camber = more.standard_normal(2)
+        section = replace(world.section, camber=_CAMBER_OFF * float(camber))
+        world = replace(world, section=section, pitch_offset=world.pitch_offset + _BLADE_OFF * float(turn))
+    own_world, own_stand = world, stand
     for change in changes:
-        own = dict(change.world)
+        own, shape = dict(change.world), dict(change.section)
         if "pitch_offset" in own:
             own["pitch_offset"] += world.pitch_offset
-        world, stand = applied(world, stand, replace(change, world=own))
+        if "camber" in shape:
+            shape["camber"] += world.section.camber
+        world, stand = applied(world, stand, replace(change, world=own, section=shape))
     real, columns = bench.measure(world, stand, rng)
     good = np.isfinite(columns["thrust_N"]) & np.isfinite(columns["torque_Nm"])
     if np.mean(good) < 0.8:
@@ -169,18 +186,7 @@ def make_item(
 
     rows = bench.rows
     air_known = "air_density" not in ids and (bench.plan == "two_air" or bool(rng.random() < 0.5))
-    shown: dict[str, Array] = {"run": rows.run.astype(float), **columns}
-    shown["temperature_C"] = rows.temperature_C + 0.1 * rng.standard_normal(rows.rpm.size)
-    if air_known:
-        shown["pressure_Pa"] = rows.pressure_Pa + 30.0 * rng.standard_normal()
-    if np.any(np.isfinite(rows.wall)):
-        shown["wall_distance_m"] = rows.wall
-    if bench.plan == "gap":
-        shown["tip_gap_mm"] = rows.gap * 1e3
-    exact = record(real, rows, bench.rig.rotor.radius, None, stand, None)
-    for name, value in (("u_thrust_N", exact["thrust_N"]), ("u_torque_Nm", exact["torque_Nm"])):
-        full = float(np.nanmax(np.abs(value)))
-        shown[name] = np.hypot(np.hypot(stand.noise, stand.session) * np.abs(value), stand.floor * full)
+    shown = _shown(bench, real, columns, stand, air_known, rng, stated)
     off = tuple(dict.fromkeys(e for c in causes for e in c.off))
     on = ("ground_effect",) if bench.plan == "wall" and "ground_effect" not in ids else ()
     files = {
@@ -190,6 +196,11 @@ def make_item(
         ),
         "stations.csv": stations_text(bench.rig),
     }
+    reference = ""
+    if _removable(causes):
+        reference = _reference(bench, causes, own_world, own_stand, air_known, more, stated)
+    if referenced and reference:
+        files["reference.csv"] = reference
 
     base = Stand(**{k: v for k, v in vars(stand).items() if k in _QUALITY})
     signed = [bench.signature(ch, c) for ch, c in zip(changes, causes, strict=True)]
@@ -216,13 +227,59 @@ def make_item(
         "rig": bench.rig.name,
         "ducted": bench.rig.duct is not None,
         "seed": seed,
+        "referenced": "reference.csv" in files,
+        "stated": stated,
         "rows": int(np.count_nonzero(good)),
         "stand": {k: v for k, v in vars(stand).items() if k in _QUALITY},
     }
     if len(parts) > 1:  # how far the weaker of a pair stands out when the stronger may take what it can
         vectors = [rule.whole @ rule.stack(s) for s in signed]
         entry["separation_together"] = [_across(vectors[k], vectors[1 - k]) for k in (0, 1)]
-    return Item(files, entry)
+    return Item(files, entry, reference)
+
+
+def _shown(
+    bench: Bench, real: TrueLoads, columns: dict[str, Array], stand: Stand, air_known: bool,
+    rng: np.random.Generator, stated: bool,
+) -> dict[str, Array]:  # fmt: skip
+    """Columns of a recording, uncertainties among them where they are stated."""
+    rows = bench.rows
+    shown: dict[str, Array] = {"run": rows.run.astype(float), **columns}
+    shown["temperature_C"] = rows.temperature_C + 0.1 * rng.standard_normal(rows.rpm.size)
+    if air_known:
+        shown["pressure_Pa"] = rows.pressure_Pa + 30.0 * rng.standard_normal()
+    if np.any(np.isfinite(rows.wall)):
+        shown["wall_distance_m"] = rows.wall
+    if bench.plan == "gap":
+        shown["tip_gap_mm"] = rows.gap * 1e3
+    if not stated:
+        return shown
+    exact = record(real, rows, bench.rig.rotor.radius, None, stand, None)
+    for name, value in (("u_thrust_N", exact["thrust_N"]), ("u_torque_Nm", exact["torque_Nm"])):
+        full = float(np.nanmax(np.abs(value)))
+        shown[name] = np.hypot(np.hypot(stand.noise, stand.session) * np.abs(value), stand.floor * full)
+    return shown
+
+
+def _removable(causes: Sequence[Cause]) -> bool:
+    """Whether a stand can run without the causes: nobody can take friction or compressibility away."""
+    return not any(c.without.section for c in causes)
+
+
+def _reference(
+    bench: Bench, causes: Sequence[Cause], world: World, stand: Stand, air_known: bool, rng: np.random.Generator,
+    stated: bool,
+) -> str:  # fmt: skip
+    """The same rotor at the same points on another day, without the causes; "" where it has no solution."""
+    for cause in causes:
+        world, stand = applied(world, stand, cause.without)
+        if cause.id == "ground_effect":
+            world = replace(world, ground=0.0)
+    ducted = all(c.without.ducted is not False for c in causes)
+    real, columns = bench.measure(world, stand, rng, ducted=ducted)
+    good = np.isfinite(columns["thrust_N"]) & np.isfinite(columns["torque_Nm"])
+    shown = _shown(bench, real, columns, stand, air_known, rng, stated)
+    return recording_text({n: v[good] for n, v in shown.items()}) if np.mean(good) >= 0.8 else ""
 
 
 _QUALITY = ("noise", "floor", "share", "memory", "session", "step", "rpm_noise", "airspeed_noise")

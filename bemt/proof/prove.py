@@ -11,7 +11,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -31,6 +31,8 @@ REAL = "real"
 _GIVEN = ("recording.csv", "case.toml", "stations.csv", "reference.csv")
 COMPARE = "compare"
 """File of an item that asks what changed between reference.csv and recording.csv."""
+ASKED = "with_reference"
+"""Folder of the same items with the reference that a diagnosis may ask for; it is not shown before."""
 TIME_LIMIT_S = 900.0
 
 
@@ -53,6 +55,10 @@ def conceal(out: Path, size: str, seed: int, say: Callable[[str], None] | None =
         folder.mkdir(parents=True)
         for file, text in item.files.items():
             write_atomic(folder / file, text)
+        if item.reference and "reference.csv" not in item.files:
+            (out / ASKED / name).mkdir(parents=True)
+            for file, text in {**item.files, "reference.csv": item.reference}.items():
+                write_atomic(out / ASKED / name / file, text)
         hashes = {file: seal.sha256(text) for file, text in item.files.items()}
         entries.append({"folder": name, "files": hashes, **item.entry})
     return seal.seal(out, {"schema": KEY_SCHEMA, "version": __version__, "seed": str(seed), "size": size,
@@ -97,11 +103,32 @@ def _question(folder: Path) -> list[str]:
 
 
 def diagnose_all(out: Path, jobs: int, say: Callable[[str], None] | None = None) -> None:
-    """Diagnose all items that have no answer yet; answers go to ``answers/<folder>.json``."""
-    answers = out / "answers"
+    """Diagnose all items that have no answer yet, then those again that asked for a reference, with it.
+
+    Answers go to ``answers/<folder>.json`` and ``answers_with_reference/<folder>.json``.
+    """
+    _diagnose_folders(sorted((out / "items").iterdir()), out / "answers", jobs, _teller("diagnosed", say))
+    asked = [f for f in sorted((out / ASKED).glob("*")) if asks(_stored(out / "answers" / f"{f.name}.json"))]
+    _diagnose_folders(asked, out / f"answers_{ASKED}", jobs, _teller("reference given", say))
+
+
+def asks(answer: Mapping[str, Any] | None) -> bool:
+    """Whether an answer leaves the cause open and asks for a reference."""
+    if not answer:
+        return False
+    step = answer.get("next_measurement") or {}
+    return answer["verdict"] in ("insufficient", "unknown") and step.get("kind") == "reference"
+
+
+def _stored(file: Path) -> dict[str, Any] | None:
+    """Answer in a file; None where there is none."""
+    found: dict[str, Any] | None = json.loads(file.read_text(encoding="utf-8"))["answer"] if file.exists() else None
+    return found
+
+
+def _diagnose_folders(folders: Sequence[Path], answers: Path, jobs: int, tell: Callable[[int, int], None]) -> None:
     answers.mkdir(exist_ok=True)
-    todo = [f for f in sorted((out / "items").iterdir()) if not (answers / f"{f.name}.json").exists()]
-    tell = _teller("diagnosed", say)
+    todo = [f for f in folders if not (answers / f"{f.name}.json").exists()]
 
     def one(folder: Path) -> None:
         began = time.monotonic()
@@ -119,7 +146,7 @@ def diagnose_all(out: Path, jobs: int, say: Callable[[str], None] | None = None)
 def proof(out: Path, digest: str | None = None) -> dict[str, Any]:
     """Open the key and score the answers."""
     key = seal.unseal(out, digest)
-    judged, seconds, errors = [], [], {}
+    judged, again, seconds, errors = [], [], [], {}
     settled: list[bool] = []
     made = key["size"] != REAL
     first, _ = np.random.SeedSequence(int(key["seed"])).spawn(2)
@@ -128,6 +155,9 @@ def proof(out: Path, digest: str | None = None) -> dict[str, Any]:
         file = out / "answers" / f"{entry['folder']}.json"
         stored: Mapping[str, Any] = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
         judged.append(score.judge(entry, stored.get("answer")))
+        if made and asks(judged[-1].answer) and (out / ASKED / entry["folder"]).exists():
+            second = _stored(out / f"answers_{ASKED}" / f"{entry['folder']}.json")
+            again.append(score.judge(entry, second))
         if made and judged[-1].answer:
             settles = resolve.resolves(found[entry["rig"], entry["plan"]], entry, judged[-1].answer)
             settled += [] if settles is None else [settles]
@@ -142,7 +172,7 @@ def proof(out: Path, digest: str | None = None) -> dict[str, Any]:
          "error": errors.get(j.entry["folder"], "")}
         for j in judged if not j.right and (j.claims or j.visible or not j.answer)
     ]  # fmt: skip
-    rows = score.score(judged, settled) if made else score.score_real(judged)
+    rows = score.score(judged, settled, again) if made else score.score_real(judged)
     return {
         "schema": SCHEMA, "version": __version__, "size": key["size"], "seed": key["seed"], "commit": _commit(),
         "key_sha256": digest or (out / seal.SEAL).read_text(encoding="utf-8").strip(), "items": len(judged),

@@ -195,6 +195,12 @@ def _blamed(j: Judged) -> bool:
     )  # fmt: skip
 
 
+def _beside(j: Judged) -> bool:
+    """Whether a claim holds no cause that is at work, and none that the plan cannot tell from one."""
+    there = {*j.entry["causes"], *(i for alike in j.entry["alike"] for i in alike)}
+    return not there & set(j.answer["effects"])
+
+
 def _parameters(j: Judged) -> list[tuple[float, bool]]:
     """Relative error of each parameter that both sides name, and whether its interval holds the truth."""
     out = []
@@ -239,8 +245,10 @@ def _located(j: Judged) -> bool:
     return any(w == f or w.startswith(f"{f}_") or (len(f) > 2 and f in w) for w in words for f in families)
 
 
-def score(judged: Sequence[Judged], settled: Sequence[bool] = ()) -> list[ScoreRow]:
-    """The table of DIAGNOSIS 5."""
+def score(
+    judged: Sequence[Judged], settled: Sequence[bool] = (), again: Sequence[Judged] = ()
+) -> list[ScoreRow]:  # fmt: skip
+    """The table of DIAGNOSIS 5; ``again`` are items that asked for a reference, with the answer that it led to."""
 
     def of(*sets: str) -> list[Judged]:
         return [j for j in judged if j.entry["set"] in sets]
@@ -265,6 +273,7 @@ def score(judged: Sequence[Judged], settled: Sequence[bool] = ()) -> list[ScoreR
         _share("top 1, visible", (j.top1 for j in visible), ">= 90 %", 0.90),
         _share("top 3, visible", (j.top3 for j in visible), ">= 98 %", 0.98),
         _share("right when it claims", (j.right for j in with_cause), ">= 98 %", 0.98),
+        _share("claims that name only what is not at work", (_beside(j) for j in with_cause), "<= 3 %", 0.03, True),
         _share("claims on visible", (j.claims for j in visible), ">= 75 %", 0.75),
         _share("wrong claims on what the plan cannot see", (j.claims and not j.right for j in hidden), "<= 2 %", 0.02,
                True),
@@ -281,7 +290,23 @@ def score(judged: Sequence[Judged], settled: Sequence[bool] = ()) -> list[ScoreR
         _median("held-out RMSE after / noise, median", [b for _, b in held], "<= 1.2", 1.2),
         _share("right variable in the location", (_located(j) for j in where), ">= 90 %", 0.90),
         _share("recommended run settles the tie", settled, ">= 70 %", 0.70),
-        _share("failed", (not j.answer for j in judged), "0", 0.0, True),
+        *_with_reference([j for j in again if j.answer]),
+        _share("failed", (not j.answer for j in (*judged, *again)), "0", 0.0, True),
+    ]  # fmt: skip
+
+
+def _with_reference(again: Sequence[Judged]) -> list[ScoreRow]:
+    """What a reference made of the items that asked for one."""
+    causes = [j for j in again if j.entry["set"] in ("single", "sensor", "pair") and j.visible]
+    claims = [j for j in again if j.claims and j.entry["set"] in ("single", "sensor", "pair", "underpowered")]
+    nothing = [j for j in again if j.entry["set"] in ("null", "mismatch")]
+    return [
+        _share("left open though visible: right or in a class with a reference", (j.right for j in causes), ">= 50 %",
+               0.5),
+        _share("right when it claims, with a reference", (j.right for j in claims), ">= 97 %", 0.97),
+        _share("claims on nulls, with a reference", (j.claims for j in nothing), "<= 2 %", 0.02, True),
+        _share("unlisted given a listed name, with a reference",
+               (j.claims for j in again if j.entry["set"] == "unlisted"), "<= 5 %", 0.05, True),
     ]  # fmt: skip
 
 

@@ -21,7 +21,7 @@ from bemt import __version__, effects
 from bemt.air import air_arrays
 from bemt.base import units
 from bemt.case import Assumption, Case
-from bemt.compare.sweep.model_error import u_model
+from bemt.compare.sweep.model_error import beyond, u_model
 from bemt.readers import references as reference_file
 from bemt.recordings import audit_remarks
 
@@ -175,6 +175,7 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
     ready, nominal = run(case, what="nominal")
     stations = case.file.model.stations
     _, refined = run(case, 2 * stations, "twice the stations")
+    extrapolated = beyond(case, nominal)[1]
     own_error = u_model(case, ready, nominal, _conditions(case, points, case)[2])
     bemt = _Model(_channels(nominal), _channels(refined), own_error)
     simple = formula(case)
@@ -202,7 +203,7 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
     variants: list[dict[str, Any]] = []
     for i, (w, v, rho) in enumerate(points):
         state = {"rpm": w, "airspeed_m_s": v, "density_kg_m3": rho, "M_tip": nominal.M_tip[i], "Re": nominal.Re75[i]}
-        flags = [*nominal.flags[i], *_tip_flags(float(nominal.M_tip[i]))]
+        flags = [*nominal.flags[i], *_tip_flags(float(nominal.M_tip[i])), *filter(None, [extrapolated[i]])]
         if np.isnan(bemt.u("thrust_N")[i]) and nominal.converged[i]:
             flags.append("unconverged somewhere in the range of the assumptions: u unknown")
         rows.append(_row(

@@ -16,7 +16,7 @@ from bemt.asbuilt.latents import Prior
 from bemt.asbuilt.mixture import LEVELS, half_width, inside
 from bemt.asbuilt.population import WEIGHTS, Population, label_angle_deg
 from bemt.asbuilt.predict import predict, sense
-from bemt.asbuilt.reference import ReferenceRun, noise_of_run
+from bemt.asbuilt.reference import ReferenceRun, noise_of_run, scatter
 from bemt.compare.validate.points import Rows, Solver, Stations, counted, rows
 from bemt.sections import rule as section_rule
 
@@ -64,11 +64,14 @@ class Expected:
         ``static`` and ``forward``, CT and CP: of an interval as wide as the error [1].
     width : dict of str to dict of str to (P,) float
         Half width of the 68 % interval over the expectation [1].
+    log_density : dict of str to dict of str to (P,) float
+        Logarithm of the predictive density of the reading over itself [1].
     """
 
     rows: Rows
     probability: dict[str, dict[str, Array]]
     width: dict[str, dict[str, Array]]
+    log_density: dict[str, dict[str, Array]]
 
 
 def observe(propeller: UiucPropeller, effects: Sequence[Effect], stations: Stations, general: bool = False) -> Observed:
@@ -94,16 +97,24 @@ def observe(propeller: UiucPropeller, effects: Sequence[Effect], stations: Stati
 
 
 def conditioned(seen: Observed, p: Population, on: str) -> Expected:
-    """Expectation after conditioning on the points of one kind, ``static`` or ``forward``; those of the other count."""
+    """Expectation after conditioning on points of one kind; those of the other count.
+
+    ``on`` is ``static``, ``forward``, or ``static_and_one``: the forward point nearest to half of the zero-thrust J
+    too.
+    """
     m, drawn = seen.record, seen.drawn
     good = counted(drawn)
     here = np.logical_or.reduce(list(good.values())) & np.isfinite(drawn.CT_bemt)
     rpm, J = drawn.rpm[here], drawn.J[here]
-    run = np.flatnonzero(good[on][here])
+    run = np.flatnonzero(good[on.removesuffix("_and_one")][here])
     run = run[np.unique(np.linspace(0, run.size - 1, min(run.size, RUN_POINTS)).round().astype(int))]
+    if on.endswith("_and_one"):
+        run = np.append(run, np.argmin(np.where(m.static, np.inf, np.abs(m.x - 0.5))))
     prior = p.prior("stations", m.diameter_m, m.gap_deg, m.family, m.section)
     x, Re, f, top, y = m.x[run], m.Re[run], m.f[:, run], m.top[:, run], m.y[:, run]
-    noise = noise_of_run(p, m.diameter_m, (x, Re), f, top, y, p.noise_sd(f, top))
+    still = m.static[run]
+    rough = np.array([[scatter(a, Re[still])] for a in (y - f)[:, still]]) * still
+    noise = noise_of_run(p, m.diameter_m, (x, Re), f, top, y, np.hypot(p.noise_sd(f, top), rough))
     bias = p.bias(x, top).reshape(-1)
     found = condition(
         lambda z: seen.solve(z, rpm[run], J[run]).reshape(-1) + bias, prior, y.reshape(-1), noise, p.rest_sizes, WEIGHTS
@@ -131,13 +142,16 @@ def _lying(seen: Observed, p: Population, prior: Prior, reference: ReferenceRun 
     CT[here], CP[here] = found.mean
     now = replace(now, CT_bemt=CT, CP_bemt=CP)
     sds = found.sds(noise=True)
+    density = found.log_density(m.y) + np.log(np.abs(m.y))
     probability: dict[str, dict[str, Array]] = {}
     width: dict[str, dict[str, Array]] = {}
+    log_density: dict[str, dict[str, Array]] = {}
     for kind, mask in good.items():
         k = mask[here]
-        probability[kind], width[kind] = {}, {}
+        probability[kind], width[kind], log_density[kind] = {}, {}, {}
         for i, q in enumerate(("CT", "CP")):
             mean, sd = found.mean[i][k], sds[i][k]
             probability[kind][q] = inside(m.y[i][k] - mean, sd, found.chances)
             width[kind][q] = half_width(LEVELS[0], sd, found.chances) / np.abs(mean)
-    return Expected(now, probability, width)
+            log_density[kind][q] = density[i][k]
+    return Expected(now, probability, width, log_density)

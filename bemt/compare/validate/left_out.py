@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bemt import __version__
 from bemt.asbuilt.fit import fit
+from bemt.asbuilt.learnt import Learnt
 from bemt.asbuilt.population import Population
 from bemt.base.tables import plain
 from bemt.base.units import INCH
+from bemt.coefficients import M_tip
 from bemt.compare.validate.built import Observed, conditioned, expect, observe
 from bemt.compare.validate.points import KINDS
 from bemt.compare.validate.pool import Pool
+from bemt.compare.validate.static_limit import from_static
 from bemt.sections import rule as section_rule
 
 if TYPE_CHECKING:
@@ -28,7 +33,8 @@ _WORDS = {
     "as_drawn": "solver on the stations as given", "declared": "as built",
     "general_section": "as built, calibrated sections taken for unknown",
     "as_drawn_large": "solver, 9 in and more", "declared_large": "as built, 9 in and more",
-    "on_static": "conditioned on the rotor's static run", "on_forward": "conditioned on its forward runs",
+    "on_static": "conditioned on the rotor's static run",
+    "on_static_and_one": "on its static run and one forward point", "on_forward": "conditioned on its forward runs",
 }  # fmt: skip
 Say = Callable[[str], None] | None
 
@@ -51,7 +57,10 @@ def fit_population(seen: Sequence[Observed], name: str) -> tuple[Population, Any
         "command": f"python -m bemt validate {name} --fit-population FILE",
         "source": "UIUC Propeller Database (Brandt, Deters, Ananda, Dantsker, Selig)",
     }  # fmt: skip
-    return fit([s.record for s in seen], provenance=provenance)
+    D = [s.record.diameter_m for s in seen]
+    fastest = max(float(M_tip(s.drawn.rpm.max() / 60.0, s.record.diameter_m, s.solve.air.a_sound)) for s in seen)
+    p, numbers = fit([s.record for s in seen], provenance=provenance)
+    return replace(p, learnt=Learnt((min(D), max(D)), fastest)), numbers
 
 
 def leave_out(
@@ -72,7 +81,7 @@ def leave_out(
         p, _ = fit([s.record for s in seen if s.record.family != family], numbers, _STEPS_LEFT_OUT)
         for one in (s for s in seen if s.record.family == family):
             found = expect(one, p)
-            for other_kind, on in (("forward", "static"), ("static", "forward")):
+            for other_kind, on in (("forward", "static"), ("forward", "static_and_one"), ("static", "forward")):
                 if one.record.static.any() and not one.record.static.all():
                     pools[f"on_{on}"].add_kind(conditioned(one, p, on), other_kind)
             large = one.record.diameter_m >= LARGE_IN * INCH
@@ -86,7 +95,29 @@ def leave_out(
                 other = observe(one.propeller, effects, stations[one.record.name], general=True)
                 found = expect(other, p)
                 pools["general_section"].add(found.rows, found)
-    return {"schema": SCHEMA, "folder": name, "families": families} | {k: pool.total() for k, pool in pools.items()}
+    out = {"schema": SCHEMA, "folder": name, "families": families} | {k: pool.total() for k, pool in pools.items()}
+    return out | {"transfer": transfer(seen, say), "static_limit": from_static([s.record for s in seen])}
+
+
+def transfer(seen: Sequence[Observed], say: Say = None) -> dict[str, Any]:
+    """Each volume (folder of the data) predicted by a population fitted to the others."""
+    volumes = sorted({s.propeller.folder for s in seen})
+    out = {}
+    for folder in volumes if len(volumes) > 1 else []:
+        if say:
+            say(f"without {Path(folder).name}")
+        p, _ = fit([s.record for s in seen if s.propeller.folder != folder])
+        pool = Pool()
+        for one in (s for s in seen if s.propeller.folder == folder):
+            found = expect(one, p)
+            pool.add(found.rows, found)
+        out[Path(folder).name] = pool.total()
+    return out
+
+
+def log_score(total: dict[str, Any]) -> float:
+    """Mean log score over CT and CP, static and forward."""
+    return float(sum(total[kind][q]["log_score"] for kind in KINDS for q in ("CT", "CP")) / 4.0)
 
 
 def table(document: dict[str, Any]) -> str:
@@ -95,21 +126,29 @@ def table(document: dict[str, Any]) -> str:
         f"{'each family left out of the population':60} {'median':>7} {'p90':>6} {'68 %':>6} {'95 %':>6} {'width':>6}"
     )
     lines = [head]
-    for key, text in _WORDS.items():
+    named = [(document[key], text) for key, text in _WORDS.items()]
+    named += [(total, f"{volume}, fitted to the other") for volume, total in document["transfer"].items()]
+    for total, text in named:
         for kind in KINDS:
             for q in ("CT", "CP"):
-                s = document[key][kind][q]
+                s = total[kind][q]
                 if s["median_abs"] is None:
                     continue
                 held = s.get("coverage", {"68": None, "95": None})
                 cells = [s["median_abs"], s["p90_abs"], held["68"], held["95"], s.get("width68")]
                 shown = [f"{'-':>6}" if v is None else f"{100 * v:6.1f}" for v in cells]
                 lines.append(f"{text + ', ' + kind + ' ' + q:60}  {' '.join(shown)}")
+    limit = document["static_limit"]
+    for key, text in (("seen", "answers known to it"), ("left_out", "rotor left out")):
+        errors = f"{100 * limit[key]['median_abs']:6.1f} {100 * limit[key]['p90_abs']:6.1f}"
+        lines.append(f"{'best line from static to forward CT, ' + text:60}  {errors}")
     n = document["declared"]
+    scores = [log_score(total) for total in (n, *document["transfer"].values())]
     lines += [
         "",
         f"Percent of the measured value; {len(document['families'])} families; static {n['static']['points']} points of"
         f" {n['static']['propellers']} propellers, forward {n['forward']['points']} of {n['forward']['propellers']}.",
+        f"Mean log score of families left out and of each volume: {', '.join(f'{s:.3f}' for s in scores)}.",
         "68 %, 95 %: share of the points inside those intervals; width: half of the 68 % interval, median.",
     ]
     return "\n".join(lines)

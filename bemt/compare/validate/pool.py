@@ -26,6 +26,7 @@ class Pool:
                 if expected is not None:
                     own._found[kind, q, "probability"] = [expected.probability[kind][q]]
                     own._found[kind, q, "width"] = [expected.width[kind][q]]
+                    own._found[kind, q, "log_density"] = [expected.log_density[kind][q]]
         for key, values in own._found.items():
             self._found.setdefault(key, []).extend(values)
         out = own.total()
@@ -42,7 +43,9 @@ class Pool:
                 self._found.setdefault(key, []).extend(values)
 
     def total(self) -> dict[str, Any]:
-        """Statistics over all points."""
+        """Statistics over all points; ``log_score`` is a mean over propellers of the mean log density of their
+        points.
+        """
         out: dict[str, Any] = {}
         for kind in KINDS:
             sizes = [e.size for e in self._found.get((kind, "CT", "error"), [])]
@@ -55,6 +58,8 @@ class Pool:
                 out[kind][q] = statistics(e)
                 if (kind, q, "probability") in self._found:
                     out[kind][q] |= coverage(probability, width)
+                    means = [float(np.mean(v)) for v in self._found[kind, q, "log_density"] if v.size]
+                    out[kind][q]["log_score"] = float(np.mean(means)) if means else None
         return out
 
 

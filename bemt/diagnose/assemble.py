@@ -1,0 +1,251 @@
+"""Recordings and cases become a problem: baselines solved, noise and nuisances worked out, the blade calibrated."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.base.errors import Fault, InputError
+from bemt.bem import model as bem
+from bemt.case.prepare import k1k2_case, prepare_case
+from bemt.diagnose import repeats
+from bemt.diagnose.blade import PLAIN, CalibratedBlade, prior_of
+from bemt.diagnose.blade_fit import calibrated
+from bemt.diagnose.noise import in_time
+from bemt.diagnose.nuisance import nuisances
+from bemt.diagnose.problem import Part, Problem
+from bemt.diagnose.record import CHANNELS, Record, concatenated, dense, merged, owners
+from bemt.effects.base import Effect
+from bemt.recordings.between import Level, odd_ones
+
+if TYPE_CHECKING:
+    from bemt.case import Case
+
+__all__ = ["assemble", "build"]
+
+Array = NDArray[np.float64]
+
+_STATIONS = 16
+_FEWEST = 3
+# Share of the largest load coefficient from which on a reading shows the level of its recording.
+_LOADED = 0.3
+# No slip of units is larger, and numbers beyond it are beyond floating point.
+_FARTHEST = 1e6
+_U_DEFAULT = 0.01
+_U_RPM = 0.003
+_U_FLOOR = 0.002
+# Prepared rotors that are kept at a time.
+_PREPARED = 30
+
+
+class _Recent(dict[Any, Any]):
+    """The last few prepared rotors: each holds megabytes of tables, and what they gave is kept by the part itself."""
+
+    def __getitem__(self, key: Any) -> Any:
+        self[key] = value = super().pop(key)
+        return value
+
+    def __setitem__(self, key: Any, value: Any) -> None:
+        super().__setitem__(key, value)
+        if len(self) > _PREPARED:
+            del self[next(iter(self))]
+
+
+def _part(record: Record, case: Case, baseline: str) -> Part:
+    model = prepare_case(case, None, _STATIONS)
+    R = model.rotor.R
+    omega = record.rpm * np.pi / 30.0
+    speed = np.hypot(omega * R, record.V)
+    top = min(1.25, float(np.max(speed / record.air.a_sound)) * 1.12 + 0.03)
+    chord = model.rotor.blade.chord
+    ratio = record.air.rho / record.air.mu
+    re_low = 0.15 * float(np.min(speed * ratio)) * float(np.min(chord))
+    re_high = 1.3 * float(np.max(speed * ratio)) * float(np.max(chord))
+    model = replace(model, mach_max=top, re_range=(re_low, re_high), _kept=_Recent())
+    plain = [e for e in model.effects if not bem.acts_on_points(e)]
+    flow = bem.flow_of(model.prepared(plain), record.rpm, record.V, record.air, record.extra, model.chord75_m)
+    part = Part(record, model, model.effects, flow, case.content_hash(), tuple(case.get("model.effects_off")))
+    if baseline == "bemt":
+        return part
+    thrust = k1k2_case(case, None, record.rpm, record.V, record.air).thrust_N
+    nothing = np.full_like(thrust, np.nan)
+    return replace(part, instead=np.concatenate([thrust if c == "thrust_N" else nothing for c in part.channels]))
+
+
+def build(records: Sequence[Record], cases: Sequence[Case], baseline: str = "bemt") -> Problem:
+    """Put recordings beside the baselines of their cases."""
+    chosen = list(cases) * len(records) if len(cases) == 1 else list(cases)
+    # recordings of one case share the errors of its model
+    groups: dict[tuple[bool, str], tuple[Case, list[Record]]] = {}
+    for r, c in zip(records, chosen, strict=True):
+        groups.setdefault((r.reference, c.content_hash()), (c, []))[1].append(r)
+    order = sorted(groups, key=lambda k: k[0])
+    problem = assemble(tuple(_part(merged(groups[k][1]), groups[k][0], baseline) for k in order))
+    if problem.y.size < _FEWEST:
+        got = f"{problem.y.size} readings beside a converged baseline"
+        raise InputError(Fault(records[0].name, "", got, f"{_FEWEST} or more"))
+    for k, name in enumerate(CHANNELS):
+        mine = problem.channel == k
+        ratio = float(np.median(np.abs(problem.y[mine])) / np.median(np.abs(problem.f0[mine]))) if mine.any() else 1.0
+        if not 1.0 / _FARTHEST < ratio < _FARTHEST:
+            raise InputError(Fault(records[0].name, name, f"{ratio:.2g} times what the case gives",
+                                   "readings of this rotor", "Another unit, or another case?"))  # fmt: skip
+    odd = _between(problem, [groups[k][1] for k in order], records)
+    problem, found = _calibrated(problem, [groups[k][0] for k in order])
+    return replace(problem, between=(*odd, *found))
+
+
+def _calibrated(problem: Problem, cases: Sequence[Case]) -> tuple[Problem, tuple[str, ...]]:
+    """Problem with the blade as its references show it, and findings."""
+    refers = [p for p in problem.parts if p.record.reference]
+    if not refers or len({p.key for p in problem.parts}) > 1 or any(p.instead is not None for p in problem.parts):
+        return problem, ()
+    blade, note, finding = calibrated(problem, prior_of(cases[0]))
+    notes, found = (note,) if note else (), (f"{refers[0].record.name}: {finding}",) if finding else ()
+    if blade is None:
+        return replace(problem, notes=(*problem.notes, *notes)), found
+    whole = assemble(tuple(_with_blade(p, blade.effect) for p in problem.parts), blade)
+    return replace(whole, notes=(*whole.notes, *notes)), found
+
+
+def _with_blade(part: Part, blade: Effect) -> Part:
+    """Part whose baseline has another blade."""
+    baseline, old = part.turned(blade), part.flow
+    plain = [e for e in baseline if not bem.acts_on_points(e)]
+    flow = bem.flow_of(
+        part.model.prepared(plain), part.record.rpm, part.record.V, part.record.air, part.record.extra, old.chord
+    )
+    return replace(part, baseline=baseline, flow=flow, _solved={})
+
+
+def _between(problem: Problem, joined: Sequence[Sequence[Record]], records: Sequence[Record]) -> tuple[str, ...]:
+    """Recordings in other units than their companions, by the level of their loads beside the baseline."""
+    names = [r.name for r in records]
+    label = {id(r): r.name if names.count(r.name) == 1 else f"{r.name} (recording {k})"
+             for k, r in enumerate(records, 1)}  # fmt: skip
+    unit = np.concatenate([p.flow.rho * p.flow.n**2 for p in problem.parts])[problem.point]
+    owner = np.concatenate([owners(rs, p.record) for rs, p in zip(joined, problem.parts, strict=True)])[problem.point]
+    size, levels = np.abs(problem.f0) / unit, []
+    with np.errstate(divide="ignore", invalid="ignore"):
+        off = np.log(np.abs(problem.y / problem.f0))
+    for c, channel in enumerate(CHANNELS[:2]):
+        for i, rs in enumerate(joined):
+            same = np.array([p.key == problem.parts[i].key for p in problem.parts])[problem.part]
+            alike = (problem.channel == c) & same
+            if not alike.any():
+                continue
+            # where the load fades the ratio is that of two errors, and says nothing of the level
+            loaded = alike & np.isfinite(off) & (size >= _LOADED * np.quantile(size[alike], 0.9))
+            for k, r in enumerate(rs):
+                mine = off[loaded & (problem.part == i) & (owner == k)]
+                if mine.size >= _FEWEST:
+                    low, mid, high = np.quantile(mine, [0.1, 0.5, 0.9])
+                    levels.append(Level(label[id(r)], channel, float(mid), float(high - low) / 2.0))
+    return tuple(f"{level.name}: {finding}" for level, finding in odd_ones(levels))
+
+
+def assemble(parts: tuple[Part, ...], blade: CalibratedBlade = PLAIN) -> Problem:
+    """Stack the readings of parts and add the nuisances."""
+    full = [p.predict(p.baseline) for p in parts]
+    y = np.concatenate([np.concatenate([p.record.measured[c] for c in p.channels]) for p in parts])
+    u = np.concatenate([np.concatenate([p.record.u[c] for c in p.channels]) for p in parts])
+    f0 = np.concatenate(full)
+    kept = np.isfinite(y) & np.isfinite(f0)
+    sizes = [len(p.record) for p in parts]
+    first = np.cumsum([0, *sizes])
+    channel = np.concatenate(
+        [np.repeat([CHANNELS.index(c) for c in p.channels], n) for p, n in zip(parts, sizes, strict=True)]
+    )
+    point = np.concatenate(
+        [np.tile(np.arange(n) + f, len(p.channels)) for p, n, f in zip(parts, sizes, first, strict=False)]
+    )
+    part = np.repeat(np.arange(len(parts)), [len(p.channels) * n for p, n in zip(parts, sizes, strict=True)])
+    notes = [f"{p.record.name}: {note}" for p in parts for note in p.record.notes]
+    lost = int(np.isfinite(y).sum() - kept.sum())
+    if lost:
+        notes.append(f"{lost} readings left out: the baseline does not converge there")
+    scale = np.concatenate([_scale(p) for p in parts])
+    problem = Problem(
+        parts, y[kept], f0[kept], u[kept], scale[kept], False, channel[kept], point[kept],
+        part[kept], kept, _covariates(parts), np.zeros((int(kept.sum()), 0)), (), np.zeros(0, dtype=bool), tuple(notes),
+        blade=blade, offset=np.zeros(int(kept.sum())),
+    )  # fmt: skip
+    problem = _with_noise(problem)
+    columns, names, own, offset = nuisances(problem)
+    return replace(problem, tangents=columns, names=names, own=own, offset=offset)
+
+
+def _with_noise(problem: Problem) -> Problem:
+    """Uncertainty of every reading: what is stated, what repeats show, else what stands usually have."""
+    stated = np.where(np.isfinite(problem.u) & (problem.u > 0.0), problem.u, np.nan)
+    full = np.zeros_like(problem.y)
+    for i, p in enumerate(problem.parts):
+        for c, name in enumerate(CHANNELS):
+            full[(problem.part == i) & (problem.channel == c)] = p.full_scale.get(name, 0.0)
+    tachometer = problem.channel == CHANNELS.index("rpm")
+    usual = np.where(tachometer, _U_RPM * problem.y, np.hypot(_U_DEFAULT * problem.y, _U_FLOOR * full))
+    sigma, known, notes = np.where(np.isfinite(stated), stated, usual), np.isfinite(stated), list(problem.notes)
+    X, rows = problem.covariates, np.arange(problem.y.size)
+    owner = np.concatenate([np.full(len(p.record), i) for i, p in enumerate(problem.parts)])
+    lengths = [X[k] for k in ("tip_gap_m", "wall_distance_m") if k in X] + [
+        np.exp(X[k]) for k in ("sideslip_rad",) if k in X
+    ]
+    label = repeats.conditions(X["rpm"], X["J"], X["density_kg_m3"], lengths, owner.astype(float))
+    label[np.array([dense(p.record) for p in problem.parts])[owner]] = -1
+    run, place = in_time(X)
+    shares: dict[str, float] = {}
+    for c, name in enumerate(CHANNELS[:2]):
+        mine = rows[(problem.channel == c) & (label[problem.point] >= 0)]
+        # readings that are those of the model to the last digit are a plan, not a measurement
+        if not np.any(np.abs(problem.residual[mine]) > 1e-9 * full[mine]):
+            continue
+        points, size = problem.point[mine], np.where(problem.y[mine] < 0, -1.0, 1.0) * problem.scale[mine]
+        fixed = repeats.projected_out(label[points], size, problem.f0[mine], full[mine], run[points], place[points])
+        told = np.where(known[mine], sigma[mine], 0.0) if known[mine].any() else None
+        found = repeats.noise_sizes(problem.residual[mine], problem.y[mine], full[mine], fixed, told)
+        if found is None or not any(found[:2]):
+            continue
+        a, b, dof = found
+        every = problem.channel == c
+        seen = np.hypot(a * problem.y[every], b * full[every])
+        sigma[every] = np.where(known[every], np.hypot(sigma[every], seen), seen)
+        known = known | every
+        shares[name] = float(np.median(seen / np.maximum(np.abs(problem.y[every]), 1e-12)))
+        beside = " beside what is stated" if told is not None else ""
+        notes.append(f"{name}: {dof} repeats scatter by {a:.2%} of the reading and {b:.2%} of full scale{beside}")
+    return replace(problem, u=sigma, u_known=bool(known.mean() > 0.5), notes=tuple(notes), scatter=shares)
+
+
+def _scale(part: Part) -> Array:
+    """Size of each reading that relative errors refer to: it does not vanish where the load does."""
+    f, out = part.flow, []
+    unit = {"thrust_N": f.rho * f.n**2, "torque_Nm": f.rho * f.n**2}
+    for c in part.channels:
+        y = part.record.measured[c]
+        if c == "rpm":
+            out.append(np.abs(part.steady_rpm))
+        else:
+            coefficient = np.abs(y / unit[c])
+            # where nearly all readings are 0 the largest stands for the size
+            out.append(unit[c] * float(np.nanquantile(coefficient, 0.9) or np.nanmax(coefficient)))
+    return np.concatenate(out)
+
+
+def _covariates(parts: Sequence[Part]) -> dict[str, Array]:
+    def join(f: Callable[[Part], Array]) -> Array:
+        return np.concatenate([f(p) for p in parts])
+
+    found = {
+        "rpm": join(lambda p: p.flow.rpm),
+        "J": join(lambda p: p.flow.J),
+        "M_tip": join(lambda p: p.flow.M_tip),
+        "Re": join(
+            lambda p: p.flow.rho * p.flow.chord * np.hypot(0.75 * p.flow.omega * p.flow.R, p.flow.V) / p.flow.mu
+        ),
+        "density_kg_m3": join(lambda p: p.flow.rho),
+    }
+    return found | concatenated([p.record for p in parts])

@@ -1,0 +1,375 @@
+"""Rules of the verdict, in the order of caution: the first that holds answers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt import effects
+from bemt.diagnose import blocks
+from bemt.diagnose import fit as fitting
+from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
+from bemt.diagnose.suggest import LEVEL
+from bemt.diagnose.verdict import (
+    BESIDE,
+    END,
+    GATE,
+    LARGEST,
+    LEFT_OVER,
+    MOST,
+    PREDICTS,
+    PROVEN,
+    ROUGH,
+    SMALL,
+    SURE,
+    VAGUE,
+    Asked,
+    Decision,
+    holds_off,
+    levels_only,
+    mass,
+    twins,
+)
+
+__all__ = ["BESIDE_IT", "RULES", "Rule", "decide"]
+
+BESIDE_IT = "one is sure, another may be there"
+"""Rule after which the second cause may as well be absent."""
+
+
+@dataclass(frozen=True)
+class Rule:
+    """One row of the table.
+
+    Attributes
+    ----------
+    name : str
+        What it asks.
+    holds : callable
+        Whether it applies.
+    answer : callable
+        What is said then.
+    threshold : str
+        Names of the numbers it asks with.
+    source : str
+        Where it comes from.
+    """
+
+    name: str
+    holds: Callable[[Asked], bool]
+    answer: Callable[[Asked], Decision]
+    threshold: str
+    source: str
+
+
+def decide(asked: Asked) -> Decision:
+    """Decide."""
+    for rule in RULES:
+        if rule.holds(asked):
+            return replace(rule.answer(asked), rule=rule.name)
+    raise AssertionError("the last rule always holds")
+
+
+def _leaves_its_range(a: Asked) -> bool:
+    """Whether physics that is on explains the readings best at the end of the range of a parameter, not as it is on."""
+    (name,) = a.leading
+    on = {e.id: e for e in a.found.problem.baseline}
+    best = fitting.fit(a.found, a.leading).settings[0]
+    for p in effects.catalogue()[name].parameters:
+        value = best.get(p.name)
+        if value is not None and value not in (getattr(on[name], p.name), p.off) and not p.low < value < p.high:
+            return True
+    return False
+
+
+def _predicts(a: Asked) -> bool:
+    """Whether an explanation brings left-out blocks nearer than calibration alone does, along some variable.
+
+    What does not change along a variable is learnt from the other lines of it without any cause.
+    """
+    problem = a.found.problem
+    u = problem.u[problem.free]
+
+    def error(what: Explanation, split: tuple[str, NDArray[np.intp]]) -> float:
+        d = (problem.y - blocks.held_out(a.found, what, split)[1])[problem.free] / u
+        return float(np.sqrt(np.mean(d**2)))
+
+    return any(error(a.leading, s) < PREDICTS * error(NONE, s) for s in blocks.partitions(problem))
+
+
+def at_end(name: str, told: Mapping[str, Mapping[str, Any]]) -> bool:
+    """Whether the size of an effect, or the first number of one without a size, is pinned to an end of its range."""
+    cls = effects.catalogue()[name]
+    numbers = [p for p in cls.parameters if p.name in told and p.name not in cls.discrete and p.steps > 0]
+    sizes = [p for p in numbers if p.off is not None] or numbers[:1]
+    for p in sizes:
+        near = END * (p.high - p.low)
+        if told[p.name]["high"] - told[p.name]["low"] > 0.5 * (p.high - p.low):
+            continue  # the readings do not say where it is
+        if p.off is not None and told[p.name]["low"] <= p.off <= told[p.name]["high"]:
+            continue  # nor whether it is there
+        ends = [e for e in (p.low, p.high) if e != p.off]
+        if any(abs(float(told[p.name]["value"]) - e) < near for e in ends):
+            return True
+    return False
+
+
+def _sizes(name: str, told: Mapping[str, Mapping[str, Any]]) -> int:
+    return sum(p.off is not None and p.name in told for p in effects.catalogue()[name].parameters)
+
+
+def _pair(a: Asked) -> Decision:
+    """Two effects at work: a set for each cause; names where the sets have one member."""
+    sure = [i for i in a.leading if a.share[i] >= SURE]
+    if len(sure) == len(a.leading):
+        return a.names(sure, min(a.share[i] for i in sure))
+    known = a.known_sets
+    total = sum(v for k, v in a.P.items() if k.pair)
+    inside = sum(a.P.get(Explanation.of(i, j), 0.0) for i in known[0] for j in known[-1])
+    members = tuple(dict.fromkeys(i for s in known for i in s))
+    if len(members) <= LARGEST and inside >= SURE * total:
+        why = (
+            "two effects are at work; one of them has look-alikes" if sure else "two are at work, each has look-alikes"
+        )
+        open_sets = tuple(s for s in known if len(s) > 1)
+        return replace(a.says("class", why, members, inside, open_sets), sets=known)
+    return a.says("insufficient", "two effects or more, not told apart")
+
+
+def _nothing(a: Asked, why: str, verdict: str = "none") -> Decision:
+    return a.says(verdict, why, leading=NONE)
+
+
+def _by_chance(a: Asked) -> str:
+    return f"nulls of the same plan look as much like a cause in {a.p_value:.0%} of draws"
+
+
+def _left(a: Asked) -> Decision:
+    return a.says("unknown", "a smooth mismatch remains when the best listed effect is taken away",
+                  probability=max(a.P[UNKNOWN], 1.0 - a.P[a.first]), leading=a.first)  # fmt: skip
+
+
+RULES: tuple[Rule, ...] = (
+    Rule(
+        "no effect can be seen",
+        lambda a: not a.first,
+        lambda a: a.says("insufficient", "no effect can be seen in these readings", probability=1.0, leading=NONE),
+        "",
+        "by definition",
+    ),
+    Rule(
+        "nulls look like it",
+        lambda a: (
+            a.p_value > GATE
+            and (a.P[NONE] > 0.5 or (a.p_value > 5.0 * GATE and a.level < LEVEL) or (not a.alone and a.likeliest_none))
+        ),
+        lambda a: _nothing(a, _by_chance(a)),
+        "GATE, LEVEL",
+        "DIAGNOSIS 2.3: p-value of the whole chain, 1 in 100; a reference has the level in it",
+    ),
+    Rule(
+        "nulls nearly look like it",
+        lambda a: a.p_value > GATE,
+        lambda a: _nothing(a, _by_chance(a), "insufficient"),
+        "GATE",
+        "the same, between 1 and 5 in 100, or where all loads are far off the case",
+    ),
+    Rule(
+        "nothing is likelier than anything",
+        lambda a: a.P[NONE] > 0.5,
+        lambda a: _nothing(a, "nothing explains the readings better than the noise"),
+        "0.5",
+        "posterior odds",
+    ),
+    Rule(
+        "unknown is likelier than all",
+        lambda a: a.P[UNKNOWN] > 0.5,
+        lambda a: a.says(
+            "unknown",
+            "a smooth effect that is not in the library explains the readings better than any that is",
+            probability=max(a.P[UNKNOWN], 1.0 - a.P[a.first]),
+            leading=a.first,
+        ),
+        "0.5",
+        "DIAGNOSIS 2.6: the second rival",
+    ),
+    Rule(
+        "a smooth rest is left",
+        lambda a: a.rest > max(LEFT_OVER, SMALL * a.found.log_bayes(a.first)),
+        _left,
+        "LEFT_OVER, SMALL",
+        "declared; the same rival beside the best effect",
+    ),
+    Rule(
+        "not much better than nothing",
+        lambda a: a.odds < a.needed,
+        lambda a: a.says("insufficient", "the best explanation is not much better than none"),
+        "ENOUGH, EXPECTED, PROVEN",
+        "declared; 8 nats are 4 sigma",
+    ),
+    Rule(
+        "does not predict",
+        lambda a: not a.expected and a.odds < PROVEN and a.vague > VAGUE and not _predicts(a),
+        lambda a: a.says("insufficient", "the best explanation does not predict what it has not seen"),
+        "PROVEN, VAGUE, PREDICTS",
+        "declared; left-out blocks, DIAGNOSIS 2.9; in any case it cost right names (7)",
+    ),
+    Rule(
+        "on, and out of its range",
+        lambda a: a.on and not a.leading.pair and _leaves_its_range(a),
+        lambda a: a.says(
+            "unknown", f"{a.leading} is on and would have to leave its range, so the law itself does not fit"
+        ),
+        "range of the parameter",
+        "declared with the effect",
+    ),
+    Rule(
+        "twin faults",
+        lambda a: twins(a.leading),
+        lambda a: a.says(
+            "unknown", "two instruments with the same fault at once: one cause that is not in the library is likelier"
+        ),
+        "",
+        "declared: two independent faults of one kind are rare",
+    ),
+    Rule(
+        "two levels",
+        lambda a: levels_only(a.leading),
+        lambda a: a.says(
+            "insufficient",
+            "thrust and torque are off by two different shares at all points: two faults at once, or another rotor "
+            "than that of the case or the reference",
+        ),
+        "",
+        "declared: two shares fit any two levels; density moves both alike, one gain moves one",
+    ),
+    Rule(
+        "unknown is nearly as likely",
+        lambda a: a.unlisted > BESIDE * mass(a.found, (*a.group, *a.leading)),
+        lambda a: a.says("insufficient", "something that is not in the library explains the readings nearly as well"),
+        "BESIDE",
+        "DIAGNOSIS 7: lost no right name and stopped the wrong ones",
+    ),
+    Rule(
+        "far rougher than stated",
+        lambda a: a.roughness > ROUGH and a.alone,
+        lambda a: a.says(
+            "insufficient",
+            f"the readings scatter {a.roughness:g} times as much as the recording states; no effect does that",
+        ),
+        "ROUGH",
+        "declared: end of the prior; hysteresis and resonance show so, and beside a reference they would be in both",
+    ),
+    Rule(
+        "may as well be absent",
+        lambda a: not a.leading.pair and len(a.group) <= 1 and holds_off(*next(iter(a.parameters.items()))),
+        lambda a: a.says("insufficient", f"{a.leading} leads, but what the readings say of its size includes none"),
+        "90 % interval",
+        "DIAGNOSIS 7: 4 of 5 wrong names, 0 of 42 right ones",
+    ),
+    Rule(
+        "another blade, or anything that scales all loads",
+        lambda a: a.another_blade and len(a.group) <= 1,
+        lambda a: a.says(
+            "insufficient",
+            f"all loads are far off, which {a.leading} would explain, and density, speed of rotation or "
+            "diameter nearly as well",
+        ),
+        "ANOTHER",
+        "declared: real recordings at another density than the case's were named section",
+    ),
+    Rule(
+        "at the end of its range",
+        lambda a: any(at_end(i, told) and (a.leading.pair or _sizes(i, told) > 1) for i, told in a.parameters.items()),
+        lambda a: a.says(
+            "insufficient", f"{' and '.join(a.leading)}: fits only with a number at the end of its physical range"
+        ),
+        "END",
+        "declared: where one number cannot go further, another makes up for something else",
+    ),
+    Rule(
+        "several are sure",
+        lambda a: len(a.sure) > 1,
+        lambda a: a.names(a.sure, min(a.share[i] for i in a.sure)),
+        "SURE",
+        "declared",
+    ),
+    Rule(
+        "one is sure",
+        lambda a: bool(a.sure) and not a.paired and len(a.group) <= 1 and not a.beside,
+        lambda a: a.names(a.sure, a.share[a.sure[0]]),
+        "SURE, PARTNER",
+        "declared",
+    ),
+    Rule(
+        BESIDE_IT,
+        lambda a: bool(a.sure) and not a.paired and len(a.group) <= 1,
+        lambda a: replace(
+            a.says(
+                "class",
+                f"{a.sure[0]} is at work; whether another effect is, too, is left open",
+                (*a.sure, *a.beside[: MOST - 1]),
+                a.share[a.sure[0]],
+            ),
+            sets=(a.sure, a.beside[: MOST - 1]),
+        ),
+        "SURE, PARTNER, MOST",
+        "declared",
+    ),
+    Rule("two at work", lambda a: a.paired, _pair, "SURE", "declared"),
+    Rule(
+        "on already, among others",
+        lambda a: a.on and not a.sure,
+        lambda a: a.says(
+            "insufficient",
+            f"{a.leading} leads, which is on: its law may be off for this blade, or another cause looks so",
+        ),
+        "PRESENT, SURE",
+        "declared: what is on is a cause only where nothing else is left",
+    ),
+    Rule(
+        "look-alikes",
+        lambda a: len(a.group) > 1 and mass(a.found, a.group) >= SURE,
+        lambda a: replace(
+            a.says("class", "these look alike in this plan", a.group, mass(a.found, a.group), (a.group,)),
+            sets=(a.group,),
+        ),
+        "SURE, NEAR, ALIKE",
+        "DIAGNOSIS 2.7: distance below 3 sigma",
+    ),
+    Rule(
+        "sure with its pairs",
+        lambda a: mass(a.found, a.group) >= SURE,
+        lambda a: a.names(a.group, mass(a.found, a.group)),
+        "SURE",
+        "declared",
+    ),
+    Rule(
+        "a few are left",
+        lambda a: bool(a.few),
+        lambda a: a.says(
+            "class",
+            "the readings leave these open",
+            a.few,
+            mass(a.found, a.few),
+            (a.group,) if len(a.group) > 1 else (),
+        ),
+        "SURE, MOST",
+        "declared",
+    ),
+    Rule(
+        "many are left",
+        lambda a: True,
+        lambda a: a.says(
+            "insufficient",
+            "several explanations are left that are not alike",
+            classes=(a.group,) if len(a.group) > 1 else (),
+        ),
+        "",
+        "the rest",
+    ),
+)
