@@ -156,7 +156,8 @@ def files() -> str:
         "",
         "Units stand in the key names. An unknown key is refused with a hint, and all faults of a file come at once. "
         "`(assumed)`: taken when the file says nothing of hub, chord, section or air, with the range that then counts "
-        "as an uncertainty; `sweep --details` says what each does to the thrust. Fans have ranges of their own; the chord is that of 10 in.",
+        "as an uncertainty; `sweep --details` says what each does to the thrust. Fans have ranges of "
+        "their own; the chord is that of 10 in.",
         "",
     ]
     for name, (model, words) in FILES.items():

@@ -78,9 +78,9 @@ def label_chord(diameter_m: float) -> Unknown:
     low, high = _CHORD_LAW
     far = math.exp(math.sqrt(3.0) * chord_sd(diameter_m))
     chord = min(max(CHORD * (diameter_m / INCH / 10.0) ** CHORD_EXPONENT, low), high)
-    ends = (float(f"{value:.2g}") for value in (max(chord / far, low), min(chord * far, high)))
+    least, most = (float(f"{value:.2g}") for value in (max(chord / far, low), min(chord * far, high)))
     why = "chord not known, law apc_like; 87 measured propellers of 2.2 to 19 in. Measure it: nothing narrows more"
-    return Unknown("blade.max_chord_over_R", float(f"{chord:.3g}"), *ends, why)
+    return Unknown("blade.max_chord_over_R", float(f"{chord:.3g}"), least, most, why)
 
 
 def _diameter_m(rotor: Any) -> float:
@@ -120,7 +120,7 @@ def completed(document: Mapping[str, Any]) -> dict[str, Any]:
         unknowns.append(AIR)
     if not isinstance(declared, list):
         return made
-    named = {item.get("key"): item for item in declared if isinstance(item, dict)}
+    named = {str(item.get("key")): item for item in declared if isinstance(item, dict)}
     for unknown in unknowns:
         home, _, name = unknown.key.rpartition(".")
         table = made
