@@ -277,7 +277,7 @@ axis and the torque lacks cl sin(phi). The run is in [reports/disk](../reports/d
 {chr(10).join(kinds["blade"])}
 
 The error is that of the file read back and solved by this project. C81 is exact at its operating point and holds no
-Reynolds number beyond it. `python -m bemt stations FILE` makes a case of somebody's XROTOR, QPROP or DFDC file.
+Reynolds number beyond it. `python -m bemt stations FILE` makes a case of a file of XROTOR, QPROP, DFDC or AeroDyn.
 
 ## Solids
 

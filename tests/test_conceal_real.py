@@ -41,7 +41,7 @@ def test_items_are_sound_and_say_nothing_of_their_cause(drawn: list[Item], tmp_p
             (folder / name).write_text(text, encoding="utf-8")
         case = load_case(folder / "case.toml")
         case.rotor()
-        channels = import_file(str(folder / "recording.csv")).channels
+        channels = import_file(str(folder / "recording.csv")).values
         assert {"thrust_N"} <= set(channels) or {"CT", "CP"} <= set(channels)
         words = "".join(text for text in item.files.values())
         assert not [c for c in item.entry["causes"] if c in words and c not in case.get("model.effects_off")]

@@ -57,8 +57,8 @@ def test_items_are_sound_and_say_nothing_of_their_cause(sealed: tuple[Path, str]
         case = load_case(folder / "case.toml")
         case.rotor()
         imported = import_file(str(folder / "recording.csv"))
-        assert {"thrust_N", "torque_Nm"} <= set(imported.channels)
-        assert np.all(np.isfinite(imported.channels["thrust_N"].values))
+        assert {"thrust_N", "torque_Nm"} <= set(imported.values)
+        assert np.all(np.isfinite(imported["thrust_N"]))
         words = "".join(p.read_text(encoding="utf-8") for p in folder.iterdir())
         told = [c for c in entry["causes"] if c in words and c not in case.get("model.effects_off")]
         assert not told

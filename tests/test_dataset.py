@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -149,6 +150,21 @@ def test_rows_are_json_and_nan_becomes_null() -> None:
 def test_pickles_for_worker_processes() -> None:
     s = pickle.loads(pickle.dumps(stand(u={"thrust_N": 0.1}, provenance={"file": "f"}, labels=("a", "b"))))
     assert s["rpm"].tolist() == [3000.0, 6000.0] and s.provenance["file"] == "f" and s.labels == ("a", "b")
+
+
+def test_nobody_can_write_to_a_dataset() -> None:
+    owned, free = np.array([1.0, 2.0]), np.array([3.0, 4.0])
+    owned.setflags(write=False)
+    view = free.view()
+    view.setflags(write=False)
+    spread, _ = np.broadcast_arrays(free, np.zeros((2, 2)))
+    d = Dataset("bench", "s", {"rpm": owned, "J": view, "CT": spread[0], "CP": np.broadcast_to(free[0], 2)})
+    again = replace(d, name="t")
+    free[:] = 0.0
+    assert [d[k].tolist() for k in ("J", "CT", "CP")] == [[3.0, 4.0], [3.0, 4.0], [3.0, 3.0]]
+    assert d["rpm"] is owned and all(again[k] is d[k] and again.u[k] is d.u[k] for k in d.values)  # and copies nothing
+    with pytest.raises(ValueError, match="read-only"):
+        d["J"][0] = 1.0
 
 
 def test_tables_go_out_and_come_back_the_same() -> None:

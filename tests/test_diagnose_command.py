@@ -155,6 +155,18 @@ def test_loads_beside_coefficients_are_used_under_any_of_their_names(tmp_path: P
     assert any("CT: thrust_N is used" in note for note in made.notes)
 
 
+@pytest.mark.parametrize("column, told", [("rpm", 7000.0), ("airspeed_m_s", 3.0)])
+def test_a_speed_that_a_table_lacks_is_as_told(tmp_path: Path, column: str, told: float) -> None:
+    has = LOADS | {"airspeed_m_s": np.full(RPM.size, 6.0)}
+    bare = {k: v for k, v in has.items() if k != column}
+    options = {"rpm" if column == "rpm" else "airspeed_m_s": told}
+    made = load(_table(tmp_path / "bare.csv", bare), case(), **options)
+    assert np.all((made.rpm if column == "rpm" else made.V) == told)
+    own = load(_table(tmp_path / "own.csv", has), case(), **options)
+    assert not np.any((own.rpm if column == "rpm" else own.V) == told)  # the file knows better
+    assert any("not as told" in note for note in own.notes)
+
+
 def test_humid_air_is_thinner_than_dry(tmp_path: Path) -> None:
     air = {"temperature_K": 311.15, "pressure_Pa": 101325.0}
     files = [_table(tmp_path / f"{h}.csv", LOADS | air | {"humidity_pct": h}) for h in (0, 95)]

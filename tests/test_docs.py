@@ -32,7 +32,7 @@ PACKAGES = ("bemt", "geometry")
 # What users call and plug-ins implement: here every parameter is documented. Elsewhere one line will do, and what a
 # docstring does say must be right.
 FACE = (
-    "bemt|bemt.library.answers|bemt.library.rotors|bemt.dataset|bemt.effects.base|bemt.readers|bemt.exports"
+    "bemt|bemt.library.answers|bemt.library.rotors|bemt.dataset.points|bemt.effects.base|bemt.readers|bemt.exports"
     "|bemt.base.errors"
 )
 # Types of numbers that have a dimension: float, array_like, (N,) float, tuple of float; not counts, masks or records.
@@ -136,7 +136,7 @@ def test_docstrings_agree_with_the_code_and_name_units(module: str) -> None:
     assert not faults, "\n".join(faults)
 
 
-@pytest.mark.parametrize("module", ["bemt.library.answers", "bemt.library.rotors", "bemt.dataset"])
+@pytest.mark.parametrize("module", ["bemt.library.answers", "bemt.library.rotors", "bemt.dataset.points"])
 def test_everything_of_the_face_has_an_example_that_runs(module: str) -> None:
     """Its own, or a line of its class's; pytest runs them."""
     without = []

@@ -318,6 +318,19 @@ def test_c81_holds_the_polars_at_the_operating_point(job: Job, tmp_path: Path) -
     assert got.torque_Nm / scale == pytest.approx(want.torque_Nm / scale, abs=1e-6)
 
 
+def test_a_fan_that_dfdc_holds_comes_back_with_its_duct(fan: Job, tmp_path: Path) -> None:
+    target, rpm = exports()["dfdc"], fan.loading.rpm
+    (tmp_path / "first").mkdir()
+    held = target.read_back(fan, target.write(fan), tmp_path / "first")  # type: ignore[attr-defined]
+    assert held.duct() is not None
+    for k, V in enumerate((0.0, 30.0)):
+        (tmp_path / str(k)).mkdir()
+        got, want = _again("dfdc", held, tmp_path / str(k), rpm, V)
+        scale = 1.225 * (rpm / 60.0) ** 2 * fan.loading.R**4 * 16.0
+        assert got.thrust_N / scale == pytest.approx(want.thrust_N / scale, abs=1e-6)
+        assert got.torque_Nm / scale == pytest.approx(want.torque_Nm / scale, abs=1e-6)
+
+
 def test_dfdc_comes_back_within_its_stated_error(fan: Job) -> None:
     stated = entry(exports()["dfdc"], fan, written("dfdc", fan))["fit_error_pct"]
     assert stated["thrust"]["at_point"] < 10.0 and stated["torque"]["at_point"] < 10.0

@@ -30,7 +30,7 @@ def _solved(ready: Model, rpm: float, V: float, air: object, stations: object) -
 def test_derivatives_are_those_of_whole_solves(project: Path, name: str, rpm: float, V: float) -> None:
     case = load_case(project / f"cases/{name}/case.toml")
     ready, air = prepare_case(case), case.air()
-    found: Gradient = ready.gradient(rpm, V, air)
+    found: Gradient = gradient(ready, ready.effects, rpm, V, air)
     s = found.stations
     assert _solved(ready, rpm, V, air, s) == pytest.approx([found.thrust_N, found.torque_Nm], rel=1e-12)
     for key in ("chord", "beta"):

@@ -125,11 +125,10 @@ def test_sign_and_sector_are_applied_only_where_told(put: Callable[..., Path]) -
     with pytest.raises(InputError, match="names of channels"):
         import_file(path, choice=Choice(sector=4, loads=("thrust",)))
     record = import_file(path, choice=Choice(PERIOD, sign=-1, sector=4, loads=("torque",)))
-    assert record.channels["torque"].mean == pytest.approx(0.8) and record.channels["volume"].mean == pytest.approx(
-        0.25
-    )
-    assert record.channels["torque"].averaged_over.endswith(", times -4")
-    assert any("holds only for axisymmetric flow" in w for w in record.warnings)
+    means = record.provenance["means"]
+    assert (means["torque"].value, means["volume"].value) == pytest.approx((0.8, 0.25))
+    assert means["torque"].over.endswith(", times -4")
+    assert any("holds only for axisymmetric flow" in w for w in record.notes)
 
 
 def report() -> str:
@@ -143,10 +142,10 @@ def report() -> str:
 def test_zones_are_added_up_only_when_named(put: Callable[..., Path]) -> None:
     path = put("forces", report())
     plain = import_file(path)
-    assert not any("+" in name for name in plain.channels)
+    assert not any("+" in name for name in plain.values)
     record = import_file(path, choice=Choice(sign=-1, zones=("blade", "hub")))
-    assert record.channels["force_total_N along (1 0 0) (blade+hub)"].mean == 9.5
-    assert record.channels["force_total_N along (1 0 0) (duct)"].mean == 4.25
+    assert record.provenance["means"]["force_total_N along (1 0 0) (blade+hub)"].value == 9.5
+    assert record.provenance["means"]["force_total_N along (1 0 0) (duct)"].value == 4.25
     with pytest.raises(InputError, match="Zones: blade, hub, duct, Net"):
         import_file(path, choice=Choice(zones=("rotor",)))
     with pytest.raises(InputError, match="Net holds them all"):
@@ -210,8 +209,15 @@ def test_means_are_over_time_when_the_step_changes(put: Callable[..., Path]) -> 
     text = '"t"\n"x etc.."\n("Time Step" "q" "flow-time")\n'
     text += "".join(f"{k} {1 if t <= 2 + 1e-9 else 3} {t:.6f}\n" for k, t in enumerate(times))
     record = import_file(put("t.out", text), choice=Choice(1.0, 2))
-    assert record.channels["q"].mean == pytest.approx(2.0)
-    assert any("means of single revolutions differ" in w for w in record.warnings)
+    assert record.provenance["means"]["q"].value == pytest.approx(2.0)
+    assert any("means of single revolutions differ" in w for w in record.notes)
+
+
+def test_a_table_with_a_column_of_time_is_averaged_over_revolutions(put: Callable[..., Path]) -> None:
+    t = 0.001 * np.arange(1, 401)
+    rows = "".join(f"{x:.3f},{2.0 + np.sin(2.0 * np.pi * x / 0.05):.9f}\n" for x in t)
+    mean = import_file(put("t.csv", "time_s,force_N\n" + rows), choice=Choice(0.05, 2)).provenance["means"]["force_N"]
+    assert mean.value == pytest.approx(2.0) and mean.over.startswith("last 2 revolutions")
 
 
 def test_the_published_screw(shared_data: Path, capsys: pytest.CaptureFixture[str]) -> None:

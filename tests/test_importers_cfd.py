@@ -14,8 +14,8 @@ import pytest
 
 from bemt import readers as importers
 from bemt.base.errors import InputError
+from bemt.dataset import Dataset
 from bemt.readers import _cfd
-from bemt.readers._imported import Imported
 from bemt.recordings.load import document, import_file
 
 RNG = np.random.default_rng(20)
@@ -137,7 +137,7 @@ def test_every_format_is_found_by_content_whatever_its_name_encoding_or_packing(
 ) -> None:
     text = SAMPLES[form]()
     plain = importers.read(put(text, "a.xyz"))
-    assert plain.format == form.split(":")[0]
+    assert plain.provenance["format"] == form.split(":")[0]
     variants = {
         "bom": b"\xef\xbb\xbf" + text.encode(), "utf16": text.encode("utf-16"), "gzip": gzip.compress(text.encode()),
         "crlf": text.replace("\r\n", "\n").replace("\n", "\r\n").encode(),
@@ -145,11 +145,11 @@ def test_every_format_is_found_by_content_whatever_its_name_encoding_or_packing(
     }  # fmt: skip
     for name, data in variants.items():
         path = put(data, name)
-        assert importers.detect(path) == plain.format, name
+        assert importers.detect(path) == plain.provenance["format"], name
         other = importers.read(path)
-        assert list(other.channels) == list(plain.channels) and other.rows == plain.rows, name
-        for key, channel in plain.channels.items():
-            np.testing.assert_array_equal(channel.values, other.channels[key].values, err_msg=name)
+        assert list(other.values) == list(plain.values) and len(other) == len(plain), name
+        for key, values in plain.values.items():
+            np.testing.assert_array_equal(values, other[key], err_msg=name)
 
 
 def test_columns_go_by_the_third_header_line(put: Callable[..., Path]) -> None:
@@ -158,10 +158,12 @@ def test_columns_go_by_the_third_header_line(put: Callable[..., Path]) -> None:
     text = '"t"\n"Time Step" "thrust etc.."\n(' + " ".join(f'"{n}"' for n in names) + ")\n"
     text += "".join(" ".join(f"{v:.9g}" for v in row) + "\n" for row in data)
     record = import_file(put(text))
-    assert record.channels["torque"].mean == pytest.approx(0.3, abs=1e-3)
-    assert record.channels["thrust(blade)"].mean == pytest.approx(-12.0, abs=1e-2)  # the sign is that of the file
-    assert record.channels["time_s"].unit == "s" and record.channels["time_s"].mean is None
-    assert record.channels["torque"].unit == ""  # stated nowhere, so none
+    assert record.provenance["means"]["torque"].value == pytest.approx(0.3, abs=1e-3)
+    assert record.provenance["means"]["thrust(blade)"].value == pytest.approx(
+        -12.0, abs=1e-2
+    )  # the sign is that of the file
+    assert record.unit("time_s") == "s" and "time_s" not in record.provenance["means"]
+    assert record.unit("torque") == ""  # stated nowhere, so none
 
 
 def test_a_report_file_without_its_third_line_is_refused(put: Callable[..., Path]) -> None:
@@ -174,7 +176,7 @@ def test_a_report_file_without_its_third_line_is_refused(put: Callable[..., Path
 
 def test_a_report_file_without_a_value_column_says_so(put: Callable[..., Path]) -> None:
     text = '"t"\n"Time Step"\n("Time Step" "flow-time")\n' + "".join(f"{k} {k * 0.1:.3f}\n" for k in range(5))
-    assert "the file has no column of values, only its clock" in import_file(put(text)).warnings
+    assert "the file has no column of values, only its clock" in import_file(put(text)).notes
 
 
 @pytest.mark.parametrize(("where", "kept"), [("rows", None), ("header", None), ("both", "torque")])
@@ -195,29 +197,29 @@ def test_a_dropped_column_never_shifts_the_others(
         return
     record = importers.read(put(text))
     for name, low, high in (("thrust", -12.1, -11.9), ("torque", 0.29, 0.31)):
-        if name in record.channels:
-            assert low < record.channels[name].mean < high
+        if name in record.values:
+            assert low < record.provenance["means"][name].value < high
 
 
 def test_number_oddities(put: Callable[..., Path]) -> None:
     cells = ["1e-21", "-0", "1.5D+01", "NaN", "-1.#IND", "1e999", "20.24100076", "0.3"]
     text = '"t"\n"i" "q"\n("Iteration" "q")\n' + "".join(f"{k + 20241} {c}\n" for k, c in enumerate(cells))
     record = importers.read(put(text))
-    np.testing.assert_array_equal(record.channels["q"].values, [1e-21, 0, 15, *[np.nan] * 3, 20.24100076, 0.3])
-    assert record.channels["q"].mean is None
-    assert "q: 3 of 8 values are not finite numbers in the file" in record.warnings
+    np.testing.assert_array_equal(record["q"], [1e-21, 0, 15, *[np.nan] * 3, 20.24100076, 0.3])
+    assert "means" not in record.provenance
+    assert "q: 3 of 8 values are not finite numbers in the file" in record.notes
     commas = put('"t"\n"i" "q"\n("Iteration" "q")\n1 0,25\n2 0,75\n')
     record = importers.read(commas)
-    assert record.channels["q"].mean == 0.5 and "decimal commas read as decimal points" in record.warnings
+    assert record.provenance["means"]["q"].value == 0.5 and "decimal commas read as decimal points" in record.notes
 
 
 def test_a_cut_last_row_is_left_out_with_a_warning(put: Callable[..., Path]) -> None:
     text = report()
     for cut in range(2, 24):
         record = importers.read(put(text[:-cut]))
-        assert record.rows in (N - 1, N - 2)
-        assert record.rows == N - 2 or any("cut" in w for w in record.warnings)
-        assert set(record.channels["torque"].values) <= set(importers.read(put(text)).channels["torque"].values)
+        assert len(record) in (N - 1, N - 2)
+        assert len(record) == N - 2 or any("cut" in w for w in record.notes)
+        assert set(record["torque"]) <= set(importers.read(put(text))["torque"])
 
 
 def test_restarts_inside_a_file(put: Callable[..., Path]) -> None:
@@ -225,63 +227,65 @@ def test_restarts_inside_a_file(put: Callable[..., Path]) -> None:
     head, rows = lines[:3], lines[3:]
     later = [row.replace(" 0.3", " 0.4").replace(" 0.29", " 0.39") for row in rows[20:30]]
     record = importers.read(put("\n".join([*head, *rows, head[2], *later]) + "\n"))
-    assert record.rows == 30  # rows 31..40 belong to the branch that was given up
-    assert np.all(record.channels["torque"].values[20:] > 0.35) and np.all(record.channels["torque"].values[:20] < 0.35)
-    assert any("header repeated" in w for w in record.warnings)
-    assert any("goes back" in w for w in record.warnings)
+    assert len(record) == 30  # rows 31..40 belong to the branch that was given up
+    assert np.all(record["torque"][20:] > 0.35) and np.all(record["torque"][:20] < 0.35)
+    assert any("header repeated" in w for w in record.notes)
+    assert any("goes back" in w for w in record.notes)
     twice = importers.read(
         put("\n".join([*head, *rows[:5], later[0].replace("121", "105").replace("0.021", "0.005"), *rows[5:]]) + "\n")
     )
-    assert twice.rows == N and twice.channels["torque"].values[4] > 0.35  # the last row of a step wins
+    assert len(twice) == N and twice["torque"][4] > 0.35  # the last row of a step wins
 
 
 def test_zones_stay_apart(put: Callable[..., Path]) -> None:
     record = importers.read(put(forces()))
-    get = {name: channel.mean for name, channel in record.channels.items()}
+    get = {name: mean.value for name, mean in record.provenance["means"].items()}
     assert get["force_total_x_N(blade:1)"] == -10.75 and get["force_pressure_y_N(hub)"] == 2.5
     assert get["force_total_N along (1 0 0) (Net)"] == -14.1875 and get["force_coefficient_viscous_x(duct)"] == -0.03125
-    assert record.channels["force_total_x_N(hub)"].unit == "N"
+    assert record.unit("force_total_x_N(hub)") == "N"
     wrong = forces().replace("(-10.75 ", "(-10.85 ", 1)
-    assert any("its parts add up to -10.75" in w for w in importers.read(put(wrong)).warnings)
+    assert any("its parts add up to -10.75" in w for w in importers.read(put(wrong)).notes)
     pounds = importers.read(put(forces("lbf")))
-    assert pounds.channels["force_total_x(hub)"].unit == "lbf"  # shown as it is, never called newtons
+    assert pounds.unit("force_total_x(hub)") == "lbf"  # shown as it is, never called newtons
 
 
 def test_transcripts_give_what_was_computed(put: Callable[..., Path]) -> None:
     record = importers.read(put(transcript()))
-    assert record.channels["moment_Nm(blade)"].mean == -0.18741116 and record.channels["moment_Nm(blade)"].unit == "Nm"
-    assert record.channels["continuity"].mean == 1.8226e-04
-    np.testing.assert_allclose(record.channels["time_s"].values, [0.5, 0.501, 0.502])
+    assert (
+        record.provenance["means"]["moment_Nm(blade)"].value == -0.18741116 and record.unit("moment_Nm(blade)") == "Nm"
+    )
+    assert record.provenance["means"]["continuity"].value == 1.8226e-04
+    np.testing.assert_allclose(record["time_s"], [0.5, 0.501, 0.502])
     assert record.provenance["cells"] == "1061927" and record.provenance["solver"] == "ANSYS Fluent 2025 R2"
 
 
 def test_openfoam_layouts_agree(put: Callable[..., Path]) -> None:
     new, old = importers.read(put(foam_new())), importers.read(put(foam_old()))
     total = [f"force_total_{a}_N" for a in "xyz"]
-    assert set(total) <= set(new.channels) & set(old.channels)
-    np.testing.assert_allclose(old.channels["force_total_x_N"].values, 20 + np.arange(1, 14))
-    np.testing.assert_allclose(old.channels["moment_total_z_Nm"].values, 60.75 + np.arange(1, 14))
+    assert set(total) <= set(new.values) & set(old.values)
+    np.testing.assert_allclose(old["force_total_x_N"], 20 + np.arange(1, 14))
+    np.testing.assert_allclose(old["moment_total_z_Nm"], 60.75 + np.arange(1, 14))
     swapped = foam_new().replace("total_x total_y", "total_y total_x")
-    assert any("is not the sum of its parts" in w for w in importers.read(put(swapped)).warnings)
+    assert any("is not the sum of its parts" in w for w in importers.read(put(swapped)).notes)
     plus = "# y+ ()\n# Time \tpatch \tmin \tmax \taverage\n10\tblade\t5.5\t90\t30\n10\thub\t1\t2\t1.5\n20\tblade\t5\t91\t31\n"
-    assert importers.read(put(plus)).channels["y_plus_average(blade)"].mean == 31
+    assert importers.read(put(plus)).provenance["means"]["y_plus_average(blade)"].value == 31
 
 
 def test_points_have_no_mean(put: Callable[..., Path]) -> None:
     for make in (post, ascii_nodes, xy):
-        assert all(channel.mean is None for channel in importers.read(put(make())).channels.values())
+        assert "means" not in importers.read(put(make())).provenance
     record = importers.read(put(post()))
-    assert [(k, c.unit) for k, c in record.channels.items()] == [
+    assert [(k, record.unit(k)) for k in record.values] == [
         ("x_m", "m"), ("y_m", "m"), ("wall_shear_Pa", "Pa"), ("velocity_u_m_s", "m_s")]  # fmt: skip
     clash = post().replace("0.5e-02\n", "0.7e-02\n", 1)
-    assert "x_m#2" in importers.read(put(clash)).channels
+    assert "x_m#2" in importers.read(put(clash)).values
 
 
 def test_dual_time_keeps_the_last_inner_iteration(put: Callable[..., Path]) -> None:
     text = '"Time_Iter","Inner_Iter","Cur_Time","CL"\n'
     text += "".join(f"{t}, {i}, {0.1 * (t + 1):.3f}, {t + i / 10}\n" for t in range(4) for i in range(3))
     record = importers.read(put(text))
-    np.testing.assert_allclose(record.channels["CL"].values, [0.2, 1.2, 2.2, 3.2])
+    np.testing.assert_allclose(record["CL"], [0.2, 1.2, 2.2, 3.2])
     assert record.provenance["clock"] == "time"
 
 
@@ -292,8 +296,10 @@ def test_other_dialects(put: Callable[..., Path]) -> None:
         put('TITLE = "SU2"\nVARIABLES = "Iteration","CL","CD","Time(min)"\nZONE T= "history"\n' + rows)
     )
     for record in (old, tecplot):
-        assert record.format == "su2_history" and record.channels["CD"].mean == pytest.approx(0.02)
-        assert record.channels["Time(min)"].mean is None  # wall time is no result
+        assert record.provenance["format"] == "su2_history" and record.provenance["means"]["CD"].value == pytest.approx(
+            0.02
+        )
+        assert "Time(min)" not in record.provenance["means"]  # wall time is no result
     names = "(total_x total_y total_z)\t(pressure_x pressure_y pressure_z)\t(viscous_x viscous_y viscous_z)"
     foam = (
         "# Moment\n# Time\t"
@@ -301,21 +307,21 @@ def test_other_dialects(put: Callable[..., Path]) -> None:
         + "\n"
         + "".join(f"{0.1 * k:g}\t(1.5 2 3)\t(1 1 1)\t(0.5 1 2)\n" for k in range(1, 9))
     )
-    assert importers.read(put(foam)).channels["moment_viscous_z_Nm"].mean == 2.0
+    assert importers.read(put(foam)).provenance["means"]["moment_viscous_z_Nm"].value == 2.0
     bare = "# Forces\n# CofR : (0 0 0)\n# Time  forces(pressure viscous)  moments(pressure viscous)\n"
     bare += "".join(f"{0.1 * k:g} ((1 0 0) (0.5 0 0)) ((0 0 1) (0 0 {k}))\n" for k in range(1, 9))
-    np.testing.assert_allclose(importers.read(put(bare)).channels["moment_total_z_Nm"].values, np.arange(2, 10))
+    np.testing.assert_allclose(importers.read(put(bare))["moment_total_z_Nm"], np.arange(2, 10))
     several = '"a"\n"Iteration" "a etc.."\n("Iteration" "a" "flow-time")\n'
     several += "".join(f"{k} {k} {0.01 * ((k - 1) // 5 + 1):.4f}\n" for k in range(1, 101))
     steps = importers.read(put(several))
-    assert steps.rows == 20 and steps.channels["a"].values[0] == 5  # the last iteration of each time step
+    assert len(steps) == 20 and steps["a"][0] == 5  # the last iteration of each time step
     still = importers.read(
         put('"a"\n"i"\n("Iteration" "a" "flow-time")\n' + "".join(f"{k} 7 0\n" for k in range(1, 51)))
     )
-    assert still.provenance["clock"] == "iteration" and still.rows == 50
+    assert still.provenance["clock"] == "iteration" and len(still) == 50
     probes = "# Probe 0 (0.05 0 0)\n# Probe 1 (0.2 0 0)\n#       Probe   0   1\n#        Time\n"
     probes += "".join(f"{0.1 * k:g}  (0 {k} 0)  (1 2 3)\n" for k in range(1, 9))
-    np.testing.assert_allclose(importers.read(put(probes)).channels["value_y(probe 0)"].values, np.arange(1, 9))
+    np.testing.assert_allclose(importers.read(put(probes))["value_y(probe 0)"], np.arange(1, 9))
 
 
 # --- damage ----------------------------------------------------------------------------------------------------------
@@ -395,7 +401,7 @@ EXACT = {"cut", "line", "column", "some", "zip", "encode"}
 """Damage that changes no digits: what comes out under a name must be values of that name."""
 
 
-def check(form: str, raw: bytes, kind: str, path: Path, truth: dict[str, Imported]) -> str:
+def check(form: str, raw: bytes, kind: str, path: Path, truth: dict[str, Dataset]) -> str:
     path.write_bytes(raw)
     (file,) = document([path], choice=None)["files"]
     if file["error"] is not None:
@@ -407,19 +413,19 @@ def check(form: str, raw: bytes, kind: str, path: Path, truth: dict[str, Importe
         return "other"
     record = import_file(path)
     known = truth[form]
-    spoken = set(record.warnings) - set(known.warnings)
+    spoken = set(record.notes) - set(known.notes)
     if kind in EXACT and (form, kind) != ("fluent_xy", "line"):  # a point of one curve may stand in another
-        for name, channel in record.channels.items():
-            if name not in known.channels:
+        for name, values in record.values.items():
+            if name not in known.values:
                 assert spoken or "°" in name, (name, kind)
                 continue
-            strange = set(channel.values[np.isfinite(channel.values)]) - set(known.channels[name].values)
+            strange = set(values[np.isfinite(values)]) - set(known[name])
             assert not strange or any("may be cut" in w for w in spoken), (
                 form,
                 kind,
                 name,
                 sorted(strange)[:5],
-                record.warnings,
+                record.notes,
             )
     return "read"
 

@@ -14,10 +14,11 @@ import pytest
 from bemt import readers as importers
 from bemt.base import units
 from bemt.base.errors import InputError
-from bemt.readers import generic_csv, jmajew, pybemt_ini, rcbenchmark
+from bemt.dataset import Dataset
+from bemt.readers import _large, generic_csv, jmajew, pybemt_ini, rcbenchmark
 from bemt.readers._headings import heading
-from bemt.readers._imported import Imported
-from bemt.readers._recording import NO_VALUE
+from bemt.readers._split import NO_VALUE
+from bemt.recordings.reduce import reduce, reduction
 
 RC_HEAD = (
     "Time (s),ESC signal (µs),Servo 1 (µs),AccX (g),Torque (N·m),Thrust (gf),Voltage (V),Current (A),"
@@ -105,8 +106,8 @@ def write(tmp_path: Path) -> Write:
     return put
 
 
-def said(imported: Imported, words: str) -> list[str]:
-    return [text for text in imported.warnings if words in text]
+def said(imported: Dataset, words: str) -> list[str]:
+    return [text for text in imported.notes if words in text]
 
 
 # ---------------------------------------------------------------- headings and units
@@ -135,19 +136,19 @@ def test_a_heading_says_name_and_unit(text: str, name: str, unit: str) -> None:
     assert (got.name, got.unit_name) == (name, unit)
 
 
-@pytest.mark.parametrize("text", ["Thrust (kg)", "thrust_g", "Thrust (lb)", "Torque (kg·cm)", "T [G]"])
+@pytest.mark.parametrize("text", ["Thrust (kg)", "load_g", "Thrust (lb)", "Torque (kg·cm)", "T [G]"])
 def test_a_mass_is_no_force(text: str, write: Write) -> None:
     got = importers.read(write(f"Time (s),{text},RPM\n" + "".join(f"{k},{k + 1},{3000 + k}\n" for k in range(5))))
-    channel = next(c for name, c in got.channels.items() if name not in ("time_s", "rpm"))
-    assert channel.unit == ""
-    assert np.array_equal(channel.values, np.arange(1.0, 6.0))  # as written: not converted
+    name = next(name for name in got.values if name not in ("time_s", "rpm"))
+    assert got.unit(name) == ""
+    assert np.array_equal(got[name], np.arange(1.0, 6.0))  # as written: not converted
     assert said(got, "no unit known, none assumed") and said(got, "f")
 
 
 def test_the_same_run_in_any_unit_is_the_same_thrust(write: Write) -> None:
     ways = [importers.read(write(rc_text(force=unit), f"{unit}.csv")) for unit in ("gf", "N", "kgf", "lbf", "ozf")]
     for way in ways[1:]:
-        assert np.allclose(way.channels["thrust_N"].values, ways[0].channels["thrust_N"].values, rtol=1e-9)
+        assert np.allclose(way["thrust_N"], ways[0]["thrust_N"], rtol=1e-9)
 
 
 def test_one_quantity_in_two_units_that_disagree_is_reported(write: Write) -> None:
@@ -187,23 +188,23 @@ def test_a_binary_file_is_refused_as_such(write: Write) -> None:
 
 def test_a_step_test_is_read_whole(write: Write) -> None:
     got = rcbenchmark.read(write(rc_text()))
-    assert (got.format, got.kind, got.rows) == ("rcbenchmark", "bench", 30)
+    assert (got.provenance["format"], got.kind, len(got)) == ("rcbenchmark", "bench", 30)
     assert got.provenance["mode"] == "steps" and len(got.provenance["sha256"]) == 64
     rpm = 3000.0 + 400.0 * np.arange(30)
-    assert np.allclose(got.channels["thrust_N"].values, 4e-8 * rpm**2)
-    assert np.allclose(got.channels["pulse_width_s"].values, (1100 + 25 * np.arange(30)) * 1e-6)
+    assert np.allclose(got["thrust_N"], 4e-8 * rpm**2)
+    assert np.allclose(got["pulse_width_s"], (1100 + 25 * np.arange(30)) * 1e-6)
     assert got.lines == tuple(range(2, 32))
     assert said(got, "'Servo 1 (µs)'")  # an empty column is named
 
 
 def test_the_two_speeds_are_kept_apart(write: Write) -> None:
     got = rcbenchmark.read(write(rc_text(optical=0.0)))
-    assert "rpm" not in got.channels
+    assert "rpm" not in got.values
     assert said(got, "optical_rpm is 0 in every row") and said(got, "mechanical_power_W is torque times electrical_rpm")
-    assert np.all(got.channels["optical_rpm"].values == 0.0)
+    assert np.all(got["optical_rpm"] == 0.0)
     got = rcbenchmark.read(write(rc_text(optical=1 / 7), "poles.csv"))
     assert said(got, "electrical over optical speed: median 7") and said(got, "were 7 pole pairs left out?")
-    assert np.allclose(got.channels["electrical_rpm"].values, 7 * got.channels["optical_rpm"].values)
+    assert np.allclose(got["electrical_rpm"], 7 * got["optical_rpm"])
     assert not said(rcbenchmark.read(write(rc_text(optical=1.0), "same.csv")), "left out")
 
 
@@ -220,18 +221,18 @@ def test_rpm_zero_and_spikes_are_kept_and_flagged(write: Write) -> None:
     put(12, "0")
     put(20, "99999")
     got = rcbenchmark.read(write("\n".join(lines)))
-    assert got.rows == 30
+    assert len(got) == 30
     assert {k: f for k, f in enumerate(got.flags) if f} == {
         0: ("spike of electrical_rpm",), 12: ("electrical_rpm is 0 under thrust",), 20: ("spike of electrical_rpm",),
     }  # fmt: skip
-    assert got.channels["electrical_rpm"].values[[0, 12, 20]].tolist() == [66434.0, 0.0, 99999.0]
+    assert got["electrical_rpm"][[0, 12, 20]].tolist() == [66434.0, 0.0, 99999.0]
 
 
 def test_signs_and_backward_time_are_reported_not_repaired(write: Write) -> None:
     text = rc_text(torque=-1.0).replace("\n3.5,", "\n-0.2,")
     got = rcbenchmark.read(write(text))
-    assert said(got, "torque_Nm is mostly negative") and np.all(got.channels["torque_Nm"].values < 0)
-    assert got.flags[1] == ("time goes backwards",) and got.channels["time_s"].values[1] == -0.2
+    assert said(got, "torque_Nm is mostly negative") and np.all(got["torque_Nm"] < 0)
+    assert got.flags[1] == ("time goes backwards",) and got["time_s"][1] == -0.2
 
 
 def test_a_continuous_record_keeps_its_sparse_channels(write: Write) -> None:
@@ -242,9 +243,9 @@ def test_a_continuous_record_keeps_its_sparse_channels(write: Write) -> None:
             cells[4] = cells[5] = ""
             lines[k] = ",".join(cells)
     got = rcbenchmark.read(write("\n".join(lines)))
-    assert got.provenance["mode"] == "continuous" and got.rows == 200
-    assert np.count_nonzero(np.isfinite(got.channels["thrust_N"].values)) == 40
-    assert np.count_nonzero(np.isfinite(got.channels["electrical_rpm"].values)) == 200
+    assert got.provenance["mode"] == "continuous" and len(got) == 200
+    assert np.count_nonzero(np.isfinite(got["thrust_N"])) == 40
+    assert np.count_nonzero(np.isfinite(got["electrical_rpm"])) == 200
 
 
 # ---------------------------------------------------------------- thrust_tool
@@ -252,11 +253,11 @@ def test_a_continuous_record_keeps_its_sparse_channels(write: Write) -> None:
 
 def test_tables_carry_their_stated_errors(write: Write) -> None:
     got = jmajew.read(write(table_text(), "grp01__motor1_prop-9x7_4s_duct_table2.csv"))
-    assert got.rows == 9 and got.channels["thrust_err_N"].unit == "N"
-    assert np.allclose(got.channels["thrust_err_N"].values, 0.5 * units.KGF * 1e-3)
-    assert np.allclose(got.channels["torque_Nm"].values, 5e-11 * units.KGF * got.channels["rpm"].values ** 2, rtol=1e-5)
+    assert len(got) == 9 and got.unit("thrust_err_N") == "N"
+    assert np.allclose(got["thrust_err_N"], 0.5 * units.KGF * 1e-3)
+    assert np.allclose(got["torque_Nm"], 5e-11 * units.KGF * got["rpm"] ** 2, rtol=1e-5)
     assert got.provenance["propeller"] == "prop-9x7" and got.provenance["duct"] == "yes"
-    assert got.provenance["battery_cells"] == "4" and not got.warnings
+    assert got.provenance["battery_cells"] == "4" and not got.notes
 
 
 def test_units_that_the_table_contradicts_are_doubted(write: Write) -> None:
@@ -269,7 +270,7 @@ def test_units_that_the_table_contradicts_are_doubted(write: Write) -> None:
 def test_rpm_of_the_raw_record_is_traced_to_telemetry(write: Write) -> None:
     got = jmajew.read(write(raw_text()))
     assert got.provenance["form"] == "raw" and said(got, "over 7 pole pairs, not a sensor of its own")
-    assert got.channels["Strain_Gauge_Thrust"].unit == "" and got.channels["ESCT_RPM"].unit == ""
+    assert got.unit("Strain_Gauge_Thrust") == "" and got.unit("ESCT_RPM") == ""
     assert not said(jmajew.read(write(raw_text().replace(",600,", ",500,"), "b.csv")), "telemetry of")
 
 
@@ -279,22 +280,22 @@ def test_rpm_of_the_raw_record_is_traced_to_telemetry(write: Write) -> None:
 @pytest.mark.parametrize("mark", [",", ";", "\t", "|"])
 def test_any_delimiter_gives_the_same_table(mark: str, write: Write) -> None:
     got = importers.read(write(plain_text(mark)))
-    assert list(got.channels) == ["time_s", "thrust_N", "Q_Nm", "rpm", "omega"] and got.kind == "bench"
-    assert np.allclose(got.channels["thrust_N"].values, (50.0 + np.arange(12)) * units.KGF * 1e-3)
-    assert got.channels["omega"].unit == "" and said(got, "'omega'") and got.texts["note"] == ("ok",) * 12
+    assert list(got.values) == ["time_s", "thrust_N", "Q_Nm", "rpm", "omega"] and got.kind == "bench"
+    assert np.allclose(got["thrust_N"], (50.0 + np.arange(12)) * units.KGF * 1e-3)
+    assert got.unit("omega") == "" and said(got, "'omega'") and got.texts["note"] == ("ok",) * 12
 
 
 def test_a_table_without_headings_has_no_units(write: Write) -> None:
     got = importers.read(write(bare_text()))
-    assert got.rows == 10 and [c.unit for c in got.channels.values()] == [""] * 4
+    assert len(got) == 10 and [got.unit(k) for k in got.values] == [""] * 4
     assert said(got, "no heading line") and said(got, "no unit known, none assumed")
 
 
 def test_a_line_of_units_below_the_headings_counts(write: Write) -> None:
     rows = "".join(f"{k},{k},{2 * k},{300 + k}\n" for k in range(9))
     got = importers.read(write("Time,Thrust,Torque,Speed\n(s),(kgf),Nm,rad/s\n" + rows))
-    assert [c.unit for c in got.channels.values()] == ["s", "N", "Nm", "rad_s"] and got.rows == 9
-    assert np.allclose(got.channels["thrust_N"].values, units.KGF * np.arange(9)) and said(got, "line 2 holds units")
+    assert [got.unit(k) for k in got.values] == ["s", "N", "Nm", "rad_s"] and len(got) == 9
+    assert np.allclose(got["thrust_N"], units.KGF * np.arange(9)) and said(got, "line 2 holds units")
 
 
 def test_units_inside_cells_are_not_stripped(write: Write) -> None:
@@ -306,7 +307,7 @@ def test_decimal_commas_are_read_where_they_can_be_nothing_else(write: Write) ->
     points = importers.read(write(plain_text(";")))
     commas = importers.read(write(plain_text(";").replace(".", ",")))
     assert said(commas, "decimal commas read as decimal points") and not said(points, "decimal commas")
-    assert all(np.array_equal(commas.channels[k].values, c.values) for k, c in points.channels.items())
+    assert all(np.array_equal(commas[k], v) for k, v in points.values.items())
 
 
 def test_doubtful_commas_are_refused_with_a_hint(write: Write) -> None:
@@ -318,7 +319,7 @@ def test_doubtful_commas_are_refused_with_a_hint(write: Write) -> None:
 
 def test_a_bad_cell_is_named_and_kept_as_nan(write: Write) -> None:
     got = importers.read(write(plain_text(rows=40).replace("3050", "3O50")))
-    assert got.rows == 40 and np.isnan(got.channels["rpm"].values[5]) and got.flags[5] == ("rpm: no number",)
+    assert len(got) == 40 and np.isnan(got["rpm"][5]) and got.flags[5] == ("rpm: no number",)
     assert said(got, "'3O50' at 7:4")
 
 
@@ -333,8 +334,8 @@ def test_lines_of_another_length_are_all_refused(write: Write) -> None:
 
 def test_a_last_line_that_was_cut_is_kept_and_flagged(write: Write) -> None:
     got = importers.read(write(plain_text()[:-18]))
-    assert got.rows == 12 and got.flags[-1][0] == "line cut off at the end of the file"
-    assert np.isfinite(got.channels["time_s"].values[-1]) and np.isnan(got.channels["omega"].values[-1])
+    assert len(got) == 12 and got.flags[-1][0] == "line cut off at the end of the file"
+    assert np.isfinite(got["time_s"][-1]) and np.isnan(got["omega"][-1])
 
 
 # ---------------------------------------------------------------- pyBEMT
@@ -343,8 +344,9 @@ def test_a_last_line_that_was_cut_is_kept_and_flagged(write: Write) -> None:
 def test_an_ini_geometry_is_read_in_si(write: Write) -> None:
     got = importers.read(write(INI, "rotor.ini"))
     assert got.kind == "geometry" and got.texts["section"] == ("A", "A", "B")
-    assert np.allclose(got.channels["beta_rad"].values, np.radians([20.0, 12.0, 8.0]))
-    assert got.constants["diameter_m"] == 0.7 and got.constants["blades"] == 2 and got.constants["density_kg_m3"] == 1.2
+    assert np.allclose(got["beta_rad"], np.radians([20.0, 12.0, 8.0]))
+    told = got.provenance["constants"]
+    assert told["diameter_m"] == 0.7 and told["blades"] == 2 and told["density_kg_m3"] == 1.2
     assert said(got, "states no units")
 
 
@@ -373,7 +375,7 @@ def laws(rows: int = 6, slip: float = 1.0) -> str:
 
 def test_the_laws_of_drive_calculator_prove_their_units(write: Write) -> None:
     got = importers.read(write(laws()))
-    assert got.format == "drivecalc" and np.allclose(got.channels["diameter_m"].values, (8 + np.arange(6)) * 0.0254)
+    assert got.provenance["format"] == "drivecalc" and np.allclose(got["diameter_m"], (8 + np.arange(6)) * 0.0254)
     assert said(got, "thrust_law_N: 100.0 % of 6 rows agree") and not any(got.flags)
     got = importers.read(write(laws(slip=units.KGF), "slip.csv"))  # 10 kgf under the heading of 10 N
     assert said(got, "thrust_law_N: 0.0 % of 6 rows agree") and said(got, "its unit is in doubt")
@@ -433,7 +435,7 @@ def mutate(text: str, rng: random.Random) -> bytes:
     return raw
 
 
-def unexplained(imported: Imported, raw: bytes) -> list[str]:
+def unexplained(imported: Dataset, raw: bytes) -> list[str]:
     """What a table lost without a word: lines that are no row, and cells that are neither number, text nor flag."""
     try:
         text = raw.decode("utf-8-sig")
@@ -443,32 +445,30 @@ def unexplained(imported: Imported, raw: bytes) -> list[str]:
     used = [k for k, t in enumerate(lines, 1) if t.strip() and not t.lstrip().startswith(("#", "%"))]
     lost = []
     bare = [k for k in used if not lines[k - 1].strip(" \t;,|")]
-    if bare and not any(f"{len(bare)} lines of empty cells" in t for t in imported.warnings):
+    if bare and not any(f"{len(bare)} lines of empty cells" in t for t in imported.notes):
         lost.append("lines of empty cells")
     used = [k for k in used if k not in bare]
-    if any("lines above the headings" in t for t in imported.warnings):  # they have fewer cells than the rows
+    if any("lines above the headings" in t for t in imported.notes):  # they have fewer cells than the rows
         first = next(k for k in used if lines[k - 1].count(",") >= lines[imported.lines[0] - 1].count(","))
         used = [k for k in used if k >= first]
-    without_heading = any("no heading line" in t for t in imported.warnings)
+    without_heading = any("no heading line" in t for t in imported.notes)
     expected = used if without_heading else used[1:]
-    if any("holds units" in t for t in imported.warnings):
+    if any("holds units" in t for t in imported.notes):
         del expected[0]
     if list(imported.lines) != expected:
         lost.append(f"lines {expected} became rows {list(imported.lines)}")
     comments = sum(t.lstrip().startswith(("#", "%")) for t in lines)
-    if comments and not any(f"{comments} comment lines" in text for text in imported.warnings):
+    if comments and not any(f"{comments} comment lines" in text for text in imported.notes):
         lost.append("comments")
-    for name, channel in imported.channels.items():
-        if len(channel.values) != imported.rows:
-            lost.append(f"{name} has {len(channel.values)} values in {imported.rows} rows")
-        empty = np.isnan(channel.values)
+    for name, values in imported.values.items():
+        empty = np.isnan(values)
         for row in np.flatnonzero(empty):
             line = lines[imported.lines[row] - 1]
             cells = [] if '"' in line else line.split(",")
             junk = [c for c in cells if c.strip() and c.strip().lower() not in NO_VALUE and importers.number(c) is None]
             if junk and not imported.flags[row] and not imported.texts and "," in lines[0]:
                 lost.append(f"{name}: row {row} {junk}")
-    if not all(np.all(np.isfinite(c.values) | np.isnan(c.values)) for c in imported.channels.values()):
+    if any(np.any(np.isinf(v)) for v in imported.values.values()):
         lost.append("infinite values")
     return lost
 
@@ -488,17 +488,17 @@ def try_mutated(count: int, seed: int, folder: Path, bases: dict[str, str]) -> C
             outcome["refused"] += 1
             continue
         outcome[type(got).__name__] += 1
-        if isinstance(got, Imported) and got.format in ("rcbenchmark", "jmajew", "table", "drivecalc"):
+        if isinstance(got, Dataset) and got.provenance["format"] in ("rcbenchmark", "jmajew", "table", "drivecalc"):
             assert not unexplained(got, raw), (k, raw)
-            assert set(got.channels) | set(got.texts) and len(got.flags) == got.rows
-            outcome["warned"] += bool(got.warnings)
+            assert set(got.values) | set(got.texts) and len(got.flags) == len(got)
+            outcome["warned"] += bool(got.notes)
     return outcome
 
 
 def test_mutated_recordings_are_read_or_refused(tmp_path: Path) -> None:
     outcome = try_mutated(400, 4, tmp_path, BASES)
-    assert outcome["refused"] + outcome["Imported"] >= 390  # others look like UIUC tables after their injuries
-    assert min(outcome["refused"], outcome["Imported"]) > 50  # both ends are reached
+    assert outcome["refused"] + outcome["Dataset"] >= 390  # others look like UIUC tables after their injuries
+    assert min(outcome["refused"], outcome["Dataset"]) > 50  # both ends are reached
 
 
 @pytest.mark.slow
@@ -510,7 +510,7 @@ def test_ten_thousand_mutated_recordings(tmp_path: Path, shared_data: Path) -> N
             if file.is_file() and file.stat().st_size < 20_000 and b"\0" not in file.read_bytes():
                 real[f"{folder}-{file.name}"] = file.read_text(encoding="utf-8-sig")
     outcome = try_mutated(10_000, 5, tmp_path, real)
-    assert min(outcome["refused"], outcome["Imported"]) > 1000
+    assert min(outcome["refused"], outcome["Dataset"]) > 1000
 
 
 # ---------------------------------------------------------------- published recordings
@@ -539,18 +539,18 @@ def test_every_published_file_is_imported_or_refused_with_the_reason(folder: str
             refused += 1
             continue
         read += 1
-        if isinstance(got, Imported) and got.format in ("rcbenchmark", "jmajew", "table", "drivecalc"):
+        if isinstance(got, Dataset) and got.provenance["format"] in ("rcbenchmark", "jmajew", "table", "drivecalc"):
             assert not unexplained(got, file.read_bytes()), file
-            for name, channel in got.channels.items():
-                label = got.headings.get(name, "") or name.replace("_", " ")
-                assert channel.unit or said(got, "no unit known, none assumed"), (file, name, label)
+            for name in got.values:
+                label = got.provenance["headings"].get(name, "") or name.replace("_", " ")
+                assert got.unit(name) or said(got, "no unit known, none assumed"), (file, name, label)
     assert (read, refused) == COUNTS[folder]
 
 
 def test_the_published_logs_show_their_known_faults(shared_data: Path) -> None:
     logs = [importers.read(f) for f in sorted((shared_data / "rcbenchmark").glob("*.csv"))]
     assert all(said(log, "optical_rpm is 0 in every row") for log in logs)  # no probe was used at all
-    rpm = np.concatenate([log.channels["electrical_rpm"].values for log in logs])
+    rpm = np.concatenate([log["electrical_rpm"] for log in logs])
     flags = [f for log in logs for f in log.flags]
     assert {rpm[k] for k, f in enumerate(flags) if "spike of electrical_rpm" in f} >= {61525.0, 66434.0}
     assert all(any("is 0" in w for w in flags[k]) for k in np.flatnonzero(rpm == 0.0))
@@ -559,14 +559,15 @@ def test_the_published_logs_show_their_known_faults(shared_data: Path) -> None:
     assert [k for k, f in enumerate(raw.flags) if "spike of torque_Nm" in f] == [831]
 
 
-GRAMS = ["Thrust (g)", "thrust [g]", "Schub (g)", "Poussée (g)", "Empuje [g]", "Motor thrust (grams)"]
+GRAMS = ["Thrust (g)", "thrust_g", "Schub_g", "Thrust g", "thrust [g]", "Schub (g)", "Poussée (g)", "Empuje [g]",
+         "Motor thrust (grams)"]  # fmt: skip
 
 
 @pytest.mark.parametrize("text", GRAMS)
 def test_grams_of_thrust_are_gram_force_and_said_to_be(text: str, write: Write) -> None:
     got = importers.read(write(f"RPM,{text}\n" + "".join(f"{3000 + k},{k + 1}\n" for k in range(5))))
-    name = next(n for n in got.channels if n.endswith("thrust_N"))
-    assert np.allclose(got.channels[name].values, 9.80665e-3 * np.arange(1.0, 6.0))
+    name = next(n for n in got.values if n.endswith("thrust_N"))
+    assert np.allclose(got[name], 9.80665e-3 * np.arange(1.0, 6.0))
     assert said(got, "gram-force")
 
 
@@ -578,16 +579,16 @@ def test_grams_of_thrust_are_gram_force_and_said_to_be(text: str, write: Write) 
 )  # fmt: skip
 def test_stands_speak_german_french_and_spanish(heads: str, write: Write) -> None:
     got = importers.read(write(f"{heads}\n4000;3,1;0,04;11,8;2,1\n6000;7,2;0,09;11,6;6,1\n"))
-    assert list(got.channels) == ["rpm", "thrust_N", "torque_Nm", "voltage_V", "current_A"]
-    assert got.channels["thrust_N"].values.tolist() == [3.1, 7.2]
+    assert list(got.values) == ["rpm", "thrust_N", "torque_Nm", "voltage_V", "current_A"]
+    assert got["thrust_N"].tolist() == [3.1, 7.2]
 
 
 def test_power_that_is_volts_times_amps_is_electrical(write: Write) -> None:
     rows = "4000,3.1,24.78,11.8,2.1\n6000,7.2,70.76,11.6,6.1\n8000,12.6,158.2,11.3,14.0\n"
     got = importers.read(write(f"rpm,thrust_N,power_W,voltage_V,current_A\n{rows}"))
-    assert "electrical_power_W" in got.channels and "power_W" not in got.channels and said(got, "electrical power")
+    assert "electrical_power_W" in got.values and "power_W" not in got.values and said(got, "electrical power")
     shaft = importers.read(write("rpm,power_W,voltage_V,current_A\n4000,18,11.8,2.1\n6000,54,11.6,6.1\n", "b.csv"))
-    assert "power_W" in shaft.channels
+    assert "power_W" in shaft.values
 
 
 def test_several_set_ups_in_one_file_are_said_and_not_diagnosed_together(write: Write, project: Path) -> None:
@@ -610,3 +611,66 @@ def test_electrical_rpm_is_asked_about_only_where_the_numbers_leave_doubt(write:
     text = "rpm,thrust_N\n{},1\n{},4\n"
     slow, fast = (importers.read(write(text.format(top / 2, top), f"{top}.csv")) for top in (9000, 60000))
     assert not said(slow, "electrical") and said(fast, "electrical")
+
+
+def _with_odd_cells(text: str, mark: str = ",") -> str:
+    """A word, an empty cell, a number in quotes and one without end, each in a row of its own."""
+    lines = [line.split(mark) for line in text.splitlines()]
+    for row, column, cell in ((60, 1, "ERR"), (75, 2, ""), (90, 3, '"1.25"'), (130, 1, "inf"), (150, 2, "n/a")):
+        lines[row][column] = cell
+    return "\n".join(mark.join(cells) for cells in lines) + "\n"
+
+
+def _log(mark: str = ",", rows: int = 300) -> str:
+    columns = (
+        (f"{0.01 * k:.2f}", f"{3000 + k * 7 % 13}", f"{0.5 + k * 5 % 11 / 100}", f"0.0{k % 9}") for k in range(rows)
+    )
+    heads = mark.join(["time_s", "rpm", "thrust_kgf", "Q_Nm" if mark == " " else "Q (Nm)"])
+    return "\n".join([heads, *map(mark.join, columns)]) + "\n"
+
+
+LARGE_LOGS = {
+    "plain": _log(), "semicolons": _log(";"), "decimal commas": _log(";").replace(".", ","), "blanks": _log(" "),
+    "tabs and a comment": "# stand 7\n" + _log("\t"), "windows": _log().replace("\n", "\r\n"),
+    "odd cells": _with_odd_cells(_log()), "cut": _log()[:-9], "no end": _log()[:-1],
+    "short line": _log() + "3.0,3000\n",
+    "long line": _log().replace("\n1.00,", "\n9,1.00,"), "comment below": _log().replace("\n1.00,", "\n# x\n1.00,"),
+    "empty line": _log().replace("\n1.00,", "\n\n1.00,"), "spaces": _log().replace(",", " , "),
+    "heads above": "Stand 7\n3 May\n" + _log(), "units below": _log().replace("Q (Nm)\n", "Q\n(s),(rpm),(kgf),(Nm)\n"),
+    "a column of words": _log().replace("\n", ",ok\n"), "late words": _log().replace("\n2.", "\nx2."),
+}  # fmt: skip
+
+
+CELL_BY_CELL = ("short line", "long line", "comment below", "empty line", "a column of words", "late words")
+
+
+@pytest.mark.parametrize("name", LARGE_LOGS)
+def test_a_large_log_reads_as_a_small_one(name: str, write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Blocks of a few lines, so that every kind of block is met."""
+    path = write(LARGE_LOGS[name])
+
+    def read() -> Dataset | str:
+        try:
+            return importers.read(path, "table")
+        except InputError as error:
+            return str(error)
+
+    small = read()
+    monkeypatch.setattr(_large, "LARGE", 0)
+    monkeypatch.setattr(_large, "BLOCK", 700)
+    monkeypatch.setattr(_large, "HEAD", 1000)
+    assert (_large.large_table(path) is None) == (name in CELL_BY_CELL)
+    large = read()
+    if isinstance(small, str) or isinstance(large, str):
+        assert large == small
+        return
+    assert list(large.values) == list(small.values) and large.notes == small.notes and large.flags == small.flags
+    assert tuple(large.lines) == tuple(small.lines) and large.provenance == small.provenance
+    for key, v in small.values.items():
+        np.testing.assert_allclose(large[key], v, rtol=1e-14, err_msg=key)
+
+
+def test_a_clock_may_count_from_1970(write: Write) -> None:
+    body = "".join(f"{1.7e9 + 0.02 * k:.2f},{3000 + k % 3},{2.0 + 0.01 * (k % 5)}\n" for k in range(500))
+    got = reduction(reduce(importers.read(write("time_s,rpm,thrust_N\n" + body))))
+    assert got.mode == "samples" and not any(lost.channel == "time_s" for lost in got.dropped)

@@ -28,7 +28,7 @@ ROOMS: tuple[str, ...] = (
     "base|base.*",
     "air",
     "coefficients",
-    "dataset",
+    "dataset|dataset.*",
     "sections|sections.*",
     "effects|effects.*",
     "bem|bem.*",

@@ -177,7 +177,7 @@ def test_the_standard_error_counts_correlated_samples_as_fewer() -> None:
 def test_the_raw_record_of_a_stand_gives_its_six_throttle_steps(shared_data: Path) -> None:
     """The published tables of that stand are of other runs, so the record is held against itself only."""
     record = importers.read(shared_data / "jmajew" / "raw" / "curr_cal.csv")
-    data = {name: c.values for name, c in record.channels.items()}
+    data = dict(record.values)
     known = find(None, data, "thrust_N", data["pulse_width_s"])
     commands = [round(p.command * 1e6) for p in known.plateaus if p.command]
     assert commands == [1000, 1200, 1400, 1450, 1500, 1550, 1600, 1000]
@@ -192,7 +192,7 @@ def test_the_raw_record_of_a_stand_gives_its_six_throttle_steps(shared_data: Pat
 
 def test_the_steps_of_a_published_log_are_found(shared_data: Path) -> None:
     log = importers.read(shared_data / "thrust_map" / "xNova-SR-steps.csv")
-    data = {name: c.values for name, c in log.channels.items()}
+    data = dict(log.values)
     got = find(data["time_s"], data, "thrust_N", data["pulse_width_s"])
     top = [p for p in got.plateaus if p.command and p.command > 1.12e-3]
     assert [round(p.command * 1e6) for p in top if p.command] == [*range(1150, 1601, 50)]
@@ -203,7 +203,7 @@ def test_the_steps_of_a_published_log_are_found(shared_data: Path) -> None:
 
 def test_steps_of_a_continuous_log_without_a_command_are_found(shared_data: Path) -> None:
     log = importers.read(shared_data / "rcbenchmark" / "Log_2019-11-05_171350.csv")
-    data = {name: c.values for name, c in log.channels.items()}
+    data = dict(log.values)
     got = find(data["time_s"], data, "thrust_N")
     assert accounted(got) and len(got.plateaus) == 23
     steady = [p for p in got.plateaus if not p.flags and p.mean["thrust_N"] > 3.0]

@@ -35,18 +35,19 @@ def test_one_rotor_that_turned_gets_the_plain_names(tmp_path: Path) -> None:
     path = tmp_path / "15in_single.csv"
     path.write_text(coaxial(False), "utf-8")
     got = import_file(path)
-    assert got.format == "coaxial_stand" and got.constants["diameter_m"] == pytest.approx(15 * 0.0254)
-    assert got.channels["thrust_N"].values[2] == pytest.approx(3e-5 * 3000**2 * G0 / 1000.0)
-    assert got.channels["torque_Nm"].values[2] > 0.0 and any("sign" in w for w in got.warnings)
-    assert np.isnan(got.channels["thrust_N"].values[0]), "a reading before the tare is no zero"
+    assert got.provenance["format"] == "coaxial_stand"
+    assert got.provenance["constants"]["diameter_m"] == pytest.approx(15 * 0.0254)
+    assert got["thrust_N"][2] == pytest.approx(3e-5 * 3000**2 * G0 / 1000.0)
+    assert got["torque_Nm"][2] > 0.0 and any("sign" in w for w in got.notes)
+    assert np.isnan(got["thrust_N"][0]), "a reading before the tare is no zero"
 
 
 def test_two_rotors_keep_their_sides(tmp_path: Path) -> None:
     path = tmp_path / "map.csv"
     path.write_text(coaxial(True), "utf-8")
     got = import_file(path)
-    assert {"thrust_left_N", "thrust_right_N", "left_rpm", "right_rpm"} <= got.channels.keys()
-    assert got.channels["speed_ratio"].values[3] == pytest.approx(0.95)
+    assert {"thrust_left_N", "thrust_right_N", "left_rpm", "right_rpm"} <= got.values.keys()
+    assert got["speed_ratio"][3] == pytest.approx(0.95)
 
 
 def test_four_propellers_on_a_scale_are_read_per_propeller(tmp_path: Path) -> None:
@@ -58,10 +59,10 @@ def test_four_propellers_on_a_scale_are_read_per_propeller(tmp_path: Path) -> No
         lines.append(",".join(str(c) for c in cells))
     path.write_text("\n".join(["pwm,vbat[V],rpm1,rpm2,rpm3,rpm4,thrust[g]", *lines]) + "\n", "utf-8")
     got = import_file(path)
-    assert got.format == "crazyflie_bench"
-    assert got.channels["thrust_N"].values[0] == pytest.approx(8e-3 * G0 / 4)
-    assert got.channels["rpm"].values[0] == pytest.approx(np.sqrt((10000**2 + 12000**2) / 2))
-    assert got.channels["throttle"].values[0] == pytest.approx(20000 / 65535)
+    assert got.provenance["format"] == "crazyflie_bench"
+    assert got["thrust_N"][0] == pytest.approx(8e-3 * G0 / 4)
+    assert got["rpm"][0] == pytest.approx(np.sqrt((10000**2 + 12000**2) / 2))
+    assert got["throttle"][0] == pytest.approx(20000 / 65535)
 
 
 def flight(rows: int = 20, version: int = 2) -> bytes:
@@ -84,10 +85,10 @@ def test_a_flight_log_is_read_whole_or_refused(tmp_path: Path, version: int) -> 
     path = tmp_path / "flight.usdlog"
     path.write_bytes(flight(version=version))
     got = import_file(path)
-    assert got.format == "crazyflie_log" and got.rows == 20
-    assert got.channels["time_s"].values[-1] == pytest.approx(0.019)
-    assert got.channels["acceleration_z_m_s2"].values[0] == pytest.approx(G0)
-    assert got.channels["voltage_V"].values[0] == pytest.approx(3.7)
+    assert got.provenance["format"] == "crazyflie_log" and len(got) == 20
+    assert got["time_s"][-1] == pytest.approx(0.019)
+    assert got["acceleration_z_m_s2"][0] == pytest.approx(G0)
+    assert got["voltage_V"][0] == pytest.approx(3.7)
     damaged = bytearray(path.read_bytes())
     damaged[-20] ^= 0xFF
     path.write_bytes(bytes(damaged))

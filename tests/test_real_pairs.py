@@ -38,8 +38,8 @@ def test_pairs_are_recordings_that_can_be_read_and_do_not_tell_their_cause(drawn
         for name, text in item.files.items():
             (folder / name).write_text(text, encoding="utf-8")
         for name in ("recording.csv", "reference.csv"):
-            channels = import_file(str(folder / name)).channels
-            assert {"thrust_N", "torque_Nm"} & set(channels) and np.isfinite(channels["rpm"].values).all()
+            channels = import_file(str(folder / name)).values
+            assert {"thrust_N", "torque_Nm"} & set(channels) and np.isfinite(channels["rpm"]).all()
         if "case.toml" in item.files:
             load_case(folder / "case.toml").rotor()
         assert not [c for c in item.entry["causes"] if c in "".join(item.files.values())]

@@ -68,25 +68,25 @@ def test_columns_units_signs_and_pole_pairs_are_applied(put: Put) -> None:
     assert importers.detect(path) == "recording"
     got = importers.read(path)
     k = np.arange(12)
-    assert np.allclose(got.channels["time_s"].values, 0.02 * k)
-    assert np.allclose(got.channels["thrust_N"].values, (100 + k) * units.KGF * 1e-3)
-    assert np.allclose(got.channels["torque_Nm"].values, (2 * k + 40) * 1e-3)
-    assert np.allclose(got.channels["rpm"].values, 10000 + 100 * k)
-    assert np.allclose(got.channels["electrical_rpm"].values, 70000 + 700 * k)  # kept beside it
-    assert any("over 7 pole pairs" in text for text in got.warnings)
-    assert got.channels["U"].unit == "" and any("'U'" in text for text in got.warnings)  # unnamed, unit unknown
-    assert (got.kind, got.rows, got.provenance["session"]) == ("bench", 12, "one")
+    assert np.allclose(got["time_s"], 0.02 * k)
+    assert np.allclose(got["thrust_N"], (100 + k) * units.KGF * 1e-3)
+    assert np.allclose(got["torque_Nm"], (2 * k + 40) * 1e-3)
+    assert np.allclose(got["rpm"], 10000 + 100 * k)
+    assert np.allclose(got["electrical_rpm"], 70000 + 700 * k)  # kept beside it
+    assert any("over 7 pole pairs" in text for text in got.notes)
+    assert got.unit("U") == "" and any("'U'" in text for text in got.notes)  # unnamed, unit unknown
+    assert (got.kind, len(got), got.provenance["session"]) == ("bench", 12, "one")
 
 
 def test_constants_and_instrument_are_in_si(put: Put) -> None:
     got = importers.read(put())
     air = Air.from_state(100200.0, 21.0, 45.0)
-    assert got.constants == pytest.approx(
+    assert got.provenance["constants"] == pytest.approx(
         {"pole_pairs": 7, "diameter_m": 0.254, "gap_m": 5e-4, "wall_distance_m": 1.2, "density_kg_m3": float(air.rho),
          "temperature_K": 294.15}
     )  # fmt: skip
     gf = units.KGF * 1e-3
-    assert got.instrument == {"thrust_N": pytest.approx({"gain": 0.005, "zero": gf, "sample": 2 * gf})}
+    assert got.provenance["instrument"] == {"thrust_N": pytest.approx({"gain": 0.005, "zero": gf, "sample": 2 * gf})}
 
 
 @pytest.mark.parametrize("unit", ["rpm", "rev_s", "rad_s"])
@@ -95,8 +95,8 @@ def test_a_speed_in_any_unit_becomes_rpm(unit: str, put: Put) -> None:
     table = "F;n\n" + "".join(f"{k};{(3000 + k) * factor!r}\n" for k in range(5))
     toml = f'[recording]\nfile = "run.csv"\n[columns]\nrpm = {{ column = "n", unit = "{unit}" }}\n'
     got = importers.read(put(toml, table))
-    assert got.channels["rpm"].unit == "rpm" and np.allclose(got.channels["rpm"].values, 3000 + np.arange(5))
-    assert any("no air state" in text for text in got.warnings)
+    assert got.unit("rpm") == "rpm" and np.allclose(got["rpm"], 3000 + np.arange(5))
+    assert any("no air state" in text for text in got.notes)
 
 
 def test_decimal_commas_and_missing_headings_are_said(put: Put) -> None:
@@ -110,14 +110,14 @@ time = { column = 1, unit = "s" }
 thrust = { column = 2, unit = "N" }
 """
     got = importers.read(put(toml, table))
-    assert np.allclose(got.channels["thrust_N"].values, np.arange(5) + 0.25) and got.rows == 5
+    assert np.allclose(got["thrust_N"], np.arange(5) + 0.25) and len(got) == 5
 
 
 def test_runs_are_joined_in_their_order(put: Put, tmp_path: Path) -> None:
     (tmp_path / "second.csv").write_text(TABLE.replace(",11.1", ",12.6"), encoding="utf-8")
     got = importers.read(put(GOOD.replace('"run.csv"', '["run.csv", "second.csv"]')))
-    assert got.rows == 24 and np.array_equal(got.channels["run"].values, np.repeat([1.0, 2.0], 12))
-    assert np.array_equal(got.channels["U"].values, np.repeat([11.1, 12.6], 12))
+    assert len(got) == 24 and np.array_equal(got["run"], np.repeat([1.0, 2.0], 12))
+    assert np.array_equal(got["U"], np.repeat([11.1, 12.6], 12))
     assert len(got.flags) == len(got.lines) == 24 and got.provenance["file"] == "run.csv+second.csv"
 
 
@@ -169,13 +169,13 @@ def test_each_fault_has_its_place(old: str, new: str, where: str, put: Put) -> N
 def test_every_air_state_gives_a_density(air: str, density: float, put: Put) -> None:
     start = GOOD.index("[air]")
     text = GOOD[:start] + "[air]\n" + air + "\n" + GOOD[GOOD.index("[stand]") :]
-    assert importers.read(put(text)).constants["density_kg_m3"] == pytest.approx(density, rel=5e-4)
+    assert importers.read(put(text)).provenance["constants"]["density_kg_m3"] == pytest.approx(density, rel=5e-4)
 
 
 def test_a_table_points_to_the_recording_beside_it(put: Put) -> None:
     path = put()
     got = importers.read(path.with_name("run.csv"))
-    assert any("import recording.toml" in text for text in got.warnings)
+    assert any("import recording.toml" in text for text in got.notes)
 
 
 def test_faults_of_the_table_name_the_table(put: Put) -> None:
@@ -210,5 +210,5 @@ def test_mutated_recordings_are_read_or_refused(put: Put) -> None:
             assert error.faults
             continue
         read += 1
-        assert got.rows == 12 and len(got.flags) == 12
+        assert len(got) == 12 and len(got.flags) == 12
     assert 5 < read < 245

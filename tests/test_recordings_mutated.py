@@ -15,10 +15,11 @@ from pathlib import Path
 import pytest
 
 from bemt.base.errors import InputError
-from bemt.recordings.channels import view
+from bemt.dataset import Dataset
+from bemt.recordings.channels import named
 from bemt.recordings.load import import_file
 from bemt.recordings.overview import findings, is_recording, points_text, reduction_document, reduction_of
-from bemt.recordings.reduce import Reduced
+from bemt.recordings.reduce import reduction
 
 INJURIES = (
     "cut", "garble", "bytes", "encoding", "huge", "tiny", "swap columns", "drop column", "double column", "rename",
@@ -207,35 +208,33 @@ def try_injured(count: int, seed: int, folder: Path, bases: dict[str, str]) -> C
             assert error.faults and all(f.file and f.got and f.expected for f in error.faults), case
             outcome["refused"] += 1
             continue
-        if record.format not in ("table", "rcbenchmark", "jmajew"):
+        if record.provenance["format"] not in ("table", "rcbenchmark", "jmajew"):
             outcome["other format"] += 1
             continue
-        notes = " ".join(record.warnings)
+        notes = " ".join(record.notes)
         head = ("no heading line" not in notes) + ("holds units" in notes)
         head += sum(int(n) for n in re.findall(r"(\d+) lines above the headings", notes))
         below = lines_below_the_heading(raw)
-        assert len(record.lines) == record.rows == len(below) - head and set(record.lines) <= below, case
+        assert len(record.lines) == len(record) == len(below) - head and set(record.lines) <= below, case
         found = findings(record)
-        assert all(f.id and f.evidence and f.correction and all(0 <= r < record.rows for r in f.rows) for f in found), (
+        assert all(f.id and f.evidence and f.correction and all(0 <= r < len(record) for r in f.rows) for f in found), (
             case
         )
         outcome["findings"] += bool(found)
         reduced = reduction_of(record) if is_recording(record, False) else None
         told = reduction_document(reduced)
         json.dumps([told, [str(f) for f in found]], allow_nan=False)
-        if isinstance(reduced, Reduced):
-            kept = [record.lines[r] for rows in reduced.rows for r in rows]
-            gone = [lost.line for lost in reduced.dropped if not lost.channel]
+        if isinstance(reduced, Dataset):
+            how = reduction(reduced)
+            kept = [record.lines[r] for rows in how.rows for r in rows]
+            gone = [line for lost in how.dropped if not lost.channel for line in lost.lines]
             assert sorted(kept + gone) == sorted(record.lines), case
-            assert all(lost.reason for lost in reduced.dropped), case
-            seen = view(record)
-            values = {(lost.line, lost.channel) for lost in reduced.dropped}
-            for (
-                channel,
-                own,
-            ) in seen.names.items():  # a value that was in the file and is no longer in the view was told
-                if own in record.channels and channel in seen.values:
-                    for row, value in enumerate(record.channels[own].values):
+            assert all(lost.reason for lost in how.dropped), case
+            seen = named(record)
+            values = {(line, lost.channel) for lost in how.dropped for line in lost.lines}
+            for channel, own in seen.provenance["names"].items():  # a value that is lost on the way was told
+                if own in record.values and channel in seen.values:
+                    for row, value in enumerate(record[own]):
                         if math.isfinite(value) and not math.isfinite(seen.values[channel][row]):
                             assert {(record.lines[row], channel), (record.lines[row], own)} & values, case
             assert told is not None and points_text(told), case

@@ -21,20 +21,24 @@ from bemt.base import units
 from bemt.base.errors import InputError
 from bemt.commands.cli import main
 from bemt.dataset import Dataset
-from bemt.readers._imported import Channel, Imported
-from bemt.recordings.channels import view
-from bemt.recordings.reduce import Reduced, reduce
+from bemt.recordings.channels import named
+from bemt.recordings.reduce import reduce, reduction
 from bemt.recordings.rows import is_samples
 
 D = 0.254
 K_T, K_Q = 2.0e-7, 3.0e-9
 
 
-def recording(values: dict[str, np.ndarray], **more: object) -> Imported:
-    told = {k: units.split_suffix(k)[1] for k in values}
-    channels = {k: Channel(np.asarray(v, float), u.suffix if u else "-") for k, v in values.items() for u in [told[k]]}
-    rows = len(next(iter(values.values())))
-    return Imported("table", "bench", rows, channels, lines=tuple(range(2, rows + 2)), **more)  # type: ignore[arg-type]
+def recording(values: dict[str, np.ndarray], **more: object) -> Dataset:
+    lines = range(2, len(next(iter(values.values()))) + 2)
+    return Dataset(
+        "bench",
+        "table",
+        values,
+        lines=lines,
+        units={"humidity": "-", "electrical_rpm": "rpm", "optical_rpm": "rpm"},
+        **more,
+    )
 
 
 def noise(rng: np.random.Generator, n: int, sd: float, r: float = 0.0) -> np.ndarray:
@@ -68,11 +72,11 @@ def log(
             "current_A": current, "voltage_V": np.full(n, 15.0) - 0.02 * current}  # fmt: skip
 
 
-def accounted(imported: Imported, got: Reduced) -> bool:
+def accounted(imported: Dataset, got: Dataset) -> bool:
     """Every row is in one point, or was dropped with a reason."""
-    kept = [imported.lines[r] for rows in got.rows for r in rows]
-    gone = [lost.line for lost in got.dropped if not lost.channel]
-    return sorted(kept + gone) == sorted(imported.lines) and all(lost.reason for lost in got.dropped)
+    kept = [imported.lines[r] for rows in reduction(got).rows for r in rows]
+    gone = [line for lost in reduction(got).dropped if not lost.channel for line in lost.lines]
+    return sorted(kept + gone) == sorted(imported.lines) and all(lost.reason for lost in reduction(got).dropped)
 
 
 # ---------------------------------------------------------------- samples
@@ -85,17 +89,17 @@ def test_a_log_becomes_points_with_their_true_values(with_command: bool) -> None
         del values["pulse_width_s"]
     imported = recording(values)
     got = reduce(imported, diameter_m=D)
-    assert got.mode == "samples" and len(got.series) == 7 and accounted(imported, got)
+    assert reduction(got).mode == "samples" and len(got) == 7 and accounted(imported, got)
     true = np.array([3000.0, 5000, 7000, 9000, 7000, 5000, 3000])
-    assert np.allclose(got.series["rpm"], true, rtol=2e-3)  # the lag of the rotor is not quite over
-    off = got.series["thrust_N"] - K_T * got.series["rpm"] ** 2
-    assert np.all(np.abs(off) < 4 * np.hypot(got.series.u["thrust_N"], got.correlated["thrust_N"]["zero"]))
-    assert got.directions == ("up", "up", "up", "up", "down", "down", "down")
-    assert got.drift["thrust_N"] == pytest.approx(0.2 * 8 / 9, abs=0.02)  # between the middles of the rests
+    assert np.allclose(got["rpm"], true, rtol=2e-3)  # the lag of the rotor is not quite over
+    off = got["thrust_N"] - K_T * got["rpm"] ** 2
+    assert np.all(np.abs(off) < 4 * np.hypot(got.u["thrust_N"], reduction(got).correlated["thrust_N"]["zero"]))
+    assert reduction(got).directions == ("up", "up", "up", "up", "down", "down", "down")
+    assert reduction(got).drift["thrust_N"] == pytest.approx(0.2 * 8 / 9, abs=0.02)  # between the middles of the rests
     assert any("drift" in n and "linear in time" in n for n in got.notes)
-    assert got.series["power_W"] == pytest.approx(got.series["torque_Nm"] * got.series["rpm"] * units.RPM)
-    assert np.all((got.series["time_s"] > 0.02 * 79) & (got.series["time_s"] < 0.02 * 641))
-    assert got.series.labels[0].startswith("table:")
+    assert got["power_W"] == pytest.approx(got["torque_Nm"] * got["rpm"] * units.RPM)
+    assert np.all((got["time_s"] > 0.02 * 79) & (got["time_s"] < 0.02 * 641))
+    assert got.labels[0].startswith("table:")
 
 
 def test_uncertainties_cover_the_errors_that_they_claim() -> None:
@@ -103,16 +107,16 @@ def test_uncertainties_cover_the_errors_that_they_claim() -> None:
     z = []
     for seed in range(12):
         got = reduce(recording(log(seed, zero=0.0, drift=0.0, sd=0.05, r=0.7)), tare=False)
-        z += list((got.series["thrust_N"] - K_T * got.series["rpm"] ** 2) / got.series.u["thrust_N"])
+        z += list((got["thrust_N"] - K_T * got["rpm"] ** 2) / got.u["thrust_N"])
     assert len(z) == 84 and 0.7 < np.sqrt(np.mean(np.square(z))) < 1.4
 
 
 def test_hysteresis_is_reported_up_and_down_apart() -> None:
     got = reduce(recording(log(loop=0.3, drift=0.0)))
-    loop = got.hysteresis["thrust_N"]
+    loop = reduction(got).hysteresis["thrust_N"]
     assert loop.difference == pytest.approx(0.3, abs=0.03) and loop.points == 3
     assert loop.share == pytest.approx(0.3 / (K_T * 9000**2), rel=0.1)
-    assert abs(reduce(recording(log(drift=0.0))).hysteresis["thrust_N"].difference) < 0.03
+    assert abs(reduction(reduce(recording(log(drift=0.0)))).hysteresis["thrust_N"].difference) < 0.03
     assert any("down is" in n for n in got.notes)
 
 
@@ -122,21 +126,22 @@ def test_start_up_settling_and_outliers_are_dropped_with_their_lines() -> None:
     values["torque_Nm"][210] = 3.0
     imported = recording(values)
     got = reduce(imported)
-    single = {(lost.line, lost.channel) for lost in got.dropped if "outlier" in lost.reason}
+    single = {
+        (line, lost.channel) for lost in reduction(got).dropped if "outlier" in lost.reason for line in lost.lines
+    }
     assert {(302, "thrust_N"), (212, "torque_Nm")} <= single and len(single) < 12
-    assert any(lost.reason == "settling" for lost in got.dropped) and accounted(imported, got)
+    assert any(lost.reason == "settling" for lost in reduction(got).dropped) and accounted(imported, got)
     clean = reduce(recording(log()))
-    assert np.allclose(got.series["thrust_N"], clean.series["thrust_N"], atol=0.01)
+    assert np.allclose(got["thrust_N"], clean["thrust_N"], atol=0.01)
 
 
 def test_a_speed_of_zero_under_load_is_no_reading() -> None:
     values = log()
     values["rpm"][250:255] = 0.0
     got = reduce(recording(values))
-    assert {lost.line for lost in got.dropped if lost.channel == "rpm" and "no reading" in lost.reason} >= {
-        *range(252, 257)
-    }
-    assert np.allclose(got.series["rpm"][:4], [3000, 5000, 7000, 9000], rtol=2e-3)
+    gone = [d.lines for d in reduction(got).dropped if d.channel == "rpm" and "no reading" in d.reason]
+    assert {line for lines in gone for line in lines} >= {*range(252, 257)}
+    assert np.allclose(got["rpm"][:4], [3000, 5000, 7000, 9000], rtol=2e-3)
 
 
 def test_runs_of_one_log_are_cut_for_themselves() -> None:
@@ -145,7 +150,7 @@ def test_runs_of_one_log_are_cut_for_themselves() -> None:
     values["run"] = np.repeat([1.0, 2.0], len(one["rpm"]))
     imported = recording(values)
     got = reduce(imported)
-    assert len(got.series) == 14 and got.series["run"].tolist() == [1.0] * 7 + [2.0] * 7 and accounted(imported, got)
+    assert len(got) == 14 and got["run"].tolist() == [1.0] * 7 + [2.0] * 7 and accounted(imported, got)
 
 
 def test_a_log_whose_clock_falls_again_and_again_is_refused() -> None:
@@ -174,7 +179,7 @@ def test_every_row_is_accounted_for(seed: int) -> None:
     except InputError as error:
         assert all(f.got and f.expected for f in error.faults)
         return
-    assert accounted(imported, got) and len(got.series) == len(got.rows) == len(got.directions)
+    assert accounted(imported, got) and len(got) == len(reduction(got).rows) == len(reduction(got).directions)
 
 
 # ---------------------------------------------------------------- points
@@ -211,16 +216,16 @@ def test_the_columns_of_the_diagnosis_mean_what_they_say(seed: int, tmp_path: Pa
         rng.shuffle(headings)
     table = contract(tmp_path / "run.csv", headings)
     imported = importers.read(tmp_path / "run.csv")
-    assert not [w for w in imported.warnings if "unit" in w]
+    assert not [w for w in imported.notes if "unit" in w]
     got = reduce(imported)
-    assert (got.mode, len(got.series)) == ("points", 24) and accounted(imported, got)
+    assert (reduction(got).mode, len(got)) == ("points", 24) and accounted(imported, got)
     for heading in headings:
         stated = heading.startswith("u_")
         base = heading.removeprefix("u_")
         name, factor, offset = NAMES.get(base, (base, 1.0, 0.0))
         if not name:
             continue
-        where = got.series.u if stated else got.series.values
+        where = got.u if stated else got.values
         assert np.allclose(where[name], table[heading] * factor + (0.0 if stated else offset), rtol=1e-9), heading
     if {"temperature_C", "pressure_Pa"} <= set(headings):
         wet = table.get("humidity_pct", np.zeros(24))
@@ -228,9 +233,9 @@ def test_the_columns_of_the_diagnosis_mean_what_they_say(seed: int, tmp_path: Pa
             Air.from_state(p, t, h).rho
             for p, t, h in zip(table["pressure_Pa"], table["temperature_C"], wet, strict=True)
         ]
-        assert np.allclose(got.series["density_kg_m3"], rho, rtol=1e-9)
+        assert np.allclose(got["density_kg_m3"], rho, rtol=1e-9)
     else:
-        assert "density_kg_m3" not in got.series and any("no density" in n for n in got.notes)
+        assert "density_kg_m3" not in got and any("no density" in n for n in got.notes)
 
 
 @pytest.mark.parametrize(
@@ -248,12 +253,12 @@ def test_the_columns_of_the_diagnosis_mean_what_they_say(seed: int, tmp_path: Pa
 )  # fmt: skip
 def test_the_rule_for_samples_or_points(values: dict[str, np.ndarray], samples: bool) -> None:
     thrust = np.repeat([1.0, 2.0, 3.0], 20) + 0.01 * np.sin(np.arange(60))
-    rec = view(recording({"thrust_N": thrust, **values}))
+    rec = named(recording({"thrust_N": thrust, **values}))
     got, reason = is_samples(rec)
     assert got is samples and reason.startswith("rows are samples" if samples else "rows are points")
     shuffled = np.random.default_rng(0).permutation(np.linspace(1.0, 3.0, 60))
     if "pulse_width_s" not in values and "throttle" not in values:
-        assert not is_samples(view(recording({"thrust_N": shuffled, **values})))[0]
+        assert not is_samples(named(recording({"thrust_N": shuffled, **values})))[0]
 
 
 def table(rows: int = 12, **more: np.ndarray) -> dict[str, np.ndarray]:
@@ -264,7 +269,7 @@ def table(rows: int = 12, **more: np.ndarray) -> dict[str, np.ndarray]:
 def test_coefficients_and_numbers_follow_from_diameter_and_air() -> None:
     rows = 12
     values = table(rows, temperature_K=np.full(rows, 295.0), pressure_Pa=np.full(rows, 1.0e5))
-    s = reduce(recording(values), diameter_m=D, chord75_m=0.02).series
+    s = reduce(recording(values), diameter_m=D, chord75_m=0.02)
     air = Air.from_state(1.0e5, 295.0 - 273.15)
     n = values["rpm"] / 60
     assert np.allclose(s["CT"], co.CT(values["thrust_N"], air.rho, n, D))
@@ -272,26 +277,26 @@ def test_coefficients_and_numbers_follow_from_diameter_and_air() -> None:
     assert np.allclose(s["FM"], co.FM(s["CT"], s["CP"])) and np.allclose(s["M_tip"], co.M_tip(n, D, air.a_sound))
     assert np.allclose(s["Re"], co.Re75(0.02, n, D, 0.0, air.rho, air.mu))
     assert np.allclose(s["efficacy_N_W"] * 1e3 / units.KGF, co.grams_per_watt(values["thrust_N"], s["power_W"]))
-    flying = reduce(recording(values | {"airspeed_m_s": np.full(rows, 8.0)}), diameter_m=D).series
+    flying = reduce(recording(values | {"airspeed_m_s": np.full(rows, 8.0)}), diameter_m=D)
     assert np.allclose(flying["J"], 8.0 / (n * D)) and np.all(np.isnan(flying["FM"]))
 
 
 def test_air_is_never_assumed() -> None:
     got = reduce(recording(table()), diameter_m=D)
-    assert not {"CT", "density_kg_m3", "M_tip"} & set(got.series.values) and any("no density" in n for n in got.notes)
+    assert not {"CT", "density_kg_m3", "M_tip"} & set(got.values) and any("no density" in n for n in got.notes)
     isa = reduce(recording(table()), diameter_m=D, isa_altitude_m=500.0)
-    assert set(isa.series.flags) == {("standard air",)}
-    assert isa.series["density_kg_m3"][0] == pytest.approx(Air.isa(500.0).rho)
+    assert set(isa.flags) == {("standard air",)}
+    assert isa["density_kg_m3"][0] == pytest.approx(Air.isa(500.0).rho)
     warm = reduce(recording(table(temperature_K=np.full(12, 303.15))), diameter_m=D, isa_altitude_m=500.0)
-    assert warm.series["density_kg_m3"][0] == pytest.approx(Air.isa(500.0, 303.15 - Air.isa(500.0).temperature_K).rho)
+    assert warm["density_kg_m3"][0] == pytest.approx(Air.isa(500.0, 303.15 - Air.isa(500.0).temperature_K).rho)
     told = reduce(recording(table()), diameter_m=D, air=Air.from_density(1.1, 30.0))
-    assert told.series["density_kg_m3"][0] == 1.1 and told.series.flags[0] == ()
+    assert told["density_kg_m3"][0] == 1.1 and told.flags[0] == ()
     measured = table(temperature_K=np.full(12, 295.0), pressure_Pa=np.full(12, 1.0e5))
     both = reduce(recording(measured), air=Air.from_density(1.1, 30.0), isa_altitude_m=0.0)
-    assert both.series["density_kg_m3"][0] == pytest.approx(Air.from_state(1e5, 21.85).rho)
-    assert any("the recorded one was taken" in n for n in both.notes) and both.series.flags[0] == ()
+    assert both["density_kg_m3"][0] == pytest.approx(Air.from_state(1e5, 21.85).rho)
+    assert any("the recorded one was taken" in n for n in both.notes) and both.flags[0] == ()
     bad = reduce(recording(table(temperature_K=np.full(12, 22.0), pressure_Pa=np.full(12, 1.0e5))))
-    assert "density_kg_m3" not in bad.series and any("no density in 12 points" in n for n in bad.notes)
+    assert "density_kg_m3" not in bad and any("no density in 12 points" in n for n in bad.notes)
 
 
 def test_a_tare_without_propeller_is_subtracted_at_equal_speed() -> None:
@@ -299,19 +304,24 @@ def test_a_tare_without_propeller_is_subtracted_at_equal_speed() -> None:
             "torque_Nm": np.array([0.001, 0.003, 0.005])}  # fmt: skip
     values = table(rpm=np.array([4000.0, 8000.0, 12000.0]), thrust_N=np.full(3, 5.0), torque_Nm=np.full(3, 0.1))
     got = reduce(recording(values), tare=recording(bare))
-    assert np.allclose(got.series["thrust_N"], [4.95, 4.85, 4.8]) and np.allclose(
-        got.series["torque_Nm"], [0.098, 0.096, 0.095]
-    )
+    assert np.allclose(got["thrust_N"], [4.95, 4.85, 4.8]) and np.allclose(got["torque_Nm"], [0.098, 0.096, 0.095])
     assert any("tare without propeller" in n and "1 points outside" in n for n in got.notes)
-    assert got.correlated["thrust_N"]["zero"] > 0
-    assert np.allclose(reduce(recording(values), tare=False).series["thrust_N"], 5.0)
+    assert reduction(got).correlated["thrust_N"]["zero"] > 0
+    assert np.allclose(reduce(recording(values), tare=False)["thrust_N"], 5.0)
 
 
 def test_the_parts_of_the_instrument_are_kept_apart() -> None:
     instrument = {"thrust_N": {"gain": 0.005, "zero": 0.02, "sample": 0.05}}
-    got = reduce(recording(table(), instrument=instrument))
-    assert got.correlated["thrust_N"] == {"gain": 0.005, "zero": 0.02}
-    assert np.allclose(got.series.u["thrust_N"], 0.05) and np.all(np.isnan(got.series.u["torque_Nm"]))
+    got = reduce(recording(table(), provenance={"instrument": instrument}))
+    assert reduction(got).correlated["thrust_N"] == {"gain": 0.005, "zero": 0.02}
+    assert np.allclose(got.u["thrust_N"], 0.05) and np.all(np.isnan(got.u["torque_Nm"]))
+
+
+def test_a_log_without_a_clock_is_no_list_of_points() -> None:
+    rng = np.random.default_rng(3)
+    rpm = np.repeat([3000.0, 6000.0, 4500.0], 20000) + rng.normal(0.0, 5.0, 60000)
+    got = reduce(recording({"rpm": rpm, "thrust_N": K_T * rpm**2}))
+    assert reduction(got).mode == "samples" and np.allclose(got["rpm"], [3000.0, 6000.0, 4500.0], rtol=1e-3)
 
 
 def test_repeats_give_the_scatter_and_only_they_show_outliers() -> None:
@@ -320,13 +330,13 @@ def test_repeats_give_the_scatter_and_only_they_show_outliers() -> None:
     thrust = K_T * rpm**2 * (1 + 0.01 * rng.standard_normal(24))
     thrust[10] *= 1.5
     got = reduce(recording({"rpm": rpm, "thrust_N": thrust}))
-    assert len(got.series) == 23 and [lost.line for lost in got.dropped] == [12]
-    assert "median of its 8 repeats" in got.dropped[0].reason
-    share = got.series.u["thrust_N"] / got.series["thrust_N"]
+    assert len(got) == 23 and [lost.lines for lost in reduction(got).dropped] == [range(12, 13)]
+    assert "median of its 8 repeats" in reduction(got).dropped[0].reason
+    share = got.u["thrust_N"] / got["thrust_N"]
     assert np.allclose(share, share[0]) and 0.006 < share[0] < 0.015
     lone = table()
     lone["thrust_N"][5] *= 1.5  # odd, but it may be physics
-    assert len(reduce(recording(lone)).series) == 12
+    assert len(reduce(recording(lone))) == 12
 
 
 def test_runs_that_differ_at_equal_speed_show_their_session_scatter() -> None:
@@ -338,12 +348,12 @@ def test_runs_that_differ_at_equal_speed_show_their_session_scatter() -> None:
         thrust = K_T * (1 + 0.1 * (rpm / 9000)) * rpm**2 * (1 + gain) * (1 + 0.003 * rng.standard_normal(15))
         runs.append(recording({"rpm": rpm, "thrust_N": thrust}))
     got = reduce(runs)
-    assert got.correlated["thrust_N"]["session"] == pytest.approx(np.std(gains, ddof=1), rel=0.15)
-    assert got.series["run"].tolist() == [float(k) for k in range(1, 7) for _ in range(15)]
+    assert reduction(got).correlated["thrust_N"]["session"] == pytest.approx(np.std(gains, ddof=1), rel=0.15)
+    assert got["run"].tolist() == [float(k) for k in range(1, 7) for _ in range(15)]
     same = reduce([runs[0], runs[0]])
-    assert same.correlated["thrust_N"]["session"] == pytest.approx(0.0, abs=1e-9)
+    assert reduction(same).correlated["thrust_N"]["session"] == pytest.approx(0.0, abs=1e-9)
     apart = {"rpm": np.linspace(12000.0, 15000.0, 5), "thrust_N": np.linspace(30.0, 40.0, 5)}
-    assert "session" not in reduce([runs[0], recording(apart)]).correlated.get("thrust_N", {})
+    assert "session" not in reduction(reduce([runs[0], recording(apart)])).correlated.get("thrust_N", {})
 
 
 def test_a_misread_speed_is_left_out_and_the_row_kept() -> None:
@@ -351,29 +361,29 @@ def test_a_misread_speed_is_left_out_and_the_row_kept() -> None:
     values["rpm"] = values["rpm"].copy()
     values["rpm"][8] *= 7.0
     got = reduce(recording(values))
-    assert len(got.series) == 12 and np.isnan(got.series["rpm"][8]) and got.series["thrust_N"][8] > 0
-    (lost,) = got.dropped
+    assert len(got) == 12 and np.isnan(got["rpm"][8]) and got["thrust_N"][8] > 0
+    (lost,) = reduction(got).dropped
     assert (lost.line, lost.channel) == (10, "rpm") and "misread: 7 times" in lost.reason
 
 
 def test_what_is_zero_throughout_or_contradicted_is_left_out_with_a_note() -> None:
     dead = reduce(recording(table(power_W=np.zeros(12))))
-    assert np.all(dead.series["power_W"] > 0) and any("power_W is 0 in every row" in n for n in dead.notes)
+    assert np.all(dead["power_W"] > 0) and any("power_W is 0 in every row" in n for n in dead.notes)
     true = table()["torque_Nm"] * table()["rpm"] * units.RPM
     computed = reduce(recording(table(mechanical_power_W=true / 6.16)))
-    assert np.allclose(computed.series["power_W"], true) and any("speed: left out" in n for n in computed.notes)
+    assert np.allclose(computed["power_W"], true) and any("speed: left out" in n for n in computed.notes)
     kept = reduce(recording(table(power_W=true / 6.16)))
-    assert np.allclose(kept.series["power_W"], true / 6.16) and any("0.1623 times torque" in n for n in kept.notes)
+    assert np.allclose(kept["power_W"], true / 6.16) and any("0.1623 times torque" in n for n in kept.notes)
 
 
 def test_the_speed_is_chosen_and_named() -> None:
     base = {k: v for k, v in table().items() if k != "rpm"}
     rpm = table()["rpm"]
     both = base | {"optical_rpm": rpm, "electrical_rpm": 7 * rpm}
-    assert np.allclose(reduce(recording(both)).series["rpm"], rpm)
-    assert np.allclose(reduce(recording(both), speed="electrical_rpm").series["rpm"], 7 * rpm)
+    assert np.allclose(reduce(recording(both))["rpm"], rpm)
+    assert np.allclose(reduce(recording(both), speed="electrical_rpm")["rpm"], 7 * rpm)
     dead = reduce(recording(both | {"optical_rpm": np.zeros(12)}))
-    assert np.allclose(dead.series["rpm"], 7 * rpm) and any("right only if the pole count" in n for n in dead.notes)
+    assert np.allclose(dead["rpm"], 7 * rpm) and any("right only if the pole count" in n for n in dead.notes)
 
 
 @pytest.mark.parametrize("values", [{"rpm": np.ones(5)}, {"thrust_N": np.full(5, np.nan)}, {"time_s": np.arange(5.0)}])
@@ -394,12 +404,12 @@ def test_a_recording_toml_carries_its_constants_and_instrument(tmp_path: Path) -
     )
     got = reduce(importers.read(tmp_path / "recording.toml"))
     gf = units.KGF * 1e-3
-    assert got.correlated["thrust_N"] == pytest.approx({"gain": 0.005, "zero": gf})
-    assert np.allclose(got.series.u["thrust_N"], 2 * gf) and np.allclose(got.series["tip_gap_m"], 5e-4)
-    assert np.allclose(got.series["wall_distance_m"], 1.2)
+    assert reduction(got).correlated["thrust_N"] == pytest.approx({"gain": 0.005, "zero": gf})
+    assert np.allclose(got.u["thrust_N"], 2 * gf) and np.allclose(got["tip_gap_m"], 5e-4)
+    assert np.allclose(got["wall_distance_m"], 1.2)
     rho = Air.from_state(100200.0, 21.0).rho
-    expected = co.CT(got.series["thrust_N"], rho, got.series["rpm"] / 60, 8 * units.INCH)
-    assert np.allclose(got.series["CT"], expected)
+    expected = co.CT(got["thrust_N"], rho, got["rpm"] / 60, 8 * units.INCH)
+    assert np.allclose(got["CT"], expected)
 
 
 # ---------------------------------------------------------------- the command
@@ -467,7 +477,7 @@ def test_every_published_recording_reduces_and_every_row_is_accounted_for(shared
         imported = importers.read(file)
         got = reduce(imported)
         assert accounted(imported, got), file
-        modes[got.mode] += 1
+        modes[reduction(got).mode] += 1
     assert modes == {"samples": 3, "points": 77}
 
 
@@ -476,7 +486,7 @@ def test_runs_of_one_condition_agree_within_the_errors_that_their_maker_states(s
     groups: dict[str, list[Dataset]] = defaultdict(list)
     for file in sorted((shared_data / "jmajew").glob("*table*.csv")):
         if not re.search("no-?prop", file.name):
-            groups[re.sub(r"_table\d", "", file.stem)].append(reduce(importers.read(file)).series)
+            groups[re.sub(r"_table\d", "", file.stem)].append(reduce(importers.read(file)))
     for channel in ("thrust_N", "torque_Nm"):
         z: list[float] = []
         for runs in groups.values():
@@ -492,14 +502,17 @@ def test_runs_of_one_condition_agree_within_the_errors_that_their_maker_states(s
     joined = reduce(
         [importers.read(f) for f in sorted((shared_data / "jmajew").glob("grp01__f1507_hqprop76x8_4s_table*.csv"))]
     )
-    assert joined.correlated["thrust_N"]["session"] < 0.01 and joined.correlated["torque_Nm"]["session"] < 0.01
+    assert (
+        reduction(joined).correlated["thrust_N"]["session"] < 0.01
+        and reduction(joined).correlated["torque_Nm"]["session"] < 0.01
+    )
 
 
 def test_plateaus_of_the_raw_record_keep_to_one_propeller(shared_data: Path) -> None:
     got = reduce(importers.read(shared_data / "jmajew" / "raw" / "curr_cal.csv"))
-    assert [round(1e6 * p) for p in got.series["pwm_s"]] == [1200, 1400, 1450, 1500, 1550, 1600]
-    k = got.series["thrust_N"] / got.series["rpm"] ** 2
-    assert np.ptp(k[1:]) / k.mean() < 0.05 and got.drift["thrust_N"] == pytest.approx(0.0069, abs=0.002)
+    assert [round(1e6 * p) for p in got["pwm_s"]] == [1200, 1400, 1450, 1500, 1550, 1600]
+    k = got["thrust_N"] / got["rpm"] ** 2
+    assert np.ptp(k[1:]) / k.mean() < 0.05 and reduction(got).drift["thrust_N"] == pytest.approx(0.0069, abs=0.002)
     assert any("power_W" in n and "times torque x speed: left out" in n for n in got.notes)
 
 
@@ -510,14 +523,12 @@ def test_plateaus_of_the_raw_record_agree_with_its_makers_own_evaluation(shared_
     2.15e-6 with 1.33, or are further off), so this is the only raw-against-maker comparison in the data.
     """
     record = importers.read(shared_data / "jmajew" / "raw" / "curr_cal.csv")
-    got = reduce(record).series
+    got = reduce(record)
     stated = []
     for file in sorted((shared_data / "jmajew").glob("*table*.csv")):
         if not re.search("no-?prop", file.name):
-            stated += list(reduce(importers.read(file)).series.u["thrust_N"])
-    pulse, power, efficacy = (
-        record.channels[name].values for name in ("pulse_width_s", "electrical_power_W", "efficacy_N_W")
-    )
+            stated += list(reduce(importers.read(file)).u["thrust_N"])
+    pulse, power, efficacy = (record[name] for name in ("pulse_width_s", "electrical_power_W", "efficacy_N_W"))
     off = []
     for i, p in enumerate(got["pwm_s"]):
         step = np.isclose(pulse, p)
@@ -528,6 +539,6 @@ def test_plateaus_of_the_raw_record_agree_with_its_makers_own_evaluation(shared_
 
 def test_a_slow_ramp_up_and_down_shows_its_hysteresis(shared_data: Path) -> None:
     got = reduce(importers.read(shared_data / "thrust_map" / "xNova-SR-ramp.csv"))
-    assert got.mode == "points" and "quasi-steady" in got.notes[0]
-    loop = got.hysteresis["thrust_N"]
+    assert reduction(got).mode == "points" and "quasi-steady" in got.notes[0]
+    loop = reduction(got).hysteresis["thrust_N"]
     assert 0.002 < abs(loop.share) < 0.02 and loop.points > 50

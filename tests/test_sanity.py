@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,6 @@ import pytest
 from bemt.base import units
 from bemt.base.errors import InputError
 from bemt.dataset import Dataset
-from bemt.readers._imported import Channel, Imported
 from bemt.recordings.check import Finding, check
 from bemt.recordings.load import import_file
 
@@ -41,11 +41,9 @@ def stand(rows: int = 15, seed: int = 0, diameter: float = 10 * INCH, noise: flo
     }  # fmt: skip
 
 
-def recording(values: dict[str, np.ndarray]) -> Imported:
-    told = {k: units.split_suffix(k)[1] for k in values}
-    channels = {k: Channel(np.asarray(v, float), u.suffix if u else "") for k, v in values.items() for u in [told[k]]}
-    rows = len(next(iter(values.values())))
-    return Imported("table", "bench", rows, channels, lines=tuple(range(2, rows + 2)))
+def recording(values: dict[str, np.ndarray]) -> Dataset:
+    own = {k: unit.suffix if (unit := units.split_suffix(k)[1]) else "" for k in values}
+    return Dataset("bench", "table", values, lines=range(2, len(next(iter(values.values()))) + 2), units=own)
 
 
 def said(found: tuple[Finding, ...], id_: str, channel: str = "") -> list[Finding]:
@@ -111,7 +109,7 @@ def test_the_file_s_own_products_name_the_slip_exactly(channel: str, factor: flo
     values["efficacy_N_W"] = values["thrust_N"] / values["electrical_power_W"]
     values[channel] = values[channel] * factor
     got = recording(values)
-    got.channels["efficacy_N_W"].__dict__["unit"] = "N/W"  # type: ignore[index]
+    got = replace(got, units={**got.units, "efficacy_N_W": "N/W"})
     (finding,) = [f for f in check(got) if f.id == id_]
     assert words in finding.correction.split("Fits as well")[0] and finding.severity == "error"
 
@@ -326,17 +324,17 @@ def test_nothing_is_said_where_nothing_can_be_known() -> None:
     values = stand()
     assert check(recording({"thrust_N": values["thrust_N"] * KGF})) == ()
     assert check(recording({"rpm": values["rpm"], "thrust_N": values["thrust_N"] / KGF})) == ()
-    assert check(Imported("table", "table", 2, {"x": Channel(np.array([1.0, 2.0]))})) == ()
-    assert check(Imported("table", "table", 1, {"thrust_N": Channel(np.array([np.nan]), "N")})) == ()
+    assert check(Dataset("table", "table", {"x": [1.0, 2.0]}, units={"x": ""})) == ()
+    assert check(Dataset("table", "table", {"thrust_N": [np.nan]})) == ()
 
 
 def test_nothing_is_changed() -> None:
     values = stand()
     values["thrust_N"] = values["thrust_N"] / KGF
     got = recording(values)
-    before = {k: c.values.copy() for k, c in got.channels.items()}
+    before = {k: v.copy() for k, v in got.values.items()}
     assert check(got, diameter_m=10 * INCH)
-    assert all(np.array_equal(before[k], c.values) for k, c in got.channels.items())
+    assert all(np.array_equal(before[k], v) for k, v in got.values.items())
 
 
 def test_several_faults_are_all_found() -> None:
@@ -388,7 +386,7 @@ stamp that is late, torque of a left-hand rotor, two misread speeds of one log. 
 Change = Callable[[np.ndarray], np.ndarray]
 
 
-def planted(source: Path, folder: Path, name: str, changes: dict[str, Change | str]) -> Imported:
+def planted(source: Path, folder: Path, name: str, changes: dict[str, Change | str]) -> Dataset:
     """The file with some columns changed (a function) or overwritten by another one (its heading)."""
     text = source.read_text(encoding="utf-8-sig")
     mark = ";" if ";" in text.split("\n", 1)[0] else ","

@@ -15,13 +15,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.errors import Fault, InputError
 
-__all__ = ["Average", "keep_last", "relation", "revolution_average", "steady_average", "time_steps"]
+__all__ = ["Average", "Mean", "keep_last", "relation", "revolution_average", "steady_average", "time_steps"]
 
 Array = NDArray[np.float64]
 
@@ -33,6 +34,14 @@ FEW_ROWS = 36
 """Rows in a revolution below which an average is doubtful (10 deg a step)."""
 STEADY_SHARE = 0.2
 """Last part of a steady run that its mean is taken over."""
+
+
+class Mean(NamedTuple):
+    """What stands for a channel, in its unit; what it was taken over, in words; drift over that part or None [1]."""
+
+    value: float
+    over: str
+    drift: float | None = None
 
 
 @dataclass(frozen=True)

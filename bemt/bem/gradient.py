@@ -1,19 +1,22 @@
 """Derivatives of thrust and torque by every blade element's chord and angle, and by the operating point.
 
 The annuli of a blade do not know of each other: all chords (or all angles) are moved at once, and the change of each
-element's own load is the derivative of the sum by that element's input. So all stations cost four solves.
+element's own load is the derivative of the sum by that element's input. So all stations cost four solves. The
+moved rotors are prepared once per geometry; every further operating point costs eleven solves.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.errors import Fault, InputError
+from bemt.bem import kernel as K
 from bemt.bem import solver
 from bemt.bem.model import Model, acts_on_points, acts_on_rotor
 
@@ -23,12 +26,13 @@ if TYPE_CHECKING:
     from bemt.effects import Effect
     from geometry.blade import Stations
 
-__all__ = ["Gradient", "gradient"]
+__all__ = ["Gradient", "gradient", "loads"]
 
 Array = NDArray[np.float64]
 
 STEP = 1e-6
 """Relative step of the central differences; of blade angles in radians, of airspeed in tip speeds."""
+_RAD_PER_RPM = math.pi / 30.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,50 +93,89 @@ def gradient(
     >>> g.chord.shape, bool(g.pitch[0] > 0), bool(g.airspeed[0] < 0)
     ((2, 40), True, True)
     """
+    moved = _moved(model, effects, stations, step)
+    tip = rpm * _RAD_PER_RPM * model.rotor.R
+    dn, dV, drho = step * rpm, step * tip, step * air.rho
+    rates, speeds, densities = (np.array([[0, 1, -1, 0, 0, 0, 0], [0, 0, 0, 1, -1, 0, 0], [0, 0, 0, 0, 0, 1, -1]])
+                                * [[dn], [dV], [drho]] + [[rpm], [airspeed_m_s], [air.rho]])  # fmt: skip
+    around_point = _elements(moved.base, rates, speeds, densities, air)
+    sums = around_point.sum(axis=2)
+    here = ([rpm], [airspeed_m_s], [air.rho], air)
+    chord, beta = (
+        (_elements(high, *here)[:, 0] - _elements(low, *here)[:, 0]) / width
+        for low, high, width in (moved.chord, moved.beta)
+    )
+    by = [(sums[:, 2 * k + 1] - sums[:, 2 * k + 2]) / (2.0 * d) for k, d in enumerate((dn, dV, drho))]
+    return Gradient(moved.base.stations, float(sums[0, 0]), float(sums[1, 0]), chord, beta, *by)
+
+
+def loads(
+    model: Model, effects: Sequence[Effect], rpm: float, airspeed_m_s: float, air: Air, stations: Stations
+) -> tuple[float, float]:
+    """Thrust [N] and torque [N m] of the rotor with these stations."""
+    both = _elements(_prepared(model, _inside(effects), stations), [rpm], [airspeed_m_s], [air.rho], air)
+    return float(both[0].sum()), float(both[1].sum())
+
+
+class _Moved(NamedTuple):
+    """The rotor, and rotors whose chords (angles) are all a little smaller and larger, with the distance between."""
+
+    base: Prepared
+    chord: tuple[Prepared, Prepared, Array]
+    beta: tuple[Prepared, Prepared, Array]
+
+
+def _moved(model: Model, effects: Sequence[Effect], stations: Stations | None, step: float) -> _Moved:
+    """Prepared once per geometry: the model keeps those of its own stations."""
+    chosen = _inside(effects)
+    s = stations if stations is not None else model.rotor.blade.midpoints(model.n_stations, spacing="cosine")
+
+    def made(s: Stations) -> Prepared:
+        return _prepared(model, chosen, s)
+
+    def pair(key: str, width: Array) -> tuple[Prepared, Prepared, Array]:
+        low, high = (made(s._replace(**{key: getattr(s, key) + sign * width})) for sign in (-1.0, 1.0))
+        return low, high, 2.0 * width
+
+    def all_of_them() -> _Moved:
+        return _Moved(made(s), pair("chord", step * s.chord), pair("beta", np.full(s.beta.shape, step)))
+
+    if stations is not None:
+        return all_of_them()
+    key = ("moved", chosen, step)
+    if key not in model._kept:
+        model._kept[key] = all_of_them()
+    found: _Moved = model._kept[key]
+    return found
+
+
+def _inside(effects: Sequence[Effect]) -> tuple[Effect, ...]:
+    """Effects in the solver's order; those around the rotor are refused."""
     around = [e.id for e in effects if acts_on_points(e)]
     if around:
         raise InputError(Fault("", "effects", ", ".join(around), "effects inside the rotor", "Differentiate without"))
-    here = stations if stations is not None else model.rotor.blade.midpoints(model.n_stations, spacing="cosine")
-    base = _prepared(model, effects, here)
-    thrust, torque = _elements(base, rpm, airspeed_m_s, air)
-
-    def by(low: Stations, high: Stations, width: Array) -> Array:
-        a, b = (np.stack(_elements(_prepared(model, effects, s), rpm, airspeed_m_s, air)) for s in (low, high))
-        return np.asarray((b - a) / width)
-
-    dc, db = step * here.chord, np.full(here.beta.shape, step)
-    chord = by(here._replace(chord=here.chord - dc), here._replace(chord=here.chord + dc), 2.0 * dc)
-    beta = by(here._replace(beta=here.beta - db), here._replace(beta=here.beta + db), 2.0 * db)
-    dn, dV, drho = step * rpm, step * rpm * np.pi / 30.0 * model.rotor.R, step * air.rho
-    rest = [
-        (rpm - dn, airspeed_m_s, air.rho),
-        (rpm + dn, airspeed_m_s, air.rho),
-        (rpm, airspeed_m_s - dV, air.rho),
-        (rpm, airspeed_m_s + dV, air.rho),
-        (rpm, airspeed_m_s, air.rho - drho),
-        (rpm, airspeed_m_s, air.rho + drho),
-    ]
-    loads = np.array([[v.sum() for v in _elements(base, n, V, replace(air, rho=float(rho)))] for n, V, rho in rest])
-    slopes = [(loads[2 * k + 1] - loads[2 * k]) / (2.0 * d) for k, d in enumerate((dn, dV, drho))]
-    return Gradient(here, float(thrust.sum()), float(torque.sum()), chord, beta, *slopes)
+    return tuple(sorted((e for e in effects if acts_on_rotor(e)), key=lambda e: (e.order, e.id)))
 
 
 def _prepared(model: Model, effects: Sequence[Effect], stations: Stations) -> Prepared:
-    chosen = tuple(sorted((e for e in effects if acts_on_rotor(e)), key=lambda e: (e.order, e.id)))
     return solver.prepare(
-        model.rotor,
-        model.polars,
-        chosen,
-        model.duct,
-        stations=stations,
-        mach_max=model.mach_max,
-        re_range=model.re_range,
-    )
+        model.rotor, model.polars, effects, model.duct, stations=stations,
+        mach_max=model.mach_max, re_range=model.re_range,
+    )  # fmt: skip
 
 
-def _elements(prep: Prepared, rpm: float, V: float, air: Air) -> tuple[Array, Array]:
-    """Thrust [N] and torque [N m] of each element, all blades."""
-    s = solver.solve(prep, rpm, V, air, radial=True)
-    if not s.converged[0]:
-        raise InputError(Fault("", f"{rpm:g} rev/min, {V:g} m/s", "; ".join(s.flags[0]), "a converged point"))
-    return s.radial["dT"][0], s.radial["dQ"][0]
+def _elements(prep: Prepared, rpm: ArrayLike, V: ArrayLike, rho: ArrayLike, air: Air) -> Array:
+    """Thrust [N] and torque [N m] of each element, all blades, (2, P, N)."""
+    points = np.empty((len(np.atleast_1d(rpm)), K.N_POINT))
+    points[:, K.P_OMEGA], points[:, K.P_V], points[:, K.P_RHO] = np.multiply(rpm, _RAD_PER_RPM), V, rho
+    points[:, K.P_MU], points[:, K.P_SOUND] = air.mu, air.a_sound
+    out = np.empty((points.shape[0], K.N_OUT))
+    radial = np.empty((points.shape[0], prep.st.shape[0], K.N_RADIAL))
+    entry, *constant = prep.kernel
+    entry(points, *constant, out, radial)
+    loads = np.stack([radial[:, :, solver.RADIAL.index(name)] for name in ("dT", "dQ")])
+    if np.any(out[:, K.O_STATUS] != K.OK) or not np.all(np.isfinite(loads)):
+        s = solver.solve(prep, np.asarray(rpm), np.asarray(V), air)
+        where = f"{np.ravel(rpm)[0]:g} rev/min, {np.ravel(V)[0]:g} m/s"
+        raise InputError(Fault("", where, "; ".join(w for f in s.flags for w in f) or "no load", "a converged point"))
+    return loads

@@ -27,7 +27,6 @@ from bemt.sections.neuralfoil import neuralfoil_polar
 from bemt.sections.polars import Polar
 
 if TYPE_CHECKING:
-    from bemt.bem.gradient import Gradient
     from geometry.duct import Duct
     from geometry.rotor import Rotor
 
@@ -71,7 +70,7 @@ class Model:
     re_range: tuple[float, float] | None = None
     effects: tuple[Effect, ...] = field(default_factory=standard)
     notes: tuple[str, ...] = ()
-    _kept: dict[Any, solver.Prepared] = field(default_factory=dict, repr=False)
+    _kept: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     @property
     def diameter_m(self) -> float:
@@ -161,12 +160,6 @@ class Model:
         provenance = {"source": "bemt", "effects": self._texts, "stations": self.n_stations}
         name = self.rotor.name or "rotor"
         return Dataset("bemt", name, values, flags=flags, provenance=provenance, notes=self.notes)
-
-    def gradient(self, rpm: float, V: float = 0.0, air: Air | None = None) -> Gradient:
-        """Differentiate rotor thrust and torque at one point by every element's chord and angle, rpm, V, density."""
-        from bemt.bem.gradient import gradient
-
-        return gradient(self, self.effects, rpm, V, Air.from_density() if air is None else air)
 
 
 def solve(

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bemt.bem.gradient import gradient
+from bemt.bem.gradient import gradient, loads
 
 if TYPE_CHECKING:
     from bemt.air import Air
     from bemt.bem.model import Model
     from bemt.effects import Effect
+    from geometry.blade import Stations
 
 __all__ = ["rotor_component"]
 
@@ -37,17 +38,16 @@ def rotor_component(model: Model, effects: Sequence[Effect], air: Air) -> Any:
             self.add_output("torque", units="N*m")
             self.declare_partials("*", "*")
 
-        def _at(self, inputs: Any) -> Any:
+        def _at(self, inputs: Any) -> tuple[float, float, Air, Stations]:
             stations = start._replace(chord=np.array(inputs["chord"]), beta=np.array(inputs["beta"]))
             here = replace(air, rho=float(inputs["density"].item()))
-            return gradient(model, effects, inputs["rpm"].item(), inputs["airspeed"].item(), here, stations)
+            return inputs["rpm"].item(), inputs["airspeed"].item(), here, stations
 
         def compute(self, inputs: Any, outputs: Any) -> None:
-            found = self._at(inputs)
-            outputs["thrust"], outputs["torque"] = found.thrust_N, found.torque_Nm
+            outputs["thrust"], outputs["torque"] = loads(model, effects, *self._at(inputs))
 
         def compute_partials(self, inputs: Any, partials: Any) -> None:
-            found = self._at(inputs)
+            found = gradient(model, effects, *self._at(inputs))
             for k, name in enumerate(("thrust", "torque")):
                 partials[name, "chord"], partials[name, "beta"] = found.chord[k], found.beta[k]
                 partials[name, "rpm"], partials[name, "airspeed"] = found.rpm[k], found.airspeed[k]

@@ -42,6 +42,9 @@ REASONS = {
 }
 """Words for the kernel's states of failure."""
 
+RADIAL = ("phi", "alpha", "cl", "cd", "W", "w", "v_t", "F", "dT", "dQ")
+"""First columns of the kernel's radial results."""
+
 THICKNESS = 0.12
 """Thickness over chord of blades whose sections are not known [1]."""
 
@@ -463,8 +466,7 @@ def _words(
 
 
 def _radial(prep: Prepared, points: Array, rad: Array) -> dict[str, Array]:
-    names = ("phi", "alpha", "cl", "cd", "W", "w", "v_t", "F", "dT", "dQ")
-    res: dict[str, Array] = {name: rad[:, :, i].copy() for i, name in enumerate(names)}
+    res: dict[str, Array] = {name: rad[:, :, i].copy() for i, name in enumerate(RADIAL)}
     res["alpha"] = np.remainder(res["alpha"] + np.pi, 2.0 * np.pi) - np.pi
     r = prep.st[:, K.S_R]
     res["r"] = np.broadcast_to(r, res["phi"].shape).copy()

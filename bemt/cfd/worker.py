@@ -91,7 +91,7 @@ def history_of(folder: Path, settings: Settings) -> Array:
     from bemt.readers.openfoam_forces import read
 
     def column(name: str, file: str, channel: str) -> Array:
-        return np.asarray(read(folder / "postProcessing" / name / "0" / file).channels[channel].values, dtype=float)
+        return np.asarray(read(folder / "postProcessing" / name / "0" / file)[channel])
 
     force, moment = (
         column("forces", "force.dat", "force_total_z_N"),

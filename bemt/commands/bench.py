@@ -18,14 +18,20 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     _options.add_json(parser, "bemt.bench/1")
     parser.add_argument("--quick", action="store_true", help="fewer repetitions")
     parser.add_argument("--work", metavar="DIR", help="time the work in this folder instead of the shipped one")
+    log = "time import and diagnose over a made-up log of N rows instead, and their memory"
+    parser.add_argument("--log", type=_options.positive, metavar="N", help=log)
 
 
 def run(args: argparse.Namespace) -> int:
     """Print the times; 1 when a point of the work did not converge."""
     import json
 
-    from bemt.compare.bench import timing, work
+    from bemt.compare.bench import large_log, timing, work
 
+    if args.log is not None:
+        log = large_log.document(args.log)
+        print(json.dumps(log, indent=1, allow_nan=False) if args.json else large_log.table(log))
+        return EXIT_OK
     found = timing.document(work.load(args.work), args.quick)
     print(json.dumps(found, indent=1, allow_nan=False) if args.json else timing.table(found))
     if found["converged"] < found["points"]:

@@ -37,9 +37,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--along", metavar="FILE", help=blade)
     seen = "look at these only (default: all that were measured)"
     parser.add_argument("--channels", choices=tuple(_CHANNELS), help=seen, **_options.MANY)
-    speed = "speed of force files of CFD, one for all or one each [rev/min]"
+    speed = "speed of files that have none, one for all or one each [rev/min]"
     parser.add_argument("--rpm", type=float, default=[], metavar="N", help=speed, **_options.MANY)
-    wind = "airspeed of force files of CFD, one for all or one each [m/s] (default: the case's)"
+    wind = "airspeed of files that have none, one for all or one each [m/s] (default: the case's)"
     parser.add_argument("--airspeed", type=float, default=[], metavar="V", help=wind, **_options.MANY)
     parser.add_argument("--out", metavar="DIR", help="write diagnosis.json, figures and the improved cases there")
     parser.add_argument("--no-figures", action="store_true", help="with --out: no figures")

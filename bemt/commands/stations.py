@@ -15,7 +15,7 @@ EXAMPLE = "stations rotor.stl --unit mm --out cases/mine"
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument("file", metavar="FILE", help="STL, OBJ, STEP; XROTOR, QPROP or DFDC")
+    parser.add_argument("file", metavar="FILE", help="STL, OBJ, STEP; XROTOR, QPROP, DFDC or an AeroDyn driver")
     parser.add_argument("--unit", choices=("mm", "m", "in"), help="of an STL or OBJ that does not state it")
     parser.add_argument("--out", metavar="DIR", help="write case.toml, stations.csv and section files there")
     _options.add_json(parser, "bemt.stations/1")

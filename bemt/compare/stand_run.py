@@ -6,7 +6,6 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,15 +13,14 @@ from numpy.typing import NDArray
 from bemt.air import Air
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
-from bemt.readers._imported import Channel, Imported
-from bemt.recordings.channels import view
-from bemt.recordings.reduce import Reduced, reduce
+from bemt.dataset import DIMENSIONLESS, Dataset
+from bemt.recordings.channels import named
+from bemt.recordings.reduce import reduce, reduction
 
 __all__ = ["StandRun", "selected", "stand_run", "with_air"]
 
 Array = NDArray[np.float64]
 
-_PURE = ("CT", "CP", "CQ", "J", "eta")
 _LOADS = ("thrust_N", "torque_Nm", "power_W", "CT", "CP", "CQ")
 _WANTED = (
     *_LOADS,
@@ -95,19 +93,19 @@ class StandRun:
         return int(next(iter(self.values.values())).size)
 
 
-def _kept(imported: Imported, column: str, wanted: str, where: str) -> NDArray[np.bool_]:
+def _kept(imported: Dataset, column: str, wanted: str, where: str) -> NDArray[np.bool_]:
     """Rows of one condition: a text, a number, or a range of numbers."""
-    names = {h: k for k, h in imported.headings.items()}
-    name = column if column in imported.channels or column in imported.texts else names.get(column, column)
+    names = {h: k for k, h in imported.provenance.get("headings", {}).items()}
+    name = column if column in imported or column in imported.texts else names.get(column, column)
     if name in imported.texts:
         found = np.array([cell.strip() == wanted for cell in imported.texts[name]])
         if not found.any():
             known = ", ".join(list(dict.fromkeys(c.strip() for c in imported.texts[name]))[:8])
             raise InputError(Fault(where, column, f"no row with {wanted}", f"one of {known}"))
         return found
-    channel = imported.channels.get(name)
-    if channel is None or channel.values.shape != (imported.rows,):
-        known = ", ".join([*imported.texts, *imported.channels][:12])
+    values = imported.values.get(name)
+    if values is None:
+        known = ", ".join([*imported.texts, *imported.values][:12])
         raise InputError(Fault(where, column, "no such column", f"one of {known}"))
     span = _RANGE.fullmatch(wanted)
     try:
@@ -115,49 +113,50 @@ def _kept(imported: Imported, column: str, wanted: str, where: str) -> NDArray[n
     except ValueError:
         raise InputError(Fault(where, column, wanted, "a number, or a range such as 0.9:1.1")) from None
     slack = _SAME_NUMBER * max(abs(low), abs(high), 1e-12)
-    kept = (channel.values >= low - slack) & (channel.values <= high + slack)
+    kept = (values >= low - slack) & (values <= high + slack)
     if not kept.any():
-        v = channel.values[np.isfinite(channel.values)]
+        v = values[np.isfinite(values)]
         told = f"{v.min():g} to {v.max():g} in SI" if v.size else "a number"
         raise InputError(Fault(where, column, f"no row with {wanted}", told))
     return np.asarray(kept)
 
 
-def _of_rotor(imported: Imported, word: str, where: str) -> Imported:
+def _of_rotor(imported: Dataset, word: str, where: str) -> Dataset:
     """Columns of one of several rotors under their plain names; columns of the others go."""
 
     def parts(name: str) -> list[str]:
         return name.split("_")
 
-    known = [w for w in _ROTOR_WORDS if any(w in parts(name) for name in imported.channels)]
+    known = [w for w in _ROTOR_WORDS if any(w in parts(name) for name in imported.values)]
     if word not in known:
         raise InputError(Fault(where, _ROTOR, word, f"one of {', '.join(known)}" if known else "a file of one rotor"))
     others = set(known) - {word}
-    channels = {}
-    for name, channel in imported.channels.items():
+    kept: dict[str, str] = {}
+    for name in imported.values:
         own = parts(name)
         if word in own:
-            channels["_".join(p for p in own if p != word)] = channel
+            kept["_".join(p for p in own if p != word)] = name
         elif not others & set(own):
-            channels.setdefault(name, channel)
-    return replace(imported, channels=channels)
+            kept.setdefault(name, name)
+    values = {new: imported[old] for new, old in kept.items()}
+    return replace(imported, values=values, u={}, u_by={}, units={new: imported.unit(old) for new, old in kept.items()})
 
 
-def selected(imported: Imported, conditions: Sequence[str], where: str) -> Imported:
+def selected(imported: Dataset, conditions: Sequence[str], where: str) -> Dataset:
     """Keep the rows, or the rotor, that a user means.
 
     Examples
     --------
-    >>> made = Imported("table", "bench", 2, {"rpm": Channel(np.array([4e3, 5e3]), "rpm")}, lines=(2, 3))
+    >>> made = Dataset("bench", "table", {"rpm": [4e3, 5e3]}, lines=(2, 3))
     >>> selected(made, ["rpm=4500:6000"], "a.csv").lines
     (3,)
     """
-    keep = np.ones(imported.rows, dtype=bool)
+    keep = np.ones(len(imported), dtype=bool)
     for text in conditions:
         found = _CONDITION.fullmatch(text)
         if not found:
             raise InputError(Fault(where, text, "no condition", "COLUMN=VALUE, COLUMN=LOW:HIGH or rotor=NAME"))
-        if found[1] == _ROTOR and _ROTOR not in imported.channels:
+        if found[1] == _ROTOR and _ROTOR not in imported:
             imported = _of_rotor(imported, found[2], where)
         else:
             keep &= _kept(imported, found[1], found[2], where)
@@ -165,27 +164,7 @@ def selected(imported: Imported, conditions: Sequence[str], where: str) -> Impor
         return imported
     if not keep.any():
         raise InputError(Fault(where, ", ".join(conditions), "no row that meets all", "one or more"))
-    return _cut(imported, np.flatnonzero(keep))
-
-
-def _cut(imported: Imported, index: NDArray[np.intp]) -> Imported:
-    """Some of the rows."""
-
-    def cut(cells: tuple[Any, ...]) -> tuple[Any, ...]:
-        return tuple(cells[i] for i in index) if len(cells) == imported.rows else cells
-
-    channels = {
-        k: Channel(c.values[index], c.unit) if c.values.shape == (imported.rows,) else c
-        for k, c in imported.channels.items()
-    }
-    return replace(
-        imported,
-        rows=int(index.size),
-        channels=channels,
-        flags=cut(imported.flags),
-        lines=cut(imported.lines),
-        texts={k: cut(v) for k, v in imported.texts.items()},
-    )
+    return imported.select(keep)
 
 
 _AIR_UNITS = {
@@ -195,13 +174,13 @@ _AIR_UNITS = {
 _AIR_RANGES = {"temperature_K": (_COLD, _HOT), "pressure_Pa": (4e4, 1.1e5), "density_kg_m3": (0.4, 1.6)}
 
 
-def with_air(imported: Imported, told: str | None, where: str) -> Imported:
+def with_air(imported: Dataset, told: str | None, where: str) -> Dataset:
     """Add the air of the day that a user tells, such as ``22C,1013hPa``, in place of what is recorded.
 
     Examples
     --------
-    >>> told = with_air(Imported("table", "bench", 1, {}), "22C, 1013hPa", "--air-a").constants
-    >>> round(told["density_kg_m3"], 3)
+    >>> told = with_air(Dataset("bench", "table", {"rpm": [4e3]}), "22C, 1013hPa", "--air-a").provenance
+    >>> round(told["constants"]["density_kg_m3"], 3)
     1.196
     """
     if told is None:
@@ -224,18 +203,20 @@ def with_air(imported: Imported, told: str | None, where: str) -> Imported:
         raise InputError(faults)
     if known.keys() >= {"temperature_K", "pressure_Pa"}:
         known["density_kg_m3"] = Air.from_state(known["pressure_Pa"], known["temperature_K"] - ZERO_CELSIUS).rho
-    left = {k: c for k, c in imported.channels.items() if k not in _AIR_RANGES}
-    constants = {k: v for k, v in imported.constants.items() if k not in _AIR_RANGES}
-    return replace(imported, channels=left, constants=constants | known)
+    left = {k: v for k, v in imported.values.items() if k not in _AIR_RANGES}
+    u = {k: v for k, v in imported.u.items() if k in left}
+    constants = {k: v for k, v in imported.provenance.get("constants", {}).items() if k not in _AIR_RANGES}
+    return replace(imported, values=left, u=u, provenance={**imported.provenance, "constants": constants | known})
 
 
 def stand_run(
-    imported: Imported, name: str, diameter_m: float | None = None, conditions: Sequence[str] = ()
+    imported: Dataset, name: str, diameter_m: float | None = None, conditions: Sequence[str] = ()
 ) -> StandRun:
     """Reduce one recording for a comparison."""
-    imported = _with_units(selected(imported, conditions, name))
-    reduced, ramp = _reduced(imported, diameter_m)
-    series = reduced.series
+    imported = selected(imported, conditions, name)
+    units = {k: unit for k, unit in imported.units.items() if unit or k not in DIMENSIONLESS}
+    imported = replace(imported, units=units)  # a throttle has none
+    series, ramp = _reduced(imported, diameter_m)
     values = {k: np.asarray(series.values[k], dtype=float) for k in _WANTED if k in series.values}
     if not {"thrust_N", "torque_Nm", "power_W"} & values.keys() and "rpm" not in values and "J" not in values:
         raise InputError(Fault(name, "", "no speed", "rpm, or J with coefficients", "Nothing to compare at"))
@@ -247,69 +228,60 @@ def stand_run(
         del values["power_W"]
     rho = values.get("density_kg_m3", np.full(1, np.nan))
     density = float(np.nanmean(rho)) if np.isfinite(rho).any() else math.nan
-    constants = dict(imported.constants)
+    constants = imported.provenance.get("constants", {})
     if not math.isfinite(density):
         density = float(constants.get("density_kg_m3", math.nan))
     told = f"{name} ({', '.join(conditions)})" if conditions else name
-    session = {k: float(v["session"]) for k, v in reduced.correlated.items() if v.get("session")}
+    session = {k: float(v["session"]) for k, v in reduction(series).correlated.items() if v.get("session")}
     diameter = diameter_m if diameter_m is not None else float(constants.get("diameter_m", math.nan))
-    notes = (*ramp, *(n for n in reduced.notes if "no density" not in n))
+    notes = (*ramp, *(n for n in series.notes if "no density" not in n))
     warm = values.get("temperature_K", np.array([constants.get("temperature_K", math.nan)]))
     warm = warm[(warm > _COLD) & (warm < _HOT)]
     temperature = float(warm.mean()) if warm.size else math.nan
     return StandRun(
-        told, values, u, session, command, density, notes, diameter, temperature, _shifts(reduced, bool(ramp))
+        told, values, u, session, command, density, notes, diameter, temperature, _shifts(series, bool(ramp))
     )
 
 
-def _shifts(reduced: Reduced, ramp: bool) -> dict[str, float]:
+def _shifts(points: Dataset, ramp: bool) -> dict[str, float]:
     """Half of what a load differs by on the way up and down, and the lag of a ramp, over its largest value."""
     out = dict.fromkeys(_LOADS, _LAG) if ramp else {}
-    for name, loop in reduced.hysteresis.items():
-        top = float(np.nanmax(np.abs(reduced.series.values[name])))
+    for name, loop in reduction(points).hysteresis.items():
+        top = float(np.nanmax(np.abs(points[name])))
         out[name] = max(out.get(name, 0.0), 0.5 * abs(loop.difference) / top if top > 0.0 else 0.0)
     return out
 
 
-def _with_units(imported: Imported) -> Imported:
-    """Published coefficients have none; without this they would count as columns of unknown unit."""
-    channels = {
-        k: replace(c, unit="-") if not c.unit and (k in _PURE or k == "throttle") else c
-        for k, c in imported.channels.items()
-    }
-    return replace(imported, channels=channels)
-
-
-def _reduced(imported: Imported, diameter_m: float | None) -> tuple[Reduced, tuple[str, ...]]:
+def _reduced(imported: Dataset, diameter_m: float | None) -> tuple[Dataset, tuple[str, ...]]:
     """Steady points; of a ramp without any to speak of, its rows."""
     try:
         steady = reduce(imported, diameter_m=diameter_m)
     except InputError:
         steady = None
-    if steady is not None and (steady.mode == "points" or _useful(steady) >= _ENOUGH):
+    if steady is not None and (reduction(steady).mode == "points" or _useful(steady) >= _ENOUGH):
         return steady, ()
     slow = _ramp(imported)
     if slow is not None:
         rows = reduce(slow, diameter_m=diameter_m, steady=True)
         if steady is None or _useful(rows) > 2 * _useful(steady):
-            words = f"few steady points: {slow.rows} of {imported.rows} rows of a slow ramp are used as they are"
+            words = f"few steady points: {len(slow)} of {len(imported)} rows of a slow ramp are used as they are"
             return rows, (words,)
     return steady or reduce(imported, diameter_m=diameter_m), ()
 
 
-def _useful(reduced: Reduced) -> int:
+def _useful(points: Dataset) -> int:
     """Points with a speed and a load."""
-    v = reduced.series.values
+    v = points.values
     loads = [np.isfinite(v[k]) for k in _LOADS if k in v]
-    speed = np.isfinite(v["rpm"]) & (v["rpm"] > 0.0) if "rpm" in v else np.ones(len(reduced.series), dtype=bool)
+    speed = np.isfinite(v["rpm"]) & (v["rpm"] > 0.0) if "rpm" in v else np.ones(len(points), dtype=bool)
     return int(np.sum(np.any(loads, axis=0) & speed)) if loads else 0
 
 
-def _ramp(imported: Imported) -> Imported | None:
+def _ramp(imported: Dataset) -> Dataset | None:
     """Rows of a record of samples at which the speed changes slowly and reads what its neighbours read."""
-    seen = view(imported).values
+    seen = named(imported).values
     t, rpm = seen.get("time_s"), seen.get("rpm")
-    if rpm is None or imported.rows < _ROWS:
+    if rpm is None or len(imported) < _ROWS:
         return None
     if t is None:
         return imported
@@ -325,7 +297,7 @@ def _ramp(imported: Imported) -> Imported | None:
         )
         rate = np.abs(np.gradient(middle, t))
     keep = np.isfinite(middle) & (np.abs(speed - middle) < _JUMP) & (far < _JUMP) & (rate < _RATE)
-    return _cut(imported, np.flatnonzero(keep)) if keep.sum() >= _ROWS else None
+    return imported.select(keep) if keep.sum() >= _ROWS else None
 
 
 def _moves(v: Array) -> bool:

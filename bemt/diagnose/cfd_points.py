@@ -13,7 +13,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
 
 if TYPE_CHECKING:
-    from bemt.readers._imported import Channel, Imported
+    from bemt.base.averaging import Mean
 
 __all__ = ["has_forces", "point_of"]
 
@@ -29,20 +29,21 @@ _NET = ("net", "total", "")
 _BESIDE = {"force.dat": "moment.dat", "moment.dat": "force.dat"}
 
 
-def has_forces(imported: Imported) -> bool:
+def has_forces(imported: Dataset) -> bool:
     """Whether a file holds forces of a computation and no points of a stand."""
-    return imported.kind == "cfd" and any(_FORCE.fullmatch(k) or _MOMENT.fullmatch(k) for k in imported.channels)
+    return imported.kind == "cfd" and any(_FORCE.fullmatch(k) or _MOMENT.fullmatch(k) for k in imported.values)
 
 
-def _components(channels: Mapping[str, Channel], pattern: re.Pattern[str], path: str) -> dict[str, tuple[float, float]]:
+def _components(d: Dataset, pattern: re.Pattern[str], path: str) -> dict[str, tuple[float, float]]:
     """Mean and drift of the whole load by axis; {} without one."""
     zones: dict[str, dict[str, dict[str, tuple[float, float]]]] = {}
-    for name, c in channels.items():
+    means: Mapping[str, Mean] = d.provenance.get("means", {})
+    for name, v in d.values.items():
         m = pattern.fullmatch(name)
         if m is None:
             continue
-        mean = float(np.nanmean(c.values)) if c.mean is None else c.mean
-        zones.setdefault((m[3] or "").lower(), {}).setdefault(m[2], {})[m[1]] = (mean, abs(mean * (c.drift or 0.0)))
+        mean, _, drift = means.get(name, (float(np.nanmean(v)), "", None))
+        zones.setdefault((m[3] or "").lower(), {}).setdefault(m[2], {})[m[1]] = (mean, abs(mean * (drift or 0.0)))
     if not zones:
         return {}
     zone = next((z for z in _NET if z in zones), None)
@@ -57,18 +58,18 @@ def _components(channels: Mapping[str, Channel], pattern: re.Pattern[str], path:
     return out
 
 
-def point_of(imported: Imported, path: str, rpm: float | None, airspeed_m_s: float | None) -> Dataset:
+def point_of(imported: Dataset, path: str, rpm: float | None, airspeed_m_s: float | None) -> Dataset:
     """One point of a force file, and of the moment file that OpenFOAM writes beside it."""
     from bemt.recordings.load import import_file
 
     if rpm is None:
         raise InputError(Fault(path, "--rpm", "a force file of CFD without a speed of rotation", "--rpm N",
                                "One number for all files, or one each; --airspeed likewise"))  # fmt: skip
-    channels = dict(imported.channels)
+    files = [imported]
     other = Path(path).with_name(_BESIDE.get(Path(path).name, Path(path).name))
     if other.name != Path(path).name and other.is_file():
-        channels = {**import_file(str(other)).channels, **channels}
-    forces, moments = (_components(channels, pattern, path) for pattern in (_FORCE, _MOMENT))
+        files.insert(0, import_file(str(other)))
+    forces, moments = ({k: v for d in files for k, v in _components(d, p, path).items()} for p in (_FORCE, _MOMENT))
     lead = forces or moments
     axis = max(lead, key=lambda a: abs(lead[a][0]))
     side = max((abs(v) for a, (v, _) in lead.items() if a != axis), default=0.0)

@@ -18,7 +18,7 @@ from bemt.effects import catalogue
 
 if TYPE_CHECKING:
     from bemt.case import Case
-    from bemt.readers._imported import Imported
+    from bemt.dataset import Dataset
 
 # Remarks on the files come first in an explanation; `import` shows them.
 _REMARK = "Before any physics"
@@ -114,7 +114,7 @@ def compare(
                 "Its scatter would count as agreement",
             )
         )
-    read: list[Imported] = []
+    read: list[Dataset] = []
     faults: list[Fault] = []
     for name, rows, air, option in zip(names, conditions, (air_a, air_b), ("--air-a", "--air-b"), strict=True):
         try:
@@ -152,7 +152,7 @@ def _case(path: str) -> Case:
 
 
 def _diagnosed(
-    names: Sequence[str], read: Sequence[Imported], case: Case, progress: Callable[[str], None] | None
+    names: Sequence[str], read: Sequence[Dataset], case: Case, progress: Callable[[str], None] | None
 ) -> dict[str, Any]:
     """Verdict of the diagnosis of B with A as reference."""
     from bemt.diagnose.chain import diagnose

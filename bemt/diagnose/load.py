@@ -20,15 +20,12 @@ from bemt.case.prepare import prepare_case
 from bemt.dataset import Dataset
 from bemt.diagnose import cfd_points
 from bemt.diagnose import record as records
-from bemt.recordings.channels import view
+from bemt.recordings.channels import file_name, named, stated
 from bemt.recordings.check import check
 
 if TYPE_CHECKING:
     from bemt.case import Case
     from bemt.diagnose.record import Record
-    from bemt.readers._imported import Imported
-    from bemt.recordings.channels import Recorded
-    from bemt.recordings.reduce import Reduced
 
 __all__ = ["cases_of", "check_effects", "load", "load_all"]
 
@@ -57,58 +54,76 @@ def cases_of(paths: Sequence[str], off: Sequence[str], n: int) -> list[Case]:
 
 
 def load(
-    path: str, case: Case, imported: Imported | None = None, rpm: float | None = None,
+    path: str, case: Case, imported: Dataset | None = None, rpm: float | None = None,
     airspeed_m_s: float | None = None,
 ) -> Record:  # fmt: skip
     """Read one recording, whatever its format."""
-    from bemt.recordings import reduce as reduction
     from bemt.recordings.load import import_file
+    from bemt.recordings.reduce import reduce, reduction
 
     if imported is None:
         imported = import_file(path)
         _one_setup(imported, path)
     if cfd_points.has_forces(imported):
         made = records.from_series(cfd_points.point_of(imported, path, rpm, airspeed_m_s), case)
-        return replace(made, notes=(*made.notes, *imported.warnings))
+        return replace(made, notes=(*made.notes, *imported.notes))
+    imported = _filled(imported, rpm, airspeed_m_s)
     _same_rotor(imported, case, path)
     ducted = case.ducted
     findings = check(imported, diameter_m=case.diameter_m, blades=int(case.get("rotor.blades")), ducted=ducted)
     found = tuple(f"{Path(path).name}: {f}" for f in findings if f.severity != "note")
-    rows = view(imported)
-    if {"CT", "CP", "CQ"} & set(imported.channels):
+    rows = named(imported)
+    if {"CT", "CP", "CQ"} & set(imported.values):
         made = records.from_series(_points(imported, rows, path), case)
     else:
-        reduced = reduction.reduce(imported, diameter_m=case.diameter_m)
-        if reduced.mode == "points" and imported.format == "table":
+        points = reduce(imported, diameter_m=case.diameter_m)
+        shared = reduction(points).correlated
+        if reduction(points).mode == "points" and imported.provenance["format"] == "table":
             # somebody's own table of points: every row counts, a jump from row to row may be what it shows
-            series = _points(imported, rows, path)
-            made = records.from_series(_scattered(series, reduced), case, reduced.correlated)
-        else:
-            made = records.from_series(reduced.series, case, reduced.correlated)
-    notes = (*made.notes, *imported.warnings, *rows.notes, *_unused(imported, rows, case))
+            points = _scattered(_points(imported, rows, path), points)
+        made = records.from_series(points, case, shared)
+    notes = (*made.notes, *imported.notes, *rows.notes, *_unused(imported, rows, case))
     return replace(made, findings=found, notes=notes)
 
 
-def _scattered(series: Dataset, reduced: Reduced) -> Dataset:
+def _filled(imported: Dataset, rpm: float | None, airspeed_m_s: float | None) -> Dataset:
+    """Recording with the speed and the airspeed that the user states where it has no column of them."""
+    known = named(imported).values
+    told, notes = {}, []
+    for name, value, same in (("rpm", rpm, ("rpm",)), ("airspeed_m_s", airspeed_m_s, ("airspeed_m_s", "J"))):
+        if value is None:
+            continue
+        own = next((k for k in same if k in known), None)
+        if own is None:
+            told[name] = np.full(len(imported), float(value))
+        notes.append(f"{name}: {value:g} as told" if own is None else f"{name}: not as told, the file has {own}")
+    values = {**imported.values, **told}
+    units = {k: unit for k, unit in imported.units.items() if k not in told}
+    return replace(imported, values=values, units=units, notes=(*imported.notes, *notes)) if notes else imported
+
+
+def _scattered(series: Dataset, reduced: Dataset) -> Dataset:
     """Rows that state no uncertainty with that which the repeats of the reduction showed."""
+    from bemt.recordings.reduce import reduction
+
     u, floor = {k: np.array(v) for k, v in series.u.items()}, 1e-3
-    for name, seen in reduced.series.u.items():
+    for name, seen in reduced.u.items():
         if name not in ("thrust_N", "torque_Nm") or name not in series or np.isfinite(u[name]).any():
             continue
         full = float(np.nanmax(np.abs(series[name])))
-        for rows, value in zip(reduced.rows, seen, strict=True):
-            u[name][list(rows)] = np.hypot(value, floor * full)
+        for rows, value in zip(reduction(reduced).rows, seen, strict=True):
+            u[name][rows] = np.hypot(value, floor * full)
     return replace(series, u=u)
 
 
-def _same_rotor(imported: Imported, case: Case, path: str) -> None:
+def _same_rotor(imported: Dataset, case: Case, path: str) -> None:
     """Refuse a recording that says itself that it is of another rotor, or contradicts itself."""
     faults = []
-    told = imported.constants.get("diameter_m")
+    told = imported.provenance.get("constants", {}).get("diameter_m")
     if told and abs(told / case.diameter_m - 1.0) > _SAME:
         faults.append(Fault(path, "diameter_m", f"{told:.4g}", f"{case.diameter_m:.4g} as in the case {case.name}",
                             "The case of another rotor?"))  # fmt: skip
-    v = view(imported).values
+    v = named(imported).values
     if {"J", "airspeed_m_s", "rpm"} <= v.keys():
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = v["airspeed_m_s"] / (v["rpm"] / 60.0 * case.diameter_m) / v["J"]
@@ -120,11 +135,11 @@ def _same_rotor(imported: Imported, case: Case, path: str) -> None:
         raise InputError(faults)
 
 
-def _unused(imported: Imported, rows: Recorded, case: Case) -> list[str]:
+def _unused(imported: Dataset, rows: Dataset, case: Case) -> list[str]:
     """Channels that the file has and that nothing here looks at, and loads that it has twice."""
     known = {*_POINT, *_LOADS, "humidity"}
-    heard = {rows.names.get(k, k) for k in rows.values if k in known} | {k for k in imported.channels if k in known}
-    left = [k for k in imported.channels if k not in heard and not k.startswith("u_") and "err" not in k]
+    heard = {file_name(rows, k) for k in rows.values if k in known} | {k for k in imported.values if k in known}
+    left = [k for k in imported.values if k not in heard and not k.startswith("u_") and "err" not in k]
     shown = ", ".join(left[:_NAMED]) + (f" and {len(left) - _NAMED} more" if len(left) > _NAMED else "")
     out = [f"not used: {shown}"] if left else []
     v, n = rows.values, rows.values.get("rpm", np.full(len(rows), np.nan)) / 60.0
@@ -137,12 +152,11 @@ def _unused(imported: Imported, rows: Recorded, case: Case) -> list[str]:
     return out
 
 
-def _points(imported: Imported, rows: Recorded, path: str) -> Dataset:
+def _points(imported: Dataset, rows: Dataset, path: str) -> Dataset:
     """Rows as they are: coefficients by their own names, measured channels as a recording names them."""
-    n, known = imported.rows, {*_POINT, *_LOADS}
-    raw = {k: np.broadcast_to(c.values, (n,)) for k, c in imported.channels.items() if c.values.shape in ((n,), (1,))}
-    values = {k: v for k, v in {**raw, **rows.values}.items() if k in known}
-    u = {k[2:]: v for k, v in raw.items() if k.startswith("u_")} | dict(rows.u)
+    known = {*_POINT, *_LOADS}
+    values = {k: v for k, v in {**imported.values, **rows.values}.items() if k in known}
+    u = {k[2:]: v for k, v in imported.values.items() if k.startswith("u_")} | stated(rows)
     wet = {k: rows.values.get(k) for k in ("pressure_Pa", "temperature_K", "humidity")}
     if "density_kg_m3" not in values and all(v is not None and np.isfinite(v).all() for v in wet.values()):
         states = zip(*wet.values(), strict=True)
@@ -164,18 +178,23 @@ def load_all(
     for case in found:
         prepare_case(case, None, 10)  # an unknown effect in the case is said before the work begins
     chosen = found * len(recordings) if len(found) == 1 else found
-    speeds, winds = _each("--rpm", rpm, len(recordings)), _each("--airspeed", airspeed_m_s, len(recordings))
-    loaded = [load(p, c, None, n, v) for p, c, n, v in zip(recordings, chosen, speeds, winds, strict=True)]
+    counts = (len(recordings), len(recordings) + len(references))
+    speeds, winds = _each("--rpm", rpm, *counts), _each("--airspeed", airspeed_m_s, *counts)
+    files = list(zip([*recordings, *references], [*chosen, *found[:1] * len(references)], speeds, winds, strict=True))
+    loaded = [load(p, c, None, n, v) for p, c, n, v in files[: len(recordings)]]
     if references and len(found) > 1:
         raise InputError(Fault("--reference", "", f"{len(found)} cases", "one case for all when there are references"))
-    return found, [*loaded, *(replace(load(p, found[0]), reference=True) for p in references)]
+    known = (load(p, c, None, n, v) for p, c, n, v in files[len(recordings) :])
+    return found, [*loaded, *(replace(r, reference=True) for r in known)]
 
 
-def _each(option: str, given: Sequence[float], n: int) -> list[float | None]:
-    """One number for each of n files: the same for all, or as given."""
-    if len(given) not in (0, 1, n):
+def _each(option: str, given: Sequence[float], recordings: int, n: int) -> list[float | None]:
+    """One number for each of n files, the references last: the same for all, or as given."""
+    if len(given) not in (0, 1, recordings, n):
         raise InputError(Fault(option, "", f"{len(given)} numbers for {n} files", "one for all, or one each"))
-    return [None] * n if not given else [float(given[0])] * n if len(given) == 1 else [float(v) for v in given]
+    if len(given) == 1:
+        return [float(given[0])] * n
+    return [*map(float, given), *[None] * (n - len(given))]
 
 
 def _told_twice(paths: Sequence[str], only: Sequence[str]) -> None:
@@ -204,7 +223,7 @@ def _unknown(only: Sequence[str]) -> list[Fault]:
     return faults
 
 
-def _one_setup(imported: Imported, path: str) -> None:
+def _one_setup(imported: Dataset, path: str) -> None:
     """Refuse a table of several propellers or motors: their points are no one curve."""
     from bemt.readers.generic_csv import setups
 

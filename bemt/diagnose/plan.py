@@ -84,21 +84,21 @@ def points(path: str, case: Case) -> Record:
     from bemt.base.errors import Fault, InputError
     from bemt.dataset import Dataset
     from bemt.diagnose.record import from_series
-    from bemt.recordings.channels import view
+    from bemt.recordings.channels import named
     from bemt.recordings.load import import_file
 
     imported = import_file(path)
-    rows = view(imported)
-    values = {k: c.values for k, c in imported.channels.items() if c.unit or k in ("rpm", "J", "run")}
+    rows = named(imported)
+    values = {k: v for k, v in imported.values.items() if imported.unit(k) or k in ("rpm", "J", "run")}
     values |= dict(rows.values)
     if "rpm" not in values:
-        raise InputError(Fault(path, "", f"columns {', '.join(imported.channels)}", "a column rpm"))
-    n = imported.rows
+        raise InputError(Fault(path, "", f"columns {', '.join(imported.values)}", "a column rpm"))
+    n = len(imported)
     loads = {k: values.get(k, np.ones(n)) for k in ("thrust_N", "torque_Nm")}
     lawful = {k: v for k, v in values.items() if not k.startswith("u_")}
     u = {k[2:]: np.abs(v) for k, v in values.items() if k.startswith("u_") and k[2:] in loads}
     made = from_series(Dataset("bench", path, lawful | loads, u), case)
-    return replace(made, notes=(*made.notes, *imported.warnings, *rows.notes))
+    return replace(made, notes=(*made.notes, *imported.notes, *rows.notes))
 
 
 def plan(record: Record, case: Case, progress: Callable[[str], None] | None = None) -> Plan:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
-from bemt.readers._imported import Imported
+from bemt.dataset import Dataset
 from bemt.recordings import plateaus
 
 __all__ = ["QUANTITIES", "MapPoints", "join", "points"]
@@ -41,15 +41,15 @@ class MapPoints:
         return MapPoints(self.pulse_us[rows], values, self.weight[rows], self.run[rows], self.notes, self.ramp)
 
 
-def _channel(got: Imported, *names: str) -> Array | None:
+def _channel(got: Dataset, *names: str) -> Array | None:
     for name in names:
-        channel = got.channels.get(name)
-        if channel is not None and channel.unit and np.any(np.isfinite(channel.values) & (channel.values != 0.0)):
-            return np.asarray(channel.values, dtype=float)
+        v = got.values.get(name)
+        if v is not None and got.unit(name) and np.any(np.isfinite(v) & (v != 0.0)):
+            return v  # type: ignore[no-any-return]
     return None
 
 
-def _command(got: Imported, name: str, notes: list[str]) -> Array:
+def _command(got: Dataset, name: str, notes: list[str]) -> Array:
     pulse = _channel(got, "pulse_width_s")
     if pulse is not None:
         return pulse * 1e6
@@ -61,7 +61,7 @@ def _command(got: Imported, name: str, notes: list[str]) -> Array:
     raise InputError(Fault(name, "pulse_width_s", "no pulse width and no throttle", "a command per row", hint))
 
 
-def points(got: Imported, name: str = "", sign: int = 1, run: int = 0) -> MapPoints:
+def points(got: Dataset, name: str = "", sign: int = 1, run: int = 0) -> MapPoints:
     """Find the steady points of one recording."""
     notes: list[str] = []
     command = _command(got, name, notes)
@@ -97,7 +97,7 @@ def points(got: Imported, name: str = "", sign: int = 1, run: int = 0) -> MapPoi
     return out
 
 
-def _reduced(got: Imported, command: Array, data: dict[str, Array], notes: list[str], run: int) -> MapPoints:
+def _reduced(got: Dataset, command: Array, data: dict[str, Array], notes: list[str], run: int) -> MapPoints:
     used = np.isfinite(command) & np.isfinite(data["thrust"])
     stays = np.mean(np.isclose(np.diff(command[used]), 0.0)) if np.count_nonzero(used) > 1 else 0.0
     if stays < 0.4:  # one row per step, or a ramp
@@ -108,9 +108,7 @@ def _reduced(got: Imported, command: Array, data: dict[str, Array], notes: list[
         weight = np.ones(len(pulse))
     else:
         ramp = False
-        time = got.channels.get("time_s")
-        clock = None if time is None else np.asarray(time.values, dtype=float)
-        found = plateaus.find(clock, data, "thrust", command)
+        found = plateaus.find(got.values.get("time_s"), data, "thrust", command)
         kept = [p for p in found.plateaus if "not settled" not in p.flags]
         lost = len(found.plateaus) - len(kept)
         if lost:

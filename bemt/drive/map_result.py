@@ -13,8 +13,8 @@ import numpy as np
 from bemt import readers as importers
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import json_text, number_text, text_table, write_atomic
+from bemt.dataset import Dataset
 from bemt.drive import bench_map, map_export, map_points, map_scatter, outputs, picture
-from bemt.readers._imported import Imported
 
 __all__ = ["MapResult", "fit", "text"]
 
@@ -57,7 +57,7 @@ def fit(
                 hint = "A recording that counts twice makes the map look surer than it is"
                 raise InputError(Fault(file, "", f"the recording of {twice} again", "each recording once", hint))
             read |= dict.fromkeys(own, file)
-            if not isinstance(got, Imported):
+            if not isinstance(got, Dataset):
                 raise InputError(Fault(file, "", "no recording", "a log or a table of a thrust stand"))
             parts.append(map_points.points(got, file, sign, i))
         except InputError as error:
@@ -142,7 +142,7 @@ def _option_faults(thrust: float | None, voltage: float | None, nodes: int, name
 
 def _sources(path: Path, got: object) -> set[Path]:
     """The file itself and the tables beside it that it names."""
-    names = got.provenance.get("file", "").split("+") if isinstance(got, Imported) else []
+    names = str(got.provenance.get("file", "")).split("+") if isinstance(got, Dataset) else []
     beside = [path.parent / Path(name).name for name in names if name]
     return {path.resolve(), *(p.resolve() for p in beside if p.is_file())}
 

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from bemt import readers as importers
 from bemt.base.errors import Fault, InputError
 from bemt.base.toml import Limits, Table, entry, read_model
+from bemt.dataset import Dataset
 from bemt.drive import motor_constant as mc
 from bemt.drive.motor_errors import Measured
-from bemt.readers._imported import Imported
 
 __all__ = ["MotorToml", "MotorTrials", "read", "read_waveform"]
 
@@ -177,21 +177,21 @@ def _columns(path: Path, units: tuple[str, ...]) -> tuple[Array, ...]:
     """Column ``trial`` and one column per unit."""
     got = importers.read(path)
     name = path.as_posix()
-    if not isinstance(got, Imported):
+    if not isinstance(got, Dataset):
         raise InputError(Fault(name, "", "no table of trials", "columns trial, " + ", ".join(units)))
     faults, found = [], []
     for unit in units:
-        of_unit = [k for k, c in got.channels.items() if c.unit == unit]
+        of_unit = [k for k in got.values if got.unit(k) == unit]
         if len(of_unit) != 1:
             shown = ", ".join(of_unit) or "none"
             faults.append(Fault(name, f"column in {unit}", shown, "one column", "Name the unit in the heading"))
         else:
-            found.append(np.asarray(got.channels[of_unit[0]].values))
-    if "trial" not in got.channels:
+            found.append(got[of_unit[0]])
+    if "trial" not in got:
         faults.append(Fault(name, "trial", "no column trial", "the number of the trial of each row"))
     if faults:
         raise InputError(faults)
-    columns = (np.asarray(got.channels["trial"].values), *found)
+    columns = (got["trial"], *found)
     bad = ~np.all(np.isfinite(columns), axis=0)
     if np.any(bad):
         rows = ", ".join(str(got.lines[i] if got.lines else i + 1) for i in np.flatnonzero(bad)[:5])

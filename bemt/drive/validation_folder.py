@@ -42,14 +42,13 @@ def _read(path: Path, sign: int = 1) -> tuple[MapPoints, Array | None]:
     """Points of a map and their torque, where each row is a point."""
     got = importers.read(path)
     points = map_points.points(got, path.as_posix(), sign)
-    torque = got.channels.get("torque_Nm")
-    usable = torque is not None and len(torque.values) == len(points)
-    return points, sign * np.asarray(torque.values) if usable and torque is not None else None
+    torque = got.values.get("torque_Nm")
+    return points, sign * torque if torque is not None and len(torque) == len(points) else None
 
 
 def _mit(path: Path) -> tuple[MapPoints, Array]:
     """Columns without headings: pulse width [us], torque [N m], thrust [N], speed [rev/min], current [A]."""
-    c = [np.asarray(v.values) for v in importers.read(path).channels.values()]
+    c = list(importers.read(path).values.values())
     nothing = np.full(len(c[0]), np.nan)
     values = {"thrust": c[2], "rpm": c[3], "current": c[4], "power": nothing, "voltage": nothing}
     return MapPoints(c[0], values, np.ones(len(c[0])), np.zeros(len(c[0]), dtype=np.intp)), c[1]
@@ -60,14 +59,10 @@ def maps(folder: Path) -> list[validation.MapCheck]:
     out = []
     bare = folder / "jmajew" / "grp01__mn2206_noprop_3s.csv"
     if bare.is_file():
-        channels = importers.read(bare).channels
-        v = {k: np.asarray(channels[f"{k}{u}"].values) for k, u in (("rpm", ""), ("current", "_A"), ("voltage", "_V"))}
-        empty = MapPoints(
-            1000.0 + 1000.0 * np.asarray(channels["throttle"].values),
-            v,
-            np.ones(len(v["rpm"])),
-            np.zeros(len(v["rpm"]), dtype=np.intp),
-        )
+        log = importers.read(bare)
+        v = {k: log[f"{k}{u}"] for k, u in (("rpm", ""), ("current", "_A"), ("voltage", "_V"))}
+        empty = MapPoints(1000.0 + 1000.0 * log["throttle"], v, np.ones(len(v["rpm"])),
+                          np.zeros(len(v["rpm"]), dtype=np.intp))  # fmt: skip
         kv, i0 = identify.no_load(empty)
         for path in sorted(bare.parent.glob("grp01__mn2206_*_table1.csv")):
             points, torque = _read(path)
@@ -109,9 +104,7 @@ def steps(folder: Path) -> tuple[list[validation.StepCheck], Drive]:
     """Compare the steps of the logs of ``thrust_step``."""
     found, levels = [], (np.array([]), np.array([]))
     for name, orders in COMMANDS.items():
-        t, scale = (
-            np.asarray(v.values) for v in importers.read(folder / "thrust_step" / f"{name}.csv").channels.values()
-        )
+        t, scale = importers.read(folder / "thrust_step" / f"{name}.csv").values.values()
         thrust = (np.median(scale[:50]) - scale) * KGF  # the scale carries the motor, thrust lifts it [kgf]
         hold = np.array([seconds for _, seconds in orders])
         pulse = 1000.0 + (np.array([48, *(order for order, _ in orders), 48]) - 48.0) / 1.999  # DShot has 48 to 2047

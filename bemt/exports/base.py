@@ -382,7 +382,7 @@ class BladeExport(Export):
         Returns
         -------
         Case
-            The case, open rotor.
+            The case.
         """
         import importlib
 

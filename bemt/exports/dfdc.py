@@ -41,7 +41,7 @@ class DfdcExport(BladeExport):
 
     def write(self, job: Job) -> Files:
         """OPER, AERO, ROTOR and GEOM."""
-        p, rotor, duct = job.loading, job.case.rotor(), job.case.duct()
+        p, rotor, duct = job.loading, job.case.rotor(), self.compared(job).duct()
         assert duct is not None
         r, c, b, _ = stations(job)
         x = duct.rotor_x if duct.rotor_x is not None else duct.length / 3.0
@@ -77,14 +77,19 @@ class DfdcExport(BladeExport):
         ]
         rows += [f" {a:.10g} {s:.10g} {np.degrees(t):.10g}" for a, s, t in zip(r, c, b, strict=True)]
         rows += ["ENDROTOR", "", "GEOM", f"{job.case.name}"]
-        rows += [f" {a:.8f} {h:.8f}" for a, h in _body(rotor.Rhub, x, duct.length)] + [" 999.0 999.0"]
-        rows += [f" {a:.8f} {h:.8f}" for a, h in _duct(duct)] + ["ENDGEOM"]
+        rows += [f" {a:.10f} {h:.10f}" for a, h in _body(rotor.Rhub, x, duct.length)] + [" 999.0 999.0"]
+        rows += [f" {a:.10f} {h:.10f}" for a, h in _duct(duct)] + ["ENDGEOM"]
         return {f"{plain_name(job.case.name)}.case": "\n".join(rows) + "\n"}
 
     def compared(self, job: Job) -> Case:
-        """The rotor without its duct: the reader takes the blade alone."""
-        off = list(job.case.file.model.effects_off)
-        return job.case.replaced({"model.effects_off": [*off, "duct"]})
+        """The case without stator and tip gap, which the format does not hold."""
+        duct = job.case.file.duct
+        gone: dict[str, float] = {}
+        if duct is not None and duct.stator is not None:
+            gone["duct.stator.recovery"] = 0.0
+        if duct is not None and duct.tip_gap_mm is not None:
+            gone["duct.tip_gap_mm"] = 0.0
+        return job.case.replaced(gone) if gone else job.case
 
     def notes(self, job: Job) -> list[str]:
         """What DFDC does not hold of the case."""
@@ -92,7 +97,7 @@ class DfdcExport(BladeExport):
             *section_notes(job, section_errors(job, [s for _, s in sections_of(job)])),
             "the stator and its recovery of swirl are left out",
             "the centre body is a cylinder of the hub's radius with an elliptic nose: not from the case",
-            "the tip gap is left out: DFDC ends the blade at the wall",
+            "the tip gap is left out: the wall is drawn in to the blade tip",
         ]
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +22,9 @@ from bemt import readers as importers
 from bemt.air import Air, isa_pressure
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH, ZERO_CELSIUS
+from bemt.dataset import Dataset
 from bemt.formula.points import FitPoints, MeasuredPropeller, Rows, join
 from bemt.readers import apc, uiuc
-from bemt.readers._imported import Imported
 from bemt.readers._uiuc_names import parse_file_name
 
 __all__ = ["LAW_M_TIP", "RHO", "files", "load"]
@@ -74,11 +74,11 @@ def _from_apc(found: apc.ApcPerformance) -> list[Rows]:
     return [(made, s["rpm"], s["J"], s["CT"], s["CP"])]
 
 
-def _from_drivecalc(path: Path, found: Imported) -> list[Rows]:
+def _from_drivecalc(path: Path, found: Dataset) -> list[Rows]:
     """Power laws at `LAW_M_TIP`, in the air that the table states for them."""
-    c = {name: channel.values for name, channel in found.channels.items()}
-    names = found.texts.get("Name", ("",) * found.rows)
-    nothing = np.full(found.rows, np.nan)
+    c = found.values
+    names = found.texts.get("Name", ("",) * len(found))
+    nothing = np.full(len(found), np.nan)
     rows: list[Rows] = []
     for i, name in enumerate(names):
         D, pitch = c["diameter_m"][i], c["pitch_m"][i]
@@ -103,7 +103,7 @@ def _from_drivecalc(path: Path, found: Imported) -> list[Rows]:
     return rows
 
 
-def _density(c: dict[str, Array], what: str, i: int) -> float:
+def _density(c: Mapping[str, Array], what: str, i: int) -> float:
     h, T = (c[f"{what}_{k}"][i] if f"{what}_{k}" in c else float("nan") for k in ("altitude_m", "temperature_K"))
     if not (np.isfinite(h) and -500.0 <= h <= 5000.0):
         return RHO
@@ -112,16 +112,16 @@ def _density(c: dict[str, Array], what: str, i: int) -> float:
     return Air.from_state(p, float(celsius)).rho
 
 
-def _from_table(path: Path, found: Imported) -> tuple[list[Rows], list[str], list[str]]:
+def _from_table(path: Path, found: Dataset) -> tuple[list[Rows], list[str], list[str]]:
     """Any table with the columns of the module notes."""
-    N = found.rows
+    N, constants = len(found), found.provenance.get("constants", {})
 
     def column(*names: str) -> Array | None:
         for name in names:
-            if name in found.channels:
-                return found.channels[name].values
-            if name in found.constants:
-                return np.full(N, float(found.constants[name]))
+            if name in found:
+                return found[name]
+            if name in constants:
+                return np.full(N, float(constants[name]))
         return None
 
     D, pitch, rpm = column("diameter_m", "D_m"), column("pitch_m"), column("rpm")
@@ -186,9 +186,9 @@ def _file(path: Path) -> tuple[list[Rows], list[str], list[str]]:
         return _from_apc(found), [], [f"{path}: computed by the vendor, not measured"]
     if isinstance(found, (uiuc.UiucStatic, uiuc.UiucLine, uiuc.UiucGeometry, uiuc.UiucThickness)):
         return *_from_uiuc_table(path, found), []
-    if isinstance(found, Imported) and found.format == "drivecalc" and "thrust_law_N" in found.channels:
+    if isinstance(found, Dataset) and found.provenance.get("format") == "drivecalc" and "thrust_law_N" in found:
         return _from_drivecalc(path, found), [], [f"{path}: power laws fitted by others, not measurements"]
-    if isinstance(found, Imported):
+    if isinstance(found, Dataset):
         return _from_table(path, found)
     return [], [f"{path}: a {type(found).__name__} says nothing of diameter, pitch, rpm and thrust"], []
 

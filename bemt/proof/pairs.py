@@ -144,7 +144,7 @@ def _flight(path: Path, mass_kg: float) -> dict[str, Array]:
     """Thrust per propeller of a flight: mass times acceleration along the rotors, averaged over a tenth of a second."""
     from bemt.recordings.load import import_file
 
-    v = {k: c.values for k, c in import_file(path).channels.items()}
+    v = import_file(path).values
     flying = (v["rpm"] > 0.5 * np.median(v["rpm"])) & (v["height_m"] > 0.3)
     block = np.floor(v["time_s"][flying] * 10.0).astype(int)
     _, block = np.unique(block, return_inverse=True)

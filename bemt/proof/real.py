@@ -257,7 +257,7 @@ def _fan() -> Iterator[Item]:
     found = {}
     for name, pattern in (("ducted", "grp01__f1507_hqprop76x8_4s_duct_table*.csv"),
                           ("open", "grp01__f1507_hqprop76x8_4s_table*.csv")):  # fmt: skip
-        parts = [reduce(import_file(str(f)), diameter_m=0.076).series.values
+        parts = [reduce(import_file(str(f)), diameter_m=0.076).values
                  for f in sorted(root.glob(pattern))] if root else []  # fmt: skip
         if not parts:
             return

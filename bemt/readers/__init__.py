@@ -1,10 +1,12 @@
 """Readers of recorded data: one file per format, found by scanning this folder.
 
-An importer is a module of this package (its name does not start with ``_``) that defines
+A reader is a module of this package (its name does not start with ``_``) that defines
 
 * ``KIND`` : str, the name used in ``format = "..."``;
 * ``sniff(head) -> bool`` : True when the head of a file (:data:`HEAD_BYTES` bytes, or text) is of this format;
-* ``read(path) -> object`` : the whole file, or :class:`bemt.base.errors.InputError` with all its faults;
+* ``read(path) -> Dataset`` : the rows of the file, samples or points, in SI, or :class:`bemt.base.errors.InputError`
+  with all its faults; :class:`bemt.readers._recording.Builder` and :func:`bemt.readers._columns.dataset` make it. Files
+  of blades and polars give the object of their room instead;
 * optionally ``sniff_folder(path) -> bool`` : True when ``read`` also takes that folder;
 * optionally ``FALLBACK = True`` : its claim counts only when no other importer claims the file.
 
@@ -250,8 +252,8 @@ def read(path: str | os.PathLike[str], format: str | None = None) -> Any:  # noq
 
     Returns
     -------
-    object
-        What that importer's ``read`` returns.
+    Dataset or object
+        What that reader's ``read`` returns.
 
     Raises
     ------

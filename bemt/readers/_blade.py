@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from bemt.base.errors import Fault, InputError
 from bemt.readers import SourceText, number
 from bemt.sections.parametric import QpropSection, XrotorSection
-from bemt.sections.polars import DEFAULT_RE
+from bemt.sections.polars import DEFAULT_RE, Polar
 
 __all__ = ["BladeFile", "case_text", "checked", "lines_of", "values", "whole"]
 
@@ -37,12 +37,14 @@ class BladeFile:
         Tip and hub radius. [m]
     r_m, chord_m, beta_rad : (N,) float
         Stations. [m], [rad]
-    sections : sequence of (float, XrotorSection or QpropSection)
+    sections : sequence of (float, XrotorSection, QpropSection or Polar)
         At r/R, ascending; linear between, held outside.
     rpm, airspeed_m_s, rho : float or None
         Operating point, where the file states one.
     notes : tuple of str
         What was left out.
+    duct : dict of float or None
+        Keys of a case's ``[duct]``; None: an open rotor.
     """
 
     name: str
@@ -53,11 +55,12 @@ class BladeFile:
     r_m: Array
     chord_m: Array
     beta_rad: Array
-    sections: Sequence[tuple[float, XrotorSection | QpropSection]]
+    sections: Sequence[tuple[float, XrotorSection | QpropSection | Polar]]
     rpm: float | None = None
     airspeed_m_s: float | None = None
     rho: float | None = None
     notes: tuple[str, ...] = ()
+    duct: Mapping[str, float] | None = None
 
 
 def lines_of(source: SourceText, comment: str) -> list[tuple[int, str]]:
@@ -124,7 +127,14 @@ def checked(source: SourceText, blade: BladeFile, faults: list[Fault]) -> BladeF
     return blade
 
 
-def _polar_csv(section: XrotorSection | QpropSection) -> str:
+def _polar_csv(section: XrotorSection | QpropSection | Polar) -> str:
+    if isinstance(section, Polar):
+        rows = [
+            f"{math.degrees(a):.9g},{section.cl[i, j, 0]:.9g},{section.cd[i, j, 0]:.9g},{Re:.9g}"
+            for j, Re in enumerate(section.Re)
+            for i, a in enumerate(section.alpha)
+        ]
+        return "\n".join(["alpha_deg,cl,cd,Re", *rows]) + "\n"
     alpha = np.arange(SPAN_DEG[0], SPAN_DEG[1] + 0.25, 0.5)
     Re = DEFAULT_RE[(DEFAULT_RE >= RE_RANGE[0]) & (DEFAULT_RE <= RE_RANGE[1])]
     Re = Re if section.reexp != 0.0 else Re[:1]
@@ -151,13 +161,15 @@ def case_text(blade: BladeFile, name: str, file: str) -> dict[str, str]:
     remark = "" if blade.rpm is not None else "  # not in the file: a tip speed near 120 m/s, set yours"
     rho = blade.rho if blade.rho is not None and blade.rho > 0.0 else 1.225
     notes = "".join(f"# {note}\n" for note in blade.notes)
+    walls = "".join(f"{key} = {value:.9g}\n" for key, value in (blade.duct or {}).items())
+    walls = f"\n[duct]\n{walls}" if walls else ""
     files["case.toml"] = f"""# From {blade.source}, {re.sub(r"[^ -~]", "_", file)}.
 {notes}schema = "bemt.case/1"
 name = "{name}"
 title = "{title}"
 
 [rotor]
-kind = "propeller"
+kind = "{"propeller" if blade.duct is None else "fan"}"
 blades = {blade.blades}
 diameter_m = {2.0 * blade.R_m:.12g}
 hub_diameter_mm = {2e3 * blade.Rhub_m:.12g}
@@ -167,7 +179,7 @@ stations = "stations.csv"
 
 [blade.section]
 thickness = 0.12  # not in the file; only wave drag looks at it
-
+{walls}
 [operating]
 rpm = {rpm:.12g}{remark}
 airspeed_m_s = {blade.airspeed_m_s or 0.0:.12g}

@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.base.averaging import Average, keep_last, steady_average
+from bemt.base.averaging import Average, Mean, keep_last, steady_average
+from bemt.dataset import Dataset
 from bemt.readers import SourceText
 from bemt.readers._cfd import Column, ExportTable, unique
-from bemt.readers._imported import Channel, Imported
+from bemt.readers._columns import Channel, dataset
 
 __all__ = ["fields", "history"]
 
@@ -32,7 +33,7 @@ def _channel(values: Array, unit: str, average: Average, over: str) -> Channel:
     """Make a channel with its average."""
     if average.mean is None:
         return Channel(values, unit)
-    return Channel(values, unit, average.mean, over, average.drift)
+    return Channel(values, unit, Mean(average.mean, over, average.drift))
 
 
 def history(
@@ -42,7 +43,7 @@ def history(
     table: ExportTable,
     warnings: Sequence[str] = (),
     provenance: Mapping[str, str] | None = None,
-) -> Imported:
+) -> Dataset:
     """Make the record of a history: repeated rows resolved, means of the channels with what they were taken over.
 
     A history by time gets the mean of all rows (whole revolutions need the speed, which the file does not say), one
@@ -86,7 +87,7 @@ def history(
         notes.append("the file has no column of values, only its clock")
     elif len(index) > 1 and not any(np.any(table.values[index, k]) for k, r in enumerate(roles) if r == "value"):
         notes.append("every value is 0: did the function object, or the report, find its surfaces?")
-    return Imported(format, "cfd", len(index), channels, tuple(notes), about)
+    return dataset(format, "cfd", channels, notes, about)
 
 
 def _clock(values: Array, roles: Sequence[str], role: str) -> int | None:
@@ -104,7 +105,7 @@ def fields(
     table: ExportTable,
     warnings: Sequence[str] = (),
     provenance: Mapping[str, str] | None = None,
-) -> Imported:
+) -> Dataset:
     """Make the record of values at points: no means, since points carry no area; equal repeated columns appear once."""
     notes = [*warnings, *table.warnings]
     channels: dict[str, Channel] = {}
@@ -124,4 +125,4 @@ def fields(
             notes.append(f"two columns are named {name.split('#')[0]} and differ: the later one is {name}")
     notes.append("values at points: no mean is taken, since points carry no areas")
     about = {"file": source.name, "sha256": source.sha256, **(provenance or {}), "clock": "none"}
-    return Imported(format, "cfd", len(table.values), channels, tuple(notes), about)
+    return dataset(format, "cfd", channels, notes, about)

@@ -218,9 +218,13 @@ def heading(text: str) -> Heading:
     ('omega', True)
     >>> heading("Drehzahl [1/min]").name, heading("Poussée (N)").name, heading("Thrust (g)").name
     ('rpm', 'thrust_N', 'thrust_N')
+    >>> heading("thrust_g").name, heading("thrust_g").told
+    ('thrust_N', "'thrust_g' is read as gram-force, as stands mean it: 1 g is 0.00981 N")
     """
     text = " ".join(text.split())
     parts = re.fullmatch(r"(.*?)\s*[\(\[]\s*([^()\[\]]*?)\s*[\)\]]\s*", text)
+    if not parts and (loose := re.fullmatch(r"(.+)[_ ](\w+)", text)) and loose[2] in _OF_A_STAND:
+        parts = loose  # thrust_g
     english = _TONGUES.get(_plain(parts[1] if parts else text), "")
     if english:
         found = heading(f"{english} ({parts[2]})" if parts else english)

@@ -10,43 +10,27 @@ import difflib
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base import units
 from bemt.base.errors import Fault, InputError
-from bemt.readers import number
+from bemt.dataset import Dataset
 from bemt.readers._clock import clock_seconds
+from bemt.readers._columns import Channel, dataset
 from bemt.readers._headings import Heading, slug
-from bemt.readers._imported import Channel, Imported
-from bemt.readers._split import SplitTable, some
+from bemt.readers._large import NumberTable
+from bemt.readers._split import MOST_ODD, SplitTable, some
 
-__all__ = ["Builder", "column_numbers", "slip", "spikes"]
+__all__ = ["Builder", "slip", "spikes"]
 
 Array = NDArray[np.float64]
-NO_VALUE = frozenset({"", "nan", "na", "n/a", "-", "--", "null", "none"})
-"""Cells that say "no value", in lower case."""
 _WITH_UNIT = re.compile(r"[+-]?[\d.]+\s*([^\W\d][\w/·]{0,6}|%)")
-BAD_SHARE = 0.1
-"""Share of cells that are no numbers from which a column is text."""
+BLOCK = 1 << 17
+"""Samples that are searched for spikes at once."""
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(,\d{3})+(\.\d*)?")
-
-
-def column_numbers(cells: Sequence[str], decimal: str = ".") -> tuple[Array, list[int], int]:
-    """Numbers of a column."""
-    values = np.full(len(cells), np.nan)
-    bad: list[int] = []
-    empty = 0
-    for i, cell in enumerate(cells):
-        value = number(cell.replace(",", ".") if decimal == "," and "." not in cell else cell)
-        if value is not None:
-            values[i] = value
-        elif cell.lower() in NO_VALUE:
-            empty += 1
-        else:
-            bad.append(i)
-    return values, bad, empty
 
 
 def spikes(values: Array, half: int = 3, times: float = 2.0) -> NDArray[np.bool_]:
@@ -67,33 +51,45 @@ def spikes(values: Array, half: int = 3, times: float = 2.0) -> NDArray[np.bool_
     rows = np.flatnonzero(np.isfinite(values))
     if len(rows) < 6:
         return out
-    v = values[rows]
+    v = values if len(rows) == len(values) else values[rows]
     low, high = np.percentile(v, [5.0, 95.0])
-    spread = max(float(high - low), 1e-12 * float(np.max(np.abs(v))))
-    padded = np.full(len(v) + 2 * half, np.nan)
-    padded[half:-half] = v
-    near = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1).copy()
-    near[:, half] = np.nan
-    lo, hi = np.nanmin(near, axis=1), np.nanmax(near, axis=1)
-    away = np.maximum(v - hi, lo - v)
-    edge = np.zeros(len(v), dtype=bool)
-    edge[:1] = edge[-1:] = True
-    need = np.maximum(times * (hi - lo), np.where(edge, 1.0, 0.25) * spread)
-    out[rows[away > need]] = True
+    top = max(abs(float(np.min(v))), abs(float(np.max(v))))
+    spread = max(float(high - low), 1e-12 * top)
+    for a in range(0, len(v), BLOCK):
+        far = _far(v, a, min(a + BLOCK, len(v)), half, times, spread)
+        out[rows[a : a + BLOCK][far]] = True
     return out
+
+
+def _far(v: Array, a: int, b: int, half: int, times: float, spread: float) -> NDArray[np.bool_]:
+    """Spikes among the samples from a to b."""
+    at = max(a - half, 0)
+    part = v[at : b + half]
+    lo, hi = np.full(len(part), np.nan), np.full(len(part), np.nan)
+    for k in range(1, half + 1):  # neighbours on either side, as far as there are any
+        for own, other in ((slice(k, None), slice(None, -k)), (slice(None, -k), slice(k, None))):
+            np.fmin(lo[own], part[other], out=lo[own])
+            np.fmax(hi[own], part[other], out=hi[own])
+    part, lo, hi = (x[a - at : b - at] for x in (part, lo, hi))
+    share = np.full(b - a, 0.25)
+    if a == 0:
+        share[0] = 1.0
+    if b == len(v):
+        share[-1] = 1.0
+    return np.maximum(part - hi, lo - part) > np.maximum(times * (hi - lo), share * spread)
 
 
 @dataclass
 class Builder:
-    """Gathers the channels, texts, flags and warnings of one table and makes the `Imported`."""
+    """Gathers the channels, texts, flags and warnings of one table and makes the `Dataset`."""
 
-    table: SplitTable
+    table: SplitTable | NumberTable
     format: str
     kind: str = "bench"
     channels: dict[str, Channel] = field(default_factory=dict)
     texts: dict[str, tuple[str, ...]] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
-    flags: list[list[str]] = field(init=False)
+    flags: dict[int, list[str]] = field(default_factory=dict)
     headings: dict[str, str] = field(default_factory=dict)
     faults: list[Fault] = field(default_factory=list)
     unitless: list[str] = field(default_factory=list)
@@ -102,12 +98,10 @@ class Builder:
     clocks: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.flags = [[] for _ in self.table.rows]
         self.warnings.extend(self.table.warnings)
         if self.table.cut is not None:
             self.flag([self.table.cut], "line cut off at the end of the file")
-        width = len(self.table.rows[0]) if self.table.rows else 0
-        self.flag(self.table.misfits, f"not {width} cells", "; no value of them is taken")
+        self.flag(self.table.misfits, f"not {self.table.width} cells", "; no value of them is taken")
 
     def line(self, row: int) -> int:
         """Line in the file of a row."""
@@ -117,9 +111,9 @@ class Builder:
         """Flag rows and warn once; rows are kept."""
         hit = [int(r) for r in rows]
         for r in hit:
-            self.flags[r].append(what)
+            self.flags.setdefault(r, []).append(what)
         if hit:
-            where = f"{len(hit)} row{'s' if len(hit) > 1 else ''} (line {some(self.line(r) for r in hit)})"
+            where = f"{len(hit)} row{'s' if len(hit) > 1 else ''} (line {some(map(self.line, hit))})"
             self.warnings.append(f"{what} in {where}, kept and flagged{why}")
 
     def free(self, name: str) -> str:
@@ -131,10 +125,10 @@ class Builder:
 
     def add(self, index: int, head: Heading, decimal: str = ".", sign: float = 1.0) -> str:
         """Add column `index` as a channel or a text; gives its name ("" when the column is empty)."""
-        cells = [row[index] for row in self.table.rows]
-        values, bad, empty = column_numbers(cells, decimal)
+        values, bad, empty = self.table.numbers(index, decimal)
+        cells = {i: self.table.cell(i, index) for i in bad}
         label = head.text or f"column {index + 1}"
-        if empty == len(cells):
+        if empty == len(values):
             self.empty.append(repr(label))
             return ""
         comma = [i for i in bad if re.fullmatch(r"[+-]?\d+,\d*|[+-]?\d{1,3}(,\d{3})*\.\d*", cells[i])]
@@ -147,17 +141,18 @@ class Builder:
             self.faults.append(Fault(self.table.source.name, where, got, "a number with a decimal point", hint))
             return ""
         name = self.free(head.name)
-        if len(bad) > BAD_SHARE * (len(cells) - empty):
-            seconds = clock_seconds(cells)
+        if len(bad) > MOST_ODD * (len(values) - empty):
+            column = self.table.cells(index)
+            seconds = clock_seconds(column)
             if seconds is not None:
                 name = self.free(f"{slug(head.text) or head.name}_s")
                 self.channels[name], self.headings[name] = Channel(seconds, "s"), head.text
                 self.clocks.append(name)
-                self.warnings.append(f"column {label!r} is a clock: seconds since {cells[0] or 'its first time'}")
+                self.warnings.append(f"column {label!r} is a clock: seconds since {column[0] or 'its first time'}")
                 return name
             name = self.free(slug(head.text) or head.name)
-            self.texts[name] = tuple(cells)
-            if len(bad) < len(cells) - empty:
+            self.texts[name] = tuple(column)
+            if len(bad) < len(values) - empty:
                 self.warnings.append(f"column {label!r} mixes numbers and text: kept as text")
             elif sum(bool(_WITH_UNIT.fullmatch(cells[i])) for i in bad) > len(bad) / 2:
                 self.warnings.append(f"column {label!r} has units in its cells ({cells[bad[0]][:20]!r}): kept as text")
@@ -171,7 +166,7 @@ class Builder:
             self.warnings.append(head.told)
         if head.unit is None:
             self.unitless.append(f"{label!r}" + (f" ({head.doubt})" if head.doubt else ""))
-        elif head.unit.suffix != "rpm":
+        elif head.unit.suffix != "rpm" and (head.unit.factor, head.unit.offset) != (1.0, 0.0):
             with np.errstate(over="ignore"):
                 values = values * head.unit.factor + head.unit.offset
             over = np.isinf(values)
@@ -179,7 +174,7 @@ class Builder:
             values[over] = np.nan
         if head.name != name:
             self.warnings.append(f"column {label!r} has the name of another column: kept as {name}")
-        self.channels[name] = Channel(values * sign, head.unit_name)
+        self.channels[name] = Channel(values if sign == 1.0 else values * sign, head.unit_name)
         self.headings[name] = head.text
         return name
 
@@ -227,8 +222,8 @@ class Builder:
                 self.warnings.append(f"{same.size} rows repeat the time of the row before (lines "
                                      f"{some(self.line(int(r)) for r in same)})")  # fmt: skip
 
-    def finish(self, provenance: Mapping[str, str] | None = None, **more: object) -> Imported:
-        """Make the `Imported`, or raise all faults."""
+    def finish(self, provenance: Mapping[str, str] | None = None, **more: Any) -> Dataset:
+        """Make the `Dataset`, or raise all faults."""
         if not self.channels and not self.faults:
             columns = f"{len(self.texts)} columns of text" if self.texts else "empty columns"
             expected = "one column of numbers or more"
@@ -243,10 +238,12 @@ class Builder:
             hint = "Name units in the headings or in a recording.toml" + _nearest(self.unitless)
             self.warnings.append(f"no unit known, none assumed, for {some(self.unitless, 8)}. {hint}")
         said = {"file": self.table.source.name, "sha256": self.table.source.sha256, **(provenance or {})}
-        return Imported(
-            self.format, self.kind, len(self.table.rows), self.channels, tuple(self.warnings), said,
-            flags=tuple(tuple(f) for f in self.flags), lines=self.table.lines, texts=self.texts,
-            headings=self.headings, **more,  # type: ignore[arg-type]
+        flags: list[tuple[str, ...]] = [()] * len(self.table) if self.flags else []
+        for row, words in self.flags.items():
+            flags[row] = tuple(words)
+        return dataset(
+            self.format, self.kind, self.channels, self.warnings, said, flags=flags, lines=self.table.lines,
+            texts=self.texts, headings=self.headings, **more,
         )  # fmt: skip
 
 

@@ -10,6 +10,9 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from bemt.base import units
 from bemt.base.errors import Fault, InputError
 from bemt.readers import SourceText, number
@@ -19,6 +22,10 @@ __all__ = ["SplitTable", "decimal_mark", "find_delimiter", "find_start", "some",
 
 DELIMITERS = (";", "\t", ",", "|")
 MAX_FAULTS = 20
+NO_VALUE = frozenset({"", "nan", "na", "n/a", "-", "--", "null", "none"})
+"""Cells that say "no value", in lower case."""
+MOST_ODD = 0.1
+"""Share of cells that are no numbers from which a column is text."""
 MISFIT_SHARE = 0.05
 """Share of lines of another length from which a file is refused."""
 _COMMA = re.compile(r"[+-]?(0|[1-9]\d{0,8}),\d+([eE][+-]?\d+)?")
@@ -38,6 +45,42 @@ class SplitTable:
     warnings: tuple[str, ...] = ()
     cut: int | None = None  # index of a row that the end of the file cut off
     misfits: tuple[int, ...] = ()  # rows of another number of cells: kept, without values
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    @property
+    def width(self) -> int:
+        """Number of columns."""
+        return len(self.rows[0]) if self.rows else 0
+
+    def cell(self, row: int, column: int) -> str:
+        """One cell."""
+        return self.rows[row][column]
+
+    def cells(self, column: int) -> Sequence[str]:
+        """Cells of a column."""
+        return [row[column] for row in self.rows]
+
+    def numbers(self, column: int, decimal: str = ".") -> tuple[NDArray[np.float64], list[int], int]:
+        """Numbers of a column, rows whose cell is none, number of empty cells."""
+        return column_numbers(self.cells(column), decimal)
+
+
+def column_numbers(cells: Sequence[str], decimal: str = ".") -> tuple[NDArray[np.float64], list[int], int]:
+    """Numbers of a column."""
+    values = np.full(len(cells), np.nan)
+    bad: list[int] = []
+    empty = 0
+    for i, cell in enumerate(cells):
+        value = number(cell.replace(",", ".") if decimal == "," and "." not in cell else cell)
+        if value is not None:
+            values[i] = value
+        elif cell.lower() in NO_VALUE:
+            empty += 1
+        else:
+            bad.append(i)
+    return values, bad, empty
 
 
 def split_line(line: str, mark: str) -> list[str]:
@@ -63,9 +106,9 @@ def some(items: Iterable[object], limit: int = 5) -> str:
     >>> some([1, 2]), some(range(9), 3)
     ('1, 2', '0, 1, 2 and 6 more')
     """
-    words = [str(item) for item in items]
-    more = f" and {len(words) - limit} more" if len(words) > limit else ""
-    return ", ".join(words[:limit]) + more
+    found = list(items)
+    more = f" and {len(found) - limit} more" if len(found) > limit else ""
+    return ", ".join(map(str, found[:limit])) + more
 
 
 def find_delimiter(lines: Sequence[str]) -> str:

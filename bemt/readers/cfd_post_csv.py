@@ -14,12 +14,14 @@ from __future__ import annotations
 
 import os
 import re
+from dataclasses import replace
 
 from bemt.base.errors import Fault, InputError
+from bemt.dataset import Dataset
 from bemt.readers import SourceText
 from bemt.readers._cfd import Column, ExportRow, cells_of, head_lines, load, numeric_table, si_unit, slug
 from bemt.readers._cfd_record import fields, history
-from bemt.readers._imported import Channel, Imported
+from bemt.readers._columns import Channel, channels_of, dataset
 
 __all__ = ["KIND", "read", "sniff"]
 
@@ -53,7 +55,7 @@ def _heading(text: str) -> Column:
     return Column(f"{slug(match[1])}_{unit}", unit, role)
 
 
-def read(path: str | os.PathLike[str]) -> Imported:
+def read(path: str | os.PathLike[str]) -> Dataset:
     """Read a CSV of CFD-Post."""
     source = load(path)
     data: list[tuple[str, list[ExportRow]]] = []
@@ -85,18 +87,17 @@ def read(path: str | os.PathLike[str]) -> Imported:
     records = [(block, _block(source, rows, mark != ",")) for block, rows in data if rows]
     if len(records) == 1:
         block, record = records[0]
-        about = {**record.provenance, "name": block}
-        return Imported(KIND, "cfd", record.rows, record.channels, (*notes, *record.warnings), about)
+        return replace(record, provenance={**record.provenance, "name": block}, notes=(*notes, *record.notes))
     channels: dict[str, Channel] = {}
     for k, (block, record) in enumerate(records):
         label = block if [b for b, _ in records].count(block) == 1 else f"{block} {k + 1}"
-        channels |= {f"{key}({label})": channel for key, channel in record.channels.items()}
-        notes += [f"{label}: {text}" for text in record.warnings]
+        channels |= {f"{key}({label})": channel for key, channel in channels_of(record).items()}
+        notes += [f"{label}: {text}" for text in record.notes]
     about = {"file": source.name, "sha256": source.sha256, "clock": "none"}
-    return Imported(KIND, "cfd", sum(r.rows for _, r in records), channels, tuple(notes), about)
+    return dataset(KIND, "cfd", channels, notes, about)
 
 
-def _block(source: SourceText, rows: list[ExportRow], commas: bool) -> Imported:
+def _block(source: SourceText, rows: list[ExportRow], commas: bool) -> Dataset:
     columns = [_heading(cell) for cell in rows[0].cells]
     if all(re.fullmatch(r"[-+.\deE]+", cell) for cell in rows[0].cells):
         got = f"numbers ({', '.join(rows[0].cells[:4])})"

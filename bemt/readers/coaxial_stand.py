@@ -10,16 +10,16 @@ from __future__ import annotations
 
 import os
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from bemt.base import units
 from bemt.base.errors import Fault, InputError
+from bemt.dataset import Dataset
 from bemt.readers import head_text, load_text
+from bemt.readers._columns import Channel
 from bemt.readers._headings import Heading
-from bemt.readers._imported import Channel, Imported
 from bemt.readers._recording import Builder
 from bemt.readers._split import split_table
 
@@ -53,7 +53,7 @@ def sniff(head: bytes | str) -> bool:
     return {(what, side) for what in ("PWM", "Thrust", "Speed") for side in ("Left", "Right")} <= found
 
 
-def read(path: str | os.PathLike[str]) -> Imported:
+def read(path: str | os.PathLike[str]) -> Dataset:
     """Read a table."""
     source = load_text(path)
     table = split_table(source, header=True)
@@ -89,9 +89,9 @@ def read(path: str | os.PathLike[str]) -> Imported:
     build.warnings.append("air density is not in the file")
     build.flag_time()
     build.check_magnitudes()
-    made = build.finish({"stand": "New Dexterity coaxial platform"})
     told = _DIAMETER.search(Path(source.name).name)
-    return replace(made, constants={"diameter_m": float(told[1]) * units.INCH}) if told else made
+    constants = {"diameter_m": float(told[1]) * units.INCH} if told else None
+    return build.finish({"stand": "New Dexterity coaxial platform"}, constants=constants)
 
 
 def _tare_row(build: Builder) -> None:

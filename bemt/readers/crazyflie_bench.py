@@ -14,9 +14,10 @@ import numpy as np
 
 from bemt.base import units
 from bemt.base.errors import Fault, InputError
+from bemt.dataset import Dataset
 from bemt.readers import head_text, load_text
+from bemt.readers._columns import Channel
 from bemt.readers._headings import Heading
-from bemt.readers._imported import Channel, Imported
 from bemt.readers._recording import Builder
 from bemt.readers._split import split_table
 
@@ -43,7 +44,7 @@ def sniff(head: bytes | str) -> bool:
     return {"pwm", *_SPEEDS} <= cells and bool(cells & set(_LOADS))
 
 
-def read(path: str | os.PathLike[str]) -> Imported:
+def read(path: str | os.PathLike[str]) -> Dataset:
     """Read a table."""
     source = load_text(path)
     table = split_table(source, header=True)

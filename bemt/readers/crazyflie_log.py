@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import G0
-from bemt.readers._imported import Channel, Imported
+from bemt.dataset import Dataset
+from bemt.readers._columns import Channel, dataset
 
 __all__ = ["KIND", "read", "sniff"]
 
@@ -52,7 +53,7 @@ def sniff(head: bytes | str) -> bool:
     return version in _TIMES and 0 < events < 1000
 
 
-def read(path: str | os.PathLike[str]) -> Imported:
+def read(path: str | os.PathLike[str]) -> Dataset:
     """Read a log."""
     name = os.fspath(path)
     try:
@@ -70,7 +71,7 @@ def read(path: str | os.PathLike[str]) -> Imported:
     tables = {k: v for k, v in tables.items() if v["time_s"].size > 1}
     if not tables:
         raise InputError(Fault(name, "", "no records", "two or more"))
-    return _imported(name, hashlib.sha256(data).hexdigest(), tables)
+    return _made(name, hashlib.sha256(data).hexdigest(), tables)
 
 
 def _text(data: bytes, at: int) -> tuple[str, int]:
@@ -110,7 +111,7 @@ def _tables(data: bytes) -> dict[str, dict[str, NDArray[np.float64]]]:
     return out
 
 
-def _imported(name: str, sha256: str, tables: dict[str, dict[str, NDArray[np.float64]]]) -> Imported:
+def _made(name: str, sha256: str, tables: dict[str, dict[str, NDArray[np.float64]]]) -> Dataset:
     main = max(tables, key=lambda k: tables[k]["time_s"].size)
     t = tables[main]["time_s"]
     columns: dict[str, NDArray[np.float64]] = {}
@@ -136,4 +137,4 @@ def _imported(name: str, sha256: str, tables: dict[str, dict[str, NDArray[np.flo
         "a flight: no thrust is measured; mass times acceleration gives it, and the mass is not in the file"
     )
     said = {"file": name, "sha256": sha256}
-    return Imported(KIND, "flight", t.size, channels, tuple(warnings), said)
+    return dataset(KIND, "flight", channels, warnings, said)

@@ -1,4 +1,4 @@
-"""DFDC: case files with a bladed rotor (duct and centre body stay behind)."""
+"""DFDC: case files with a bladed rotor in a duct (the centre body gives the hub)."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
     if "ROTOR" not in words:
         got = "an actuator disk without blades" if "ACTDISK" in words else "no ROTOR"
         raise InputError(Fault(source.name, "", got, "a case with a ROTOR block", "A disk has no blade to read"))
-    notes = ["duct and centre body of the file are left out: declare a [duct] in the case"]
+    notes = ["the blade ends at the wall: the file has no tip gap"]
     name = rows[1][1].strip() if len(rows) > 1 else ""
     V = rpm = rho = None
     if "OPER" in words:
@@ -69,23 +69,25 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
     if faults:
         raise InputError(faults)
     r, c, b = body.T
-    hub, tip = _walls(source, rows, words, x_disk, faults)
+    hub, tip, duct = _walls(source, rows, words, x_disk, faults)
     if hub is None or not 0.0 < hub <= r[0]:
         hub = float(r[0])
         notes.append("no centre body at the rotor: the hub is that of the first station")
     if tip is None or tip < r[-1]:
         tip = float(r[-1])
         notes.append("no duct at the rotor: the tip is that of the last station")
-    blade = BladeFile(name, "DFDC", whole(blades), tip, hub, r, c, np.radians(b), sections, rpm, V, rho, tuple(notes))
+    blade = BladeFile(
+        name, "DFDC", whole(blades), tip, hub, r, c, np.radians(b), sections, rpm, V, rho, tuple(notes), duct
+    )  # fmt: skip
     return checked(source, blade, faults)
 
 
 def _walls(
     source: SourceText, rows: list[tuple[int, str]], words: list[str], x: float, faults: list[Fault]
-) -> tuple[float | None, float | None]:
-    """Radius of centre body and of the duct's bore at an axial position, None where the outline is not there."""
+) -> tuple[float | None, float | None, dict[str, float] | None]:
+    """Radii of centre body and bore at the rotor, None where there is no outline; the duct's keys of a case."""
     if "GEOM" not in words or "ENDGEOM" not in words:
-        return None, None
+        return None, None, None
     parts: list[list[list[float]]] = [[]]
     for line, text in rows[words.index("GEOM") + 2 : words.index("ENDGEOM")]:
         pair = values(source, line, text, 2, "x r", faults)
@@ -93,17 +95,32 @@ def _walls(
             parts.append([])
         else:
             parts[-1].append(pair)
-    radii = []
-    for part in parts[:2]:
-        a = np.array(part).reshape(-1, 2)
-        cross = []
-        for (x0, r0), (x1, r1) in zip(a[:-1], a[1:], strict=True):
-            if min(x0, x1) <= x <= max(x0, x1) and x0 != x1:
-                cross.append(abs(r0 + (x - x0) / (x1 - x0) * (r1 - r0)))
-        radii.append(cross)
-    body = max(radii[0]) if radii and radii[0] else None
-    bore = min(radii[1]) if len(radii) > 1 and radii[1] else None
-    return body, bore
+    outlines = [np.array(part).reshape(-1, 2) for part in parts]
+    body = max(_crossings(outlines[0], x), default=None)
+    if len(outlines) < 2 or not (bores := _crossings(outlines[1], x)):
+        return body, None, None
+    wall, bore = outlines[1], min(bores)
+    lip = int(np.argmin(wall[:, 0]))
+    inside = wall[lip:] if wall[lip:, 1].mean() < wall[: lip + 1, 1].mean() else wall[lip::-1]
+    x_lip, (x_exit, r_exit) = wall[lip, 0], inside[-1]
+    duct = {
+        "inner_diameter_mm": 2e3 * bore,
+        "length_mm": 1e3 * (x_exit - x_lip),
+        "lip_radius_mm": 1e3 * max(wall[lip, 1] - bore, 0.0),
+        "rotor_position_mm": 1e3 * (x - x_lip),
+        "exit_diameter_mm": 2e3 * r_exit,
+        "exit_hub_diameter_mm": 2e3 * max(_crossings(outlines[0], x_exit - 1e-6 * abs(x_exit)), default=0.0),
+    }
+    return body, bore, duct
+
+
+def _crossings(outline: np.ndarray, x: float) -> list[float]:
+    """Radii at which an outline passes an axial position."""
+    out = []
+    for (x0, r0), (x1, r1) in zip(outline[:-1], outline[1:], strict=True):
+        if min(x0, x1) <= x <= max(x0, x1) and x0 != x1:
+            out.append(float(abs(r0 + (x - x0) / (x1 - x0) * (r1 - r0))))
+    return out
 
 
 def _line(

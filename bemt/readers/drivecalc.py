@@ -15,9 +15,9 @@ import os
 import numpy as np
 
 from bemt.base import units
+from bemt.dataset import Dataset
 from bemt.readers import head_text, load_text
 from bemt.readers._headings import Heading, heading
-from bemt.readers._imported import Imported
 from bemt.readers._recording import Builder
 from bemt.readers._split import split_table
 
@@ -47,7 +47,7 @@ def sniff(head: bytes | str) -> bool:
     return cells >= _PROPELLERS or cells >= _POINTS
 
 
-def read(path: str | os.PathLike[str]) -> Imported:
+def read(path: str | os.PathLike[str]) -> Dataset:
     """Read one of the two tables."""
     source = load_text(path)
     table = split_table(source, header=True)

@@ -15,9 +15,9 @@ import os
 from dataclasses import replace
 
 from bemt.base.errors import Fault, InputError
+from bemt.dataset import Dataset
 from bemt.readers._cfd import Column, ExportRow, cells_of, head_lines, load, numeric_table
 from bemt.readers._cfd_record import fields
-from bemt.readers._imported import Imported
 
 __all__ = ["KIND", "read", "sniff"]
 
@@ -38,7 +38,7 @@ def sniff(head: bytes | str) -> bool:
     return bool(lines) and lines[0].lower().lstrip('"').startswith(_FIRST)
 
 
-def read(path: str | os.PathLike[str]) -> Imported:
+def read(path: str | os.PathLike[str]) -> Dataset:
     """Read an ASCII export."""
     source = load(path)
     lines = [(k, text.strip()) for k, text in enumerate(source.lines, 1) if text.strip()]

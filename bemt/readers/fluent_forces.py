@@ -23,10 +23,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bemt.base.averaging import Mean
 from bemt.base.errors import Fault, InputError
+from bemt.dataset import Dataset
 from bemt.readers import SourceText, number
 from bemt.readers._cfd import head_lines, load, si_unit, slug, unique
-from bemt.readers._imported import Channel, Imported
+from bemt.readers._columns import Channel, dataset
 
 __all__ = ["KIND", "Entry", "blocks", "read", "sniff"]
 
@@ -175,16 +177,16 @@ def _sums(entries: Sequence[Entry], damaged: bool, line: int) -> list[str]:
     return notes
 
 
-def channels_of(entries: Sequence[Entry]) -> dict[str, Channel]:
+def _channels(entries: Sequence[Entry]) -> dict[str, Channel]:
     """Make one channel of each number, its mean being the number."""
     names = unique([f"{e.name}({e.zone})" for e in entries])
     return {
-        name: Channel(np.array([e.value]), e.unit, e.value, "one value of a report")
+        name: Channel(np.array([e.value]), e.unit, Mean(e.value, "one value of a report"))
         for name, e in zip(names, entries, strict=True)
     }
 
 
-def read(path: str | os.PathLike[str]) -> Imported:
+def read(path: str | os.PathLike[str]) -> Dataset:
     """Read a force report."""
     source = load(path)
     entries: list[Entry] = []
@@ -202,4 +204,4 @@ def read(path: str | os.PathLike[str]) -> Imported:
     notes.append("choose the zones that count: Net holds all that were selected in the report")
     titles = [text.strip() for text in source.lines if _TITLE.fullmatch(text.strip())]
     about = {"file": source.name, "sha256": source.sha256, "tables": "; ".join(titles), "clock": "none"}
-    return Imported(KIND, "cfd", len(zones), channels_of(entries), tuple(notes), about)
+    return dataset(KIND, "cfd", _channels(entries), notes, about)

@@ -13,9 +13,9 @@ import os
 import re
 
 from bemt.base.errors import Fault, InputError
+from bemt.dataset import Dataset
 from bemt.readers._cfd import ExportRow, head_lines, load, numeric_table
 from bemt.readers._cfd_record import history
-from bemt.readers._imported import Imported
 from bemt.readers.fluent_report import column_of
 
 __all__ = ["KIND", "read", "sniff"]
@@ -44,7 +44,7 @@ def sniff(head: bytes | str) -> bool:
     )
 
 
-def read(path: str | os.PathLike[str]) -> Imported:
+def read(path: str | os.PathLike[str]) -> Dataset:
     """Read a monitor."""
     source = load(path)
     title: str | None = None

@@ -19,9 +19,9 @@ import os
 import re
 
 from bemt.base.errors import Fault, InputError
+from bemt.dataset import Dataset
 from bemt.readers._cfd import Column, ExportRow, head_lines, load, numeric_table, si_unit
 from bemt.readers._cfd_record import history
-from bemt.readers._imported import Imported
 
 __all__ = ["KIND", "column_of", "read", "sniff"]
 
@@ -68,7 +68,7 @@ def sniff(head: bytes | str) -> bool:
     return any(line.startswith('("') or line.endswith(' etc.."') for line in lines[1:])
 
 
-def read(path: str | os.PathLike[str]) -> Imported:
+def read(path: str | os.PathLike[str]) -> Dataset:
     """Read a report file."""
     source = load(path)
     title = ""

@@ -22,11 +22,12 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from bemt.base.averaging import keep_last
+from bemt.base.averaging import Mean, keep_last
 from bemt.base.errors import Fault, InputError
+from bemt.dataset import Dataset
 from bemt.readers import SourceText, number
 from bemt.readers._cfd import head_lines, load, si_unit, slug
-from bemt.readers._imported import Channel, Imported
+from bemt.readers._columns import Channel, dataset
 from bemt.readers.fluent_forces import blocks
 
 __all__ = ["KIND", "read", "sniff"]
@@ -124,11 +125,11 @@ def _history(columns: Mapping[str, list[float]], steps: list[float]) -> dict[str
     for name, column in columns.items():
         values = np.array(column)[keep]
         last = float(values[-1]) if np.isfinite(values[-1]) else None
-        channels[name] = Channel(values, "", last, "" if last is None else "last iteration")
+        channels[name] = Channel(values, "", None if last is None else Mean(last, "last iteration"))
     return channels
 
 
-def read(path: str | os.PathLike[str]) -> Imported:
+def read(path: str | os.PathLike[str]) -> Dataset:
     """Read a transcript."""
     source = load(path)
     notes: list[str] = []
@@ -155,7 +156,7 @@ def read(path: str | os.PathLike[str]) -> Imported:
             found[f"{entry.name}({entry.zone})", entry.unit].append(entry.value)
     for (name, unit), values in found.items():
         times_text = "" if len(values) == 1 else f", last of {len(values)}"
-        channels[name] = Channel(np.array(values), unit, values[-1], f"one computed value{times_text}")
+        channels[name] = Channel(np.array(values), unit, Mean(values[-1], f"one computed value{times_text}"))
         if max(values) != min(values):
             notes.append(f"{name}: computed {len(values)} times with different values; the last one holds")
     if not channels:
@@ -168,8 +169,7 @@ def read(path: str | os.PathLike[str]) -> Imported:
         about["solver"] = version[1].strip()
     if cells:
         about["cells"] = cells[0]
-    return Imported(KIND, "cfd", len(channels["Iteration"].values) if steps else len(times) or len(found), channels,
-                    tuple(notes), about)  # fmt: skip
+    return dataset(KIND, "cfd", channels, notes, about)
 
 
 def _remarks(source: SourceText) -> list[str]:

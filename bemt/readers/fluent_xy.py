@@ -17,10 +17,11 @@ import re
 from dataclasses import replace
 
 from bemt.base.errors import Fault, InputError
+from bemt.dataset import Dataset
 from bemt.readers import SourceText
 from bemt.readers._cfd import Column, ExportRow, head_lines, load, numeric_table, unique
 from bemt.readers._cfd_record import history
-from bemt.readers._imported import Channel, Imported
+from bemt.readers._columns import Channel, channels_of, dataset
 from bemt.readers.fluent_report import column_of
 
 __all__ = ["KIND", "read", "sniff"]
@@ -44,7 +45,7 @@ def sniff(head: bytes | str) -> bool:
     return any(line.startswith("(labels ") for line in lines) and lines[0].startswith(("(title", "(labels"))
 
 
-def read(path: str | os.PathLike[str]) -> Imported:
+def read(path: str | os.PathLike[str]) -> Dataset:
     """Read an XY plot."""
     source = load(path)
     title = ""
@@ -89,12 +90,11 @@ def _column(label: str) -> Column:
 
 def _record(
     source: SourceText, title: str, labels: list[str], zones: list[tuple[str, list[ExportRow]]], closed: bool
-) -> Imported:
+) -> Dataset:
     columns = [_column(label) for label in labels]
     counts = columns[0].role in ("step", "time")
     channels: dict[str, Channel] = {}
     notes: list[str] = [] if closed else ["the last list is not closed: the file may be cut"]
-    rows = 0
     names = unique([zone for zone, _ in zones])
     clocks: list[str] = []
     for name, (_, data) in zip(names, zones, strict=True):
@@ -103,16 +103,15 @@ def _record(
             continue
         table = numeric_table(source, columns, data)
         record = history(KIND, source, columns, table)
-        rows += len(table.values) if not counts else record.rows
         keys = unique([c.name for c in columns])
-        for k, (key, channel) in enumerate(zip(keys, record.channels.values(), strict=True)):
+        for k, (key, channel) in enumerate(zip(keys, channels_of(record).values(), strict=True)):
             if counts:
                 channels[f"{key}({name})"] = channel
                 if k == 0:
                     clocks.append(f"{key}({name})")
             else:
                 channels[f"{key}({name})"] = Channel(table.values[:, k], columns[k].unit)
-        notes += [f"{name}: {text}" for text in (record.warnings if counts else table.warnings)]
+        notes += [f"{name}: {text}" for text in (record.notes if counts else table.warnings)]
     if not channels:
         raise InputError(Fault(source.name, "", "no points", "one pair of numbers or more"))
     if not counts:
@@ -122,4 +121,4 @@ def _record(
         about |= {"clock": "time" if columns[0].role == "time" else "iteration", "clock_channels": "\t".join(clocks)}
         if columns[0].role == "time" and len(clocks) == 1:
             about["time_channel"] = clocks[0]
-    return Imported(KIND, "cfd", rows, channels, tuple(notes), about)
+    return dataset(KIND, "cfd", channels, notes, about)

@@ -16,9 +16,10 @@ from pathlib import Path
 
 import numpy as np
 
-from bemt.readers import SourceText, head_text, load_text, number
+from bemt.dataset import Dataset
+from bemt.readers import head_text, load_text, number
 from bemt.readers._headings import Heading, heading
-from bemt.readers._imported import Imported
+from bemt.readers._large import NumberTable, large_table
 from bemt.readers._recording import Builder, spikes
 from bemt.readers._split import SplitTable, decimal_mark, find_start, split_line, split_table
 
@@ -71,23 +72,26 @@ def _blank_numbers(line: str) -> bool:
     return len(cells) > 1 and sum(number(c) is not None for c in cells) >= 0.8 * len(cells)
 
 
-def read(path: str | os.PathLike[str]) -> Imported:
+def read(path: str | os.PathLike[str]) -> Dataset:
     """Read a table."""
-    source = load_text(path)
-    table = split_table(source)
-    imported = convert(source, table, decimal_mark(table))
+    large = large_table(path)
+    if large is None:
+        table = split_table(load_text(path))
+        imported = convert(table, decimal_mark(table))
+    else:
+        imported = convert(*large)
     beside = Path(path).with_name("recording.toml")
     if beside.is_file() and Path(path).name in beside.read_text(encoding="utf-8", errors="replace"):
         more = f"{beside.name} beside it names this file: import {beside.name} for what it says"
-        imported = Imported(**{**vars(imported), "warnings": (*imported.warnings, more)})
+        imported = replace(imported, notes=(*imported.notes, more))
     return imported
 
 
-def convert(source: SourceText, table: SplitTable, decimal: str = ".") -> Imported:
+def convert(table: SplitTable | NumberTable, decimal: str = ".") -> Dataset:
     """Make channels of a split table."""
     build = Builder(table, KIND, kind="table")
     heads = [heading(t) if t else Heading("", f"column_{k + 1}", None) for k, t in enumerate(table.headings)]
-    heads = heads or [Heading("", f"column_{k + 1}", None) for k in range(len(table.rows[0]))]
+    heads = heads or [Heading("", f"column_{k + 1}", None) for k in range(table.width)]
     if any(head.name == "CT" for head in heads):  # beside a thrust coefficient, Cp is that of the power
         heads = [replace(h, name={"Cp": "CP", "Cq": "CQ"}.get(h.name, h.name)) for h in heads]
     for k, head in enumerate(heads):

@@ -22,9 +22,9 @@ import numpy as np
 
 from bemt.base import units
 from bemt.base.errors import Fault
+from bemt.dataset import Dataset
 from bemt.readers import head_text, load_text
 from bemt.readers._headings import Heading, heading
-from bemt.readers._imported import Imported
 from bemt.readers._recording import Builder, slip, spikes
 from bemt.readers._split import split_table
 
@@ -58,7 +58,7 @@ def sniff(head: bytes | str) -> bool:
     return {"out", "th", "th_err", "tq", "tq_err", "rpm"} <= cells or cells >= _RAW_KEYS
 
 
-def read(path: str | os.PathLike[str]) -> Imported:
+def read(path: str | os.PathLike[str]) -> Dataset:
     """Read a table or a raw record. ["form"]"""
     source = load_text(path)
     table = split_table(source, header=True)

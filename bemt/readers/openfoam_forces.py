@@ -24,11 +24,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from bemt.base.averaging import Mean
 from bemt.base.errors import Fault, InputError
+from bemt.dataset import Dataset
 from bemt.readers import SourceText
 from bemt.readers._cfd import Column, ExportRow, ExportTable, head_lines, load, numeric_table
 from bemt.readers._cfd_record import history
-from bemt.readers._imported import Channel, Imported
+from bemt.readers._columns import Channel, dataset
 
 __all__ = ["KIND", "read", "sniff"]
 
@@ -72,7 +74,7 @@ def _columns(header: str, title: str) -> tuple[list[Column], str, list[tuple[str
     return [Column("Time", "", "time"), *(Column(name) for name in names)], "flat", []
 
 
-def read(path: str | os.PathLike[str]) -> Imported:
+def read(path: str | os.PathLike[str]) -> Dataset:
     """Read a table of ``postProcessing``."""
     source = load(path)
     title = ""
@@ -159,7 +161,7 @@ def _totals(
 
 def _record(
     source: SourceText, columns: list[Column], table: ExportTable, about: dict[str, str], notes: list[str]
-) -> Imported:
+) -> Dataset:
     times = table.values[:, 0]
     known = times[np.isfinite(times)]
     if known.size and np.all(known == np.round(known)):
@@ -200,7 +202,7 @@ def _balance(columns: list[Column], table: ExportTable, axis: str) -> list[str]:
 
 def _by_patch(
     source: SourceText, names: list[str], rows: Sequence[tuple[int, str]], about: dict[str, str], notes: list[str]
-) -> Imported:
+) -> Dataset:
     """Table with a patch in the second column (yPlus): one channel for each patch and column."""
     columns = [Column("Time", "", "step"), *(Column(name) for name in names[1:])]
     patches: dict[str, list[ExportRow]] = {}
@@ -208,23 +210,21 @@ def _by_patch(
         cells = text.split()
         patches.setdefault(cells[1] if len(cells) > 1 else "?", []).append(ExportRow(line, (cells[0], *cells[2:])))
     channels: dict[str, Channel] = {}
-    last = 0
     prefix = "y_plus" if "y+" in about.get("title", "") else about.get("title", "").strip() or "value"
     for patch, data in patches.items():
         record = history(KIND, source, columns, numeric_table(source, columns, data, commas=False))
-        notes += [f"{patch}: {text}" for text in record.warnings]
-        last += record.rows
+        notes += [f"{patch}: {text}" for text in record.notes]
         for name in names[1:]:
-            values = record.channels[name].values
-            mean = float(values[-1]) if np.isfinite(values[-1]) else None
-            channels[f"{prefix}_{name}({patch})"] = Channel(values, "", mean, "" if mean is None else "last row")
+            values = record[name]
+            mean = Mean(float(values[-1]), "last row") if np.isfinite(values[-1]) else None
+            channels[f"{prefix}_{name}({patch})"] = Channel(values, "", mean)
     if not channels:
         raise InputError(Fault(source.name, "", "no rows", "one patch or more"))
-    return Imported(KIND, "cfd", last, channels, tuple(notes),
-                    {"file": source.name, "sha256": source.sha256, **about, "clock": "none"})  # fmt: skip
+    about = {"file": source.name, "sha256": source.sha256, **about, "clock": "none"}
+    return dataset(KIND, "cfd", channels, notes, about)
 
 
-def _probes(source: SourceText, probes: dict[str, str], rows: Sequence[tuple[int, str]], notes: list[str]) -> Imported:
+def _probes(source: SourceText, probes: dict[str, str], rows: Sequence[tuple[int, str]], notes: list[str]) -> Dataset:
     """Field at points over time: one channel for each probe and component; the field is named by the file's name."""
     vector = bool(rows) and "(" in rows[0][1]
     parts = ("_x", "_y", "_z") if vector else ("",)

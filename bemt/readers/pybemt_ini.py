@@ -15,8 +15,9 @@ import numpy as np
 
 from bemt.base import units
 from bemt.base.errors import Fault, InputError
+from bemt.dataset import Dataset
 from bemt.readers import head_text, load_text, number
-from bemt.readers._imported import Channel, Imported
+from bemt.readers._columns import Channel, dataset
 
 __all__ = ["KIND", "read", "sniff"]
 
@@ -44,7 +45,7 @@ def sniff(head: bytes | str) -> bool:
     return "[rotor]" in lines and {"nblades", "radius"} <= keys
 
 
-def read(path: str | os.PathLike[str]) -> Imported:
+def read(path: str | os.PathLike[str]) -> Dataset:
     """Read one description."""
     source = load_text(path)
     parser = configparser.ConfigParser(interpolation=None, strict=True, inline_comment_prefixes=("#", ";"))
@@ -84,8 +85,8 @@ def read(path: str | os.PathLike[str]) -> Imported:
     if len(parts) > 1:
         channels["rotor"] = Channel(rotor, "-")
     said_of = {"file": source.name, "sha256": source.sha256, "coaxial": tables.get("case", {}).get("coaxial", "False")}
-    return Imported(KIND, "geometry", len(rotor), channels, tuple(warnings), said_of,
-                    texts={"section": sum(names, ())}, constants=constants)  # fmt: skip
+    texts = {"section": sum(names, ())}
+    return dataset(KIND, "geometry", channels, warnings, said_of, texts=texts, constants=constants)
 
 
 def _scalars(

@@ -28,9 +28,9 @@ import numpy as np
 
 from bemt.base import units
 from bemt.base.errors import Fault, InputError
+from bemt.dataset import Dataset
 from bemt.readers import head_text, load_text, number
 from bemt.readers._headings import heading
-from bemt.readers._imported import Imported
 from bemt.readers._recording import Array, Builder, slip, spikes
 from bemt.readers._split import SplitTable, split_table
 
@@ -63,7 +63,7 @@ def sniff(head: bytes | str) -> bool:
     return any(c.startswith("Time (") for c in cells) and own >= 2
 
 
-def read(path: str | os.PathLike[str]) -> Imported:
+def read(path: str | os.PathLike[str]) -> Dataset:
     """Read one log. ["mode"]"""
     source = load_text(path)
     table = split_table(source, header=True)
@@ -121,7 +121,7 @@ def _turned(table: SplitTable, sides: Sequence[tuple[str, str]], side: str) -> b
 
 def _messages(build: Builder, k: int, text: str) -> None:
     """Messages of the stand's software, row by row."""
-    cells = tuple(row[k] for row in build.table.rows)
+    cells = tuple(build.table.cells(k))
     if any(cells):
         build.texts["app_message" if text else f"column_{k + 1}"] = cells
         rows = [i for i, cell in enumerate(cells) if cell]

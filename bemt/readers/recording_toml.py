@@ -19,9 +19,11 @@ from bemt.air import Air
 from bemt.base import units
 from bemt.base.errors import Fault, InputError
 from bemt.base.toml import Collector, Table, entry, load_toml, shown, validated
+from bemt.dataset import Dataset
 from bemt.readers import head_text, load_text
+from bemt.readers._columns import Channel, dataset
 from bemt.readers._headings import Heading, heading
-from bemt.readers._imported import Channel, Imported
+from bemt.readers._large import large_table
 from bemt.readers._recording import Builder, spikes
 from bemt.readers._split import some, split_table
 
@@ -207,7 +209,7 @@ def sniff(head: bytes | str) -> bool:
     return any(line.split("#")[0].strip() == "[recording]" for line in head_text(head).splitlines())
 
 
-def read(path: str | os.PathLike[str]) -> Imported:
+def read(path: str | os.PathLike[str]) -> Dataset:
     """Read a recording.toml and the tables that it names."""
     out = Collector(os.fspath(path))
     document = load_toml(Path(path), out)
@@ -216,7 +218,7 @@ def read(path: str | os.PathLike[str]) -> Imported:
     if made is None or out.faults:
         raise InputError(out.faults)
     head, constants = made.recording, made.rotor.constants() | made.stand.constants() | made.air.constants()
-    runs: list[Imported] = []
+    runs: list[Dataset] = []
     faults: list[Fault] = []
     for name in head.files:
         try:
@@ -226,14 +228,15 @@ def read(path: str | os.PathLike[str]) -> Imported:
     if faults:
         raise InputError(faults)
     joined = _join(runs, head.files)
-    warnings = list(joined.warnings)
-    if "density_kg_m3" not in constants and "density_kg_m3" not in joined.channels:
+    warnings = list(joined.notes)
+    if "density_kg_m3" not in constants and "density_kg_m3" not in joined:
         warnings.append("no air state: coefficients need a density ([air] in the recording)")
     said = {"recording": out.file, **{k: v for k, v in head.given().items() if isinstance(v, str) and k != "file"}}
     for name, facts in (("rotor", made.rotor), ("stand", made.stand)):
         said |= {f"{name}_{k}": v for k, v in facts.given().items() if isinstance(v, str)}
-    return replace(joined, format=KIND, kind="bench", warnings=tuple(dict.fromkeys(warnings)), constants=constants,
-                   provenance={**joined.provenance, **said}, instrument=_instrument(made.columns))  # fmt: skip
+    told = {"constants": constants, "instrument": _instrument(made.columns)}
+    about = {**joined.provenance, **said, **{k: v for k, v in told.items() if v}, "format": KIND}
+    return replace(joined, kind="bench", notes=tuple(dict.fromkeys(warnings)), provenance=about)
 
 
 def _check_poles(out: Collector, document: Mapping[str, Any]) -> None:
@@ -271,12 +274,13 @@ def _heading(name: str, unit: str, text: str) -> Heading:
     return Heading(text, heading(f"{name}_{unit}").name, units.UNITS[unit])
 
 
-def _run(file: str, path: Path, made: RecordingToml) -> Imported:
+def _run(file: str, path: Path, made: RecordingToml) -> Dataset:
     """One table with the map applied."""
     head, columns = made.recording, made.columns.given()
-    source = load_text(path)
-    table = split_table(source, head.delimiter, head.header)
-    width = len(table.rows[0])
+    large = large_table(path) if not {"delimiter", "header", "decimal"} & head.model_fields_set else None
+    told = (head.delimiter, head.header)
+    table = large[0] if large is not None and large[1] == "." else split_table(load_text(path), *told)
+    source, width = table.source, table.width
     places: dict[int, str] = {}
     faults = []
     for name, column in columns.items():
@@ -334,21 +338,21 @@ def _derive(build: Builder, pairs: int) -> None:
     build.check_magnitudes()
 
 
-def _join(runs: list[Imported], files: Sequence[str]) -> Imported:
+def _join(runs: list[Dataset], files: Sequence[str]) -> Dataset:
     """Runs in their order; a channel that a run lacks is NaN there."""
     if len(runs) == 1:
         return runs[0]
-    names = list(dict.fromkeys(name for run in runs for name in run.channels))
+    names = list(dict.fromkeys(name for run in runs for name in run.values))
     channels = {}
     for name in names:
-        found = [run.channels[name].unit for run in runs if name in run.channels]
-        parts = [run.channels[name].values if name in run.channels else np.full(run.rows, np.nan) for run in runs]
-        channels[name] = Channel(np.concatenate(parts), found[0] if len(set(found)) == 1 else "")
-    channels["run"] = Channel(np.concatenate([np.full(run.rows, k, dtype=float) for k, run in enumerate(runs, 1)]), "-")
-    texts = {name: sum((run.texts.get(name, ("",) * run.rows) for run in runs), ())
+        found = {run.unit(name) for run in runs if name in run}
+        parts = [run.values.get(name, np.full(len(run), np.nan)) for run in runs]
+        channels[name] = Channel(np.concatenate(parts), found.pop() if len(found) == 1 else "")
+    channels["run"] = Channel(np.concatenate([np.full(len(run), float(k)) for k, run in enumerate(runs, 1)]), "-")
+    texts = {name: sum((run.texts.get(name, ("",) * len(run)) for run in runs), ())
              for name in dict.fromkeys(n for run in runs for n in run.texts)}  # fmt: skip
-    warnings = tuple(f"{file}: {text}" for file, run in zip(files, runs, strict=True) for text in run.warnings)
+    warnings = [f"{file}: {text}" for file, run in zip(files, runs, strict=True) for text in run.notes]
     said = {"file": "+".join(files), "sha256": "+".join(run.provenance["sha256"] for run in runs)}
-    return Imported(KIND, "bench", sum(run.rows for run in runs), channels, warnings, said,
-                    flags=sum((run.flags for run in runs), ()), lines=sum((run.lines for run in runs), ()), texts=texts,
-                    headings={k: v for run in runs for k, v in run.headings.items()})  # fmt: skip
+    return dataset(KIND, "bench", channels, warnings, said, flags=sum((run.flags for run in runs), ()),
+                   lines=sum((tuple(run.lines) for run in runs), ()), texts=texts,
+                   headings={k: v for run in runs for k, v in run.provenance.get("headings", {}).items()})  # fmt: skip

@@ -17,9 +17,9 @@ import re
 import numpy as np
 
 from bemt.base.errors import Fault, InputError
+from bemt.dataset import Dataset
 from bemt.readers._cfd import Column, ExportRow, ExportTable, cells_of, head_lines, load, numeric_table
 from bemt.readers._cfd_record import history
-from bemt.readers._imported import Imported
 
 __all__ = ["KIND", "read", "sniff"]
 
@@ -40,7 +40,7 @@ def sniff(head: bytes | str) -> bool:
     return any(_START.match(line) for line in head_lines(head, 4))
 
 
-def read(path: str | os.PathLike[str]) -> Imported:
+def read(path: str | os.PathLike[str]) -> Dataset:
     """Read a history."""
     source = load(path)
     names: tuple[str, ...] | None = None

@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from bemt.base.averaging import Mean
 from bemt.base.errors import Fault, InputError
-from bemt.base.units import split_suffix
 from bemt.dataset import Dataset
+from bemt.dataset.points import unit_in
 from bemt.readers import polar_c81, uiuc
-from bemt.readers._imported import Channel, Imported
+from bemt.readers._columns import Channel, dataset
 from bemt.readers.apc import ApcPerformance
 from bemt.readers.references import Reference
 from bemt.sections.polars import Polar
@@ -114,33 +115,38 @@ def _columns(found: Any) -> Iterator[tuple[str, Any]]:
             yield item.name, np.array([value])
 
 
-def _channel(name: str, values: Any) -> Channel:
-    array = np.asarray(values, dtype=float)
-    _, unit = split_suffix(name)
-    one = float(array[0]) if array.size == 1 and np.isfinite(array[0]) else None
-    return Channel(array, unit.suffix if unit else "", one, "" if one is None else "one value")
+def _channels(columns: Mapping[str, Any]) -> dict[str, Channel]:
+    """Columns with the unit that their name says; one value stands for all rows."""
+    rows = max((np.size(v) for v in columns.values()), default=0)
+    out = {}
+    for name, values in columns.items():
+        array = np.asarray(values, dtype=float)
+        one = array.size == 1 and bool(np.isfinite(array[0]))
+        mean = Mean(float(array[0]), "one value") if one else None
+        out[name] = Channel(np.full(rows, array[0]) if one else array, unit_in(name), mean)
+    return out
 
 
-def adapt(found: Any, form: str, name: str) -> Imported:
-    """Make the record of whatever an importer returned.
+def adapt(found: Any, form: str, name: str) -> Dataset:
+    """Make the dataset of whatever a reader returned.
 
     Examples
     --------
-    >>> record = adapt(Dataset("bench", "stand", {"rpm": [6000.0, 7000.0], "thrust_N": [10.0, 13.5]}), "csv", "a.csv")
-    >>> record.kind, record.rows, record.channels["thrust_N"].unit
-    ('bench', 2, 'N')
+    >>> adapt(Dataset("bench", "stand", {"rpm": [6000.0, 7000.0], "thrust_N": [10.0, 13.5]}), "csv", "a.csv")
+    Dataset('bench', 'stand', 2 points: rpm, thrust_N)
     """
-    if isinstance(found, Imported):
-        return found
     if isinstance(found, Dataset):
-        channels = {key: _channel(key, found[key]) for key in found.values}
+        if "format" in found.provenance:
+            return found
         flags = sorted({flag for row in found.flags for flag in row})
-        return Imported(form, found.kind, len(found), channels, tuple(flags), _texts(found.provenance, name))
+        about = {**_texts(found.provenance, name), "format": form}
+        return replace(found, provenance=about, notes=(*found.notes, *flags))
     if isinstance(found, Polar):
-        channels = {"alpha_rad": _channel("alpha_rad", found.alpha), "Re": _channel("Re", found.Re)}
-        channels |= {"M": _channel("M", found.M)}
+        at = np.meshgrid(found.alpha, found.Re, found.M, indexing="ij")
+        axes = {"alpha_rad": found.alpha, "Re": found.Re, "M": found.M}
+        channels = _channels({k: v.ravel() if axes[k].size > 1 else axes[k] for k, v in zip(axes, at, strict=True)})
         channels |= {key: Channel(getattr(found, key).ravel()) for key in ("cl", "cd")}
-        return Imported(form, "polar", len(found.alpha), channels, found.notes, {"file": name, "source": found.source})
+        return dataset(form, "polar", channels, found.notes, {"file": name, "source": found.source})
     if isinstance(found, (list, tuple)) and found and all(isinstance(item, Reference) for item in found):
         return _references(list(found), form, name)
     if isinstance(found, (list, tuple)) and found and all(isinstance(item, uiuc.UiucPropeller) for item in found):
@@ -149,15 +155,13 @@ def adapt(found: Any, form: str, name: str) -> Imported:
         told = f"{found.name}: {found.blades} blades, D {found.diameter_m:.4g} m, pitch {found.pitch_m:.4g} m"
         table = adapt(found.series, form, name)
         remark = str(found.series.provenance.get("remark", ""))
-        return replace(table, warnings=(told, *([remark] if remark else []), *table.warnings))
+        return replace(table, notes=(told, *([remark] if remark else []), *table.notes))
     if is_dataclass(found) and not isinstance(found, type):
         columns = dict(_columns(found))
-        rows = max((len(values) for values in columns.values()), default=0)
-        if rows:
+        if any(len(values) for values in columns.values()):
             kind = "geometry" if type(found).__name__ in _GEOMETRY else _KIND.get(form, "table")
             notes = tuple(str(note) for note in getattr(found, "notes", ()) or ())
-            channels = {key: _channel(key, values) for key, values in columns.items()}
-            return Imported(form, kind, rows, channels, notes, _texts(getattr(found, "provenance", {}), name))
+            return dataset(form, kind, _channels(columns), notes, _texts(getattr(found, "provenance", {}), name))
     raise InputError(Fault(name, "", f"a {type(found).__name__} without numbers", "something that can be shown"))
 
 
@@ -165,23 +169,20 @@ def _texts(provenance: Mapping[str, Any], name: str) -> dict[str, str]:
     return {"file": name, **{str(k): str(v) for k, v in provenance.items() if isinstance(v, (str, int, float))}}
 
 
-def _references(found: list[Reference], form: str, name: str) -> Imported:
+def _references(found: list[Reference], form: str, name: str) -> Dataset:
     columns: dict[str, list[float]] = {}
     for item in found:
         columns.setdefault(item.channel, []).append(item.value)
     kinds = {item.kind for item in found}
     kind = kinds.pop() if len(kinds) == 1 else "table"
-    channels = {key: _channel(key, values) for key, values in columns.items()}
-    return Imported(form, kind, len(found), channels, (), {"file": name, "sha256": found[0].sha256})
+    return dataset(form, kind, _channels(columns), (), {"file": name, "sha256": found[0].sha256})
 
 
-def _propellers(found: list[uiuc.UiucPropeller], form: str, name: str) -> Imported:
+def _propellers(found: list[uiuc.UiucPropeller], form: str, name: str) -> Dataset:
     runs = [uiuc.to_series(item) for item in found if item.statics or item.lines]
     bare = len(found) - len(runs)
     notes = [f"{len(found)} propellers"] + ([f"{bare} of them with geometry only"] if bare else [])
     columns = {key: np.concatenate([run[key] for run in runs]) for key in runs[0].values} if runs else {}
     if not columns:
         columns = {"diameter_in": np.array([item.diameter_in for item in found])}
-    rows = len(next(iter(columns.values())))
-    channels = {key: _channel(key, values) for key, values in columns.items()}
-    return Imported(form, "bench", rows, channels, tuple(notes), {"file": name})
+    return dataset(form, "bench", _channels(columns), notes, {"file": name})

@@ -1,26 +1,29 @@
-"""What a recording measured, under the names that a `Dataset` has: one view for reduction and sanity checks.
+"""What a recording measured, under the usual names, for reduction and sanity checks.
 
-The importers keep the names of the file; here ``T_N`` becomes ``thrust_N``, the pulse width ``pwm_s``, one of several
-speeds ``rpm``. Every choice is a note, every value that is left out an entry of `lost`.
+Readers keep the names of the file; here ``T_N`` becomes ``thrust_N``, the pulse width ``pwm_s``, one of several speeds
+``rpm``, and a column of uncertainties goes with its channel. Every choice is a note, every value that is left out an
+entry of `dropped`.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from bemt.base import units
-from bemt.readers._imported import Imported
+from bemt.dataset import Dataset
 
-__all__ = ["LOADS", "MEASURED", "Lost", "Recorded", "shaft_power", "view"]
+__all__ = ["LOADS", "MEASURED", "Lost", "dropped", "file_name", "lost", "named", "runs_of", "shaft_power", "stated"]
 
 Array = NDArray[np.float64]
 HUGE = 1e9
 """Magnitude in SI above which no reading of a stand is physical."""
+LATEST_S = 1e11
+"""A clock may count from 1970."""
 LOADS = ("thrust_N", "duct_thrust_N", "torque_Nm", "power_W", "electrical_power_W", "current_A", "CT", "CP", "CQ")
 """Channels of which a point needs one."""
 MEASURED = (
@@ -40,51 +43,30 @@ _SPEEDS = ("optical_rpm", "electrical_rpm")
 _BARE_POWER = re.compile(r"\s*power\s*[\[(]\s*w(atts?)?\s*[\])]\s*", re.IGNORECASE)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Lost:
-    """A row, or one value of it, that was left out: `line` in the file, `channel` ("" for the row) and `reason`."""
+    """Rows, or one value of each, that were left out: first and last line, `channel` ("" for the rows) and `reason`."""
 
     line: int
+    last: int
     channel: str
     reason: str
 
+    @property
+    def lines(self) -> range:
+        """Their lines in the file."""
+        return range(self.line, self.last + 1)
 
-@dataclass(frozen=True, eq=False)
-class Recorded:
-    """Channels of a recording by name of a Dataset.
 
-    Parameters
-    ----------
-    values : mapping of str to (N,) float
-        In SI, ``rpm`` in rev/min; NaN: no value.
-    u : mapping of str to (N,) float
-        Standard uncertainty that the file states row by row.
-    lines : tuple of int
-        Line in the file of each row (row number from 1 when it is not known).
-    run : (N,) float
-        Run of each row, from 1. [-]
-    names : mapping of str to str
-        Name that the importer gave to each channel.
-    notes : tuple of str
-        Choices that were made.
-    lost : tuple of Lost
-        Values that were left out.
-    flags : tuple of tuple of str
-        Of the importer, per row.
-    """
-
-    values: Mapping[str, Array]
-    u: Mapping[str, Array]
-    lines: tuple[int, ...]
-    run: Array
-    names: Mapping[str, str] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
-    lost: tuple[Lost, ...] = ()
-    flags: tuple[tuple[str, ...], ...] = ()
-
-    def __len__(self) -> int:
-        """Give the number of rows."""
-        return len(self.lines)
+def lost(d: Dataset, rows: ArrayLike, channel: str, reason: str) -> list[Lost]:
+    """Rows that are left out, one entry for lines that follow each other."""
+    at = np.asarray(rows, dtype=np.intp)
+    if not at.size:
+        return []
+    lines = np.asarray(d.lines, dtype=np.intp)[at] if not isinstance(d.lines, range) else d.lines.start + at
+    cuts = np.flatnonzero(np.diff(lines) != 1) + 1
+    first, last = lines[np.concatenate([[0], cuts])], lines[np.concatenate([cuts - 1, [-1]])]
+    return [Lost(a, b, channel, reason) for a, b in zip(first.tolist(), last.tolist(), strict=True)]
 
 
 def _alive(v: Array) -> bool:
@@ -101,57 +83,77 @@ def _base_of_u(name: str) -> str | None:
     return re.sub(r"_err_", "_", name) if "_err_" in name else None
 
 
-def view(imported: Imported, speed: str | None = None) -> Recorded:
-    """Name the channels of a recording.
+def dropped(d: Dataset) -> tuple[Lost, ...]:
+    """Values and rows that were left out so far."""
+    return tuple(d.provenance.get("dropped", ()))
+
+
+def file_name(d: Dataset, channel: str) -> str:
+    """Name that the file has for a channel."""
+    return str(d.provenance.get("names", {}).get(channel, channel))
+
+
+def stated(d: Dataset) -> dict[str, Array]:
+    """Standard uncertainties that the file states row by row."""
+    return {key: u for key, u in d.u.items() if np.isfinite(u).any()}
+
+
+def runs_of(d: Dataset) -> Array:
+    """Run of each row, (N,), from 1; 0 where the file has a gap."""
+    return np.nan_to_num(d["run"]) if "run" in d else np.ones(len(d))
+
+
+def named(d: Dataset, speed: str | None = None) -> Dataset:
+    """Give the channels of a recording their usual names.
 
     Examples
     --------
-    >>> from bemt.readers._imported import Channel
-    >>> read = Imported("table", "bench", 2, {"T_N": Channel([1.0, 2.0], "N"), "x": Channel([0.0, 1.0])})
-    >>> sorted(view(read).values)
+    >>> read = Dataset("bench", "table", {"T_N": [1.0, 2.0], "x": [0.0, 1.0]}, units={"x": ""})
+    >>> sorted(named(read).values)
     ['thrust_N']
     """
-    n = imported.rows
-    lines = imported.lines if len(imported.lines) == n else tuple(range(1, n + 1))
+    n = len(d)
+    d = d if d.lines else replace(d, lines=range(1, n + 1))
     values: dict[str, Array] = {}
     names: dict[str, str] = {}
     notes: list[str] = []
-    lost: list[Lost] = []
-    raw = {k: np.asarray(c.values, dtype=float) for k, c in imported.channels.items()}
-    raw = {k: v for k, v in raw.items() if v.shape == (n,)}
-    for name, v in raw.items():
-        if not imported.channels[name].unit and name not in ("run", "rpm", *_SPEEDS):
+    out: list[Lost] = []
+    for name, v in d.values.items():
+        if not d.unit(name) and name not in ("run", "rpm", *_SPEEDS):
             continue
         target = _ALIASES.get(name, name)
-        if target != name and (target in raw or target in values):
+        if target != name and (target in d or target in values):
             continue
         if target not in MEASURED and _base_of_u(name) is None:
             continue
-        far = np.flatnonzero(np.abs(v) > HUGE)
-        lost += [Lost(lines[i], target, f"{v[i]:.3g} is no physical magnitude") for i in far]
-        values[target], names[target] = np.where(np.abs(v) > HUGE, np.nan, v), name
-    u = {}
+        far = np.abs(v) > (HUGE if target != "time_s" else LATEST_S)
+        if far.any():
+            shown = ", ".join(f"{x:.3g}" for x in v[far][:3]) + (", ..." if far.sum() > 3 else "")
+            out += lost(d, np.flatnonzero(far), target, f"{shown}: no physical magnitude")
+        values[target], names[target] = np.where(far, np.nan, v) if far.any() else v, name
+    u = {_ALIASES.get(key, key): v for key, v in stated(d).items() if _ALIASES.get(key, key) in values}
     for name in [k for k in values if _base_of_u(k) is not None]:
         base = _base_of_u(name) or ""
         base = _ALIASES.get(base, base)
         column = values.pop(name)
         names.pop(name)
         if base in values:
-            bad = np.flatnonzero(column < 0.0)
-            lost += [Lost(lines[i], f"u_{base}", "a negative uncertainty") for i in bad]
+            out += lost(d, np.flatnonzero(column < 0.0), f"u_{base}", "a negative uncertainty")
             u[base] = np.where(column < 0.0, np.nan, column)
         else:
             notes.append(f"{name}: uncertainty of a channel that the file has not; left out")
     _speed(values, names, notes, speed)
-    _power(values, names, notes, raw.get("P_W"))
-    if names.get("power_W") == "power_W" and _BARE_POWER.fullmatch(imported.headings.get("power_W", "")):
+    _power(values, names, notes, d.values.get("P_W"))
+    bare = d.provenance.get("headings", {}).get("power_W", "")
+    if names.get("power_W") == "power_W" and _BARE_POWER.fullmatch(bare):
         notes.append("power_W: taken as shaft power; if a wattmeter read it, name the column electrical_power_W")
-    run = values.get("run", np.ones(n))
-    if np.any(~np.isfinite(run)):
-        notes.append(f"{int(np.sum(~np.isfinite(run)))} rows without a run: taken as run 0")
-        run = np.where(np.isfinite(run), run, 0.0)
-    flags = imported.flags if len(imported.flags) == n else ((),) * n
-    return Recorded(values, u, lines, run, names, tuple(notes), tuple(lost), flags)
+    none = int(np.sum(~np.isfinite(values["run"]))) if "run" in values else 0
+    if none:
+        notes.append(f"{none} rows without a run: taken as run 0")
+    own = {key: d.unit(name) for key, name in names.items() if name in d}
+    about = {**d.provenance, "names": names, "dropped": tuple(out)}
+    return replace(d, values=values or {"run": np.ones(n)}, u=u, u_by={}, provenance=about, notes=tuple(notes),
+                   units=own, texts={})  # fmt: skip
 
 
 def _speed(values: dict[str, Array], names: dict[str, str], notes: list[str], speed: str | None) -> None:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import numpy as np
 
 from bemt.dataset import Dataset
-from bemt.readers._imported import Imported
 from bemt.recordings import columns, signs, slips  # they register themselves
 from bemt.recordings.findings import CHECKS, SEVERITIES, Finding, facts_of
 
@@ -21,7 +20,7 @@ _ROOMS = (slips, signs, columns)
 
 @np.errstate(all="ignore")  # a damaged file may hold any number
 def check(
-    source: Imported | Dataset, *, diameter_m: float | None = None, pitch_m: float | None = None,
+    source: Dataset, *, diameter_m: float | None = None, pitch_m: float | None = None,
     blades: int | None = None, ducted: bool = False,
 ) -> tuple[Finding, ...]:  # fmt: skip
     """Look for faults in a recording.

@@ -8,12 +8,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from bemt.base.averaging import Average, keep_last, revolution_average
+from bemt.base.averaging import Average, Mean, keep_last, revolution_average
 from bemt.base.errors import Fault, InputError
-from bemt.readers._imported import Channel, Imported
+from bemt.dataset import Dataset
 
 __all__ = ["Choice", "asked", "averaged", "chosen"]
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -44,90 +47,93 @@ class Choice:
     loads: tuple[str, ...] = ()
 
 
-def averaged(record: Imported, period: float, revolutions: int | None = None) -> Imported:
+def averaged(record: Dataset, period: float, revolutions: int | None = None) -> Dataset:
     """Replace the means of a history by those over its last whole revolutions.
 
     Examples
     --------
     >>> t = np.arange(1, 401) * 0.01
-    >>> r = Imported("x", "cfd", 400, {"time_s": Channel(t, "s"), "q": Channel(2 + np.sin(2 * np.pi * t))},
-    ...              provenance={"clock": "time", "time_channel": "time_s", "clock_channels": "time_s"})
-    >>> c = averaged(r, 1.0).channels["q"]
-    >>> round(c.mean, 9), c.averaged_over
+    >>> r = Dataset("cfd", "x", {"time_s": t, "q": 2 + np.sin(2 * np.pi * t)}, units={"q": ""},
+    ...             provenance={"clock": "time", "time_channel": "time_s", "clock_channels": "time_s"})
+    >>> mean = averaged(r, 1.0).provenance["means"]["q"]
+    >>> round(mean.value, 9), mean.over
     (2.0, 'last 2 revolutions (2 to 4 s, 200 rows)')
     """
-    name = record.provenance.get("time_channel", "")
-    own = set(record.provenance.get("clock_channels", "").split("\t"))
-    if name not in record.channels:
+    name = record.provenance.get("time_channel", "time_s")
+    own = {name, *record.provenance.get("clock_channels", "").split("\t")}
+    if name not in record:
         note = "no column of time: the speed of rotation is not used"
-        return replace(record, warnings=(*record.warnings, note))
-    time = record.channels[name].values
+        return replace(record, notes=(*record.notes, note))
+    time = record[name]
+    told = record.provenance.get("means", {})
     index, notes = keep_last(time, name)
     problems: dict[str, list[str]] = {}
     scatter: dict[str, float] = {}
-    channels: dict[str, Channel] = {}
-    for key, channel in record.channels.items():
-        if key in own or channel.values.shape != time.shape or (channel.mean is None and channel.unit == "s"):
-            channels[key] = channel
+    means: dict[str, Mean] = {}
+    for key, values in record.values.items():
+        if key in own or (key not in told and record.unit(key) == "s"):
             continue
-        average = revolution_average(time[index], channel.values[index], period, revolutions)
+        average = revolution_average(time[index], values[index], period, revolutions)
         turns = average.per_revolution
         if average.mean and turns and max(turns) - min(turns) > 0.02 * abs(average.mean):
             scatter[key] = (max(turns) - min(turns)) / abs(average.mean)
         if average.problem:
             problems.setdefault(average.problem, []).append(key)
-        channels[key] = _channel(channel, average)
+        if average.mean is not None:
+            means[key] = Mean(average.mean, _span(average), average.drift)
     more = [f"{'no mean' if 'only' not in text else 'doubtful mean'} of {', '.join(keys)}: {text}"
             for text, keys in problems.items()]  # fmt: skip
     if scatter:
         worst = ", ".join(f"{key} {value:.2%}" for key, value in list(scatter.items())[:6])
         more.append(f"means of single revolutions differ: {worst}")
-    return replace(record, channels=channels, warnings=(*record.warnings, *notes, *more))
+    return replace(record, provenance={**record.provenance, "means": means}, notes=(*record.notes, *notes, *more))
 
 
-def _channel(channel: Channel, average: Average) -> Channel:
-    if average.mean is None:
-        return Channel(channel.values, channel.unit)
+def _span(average: Average) -> str:
     turns = f"{average.revolutions} revolution" + ("s" if average.revolutions > 1 else "")
-    over = f"last {turns} ({average.start:.6g} to {average.end:.6g} s, {average.rows} rows)"
-    return Channel(channel.values, channel.unit, average.mean, over, average.drift)
+    return f"last {turns} ({average.start:.6g} to {average.end:.6g} s, {average.rows} rows)"
 
 
-def chosen(record: Imported, choice: Choice) -> Imported:
+def chosen(record: Dataset, choice: Choice) -> Dataset:
     """Apply zones, sector and sign, in this order."""
-    channels = dict(record.channels)
-    notes = list(record.warnings)
+    values, own = dict(record.values), dict(record.units)
+    means: dict[str, Mean] = dict(record.provenance.get("means", {}))
+    notes = list(record.notes)
     file = record.provenance.get("file", "")
     if choice.zones:
-        channels |= _zone_sums(record, choice.zones, file)
+        _add_zones(record, choice.zones, file, values, means, own)
     factor = choice.sign * choice.sector
     if factor != 1:
-        absent = [name for name in choice.loads if name not in channels]
+        absent = [name for name in choice.loads if name not in values]
         if absent:
-            hint = f"Channels: {', '.join(list(channels)[:12])}"
+            hint = f"Channels: {', '.join(list(values)[:12])}"
             raise InputError(Fault(file, "--load", ", ".join(absent), "names of channels", hint))
-        loads = choice.loads or tuple(n for n, c in channels.items() if c.unit in ("N", "Nm"))
+        loads = choice.loads or tuple(n for n in values if own.get(n, record.unit(n)) in ("N", "Nm"))
         if not loads:
             hint = "Name them: --load NAME"
             raise InputError(Fault(file, "--sign, --sector", "no channel in N or Nm", "loads to apply them to", hint))
         for name in loads:
-            old = channels[name]
-            mean = None if old.mean is None else old.mean * factor
-            over = f"{old.averaged_over}, times {factor}" if old.averaged_over else ""
-            channels[name] = Channel(old.values * factor, old.unit, mean, over, old.drift)
+            values[name] = values[name] * factor
+            if (old := means.get(name)) is not None:
+                means[name] = Mean(old.value * factor, f"{old.over}, times {factor}", old.drift)
         text = f"sign {choice.sign:+d}, {choice.sector} sectors, as told: {len(loads)} channels times {factor}"
         notes.append(text + ("; holds only for axisymmetric flow" if choice.sector > 1 else ""))
-    return replace(record, channels=channels, warnings=tuple(notes))
+    about = {**record.provenance, **({"means": means} if means else {})}
+    return replace(record, values=values, units=own, provenance=about, notes=tuple(notes))
 
 
-def _zone_sums(record: Imported, zones: Sequence[str], file: str) -> dict[str, Channel]:
-    groups: dict[str, dict[str, Channel]] = {}
-    for name, channel in record.channels.items():
+def _add_zones(
+    record: Dataset, zones: Sequence[str], file: str, values: dict[str, Array], means: dict[str, Mean],
+    own: dict[str, str],
+) -> None:  # fmt: skip
+    """Add the sums over the zones that count."""
+    groups: dict[str, dict[str, str]] = {}
+    for name in record.values:
         match = re.fullmatch(r"(.+?)\(([^()]*)\)", name)
-        if record.format == "openfoam_forces":  # Cd(f), Cd(r): front and rear, no zones
+        if record.provenance.get("format") == "openfoam_forces":  # Cd(f), Cd(r): front and rear, no zones
             continue
         if match and "center_of_pressure" not in name and "y_plus" not in name:
-            groups.setdefault(match[1], {})[match[2]] = channel
+            groups.setdefault(match[1], {})[match[2]] = name
     known = list(dict.fromkeys(zone for group in groups.values() for zone in group))
     absent = [zone for zone in zones if zone not in known]
     if absent:
@@ -135,20 +141,19 @@ def _zone_sums(record: Imported, zones: Sequence[str], file: str) -> dict[str, C
         raise InputError(Fault(file, "--zones", ", ".join(absent), "zones of the file", hint))
     if "Net" in zones and len(zones) > 1:
         raise InputError(Fault(file, "--zones", "Net beside other zones", "Net alone, or zones", "Net holds them all"))
-    out = {}
     for base, group in groups.items():
         parts = [group[zone] for zone in zones if zone in group]
-        if len(parts) != len(zones) or len(zones) < 2 or len({p.values.shape for p in parts}) != 1:
+        if len(parts) != len(zones) or len(zones) < 2:
             continue
-        means = [p.mean for p in parts if p.mean is not None]
-        mean = math.fsum(means) if len(means) == len(parts) else None
-        over = f"{parts[0].averaged_over}, sum of {len(parts)} zones" if mean is not None else ""
-        drift = None
-        if mean and all(p.drift is not None for p in parts):
-            drift = sum((p.drift or 0.0) * abs(p.mean or 0.0) for p in parts) / abs(mean)  # drift is change / |mean|
-        values = np.sum([p.values for p in parts], axis=0)
-        out[f"{base}({'+'.join(zones)})"] = Channel(values, parts[0].unit, mean, over, drift)
-    return out
+        label = f"{base}({'+'.join(zones)})"
+        values[label], own[label] = np.sum([values[p] for p in parts], axis=0), record.unit(parts[0])
+        found = [means[p] for p in parts if p in means]
+        if len(found) < len(parts):
+            continue
+        mean, drift = math.fsum(m.value for m in found), None
+        if mean and all(m.drift is not None for m in found):  # drift is change / |mean|
+            drift = sum((m.drift or 0.0) * abs(m.value) for m in found) / abs(mean)
+        means[label] = Mean(mean, f"{found[0].over}, sum of {len(parts)} zones", drift)
 
 
 def asked(

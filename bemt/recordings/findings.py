@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.base import units
 from bemt.dataset import Dataset
-from bemt.readers._imported import Imported
-from bemt.recordings.channels import view
+from bemt.recordings.channels import named
 
 __all__ = ["CHECKS", "MANY", "SEVERITIES", "Facts", "Finding", "check_for", "facts_of"]
 
 Array = NDArray[np.float64]
 SEVERITIES = ("error", "warning", "note")
+ENOUGH = 200_000
+"""Rows from which a median is taken over every so many of them."""
 MANY, GAP = 50, 50
 """Rows from which a recording is a log with fast and slow channels; rows over which a slow one is interpolated."""
 LIKELY_RHO = 1.2
@@ -69,7 +69,7 @@ class Facts:
         Unit of each of them.
     names : mapping of str to str
         Name in the file of each channel of `values`.
-    lines : tuple of int
+    lines : sequence of int
         Line in the file.
     diameter_m, pitch_m : float or None
         As far as known. [m]
@@ -85,7 +85,7 @@ class Facts:
     raw: Mapping[str, Array]
     unit: Mapping[str, str]
     names: Mapping[str, str]
-    lines: tuple[int, ...]
+    lines: Sequence[int]
     diameter_m: float | None = None
     pitch_m: float | None = None
     blades: int | None = None
@@ -110,6 +110,14 @@ class Facts:
         """Density, a usual one where none is recorded. [kg/m3]"""
         v = self.values.get("density_kg_m3", np.full(len(self), np.nan))
         return np.where((v > 0.2) & (v < 2.0), v, LIKELY_RHO)
+
+    def sampled(self, most: int = ENOUGH) -> Facts:
+        """Every so many rows of a long log: medians need no more."""
+        step = -(-len(self) // most)
+        if step == 1:
+            return self
+        values, raw = ({k: v[::step] for k, v in part.items()} for part in (self.filled, self.raw))
+        return replace(self, values=values, raw=raw, lines=self.lines[::step])
 
     @cached_property
     def filled(self) -> Mapping[str, Array]:
@@ -173,23 +181,16 @@ def check_for(name: str) -> Callable[[Check], Check]:
 
 
 def facts_of(
-    source: Imported | Dataset, diameter_m: float | None, pitch_m: float | None, blades: int | None, ducted: bool
+    source: Dataset, diameter_m: float | None, pitch_m: float | None, blades: int | None, ducted: bool
 ) -> Facts:
     """Gather the facts of a recording or a series."""
-    if isinstance(source, Dataset):
-        raw = {k: np.asarray(v, dtype=float) for k, v in source.values.items()}
-        told = {k: units.split_suffix(k)[1] for k in raw}
-        unit = {k: u.suffix if u is not None else "-" for k, u in told.items()}
-        return Facts(raw, raw, unit, {}, tuple(range(1, len(source) + 1)), diameter_m, pitch_m, blades, ducted)
-    rec = view(source)
-    raw = {k: np.asarray(c.values, dtype=float) for k, c in source.channels.items()}
-    raw = {k: np.where(np.abs(v) > 1e12, np.nan, v) for k, v in raw.items() if v.shape == (source.rows,)}
-    said = source.constants
+    rec = named(source)
+    raw = {k: np.where(far, np.nan, v) if (far := np.abs(v) > 1e12).any() else v for k, v in source.values.items()}
+    said, about = source.provenance.get("constants", {}), source.provenance
     own = int(said["blades"]) if "blades" in said else None
     return Facts(
-        rec.values, raw, {k: c.unit for k, c in source.channels.items()}, rec.names, rec.lines,
+        rec.values, raw, {k: source.unit(k) for k in raw}, rec.provenance["names"], rec.lines,
         diameter_m if diameter_m is not None else said.get("diameter_m"),
         pitch_m if pitch_m is not None else said.get("pitch_m"), blades if blades is not None else own,
-        ducted or source.provenance.get("rotor_ducted") == "yes" or source.provenance.get("duct") == "yes",
-        source.provenance.get("propeller") == "none",
+        ducted or about.get("rotor_ducted") == "yes" or about.get("duct") == "yes", about.get("propeller") == "none",
     )  # fmt: skip

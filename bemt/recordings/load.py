@@ -7,8 +7,9 @@ appear in ``averaged_over`` and in the warnings. Files are never joined: a resta
 Schema ``bemt.import/1``: ``files`` is a list of ``path``, ``format``, ``kind``, ``rows``, ``channels`` (name to
 ``unit``, ``mean``, ``averaged_over``, ``drift``), ``warnings``, ``error`` (null when the file was read), ``findings``
 (``id``, ``channel``, ``evidence``, ``correction``, ``rows``, ``severity``; nothing is corrected) and ``reduction``
-(null unless it is a recording: ``mode``, ``points``, ``correlated``, ``dropped``, ``notes``, ``error``). A channel of
-a recording has a mean only where the recording is one steady point.
+(null unless it is a recording: ``mode``, ``points``, ``correlated``, ``dropped`` with first ``line`` and ``last``,
+``channel`` and ``reason``, ``notes``, ``error``). A channel of a recording has a mean only where the recording is one
+steady point.
 """
 
 from __future__ import annotations
@@ -26,14 +27,14 @@ import numpy as np
 
 from bemt import readers as importers
 from bemt.base import tables
-from bemt.base.averaging import relation
+from bemt.base.averaging import Mean, relation
 from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError, system_fault
 from bemt.dataset import Dataset
-from bemt.readers._imported import Channel, Imported
+from bemt.dataset.points import channel_fault
 from bemt.recordings.adapt import adapt, damaged_export, recognised
 from bemt.recordings.choice import Choice, averaged, chosen
 from bemt.recordings.overview import findings, is_recording, points_text, reduction_document, reduction_of
-from bemt.recordings.reduce import Reduced
+from bemt.recordings.reduce import reduction
 
 __all__ = ["SCHEMA", "Choice", "as_dataset", "averaged", "chosen", "document", "exit_code", "import_file", "text"]
 
@@ -45,7 +46,7 @@ SETTLED = 0.01
 _RESTART = re.compile(r"(.+?)((?:_\d+)+)(\.[^.]*)?(?:\.gz)?")
 
 
-def import_file(path: str | os.PathLike[str], format: str | None = None, choice: Choice | None = None) -> Imported:  # noqa: A002
+def import_file(path: str | os.PathLike[str], format: str | None = None, choice: Choice | None = None) -> Dataset:  # noqa: A002
     """Read one file or folder of any known format."""
     choice = choice or Choice()
     name = os.fspath(path)
@@ -71,30 +72,32 @@ def import_file(path: str | os.PathLike[str], format: str | None = None, choice:
         record = averaged(record, choice.period, choice.revolutions)
     elif record.provenance.get("clock") == "time":
         note = "mean over all rows, start-up included: give --rpm or --period for whole revolutions"
-        record = replace(record, warnings=(*record.warnings, note))
+        record = replace(record, notes=(*record.notes, note))
     record = chosen(record, choice)
-    return replace(record, warnings=(*record.warnings, *_unsettled(record)))
+    return replace(record, notes=(*record.notes, *_unsettled(record)))
 
 
-def _unsettled(record: Imported) -> list[str]:
+def _unsettled(record: Dataset) -> list[str]:
     """One line for the loads whose mean still moves; small ones beside large ones of the same unit do not count."""
     if record.provenance.get("clock") not in ("time", "iteration"):
         return []
+    means: Mapping[str, Mean] = record.provenance.get("means", {})
     top: dict[str, float] = {}
-    for channel in record.channels.values():
-        if channel.mean is not None and channel.unit:
-            top[channel.unit] = max(top.get(channel.unit, 0.0), abs(channel.mean))
+    for name, mean in means.items():
+        unit = record.unit(name)
+        if unit:
+            top[unit] = max(top.get(unit, 0.0), abs(mean.value))
     moving = [
-        f"{name} {channel.drift:+.2%}"
-        for name, channel in record.channels.items()
-        if channel.drift is not None and channel.mean is not None and abs(channel.drift) > SETTLED
-        and not name.lower().startswith(("rms[", "res_")) and abs(channel.mean) >= 0.05 * top.get(channel.unit, 0.0)
+        f"{name} {mean.drift:+.2%}"
+        for name, mean in means.items()
+        if mean.drift is not None and abs(mean.drift) > SETTLED
+        and not name.lower().startswith(("rms[", "res_")) and abs(mean.value) >= 0.05 * top.get(record.unit(name), 0.0)
     ]  # fmt: skip
     more = f" and {len(moving) - 6} more" if len(moving) > 6 else ""
     return [f"not settled (drift over the averaged part): {', '.join(moving[:6])}{more}"] if moving else []
 
 
-def _restart_notes(paths: Sequence[str], records: Mapping[str, Imported]) -> dict[str, list[str]]:
+def _restart_notes(paths: Sequence[str], records: Mapping[str, Dataset]) -> dict[str, list[str]]:
     """Say of every restart file what it belongs to, and that it was not joined."""
     notes: dict[str, list[str]] = {}
     for path in paths:
@@ -112,13 +115,13 @@ def _restart_notes(paths: Sequence[str], records: Mapping[str, Imported]) -> dic
     return notes
 
 
-def _earlier(path: Path, paths: Sequence[str], records: Mapping[str, Imported]) -> list[str]:
+def _earlier(path: Path, paths: Sequence[str], records: Mapping[str, Dataset]) -> list[str]:
     match = _RESTART.fullmatch(path.name)
-    if match and records[str(path)].format == "fluent_report":
+    if match and records[str(path)].provenance["format"] == "fluent_report":
         base = path.with_name(match[1] + (match[3] or ""))
         known = [p for p in paths if Path(p) == base]
         return known or ([str(base)] if base.is_file() else [])
-    if records[str(path)].format == "openfoam_forces":
+    if records[str(path)].provenance["format"] == "openfoam_forces":
         try:
             start = float(path.parent.name)
         except ValueError:
@@ -135,11 +138,11 @@ def _before(name: str, start: float) -> bool:
         return False
 
 
-def _clock(record: Imported) -> tuple[Any, Any]:
+def _clock(record: Dataset) -> tuple[Any, Any]:
     time = record.provenance.get("time_channel", "")
-    names = [n for n in record.provenance.get("clock_channels", "").split("\t") if n in record.channels and n != time]
-    times = record.channels[time].values if time in record.channels else np.empty(0)
-    return (record.channels[names[0]].values if names else times), times
+    names = [n for n in record.provenance.get("clock_channels", "").split("\t") if n in record and n != time]
+    times = record[time] if time in record else np.empty(0)
+    return (record[names[0]] if names else times), times
 
 
 def document(
@@ -149,7 +152,7 @@ def document(
 ) -> dict[str, Any]:
     """Read files and give the document ``bemt.import/1``."""
     names = [os.fspath(path) for path in paths]
-    records: dict[str, Imported] = {}
+    records: dict[str, Dataset] = {}
     errors: dict[str, str] = {}
     for name in names:
         try:
@@ -178,48 +181,44 @@ def _refusal(error: Exception) -> str:
 
 
 def _entry(
-    name: str, record: Imported | None, format: str | None, notes: Sequence[str], error: str | None  # noqa: A002
+    name: str, record: Dataset | None, format: str | None, notes: Sequence[str], error: str | None  # noqa: A002
 ) -> dict[str, Any]:
     reduced = _reduced(record)
     means = _means(record, reduced) if record else {}
+    channels = {k: _shown(record.unit(k), means.get(k)) for k in record.values} if record else {}
     return {
         "path": name,
-        "format": record.format if record else format,
+        "format": record.provenance["format"] if record else format,
         "kind": record.kind if record else None,
-        "rows": record.rows if record else 0,
-        "channels": {k: _shown(c) for k, c in means.items()},
-        "warnings": [*(record.warnings if record else ()), *notes],
+        "rows": len(record) if record else 0,
+        "channels": channels,
+        "warnings": [*(record.notes if record else ()), *notes],
         "error": error,
         "findings": [asdict(finding) for finding in findings(record)] if record else [],
         "reduction": reduction_document(reduced),
     }
 
 
-def _reduced(record: Imported | None) -> Reduced | str | None:
+def _reduced(record: Dataset | None) -> Dataset | str | None:
     """Steady points of a recording."""
     if record is None or not is_recording(record, "adapted" in record.provenance):
         return None
     return reduction_of(record)
 
 
-def _means(record: Imported, reduced: Reduced | str | None) -> Mapping[str, Channel]:
-    """Channels, with means where the whole recording is one steady point."""
-    if not isinstance(reduced, Reduced) or len(reduced.series) != 1:
-        return record.channels
-    rows = len(reduced.rows[0])
-    over = f"the steady rows ({rows} of {record.rows})"
-    series = reduced.series
-    return {
-        name: replace(channel, mean=float(series[name][0]), averaged_over=over)
-        if name in series and channel.mean is None else channel
-        for name, channel in record.channels.items()
-    }  # fmt: skip
+def _means(record: Dataset, reduced: Dataset | str | None) -> Mapping[str, Mean]:
+    """Means of the file, and of the channels where the whole recording is one steady point."""
+    means: dict[str, Mean] = dict(record.provenance.get("means", {}))
+    if isinstance(reduced, Dataset) and len(reduced) == 1:
+        over = f"the steady rows ({len(reduction(reduced).rows[0])} of {len(record)})"
+        means = {name: Mean(float(reduced[name][0]), over) for name in record.values if name in reduced} | means
+    return means
 
 
-def _shown(channel: Channel) -> dict[str, Any]:
-    mean = channel.mean if channel.mean is not None and math.isfinite(channel.mean) else None
-    over = channel.averaged_over if mean is not None else ""
-    return {"unit": channel.unit, "mean": mean, "averaged_over": over, "drift": channel.drift}
+def _shown(unit: str, found: Mean | None) -> dict[str, Any]:
+    mean = found.value if found is not None and math.isfinite(found.value) else None
+    over = found.over if found is not None and mean is not None else ""
+    return {"unit": unit, "mean": mean, "averaged_over": over, "drift": found.drift if found is not None else None}
 
 
 def _file_text(file: Mapping[str, Any]) -> str:
@@ -259,32 +258,23 @@ def check_format(name: str | None) -> None:
         raise InputError(Fault("", "--format", repr(name), f"one of {', '.join(importers.importers())}"))
 
 
-def as_dataset(record: Imported) -> Dataset:
+def as_dataset(record: Dataset) -> Dataset:
     """Points of what was read: steady points of a recording, rows of a table, else one point of means."""
-    notes = [*record.warnings, *(f"{f.severity}: {f.id} in {f.channel}: {f.evidence}" for f in findings(record))]
+    notes = [*record.notes, *(f"{f.severity}: {f.id} in {f.channel}: {f.evidence}" for f in findings(record))]
     reduced = _reduced(record)
-    if isinstance(reduced, Reduced):
-        return replace(reduced.series, notes=(*reduced.series.notes, *reduced.notes, *notes))
+    if isinstance(reduced, Dataset):
+        return replace(reduced, notes=(*reduced.notes, *notes))
     if isinstance(reduced, str):
         notes.append(reduced)
-    told = {"file": record.provenance.get("file", ""), "format": record.format}
-    kind = record.kind if re.fullmatch(r"[a-z][a-z0-9_]*", record.kind) else "bench"
-    rows = {k: c.values for k, c in record.channels.items() if _fit(k) and c.values.shape == (record.rows,)}
-    means = {k: np.array([c.mean]) for k, c in record.channels.items() if _fit(k) and c.mean is not None}
-    history = record.provenance.get("clock") in ("time", "iteration")
-    values = means if history and means else rows
-    left = [name for name in record.channels if name not in values]
+    file, form = str(record.provenance.get("file", "")), str(record.provenance["format"])
+    fit = [name for name in record.values if not channel_fault(name)]
+    means: Mapping[str, Mean] = record.provenance.get("means", {})
+    whole = [k for k in fit if k in means] if record.provenance.get("clock") in ("time", "iteration") else []
+    left = [name for name in record.values if name not in (whole or fit)]
     notes += [f"left out, no quantity in a known unit: {', '.join(left)}"] if left else []
-    if not values:
-        got = f"channels {', '.join(list(record.channels)[:8])}"
-        raise InputError(Fault(told["file"], "", got, "a quantity in a known unit", "Name units, as in thrust_N"))
-    return Dataset(kind, Path(told["file"]).stem or record.format, values, provenance=told, notes=tuple(notes))
-
-
-def _fit(name: str) -> bool:
-    """Whether a channel may stand in a dataset."""
-    try:
-        Dataset("bench", "x", {name: np.zeros(1)})
-    except InputError:
-        return False
-    return True
+    if not fit:
+        got = f"channels {', '.join(list(record.values)[:8])}"
+        raise InputError(Fault(file, "", got, "a quantity in a known unit", "Name units, as in thrust_N"))
+    told = {"file": file, "format": form}
+    values = {k: np.array([means[k].value]) for k in whole} or {k: record[k] for k in fit}
+    return Dataset(record.kind, Path(file).stem or form, values, provenance=told, notes=tuple(notes))

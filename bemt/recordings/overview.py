@@ -9,9 +9,9 @@ from typing import Any
 
 from bemt.base import tables
 from bemt.base.errors import InputError
-from bemt.readers._imported import Imported
+from bemt.dataset import Dataset
 from bemt.recordings.check import Finding, check
-from bemt.recordings.reduce import Reduced, reduce
+from bemt.recordings.reduce import reduce, reduction
 
 __all__ = ["findings", "is_recording", "points_text", "reduction_document", "reduction_of"]
 
@@ -22,21 +22,21 @@ MOST = 40
 """Points shown; JSON has all."""
 
 
-def is_recording(record: Imported, adapted: bool) -> bool:
+def is_recording(record: Dataset, adapted: bool) -> bool:
     """Whether a record is a table of measurements as a stand wrote it: to be checked and reduced."""
     if adapted:
         return False
-    known = {name for name, c in record.channels.items() if c.unit}
+    known = {name for name in record.values if record.unit(name)}
     loads = {"thrust_N", "torque_Nm", "T_N", "Q_Nm", "power_W"} & known
     return record.kind == "bench" or (record.kind == "table" and bool(loads) and any("rpm" in n for n in known))
 
 
-def findings(record: Imported) -> tuple[Finding, ...]:
+def findings(record: Dataset) -> tuple[Finding, ...]:
     """Faults of a recording."""
     return check(record) if record.kind in ("bench", "table") else ()
 
 
-def reduction_of(record: Imported) -> Reduced | str:
+def reduction_of(record: Dataset) -> Dataset | str:
     """Reduce, or say why not."""
     try:
         return reduce(record)
@@ -46,33 +46,34 @@ def reduction_of(record: Imported) -> Reduced | str:
         )
 
 
-def reduction_document(reduced: Reduced | str | None) -> dict[str, Any] | None:
+def reduction_document(reduced: Dataset | str | None) -> dict[str, Any] | None:
     """The part of the JSON document that holds the steady points."""
     if reduced is None:
         return None
     if isinstance(reduced, str):
         return {"mode": None, "points": [], "correlated": {}, "dropped": [], "notes": [], "error": reduced}
-    rows = [{**row, "direction": way} for row, way in zip(reduced.series.to_rows(), reduced.directions, strict=True)]
+    how = reduction(reduced)
+    rows = [{**row, "direction": way} for row, way in zip(reduced.to_rows(), how.directions, strict=True)]
     return {
-        "mode": reduced.mode, "points": rows, "correlated": {k: dict(v) for k, v in reduced.correlated.items()},
-        "dropped": [asdict(lost) for lost in reduced.dropped], "notes": list(reduced.notes), "error": None,
+        "mode": how.mode, "points": rows, "correlated": {k: dict(v) for k, v in how.correlated.items()},
+        "dropped": [asdict(lost) for lost in how.dropped], "notes": list(reduced.notes), "error": None,
     }  # fmt: skip
 
 
-def ranges(lines: Iterable[int]) -> str:
-    """Lines as ranges.
+def ranges(lines: Iterable[tuple[int, int]]) -> str:
+    """First and last lines as ranges.
 
     Examples
     --------
-    >>> ranges([5, 2, 3, 4, 9])
+    >>> ranges([(5, 5), (2, 3), (4, 4), (9, 9)])
     '2-5, 9'
     """
     out: list[list[int]] = []
-    for line in sorted(set(lines)):
-        if out and line == out[-1][1] + 1:
-            out[-1][1] = line
+    for first, last in sorted(set(lines)):
+        if out and first <= out[-1][1] + 1:
+            out[-1][1] = max(last, out[-1][1])
         else:
-            out.append([line, line])
+            out.append([first, last])
     return ", ".join(f"{a}" if a == b else f"{a}-{b}" for a, b in out)
 
 
@@ -97,14 +98,14 @@ def points_text(found: Mapping[str, Any], indent: str = "  ") -> list[str]:
     what = "each row one" if found["mode"] == "points" else "means of plateaus"
     out = [f"{indent}{len(points)} steady point{'s' if len(points) > 1 else ''}, {what}{many}:"]
     out.append(tables.text_table([*head, "flags"], rows, (len(head),), indent + "  "))
-    reasons: dict[tuple[str, str], list[int]] = {}
+    reasons: dict[tuple[str, str], list[tuple[int, int]]] = {}
     for lost in found["dropped"]:
         what = "rows" if not lost["channel"] else f"values of {lost['channel']}"
-        reasons.setdefault((what, lost["reason"]), []).append(lost["line"])
+        reasons.setdefault((what, lost["reason"]), []).append((lost["line"], lost["last"]))
     for (what, reason), lines in reasons.items():
         text = ranges(lines)
         text = text if len(text) <= 90 else text[:90].rsplit(",", 1)[0] + ", ..."
-        out.append(f"{indent}dropped {len(lines)} {what} (lines {text}): {reason}")
+        out.append(f"{indent}dropped {sum(b - a + 1 for a, b in lines)} {what} (lines {text}): {reason}")
     for channel, parts in found["correlated"].items():
         words = ", ".join(f"{part} {value:.3g}" for part, value in parts.items())
         out.append(f"{indent}shared by all points, {channel}: {words}")

@@ -34,6 +34,8 @@ __all__ = ["Dropped", "Plateau", "Plateaus", "PlateauSettings", "find", "standar
 Array = NDArray[np.float64]
 OUTLIER = 6.0
 """Robust standard deviations from which a sample is an outlier."""
+BLOCK = 1 << 16
+"""Windows whose medians are taken at once: a log may have millions of rows."""
 LOCAL = 3.0
 """Standard errors, from the spread of the samples beside it, that a step must exceed."""
 
@@ -155,23 +157,31 @@ def standard_error(values: ArrayLike) -> float:
     n = len(v)
     if n < 2:
         return math.nan
-    sd = float(np.std(v, ddof=1))
     d = v - v.mean()
-    power = float(d @ d)
-    r = float(d[1:] @ d[:-1]) / power if power > 0 else 0.0
+    power = _product(d, d)
+    sd = math.sqrt(power / (n - 1))
+    r = _product(d[1:], d[:-1]) / power if power > 0 else 0.0
     r = min(max(r, 0.0), 1.0 - 1e-9)
     return sd / math.sqrt(max(n * (1.0 - r) / (1.0 + r), 1.0))
+
+
+def _product(a: Array, b: Array) -> float:
+    """Inner product without the threads of BLAS, which cost more than they bring here."""
+    return float(np.einsum("i,i->", a, b))
 
 
 def _spread(v: Array) -> float:
     """Robust standard deviation that is not 0 for quantised samples."""
     if len(v) < 2:
         return 0.0
-    mad = 1.4826 * float(np.median(np.abs(v - np.median(v))))
-    lo, hi = np.percentile(v, [15.87, 84.13])
+    lo, middle, hi = np.percentile(v, [15.87, 50.0, 84.13])
+    seen = max(1.4826 * float(np.median(np.abs(v - middle))), 0.5 * float(hi - lo))
+    sd = float(np.std(v))
+    if sd <= seen:
+        return seen
     distinct = np.diff(np.unique(v))
     grain = float(distinct.min()) / math.sqrt(12.0) if distinct.size else 0.0
-    return max(mad, 0.5 * float(hi - lo), min(grain, float(np.std(v))))
+    return max(seen, min(grain, sd))
 
 
 def _running_median(v: Array, half: int) -> Array:
@@ -179,8 +189,8 @@ def _running_median(v: Array, half: int) -> Array:
     half = min(half, max((n - 1) // 2, 0))
     if half == 0:
         return v.copy()
-    padded = np.pad(v, half, mode="edge")
-    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1), axis=1))
+    windows = np.lib.stride_tricks.sliding_window_view(np.pad(v, half, mode="edge"), 2 * half + 1)
+    return np.concatenate([np.median(windows[a : a + BLOCK], axis=1) for a in range(0, n, BLOCK)])
 
 
 def find(
@@ -210,20 +220,22 @@ def find(
         notes.append(f"rows left out because their time falls: {', '.join(map(str, back))}")
         t = np.maximum.accumulate(t)
         data = {name: np.where(np.isin(np.arange(n), back), np.nan, v) for name, v in data.items()}
-    used = np.flatnonzero(np.isfinite(data[signal]))
+    good = np.isfinite(data[signal])
+    used = np.flatnonzero(good) if not good.all() else np.arange(n)
     dropped: list[Dropped] = []
     if command is not None:
         stretches, moving = _by_command(np.asarray(command, dtype=float), rules)
     else:
-        stretches, moving = _by_signal(data[signal][used], rules)
+        stretches, moving = _by_signal(data[signal] if good.all() else data[signal][used], rules)
         rows = np.append(used, n)
         stretches = [(int(rows[a]) if a else 0, int(rows[b])) for a, b in stretches]
         moving = [Dropped(int(rows[d.start]) if d.start else 0, int(rows[d.stop]), d.reason) for d in moving]
     dropped += moving
     found: list[Plateau] = []
     levels: list[float] = []
+    span = float(np.nanmax(data[signal]) - np.nanmin(data[signal]))
     for start, stop in stretches:
-        plateau, cuts = _reduce(t, data, signal, command, start, stop, rules)
+        plateau, cuts = _reduce(t, data, signal, command, start, stop, rules, span)
         dropped += cuts
         if plateau is None:
             continue
@@ -290,18 +302,30 @@ def _by_command(command: Array, rules: PlateauSettings) -> tuple[list[tuple[int,
     return stretches, dropped
 
 
+def _jumps(v: Array, w: int) -> tuple[Array, Array]:
+    """Step between the medians of the windows beside each place, and what the noise there makes of it, (n + 1,)."""
+    n = len(v)
+    windows = np.lib.stride_tricks.sliding_window_view(v, w)
+    medians, sway = np.empty(len(windows)), np.empty(len(windows))
+    for a in range(0, len(windows), BLOCK):
+        part = windows[a : a + BLOCK]
+        medians[a : a + BLOCK] = middle = np.median(part, axis=1)
+        sway[a : a + BLOCK] = 1.4826 * np.median(np.abs(part - middle[:, None]), axis=1)
+    jump, local = np.zeros(n + 1), np.zeros(n + 1)
+    inside = slice(w, n - w + 1)
+    np.subtract(medians[w:], medians[: n - 2 * w + 1], out=jump[inside])
+    np.abs(jump, out=jump)
+    np.maximum(sway[w:], sway[: n - 2 * w + 1], out=local[inside])
+    local *= LOCAL * 1.2533 * math.sqrt(2.0 / w)
+    return jump, local
+
+
 def _by_signal(v: Array, rules: PlateauSettings) -> tuple[list[tuple[int, int]], list[Dropped]]:
     """Stretches between jumps of the medians of neighbouring windows."""
     n, w = len(v), rules.window
     if n < 2 * w:
         return [(0, n)], []
-    windows = np.lib.stride_tricks.sliding_window_view(v, w)
-    medians = np.median(windows, axis=1)
-    sway = 1.4826 * np.median(np.abs(windows - medians[:, None]), axis=1)  # noise may differ from level to level
-    jump = np.zeros(n + 1)
-    jump[w : n - w + 1] = np.abs(medians[w:] - medians[: n - 2 * w + 1])
-    local = np.zeros(n + 1)
-    local[w : n - w + 1] = LOCAL * np.maximum(sway[w:], sway[: n - 2 * w + 1]) * 1.2533 * math.sqrt(2.0 / w)
+    jump, local = _jumps(v, w)
     noise = 1.4826 * float(np.median(np.abs(np.diff(v) - np.median(np.diff(v))))) / math.sqrt(2.0)
     lo, hi = np.percentile(v, [1.0, 99.0])
     least = max(rules.least_step * float(hi - lo), 5.0 * 1.2533 * noise * math.sqrt(2.0 / w))
@@ -359,6 +383,18 @@ def _leaving(v: Array, cut: int, rules: PlateauSettings) -> int:
     return late if late and outside.size >= 0.5 * late else 0  # a single outlier is no step
 
 
+def _outliers(v: Array) -> NDArray[np.intp]:
+    """Samples far from their neighbours."""
+    if len(v) < 7:
+        return np.empty(0, dtype=np.intp)
+    rest = v - _running_median(v, 3)
+    size = np.abs(rest)
+    band = max(_spread(rest), 1e-12 * float(np.max(np.abs(v))))
+    if float(size.max()) > OUTLIER * band:
+        band = max(band, _spread(v) / 3.0)
+    return np.flatnonzero(size > OUTLIER * band)
+
+
 def _reduce(
     t: Array,
     data: Mapping[str, Array],
@@ -367,6 +403,7 @@ def _reduce(
     start: int,
     stop: int,
     rules: PlateauSettings,
+    span: float,
 ) -> tuple[Plateau | None, list[Dropped]]:
     rows = start + np.flatnonzero(np.isfinite(data[signal][start:stop]))
     if len(rows) < rules.least_samples:
@@ -381,29 +418,27 @@ def _reduce(
         return None, [Dropped(start, end, "too short after settling")]
     mean, sd, u, n, out, drift = {}, {}, {}, {}, {}, {}
     for name, values in data.items():
-        own = first + np.flatnonzero(np.isfinite(values[first:stop]))
-        v = values[own]
-        if len(v) == 0:
+        good = np.isfinite(values[first:stop])
+        if not good.any():
             continue
-        far = np.zeros(len(v), dtype=bool)
-        if len(v) >= 7:
-            rest = v - _running_median(v, 3)
-            far = np.abs(rest) > OUTLIER * max(_spread(rest), _spread(v) / 3.0, 1e-12 * float(np.max(np.abs(v))))
-        if np.any(far):
-            out[name] = tuple(int(r) for r in own[far])
-        kept, when = v[~far], t[own][~far]
+        kept, when = values[first:stop], t[first:stop]
+        if not good.all():
+            kept, when = kept[good], when[good]
+        far = _outliers(kept)
+        if far.size:
+            out[name] = tuple((first + np.flatnonzero(good)[far]).tolist())
+            kept, when = np.delete(kept, far), np.delete(when, far)
         mean[name], n[name] = float(np.mean(kept)), len(kept)
         sd[name] = float(np.std(kept, ddof=1)) if len(kept) > 1 else math.nan
         u[name] = standard_error(kept)
-        span = float(when[-1] - when[0])
-        if len(kept) > 2 and span > 0.0 and mean[name] != 0.0:
+        lasts = float(when[-1] - when[0])
+        if len(kept) > 2 and lasts > 0.0 and mean[name] != 0.0:
             x = when - when.mean()
-            drift[name] = float(x @ kept / (x @ x)) * span / abs(mean[name])
+            drift[name] = _product(x, kept) / _product(x, x) * lasts / abs(mean[name])
     flags = [] if settles else ["not settled"]
     change = abs(drift.get(signal, 0.0) * mean.get(signal, 0.0))
-    spans = np.nanmax(data[signal]) - np.nanmin(data[signal])
     # a drift counts when it also stands out of the noise and is no trifle beside the whole signal
-    if change > max(rules.drift * abs(mean.get(signal, 0.0)), 3.0 * u.get(signal, 0.0), 0.005 * float(spans)):
+    if change > max(rules.drift * abs(mean.get(signal, 0.0)), 3.0 * u.get(signal, 0.0), 0.005 * span):
         flags.append("drifts")
     level = None if command is None else float(np.asarray(command, dtype=float)[start])
     cuts = [Dropped(start, first, "settling"), Dropped(stop, end, "the next step begins")]

@@ -13,14 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
+from bemt.dataset import Dataset
 from bemt.recordings import plateaus
-from bemt.recordings.channels import LOADS, Lost, Recorded
+from bemt.recordings.channels import LOADS, Lost, file_name, lost, runs_of, stated
 from bemt.recordings.rows import at_rest, command_of
 from bemt.recordings.tare import Rest
 
 __all__ = ["Found", "Point", "from_rows", "from_samples"]
 
 Array = NDArray[np.float64]
+Rows = NDArray[np.intp]
 SIGNALS = ("thrust_N", "torque_Nm", "rpm", "power_W", "current_A", "electrical_power_W", "CT", "CP")
 """Channels that decide about steps, first one first."""
 WILD = 2.5
@@ -37,7 +39,7 @@ class Point:
 
     values: Mapping[str, float]
     u: Mapping[str, float]
-    rows: tuple[int, ...]
+    rows: Rows
     when: float
     run: float
     direction: str
@@ -54,33 +56,43 @@ class Found:
     notes: list[str] = field(default_factory=list)
 
 
-def _clean(rec: Recorded, rest: NDArray[np.bool_], found: Found) -> dict[str, Array]:
+def _clean(rec: Dataset, rest: NDArray[np.bool_], found: Found) -> dict[str, Array]:
     """Copies of the channels without readings of a speed sensor that failed."""
-    data = {name: v.copy() for name, v in rec.values.items() if name not in _SKIP}
+    data = {name: v for name, v in rec.values.items() if name not in _SKIP}
     if "rpm" in data:
         failed = np.flatnonzero((data["rpm"] == 0.0) & ~rest)
-        found.lost += [Lost(rec.lines[i], "rpm", "reads 0 while the rotor turns: no reading") for i in failed]
+        found.lost += lost(rec, failed, "rpm", "reads 0 while the rotor turns: no reading")
         slow = np.flatnonzero((np.abs(data["rpm"]) < SLOWEST) & (data["rpm"] != 0.0))
-        found.lost += [Lost(rec.lines[i], "rpm", f"{data['rpm'][i]:.3g} rev/min is no speed of a rotor") for i in slow]
-        data["rpm"][[*failed, *slow]] = np.nan
+        for i in slow:
+            found.lost += lost(rec, [i], "rpm", f"{data['rpm'][i]:.3g} rev/min is no speed of a rotor")
+        data["rpm"] = _without(data["rpm"], [*failed, *slow])
     return data
 
 
-def _rest(rows: Sequence[int], data: Mapping[str, Array], when: float) -> Rest:
+def _without(values: Array, rows: Sequence[int]) -> Array:
+    """Channel without some of its values; itself when there are none to leave out."""
+    if not rows:
+        return values
+    out = values.copy()
+    out[rows] = np.nan
+    return out
+
+
+def _rest(rows: Rows, data: Mapping[str, Array], when: float) -> Rest:
     mean, u = {}, {}
     for name, v in data.items():
-        own = v[list(rows)]
+        own = v[rows]
         own = own[np.isfinite(own)]
         if own.size:
             mean[name], u[name] = float(np.median(own)), plateaus.standard_error(own)
     return Rest(when, mean, u)
 
 
-def _note_rest(found: Found, rec: Recorded, rows: Sequence[int]) -> None:
-    found.lost += [Lost(rec.lines[i], "", "at rest: a zero of the stand, no point") for i in rows]
+def _note_rest(found: Found, rec: Dataset, rows: Rows) -> None:
+    found.lost += lost(rec, rows, "", "at rest: a zero of the stand, no point")
 
 
-def from_samples(rec: Recorded, name: str, settings: plateaus.PlateauSettings | None) -> Found:
+def from_samples(rec: Dataset, name: str, settings: plateaus.PlateauSettings | None) -> Found:
     """Plateaus of every run."""
     found = Found()
     signal = next((s for s in SIGNALS if s in rec.values and _moves(rec.values[s])), None)
@@ -91,12 +103,15 @@ def from_samples(rec: Recorded, name: str, settings: plateaus.PlateauSettings | 
     rest = at_rest(rec)
     data = _clean(rec, rest, found)
     _spikes(rec, data, found)
-    for run in dict.fromkeys(rec.run.tolist()):
-        rows = np.flatnonzero(rec.run == run)
+    runs, told = runs_of(rec), stated(rec)
+    labels, first = np.unique(runs, return_index=True)
+    for run in labels[np.argsort(first)].tolist():
+        rows = np.flatnonzero(runs == run)
         rows, t = _clock(rec, rows, found)
-        part = {key: v[rows] for key, v in data.items() if np.any(np.isfinite(v[rows]))}
+        inside = {key: v if len(rows) == len(v) else v[rows] for key, v in data.items()}
+        part = {key: v for key, v in inside.items() if np.any(np.isfinite(v))}
         if signal not in part:
-            found.lost += [Lost(rec.lines[i], "", f"a run without {signal}") for i in rows]
+            found.lost += lost(rec, rows, "", f"a run without {signal}")
             continue
         command = command_of(rec)
         own = command[1][rows] if command is not None else None
@@ -106,31 +121,31 @@ def from_samples(rec: Recorded, name: str, settings: plateaus.PlateauSettings | 
             got = plateaus.find(t, part, signal, own, settings)
         except InputError as error:
             raise InputError([Fault(name, f.where, f.got, f.expected, f.hint) for f in error.faults]) from error
-        found.notes += [f"run {run:g}: {n}" if len(np.unique(rec.run)) > 1 else n for n in got.notes]
+        found.notes += [f"run {run:g}: {n}" if labels.size > 1 else n for n in got.notes]
         for d in got.dropped:
-            found.lost += [Lost(rec.lines[i], "", d.reason) for i in rows[d.start : d.stop]]
+            found.lost += lost(rec, rows[d.start : d.stop], "", d.reason)
         for p in got.plateaus:
-            inside = rows[p.start : p.stop]
+            own_rows = rows[p.start : p.stop]
             middle = 0.5 * (p.t0 + p.t1)
-            if np.mean(rest[inside]) > 0.5:
-                still, moving = inside[rest[inside]], inside[~rest[inside]]
-                found.rests.setdefault(run, []).append(_rest(still.tolist(), data, middle))
-                _note_rest(found, rec, still.tolist())
-                found.lost += [Lost(rec.lines[i], "", "coming to rest, or starting") for i in moving]
+            if np.mean(rest[own_rows]) > 0.5:
+                still, moving = own_rows[rest[own_rows]], own_rows[~rest[own_rows]]
+                found.rests.setdefault(run, []).append(_rest(still, data, middle))
+                _note_rest(found, rec, still)
+                found.lost += lost(rec, moving, "", "coming to rest, or starting")
                 continue
             for channel, outliers in p.outliers.items():
                 reason = f"outlier: more than {plateaus.OUTLIER:g} robust standard deviations from its neighbours"
-                found.lost += [Lost(rec.lines[rows[i]], channel, reason) for i in outliers]
+                found.lost += lost(rec, rows[list(outliers)], channel, reason)
             u = {key: e for key, e in p.u.items() if e > 1e-12 * abs(p.mean[key]) and key not in _COMMANDS}
-            for key, e in rec.u.items():  # what rows state averages down no further than the scatter shows
-                own_u = e[inside][np.isfinite(e[inside])]
+            for key, e in told.items():  # what rows state averages down no further than the scatter shows
+                own_u = e[own_rows][np.isfinite(e[own_rows])]
                 if own_u.size:
-                    stated = float(np.sqrt(np.mean(own_u**2) / own_u.size))
-                    u[key] = max(stated, u.get(key, 0.0)) if math.isfinite(u.get(key, 0.0)) else stated
+                    least = float(np.sqrt(np.mean(own_u**2) / own_u.size))
+                    u[key] = max(least, u.get(key, 0.0)) if math.isfinite(u.get(key, 0.0)) else least
             values = dict(p.mean)
             if t is not None:
                 values["time_s"] = middle
-            found.points.append(Point(values, u, tuple(inside.tolist()), middle, run, p.direction, p.flags))
+            found.points.append(Point(values, u, own_rows, middle, run, p.direction, p.flags))
     return found
 
 
@@ -139,32 +154,34 @@ def _moves(v: Array) -> bool:
     return finite.size > 1 and float(np.ptp(finite)) > 0.0
 
 
-def _spikes(rec: Recorded, data: dict[str, Array], found: Found) -> None:
+def _spikes(rec: Dataset, data: dict[str, Array], found: Found) -> None:
     """Leave out what the importer flagged as a jump away from all neighbours."""
     by_file: dict[str, list[str]] = {}
-    for key, own in rec.names.items():
-        if key in data:
-            by_file.setdefault(own, []).append(key)
-    for i, flags in enumerate(rec.flags):
-        for flag in flags:
+    for key in data:
+        by_file.setdefault(file_name(rec, key), []).append(key)
+    gone: dict[str, list[int]] = {}
+    for i in [i for i, flags in enumerate(rec.flags) if flags]:
+        for flag in rec.flags[i]:
             for key in by_file.get(flag.removeprefix("spike of "), []) if flag.startswith("spike of ") else []:
                 if np.isfinite(data[key][i]):
-                    data[key][i] = np.nan
-                    found.lost.append(Lost(rec.lines[i], key, "spike: jumps away from all its neighbours and back"))
+                    gone.setdefault(key, []).append(i)
+    for key, rows in gone.items():
+        data[key] = _without(data[key], rows)
+        found.lost += lost(rec, rows, key, "spike: jumps away from all its neighbours and back")
 
 
-def _clock(rec: Recorded, rows: NDArray[np.intp], found: Found) -> tuple[NDArray[np.intp], Array | None]:
+def _clock(rec: Dataset, rows: NDArray[np.intp], found: Found) -> tuple[NDArray[np.intp], Array | None]:
     """Rows with a time, and the times; None: rows count."""
     t = rec.values.get("time_s")
     if t is None or np.mean(np.isfinite(t[rows])) < 0.5:
         return rows, None
     none = rows[~np.isfinite(t[rows])]
-    found.lost += [Lost(rec.lines[i], "", "no time") for i in none]
+    found.lost += lost(rec, none, "", "no time")
     kept = rows[np.isfinite(t[rows])]
-    return kept, t[kept]
+    return kept, t if len(kept) == len(t) else t[kept]
 
 
-def from_rows(rec: Recorded) -> Found:
+def from_rows(rec: Dataset) -> Found:
     """Each row a point."""
     found = Found()
     rest = at_rest(rec)
@@ -173,12 +190,13 @@ def from_rows(rec: Recorded) -> Found:
     time = rec.values.get("time_s")
     loads = [data[name] for name in LOADS if name in data]
     empty = ~np.any([np.isfinite(v) for v in loads], axis=0) if loads else np.ones(len(rec), dtype=bool)
-    found.lost += [Lost(rec.lines[i], "", "no load, power or coefficient in this row") for i in np.flatnonzero(empty)]
+    found.lost += lost(rec, np.flatnonzero(empty), "", "no load, power or coefficient in this row")
+    runs, told = runs_of(rec), stated(rec)
     before: dict[float, float] = {}
     at: dict[float, list[int]] = {}
     level_of = data.get("rpm", command_of(rec)[1] if command_of(rec) is not None else None)  # type: ignore[index]
     for i in np.flatnonzero(~empty):
-        run = float(rec.run[i])
+        run = float(runs[i])
         when = float(time[i]) if time is not None and math.isfinite(time[i]) else float(i)
         if rest[i]:
             at.setdefault(run, []).append(int(i))
@@ -190,27 +208,27 @@ def from_rows(rec: Recorded) -> Found:
         values = {name: float(v[i]) for name, v in data.items()}
         if time is not None:
             values["time_s"] = float(time[i])
-        u = {name: float(v[i]) for name, v in rec.u.items()}
+        u = {name: float(v[i]) for name, v in told.items()}
         flags = tuple(f for f in rec.flags[i] if not f.startswith("spike of "))
-        found.points.append(Point(values, u, (int(i),), when, run, way, flags))
+        found.points.append(Point(values, u, np.array([i]), when, run, way, flags))
     for run in list(at):
         _close(rec, data, time, at, run, found)
     return found
 
 
 def _close(
-    rec: Recorded, data: Mapping[str, Array], time: Array | None, at: dict[float, list[int]], run: float, found: Found
+    rec: Dataset, data: Mapping[str, Array], time: Array | None, at: dict[float, list[int]], run: float, found: Found
 ) -> None:
     """End a stretch at rest."""
-    rows = at.pop(run, [])
-    if rows:
-        times = time[rows] if time is not None else np.array(rows, dtype=float)
+    rows = np.array(at.pop(run, []), dtype=np.intp)
+    if rows.size:
+        times = time[rows] if time is not None else rows.astype(float)
         when = float(np.mean(times)) if np.all(np.isfinite(times)) else float(np.mean(rows))
         found.rests.setdefault(run, []).append(_rest(rows, data, when))
         _note_rest(found, rec, rows)
 
 
-def _wild(rec: Recorded, data: dict[str, Array], rest: NDArray[np.bool_], found: Found) -> None:
+def _wild(rec: Dataset, data: dict[str, Array], rest: NDArray[np.bool_], found: Found) -> None:
     """Leave out speeds of a static table that the load of their row contradicts.
 
     Load goes with the square of the speed; a factor of more than 2.5 in speed against the rest of the table is a
@@ -230,5 +248,5 @@ def _wild(rec: Recorded, data: dict[str, Array], rest: NDArray[np.bool_], found:
     for j in np.flatnonzero((ratio > WILD) | (ratio < 1.0 / WILD)):
         i = int(np.flatnonzero(good)[j])
         times = 1.0 / ratio[j]
-        found.lost.append(Lost(rec.lines[i], "rpm", f"misread: {times:.3g} times what the load of its row needs"))
-        data["rpm"][i] = np.nan
+        found.lost += lost(rec, [i], "rpm", f"misread: {times:.3g} times what the load of its row needs")
+        data["rpm"] = _without(data["rpm"], [i])

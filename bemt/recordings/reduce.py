@@ -6,7 +6,7 @@ is found; coefficients follow where diameter and density are known; ``scatter`` 
 repeats.
 
 The uncertainties of the series are the UNCORRELATED part, independent from point to point. What all points share is in
-`Reduced.correlated`: ``gain`` [1], ``zero`` [unit of the channel], ``session`` [1] (between runs of one condition).
+`Reduction.correlated`: ``gain`` [1], ``zero`` [unit of the channel], ``session`` [1] (between runs of one condition).
 Nothing is corrected but the zero, and that is said.
 """
 
@@ -23,9 +23,8 @@ from numpy.typing import NDArray
 from bemt import coefficients as co
 from bemt.air import Air
 from bemt.base.errors import Fault, InputError
-from bemt.dataset import Dataset
-from bemt.readers._imported import Imported
-from bemt.recordings.channels import LOADS, Lost, Recorded, shaft_power, view
+from bemt.dataset import Dataset, concat
+from bemt.recordings.channels import LOADS, Lost, dropped, file_name, lost, named, runs_of, shaft_power, stated
 from bemt.recordings.plateaus import PlateauSettings
 from bemt.recordings.points import Found, Point, from_rows, from_samples
 from bemt.recordings.rows import command_of, is_samples
@@ -33,29 +32,25 @@ from bemt.recordings.scatter import Hysteresis, hysteresis, repeats, session
 from bemt.recordings.site_air import AirOfPoints, air_of
 from bemt.recordings.tare import TARED, TareZero, from_rest, from_table
 
-__all__ = ["Reduced", "reduce"]
+__all__ = ["Reduction", "reduce", "reduction"]
 
 Array = NDArray[np.float64]
 _SCATTERED = ("thrust_N", "duct_thrust_N", "torque_Nm")
 
 
 @dataclass(frozen=True, eq=False)
-class Reduced:
-    """Outcome of `reduce`.
+class Reduction:
+    """How points were made of rows; `provenance["reduction"]` of what `reduce` gives.
 
     Parameters
     ----------
-    series : Dataset
-        Kind ``bench``; uncertainties are the uncorrelated part.
+    mode, reason : str
+        ``samples`` or ``points``, and what decided it.
     correlated : mapping of str to mapping
         By channel: ``gain`` [1], ``zero`` [unit of the channel], ``session`` [1], as far as known.
     dropped : tuple of Lost
         Line, channel ("" for the whole row) and reason of everything that was left out.
-    notes : tuple of str
-        What was decided and found.
-    mode : str
-        ``samples`` or ``points``.
-    rows : tuple of tuple of int
+    rows : tuple of (M,) int
         Rows of the recording in each point.
     directions : tuple of str
         ``first``, ``up`` or ``down`` per point.
@@ -65,39 +60,43 @@ class Reduced:
         Change of the zero from first to last rest, by channel. [unit of the channel]
     """
 
-    series: Dataset
+    mode: str
+    reason: str
     correlated: Mapping[str, Mapping[str, float]]
     dropped: tuple[Lost, ...]
-    notes: tuple[str, ...]
-    mode: str
-    rows: tuple[tuple[int, ...], ...]
+    rows: tuple[NDArray[np.intp], ...]
     directions: tuple[str, ...]
     hysteresis: Mapping[str, Hysteresis]
     drift: Mapping[str, float]
 
 
+def reduction(points: Dataset) -> Reduction:
+    """How the points of a reduced recording were made."""
+    how: Reduction = points.provenance["reduction"]
+    return how
+
+
 @np.errstate(all="ignore")  # a damaged file may hold any number; what is not finite becomes NaN or a refusal
 def reduce(
-    imported: Imported | Sequence[Imported], *, diameter_m: float | None = None, chord75_m: float | None = None,
-    air: Air | None = None, isa_altitude_m: float | None = None, tare: Imported | Literal[False] | None = None,
+    recording: Dataset | Sequence[Dataset], *, diameter_m: float | None = None, chord75_m: float | None = None,
+    air: Air | None = None, isa_altitude_m: float | None = None, tare: Dataset | Literal[False] | None = None,
     steady: bool | None = None, speed: str | None = None, settings: PlateauSettings | None = None,
-) -> Reduced:  # fmt: skip
-    """Reduce a recording to steady points.
+) -> Dataset:  # fmt: skip
+    """Reduce a recording to steady points: kind ``bench``, uncertainties the uncorrelated part, `reduction` of them.
 
     Examples
     --------
-    >>> from bemt.readers._imported import Channel
-    >>> table = {"rpm": Channel([5000.0, 6000.0], "rpm"), "thrust_N": Channel([4.0, 5.8], "N")}
-    >>> got = reduce(Imported("table", "bench", 2, table), diameter_m=0.254, isa_altitude_m=0.0)
-    >>> got.mode, got.series["CT"].round(3).tolist(), got.series.flags[0]
+    >>> table = Dataset("bench", "table", {"rpm": [5000.0, 6000.0], "thrust_N": [4.0, 5.8]})
+    >>> got = reduce(table, diameter_m=0.254, isa_altitude_m=0.0)
+    >>> reduction(got).mode, got["CT"].round(3).tolist(), got.flags[0]
     ('points', [0.113, 0.114], ('standard air',))
     """
-    records = [imported] if isinstance(imported, Imported) else list(imported)
+    records = [recording] if isinstance(recording, Dataset) else list(recording)
     if not records:
         raise InputError(Fault("", "recordings", "none", "one or more"))
-    name = records[0].provenance.get("file", "") or records[0].format
-    rec = _trusted(_joined([view(record, speed) for record in records]))
-    constants = {k: v for record in reversed(records) for k, v in record.constants.items()}
+    name = str(records[0].provenance.get("file", "") or records[0].name)
+    rec = _trusted(_joined([named(record, speed) for record in records]))
+    constants = {k: v for record in reversed(records) for k, v in record.provenance.get("constants", {}).items()}
     if not set(LOADS) & rec.values.keys():
         got = "no thrust, torque, power, current or coefficient with a unit"
         raise InputError(Fault(name, "", got, "one of them", "Name units in the headings or in a recording.toml"))
@@ -105,10 +104,10 @@ def reduce(
     found = from_samples(rec, name, settings) if samples else from_rows(rec)
     _outliers(rec, found)
     if not found.points:
-        reasons = ", ".join(sorted({lost.reason for lost in found.lost if not lost.channel}))
+        reasons = ", ".join(sorted({gone.reason for gone in found.lost if not gone.channel}))
         raise InputError(Fault(name, "", f"no steady point in {len(rec)} rows ({reasons or 'no rows'})", "one or more"))
     values, u = _columns(found.points)
-    notes = [reason, *rec.notes, *found.notes, *_shared(values, rec.u)]
+    notes = [reason, *rec.notes, *found.notes, *_shared(values, stated(rec))]
     for key, constant in (("tip_gap_m", "gap_m"), ("wall_distance_m", "wall_distance_m")):
         if key not in values and constant in constants:
             values[key] = np.full(len(found.points), constants[constant])
@@ -118,47 +117,43 @@ def reduce(
     notes += surroundings.notes
     _fill_scatter(found, values, u, correlated, notes)
     diameter = diameter_m if diameter_m is not None else constants.get("diameter_m")
-    series = _series(records, found, rec, values, u, surroundings, diameter, chord75_m, reason)
+    series = _series(records, found, rec, values, u, surroundings, diameter, chord75_m)
     loops = _hysteresis(found, values, rec, notes)
-    return Reduced(
-        series, {k: dict(v) for k, v in correlated.items() if v}, tuple([*rec.lost, *found.lost]), tuple(notes),
-        "samples" if samples else "points", tuple(p.rows for p in found.points),
-        tuple(p.direction for p in found.points), loops, drift,
+    how = Reduction(
+        "samples" if samples else "points", reason, {k: dict(v) for k, v in correlated.items() if v},
+        (*dropped(rec), *found.lost), tuple(p.rows for p in found.points), tuple(p.direction for p in found.points),
+        loops, drift,
     )  # fmt: skip
+    return replace(series, provenance={**series.provenance, "reduction": how}, notes=tuple(notes))
 
 
-def _joined(views: Sequence[Recorded]) -> Recorded:
+def _joined(parts: Sequence[Dataset]) -> Dataset:
     """Runs one after the other, numbered through."""
-    if len(views) == 1:
-        return views[0]
-    keys = list(dict.fromkeys(k for v in views for k in v.values))
-    u_keys = list(dict.fromkeys(k for v in views for k in v.u))
-
-    def column(part: str, key: str) -> Array:
-        return np.concatenate([getattr(v, part).get(key, np.full(len(v), np.nan)) for v in views])
-
+    if len(parts) == 1:
+        return parts[0]
     run, k = [], 0
-    for v in views:
-        labels, index = np.unique(v.run, return_inverse=True)
+    for v in parts:
+        labels, index = np.unique(runs_of(v), return_inverse=True)
         run.append(k + 1.0 + index)
         k += len(labels)
-    runs = np.concatenate(run)
-    notes = tuple(dict.fromkeys(n for v in views for n in v.notes))
-    return Recorded(
-        {**{key: column("values", key) for key in keys}, "run": runs}, {key: column("u", key) for key in u_keys},
-        sum((v.lines for v in views), ()), runs, {a: b for v in views for a, b in v.names.items()}, notes,
-        sum((v.lost for v in views), ()), sum((v.flags for v in views), ()),
-    )  # fmt: skip
+    whole = concat([replace(v, kind="bench") for v in parts])
+    about = {
+        **parts[0].provenance, "dropped": sum((dropped(v) for v in parts), ()),
+        "names": {a: b for v in parts for a, b in v.provenance["names"].items()},
+    }  # fmt: skip
+    return replace(whole, values={**whole.values, "run": np.concatenate(run)}, provenance=about,
+                   notes=tuple(dict.fromkeys(n for v in parts for n in v.notes)),
+                   lines=sum((tuple(v.lines) for v in parts), ()))  # fmt: skip
 
 
-def _trusted(rec: Recorded) -> Recorded:
+def _trusted(rec: Dataset) -> Dataset:
     """Without sensors that saw nothing, and without a computed shaft power that its factors contradict."""
     values, notes = dict(rec.values), list(rec.notes)
     for name in ("rpm", "power_W", "electrical_power_W", "voltage_V", "current_A", "density_kg_m3"):
         v = values.get(name)
         if v is not None and np.any(np.isfinite(v)) and not np.any(np.nan_to_num(v)):
             del values[name]
-            notes.append(f"{rec.names.get(name, name)} is 0 in every row: no measurement, left out")
+            notes.append(f"{file_name(rec, name)} is 0 in every row: no measurement, left out")
     product, told = shaft_power(values), values.get("power_W")
     if product is not None and told is not None:
         size = np.abs(product)
@@ -166,14 +161,15 @@ def _trusted(rec: Recorded) -> Recorded:
         good &= size > 0.2 * (np.percentile(size[good], 95) if np.any(good) else 0.0)
         ratio = float(np.median(np.abs(told[good]) / size[good])) if np.count_nonzero(good) >= 3 else 1.0
         if abs(ratio - 1.0) > 0.05:
-            own = rec.names.get("power_W", "power_W")
+            own = file_name(rec, "power_W")
             words = f"{own} is {ratio:.4g} times torque x speed"
             if own == "mechanical_power_W":  # computed by the stand's software, no sensor of its own
                 del values["power_W"]
                 notes.append(f"{words}: left out; the power is taken from torque and speed")
             else:
                 notes.append(f"{words}: kept as recorded, one of them is wrong")
-    return replace(rec, values=values, notes=tuple(notes))
+    u = {k: v for k, v in rec.u.items() if k in values}
+    return replace(rec, values=values, u=u, notes=tuple(notes))
 
 
 def _columns(points: Sequence[Point]) -> tuple[dict[str, Array], dict[str, Array]]:
@@ -192,7 +188,7 @@ def _flow(values: Mapping[str, Array]) -> Array | None:
         return np.nan_to_num(v / values["rpm"] * 60.0) if "rpm" in values else None
 
 
-def _outliers(rec: Recorded, found: Found) -> None:
+def _outliers(rec: Dataset, found: Found) -> None:
     """Drop points that stand apart from four or more repeats of their own condition."""
     values, _ = _columns(found.points)
     if "rpm" not in values:
@@ -204,7 +200,7 @@ def _outliers(rec: Recorded, found: Found) -> None:
             for i, far, n in repeats(values[name], values["rpm"], group, _flow(values)).outliers:
                 words = f"outlier: {name} is {far:.3g} robust standard deviations from the median of its {n} repeats"
                 out.setdefault(i, words)
-    found.lost += [Lost(rec.lines[r], "", reason) for i, reason in out.items() for r in found.points[i].rows]
+    found.lost += [entry for i, reason in out.items() for entry in lost(rec, found.points[i].rows, "", reason)]
     found.points = [p for i, p in enumerate(found.points) if i not in out]
 
 
@@ -221,22 +217,22 @@ def _shared(values: Mapping[str, Array], u: Mapping[str, Array]) -> list[str]:
 
 
 def _instrument(
-    records: Sequence[Imported], rec: Recorded, values: Mapping[str, Array], u: dict[str, Array]
+    records: Sequence[Dataset], rec: Dataset, values: Mapping[str, Array], u: dict[str, Array]
 ) -> dict[str, dict[str, float]]:
     """Correlated parts as stated; the sample part goes into `u` where it is larger than what is there."""
     out: dict[str, dict[str, float]] = {key: {} for key in values}
     for key in values:
         for record in records:
-            stated = record.instrument.get(rec.names.get(key, key), {})
-            out[key] |= {part: stated[part] for part in ("gain", "zero") if part in stated}
-            if "sample" in stated:
-                u[key] = np.fmax(u[key], stated["sample"])
+            told = record.provenance.get("instrument", {}).get(file_name(rec, key), {})
+            out[key] |= {part: told[part] for part in ("gain", "zero") if part in told}
+            if "sample" in told:
+                u[key] = np.fmax(u[key], told["sample"])
     return out
 
 
 def _subtract(
-    rec: Recorded, found: Found, values: dict[str, Array], correlated: dict[str, dict[str, float]],
-    tare: Imported | Literal[False] | None, notes: list[str],
+    rec: Dataset, found: Found, values: dict[str, Array], correlated: dict[str, dict[str, float]],
+    tare: Dataset | Literal[False] | None, notes: list[str],
 ) -> dict[str, float]:  # fmt: skip
     """Subtract the zero; gives its drift."""
     drift: dict[str, float] = {}
@@ -261,7 +257,7 @@ def _subtract(
         if "rpm" not in values:
             notes.append("the tare was not subtracted: no speed to find its rows by")
             return drift
-        other = view(tare)
+        other = named(tare)
         if "rpm" not in other.values:
             raise InputError(Fault(tare.provenance.get("file", "tare"), "rpm", "no speed", "a speed for each row"))
         take(from_table(values["rpm"], other.values["rpm"], other.values, other.u), np.arange(len(found.points)))
@@ -306,8 +302,8 @@ def _fill_scatter(
 
 
 def _series(
-    records: Sequence[Imported], found: Found, rec: Recorded, values: Mapping[str, Array], u: Mapping[str, Array],
-    air: AirOfPoints, diameter: float | None, chord75_m: float | None, reason: str,
+    records: Sequence[Dataset], found: Found, rec: Dataset, values: Mapping[str, Array], u: Mapping[str, Array],
+    air: AirOfPoints, diameter: float | None, chord75_m: float | None,
 ) -> Dataset:  # fmt: skip
     """Channels and derived ones, as a `Dataset`."""
     n = len(found.points)
@@ -317,14 +313,14 @@ def _series(
     if np.any(np.isfinite(air.rho)):
         shown["density_kg_m3"] = air.rho
     said = records[0].provenance
-    file = str(said.get("file", records[0].format))
+    file = str(said.get("file", records[0].name))
     short = file.replace("\\", "/").rsplit("/", 1)[-1]
     labels = []
     for p in found.points:
         first, last = rec.lines[p.rows[0]], rec.lines[p.rows[-1]]
         labels.append(f"{short}:{first}" + (f"-{last}" if len(p.rows) > 1 else ""))
     flags = tuple((*p.flags, *((air.flag,) if air.flag else ())) for p in found.points)
-    provenance = {**said, "format": records[0].format, "reduction": reason}
+    provenance = {k: v for k, v in said.items() if isinstance(v, str)}
     series = Dataset("bench", str(said.get("run_name", short)), shown, {k: v for k, v in u.items() if k in shown},
                     flags, provenance, tuple(labels))  # fmt: skip
     if diameter is None:
@@ -364,7 +360,7 @@ def _numbers(series: Dataset, air: AirOfPoints, D: float, chord75_m: float | Non
     return replace(series, values={**series.values, **more}, u={**series.u, **u_more})
 
 
-def _hysteresis(found: Found, values: Mapping[str, Array], rec: Recorded, notes: list[str]) -> dict[str, Hysteresis]:
+def _hysteresis(found: Found, values: Mapping[str, Array], rec: Dataset, notes: list[str]) -> dict[str, Hysteresis]:
     """Down against up, for a sweep that goes up and comes down; a table in any order has no branches."""
     ways = [p.direction for p in found.points]
     turns = sum(a != b for a, b in zip(ways[1:-1], ways[2:], strict=True)) if len(ways) > 2 else 0

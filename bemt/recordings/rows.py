@@ -9,7 +9,8 @@ The rule, in this order:
 4. with time: a median step of 0.2 s or less makes samples; up to 2 s still, when the command is held for five rows or
    more in most rows, or up to 0.5 s when there is no command; anything slower makes points, and so does a command that
    changes from row to row (a slow ramp: quasi-steady);
-5. without time: a command that is held like that makes samples, else points.
+5. without time: a command that is held like that makes samples, else points;
+6. more than 50,000 rows are samples in any case: nobody has so many steady points.
 
 Rest is where nothing turns: the speed reads 0, or no sensor tells and the command is 0 %, and no more current flows
 than 0.5 % of the largest (1000 us and 0 % are rest by themselves). A speed of 0 while current flows is a sensor that
@@ -21,19 +22,21 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.recordings.channels import Recorded
+from bemt.dataset import Dataset
+from bemt.recordings.channels import stated
 
 __all__ = ["at_rest", "command_of", "is_samples"]
 
 Array = NDArray[np.float64]
 FEWEST = 12
 MOST_POINTS, UNLIKE = 400, 0.02
+LOG = 50_000
 FAST_S, MIDDLE_S, SLOW_S = 0.2, 0.5, 2.0
 HELD = 5
 IDLE_S = 1.0005e-3
 
 
-def command_of(rec: Recorded) -> tuple[str, Array] | None:
+def command_of(rec: Dataset) -> tuple[str, Array] | None:
     """Find the command."""
     for name in ("pwm_s", "throttle"):
         v = rec.values.get(name)
@@ -49,7 +52,7 @@ def _held(command: Array) -> bool:
     return bool(lengths[lengths >= HELD].sum() > 0.5 * len(command))
 
 
-def _unlike(rec: Recorded) -> bool:
+def _unlike(rec: Dataset) -> bool:
     """Whether neighbouring rows differ in everything that was measured."""
     steps = []
     for name in ("rpm", "thrust_N", "torque_Nm", "power_W", "current_A"):
@@ -61,9 +64,9 @@ def _unlike(rec: Recorded) -> bool:
     return bool(steps) and min(steps) > UNLIKE
 
 
-def is_samples(rec: Recorded) -> tuple[bool, str]:
+def is_samples(rec: Dataset) -> tuple[bool, str]:
     """Decide what the rows are."""
-    if rec.u:
+    if stated(rec):
         return False, "rows are points: they have uncertainties of their own"
     if len(rec) < FEWEST:
         return False, f"rows are points: fewer than {FEWEST}"
@@ -80,14 +83,18 @@ def is_samples(rec: Recorded) -> tuple[bool, str]:
             return True, f"rows are samples: {words}"
         if step <= SLOW_S and held:
             return True, f"rows are samples: {words} and the command is held"
+        if len(rec) > LOG:
+            return True, f"rows are samples: more than {LOG}"
         more = "" if found is None else ", and the command changes" if not held else ""
         return False, f"rows are points: {words}{more}" + (" (a slow ramp: quasi-steady)" if step <= MIDDLE_S else "")
     if held:
         return True, "rows are samples: no time, but the command is held over many rows"
+    if len(rec) > LOG:
+        return True, f"rows are samples: more than {LOG}"
     return False, "rows are points: no time, and no command that is held"
 
 
-def at_rest(rec: Recorded) -> NDArray[np.bool_]:
+def at_rest(rec: Dataset) -> NDArray[np.bool_]:
     """Rows at which nothing turns, (N,)."""
     n = len(rec)
     found = command_of(rec)

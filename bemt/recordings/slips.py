@@ -296,6 +296,7 @@ def _told(q: str, facts: Facts) -> str:
 @check_for("slips")
 def find_slips(facts: Facts) -> Iterator[Finding]:
     """Name the slip of a unit that repairs what does not fit together."""
+    facts = facts.sampled()
     known = relations(facts) if not facts.bare else []
     broken = [r for r in known if r.broken]
     share = _electrical(facts, broken) if not facts.bare else None

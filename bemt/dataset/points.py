@@ -11,7 +11,6 @@ known they are split by :data:`ORIGINS`, and the total is the root of the sum of
 
 from __future__ import annotations
 
-import html
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -31,7 +30,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-__all__ = ["DIMENSIONLESS", "KINDS", "ORIGINS", "Dataset", "concat", "from_pandas"]
+__all__ = ["DIMENSIONLESS", "KINDS", "ORIGINS", "Dataset", "concat"]
 
 KINDS = ("bemt", "k1k2", "cfd", "bench", "vendor")
 """Kinds that comparisons know; others (``k1k2_printed``, ``flight``) are allowed and kept apart."""
@@ -50,7 +49,7 @@ _KIND = re.compile(r"[a-z][a-z0-9_]*")
 
 
 @lru_cache(maxsize=1024)
-def _channel_fault(name: str) -> tuple[str, str, str] | None:
+def channel_fault(name: str) -> tuple[str, str, str] | None:
     """Reason why a channel name is refused: (got, expected, hint)."""
     if name == "rpm" or name in DIMENSIONLESS:
         return None
@@ -63,10 +62,34 @@ def _channel_fault(name: str) -> tuple[str, str, str] | None:
     return None
 
 
+def unit_in(name: str) -> str:
+    """Unit that the name of a channel says; "-" for none."""
+    if name == "rpm" or name in DIMENSIONLESS:
+        return "rpm" if name == "rpm" else "-"
+    unit = units.split_suffix(name)[1]
+    return "" if unit is None else unit.suffix or "-"
+
+
+def _still(array: NDArray[Any]) -> bool:
+    """Whether nobody can write to an array, nor to what it is a view of."""
+    part = array.base
+    while part is not None:
+        if not isinstance(part, np.ndarray) or part.flags.writeable:
+            return False
+        part = part.base
+    return not array.flags.writeable
+
+
 def _frozen(array: ArrayLike) -> Array:
+    """Read-only array; one that nobody can write to is shared, since a log may have millions of rows."""
+    if isinstance(array, np.ndarray) and array.dtype == np.float64 and _still(array):
+        return array
     out = np.array(array, dtype=float)
     out.setflags(write=False)
     return out
+
+
+_UNKNOWN = _frozen(np.nan)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +117,12 @@ class Dataset:
         the root of the sum of squares of their parts.
     notes : tuple of str
         What was assumed, dropped or averaged.
+    units : mapping of str to str
+        Unit of channels whose name does not end in it, as a file has them; "": not known.
+    lines : range or tuple of int
+        Line of each point in its file, from 1; empty: not known.
+    texts : mapping of str to tuple of str
+        Columns of text, by name, one entry per point.
 
     Raises
     ------
@@ -117,6 +146,9 @@ class Dataset:
     labels: tuple[str, ...] = ()
     u_by: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict)
+    lines: Sequence[int] = ()
+    texts: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         values = {key: _frozen(v) for key, v in self.values.items()}
@@ -135,7 +167,7 @@ class Dataset:
                     got = "a negative or infinite uncertainty"
                     found.append((f"{where}.{key}", got, "zero or more; NaN = unknown", ""))
                 else:
-                    kept[key] = _frozen(np.broadcast_to(array, (n,)))
+                    kept[key] = array if array.shape else np.broadcast_to(array, (n,))
             return kept
 
         u = checked("u", self.u)
@@ -149,15 +181,19 @@ class Dataset:
         if found:
             file = str(self.provenance.get("file", "")) or self.name
             raise InputError([Fault(file, *fault) for fault in found])
-        unknown = _frozen(np.full(n, np.nan))
+        unknown = np.broadcast_to(_UNKNOWN, (n,))
         object.__setattr__(self, "values", MappingProxyType(values))
         object.__setattr__(self, "u", MappingProxyType({key: u.get(key, unknown) for key in values}))
-        object.__setattr__(self, "flags", tuple(tuple(f) for f in self.flags) or ((),) * n)
+        flags = self.flags if {*map(type, self.flags)} <= {tuple} else (tuple(f) for f in self.flags)
+        object.__setattr__(self, "flags", tuple(flags) or ((),) * n)
         object.__setattr__(self, "labels", tuple(self.labels))
         object.__setattr__(self, "provenance", MappingProxyType(dict(self.provenance)))
         by = {origin: MappingProxyType(u_by[origin]) for origin in ORIGINS if u_by.get(origin)}
         object.__setattr__(self, "u_by", MappingProxyType(by))
         object.__setattr__(self, "notes", tuple(self.notes))
+        object.__setattr__(self, "units", MappingProxyType({k: v for k, v in self.units.items() if k in values}))
+        object.__setattr__(self, "lines", self.lines if isinstance(self.lines, range) else tuple(self.lines))
+        object.__setattr__(self, "texts", MappingProxyType({k: tuple(v) for k, v in self.texts.items()}))
 
     def _head_faults(self, values: Mapping[str, Array], n: int) -> Iterable[tuple[str, str, str, str]]:
         if not _KIND.fullmatch(self.kind):
@@ -165,14 +201,15 @@ class Dataset:
         if not values:
             yield ("values", "no channels", "one channel or more", "")
         for key, array in values.items():
-            if fault := _channel_fault(key):
+            if key not in self.units and (fault := channel_fault(key)):
                 yield (f"values.{key}", *fault)
             if array.shape != (n,):
                 yield (f"values.{key}", f"shape {array.shape}", f"shape ({n},) like the first channel", "")
             elif np.any(np.isinf(array)):
                 yield (f"values.{key}", "an infinite value", "finite numbers, or NaN for none", "")
-        for what, items in (("flags", self.flags), ("labels", self.labels)):
-            if items and len(items) != n:
+        texts = ((f"texts.{key}", cells) for key, cells in self.texts.items())
+        for what, items in (("flags", self.flags), ("labels", self.labels), ("lines", self.lines), *texts):
+            if len(items) not in (0, n):
                 yield (what, f"{len(items)} entries", f"{n}, one per point", "")
 
     def __len__(self) -> int:
@@ -196,33 +233,15 @@ class Dataset:
 
     def _repr_html_(self) -> str:
         """Show the points in a notebook: each value with its standard uncertainty, where one is known."""
-        columns = [*self.values, *(["flags"] if any(self.flags) else [])]
-        shown = list(range(len(self))) if len(self) <= 12 else [*range(8), None, *range(len(self) - 3, len(self))]
+        from bemt.dataset import tables
 
-        def cell(name: str, i: int) -> str:
-            if name == "flags":
-                return ", ".join(self.flags[i])
-            value, u = self.values[name][i], self.u[name][i]
-            if not np.isfinite(value):
-                return "-"
-            if not u > 0.0:
-                return f"{value:.6g}"
-            digits = max(0, 1 - math.floor(math.log10(u)))  # two digits of the uncertainty
-            return f"{value:.{digits}f} &plusmn; {u:.{digits}f}"
-
-        head = "".join(f"<th>{html.escape(name)}</th>" for name in columns)
-        rows = "".join(
-            "<tr>" + "".join(f"<td>{'&#8942;' if i is None else cell(name, i)}</td>" for name in columns) + "</tr>"
-            for i in shown
-        )
-        notes = "".join(f"<br><small>{html.escape(note)}</small>" for note in self.notes)
-        what = f"<strong>{html.escape(f'{self.kind}: {self.name}, {len(self)} points')}</strong>"
-        return f'{what}<div style="overflow-x:auto"><table class="bemt"><tr>{head}</tr>{rows}</table></div>{notes}'
+        return tables.to_html(self)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle as plain dictionaries (worker processes send series back)."""
         by = {origin: dict(parts) for origin, parts in self.u_by.items()}
-        plain = (dict(self.values), dict(self.u), self.flags, dict(self.provenance), self.labels, by, self.notes)
+        plain = (dict(self.values), dict(self.u), self.flags, dict(self.provenance), self.labels, by, self.notes,
+                 dict(self.units), self.lines, dict(self.texts))  # fmt: skip
         return (Dataset, (self.kind, self.name, *plain))
 
     @property
@@ -243,6 +262,29 @@ class Dataset:
         if channel in values:
             return values[channel]  # type: ignore[no-any-return]
         raise AttributeError(f"no channel {channel!r}; there are {', '.join(values)}")
+
+    def unit(self, channel: str) -> str:
+        """Give the unit of a channel.
+
+        Parameters
+        ----------
+        channel : str
+            Its name.
+
+        Returns
+        -------
+        str
+            SI suffix, ``rpm``, "-" without dimension, or what the file says; "" when it is not known.
+
+        Examples
+        --------
+        >>> d = Dataset("table", "t", {"thrust_N": [1.0], "J": [0.1], "x": [2.0]}, units={"x": ""})
+        >>> [d.unit(k) for k in d.values]
+        ['N', '-', '']
+        """
+        if channel in self.units:
+            return self.units[channel]
+        return unit_in(channel)
 
     @classmethod
     def from_rotor_convention(cls, kind: str, name: str, values: Mapping[str, ArrayLike], **kwargs: Any) -> Dataset:
@@ -376,6 +418,8 @@ class Dataset:
             flags=tuple(self.flags[i] for i in index),
             labels=tuple(self.labels[i] for i in index) if self.labels else (),
             u_by={origin: {key: v[index] for key, v in parts.items()} for origin, parts in self.u_by.items()},
+            lines=tuple(self.lines[i] for i in index) if self.lines else (),
+            texts={key: tuple(cells[i] for i in index) if cells else () for key, cells in self.texts.items()},
         )
 
     def to_pandas(self) -> pd.DataFrame:
@@ -393,17 +437,9 @@ class Dataset:
               rpm  thrust_N  u_thrust_N
         0  6000.0      10.0         0.1
         """
-        import pandas as pd
+        from bemt.dataset import tables
 
-        columns: dict[str, Any] = dict(self.values)
-        columns |= {f"u_{key}": v for key, v in self.u.items() if not np.all(np.isnan(v))}
-        columns |= {f"u_{origin}_{key}": v for origin, parts in self.u_by.items() for key, v in parts.items()}
-        if any(self.flags):
-            columns["flags"] = ["; ".join(words) for words in self.flags]
-        frame = pd.DataFrame(columns, index=pd.Index(self.labels) if self.labels else None)
-        about = {"kind": self.kind, "name": self.name, "provenance": dict(self.provenance), "notes": list(self.notes)}
-        frame.attrs.update(about)
-        return frame
+        return tables.to_pandas(self)
 
     def to_xarray(self) -> xr.Dataset:
         """Give the points as an xarray dataset over the dimension ``point``.
@@ -424,15 +460,9 @@ class Dataset:
         >>> x["thrust_N"].attrs["units"], x.sizes["point"]
         ('N', 1)
         """
-        from bemt.base.errors import needs
+        from bemt.dataset import tables
 
-        xarray = needs("xarray", "xarray")
-        frame = self.to_pandas()
-        out = xarray.Dataset({key: ("point", frame[key].to_numpy()) for key in frame.columns}, attrs=dict(frame.attrs))
-        for key in out.data_vars:
-            _, unit = units.split_suffix(str(key))
-            out[key].attrs["units"] = "1" if unit is None else unit.suffix
-        return out
+        return tables.to_xarray(self)
 
     def plot(self, x: str | None = None, y: Sequence[str] = (), ax: Any = None) -> Any:
         """Draw channels over another one, with bands where uncertainties are known.
@@ -462,41 +492,9 @@ class Dataset:
         >>> d.plot().get_xlabel()
         'rpm'
         """
-        import matplotlib.pyplot as plt
+        from bemt.dataset.plot import plot
 
-        ways = [k for k in ("J", "airspeed_m_s", "rpm") if k in self and np.unique(self[k].round(9)).size > 1]
-        x = x or (ways[0] if ways else "rpm")
-        wanted = list(y) or [k for k in ("CT", "CP") if k in self and x == "J"] or ["thrust_N"]
-        wanted = [y] if isinstance(y, str) else wanted
-        unknown = [key for key in (x, *wanted) if key not in self]
-        if unknown:
-            known = ", ".join(self.values)
-            raise InputError(Fault(self.name, ", ".join(unknown), "no such channel", f"one of {known}"))
-        beside, points = ax is not None, self.kind in ("bench", "cfd", "vendor")
-        ax = ax if beside else plt.subplots(layout="constrained")[1]
-        drawn = [line.get_gid() for line in ax.lines]
-        colours = {line.get_gid(): line.get_color() for line in ax.lines if drawn.count(line.get_gid()) == 1}
-        speeds = np.unique(self["rpm"]) if "rpm" in self and x != "rpm" else np.array([np.nan])
-        for channel in wanted:
-            for speed in speeds:
-                rows = np.flatnonzero(self["rpm"] == speed) if np.isfinite(speed) else np.arange(len(self))
-                rows = rows[np.argsort(self[x][rows], kind="stable")]
-                name = f"{channel}, {speed:.0f} rev/min" if len(speeds) > 1 else channel
-                name = f"{name}, {self.name}" if beside else name
-                style = {"marker": "o", "ls": ""} if points else {}
-                style |= {"color": colours[channel]} if channel in colours and len(speeds) == 1 else {}
-                at, value, u = self[x][rows], self[channel][rows], self.u[channel][rows]
-                (line,) = ax.plot(at, value, label=name, gid=channel, **style)
-                if np.any(u > 0.0) and points:
-                    ax.errorbar(at, value, np.nan_to_num(u), fmt="none", ecolor=line.get_color(), lw=1)
-                elif np.any(u > 0.0):
-                    ax.fill_between(at, value - u, value + u, alpha=0.2, color=line.get_color(), lw=0)
-        ax.set_xlabel(x)
-        ax.set_ylabel(", ".join(wanted))
-        if not beside:
-            ax.set_title(self.name, fontsize=10)
-        ax.legend(fontsize=8, frameon=False)
-        return ax
+        return plot(self, x, y, ax)
 
     def to_rows(self) -> list[dict[str, Any]]:
         """Give one plain dictionary per point, fit for JSON.
@@ -573,75 +571,5 @@ def concat(series: Iterable[Dataset], name: str | None = None) -> Dataset:
         sum((part.flags for part in parts), ()),
         {"parts": tuple((part.name, len(part), dict(part.provenance)) for part in parts)},
         sum((part.labels or ("",) * len(part) for part in parts), ()) if any(part.labels for part in parts) else (),
+        units={key: unit for part in parts for key, unit in part.units.items()},
     )
-
-
-def from_pandas(frame: pd.DataFrame, kind: str = "bench", name: str = "table", **more: Any) -> Dataset:
-    """Make a dataset from a table whose headings carry their units.
-
-    Parameters
-    ----------
-    frame : pandas.DataFrame
-        Columns ``rpm``, coefficients, or names that end in a unit (``thrust_N``, ``thrust_gf``, ``airspeed_km_h``);
-        they are converted to SI by it. ``u_<column>`` is a standard uncertainty, ``flags`` words joined by "; ".
-    kind, name : str
-        As for :class:`Dataset`.
-    **more
-        ``provenance``, ``notes``.
-
-    Returns
-    -------
-    Dataset
-        With the index as labels, unless it only counts.
-
-    Raises
-    ------
-    InputError
-        With all faults: headings without a known unit, cells that are no numbers.
-
-    Examples
-    --------
-    >>> import pandas as pd
-    >>> d = from_pandas(pd.DataFrame({"rpm": [6000], "thrust_gf": [1000.0]}))
-    >>> d["thrust_N"].round(5), d.kind
-    (array([9.80665]), 'bench')
-    """
-    import pandas as pd
-
-    faults: list[Fault] = []
-    values: dict[str, Array] = {}
-    u: dict[str, Array] = {}
-    u_by: dict[str, dict[str, Array]] = {}
-    for heading in map(str, frame.columns):
-        if heading == "flags":
-            continue
-        column = heading.removeprefix("u_") if heading.startswith("u_") else heading
-        origin = next((o for o in ORIGINS if column.startswith(f"{o}_") and heading.startswith("u_")), "")
-        column = column.removeprefix(f"{origin}_") if origin else column
-        base, unit = units.split_suffix(column)
-        scale, offset, channel = 1.0, 0.0, column
-        named = column == "rpm" or column in DIMENSIONLESS
-        if not named and unit is not None and (unit.factor, unit.offset) != (1.0, 0.0):
-            base_unit = (unit.dimension, 1.0, 0.0)
-            si = next(s for s, o in units.UNITS.items() if (o.dimension, o.factor, o.offset) == base_unit)
-            scale, offset, channel = unit.factor, unit.offset, f"{base}_{si}"
-        elif fault := _channel_fault(column):
-            faults.append(Fault(name, heading, *fault))
-            continue
-        try:
-            numbers = pd.to_numeric(frame[heading]).to_numpy(dtype=float)
-        except (ValueError, TypeError) as error:
-            faults.append(Fault(name, heading, str(error), "a column of numbers"))
-            continue
-        if heading == column:
-            values[channel] = numbers * scale + offset
-        elif origin:
-            u_by.setdefault(origin, {})[channel] = numbers * scale
-        else:
-            u[channel] = numbers * scale
-    if faults:
-        raise InputError(faults)
-    flags = tuple(tuple(w for w in str(words).split("; ") if w) for words in frame["flags"]) if "flags" in frame else ()
-    counted = isinstance(frame.index, pd.RangeIndex)
-    labels = () if counted else tuple(map(str, frame.index))
-    return Dataset(kind, name, values, u, flags, more.pop("provenance", {}), labels, u_by, more.pop("notes", ()))

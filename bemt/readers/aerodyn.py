@@ -1,0 +1,142 @@
+"""AeroDyn 15: driver file with the primary, blade and airfoil files that it names (NREL, AeroDyn user guide).
+
+A value stands before its name. The driver holds blade count and hub radius, the primary file the list of airfoils, the
+blade file the nodes: span from the hub, twist from the plane of rotation to feather, chord, number of the airfoil.
+
+AeroDyn is for turbines: lift of its sections drives the rotor. For the propeller convention sections are turned over,
+``cl(alpha) = -cl_turbine(-alpha)``, so that a rotor that brakes the flow has negative thrust and torque.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from bemt.base.errors import Fault, InputError
+from bemt.readers import SourceText, head_text, load_text, number, polar_aerodyn
+from bemt.readers._blade import BladeFile, checked, values, whole
+from bemt.sections.polars import Polar
+
+__all__ = ["BLADE", "KIND", "read", "sniff"]
+
+KIND = "aerodyn"
+BLADE = True
+
+_DRIVER = re.compile(r"\bAeroDyn\b[^\n]*\bDriver\b|\bNumBlades(\(1\))?\b", re.I)
+_PART = re.compile(r"\b(ADBlFile|NumBlNds)\b")
+
+
+def sniff(head: bytes | str) -> bool:
+    r"""Tell whether a file is a driver, primary or blade file of AeroDyn 15.
+
+    Examples
+    --------
+    >>> sniff("--- AeroDyn Driver Input File ---\nRotor\n"), sniff("3 NumBlNds - nodes\n"), sniff("1 NumTabs\n")
+    (True, True, False)
+    """
+    text = head_text(head)
+    return _DRIVER.search(text) is not None or _PART.search(text) is not None
+
+
+def read(path: str | os.PathLike[str]) -> BladeFile:
+    """Read the first rotor of a driver file."""
+    driver = load_text(path)
+    if not _DRIVER.search(driver.text):
+        got = "a part of an AeroDyn model, without blade count and hub radius"
+        raise InputError(Fault(driver.name, "", got, "the driver file that names it", "It holds NumBlades and HubRad"))
+    faults: list[Fault] = []
+    count, hub = (_number(driver, key, faults) for key in ("NumBlades", "HubRad"))
+    primary = load_text(_file(driver, ("AeroFile", "AD_InputFile", "InputFile"), Path(path).parent, faults))
+    folder = Path(path).parent / Path(_text(driver, ("AeroFile", "AD_InputFile", "InputFile"))).parent
+    blade = load_text(_file(primary, ("ADBlFile(1)", "ADBlFile"), folder, faults))
+    polars = [_turned(polar_aerodyn.read(folder / name)) for name in _airfoils(primary, faults)]
+    nodes = _nodes(blade, faults)
+    ids = [whole(row[6]) for row in nodes]
+    for bad in sorted({i for i in ids if not 1 <= i <= len(polars)}):
+        faults.append(Fault(blade.name, "BlAFID", f"{bad}", f"1 to {len(polars)}, as {primary.name} lists"))
+    if faults:
+        raise InputError(faults)
+    span, chord, twist = (np.array([row[k] for row in nodes]) for k in (0, 5, 4))
+    r = hub + span
+    notes = ["sections are turned over for the propeller convention: braking the flow is negative thrust"]
+    if any(abs(v) > 1e-9 for row in nodes for v in row[1:4]):
+        notes.append("prebend, sweep and cant of the blade are left out")
+    V, rpm, rho = (_optional(driver, key) for key in ("HWindSpeed", "RotSpeed", "FldDens"))
+    found = BladeFile(
+        Path(path).stem, "AeroDyn", whole(count), float(r[-1]), hub, r, chord, np.radians(twist),
+        _anchors(r / r[-1], ids, polars), rpm, V, rho, tuple(notes),
+    )  # fmt: skip
+    return checked(blade, found, faults)
+
+
+def _value(source: SourceText, key: str) -> tuple[int, str] | None:
+    """Line and text in front of a name; quoted texts may hold blanks."""
+    name = re.compile(r'^\s*("[^"]*"|\S+)\s+' + re.escape(key) + r"(?:\(1\))?(?=\s|$)")
+    for i, line in enumerate(source.lines, 1):
+        if found := name.match(line):
+            return i, found[1].strip('"')
+    return None
+
+
+def _number(source: SourceText, key: str, faults: list[Fault]) -> float:
+    found = _value(source, key)
+    value = None if found is None else number(found[1])
+    if value is None:
+        got = "nothing" if found is None else repr(found[1])
+        faults.append(Fault(source.name, key if found is None else str(found[0]), got, f"a number for {key}"))
+    return math.nan if value is None else value
+
+
+def _optional(source: SourceText, key: str) -> float | None:
+    found = _value(source, key)
+    return None if found is None else number(found[1])
+
+
+def _text(source: SourceText, keys: Sequence[str]) -> str:
+    return next((found[1] for key in keys if (found := _value(source, key))), "")
+
+
+def _file(source: SourceText, keys: Sequence[str], folder: Path, faults: list[Fault]) -> Path:
+    name = _text(source, keys)
+    if not name:
+        raise InputError([*faults, Fault(source.name, keys[0], "nothing", "the name of a file")])
+    return folder / name
+
+
+def _airfoils(source: SourceText, faults: list[Fault]) -> list[str]:
+    """Files of ``AFNames``: a quoted name on each of ``NumAFfiles`` lines."""
+    count = whole(_number(source, "NumAFfiles", faults))
+    first = next((i for i, line in enumerate(source.lines) if re.search(r'"\s+AFNames\b', line)), None)
+    lines = [] if first is None else source.lines[first : first + count]
+    names = [m[1] for line in lines if (m := re.match(r'\s*"([^"]+)"', line))]
+    if len(names) < max(count, 1):
+        faults.append(Fault(source.name, "AFNames", f"{len(names)} files", f"{max(count, 1)} in quotes"))
+    return names
+
+
+def _nodes(source: SourceText, faults: list[Fault]) -> list[list[float]]:
+    """Rows of span, three shapes of the axis, twist, chord and airfoil."""
+    count = whole(_number(source, "NumBlNds", faults))
+    begin = (_value(source, "NumBlNds") or (0, ""))[0] + 2
+    rows = [(i + 1, source.lines[i]) for i in range(begin, min(begin + count, len(source.lines)))]
+    if len(rows) < max(count, 2):
+        faults.append(Fault(source.name, "NumBlNds", f"{len(rows)} nodes", f"{max(count, 2)}"))
+        raise InputError(faults)
+    return [values(source, i, text, 7, "a node", faults, most=7) for i, text in rows]
+
+
+def _anchors(rR: np.ndarray, ids: Sequence[int], polars: Sequence[Polar]) -> list[tuple[float, Polar]]:
+    """First and last node of each run of one airfoil."""
+    ends = [k for k in range(len(ids)) if k in (0, len(ids) - 1) or ids[k] != ids[k - 1] or ids[k] != ids[k + 1]]
+    return [(float(rR[k]), polars[ids[k] - 1]) for k in ends]
+
+
+def _turned(polar: Polar) -> Polar:
+    """The section upside down."""
+    return replace(polar, alpha=-polar.alpha[::-1], cl=-polar.cl[::-1], cd=polar.cd[::-1], confidence=None)
