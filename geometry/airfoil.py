@@ -120,11 +120,6 @@ class Airfoil:
         return float(self._lines[1].max())
 
     @property
-    def x_thickness(self) -> float:
-        """Chord fraction of the greatest thickness [-]."""
-        return float(self._lines[0][int(np.argmax(self._lines[1]))])
-
-    @property
     def camber(self) -> float:
         """Greatest distance of the mid line from the line (0, 0) to the trailing edge, with its sign [-]."""
         x, _, mean = self._lines

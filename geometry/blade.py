@@ -124,14 +124,6 @@ class Blade:
         columns = self._at(r)
         return columns[..., 0], columns[..., 1]
 
-    def elements(self, edges: ArrayLike) -> Stations:
-        """Cut the blade at given edges. [m, rad]"""
-        edges = np.asarray(edges, dtype=np.float64)
-        if edges.ndim != 1 or edges.size < 2 or not (np.diff(edges) > 0).all():
-            raise GeometryError([("edges", f"shape {edges.shape}", "two or more ascending radii in metres", "")])
-        r = 0.5 * (edges[1:] + edges[:-1])
-        return Stations(r, np.diff(edges), *self.at(r))
-
     def midpoints(self, n: int, spacing: str = "uniform") -> Stations:
         """Cut the blade into n elements between Rhub and R: what the solver consumes. [m, rad]
 
@@ -162,14 +154,6 @@ class Blade:
         r = self.Rhub + 0.5 * (steps[1:] + steps[:-1])
         return Stations(r, np.diff(steps), *self.at(r))
 
-    def resample(self, r: ArrayLike) -> Blade:
-        """Return the blade with stations at other radii, everything interpolated."""
-        columns = self._at(r)
-        return replace(
-            self, r=np.asarray(r, dtype=np.float64), chord=columns[..., 0], beta=columns[..., 1],
-            sweep=None if self.sweep is None else columns[..., 2], rake=None if self.rake is None else columns[..., 3],
-        )  # fmt: skip
-
     def with_pitch_offset(self, dbeta: float) -> Blade:
         """Return the blade turned as a whole by `dbeta` [rad]."""
         return replace(self, beta=self.beta + dbeta)
@@ -177,10 +161,14 @@ class Blade:
     def scaled(self, factor: float) -> Blade:
         """Return the blade with every length multiplied by `factor` (> 0) [-]; angles and sections stay."""
         return replace(
-            self, r=self.r * factor, chord=self.chord * factor, R=self.R * factor, Rhub=self.Rhub * factor,
+            self,
+            r=self.r * factor,
+            chord=self.chord * factor,
+            R=self.R * factor,
+            Rhub=self.Rhub * factor,
             sweep=None if self.sweep is None else self.sweep * factor,
             rake=None if self.rake is None else self.rake * factor,
-        )  # fmt: skip
+        )
 
     def pitch_m(self, r_over_R: float = 0.75) -> float:
         """Return the geometric pitch 2 pi r tan(beta), the advance per turn, at one r/R (0.75 unless told) [m]."""
@@ -264,8 +252,12 @@ def _check_arrays(blade: Blade, faults: Faults) -> None:
         elif key == "beta":
             k = int(np.argmax(np.abs(values)))
             if abs(values[k]) > math.pi / 2 + 1e-9:
-                faults.add(f"beta[{k}]", f"{values[k]:g} rad", "radians from -pi/2 to pi/2",
-                           "Given in degrees? Multiply by pi/180")  # fmt: skip
+                faults.add(
+                    f"beta[{k}]",
+                    f"{values[k]:g} rad",
+                    "radians from -pi/2 to pi/2",
+                    "Given in degrees? Multiply by pi/180",
+                )
 
 
 def _check_stations(r: Array, R: float, faults: Faults) -> None:
@@ -282,11 +274,19 @@ def _check_stations(r: Array, R: float, faults: Faults) -> None:
 
 
 def from_stations(
-    r: ArrayLike, chord: ArrayLike, beta: ArrayLike, R: float, Rhub: float,
-    anchors: Airfoil | Sequence[tuple[float, Airfoil]] | None = None, *,
-    sweep: ArrayLike | None = None, rake: ArrayLike | None = None, axis: float = 0.25, interpolation: str = "pchip",
+    r: ArrayLike,
+    chord: ArrayLike,
+    beta: ArrayLike,
+    R: float,
+    Rhub: float,
+    anchors: Airfoil | Sequence[tuple[float, Airfoil]] | None = None,
+    *,
+    sweep: ArrayLike | None = None,
+    rake: ArrayLike | None = None,
+    axis: float = 0.25,
+    interpolation: str = "pchip",
     name: str = "",
-) -> Blade:  # fmt: skip
+) -> Blade:
     """Make a blade from tabulated stations.
 
     Examples

@@ -82,8 +82,9 @@ def planar_sections(rotor: Rotor, options: Options | None = None) -> list[tuple[
     bottom, top = float(x[0].max()), float(x[-1].min())
     root = _inner_plane(curves[0], rotor.Rhub)
     if root < bottom or top < rotor.R:
-        raise GeometryError([("chord", "a blade too wide for its hub", "a root that ends inside the hub",
-                              "Less chord or a larger hub")])  # fmt: skip
+        raise GeometryError(
+            [("chord", "a blade too wide for its hub", "a root that ends inside the hub", "Less chord or a larger hub")]
+        )
     planes = np.unique(np.concatenate([[root], rho[(rho > 1.01 * root) & (rho < rotor.R)], [rotor.R + 0.4 * step]]))
     planes = planes[np.concatenate([[True], np.diff(planes) > 1e-4 * rotor.R])]
     out = []
@@ -135,8 +136,10 @@ def _loft(sections: list[tuple[float, Array]]) -> Any:
         if not blunt:
             points[-1] = points[0] = (points[0] + points[-1]) * 0.5
         nose = len(points) // 2
-        edges = [cq.Edge.makeSpline(points[: nose + 1], parameters=first),
-                 cq.Edge.makeSpline(points[nose:], parameters=second)]  # fmt: skip
+        edges = [
+            cq.Edge.makeSpline(points[: nose + 1], parameters=first),
+            cq.Edge.makeSpline(points[nose:], parameters=second),
+        ]
         if blunt:
             edges.append(cq.Edge.makeLine(points[-1], points[0]))
         wires.append(cq.Wire.assembleEdges(edges))

@@ -103,8 +103,8 @@ class Duct:
     Examples
     --------
     >>> duct = Duct(0.0349, 0.060, 0.003, 0.0004, exit_radius=0.033, exit_hub_radius=0.010)
-    >>> round(duct.exit_area * 1e4, 2), round(duct.length_ratio, 3)
-    (31.07, 0.86)
+    >>> round(duct.exit_area * 1e4, 2)
+    31.07
     """
 
     inner_radius: float
@@ -174,37 +174,14 @@ class Duct:
         """Return exit area over swept annulus area, the wake area ratio of duct momentum theory [-]."""
         return self.exit_area / rotor.annulus_area
 
-    def passage_ratio(self, rotor: Rotor) -> float:
-        """Return exit area over passage area in the rotor plane: exactly 1 for a straight duct and hub [-]."""
-        return self.exit_area / self.passage_area(rotor)
-
-    @property
-    def length_ratio(self) -> float:
-        """Length over bore diameter [-]."""
-        return self.length / (2 * self.inner_radius)
-
-    @property
-    def lip_ratio(self) -> float:
-        """Lip radius over bore diameter [-]."""
-        return self.lip_radius / (2 * self.inner_radius)
-
     @property
     def lip_length(self) -> float:
         """Axial length of the lip [m]."""
         return self.lip_aspect * self.lip_radius
 
-    def gap_over_R(self, rotor: Rotor) -> float:
-        """Return tip gap over tip radius [-]."""
-        return self.gap / rotor.R
-
     def gap_over_span(self, rotor: Rotor) -> float:
         """Return tip gap over blade length [-]."""
         return self.gap / rotor.span
-
-    @property
-    def diffuser_angle(self) -> float:
-        """Half angle of the diffuser, negative for a nozzle, 0 where the bore reaches the exit [rad]."""
-        return math.atan2(self._exit - self.inner_radius, max(self.length - self.bore_end, 1e-12))
 
     @property
     def bore_end(self) -> float:

@@ -36,9 +36,15 @@ READ_TOLERANCE = 2e-6  # of the size of the part, when CAD surfaces are meshed
 
 
 def export(
-    rotor: Rotor, duct: Duct | None, out: Path, formats: Sequence[str], *, name: str = "rotor", unit: str = "mm",
+    rotor: Rotor,
+    duct: Duct | None,
+    out: Path,
+    formats: Sequence[str],
+    *,
+    name: str = "rotor",
+    unit: str = "mm",
     options: Options | None = None,
-) -> dict[str, Any]:  # fmt: skip
+) -> dict[str, Any]:
     """Write the solids of a rotor and its duct."""
     faults = Faults()
     for word in formats:
@@ -97,8 +103,11 @@ def _rounded(value: Any) -> Any:
 
 
 def _surfaces(model: MeshModel) -> list[dict[str, Any]]:
-    return [{"name": name, "triangles": len(part.part(name)), "area_m2": part.area(name)}
-            for part in model.parts for name in part.names]  # fmt: skip
+    return [
+        {"name": name, "triangles": len(part.part(name)), "area_m2": part.area(name)}
+        for part in model.parts
+        for name in part.names
+    ]
 
 
 def _stl(vertices: Array, faces: NDArray[np.int64], title: str) -> str:

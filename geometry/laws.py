@@ -145,10 +145,17 @@ def chord_over_R(law: str, x: ArrayLike, hub: float = 0.15, **parameters: float 
 
 
 def from_laws(
-    diameter: float, chord_law: str = "apc_like", pitch_law: str = "helix", hub: float = 0.15, *,
-    chord: Mapping[str, float | None] | None = None, pitch: Mapping[str, float | None] | None = None,
-    anchors: Airfoil | Sequence[tuple[float, Airfoil]] | None = None, n: int = 61, name: str = "",
-) -> Blade:  # fmt: skip
+    diameter: float,
+    chord_law: str = "apc_like",
+    pitch_law: str = "helix",
+    hub: float = 0.15,
+    *,
+    chord: Mapping[str, float | None] | None = None,
+    pitch: Mapping[str, float | None] | None = None,
+    anchors: Airfoil | Sequence[tuple[float, Airfoil]] | None = None,
+    n: int = 61,
+    name: str = "",
+) -> Blade:
     """Make a blade from a chord law and a pitch law.
 
     Examples
@@ -177,9 +184,17 @@ def from_laws(
 
 
 def helix(
-    diameter: float, pitch: float, chord_law: str = "apc_like", hub: float = 0.15, *, max_chord: float | None = None,
-    dbeta: float = 0.0, anchors: Airfoil | Sequence[tuple[float, Airfoil]] | None = None, n: int = 61, name: str = "",
-) -> Blade:  # fmt: skip
+    diameter: float,
+    pitch: float,
+    chord_law: str = "apc_like",
+    hub: float = 0.15,
+    *,
+    max_chord: float | None = None,
+    dbeta: float = 0.0,
+    anchors: Airfoil | Sequence[tuple[float, Airfoil]] | None = None,
+    n: int = 61,
+    name: str = "",
+) -> Blade:
     """Make a constant-pitch blade: beta = atan(pitch / (2 pi r)).
 
     Examples

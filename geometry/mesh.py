@@ -207,10 +207,15 @@ def _rotor(rotor: Rotor, options: Options) -> tuple[Mesh, dict[str, float]]:
         raise GeometryError([("rotor", f"a tip radius of {tip:g} m", f"R = {rotor.R:g} m", "")])
     thick = [float(_thickness(curve)) for curve in curves[1:]]
     checks = {
-        "volume_rotor_mesh": mesh.volume, "volume_rotor_sections": expected, "volume_blade_sections": sections,
-        "tip_radius": tip, "min_section_thickness": min(thick),
-        "min_trailing_edge": float(min(np.linalg.norm(c[0] - c[-1]) if curves.shape[1] % 2 else 0.0 for c in curves[1:])),  # noqa: E501
-    }  # fmt: skip
+        "volume_rotor_mesh": mesh.volume,
+        "volume_rotor_sections": expected,
+        "volume_blade_sections": sections,
+        "tip_radius": tip,
+        "min_section_thickness": min(thick),
+        "min_trailing_edge": float(
+            min(np.linalg.norm(c[0] - c[-1]) if curves.shape[1] % 2 else 0.0 for c in curves[1:])
+        ),  # noqa: E501
+    }
     return mesh, checks
 
 

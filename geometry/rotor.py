@@ -114,23 +114,6 @@ class Rotor:
         st = self.blade.midpoints(400)
         return float(self.B * np.sum(st.chord * st.dr)) / self.disk_area
 
-    @property
-    def annulus_solidity(self) -> float:
-        """Blade area over swept annulus area, the figure of a fan [-]."""
-        return self.solidity * self.disk_area / self.annulus_area
-
-    @property
-    def thrust_solidity(self) -> float:
-        """Thrust-weighted solidity, 3 times the integral of (B c / pi R) x^2 over x = r/R from hub to tip [-].
-
-        Notes
-        -----
-        Equals B c / (pi R) for a constant chord that starts on the axis (Johnson, Helicopter Theory, 1980, chapter 2;
-        not checked against the book).
-        """
-        st = self.blade.midpoints(400)
-        return float(3 * self.B * np.sum(st.chord * st.r**2 * st.dr)) / (math.pi * self.R**4)
-
     def with_pitch_offset(self, dbeta: float) -> Rotor:
         """Return the rotor with all blades turned by `dbeta` [rad]."""
         return replace(self, blade=self.blade.with_pitch_offset(dbeta))

@@ -177,8 +177,10 @@ def pick(points: Array, faces: Faces) -> tuple[Faces, int, float, Array, Array, 
         for k in range(min(3, len(large) - 1)):
             rest = np.concatenate(large[k + 1 :])
             options.append((rest, f"the {k + 1} largest of the file's bodies (a duct or stator?) were left out"))
-        options += [(group, "equal bodies of the file were taken for the blades, the others left out")
-                    for group in _alike(points, large)]  # fmt: skip
+        options += [
+            (group, "equal bodies of the file were taken for the blades, the others left out")
+            for group in _alike(points, large)
+        ]
         options += [(p, "the other bodies of the file (a duct or stator?) were left out") for p in large]
     best: tuple[float, int, Array, Array] | None = None
     chosen, note = faces, ""

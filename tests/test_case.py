@@ -86,8 +86,9 @@ def test_no_value_that_the_source_does_not_give_is_left_undeclared() -> None:
     for path in find_cases([CASES]):
         case = load_case(path)
         declared = {a.key for a in case.assumptions}
-        numbers = {f"{t}.{k}" for t in ("rotor", "blade") for k, v in case.written[t].items()
-                   if isinstance(v, (int, float))}  # fmt: skip
+        numbers = {
+            f"{t}.{k}" for t in ("rotor", "blade") for k, v in case.written[t].items() if isinstance(v, (int, float))
+        }
         numbers |= {f"blade.section.{k}" for k in ("camber", "thickness")}
         numbers |= {f"duct.{k}" for k, v in case.written.get("duct", {}).items() if isinstance(v, (int, float))}
         given_here = given if case.kind == "propeller" else {"rotor.hub_diameter_mm", "duct.length_mm"}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import shutil
@@ -76,9 +77,12 @@ def test_a_bare_call_shows_the_commands_in_groups(capsys: pytest.CaptureFixture[
 
 @pytest.mark.parametrize(
     ("arguments", "meant"),
-    [(["swep", "cases"], "Did you mean sweep?"), (["sweep", "cases", "--tolerence", "3"], "Did you mean --tolerance?"),
-     (["export", "cases", "--out", "x", "--format", "stp"], "Did you mean")],
-)  # fmt: skip
+    [
+        (["swep", "cases"], "Did you mean sweep?"),
+        (["sweep", "cases", "--tolerence", "3"], "Did you mean --tolerance?"),
+        (["export", "cases", "--out", "x", "--format", "stp"], "Did you mean"),
+    ],
+)
 def test_what_was_meant_is_guessed_and_said_but_not_done(
     arguments: list[str], meant: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -198,7 +202,7 @@ def test_polar_option_is_a_reynolds_number() -> None:
         (ZeroDivisionError("boom"), 3, "internal error"),
         (KeyboardInterrupt(), 130, "interrupted"),
     ],
-)  # fmt: skip
+)
 def test_exit_code_follows_the_outcome(
     outcome: object, code: int, words: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -246,9 +250,12 @@ def test_folder_of_results_that_is_a_file_is_2(tmp_path: Path) -> None:
 )  # fmt: skip
 @pytest.mark.parametrize("below", ["", "/deeper/still"])
 def test_a_file_for_a_folder_is_refused_before_any_work(
-    arguments: list[str], below: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+    below: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
+) -> None:
     begun: list[str] = []
     monkeypatch.setattr(f"bemt.commands.{arguments[0]}.run", lambda args: begun.append(args.command))
     file = tmp_path / "file"
@@ -287,3 +294,42 @@ def test_json_of_a_bad_case_is_still_a_document() -> None:
     assert document["cases"][0]["faults"] == [
         "number_is_nan.toml: operating.rpm: got nan; expected a number from 10 to 300000 rev/min."
     ]
+
+
+class Terminal(io.StringIO):
+    """A stream that somebody watches."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.mark.parametrize(
+    ("stream", "variables", "coloured"),
+    [
+        (Terminal, {}, True),
+        (Terminal, {"NO_COLOR": "1"}, False),
+        (Terminal, {"TERM": "dumb"}, False),
+        (io.StringIO, {}, False),
+    ],
+)
+def test_colour_is_for_terminals_and_verdicts(
+    stream: type[io.StringIO],
+    variables: dict[str, str],
+    coloured: bool,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for name in ("NO_COLOR", "TERM"):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in variables.items():
+        monkeypatch.setenv(name, value)
+    out, err = stream(), stream()
+    monkeypatch.setattr(sys, "stdout", out)
+    monkeypatch.setattr(sys, "stderr", err)
+    log = tmp_path / "l.csv"
+    log.write_text("rpm,thrust_N\n4000,-1.1\n6000,2.4\n8000,4.3\n9000,5.4\n")
+    assert cli.main(["import", str(log)]) == 0 and cli.main(["sweep", str(tmp_path / "none")]) == 2
+    assert (sys.stdout, sys.stderr) == (out, err)
+    for text in (out.getvalue(), err.getvalue()):
+        assert ("\x1b[3" in text) is coloured
+    assert "\x1b[31m  ! error:\x1b[0m" in out.getvalue() or not coloured

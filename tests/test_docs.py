@@ -26,6 +26,7 @@ from types import ModuleType
 import pytest
 
 import bemt
+from bemt.case.load import case_of
 
 PACKAGES = ("bemt", "geometry")
 # What users call and plug-ins implement: here every parameter is documented. Elsewhere one line will do, and what a
@@ -323,6 +324,30 @@ def test_the_diagnosis_page_says_what_the_code_does(project: Path, maker: Module
         assert told == {ast.literal_eval(key) for key in returned.keys} | more
 
 
+def test_the_page_of_files_holds_every_key(project: Path, maker: ModuleType) -> None:
+    """By heading: key, unit, default and range; wording may differ."""
+
+    def keys(text: str) -> dict[str, set[tuple[str, ...]]]:
+        found: dict[str, set[tuple[str, ...]]] = {}
+        file = ""
+        for line in text.splitlines():
+            if line.startswith("#"):
+                file, head = (line[3:], "") if line.startswith("## ") else (file, line)
+            elif line.startswith("| `"):
+                cells = re.split(r"(?<!\\)\|", line)
+                found.setdefault(f"{file} {head}", set()).add(tuple(cells[k].strip() for k in (1, 3, 4, 5)))
+        return found
+
+    written = keys((project / "docs" / "reference_files.md").read_text(encoding="utf-8"))
+    assert written == keys(maker.files()), "run python docs/make.py"
+    assert sum(map(len, written.values())) > 150
+
+
+def test_the_shortest_case_has_six_lines(project: Path) -> None:
+    text = (project / "docs" / "files" / "case.toml").read_text(encoding="utf-8")
+    assert len(text.splitlines()) == 6 and case_of(text).assumptions
+
+
 def test_the_gallery_shows_the_shipped_cases(project: Path, maker: ModuleType) -> None:
     text = (project / "docs" / "gallery.md").read_text(encoding="utf-8")
     made = maker.gallery(maker.shipped())
@@ -408,8 +433,14 @@ def test_every_imported_library_is_declared(project: Path) -> None:
             names += [node.module or ""] if isinstance(node, ast.ImportFrom) and not node.level else []
             found |= {name.split(".")[0].lower() for name in names}
     # what comes with a declared library, and has no version of its own to ask for
-    comes_with = {"ocp": "cadquery", "distributed": "dask", "pil": "matplotlib", "psutil": "dask", "requests": "pooch",
-                  "pydantic_core": "pydantic"}
+    comes_with = {
+        "ocp": "cadquery",
+        "distributed": "dask",
+        "pil": "matplotlib",
+        "psutil": "dask",
+        "requests": "pooch",
+        "pydantic_core": "pydantic",
+    }
     assert set(comes_with.values()) <= declared
     ours = {"bemt", "geometry", "conftest", "tests", "__future__", *(p.stem for p in (project / "tests").glob("*.py"))}
     assert found - {n.lower() for n in sys.stdlib_module_names} - ours - set(comes_with) <= declared

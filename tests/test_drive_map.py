@@ -27,8 +27,13 @@ def made(pulse: np.ndarray, volts: np.ndarray | float = 12.0, noise: float = 0.0
     share = np.clip((pulse - 1080.0) / 920.0, 0.0, None)
     rng = np.random.default_rng(seed)
     thrust = 20.0 * share**1.7 * (volts / 12.0) ** 2 + noise * rng.standard_normal(len(pulse))
-    values = {"thrust": thrust, "rpm": 9000.0 * share**0.85 * volts / 12.0, "current": 30.0 * share**2.4,
-              "power": 30.0 * share**2.4 * volts, "voltage": volts}  # fmt: skip
+    values = {
+        "thrust": thrust,
+        "rpm": 9000.0 * share**0.85 * volts / 12.0,
+        "current": 30.0 * share**2.4,
+        "power": 30.0 * share**2.4 * volts,
+        "voltage": volts,
+    }
     return MapPoints(pulse, values, np.ones(len(pulse)), np.zeros(len(pulse), dtype=np.intp))
 
 
@@ -119,8 +124,10 @@ def log(tmp_path: Path, sign: int = 1, extra: str = "") -> Path:
         p = made(np.array([pulse]))
         for _ in range(20):
             t += 0.1
-            rows.append(f"{t:.2f},{pulse:.0f},{sign * p.values['thrust'][0]:.4f},12.0,{p.values['current'][0]:.3f},"
-                        f"{p.values['rpm'][0]:.0f}")  # fmt: skip
+            rows.append(
+                f"{t:.2f},{pulse:.0f},{sign * p.values['thrust'][0]:.4f},12.0,{p.values['current'][0]:.3f},"
+                f"{p.values['rpm'][0]:.0f}"
+            )
     path = tmp_path / "log.csv"
     path.write_text("\n".join(rows) + "\n" + extra)
     return path
@@ -148,8 +155,10 @@ def test_the_c_header_compiles_and_gives_the_map(tmp_path: Path, batteries: int)
     (tmp_path / "map.h").write_text(map_export.c_header(chart, "2 fans", 101))
     volts = chart.voltage_ref if batteries == 2 else None
     arg = f", {volts}f" if volts else ""
-    calls = "".join(f'printf("%.4f %.4f\\n", m_2_fans_pulse({t}.0f{arg}), m_2_fans_thrust({p}.0f{arg}));'
-                    for t, p in ((1, 1200), (5, 1500), (15, 1900), (1000, 2500)))  # fmt: skip
+    calls = "".join(
+        f'printf("%.4f %.4f\\n", m_2_fans_pulse({t}.0f{arg}), m_2_fans_thrust({p}.0f{arg}));'
+        for t, p in ((1, 1200), (5, 1500), (15, 1900), (1000, 2500))
+    )
     program = f'#include <stdio.h>\n#include "map.h"\nint main(void) {{ {calls} return 0; }}\n'
     (tmp_path / "a.c").write_text(program)
     flags = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-Wno-unused-const-variable"]
@@ -172,25 +181,30 @@ def test_bad_recordings_are_refused_with_the_reason(tmp_path: Path, capsys: pyte
 
 # Where a recording repeats itself worse than 1 %, no map can hold 1 %: reports/drive/README.md lists all of them.
 REAL = [
-    ("thrust_map/xNova-SR-steps.csv", -1, 0.010), ("rcbenchmark/a1_7.csv", 1, 0.010),
+    ("thrust_map/xNova-SR-steps.csv", -1, 0.010),
+    ("rcbenchmark/a1_7.csv", 1, 0.010),
     ("rcbenchmark/a4_7.csv", 1, 0.010),
     ("jmajew/grp01__mn2206_gemfanbull6045_3s_table1.csv", 1, 0.010),
-    ("jmajew/grp01__f1507_t3140_4s_table1.csv", 1, 0.010), ("jmajew/grp01__mn2206_hqprop6x4x3_3s_table1.csv", 1, 0.010),
-]  # fmt: skip
+    ("jmajew/grp01__f1507_t3140_4s_table1.csv", 1, 0.010),
+    ("jmajew/grp01__mn2206_hqprop6x4x3_3s_table1.csv", 1, 0.010),
+]
 
 
 @pytest.mark.parametrize(("file", "sign", "worst"), REAL)
 def test_round_trip_on_held_out_plateaus_of_real_recordings(
     shared_data: Path, file: str, sign: int, worst: float
-) -> None:  # fmt: skip
+) -> None:
     trip = bench_map.held_out(points(importers.read(shared_data / file), file, sign))
     assert trip.worst <= worst and trip.rms <= 0.5 * worst + 0.001
 
 
 def test_where_a_round_trip_misses_the_readings_themselves_scatter(shared_data: Path) -> None:
     """Recordings that miss 1 %: with the speed of each level known, and so without ESC and battery, they still do."""
-    names = ["grp01__dualsky-eco2814c-v2_graupner-12x6_3s_table1", "grp01__f1507_hqprop76x8_4s_table4",
-             "grp01__mn2206_hqprop6x3-5_3s_table2"]  # fmt: skip
+    names = [
+        "grp01__dualsky-eco2814c-v2_graupner-12x6_3s_table1",
+        "grp01__f1507_hqprop76x8_4s_table4",
+        "grp01__mn2206_hqprop6x3-5_3s_table2",
+    ]
     files = [shared_data / "jmajew" / f"{name}.csv" for name in names]
     files += [shared_data / "rcbenchmark" / f"StepsTest_2020-{d}.csv" for d in ("05-23_154840", "06-16_212732")]
     for file in files:
@@ -223,19 +237,22 @@ def test_recordings_without_a_map_in_them_are_refused(shared_data: Path, capsys:
         assert "off any rising curve" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(("words", "message"), [
-    (("--thrust", "nan"), "--thrust: got nan; expected a finite number of 0 or more [N]."),
-    (("--thrust", "inf"), "--thrust: got inf"),
-    (("--thrust=-5",), "--thrust: got -5; expected a finite number of 0 or more [N]. --sign -1"),
-    (("--nodes", "1"), "--nodes: got 1; expected 2 or more"),
-    (("--name", "../evil"), "--name: got '../evil'"),
-    (("--name", ".."), "--name: got '..'"),
-    (("--name", ""), "--name: got ''"),
-    (("--name", "a\\b"), "--name: got"),
-    (("--voltage", "12"), "--voltage: got 12; expected none without --thrust"),
-    (("--thrust", "5", "--voltage", "-3"), "--voltage: got -3; expected a finite number above 0 [V]."),
-    (("--thrust", "5", "--voltage", "nan"), "--voltage: got nan"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--thrust", "nan"), "--thrust: got nan; expected a finite number of 0 or more [N]."),
+        (("--thrust", "inf"), "--thrust: got inf"),
+        (("--thrust=-5",), "--thrust: got -5; expected a finite number of 0 or more [N]. --sign -1"),
+        (("--nodes", "1"), "--nodes: got 1; expected 2 or more"),
+        (("--name", "../evil"), "--name: got '../evil'"),
+        (("--name", ".."), "--name: got '..'"),
+        (("--name", ""), "--name: got ''"),
+        (("--name", "a\\b"), "--name: got"),
+        (("--voltage", "12"), "--voltage: got 12; expected none without --thrust"),
+        (("--thrust", "5", "--voltage", "-3"), "--voltage: got -3; expected a finite number above 0 [V]."),
+        (("--thrust", "5", "--voltage", "nan"), "--voltage: got nan"),
+    ],
+)
 def test_bad_options_are_refused_and_nothing_is_written(
     tmp_path: Path, words: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

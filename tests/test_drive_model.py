@@ -24,10 +24,11 @@ PULSE = np.linspace(1050.0, 2000.0, 20)
 def drive(**changes: object) -> Drive:
     """Ordinary 4S drive of an 8 in propeller."""
     parts = {
-        "battery": Battery(4, 0.02, 2.2), "esc": Esc(resistance_ohm=0.005, idle_A=0.05),
+        "battery": Battery(4, 0.02, 2.2),
+        "esc": Esc(resistance_ohm=0.005, idle_A=0.05),
         "motor": Motor(1100.0, 0.06, 0.8, 1.2e-5, 25.0, 4.0),
         "rotor": rotor_table.from_coefficients(0.11, 0.0082, 0.2032, 1.225, 1.5e-5, 0.09),
-    }  # fmt: skip
+    }
     return Drive(**{**parts, **changes})  # type: ignore[arg-type]
 
 
@@ -87,8 +88,12 @@ def test_beyond_the_rotor_table_is_nan_and_flagged() -> None:
 def test_speed_without_load_rises_with_the_motor_time_constant() -> None:
     """J R / k^2: the textbook time constant of a motor without load."""
     J = 2e-5
-    free = drive(battery=Battery(4, 0.0, **FLAT), esc=Esc(), motor=Motor(1100.0, 0.06, 0.0, J),
-                 rotor=rotor_table.quadratic(0.0, 0.0, 0.2))  # fmt: skip
+    free = drive(
+        battery=Battery(4, 0.0, **FLAT),
+        esc=Esc(),
+        motor=Motor(1100.0, 0.06, 0.0, J),
+        rotor=rotor_table.quadratic(0.0, 0.0, 0.2),
+    )
     tau = J * 0.06 / float(free.motor.k()) ** 2
     t = np.linspace(0.0, 12.0 * tau, 6001)
     got = transient.simulate(free, [(0.0, 1200.0), (2.0 * tau, 1800.0)], t[-1], t)
@@ -98,8 +103,12 @@ def test_speed_without_load_rises_with_the_motor_time_constant() -> None:
 def test_a_rotor_without_brake_coasts_down_on_its_drag() -> None:
     """J dOmega/dt = -k_Q Omega^2: Omega_0 / (1 + k_Q Omega_0 t / J); any throttle brings the brake back."""
     kQ, J, t = 2e-8, 1e-5, np.linspace(0.0, 0.5, 501)
-    coasting = drive(battery=Battery(4, 0.0, **FLAT), esc=Esc(brake_on_stop=0.0), motor=Motor(1100.0, 0.06, 0.0, J),
-                     rotor=rotor_table.quadratic(1e-6, kQ, 0.2))  # fmt: skip
+    coasting = drive(
+        battery=Battery(4, 0.0, **FLAT),
+        esc=Esc(brake_on_stop=0.0),
+        motor=Motor(1100.0, 0.06, 0.0, J),
+        rotor=rotor_table.quadratic(1e-6, kQ, 0.2),
+    )
     stop = [(0.0, 1600.0), (0.1, 1000.0)]
     got = transient.simulate(coasting, stop, 0.5, t)
     start = got.rpm[0] * np.pi / 30.0
@@ -179,8 +188,10 @@ def test_hover_and_endurance() -> None:
 
 @pytest.mark.parametrize("ripple", [math.inf, 0.4])
 def test_a_planted_drive_is_found_from_its_thrust_map(ripple: float) -> None:
-    truth = drive(battery=Battery(1, 0.03, soc_table=(0.0, 1.0), ocv_V=(15.0, 15.0)),
-                  esc=Esc(1040.0, 1940.0, braking=math.isinf(ripple), ripple_ohm=ripple))  # fmt: skip
+    truth = drive(
+        battery=Battery(1, 0.03, soc_table=(0.0, 1.0), ocv_V=(15.0, 15.0)),
+        esc=Esc(1040.0, 1940.0, braking=math.isinf(ripple), ripple_ohm=ripple),
+    )
     s = truth.steady(PULSE)
     values = {"thrust": s.thrust_N, "rpm": s.rpm, "current": s.battery_A, "power": s.power_W, "voltage": s.voltage_V}
     points = MapPoints(PULSE, values, np.ones(20), np.zeros(20, dtype=np.intp))

@@ -71,8 +71,10 @@ def test_oscilloscope_files_of_three_kinds(tmp_path: Path) -> None:
     keysight = "x-axis,1\nsecond,Volt\n" + "".join(f"{a:.6e},{b:.6e}\n" for a, b in rows)
     plain = "Time (ms),CH1 (mV)\n" + "".join(f"{1e3 * a:.6f},{1e3 * b:.4f}\n" for a, b in rows)
     head = [("Record Length", "200"), ("Vertical Units", "V"), ("Horizontal Units", "s")]
-    tek = "".join(f"{head[i][0] if i < 3 else ''},{head[i][1] if i < 3 else ''},,{a:.6e},{b:.6e},\n"
-                  for i, (a, b) in enumerate(rows))  # fmt: skip
+    tek = "".join(
+        f"{head[i][0] if i < 3 else ''},{head[i][1] if i < 3 else ''},,{a:.6e},{b:.6e},\n"
+        for i, (a, b) in enumerate(rows)
+    )
     for name, text in (("k", keysight), ("p", plain), ("t", tek)):
         (tmp_path / name).write_text(text)
         got_t, got_v = motor_file.read_waveform(tmp_path / name)
@@ -99,9 +101,13 @@ def test_clean_trials_name_no_error(tmp_path: Path) -> None:
 
 
 PLANTED = [
-    ("back_emf.offset", 0.1), ("back_emf.offset", -0.2), ("torque.offset", 0.03), ("torque.offset", -0.02),
-    ("torque.shunt", 1.04), ("torque.shunt", 0.95),
-]  # fmt: skip
+    ("back_emf.offset", 0.1),
+    ("back_emf.offset", -0.2),
+    ("torque.offset", 0.03),
+    ("torque.offset", -0.02),
+    ("torque.shunt", 1.04),
+    ("torque.shunt", 0.95),
+]
 
 
 @pytest.mark.parametrize(("name", "size"), PLANTED)

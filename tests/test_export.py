@@ -122,6 +122,37 @@ def test_stations_of_an_export_make_a_case_that_solves(
     assert (tmp_path / "case" / "case.toml").read_bytes() == edited
 
 
+def test_a_scan_becomes_a_new_case_with_its_unknowns(
+    propeller: Rotor, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    export(propeller, None, tmp_path, ["stl"], name="found", unit="m", options=COARSE)
+    out = tmp_path / "new"
+    words = [
+        "new",
+        "mine",
+        "--scan",
+        str(tmp_path / "found.stl"),
+        "--rpm",
+        "7000",
+        "--airspeed",
+        "4",
+        "--out",
+        str(out),
+    ]
+    assert main(words) == 0
+    case = load_case(out)
+    assert (case.name, case.rpm, case.airspeed_m_s, case.file.blade.known_from) == ("mine", 7000.0, 4.0, "scan")
+    assert (case.rotor().B, case.diameter_m) == (3, pytest.approx(0.15, rel=1e-5))
+    assert {a.key for a in case.assumptions} == {"model.n_crit", "model.drag_level", "air.density_kg_m3"}
+    capsys.readouterr()
+    assert main(["sweep", str(out), "--json"]) == 0
+    row = json.loads(capsys.readouterr().out)["cases"][0]["rows"][0]
+    assert row["converged"] and row["u_input"] > 0 and row["u_model"] > 0
+    before = (out / "case.toml").read_bytes()
+    assert main(words) == 2
+    assert (out / "case.toml").read_bytes() == before
+
+
 def test_step_is_written_read_back_and_cut(propeller: Rotor, tmp_path: Path) -> None:
     try:
         import cadquery  # noqa: F401

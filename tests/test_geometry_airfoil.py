@@ -46,9 +46,14 @@ TABLE_23012 = """
 90.0 1.68 -1.23
 """
 SHAPES = {
-    "0012": naca("0012"), "4412": naca("4412"), "23012": naca("23012"), "23112": naca("23112"),
-    "closed": naca4(0.03, 0.45, 0.09, te_gap=0.0), "plate": plate(0.06, 0.03), "negative": naca4(-0.04, 0.4, 0.12),
-}  # fmt: skip
+    "0012": naca("0012"),
+    "4412": naca("4412"),
+    "23012": naca("23012"),
+    "23112": naca("23112"),
+    "closed": naca4(0.03, 0.45, 0.09, te_gap=0.0),
+    "plate": plate(0.06, 0.03),
+    "negative": naca4(-0.04, 0.4, 0.12),
+}
 shapes = pytest.mark.parametrize("section", SHAPES.values(), ids=SHAPES.keys())
 cambers = st.floats(-0.12, 0.12).map(lambda v: round(v, 4))
 positions = st.floats(0.2, 0.7)

@@ -29,17 +29,13 @@ def test_areas_of_the_ds30() -> None:
 
 
 def test_ratios() -> None:
-    assert DUCT.length_ratio == pytest.approx(0.060 / 0.0698)
-    assert DUCT.lip_ratio == pytest.approx(0.003 / 0.0698)
-    assert DUCT.gap_over_R(ROTOR) == pytest.approx(0.4 / 34.5)
     assert DUCT.gap_over_span(ROTOR) == pytest.approx(0.4 / (34.5 - 12.7))
 
 
 @pytest.mark.parametrize("gap", [0.0, 0.0004, 0.002])
 def test_a_straight_duct_passes_what_it_takes_in(gap: float) -> None:
     duct = around(ROTOR, 0.06, gap, exit_hub_radius=ROTOR.Rhub)
-    assert duct.passage_ratio(ROTOR) == pytest.approx(1.0, rel=1e-14)
-    assert duct.diffuser_angle == 0.0
+    assert duct.exit_area == pytest.approx(duct.passage_area(ROTOR), rel=1e-14)
     assert (duct.area_ratio(ROTOR) == pytest.approx(1.0, rel=1e-14)) == (gap == 0.0)  # the gap belongs to the passage
     np.testing.assert_allclose(duct.inner(np.linspace(0, 0.06, 20)), ROTOR.R + gap, rtol=1e-14)
 
@@ -48,9 +44,14 @@ ducts = st.builds(
     lambda k, length, lip, cone, te, x, aspect: Duct(
         k, length * k, lip * k, 0.01 * k, cone * k, 0.1 * k, x * length * k, lip_aspect=aspect, te_thickness=te * k
     ),
-    st.floats(0.01, 2), st.floats(0.6, 5), st.just(0.0) | st.floats(0.005, 0.25), st.floats(0.5, 1.6),
-    st.floats(0.001, 0.2), st.floats(0.1, 0.9), st.floats(0.3, 2.0),
-)  # fmt: skip
+    st.floats(0.01, 2),
+    st.floats(0.6, 5),
+    st.just(0.0) | st.floats(0.005, 0.25),
+    st.floats(0.5, 1.6),
+    st.floats(0.001, 0.2),
+    st.floats(0.1, 0.9),
+    st.floats(0.3, 2.0),
+)
 
 
 @settings(max_examples=100, deadline=None)
@@ -78,26 +79,22 @@ def test_walls(duct: Duct) -> None:
         along = (duct.lip_length - x[lip]) / duct.lip_length
         across = (duct.inner_radius + duct.lip_radius - inner[lip, 1]) / duct.lip_radius
         np.testing.assert_allclose(along**2 + across**2, 1.0, rtol=1e-6)
-    assert math.copysign(1, duct.diffuser_angle) == math.copysign(1, duct.exit_radius - duct.inner_radius)  # type: ignore[operator]
 
 
 @pytest.mark.parametrize("k", [0.1, 3.0])
 def test_scaling_is_a_similarity(k: float) -> None:
     big, rotor = DUCT.scaled(k), ROTOR.scaled(k)
     big.check(rotor)
-    for ratio in ("area_ratio", "passage_ratio", "gap_over_R", "gap_over_span"):
+    for ratio in ("area_ratio", "gap_over_span"):
         assert getattr(big, ratio)(rotor) == pytest.approx(getattr(DUCT, ratio)(ROTOR), rel=1e-12)
-    assert (big.length_ratio, big.lip_ratio) == pytest.approx((DUCT.length_ratio, DUCT.lip_ratio), rel=1e-12)
-    assert big.diffuser_angle == pytest.approx(DUCT.diffuser_angle, rel=1e-12)
     for a, b in zip(DUCT.profile(), big.profile(), strict=True):
         np.testing.assert_allclose(b, k * a, rtol=1e-9)
     assert big.stator == Stator(5, 0.02 * k, 0.035 * k)
     np.testing.assert_allclose(big.stator.sigma(0.025 * k), DUCT.stator.sigma(0.025), rtol=1e-12)  # type: ignore[union-attr]
 
 
-def test_diffuser_angle_in_closed_form() -> None:
+def test_a_diffuser_is_straight() -> None:
     duct = Duct(0.1, 0.3, 0.01, 0.001, exit_radius=0.12, rotor_x=0.1, diffuser_x=0.1)
-    assert math.tan(duct.diffuser_angle) == pytest.approx(0.02 / 0.2)
     assert float(duct.inner(0.2)) == pytest.approx(0.11)
 
 

@@ -29,8 +29,10 @@ def random_rotor(rng: np.random.Generator) -> tuple[Rotor, Duct | None]:
     blades_, diameter, ducted = int(rng.integers(2, 13)), float(rng.uniform(0.05, 0.6)), bool(rng.random() < 0.4)
     hub = float(rng.uniform(0.25, 0.5) if ducted else rng.uniform(0.12, 0.3))
     law = str(rng.choice(["apc_like", "elliptic", "constant", "linear_taper", "fan"]))
-    sections = [(x, naca4(float(rng.uniform(0, 0.07)), float(rng.uniform(0.3, 0.5)), float(rng.uniform(t, t + 0.08))))
-                for x, t in ((0.0, 0.09), (1.0, 0.05))]  # fmt: skip
+    sections = [
+        (x, naca4(float(rng.uniform(0, 0.07)), float(rng.uniform(0.3, 0.5)), float(rng.uniform(t, t + 0.08))))
+        for x, t in ((0.0, 0.09), (1.0, 0.05))
+    ]
     blade = from_laws(diameter, law, "helix", max(hub, 0.22) if blades_ > 6 else hub, anchors=sections,
                       chord={"max_chord": float(rng.uniform(0.08, 0.45))},
                       pitch={"pitch": float(rng.uniform(0.3, 1.5)) * diameter})  # fmt: skip
@@ -38,9 +40,14 @@ def random_rotor(rng: np.random.Generator) -> tuple[Rotor, Duct | None]:
     if not ducted:
         return rotor, None
     stator = Stator(int(rng.integers(3, 8)), 0.12 * diameter) if rng.random() < 0.5 else None
-    duct = around(rotor, float(rng.uniform(0.4, 1.0)) * diameter, float(rng.uniform(0.003, 0.03)) * rotor.R,
-                  float(rng.uniform(0.01, 0.08)) * rotor.R, exit_area_ratio=float(rng.uniform(0.8, 1.2)),
-                  stator=stator)  # fmt: skip
+    duct = around(
+        rotor,
+        float(rng.uniform(0.4, 1.0)) * diameter,
+        float(rng.uniform(0.003, 0.03)) * rotor.R,
+        float(rng.uniform(0.01, 0.08)) * rotor.R,
+        exit_area_ratio=float(rng.uniform(0.8, 1.2)),
+        stator=stator,
+    )
     return rotor, duct
 
 
@@ -60,8 +67,10 @@ def errors(found: FoundRotor, rotor: Rotor, scale: float) -> tuple[float, float]
     inside = (x > 0.25) & (x < 0.95)
     assert inside.sum() >= 10
     chord, beta = rotor.blade.at(found.r / scale)
-    return (float(np.abs(found.chord / scale / chord - 1)[inside].max()),
-            float(np.degrees(np.abs(found.beta - beta))[inside].max()))  # fmt: skip
+    return (
+        float(np.abs(found.chord / scale / chord - 1)[inside].max()),
+        float(np.degrees(np.abs(found.beta - beta))[inside].max()),
+    )
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -174,8 +183,9 @@ def test_a_fillet_adds_its_own_volume_at_the_root_only() -> None:
 
 
 def fan(chord: float = 0.3, blades_: int = 8, hub: float = 0.37) -> Rotor:
-    blade = from_laws(0.069, "fan", "helix", hub, chord={"max_chord": chord}, pitch={"pitch": 0.1},
-                      anchors=naca4(0.05, 0.45, 0.09))  # fmt: skip
+    blade = from_laws(
+        0.069, "fan", "helix", hub, chord={"max_chord": chord}, pitch={"pitch": 0.1}, anchors=naca4(0.05, 0.45, 0.09)
+    )
     return Rotor(blade, blades_)
 
 
@@ -187,12 +197,14 @@ def fan(chord: float = 0.3, blades_: int = 8, hub: float = 0.37) -> Rotor:
         (lambda: build(fan(1.2, 30)), "run into each other"),
         (lambda: build(fan(), options=Options(min_thickness=0.005)), "thickness: got 0.8"),
         (lambda: build(fan(), around(fan(), 0.06, 0.0)), "duct.gap"),
-        (lambda: build(fan(), Duct(0.0349, 0.06, 0.004, 0.0004, exit_radius=0.03, rotor_x=0.02, diffuser_x=0.018)),
-         "duct.gap"),
+        (
+            lambda: build(fan(), Duct(0.0349, 0.06, 0.004, 0.0004, exit_radius=0.03, rotor_x=0.02, diffuser_x=0.018)),
+            "duct.gap",
+        ),
         (lambda: build(fan(), around(fan(), 0.06, 0.0004, stator=Stator(5, 0.055))), "stator"),
         (lambda: build(fan(), around(fan(), 0.06, 0.0004, rotor_x=0.0)), "blade tips outside the duct"),
     ],
-)  # fmt: skip
+)
 def test_what_makes_no_solid_is_refused_with_the_reason(make: object, reason: str) -> None:
     with pytest.raises(GeometryError, match=reason):
         make()  # type: ignore[operator]

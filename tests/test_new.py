@@ -45,15 +45,59 @@ def test_a_new_folder_runs_at_once(words: list[str], name: str, capsys: pytest.C
         assert found["assumed"] and found["steady"]["thrust_N"][-1] > 1.0
 
 
+SIX = """schema = "bemt.case/1"
+name = "prop_10x5"
+rotor.blades = 2
+rotor.diameter_in = 10
+blade.pitch_in = 5
+operating.rpm = 6000
+"""
+
+
+def test_six_lines_are_the_case_that_new_writes(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (here / "case.toml").write_text(SIX)
+    short = load_case("case.toml")
+    assert main(["new", "10x5", "--rpm", "6000"]) == 0
+    written = load_case("prop_10x5")
+    tables = ("rotor", "blade", "operating", "air", "model")
+    assert [getattr(short.file, t) for t in tables] == [getattr(written.file, t) for t in tables]
+    assert {a.key: a for a in short.assumptions} == {a.key: a for a in written.assumptions}
+    capsys.readouterr()
+    assert main(["sweep", "case.toml", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)["cases"][0]["assumptions"]
+    assert {"rotor.hub_ratio", "blade.max_chord_over_R", "air.density_kg_m3"} <= {a["key"] for a in told}
+    assert all(a["u_thrust_N"] > 0 and a["why"] for a in told)
+
+
+def test_what_a_short_case_states_is_no_assumption(here: Path) -> None:
+    text = SIX + 'rotor.hub_diameter_mm = 30\nair.altitude_m = 500\nblade.section.naca = "4412"\n'
+    text += '[[assumptions]]\nkey = "blade.max_chord_over_R"\nlow = 0.19\nhigh = 0.20\nwhy = "measured"\n'
+    (here / "case.toml").write_text(text)
+    case = load_case("case.toml")
+    assert case.hub_diameter_m == 0.03 and case.air().rho < 1.18
+    assert case.file.blade.max_chord_over_R == pytest.approx(0.195)  # the middle of the range that the user gives
+    assert {a.key: a.values for a in case.assumptions} == {
+        "blade.max_chord_over_R": (0.19, 0.20),
+        "blade.beta_offset_deg": (0.0, 1.4),
+    }
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["10by5"], "LABEL"), ([], "LABEL, --stations"), (["10x5", "--kv", "900"], "--cells together"),
+        (["10by5"], "LABEL"),
+        ([], "LABEL, --stations"),
+        (["10x5", "--kv", "900"], "--cells together"),
         (["--stations", "blade.csv"], "--diameter-mm"),
         (["--stations", "absent.csv", "--diameter-mm", "254"], "absent"),
-        (["--stations", "blade.csv", "--diameter-mm", "0.254"], "Times 1000"), (["seventy", "--fan"], "70mm"),
+        (["--stations", "blade.csv", "--diameter-mm", "0.254"], "Times 1000"),
+        (["seventy", "--fan"], "70mm"),
+        (["mine", "--scan", "absent.stl"], "absent.stl"),
+        (["mine", "--scan", "blade.csv"], "a solid"),
+        (["10x5", "--unit", "mm"], "--scan"),
+        (["mine", "--scan", "a.stl", "--blades", "2"], "--blades"),
     ],
-)  # fmt: skip
+)
 def test_what_is_no_propeller_is_refused_and_nothing_is_written(
     words: list[str], said: str, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -75,9 +75,12 @@ def test_derived_quantities_of_a_known_curve() -> None:
 def test_bad_tables_are_refused() -> None:
     good = P.linear_polar()
     bad = {
-        "cd": good.cd * 0.0, "cl": np.where(good.alpha[:, None, None] > 3.1, 1.0, good.cl), "alpha": good.alpha[::-1],
-        "Re": good.Re[:3], "confidence": np.zeros(3),
-    }  # fmt: skip
+        "cd": good.cd * 0.0,
+        "cl": np.where(good.alpha[:, None, None] > 3.1, 1.0, good.cl),
+        "alpha": good.alpha[::-1],
+        "Re": good.Re[:3],
+        "confidence": np.zeros(3),
+    }
     for field, value in bad.items():
         parts = {f: getattr(good, f) for f in ("alpha", "Re", "M", "cl", "cd")} | {field: value}
         with pytest.raises(ValueError, match="expected"):

@@ -14,9 +14,13 @@ from bemt.sections.polars import ALPHA_GRID, DEFAULT_RE, Polar
 from geometry.airfoil import Airfoil, naca, naca4
 
 SECTIONS = {
-    "0012": naca("0012"), "4412": naca("4412"), "2415": naca("2415"), "thin": naca4(0.04, 0.4, 0.06),
-    "sharp": naca4(0.06, 0.4, 0.04), "23015": naca("23015"),
-}  # fmt: skip
+    "0012": naca("0012"),
+    "4412": naca("4412"),
+    "2415": naca("2415"),
+    "thin": naca4(0.04, 0.4, 0.06),
+    "sharp": naca4(0.06, 0.4, 0.04),
+    "23015": naca("23015"),
+}
 pytestmark = pytest.mark.usefixtures("own_cache")
 
 

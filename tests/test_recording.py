@@ -160,10 +160,12 @@ def test_each_fault_has_its_place(old: str, new: str, where: str, put: Put) -> N
 @pytest.mark.parametrize(
     ("air", "density"),
     [
-        ("density_kg_m3 = 1.19", 1.19), ("altitude_m = 0.0", 1.225), ("altitude_m = 0.0\ntemperature_C = 30.0", 1.1644),
+        ("density_kg_m3 = 1.19", 1.19),
+        ("altitude_m = 0.0", 1.225),
+        ("altitude_m = 0.0\ntemperature_C = 30.0", 1.1644),
         ("pressure_hPa = 1013.25\ntemperature_C = 15.0", 1.2250),
     ],
-)  # fmt: skip
+)
 def test_every_air_state_gives_a_density(air: str, density: float, put: Put) -> None:
     start = GOOD.index("[air]")
     text = GOOD[:start] + "[air]\n" + air + "\n" + GOOD[GOOD.index("[stand]") :]

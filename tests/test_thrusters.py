@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from bemt.base.errors import InputError
@@ -56,13 +56,12 @@ def test_canted_and_lifted_thrusters() -> None:
 
 
 finite = st.floats(-1.0, 1.0)
-bodies = st.lists(
-    st.tuples(finite, st.floats(0.5, 50.0), st.floats(-0.9, 0.4)), min_size=1, max_size=5
-)  # fmt: skip
+bodies = st.lists(st.tuples(finite, st.floats(0.5, 50.0), st.floats(-0.9, 0.4)), min_size=1, max_size=5)
 
 
 @settings(max_examples=60, deadline=None)
 @given(bodies, st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.sampled_from(["moment", "force"]))
+@example([(3.6e-20, 1.0, 0.0)], 0.0, 0.0, "moment")  # an arm that is rounding
 def test_any_body_stays_within_its_limits_and_meets_what_is_attainable(
     body: list[tuple[float, float, float]], f: float, m: float, priority: str
 ) -> None:
@@ -72,8 +71,11 @@ def test_any_body_stays_within_its_limits_and_meets_what_is_attainable(
     got = allocate(group, f * 50.0, m * 20.0, priority)
     assert all(t.thrust_min_N - 1e-9 <= v <= t.thrust_max_N + 1e-9 for t, v in zip(group, got.thrust_N, strict=True))
     assert np.allclose(effectiveness(group) @ got.thrust_N, [got.force_N, got.moment_Nm], atol=1e-9)
-    row, low, high = (1, corners[:, 1].min(), corners[:, 1].max()) if priority == "moment" else (
-        0, corners[:, 0].min(), corners[:, 0].max())  # fmt: skip
+    row, low, high = (
+        (1, corners[:, 1].min(), corners[:, 1].max())
+        if priority == "moment"
+        else (0, corners[:, 0].min(), corners[:, 0].max())
+    )
     nearest = np.clip((f * 50.0, m * 20.0)[row], low, high)
     assert (got.force_N, got.moment_Nm)[row] == pytest.approx(nearest, abs=2e-5 * max(1.0, high - low))
     # what thrusts give is met when asked for

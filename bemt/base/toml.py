@@ -1,9 +1,9 @@
 """TOML documents as typed models: types, units, ranges, suspicious values, all faults at once.
 
-A file is a :class:`Table` (a pydantic model) whose fields say in a :class:`Key` what they may hold; :func:`validated`
-gives the model or every fault. Units live in the key names (``diameter_in``); a suspicious value (127 in a key that
-ends in ``_in``) is refused with a hint, never converted. Files that are no cases use tables of Keys
-(:func:`check_table`).
+A file is a :class:`Table` (a pydantic model); each field states its meaning, unit and range by :func:`entry`.
+:func:`read_model` gives the model of a file, or every fault as ``file: dotted.key: got X; expected Y. Hint.``
+Units live in the key names (``diameter_in``); a suspicious value (127 in a key that ends in ``_in``) is refused with a
+hint, never converted.
 """
 
 from __future__ import annotations
@@ -12,91 +12,219 @@ import difflib
 import math
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, Self, TypeVar, Union, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
-from pydantic_core import PydanticCustomError
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    Strict,
+    StringConstraints,
+    ValidationError,
+    create_model,
+    model_validator,
+)
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticCustomError, core_schema
 
-from bemt.base.errors import Fault
+from bemt.base.errors import Fault, InputError
 
 __all__ = [
-    "AXIS",
-    "Collector",
-    "Key",
-    "Table",
-    "check_table",
-    "check_value",
-    "entry",
-    "load_toml",
-    "shown",
-    "validated",
-]
+    "Axis", "Collector", "Limits", "Span", "Table", "axis_values", "check_field", "entry", "expected", "limits_of",
+    "load_toml", "read_model", "shown", "validated",
+]  # fmt: skip
 
 AXIS = "a list of distinct numbers, or {start, stop, num}"
 _UNIT_TAIL = re.compile(r"_(in|mm|cm|m|m_s|kg_m3|hPa|C|pct|deg)$")
+_FAULTS = "bemt_faults"
+_NOT_EMPTY = StringConstraints(pattern=r"\S")
 
 
 @dataclass(frozen=True)
-class Key:
-    """What one key of a table may hold.
+class Limits:
+    """What the numbers or texts of a field may be; as metadata of the field it builds pydantic's own checks."""
 
-    Parameters
-    ----------
-    kind : str
-        ``number``, ``integer``, ``text``, ``choice``, ``file``, ``numbers`` (a list), ``scalar_or_list``, ``texts``,
-        ``text_or_texts``, ``list`` or ``axis`` (list or start/stop/num).
-    unit : str
-        Unit, for messages.
-    low, high : float
-        Closed range of a number, in the unit of the key.
-    required : bool
-        Whether the key must be there.
-    choices : tuple of str
-        Lawful texts of a ``choice``.
-    suspect : callable, optional
-        ``suspect(value) -> hint`` (empty when the value is plausible); called for numbers only.
-    """
-
-    kind: str = "number"
-    unit: str = ""
-    low: float = -math.inf
+    unit: str = ""  # for messages
+    low: float = -math.inf  # closed range of every number, in the unit of the key
     high: float = math.inf
-    required: bool = False
-    choices: tuple[str, ...] = ()
-    suspect: Callable[[float], str] | None = None
+    suspect: Callable[[Any], str] | None = None  # hint for a value that is not plausible, else empty
+    choices: tuple[str, ...] = ()  # lawful texts, where the annotation is not a Literal
+    words: str = ""  # what a value must be, where type and range do not say it
 
-    @property
-    def expected(self) -> str:
-        """What a value must be, in words."""
-        if self.kind == "choice":
-            return ("one of " if len(self.choices) > 1 else "") + ", ".join(self.choices)
-        plain = {
-            "text": "a text that is not empty", "file": "the name of a file beside the case", "axis": AXIS,
-            "texts": "a list of texts", "text_or_texts": "a text or a list of texts", "list": "a list",
-        }  # fmt: skip
-        if self.kind in plain:
-            return plain[self.kind]
-        noun = {"integer": "a whole number", "numbers": "a list of numbers"}.get(self.kind, "a number")
-        if self.kind == "scalar_or_list":
-            noun = "a number or a list of numbers"
-        if math.isfinite(self.low) and math.isfinite(self.high):
-            noun += f" from {self.low:g} to {self.high:g}"
-        elif math.isfinite(self.low):
-            noun += f" of {self.low:g} or more"
-        return noun + (f" {self.unit}" if self.unit else "")
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        """Check every number and text that an annotation holds."""
+        return handler.generate_schema(self._within(source))
+
+    def _within(self, kind: Any) -> Any:
+        origin, inner = get_origin(kind), get_args(kind)
+        if origin in (Union, UnionType):
+            made: Any = Union[tuple(self._within(part) for part in inner)]  # noqa: UP007
+            return Annotated[made, AfterValidator(self._axis)] if Span in inner else made
+        if origin is tuple and inner[0] in (float, int):
+            one: Any = self._within(inner[0])
+            return Annotated[tuple[one, ...], Field(min_length=1)]
+        if origin is tuple and inner[0] is str:
+            text: Any = self._within(str)
+            return tuple[text, ...]
+        if kind is str and self.choices:
+            return Literal[self.choices]
+        if kind in (float, int):
+            return Annotated[kind, _Number(self)]
+        return {str: Annotated[str, _NOT_EMPTY], bool: Annotated[bool, Strict()]}.get(kind, kind)
+
+    def _axis(self, value: Any) -> Any:
+        if isinstance(value, Span):
+            for end in ("start", "stop"):
+                number = getattr(value, end)
+                hint = self.suspect(number) if self.suspect else ""
+                if hint or not self.low <= number <= self.high:
+                    raise _refusal(f".{end}", shown(number), expected(float, self), hint)
+        elif value is not None and len(set(value)) < len(value):
+            raise _refusal("", "a list with repeated values", AXIS)
+        return value
+
+
+@dataclass(frozen=True)
+class _Number:
+    """A finite number within limits: no text, no truth value; 4.0 is a whole number."""
+
+    limits: Limits
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        low, high = ((None if math.isinf(v) else v) for v in (self.limits.low, self.limits.high))
+        if source is int:
+            made: Any = core_schema.int_schema(ge=low, le=high, strict=True)  # type: ignore[arg-type]
+            made = core_schema.no_info_before_validator_function(
+                lambda v: int(v) if isinstance(v, float) and v.is_integer() else v, made
+            )
+        else:
+            made = core_schema.float_schema(ge=low, le=high, strict=True, allow_inf_nan=False)
+        return core_schema.no_info_after_validator_function(self._plausible, made) if self.limits.suspect else made
+
+    def _plausible(self, value: float) -> float:
+        if self.limits.suspect and self.limits.suspect(value):
+            raise PydanticCustomError("suspect", "not plausible")
+        return value
+
+
+def entry(
+    meaning: str,
+    unit: str | Limits = "",
+    low: float = -math.inf,
+    high: float = math.inf,
+    suspect: Callable[[Any], str] | None = None,
+    *,
+    default: Any = None,
+    required: bool = False,
+    choices: Iterable[str] = (),
+    words: str = "",
+    alias: str | None = None,
+) -> Any:
+    """Declare one field of a :class:`Table`: what it means, its unit and range (or those of another), its default."""
+    made = Field(... if required else default, description=meaning, alias=alias)
+    made.metadata.append(unit if isinstance(unit, Limits) else Limits(unit, low, high, suspect, tuple(choices), words))
+    return made
+
+
+class Table(BaseModel):
+    """A TOML table with typed keys; frozen, unknown keys refused. Fields are declared by :func:`entry`."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    @model_validator(mode="after")
+    def _ruled(self) -> Self:
+        found = [(where and f".{where}", *rest, *[""] * (3 - len(rest))) for where, *rest in self.rules()]
+        if found:
+            raise PydanticCustomError(_FAULTS, "not as declared", {"faults": found})
+        return self
+
+    def rules(self) -> Iterable[tuple[str, ...]]:
+        """What joins several sound values: (where in this table, got, expected[, hint]) of each fault."""
+        return ()
+
+    @classmethod
+    def named(cls) -> dict[str, FieldInfo]:
+        """Fields by the names that a file uses."""
+        return {field.alias or name: field for name, field in cls.model_fields.items()}
+
+    @classmethod
+    def inner(cls, name: str) -> type[Table] | None:
+        """Model of a table inside this one, or of each of an array of tables; None for a plain value."""
+        return next((model for model in _models(cls.named()[name].annotation) if model is not Span), None)
+
+    def given(self) -> dict[str, Any]:
+        """What the file states of this table."""
+        return {name: getattr(self, name) for name in type(self).model_fields if name in self.model_fields_set}
+
+
+class Span(Table):
+    """{start, stop, num}: equal steps."""
+
+    start: float = entry("first value", required=True)
+    stop: float = entry("last value", required=True)
+    num: int = entry("how many", low=2, high=10_000_000, required=True)
+
+    def rules(self) -> Iterable[tuple[str, ...]]:
+        """Two ends."""
+        if self.start == self.stop:
+            yield "", "start equal to stop", "two different ends"
+
+
+Axis = tuple[float, ...] | Span | None
+
+
+def axis_values(axis: tuple[float, ...] | Span) -> NDArray[np.float64]:
+    """Values of an axis, (N,)."""
+    return np.linspace(axis.start, axis.stop, axis.num) if isinstance(axis, Span) else np.array(axis, dtype=float)
+
+
+def limits_of(field: FieldInfo) -> Limits:
+    """What the values of a field may be."""
+    return next((item for item in field.metadata if isinstance(item, Limits)), Limits())
+
+
+def expected(kind: Any, limits: Limits, name: str = "") -> str:
+    """What a value must be, in words.
+
+    Examples
+    --------
+    >>> expected(float | None, Limits("mm", 0, 5)), expected(Literal["a", "b"], Limits())
+    ('a number from 0 to 5 mm', 'one of a, b')
+    """
+    if limits.words:
+        return limits.words
+    parts = [part for part in _parts(kind) if part is not NoneType]
+    if Span in parts:
+        return AXIS
+    choices = limits.choices or (get_args(parts[0]) if get_origin(parts[0]) is Literal else ())
+    if choices:
+        return ("one of " if len(choices) > 1 else "") + ", ".join(choices)
+    lists = [get_args(part)[0] for part in parts if get_origin(part) is tuple]
+    first = next((part for part in parts if get_origin(part) is not tuple), None)
+    models = list(_models(kind))
+    if models:
+        return f"tables [[{name}]]" if lists else f"a table [{name}]"
+    one = {str: "a text", bool: "true or false", int: "a whole number", float: "a number"}.get(first or NoneType, "")
+    many = {str: "a list of texts", float: "a list of numbers"}.get(lists[0], "a list") if lists else ""
+    if first is str and not many:
+        return "a text that is not empty"
+    noun = " or ".join(word for word in (one, many) if word)
+    if math.isfinite(limits.low):
+        finite = math.isfinite(limits.high)
+        noun += f" from {limits.low:g} to {limits.high:g}" if finite else f" of {limits.low:g} or more"
+    return noun + (f" {limits.unit}" if limits.unit else "")
 
 
 class Collector:
-    """Gathers the faults of one file.
-
-    Parameters
-    ----------
-    file : str
-        Name that every fault starts with.
-    """
+    """Gathers the faults of one file."""
 
     def __init__(self, file: str) -> None:
         self.file = file
@@ -117,7 +245,7 @@ def shown(value: Any) -> str:
     """
     if isinstance(value, bool):
         return "true" if value else "false"
-    if isinstance(value, list):
+    if isinstance(value, (list, tuple)):
         return f"a list of {len(value)}"
     if isinstance(value, Mapping):
         return "a table"
@@ -130,153 +258,44 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
-def _slip_of_length(where: str, value: float, key: Key) -> str:
-    """Hint for a length in m or mm that would be possible in the other unit."""
-    if key.unit == "m" and where.endswith("_m") and key.low <= value / 1e3 <= key.high:
-        return f"In mm? Divide by 1000, or write {where.rpartition('.')[2].removesuffix('_m')}_mm"
-    if key.unit == "mm" and where.endswith("_mm") and key.low <= value * 1e3 <= key.high and value < 1.0:
+def _hint(where: str, value: Any, kind: Any, limits: Limits) -> str:
+    """How to repair a value that is not what its field holds."""
+    parts, name = _parts(kind), where.rpartition(".")[2]
+    if isinstance(value, str):
+        choices = limits.choices or next((get_args(k) for k in parts if get_origin(k) is Literal), ())
+        if choices:
+            return (limits.suspect(value) if limits.suspect else "") or _did_you_mean(value, choices)
+        return "Drop the quotes" if {int, float} & set(parts) and _quoted_number(value) else ""
+    if isinstance(value, Mapping) and next(_models(parts[0]), None) and get_origin(parts[0]) is tuple:
+        return f"Write [[{name}]] with two brackets"
+    if not _is_number(value) or not math.isfinite(value):
+        return ""
+    if Span in parts:
+        return f"Write [{shown(value)}]"
+    low, high = limits.low, limits.high
+    if limits.suspect and (hint := limits.suspect(float(value))):
+        return hint
+    if limits.unit == "m" and where.endswith("_m") and low <= value / 1e3 <= high:
+        return f"In mm? Divide by 1000, or write {name.removesuffix('_m')}_mm"
+    if limits.unit == "mm" and where.endswith("_mm") and low <= value * 1e3 <= high and value < 1.0:
         return "In m? Times 1000"
     return ""
 
 
-def _check_number(out: Collector, where: str, value: Any, key: Key) -> bool:
-    if not _is_number(value) or not math.isfinite(value):
-        out.add(where, shown(value), key.expected, "Drop the quotes" if _quoted_number(value) else "")
-        return False
-    if key.kind == "integer" and value != int(value):
-        out.add(where, shown(value), key.expected)
-        return False
-    hint = key.suspect(float(value)) if key.suspect else ""
-    if hint or not key.low <= value <= key.high:
-        out.add(where, shown(value), key.expected, hint or _slip_of_length(where, float(value), key))
-        return False
-    return True
+def _parts(kind: Any) -> tuple[Any, ...]:
+    return get_args(kind) if get_origin(kind) in (Union, UnionType) else (kind,)
 
 
-def _quoted_number(value: Any) -> bool:
+def _quoted_number(value: str) -> bool:
     try:
-        return isinstance(value, str) and math.isfinite(float(value))
+        return math.isfinite(float(value))
     except ValueError:
         return False
-
-
-def _check_axis(out: Collector, where: str, value: Any, key: Key) -> bool:
-    if isinstance(value, Mapping):
-        extra = sorted(set(value) - {"start", "stop", "num"})
-        lacking = [name for name in ("start", "stop", "num") if name not in value]
-        if extra or lacking:
-            got = f"{{{', '.join(value)}}}"
-            out.add(where, got, AXIS, f"Missing: {', '.join(lacking)}" if lacking else f"Drop {', '.join(extra)}")
-            return False
-        number = Key(unit=key.unit, low=key.low, high=key.high, suspect=key.suspect)
-        fine = [_check_number(out, f"{where}.{end}", value[end], number) for end in ("start", "stop")]
-        fine.append(_check_number(out, f"{where}.num", value["num"], Key("integer", low=2, high=1e7)))
-        if all(fine) and value["start"] == value["stop"]:
-            out.add(where, "start equal to stop", "two different ends")
-            return False
-        return all(fine)
-    if not isinstance(value, list) or not value:
-        out.add(where, shown(value), AXIS, f"Write [{shown(value)}]" if _is_number(value) else "")
-        return False
-    number = Key(unit=key.unit, low=key.low, high=key.high, suspect=key.suspect)
-    if not all([_check_number(out, f"{where}[{i}]", item, number) for i, item in enumerate(value)]):
-        return False
-    if len(set(value)) < len(value):
-        out.add(where, "a list with repeated values", AXIS)
-        return False
-    return True
-
-
-def check_value(out: Collector, where: str, value: Any, key: Key) -> bool:
-    """Check one value; add what is wrong to the collector.
-
-    Examples
-    --------
-    >>> out = Collector("case.toml")
-    >>> check_value(out, "rotor.blades", 2.5, Key("integer", low=1, high=64))
-    False
-    >>> print(out.faults[0])
-    case.toml: rotor.blades: got 2.5; expected a whole number from 1 to 64.
-    """
-    if key.kind in ("number", "integer"):
-        return _check_number(out, where, value, key)
-    if key.kind == "axis":
-        return _check_axis(out, where, value, key)
-    if key.kind == "scalar_or_list" and not isinstance(value, list):
-        return _check_number(out, where, value, key)
-    if key.kind in ("numbers", "scalar_or_list"):
-        if not isinstance(value, list) or not value:
-            out.add(where, shown(value), key.expected)
-            return False
-        number = Key(unit=key.unit, low=key.low, high=key.high, suspect=key.suspect)
-        return all([_check_number(out, f"{where}[{i}]", item, number) for i, item in enumerate(value)])
-    if key.kind == "list":
-        fine = isinstance(value, list)
-    elif key.kind == "texts" or (key.kind == "text_or_texts" and isinstance(value, list)):
-        fine = isinstance(value, list) and all(isinstance(item, str) and item for item in value)
-    elif key.kind == "choice":
-        fine = isinstance(value, str) and value in key.choices
-    else:
-        fine = isinstance(value, str) and bool(value.strip())
-    if not fine:
-        hint = _did_you_mean(value, key.choices) if key.kind == "choice" and isinstance(value, str) else ""
-        out.add(where, shown(value), key.expected, hint)
-    return fine
 
 
 def _did_you_mean(word: str, known: Iterable[str]) -> str:
     close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)
     return f"Did you mean {close[0]}?" if close else ""
-
-
-def _unknown_key_hint(name: str, table: str, keys: Mapping[str, Key], schema: Mapping[str, Mapping[str, Key]]) -> str:
-    stem = _UNIT_TAIL.sub("", name)
-    same = [key for key in keys if _UNIT_TAIL.sub("", key) == stem and key != stem]
-    if same:
-        return f"State the unit in the name: {' or '.join(same)}"
-    homes = [other for other, known in schema.items() if name in known and other != table]
-    if homes and not name.startswith("_"):
-        home = f"[{homes[0]}]" if homes[0] else "the top of the file"
-        return f"{name} belongs in {home}"
-    return _did_you_mean(name, keys)
-
-
-def check_table(
-    out: Collector,
-    table: str,
-    value: Any,
-    schema: Mapping[str, Mapping[str, Key]],
-    where: str | None = None,
-    subtables: Iterable[str] = (),
-    homes: Mapping[str, Mapping[str, Key]] | None = None,
-) -> None:
-    """Check one table against its schema: unknown keys, missing keys, each value.
-
-    Examples
-    --------
-    >>> out = Collector("case.toml")
-    >>> check_table(out, "rotor", {"blads": 2}, {"rotor": {"blades": Key("integer", low=1, high=64, required=True)}})
-    >>> for fault in out.faults: print(fault)
-    case.toml: rotor.blads: got an unknown key; expected one of blades. Did you mean blades?
-    case.toml: rotor.blades: got nothing; expected a whole number from 1 to 64.
-    """
-    keys = schema[table]
-    where = table if where is None else where
-    if not isinstance(value, Mapping):
-        out.add(where, shown(value), f"a table [{table}]")
-        return
-    prefix = f"{where}." if where else ""
-    names = [*keys, *subtables]
-    for name, item in value.items():
-        if name in keys:
-            check_value(out, prefix + name, item, keys[name])
-        elif name not in names:
-            hint = _unknown_key_hint(name, table, keys, homes if homes is not None else schema)
-            hint = hint or _did_you_mean(name, names)
-            out.add(prefix + name, "an unknown key", "one of " + ", ".join(names), hint)
-    for name, key in keys.items():
-        if key.required and name not in value:
-            out.add(prefix + name, "nothing", key.expected)
 
 
 def load_toml(path: str | Path, out: Collector) -> dict[str, Any] | None:
@@ -337,64 +356,9 @@ def _syntax_fault(message: str, text: str) -> tuple[str, str, str, str]:
     return f"{line}:{column}", what + (f" in `{source[:60]}`" if source else ""), "valid TOML 1.0", hint
 
 
-_FAULTS = "bemt_faults"
-
-
-def entry(
-    kind: str = "number",
-    unit: str = "",
-    low: float = -math.inf,
-    high: float = math.inf,
-    choices: tuple[str, ...] = (),
-    suspect: Callable[[float], str] | None = None,
-    default: Any = None,
-    required: bool = False,
-    key: Key | None = None,
-    alias: str | None = None,
-) -> Any:
-    """Declare one field of a :class:`Table`: a :class:`Key`, and its default (none when ``required``)."""
-    held = key or Key(kind, unit, low, high, required, choices, suspect)
-    extra: Any = {"key": held}
-    return Field(... if held.required else default, json_schema_extra=extra, alias=alias)
-
-
-class Table(BaseModel):
-    """A TOML table with typed keys; frozen, unknown keys refused. Fields are declared by :func:`entry`."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
-
-    @classmethod
-    def declared(cls, name: str) -> Key | None:
-        """What a key may hold; None for a table inside this one."""
-        extra: Any = cls.named()[name].json_schema_extra
-        return extra["key"] if extra else None
-
-    @classmethod
-    def named(cls) -> dict[str, Any]:
-        """Fields by the names that a file uses."""
-        return {field.alias or name: field for name, field in cls.model_fields.items()}
-
-    @field_validator("*", mode="before")
-    @classmethod
-    def _sound(cls, value: Any, info: ValidationInfo) -> Any:
-        name = cls.model_fields[str(info.field_name)].alias or str(info.field_name)
-        key, out = cls.declared(name), Collector("")
-        if key is not None:
-            check_value(out, "", value, key)
-        elif isinstance(value, list) and not _is_array(cls, name):
-            out.add("", shown(value), f"a table [{name}]")
-        elif not isinstance(value, (Mapping, BaseModel)) and not _is_array(cls, name):
-            out.add("", shown(value), f"a table [{name}]")
-        elif _is_array(cls, name) and not isinstance(value, (list, tuple)):
-            out.add("", shown(value), f"tables [[{name}]]", f"Write [[{name}]] with two brackets")
-        if out.faults:
-            found = [(f.where, f.got, f.expected, f.hint) for f in out.faults]
-            raise PydanticCustomError(_FAULTS, "not as declared", {"faults": found})
-        return tuple(value) if isinstance(value, list) else value
-
-
-def _is_array(model: type[Table], name: str) -> bool:
-    return str(model.named()[name].annotation).startswith("tuple[")
+def _refusal(where: str, got: str, expected: str, hint: str = "") -> PydanticCustomError:
+    """Error of a validator in our words; `where` is what follows the place of the value, such as ``.unit``."""
+    return PydanticCustomError(_FAULTS, "not as declared", {"faults": [(where, got, expected, hint)]})
 
 
 T = TypeVar("T", bound=Table)
@@ -406,7 +370,7 @@ def validated(model: type[T], document: Mapping[str, Any], out: Collector) -> T 
     Examples
     --------
     >>> class Rotor(Table):
-    ...     blades: int = entry("integer", low=1, high=64, required=True)
+    ...     blades: int = entry("number", low=1, high=64, required=True)
     >>> out = Collector("case.toml")
     >>> validated(Rotor, {"blads": 2}, out)
     >>> for fault in out.faults: print(fault)
@@ -416,16 +380,82 @@ def validated(model: type[T], document: Mapping[str, Any], out: Collector) -> T 
     try:
         return model.model_validate(document)
     except ValidationError as error:
-        found = [(_rank(document, e["loc"]), fault) for e in error.errors() for fault in _faults_of(model, e)]
-    for _, fault in sorted(found, key=lambda pair: pair[0]):
-        out.add(*fault)
+        found: dict[str, tuple[Any, tuple[str, str, str, str]]] = {}
+        for item in error.errors(include_url=False):
+            place = _Place(model, item["loc"], item["type"] == "extra_forbidden")
+            for fault in _faults_of(model, item, place):
+                found.setdefault(fault[0], (_rank(document, place.path), fault))
+    for where, (_, fault) in sorted(found.items(), key=lambda pair: pair[1][0]):
+        if not any(other.startswith((f"{where}.", f"{where}[")) for other in found):  # else a branch that was not meant
+            out.add(*fault)
     return None
 
 
-def _rank(document: Any, loc: tuple[int | str, ...]) -> tuple[int, ...]:
+def read_model(model: type[T], path: Path) -> T:
+    """Model of a TOML file; all its faults in one InputError."""
+    out = Collector(path.as_posix())
+    document = load_toml(path, out)
+    made = None if document is None else validated(model, document, out)
+    if made is None:
+        raise InputError(out.faults)
+    return made
+
+
+def check_field(out: Collector, where: str, model: type[Table], name: str, value: Any) -> bool:
+    """Check one value as the field of that name; add what is wrong to the collector.
+
+    Examples
+    --------
+    >>> class Rotor(Table):
+    ...     blades: int = entry("number", low=1, high=64, required=True)
+    >>> out = Collector("case.toml")
+    >>> check_field(out, "assumptions[0].low", Rotor, "blades", 2.5)
+    False
+    >>> print(out.faults[0])
+    case.toml: assumptions[0].low: got 2.5; expected a whole number from 1 to 64.
+    """
+    own = Collector(out.file)
+    validated(_alone(model, name), {name: value}, own)
+    for fault in own.faults:
+        out.add(where + fault.where.removeprefix(name), fault.got, fault.expected, fault.hint)
+    return not own.faults
+
+
+@cache
+def _alone(model: type[Table], name: str) -> type[Table]:
+    field = model.named()[name]
+    own = next(key for key, value in model.model_fields.items() if value is field)
+    alone: Any = create_model("Alone", __base__=Table, **{own: (field.annotation, field)})  # type: ignore[call-overload]
+    return alone  # type: ignore[no-any-return]
+
+
+class _Place:
+    """Where an error of pydantic is: its path without the names of union branches, and the field there."""
+
+    def __init__(self, model: type[Table], loc: tuple[int | str, ...], undeclared: bool) -> None:
+        self.path: list[int | str] = []
+        self.owner: type[Table] | None = model
+        self.field: FieldInfo | None = None
+        self.name = ""
+        inner: type[Table] | None = model
+        for k, part in enumerate(loc):
+            if isinstance(part, int):
+                self.path.append(part)
+            elif inner is not None and part in inner.named():
+                self.path.append(part)
+                self.owner, self.name, self.field = inner, part, inner.named()[part]
+                inner = next(_models(self.field.annotation), None)
+            elif inner is not None and undeclared and k == len(loc) - 1:
+                self.path.append(part)
+                self.owner, self.name, self.field = inner, part, None
+        self.where = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in self.path)[1:]
+        self.indexed = bool(self.path) and isinstance(self.path[-1], int)
+
+
+def _rank(document: Any, path: list[int | str]) -> tuple[int, ...]:
     """Place of a value in its document: by depth of the table, order of the keys; absent ones last."""
     ranks = []
-    for part in loc:
+    for part in path:
         if isinstance(document, Mapping):
             names = list(document)
             ranks.append(names.index(part) if part in names else len(names))
@@ -433,42 +463,34 @@ def _rank(document: Any, loc: tuple[int | str, ...]) -> tuple[int, ...]:
         elif isinstance(part, int) and isinstance(document, (list, tuple)):
             ranks.append(part)
             document = document[part] if part < len(document) else None
-    return (len(loc) > 1, *ranks)
+    return (len(path) > 1, *ranks)
 
 
-def _faults_of(model: type[Table], error: Any) -> Iterable[tuple[str, str, str, str]]:
+def _faults_of(model: type[Table], error: Any, at: _Place) -> Iterable[tuple[str, str, str, str]]:
     """Our words for one error of pydantic."""
-    loc = tuple(error["loc"])
-    where = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in loc).removeprefix(".")
+    kind = None if at.field is None else at.field.annotation
     if error["type"] == _FAULTS:
-        owner, value = _model_at(model, loc[:-1]), error["input"]
-        held = owner.declared(str(loc[-1])) if loc and str(loc[-1]) in owner.named() else None
-        slip = _slip_of_length(where, float(value), held) if held is not None and _is_number(value) else ""
-        for at, got, expected, hint in error["ctx"]["faults"]:
-            yield where + at, got, expected, hint or slip
-        return
-    owner = _model_at(model, loc[:-1])
-    name = str(loc[-1]) if loc else ""
-    if error["type"] == "extra_forbidden":
-        known = list(owner.named())
-        yield where, "an unknown key", "one of " + ", ".join(known), _stray_hint(name, owner, model)
+        for where, got, wanted, hint in error["ctx"]["faults"]:
+            yield (at.where + where).removeprefix("."), got, wanted, hint
+    elif error["type"] == "extra_forbidden" and at.owner is not None:
+        known = "one of " + ", ".join(at.owner.named())
+        yield at.where, "an unknown key", known, _stray_hint(str(at.path[-1]), at.owner, model)
+    elif at.field is None:
+        yield at.where, shown(error["input"]), error["msg"], ""
     elif error["type"] == "missing":
-        key = owner.declared(name)
-        yield where, "nothing", f"a table [{name}]" if key is None else key.expected, ""
+        yield at.where, "nothing", expected(kind, limits_of(at.field), at.name), ""
+    elif at.indexed:
+        kind = next(get_args(part)[0] for part in _parts(kind) if get_origin(part) is tuple)
+        limits, table = limits_of(at.field), f"a table [[{at.name}]]"
+        wanted = table if next(_models(kind), None) else expected(kind, limits)
+        yield at.where, shown(error["input"]), wanted, _hint(at.where, error["input"], kind, limits)
     else:
-        key = owner.declared(name) if name in owner.named() else None
-        yield where, shown(error["input"]), error["msg"] if key is None else key.expected, ""
+        limits = limits_of(at.field)
+        hint = _hint(at.where, error["input"], kind, limits)
+        yield at.where, shown(error["input"]), expected(kind, limits, at.name), hint
 
 
-def _model_at(model: type[Table], loc: tuple[int | str, ...]) -> type[Table]:
-    """Model of the table at a place."""
-    for part in loc:
-        if isinstance(part, str) and part in model.named():
-            model = next((m for m in _models(model.named()[part].annotation)), model)
-    return model
-
-
-def _models(annotation: Any) -> Iterable[type[Table]]:
+def _models(annotation: Any) -> Iterator[type[Table]]:
     """Models that an annotation holds."""
     if isinstance(annotation, type) and issubclass(annotation, Table):
         yield annotation
@@ -476,18 +498,29 @@ def _models(annotation: Any) -> Iterable[type[Table]]:
         yield from _models(inner)
 
 
-def _tables(model: type[Table], where: str = "") -> Iterable[tuple[str, dict[str, Key]]]:
-    """All tables of a model by dotted name, with their keys; arrays of tables are left out."""
-    yield where, {name: key for name in model.named() if (key := model.declared(name)) is not None}
+def _tables(model: type[Table], where: str = "") -> Iterable[tuple[str, type[Table]]]:
+    """All tables of a model by dotted name; arrays of tables are left out."""
+    yield where, model
     for name, field in model.named().items():
-        if not _is_array(model, name):
-            for inner in _models(field.annotation):
-                yield from _tables(inner, f"{where}.{name}".removeprefix("."))
+        inner = model.inner(name)
+        if inner is not None and get_origin(field.annotation) is not tuple:
+            yield from _tables(inner, f"{where}.{name}".removeprefix("."))
 
 
 def _stray_hint(name: str, owner: type[Table], root: type[Table]) -> str:
-    schema = dict(_tables(root))
-    keys = {n: key for n in owner.named() if (key := owner.declared(n)) is not None}
-    mine = next((where for where, known in schema.items() if known == keys), None)
-    homes = {} if mine is None else schema
-    return _unknown_key_hint(name, mine or "", keys, homes) or _did_you_mean(name, owner.named())
+    """What an unknown key was meant to be: one with a unit, one of another table, or a slip of the pen."""
+    keys = [key for key in owner.named() if owner.inner(key) is None]
+    stem = _UNIT_TAIL.sub("", name)
+    same = [key for key in keys if _UNIT_TAIL.sub("", key) == stem and key != stem]
+    if same:
+        return f"State the unit in the name: {' or '.join(same)}"
+    tables = dict(_tables(root))
+    homes = [
+        where
+        for where, other in tables.items()
+        if other is not owner and name in other.named() and other.inner(name) is None
+    ]
+    if homes and owner in tables.values() and not name.startswith("_"):
+        home = f"[{homes[0]}]" if homes[0] else "the top of the file"
+        return f"{name} belongs in {home}"
+    return _did_you_mean(name, keys) or _did_you_mean(name, owner.named())

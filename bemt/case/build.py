@@ -51,16 +51,20 @@ def _anchors(case: CaseFile, path: Path) -> list[tuple[float, Airfoil]]:
     radii = section.r_over_R or (0.0,)
     file = path.as_posix()
     if section.naca is not None:
-        shapes = [_as_input(file, "blade.section.naca", lambda d=d: naca(d))  # type: ignore[misc]
-                  for d in _per_anchor(section.naca, len(radii))]  # fmt: skip
+        shapes = [
+            _as_input(file, "blade.section.naca", lambda d=d: naca(d))  # type: ignore[misc]
+            for d in _per_anchor(section.naca, len(radii))
+        ]
     elif section.dat is not None:
         shapes = [_dat(path.parent / name) for name in _per_anchor(section.dat, len(radii))]
     else:
         shape = (section.camber, section.camber_position, section.thickness)
         columns = [_per_anchor(value, len(radii)) for value in shape]
         scale, thicker = section.camber_scale, section.thickness_scale
-        shapes = [_as_input(file, "blade.section", lambda m=m, p=p, t=t: naca4(m * scale, p, t * thicker))  # type: ignore[misc]
-                  for m, p, t in zip(*columns, strict=True)]  # fmt: skip
+        shapes = [
+            _as_input(file, "blade.section", lambda m=m, p=p, t=t: naca4(m * scale, p, t * thicker))  # type: ignore[misc]
+            for m, p, t in zip(*columns, strict=True)
+        ]
     return list(zip(map(float, radii), shapes, strict=True))
 
 
@@ -126,10 +130,14 @@ def _blade(case: CaseFile, path: Path) -> Blade:
         chord = {"max_chord": blade.max_chord_over_R, "taper": blade.taper}
         laws = {"pitch": blade.pitch_m(case.rotor.diameter_m), "relief": blade.tip_relief}
         made = from_laws(
-            case.rotor.diameter_m, blade.chord_law, blade.pitch_law, hub, anchors=anchors,
+            case.rotor.diameter_m,
+            blade.chord_law,
+            blade.pitch_law,
+            hub,
+            anchors=anchors,
             chord={k: v for k, v in chord.items() if v is not None},
             pitch={k: v for k, v in laws.items() if v is not None},
-        )  # fmt: skip
+        )
         return from_stations(made.r, made.chord * scale, made.beta + turned, R, hub * R, anchors, name=case.name)
     x, c, beta = _stations(case, path)
     return from_stations(x * R, c * R * scale, beta + turned, R, hub * R, anchors, name=case.name)

@@ -6,69 +6,18 @@ import math
 import re
 from pathlib import Path
 
-from bemt.asbuilt.population import chord_sd
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
+from bemt.case.unknowns import AIR, FAN, HUB, OFFSET, SECTION, SURFACE, Unknown, label_chord
 from geometry.common import GeometryError
 from geometry.designation import parse_designation
 
 __all__ = ["case_name", "fan_text", "label_parts", "label_text", "of_stations", "stations_text"]
 
-CHORD, CHORD_EXPONENT = 0.218, -0.4
-"""Largest chord over tip radius of the usual 10 in propeller and its exponent over the diameter: 87 propellers of UIUC
-volumes 1 and 2 with stations, families alike in weight (chord at 0.75 R 0.145 R; law `apc_like`) [1]."""
 TIP_SPEED = 120.0
 """Speed of the blade tips at the operating point of a new case, for want of a better one. [m/s]"""
 
-# Chords over the radius that a propeller may have.
-_CHORD_LAW = (0.05, 1.0)
-
-SECTION = """
-[[assumptions]]
-key = "blade.section.camber"
-low = 0.02
-high = 0.05
-why = "section not known; measured families of propellers have 3 to 5 %, slow flyers more"
-
-[[assumptions]]
-key = "blade.section.thickness"
-low = 0.06
-high = 0.12
-why = "section not known"
-"""
-SURFACE = """
-[[assumptions]]
-key = "model.n_crit"
-low = 1.0
-high = 5.0
-why = "transition not known; 3 is the rule for disturbed flow"
-
-[[assumptions]]
-key = "model.drag_level"
-low = 1.0
-high = 1.2
-why = "surface not known; smooth (1.0) to twice the excess of moulded blades (1.1)"
-"""
-BLADE = """
-[[assumptions]]
-key = "rotor.hub_ratio"
-low = 0.10
-high = 0.20
-why = "hub not known; hubs and spinners of small propellers"
-
-[[assumptions]]
-key = "blade.beta_offset_deg"
-low = 0.0
-high = 1.4
-why = "a label's pitch is that of the chord line (0) or of the flat underside (up to 1.4 deg more)"
-
-[[assumptions]]
-key = "blade.max_chord_over_R"
-low = {low:.2g}
-high = {high:.2g}
-why = "chord not known; 87 measured propellers of 2.2 to 19 in. Measure it at 0.75 R: nothing narrows more"
-"""
-FAN = """
+FAN_RANGES = """
 [[assumptions]]
 key = "rotor.blades"
 values = [{blades_low}, {blades}, {blades_high}]
@@ -79,18 +28,6 @@ key = "blade.pitch_in"
 low = {pitch_low:.4g}
 high = {pitch_high:.4g}
 why = "pitch not known; fans of this kind have about 1.2 to 1.7 diameters per turn"
-
-[[assumptions]]
-key = "blade.max_chord_over_R"
-low = 0.30
-high = 0.60
-why = "chord not known; range of the chord law"
-
-[[assumptions]]
-key = "blade.section.camber"
-low = 0.03
-high = 0.07
-why = "section not known; cambered compressor-like sections"
 
 [[assumptions]]
 key = "duct.tip_gap_mm"
@@ -104,6 +41,10 @@ low = 0.85
 high = 1.0
 why = "nozzle not known; 85 % of the swept annulus to all of it"
 """
+
+
+def _blocks(*unknowns: Unknown) -> str:
+    return "".join(item.block() for item in unknowns)
 
 
 def label_parts(label: str, blades: int | None = None) -> tuple[float, float, int]:
@@ -143,10 +84,8 @@ def label_text(label: str, blades: int | None = None, rpm: float | None = None, 
     """Write the case of a label such as ``10x5``."""
     D, pitch, B = label_parts(label, blades)
     name = case_name(f"prop_{D:g}x{pitch:g}" + (f"x{B}" if B != 2 else ""))
-    chord, far = CHORD * (D / 10.0) ** CHORD_EXPONENT, math.exp(math.sqrt(3.0) * chord_sd(D * INCH))
-    lowest, highest = _CHORD_LAW
-    chord = min(max(chord, lowest), highest)
-    blade = BLADE.format(low=max(chord / far, lowest), high=min(chord * far, highest))
+    chord = label_chord(D * INCH)
+    unknowns = _blocks(HUB, OFFSET, chord, *SECTION, *SURFACE, AIR)
     return f"""# A {D:g}x{pitch:g} propeller, known by its label. [[assumptions]] are declared unknowns with ranges:
 # `bemt sweep` says what each does to the thrust. Put in what you measure and delete its assumption.
 schema = "bemt.case/1"
@@ -164,18 +103,23 @@ hub_ratio = 0.15
 pitch_in = {pitch:g}
 beta_offset_deg = 0.7
 chord_law = "apc_like"
-max_chord_over_R = {chord:.3g}
+max_chord_over_R = {chord.value:.3g}
 
 [blade.section]
 camber = 0.035
 thickness = 0.09
-{_operating(_rpm(D * INCH, rpm), airspeed_m_s, rpm is not None)}{blade}{SECTION}{SURFACE}"""
+{_operating(_rpm(D * INCH, rpm), airspeed_m_s, rpm is not None)}{unknowns}"""
 
 
 def stations_text(
-    file: str, diameter_m: float, blades: int, rpm: float | None = None, airspeed_m_s: float = 0.0,
-    hub_ratio: float = 0.15, key: str = "stations",
-) -> str:  # fmt: skip
+    file: str,
+    diameter_m: float,
+    blades: int,
+    rpm: float | None = None,
+    airspeed_m_s: float = 0.0,
+    hub_ratio: float = 0.15,
+    key: str = "stations",
+) -> str:
     """Write the case of a blade whose chord and angle stand in a file beside it."""
     return f"""# A propeller with the stations of {file}. What is not known is an assumption with its range.
 schema = "bemt.case/1"
@@ -194,7 +138,7 @@ hub_ratio = {hub_ratio:.4g}
 [blade.section]
 camber = 0.035
 thickness = 0.09
-{_operating(_rpm(diameter_m, rpm), airspeed_m_s, rpm is not None)}{SECTION}{SURFACE}"""
+{_operating(_rpm(diameter_m, rpm), airspeed_m_s, rpm is not None)}{_blocks(*SECTION, *SURFACE, AIR)}"""
 
 
 def fan_text(
@@ -204,10 +148,15 @@ def fan_text(
     D, B = diameter_m / INCH, blades or 11
     P = pitch_in or 1.45 * D
     mm = 1e3 * diameter_m
-    ranges = FAN.format(
-        blades=B, blades_low=max(B - 2, 2), blades_high=B + 2, pitch_low=0.85 * P, pitch_high=1.15 * P,
-        gap_low=3e-3 * mm, gap_high=1e-2 * mm,
-    )  # fmt: skip
+    ranges = FAN_RANGES.format(
+        blades=B,
+        blades_low=max(B - 2, 2),
+        blades_high=B + 2,
+        pitch_low=0.85 * P,
+        pitch_high=1.15 * P,
+        gap_low=3e-3 * mm,
+        gap_high=1e-2 * mm,
+    )
     if blades:  # counted: no assumption
         ranges = "\n[[assumptions]]" + ranges.split("[[assumptions]]", 2)[2]
     told = _rpm(diameter_m, rpm, 180.0)
@@ -241,7 +190,7 @@ exit_area_ratio = 0.925
 blades = 5
 chord_mm = {0.29 * mm:.3g}
 recovery = 0.8
-{_operating(told, 0.0, rpm is not None).replace("120", "180")}{ranges}{SURFACE}"""
+{_operating(told, 0.0, rpm is not None).replace("120", "180")}{ranges}{_blocks(*FAN, *SURFACE, AIR)}"""
 
 
 def of_stations(file: Path) -> tuple[float, str]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_text, text_table, write_atomic
+from bemt.case.unknowns import AIR, SURFACE
 from geometry.common import GeometryError
 from geometry.export import UNITS, read_solid
 from geometry.slicing import FoundRotor, find_rotor
@@ -53,12 +54,22 @@ def _csv(header: str, rows: list[list[str]]) -> str:
     return "".join(f"{line}\n" for line in [header, *(",".join(row) for row in rows)])
 
 
-def case_files(found: FoundRotor, scale: float, name: str, source: str) -> dict[str, str]:
+def case_files(
+    found: FoundRotor,
+    scale: float,
+    name: str,
+    source: str,
+    known_from: str | None = None,
+    rpm: float | None = None,
+    airspeed_m_s: float = 0.0,
+) -> dict[str, str]:
     """Write the found rotor as a case."""
     x = found.r / found.R
     files: dict[str, str] = {}
-    rows = [[f"{a:.6f}", f"{b:.6f}", f"{c:.5f}"] for a, b, c in
-            zip(x, found.chord / found.R, np.degrees(found.beta), strict=True)]  # fmt: skip
+    rows = [
+        [f"{a:.6f}", f"{b:.6f}", f"{c:.5f}"]
+        for a, b, c in zip(x, found.chord / found.R, np.degrees(found.beta), strict=True)
+    ]
     files["stations.csv"] = _csv("r_over_R,chord_over_R,beta_deg", rows)
     files["sections.csv"] = _csv(
         "r_m,chord_m,beta_deg,thickness,camber,camber_position",
@@ -78,10 +89,11 @@ def case_files(found: FoundRotor, scale: float, name: str, source: str) -> dict[
         names.append(f"{title}.dat")
         pairs = "".join(f"{a:.6f} {b:.6f}\n" for a, b in zip(section.x, section.y, strict=True))
         files[f"{title}.dat"] = f"{title}\n{pairs}"
-    rpm = float(f"{TIP_SPEED / (found.R * scale) * 30 / math.pi:.2g}")
+    told = float(f"{TIP_SPEED / (found.R * scale) * 30 / math.pi:.2g}") if rpm is None else rpm
+    known = f'\nknown_from = "{known_from}"' if known_from else ""
     quoted = ", ".join(f'"{n}"' for n in names)
     files["case.toml"] = f"""# Blade stations cut from {source}.
-# Not in the geometry, set here to be changed: operating.rpm (a tip speed near {TIP_SPEED:g} m/s), speed, air.
+# Not in the geometry: rpm (a tip speed near {TIP_SPEED:g} m/s unless told), speed, and what [[assumptions]] declare.
 schema = "bemt.case/1"
 name = "{name}"
 title = "{found.B} blades, {2e3 * found.R * scale:.4g} mm, from {source}"
@@ -94,22 +106,20 @@ hub_diameter_mm = {2e3 * found.Rhub * scale:.6g}
 rotation = "{"right" if found.rotation > 0 else "left"}"
 
 [blade]
-stations = "stations.csv"
+stations = "stations.csv"{known}
 
 [blade.section]
 dat = [{quoted}]
 r_over_R = [{", ".join(f"{at:.4f}" for at in anchors.values())}]
 
 [operating]
-rpm = {rpm:.0f}
-airspeed_m_s = 0
+rpm = {told:.6g}
+airspeed_m_s = {airspeed_m_s:g}
 
 [air]
-density_kg_m3 = 1.225
-"""
+density_kg_m3 = {AIR.value}
+{"".join(unknown.block() for unknown in (*SURFACE, AIR))}"""
     return files
-
-
 
 
 def refuse_other(path: Path, content: str) -> None:
@@ -137,8 +147,10 @@ def text(found: FoundRotor, scale: float, path: Path, words: str, out: str | Non
             zip(found.r / found.R, found.r * scale * 1e3, found.chord * scale * 1e3, np.degrees(found.beta),
                 100 * found.thickness, 100 * found.camber, strict=True)]  # fmt: skip
     hand = "right" if found.rotation > 0 else "left"
-    head = (f"{path.name}: {found.B} blades, {hand}-hand, diameter {number_text(2e3 * found.R * scale, 5)} mm, hub "
-            f"{number_text(2e3 * found.Rhub * scale)} mm ({words})")  # fmt: skip
+    head = (
+        f"{path.name}: {found.B} blades, {hand}-hand, diameter {number_text(2e3 * found.R * scale, 5)} mm, hub "
+        f"{number_text(2e3 * found.Rhub * scale)} mm ({words})"
+    )
     axis = ", ".join(f"{v + 0.0:.4f}" for v in found.axis)
     lines = [head, f"thrust along ({axis})", *(f"note: {note}" for note in found.notes)]
     lines.append(text_table(["r/R", "r mm", "chord mm", "beta deg", "t/c %", "camber %"], rows, left=()).rstrip())

@@ -24,6 +24,7 @@ from bemt.case.as_built import CaseAsBuilt, as_built_of, stated_effects
 from bemt.case.build import build_air, build_duct, build_rotor
 from bemt.case.rules import check_case, check_shape, value_at
 from bemt.case.schema import AXES, GROUPS, CaseFile
+from bemt.case.unknowns import completed
 
 if TYPE_CHECKING:
     from bemt.air import Air
@@ -327,6 +328,7 @@ def case_of(text: str, folder: str | Path = ".") -> Case:
 
 
 def _checked(path: Path, document: dict[str, Any], out: Collector) -> Case:
+    document = completed(document)
     file = check_case(out, document, path.parent)
     check_name(out, document.get("name"))
     if file is None or out.faults:

@@ -8,15 +8,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from bemt.air import LIQUID
-from bemt.base.toml import Collector, Key, Table, check_value, shown, validated
-from bemt.case.schema import GROUPS, INCH, TEMPERATURE, CaseFile, SectionTable
+from bemt.base.toml import Collector, Table, check_field, shown, validated
+from bemt.case.schema import GROUPS, INCH, CaseFile, SectionTable
 
 __all__ = ["check_case", "check_shape", "table_at", "value_at"]
 
 A_SOUND = 340.3  # only to refuse impossible tip speeds
 MAX_TIP_MACH = 2.0
-_HEAVIEST = 10.0  # kg/m3, of a gas
 MAX_GRID = 50_000_000
 
 
@@ -34,7 +32,7 @@ def check_case(out: Collector, document: Mapping[str, Any], folder: Path) -> Cas
     _check_groups(out, document)
     _check_files(out, document, folder)
     if case is not None and not out.faults:  # the rules below need sound values
-        for rule in (check_shape, _check_blade, _check_air, _check_sweep, _check_assumptions):
+        for rule in (check_shape, _check_blade, _check_sweep, _check_assumptions):
             rule(out, case)
     return None if out.faults else case
 
@@ -127,7 +125,7 @@ def _check_blade(out: Collector, case: CaseFile) -> None:
     pitches = _given(blade, "pitch_in", "pitch_mm", "pitch_ratio")
     if blade.chord_law is not None:
         if not pitches:
-            out.add("blade", "chord_law without a pitch", "one of pitch_in, pitch_mm, pitch_ratio")
+            out.add("blade", "no pitch", "one of pitch_in, pitch_mm, pitch_ratio")
         if blade.taper is not None and blade.chord_law != "linear_taper":
             out.add("blade.taper", shown(blade.taper), "nothing, because chord_law is not linear_taper")
         if blade.tip_relief is not None and blade.pitch_law != "tip_relieved":
@@ -142,10 +140,7 @@ def _check_blade(out: Collector, case: CaseFile) -> None:
         got = 'known_from = "reference" without as_built.file' if not posterior else "as_built.file"
         expected = 'known_from = "reference" and blade.as_built.file together'
         out.add("blade.known_from", got, expected, "python -m bemt calibrate-rotor writes both")
-    if blade.section is None:
-        hint = "Tables [[polars]] replace only its aerodynamics"
-        out.add("blade.section", "nothing", "a table [blade.section]", hint)
-    else:
+    if blade.section is not None:
         _check_section(out, blade.section)
 
 
@@ -182,8 +177,11 @@ def _check_section(out: Collector, section: SectionTable) -> None:
     for key in ("camber", "camber_position"):
         if key in stated and "thickness" not in stated:
             value = stated[key]
-            out.add(f"blade.section.{key}", shown(list(value) if isinstance(value, tuple) else value),
-                    "nothing without thickness")  # fmt: skip
+            out.add(
+                f"blade.section.{key}",
+                shown(list(value) if isinstance(value, tuple) else value),
+                "nothing without thickness",
+            )
 
 
 def _check_duct(out: Collector, case: CaseFile) -> None:
@@ -201,29 +199,18 @@ def _check_duct(out: Collector, case: CaseFile) -> None:
             out.add(f"duct.{key}", shown(value), f"at most length_mm, {duct.length_mm:g}")
 
 
-def _check_air(out: Collector, case: CaseFile) -> None:
-    air = case.air
-    if air.pressure_hPa is not None and air.temperature_C is None:
-        out.add("air.temperature_C", "nothing", f"{TEMPERATURE.expected}, because pressure_hPa is given")
-    if air.salinity_g_kg is not None and air.fluid is None:
-        out.add("air.salinity_g_kg", shown(air.salinity_g_kg), 'nothing without fluid = "water"')
-    rho = air.density_kg_m3
-    if rho is not None and _HEAVIEST < rho < LIQUID[0]:
-        out.add("air.density_kg_m3", shown(rho), "0.01 to 10 kg/m3, or 900 to 1100 for water")
-    if air.fluid is not None and (air.temperature_C or 0.0) < 0.0:
-        out.add("air.temperature_C", shown(air.temperature_C), "0 to 60 C, water")
-    if air.humidity_pct is not None and air.pressure_hPa is None:
-        out.add("air.humidity_pct", shown(air.humidity_pct), "nothing without pressure_hPa")
-
-
 def _check_sweep(out: Collector, case: CaseFile) -> None:
     sweep = case.sweep.axes()
     if "density_kg_m3" in sweep and ("altitude_m" in sweep or "temperature_C" in sweep):
         other = "altitude_m" if "altitude_m" in sweep else "temperature_C"
         out.add("sweep.density_kg_m3", f"an axis beside {other}", f"density_kg_m3 or {other}, not both")
     if "temperature_C" in sweep and case.air.density_kg_m3 is not None and "altitude_m" not in sweep:
-        out.add("sweep.temperature_C", "an axis with air.density_kg_m3", "air.altitude_m or air.pressure_hPa",
-                "Temperature changes nothing when the density is fixed")  # fmt: skip
+        out.add(
+            "sweep.temperature_C",
+            "an axis with air.density_kg_m3",
+            "air.altitude_m or air.pressure_hPa",
+            "Temperature changes nothing when the density is fixed",
+        )
     if "pitch_in" in sweep and case.blade.chord_law is None:
         out.add("sweep.pitch_in", "an axis", "nothing, because the blade comes from stations")
     if "tip_gap_mm" in sweep and case.duct is None:
@@ -239,19 +226,19 @@ def _check_assumptions(out: Collector, case: CaseFile) -> None:
         where, key = f"assumptions[{i}]", item.key
         home, _, name = key.rpartition(".")
         table, nominal = table_at(case, home), value_at(case, key)
-        if not home or table is None or nominal is None or table.declared(name) is None:
+        if not home or table is None or nominal is None or table.inner(name) is not None:
             out.add(f"{where}.key", repr(key), "the dotted key of a value in this file")
             continue
         if key in seen:
             out.add(f"{where}.key", f"{key!r} again", "each key once")
         seen.add(key)
         stated = {k: list(v) if isinstance(v, tuple) else v for k, v in item.model_dump(exclude_unset=True).items()}
-        what = table.declared(name)
-        assert what is not None
-        _check_assumption(out, where, stated, nominal, what)
+        _check_assumption(out, where, stated, nominal, type(table), name)
 
 
-def _check_assumption(out: Collector, where: str, item: Mapping[str, Any], nominal: Any, key: Key) -> None:
+def _check_assumption(
+    out: Collector, where: str, item: Mapping[str, Any], nominal: Any, table: type[Table], name: str
+) -> None:
     if "values" in item:
         if "low" in item or "high" in item:
             out.add(where, "values beside low or high", "values, or low and high")
@@ -259,13 +246,13 @@ def _check_assumption(out: Collector, where: str, item: Mapping[str, Any], nomin
             out.add(f"{where}.values", shown(item["values"]), f"two or more values, one of them {shown(nominal)}")
             return
         for i, value in enumerate(item["values"]):
-            check_value(out, f"{where}.values[{i}]", value, key)
+            check_field(out, f"{where}.values[{i}]", table, name, value)
         return
     lacking = [end for end in ("low", "high") if end not in item]
     if lacking:
         out.add(where, f"no {' and no '.join(lacking)}", "low and high, or values")
         return
-    ends = [check_value(out, f"{where}.{end}", item[end], key) for end in ("low", "high")]
+    ends = [check_field(out, f"{where}.{end}", table, name, item[end]) for end in ("low", "high")]
     if not all(ends):
         return
     if isinstance(nominal, (str, list)):

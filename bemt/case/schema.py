@@ -7,7 +7,7 @@ uses, exactly one of :data:`GROUPS` is given.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, Literal
 
 import numpy as np
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from bemt.air import LIQUID
 from bemt.asbuilt.latents import KNOWN_FROM
-from bemt.base.toml import Key, Table, entry
+from bemt.base.toml import Axis, Limits, Table, axis_values, entry, expected, shown
 from bemt.sections.rule import DRAG_LEVEL, N_CRIT
 from geometry.laws import CHORD_LAWS as GEOMETRY_CHORD_LAWS
 
@@ -25,7 +25,6 @@ __all__ = [
     "GROUPS",
     "INCH",
     "RPM",
-    "TEMPERATURE",
     "AirTable",
     "AsBuiltTable",
     "AssumptionTable",
@@ -41,9 +40,9 @@ __all__ = [
     "SweepTable",
 ]
 
-SCHEMA_NAME = "bemt.case/1"
 CHORD_LAWS = tuple(GEOMETRY_CHORD_LAWS)
 INCH = 0.0254
+_HEAVIEST = 10.0  # of a gas [kg/m3]
 Suspect = Callable[[float], str]
 
 
@@ -71,27 +70,25 @@ def _percent(key: str, low: float = 1.0) -> Suspect:
     return _looks((low, 1000.0, "percent", lambda v: v / 100.0, key))
 
 
-RPM = Key(unit="rev/min", low=10, high=300_000, required=True,
-           suspect=_looks((1e-9, 9.999, "rev/s", lambda v: v * 60, "rpm")))  # fmt: skip
-AIRSPEED = Key(unit="m/s", low=-100, high=300, suspect=_looks((300.1, 1100, "km/h", lambda v: v / 3.6, "airspeed_m_s")))
-_DENSITY = Key(unit="kg/m3", low=0.01, high=LIQUID[1], suspect=_looks(
+RPM = Limits("rev/min", 10, 300_000, _looks((1e-9, 9.999, "rev/s", lambda v: v * 60, "rpm")))
+AIRSPEED = Limits("m/s", -100, 300, _looks((300.1, 1100, "km/h", lambda v: v / 3.6, "airspeed_m_s")))
+_DENSITY = Limits("kg/m3", 0.01, LIQUID[1], _looks(
     (1100.01, 1500, "g/m3", lambda v: v / 1000, "density_kg_m3"),
     (0.0755, 0.0775, "lb/ft3", lambda v: v * 16.018463, "density_kg_m3"),
     (0.00235, 0.0024, "slug/ft3", lambda v: v * 515.37882, "density_kg_m3")))  # fmt: skip
-_ALTITUDE = Key(unit="m", low=-500, high=20_000,
-                suspect=_looks((20_000.1, 70_000, "feet", lambda v: v * 0.3048, "altitude_m")))  # fmt: skip
-TEMPERATURE = Key(unit="C", low=-60, high=60, suspect=_looks(
+_ALTITUDE = Limits("m", -500, 20_000, _looks((20_000.1, 70_000, "feet", lambda v: v * 0.3048, "altitude_m")))
+_TEMPERATURE = Limits("C", -60, 60, _looks(
     (180, 340, "kelvin", lambda v: v - 273.15, "temperature_C"),
     (60.1, 140, "degrees Fahrenheit", lambda v: (v - 32) / 1.8, "temperature_C")))  # fmt: skip
-_PITCH_IN = Key(unit="in", low=0.1, high=120, suspect=_inch("pitch_in", 120.1))
-_DIAMETER_IN = Key(unit="in", low=0.5, high=200, suspect=_inch("diameter_in", 200.1))
-_GAP = Key(unit="mm", low=0, high=50, suspect=_metres("tip_gap_mm", 0.005))
-
-_PRESSURE = Key(unit="hPa", low=50, high=1200, suspect=_looks(
+_PRESSURE = Limits("hPa", 50, 1200, _looks(
     (5000, 120_000, "pascals", lambda v: v / 100, "pressure_hPa"),
     (0.5, 1.2, "bar", lambda v: v * 1000, "pressure_hPa"),
     (25, 32, "inches of mercury", lambda v: v * 33.86389, "pressure_hPa")))  # fmt: skip
+_PITCH_IN = Limits("in", 0.1, 120, _inch("pitch_in", 120.1))
+_DIAMETER_IN = Limits("in", 0.5, 200, _inch("diameter_in", 200.1))
+_GAP = Limits("mm", 0, 50, _metres("tip_gap_mm", 0.005))
 _FRACTION_OF_HUMIDITY = _looks((1e-9, 0.999, "a fraction", lambda v: v * 100, "humidity_pct"))
+FILE = "the name of a file beside the case"
 
 KnownFrom = Literal["cad", "scan", "stations", "label", "reference"]
 Rotations = Literal["right", "left"]
@@ -110,16 +107,16 @@ def _metres_of(inch: float | None, millimetre: float | None, metre: float | None
 class RotorTable(Table):
     """[rotor]: what turns."""
 
-    kind: Literal["propeller", "fan"] = entry("choice", choices=("propeller", "fan"), required=True)
-    blades: int = entry("integer", low=1, high=64, required=True)
-    diameter_in: float | None = entry(key=_DIAMETER_IN)
-    diameter_mm: float | None = entry(unit="mm", low=10, high=6000, suspect=_metres("diameter_mm", 6.0))
-    diameter_m_: float | None = entry(unit="m", low=0.01, high=6, alias="diameter_m")
-    hub_ratio: float | None = entry(low=0.01, high=0.95, suspect=_percent("hub_ratio"))
-    hub_diameter_mm: float | None = entry(unit="mm", low=0.5, high=3000, suspect=_metres("hub_diameter_mm", 0.499))
-    hub_diameter_in: float | None = entry(unit="in", low=0.02, high=120)
-    spinner_mm: float = entry(unit="mm", low=0, high=3000, default=0.0)
-    rotation: Rotations = entry("choice", choices=("right", "left"), default="right")
+    kind: Literal["propeller", "fan"] = entry("open rotor, or fan; fan where there is a [duct]", default="propeller")
+    blades: int = entry("number of blades", low=1, high=64, required=True)
+    diameter_in: float | None = entry("tip diameter", _DIAMETER_IN)
+    diameter_mm: float | None = entry("tip diameter", "mm", 10, 6000, _metres("diameter_mm", 6.0))
+    diameter_m_: float | None = entry("tip diameter", "m", 0.01, 6, alias="diameter_m")
+    hub_ratio: float | None = entry("hub over tip radius", "", 0.01, 0.95, _percent("hub_ratio"))
+    hub_diameter_mm: float | None = entry("hub diameter", "mm", 0.5, 3000, _metres("hub_diameter_mm", 0.499))
+    hub_diameter_in: float | None = entry("hub diameter", "in", 0.02, 120)
+    spinner_mm: float = entry("length of the nose ahead of the hub; 0 is a flat face", "mm", 0, 3000, default=0.0)
+    rotation: Rotations = entry("hand, seen from behind", default="right")
 
     @property
     def diameter_m(self) -> float:
@@ -137,55 +134,57 @@ class RotorTable(Table):
 class SectionTable(Table):
     """[blade.section]: one section, or one per r_over_R."""
 
-    naca: Texts = entry("text_or_texts")
-    dat: Texts = entry("text_or_texts")
+    naca: Texts = entry("NACA digits, such as 4412")
+    dat: Texts = entry("files of coordinates beside the case")
     camber: float | tuple[float, ...] = entry(
-        "scalar_or_list", "of the chord", -0.2, 0.2, suspect=_percent("camber", 0.9), default=0.0
+        "largest height of the camber line", "of the chord", -0.2, 0.2, _percent("camber", 0.9), default=0.0
     )
     camber_position: float | tuple[float, ...] = entry(
-        "scalar_or_list", "of the chord", 0.1, 0.8, suspect=_percent("camber_position"), default=0.4
+        "where the camber is largest", "of the chord", 0.1, 0.8, _percent("camber_position"), default=0.4
     )
-    thickness: Numbers = entry("scalar_or_list", "of the chord", 0.01, 0.5, suspect=_percent("thickness", 1.5))
-    camber_scale: float = entry(low=0, high=5, default=1.0)
-    thickness_scale: float = entry(low=0.1, high=5, default=1.0)
-    r_over_R: tuple[float, ...] | None = entry("numbers", low=0, high=1, suspect=_percent("r_over_R", 2.0))
+    thickness: Numbers = entry("largest thickness", "of the chord", 0.01, 0.5, _percent("thickness", 1.5))
+    camber_scale: float = entry("factor on the camber", "", 0, 5, default=1.0)
+    thickness_scale: float = entry("factor on the thickness", "", 0.1, 5, default=1.0)
+    r_over_R: tuple[float, ...] | None = entry("radii of lists above", "", 0, 1, _percent("r_over_R", 2.0))
 
 
 class AsBuiltTable(Table):
     """[blade.as_built]: what is known of this very rotor beyond its drawing, expectations and standard deviations."""
 
-    angle_deg: float | None = entry(unit="deg", low=-20, high=20)
-    angle_sd_deg: float | None = entry(unit="deg", low=0, high=20)
-    camber_deg: float | None = entry(unit="deg", low=-20, high=20)
-    camber_sd_deg: float | None = entry(unit="deg", low=0, high=20)
-    lift: float | None = entry(low=-1, high=1)
-    lift_sd: float | None = entry(low=0, high=1, suspect=_percent("lift_sd"))
-    drag: float | None = entry(low=-2, high=2)
-    drag_sd: float | None = entry(low=0, high=2, suspect=_percent("drag_sd", 2.0))
-    file: str | None = entry("file")
+    angle_deg: float | None = entry("expected blade angle above the drawn one", "deg", -20, 20)
+    angle_sd_deg: float | None = entry("its standard deviation", "deg", 0, 20)
+    camber_deg: float | None = entry("expected lowering of the zero-lift angle", "deg", -20, 20)
+    camber_sd_deg: float | None = entry("its standard deviation", "deg", 0, 20)
+    lift: float | None = entry("expected change of ln(cl)", "", -1, 1)
+    lift_sd: float | None = entry("its standard deviation", "", 0, 1, _percent("lift_sd"))
+    drag: float | None = entry("expected change of ln(cd)", "", -2, 2)
+    drag_sd: float | None = entry("its standard deviation", "", 0, 2, _percent("drag_sd", 2.0))
+    file: str | None = entry("posterior that calibrate-rotor wrote", words=FILE)
 
 
 class BladeTable(Table):
     """[blade]: pitch and chord by a law, or stations from a file; how well it is known."""
 
-    pitch_in: float | None = entry(key=_PITCH_IN)
-    pitch_mm: float | None = entry(unit="mm", low=2.5, high=3000, suspect=_metres("pitch_mm", 2.0))
-    pitch_ratio: float | None = entry(low=0.01, high=10)
-    pitch_law: Literal["helix", "tip_relieved"] = entry("choice", choices=("helix", "tip_relieved"), default="helix")
-    tip_relief: float | None = entry(low=0, high=0.6, suspect=_percent("tip_relief"))
-    chord_law: str | None = entry("choice", choices=CHORD_LAWS)
-    max_chord_over_R: float | None = entry(
-        unit="of the tip radius", low=0.005, high=2, suspect=_percent("max_chord_over_R", 3.0)
+    pitch_in: float | None = entry("advance per turn", _PITCH_IN)
+    pitch_mm: float | None = entry("advance per turn", "mm", 2.5, 3000, _metres("pitch_mm", 2.0))
+    pitch_ratio: float | None = entry("advance per turn over diameter", "", 0.01, 10)
+    pitch_law: Literal["helix", "tip_relieved"] = entry("pitch over the radius", default="helix")
+    tip_relief: float | None = entry(
+        "share of the pitch that the tip lacks, with tip_relieved", "", 0, 0.6, _percent("tip_relief")
     )
-    taper: float | None = entry(low=0.05, high=3)
-    chord_scale: float = entry(low=0.1, high=10, suspect=_percent("chord_scale", 20.0), default=1.0)
-    stations: str | None = entry("file")
-    uiuc: str | None = entry("file")
-    apc: str | None = entry("file")
-    beta_offset_deg: float = entry(unit="deg", low=-45, high=45, default=0.0)
-    known_from: KnownFrom | None = entry("choice", choices=KNOWN_FROM)
-    label_pitch_in: float | None = entry(unit="in", low=0.1, high=120, suspect=_inch("label_pitch_in", 120.1))
-    family: str | None = entry("text")
+    chord_law: str | None = entry("chord over the radius", choices=CHORD_LAWS)
+    max_chord_over_R: float | None = entry(
+        "largest chord", "of the tip radius", 0.005, 2, _percent("max_chord_over_R", 3.0)
+    )
+    taper: float | None = entry("tip over root chord, with linear_taper", "", 0.05, 3)
+    chord_scale: float = entry("factor on every chord", "", 0.1, 10, _percent("chord_scale", 20.0), default=1.0)
+    stations: str | None = entry("CSV r_over_R,chord_over_R,beta_deg", words=FILE)
+    uiuc: str | None = entry("geometry file of UIUC", words=FILE)
+    apc: str | None = entry("PE0 file of APC", words=FILE)
+    beta_offset_deg: float = entry("turns the whole blade", "deg", -45, 45, default=0.0)
+    known_from: KnownFrom | None = entry("how the shape is known; sets its uncertainty", choices=KNOWN_FROM)
+    label_pitch_in: float | None = entry("pitch printed on it", "in", 0.1, 120, _inch("label_pitch_in", 120.1))
+    family: str | None = entry("maker's series")
     as_built: AsBuiltTable | None = None
     section: SectionTable | None = None
 
@@ -199,25 +198,25 @@ class BladeTable(Table):
 class StatorTable(Table):
     """[duct.stator]: vanes behind the rotor."""
 
-    blades: int = entry("integer", low=1, high=64, required=True)
-    chord_mm: float = entry(unit="mm", low=1, high=1000, required=True, suspect=_metres("chord_mm", 0.999))
-    angle_deg: float = entry(unit="deg", low=0, high=60, default=0.0)
-    recovery: float | None = entry(low=0, high=1, suspect=_percent("recovery", 1.5))
+    blades: int = entry("number of vanes", low=1, high=64, required=True)
+    chord_mm: float = entry("chord", "mm", 1, 1000, _metres("chord_mm", 0.999), required=True)
+    angle_deg: float = entry("vane angle from the axis, for geometry and CFD", "deg", 0, 60, default=0.0)
+    recovery: float | None = entry("share of the swirl that is taken out", "", 0, 1, _percent("recovery", 1.5))
 
 
 class DuctTable(Table):
     """[duct]: the wall around the rotor."""
 
-    inner_diameter_mm: float | None = entry(unit="mm", low=10, high=6000, suspect=_metres("inner_diameter_mm", 6.0))
-    inner_diameter_in: float | None = entry(unit="in", low=0.5, high=240)
-    tip_gap_mm: float | None = entry(key=_GAP)
-    length_mm: float = entry(unit="mm", low=1, high=10_000, required=True, suspect=_metres("length_mm", 0.999))
-    lip_radius_mm: float = entry(unit="mm", low=0, high=1000, default=0.0)
-    lip_loss: float | None = entry(low=0, high=1, suspect=_percent("lip_loss", 1.5))
-    rotor_position_mm: float | None = entry(unit="mm", low=-1000, high=10_000)
-    exit_area_ratio: float | None = entry(low=0.3, high=3, suspect=_percent("exit_area_ratio", 20.0))
-    exit_diameter_mm: float | None = entry(unit="mm", low=5, high=6000, suspect=_metres("exit_diameter_mm", 4.9))
-    exit_hub_diameter_mm: float = entry(unit="mm", low=0, high=6000, default=0.0)
+    inner_diameter_mm: float | None = entry("bore", "mm", 10, 6000, _metres("inner_diameter_mm", 6.0))
+    inner_diameter_in: float | None = entry("bore", "in", 0.5, 240)
+    tip_gap_mm: float | None = entry("between blade tip and wall", _GAP)
+    length_mm: float = entry("inlet to exit", "mm", 1, 10_000, _metres("length_mm", 0.999), required=True)
+    lip_radius_mm: float = entry("of the inlet lip", "mm", 0, 1000, default=0.0)
+    lip_loss: float | None = entry("loss coefficient of the inlet lip", "", 0, 1, _percent("lip_loss", 1.5))
+    rotor_position_mm: float | None = entry("rotor behind the inlet", "mm", -1000, 10_000)
+    exit_area_ratio: float | None = entry("exit area over swept annulus", "", 0.3, 3, _percent("exit_area_ratio", 20.0))
+    exit_diameter_mm: float | None = entry("of the exit", "mm", 5, 6000, _metres("exit_diameter_mm", 4.9))
+    exit_hub_diameter_mm: float = entry("of the centre body at the exit", "mm", 0, 6000, default=0.0)
     stator: StatorTable | None = None
 
     @property
@@ -229,92 +228,92 @@ class DuctTable(Table):
 class OperatingTable(Table):
     """[operating]: the case's own point."""
 
-    rpm: float = entry(key=RPM)
-    airspeed_m_s: float = entry(key=AIRSPEED, default=0.0)
+    rpm: float = entry("speed of rotation", RPM, required=True)
+    airspeed_m_s: float = entry("axial speed of flight", AIRSPEED, default=0.0)
 
 
 class AirTable(Table):
     """[air]: density, or altitude, or pressure with temperature and humidity; or water."""
 
-    density_kg_m3: float | None = entry(key=_DENSITY)
-    altitude_m: float | None = entry(key=_ALTITUDE)
-    pressure_hPa: float | None = entry(key=_PRESSURE)
-    temperature_C: float | None = entry(key=TEMPERATURE)
-    humidity_pct: float | None = entry(unit="%", low=0, high=100, suspect=_FRACTION_OF_HUMIDITY)
-    fluid: Literal["water"] | None = entry("choice", choices=("water",))
-    salinity_g_kg: float | None = entry(unit="g/kg", low=0, high=45)
+    density_kg_m3: float | None = entry("density", _DENSITY)
+    altitude_m: float | None = entry("altitude in the standard atmosphere", _ALTITUDE)
+    pressure_hPa: float | None = entry("static pressure", _PRESSURE)
+    temperature_C: float | None = entry("temperature", _TEMPERATURE)
+    humidity_pct: float | None = entry("relative humidity, with pressure", "%", 0, 100, _FRACTION_OF_HUMIDITY)
+    fluid: Literal["water"] | None = entry("a liquid instead of air; with temperature_C")
+    salinity_g_kg: float | None = entry("salt, with fluid", "g/kg", 0, 45)
+
+    def rules(self) -> Iterable[tuple[str, ...]]:
+        """Pressure goes with temperature, humidity with pressure, salt with water."""
+        if self.pressure_hPa is not None and self.temperature_C is None:
+            yield "temperature_C", "nothing", f"{expected(float, _TEMPERATURE)}, because pressure_hPa is given"
+        if self.salinity_g_kg is not None and self.fluid is None:
+            yield "salinity_g_kg", shown(self.salinity_g_kg), 'nothing without fluid = "water"'
+        if self.density_kg_m3 is not None and _HEAVIEST < self.density_kg_m3 < LIQUID[0]:
+            yield "density_kg_m3", shown(self.density_kg_m3), "0.01 to 10 kg/m3, or 900 to 1100 for water"
+        if self.fluid is not None and (self.temperature_C or 0.0) < 0.0:
+            yield "temperature_C", shown(self.temperature_C), "0 to 60 C, water"
+        if self.humidity_pct is not None and self.pressure_hPa is None:
+            yield "humidity_pct", shown(self.humidity_pct), "nothing without pressure_hPa"
 
 
 class ModelTable(Table):
     """[model]: physics that is on, section tables, blade elements."""
 
-    effects_on: tuple[str, ...] = entry("texts", default=())
-    effects_off: tuple[str, ...] = entry("texts", default=())
-    also_without: tuple[str, ...] = entry("texts", default=())
-    n_crit: float = entry(low=0.1, high=14, default=N_CRIT)
-    drag_level: float = entry(low=0.3, high=3, suspect=_percent("drag_level", 20.0), default=DRAG_LEVEL)
-    stations: int = entry("integer", low=5, high=1000, default=40)
-
-
-Axis = tuple[float, ...] | dict[str, float] | None
-
-
-def _axis(key: Key) -> Any:
-    return entry("axis", unit=key.unit, low=key.low, high=key.high, suspect=key.suspect)
+    effects_on: tuple[str, ...] = entry("effects to add, as name or name(parameter=value)", default=())
+    effects_off: tuple[str, ...] = entry("effects to leave out", default=())
+    also_without: tuple[str, ...] = entry("effects that the sweep also shows left out", default=())
+    n_crit: float = entry("amplification at transition (e^N)", "", 0.1, 14, default=N_CRIT)
+    drag_level: float = entry(
+        "factor on the profile drag of the section rule", "", 0.3, 3, _percent("drag_level", 20.0), default=DRAG_LEVEL
+    )
+    stations: int = entry("blade elements", low=5, high=1000, default=40)
 
 
 class SweepTable(Table):
     """[sweep]: axes of a parameter grid, lists or {start, stop, num}."""
 
-    rpm: Axis = _axis(RPM)
-    airspeed_m_s: Axis = _axis(AIRSPEED)
-    altitude_m: Axis = _axis(_ALTITUDE)
-    density_kg_m3: Axis = _axis(_DENSITY)
-    temperature_C: Axis = _axis(TEMPERATURE)
-    pitch_in: Axis = _axis(_PITCH_IN)
-    diameter_in: Axis = _axis(_DIAMETER_IN)
-    tip_gap_mm: Axis = _axis(_GAP)
+    rpm: Axis = entry("speeds of rotation", RPM)
+    airspeed_m_s: Axis = entry("speeds of flight", AIRSPEED)
+    altitude_m: Axis = entry("altitudes", _ALTITUDE)
+    density_kg_m3: Axis = entry("densities", _DENSITY)
+    temperature_C: Axis = entry("temperatures", _TEMPERATURE)
+    pitch_in: Axis = entry("pitches", _PITCH_IN)
+    diameter_in: Axis = entry("diameters", _DIAMETER_IN)
+    tip_gap_mm: Axis = entry("tip gaps", _GAP)
 
     def axes(self) -> dict[str, NDArray[np.float64]]:
-        """Axes in the order of the file: name (with its unit) to values, (N,)."""
-        out: dict[str, NDArray[np.float64]] = {}
-        for name, axis in self.model_dump(exclude_unset=True).items():
-            if isinstance(axis, dict):
-                out[name] = np.linspace(axis["start"], axis["stop"], int(axis["num"]))
-            elif axis is not None:
-                out[name] = np.array(axis, dtype=float)
-        return out
+        """Axes: name (with its unit) to values, (N,)."""
+        return {name: axis_values(axis) for name, axis in self.given().items() if axis is not None}
 
 
 class AssumptionTable(Table):
     """[[assumptions]]: a value that the source does not give, with its range."""
 
-    key: str = entry("text", required=True)
-    low: float | None = entry()
-    high: float | None = entry()
-    values: tuple[Any, ...] | None = entry("list")
-    why: str = entry("text", required=True)
+    key: str = entry("dotted key of the value, such as rotor.hub_ratio", required=True)
+    low: float | None = entry("lower end, in the unit of the key")
+    high: float | None = entry("upper end")
+    values: tuple[Any, ...] | None = entry("all values that it may take, instead of low and high")
+    why: str = entry("where value and range come from", required=True)
 
 
 class PolarTable(Table):
     """[[polars]]: a section table of the user's own."""
 
-    file: str = entry("file", required=True)
-    r_over_R: float = entry(low=0, high=1, required=True, suspect=_percent("r_over_R", 2.0))
-    format: Literal["csv", "xfoil", "c81", "aerodyn"] | None = entry(
-        "choice", choices=("csv", "xfoil", "c81", "aerodyn")
-    )
+    file: str = entry("table of lift and drag", required=True, words=FILE)
+    r_over_R: float = entry("radius at which it holds", "", 0, 1, _percent("r_over_R", 2.0), required=True)
+    format: Literal["csv", "xfoil", "c81", "aerodyn"] | None = entry("of the file; told by its content if left out")
 
 
 class CaseFile(Table):
     """A whole case file."""
 
-    schema_: Literal["bemt.case/1"] = entry("choice", choices=(SCHEMA_NAME,), required=True, alias="schema")
-    name: str = entry("text", required=True)
-    title: str = entry("text", default="")
-    notes: str = entry("text", default="")
-    origin: str = entry("text", default="")
-    references: str | None = entry("file")
+    schema_: Literal["bemt.case/1"] = entry("version of the format", required=True, alias="schema")
+    name: str = entry("names the folder of results: letters, digits, dot, dash, underscore", required=True)
+    title: str = entry("one line for people", default="")
+    notes: str = entry("anything", default="")
+    origin: str = entry("where the case comes from", default="")
+    references: str | None = entry("recorded values", words=FILE)
     rotor: RotorTable
     blade: BladeTable
     duct: DuctTable | None = None

@@ -57,7 +57,8 @@ def run_campaign(
     for k, (point, key) in enumerate(zip(campaign.points, keys, strict=True), 1):
         if (only is not None and k != only) or (only is None and key[0] in record.done):
             continue
-        said = ", ".join(f"{name} {value}" for name, value in point.values.items()
+        said = ", ".join(f"{name} {value:g}" if isinstance(value, float) else f"{name} {value}"
+                         for name, value in point.values.items()
                          if name not in ("iterations", "average", "start"))  # fmt: skip
         say(f"{campaign.name} {k}/{len(campaign.points)}: {said}")
         outcome = worker.run(point, key)

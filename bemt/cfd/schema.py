@@ -6,103 +6,93 @@ import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from types import NoneType
+from typing import Any, Literal, get_args
+
+from pydantic import create_model
+from pydantic.fields import FieldInfo
 
 from bemt.base.errors import Fault, InputError
-from bemt.base.toml import Collector, Key, check_table, load_toml, shown
+from bemt.base.toml import Collector, Table, entry, limits_of, load_toml, shown, validated
 from bemt.case import Case, check_name, load_case
 from bemt.exports.openfoam.settings import DOMAINS, GASES, SECTORS, TURBULENCE, ZONES
-from bemt.exports.openfoam.write import Run
+from bemt.exports.openfoam.write import Run, RunRanges
 
-__all__ = ["SCHEMA_NAME", "Campaign", "CampaignPoint", "load_campaign"]
+__all__ = ["Campaign", "CampaignFile", "CampaignPoint", "load_campaign"]
 
-SCHEMA_NAME = "bemt.cfd/1"
-STARTS = ("neighbour", "slipstream")
-POINT: dict[str, Key] = {
-    "rpm": Key(unit="rev/min", low=10, high=300_000),
-    "airspeed_m_s": Key(unit="m/s", low=0, high=300),
-    "J": Key(low=0, high=5),
-    "sideslip_deg": Key(unit="deg", low=0, high=90),
-    "pitch_offset_deg": Key(unit="deg", low=-30, high=30),
-    "tip_gap_pct_R": Key(unit="% of R", low=0.1, high=10),
-    "wall_distance_over_R": Key(unit="R", low=0.2, high=20),
-    "plate_radius_over_R": Key(unit="R", low=0.5, high=5),
-    "solver": Key("choice", choices=("incompressible", "compressible")),
-    "gas": Key("choice", choices=GASES),
-    "sector": Key("choice", choices=SECTORS),
-    "domain": Key("choice", choices=DOMAINS),
-    "turbulence": Key("choice", choices=TURBULENCE),
-    "level": Key(low=4, high=9),
-    "iterations": Key("integer", low=20, high=100_000),
-    "average": Key("integer", low=10, high=100_000),
-    "start": Key("choice", choices=STARTS),
-    "zone": Key("choice", choices=ZONES),
-}
-SCHEMA: dict[str, dict[str, Key]] = {
-    "": {
-        "schema": Key("choice", required=True, choices=(SCHEMA_NAME,)),
-        "name": Key("text", required=True),
-        "title": Key("text"),
-        "case": Key("text", required=True),
-        "grid_study": Key("text"),
-    },
-    "defaults": POINT,
-    "point": POINT,
-    "duct": {
-        "length_mm": Key(unit="mm", low=1, high=10_000, required=True),
-        "lip_radius_mm": Key(unit="mm", low=0, high=1000),
-        "rotor_position_mm": Key(unit="mm", low=-1000, high=10_000),
-        "exit_area_ratio": Key(low=0.3, high=3, required=True),
-    },
-}
+
+class PointTable(RunRanges):
+    """[defaults], [[points]] and, as lists, [axes]: one CFD run; what is left out is the case's."""
+
+    J: float | None = entry("advance ratio, with rpm and instead of airspeed_m_s", low=0, high=5)
+    pitch_offset_deg: float | None = entry("turns the whole blade", "deg", -30, 30)
+    tip_gap_pct_R: float | None = entry("tip gap, with a duct", "% of R", 0.1, 10)
+    wall_distance_over_R: float | None = entry("round plate behind the rotor", "R", 0.2, 20)
+    plate_radius_over_R: float | None = entry("radius of that plate", "R", 0.5, 5)
+    solver: Literal["incompressible", "compressible"] | None = entry("left out: by the tip Mach number")
+    gas: str | None = entry("of the compressible solver", choices=GASES)
+    sector: str | None = entry("part of the disk that is meshed; the smallest that fits if left out", choices=SECTORS)
+    domain: str | None = entry("free air, or a pipe of the rotor's diameter", choices=DOMAINS)
+    turbulence: str | None = entry("model", choices=TURBULENCE)
+    iterations: int | None = entry("of the solver", low=20, high=100_000)
+    average: int | None = entry("last iterations that are averaged", low=10, high=100_000)
+    start: Literal["neighbour", "slipstream"] | None = entry("run on the same grid, or momentum theory")
+    zone: str | None = entry("how the rotating zone is bounded", choices=ZONES)
+
+
+def _listed(field: FieldInfo) -> Any:
+    kind: Any = next(part for part in get_args(field.annotation) if part is not NoneType)
+    return tuple[kind, ...] | None, entry(field.description or "", limits_of(field))
+
+
+AxesTable: Any = create_model(
+    "AxesTable", __base__=Table, **{name: _listed(field) for name, field in PointTable.model_fields.items()}
+)
+
+
+class CampaignDuct(Table):
+    """[duct]: for runs with tip_gap_pct_R of a case without one."""
+
+    length_mm: float = entry("inlet to exit", "mm", 1, 10_000, required=True)
+    lip_radius_mm: float | None = entry("of the inlet lip", "mm", 0, 1000)
+    rotor_position_mm: float | None = entry("rotor behind the inlet", "mm", -1000, 10_000)
+    exit_area_ratio: float = entry("exit area over swept annulus", "", 0.3, 3, required=True)
+
+
+class CampaignFile(Table):
+    """campaign.toml: CFD runs of one case, every combination of [axes] and each of [[points]]."""
+
+    schema_: Literal["bemt.cfd/1"] = entry("version of the format", required=True, alias="schema")
+    name: str = entry("names the folder of the runs", required=True)
+    title: str | None = entry("one line for people")
+    case: str = entry("case.toml, from here", required=True)
+    grid_study: str | None = entry("folder of the campaign that gives the numerical uncertainty")
+    defaults: PointTable = PointTable()
+    axes: AxesTable = AxesTable()
+    points: tuple[PointTable, ...] = ()
+    duct: CampaignDuct | None = None
 
 
 @dataclass(frozen=True)
 class CampaignPoint:
-    """One run of a campaign.
+    """One run of a campaign."""
 
-    Parameters
-    ----------
-    case : Case
-        The case with the changes of this point.
-    run : Run
-        Operating point, domain, grid and models.
-    values : mapping
-        What the file says for this point, defaults included.
-    warm : bool
-        Whether it may start from the flow of a run on the same grid.
-    """
-
-    case: Case
+    case: Case  # with the changes of this point
     run: Run
-    values: Mapping[str, Any]
-    warm: bool
+    values: Mapping[str, Any]  # what the file says for this point, defaults included
+    warm: bool  # whether it may start from the flow of a run on the same grid
 
 
 @dataclass(frozen=True)
 class Campaign:
-    """A checked campaign.
-
-    Parameters
-    ----------
-    path : Path
-        Its file; recording and manifest stand beside it.
-    name, title : str
-        Names.
-    case : Case
-        The case, unchanged.
-    points : tuple of CampaignPoint
-        In the order in which they run.
-    grid_study : Path or None
-        Folder of the campaign whose grid study gives the numerical uncertainty.
-    """
+    """A checked campaign; recording and manifest stand beside its file."""
 
     path: Path
     name: str
     title: str
     case: Case
     points: tuple[CampaignPoint, ...]
-    grid_study: Path | None
+    grid_study: Path | None  # folder of the campaign that gives the numerical uncertainty
 
 
 def load_campaign(path: str | Path) -> Campaign:
@@ -114,72 +104,44 @@ def load_campaign(path: str | Path) -> Campaign:
     document = load_toml(path, out)
     if document is None:
         raise InputError(out.faults)
-    tables = ("defaults", "axes", "points", "duct")
-    check_table(out, "", document, SCHEMA, subtables=tables)
+    file = validated(CampaignFile, document, out)
     check_name(out, document.get("name"))  # the default work folder bears it
-    for table in ("defaults", "duct"):
-        if table in document:
-            check_table(out, table, document[table], SCHEMA)
-    rows = _rows(out, document)
     case = None
     if isinstance(document.get("case"), str) and document["case"].strip():
         try:
             case = load_case(path.parent / document["case"])
         except InputError as error:
             out.faults += error.faults
-    points = []
-    if case is not None and not out.faults:
-        for where, row in rows:
-            points += _point(out, where, row, case, document.get("duct"))
+    rows = [] if file is None else _rows(out, file)
+    if case is None or file is None or out.faults:
+        raise InputError(out.faults)
+    points = [p for where, row in rows for p in _point(out, where, row, case, file.duct)]
     if out.faults:
         raise InputError(out.faults)
-    assert case is not None
-    study = document.get("grid_study")
-    return Campaign(path, document["name"], document.get("title", document["name"]), case, tuple(points),
-                    None if study is None else path.parent / study)  # fmt: skip
+    study = None if file.grid_study is None else path.parent / file.grid_study
+    return Campaign(path, file.name, file.title or file.name, case, tuple(points), study)
 
 
-def _rows(out: Collector, document: Mapping[str, Any]) -> list[tuple[str, dict[str, Any]]]:
-    defaults = document.get("defaults", {})
-    defaults = dict(defaults) if isinstance(defaults, Mapping) else {}
-    found: list[tuple[str, dict[str, Any]]] = []
-    axes, listed = document.get("axes", {}), document.get("points", [])
-    if not isinstance(axes, Mapping):
-        out.add("axes", shown(axes), "a table [axes]")
-        axes = {}
-    for name, values in axes.items():
-        if not isinstance(values, list) or not values:
-            out.add(f"axes.{name}", shown(values), "a list of values")
-    if not isinstance(listed, list):
-        out.add("points", shown(listed), "tables [[points]]")
-        listed = []
-    for i, item in enumerate(listed):
-        if not isinstance(item, Mapping):
-            out.add(f"points[{i}]", shown(item), "a table [[points]]")
-            continue
-        found.append((f"points[{i}]", {**defaults, **item}))
-    if axes and not out.faults:
-        for chosen in itertools.product(*axes.values()):
-            found.append(("axes", {**defaults, **dict(zip(axes, chosen, strict=True))}))
-    before = len(out.faults)
+def _rows(out: Collector, file: CampaignFile) -> list[tuple[str, dict[str, Any]]]:
+    """What is stated of each run, with its place in the file."""
+    defaults, axes = file.defaults.given(), file.axes.given()
+    found = [(f"points[{i}]", defaults | item.given()) for i, item in enumerate(file.points)]
+    if axes:
+        crossed = itertools.product(*axes.values())
+        found += [("axes", defaults | dict(zip(axes, chosen, strict=True))) for chosen in crossed]
     for where, row in found:
-        check_table(out, "point", row, SCHEMA, where=where)
-        if len(out.faults) - before > 20:
-            break
-    for where, row in found:
-        given = {k for k in ("J", "airspeed_m_s") if k in row}
-        if len(given) == 2:
+        if "J" in row and "airspeed_m_s" in row:
             out.add(where, "J and airspeed_m_s", "one of them")
         if "J" in row and "rpm" not in row:
             out.add(where, "J without rpm", "a speed to which it belongs")
-    if not found and not out.faults:
+    if not found:
         out.add("", "no points", "[axes] or [[points]]")
     out.faults = list(dict.fromkeys(out.faults))
     return found
 
 
 def _point(
-    out: Collector, where: str, row: dict[str, Any], case: Case, duct: Mapping[str, Any] | None
+    out: Collector, where: str, row: dict[str, Any], case: Case, duct: CampaignDuct | None
 ) -> list[CampaignPoint]:
     overrides: dict[str, Any] = {}
     if "pitch_offset_deg" in row:
@@ -188,7 +150,7 @@ def _point(
         if duct is None and not case.ducted:
             out.add(f"{where}.tip_gap_pct_R", shown(row["tip_gap_pct_R"]), "a table [duct] or a case with a duct")
             return []
-        overrides |= {f"duct.{key}": value for key, value in (duct or {}).items()}
+        overrides |= {f"duct.{key}": value for key, value in (duct.given() if duct else {}).items()}
         overrides["duct.tip_gap_mm"] = 10.0 * row["tip_gap_pct_R"] * 0.5 * case.diameter_m
     rpm = float(row.get("rpm", case.rpm))
     speed = row.get("airspeed_m_s", row["J"] * rpm / 60 * case.diameter_m if "J" in row else case.airspeed_m_s)

@@ -38,8 +38,9 @@ def run(args: argparse.Namespace) -> int:
         found = summary(args.campaign)
         print(json_text(found) if args.json else summary_text(found), end="")
         return EXIT_OK
-    record = campaigns.run(args.campaign, args.only, args.ranks, args.work, args.keep,
-                           None if args.quiet else _terminal.complain)  # fmt: skip
+    record = campaigns.run(
+        args.campaign, args.only, args.ranks, args.work, args.keep, None if args.quiet else _terminal.complain
+    )
     if args.json:
         print(json_text(campaigns.document(record)), end="")
     elif not args.quiet:

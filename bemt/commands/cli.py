@@ -20,7 +20,7 @@ from typing import Any
 import bemt.commands
 from bemt import __version__
 from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError, system_fault
-from bemt.commands._terminal import called
+from bemt.commands._terminal import called, coloured
 
 __all__ = ["build_parser", "commands", "main"]
 
@@ -125,8 +125,12 @@ def build_parser() -> argparse.ArgumentParser:
     parser.found, parser.parsers = commands(), {}
     for name, module in parser.found.items():
         # a percent sign in help is argparse's own
-        one = adder.add_parser(name, help=module.HELP, description=f"{module.HELP[0].upper()}{module.HELP[1:]}.",
-                               epilog=f"example: {parser.prog} {module.EXAMPLE}")  # fmt: skip
+        one = adder.add_parser(
+            name,
+            help=module.HELP,
+            description=f"{module.HELP[0].upper()}{module.HELP[1:]}.",
+            epilog=f"example: {parser.prog} {module.EXAMPLE}",
+        )
         module.arguments(one)
         parser.parsers[name] = one
     return parser
@@ -146,12 +150,17 @@ def _check_folders(args: argparse.Namespace) -> None:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line."""
+    """Run the command line; colour where a terminal has it."""
+    with coloured():
+        return _main(sys.argv[1:] if argv is None else list(argv))
+
+
+def _main(argv: list[str]) -> int:
     for stream in (sys.stdout, sys.stderr):  # a terminal that is not UTF-8 must not end a run
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
     parser = build_parser()
-    if not (sys.argv[1:] if argv is None else argv):
+    if not argv:
         parser.print_help()
         return EXIT_OK
     args = parser.parse_args(argv)

@@ -61,8 +61,9 @@ def run(args: argparse.Namespace) -> int:
                                  airspeed_m_s=args.airspeed)  # fmt: skip
     with _terminal.progress(args.quiet or args.json) as say:
         channels = [_CHANNELS[c] for c in args.channels or ()] or None
-        answer = diagnose(recordings, cases, args.only or None, say, baseline=args.baseline, given=_given(args),
-                          channels=channels)  # fmt: skip
+        answer = diagnose(
+            recordings, cases, args.only or None, say, baseline=args.baseline, given=_given(args), channels=channels
+        )
     blade = along(cases[0], Path(args.along)) if args.along else {}
     found = document(answer) | {"recordings": list(args.recordings), "cases": [c.name for c in cases]}
     if blade:

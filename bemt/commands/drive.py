@@ -47,8 +47,9 @@ def run(args: argparse.Namespace) -> int:
     if args.kv is not None or args.cells is not None:
         from bemt.drive import new_folder
 
-        estimate = new_folder.estimate_of(args.case, args.kv, args.cells, args.mass, args.rotors, args.capacity,
-                                          args.airspeed)  # fmt: skip
+        estimate = new_folder.estimate_of(
+            args.case, args.kv, args.cells, args.mass, args.rotors, args.capacity, args.airspeed
+        )
         if args.out:
             for name, content in (("drive.json", json_text(estimate.to_dict())), ("drive.txt", estimate.text)):
                 write_atomic(Path(args.out) / name, content)

@@ -9,7 +9,7 @@ from bemt.commands import _options
 from bemt.commands._terminal import called
 
 NAME = "new"
-HELP = "write a case folder from a label, a file of stations or a fan's diameter"
+HELP = "write a case folder from a label, stations, a scan or a fan's diameter"
 GROUP = "Propellers and fans"
 EXAMPLE = "new 10x5 --kv 1000 --cells 3"
 
@@ -19,6 +19,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     label = "diameter x pitch in inches, blades if not 2: 10x5, 8x4.5x3; with --fan the diameter alone: 70mm"
     parser.add_argument("label", nargs="?", metavar="LABEL", help=label)
     table = "blade in a file: CSV r_over_R,chord_over_R,beta_deg; UIUC geometry; APC PE0"
+    solid = "blade in a scan or CAD model (STL, OBJ, STEP); LABEL then names the case"
+    parser.add_argument("--scan", metavar="FILE", help=solid)
+    parser.add_argument("--unit", choices=("mm", "m", "in"), help="with --scan: of a file that does not state it")
     parser.add_argument("--stations", metavar="FILE", help=table)
     parser.add_argument("--diameter-mm", type=float, metavar="D", help="with --stations: diameter [mm]")
     parser.add_argument("--fan", action="store_true", help="a ducted fan")
@@ -36,10 +39,8 @@ def run(args: argparse.Namespace) -> int:
 
     from bemt.drive import new_folder
 
-    folder, files = new_folder.write(
-        args.label, args.stations, args.diameter_mm, args.fan, args.blades, args.rpm, args.airspeed, args.kv,
-        args.cells, args.out,
-    )  # fmt: skip
+    told = {name: value for name, value in vars(args).items() if name in new_folder.Wanted.__dataclass_fields__}
+    folder, files = new_folder.write(new_folder.Wanted(**told, airspeed_m_s=args.airspeed), args.out)
     print(f"{folder.as_posix()}: {', '.join(files)}")
     typed = shlex.quote(folder.as_posix())
     print(f"next: {called()} sweep {typed}")

@@ -38,22 +38,13 @@ REPEAT_VOLTAGE = 0.005
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """One quantity over pulse width.
+    """One quantity over pulse width."""
 
-    Parameters
-    ----------
-    pulse_us, values : (K,) float
-        Nodes [us] and values in the unit of the quantity, not falling.
-    exponent : float
-        Power of V / V_ref; 0 when the voltage is no parameter. [-]
-    smoothness : float
-        Penalty chosen. [-]
-    """
-
+    # (K,) nodes [us] and values in the unit of the quantity, not falling
     pulse_us: Array
     values: Array
-    exponent: float = 0.0
-    smoothness: float = 0.0
+    exponent: float = 0.0  # power of V / V_ref; 0 when the voltage is no parameter. [-]
+    smoothness: float = 0.0  # penalty chosen. [-]
 
     def at(self, pulse_us: ArrayLike) -> Array:
         """Evaluate at the reference voltage; NaN outside the recorded pulse widths, (N,)."""
@@ -69,30 +60,14 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class BenchMap:
-    """Map of one drive.
+    """Map of one drive."""
 
-    Parameters
-    ----------
-    curves : mapping of str to Curve
-        thrust [N], rpm [rev/min], current [A], power [W], as recorded.
-    voltage : Curve or None
-        Voltage that belongs to a pulse width, as minus its value (it falls). [V]
-    voltage_ref : float
-        V_ref, NaN when no voltage was recorded. [V]
-    voltage_range : tuple of float
-        Least and greatest voltage recorded. [V]
-    notes : tuple of str
-        What was assumed.
-    points : MapPoints or None
-        What it was fitted to.
-    """
-
-    curves: dict[str, Curve]
-    voltage: Curve | None
-    voltage_ref: float
-    voltage_range: tuple[float, float]
-    notes: tuple[str, ...] = ()
-    points: MapPoints | None = field(default=None, repr=False)
+    curves: dict[str, Curve]  # thrust [N], rpm [rev/min], current [A], power [W], as recorded
+    voltage: Curve | None  # voltage that belongs to a pulse width, as minus its value (it falls). [V]
+    voltage_ref: float  # V_ref, NaN when no voltage was recorded. [V]
+    voltage_range: tuple[float, float]  # least and greatest voltage recorded. [V]
+    notes: tuple[str, ...] = ()  # what was assumed
+    points: MapPoints | None = field(default=None, repr=False)  # what it was fitted to
 
     @property
     def with_voltage(self) -> bool:

@@ -1,149 +1,151 @@
-"""``drive.toml``: battery, ESC, motor and vehicle that belong to the rotor of a case.
-
-::
-
-    schema = "bemt.drive/1"
-
-    [battery]
-    cells = 6
-    capacity_Ah = 5.0
-    resistance_mohm = 20.0          # of the pack with leads
-    soc = 1.0                       # state of charge at the start
-    soc_min = 0.2                   # where a flight ends
-    # soc_table, ocv_cell_V: open-circuit voltage of a cell; a lithium polymer cell by default
-
-    [esc]
-    pulse_min_us = 1000
-    pulse_max_us = 2000
-    exponent = 1.0                  # duty = share of the pulse width to this power
-    resistance_mohm = 5.0
-    idle_A = 0.05
-    current_limit_A = 95
-    braking = "yes"                 # complementary switching; "no": diodes
-    brake_on_stop = 1.0             # brake force at no throttle; 0: the rotor coasts (firmware setting of that name)
-    # pwm_kHz: switching frequency; with motor.inductance_uH it says when a current through diodes stops
-
-    [motor]
-    name = "HET 700-68-1400"
-    kv_rpm_V = 1400
-    resistance_mohm = 12.0
-    no_load_A = 3.0
-    inertia_kg_mm2 = 20.0           # of the turning part
-    heat_capacity_J_K = 60.0        # these two or none: without them the motor stays cold
-    thermal_K_W = 1.5
-    max_temperature_C = 120
-    # inductance_uH (between lines) and pole_pairs: reactance of the winding
-
-    [rotor]
-    inertia_kg_mm2 = 8.0
-
-    [vehicle]
-    mass_kg = 6.5
-    rotors = 2                      # that share the battery
-
-    [[assumed]]
-    key = "motor.resistance_mohm"
-    why = "no data sheet at hand"
-"""
+"""``drive.toml``: battery, ESC, motor and vehicle that belong to the rotor of a case."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Literal
 
-from bemt.base.errors import InputError
-from bemt.base.toml import Collector, Key, check_table, load_toml
+import numpy as np
+
+from bemt.base.toml import Table, entry, read_model
 from bemt.drive.drive_model import LIPO_SOC, LIPO_V, Battery, Drive, Esc, Motor
 from bemt.drive.rotor_table import RotorMap
 
-__all__ = ["SCHEMA", "DriveFile", "read"]
-
-SCHEMA = "bemt.drive/1"
+__all__ = ["DriveFile", "DriveToml", "read"]
 
 
 def _slip_mohm(value: float) -> str:
     return "Is that in ohm? Write milliohm" if 0.0 < value < 0.05 else ""
 
 
-TABLES: dict[str, dict[str, Key]] = {
-    "": {"schema": Key("choice", choices=(SCHEMA,), required=True)},
-    "battery": {
-        "cells": Key("integer", low=1, high=60, required=True),
-        "capacity_Ah": Key(unit="A h", low=0.01, high=1000.0, required=True),
-        "resistance_mohm": Key(unit="mohm", low=0.0, high=5000.0, required=True, suspect=_slip_mohm),
-        "soc": Key(low=0.01, high=1.0), "soc_min": Key(low=0.0, high=0.99),
-        "soc_table": Key("numbers", low=0.0, high=1.0), "ocv_cell_V": Key("numbers", unit="V", low=0.5, high=5.0),
-    },
-    "esc": {
-        "pulse_min_us": Key(unit="us", low=0.0, high=5000.0), "pulse_max_us": Key(unit="us", low=1.0, high=5000.0),
-        "exponent": Key(low=0.2, high=5.0),
-        "resistance_mohm": Key(unit="mohm", low=0.0, high=1000.0, suspect=_slip_mohm),
-        "idle_A": Key(unit="A", low=0.0, high=5.0), "current_limit_A": Key(unit="A", low=0.1, high=1000.0),
-        "braking": Key("choice", choices=("yes", "no")), "name": Key("text"),
-        "brake_on_stop": Key(low=0.0, high=1.0),
-        "pwm_kHz": Key(unit="kHz", low=0.1, high=1000.0),
-    },
-    "motor": {
-        "name": Key("text"), "kv_rpm_V": Key(unit="rev/min/V", low=1.0, high=50000.0, required=True),
-        "resistance_mohm": Key(unit="mohm", low=0.01, high=50000.0, required=True, suspect=_slip_mohm),
-        "no_load_A": Key(unit="A", low=0.0, high=100.0, required=True),
-        "inertia_kg_mm2": Key(unit="kg mm2", low=0.0, high=1e7, required=True),
-        "heat_capacity_J_K": Key(unit="J/K", low=0.01, high=1e6),
-        "thermal_K_W": Key(unit="K/W", low=0.001, high=1000.0),
-        "ambient_C": Key(unit="C", low=-60.0, high=60.0), "max_temperature_C": Key(unit="C", low=20.0, high=400.0),
-        "inductance_uH": Key(unit="uH", low=0.01, high=1e5), "pole_pairs": Key("integer", low=1, high=200),
-    },
-    "rotor": {"inertia_kg_mm2": Key(unit="kg mm2", low=0.0, high=1e7, required=True)},
-    "vehicle": {
-        "mass_kg": Key(unit="kg", low=0.001, high=1e5, required=True),
-        "rotors": Key("integer", low=1, high=64, required=True),
-    },
-    "assumed": {"key": Key("text", required=True), "why": Key("text", required=True)},
-}  # fmt: skip
+class BatteryTable(Table):
+    """[battery]: of the whole vehicle."""
+
+    cells: int = entry("in series", low=1, high=60, required=True)
+    capacity_Ah: float = entry("charge", "A h", 0.01, 1000.0, required=True)
+    resistance_mohm: float = entry("of the pack with leads", "mohm", 0.0, 5000.0, _slip_mohm, required=True)
+    soc: float = entry("state of charge at the start", "", 0.01, 1.0, default=1.0)
+    soc_min: float = entry("state of charge where a flight ends", "", 0.0, 0.99, default=0.2)
+    soc_table: tuple[float, ...] = entry("states of charge of ocv_cell_V, rising", "", 0.0, 1.0, default=LIPO_SOC)
+    ocv_cell_V: tuple[float, ...] = entry("open-circuit voltages of a cell", "V", 0.5, 5.0, default=LIPO_V)
+
+    def rules(self) -> Iterable[tuple[str, ...]]:
+        """A flight ends below its start; the table of voltages is whole."""
+        if self.soc_min >= self.soc:
+            yield "soc_min", f"{self.soc_min:g}", "less than soc"
+        if ("soc_table" in self.model_fields_set) != ("ocv_cell_V" in self.model_fields_set):
+            yield "ocv_cell_V", "one of soc_table, ocv_cell_V", "both or none"
+        elif not len(self.soc_table) == len(self.ocv_cell_V) > 1 or np.any(np.diff(self.soc_table) <= 0):
+            yield "soc_table", "lists that do not fit", "rising values, as many as ocv_cell_V, 2 or more"
+
+
+class EscTable(Table):
+    """[esc]: controller."""
+
+    name: str | None = entry("of the controller")
+    pulse_min_us: float = entry("pulse width of no throttle", "us", 0.0, 5000.0, default=1000.0)
+    pulse_max_us: float = entry("pulse width of full throttle", "us", 1.0, 5000.0, default=2000.0)
+    exponent: float = entry("duty = share of the pulse width to this power", "", 0.2, 5.0, default=1.0)
+    resistance_mohm: float = entry("of the switches", "mohm", 0.0, 1000.0, _slip_mohm, default=0.0)
+    idle_A: float = entry("own current", "A", 0.0, 5.0, default=0.0)
+    current_limit_A: float | None = entry("of the battery side; no limit if left out", "A", 0.1, 1000.0)
+    braking: Literal["yes", "no"] = entry("complementary switching (yes) or diodes (no)", default="yes")
+    brake_on_stop: float = entry("brake force at no throttle; 0: the rotor coasts", "", 0.0, 1.0, default=1.0)
+    pwm_kHz: float | None = entry(
+        "switching frequency; with motor.inductance_uH: when a current through diodes stops", "kHz", 0.1, 1000.0
+    )
+
+    def rules(self) -> Iterable[tuple[str, ...]]:
+        """Pulse widths in order."""
+        if self.pulse_max_us <= self.pulse_min_us:
+            yield "pulse_max_us", f"{self.pulse_max_us:g}", "more than pulse_min_us"
+
+
+class MotorTable(Table):
+    """[motor]: machine."""
+
+    name: str | None = entry("of the motor")
+    kv_rpm_V: float = entry("speed constant", "rev/min/V", 1.0, 50000.0, required=True)
+    resistance_mohm: float = entry("between two leads", "mohm", 0.01, 50000.0, _slip_mohm, required=True)
+    no_load_A: float = entry("current without load", "A", 0.0, 100.0, required=True)
+    inertia_kg_mm2: float = entry("of the turning part", "kg mm2", 0.0, 1e7, required=True)
+    heat_capacity_J_K: float | None = entry("of the winding; it stays cold if left out", "J/K", 0.01, 1e6)
+    thermal_K_W: float | None = entry("winding to air; with heat_capacity_J_K", "K/W", 0.001, 1000.0)
+    ambient_C: float = entry("air around it", "C", -60.0, 60.0, default=25.0)
+    max_temperature_C: float | None = entry("of the winding", "C", 20.0, 400.0)
+    inductance_uH: float | None = entry("between two leads", "uH", 0.01, 1e5)
+    pole_pairs: int | None = entry("for the reactance of the winding", low=1, high=200)
+
+    def rules(self) -> Iterable[tuple[str, ...]]:
+        """Heat needs both numbers, reactance needs the inductance."""
+        if (self.heat_capacity_J_K is None) != (self.thermal_K_W is None):
+            yield "thermal_K_W", "one of heat_capacity_J_K, thermal_K_W", "both or none"
+        if self.pole_pairs is not None and self.inductance_uH is None:
+            yield "inductance_uH", "nothing", "a value, as motor.pole_pairs is given"
+
+
+class TurningTable(Table):
+    """[rotor]: what the case does not say of it."""
+
+    inertia_kg_mm2: float = entry("of the rotor", "kg mm2", 0.0, 1e7, required=True)
+
+
+class VehicleTable(Table):
+    """[vehicle]: what flies."""
+
+    mass_kg: float = entry("of all", "kg", 0.001, 1e5, required=True)
+    rotors: int = entry("that share the battery", low=1, high=64, required=True)
+
+
+class AssumedTable(Table):
+    """[[assumed]]: a value of this file that no source states."""
+
+    key: str = entry("dotted key, as motor.kv_rpm_V", required=True)
+    why: str = entry("where it comes from", required=True)
+
+
+class DriveToml(Table):
+    """drive.toml: battery, ESC, motor and vehicle that belong to the rotor of a case."""
+
+    schema_: Literal["bemt.drive/1"] = entry("version of the format", required=True, alias="schema")
+    battery: BatteryTable
+    esc: EscTable = EscTable()
+    motor: MotorTable
+    rotor: TurningTable
+    vehicle: VehicleTable | None = None
+    assumed: tuple[AssumedTable, ...] = ()
+
+    def rules(self) -> Iterable[tuple[str, ...]]:
+        """What joins battery, controller, motor and rotor."""
+        if self.esc.pwm_kHz is not None and self.motor.inductance_uH is None:
+            yield "motor.inductance_uH", "nothing", "a value, as esc.pwm_kHz is given"
+        if self.rotor.inertia_kg_mm2 + self.motor.inertia_kg_mm2 <= 0.0:
+            yield "rotor.inertia_kg_mm2", "0 with a motor of 0", "more than 0 together"
+        for i, item in enumerate(self.assumed):
+            table, _, key = item.key.partition(".")
+            home = self.inner(table) if table in self.named() and table != "assumed" else None
+            if home is None or key not in home.named():
+                yield f"assumed[{i}].key", repr(item.key), "a dotted key of this file, as motor.kv_rpm_V"
 
 
 @dataclass(frozen=True, eq=False)
 class DriveFile:
-    """A drive.toml, read.
-
-    Parameters
-    ----------
-    path : Path
-        Of the file.
-    battery : Battery
-        Share of one rotor: its capacity over the rotors, its resistance times them.
-    esc : Esc
-        Controller.
-    motor : Motor
-        Machine.
-    rotor_inertia_kg_m2 : float
-        Of the rotor. [kg m2]
-    soc, soc_min : float
-        State of charge at start and end. [1]
-    mass_kg : float
-        Of the vehicle, NaN without one. [kg]
-    rotors : int
-        That share the battery.
-    max_temperature_C : float
-        Of the winding, NaN when not stated. [C]
-    assumed : mapping of str to str
-        Values that no source states, with the reason.
-    """
+    """A drive.toml as the drive is solved: battery and its resistance are the share of one rotor."""
 
     path: Path
     battery: Battery
     esc: Esc
     motor: Motor
     rotor_inertia_kg_m2: float
-    soc: float
-    soc_min: float
-    mass_kg: float
-    rotors: int
-    max_temperature_C: float
-    assumed: Mapping[str, str]
+    soc: float  # at the start
+    soc_min: float  # where a flight ends
+    mass_kg: float  # of the vehicle, NaN without one
+    rotors: int  # that share the battery
+    max_temperature_C: float  # of the winding, NaN when not stated
+    assumed: Mapping[str, str]  # key to reason
 
     def drive(self, rotor: RotorMap) -> Drive:
         """Put the drive of a rotor together."""
@@ -157,70 +159,28 @@ class DriveFile:
 
 def read(path: Path) -> DriveFile:
     """Read a drive.toml."""
-    out = Collector(path.as_posix())
-    doc = load_toml(path, out)
-    if doc is None:
-        raise InputError(out.faults)
-    tops = [name for name in TABLES if name]
-    check_table(out, "", {k: v for k, v in doc.items() if k not in tops}, TABLES, subtables=tops)
-    for name in ("battery", "esc", "motor", "rotor", "vehicle"):
-        if name in doc:
-            check_table(out, name, doc[name], TABLES)
-        elif name not in ("esc", "vehicle"):
-            out.add(name, "nothing", f"a table [{name}]")
-    assumed = doc.get("assumed", [])
-    for i, item in enumerate(assumed if isinstance(assumed, list) else [assumed]):
-        check_table(out, "assumed", item, TABLES, where=f"assumed[{i}]")
-    if not out.faults:
-        _consistent(doc, out)
-    if out.faults:
-        raise InputError(out.faults)
-    b, e, m = doc["battery"], doc.get("esc", {}), doc["motor"]
-    vehicle = doc.get("vehicle", {})
-    n = int(vehicle.get("rotors", 1))
-    battery = Battery(
-        int(b["cells"]), n * b["resistance_mohm"] * 1e-3, b["capacity_Ah"] / n, tuple(b.get("soc_table", LIPO_SOC)),
-        tuple(b.get("ocv_cell_V", LIPO_V)),
-    )  # fmt: skip
-    esc = Esc(
-        e.get("pulse_min_us", 1000.0), e.get("pulse_max_us", 2000.0), e.get("exponent", 1.0),
-        e.get("resistance_mohm", 0.0) * 1e-3, e.get("idle_A", 0.0), e.get("current_limit_A", math.inf),
-        e.get("braking", "yes") == "yes",
-        e.get("brake_on_stop", 1.0),
-        2e-3 * m["inductance_uH"] * e["pwm_kHz"] if "inductance_uH" in m and "pwm_kHz" in e else math.inf,
-    )  # fmt: skip
-    motor = Motor(
-        m["kv_rpm_V"], m["resistance_mohm"] * 1e-3, m["no_load_A"], m["inertia_kg_mm2"] * 1e-6,
-        m.get("heat_capacity_J_K", math.inf), m.get("thermal_K_W", 0.0), m.get("ambient_C", 25.0),
-        m["pole_pairs"] * m["inductance_uH"] * 1e-6 if "pole_pairs" in m else 0.0,
-    )  # fmt: skip
+    file = read_model(DriveToml, path)
+    b, e, m = file.battery, file.esc, file.motor
+    n = file.vehicle.rotors if file.vehicle else 1
+    henry = None if m.inductance_uH is None else m.inductance_uH * 1e-6
     return DriveFile(
-        path, battery, esc, motor, doc["rotor"]["inertia_kg_mm2"] * 1e-6, b.get("soc", 1.0), b.get("soc_min", 0.2),
-        vehicle.get("mass_kg", math.nan), n, m.get("max_temperature_C", math.nan),
-        {item["key"]: item["why"] for item in assumed},
+        path=path,
+        battery=Battery(b.cells, n * b.resistance_mohm * 1e-3, b.capacity_Ah / n, b.soc_table, b.ocv_cell_V),
+        esc=Esc(
+            e.pulse_min_us, e.pulse_max_us, e.exponent, e.resistance_mohm * 1e-3, e.idle_A,
+            _or(e.current_limit_A, math.inf), e.braking == "yes", e.brake_on_stop,
+            math.inf if henry is None or e.pwm_kHz is None else 2e3 * henry * e.pwm_kHz,
+        ),
+        motor=Motor(
+            m.kv_rpm_V, m.resistance_mohm * 1e-3, m.no_load_A, m.inertia_kg_mm2 * 1e-6,
+            _or(m.heat_capacity_J_K, math.inf), _or(m.thermal_K_W, 0.0), m.ambient_C,
+            0.0 if henry is None or m.pole_pairs is None else m.pole_pairs * henry,
+        ),
+        rotor_inertia_kg_m2=file.rotor.inertia_kg_mm2 * 1e-6, soc=b.soc, soc_min=b.soc_min,
+        mass_kg=file.vehicle.mass_kg if file.vehicle else math.nan, rotors=n,
+        max_temperature_C=_or(m.max_temperature_C, math.nan), assumed={item.key: item.why for item in file.assumed},
     )  # fmt: skip
 
 
-def _consistent(doc: Mapping[str, Any], out: Collector) -> None:
-    b, e, m = doc["battery"], doc.get("esc", {}), doc["motor"]
-    if e.get("pulse_max_us", 2000.0) <= e.get("pulse_min_us", 1000.0):
-        out.add("esc.pulse_max_us", f"{e.get('pulse_max_us', 2000.0):g}", "more than pulse_min_us")
-    if ("soc_table" in b) != ("ocv_cell_V" in b):
-        out.add("battery.ocv_cell_V", "one of soc_table, ocv_cell_V", "both or none")
-    elif "soc_table" in b:
-        rising = all(x < y for x, y in zip(b["soc_table"][:-1], b["soc_table"][1:], strict=True))
-        if len(b["soc_table"]) != len(b["ocv_cell_V"]) or len(b["soc_table"]) < 2 or not rising:
-            out.add("battery.soc_table", "lists that do not fit", "rising values, as many as ocv_cell_V, 2 or more")
-    if ("heat_capacity_J_K" in m) != ("thermal_K_W" in m):
-        out.add("motor.thermal_K_W", "one of heat_capacity_J_K, thermal_K_W", "both or none")
-    for key, has in (("esc.pwm_kHz", "pwm_kHz" in e), ("motor.pole_pairs", "pole_pairs" in m)):
-        if has and "inductance_uH" not in m:
-            out.add("motor.inductance_uH", "nothing", f"a value, as {key} is given")
-    if b.get("soc_min", 0.2) >= b.get("soc", 1.0):
-        out.add("battery.soc_min", f"{b.get('soc_min', 0.2):g}", "less than soc")
-    if doc["rotor"]["inertia_kg_mm2"] + m["inertia_kg_mm2"] <= 0.0:
-        out.add("rotor.inertia_kg_mm2", "0 with a motor of 0", "more than 0 together")
-    for i, item in enumerate(doc.get("assumed", [])):
-        table, _, key = item["key"].partition(".")
-        if key not in TABLES.get(table, {}) or table in ("", "assumed"):
-            out.add(f"assumed[{i}].key", repr(item["key"]), "a dotted key of this file, as motor.kv_rpm_V")
+def _or(value: float | None, otherwise: float) -> float:
+    return otherwise if value is None else value

@@ -54,23 +54,12 @@ REFERENCE_C = 25.0
 
 @dataclass(frozen=True)
 class Battery:
-    """Source with one resistance.
+    """Source with one resistance."""
 
-    Parameters
-    ----------
-    cells : int
-        In series.
-    resistance_ohm : float
-        Of the pack with its leads, as seen by one drive. [ohm]
-    capacity_Ah : float
-        Share of one drive. [A h]
-    soc_table, ocv_V : tuple of float
-        State of charge, rising [1], and open-circuit voltage of a cell [V].
-    """
-
-    cells: int
-    resistance_ohm: float
-    capacity_Ah: float = math.nan
+    cells: int  # in series
+    resistance_ohm: float  # of the pack with its leads, as seen by one drive. [ohm]
+    capacity_Ah: float = math.nan  # share of one drive. [A h]
+    # state of charge, rising [1], and open-circuit voltage of a cell [V]
     soc_table: tuple[float, ...] = LIPO_SOC
     ocv_V: tuple[float, ...] = LIPO_V
 
@@ -122,34 +111,17 @@ class Esc:
 
 @dataclass(frozen=True)
 class Motor:
-    """Brushless motor as a direct-current machine.
+    """Brushless motor as a direct-current machine."""
 
-    Parameters
-    ----------
-    kv_rpm_V : float
-        Speed constant. [rev/min/V]
-    resistance_ohm : float
-        Between lines, at 25 C. [ohm]
-    no_load_A : float
-        Current that covers friction and iron. [A]
-    inertia_kg_m2 : float
-        Of the turning part. [kg m2]
-    heat_capacity_J_K, thermal_K_W : float
-        Of the winding [J/K]; to the air [K/W].
-    ambient_C : float
-        Temperature of the air. [C]
-    reactance_ohm_s : float
-        p L: pole pairs and inductance between lines; reactance over speed. [ohm s/rad]
-    """
-
-    kv_rpm_V: float
-    resistance_ohm: float
-    no_load_A: float = 0.0
-    inertia_kg_m2: float = 0.0
+    kv_rpm_V: float  # speed constant. [rev/min/V]
+    resistance_ohm: float  # between lines, at 25 C. [ohm]
+    no_load_A: float = 0.0  # current that covers friction and iron. [A]
+    inertia_kg_m2: float = 0.0  # of the turning part. [kg m2]
+    # of the winding [J/K]; to the air [K/W]
     heat_capacity_J_K: float = math.inf
     thermal_K_W: float = 0.0
-    ambient_C: float = REFERENCE_C
-    reactance_ohm_s: float = 0.0
+    ambient_C: float = REFERENCE_C  # temperature of the air. [C]
+    reactance_ohm_s: float = 0.0  # p L: pole pairs and inductance between lines; reactance over speed. [ohm s/rad]
 
     def k(self, temperature_C: ArrayLike = REFERENCE_C) -> Array:
         """EMF per speed and torque per current, (N,) [V s/rad]."""
@@ -164,63 +136,34 @@ class Motor:
 
 @dataclass(frozen=True)
 class Steady:
-    """Steady answers at N pulse widths; zero speed where the motor cannot start.
+    """Steady answers at N pulse widths; zero speed where the motor cannot start."""
 
-    Attributes
-    ----------
-    pulse_us, duty : (N,) float
-        Pulse width [us] and duty in effect [1].
-    rpm, thrust_N, torque_Nm : (N,) float
-        Speed [rev/min], thrust [N], shaft torque [N m].
-    motor_A, battery_A, voltage_V : (N,) float
-        Currents [A] and voltage at the ESC [V].
-    power_W : (N,) float
-        Drawn from the battery. [W]
-    efficiency : (N,) float
-        Shaft power over `power_W`. [1]
-    limited : (N,) bool
-        Whether the current limit acts.
-    converged : (N,) bool
-        False where the rotor table does not reach; values there are NaN.
-    """
-
+    # (N,) pulse width [us] and duty in effect [1]
     pulse_us: Array
     duty: Array
+    # (N,) speed [rev/min], thrust [N], shaft torque [N m]
     rpm: Array
     thrust_N: Array
     torque_Nm: Array
+    # (N,) currents [A] and voltage at the ESC [V]
     motor_A: Array
     battery_A: Array
     voltage_V: Array
-    power_W: Array
-    efficiency: Array
-    limited: NDArray[np.bool_]
-    converged: NDArray[np.bool_]
+    power_W: Array  # (N,) drawn from the battery. [W]
+    efficiency: Array  # (N,) shaft power over `power_W`. [1]
+    limited: NDArray[np.bool_]  # (N,) whether the current limit acts
+    converged: NDArray[np.bool_]  # (N,) false where the rotor table does not reach; values there are NaN
 
 
 @dataclass(frozen=True)
 class Drive:
-    """One battery share, ESC, motor and rotor.
+    """One battery share, ESC, motor and rotor."""
 
-    Parameters
-    ----------
-    battery : Battery
-        Source.
-    esc : Esc
-        Controller.
-    motor : Motor
-        Machine.
-    rotor : RotorMap
-        Load.
-    off : frozenset of str
-        Effects switched off, see `EFFECTS`.
-    """
-
-    battery: Battery
-    esc: Esc
-    motor: Motor
-    rotor: RotorMap
-    off: frozenset[str] = field(default_factory=frozenset)
+    battery: Battery  # source
+    esc: Esc  # controller
+    motor: Motor  # machine
+    rotor: RotorMap  # load
+    off: frozenset[str] = field(default_factory=frozenset)  # effects switched off, see `EFFECTS`
 
     def without(self, *effects: str) -> Drive:
         """The drive with some effects off."""
@@ -283,9 +226,10 @@ class Drive:
         speed at no load.
         """
         pulse, charge, warm = np.broadcast_arrays(
-            np.atleast_1d(np.asarray(pulse_us, dtype=float)), np.asarray(soc, dtype=float),
+            np.atleast_1d(np.asarray(pulse_us, dtype=float)),
+            np.asarray(soc, dtype=float),
             np.asarray(self.motor.ambient_C if temperature_C is None else temperature_C, dtype=float),
-        )  # fmt: skip
+        )
         voc, duty = self.battery.voc(charge), self.esc.duty(pulse)
         k = self.motor.k(warm)
 

@@ -26,8 +26,6 @@ LOW, HIGH = 0.2, 0.8
 """Shares of full thrust of the step."""
 
 
-
-
 @dataclasses.dataclass(frozen=True)
 class DriveResult:
     """What came out; ``reached`` is False when hover or airspeed is beyond the drive, or a point is unconverged."""
@@ -40,9 +38,12 @@ class DriveResult:
 
 
 def solve(
-    case_path: str | None, drive_path: str | None = None, off: Sequence[str] = (), airspeed: float = 0.0,
+    case_path: str | None,
+    drive_path: str | None = None,
+    off: Sequence[str] = (),
+    airspeed: float = 0.0,
     out: str | None = None,
-) -> DriveResult:  # fmt: skip
+) -> DriveResult:
     """Solve a case with its drive, ``bemt.drive.result/1``; faults of options, case and drive.toml come at once."""
     if not case_path:
         raise InputError(Fault("", "CASE", "nothing", "a case file or its folder", "Or --validate DIR"))
@@ -128,8 +129,10 @@ def text(result: DriveResult) -> str:
         lines.append(f"at full pulse width the winding settles at {words}{over}")
     if (h := doc["hover"]) is not None:
         if math.isfinite(h["pulse_us"]):
-            lines.append(f"hover: {h['wanted_N']:.2f} N of each rotor at {h['pulse_us']:.0f} us, {h['rpm']:.0f} rpm, "
-                         f"{h['battery_A']:.2f} A, {h['power_W']:.1f} W, {h['g_per_W']:.2f} gf/W")  # fmt: skip
+            lines.append(
+                f"hover: {h['wanted_N']:.2f} N of each rotor at {h['pulse_us']:.0f} us, {h['rpm']:.0f} rpm, "
+                f"{h['battery_A']:.2f} A, {h['power_W']:.1f} W, {h['g_per_W']:.2f} gf/W"
+            )
             lines.append(f"endurance: {doc['endurance_s'] / 60.0:.1f} min, to a charge of {doc['soc_end']:.0%}")
         else:
             gives = f"{h['full_N']:.1f} N" if math.isfinite(h["full_N"]) else "none that is known"

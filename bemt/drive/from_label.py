@@ -139,9 +139,11 @@ def _check(
         ("--capacity", capacity_Ah, 0.05, 200.0, "A h", "In mAh? Divide by 1000"),
         ("--airspeed", airspeed_m_s, 0.0, 150.0, "m/s", ""),
     )
-    faults = [Fault("", name, f"{value:g}", f"{low:g} to {high:g} {unit}", hint)
-              for name, value, low, high, unit, hint in rows
-              if value is not None and not low <= value <= high]  # fmt: skip
+    faults = [
+        Fault("", name, f"{value:g}", f"{low:g} to {high:g} {unit}", hint)
+        for name, value, low, high, unit, hint in rows
+        if value is not None and not low <= value <= high
+    ]
     for name, count in (("--cells", cells), ("--rotors", rotors)):
         if math.isfinite(count) and count != int(count):
             faults.append(Fault("", name, f"{count:g}", "a whole number"))
@@ -150,9 +152,14 @@ def _check(
 
 
 def estimate(
-    case: Case, kv: float, cells: int, mass_kg: float | None = None, rotors: int = 1, capacity_Ah: float | None = None,
+    case: Case,
+    kv: float,
+    cells: int,
+    mass_kg: float | None = None,
+    rotors: int = 1,
+    capacity_Ah: float | None = None,
     airspeed_m_s: float = 0.0,
-) -> DriveEstimate:  # fmt: skip
+) -> DriveEstimate:
     """Solve the drive at the middle of every unknown and at its ends; impossible numbers are refused."""
     _check(kv, cells, mass_kg, rotors, capacity_Ah, airspeed_m_s)
     open_V = float(Battery(cells, 0.0).voc(1.0))
@@ -181,29 +188,38 @@ def estimate(
         add(name, True, runs)
     motor = _drive(rotor, kv, cells, rotors, capacity_Ah, middle)
     for item in case.assumptions:
-        drives = [motor if v == item.nominal else replace(motor, rotor=table(case.replaced({item.key: v})))
-                  for v in item.values]  # fmt: skip
+        drives = [
+            motor if v == item.nominal else replace(motor, rotor=table(case.replaced({item.key: v})))
+            for v in item.values
+        ]
         add(item.key, item.discrete, [_answers(d, mass_kg, rotors, capacity_Ah) for d in drives])
     bands = {key: Band(value, math.sqrt(variance[key]), math.sqrt(with_sheet[key])) for key, value in nominal.items()}
     given = {"kv_rpm_V": kv, "cells": cells, "mass_kg": mass_kg, "rotors": rotors, "capacity_Ah": capacity_Ah,
              "airspeed_m_s": airspeed_m_s, "soc": SOC, "resistance_mohm": 1e3 * motor.motor.resistance_ohm,
              "no_load_A": motor.motor.no_load_A, "battery_mohm": 1e3 * motor.battery.resistance_ohm}  # fmt: skip
-    parts = {head: {key.partition(".")[2]: b for key, b in bands.items() if key.startswith(head)}
-             for head in ("full", "hover")}  # fmt: skip
+    parts = {
+        head: {key.partition(".")[2]: b for key, b in bands.items() if key.startswith(head)}
+        for head in ("full", "hover")
+    }
     unknowns = {name: f"{u.low:g} to {u.high:g} ({u.what}; {u.source})" for name, u in POPULATION.items()}
     unknowns |= {item.key: item.range_text for item in case.assumptions}
     return DriveEstimate(case.name, given, parts["full"], parts["hover"], unknowns, _notes(case, kv, cells, nominal))
 
 
 def _drive(
-    rotor: rotor_table.RotorMap, kv: float, cells: int, rotors: int, capacity_Ah: float | None,
+    rotor: rotor_table.RotorMap,
+    kv: float,
+    cells: int,
+    rotors: int,
+    capacity_Ah: float | None,
     unknown: Mapping[str, float],
-) -> Drive:  # fmt: skip
+) -> Drive:
     """Drive whose losses at full throttle are the shares that are assumed."""
     scaled = replace(
-        rotor, thrust_law=_times(rotor.thrust_law, unknown["model_thrust"]),
+        rotor,
+        thrust_law=_times(rotor.thrust_law, unknown["model_thrust"]),
         torque_law=_times(rotor.torque_law, unknown["model_torque"]),
-    )  # fmt: skip
+    )
     volts = float(Battery(cells, 0.0).voc(SOC))
     loaded = volts * (1.0 - unknown["battery_sag"])
     speed = kv * loaded * (1.0 - unknown["winding_drop"]) * math.pi / 30.0
@@ -212,9 +228,11 @@ def _drive(
     amps = max(amps, 1e-3)
     capacity = math.nan if capacity_Ah is None else capacity_Ah / rotors
     return Drive(
-        Battery(cells, volts * unknown["battery_sag"] / amps, capacity), Esc(),
-        Motor(kv, loaded * unknown["winding_drop"] / amps, unknown["idle_share"] * amps), scaled,
-    )  # fmt: skip
+        Battery(cells, volts * unknown["battery_sag"] / amps, capacity),
+        Esc(),
+        Motor(kv, loaded * unknown["winding_drop"] / amps, unknown["idle_share"] * amps),
+        scaled,
+    )
 
 
 def _times(law: Callable[[Any], Any], factor: float) -> Callable[[Any], Any]:
@@ -228,9 +246,14 @@ def _answers(drive: Drive, mass_kg: float | None, rotors: int, capacity_Ah: floa
     out["full.g_per_W"] = 1e3 * out["full.thrust_N"] / KGF / out["full.power_W"]
     mass = HOVER_SHARE * out["full.thrust_N"] / KGF if mass_kg is None else mass_kg / rotors
     h = mission.hover(drive, mass, 1, SOC)
-    out |= {"hover.thrust_N": h.wanted_N, "hover.rpm": h.rpm, "hover.battery_A": h.battery_A,
-            "hover.power_W": h.power_W, "hover.g_per_W": h.g_per_W,
-            "hover.throttle": (h.pulse_us - drive.esc.pulse_min_us) / 1000.0}  # fmt: skip
+    out |= {
+        "hover.thrust_N": h.wanted_N,
+        "hover.rpm": h.rpm,
+        "hover.battery_A": h.battery_A,
+        "hover.power_W": h.power_W,
+        "hover.g_per_W": h.g_per_W,
+        "hover.throttle": (h.pulse_us - drive.esc.pulse_min_us) / 1000.0,
+    }
     if capacity_Ah is None:
         out["hover.minutes"] = 60.0 * (1.0 - SOC_MIN) / (h.battery_A * rotors)
     else:
@@ -252,9 +275,12 @@ def _notes(case: Case, kv: float, cells: int, nominal: Mapping[str, float]) -> t
             f"{first}: without load the tips would run at {tips:.0f} m/s; 95 % of 1088 recorded motors stay below "
             f"{TIPS[2]:.0f}.\n  {kv:g} rev/min/V on {cells}S suits propellers of {fit[0]:.1f} to {fit[1]:.1f} in; a "
             f"propeller of {case.diameter_m / INCH:.3g} in suits {slower[0]:.0f} to {slower[1]:.0f} rev/min/V.\n  "
-            + ("A usual motor would be overloaded and burn: the numbers are those of one large enough not to."
-               if rare else "Racing propellers are run so; the motor gets hot at full throttle.")
-        )  # fmt: skip
+            + (
+                "A usual motor would be overloaded and burn: the numbers are those of one large enough not to."
+                if rare
+                else "Racing propellers are run so; the motor gets hot at full throttle."
+            )
+        )
     mach = math.pi * case.diameter_m * nominal["full.rpm"] / 60.0 / case.air().a_sound
     if mach > 0.8:
         notes.append(f"the tips run at Mach {mach:.2f}: beyond where section tables are good")
@@ -285,14 +311,19 @@ def text(found: DriveEstimate) -> str:
     one = " (one rotor)" if given["rotors"] > 1 else ""
     lines.append(f"{'':<12}{'full throttle' + one:<28}{where + one}")
     rows = (
-        ("speed", "rpm", "rev/min", 1.0), ("thrust", "thrust_N", "N", 1.0), ("", "thrust_N", "gf", 1e3 / KGF),
-        ("current", "battery_A", "A", 1.0), ("power", "power_W", "W", 1.0), ("", "g_per_W", "gf/W", 1.0),
-    )  # fmt: skip
+        ("speed", "rpm", "rev/min", 1.0),
+        ("thrust", "thrust_N", "N", 1.0),
+        ("", "thrust_N", "gf", 1e3 / KGF),
+        ("current", "battery_A", "A", 1.0),
+        ("power", "power_W", "W", 1.0),
+        ("", "g_per_W", "gf/W", 1.0),
+    )
     lines += [f"{name:<12}{_shown(full[key], unit, k):<28}{_shown(hover[key], unit, k)}" for name, key, unit, k in rows]
     lines.append(f"{'throttle':<12}{'100 %':<28}{_shown(hover['throttle'], '%', 100.0)}")
     if not found.reached:
-        lines.append(f"no hover: each rotor must give {hover['thrust_N'].value:.1f} N and gives "
-                     f"{full['thrust_N'].value:.1f} N")  # fmt: skip
+        lines.append(
+            f"no hover: each rotor must give {hover['thrust_N'].value:.1f} N and gives {full['thrust_N'].value:.1f} N"
+        )
     else:
         aloft = "min" if given["capacity_Ah"] is not None else "min for each A h of capacity"
         lines.append(f"{'time aloft':<12}{'':<28}{_shown(hover['minutes'], aloft)}")

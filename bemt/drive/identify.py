@@ -35,34 +35,27 @@ __all__ = [
 
 Array = NDArray[np.float64]
 FREE: dict[str, tuple[float, float, float]] = {
-    "pulse_min_us": (1030.0, 800.0, 1250.0), "pulse_max_us": (1960.0, 1700.0, 2050.0),
-    "resistance_ohm": (0.1, 1e-3, 2.0), "ripple_ohm": (0.3, 1e-2, 1e3),
-    "kv_rpm_V": (1000.0, 50.0, 20000.0), "no_load_A": (0.3, 0.0, 10.0), "kQ": (1e-7, 1e-12, 1e-2),
-}  # fmt: skip
+    "pulse_min_us": (1030.0, 800.0, 1250.0),
+    "pulse_max_us": (1960.0, 1700.0, 2050.0),
+    "resistance_ohm": (0.1, 1e-3, 2.0),
+    "ripple_ohm": (0.3, 1e-2, 1e3),
+    "kv_rpm_V": (1000.0, 50.0, 20000.0),
+    "no_load_A": (0.3, 0.0, 10.0),
+    "kQ": (1e-7, 1e-12, 1e-2),
+}
 """What can be fitted: start and bounds, in the unit of the name; kQ in N m s2/rad2."""
 
 
 @dataclass(frozen=True, eq=False)
 class MapFit:
-    """Drive fitted to a thrust map.
+    """Drive fitted to a thrust map."""
 
-    Parameters
-    ----------
-    drive : Drive
-        The drive, with a battery whose voltage at rest is that of the recording.
-    fitted : mapping of str to float
-        What was fitted, in the unit of its name.
-    kT, kQ : float
-        Rotor constants. [N s2/rad2], [N m s2/rad2]
-    full_thrust_N : float
-        Greatest thrust recorded. [N]
-    """
-
-    drive: Drive
-    fitted: Mapping[str, float]
+    drive: Drive  # the drive, with a battery whose voltage at rest is that of the recording
+    fitted: Mapping[str, float]  # what was fitted, in the unit of its name
+    # rotor constants. [N s2/rad2], [N m s2/rad2]
     kT: float
     kQ: float
-    full_thrust_N: float
+    full_thrust_N: float  # greatest thrust recorded. [N]
 
 
 def no_load(points: MapPoints) -> tuple[float, float]:
@@ -78,16 +71,21 @@ def _rotor_constant(omega: Array, load: Array) -> float:
 
 
 def fit_map(
-    points: MapPoints, known: Mapping[str, float] | None = None, torque_Nm: ArrayLike | None = None,
+    points: MapPoints,
+    known: Mapping[str, float] | None = None,
+    torque_Nm: ArrayLike | None = None,
     diameter_m: float = 0.2,
-) -> MapFit:  # fmt: skip
+) -> MapFit:
     """Fit a drive to a thrust map."""
     from scipy.optimize import least_squares
 
     known = dict(known or {})
     v = points.values
-    faults = [Fault("", name, "no values", "a recorded channel") for name in ("rpm", "current")
-              if np.count_nonzero(np.isfinite(v[name])) < 4]  # fmt: skip
+    faults = [
+        Fault("", name, "no values", "a recorded channel")
+        for name in ("rpm", "current")
+        if np.count_nonzero(np.isfinite(v[name])) < 4
+    ]
     if np.count_nonzero(np.isfinite(v["voltage"])) < 4 and "voltage_V" not in known:
         faults.append(Fault("", "voltage", "no values", "recorded, or stated as voltage_V"))
     if faults:
@@ -110,11 +108,17 @@ def fit_map(
     def built(theta: Mapping[str, float]) -> Drive:
         every = {"exponent": 1.0, **known, **theta}
         ripple = every.get("ripple_ohm", math.inf)
-        esc = Esc(every["pulse_min_us"], every["pulse_max_us"], every["exponent"], braking=math.isinf(ripple),
-                  ripple_ohm=ripple)  # fmt: skip
+        esc = Esc(
+            every["pulse_min_us"],
+            every["pulse_max_us"],
+            every["exponent"],
+            braking=math.isinf(ripple),
+            ripple_ohm=ripple,
+        )
         motor = Motor(every["kv_rpm_V"], every["resistance_ohm"], every["no_load_A"])
-        return Drive(Battery(1, rb, ocv_V=(voc, voc), soc_table=(0.0, 1.0)), esc, motor,
-                     quadratic(kT, every["kQ"], diameter_m))  # fmt: skip
+        return Drive(
+            Battery(1, rb, ocv_V=(voc, voc), soc_table=(0.0, 1.0)), esc, motor, quadratic(kT, every["kQ"], diameter_m)
+        )
 
     def fitted_to(names: list[str], begin: Mapping[str, float]) -> tuple[float, dict[str, float]]:
         low = np.array([math.log(FREE[n][1] + 1e-9) for n in names])
@@ -122,8 +126,11 @@ def fit_map(
 
         def misfit(x: Array) -> Array:
             got = built(dict(zip(names, map(float, np.exp(x)), strict=True))).steady(points.pulse_us)
-            parts = [(got.thrust_N - v["thrust"]) / full["thrust"], (got.rpm - v["rpm"]) / full["rpm"],
-                     0.5 * (got.battery_A - v["current"]) / full["current"]]  # fmt: skip
+            parts = [
+                (got.thrust_N - v["thrust"]) / full["thrust"],
+                (got.rpm - v["rpm"]) / full["rpm"],
+                0.5 * (got.battery_A - v["current"]) / full["current"],
+            ]
             return np.nan_to_num(np.concatenate(parts))
 
         x0 = np.clip([math.log(begin[n] + 1e-9) for n in names], low + 1e-6, high - 1e-6)
@@ -137,8 +144,13 @@ def fit_map(
         less, better = min(tries, key=lambda one: one[0])
         if size * math.log(max(less, 1e-12) / max(cost, 1e-12)) < -math.log(size):
             fitted = better
-    return MapFit(built(fitted), fitted | {"battery_ohm": rb, "voltage_at_rest_V": voc}, kT,
-                  {**known, **fitted}["kQ"], full["thrust"])  # fmt: skip
+    return MapFit(
+        built(fitted),
+        fitted | {"battery_ohm": rb, "voltage_at_rest_V": voc},
+        kT,
+        {**known, **fitted}["kQ"],
+        full["thrust"],
+    )
 
 
 def _battery(current: Array, voltage: Array, known: Mapping[str, float]) -> tuple[float, float]:
@@ -194,6 +206,10 @@ def step_constant(
     motor = replace(drive.motor, inertia_kg_m2=inertia_kg_m2)
     rotor = RotorMap(**{**vars(drive.rotor), "inertia_kg_m2": 0.0})
     t = times_s - times_s[0]
-    got = transient.simulate(replace(drive, motor=motor, rotor=rotor),
-                             [(0.0, before_us), (step_s - float(times_s[0]), after_us)], float(t[-1]), t)  # fmt: skip
+    got = transient.simulate(
+        replace(drive, motor=motor, rotor=rotor),
+        [(0.0, before_us), (step_s - float(times_s[0]), after_us)],
+        float(t[-1]),
+        t,
+    )
     return transient.first_order(t, got.thrust_N).tau_s

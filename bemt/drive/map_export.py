@@ -88,8 +88,11 @@ def c_header(chart: BenchMap, name: str = "drive", nodes: int = 41) -> str:
     if m:
         arg = ", float voltage_V"
         scale = f"    const float scale = powf(voltage_V / {chart.voltage_ref:.7e}f, {m:.7e}f);\n"
-    parts.append(_FUNCTIONS.format(p=p, g=guard[:-2], arg=arg, scale=scale, by=" * scale" if m else "",
-                                   over=" / scale" if m else ""))  # fmt: skip
+    parts.append(
+        _FUNCTIONS.format(
+            p=p, g=guard[:-2], arg=arg, scale=scale, by=" * scale" if m else "", over=" / scale" if m else ""
+        )
+    )
     return "\n".join(parts) + f"\n#endif /* {guard} */\n"
 
 

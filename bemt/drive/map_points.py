@@ -23,30 +23,14 @@ RAMP = 40
 
 @dataclass(frozen=True, eq=False)
 class MapPoints:
-    """Steady points of one or more recordings.
+    """Steady points of one or more recordings."""
 
-    Parameters
-    ----------
-    pulse_us : (N,) float
-        Pulse width. [us]
-    values : mapping of str to (N,) float
-        thrust [N], rpm [rev/min], current [A], power [W], voltage [V]; NaN where not recorded.
-    weight : (N,) float
-        Weight of each point in a fit. [-]
-    run : (N,) int
-        Which recording a point is from.
-    notes : tuple of str
-        What was assumed or left out.
-    ramp : bool
-        Whether the command moved all the time.
-    """
-
-    pulse_us: Array
-    values: dict[str, Array]
-    weight: Array
-    run: NDArray[np.intp]
-    notes: tuple[str, ...] = ()
-    ramp: bool = False
+    pulse_us: Array  # (N,) pulse width. [us]
+    values: dict[str, Array]  # thrust [N], rpm [rev/min], current [A], power [W], voltage [V]; NaN where not recorded
+    weight: Array  # (N,) weight of each point in a fit. [-]
+    run: NDArray[np.intp]  # (N,) which recording a point is from
+    notes: tuple[str, ...] = ()  # what was assumed or left out
+    ramp: bool = False  # whether the command moved all the time
 
     def __len__(self) -> int:
         return len(self.pulse_us)
@@ -142,6 +126,8 @@ def join(parts: Sequence[MapPoints]) -> MapPoints:
     return MapPoints(
         np.concatenate([p.pulse_us for p in parts]),
         {key: np.concatenate([p.values[key] for p in parts]) for key in keys},
-        np.concatenate([p.weight for p in parts]), np.concatenate([p.run for p in parts]),
-        notes, any(p.ramp for p in parts),
-    )  # fmt: skip
+        np.concatenate([p.weight for p in parts]),
+        np.concatenate([p.run for p in parts]),
+        notes,
+        any(p.ramp for p in parts),
+    )

@@ -25,8 +25,6 @@ RESULTS = ("{}.map.json", "{}.map.csv", "{}.inverse.csv", "{}_map.h", "{}.map.pn
 """Names of the results, for the name of the map."""
 
 
-
-
 @dataclass(frozen=True)
 class MapResult:
     """A map with its document ``bemt.map/1``; ``reached`` is False when the wanted thrust is more than it gives."""
@@ -38,9 +36,14 @@ class MapResult:
 
 
 def fit(
-    files: Sequence[str], sign: int = 1, nodes: int = 41, name: str | None = None, thrust: float | None = None,
-    voltage: float | None = None, out: str | None = None,
-) -> MapResult:  # fmt: skip
+    files: Sequence[str],
+    sign: int = 1,
+    nodes: int = 41,
+    name: str | None = None,
+    thrust: float | None = None,
+    voltage: float | None = None,
+    out: str | None = None,
+) -> MapResult:
     """Fit a map to recordings of one drive and write it where told; faults of options and files come at once."""
     parts: list[map_points.MapPoints] = []
     faults = _option_faults(thrust, voltage, nodes, name)
@@ -119,9 +122,7 @@ def text(result: MapResult) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _option_faults(
-    thrust: float | None, voltage: float | None, nodes: int, name: str | None
-) -> list[Fault]:
+def _option_faults(thrust: float | None, voltage: float | None, nodes: int, name: str | None) -> list[Fault]:
     """What is wrong with the options."""
     faults = []
     if thrust is not None and not 0.0 <= thrust < math.inf:
@@ -149,8 +150,11 @@ def _sources(path: Path, got: object) -> set[Path]:
 def _write(folder: Path, name: str, chart: bench_map.BenchMap, nodes: int, text: str) -> None:
     forward, inverse = map_export.tables(chart, nodes)
     contents: Iterable[bytes | str] = (
-        text, map_export.table_csv(forward), map_export.table_csv(inverse), map_export.c_header(chart, name, nodes),
+        text,
+        map_export.table_csv(forward),
+        map_export.table_csv(inverse),
+        map_export.c_header(chart, name, nodes),
         picture.bench_map(chart, name),
-    )  # fmt: skip
+    )
     for form, content in zip(RESULTS, contents, strict=True):
         write_atomic(folder / form.format(name), content)

@@ -19,28 +19,19 @@ G0 = 9.80665
 
 @dataclass(frozen=True)
 class Hover:
-    """Hover of one rotor; NaN where the drive does not carry the weight.
+    """Hover of one rotor; NaN where the drive does not carry the weight."""
 
-    Attributes
-    ----------
-    wanted_N, full_N : float
-        Thrust that one rotor must give, and the most it gives at this charge. [N]
-    pulse_us, rpm : float
-        Pulse width [us] and speed [rev/min].
-    battery_A, power_W, g_per_W : float
-        Current [A], power [W] and thrust over power [gf/W].
-    temperature_C : float
-        Where the winding settles. [C]
-    """
-
+    # thrust that one rotor must give, and the most it gives at this charge. [N]
     wanted_N: float
     full_N: float
+    # pulse width [us] and speed [rev/min]
     pulse_us: float
     rpm: float
+    # current [A], power [W] and thrust over power [gf/W]
     battery_A: float
     power_W: float
     g_per_W: float
-    temperature_C: float
+    temperature_C: float  # where the winding settles. [C]
 
 
 def settled_temperature(drive: Drive, pulse_us: float, soc: float) -> float:
@@ -103,23 +94,15 @@ def endurance(
 
 @dataclass(frozen=True)
 class Response:
-    """Answer to a step of the command.
+    """Answer to a step of the command."""
 
-    Attributes
-    ----------
-    before_us, after_us : float
-        Command. [us]
-    before_N, after_N : float
-        Thrust. [N]
-    time63_s : float
-        Time to 63 % of the change of thrust. [s]
-    """
-
+    # command. [us]
     before_us: float
     after_us: float
+    # thrust. [N]
     before_N: float
     after_N: float
-    time63_s: float
+    time63_s: float  # time to 63 % of the change of thrust. [s]
 
 
 def response(drive: Drive, low: float, high: float, soc: float) -> tuple[list[Response], transient.History | None]:
@@ -137,8 +120,10 @@ def response(drive: Drive, low: float, high: float, soc: float) -> tuple[list[Re
         course = transient.simulate(drive, [(0.0, a), (0.1 * guess, b), (1.1 * guess, a)], end, t, soc)
         up = (t >= 0.05 * guess) & (t < 1.1 * guess)
         down = t >= 1.05 * guess
-        times = [transient.time_to(t[up], course.thrust_N[up], 0.1 * guess),
-                 transient.time_to(t[down], course.thrust_N[down], 1.1 * guess)]  # fmt: skip
+        times = [
+            transient.time_to(t[up], course.thrust_N[up], 0.1 * guess),
+            transient.time_to(t[down], course.thrust_N[down], 1.1 * guess),
+        ]
         if not np.all(np.isfinite(times)) or max(times) < 0.1 * guess:
             break
         guess *= 2.5

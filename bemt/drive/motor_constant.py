@@ -95,21 +95,13 @@ def from_kv(kv_rpm_V: float, winding: str, measure: str = "peak", between: str =
 
 @dataclass(frozen=True)
 class TorqueLoop:
-    """Torque transmitter read as volts over a resistor.
+    """Torque transmitter read as volts over a resistor."""
 
-    Parameters
-    ----------
-    shunt_ohm : float
-        Resistor as assumed. [ohm]
-    low_mA, high_mA : float
-        Current at the ends of the calibration line. [mA]
-    torque_low_Nm, torque_high_Nm : float
-        Torque there. [N m]
-    """
-
-    shunt_ohm: float
+    shunt_ohm: float  # resistor as assumed. [ohm]
+    # current at the ends of the calibration line. [mA]
     low_mA: float = 4.0
     high_mA: float = 20.0
+    # torque there. [N m]
     torque_low_Nm: float = 0.0
     torque_high_Nm: float = 2.0
 
@@ -137,26 +129,16 @@ class TorqueLoop:
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """Mean straight line of some trials.
+    """Mean straight line of some trials."""
 
-    Parameters
-    ----------
-    slope, intercept : float
-        Means, in the units of y/x and y.
-    cov : (2, 2) float
-        Covariance of the two means, in their units, widened for the number of trials.
-    slopes, intercepts : (N,) float
-        By trial, in the units of y/x and y.
-    names : tuple of str
-        Of the trials.
-    """
-
+    # means, in the units of y/x and y
     slope: float
     intercept: float
-    cov: Array
+    cov: Array  # (2, 2) covariance of the two means, in their units, widened for the number of trials
+    # (N,) by trial, in the units of y/x and y
     slopes: Array
     intercepts: Array
-    names: tuple[str, ...] = ()
+    names: tuple[str, ...] = ()  # of the trials
 
     @property
     def sd(self) -> float:
@@ -166,8 +148,9 @@ class Line:
     def scaled(self, factor: float) -> Line:
         """The line with its slope in another unit."""
         to = np.diag([factor, 1.0])
-        return Line(self.slope * factor, self.intercept, to @ self.cov @ to, self.slopes * factor, self.intercepts,
-                    self.names)  # fmt: skip
+        return Line(
+            self.slope * factor, self.intercept, to @ self.cov @ to, self.slopes * factor, self.intercepts, self.names
+        )
 
 
 def _widened(n: int, parameters: int) -> float:
@@ -200,23 +183,14 @@ def line(x: ArrayLike, y: ArrayLike, trial: ArrayLike) -> Line:
 
 @dataclass(frozen=True)
 class Waveform:
-    """Back-EMF seen by an oscilloscope.
+    """Back-EMF seen by an oscilloscope."""
 
-    Parameters
-    ----------
-    frequency_Hz, amplitude_V, offset_V : float
-        Of the fundamental [Hz], its peak [V], and the mean [V].
-    harmonics : tuple of float
-        Third and fifth harmonic over the fundamental. [1]
-    residual_V : float
-        Standard deviation of what is left. [V]
-    """
-
+    # of the fundamental [Hz], its peak [V], and the mean [V]
     frequency_Hz: float
     amplitude_V: float
     offset_V: float
-    harmonics: tuple[float, float]
-    residual_V: float
+    harmonics: tuple[float, float]  # third and fifth harmonic over the fundamental. [1]
+    residual_V: float  # standard deviation of what is left. [V]
 
     def ke(self, pole_pairs: int, between: str, winding: str) -> float:
         """Peak EMF of a winding per mechanical speed. [V s/rad]"""
@@ -251,8 +225,12 @@ def fit_waveform(time_s: ArrayLike, volts: ArrayLike) -> Waveform:
         return c, v - basis @ c
 
     span = 0.5 / t[-1]
-    best = minimize_scalar(lambda f: float(np.sum(solve(f)[1] ** 2)), bounds=(max(coarse - span, 0.1 * coarse),
-                           coarse + span), method="bounded", options={"xatol": 1e-9 * coarse})  # fmt: skip
+    best = minimize_scalar(
+        lambda f: float(np.sum(solve(f)[1] ** 2)),
+        bounds=(max(coarse - span, 0.1 * coarse), coarse + span),
+        method="bounded",
+        options={"xatol": 1e-9 * coarse},
+    )
     f = float(best.x)
     c, rest = solve(f)
     sizes = [math.hypot(c[1 + 2 * k], c[2 + 2 * k]) for k in range(3)]

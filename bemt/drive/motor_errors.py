@@ -34,9 +34,13 @@ METHODS = ("data_sheet", "back_emf", "torque")
 ALPHA = 0.001
 """Probability at which agreement is rejected."""
 FACTORS = {
-    "sqrt(3/2)": math.sqrt(1.5), "sqrt(3)": math.sqrt(3.0), "2": 2.0,
-    "1/sqrt(3/2)": 1.0 / math.sqrt(1.5), "1/sqrt(3)": 1.0 / math.sqrt(3.0), "1/2": 0.5,
-}  # fmt: skip
+    "sqrt(3/2)": math.sqrt(1.5),
+    "sqrt(3)": math.sqrt(3.0),
+    "2": 2.0,
+    "1/sqrt(3/2)": 1.0 / math.sqrt(1.5),
+    "1/sqrt(3)": 1.0 / math.sqrt(3.0),
+    "1/2": 0.5,
+}
 """Convention factors: what a method's value may be too large by."""
 NEAR = 6.0
 """Difference of the criterion below which two explanations are not told apart."""
@@ -72,29 +76,17 @@ class Measured:
 
 @dataclass(frozen=True)
 class ErrorSource:
-    """One hypothesis fitted.
+    """One hypothesis fitted."""
 
-    Parameters
-    ----------
-    names : tuple of str
-        Errors, such as ``torque.shunt`` or ``back_emf.factor sqrt(3)``; empty: none.
-    ke, u_ke : float
-        Constant under it and its standard uncertainty. [V s/rad]
-    sizes, u_sizes : tuple of float
-        By error: offset [V or N m], R_true/R_assumed or factor [1]; standard uncertainty, 0 for a factor.
-    chi2 : float
-        Misfit. [1]
-    p : float
-        Probability of a misfit as large. [1]
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # errors, such as ``torque.shunt`` or ``back_emf.factor sqrt(3)``; empty: none
+    # constant under it and its standard uncertainty. [V s/rad]
     ke: float
     u_ke: float
+    # by error: offset [V or N m], R_true/R_assumed or factor [1]; standard uncertainty, 0 for a factor
     sizes: tuple[float, ...]
     u_sizes: tuple[float, ...]
-    chi2: float
-    p: float
+    chi2: float  # misfit. [1]
+    p: float  # probability of a misfit as large. [1]
 
 
 @dataclass(frozen=True)

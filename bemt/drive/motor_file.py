@@ -1,191 +1,176 @@
-"""``motor.toml``: the recordings of a motor constant and the conventions they were made in.
-
-::
-
-    schema = "bemt.motor/1"
-
-    [motor]
-    name = "MN4006 KV380"
-    winding = "delta"                  # or "wye"
-    kv_rpm_V = 380                     # optional: method data sheet
-    kv_tolerance_pct = 5.0             # half-width stated or assumed; without it the uncertainty is unknown
-    kv_measure = "peak"                # which volt K_v means: peak, rms, peak_to_peak
-    kv_between = "line"
-    pole_pairs = 12                    # needed by waveforms
-    data = "generated, seed 0"         # what the trials are
-
-    [result]
-    current = "q_power_invariant"      # K_t is torque per this current; also peak, rms, q_amplitude_invariant
-    between = "phase"                  # in a winding, or line
-
-    [back_emf]
-    file = "back_emf.csv"              # columns trial, rpm, one in V; or
-    waveforms = ["scope1.csv"]         # oscilloscope traces, one trial each
-    measure = "peak_to_peak"
-    between = "phase"
-    u_gain_pct = 0.5                   # standard uncertainty common to all trials
-
-    [torque]
-    file = "torque.csv"                # columns trial, one in A, one in V
-    shunt_ohm = 250.0
-    u_shunt_pct = 0.05
-    low_mA = 4.0
-    high_mA = 20.0
-    torque_low_Nm = 0.0
-    torque_high_Nm = 2.0
-    current = "q_power_invariant"
-    between = "phase"
-    u_gain_pct = 0.3
-
-    [[stated]]                         # values of others, drawn beside ours
-    name = "thesis, adopted"
-    Kt_Nm_A = 0.0311
-"""
+"""``motor.toml``: the recordings of a motor constant and the conventions they were made in."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bemt import readers as importers
 from bemt.base.errors import Fault, InputError
-from bemt.base.toml import Collector, Key, check_table, load_toml
+from bemt.base.toml import Limits, Table, entry, read_model
 from bemt.dataset import Dataset
 from bemt.drive import motor_constant as mc
 from bemt.drive.motor_errors import Measured
 
-__all__ = ["SCHEMA", "MotorTrials", "read", "read_waveform"]
+__all__ = ["MotorToml", "MotorTrials", "read", "read_waveform"]
 
 Array = NDArray[np.float64]
-SCHEMA = "bemt.motor/1"
-_VOLT, _AMP = tuple(mc.VOLTAGES), tuple(mc.CURRENTS)
-_PCT = Key(unit="%", low=0.0, high=50.0)
-TABLES: dict[str, dict[str, Key]] = {
-    "": {"schema": Key("choice", choices=(SCHEMA,), required=True)},
-    "motor": {
-        "name": Key("text", required=True), "winding": Key("choice", choices=mc.WINDINGS, required=True),
-        "kv_rpm_V": Key(unit="rev/min/V", low=1.0, high=50000.0), "kv_tolerance_pct": _PCT,
-        "kv_measure": Key("choice", choices=_VOLT), "kv_between": Key("choice", choices=("line", "phase")),
-        "pole_pairs": Key("integer", low=1, high=60), "data": Key("text"), "source": Key("text"),
-    },
-    "result": {"current": Key("choice", choices=_AMP), "between": Key("choice", choices=("line", "phase"))},
-    "back_emf": {
-        "file": Key("text"), "waveforms": Key("texts"), "measure": Key("choice", choices=_VOLT),
-        "between": Key("choice", choices=("line", "phase"), required=True), "u_gain_pct": _PCT,
-    },
-    "torque": {
-        "file": Key("text", required=True), "shunt_ohm": Key(unit="ohm", low=0.01, high=1e5, required=True),
-        "u_shunt_pct": _PCT, "low_mA": Key(unit="mA", low=0.0, high=100.0),
-        "high_mA": Key(unit="mA", low=0.1, high=100.0),
-        "torque_low_Nm": Key(unit="N m", low=-1e4, high=1e4), "torque_high_Nm": Key(unit="N m", low=1e-4, high=1e4),
-        "current": Key("choice", choices=_AMP, required=True),
-        "between": Key("choice", choices=("line", "phase"), required=True), "u_gain_pct": _PCT,
-    },
-    "stated": {"name": Key("text", required=True), "Kt_Nm_A": Key(unit="N m/A", low=1e-7, high=1e3, required=True)},
-}  # fmt: skip
+Volt = Literal["peak", "rms", "peak_to_peak"]
+Ampere = Literal["q_power_invariant", "q_amplitude_invariant", "peak", "rms"]
+Between = Literal["line", "phase"]
+_PCT = Limits("%", 0.0, 50.0)
+
+
+class MotorHead(Table):
+    """[motor]: the machine and its data sheet."""
+
+    name: str = entry("of the motor", required=True)
+    winding: Literal["wye", "delta"] = entry("how the phases are joined", required=True)
+    kv_rpm_V: float | None = entry("speed constant: the method data sheet", "rev/min/V", 1.0, 50000.0)
+    kv_tolerance_pct: float | None = entry("half-width, stated or assumed; unknown if left out", _PCT)
+    kv_measure: Volt = entry("which volt K_v means", default="peak")
+    kv_between: Between = entry("where that volt is measured", default="line")
+    pole_pairs: int | None = entry("needed by waveforms", low=1, high=60)
+    data: str = entry("what the trials are", default="")
+    source: str | None = entry("where they come from")
+
+
+class ResultTable(Table):
+    """[result]: convention of K_t."""
+
+    current: Ampere = entry("K_t is torque per this current", default="q_power_invariant")
+    between: Between = entry("in a winding (phase) or a lead (line)", default="phase")
+
+
+class BackEmfTable(Table):
+    """[back_emf]: generator trials."""
+
+    file: str | None = entry("columns trial, rpm, one in V")
+    waveforms: tuple[str, ...] | None = entry("oscilloscope traces, one trial each")
+    measure: Volt | None = entry("what the column in V is")
+    between: Between = entry("where it is measured", required=True)
+    u_gain_pct: float | None = entry("standard uncertainty common to all trials", _PCT)
+
+    def rules(self) -> Iterable[tuple[str, ...]]:
+        """One way; a column needs its measure."""
+        if (self.file is None) == (self.waveforms is None):
+            yield "", "both or neither of file, waveforms", "one of them"
+        elif self.file is not None and self.measure is None:
+            yield "measure", "nothing", f"one of {', '.join(get_args(Volt))}", "peak_to_peak is twice the peak"
+        elif self.waveforms is not None and len(self.waveforms) < 3:
+            yield "waveforms", f"{len(self.waveforms)} traces", "3 or more"
+
+
+class TorqueTable(Table):
+    """[torque]: trials with a torque sensor that drives a current loop."""
+
+    file: str = entry("columns trial, one in A, one in V", required=True)
+    shunt_ohm: float = entry(
+        "resistance that turns the loop's current into the column in V", "ohm", 0.01, 1e5, required=True
+    )
+    u_shunt_pct: float = entry("its standard uncertainty", _PCT, default=0.0)
+    low_mA: float = entry("current at torque_low_Nm", "mA", 0.0, 100.0, default=4.0)
+    high_mA: float = entry("current at torque_high_Nm", "mA", 0.1, 100.0, default=20.0)
+    torque_low_Nm: float = entry("lower end of the sensor", "N m", -1e4, 1e4, default=0.0)
+    torque_high_Nm: float = entry("upper end of the sensor", "N m", 1e-4, 1e4, default=2.0)
+    current: Ampere = entry("what the column in A is", required=True)
+    between: Between = entry("where it is measured", required=True)
+    u_gain_pct: float | None = entry("standard uncertainty common to all trials", _PCT)
+
+    def rules(self) -> Iterable[tuple[str, ...]]:
+        """Ends of the loop in order."""
+        if self.high_mA <= self.low_mA:
+            yield "high_mA", f"{self.high_mA:g}", "more than low_mA"
+
+
+class StatedTable(Table):
+    """[[stated]]: a value of others, drawn beside ours."""
+
+    name: str = entry("whose", required=True)
+    Kt_Nm_A: float = entry("torque constant", "N m/A", 1e-7, 1e3, required=True)
+
+
+class MotorToml(Table):
+    """motor.toml: the recordings of a motor constant and the conventions they were made in."""
+
+    schema_: Literal["bemt.motor/1"] = entry("version of the format", required=True, alias="schema")
+    motor: MotorHead
+    result: ResultTable = ResultTable()
+    back_emf: BackEmfTable | None = None
+    torque: TorqueTable | None = None
+    stated: tuple[StatedTable, ...] = ()
+
+    def rules(self) -> Iterable[tuple[str, ...]]:
+        """One method or more; waveforms need the pole pairs."""
+        if self.back_emf is None and self.torque is None and self.motor.kv_rpm_V is None:
+            yield "", "no method", "motor.kv_rpm_V, [back_emf] or [torque]"
+        if self.back_emf is not None and self.back_emf.waveforms and self.motor.pole_pairs is None:
+            yield "motor.pole_pairs", "nothing", "a whole number, for waveforms"
 
 
 @dataclass(frozen=True, eq=False)
 class MotorTrials:
-    """All that was recorded of one motor.
-
-    Parameters
-    ----------
-    name, data : str
-        Of the motor; what the trials are.
-    measured : Measured
-        Results of the methods as ke.
-    to_kt : float
-        K_t in the convention asked for, over ke. [N m/A per V s/rad]
-    convention : str
-        Of K_t, in words.
-    stated : mapping of str to float
-        Values of others. [N m/A]
-    notes : tuple of str
-        What a reader has to know.
-    files : tuple of Path
-        All that was read: motor.toml and its recordings.
-    """
+    """All that was recorded of one motor."""
 
     name: str
-    data: str
-    measured: Measured
-    to_kt: float
-    convention: str
-    stated: Mapping[str, float]
-    notes: tuple[str, ...] = ()
-    files: tuple[Path, ...] = ()
+    data: str  # what the trials are
+    measured: Measured  # results of the methods as ke
+    to_kt: float  # K_t in the convention asked for, over ke [N m/A per V s/rad]
+    convention: str  # of K_t, in words
+    stated: Mapping[str, float]  # values of others [N m/A]
+    notes: tuple[str, ...] = ()  # what a reader has to know
+    files: tuple[Path, ...] = ()  # all that was read, motor.toml first
 
 
 def read(path: str | Path) -> MotorTrials:
     """Read a motor.toml and its recordings."""
     file = Path(path) / "motor.toml" if Path(path).is_dir() else Path(path)
-    out = Collector(file.as_posix())
-    doc = load_toml(file, out)
-    if doc is None:
-        raise InputError(out.faults)
-    tops = [name for name in TABLES if name]
-    check_table(out, "", {k: v for k, v in doc.items() if k not in tops}, TABLES, subtables=tops)
-    for name in ("motor", "result", "back_emf", "torque"):
-        if name in doc:
-            check_table(out, name, doc[name], TABLES)
-    stated = doc.get("stated", [])
-    for i, item in enumerate(stated if isinstance(stated, list) else [stated]):
-        check_table(out, "stated", item, TABLES, where=f"stated[{i}]")
-    if "motor" not in doc:
-        out.add("motor", "nothing", "a table [motor]")
-    elif not isinstance(doc["motor"], Mapping) or not ({"back_emf", "torque"} & set(doc) or "kv_rpm_V" in doc["motor"]):
-        out.add("", "no method", "motor.kv_rpm_V, [back_emf] or [torque]")
-    if out.faults:
-        raise InputError(out.faults)
-    return _built(file, doc, out)
-
-
-def _built(file: Path, doc: dict[str, Any], out: Collector) -> MotorTrials:
-    motor, result = doc["motor"], doc.get("result", {})
-    winding, notes = motor["winding"], []
-    measure, between = result.get("current", "q_power_invariant"), result.get("between", "phase")
+    made = read_model(MotorToml, file)
+    motor, result, emf_table, torque_table = made.motor, made.result, made.back_emf, made.torque
+    winding, notes = motor.winding, []
     sheet, u_sheet = None, math.nan
-    if "kv_rpm_V" in motor:
-        words = motor.get("kv_measure", "peak"), motor.get("kv_between", "line")
-        sheet = mc.from_kv(motor["kv_rpm_V"], winding, *words)
-        if "kv_tolerance_pct" in motor:
-            u_sheet = sheet * motor["kv_tolerance_pct"] / 100.0 / math.sqrt(3.0)
+    if motor.kv_rpm_V is not None:
+        sheet = mc.from_kv(motor.kv_rpm_V, winding, motor.kv_measure, motor.kv_between)
+        if motor.kv_tolerance_pct is not None:
+            u_sheet = sheet * motor.kv_tolerance_pct / 100.0 / math.sqrt(3.0)
         else:
             notes.append("no tolerance of K_v is stated: the data sheet only bears on convention factors")
+    faults: list[Fault] = []
     emf = torque = loop = None
     try:
-        emf = _back_emf(file, doc["back_emf"], winding, motor.get("pole_pairs")) if "back_emf" in doc else None
+        emf = None if emf_table is None else _back_emf(file, emf_table, winding, motor.pole_pairs)
     except InputError as error:
-        out.faults += error.faults
+        faults += error.faults
     try:
-        if "torque" in doc:
-            torque, loop = _torque(file, doc["torque"], winding)
+        if torque_table is not None:
+            torque, loop = _torque(file, torque_table, winding)
     except InputError as error:
-        out.faults += error.faults
-    if out.faults:
-        raise InputError(out.faults)
-    gains = {name: doc.get(name, {}).get("u_gain_pct") for name in ("back_emf", "torque")}
-    notes += [f"no gain uncertainty of {name} is stated: counted as none" for name, u in gains.items()
-              if u is None and name in doc]  # fmt: skip
+        faults += error.faults
+    if faults:
+        raise InputError(faults)
+    gains = {name: table.u_gain_pct for name, table in (("back_emf", emf_table), ("torque", torque_table)) if table}
+    notes += [f"no gain uncertainty of {name} is stated: counted as none" for name, u in gains.items() if u is None]
     measured = Measured(
-        sheet, u_sheet, emf, torque, (gains["back_emf"] or 0.0) / 100.0, (gains["torque"] or 0.0) / 100.0,
-        doc.get("torque", {}).get("u_shunt_pct", 0.0) / 100.0, loop.live_zero_Nm if loop else 0.0,
+        sheet, u_sheet, emf, torque, (gains.get("back_emf") or 0.0) / 100.0, (gains.get("torque") or 0.0) / 100.0,
+        torque_table.u_shunt_pct / 100.0 if torque_table else 0.0, loop.live_zero_Nm if loop else 0.0,
     )  # fmt: skip
-    where = "a winding" if between == "phase" else "a line"
-    convention = f"torque per {measure.replace('_', ' ')} current in {where}, {winding}"
-    stated = {item["name"]: float(item["Kt_Nm_A"]) for item in doc.get("stated", [])}
-    tables = doc.get("back_emf", {}), doc.get("torque", {})
-    names = [name for table in tables for name in (table.get("file"), *table.get("waveforms", ())) if name]
-    return MotorTrials(motor["name"], motor.get("data", ""), measured, mc.ke_to_kt(1.0, measure, between, winding),
-                       convention, stated, tuple(notes), (file, *(file.parent / name for name in names)))  # fmt: skip
+    where = "a winding" if result.between == "phase" else "a line"
+    convention = f"torque per {result.current.replace('_', ' ')} current in {where}, {winding}"
+    stated = {item.name: item.Kt_Nm_A for item in made.stated}
+    names = [
+        *((emf_table.file, *(emf_table.waveforms or ())) if emf_table else ()),
+        torque_table.file if torque_table else None,
+    ]
+    to_kt = mc.ke_to_kt(1.0, result.current, result.between, winding)
+    files = (file, *(file.parent / name for name in names if name))
+    return MotorTrials(motor.name, motor.data, measured, to_kt, convention, stated, tuple(notes), files)
 
 
 def _columns(path: Path, units: tuple[str, ...]) -> tuple[Array, ...]:
@@ -214,37 +199,26 @@ def _columns(path: Path, units: tuple[str, ...]) -> tuple[Array, ...]:
     return columns
 
 
-def _back_emf(file: Path, table: Mapping[str, Any], winding: str, pole_pairs: int | None) -> mc.Line:
-    if ("file" in table) == ("waveforms" in table):
-        raise InputError(Fault(file.as_posix(), "back_emf", "both or neither of file, waveforms", "one of them"))
-    if "file" in table:
-        if "measure" not in table:
-            hint = "peak_to_peak is twice the peak"
-            raise InputError(Fault(file.as_posix(), "back_emf.measure", "nothing", f"one of {', '.join(_VOLT)}", hint))
-        trial, rpm, volts = _columns(file.parent / table["file"], ("rpm", "V"))
+def _back_emf(file: Path, table: BackEmfTable, winding: str, pole_pairs: int | None) -> mc.Line:
+    if table.file is not None and table.measure is not None:
+        trial, rpm, volts = _columns(file.parent / table.file, ("rpm", "V"))
         line = mc.line(rpm * 2.0 * math.pi / 60.0, volts, trial)
-        return line.scaled(1.0 / mc.voltage_factor(table["measure"], table["between"], winding))
-    if pole_pairs is None:
-        raise InputError(Fault(file.as_posix(), "motor.pole_pairs", "nothing", "a whole number, for waveforms"))
-    waves = [mc.fit_waveform(*read_waveform(file.parent / name)) for name in table["waveforms"]]
-    if len(waves) < 3:
-        raise InputError(Fault(file.as_posix(), "back_emf.waveforms", f"{len(waves)} traces", "3 or more"))
-    omega = np.array([2.0 * math.pi * w.frequency_Hz / pole_pairs for w in waves])
-    peak = np.array([w.amplitude_V for w in waves]) / mc.voltage_factor("peak", table["between"], winding)
+        return line.scaled(1.0 / mc.voltage_factor(table.measure, table.between, winding))
+    names = table.waveforms or ()
+    waves = [mc.fit_waveform(*read_waveform(file.parent / name)) for name in names]
+    omega = np.array([2.0 * math.pi * w.frequency_Hz / (pole_pairs or 1) for w in waves])
+    peak = np.array([w.amplitude_V for w in waves]) / mc.voltage_factor("peak", table.between, winding)
     if len(np.unique(np.round(omega, 1))) >= 3:
         return mc.line(omega, peak, np.arange(len(waves)))
     each = peak / omega  # all at one speed: an offset of the amplitude cannot be told
     u2 = float(np.var(each, ddof=1)) / len(each) * (len(each) - 1) / max(len(each) - 3, 0.5)
     cov = np.diag([u2, (10.0 * float(peak.max())) ** 2])
-    return mc.Line(float(each.mean()), 0.0, cov, each, np.full(len(each), math.nan), tuple(table["waveforms"]))
+    return mc.Line(float(each.mean()), 0.0, cov, each, np.full(len(each), math.nan), names)
 
 
-def _torque(file: Path, table: Mapping[str, Any], winding: str) -> tuple[mc.Line, mc.TorqueLoop]:
-    names = ("low_mA", "high_mA", "torque_low_Nm", "torque_high_Nm")
-    loop = mc.TorqueLoop(table["shunt_ohm"], **{k: table[k] for k in names if k in table})
-    if loop.high_mA <= loop.low_mA:
-        raise InputError(Fault(file.as_posix(), "torque.high_mA", f"{loop.high_mA:g}", "more than low_mA"))
-    trial, amps, volts = _columns(file.parent / table["file"], ("A", "V"))
+def _torque(file: Path, table: TorqueTable, winding: str) -> tuple[mc.Line, mc.TorqueLoop]:
+    loop = mc.TorqueLoop(table.shunt_ohm, table.low_mA, table.high_mA, table.torque_low_Nm, table.torque_high_Nm)
+    trial, amps, volts = _columns(file.parent / table.file, ("A", "V"))
     mA = volts / loop.shunt_ohm * 1e3
     beyond = (mA < loop.low_mA - 1.0) | (mA > loop.high_mA + 2.0)
     if np.mean(beyond) > 0.5:
@@ -254,7 +228,7 @@ def _torque(file: Path, table: Mapping[str, Any], winding: str) -> tuple[mc.Line
             Fault(file.as_posix(), "torque.shunt_ohm", got, f"{loop.low_mA:g} to {loop.high_mA:g} mA", hint)
         )
     line = mc.line(amps, loop.torque(volts), trial)
-    return line.scaled(mc.current_factor(table["current"], table["between"], winding) / 1.5), loop
+    return line.scaled(mc.current_factor(table.current, table.between, winding) / 1.5), loop
 
 
 def read_waveform(path: Path) -> tuple[Array, Array]:

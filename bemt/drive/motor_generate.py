@@ -24,41 +24,25 @@ LABEL = "# generated, not measured"
 
 @dataclass(frozen=True)
 class MotorBench:
-    """What the generated trials pretend to be; defaults follow the thesis's joint motor.
+    """What the generated trials pretend to be; defaults follow the thesis's joint motor."""
 
-    Parameters
-    ----------
-    name : str
-        Of the motor.
-    kv_rpm_V, kv_tolerance_pct : float
-        Data sheet. [rev/min/V], [%]
-    Kt : float
-        True q-axis, power-invariant constant. [N m/A]
-    emf_trials, torque_trials : int
-        Trials.
-    sd_trial : float
-        Relative scatter of a trial's slope. [1]
-    sd_volt, sd_torque : float
-        Noise of a reading. [V], [N m]
-    u_gain_emf_pct, u_gain_torque_pct, u_shunt_pct : float
-        Gains common to all trials are drawn with these. [%]
-    shunt_ohm : float
-        Resistor as assumed. [ohm]
-    """
-
-    name: str = "T-Motor MN4006 KV380"
+    name: str = "T-Motor MN4006 KV380"  # of the motor
+    # data sheet. [rev/min/V], [%]
     kv_rpm_V: float = 380.0
     kv_tolerance_pct: float = 5.0
-    Kt: float = 0.0311
+    Kt: float = 0.0311  # true q-axis, power-invariant constant. [N m/A]
+    # trials
     emf_trials: int = 10
     torque_trials: int = 28
-    sd_trial: float = 0.015
+    sd_trial: float = 0.015  # relative scatter of a trial's slope. [1]
+    # noise of a reading. [V], [N m]
     sd_volt: float = 0.03
     sd_torque: float = 0.004
+    # gains common to all trials are drawn with these. [%]
     u_gain_emf_pct: float = 0.5
     u_gain_torque_pct: float = 0.3
     u_shunt_pct: float = 0.1
-    shunt_ohm: float = 250.0
+    shunt_ohm: float = 250.0  # resistor as assumed. [ohm]
 
 
 def plants(words: list[str]) -> dict[str, float]:

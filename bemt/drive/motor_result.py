@@ -22,8 +22,6 @@ RESULTS = ("motor.json", "trials.csv", "motor.png")
 TITLES = {"data_sheet": "data sheet", "back_emf": "back-EMF", "torque": "torque sensor"}
 
 
-
-
 def check_options(
     file: str | None, generate: str | None, seed: int | None, plant: Sequence[str], out: str | None
 ) -> None:
@@ -73,8 +71,13 @@ def generate(
         raise InputError(faults)
     for name, content in texts.items():
         write_atomic(folder / name, content)
-    return {"schema": "bemt.motor.generated/1", "folder": folder.as_posix(), "files": list(texts), "seed": seed,
-            "planted": planted}  # fmt: skip
+    return {
+        "schema": "bemt.motor.generated/1",
+        "folder": folder.as_posix(),
+        "files": list(texts),
+        "seed": seed,
+        "planted": planted,
+    }
 
 
 def _generated(path: Path) -> bool:
@@ -88,11 +91,16 @@ def _generated(path: Path) -> bool:
 def _method(name: str, line: Line, u_gain: float, to_kt: float) -> dict[str, Any]:
     mean, u = line.slope, math.hypot(math.sqrt(line.cov[0, 0]), u_gain * line.slope)
     return {
-        "method": name, "n": len(line.slopes), "mean": mean * to_kt, "u": u * to_kt, "sigma3": 3.0 * line.sd * to_kt,
+        "method": name,
+        "n": len(line.slopes),
+        "mean": mean * to_kt,
+        "u": u * to_kt,
+        "sigma3": 3.0 * line.sd * to_kt,
         "interval95": [(mean - 1.96 * u) * to_kt, (mean + 1.96 * u) * to_kt],
-        "intercept": line.intercept, "u_intercept": float(math.sqrt(line.cov[1, 1])),
+        "intercept": line.intercept,
+        "u_intercept": float(math.sqrt(line.cov[1, 1])),
         "trials": [float(v) * to_kt for v in line.slopes],
-    }  # fmt: skip
+    }
 
 
 def document(trials: motor_file.MotorTrials, verdict: motor_errors.Verdict) -> dict[str, Any]:
@@ -189,8 +197,11 @@ def judge(file: str, out: str | None = None) -> tuple[motor_file.MotorTrials, di
     if out:
         folder = Path(out)
         write_atomic(folder / "motor.json", json_text(made))
-        rows = [{"method": m["method"], "trial": t, "Kt_Nm_A": v} for m in made["methods"]
-                for t, v in enumerate(m["trials"] or [m["mean"]], 1)]  # fmt: skip
+        rows = [
+            {"method": m["method"], "trial": t, "Kt_Nm_A": v}
+            for m in made["methods"]
+            for t, v in enumerate(m["trials"] or [m["mean"]], 1)
+        ]
         write_atomic(folder / "trials.csv", csv_text(["method", "trial", "Kt_Nm_A"], rows))
         title = f"{trials.name}: {trials.data}" if trials.data else trials.name
         values = {TITLES[m["method"]]: np.array(m["trials"] or [m["mean"]]) for m in made["methods"]}

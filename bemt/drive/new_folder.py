@@ -3,75 +3,113 @@
 from __future__ import annotations
 
 import re
-import shutil
+import tempfile
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import write_atomic
 from bemt.base.units import INCH
-from bemt.case import Case, case_of, find_cases, fresh, load_case
+from bemt.case import Case, case_of, find_cases, fresh, from_solid, load_case
 from bemt.drive import from_label
 
-__all__ = ["write"]
+__all__ = ["Wanted", "write"]
 
 
-def write(
-    label: str | None, stations: str | None = None, diameter_mm: float | None = None, fan: bool = False,
-    blades: int | None = None, rpm: float | None = None, airspeed_m_s: float = 0.0, kv: float | None = None,
-    cells: int | None = None, out: str | None = None,
-) -> tuple[Path, list[str]]:  # fmt: skip
+@dataclass(frozen=True)
+class Wanted:
+    """What somebody knows of a propeller or fan, as `bemt new` is told it."""
+
+    label: str | None = None
+    stations: str | None = None
+    scan: str | None = None
+    unit: str | None = None
+    diameter_mm: float | None = None
+    fan: bool = False
+    blades: int | None = None
+    rpm: float | None = None
+    airspeed_m_s: float = 0.0
+    kv: float | None = None
+    cells: int | None = None
+
+
+def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str]]:
     """Write a new case that can be solved; nothing is written unless all of it is sound. Gives folder and files."""
-    text, source = _text(label, stations, diameter_mm, fan, blades, rpm, airspeed_m_s)
-    if (kv is None) != (cells is None):
-        given = "--kv" if kv is not None else "--cells"
-        raise InputError(Fault("", given, "alone", "--kv and --cells together"))
-    case = case_of(text, source.parent if source else ".")
-    folder = Path(out) if out else Path(case.name)
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise InputError(Fault(folder.as_posix(), "", "something there already", "a new folder", "Choose --out DIR"))
-    drive = _drive_text(case, kv, cells) if kv is not None and cells is not None else None
-    if source is not None:
-        folder.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(source, folder / source.name)
-    if drive is not None:
-        write_atomic(folder / "drive.toml", drive)
-    write_atomic(folder / "case.toml", text)  # last: what it names is there
-    return folder, sorted(path.name for path in folder.iterdir())
-
-
-def _text(
-    label: str | None, stations: str | None, diameter_mm: float | None, fan: bool, blades: int | None,
-    rpm: float | None, airspeed_m_s: float,
-) -> tuple[str, Path | None]:  # fmt: skip
-    """Text of the case, and the file of stations that goes beside it."""
-    faults = []
-    if (label is None) == (stations is None):
-        got = "neither" if label is None else "both"
-        faults.append(Fault("", "LABEL, --stations", got, "one of them", "As in: new 10x5"))
-    if stations is not None and fan:
-        faults.append(Fault("", "--fan", "beside --stations", "--fan with the diameter as LABEL"))
-    if stations is not None and diameter_mm is None:
-        faults.append(Fault("", "--diameter-mm", "nothing", "the diameter beside --stations"))
-    if diameter_mm is not None and (stations is None or not 5.0 <= diameter_mm <= 10000.0):
-        expected = "5 to 10000 mm" if stations else "nothing without --stations"
-        faults.append(Fault("", "--diameter-mm", f"{diameter_mm:g}", expected, "In m? Times 1000"))
+    faults = _faults(wanted)
     if faults:
         raise InputError(faults)
-    if stations is not None and diameter_mm is not None:
-        file = Path(stations)
+    with tempfile.TemporaryDirectory() as made:  # a case is checked with the files that it names
+        files = _files(wanted)
+        for name, content in files.items():
+            (Path(made) / name).write_bytes(content)
+        try:
+            case = load_case(made)
+        except InputError as error:
+            place = Path(made).as_posix() + "/"
+            raise InputError([replace(f, file=f.file.removeprefix(place)) for f in error.faults]) from None
+        folder = Path(out) if out else Path(case.name)
+        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            raise InputError(
+                Fault(folder.as_posix(), "", "something there already", "a new folder", "Choose --out DIR")
+            )
+        if wanted.kv is not None and wanted.cells is not None:
+            files["drive.toml"] = _drive_text(case, wanted.kv, wanted.cells).encode()
+    for name in sorted(files, key=lambda name: name == "case.toml"):  # last: what it names is there
+        write_atomic(folder / name, files[name])
+    return folder, sorted(files)
+
+
+def _faults(w: Wanted) -> list[Fault]:
+    """What does not go together."""
+    faults = []
+    if w.stations is not None and (w.label is not None or w.scan is not None):
+        faults.append(Fault("", "LABEL, --stations", "both", "one of them", "As in: new 10x5"))
+    if w.label is None and w.stations is None and w.scan is None:
+        faults.append(Fault("", "LABEL, --stations", "neither", "one of them, or --scan", "As in: new 10x5"))
+    if w.fan and (w.stations is not None or w.scan is not None):
+        faults.append(Fault("", "--fan", "beside a file of the blade", "--fan with the diameter as LABEL"))
+    if w.scan is not None and w.blades is not None:
+        faults.append(Fault("", "--blades", str(w.blades), "nothing with --scan, which shows them"))
+    if w.unit is not None and w.scan is None:
+        faults.append(Fault("", "--unit", w.unit, "nothing without --scan"))
+    if w.stations is not None and w.diameter_mm is None:
+        faults.append(Fault("", "--diameter-mm", "nothing", "the diameter beside --stations"))
+    if w.diameter_mm is not None and (w.stations is None or not 5.0 <= w.diameter_mm <= 10000.0):
+        expected = "5 to 10000 mm" if w.stations else "nothing without --stations"
+        faults.append(Fault("", "--diameter-mm", f"{w.diameter_mm:g}", expected, "In m? Times 1000"))
+    if (w.kv is None) != (w.cells is None):
+        given = "--kv" if w.kv is not None else "--cells"
+        faults.append(Fault("", given, "alone", "--kv and --cells together"))
+    return faults
+
+
+def _files(w: Wanted) -> dict[str, bytes]:
+    """Content of the folder by name."""
+    if w.scan is not None:
+        found, scale, _ = from_solid.read_stations(Path(w.scan), w.unit)
+        name = fresh.case_name(w.label or Path(w.scan).stem)
+        source = re.sub(r'["\\\n]', "_", Path(w.scan).name)
+        texts = from_solid.case_files(found, scale, name, source, "scan", w.rpm, w.airspeed_m_s)
+        return {name: text.encode() for name, text in texts.items()}
+    if w.stations is not None and w.diameter_mm is not None:
+        file = Path(w.stations)
         hub, key = fresh.of_stations(file)
-        return fresh.stations_text(file.name, diameter_mm * 1e-3, blades or 2, rpm, airspeed_m_s, hub, key), file
-    assert label is not None
-    if not fan:
-        return fresh.label_text(label, blades, rpm, airspeed_m_s), None
+        text = fresh.stations_text(file.name, w.diameter_mm * 1e-3, w.blades or 2, w.rpm, w.airspeed_m_s, hub, key)
+        return {file.name: file.read_bytes(), "case.toml": text.encode()}
+    return {"case.toml": _label_text(w, w.label or "").encode()}
+
+
+def _label_text(w: Wanted, label: str) -> str:
+    if not w.fan:
+        return fresh.label_text(label, w.blades, w.rpm, w.airspeed_m_s)
     size = re.fullmatch(r"(\d+(?:\.\d+)?)\s*(mm|in)?", label.strip())
     if size is None:
         if "x" in label.lower():
-            D, pitch, told = fresh.label_parts(label, blades)
-            return fresh.fan_text(D * INCH, pitch, told if told > 2 else blades, rpm), None
+            D, pitch, told = fresh.label_parts(label, w.blades)
+            return fresh.fan_text(D * INCH, pitch, told if told > 2 else w.blades, w.rpm)
         raise InputError(Fault("LABEL", "", repr(label), "a diameter, as in 70mm", "Or diameter x pitch in inches"))
     value = float(size[1])
-    return fresh.fan_text(value * INCH if size[2] == "in" else value * 1e-3, None, blades, rpm), None
+    return fresh.fan_text(value * INCH if size[2] == "in" else value * 1e-3, None, w.blades, w.rpm)
 
 
 def _drive_text(case: Case, kv: float, cells: int) -> str:
@@ -79,11 +117,13 @@ def _drive_text(case: Case, kv: float, cells: int) -> str:
     given = from_label.estimate(case, kv, cells).given
     typical = "not known: typical of measured motors under a propeller; take it from the motor's sheet"
     assumed = {
-        "motor.resistance_mohm": typical, "motor.no_load_A": typical,
+        "motor.resistance_mohm": typical,
+        "motor.no_load_A": typical,
         "motor.inertia_kg_mm2": "not known; it only decides how fast thrust follows the throttle",
         "rotor.inertia_kg_mm2": "not known; blades of plastic, 0.06 kg per m2 of diameter squared",
-        "battery.capacity_Ah": "yours?", "battery.resistance_mohm": "not known: 6 % of the voltage at full throttle",
-    }  # fmt: skip
+        "battery.capacity_Ah": "yours?",
+        "battery.resistance_mohm": "not known: 6 % of the voltage at full throttle",
+    }
     # two slender blades: m R^2 / 3, their mass nearer to the hub than that: a third of it
     inertia = 0.06 * case.diameter_m**2 * (0.5 * case.diameter_m) ** 2 / 9.0 * 1e6 * case.file.rotor.blades
     rows = "".join(f'\n[[assumed]]\nkey = "{key}"\nwhy = "{text}"\n' for key, text in assumed.items())
@@ -115,9 +155,14 @@ inertia_kg_mm2 = {inertia:.3g}
 
 
 def estimate_of(
-    what: str | None, kv: float | None, cells: int | None, mass_kg: float | None = None, rotors: int = 1,
-    capacity_Ah: float | None = None, airspeed_m_s: float = 0.0,
-) -> from_label.DriveEstimate:  # fmt: skip
+    what: str | None,
+    kv: float | None,
+    cells: int | None,
+    mass_kg: float | None = None,
+    rotors: int = 1,
+    capacity_Ah: float | None = None,
+    airspeed_m_s: float = 0.0,
+) -> from_label.DriveEstimate:
     """Estimate of a label, or of a case, as the command line names it."""
     faults = []
     if what is None:

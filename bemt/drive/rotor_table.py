@@ -21,36 +21,20 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class RotorMap:
-    """Loads of a rotor over speed.
+    """Loads of a rotor over speed."""
 
-    Parameters
-    ----------
-    omega_max : float
-        Greatest speed of the table. [rad/s]
-    thrust_law, torque_law, slope_law : callable
-        Speed [rad/s] to thrust [N], torque [N m] and thrust per induced speed at fixed rotation [N s/m].
-    radius_m, area_m2 : float
-        Of the rotor [m]; swept area that carries the thrust [m2].
-    rho : float
-        Density of the air. [kg/m3]
-    airspeed_m_s : float
-        Of flight. [m/s]
-    inertia_kg_m2 : float
-        Of the rotor alone. [kg m2]
-    notes : tuple of str
-        What was left out.
-    """
-
-    omega_max: float
+    omega_max: float  # greatest speed of the table. [rad/s]
+    # speed [rad/s] to thrust [N], torque [N m] and thrust per induced speed at fixed rotation [N s/m]
     thrust_law: Callable[[Array], Array]
     torque_law: Callable[[Array], Array]
     slope_law: Callable[[Array], Array] | None
+    # of the rotor [m]; swept area that carries the thrust [m2]
     radius_m: float
     area_m2: float
-    rho: float
-    airspeed_m_s: float = 0.0
-    inertia_kg_m2: float = 0.0
-    notes: tuple[str, ...] = ()
+    rho: float  # density of the air. [kg/m3]
+    airspeed_m_s: float = 0.0  # of flight. [m/s]
+    inertia_kg_m2: float = 0.0  # of the rotor alone. [kg m2]
+    notes: tuple[str, ...] = ()  # what was left out
 
     def thrust(self, omega: ArrayLike) -> Array:
         """Steady thrust, (N,) [N]."""
@@ -73,9 +57,13 @@ class RotorMap:
 
 
 def from_coefficients(
-    CT: float, CQ: float, diameter_m: float, rho: float = 1.225, inertia_kg_m2: float = 0.0,
+    CT: float,
+    CQ: float,
+    diameter_m: float,
+    rho: float = 1.225,
+    inertia_kg_m2: float = 0.0,
     solidity: float | None = None,
-) -> RotorMap:  # fmt: skip
+) -> RotorMap:
     """Rotor with constant coefficients.
 
     Notes
@@ -89,9 +77,13 @@ def from_coefficients(
 
 
 def quadratic(
-    kT: float, kQ: float, diameter_m: float, rho: float = 1.225, inertia_kg_m2: float = 0.0,
+    kT: float,
+    kQ: float,
+    diameter_m: float,
+    rho: float = 1.225,
+    inertia_kg_m2: float = 0.0,
     solidity: float | None = None,
-) -> RotorMap:  # fmt: skip
+) -> RotorMap:
     """Rotor whose loads go with the square of the speed."""
     R, A = 0.5 * diameter_m, math.pi * diameter_m**2 / 4.0
     slope = None if solidity is None else (lambda w: -0.25 * rho * solidity * 5.7 * A * R * w)
@@ -99,9 +91,13 @@ def quadratic(
 
 
 def from_case(
-    case: Case, rpm_max: float, airspeed_m_s: float = 0.0, air: Air | None = None, inertia_kg_m2: float = 0.0,
+    case: Case,
+    rpm_max: float,
+    airspeed_m_s: float = 0.0,
+    air: Air | None = None,
+    inertia_kg_m2: float = 0.0,
     points: int = 33,
-) -> RotorMap:  # fmt: skip
+) -> RotorMap:
     """Rotor of a case by BEMT."""
     from scipy.interpolate import PchipInterpolator
 

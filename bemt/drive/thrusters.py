@@ -56,29 +56,17 @@ class Thruster:
 
 @dataclass(frozen=True)
 class Allocation:
-    """Thrusts for a command.
+    """Thrusts for a command."""
 
-    Attributes
-    ----------
-    thrust_N : (N,) float
-        Of each thruster. [N]
-    force_N, moment_Nm : float
-        What they give together. [N], [N m]
-    wanted_force_N, wanted_moment_Nm : float
-        The command. [N], [N m]
-    saturated : (N,) bool
-        At a limit.
-    met : bool
-        Whether the command is met within 1e-6 of the greatest force and moment.
-    """
-
-    thrust_N: Array
+    thrust_N: Array  # (N,) of each thruster. [N]
+    # what they give together. [N], [N m]
     force_N: float
     moment_Nm: float
+    # the command. [N], [N m]
     wanted_force_N: float
     wanted_moment_Nm: float
-    saturated: NDArray[np.bool_]
-    met: bool
+    saturated: NDArray[np.bool_]  # (N,) at a limit
+    met: bool  # whether the command is met within 1e-6 of the greatest force and moment
 
 
 def effectiveness(thrusters: Sequence[Thruster]) -> Array:
@@ -89,9 +77,7 @@ def effectiveness(thrusters: Sequence[Thruster]) -> Array:
     return np.vstack([c, y * c - z * s])
 
 
-def allocate(
-    thrusters: Sequence[Thruster], force_N: float, moment_Nm: float, priority: str = "moment"
-) -> Allocation:  # fmt: skip
+def allocate(thrusters: Sequence[Thruster], force_N: float, moment_Nm: float, priority: str = "moment") -> Allocation:
     """Share a command among thrusters.
 
     Examples
@@ -104,8 +90,11 @@ def allocate(
     from scipy.optimize import linprog, lsq_linear
 
     faults = [] if thrusters else [Fault("", "thrusters", "none", "one or more")]
-    faults += [Fault("", t.name or f"thruster {i + 1}", f"{t.thrust_min_N:g} to {t.thrust_max_N:g} N", "min below max")
-               for i, t in enumerate(thrusters) if not t.thrust_min_N < t.thrust_max_N]  # fmt: skip
+    faults += [
+        Fault("", t.name or f"thruster {i + 1}", f"{t.thrust_min_N:g} to {t.thrust_max_N:g} N", "min below max")
+        for i, t in enumerate(thrusters)
+        if not t.thrust_min_N < t.thrust_max_N
+    ]
     wishes = {"force_N": force_N, "moment_Nm": moment_Nm}
     faults += [Fault("", name, f"{v}", "a finite number") for name, v in wishes.items() if not math.isfinite(v)]
     if priority not in ("moment", "force"):
@@ -114,7 +103,11 @@ def allocate(
         raise InputError(faults)
     b = effectiveness(thrusters)
     low, high = np.array([t.thrust_min_N for t in thrusters]), np.array([t.thrust_max_N for t in thrusters])
-    limit = np.maximum(np.abs(b) @ np.maximum(np.abs(low), np.abs(high)), 1e-12)  # greatest force and moment
+    most = np.maximum(np.abs(low), np.abs(high))
+    low = np.where(np.abs(low) < 1e-12 * most, 0.0, low)
+    limit = np.abs(b) @ most  # greatest force and moment
+    none = limit < 1e-9 * most.sum()  # arms that are rounding: the solver must not see them
+    b[none], limit[none] = 0.0, 1e-2 * most.sum()
     b, wanted = b / limit[:, None], np.array([force_N, moment_Nm]) / limit
     bounds = list(zip(low, high, strict=True))
 
@@ -126,7 +119,7 @@ def allocate(
             extra = {"A_eq": a_eq, "b_eq": b_eq} if fixed else {}
             end = linprog(sign * b[row], bounds=bounds, **extra)
             if not end.success:  # the row before lies on the edge of what is attainable: its own rounding
-                extra = {"A_ub": np.vstack([a_eq, -a_eq]), "b_ub": np.concatenate([b_eq, -b_eq]) + 1e-9}
+                extra = {"A_ub": np.vstack([a_eq, -a_eq]), "b_ub": np.concatenate([b_eq, -b_eq]) + 1e-7}
                 end = linprog(sign * b[row], bounds=bounds, **extra)
             ends.append(float(b[row] @ end.x))
         return float(np.clip(wanted[row], min(ends), max(ends)))
@@ -139,7 +132,7 @@ def allocate(
     matrix = np.vstack([1e5 * b, np.eye(len(low)) / size])
     found = lsq_linear(matrix, np.concatenate([1e5 * goal, np.zeros(len(low))]), bounds=(low, high), method="bvls")
     thrust = np.clip(found.x, low, high)
-    force, moment = (b @ thrust) * limit
+    force, moment = effectiveness(thrusters) @ thrust
     near = 1e-6 * (high - low)
     met = bool(np.all(np.abs(b @ thrust - wanted) <= 1e-6))
     return Allocation(thrust, float(force), float(moment), force_N, moment_Nm,

@@ -27,39 +27,34 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """Course of a simulation; all (N,) float.
+    """Course of a simulation; all (N,) float."""
 
-    Attributes
-    ----------
-    time_s, pulse_us : (N,) float
-        Time [s] and command [us].
-    rpm, thrust_N, torque_Nm : (N,) float
-        Speed [rev/min], thrust [N], torque of the air [N m].
-    motor_A, battery_A, voltage_V : (N,) float
-        Currents [A], voltage at the ESC [V].
-    temperature_C, soc : (N,) float
-        Of the winding [C]; state of charge [1].
-    converged : bool
-        Whether the integrator reached the end; NaN after where it stopped.
-    """
-
+    # (N,) time [s] and command [us]
     time_s: Array
     pulse_us: Array
+    # (N,) speed [rev/min], thrust [N], torque of the air [N m]
     rpm: Array
     thrust_N: Array
     torque_Nm: Array
+    # (N,) currents [A], voltage at the ESC [V]
     motor_A: Array
     battery_A: Array
     voltage_V: Array
+    # (N,) of the winding [C]; state of charge [1]
     temperature_C: Array
     soc: Array
-    converged: bool
+    converged: bool  # whether the integrator reached the end; NaN after where it stopped
 
 
 def simulate(
-    drive: Drive, steps: Sequence[tuple[float, float]], end_s: float, times_s: ArrayLike | None = None,
-    soc: float = 1.0, temperature_C: float | None = None, omega0: float | None = None,
-) -> History:  # fmt: skip
+    drive: Drive,
+    steps: Sequence[tuple[float, float]],
+    end_s: float,
+    times_s: ArrayLike | None = None,
+    soc: float = 1.0,
+    temperature_C: float | None = None,
+    omega0: float | None = None,
+) -> History:
     """Integrate the drive through steps of the command."""
     from scipy.integrate import solve_ivp
 
@@ -156,19 +151,13 @@ def time_to(time_s: Array, values: Array, start_s: float, share: float = 1.0 - m
 
 @dataclass(frozen=True)
 class FirstOrder:
-    """Delayed first-order step.
+    """Delayed first-order step."""
 
-    Attributes
-    ----------
-    tau_s, u_tau_s, delay_s : float
-        Time constant, its standard uncertainty from the scatter of the samples, time of the step. [s]
-    before, after : float
-        Levels, in the unit of the samples.
-    """
-
+    # time constant, its standard uncertainty from the scatter of the samples, time of the step. [s]
     tau_s: float
     u_tau_s: float
     delay_s: float
+    # levels, in the unit of the samples
     before: float
     after: float
 

@@ -20,28 +20,19 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class MapCheck:
-    """Thrust over pulse width, model beside recording.
+    """Thrust over pulse width, model beside recording."""
 
-    Attributes
-    ----------
-    name, how : str
-        Recording; what of the model was fitted to it.
-    pulse_us, thrust_N, model_N : (N,) float
-        Pulse width [us]; thrust recorded and of the model [N].
-    worst, rms : float
-        Error over full scale. [1]
-    fitted : mapping of str to float
-        Constants fitted, in the unit of their names.
-    """
-
+    # recording; what of the model was fitted to it
     name: str
     how: str
+    # (N,) pulse width [us]; thrust recorded and of the model [N]
     pulse_us: Array
     thrust_N: Array
     model_N: Array
+    # error over full scale. [1]
     worst: float
     rms: float
-    fitted: Mapping[str, float]
+    fitted: Mapping[str, float]  # constants fitted, in the unit of their names
 
 
 def check_map(name: str, how: str, drive: Drive, points: MapPoints, fitted: Mapping[str, float]) -> MapCheck:
@@ -61,52 +52,32 @@ def other_battery(drive: Drive, points: MapPoints) -> Drive:
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One step of a log.
+    """One step of a log."""
 
-    Parameters
-    ----------
-    log : str
-        Which log.
-    pulse_us : (float, float)
-        Commands before and after. [us]
-    time_s, thrust_N : (N,) float
-        Samples from before the step until it has settled: time [s], thrust [N].
-    """
-
-    log: str
-    pulse_us: tuple[float, float]
+    log: str  # which log
+    pulse_us: tuple[float, float]  # commands before and after. [us]
+    # (N,) samples from before the step until it has settled: time [s], thrust [N]
     time_s: Array
     thrust_N: Array
 
 
 @dataclass(frozen=True)
 class StepCheck:
-    """One step of a log, model beside recording.
+    """One step of a log, model beside recording."""
 
-    Attributes
-    ----------
-    log : str
-        Which log.
-    from_us, to_us : float
-        Commands. [us]
-    at_s, before_N, after_N : float
-        Time of the step [s], levels [N].
-    tau_s, u_tau_s, model_s : float
-        Time constant recorded, its standard uncertainty, and of the model. [s]
-    sample_s : float
-        Between samples: what is faster than two of them is not resolved. [s]
-    """
-
-    log: str
+    log: str  # which log
+    # commands. [us]
     from_us: float
     to_us: float
+    # time of the step [s], levels [N]
     at_s: float
     before_N: float
     after_N: float
+    # time constant recorded, its standard uncertainty, and of the model. [s]
     tau_s: float
     u_tau_s: float
     model_s: float
-    sample_s: float
+    sample_s: float  # between samples: what is faster than two of them is not resolved. [s]
 
     @property
     def resolved(self) -> bool:
@@ -120,9 +91,15 @@ class StepCheck:
 
 
 def step_drive(
-    voltage_V: float, full_thrust_N: float, drop: float, skew: float, inertia_kg_m2: float = 0.0,
-    diameter_m: float = 0.127, tip_m_s: float = 170.0, brake_on_stop: float = 1.0,
-) -> Drive:  # fmt: skip
+    voltage_V: float,
+    full_thrust_N: float,
+    drop: float,
+    skew: float,
+    inertia_kg_m2: float = 0.0,
+    diameter_m: float = 0.127,
+    tip_m_s: float = 170.0,
+    brake_on_stop: float = 1.0,
+) -> Drive:
     """Drive of logs that state neither motor nor propeller, by what their thrust over duty says of it."""
     omega = tip_m_s / (0.5 * diameter_m)
     kT = full_thrust_N / omega**2
@@ -135,9 +112,8 @@ def step_drive(
 
 
 def check_steps(
-    voltage_V: float, levels: tuple[Array, Array], steps: Sequence[Step], u_level: float = 0.02,
-    u_tau: float = 0.1,
-) -> tuple[list[StepCheck], Drive]:  # fmt: skip
+    voltage_V: float, levels: tuple[Array, Array], steps: Sequence[Step], u_level: float = 0.02, u_tau: float = 0.1
+) -> tuple[list[StepCheck], Drive]:
     """Fit drop, reactance, inertia and brake force to levels and steps of logs, and compare the time constants."""
     from scipy.optimize import least_squares
     from scipy.special import expit
@@ -162,8 +138,10 @@ def check_steps(
         k, ohm = drive.motor.k(), drive.motor.resistance_ohm
         ohms = ohm + (drive.motor.reactance_ohm_s * omega) ** 2 / ohm
         duty = (k * omega + ohms * drive.rotor.torque(omega) / k) / voltage_V
-        gaps = [np.log(m / seen[i].tau_s) / np.hypot(u_tau, seen[i].u_tau_s / seen[i].tau_s)
-                for i, m in zip(held, constants(drive), strict=True)]  # fmt: skip
+        gaps = [
+            np.log(m / seen[i].tau_s) / np.hypot(u_tau, seen[i].u_tau_s / seen[i].tau_s)
+            for i, m in zip(held, constants(drive), strict=True)
+        ]
         return np.concatenate([(duty - drive.esc.duty(pulse)) / u_level, gaps])
 
     start = np.append(np.log([1.05 * float(np.max(thrust)), 0.5, 1.0, 4e-6]), 1.0)

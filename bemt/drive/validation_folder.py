@@ -111,8 +111,12 @@ def steps(folder: Path) -> tuple[list[validation.StepCheck], Drive]:
         last = float(np.mean(thrust[(t > t[np.argmax(thrust)]) & (t < t[np.argmax(thrust)] + 0.2)]))
         end = float(t[np.flatnonzero(thrust > 0.5 * last)[-1]])
         starts = end - np.concatenate([np.cumsum(hold[::-1])[::-1], [0.0]])
-        size = np.array([np.median(thrust[(t > a + 0.4 * h) & (t < a + 0.95 * h)])
-                         for a, h in zip(starts, [*hold, 1.0], strict=True)])  # fmt: skip
+        size = np.array(
+            [
+                np.median(thrust[(t > a + 0.4 * h) & (t < a + 0.95 * h)])
+                for a, h in zip(starts, [*hold, 1.0], strict=True)
+            ]
+        )
         if len(orders) > 10:
             levels = (pulse[2:-1], size[1:-1])
         for i, change in enumerate(np.diff(np.concatenate([[0.0], size]))):
@@ -120,8 +124,6 @@ def steps(folder: Path) -> tuple[list[validation.StepCheck], Drive]:
                 rows = (t >= starts[i] - 0.4) & (t <= starts[i] + 0.8)
                 found.append(validation.Step(name, (float(pulse[i]), float(pulse[i + 1])), t[rows], thrust[rows]))
     return validation.check_steps(VOLTS, levels, found)
-
-
 
 
 def _sorted(x: Array, y: Array) -> tuple[Array, Array]:
@@ -143,7 +145,7 @@ def compare(path: str, out: str | None = None) -> tuple[dict[str, Any], str]:
         "inertia_kg_m2": drive.motor.inertia_kg_m2 if drive else None,
         "reactance_ohm_s": drive.motor.reactance_ohm_s if drive else None,
         "brake_on_stop": drive.esc.brake_on_stop if drive else None,
-    }  # fmt: skip
+    }
     rows = [[m.name, f"{100 * m.worst:.1f}", f"{100 * m.rms:.1f}", m.how] for m in found]
     lines = [text_table(["thrust over pulse width", "worst [%FS]", "rms [%FS]", "fitted"], rows, left=(0, 3))]
     rows = [[f"{s.log} at {s.at_s:.2f} s", f"{s.before_N:.2f} to {s.after_N:.2f}",

@@ -1,51 +1,24 @@
 """``recording.toml``: what a table of measurements does not say of itself, in a small file beside it.
 
-::
-
-    [recording]
-    file = "run1.csv"              # or a list, in the order in which the runs were made
-    session = "2024-05-03"         # runs of one session share their zero and gain
-    decimal = "."                  # or ","
-    header = true                  # false: the first line is data
-
-    [columns]                      # channel = where it stands, unit, sign, uncertainty of the instrument
-    time = { column = "t", unit = "ms" }
-    thrust = { column = 2, unit = "gf", sign = -1, u_gain_pct = 0.5, u_zero = 1.0, u_sample = 2.0 }
-    electrical_rpm = { column = "eRPM", unit = "rpm" }
-
-    [rotor]
-    pole_pairs = 7                 # needed by electrical_rpm, refused without it
-    diameter_in = 10.0
-    gap_mm = 0.5
-
-    [air]                          # a density, or pressure and temperature (and humidity), or an altitude
-    pressure_hPa = 1002.0
-    temperature_C = 21.0
-    humidity_pct = 45.0
-
-    [stand]
-    wall_distance_m = 1.2
-    name = "home-made"
-
 Keys are strict, and all faults of the file are reported at once. ``u_zero`` and ``u_sample`` are standard uncertainties
 in the unit of the column. Columns that are not named keep what their headings say.
 """
 
 from __future__ import annotations
 
-import difflib
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
+from pydantic import create_model
 
 from bemt.air import Air
 from bemt.base import units
 from bemt.base.errors import Fault, InputError
-from bemt.base.toml import Collector, Key, check_table, load_toml, shown
+from bemt.base.toml import Collector, Table, entry, load_toml, shown, validated
 from bemt.dataset import Dataset
 from bemt.readers import head_text, load_text
 from bemt.readers._columns import Channel, dataset
@@ -54,7 +27,7 @@ from bemt.readers._large import large_table
 from bemt.readers._recording import Builder, spikes
 from bemt.readers._split import some, split_table
 
-__all__ = ["KIND", "QUANTITIES", "read", "sniff"]
+__all__ = ["KIND", "QUANTITIES", "RecordingToml", "read", "sniff"]
 
 KIND = "recording"
 QUANTITIES: dict[str, str] = {
@@ -66,37 +39,163 @@ QUANTITIES: dict[str, str] = {
 """Channels that ``[columns]`` may name, and their dimension."""
 
 
-def _lengths(name: str, low_m: float, high_m: float) -> dict[str, Key]:
-    """The same length in m, mm and in."""
-    scale = {"m": 1.0, "mm": 1e-3, "in": units.INCH}
-    return {f"{name}_{u}": Key(unit=u, low=low_m / f, high=high_m / f) for u, f in scale.items()}
+def _mass_for_force(unit: Any) -> str:
+    mass = unit in units.UNITS and units.UNITS[unit].dimension == "mass"
+    return f"{unit} is a mass: write {unit}f for the force" if mass else ""
 
 
-SCHEMA: dict[str, dict[str, Key]] = {
-    "recording": {
-        "file": Key("text_or_texts", required=True), "session": Key("text"), "remark": Key("text"),
-        "decimal": Key("choice", choices=(".", ",")), "delimiter": Key("choice", choices=(",", ";", "\t", "|", " ")),
-        "uncertainty_source": Key("text"),
-    },
-    "column": {
-        "unit": Key("choice", choices=(*sorted(units.UNITS), "-"), required=True),
-        "sign": Key("integer", low=-1, high=1), "u_gain_pct": Key(unit="%", low=0.0, high=50.0),
-        "u_zero": Key(low=0.0), "u_sample": Key(low=0.0),
-    },
-    "rotor": {
-        "pole_pairs": Key("integer", low=1, high=60), "blades": Key("integer", low=1, high=64), "name": Key("text"),
-        "motor": Key("text"), "ducted": Key("choice", choices=("yes", "no")),
-        **_lengths("diameter", 0.005, 12.0), **_lengths("pitch", 0.001, 20.0), **_lengths("gap", 0.0, 0.2),
-    },
-    "air": {
-        "density_kg_m3": Key(unit="kg/m3", low=0.2, high=2.0), "pressure_hPa": Key(unit="hPa", low=300.0, high=1100.0),
-        "temperature_C": Key(unit="C", low=-60.0, high=60.0), "humidity_pct": Key(unit="%", low=0.0, high=100.0),
-        "altitude_m": Key(unit="m", low=-500.0, high=11000.0),
-    },
-    "stand": {
-        "name": Key("text"), **_lengths("wall_distance", 0.01, 100.0), **_lengths("ground_distance", 0.01, 100.0),
-    },
-}  # fmt: skip
+def _nothing_left(sign: float) -> str:
+    return "" if sign else "Nothing would be left"
+
+
+class ColumnTable(Table):
+    """[columns]: where a channel stands, its unit, sign and the uncertainty of its instrument."""
+
+    column: int | str = entry("where it stands", low=1, required=True,
+                              words="a heading, or the number of a column from 1")  # fmt: skip
+    unit: str = entry("of the column", required=True)
+    sign: int = entry("factor on every value", "", -1, 1, _nothing_left, default=1, words="1 or -1")
+    u_gain_pct: float | None = entry("standard uncertainty of the scale", "%", 0.0, 50.0)
+    u_zero: float | None = entry("standard uncertainty of the zero, in the unit of the column", low=0.0)
+    u_sample: float | None = entry("standard uncertainty of one sample, in the unit of the column", low=0.0)
+
+
+def _column_of(dimension: str) -> type[ColumnTable]:
+    choices = units.suffixes(dimension) + (("-",) if dimension == "fraction" else ())
+    suspect = _mass_for_force if dimension == "force" else None
+    unit = entry("of the column", suspect=suspect, required=True, choices=choices)
+    return create_model("ColumnTable", __base__=ColumnTable, unit=(str, unit))
+
+
+_OF = {dimension: _column_of(dimension) for dimension in set(QUANTITIES.values())}
+_COLUMNS: Any = {name: (_OF[dimension] | None, entry(dimension, words='{ column = "heading or number", unit = "..." }'))
+                 for name, dimension in QUANTITIES.items()}  # fmt: skip
+ColumnsTable: Any = create_model("ColumnsTable", __base__=Table, **_COLUMNS)
+
+
+class RecordingHead(Table):
+    """[recording]: the tables and how they are written."""
+
+    file: str | tuple[str, ...] = entry("table beside this file, or tables in the order of their runs", required=True)
+    session: str | None = entry("runs of one session share their zero and gain")
+    remark: str | None = entry("anything")
+    decimal: Literal[".", ","] = entry("mark of decimals", default=".", words='"." or ","')
+    delimiter: Literal[",", ";", "\t", "|", " "] | None = entry(
+        "between cells; found if left out", words='one of ",", ";", "|", tab, space'
+    )
+    header: bool | None = entry("false: the first line is data; found if left out")
+    uncertainty_source: str | None = entry("where the uncertainties come from")
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Names of the tables."""
+        return (self.file,) if isinstance(self.file, str) else self.file
+
+    def rules(self) -> Iterable[tuple[str, ...]]:
+        """Tables lie beside this file."""
+        for name in self.files:
+            if Path(name).is_absolute() or ".." in Path(name).parts:
+                yield "file", repr(name), "the name of a file beside this one"
+
+
+class _Constants(Table):
+    """Numbers that hold for all rows."""
+
+    def constants(self) -> dict[str, float]:
+        """By name, lengths in m."""
+        found = {}
+        for key, value in self.given().items():
+            if isinstance(value, (int, float)):
+                name, unit = units.split_suffix(key)
+                found[f"{name}_m" if unit else key] = float(units.to_si(value, unit.suffix) if unit else value)
+        return found
+
+    def rules(self) -> Iterable[tuple[str, ...]]:
+        """Each length once."""
+        names = [units.split_suffix(key)[0] for key in self.given()]
+        for key, name in zip(self.given(), names, strict=True):
+            if names.count(name) > 1 and key != list(self.given())[names.index(name)]:
+                yield key, "a second unit of the same length", "each length once"
+
+
+class RotorFacts(_Constants):
+    """[rotor]: what turned."""
+
+    pole_pairs: int | None = entry("of the motor; needed by electrical_rpm, refused without it", low=1, high=60)
+    blades: int | None = entry("number of blades", low=1, high=64)
+    name: str | None = entry("of the rotor")
+    motor: str | None = entry("name of the motor")
+    ducted: Literal["yes", "no"] | None = entry("whether there was a duct")
+    diameter_in: float | None = entry("tip diameter", "in", 0.2, 480)
+    diameter_mm: float | None = entry("tip diameter", "mm", 5, 12_000)
+    diameter_m: float | None = entry("tip diameter", "m", 0.005, 12.0)
+    pitch_in: float | None = entry("advance per turn", "in", 0.04, 800)
+    pitch_mm: float | None = entry("advance per turn", "mm", 1, 20_000)
+    pitch_m: float | None = entry("advance per turn", "m", 0.001, 20.0)
+    gap_in: float | None = entry("tip gap", "in", 0, 8)
+    gap_mm: float | None = entry("tip gap", "mm", 0, 200)
+    gap_m: float | None = entry("tip gap", "m", 0.0, 0.2)
+
+
+class AirFacts(Table):
+    """[air]: a density, or pressure and temperature (and humidity), or an altitude."""
+
+    density_kg_m3: float | None = entry("density", "kg/m3", 0.2, 2.0)
+    pressure_hPa: float | None = entry("static pressure", "hPa", 300.0, 1100.0)
+    temperature_C: float | None = entry("temperature", "C", -60.0, 60.0)
+    humidity_pct: float | None = entry("relative humidity, with pressure", "%", 0.0, 100.0)
+    altitude_m: float | None = entry("altitude in the standard atmosphere", "m", -500.0, 11000.0)
+
+    def rules(self) -> Iterable[tuple[str, ...]]:
+        """One way to a density."""
+        ways = [key for key in ("density_kg_m3", "pressure_hPa", "altitude_m") if key in self.given()]
+        if self.given() and len(ways) != 1:
+            yield "", " and ".join(ways) or "no density", "one of density_kg_m3, pressure_hPa, altitude_m"
+        elif ways == ["pressure_hPa"] and self.temperature_C is None:
+            yield "temperature_C", "nothing", "the temperature that goes with pressure_hPa"
+        elif self.humidity_pct is not None and ways != ["pressure_hPa"]:
+            yield "humidity_pct", shown(self.humidity_pct), "no humidity without pressure_hPa"
+
+    def constants(self) -> dict[str, float]:
+        """Density and temperature in SI; nothing when nothing is stated."""
+        if not self.given():
+            return {}
+        warm = {} if self.temperature_C is None else {"temperature_K": self.temperature_C + units.ZERO_CELSIUS}
+        if self.density_kg_m3 is not None:
+            return {"density_kg_m3": self.density_kg_m3, **warm}
+        if self.pressure_hPa is not None and self.temperature_C is not None:
+            air = Air.from_state(self.pressure_hPa * 100.0, self.temperature_C, self.humidity_pct or 0.0)
+            return {"density_kg_m3": float(air.rho), **warm}
+        standard = Air.isa(self.altitude_m or 0.0)
+        factor = float(standard.temperature) / warm["temperature_K"] if warm else 1.0
+        return {"density_kg_m3": float(standard.rho) * factor, **warm}
+
+
+class StandFacts(_Constants):
+    """[stand]: what stood around it."""
+
+    name: str | None = entry("of the stand")
+    wall_distance_in: float | None = entry("rotor to the wall behind it", "in", 0.4, 4000)
+    wall_distance_mm: float | None = entry("rotor to the wall behind it", "mm", 10, 100_000)
+    wall_distance_m: float | None = entry("rotor to the wall behind it", "m", 0.01, 100.0)
+    ground_distance_in: float | None = entry("axis to the ground", "in", 0.4, 4000)
+    ground_distance_mm: float | None = entry("axis to the ground", "mm", 10, 100_000)
+    ground_distance_m: float | None = entry("axis to the ground", "m", 0.01, 100.0)
+
+
+class RecordingToml(Table):
+    """recording.toml: what a table of measurements does not say of itself."""
+
+    recording: RecordingHead
+    columns: ColumnsTable = entry("channels", required=True, words="a table with one channel or more")
+    rotor: RotorFacts = RotorFacts()
+    air: AirFacts = AirFacts()
+    stand: StandFacts = StandFacts()
+
+    def rules(self) -> Iterable[tuple[str, ...]]:
+        """One channel or more."""
+        if not self.columns.given():
+            yield "columns", "a table without channels", "a table with one channel or more"
 
 
 def sniff(head: bytes | str) -> bool:
@@ -114,153 +213,53 @@ def read(path: str | os.PathLike[str]) -> Dataset:
     """Read a recording.toml and the tables that it names."""
     out = Collector(os.fspath(path))
     document = load_toml(Path(path), out)
-    if document is None:
+    made = None if document is None else validated(RecordingToml, document, out)
+    _check_poles(out, document or {})
+    if made is None or out.faults:
         raise InputError(out.faults)
-    _check(out, document)
-    constants = _constants(out, document)
-    if out.faults:
-        raise InputError(out.faults)
-    head = document["recording"]
-    files = [head["file"]] if isinstance(head["file"], str) else list(head["file"])
+    head, constants = made.recording, made.rotor.constants() | made.stand.constants() | made.air.constants()
     runs: list[Dataset] = []
     faults: list[Fault] = []
-    for name in files:
+    for name in head.files:
         try:
-            runs.append(_run(out.file, Path(path).with_name(name), document))
+            runs.append(_run(out.file, Path(path).with_name(name), made))
         except InputError as error:
             faults.extend(error.faults)
     if faults:
         raise InputError(faults)
-    joined = _join(runs, files)
+    joined = _join(runs, head.files)
     warnings = list(joined.notes)
     if "density_kg_m3" not in constants and "density_kg_m3" not in joined:
         warnings.append("no air state: coefficients need a density ([air] in the recording)")
-    said = {"recording": out.file, **{k: str(v) for k, v in head.items() if isinstance(v, str) and k != "file"}}
-    for table in ("rotor", "stand"):
-        said |= {f"{table}_{k}": v for k, v in document.get(table, {}).items() if isinstance(v, str)}
-    told = {"constants": constants, "instrument": _instrument(document["columns"])}
+    said = {"recording": out.file, **{k: v for k, v in head.given().items() if isinstance(v, str) and k != "file"}}
+    for name, facts in (("rotor", made.rotor), ("stand", made.stand)):
+        said |= {f"{name}_{k}": v for k, v in facts.given().items() if isinstance(v, str)}
+    told = {"constants": constants, "instrument": _instrument(made.columns)}
     about = {**joined.provenance, **said, **{k: v for k, v in told.items() if v}, "format": KIND}
     return replace(joined, kind="bench", notes=tuple(dict.fromkeys(warnings)), provenance=about)
 
 
-def _check(out: Collector, document: Mapping[str, Any]) -> None:
-    """All faults of the TOML document."""
-    tables = ("recording", "columns", "rotor", "air", "stand")
-    for name in document:
-        if name not in tables:
-            close = difflib.get_close_matches(name, tables, n=1)
-            hint = f"Did you mean {close[0]}?" if close else ""
-            out.add(name, "an unknown table", f"one of {', '.join(tables)}", hint)
-    head = document.get("recording", {})
-    plain = {k: v for k, v in head.items() if k != "header"} if isinstance(head, Mapping) else head
-    check_table(out, "recording", plain, SCHEMA)
-    if isinstance(head, Mapping) and not isinstance(head.get("header", True), bool):
-        out.add("recording.header", shown(head["header"]), "true or false")
-    for name in _names(head):
-        if Path(name).is_absolute() or ".." in Path(name).parts:
-            out.add("recording.file", repr(name), "the name of a file beside this one")
-    for name in ("rotor", "air", "stand"):
-        if name in document:
-            check_table(out, name, document[name], SCHEMA)
-    columns = document.get("columns")
-    if not isinstance(columns, Mapping) or not columns:
-        out.add("columns", "nothing" if columns is None else shown(columns), "a table with one channel or more")
-        return
-    for name, column in columns.items():
-        _check_column(out, name, column)
-    _check_poles(out, document, columns)
-
-
-def _names(head: Any) -> list[str]:
-    value = head.get("file") if isinstance(head, Mapping) else None
-    found = value if isinstance(value, list) else [value]
-    return [name for name in found if isinstance(name, str)]
-
-
-def _check_column(out: Collector, name: str, column: Any) -> None:
-    where = f"columns.{name}"
-    if name not in QUANTITIES:
-        close = difflib.get_close_matches(name, QUANTITIES, n=1)
-        hint = f"Did you mean {close[0]}?" if close else ""
-        out.add(where, "an unknown channel", f"one of {', '.join(QUANTITIES)}", hint)
-        return
-    if not isinstance(column, Mapping):
-        out.add(where, shown(column), '{ column = "heading or number", unit = "..." }')
-        return
-    check_table(out, "column", {k: v for k, v in column.items() if k != "column"}, SCHEMA, where=where)
-    place = column.get("column")
-    if isinstance(place, bool) or not (isinstance(place, int) and place >= 1 or isinstance(place, str) and place):
-        got = "nothing" if place is None else shown(place)
-        out.add(f"{where}.column", got, "a heading, or the number of a column from 1")
-    if column.get("sign") == 0:
-        out.add(f"{where}.sign", "0", "1 or -1")
-    unit, dimension = column.get("unit"), QUANTITIES[name]
-    lawful = units.suffixes(dimension) + (("-",) if dimension == "fraction" else ())
-    if isinstance(unit, str) and (unit in units.UNITS or unit == "-") and unit not in lawful:
-        mass = unit in units.UNITS and units.UNITS[unit].dimension == "mass" and dimension == "force"
-        hint = f"{unit} is a mass: write {unit}f for the force" if mass else ""
-        out.add(f"{where}.unit", repr(unit), f"one of {', '.join(lawful)}", hint)
-
-
-def _check_poles(out: Collector, document: Mapping[str, Any], columns: Mapping[str, Any]) -> None:
-    rotor = document.get("rotor")
+def _check_poles(out: Collector, document: Mapping[str, Any]) -> None:
+    """Pole pairs and electrical_rpm come together; said also where other values are wrong."""
+    rotor, columns = document.get("rotor"), document.get("columns")
     poles = isinstance(rotor, Mapping) and "pole_pairs" in rotor
-    if "electrical_rpm" in columns and not poles:
+    electrical = isinstance(columns, Mapping) and "electrical_rpm" in columns
+    if electrical and not poles:
         hint = "An outrunner with 14 magnets has 7; a stand that divided already gives rpm, not electrical_rpm"
         out.add("rotor.pole_pairs", "nothing", "the pole pairs of the motor, since electrical_rpm is given", hint)
-    if poles and "electrical_rpm" not in columns:
+    if poles and not electrical and isinstance(columns, Mapping):
         out.add("rotor.pole_pairs", shown(rotor["pole_pairs"]) if rotor else "", "no pole_pairs without electrical_rpm",
                 "Name the column electrical_rpm if it counts electrical revolutions")  # fmt: skip
 
 
-def _constants(out: Collector, document: Mapping[str, Any]) -> dict[str, float]:
-    """Numbers that hold for all rows, in SI."""
-    found: dict[str, float] = {}
-    if out.faults:
-        return found
-    for table in ("rotor", "stand"):
-        for key, value in document.get(table, {}).items():
-            if isinstance(value, str):
-                continue
-            name, unit = units.split_suffix(key)
-            label = f"{name}_m" if unit is not None else key
-            if label in found:
-                out.add(f"{table}.{key}", "a second unit of the same length", "each length once")
-            found[label] = float(units.to_si(float(value), unit.suffix)) if unit is not None else float(value)
-    air = document.get("air", {})
-    ways = [key for key in ("density_kg_m3", "pressure_hPa", "altitude_m") if key in air]
-    if air and len(ways) != 1:
-        out.add("air", " and ".join(ways) or "no density", "one of density_kg_m3, pressure_hPa, altitude_m")
-    elif ways == ["pressure_hPa"] and "temperature_C" not in air:
-        out.add("air.temperature_C", "nothing", "the temperature that goes with pressure_hPa")
-    elif "humidity_pct" in air and ways != ["pressure_hPa"]:
-        out.add("air.humidity_pct", shown(air["humidity_pct"]), "no humidity without pressure_hPa")
-    elif ways:
-        found |= {"density_kg_m3": _density(air, ways[0])}
-        if "temperature_C" in air:
-            found["temperature_K"] = float(air["temperature_C"]) + units.ZERO_CELSIUS
-    return found
-
-
-def _density(air: Mapping[str, Any], way: str) -> float:
-    if way == "density_kg_m3":
-        return float(air[way])
-    if way == "pressure_hPa":
-        pressure, humidity = float(air[way]) * 100.0, float(air.get("humidity_pct", 0.0))
-        return float(Air.from_state(pressure, float(air["temperature_C"]), humidity).rho)
-    standard = Air.isa(float(air[way]))
-    rho, T = float(standard.rho), float(standard.temperature)
-    return rho * T / (float(air["temperature_C"]) + units.ZERO_CELSIUS) if "temperature_C" in air else rho
-
-
-def _instrument(columns: Mapping[str, Any]) -> dict[str, dict[str, float]]:
+def _instrument(columns: Any) -> dict[str, dict[str, float]]:
     """Uncertainties by channel: gain [1], zero and sample in the unit of the channel."""
     out: dict[str, dict[str, float]] = {}
-    for name, column in columns.items():
-        head = _heading(name, column["unit"], "")
+    for name, column in columns.given().items():
+        head = _heading(name, column.unit, "")
         factor = 1.0 if head.unit is None or head.unit.suffix == "rpm" else head.unit.factor
-        own = {"gain": column["u_gain_pct"] / 100.0} if "u_gain_pct" in column else {}
-        own |= {k[2:]: column[k] * factor for k in ("u_zero", "u_sample") if k in column}
+        stated = ("gain", column.u_gain_pct, 0.01), ("zero", column.u_zero, factor), ("sample", column.u_sample, factor)
+        own = {key: value * scale for key, value, scale in stated if value is not None}
         if own:
             out[head.name] = own
     return out
@@ -275,17 +274,17 @@ def _heading(name: str, unit: str, text: str) -> Heading:
     return Heading(text, heading(f"{name}_{unit}").name, units.UNITS[unit])
 
 
-def _run(file: str, path: Path, document: Mapping[str, Any]) -> Dataset:
+def _run(file: str, path: Path, made: RecordingToml) -> Dataset:
     """One table with the map applied."""
-    head, columns = document["recording"], document["columns"]
-    large = large_table(path) if not {"delimiter", "header", "decimal"} & head.keys() else None
-    told = (head.get("delimiter"), head.get("header"))
+    head, columns = made.recording, made.columns.given()
+    large = large_table(path) if not {"delimiter", "header", "decimal"} & head.model_fields_set else None
+    told = (head.delimiter, head.header)
     table = large[0] if large is not None and large[1] == "." else split_table(load_text(path), *told)
     source, width = table.source, table.width
     places: dict[int, str] = {}
     faults = []
     for name, column in columns.items():
-        place = column["column"]
+        place = column.column
         if isinstance(place, int):
             index = place - 1 if place <= width else None
         else:
@@ -300,14 +299,14 @@ def _run(file: str, path: Path, document: Mapping[str, Any]) -> Dataset:
     if faults:
         raise InputError(faults)
     build = Builder(table, KIND)
-    decimal = head.get("decimal", ".")
+    decimal = head.decimal
     for k in sorted(range(width), key=lambda k: k not in places):
         text = table.headings[k] if table.headings else ""
         if k in places:
             column = columns[places[k]]
-            at = _heading(places[k], column["unit"], text or f"column {k + 1}")
+            at = _heading(places[k], column.unit, text or f"column {k + 1}")
             rows = len(build.unitless)
-            name = build.add(k, at, decimal, float(column.get("sign", 1)))
+            name = build.add(k, at, decimal, float(column.sign))
             if not name and not build.faults:
                 where = f"columns.{places[k]}.column"
                 build.faults.append(Fault(file, where, f"column {k + 1} without numbers", "a column of numbers"))
@@ -315,11 +314,11 @@ def _run(file: str, path: Path, document: Mapping[str, Any]) -> Dataset:
         else:
             build.add(k, heading(text) if text else Heading("", f"column_{k + 1}", None), decimal)
     if not build.faults:
-        _derive(build, document)
+        _derive(build, made.rotor.pole_pairs or 1)
     return build.finish()
 
 
-def _derive(build: Builder, document: Mapping[str, Any]) -> None:
+def _derive(build: Builder, pairs: int) -> None:
     """Mechanical speed from the electrical one, and the flags."""
     for name in ("rpm", "electrical_rpm", "optical_rpm"):
         if name in build.channels:
@@ -328,7 +327,6 @@ def _derive(build: Builder, document: Mapping[str, Any]) -> None:
             build.flag(np.flatnonzero(values == 0.0), f"{name} is 0")
             build.flag(np.flatnonzero(values < 0.0), f"{name} is negative")
     if "electrical_rpm" in build.channels:
-        pairs = int(document["rotor"]["pole_pairs"])
         label = build.free("rpm") if "rpm" not in build.channels else "rpm_from_electrical_rpm"
         build.channels[label] = Channel(build.channels["electrical_rpm"].values / pairs, "rpm")
         build.warnings.append(f"{label} is electrical_rpm over {pairs} pole pairs, as the recording says")
@@ -340,7 +338,7 @@ def _derive(build: Builder, document: Mapping[str, Any]) -> None:
     build.check_magnitudes()
 
 
-def _join(runs: list[Dataset], files: list[str]) -> Dataset:
+def _join(runs: list[Dataset], files: Sequence[str]) -> Dataset:
     """Runs in their order; a channel that a run lacks is NaN there."""
     if len(runs) == 1:
         return runs[0]

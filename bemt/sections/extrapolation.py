@@ -49,9 +49,17 @@ def _viterna(a: Array, a_s: float, cl_s: float, cd_s: float, cd_max: float, meth
 
 
 def extend(
-    alpha: Array, cl: Array, cd: Array, *, lo: float, hi: float, cd_max: float, out: Array = ALPHA_GRID,
-    half: float = 0.0, method: str = "viterna",
-) -> tuple[Array, Array]:  # fmt: skip
+    alpha: Array,
+    cl: Array,
+    cd: Array,
+    *,
+    lo: float,
+    hi: float,
+    cd_max: float,
+    out: Array = ALPHA_GRID,
+    half: float = 0.0,
+    method: str = "viterna",
+) -> tuple[Array, Array]:
     """One section's cl and cd continued to +-pi: data between lo and hi, Viterna-Corrigan and reversed flow outside.
     [-]
 
@@ -112,9 +120,14 @@ class ExtrapolatedTable:
 
 
 def from_tables(
-    tables: Sequence[ExtrapolatedTable], *, name: str = "", source: str = "", ar: float = 10.0,
-    cd_max: float | None = None, notes: Sequence[str] = (),
-) -> Polar:  # fmt: skip
+    tables: Sequence[ExtrapolatedTable],
+    *,
+    name: str = "",
+    source: str = "",
+    ar: float = 10.0,
+    cd_max: float | None = None,
+    notes: Sequence[str] = (),
+) -> Polar:
     """Polar from single-Re tables, each continued to +-180 deg where its data stop."""
     top = viterna_cd_max(ar) if cd_max is None else float(cd_max)
     re, mach = (np.unique([getattr(t, k) for t in tables]) for k in ("Re", "M"))

@@ -68,10 +68,19 @@ def neuralfoil_polar(airfoil: Airfoil, n_crit: float = rule.N_CRIT, drag_level: 
 
 
 def tunnel_polar(
-    airfoil: Airfoil, *, re: Array = DEFAULT_RE, n_crit: float = 9.0, xtr_upper: float = 1.0,
-    xtr_lower: float = 1.0, model: str = "xlarge", ar: float = 10.0, cd_max: float | None = None,
-    method: str = "viterna", past_stall: float = np.pi, lift_floor: float = 0.5,
-) -> Polar:  # fmt: skip
+    airfoil: Airfoil,
+    *,
+    re: Array = DEFAULT_RE,
+    n_crit: float = 9.0,
+    xtr_upper: float = 1.0,
+    xtr_lower: float = 1.0,
+    model: str = "xlarge",
+    ar: float = 10.0,
+    cd_max: float | None = None,
+    method: str = "viterna",
+    past_stall: float = np.pi,
+    lift_floor: float = 0.5,
+) -> Polar:
     """Incompressible polar of a smooth section in a wind tunnel, continued to +-180 deg, cached on disk by content. [0]
 
     Notes
@@ -115,9 +124,14 @@ def _make_neuralfoil(airfoil: Airfoil, wanted: Array, settings: dict[str, Any]) 
     raw_deg = np.arange(-2 * reach, 2 * reach + 1) / 2.0
     a, r = np.meshgrid(raw_deg, np.append(re, RE_REFERENCE), indexing="ij")
     aero = nf.get_aero_from_coordinates(
-        np.column_stack([airfoil.x, airfoil.y]), a.ravel(), r.ravel(), n_crit=settings["n_crit"],
-        xtr_upper=settings["xtr"][0], xtr_lower=settings["xtr"][1], model_size=settings["model"],
-    )  # fmt: skip
+        np.column_stack([airfoil.x, airfoil.y]),
+        a.ravel(),
+        r.ravel(),
+        n_crit=settings["n_crit"],
+        xtr_upper=settings["xtr"][0],
+        xtr_lower=settings["xtr"][1],
+        model_size=settings["model"],
+    )
     cl, cd, conf = (np.asarray(aero[k], dtype=float).reshape(a.shape) for k in ("CL", "CD", "analysis_confidence"))
     if settings["lift_floor"] > 0.0:
         up, down, keep = np.maximum(cl[:, -1:], 0.0), np.minimum(cl[:, -1:], 0.0), settings["lift_floor"]

@@ -15,7 +15,7 @@ import numpy as np
 
 from bemt.base.errors import Fault, InputError, needs
 from bemt.base.tables import write_atomic
-from bemt.base.toml import Collector, Key, check_value
+from bemt.base.toml import Collector, Table, check_field, entry
 from bemt.case import Case
 from bemt.case.schema import AIRSPEED, RPM
 from bemt.exports.openfoam import Body, Settings, Sweep, case_files, sector_choice
@@ -31,16 +31,18 @@ if TYPE_CHECKING:
     from geometry.mesh import MeshModel
     from geometry.rotor import Rotor
 
-__all__ = ["RANGES", "Run", "check_run", "settings_of", "write_openfoam"]
+__all__ = ["Run", "RunRanges", "check_run", "settings_of", "write_openfoam"]
 
 FACETS = 96  # of the centre body
-RANGES: dict[str, Key] = {
-    "rpm": RPM,
-    "airspeed_m_s": replace(AIRSPEED, low=0.0),  # backward flight has no inlet
-    "sideslip_deg": Key(unit="deg", low=0, high=90),
-    "level": Key(low=4, high=9),
-}
-"""What the numbers of a :class:`Run` may be: those of a case file, where it has them."""
+
+
+class RunRanges(Table):
+    """What the numbers of a :class:`Run` may be: those of a case file, where it has them."""
+
+    rpm: float | None = entry("speed of rotation", RPM)
+    airspeed_m_s: float | None = entry("speed of flight", replace(AIRSPEED, low=0.0))  # backward flight has no inlet
+    sideslip_deg: float | None = entry("angle between shaft and wind", "deg", 0, 90)
+    level: float | None = entry("fineness of the grid", "", 4, 9)
 
 
 @dataclass(frozen=True)
@@ -91,10 +93,10 @@ def check_run(run: Run, names: Mapping[str, str] | None = None, file: str = "") 
     level: got 20; expected a number from 4 to 9.
     """
     out = Collector(file)
-    for key, allowed in RANGES.items():
+    for key in RunRanges.named():
         value = getattr(run, key)
         if value is not None:
-            check_value(out, key if names is None else names[key], value, allowed)
+            check_field(out, key if names is None else names[key], RunRanges, key, value)
     return out.faults
 
 

@@ -1,0 +1,138 @@
+"""What a short case leaves open: the value that is taken and its range, one rule for case files and for `bemt new`."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from bemt.asbuilt.population import chord_sd
+from bemt.base.units import INCH
+from bemt.sections.rule import DRAG_LEVEL, N_CRIT
+
+__all__ = ["AIR", "FAN", "HUB", "OFFSET", "SECTION", "SURFACE", "Unknown", "completed", "label_chord"]
+
+
+CHORD, CHORD_EXPONENT = 0.218, -0.4
+"""Largest chord over tip radius of the usual 10 in propeller and its exponent over the diameter: 87 propellers of UIUC
+volumes 1 and 2 with stations, families alike in weight (chord at 0.75 R 0.145 R; law `apc_like`) [1]."""
+_CHORD_LAW = (0.05, 1.0)  # chords over the radius that a propeller may have
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A value that nobody stated: dotted key, what is taken, its range, and where that comes from."""
+
+    key: str
+    value: Any
+    low: Any
+    high: Any
+    why: str
+
+    def block(self) -> str:
+        """Entry of a case file."""
+        return (
+            f'\n[[assumptions]]\nkey = "{self.key}"\nlow = {self.low:.4g}\nhigh = {self.high:.4g}\nwhy = "{self.why}"\n'
+        )
+
+
+HUB = Unknown("rotor.hub_ratio", 0.15, 0.10, 0.20, "hub not known; hubs and spinners of small propellers")
+_UNDERSIDE = "a label's pitch is that of the chord line (0) or of the flat underside (up to 1.4 deg more)"
+OFFSET = Unknown("blade.beta_offset_deg", 0.7, 0.0, 1.4, _UNDERSIDE)
+THICKNESS = Unknown("blade.section.thickness", 0.09, 0.06, 0.12, "section not known")
+SECTION = (
+    Unknown(
+        "blade.section.camber",
+        0.035,
+        0.02,
+        0.05,
+        "section not known; measured families of propellers have 3 to 5 %, slow flyers more",
+    ),
+    THICKNESS,
+)
+SURFACE = (
+    Unknown("model.n_crit", N_CRIT, 1.0, 5.0, "transition not known; 3 is the rule for disturbed flow"),
+    Unknown(
+        "model.drag_level",
+        DRAG_LEVEL,
+        1.0,
+        1.2,
+        "surface not known; smooth (1.0) to twice the excess of moulded blades (1.1)",
+    ),
+)
+AIR = Unknown("air.density_kg_m3", 1.225, 1.16, 1.29, "air not stated; 30 to 0 C at sea level")
+FAN = (
+    Unknown("rotor.hub_ratio", 0.37, 0.30, 0.45, "hub not known; hubs of ducted fans"),
+    Unknown("blade.max_chord_over_R", 0.45, 0.30, 0.60, "chord not known, law fan; range of that law"),
+    Unknown("blade.section.camber", 0.05, 0.03, 0.07, "section not known; cambered compressor-like sections"),
+    THICKNESS,
+)
+HUBS = ("hub_ratio", "hub_diameter_mm", "hub_diameter_in")
+CHORDS = ("chord_law", "stations", "uiuc", "apc")
+
+
+def label_chord(diameter_m: float) -> Unknown:
+    """Largest chord of a propeller that is known by its label."""
+    low, high = _CHORD_LAW
+    far = math.exp(math.sqrt(3.0) * chord_sd(diameter_m))
+    chord = min(max(CHORD * (diameter_m / INCH / 10.0) ** CHORD_EXPONENT, low), high)
+    least, most = (float(f"{value:.2g}") for value in (max(chord / far, low), min(chord * far, high)))
+    why = "chord not known, law apc_like; 87 measured propellers of 2.2 to 19 in. Measure it: nothing narrows more"
+    return Unknown("blade.max_chord_over_R", float(f"{chord:.3g}"), least, most, why)
+
+
+def _diameter_m(rotor: Any) -> float:
+    """What a document states of it, sound or not; 10 in where it states nothing."""
+    for key, factor in (("diameter_in", INCH), ("diameter_mm", 1e-3), ("diameter_m", 1.0)):
+        value = rotor.get(key) if isinstance(rotor, dict) else None
+        if isinstance(value, (int, float)) and 1e-3 < value * factor < 100.0:
+            return value * factor
+    return 10.0 * INCH
+
+
+def completed(document: Mapping[str, Any]) -> dict[str, Any]:
+    """Document with what a short case leaves out: kind, hub, chord law, section and air, each with its assumption.
+
+    Examples
+    --------
+    >>> short = {"rotor": {"blades": 2, "diameter_in": 10}, "blade": {"pitch_in": 5}, "operating": {"rpm": 6000}}
+    >>> full = completed(short)
+    >>> full["rotor"]["kind"], full["rotor"]["hub_ratio"], full["blade"]["chord_law"], full["air"]["density_kg_m3"]
+    ('propeller', 0.15, 'apc_like', 1.225)
+    """
+    made: dict[str, Any] = copy.deepcopy(dict(document))
+    rotor, blade, declared = made.get("rotor"), made.get("blade"), made.get("assumptions", [])
+    fan = "duct" in made
+    unknowns: list[Unknown] = []
+    if isinstance(rotor, dict):
+        fan = rotor.setdefault("kind", "fan" if fan else "propeller") == "fan"
+        if not any(key in rotor for key in HUBS):
+            unknowns.append(FAN[0] if fan else HUB)
+    if isinstance(blade, dict):
+        if not any(key in blade for key in CHORDS):
+            blade["chord_law"] = "fan" if fan else "apc_like"
+            unknowns += FAN[1:2] if fan else [OFFSET, label_chord(_diameter_m(rotor))]
+        if "section" not in blade:
+            unknowns += [*(FAN[2:] if fan else SECTION), *SURFACE]
+    if "air" not in made:
+        unknowns.append(AIR)
+    if not isinstance(declared, list):
+        return made
+    named = {str(item.get("key")): item for item in declared if isinstance(item, dict)}
+    for unknown in unknowns:
+        home, _, name = unknown.key.rpartition(".")
+        table = made
+        for part in home.split("."):
+            table = table.setdefault(part, {})
+        if not isinstance(table, dict) or name in table:
+            continue
+        table[name] = unknown.value
+        own = named.get(unknown.key)
+        if own is None:
+            item = {"key": unknown.key, "low": unknown.low, "high": unknown.high, "why": unknown.why}
+            made.setdefault("assumptions", []).append(item)
+        elif all(isinstance(own.get(end), (int, float)) for end in ("low", "high")):
+            table[name] = 0.5 * (own["low"] + own["high"])  # the user's range, in the middle of it
+    return made
