@@ -92,6 +92,13 @@ def test_what_is_named_beside_a_slip_explains_its_own(
     assert leading == explained(left) and share["untwist"] == (0.99 if leading == pair else 0.0)
 
 
+@pytest.mark.parametrize("walls", [None, object()])
+def test_a_duct_of_the_case_is_on_already(walls: object, answer: chain.Diagnosis) -> None:
+    parts = [SimpleNamespace(baseline=p.baseline, model=SimpleNamespace(duct=walls)) for p in answer.problem.parts]
+    problem: Any = SimpleNamespace(parts=parts)
+    assert ("duct" in prior.present(problem)) == (walls is not None)
+
+
 def test_the_nearest_signature_is_a_baseline_of_its_own(answer: chain.Diagnosis) -> None:
     assert confusion.nearest(answer.found) == "compressibility"
 
@@ -178,6 +185,11 @@ ROWS: dict[str, dict[str, Any]] = {
         "leading": Explanation.of("untwist", "duct"),
         "parameters": {"untwist": {"tip_deg": {"value": 5.0, "low": 4.0, "high": 5.0}}},
     },
+    "on already, and no reference": {
+        "on": True,
+        "leading": Explanation.of("reynolds", "duct"),
+        "parameters": {},
+    },
     "several are sure": {"sure": ("reynolds", "duct")},
     "one is sure": {},
     "one is sure, another may be there": {"beside": ("duct",)},
@@ -185,6 +197,7 @@ ROWS: dict[str, dict[str, Any]] = {
     "on already, among others": {
         "sure": (),
         "on": True,
+        "alone": False,
         "leading": Explanation.of("reynolds", "duct"),
         "parameters": {},
     },

@@ -9,6 +9,7 @@ import numpy as np
 
 from bemt import effects
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
+from bemt.effects.duct import DuctEffect
 
 if TYPE_CHECKING:
     from bemt.diagnose.problem import Problem
@@ -33,8 +34,9 @@ def prior_weights(problem: Problem, ids: Sequence[str]) -> dict[str, float]:
 
 
 def present(problem: Problem) -> set[str]:
-    """Effects that the baseline of every recording has."""
-    return set.intersection(*({e.id for e in p.baseline} for p in problem.parts))
+    """Effects that the baseline of every recording has; the case's own duct is one."""
+    ducts = [{DuctEffect.id} if p.model.duct is not None else set() for p in problem.parts]
+    return set.intersection(*({e.id for e in p.baseline} | d for p, d in zip(problem.parts, ducts, strict=True)))
 
 
 def log_priors(weights: dict[str, float], pairs: bool = True) -> dict[Explanation, float]:

@@ -292,6 +292,16 @@ RULES: tuple[Rule, ...] = (
         "declared: where one number cannot go further, another makes up for something else",
     ),
     Rule(
+        "on already, and no reference",
+        lambda a: a.on and a.alone,
+        lambda a: a.says(
+            "insufficient",
+            f"{a.leading} leads, which the model has already: without a reference an error of its law looks the same",
+        ),
+        "",
+        "declared after a proof named the law of a duct, and of stall delay, where only the solver was another",
+    ),
+    Rule(
         "several are sure",
         lambda a: len(a.sure) > 1,
         lambda a: a.names(a.sure, min(a.share[i] for i in a.sure)),
