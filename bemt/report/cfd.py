@@ -73,9 +73,13 @@ def cfd_runs(out: Path) -> list[dict[str, Any]]:
 
 
 def is_plain(run: Mapping[str, Any]) -> bool:
-    """Tell whether a run is the bare case: free domain, axial flow, no plate, blades as they are, settled."""
+    """Tell whether a run is the bare case: free domain, axial flow, no plate, blades as they are, settled.
+
+    A sector of one blade counts with its balance only: its sides may leak.
+    """
     apart = [run["sideslip_deg"], run["pitch_offset_deg"]]
-    return (run["domain"] == "free" and run["converged"] == 1 and math.isnan(run["wall_distance_m"])
+    closed = run["sector"] != "blade" or math.isfinite(run["balance_mass"])
+    return (closed and run["domain"] == "free" and run["converged"] == 1 and math.isnan(run["wall_distance_m"])
             and all(not abs(v) > 1e-9 for v in apart))  # fmt: skip
 
 
