@@ -1,4 +1,4 @@
-"""Loads along the blade beside those of a rotor: where they part, and which one effect brings them together."""
+"""Loads of CFD along the blade beside those of a rotor: where they part, and which one effect brings them together."""
 
 from __future__ import annotations
 
@@ -34,6 +34,8 @@ BANDS = np.linspace(0.40, 0.95, 6)
 EXPLAINED, ALIKE = 0.3, 1.5
 # Loads that agree this well on the average need no explanation: grids of such CFD are no better.
 FINE = 0.10
+# What untwists under load is no rotor of CFD: its blades are rigid.
+RIGID = ("untwist",)
 
 
 @dataclass(frozen=True)
@@ -171,12 +173,12 @@ def _banded(x: Array, values: Array) -> Array:
 
 
 def _candidates(model: Model) -> list[Effect]:
-    """Every diagnosed effect of the rotor, at each of its settings that the model does not have."""
+    """Every diagnosed effect of a rigid rotor, at each of its settings that the model does not have."""
     out: list[Effect] = []
     on = {e.id: e for e in model.effects}
     for cls in catalogue().values():
         plain = cls()
-        if not cls.diagnosed or not acts_on_rotor(plain):
+        if not cls.diagnosed or not acts_on_rotor(plain) or cls.id in RIGID:
             continue
         ranged = [(p.name, v) for p in cls.parameters if p.steps > 1 for v in np.linspace(p.low, p.high, p.steps)]
         settings = [{}, *(plain.variants() or ({name: float(v)} for name, v in ranged))]

@@ -323,9 +323,9 @@ def compare(
     ...     _ = file.write_text("\n".join(lines))
     >>> found = bemt.compare(a, b)
     >>> found.verdict, found.effects
-    ('sensor', ('thrust_gain',))
+    ('class', ('thrust_gain', 'ground_effect'))
     >>> print(found.text.splitlines()[0])
-    verdict: sensor thrust_gain
+    Calibration of the thrust cell or a wall behind or before the propeller (thrust -10.0% and torque +0.0%).
     """
     from bemt.diagnose import contrast
 

@@ -51,7 +51,7 @@ class Propeller:
     --------
     >>> p = propeller("10x5")
     >>> p
-    <propeller prop_10x5: 0.254 m, 2 blades, 7 unknowns>
+    <propeller prop_10x5: 0.254 m, 2 blades, 8 unknowns>
     """
 
     case: Case
