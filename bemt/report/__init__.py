@@ -23,6 +23,7 @@ def _pages(book: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     from bemt.report.case_page import case_sections, reproduction_table
     from bemt.report.cfd_page import CFD_WORDS, cfd_sections
     from bemt.report.diagnosis_block import diagnosis_parts
+    from bemt.report.fidelity import FIDELITY_WORDS, fidelity_sections
     from bemt.report.front import answers, front_parts
     from bemt.report.trend_page import trend_sections
     from bemt.report.values import sections
@@ -47,6 +48,7 @@ def _pages(book: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     for key, title, top, found in (
         ("trends", "Trends", [], trend_sections(book)),
         ("cfd", "Own CFD", [("words", CFD_WORDS)], cfd_sections(book["cfd"])),
+        ("fidelities", "Three fidelities", [("words", FIDELITY_WORDS)], fidelity_sections(book["fidelities"])),
         ("diagnoses", "Diagnoses", [], told),
         ("reproduction", "Reproduction", [("words", thesis), ("table", numbers), ("more", inputs)], []),
     ):

@@ -17,7 +17,7 @@ from bemt.readers import number
 from bemt.recordings.audit import CfdFacts, audit, audit_document
 from bemt.report.found_files import read_json, safe_files
 
-__all__ = ["attach", "cfd_runs", "is_plain", "operating_run", "radial_of"]
+__all__ = ["attach", "cfd_runs", "is_plain", "operating_run", "radial_of", "read_rows", "value"]
 
 SCHEMA = "bemt.cfd-recording/"
 CSV_BYTES = 20_000_000
@@ -31,7 +31,7 @@ NUMBERS = ("rpm", "airspeed_m_s", "J", "thrust_N", "torque_Nm", "u_thrust_N", "u
 WORDS = ("run", "solver", "gas", "domain", "sector", "turbulence", "note")
 
 
-def _rows(path: Path) -> list[dict[str, str]]:
+def read_rows(path: Path) -> list[dict[str, str]]:
     """Lines of a CSV file that somebody else wrote; none when it is missing or no text."""
     try:
         if path.stat().st_size > CSV_BYTES:
@@ -43,7 +43,8 @@ def _rows(path: Path) -> list[dict[str, str]]:
         return []
 
 
-def _value(text: str | None) -> float:
+def value(text: str | None) -> float:
+    """Finite number in a cell, else NaN."""
     found = number(text) if text else None
     return found if found is not None and math.isfinite(found) else math.nan
 
@@ -56,13 +57,13 @@ def cfd_runs(out: Path) -> list[dict[str, Any]]:
         if not isinstance(manifest, Mapping) or not str(manifest.get("schema", "")).startswith(SCHEMA):
             continue
         runs = []
-        for row in _rows(path.parent / "recording.csv"):
-            run: dict[str, Any] = {k: _value(row.get(k)) for k in NUMBERS} | {k: row.get(k, "") for k in WORDS}
+        for row in read_rows(path.parent / "recording.csv"):
+            run: dict[str, Any] = {k: value(row.get(k)) for k in NUMBERS} | {k: row.get(k, "") for k in WORDS}
             if run["rpm"] > 0 and math.isfinite(run["thrust_N"]):
                 runs.append(run)
         radial: dict[str, list[tuple[float, float, float]]] = {}
-        for row in _rows(path.parent / "radial.csv"):
-            point = tuple(_value(row.get(k)) for k in ("r_m", "thrust_per_radius_N_m", "torque_per_radius_Nm_m"))
+        for row in read_rows(path.parent / "radial.csv"):
+            point = tuple(value(row.get(k)) for k in ("r_m", "thrust_per_radius_N_m", "torque_per_radius_Nm_m"))
             if all(map(math.isfinite, point)):
                 radial.setdefault(row.get("run", ""), []).append(point)  # type: ignore[arg-type]
         if runs:

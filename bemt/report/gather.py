@@ -14,6 +14,7 @@ from bemt.case import Case, find_cases, load_case
 from bemt.compare.thesis import ORIGIN
 from bemt.report import curves, trends
 from bemt.report.cfd import attach, cfd_runs
+from bemt.report.fidelity import fidelities
 from bemt.report.found_files import read_json, safe_files
 from bemt.report.rotor_view import still
 from geometry.common import GeometryError
@@ -48,6 +49,7 @@ def gather(paths: Sequence[str | Path], out: Path, progress: Progress | None = N
         "reproduction": _reproduction() if of_thesis else [],
         "exit_code": document["exit_code"],
         "cfd": cfd_runs(out),
+        "fidelities": fidelities(out, [str(page["result"]["name"]) for page in pages]),
     }
     attach(book)
     attach_diagnoses(book, out)
