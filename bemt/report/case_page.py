@@ -138,8 +138,8 @@ def _performance(page: Mapping[str, Any]) -> Section:
         title = f"{title} at {own['airspeed_m_s']:g} m/s"
         plots.append(Plot(title, "rotational speed [rev/min]", label, traces, x_zero=True))
     words = (
-        "Bands: one standard uncertainty from the declared assumptions. They do not hold the error of the theory. "
-        "Points: recorded values; a value without a bar states no uncertainty."
+        "Bands: one standard uncertainty from the declared assumptions and of the model on real rotors; of efficiency "
+        "from the assumptions alone. Points: recorded values; a value without a bar states no uncertainty."
     )
     return "Performance", [("words", words), ("figures", [figure(p) for p in plots])]
 

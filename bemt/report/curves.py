@@ -1,7 +1,7 @@
 """What a case page plots: geometry, performance over J and rpm with bands, radial loading, refinement of the stations.
 
 The bands are the standard uncertainty from the declared assumptions, propagated as in `bemt.compare.sweep`: one at a
-time through its range. They do not hold the error of the theory.
+time through its range, and of the model itself on real rotors (efficiency: of the assumptions alone).
 """
 
 from __future__ import annotations
@@ -59,6 +59,7 @@ def case_curves(case: Case, threads: int = 1) -> dict[str, Any]:
     """Performance over J and over rpm, BEMT with bands and K1/K2."""
     from bemt.case.prepare import k1k2_case, prepare_case
     from bemt.compare.sweep.case import spread
+    from bemt.compare.sweep.model_error import u_model
 
     ready = prepare_case(case)
     rpm, V, cut = _grids(case, ready.pitch_m / ready.diameter_m)
@@ -80,6 +81,9 @@ def case_curves(case: Case, threads: int = 1) -> dict[str, Any]:
             runs.append({name: np.asarray(getattr(points, name), float) for name in CHANNELS})
         for name, values in base.items():
             variance[name] = variance[name] + spread(assumption.discrete, values, [run[name] for run in runs]) ** 2
+    for name, u in u_model(case, ready, nominal, air).items():
+        if name in variance:
+            variance[name] = variance[name] + u**2
     simple = k1k2_case(case, None, rpm, V, air)
     whole: dict[str, Array] = {
         **values_of,
