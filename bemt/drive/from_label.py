@@ -24,7 +24,7 @@ from bemt.compare.sweep.case import spread
 from bemt.drive import mission, rotor_table
 from bemt.drive.drive_model import Battery, Drive, Esc, Motor
 
-__all__ = ["POPULATION", "Band", "DriveEstimate", "Unknown", "estimate", "text"]
+__all__ = ["POPULATION", "Band", "DriveEstimate", "DriveUnknown", "estimate", "text"]
 
 SCHEMA = "bemt.drive.estimate/1"
 TIPS = (126.0, 190.0, 218.0, 310.0)
@@ -36,7 +36,7 @@ SOC, SOC_MIN = 0.5, 0.2
 
 
 @dataclass(frozen=True)
-class Unknown:
+class DriveUnknown:
     """Number that a label does not give, with the range that holds 68 % of a population, or was declared."""
 
     nominal: float
@@ -47,12 +47,14 @@ class Unknown:
 
 
 _USED = "3582 points of 1088 motors with a propeller, Drive Calculator"
-POPULATION: Mapping[str, Unknown] = {
-    "winding_drop": Unknown(0.14, 0.07, 0.24, "share of the voltage that the motor's winding takes", _USED),
-    "idle_share": Unknown(0.073, 0.049, 0.11, "share of the current that friction and iron take", _USED),
-    "battery_sag": Unknown(0.06, 0.03, 0.10, "share of its voltage that the pack loses at full throttle", "declared"),
-    "model_thrust": Unknown(1.0, 0.93, 1.07, "thrust of a real propeller over BEMT", "UIUC volume 1 at rest"),
-    "model_torque": Unknown(1.0, 0.90, 1.10, "torque of a real propeller over BEMT", "UIUC volume 1 at rest"),
+POPULATION: Mapping[str, DriveUnknown] = {
+    "winding_drop": DriveUnknown(0.14, 0.07, 0.24, "share of the voltage that the motor's winding takes", _USED),
+    "idle_share": DriveUnknown(0.073, 0.049, 0.11, "share of the current that friction and iron take", _USED),
+    "battery_sag": DriveUnknown(
+        0.06, 0.03, 0.10, "share of its voltage that the pack loses at full throttle", "declared"
+    ),
+    "model_thrust": DriveUnknown(1.0, 0.93, 1.07, "thrust of a real propeller over BEMT", "UIUC volume 1 at rest"),
+    "model_torque": DriveUnknown(1.0, 0.90, 1.10, "torque of a real propeller over BEMT", "UIUC volume 1 at rest"),
 }
 MOTOR = ("winding_drop", "idle_share")
 """What a motor sheet tells."""
