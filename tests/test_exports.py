@@ -253,8 +253,11 @@ def test_rotor_disk_in_openfoam(project: Path, tmp_path: Path, speed: float) -> 
     control = tmp_path / "system/controlDict"
     control.write_text(control.read_text().replace("400;", "2;"))
     subprocess.run(["sh", "Allrun"], cwd=tmp_path, check=True)
+    packaged = Path("/usr/share/openfoam")  # as Debian installs it, without its environment
+    where = os.environ | ({"WM_PROJECT_DIR": str(packaged)} if packaged.is_dir() else {})
     for made in ("writeCellCentres", "writeCellVolumes"):
-        subprocess.run(["postProcess", "-latestTime", "-func", made], cwd=tmp_path, check=True, capture_output=True)
+        command = ["postProcess", "-latestTime", "-func", made]
+        subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, env=where)
     lift = float((tmp_path / "log.simpleFoam").read_text().split("Effective lift =")[-1].split()[0])
     force, centre, volume = (_field(tmp_path / "2" / name) for name in ("disk:rotorForce", "C", "V"))
     load = job.loading.rho * force * volume
