@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.diagnose import noise
-from bemt.diagnose.evidence import log_mean
+from bemt.diagnose.evidence import log_mean, unknown
 from bemt.diagnose.explanation import Explanation
 from bemt.diagnose.form import FORM, form_modes
 from bemt.diagnose.signatures import effect_of
@@ -332,16 +332,8 @@ def smooth(found: Evidence, best: Fit) -> Array:
 
 def left_over(found: Evidence, what: Explanation) -> float:
     """Logarithm of the odds that something smooth is left when an explanation is taken away. [1]"""
-    problem, hyper = found.problem, found.states[0].hyper
+    problem = found.problem
     best = fit(found, what)
-    rest = problem.residual - best.signature
-    C = noise.covariance(problem, hyper) + form_covariance(found, best)
-    white = noise.whitener(C, problem.u)
-    w = white(rest)
-    base = 0.5 * float(w @ w) + white.log_det
-    gains = []
-    for _, K in noise.rivals(problem):
-        rival = noise.whitener(C + K, problem.u)
-        v = rival(rest)
-        gains.append(base - 0.5 * float(v @ v) - rival.log_det)
-    return float(log_mean(np.array(gains), np.full(len(gains), -np.log(len(gains))))) if gains else float("-inf")
+    C = noise.covariance(problem, found.states[0].hyper) + form_covariance(found, best)
+    gains = unknown(noise.unlike(C, problem.u, found.rivals), problem.residual - best.signature)
+    return float(log_mean(gains, np.full(gains.size, -np.log(gains.size)))) if gains.size else float("-inf")
