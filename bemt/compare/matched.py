@@ -73,47 +73,21 @@ _LOCAL = 3.0
 
 @dataclass(frozen=True, eq=False)
 class MatchedChannel:
-    """One channel of both recordings.
+    """One channel of both recordings."""
 
-    Parameters
-    ----------
-    name : str
-        thrust, torque, speed, electrical or voltage.
-    channel : str
-        Name of the reading.
-    y : (N,) float
-        Logarithm of the reading over its power of the speed, and over the density where both recordings tell it. [1]
-    x : (N, 2) float
-        ln rpm or the command, and advance ratio or advance per turn [m].
-    second : (N,) bool
-        Whether a point is of B.
-    run : (N,) int
-        Runs, numbered through.
-    floor : (N,) float
-        Largest reading over this one [1].
-    u : (N,) float
-        Stated relative uncertainty [1]; 0: none.
-    log_density : float
-        ln of B's density over A's that was taken out of y. [1]
-    session : float
-        Standard deviation of the level of a run, share. [1]
-    notes : tuple of str
-        What was left out.
-    shift : (N,) float or None
-        Standard deviation of the shift of a run by lag or hysteresis, share of full scale. [1]
-    """
-
-    name: str
-    channel: str
+    name: str  # thrust, torque, speed, electrical or voltage
+    channel: str  # Name of the reading
+    # (N,) logarithm of the reading over its power of the speed, and over the density where both recordings tell it [1]
     y: Array
-    x: Array
-    second: NDArray[np.bool_]
-    run: NDArray[np.intp]
-    floor: Array
-    u: Array
-    log_density: float
-    session: float
-    notes: tuple[str, ...] = ()
+    x: Array  # (N, 2) ln rpm or the command, and advance ratio or advance per turn [m]
+    second: NDArray[np.bool_]  # (N,) whether a point is of B
+    run: NDArray[np.intp]  # (N,) runs, numbered through
+    floor: Array  # (N,) largest reading over this one [1]
+    u: Array  # (N,) stated relative uncertainty [1]; 0: none
+    log_density: float  # ln of B's density over A's that was taken out of y [1]
+    session: float  # Standard deviation of the level of a run, share [1]
+    notes: tuple[str, ...] = ()  # What was left out
+    # (N,) standard deviation of the shift of a run by lag or hysteresis, share of full scale [1]
     shift: Array | None = None
 
     def common(self) -> tuple[float, float]:
@@ -260,8 +234,6 @@ def matched(a: StandRun, b: StandRun, name: str, diameter: float = math.nan) -> 
 def density_change(a: StandRun, b: StandRun) -> tuple[float, float]:
     """Logarithm of the density of B over that of A as recorded, and what a thermometer alone leaves open.
 
-    Examples
-    --------
     >>> from bemt.compare.stand_run import StandRun
     >>> warm, cold = (StandRun("", {}, {}, {}, "", math.nan, (), math.nan, T) for T in (300.0, 285.0))
     >>> round(density_change(warm, cold)[0], 3)
@@ -472,25 +444,14 @@ def in_common(c: MatchedChannel) -> MatchedChannel:
 
 @dataclass(frozen=True, eq=False)
 class MatchedRuns:
-    """Channels of one kind that both recordings have.
+    """Channels of one kind that both recordings have."""
 
-    Parameters
-    ----------
-    channels : mapping of str to MatchedChannel
-        By name.
-    free, steady : mapping of str to Scatter
-        Likeliest scatter if anything smooth, or one factor, changed between the recordings.
-    likelier : mapping of str to Scatter
-        The better of the two.
-    strays : mapping of str to int
-        Readings that were left out.
-    """
-
-    channels: Mapping[str, MatchedChannel]
+    channels: Mapping[str, MatchedChannel]  # By name
+    # Likeliest scatter if anything smooth, or one factor, changed between the recordings
     free: Mapping[str, Scatter]
     steady: Mapping[str, Scatter]
-    likelier: Mapping[str, Scatter]
-    strays: Mapping[str, int]
+    likelier: Mapping[str, Scatter]  # The better of the two
+    strays: Mapping[str, int]  # Readings that were left out
 
 
 def prepared(a: StandRun, b: StandRun, names: Sequence[str], diameter: float) -> MatchedRuns:

@@ -43,35 +43,20 @@ OTHER_STAND = "no change on one stand moves every load by so much: look at the u
 
 @dataclass(frozen=True, eq=False)
 class RunChange:
-    """Outcome of a comparison of two recordings.
+    """Outcome of a comparison of two recordings."""
 
-    Parameters
-    ----------
-    a, b : StandRun
-        Recordings.
-    diameter_m : float
-        Of the rotor [m]; NaN: unknown.
-    channels : mapping of str to MatchedChannel
-        What both recorded.
-    ratios : mapping of str to mapping
-        B over A by channel: of :func:`bemt.compare.matched.ratio_of`, and ``density_ratio``.
-    loads, drive : Judgement
-        Verdict on what acts on the rotor, and on motor, controller and battery.
-    assumed : tuple of str
-        What neither recording says.
-    notes : tuple of str
-        What was left out.
-    """
-
+    # Recordings
     a: StandRun
     b: StandRun
-    diameter_m: float
-    channels: Mapping[str, MatchedChannel]
+    diameter_m: float  # Of the rotor [m]; NaN: unknown
+    channels: Mapping[str, MatchedChannel]  # What both recorded
+    # B over A by channel: of :func:`bemt.compare.matched.ratio_of`, and ``density_ratio``
     ratios: Mapping[str, Mapping[str, Any]]
+    # Verdict on what acts on the rotor, and on motor, controller and battery
     loads: Judgement
     drive: Judgement
-    assumed: tuple[str, ...] = ()
-    notes: tuple[str, ...] = field(default=())
+    assumed: tuple[str, ...] = ()  # What neither recording says
+    notes: tuple[str, ...] = field(default=())  # What was left out
 
     @property
     def density_ratio(self) -> float:

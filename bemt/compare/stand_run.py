@@ -51,41 +51,19 @@ _ROTOR_WORDS = ("left", "right", "upper", "lower", "front", "rear", "A", "B", "C
 
 @dataclass(frozen=True, eq=False)
 class StandRun:
-    """Steady points of one recording.
+    """Steady points of one recording."""
 
-    Parameters
-    ----------
-    name : str
-        File, and the rows that were chosen.
-    values : mapping of str to (N,) float
-        Channels in SI, rpm in rev/min; ``command`` is the pulse width [s] or the throttle [1].
-    u : mapping of str to (N,) float
-        Standard uncertainty of each, uncorrelated part; NaN: unknown.
-    session : mapping of str to float
-        Scatter between the runs of this recording at equal speed, share, where it shows.
-    command : str
-        ``pwm_s``, ``throttle`` or "" without one.
-    density : float
-        Mean recorded density, or that of recorded pressure and temperature [kg/m3]; NaN: not recorded.
-    notes : tuple of str
-        What the reduction decided.
-    diameter_m : float
-        As the recording or the label says; NaN: unknown. [m]
-    temperature_K : float
-        Mean of the air [K]; NaN: not recorded.
-    shift : mapping of str to float
-        What lag or hysteresis shifts a load by, standard deviation as a share of its largest value [1].
-    """
-
-    name: str
+    name: str  # File, and the rows that were chosen
+    # (N,) channels in SI, rpm in rev/min; ``command`` is the pulse width [s] or the throttle [1]
     values: Mapping[str, Array]
-    u: Mapping[str, Array]
-    session: Mapping[str, float]
-    command: str
-    density: float
-    notes: tuple[str, ...]
-    diameter_m: float
-    temperature_K: float = math.nan
+    u: Mapping[str, Array]  # (N,) standard uncertainty of each, uncorrelated part; NaN: unknown
+    session: Mapping[str, float]  # Scatter between the runs of this recording at equal speed, share, where it shows
+    command: str  # ``pwm_s``, ``throttle`` or "" without one
+    density: float  # Mean recorded density, or that of recorded pressure and temperature [kg/m3]; NaN: not recorded
+    notes: tuple[str, ...]  # What the reduction decided
+    diameter_m: float  # As the recording or the label says; NaN: unknown [m]
+    temperature_K: float = math.nan  # Mean of the air [K]; NaN: not recorded
+    # What lag or hysteresis shifts a load by, standard deviation as a share of its largest value [1]
     shift: Mapping[str, float] = field(default_factory=dict)
 
     def __len__(self) -> int:
@@ -145,8 +123,6 @@ def _of_rotor(imported: Dataset, word: str, where: str) -> Dataset:
 def selected(imported: Dataset, conditions: Sequence[str], where: str) -> Dataset:
     """Keep the rows, or the rotor, that a user means.
 
-    Examples
-    --------
     >>> made = Dataset("bench", "table", {"rpm": [4e3, 5e3]}, lines=(2, 3))
     >>> selected(made, ["rpm=4500:6000"], "a.csv").lines
     (3,)
@@ -177,8 +153,6 @@ _AIR_RANGES = {"temperature_K": (_COLD, _HOT), "pressure_Pa": (4e4, 1.1e5), "den
 def with_air(imported: Dataset, told: str | None, where: str) -> Dataset:
     """Add the air of the day that a user tells, such as ``22C,1013hPa``, in place of what is recorded.
 
-    Examples
-    --------
     >>> told = with_air(Dataset("bench", "table", {"rpm": [4e3]}), "22C, 1013hPa", "--air-a").provenance
     >>> round(told["constants"]["density_kg_m3"], 3)
     1.196

@@ -242,24 +242,13 @@ def _with_voltage(x: Array, y: Array, w: Array, ratio: Array, smoothness: float 
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """Round trip on plateaus that the map was not fitted to.
+    """Round trip on plateaus that the map was not fitted to."""
 
-    Parameters
-    ----------
-    thrust_N : (M,) float
-        Wanted: the thrust recorded there. [N]
-    pulse_us : (M,) float
-        Pulse width at which it was recorded. [us]
-    pulse_found_us : (M,) float
-        What the inverse map asks for. [us]
-    error : (M,) float
-        Thrust that the drive gives there minus the wanted one, over full thrust [1]; what the drive gives is read
-        from the record between its neighbouring levels.
-    """
-
-    thrust_N: Array
-    pulse_us: Array
-    pulse_found_us: Array
+    thrust_N: Array  # (M,) wanted: the thrust recorded there [N]
+    pulse_us: Array  # (M,) pulse width at which it was recorded [us]
+    pulse_found_us: Array  # (M,) what the inverse map asks for [us]
+    # (M,) thrust that the drive gives there minus the wanted one, over full thrust [1]; what the drive gives is read
+    # from the record between its neighbouring levels
     error: Array
 
     @property
@@ -292,8 +281,6 @@ def repeat_spread(points: MapPoints, chart: BenchMap) -> float:
 def held_out(points: MapPoints, folds: int = 5, smoothness: float | None = None) -> HeldOut:
     """Leave levels out in turn, fit to the rest, and make the round trip on what was left out.
 
-    Notes
-    -----
     A plateau was recorded at pulse p with thrust T. The inverse map gives p' for T. The drive gives T at p, so the
     round trip misses by map(p) - T up to the slope's change between p and p'; that is the error stated.
     """

@@ -106,8 +106,6 @@ def runs_of(d: Dataset) -> Array:
 def named(d: Dataset, speed: str | None = None) -> Dataset:
     """Give the channels of a recording their usual names.
 
-    Examples
-    --------
     >>> read = Dataset("bench", "table", {"T_N": [1.0, 2.0], "x": [0.0, 1.0]}, units={"x": ""})
     >>> sorted(named(read).values)
     ['thrust_N']

@@ -42,75 +42,38 @@ LOCAL = 3.0
 
 @dataclass(frozen=True)
 class PlateauSettings:
-    """Rules of the detection.
+    """Rules of the detection."""
 
-    Parameters
-    ----------
-    window : int
-        Samples on each side of a possible step, 3 or more.
-    least_step : float
-        Smallest step that separates plateaus, as a share of the range of the signal. [1]
-    least_samples : int
-        Samples that a plateau must keep after the cuts.
-    least_time_s : float
-        Duration that a plateau must keep after the cuts. [s]
-    drift : float
-        Change over a plateau, relative to its level, from which it is flagged. [1]
-    settle_time_s : float or None
-        Cut this much after every step; None finds the settling from the signal. [s]
-    """
-
-    window: int = 8
-    least_step: float = 0.01
-    least_samples: int = 5
-    least_time_s: float = 0.0
-    drift: float = 0.02
-    settle_time_s: float | None = None
+    window: int = 8  # Samples on each side of a possible step, 3 or more
+    least_step: float = 0.01  # Smallest step that separates plateaus, as a share of the range of the signal [1]
+    least_samples: int = 5  # Samples that a plateau must keep after the cuts
+    least_time_s: float = 0.0  # Duration that a plateau must keep after the cuts [s]
+    drift: float = 0.02  # Change over a plateau, relative to its level, from which it is flagged [1]
+    settle_time_s: float | None = None  # Cut this much after every step; None finds the settling from the signal [s]
 
 
 @dataclass(frozen=True, eq=False)
 class Plateau:
-    """One steady stretch.
+    """One steady stretch."""
 
-    Parameters
-    ----------
-    start, stop : int
-        Rows, `stop` not included, after the cuts.
-    t0, t1 : float
-        Times of the first and last row [s], or row numbers when there is no time.
-    command : float or None
-        Command during the stretch, in its unit.
-    direction : str
-        ``up`` or ``down`` from the stretch before; ``first`` when there is none.
-    mean, sd, u : mapping of str to float
-        Mean, standard deviation and standard error of the mean by channel, in its unit; the standard error counts
-        samples that follow each other closely as fewer than they are (see `standard_error`).
-    n : mapping of str to int
-        Samples used by channel.
-    outliers : mapping of str to tuple of int
-        Rows dropped by channel; empty ones are left out.
-    settling : int
-        Rows cut at its start.
-    drift : mapping of str to float
-        Change over the plateau by a straight line, relative to the mean. [1]
-    flags : tuple of str
-        ``drifts``, ``not settled``.
-    """
-
+    # Rows, `stop` not included, after the cuts
     start: int
     stop: int
+    # Times of the first and last row [s], or row numbers when there is no time
     t0: float
     t1: float
-    command: float | None
-    direction: str
+    command: float | None  # Command during the stretch, in its unit
+    direction: str  # ``up`` or ``down`` from the stretch before; ``first`` when there is none
+    # Mean, standard deviation and standard error of the mean by channel, in its unit; the standard error counts samples
+    # that follow each other closely as fewer than they are (see `standard_error`)
     mean: Mapping[str, float]
     sd: Mapping[str, float]
     u: Mapping[str, float]
-    n: Mapping[str, int]
-    outliers: Mapping[str, tuple[int, ...]]
-    settling: int
-    drift: Mapping[str, float]
-    flags: tuple[str, ...] = ()
+    n: Mapping[str, int]  # Samples used by channel
+    outliers: Mapping[str, tuple[int, ...]]  # Rows dropped by channel; empty ones are left out
+    settling: int  # Rows cut at its start
+    drift: Mapping[str, float]  # Change over the plateau by a straight line, relative to the mean [1]
+    flags: tuple[str, ...] = ()  # ``drifts``, ``not settled``
 
 
 @dataclass(frozen=True)
@@ -144,12 +107,8 @@ class Plateaus:
 def standard_error(values: ArrayLike) -> float:
     """Standard error of the mean of samples that may follow each other closely. [unit of the samples]
 
-    Notes
-    -----
     First-order autoregressive noise; the formula is the large-sample limit.
 
-    Examples
-    --------
     >>> round(standard_error([1.0, 3.0, 1.0, 3.0]), 6)
     0.57735
     """
@@ -202,8 +161,6 @@ def find(
 ) -> Plateaus:
     """Find the plateaus of a recording.
 
-    Examples
-    --------
     >>> t = np.arange(60) * 0.1
     >>> got = find(t, {"thrust_N": np.where(t < 3.0, 1.0, 2.0)}, "thrust_N")
     >>> [(p.mean["thrust_N"], p.direction) for p in got.plateaus]

@@ -40,34 +40,18 @@ _SCATTERED = ("thrust_N", "duct_thrust_N", "torque_Nm")
 
 @dataclass(frozen=True, eq=False)
 class Reduction:
-    """How points were made of rows; `provenance["reduction"]` of what `reduce` gives.
+    """How points were made of rows; `provenance["reduction"]` of what `reduce` gives."""
 
-    Parameters
-    ----------
-    mode, reason : str
-        ``samples`` or ``points``, and what decided it.
-    correlated : mapping of str to mapping
-        By channel: ``gain`` [1], ``zero`` [unit of the channel], ``session`` [1], as far as known.
-    dropped : tuple of Lost
-        Line, channel ("" for the whole row) and reason of everything that was left out.
-    rows : tuple of (M,) int
-        Rows of the recording in each point.
-    directions : tuple of str
-        ``first``, ``up`` or ``down`` per point.
-    hysteresis : mapping of str to Hysteresis
-        By channel, where both branches were recorded.
-    drift : mapping of str to float
-        Change of the zero from first to last rest, by channel. [unit of the channel]
-    """
-
+    # ``samples`` or ``points``, and what decided it
     mode: str
     reason: str
+    # By channel: ``gain`` [1], ``zero`` [unit of the channel], ``session`` [1], as far as known
     correlated: Mapping[str, Mapping[str, float]]
-    dropped: tuple[Lost, ...]
-    rows: tuple[NDArray[np.intp], ...]
-    directions: tuple[str, ...]
-    hysteresis: Mapping[str, Hysteresis]
-    drift: Mapping[str, float]
+    dropped: tuple[Lost, ...]  # Line, channel ("" for the whole row) and reason of everything that was left out
+    rows: tuple[NDArray[np.intp], ...]  # (M,) rows of the recording in each point
+    directions: tuple[str, ...]  # ``first``, ``up`` or ``down`` per point
+    hysteresis: Mapping[str, Hysteresis]  # By channel, where both branches were recorded
+    drift: Mapping[str, float]  # Change of the zero from first to last rest, by channel [unit of the channel]
 
 
 def reduction(points: Dataset) -> Reduction:
@@ -84,8 +68,6 @@ def reduce(
 ) -> Dataset:  # fmt: skip
     """Reduce a recording to steady points: kind ``bench``, uncertainties the uncorrelated part, `reduction` of them.
 
-    Examples
-    --------
     >>> table = Dataset("bench", "table", {"rpm": [5000.0, 6000.0], "thrust_N": [4.0, 5.8]})
     >>> got = reduce(table, diameter_m=0.254, isa_altitude_m=0.0)
     >>> reduction(got).mode, got["CT"].round(3).tolist(), got.flags[0]

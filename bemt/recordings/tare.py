@@ -41,8 +41,6 @@ class TareZero:
 def from_rest(when: Array, rests: Sequence[Rest], full_scale: Mapping[str, float]) -> TareZero:
     """Zero of every point from the stretches at rest, linear in time between them and held outside.
 
-    Examples
-    --------
     >>> rests = [Rest(0.0, {"thrust_N": 0.1}, {}), Rest(10.0, {"thrust_N": 0.3}, {})]
     >>> zero = from_rest(np.array([5.0, 20.0]), rests, {"thrust_N": 10.0})
     >>> zero.value["thrust_N"].round(3).tolist(), round(zero.drift["thrust_N"], 3)
