@@ -120,34 +120,33 @@ class Scatter:
 
 def _like_voltage(a: StandRun, b: StandRun) -> bool:
     """Whether motor and controller work at like voltages, so that electrical power may stand for torque."""
-    v = [np.nanmedian(r.values["voltage_V"]) if "voltage_V" in r.values else math.nan for r in (a, b)]
+    v = [np.nanmedian(r.points["voltage_V"]) if "voltage_V" in r.points else math.nan for r in (a, b)]
     return bool(abs(math.log(v[1] / v[0])) < _LIKE) if all(x > 0.0 for x in v) else False
 
 
 def _advance(run: StandRun, diameter: float) -> Array:
     """V/(n D), or V/n [m] without a diameter; zero where no airspeed was recorded."""
-    n = len(run)
-    if "J" in run.values:
-        return np.nan_to_num(run.values["J"])
-    V = np.nan_to_num(run.values.get("airspeed_m_s", np.zeros(n)))
+    if "J" in run.points:
+        return np.asarray(np.nan_to_num(run.points["J"]))
+    V = np.nan_to_num(run.points.values.get("airspeed_m_s", np.zeros(len(run))))
     with np.errstate(divide="ignore", invalid="ignore"):
-        turn = V / (run.values["rpm"] / 60.0)
+        turn = V / (run.points["rpm"] / 60.0)
     return np.nan_to_num(turn / (diameter if math.isfinite(diameter) else 1.0))
 
 
 def _readings(run: StandRun, name: str, channel: str, diameter: float) -> dict[str, Array] | None:
     """Points of one channel in one recording."""
-    v = run.values.get(channel)
+    v = run.points.values.get(channel)
     if v is None or np.isfinite(v).sum() < 2:
         return None
-    rpm = run.values.get("rpm")
+    rpm = run.points.values.get("rpm")
     over_command = name in ("speed", "voltage")
-    if over_command and "command" not in run.values:
+    if over_command and "command" not in run.points:
         return None
     if rpm is None and (name not in LOADS or channel not in _COEFFICIENTS):
         return None
     speed = rpm if rpm is not None else np.ones(len(run))
-    first = run.values["command"] if over_command else np.log(np.where(speed > 0.0, speed, np.nan))
+    first = run.points["command"] if over_command else np.log(np.where(speed > 0.0, speed, np.nan))
     sign = float(np.sign(np.nansum(v)))
     size = np.where(v * sign > 0.0, v * sign, np.nan)
     top = float(np.nanmax(size)) if np.isfinite(size).any() else math.nan
@@ -158,14 +157,14 @@ def _readings(run: StandRun, name: str, channel: str, diameter: float) -> dict[s
         good &= scaled > _NEAR_ZERO * level
     if good.sum() < 2:
         return None
-    stated = run.u.get(channel, np.full(len(run), np.nan)) / size
+    stated = run.points.u[channel] / size
     return {
         "y": np.log(scaled[good]),
         "x": np.column_stack([first, _advance(run, diameter) if not over_command else np.zeros(len(run))])[good],
         "floor": top / size[good],
         "u": np.nan_to_num(stated[good]),
         "sign": np.full(int(good.sum()), sign),
-        "run": run.values.get("run", np.zeros(len(run)))[good],
+        "run": run.points.values.get("run", np.zeros(len(run)))[good],
         "lost": np.full(int(good.sum()), float((~good).sum())),
     }
 
@@ -209,7 +208,7 @@ def matched(a: StandRun, b: StandRun, name: str, diameter: float = math.nan) -> 
     parts = [_averaged(one), _averaged(two)]
     for part, run in zip(parts, (a, b), strict=True):
         if part["lost"][0] > 0.5 * len(run):
-            notes.append(f"{channel}: {part['lost'][0]:.0f} of {len(run)} points of {run.name} are near zero")
+            notes.append(f"{channel}: {part['lost'][0]:.0f} of {len(run)} points of {run.points.name} are near zero")
     log_density, unsure = density_change(a, b) if name in LOADS and channel not in _COEFFICIENTS else (0.0, 0.0)
     shift = [0.0, log_density]
     codes = [np.unique(p["run"], return_inverse=True)[1] for p in parts]
@@ -234,8 +233,9 @@ def matched(a: StandRun, b: StandRun, name: str, diameter: float = math.nan) -> 
 def density_change(a: StandRun, b: StandRun) -> tuple[float, float]:
     """Logarithm of the density of B over that of A as recorded, and what a thermometer alone leaves open.
 
-    >>> from bemt.compare.stand_run import StandRun
-    >>> warm, cold = (StandRun("", {}, {}, {}, "", math.nan, (), math.nan, T) for T in (300.0, 285.0))
+    >>> from bemt.dataset import Dataset
+    >>> none = Dataset("bench", "none", {"rpm": []})
+    >>> warm, cold = (StandRun(none, "", math.nan, math.nan, T) for T in (300.0, 285.0))
     >>> round(density_change(warm, cold)[0], 3)
     0.051
     """
@@ -250,7 +250,7 @@ def _set_up(name: str, channel: str, a: StandRun, b: StandRun) -> float:
     """Standard deviation of the level of one run where the recordings do not show it."""
     if name in LOADS and channel == "electrical_power_W":
         return _BY_POWER
-    if name == "speed" and all("voltage_V" in r.values for r in (a, b)):
+    if name == "speed" and all("voltage_V" in r.points for r in (a, b)):
         return _AT_KNOWN_VOLTAGE
     return SESSION[name]
 
