@@ -131,7 +131,7 @@ def _advance(run: StandRun, diameter: float) -> Array:
     V = np.nan_to_num(run.points.values.get("airspeed_m_s", np.zeros(len(run))))
     with np.errstate(divide="ignore", invalid="ignore"):
         turn = V / (run.points["rpm"] / 60.0)
-    return np.nan_to_num(turn / (diameter if math.isfinite(diameter) else 1.0))
+    return np.asarray(np.nan_to_num(turn / (diameter if math.isfinite(diameter) else 1.0)))
 
 
 def _readings(run: StandRun, name: str, channel: str, diameter: float) -> dict[str, Array] | None:
