@@ -27,47 +27,26 @@ Faces = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class FoundRotor:
-    """A rotor found in a mesh; lengths in the mesh's own unit, angles in radians.
+    """A rotor found in a mesh; lengths in the mesh's own unit, angles in radians."""
 
-    Parameters
-    ----------
-    B : int
-        Blades.
-    rotation : int
-        +1 turns right-handed about the direction of thrust, -1 left-handed.
-    R, Rhub : float
-        Tip radius, and the radius below which the blades are no longer free. [unit of the mesh]
-    origin : (3,) float
-        A point on the shaft. [unit of the mesh]
-    axis : (3,) float
-        Unit vector in the direction of thrust. [-]
-    r, chord, beta : (N,) float
-        Stations: radius and chord [unit of the mesh], blade angle [rad].
-    thickness, camber, camber_position : (N,) float
-        Over the chord. [-]
-    sections : tuple of Airfoil
-        The section of every station.
-    spread : float
-        How far the blades differ from each other, relative. [-]
-    notes : tuple of str
-        What a user has to know: parts left out, doubts.
-    """
-
-    B: int
-    rotation: int
+    B: int  # Blades
+    rotation: int  # +1 turns right-handed about the direction of thrust, -1 left-handed
+    # Tip radius, and the radius below which the blades are no longer free [unit of the mesh]
     R: float
     Rhub: float
-    origin: Array
-    axis: Array
+    origin: Array  # (3,) a point on the shaft [unit of the mesh]
+    axis: Array  # (3,) unit vector in the direction of thrust [-]
+    # (N,) stations: radius and chord [unit of the mesh], blade angle [rad]
     r: Array
     chord: Array
     beta: Array
+    # (N,) over the chord [-]
     thickness: Array
     camber: Array
     camber_position: Array
-    sections: tuple[Airfoil, ...]
-    spread: float
-    notes: tuple[str, ...] = ()
+    sections: tuple[Airfoil, ...]  # The section of every station
+    spread: float  # How far the blades differ from each other, relative [-]
+    notes: tuple[str, ...] = ()  # What a user has to know: parts left out, doubts
 
 
 def _hub(points: Array, faces: Faces, tip: float, count: int) -> float:
@@ -95,8 +74,6 @@ def find_rotor(
 ) -> FoundRotor:
     """Find the rotor in a mesh and cut its blades.
 
-    Notes
-    -----
     The shaft is the principal direction of inertia about which the cuts of all blades are alike to third moments. The
     leading edge is the thicker end of the section, and the direction of thrust the one towards which it is tilted.
     """

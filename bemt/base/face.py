@@ -33,8 +33,6 @@ class CallableRoom(ModuleType):
 def as_html(head: str, text: str) -> str:
     """A heading and a text of fixed width, for notebooks.
 
-    Examples
-    --------
     >>> as_html("a < b", "text")
     '<strong>a &lt; b</strong><pre style="line-height:1.35">text</pre>'
     """
@@ -44,8 +42,6 @@ def as_html(head: str, text: str) -> str:
 def table_html(head: str, rows: Mapping[str, str], note: str = "") -> str:
     """A heading and names with their values, for notebooks.
 
-    Examples
-    --------
     >>> table_html("10x5", {"blades": "2"})
     '<strong>10x5</strong><table class="bemt"><tr><th>blades</th><td>2</td></tr></table>'
     """

@@ -37,8 +37,6 @@ def find_uiuc() -> Path | None:
 def uiuc_statistics(folder: Path) -> dict[str, Any]:
     """Hold the K1/K2 model against measured propellers: nominal diameter and pitch, nothing fitted. [-]
 
-    Notes
-    -----
     Thrust follows from CT at 1.225 kg/m3: density cancels in the ratio, and so does n.  Propellers without a nominal
     pitch are left out; 3- and 4-blade ones are kept, as the model has no blade count.
     """
@@ -263,8 +261,6 @@ def _motor(f: th.ThesisFacts) -> None:
 def items(uiuc: dict[str, Any] | None = None) -> list[th.ThesisItem]:
     """Give every number of the thesis with ours and its status.
 
-    Examples
-    --------
     >>> [i.status for i in items() if i.quantity == "8x5: K1/K2 recomputed before"]
     ['reproduced']
     """

@@ -70,45 +70,22 @@ Term = tuple[float, Mapping[str, Basis]]
 
 @dataclass(frozen=True)
 class ScalingLaw:
-    """How one cause moves the channels.
+    """How one cause moves the channels."""
 
-    Parameters
-    ----------
-    id : str
-        Of the effect, as in the catalogue of effects where it is there.
-    title : str
-        In words.
-    terms : tuple of (float, mapping)
-        Size relative to the first term, and channel to basis to weight. Bases: ``all`` 1; ``zero`` full scale over
-        reading; ``still`` 1 at rest, fading to 0 at the largest advance; ``slope`` the channel's own derivative with
-        respect to ln J; ``slip`` that over V; ``drag`` V^2 over thrust; ``n2`` square of the speed; ``volts`` ln of
-        the voltage ratio at equal command, or 1 where it is not recorded.
-    sizes : tuple of float
-        Standard deviations of the first term, share; they share the prior. [1]
-    says : str
-        Why this cause, in a sentence.
-    settles : str
-        Measurement that tells it from others.
-    source : str
-        Of the scaling.
-    kind : str
-        air, stand or drive.
-    flow : bool
-        Only with airspeed.
-    exact : bool
-        Whether nothing but the law is moved, as by instruments.
-    """
-
-    id: str
-    title: str
+    id: str  # Of the effect, as in the catalogue of effects where it is there
+    title: str  # In words
+    # Size relative to the first term, and channel to basis to weight. Bases: ``all`` 1; ``zero`` full scale over
+    # reading; ``still`` 1 at rest, fading to 0 at the largest advance; ``slope`` the channel's own derivative with
+    # respect to ln J; ``slip`` that over V; ``drag`` V^2 over thrust; ``n2`` square of the speed; ``volts`` ln of the
+    # voltage ratio at equal command, or 1 where it is not recorded.
     terms: tuple[Term, ...]
-    says: str
-    settles: str
-    source: str
-    kind: str = "air"
-    sizes: tuple[float, ...] = _SIZES
-    flow: bool = False
-    exact: bool = False
+    says: str  # Why this cause, in a sentence
+    settles: str  # Measurement that tells it from others
+    source: str  # Of the scaling
+    kind: str = "air"  # air, stand or drive
+    sizes: tuple[float, ...] = _SIZES  # Standard deviations of the first term, share; they share the prior [1]
+    flow: bool = False  # Only with airspeed
+    exact: bool = False  # Whether nothing but the law is moved, as by instruments
 
 
 _T, _Q = "thrust", "torque"
@@ -336,27 +313,14 @@ LAWS: tuple[ScalingLaw, ...] = (
 
 @dataclass(frozen=True, eq=False)
 class Judgement:
-    """What is said of one sub-system.
+    """What is said of one sub-system."""
 
-    Parameters
-    ----------
-    verdict : str
-        none, named, sensor, class, unknown or insufficient.
-    effects : tuple of str
-        Of the verdict.
-    probability : mapping of str to float
-        Of every explanation, the likeliest first.
-    size : mapping of str to (value, error)
-        Of the first term of each effect: ln ratio, or share of full scale.
-    why : str
-        The rule that decided.
-    """
-
-    verdict: str
-    effects: tuple[str, ...]
-    probability: Mapping[str, float]
+    verdict: str  # none, named, sensor, class, unknown or insufficient
+    effects: tuple[str, ...]  # Of the verdict
+    probability: Mapping[str, float]  # Of every explanation, the likeliest first
+    # (value, error) of the first term of each effect: ln ratio, or share of full scale
     size: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    why: str = ""
+    why: str = ""  # The rule that decided
 
 
 def law(name: str) -> ScalingLaw | None:

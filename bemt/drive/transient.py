@@ -130,8 +130,6 @@ def _rates(t: float, y: Array, drive: Drive, duty: Array, inertia: float) -> lis
 def time_to(time_s: Array, values: Array, start_s: float, share: float = 1.0 - math.exp(-1.0)) -> float:
     """Time from a step until a share of the change is reached. [s]
 
-    Examples
-    --------
     >>> t = np.linspace(0.0, 1.0, 1001)
     >>> round(time_to(t, 1 - np.exp(-t / 0.05), 0.0), 4)
     0.05
@@ -165,12 +163,8 @@ class FirstOrder:
 def first_order(time_s: ArrayLike, values: ArrayLike) -> FirstOrder:
     """Fit a delayed first-order step, as load-cell logs are usually read.
 
-    Notes
-    -----
     Least squares of before + (after - before) (1 - exp(-(t - t0)/tau)), levels solved linearly.
 
-    Examples
-    --------
     >>> t = np.arange(0.0, 1.0, 0.02)
     >>> got = first_order(t, np.where(t > 0.31, 2.0 * (1 - np.exp(-(t - 0.31) / 0.05)), 0.0))
     >>> round(got.tau_s, 3), round(got.delay_s, 3), round(got.after, 3)

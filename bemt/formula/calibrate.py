@@ -192,7 +192,10 @@ def read(given: Sequence[str], test: Sequence[str] = ()) -> tuple[FitPoints, Fit
 
 
 def document(
-    points: FitPoints, test: FitPoints | None, given: Sequence[str], held: Sequence[str],
+    points: FitPoints,
+    test: FitPoints | None,
+    given: Sequence[str],
+    held: Sequence[str],
     progress: Callable[[str], None],
 ) -> tuple[dict[str, Any], dict[str, tuple[FitPoints, dict[str, Array]]]]:
     """Do as `calibrate`, with the names of the files in the document."""
@@ -201,9 +204,7 @@ def document(
     return {"schema": found["schema"], **names, **found}, predictions
 
 
-def write(
-    found: dict[str, Any], predictions: dict[str, tuple[FitPoints, dict[str, Array]]], out: str | Path
-) -> None:
+def write(found: dict[str, Any], predictions: dict[str, tuple[FitPoints, dict[str, Array]]], out: str | Path) -> None:
     """Write calibration.json, .txt and .png."""
     from bemt.formula.figure import draw
 

@@ -28,22 +28,15 @@ DRAWS = 1000
 
 @dataclass(frozen=True)
 class K1K2:
-    """Constants with their 95 % intervals.
+    """Constants with their 95 % intervals."""
 
-    Attributes
-    ----------
-    K1, K2 : float
-        Constants. [-]
-    K1_95, K2_95 : (float, float)
-        Bootstrap percentiles over propellers; NaN where not estimated. [-]
-    points, propellers : int
-        What they were fitted on.
-    """
-
+    # Constants [-]
     K1: float
     K2: float
+    # Bootstrap percentiles over propellers; NaN where not estimated [-]
     K1_95: tuple[float, float] = (float("nan"), float("nan"))
     K2_95: tuple[float, float] = (float("nan"), float("nan"))
+    # What they were fitted on
     points: int = 0
     propellers: int = 0
 
@@ -72,13 +65,9 @@ def weights(index: NDArray[np.intp]) -> Array:
 def huber_line(t: Array, y: Array, w: Array, scale: float | None = None) -> tuple[float, float]:
     """Weighted robust straight line y = a + b t. [-]
 
-    References
-    ----------
     P. J. Huber, "Robust Estimation of a Location Parameter", Annals of Mathematical Statistics 35, 1964, 73-101,
     doi:10.1214/aoms/1177703732. Not checked against the paper.
 
-    Examples
-    --------
     >>> t = np.arange(10.0)
     >>> y = 1.0 + 2.0 * t
     >>> y[3] = 50.0
@@ -109,8 +98,6 @@ def huber_line(t: Array, y: Array, w: Array, scale: float | None = None) -> tupl
 def robust_scale(e: Array, w: Array) -> float:
     """Standard deviation by the weighted median of deviations, as if they were normal. [-]
 
-    Examples
-    --------
     >>> round(robust_scale(np.array([1.0, 2.0, 3.0, 100.0]), np.ones(4)), 4)
     3.7065
     """

@@ -39,8 +39,6 @@ def flight(points: FitPoints) -> Mask:
 def ratios(ratio: Array) -> dict[str, Any]:
     """Count ratios of made to measured values. [-]
 
-    Examples
-    --------
     >>> ratios(np.array([1.0, 1.1, 1.2, 2.0]))
     {'points': 4, 'median': 1.15, 'within_13': 0.5, 'within_26': 0.75}
     """

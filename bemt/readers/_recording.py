@@ -36,14 +36,10 @@ _THOUSANDS = re.compile(r"[+-]?\d{1,3}(,\d{3})+(\.\d*)?")
 def spikes(values: Array, half: int = 3, times: float = 2.0) -> NDArray[np.bool_]:
     """Single samples that jump away from all their neighbours and back, (N,).
 
-    Notes
-    -----
     A sample is a spike when it lies outside the range of its neighbours by more than `times` that range and by more
     than a quarter of the spread of the whole channel. At an end, one side has no neighbours; there the jump must exceed
     the spread of the whole channel, since a start-up looks like one.
 
-    Examples
-    --------
     >>> spikes(np.array([1.0, 1.1, 1.2, 9.0, 1.4, 1.5, 1.6, 1.7])).nonzero()[0]
     array([3])
     """
@@ -273,8 +269,6 @@ _MEANINGS = ("rpm", "thrust", "torque", "voltage", "current", "power", "time", "
 def _nearest(headings: Sequence[str]) -> str:
     r"""What headings without a unit may mean, and the line of a recording.toml that says so; empty: nothing is near.
 
-    Examples
-    --------
     >>> _nearest(["'Trust'", "'x'"])
     '; nearest meaning: \'Trust\' thrust. The line: [columns] thrust = { column = "Trust", unit = "N" }'
     """

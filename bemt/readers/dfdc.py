@@ -22,8 +22,6 @@ _HEAD = re.compile(r"\s*DFDC\s+Version", re.I)
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a file begins as a DFDC case.
 
-    Examples
-    --------
     >>> sniff("DFDC Version 0.55\nduct\n"), sniff("XROTOR VERSION: 7.55\n")
     (True, False)
     """

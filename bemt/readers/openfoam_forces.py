@@ -46,8 +46,6 @@ _VECTOR = re.compile(r"\(\s*((?:\w+_[xyz]\s*){3})\)")
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a comment line begins with Time and names columns.
 
-    Examples
-    --------
     >>> sniff("# Force\n# Time  total_x total_y\n1 2 3"), sniff("# Time\n"), sniff("#  Time  forces(pressure viscous)")
     (True, False, True)
     """

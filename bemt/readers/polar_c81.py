@@ -35,8 +35,6 @@ _HINT = "C81 fields are 7 characters wide, nine values after the first field"
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a file begins with a name, six counts of two digits and a line of Mach numbers.
 
-    Examples
-    --------
     >>> sniff("NACA 0012".ljust(30) + " 2 3 2 3 0 0\n" + 7 * " " + "   0.00   0.50\n"), sniff("alpha,cl,cd")
     (True, False)
     """

@@ -35,8 +35,6 @@ _SCALARS: dict[str, dict[str, tuple[str, float, float]]] = {  # section -> key -
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a text is an ini file with a rotor of this format. [rotor]
 
-    Examples
-    --------
     >>> sniff("[rotor]\nnblades = 2\nradius = 0.1 0.2\n"), sniff("[rotor]\nblades = 2\n")
     (True, False)
     """

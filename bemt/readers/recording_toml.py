@@ -201,8 +201,6 @@ class RecordingToml(Table):
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a text has the tables of a recording.toml. [recording]
 
-    Examples
-    --------
     >>> sniff('[recording]\nfile = "a.csv"\n'), sniff("[rotor]\n")
     (True, False)
     """

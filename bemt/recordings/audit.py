@@ -62,86 +62,41 @@ SKEW_LIMIT = 5.0
 
 @dataclass(frozen=True)
 class CfdFacts:
-    """What is known of a CFD run; None or NaN where nothing is stated.
+    """What is known of a CFD run; None or NaN where nothing is stated."""
 
-    Parameters
-    ----------
-    M_tip, J, pitch_over_D, CT : float
-        Rotational tip Mach number, advance ratio, pitch over diameter, thrust coefficient. [1]
-    domain_over_D : float
-        Diameter of the domain over that of the disk. [1]
-    compressible : bool or None
-        Whether the density followed the pressure.
-    grids : int or None
-        Number of grids the value was computed on; 0 or 1 is no grid study.
-    u_grid : float
-        Standard uncertainty from a grid study (GCI / 1.15), relative. [1]
-    cells : float
-        Cells of the grid. [1]
-    drift : float
-        Change of the thrust over the averaged iterations or revolutions, relative. [1]
-    wall : str
-        ``function``, ``scalable``, ``automatic``, ``resolved`` or empty.
-    y_plus : float
-        Mean distance of the first cell in wall units. [1]
-    turbulence : str
-        Model; empty is not stated.
-    thrust_from : str
-        ``forces``, ``node``, ``momentum`` or empty.
-    steady_mrf : bool or None
-        Whether the rotor was frozen in a rotating frame.
-    skew_deg : float
-        Angle of the inflow against the shaft. [deg]
-    mass_balance, momentum_balance : float
-        Residual of mass over what passes the disk, and of axial momentum over the thrust. [1]
-    ducted : bool
-        Whether the rotor runs in a duct; the rules that were measured on an open propeller are not used then.
-    """
-
+    # Rotational tip Mach number, advance ratio, pitch over diameter, thrust coefficient [1]
     M_tip: float = math.nan
     J: float = 0.0
     pitch_over_D: float = math.nan
     CT: float = math.nan
-    domain_over_D: float = math.nan
-    compressible: bool | None = None
-    grids: int | None = None
-    u_grid: float = math.nan
-    cells: float = math.nan
-    drift: float = math.nan
-    wall: str = ""
-    y_plus: float = math.nan
-    turbulence: str = ""
-    thrust_from: str = ""
-    steady_mrf: bool | None = None
-    skew_deg: float = 0.0
+    domain_over_D: float = math.nan  # Diameter of the domain over that of the disk [1]
+    compressible: bool | None = None  # Whether the density followed the pressure
+    grids: int | None = None  # Number of grids the value was computed on; 0 or 1 is no grid study
+    u_grid: float = math.nan  # Standard uncertainty from a grid study (GCI / 1.15), relative [1]
+    cells: float = math.nan  # Cells of the grid [1]
+    drift: float = math.nan  # Change of the thrust over the averaged iterations or revolutions, relative [1]
+    wall: str = ""  # ``function``, ``scalable``, ``automatic``, ``resolved`` or empty
+    y_plus: float = math.nan  # Mean distance of the first cell in wall units [1]
+    turbulence: str = ""  # Model; empty is not stated
+    thrust_from: str = ""  # ``forces``, ``node``, ``momentum`` or empty
+    steady_mrf: bool | None = None  # Whether the rotor was frozen in a rotating frame
+    skew_deg: float = 0.0  # Angle of the inflow against the shaft [deg]
+    # Residual of mass over what passes the disk, and of axial momentum over the thrust [1]
     mass_balance: float = math.nan
     momentum_balance: float = math.nan
+    # Whether the rotor runs in a duct; the rules that were measured on an open propeller are not used then
     ducted: bool = False
 
 
 @dataclass(frozen=True)
 class AuditLine:
-    """One setting and its consequence.
+    """One setting and its consequence."""
 
-    Parameters
-    ----------
-    topic : str
-        Setting.
-    status : str
-        One of :data:`STATUSES`.
-    finding : str
-        What is known.
-    consequence : str
-        What that does to the number.
-    u_relative : float
-        Part of the standard uncertainty of the thrust; NaN is unknown. [1]
-    """
-
-    topic: str
-    status: str
-    finding: str
-    consequence: str
-    u_relative: float
+    topic: str  # Setting
+    status: str  # One of :data:`STATUSES`
+    finding: str  # What is known
+    consequence: str  # What that does to the number
+    u_relative: float  # Part of the standard uncertainty of the thrust; NaN is unknown [1]
 
 
 def _domain(f: CfdFacts) -> AuditLine:
@@ -366,8 +321,6 @@ def _frame(f: CfdFacts) -> AuditLine:
 def audit(facts: CfdFacts) -> tuple[AuditLine, ...]:
     """Judge the set-up of a CFD run.
 
-    Examples
-    --------
     >>> lines = audit(CfdFacts(M_tip=0.63, domain_over_D=1.0, grids=0, thrust_from="node", pitch_over_D=0.625, CT=0.11))
     >>> [line.topic for line in lines if line.status == "fault"]
     ['domain against disk', 'grid study', 'where the thrust was read']
@@ -379,8 +332,6 @@ def audit(facts: CfdFacts) -> tuple[AuditLine, ...]:
 def combined(lines: Iterable[AuditLine]) -> tuple[float, float]:
     """Put the parts together as a root of squares. [1]
 
-    Examples
-    --------
     >>> combined([AuditLine("a", "fine", "", "", 0.03), AuditLine("b", "fine", "", "", 0.04)])
     (0.05, 0.05)
     """

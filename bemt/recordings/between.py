@@ -28,31 +28,17 @@ _QUANTITY = {"thrust_N": "T", "torque_Nm": "Q"}
 
 @dataclass(frozen=True)
 class Level:
-    """Level of one load in one recording.
+    """Level of one load in one recording."""
 
-    Parameters
-    ----------
-    name : str
-        Recording; no two have one name.
-    channel : str
-        thrust_N or torque_Nm.
-    log_ratio : float
-        Median of ln |reading / model| over readings under load. [1]
-    spread : float
-        Half of what the middle four fifths of those span. [1]
-    """
-
-    name: str
-    channel: str
-    log_ratio: float
-    spread: float
+    name: str  # Recording; no two have one name
+    channel: str  # thrust_N or torque_Nm
+    log_ratio: float  # Median of ln |reading / model| over readings under load [1]
+    spread: float  # Half of what the middle four fifths of those span [1]
 
 
 def odd_ones(levels: Sequence[Level]) -> list[tuple[Level, Finding]]:
     """Name recordings whose level differs from that of most others by the factor of a usual slip.
 
-    Examples
-    --------
     >>> files = [("a", 0.02), ("b", -0.05), ("c", 4.6), ("d", 0.8)]  # c reads 102 times, d 2.3 times what others do
     >>> [(level.name, f.correction.split(".")[0]) for level, f in odd_ones([Level(n, "thrust_N", x, 0.1)
     ...     for n, x in files])]

@@ -25,8 +25,6 @@ def check(
 ) -> tuple[Finding, ...]:  # fmt: skip
     """Look for faults in a recording.
 
-    Examples
-    --------
     >>> rpm = [4000.0, 5000.0, 6000.0, 7000.0]
     >>> stand = Dataset("bench", "stand", {"rpm": rpm, "thrust_N": [0.22, 0.34, 0.50, 0.68]})  # kgf, not N
     >>> [(f.id, f.correction.split(".")[0]) for f in check(stand, diameter_m=0.254)]

@@ -21,37 +21,19 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Choice:
-    """What only the user knows.
+    """What only the user knows."""
 
-    Parameters
-    ----------
-    period : float or None
-        Duration of a revolution [s]; None: no average over revolutions.
-    revolutions : int or None
-        How many; None takes 4, or half of the run.
-    sign : int
-        +1 or -1 for the loads.
-    sector : int
-        Number of equal sectors of which the model is one; loads are multiplied by it.
-    zones : tuple of str
-        Zones whose loads are added up; empty: none are.
-    loads : tuple of str
-        Channels that sign and sector apply to; empty: all in N or Nm.
-    """
-
-    period: float | None = None
-    revolutions: int | None = None
-    sign: int = 1
-    sector: int = 1
-    zones: tuple[str, ...] = ()
-    loads: tuple[str, ...] = ()
+    period: float | None = None  # Duration of a revolution [s]; None: no average over revolutions
+    revolutions: int | None = None  # How many; None takes 4, or half of the run
+    sign: int = 1  # +1 or -1 for the loads
+    sector: int = 1  # Number of equal sectors of which the model is one; loads are multiplied by it
+    zones: tuple[str, ...] = ()  # Zones whose loads are added up; empty: none are
+    loads: tuple[str, ...] = ()  # Channels that sign and sector apply to; empty: all in N or Nm
 
 
 def averaged(record: Dataset, period: float, revolutions: int | None = None) -> Dataset:
     """Replace the means of a history by those over its last whole revolutions.
 
-    Examples
-    --------
     >>> t = np.arange(1, 401) * 0.01
     >>> r = Dataset("cfd", "x", {"time_s": t, "q": 2 + np.sin(2 * np.pi * t)}, units={"q": ""},
     ...             provenance={"clock": "time", "time_channel": "time_s", "clock_channels": "time_s"})

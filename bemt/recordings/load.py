@@ -181,7 +181,11 @@ def _refusal(error: Exception) -> str:
 
 
 def _entry(
-    name: str, record: Dataset | None, format: str | None, notes: Sequence[str], error: str | None  # noqa: A002
+    name: str,
+    record: Dataset | None,
+    format: str | None,
+    notes: Sequence[str],
+    error: str | None,  # noqa: A002
 ) -> dict[str, Any]:
     reduced = _reduced(record)
     means = _means(record, reduced) if record else {}

@@ -63,8 +63,6 @@ def reduction_document(reduced: Dataset | str | None) -> dict[str, Any] | None:
 def ranges(lines: Iterable[tuple[int, int]]) -> str:
     """First and last lines as ranges.
 
-    Examples
-    --------
     >>> ranges([(5, 5), (2, 3), (4, 4), (9, 9)])
     '2-5, 9'
     """

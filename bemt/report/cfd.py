@@ -168,8 +168,6 @@ def _plain_rows(found: Sequence[Mapping[str, Any]], result: Mapping[str, Any]) -
 def attach(book: dict[str, Any]) -> None:
     """Audit every run, and compare the run at a case's operating point with its BEMT.
 
-    Notes
-    -----
     The uncertainty of the run is that of its audit, so it is unknown as long as one of its lines is.
     """
     found = book["cfd"]

@@ -99,8 +99,6 @@ def _numbers(values: ArrayLike) -> list[float | None]:
 def ccblade(work: Work, quick: bool = False) -> dict[str, Any]:
     """Time CCBlade of WISDEM on the work, if it is installed. [us]
 
-    Notes
-    -----
     CCBlade is a turbine code: the propeller is given to it with its sections turned over, cl'(alpha) = -cl(-alpha), and
     thrust and torque change sign.  Its splines smooth the table.  At J = 0 it returns zero loads without a warning.
     """

@@ -49,24 +49,12 @@ STATISTICS = ("thrust_N", "torque_Nm", "M_tip")
 
 @dataclass(frozen=True)
 class Grid:
-    """Axes of a sweep in row order.
+    """Axes of a sweep in row order."""
 
-    Parameters
-    ----------
-    names : tuple of str
-        Axis names with their units.
-    values : tuple of (N,) float
-        Axis values, in the unit of the axis's name.
-    geometries : int
-        Combinations of the geometric axes.
-    chunk : int
-        Points per chunk.
-    """
-
-    names: tuple[str, ...]
-    values: tuple[NDArray[np.float64], ...]
-    geometries: int
-    chunk: int
+    names: tuple[str, ...]  # Axis names with their units
+    values: tuple[NDArray[np.float64], ...]  # (N,) axis values, in the unit of the axis's name
+    geometries: int  # Combinations of the geometric axes
+    chunk: int  # Points per chunk
 
     @classmethod
     def of(cls, case: Case) -> Grid | None:
