@@ -7,7 +7,7 @@ done for all settings of the covariance and added up with their prior weights.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from bemt.diagnose import form, noise, prior
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
 from bemt.diagnose.form import Form, Forms
+from bemt.diagnose.signatures import effect_of
 
 if TYPE_CHECKING:
     from bemt.diagnose.noise import Conditional, Hyper, Rival, Whitener
@@ -32,6 +33,8 @@ Array = NDArray[np.float64]
 _DROP = 8.0
 _KEEP = 6
 _PAIR_LEADERS = 60
+# Leading pairs that are solved together: what one effect changes depends on the other.
+_TOGETHER, _ROUNDS = 24, 2
 FOR_NULLS = 3
 """Settings of the covariance, best first, that nulls are weighed under; only these keep what rivals need [1]."""
 
@@ -82,6 +85,8 @@ class State:
         Logarithm of the evidence per explanation.
     best_rival : str
         Unknown smooth effect of largest evidence.
+    mixed : dict of Explanation to (float array, int, int)
+        What two effects change together beyond the sum of both, whitened, and the columns at which it was solved.
     """
 
     hyper: Hyper
@@ -93,6 +98,30 @@ class State:
     rivals: list[tuple[Conditional, Whitener]] = field(default_factory=list)
     log_z: dict[Explanation, float] = field(default_factory=dict)
     best_rival: str = ""
+    mixed: dict[Explanation, tuple[Array, int, int]] = field(default_factory=dict)
+
+    def both(self, pair: Explanation, spans: Mapping[str, slice], log_w: Array) -> Array:
+        """Log likelihood over that of "none" of all settings of two effects, priors included, forms left out, (A, B).
+
+        Signatures are added; what they change together, where it was solved, grows as the product of their sizes.
+        """
+        A, B = (spans[i] for i in pair)
+        a, b = (self.S[:, x].T @ self.r - self.half[x] + log_w[x] for x in (A, B))
+        total = a[:, None] + b[None, :] - self.S[:, A].T @ self.S[:, B]
+        if pair in self.mixed:
+            extra, i, j = self.mixed[pair]
+            share = np.outer(self.S[:, A].T @ self.S[:, i] / (2.0 * self.half[i]),
+                             self.S[:, B].T @ self.S[:, j] / (2.0 * self.half[j]))  # fmt: skip
+            met = (extra @ self.S[:, A])[:, None] + (extra @ self.S[:, B])[None, :]
+            total += share * (extra @ self.r - met) - 0.5 * share**2 * (extra @ extra)
+        return np.asarray(total)
+
+    def best_of(self, pair: Explanation, spans: Mapping[str, slice], log_w: Array) -> tuple[int, int]:
+        """Columns of the best setting of two effects."""
+        total = self.both(pair, spans, log_w)
+        i, j = np.unravel_index(int(np.argmax(total)), total.shape)
+        A, B = (spans[k] for k in pair)
+        return A.start + int(i), B.start + int(j)
 
     def gains(self, name: str, span: slice, R: Array) -> Array:
         """Log likelihood over that of "none" of every setting of a candidate for whitened residuals. [1]"""
@@ -202,8 +231,10 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
         states.append(state)
         for s in sorted(states, key=_standing)[FOR_NULLS:]:
             s.rivals = []
-    weights = prior.prior_weights(problem, list(spans))
-    probability = _posterior(states, prior.log_priors(weights, pairs))
+    before = prior.log_priors(prior.prior_weights(problem, list(spans)), pairs)
+    if pairs:
+        _solve_pairs(problem, candidates, states, spans, log_w, before)
+    probability = _posterior(states, before)
     states.sort(key=_standing)
     return Evidence(problem, tuple(candidates), tuple(states), probability, spans, log_w, rivals)
 
@@ -363,18 +394,53 @@ def _pairs(state: State, spans: dict[str, slice], log_w: Array) -> None:
             upper[pair] = max(state.log_z[Explanation.of(k)] for k in (a, b))
             upper[pair] = max(upper[pair], state.log_z[pair])
     for pair in sorted(upper, key=lambda k: -upper[k])[:_PAIR_LEADERS]:
-        forms = [state.forms[i] for i in pair]
-        both = np.concatenate([f.B for f in forms], axis=1)
-        if not both.shape[1]:
-            continue
-        joint = Form(both, np.linalg.cholesky(np.eye(both.shape[1]) + both.T @ both))
-        A, B = (spans[i] for i in pair)
-        total = together(A, B)
-        k, m = np.unravel_index(int(np.argmax(total)), total.shape)
-        d = state.r - state.S[:, A.start + int(k)] - state.S[:, B.start + int(m)]
-        p = joint.project(d)
-        chosen = sum(float(np.log(form.FORM.get(f.size, 1.0))) for f in forms)
-        state.log_z[pair] += 0.5 * float(p @ p) - joint.half_log_det + chosen
+        state.log_z[pair] = _log_z(state, pair, spans, log_w)
+
+
+def _log_z(state: State, pair: Explanation, spans: Mapping[str, slice], log_w: Array) -> float:
+    """Logarithm of the evidence of two effects, with the error of both forms at their best settings."""
+    total = state.both(pair, spans, log_w)
+    out = state.log_z[NONE] + float(log_mean(total.ravel(), np.zeros(total.size)))
+    forms = [state.forms[i] for i in pair]
+    both = np.concatenate([f.B for f in forms], axis=1)
+    if not both.shape[1]:
+        return out
+    joint = Form(both, np.linalg.cholesky(np.eye(both.shape[1]) + both.T @ both))
+    k, m = np.unravel_index(int(np.argmax(total)), total.shape)
+    A, B = (spans[i] for i in pair)
+    i, j = A.start + int(k), B.start + int(m)
+    d = state.r - state.S[:, i] - state.S[:, j]
+    if pair in state.mixed:
+        extra, at, to = state.mixed[pair]
+        share = (state.S[:, i] @ state.S[:, at]) * (state.S[:, j] @ state.S[:, to])
+        d -= share / (4.0 * state.half[at] * state.half[to]) * extra
+    p = joint.project(d)
+    chosen = sum(float(np.log(form.FORM.get(f.size, 1.0))) for f in forms)
+    return out + 0.5 * float(p @ p) - joint.half_log_det + chosen
+
+
+def _solve_pairs(
+    problem: Problem, candidates: Sequence[Candidate], states: Sequence[State], spans: Mapping[str, slice],
+    log_w: Array, before: Mapping[Explanation, float],
+) -> None:  # fmt: skip
+    """Solve the leading pairs with both effects on and weigh them again."""
+    of = {c.id: c for c in candidates}
+    score = {k: max(s.log_z[k] + np.log(s.hyper.weight) for s in states) + v for k, v in before.items() if k.pair}
+    for pair in sorted(score, key=lambda k: -score[k])[:_TOGETHER]:
+        state = max(states, key=lambda s: s.log_z[pair] + np.log(s.hyper.weight))
+        for _ in range(_ROUNDS):
+            best = state.best_of(pair, spans, log_w)
+            if best == state.mixed.get(pair, (None, None, None))[1:]:
+                break
+            chosen = [(of[k], c - spans[k].start) for k, c in zip(pair, best, strict=True)]
+            both = problem.signature(tuple(effect_of(c.id, c.settings[g]) for c, g in chosen))
+            extra = both - sum(c.signatures[:, g] for c, g in chosen)
+            if not np.isfinite(extra).all() or not min(state.half[list(best)]) > 0.0:
+                break
+            for s in states:
+                s.mixed[pair] = s.white.changes(extra), *best
+        for s in states:
+            s.log_z[pair] = _log_z(s, pair, spans, log_w)
 
 
 def _posterior(states: Sequence[State], before: dict[Explanation, float]) -> dict[Explanation, float]:

@@ -62,16 +62,12 @@ def fit(found: Evidence, what: Explanation) -> Fit:
     ids = tuple(what)
     if not ids:
         return Fit((), (), (), np.zeros_like(problem.y))
-    gain = state.S.T @ state.r - state.half + found.log_w
     if len(ids) == 1:
         span = found.spans[ids[0]]
         own = state.gains(ids[0], span, state.r[:, None])[:, 0] + found.log_w[span]
         columns: tuple[int, ...] = (span.start + int(np.argmax(own)),)
     else:
-        A, B = (found.spans[i] for i in ids)
-        total = gain[A][:, None] + gain[B][None, :] - state.S[:, A].T @ state.S[:, B]
-        i, j = np.unravel_index(int(np.argmax(total)), total.shape)
-        columns = (A.start + int(i), B.start + int(j))
+        columns = state.best_of(what, found.spans, found.log_w)
     settings = tuple(found.of(i).settings[c - found.spans[i].start] for i, c in zip(ids, columns, strict=True))
     signature = problem.signature(tuple(effect_of(i, s) for i, s in zip(ids, settings, strict=True)))
     if not np.isfinite(signature).all():
@@ -93,12 +89,11 @@ def weights(found: Evidence, what: Explanation) -> dict[str, Array]:
     share = np.exp(share - share.max())
     out = {i: np.zeros(found.of(i).weight.size) for i in ids}
     for s, w in zip(states, share / share.sum(), strict=True):
-        spans = [found.spans[i] for i in ids]
         if len(ids) == 1:
-            total = s.gains(ids[0], spans[0], s.r[:, None])[:, 0] + found.log_w[spans[0]]
+            span = found.spans[ids[0]]
+            total = s.gains(ids[0], span, s.r[:, None])[:, 0] + found.log_w[span]
         else:
-            a, b = (s.S[:, span].T @ s.r - s.half[span] + found.log_w[span] for span in spans)
-            total = a[:, None] + b[None, :] - s.S[:, spans[0]].T @ s.S[:, spans[1]]
+            total = s.both(what, found.spans, found.log_w)
         p = np.exp(total - total.max())
         p /= p.sum()
         for k, i in enumerate(ids):

@@ -148,7 +148,7 @@ class Forms:
 
 
 def columns(candidate: Candidate, setting: int, modes: Array) -> tuple[int, Array]:
-    """Modes times the size of a signature, and what lies between it and its neighbours on the grid; how many are modes."""
+    """How many modes there are; modes times the signature, and what lies between it and its neighbours on the grid."""
     shape = candidate.signatures[:, setting, None] * modes
     return modes.shape[1], np.concatenate([shape, candidate.between(setting)], axis=1)
 

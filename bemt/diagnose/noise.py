@@ -57,6 +57,10 @@ _FORM_LENGTH = 0.7
 # Unknown smooth effect: lengths over the spread of a variable, sizes as a share of the largest coefficient.
 _RIVAL_LENGTHS = (0.15, 0.5)
 _RIVAL_SIZES = (0.03, 0.12)
+# A balance or mount that stays behind while its load falls (hysteresis as ISO 376 and OIML R 60 define it, decreasing
+# less increasing load; not checked): shares of the largest reading, length over the load, least fall that is one, and
+# fewest points of either kind.
+_BEHIND, _BEHIND_LENGTH, _FALL, _FEW = (0.01, 0.04), 0.5, 0.02, 4
 
 
 # What every law of the flow depends on, and the spread below which a variable hardly changes it: natural logarithms of
@@ -364,7 +368,31 @@ def rivals(problem: Problem) -> tuple[Rival, ...]:
                 for size in _RIVAL_SIZES:
                     label = " and ".join(words[k] for k in group)
                     out.append(Rival(f"{label} over {', '.join(names)}: {size:.0%}", mine, kernel, size))
+    load, falling = _loading(problem)
+    for group in groups:
+        mine = free & np.isin(c, group) & falling
+        here = free & np.isin(c, group) & (c < 2)
+        if min(np.count_nonzero(mine), np.count_nonzero(here & ~falling)) < _FEW * len(group):
+            continue
+        most = np.array([np.max(np.abs(problem.y[c == k])) for k in present])[np.searchsorted(present, c[mine])]
+        kernel = np.equal.outer(c[mine], c[mine]) * np.multiply.outer(most, most)
+        kernel *= np.exp(-0.5 * (np.subtract.outer(load[mine], load[mine]) / _BEHIND_LENGTH) ** 2)
+        label = " and ".join(words[k] for k in group)
+        out += [Rival(f"{label} while the load falls: {size:.0%}", mine, kernel, size) for size in _BEHIND]
     return tuple(out)
+
+
+def _loading(problem: Problem) -> tuple[Array, NDArray[np.bool_]]:
+    """Computed load of every reading over the largest of its channel, (M,), and whether it fell to there, (M,)."""
+    run, place = in_time(problem.covariates)
+    load, falling = np.zeros_like(problem.f0), np.zeros(problem.f0.size, dtype=bool)
+    for k in np.unique(problem.channel[problem.channel < 2]):
+        mine = np.flatnonzero(problem.channel == k)
+        load[mine] = np.abs(problem.f0[mine]) / max(float(np.max(np.abs(problem.f0[mine]))), 1e-300)
+        order = mine[np.lexsort((place[problem.point[mine]], run[problem.point[mine]], problem.part[mine]))]
+        same = (np.diff(run[problem.point[order]]) == 0) & (np.diff(problem.part[order]) == 0)
+        falling[order[1:]] = same & (np.diff(load[order]) < -_FALL)
+    return load, falling
 
 
 def law_of(effect: Effect | type[Effect]) -> tuple[str, ...]:
