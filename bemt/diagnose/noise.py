@@ -37,7 +37,7 @@ _WHITE = 0.2
 _MODEL = {(0.003, 0.3): 0.2, (0.01, 0.6): 0.25, (0.03, 1.0): 0.3, (0.08, 1.0): 0.25}
 # Without a reference: probability that the rotor is a real one, of which no more is known than the case says; sizes of
 # what those differ by (heavy tails of the population, two of its six quantiles' means) and what is added at least.
-_REAL, _REAL_SIZES, _LEAST = 0.5, {1.0: 0.8, 2.0: 0.2}, 0.003
+_REAL, _REAL_SIZES = 0.5, {(0.01, 1.0): 0.8, (0.08, 2.0): 0.2}
 # Reference recordings show the error of the solver, however large: it need not be kept small by its prior.
 _MODEL_SHOWN = {(0.0, 1.0): 0.15, (0.01, 1.0): 0.2, (0.03, 1.0): 0.2, (0.08, 1.0): 0.2, (0.25, 1.0): 0.25}
 _MODEL_RPM = 0.1
@@ -111,7 +111,7 @@ def hypers(problem: Problem) -> tuple[Hyper, ...]:
     model = {(m, f, 0.0): w for (m, f), w in (_MODEL if alone else _MODEL_SHOWN).items()}
     if alone and all(p.as_built is not None for p in problem.parts):
         model = {k: (1.0 - _REAL) * w for k, w in model.items()}
-        model |= {(_LEAST, 1.0, size): _REAL * w for size, w in _REAL_SIZES.items()}
+        model |= {(least, 1.0, size): _REAL * w for (least, size), w in _REAL_SIZES.items()}
     apart = _SESSIONS if np.ptp(problem.covariates["run"]) > 0.0 else {0.0: 1.0}
     return tuple(Hyper(s, a, m, f, each * w * v, d, real)
                  for s in scales for a in _AR for (m, f, real), w in model.items() for d, v in apart.items())  # fmt: skip
