@@ -30,7 +30,7 @@ from bemt.base import tables
 from bemt.base.averaging import Mean, relation
 from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError, system_fault
 from bemt.dataset import Dataset
-from bemt.dataset.points import channel_fault
+from bemt.dataset.channels import channel_fault
 from bemt.recordings.adapt import adapt, damaged_export, recognised
 from bemt.recordings.choice import Choice, averaged, chosen
 from bemt.recordings.overview import findings, is_recording, points_text, reduction_document, reduction_of
