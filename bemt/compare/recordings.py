@@ -170,8 +170,11 @@ def _speeds(ratios: Mapping[str, Mapping[str, Any]]) -> tuple[float, float] | No
 
 def _told(run: StandRun) -> str:
     """Channels of a recording, how many points, and which of them are no measurement."""
-    told = [k + ("" if np.nan_to_num(v).any() else " (all 0)")
-            for k, v in run.points.values.items() if k not in ("run", "command")]  # fmt: skip
+    told = [
+        k + ("" if np.nan_to_num(v).any() else " (all 0)")
+        for k, v in run.points.values.items()
+        if k not in ("run", "command")
+    ]
     return f"{', '.join(told) or 'nothing'} at {len(run)} point{'s' if len(run) != 1 else ''}"
 
 

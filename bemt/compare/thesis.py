@@ -204,9 +204,15 @@ class ThesisFacts:
         self.items.append(ThesisItem(self.section, quantity, stated, None, unit, INPUT, note))
 
     def check(
-        self, quantity: str, stated: str, ours: float, unit: str = "", note: str = "",
-        variants: Iterable[tuple[str, float]] = (), because: str = "",
-    ) -> None:  # fmt: skip
+        self,
+        quantity: str,
+        stated: str,
+        ours: float,
+        unit: str = "",
+        note: str = "",
+        variants: Iterable[tuple[str, float]] = (),
+        because: str = "",
+    ) -> None:
         """Add a computed number; the status follows from the printed digits, then from variants of rounded inputs."""
         status = matches(stated, ours)
         if status != REPRODUCED:
@@ -221,5 +227,6 @@ class ThesisFacts:
     def word(self, quantity: str, stated: str, ours: str, because: str = "", note: str = "") -> None:
         """Add a statement in words; equal or not."""
         same = stated == ours
-        self.items.append(ThesisItem(self.section, quantity, stated, ours, "", REPRODUCED if same else NOT,
-                               note if same else because))  # fmt: skip
+        self.items.append(
+            ThesisItem(self.section, quantity, stated, ours, "", REPRODUCED if same else NOT, note if same else because)
+        )

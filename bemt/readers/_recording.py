@@ -217,8 +217,10 @@ class Builder:
             self.flag(rows[1:][step < 0.0], "time goes backwards")
             same = rows[1:][step == 0.0]
             if same.size:
-                self.warnings.append(f"{same.size} rows repeat the time of the row before (lines "
-                                     f"{some(self.line(int(r)) for r in same)})")  # fmt: skip
+                self.warnings.append(
+                    f"{same.size} rows repeat the time of the row before (lines "
+                    f"{some(self.line(int(r)) for r in same)})"
+                )
 
     def finish(self, provenance: Mapping[str, str] | None = None, **more: Any) -> Dataset:
         """Make the `Dataset`, or raise all faults."""

@@ -90,9 +90,11 @@ def _unsettled(record: Dataset) -> list[str]:
     moving = [
         f"{name} {mean.drift:+.2%}"
         for name, mean in means.items()
-        if mean.drift is not None and abs(mean.drift) > SETTLED
-        and not name.lower().startswith(("rms[", "res_")) and abs(mean.value) >= 0.05 * top.get(record.unit(name), 0.0)
-    ]  # fmt: skip
+        if mean.drift is not None
+        and abs(mean.drift) > SETTLED
+        and not name.lower().startswith(("rms[", "res_"))
+        and abs(mean.value) >= 0.05 * top.get(record.unit(name), 0.0)
+    ]
     more = f" and {len(moving) - 6} more" if len(moving) > 6 else ""
     return [f"not settled (drift over the averaged part): {', '.join(moving[:6])}{more}"] if moving else []
 
