@@ -9,7 +9,7 @@ from typing import Any
 
 from bemt.base.tables import number_text, text_table
 from bemt.compare.recordings import OTHER_STAND
-from bemt.compare.scaling import FAMILY, law
+from bemt.compare.scaling_laws import FAMILY, law
 
 __all__ = ["headline", "text"]
 

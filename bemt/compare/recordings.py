@@ -17,7 +17,8 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
 from bemt.compare import matched as fits
 from bemt.compare.matched import MatchedChannel, Scatter
-from bemt.compare.scaling import FAMILY, Judgement, judge, law, weigh
+from bemt.compare.scaling import Judgement, judge, weigh
+from bemt.compare.scaling_laws import FAMILY, law
 from bemt.compare.stand_run import StandRun
 
 __all__ = ["OTHER_STAND", "SCHEMA", "RunChange", "changed", "document"]

@@ -64,9 +64,7 @@ def hover(drive: Drive, mass_kg: float, rotors: int, soc: float) -> Hover:
                  settled_temperature(drive, pulse, soc))  # fmt: skip
 
 
-def endurance(
-    drive: Drive, mass_kg: float, rotors: int, soc: float, soc_min: float
-) -> tuple[float, float]:
+def endurance(drive: Drive, mass_kg: float, rotors: int, soc: float, soc_min: float) -> tuple[float, float]:
     """Time in hover until the charge is used, or the drive no longer carries the weight."""
     wanted = mass_kg * G0 / rotors
 
