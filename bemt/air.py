@@ -184,8 +184,9 @@ class Air:
         >>> Air.stack([Air.isa(0.0), Air.isa(1000.0)]).rho.round(4)
         array([1.225 , 1.1116])
         """
-        rho, mu, a, T = (np.array([getattr(x, f) for x in airs], dtype=float)
-                         for f in ("rho", "mu", "a_sound", "temperature_K"))  # fmt: skip
+        rho, mu, a, T = (
+            np.array([getattr(x, f) for x in airs], dtype=float) for f in ("rho", "mu", "a_sound", "temperature_K")
+        )
         make: Any = cls  # the annotations of the fields say float, the common case
         air: Air = make(rho, mu, a, T, "; ".join(dict.fromkeys(x.source for x in airs)))
         return air

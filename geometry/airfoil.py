@@ -201,7 +201,7 @@ _FIVE = {1: (0.0580, 361.4), 2: (0.1260, 51.64), 3: (0.2025, 15.957), 4: (0.2900
 _REFLEX = {2: (0.1300, 51.99, 0.000764), 3: (0.2170, 15.793, 0.00677), 4: (0.3180, 6.520, 0.0303), 5: (0.4410, 3.191, 0.1355)}  # fmt: skip  # noqa: E501
 
 
-def naca(digits: str, n: int = 161, te_gap: float | None = None) -> Airfoil:
+def naca(digits: str, n: int = 161) -> Airfoil:
     """Make a NACA four- or five-digit section from its designation.
 
     E. N. Jacobs and R. M. Pinkerton, NACA Report 537 (1935), plain lines; C. L. Ladson et al., NASA TM-4741 (1996),
@@ -222,7 +222,7 @@ def naca(digits: str, n: int = 161, te_gap: float | None = None) -> Airfoil:
         m, p = int(code[0]) / 100, int(code[1]) / 10
         if m > 0 and p == 0:
             raise GeometryError([("naca", repr(digits), expected, "Camber needs a position: the second digit is 0")])
-        shape = naca4(m, p or 0.4, t, n, te_gap)
+        shape = naca4(m, p or 0.4, t, n)
         return Airfoil(f"naca{code}", shape.x, shape.y)
     line, kind, cl = int(code[1]), int(code[2]), 0.15 * int(code[0])
     if cl == 0 or kind > 1 or line not in (_FIVE, _REFLEX)[kind]:
@@ -238,7 +238,7 @@ def naca(digits: str, n: int = 161, te_gap: float | None = None) -> Airfoil:
         mean = k * (x - r) ** 3 - k21 * (1 - r) ** 3 * x - r**3 * x + r**3
         slope = 3 * k * (x - r) ** 2 - k21 * (1 - r) ** 3 - r**3
     scale = k1 / 6 * cl / 0.3
-    return _from_lines(f"naca{code}", x, scale * mean, scale * slope, _naca_half(x, t, te_gap))
+    return _from_lines(f"naca{code}", x, scale * mean, scale * slope, _naca_half(x, t, None))
 
 
 def plate(camber: float, thickness: float, n: int = 161) -> Airfoil:

@@ -8,7 +8,6 @@ length, blades joined to the hub or only touching it, a duct beside them or not.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,7 +69,7 @@ def _hub(points: Array, faces: Faces, tip: float, count: int) -> float:
 
 
 def find_rotor(
-    vertices: Array, faces: Faces, stations: int = 28, at: Sequence[float] | None = None, n: int = 121
+    vertices: Array, faces: Faces, stations: int = 28
 ) -> FoundRotor:
     """Find the rotor in a mesh and cut its blades.
 
@@ -82,11 +81,9 @@ def find_rotor(
     used = np.unique(chosen)
     tip = float(np.hypot(local[used, 0], local[used, 1]).max())
     hub = _hub(local, chosen, tip, count)
-    if at is None:
-        s = 0.5 * (1 - np.cos(np.linspace(0.0, np.pi, stations)))
-        lowest = hub + 0.01 * (tip - hub)
-        at = ((lowest + (0.992 * tip - lowest) * (0.5 * s + 0.5 * np.linspace(0, 1, stations))) / tip).tolist()
-    assert at is not None
+    s = 0.5 * (1 - np.cos(np.linspace(0.0, np.pi, stations)))
+    lowest = hub + 0.01 * (tip - hub)
+    at = (lowest + (0.992 * tip - lowest) * (0.5 * s + 0.5 * np.linspace(0, 1, stations))) / tip
     sign, rotation, doubt = _sense(local, chosen, tip, hub, count)
     if doubt:
         notes.append(doubt)
@@ -96,7 +93,7 @@ def find_rotor(
         found = blades(local, chosen, float(x) * tip)
         if found is None or len(found) != count:
             continue
-        cuts = [fit_section(loop * [sign * rotation, sign], n) for loop in found]
+        cuts = [fit_section(loop * [sign * rotation, sign], 121) for loop in found]
         whole = [cut for cut in cuts if cut is not None]
         if whole:
             r.append(float(x) * tip)

@@ -78,23 +78,22 @@ class Mesh:
         return trimesh.Trimesh(self.vertices, self.faces, process=False)
 
 
-def skin(points: Array, closed_ends: bool = True) -> tuple[Array, Faces]:
+def skin(points: Array) -> tuple[Array, Faces]:
     """Mesh rings of one topology, with caps at both ends; the result is oriented outwards."""
     rows, m = points.shape[:2]
     index = np.arange(rows * m).reshape(rows, m)
     a, b = index[:-1], index[1:]
     a1, b1 = np.roll(a, -1, axis=1), np.roll(b, -1, axis=1)
     faces = [np.stack([a, a1, b1], -1).reshape(-1, 3), np.stack([a, b1, b], -1).reshape(-1, 3)]
-    if closed_ends:
-        k = np.arange((m + 1) // 2)  # pairs k and -1-k; an even m is a sharp edge, whose pair is itself
-        last = (m - 1 - k) if m % 2 else (m - k) % m
-        cap = []
-        for i in range(len(k) - 1):
-            cap += [(k[i], last[i + 1], k[i + 1]), (k[i], last[i], last[i + 1])]
-        if m % 2 == 0:
-            cap.append((k[-1], last[-1], m // 2))
-        strip = np.array([t for t in cap if len(set(t)) == 3])
-        faces += [index[0][strip], index[-1][strip[:, ::-1]]]
+    k = np.arange((m + 1) // 2)  # pairs k and -1-k; an even m is a sharp edge, whose pair is itself
+    last = (m - 1 - k) if m % 2 else (m - k) % m
+    cap = []
+    for i in range(len(k) - 1):
+        cap += [(k[i], last[i + 1], k[i + 1]), (k[i], last[i], last[i + 1])]
+    if m % 2 == 0:
+        cap.append((k[-1], last[-1], m // 2))
+    strip = np.array([t for t in cap if len(set(t)) == 3])
+    faces += [index[0][strip], index[-1][strip[:, ::-1]]]
     vertices, out = points.reshape(-1, 3), np.concatenate(faces)
     if Mesh(vertices, out, np.zeros(len(out), np.int64), ("",)).volume < 0:
         out = out[:, ::-1]

@@ -80,12 +80,13 @@ def surfaces(rotor: Rotor, duct: Duct | None = None) -> list[Surface]:
         return found
     wall = duct_profile(duct, 33)
     wall = _split(np.vstack([wall, wall[:1]]), step)
-    cut = [np.stack([r * np.cos(a), r * np.sin(a), z], axis=-1)
-           for r, z, a in ((*wall.T, 0.0), (*wall.T, np.pi))]  # fmt: skip
+    cut = [np.stack([r * np.cos(a), r * np.sin(a), z], axis=-1) for r, z, a in ((*wall.T, 0.0), (*wall.T, np.pi))]
     found.append(_turned("duct", wall, 0.0, math.pi))
     found += [Surface("cut", np.stack([edge, edge[::-1]])) for edge in cut]
     plan = plan_stator(duct, float(hub[:, 1].min()), rotor.Rhub)
     if plan is not None:
-        found += [Surface("stator", _capped(_split(vane_rows(duct, plan, COARSE), step)), plan.stator.B),
-                  _turned("stator", _split(centre_body(duct, plan), step))]  # fmt: skip
+        found += [
+            Surface("stator", _capped(_split(vane_rows(duct, plan, COARSE), step)), plan.stator.B),
+            _turned("stator", _split(centre_body(duct, plan), step)),
+        ]
     return found

@@ -62,8 +62,9 @@ def render(package: str, template: str, scripts: Sequence[str] = (), **values: A
     from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
     loader = ChoiceLoader([PackageLoader(name) for name in dict.fromkeys((package, "bemt.base"))])
-    pages = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True,
-                        lstrip_blocks=True, finalize=_clean)  # fmt: skip
+    pages = Environment(
+        loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, finalize=_clean
+    )
     script = "".join(loader.get_source(pages, name)[0] for name in scripts)
     mark = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     style = loader.get_source(pages, "page.css")[0]

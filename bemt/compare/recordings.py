@@ -17,7 +17,8 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
 from bemt.compare import matched as fits
 from bemt.compare.matched import MatchedChannel, Scatter
-from bemt.compare.scaling import FAMILY, Judgement, judge, law, weigh
+from bemt.compare.scaling import Judgement, judge, weigh
+from bemt.compare.scaling_laws import FAMILY, law
 from bemt.compare.stand_run import StandRun
 
 __all__ = ["OTHER_STAND", "SCHEMA", "RunChange", "changed", "document"]
@@ -170,8 +171,11 @@ def _speeds(ratios: Mapping[str, Mapping[str, Any]]) -> tuple[float, float] | No
 
 def _told(run: StandRun) -> str:
     """Channels of a recording, how many points, and which of them are no measurement."""
-    told = [k + ("" if np.nan_to_num(v).any() else " (all 0)")
-            for k, v in run.points.values.items() if k not in ("run", "command")]  # fmt: skip
+    told = [
+        k + ("" if np.nan_to_num(v).any() else " (all 0)")
+        for k, v in run.points.values.items()
+        if k not in ("run", "command")
+    ]
     return f"{', '.join(told) or 'nothing'} at {len(run)} point{'s' if len(run) != 1 else ''}"
 
 

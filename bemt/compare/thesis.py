@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from decimal import Decimal
 from typing import Any
@@ -144,7 +144,7 @@ def ds30_readings() -> list[PrintedValue]:
     return sorted(out, key=lambda r: (not r.sensible, r.formula != "K1/K2", abs(math.log(r.pitch_over_D))))
 
 
-def nearest_slip(ratio: float, factors: Mapping[str, float] = SLIP_FACTORS) -> tuple[str, float, float]:
+def nearest_slip(ratio: float) -> tuple[str, float, float]:
     """Name the slip of units nearest to a ratio.
 
     >>> name, factor, miss = nearest_slip(9.78)
@@ -152,7 +152,7 @@ def nearest_slip(ratio: float, factors: Mapping[str, float] = SLIP_FACTORS) -> t
     ('kgf <-> N', 9.80665, -0.0027)
     """
     r = max(ratio, 1.0 / ratio)
-    name, f = min(((n, max(v, 1.0 / v)) for n, v in factors.items()), key=lambda nv: abs(math.log(r / nv[1])))
+    name, f = min(((n, max(v, 1.0 / v)) for n, v in SLIP_FACTORS.items()), key=lambda nv: abs(math.log(r / nv[1])))
     return name, f, r / f - 1.0
 
 
@@ -204,9 +204,15 @@ class ThesisFacts:
         self.items.append(ThesisItem(self.section, quantity, stated, None, unit, INPUT, note))
 
     def check(
-        self, quantity: str, stated: str, ours: float, unit: str = "", note: str = "",
-        variants: Iterable[tuple[str, float]] = (), because: str = "",
-    ) -> None:  # fmt: skip
+        self,
+        quantity: str,
+        stated: str,
+        ours: float,
+        unit: str = "",
+        note: str = "",
+        variants: Iterable[tuple[str, float]] = (),
+        because: str = "",
+    ) -> None:
         """Add a computed number; the status follows from the printed digits, then from variants of rounded inputs."""
         status = matches(stated, ours)
         if status != REPRODUCED:
@@ -221,5 +227,6 @@ class ThesisFacts:
     def word(self, quantity: str, stated: str, ours: str, because: str = "", note: str = "") -> None:
         """Add a statement in words; equal or not."""
         same = stated == ours
-        self.items.append(ThesisItem(self.section, quantity, stated, ours, "", REPRODUCED if same else NOT,
-                               note if same else because))  # fmt: skip
+        self.items.append(
+            ThesisItem(self.section, quantity, stated, ours, "", REPRODUCED if same else NOT, note if same else because)
+        )

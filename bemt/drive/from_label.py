@@ -73,6 +73,22 @@ class Band:
 class DriveEstimate:
     """Full throttle and hover of one rotor; NaN where the drive does not get there.
 
+    Parameters
+    ----------
+    label : str
+        Name of the case.
+    given : mapping
+        What was told.
+    full, hover : mapping of str to Band
+        ``rpm``, ``thrust_N``, ``battery_A``, ``power_W``, ``g_per_W`` and, in hover, ``throttle`` [-] and
+        ``minutes`` (of the capacity, or per A h where none is given).
+    unknowns : mapping of str to str
+        What was varied, and how far.
+    notes : tuple of str
+        What does not fit.
+
+    Examples
+    --------
     >>> import bemt
     >>> found = bemt.drive("10x5", kv=1000, cells=3, mass_kg=1.2, rotors=4)
     >>> found.reached, 0.3 < found.hover["throttle"].value < 0.8, found.to_dict()["schema"]
@@ -81,14 +97,12 @@ class DriveEstimate:
     prop_10x5, 1000 rev/min/V, 3S at 50% charge, ± one standard deviation
     """
 
-    label: str  # Name of the case
-    given: Mapping[str, Any]  # What was told
-    # ``rpm``, ``thrust_N``, ``battery_A``, ``power_W``, ``g_per_W`` and, in hover, ``throttle`` [-] and ``minutes`` (of
-    # the capacity, or per A h where none is given)
+    label: str
+    given: Mapping[str, Any]
     full: Mapping[str, Band]
     hover: Mapping[str, Band]
-    unknowns: Mapping[str, str]  # What was varied, and how far
-    notes: tuple[str, ...]  # What does not fit
+    unknowns: Mapping[str, str]
+    notes: tuple[str, ...]
 
     def __repr__(self) -> str:
         """Say what is known in a line."""

@@ -179,9 +179,14 @@ def effective_pitch(label: ArrayLike, measured: ArrayLike) -> Array:
 
 
 def coefficients(
-    P_D: ArrayLike, J: ArrayLike, solidity: ArrayLike, Re: ArrayLike, constants: Constants = CONSTANTS,
-    zero_lift: ArrayLike = 0.0, level: ArrayLike = 1.0,
-) -> tuple[Array, Array]:  # fmt: skip
+    P_D: ArrayLike,
+    J: ArrayLike,
+    solidity: ArrayLike,
+    Re: ArrayLike,
+    constants: Constants = CONSTANTS,
+    zero_lift: ArrayLike = 0.0,
+    level: ArrayLike = 1.0,
+) -> tuple[Array, Array]:
     """Thrust and power coefficient by the formula of the module. [-]
 
     At J = 0 without stall this is the hover of an ideally twisted rotor [1]_, C = 2 li^2 = K (theta - li) r.
@@ -216,9 +221,13 @@ SERIES_AT_REST, SERIES_WHOLE = 0.5, 0.5
 
 
 def series_coefficients(
-    P_D: ArrayLike, J: ArrayLike, solidity: ArrayLike, Re: ArrayLike, zero_lift: ArrayLike,
+    P_D: ArrayLike,
+    J: ArrayLike,
+    solidity: ArrayLike,
+    Re: ArrayLike,
+    zero_lift: ArrayLike,
     constants: Constants = CONSTANTS,
-) -> tuple[Array, Array]:  # fmt: skip
+) -> tuple[Array, Array]:
     """Thrust and power coefficient of a propeller of a known series. [-]
 
     a0 of a series is learnt at rest and in flight together. In flight it helps thrust (given the chord, 9.7 to 7.6 %

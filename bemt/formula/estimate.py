@@ -25,7 +25,7 @@ from bemt.formula.compact import (
     effective_pitch,
     find_series,
     series_coefficients,
-)  # fmt: skip
+)
 
 Array = NDArray[np.float64]
 UNITS = {"mm": 1e-3, "in": INCH, "cm": 1e-2, "m": 1.0}
@@ -66,9 +66,15 @@ class Estimate:
 
 
 def validity_flags(
-    diameter_m: float, P_D: float, blades: float, Re: float, M_tip: float, x: float, chord_known: bool = True,
+    diameter_m: float,
+    P_D: float,
+    blades: float,
+    Re: float,
+    M_tip: float,
+    x: float,
+    chord_known: bool = True,
     ducted: bool = False,
-) -> tuple[str, ...]:  # fmt: skip
+) -> tuple[str, ...]:
     """Say where a point leaves the data of the calibration.
 
     >>> validity_flags(0.254, 0.5, 2, 5e4, 0.2, 0.3)
@@ -201,5 +207,6 @@ def estimate(
         return np.where(unknown, np.nan, np.interp(x, BAND_X, band[key]) * scale)
 
     T0, P0 = np.asarray(co.thrust(CT0, rho, n, D)), np.asarray(co.power(CP0, rho, n, D))
-    return Estimate(T, P, w, V, CT, CP, J, M, Re, width("CT68", T0), width("CP68", P0), width("CT95", T0),
-                    width("CP95", P0), flags)  # fmt: skip
+    return Estimate(
+        T, P, w, V, CT, CP, J, M, Re, width("CT68", T0), width("CP68", P0), width("CT95", T0), width("CP95", P0), flags
+    )

@@ -146,9 +146,9 @@ def fit(points: FitPoints, flight: bool = False, draws: int = DRAWS) -> K1K2:
     return K1K2(K1, K2, (float(low[0]), float(high[0])), (float(low[1]), float(high[1])), out.points, out.propellers)
 
 
-def goal_seek(points: FitPoints, K2: float = empirical.K2) -> K1K2:
+def goal_seek(points: FitPoints) -> K1K2:
     """K1 as the thesis's source found it: K2 fixed, mean relative error of the static points zero."""
-    used = points.select(usable(points))
+    used, K2 = points.select(usable(points)), empirical.K2
     mean = float(np.mean(CT_k1k2(used, 1.0, K2) / used.CT))
     return K1K2(mean ** (-1.0 / K2), K2, points=used.rpm.size, propellers=np.unique(used.index).size)
 

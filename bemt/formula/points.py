@@ -67,9 +67,11 @@ class FitPoints:
         return np.array([p.ducted for p in self.propellers])[self.index]
 
     def chord(
-        self, constants: compact.Constants = compact.CONSTANTS, known: bool = True,
+        self,
+        constants: compact.Constants = compact.CONSTANTS,
+        known: bool = True,
         series: Mapping[str, compact.MakerSeries] = compact.SERIES,
-    ) -> Array:  # fmt: skip
+    ) -> Array:
         """Chord at 0.75 R, (N,) [m]."""
         c = self.of("chord_m")
         own = np.array([series.get(p.maker, compact.MakerSeries()).chord for p in self.propellers])[self.index]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from bemt.base.averaging import Mean
 from bemt.dataset import Dataset
-from bemt.dataset.points import channel_fault, unit_in
+from bemt.dataset.channels import channel_fault, unit_in
 
 __all__ = ["Channel", "channels_of", "dataset"]
 

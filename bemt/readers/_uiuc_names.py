@@ -105,9 +105,10 @@ def _size(token: str, family: str) -> dict[str, object]:
     if match := re.fullmatch(r"(\d+)([tp])(\d)", token):
         rotation = -1 if match[2] == "p" else 1
         return {
-            "diameter_in": NAMED_DIAMETERS_IN.get(f"{family}_{match[1]}"), "rotation": rotation,
+            "diameter_in": NAMED_DIAMETERS_IN.get(f"{family}_{match[1]}"),
+            "rotation": rotation,
             "specimen": int(match[3]),
-        }  # fmt: skip
+        }
     if match := re.fullmatch(_N, token):
         value = float(token)
         return {"diameter_in": value / 25.4 if value > MM_ABOVE else value}

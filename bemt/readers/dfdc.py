@@ -76,7 +76,7 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
         notes.append("no duct at the rotor: the tip is that of the last station")
     blade = BladeFile(
         name, "DFDC", whole(blades), tip, hub, r, c, np.radians(b), sections, rpm, V, rho, tuple(notes), duct
-    )  # fmt: skip
+    )
     return checked(source, blade, faults)
 
 

@@ -122,9 +122,15 @@ def _header(source: SourceText, line: int, text: str) -> tuple[dict[str, int], l
 
 
 def assemble(
-    source: SourceText, rows: Sequence[PolarRow], faults: list[Fault], *, name: str = "", kind: str = "CSV",
-    radians: bool = False, notes: Sequence[str] = (),
-) -> Polar:  # fmt: skip
+    source: SourceText,
+    rows: Sequence[PolarRow],
+    faults: list[Fault],
+    *,
+    name: str = "",
+    kind: str = "CSV",
+    radians: bool = False,
+    notes: Sequence[str] = (),
+) -> Polar:
     """Check rows of any polar format and make the Polar."""
     said = list(notes)
     faults += _doubts(source.name, rows, radians)

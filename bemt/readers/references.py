@@ -293,9 +293,11 @@ def to_series(references: Iterable[Reference], name: str) -> list[Dataset]:
                 values[column] = condition
         remarks = dict.fromkeys(ref.remark for point in points for ref in point.values() if ref.remark)
         provenance = {
-            "source": source, "file": firsts[0].where.rsplit(":", 1)[0], "sha256": firsts[0].sha256,
+            "source": source,
+            "file": firsts[0].where.rsplit(":", 1)[0],
+            "sha256": firsts[0].sha256,
             "remark": "; ".join(remarks),
-        }  # fmt: skip
+        }
         labels = tuple(first.where for first in firsts)
         out.append(Dataset(kind, name, values, u, (), provenance, labels))
     return out

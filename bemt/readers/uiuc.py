@@ -106,10 +106,14 @@ class UiucPropeller:
             return self.statics[0] if self.statics else None
         tables = self.statics
         return UiucStatic(
-            "+".join(t.file for t in tables), "+".join(t.sha256 for t in tables), sum((t.rows for t in tables), ()),
-            sum((t.flags for t in tables), ()), np.concatenate([t.rpm for t in tables]),
-            np.concatenate([t.CT for t in tables]), np.concatenate([t.CP for t in tables]),
-        )  # fmt: skip
+            "+".join(t.file for t in tables),
+            "+".join(t.sha256 for t in tables),
+            sum((t.rows for t in tables), ()),
+            sum((t.flags for t in tables), ()),
+            np.concatenate([t.rpm for t in tables]),
+            np.concatenate([t.CT for t in tables]),
+            np.concatenate([t.CP for t in tables]),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -281,7 +285,9 @@ def to_series(propeller: UiucPropeller) -> Dataset:
         raise InputError(fault)
     values = {name: np.concatenate(arrays) for name, arrays in columns.items()}
     provenance = {
-        "source": SOURCE, "file": propeller.folder, "sha256": hashes,
+        "source": SOURCE,
+        "file": propeller.folder,
+        "sha256": hashes,
         "remark": f"coefficients on the true diameter; nominal {propeller.diameter_in:g} in",
-    }  # fmt: skip
+    }
     return Dataset("bench", propeller.name, values, {}, tuple(flags), provenance, tuple(labels))

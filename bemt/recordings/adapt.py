@@ -14,7 +14,7 @@ import numpy as np
 from bemt.base.averaging import Mean
 from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
-from bemt.dataset.points import unit_in
+from bemt.dataset.channels import unit_in
 from bemt.readers import polar_c81, uiuc
 from bemt.readers._columns import Channel, dataset
 from bemt.readers.apc import ApcPerformance

@@ -89,14 +89,20 @@ def _apart(levels: Sequence[Level]) -> list[_Odd]:
     spread = max(abs(w.log_ratio - usual) for w in groups[k])
     far = max(FAR, SPREADS * spread)
     # a slip is one factor: readings that scatter about it have another reason
-    return [_Odd(v, v.log_ratio - usual, groups[k], spread) for v in levels
-            if v not in groups[k] and abs(v.log_ratio - usual) >= far and v.spread <= TOGETHER]  # fmt: skip
+    return [
+        _Odd(v, v.log_ratio - usual, groups[k], spread)
+        for v in levels
+        if v not in groups[k] and abs(v.log_ratio - usual) >= far and v.spread <= TOGETHER
+    ]
 
 
 def _likely(quantity: str, log_factor: float) -> list[Slip]:
     """Slips that the logarithm of a factor repairs, the likeliest first."""
-    fits = [(((log_factor - math.log(s.factor)) / _SIGMA) ** 2 + s.rarity, k, s) for k, s in enumerate(slips())
-            if s.quantity == quantity and abs(log_factor - math.log(s.factor)) <= NEAR]  # fmt: skip
+    fits = [
+        (((log_factor - math.log(s.factor)) / _SIGMA) ** 2 + s.rarity, k, s)
+        for k, s in enumerate(slips())
+        if s.quantity == quantity and abs(log_factor - math.log(s.factor)) <= NEAR
+    ]
     best = min(fits, default=(0.0,))[0]
     return [s for score, _, s in sorted(fits) if score - best < ALIKE]
 

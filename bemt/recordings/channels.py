@@ -150,8 +150,9 @@ def named(d: Dataset) -> Dataset:
         notes.append(f"{none} rows without a run: taken as run 0")
     own = {key: d.unit(name) for key, name in names.items() if name in d}
     about = {**d.provenance, "names": names, "dropped": tuple(out)}
-    return replace(d, values=values or {"run": np.ones(n)}, u=u, u_by={}, provenance=about, notes=tuple(notes),
-                   units=own, texts={})  # fmt: skip
+    return replace(
+        d, values=values or {"run": np.ones(n)}, u=u, u_by={}, provenance=about, notes=tuple(notes), units=own, texts={}
+    )
 
 
 def _speed(values: dict[str, Array], names: dict[str, str], notes: list[str]) -> None:

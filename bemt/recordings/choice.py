@@ -63,8 +63,10 @@ def averaged(record: Dataset, period: float, revolutions: int | None = None) -> 
             problems.setdefault(average.problem, []).append(key)
         if average.mean is not None:
             means[key] = Mean(average.mean, _span(average), average.drift)
-    more = [f"{'no mean' if 'only' not in text else 'doubtful mean'} of {', '.join(keys)}: {text}"
-            for text, keys in problems.items()]  # fmt: skip
+    more = [
+        f"{'no mean' if 'only' not in text else 'doubtful mean'} of {', '.join(keys)}: {text}"
+        for text, keys in problems.items()
+    ]
     if scatter:
         worst = ", ".join(f"{key} {value:.2%}" for key, value in list(scatter.items())[:6])
         more.append(f"means of single revolutions differ: {worst}")
@@ -105,9 +107,13 @@ def chosen(record: Dataset, choice: Choice) -> Dataset:
 
 
 def _add_zones(
-    record: Dataset, zones: Sequence[str], file: str, values: dict[str, Array], means: dict[str, Mean],
+    record: Dataset,
+    zones: Sequence[str],
+    file: str,
+    values: dict[str, Array],
+    means: dict[str, Mean],
     own: dict[str, str],
-) -> None:  # fmt: skip
+) -> None:
     """Add the sums over the zones that count."""
     groups: dict[str, dict[str, str]] = {}
     for name in record.values:
@@ -139,9 +145,14 @@ def _add_zones(
 
 
 def asked(
-    rpm: float | None = None, period: float | None = None, revolutions: int | None = None, sign: int = 1,
-    sector: int = 1, zones: Sequence[str] = (), loads: Sequence[str] = (),
-) -> Choice:  # fmt: skip
+    rpm: float | None = None,
+    period: float | None = None,
+    revolutions: int | None = None,
+    sign: int = 1,
+    sector: int = 1,
+    zones: Sequence[str] = (),
+    loads: Sequence[str] = (),
+) -> Choice:
     """Make a choice of options, or refuse them, all faults at once."""
     faults = []
     if rpm is not None and not (math.isfinite(rpm) and 0.01 <= rpm <= 1e6):

@@ -386,6 +386,7 @@ def _reduce(
         flags.append("drifts")
     level = None if command is None else float(np.asarray(command, dtype=float)[start])
     cuts = [Dropped(start, first, "settling"), Dropped(stop, end, "the next step begins")]
-    plateau = Plateau(first, stop, float(t[first]), float(t[stop - 1]), level, "first", mean, sd, u, n, out, drift,
-                      tuple(flags))  # fmt: skip
+    plateau = Plateau(
+        first, stop, float(t[first]), float(t[stop - 1]), level, "first", mean, sd, u, n, out, drift, tuple(flags)
+    )
     return plateau, cuts

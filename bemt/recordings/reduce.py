@@ -115,12 +115,17 @@ def _joined(parts: Sequence[Dataset]) -> Dataset:
         k += len(labels)
     whole = concat([replace(v, kind="bench") for v in parts])
     about = {
-        **parts[0].provenance, "dropped": sum((dropped(v) for v in parts), ()),
+        **parts[0].provenance,
+        "dropped": sum((dropped(v) for v in parts), ()),
         "names": {a: b for v in parts for a, b in v.provenance["names"].items()},
-    }  # fmt: skip
-    return replace(whole, values={**whole.values, "run": np.concatenate(run)}, provenance=about,
-                   notes=tuple(dict.fromkeys(n for v in parts for n in v.notes)),
-                   lines=sum((tuple(v.lines) for v in parts), ()))  # fmt: skip
+    }
+    return replace(
+        whole,
+        values={**whole.values, "run": np.concatenate(run)},
+        provenance=about,
+        notes=tuple(dict.fromkeys(n for v in parts for n in v.notes)),
+        lines=sum((tuple(v.lines) for v in parts), ()),
+    )
 
 
 def _trusted(rec: Dataset) -> Dataset:
@@ -188,8 +193,10 @@ def _shared(values: Mapping[str, Array], u: Mapping[str, Array]) -> list[str]:
         e, v = u[name][np.isfinite(u[name])], np.abs(values[name])
         if len(e) >= 5 and e.min() > 0.8 * e.max() > 0.0 and np.nanmax(v) > 3.0 * np.nanmin(v):
             unit = name.rsplit("_", 1)[1]
-            out.append(f"{name}: the stated error is {np.median(e):.3g} {unit} at any load: it looks like a zero "
-                       "that all rows share; kept as independent")  # fmt: skip
+            out.append(
+                f"{name}: the stated error is {np.median(e):.3g} {unit} at any load: it looks like a zero "
+                "that all rows share; kept as independent"
+            )
     return sorted(out)
 
 
@@ -243,9 +250,12 @@ def _subtract(
 
 
 def _fill_scatter(
-    found: Found, values: Mapping[str, Array], u: dict[str, Array], correlated: dict[str, dict[str, float]],
+    found: Found,
+    values: Mapping[str, Array],
+    u: dict[str, Array],
+    correlated: dict[str, dict[str, float]],
     notes: list[str],
-) -> None:  # fmt: skip
+) -> None:
     """Uncertainty from repeats where a point has none, and the scatter between runs."""
     if "rpm" not in values:
         return
@@ -269,9 +279,14 @@ def _fill_scatter(
 
 
 def _series(
-    records: Sequence[Dataset], found: Found, rec: Dataset, values: Mapping[str, Array], u: Mapping[str, Array],
-    air: AirOfPoints, diameter: float | None,
-) -> Dataset:  # fmt: skip
+    records: Sequence[Dataset],
+    found: Found,
+    rec: Dataset,
+    values: Mapping[str, Array],
+    u: Mapping[str, Array],
+    air: AirOfPoints,
+    diameter: float | None,
+) -> Dataset:
     """Channels and derived ones, as a `Dataset`."""
     n = len(found.points)
     shown = {k: v for k, v in values.items() if k not in ("humidity", "electrical_rpm", "optical_rpm")}
@@ -341,6 +356,8 @@ def _hysteresis(found: Found, values: Mapping[str, Array], rec: Dataset, notes: 
             if loop is not None:
                 out[name] = loop
                 unit = name.rsplit("_", 1)[1]
-                notes.append(f"{name}: down is {loop.difference:+.3g} +- {loop.u:.2g} {unit} from up at equal {key} "
-                             f"({loop.share:+.2%} of the largest, {loop.points} points)")  # fmt: skip
+                notes.append(
+                    f"{name}: down is {loop.difference:+.3g} +- {loop.u:.2g} {unit} from up at equal {key} "
+                    f"({loop.share:+.2%} of the largest, {loop.points} points)"
+                )
     return out

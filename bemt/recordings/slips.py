@@ -137,10 +137,14 @@ def slips() -> tuple[Slip, ...]:
         "cm taken for m": (1e-2, 1.0), "radius taken for diameter": (2.0, 1.0),
     })  # fmt: skip
     for q, words in (("H", "thrust per electrical power"), ("G", "thrust per shaft power")):
-        found += [Slip("efficacy_unit", q, f, f"{words} in another unit: multiply by {f:.6g}", 5.0)
-                  for k in ("kgf", "lbf", "gf") for f in (u[k], 1 / u[k])]  # fmt: skip
-        found += [Slip("efficacy_unit", q, f, f"{words} in another unit: multiply by {f:.6g}", 5.0)
-                  for f in (1e3, 1e-3)]  # fmt: skip
+        found += [
+            Slip("efficacy_unit", q, f, f"{words} in another unit: multiply by {f:.6g}", 5.0)
+            for k in ("kgf", "lbf", "gf")
+            for f in (u[k], 1 / u[k])
+        ]
+        found += [
+            Slip("efficacy_unit", q, f, f"{words} in another unit: multiply by {f:.6g}", 5.0) for f in (1e3, 1e-3)
+        ]
     return tuple(found)
 
 

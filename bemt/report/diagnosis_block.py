@@ -58,11 +58,15 @@ def diagnosis_parts(item: Mapping[str, Any]) -> list[Part]:
             ("words", f"Located in {place['channel']} where {variable} is {low} to {high} (size {size}, z {z}).")
         )
     ranking = [_mapping(r) for r in _list(d.get("ranking"))[:RANKED]]
-    rows = [[str(r.get("effect", "")), p, _parameters(r.get("parameters"))] for r in ranking
-            if (p := num(r.get("probability"), 3)).value is None or p.value >= LEAST]  # fmt: skip
+    rows = [
+        [str(r.get("effect", "")), p, _parameters(r.get("parameters"))]
+        for r in ranking
+        if (p := num(r.get("probability"), 3)).value is None or p.value >= LEAST
+    ]
     out.append(("table", table(["effect", "probability [-]", "parameters (90 % interval)"], rows)))
-    fits = [[str(channel), *(num(_mapping(fit).get(k), 3) for k in FIT)]
-            for channel, fit in _mapping(d.get("fit")).items()]  # fmt: skip
+    fits = [
+        [str(channel), *(num(_mapping(fit).get(k), 3) for k in FIT)] for channel, fit in _mapping(d.get("fit")).items()
+    ]
     out.append(("table", table(FIT_HEAD, fits)))
     classes = [c for c in _list(d.get("classes")) if isinstance(c, list) and len(c) > 1]
     if classes:

@@ -54,8 +54,11 @@ def _share(c: Mapping[str, Any]) -> str:
 
 def _thrusts(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     """Recorded thrusts that BEMT is compared with, in the order of the sources."""
-    lines = [c for c in result.get("comparisons", [])
-             if c.get("model") == "bemt" and c.get("quantity") == "thrust_N" and _finite(c.get("E"))]  # fmt: skip
+    lines = [
+        c
+        for c in result.get("comparisons", [])
+        if c.get("model") == "bemt" and c.get("quantity") == "thrust_N" and _finite(c.get("E"))
+    ]
     return [c for source in NAMES for c in lines if c.get("source") == source]
 
 

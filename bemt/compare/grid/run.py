@@ -136,8 +136,10 @@ class GridSolver:
         which = np.zeros(size, dtype=np.intp)
         for name in self._air_names:
             which = which * axes[name].size + index[name]
-        flow = [axes[n][index[n]] if n in axes else np.full(size, default)
-                for n, default in zip(FLOW, (self.case.rpm, self.case.airspeed_m_s), strict=True)]  # fmt: skip
+        flow = [
+            axes[n][index[n]] if n in axes else np.full(size, default)
+            for n, default in zip(FLOW, (self.case.rpm, self.case.airspeed_m_s), strict=True)
+        ]
         distinct, here = np.unique(which, return_inverse=True)
         states = [self._state(flat) for flat in distinct.tolist()]
         air = states[0] if not self._air_names else air_arrays(states, here)

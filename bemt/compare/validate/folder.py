@@ -80,6 +80,8 @@ def _pe0_stations(folder: Path) -> tuple[dict[tuple[str, float, float], Stations
             continue
         R = blade.radius_m
         found[family, round(blade.diameter_m / INCH, 2), round(blade.pitch_m / INCH, 2)] = (
-            blade.r_m / R, blade.chord_m / R, blade.beta_rad,
-        )  # fmt: skip
+            blade.r_m / R,
+            blade.chord_m / R,
+            blade.beta_rad,
+        )
     return found, notes

@@ -18,8 +18,8 @@ from bemt.base.tables import write_atomic
 from bemt.base.toml import Collector, Table, check_field, entry
 from bemt.case import Case
 from bemt.case.schema import AIRSPEED, RPM
-from bemt.exports.openfoam import Body, Settings, Sweep, case_files, sector_choice
-from bemt.exports.openfoam.settings import MACH_COMPRESSIBLE
+from bemt.exports.openfoam.case import case_files
+from bemt.exports.openfoam.settings import MACH_COMPRESSIBLE, Body, Settings, Sweep, sector_choice
 from geometry.common import GeometryError
 from geometry.export import MANIFEST, export
 from geometry.mesh import Options, build
