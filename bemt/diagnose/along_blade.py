@@ -142,9 +142,9 @@ def read_blade_loads(path: Path) -> dict[str, BladeLoads]:
         def of(name: str) -> float | None:
             return number(row.get(name) or "")
 
-        at = tuple(of(c) for c in ("rpm", "airspeed_m_s", "density_kg_m3"))
+        rpm, V, density = (of(c) for c in ("rpm", "airspeed_m_s", "density_kg_m3"))
         thrust, torque = (abs((of(f"u_{c}") or 0.0) / (of(c) or np.inf)) for c in ("thrust_N", "torque_Nm"))
-        return BladeLoads(run, *table[run], *at, (thrust, torque))
+        return BladeLoads(run, *table[run], rpm=rpm, V=V, density=density, u=(thrust, torque))
 
     return {run: made(run) for run in table}
 
