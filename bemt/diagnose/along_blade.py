@@ -143,8 +143,9 @@ def read_blade_loads(path: Path) -> dict[str, BladeLoads]:
             return number(row.get(name) or "")
 
         rpm, V, density = (of(c) for c in ("rpm", "airspeed_m_s", "density_kg_m3"))
+        shape = table[run][0], table[run][1], table[run][2]
         thrust, torque = (abs((of(f"u_{c}") or 0.0) / (of(c) or np.inf)) for c in ("thrust_N", "torque_Nm"))
-        return BladeLoads(run, *table[run], rpm=rpm, V=V, density=density, u=(thrust, torque))
+        return BladeLoads(run, *shape, rpm, V, density, (thrust, torque))
 
     return {run: made(run) for run in table}
 
