@@ -35,6 +35,9 @@ _WHITE = 0.2
 # nuisances, with the prior weight.  Declared after volume 1 of the UIUC database, where thrust and torque at rest are
 # off by 3 and 5 % (median) and one propeller in ten by more than 10 %.
 _MODEL = {(0.003, 0.3): 0.2, (0.01, 0.6): 0.25, (0.03, 1.0): 0.3, (0.08, 1.0): 0.25}
+# Without a reference: probability that the rotor is a real one, of which no more is known than the case says; sizes of
+# what those differ by (heavy tails of the population, two of its six quantiles' means) and what is added at least.
+_REAL, _REAL_SIZES = 0.5, {(0.01, 1.0): 0.8, (0.08, 2.0): 0.2}
 # Reference recordings show the error of the solver, however large: it need not be kept small by its prior.
 _MODEL_SHOWN = {(0.0, 1.0): 0.15, (0.01, 1.0): 0.2, (0.03, 1.0): 0.2, (0.08, 1.0): 0.2, (0.25, 1.0): 0.25}
 _MODEL_RPM = 0.1
@@ -87,6 +90,8 @@ class Hyper:
         Prior probability [1].
     session : float
         What runs differ by, a share [1].
+    real : float
+        Size of what real rotors differ by from the solver, over that of the population [1].
     """
 
     scale: float
@@ -95,16 +100,21 @@ class Hyper:
     own: float
     weight: float
     session: float = 0.006
+    real: float = 0.0
 
 
 def hypers(problem: Problem) -> tuple[Hyper, ...]:
     """All settings, with prior weights that add up to 1."""
     scales = _SCALES[problem.u_known]
     each = 1.0 / (len(scales) * len(_AR))
-    model = _MODEL if problem.free.all() else _MODEL_SHOWN
+    alone = problem.free.all()
+    model = {(m, f, 0.0): w for (m, f), w in (_MODEL if alone else _MODEL_SHOWN).items()}
+    if alone and all(p.as_built is not None for p in problem.parts):
+        model = {k: (1.0 - _REAL) * w for k, w in model.items()}
+        model |= {(least, 1.0, size): _REAL * w for (least, size), w in _REAL_SIZES.items()}
     apart = _SESSIONS if np.ptp(problem.covariates["run"]) > 0.0 else {0.0: 1.0}
-    return tuple(Hyper(s, a, m, f, each * w * v, d)
-                 for s in scales for a in _AR for (m, f), w in model.items() for d, v in apart.items())  # fmt: skip
+    return tuple(Hyper(s, a, m, f, each * w * v, d, real)
+                 for s in scales for a in _AR for (m, f, real), w in model.items() for d, v in apart.items())  # fmt: skip
 
 
 def in_time(covariates: Mapping[str, Array]) -> tuple[Array, Array]:
@@ -264,6 +274,8 @@ def covariance(problem: Problem, h: Hyper) -> Array:
     """Covariance of noise, nuisances and solver for one setting, (M, M)."""
     stand, own = _tangents(problem)
     wrong = h.own**2 * own + h.model**2 * discrepancy(problem)
+    if h.real > 0.0:
+        wrong = wrong + h.real**2 * problem.of_real_rotors
     return np.asarray(h.scale**2 * noise(problem, h.ar) + h.session**2 * sessions(problem) + stand + wrong)
 
 
@@ -273,7 +285,8 @@ def covariances(problem: Problem) -> Iterator[tuple[Hyper, Array]]:
     wrong, apart = discrepancy(problem), sessions(problem)
     by_ar = {ar: noise(problem, ar) for ar in _AR}
     for h in hypers(problem):
-        yield h, h.scale**2 * by_ar[h.ar] + h.session**2 * apart + stand + h.own**2 * own + h.model**2 * wrong
+        C = h.scale**2 * by_ar[h.ar] + h.session**2 * apart + stand + h.own**2 * own + h.model**2 * wrong
+        yield h, C + h.real**2 * problem.of_real_rotors if h.real > 0.0 else C
 
 
 def _tangents(problem: Problem) -> tuple[Array, Array]:
