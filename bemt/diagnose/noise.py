@@ -112,8 +112,13 @@ def hypers(problem: Problem) -> tuple[Hyper, ...]:
         model = {k: (1.0 - _REAL) * w for k, w in model.items()}
         model |= {(least, 1.0, size): _REAL * w for (least, size), w in _REAL_SIZES.items()}
     apart = _SESSIONS if np.ptp(problem.covariates["run"]) > 0.0 else {0.0: 1.0}
-    return tuple(Hyper(s, a, m, f, each * w * v, d, real)
-                 for s in scales for a in _AR for (m, f, real), w in model.items() for d, v in apart.items())  # fmt: skip
+    return tuple(
+        Hyper(s, a, m, f, each * w * v, d, real)
+        for s in scales
+        for a in _AR
+        for (m, f, real), w in model.items()
+        for d, v in apart.items()
+    )
 
 
 def in_time(covariates: Mapping[str, Array]) -> tuple[Array, Array]:

@@ -48,6 +48,7 @@ def covariance(problem: Problem) -> Array:
 def _of_points(parts: Sequence[Part], rpm: Array, J: Array, Re: Array) -> Array:
     """Of one rotor at the points of some recordings, thrust [N] first, then torque [N m], (2 P, 2 P)."""
     p, known, model = population(), parts[0].as_built, parts[0].model
+    assert known is not None
     state = {k: np.concatenate([getattr(q.record.air, k) for q in parts]) for k in _AIR}
     here = sense(coefficients(model, air_of(state)), model.diameter_m, rpm, J, Re, known.drawn)
     f, top, T = (np.nan_to_num(v) for v in (here.f, here.top, here.T))
