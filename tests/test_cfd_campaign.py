@@ -7,6 +7,7 @@ import json
 import math
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -23,6 +24,7 @@ from bemt.cfd.campaign import run_campaign
 from bemt.cfd.record import COLUMNS, CampaignRecord, grid_studies, grid_uncertainty
 from bemt.cfd.schema import load_campaign
 from bemt.cfd.start import StartField, splice
+from bemt.cfd.summary import summary
 from bemt.cfd.worker import point_key, radial_of
 from bemt.commands.cli import main
 from bemt.exports.openfoam.write import settings_of
@@ -590,3 +592,19 @@ def test_files_of_a_balance_that_are_absent_or_cut_short_are_all_named(project: 
         assert words in told
     with pytest.raises(InputError, match="mass_inlet"):
         balance_of(tmp_path / "nothing", s)
+
+
+def test_beside_a_run_stands_the_rotor_of_that_run(project: Path, tmp_path: Path) -> None:
+    """Gap as in the grid; vanes only where the sector holds them."""
+    for name in ("ds30_spinner", "ds30_vanes"):
+        shutil.copytree(project / "reports" / "cfd" / name, tmp_path / name)
+    bare, vaned = (c["rows"] for c in summary(tmp_path)["campaigns"])
+    thrust = {
+        (name, float(row["tip_gap_mm"]) > 0.1): row["bemt_thrust_N"]
+        for name, rows in (("bare", bare), ("vaned", vaned))
+        for row in rows
+    }
+    for name in ("bare", "vaned"):
+        assert thrust[name, False] > thrust[name, True] + 0.5
+    for gap in (False, True):
+        assert thrust["vaned", gap] > thrust["bare", gap] + 2.0

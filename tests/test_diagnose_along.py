@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +14,7 @@ from bemt.bem import solver
 from bemt.bem.model import Model
 from bemt.case import Case, load_case
 from bemt.case.prepare import prepare_case
+from bemt.cfd.schema import load_campaign
 from bemt.diagnose.along_blade import BladeLoads, along, compare_along, read_blade_loads
 
 AIR = Air.from_density(1.225)
@@ -59,6 +62,33 @@ def test_our_cfd_names_a_class_with_the_row(project: Path, tmp_path: Path, old: 
     for found in runs.values():
         assert "cascade" in found.named, found.text()
     assert all(now.named == () for now in along(fan(project, tmp_path), path).values())
+
+
+def test_what_lies_within_the_recordings_own_uncertainty_is_not_named(project: Path, tmp_path: Path) -> None:
+    truth = loads(prepare_case(fan(project, tmp_path / "whole")), noise=0.02)
+    bare = prepare_case(fan(project, tmp_path / "bare", 'effects_off = ["cascade"]'))
+    for u, named in ((0.05, True), (0.5, False)):
+        found = compare_along(bare, replace(truth, u=(u, u)), 55000.0, 0.0, AIR)
+        assert bool(found.named) == found.beyond == named, found.text()
+
+
+TRUE = {"prop_8x5_pipe": {"duct"}, "prop_8x5_duct": {"duct"}, "prop_8x5_pitch": {"pitch_offset"}}
+
+
+@pytest.mark.slow
+def test_our_campaigns_name_nothing_wrong(project: Path) -> None:
+    """Every converged run beside its case, with or without effects of the Mach number as it was run."""
+    said = {}
+    for path in sorted((project / "reports" / "cfd").glob("*/radial.csv")):
+        campaign = load_campaign(path.with_name("campaign.toml"))
+        with path.with_name("recording.csv").open(encoding="utf-8") as stream:
+            solver_of = {row["run"]: row["solver"] for row in csv.DictReader(stream)}
+        for solved, off in (("compressible", []), ("incompressible", ["compressibility", "drag_divergence"])):
+            case = campaign.case.replaced({"model.effects_off": off})
+            for run, found in along(case, path).items():
+                if solver_of[run] == solved and not set(found.named) <= TRUE.get(path.parent.name, set()):
+                    said[f"{path.parent.name} {run}"] = found.named
+    assert not said
 
 
 def test_a_file_without_its_columns_is_refused(tmp_path: Path) -> None:

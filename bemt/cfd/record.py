@@ -151,12 +151,13 @@ class CampaignRecord:
         return {row["run"] for row in self.rows if _tried(row)}
 
     def borrow(self, names: Sequence[str]) -> None:
-        """Take over runs that a campaign beside this one has recorded already."""
+        """Take over runs that a campaign beside this one has recorded already, with their balance."""
         for path in sorted(self.folder.parent.glob("*/recording.csv")):
             if path != self.path and not set(names) <= self.done:
                 wanted = set(names) - self.done
-                self._take(row for row in _read(path) if row["run"] in wanted and _tried(row))
-                self._radial(path.parent / "radial.csv", wanted)
+                rows = [row for row in _read(path) if row["run"] in wanted and not math.isnan(row["balance_mass"])]
+                self._take(rows)
+                self._radial(path.parent / "radial.csv", {row["run"] for row in rows})
 
     def _take(self, rows: Iterable[dict[str, Any]]) -> None:
         """Put in rows, in place of those of the same run."""
@@ -191,13 +192,13 @@ class CampaignRecord:
             write_atomic(path, csv_text(RADIAL, [*kept, *rows]))
 
     def studies(self) -> list[dict[str, Any]]:
-        """Grid studies: those of this recording, else those of the campaign that it names."""
+        """Grid studies: those of this recording and of the campaign that it names; the larger uncertainty counts."""
         own = grid_studies(self.rows)
         other = self.campaign.grid_study
-        if own or other is None or not (other / "manifest.json").is_file():
+        if other is None or not (other / "manifest.json").is_file():
             return own
         found = json.loads((other / "manifest.json").read_text(encoding="utf-8")).get("grid_studies", [])
-        return list(found)
+        return [*own, *found]
 
     def write(self, order: Sequence[str]) -> None:
         """Write recording and manifest, uncertainties from what is known now."""

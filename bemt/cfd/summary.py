@@ -15,7 +15,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_text, text_table
 from bemt.bem import solver
 from bemt.bem.model import Model
-from bemt.case import Case, load_case
+from bemt.case import Case
 from bemt.case.prepare import prepare_case
 from bemt.cfd.schema import Campaign, load_campaign
 
@@ -32,18 +32,31 @@ class _Bemt:
     def __init__(self) -> None:
         self.ready: dict[str, Model] = {}
 
-    def solve(self, case: Case, row: dict[str, str]) -> solver.Solution:
-        turned = float(row["pitch_offset_deg"] or 0)
+    def solve(self, campaign: Campaign, row: dict[str, str]) -> solver.Solution:
+        case = _case_of(campaign, row)
         overrides: dict[str, Any] = {}
-        if turned:
-            overrides["blade.beta_offset_deg"] = case.file.blade.beta_offset_deg + turned
         if row["solver"] == "incompressible":
             overrides["model.effects_off"] = sorted({*case.file.model.effects_off, *MACH_EFFECTS})
-        key = f"{case.path}|{sorted(overrides.items())}"
+        vanes = case.get("duct.stator.blades")
+        if vanes and row["sector"] == "blade" and vanes % case.rotor().B:
+            overrides["duct.stator.recovery"] = 0.0  # left out of the grid
+        changed = case.replaced(overrides)
+        key = changed.file.model_dump_json()
         if key not in self.ready:
-            self.ready[key] = prepare_case(case.replaced(overrides))
+            self.ready[key] = prepare_case(changed)
         V = float(row["airspeed_m_s"]) * math.cos(math.radians(float(row["sideslip_deg"] or 0)))
         return solver.solve(self.ready[key].prep, float(row["rpm"]), V, case.air(), radial=True)
+
+
+def _case_of(campaign: Campaign, row: Mapping[str, str]) -> Case:
+    """Case with the changes of the point that a run belongs to: blade angle, duct, gap; the plain one where none is."""
+    pitch, gap = _number(row["pitch_offset_deg"]), _number(row["tip_gap_mm"])
+    for point in campaign.points:
+        own = point.case.get("duct.tip_gap_mm") if point.case.ducted else math.nan
+        alike = math.isnan(gap) and math.isnan(own) or math.isclose(gap, own, rel_tol=1e-3)
+        if alike and math.isclose(point.values.get("pitch_offset_deg", 0.0), 0.0 if math.isnan(pitch) else pitch):
+            return point.case
+    return campaign.case
 
 
 def _bands(R: float, edges: np.ndarray, load: np.ndarray) -> np.ndarray:
@@ -98,7 +111,7 @@ def summary(folder: str | Path) -> dict[str, Any]:
         manifest = json.loads(manifest_path.read_text(encoding="utf-8")) if manifest_path.is_file() else {}
         rows = []
         for row in _rows(path.parent / "recording.csv"):
-            found = model.solve(load_case(campaign.case.path), row)
+            found = model.solve(campaign, row)
             rows.append({**row, "bemt_thrust_N": float(found.T[0]), "bemt_torque_Nm": float(found.Q[0]),
                          "radial": _radial(campaign, row["run"], found)})  # fmt: skip
         out.append({"name": campaign.name, "title": campaign.title, "points": len(campaign.points),

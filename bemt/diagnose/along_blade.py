@@ -32,7 +32,8 @@ BANDS = np.linspace(0.40, 0.95, 6)
 # An effect explains when it leaves at most this share of the squared misfit; those within this factor of the best are
 # not told apart.
 EXPLAINED, ALIKE = 0.3, 1.5
-# Loads that agree this well on the average need no explanation: grids of such CFD are no better.
+# Loads that agree this well on the average need no explanation: grids of such CFD are no better. What the recording
+# states of its own uncertainty counts where it is larger.
 FINE = 0.10
 # What untwists under load is no rotor of CFD: its blades are rigid.
 RIGID = ("untwist",)
@@ -40,7 +41,10 @@ RIGID = ("untwist",)
 
 @dataclass(frozen=True)
 class BladeLoads:
-    """Thrust and torque per radius of the whole rotor at radii of one run [m], [N/m], [N m/m], and where it ran."""
+    """Thrust and torque per radius of the whole rotor at radii of one run [m], [N/m], [N m/m], and where it ran.
+
+    ``u`` holds the standard uncertainty of thrust and torque, the grid's included, as a share [1].
+    """
 
     run: str
     r: Array
@@ -49,6 +53,7 @@ class BladeLoads:
     rpm: float | None = None
     V: float | None = None
     density: float | None = None
+    u: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -65,6 +70,8 @@ class Comparison:
         Effect as a case writes it to the share of the squared misfit that is left with it, best first [1].
     named : tuple of str
         Effects that explain and are not told apart; empty: none does, or nothing needs to.
+    fine : (2,) tuple of float
+        Difference of thrust and torque up to which nothing needs to be explained [1].
     """
 
     bands: Array
@@ -72,6 +79,12 @@ class Comparison:
     torque: Array
     left: dict[str, float]
     named: tuple[str, ...]
+    fine: tuple[float, float] = (FINE, FINE)
+
+    @property
+    def beyond(self) -> bool:
+        """Whether the loads differ by more than need not be explained."""
+        return _misfit(np.stack([self.thrust, self.torque]), self.fine) > self.thrust.size * 2.0
 
     def text(self) -> str:
         """Lines for people."""
@@ -86,20 +99,24 @@ class Comparison:
             rows.append(
                 f"  {' or '.join(self.named)}: {best} leaves {100 * self.left[best]:.0f} % of the squared misfit."
             )
-        elif rms > FINE:
+        elif self.beyond:
             rows.append("  No single effect explains it.")
+        else:
+            limits = "thrust by {:.0%} and torque by {:.0%}".format(*self.fine)
+            rows.append(f"  Nothing to explain: the recording may be off in {limits}.")
         return "\n".join(rows)
 
     def document(self) -> dict[str, Any]:
         """As JSON takes it."""
         return {"bands": self.bands.tolist(), "thrust_ratio": self.thrust.tolist(),
-                "torque_ratio": self.torque.tolist(), "left": self.left, "named": list(self.named)}  # fmt: skip
+                "torque_ratio": self.torque.tolist(), "left": self.left, "named": list(self.named),
+                "fine": list(self.fine)}  # fmt: skip
 
 
 def read_blade_loads(path: Path) -> dict[str, BladeLoads]:
     """Read ``radial.csv`` of a campaign: columns run, r_m, thrust_per_radius_N_m, torque_per_radius_Nm_m.
 
-    Speeds and density of each run come from ``recording.csv`` beside it, where there is one.
+    Speeds, density and uncertainties of each run come from ``recording.csv`` beside it, where there is one.
     """
     from bemt.readers import load_text, number
 
@@ -119,11 +136,18 @@ def read_blade_loads(path: Path) -> dict[str, BladeLoads]:
     beside = path.with_name("recording.csv")
     points = {row["run"]: row for row in csv.DictReader(load_text(beside).lines)} if beside.is_file() else {}
 
-    def at(run: str) -> tuple[float | None, ...]:
+    def made(run: str) -> BladeLoads:
         row = points.get(run, {})
-        return tuple(number(row.get(c) or "") for c in ("rpm", "airspeed_m_s", "density_kg_m3"))
 
-    return {run: BladeLoads(run, *columns, *at(run)) for run, columns in table.items()}
+        def of(name: str) -> float | None:
+            return number(row.get(name) or "")
+
+        rpm, V, density = (of(c) for c in ("rpm", "airspeed_m_s", "density_kg_m3"))
+        shape = table[run][0], table[run][1], table[run][2]
+        thrust, torque = (abs((of(f"u_{c}") or 0.0) / (of(c) or np.inf)) for c in ("thrust_N", "torque_Nm"))
+        return BladeLoads(run, *shape, rpm, V, density, (thrust, torque))
+
+    return {run: made(run) for run in table}
 
 
 def along(case: Case, path: Path) -> dict[str, Comparison]:
@@ -140,6 +164,7 @@ def along(case: Case, path: Path) -> dict[str, Comparison]:
 def compare_along(model: Model, loads: BladeLoads, rpm: float, V: float, air: Air) -> Comparison:
     """Compare loads in bands along the blade, then with each effect changed alone."""
     recorded = _banded(loads.r / model.rotor.R, np.stack([loads.thrust, loads.torque]))
+    fine = (max(FINE, loads.u[0]), max(FINE, loads.u[1]))
 
     def ratio(effects: Sequence[Effect]) -> Array:
         prep = model.prepared([e for e in effects if not acts_on_points(e)])
@@ -147,22 +172,26 @@ def compare_along(model: Model, loads: BladeLoads, rpm: float, V: float, air: Ai
         found = np.stack([s.radial[k][0] / prep.st[:, 1] for k in ("dT", "dQ")])
         return _banded(np.broadcast_to(s.radial["r"], (1, prep.st.shape[0]))[0] / model.rotor.R, found) / recorded
 
-    def misfit(r: Array) -> float:
-        return float(np.sum(np.log(r) ** 2)) if np.all(r > 0.0) else np.inf
-
     base = ratio(model.effects)
-    whole = misfit(base)
+    whole = _misfit(base, fine)
     left = {}
     for effect in _candidates(model):
         others = [e for e in model.effects if e.id != effect.id]
-        left[to_text(effect)] = misfit(ratio([*others, effect])) / max(whole, 1e-12)
+        left[to_text(effect)] = _misfit(ratio([*others, effect]), fine) / max(whole, 1e-12)
     left = dict(sorted(left.items(), key=lambda item: item[1]))
     best = next(iter(left.values()), np.inf)
     named: tuple[str, ...] = ()
-    if whole / base.size > FINE**2 and best < EXPLAINED:
+    if whole > base.size and best < EXPLAINED:
         good = [text for text, share in left.items() if share <= max(ALIKE * best, 0.02)]
         named = tuple(dict.fromkeys(text.partition("(")[0] for text in good))
-    return Comparison(BANDS, base[0], base[1], left, named)
+    return Comparison(BANDS, base[0], base[1], left, named, fine)
+
+
+def _misfit(ratio: Array, fine: tuple[float, float]) -> float:
+    """Sum of squares of the logarithms of (2, N) ratios over what needs no explanation; infinite for reversed load."""
+    if not np.all(ratio > 0.0):
+        return float(np.inf)
+    return float(np.sum((np.log(ratio) / np.array(fine)[:, None]) ** 2))
 
 
 def _banded(x: Array, values: Array) -> Array:

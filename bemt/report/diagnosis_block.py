@@ -47,7 +47,7 @@ def diagnosis_parts(item: Mapping[str, Any]) -> list[Part]:
     d = _mapping(item.get("document"))
     said = str(d.get("verdict") or "unknown")
     effects = ", ".join(str(e) for e in _list(d.get("effects")))
-    why = str(d.get("explanation") or "").partition(" Not tried: ")[0]
+    why = str(d.get("explanation") or "").partition(" Not tried: ")[0].partition(" Next: ")[0]
     head = (KIND.get(said, "unknown"), f"{said}: {effects}" if effects else said, why)
     out: list[Part] = [("verdict", head)]
     place = _mapping(d.get("location"))
@@ -74,7 +74,8 @@ def diagnosis_parts(item: Mapping[str, Any]) -> list[Part]:
         out.append(("words", f"Not told apart by these data: {told}."))
     step = _mapping(d.get("next_measurement"))
     if step.get("text"):
-        out.append(("words", f"Next measurement: {step['text']}"))
+        out.append(("words", f"Next measurement: {step['text']}."))
+        out += [("command", str(command)) for command in _list(step.get("commands"))]
     absent = [f"{effect}: {reason}" for effect, reason in _mapping(d.get("not_tried")).items()]
     out.append(("more", (f"{len(absent)} effects not tried, and why", [("list", absent)])) if absent else ("list", []))
     return [*out, ("figures", [picture(name, data) for name, data in item.get("figures", [])])]
