@@ -229,7 +229,7 @@ def _shifts(points: Dataset, ramp: bool) -> dict[str, float]:
 
 
 def _reduced(imported: Dataset, diameter_m: float | None) -> tuple[Dataset, tuple[str, ...]]:
-    """Steady points; of a ramp without any to speak of, its rows."""
+    """Steady points; for a slow ramp, which has hardly any, its rows."""
     try:
         steady = reduce(imported, diameter_m=diameter_m)
     except InputError:

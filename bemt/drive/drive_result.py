@@ -28,7 +28,7 @@ LOW, HIGH = 0.2, 0.8
 
 @dataclasses.dataclass(frozen=True)
 class DriveResult:
-    """What came out; ``reached`` is False when hover or airspeed is beyond the drive, or a point is unconverged."""
+    """Result of a drive; ``reached`` is False when hover or airspeed is beyond the drive, or a point is unconverged."""
 
     document: dict[str, Any]
     steady: Steady

@@ -24,7 +24,7 @@ LABEL = "# generated, not measured"
 
 @dataclass(frozen=True)
 class MotorBench:
-    """What the generated trials pretend to be; defaults follow the thesis's joint motor."""
+    """The truth behind generated trials; defaults follow the thesis's joint motor."""
 
     name: str = "T-Motor MN4006 KV380"  # of the motor
     # data sheet. [rev/min/V], [%]

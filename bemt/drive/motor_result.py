@@ -44,7 +44,7 @@ def check_options(
 def generate(
     target: str, seed: int | None, plant: Sequence[str], file: str | None = None, out: str | None = None
 ) -> dict[str, Any]:
-    """Write generated trials, over nothing but other generated ones."""
+    """Write generated trials; only generated files are overwritten."""
     folder, seed = Path(target), seed or 0
     faults: list[Fault] = []
     planted: dict[str, float] = {}

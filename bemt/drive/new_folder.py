@@ -18,7 +18,7 @@ __all__ = ["Wanted", "write"]
 
 @dataclass(frozen=True)
 class Wanted:
-    """What somebody knows of a propeller or fan, as `bemt new` is told it."""
+    """What the user of `bemt new` knows of a propeller or fan."""
 
     label: str | None = None
     stations: str | None = None

@@ -51,7 +51,7 @@ _INSIDE: tuple[tuple[re.Pattern[bytes], str, str], ...] = (
 
 
 def recognised(path: str | os.PathLike[str]) -> tuple[str, str] | None:
-    """Say what a file is that no reader takes."""
+    """Identify a file that no reader takes: what it is, and a hint."""
     try:
         with Path(path).open("rb") as stream:
             head = stream.read(16384)

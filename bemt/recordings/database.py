@@ -124,7 +124,7 @@ def get(
 
 
 def text(doc: dict[str, Any]) -> str:
-    """Say what is where."""
+    """Tell where the data lie and where they came from."""
     said = {
         "first use": "first use: the publisher gives no hash, so this one is trusted and recorded",
         "as recorded": "as recorded at its first use",

@@ -75,7 +75,7 @@ class Facts:
         return np.where((v > 0.2) & (v < 2.0), v, LIKELY_RHO)
 
     def sampled(self, most: int = ENOUGH) -> Facts:
-        """Every so many rows of a long log: medians need no more."""
+        """Every nth row of a long log: medians need no more."""
         step = -(-len(self) // most)
         if step == 1:
             return self

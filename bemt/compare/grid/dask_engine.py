@@ -95,7 +95,7 @@ _own = threading.local()
 
 
 def _carry(work: bytes) -> bytes:
-    """Give back what it takes: as a task, the work is made again from the scheduler when its holders die."""
+    """Return the argument: as a task, the scheduler can make the work again when its holders die."""
     return work
 
 

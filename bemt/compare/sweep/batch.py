@@ -39,7 +39,7 @@ Ready = tuple[Case, str]
 
 
 def _fit(name: str) -> bool:
-    """Whether a name may name a folder."""
+    """Whether a name can be that of a folder."""
     out = Collector("")
     check_name(out, name)
     return bool(name.strip()) and not out.faults
