@@ -37,11 +37,6 @@ from pydantic_core import PydanticCustomError, core_schema
 from bemt.base.errors import InputError
 from bemt.base.toml_text import Collector, load_toml
 
-__all__ = [
-    "Axis", "Limits", "Span", "Table", "axis_values", "check_field", "entry", "expected", "limits_of",
-    "read_model", "shown", "validated",
-]  # fmt: skip
-
 AXIS = "a list of distinct numbers, or {start, stop, num}"
 _UNIT_TAIL = re.compile(r"_(in|mm|cm|m|m_s|kg_m3|hPa|C|pct|deg)$")
 _FAULTS = "bemt_faults"

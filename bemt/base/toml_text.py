@@ -9,8 +9,6 @@ from typing import Any
 
 from bemt.base.errors import Fault
 
-__all__ = ["Collector", "load_toml"]
-
 
 class Collector:
     """Gathers the faults of one file."""

@@ -21,8 +21,6 @@ from bemt.compare.scaling import Judgement, judge, weigh
 from bemt.compare.scaling_laws import FAMILY, law
 from bemt.compare.stand_run import StandRun
 
-__all__ = ["OTHER_STAND", "SCHEMA", "RunChange", "changed", "document"]
-
 SCHEMA = "bemt.comparison/1"
 # Recorded densities are this good: a barometer, a thermometer and nobody's humidity, share.
 _TOLD_DENSITY, _BAROMETER, _SURE = 0.012, 0.004, 2.0

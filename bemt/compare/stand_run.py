@@ -17,8 +17,6 @@ from bemt.dataset import DIMENSIONLESS, Dataset
 from bemt.recordings.channels import named
 from bemt.recordings.reduce import reduce, reduction
 
-__all__ = ["StandRun", "selected", "stand_run", "with_air"]
-
 Array = NDArray[np.float64]
 
 _LOADS = ("thrust_N", "torque_Nm", "power_W", "CT", "CP", "CQ")

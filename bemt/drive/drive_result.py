@@ -17,8 +17,6 @@ from bemt.case.schema import AIRSPEED
 from bemt.drive import drive_file, mission, outputs, picture, rotor_table
 from bemt.drive.drive_model import EFFECTS, Drive, Steady
 
-__all__ = ["DriveResult", "solve", "text"]
-
 COLUMNS = {"pulse_us": "pulse [us]", "rpm": "rpm", "thrust_N": "T [N]", "battery_A": "I [A]", "voltage_V": "V [V]",
            "power_W": "P [W]", "efficiency": "eta"}  # fmt: skip
 RESULTS = ("drive.json", "drive.csv", "drive.png")

@@ -13,8 +13,6 @@ from bemt.base.units import INCH
 from bemt.case import Case, case_of, find_cases, fresh, from_solid, load_case
 from bemt.drive import from_label
 
-__all__ = ["Wanted", "write"]
-
 
 @dataclass(frozen=True)
 class Wanted:

@@ -16,17 +16,6 @@ if TYPE_CHECKING:
     from bemt.bem.model import Model
     from bemt.case import Case
 
-__all__ = [
-    "StatedBand",
-    "Loading",
-    "Performance",
-    "PointLoads",
-    "band_of",
-    "loading_of",
-    "performance_of",
-    "solve_points",
-]
-
 Array = NDArray[np.float64]
 
 LOWEST = 0.25

@@ -19,18 +19,6 @@ from numpy.typing import NDArray
 from bemt.base.errors import Fault, InputError
 from bemt.readers import GZIP, WIDE, SourceText, decode, number
 
-__all__ = [
-    "Column",
-    "ExportRow",
-    "ExportTable",
-    "cells_of",
-    "head_lines",
-    "numeric_table",
-    "si_unit",
-    "slug",
-    "unique",
-]
-
 Array = NDArray[np.float64]
 
 _NAN = re.compile(r"[+-]?(nan|n/a|-?1\.#(qnan|snan|ind|inf)\w*|inf(inity)?|null|\*+)(\(\w*\))?", re.IGNORECASE)

@@ -23,8 +23,6 @@ from bemt.readers._cfd import Column, ExportRow, cells_of, head_lines, numeric_t
 from bemt.readers._cfd_record import fields, history
 from bemt.readers._columns import Channel, channels_of, dataset
 
-__all__ = ["KIND", "read", "sniff"]
-
 KIND = "cfd_post_csv"
 
 _SECTION = re.compile(r"\[(\w[\w ]*)\]")

@@ -20,8 +20,6 @@ from bemt.readers import load_text
 from bemt.readers._cfd import Column, ExportRow, cells_of, head_lines, numeric_table
 from bemt.readers._cfd_record import fields
 
-__all__ = ["KIND", "read", "sniff"]
-
 KIND = "fluent_ascii"
 
 _FIRST = ("nodenumber", "cellnumber")

@@ -30,8 +30,6 @@ from bemt.readers import SourceText, load_text, number
 from bemt.readers._cfd import head_lines, si_unit, slug, unique
 from bemt.readers._columns import Channel, dataset
 
-__all__ = ["KIND", "Entry", "blocks", "read", "sniff"]
-
 KIND = "fluent_forces"
 
 _TITLE = re.compile(r"(Forces|Moments|Center of Pressure)\b(?!\s*[\[(])(.*)")

@@ -19,8 +19,6 @@ from bemt.readers._cfd import ExportRow, head_lines, numeric_table
 from bemt.readers._cfd_record import history
 from bemt.readers.fluent_report import column_of
 
-__all__ = ["KIND", "read", "sniff"]
-
 KIND = "fluent_monitor"
 
 _TITLE = re.compile(r'"[^"]*"')

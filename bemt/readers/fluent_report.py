@@ -24,8 +24,6 @@ from bemt.readers import load_text
 from bemt.readers._cfd import Column, ExportRow, head_lines, numeric_table, si_unit
 from bemt.readers._cfd_record import history
 
-__all__ = ["KIND", "column_of", "read", "sniff"]
-
 KIND = "fluent_report"
 
 _QUOTED = re.compile(r'"([^"]*)"')

@@ -30,8 +30,6 @@ from bemt.readers._cfd import head_lines, si_unit, slug
 from bemt.readers._columns import Channel, dataset
 from bemt.readers.fluent_forces import blocks
 
-__all__ = ["KIND", "read", "sniff"]
-
 KIND = "fluent_transcript"
 
 _FLOW = re.compile(r"\s*Flow time = (\S+?)s?, time step = (\d+)\s*")

@@ -24,8 +24,6 @@ from bemt.readers._cfd_record import history
 from bemt.readers._columns import Channel, channels_of, dataset
 from bemt.readers.fluent_report import column_of
 
-__all__ = ["KIND", "read", "sniff"]
-
 KIND = "fluent_xy"
 
 _LABELS = re.compile(r'\(labels\s+"([^"]*)"\s+"([^"]*)"\s*\)')

@@ -32,8 +32,6 @@ from bemt.readers._cfd import Column, ExportRow, ExportTable, head_lines, numeri
 from bemt.readers._cfd_record import history
 from bemt.readers._columns import Channel, dataset
 
-__all__ = ["KIND", "read", "sniff"]
-
 KIND = "openfoam_forces"
 
 _TIME = re.compile(r"#\s*Time\b(.*)")

@@ -22,8 +22,6 @@ from bemt.readers import load_text
 from bemt.readers._cfd import Column, ExportRow, ExportTable, cells_of, head_lines, numeric_table
 from bemt.readers._cfd_record import history
 
-__all__ = ["KIND", "read", "sniff"]
-
 KIND = "su2_history"
 
 _STEPS = ("Time_Iter", "Outer_Iter", "Inner_Iter", "Iteration")

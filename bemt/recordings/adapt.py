@@ -21,8 +21,6 @@ from bemt.readers.apc import ApcPerformance
 from bemt.readers.references import Reference
 from bemt.sections.polars import Polar
 
-__all__ = ["adapt", "damaged_export", "recognised"]
-
 _KIND = {"apc": "vendor", "uiuc": "bench", "references": "table"}
 _GEOMETRY = ("ApcBlade", "BladeFile", "UiucGeometry", "UiucThickness")
 _EXPORT = "Export report files, monitors, force reports or CSV"

@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 from bemt.air import LIQUID
 from bemt.recordings.findings import Facts, Finding, check_for
 
-__all__: list[str] = []
-
 Array = NDArray[np.float64]
 SENSORS = (
     "thrust_N", "duct_thrust_N", "torque_Nm", "voltage_V", "current_A", "electrical_rpm", "optical_rpm", "rpm",

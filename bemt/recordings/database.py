@@ -22,8 +22,6 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.tables import file_hash, json_text
 from bemt.recordings.archive import download, unpacked
 
-__all__ = ["RECORD", "SCHEMA", "URLS", "folder_of", "get", "text"]
-
 SCHEMA = "bemt.data/1"
 RECORD = ".bemt-data.json"
 URLS = {"uiuc": "https://m-selig.ae.illinois.edu/props/download/UIUC-propDB.zip"}

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 from bemt.dataset import Dataset
 from bemt.recordings.channels import named
 
-__all__ = ["CHECKS", "MANY", "SEVERITIES", "Facts", "Finding", "check_for", "facts_of"]
-
 Array = NDArray[np.float64]
 SEVERITIES = ("error", "warning", "note")
 ENOUGH = 200_000

@@ -28,8 +28,6 @@ from dataclasses import dataclass
 
 from bemt.base.errors import Fault, InputError
 
-__all__ = ["FS_THREE", "FS_TWO", "GridStudy", "cell_size", "grid_study", "ratios"]
-
 FS_THREE = 1.25
 """Safety factor with three grids."""
 FS_TWO = 3.0

@@ -29,8 +29,6 @@ from bemt.recordings.scatter import Hysteresis, hysteresis, repeats, session
 from bemt.recordings.site_air import AirOfPoints, air_of
 from bemt.recordings.tare import TARED, TareZero, from_rest
 
-__all__ = ["Reduction", "reduce", "reduction"]
-
 Array = NDArray[np.float64]
 _SCATTERED = ("thrust_N", "duct_thrust_N", "torque_Nm")
 

@@ -32,8 +32,6 @@ from bemt.case.schema import CaseFile
 from bemt.compare.grid.identity import program_hash
 from bemt.compare.grid.run import Grid, GridSolver, Solved, solve_chunk
 
-__all__ = ["Cluster"]
-
 IN_FLIGHT = 2
 """Chunks per worker thread that are out at a time: one at work, one waiting; this bounds the memory."""
 SAMPLE = 256
