@@ -55,28 +55,9 @@ _M_DRY = 28.96546e-3
 def sutherland(temperature_K: float) -> float:
     """Dynamic viscosity of air by Sutherland's law.
 
-    Parameters
-    ----------
-    temperature_K : float
-        Static temperature. [K]
-
-    Returns
-    -------
-    float
-        Dynamic viscosity. [Pa s]
-
-    Raises
-    ------
-    InputError
-        If the temperature is not positive.
-
-    Notes
-    -----
     Reference [1] of the module, eq. 51: mu = 1.458e-6 T^1.5 / (T + 110.4).  Good to about 2 % from 170 K to 1900 K.
     Humidity is left out: it lowers the viscosity by less than 1 % below 35 degC.
 
-    Examples
-    --------
     >>> round(sutherland(288.15) * 1e5, 4)
     1.7894
     """
@@ -88,27 +69,8 @@ def sutherland(temperature_K: float) -> float:
 def isa_pressure(altitude_m: float) -> tuple[float, float]:
     """Pressure and temperature of the standard atmosphere.
 
-    Parameters
-    ----------
-    altitude_m : float
-        Geopotential altitude, -5000 to 32 000. [m]
-
-    Returns
-    -------
-    pressure, temperature : float
-        Static pressure [Pa] and temperature [K].
-
-    Raises
-    ------
-    InputError
-        Outside the range.
-
-    Notes
-    -----
     Reference [1] of the module, eqs. 23, 33a (lapse) and 33b (isothermal).
 
-    Examples
-    --------
     >>> p, T = isa_pressure(11000.0)
     >>> round(p), round(T, 2)
     (22632, 216.65)
@@ -136,22 +98,8 @@ def _step(p: float, T: float, lapse: float, dh: float) -> float:
 def saturation_pressure(temperature_K: float) -> float:
     """Saturation pressure of water vapour over liquid water.
 
-    Parameters
-    ----------
-    temperature_K : float
-        Temperature. [K]
-
-    Returns
-    -------
-    float
-        Saturation vapour pressure. [Pa]
-
-    Notes
-    -----
     CIPM-2007, reference [2] of the module, appendix A.1.
 
-    Examples
-    --------
     >>> round(saturation_pressure(293.15))
     2339
     """
@@ -162,26 +110,8 @@ def saturation_pressure(temperature_K: float) -> float:
 def vapour_fraction(pressure_Pa: float, temperature_K: float, humidity_pct: float) -> float:
     """Mole fraction of water vapour.
 
-    Parameters
-    ----------
-    pressure_Pa : float
-        Total pressure. [Pa]
-    temperature_K : float
-        Temperature. [K]
-    humidity_pct : float
-        Relative humidity. [%]
-
-    Returns
-    -------
-    float
-        Mole fraction of vapour. [-]
-
-    Notes
-    -----
     CIPM-2007, reference [2] of the module, appendix A.1: x_v = h f(p, t) p_sv / p with enhancement factor f.
 
-    Examples
-    --------
     >>> round(vapour_fraction(101325.0, 293.15, 50.0), 5)
     0.01159
     """
@@ -200,40 +130,33 @@ def _positive(value: Any) -> bool:
     return v.size > 0 and bool(np.all(np.isfinite(v) & (v > 0.0)))
 
 
+def _within(given: Sequence[tuple[str, float, float, float, str, str]]) -> None:
+    """Refuse all that lies outside: name, value, bounds, unit, hint."""
+    faults = [
+        Fault("", f"air.{name}", f"{value:g}", f"{low:g} to {high:g} {unit}", hint)
+        for name, value, low, high, unit, hint in given
+        if not low <= value <= high
+    ]
+    if faults:
+        raise InputError(faults)
+
+
 @dataclass(frozen=True)
 class Air:
     """State of the air; `Air.stack` makes one of arrays, for a batch in which the air differs from point to point.
 
-    Attributes
-    ----------
-    rho : float
-        Density. [kg/m3]
-    mu : float
-        Dynamic viscosity. [Pa s]
-    a_sound : float
-        Speed of sound. [m/s]
-    temperature_K : float
-        Static temperature. [K]
-    source : str
-        How the state was made; printed in reports.
+    Raises InputError: if a value is not a positive finite number; all faults at once.
 
-    Raises
-    ------
-    InputError
-        If a value is not a positive finite number; all faults at once.
-
-    Examples
-    --------
     >>> air = Air.isa(0.0)
     >>> round(air.rho, 4), round(air.a_sound, 2)
     (1.225, 340.29)
     """
 
-    rho: float
-    mu: float
-    a_sound: float
-    temperature_K: float = T0
-    source: str = "given"
+    rho: float  # Density [kg/m3]
+    mu: float  # Dynamic viscosity [Pa s]
+    a_sound: float  # Speed of sound [m/s]
+    temperature_K: float = T0  # Static temperature [K]
+    source: str = "given"  # How the state was made; printed in reports
 
     def __post_init__(self) -> None:
         faults = [
@@ -258,28 +181,12 @@ class Air:
     def stack(cls, airs: Sequence[Air]) -> Air:
         """Join states into one whose fields are arrays.
 
-        Parameters
-        ----------
-        airs : sequence of Air
-            N states.
-
-        Returns
-        -------
-        Air
-            Fields of shape (N,).
-
-        Raises
-        ------
-        InputError
-            If there is none.
-
-        Examples
-        --------
         >>> Air.stack([Air.isa(0.0), Air.isa(1000.0)]).rho.round(4)
         array([1.225 , 1.1116])
         """
-        rho, mu, a, T = (np.array([getattr(x, f) for x in airs], dtype=float)
-                         for f in ("rho", "mu", "a_sound", "temperature_K"))  # fmt: skip
+        rho, mu, a, T = (
+            np.array([getattr(x, f) for x in airs], dtype=float) for f in ("rho", "mu", "a_sound", "temperature_K")
+        )
         make: Any = cls  # the annotations of the fields say float, the common case
         air: Air = make(rho, mu, a, T, "; ".join(dict.fromkeys(x.source for x in airs)))
         return air
@@ -288,25 +195,6 @@ class Air:
     def from_density(cls, rho: float = 1.225, temperature_C: float = 15.0) -> Air:
         """Air of a given density; viscosity and sound speed of dry air, or of water where it is as dense as water.
 
-        Parameters
-        ----------
-        rho : float
-            Density. [kg/m3]
-        temperature_C : float
-            Static temperature. [degC]
-
-        Returns
-        -------
-        Air
-            The state.
-
-        Raises
-        ------
-        InputError
-            If density or absolute temperature is not positive.
-
-        Examples
-        --------
         >>> air = Air.from_density()
         >>> air.rho, round(air.a_sound, 1)
         (1.225, 340.3)
@@ -323,45 +211,20 @@ class Air:
     def water(cls, temperature_C: float = 15.0, salinity_g_kg: float = 0.0) -> Air:
         """Fresh water or sea water at one atmosphere; a propeller does not know that it is not air.
 
-        Parameters
-        ----------
-        temperature_C : float
-            0 to 60. [degC]
-        salinity_g_kg : float
-            0 to 45; the oceans have 35. [g/kg]
-
-        Returns
-        -------
-        Air
-            The state; cavitation is not modelled.
-
-        Raises
-        ------
-        InputError
-            Outside of the ranges.
-
-        Notes
-        -----
         Reference [3] of the module.
 
-        Examples
-        --------
         >>> fresh, sea = Air.water(15.0), Air.water(15.0, 35.0)
         >>> round(fresh.rho, 1), round(fresh.nu * 1e6, 3), round(fresh.a_sound)
         (999.1, 1.139, 1466)
         >>> round(sea.rho, 1), round(sea.nu * 1e6, 3)
         (1026.2, 1.189)
         """
-        faults = [
-            Fault("", f"air.{name}", f"{value:g}", f"0 to {high:g} {unit}", hint)
-            for name, value, high, unit, hint in (
-                ("temperature_C", temperature_C, 60.0, "degC", "Kelvin given?"),
-                ("salinity_g_kg", salinity_g_kg, _SALT, "g/kg", "The oceans have 35"),
-            )
-            if not 0.0 <= value <= high
-        ]
-        if faults:
-            raise InputError(faults)
+        _within(
+            [
+                ("temperature_C", temperature_C, 0.0, 60.0, "degC", "Kelvin given?"),
+                ("salinity_g_kg", salinity_g_kg, 0.0, _SALT, "g/kg", "The oceans have 35"),
+            ]
+        )
         t, S = temperature_C, 1e-3 * salinity_g_kg
         kell = (999.83952, 16.945176, -7.9870401e-3, -46.170461e-6, 105.56302e-9, -280.54253e-12)
         rho = sum(a * t**k for k, a in enumerate(kell)) / (1.0 + 16.879850e-3 * t)
@@ -378,29 +241,8 @@ class Air:
     def isa(cls, altitude_m: float = 0.0, dT: float = 0.0) -> Air:
         """Air of the International Standard Atmosphere.
 
-        Parameters
-        ----------
-        altitude_m : float
-            Geopotential pressure altitude, -5000 to 32 000. [m]
-        dT : float
-            Temperature deviation at unchanged pressure, as in "ISA + 15". [K]
-
-        Returns
-        -------
-        Air
-            The state.
-
-        Raises
-        ------
-        InputError
-            Outside the altitude range.
-
-        Notes
-        -----
         Reference [1] of the module, eqs. 33a, 33b, 42, 50 and 51.
 
-        Examples
-        --------
         >>> air = Air.isa(5000.0)
         >>> round(air.rho, 5), round(air.a_sound, 2), round(air.mu * 1e5, 4)
         (0.73612, 320.53, 1.6281)
@@ -417,63 +259,26 @@ class Air:
     def from_state(cls, pressure_Pa: float, temperature_C: float, humidity_pct: float = 0.0) -> Air:
         """Moist air from a barometer, a thermometer and a hygrometer.
 
-        Parameters
-        ----------
-        pressure_Pa : float
-            Absolute (station, not sea-level reduced) pressure, 1e4 to 1.2e5. [Pa]
-        temperature_C : float
-            Air temperature, -60 to 60. [degC]
-        humidity_pct : float
-            Relative humidity, 0 to 100. [%]
-
-        Returns
-        -------
-        Air
-            The state.
-
-        Raises
-        ------
-        InputError
-            If a reading is outside its range; all faults at once.
-
-        Notes
-        -----
         Density: CIPM-2007, eq. 1 of [2] with 400 ppm CO2, rho = p M_a / (Z R T) (1 - 0.3780 x_v); uncertainty 2.2e-5
         for 600-1100 hPa, 15-27 degC, and a smooth extrapolation outside.  Sound speed: ideal mixture,
         gamma = cp/(cp - R) with cp/R of 3.5 (dry) and 4.0 (vapour), within 0.1 % of real air.  Viscosity: dry.
 
-        Examples
-        --------
         >>> air = Air.from_state(101325.0, 20.0, 50.0)
         >>> round(air.rho, 3), round(air.a_sound, 1)
         (1.199, 343.9)
         """
-        faults = [
-            Fault("", f"air.{name}", f"{value:g}", f"{low:g} to {high:g} {unit}", hint)
-            for name, value, low, high, unit, hint in (
+        _within(
+            [
                 ("pressure_Pa", pressure_Pa, 1e4, 1.2e5, "Pa", "hPa given?"),
                 ("temperature_C", temperature_C, -60.0, 60.0, "degC", "Kelvin given?"),
                 ("humidity_pct", humidity_pct, 0.0, 100.0, "%", "Relative humidity in per cent"),
-            )
-            if not low <= value <= high
-        ]
-        if faults:
-            raise InputError(faults)
+            ]
+        )
         T, t, p = temperature_C + ZERO_CELSIUS, temperature_C, pressure_Pa
         x = vapour_fraction(p, T, humidity_pct)
-        Z = (
-            1.0
-            - p
-            / T
-            * (
-                1.58123e-6
-                - 2.9331e-8 * t
-                + 1.1043e-10 * t * t
-                + (5.707e-6 - 2.051e-8 * t) * x
-                + (1.9898e-4 - 2.376e-6 * t) * x * x
-            )
-            + (p / T) ** 2 * (1.83e-11 - 0.765e-8 * x * x)
-        )
+        virial = 1.58123e-6 - 2.9331e-8 * t + 1.1043e-10 * t * t
+        virial += (5.707e-6 - 2.051e-8 * t) * x + (1.9898e-4 - 2.376e-6 * t) * x * x
+        Z = 1.0 - p / T * virial + (p / T) ** 2 * (1.83e-11 - 0.765e-8 * x * x)
         rho = p * _M_DRY / (Z * _R_GAS * T) * (1.0 - x * (1.0 - _M_WATER / _M_DRY))
         cp = 3.5 * (1.0 - x) + 4.0 * x
         molar = _M_DRY * (1.0 - x) + _M_WATER * x

@@ -5,7 +5,8 @@ CP = P/(rho n^3 D^5) = 2 pi CQ, J = V/(n D), with n in revolutions per second.
 HELICOPTER convention (suffix ``_rotor``): CT_rotor = T/(rho A (Omega R)^2), CP_rotor = P/(rho A (Omega R)^3),
 CQ_rotor = Q/(rho A (Omega R)^2 R) = CP_rotor.
 
-All functions broadcast over their arguments.  A coefficient at n <= 0 is NaN, never zero or a warning.
+Arguments broadcast: thrust T [N], torque Q [N m], shaft power P [W], density rho [kg/m3], n [rev/s], diameter D [m],
+axial airspeed V [m/s], speed of sound a_sound [m/s], viscosity mu [Pa s], chord [m].  A coefficient at n <= 0 is NaN.
 
 References
 ----------
@@ -48,22 +49,8 @@ def _ratio(num: ArrayLike, den: ArrayLike, valid: ArrayLike) -> Any:
 
 
 def CT(T: ArrayLike, rho: ArrayLike, n: ArrayLike, D: ArrayLike) -> Any:
-    """Thrust coefficient, propeller convention.
+    """Thrust coefficient CT = T/(rho n^2 D^4); NaN where n <= 0.
 
-    Parameters
-    ----------
-    T : float or array
-        Thrust. [N]
-    rho, n, D : float or array
-        Density [kg/m3], rotational speed [rev/s], diameter [m].
-
-    Returns
-    -------
-    float or array
-        CT = T/(rho n^2 D^4); NaN where n <= 0. [-]
-
-    Examples
-    --------
     >>> round(CT(2.60 * 9.80665, 1.225, 20000 / 60, 8 * 0.0254), 3)
     0.11
     """
@@ -72,22 +59,8 @@ def CT(T: ArrayLike, rho: ArrayLike, n: ArrayLike, D: ArrayLike) -> Any:
 
 
 def CQ(Q: ArrayLike, rho: ArrayLike, n: ArrayLike, D: ArrayLike) -> Any:
-    """Torque coefficient, propeller convention.
+    """Torque coefficient CQ = Q/(rho n^2 D^5); NaN where n <= 0.
 
-    Parameters
-    ----------
-    Q : float or array
-        Shaft torque. [N m]
-    rho, n, D : float or array
-        Density [kg/m3], rotational speed [rev/s], diameter [m].
-
-    Returns
-    -------
-    float or array
-        CQ = Q/(rho n^2 D^5); NaN where n <= 0. [-]
-
-    Examples
-    --------
     >>> CQ(0.5, 1.0, 10.0, 1.0)
     0.005
     """
@@ -96,22 +69,8 @@ def CQ(Q: ArrayLike, rho: ArrayLike, n: ArrayLike, D: ArrayLike) -> Any:
 
 
 def CP(P: ArrayLike, rho: ArrayLike, n: ArrayLike, D: ArrayLike) -> Any:
-    """Power coefficient, propeller convention.
+    """Power coefficient CP = P/(rho n^3 D^5); NaN where n <= 0.
 
-    Parameters
-    ----------
-    P : float or array
-        Shaft power. [W]
-    rho, n, D : float or array
-        Density [kg/m3], rotational speed [rev/s], diameter [m].
-
-    Returns
-    -------
-    float or array
-        CP = P/(rho n^3 D^5); NaN where n <= 0. [-]
-
-    Examples
-    --------
     >>> CP(50.0, 1.0, 10.0, 1.0)
     0.05
     """
@@ -122,20 +81,6 @@ def CP(P: ArrayLike, rho: ArrayLike, n: ArrayLike, D: ArrayLike) -> Any:
 def thrust(CT: ArrayLike, rho: ArrayLike, n: ArrayLike, D: ArrayLike) -> Any:
     """Thrust from its coefficient; the inverse of `CT`.
 
-    Parameters
-    ----------
-    CT : float or array
-        Thrust coefficient, propeller convention. [-]
-    rho, n, D : float or array
-        Density [kg/m3], rotational speed [rev/s], diameter [m].
-
-    Returns
-    -------
-    float or array
-        Thrust. [N]
-
-    Examples
-    --------
     >>> thrust(0.1, 1.0, 10.0, 1.0)
     10.0
     """
@@ -145,20 +90,6 @@ def thrust(CT: ArrayLike, rho: ArrayLike, n: ArrayLike, D: ArrayLike) -> Any:
 def torque(CQ: ArrayLike, rho: ArrayLike, n: ArrayLike, D: ArrayLike) -> Any:
     """Torque from its coefficient; the inverse of `CQ`.
 
-    Parameters
-    ----------
-    CQ : float or array
-        Torque coefficient, propeller convention. [-]
-    rho, n, D : float or array
-        Density [kg/m3], rotational speed [rev/s], diameter [m].
-
-    Returns
-    -------
-    float or array
-        Shaft torque. [N m]
-
-    Examples
-    --------
     >>> torque(0.01, 1.0, 10.0, 1.0)
     1.0
     """
@@ -168,20 +99,6 @@ def torque(CQ: ArrayLike, rho: ArrayLike, n: ArrayLike, D: ArrayLike) -> Any:
 def power(CP: ArrayLike, rho: ArrayLike, n: ArrayLike, D: ArrayLike) -> Any:
     """Power from its coefficient; the inverse of `CP`.
 
-    Parameters
-    ----------
-    CP : float or array
-        Power coefficient, propeller convention. [-]
-    rho, n, D : float or array
-        Density [kg/m3], rotational speed [rev/s], diameter [m].
-
-    Returns
-    -------
-    float or array
-        Shaft power. [W]
-
-    Examples
-    --------
     >>> power(0.05, 1.0, 10.0, 1.0)
     50.0
     """
@@ -191,18 +108,6 @@ def power(CP: ArrayLike, rho: ArrayLike, n: ArrayLike, D: ArrayLike) -> Any:
 def CP_from_CQ(CQ: ArrayLike) -> Any:
     """Power coefficient from the torque coefficient, CP = 2 pi CQ.
 
-    Parameters
-    ----------
-    CQ : float or array
-        Torque coefficient, propeller convention. [-]
-
-    Returns
-    -------
-    float or array
-        Power coefficient, propeller convention. [-]
-
-    Examples
-    --------
     >>> round(CP_from_CQ(0.01), 6)
     0.062832
     """
@@ -212,18 +117,6 @@ def CP_from_CQ(CQ: ArrayLike) -> Any:
 def CQ_from_CP(CP: ArrayLike) -> Any:
     """Torque coefficient from the power coefficient, CQ = CP/(2 pi).
 
-    Parameters
-    ----------
-    CP : float or array
-        Power coefficient, propeller convention. [-]
-
-    Returns
-    -------
-    float or array
-        Torque coefficient, propeller convention. [-]
-
-    Examples
-    --------
     >>> round(CQ_from_CP(0.05), 6)
     0.007958
     """
@@ -231,22 +124,8 @@ def CQ_from_CP(CP: ArrayLike) -> Any:
 
 
 def J(V: ArrayLike, n: ArrayLike, D: ArrayLike) -> Any:
-    """Advance ratio.
+    """Advance ratio J = V/(n D); NaN where n <= 0.
 
-    Parameters
-    ----------
-    V : float or array
-        Axial airspeed, positive in climb. [m/s]
-    n, D : float or array
-        Rotational speed [rev/s], diameter [m].
-
-    Returns
-    -------
-    float or array
-        J = V/(n D); NaN where n <= 0. [-]
-
-    Examples
-    --------
     >>> J(15.0, 100.0, 0.25)
     0.6
     """
@@ -257,20 +136,6 @@ def J(V: ArrayLike, n: ArrayLike, D: ArrayLike) -> Any:
 def airspeed(J: ArrayLike, n: ArrayLike, D: ArrayLike) -> Any:
     """Airspeed from the advance ratio; the inverse of `J`.
 
-    Parameters
-    ----------
-    J : float or array
-        Advance ratio. [-]
-    n, D : float or array
-        Rotational speed [rev/s], diameter [m].
-
-    Returns
-    -------
-    float or array
-        Axial airspeed. [m/s]
-
-    Examples
-    --------
     >>> airspeed(0.6, 100.0, 0.25)
     15.0
     """
@@ -280,25 +145,11 @@ def airspeed(J: ArrayLike, n: ArrayLike, D: ArrayLike) -> Any:
 def eta(J: ArrayLike, CT: ArrayLike, CP: ArrayLike) -> Any:
     """Propulsive efficiency.
 
-    Parameters
-    ----------
-    J : float or array
-        Advance ratio. [-]
-    CT, CP : float or array
-        Thrust and power coefficient, propeller convention. [-]
+    J CT/CP where the shaft takes power (CP > 0); exactly 0 at J = 0; negative where the propeller brakes
+    (CT < 0); NaN where the shaft gives power (CP <= 0), because T V/P is then no efficiency.
 
-    Returns
-    -------
-    float or array
-        eta = J CT/CP where the shaft takes power (CP > 0); exactly 0 at J = 0; negative where the propeller brakes
-        (CT < 0); NaN where the shaft gives power (CP <= 0), because T V/P is then no efficiency. [-]
-
-    Notes
-    -----
     At J = 0 the useful power T V is zero: use `FM` or `grams_per_watt` there.
 
-    Examples
-    --------
     >>> eta([0.0, 0.5, 0.9, 1.2], [0.10, 0.05, -0.01, -0.05], [0.04, 0.035, 0.01, -0.02]).round(3)
     array([ 0.   ,  0.714, -0.9  ,    nan])
     """
@@ -309,24 +160,10 @@ def eta(J: ArrayLike, CT: ArrayLike, CP: ArrayLike) -> Any:
 
 
 def FM(CT: ArrayLike, CP: ArrayLike) -> Any:
-    """Figure of merit: ideal hover power over actual power.
+    """Figure of merit T^1.5/(P sqrt(2 rho A)) = sqrt(2/pi) CT^1.5/CP; NaN where CT < 0 or CP <= 0.
 
-    Parameters
-    ----------
-    CT, CP : float or array
-        Thrust and power coefficient, propeller convention. [-]
+    A ducted rotor may exceed 1: its own ideal power is lower.
 
-    Returns
-    -------
-    float or array
-        FM = sqrt(2/pi) CT^1.5/CP; NaN where CT < 0 or CP <= 0. [-]
-
-    Notes
-    -----
-    T^1.5/(P sqrt(2 rho A)) with A = pi D^2/4.  A ducted rotor may exceed 1: its own ideal power is lower.
-
-    Examples
-    --------
     >>> round(FM(0.1, 0.04), 4)
     0.6308
     """
@@ -335,22 +172,8 @@ def FM(CT: ArrayLike, CP: ArrayLike) -> Any:
 
 
 def grams_per_watt(T: ArrayLike, P: ArrayLike) -> Any:
-    """Gram-force of thrust per watt of shaft power.
+    """Gram-force of thrust per watt of shaft power; NaN where P <= 0. [gf/W]
 
-    Parameters
-    ----------
-    T : float or array
-        Thrust. [N]
-    P : float or array
-        Shaft power. [W]
-
-    Returns
-    -------
-    float or array
-        1000 T/(9.80665 P); NaN where P <= 0. [gf/W]
-
-    Examples
-    --------
     >>> round(grams_per_watt(9.80665, 100.0), 6)
     10.0
     """
@@ -361,20 +184,6 @@ def grams_per_watt(T: ArrayLike, P: ArrayLike) -> Any:
 def M_tip(n: ArrayLike, D: ArrayLike, a_sound: ArrayLike) -> Any:
     """Rotational tip Mach number.
 
-    Parameters
-    ----------
-    n, D : float or array
-        Rotational speed [rev/s], diameter [m].
-    a_sound : float or array
-        Speed of sound. [m/s]
-
-    Returns
-    -------
-    float or array
-        pi n D/a. [-]
-
-    Examples
-    --------
     >>> round(M_tip(20000 / 60, 14 * 0.0254, 340.3), 2)
     1.09
     """
@@ -382,24 +191,8 @@ def M_tip(n: ArrayLike, D: ArrayLike, a_sound: ArrayLike) -> Any:
 
 
 def M_tip_helical(n: ArrayLike, D: ArrayLike, a_sound: ArrayLike, V: ArrayLike) -> Any:
-    """Helical tip Mach number, of the resultant of rotation and flight.
+    """Helical tip Mach number sqrt((pi n D)^2 + V^2)/a; induced velocity left out.
 
-    Parameters
-    ----------
-    n, D : float or array
-        Rotational speed [rev/s], diameter [m].
-    a_sound : float or array
-        Speed of sound. [m/s]
-    V : float or array
-        Axial airspeed. [m/s]
-
-    Returns
-    -------
-    float or array
-        sqrt((pi n D)^2 + V^2)/a; induced velocity left out. [-]
-
-    Examples
-    --------
     >>> round(M_tip_helical(100.0, 1.0, 340.0, 100.0), 4)
     0.9697
     """
@@ -407,28 +200,8 @@ def M_tip_helical(n: ArrayLike, D: ArrayLike, a_sound: ArrayLike, V: ArrayLike) 
 
 
 def Re75(chord75: ArrayLike, n: ArrayLike, D: ArrayLike, V: ArrayLike, rho: ArrayLike, mu: ArrayLike) -> Any:
-    """Reynolds number of the section at 0.75 R.
+    """Reynolds number at 0.75 R: rho W c/mu with W = sqrt((0.75 pi n D)^2 + V^2); induced velocity left out.
 
-    Parameters
-    ----------
-    chord75 : float or array
-        Chord at 0.75 R. [m]
-    n, D : float or array
-        Rotational speed [rev/s], diameter [m].
-    V : float or array
-        Axial airspeed. [m/s]
-    rho : float or array
-        Density. [kg/m3]
-    mu : float or array
-        Dynamic viscosity. [Pa s]
-
-    Returns
-    -------
-    float or array
-        rho W c/mu with W = sqrt((0.75 pi n D)^2 + V^2); induced velocity left out. [-]
-
-    Examples
-    --------
     >>> round(Re75(0.02, 100.0, 0.254, 0.0, 1.225, 1.7894e-5))
     81941
     """
@@ -439,18 +212,6 @@ def Re75(chord75: ArrayLike, n: ArrayLike, D: ArrayLike, V: ArrayLike, rho: Arra
 def to_rotor(CT: ArrayLike, CP: ArrayLike) -> tuple[Any, Any]:
     """Propeller convention to helicopter convention.
 
-    Parameters
-    ----------
-    CT, CP : float or array
-        Coefficients in the propeller convention. [-]
-
-    Returns
-    -------
-    CT_rotor, CP_rotor : float or array
-        Coefficients in the helicopter convention; CQ_rotor equals CP_rotor. [-]
-
-    Examples
-    --------
     >>> CT_rotor, CP_rotor = to_rotor(0.1, 0.04)
     >>> round(CT_rotor, 5), round(CP_rotor, 6)
     (0.0129, 0.001643)
@@ -461,18 +222,6 @@ def to_rotor(CT: ArrayLike, CP: ArrayLike) -> tuple[Any, Any]:
 def from_rotor(CT_rotor: ArrayLike, CP_rotor: ArrayLike) -> tuple[Any, Any]:
     """Helicopter convention to propeller convention; the inverse of `to_rotor`.
 
-    Parameters
-    ----------
-    CT_rotor, CP_rotor : float or array
-        Coefficients in the helicopter convention; give CQ_rotor as CP_rotor, they are equal. [-]
-
-    Returns
-    -------
-    CT, CP : float or array
-        Coefficients in the propeller convention. [-]
-
-    Examples
-    --------
     >>> CT, CP = from_rotor(0.0046, 0.0003)
     >>> round(CT, 5), round(CP, 6)
     (0.03566, 0.007306)

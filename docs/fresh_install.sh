@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Seconds and MB from nothing to a first answer, outside of the checkout: bash docs/fresh_install.sh
 # A wheel is built and installed without pip's cache; beside it the libraries that pyBEMT asks for (requirements.txt without
-# its documentation), since pyBEMT itself is on no package index. The download is in the time of the install.
+# its documentation), since pyBEMT itself is on no package index. With its sources in PYBEMT=FOLDER its propeller example runs
+# as well (it needs Python 3.11: SafeConfigParser is gone in 3.12). The download is in the time of the install.
 set -euo pipefail
 root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd)
 work=$(mktemp -d)
@@ -35,3 +36,9 @@ timed "install pyBEMT's libraries" "$work/peer/bin/pip" -q install --no-cache-di
 echo "    $(du -sm "$work/peer" | cut -f1) MB"
 timed "import them, first" "$work/peer/bin/python" -c 'import numpy, scipy.optimize, pandas, matplotlib.pyplot'
 timed "import them" "$work/peer/bin/python" -c 'import numpy, scipy.optimize, pandas, matplotlib.pyplot'
+if [[ -n ${PYBEMT:-} ]]; then
+    cd -- "$PYBEMT/examples"
+    export MPLBACKEND=Agg PYTHONPATH="$PYBEMT" PYTHONWARNINGS=ignore
+    timed "pyBEMT's run_propeller.py, first" "$work/peer/bin/python" run_propeller.py
+    timed "pyBEMT's run_propeller.py" "$work/peer/bin/python" run_propeller.py
+fi

@@ -27,7 +27,7 @@ API = {  # page: title, introduction, names
         *(f"bemt.library.answers.{n}" for n in ("read", "diagnose", "Answer", "compare", "drive", "validate")),
         "bemt.diagnose.contrast.Contrast", "bemt.drive.from_label.DriveEstimate", "bemt.drive.from_label.Band")),
     "api_dataset.md": ("Dataset", "What every source gives and every question takes.", (
-        "bemt.dataset.points", "bemt.dataset.tables.from_pandas", "bemt.base.errors.InputError",
+        "bemt.dataset.points", "bemt.dataset.make", "bemt.base.errors.InputError",
         "bemt.base.errors.Fault")),
     "api_contracts.md": ("Plug-in contracts", "One file each, found by scanning; [examples](adding.md).", (
         "bemt.effects.base", "bemt.readers", "bemt.exports.base", "bemt.commands")),

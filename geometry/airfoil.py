@@ -29,26 +29,15 @@ def _spaced(n: int) -> Array:
 class Airfoil:
     """A section with unit chord; arrays are read-only.
 
-    Parameters
-    ----------
-    name : str
-        For people; the identity of the shape is :meth:`key`.
-    x, y : (N,) float
-        Coordinates in Selig order over the chord. [-]
+    Raises GeometryError: if the loop is not finite, not in Selig order, not of unit chord, or crosses itself.
 
-    Raises
-    ------
-    GeometryError
-        If the loop is not finite, not in Selig order, not of unit chord, or crosses itself.
-
-    Examples
-    --------
     >>> section = naca4(0.04, 0.40, 0.12)
     >>> section.name, round(section.thickness, 3), round(section.camber, 4), round(section.te_gap, 4)
     ('naca4:0.040,0.40,0.120', 0.12, 0.04, 0.0025)
     """
 
-    name: str
+    name: str  # For people; the identity of the shape is :meth:`key`
+    # (N,) coordinates in Selig order over the chord [-]
     x: Array
     y: Array
 
@@ -180,13 +169,9 @@ def _naca_half(x: Array, thickness: float, te_gap: float | None) -> Array:
 def naca4(camber: float, position: float, thickness: float, n: int = 161, te_gap: float | None = None) -> Airfoil:
     """Make a NACA four-digit section from real numbers.
 
-    References
-    ----------
     I. H. Abbott and A. E. von Doenhoff, Theory of Wing Sections, Dover 1959, section 6.4 (not checked against the
     book).
 
-    Examples
-    --------
     >>> round(naca4(0.0, 0.4, 0.12, te_gap=0.0).area, 4)
     0.0809
     """
@@ -216,16 +201,12 @@ _FIVE = {1: (0.0580, 361.4), 2: (0.1260, 51.64), 3: (0.2025, 15.957), 4: (0.2900
 _REFLEX = {2: (0.1300, 51.99, 0.000764), 3: (0.2170, 15.793, 0.00677), 4: (0.3180, 6.520, 0.0303), 5: (0.4410, 3.191, 0.1355)}  # fmt: skip  # noqa: E501
 
 
-def naca(digits: str, n: int = 161, te_gap: float | None = None) -> Airfoil:
+def naca(digits: str, n: int = 161) -> Airfoil:
     """Make a NACA four- or five-digit section from its designation.
 
-    References
-    ----------
     E. N. Jacobs and R. M. Pinkerton, NACA Report 537 (1935), plain lines; C. L. Ladson et al., NASA TM-4741 (1996),
     reflexed lines (constants as commonly reprinted; not checked against the reports).
 
-    Examples
-    --------
     >>> naca("NACA 4412").name, round(naca("23012").camber, 3)
     ('naca4412', 0.018)
     """
@@ -241,7 +222,7 @@ def naca(digits: str, n: int = 161, te_gap: float | None = None) -> Airfoil:
         m, p = int(code[0]) / 100, int(code[1]) / 10
         if m > 0 and p == 0:
             raise GeometryError([("naca", repr(digits), expected, "Camber needs a position: the second digit is 0")])
-        shape = naca4(m, p or 0.4, t, n, te_gap)
+        shape = naca4(m, p or 0.4, t, n)
         return Airfoil(f"naca{code}", shape.x, shape.y)
     line, kind, cl = int(code[1]), int(code[2]), 0.15 * int(code[0])
     if cl == 0 or kind > 1 or line not in (_FIVE, _REFLEX)[kind]:
@@ -257,14 +238,12 @@ def naca(digits: str, n: int = 161, te_gap: float | None = None) -> Airfoil:
         mean = k * (x - r) ** 3 - k21 * (1 - r) ** 3 * x - r**3 * x + r**3
         slope = 3 * k * (x - r) ** 2 - k21 * (1 - r) ** 3 - r**3
     scale = k1 / 6 * cl / 0.3
-    return _from_lines(f"naca{code}", x, scale * mean, scale * slope, _naca_half(x, t, te_gap))
+    return _from_lines(f"naca{code}", x, scale * mean, scale * slope, _naca_half(x, t, None))
 
 
 def plate(camber: float, thickness: float, n: int = 161) -> Airfoil:
     """Make a flat or circular-arc plate of constant thickness with rounded edges.
 
-    Examples
-    --------
     >>> section = plate(0.05, 0.02)
     >>> round(section.camber, 3), round(section.thickness, 3), section.te_gap
     (0.05, 0.02, 0.0)
@@ -292,8 +271,6 @@ def plate(camber: float, thickness: float, n: int = 161) -> Airfoil:
 def blend(a: Airfoil, b: Airfoil, w: float) -> Airfoil:
     """Blend two sections linearly, side by side at equal chord fractions.
 
-    Examples
-    --------
     >>> round(blend(naca("0010"), naca("0020"), 0.5).thickness, 4)
     0.15
     """

@@ -40,8 +40,6 @@ def _numbers(text: str, faults: Faults) -> tuple[str, list[tuple[int, float, flo
 def parse_dat(text: str, name: str = "") -> Airfoil:
     r"""Read a section file in Selig or Lednicer form.
 
-    Examples
-    --------
     >>> from geometry.airfoil import naca
     >>> section = naca("2412")
     >>> text = "my section" + "".join(f"\n{x:.6f} {y:.6f}" for x, y in zip(section.x, section.y))

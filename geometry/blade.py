@@ -34,54 +34,29 @@ class Stations(NamedTuple):
 class Blade:
     """One blade; arrays are read-only, lengths in metres, angles in radians.
 
-    Parameters
-    ----------
-    r : (N,) float
-        Station radii, strictly ascending, N >= 2, between 0 and R. [m]
-    chord : (N,) float
-        Chord, positive. [m]
-    beta : (N,) float
-        Blade angle of the chord line. [rad]
-    R, Rhub : float
-        Tip and hub radius, 0 <= Rhub < R. The stations need not reach either: values are held outside them. [m]
-    anchors : tuple of (float, Airfoil)
-        Sections at ascending r/R; between them the section is blended linearly in r/R, outside them held. Empty when
-        the sections are not known.
-    sweep : (N,) float or None
-        Offset of the pitch axis in the plane of rotation, positive towards the trailing edge. [m]
-    rake : (N,) float or None
-        Offset of the pitch axis along the shaft, positive downstream. [m]
-    axis : float
-        Chord fraction that lies on the pitch axis and that beta turns about. [-]
-    interpolation : {"pchip", "linear"}
-        How chord, beta, sweep and rake run between stations.
-    name : str
-        For people.
+    Raises GeometryError: with all faults at once.
 
-    Raises
-    ------
-    GeometryError
-        With all faults at once.
-
-    Examples
-    --------
     >>> from geometry.laws import helix
     >>> blade = helix(0.2032, 0.127)
     >>> round(blade.pitch_m(), 4)
     0.127
     """
 
-    r: Array
-    chord: Array
-    beta: Array
+    r: Array  # (N,) station radii, strictly ascending, N >= 2, between 0 and R [m]
+    chord: Array  # (N,) chord, positive [m]
+    beta: Array  # (N,) blade angle of the chord line [rad]
+    # Tip and hub radius, 0 <= Rhub < R. The stations need not reach either: values are held outside them [m]
     R: float
     Rhub: float
+    # Sections at ascending r/R; between them the section is blended linearly in r/R, outside them held. Empty when the
+    # sections are not known.
     anchors: tuple[tuple[float, Airfoil], ...] = ()
+    # (N,) offset of the pitch axis in the plane of rotation, positive towards the trailing edge [m]
     sweep: Array | None = None
-    rake: Array | None = None
-    axis: float = 0.25
-    interpolation: str = "pchip"
-    name: str = ""
+    rake: Array | None = None  # (N,) offset of the pitch axis along the shaft, positive downstream [m]
+    axis: float = 0.25  # Chord fraction that lies on the pitch axis and that beta turns about [-]
+    interpolation: str = "pchip"  # How chord, beta, sweep and rake run between stations
+    name: str = ""  # For people
     _columns: Array = field(init=False, repr=False)
     _slopes: Array = field(init=False, repr=False)
 
@@ -127,13 +102,9 @@ class Blade:
     def midpoints(self, n: int, spacing: str = "uniform") -> Stations:
         """Cut the blade into n elements between Rhub and R: what the solver consumes. [m, rad]
 
-        Notes
-        -----
         ``dr.sum() == R - Rhub`` exactly and in any order of summation: the widths are whole multiples of the rounding
         unit of R - Rhub.
 
-        Examples
-        --------
         >>> from geometry.laws import helix
         >>> st = helix(0.2032, 0.127).midpoints(40, "cosine")
         >>> bool(st.dr.sum() == 0.1016 - 0.15 * 0.1016)
@@ -190,8 +161,6 @@ class Blade:
     def section_curve(self, r: float, n: int | None = None) -> Array:
         """Return the true section outline at a radius: chord, blade angle, sweep and rake applied. [m]
 
-        Notes
-        -----
         The planar outline; a solid modeller places it on the plane, or wraps it on the cylinder, of radius r.
         """
         section = self.section(r)
@@ -289,8 +258,6 @@ def from_stations(
 ) -> Blade:
     """Make a blade from tabulated stations.
 
-    Examples
-    --------
     >>> from_stations([0.02, 0.1], [0.01, -0.01], [20.0, 10.0], 0.1, 0.01)
     Traceback (most recent call last):
         ...

@@ -29,18 +29,11 @@ _POINTS = 45
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """CAD solids of a rotor and its duct.
+    """CAD solids of a rotor and its duct."""
 
-    Parameters
-    ----------
-    solids : tuple of (str, str, object)
-        Surface name (blade, hub, duct, stator), name of the part (blade_1 and so on), cadquery solid in millimetres.
-    volumes : dict of str to float
-        Volume by surface name. [m^3]
-    """
-
+    # Surface name (blade, hub, duct, stator), name of the part (blade_1 and so on), cadquery solid in millimetres
     solids: tuple[tuple[str, str, Any], ...]
-    volumes: dict[str, float] = field(default_factory=dict)
+    volumes: dict[str, float] = field(default_factory=dict)  # Volume by surface name [m^3]
 
     @property
     def rotor_volume(self) -> float:
@@ -51,8 +44,6 @@ class Parts:
 def planar_sections(rotor: Rotor, options: Options | None = None) -> list[tuple[float, Array]]:
     """Cut the wrapped blade by planes across its pitch axis. [m]
 
-    Notes
-    -----
     A point with arc t(rho) lies at x = rho cos(t/rho), y = rho sin(t/rho); x grows with rho while the arc stays below a
     quarter turn, so that the radius is found by interpolation on a fine table of radii.
     """
@@ -292,8 +283,6 @@ def assembly(parts: Parts, name: str) -> Any:
 def tessellate(shape: Any, tolerance: float, angle: float = 0.1) -> Mesh:
     """Mesh CAD solids; each stays a body of its own. [m]
 
-    Notes
-    -----
     Older triangles are removed first: without that the CAD kernel returns them, whatever the tolerance.
     """
     cq = needs("cadquery", "cad")

@@ -56,8 +56,6 @@ def needs(module: str, extra: str) -> Any:
 class Faults:
     """Collects faults, then raises them together.
 
-    Examples
-    --------
     >>> faults = Faults()
     >>> faults.number("gap", -1.0, 0.0, 1.0, "m")
     >>> faults.found
@@ -114,18 +112,12 @@ def pchip_slopes(x: Array, y: Array) -> Array:
 def pchip(x: Array, y: Array, xq: ArrayLike, slopes: Array | None = None) -> Array:
     """Interpolate monotone-preserving (PCHIP), clamped to the end values outside the data.
 
-    Notes
-    -----
     Weighted harmonic mean slopes, one-sided three-point ends: what ``scipy.interpolate.PchipInterpolator`` does,
     without its half-second import. Overshoots nowhere; second order at data extrema, third order elsewhere.
 
-    References
-    ----------
     F. N. Fritsch and J. Butland, A method for constructing local monotone piecewise cubic interpolants, SIAM J. Sci.
     Stat. Comput. 5 (1984) 300-304, doi:10.1137/0905021 (slope formula; not checked against the paper).
 
-    Examples
-    --------
     >>> pchip(np.array([0.0, 1.0, 2.0]), np.array([0.0, 1.0, 1.0]), [-1.0, 0.5, 1.5, 9.0]).tolist()
     [0.0, 0.6875, 1.0, 1.0]
     """

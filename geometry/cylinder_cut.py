@@ -19,8 +19,6 @@ Faces = NDArray[np.int64]
 def loops(points: Array, faces: Faces, r: float) -> tuple[list[Array], int]:
     """Cut a mesh by the cylinder of radius r round the z axis.
 
-    Notes
-    -----
     Every edge is met exactly; lines are joined by the edges that faces share, not by nearness.
     """
     square = points[:, 0] ** 2 + points[:, 1] ** 2

@@ -13,8 +13,6 @@ __all__ = ["parse_designation"]
 def parse_designation(text: str) -> tuple[float, float, int | None]:
     """Read a propeller designation: diameter x pitch in inches, with an optional blade count.
 
-    Examples
-    --------
     >>> parse_designation("10x4.7"), parse_designation("8x5x3")
     ((10.0, 4.7, None), (8.0, 5.0, 3))
     >>> parse_designation("10x47")

@@ -22,30 +22,15 @@ __all__ = ["Duct", "Stator", "around"]
 class Stator:
     """A row of straight vanes behind the rotor.
 
-    Parameters
-    ----------
-    B : int
-        Number of vanes.
-    chord : float
-        Vane chord, the same from hub to wall. [m]
-    x : float or None
-        Axial position of the leading edges behind the lip; None is unknown. [m]
-    beta : float
-        Vane angle from the plane of rotation to the chord line; pi/2 is axial. [rad]
-    section : Airfoil or None
-        Vane section; None is unknown.
-
-    Examples
-    --------
     >>> round(float(Stator(5, 0.02).sigma(0.025)), 3)
     0.637
     """
 
-    B: int
-    chord: float
-    x: float | None = None
-    beta: float = math.pi / 2
-    section: Airfoil | None = None
+    B: int  # Number of vanes
+    chord: float  # Vane chord, the same from hub to wall [m]
+    x: float | None = None  # Axial position of the leading edges behind the lip; None is unknown [m]
+    beta: float = math.pi / 2  # Vane angle from the plane of rotation to the chord line; pi/2 is axial [rad]
+    section: Airfoil | None = None  # Vane section; None is unknown
 
     def __post_init__(self) -> None:
         faults = Faults()
@@ -68,57 +53,28 @@ class Stator:
 class Duct:
     """A duct of revolution: elliptic lip, straight bore past the rotor, diffuser or nozzle to the exit.
 
-    Parameters
-    ----------
-    inner_radius : float
-        Bore radius at the rotor: tip radius plus gap. [m]
-    length : float
-        Axial length from lip to exit. [m]
-    lip_radius : float
-        Radial half thickness of the lip: the bore widens by this much to the leading edge; 0 is a flat face. [m]
-    gap : float
-        Tip clearance, radial. [m]
-    exit_radius : float or None
-        Inner radius at the exit; None is the bore's. [m]
-    exit_hub_radius : float
-        Radius of the body in the exit plane (motor or tail cone); 0 is an open exit. [m]
-    rotor_x : float or None
-        Axial position of the blades' pitch axis behind the lip; None is a third of the length. [m]
-    stator : Stator or None
-        Vanes behind the rotor.
-    lip_aspect : float
-        Axial over radial half axis of the lip's ellipse, 0.2 to 10. [-]
-    diffuser_x : float or None
-        Where the bore ends; None is a quarter of the way from rotor to exit. [m]
-    te_thickness : float or None
-        Least wall thickness and the thickness at the exit; None is 2 % of the bore radius. [m]
-    name : str
-        For people.
+    Raises GeometryError: with all faults at once.
 
-    Raises
-    ------
-    GeometryError
-        With all faults at once.
-
-    Examples
-    --------
     >>> duct = Duct(0.0349, 0.060, 0.003, 0.0004, exit_radius=0.033, exit_hub_radius=0.010)
     >>> round(duct.exit_area * 1e4, 2)
     31.07
     """
 
-    inner_radius: float
-    length: float
+    inner_radius: float  # Bore radius at the rotor: tip radius plus gap [m]
+    length: float  # Axial length from lip to exit [m]
+    # Radial half thickness of the lip: the bore widens by this much to the leading edge; 0 is a flat face [m]
     lip_radius: float = 0.0
-    gap: float = 0.0
-    exit_radius: float | None = None
-    exit_hub_radius: float = 0.0
+    gap: float = 0.0  # Tip clearance, radial [m]
+    exit_radius: float | None = None  # Inner radius at the exit; None is the bore's [m]
+    exit_hub_radius: float = 0.0  # Radius of the body in the exit plane (motor or tail cone); 0 is an open exit [m]
+    # Axial position of the blades' pitch axis behind the lip; None is a third of the length [m]
     rotor_x: float | None = None
-    stator: Stator | None = None
-    lip_aspect: float = 1.0
-    diffuser_x: float | None = None
+    stator: Stator | None = None  # Vanes behind the rotor
+    lip_aspect: float = 1.0  # Axial over radial half axis of the lip's ellipse, 0.2 to 10 [-]
+    diffuser_x: float | None = None  # Where the bore ends; None is a quarter of the way from rotor to exit [m]
+    # Least wall thickness and the thickness at the exit; None is 2 % of the bore radius [m]
     te_thickness: float | None = None
-    name: str = ""
+    name: str = ""  # For people
 
     def __post_init__(self) -> None:
         faults, ri, length = Faults(), self.inner_radius, self.length
@@ -256,8 +212,6 @@ def around(rotor: Rotor, length: float, gap: float, lip_radius: float = 0.0, *, 
            name: str = "") -> Duct:  # fmt: skip
     """Fit a duct round a rotor.
 
-    Examples
-    --------
     >>> from geometry.laws import helix
     >>> rotor = Rotor(helix(0.069, 0.1, "fan", hub=0.368), 8)
     >>> round(around(rotor, 0.06, 0.0004, exit_area_ratio=0.9).area_ratio(rotor), 6)

@@ -133,8 +133,6 @@ def _arguments(kind: str, laws: Mapping[str, Law], name: str, given: Mapping[str
 def chord_over_R(law: str, x: ArrayLike, hub: float = 0.15, **parameters: float | None) -> Array:
     """Evaluate a chord law. [-]
 
-    Examples
-    --------
     >>> chord_over_R("apc_like", [0.15, 0.4, 0.75, 1.0]).round(2).tolist()
     [0.13, 0.19, 0.13, 0.04]
     """
@@ -158,8 +156,6 @@ def from_laws(
 ) -> Blade:
     """Make a blade from a chord law and a pitch law.
 
-    Examples
-    --------
     >>> blade = from_laws(2.286, "constant", "constant_beta", 0.1, chord={"max_chord": 1 / 6}, pitch={"beta": 0.1396})
     >>> round(float(blade.chord[0]), 4), round(float(blade.beta[-1]), 4)
     (0.1905, 0.1396)
@@ -197,8 +193,6 @@ def helix(
 ) -> Blade:
     """Make a constant-pitch blade: beta = atan(pitch / (2 pi r)).
 
-    Examples
-    --------
     >>> blade = helix(8 * 0.0254, 5 * 0.0254)
     >>> round(math.degrees(blade.at(0.75 * blade.R)[1]), 2)
     14.86

@@ -40,20 +40,11 @@ VOLUME_TOLERANCE = 5e-3
 
 @dataclass(frozen=True, eq=False)
 class MeshModel:
-    """Everything that is exported: the turning solid and the standing one.
+    """Everything that is exported: the turning solid and the standing one."""
 
-    Parameters
-    ----------
-    rotor : Mesh
-        Blades and hub.
-    duct : Mesh or None
-        Duct and stator.
-    checks : mapping of str to float
-        What was measured on the meshes, lengths in metres, volumes in cubic metres.
-    """
-
-    rotor: Mesh
-    duct: Mesh | None = None
+    rotor: Mesh  # Blades and hub
+    duct: Mesh | None = None  # Duct and stator
+    # What was measured on the meshes, lengths in metres, volumes in cubic metres
     checks: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -102,8 +93,6 @@ def _area(curve: Array) -> float:
 def radii(blade: Blade, options: Options | None = None) -> Array:
     """Choose the radii of the rings so that straight lines between them keep chord and blade angle, (N,) [m].
 
-    Examples
-    --------
     >>> from geometry.laws import helix
     >>> ring = radii(helix(0.2032, 0.127))
     >>> bool(ring[0] == 0.15 * 0.1016), bool(ring[-1] == 0.1016), 20 < len(ring) < 100
@@ -263,8 +252,6 @@ def _integral(blade: Blade, ring: Array, options: Options) -> float:
 def build(rotor: Rotor, duct: Duct | None = None, options: Options | None = None) -> MeshModel:
     """Mesh a rotor and its duct and check how they fit.
 
-    Examples
-    --------
     >>> from geometry.airfoil import naca
     >>> from geometry.laws import helix
     >>> model = build(Rotor(helix(0.2032, 0.127, anchors=naca("4412")), 2), options=Options(n=41))

@@ -106,8 +106,6 @@ def centre_body(duct: Duct, plan: StatorPlan, n: int = 33) -> Array:
 def duct_mesh(duct: Duct, plan: StatorPlan | None, options: Options | None = None) -> tuple[Mesh, float]:
     """Mesh the duct, with vanes and centre body when there is a stator.
 
-    Examples
-    --------
     >>> mesh, volume = duct_mesh(Duct(0.035, 0.06, 0.004, 0.0004), None)
     >>> mesh.names, abs(mesh.volume / volume - 1) < 1e-4
     (('duct',), True)

@@ -49,46 +49,23 @@ COARSE = Options(n=61, tolerance=2e-3, segments=96)
 
 @dataclass(frozen=True, eq=False)
 class Layer:
-    """One surface of a picture.
+    """One surface of a picture."""
 
-    Parameters
-    ----------
-    vertices : (N, 3) float
-        Corners. [m]
-    faces : (M, 3) int
-        Triangles.
-    colour : str
-        ``#rrggbb``.
-    cut : tuple of float or None
-        The half-space on this side of the origin is cut away and the cut is closed; a normal. [-]
-    """
-
-    vertices: Array
-    faces: Faces
-    colour: str
+    vertices: Array  # (N, 3) corners [m]
+    faces: Faces  # (M, 3) triangles
+    colour: str  # ``#rrggbb``
+    # The half-space on this side of the origin is cut away and the cut is closed; a normal [-]
     cut: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Surfaces and how they are looked at, in parallel projection.
+    """Surfaces and how they are looked at, in parallel projection."""
 
-    Parameters
-    ----------
-    layers : tuple of Layer
-        Surfaces.
-    eye : tuple of float
-        Direction from the middle of the scene to the eye. [-]
-    up : tuple of float
-        Direction that points up in the picture. [-]
-    size : tuple of int
-        Width and height in pixels.
-    """
-
-    layers: tuple[Layer, ...]
-    eye: tuple[float, float, float]
-    up: tuple[float, float, float]
-    size: tuple[int, int] = (640, 480)
+    layers: tuple[Layer, ...]  # Surfaces
+    eye: tuple[float, float, float]  # Direction from the middle of the scene to the eye [-]
+    up: tuple[float, float, float]  # Direction that points up in the picture [-]
+    size: tuple[int, int] = (640, 480)  # Width and height in pixels
 
 
 def _fineness(options: Options | None) -> Options:
@@ -105,8 +82,6 @@ def _layers(mesh: Mesh, colours: Mapping[str, str], cut: tuple[float, float, flo
 def rotor_scene(rotor: Rotor, options: Options | None = None) -> Scene:
     """Show a rotor from the front and a little from the side.
 
-    Examples
-    --------
     >>> from geometry.airfoil import naca
     >>> from geometry.laws import helix
     >>> len(rotor_scene(Rotor(helix(0.2032, 0.127, anchors=naca("4412")), 2)).layers)
@@ -157,8 +132,6 @@ def pressure_picture(
 ) -> None:
     """Draw the pressure on the blades of an OpenFOAM result, from the front and from behind.
 
-    Notes
-    -----
     Colours show pressure less that of the largest cell, which lies in the far field; 2 % of the area at either end of
     the scale are clipped. Whether `p` is kinematic is read from its dimensions in the file.
     """

@@ -43,8 +43,6 @@ PUBLISHED = ("sda1075", "clark_y")
 def published(name: str) -> Airfoil:
     """Make a published section.
 
-    Examples
-    --------
     >>> for name in PUBLISHED:
     ...     print(name, round(published(name).thickness, 3), round(published(name).camber, 3))
     sda1075 0.12 0.02
@@ -76,8 +74,6 @@ def _on_chord(x: Array, y: Array, nose: Array, tail: Array) -> tuple[Array, Arra
 def thickened(section: Airfoil, thickness: float) -> Airfoil:
     """Scale the ordinates of a section to a thickness; its camber goes along.
 
-    Examples
-    --------
     >>> thin = thickened(published("clark_y"), 0.0585)
     >>> round(thin.thickness, 4), round(thin.camber / published("clark_y").camber, 4)
     (0.0585, 0.5)

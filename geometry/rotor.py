@@ -18,40 +18,22 @@ __all__ = ["Rotor"]
 class Rotor:
     """A rotor of equal blades.
 
-    Parameters
-    ----------
-    blade : Blade
-        One blade.
-    B : int
-        Number of blades, 1 to 100.
-    rotation : {+1, -1}
-        +1 is a right-hand propeller: clockwise seen from behind, right-handed about the direction of thrust.
-    name : str
-        For people.
-    hub_length : float or None
-        Axial length of the hub cylinder, centred on the blades; None takes the axial extent of the root section. [m]
-    spinner_length : float
-        Length of the nose ahead of the hub, a half ellipsoid; 0 is a flat hub face. [m]
+    Raises GeometryError: with all faults at once.
 
-    Raises
-    ------
-    GeometryError
-        With all faults at once.
-
-    Examples
-    --------
     >>> from geometry.laws import helix
     >>> rotor = Rotor(helix(0.2032, 0.127), 2)
     >>> rotor.D, round(rotor.solidity, 3)
     (0.2032, 0.079)
     """
 
-    blade: Blade
-    B: int
+    blade: Blade  # One blade
+    B: int  # Number of blades, 1 to 100
+    # +1 is a right-hand propeller: clockwise seen from behind, right-handed about the direction of thrust
     rotation: int = 1
-    name: str = ""
+    name: str = ""  # For people
+    # Axial length of the hub cylinder, centred on the blades; None takes the axial extent of the root section [m]
     hub_length: float | None = None
-    spinner_length: float = 0.0
+    spinner_length: float = 0.0  # Length of the nose ahead of the hub, a half ellipsoid; 0 is a flat hub face [m]
 
     def __post_init__(self) -> None:
         faults = Faults()

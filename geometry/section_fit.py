@@ -106,8 +106,6 @@ def _refine(loop: Array, nose: Array, tail: Array) -> tuple[Array, Array]:
 def fit_section(loop: Array, n: int = 121) -> Cut | None:
     """Measure a section.
 
-    Examples
-    --------
     >>> from geometry.airfoil import naca
     >>> s = naca("4412")
     >>> cut = fit_section(0.1 * np.stack([-s.x, s.y], axis=1))

@@ -8,7 +8,6 @@ length, blades joined to the hub or only touching it, a duct beside them or not.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,47 +26,26 @@ Faces = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class FoundRotor:
-    """A rotor found in a mesh; lengths in the mesh's own unit, angles in radians.
+    """A rotor found in a mesh; lengths in the mesh's own unit, angles in radians."""
 
-    Parameters
-    ----------
-    B : int
-        Blades.
-    rotation : int
-        +1 turns right-handed about the direction of thrust, -1 left-handed.
-    R, Rhub : float
-        Tip radius, and the radius below which the blades are no longer free. [unit of the mesh]
-    origin : (3,) float
-        A point on the shaft. [unit of the mesh]
-    axis : (3,) float
-        Unit vector in the direction of thrust. [-]
-    r, chord, beta : (N,) float
-        Stations: radius and chord [unit of the mesh], blade angle [rad].
-    thickness, camber, camber_position : (N,) float
-        Over the chord. [-]
-    sections : tuple of Airfoil
-        The section of every station.
-    spread : float
-        How far the blades differ from each other, relative. [-]
-    notes : tuple of str
-        What a user has to know: parts left out, doubts.
-    """
-
-    B: int
-    rotation: int
+    B: int  # Blades
+    rotation: int  # +1 turns right-handed about the direction of thrust, -1 left-handed
+    # Tip radius, and the radius below which the blades are no longer free [unit of the mesh]
     R: float
     Rhub: float
-    origin: Array
-    axis: Array
+    origin: Array  # (3,) a point on the shaft [unit of the mesh]
+    axis: Array  # (3,) unit vector in the direction of thrust [-]
+    # (N,) stations: radius and chord [unit of the mesh], blade angle [rad]
     r: Array
     chord: Array
     beta: Array
+    # (N,) over the chord [-]
     thickness: Array
     camber: Array
     camber_position: Array
-    sections: tuple[Airfoil, ...]
-    spread: float
-    notes: tuple[str, ...] = ()
+    sections: tuple[Airfoil, ...]  # The section of every station
+    spread: float  # How far the blades differ from each other, relative [-]
+    notes: tuple[str, ...] = ()  # What a user has to know: parts left out, doubts
 
 
 def _hub(points: Array, faces: Faces, tip: float, count: int) -> float:
@@ -91,12 +69,10 @@ def _hub(points: Array, faces: Faces, tip: float, count: int) -> float:
 
 
 def find_rotor(
-    vertices: Array, faces: Faces, stations: int = 28, at: Sequence[float] | None = None, n: int = 121
+    vertices: Array, faces: Faces, stations: int = 28
 ) -> FoundRotor:
     """Find the rotor in a mesh and cut its blades.
 
-    Notes
-    -----
     The shaft is the principal direction of inertia about which the cuts of all blades are alike to third moments. The
     leading edge is the thicker end of the section, and the direction of thrust the one towards which it is tilted.
     """
@@ -105,11 +81,9 @@ def find_rotor(
     used = np.unique(chosen)
     tip = float(np.hypot(local[used, 0], local[used, 1]).max())
     hub = _hub(local, chosen, tip, count)
-    if at is None:
-        s = 0.5 * (1 - np.cos(np.linspace(0.0, np.pi, stations)))
-        lowest = hub + 0.01 * (tip - hub)
-        at = ((lowest + (0.992 * tip - lowest) * (0.5 * s + 0.5 * np.linspace(0, 1, stations))) / tip).tolist()
-    assert at is not None
+    s = 0.5 * (1 - np.cos(np.linspace(0.0, np.pi, stations)))
+    lowest = hub + 0.01 * (tip - hub)
+    at = (lowest + (0.992 * tip - lowest) * (0.5 * s + 0.5 * np.linspace(0, 1, stations))) / tip
     sign, rotation, doubt = _sense(local, chosen, tip, hub, count)
     if doubt:
         notes.append(doubt)
@@ -119,7 +93,7 @@ def find_rotor(
         found = blades(local, chosen, float(x) * tip)
         if found is None or len(found) != count:
             continue
-        cuts = [fit_section(loop * [sign * rotation, sign], n) for loop in found]
+        cuts = [fit_section(loop * [sign * rotation, sign], 121) for loop in found]
         whole = [cut for cut in cuts if cut is not None]
         if whole:
             r.append(float(x) * tip)

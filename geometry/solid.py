@@ -24,30 +24,16 @@ Faces = NDArray[np.int64]
 class Options:
     """How fine a solid is made, and what it must keep.
 
-    Parameters
-    ----------
-    n : int
-        Points of a section, odd, 21 or more.
-    tolerance : float
-        Greatest error of chord and blade angle between two rings, of their value; 2e-3 or less keeps the promise. [-]
-    segments : int
-        Facets round hub and duct, at least.
-    fillet : float
-        Radius of the fillet between blade and hub; 0 is none. [m]
-    min_thickness : float
-        Smallest section thickness that is let pass; 0 lets all pass. [m]
-
-    Examples
-    --------
     >>> Options(n=61).tolerance
     0.0004
     """
 
-    n: int = 101
+    n: int = 101  # Points of a section, odd, 21 or more
+    # Greatest error of chord and blade angle between two rings, of their value; 2e-3 or less keeps the promise [-]
     tolerance: float = 4e-4
-    segments: int = 240
-    fillet: float = 0.0
-    min_thickness: float = 0.0
+    segments: int = 240  # Facets round hub and duct, at least
+    fillet: float = 0.0  # Radius of the fillet between blade and hub; 0 is none [m]
+    min_thickness: float = 0.0  # Smallest section thickness that is let pass; 0 lets all pass [m]
 
     def __post_init__(self) -> None:
         faults = Faults()
@@ -62,24 +48,12 @@ class Options:
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A closed triangle mesh whose faces carry names.
+    """A closed triangle mesh whose faces carry names."""
 
-    Parameters
-    ----------
-    vertices : (N, 3) float
-        Corners. [m]
-    faces : (M, 3) int
-        Corners of each face, counter-clockwise seen from outside.
-    group : (M,) int
-        Index into `names` of each face.
-    names : tuple of str
-        Surfaces: blade, hub, duct, stator.
-    """
-
-    vertices: Array
-    faces: Faces
-    group: NDArray[np.int64]
-    names: tuple[str, ...]
+    vertices: Array  # (N, 3) corners [m]
+    faces: Faces  # (M, 3) corners of each face, counter-clockwise seen from outside
+    group: NDArray[np.int64]  # (M,) index into `names` of each face
+    names: tuple[str, ...]  # Surfaces: blade, hub, duct, stator
 
     @property
     def volume(self) -> float:
@@ -104,23 +78,22 @@ class Mesh:
         return trimesh.Trimesh(self.vertices, self.faces, process=False)
 
 
-def skin(points: Array, closed_ends: bool = True) -> tuple[Array, Faces]:
+def skin(points: Array) -> tuple[Array, Faces]:
     """Mesh rings of one topology, with caps at both ends; the result is oriented outwards."""
     rows, m = points.shape[:2]
     index = np.arange(rows * m).reshape(rows, m)
     a, b = index[:-1], index[1:]
     a1, b1 = np.roll(a, -1, axis=1), np.roll(b, -1, axis=1)
     faces = [np.stack([a, a1, b1], -1).reshape(-1, 3), np.stack([a, b1, b], -1).reshape(-1, 3)]
-    if closed_ends:
-        k = np.arange((m + 1) // 2)  # pairs k and -1-k; an even m is a sharp edge, whose pair is itself
-        last = (m - 1 - k) if m % 2 else (m - k) % m
-        cap = []
-        for i in range(len(k) - 1):
-            cap += [(k[i], last[i + 1], k[i + 1]), (k[i], last[i], last[i + 1])]
-        if m % 2 == 0:
-            cap.append((k[-1], last[-1], m // 2))
-        strip = np.array([t for t in cap if len(set(t)) == 3])
-        faces += [index[0][strip], index[-1][strip[:, ::-1]]]
+    k = np.arange((m + 1) // 2)  # pairs k and -1-k; an even m is a sharp edge, whose pair is itself
+    last = (m - 1 - k) if m % 2 else (m - k) % m
+    cap = []
+    for i in range(len(k) - 1):
+        cap += [(k[i], last[i + 1], k[i + 1]), (k[i], last[i], last[i + 1])]
+    if m % 2 == 0:
+        cap.append((k[-1], last[-1], m // 2))
+    strip = np.array([t for t in cap if len(set(t)) == 3])
+    faces += [index[0][strip], index[-1][strip[:, ::-1]]]
     vertices, out = points.reshape(-1, 3), np.concatenate(faces)
     if Mesh(vertices, out, np.zeros(len(out), np.int64), ("",)).volume < 0:
         out = out[:, ::-1]
@@ -157,8 +130,6 @@ def revolve(profile: Array, segments: int) -> tuple[Array, Faces]:
 def profile_volume(profile: Array) -> float:
     """Exact volume of revolution of a closed profile, a sum of cone frusta. [m^3]
 
-    Examples
-    --------
     >>> round(profile_volume(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 2.0], [0.0, 2.0]])) / math.pi, 9)
     2.0
     """

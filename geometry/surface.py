@@ -24,21 +24,11 @@ TURN = 61
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """A grid of points, repeated round the z axis.
+    """A grid of points, repeated round the z axis."""
 
-    Parameters
-    ----------
-    name : str
-        ``blade``, ``hub``, ``duct`` or ``stator``.
-    points : (rows, columns, 3) float
-        Neighbours in the grid are neighbours on the surface. [m]
-    copies : int
-        How often it stands round the axis, evenly.
-    """
-
-    name: str
-    points: Array
-    copies: int = 1
+    name: str  # ``blade``, ``hub``, ``duct`` or ``stator``
+    points: Array  # Neighbours in the grid are neighbours on the surface [m]
+    copies: int = 1  # How often it stands round the axis, evenly
 
 
 def _turned(name: str, profile: Array, start: float = 0.0, end: float = 2 * math.pi) -> Surface:
@@ -68,8 +58,6 @@ def _capped(rows: Array) -> Array:
 def surfaces(rotor: Rotor, duct: Duct | None = None) -> list[Surface]:
     """Give the surfaces of blades and hub, and of a duct cut open on the side of -y, with its vanes.
 
-    Examples
-    --------
     >>> from geometry.airfoil import naca
     >>> from geometry.laws import helix
     >>> found = surfaces(Rotor(helix(0.2032, 0.127, anchors=naca("4412")), 2))
@@ -92,12 +80,13 @@ def surfaces(rotor: Rotor, duct: Duct | None = None) -> list[Surface]:
         return found
     wall = duct_profile(duct, 33)
     wall = _split(np.vstack([wall, wall[:1]]), step)
-    cut = [np.stack([r * np.cos(a), r * np.sin(a), z], axis=-1)
-           for r, z, a in ((*wall.T, 0.0), (*wall.T, np.pi))]  # fmt: skip
+    cut = [np.stack([r * np.cos(a), r * np.sin(a), z], axis=-1) for r, z, a in ((*wall.T, 0.0), (*wall.T, np.pi))]
     found.append(_turned("duct", wall, 0.0, math.pi))
     found += [Surface("cut", np.stack([edge, edge[::-1]])) for edge in cut]
     plan = plan_stator(duct, float(hub[:, 1].min()), rotor.Rhub)
     if plan is not None:
-        found += [Surface("stator", _capped(_split(vane_rows(duct, plan, COARSE), step)), plan.stator.B),
-                  _turned("stator", _split(centre_body(duct, plan), step))]  # fmt: skip
+        found += [
+            Surface("stator", _capped(_split(vane_rows(duct, plan, COARSE), step)), plan.stator.B),
+            _turned("stator", _split(centre_body(duct, plan), step)),
+        ]
     return found

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from bemt.base.errors import InputError
 from bemt.commands.cli import main
-from bemt.compare.scaling import LAWS
+from bemt.compare.scaling_laws import LAWS
 from bemt.diagnose.contrast import compare
 from bemt.effects import catalogue
 

@@ -122,7 +122,7 @@ def test_an_unknown_effect_is_in_the_test_not_in_the_reference() -> None:
     problem = build(records, [truth])
     kernels = noise.rivals(problem)
     assert kernels and 0 < problem.free.sum() < problem.free.size
-    for _, K in kernels:
+    for K in (k.covariance for k in kernels):
         assert not K[~problem.free].any() and (np.diag(K)[problem.free] >= 0.0).all() and K[problem.free].any()
 
 

@@ -32,8 +32,8 @@ PACKAGES = ("bemt", "geometry")
 # What users call and plug-ins implement: here every parameter is documented. Elsewhere one line will do, and what a
 # docstring does say must be right.
 FACE = (
-    "bemt|bemt.library.answers|bemt.library.rotors|bemt.dataset.points|bemt.effects.base|bemt.readers|bemt.exports"
-    "|bemt.base.errors"
+    "bemt|bemt.library.answers|bemt.library.rotors|bemt.dataset.make|bemt.dataset.points|bemt.effects.base|bemt.readers"
+    "|bemt.exports|bemt.base.errors"
 )
 # Types of numbers that have a dimension: float, array_like, (N,) float, tuple of float; not counts, masks or records.
 NUMERIC = re.compile(r"^(tuple of )?(\([^()]*\) )*(float|array_like|ndarray)\b(?! of (int|bool|str))")

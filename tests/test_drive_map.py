@@ -17,24 +17,25 @@ from hypothesis import strategies as st
 from bemt import readers as importers
 from bemt.base.errors import InputError
 from bemt.commands.cli import main
+from bemt.dataset import Dataset
 from bemt.drive import bench_map, map_export, map_scatter
-from bemt.drive.map_points import MapPoints, join, points
+from bemt.drive.map_points import join, map_points, points
 
 
-def made(pulse: np.ndarray, volts: np.ndarray | float = 12.0, noise: float = 0.0, seed: int = 0) -> MapPoints:
+def made(pulse: np.ndarray, volts: np.ndarray | float = 12.0, noise: float = 0.0, seed: int = 0) -> Dataset:
     """Steady points of a drive with a dead band, whose thrust goes with the square of the voltage."""
     volts = np.broadcast_to(np.asarray(volts, dtype=float), pulse.shape).copy()
     share = np.clip((pulse - 1080.0) / 920.0, 0.0, None)
     rng = np.random.default_rng(seed)
     thrust = 20.0 * share**1.7 * (volts / 12.0) ** 2 + noise * rng.standard_normal(len(pulse))
     values = {
-        "thrust": thrust,
+        "thrust_N": thrust,
         "rpm": 9000.0 * share**0.85 * volts / 12.0,
-        "current": 30.0 * share**2.4,
-        "power": 30.0 * share**2.4 * volts,
-        "voltage": volts,
+        "current_A": 30.0 * share**2.4,
+        "electrical_power_W": 30.0 * share**2.4 * volts,
+        "voltage_V": volts,
     }
-    return MapPoints(pulse, values, np.ones(len(pulse)), np.zeros(len(pulse), dtype=np.intp))
+    return map_points(pulse, values)
 
 
 LEVELS = np.linspace(1000.0, 2000.0, 21)
@@ -43,7 +44,7 @@ LEVELS = np.linspace(1000.0, 2000.0, 21)
 def test_the_map_is_monotone_and_near_the_truth_between_levels() -> None:
     chart = bench_map.fit(made(LEVELS, noise=0.05))
     pulse = np.linspace(1000.0, 2000.0, 2001)
-    truth = made(pulse).values["thrust"]
+    truth = made(pulse).thrust_N
     for name in chart.curves:
         assert np.all(np.diff(chart.at(name, pulse)) >= 0.0), name
     assert np.max(np.abs(chart.at("thrust", pulse) - truth)) < 0.01 * 20.0
@@ -66,9 +67,7 @@ def test_the_inverse_returns_what_the_map_gives() -> None:
 def test_any_points_give_a_monotone_map(thrust: list[float], smoothness: float) -> None:
     pulse = np.linspace(1000.0, 2000.0, len(thrust))
     base = made(pulse)
-    chart = bench_map.fit(
-        MapPoints(pulse, {**base.values, "thrust": np.array(thrust)}, base.weight, base.run), smoothness
-    )
+    chart = bench_map.fit(map_points(pulse, {**base.values, "thrust_N": np.array(thrust)}), smoothness)
     values = chart.at("thrust", np.linspace(1000.0, 2000.0, 300))
     assert np.all(np.diff(values) >= -1e-9 * max(1.0, *thrust)) and np.all(np.isfinite(values))
 
@@ -79,7 +78,7 @@ def test_two_batteries_make_voltage_a_parameter() -> None:
     assert chart.with_voltage and chart.curves["thrust"].exponent == pytest.approx(2.0, abs=0.02)
     assert chart.curves["rpm"].exponent == pytest.approx(1.0, abs=0.02)
     pulse = float(chart.pulse_for(9.0, 14.0))
-    assert made(np.array([pulse]), 14.0).values["thrust"][0] == pytest.approx(9.0, abs=0.2)
+    assert made(np.array([pulse]), 14.0).thrust_N[0] == pytest.approx(9.0, abs=0.2)
     one = bench_map.fit(made(LEVELS, 12.0 - 0.001 * (LEVELS - 1000.0)))  # sag alone says nothing of another battery
     assert not one.with_voltage
     with pytest.raises(InputError, match="another battery voltage"):
@@ -102,19 +101,19 @@ def test_scatter_of_the_readings_is_told_from_that_of_the_esc() -> None:
     thrust = 2e-7 * rpm**2
     full = thrust.max()
 
-    def points_of(T: np.ndarray) -> MapPoints:
-        empty = np.full(pulse.size, np.nan)
-        values = {"thrust": T, "rpm": rpm, "current": empty, "power": empty, "voltage": empty}
-        return MapPoints(pulse, values, np.ones(pulse.size), np.zeros(pulse.size, int))
+    def points_of(T: np.ndarray) -> Dataset:
+        return map_points(pulse, {"thrust_N": T, "rpm": rpm})
 
     assert bench_map.held_out(points_of(thrust)).rms > 0.02
     assert np.max(np.abs(map_scatter.speed_known(points_of(thrust)))) < 1e-12
     noise = 0.01 * full * rng.standard_normal(pulse.size)
     rms = map_scatter.document(points_of(thrust + noise))["rms_of_full_thrust"]
     assert 0.007 < rms < 0.025  # the level's own reading and its two neighbours'
-    bare = points_of(thrust)
-    bare.values["rpm"][:] = np.nan
-    assert map_scatter.document(bare) == {"points": 0, "worst_of_full_thrust": None, "rms_of_full_thrust": None}
+    assert map_scatter.document(map_points(pulse, {"thrust_N": thrust})) == {
+        "points": 0,
+        "worst_of_full_thrust": None,
+        "rms_of_full_thrust": None,
+    }
 
 
 def log(tmp_path: Path, sign: int = 1, extra: str = "") -> Path:
@@ -124,10 +123,7 @@ def log(tmp_path: Path, sign: int = 1, extra: str = "") -> Path:
         p = made(np.array([pulse]))
         for _ in range(20):
             t += 0.1
-            rows.append(
-                f"{t:.2f},{pulse:.0f},{sign * p.values['thrust'][0]:.4f},12.0,{p.values['current'][0]:.3f},"
-                f"{p.values['rpm'][0]:.0f}"
-            )
+            rows.append(f"{t:.2f},{pulse:.0f},{sign * p.thrust_N[0]:.4f},12.0,{p.current_A[0]:.3f},{p.rpm[0]:.0f}")
     path = tmp_path / "log.csv"
     path.write_text("\n".join(rows) + "\n" + extra)
     return path

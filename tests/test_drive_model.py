@@ -15,7 +15,7 @@ from bemt.base.errors import InputError
 from bemt.commands.cli import main
 from bemt.drive import identify, mission, rotor_table, transient, validation_folder
 from bemt.drive.drive_model import EFFECTS, Battery, Drive, Esc, Motor
-from bemt.drive.map_points import MapPoints
+from bemt.drive.map_points import map_points
 
 FLAT = dict(soc_table=(0.0, 1.0), ocv_V=(3.7, 3.7))
 PULSE = np.linspace(1050.0, 2000.0, 20)
@@ -193,8 +193,8 @@ def test_a_planted_drive_is_found_from_its_thrust_map(ripple: float) -> None:
         esc=Esc(1040.0, 1940.0, braking=math.isinf(ripple), ripple_ohm=ripple),
     )
     s = truth.steady(PULSE)
-    values = {"thrust": s.thrust_N, "rpm": s.rpm, "current": s.battery_A, "power": s.power_W, "voltage": s.voltage_V}
-    points = MapPoints(PULSE, values, np.ones(20), np.zeros(20, dtype=np.intp))
+    recorded = {"thrust_N": s.thrust_N, "rpm": s.rpm, "current_A": s.battery_A, "voltage_V": s.voltage_V}
+    points = map_points(PULSE, recorded)
     fit = identify.fit_map(points, {"kv_rpm_V": 1100.0, "no_load_A": 0.8}, s.torque_Nm)
     assert fit.fitted["pulse_min_us"] == pytest.approx(1040.0, abs=2.0)
     assert fit.fitted["pulse_max_us"] == pytest.approx(1940.0, abs=2.0)

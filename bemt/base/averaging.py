@@ -46,37 +46,18 @@ class Mean(NamedTuple):
 
 @dataclass(frozen=True)
 class Average:
-    """Mean over a part of a history.
+    """Mean over a part of a history."""
 
-    Parameters
-    ----------
-    mean : float or None
-        The mean, in the unit of the values; None when there is none, and `problem` says why.
-    rows : int
-        Rows averaged.
-    revolutions : int
-        Whole revolutions averaged; 0 for a steady run.
-    start, end : float
-        Time span averaged. [s] (rows of a steady run)
-    drift : float or None
-        Change over the span relative to the mean [1]; None when it cannot be told.
-    spread : float or None
-        Largest minus smallest value in the span relative to the mean. [1]
-    per_revolution : tuple of float
-        Mean of each averaged revolution, in time order. [unit of the values]
-    problem : str
-        Why there is no mean, or what makes it doubtful; empty when nothing does.
-    """
-
-    mean: float | None
-    rows: int
-    revolutions: int
+    mean: float | None  # The mean, in the unit of the values; None when there is none, and `problem` says why
+    rows: int  # Rows averaged
+    revolutions: int  # Whole revolutions averaged; 0 for a steady run
+    # Time span averaged. [s] (rows of a steady run)
     start: float
     end: float
-    drift: float | None = None
-    spread: float | None = None
-    per_revolution: tuple[float, ...] = ()
-    problem: str = ""
+    drift: float | None = None  # Change over the span relative to the mean [1]; None when it cannot be told
+    spread: float | None = None  # Largest minus smallest value in the span relative to the mean [1]
+    per_revolution: tuple[float, ...] = ()  # Mean of each averaged revolution, in time order [unit of the values]
+    problem: str = ""  # Why there is no mean, or what makes it doubtful; empty when nothing does
 
 
 def _mean(values: Array, weights: Array) -> float | None:
@@ -104,8 +85,6 @@ def _spread(values: Array, mean: float | None) -> float | None:
 def time_steps(time: ArrayLike) -> Array:
     """Give the time step that each row stands for, (N,) [s].
 
-    Examples
-    --------
     >>> time_steps([0.0, 0.5, 1.0, 3.0]).tolist()
     [0.0, 0.5, 0.5, 2.0]
     """
@@ -119,8 +98,6 @@ def time_steps(time: ArrayLike) -> Array:
 def revolution_average(time: ArrayLike, values: ArrayLike, period: float, revolutions: int | None = None) -> Average:
     """Average over the last whole revolutions, by time.
 
-    Examples
-    --------
     >>> import numpy as np
     >>> t = np.cumsum(np.where(np.arange(900) < 300, 0.004, 0.002))          # the step halves at 1.2 s
     >>> a = revolution_average(t, 5.0 + np.cos(2 * np.pi * t / 0.5) + 0.2 * np.exp(-t / 0.1), period=0.5)
@@ -178,8 +155,6 @@ def revolution_average(time: ArrayLike, values: ArrayLike, period: float, revolu
 def steady_average(values: ArrayLike, share: float = STEADY_SHARE) -> Average:
     """Average over the last part of a run that has no time.
 
-    Examples
-    --------
     >>> import numpy as np
     >>> a = steady_average(1.0 + np.exp(-np.arange(400) / 20.0))
     >>> round(a.mean, 6), a.rows, abs(a.drift) < 1e-5
@@ -208,8 +183,6 @@ def keep_last(clock: ArrayLike, name: str = "step") -> tuple[NDArray[np.intp], t
     on belongs to an abandoned branch and is dropped. A single row out of order is damage, not a restart: it is
     dropped itself.
 
-    Examples
-    --------
     >>> keep_last([1, 2, 3, 4, 3, 4, 5])[0].tolist()
     [0, 1, 4, 5, 6]
     >>> keep_last([1, 2, 30, 4, 5])[0].tolist(), keep_last([11, 12, 3, 14, 15])[0].tolist()
@@ -263,8 +236,6 @@ def _ascending(c: Array, order: NDArray[np.intp], name: str) -> tuple[NDArray[np
 def relation(first: Sequence[ArrayLike], second: Sequence[ArrayLike]) -> str:
     """Tell how the history of a restart file relates to that of the file before it.
 
-    Examples
-    --------
     >>> a = ([1, 2, 3], [0.1, 0.2, 0.3])
     >>> relation(a, ([4, 5], [0.4, 0.5])), relation(a, ([3, 4], [0.3, 0.4])), relation(a, ([1, 2], [0.01, 0.02]))
     ('continues', 'overlaps', 'other clock')

@@ -36,8 +36,6 @@ _watched: list[dict[tuple[str, str], Arrays]] = []
 def cache_dir() -> Path | None:
     """Folder of the disk cache, or None when it is switched off.
 
-    Notes
-    -----
     A home folder that cannot be found counts as switched off.
     """
     named = os.environ.get("BEMT_CACHE")
@@ -55,8 +53,6 @@ def cache_dir() -> Path | None:
 def content_key(*parts: object) -> str:
     """Hash of everything that decides a result.
 
-    Examples
-    --------
     >>> content_key("a", 1.0) == content_key("a", 1.0)
     True
     >>> content_key("a", 1.0) == content_key("a", 1.0 + 1e-15)
@@ -83,12 +79,8 @@ def _plain(value: object) -> object:
 def cached_arrays(kind: str, key: str, make: Callable[[], Arrays]) -> Arrays:
     """Arrays of a cache entry, made and kept when absent.
 
-    Notes
-    -----
     Faults of the disk (no room, no permission, damaged entry) never reach the caller.
 
-    Examples
-    --------
     >>> a = cached_arrays("doctest", content_key("x"), lambda: {"v": np.arange(3.0)})
     >>> a["v"].tolist()
     [0.0, 1.0, 2.0]
@@ -121,8 +113,6 @@ def cached_arrays(kind: str, key: str, make: Callable[[], Arrays]) -> Arrays:
 def used() -> Iterator[dict[tuple[str, str], Arrays]]:
     """Collect the entries that are asked for, so that another process can be given them.
 
-    Examples
-    --------
     >>> with used() as entries:
     ...     _ = cached_arrays("doctest", "0" * 64, lambda: {"v": np.arange(2.0)})
     >>> list(entries) == [("doctest", "0" * 64)]
@@ -140,8 +130,6 @@ def used() -> Iterator[dict[tuple[str, str], Arrays]]:
 def installed_version(package: str) -> str:
     """Version of an installed package, found without importing it.
 
-    Notes
-    -----
     The folder beside the package says it; ``importlib.metadata`` does as well, but takes 15 ms to import.
     """
     spec = find_spec(package)

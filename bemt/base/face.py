@@ -33,22 +33,17 @@ class CallableRoom(ModuleType):
 def as_html(head: str, text: str) -> str:
     """A heading and a text of fixed width, for notebooks.
 
-    Examples
-    --------
     >>> as_html("a < b", "text")
     '<strong>a &lt; b</strong><pre style="line-height:1.35">text</pre>'
     """
     return f'<strong>{html.escape(head)}</strong><pre style="line-height:1.35">{html.escape(text)}</pre>'
 
 
-def table_html(head: str, rows: Mapping[str, str], note: str = "") -> str:
+def table_html(head: str, rows: Mapping[str, str]) -> str:
     """A heading and names with their values, for notebooks.
 
-    Examples
-    --------
     >>> table_html("10x5", {"blades": "2"})
     '<strong>10x5</strong><table class="bemt"><tr><th>blades</th><td>2</td></tr></table>'
     """
     cells = "".join(f"<tr><th>{html.escape(k)}</th><td>{html.escape(v)}</td></tr>" for k, v in rows.items())
-    tail = f"<small>{html.escape(note)}</small>" if note else ""
-    return f'<strong>{html.escape(head)}</strong><table class="bemt">{cells}</table>{tail}'
+    return f'<strong>{html.escape(head)}</strong><table class="bemt">{cells}</table>'

@@ -21,8 +21,6 @@ def data_roots() -> list[Path]:
 def find_data(kind: str) -> Path | None:
     """Folder of one database.
 
-    Examples
-    --------
     >>> find_data("no such database") is None
     True
     """

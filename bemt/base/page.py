@@ -20,30 +20,14 @@ _UNSEEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud8
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell of a table.
+    """A cell of a table."""
 
-    Parameters
-    ----------
-    text : str
-        What is shown.
-    value : float or None
-        What a sort goes by; None sorts last. Given for numbers only.
-    number : bool
-        Whether the cell is a number.
-    badge : str
-        Kind of a coloured word.
-    link : str
-        Id on the page.
-    code : bool
-        Whether it is a name in a file.
-    """
-
-    text: str = ""
-    value: float | None = None
-    number: bool = False
-    badge: str = ""
-    link: str = ""
-    code: bool = False
+    text: str = ""  # What is shown
+    value: float | None = None  # What a sort goes by; None sorts last. Given for numbers only.
+    number: bool = False  # Whether the cell is a number
+    badge: str = ""  # Kind of a coloured word
+    link: str = ""  # Id on the page
+    code: bool = False  # Whether it is a name in a file
 
 
 def num(value: Any, digits: int = 4, signed: bool = False, none: str = "-") -> Cell:
@@ -72,16 +56,15 @@ def _clean(value: Any) -> Any:
 def render(package: str, template: str, scripts: Sequence[str] = (), **values: Any) -> str:
     """Fill a template of a package; the pages of this room are there to extend and import.
 
-    Examples
-    --------
     >>> "&lt;b&gt;" in render("bemt.base", "page.html", title="<b>")
     True
     """
     from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
     loader = ChoiceLoader([PackageLoader(name) for name in dict.fromkeys((package, "bemt.base"))])
-    pages = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True,
-                        lstrip_blocks=True, finalize=_clean)  # fmt: skip
+    pages = Environment(
+        loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, finalize=_clean
+    )
     script = "".join(loader.get_source(pages, name)[0] for name in scripts)
     mark = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     style = loader.get_source(pages, "page.css")[0]

@@ -27,8 +27,6 @@ _POWERS = 10.0 ** np.arange(0, 23)
 def number_text(value: float | None, digits: int = 4, none: str = "-") -> str:
     """Show a number with some significant digits, without exponent where that is short.
 
-    Examples
-    --------
     >>> number_text(24.0851), number_text(0.110419), number_text(123456.0), number_text(None), number_text(0.0)
     ('24.09', '0.1104', '123500', '-', '0')
     """
@@ -46,8 +44,6 @@ def number_text(value: float | None, digits: int = 4, none: str = "-") -> str:
 def plain(value: Any, digits: int = 10) -> Any:
     """Make a value fit for JSON: NaN and infinities become None, floats keep some significant digits.
 
-    Examples
-    --------
     >>> plain({"a": (1, 0.1 + 0.2, float("nan"))})
     {'a': [1, 0.3, None]}
     """
@@ -74,8 +70,6 @@ def text_table(
 ) -> str:
     """Align columns.
 
-    Examples
-    --------
     >>> print(text_table(["source", "T [N]"], [["bemt", "31.2"], ["cfd", "5"]]))
     source  T [N]
     bemt     31.2
@@ -155,8 +149,6 @@ def _value_cells(values: NDArray[np.float64]) -> NDArray[np.uint8]:
 def csv_block(columns: Sequence[NDArray[Any] | tuple[NDArray[np.float64], NDArray[np.intp]]]) -> bytes:
     """Format many rows of numbers as CSV, about ten times faster than a loop.
 
-    Examples
-    --------
     >>> axis = (np.array([5000.0, 20000.0]), np.array([0, 1]))
     >>> print(csv_block([axis, np.array([-1.5, np.nan]), np.array([True, False])]).decode(), end="")
     5000,-1.500000e+00,1

@@ -194,8 +194,6 @@ def limits_of(field: FieldInfo) -> Limits:
 def expected(kind: Any, limits: Limits, name: str = "") -> str:
     """What a value must be, in words.
 
-    Examples
-    --------
     >>> expected(float | None, Limits("mm", 0, 5)), expected(Literal["a", "b"], Limits())
     ('a number from 0 to 5 mm', 'one of a, b')
     """
@@ -238,8 +236,6 @@ class Collector:
 def shown(value: Any) -> str:
     """Show a TOML value shortly, as a user wrote it.
 
-    Examples
-    --------
     >>> shown("eight"), shown(True), shown([1, 2]), shown({"a": 1}), shown(0.5)
     ("'eight'", 'true', 'a list of 2', 'a table', '0.5')
     """
@@ -367,8 +363,6 @@ T = TypeVar("T", bound=Table)
 def validated(model: type[T], document: Mapping[str, Any], out: Collector) -> T | None:
     """Make a typed model of a document; add what is wrong to the collector.
 
-    Examples
-    --------
     >>> class Rotor(Table):
     ...     blades: int = entry("number", low=1, high=64, required=True)
     >>> out = Collector("case.toml")
@@ -404,8 +398,6 @@ def read_model(model: type[T], path: Path) -> T:
 def check_field(out: Collector, where: str, model: type[Table], name: str, value: Any) -> bool:
     """Check one value as the field of that name; add what is wrong to the collector.
 
-    Examples
-    --------
     >>> class Rotor(Table):
     ...     blades: int = entry("number", low=1, high=64, required=True)
     >>> out = Collector("case.toml")

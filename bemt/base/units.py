@@ -53,24 +53,12 @@ ZERO_CELSIUS = 273.15
 
 @dataclass(frozen=True)
 class Unit:
-    """One unit: ``si = value * factor + offset``.
+    """One unit: ``si = value * factor + offset``."""
 
-    Attributes
-    ----------
-    suffix : str
-        As written at the end of a key.
-    dimension : str
-        Kind of quantity, such as ``length`` or ``force``.
-    factor : float
-        SI units per one of this unit.
-    offset : float
-        Added after the factor; non-zero for temperatures only. [K]
-    """
-
-    suffix: str
-    dimension: str
-    factor: float
-    offset: float = 0.0
+    suffix: str  # As written at the end of a key
+    dimension: str  # Kind of quantity, such as ``length`` or ``force``
+    factor: float  # SI units per one of this unit
+    offset: float = 0.0  # Added after the factor; non-zero for temperatures only [K]
 
 
 def _table() -> dict[str, Unit]:
@@ -140,8 +128,6 @@ def _get(unit: str) -> Unit:
 def to_si(value: Numeric, unit: str) -> Numeric:
     """Convert a value to SI.
 
-    Examples
-    --------
     >>> to_si(10.0, "in")
     0.254
     >>> to_si(15.0, "C")
@@ -154,8 +140,6 @@ def to_si(value: Numeric, unit: str) -> Numeric:
 def from_si(value: Numeric, unit: str) -> Numeric:
     """Convert an SI value to a unit.
 
-    Examples
-    --------
     >>> round(from_si(27.0, "kgf"), 4)
     2.7532
     """
@@ -166,8 +150,6 @@ def from_si(value: Numeric, unit: str) -> Numeric:
 def convert(value: Numeric, unit: str, to: str) -> Numeric:
     """Convert between two units of the same dimension.
 
-    Examples
-    --------
     >>> round(convert(1.0, "kgf", "lbf"), 5)
     2.20462
     >>> convert(1.0, "kgf", "kg")
@@ -187,8 +169,6 @@ def split_suffix(key: str) -> tuple[str, Unit | None]:
 
     The longest suffix wins, so ``speed_m_s`` is metres per second and not seconds.
 
-    Examples
-    --------
     >>> name, unit = split_suffix("airspeed_m_s")
     >>> name, unit.dimension
     ('airspeed', 'speed')
@@ -206,8 +186,6 @@ def split_suffix(key: str) -> tuple[str, Unit | None]:
 def suffixes(dimension: str) -> tuple[str, ...]:
     """List the suffixes of a dimension, SI first.
 
-    Examples
-    --------
     >>> suffixes("angle")
     ('rad', 'deg')
     """

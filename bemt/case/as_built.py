@@ -36,21 +36,11 @@ _SCHEMA = "bemt.as_built/1"
 
 @dataclass(frozen=True, eq=False)
 class CaseAsBuilt:
-    """What is known of the rotor of a case.
+    """What is known of the rotor of a case."""
 
-    Attributes
-    ----------
-    prior : Prior
-        Law of the latent numbers, after the reference run if there is one.
-    drawn : (K,) float
-        Latent numbers with which the case is solved: zero, or what the case states [units of `NAMES`].
-    reference : ReferenceRun or None
-        The run's rows.
-    """
-
-    prior: Prior
-    drawn: Array
-    reference: ReferenceRun | None = None
+    prior: Prior  # Law of the latent numbers, after the reference run if there is one
+    drawn: Array  # (K,) latent numbers with which the case is solved: zero, or what the case states [units of `NAMES`]
+    reference: ReferenceRun | None = None  # The run's rows
 
 
 def stated_effects(file: CaseFile, folder: Path) -> tuple[AsBuilt, ...]:

@@ -201,8 +201,6 @@ def build_air(air: AirTable) -> Air:
 
     Without a temperature, a given density has that of 15 degC and a given altitude that of the standard atmosphere.
 
-    Examples
-    --------
     >>> round(build_air(AirTable(altitude_m=0.0, temperature_C=30.0)).rho, 4)
     1.1644
     """

@@ -40,34 +40,18 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 
 @dataclass(frozen=True)
 class Assumption:
-    """A value that the source of a case does not give.
+    """A value that the source of a case does not give."""
 
-    Parameters
-    ----------
-    key : str
-        Dotted key in the case file.
-    nominal : float or str
-        Value used, in the unit of the key.
-    values : tuple
-        The ends of the range, or the discrete values that it may take.
-    discrete : bool
-        Whether ``values`` are all values that it may take.
-    why : str
-        Where nominal value and range come from.
-    """
-
-    key: str
-    nominal: Any
-    values: tuple[Any, ...]
-    discrete: bool
-    why: str
+    key: str  # Dotted key in the case file
+    nominal: Any  # Value used, in the unit of the key
+    values: tuple[Any, ...]  # The ends of the range, or the discrete values that it may take
+    discrete: bool  # Whether ``values`` are all values that it may take
+    why: str  # Where nominal value and range come from
 
     @property
     def range_text(self) -> str:
         """The range as a user would write it.
 
-        Examples
-        --------
         >>> Assumption("blade.pitch_mm", 110.0, (100.0, 120.0), False, "").range_text
         '100 .. 120'
         """
@@ -77,24 +61,12 @@ class Assumption:
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """One validated case. :meth:`replaced` gives a new one; nothing else knows of changed values.
+    """One validated case. :meth:`replaced` gives a new one; nothing else knows of changed values."""
 
-    Parameters
-    ----------
-    path : Path
-        The case file.
-    written : mapping
-        The document as the file has it, without defaults.
-    file : CaseFile
-        The same, typed, with defaults.
-    assumptions : tuple of Assumption
-        Declared unknowns.
-    """
-
-    path: Path
-    written: Mapping[str, Any]
-    file: CaseFile
-    assumptions: tuple[Assumption, ...] = ()
+    path: Path  # The case file
+    written: Mapping[str, Any]  # The document as the file has it, without defaults
+    file: CaseFile  # The same, typed, with defaults
+    assumptions: tuple[Assumption, ...] = ()  # Declared unknowns
     _built: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     @property
@@ -159,23 +131,7 @@ class Case:
         return default if value is None else value
 
     def replaced(self, overrides: Mapping[str, Any] | None) -> Case:
-        """Case with some values changed; keys of the same quantity in another unit are dropped.
-
-        Parameters
-        ----------
-        overrides : mapping of str to object, or None
-            Dotted key to new value.
-
-        Returns
-        -------
-        Case
-            A new case, or this one when nothing changes.
-
-        Raises
-        ------
-        InputError
-            When a value is not one that a file may hold.
-        """
+        """Case with some values changed, by dotted key; keys of the same quantity in another unit are dropped."""
         if not overrides:
             return self
         written = copy.deepcopy(dict(self.written))
@@ -272,17 +228,8 @@ def _assumptions(case: CaseFile) -> tuple[Assumption, ...]:
 
 
 def check_name(out: Collector, name: Any) -> None:
-    """Check a name that becomes the name of a folder or file; add what is wrong to the collector.
+    """Check a name that becomes the name of a folder or file; no text, or an empty one, is a fault of the schema.
 
-    Parameters
-    ----------
-    out : Collector
-        Receives the fault.
-    name : object
-        Value of the key ``name``; what is no text, or empty, is a fault of the schema and none here.
-
-    Examples
-    --------
     >>> out = Collector("case.toml")
     >>> check_name(out, "8x5_v1.2"), check_name(out, "../8x5")
     (None, None)
@@ -294,23 +241,7 @@ def check_name(out: Collector, name: Any) -> None:
 
 
 def load_case(path: str | Path) -> Case:
-    """Read and check a case file.
-
-    Parameters
-    ----------
-    path : str or Path
-        ``case.toml``, or the folder that holds it.
-
-    Returns
-    -------
-    Case
-        The validated case; its geometry has been built once.
-
-    Raises
-    ------
-    InputError
-        With every fault of the file.
-    """
+    """Read and check a case file, or the one of a folder; its geometry has been built once."""
     path = Path(path)
     if path.is_dir():
         path = path / FILE_NAME
@@ -377,23 +308,7 @@ def _natural(path: Path) -> list[tuple[int, str]]:
 
 
 def find_cases(paths: Iterable[str | Path]) -> list[Path]:
-    """Case files below the given folders.
-
-    Parameters
-    ----------
-    paths : iterable of str or Path
-        Case files, folders with a ``case.toml``, or folders of such folders.
-
-    Returns
-    -------
-    list of Path
-        Case files, sorted within each folder (8x5 before 10x5), each once.
-
-    Raises
-    ------
-    InputError
-        When a path does not exist or holds no case.
-    """
+    """Case files, each once, of files, folders with a case and folders of such; sorted, 8x5 before 10x5."""
     found: list[Path] = []
     faults: list[Fault] = []
     for item in map(Path, paths):
@@ -423,18 +338,7 @@ def find_cases(paths: Iterable[str | Path]) -> list[Path]:
 
 
 def repeated_names(cases: Mapping[int, Case]) -> dict[int, Fault]:
-    """Find cases that would write into the folder of another one.
-
-    Parameters
-    ----------
-    cases : mapping of int to Case
-        Cases by any number, in order.
-
-    Returns
-    -------
-    dict of int to Fault
-        Every case but the first of a name; names that differ in case alone are one folder on some disks.
-    """
+    """Cases but the first that would write into one folder; case of letters does not tell names apart on some disks."""
     first: dict[str, str] = {}
     faults = {}
     for i, case in cases.items():

@@ -21,8 +21,6 @@ MAX_GRID = 50_000_000
 def check_case(out: Collector, document: Mapping[str, Any], folder: Path) -> CaseFile | None:
     """Check a whole case document; add every fault to the collector.
 
-    Examples
-    --------
     >>> out = Collector("case.toml")
     >>> check_case(out, {"schema": "bemt.case/1", "name": "x", "rotr": {}}, Path("."))
     >>> print(out.faults[0])  # doctest: +ELLIPSIS

@@ -95,8 +95,6 @@ def _diameter_m(rotor: Any) -> float:
 def completed(document: Mapping[str, Any]) -> dict[str, Any]:
     """Document with what a short case leaves out: kind, hub, chord law, section and air, each with its assumption.
 
-    Examples
-    --------
     >>> short = {"rotor": {"blades": 2, "diameter_in": 10}, "blade": {"pitch_in": 5}, "operating": {"rpm": 6000}}
     >>> full = completed(short)
     >>> full["rotor"]["kind"], full["rotor"]["hub_ratio"], full["blade"]["chord_law"], full["air"]["density_kg_m3"]

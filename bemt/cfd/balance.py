@@ -49,28 +49,16 @@ class Balance:
     """Residuals of a run, relative and signed.
 
     Positive is made in the domain: mass, momentum along the axis, angular momentum in the sense of rotation.
-
-    Parameters
-    ----------
-    mass : float
-        Net outflow of the open ends over the mass flow of an actuator disk with the run's thrust,
-        rho A (V/2 + sqrt(V^2/4 + |T| / (2 rho A))) (W.F. Durand ed., H. Glauert, Aerodynamic Theory IV, div. L, 1935,
-        not checked). [1]
-    momentum : float
-        Axial momentum of the open ends and force on all walls over the thrust (at least CT = 0.01). [1]
-    angular_momentum : float
-        What the periodic sides make over the shaft torque (at least CQ = 0.001); NaN without such sides. [1]
-    swirl : float
-        Angular momentum that leaves through the open ends over the shaft torque. [1]
-    leaks : tuple of str
-        Where each residual beyond :data:`BALANCE_LIMIT` is made.
     """
 
+    # Net outflow of the open ends over the mass flow of an actuator disk with the run's thrust, rho A (V/2 + sqrt(V^2/4
+    # + |T| / (2 rho A))) (W.F. Durand ed., H. Glauert, Aerodynamic Theory IV, div. L, 1935, not checked) [1]
     mass: float
-    momentum: float
+    momentum: float  # Axial momentum of the open ends and force on all walls over the thrust (at least CT = 0.01) [1]
+    # What the periodic sides make over the shaft torque (at least CQ = 0.001); NaN without such sides [1]
     angular_momentum: float
-    swirl: float
-    leaks: tuple[str, ...] = ()
+    swirl: float  # Angular momentum that leaves through the open ends over the shaft torque [1]
+    leaks: tuple[str, ...] = ()  # Where each residual beyond :data:`BALANCE_LIMIT` is made
 
     @property
     def closes(self) -> bool:
@@ -150,8 +138,6 @@ def _load(folder: Path, name: str, times: Array, faults: list[Fault]) -> tuple[f
 def balance_of(run: Path, settings: Settings) -> Balance:
     """Balance a run by what its function objects wrote during the averaged iterations.
 
-    Notes
-    -----
     See the head of this module for the equations and what each residual is relative to. Loads are means over the same
     iterations as the fluxes.
     """

@@ -25,8 +25,12 @@ __all__ = ["document", "is_folder_of_campaigns", "run", "run_campaign", "text"]
 
 
 def run_campaign(
-    campaign: Campaign, work: Path, only: int | None = None, ranks: int = 2,
-    tell: Callable[[str], None] | None = None, keep: bool = True,
+    campaign: Campaign,
+    work: Path,
+    only: int | None = None,
+    ranks: int = 2,
+    tell: Callable[[str], None] | None = None,
+    keep: bool = True,
 ) -> CampaignRecord:
     """Run the points of a campaign that are not recorded yet."""
     keys: list[tuple[str, str, Settings]] = []

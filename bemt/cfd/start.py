@@ -20,24 +20,12 @@ POWERS = {"U": 1, "p": 2, "k": 2, "omega": 1, "epsilon": 3, "nut": 1}
 
 @dataclass(frozen=True)
 class StartField:
-    """What a flow was computed for.
+    """What a flow was computed for."""
 
-    Parameters
-    ----------
-    rpm : float
-        Speed. [rev/min]
-    wind : tuple of float
-        Velocity far away. [m/s]
-    pressure : float
-        Static pressure far away; 0 for kinematic pressures. [Pa]
-    compressible : bool
-        Whether pressures are absolute.
-    """
-
-    rpm: float
-    wind: tuple[float, float, float]
-    pressure: float
-    compressible: bool
+    rpm: float  # Speed [rev/min]
+    wind: tuple[float, float, float]  # Velocity far away [m/s]
+    pressure: float  # Static pressure far away; 0 for kinematic pressures [Pa]
+    compressible: bool  # Whether pressures are absolute
 
 
 def splice(name: str, source: bytes, target: bytes, old: StartField, new: StartField) -> bytes | None:

@@ -138,8 +138,23 @@ def summary_text(document: dict[str, Any], radial: bool = True) -> str:
     counts = [[c["name"], *(str(c[key]) for key in keys)] for c in document["campaigns"]]
     counts.append(["all", *(str(sum(int(row[k]) for row in counts)) for k in (1, 2, 3, 4))])
     lines.append(text_table(["campaign", "points", "run", "converged", "and balanced"], counts))
-    head = ["run", "solver", "level", "cells", "rpm", "J", "other", "T [N]", "u", "BEMT", "Q [N m]", "u", "BEMT", "y+",
-            "leak [%]"]  # the largest residual of mass, momentum and angular momentum; empty where none was written
+    head = [
+        "run",
+        "solver",
+        "level",
+        "cells",
+        "rpm",
+        "J",
+        "other",
+        "T [N]",
+        "u",
+        "BEMT",
+        "Q [N m]",
+        "u",
+        "BEMT",
+        "y+",
+        "leak [%]",
+    ]  # the largest residual of mass, momentum and angular momentum; empty where none was written
     for campaign in document["campaigns"]:
         rows = []
         for row in campaign["rows"]:

@@ -53,8 +53,6 @@ def _digest(*parts: str) -> str:
 def point_key(point: CampaignPoint) -> tuple[str, str, Settings]:
     """Name a run and its grid by all that decides them.
 
-    Notes
-    -----
     The number of ranks, the place of the files and what is written down for the balance do not count.
     """
     settings, parts = settings_of(point.case, point.run)
@@ -69,21 +67,11 @@ def point_key(point: CampaignPoint) -> tuple[str, str, Settings]:
 
 @dataclass
 class Outcome:
-    """What a run gave.
+    """What a run gave."""
 
-    Parameters
-    ----------
-    values : dict
-        Columns of the recording.
-    history : (N, 3) array or None
-        Iteration, thrust [N], torque [N m] of the whole rotor.
-    radial : (M, 3) array or None
-        Radius [m], thrust and torque of all blades per radius [N/m, N m/m].
-    """
-
-    values: dict[str, Any]
-    history: Array | None = None
-    radial: Array | None = None
+    values: dict[str, Any]  # Columns of the recording
+    history: Array | None = None  # (N, 3) iteration, thrust [N], torque [N m] of the whole rotor
+    radial: Array | None = None  # (M, 3) radius [m], thrust and torque of all blades per radius [N/m, N m/m]
 
 
 def history_of(folder: Path, settings: Settings) -> Array:
@@ -109,8 +97,6 @@ def history_of(folder: Path, settings: Settings) -> Array:
 def radial_of(folder: Path, settings: Settings, last: int) -> Array | None:
     """Read the loads of the blades along the radius, (M, 3).
 
-    Notes
-    -----
     Bins are those of x, along blade 1: within 1 - cos of the blade's half angle of the radius.
     """
     loads = []
@@ -162,20 +148,11 @@ def _last_words(out: Path) -> str:
 
 @dataclass
 class Worker:
-    """Runs points in a work folder.
+    """Runs points in a work folder."""
 
-    Parameters
-    ----------
-    work : Path
-        Folder of grids and runs.
-    ranks : int
-        Processes of a run.
-    keep : bool
-        Whether the folders made there stay for good; else they are marked, and :meth:`clear` removes them.
-    """
-
-    work: Path
-    ranks: int = 1
+    work: Path  # Folder of grids and runs
+    ranks: int = 1  # Processes of a run
+    # Whether the folders made there stay for good; else they are marked, and :meth:`clear` removes them
     keep: bool = True
 
     def _own(self, folder: Path) -> None:

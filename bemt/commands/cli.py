@@ -93,8 +93,6 @@ class _Top(_Parser):
 def did_you_mean(got: str, known: Iterable[str]) -> str:
     """`` Did you mean X?`` when a known word is near, else nothing.
 
-    Examples
-    --------
     >>> did_you_mean("swep", ["sweep", "report"]), did_you_mean("x", ["sweep"])
     (' Did you mean sweep?', '')
     """
@@ -112,8 +110,6 @@ def commands() -> dict[str, ModuleType]:
 def build_parser() -> argparse.ArgumentParser:
     """Make the parser of the whole command line.
 
-    Examples
-    --------
     >>> args = build_parser().parse_args(["sweep", "cases/", "--jobs", "2"])
     >>> args.command, args.paths, args.jobs
     ('sweep', ['cases/'], 2)

@@ -30,27 +30,13 @@ MOST_POINTS = 40
 
 @dataclass(frozen=True, eq=False)
 class AsMeasured:
-    """Outcome of `as_measured`.
+    """Outcome of `as_measured`."""
 
-    Attributes
-    ----------
-    prior : Prior
-        What the case and the population said.
-    posterior : Prior
-        After the run; ``known_from`` is ``reference``.
-    reference : ReferenceRun
-        Rows of the run, for predictions near them.
-    found : Conditioned
-        Steps, convergence, evidence.
-    points : int
-        Points of the run that were used [1].
-    """
-
-    prior: Prior
-    posterior: Prior
-    reference: ReferenceRun
-    found: Conditioned
-    points: int
+    prior: Prior  # What the case and the population said
+    posterior: Prior  # After the run; ``known_from`` is ``reference``
+    reference: ReferenceRun  # Rows of the run, for predictions near them
+    found: Conditioned  # Steps, convergence, evidence
+    points: int  # Points of the run that were used [1]
 
 
 def _groups(rpm: Array, J: Array) -> list[NDArray[np.intp]]:

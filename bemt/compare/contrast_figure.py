@@ -52,7 +52,7 @@ def picture(change: RunChange, doc: Mapping[str, Any]) -> bytes:
             _readings(row[0], change, c)
             _ratio(row[1], change.ratios[c.channel], c.name)
         said = doc["verdict"] + (": " + ", ".join(doc["effects"]) if doc["effects"] else "")
-        figure.suptitle(f"A: {_short(change.a.name)}    B: {_short(change.b.name)}\n{said}", fontsize=9.5)
+        figure.suptitle(f"A: {_short(change.a.points.name)}    B: {_short(change.b.points.name)}\n{said}", fontsize=9.5)
         buffer = io.BytesIO()
         figure.savefig(buffer, format="png", dpi=150)
     return buffer.getvalue()

@@ -9,7 +9,7 @@ from typing import Any
 
 from bemt.base.tables import number_text, text_table
 from bemt.compare.recordings import OTHER_STAND
-from bemt.compare.scaling import FAMILY, law
+from bemt.compare.scaling_laws import FAMILY, law
 
 __all__ = ["headline", "text"]
 
@@ -80,8 +80,11 @@ _FAMILY_WORD = {
 
 def headline(doc: Mapping[str, Any]) -> str:
     """What an engineer would say first."""
-    shares = [(_WORD[c], math.log(r["ratio"] * r["density_ratio"])) for c, r in doc["ratios"].items()
-              if r["kind"] in ("thrust", "torque")]  # fmt: skip
+    shares = [
+        (_WORD[c], math.log(r["ratio"] * r["density_ratio"]))
+        for c, r in doc["ratios"].items()
+        if r["kind"] in ("thrust", "torque")
+    ]
     moved = " and ".join(f"{word} {_share(math.exp(x))}" for word, x in shares)
     effects, verdict = list(doc["effects"]), doc["verdict"]
     if verdict == "none":

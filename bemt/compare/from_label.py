@@ -33,10 +33,16 @@ def _label(text: str, faults: list[Fault]) -> tuple[float, float, int | None]:
 
 
 def document(
-    label: str, speeds: Sequence[float], airspeeds: Sequence[float] = (), blades: int | None = None,
-    chord_mm: float | None = None, measured_pitch_in: float | None = None, series: str | None = None,
-    density: float = 1.225, ducted: bool = False,
-) -> dict[str, Any]:  # fmt: skip
+    label: str,
+    speeds: Sequence[float],
+    airspeeds: Sequence[float] = (),
+    blades: int | None = None,
+    chord_mm: float | None = None,
+    measured_pitch_in: float | None = None,
+    series: str | None = None,
+    density: float = 1.225,
+    ducted: bool = False,
+) -> dict[str, Any]:
     """Estimate every speed [rev/min] with every airspeed [m/s]: ``bemt.estimate/1``; unknown numbers are null.
 
     An unreadable label, impossible numbers and an unknown series are refused, all at once.
@@ -48,16 +54,17 @@ def document(
         faults.append(Fault("--blades", "", str(told), f"{marked}, as in {label}"))
     if not 0.1 <= density <= 2.0:
         faults.append(Fault("--density", "", f"{density:g}", "kg/m3 from 0.1 to 2 (1.225 at sea level)"))
-    lengths = (("--chord-mm", chord_mm, "mm", "chord"),
-               ("--measured-pitch-in", measured_pitch_in, "in", "pitch"))  # fmt: skip
+    lengths = (("--chord-mm", chord_mm, "mm", "chord"), ("--measured-pitch-in", measured_pitch_in, "in", "pitch"))
     for option, value, unit, name in lengths:
         faults += [] if value is None else length_faults((option, ""), value, unit, D * INCH, POSSIBLE[name])
     # what is no number, or turns backwards, the formula refuses itself
-    faults += [Fault("--rpm", "", f"{n:g}", f"0 to {RPM.high:g} rev/min") for n in speeds
-               if RPM.high < n < math.inf]  # fmt: skip
+    faults += [Fault("--rpm", "", f"{n:g}", f"0 to {RPM.high:g} rev/min") for n in speeds if RPM.high < n < math.inf]
     limits = f"{AIRSPEED.low:g} to {AIRSPEED.high:g} m/s"
-    faults += [Fault("--airspeed", "", f"{v:g}", limits) for v in airspeeds
-               if math.isfinite(v) and not AIRSPEED.low <= v <= AIRSPEED.high]  # fmt: skip
+    faults += [
+        Fault("--airspeed", "", f"{v:g}", limits)
+        for v in airspeeds
+        if math.isfinite(v) and not AIRSPEED.low <= v <= AIRSPEED.high
+    ]
     rpm, V = (v.ravel() for v in np.meshgrid(speeds, list(airspeeds) or [0.0], indexing="ij"))
     if faults:  # the rest is looked at beside a propeller that is right, so that all faults come at once
         try:
@@ -79,8 +86,10 @@ def document(
         "u95_thrust_N": e.u95_thrust_N, "power_W": e.power_W, "u_power_W": e.u_power_W, "u95_power_W": e.u95_power_W,
         "J": e.J, "CT": e.CT, "CP": e.CP, "M_tip": e.M_tip, "Re75": e.Re, "k1k2_thrust_N": k.thrust_N,
     }  # fmt: skip
-    rows = [{name: number(column[i]) for name, column in columns.items()} | {"flags": list(e.flags[i])}
-            for i in range(rpm.size)]  # fmt: skip
+    rows = [
+        {name: number(column[i]) for name, column in columns.items()} | {"flags": list(e.flags[i])}
+        for i in range(rpm.size)
+    ]
     given = {"label": label, "diameter_in": D, "pitch_in": pitch, "blades": blades, "chord_mm": chord_mm,
              "measured_pitch_in": measured_pitch_in, "series": series, "density_kg_m3": density,
              "ducted": ducted}  # fmt: skip
@@ -96,8 +105,9 @@ def text(doc: dict[str, Any]) -> str:
     head = ["rpm", "V [m/s]", "T [N]", "+- 68 %", "+- 95 %", "P [W]", "+- 68 %", "+- 95 %", "K1/K2 [N]", "J", "M tip"]
     keys = ("rpm", "airspeed_m_s", "thrust_N", "u_thrust_N", "u95_thrust_N", "power_W", "u_power_W", "u95_power_W",
             "k1k2_thrust_N", "J", "M_tip")  # fmt: skip
-    table = [[shown(row[key], 2 if key.startswith("u") else 6 if key == "rpm" else 4) for key in keys]
-             for row in doc["rows"]]  # fmt: skip
+    table = [
+        [shown(row[key], 2 if key.startswith("u") else 6 if key == "rpm" else 4) for key in keys] for row in doc["rows"]
+    ]
     words = {flag: None for row in doc["rows"] for flag in row["flags"]}
     notes = [f"do not trust: {flag}" for flag in words]
     more = [f"--{key.replace('_', '-')}" for key in ("chord_mm", "measured_pitch_in") if doc["given"][key] is None]

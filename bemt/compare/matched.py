@@ -73,47 +73,21 @@ _LOCAL = 3.0
 
 @dataclass(frozen=True, eq=False)
 class MatchedChannel:
-    """One channel of both recordings.
+    """One channel of both recordings."""
 
-    Parameters
-    ----------
-    name : str
-        thrust, torque, speed, electrical or voltage.
-    channel : str
-        Name of the reading.
-    y : (N,) float
-        Logarithm of the reading over its power of the speed, and over the density where both recordings tell it. [1]
-    x : (N, 2) float
-        ln rpm or the command, and advance ratio or advance per turn [m].
-    second : (N,) bool
-        Whether a point is of B.
-    run : (N,) int
-        Runs, numbered through.
-    floor : (N,) float
-        Largest reading over this one [1].
-    u : (N,) float
-        Stated relative uncertainty [1]; 0: none.
-    log_density : float
-        ln of B's density over A's that was taken out of y. [1]
-    session : float
-        Standard deviation of the level of a run, share. [1]
-    notes : tuple of str
-        What was left out.
-    shift : (N,) float or None
-        Standard deviation of the shift of a run by lag or hysteresis, share of full scale. [1]
-    """
-
-    name: str
-    channel: str
+    name: str  # thrust, torque, speed, electrical or voltage
+    channel: str  # Name of the reading
+    # (N,) logarithm of the reading over its power of the speed, and over the density where both recordings tell it [1]
     y: Array
-    x: Array
-    second: NDArray[np.bool_]
-    run: NDArray[np.intp]
-    floor: Array
-    u: Array
-    log_density: float
-    session: float
-    notes: tuple[str, ...] = ()
+    x: Array  # (N, 2) ln rpm or the command, and advance ratio or advance per turn [m]
+    second: NDArray[np.bool_]  # (N,) whether a point is of B
+    run: NDArray[np.intp]  # (N,) runs, numbered through
+    floor: Array  # (N,) largest reading over this one [1]
+    u: Array  # (N,) stated relative uncertainty [1]; 0: none
+    log_density: float  # ln of B's density over A's that was taken out of y [1]
+    session: float  # Standard deviation of the level of a run, share [1]
+    notes: tuple[str, ...] = ()  # What was left out
+    # (N,) standard deviation of the shift of a run by lag or hysteresis, share of full scale [1]
     shift: Array | None = None
 
     def common(self) -> tuple[float, float]:
@@ -146,34 +120,33 @@ class Scatter:
 
 def _like_voltage(a: StandRun, b: StandRun) -> bool:
     """Whether motor and controller work at like voltages, so that electrical power may stand for torque."""
-    v = [np.nanmedian(r.values["voltage_V"]) if "voltage_V" in r.values else math.nan for r in (a, b)]
+    v = [np.nanmedian(r.points["voltage_V"]) if "voltage_V" in r.points else math.nan for r in (a, b)]
     return bool(abs(math.log(v[1] / v[0])) < _LIKE) if all(x > 0.0 for x in v) else False
 
 
 def _advance(run: StandRun, diameter: float) -> Array:
     """V/(n D), or V/n [m] without a diameter; zero where no airspeed was recorded."""
-    n = len(run)
-    if "J" in run.values:
-        return np.nan_to_num(run.values["J"])
-    V = np.nan_to_num(run.values.get("airspeed_m_s", np.zeros(n)))
+    if "J" in run.points:
+        return np.asarray(np.nan_to_num(run.points["J"]))
+    V = np.nan_to_num(run.points.values.get("airspeed_m_s", np.zeros(len(run))))
     with np.errstate(divide="ignore", invalid="ignore"):
-        turn = V / (run.values["rpm"] / 60.0)
-    return np.nan_to_num(turn / (diameter if math.isfinite(diameter) else 1.0))
+        turn = V / (run.points["rpm"] / 60.0)
+    return np.asarray(np.nan_to_num(turn / (diameter if math.isfinite(diameter) else 1.0)))
 
 
 def _readings(run: StandRun, name: str, channel: str, diameter: float) -> dict[str, Array] | None:
     """Points of one channel in one recording."""
-    v = run.values.get(channel)
+    v = run.points.values.get(channel)
     if v is None or np.isfinite(v).sum() < 2:
         return None
-    rpm = run.values.get("rpm")
+    rpm = run.points.values.get("rpm")
     over_command = name in ("speed", "voltage")
-    if over_command and "command" not in run.values:
+    if over_command and "command" not in run.points:
         return None
     if rpm is None and (name not in LOADS or channel not in _COEFFICIENTS):
         return None
     speed = rpm if rpm is not None else np.ones(len(run))
-    first = run.values["command"] if over_command else np.log(np.where(speed > 0.0, speed, np.nan))
+    first = run.points["command"] if over_command else np.log(np.where(speed > 0.0, speed, np.nan))
     sign = float(np.sign(np.nansum(v)))
     size = np.where(v * sign > 0.0, v * sign, np.nan)
     top = float(np.nanmax(size)) if np.isfinite(size).any() else math.nan
@@ -184,14 +157,14 @@ def _readings(run: StandRun, name: str, channel: str, diameter: float) -> dict[s
         good &= scaled > _NEAR_ZERO * level
     if good.sum() < 2:
         return None
-    stated = run.u.get(channel, np.full(len(run), np.nan)) / size
+    stated = run.points.u[channel] / size
     return {
         "y": np.log(scaled[good]),
         "x": np.column_stack([first, _advance(run, diameter) if not over_command else np.zeros(len(run))])[good],
         "floor": top / size[good],
         "u": np.nan_to_num(stated[good]),
         "sign": np.full(int(good.sum()), sign),
-        "run": run.values.get("run", np.zeros(len(run)))[good],
+        "run": run.points.values.get("run", np.zeros(len(run)))[good],
         "lost": np.full(int(good.sum()), float((~good).sum())),
     }
 
@@ -235,7 +208,7 @@ def matched(a: StandRun, b: StandRun, name: str, diameter: float = math.nan) -> 
     parts = [_averaged(one), _averaged(two)]
     for part, run in zip(parts, (a, b), strict=True):
         if part["lost"][0] > 0.5 * len(run):
-            notes.append(f"{channel}: {part['lost'][0]:.0f} of {len(run)} points of {run.name} are near zero")
+            notes.append(f"{channel}: {part['lost'][0]:.0f} of {len(run)} points of {run.points.name} are near zero")
     log_density, unsure = density_change(a, b) if name in LOADS and channel not in _COEFFICIENTS else (0.0, 0.0)
     shift = [0.0, log_density]
     codes = [np.unique(p["run"], return_inverse=True)[1] for p in parts]
@@ -260,10 +233,9 @@ def matched(a: StandRun, b: StandRun, name: str, diameter: float = math.nan) -> 
 def density_change(a: StandRun, b: StandRun) -> tuple[float, float]:
     """Logarithm of the density of B over that of A as recorded, and what a thermometer alone leaves open.
 
-    Examples
-    --------
-    >>> from bemt.compare.stand_run import StandRun
-    >>> warm, cold = (StandRun("", {}, {}, {}, "", math.nan, (), math.nan, T) for T in (300.0, 285.0))
+    >>> from bemt.dataset import Dataset
+    >>> none = Dataset("bench", "none", {"rpm": []})
+    >>> warm, cold = (StandRun(none, "", math.nan, math.nan, T) for T in (300.0, 285.0))
     >>> round(density_change(warm, cold)[0], 3)
     0.051
     """
@@ -278,7 +250,7 @@ def _set_up(name: str, channel: str, a: StandRun, b: StandRun) -> float:
     """Standard deviation of the level of one run where the recordings do not show it."""
     if name in LOADS and channel == "electrical_power_W":
         return _BY_POWER
-    if name == "speed" and all("voltage_V" in r.values for r in (a, b)):
+    if name == "speed" and all("voltage_V" in r.points for r in (a, b)):
         return _AT_KNOWN_VOLTAGE
     return SESSION[name]
 
@@ -472,25 +444,14 @@ def in_common(c: MatchedChannel) -> MatchedChannel:
 
 @dataclass(frozen=True, eq=False)
 class MatchedRuns:
-    """Channels of one kind that both recordings have.
+    """Channels of one kind that both recordings have."""
 
-    Parameters
-    ----------
-    channels : mapping of str to MatchedChannel
-        By name.
-    free, steady : mapping of str to Scatter
-        Likeliest scatter if anything smooth, or one factor, changed between the recordings.
-    likelier : mapping of str to Scatter
-        The better of the two.
-    strays : mapping of str to int
-        Readings that were left out.
-    """
-
-    channels: Mapping[str, MatchedChannel]
+    channels: Mapping[str, MatchedChannel]  # By name
+    # Likeliest scatter if anything smooth, or one factor, changed between the recordings
     free: Mapping[str, Scatter]
     steady: Mapping[str, Scatter]
-    likelier: Mapping[str, Scatter]
-    strays: Mapping[str, int]
+    likelier: Mapping[str, Scatter]  # The better of the two
+    strays: Mapping[str, int]  # Readings that were left out
 
 
 def prepared(a: StandRun, b: StandRun, names: Sequence[str], diameter: float) -> MatchedRuns:

@@ -17,7 +17,8 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
 from bemt.compare import matched as fits
 from bemt.compare.matched import MatchedChannel, Scatter
-from bemt.compare.scaling import FAMILY, Judgement, judge, law, weigh
+from bemt.compare.scaling import Judgement, judge, weigh
+from bemt.compare.scaling_laws import FAMILY, law
 from bemt.compare.stand_run import StandRun
 
 __all__ = ["OTHER_STAND", "SCHEMA", "RunChange", "changed", "document"]
@@ -43,35 +44,20 @@ OTHER_STAND = "no change on one stand moves every load by so much: look at the u
 
 @dataclass(frozen=True, eq=False)
 class RunChange:
-    """Outcome of a comparison of two recordings.
+    """Outcome of a comparison of two recordings."""
 
-    Parameters
-    ----------
-    a, b : StandRun
-        Recordings.
-    diameter_m : float
-        Of the rotor [m]; NaN: unknown.
-    channels : mapping of str to MatchedChannel
-        What both recorded.
-    ratios : mapping of str to mapping
-        B over A by channel: of :func:`bemt.compare.matched.ratio_of`, and ``density_ratio``.
-    loads, drive : Judgement
-        Verdict on what acts on the rotor, and on motor, controller and battery.
-    assumed : tuple of str
-        What neither recording says.
-    notes : tuple of str
-        What was left out.
-    """
-
+    # Recordings
     a: StandRun
     b: StandRun
-    diameter_m: float
-    channels: Mapping[str, MatchedChannel]
+    diameter_m: float  # Of the rotor [m]; NaN: unknown
+    channels: Mapping[str, MatchedChannel]  # What both recorded
+    # B over A by channel: of :func:`bemt.compare.matched.ratio_of`, and ``density_ratio``
     ratios: Mapping[str, Mapping[str, Any]]
+    # Verdict on what acts on the rotor, and on motor, controller and battery
     loads: Judgement
     drive: Judgement
-    assumed: tuple[str, ...] = ()
-    notes: tuple[str, ...] = field(default=())
+    assumed: tuple[str, ...] = ()  # What neither recording says
+    notes: tuple[str, ...] = field(default=())  # What was left out
 
     @property
     def density_ratio(self) -> float:
@@ -105,7 +91,7 @@ def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> RunChange
         got = f"{_told(a)} in A, {_told(b)} in B"
         raise InputError(
             Fault(
-                f"{a.name}, {b.name}",
+                f"{a.points.name}, {b.points.name}",
                 "",
                 got,
                 "one load that both recorded at two or more speeds of rotation, above zero",
@@ -185,8 +171,11 @@ def _speeds(ratios: Mapping[str, Mapping[str, Any]]) -> tuple[float, float] | No
 
 def _told(run: StandRun) -> str:
     """Channels of a recording, how many points, and which of them are no measurement."""
-    told = [k + ("" if np.nan_to_num(v).any() else " (all 0)")
-            for k, v in run.values.items() if k not in ("run", "command")]  # fmt: skip
+    told = [
+        k + ("" if np.nan_to_num(v).any() else " (all 0)")
+        for k, v in run.points.values.items()
+        if k not in ("run", "command")
+    ]
     return f"{', '.join(told) or 'nothing'} at {len(run)} point{'s' if len(run) != 1 else ''}"
 
 
@@ -227,14 +216,14 @@ def _assumed(a: StandRun, b: StandRun, diameter: float, loads: Mapping[str, Matc
         out.append("air pressure is not recorded in both: taken as equal within 1 %")
     elif unknown and any(c.channel in ("thrust_N", "torque_Nm", "power_W") for c in loads.values()):
         out.append(f"air density is not recorded in {' and '.join(unknown)}: taken as equal")
-    still = [n for n, r in (("A", a), ("B", b)) if not {"airspeed_m_s", "J"} & r.values.keys()]
+    still = [n for n, r in (("A", a), ("B", b)) if not {"airspeed_m_s", "J"} & r.points.values.keys()]
     if still:
         out.append(f"airspeed is not recorded in {' and '.join(still)}: taken as still air")
     if "torque" not in loads and "thrust" in loads:
         out.append("torque is not recorded in both: gain, air and blade scale alike in thrust alone")
     if "torque" in loads and loads["torque"].channel == "electrical_power_W":
         out.append("torque is not recorded: electrical power stands for it, with one motor and controller in both")
-    told = all("J" in r.values for r in (a, b))
+    told = all("J" in r.points for r in (a, b))
     if not told and not math.isfinite(diameter) and any(c.advance_moves() for c in loads.values()):
         out.append("no diameter: compared at equal advance per turn, V/n; --label 10x5 gives J")
     return out
@@ -253,7 +242,7 @@ def _notes(a: StandRun, b: StandRun, channels: Mapping[str, MatchedChannel], str
             out.append(f"{c.channel}: no speed that both have, {gap:.0%} apart; carried over by the law of the speed")
     if a.command and b.command and a.command != b.command:
         out.append(f"commands differ in kind ({a.command}, {b.command}): the drive is not compared")
-    return list(dict.fromkeys([*out, *(f"A: {n}" for n in a.notes), *(f"B: {n}" for n in b.notes)]))
+    return list(dict.fromkeys([*out, *(f"A: {n}" for n in a.points.notes), *(f"B: {n}" for n in b.points.notes)]))
 
 
 def next_step(change: RunChange, files: Sequence[str]) -> dict[str, str]:
@@ -272,7 +261,7 @@ def next_step(change: RunChange, files: Sequence[str]) -> dict[str, str]:
         text = rows[0].settles if rows else "read the label of the channel"
         return {"text": f"to be sure, {text}", "command": f"{ask} {a} {b} --case CASE"}
     if loads and all(r["extrapolated"] for r in loads):
-        v = change.a.values
+        v = change.a.points
         where = "where A was measured"
         if "rpm" in v:
             where = f"at the speeds of A, {np.nanmin(v['rpm']):.0f} to {np.nanmax(v['rpm']):.0f} rev/min"

@@ -37,8 +37,6 @@ def find_uiuc() -> Path | None:
 def uiuc_statistics(folder: Path) -> dict[str, Any]:
     """Hold the K1/K2 model against measured propellers: nominal diameter and pitch, nothing fitted. [-]
 
-    Notes
-    -----
     Thrust follows from CT at 1.225 kg/m3: density cancels in the ratio, and so does n.  Propellers without a nominal
     pitch are left out; 3- and 4-blade ones are kept, as the model has no blade count.
     """
@@ -94,13 +92,23 @@ def _model(f: th.ThesisFacts, uiuc: dict[str, Any] | None) -> None:
     f.given("best D/p, from", "0.8")
     f.given("best D/p, to", "1.8")
     f.check("zero-thrust J over P/D, by the formula", "1.00", _zero_thrust())
-    defect = {name: k.unit_defect(g, length=INCH) for name, g in
-              (("right", k.corrected_equation), ("printed", k.printed_equation))}  # fmt: skip
-    f.word("printed final equation", "dimensionally wrong", _wrong(defect["printed"]),
-           "the printed form turned out homogeneous",
-           note=f"inches for metres change its thrust by {defect['printed']:+.0%}")  # fmt: skip
-    f.word("equation with every term in the bracket", "right", "right" if abs(defect["right"]) < 1e-9 else "wrong",
-           note=f"inches for metres change its thrust by {abs(defect['right']):.0e}")  # fmt: skip
+    defect = {
+        name: k.unit_defect(g, length=INCH)
+        for name, g in (("right", k.corrected_equation), ("printed", k.printed_equation))
+    }
+    f.word(
+        "printed final equation",
+        "dimensionally wrong",
+        _wrong(defect["printed"]),
+        "the printed form turned out homogeneous",
+        note=f"inches for metres change its thrust by {defect['printed']:+.0%}",
+    )
+    f.word(
+        "equation with every term in the bracket",
+        "right",
+        "right" if abs(defect["right"]) < 1e-9 else "wrong",
+        note=f"inches for metres change its thrust by {abs(defect['right']):.0e}",
+    )
     u = uiuc or {}
     pct = {key: None if u.get(key) is None else 100 * u[key] for key in ("within_13", "within_26")}
     flight = u.get("flight") or [None] * 5
@@ -160,17 +168,24 @@ def _cfd(f: th.ThesisFacts) -> None:
         f.check(f"{name}: K1/K2 recomputed before", again, F, "kgf")
         of_print = abs(F_cfd - float(printed)) / F_cfd * 100
         f.check(f"{name}: printed error", err, errors[-1], "%", variants=[("of the printed, rounded values", of_print)])
-        f.check(f"{name}: CT of the Fluent value", CT,
-                co.CT(F_cfd * KGF, k.RHO_FIXED, th.RPM_PROPS / 60, d * INCH))  # fmt: skip
-        f.check(f"{name}: rotational tip Mach", M, blind["M_tip"][name],
-                note="supersonic" if blind["M_tip"][name] > 1 else "")  # fmt: skip
+        f.check(f"{name}: CT of the Fluent value", CT, co.CT(F_cfd * KGF, k.RHO_FIXED, th.RPM_PROPS / 60, d * INCH))
+        f.check(
+            f"{name}: rotational tip Mach",
+            M,
+            blind["M_tip"][name],
+            note="supersonic" if blind["M_tip"][name] > 1 else "",
+        )
     f.check("average error, printed", "5.22", float(np.mean(errors)), "%", note="mean of the unrounded errors")
     f.check("mean of the four printed errors", "5.21", float(np.mean([float(r[4]) for r in th.PROPS])), "%")
     f.word("K1/K2 against Fluent, 8, 10, 12, 14 in", "low low high high", " ".join(signs))
     f.word("supersonic tips", "14x8", " ".join(blind["supersonic"]) or "none")
     knows = "knows no Mach number" if blind["CT_spread"] < 1e-9 else "depends on the Mach number"
-    f.word("K1/K2 and the Mach number", "knows no Mach number", knows,
-           note=f"CT from tip Mach 0.05 to 1.5 changes by {blind['CT_spread']:.0e}")  # fmt: skip
+    f.word(
+        "K1/K2 and the Mach number",
+        "knows no Mach number",
+        knows,
+        note=f"CT from tip Mach 0.05 to 1.5 changes by {blind['CT_spread']:.0e}",
+    )
 
 
 def _fan(f: th.ThesisFacts) -> None:
@@ -189,9 +204,13 @@ def _fan(f: th.ThesisFacts) -> None:
     ):  # fmt: skip
         f.given(name, stated, unit)
     top = 6 * 4.2
-    f.given("motor HET 700-68-1400: last number", "1400", "",
-            f"if this is rpm/V, six cells at 4.2 V turn it at most at {1400 * top:.0f} rev/min unloaded, and 55000 "
-            f"rev/min need {s['rpm'] / 1400:.1f} V (not checked against a data sheet)")  # fmt: skip
+    f.given(
+        "motor HET 700-68-1400: last number",
+        "1400",
+        "",
+        f"if this is rpm/V, six cells at 4.2 V turn it at most at {1400 * top:.0f} rev/min unloaded, and 55000 "
+        f"rev/min need {s['rpm'] / 1400:.1f} V (not checked against a data sheet)",
+    )
     f.check("tip Mach at 55 000 rev/min", "0.58", co.M_tip(n, D, th.A_THESIS))
     f.check("diameter", "2.717", D / INCH, "in")
     f.check("annulus area, 69 mm less hub", "3.233e-3", annulus, "m2")
@@ -216,8 +235,12 @@ def _fan(f: th.ThesisFacts) -> None:
         f"Other formula, 2.64 kgf: {other or 'none'}."))  # fmt: skip
     f.word("unit in which K1/K2 gives 2.64", "N", " ".join(found["units"]))
     f.check("pitch/D where it does", "1.0", best.pitch_over_D)
-    f.check("factor below the claim", "9.81", found["slip_factor"], note=(
-        f"ratio at pitch = diameter {found['ratio']:.2f}; nearest slip of units: {found['slip']}"))  # fmt: skip
+    f.check(
+        "factor below the claim",
+        "9.81",
+        found["slip_factor"],
+        note=(f"ratio at pitch = diameter {found['ratio']:.2f}; nearest slip of units: {found['slip']}"),
+    )
     f.check("vendor thrust over K1/K2 ('about ten')", "10", s["thrust_N"] / found["K1K2_at_pitch_equal_diameter_N"])
     f.check("momentum check, rho A v^2", "30.2", k.RHO_FIXED * annulus * s["exhaust_m_s"] ** 2, "N",
             note="12 % above the 27 N of the vendor: holds for a straight exhaust of the annulus area")  # fmt: skip
@@ -256,15 +279,17 @@ def _motor(f: th.ThesisFacts) -> None:
     f.given("torque sensor range", "2", "N m")
     f.given("transmitter current, from", "4", "mA")
     f.given("transmitter current, to", "20", "mA")
-    f.given("K_t, mean of the torque sensor", "0.0311", "N m/A",
-            f"{0.0311 * Kv / per_q - 1:+.1%} against the data sheet route")  # fmt: skip
+    f.given(
+        "K_t, mean of the torque sensor",
+        "0.0311",
+        "N m/A",
+        f"{0.0311 * Kv / per_q - 1:+.1%} against the data sheet route",
+    )
 
 
 def items(uiuc: dict[str, Any] | None = None) -> list[th.ThesisItem]:
     """Give every number of the thesis with ours and its status.
 
-    Examples
-    --------
     >>> [i.status for i in items() if i.quantity == "8x5: K1/K2 recomputed before"]
     ['reproduced']
     """
@@ -283,9 +308,11 @@ def findings() -> dict[str, Any]:
         "ds30": plain | {"readings": [asdict(r) for r in th.ds30_readings() if r.sensible]},
         "mach": th.mach_blindness(),
         "k1k2_print": [{"variant": n, "kgf": list(v)} for n, v in th.k1k2_variants()],
-        "printed_equation": {"inch_for_metre_changes_thrust_by": k.unit_defect(k.printed_equation, length=INCH),
-                             "right_form_changes_by": k.unit_defect(k.corrected_equation, length=INCH)},
-    }  # fmt: skip
+        "printed_equation": {
+            "inch_for_metre_changes_thrust_by": k.unit_defect(k.printed_equation, length=INCH),
+            "right_form_changes_by": k.unit_defect(k.corrected_equation, length=INCH),
+        },
+    }
 
 
 def _plain(value: Any) -> Any:

@@ -1,9 +1,10 @@
 """Which change can make the ratios of two recordings, without any blade: how loads scale, weighed by their evidence.
 
-Every row of :data:`LAWS` says how thrust, torque or the drive move together and with what they grow. A row is a linear
-Gaussian model on top of :func:`bemt.compare.matched.covariance`, so its evidence has a closed form (Rasmussen and
-Williams 2006, eq. 2.30 and 2.40 to 2.43). Two rivals always compete: nothing, and a smooth change of every channel on
-its own. What a blade would do in detail is not known here; with a case, :mod:`bemt.diagnose.contrast` asks the solver.
+Every row of :mod:`bemt.compare.scaling_laws` says how thrust, torque or the drive move together and with what they
+grow. A row is a linear Gaussian model on top of :func:`bemt.compare.matched.covariance`, so its evidence has a closed
+form (Rasmussen and Williams 2006, eq. 2.30 and 2.40 to 2.43). Two rivals always compete: nothing, and a smooth change
+of every channel on its own. What a blade would do in detail is not known here; with a case,
+:mod:`bemt.diagnose.contrast` asks the solver.
 """
 
 from __future__ import annotations
@@ -17,21 +18,14 @@ from numpy.typing import NDArray
 
 from bemt.compare import matched as fits
 from bemt.compare.matched import MatchedChannel, Scatter
+from bemt.compare.scaling_laws import FAMILY, LAWS, ScalingLaw, law
 
-__all__ = ["LAWS", "NONE", "UNKNOWN", "Judgement", "ScalingLaw", "judge", "weigh"]
+__all__ = ["NONE", "UNKNOWN", "Judgement", "judge", "weigh"]
 
 Array = NDArray[np.float64]
 
 NONE, UNKNOWN = "none", "unknown"
 _PRIOR = {NONE: 0.5, UNKNOWN: 0.1}
-_SIZES = (0.02, 0.07, 0.25)
-# Barometers read 970 to 1040 hPa and rooms 0 to 35 C (5 %); 1,000 m are 10 %.
-_AIRS = (0.02, 0.05, 0.1)
-# Cells keep their calibration within some per cent; a lever that was measured wrongly is 10 to 16 % off.
-_GAINS = (0.01, 0.03, 0.1)
-# Cheeseman and Bennett at half a radius from the wall: 1.33, at one radius 1.07.
-_WALLS = (0.02, 0.07, 0.15)
-_ZEROS = (0.004, 0.015, 0.05)
 # Smooth changes of each load on its own, as (size, and its level, bend and local shape over it): nobody knows what
 # makes them; beyond a tenth of level it is rather another blade, whose coefficients are other lines with a slight bend.
 _UNKNOWN_KINDS = ((0.1, 1.0, 0.1, 0.06), (0.35, 1.0, 0.1, 0.06), (1.0, 0.35, 0.1, 0.06))
@@ -46,14 +40,6 @@ _EXACT = {1.0: 1.0}
 NEAR, MOST, FAMILIES = 20.0, 6, 3
 """An effect this many times less likely than the leading one is still in its class, which has at most so many members,
 or members of at most so many families: a law is rougher than its evidence."""
-FAMILY = {
-    **dict.fromkeys(("diameter", "pitch_offset", "section", "propeller", "untwist"), "blade"),
-    **dict.fromkeys(("duct", "ground_effect", "coaxial_neighbour", "recirculation"), "surroundings"),
-    **dict.fromkeys(("airspeed_offset", "airspeed_gain", "nacelle"), "airspeed"),
-    **dict.fromkeys(("thrust_gain", "torque_gain", "thrust_zero", "torque_zero"), "load cell"),
-    **dict.fromkeys(("battery_sag", "motor_heating", "motor"), "drive"),
-}
-"""What an engineer would look at, at once; an effect that is not listed is a family of its own."""
 _OWN_SHAPE, _FURTHER = "propeller", 20.0
 RIVAL, DOUBT = 0.1, 0.3
 """An effect beside which the unknown keeps more than the first is not named; a class beside the second is not given."""
@@ -64,304 +50,17 @@ _ODD_SPEED = 0.4
 # Pole pairs left out, and one more or less than set.
 _POLE_PAIRS = (*((p, 1) for p in range(2, 15)), *((p + 1, p) for p in range(2, 9)))
 
-Basis = Mapping[str, float]
-Term = tuple[float, Mapping[str, Basis]]
-
-
-@dataclass(frozen=True)
-class ScalingLaw:
-    """How one cause moves the channels.
-
-    Parameters
-    ----------
-    id : str
-        Of the effect, as in the catalogue of effects where it is there.
-    title : str
-        In words.
-    terms : tuple of (float, mapping)
-        Size relative to the first term, and channel to basis to weight. Bases: ``all`` 1; ``zero`` full scale over
-        reading; ``still`` 1 at rest, fading to 0 at the largest advance; ``slope`` the channel's own derivative with
-        respect to ln J; ``slip`` that over V; ``drag`` V^2 over thrust; ``n2`` square of the speed; ``volts`` ln of
-        the voltage ratio at equal command, or 1 where it is not recorded.
-    sizes : tuple of float
-        Standard deviations of the first term, share; they share the prior. [1]
-    says : str
-        Why this cause, in a sentence.
-    settles : str
-        Measurement that tells it from others.
-    source : str
-        Of the scaling.
-    kind : str
-        air, stand or drive.
-    flow : bool
-        Only with airspeed.
-    exact : bool
-        Whether nothing but the law is moved, as by instruments.
-    """
-
-    id: str
-    title: str
-    terms: tuple[Term, ...]
-    says: str
-    settles: str
-    source: str
-    kind: str = "air"
-    sizes: tuple[float, ...] = _SIZES
-    flow: bool = False
-    exact: bool = False
-
-
-_T, _Q = "thrust", "torque"
-LAWS: tuple[ScalingLaw, ...] = (
-    ScalingLaw(
-        "air_density",
-        "density of the air",
-        ((1.0, {_T: {"all": 1.0}, _Q: {"all": 1.0}}),),
-        "thrust and torque change by the same share at every speed",
-        "read barometer and thermometer in both runs",
-        "T = CT rho n^2 D^4, Q = CQ rho n^2 D^5",
-        sizes=_AIRS,
-        exact=True,
-    ),
-    ScalingLaw(
-        "rpm_scale",
-        "speed of rotation other than indicated",
-        ((1.0, {_T: {"all": 2.0, "slope": -1.0}, _Q: {"all": 2.0, "slope": -1.0}}),),
-        "thrust and torque change by the same square, whatever the speed",
-        "check the speed with an optical tachometer",
-        "T and Q go with n^2 at fixed CT, CQ; J with 1/n",
-        "stand",
-        (0.01, 0.04),
-    ),
-    ScalingLaw(
-        "diameter",
-        "another diameter, or a cut tip",
-        (
-            (1.0, {_T: {"all": 4.0, "slope": -1.0}, _Q: {"all": 5.0, "slope": -1.0}}),
-            (0.5, {_T: {"all": 1.0}}),
-            (0.5, {_Q: {"all": 1.0}}),
-        ),
-        "torque changes a little more than thrust, both at every speed",
-        "measure the diameter",
-        "T ~ D^4, Q ~ D^5 at fixed CT, CQ; the shape of another blade adds some per cent",
-        sizes=(0.01, 0.03, 0.1),
-    ),
-    ScalingLaw(
-        "pitch_offset",
-        "another pitch or blade angle",
-        (
-            (1.0, {_T: {"all": 1.0, "slope": -1.0}, _Q: {"all": 1.5, "slope": -1.0}}),
-            (0.8, {_Q: {"all": 1.0}}),
-            (0.15, {_T: {"slope": 1.0}, _Q: {"slope": 1.0}}),
-        ),
-        "torque changes more than thrust, at every speed, and the advance ratio of zero thrust moves",
-        "measure the blade angle; record a run with airspeed",
-        "momentum theory: P ~ T^1.5 at equal figure of merit; blades near stall add torque and no thrust",
-        sizes=(*_SIZES, 0.5),
-    ),
-    ScalingLaw(
-        "section",
-        "another blade section or surface",
-        ((1.0, {_T: {"all": 0.5}}), (1.0, {_Q: {"all": 1.0}})),
-        "torque and thrust change by constant shares of their own",
-        "compare the blades by weight and shape",
-        "lift and drag of the section move CT and CP apart",
-    ),
-    ScalingLaw(
-        "propeller",
-        "another propeller",
-        (
-            (1.0, {_T: {"all": 1.0}}),
-            (1.0, {_Q: {"all": 1.0}}),
-            (0.15, {_T: {"n2": 1.0}}),
-            (0.15, {_Q: {"n2": 1.0}}),
-            (0.5, {_T: {"slope": 1.0}, _Q: {"slope": 1.0}}),
-        ),
-        "both loads change by large shares of their own: pitch, blades, chord and section at once",
-        "compare label, blade count and weight",
-        "CT and CP of another blade",
-        sizes=(0.07, 0.2, 0.6, 1.5),
-    ),
-    ScalingLaw(
-        "untwist",
-        "elastic twist of the blades",
-        ((1.0, {_T: {"n2": 1.0}, _Q: {"n2": 1.3}}),),
-        "the change grows with the square of the speed",
-        "run a stiffer blade of the same shape",
-        "twist goes with rho Omega^2; P ~ T^1.5",
-        sizes=(0.03, 0.1),
-    ),
-    ScalingLaw(
-        "duct",
-        "a duct, or none",
-        ((1.0, {_T: {"still": 1.0}, _Q: {"still": -0.7}}), (0.7, {_Q: {"still": 1.0}})),
-        "thrust rises at the same speed while torque falls or stays, fading with airspeed",
-        "weigh rotor and duct apart",
-        "momentum theory of the ducted fan: T/T_rotor = 2 sigma at rest",
-    ),
-    ScalingLaw(
-        "ground_effect",
-        "a wall behind or before the propeller",
-        ((1.0, {_T: {"still": 1.0}}), (0.2, {_Q: {"still": 1.0}})),
-        "thrust changes at the same speed while torque stays, fading with airspeed",
-        "measure at twice the distance",
-        "Cheeseman and Bennett, ARC R&M 3021, 1955",
-        sizes=_WALLS,
-    ),
-    ScalingLaw(
-        "coaxial_neighbour",
-        "slipstream of another rotor",
-        ((1.0, {_T: {"all": -1.0}, _Q: {"all": -0.3}}), (0.35, {_Q: {"all": 1.0}}), (0.3, {_T: {"n2": 1.0}})),
-        "thrust falls at the same speed and torque far less",
-        "run the rotor alone",
-        "a rotor in a slipstream climbs: thrust falls, power hardly",
-        sizes=(*_SIZES, 0.5),
-    ),
-    ScalingLaw(
-        "recirculation",
-        "slipstream that returns through the room",
-        ((1.0, {_T: {"still": -1.0}, _Q: {"still": -0.2}}), (0.3, {_Q: {"still": 1.0}})),
-        "thrust falls at low advance ratio, torque less",
-        "run in the open, or watch the first seconds of a start",
-        "onset flow lowers the angle of attack as a climb does",
-        sizes=(0.02, 0.07),
-    ),
-    ScalingLaw(
-        "airspeed_offset",
-        "airspeed other than recorded",
-        ((1.0, {_T: {"slip": 1.0}, _Q: {"slip": 1.0}}),),
-        "both loads move as if J were another, most at low airspeed",
-        "use a second pitot tube",
-        "J = V/(n D)",
-        "stand",
-        flow=True,
-    ),
-    ScalingLaw(
-        "airspeed_gain",
-        "airspeed by another factor",
-        ((1.0, {_T: {"slope": 1.0}, _Q: {"slope": 1.0}}),),
-        "both loads move as if J were another by one factor",
-        "use a second pitot tube",
-        "J = V/(n D)",
-        "stand",
-        flow=True,
-    ),
-    ScalingLaw(
-        "nacelle",
-        "drag of what hangs in the stream",
-        ((1.0, {_T: {"drag": 1.0}}),),
-        "thrust changes with V^2, whatever the speed, torque stays",
-        "run the stand without propeller in the stream",
-        "D = q S CD",
-        flow=True,
-        sizes=_ZEROS,
-    ),
-    ScalingLaw(
-        "thrust_gain",
-        "calibration of the thrust cell",
-        ((1.0, {_T: {"all": 1.0}}),),
-        "thrust changes by one factor and torque does not",
-        "hang dead weights on the cell",
-        "T' = g T",
-        "stand",
-        _GAINS,
-    ),
-    ScalingLaw(
-        "torque_gain",
-        "calibration of the torque cell",
-        ((1.0, {_Q: {"all": 1.0}}),),
-        "torque changes by one factor and thrust does not",
-        "hang a known lever and weight",
-        "Q' = g Q",
-        "stand",
-        _GAINS,
-    ),
-    ScalingLaw(
-        "thrust_zero",
-        "zero of the thrust cell",
-        ((1.0, {_T: {"zero": 1.0}}),),
-        "thrust is off by a constant, which falls as 1/n^2",
-        "note the zero before and after the run",
-        "T' = T + z",
-        "stand",
-        _ZEROS,
-    ),
-    ScalingLaw(
-        "torque_zero",
-        "zero of the torque cell",
-        ((1.0, {_Q: {"zero": 1.0}}),),
-        "torque is off by a constant, which falls as 1/n^2",
-        "note the zero before and after the run",
-        "Q' = Q + z",
-        "stand",
-        _ZEROS,
-    ),
-    ScalingLaw(
-        "battery_sag",
-        "supply or battery voltage",
-        ((1.0, {"speed": {"volts": 1.0}}), (0.5, {"electrical": {"volts": 1.0}})),
-        "speed at one command goes with the voltage; loads at the measured speed stay",
-        "log voltage at the controller",
-        "n ~ command x V less I R",
-        "drive",
-        (*_SIZES, 0.8),
-    ),
-    ScalingLaw(
-        "motor_heating",
-        "winding and magnets of the motor get warm",
-        ((1.0, {"speed": {"all": -0.5}, "electrical": {"all": 1.0}}), (0.4, {"electrical": {"all": 1.0}})),
-        "more electrical power for the same speed and load, and less speed at one command",
-        "repeat after a pause",
-        "R = R0 (1 + 0.0039 dT)",
-        "drive",
-        sizes=(0.03, 0.1),
-    ),
-    ScalingLaw(
-        "motor",
-        "another motor, controller or setting",
-        (
-            (1.0, {"speed": {"all": 1.0}}),
-            (1.0, {"electrical": {"all": 1.0}}),
-            (0.5, {"speed": {"ramp": 1.0}}),
-            (0.5, {"electrical": {"ramp": 1.0}}),
-        ),
-        "speed at one command and electrical power change, loads at the measured speed stay",
-        "compare motor, controller and its settings",
-        "shares of their own",
-        "drive",
-    ),
-)
-"""Causes that are weighed without a blade."""
-
 
 @dataclass(frozen=True, eq=False)
 class Judgement:
-    """What is said of one sub-system.
+    """What is said of one sub-system."""
 
-    Parameters
-    ----------
-    verdict : str
-        none, named, sensor, class, unknown or insufficient.
-    effects : tuple of str
-        Of the verdict.
-    probability : mapping of str to float
-        Of every explanation, the likeliest first.
-    size : mapping of str to (value, error)
-        Of the first term of each effect: ln ratio, or share of full scale.
-    why : str
-        The rule that decided.
-    """
-
-    verdict: str
-    effects: tuple[str, ...]
-    probability: Mapping[str, float]
+    verdict: str  # none, named, sensor, class, unknown or insufficient
+    effects: tuple[str, ...]  # Of the verdict
+    probability: Mapping[str, float]  # Of every explanation, the likeliest first
+    # (value, error) of the first term of each effect: ln ratio, or share of full scale
     size: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    why: str = ""
-
-
-def law(name: str) -> ScalingLaw | None:
-    """Row of an effect; None for unit slips and rivals."""
-    return next((row for row in LAWS if row.id == name), None)
+    why: str = ""  # The rule that decided
 
 
 def _bases(c: MatchedChannel, volts: float | Array = 1.0) -> dict[str, Array]:

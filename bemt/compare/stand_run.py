@@ -51,46 +51,21 @@ _ROTOR_WORDS = ("left", "right", "upper", "lower", "front", "rear", "A", "B", "C
 
 @dataclass(frozen=True, eq=False)
 class StandRun:
-    """Steady points of one recording.
+    """Steady points of one recording, and what holds for all of it."""
 
-    Parameters
-    ----------
-    name : str
-        File, and the rows that were chosen.
-    values : mapping of str to (N,) float
-        Channels in SI, rpm in rev/min; ``command`` is the pulse width [s] or the throttle [1].
-    u : mapping of str to (N,) float
-        Standard uncertainty of each, uncorrelated part; NaN: unknown.
-    session : mapping of str to float
-        Scatter between the runs of this recording at equal speed, share, where it shows.
-    command : str
-        ``pwm_s``, ``throttle`` or "" without one.
-    density : float
-        Mean recorded density, or that of recorded pressure and temperature [kg/m3]; NaN: not recorded.
-    notes : tuple of str
-        What the reduction decided.
-    diameter_m : float
-        As the recording or the label says; NaN: unknown. [m]
-    temperature_K : float
-        Mean of the air [K]; NaN: not recorded.
-    shift : mapping of str to float
-        What lag or hysteresis shifts a load by, standard deviation as a share of its largest value [1].
-    """
-
-    name: str
-    values: Mapping[str, Array]
-    u: Mapping[str, Array]
-    session: Mapping[str, float]
-    command: str
-    density: float
-    notes: tuple[str, ...]
-    diameter_m: float
-    temperature_K: float = math.nan
+    points: Dataset  # Channels in SI, rpm in rev/min; ``command`` is the pulse width [s] or the throttle [1]
+    command: str  # ``pwm_s``, ``throttle`` or "" without one
+    density: float  # Mean recorded density, or that of recorded pressure and temperature [kg/m3]; NaN: not recorded
+    diameter_m: float  # As the recording or the label says [m]; NaN: unknown
+    temperature_K: float = math.nan  # Mean of the air [K]; NaN: not recorded
+    # Scatter between the runs of this recording at equal speed, share, by channel, where it shows
+    session: Mapping[str, float] = field(default_factory=dict)
+    # What lag or hysteresis shifts a load by, standard deviation as a share of its largest value, by channel [1]
     shift: Mapping[str, float] = field(default_factory=dict)
 
     def __len__(self) -> int:
         """Give the number of points."""
-        return int(next(iter(self.values.values())).size)
+        return len(self.points)
 
 
 def _kept(imported: Dataset, column: str, wanted: str, where: str) -> NDArray[np.bool_]:
@@ -145,8 +120,6 @@ def _of_rotor(imported: Dataset, word: str, where: str) -> Dataset:
 def selected(imported: Dataset, conditions: Sequence[str], where: str) -> Dataset:
     """Keep the rows, or the rotor, that a user means.
 
-    Examples
-    --------
     >>> made = Dataset("bench", "table", {"rpm": [4e3, 5e3]}, lines=(2, 3))
     >>> selected(made, ["rpm=4500:6000"], "a.csv").lines
     (3,)
@@ -177,8 +150,6 @@ _AIR_RANGES = {"temperature_K": (_COLD, _HOT), "pressure_Pa": (4e4, 1.1e5), "den
 def with_air(imported: Dataset, told: str | None, where: str) -> Dataset:
     """Add the air of the day that a user tells, such as ``22C,1013hPa``, in place of what is recorded.
 
-    Examples
-    --------
     >>> told = with_air(Dataset("bench", "table", {"rpm": [4e3]}), "22C, 1013hPa", "--air-a").provenance
     >>> round(told["constants"]["density_kg_m3"], 3)
     1.196
@@ -209,37 +180,42 @@ def with_air(imported: Dataset, told: str | None, where: str) -> Dataset:
     return replace(imported, values=left, u=u, provenance={**imported.provenance, "constants": constants | known})
 
 
-def stand_run(
-    imported: Dataset, name: str, diameter_m: float | None = None, conditions: Sequence[str] = ()
-) -> StandRun:
+def stand_run(imported: Dataset, name: str, diameter_m: float | None = None) -> StandRun:
     """Reduce one recording for a comparison."""
-    imported = selected(imported, conditions, name)
     units = {k: unit for k, unit in imported.units.items() if unit or k not in DIMENSIONLESS}
     imported = replace(imported, units=units)  # a throttle has none
     series, ramp = _reduced(imported, diameter_m)
-    values = {k: np.asarray(series.values[k], dtype=float) for k in _WANTED if k in series.values}
+    values = {k: series[k] for k in _WANTED if k in series}
     if not {"thrust_N", "torque_Nm", "power_W"} & values.keys() and "rpm" not in values and "J" not in values:
         raise InputError(Fault(name, "", "no speed", "rpm, or J with coefficients", "Nothing to compare at"))
-    u = {k: np.asarray(series.u[k], dtype=float) for k in values if k in series.u}
-    command = next((k for k in ("pwm_s", "throttle") if k in series.values and _moves(series.values[k])), "")
+    command = next((k for k in ("pwm_s", "throttle") if k in series and _moves(series[k])), "")
     if command:
-        values["command"] = np.asarray(series.values[command], dtype=float)
+        values["command"] = series[command]
     if "power_W" in values and "torque_Nm" in values:
         del values["power_W"]
+    constants = imported.provenance.get("constants", {})
     rho = values.get("density_kg_m3", np.full(1, np.nan))
     density = float(np.nanmean(rho)) if np.isfinite(rho).any() else math.nan
-    constants = imported.provenance.get("constants", {})
     if not math.isfinite(density):
         density = float(constants.get("density_kg_m3", math.nan))
-    told = f"{name} ({', '.join(conditions)})" if conditions else name
-    session = {k: float(v["session"]) for k, v in reduction(series).correlated.items() if v.get("session")}
     diameter = diameter_m if diameter_m is not None else float(constants.get("diameter_m", math.nan))
-    notes = (*ramp, *(n for n in series.notes if "no density" not in n))
     warm = values.get("temperature_K", np.array([constants.get("temperature_K", math.nan)]))
     warm = warm[(warm > _COLD) & (warm < _HOT)]
-    temperature = float(warm.mean()) if warm.size else math.nan
     return StandRun(
-        told, values, u, session, command, density, notes, diameter, temperature, _shifts(series, bool(ramp))
+        Dataset(
+            series.kind,
+            name,
+            values,
+            {k: series.u[k] for k in values if k in series},
+            notes=(*ramp, *(n for n in series.notes if "no density" not in n)),
+            units={"command": "s" if command == "pwm_s" else "-"},
+        ),
+        command,
+        density,
+        diameter,
+        float(warm.mean()) if warm.size else math.nan,
+        {k: float(v["session"]) for k, v in reduction(series).correlated.items() if v.get("session")},
+        _shifts(series, bool(ramp)),
     )
 
 

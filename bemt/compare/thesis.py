@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from decimal import Decimal
 from typing import Any
@@ -47,40 +47,20 @@ _PITCH_D = tuple(1.0 / x for x in reversed(k.D_OVER_P_USABLE))
 
 @dataclass(frozen=True)
 class ThesisItem:
-    """One stated number beside ours.
+    """One stated number beside ours."""
 
-    Attributes
-    ----------
-    section : str
-        Part of the thesis.
-    quantity : str
-        What it is.
-    stated : str
-        As printed, so that its rounding is known.
-    ours : number, str or None
-        Computed; None for an input.
-    unit : str
-        Unit of both.
-    status : str
-        One of `STATUSES`.
-    note : str
-        Reason or remark.
-    """
-
-    section: str
-    quantity: str
-    stated: str
-    ours: float | str | None
-    unit: str
-    status: str
-    note: str = ""
+    section: str  # Part of the thesis
+    quantity: str  # What it is
+    stated: str  # As printed, so that its rounding is known
+    ours: float | str | None  # Computed; None for an input
+    unit: str  # Unit of both
+    status: str  # One of `STATUSES`
+    note: str = ""  # Reason or remark
 
 
 def matches(stated: str, value: float) -> str | None:
     """Compare a computed number with a printed one, at the digits that were printed.
 
-    Examples
-    --------
     >>> matches("0.0308", 0.030779), matches("0.0307", 0.030779), matches("0.0306", 0.030779)
     ('reproduced', 'reproduced within rounding', None)
     """
@@ -96,8 +76,6 @@ def matches(stated: str, value: float) -> str | None:
 def k1k2_variants() -> list[tuple[str, tuple[float, ...]]]:
     """Search for the rounding of inputs that gives all four printed K1/K2 values.
 
-    Notes
-    -----
     Varied: standard gravity (9.80665, 9.81, 9.8), K1 (exact, 0.3034, 0.303), inch (0.0254, 0.025), each at most once.
     """
     choices = {
@@ -128,38 +106,24 @@ def mach_blindness() -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class PrintedValue:
-    """One way to reach the stated K1/K2 thrust of the fan.
+    """One way to reach the stated K1/K2 thrust of the fan."""
 
-    Attributes
-    ----------
-    formula, area, unit : str
-        Formula variant, area that makes thrust, unit in which the number is read.
-    diameter_m, pitch_m, pitch_over_D : float
-        Diameter [m], the pitch that gives the number [m], their ratio [-].
-    unit_factor : float
-        Newtons per unit read over newtons per kilogram-force: 1 agrees with the claim. [-]
-    sensible : bool
-        Pitch inside the stated range of the model, D/p 0.5-2.5.
-    above_exhaust : bool
-        Pitch above the one that the stated exhaust speed demands.
-    """
-
+    # Formula variant, area that makes thrust, unit in which the number is read
     formula: str
     area: str
     unit: str
+    # Diameter [m], the pitch that gives the number [m], their ratio [-]
     diameter_m: float
     pitch_m: float
     pitch_over_D: float
-    unit_factor: float
-    sensible: bool
-    above_exhaust: bool
+    unit_factor: float  # Newtons per unit read over newtons per kilogram-force: 1 agrees with the claim [-]
+    sensible: bool  # Pitch inside the stated range of the model, D/p 0.5-2.5
+    above_exhaust: bool  # Pitch above the one that the stated exhaust speed demands
 
 
 def ds30_readings() -> list[PrintedValue]:
     """Search for what gives 2.64: over formula, area, diameter and unit, solved for the pitch that is not given.
 
-    Notes
-    -----
     K1/K2 at rest is F = rho A n^2 K1^1.5 D^1.5 p^0.5, so p = D (F/F(p = D))^2; without the factor (K1 D/p)^K2 it is
     F = rho A n^2 p^2, so p = D (F/F(p = D))^0.5.
     """
@@ -180,17 +144,15 @@ def ds30_readings() -> list[PrintedValue]:
     return sorted(out, key=lambda r: (not r.sensible, r.formula != "K1/K2", abs(math.log(r.pitch_over_D))))
 
 
-def nearest_slip(ratio: float, factors: Mapping[str, float] = SLIP_FACTORS) -> tuple[str, float, float]:
+def nearest_slip(ratio: float) -> tuple[str, float, float]:
     """Name the slip of units nearest to a ratio.
 
-    Examples
-    --------
     >>> name, factor, miss = nearest_slip(9.78)
     >>> name, round(factor, 5), round(miss, 4)
     ('kgf <-> N', 9.80665, -0.0027)
     """
     r = max(ratio, 1.0 / ratio)
-    name, f = min(((n, max(v, 1.0 / v)) for n, v in factors.items()), key=lambda nv: abs(math.log(r / nv[1])))
+    name, f = min(((n, max(v, 1.0 / v)) for n, v in SLIP_FACTORS.items()), key=lambda nv: abs(math.log(r / nv[1])))
     return name, f, r / f - 1.0
 
 
@@ -219,8 +181,6 @@ def ds30_finding() -> dict[str, Any]:
 def clarke_factor() -> tuple[float, float]:
     """Power-invariant Clarke transform of a balanced three-phase machine, by numbers.
 
-    Examples
-    --------
     >>> [round(x, 6) for x in clarke_factor()]
     [1.224745, 1.224745]
     """
@@ -244,9 +204,15 @@ class ThesisFacts:
         self.items.append(ThesisItem(self.section, quantity, stated, None, unit, INPUT, note))
 
     def check(
-        self, quantity: str, stated: str, ours: float, unit: str = "", note: str = "",
-        variants: Iterable[tuple[str, float]] = (), because: str = "",
-    ) -> None:  # fmt: skip
+        self,
+        quantity: str,
+        stated: str,
+        ours: float,
+        unit: str = "",
+        note: str = "",
+        variants: Iterable[tuple[str, float]] = (),
+        because: str = "",
+    ) -> None:
         """Add a computed number; the status follows from the printed digits, then from variants of rounded inputs."""
         status = matches(stated, ours)
         if status != REPRODUCED:
@@ -261,5 +227,6 @@ class ThesisFacts:
     def word(self, quantity: str, stated: str, ours: str, because: str = "", note: str = "") -> None:
         """Add a statement in words; equal or not."""
         same = stated == ours
-        self.items.append(ThesisItem(self.section, quantity, stated, ours, "", REPRODUCED if same else NOT,
-                               note if same else because))  # fmt: skip
+        self.items.append(
+            ThesisItem(self.section, quantity, stated, ours, "", REPRODUCED if same else NOT, note if same else because)
+        )

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bemt.base.errors import Fault, InputError
-from bemt.dataset.points import Dataset
+
+if TYPE_CHECKING:
+    from bemt.dataset.points import Dataset
 
 __all__ = ["plot"]
 

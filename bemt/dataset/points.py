@@ -15,7 +15,6 @@ import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -23,51 +22,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bemt import coefficients as co
-from bemt.base import units
 from bemt.base.errors import Fault, InputError
+from bemt.dataset import plot as pictures
+from bemt.dataset import tables
+from bemt.dataset.channels import KINDS, ORIGINS, channel_fault, unit_in
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-__all__ = ["DIMENSIONLESS", "KINDS", "ORIGINS", "Dataset", "concat"]
-
-KINDS = ("bemt", "k1k2", "cfd", "bench", "vendor")
-"""Kinds that comparisons know; others (``k1k2_printed``, ``flight``) are allowed and kept apart."""
-
-ORIGINS = ("random", "session", "input", "model", "numerics")
-"""Where an uncertainty comes from: scatter of points, what a session shares (gain, zero), inputs not known exactly, the
-model's own error on real rotors, discretisation."""
-
-DIMENSIONLESS = frozenset(
-    {"CT", "CP", "CQ", "J", "eta", "FM", "Re", "Re75", "M_tip", "M_tip_helical", "throttle", "duct_share", "run"}
-)
-"""Channel names without a unit."""
+__all__ = ["Dataset"]
 
 Array = NDArray[np.float64]
 _KIND = re.compile(r"[a-z][a-z0-9_]*")
-
-
-@lru_cache(maxsize=1024)
-def channel_fault(name: str) -> tuple[str, str, str] | None:
-    """Reason why a channel name is refused: (got, expected, hint)."""
-    if name == "rpm" or name in DIMENSIONLESS:
-        return None
-    base, unit = units.split_suffix(name)
-    if unit is None or not base:
-        return (f"channel {name!r}", "rpm, a coefficient, or a name that ends in its SI unit", "As in thrust_N")
-    if unit.factor != 1.0 or unit.offset != 0.0:
-        hint = f"Convert it with units.to_si(..., {unit.suffix!r})"
-        return (f"channel {name!r} in {unit.suffix}", "an SI unit", hint)
-    return None
-
-
-def unit_in(name: str) -> str:
-    """Unit that the name of a channel says; "-" for none."""
-    if name == "rpm" or name in DIMENSIONLESS:
-        return "rpm" if name == "rpm" else "-"
-    unit = units.split_suffix(name)[1]
-    return "" if unit is None else unit.suffix or "-"
 
 
 def _still(array: NDArray[Any]) -> bool:
@@ -233,8 +200,6 @@ class Dataset:
 
     def _repr_html_(self) -> str:
         """Show the points in a notebook: each value with its standard uncertainty, where one is known."""
-        from bemt.dataset import tables
-
         return tables.to_html(self)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -312,9 +277,11 @@ class Dataset:
         0.03101
         """
         factors = {
-            "CT_rotor": ("CT", co.CT_PER_ROTOR), "CP_rotor": ("CP", co.CP_PER_ROTOR),
-            "CQ_rotor": ("CQ", co.CQ_PER_ROTOR), "mu_axial": ("J", math.pi),
-        }  # fmt: skip
+            "CT_rotor": ("CT", co.CT_PER_ROTOR),
+            "CP_rotor": ("CP", co.CP_PER_ROTOR),
+            "CQ_rotor": ("CQ", co.CQ_PER_ROTOR),
+            "mu_axial": ("J", math.pi),
+        }
 
         def convert(channels: Mapping[str, ArrayLike]) -> dict[str, Array]:
             pairs = ((*factors.get(key, (key, 1.0)), array) for key, array in channels.items())
@@ -437,8 +404,6 @@ class Dataset:
               rpm  thrust_N  u_thrust_N
         0  6000.0      10.0         0.1
         """
-        from bemt.dataset import tables
-
         return tables.to_pandas(self)
 
     def to_xarray(self) -> xr.Dataset:
@@ -460,8 +425,6 @@ class Dataset:
         >>> x["thrust_N"].attrs["units"], x.sizes["point"]
         ('N', 1)
         """
-        from bemt.dataset import tables
-
         return tables.to_xarray(self)
 
     def plot(self, x: str | None = None, y: Sequence[str] = (), ax: Any = None) -> Any:
@@ -492,9 +455,7 @@ class Dataset:
         >>> d.plot().get_xlabel()
         'rpm'
         """
-        from bemt.dataset.plot import plot
-
-        return plot(self, x, y, ax)
+        return pictures.plot(self, x, y, ax)
 
     def to_rows(self) -> list[dict[str, Any]]:
         """Give one plain dictionary per point, fit for JSON.
@@ -523,53 +484,3 @@ class Dataset:
                 row["label"] = self.labels[i]
             rows.append(row)
         return rows
-
-
-def concat(series: Iterable[Dataset], name: str | None = None) -> Dataset:
-    """Join series of one kind, point after point.
-
-    Parameters
-    ----------
-    series : iterable of Dataset
-        At least one; all of the same kind.
-    name : str or None
-        Name of the result; None takes the first.
-
-    Returns
-    -------
-    Dataset
-        All channels of all; NaN where a part lacks one. ``provenance["parts"]`` lists (name, points, provenance).
-
-    Raises
-    ------
-    InputError
-        When there is none, or kinds differ.
-
-    Examples
-    --------
-    >>> a, b = Dataset("bench", "a", {"J": [0.1]}), Dataset("bench", "b", {"J": [0.2], "CT": [0.1]})
-    >>> concat([a, b])["CT"]
-    array([nan, 0.1])
-    """
-    parts = list(series)
-    kinds = sorted({part.kind for part in parts})
-    if len(kinds) != 1:
-        got = f"kinds {', '.join(kinds)}" if kinds else "no series"
-        raise InputError(Fault(name or "concat", "", got, "one or more series of one kind", ""))
-    if len(parts) == 1:
-        return parts[0] if name is None else replace(parts[0], name=name)
-    channels = list(dict.fromkeys(key for part in parts for key in part.values))
-
-    def joined(attribute: str, key: str) -> Array:
-        return np.concatenate([getattr(p, attribute).get(key, np.full(len(p), np.nan)) for p in parts])
-
-    return Dataset(
-        kinds[0],
-        parts[0].name if name is None else name,
-        {key: joined("values", key) for key in channels},
-        {key: joined("u", key) for key in channels},
-        sum((part.flags for part in parts), ()),
-        {"parts": tuple((part.name, len(part), dict(part.provenance)) for part in parts)},
-        sum((part.labels or ("",) * len(part) for part in parts), ()) if any(part.labels for part in parts) else (),
-        units={key: unit for part in parts for key, unit in part.units.items()},
-    )

@@ -1,4 +1,4 @@
-"""A dataset as a table of pandas or xarray, and a table as a dataset."""
+"""A dataset as a table of pandas or xarray, or of a notebook."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bemt.base import units
-from bemt.base.errors import Fault, InputError, needs
-from bemt.dataset.points import DIMENSIONLESS, ORIGINS, Array, Dataset, channel_fault
+from bemt.base.errors import needs
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-__all__ = ["from_pandas", "to_html", "to_pandas", "to_xarray"]
+    from bemt.dataset.points import Dataset
+
+__all__ = ["to_html", "to_pandas", "to_xarray"]
 
 
 def to_pandas(d: Dataset) -> pd.DataFrame:
@@ -43,77 +44,6 @@ def to_xarray(d: Dataset) -> xr.Dataset:
         _, unit = units.split_suffix(str(key))
         out[key].attrs["units"] = "1" if unit is None else unit.suffix
     return out
-
-
-def from_pandas(frame: pd.DataFrame, kind: str = "bench", name: str = "table", **more: Any) -> Dataset:
-    """Make a dataset from a table whose headings carry their units.
-
-    Parameters
-    ----------
-    frame : pandas.DataFrame
-        Columns ``rpm``, coefficients, or names that end in a unit (``thrust_N``, ``thrust_gf``, ``airspeed_km_h``);
-        they are converted to SI by it. ``u_<column>`` is a standard uncertainty, ``flags`` words joined by "; ".
-    kind, name : str
-        As for :class:`Dataset`.
-    **more
-        ``provenance``, ``notes``.
-
-    Returns
-    -------
-    Dataset
-        With the index as labels, unless it only counts.
-
-    Raises
-    ------
-    InputError
-        With all faults: headings without a known unit, cells that are no numbers.
-
-    Examples
-    --------
-    >>> import pandas as pd
-    >>> d = from_pandas(pd.DataFrame({"rpm": [6000], "thrust_gf": [1000.0]}))
-    >>> d["thrust_N"].round(5), d.kind
-    (array([9.80665]), 'bench')
-    """
-    import pandas as pd
-
-    faults: list[Fault] = []
-    values: dict[str, Array] = {}
-    u: dict[str, Array] = {}
-    u_by: dict[str, dict[str, Array]] = {}
-    for heading in map(str, frame.columns):
-        if heading == "flags":
-            continue
-        column = heading.removeprefix("u_") if heading.startswith("u_") else heading
-        origin = next((o for o in ORIGINS if column.startswith(f"{o}_") and heading.startswith("u_")), "")
-        column = column.removeprefix(f"{origin}_") if origin else column
-        base, unit = units.split_suffix(column)
-        scale, offset, channel = 1.0, 0.0, column
-        named = column == "rpm" or column in DIMENSIONLESS
-        if not named and unit is not None and (unit.factor, unit.offset) != (1.0, 0.0):
-            base_unit = (unit.dimension, 1.0, 0.0)
-            si = next(s for s, o in units.UNITS.items() if (o.dimension, o.factor, o.offset) == base_unit)
-            scale, offset, channel = unit.factor, unit.offset, f"{base}_{si}"
-        elif fault := channel_fault(column):
-            faults.append(Fault(name, heading, *fault))
-            continue
-        try:
-            numbers = pd.to_numeric(frame[heading]).to_numpy(dtype=float)
-        except (ValueError, TypeError) as error:
-            faults.append(Fault(name, heading, str(error), "a column of numbers"))
-            continue
-        if heading == column:
-            values[channel] = numbers * scale + offset
-        elif origin:
-            u_by.setdefault(origin, {})[channel] = numbers * scale
-        else:
-            u[channel] = numbers * scale
-    if faults:
-        raise InputError(faults)
-    flags = tuple(tuple(w for w in str(words).split("; ") if w) for words in frame["flags"]) if "flags" in frame else ()
-    counted = isinstance(frame.index, pd.RangeIndex)
-    labels = () if counted else tuple(map(str, frame.index))
-    return Dataset(kind, name, values, u, flags, more.pop("provenance", {}), labels, u_by, more.pop("notes", ()))
 
 
 def to_html(d: Dataset) -> str:

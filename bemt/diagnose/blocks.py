@@ -69,7 +69,7 @@ def held_out(
     member = block[problem.point]
     hyper = found.states[0].hyper
     C = noise.covariance(problem, hyper)
-    K = next((k for n, k in noise.rivals(problem) if n == found.states[0].best_rival), np.zeros_like(C))
+    K = next((k.covariance for k in found.rivals if k.name == found.states[0].best_rival), np.zeros_like(C))
     S, log_w = _columns(found, what)
     r = problem.residual
     after, smooth_part = np.array(problem.centre), np.array(problem.centre)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.diagnose.form import Form, Forms, form_modes
+from bemt.diagnose.form import Form, Forms, columns, form_modes
 
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence, State
@@ -85,7 +85,8 @@ def confusion(found: Evidence, settings: dict[str, int] | None = None) -> Confus
     at = [settings.get(c.id, c.middle) for c in found.candidates]
     matrix = np.zeros((len(ids), len(ids)))
     if ids:
-        forms = Forms.of(state.white, found.candidates, at, [modes[i] for i in ids])
+        own = [columns(c, g, modes[c.id]) for c, g in zip(found.candidates, at, strict=True)]
+        forms = Forms.of(state.white, own)
         starts = [found.spans[i].start for i in ids]
         for k, s in enumerate(chosen):
             square = _squares(s[:, None] - state.S, forms[k])

@@ -73,7 +73,7 @@ class Contrast:
 
     def __repr__(self) -> str:
         """Say the verdict in a line."""
-        runs = f"{self.change.a.name}, {self.change.b.name}"
+        runs = f"{self.change.a.points.name}, {self.change.b.points.name}"
         return f"<contrast of {runs}: {' '.join((self.verdict, ', '.join(self.effects))).strip()}>"
 
 
@@ -127,8 +127,7 @@ def compare(
     runs = []
     for name, rows, imported in zip(names, conditions, read, strict=True):
         try:
-            run = stand_run(imported, name, D)
-            runs.append(replace(run, name=f"{name} ({', '.join(rows)})" if rows else name))
+            runs.append(stand_run(imported, f"{name} ({', '.join(rows)})" if rows else name, D))
         except InputError as error:
             faults += error.faults
     if faults:

@@ -7,7 +7,7 @@ done for all settings of the covariance and added up with their prior weights.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 from bemt.diagnose import form, noise, prior
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
 from bemt.diagnose.form import Form, Forms
+from bemt.diagnose.signatures import effect_of
 
 if TYPE_CHECKING:
-    from bemt.diagnose.noise import Hyper, Whitener
+    from bemt.diagnose.noise import Conditional, Hyper, Rival, Whitener
     from bemt.diagnose.problem import Problem
     from bemt.diagnose.signatures import Candidate
 
@@ -32,6 +33,10 @@ Array = NDArray[np.float64]
 _DROP = 8.0
 _KEEP = 6
 _PAIR_LEADERS = 60
+# Leading pairs that are solved together: what one effect changes depends on the other.
+_TOGETHER, _ROUNDS = 24, 2
+FOR_NULLS = 3
+"""Settings of the covariance, best first, that nulls are weighed under; only these keep what rivals need [1]."""
 
 
 @contextmanager
@@ -58,14 +63,14 @@ def log_mean(log_values: Array, log_weights: Array, axis: int = -1) -> Array:
 
 @dataclass(eq=False)
 class State:
-    """Readings and signatures whitened by one setting of the covariance.
+    """Readings and signatures whitened by one setting of the covariance, those of the test given the reference.
 
     Attributes
     ----------
     hyper : Hyper
         The setting.
-    white : Whitener
-        Its factor.
+    white : Conditional
+        Its factors.
     r : (M,) float
         Whitened residual [1].
     S : (M, G) float
@@ -74,23 +79,49 @@ class State:
         Half of their squared lengths [1].
     forms : dict of str to Form
         Error of the form of each candidate, at its best setting.
-    rivals : list of (str, Whitener)
-        Factors for the unknown smooth effect.
+    rivals : list of (Conditional, Whitener)
+        Factors without and with each unknown smooth effect.
     log_z : dict of Explanation to float
         Logarithm of the evidence per explanation.
     best_rival : str
         Unknown smooth effect of largest evidence.
+    mixed : dict of Explanation to (float array, int, int)
+        What two effects change together beyond the sum of both, whitened, and the columns at which it was solved.
     """
 
     hyper: Hyper
-    white: Whitener
+    white: Conditional
     r: Array
     S: Array
     half: Array
     forms: dict[str, Form] = field(default_factory=dict)
-    rivals: list[tuple[str, Whitener]] = field(default_factory=list)
+    rivals: list[tuple[Conditional, Whitener]] = field(default_factory=list)
     log_z: dict[Explanation, float] = field(default_factory=dict)
     best_rival: str = ""
+    mixed: dict[Explanation, tuple[Array, int, int]] = field(default_factory=dict)
+
+    def both(self, pair: Explanation, spans: Mapping[str, slice], log_w: Array) -> Array:
+        """Log likelihood over that of "none" of all settings of two effects, priors included, forms left out, (A, B).
+
+        Signatures are added; what they change together, where it was solved, grows as the product of their sizes.
+        """
+        A, B = (spans[i] for i in pair)
+        a, b = (self.S[:, x].T @ self.r - self.half[x] + log_w[x] for x in (A, B))
+        total = a[:, None] + b[None, :] - self.S[:, A].T @ self.S[:, B]
+        if pair in self.mixed:
+            extra, i, j = self.mixed[pair]
+            share = np.outer(self.S[:, A].T @ self.S[:, i] / (2.0 * self.half[i]),
+                             self.S[:, B].T @ self.S[:, j] / (2.0 * self.half[j]))  # fmt: skip
+            met = (extra @ self.S[:, A])[:, None] + (extra @ self.S[:, B])[None, :]
+            total += share * (extra @ self.r - met) - 0.5 * share**2 * (extra @ extra)
+        return np.asarray(total)
+
+    def best_of(self, pair: Explanation, spans: Mapping[str, slice], log_w: Array) -> tuple[int, int]:
+        """Columns of the best setting of two effects."""
+        total = self.both(pair, spans, log_w)
+        i, j = np.unravel_index(int(np.argmax(total)), total.shape)
+        A, B = (spans[k] for k in pair)
+        return A.start + int(i), B.start + int(j)
 
     def gains(self, name: str, span: slice, R: Array) -> Array:
         """Log likelihood over that of "none" of every setting of a candidate for whitened residuals. [1]"""
@@ -123,6 +154,8 @@ class Evidence:
         Columns of each candidate in ``State.S``.
     log_w : (G,) float
         Logarithm of the prior weight of each column within its candidate [1].
+    rivals : tuple of Rival
+        Unknown smooth effects.
     """
 
     problem: Problem
@@ -131,6 +164,7 @@ class Evidence:
     probability: dict[Explanation, float]
     spans: dict[str, slice]
     log_w: Array
+    rivals: tuple[Rival, ...] = ()
 
     def of(self, name: str) -> Candidate:
         """Candidate by id."""
@@ -153,45 +187,61 @@ def singles(state: State, R: Array, spans: dict[str, slice], log_w: Array) -> di
     return out
 
 
-def unknown(r: Array, rivals: Sequence[tuple[str, Whitener]], log_det: float, back: Array, base: Array) -> Array:
-    """Log evidence over that of "none" of each rival kernel, (K,) or (K, B).
-
-    ``back`` is the residual before whitening, ``base`` half its squared whitened length.
-    """
+def unknown(rivals: Sequence[tuple[Conditional, Whitener]], residual: Array) -> Array:
+    """Log evidence over that of "none" of each rival for residuals (M,) or (M, B): (K,) or (K, B)."""
+    rest: dict[int, tuple[Array, Array]] = {}
     rows = []
-    for _, white in rivals:
-        w = white(back)
-        rows.append(base - 0.5 * np.sum(w * w, axis=0) - (white.log_det - log_det))
+    for given, white in rivals:
+        if id(given) not in rest:
+            e = given.rest(residual)
+            w = given.white(e)
+            rest[id(given)] = e, 0.5 * np.sum(w * w, axis=0)
+        e, base = rest[id(given)]
+        w = white(e)
+        rows.append(base - 0.5 * np.sum(w * w, axis=0) - (white.log_det - given.white.log_det))
     return np.array(rows)
 
 
 def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True) -> Evidence:
     """Weigh all explanations."""
-    r = problem.residual
     spans, S, log_w = _stacked(problem, candidates)
-    covariance = dict(noise.covariances(problem))
     modes = form.form_modes(problem, candidates)
     # a few settings of each effect are enough to see which covariances matter
     coarse = _Table(problem, S, log_w, spans, candidates, modes, _few(candidates))
-    best = {h: coarse.state(h, C).log_z for h, C in covariance.items()}
+    best: dict[Hyper, dict[Explanation, float]] = {}
+    top = -np.inf
+    for h, C in noise.covariances(problem):
+        best[h] = coarse.state(h, C, top - _DROP).log_z
+        top = max(top, max(best[h].values()) + np.log(h.weight))
     fine = _Table(problem, S, log_w, spans, candidates, modes, None)
-    states = [fine.state(h, covariance[h]) for h in _leading(best)]
-    kernels = noise.rivals(problem)
-    for state in states:
-        state.rivals = [(name, noise.whitener(covariance[state.hyper] + K, problem.u)) for name, K in kernels]
-        base = 0.5 * float(state.r @ state.r)
-        gains = unknown(state.r, state.rivals, state.white.log_det, r, np.asarray(base))
+    rivals = noise.rivals(problem)
+    states: list[State] = []
+    for h in _leading(best):
+        C = noise.covariance(problem, h)
+        state = fine.state(h, C)
+        state.rivals = noise.unlike(C, problem.u, rivals)
+        gains = unknown(state.rivals, problem.residual)
         if gains.size:
-            state.best_rival = kernels[int(np.argmax(gains))][0]
+            state.best_rival = rivals[int(np.argmax(gains))].name
             state.log_z[UNKNOWN] = state.log_z[NONE] + float(log_mean(gains, np.full(gains.size, -np.log(gains.size))))
         else:
             state.log_z[UNKNOWN] = state.log_z[NONE]
         if pairs:
             _pairs(state, spans, log_w)
-    weights = prior.prior_weights(problem, list(spans))
-    probability = _posterior(states, prior.log_priors(weights, pairs))
-    states.sort(key=lambda s: -(max(s.log_z.values()) + np.log(s.hyper.weight)))
-    return Evidence(problem, tuple(candidates), tuple(states), probability, spans, log_w)
+        states.append(state)
+        for s in sorted(states, key=_standing)[FOR_NULLS:]:
+            s.rivals = []
+    before = prior.log_priors(prior.prior_weights(problem, list(spans)), pairs)
+    if pairs:
+        _solve_pairs(problem, candidates, states, spans, log_w, before)
+    probability = _posterior(states, before)
+    states.sort(key=_standing)
+    return Evidence(problem, tuple(candidates), tuple(states), probability, spans, log_w, rivals)
+
+
+def _standing(state: State) -> float:
+    """Place of a setting of the covariance among others: smallest first."""
+    return -float(max(state.log_z.values()) + np.log(state.hyper.weight))
 
 
 def _stacked(problem: Problem, candidates: Sequence[Candidate]) -> tuple[dict[str, slice], Array, Array]:
@@ -205,8 +255,8 @@ def _stacked(problem: Problem, candidates: Sequence[Candidate]) -> tuple[dict[st
 def bare(problem: Problem, candidates: Sequence[Candidate], hyper: Hyper) -> Evidence:
     """Whitened signatures under one covariance, without weighing: all that a plan needs."""
     spans, S, log_w = _stacked(problem, candidates)
-    white = noise.whitener(noise.covariance(problem, hyper), problem.u)
-    Sw = white(S)
+    white = noise.conditional(noise.covariance(problem, hyper), problem.u, problem.free)
+    Sw = white.changes(S)
     state = State(hyper, white, white(problem.residual), Sw, 0.5 * np.sum(Sw * Sw, axis=0))
     return Evidence(problem, tuple(candidates), (state,), {}, spans, log_w)
 
@@ -240,36 +290,47 @@ class _Table:
         self.problem, self.candidates = problem, candidates
         self.modes = [modes[c.id] for c in candidates]
         columns = np.arange(log_w.size) if some is None else some
-        self.vectors = np.column_stack([problem.residual, S[:, columns]])
+        self.S, self.residual = S if some is None else S[:, columns], problem.residual
         self.log_w = log_w[columns]
-        self.starts = np.array([spans[c.id].start for c in candidates], dtype=np.intp)
+        self.first = np.array([spans[c.id].start for c in candidates], dtype=np.intp)
         ends = [[spans[c.id].start, spans[c.id].stop] for c in candidates]
         self.spans = {c.id: slice(*np.searchsorted(columns, e)) for c, e in zip(candidates, ends, strict=True)}
+        self.starts = np.array([s.start for s in self.spans.values()], dtype=np.intp)
+        self.counts = np.array([s.stop - s.start for s in self.spans.values()], dtype=np.intp)
         self.columns = columns
+        self._own: dict[tuple[int, int], tuple[int, Array]] = {}
 
-    def state(self, h: Hyper, C: Array) -> State:
-        """Whitened readings and the evidence of none and of every single effect."""
-        white = noise.whitener(C, self.problem.u)
-        w = white(self.vectors)
-        r, S = w[:, 0], w[:, 1:]
-        state = State(h, white, r, S, 0.5 * np.sum(S * S, axis=0))
-        state.log_z[NONE] = none = -0.5 * float(r @ r) - white.log_det
-        if not self.candidates:
-            return state
+    def state(self, h: Hyper, C: Array, least: float = -np.inf) -> State:
+        """Whitened readings and the evidence of none and, unless all must be below a score, of every single effect."""
+        white = noise.conditional(C, self.problem.u, self.problem.free)
+        r = white(self.residual)
+        reach = -white.log_det - float(white.misfit(self.residual))
+        none = reach - 0.5 * float(r @ r)
+        # no explanation does better than to leave nothing of the test
+        if not self.candidates or reach + np.log(h.weight) < least:
+            return State(h, white, r, self.S[:0], np.zeros(0), log_z={NONE: none})
+        S = white.changes(self.S)
+        state = State(h, white, r, S, 0.5 * np.sum(S * S, axis=0), log_z={NONE: none})
         base = S.T @ r - state.half
         # the form follows the size of the best setting, which depends on the form
         best = self._best(base)
         rest = r[:, None] - S
-        forms = self._forms(white, best, rest)
-        gain = self._gain(base, forms, rest)
+        every = np.arange(len(self.candidates))
+        forms = self._forms(white, best, rest, every)
+        gain = base.copy()
+        self._add(gain, base, forms, rest, every)
         again = self._best(gain)
         moved = np.flatnonzero(again != best)
         if moved.size:
-            forms = forms.replaced(moved, self._forms(white, again, rest, moved))
-            gain = self._gain(base, forms, rest)
-        for k, (name, span) in enumerate(self.spans.items()):
+            other = self._forms(white, again, rest, moved)
+            forms = forms.replaced(moved, other)
+            self._add(gain, base, other, rest, moved)
+        total = gain + self.log_w
+        top = np.maximum.reduceat(total, self.starts)
+        log_z = none + top + np.log(np.add.reduceat(np.exp(total - np.repeat(top, self.counts)), self.starts))
+        for k, name in enumerate(self.spans):
             state.forms[name] = forms[k]
-            state.log_z[Explanation.of(name)] = none + float(log_mean(gain[span], self.log_w[span]))
+            state.log_z[Explanation.of(name)] = float(log_z[k])
         return state
 
     def _best(self, gain: Array) -> NDArray[np.intp]:
@@ -277,22 +338,22 @@ class _Table:
         total = gain + self.log_w
         return np.array([s.start + int(np.argmax(total[s])) for s in self.spans.values()], dtype=np.intp)
 
-    def _forms(self, white: Whitener, at: NDArray[np.intp], rest: Array, some: NDArray[np.intp] | None = None) -> Forms:
-        """Error of the form at the best settings of all candidates, or of some."""
-        which = range(len(self.candidates)) if some is None else some.tolist()
-        settings = [int(self.columns[at[k]] - self.starts[k]) for k in which]
-        columns = at if some is None else at[some]
-        return Forms.of(white, [self.candidates[k] for k in which], settings, [self.modes[k] for k in which],
-                        rest[:, columns])  # fmt: skip
+    def _forms(self, white: Conditional, at: NDArray[np.intp], rest: Array, which: NDArray[np.intp]) -> Forms:
+        """Error of the form at the best settings of some candidates."""
+        return Forms.of(white, [self._columns(k, int(at[k])) for k in which.tolist()], rest[:, at[which]])
 
-    def _gain(self, base: Array, forms: Forms, rest: Array) -> Array:
-        """Log likelihood over that of "none" of every setting, its form taken into account."""
-        out = base.copy()
-        for k, (P, span) in enumerate(zip(forms.projectors(), self.spans.values(), strict=True)):
-            if forms.width[k]:
-                x = P[: forms.width[k]] @ rest[:, span]
-                out[span] += 0.5 * np.einsum("qg,qg->g", x, x) - forms.half_log_det[k]
-        return out
+    def _columns(self, k: int, at: int) -> tuple[int, Array]:
+        if (k, at) not in self._own:
+            setting = int(self.columns[at] - self.first[k])
+            self._own[(k, at)] = form.columns(self.candidates[k], setting, self.modes[k])
+        return self._own[(k, at)]
+
+    def _add(self, gain: Array, base: Array, forms: Forms, rest: Array, which: NDArray[np.intp]) -> None:
+        """Put in the log likelihood over that of "none" of every setting, its form taken into account."""
+        spans = list(self.spans.values())
+        added = forms.gains([rest[:, spans[k]] for k in which])
+        for k, more, width in zip(which, added, forms.width, strict=True):
+            gain[spans[k]] = base[spans[k]] + (more if width else 0.0)
 
 
 def _leading(log_z: dict[Hyper, dict[Explanation, float]]) -> list[Hyper]:
@@ -314,27 +375,72 @@ def _pairs(state: State, spans: dict[str, slice], log_w: Array) -> None:
     """
     gain = state.S.T @ state.r - state.half + log_w
     none = state.log_z[NONE]
-    names = list(spans)
-    best: dict[Explanation, tuple[int, int]] = {}
-    for i, a in enumerate(names):
-        for b in names[i + 1 :]:
-            A, B = spans[a], spans[b]
-            total = gain[A][:, None] + gain[B][None, :] - state.S[:, A].T @ state.S[:, B]
+    names, ends = list(spans), list(spans.values())
+    starts = np.array([s.start for s in ends])
+
+    def together(A: slice, B: slice) -> Array:
+        return np.asarray(gain[A][:, None] + gain[B][None, :] - state.S[:, A].T @ state.S[:, B])
+
+    upper: dict[Explanation, float] = {}
+    for i, a in enumerate(names[:-1]):
+        others = slice(ends[i].stop, ends[-1].stop)
+        total, at = together(ends[i], others), starts[i + 1 :] - others.start
+        top = np.max(np.maximum.reduceat(total, at, axis=1), axis=0)
+        total -= np.repeat(top, np.diff([*at, total.shape[1]]))
+        log_sum = top + np.log(np.add.reduceat(np.sum(np.exp(total, out=total), axis=0), at))
+        for b, value in zip(names[i + 1 :], log_sum, strict=True):
             pair = Explanation.of(a, b)
-            state.log_z[pair] = none + float(log_mean(total.ravel(), np.zeros(total.size)))
-            k, m = np.unravel_index(int(np.argmax(total)), total.shape)
-            best[pair] = A.start + int(k), B.start + int(m)
-    upper = {k: max(state.log_z[k], *(state.log_z[Explanation.of(i)] for i in k)) for k in best}
+            state.log_z[pair] = none + float(value)
+            upper[pair] = max(state.log_z[Explanation.of(k)] for k in (a, b))
+            upper[pair] = max(upper[pair], state.log_z[pair])
     for pair in sorted(upper, key=lambda k: -upper[k])[:_PAIR_LEADERS]:
-        forms = [state.forms[i] for i in pair]
-        both = np.concatenate([f.B for f in forms], axis=1)
-        if not both.shape[1]:
-            continue
-        joint = Form(both, np.linalg.cholesky(np.eye(both.shape[1]) + both.T @ both))
-        d = state.r - state.S[:, best[pair][0]] - state.S[:, best[pair][1]]
-        p = joint.project(d)
-        chosen = sum(float(np.log(form.FORM.get(f.size, 1.0))) for f in forms)
-        state.log_z[pair] += 0.5 * float(p @ p) - joint.half_log_det + chosen
+        state.log_z[pair] = _log_z(state, pair, spans, log_w)
+
+
+def _log_z(state: State, pair: Explanation, spans: Mapping[str, slice], log_w: Array) -> float:
+    """Logarithm of the evidence of two effects, with the error of both forms at their best settings."""
+    total = state.both(pair, spans, log_w)
+    out = state.log_z[NONE] + float(log_mean(total.ravel(), np.zeros(total.size)))
+    forms = [state.forms[i] for i in pair]
+    both = np.concatenate([f.B for f in forms], axis=1)
+    if not both.shape[1]:
+        return out
+    joint = Form(both, np.linalg.cholesky(np.eye(both.shape[1]) + both.T @ both))
+    k, m = np.unravel_index(int(np.argmax(total)), total.shape)
+    A, B = (spans[i] for i in pair)
+    i, j = A.start + int(k), B.start + int(m)
+    d = state.r - state.S[:, i] - state.S[:, j]
+    if pair in state.mixed:
+        extra, at, to = state.mixed[pair]
+        share = (state.S[:, i] @ state.S[:, at]) * (state.S[:, j] @ state.S[:, to])
+        d -= share / (4.0 * state.half[at] * state.half[to]) * extra
+    p = joint.project(d)
+    chosen = sum(float(np.log(form.FORM.get(f.size, 1.0))) for f in forms)
+    return out + 0.5 * float(p @ p) - joint.half_log_det + chosen
+
+
+def _solve_pairs(
+    problem: Problem, candidates: Sequence[Candidate], states: Sequence[State], spans: Mapping[str, slice],
+    log_w: Array, before: Mapping[Explanation, float],
+) -> None:  # fmt: skip
+    """Solve the leading pairs with both effects on and weigh them again."""
+    of = {c.id: c for c in candidates}
+    score = {k: max(s.log_z[k] + np.log(s.hyper.weight) for s in states) + v for k, v in before.items() if k.pair}
+    for pair in sorted(score, key=lambda k: -score[k])[:_TOGETHER]:
+        state = max(states, key=lambda s: s.log_z[pair] + np.log(s.hyper.weight))
+        for _ in range(_ROUNDS):
+            best = state.best_of(pair, spans, log_w)
+            if best == state.mixed.get(pair, (None, None, None))[1:]:
+                break
+            chosen = [(of[k], c - spans[k].start) for k, c in zip(pair, best, strict=True)]
+            both = problem.signature(tuple(effect_of(c.id, c.settings[g]) for c, g in chosen))
+            extra = both - sum(c.signatures[:, g] for c, g in chosen)
+            if not np.isfinite(extra).all() or not min(state.half[list(best)]) > 0.0:
+                break
+            for s in states:
+                s.mixed[pair] = s.white.changes(extra), *best
+        for s in states:
+            s.log_z[pair] = _log_z(s, pair, spans, log_w)
 
 
 def _posterior(states: Sequence[State], before: dict[Explanation, float]) -> dict[Explanation, float]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.diagnose import noise
-from bemt.diagnose.evidence import log_mean
+from bemt.diagnose.evidence import log_mean, unknown
 from bemt.diagnose.explanation import Explanation
 from bemt.diagnose.form import FORM, form_modes
 from bemt.diagnose.signatures import effect_of
@@ -62,16 +62,12 @@ def fit(found: Evidence, what: Explanation) -> Fit:
     ids = tuple(what)
     if not ids:
         return Fit((), (), (), np.zeros_like(problem.y))
-    gain = state.S.T @ state.r - state.half + found.log_w
     if len(ids) == 1:
         span = found.spans[ids[0]]
         own = state.gains(ids[0], span, state.r[:, None])[:, 0] + found.log_w[span]
         columns: tuple[int, ...] = (span.start + int(np.argmax(own)),)
     else:
-        A, B = (found.spans[i] for i in ids)
-        total = gain[A][:, None] + gain[B][None, :] - state.S[:, A].T @ state.S[:, B]
-        i, j = np.unravel_index(int(np.argmax(total)), total.shape)
-        columns = (A.start + int(i), B.start + int(j))
+        columns = state.best_of(what, found.spans, found.log_w)
     settings = tuple(found.of(i).settings[c - found.spans[i].start] for i, c in zip(ids, columns, strict=True))
     signature = problem.signature(tuple(effect_of(i, s) for i, s in zip(ids, settings, strict=True)))
     if not np.isfinite(signature).all():
@@ -93,12 +89,11 @@ def weights(found: Evidence, what: Explanation) -> dict[str, Array]:
     share = np.exp(share - share.max())
     out = {i: np.zeros(found.of(i).weight.size) for i in ids}
     for s, w in zip(states, share / share.sum(), strict=True):
-        spans = [found.spans[i] for i in ids]
         if len(ids) == 1:
-            total = s.gains(ids[0], spans[0], s.r[:, None])[:, 0] + found.log_w[spans[0]]
+            span = found.spans[ids[0]]
+            total = s.gains(ids[0], span, s.r[:, None])[:, 0] + found.log_w[span]
         else:
-            a, b = (s.S[:, span].T @ s.r - s.half[span] + found.log_w[span] for span in spans)
-            total = a[:, None] + b[None, :] - s.S[:, spans[0]].T @ s.S[:, spans[1]]
+            total = s.both(what, found.spans, found.log_w)
         p = np.exp(total - total.max())
         p /= p.sum()
         for k, i in enumerate(ids):
@@ -332,16 +327,8 @@ def smooth(found: Evidence, best: Fit) -> Array:
 
 def left_over(found: Evidence, what: Explanation) -> float:
     """Logarithm of the odds that something smooth is left when an explanation is taken away. [1]"""
-    problem, hyper = found.problem, found.states[0].hyper
+    problem = found.problem
     best = fit(found, what)
-    rest = problem.residual - best.signature
-    C = noise.covariance(problem, hyper) + form_covariance(found, best)
-    white = noise.whitener(C, problem.u)
-    w = white(rest)
-    base = 0.5 * float(w @ w) + white.log_det
-    gains = []
-    for _, K in noise.rivals(problem):
-        rival = noise.whitener(C + K, problem.u)
-        v = rival(rest)
-        gains.append(base - 0.5 * float(v @ v) - rival.log_det)
-    return float(log_mean(np.array(gains), np.full(len(gains), -np.log(len(gains))))) if gains else float("-inf")
+    C = noise.covariance(problem, found.states[0].hyper) + form_covariance(found, best)
+    gains = unknown(noise.unlike(C, problem.u, found.rivals), problem.residual - best.signature)
+    return float(log_mean(gains, np.full(gains.size, -np.log(gains.size)))) if gains.size else float("-inf")

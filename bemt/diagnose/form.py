@@ -13,11 +13,11 @@ from bemt import effects
 from bemt.diagnose import noise
 
 if TYPE_CHECKING:
-    from bemt.diagnose.noise import Whitener
+    from bemt.diagnose.noise import Conditional
     from bemt.diagnose.problem import Problem
     from bemt.diagnose.signatures import Candidate
 
-__all__ = ["FORM", "Form", "Forms", "form_modes"]
+__all__ = ["FORM", "Form", "Forms", "columns", "form_modes"]
 
 Array = NDArray[np.float64]
 
@@ -88,17 +88,12 @@ class Forms:
     half_log_det: Array
 
     @classmethod
-    def of(
-        cls, white: Whitener, candidates: Sequence[Candidate], at: Sequence[int], modes: Sequence[Array],
-        d: Array | None = None,
-    ) -> Forms:  # fmt: skip
-        """Modes times the size of a signature, and what lies between it and its neighbours on the grid, whitened."""
-        shapes = [c.signatures[:, g, None] * m for c, g, m in zip(candidates, at, modes, strict=True)]
-        betweens = [c.between(g) for c, g in zip(candidates, at, strict=True)]
-        q = np.array([x.shape[1] for x in shapes], dtype=np.intp)
-        width = q + np.array([x.shape[1] for x in betweens], dtype=np.intp)
-        flat = white(np.concatenate([x for both in zip(shapes, betweens, strict=True) for x in both], axis=1))
-        C, Q = len(shapes), int(width.max(initial=0))
+    def of(cls, white: Conditional, columns: Sequence[tuple[int, Array]], d: Array | None = None) -> Forms:
+        """Whitened columns of each effect, as :func:`columns` gives them; ``d`` chooses the sizes."""
+        q = np.array([n for n, _ in columns], dtype=np.intp)
+        width = np.array([x.shape[1] for _, x in columns], dtype=np.intp)
+        flat = white.changes(np.concatenate([x for _, x in columns], axis=1))
+        C, Q = len(columns), int(width.max(initial=0))
         there = np.arange(Q) < width[:, None]
         B = np.zeros((C, Q, flat.shape[0]))
         B[there] = flat.T
@@ -114,10 +109,15 @@ class Forms:
         return cls(B.transpose(0, 2, 1), sizes[best], scale[best, k], gram[best, k], width,
                    np.where(width > 0, half[best, k], 0.0))  # fmt: skip
 
-    def projectors(self) -> Array:
-        """What takes whitened vectors to the part that each form may explain, (C, Q, M)."""
-        root = np.linalg.cholesky(self.gram)
-        return np.linalg.solve(root, self.scale[:, :, None] * self.B.transpose(0, 2, 1))
+    def gains(self, rest: Sequence[Array]) -> list[Array]:
+        """What each form adds to the log likelihood of its effect's settings, for what these leave, (M, n) each."""
+        C, _, Q = self.B.shape
+        x = np.zeros((C, Q, max((r.shape[1] for r in rest), default=0)))
+        for k, r in enumerate(rest):
+            x[k, :, : r.shape[1]] = self.B[k].T @ r
+        x *= self.scale[:, :, None]
+        total = 0.5 * np.sum(x * np.linalg.solve(self.gram, x), axis=1) - self.half_log_det[:, None]
+        return [t[: r.shape[1]] for t, r in zip(total, rest, strict=True)]
 
     def replaced(self, where: NDArray[np.intp], other: Forms) -> Forms:
         """The same with some effects taken from another one that has only these."""
@@ -145,6 +145,12 @@ class Forms:
         w = int(self.width[k])
         B = self.B[k, :, :w] * self.scale[k, :w]
         return Form(B, np.asarray(np.linalg.cholesky(self.gram[k, :w, :w]), dtype=float), float(self.size[k]))
+
+
+def columns(candidate: Candidate, setting: int, modes: Array) -> tuple[int, Array]:
+    """How many modes there are; modes times the signature, and what lies between it and its neighbours on the grid."""
+    shape = candidate.signatures[:, setting, None] * modes
+    return modes.shape[1], np.concatenate([shape, candidate.between(setting)], axis=1)
 
 
 def _sizes(plain: Array, q: NDArray[np.intp], width: NDArray[np.intp]) -> tuple[Array, Array, Array, Array]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.diagnose import evidence as ev
-from bemt.diagnose import prior
+from bemt.diagnose import noise, prior
 from bemt.diagnose.explanation import UNKNOWN, Explanation
 
 if TYPE_CHECKING:
@@ -25,16 +25,15 @@ Array = NDArray[np.float64]
 
 NULLS = 400
 """Bootstrapped nulls of one diagnosis [1]."""
-# Settings of the covariance that nulls are weighed under.
-_STATES = 3
 
 
 def p_value(found: Evidence, nulls: int = NULLS, seed: int = 0) -> float:
     """Share of nulls that look at least as much like a cause as the recording does. [1]"""
     rng = np.random.default_rng(seed)
-    M = found.problem.y.size
     source = found.states[0]
-    draws = source.white.factor @ rng.standard_normal((M, nulls))
+    problem, M = found.problem, found.problem.y.size
+    factor = noise.whitener(noise.covariance(problem, source.hyper), problem.u).factor
+    draws = factor @ rng.standard_normal((M, nulls))
     return float((1 + np.sum(statistic(found, draws) >= float(statistic(found, found.problem.residual[:, None])[0])))
                  / (1 + nulls))  # fmt: skip
 
@@ -43,13 +42,12 @@ def statistic(found: Evidence, residuals: Array) -> Array:
     """Log odds of any cause over none for residuals (M, B), all settings of the covariance added up."""
     before = prior.log_priors(prior.prior_weights(found.problem, list(found.spans)), pairs=False)
     some, none = [], []
-    for s in found.states[:_STATES]:
+    for s in found.states[: ev.FOR_NULLS]:
         r = s.white(residuals)
-        base = 0.5 * np.sum(r * r, axis=0)
-        w = np.log(s.hyper.weight) - s.white.log_det - base
+        w = np.log(s.hyper.weight) - s.white.log_det - 0.5 * np.sum(r * r, axis=0) - s.white.misfit(residuals)
         gains = [g + before[Explanation.of(name)] for name, g in ev.singles(s, r, found.spans, found.log_w).items()]
         if s.rivals:
-            rival = ev.unknown(r, s.rivals, s.white.log_det, residuals, base)
+            rival = ev.unknown(s.rivals, residuals)
             share = np.full(rival.shape, -np.log(rival.shape[0]))
             gains.append(ev.log_mean(rival, share, axis=0) + before[UNKNOWN])
         stack = np.array(gains)

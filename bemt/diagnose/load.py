@@ -36,6 +36,8 @@ _LOADS = ("CT", "CP", "CQ", "thrust_N", "torque_Nm", "power_W")
 # Share by which a stated diameter or advance ratio may differ from the case's; advance ratios that are as good as none.
 _SAME, _SLOW = 0.05, 0.02
 _NAMED = 8
+# Rows up to which a log is kept whole for its transients, and share of them in steady points from which it is not.
+_SHORT, _STEADY = 200, 0.75
 
 
 def cases_of(paths: Sequence[str], off: Sequence[str], n: int) -> list[Case]:
@@ -81,6 +83,8 @@ def load(
         if reduction(points).mode == "points" and imported.provenance["format"] == "table":
             # somebody's own table of points: every row counts, a jump from row to row may be what it shows
             points = _scattered(_points(imported, rows, path), points)
+        elif _step_responses(imported, rows, points):
+            points = _points(imported, rows, path)
         made = records.from_series(points, case, shared)
     notes = (*made.notes, *imported.notes, *rows.notes, *_unused(imported, rows, case))
     return replace(made, findings=found, notes=notes)
@@ -100,6 +104,15 @@ def _filled(imported: Dataset, rpm: float | None, airspeed_m_s: float | None) ->
     values = {**imported.values, **told}
     units = {k: unit for k, unit in imported.units.items() if k not in told}
     return replace(imported, values=values, units=units, notes=(*imported.notes, *notes)) if notes else imported
+
+
+def _step_responses(imported: Dataset, rows: Dataset, points: Dataset) -> bool:
+    """Whether a short log of a turning rotor is for its transients, which its steady points leave out."""
+    from bemt.recordings.reduce import reduction
+
+    found, rpm = reduction(points), rows.values.get("rpm", np.zeros(1))
+    log = found.mode == "samples" and imported.provenance["format"] == "table" and len(imported) <= _SHORT
+    return log and bool(np.all(rpm > 0.0)) and sum(map(len, found.rows)) < _STEADY * len(imported)
 
 
 def _scattered(series: Dataset, reduced: Dataset) -> Dataset:

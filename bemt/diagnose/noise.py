@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from bemt.diagnose.problem import Problem
     from bemt.effects.base import Effect
 
-__all__ = ["Hyper", "Whitener", "discrepancy", "hypers", "rivals", "whitener"]
+__all__ = ["Conditional", "Hyper", "Rival", "Whitener", "conditional", "discrepancy", "hypers", "rivals", "unlike",
+           "whitener"]  # fmt: skip
 
 Array = NDArray[np.float64]
 
@@ -34,6 +35,9 @@ _WHITE = 0.2
 # nuisances, with the prior weight.  Declared after volume 1 of the UIUC database, where thrust and torque at rest are
 # off by 3 and 5 % (median) and one propeller in ten by more than 10 %.
 _MODEL = {(0.003, 0.3): 0.2, (0.01, 0.6): 0.25, (0.03, 1.0): 0.3, (0.08, 1.0): 0.25}
+# Without a reference: probability that the rotor is a real one, of which no more is known than the case says; sizes of
+# what those differ by (heavy tails of the population, two of its six quantiles' means) and what is added at least.
+_REAL, _REAL_SIZES = 0.5, {(0.01, 1.0): 0.8, (0.08, 2.0): 0.2}
 # Reference recordings show the error of the solver, however large: it need not be kept small by its prior.
 _MODEL_SHOWN = {(0.0, 1.0): 0.15, (0.01, 1.0): 0.2, (0.03, 1.0): 0.2, (0.08, 1.0): 0.2, (0.25, 1.0): 0.25}
 _MODEL_RPM = 0.1
@@ -53,6 +57,10 @@ _FORM_LENGTH = 0.7
 # Unknown smooth effect: lengths over the spread of a variable, sizes as a share of the largest coefficient.
 _RIVAL_LENGTHS = (0.15, 0.5)
 _RIVAL_SIZES = (0.03, 0.12)
+# A balance or mount that stays behind while its load falls (hysteresis as ISO 376 and OIML R 60 define it, decreasing
+# less increasing load; not checked): shares of the largest reading, length over the load, least fall that is one, and
+# fewest points of either kind.
+_BEHIND, _BEHIND_LENGTH, _FALL, _FEW = (0.01, 0.04), 0.5, 0.02, 4
 
 
 # What every law of the flow depends on, and the spread below which a variable hardly changes it: natural logarithms of
@@ -82,6 +90,8 @@ class Hyper:
         Prior probability [1].
     session : float
         What runs differ by, a share [1].
+    real : float
+        Size of what real rotors differ by from the solver, over that of the population [1].
     """
 
     scale: float
@@ -90,16 +100,21 @@ class Hyper:
     own: float
     weight: float
     session: float = 0.006
+    real: float = 0.0
 
 
 def hypers(problem: Problem) -> tuple[Hyper, ...]:
     """All settings, with prior weights that add up to 1."""
     scales = _SCALES[problem.u_known]
     each = 1.0 / (len(scales) * len(_AR))
-    model = _MODEL if problem.free.all() else _MODEL_SHOWN
+    alone = problem.free.all()
+    model = {(m, f, 0.0): w for (m, f), w in (_MODEL if alone else _MODEL_SHOWN).items()}
+    if alone and all(p.as_built is not None for p in problem.parts):
+        model = {k: (1.0 - _REAL) * w for k, w in model.items()}
+        model |= {(least, 1.0, size): _REAL * w for (least, size), w in _REAL_SIZES.items()}
     apart = _SESSIONS if np.ptp(problem.covariates["run"]) > 0.0 else {0.0: 1.0}
-    return tuple(Hyper(s, a, m, f, each * w * v, d)
-                 for s in scales for a in _AR for (m, f), w in model.items() for d, v in apart.items())  # fmt: skip
+    return tuple(Hyper(s, a, m, f, each * w * v, d, real)
+                 for s in scales for a in _AR for (m, f, real), w in model.items() for d, v in apart.items())  # fmt: skip
 
 
 def in_time(covariates: Mapping[str, Array]) -> tuple[Array, Array]:
@@ -175,6 +190,68 @@ def whitener(covariance: Array, u: Array) -> Whitener:
     return Whitener(factor, float(np.sum(np.log(np.diag(factor)))))
 
 
+@dataclass(frozen=True, eq=False)
+class Conditional:
+    """Some readings given all others: causes change only these, so the others enter once and not with every cause.
+
+    Attributes
+    ----------
+    rows, others : (N,), (M - N,) int
+        The readings, and those that are given.
+    gain : (N, M - N) float
+        Expected change of the readings for one of the others [unit/unit].
+    covariance : (N, N) float
+        Of what remains [square of the units of the readings].
+    white : Whitener
+        Its factor.
+    outside : Whitener
+        Factor of the covariance of the others.
+    """
+
+    rows: NDArray[np.intp]
+    others: NDArray[np.intp]
+    gain: Array
+    covariance: Array
+    white: Whitener
+    outside: Whitener
+
+    @property
+    def log_det(self) -> float:
+        """Sum of the logarithms of the diagonal of the factor of all readings [1]."""
+        return self.white.log_det + self.outside.log_det
+
+    def rest(self, vectors: Array) -> Array:
+        """What the others leave of vectors or columns."""
+        return np.asarray(vectors[self.rows] - self.gain @ vectors[self.others])
+
+    def __call__(self, vectors: Array) -> Array:
+        """Whiten what the others leave of vectors or columns."""
+        return self.white(self.rest(vectors))
+
+    def changes(self, vectors: Array) -> Array:
+        """Whiten vectors or columns that are zero but in these rows."""
+        return self.white(vectors[self.rows])
+
+    def misfit(self, vectors: Array) -> Array:
+        """Half the squared whitened length of the others."""
+        w = self.outside(vectors[self.others])
+        return np.asarray(0.5 * np.sum(w * w, axis=0))
+
+
+def conditional(covariance: Array, u: Array, mine: NDArray[np.bool_]) -> Conditional:
+    """Condition some readings on the others, jointly normal."""
+    from scipy.linalg import solve_triangular
+
+    rows, others = np.flatnonzero(mine), np.flatnonzero(~mine)
+    rest, gain = covariance[np.ix_(rows, rows)], np.zeros((rows.size, others.size))
+    outside = whitener(covariance[np.ix_(others, others)], u[others])
+    if others.size:
+        cross = outside(covariance[np.ix_(others, rows)])
+        rest = rest - cross.T @ cross
+        gain = np.asarray(solve_triangular(outside.factor, cross, lower=True, trans="T", check_finite=False)).T
+    return Conditional(rows, others, gain, rest, whitener(rest, u[rows]), outside)
+
+
 def sessions(problem: Problem) -> Array:
     """Covariance of what differs from run to run, of relative size 1, (M, M); zero for a single run."""
     run = problem.covariates["run"][problem.point]
@@ -197,6 +274,8 @@ def covariance(problem: Problem, h: Hyper) -> Array:
     """Covariance of noise, nuisances and solver for one setting, (M, M)."""
     stand, own = _tangents(problem)
     wrong = h.own**2 * own + h.model**2 * discrepancy(problem)
+    if h.real > 0.0:
+        wrong = wrong + h.real**2 * problem.of_real_rotors
     return np.asarray(h.scale**2 * noise(problem, h.ar) + h.session**2 * sessions(problem) + stand + wrong)
 
 
@@ -206,7 +285,8 @@ def covariances(problem: Problem) -> Iterator[tuple[Hyper, Array]]:
     wrong, apart = discrepancy(problem), sessions(problem)
     by_ar = {ar: noise(problem, ar) for ar in _AR}
     for h in hypers(problem):
-        yield h, h.scale**2 * by_ar[h.ar] + h.session**2 * apart + stand + h.own**2 * own + h.model**2 * wrong
+        C = h.scale**2 * by_ar[h.ar] + h.session**2 * apart + stand + h.own**2 * own + h.model**2 * wrong
+        yield h, C + h.real**2 * problem.of_real_rotors if h.real > 0.0 else C
 
 
 def _tangents(problem: Problem) -> tuple[Array, Array]:
@@ -215,8 +295,50 @@ def _tangents(problem: Problem) -> tuple[Array, Array]:
     return stand @ stand.T, own @ own.T
 
 
-def rivals(problem: Problem) -> tuple[tuple[str, Array], ...]:
-    """Covariances of an unknown smooth effect of the test: along each recorded variable, and pairs of them."""
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """An unknown smooth effect of the test.
+
+    Attributes
+    ----------
+    name : str
+        Channels, variables and size.
+    mine : (M,) bool
+        Readings that it changes.
+    kernel : (N, N) float
+        Its covariance in these at size 1 [square of the units of the readings].
+    size : float
+        Standard deviation, share of the largest coefficient [1].
+    """
+
+    name: str
+    mine: NDArray[np.bool_]
+    kernel: Array
+    size: float
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance of all readings, (M, M)."""
+        out = np.zeros((self.mine.size, self.mine.size))
+        out[np.ix_(self.mine, self.mine)] = self.size**2 * self.kernel
+        return out
+
+
+def unlike(covariance: Array, u: Array, chosen: Sequence[Rival]) -> list[tuple[Conditional, Whitener]]:
+    """What rivals change given the rest, without and with each of them beside a covariance."""
+    found: dict[bytes, Conditional] = {}
+    out = []
+    for k in chosen:
+        key = k.mine.tobytes()
+        if key not in found:
+            found[key] = conditional(covariance, u, k.mine)
+        given = found[key]
+        out.append((given, whitener(given.covariance + k.size**2 * k.kernel, u[k.mine])))
+    return out
+
+
+def rivals(problem: Problem) -> tuple[Rival, ...]:
+    """Unknown smooth effects of the test: along each recorded variable, and pairs of them."""
     X: dict[str, Array] = {}
     for name, values in problem.covariates.items():
         if name in ("run", "Re", "M_tip", "pressure_Pa"):
@@ -231,25 +353,46 @@ def rivals(problem: Problem) -> tuple[tuple[str, Array], ...]:
     p, c = problem.point, problem.channel
     # a cause of the test is not in the reference, whether it is in the library or not
     free = problem.free
-    same = (c[:, None] == c[None, :]) & free[:, None] & free[None, :]
-    S = problem.scale[:, None] * problem.scale[None, :]
     present = [k for k in (0, 1, 2) if np.any(c == k)]
     words = ("thrust", "torque", "speed")
     groups = [tuple(present)] if len(present) == 1 else [tuple(present), *((k,) for k in present)]
     out = []
     for names in sets:
         for length in _RIVAL_LENGTHS:
-            kernel = np.ones((p.size, p.size))
-            for name in names:
-                x = X[name][p]
-                kernel *= np.exp(-0.5 * ((x[:, None] - x[None, :]) / length) ** 2)
             for group in groups:
-                inside = np.isin(c, group)
-                K = np.where(same & inside[:, None] & inside[None, :], kernel, 0.0) * S
+                mine = free & np.isin(c, group)
+                kernel = np.equal.outer(c[mine], c[mine]) * np.multiply.outer(problem.scale[mine], problem.scale[mine])
+                for name in names:
+                    x = X[name][p[mine]]
+                    kernel *= np.exp(-0.5 * ((x[:, None] - x[None, :]) / length) ** 2)
                 for size in _RIVAL_SIZES:
                     label = " and ".join(words[k] for k in group)
-                    out.append((f"{label} over {', '.join(names)}: {size:.0%}", size**2 * K))
+                    out.append(Rival(f"{label} over {', '.join(names)}: {size:.0%}", mine, kernel, size))
+    load, falling = _loading(problem)
+    for group in groups:
+        mine = free & np.isin(c, group) & falling
+        here = free & np.isin(c, group) & (c < 2)
+        if min(np.count_nonzero(mine), np.count_nonzero(here & ~falling)) < _FEW * len(group):
+            continue
+        most = np.array([np.max(np.abs(problem.y[c == k])) for k in present])[np.searchsorted(present, c[mine])]
+        kernel = np.equal.outer(c[mine], c[mine]) * np.multiply.outer(most, most)
+        kernel *= np.exp(-0.5 * (np.subtract.outer(load[mine], load[mine]) / _BEHIND_LENGTH) ** 2)
+        label = " and ".join(words[k] for k in group)
+        out += [Rival(f"{label} while the load falls: {size:.0%}", mine, kernel, size) for size in _BEHIND]
     return tuple(out)
+
+
+def _loading(problem: Problem) -> tuple[Array, NDArray[np.bool_]]:
+    """Computed load of every reading over the largest of its channel, (M,), and whether it fell to there, (M,)."""
+    run, place = in_time(problem.covariates)
+    load, falling = np.zeros_like(problem.f0), np.zeros(problem.f0.size, dtype=bool)
+    for k in np.unique(problem.channel[problem.channel < 2]):
+        mine = np.flatnonzero(problem.channel == k)
+        load[mine] = np.abs(problem.f0[mine]) / max(float(np.max(np.abs(problem.f0[mine]))), 1e-300)
+        order = mine[np.lexsort((place[problem.point[mine]], run[problem.point[mine]], problem.part[mine]))]
+        same = (np.diff(run[problem.point[order]]) == 0) & (np.diff(problem.part[order]) == 0)
+        falling[order[1:]] = same & (np.diff(load[order]) < -_FALL)
+    return load, falling
 
 
 def law_of(effect: Effect | type[Effect]) -> tuple[str, ...]:

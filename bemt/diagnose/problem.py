@@ -5,15 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bemt.bem import model as bem
+from bemt.diagnose import real_rotors
 from bemt.diagnose.blade import PLAIN, CalibratedBlade
 from bemt.diagnose.record import CHANNELS, Record
 from bemt.effects.base import Effect, Flow, Reading
+
+if TYPE_CHECKING:
+    from bemt.case.as_built import CaseAsBuilt
 
 __all__ = ["Part", "Problem"]
 
@@ -38,6 +42,8 @@ class Part:
         Rotor: parts of one rotor share the error of its model.
     left_out : tuple of str
         Effects that the case switches off.
+    as_built : CaseAsBuilt or None
+        How well the rotor is known; None where the population of real rotors says nothing of the baseline.
     instead : (C P,) float or None
         Baseline of another model, to which effects add what share they change in ours [N], [N m], [rev/min].
     """
@@ -48,6 +54,7 @@ class Part:
     flow: Flow
     key: str = ""
     left_out: tuple[str, ...] = ()
+    as_built: CaseAsBuilt | None = None
     instead: Array | None = None
     _solved: dict[tuple[Effect, ...], tuple[Array, Array, Flow]] = field(default_factory=dict, repr=False)
 
@@ -205,6 +212,11 @@ class Problem:
         """Index of the rotor of each reading, (M,)."""
         keys = list(dict.fromkeys(p.key for p in self.parts))
         return np.array([keys.index(p.key) for p in self.parts])[self.part]
+
+    @cached_property
+    def of_real_rotors(self) -> Array:
+        """Covariance of the readings over real rotors of which as much is known as of the case's, (M, M)."""
+        return real_rotors.covariance(self)
 
     @property
     def centre(self) -> Array:

@@ -311,7 +311,7 @@ def inclusion(found: Evidence) -> dict[str, float]:
 def alike(found: Evidence, name: str) -> tuple[str, ...]:
     """Single effects that explain what an effect explains, within noise and evidence, itself left out."""
     state, what = found.states[0], Explanation.of(name)
-    s = state.white(fitting.fit(found, what).signature)
+    s = state.white.changes(fitting.fit(found, what).signature)
     limit = found.log_bayes(what) - NEAR
     return tuple(
         i

@@ -23,7 +23,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.errors import Fault, InputError
-from bemt.drive.map_points import QUANTITIES, MapPoints
+from bemt.dataset import Dataset
+from bemt.drive.map_points import CHANNELS
 
 __all__ = ["BenchMap", "Curve", "HeldOut", "fit", "held_out", "misfit", "repeat_spread"]
 
@@ -67,7 +68,7 @@ class BenchMap:
     voltage_ref: float  # V_ref, NaN when no voltage was recorded. [V]
     voltage_range: tuple[float, float]  # least and greatest voltage recorded. [V]
     notes: tuple[str, ...] = ()  # what was assumed
-    points: MapPoints | None = field(default=None, repr=False)  # what it was fitted to
+    points: Dataset | None = field(default=None, repr=False)  # what it was fitted to
 
     @property
     def with_voltage(self) -> bool:
@@ -124,7 +125,7 @@ class BenchMap:
         return np.where(missing, np.nan, out).reshape(np.shape(thrust_N))
 
 
-def _monotone(x: Array, y: Array, w: Array, grid: Array, smoothness: float) -> Array:
+def _monotone(x: Array, y: Array, grid: Array, smoothness: float) -> Array:
     """Values at the grid: non-negative increments, penalised second differences; y is of the order of 1."""
     from scipy.optimize import nnls
 
@@ -136,8 +137,8 @@ def _monotone(x: Array, y: Array, w: Array, grid: Array, smoothness: float) -> A
     to_data[rows, k], to_data[rows, k + 1] = 1.0 - f, f
     second = np.diff(np.eye(len(grid)), n=2, axis=0) * len(grid) ** 1.5 * np.sqrt(smoothness)
     sums = np.tril(np.ones((len(grid), len(grid))))  # value = start + sum of increments
-    root = np.sqrt(w / w.sum())
-    a = np.vstack([(root[:, None] * to_data) @ sums, second @ sums])
+    root = np.sqrt(1.0 / len(x))
+    a = np.vstack([(root * to_data) @ sums, second @ sums])
     b = np.concatenate([root * y, np.zeros(len(second))])
     # the start is free: its column enters with both signs
     solution, _ = nnls(np.hstack([a, -a[:, :1]]), b, maxiter=50 * len(grid))
@@ -155,16 +156,16 @@ def _levels(pulse: Array) -> NDArray[np.intp]:
     return np.asarray(np.digitize(pulse, bins))
 
 
-def _curve(pulse: Array, y: Array, w: Array, smoothness: float | None, grid: Array) -> Curve:
+def _curve(pulse: Array, y: Array, smoothness: float | None, grid: Array) -> Curve:
     ok = np.isfinite(y)
-    x, v, w = pulse[ok], y[ok], w[ok]
+    x, v = pulse[ok], y[ok]
     size = float(np.max(np.abs(v))) or 1.0
     if smoothness is None:
-        smoothness = _chosen(x, v / size, w, grid)
-    return Curve(grid, size * _monotone(x, v / size, w, grid, smoothness), 0.0, smoothness)
+        smoothness = _chosen(x, v / size, grid)
+    return Curve(grid, size * _monotone(x, v / size, grid, smoothness), 0.0, smoothness)
 
 
-def _chosen(x: Array, y: Array, w: Array, grid: Array) -> float:
+def _chosen(x: Array, y: Array, grid: Array) -> float:
     level = _levels(x)
     inner = [k for k in np.unique(level) if np.min(x) < np.mean(x[level == k]) < np.max(x)]
     if len(inner) < 2:
@@ -175,8 +176,8 @@ def _chosen(x: Array, y: Array, w: Array, grid: Array) -> float:
         error = 0.0
         for fold in folds:
             out = np.isin(level, fold)
-            values = _monotone(x[~out], y[~out], w[~out], grid, float(smoothness))
-            error += float(np.sum(w[out] * (np.interp(x[out], grid, values) - y[out]) ** 2))
+            values = _monotone(x[~out], y[~out], grid, float(smoothness))
+            error += float(np.sum((np.interp(x[out], grid, values) - y[out]) ** 2))
         best.append(error)
     return float(SMOOTHNESS[int(np.argmin(best))])
 
@@ -193,73 +194,62 @@ def _own_voltage(pulse: Array, voltage: Array, current: Array, sag: Curve, ramp:
 
 
 def fit(
-    points: MapPoints,
+    points: Dataset,
     smoothness: float | None = None,
     nodes: int = NODES,
-    quantities: Iterable[str] = tuple(QUANTITIES),
+    quantities: Iterable[str] = tuple(CHANNELS),
 ) -> BenchMap:
     """Fit the map of one drive."""
     if len(points) < 4:
         raise InputError(Fault("", "points", f"{len(points)}", "4 or more"))
-    pulse, w = points.pulse_us, points.weight
+    pulse = points.pulse_us
     grid = np.linspace(pulse.min(), pulse.max(), nodes)
     notes = list(points.notes)
-    voltage = points.values["voltage"]
+    voltage = points.voltage_V
     known = np.isfinite(voltage) & (voltage > 0.0)
     sag, ref, limits, own = None, float("nan"), (float("nan"), float("nan")), 0.0
     if np.count_nonzero(known) >= 4:
-        sag = _curve(pulse[known], -voltage[known], w[known], 1e-6, grid)
+        sag = _curve(pulse[known], -voltage[known], 1e-6, grid)
         ref = float(np.median(voltage[known]))
         limits = float(voltage[known].min()), float(voltage[known].max())
-        own = _own_voltage(pulse[known], voltage[known], points.values["current"][known], sag, points.ramp)
+        own = _own_voltage(pulse[known], voltage[known], points.current_A[known], sag, points.provenance["ramp"])
         if own < 1.0:
             notes.append("voltage varies only with the sag of this battery: the map holds for it, not for others")
     curves: dict[str, Curve] = {}
     for name in quantities:
-        y = points.values[name]
+        y = points[CHANNELS[name]]
         ok = np.isfinite(y)
         if np.count_nonzero(ok) < 4:
             continue
         if own < 1.0:
-            curves[name] = _curve(pulse[ok], y[ok], w[ok], smoothness, grid)
+            curves[name] = _curve(pulse[ok], y[ok], smoothness, grid)
             continue
         ok &= known
-        curves[name] = _with_voltage(pulse[ok], y[ok], w[ok], voltage[ok] / ref, smoothness, grid)
+        curves[name] = _with_voltage(pulse[ok], y[ok], voltage[ok] / ref, smoothness, grid)
     return BenchMap(curves, sag, ref, limits, tuple(notes), points)
 
 
-def _with_voltage(x: Array, y: Array, w: Array, ratio: Array, smoothness: float | None, grid: Array) -> Curve:
+def _with_voltage(x: Array, y: Array, ratio: Array, smoothness: float | None, grid: Array) -> Curve:
     from scipy.optimize import minimize_scalar
 
     def misfit(m: float) -> float:
-        values = _curve(x, y / ratio**m, w, 1e-3, grid).values
-        return float(np.sum(w * (np.interp(x, grid, values) * ratio**m - y) ** 2))
+        values = _curve(x, y / ratio**m, 1e-3, grid).values
+        return float(np.sum((np.interp(x, grid, values) * ratio**m - y) ** 2))
 
     m = float(minimize_scalar(misfit, bounds=(0.0, 4.0), method="bounded", options={"xatol": 1e-3}).x)
-    curve = _curve(x, y / ratio**m, w, smoothness, grid)
+    curve = _curve(x, y / ratio**m, smoothness, grid)
     return Curve(curve.pulse_us, curve.values, m, curve.smoothness)
 
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """Round trip on plateaus that the map was not fitted to.
+    """Round trip on plateaus that the map was not fitted to."""
 
-    Parameters
-    ----------
-    thrust_N : (M,) float
-        Wanted: the thrust recorded there. [N]
-    pulse_us : (M,) float
-        Pulse width at which it was recorded. [us]
-    pulse_found_us : (M,) float
-        What the inverse map asks for. [us]
-    error : (M,) float
-        Thrust that the drive gives there minus the wanted one, over full thrust [1]; what the drive gives is read
-        from the record between its neighbouring levels.
-    """
-
-    thrust_N: Array
-    pulse_us: Array
-    pulse_found_us: Array
+    thrust_N: Array  # (M,) wanted: the thrust recorded there [N]
+    pulse_us: Array  # (M,) pulse width at which it was recorded [us]
+    pulse_found_us: Array  # (M,) what the inverse map asks for [us]
+    # (M,) thrust that the drive gives there minus the wanted one, over full thrust [1]; what the drive gives is read
+    # from the record between its neighbouring levels
     error: Array
 
     @property
@@ -273,27 +263,25 @@ class HeldOut:
         return float(np.sqrt(np.nanmean(self.error**2)))
 
 
-def misfit(points: MapPoints, chart: BenchMap) -> float:
+def misfit(points: Dataset, chart: BenchMap) -> float:
     """How far the points lie from a map that may not fall. [1]"""
-    volts = points.values["voltage"] if chart.with_voltage else None
-    rest = chart.at("thrust", points.pulse_us, volts) - points.values["thrust"]
-    return float(np.sqrt(np.nanmean(rest**2))) / float(np.nanmax(np.abs(points.values["thrust"])))
+    volts = points.voltage_V if chart.with_voltage else None
+    rest = chart.at("thrust", points.pulse_us, volts) - points.thrust_N
+    return float(np.sqrt(np.nanmean(rest**2))) / float(np.nanmax(np.abs(points.thrust_N)))
 
 
-def repeat_spread(points: MapPoints, chart: BenchMap) -> float:
+def repeat_spread(points: Dataset, chart: BenchMap) -> float:
     """How far the recording itself differs at one pulse width: a map of pulse width alone cannot be nearer. [1]"""
-    near, thrust = np.round(points.pulse_us), points.values["thrust"]
+    near, thrust = np.round(points.pulse_us), points.thrust_N
     if chart.with_voltage:
-        thrust = thrust / (points.values["voltage"] / chart.voltage_ref) ** chart.curves["thrust"].exponent
+        thrust = thrust / (points.voltage_V / chart.voltage_ref) ** chart.curves["thrust"].exponent
     spans = [float(np.ptp(thrust[near == u])) for u in np.unique(near) if np.count_nonzero(near == u) > 1]
     return max(spans) / float(np.max(thrust)) if spans else float("nan")
 
 
-def held_out(points: MapPoints, folds: int = 5, smoothness: float | None = None) -> HeldOut:
+def held_out(points: Dataset, folds: int = 5, smoothness: float | None = None) -> HeldOut:
     """Leave levels out in turn, fit to the rest, and make the round trip on what was left out.
 
-    Notes
-    -----
     A plateau was recorded at pulse p with thrust T. The inverse map gives p' for T. The drive gives T at p, so the
     round trip misses by map(p) - T up to the slope's change between p and p'; that is the error stated.
     """
@@ -302,10 +290,10 @@ def held_out(points: MapPoints, folds: int = 5, smoothness: float | None = None)
     wanted, pulses, found, errors = [], [], [], []
     for k in range(min(folds, len(inner))):
         out = np.isin(level, inner[k::folds])
-        chart = fit(points.take(~out), smoothness, quantities=("thrust",))
-        test = points.take(out)
-        thrust, pulse = test.values["thrust"], test.pulse_us
-        volts = test.values["voltage"] if chart.with_voltage else None
+        chart = fit(points.select(~out), smoothness, quantities=("thrust",))
+        test = points.select(out)
+        thrust, pulse = test.thrust_N, test.pulse_us
+        volts = test.voltage_V if chart.with_voltage else None
         full = chart.full_thrust_N if volts is None else chart.at("thrust", chart.pulse_range_us[1], volts)
         wanted.append(thrust)
         pulses.append(pulse)

@@ -70,37 +70,21 @@ class Battery:
 
 @dataclass(frozen=True)
 class Esc:
-    """Speed controller.
+    """Speed controller."""
 
-    Parameters
-    ----------
-    pulse_min_us, pulse_max_us : float
-        Pulse width of no and of full duty. [us]
-    exponent : float
-        duty = share ** exponent; 1 is linear. [-]
-    resistance_ohm : float
-        Of bridge and leads. [ohm]
-    idle_A : float
-        Own current. [A]
-    current_limit_A : float
-        Battery current above which it lowers the duty, and motor current to which it limits braking. [A]
-    braking : bool
-        Whether it can slow the rotor (complementary switching); else the current never goes below 0.
-    brake_on_stop : float
-        Share of the time for which it shorts the motor at no duty; 0: the bridge is open there and the rotor coasts.
-        Without `braking` it has no effect. [1]
-    ripple_ohm : float
-        Z = 2 L f: winding between lines, switching frequency; without braking it says when the current stops. [ohm]
-    """
-
+    # Pulse width of no and of full duty [us]
     pulse_min_us: float = 1000.0
     pulse_max_us: float = 2000.0
-    exponent: float = 1.0
-    resistance_ohm: float = 0.0
-    idle_A: float = 0.0
+    exponent: float = 1.0  # duty = share ** exponent; 1 is linear [-]
+    resistance_ohm: float = 0.0  # Of bridge and leads [ohm]
+    idle_A: float = 0.0  # Own current [A]
+    # Battery current above which it lowers the duty, and motor current to which it limits braking [A]
     current_limit_A: float = math.inf
-    braking: bool = True
+    braking: bool = True  # Whether it can slow the rotor (complementary switching); else the current never goes below 0
+    # Share of the time for which it shorts the motor at no duty; 0: the bridge is open there and the rotor coasts.
+    # Without `braking` it has no effect [1]
     brake_on_stop: float = 1.0
+    # Z = 2 L f: winding between lines, switching frequency; without braking it says when the current stops [ohm]
     ripple_ohm: float = math.inf
 
     def duty(self, pulse_us: ArrayLike) -> Array:
@@ -220,8 +204,6 @@ class Drive:
     def steady(self, pulse_us: ArrayLike, soc: ArrayLike = 1.0, temperature_C: ArrayLike | None = None) -> Steady:
         """Solve for the speed at which motor and rotor agree.
 
-        Notes
-        -----
         Motor torque falls with speed and rotor torque rises: one root, found by bisection between rest and twice the
         speed at no load.
         """

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.errors import Fault, InputError
+from bemt.dataset import Dataset
 from bemt.drive import transient
 from bemt.drive.drive_model import Battery, Drive, Esc, Motor
-from bemt.drive.map_points import MapPoints
 from bemt.drive.rotor_table import RotorMap, quadratic
 
 __all__ = [
@@ -58,11 +58,10 @@ class MapFit:
     full_thrust_N: float  # greatest thrust recorded. [N]
 
 
-def no_load(points: MapPoints) -> tuple[float, float]:
+def no_load(points: Dataset) -> tuple[float, float]:
     """K_v and I_0 of a run without propeller at full pulse width, as data sheets define them."""
     top = points.pulse_us >= np.max(points.pulse_us) - 1.0
-    v = points.values
-    return float(np.mean(v["rpm"][top] / v["voltage"][top])), float(np.mean(v["current"][top]))
+    return float(np.mean(points.rpm[top] / points.voltage_V[top])), float(np.mean(points.current_A[top]))
 
 
 def _rotor_constant(omega: Array, load: Array) -> float:
@@ -71,7 +70,7 @@ def _rotor_constant(omega: Array, load: Array) -> float:
 
 
 def fit_map(
-    points: MapPoints,
+    points: Dataset,
     known: Mapping[str, float] | None = None,
     torque_Nm: ArrayLike | None = None,
     diameter_m: float = 0.2,
@@ -83,27 +82,27 @@ def fit_map(
     v = points.values
     faults = [
         Fault("", name, "no values", "a recorded channel")
-        for name in ("rpm", "current")
+        for name in ("rpm", "current_A")
         if np.count_nonzero(np.isfinite(v[name])) < 4
     ]
-    if np.count_nonzero(np.isfinite(v["voltage"])) < 4 and "voltage_V" not in known:
-        faults.append(Fault("", "voltage", "no values", "recorded, or stated as voltage_V"))
+    if np.count_nonzero(np.isfinite(v["voltage_V"])) < 4 and "voltage_V" not in known:
+        faults.append(Fault("", "voltage_V", "no values", "recorded, or stated as voltage_V"))
     if faults:
         raise InputError(faults)
     omega = v["rpm"] * math.pi / 30.0
-    kT = _rotor_constant(omega, v["thrust"])
+    kT = _rotor_constant(omega, v["thrust_N"])
     if torque_Nm is not None:
         known.setdefault("kQ", _rotor_constant(omega, np.asarray(torque_Nm, dtype=float)))
-    voc, rb = _battery(v["current"], v["voltage"], known)
+    voc, rb = _battery(v["current_A"], v["voltage_V"], known)
     free = [name for name in FREE if name not in known]
-    full = {name: float(np.nanmax(v[name])) for name in ("thrust", "rpm", "current")}
+    full = {name: float(np.nanmax(v[name])) for name in ("thrust_N", "rpm", "current_A")}
     start = {name: FREE[name][0] for name in free}
-    top = int(np.nanargmax(v["thrust"]))
+    top = int(np.nanargmax(v["thrust_N"]))
     if "kv_rpm_V" in free:
-        start["kv_rpm_V"] = 1.25 * full["rpm"] / (v["voltage"][top] if np.isfinite(v["voltage"][top]) else voc)
+        start["kv_rpm_V"] = 1.25 * full["rpm"] / (v["voltage_V"][top] if np.isfinite(v["voltage_V"][top]) else voc)
     if "kQ" in free:
         k = 60.0 / (2.0 * math.pi * known.get("kv_rpm_V", start.get("kv_rpm_V", 1000.0)))
-        start["kQ"] = k * full["current"] / (full["rpm"] * math.pi / 30.0) ** 2
+        start["kQ"] = k * full["current_A"] / (full["rpm"] * math.pi / 30.0) ** 2
 
     def built(theta: Mapping[str, float]) -> Drive:
         every = {"exponent": 1.0, **known, **theta}
@@ -127,11 +126,11 @@ def fit_map(
         def misfit(x: Array) -> Array:
             got = built(dict(zip(names, map(float, np.exp(x)), strict=True))).steady(points.pulse_us)
             parts = [
-                (got.thrust_N - v["thrust"]) / full["thrust"],
+                (got.thrust_N - v["thrust_N"]) / full["thrust_N"],
                 (got.rpm - v["rpm"]) / full["rpm"],
-                0.5 * (got.battery_A - v["current"]) / full["current"],
+                0.5 * (got.battery_A - v["current_A"]) / full["current_A"],
             ]
-            return np.nan_to_num(np.concatenate(parts))
+            return np.asarray(np.nan_to_num(np.concatenate(parts)))
 
         x0 = np.clip([math.log(begin[n] + 1e-9) for n in names], low + 1e-6, high - 1e-6)
         found = least_squares(misfit, x0, bounds=(low, high), loss="soft_l1", f_scale=0.03, x_scale=0.1, diff_step=1e-4)
@@ -149,7 +148,7 @@ def fit_map(
         fitted | {"battery_ohm": rb, "voltage_at_rest_V": voc},
         kT,
         {**known, **fitted}["kQ"],
-        full["thrust"],
+        full["thrust_N"],
     )
 
 
@@ -164,17 +163,17 @@ def _battery(current: Array, voltage: Array, known: Mapping[str, float]) -> tupl
     return (float(rest), float(-slope)) if slope < 0.0 else (float(np.mean(voltage[ok])), 0.0)
 
 
-def battery_of(points: MapPoints) -> tuple[float, float]:
+def battery_of(points: Dataset) -> tuple[float, float]:
     """Voltage at rest and resistance of the battery of a recording."""
-    current, voltage = points.values["current"], points.values["voltage"]
+    current, voltage = points.current_A, points.voltage_V
     if np.count_nonzero(np.isfinite(current) & np.isfinite(voltage)) < 4:
-        raise InputError(Fault("", "voltage", "no values", "recorded voltage and current"))
+        raise InputError(Fault("", "voltage_V", "no values", "recorded voltage and current"))
     return _battery(current, voltage, {})
 
 
-def thrust_error(drive: Drive, points: MapPoints, full_thrust_N: float) -> Array:
+def thrust_error(drive: Drive, points: Dataset, full_thrust_N: float) -> Array:
     """Thrust over pulse width, model minus recording, (N,) [1]."""
-    return np.asarray((drive.steady(points.pulse_us).thrust_N - points.values["thrust"]) / full_thrust_N)
+    return np.asarray((drive.steady(points.pulse_us).thrust_N - points.thrust_N) / full_thrust_N)
 
 
 def fit_inertia(

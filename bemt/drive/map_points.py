@@ -2,43 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.errors import Fault, InputError
-from bemt.dataset import Dataset
+from bemt.dataset import Dataset, concat
 from bemt.recordings import plateaus
 
-__all__ = ["QUANTITIES", "MapPoints", "join", "points"]
+__all__ = ["CHANNELS", "join", "map_points", "points"]
 
 Array = NDArray[np.float64]
-QUANTITIES = {"thrust": "N", "rpm": "rev/min", "current": "A", "power": "W"}
-"""What a map gives beside the pulse width, with units."""
+CHANNELS = {"thrust": "thrust_N", "rpm": "rpm", "current": "current_A", "power": "electrical_power_W"}
+"""What a map gives beside the pulse width, and the channel it is fitted to."""
+_RECORDED = (*CHANNELS.values(), "voltage_V")
 RAMP = 40
 """Distinct commands, one sample each, from which a recording is a ramp and not a table of steps."""
 
 
-@dataclass(frozen=True, eq=False)
-class MapPoints:
-    """Steady points of one or more recordings."""
-
-    pulse_us: Array  # (N,) pulse width. [us]
-    values: dict[str, Array]  # thrust [N], rpm [rev/min], current [A], power [W], voltage [V]; NaN where not recorded
-    weight: Array  # (N,) weight of each point in a fit. [-]
-    run: NDArray[np.intp]  # (N,) which recording a point is from
-    notes: tuple[str, ...] = ()  # what was assumed or left out
-    ramp: bool = False  # whether the command moved all the time
-
-    def __len__(self) -> int:
-        return len(self.pulse_us)
-
-    def take(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> MapPoints:
-        """Some of the points."""
-        values = {name: v[rows] for name, v in self.values.items()}
-        return MapPoints(self.pulse_us[rows], values, self.weight[rows], self.run[rows], self.notes, self.ramp)
+def map_points(
+    pulse_us: Array, recorded: Mapping[str, ArrayLike], run: int = 0, notes: Sequence[str] = (), ramp: bool = False
+) -> Dataset:
+    """Steady points over the pulse width [us]; NaN for what is not recorded. `ramp`: the command moved all the time."""
+    nothing = np.full(len(pulse_us), np.nan)
+    values = {
+        "pulse_us": pulse_us,
+        **{k: recorded.get(k, nothing) for k in _RECORDED},
+        "run": np.full(len(pulse_us), run),
+    }
+    return Dataset("bench", "map", values, units={"pulse_us": "us"}, notes=tuple(notes), provenance={"ramp": ramp})
 
 
 def _channel(got: Dataset, *names: str) -> Array | None:
@@ -61,7 +55,7 @@ def _command(got: Dataset, name: str, notes: list[str]) -> Array:
     raise InputError(Fault(name, "pulse_width_s", "no pulse width and no throttle", "a command per row", hint))
 
 
-def points(got: Dataset, name: str = "", sign: int = 1, run: int = 0) -> MapPoints:
+def points(got: Dataset, name: str = "", sign: int = 1, run: int = 0) -> Dataset:
     """Find the steady points of one recording."""
     notes: list[str] = []
     command = _command(got, name, notes)
@@ -77,9 +71,8 @@ def points(got: Dataset, name: str = "", sign: int = 1, run: int = 0) -> MapPoin
     power = _channel(got, "electrical_power_W")
     if power is None and current is not None and voltage is not None:
         power = current * voltage
-    empty = np.full(len(command), np.nan)
-    raw = {"thrust": thrust, "rpm": rpm, "current": current, "power": power, "voltage": voltage}
-    data = {key: empty if v is None else v for key, v in raw.items()}
+    raw = (thrust, rpm, current, power, voltage)
+    data = {key: np.full(len(command), np.nan) if v is None else v for key, v in zip(_RECORDED, raw, strict=True)}
     full = float(np.nanmax(np.abs(thrust)))
     silent = (data["rpm"] == 0.0) & (np.abs(thrust) > 0.05 * full)
     if np.any(silent):
@@ -90,44 +83,30 @@ def points(got: Dataset, name: str = "", sign: int = 1, run: int = 0) -> MapPoin
         got_text = f"{len(out)} steady points"
         raise InputError(Fault(name, "", got_text, "4 points or more at different pulse widths"))
     top = out.pulse_us >= np.max(out.pulse_us) - 0.2 * np.ptp(out.pulse_us)
-    if np.nanmean(out.values["thrust"][top]) <= 0.0:
-        shown = f"{np.nanmean(out.values['thrust'][top]):.3g} N at the greatest pulse widths"
+    if np.nanmean(out.thrust_N[top]) <= 0.0:
+        shown = f"{np.nanmean(out.thrust_N[top]):.3g} N at the greatest pulse widths"
         hint = "Give --sign -1 if the stand counts thrust the other way"
         raise InputError(Fault(name, "thrust_N", shown, "positive thrust", hint))
     return out
 
 
-def _reduced(got: Dataset, command: Array, data: dict[str, Array], notes: list[str], run: int) -> MapPoints:
-    used = np.isfinite(command) & np.isfinite(data["thrust"])
+def _reduced(got: Dataset, command: Array, data: dict[str, Array], notes: list[str], run: int) -> Dataset:
+    used = np.isfinite(command) & np.isfinite(data["thrust_N"])
     stays = np.mean(np.isclose(np.diff(command[used]), 0.0)) if np.count_nonzero(used) > 1 else 0.0
     if stays < 0.4:  # one row per step, or a ramp
         ramp = len(np.unique(command[used])) > RAMP
         if ramp:
             notes.append("the command moves all the time: lag of the drive is part of the map")
-        pulse, values = command[used], {key: v[used] for key, v in data.items()}
-        weight = np.ones(len(pulse))
-    else:
-        ramp = False
-        found = plateaus.find(got.values.get("time_s"), data, "thrust", command)
-        kept = [p for p in found.plateaus if "not settled" not in p.flags]
-        lost = len(found.plateaus) - len(kept)
-        if lost:
-            notes.append(f"{lost} plateaus that do not settle were left out")
-        pulse = np.array([p.command for p in kept], dtype=float)
-        values = {key: np.array([p.mean.get(key, np.nan) for p in kept]) for key in data}
-        weight = np.ones(len(kept))
-    return MapPoints(pulse, values, weight, np.full(len(pulse), run), tuple(notes), ramp)
+        return map_points(command[used], {key: v[used] for key, v in data.items()}, run, notes, ramp)
+    found = plateaus.find(got.values.get("time_s"), data, "thrust_N", command)
+    kept = [p for p in found.plateaus if "not settled" not in p.flags]
+    if lost := len(found.plateaus) - len(kept):
+        notes.append(f"{lost} plateaus that do not settle were left out")
+    pulse = np.array([p.command for p in kept], dtype=float)
+    return map_points(pulse, {key: np.array([p.mean.get(key, np.nan) for p in kept]) for key in data}, run, notes)
 
 
-def join(parts: Sequence[MapPoints]) -> MapPoints:
+def join(parts: Sequence[Dataset]) -> Dataset:
     """Put recordings of one drive together."""
-    keys = list(parts[0].values)
-    notes = tuple(dict.fromkeys(note for part in parts for note in part.notes))
-    return MapPoints(
-        np.concatenate([p.pulse_us for p in parts]),
-        {key: np.concatenate([p.values[key] for p in parts]) for key in keys},
-        np.concatenate([p.weight for p in parts]),
-        np.concatenate([p.run for p in parts]),
-        notes,
-        any(p.ramp for p in parts),
-    )
+    notes = dict.fromkeys(note for part in parts for note in part.notes)
+    return replace(concat(parts), notes=tuple(notes), provenance={"ramp": any(p.provenance["ramp"] for p in parts)})

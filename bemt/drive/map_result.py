@@ -45,7 +45,7 @@ def fit(
     out: str | None = None,
 ) -> MapResult:
     """Fit a map to recordings of one drive and write it where told; faults of options and files come at once."""
-    parts: list[map_points.MapPoints] = []
+    parts: list[Dataset] = []
     faults = _option_faults(thrust, voltage, nodes, name)
     name = name or Path(files[0]).stem
     read: dict[Path, str] = {}

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.drive.map_points import MapPoints
+from bemt.dataset import Dataset
 
 __all__ = ["speed_known"]
 
@@ -16,14 +16,14 @@ LEAST_THRUST = 0.05
 """Share of the greatest thrust below which a level does not speak for T/rpm^2: there it is mostly zero point."""
 
 
-def speed_known(points: MapPoints) -> Array:
+def speed_known(points: Dataset) -> Array:
     """Errors of the same held-out levels if their speed were known: what is left is not the map's, (M,) [1].
 
     A propeller at rest has thrust = k rpm^2, with k almost constant (Reynolds number). Each level's k is read between
     the nearest levels below and above in speed; its thrust then misses by this much. It holds the scatter of the
     readings of thrust and speed, whatever ESC and battery do.
     """
-    thrust, rpm = points.values["thrust"], points.values["rpm"]
+    thrust, rpm = points.thrust_N, points.rpm
     usable = np.isfinite(thrust) & np.isfinite(rpm) & (rpm > 0.0)
     if not np.any(usable):
         return np.empty(0)
@@ -43,7 +43,7 @@ def speed_known(points: MapPoints) -> Array:
     return np.array(errors)
 
 
-def document(points: MapPoints) -> dict[str, Any]:
+def document(points: Dataset) -> dict[str, Any]:
     """Summary of `speed_known`. [1]"""
     e = speed_known(points)
     worst, rms = (float(np.max(np.abs(e))), float(np.sqrt(np.mean(e**2)))) if e.size else (None, None)

@@ -64,9 +64,7 @@ def hover(drive: Drive, mass_kg: float, rotors: int, soc: float) -> Hover:
                  settled_temperature(drive, pulse, soc))  # fmt: skip
 
 
-def endurance(
-    drive: Drive, mass_kg: float, rotors: int, soc: float, soc_min: float, points: int = 21
-) -> tuple[float, float]:
+def endurance(drive: Drive, mass_kg: float, rotors: int, soc: float, soc_min: float) -> tuple[float, float]:
     """Time in hover until the charge is used, or the drive no longer carries the weight."""
     wanted = mass_kg * G0 / rotors
 
@@ -74,7 +72,7 @@ def endurance(
         pulse = drive.pulse_for(wanted, c)
         return math.nan if math.isnan(pulse) else float(drive.steady(pulse, c).battery_A[0])
 
-    charge = np.linspace(soc, soc_min, points)
+    charge = np.linspace(soc, soc_min, 21)
     amps = np.array([drawn(float(c)) for c in charge])
     good = int(np.argmax(~np.isfinite(amps))) if np.any(~np.isfinite(amps)) else len(amps)
     if good < 1:

@@ -51,8 +51,6 @@ def _known(where: str, value: str, known: tuple[str, ...]) -> None:
 def voltage_factor(measure: str, between: str, winding: str) -> float:
     """Measured voltage over the peak voltage of a winding. [1]
 
-    Examples
-    --------
     >>> voltage_factor("peak_to_peak", "phase", "delta"), round(voltage_factor("rms", "line", "wye"), 6)
     (2.0, 1.224745)
     """
@@ -65,8 +63,6 @@ def voltage_factor(measure: str, between: str, winding: str) -> float:
 def current_factor(measure: str, between: str, winding: str) -> float:
     """Measured current over the peak current of a winding. [1]
 
-    Examples
-    --------
     >>> round(current_factor("q_power_invariant", "phase", "delta"), 6)
     1.224745
     """
@@ -84,8 +80,6 @@ def ke_to_kt(ke: float, measure: str = "q_power_invariant", between: str = "phas
 def from_kv(kv_rpm_V: float, winding: str, measure: str = "peak", between: str = "line") -> float:
     """Give ke of the speed constant in a data sheet. [V s/rad]
 
-    Examples
-    --------
     >>> ke = from_kv(380.0, "delta")
     >>> round(ke, 5), round(ke_to_kt(ke, "q_power_invariant", "phase", "delta"), 4)
     (0.02513, 0.0308)
@@ -118,8 +112,6 @@ class TorqueLoop:
     def torque(self, shunt_V: ArrayLike) -> Array:
         """Torque of a reading, (N,) [N m].
 
-        Examples
-        --------
         >>> TorqueLoop(250.0).torque([1.0, 3.0, 5.0])
         array([0., 1., 2.])
         """

@@ -48,30 +48,19 @@ NEAR = 6.0
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """What the methods gave, all slopes as ke [V s/rad].
+    """What the methods gave, all slopes as ke [V s/rad]."""
 
-    Parameters
-    ----------
-    data_sheet : float or None
-        ke of the data sheet. [V s/rad]
-    u_data_sheet : float
-        Its standard uncertainty; NaN when not stated: then it only bears on convention factors. [V s/rad]
-    back_emf, torque : Line or None
-        Trials: slopes in V s/rad, intercepts in V and N m.
-    u_gain_back_emf, u_gain_torque, u_shunt : float
-        Standard uncertainty of gains and of the resistor, common to all trials. [1]
-    live_zero_Nm : float
-        Shift of torque by a resistor that is wrong by 1. [N m]
-    """
-
-    data_sheet: float | None
+    data_sheet: float | None  # ke of the data sheet [V s/rad]
+    # Its standard uncertainty; NaN when not stated: then it only bears on convention factors [V s/rad]
     u_data_sheet: float
+    # Trials: slopes in V s/rad, intercepts in V and N m
     back_emf: Line | None
     torque: Line | None
+    # Standard uncertainty of gains and of the resistor, common to all trials [1]
     u_gain_back_emf: float = 0.0
     u_gain_torque: float = 0.0
     u_shunt: float = 0.0
-    live_zero_Nm: float = 0.0
+    live_zero_Nm: float = 0.0  # Shift of torque by a resistor that is wrong by 1 [N m]
 
 
 @dataclass(frozen=True)
@@ -91,21 +80,12 @@ class ErrorSource:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether the methods agree.
+    """Whether the methods agree."""
 
-    Parameters
-    ----------
-    agree : bool
-        Whether no systematic error is needed.
-    explanations : tuple of ErrorSource
-        What explains a disagreement, best first; several: not told apart; empty: agreement, or nothing known does.
-    none : ErrorSource
-        The fit without any error.
-    """
-
-    agree: bool
+    agree: bool  # Whether no systematic error is needed
+    # What explains a disagreement, best first; several: not told apart; empty: agreement, or nothing known does
     explanations: tuple[ErrorSource, ...]
-    none: ErrorSource
+    none: ErrorSource  # The fit without any error
 
     @property
     def named(self) -> tuple[str, ...]:

@@ -65,8 +65,6 @@ def plants(words: list[str]) -> dict[str, float]:
 def generate(seed: int, planted: Mapping[str, float] | None = None, bench: MotorBench | None = None) -> dict[str, str]:
     """Generate trials and the motor.toml that describes them.
 
-    Notes
-    -----
     The readings carry the error, the motor.toml does not know of it. The data sheet's K_v is drawn within its tolerance
     of what belongs to the true constant only when a seed other than 0 asks for it; seed 0 keeps the printed K_v.
     """

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.drive.map_points import CHANNELS
+
 if TYPE_CHECKING:
     from bemt.drive.bench_map import BenchMap
 
@@ -49,10 +51,10 @@ def bench_map(chart: BenchMap, name: str) -> bytes:
     pulse = np.linspace(*chart.pulse_range_us, 400)
     for ax, quantity in zip(axes, chart.curves, strict=True):
         if chart.points is not None:
-            y = chart.points.values[quantity]
+            y = chart.points[CHANNELS[quantity]]
             words = "recorded"
             if chart.with_voltage:
-                ratio = chart.points.values["voltage"] / chart.voltage_ref
+                ratio = chart.points.voltage_V / chart.voltage_ref
                 y, words = y / ratio ** chart.curves[quantity].exponent, f"recorded, taken to {chart.voltage_ref:.1f} V"
             ax.plot(chart.points.pulse_us, y, "o", ms=4, mfc="none", color=COLOURS[6], label=words)
         reference = f"map at {chart.voltage_ref:.1f} V" if chart.with_voltage else "map"

@@ -66,8 +66,6 @@ def from_coefficients(
 ) -> RotorMap:
     """Rotor with constant coefficients.
 
-    Notes
-    -----
     With a lift slope a of 5.7 per radian, dT/dw = -rho sigma a A Omega R / 4 (blade element, uniform inflow; J. G.
     Leishman, "Principles of Helicopter Aerodynamics", 2006, ch. 3; not checked).
     """

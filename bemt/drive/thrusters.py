@@ -32,26 +32,15 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Thruster:
-    """One thruster.
+    """One thruster."""
 
-    Parameters
-    ----------
-    y_m, z_m : float
-        Position, to the left and up. [m]
-    thrust_max_N, thrust_min_N : float
-        Limits. [N]
-    cant_rad : float
-        Tilt of the thrust from the vertical to the left. [rad]
-    name : str
-        Of the thruster.
-    """
-
-    y_m: float
+    y_m: float  # Position, to the left and up [m]
+    # Limits [N]
     thrust_max_N: float
     thrust_min_N: float = 0.0
-    z_m: float = 0.0
-    cant_rad: float = 0.0
-    name: str = ""
+    z_m: float = 0.0  # Position, to the left and up [m]
+    cant_rad: float = 0.0  # Tilt of the thrust from the vertical to the left [rad]
+    name: str = ""  # Of the thruster
 
 
 @dataclass(frozen=True)
@@ -80,8 +69,6 @@ def effectiveness(thrusters: Sequence[Thruster]) -> Array:
 def allocate(thrusters: Sequence[Thruster], force_N: float, moment_Nm: float, priority: str = "moment") -> Allocation:
     """Share a command among thrusters.
 
-    Examples
-    --------
     >>> pair = [Thruster(0.2, 27.0), Thruster(-0.2, 27.0)]
     >>> got = allocate(pair, 27.0, 5.4)
     >>> got.thrust_N.round(6), got.met
@@ -155,8 +142,6 @@ def attainable(thrusters: Sequence[Thruster]) -> Array:
 def moment_at(distance_m: ArrayLike, thrust_N: float, total_force_N: float | None = None) -> Array:
     """Roll moment of a pair of thrusters over the distance at which they are mounted, (N,) [N m].
 
-    Examples
-    --------
     >>> round(float(moment_at(0.2, 27.0)), 6), round(float(moment_at(0.2, 27.0, 40.0)), 6)
     (5.4, 2.8)
     """

@@ -52,8 +52,6 @@ def simulate(
     end_s: float,
     times_s: ArrayLike | None = None,
     soc: float = 1.0,
-    temperature_C: float | None = None,
-    omega0: float | None = None,
 ) -> History:
     """Integrate the drive through steps of the command."""
     from scipy.integrate import solve_ivp
@@ -65,11 +63,11 @@ def simulate(
     orders = sorted(steps)
     if not orders or np.any(np.diff(at) < 0.0) or at[0] < 0.0 or at[-1] > end_s * (1 + 1e-12):
         raise InputError(Fault("", "times_s", "times or steps out of order", "0 to end_s, rising"))
-    warm0 = drive.motor.ambient_C if temperature_C is None else temperature_C
+    warm0 = drive.motor.ambient_C
     if "rotor_inertia" in drive.off:
         inertia *= 1e-3
     first = drive.steady(orders[0][1], soc, warm0)
-    omega = float(first.rpm[0]) * math.pi / 30.0 if omega0 is None else omega0
+    omega = float(first.rpm[0]) * math.pi / 30.0
     state = np.array([omega, float(drive.rotor.induced(drive.rotor.thrust(omega))), warm0, soc])
     out = np.full((4, len(at)), np.nan)
     pulse = np.full(len(at), orders[0][1])
@@ -127,11 +125,9 @@ def _rates(t: float, y: Array, drive: Drive, duty: Array, inertia: float) -> lis
     return rates
 
 
-def time_to(time_s: Array, values: Array, start_s: float, share: float = 1.0 - math.exp(-1.0)) -> float:
-    """Time from a step until a share of the change is reached. [s]
+def time_to(time_s: Array, values: Array, start_s: float) -> float:
+    """Time from a step until 63 % of the change, 1 - 1/e, is reached. [s]
 
-    Examples
-    --------
     >>> t = np.linspace(0.0, 1.0, 1001)
     >>> round(time_to(t, 1 - np.exp(-t / 0.05), 0.0), 4)
     0.05
@@ -140,7 +136,7 @@ def time_to(time_s: Array, values: Array, start_s: float, share: float = 1.0 - m
     change = float(values[-1]) - before
     if change == 0.0 or not math.isfinite(change):
         return math.nan
-    done = (values - before) / change
+    done, share = (values - before) / change, 1.0 - math.exp(-1.0)
     later = np.flatnonzero((time_s >= start_s) & (done >= share))
     if len(later) == 0 or later[0] == 0:
         return math.nan
@@ -165,12 +161,8 @@ class FirstOrder:
 def first_order(time_s: ArrayLike, values: ArrayLike) -> FirstOrder:
     """Fit a delayed first-order step, as load-cell logs are usually read.
 
-    Notes
-    -----
     Least squares of before + (after - before) (1 - exp(-(t - t0)/tau)), levels solved linearly.
 
-    Examples
-    --------
     >>> t = np.arange(0.0, 1.0, 0.02)
     >>> got = first_order(t, np.where(t > 0.31, 2.0 * (1 - np.exp(-(t - 0.31) / 0.05)), 0.0))
     >>> round(got.tau_s, 3), round(got.delay_s, 3), round(got.after, 3)

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.dataset import Dataset
 from bemt.drive import identify, transient
 from bemt.drive.drive_model import Battery, Drive, Esc, Motor
-from bemt.drive.map_points import MapPoints
 from bemt.drive.rotor_table import quadratic
 
 __all__ = ["MapCheck", "Step", "StepCheck", "check_map", "check_steps", "other_battery", "step_drive"]
@@ -35,16 +35,16 @@ class MapCheck:
     fitted: Mapping[str, float]  # constants fitted, in the unit of their names
 
 
-def check_map(name: str, how: str, drive: Drive, points: MapPoints, fitted: Mapping[str, float]) -> MapCheck:
+def check_map(name: str, how: str, drive: Drive, points: Dataset, fitted: Mapping[str, float]) -> MapCheck:
     """Compare a drive with a thrust map."""
-    thrust = points.values["thrust"]
+    thrust = points.thrust_N
     model = drive.steady(points.pulse_us).thrust_N
     error = np.abs(model - thrust) / float(np.nanmax(thrust))
     return MapCheck(name, how, points.pulse_us, thrust, model, float(np.nanmax(error)),
                     float(np.sqrt(np.nanmean(error**2))), dict(fitted))  # fmt: skip
 
 
-def other_battery(drive: Drive, points: MapPoints) -> Drive:
+def other_battery(drive: Drive, points: Dataset) -> Drive:
     """The drive on the battery of another recording."""
     voc, rb = identify.battery_of(points)
     return replace(drive, battery=Battery(1, rb, soc_table=(0.0, 1.0), ocv_V=(voc, voc)))

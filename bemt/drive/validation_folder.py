@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from bemt import readers as importers
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import json_text, number_text, text_table, write_atomic
+from bemt.dataset import Dataset
 from bemt.drive import identify, map_points, picture, validation
 from bemt.drive.drive_model import Drive
-from bemt.drive.map_points import MapPoints
 
 __all__ = ["compare", "maps", "steps"]
 
@@ -38,7 +38,7 @@ ALL = f"{ESC}, K_v and I0: no data sheet known"
 MIT = f"{ESC} and I0; K_v 775 by its motor's name, 12 V assumed, no voltage recorded"
 
 
-def _read(path: Path, sign: int = 1) -> tuple[MapPoints, Array | None]:
+def _read(path: Path, sign: int = 1) -> tuple[Dataset, Array | None]:
     """Points of a map and their torque, where each row is a point."""
     got = importers.read(path)
     points = map_points.points(got, path.as_posix(), sign)
@@ -46,12 +46,10 @@ def _read(path: Path, sign: int = 1) -> tuple[MapPoints, Array | None]:
     return points, sign * torque if torque is not None and len(torque) == len(points) else None
 
 
-def _mit(path: Path) -> tuple[MapPoints, Array]:
+def _mit(path: Path) -> tuple[Dataset, Array]:
     """Columns without headings: pulse width [us], torque [N m], thrust [N], speed [rev/min], current [A]."""
     c = list(importers.read(path).values.values())
-    nothing = np.full(len(c[0]), np.nan)
-    values = {"thrust": c[2], "rpm": c[3], "current": c[4], "power": nothing, "voltage": nothing}
-    return MapPoints(c[0], values, np.ones(len(c[0])), np.zeros(len(c[0]), dtype=np.intp)), c[1]
+    return map_points.map_points(c[0], {"thrust_N": c[2], "rpm": c[3], "current_A": c[4]}), c[1]
 
 
 def maps(folder: Path) -> list[validation.MapCheck]:
@@ -60,10 +58,7 @@ def maps(folder: Path) -> list[validation.MapCheck]:
     bare = folder / "jmajew" / "grp01__mn2206_noprop_3s.csv"
     if bare.is_file():
         log = importers.read(bare)
-        v = {k: log[f"{k}{u}"] for k, u in (("rpm", ""), ("current", "_A"), ("voltage", "_V"))}
-        empty = MapPoints(1000.0 + 1000.0 * log["throttle"], v, np.ones(len(v["rpm"])),
-                          np.zeros(len(v["rpm"]), dtype=np.intp))  # fmt: skip
-        kv, i0 = identify.no_load(empty)
+        kv, i0 = identify.no_load(map_points.map_points(1000.0 + 1000.0 * log["throttle"], log.values))
         for path in sorted(bare.parent.glob("grp01__mn2206_*_table1.csv")):
             points, torque = _read(path)
             fit = identify.fit_map(points, {"kv_rpm_V": kv, "no_load_A": i0}, torque)
@@ -94,7 +89,7 @@ def maps(folder: Path) -> list[validation.MapCheck]:
             fit = identify.fit_map(points, None, torque)
         except InputError:  # too few steady points, or no speed
             continue
-        thrust = points.values["thrust"]
+        thrust = points.thrust_N
         if np.corrcoef(points.pulse_us, thrust)[0, 1] > 0.9:  # else no propeller, or the run broke off
             out.append(validation.check_map(f"rcbenchmark {path.stem}", ALL, fit.drive, points, fit.fitted))
     return out

@@ -47,32 +47,19 @@ def anchors_of(job: Job) -> list[tuple[float, Polar, float]]:
 
 @dataclass(frozen=True, eq=False)
 class Frozen:
-    """Tables at radii with Reynolds number held at that of the operating point.
+    """Tables at radii with Reynolds number held at that of the operating point."""
 
-    Attributes
-    ----------
-    r, chord, beta : (S,) float
-        Stations. [m], [rad]
-    alpha : (Na,) float
-        Angles of attack. [rad]
-    M : (Nm,) float
-        Mach numbers [1].
-    cl, cd : (S, Na, Nm) float
-        Coefficients [1].
-    Re : (S,) float
-        Reynolds numbers that were held [1].
-    at_alpha, at_M : (S,) float
-        Angle of attack [rad] and Mach number of the operating point.
-    """
-
+    # (S,) stations [m], [rad]
     r: Array
     chord: Array
     beta: Array
-    alpha: Array
-    M: Array
+    alpha: Array  # (Na,) angles of attack [rad]
+    M: Array  # (Nm,) Mach numbers [1]
+    # (S, Na, Nm) coefficients [1]
     cl: Array
     cd: Array
-    Re: Array
+    Re: Array  # (S,) Reynolds numbers that were held [1]
+    # (S,) angle of attack [rad] and Mach number of the operating point
     at_alpha: Array
     at_M: Array
 

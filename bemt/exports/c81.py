@@ -43,8 +43,7 @@ class C81Export(BladeExport):
             files[name] = c81_text(f, k, f"{job.case.name} {f.r[k] / p.R:.3f}")
             tables.append(f'[[polars]]\nfile = "{name}"\nr_over_R = {f.r[k] / p.R:.12g}\nformat = "c81"\n')
         rows = [
-            f"{a:.15g},{c:.15g},{b:.15g}"
-            for a, c, b in zip(p.r / p.R, p.chord / p.R, np.degrees(p.beta), strict=True)
+            f"{a:.15g},{c:.15g},{b:.15g}" for a, c, b in zip(p.r / p.R, p.chord / p.R, np.degrees(p.beta), strict=True)
         ]
         files["stations.csv"] = "r_over_R,chord_over_R,beta_deg\n" + "\n".join(rows) + "\n"
         model = job.case.file.model

@@ -72,38 +72,23 @@ def solve_points(
 
 @dataclass(frozen=True, eq=False)
 class Performance:
-    """Loads over speed of rotation and advance ratio.
+    """Loads over speed of rotation and advance ratio."""
 
-    Attributes
-    ----------
-    name : str
-        Of the case.
-    rpm : (R,) float
-        Ascending. [rev/min]
-    J : (K,) float
-        Ascending, from below 0 to beyond zero thrust; holds 0. [-]
-    thrust_N, torque_Nm, CT, CP : (R, K) float
-        Loads [N], [N m]; propeller convention. [-]
-    J_zero : (R,) float
-        Where thrust vanishes. [-]
-    diameter_m, rho, a_sound, mu : float
-        Of rotor and air. [m], [kg/m3], [m/s], [Pa s]
-    blades, sense : int
-        Number; +1 right-handed, seen from behind clockwise.
-    """
-
-    name: str
-    rpm: Array
-    J: Array
+    name: str  # Of the case
+    rpm: Array  # (R,) ascending [rev/min]
+    J: Array  # (K,) ascending, from below 0 to beyond zero thrust; holds 0 [-]
+    # (R, K) loads [N], [N m]; propeller convention [-]
     thrust_N: Array
     torque_Nm: Array
     CT: Array
     CP: Array
-    J_zero: Array
+    J_zero: Array  # (R,) where thrust vanishes [-]
+    # Of rotor and air [m], [kg/m3], [m/s], [Pa s]
     diameter_m: float
     rho: float
     a_sound: float
     mu: float
+    # Number; +1 right-handed, seen from behind clockwise
     blades: int
     sense: int
 
@@ -281,49 +266,36 @@ def band_of(case: Case, rpm: float, airspeed_m_s: tuple[float, float]) -> Stated
 
 @dataclass(frozen=True, eq=False)
 class Loading:
-    """Loads along the blade at one point; all blades together.
+    """Loads along the blade at one point; all blades together."""
 
-    Attributes
-    ----------
-    rpm, airspeed_m_s, rho, mu, a_sound : float
-        The point. [rev/min], [m/s], SI
-    r, dr, chord, beta : (N,) float
-        Elements, with what effects do to the blade. [m], [rad]
-    dT, dQ : (N,) float
-        Thrust [N] and torque [N m] of each element, of all blades.
-    alpha, Re, M : (N,) float
-        Angle of attack [rad], chord Reynolds and Mach number at which the section tables are read.
-    R, Rhub : float
-        Tip and hub radius. [m]
-    blades, sense : int
-        Number; +1 right-handed.
-    thrust_N, torque_Nm : float
-        Sums over the elements. [N], [N m]
-    duct_thrust_N : float
-        Thrust of duct and stator beside the rotor's. [N]
-    """
-
+    # The point. [rev/min], [m/s], SI
     rpm: float
     airspeed_m_s: float
     rho: float
     mu: float
     a_sound: float
+    # (N,) elements, with what effects do to the blade [m], [rad]
     r: Array
     dr: Array
     chord: Array
     beta: Array
+    # (N,) thrust [N] and torque [N m] of each element, of all blades
     dT: Array
     dQ: Array
+    # (N,) angle of attack [rad], chord Reynolds and Mach number at which the section tables are read
     alpha: Array
     Re: Array
     M: Array
+    # Tip and hub radius [m]
     R: float
     Rhub: float
+    # Number; +1 right-handed
     blades: int
     sense: int
+    # Sums over the elements [N], [N m]
     thrust_N: float
     torque_Nm: float
-    duct_thrust_N: float
+    duct_thrust_N: float  # Thrust of duct and stator beside the rotor's [N]
 
     @property
     def omega(self) -> float:

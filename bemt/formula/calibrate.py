@@ -42,11 +42,12 @@ MODELS = {"compact_pitch": "pitch", "compact": "chord", "compact_no_chord": "lab
 
 def _counts(points: FitPoints) -> dict[str, int]:
     return {
-        "propellers": len(points.propellers), "points": int(points.rpm.size),
+        "propellers": len(points.propellers),
+        "points": int(points.rpm.size),
         "static": int(np.count_nonzero(points.J == 0)),
         "with_chord": sum(bool(np.isfinite(p.chord_m)) for p in points.propellers),
         "ducted": sum(p.ducted for p in points.propellers),
-    }  # fmt: skip
+    }
 
 
 def _k1k2(points: FitPoints, draws: int, notes: list[str]) -> dict[str, fitting.K1K2]:
@@ -63,9 +64,11 @@ def _k1k2(points: FitPoints, draws: int, notes: list[str]) -> dict[str, fitting.
 
 
 def calibrate(
-    points: FitPoints, test: FitPoints | None = None, draws: int = fitting.DRAWS,
+    points: FitPoints,
+    test: FitPoints | None = None,
+    draws: int = fitting.DRAWS,
     progress: Callable[[str], None] | None = None,
-) -> tuple[dict[str, Any], dict[str, tuple[FitPoints, dict[str, Array]]]]:  # fmt: skip
+) -> tuple[dict[str, Any], dict[str, tuple[FitPoints, dict[str, Array]]]]:
     """Fit, leave out, score."""
     say = progress or (lambda _: None)
     notes = [*points.notes, *(test.notes if test else ())]
@@ -82,11 +85,14 @@ def calibrate(
         "data": {"calibration": _counts(points), "test": _counts(test) if test else None},
         "k1k2": {name: asdict(c) for name, c in k1k2.items()},
         "compact": {
-            "constants": asdict(used.constants), "published": asdict(compact.CONSTANTS), "refitted": fitted is not None,
-            "propellers": used.propellers, "chords": used.chords,
+            "constants": asdict(used.constants),
+            "published": asdict(compact.CONSTANTS),
+            "refitted": fitted is not None,
+            "propellers": used.propellers,
+            "chords": used.chords,
             "series": {name: asdict(series) for name, series in used.series.items()},
         },
-    }  # fmt: skip
+    }
     sets = {"calibration": points} | ({"test": test} if test else {})
     predictions: dict[str, tuple[FitPoints, dict[str, Array]]] = {}
     document["scores"] = {"calibration": None, "test": None}
@@ -117,9 +123,13 @@ def calibrate(
 
 
 def _leave_out(
-    points: FitPoints, fitted: refit.Fitted, CT: dict[str, Array], CP: dict[str, Array],
-    document: dict[str, Any], say: Callable[[str], None],
-) -> None:  # fmt: skip
+    points: FitPoints,
+    fitted: refit.Fitted,
+    CT: dict[str, Array],
+    CP: dict[str, Array],
+    document: dict[str, Any],
+    say: Callable[[str], None],
+) -> None:
     """Replace the compact predictions by those without the propeller, add those without the maker, and the bands."""
     makers = np.unique([p.maker for p in points.propellers], return_inverse=True)[1][points.index]
     for suffix, groups in (("", points.index), ("_maker_out", makers)):
@@ -192,7 +202,10 @@ def read(given: Sequence[str], test: Sequence[str] = ()) -> tuple[FitPoints, Fit
 
 
 def document(
-    points: FitPoints, test: FitPoints | None, given: Sequence[str], held: Sequence[str],
+    points: FitPoints,
+    test: FitPoints | None,
+    given: Sequence[str],
+    held: Sequence[str],
     progress: Callable[[str], None],
 ) -> tuple[dict[str, Any], dict[str, tuple[FitPoints, dict[str, Array]]]]:
     """Do as `calibrate`, with the names of the files in the document."""
@@ -201,9 +214,7 @@ def document(
     return {"schema": found["schema"], **names, **found}, predictions
 
 
-def write(
-    found: dict[str, Any], predictions: dict[str, tuple[FitPoints, dict[str, Array]]], out: str | Path
-) -> None:
+def write(found: dict[str, Any], predictions: dict[str, tuple[FitPoints, dict[str, Array]]], out: str | Path) -> None:
     """Write calibration.json, .txt and .png."""
     from bemt.formula.figure import draw
 

@@ -78,36 +78,16 @@ X_LIMIT = 1.2
 
 @dataclass(frozen=True)
 class Constants:
-    """The eight fitted constants.
+    """The eight fitted constants."""
 
-    Attributes
-    ----------
-    pitch_factor : float
-        k, effective over nominal pitch. [-]
-    zero_lift : float
-        a0, zero-lift angle of a cambered section at high Reynolds number. [rad]
-    loading_max : float
-        m, largest blade loading C/s at high Reynolds number. [-]
-    re_scale : float
-        Re0 of r. [-]
-    cd0 : float
-        Profile drag at Re 1e5. [-]
-    stall_drag : float
-        d, share of the thrust lost to stall that returns as drag. [-]
-    chord_R : float
-        c1, chord over tip radius at 0.75 R of a 10 in propeller. [-]
-    chord_exponent : float
-        e, how it changes with diameter. [-]
-    """
-
-    pitch_factor: float
-    zero_lift: float
-    loading_max: float
-    re_scale: float
-    cd0: float
-    stall_drag: float
-    chord_R: float
-    chord_exponent: float
+    pitch_factor: float  # k, effective over nominal pitch [-]
+    zero_lift: float  # a0, zero-lift angle of a cambered section at high Reynolds number [rad]
+    loading_max: float  # m, largest blade loading C/s at high Reynolds number [-]
+    re_scale: float  # Re0 of r [-]
+    cd0: float  # Profile drag at Re 1e5 [-]
+    stall_drag: float  # d, share of the thrust lost to stall that returns as drag [-]
+    chord_R: float  # c1, chord over tip radius at 0.75 R of a 10 in propeller [-]
+    chord_exponent: float  # e, how it changes with diameter [-]
 
 
 CONSTANTS = Constants(0.9143, 0.1714, 0.1966, 2548.0, 0.02961, 0.7756, 0.1462, -0.2348)
@@ -116,21 +96,11 @@ CONSTANTS = Constants(0.9143, 0.1714, 0.1966, 2548.0, 0.02961, 0.7756, 0.1462, -
 
 @dataclass(frozen=True)
 class MakerSeries:
-    """What sets a series of propellers apart from the mean of all.
+    """What sets a series of propellers apart from the mean of all."""
 
-    Attributes
-    ----------
-    zero_lift : float
-        Added to a0. [rad]
-    chord : float
-        Chord over the typical one. [-]
-    name : str
-        Maker and series.
-    """
-
-    zero_lift: float = 0.0
-    chord: float = 1.0
-    name: str = ""
+    zero_lift: float = 0.0  # Added to a0 [rad]
+    chord: float = 1.0  # Chord over the typical one [-]
+    name: str = ""  # Maker and series
 
 
 SERIES: dict[str, MakerSeries] = {
@@ -181,8 +151,6 @@ the maker is left out of the fit, over `BAND_X`; given label, chord, chord and m
 def find_series(name: str) -> MakerSeries:
     """Maker series by UIUC family (``gwsdd``) or name (``GWS Direct Drive``).
 
-    Examples
-    --------
     >>> find_series("GWS Direct Drive") is SERIES["gwsdd"]
     True
     """
@@ -196,8 +164,6 @@ def find_series(name: str) -> MakerSeries:
 def default_chord(diameter_m: ArrayLike, constants: Constants = CONSTANTS) -> Any:
     """Typical chord at 0.75 R of one blade of a two-bladed small propeller. [m]
 
-    Examples
-    --------
     >>> round(1000 * default_chord(0.254), 1)
     18.6
     """
@@ -213,17 +179,18 @@ def effective_pitch(label: ArrayLike, measured: ArrayLike) -> Array:
 
 
 def coefficients(
-    P_D: ArrayLike, J: ArrayLike, solidity: ArrayLike, Re: ArrayLike, constants: Constants = CONSTANTS,
-    zero_lift: ArrayLike = 0.0, level: ArrayLike = 1.0,
-) -> tuple[Array, Array]:  # fmt: skip
+    P_D: ArrayLike,
+    J: ArrayLike,
+    solidity: ArrayLike,
+    Re: ArrayLike,
+    constants: Constants = CONSTANTS,
+    zero_lift: ArrayLike = 0.0,
+    level: ArrayLike = 1.0,
+) -> tuple[Array, Array]:
     """Thrust and power coefficient by the formula of the module. [-]
 
-    Notes
-    -----
     At J = 0 without stall this is the hover of an ideally twisted rotor [1]_, C = 2 li^2 = K (theta - li) r.
 
-    Examples
-    --------
     >>> CT, CP = coefficients(0.5, [0.0, 0.3, 0.6], 0.0929, 5e4)
     >>> CT.round(3), CP.round(3)
     (array([0.093, 0.056, 0.003]), array([0.038, 0.034, 0.014]))
@@ -254,9 +221,13 @@ SERIES_AT_REST, SERIES_WHOLE = 0.5, 0.5
 
 
 def series_coefficients(
-    P_D: ArrayLike, J: ArrayLike, solidity: ArrayLike, Re: ArrayLike, zero_lift: ArrayLike,
+    P_D: ArrayLike,
+    J: ArrayLike,
+    solidity: ArrayLike,
+    Re: ArrayLike,
+    zero_lift: ArrayLike,
     constants: Constants = CONSTANTS,
-) -> tuple[Array, Array]:  # fmt: skip
+) -> tuple[Array, Array]:
     """Thrust and power coefficient of a propeller of a known series. [-]
 
     a0 of a series is learnt at rest and in flight together. In flight it helps thrust (given the chord, 9.7 to 7.6 %

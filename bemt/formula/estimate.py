@@ -25,7 +25,7 @@ from bemt.formula.compact import (
     effective_pitch,
     find_series,
     series_coefficients,
-)  # fmt: skip
+)
 
 Array = NDArray[np.float64]
 UNITS = {"mm": 1e-3, "in": INCH, "cm": 1e-2, "m": 1.0}
@@ -36,40 +36,28 @@ POSSIBLE = {"pitch": (0.1, 2.5), "chord": (0.02, 0.4)}
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Outcome of the compact formula over N points.
+    """Outcome of the compact formula over N points."""
 
-    Attributes
-    ----------
-    thrust_N, power_W : (N,) float
-        Thrust [N], shaft power [W].
-    rpm, airspeed_m_s : (N,) float
-        Rotational speed [rev/min], airspeed [m/s].
-    CT, CP, J, M_tip, Re : (N,) float
-        Propeller convention, advance ratio, rotational tip Mach number, Reynolds number at 0.75 R. [-]
-    u_thrust_N, u_power_W : (N,) float
-        Half-widths that held 68 % of the points of makers left out of the fit; NaN (unknown) for ducted rotors, near
-        the speed of sound and beyond zero thrust. At flagged points too narrow: on volume 2 they hold about half. [N],
-        [W]
-    u95_thrust_N, u95_power_W : (N,) float
-        The same for 95 %. [N], [W]
-    flags : tuple of tuple of str
-        Per point, why not to trust it; empty when inside the data.
-    """
-
+    # (N,) thrust [N], shaft power [W]
     thrust_N: Array
     power_W: Array
+    # (N,) rotational speed [rev/min], airspeed [m/s]
     rpm: Array
     airspeed_m_s: Array
+    # (N,) propeller convention, advance ratio, rotational tip Mach number, Reynolds number at 0.75 R [-]
     CT: Array
     CP: Array
     J: Array
     M_tip: Array
     Re: Array
+    # (N,) half-widths that held 68 % of the points of makers left out of the fit; NaN (unknown) for ducted rotors, near
+    # the speed of sound and beyond zero thrust. At flagged points too narrow: on volume 2 they hold about half [N], [W]
     u_thrust_N: Array
     u_power_W: Array
+    # (N,) the same for 95 % [N], [W]
     u95_thrust_N: Array
     u95_power_W: Array
-    flags: tuple[tuple[str, ...], ...]
+    flags: tuple[tuple[str, ...], ...]  # Per point, why not to trust it; empty when inside the data
 
     @property
     def thrust_kgf(self) -> Array:
@@ -78,13 +66,17 @@ class Estimate:
 
 
 def validity_flags(
-    diameter_m: float, P_D: float, blades: float, Re: float, M_tip: float, x: float, chord_known: bool = True,
+    diameter_m: float,
+    P_D: float,
+    blades: float,
+    Re: float,
+    M_tip: float,
+    x: float,
+    chord_known: bool = True,
     ducted: bool = False,
-) -> tuple[str, ...]:  # fmt: skip
+) -> tuple[str, ...]:
     """Say where a point leaves the data of the calibration.
 
-    Examples
-    --------
     >>> validity_flags(0.254, 0.5, 2, 5e4, 0.2, 0.3)
     ()
     >>> validity_flags(0.3556, 0.57, 2, 3e5, 1.09, 0.0)[-1]
@@ -122,8 +114,6 @@ def length_faults(
 ) -> list[Fault]:
     """Say whether a length fits the diameter, and in which unit it would.
 
-    Examples
-    --------
     >>> print(*length_faults(("--measured-pitch-in", ""), 127.0, "in", 8 * 0.0254, POSSIBLE["pitch"]))
     --measured-pitch-in: got 127; expected 0.1 to 2.5 diameters, 0.8 to 20 in. 127 mm would be 0.62 diameters.
     """
@@ -174,8 +164,6 @@ def estimate(
 ) -> Estimate:  # fmt: skip
     """Thrust and power with their bands and flags.
 
-    Examples
-    --------
     >>> e = estimate(10 * 0.0254, 5 * 0.0254, 2, 6000.0)
     >>> e.thrust_N.round(1), e.u_thrust_N.round(1), e.power_W.round(0), e.flags
     (array([5.2]), array([0.7]), array([51.]), ((),))
@@ -219,5 +207,6 @@ def estimate(
         return np.where(unknown, np.nan, np.interp(x, BAND_X, band[key]) * scale)
 
     T0, P0 = np.asarray(co.thrust(CT0, rho, n, D)), np.asarray(co.power(CP0, rho, n, D))
-    return Estimate(T, P, w, V, CT, CP, J, M, Re, width("CT68", T0), width("CP68", P0), width("CT95", T0),
-                    width("CP95", P0), flags)  # fmt: skip
+    return Estimate(
+        T, P, w, V, CT, CP, J, M, Re, width("CT68", T0), width("CP68", P0), width("CT95", T0), width("CP95", P0), flags
+    )

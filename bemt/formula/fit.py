@@ -28,22 +28,15 @@ DRAWS = 1000
 
 @dataclass(frozen=True)
 class K1K2:
-    """Constants with their 95 % intervals.
+    """Constants with their 95 % intervals."""
 
-    Attributes
-    ----------
-    K1, K2 : float
-        Constants. [-]
-    K1_95, K2_95 : (float, float)
-        Bootstrap percentiles over propellers; NaN where not estimated. [-]
-    points, propellers : int
-        What they were fitted on.
-    """
-
+    # Constants [-]
     K1: float
     K2: float
+    # Bootstrap percentiles over propellers; NaN where not estimated [-]
     K1_95: tuple[float, float] = (float("nan"), float("nan"))
     K2_95: tuple[float, float] = (float("nan"), float("nan"))
+    # What they were fitted on
     points: int = 0
     propellers: int = 0
 
@@ -72,13 +65,9 @@ def weights(index: NDArray[np.intp]) -> Array:
 def huber_line(t: Array, y: Array, w: Array, scale: float | None = None) -> tuple[float, float]:
     """Weighted robust straight line y = a + b t. [-]
 
-    References
-    ----------
     P. J. Huber, "Robust Estimation of a Location Parameter", Annals of Mathematical Statistics 35, 1964, 73-101,
     doi:10.1214/aoms/1177703732. Not checked against the paper.
 
-    Examples
-    --------
     >>> t = np.arange(10.0)
     >>> y = 1.0 + 2.0 * t
     >>> y[3] = 50.0
@@ -109,8 +98,6 @@ def huber_line(t: Array, y: Array, w: Array, scale: float | None = None) -> tupl
 def robust_scale(e: Array, w: Array) -> float:
     """Standard deviation by the weighted median of deviations, as if they were normal. [-]
 
-    Examples
-    --------
     >>> round(robust_scale(np.array([1.0, 2.0, 3.0, 100.0]), np.ones(4)), 4)
     3.7065
     """
@@ -159,9 +146,9 @@ def fit(points: FitPoints, flight: bool = False, draws: int = DRAWS) -> K1K2:
     return K1K2(K1, K2, (float(low[0]), float(high[0])), (float(low[1]), float(high[1])), out.points, out.propellers)
 
 
-def goal_seek(points: FitPoints, K2: float = empirical.K2) -> K1K2:
+def goal_seek(points: FitPoints) -> K1K2:
     """K1 as the thesis's source found it: K2 fixed, mean relative error of the static points zero."""
-    used = points.select(usable(points))
+    used, K2 = points.select(usable(points)), empirical.K2
     mean = float(np.mean(CT_k1k2(used, 1.0, K2) / used.CT))
     return K1K2(mean ** (-1.0 / K2), K2, points=used.rpm.size, propellers=np.unique(used.index).size)
 

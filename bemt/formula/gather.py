@@ -47,8 +47,9 @@ def _from_uiuc(p: uiuc.UiucPropeller) -> tuple[list[Rows], list[str]]:
         chord = float(np.interp(0.75, p.geometry.r_R, p.geometry.c_R)) * p.diameter_m / 2.0
         beta = np.radians(np.interp(0.75, p.geometry.r_R, p.geometry.beta_deg))
         pitch = 0.75 * np.pi * p.diameter_m * float(np.tan(beta))
-    made = MeasuredPropeller(p.name, p.family, "UIUC", p.diameter_m, p.pitch_in * INCH, p.blades, chord,
-                     measured_pitch_m=pitch)  # fmt: skip
+    made = MeasuredPropeller(
+        p.name, p.family, "UIUC", p.diameter_m, p.pitch_in * INCH, p.blades, chord, measured_pitch_m=pitch
+    )
     rows: list[Rows] = [(made, s.rpm, np.zeros_like(s.rpm), s.CT, s.CP) for s in p.statics]
     rows += [(made, np.full_like(line.J, line.rpm), line.J, line.CT, line.CP) for line in p.lines]
     return rows, [] if rows else [f"{p.name}: geometry only"]

@@ -63,8 +63,6 @@ nominal D and p; `bemt.compare.reproduce` recomputes it where the data are."""
 def corrected_equation(rho: Any, area: Any, v_pitch: Any, V: Any, d_over_p: Any) -> Any:
     """K1/K2 equation in its right form, every term inside the bracket. [N]
 
-    Examples
-    --------
     >>> round(corrected_equation(1.225, 1.0, 10.0, 5.0, 3.29546), 3)
     61.25
     """
@@ -74,13 +72,9 @@ def corrected_equation(rho: Any, area: Any, v_pitch: Any, V: Any, d_over_p: Any)
 def printed_equation(rho: Any, area: Any, v_pitch: Any, V: Any, d_over_p: Any) -> Any:
     """K1/K2 equation as printed in the thesis, kept ONLY to show that it cannot be right.  Never use it.
 
-    Notes
-    -----
     The term with V stands outside the bracket that density and area multiply, (rho A v_p^2 - v_p V)(K1 D/p)^K2.  A
     change of units therefore changes the ratio to `corrected_equation`; see `unit_defect`.  Static values agree.
 
-    Examples
-    --------
     >>> static = (1.225, 0.05, 40.0, 0.0, 1.6)
     >>> printed_equation(*static) == corrected_equation(*static)
     True
@@ -91,13 +85,9 @@ def printed_equation(rho: Any, area: Any, v_pitch: Any, V: Any, d_over_p: Any) -
 def unit_defect(formula: Callable[..., float], mass: float = 1.0, length: float = 1.0, time: float = 1.0) -> float:
     """Relative error that a mere change of units makes in a thrust formula; zero for a right one. [-]
 
-    Notes
-    -----
     Any physical equation is homogeneous in mass, length and time (Bridgman, "Dimensional Analysis", 1922), so that the
     result is zero for every choice of units.  Evaluated for an 8x5 at 6000 rev/min and half its pitch speed.
 
-    Examples
-    --------
     >>> abs(unit_defect(corrected_equation, length=0.0254)) < 1e-12
     True
     >>> abs(unit_defect(printed_equation, length=0.0254)) > 0.5
@@ -133,8 +123,6 @@ def _check(D: Array, pitch: Array, rpm: Array, V: Array, rho: Array, hub: Array)
 def pitch_speed(rpm: ArrayLike, pitch_m: ArrayLike) -> Any:
     """Advance of a screw in still air. [m/s]
 
-    Examples
-    --------
     >>> pitch_speed(6000.0, 0.127)
     12.7
     """
@@ -144,12 +132,8 @@ def pitch_speed(rpm: ArrayLike, pitch_m: ArrayLike) -> Any:
 def zero_thrust_J(diameter_m: ArrayLike, pitch_m: ArrayLike) -> Any:
     """Advance ratio at which the formula gives no thrust. [-]
 
-    Notes
-    -----
     Measured on UIUC propellers it is 1.19 P/D on average: zero lift is not zero blade angle on a cambered section.
 
-    Examples
-    --------
     >>> zero_thrust_J(0.2032, 0.127)
     0.625
     """
@@ -158,17 +142,17 @@ def zero_thrust_J(diameter_m: ArrayLike, pitch_m: ArrayLike) -> Any:
 
 
 def thrust(
-    diameter_m: ArrayLike, pitch_m: ArrayLike, rpm: ArrayLike, V: ArrayLike = 0.0, rho: ArrayLike = RHO_FIXED,
+    diameter_m: ArrayLike,
+    pitch_m: ArrayLike,
+    rpm: ArrayLike,
+    V: ArrayLike = 0.0,
+    rho: ArrayLike = RHO_FIXED,
     hub_diameter_m: ArrayLike = 0.0,
-) -> Any:  # fmt: skip
+) -> Any:
     """Thrust by the K1/K2 model. [N]
 
-    Notes
-    -----
     Reference [1] of the module, final equation of part 1.  Its worked example: 10x6 at 10 500 rev/min, 1619 gf.
 
-    Examples
-    --------
     >>> round(1000 * thrust(10 * 0.0254, 6 * 0.0254, 10500.0) / 9.80665)
     1619
     >>> [round(thrust(d * 0.0254, p * 0.0254, 20000.0) / 9.80665, 3) for d, p in ((8, 5), (10, 5), (12, 6), (14, 8))]
@@ -183,8 +167,6 @@ def thrust(
 def validity_flags(d_over_p: float, M_tip: float = 0.0, J: float = 0.0, ducted: bool = False) -> tuple[str, ...]:
     """Say why the model should not be trusted at a point.
 
-    Examples
-    --------
     >>> validity_flags(1.6, 0.63)
     ()
     >>> validity_flags(1.75, 1.09)
@@ -216,13 +198,16 @@ def validity_flags(d_over_p: float, M_tip: float = 0.0, J: float = 0.0, ducted: 
 
 
 def estimate(
-    diameter_m: ArrayLike, pitch_m: ArrayLike, rpm: ArrayLike, V: ArrayLike = 0.0, air: Air | None = None,
-    hub_diameter_m: ArrayLike = 0.0, ducted: bool = False,
-) -> Dataset:  # fmt: skip
+    diameter_m: ArrayLike,
+    pitch_m: ArrayLike,
+    rpm: ArrayLike,
+    V: ArrayLike = 0.0,
+    air: Air | None = None,
+    hub_diameter_m: ArrayLike = 0.0,
+    ducted: bool = False,
+) -> Dataset:
     """Thrust by the K1/K2 model with coefficients, uncertainty and flags.
 
-    Examples
-    --------
     >>> from bemt.base.units import KGF
     >>> e = estimate(14 * 0.0254, 8 * 0.0254, 20000.0)
     >>> (e.thrust_N / KGF).round(3), e.flags[0]

@@ -18,63 +18,34 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class MeasuredPropeller:
-    """One propeller of the data.
+    """One propeller of the data."""
 
-    Attributes
-    ----------
-    name, maker, source : str
-        As the data name it; the family that is left out together; where it comes from.
-    diameter_m, pitch_m : float
-        Nominal. [m]
-    blades : int
-        Number of blades.
-    chord_m : float
-        Chord at 0.75 R; NaN when unknown. [m]
-    ducted : bool
-        In a duct: scored, never fitted.
-    measured_pitch_m : float
-        2 pi 0.75 R tan(blade angle there); NaN when unknown. [m]
-    """
-
+    # As the data name it; the family that is left out together; where it comes from
     name: str
     maker: str
     source: str
+    # Nominal [m]
     diameter_m: float
     pitch_m: float
-    blades: int = 2
-    chord_m: float = float("nan")
-    ducted: bool = False
-    measured_pitch_m: float = float("nan")
+    blades: int = 2  # Number of blades
+    chord_m: float = float("nan")  # Chord at 0.75 R; NaN when unknown [m]
+    ducted: bool = False  # In a duct: scored, never fitted
+    measured_pitch_m: float = float("nan")  # 2 pi 0.75 R tan(blade angle there); NaN when unknown [m]
 
 
 @dataclass(frozen=True, eq=False)
 class FitPoints:
-    """N measured points of K propellers.
+    """N measured points of K propellers."""
 
-    Attributes
-    ----------
-    propellers : tuple of MeasuredPropeller
-        K propellers.
-    index : (N,) int
-        MeasuredPropeller of each point.
-    rpm : (N,) float
-        Rotational speed. [rev/min]
-    J, CT, CP : (N,) float
-        MeasuredPropeller convention; CP is NaN where no power was measured. [-]
-    refused : tuple of str
-        Files or propellers left out, with the reason.
-    notes : tuple of str
-        What a user has to know of the sources.
-    """
-
-    propellers: tuple[MeasuredPropeller, ...]
-    index: NDArray[np.intp]
-    rpm: Array
+    propellers: tuple[MeasuredPropeller, ...]  # K propellers
+    index: NDArray[np.intp]  # (N,) propeller of each point
+    rpm: Array  # (N,) rotational speed [rev/min]
+    # (N,) propeller convention; CP is NaN where no power was measured [-]
     J: Array
     CT: Array
     CP: Array
-    refused: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+    refused: tuple[str, ...] = ()  # Files or propellers left out, with the reason
+    notes: tuple[str, ...] = ()  # What a user has to know of the sources
 
     def of(self, name: str) -> Array:
         """Number of the propeller at each point, by field name, (N,)."""
@@ -96,9 +67,11 @@ class FitPoints:
         return np.array([p.ducted for p in self.propellers])[self.index]
 
     def chord(
-        self, constants: compact.Constants = compact.CONSTANTS, known: bool = True,
+        self,
+        constants: compact.Constants = compact.CONSTANTS,
+        known: bool = True,
         series: Mapping[str, compact.MakerSeries] = compact.SERIES,
-    ) -> Array:  # fmt: skip
+    ) -> Array:
         """Chord at 0.75 R, (N,) [m]."""
         c = self.of("chord_m")
         own = np.array([series.get(p.maker, compact.MakerSeries()).chord for p in self.propellers])[self.index]

@@ -39,8 +39,6 @@ def flight(points: FitPoints) -> Mask:
 def ratios(ratio: Array) -> dict[str, Any]:
     """Count ratios of made to measured values. [-]
 
-    Examples
-    --------
     >>> ratios(np.array([1.0, 1.1, 1.2, 2.0]))
     {'points': 4, 'median': 1.15, 'within_13': 0.5, 'within_26': 0.75}
     """
@@ -49,16 +47,20 @@ def ratios(ratio: Array) -> dict[str, Any]:
     e = np.where(np.isfinite(ratio), np.abs(ratio - 1.0), np.inf)
     median = float(np.median(ratio[np.isfinite(ratio)])) if np.any(np.isfinite(ratio)) else None
     return {
-        "points": int(ratio.size), "median": median, "within_13": float(np.mean(e <= NEAR + 1e-12)),
+        "points": int(ratio.size),
+        "median": median,
+        "within_13": float(np.mean(e <= NEAR + 1e-12)),
         "within_26": float(np.mean(e <= FAR + 1e-12)),
-    }  # fmt: skip
+    }
 
 
 def _labels(edges: tuple[float, ...]) -> list[str]:
     if edges == _EDGES["blades"]:
         return ["2", "3", "4", "5 and more"]
-    return [f"below {b:g}" if a == 0.0 else f"{a:g} and more" if np.isinf(b) else f"{a:g} to {b:g}"
-            for a, b in zip(edges[:-1], edges[1:], strict=True)]  # fmt: skip
+    return [
+        f"below {b:g}" if a == 0.0 else f"{a:g} and more" if np.isinf(b) else f"{a:g} to {b:g}"
+        for a, b in zip(edges[:-1], edges[1:], strict=True)
+    ]
 
 
 def score(points: FitPoints, models: Mapping[str, Array]) -> dict[str, Any]:
@@ -79,9 +81,12 @@ def score(points: FitPoints, models: Mapping[str, Array]) -> dict[str, Any]:
         for a, b in zip(X_EDGES[:-1], X_EDGES[1:], strict=True)
     ]
     values = {
-        "P/D": points.P_D, "diameter [in]": points.of("diameter_m") / INCH, "tip Mach": points.M_tip,
-        "Re": points.Re(points.chord()), "blades": points.of("blades"),
-    }  # fmt: skip
+        "P/D": points.P_D,
+        "diameter [in]": points.of("diameter_m") / INCH,
+        "tip Mach": points.M_tip,
+        "Re": points.Re(points.chord()),
+        "blades": points.of("blades"),
+    }
     rows: list[dict[str, Any]] = []
     for quantity, v in values.items():
         edges = _EDGES[quantity]

@@ -39,8 +39,11 @@ def _totals(found: Mapping[str, Any], which: str) -> str:
 def _set(name: str, found: Mapping[str, Any]) -> list[str]:
     s, f = found["static"], found["flight"]
     title = {"calibration": "CALIBRATION, fitted models with the propeller left out", "test": "TEST, held out"}[name]
-    lines = ["", f"{title}: {s['points']} points of {s['propellers']} propellers at rest, {f['points']} of "
-             f"{f['propellers']} in flight (J/(P/D) below 0.8)"]  # fmt: skip
+    lines = [
+        "",
+        f"{title}: {s['points']} points of {s['propellers']} propellers at rest, {f['points']} of "
+        f"{f['propellers']} in flight (J/(P/D) below 0.8)",
+    ]
     lines.append(_totals(found, "all"))
     with_chord = found["chord_known"]["static"]
     if 0 < with_chord["points"] < s["points"]:

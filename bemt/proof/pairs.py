@@ -159,7 +159,7 @@ def _flight(path: Path, mass_kg: float) -> dict[str, Array]:
 
 def _read(path: Path, how: Mapping[str, Any]) -> dict[str, Array]:
     """Steady points of one recording, in SI."""
-    from bemt.compare.stand_run import stand_run
+    from bemt.compare.stand_run import selected, stand_run
     from bemt.recordings.load import import_file
 
     if "mass_kg" in how:
@@ -167,10 +167,10 @@ def _read(path: Path, how: Mapping[str, Any]) -> dict[str, Array]:
     elif "table" in how or "numbered" in how:
         columns = _plain(path, how)
     else:
-        run = stand_run(import_file(path), path.name, None, how.get("rows", ()))
-        columns = {k: run.values[k] for k in _KEPT if k in run.values}
+        run = stand_run(selected(import_file(path), how.get("rows", ()), path.name), path.name)
+        columns = {k: run.points[k] for k in _KEPT if k in run.points}
         if run.command:
-            columns["pulse_width_s" if run.command == "pwm_s" else run.command] = run.values["command"]
+            columns["pulse_width_s" if run.command == "pwm_s" else run.command] = run.points["command"]
     n = next(iter(columns.values())).size
     columns |= {k: np.full(n, float(v)) for k, v in how.get("constant", {}).items()}
     load = [np.isfinite(columns[k]) for k in ("thrust_N", "torque_Nm") if k in columns]

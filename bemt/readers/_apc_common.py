@@ -22,8 +22,6 @@ def _readings(token: str, low: float, high: float) -> float | None:
 def parse_designation(text: str) -> tuple[float, float, int] | None:
     """Read diameter, pitch and blade number from an APC designation.
 
-    Examples
-    --------
     >>> parse_designation("134x135-3"), parse_designation("10x47SF"), parse_designation("525x475")
     ((13.4, 13.5, 3), (10.0, 4.7, 2), (5.25, 4.75, 2))
     >>> parse_designation("propeller") is None

@@ -24,50 +24,32 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class ApcBlade:
-    """Blade of a PE0 file, in SI units and radians.
+    """Blade of a PE0 file, in SI units and radians."""
 
-    Parameters
-    ----------
-    name, version : str
-        Designation (``10x5E``) and version line.
-    diameter_m, pitch_m, radius_m, hub_radius_m : float
-        Nominal diameter and pitch, tip radius, radius of the hub transition. [m]
-    blades : int
-        Number of blades.
-    r_m, chord_m, beta_rad : (N,) array
-        Stations ascending in radius [m], chord [m], twist between the LE and TE parting lines [rad].
-    t_c : (N,) array
-        Thickness over chord.
-    sweep_m, z_high_m : (N,) array
-        Leading edge ahead of the radial line; highest point of the upper surface. [m]
-    pitch_quoted_m, pitch_prather_m : (N,) array
-        Pitch as quoted, and as a gauge on the lower surface reads it. [m]
-    airfoils : tuple of (float, str)
-        Radius [m] where the transition from the first to the last section starts and ends, with the section names.
-    notes : tuple of str
-        Remarks of the file, such as "APC12 airfoil is equivalent to NACA 4412".
-    provenance : mapping
-        source, file, sha256, remark.
-    """
-
+    # Designation (``10x5E``) and version line
     name: str
     version: str
+    # Nominal diameter and pitch, tip radius, radius of the hub transition [m]
     diameter_m: float
     pitch_m: float
     radius_m: float
     hub_radius_m: float
-    blades: int
+    blades: int  # Number of blades
+    # (N,) stations ascending in radius [m], chord [m], twist between the LE and TE parting lines [rad]
     r_m: Array
     chord_m: Array
     beta_rad: Array
-    t_c: Array
+    t_c: Array  # (N,) thickness over chord
+    # (N,) leading edge ahead of the radial line; highest point of the upper surface [m]
     sweep_m: Array
     z_high_m: Array
+    # (N,) pitch as quoted, and as a gauge on the lower surface reads it [m]
     pitch_quoted_m: Array
     pitch_prather_m: Array
+    # Radius [m] where the transition from the first to the last section starts and ends, with the section names
     airfoils: tuple[tuple[float, str], ...]
-    notes: tuple[str, ...]
-    provenance: Mapping[str, Any]
+    notes: tuple[str, ...]  # Remarks of the file, such as "APC12 airfoil is equivalent to NACA 4412"
+    provenance: Mapping[str, Any]  # source, file, sha256, remark
 
 
 def _pe0_columns(source: SourceText) -> tuple[int, list[str]]:

@@ -23,25 +23,14 @@ _TOKEN = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:NaN|Inf(
 
 @dataclass(frozen=True, eq=False)
 class ApcPerformance:
-    """Performance of a PER3 file.
+    """Performance of a PER3 file."""
 
-    Parameters
-    ----------
-    name : str
-        Designation.
-    diameter_m, pitch_m : float
-        Nominal. [m]
-    blades : int
-        Number of blades.
-    series : Dataset
-        Kind ``vendor``; channels rpm, airspeed_m_s, J, eta, CT, CP, power_W, torque_Nm, thrust_N.
-    """
-
-    name: str
+    name: str  # Designation
+    # Nominal [m]
     diameter_m: float
     pitch_m: float
-    blades: int
-    series: Dataset
+    blades: int  # Number of blades
+    series: Dataset  # Kind ``vendor``; channels rpm, airspeed_m_s, J, eta, CT, CP, power_W, torque_Nm, thrust_N
 
 
 def _per3_rows(source: SourceText, faults: list[Fault]) -> tuple[list[tuple[float, ...]], list[int]]:

@@ -25,42 +25,27 @@ RE_RANGE = (5e3, 3e6)
 
 @dataclass(frozen=True, eq=False)
 class BladeFile:
-    """One rotor of a file.
+    """One rotor of a file."""
 
-    Attributes
-    ----------
-    name, source : str
-        Title in the file; program.
-    blades : int
-        Number.
-    R_m, Rhub_m : float
-        Tip and hub radius. [m]
-    r_m, chord_m, beta_rad : (N,) float
-        Stations. [m], [rad]
-    sections : sequence of (float, XrotorSection, QpropSection or Polar)
-        At r/R, ascending; linear between, held outside.
-    rpm, airspeed_m_s, rho : float or None
-        Operating point, where the file states one.
-    notes : tuple of str
-        What was left out.
-    duct : dict of float or None
-        Keys of a case's ``[duct]``; None: an open rotor.
-    """
-
+    # Title in the file; program
     name: str
     source: str
-    blades: int
+    blades: int  # Number
+    # Tip and hub radius [m]
     R_m: float
     Rhub_m: float
+    # (N,) stations [m], [rad]
     r_m: Array
     chord_m: Array
     beta_rad: Array
+    # At r/R, ascending; linear between, held outside
     sections: Sequence[tuple[float, XrotorSection | QpropSection | Polar]]
+    # Operating point, where the file states one
     rpm: float | None = None
     airspeed_m_s: float | None = None
     rho: float | None = None
-    notes: tuple[str, ...] = ()
-    duct: Mapping[str, float] | None = None
+    notes: tuple[str, ...] = ()  # What was left out
+    duct: Mapping[str, float] | None = None  # Keys of a case's ``[duct]``; None: an open rotor
 
 
 def lines_of(source: SourceText, comment: str) -> list[tuple[int, str]]:

@@ -74,28 +74,16 @@ class ExportRow:
 
 @dataclass(frozen=True, eq=False)
 class ExportTable:
-    """Numbers of a table.
+    """Numbers of a table."""
 
-    Parameters
-    ----------
-    values : (N, K) array
-        NaN where the file says so.
-    lines : tuple of int
-        Line of each row.
-    warnings : tuple of str
-        Rows left out and why.
-    """
-
-    values: Array
-    lines: tuple[int, ...]
-    warnings: tuple[str, ...] = field(default=())
+    values: Array  # (N, K) naN where the file says so
+    lines: tuple[int, ...]  # Line of each row
+    warnings: tuple[str, ...] = field(default=())  # Rows left out and why
 
 
 def decode(raw: bytes) -> str:
     r"""Text of bytes: UTF-8, UTF-16 with its mark, else Latin-1; gzip is unpacked as far as it goes.
 
-    Examples
-    --------
     >>> decode("\ufeff°".encode("utf-16-le")), decode(b"\xb0")
     ('°', '°')
     """
@@ -113,8 +101,6 @@ def decode(raw: bytes) -> str:
 def head_lines(head: bytes | str, count: int = 40) -> list[str]:
     r"""First lines of a file that are not blank, stripped, for sniffers; none for binary data.
 
-    Examples
-    --------
     >>> head_lines(b"\n a \r\n\r\nb")
     ['a', 'b']
     """
@@ -167,8 +153,6 @@ def cells_of(line: str, separator: str | None) -> tuple[str, ...]:
 def si_unit(text: str) -> str | None:
     """Suffix of an SI unit as programs write it, None for one that is unknown (or not SI).
 
-    Examples
-    --------
     >>> si_unit("N m"), si_unit(" m s^-1 "), si_unit("n-m"), si_unit("lbf")
     ('Nm', 'm_s', 'Nm', None)
     """
@@ -178,8 +162,6 @@ def si_unit(text: str) -> str | None:
 def slug(text: str) -> str:
     """Name in small letters with underscores.
 
-    Examples
-    --------
     >>> slug("Wall Shear X")
     'wall_shear_x'
     """
@@ -189,8 +171,6 @@ def slug(text: str) -> str:
 def unique(names: Sequence[str]) -> list[str]:
     """Make names unique by ``#2``, ``#3``.
 
-    Examples
-    --------
     >>> unique(["x", "y", "x"])
     ['x', 'y', 'x#2']
     """

@@ -20,8 +20,6 @@ def clock_seconds(cells: Sequence[str]) -> Array | None:
     """Read ``12:30:05.25`` or ``2024-05-01T12:30:05``; other orders of day and month are ambiguous and stay text, (N,)
     [s].
 
-    Examples
-    --------
     >>> clock_seconds(["23:59:59.5", "", "00:00:01.0"]), clock_seconds(["1:2", "x"]) is None
     (array([0. , nan, 1.5]), True)
     """

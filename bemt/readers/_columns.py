@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from bemt.base.averaging import Mean
 from bemt.dataset import Dataset
-from bemt.dataset.points import channel_fault, unit_in
+from bemt.dataset.channels import channel_fault, unit_in
 
 __all__ = ["Channel", "channels_of", "dataset"]
 
@@ -21,21 +21,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """One column of a file, while it is read.
+    """One column of a file, while it is read."""
 
-    Parameters
-    ----------
-    values : (N,) float
-        Values in ``unit``, NaN where the file has none.
-    unit : str
-        Unit of the values, "" when the file states none and none may be assumed.
-    mean : Mean or None
-        What stands for the channel, in its unit; None when nothing does.
-    """
-
-    values: Array
-    unit: str = ""
-    mean: Mean | None = None
+    values: Array  # (N,) values in ``unit``, NaN where the file has none
+    unit: str = ""  # Unit of the values, "" when the file states none and none may be assumed
+    mean: Mean | None = None  # What stands for the channel, in its unit; None when nothing does
 
 
 def dataset(
@@ -46,34 +36,9 @@ def dataset(
 ) -> Dataset:  # fmt: skip
     """Make the dataset of a file: columns of another length than the longest end in NaN.
 
-    Parameters
-    ----------
-    form, kind : str
-        KIND of the reader; what the numbers are: cfd, bench, vendor, geometry, polar, table, flight.
-    channels : mapping of str to Channel
-        By name; SI names with unit suffix where the unit is known, the file's own names otherwise.
-    notes : sequence of str
-        What a user has to know: assumptions, dropped rows, restarts, missing units.
-    provenance : mapping
-        File, SHA-256 and whatever the file says of itself.
-    flags, lines, texts
-        Per row, as in :class:`Dataset`.
-    headings : mapping of str to str
-        Heading in the file of each channel, where it has one.
-    constants : mapping of str to float
-        Numbers that hold for the whole file, by name with SI unit suffix (``density_kg_m3``).
-    instrument : mapping of str to mapping
-        Standard uncertainty of the instrument per channel, correlated parts apart: ``gain`` [1], ``zero`` and
-        ``sample`` (in the unit of the channel).
+    `headings` are those of the file by channel, `constants` numbers that hold for all of it (``density_kg_m3``),
+    `instrument` the standard uncertainty by channel: ``gain`` [1], ``zero`` and ``sample`` in the channel's unit.
 
-    Returns
-    -------
-    Dataset
-        ``provenance`` has ``format`` and, as far as there are any, ``headings``, ``constants``, ``instrument`` and
-        ``means`` (:class:`bemt.base.averaging.Mean` by channel).
-
-    Examples
-    --------
     >>> d = dataset("table", "bench", {"rpm": Channel(np.array([4e3, 5e3]), "rpm"), "x": Channel(np.array([1.0]))})
     >>> d.unit("rpm"), d.unit("x"), d["x"]
     ('rpm', '', array([ 1., nan]))

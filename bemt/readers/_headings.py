@@ -144,8 +144,6 @@ def _si_name(unit: units.Unit) -> str:
 def unit_of(text: str) -> units.Unit | str:
     """Unit that a text states.
 
-    Examples
-    --------
     >>> unit_of("N·m").suffix, unit_of("µs").suffix, unit_of("1/min").suffix
     ('Nm', 'us', 'rpm')
     >>> unit_of("kg")
@@ -210,8 +208,6 @@ def _plain(text: str) -> str:
 def heading(text: str) -> Heading:
     """Read one heading, in English, German, French or Spanish.
 
-    Examples
-    --------
     >>> heading("Thrust (gf)").name, heading("Q(Nm)").name, heading("RPM").name, heading("chord_mm").name
     ('thrust_N', 'Q_Nm', 'rpm', 'chord_m')
     >>> heading("omega").name, heading("omega").unit is None

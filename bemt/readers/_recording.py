@@ -30,20 +30,18 @@ Array = NDArray[np.float64]
 _WITH_UNIT = re.compile(r"[+-]?[\d.]+\s*([^\W\d][\w/·]{0,6}|%)")
 BLOCK = 1 << 17
 """Samples that are searched for spikes at once."""
+HALF, TIMES, SLIP = 3, 2.0, 0.02
+"""Neighbours on each side of a spike, and ranges of theirs that it leaves; share that a ratio is near a slip by."""
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(,\d{3})+(\.\d*)?")
 
 
-def spikes(values: Array, half: int = 3, times: float = 2.0) -> NDArray[np.bool_]:
+def spikes(values: Array) -> NDArray[np.bool_]:
     """Single samples that jump away from all their neighbours and back, (N,).
 
-    Notes
-    -----
-    A sample is a spike when it lies outside the range of its neighbours by more than `times` that range and by more
+    A sample is a spike when it lies outside the range of its neighbours by more than `TIMES` that range and by more
     than a quarter of the spread of the whole channel. At an end, one side has no neighbours; there the jump must exceed
     the spread of the whole channel, since a start-up looks like one.
 
-    Examples
-    --------
     >>> spikes(np.array([1.0, 1.1, 1.2, 9.0, 1.4, 1.5, 1.6, 1.7])).nonzero()[0]
     array([3])
     """
@@ -56,17 +54,17 @@ def spikes(values: Array, half: int = 3, times: float = 2.0) -> NDArray[np.bool_
     top = max(abs(float(np.min(v))), abs(float(np.max(v))))
     spread = max(float(high - low), 1e-12 * top)
     for a in range(0, len(v), BLOCK):
-        far = _far(v, a, min(a + BLOCK, len(v)), half, times, spread)
+        far = _far(v, a, min(a + BLOCK, len(v)), spread)
         out[rows[a : a + BLOCK][far]] = True
     return out
 
 
-def _far(v: Array, a: int, b: int, half: int, times: float, spread: float) -> NDArray[np.bool_]:
+def _far(v: Array, a: int, b: int, spread: float) -> NDArray[np.bool_]:
     """Spikes among the samples from a to b."""
-    at = max(a - half, 0)
-    part = v[at : b + half]
+    at = max(a - HALF, 0)
+    part = v[at : b + HALF]
     lo, hi = np.full(len(part), np.nan), np.full(len(part), np.nan)
-    for k in range(1, half + 1):  # neighbours on either side, as far as there are any
+    for k in range(1, HALF + 1):  # neighbours on either side, as far as there are any
         for own, other in ((slice(k, None), slice(None, -k)), (slice(None, -k), slice(k, None))):
             np.fmin(lo[own], part[other], out=lo[own])
             np.fmax(hi[own], part[other], out=hi[own])
@@ -76,7 +74,7 @@ def _far(v: Array, a: int, b: int, half: int, times: float, spread: float) -> ND
         share[0] = 1.0
     if b == len(v):
         share[-1] = 1.0
-    return np.maximum(part - hi, lo - part) > np.maximum(times * (hi - lo), share * spread)
+    return np.maximum(part - hi, lo - part) > np.maximum(TIMES * (hi - lo), share * spread)
 
 
 @dataclass
@@ -206,21 +204,23 @@ class Builder:
                     f"once both are in {channel.unit}{slip(ratio)}; nothing was converted"
                 )
 
-    def flag_time(self, name: str = "time_s") -> None:
+    def flag_time(self) -> None:
         """Flag rows where time does not advance; the only clock is the time of a file that has no other."""
-        if name not in self.channels and len(self.clocks) == 1:
+        if "time_s" not in self.channels and len(self.clocks) == 1:
             clock = self.clocks.pop()
-            self.channels = {name if k == clock else k: channel for k, channel in self.channels.items()}
-            self.headings[name] = self.headings.pop(clock)
-        if name in self.channels:
-            t = self.channels[name].values
+            self.channels = {"time_s" if k == clock else k: channel for k, channel in self.channels.items()}
+            self.headings["time_s"] = self.headings.pop(clock)
+        if "time_s" in self.channels:
+            t = self.channels["time_s"].values
             rows = np.flatnonzero(np.isfinite(t))
             step = np.diff(t[rows])
             self.flag(rows[1:][step < 0.0], "time goes backwards")
             same = rows[1:][step == 0.0]
             if same.size:
-                self.warnings.append(f"{same.size} rows repeat the time of the row before (lines "
-                                     f"{some(self.line(int(r)) for r in same)})")  # fmt: skip
+                self.warnings.append(
+                    f"{same.size} rows repeat the time of the row before (lines "
+                    f"{some(self.line(int(r)) for r in same)})"
+                )
 
     def finish(self, provenance: Mapping[str, str] | None = None, **more: Any) -> Dataset:
         """Make the `Dataset`, or raise all faults."""
@@ -257,13 +257,13 @@ _PLAUSIBLE: dict[str, tuple[float, float, str]] = {
 }  # fmt: skip
 
 
-def slip(ratio: float, within: float = 0.02) -> str:
+def slip(ratio: float) -> str:
     """Slip of units that a ratio looks like, as words to append; "" when none fits."""
     for name, factor in units.SLIP_FACTORS.items():
         for value in (factor, 1.0 / factor):
-            if abs(abs(ratio) / value - 1.0) < within:
+            if abs(abs(ratio) / value - 1.0) < SLIP:
                 return f" (the factor of {name})"
-    return " (the sign differs)" if abs(ratio + 1.0) < within else ""
+    return " (the sign differs)" if abs(ratio + 1.0) < SLIP else ""
 
 
 _MEANINGS = ("rpm", "thrust", "torque", "voltage", "current", "power", "time", "airspeed", "throttle", "pressure",
@@ -273,8 +273,6 @@ _MEANINGS = ("rpm", "thrust", "torque", "voltage", "current", "power", "time", "
 def _nearest(headings: Sequence[str]) -> str:
     r"""What headings without a unit may mean, and the line of a recording.toml that says so; empty: nothing is near.
 
-    Examples
-    --------
     >>> _nearest(["'Trust'", "'x'"])
     '; nearest meaning: \'Trust\' thrust. The line: [columns] thrust = { column = "Trust", unit = "N" }'
     """

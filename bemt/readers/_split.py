@@ -101,8 +101,6 @@ def _is_units(cells: Sequence[str]) -> bool:
 def some(items: Iterable[object], limit: int = 5) -> str:
     """First few of many, in words.
 
-    Examples
-    --------
     >>> some([1, 2]), some(range(9), 3)
     ('1, 2', '0, 1, 2 and 6 more')
     """
@@ -114,8 +112,6 @@ def some(items: Iterable[object], limit: int = 5) -> str:
 def find_delimiter(lines: Sequence[str]) -> str:
     """Delimiter of some lines: the first of ``; tab , |`` that all of them have, else blanks.
 
-    Examples
-    --------
     >>> find_delimiter(["r;mm,x", "1,2"]), find_delimiter(["a;b", "1,5;2,5"]), find_delimiter(["1 2", "3 4"])
     (',', ';', ' ')
     """
@@ -130,8 +126,6 @@ def find_start(lines: Sequence[str]) -> tuple[int, str]:
     Lines above count as such only when they have fewer cells than the rows, and a line of headings without numbers,
     as long as the rows, follows: a damaged line of headings is none.
 
-    Examples
-    --------
     >>> find_start(["Run 7", "rpm;T_N", "1;2", "3;4"]), find_start(["sep=;", "rpm;T_N", "1;2"])
     ((1, ';'), (1, ';'))
     """

@@ -64,38 +64,20 @@ _FILE = re.compile(r"[a-z][a-z0-9]*(?:-[a-z0-9]+)*", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class UiucName:
-    """What the name of a propeller says.
+    """What the name of a propeller says."""
 
-    Parameters
-    ----------
-    name, family : str
-        ``apce_10x5`` and ``apce``.
-    diameter_in, pitch_in : float or None
-        Nominal. [in]
-    angle_deg : float or None
-        Nominal blade angle at r/R = 0.75, given or from the pitch. [deg]
-    blades : int
-        Number of blades.
-    blades_from : str
-        ``name``, ``family`` or ``default``.
-    rotation : int
-        +1 tractor, -1 pusher.
-    specimen : int
-        Number of the specimen; 1 when the name has none.
-    faults : tuple of (got, expected, hint)
-        Why the name cannot be used; empty when it can.
-    """
-
+    # ``apce_10x5`` and ``apce``
     name: str
     family: str
+    # Nominal [in]
     diameter_in: float | None = None
     pitch_in: float | None = None
-    angle_deg: float | None = None
-    blades: int = 2
-    blades_from: str = "default"
-    rotation: int = 1
-    specimen: int = 1
-    faults: tuple[tuple[str, str, str], ...] = ()
+    angle_deg: float | None = None  # Nominal blade angle at r/R = 0.75, given or from the pitch [deg]
+    blades: int = 2  # Number of blades
+    blades_from: str = "default"  # ``name``, ``family`` or ``default``
+    rotation: int = 1  # +1 tractor, -1 pusher
+    specimen: int = 1  # Number of the specimen; 1 when the name has none
+    faults: tuple[tuple[str, str, str], ...] = ()  # Why the name cannot be used; empty when it can
 
 
 @dataclass(frozen=True)
@@ -123,9 +105,10 @@ def _size(token: str, family: str) -> dict[str, object]:
     if match := re.fullmatch(r"(\d+)([tp])(\d)", token):
         rotation = -1 if match[2] == "p" else 1
         return {
-            "diameter_in": NAMED_DIAMETERS_IN.get(f"{family}_{match[1]}"), "rotation": rotation,
+            "diameter_in": NAMED_DIAMETERS_IN.get(f"{family}_{match[1]}"),
+            "rotation": rotation,
             "specimen": int(match[3]),
-        }  # fmt: skip
+        }
     if match := re.fullmatch(_N, token):
         value = float(token)
         return {"diameter_in": value / 25.4 if value > MM_ABOVE else value}
@@ -170,8 +153,6 @@ def _propeller(family: str, middle: list[str]) -> UiucName:
 def parse_file_name(stem: str) -> UiucFile | None:
     """Read a file name of the archive.
 
-    Examples
-    --------
     >>> file = parse_file_name("nr640_9_15deg_3b_0725rd_3025")
     >>> file.role, file.rpm, file.propeller.name, file.propeller.blades
     ('line', 3025.0, 'nr640_9_15deg_3b', 3)

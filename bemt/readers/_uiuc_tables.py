@@ -106,8 +106,6 @@ def _header(text: str) -> tuple[int, str | None]:
 def role_of(head: bytes | str) -> str | None:
     r"""Tell which table the head of a file announces.
 
-    Examples
-    --------
     >>> role_of("RPM    CT       CP\n")
     'static'
     """
@@ -117,8 +115,6 @@ def role_of(head: bytes | str) -> str | None:
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether the head of a file is a table of this archive.
 
-    Examples
-    --------
     >>> sniff(b"J       CT       CP       eta\n0.1 0.1 0.05 0.2\n"), sniff("quantity,value,unit")
     (True, False)
     """

@@ -35,8 +35,6 @@ _PART = re.compile(r"\b(ADBlFile|NumBlNds)\b")
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a file is a driver, primary or blade file of AeroDyn 15.
 
-    Examples
-    --------
     >>> sniff("--- AeroDyn Driver Input File ---\nRotor\n"), sniff("3 NumBlNds - nodes\n"), sniff("1 NumTabs\n")
     (True, True, False)
     """

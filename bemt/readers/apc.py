@@ -33,8 +33,6 @@ KIND = "apc"
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether the head of a file is an APC PE0 or PER3 file.
 
-    Examples
-    --------
     >>> sniff("10x5E (10x5E.dat)\n ----- AIRFOIL SUMMARY DATA -----"), sniff("RPM CT CP")
     (True, False)
     """

@@ -34,8 +34,6 @@ _HEADING = re.compile(r"(.*?)\s*\[([^\]]*)\]\s*")
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether the file begins with the section Name or Data.
 
-    Examples
-    --------
     >>> sniff("[Name]\nBlade\n\n[Data]\nX [ m ], Y [ m ]"), sniff("[propeller]\nname = 1")
     (True, False)
     """

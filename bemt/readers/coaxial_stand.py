@@ -42,8 +42,6 @@ _DIAMETER = re.compile(r"(?:^|_)(\d+(?:\.\d+)?)in_")
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether the first line names both sides of this stand.
 
-    Examples
-    --------
     >>> sniff("PWM Left,PWM Right,Thrust Left [g],Thrust Right [g],Speed Left [rpm],Speed Right [rpm]\n")
     True
     """

@@ -34,8 +34,6 @@ _MORE = {"vbat[V]": ("voltage", "V"), "v[V]": ("supply_voltage", "V"), "i[A]": (
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether the first line has a command, four speeds and a total thrust.
 
-    Examples
-    --------
     >>> sniff("pwm,vbat[V],rpm1,rpm2,rpm3,rpm4,thrust[g]\n"), sniff("pwm,rpm,thrust[g]\n")
     (True, False)
     """

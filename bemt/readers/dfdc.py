@@ -22,8 +22,6 @@ _HEAD = re.compile(r"\s*DFDC\s+Version", re.I)
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a file begins as a DFDC case.
 
-    Examples
-    --------
     >>> sniff("DFDC Version 0.55\nduct\n"), sniff("XROTOR VERSION: 7.55\n")
     (True, False)
     """
@@ -78,7 +76,7 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
         notes.append("no duct at the rotor: the tip is that of the last station")
     blade = BladeFile(
         name, "DFDC", whole(blades), tip, hub, r, c, np.radians(b), sections, rpm, V, rho, tuple(notes), duct
-    )  # fmt: skip
+    )
     return checked(source, blade, faults)
 
 

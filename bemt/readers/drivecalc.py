@@ -37,8 +37,6 @@ _KNOWN = {
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether the first line has the headings of one of the two tables.
 
-    Examples
-    --------
     >>> sniff("myid,tbs,Name,Dia,Pitch,a,b,c,d,n10N,n100W\n"), sniff("Name,Dia,Pitch\n")
     (True, False)
     """

@@ -29,8 +29,6 @@ _FIRST = ("nodenumber", "cellnumber")
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether the first line names node or cell numbers and a coordinate.
 
-    Examples
-    --------
     >>> sniff("nodenumber,  x-coordinate, pressure\n 1, 0.1, 3"), sniff("node,x\n1,2")
     (True, False)
     """

@@ -54,8 +54,6 @@ class Entry:
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a title of forces is followed by a line of zones, and this is no transcript.
 
-    Examples
-    --------
     >>> sniff("Forces\n      Forces (n)\nZone  Pressure  Viscous  Total\n"), sniff("Zone,Pressure")
     (True, False)
     """

@@ -29,8 +29,6 @@ _NAMES = re.compile(r'"[^"]*"(?:\s+"[^"]*")+')
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a quoted title is followed by a line of quoted names and then by a number.
 
-    Examples
-    --------
     >>> sniff('"Drag Convergence"\r\n"Flow Time" "cd"\r\n5e-03 7e-02'), sniff('"a","b"\n1,2')
     (True, False)
     """

@@ -37,8 +37,6 @@ _TIMES = {"flow time", "flow-time", "physical-time", "time"}
 def column_of(name: str) -> Column:
     """Make the column of a name in Fluent's words; times are in seconds.
 
-    Examples
-    --------
     >>> column_of("flow-time").name, column_of("Iteration").role, column_of("thrust(blade:1)").role
     ('time_s', 'step', 'value')
     """
@@ -57,8 +55,6 @@ def column_of(name: str) -> Column:
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether one of the first lines is a parenthesised list of quoted names under a quoted title.
 
-    Examples
-    --------
     >>> sniff('"t-rfile"\n"Iteration" "t"\n("Iteration" "t")\n1 0.3'), sniff('(title "a")\n(labels "x" "y")')
     (True, False)
     """

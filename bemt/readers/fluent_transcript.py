@@ -52,8 +52,6 @@ _AVERAGE = re.compile(r"\(Average Over\)\"?\s+(\d+)")
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a text shows marks of a Fluent console.
 
-    Examples
-    --------
     >>> sniff("  iter  continuity  x-velocity  time/iter\n 1 1.0 1.0 0:00:01 9"), sniff("iteration,continuity")
     (True, False)
     >>> sniff("  Moment   [N m]\n------------ ----------\n  blade   -0.18\n")

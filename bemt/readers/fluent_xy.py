@@ -36,8 +36,6 @@ _UNIT = re.compile(r"\s*[\[(]\s*([^\])]*?)\s*[\])]\s*$")
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether the file begins with a title and labels in parentheses.
 
-    Examples
-    --------
     >>> sniff('(title "a")\n(labels "x" "y")\n'), sniff('("Iteration" "drag")')
     (True, False)
     """

@@ -36,8 +36,6 @@ DOUBTFUL_RPM = 20000.0
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a text is a table with a column of numbers.
 
-    Examples
-    --------
     >>> sniff("time;thrust_N\n0.0;1.2\n0.1;1.3\n"), sniff("A text, with commas,\nand no numbers.\n")
     (True, False)
     """

@@ -48,8 +48,6 @@ _RAW_KEYS = {"Motor Output", "ESCT RPM", "Thrust [G]", "Torque [G cm]"}
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether the first line has this stand's headings.
 
-    Examples
-    --------
     >>> sniff("out,th,th_err,tq,tq_err,rpm,rpm_err,v,v_err,a,a_err,pin,theff\n"), sniff("th,tq,rpm\n")
     (True, False)
     """

@@ -46,8 +46,6 @@ _VECTOR = re.compile(r"\(\s*((?:\w+_[xyz]\s*){3})\)")
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a comment line begins with Time and names columns.
 
-    Examples
-    --------
     >>> sniff("# Force\n# Time  total_x total_y\n1 2 3"), sniff("# Time\n"), sniff("#  Time  forces(pressure viscous)")
     (True, False, True)
     """
@@ -63,8 +61,10 @@ def _columns(header: str, title: str) -> tuple[list[Column], str, list[tuple[str
         unit = {True: "Nm", False: "N"}
         columns = [
             Column(f"{name}_{part}_{axis}_{unit['moment' in name]}", unit["moment" in name])
-            for name, parts in groups for part in parts for axis in "xyz"
-        ]  # fmt: skip
+            for name, parts in groups
+            for part in parts
+            for axis in "xyz"
+        ]
         return [Column("Time", "", "time"), *columns], "nested", groups
     names = _VECTOR.sub(r"\1", header).split()
     kind = title.strip().lower().removesuffix("s")

@@ -31,8 +31,6 @@ _MILLION = 1e6
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a file is an AeroDyn airfoil file of version 13 to 15.
 
-    Examples
-    --------
     >>> sniff("! AirfoilInfo v1.01.x Input File\n  1  NumTabs  ! Number of tables\n"), sniff("alpha,cl,cd")
     (True, False)
     """

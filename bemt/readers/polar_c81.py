@@ -35,8 +35,6 @@ _HINT = "C81 fields are 7 characters wide, nine values after the first field"
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a file begins with a name, six counts of two digits and a line of Mach numbers.
 
-    Examples
-    --------
     >>> sniff("NACA 0012".ljust(30) + " 2 3 2 3 0 0\n" + 7 * " " + "   0.00   0.50\n"), sniff("alpha,cl,cd")
     (True, False)
     """
@@ -151,9 +149,12 @@ def _field(source: SourceText, at: int, line: str, k: int, expected: str, faults
 
 
 def _spread(
-    a0: NDArray[np.float64], m0: NDArray[np.float64], table: NDArray[np.float64], alpha: NDArray[np.float64],
+    a0: NDArray[np.float64],
+    m0: NDArray[np.float64],
+    table: NDArray[np.float64],
+    alpha: NDArray[np.float64],
     mach: NDArray[np.float64],
-) -> NDArray[np.float64]:  # fmt: skip
+) -> NDArray[np.float64]:
     """Table (Na0, Nm0) on other axes, linear, held at the ends."""
     on_alpha = np.stack([np.interp(alpha, a0, table[:, j]) for j in range(m0.size)], axis=1)
     return np.stack([np.interp(mach, m0, on_alpha[i]) for i in range(alpha.size)], axis=0)

@@ -35,33 +35,20 @@ _NAMES = {"alpha_deg": "alpha_deg", "alpha_rad": "alpha_rad", "cl": "cl", "cd": 
 
 @dataclass(frozen=True)
 class PolarRow:
-    """One line of polar data.
+    """One line of polar data."""
 
-    Parameters
-    ----------
-    line : int
-        Line in the file, from 1.
-    alpha, cl, cd : float
-        Angle of attack [rad], lift and drag coefficients. [-]
-    Re : float or None
-        Chord Reynolds number; None when the source states none. [-]
-    M : float
-        Mach number. [-]
-    """
-
-    line: int
+    line: int  # Line in the file, from 1
+    # Angle of attack [rad], lift and drag coefficients [-]
     alpha: float
     cl: float
     cd: float
-    Re: float | None = None
-    M: float = 0.0
+    Re: float | None = None  # Chord Reynolds number; None when the source states none [-]
+    M: float = 0.0  # Mach number [-]
 
 
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether the first line that is no comment is a header of alpha, cl and cd.
 
-    Examples
-    --------
     >>> sniff("alpha_deg,cl,cd"), sniff("# polar\nRe;alpha;CL;CD"), sniff("rpm,thrust_N")
     (True, True, False)
     """
@@ -135,9 +122,15 @@ def _header(source: SourceText, line: int, text: str) -> tuple[dict[str, int], l
 
 
 def assemble(
-    source: SourceText, rows: Sequence[PolarRow], faults: list[Fault], *, name: str = "", kind: str = "CSV",
-    radians: bool = False, notes: Sequence[str] = (),
-) -> Polar:  # fmt: skip
+    source: SourceText,
+    rows: Sequence[PolarRow],
+    faults: list[Fault],
+    *,
+    name: str = "",
+    kind: str = "CSV",
+    radians: bool = False,
+    notes: Sequence[str] = (),
+) -> Polar:
     """Check rows of any polar format and make the Polar."""
     said = list(notes)
     faults += _doubts(source.name, rows, radians)

@@ -49,8 +49,6 @@ _TRIP = re.compile(r"xtrf\s*=\s*(\S+)\s*\(top\)\s*(\S+)\s*\(bottom\)")
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a file begins like an XFOIL polar.
 
-    Examples
-    --------
     >>> sniff("       XFOIL         Version 6.99\n\n Calculated polar for: NACA 4412\n"), sniff("alpha,cl,cd")
     (True, False)
     """

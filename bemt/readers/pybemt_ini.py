@@ -35,8 +35,6 @@ _SCALARS: dict[str, dict[str, tuple[str, float, float]]] = {  # section -> key -
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a text is an ini file with a rotor of this format. [rotor]
 
-    Examples
-    --------
     >>> sniff("[rotor]\nnblades = 2\nradius = 0.1 0.2\n"), sniff("[rotor]\nblades = 2\n")
     (True, False)
     """
@@ -79,9 +77,10 @@ def read(path: str | os.PathLike[str]) -> Dataset:
     values = {key: np.concatenate([c[key] for c in columns]) for key in _LISTS}
     rotor = np.concatenate([np.full(len(c["radius"]), float(k)) for k, c in zip(index, columns, strict=True)])
     channels = {
-        "r_m": Channel(values["radius"], "m"), "chord_m": Channel(values["chord"], "m"),
+        "r_m": Channel(values["radius"], "m"),
+        "chord_m": Channel(values["chord"], "m"),
         "beta_rad": Channel(values["pitch"] * units.DEG, "rad"),
-    }  # fmt: skip
+    }
     if len(parts) > 1:
         channels["rotor"] = Channel(rotor, "-")
     said_of = {"file": source.name, "sha256": source.sha256, "coaxial": tables.get("case", {}).get("coaxial", "False")}

@@ -30,8 +30,6 @@ HEAD = (
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a file has a title and the seven lines of numbers of a propeller file, then stations.
 
-    Examples
-    --------
     >>> head = "6x3\n 2 .0762\n0.5 5.8\n-0.4 1.2\n.028 .05 .05 .5\n70000 -.7\n.0254 .0254 1\n0 0 0\n"
     >>> sniff(head + ".75 .66 27.5\n1 .69 22\n")
     True

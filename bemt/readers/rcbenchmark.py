@@ -49,8 +49,6 @@ _HEAD = re.compile(r"(ESC( signal)?( [A-D])?|Motor (Electrical|Optical) Speed( [
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether the first line names time and the stand's own channels.
 
-    Examples
-    --------
     >>> sniff("Time (s),ESC signal (µs),Thrust (gf),Motor Optical Speed (RPM)\n"), sniff("Time (s),Thrust (gf)\n")
     (True, False)
     >>> sniff("Time (s),Powertrain 1 - voltage (V),Powertrain 1 - current (A)\n")

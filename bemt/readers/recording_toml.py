@@ -51,8 +51,9 @@ def _nothing_left(sign: float) -> str:
 class ColumnTable(Table):
     """[columns]: where a channel stands, its unit, sign and the uncertainty of its instrument."""
 
-    column: int | str = entry("where it stands", low=1, required=True,
-                              words="a heading, or the number of a column from 1")  # fmt: skip
+    column: int | str = entry(
+        "where it stands", low=1, required=True, words="a heading, or the number of a column from 1"
+    )
     unit: str = entry("of the column", required=True)
     sign: int = entry("factor on every value", "", -1, 1, _nothing_left, default=1, words="1 or -1")
     u_gain_pct: float | None = entry("standard uncertainty of the scale", "%", 0.0, 50.0)
@@ -201,8 +202,6 @@ class RecordingToml(Table):
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a text has the tables of a recording.toml. [recording]
 
-    Examples
-    --------
     >>> sniff('[recording]\nfile = "a.csv"\n'), sniff("[rotor]\n")
     (True, False)
     """
@@ -248,8 +247,12 @@ def _check_poles(out: Collector, document: Mapping[str, Any]) -> None:
         hint = "An outrunner with 14 magnets has 7; a stand that divided already gives rpm, not electrical_rpm"
         out.add("rotor.pole_pairs", "nothing", "the pole pairs of the motor, since electrical_rpm is given", hint)
     if poles and not electrical and isinstance(columns, Mapping):
-        out.add("rotor.pole_pairs", shown(rotor["pole_pairs"]) if rotor else "", "no pole_pairs without electrical_rpm",
-                "Name the column electrical_rpm if it counts electrical revolutions")  # fmt: skip
+        out.add(
+            "rotor.pole_pairs",
+            shown(rotor["pole_pairs"]) if rotor else "",
+            "no pole_pairs without electrical_rpm",
+            "Name the column electrical_rpm if it counts electrical revolutions",
+        )
 
 
 def _instrument(columns: Any) -> dict[str, dict[str, float]]:
@@ -349,8 +352,10 @@ def _join(runs: list[Dataset], files: Sequence[str]) -> Dataset:
         parts = [run.values.get(name, np.full(len(run), np.nan)) for run in runs]
         channels[name] = Channel(np.concatenate(parts), found.pop() if len(found) == 1 else "")
     channels["run"] = Channel(np.concatenate([np.full(len(run), float(k)) for k, run in enumerate(runs, 1)]), "-")
-    texts = {name: sum((run.texts.get(name, ("",) * len(run)) for run in runs), ())
-             for name in dict.fromkeys(n for run in runs for n in run.texts)}  # fmt: skip
+    texts = {
+        name: sum((run.texts.get(name, ("",) * len(run)) for run in runs), ())
+        for name in dict.fromkeys(n for run in runs for n in run.texts)
+    }
     warnings = [f"{file}: {text}" for file, run in zip(files, runs, strict=True) for text in run.notes]
     said = {"file": "+".join(files), "sha256": "+".join(run.provenance["sha256"] for run in runs)}
     return dataset(KIND, "bench", channels, warnings, said, flags=sum((run.flags for run in runs), ()),

@@ -73,41 +73,22 @@ _MASS = {"kg": "kgf", "g": "gf", "lb": "lbf", "oz": "ozf", "lbs": "lbf", "grams"
 
 @dataclass(frozen=True)
 class Reference:
-    """One recorded value.
+    """One recorded value."""
 
-    Parameters
-    ----------
-    quantity, kind, source, remark : str
-        As in the file.
-    value : float
-        In SI units (rpm for a rotational speed).
-    u : float
-        Standard uncertainty in the unit of ``value``; NaN means unknown.
-    channel : str
-        Channel of a series, with its unit: ``thrust_N``.
-    printed : str
-        Value and unit as written, for reports: ``2.60 kgf``.
-    rpm, airspeed_m_s, density_kg_m3 : float
-        Condition [rev/min], [m/s], [kg/m3]; NaN means as the case says.
-    where : str
-        ``file:line``.
-    sha256 : str
-        Hash of the file.
-    """
-
-    quantity: str
-    value: float
-    u: float
-    channel: str
-    kind: str
-    source: str
-    remark: str
-    printed: str
+    quantity: str  # As in the file
+    value: float  # In SI units (rpm for a rotational speed)
+    u: float  # Standard uncertainty in the unit of ``value``; NaN means unknown
+    channel: str  # Channel of a series, with its unit: ``thrust_N``
+    kind: str  # As in the file
+    source: str  # As in the file
+    remark: str  # As in the file
+    printed: str  # Value and unit as written, for reports: ``2.60 kgf``
+    # Condition [rev/min], [m/s], [kg/m3]; NaN means as the case says
     rpm: float = math.nan
     airspeed_m_s: float = math.nan
     density_kg_m3: float = math.nan
-    where: str = ""
-    sha256: str = field(default="", repr=False)
+    where: str = ""  # ``file:line``
+    sha256: str = field(default="", repr=False)  # Hash of the file
 
     @property
     def condition(self) -> tuple[float | None, float | None, float | None]:
@@ -120,8 +101,6 @@ class Reference:
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether the head of a file is a table of references.
 
-    Examples
-    --------
     >>> sniff("# case 8x5\nquantity,value,unit,uncertainty,kind,source,remark\n"), sniff("J CT CP eta\n")
     (True, False)
     """
@@ -314,9 +293,11 @@ def to_series(references: Iterable[Reference], name: str) -> list[Dataset]:
                 values[column] = condition
         remarks = dict.fromkeys(ref.remark for point in points for ref in point.values() if ref.remark)
         provenance = {
-            "source": source, "file": firsts[0].where.rsplit(":", 1)[0], "sha256": firsts[0].sha256,
+            "source": source,
+            "file": firsts[0].where.rsplit(":", 1)[0],
+            "sha256": firsts[0].sha256,
             "remark": "; ".join(remarks),
-        }  # fmt: skip
+        }
         labels = tuple(first.where for first in firsts)
         out.append(Dataset(kind, name, values, u, (), provenance, labels))
     return out

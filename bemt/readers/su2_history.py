@@ -32,8 +32,6 @@ _START = re.compile(r'(VARIABLES\s*=\s*)?"\s*(Time_Iter|Outer_Iter|Inner_Iter|It
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether one of the first lines is a list of quoted names that begins with an iteration.
 
-    Examples
-    --------
     >>> sniff('"Time_Iter","Inner_Iter", "CD"\n0,0,0.2'), sniff('"Iteration" "drag"')
     (True, False)
     """

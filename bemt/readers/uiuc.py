@@ -73,41 +73,24 @@ _READERS: dict[str, Callable[[Path], Any]] = {
 
 @dataclass(frozen=True, eq=False)
 class UiucPropeller:
-    """One propeller of the archive with all its data.
+    """One propeller of the archive with all its data."""
 
-    Parameters
-    ----------
-    name, family, label, folder : str
-        ``apce_10x5``, ``apce``, "APC Thin Electric", folder that holds the files.
-    diameter_in, pitch_in : float, float or None
-        Nominal, see the module notes. [in]
-    angle_deg : float or None
-        Nominal blade angle at r/R = 0.75. [deg]
-    blades, rotation, specimen : int
-        Number of blades, +1 tractor or -1 pusher, specimen.
-    blades_from : str
-        ``name``, ``family`` or ``default`` (2).
-    geometry : UiucGeometry or None
-        Stations, from this or a related propeller (``geometry.origin``).
-    thickness : UiucThickness or None
-        Thickness of its family, if published.
-    statics, lines : tuple
-        Static runs; advance-ratio runs ascending in rpm.
-    """
-
+    # ``apce_10x5``, ``apce``, "APC Thin Electric", folder that holds the files
     name: str
     family: str
     label: str
     folder: str
+    # Nominal, see the module notes [in]
     diameter_in: float
     pitch_in: float | None
-    angle_deg: float | None
-    blades: int
-    blades_from: str
-    rotation: int
-    specimen: int
-    geometry: UiucGeometry | None
-    thickness: UiucThickness | None
+    angle_deg: float | None  # Nominal blade angle at r/R = 0.75 [deg]
+    blades: int  # Number of blades, +1 tractor or -1 pusher, specimen
+    blades_from: str  # ``name``, ``family`` or ``default`` (2)
+    rotation: int  # Number of blades, +1 tractor or -1 pusher, specimen
+    specimen: int  # Number of blades, +1 tractor or -1 pusher, specimen
+    geometry: UiucGeometry | None  # Stations, from this or a related propeller (``geometry.origin``)
+    thickness: UiucThickness | None  # Thickness of its family, if published
+    # Static runs; advance-ratio runs ascending in rpm
     statics: tuple[UiucStatic, ...]
     lines: tuple[UiucLine, ...]
 
@@ -123,10 +106,14 @@ class UiucPropeller:
             return self.statics[0] if self.statics else None
         tables = self.statics
         return UiucStatic(
-            "+".join(t.file for t in tables), "+".join(t.sha256 for t in tables), sum((t.rows for t in tables), ()),
-            sum((t.flags for t in tables), ()), np.concatenate([t.rpm for t in tables]),
-            np.concatenate([t.CT for t in tables]), np.concatenate([t.CP for t in tables]),
-        )  # fmt: skip
+            "+".join(t.file for t in tables),
+            "+".join(t.sha256 for t in tables),
+            sum((t.rows for t in tables), ()),
+            sum((t.flags for t in tables), ()),
+            np.concatenate([t.rpm for t in tables]),
+            np.concatenate([t.CT for t in tables]),
+            np.concatenate([t.CP for t in tables]),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -298,7 +285,9 @@ def to_series(propeller: UiucPropeller) -> Dataset:
         raise InputError(fault)
     values = {name: np.concatenate(arrays) for name, arrays in columns.items()}
     provenance = {
-        "source": SOURCE, "file": propeller.folder, "sha256": hashes,
+        "source": SOURCE,
+        "file": propeller.folder,
+        "sha256": hashes,
         "remark": f"coefficients on the true diameter; nominal {propeller.diameter_in:g} in",
-    }  # fmt: skip
+    }
     return Dataset("bench", propeller.name, values, {}, tuple(flags), provenance, tuple(labels))

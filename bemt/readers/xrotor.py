@@ -23,8 +23,6 @@ _HEAD = re.compile(r"\s*XROTOR\s+VERSION", re.I)
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a file begins as XROTOR's SAVE writes it.
 
-    Examples
-    --------
     >>> sniff("XROTOR VERSION:  7.55\nblade\n"), sniff("DFDC Version 0.55\n")
     (True, False)
     """

@@ -14,7 +14,7 @@ import numpy as np
 from bemt.base.averaging import Mean
 from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
-from bemt.dataset.points import unit_in
+from bemt.dataset.channels import unit_in
 from bemt.readers import polar_c81, uiuc
 from bemt.readers._columns import Channel, dataset
 from bemt.readers.apc import ApcPerformance
@@ -130,8 +130,6 @@ def _channels(columns: Mapping[str, Any]) -> dict[str, Channel]:
 def adapt(found: Any, form: str, name: str) -> Dataset:
     """Make the dataset of whatever a reader returned.
 
-    Examples
-    --------
     >>> adapt(Dataset("bench", "stand", {"rpm": [6000.0, 7000.0], "thrust_N": [10.0, 13.5]}), "csv", "a.csv")
     Dataset('bench', 'stand', 2 points: rpm, thrust_N)
     """

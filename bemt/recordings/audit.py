@@ -24,21 +24,13 @@ paper). ASME V&V 20-2009. Limits of y+ for wall functions: B.E. Launder, D.B. Sp
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from bemt.formula.k1k2 import ZERO_THRUST_MEASURED
 
-__all__ = [
-    "MEASURED",
-    "STATUSES",
-    "AuditLine",
-    "CfdFacts",
-    "audit",
-    "audit_document",
-    "combined",
-]
+__all__ = ["MEASURED", "STATUSES", "AuditLine", "CfdFacts", "audit", "audit_document", "combined"]
 
 STATUSES = ("fine", "doubtful", "fault", "not stated")
 
@@ -62,107 +54,59 @@ SKEW_LIMIT = 5.0
 
 @dataclass(frozen=True)
 class CfdFacts:
-    """What is known of a CFD run; None or NaN where nothing is stated.
+    """What is known of a CFD run; None or NaN where nothing is stated."""
 
-    Parameters
-    ----------
-    M_tip, J, pitch_over_D, CT : float
-        Rotational tip Mach number, advance ratio, pitch over diameter, thrust coefficient. [1]
-    domain_over_D : float
-        Diameter of the domain over that of the disk. [1]
-    compressible : bool or None
-        Whether the density followed the pressure.
-    grids : int or None
-        Number of grids the value was computed on; 0 or 1 is no grid study.
-    u_grid : float
-        Standard uncertainty from a grid study (GCI / 1.15), relative. [1]
-    cells : float
-        Cells of the grid. [1]
-    drift : float
-        Change of the thrust over the averaged iterations or revolutions, relative. [1]
-    wall : str
-        ``function``, ``scalable``, ``automatic``, ``resolved`` or empty.
-    y_plus : float
-        Mean distance of the first cell in wall units. [1]
-    turbulence : str
-        Model; empty is not stated.
-    thrust_from : str
-        ``forces``, ``node``, ``momentum`` or empty.
-    steady_mrf : bool or None
-        Whether the rotor was frozen in a rotating frame.
-    skew_deg : float
-        Angle of the inflow against the shaft. [deg]
-    mass_balance, momentum_balance : float
-        Residual of mass over what passes the disk, and of axial momentum over the thrust. [1]
-    ducted : bool
-        Whether the rotor runs in a duct; the rules that were measured on an open propeller are not used then.
-    """
-
+    # Rotational tip Mach number, advance ratio, pitch over diameter, thrust coefficient [1]
     M_tip: float = math.nan
     J: float = 0.0
     pitch_over_D: float = math.nan
     CT: float = math.nan
-    domain_over_D: float = math.nan
-    compressible: bool | None = None
-    grids: int | None = None
-    u_grid: float = math.nan
-    cells: float = math.nan
-    drift: float = math.nan
-    wall: str = ""
-    y_plus: float = math.nan
-    turbulence: str = ""
-    thrust_from: str = ""
-    steady_mrf: bool | None = None
-    skew_deg: float = 0.0
+    domain_over_D: float = math.nan  # Diameter of the domain over that of the disk [1]
+    compressible: bool | None = None  # Whether the density followed the pressure
+    grids: int | None = None  # Number of grids the value was computed on; 0 or 1 is no grid study
+    u_grid: float = math.nan  # Standard uncertainty from a grid study (GCI / 1.15), relative [1]
+    cells: float = math.nan  # Cells of the grid [1]
+    drift: float = math.nan  # Change of the thrust over the averaged iterations or revolutions, relative [1]
+    wall: str = ""  # ``function``, ``scalable``, ``automatic``, ``resolved`` or empty
+    y_plus: float = math.nan  # Mean distance of the first cell in wall units [1]
+    turbulence: str = ""  # Model; empty is not stated
+    thrust_from: str = ""  # ``forces``, ``node``, ``momentum`` or empty
+    steady_mrf: bool | None = None  # Whether the rotor was frozen in a rotating frame
+    skew_deg: float = 0.0  # Angle of the inflow against the shaft [deg]
+    # Residual of mass over what passes the disk, and of axial momentum over the thrust [1]
     mass_balance: float = math.nan
     momentum_balance: float = math.nan
+    # Whether the rotor runs in a duct; the rules that were measured on an open propeller are not used then
     ducted: bool = False
 
 
 @dataclass(frozen=True)
 class AuditLine:
-    """One setting and its consequence.
+    """One setting and its consequence."""
 
-    Parameters
-    ----------
-    topic : str
-        Setting.
-    status : str
-        One of :data:`STATUSES`.
-    finding : str
-        What is known.
-    consequence : str
-        What that does to the number.
-    u_relative : float
-        Part of the standard uncertainty of the thrust; NaN is unknown. [1]
-    """
-
-    topic: str
-    status: str
-    finding: str
-    consequence: str
-    u_relative: float
+    topic: str  # Setting
+    status: str  # One of :data:`STATUSES`
+    finding: str  # What is known
+    consequence: str  # What that does to the number
+    u_relative: float  # Part of the standard uncertainty of the thrust; NaN is unknown [1]
 
 
-def _domain(f: CfdFacts) -> AuditLine:
-    topic = "domain against disk"
+Judged = tuple[str, str, str, float]
+"""Status, finding, consequence and uncertainty of an :class:`AuditLine`."""
+
+
+def _domain(f: CfdFacts) -> Judged:
     if math.isnan(f.domain_over_D):
-        return AuditLine(topic, "not stated", "size of the domain not stated", "blockage unknown", math.nan)
+        return "not stated", "size of the domain not stated", "blockage unknown", math.nan
     a = 1.0 / f.domain_over_D**2
     words = f"domain {f.domain_over_D:.3g} disk diameters wide, blockage {a:.2g}"
     if f.domain_over_D < 1.5:
-        return AuditLine(
-            topic,
-            "fault",
-            words,
-            "a rotor in a pipe, no free propeller: no entrainment, no far field; the "
-            "one-dimensional correction does not hold",
-            math.nan,
-        )
+        says = "a rotor in a pipe, no free propeller: no entrainment, no far field"
+        return "fault", words, f"{says}; the one-dimensional correction does not hold", math.nan
     status = "fine" if f.domain_over_D >= DOMAIN_WIDE else "doubtful"
     J0 = ZERO_THRUST_MEASURED * f.pitch_over_D
     if a > BLOCKAGE_KNOWN or f.ducted or not (math.isfinite(J0) and f.CT > 0 and J0 > f.J):
-        return AuditLine(topic, status, words, "no rule for this blockage or rotor", math.nan)
+        return status, words, "no rule for this blockage or rotor", math.nan
     load = f.CT * 4.0 / math.pi  # T / (rho A) over (n D)^2
     if f.J > 0:
         tau = load / f.J**2
@@ -170,85 +114,56 @@ def _domain(f: CfdFacts) -> AuditLine:
     else:
         shift = a / (2.0 * math.sqrt(2.0)) * math.sqrt(load)
     u = shift / (J0 - f.J)
-    return AuditLine(topic, status, words, f"Glauert's tunnel correction: J off by {shift:.2g}, thrust by {u:.1%}", u)
+    return status, words, f"Glauert's tunnel correction: J off by {shift:.2g}, thrust by {u:.1%}", u
 
 
-def _compressibility(f: CfdFacts) -> AuditLine:
-    topic, M = "compressibility against tip Mach", f.M_tip
+def _compressibility(f: CfdFacts) -> Judged:
+    M = f.M_tip
     if f.compressible:
-        return AuditLine(topic, "fine", f"compressible flow, tip Mach {M:.2f}", "none", 0.0)
+        return "fine", f"compressible flow, tip Mach {M:.2f}", "none", 0.0
     known = "incompressible flow" if f.compressible is False else "not stated whether compressible"
     words = f"{known}, tip Mach {M:.2f}" if math.isfinite(M) else f"{known}, tip Mach unknown"
     if math.isnan(M):
-        return AuditLine(topic, "not stated", words, "unknown", math.nan)
+        return "not stated", words, "unknown", math.nan
     bias = MEASURED["compressible"] * (M / MEASURED["compressible_M_tip"]) ** 2
-    if f.compressible is None and M > M_TIP_NEGLIGIBLE:
-        if M > M_TIP_KNOWN or f.ducted:
-            return AuditLine(
-                topic,
-                "not stated",
-                words,
-                "beyond the measured rule" if M > M_TIP_KNOWN else "no rule measured for ducted rotors",
-                math.nan,
-            )
-        return AuditLine(
-            topic,
-            "not stated",
-            words,
-            f"thrust up to {bias:.1%} low if incompressible (own runs, M^2)",
-            bias / math.sqrt(3.0),
-        )
     if M <= M_TIP_NEGLIGIBLE:
-        return AuditLine(topic, "fine", words, f"thrust at most {bias:.1%} low (own runs, M^2)", bias)
-    if M > M_TIP_KNOWN or f.ducted:
-        return AuditLine(
-            topic,
-            "fault",
-            words,
-            "shocks and wave drag are left out: beyond the measured rule"
-            if M > M_TIP_KNOWN
-            else "no rule measured for ducted rotors",
-            math.nan,
-        )
-    return AuditLine(
-        topic,
-        "doubtful" if M <= 0.5 else "fault",
-        words,
-        f"thrust about {bias:.1%} low, torque a fifth more than that (own runs, M^2)",
-        bias,
-    )
+        return "fine", words, f"thrust at most {bias:.1%} low (own runs, M^2)", bias
+    told = f.compressible is False
+    if M > M_TIP_KNOWN:
+        shocks = "shocks and wave drag are left out: " if told else ""
+        return "fault" if told else "not stated", words, f"{shocks}beyond the measured rule", math.nan
+    if f.ducted:
+        return "fault" if told else "not stated", words, "no rule measured for ducted rotors", math.nan
+    if not told:
+        low = f"thrust up to {bias:.1%} low if incompressible (own runs, M^2)"
+        return "not stated", words, low, bias / math.sqrt(3.0)
+    low = f"thrust about {bias:.1%} low, torque a fifth more than that (own runs, M^2)"
+    return "doubtful" if M <= 0.5 else "fault", words, low, bias
 
 
-def _grid(f: CfdFacts) -> AuditLine:
-    topic = "grid study"
+def _grid(f: CfdFacts) -> Judged:
     cells = f"{f.cells:,.0f} cells" if f.cells > 0 else "cells not stated"
     if math.isfinite(f.u_grid):
         n = f.grids or 3
         status = "fine" if f.u_grid <= 0.02 and n >= 3 else "doubtful"
-        return AuditLine(topic, status, f"{n} grids, {cells}", f"u of the grid {f.u_grid:.2%} (GCI / 1.15)", f.u_grid)
+        return status, f"{n} grids, {cells}", f"u of the grid {f.u_grid:.2%} (GCI / 1.15)", f.u_grid
     if f.grids is None:
-        return AuditLine(topic, "not stated", f"grid study not stated; {cells}", "discretization unknown", math.nan)
+        return "not stated", f"grid study not stated; {cells}", "discretization unknown", math.nan
     words = "no grid study" if f.grids <= 1 else f"{f.grids} grids without an index"
-    return AuditLine(topic, "fault", f"{words}; {cells}", "discretization unknown", math.nan)
+    return "fault", f"{words}; {cells}", "discretization unknown", math.nan
 
 
-def _drift(f: CfdFacts) -> AuditLine:
-    topic = "iterative drift"
+def _drift(f: CfdFacts) -> Judged:
     if math.isnan(f.drift):
-        return AuditLine(topic, "not stated", "history of the thrust not stated", "convergence unknown", math.nan)
+        return "not stated", "history of the thrust not stated", "convergence unknown", math.nan
     size = abs(f.drift)
     status = "fine" if size <= 0.005 else "doubtful" if size <= 0.02 else "fault"
-    return AuditLine(
-        topic,
-        status,
-        f"thrust drifts by {round(f.drift, 4) + 0.0:+.2%} over the averaged part",
-        "taken whole as its standard uncertainty",
-        size,
-    )
+    words = f"thrust drifts by {round(f.drift, 4) + 0.0:+.2%} over the averaged part"
+    return status, words, "taken whole as its standard uncertainty", size
 
 
-def _wall(f: CfdFacts) -> AuditLine:
-    topic, y = "wall treatment against y+", f.y_plus
+def _wall(f: CfdFacts) -> Judged:
+    y = f.y_plus
     words = {
         "function": "wall functions",
         "scalable": "scalable wall functions",
@@ -256,75 +171,50 @@ def _wall(f: CfdFacts) -> AuditLine:
         "resolved": "resolved down to the wall",
     }.get(f.wall, "wall treatment not stated")
     if math.isnan(y):
-        return AuditLine(topic, "not stated", f"{words}; y+ not stated", "skin friction and stall unknown", math.nan)
+        return "not stated", f"{words}; y+ not stated", "skin friction and stall unknown", math.nan
     words = f"{words}, mean y+ {y:.3g}"
-    buffer = math.nan if f.ducted else MEASURED["buffer_layer"]
     if not f.wall:
-        return AuditLine(topic, "not stated", words, "unknown", math.nan)
+        return "not stated", words, "unknown", math.nan
     if f.wall == "resolved":
-        good = y <= 2.0
-        return AuditLine(
-            topic,
-            "fine" if good else "fault",
-            words,
-            "none" if good else "the sublayer is not resolved",
-            0.0 if good else math.nan,
-        )
+        if y <= 2.0:
+            return "fine", words, "none", 0.0
+        return "fault", words, "the sublayer is not resolved", math.nan
     if 30.0 <= y <= 300.0:
-        return AuditLine(topic, "fine", words, "within the log layer", 0.0)
+        return "fine", words, "within the log layer", 0.0
     if y > 300.0:
-        return AuditLine(topic, "fault", words, "first cell above the log layer", math.nan)
+        return "fault", words, "first cell above the log layer", math.nan
     if y <= 5.0 and f.wall == "automatic":
-        return AuditLine(topic, "fine", words, "within the viscous sublayer", 0.0)
-    return AuditLine(
-        topic,
-        "doubtful",
-        words,
-        "buffer layer: own runs at y+ 16 and 51 differ by 1.2 % in thrust, 2.4 % in torque"
-        if math.isfinite(buffer)
-        else "buffer layer; no rule measured for ducted rotors",
-        buffer,
-    )
-
-
-def _turbulence(f: CfdFacts) -> AuditLine:
-    topic = "turbulence model"
-    if not f.turbulence:
-        return AuditLine(topic, "not stated", "model not stated", "unknown", math.nan)
+        return "fine", words, "within the viscous sublayer", 0.0
     if f.ducted:
-        return AuditLine(topic, "doubtful", f.turbulence, "no rule measured for ducted rotors", math.nan)
-    u = MEASURED["turbulence"]
-    return AuditLine(
-        topic,
-        "fine",
-        f.turbulence,
-        "own runs: k-omega SST and realizable k-epsilon differ by 1.6 % in thrust, 4.5 % in torque",
-        u,
-    )
+        return "doubtful", words, "buffer layer; no rule measured for ducted rotors", math.nan
+    says = "buffer layer: own runs at y+ 16 and 51 differ by 1.2 % in thrust, 2.4 % in torque"
+    return "doubtful", words, says, MEASURED["buffer_layer"]
 
 
-def _thrust(f: CfdFacts) -> AuditLine:
-    topic = "where the thrust was read"
+def _turbulence(f: CfdFacts) -> Judged:
+    if not f.turbulence:
+        return "not stated", "model not stated", "unknown", math.nan
+    if f.ducted:
+        return "doubtful", f.turbulence, "no rule measured for ducted rotors", math.nan
+    says = "own runs: k-omega SST and realizable k-epsilon differ by 1.6 % in thrust, 4.5 % in torque"
+    return "fine", f.turbulence, says, MEASURED["turbulence"]
+
+
+def _thrust(f: CfdFacts) -> Judged:
+    if f.thrust_from == "forces":
+        return "fine", "pressure and shear integrated over the blades", "none", 0.0
     table = {
-        "forces": ("fine", "pressure and shear integrated over the blades", "none", 0.0),
-        "momentum": (
-            "doubtful",
-            "momentum through a plane",
-            "depends on the plane and on the pressure there",
-            math.nan,
-        ),
+        "momentum": ("doubtful", "momentum through a plane", "depends on the plane and on the pressure there"),
         "node": (
             "fault",
             "one node behind the propeller",
             "one point of a wake that is not uniform: no integral of anything",
-            math.nan,
         ),
     }
-    return AuditLine(topic, *table.get(f.thrust_from, ("not stated", "not stated", "unknown", math.nan)))
+    return *table.get(f.thrust_from, ("not stated", "not stated", "unknown")), math.nan
 
 
-def _balance(f: CfdFacts) -> AuditLine:
-    topic = "balance of mass and momentum"
+def _balance(f: CfdFacts) -> Judged:
     parts = {"mass": f.mass_balance, "momentum": f.momentum_balance}
     known = {name: abs(value) for name, value in parts.items() if math.isfinite(value)}
     words = ", ".join(
@@ -333,54 +223,50 @@ def _balance(f: CfdFacts) -> AuditLine:
     open_ones = [name for name, size in known.items() if size > BALANCE_LIMIT]
     if open_ones:
         consequence = f"{' and '.join(open_ones)} made or lost in the domain: the loads are those of another flow"
-        return AuditLine(topic, "fault", words, consequence, math.nan)
+        return "fault", words, consequence, math.nan
     if len(known) < len(parts):
-        return AuditLine(topic, "not stated", words, "a leak is not excluded: one of 11 % went unseen here", math.nan)
+        return "not stated", words, "a leak is not excluded: one of 11 % went unseen here", math.nan
     u = max(known.values())
-    return AuditLine(topic, "fine", words, "the larger taken whole as a standard uncertainty", u)
+    return "fine", words, "the larger taken whole as a standard uncertainty", u
 
 
-def _frame(f: CfdFacts) -> AuditLine:
-    topic = "frozen rotor against inflow"
+def _frame(f: CfdFacts) -> Judged:
     if f.steady_mrf is None:
-        return AuditLine(topic, "not stated", "steady or transient not stated", "unknown", math.nan)
+        return "not stated", "steady or transient not stated", "unknown", math.nan
     if not f.steady_mrf:
-        return AuditLine(topic, "fine", "the mesh turns", "none", 0.0)
+        return "fine", "the mesh turns", "none", 0.0
+    words = f"rotating frame, inflow {f.skew_deg:.3g} deg off the shaft"
     if abs(f.skew_deg) <= SKEW_LIMIT:
-        return AuditLine(
-            topic,
-            "fine",
-            f"rotating frame, inflow {f.skew_deg:.3g} deg off the shaft",
-            "none: steady in that frame",
-            0.0,
-        )
-    return AuditLine(
-        topic,
-        "fault",
-        f"rotating frame, inflow {f.skew_deg:.3g} deg off the shaft",
-        "blades stand still at one azimuth: the once-per-turn loads are left out",
-        math.nan,
-    )
+        return "fine", words, "none: steady in that frame", 0.0
+    return "fault", words, "blades stand still at one azimuth: the once-per-turn loads are left out", math.nan
+
+
+JUDGES: Mapping[str, Callable[[CfdFacts], Judged]] = {
+    "domain against disk": _domain,
+    "compressibility against tip Mach": _compressibility,
+    "grid study": _grid,
+    "iterative drift": _drift,
+    "balance of mass and momentum": _balance,
+    "wall treatment against y+": _wall,
+    "turbulence model": _turbulence,
+    "where the thrust was read": _thrust,
+    "frozen rotor against inflow": _frame,
+}
 
 
 def audit(facts: CfdFacts) -> tuple[AuditLine, ...]:
     """Judge the set-up of a CFD run.
 
-    Examples
-    --------
     >>> lines = audit(CfdFacts(M_tip=0.63, domain_over_D=1.0, grids=0, thrust_from="node", pitch_over_D=0.625, CT=0.11))
     >>> [line.topic for line in lines if line.status == "fault"]
     ['domain against disk', 'grid study', 'where the thrust was read']
     """
-    judges = (_domain, _compressibility, _grid, _drift, _balance, _wall, _turbulence, _thrust, _frame)
-    return tuple(judge(facts) for judge in judges)
+    return tuple(AuditLine(topic, *judge(facts)) for topic, judge in JUDGES.items())
 
 
 def combined(lines: Iterable[AuditLine]) -> tuple[float, float]:
     """Put the parts together as a root of squares. [1]
 
-    Examples
-    --------
     >>> combined([AuditLine("a", "fine", "", "", 0.03), AuditLine("b", "fine", "", "", 0.04)])
     (0.05, 0.05)
     """

@@ -45,8 +45,6 @@ _NUMBERS: tuple[tuple[str, str, float], ...] = (
 def facts_from_remark(remark: str, known: CfdFacts | None = None) -> CfdFacts:
     """Read set phrases of a remark in ``references.csv``; other words say nothing.
 
-    Examples
-    --------
     >>> f = facts_from_remark("MRF; k-omega SST with automatic wall functions; domain 5 D, y+ 51, GCI 2.3 %")
     >>> f.steady_mrf, f.wall, f.domain_over_D, f.y_plus, f.u_grid, f.compressible
     (True, 'automatic', 5.0, 51.0, 0.02, None)

@@ -28,31 +28,17 @@ _QUANTITY = {"thrust_N": "T", "torque_Nm": "Q"}
 
 @dataclass(frozen=True)
 class Level:
-    """Level of one load in one recording.
+    """Level of one load in one recording."""
 
-    Parameters
-    ----------
-    name : str
-        Recording; no two have one name.
-    channel : str
-        thrust_N or torque_Nm.
-    log_ratio : float
-        Median of ln |reading / model| over readings under load. [1]
-    spread : float
-        Half of what the middle four fifths of those span. [1]
-    """
-
-    name: str
-    channel: str
-    log_ratio: float
-    spread: float
+    name: str  # Recording; no two have one name
+    channel: str  # thrust_N or torque_Nm
+    log_ratio: float  # Median of ln |reading / model| over readings under load [1]
+    spread: float  # Half of what the middle four fifths of those span [1]
 
 
 def odd_ones(levels: Sequence[Level]) -> list[tuple[Level, Finding]]:
     """Name recordings whose level differs from that of most others by the factor of a usual slip.
 
-    Examples
-    --------
     >>> files = [("a", 0.02), ("b", -0.05), ("c", 4.6), ("d", 0.8)]  # c reads 102 times, d 2.3 times what others do
     >>> [(level.name, f.correction.split(".")[0]) for level, f in odd_ones([Level(n, "thrust_N", x, 0.1)
     ...     for n, x in files])]
@@ -103,14 +89,20 @@ def _apart(levels: Sequence[Level]) -> list[_Odd]:
     spread = max(abs(w.log_ratio - usual) for w in groups[k])
     far = max(FAR, SPREADS * spread)
     # a slip is one factor: readings that scatter about it have another reason
-    return [_Odd(v, v.log_ratio - usual, groups[k], spread) for v in levels
-            if v not in groups[k] and abs(v.log_ratio - usual) >= far and v.spread <= TOGETHER]  # fmt: skip
+    return [
+        _Odd(v, v.log_ratio - usual, groups[k], spread)
+        for v in levels
+        if v not in groups[k] and abs(v.log_ratio - usual) >= far and v.spread <= TOGETHER
+    ]
 
 
 def _likely(quantity: str, log_factor: float) -> list[Slip]:
     """Slips that the logarithm of a factor repairs, the likeliest first."""
-    fits = [(((log_factor - math.log(s.factor)) / _SIGMA) ** 2 + s.rarity, k, s) for k, s in enumerate(slips())
-            if s.quantity == quantity and abs(log_factor - math.log(s.factor)) <= NEAR]  # fmt: skip
+    fits = [
+        (((log_factor - math.log(s.factor)) / _SIGMA) ** 2 + s.rarity, k, s)
+        for k, s in enumerate(slips())
+        if s.quantity == quantity and abs(log_factor - math.log(s.factor)) <= NEAR
+    ]
     best = min(fits, default=(0.0,))[0]
     return [s for score, _, s in sorted(fits) if score - best < ALIKE]
 

@@ -103,11 +103,9 @@ def runs_of(d: Dataset) -> Array:
     return np.nan_to_num(d["run"]) if "run" in d else np.ones(len(d))
 
 
-def named(d: Dataset, speed: str | None = None) -> Dataset:
+def named(d: Dataset) -> Dataset:
     """Give the channels of a recording their usual names.
 
-    Examples
-    --------
     >>> read = Dataset("bench", "table", {"T_N": [1.0, 2.0], "x": [0.0, 1.0]}, units={"x": ""})
     >>> sorted(named(read).values)
     ['thrust_N']
@@ -142,7 +140,7 @@ def named(d: Dataset, speed: str | None = None) -> Dataset:
             u[base] = np.where(column < 0.0, np.nan, column)
         else:
             notes.append(f"{name}: uncertainty of a channel that the file has not; left out")
-    _speed(values, names, notes, speed)
+    _speed(values, names, notes)
     _power(values, names, notes, d.values.get("P_W"))
     bare = d.provenance.get("headings", {}).get("power_W", "")
     if names.get("power_W") == "power_W" and _BARE_POWER.fullmatch(bare):
@@ -152,16 +150,13 @@ def named(d: Dataset, speed: str | None = None) -> Dataset:
         notes.append(f"{none} rows without a run: taken as run 0")
     own = {key: d.unit(name) for key, name in names.items() if name in d}
     about = {**d.provenance, "names": names, "dropped": tuple(out)}
-    return replace(d, values=values or {"run": np.ones(n)}, u=u, u_by={}, provenance=about, notes=tuple(notes),
-                   units=own, texts={})  # fmt: skip
+    return replace(
+        d, values=values or {"run": np.ones(n)}, u=u, u_by={}, provenance=about, notes=tuple(notes), units=own, texts={}
+    )
 
 
-def _speed(values: dict[str, Array], names: dict[str, str], notes: list[str], speed: str | None) -> None:
+def _speed(values: dict[str, Array], names: dict[str, str], notes: list[str]) -> None:
     """Choose the speed of the rotor among those that the file has."""
-    if speed is not None and speed != "rpm" and speed in values:
-        values["rpm"], names["rpm"] = values[speed], names[speed]
-        notes.append(f"rpm is {speed}, as told")
-        return
     if "rpm" in values:
         return
     for name in _SPEEDS:

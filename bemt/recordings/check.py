@@ -20,13 +20,15 @@ _ROOMS = (slips, signs, columns)
 
 @np.errstate(all="ignore")  # a damaged file may hold any number
 def check(
-    source: Dataset, *, diameter_m: float | None = None, pitch_m: float | None = None,
-    blades: int | None = None, ducted: bool = False,
-) -> tuple[Finding, ...]:  # fmt: skip
+    source: Dataset,
+    *,
+    diameter_m: float | None = None,
+    pitch_m: float | None = None,
+    blades: int | None = None,
+    ducted: bool = False,
+) -> tuple[Finding, ...]:
     """Look for faults in a recording.
 
-    Examples
-    --------
     >>> rpm = [4000.0, 5000.0, 6000.0, 7000.0]
     >>> stand = Dataset("bench", "stand", {"rpm": rpm, "thrust_N": [0.22, 0.34, 0.50, 0.68]})  # kgf, not N
     >>> [(f.id, f.correction.split(".")[0]) for f in check(stand, diameter_m=0.254)]

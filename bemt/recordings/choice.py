@@ -21,37 +21,19 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Choice:
-    """What only the user knows.
+    """What only the user knows."""
 
-    Parameters
-    ----------
-    period : float or None
-        Duration of a revolution [s]; None: no average over revolutions.
-    revolutions : int or None
-        How many; None takes 4, or half of the run.
-    sign : int
-        +1 or -1 for the loads.
-    sector : int
-        Number of equal sectors of which the model is one; loads are multiplied by it.
-    zones : tuple of str
-        Zones whose loads are added up; empty: none are.
-    loads : tuple of str
-        Channels that sign and sector apply to; empty: all in N or Nm.
-    """
-
-    period: float | None = None
-    revolutions: int | None = None
-    sign: int = 1
-    sector: int = 1
-    zones: tuple[str, ...] = ()
-    loads: tuple[str, ...] = ()
+    period: float | None = None  # Duration of a revolution [s]; None: no average over revolutions
+    revolutions: int | None = None  # How many; None takes 4, or half of the run
+    sign: int = 1  # +1 or -1 for the loads
+    sector: int = 1  # Number of equal sectors of which the model is one; loads are multiplied by it
+    zones: tuple[str, ...] = ()  # Zones whose loads are added up; empty: none are
+    loads: tuple[str, ...] = ()  # Channels that sign and sector apply to; empty: all in N or Nm
 
 
 def averaged(record: Dataset, period: float, revolutions: int | None = None) -> Dataset:
     """Replace the means of a history by those over its last whole revolutions.
 
-    Examples
-    --------
     >>> t = np.arange(1, 401) * 0.01
     >>> r = Dataset("cfd", "x", {"time_s": t, "q": 2 + np.sin(2 * np.pi * t)}, units={"q": ""},
     ...             provenance={"clock": "time", "time_channel": "time_s", "clock_channels": "time_s"})
@@ -81,8 +63,10 @@ def averaged(record: Dataset, period: float, revolutions: int | None = None) -> 
             problems.setdefault(average.problem, []).append(key)
         if average.mean is not None:
             means[key] = Mean(average.mean, _span(average), average.drift)
-    more = [f"{'no mean' if 'only' not in text else 'doubtful mean'} of {', '.join(keys)}: {text}"
-            for text, keys in problems.items()]  # fmt: skip
+    more = [
+        f"{'no mean' if 'only' not in text else 'doubtful mean'} of {', '.join(keys)}: {text}"
+        for text, keys in problems.items()
+    ]
     if scatter:
         worst = ", ".join(f"{key} {value:.2%}" for key, value in list(scatter.items())[:6])
         more.append(f"means of single revolutions differ: {worst}")
@@ -123,9 +107,13 @@ def chosen(record: Dataset, choice: Choice) -> Dataset:
 
 
 def _add_zones(
-    record: Dataset, zones: Sequence[str], file: str, values: dict[str, Array], means: dict[str, Mean],
+    record: Dataset,
+    zones: Sequence[str],
+    file: str,
+    values: dict[str, Array],
+    means: dict[str, Mean],
     own: dict[str, str],
-) -> None:  # fmt: skip
+) -> None:
     """Add the sums over the zones that count."""
     groups: dict[str, dict[str, str]] = {}
     for name in record.values:
@@ -157,9 +145,14 @@ def _add_zones(
 
 
 def asked(
-    rpm: float | None = None, period: float | None = None, revolutions: int | None = None, sign: int = 1,
-    sector: int = 1, zones: Sequence[str] = (), loads: Sequence[str] = (),
-) -> Choice:  # fmt: skip
+    rpm: float | None = None,
+    period: float | None = None,
+    revolutions: int | None = None,
+    sign: int = 1,
+    sector: int = 1,
+    zones: Sequence[str] = (),
+    loads: Sequence[str] = (),
+) -> Choice:
     """Make a choice of options, or refuse them, all faults at once."""
     faults = []
     if rpm is not None and not (math.isfinite(rpm) and 0.01 <= rpm <= 1e6):

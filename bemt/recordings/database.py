@@ -67,9 +67,13 @@ def _check_own(folder: Path, known: dict[str, Any]) -> None:
 
 
 def get(
-    kind: str, folder: Path, source: str | Path | None = None, url: str | None = None, refresh: bool = False,
+    kind: str,
+    folder: Path,
+    source: str | Path | None = None,
+    url: str | None = None,
+    refresh: bool = False,
     progress: Callable[[int, int], None] | None = None,
-) -> dict[str, Any]:  # fmt: skip
+) -> dict[str, Any]:
     """Put a database into a folder."""
     from bemt.readers.uiuc import scan_folder
 
@@ -112,16 +116,20 @@ def get(
         if source is None:
             archive.unlink(missing_ok=True)
     same = known is not None and known["sha256"] == digest
-    return {**document, "checksum": "as recorded" if same else "replaced" if known else "first use",
-            "fetched": source is None}  # fmt: skip
+    return {
+        **document,
+        "checksum": "as recorded" if same else "replaced" if known else "first use",
+        "fetched": source is None,
+    }
 
 
 def text(doc: dict[str, Any]) -> str:
     """Say what is where."""
     said = {
         "first use": "first use: the publisher gives no hash, so this one is trusted and recorded",
-        "as recorded": "as recorded at its first use", "replaced": "another archive than before, as asked by --from",
-    }  # fmt: skip
+        "as recorded": "as recorded at its first use",
+        "replaced": "another archive than before, as asked by --from",
+    }
     lines = [
         f"{doc['kind']}: {doc['propellers']} propellers, {doc['files']} files in {doc['folder']}",
         f"from {doc['url'] or doc['archive']}, {doc['bytes']} bytes",

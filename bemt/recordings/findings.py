@@ -26,30 +26,14 @@ LIKELY_RHO = 1.2
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that looks wrong; nothing was corrected.
+    """One thing that looks wrong; nothing was corrected."""
 
-    Parameters
-    ----------
-    id : str
-        Name of the fault, such as ``thrust_unit``.
-    channel : str
-        Channel as the file names it in SI.
-    evidence : str
-        Numbers that show it.
-    correction : str
-        What would make it right.
-    rows : tuple of int
-        Rows, from 0; empty: the whole channel.
-    severity : str
-        ``error`` (cannot be so), ``warning`` (hardly so) or ``note`` (known habit of stands).
-    """
-
-    id: str
-    channel: str
-    evidence: str
-    correction: str
-    rows: tuple[int, ...] = ()
-    severity: str = "error"
+    id: str  # Name of the fault, such as ``thrust_unit``
+    channel: str  # Channel as the file names it in SI
+    evidence: str  # Numbers that show it
+    correction: str  # What would make it right
+    rows: tuple[int, ...] = ()  # Rows, from 0; empty: the whole channel
+    severity: str = "error"  # ``error`` (cannot be so), ``warning`` (hardly so) or ``note`` (known habit of stands)
 
     def __str__(self) -> str:
         return f"{self.severity}: {self.id} ({self.channel}): {self.evidence}. Correction: {self.correction}"
@@ -57,40 +41,19 @@ class Finding:
 
 @dataclass(frozen=True, eq=False)
 class Facts:
-    """What the checks look at; every array has one entry per row.
+    """What the checks look at; every array has one entry per row."""
 
-    Parameters
-    ----------
-    values : mapping of str to (N,) float
-        Channels by name of a Dataset.
-    raw : mapping of str to (N,) float
-        All channels as the file names them, with or without a unit.
-    unit : mapping of str to str
-        Unit of each of them.
-    names : mapping of str to str
-        Name in the file of each channel of `values`.
-    lines : sequence of int
-        Line in the file.
-    diameter_m, pitch_m : float or None
-        As far as known. [m]
-    blades : int or None
-        Blades.
-    ducted : bool
-        Rotor in a duct.
-    bare : bool
-        Recorded without a propeller: nothing is expected of its loads.
-    """
-
-    values: Mapping[str, Array]
-    raw: Mapping[str, Array]
-    unit: Mapping[str, str]
-    names: Mapping[str, str]
-    lines: Sequence[int]
+    values: Mapping[str, Array]  # (N,) channels by name of a Dataset
+    raw: Mapping[str, Array]  # (N,) all channels as the file names them, with or without a unit
+    unit: Mapping[str, str]  # Unit of each of them
+    names: Mapping[str, str]  # Name in the file of each channel of `values`
+    lines: Sequence[int]  # Line in the file
+    # As far as known [m]
     diameter_m: float | None = None
     pitch_m: float | None = None
-    blades: int | None = None
-    ducted: bool = False
-    bare: bool = False
+    blades: int | None = None  # Blades
+    ducted: bool = False  # Rotor in a duct
+    bare: bool = False  # Recorded without a propeller: nothing is expected of its loads
 
     def __len__(self) -> int:
         """Give the number of rows."""

@@ -44,49 +44,25 @@ COVERAGE = 1.15
 
 @dataclass(frozen=True)
 class GridStudy:
-    """Outcome of a grid study; index 1 is the finest grid.
+    """Outcome of a grid study; index 1 is the finest grid."""
 
-    Parameters
-    ----------
-    values : tuple of float
-        f1, f2 (, f3). [unit of the quantity]
-    ratios : tuple of float
-        r21 (, r32). [1]
-    order : float or None
-        Observed order; the assumed one with two grids; None when it cannot be told (oscillation, no difference).
-        [1]
-    extrapolated : float or None
-        Value at cell size zero; None without an order. [unit of the quantity]
-    gci_fine, gci_coarse : float or None
-        GCI21 and GCI32 as fractions of f1 and f2; None without an order (gci_coarse: also with two grids).
-        [1]
-    asymptotic : float or None
-        GCI32 / (r21^p GCI21), near 1 in the asymptotic range. [1]
-    safety : float
-        Factor Fs. [1]
-    u_relative : float
-        Standard uncertainty of f1 by the grid, relative. [1]
-    flags : tuple of str
-        What is wrong with the study; empty when nothing is.
-    """
-
-    values: tuple[float, ...]
-    ratios: tuple[float, ...]
+    values: tuple[float, ...]  # f1, f2 (, f3) [unit of the quantity]
+    ratios: tuple[float, ...]  # r21 (, r32) [1]
+    # Observed order; the assumed one with two grids; None when it cannot be told (oscillation, no difference) [1]
     order: float | None
-    extrapolated: float | None
+    extrapolated: float | None  # Value at cell size zero; None without an order [unit of the quantity]
+    # GCI21 and GCI32 as fractions of f1 and f2; None without an order (gci_coarse: also with two grids) [1]
     gci_fine: float | None
     gci_coarse: float | None
-    asymptotic: float | None
-    safety: float
-    u_relative: float
-    flags: tuple[str, ...]
+    asymptotic: float | None  # GCI32 / (r21^p GCI21), near 1 in the asymptotic range [1]
+    safety: float  # Factor Fs [1]
+    u_relative: float  # Standard uncertainty of f1 by the grid, relative [1]
+    flags: tuple[str, ...]  # What is wrong with the study; empty when nothing is
 
 
 def cell_size(cells: float, volume: float = 1.0, dimensions: int = 3) -> float:
     """Give the representative cell size (V/N)^(1/d). [m]
 
-    Examples
-    --------
     >>> round(cell_size(1e6) / cell_size(8e6), 3)
     2.0
     """
@@ -99,8 +75,6 @@ def cell_size(cells: float, volume: float = 1.0, dimensions: int = 3) -> float:
 def ratios(cells: Sequence[float], dimensions: int = 3) -> tuple[float, ...]:
     """Give refinement ratios from cell counts, finest grid first. [1]
 
-    Examples
-    --------
     >>> [round(r, 3) for r in ratios([8e6, 1e6, 125e3])]
     [2.0, 2.0]
     """
@@ -133,8 +107,6 @@ def grid_study(
 ) -> GridStudy:
     """Estimate what a value still owes to the grid.
 
-    Examples
-    --------
     >>> s = grid_study([0.97050, 0.96854, 0.96178], [2, 2])
     >>> f"{s.order:.4f} {s.extrapolated:.5f} {s.gci_fine:.4%} {s.gci_coarse:.4%} {s.asymptotic:.3f}"
     '1.7862 0.97130 0.1031% 0.3562% 1.002'

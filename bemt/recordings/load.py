@@ -30,7 +30,7 @@ from bemt.base import tables
 from bemt.base.averaging import Mean, relation
 from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError, system_fault
 from bemt.dataset import Dataset
-from bemt.dataset.points import channel_fault
+from bemt.dataset.channels import channel_fault
 from bemt.recordings.adapt import adapt, damaged_export, recognised
 from bemt.recordings.choice import Choice, averaged, chosen
 from bemt.recordings.overview import findings, is_recording, points_text, reduction_document, reduction_of
@@ -90,9 +90,11 @@ def _unsettled(record: Dataset) -> list[str]:
     moving = [
         f"{name} {mean.drift:+.2%}"
         for name, mean in means.items()
-        if mean.drift is not None and abs(mean.drift) > SETTLED
-        and not name.lower().startswith(("rms[", "res_")) and abs(mean.value) >= 0.05 * top.get(record.unit(name), 0.0)
-    ]  # fmt: skip
+        if mean.drift is not None
+        and abs(mean.drift) > SETTLED
+        and not name.lower().startswith(("rms[", "res_"))
+        and abs(mean.value) >= 0.05 * top.get(record.unit(name), 0.0)
+    ]
     more = f" and {len(moving) - 6} more" if len(moving) > 6 else ""
     return [f"not settled (drift over the averaged part): {', '.join(moving[:6])}{more}"] if moving else []
 
@@ -181,7 +183,11 @@ def _refusal(error: Exception) -> str:
 
 
 def _entry(
-    name: str, record: Dataset | None, format: str | None, notes: Sequence[str], error: str | None  # noqa: A002
+    name: str,
+    record: Dataset | None,
+    format: str | None,
+    notes: Sequence[str],
+    error: str | None,  # noqa: A002
 ) -> dict[str, Any]:
     reduced = _reduced(record)
     means = _means(record, reduced) if record else {}

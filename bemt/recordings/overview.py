@@ -55,16 +55,18 @@ def reduction_document(reduced: Dataset | str | None) -> dict[str, Any] | None:
     how = reduction(reduced)
     rows = [{**row, "direction": way} for row, way in zip(reduced.to_rows(), how.directions, strict=True)]
     return {
-        "mode": how.mode, "points": rows, "correlated": {k: dict(v) for k, v in how.correlated.items()},
-        "dropped": [asdict(lost) for lost in how.dropped], "notes": list(reduced.notes), "error": None,
-    }  # fmt: skip
+        "mode": how.mode,
+        "points": rows,
+        "correlated": {k: dict(v) for k, v in how.correlated.items()},
+        "dropped": [asdict(lost) for lost in how.dropped],
+        "notes": list(reduced.notes),
+        "error": None,
+    }
 
 
 def ranges(lines: Iterable[tuple[int, int]]) -> str:
     """First and last lines as ranges.
 
-    Examples
-    --------
     >>> ranges([(5, 5), (2, 3), (4, 4), (9, 9)])
     '2-5, 9'
     """

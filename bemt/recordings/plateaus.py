@@ -4,8 +4,8 @@ From a time series to steady points, in the order below; each sample ends in one
 dropped, with the reason.
 
 1. *Steps.* With a command (pulse width, throttle), a step is where the command changes, and a stretch in which it
-   changes all the time is a ramp. Without one, a step is where the medians of the `window` samples before and after
-   differ by more than `least_step`, by more than five standard errors of the whole recording and three of the samples
+   changes all the time is a ramp. Without one, a step is where the medians of the `WINDOW` samples before and after
+   differ by more than `LEAST_STEP`, by more than five standard errors of the whole recording and three of the samples
    beside it.
 2. *Settling.* The start of a stretch is cut until the running median stays within the band of the second half of the
    stretch (twice its robust spread, or 1 % of its level). Without a command, the end is cut likewise where the samples
@@ -22,95 +22,53 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.errors import Fault, InputError
 
-__all__ = ["Dropped", "Plateau", "Plateaus", "PlateauSettings", "find", "standard_error"]
+__all__ = ["Dropped", "Plateau", "Plateaus", "find", "standard_error"]
 
 Array = NDArray[np.float64]
 OUTLIER = 6.0
 """Robust standard deviations from which a sample is an outlier."""
 BLOCK = 1 << 16
 """Windows whose medians are taken at once: a log may have millions of rows."""
+WINDOW = 8
+"""Samples on each side of a possible step."""
+LEAST_STEP = 0.01
+"""Smallest step that separates plateaus, as a share of the range of the signal. [1]"""
+LEAST_SAMPLES = 5
+"""Samples that a plateau must keep after the cuts."""
+DRIFT = 0.02
+"""Change over a plateau, relative to its level, from which it is flagged. [1]"""
 LOCAL = 3.0
 """Standard errors, from the spread of the samples beside it, that a step must exceed."""
 
 
-@dataclass(frozen=True)
-class PlateauSettings:
-    """Rules of the detection.
-
-    Parameters
-    ----------
-    window : int
-        Samples on each side of a possible step, 3 or more.
-    least_step : float
-        Smallest step that separates plateaus, as a share of the range of the signal. [1]
-    least_samples : int
-        Samples that a plateau must keep after the cuts.
-    least_time_s : float
-        Duration that a plateau must keep after the cuts. [s]
-    drift : float
-        Change over a plateau, relative to its level, from which it is flagged. [1]
-    settle_time_s : float or None
-        Cut this much after every step; None finds the settling from the signal. [s]
-    """
-
-    window: int = 8
-    least_step: float = 0.01
-    least_samples: int = 5
-    least_time_s: float = 0.0
-    drift: float = 0.02
-    settle_time_s: float | None = None
-
-
 @dataclass(frozen=True, eq=False)
 class Plateau:
-    """One steady stretch.
+    """One steady stretch."""
 
-    Parameters
-    ----------
-    start, stop : int
-        Rows, `stop` not included, after the cuts.
-    t0, t1 : float
-        Times of the first and last row [s], or row numbers when there is no time.
-    command : float or None
-        Command during the stretch, in its unit.
-    direction : str
-        ``up`` or ``down`` from the stretch before; ``first`` when there is none.
-    mean, sd, u : mapping of str to float
-        Mean, standard deviation and standard error of the mean by channel, in its unit; the standard error counts
-        samples that follow each other closely as fewer than they are (see `standard_error`).
-    n : mapping of str to int
-        Samples used by channel.
-    outliers : mapping of str to tuple of int
-        Rows dropped by channel; empty ones are left out.
-    settling : int
-        Rows cut at its start.
-    drift : mapping of str to float
-        Change over the plateau by a straight line, relative to the mean. [1]
-    flags : tuple of str
-        ``drifts``, ``not settled``.
-    """
-
+    # Rows, `stop` not included, after the cuts
     start: int
     stop: int
+    # Times of the first and last row [s], or row numbers when there is no time
     t0: float
     t1: float
-    command: float | None
-    direction: str
+    command: float | None  # Command during the stretch, in its unit
+    direction: str  # ``up`` or ``down`` from the stretch before; ``first`` when there is none
+    # Mean, standard deviation and standard error of the mean by channel, in its unit; the standard error counts samples
+    # that follow each other closely as fewer than they are (see `standard_error`)
     mean: Mapping[str, float]
     sd: Mapping[str, float]
     u: Mapping[str, float]
-    n: Mapping[str, int]
-    outliers: Mapping[str, tuple[int, ...]]
-    settling: int
-    drift: Mapping[str, float]
-    flags: tuple[str, ...] = ()
+    n: Mapping[str, int]  # Samples used by channel
+    outliers: Mapping[str, tuple[int, ...]]  # Rows dropped by channel; empty ones are left out
+    drift: Mapping[str, float]  # Change over the plateau by a straight line, relative to the mean [1]
+    flags: tuple[str, ...] = ()  # ``drifts``, ``not settled``
 
 
 @dataclass(frozen=True)
@@ -144,12 +102,8 @@ class Plateaus:
 def standard_error(values: ArrayLike) -> float:
     """Standard error of the mean of samples that may follow each other closely. [unit of the samples]
 
-    Notes
-    -----
     First-order autoregressive noise; the formula is the large-sample limit.
 
-    Examples
-    --------
     >>> round(standard_error([1.0, 3.0, 1.0, 3.0]), 6)
     0.57735
     """
@@ -198,20 +152,16 @@ def find(
     channels: Mapping[str, ArrayLike],
     signal: str,
     command: ArrayLike | None = None,
-    settings: PlateauSettings | None = None,
 ) -> Plateaus:
     """Find the plateaus of a recording.
 
-    Examples
-    --------
     >>> t = np.arange(60) * 0.1
     >>> got = find(t, {"thrust_N": np.where(t < 3.0, 1.0, 2.0)}, "thrust_N")
     >>> [(p.mean["thrust_N"], p.direction) for p in got.plateaus]
     [(1.0, 'first'), (2.0, 'up')]
     """
-    rules = settings or PlateauSettings()
     data = {name: np.asarray(v, dtype=float) for name, v in channels.items()}
-    t, faults = _checked(time_s, data, signal, command, rules)
+    t, faults = _checked(time_s, data, signal, command)
     if faults:
         raise InputError(faults)
     n = len(t)
@@ -224,9 +174,9 @@ def find(
     used = np.flatnonzero(good) if not good.all() else np.arange(n)
     dropped: list[Dropped] = []
     if command is not None:
-        stretches, moving = _by_command(np.asarray(command, dtype=float), rules)
+        stretches, moving = _by_command(np.asarray(command, dtype=float))
     else:
-        stretches, moving = _by_signal(data[signal] if good.all() else data[signal][used], rules)
+        stretches, moving = _by_signal(data[signal] if good.all() else data[signal][used])
         rows = np.append(used, n)
         stretches = [(int(rows[a]) if a else 0, int(rows[b])) for a, b in stretches]
         moving = [Dropped(int(rows[d.start]) if d.start else 0, int(rows[d.stop]), d.reason) for d in moving]
@@ -235,14 +185,14 @@ def find(
     levels: list[float] = []
     span = float(np.nanmax(data[signal]) - np.nanmin(data[signal]))
     for start, stop in stretches:
-        plateau, cuts = _reduce(t, data, signal, command, start, stop, rules, span)
+        plateau, cuts = _reduce(t, data, signal, command, start, stop, span)
         dropped += cuts
         if plateau is None:
             continue
         level = plateau.command if plateau.command is not None else plateau.mean[signal]
         way = "first" if not levels else "up" if level >= levels[-1] else "down"
         levels.append(level)
-        found.append(Plateau(**{**vars(plateau), "direction": way}))
+        found.append(replace(plateau, direction=way))
     order = sorted((d for d in dropped if d.stop > d.start), key=lambda d: d.start)
     if not found:
         notes.append("no plateau was found")
@@ -250,7 +200,7 @@ def find(
 
 
 def _checked(
-    time_s: ArrayLike | None, data: Mapping[str, Array], signal: str, command: ArrayLike | None, rules: PlateauSettings
+    time_s: ArrayLike | None, data: Mapping[str, Array], signal: str, command: ArrayLike | None
 ) -> tuple[Array, list[Fault]]:
     faults = []
     n = len(next(iter(data.values()))) if data else 0
@@ -270,9 +220,6 @@ def _checked(
     elif len(back := _backwards(t)) > max(2, n // 100):
         got = f"time that falls in {len(back)} rows, first row {back[0]}"
         faults.append(Fault("", "time_s", got, "times in order", "Sort the file, or split it where its clock restarts"))
-    if rules.window < 3 or rules.least_samples < 2:
-        got = f"window {rules.window}, least_samples {rules.least_samples}"
-        faults.append(Fault("", "settings", got, "window 3 or more, least_samples 2 or more"))
     return t, faults
 
 
@@ -281,7 +228,7 @@ def _backwards(t: Array) -> list[int]:
     return [int(row) for row in np.flatnonzero(t < np.maximum.accumulate(t))]
 
 
-def _by_command(command: Array, rules: PlateauSettings) -> tuple[list[tuple[int, int]], list[Dropped]]:
+def _by_command(command: Array) -> tuple[list[tuple[int, int]], list[Dropped]]:
     """Stretches of constant command; those too short are ramps."""
     same = np.isclose(command[1:], command[:-1], rtol=1e-9, atol=0.0) | (np.isnan(command[1:]) & np.isnan(command[:-1]))
     edges = [0, *(np.flatnonzero(~same) + 1).tolist(), len(command)]
@@ -290,7 +237,7 @@ def _by_command(command: Array, rules: PlateauSettings) -> tuple[list[tuple[int,
     for a, b in zip(edges[:-1], edges[1:], strict=True):
         if np.isnan(command[a]):
             reason = "no command"
-        elif b - a < rules.least_samples:
+        elif b - a < LEAST_SAMPLES:
             reason = "the command changes"
         else:
             stretches.append((a, b))
@@ -320,15 +267,15 @@ def _jumps(v: Array, w: int) -> tuple[Array, Array]:
     return jump, local
 
 
-def _by_signal(v: Array, rules: PlateauSettings) -> tuple[list[tuple[int, int]], list[Dropped]]:
+def _by_signal(v: Array) -> tuple[list[tuple[int, int]], list[Dropped]]:
     """Stretches between jumps of the medians of neighbouring windows."""
-    n, w = len(v), rules.window
+    n, w = len(v), WINDOW
     if n < 2 * w:
         return [(0, n)], []
     jump, local = _jumps(v, w)
     noise = 1.4826 * float(np.median(np.abs(np.diff(v) - np.median(np.diff(v))))) / math.sqrt(2.0)
     lo, hi = np.percentile(v, [1.0, 99.0])
-    least = max(rules.least_step * float(hi - lo), 5.0 * 1.2533 * noise * math.sqrt(2.0 / w))
+    least = max(LEAST_STEP * float(hi - lo), 5.0 * 1.2533 * noise * math.sqrt(2.0 / w))
     if least <= 0.0:
         return [(0, n)], []
     moving = jump > least
@@ -354,32 +301,30 @@ def _by_signal(v: Array, rules: PlateauSettings) -> tuple[list[tuple[int, int]],
     return stretches, dropped
 
 
-def _settled(t: Array, v: Array, rules: PlateauSettings) -> tuple[int, bool]:
+def _settled(v: Array) -> tuple[int, bool]:
     """Samples to cut at the start of a stretch, and whether it settles at all."""
     n = len(v)
-    if rules.settle_time_s is not None:
-        return int(np.searchsorted(t - t[0], rules.settle_time_s, side="left")), True
     if n < 4:
         return 0, True
     tail = v[n // 2 :]
     centre, sd = float(np.median(tail)), _spread(tail)
-    band = max(2.0 * sd / math.sqrt(min(rules.window, n // 2)) + 1e-12, 0.01 * abs(centre))
-    smooth = _running_median(v, rules.window // 4)
+    band = max(2.0 * sd / math.sqrt(min(WINDOW, n // 2)) + 1e-12, 0.01 * abs(centre))
+    smooth = _running_median(v, WINDOW // 4)
     outside = np.flatnonzero(np.abs(smooth - centre) > band + 2.0 * sd)
     early = outside[outside < n // 2]
     cut = int(early[-1]) + 1 if early.size else 0
     return cut, cut < n // 2
 
 
-def _leaving(v: Array, cut: int, rules: PlateauSettings) -> int:
+def _leaving(v: Array, cut: int) -> int:
     """Samples at the end of a stretch that already follow the next step (at most a window)."""
     body = v[cut:]
-    if len(body) < 3 * rules.window:
+    if len(body) < 3 * WINDOW:
         return 0
-    rest = body[: -rules.window]
-    band = max(OUTLIER * _spread(rest[-3 * rules.window :]), 0.01 * abs(float(np.median(rest))))
-    outside = np.flatnonzero(np.abs(body[-rules.window :] - np.median(rest[-3 * rules.window :])) > band)
-    late = rules.window - int(outside[0]) if outside.size else 0
+    rest = body[:-WINDOW]
+    band = max(OUTLIER * _spread(rest[-3 * WINDOW :]), 0.01 * abs(float(np.median(rest))))
+    outside = np.flatnonzero(np.abs(body[-WINDOW:] - np.median(rest[-3 * WINDOW :])) > band)
+    late = WINDOW - int(outside[0]) if outside.size else 0
     return late if late and outside.size >= 0.5 * late else 0  # a single outlier is no step
 
 
@@ -402,19 +347,18 @@ def _reduce(
     command: ArrayLike | None,
     start: int,
     stop: int,
-    rules: PlateauSettings,
     span: float,
 ) -> tuple[Plateau | None, list[Dropped]]:
     rows = start + np.flatnonzero(np.isfinite(data[signal][start:stop]))
-    if len(rows) < rules.least_samples:
-        return None, [Dropped(start, stop, f"fewer than {rules.least_samples} samples")]
-    cut, settles = _settled(t[rows], data[signal][rows], rules)
+    if len(rows) < LEAST_SAMPLES:
+        return None, [Dropped(start, stop, f"fewer than {LEAST_SAMPLES} samples")]
+    cut, settles = _settled(data[signal][rows])
     if cut >= len(rows):
         return None, [Dropped(start, stop, "shorter than the settling")]
     first, end = (int(rows[cut]) if cut else start), stop
-    if command is None and (late := _leaving(data[signal][rows], cut, rules)):
+    if command is None and (late := _leaving(data[signal][rows], cut)):
         stop = int(rows[len(rows) - late])
-    if len(rows) - cut < rules.least_samples or t[stop - 1] - t[first] < rules.least_time_s or stop <= first:
+    if len(rows) - cut < LEAST_SAMPLES or stop <= first:
         return None, [Dropped(start, end, "too short after settling")]
     mean, sd, u, n, out, drift = {}, {}, {}, {}, {}, {}
     for name, values in data.items():
@@ -438,10 +382,11 @@ def _reduce(
     flags = [] if settles else ["not settled"]
     change = abs(drift.get(signal, 0.0) * mean.get(signal, 0.0))
     # a drift counts when it also stands out of the noise and is no trifle beside the whole signal
-    if change > max(rules.drift * abs(mean.get(signal, 0.0)), 3.0 * u.get(signal, 0.0), 0.005 * span):
+    if change > max(DRIFT * abs(mean.get(signal, 0.0)), 3.0 * u.get(signal, 0.0), 0.005 * span):
         flags.append("drifts")
     level = None if command is None else float(np.asarray(command, dtype=float)[start])
     cuts = [Dropped(start, first, "settling"), Dropped(stop, end, "the next step begins")]
-    plateau = Plateau(first, stop, float(t[first]), float(t[stop - 1]), level, "first", mean, sd, u, n, out,
-                      first - start, drift, tuple(flags))  # fmt: skip
+    plateau = Plateau(
+        first, stop, float(t[first]), float(t[stop - 1]), level, "first", mean, sd, u, n, out, drift, tuple(flags)
+    )
     return plateau, cuts

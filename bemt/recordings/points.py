@@ -92,7 +92,7 @@ def _note_rest(found: Found, rec: Dataset, rows: Rows) -> None:
     found.lost += lost(rec, rows, "", "at rest: a zero of the stand, no point")
 
 
-def from_samples(rec: Dataset, name: str, settings: plateaus.PlateauSettings | None) -> Found:
+def from_samples(rec: Dataset, name: str) -> Found:
     """Plateaus of every run."""
     found = Found()
     signal = next((s for s in SIGNALS if s in rec.values and _moves(rec.values[s])), None)
@@ -118,7 +118,7 @@ def from_samples(rec: Dataset, name: str, settings: plateaus.PlateauSettings | N
         if own is not None and not np.any(np.isfinite(own)):
             own = None
         try:
-            got = plateaus.find(t, part, signal, own, settings)
+            got = plateaus.find(t, part, signal, own)
         except InputError as error:
             raise InputError([Fault(name, f.where, f.got, f.expected, f.hint) for f in error.faults]) from error
         found.notes += [f"run {run:g}: {n}" if labels.size > 1 else n for n in got.notes]

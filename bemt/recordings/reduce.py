@@ -1,7 +1,7 @@
 """From a recording to an honest `Dataset`: steady points with uncertainties, and everything that was left out.
 
 In this order: the rows are told to be samples or points (``rows``); samples are cut into ``plateaus`` (start-up,
-settling, outliers); rows at rest, or a run without propeller, give the zero that is subtracted (``tare``); the ``air``
+settling, outliers); rows at rest give the zero that is subtracted (``tare``); the ``air``
 is found; coefficients follow where diameter and density are known; ``scatter`` comes from plateaus, stated errors,
 repeats.
 
@@ -15,22 +15,19 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bemt import coefficients as co
-from bemt.air import Air
 from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset, concat
 from bemt.recordings.channels import LOADS, Lost, dropped, file_name, lost, named, runs_of, shaft_power, stated
-from bemt.recordings.plateaus import PlateauSettings
 from bemt.recordings.points import Found, Point, from_rows, from_samples
 from bemt.recordings.rows import command_of, is_samples
 from bemt.recordings.scatter import Hysteresis, hysteresis, repeats, session
 from bemt.recordings.site_air import AirOfPoints, air_of
-from bemt.recordings.tare import TARED, TareZero, from_rest, from_table
+from bemt.recordings.tare import TARED, TareZero, from_rest
 
 __all__ = ["Reduction", "reduce", "reduction"]
 
@@ -40,34 +37,18 @@ _SCATTERED = ("thrust_N", "duct_thrust_N", "torque_Nm")
 
 @dataclass(frozen=True, eq=False)
 class Reduction:
-    """How points were made of rows; `provenance["reduction"]` of what `reduce` gives.
+    """How points were made of rows; `provenance["reduction"]` of what `reduce` gives."""
 
-    Parameters
-    ----------
-    mode, reason : str
-        ``samples`` or ``points``, and what decided it.
-    correlated : mapping of str to mapping
-        By channel: ``gain`` [1], ``zero`` [unit of the channel], ``session`` [1], as far as known.
-    dropped : tuple of Lost
-        Line, channel ("" for the whole row) and reason of everything that was left out.
-    rows : tuple of (M,) int
-        Rows of the recording in each point.
-    directions : tuple of str
-        ``first``, ``up`` or ``down`` per point.
-    hysteresis : mapping of str to Hysteresis
-        By channel, where both branches were recorded.
-    drift : mapping of str to float
-        Change of the zero from first to last rest, by channel. [unit of the channel]
-    """
-
+    # ``samples`` or ``points``, and what decided it
     mode: str
     reason: str
+    # By channel: ``gain`` [1], ``zero`` [unit of the channel], ``session`` [1], as far as known
     correlated: Mapping[str, Mapping[str, float]]
-    dropped: tuple[Lost, ...]
-    rows: tuple[NDArray[np.intp], ...]
-    directions: tuple[str, ...]
-    hysteresis: Mapping[str, Hysteresis]
-    drift: Mapping[str, float]
+    dropped: tuple[Lost, ...]  # Line, channel ("" for the whole row) and reason of everything that was left out
+    rows: tuple[NDArray[np.intp], ...]  # (M,) rows of the recording in each point
+    directions: tuple[str, ...]  # ``first``, ``up`` or ``down`` per point
+    hysteresis: Mapping[str, Hysteresis]  # By channel, where both branches were recorded
+    drift: Mapping[str, float]  # Change of the zero from first to last rest, by channel [unit of the channel]
 
 
 def reduction(points: Dataset) -> Reduction:
@@ -78,30 +59,26 @@ def reduction(points: Dataset) -> Reduction:
 
 @np.errstate(all="ignore")  # a damaged file may hold any number; what is not finite becomes NaN or a refusal
 def reduce(
-    recording: Dataset | Sequence[Dataset], *, diameter_m: float | None = None, chord75_m: float | None = None,
-    air: Air | None = None, isa_altitude_m: float | None = None, tare: Dataset | Literal[False] | None = None,
-    steady: bool | None = None, speed: str | None = None, settings: PlateauSettings | None = None,
-) -> Dataset:  # fmt: skip
+    recording: Dataset | Sequence[Dataset], *, diameter_m: float | None = None, steady: bool | None = None
+) -> Dataset:
     """Reduce a recording to steady points: kind ``bench``, uncertainties the uncorrelated part, `reduction` of them.
 
-    Examples
-    --------
-    >>> table = Dataset("bench", "table", {"rpm": [5000.0, 6000.0], "thrust_N": [4.0, 5.8]})
-    >>> got = reduce(table, diameter_m=0.254, isa_altitude_m=0.0)
-    >>> reduction(got).mode, got["CT"].round(3).tolist(), got.flags[0]
-    ('points', [0.113, 0.114], ('standard air',))
+    >>> values = {"rpm": [5000.0, 6000.0], "thrust_N": [4.0, 5.8], "density_kg_m3": [1.225, 1.225]}
+    >>> got = reduce(Dataset("bench", "table", values), diameter_m=0.254)
+    >>> reduction(got).mode, got["CT"].round(3).tolist()
+    ('points', [0.113, 0.114])
     """
     records = [recording] if isinstance(recording, Dataset) else list(recording)
     if not records:
         raise InputError(Fault("", "recordings", "none", "one or more"))
     name = str(records[0].provenance.get("file", "") or records[0].name)
-    rec = _trusted(_joined([named(record, speed) for record in records]))
+    rec = _trusted(_joined([named(record) for record in records]))
     constants = {k: v for record in reversed(records) for k, v in record.provenance.get("constants", {}).items()}
     if not set(LOADS) & rec.values.keys():
         got = "no thrust, torque, power, current or coefficient with a unit"
         raise InputError(Fault(name, "", got, "one of them", "Name units in the headings or in a recording.toml"))
     samples, reason = is_samples(rec) if steady is None else (not steady, "as told")
-    found = from_samples(rec, name, settings) if samples else from_rows(rec)
+    found = from_samples(rec, name) if samples else from_rows(rec)
     _outliers(rec, found)
     if not found.points:
         reasons = ", ".join(sorted({gone.reason for gone in found.lost if not gone.channel}))
@@ -112,12 +89,12 @@ def reduce(
         if key not in values and constant in constants:
             values[key] = np.full(len(found.points), constants[constant])
     correlated = _instrument(records, rec, values, u)
-    drift = _subtract(rec, found, values, correlated, tare, notes)
-    surroundings = air_of(values, len(found.points), constants, air, isa_altitude_m)
+    drift = _subtract(found, values, correlated, notes)
+    surroundings = air_of(values, len(found.points), constants)
     notes += surroundings.notes
     _fill_scatter(found, values, u, correlated, notes)
     diameter = diameter_m if diameter_m is not None else constants.get("diameter_m")
-    series = _series(records, found, rec, values, u, surroundings, diameter, chord75_m)
+    series = _series(records, found, rec, values, u, surroundings, diameter)
     loops = _hysteresis(found, values, rec, notes)
     how = Reduction(
         "samples" if samples else "points", reason, {k: dict(v) for k, v in correlated.items() if v},
@@ -138,12 +115,17 @@ def _joined(parts: Sequence[Dataset]) -> Dataset:
         k += len(labels)
     whole = concat([replace(v, kind="bench") for v in parts])
     about = {
-        **parts[0].provenance, "dropped": sum((dropped(v) for v in parts), ()),
+        **parts[0].provenance,
+        "dropped": sum((dropped(v) for v in parts), ()),
         "names": {a: b for v in parts for a, b in v.provenance["names"].items()},
-    }  # fmt: skip
-    return replace(whole, values={**whole.values, "run": np.concatenate(run)}, provenance=about,
-                   notes=tuple(dict.fromkeys(n for v in parts for n in v.notes)),
-                   lines=sum((tuple(v.lines) for v in parts), ()))  # fmt: skip
+    }
+    return replace(
+        whole,
+        values={**whole.values, "run": np.concatenate(run)},
+        provenance=about,
+        notes=tuple(dict.fromkeys(n for v in parts for n in v.notes)),
+        lines=sum((tuple(v.lines) for v in parts), ()),
+    )
 
 
 def _trusted(rec: Dataset) -> Dataset:
@@ -211,8 +193,10 @@ def _shared(values: Mapping[str, Array], u: Mapping[str, Array]) -> list[str]:
         e, v = u[name][np.isfinite(u[name])], np.abs(values[name])
         if len(e) >= 5 and e.min() > 0.8 * e.max() > 0.0 and np.nanmax(v) > 3.0 * np.nanmin(v):
             unit = name.rsplit("_", 1)[1]
-            out.append(f"{name}: the stated error is {np.median(e):.3g} {unit} at any load: it looks like a zero "
-                       "that all rows share; kept as independent")  # fmt: skip
+            out.append(
+                f"{name}: the stated error is {np.median(e):.3g} {unit} at any load: it looks like a zero "
+                "that all rows share; kept as independent"
+            )
     return sorted(out)
 
 
@@ -231,13 +215,12 @@ def _instrument(
 
 
 def _subtract(
-    rec: Dataset, found: Found, values: dict[str, Array], correlated: dict[str, dict[str, float]],
-    tare: Dataset | Literal[False] | None, notes: list[str],
-) -> dict[str, float]:  # fmt: skip
+    found: Found, values: dict[str, Array], correlated: dict[str, dict[str, float]], notes: list[str]
+) -> dict[str, float]:
     """Subtract the zero; gives its drift."""
     drift: dict[str, float] = {}
     loads = [name for name in TARED if name in values]
-    if tare is False or not loads:
+    if not loads:
         return drift
     top = {name: float(np.nanmax(np.abs(values[name]))) for name in loads}
 
@@ -253,15 +236,6 @@ def _subtract(
                 drift[name] = max(change, drift.get(name, change), key=abs)
         notes.extend(n for n in zero.notes if n.split(":")[0] in loads)
 
-    if tare is not None:
-        if "rpm" not in values:
-            notes.append("the tare was not subtracted: no speed to find its rows by")
-            return drift
-        other = named(tare)
-        if "rpm" not in other.values:
-            raise InputError(Fault(tare.provenance.get("file", "tare"), "rpm", "no speed", "a speed for each row"))
-        take(from_table(values["rpm"], other.values["rpm"], other.values, other.u), np.arange(len(found.points)))
-        return drift
     runs = np.array([p.run for p in found.points])
     when = np.array([p.when for p in found.points])
     for run, rests in found.rests.items():
@@ -276,9 +250,12 @@ def _subtract(
 
 
 def _fill_scatter(
-    found: Found, values: Mapping[str, Array], u: dict[str, Array], correlated: dict[str, dict[str, float]],
+    found: Found,
+    values: Mapping[str, Array],
+    u: dict[str, Array],
+    correlated: dict[str, dict[str, float]],
     notes: list[str],
-) -> None:  # fmt: skip
+) -> None:
     """Uncertainty from repeats where a point has none, and the scatter between runs."""
     if "rpm" not in values:
         return
@@ -302,9 +279,14 @@ def _fill_scatter(
 
 
 def _series(
-    records: Sequence[Dataset], found: Found, rec: Dataset, values: Mapping[str, Array], u: Mapping[str, Array],
-    air: AirOfPoints, diameter: float | None, chord75_m: float | None,
-) -> Dataset:  # fmt: skip
+    records: Sequence[Dataset],
+    found: Found,
+    rec: Dataset,
+    values: Mapping[str, Array],
+    u: Mapping[str, Array],
+    air: AirOfPoints,
+    diameter: float | None,
+) -> Dataset:
     """Channels and derived ones, as a `Dataset`."""
     n = len(found.points)
     shown = {k: v for k, v in values.items() if k not in ("humidity", "electrical_rpm", "optical_rpm")}
@@ -319,10 +301,9 @@ def _series(
     for p in found.points:
         first, last = rec.lines[p.rows[0]], rec.lines[p.rows[-1]]
         labels.append(f"{short}:{first}" + (f"-{last}" if len(p.rows) > 1 else ""))
-    flags = tuple((*p.flags, *((air.flag,) if air.flag else ())) for p in found.points)
     provenance = {k: v for k, v in said.items() if isinstance(v, str)}
     series = Dataset("bench", str(said.get("run_name", short)), shown, {k: v for k, v in u.items() if k in shown},
-                    flags, provenance, tuple(labels))  # fmt: skip
+                    tuple(p.flags for p in found.points), provenance, tuple(labels))  # fmt: skip
     if diameter is None:
         if {"torque_Nm", "rpm"} <= shown.keys() and "power_W" not in shown:
             series = series.derive(1.0, np.full(n, np.nan))
@@ -330,21 +311,17 @@ def _series(
             series = replace(series, values={k: series[k] for k in keep}, u={k: series.u[k] for k in keep})
         return series
     series = series.derive(diameter, air.rho if np.any(np.isfinite(air.rho)) else None)
-    return _numbers(series, air, diameter, chord75_m)
+    return _numbers(series, air, diameter)
 
 
-def _numbers(series: Dataset, air: AirOfPoints, D: float, chord75_m: float | None) -> Dataset:
-    """Tip Mach and Reynolds numbers, figure of merit at rest, thrust per shaft power."""
+def _numbers(series: Dataset, air: AirOfPoints, D: float) -> Dataset:
+    """Tip Mach number, figure of merit at rest, thrust per shaft power."""
     more: dict[str, Array] = {}
     u_more: dict[str, Array] = {}
     rpm = series.values.get("rpm")
     V = series.values.get("airspeed_m_s", np.zeros(len(series)))
-    if rpm is not None:
-        n = rpm / 60.0
-        if np.any(np.isfinite(air.a_sound)):
-            more["M_tip"] = np.asarray(co.M_tip(n, D, air.a_sound), dtype=float)
-        if chord75_m is not None and np.any(np.isfinite(air.mu)):
-            more["Re"] = np.asarray(co.Re75(chord75_m, n, D, V, air.rho, air.mu), dtype=float)
+    if rpm is not None and np.any(np.isfinite(air.a_sound)):
+        more["M_tip"] = np.asarray(co.M_tip(rpm / 60.0, D, air.a_sound), dtype=float)
     if {"CT", "CP"} <= series.values.keys():
         still = np.abs(np.nan_to_num(V)) <= 0.0
         with np.errstate(all="ignore"):
@@ -379,6 +356,8 @@ def _hysteresis(found: Found, values: Mapping[str, Array], rec: Dataset, notes: 
             if loop is not None:
                 out[name] = loop
                 unit = name.rsplit("_", 1)[1]
-                notes.append(f"{name}: down is {loop.difference:+.3g} +- {loop.u:.2g} {unit} from up at equal {key} "
-                             f"({loop.share:+.2%} of the largest, {loop.points} points)")  # fmt: skip
+                notes.append(
+                    f"{name}: down is {loop.difference:+.3g} +- {loop.u:.2g} {unit} from up at equal {key} "
+                    f"({loop.share:+.2%} of the largest, {loop.points} points)"
+                )
     return out

@@ -62,8 +62,6 @@ def _scaled(load: Array, rpm: Array) -> Array:
 def repeats(load: Array, rpm: Array, group: Array, flow: Array | None = None) -> Repeats:
     """Scatter among points of one speed (and advance) within one run.
 
-    Examples
-    --------
     >>> rng = np.random.default_rng(0)
     >>> rpm = np.repeat([4000.0, 6000.0], 50)
     >>> got = repeats(1e-7 * rpm**2 * (1 + 0.01 * rng.standard_normal(100)), rpm, np.ones(100))
@@ -110,8 +108,6 @@ def _same(flow: Array | None, i: int | np.intp, j: int | np.intp) -> bool:
 def session(load: Array, rpm: Array, run: Array, flow: Array | None = None) -> Session:
     """Scatter between runs of the same conditions: what a gain or a set-up changes from run to run.
 
-    Notes
-    -----
     Each point is compared with the points of every other run whose speed differs by less than 3 %, interpolated to its
     own speed where two enclose it; the runs' levels follow from all differences by least squares.
     """
@@ -163,8 +159,6 @@ def _differences(k: Array, rpm: Array, one: Array, two: Array, flow: Array | Non
 def hysteresis(load: Array, x: Array, up: Mask, down: Mask, power: float = 2.0) -> Hysteresis | None:
     """Compare the branch reached from above with the one reached from below.
 
-    Examples
-    --------
     >>> x = np.array([1.0, 2, 3, 4, 5, 4, 3, 2, 1])
     >>> up = np.arange(9) < 5
     >>> got = hysteresis(x**2 + 0.1 * ~up, x, up, ~up)

@@ -37,37 +37,23 @@ EFFICIENCY, SAME_DIGITS = (0.2, 0.95), 0.001
 
 @dataclass(frozen=True)
 class Relation:
-    """A product of powers with the value that it must have.
+    """A product of powers with the value that it must have."""
 
-    Parameters
-    ----------
-    name : str
-        In words.
-    powers : mapping of str to float
-        Exponent of each quantity: T, Q, n, D, P (shaft), E (electrical), U, I, H (thrust per electrical power), G
-        (thrust per shaft power), n2 (second speed), p (pitch).
-    value : float
-        Median over the rows under load. [1]
-    range_low, range_high : float
-        Between which the middle three fifths of those rows lie. [1]
-    low, high : float
-        Bounds. [1]
-    centre, spread : float
-        Usual value and the factor of one standard deviation. [1]
-    exact : bool
-        Whether it holds by definition.
-    """
-
-    name: str
+    name: str  # In words
+    # Exponent of each quantity: T, Q, n, D, P (shaft), E (electrical), U, I, H (thrust per electrical power), G (thrust
+    # per shaft power), n2 (second speed), p (pitch)
     powers: Mapping[str, float]
-    value: float
+    value: float  # Median over the rows under load [1]
+    # Between which the middle three fifths of those rows lie [1]
     range_low: float
     range_high: float
+    # Bounds [1]
     low: float
     high: float
+    # Usual value and the factor of one standard deviation [1]
     centre: float
     spread: float
-    exact: bool = False
+    exact: bool = False  # Whether it holds by definition
 
     def after(self, shift: Mapping[str, float]) -> float:
         """Value once quantities are multiplied by the factors of `shift`."""
@@ -116,8 +102,6 @@ def _both_ways(id_: str, q: str, table: Mapping[str, tuple[float, float]]) -> li
 def slips() -> tuple[Slip, ...]:
     """List the usual slips.
 
-    Examples
-    --------
     >>> next(s.words for s in slips() if s.quantity == "T")
     'kgf taken for N: multiply by 9.80665'
     """
@@ -153,10 +137,14 @@ def slips() -> tuple[Slip, ...]:
         "cm taken for m": (1e-2, 1.0), "radius taken for diameter": (2.0, 1.0),
     })  # fmt: skip
     for q, words in (("H", "thrust per electrical power"), ("G", "thrust per shaft power")):
-        found += [Slip("efficacy_unit", q, f, f"{words} in another unit: multiply by {f:.6g}", 5.0)
-                  for k in ("kgf", "lbf", "gf") for f in (u[k], 1 / u[k])]  # fmt: skip
-        found += [Slip("efficacy_unit", q, f, f"{words} in another unit: multiply by {f:.6g}", 5.0)
-                  for f in (1e3, 1e-3)]  # fmt: skip
+        found += [
+            Slip("efficacy_unit", q, f, f"{words} in another unit: multiply by {f:.6g}", 5.0)
+            for k in ("kgf", "lbf", "gf")
+            for f in (u[k], 1 / u[k])
+        ]
+        found += [
+            Slip("efficacy_unit", q, f, f"{words} in another unit: multiply by {f:.6g}", 5.0) for f in (1e3, 1e-3)
+        ]
     return tuple(found)
 
 

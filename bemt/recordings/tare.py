@@ -1,4 +1,4 @@
-"""What a stand shows without load, subtracted: from rows at rest (linear in time), or from a run without propeller.
+"""What a stand shows without load, subtracted: from rows at rest, linear in time.
 
 The uncertainty of what is subtracted is shared by all points of a run, so it goes to the correlated part ``zero``.
 """
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["TARED", "Rest", "TareZero", "from_rest", "from_table"]
+__all__ = ["TARED", "Rest", "TareZero", "from_rest"]
 
 Array = NDArray[np.float64]
 TARED = ("thrust_N", "duct_thrust_N", "torque_Nm")
@@ -41,8 +41,6 @@ class TareZero:
 def from_rest(when: Array, rests: Sequence[Rest], full_scale: Mapping[str, float]) -> TareZero:
     """Zero of every point from the stretches at rest, linear in time between them and held outside.
 
-    Examples
-    --------
     >>> rests = [Rest(0.0, {"thrust_N": 0.1}, {}), Rest(10.0, {"thrust_N": 0.3}, {})]
     >>> zero = from_rest(np.array([5.0, 20.0]), rests, {"thrust_N": 10.0})
     >>> zero.value["thrust_N"].round(3).tolist(), round(zero.drift["thrust_N"], 3)
@@ -76,30 +74,3 @@ def from_rest(when: Array, rests: Sequence[Rest], full_scale: Mapping[str, float
         else:
             notes.append(f"{name}: zero {means[0]:.4g} {unit} at rest{share} subtracted; drift unknown (one rest only)")
     return TareZero(value, u, drift, tuple(notes))
-
-
-def from_table(
-    rpm: Array, table_rpm: Array, table: Mapping[str, Array], u_table: Mapping[str, Array] | None = None
-) -> TareZero:
-    """Zero of every point from a run without propeller, linear in speed and held outside its range."""
-    value: dict[str, Array] = {}
-    u: dict[str, float] = {}
-    notes = []
-    for name in TARED:
-        loads = table.get(name)
-        if loads is None:
-            continue
-        good = np.isfinite(loads) & np.isfinite(table_rpm)
-        if not np.any(good):
-            continue
-        order = np.argsort(table_rpm[good])
-        x, y = table_rpm[good][order], loads[good][order]
-        value[name] = np.where(np.isfinite(rpm), np.interp(rpm, x, y), float(np.mean(y)))
-        stated = (u_table or {}).get(name)
-        own = stated[np.isfinite(stated)] if stated is not None else np.empty(0)
-        u[name] = float(np.sqrt(np.mean(own**2))) if own.size else float(np.std(y)) if len(y) > 1 else 0.0
-        outside = int(np.sum((rpm < x[0]) | (rpm > x[-1])))
-        unit = name.rsplit("_", 1)[1]
-        beyond = f"; its end value at {outside} points outside {x[0]:.0f} to {x[-1]:.0f} rpm" if outside else ""
-        notes.append(f"{name}: tare without propeller, {y.min():.4g} to {y.max():.4g} {unit}, subtracted{beyond}")
-    return TareZero(value, u, {}, tuple(notes))

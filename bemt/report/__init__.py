@@ -34,9 +34,13 @@ def _pages(book: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     yield {"id": "front", "name": "Answers", "title": "Answers", "answers": answers(book, ids),
            "top": front_parts(book, ids), "sections": []}  # fmt: skip
     for page, name, key in zip(book["cases"], names, ids, strict=True):
-        yield {"id": key, "name": name[:40], "title": headline(page["result"]),
-               "top": [("verdict", verdict(page["result"]))],
-               "sections": case_sections(page, book["reproduction"])}  # fmt: skip
+        yield {
+            "id": key,
+            "name": name[:40],
+            "title": headline(page["result"]),
+            "top": [("verdict", verdict(page["result"]))],
+            "sections": case_sections(page, book["reproduction"]),
+        }
     given = [item for item in book["reproduction"] if str(item["status"]).startswith("input")]
     numbers = reproduction_table([item for item in book["reproduction"] if item not in given])
     inputs = f"{len(given)} inputs, not computed", [("table", reproduction_table(given))]

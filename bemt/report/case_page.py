@@ -98,10 +98,12 @@ def _inputs(page: Mapping[str, Any]) -> Section:
         lines.append([Cell(a["key"], code=True), shown, a["range"], spread, num(a["u_thrust_N"], 2), a["why"]])
     head = ["assumed", "value", "range", "thrust over the range [N]", "u [N]", "why"]
     return "Inputs and assumptions", [
-        ("table", table(["input", "value", "unit"], rows, sort=False)), ("words", words),
-        ("words", told if lines else ""), ("table", table(head, lines)),
+        ("table", table(["input", "value", "unit"], rows, sort=False)),
+        ("words", words),
+        ("words", told if lines else ""),
+        ("table", table(head, lines)),
         ("more", ("Files and their SHA-256", [("table", table(["file", "SHA-256"], files, sort=False))])),
-    ]  # fmt: skip
+    ]
 
 
 def _performance(page: Mapping[str, Any]) -> Section:
@@ -188,8 +190,9 @@ def _verification(page: Mapping[str, Any]) -> Section:
     if not v:
         return "", []
     line = Trace("BEMT", v["stations"], v["thrust_N"], colour=COLOURS["bemt"])
-    plot = figure(Plot("Thrust against blade elements", "blade elements [-]", "thrust [N]", [line], log_x=True,
-                       zero=False))  # fmt: skip
+    plot = figure(
+        Plot("Thrust against blade elements", "blade elements [-]", "thrust [N]", [line], log_x=True, zero=False)
+    )
     solved = zip(v["stations"], v["thrust_N"].tolist(), v["torque_Nm"].tolist(), strict=True)
     rows = [[num(n), num(T, 7), num(Q, 6)] for n, T, Q in solved]
     words, study = [], v.get("grid_study")

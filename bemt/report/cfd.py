@@ -37,8 +37,10 @@ def read_rows(path: Path) -> list[dict[str, str]]:
         if path.stat().st_size > CSV_BYTES:
             return []
         text = path.read_text(encoding="utf-8", errors="replace")
-        return [{k: v for k, v in row.items() if isinstance(k, str) and isinstance(v, str)}
-                for row in csv.DictReader(io.StringIO(text))]  # fmt: skip
+        return [
+            {k: v for k, v in row.items() if isinstance(k, str) and isinstance(v, str)}
+            for row in csv.DictReader(io.StringIO(text))
+        ]
     except (OSError, csv.Error):
         return []
 
@@ -95,9 +97,12 @@ def operating_run(found: Sequence[Mapping[str, Any]], result: Mapping[str, Any])
         if item["case"] != result["name"] or ("duct" in item["name"] and not ducted):
             continue
         for run in item["runs"]:
-            if not is_plain(run) or abs(run["rpm"] / c["rpm"] - 1) > 1e-3 or (
-                math.isfinite(run["tip_gap_mm"]) and not ducted
-            ) or abs(run["airspeed_m_s"] - c["airspeed_m_s"]) > 0.05:  # fmt: skip
+            if (
+                not is_plain(run)
+                or abs(run["rpm"] / c["rpm"] - 1) > 1e-3
+                or (math.isfinite(run["tip_gap_mm"]) and not ducted)
+                or abs(run["airspeed_m_s"] - c["airspeed_m_s"]) > 0.05
+            ):
                 continue
             rank = (run["solver"] == "compressible", run["turbulence"] == "kOmegaSST", run["level"])
             if best is None or rank > best[0]:
@@ -168,8 +173,6 @@ def _plain_rows(found: Sequence[Mapping[str, Any]], result: Mapping[str, Any]) -
 def attach(book: dict[str, Any]) -> None:
     """Audit every run, and compare the run at a case's operating point with its BEMT.
 
-    Notes
-    -----
     The uncertainty of the run is that of its audit, so it is unknown as long as one of its lines is.
     """
     found = book["cfd"]

@@ -60,8 +60,11 @@ def _plots(item: Mapping[str, Any]) -> list[dict[str, Any] | None]:
 
 
 def _runs(item: Mapping[str, Any]) -> dict[str, Any] | None:
-    used = [c for c in COLUMNS if any(math.isfinite(r[c[0]]) and (r[c[0]] != 0 or c[0] in ("J", "airspeed_m_s"))
-                                      for r in item["runs"])]  # fmt: skip
+    used = [
+        c
+        for c in COLUMNS
+        if any(math.isfinite(r[c[0]]) and (r[c[0]] != 0 or c[0] in ("J", "airspeed_m_s")) for r in item["runs"])
+    ]
     rows = []
     for run in item["runs"]:
         audit = run.get("audit")

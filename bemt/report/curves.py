@@ -55,7 +55,7 @@ def _grids(case: Case, pitch_over_D: float) -> tuple[Array, Array, int]:
     )
 
 
-def case_curves(case: Case, threads: int = 1) -> dict[str, Any]:
+def case_curves(case: Case) -> dict[str, Any]:
     """Performance over J and over rpm, BEMT with bands and K1/K2."""
     from bemt.case.prepare import k1k2_case, prepare_case
     from bemt.compare.sweep.case import spread
@@ -64,9 +64,9 @@ def case_curves(case: Case, threads: int = 1) -> dict[str, Any]:
     ready = prepare_case(case)
     rpm, V, cut = _grids(case, ready.pitch_m / ready.diameter_m)
     air = case.air()
-    nominal = ready.solve(rpm, V, air, threads)
+    nominal = ready.solve(rpm, V, air)
     values_of = {name: np.asarray(getattr(nominal, name), float) for name in CHANNELS}
-    rough = prepare_case(case, None, COARSE).solve(rpm, V, air, threads)
+    rough = prepare_case(case, None, COARSE).solve(rpm, V, air)
     base = {name: np.asarray(getattr(rough, name), float) for name in CHANNELS}
     variance = {name: np.zeros_like(v) for name, v in base.items()}
     for assumption in case.assumptions:
@@ -77,7 +77,7 @@ def case_curves(case: Case, threads: int = 1) -> dict[str, Any]:
                 continue
             changes = {assumption.key: value}
             state = case.air(changes) if assumption.key.startswith("air.") else air
-            points = prepare_case(case, changes, COARSE).solve(rpm, V, state, threads)
+            points = prepare_case(case, changes, COARSE).solve(rpm, V, state)
             runs.append({name: np.asarray(getattr(points, name), float) for name in CHANNELS})
         for name, values in base.items():
             variance[name] = variance[name] + spread(assumption.discrete, values, [run[name] for run in runs]) ** 2

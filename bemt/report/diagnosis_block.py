@@ -47,7 +47,7 @@ def diagnosis_parts(item: Mapping[str, Any]) -> list[Part]:
     d = _mapping(item.get("document"))
     said = str(d.get("verdict") or "unknown")
     effects = ", ".join(str(e) for e in _list(d.get("effects")))
-    why = str(d.get("explanation") or "").partition(" Not tried: ")[0]
+    why = str(d.get("explanation") or "").partition(" Not tried: ")[0].partition(" Next: ")[0]
     head = (KIND.get(said, "unknown"), f"{said}: {effects}" if effects else said, why)
     out: list[Part] = [("verdict", head)]
     place = _mapping(d.get("location"))
@@ -58,11 +58,15 @@ def diagnosis_parts(item: Mapping[str, Any]) -> list[Part]:
             ("words", f"Located in {place['channel']} where {variable} is {low} to {high} (size {size}, z {z}).")
         )
     ranking = [_mapping(r) for r in _list(d.get("ranking"))[:RANKED]]
-    rows = [[str(r.get("effect", "")), p, _parameters(r.get("parameters"))] for r in ranking
-            if (p := num(r.get("probability"), 3)).value is None or p.value >= LEAST]  # fmt: skip
+    rows = [
+        [str(r.get("effect", "")), p, _parameters(r.get("parameters"))]
+        for r in ranking
+        if (p := num(r.get("probability"), 3)).value is None or p.value >= LEAST
+    ]
     out.append(("table", table(["effect", "probability [-]", "parameters (90 % interval)"], rows)))
-    fits = [[str(channel), *(num(_mapping(fit).get(k), 3) for k in FIT)]
-            for channel, fit in _mapping(d.get("fit")).items()]  # fmt: skip
+    fits = [
+        [str(channel), *(num(_mapping(fit).get(k), 3) for k in FIT)] for channel, fit in _mapping(d.get("fit")).items()
+    ]
     out.append(("table", table(FIT_HEAD, fits)))
     classes = [c for c in _list(d.get("classes")) if isinstance(c, list) and len(c) > 1]
     if classes:
@@ -70,7 +74,8 @@ def diagnosis_parts(item: Mapping[str, Any]) -> list[Part]:
         out.append(("words", f"Not told apart by these data: {told}."))
     step = _mapping(d.get("next_measurement"))
     if step.get("text"):
-        out.append(("words", f"Next measurement: {step['text']}"))
+        out.append(("words", f"Next measurement: {step['text']}."))
+        out += [("command", str(command)) for command in _list(step.get("commands"))]
     absent = [f"{effect}: {reason}" for effect, reason in _mapping(d.get("not_tried")).items()]
     out.append(("more", (f"{len(absent)} effects not tried, and why", [("list", absent)])) if absent else ("list", []))
     return [*out, ("figures", [picture(name, data) for name, data in item.get("figures", [])])]

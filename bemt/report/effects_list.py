@@ -74,8 +74,7 @@ def text() -> str:
                 continue
             state = "on" if e["on_by_default"] else "off"
             rows.append([e["id"], state, e["title"], "", ""])
-            rows += [["", "", "", p["name"], f"{_range(p)}, default {p['default']:.4g}"]
-                     for p in e["parameters"]]  # fmt: skip
+            rows += [["", "", "", p["name"], f"{_range(p)}, default {p['default']:.4g}"] for p in e["parameters"]]
         if rows:
             table = text_table(["effect", "default", "what", "parameter", "range"], rows, left=range(5))
             lines += [head, "\n".join(line.rstrip() for line in table.splitlines()), ""]
@@ -86,12 +85,15 @@ def markdown(only: Container[str] | None = None) -> str:
     """Give effects as the page docs/effects.md."""
     found = [e for e in document()["effects"] if only is None or e["id"] in only]
     lines = [
-        "# Effects", "",
+        "# Effects",
+        "",
         "The effects of the catalogue `bemt/effects/`, one file each. This page is written by",
-        "`python -m bemt effects --markdown`; do not edit it.", "",
+        "`python -m bemt effects --markdown`; do not edit it.",
+        "",
         "A case names them in `model.effects_on` and `model.effects_off`, with parameters where they differ from the",
-        'defaults: `effects_on = ["tip_loss(strength=0.9)"]`.', "",
-    ]  # fmt: skip
+        'defaults: `effects_on = ["tip_loss(strength=0.9)"]`.',
+        "",
+    ]
     for kind, head in KINDS.items():
         mine = [e for e in found if e["kind"] == kind]
         if not mine:

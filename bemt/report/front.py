@@ -108,5 +108,9 @@ def _comparison_table(book: Mapping[str, Any], ids: Sequence[str]) -> dict[str, 
 def front_parts(book: Mapping[str, Any], ids: Sequence[str]) -> list[Part]:
     """Give the chart and the table of all cases."""
     plot = _comparison_plot(book)
-    return [("words", NEEDS if plot else ""), ("figures", [plot] if plot else []), ("words", OF_TABLE),
-            ("table", _comparison_table(book, ids))]  # fmt: skip
+    return [
+        ("words", NEEDS if plot else ""),
+        ("figures", [plot] if plot else []),
+        ("words", OF_TABLE),
+        ("table", _comparison_table(book, ids)),
+    ]

@@ -38,40 +38,19 @@ ROW = 56
 
 @dataclass(frozen=True)
 class Trace:
-    """One source in a plot.
+    """One source in a plot."""
 
-    Parameters
-    ----------
-    name : str
-        For the key.
-    x, y : sequence of float
-        Points, in the units of the axes; NaN and None break a line.
-    u : sequence of float or None
-        Standard uncertainty of y, same unit: a band round a line, bars through points.
-    colour : str
-        ``#rrggbb``.
-    dash : str
-        SVG dash pattern; empty is a full line.
-    shape : str
-        Marker of points: circle, square, triangle, diamond, cross, bar, star.
-    points : bool
-        Points instead of a line.
-    labels : sequence of str
-        Words per point, shown on hovering.
-    horizontal : bool
-        The uncertainty belongs to x.
-    """
-
-    name: str
+    name: str  # For the key
+    # Points, in the units of the axes; NaN and None break a line
     x: Sequence[Any]
     y: Sequence[Any]
-    u: Sequence[Any] | None = None
-    colour: str = SERIES[0]
-    dash: str = ""
-    shape: str = "circle"
-    points: bool = False
-    labels: Sequence[str] = ()
-    horizontal: bool = False
+    u: Sequence[Any] | None = None  # Standard uncertainty of y, same unit: a band round a line, bars through points
+    colour: str = SERIES[0]  # ``#rrggbb``
+    dash: str = ""  # SVG dash pattern; empty is a full line
+    shape: str = "circle"  # Marker of points: circle, square, triangle, diamond, cross, bar, star
+    points: bool = False  # Points instead of a line
+    labels: Sequence[str] = ()  # Words per point, shown on hovering
+    horizontal: bool = False  # The uncertainty belongs to x
 
 
 def points(
@@ -86,65 +65,31 @@ def points(
 
 @dataclass(frozen=True)
 class Mark:
-    """A place on an axis: a line across the plot with words, or a shaded range beyond it.
+    """A place on an axis: a line across the plot with words, or a shaded range beyond it."""
 
-    Parameters
-    ----------
-    at : float
-        Where, in the unit of the axis.
-    words : str
-        What is there.
-    axis : str
-        ``x`` or ``y``.
-    beyond : str
-        Empty, ``above`` or ``below``: which side is outside of the range of a model.
-    """
-
-    at: float
-    words: str
-    axis: str = "x"
-    beyond: str = ""
+    at: float  # Where, in the unit of the axis
+    words: str  # What is there
+    axis: str = "x"  # ``x`` or ``y``
+    beyond: str = ""  # Empty, ``above`` or ``below``: which side is outside of the range of a model
 
 
 @dataclass(frozen=True)
 class Plot:
-    """A plot with axes.
+    """A plot with axes."""
 
-    Parameters
-    ----------
-    title, x_label, y_label : str
-        Words; the labels hold the units.
-    traces : sequence of Trace
-        What is drawn; traces without a finite point are left out.
-    marks : sequence of Mark
-        Places.
-    note : str
-        Sentence below the plot.
-    y_names : sequence of str
-        Names of the rows 0, 1, ... when y counts categories.
-    zero : bool
-        Whether the y axis holds zero.
-    x_zero : bool
-        Whether the x axis holds zero.
-    log_x : bool
-        Whether the x axis is logarithmic.
-    wide : bool
-        Whether it takes the width of the page.
-    x_limits : tuple of float or None
-        Points beyond stand at the edge as an arrow with their value, so that one of them does not flatten the rest.
-    """
-
+    # Words; the labels hold the units
     title: str
     x_label: str
     y_label: str
-    traces: Sequence[Trace]
-    marks: Sequence[Mark] = field(default_factory=tuple)
-    note: str = ""
-    y_names: Sequence[str] = ()
-    zero: bool = True
-    x_zero: bool = False
-    log_x: bool = False
-    wide: bool = False
+    traces: Sequence[Trace]  # What is drawn; traces without a finite point are left out
+    marks: Sequence[Mark] = field(default_factory=tuple)  # Places
+    note: str = ""  # Sentence below the plot
+    y_names: Sequence[str] = ()  # Names of the rows 0, 1, ... when y counts categories.
+    zero: bool = True  # Whether the y axis holds zero
+    x_zero: bool = False  # Whether the x axis holds zero
+    log_x: bool = False  # Whether the x axis is logarithmic
+    wide: bool = False  # Whether it takes the width of the page
+    # Points beyond stand at the edge as an arrow with their value, so that one of them does not flatten the rest
     x_limits: tuple[float, float] | None = None
 
 
@@ -162,8 +107,6 @@ def _number(value: Any) -> float:
 def ticks(low: float, high: float, n: int = 6) -> list[float]:
     """Round numbers between two ends.
 
-    Examples
-    --------
     >>> ticks(0.0, 1.0)
     [0.0, 0.2, 0.4, 0.6, 0.8, 1.0]
     """
@@ -374,8 +317,6 @@ def _csv(plot: Plot, traces: Sequence[_Numbers]) -> str:
 def figure(plot: Plot) -> dict[str, Any] | None:
     """Make the values of a plot for its template; None where nothing is finite.
 
-    Examples
-    --------
     >>> figure(Plot("t", "x [m]", "y [N]", [Trace("a", [1.0], [float("nan")])]))
     >>> figure(Plot("t", "x [m]", "y [N]", [Trace("a", [1.0, 2.0], [3.0, 4.0])]))["traces"][0]["paths"][0][0]
     'line'

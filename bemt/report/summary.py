@@ -16,8 +16,6 @@ __all__ = ["plain_markdown", "summary"]
 def plain_markdown(value: Any, limit: int = 500) -> str:
     r"""Make a text that Markdown shows as it is, on one line.
 
-    Examples
-    --------
     >>> plain_markdown("a|b <script> [x](y)")
     'a\\|b &lt;script&gt; \\[x\\](y)'
     """

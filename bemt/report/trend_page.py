@@ -47,9 +47,11 @@ def _families(f: Mapping[str, Any], results: Sequence[Mapping[str, Any]]) -> Sec
     over, sonic = f"K1/K2: tip Mach {M_TIP_LIMIT:g}", "supersonic tip"
     narrow, wide = f"K1/K2: D/p {low:g}", f"K1/K2: D/p {high:g}"
     by_size = [
-        Mark(M_TIP_LIMIT / per_inch, over), Mark(1.0 / per_inch, sonic, beyond="above"), Mark(low * p, narrow),
+        Mark(M_TIP_LIMIT / per_inch, over),
+        Mark(1.0 / per_inch, sonic, beyond="above"),
+        Mark(low * p, narrow),
         Mark(high * p, wide),
-    ]  # fmt: skip
+    ]
     by_pitch = [Mark(D / high, wide, beyond="below"), Mark(D / low, narrow, beyond="above")]
     by_speed = [Mark(M_TIP_LIMIT / per_rpm, over), Mark(1.0 / per_rpm, sonic, beyond="above")]
     by_mach = [Mark(M_TIP_LIMIT, over), Mark(1.0, sonic, beyond="above")]
@@ -101,8 +103,11 @@ def _choice(rows: Sequence[Mapping[str, Any]]) -> Section:
         f"given for the DS-30 only ({fan:g} kg with motor: 27 N is {27 / (fan * 9.80665):.1f} times its weight); for "
         f"the propellers none is, so the choice is made on the robot's weight."
     )
-    return "Choice of a drive by thrust to weight", [("words", words), ("figures", [plot]),
-                                                     ("table", table(header, lines))]  # fmt: skip
+    return "Choice of a drive by thrust to weight", [
+        ("words", words),
+        ("figures", [plot]),
+        ("table", table(header, lines)),
+    ]
 
 
 def _moments(d: Mapping[str, Any]) -> Section:
@@ -132,5 +137,6 @@ def _moments(d: Mapping[str, Any]) -> Section:
 def trend_sections(book: Mapping[str, Any]) -> list[Section]:
     """Give how thrust moves, and what that means for the robot of the thesis."""
     t = book["trends"]
-    return sections(_families(t["family"], [page["result"] for page in book["cases"]]), _choice(t["choice"]),
-                    _moments(t["moments"]))  # fmt: skip
+    return sections(
+        _families(t["family"], [page["result"] for page in book["cases"]]), _choice(t["choice"]), _moments(t["moments"])
+    )

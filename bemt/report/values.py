@@ -8,7 +8,7 @@ from typing import Any
 __all__ = ["Part", "Section", "picture", "sections", "uri"]
 
 Part = tuple[str, Any]
-"""What it is, and its value: words, verdict, table, list, figures, more (see `templates/report.html`)."""
+"""What it is, and its value: words, command, verdict, table, list, figures, more (see `templates/report.html`)."""
 Section = tuple[str, list[Part]]
 
 

@@ -31,8 +31,6 @@ def recorded(result: Mapping[str, Any], source: str) -> list[Mapping[str, Any]]:
 def stand(c: Mapping[str, Any]) -> tuple[str, str]:
     """Kind of a badge, and how model and recording stand or what agreement would need, in few words.
 
-    Examples
-    --------
     >>> stand({"E": 14.2, "D": 104.9, "u_num": 0.1, "u_input": 13.0, "u_model": 0.0, "u_val": None})
     ('unknown', 'needs u_D ≥ 5.4 %')
     """
@@ -56,8 +54,11 @@ def _share(c: Mapping[str, Any]) -> str:
 
 def _thrusts(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     """Recorded thrusts that BEMT is compared with, in the order of the sources."""
-    lines = [c for c in result.get("comparisons", [])
-             if c.get("model") == "bemt" and c.get("quantity") == "thrust_N" and _finite(c.get("E"))]  # fmt: skip
+    lines = [
+        c
+        for c in result.get("comparisons", [])
+        if c.get("model") == "bemt" and c.get("quantity") == "thrust_N" and _finite(c.get("E"))
+    ]
     return [c for source in NAMES for c in lines if c.get("source") == source]
 
 
@@ -74,8 +75,6 @@ def _unsolved(result: Mapping[str, Any]) -> tuple[str, str, str] | None:
 def verdict(result: Mapping[str, Any]) -> tuple[str, str, str]:
     """Say how BEMT and the recordings of a case stand: kind and words of a badge, and sentences.
 
-    Examples
-    --------
     >>> verdict({"rows": [], "faults": ["a", "b"]})
     ('fault', 'not solved', '2 faults in the input; nothing was computed.')
     """
@@ -124,8 +123,6 @@ def _open(lines: Sequence[Mapping[str, Any]]) -> list[str]:
 def answer(result: Mapping[str, Any]) -> str:
     """Answer in one sentence: both numbers, and what their agreement hangs on; then the other recordings.
 
-    Examples
-    --------
     >>> row = {"source": "bemt", "thrust_N": 119.1, "u": 13.0}
     >>> cfd = {"model": "bemt", "quantity": "thrust_N", "source": "cfd", "reference": "cfd", "D": 104.9, "E": 14.2,
     ...        "E_pct": 13.5, "u_num": 0.1, "u_input": 13.0, "u_model": 0.0, "u_val": None}

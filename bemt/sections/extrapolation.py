@@ -63,16 +63,12 @@ def extend(
     """One section's cl and cd continued to +-pi: data between lo and hi, Viterna-Corrigan and reversed flow outside.
     [-]
 
-    Notes
-    -----
     Up to 90 deg either side: Viterna & Janetzke (1982) matched to the data at hi, and mirrored to the data at lo.
     Beyond 90 deg: the same curve seen from behind with 0.7 of its lift, and within hi (lo) of 180 deg a straight line
     of cl through 0, as in AirfoilPrep (NREL). Drag at 180 deg is twice the least drag of the data, 0.02 at least (own
     assumption). The fading of method "normal", exp(-(alpha - hi) / 5 deg), is an assumption as well. Equation
     numbers and values at 180 deg are not checked against the papers.
 
-    References
-    ----------
     Viterna, L. A., Janetzke, D. C.: Theoretical and experimental power from large horizontal-axis wind turbines.
     NASA TM-82944 (1982).
     """
@@ -100,21 +96,13 @@ def extend(
 
 @dataclass(frozen=True, eq=False)
 class ExtrapolatedTable:
-    """One measured or computed polar at one Reynolds and Mach number, over any range of alpha.
+    """One measured or computed polar at one Reynolds and Mach number, over any range of alpha."""
 
-    Parameters
-    ----------
-    alpha : (N,) float
-        Ascending angles of attack. [rad]
-    cl, cd : (N,) float
-        Coefficients. [-]
-    Re, M : float
-        Reynolds number (1e5 stands in when the source states none) and Mach number. [-]
-    """
-
-    alpha: Array
+    alpha: Array  # (N,) ascending angles of attack [rad]
+    # (N,) coefficients [-]
     cl: Array
     cd: Array
+    # Reynolds number (1e5 stands in when the source states none) and Mach number [-]
     Re: float = 1e5
     M: float = 0.0
 

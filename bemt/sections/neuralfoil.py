@@ -83,8 +83,6 @@ def tunnel_polar(
 ) -> Polar:
     """Incompressible polar of a smooth section in a wind tunnel, continued to +-180 deg, cached on disk by content. [0]
 
-    Notes
-    -----
     Two bounds keep low Reynolds numbers sane. NeuralFoil mirrors XFOIL, whose steady laminar separation without
     reattachment takes nearly all lift (NACA 2415, Re 2e4, n_crit 9: cl(0) < 0, slope 0.45 of 2 pi), while the mean
     lift of the unsteady flow keeps about half: hence `lift_floor` (own assumption). And no cd is below laminar friction
@@ -93,8 +91,6 @@ def tunnel_polar(
     Below Re 1e4 the network is not asked: lift is that at 1e4, and the least drag of the section grows as laminar
     friction does, with 1 / sqrt(Re) (Schlichting 1979, Boundary-Layer Theory, eq. 7.34), at other angles with cos^2.
 
-    References
-    ----------
     Sharpe, P., Hansman, R. J.: NeuralFoil: an airfoil aerodynamics analysis tool using physics-informed machine
     learning. arXiv:2503.16323 (2025).
     """

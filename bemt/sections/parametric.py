@@ -25,8 +25,6 @@ LOW, HIGH = np.radians(-16.0), np.radians(22.0)
 class XrotorSection:
     """Section of XROTOR and DFDC; radians inside, the files count ``a0_deg`` in degrees.
 
-    Notes
-    -----
     M. Drela and H. Youngren, XROTOR 7.55 (subroutine CLCDCM) at Mach number 0, with
     ``cla = dclda (alpha - a0)`` and the limiter ``L = d ln((1 + exp((cla - clmax)/d)) / (1 + exp((clmin - cla)/d)))``::
 
@@ -67,8 +65,6 @@ class XrotorSection:
 class QpropSection:
     """Section of QPROP.
 
-    Notes
-    -----
     M. Drela, QPROP 1.22 (propeller file, subroutines CDFUN and DCDFUN) at Mach number 0::
 
         cl = cl0 + cla alpha, clipped to clmin .. clmax

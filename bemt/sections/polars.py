@@ -48,47 +48,26 @@ STALL_DROP = 0.03
 class Polar:
     """Lift and drag coefficients of one section over angle of attack, Reynolds and Mach number.
 
-    Parameters
-    ----------
-    alpha : (Na,) float
-        Angles of attack, ascending from -pi to pi. [rad]
-    Re : (Nr,) float
-        Chord Reynolds numbers, ascending; one entry means no dependence. [-]
-    M : (Nm,) float
-        Mach numbers, ascending; one entry means no dependence. [-]
-    cl, cd : (Na, Nr, Nm) float
-        Lift and drag coefficients. [-]
-    confidence : (Na, Nr) float or None
-        The data source's own confidence, 0 to 1 (0 in extrapolated parts); None when it states none. [-]
-    name : str
-        Name of the section.
-    source : str
-        Where the numbers come from.
-    notes : tuple of str
-        What a user of the numbers should know (extrapolation, resampling).
+    Raises ValueError: when shapes disagree, an axis does not ascend, a number is not finite, cd <= 0 or +-pi do not
+    agree.
 
-    Raises
-    ------
-    ValueError
-        When shapes disagree, an axis does not ascend, a number is not finite, cd <= 0 or +-pi do not agree.
-
-    Examples
-    --------
     >>> p = linear_polar(cd=0.01)
     >>> cl, cd = p.lookup(np.deg2rad(3.0), 1e5)
     >>> round(float(cl), 6), round(float(cd), 6)
     (0.328987, 0.01)
     """
 
-    alpha: Array
-    Re: Array
-    M: Array
+    alpha: Array  # (Na,) angles of attack, ascending from -pi to pi [rad]
+    Re: Array  # (Nr,) chord Reynolds numbers, ascending; one entry means no dependence [-]
+    M: Array  # (Nm,) Mach numbers, ascending; one entry means no dependence [-]
+    # (Na, Nr, Nm) lift and drag coefficients [-]
     cl: Array
     cd: Array
+    # (Na, Nr) the data source's own confidence, 0 to 1 (0 in extrapolated parts); None when it states none [-]
     confidence: Array | None = None
-    name: str = ""
-    source: str = ""
-    notes: tuple[str, ...] = ()
+    name: str = ""  # Name of the section
+    source: str = ""  # Where the numbers come from
+    notes: tuple[str, ...] = ()  # What a user of the numbers should know (extrapolation, resampling)
 
     def __post_init__(self) -> None:
         """Freeze the arrays and check them."""
@@ -129,20 +108,7 @@ class Polar:
         return np.array_equal(self.alpha, ALPHA_GRID) and np.array_equal(self.Re, DEFAULT_RE)
 
     def lookup(self, alpha: ArrayLike, Re: ArrayLike, M: ArrayLike = 0.0) -> tuple[Array, Array]:
-        """Interpolated cl and cd: linear in alpha, ln Re and M; the reference for the compiled kernel.
-
-        Parameters
-        ----------
-        alpha : array_like of float
-            Angle of attack, any turn (wrapped to +-pi). [rad]
-        Re, M : array_like of float
-            Reynolds and Mach number, broadcast with alpha; held at the ends of the tables. [-]
-
-        Returns
-        -------
-        cl, cd : ndarray of float
-            Coefficients in the broadcast shape. [-]
-        """
+        """Interpolated cl and cd: linear in alpha [rad], ln Re and M; the reference for the compiled kernel."""
         a, r, m = np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in (alpha, Re, M)))
         cl, cd = self._interpolate((self.cl, self.cd), a, r, m)
         return cl, cd

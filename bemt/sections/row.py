@@ -31,8 +31,6 @@ class RowLift(NamedTuple):
 def weinig_factor(solidity: Array, stagger: Array) -> Array:
     """Lift-slope ratio of an infinite row of flat plates to a single one, (N,) [1].
 
-    Notes
-    -----
     Conformal mapping of the row on a circle, Weinig (1935), "Die Stroemung um die Schaufeln von Turbomaschinen"; in
     the form of Scholz (1965), "Aerodynamik der Schaufelgitter", ch. 3.  Checked in the tests against a vortex sheet
     solution and the closed forms (2/pi s) tanh(pi s / 2) at stagger 0 and (2/pi s) tan(pi s / 2) at 90 deg.
@@ -152,14 +150,10 @@ def _solve(shape: _Shape, solidity: float, stagger: float) -> RowLift:
 def row_lift(section: Airfoil, solidity: float, stagger: float) -> RowLift:
     """Lift of a section in a row, in potential flow.
 
-    Notes
-    -----
     Vortex panels of linear strength on the outline, constant stream function on it, equal and opposite strength at
     the trailing edge (Drela 1989, Lect. Notes Eng. 54, eq. 1-6, for one section); the other blades of the row add
     log |sinh(zeta) / zeta| to the kernel (Martensen 1959, Arch. Rat. Mech. Anal. 3:235, has its derivative).
 
-    Examples
-    --------
     >>> import numpy as np
     >>> from geometry.airfoil import naca4
     >>> section = naca4(0.05, 0.45, 0.09)

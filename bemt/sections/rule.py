@@ -42,23 +42,14 @@ N_CRIT_LARGE = 9.0
 
 @dataclass(frozen=True)
 class RuleSection:
-    """A section at one radius: NACA four-digit, or a published one.
+    """A section at one radius: NACA four-digit, or a published one."""
 
-    Attributes
-    ----------
-    r_R : float
-        Where it applies, r/R [1].
-    camber, position, thickness : float
-        Fractions of the chord [1]; a published section has its own camber, which goes with its thickness.
-    shape : str
-        ``naca4``, or a name of :data:`geometry.published.PUBLISHED`.
-    """
-
-    r_R: float
+    r_R: float  # Where it applies, r/R [1]
+    # Fractions of the chord [1]; a published section has its own camber, which goes with its thickness
     camber: float
     position: float
     thickness: float
-    shape: str = "naca4"
+    shape: str = "naca4"  # ``naca4``, or a name of :data:`geometry.published.PUBLISHED`
 
 
 def _one(camber: float, thickness: float = 0.09) -> tuple[RuleSection, ...]:

@@ -35,11 +35,13 @@ def write_log(path: Path, rows: int, seed: int = 1) -> None:
         rpm[rpm < 1.0] = 0.0
         torque, volt, noise = 2e-9 * rpm**2, 16.0 - 1e-8 * rpm**2, rng.normal(size=(4, t.size))
         columns = {
-            "time_s": t.round(4), "rpm": np.where(rpm > 0.0, rpm + 5.0 * noise[0], 0.0).round(1),
+            "time_s": t.round(4),
+            "rpm": np.where(rpm > 0.0, rpm + 5.0 * noise[0], 0.0).round(1),
             "thrust_N": (1.2e-7 * rpm**2 + 0.02 + 0.02 * noise[1]).round(4),
-            "torque_Nm": (torque + 0.001 + 0.001 * noise[2]).round(5), "voltage_V": (volt + 0.01 * noise[3]).round(3),
+            "torque_Nm": (torque + 0.001 + 0.001 * noise[2]).round(5),
+            "voltage_V": (volt + 0.01 * noise[3]).round(3),
             "current_A": np.where(rpm > 0.0, torque * rpm * 0.131 / volt + 0.1, 0.0).round(3),
-        }  # fmt: skip
+        }
         pd.DataFrame(columns).to_csv(path, mode="a", header=first == 0, index=False)
 
 
@@ -50,9 +52,12 @@ def _run(words: list[str]) -> dict[str, Any]:
     _, status, used = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
     return {
-        "command": words[0], "exit": process.returncode, "wall_s": time.perf_counter() - began,
-        "cpu_s": used.ru_utime + used.ru_stime, "peak_MB": used.ru_maxrss / 1024.0,
-    }  # fmt: skip
+        "command": words[0],
+        "exit": process.returncode,
+        "wall_s": time.perf_counter() - began,
+        "cpu_s": used.ru_utime + used.ru_stime,
+        "peak_MB": used.ru_maxrss / 1024.0,
+    }
 
 
 def document(rows: int) -> dict[str, Any]:
@@ -69,6 +74,9 @@ def document(rows: int) -> dict[str, Any]:
 def table(found: dict[str, Any]) -> str:
     """A line for each command."""
     lines = [f"{found['rows']} rows, {found['MB']:.0f} MB"]
-    lines += [f"{r['command']:>9}: {r['wall_s']:6.1f} s wall, {r['cpu_s']:6.1f} s CPU, {r['peak_MB']:5.0f} MB"
-              f"{'' if r['exit'] in (0, 1) else ', exit ' + str(r['exit'])}" for r in found["runs"]]  # fmt: skip
+    lines += [
+        f"{r['command']:>9}: {r['wall_s']:6.1f} s wall, {r['cpu_s']:6.1f} s CPU, {r['peak_MB']:5.0f} MB"
+        f"{'' if r['exit'] in (0, 1) else ', exit ' + str(r['exit'])}"
+        for r in found["runs"]
+    ]
     return "\n".join(lines)

@@ -86,10 +86,14 @@ def measure(work: Work, quick: bool = False) -> dict[str, Any]:
             "batch_large": cpu_us(lambda: solver.solve(prep, *large, air), n * many, 1 if quick else 3),
             "standard": cpu_us(lambda: solver.solve(full, rpm, V, air), n, repeats),
         },
-        "prepare_ms": float(np.median(made)) * 1e3, "compile_s": compile_s,
-        "rpm": rpm.tolist(), "J": sol.J.tolist(), "CT": _numbers(sol.CT), "CP": _numbers(sol.CP),
+        "prepare_ms": float(np.median(made)) * 1e3,
+        "compile_s": compile_s,
+        "rpm": rpm.tolist(),
+        "J": sol.J.tolist(),
+        "CT": _numbers(sol.CT),
+        "CP": _numbers(sol.CP),
         "converged": int(np.sum(sol.converged)),
-    }  # fmt: skip
+    }
 
 
 def _numbers(values: ArrayLike) -> list[float | None]:
@@ -99,8 +103,6 @@ def _numbers(values: ArrayLike) -> list[float | None]:
 def ccblade(work: Work, quick: bool = False) -> dict[str, Any]:
     """Time CCBlade of WISDEM on the work, if it is installed. [us]
 
-    Notes
-    -----
     CCBlade is a turbine code: the propeller is given to it with its sections turned over, cl'(alpha) = -cl(-alpha), and
     thrust and torque change sign.  Its splines smooth the table.  At J = 0 it returns zero loads without a warning.
     """
@@ -181,18 +183,21 @@ def table(doc: dict[str, Any]) -> str:
     m = doc["machine"]
     out = [
         f"work {doc['work']}: {doc['points']} points, {doc['elements']} elements, 1 thread, CPU time, best of repeats",
-        f"{m['processor']}, {m['cores']} cores, Python {m['python']}, numpy {m['numpy']}, numba {m['numba']}", "",
+        f"{m['processor']}, {m['cores']} cores, Python {m['python']}, numpy {m['numpy']}, numba {m['numba']}",
+        "",
         f"{'':<36}{'us per operating point':>24}",
-    ]  # fmt: skip
+    ]
     out += [f"{_LABELS[key]:<36}{us:>24.2f}" for key, us in doc["us_per_point"].items()]
     for name, us in doc["peers"].items():
         note = doc["peer_notes"][name]
         out.append(f"{'peer: ' + name:<36}{'-' if us is None else format(us, '.1f'):>24}{'  ' + note if note else ''}")
     out += [
-        "", f"prepare {doc['prepare_ms']:.1f} ms; compile or load from cache, once: {doc['compile_s']:.1f} s; "
-        f"{doc['converged']} of {doc['points']} converged", "",
+        "",
+        f"prepare {doc['prepare_ms']:.1f} ms; compile or load from cache, once: {doc['compile_s']:.1f} s; "
+        f"{doc['converged']} of {doc['points']} converged",
+        "",
         f"{'J':>6} {'CT':>8} {'CP':>8}   at {RPM[1]:.0f} rev/min",
-    ]  # fmt: skip
+    ]
     rows = [r for r in zip(doc["rpm"], doc["J"], doc["CT"], doc["CP"], strict=True) if r[0] == RPM[1]]
     for _, J, CT, CP in rows[::3]:
         out.append(f"{J:>6.3f} " + " ".join(f"{'-':>8}" if c is None else f"{c:>8.4f}" for c in (CT, CP)))

@@ -35,34 +35,19 @@ PEER_EFFECTS = ("tip_loss", "hub_loss", "swirl", "high_induction")
 
 @dataclass(frozen=True, eq=False)
 class Work:
-    """What is timed.
+    """What is timed."""
 
-    Attributes
-    ----------
-    name : str
-        Of the blade.
-    edges : (31,) float
-        Element edges r/R. [-]
-    r_R, c_R : (30,) float
-        Element centres and chords over R. [-]
-    beta_deg : (30,) float
-        Blade angles. [deg]
-    alpha_deg : (Na,) float
-        Angles of attack of the table. [deg]
-    cl, cd : (Na,) float
-        Section table. [-]
-    rpm, V : (60,) float
-        Operating points. [rev/min], [m/s]
-    """
-
-    name: str
-    edges: Array
+    name: str  # Of the blade
+    edges: Array  # (31,) element edges r/R [-]
+    # (30,) element centres and chords over R [-]
     r_R: Array
     c_R: Array
-    beta_deg: Array
-    alpha_deg: Array
+    beta_deg: Array  # (30,) blade angles [deg]
+    alpha_deg: Array  # (Na,) angles of attack of the table [deg]
+    # (Na,) section table [-]
     cl: Array
     cd: Array
+    # (60,) operating points [rev/min], [m/s]
     rpm: Array
     V: Array
 
@@ -98,8 +83,6 @@ def _columns(path: Path, names: tuple[str, ...]) -> list[Array]:
 def load(folder: Path | str | None = None, name: str | None = None) -> Work:
     """Read the work.
 
-    Examples
-    --------
     >>> work = load()
     >>> work.name, work.edges.size, work.r_R.size, work.rpm.size
     ('generic_10x5', 31, 30, 60)
@@ -125,8 +108,6 @@ def load(folder: Path | str | None = None, name: str | None = None) -> Work:
 def generate(folder: Path | str) -> list[Path]:
     """Make the files of the work: stations by a documented law, table by NeuralFoil.
 
-    Notes
-    -----
     beta = atan(pitch/(2 pi r)) with 5 in of pitch on 10 in, chord ``apc_like``; 30 equal elements from r/R 0.15 to 1,
     values at their centres.  The table: every degree from -180 to 180.
     """

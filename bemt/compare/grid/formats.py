@@ -36,28 +36,17 @@ def require_extra(option: str, *modules: str) -> None:
 
 @dataclass(frozen=True)
 class Block:
-    """N rows of a grid.
+    """N rows of a grid."""
 
-    Parameters
-    ----------
-    axes : dict of str to ((A,) float, (N,) int)
-        Values of each axis, in the unit of its name, and which one holds in each row.
-    columns : dict of str to (N,) float
-        Results, in the unit of the name; NaN where not converged.
-    converged : (N,) bool
-        Whether the point has a solution.
-    """
-
+    # (A,) values of each axis, in the unit of its name, and which one holds in each row
     axes: dict[str, tuple[NDArray[np.float64], NDArray[np.intp]]]
-    columns: dict[str, NDArray[np.float64]]
-    converged: NDArray[np.bool_]
+    columns: dict[str, NDArray[np.float64]]  # (N,) results, in the unit of the name; NaN where not converged
+    converged: NDArray[np.bool_]  # (N,) whether the point has a solution
 
 
 def encode(block: Block, form: str) -> bytes:
     """Bytes of a block.
 
-    Examples
-    --------
     >>> axis = {"rpm": (np.array([5000.0, 6000.0]), np.array([0, 1]))}
     >>> print(encode(Block(axis, {"CT": np.array([0.1, np.nan])}, np.array([True, False])), "csv").decode(), end="")
     5000,1.000000e-01,1

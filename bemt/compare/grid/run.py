@@ -49,24 +49,12 @@ STATISTICS = ("thrust_N", "torque_Nm", "M_tip")
 
 @dataclass(frozen=True)
 class Grid:
-    """Axes of a sweep in row order.
+    """Axes of a sweep in row order."""
 
-    Parameters
-    ----------
-    names : tuple of str
-        Axis names with their units.
-    values : tuple of (N,) float
-        Axis values, in the unit of the axis's name.
-    geometries : int
-        Combinations of the geometric axes.
-    chunk : int
-        Points per chunk.
-    """
-
-    names: tuple[str, ...]
-    values: tuple[NDArray[np.float64], ...]
-    geometries: int
-    chunk: int
+    names: tuple[str, ...]  # Axis names with their units
+    values: tuple[NDArray[np.float64], ...]  # (N,) axis values, in the unit of the axis's name
+    geometries: int  # Combinations of the geometric axes
+    chunk: int  # Points per chunk
 
     @classmethod
     def of(cls, case: Case) -> Grid | None:
@@ -148,8 +136,10 @@ class GridSolver:
         which = np.zeros(size, dtype=np.intp)
         for name in self._air_names:
             which = which * axes[name].size + index[name]
-        flow = [axes[n][index[n]] if n in axes else np.full(size, default)
-                for n, default in zip(FLOW, (self.case.rpm, self.case.airspeed_m_s), strict=True)]  # fmt: skip
+        flow = [
+            axes[n][index[n]] if n in axes else np.full(size, default)
+            for n, default in zip(FLOW, (self.case.rpm, self.case.airspeed_m_s), strict=True)
+        ]
         distinct, here = np.unique(which, return_inverse=True)
         states = [self._state(flat) for flat in distinct.tolist()]
         air = states[0] if not self._air_names else air_arrays(states, here)

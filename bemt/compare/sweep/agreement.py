@@ -24,8 +24,6 @@ def known(c: Mapping[str, Any]) -> float:
 def needed(c: Mapping[str, Any]) -> float:
     """Least standard uncertainty of the recording with which the two agree: |E| <= u_val; 0 inside the model's band.
 
-    Examples
-    --------
     >>> needed({"E": 5.0, "u_num": 0.0, "u_input": 3.0, "u_model": 0.0})
     4.0
     """

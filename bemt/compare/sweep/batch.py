@@ -227,8 +227,12 @@ def sweep(
         for i, result in _results(left, folder, resume, jobs, tell, grid_format, on) if left else ():
             found[todo[i]] = result
         results = [found[i] for i in range(len(files))]
-        document = {"schema": SCHEMA, "version": bemt.__version__, "cases": results,
-                    "exit_code": max((r["exit_code"] for r in results), default=EXIT_OK)}  # fmt: skip
+        document = {
+            "schema": SCHEMA,
+            "version": bemt.__version__,
+            "cases": results,
+            "exit_code": max((r["exit_code"] for r in results), default=EXIT_OK),
+        }
         if folder is not None:
             store.keep_overview(folder, document)
     return document
@@ -277,8 +281,11 @@ def _read(files: Sequence[Path], out: Path | None) -> tuple[dict[int, Ready], di
 def _unfit_names(cases: Mapping[int, Case], kept: bool) -> dict[int, Fault]:
     """Cases that would write where another one or the sweep itself does."""
     taken = "The sweep writes a file of that name"
-    ours = {i: Fault(case.path.as_posix(), "name", repr(case.name), "another name", taken)
-            for i, case in cases.items() if kept and case.name.casefold() in store.OVERVIEW}  # fmt: skip
+    ours = {
+        i: Fault(case.path.as_posix(), "name", repr(case.name), "another name", taken)
+        for i, case in cases.items()
+        if kept and case.name.casefold() in store.OVERVIEW
+    }
     return ours | repeated_names(cases)
 
 

@@ -43,7 +43,10 @@ def u_model(case: Case, model: Model, points: Dataset, air: Air) -> dict[str, Ar
         V, exit_speed = points.airspeed_m_s, points.exhaust_speed_m_s
         exhaust = np.abs(exit_speed - V) / np.abs(2.0 * exit_speed - V) * thrust * np.abs(exit_speed)
     return {
-        "thrust_N": thrust * np.abs(points.thrust_N), "CT": u[0], "CP": u[1],
-        "torque_Nm": power * np.abs(points.torque_Nm), "power_W": power * np.abs(points.power_W),
+        "thrust_N": thrust * np.abs(points.thrust_N),
+        "CT": u[0],
+        "CP": u[1],
+        "torque_Nm": power * np.abs(points.torque_Nm),
+        "power_W": power * np.abs(points.power_W),
         "exhaust_speed_m_s": exhaust,
-    }  # fmt: skip
+    }

@@ -38,8 +38,11 @@ def summary(results: Sequence[Mapping[str, Any]], called: str = "python -m bemt"
 
 def _compared(result: Mapping[str, Any]) -> list[dict[str, Any]]:
     """BEMT against each recorded thrust of a case; equal values of one kind count once."""
-    rows = [c for c in result["comparisons"]
-            if c["model"] == "bemt" and c["quantity"] == "thrust_N" and c["source"] in ROW_SOURCES]  # fmt: skip
+    rows = [
+        c
+        for c in result["comparisons"]
+        if c["model"] == "bemt" and c["quantity"] == "thrust_N" and c["source"] in ROW_SOURCES
+    ]
     largest = max((abs(c["D"]) for c in rows), default=0.0)
     out: dict[tuple[str, str, float], dict[str, Any]] = {}
     for c in rows:
@@ -82,8 +85,7 @@ def _table(solved: Sequence[Mapping[str, Any]], found: Sequence[Mapping[str, Any
             u = "" if not math.isfinite(row["u"]) else f" ± {number_text(row['u'], 2)}"
             simple = formula.get((row["rpm"], row["airspeed_m_s"]), {}).get("thrust_N")
             at = [f"{row['rpm']:.0f}", *([f"{row['airspeed_m_s']:g}"] if moving else [])]
-            cells = [*at, f"{number_text(row['thrust_N'], 3)}{u}",
-                     number_text(simple, 3)]  # fmt: skip
+            cells = [*at, f"{number_text(row['thrust_N'], 3)}{u}", number_text(simple, 3)]
             some: list[Mapping[str, Any] | None] = [*own] if own else [None]
             for c in some:
                 told = ["-", "", ""] if c is None else [
@@ -136,8 +138,9 @@ def _ducts(solved: Sequence[Mapping[str, Any]]) -> list[str]:
 def _unknowns(solved: Sequence[Mapping[str, Any]]) -> list[str]:
     lines = []
     for result in solved[:8]:
-        first = sorted((a for a in result["assumptions"] if math.isfinite(a["u_thrust_N"])),
-                       key=lambda a: -a["u_thrust_N"])[:3]  # fmt: skip
+        first = sorted(
+            (a for a in result["assumptions"] if math.isfinite(a["u_thrust_N"])), key=lambda a: -a["u_thrust_N"]
+        )[:3]
         if first:
             told = [f"{a['key'].rpartition('.')[2]} {number_text(a['u_thrust_N'], 2)} N" for a in first]
             while len(", ".join(told)) > WIDTH - 20:
@@ -167,8 +170,10 @@ def _grids(solved: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def _next(called: str, compared: bool) -> list[str]:
-    lines = ["Read on: --details (every case in full), --out DIR (tables), --json,",
-             f"  {called} report CASES --out DIR (figures)"]  # fmt: skip
+    lines = [
+        "Read on: --details (every case in full), --out DIR (tables), --json,",
+        f"  {called} report CASES --out DIR (figures)",
+    ]
     if compared:
         lines[-1] += ","
         lines.append(f"  {called} diagnose LOG --case CASE (what physics is missing)")

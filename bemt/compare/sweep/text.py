@@ -172,7 +172,7 @@ def case_text(result: Mapping[str, Any]) -> str:
         low, high = bemt["thrust_N_range"]
         lines += ["", _assumption_table(result)]
         parts = ", ".join(f"{k} {_n(bemt[k], 3)} N" for k in ("u_input", "u_model", "u_num"))
-        lines += [f"  together: {parts}; one at a time the thrust runs from {_n(low)} to {_n(high)} N"]  # fmt: skip
+        lines += [f"  together: {parts}; one at a time the thrust runs from {_n(low)} to {_n(high)} N"]
     lines += _grid_lines(result.get("grid"))
     lines += [_wrap(note, "  ", "note: ") for note in result["notes"]]
     return "\n".join(lines)

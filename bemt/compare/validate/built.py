@@ -32,46 +32,23 @@ RUN_POINTS = 24
 
 @dataclass(frozen=True, eq=False)
 class Observed:
-    """One propeller of a folder: the solver as drawn at its points, and its sensitivities.
+    """One propeller of a folder: the solver as drawn at its points, and its sensitivities."""
 
-    Attributes
-    ----------
-    propeller : UiucPropeller
-        As read.
-    solve : Solver
-        For other latent numbers.
-    drawn : Rows
-        All points, the solver on the stations.
-    record : MeasuredRotor
-        The points that count, static ones first.
-    """
-
-    propeller: UiucPropeller
-    solve: Solver
-    drawn: Rows
-    record: MeasuredRotor
+    propeller: UiucPropeller  # As read
+    solve: Solver  # For other latent numbers
+    drawn: Rows  # All points, the solver on the stations
+    record: MeasuredRotor  # The points that count, static ones first
 
 
 @dataclass(frozen=True, eq=False)
 class Expected:
-    """Expectation for one propeller and how the measured points lie in it, over the points that count.
+    """Expectation for one propeller and how the measured points lie in it, over the points that count."""
 
-    Attributes
-    ----------
-    rows : Rows
-        As `Observed.drawn`, the computed coefficients being expectations.
-    probability : dict of str to dict of str to (P,) float
-        ``static`` and ``forward``, CT and CP: of an interval as wide as the error [1].
-    width : dict of str to dict of str to (P,) float
-        Half width of the 68 % interval over the expectation [1].
-    log_density : dict of str to dict of str to (P,) float
-        Logarithm of the predictive density of the reading over itself [1].
-    """
-
-    rows: Rows
+    rows: Rows  # As `Observed.drawn`, the computed coefficients being expectations
+    # (P,) ``static`` and ``forward``, CT and CP: of an interval as wide as the error [1]
     probability: dict[str, dict[str, Array]]
-    width: dict[str, dict[str, Array]]
-    log_density: dict[str, dict[str, Array]]
+    width: dict[str, dict[str, Array]]  # (P,) half width of the 68 % interval over the expectation [1]
+    log_density: dict[str, dict[str, Array]]  # (P,) logarithm of the predictive density of the reading over itself [1]
 
 
 def observe(propeller: UiucPropeller, effects: Sequence[Effect], stations: Stations, general: bool = False) -> Observed:

@@ -21,21 +21,12 @@ _APC_SERIES = {"E": "apce", "SF": "apcsf", "": "apcsp", "F": "apcff", "MR": "apc
 
 @dataclass(frozen=True)
 class Folder:
-    """What a folder holds.
+    """What a folder holds."""
 
-    Attributes
-    ----------
-    propellers : tuple of (UiucPropeller, Stations)
-        Measured propellers with their stations: r/R [1], c/R [1], beta [rad].
-    skipped : tuple of (str, str)
-        Name and reason of those that cannot be compared.
-    faults : tuple of str
-        What could not be read.
-    """
-
+    # (UiucPropeller, Stations) measured propellers with their stations: r/R [1], c/R [1], beta [rad]
     propellers: tuple[tuple[UiucPropeller, Stations], ...]
-    skipped: tuple[tuple[str, str], ...]
-    faults: tuple[str, ...]
+    skipped: tuple[tuple[str, str], ...]  # Name and reason of those that cannot be compared
+    faults: tuple[str, ...]  # What could not be read
 
 
 def read_folder(folder: Path) -> Folder:
@@ -89,6 +80,8 @@ def _pe0_stations(folder: Path) -> tuple[dict[tuple[str, float, float], Stations
             continue
         R = blade.radius_m
         found[family, round(blade.diameter_m / INCH, 2), round(blade.pitch_m / INCH, 2)] = (
-            blade.r_m / R, blade.chord_m / R, blade.beta_rad,
-        )  # fmt: skip
+            blade.r_m / R,
+            blade.chord_m / R,
+            blade.beta_rad,
+        )
     return found, notes

@@ -52,11 +52,14 @@ def watch(folder: Folder, effects: Sequence[Effect], say: Say = None) -> list[Ob
 def fit_population(seen: Sequence[Observed], name: str) -> tuple[Population, Any]:
     """Population of measured propellers and the numbers of its search."""
     provenance = {
-        "propellers": len(seen), "points": int(sum(s.record.x.size for s in seen)), "folder": name,
-        "families": sorted({s.record.family for s in seen}), "version": __version__,
+        "propellers": len(seen),
+        "points": int(sum(s.record.x.size for s in seen)),
+        "folder": name,
+        "families": sorted({s.record.family for s in seen}),
+        "version": __version__,
         "command": f"python -m bemt validate {name} --fit-population FILE",
         "source": "UIUC Propeller Database (Brandt, Deters, Ananda, Dantsker, Selig)",
-    }  # fmt: skip
+    }
     D = [s.record.diameter_m for s in seen]
     fastest = max(float(M_tip(s.drawn.rpm.max() / 60.0, s.record.diameter_m, s.solve.air.a_sound)) for s in seen)
     p, numbers = fit([s.record for s in seen], provenance=provenance)

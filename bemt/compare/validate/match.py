@@ -19,7 +19,7 @@ _STEP_DEG = 1.0
 _CLOSE = 1e-4
 
 
-def shift_to(J0: float, J0_of: Callable[[float], float], reach: float = REACH_DEG) -> float:
+def shift_to(J0: float, J0_of: Callable[[float], float]) -> float:
     """Blade angle shift that brings the zero-thrust advance ratio to the measured one."""
     from scipy.optimize import brentq
 
@@ -27,7 +27,7 @@ def shift_to(J0: float, J0_of: Callable[[float], float], reach: float = REACH_DE
     if not np.isfinite(last):
         return float("nan")
     step = -np.copysign(_STEP_DEG, last)
-    while abs(last) > _CLOSE and abs(at) < reach:
+    while abs(last) > _CLOSE and abs(at) < REACH_DEG:
         now = J0_of(at + step) - J0
         if not np.isfinite(now):
             return float("nan")

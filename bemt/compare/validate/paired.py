@@ -72,10 +72,13 @@ def difference(pairs: Sequence[tuple[float, float]]) -> dict[str, Any]:
     means = delta[random.integers(0, delta.size, (RESAMPLES, delta.size))].mean(axis=1)
     low, high = np.quantile(means, (0.025, 0.975))
     return {
-        "propellers": int(values.shape[0]), "median_ours": float(np.median(values[:, 0])),
-        "median_theirs": float(np.median(values[:, 1])), "won": int((values[:, 0] < values[:, 1]).sum()),
-        "difference": float(delta.mean()), "interval95": [float(low), float(high)],
-    }  # fmt: skip
+        "propellers": int(values.shape[0]),
+        "median_ours": float(np.median(values[:, 0])),
+        "median_theirs": float(np.median(values[:, 1])),
+        "won": int((values[:, 0] < values[:, 1]).sum()),
+        "difference": float(delta.mean()),
+        "interval95": [float(low), float(high)],
+    }
 
 
 def text(document: dict[str, Any]) -> str:

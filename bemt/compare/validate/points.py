@@ -26,27 +26,18 @@ KINDS = ("static", "forward")
 
 @dataclass(frozen=True)
 class Rows:
-    """Measured and computed coefficients of one propeller, P points.
+    """Measured and computed coefficients of one propeller, P points."""
 
-    Attributes
-    ----------
-    static : (P,) bool
-        Static points.
-    rpm, J : (P,) float
-        Conditions [rev/min], [1].
-    CT, CP, CT_bemt, CP_bemt : (P,) float
-        Propeller convention [1]; NaN where not converged.
-    J0, J0_bemt : float
-        Advance ratio of zero thrust, measured and computed [1]; NaN where not reached.
-    """
-
-    static: NDArray[np.bool_]
+    static: NDArray[np.bool_]  # (P,) static points
+    # (P,) conditions [rev/min], [1]
     rpm: Array
     J: Array
+    # (P,) propeller convention [1]; NaN where not converged
     CT: Array
     CP: Array
     CT_bemt: Array
     CP_bemt: Array
+    # Advance ratio of zero thrust, measured and computed [1]; NaN where not reached
     J0: float
     J0_bemt: float
 

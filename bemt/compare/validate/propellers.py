@@ -30,9 +30,13 @@ SCHEMA = "bemt.validation/1"
 
 
 def validate(
-    folder: Path, effects: Sequence[Effect] | None = None, fixed_re: float | None = None,
-    progress: Callable[[str], None] | None = None, match_J0: bool = False, as_drawn: bool = False,
-) -> dict[str, Any]:  # fmt: skip
+    folder: Path,
+    effects: Sequence[Effect] | None = None,
+    fixed_re: float | None = None,
+    progress: Callable[[str], None] | None = None,
+    match_J0: bool = False,
+    as_drawn: bool = False,
+) -> dict[str, Any]:
     """Compare a folder."""
     from bemt import effects as registry
     from bemt.sections import rule as section_rule
@@ -77,9 +81,12 @@ def validate(
     doc["unconverged"] = unconverged
     doc["effects"] = [e.describe() for e in eff]
     doc["polar"] = {
-        "rule": "bemt.sections.rule", "n_crit": section_rule.N_CRIT, "drag_level": section_rule.DRAG_LEVEL,
-        "fixed_re": fixed_re, "calibrated_on": "UIUC volume 1",
-    }  # fmt: skip
+        "rule": "bemt.sections.rule",
+        "n_crit": section_rule.N_CRIT,
+        "drag_level": section_rule.DRAG_LEVEL,
+        "fixed_re": fixed_re,
+        "calibrated_on": "UIUC volume 1",
+    }
     doc["propellers"] = rows
     doc["skipped"] = [{"name": name, "reason": why} for name, why in found.skipped]
     doc["faults"] = list(found.faults)

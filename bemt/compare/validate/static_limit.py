@@ -53,5 +53,7 @@ def from_static(rotors: Sequence[MeasuredRotor]) -> dict[str, Any]:
     own = np.repeat(np.arange(len(parts)), [b.size for _, b in parts])
     left = [y[own == i] - A[own == i] @ _line(A[own != i], y[own != i]) for i in range(len(parts))]
     return {
-        "rotors": len(parts), "seen": statistics(y - A @ _line(A, y)), "left_out": statistics(np.concatenate(left)),
-    }  # fmt: skip
+        "rotors": len(parts),
+        "seen": statistics(y - A @ _line(A, y)),
+        "left_out": statistics(np.concatenate(left)),
+    }

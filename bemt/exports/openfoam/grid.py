@@ -145,8 +145,6 @@ def block_mesh(s: Settings) -> str:
 def mrf_zone(s: Settings) -> tuple[float, float, float]:
     """Cylinder that turns with the rotor. [m]
 
-    Notes
-    -----
     It may reach into a duct's wall, which does not turn with it, but never beyond one. Its ends are planes of the base
     grid unless the settings say ``margin``, and are numbers of nine digits: the text of a case holds them whole.
     The tip of a long nose stays outside and at rest: what a zone leaks at the facets of its walls goes with its length.
@@ -177,8 +175,6 @@ def _written(value: float) -> float:
 def lines(s: Settings) -> str:
     """Write lines along the blades' pitch axes and in the duct's wall, from which refinement starts.
 
-    Notes
-    -----
     snappyHexMesh looks for surfaces between the centres of neighbouring cells. A blade is thinner and narrower than the
     base cells and would be overlooked.
     """

@@ -50,8 +50,6 @@ def _balance(s: Settings) -> dict[str, Any]:
 def control(s: Settings, balance: bool = True) -> str:
     """Write ``controlDict``.
 
-    Notes
-    -----
     ``forces`` holds blade and hub of the sector that is solved; ``standing`` duct, stator and centre body; ``plate``
     the plate; ``radial`` the blade in bins along x, which blade 1 lies on (no bins for the whole rotor). ``mass_...``,
     ``momentum_...``, ``open`` and ``sides`` are for :mod:`bemt.cfd.balance`.

@@ -33,47 +33,30 @@ PIPE_RADIUS = 0.998
 
 @dataclass(frozen=True)
 class Body:
-    """Extents of one exported part.
+    """Extents of one exported part."""
 
-    Parameters
-    ----------
-    low, high : float
-        Least and greatest z. [m]
-    radius : float
-        Greatest radius. [m]
-    """
-
+    # Least and greatest z [m]
     low: float
     high: float
-    radius: float
+    radius: float  # Greatest radius [m]
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """Where the blades are, for the grid.
+    """Where the blades are, for the grid."""
 
-    Parameters
-    ----------
-    low, high : float
-        z of the blades' lowest and highest point. [m]
-    tip_low, tip_high : float
-        z of the tip section. [m]
-    tip_half_angle : float
-        Half of the angle that the tip section takes about the shaft. [rad]
-    """
-
+    # z of the blades' lowest and highest point [m]
     low: float
     high: float
+    # z of the tip section [m]
     tip_low: float
     tip_high: float
-    tip_half_angle: float
+    tip_half_angle: float  # Half of the angle that the tip section takes about the shaft [rad]
 
 
 def sector_choice(blades: int, sideslip: float = 0.0) -> str:
     """Choose the smallest periodic part: one blade from three up, else half, all of it in oblique flow.
 
-    Examples
-    --------
     >>> sector_choice(2), sector_choice(3), sector_choice(2, 0.3), sector_choice(1)
     ('half', 'blade', 'full', 'full')
     """
@@ -84,90 +67,44 @@ def sector_choice(blades: int, sideslip: float = 0.0) -> str:
 
 @dataclass(frozen=True)
 class Settings:
-    """One case.
+    """One case."""
 
-    Parameters
-    ----------
-    R, Rhub : float
-        Tip and hub radius. [m]
-    B : int
-        Number of blades.
-    rotation : {+1, -1}
-        Sense of rotation about z.
-    rotor : Body
-        Extents of blades and hub.
-    blades : Sweep
-        Extents of the blades.
-    rpm : float
-        Speed. [rev/min]
-    rho, mu, a_sound, temperature : float
-        Density [kg/m3], viscosity [Pa s], speed of sound [m/s] and temperature [K] far away.
-    V : float
-        Speed of the wind; positive is flight forwards. [m/s]
-    sideslip : float
-        Angle between the shaft and the wind, 0 to 90 deg; needs the whole rotor. [rad]
-    sector : str
-        ``half`` (even blade counts), ``blade`` (three blades or more) or ``full``.
-    domain : str
-        ``free`` or ``pipe`` (cylinder of the propeller's diameter, frictionless, open at both ends).
-    level : float
-        The cells on the blade are R / 2^(level + 2) wide and all others scale with them. [1]
-    turbulence : str
-        ``kOmegaSST`` or ``realizableKE``, with wall functions.
-    compressible : bool
-        Whether rhoSimpleFoam runs instead of simpleFoam.
-    gas : str
-        ``isentropic`` (density follows pressure) or ``perfect`` (energy equation; see `flow`).
-    duct, body : Body or None
-        Extents of the duct and of the centre body or stator, when exported.
-    gap : float
-        Radial tip clearance in the duct. [m]
-    plate_z : float or None
-        Where the face of a round plate behind the rotor lies, negative. [m]
-    plate_radius : float
-        Its radius. [m]
-    pitch : float
-        Geometric pitch at 0.75 R; 0 when unknown. [m]
-    iterations, average : int
-        Iterations, and how many of the last are averaged.
-    ranks : int
-        Processes when nothing else is said at run time.
-    zone : str
-        ``grid``: the rotating zone ends on planes of the base grid, so that both periodic sides are cut alike;
-        ``margin``: wherever a margin of 0.15 R ends, as runs before that rule have it (their grids can be made again).
-    surfaces : tuple of str
-        Surfaces in ``constant/triSurface``; blade and hub among them.
-    """
-
+    # Tip and hub radius [m]
     R: float
     Rhub: float
-    B: int
-    rotation: int
-    rotor: Body
-    blades: Sweep
-    rpm: float
+    B: int  # Number of blades
+    rotation: int  # Sense of rotation about z
+    rotor: Body  # Extents of blades and hub
+    blades: Sweep  # Extents of the blades
+    rpm: float  # Speed [rev/min]
+    # Density [kg/m3], viscosity [Pa s], speed of sound [m/s] and temperature [K] far away
     rho: float
     mu: float
     a_sound: float
     temperature: float
-    V: float = 0.0
-    sideslip: float = 0.0
-    sector: str = "half"
-    domain: str = "free"
-    level: float = 6.0
-    turbulence: str = "kOmegaSST"
-    compressible: bool = False
-    gas: str = "isentropic"
+    V: float = 0.0  # Speed of the wind; positive is flight forwards [m/s]
+    sideslip: float = 0.0  # Angle between the shaft and the wind, 0 to 90 deg; needs the whole rotor [rad]
+    sector: str = "half"  # ``half`` (even blade counts), ``blade`` (three blades or more) or ``full``
+    domain: str = "free"  # ``free`` or ``pipe`` (cylinder of the propeller's diameter, frictionless, open at both ends)
+    level: float = 6.0  # The cells on the blade are R / 2^(level + 2) wide and all others scale with them [1]
+    turbulence: str = "kOmegaSST"  # ``kOmegaSST`` or ``realizableKE``, with wall functions
+    compressible: bool = False  # Whether rhoSimpleFoam runs instead of simpleFoam
+    gas: str = "isentropic"  # ``isentropic`` (density follows pressure) or ``perfect`` (energy equation; see `flow`)
+    # Extents of the duct and of the centre body or stator, when exported
     duct: Body | None = None
     body: Body | None = None
-    gap: float = 0.0
-    plate_z: float | None = None
-    plate_radius: float = 0.0
-    pitch: float = 0.0
+    gap: float = 0.0  # Radial tip clearance in the duct [m]
+    plate_z: float | None = None  # Where the face of a round plate behind the rotor lies, negative [m]
+    plate_radius: float = 0.0  # Its radius [m]
+    pitch: float = 0.0  # Geometric pitch at 0.75 R; 0 when unknown [m]
+    # Iterations, and how many of the last are averaged
     iterations: int = 400
     average: int = 100
-    ranks: int = 2
+    ranks: int = 2  # Processes when nothing else is said at run time
+    # ``grid``: the rotating zone ends on planes of the base grid, so that both periodic sides are cut alike;
+    # ``margin``: wherever a margin of 0.15 R ends, as runs before that rule have it (their grids can be made again)
     zone: str = "grid"
+    # Surfaces in ``constant/triSurface``; blade and hub among them
     surfaces: tuple[str, ...] = field(default=("blade", "hub"))
 
     def __post_init__(self) -> None:

@@ -13,8 +13,6 @@ Entries = Mapping[str, Any]
 def vector(*components: float) -> str:
     """Give a vector or a list of numbers in parentheses.
 
-    Examples
-    --------
     >>> vector(0, 0, -1.5)
     '(0 0 -1.5)'
     """
@@ -24,8 +22,6 @@ def vector(*components: float) -> str:
 def value_text(value: Any) -> str:
     """Give one value: numbers with nine digits, booleans as words, sequences in parentheses, texts as they are.
 
-    Examples
-    --------
     >>> value_text(True), value_text(0.1 + 0.2), value_text(["a", (0, 1)])
     ('true', '0.3', '(a (0 1))')
     """
@@ -41,8 +37,6 @@ def value_text(value: Any) -> str:
 def block(entries: Entries, depth: int = 0) -> str:
     """Give the entries of a dictionary, nested ones in braces.
 
-    Examples
-    --------
     >>> print(block({"a": 1, "b": {"c": "uniform 0"}}), end="")
     a 1;
     b

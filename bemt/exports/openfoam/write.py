@@ -18,8 +18,8 @@ from bemt.base.tables import write_atomic
 from bemt.base.toml import Collector, Table, check_field, entry
 from bemt.case import Case
 from bemt.case.schema import AIRSPEED, RPM
-from bemt.exports.openfoam import Body, Settings, Sweep, case_files, sector_choice
-from bemt.exports.openfoam.settings import MACH_COMPRESSIBLE
+from bemt.exports.openfoam.case import case_files
+from bemt.exports.openfoam.settings import MACH_COMPRESSIBLE, Body, Settings, Sweep, sector_choice
 from geometry.common import GeometryError
 from geometry.export import MANIFEST, export
 from geometry.mesh import Options, build
@@ -47,47 +47,33 @@ class RunRanges(Table):
 
 @dataclass(frozen=True)
 class Run:
-    """What is asked of a CFD run; the case gives the rest.
+    """What is asked of a CFD run; the case gives the rest."""
 
-    Parameters
-    ----------
-    rpm, airspeed_m_s : float or None
-        Operating point; None is the case's. [rev/min, m/s]
-    sideslip_deg : float
-        Angle between shaft and wind, 0 to 90. With a frozen rotor (MRF) this is an approximation: the blades are seen
-        at one azimuth only. [deg]
-    solver : str or None
-        ``incompressible`` or ``compressible``; None decides by the helical tip Mach number, compressible above 0.5.
-    gas : str
-        As in :class:`bemt.exports.openfoam.settings.Settings`.
-    sector, domain, turbulence, level, iterations, average, ranks, zone
-        As there; `sector` None is the smallest that fits.
-    wall_distance_over_R, plate_radius_over_R : float or None
-        Where a round plate stands behind the rotor, and its radius. [R]
-    """
-
+    # Operating point; None is the case's [rev/min, m/s]
     rpm: float | None = None
     airspeed_m_s: float | None = None
+    # Angle between shaft and wind, 0 to 90. With a frozen rotor (MRF) this is an approximation: the blades are seen at
+    # one azimuth only [deg]
     sideslip_deg: float = 0.0
+    # ``incompressible`` or ``compressible``; None decides by the helical tip Mach number, compressible above 0.5
     solver: str | None = None
-    gas: str = "isentropic"
-    sector: str | None = None
-    domain: str = "free"
-    turbulence: str = "kOmegaSST"
-    level: float = 6.0
+    gas: str = "isentropic"  # As in :class:`bemt.exports.openfoam.settings.Settings`
+    sector: str | None = None  # As there; `sector` None is the smallest that fits
+    domain: str = "free"  # As there; `sector` None is the smallest that fits
+    turbulence: str = "kOmegaSST"  # As there; `sector` None is the smallest that fits
+    level: float = 6.0  # As there; `sector` None is the smallest that fits
+    # Where a round plate stands behind the rotor, and its radius [R]
     wall_distance_over_R: float | None = None
     plate_radius_over_R: float = 2.0
-    iterations: int = 400
-    average: int = 100
-    ranks: int = 2
-    zone: str = "grid"
+    iterations: int = 400  # As there; `sector` None is the smallest that fits
+    average: int = 100  # As there; `sector` None is the smallest that fits
+    ranks: int = 2  # As there; `sector` None is the smallest that fits
+    zone: str = "grid"  # As there; `sector` None is the smallest that fits
 
 
 def check_run(run: Run, names: Mapping[str, str] | None = None, file: str = "") -> list[Fault]:
     """Find the numbers of a run that are not finite or out of range.
 
-    Examples
-    --------
     >>> for fault in check_run(Run(rpm=float("nan"), level=20.0)): print(fault)
     rpm: got nan; expected a number from 10 to 300000 rev/min.
     level: got 20; expected a number from 4 to 9.
