@@ -17,6 +17,7 @@ from bemt.diagnose.suggest import LEVEL
 from bemt.diagnose.verdict import (
     BESIDE,
     END,
+    ENOUGH,
     GATE,
     LARGEST,
     LEFT_OVER,
@@ -184,6 +185,13 @@ RULES: tuple[Rule, ...] = (
         lambda a: _nothing(a, "nothing explains the readings better than the noise"),
         "0.5",
         "posterior odds",
+    ),
+    Rule(
+        "unknown, and not much better than nothing",
+        lambda a: a.P[UNKNOWN] > 0.5 and a.vague < ENOUGH,
+        lambda a: a.says("insufficient", "something smooth that is not in the library leads, but not by enough"),
+        "0.5, ENOUGH",
+        "as of a name: stands differed from cases of a label by 5 and were called unknown",
     ),
     Rule(
         "unknown is likelier than all",
