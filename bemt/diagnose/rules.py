@@ -326,7 +326,8 @@ RULES: tuple[Rule, ...] = (
     Rule(
         BESIDE_IT,
         lambda a: (
-            not a.paired and (len(a.group) <= 1 if a.sure else a.beside and not a.on and mass(a.found, a.group) >= SURE)
+            not a.paired
+            and (len(a.group) <= 1 if a.sure else bool(a.beside) and not a.on and mass(a.found, a.group) >= SURE)
         ),
         lambda a: replace(
             a.says(
