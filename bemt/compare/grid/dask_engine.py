@@ -133,19 +133,9 @@ def _solve(token: str, packed: bytes, number: int) -> Solved:
 
 
 class Cluster:
-    """Engine on a Dask cluster, an existing one or one of processes on this machine.
+    """Engine on a Dask cluster: at the address of a scheduler, or local processes, started when first needed.
 
-    Parameters
-    ----------
-    scheduler : str, optional
-        Address of a scheduler; by default a local cluster is started when the first grid needs it.
-    workers : int, optional
-        Processes of the local cluster; by default one per core.
-
-    Raises
-    ------
-    InputError
-        When the scheduler does not answer.
+    Raises InputError when the scheduler does not answer.
     """
 
     def __init__(self, scheduler: str | None = None, workers: int | None = None) -> None:
