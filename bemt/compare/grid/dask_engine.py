@@ -123,8 +123,8 @@ def _solver(token: str, packed: bytes) -> GridSolver:
 
 def _check(address: str, where: str, got: str, expected: str, hint: str) -> None:
     if got != expected:
-        raise InputError(Fault(f"worker {address}", where, f"other bits ({got[:12]})", f"those of this machine "
-                               f"({expected[:12]}), so that the answer is the same", hint))  # fmt: skip
+        wanted = f"those of this machine ({expected[:12]}), so that the answer is the same"
+        raise InputError(Fault(f"worker {address}", where, f"other bits ({got[:12]})", wanted, hint))
 
 
 def _solve(token: str, packed: bytes, number: int) -> Solved:
@@ -177,9 +177,9 @@ class Cluster:
             self._client.wait_for_workers(1, timeout=PATIENCE)
         except (OSError, ValueError, TimeoutError) as error:
             self.__exit__(None, None, None)
-            raise InputError(Fault("", "--scheduler", f"{self.scheduler} ({_first_line(error)})",
-                                   "the address of a running Dask scheduler with a worker, as in tcp://host:8786",
-                                   "Start `dask scheduler` and `dask worker ADDRESS`")) from error  # fmt: skip
+            got, hint = f"{self.scheduler} ({_first_line(error)})", "Start `dask scheduler` and `dask worker ADDRESS`"
+            expected = "the address of a running Dask scheduler with a worker, as in tcp://host:8786"
+            raise InputError(Fault("", "--scheduler", got, expected, hint)) from error
         return self._client
 
     def __call__(self, case: Case, grid: Grid, numbers: Sequence[int], form: str | None) -> Generator[Solved]:
@@ -217,8 +217,9 @@ class Cluster:
         except (ImportError, RuntimeError) as error:
             if isinstance(error, RuntimeError) and "deserializ" not in str(error):
                 raise
-            raise InputError(Fault("", "--engine dask", f"a cluster that cannot load the work ({_first_line(error)})",
-                                   "bemt of this version on the scheduler and on every worker")) from error  # fmt: skip
+            got = f"a cluster that cannot load the work ({_first_line(error)})"
+            expected = "bemt of this version on the scheduler and on every worker"
+            raise InputError(Fault("", "--engine dask", got, expected)) from error
         finally:
             client.cancel([*out, work])
 
