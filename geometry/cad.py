@@ -20,8 +20,6 @@ from geometry.mesh_duct import StatorPlan, centre_body, duct_profile, plan_stato
 from geometry.rotor import Rotor
 from geometry.solid import Mesh, profile_volume
 
-__all__ = ["Parts", "assembly", "blade_solid", "planar_sections", "solids", "tessellate"]
-
 MM = 1000.0
 TOLERANCE = 5e-3
 _POINTS = 45

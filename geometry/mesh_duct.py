@@ -14,8 +14,6 @@ from geometry.common import Array, GeometryError
 from geometry.duct import Duct, Stator
 from geometry.solid import Mesh, Options, as_solid, check_closed, join, profile_volume, revolve, skin
 
-__all__ = ["StatorPlan", "centre_body", "duct_mesh", "duct_profile", "plan_stator", "vane_rows"]
-
 CLEARANCE = 0.04  # axial distance of hub and centre body over the bore radius
 THICKNESS = 0.10  # symmetric NACA section of vanes that have none: an assumption
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from bemt.diagnose.problem import Problem
     from bemt.diagnose.verdict import Decision
 
-__all__ = ["FACTOR", "RESTLESS", "Suspect", "finding", "judged", "levels", "of_recorded", "suspects"]
+__all__ = ["FACTOR", "RESTLESS", "Suspect", "finding", "judged", "levels", "of_recorded", "suspects", "to_mend"]
 
 FACTOR = 3.0
 """Thrust or torque over that of the case, or under it, from which on the question comes first [1]."""
@@ -36,6 +36,8 @@ _SHOWN = 3
 _POLE_PAIRS = (2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 14, 16, 18, 20, 21)
 _ANGLES_DEG = (-12.0, -9.0, -6.0, -3.0, 3.0, 6.0, 9.0, 12.0, 16.0)
 _BLADES = (1, 2, 3, 4, 5, 6, 8, 12)
+_ERROR = ": error: "
+_CONTRADICTED = "a recording contradicts itself: what physics leaves over cannot be told from that"
 # Effects that are such a slip themselves.
 _SLIPS = ("unit_slip", "rpm_scale")
 
@@ -123,6 +125,26 @@ def _restless(problem: Problem) -> dict[str, float]:
     return {c: s for c, s in problem.scatter.items() if s > RESTLESS}
 
 
+def _impossible(problem: Problem) -> tuple[str, ...]:
+    """What recordings show that cannot be so."""
+    return tuple(f for f in problem.findings if _ERROR in f)
+
+
+def to_mend(problem: Problem, decision: Decision) -> str:
+    """What comes before any run: whose rotor it is, or what cannot be so and would be in a reference, too."""
+    if decision.verdict != "insufficient":
+        return ""
+    if _suspicious(levels(problem)):
+        slips = "; ".join(f"{k}. {s.words}" for k, s in enumerate(suspects(problem)[:_SHOWN], 1))
+        return f"make sure that the case is this rotor; what else would explain the loads: {slips}"
+    wrong = _impossible(problem)
+    alone = all(not part.record.reference for part in problem.parts)
+    if not wrong or not (alone or decision.why == _CONTRADICTED):
+        return ""
+    file, _, what = wrong[0].partition(_ERROR)
+    return f"mend {file} before any run: {what.partition('Correction: ')[2] or what}"
+
+
 def finding(problem: Problem) -> str:
     """Question to the user, "" where the loads may be those of the case's rotor, at rest but for what is recorded."""
     found, names = levels(problem), {"thrust_N": "thrust", "torque_Nm": "torque"}
@@ -139,6 +161,8 @@ def judged(problem: Problem, decision: Decision) -> Decision:
     if _restless(problem) and decision.verdict not in ("none", "unknown"):
         why = "repeats at one condition differ by more than any stand's: what changes between them is not recorded"
         return replace(decision, verdict="insufficient", effects=(), classes=(), why=why)
+    if decision.verdict == "unknown" and _impossible(problem):
+        return replace(decision, verdict="insufficient", classes=(), why=_CONTRADICTED)
     slip = decision.verdict in ("named", "sensor") and set(decision.effects) & set(_SLIPS)
     if slip or not _suspicious(levels(problem)):
         return decision

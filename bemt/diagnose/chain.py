@@ -244,6 +244,10 @@ def _next(
         commands: tuple[str, ...] = (given.command(reference=file), given.comparison(file))
     elif chosen.kind in ("run", "look"):
         commands = (given.command(run=file),)
+    elif chosen.kind == "air":
+        commands = given.of_days()
+    elif chosen.kind == "mend":
+        commands = tuple(f"python -m bemt import {f}" for f in given.recordings)
     else:
         commands = ()
     return replace(chosen, commands=commands)
@@ -255,8 +259,12 @@ def _settling(found: evidence.Evidence, decision: verdict.Decision, best: fittin
     singles = sorted(single, key=lambda i: -single[i])
     if decision.verdict == "none":
         return suggestion.nothing_called_for(found)
+    if mend := another_rotor.to_mend(found.problem, decision):
+        return suggestion.Suggestion(mend, (), (), 0.0, 0.0, "mend")
     if not singles:
         return suggestion.Suggestion(suggestion.REFERENCE, (), (), 0.0, 0.0, "reference")
+    if decision.verdict == "insufficient" and (note := suggestion.weather(found)):
+        return note
     lead = best.ids[0] if best.ids else singles[0]
     rivals = [i for i in (*decision.effects, *(j for g in decision.classes for j in g), *singles) if i != lead]
     first = (lead, fitting.fit(found, Explanation.of(lead)).settings[0])

@@ -35,8 +35,8 @@ _WHITE = 0.2
 # nuisances, with the prior weight.  Declared after volume 1 of the UIUC database, where thrust and torque at rest are
 # off by 3 and 5 % (median) and one propeller in ten by more than 10 %.
 _MODEL = {(0.003, 0.3): 0.2, (0.01, 0.6): 0.25, (0.03, 1.0): 0.3, (0.08, 1.0): 0.25}
-# Without a reference: probability that the rotor is a real one, of which no more is known than the case says; sizes of
-# what those differ by (heavy tails of the population, two of its six quantiles' means) and what is added at least.
+# Probability that the rotor is a real one, of which no more is known than the case, and a reference, say; smooth error
+# beside, and size of what those differ by (heavy tails of the population, two for its six quantiles).
 _REAL, _REAL_SIZES = 0.5, {(0.01, 1.0): 0.8, (0.08, 2.0): 0.2}
 # Reference recordings show the error of the solver, however large: it need not be kept small by its prior.
 _MODEL_SHOWN = {(0.0, 1.0): 0.15, (0.01, 1.0): 0.2, (0.03, 1.0): 0.2, (0.08, 1.0): 0.2, (0.25, 1.0): 0.25}
@@ -60,7 +60,7 @@ _RIVAL_SIZES = (0.03, 0.12)
 # A balance or mount that stays behind while its load falls (hysteresis as ISO 376 and OIML R 60 define it, decreasing
 # less increasing load; not checked): shares of the largest reading, length over the load, least fall that is one, and
 # fewest points of either kind.
-_BEHIND, _BEHIND_LENGTH, _FALL, _FEW = (0.01, 0.04), 0.5, 0.02, 4
+_BEHIND, _BEHIND_LENGTH, _FALL, _FEW = (0.01, 0.04), 0.5, 0.002, 4
 
 
 # What every law of the flow depends on, and the spread below which a variable hardly changes it: natural logarithms of
@@ -107,14 +107,18 @@ def hypers(problem: Problem) -> tuple[Hyper, ...]:
     """All settings, with prior weights that add up to 1."""
     scales = _SCALES[problem.u_known]
     each = 1.0 / (len(scales) * len(_AR))
-    alone = problem.free.all()
-    model = {(m, f, 0.0): w for (m, f), w in (_MODEL if alone else _MODEL_SHOWN).items()}
-    if alone and all(p.as_built is not None for p in problem.parts):
+    model = {(m, f, 0.0): w for (m, f), w in (_MODEL if problem.free.all() else _MODEL_SHOWN).items()}
+    if all(p.as_built is not None for p in problem.parts):
         model = {k: (1.0 - _REAL) * w for k, w in model.items()}
         model |= {(least, 1.0, size): _REAL * w for (least, size), w in _REAL_SIZES.items()}
     apart = _SESSIONS if np.ptp(problem.covariates["run"]) > 0.0 else {0.0: 1.0}
-    return tuple(Hyper(s, a, m, f, each * w * v, d, real)
-                 for s in scales for a in _AR for (m, f, real), w in model.items() for d, v in apart.items())  # fmt: skip
+    return tuple(
+        Hyper(s, a, m, f, each * w * v, d, real)
+        for s in scales
+        for a in _AR
+        for (m, f, real), w in model.items()
+        for d, v in apart.items()
+    )
 
 
 def in_time(covariates: Mapping[str, Array]) -> tuple[Array, Array]:

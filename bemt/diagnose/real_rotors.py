@@ -48,15 +48,19 @@ def covariance(problem: Problem) -> Array:
 def _of_points(parts: Sequence[Part], rpm: Array, J: Array, Re: Array) -> Array:
     """Of one rotor at the points of some recordings, thrust [N] first, then torque [N m], (2 P, 2 P)."""
     p, known, model = population(), parts[0].as_built, parts[0].model
+    assert known is not None
     state = {k: np.concatenate([getattr(q.record.air, k) for q in parts]) for k in _AIR}
     here = sense(coefficients(model, air_of(state)), model.diameter_m, rpm, J, Re, known.drawn)
     f, top, T = (np.nan_to_num(v) for v in (here.f, here.top, here.T))
     top = np.where(top == 0.0, _NOTHING, top)
-    slopes = T.transpose(0, 2, 1).reshape(2 * rpm.size, -1)
     # that the population is not centred at the case is one more thing that is not known of this rotor
-    usual = slopes @ (known.prior.mean - known.drawn) + p.bias(here.x, top).reshape(-1)
-    rest = p.rest(model.diameter_m, here.x, Re, f, top)
-    C = slopes @ known.prior.cov @ slopes.T + rest + np.outer(usual, usual)
+    usual = p.bias(here.x, top).reshape(-1)
+    C = p.rest(model.diameter_m, here.x, Re, f, top)
+    if not any(q.record.reference for q in parts):  # it shows the blade itself
+        slopes = T.transpose(0, 2, 1).reshape(2 * rpm.size, -1)
+        C += slopes @ known.prior.cov @ slopes.T
+        usual += slopes @ (known.prior.mean - known.drawn)
+    C += np.outer(usual, usual)
     thrust = state["rho"] * (rpm / 60.0) ** 2 * model.diameter_m**4
     unit = np.concatenate([thrust, thrust * model.diameter_m / (2.0 * np.pi)])
     return np.asarray(C * unit[:, None] * unit[None, :])

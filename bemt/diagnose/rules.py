@@ -17,6 +17,7 @@ from bemt.diagnose.suggest import LEVEL
 from bemt.diagnose.verdict import (
     BESIDE,
     END,
+    ENOUGH,
     GATE,
     LARGEST,
     LEFT_OVER,
@@ -186,6 +187,13 @@ RULES: tuple[Rule, ...] = (
         "posterior odds",
     ),
     Rule(
+        "unknown, and not much better than nothing",
+        lambda a: a.P[UNKNOWN] > 0.5 and a.vague < ENOUGH,
+        lambda a: a.says("insufficient", "something smooth that is not in the library leads, but not by enough"),
+        "0.5, ENOUGH",
+        "as of a name: stands differed from cases of a label by 5 and were called unknown",
+    ),
+    Rule(
         "unknown is likelier than all",
         lambda a: a.P[UNKNOWN] > 0.5,
         lambda a: a.says(
@@ -317,15 +325,17 @@ RULES: tuple[Rule, ...] = (
     ),
     Rule(
         BESIDE_IT,
-        lambda a: bool(a.sure) and not a.paired and len(a.group) <= 1,
+        lambda a: (
+            not a.paired and (len(a.group) <= 1 if a.sure else a.beside and not a.on and mass(a.found, a.group) >= SURE)
+        ),
         lambda a: replace(
             a.says(
                 "class",
-                f"{a.sure[0]} is at work; whether another effect is, too, is left open",
-                (*a.sure, *a.beside[: MOST - 1]),
-                a.share[a.sure[0]],
+                f"{' or '.join(a.group)} is at work; whether another effect is, too, is left open",
+                (*a.group, *a.beside[: MOST - 1]),
+                mass(a.found, a.group),
             ),
-            sets=(a.sure, a.beside[: MOST - 1]),
+            sets=(a.group, a.beside[: MOST - 1]),
         ),
         "SURE, PARTNER, MOST",
         "declared",

@@ -13,6 +13,7 @@ from bemt import effects
 from bemt.air import R_DRY
 from bemt.base.units import ZERO_CELSIUS
 from bemt.bem import model as bem
+from bemt.compare.recordings import DAYS
 from bemt.diagnose import noise
 from bemt.diagnose.assemble import assemble
 from bemt.diagnose.nuisance import PRIORS
@@ -23,7 +24,7 @@ from bemt.diagnose.signatures import effect_of
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence
 
-__all__ = ["LEVEL", "REFERENCE", "Given", "Suggestion", "nothing_called_for", "suggest"]
+__all__ = ["LEVEL", "REFERENCE", "Given", "Suggestion", "nothing_called_for", "suggest", "weather"]
 
 Array = NDArray[np.float64]
 
@@ -32,6 +33,9 @@ REFERENCE = (
     "or another rotor of the kind that is known to be right)"
 )
 """The run that settles most: it shows how far model and stand differ anyway."""
+
+# Loads of a run and its reference that differ by such a share may be of days of different density.
+_DAYS = 0.03, 0.15
 
 LEVEL = 0.1
 """A load off the case by more than this, at usual, is no agreement, even if calibration may be that far off [1]."""
@@ -69,6 +73,11 @@ class Given:
         """Command that sets the first recording beside a reference."""
         return f"python -m bemt compare {reference} {self.recordings[0]}"
 
+    def of_days(self) -> tuple[str, ...]:
+        """Command that compares with each reference in the air of both days."""
+        air = "--air-a 20C,1013hPa --air-b 20C,1013hPa"
+        return tuple(f"{self.comparison(file)} {air}" for file in self.references or ("REFERENCE",))
+
 
 @dataclass(frozen=True)
 class Suggestion:
@@ -85,7 +94,8 @@ class Suggestion:
     before, after : float
         Distance of the two in standard deviations, now and with the run [1].
     kind : str
-        "run", "reference" (a run without the cause), "look" (without a run), or "" when nothing is called for.
+        "run", "reference" (a run without the cause), "look" (without a run), "mend" (the recording), "air" (write it
+        down), or "" when nothing is called for.
     commands : tuple of str
         What to type then.
     """
@@ -213,13 +223,32 @@ def _distance(problem: Problem, covariance_of: noise.Hyper, a: Array, b: Array) 
 def nothing_called_for(found: Evidence) -> Suggestion:
     """What is left to say after "none": nothing to do, and what would show fainter causes."""
     if _referenced(found):
-        return Suggestion("no further run is called for", (), (), 0.0, 0.0, "")
+        return weather(found) or Suggestion("no further run is called for", (), (), 0.0, 0.0, "")
     level = max((abs(v) for v in found.problem.level.values()), default=0.0)
     if level > LEVEL:
         text = f"{REFERENCE}; it says whether the level is the blade's, the stand's or the model's"
         return Suggestion(text, (), (), 0.0, 0.0, "reference")
     text = "no further run is called for; with a reference (the same rotor before the change) fainter causes would show"
     return Suggestion(text, (), (), 0.0, 0.0, "reference")
+
+
+def weather(found: Evidence) -> Suggestion | None:
+    """Air to be written down, where a run differs from its reference and nobody knows the air of both."""
+    known = all(p.record.air_recorded for p in found.problem.parts)
+    apart = 0.0 if known else _apart(found.problem)
+    return Suggestion(DAYS, (), (), 0.0, 0.0, "air") if _DAYS[0] < apart < _DAYS[1] else None
+
+
+def _apart(problem: Problem) -> float:
+    """Largest share by which a load of the test differs from its reference, what the model changes taken out."""
+    out = [0.0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = problem.y / problem.f0
+    for c in np.unique(problem.channel):
+        test, known = (ratio[(problem.channel == c) & (problem.free == free)] for free in (True, False))
+        if test.size and known.size:
+            out.append(abs(float(np.median(test) / np.median(known)) - 1.0))
+    return max(out)
 
 
 def _referenced(found: Evidence) -> bool:

@@ -23,8 +23,6 @@ from bemt.base import units
 from bemt.formula import k1k2 as empirical
 from bemt.recordings.findings import Facts, Finding, check_for
 
-__all__ = ["Relation", "Slip", "relations", "slips"]
-
 Array = NDArray[np.float64]
 EXACT = 0.03
 """Relative width of a relation that holds within the file."""

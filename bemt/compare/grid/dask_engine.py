@@ -32,8 +32,6 @@ from bemt.case.schema import CaseFile
 from bemt.compare.grid.identity import program_hash
 from bemt.compare.grid.run import Grid, GridSolver, Solved, solve_chunk
 
-__all__ = ["Cluster"]
-
 IN_FLIGHT = 2
 """Chunks per worker thread that are out at a time: one at work, one waiting; this bounds the memory."""
 SAMPLE = 256
@@ -95,7 +93,7 @@ _own = threading.local()
 
 
 def _carry(work: bytes) -> bytes:
-    """Give back what it takes: as a task, the work is made again from the scheduler when its holders die."""
+    """Return the argument: as a task, the scheduler can make the work again when its holders die."""
     return work
 
 

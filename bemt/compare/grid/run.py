@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from bemt.air import Air
     from bemt.dataset import Dataset
 
-__all__ = ["CHUNK", "Engine", "Grid", "GridSolver", "run_grid", "solve_chunk"]
-
 CHUNK = 50_000
 """Points per chunk, at most."""
 MAX_AIRS = 100_000

@@ -22,7 +22,7 @@ from typing import Any
 import bemt
 from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError, system_fault
 from bemt.base.tables import plain, remove_stale
-from bemt.base.toml import Collector
+from bemt.base.toml_text import Collector
 from bemt.case import Case, check_name, find_cases, load_case, repeated_names
 from bemt.compare.grid.formats import FORMATS, require_extra
 from bemt.compare.grid.run import Engine, run_grid
@@ -39,7 +39,7 @@ Ready = tuple[Case, str]
 
 
 def _fit(name: str) -> bool:
-    """Whether a name may name a folder."""
+    """Whether a name can be that of a folder."""
     out = Collector("")
     check_name(out, name)
     return bool(name.strip()) and not out.faults

@@ -1,0 +1,107 @@
+"""Every verdict says what to do next and what to type then, and blames no physics for what a real rotor differs by."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
+import pytest
+from diagnosing import case, diagnose, left_out, points, recording
+
+from bemt.asbuilt.latents import AsBuilt
+from bemt.dataset import Dataset
+from bemt.diagnose import another_rotor, chain, rules, verdict
+from bemt.diagnose.document import text
+from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
+from bemt.diagnose.record import Record, from_series
+
+
+def of(series: Dataset, reference: bool = False, findings: tuple[str, ...] = ()) -> Record:
+    return replace(from_series(series, case()), reference=reference, findings=findings)
+
+
+def told(*records: Record) -> chain.Diagnosis:
+    return chain.diagnose(records, [case()])
+
+
+def step(d: chain.Diagnosis) -> list[str]:
+    """Lines from "Next:" on that say what to do and what to type."""
+    lines = text(d).split("\n")
+    first = next(i for i, line in enumerate(lines) if line.strip().startswith("Next: "))
+    return [
+        lines[first].strip(),
+        *(line.strip() for line in lines[first:] if line.strip().startswith("python -m bemt")),
+    ]
+
+
+REAL = AsBuilt(angle_deg=1.0, lift=-0.06, drag=0.2, low_re_lift=0.05, camber_deg=0.5)
+
+
+@pytest.fixture(scope="module")
+def grid() -> dict[str, np.ndarray]:
+    return points("grid")
+
+
+def test_a_blade_as_far_off_as_real_ones_are_is_no_cause(grid: dict[str, np.ndarray]) -> None:
+    said = told(of(recording(case(), grid, (REAL,))))
+    assert said.decision.verdict in ("none", "insufficient")
+    assert "reference" in step(said)[0] and "--reference" in step(said)[1]
+
+
+def test_beside_a_reference_at_other_speeds_it_is_none_either(grid: dict[str, np.ndarray]) -> None:
+    slow = grid["rpm"] < 14000.0
+    known, test = ({k: v[rows] for k, v in grid.items()} for rows in (slow, ~slow))
+    said = told(of(recording(case(), test, (REAL,), seed=1)), of(recording(case(), known, (REAL,)), reference=True))
+    assert said.decision.verdict == "none"
+    assert "no further run is called for" in step(said)[0]
+
+
+def test_a_named_effect_has_a_step_and_a_command(grid: dict[str, np.ndarray]) -> None:
+    said = diagnose(recording(case(), grid), left_out("compressibility", case()))
+    assert said.decision.verdict == "named"
+    assert len(step(said)) > 1
+
+
+def test_a_recording_that_contradicts_itself_is_mended_first(grid: dict[str, np.ndarray]) -> None:
+    wrong = "log.csv: error: power_above_input (torque x speed): 1.5 times. Correction: unit or gain of the torque"
+    problem = SimpleNamespace(findings=(wrong,), scatter={}, level={"thrust_N": 0.0}, parts=())
+    found = verdict.Decision("unknown", (), Explanation.of(), 0.9, 5.0, (), "a smooth rest")
+    said = another_rotor.judged(cast("chain.Problem", problem), found)
+    assert said.verdict == "insufficient"
+    assert "unit or gain of the torque" in another_rotor.to_mend(cast("chain.Problem", problem), said)
+
+
+def test_the_loads_of_another_rotor_bring_the_question_first(grid: dict[str, np.ndarray]) -> None:
+    series = recording(case(), grid)
+    series = replace(
+        series, values={**series.values, "thrust_N": 5.0 * series["thrust_N"], "torque_Nm": 7.0 * series["torque_Nm"]}
+    )
+    said = told(of(series))
+    assert said.decision.verdict == "insufficient"
+    assert "this rotor" in step(said)[0] and step(said)[1].startswith("python -m bemt import")
+
+
+def test_a_level_beside_a_reference_asks_for_the_weather_of_both_days() -> None:
+    given = points("static")
+    first = recording(case(), given)
+    later = replace(first, values={**first.values, "thrust_N": 1.035 * first["thrust_N"]})
+    said = told(
+        *(replace(of(s, r).only(("thrust_N",)), air_recorded=False) for s, r in ((later, False), (first, True)))
+    )
+    assert said.decision.verdict in ("none", "insufficient")
+    assert "temperature and pressure" in step(said)[0] and "--air-a" in step(said)[1]
+
+
+def test_what_is_asked_of_a_name_is_asked_of_something_unknown() -> None:
+    asked = SimpleNamespace(
+        first=Explanation.of("section"),
+        p_value=0.002,
+        P={NONE: 0.05, Explanation.of("section"): 0.05, UNKNOWN: 0.9},
+        vague=5.0,
+    )
+    asked.says = lambda v, why, **_: verdict.Decision(v, (), Explanation.of(), 0.9, 0.0, (), why)
+    assert rules.decide(cast("verdict.Asked", asked)).verdict == "insufficient"
+    asked.vague = 12.0
+    assert rules.decide(cast("verdict.Asked", asked)).verdict == "unknown"
