@@ -157,7 +157,7 @@ def asked(**changed: Any) -> Any:
         "expected": False, "paired": False, "sure": ("reynolds",), "group": ("reynolds",), "beside": (), "few": (),
         "P": {NONE: 0.0, UNKNOWN: 0.0, lead: 1.0}, "share": {"reynolds": 1.0}, "unlisted": 0.0, "roughness": 1.0,
         "vague": 0.0, "alone": True, "level": 0.0, "another_blade": False,
-        "parameters": {"reynolds": {}},
+        "factor": False, "parameters": {"reynolds": {}},
     }  # fmt: skip
     return SimpleNamespace(
         **(plain | changed), found=SimpleNamespace(log_bayes=lambda _: 100.0, probability={lead: 1.0})
