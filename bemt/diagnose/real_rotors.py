@@ -7,7 +7,6 @@ calibration alone called 14 unknown and named a cause of 5.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -55,7 +54,7 @@ def _of_points(parts: Sequence[Part], rpm: Array, J: Array, Re: Array) -> Array:
     f, top, T = (np.nan_to_num(v) for v in (here.f, here.top, here.T))
     top = np.where(top == 0.0, _NOTHING, top)
     # that the population is not centred at the case is one more thing that is not known of this rotor
-    usual = p.bias(replace(here, T=T)).reshape(-1)
+    usual = np.nan_to_num(p.bias(here)).reshape(-1)
     C = p.rest(model.diameter_m, here.x, Re, f, top)
     if not any(q.record.reference for q in parts):  # it shows the blade itself
         slopes = T.transpose(0, 2, 1).reshape(2 * rpm.size, -1)
