@@ -2,7 +2,7 @@
 
 >>> import bemt
 >>> bemt.propeller("10x5").solve(rpm=6000).thrust_N.round(1)
-array([5.1])
+array([4.8])
 
 Everything is loaded when it is first used.
 """

@@ -36,7 +36,7 @@ ANGLE_SD = {"cad": 0.1, "scan": 0.5}
 as far off as optical stations.  Those of stations and labels are part of the fit."""
 CHORD_SD, CHORD_SD_SMALL = 0.21, 0.45
 """Scatter of ln(lift) and ln(drag) for a chord that only the label tells, from 7 in up and below, calibrated: of 87
-propellers of UIUC the chord itself scatters by 0.17 and 0.25 around the law of `bemt.case.fresh` (each family left out
+propellers of UIUC the chord itself scatters by 0.17 and 0.25 around a power of the diameter (each family left out
 of it), but from the label alone these widths predict them better (log score -0.09 a point for -0.12), as the blade's
 law is unknown too [1]."""
 LABEL_NU = 2.9

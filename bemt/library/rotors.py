@@ -110,7 +110,7 @@ class Propeller:
         Examples
         --------
         >>> propeller("10x5").unknowns["blade.max_chord_over_R"]
-        '0.15 .. 0.31'
+        '0.14 .. 0.29'
         """
         return {item.key: item.range_text for item in self.case.assumptions}
 
@@ -147,7 +147,7 @@ class Propeller:
         --------
         >>> d = propeller("10x5").solve(rpm=[6000, 9000])
         >>> d.thrust_N.round(1), d.power_W.round(0)
-        (array([ 5.1, 11.7]), array([ 49., 169.]))
+        (array([ 4.8, 11. ]), array([ 46., 156.]))
         """
         n, V = self._conditions(rpm, airspeed_m_s, J)
         density = None if density_kg_m3 is None else float(numbers("density_kg_m3", density_kg_m3))
@@ -196,7 +196,7 @@ class Propeller:
         --------
         >>> d = propeller("10x5").curve(rpm=6000, J=[0.0, 0.3, 0.6])
         >>> bool(d.u["CT"][0] > 0), d.CT.round(2)
-        (True, array([0.1 , 0.07, 0.01]))
+        (True, array([0.09, 0.06, 0.01]))
         """
         given = J is not None or airspeed_m_s is not None
         n = np.atleast_1d(numbers("rpm", self.case.rpm if rpm is None else rpm))
