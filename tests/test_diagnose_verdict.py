@@ -156,7 +156,7 @@ def asked(**changed: Any) -> Any:
         "first": lead, "leading": lead, "rest": 0.0, "odds": 100.0, "needed": 8.0, "p_value": 0.002, "on": False,
         "expected": False, "paired": False, "sure": ("reynolds",), "group": ("reynolds",), "beside": (), "few": (),
         "P": {NONE: 0.0, UNKNOWN: 0.0, lead: 1.0}, "share": {"reynolds": 1.0}, "unlisted": 0.0, "roughness": 1.0,
-        "vague": 0.0, "alone": True, "level": 0.0, "another_blade": False,
+        "vague": 0.0, "alone": True, "level": 0.0, "another_blade": False, "factor": False,
         "parameters": {"reynolds": {}},
     }  # fmt: skip
     return SimpleNamespace(
@@ -169,7 +169,8 @@ ROWS: dict[str, dict[str, Any]] = {
     "nulls look like it": {"p_value": 0.2},
     "nulls nearly look like it": {"p_value": 0.03},
     "nothing is likelier than anything": {"P": {NONE: 0.6, UNKNOWN: 0.0}},
-    "unknown is likelier than all": {"P": {NONE: 0.0, UNKNOWN: 0.6}},
+    "unknown, and not much better than nothing": {"P": {NONE: 0.0, UNKNOWN: 0.6}, "vague": 5.0},
+    "unknown is likelier than all": {"P": {NONE: 0.0, UNKNOWN: 0.6}, "vague": 12.0},
     "a smooth rest is left": {"rest": 10.5},
     "not much better than nothing": {"odds": 7.0},
     "twin faults": {"leading": Explanation.of("thrust_zero", "torque_drift")},
