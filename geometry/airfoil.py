@@ -16,8 +16,6 @@ from numpy.typing import ArrayLike
 
 from geometry.common import Array, Faults, GeometryError, frozen, pchip
 
-__all__ = ["Airfoil", "blend", "naca", "naca4", "plate"]
-
 
 def _spaced(n: int) -> Array:
     """Chord fractions 0..1 with half-cosine spacing, n points."""

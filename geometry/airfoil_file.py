@@ -9,8 +9,6 @@ import numpy as np
 from geometry.airfoil import Airfoil
 from geometry.common import Faults
 
-__all__ = ["parse_dat"]
-
 
 def _numbers(text: str, faults: Faults) -> tuple[str, list[tuple[int, float, float]]]:
     """Read title and number pairs with their line numbers; note what is neither."""

@@ -18,8 +18,6 @@ from numpy.typing import ArrayLike
 from geometry.airfoil import Airfoil, blend
 from geometry.common import Array, Faults, GeometryError, frozen, pchip, pchip_slopes
 
-__all__ = ["Blade", "Stations", "from_stations"]
-
 
 class Stations(NamedTuple):
     """Blade elements as a solver consumes them: centre radius, width, chord [m] and blade angle [rad], each (n,)."""

@@ -10,8 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Array", "Faults", "GeometryError", "frozen", "needs", "pchip", "pchip_slopes"]
-
 Array = NDArray[np.float64]
 
 

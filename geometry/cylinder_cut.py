@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from geometry.common import Array
 from geometry.section_fit import loop_area
 
-__all__ = ["blades", "loops"]
-
 Faces = NDArray[np.int64]
 
 

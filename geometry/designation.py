@@ -7,8 +7,6 @@ import re
 
 from geometry.common import Faults, GeometryError
 
-__all__ = ["parse_designation"]
-
 
 def parse_designation(text: str) -> tuple[float, float, int | None]:
     """Read a propeller designation: diameter x pitch in inches, with an optional blade count.

@@ -15,8 +15,6 @@ from geometry.airfoil import Airfoil
 from geometry.common import Array, Faults
 from geometry.rotor import Rotor
 
-__all__ = ["Duct", "Stator", "around"]
-
 
 @dataclass(frozen=True)
 class Stator:

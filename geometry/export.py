@@ -24,8 +24,6 @@ from geometry.mesh import MeshModel, Options, build
 from geometry.rotor import Rotor
 from geometry.solid import Mesh
 
-__all__ = ["FORMATS", "MANIFEST", "SCHEMA", "UNITS", "export", "read_solid"]
-
 FORMATS = ("stl", "step", "obj", "openfoam")
 UNITS = {"mm": 1e-3, "m": 1.0, "in": 0.0254}
 SCHEMA = "geometry.export/1"

@@ -13,8 +13,6 @@ from geometry.airfoil import Airfoil
 from geometry.blade import Blade, from_stations
 from geometry.common import Array, Faults, GeometryError
 
-__all__ = ["CHORD_LAWS", "PITCH_LAWS", "Law", "LawParameter", "chord_over_R", "from_laws", "helix"]
-
 
 @dataclass(frozen=True)
 class LawParameter:

@@ -14,8 +14,6 @@ import numpy as np
 from geometry.common import Array, GeometryError, needs
 from geometry.solid import Faces
 
-__all__ = ["PictureError", "draw", "times"]
-
 CUT = "#f0cf8e"
 
 

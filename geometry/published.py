@@ -7,8 +7,6 @@ import numpy as np
 from geometry.airfoil import Airfoil
 from geometry.common import Array, Faults, pchip
 
-__all__ = ["PUBLISHED", "published", "thickened"]
-
 # Deters, Ananda and Selig (2014), Reynolds Number Effects on the Performance of Small-Scale Propellers, AIAA 2014-2151,
 # appendix A, table 4 (read from a transcription, not from the paper): x, y in Selig order.  The trailing edge is blunt
 # (0.011) so that 5 in blades could be printed.

@@ -11,8 +11,6 @@ from numpy.typing import ArrayLike
 from geometry.blade import Blade
 from geometry.common import Array, Faults
 
-__all__ = ["Rotor"]
-
 
 @dataclass(frozen=True, eq=False)
 class Rotor:

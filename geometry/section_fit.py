@@ -10,8 +10,6 @@ import numpy as np
 from geometry.airfoil import Airfoil
 from geometry.common import Array, GeometryError
 
-__all__ = ["Cut", "fit_section", "loop_area", "nose_first"]
-
 
 class Cut(NamedTuple):
     """One section: chord in the outline's unit, beta [rad], the rest over the chord [-], the unit-chord shape."""

@@ -19,8 +19,6 @@ from geometry.cylinder_cut import blades
 from geometry.rotor_axis import PROBES, frame, pick
 from geometry.section_fit import Cut, fit_section, nose_first
 
-__all__ = ["FoundRotor", "find_rotor"]
-
 Faces = NDArray[np.int64]
 
 
@@ -68,9 +66,7 @@ def _hub(points: Array, faces: Faces, tip: float, count: int) -> float:
     return high
 
 
-def find_rotor(
-    vertices: Array, faces: Faces, stations: int = 28
-) -> FoundRotor:
+def find_rotor(vertices: Array, faces: Faces, stations: int = 28) -> FoundRotor:
     """Find the rotor in a mesh and cut its blades.
 
     The shaft is the principal direction of inertia about which the cuts of all blades are alike to third moments. The

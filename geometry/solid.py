@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 
 from geometry.common import Array, Faults, GeometryError, needs
 
-__all__ = ["Mesh", "Options", "as_solid", "check_closed", "join", "profile_volume", "revolve", "skin"]
-
 Faces = NDArray[np.int64]
 
 

@@ -14,8 +14,6 @@ from geometry.mesh_duct import centre_body, duct_profile, plan_stator, vane_rows
 from geometry.rotor import Rotor
 from geometry.solid import Options
 
-__all__ = ["Surface", "surfaces"]
-
 COARSE = Options(n=41)
 RINGS = 29
 TURN = 61

@@ -419,6 +419,13 @@ def test_a_run_that_a_campaign_beside_has_is_taken_over(project: Path, tmp_path:
     run_campaign(first, tmp_path / "w", ranks=1)
     record = run_campaign(second, tmp_path / "w", ranks=1)
     assert calls(programs, "simpleFoam") == 2 and [row["rpm"] for row in record.rows] == [9000]
+    found = record.rows[0]["balance_mass"]
+    path = first.path.parent / "recording.csv"  # as if it had been made before the balance was checked
+    path.write_text(path.read_text().replace(f",{float(found):.7g},", ",,"))
+    (second.path.parent / "recording.csv").unlink()
+    assert any(math.isnan(old["balance_mass"]) for old in CampaignRecord(first).rows)
+    run_campaign(second, tmp_path / "w", ranks=1)
+    assert calls(programs, "simpleFoam") == 3, "it does not count as evidence: it is run"
 
 
 def row(level: float, thrust: float, **more: Any) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,8 +11,9 @@ from diagnosing import case, left_out, points, recording
 
 from bemt.asbuilt.latents import AsBuilt
 from bemt.dataset import Dataset
-from bemt.diagnose import chain
+from bemt.diagnose import chain, noise
 from bemt.diagnose.assemble import build
+from bemt.diagnose.load import load
 from bemt.diagnose.record import from_series
 from bemt.diagnose.repeats import conditions, noise_sizes, projected_out, spread_sizes
 from bemt.effects.ground_effect import GroundEffect
@@ -127,3 +129,45 @@ def test_a_motor_that_does_not_do_as_told_keeps_its_misfit_to_itself() -> None:
     assert answer.systems["drive"]["verdict"] in ("unknown", "insufficient")
     loads = chain.diagnose([record], [left_out("compressibility", base)], nulls=200, channels=["torque_Nm"])
     assert set(loads.scores) == {"torque_Nm"} and loads.systems["drive"]["verdict"] == "not recorded"
+
+
+def test_readings_given_the_others_are_as_likely_as_all() -> None:
+    rng = np.random.default_rng(4)
+    root = rng.standard_normal((12, 12))
+    C, u, mine = root @ root.T + np.eye(12), np.full(12, 0.1), np.arange(12) % 3 > 0
+    r, s = rng.standard_normal(12), np.where(mine, rng.standard_normal(12), 0.0)
+    whole, part = noise.whitener(C, u), noise.conditional(C, u, mine)
+    assert part.log_det == pytest.approx(whole.log_det)
+    for change in (0.0 * s, s):
+        left = whole(r - change)
+        rest = part(r) - part.changes(change)
+        assert 0.5 * rest @ rest + part.misfit(r) == pytest.approx(0.5 * left @ left)
+
+
+@pytest.mark.parametrize(("rows", "kept"), [(160, True), (1200, False)])
+def test_a_short_log_of_step_responses_keeps_its_transients(tmp_path: Path, rows: int, kept: bool) -> None:
+    t = 0.025 * np.arange(rows)
+    target = np.array([6000.0, 12000.0, 8000.0, 14000.0])[(4 * np.arange(rows)) // rows]
+    rpm = np.empty(rows)
+    rpm[0] = target[0]
+    for k in range(1, rows):
+        rpm[k] = rpm[k - 1] + 0.12 * (target[k] - rpm[k - 1])
+    table = np.column_stack([rpm, 1e-7 * rpm**2, 1.5e-9 * rpm**2, t])
+    file = tmp_path / "steps.csv"
+    np.savetxt(file, table, delimiter=",", header="rpm,thrust_N,torque_Nm,time_s", comments="", fmt="%.7g")
+    n = len(load(str(file), case()))
+    assert n > 0.9 * rows if kept else n < 0.1 * rows
+
+
+def test_a_balance_that_stays_behind_is_nothing_in_the_library() -> None:
+    up = points("static")
+    there_and_back = np.r_[np.arange(17), np.arange(16, -1, -1)]
+    given = {k: v[there_and_back] for k, v in up.items()} | {"time_s": 20.0 * np.arange(34.0)}
+    series = recording(case(), given, noise=0.003)
+    behind = np.r_[np.zeros(17), np.ones(17)]
+    full = {k: float(np.max(series[k])) for k in ("thrust_N", "torque_Nm")}
+    late = {k: series[k] + 0.03 * full[k] * behind * (1.0 - (series[k] / full[k]) ** 2) for k in full}
+    record = from_series(replace(series, values={**series.values, **late}), case())
+    answer = chain.diagnose([record], [case()])
+    assert answer.decision.verdict == "unknown"
+    assert answer.found.states[0].best_rival.split(":")[0].endswith("while the load falls")

@@ -12,7 +12,7 @@ from diagnosing import case, diagnose, left_out, points, recording
 
 from bemt import effects
 from bemt.bem import model as bem
-from bemt.diagnose import blocks, chain, confusion, fit, interval_scales, noise, prior, rules, verdict
+from bemt.diagnose import blocks, chain, confusion, fit, interval_scales, noise, prior, rules, signatures, verdict
 from bemt.diagnose.assemble import build
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
 from bemt.diagnose.record import from_series
@@ -170,7 +170,7 @@ ROWS: dict[str, dict[str, Any]] = {
     "nulls nearly look like it": {"p_value": 0.03},
     "nothing is likelier than anything": {"P": {NONE: 0.6, UNKNOWN: 0.0}},
     "unknown, and not much better than nothing": {"P": {NONE: 0.0, UNKNOWN: 0.6}, "vague": 5.0},
-    "unknown is likelier than all": {"P": {NONE: 0.0, UNKNOWN: 0.6}, "vague": 12.0},
+    "unknown is likelier than all": {"P": {NONE: 0.0, UNKNOWN: 0.6}, "vague": 20.0},
     "a smooth rest is left": {"rest": 10.5},
     "not much better than nothing": {"odds": 7.0},
     "twin faults": {"leading": Explanation.of("thrust_zero", "torque_drift")},
@@ -274,3 +274,19 @@ def test_a_number_that_may_as_well_be_off_is_not_pinned_to_its_end() -> None:
     low = {"value": 0.7, "low": 0.7, "high": 1.1}
     assert not rules.at_end("section", {"drag": low})
     assert rules.at_end("section", {"drag": {**low, "high": 0.9}})
+
+
+def test_two_effects_are_weighed_as_they_act_together(answer: chain.Diagnosis) -> None:
+    found, state = answer.found, answer.found.states[0]
+    assert state.mixed
+    for pair, (extra, i, j) in state.mixed.items():
+        a, b = (found.of(k).settings[c - found.spans[k].start] for k, c in zip(pair, (i, j), strict=True))
+        solved = [signatures.effect_of(k, s) for k, s in zip(pair, (a, b), strict=True)]
+        parts = [found.problem.signature((e,)) for e in solved]
+        together = found.problem.signature(tuple(solved)) - sum(parts)
+        np.testing.assert_allclose(extra, state.white.changes(together), atol=1e-9)
+        rest = state.r - state.S[:, i] - state.S[:, j] - extra
+        A, B = (found.spans[k] for k in pair)
+        total = state.both(pair, found.spans, found.log_w)[i - A.start, j - B.start]
+        expected = 0.5 * state.r @ state.r - 0.5 * rest @ rest + found.log_w[i] + found.log_w[j]
+        assert total == pytest.approx(expected, abs=1e-6)

@@ -364,7 +364,7 @@ def test_links_lead_somewhere(project: Path, document: str) -> None:
     assert all((path.parent / target).exists() for target in targets)
     named = re.findall(r"`((?:bemt|geometry|cases|tests|docs|\.ci)/[\w./]+)`", text)
     made_up = set(re.findall(r"^`([^`]+)`:$", text, flags=re.M))
-    made_up |= {"tests/test_importers_example_stand.py", "cases/example", "cases/mine"}
+    made_up |= {"tests/test_readers_example_stand.py", "cases/example", "cases/mine"}
     assert [name for name in named if not (project / name).exists() and name not in made_up] == []
 
 

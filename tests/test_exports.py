@@ -1,7 +1,8 @@
-"""The promise of the exports: what is written is what the solver says, within the stated error, or it is refused."""
+"""Exports: what is written is what the solver says, within the stated error, whole, or it is refused."""
 
 from __future__ import annotations
 
+import hashlib
 import importlib.util
 import json
 import os
@@ -15,12 +16,24 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bemt.base.errors import InputError
 from bemt.base.tables import write_atomic
 from bemt.case import Case, load_case
 from bemt.commands.cli import main
 from bemt.exports import exports, target_ids
 from bemt.exports.base import FEATURES, Files, Job, LoadsExport, entry
+from bemt.exports.folder import export_case
+from bemt.exports.openfoam.write import Run, settings_of
 from bemt.exports.performance import solve_points
+from geometry import export as module
+from geometry.airfoil import naca4
+from geometry.common import GeometryError
+from geometry.duct import around
+from geometry.export import export, read_solid
+from geometry.laws import helix
+from geometry.mesh import Options
+from geometry.rotor import Rotor
+from geometry.slicing import find_rotor
 
 NUMBERS = [word for word in target_ids() if word not in ("stl", "obj", "step", "openfoam")]
 LOADS = [word for word in NUMBERS if word in ("jsbsim", "mujoco", "rotorpy", "gazebo", "px4", "ardupilot", "simulink",
@@ -337,3 +350,322 @@ def test_a_fan_that_dfdc_holds_comes_back_with_its_duct(fan: Job, tmp_path: Path
 def test_dfdc_comes_back_within_its_stated_error(fan: Job) -> None:
     stated = entry(exports()["dfdc"], fan, written("dfdc", fan))["fit_error_pct"]
     assert stated["thrust"]["at_point"] < 10.0 and stated["torque"]["at_point"] < 10.0
+
+
+# The promise of the files: whole, named, with their unit, never half written; stations read back make a case.
+
+
+COARSE = Options(n=61)
+
+
+@pytest.fixture(scope="module")
+def propeller() -> Rotor:
+    return Rotor(helix(0.15, 0.1, anchors=naca4(0.04, 0.4, 0.12)), 3, -1)
+
+
+def test_files_are_closed_named_and_state_their_unit(propeller: Rotor, tmp_path: Path) -> None:
+    import trimesh
+
+    duct = around(propeller, 0.08, 0.001, 0.004)
+    manifest = export(propeller, duct, tmp_path, ["stl", "obj", "openfoam"], name="p", unit="mm", options=COARSE)
+    stored = json.loads((tmp_path / "manifest.json").read_text())
+    assert [item["sha256"] for item in stored["files"]] == [item["sha256"] for item in manifest["files"]]
+    named = {item["path"]: item for item in stored["files"]}
+    assert set(named) == {"p.stl", "p.obj", *(f"constant/triSurface/{n}.stl" for n in ("blade", "hub", "duct"))}
+    on_disk = {p.relative_to(tmp_path).as_posix() for p in tmp_path.rglob("*") if p.is_file()}
+    assert on_disk == {*named, "manifest.json"}
+    for path, item in named.items():
+        assert hashlib.sha256((tmp_path / path).read_bytes()).hexdigest() == item["sha256"]
+        assert item["unit"] == ("m" if item["format"] == "openfoam" else "mm")
+    volume = stored["volumes_m3"]["volume_rotor_mesh"] + stored["volumes_m3"]["volume_duct_mesh"]
+    for name, size in (("p.stl", 150.0), ("p.obj", 150.0)):
+        points, faces, unit = read_solid(tmp_path / name)
+        solid = trimesh.Trimesh(points, faces, process=False)
+        assert unit == "mm" and solid.is_watertight and solid.is_winding_consistent and solid.body_count == 2
+        assert solid.volume == pytest.approx(volume * 1e9, rel=1e-6)
+        assert np.ptp(points[:, 0]) > size
+    words = [line.split()[1] for line in (tmp_path / "p.stl").read_text().splitlines() if line.startswith("solid ")]
+    assert words == ["blade", "hub", "duct"]
+    assert (tmp_path / "constant/triSurface/blade.stl").read_text(encoding="ascii").startswith("solid blade\n")
+    blade, _, _ = read_solid(tmp_path / "constant/triSurface/blade.stl")
+    assert np.hypot(blade[:, 0], blade[:, 1]).max() == pytest.approx(0.075, rel=1e-6)
+
+
+def test_metres_are_a_thousandth(propeller: Rotor, tmp_path: Path) -> None:
+    for unit in ("mm", "m"):
+        export(propeller, None, tmp_path / unit, ["stl"], name="p", unit=unit, options=COARSE)
+    (a, _, u), (b, _, v) = (read_solid(tmp_path / unit / "p.stl") for unit in ("mm", "m"))
+    assert (u, v) == ("mm", "m")
+    assert np.ptp(a, axis=0) == pytest.approx(1000 * np.ptp(b, axis=0), rel=1e-6)
+
+
+def test_two_runs_write_the_same_solids(propeller: Rotor, tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        export(propeller, None, tmp_path / name, ["stl", "obj"], name="p", options=COARSE)
+    for file in ("p.stl", "p.obj", "manifest.json"):
+        assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
+
+
+def test_nothing_is_left_of_a_refused_export(propeller: Rotor, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(GeometryError, match="duct.gap"):
+        export(propeller, around(propeller, 0.08, 0.0), tmp_path / "a", ["stl"], options=COARSE)
+    monkeypatch.setattr(module, "_stl", lambda *args: "solid blade\nendsolid blade\n")
+    with pytest.raises(GeometryError):
+        export(propeller, None, tmp_path / "b", ["obj", "stl"], options=COARSE)
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_open_file_is_noticed(propeller: Rotor, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = module._stl
+    monkeypatch.setattr(module, "_stl", lambda points, faces, title: whole(points, faces[1:], title))
+    with pytest.raises(GeometryError, match="open or twisted edges"):
+        export(propeller, None, tmp_path / "a", ["stl"], options=COARSE)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("kind", ["stl", "obj"])
+def test_stations_of_an_export_make_a_case_that_solves(
+    kind: str, propeller: Rotor, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    export(propeller, None, tmp_path, [kind], name="my prop", unit="m", options=COARSE)
+    assert main(["stations", str(tmp_path / f"my prop.{kind}"), "--out", str(tmp_path / "case"), "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert (document["schema"], document["blades"], document["rotation"]) == ("bemt.stations/1", 3, "left")
+    case = load_case(tmp_path / "case")
+    rotor = case.rotor()
+    assert (rotor.B, rotor.rotation) == (3, -1)
+    assert rotor.R == pytest.approx(0.075, rel=1e-5)
+    r = np.linspace(0.25, 0.95, 29) * 0.075
+    (chord, beta), (chord0, beta0) = rotor.blade.at(r), propeller.blade.at(r)
+    assert chord == pytest.approx(chord0, rel=0.005)
+    assert np.degrees(beta) == pytest.approx(np.degrees(beta0), abs=0.1)
+    assert rotor.blade.section(0.05).thickness == pytest.approx(0.12, abs=2e-3)
+    assert rotor.blade.section(0.05).camber == pytest.approx(0.04, abs=1e-3)
+    if kind == "stl":
+        assert main(["sweep", str(tmp_path / "case"), "--json"]) == 0
+        assert json.loads(capsys.readouterr().out)["cases"]
+    again = ["stations", str(tmp_path / f"my prop.{kind}"), "--out", str(tmp_path / "case")]
+    assert main(again) == 0
+    edited = (tmp_path / "case" / "case.toml").read_bytes() + b"# mine\n"
+    (tmp_path / "case" / "case.toml").write_bytes(edited)
+    assert main(again) == 2
+    assert (tmp_path / "case" / "case.toml").read_bytes() == edited
+
+
+def test_a_scan_becomes_a_new_case_with_its_unknowns(
+    propeller: Rotor, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    export(propeller, None, tmp_path, ["stl"], name="found", unit="m", options=COARSE)
+    out = tmp_path / "new"
+    words = [
+        "new",
+        "mine",
+        "--scan",
+        str(tmp_path / "found.stl"),
+        "--rpm",
+        "7000",
+        "--airspeed",
+        "4",
+        "--out",
+        str(out),
+    ]
+    assert main(words) == 0
+    case = load_case(out)
+    assert (case.name, case.rpm, case.airspeed_m_s, case.file.blade.known_from) == ("mine", 7000.0, 4.0, "scan")
+    assert (case.rotor().B, case.diameter_m) == (3, pytest.approx(0.15, rel=1e-5))
+    assert {a.key for a in case.assumptions} == {"model.n_crit", "model.drag_level", "air.density_kg_m3"}
+    capsys.readouterr()
+    assert main(["sweep", str(out), "--json"]) == 0
+    row = json.loads(capsys.readouterr().out)["cases"][0]["rows"][0]
+    assert row["converged"] and row["u_input"] > 0 and row["u_model"] > 0
+    before = (out / "case.toml").read_bytes()
+    assert main(words) == 2
+    assert (out / "case.toml").read_bytes() == before
+
+
+def test_step_is_written_read_back_and_cut(propeller: Rotor, tmp_path: Path) -> None:
+    try:
+        import cadquery  # noqa: F401
+    except ImportError as error:
+        pytest.skip(f"cadquery cannot be loaded (it needs libGL, libX11 and libexpat): {error}")
+    manifest = export(propeller, None, tmp_path, ["step"], name="p", unit="m", options=COARSE)
+    words = (tmp_path / "p.step").read_text().replace(" ", "")
+    assert "LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT($,.METRE.)" in words and "SI_UNIT(.MILLI.,.METRE.)" not in words
+    volumes = manifest["volumes_m3"]
+    assert volumes["volume_rotor_cad"] == pytest.approx(volumes["volume_rotor_mesh"], rel=5e-3)
+    points, faces, unit = read_solid(tmp_path / "p.step")
+    found = find_rotor(points, faces)
+    assert (unit, found.B, found.rotation) == ("m", 3, -1)
+    inside = (found.r > 0.25 * found.R) & (found.r < 0.95 * found.R)
+    chord, beta = propeller.blade.at(found.r)
+    assert np.abs(found.chord / chord - 1)[inside].max() < 0.005
+    assert np.degrees(np.abs(found.beta - beta))[inside].max() < 0.15
+    assert found.axis[2] > 1 - 1e-6
+    assert found.R == pytest.approx(0.075, rel=2e-4)
+
+
+def test_the_unit_is_asked_for_not_guessed(
+    propeller: Rotor, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    export(propeller, None, tmp_path, ["stl"], name="p", unit="mm", options=COARSE)
+    path = tmp_path / "p.stl"
+    assert main(["stations", str(path), "--unit", "m"]) == 2
+    assert "mm, which the file states" in capsys.readouterr().err
+    path.write_text(path.read_text().replace(" unit=mm", ""))
+    assert main(["stations", str(path)]) == 2
+    assert "Give --unit?" in capsys.readouterr().err.replace("Give --unit.", "Give --unit?")
+    assert main(["stations", str(path), "--unit", "mm"]) == 0
+    assert "diameter 150.00 mm" in capsys.readouterr().out
+    assert main(["stations", str(path), "--unit", "m"]) == 2
+    assert "Another --unit?" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"solid x\nendsolid x\n", b"\x00" * 200, b"ISO-10303-21;\nHEADER;", b"v 1 2\n"]
+)
+@pytest.mark.parametrize("kind", ["stl", "obj"])
+def test_a_broken_file_is_an_input_error(
+    content: bytes, kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / f"x.{kind}"
+    path.write_bytes(content)
+    assert main(["stations", str(path), "--unit", "mm"]) == 2
+    assert "expected" in capsys.readouterr().err
+
+
+def test_export_command_prints_one_document(project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "o"
+    assert main(["export", str(project / "cases/prop_8x5"), "--out", str(out), "--format", "openfoam", "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["schema"] == "bemt.export/1"
+    assert [s["name"] for item in document["cases"][0]["files"] for s in item["surfaces"]] == ["blade", "hub"]
+    thick = ["--format", "stl", "--min-thickness-mm", "5"]
+    assert main(["export", str(project / "cases/prop_8x5"), "--out", str(tmp_path / "q"), *thick]) == 2
+    assert "at least min_thickness, 5 mm" in capsys.readouterr().err
+    assert not (tmp_path / "q").exists()
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if not p.is_dir()}
+
+
+def copies(project: Path, folder: Path, names: dict[str, str]) -> Path:
+    """Cases in folders, with names of their own."""
+    for sub, name in names.items():
+        shutil.copytree(project / "cases" / "prop_8x5", folder / sub)
+        path = folder / sub / "case.toml"
+        text = path.read_text()
+        assert text.count('name = "prop_8x5"') == 1
+        path.write_text(text.replace('name = "prop_8x5"', f'name = "{name}"'))
+    return folder
+
+
+def test_cases_of_one_name_are_refused_before_anything_is_written(
+    project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    names = {"a": "p", "b": "q", "c": "p", "d": "q", "e": "P", "f": "r"}
+    folder = copies(project, tmp_path / "cases", names)
+    out = tmp_path / "out"
+    assert main(["export", str(folder), "--out", str(out)]) == 2
+    told = capsys.readouterr().err.splitlines()
+    assert [line.split("/cases/")[1].split("/")[0] for line in told] == ["c", "d", "e"]
+    assert f"name: got 'q' as in {folder.as_posix()}/b/case.toml; expected a name of its own." in told[1]
+    assert not out.exists()
+    for name in "cde":
+        shutil.rmtree(folder / name)
+    assert main(["export", str(folder), "--out", str(out)]) == 0
+    assert {p.name for p in out.iterdir()} == {"p", "q", "r"}
+
+
+BAD = [("--rpm", "nan"), ("--rpm", "inf"), ("--rpm", "0"), ("--rpm", "-5"), ("--rpm", "1e6"), ("--rpm", "1e308"),
+       ("--airspeed", "1e4"), ("--airspeed", "-1"), ("--airspeed", "nan"), ("--airspeed", "1e308"),
+       ("--level", "nan"), ("--level", "3.9"), ("--sideslip-deg", "nan"), ("--sideslip-deg", "91")]  # fmt: skip
+
+
+@pytest.mark.parametrize(("option", "value"), BAD)
+def test_numbers_of_the_flow_are_checked_as_those_of_a_case(
+    project: Path, tmp_path: Path, option: str, value: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Refused on the command line and from Python alike, before anything is written."""
+    out = tmp_path / "o"
+    command = ["export", str(project / "cases/prop_8x5"), "--out", str(out), "--format", "stl", "openfoam"]
+    assert main([*command, f"{option}={value}"]) == 2
+    told = capsys.readouterr().err
+    assert told.startswith(f"{option}: got ") and "expected a number from " in told and len(told.splitlines()) == 1
+    assert not out.exists()
+    key = {"--rpm": "rpm", "--airspeed": "airspeed_m_s", "--level": "level", "--sideslip-deg": "sideslip_deg"}[option]
+    with pytest.raises(InputError, match=f"case.toml: {key}: got "):
+        settings_of(load_case(project / "cases" / "prop_8x5"), Run(**{key: float(value)}))
+
+
+def test_all_faults_of_the_options_are_told_at_once(
+    project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["export", str(project / "cases/prop_8x5"), "--out", str(tmp_path / "o"), "--fillet-mm", "-1"]
+    assert main([*command, "--format", "openfoam", "--rpm", "nan", "--airspeed", "1000", "--level", "12"]) == 2
+    told = capsys.readouterr().err
+    assert [line.split(":")[0] for line in told.splitlines()] == ["--rpm", "--airspeed", "--level", "fillet"]
+    assert "from 10 to 300000 rev/min" in told and "from 0 to 300 m/s. Looks like km/h" in told
+    assert main([*command, "--format", "stl", "obj", "--rpm", "9000", "--airspeed", "4", "--sideslip-deg", "5",
+                 "--level", "5", "--domain", "pipe", "--sector", "full", "--turbulence", "realizableKE",
+                 "--incompressible"]) == 2  # fmt: skip
+    told = capsys.readouterr().err
+    assert [line.split(":")[0] for line in told.splitlines()] == [
+        "--rpm", "--airspeed", "--sideslip-deg", "--level", "--domain", "--sector", "--turbulence", "--incompressible",
+        "fillet"]  # fmt: skip
+    assert told.count("expected nothing with the format stl, obj. Formats that read it: ") == 8
+    assert not (tmp_path / "o").exists()
+
+
+def test_an_earlier_export_leaves_nothing_that_no_manifest_lists(project: Path, tmp_path: Path) -> None:
+    case = load_case(project / "cases" / "prop_8x5")
+    mine = {"notes.txt": b"mine", "mine.obj": b"mine", "constant/triSurface/mine.stl": b"mine"}
+
+    def now(formats: list[str], unit: str = "mm") -> set[str]:
+        """What is in the folder after an export, the owner's own files aside, which are as they were."""
+        export_case(case, tmp_path, formats, unit, COARSE)
+        there = files(tmp_path)
+        assert {name: there.pop(name) for name in mine} == mine
+        manifest = json.loads(there.pop("manifest.json"))
+        listed = {item["path"]: item["sha256"] for item in manifest["files"]}
+        listed |= manifest.get("openfoam", {}).get("files", {})
+        assert {name: hashlib.sha256(data).hexdigest() for name, data in there.items()} == listed
+        return {name for name in there if "/" not in name}
+
+    for name, data in mine.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_bytes(data)
+    assert now(["stl", "obj"], "m") == {"prop_8x5.stl", "prop_8x5.obj"}
+    assert now(["stl"]) == {"prop_8x5.stl"}, "the OBJ of the other unit is gone"
+    assert now(["stl", "openfoam"]) == {"prop_8x5.stl", "Allrun"}
+    assert now(["obj"]) == {"prop_8x5.obj"}
+    assert {p.name for p in tmp_path.iterdir() if p.is_dir()} == {"constant"}, "no empty folders"
+    edited = tmp_path / "prop_8x5.obj"
+    edited.write_text("my own edit")
+    export_case(case, tmp_path, ["stl"], "mm", COARSE)
+    assert edited.read_text() == "my own edit", "not what the manifest lists any more"
+
+
+@pytest.mark.parametrize("schema", ["geometry.export/1", "another/1"])
+def test_a_manifest_removes_nothing_elsewhere(project: Path, tmp_path: Path, schema: str) -> None:
+    """A manifest is a file that anybody may have written."""
+    out, case = tmp_path / "out", load_case(project / "cases" / "prop_8x5")
+    (tmp_path / "elsewhere").mkdir()
+    out.mkdir()
+    (out / "link").symlink_to(tmp_path / "elsewhere")
+    (tmp_path / "elsewhere" / "a").write_text("mine")
+    (tmp_path / "b").write_text("mine")
+    (out / "c").symlink_to(tmp_path / "b")
+    (out / "d").write_text("mine")
+    digest = hashlib.sha256(b"mine").hexdigest()
+    paths = ["../b", (tmp_path / "b").as_posix(), "link/a", "c", "", "..", "x/../../b", "link", "a\0b", "d"]
+    listed = [{"path": path, "sha256": digest} for path in paths]
+    (out / "manifest.json").write_text(json.dumps({"schema": schema, "files": listed}))
+    before = files(tmp_path)
+    export_case(case, out, ["stl"], "mm", COARSE)
+    after = files(tmp_path)
+    gone = {"out/d"} if schema == "geometry.export/1" else set()
+    assert {name for name in before if after.get(name) != before[name]} == {"out/manifest.json", *gone}
+    for text in ("", "[]", "{}", '{"schema": "geometry.export/1", "files": [1]}', "[" * 100_000, "\xff"):
+        (out / "manifest.json").write_bytes(text.encode("latin-1"))
+        export_case(case, out, ["stl"], "mm", COARSE)

@@ -10,7 +10,8 @@ from typing import Any
 
 import pytest
 
-from bemt.base.toml import Collector, Limits, Table, limits_of, validated
+from bemt.base.toml import Limits, Table, limits_of, validated
+from bemt.base.toml_text import Collector
 from bemt.case.schema import CaseFile
 from bemt.cfd.schema import CampaignFile
 from bemt.drive.drive_file import DriveToml

@@ -54,7 +54,7 @@ MAY: dict[str, set[str]] = {
     "bemt.commands.*": {"print", "files", "environment", "clock"},  # and nothing else prints
     "bemt.base.cache": {"files", "environment"},
     "bemt.base.folders": {"environment"},
-    "bemt.base.tables|bemt.base.toml": {"files"},
+    "bemt.base.tables|bemt.base.toml_text": {"files"},
     "bemt.case|bemt.case.*": {"files"},
     "bemt.asbuilt.population": {"files"},
     "bemt.readers|bemt.readers.*": {"files"},

@@ -22,8 +22,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.errors import Fault, InputError
 
-__all__ = ["Average", "Mean", "keep_last", "relation", "revolution_average", "steady_average", "time_steps"]
-
 Array = NDArray[np.float64]
 
 DEFAULT_REVOLUTIONS = 4

@@ -24,8 +24,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["cache_dir", "cached_arrays", "clear_memory", "content_key", "installed_version", "used"]
-
 Arrays = dict[str, np.ndarray]
 
 MEMORY_ENTRIES = 256

@@ -9,8 +9,6 @@ from collections.abc import Mapping
 from types import ModuleType
 from typing import Any
 
-__all__ = ["CallableRoom", "as_html", "table_html"]
-
 
 class CallableRoom(ModuleType):
     """Package whose call and signature are those of the function of its name in ``bemt.library``.

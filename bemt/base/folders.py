@@ -7,8 +7,6 @@ from pathlib import Path
 
 from bemt.base.cache import cache_dir
 
-__all__ = ["data_roots", "find_data"]
-
 
 def data_roots() -> list[Path]:
     """Folders that may hold databases, first to last."""

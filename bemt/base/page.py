@@ -12,8 +12,6 @@ from typing import Any
 
 from bemt.base.tables import number_text
 
-__all__ = ["Cell", "num", "render", "table"]
-
 _UNSEEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
 """Control characters, marks that turn the direction of writing, halves of characters."""
 

@@ -15,11 +15,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = [
-    "csv_block", "csv_text", "file_hash", "json_text", "number_text", "plain", "remove_stale", "text_table",
-    "write_atomic",
-]  # fmt: skip
-
 DIGITS = 7
 _POWERS = 10.0 ** np.arange(0, 23)
 

@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
-from bemt.base.toml import Collector, load_toml, validated
+from bemt.base.toml import validated
+from bemt.base.toml_text import Collector, load_toml
 from bemt.case.as_built import CaseAsBuilt, as_built_of, stated_effects
 from bemt.case.build import build_air, build_duct, build_rotor
 from bemt.case.rules import check_case, check_shape, value_at

@@ -8,7 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from bemt.base.toml import Collector, Table, check_field, shown, validated
+from bemt.base.toml import Table, check_field, shown, validated
+from bemt.base.toml_text import Collector
 from bemt.case.schema import GROUPS, INCH, CaseFile, SectionTable
 
 __all__ = ["check_case", "check_shape", "table_at", "value_at"]

@@ -13,7 +13,8 @@ from pydantic import create_model
 from pydantic.fields import FieldInfo
 
 from bemt.base.errors import Fault, InputError
-from bemt.base.toml import Collector, Table, entry, limits_of, load_toml, shown, validated
+from bemt.base.toml import Table, entry, limits_of, shown, validated
+from bemt.base.toml_text import Collector, load_toml
 from bemt.case import Case, check_name, load_case
 from bemt.exports.openfoam.settings import DOMAINS, GASES, SECTORS, TURBULENCE, ZONES
 from bemt.exports.openfoam.write import Run, RunRanges

@@ -12,8 +12,6 @@ import numpy as np
 if TYPE_CHECKING:
     from bemt.compare.recordings import RunChange
 
-__all__ = ["picture"]
-
 # Okabe and Ito 2008, Color Universal Design.
 _A, _B, _BAND, _GREY = "#0072B2", "#D55E00", "#56B4E9", "#8a8a8a"
 _LABEL = {

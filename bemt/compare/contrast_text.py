@@ -11,8 +11,6 @@ from bemt.base.tables import number_text, text_table
 from bemt.compare.recordings import OTHER_STAND
 from bemt.compare.scaling_laws import FAMILY, law
 
-__all__ = ["headline", "text"]
-
 _WORD = {
     "thrust_N": "thrust",
     "torque_Nm": "torque",

@@ -18,8 +18,6 @@ from bemt.formula.estimate import POSSIBLE, estimate, length_faults
 from geometry.common import GeometryError
 from geometry.designation import parse_designation
 
-__all__ = ["SCHEMA", "document", "text"]
-
 SCHEMA = "bemt.estimate/1"
 
 

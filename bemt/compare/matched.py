@@ -23,18 +23,6 @@ from numpy.typing import NDArray
 
 from bemt.compare.stand_run import StandRun
 
-__all__ = [
-    "DRIVE",
-    "LOADS",
-    "MatchedChannel",
-    "MatchedRuns",
-    "Scatter",
-    "covariance",
-    "matched",
-    "prepared",
-    "ratio_of",
-]
-
 Array = NDArray[np.float64]
 
 LOADS = {"thrust": ("thrust_N", "CT"), "torque": ("torque_Nm", "power_W", "CP", "CQ", "electrical_power_W")}

@@ -21,8 +21,6 @@ from bemt.compare.scaling import Judgement, judge, weigh
 from bemt.compare.scaling_laws import FAMILY, law
 from bemt.compare.stand_run import StandRun
 
-__all__ = ["OTHER_STAND", "SCHEMA", "RunChange", "changed", "document"]
-
 DAYS = "note temperature and pressure of both days; density is the first thing that differs between days"
 """What tells two runs apart whose loads differ by a share."""
 SCHEMA = "bemt.comparison/1"
@@ -32,11 +30,11 @@ _TOLD_DENSITY, _BAROMETER, _SURE = 0.012, 0.004, 2.0
 _TOLD_VOLTAGE, _FOLLOWS, _SAME_LOAD = 0.03, 0.3, 0.1
 _NO_TALK = Judgement("insufficient", (), {}, {}, "not recorded in both")
 _TORQUES = {"torque_Nm", "power_W", "CP", "CQ"}
-# Density is asked for where it is not so many times less likely than the likeliest cause.
+# Density is asked for unless it is this many times less likely than the likeliest cause.
 _FIRST = 5.0
 # Change of a load that days of one site can make, in ln.
 _DAY = 0.12
-# How a verdict begins that both recordings tell by themselves.
+# Start of a verdict that rests on what both recordings state.
 _TOLD = ("density as recorded", "by the thermometers", "voltage as recorded")
 _MOVED, _WIDE = 2.5, 1.4
 # Thrust of a propeller of 2.3 times the diameter at one speed: no stand takes both. [1]
@@ -147,7 +145,7 @@ def _with_voltage(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> J
 
 
 def _far_apart(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> Judgement:
-    """No answer where the speeds have nothing in common, unless a ratio of pole pairs explains that very thing."""
+    """No answer where the runs share no speeds, unless a ratio of pole pairs explains just that."""
     loads = [r for r in ratios.values() if r["kind"] in fits.LOADS]
     wide = all(r["extrapolated"] and r["high95"] / r["low95"] > _WIDE for r in loads)
     if not loads or not wide or said.effects == ("rpm_scale",):
@@ -158,7 +156,7 @@ def _far_apart(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> Judg
 
 
 def _far_off(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> Judgement:
-    """No answer where every load is so many times the other that one stand cannot have measured both."""
+    """No answer where loads differ by more than one stand can measure."""
     loads = [abs(math.log(r["ratio"])) for r in ratios.values() if r["kind"] in fits.LOADS]
     if min(loads) < math.log(_FAR_OFF) or said.effects in (("rpm_scale",), ("unit_slip",)):
         return said

@@ -35,7 +35,7 @@ def find_uiuc() -> Path | None:
 
 
 def uiuc_statistics(folder: Path) -> dict[str, Any]:
-    """Hold the K1/K2 model against measured propellers: nominal diameter and pitch, nothing fitted. [-]
+    """Compare the K1/K2 model with measured propellers: nominal diameter and pitch, nothing fitted. [-]
 
     Thrust follows from CT at 1.225 kg/m3: density cancels in the ratio, and so does n.  Propellers without a nominal
     pitch are left out; 3- and 4-blade ones are kept, as the model has no blade count.

@@ -20,8 +20,6 @@ from bemt.compare import matched as fits
 from bemt.compare.matched import MatchedChannel, Scatter
 from bemt.compare.scaling_laws import FAMILY, LAWS, ScalingLaw, law
 
-__all__ = ["NONE", "UNKNOWN", "Judgement", "judge", "weigh"]
-
 Array = NDArray[np.float64]
 
 NONE, UNKNOWN = "none", "unknown"

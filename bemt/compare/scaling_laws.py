@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-__all__ = ["FAMILY", "LAWS", "ScalingLaw", "law"]
-
 _SIZES = (0.02, 0.07, 0.25)
 # Barometers read 970 to 1040 hPa and rooms 0 to 35 C (5 %); 1,000 m are 10 %.
 _AIRS = (0.02, 0.05, 0.1)

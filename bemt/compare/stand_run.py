@@ -17,8 +17,6 @@ from bemt.dataset import DIMENSIONLESS, Dataset
 from bemt.recordings.channels import named
 from bemt.recordings.reduce import reduce, reduction
 
-__all__ = ["StandRun", "selected", "stand_run", "with_air"]
-
 Array = NDArray[np.float64]
 
 _LOADS = ("thrust_N", "torque_Nm", "power_W", "CT", "CP", "CQ")
@@ -229,7 +227,7 @@ def _shifts(points: Dataset, ramp: bool) -> dict[str, float]:
 
 
 def _reduced(imported: Dataset, diameter_m: float | None) -> tuple[Dataset, tuple[str, ...]]:
-    """Steady points; of a ramp without any to speak of, its rows."""
+    """Steady points; for a slow ramp, which has hardly any, its rows."""
     try:
         steady = reduce(imported, diameter_m=diameter_m)
     except InputError:

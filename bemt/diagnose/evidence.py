@@ -34,7 +34,7 @@ _DROP = 8.0
 _KEEP = 6
 _PAIR_LEADERS = 60
 # Leading pairs that are solved together: what one effect changes depends on the other.
-_TOGETHER, _ROUNDS = 24, 2
+_TOGETHER, _ROUNDS = 24, 6
 FOR_NULLS = 3
 """Settings of the covariance, best first, that nulls are weighed under; only these keep what rivals need [1]."""
 
@@ -432,13 +432,15 @@ def _solve_pairs(
             best = state.best_of(pair, spans, log_w)
             if best == state.mixed.get(pair, (None, None, None))[1:]:
                 break
-            chosen = [(of[k], c - spans[k].start) for k, c in zip(pair, best, strict=True)]
-            both = problem.signature(tuple(effect_of(c.id, c.settings[g]) for c, g in chosen))
-            extra = both - sum(c.signatures[:, g] for c, g in chosen)
+            a, b = (effect_of(k, of[k].settings[c - spans[k].start]) for k, c in zip(pair, best, strict=True))
+            extra = problem.signature((a, b)) - problem.signature((a,)) - problem.signature((b,))
             if not np.isfinite(extra).all() or not min(state.half[list(best)]) > 0.0:
                 break
             for s in states:
                 s.mixed[pair] = s.white.changes(extra), *best
+        else:  # it does not settle: what was solved does not say what holds at the best setting
+            for s in states:
+                s.mixed.pop(pair, None)
         for s in states:
             s.log_z[pair] = _log_z(s, pair, spans, log_w)
 

@@ -84,7 +84,7 @@ def load(
             # somebody's own table of points: every row counts, a jump from row to row may be what it shows
             points = _scattered(_points(imported, rows, path), points)
         elif _step_responses(imported, rows, points):
-            points = _points(imported, rows, path)
+            points = replace(_points(imported, rows, path), notes=("short log: every row counts, transients too",))
         made = records.from_series(points, case, shared)
     notes = (*made.notes, *imported.notes, *rows.notes, *_unused(imported, rows, case))
     return replace(made, findings=found, notes=notes)

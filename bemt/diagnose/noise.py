@@ -60,7 +60,7 @@ _RIVAL_SIZES = (0.03, 0.12)
 # A balance or mount that stays behind while its load falls (hysteresis as ISO 376 and OIML R 60 define it, decreasing
 # less increasing load; not checked): shares of the largest reading, length over the load, least fall that is one, and
 # fewest points of either kind.
-_BEHIND, _BEHIND_LENGTH, _FALL, _FEW = (0.01, 0.04), 0.5, 0.02, 4
+_BEHIND, _BEHIND_LENGTH, _FALL, _FEW = (0.01, 0.04), 0.5, 0.002, 4
 
 
 # What every law of the flow depends on, and the spread below which a variable hardly changes it: natural logarithms of

@@ -325,15 +325,18 @@ RULES: tuple[Rule, ...] = (
     ),
     Rule(
         BESIDE_IT,
-        lambda a: bool(a.sure) and not a.paired and len(a.group) <= 1,
+        lambda a: (
+            not a.paired
+            and (len(a.group) <= 1 if a.sure else bool(a.beside) and not a.on and mass(a.found, a.group) >= SURE)
+        ),
         lambda a: replace(
             a.says(
                 "class",
-                f"{a.sure[0]} is at work; whether another effect is, too, is left open",
-                (*a.sure, *a.beside[: MOST - 1]),
-                a.share[a.sure[0]],
+                f"{' or '.join(a.group)} is at work; whether another effect is, too, is left open",
+                (*a.group, *a.beside[: MOST - 1]),
+                mass(a.found, a.group),
             ),
-            sets=(a.sure, a.beside[: MOST - 1]),
+            sets=(a.group, a.beside[: MOST - 1]),
         ),
         "SURE, PARTNER, MOST",
         "declared",

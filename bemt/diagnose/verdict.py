@@ -273,9 +273,10 @@ class Asked:
 
     @cached_property
     def beside(self) -> tuple[str, ...]:
-        """Effects that may be at work beside the one that is sure."""
-        together = {i: self.P.get(Explanation.of(self.sure[0], i), 0.0) for i in inclusion(self.found)}
-        return tuple(i for i, p in together.items() if p >= PARTNER and i not in self.group)
+        """Effects that may be at work beside the one that is sure, or one of its look-alikes."""
+        others = [i for i in inclusion(self.found) if i not in self.group]
+        together = {i: sum(self.P.get(Explanation.of(g, i), 0.0) for g in self.group) for i in others}
+        return tuple(i for i, p in together.items() if p >= PARTNER)
 
     @cached_property
     def known_sets(self) -> tuple[tuple[str, ...], ...]:

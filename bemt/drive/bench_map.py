@@ -26,8 +26,6 @@ from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
 from bemt.drive.map_points import CHANNELS
 
-__all__ = ["BenchMap", "Curve", "HeldOut", "fit", "held_out", "misfit", "repeat_spread"]
-
 Array = NDArray[np.float64]
 NODES = 49
 SMOOTHNESS = 10.0 ** np.arange(-10.0, 0.1, 2.0)

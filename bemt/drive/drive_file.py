@@ -14,8 +14,6 @@ from bemt.base.toml import Table, entry, read_model
 from bemt.drive.drive_model import LIPO_SOC, LIPO_V, Battery, Drive, Esc, Motor
 from bemt.drive.rotor_table import RotorMap
 
-__all__ = ["DriveFile", "DriveToml", "read"]
-
 
 def _slip_mohm(value: float) -> str:
     return "Is that in ohm? Write milliohm" if 0.0 < value < 0.05 else ""

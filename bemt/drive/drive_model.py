@@ -41,8 +41,6 @@ from numpy.typing import ArrayLike, NDArray
 from bemt.drive.rotor_table import RotorMap
 from bemt.effects.motor_heating import COPPER, MAGNET
 
-__all__ = ["EFFECTS", "Battery", "Drive", "Esc", "Motor", "Steady"]
-
 Array = NDArray[np.float64]
 EFFECTS = ("battery_sag", "motor_heating", "rotor_inertia", "inflow_lag")
 """Effects of the drive that can be switched off; ids of the diagnosis."""

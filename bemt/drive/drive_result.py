@@ -17,8 +17,6 @@ from bemt.case.schema import AIRSPEED
 from bemt.drive import drive_file, mission, outputs, picture, rotor_table
 from bemt.drive.drive_model import EFFECTS, Drive, Steady
 
-__all__ = ["DriveResult", "solve", "text"]
-
 COLUMNS = {"pulse_us": "pulse [us]", "rpm": "rpm", "thrust_N": "T [N]", "battery_A": "I [A]", "voltage_V": "V [V]",
            "power_W": "P [W]", "efficiency": "eta"}  # fmt: skip
 RESULTS = ("drive.json", "drive.csv", "drive.png")
@@ -28,7 +26,7 @@ LOW, HIGH = 0.2, 0.8
 
 @dataclasses.dataclass(frozen=True)
 class DriveResult:
-    """What came out; ``reached`` is False when hover or airspeed is beyond the drive, or a point is unconverged."""
+    """Result of a drive; ``reached`` is False when hover or airspeed is beyond the drive, or a point is unconverged."""
 
     document: dict[str, Any]
     steady: Steady

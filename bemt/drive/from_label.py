@@ -24,8 +24,6 @@ from bemt.compare.sweep.case import spread
 from bemt.drive import mission, rotor_table
 from bemt.drive.drive_model import Battery, Drive, Esc, Motor
 
-__all__ = ["POPULATION", "Band", "DriveEstimate", "DriveUnknown", "estimate", "text"]
-
 SCHEMA = "bemt.drive.estimate/1"
 TIPS = (126.0, 190.0, 218.0, 310.0)
 """Tip speed of K_v times the loaded voltage, without load: 68 % of those 1088 motors; 95 % and 99 % below. [m/s]"""

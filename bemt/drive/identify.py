@@ -22,17 +22,6 @@ from bemt.drive import transient
 from bemt.drive.drive_model import Battery, Drive, Esc, Motor
 from bemt.drive.rotor_table import RotorMap, quadratic
 
-__all__ = [
-    "FREE",
-    "MapFit",
-    "battery_of",
-    "fit_inertia",
-    "fit_map",
-    "no_load",
-    "step_constant",
-    "thrust_error",
-]
-
 Array = NDArray[np.float64]
 FREE: dict[str, tuple[float, float, float]] = {
     "pulse_min_us": (1030.0, 800.0, 1250.0),

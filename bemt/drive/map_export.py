@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from bemt.base.tables import csv_text
 from bemt.drive.bench_map import BenchMap
 
-__all__ = ["c_header", "document", "table_csv", "tables"]
-
 Array = NDArray[np.float64]
 COLUMNS = {"thrust": "thrust_N", "rpm": "rpm", "current": "current_A", "power": "power_W"}
 

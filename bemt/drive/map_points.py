@@ -12,8 +12,6 @@ from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset, concat
 from bemt.recordings import plateaus
 
-__all__ = ["CHANNELS", "join", "map_points", "points"]
-
 Array = NDArray[np.float64]
 CHANNELS = {"thrust": "thrust_N", "rpm": "rpm", "current": "current_A", "power": "electrical_power_W"}
 """What a map gives beside the pulse width, and the channel it is fitted to."""

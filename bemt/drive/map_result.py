@@ -16,8 +16,6 @@ from bemt.base.tables import json_text, number_text, text_table, write_atomic
 from bemt.dataset import Dataset
 from bemt.drive import bench_map, map_export, map_points, map_scatter, outputs, picture
 
-__all__ = ["MapResult", "fit", "text"]
-
 SCHEMA = "bemt.map/1"
 UNFIT = 0.05
 """Misfit from which a recording holds no map. [1]"""

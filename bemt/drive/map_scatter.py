@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from bemt.dataset import Dataset
 
-__all__ = ["speed_known"]
-
 Array = NDArray[np.float64]
 LEAST_THRUST = 0.05
 """Share of the greatest thrust below which a level does not speak for T/rpm^2: there it is mostly zero point."""

@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from bemt.drive import transient
 from bemt.drive.drive_model import Drive
 
-__all__ = ["Hover", "Response", "endurance", "hover", "response", "settled_temperature"]
-
 Array = NDArray[np.float64]
 G0 = 9.80665
 

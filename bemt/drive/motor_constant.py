@@ -30,11 +30,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.errors import Fault, InputError
 
-__all__ = [
-    "CURRENTS", "VOLTAGES", "Line", "TorqueLoop", "Waveform", "current_factor", "fit_waveform", "from_kv", "ke_to_kt",
-    "line", "voltage_factor",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 VOLTAGES = {"peak": 1.0, "peak_to_peak": 2.0, "rms": math.sqrt(0.5)}
 """Measure of a sinusoidal voltage over its peak. [1]"""

@@ -27,8 +27,6 @@ from numpy.typing import NDArray
 
 from bemt.drive.motor_constant import Line
 
-__all__ = ["ALPHA", "FACTORS", "METHODS", "ErrorSource", "Measured", "Verdict", "judge"]
-
 Array = NDArray[np.float64]
 METHODS = ("data_sheet", "back_emf", "torque")
 ALPHA = 0.001

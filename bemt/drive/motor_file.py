@@ -19,8 +19,6 @@ from bemt.dataset import Dataset
 from bemt.drive import motor_constant as mc
 from bemt.drive.motor_errors import Measured
 
-__all__ = ["MotorToml", "MotorTrials", "read", "read_waveform"]
-
 Array = NDArray[np.float64]
 Volt = Literal["peak", "rms", "peak_to_peak"]
 Ampere = Literal["q_power_invariant", "q_amplitude_invariant", "peak", "rms"]

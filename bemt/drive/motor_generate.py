@@ -13,8 +13,6 @@ from bemt.base.errors import Fault, InputError
 from bemt.drive import motor_constant as mc
 from bemt.drive.motor_errors import FACTORS
 
-__all__ = ["LABEL", "PLANTS", "MotorBench", "generate", "plants"]
-
 Array = NDArray[np.float64]
 PLANTS = ("back_emf.offset", "torque.offset", "torque.shunt", "data_sheet.factor", "back_emf.factor", "torque.factor")
 """Errors that can be planted: offsets in V and N m, R_true/R_assumed, a factor on the method's result."""
@@ -24,7 +22,7 @@ LABEL = "# generated, not measured"
 
 @dataclass(frozen=True)
 class MotorBench:
-    """What the generated trials pretend to be; defaults follow the thesis's joint motor."""
+    """The truth behind generated trials; defaults follow the thesis's joint motor."""
 
     name: str = "T-Motor MN4006 KV380"  # of the motor
     # data sheet. [rev/min/V], [%]

@@ -15,8 +15,6 @@ from bemt.base.tables import csv_text, json_text, number_text, text_table, write
 from bemt.drive import motor_errors, motor_file, motor_generate, outputs, picture
 from bemt.drive.motor_constant import Line
 
-__all__ = ["check_options", "document", "generate", "generated_text", "judge", "text", "verdict_text"]
-
 Array = NDArray[np.float64]
 RESULTS = ("motor.json", "trials.csv", "motor.png")
 TITLES = {"data_sheet": "data sheet", "back_emf": "back-EMF", "torque": "torque sensor"}
@@ -44,7 +42,7 @@ def check_options(
 def generate(
     target: str, seed: int | None, plant: Sequence[str], file: str | None = None, out: str | None = None
 ) -> dict[str, Any]:
-    """Write generated trials, over nothing but other generated ones."""
+    """Write generated trials; only generated files are overwritten."""
     folder, seed = Path(target), seed or 0
     faults: list[Fault] = []
     planted: dict[str, float] = {}

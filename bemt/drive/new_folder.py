@@ -13,12 +13,10 @@ from bemt.base.units import INCH
 from bemt.case import Case, case_of, find_cases, fresh, from_solid, load_case
 from bemt.drive import from_label
 
-__all__ = ["Wanted", "write"]
-
 
 @dataclass(frozen=True)
 class Wanted:
-    """What somebody knows of a propeller or fan, as `bemt new` is told it."""
+    """What the user of `bemt new` knows of a propeller or fan."""
 
     label: str | None = None
     stations: str | None = None

@@ -7,8 +7,6 @@ from pathlib import Path
 
 from bemt.base.errors import Fault, InputError
 
-__all__ = ["check", "faults"]
-
 
 def faults(option: str, folder: Path, names: Iterable[str], inputs: Iterable[Path]) -> list[Fault]:
     """Say which results must not be written."""

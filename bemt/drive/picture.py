@@ -15,8 +15,6 @@ from bemt.drive.map_points import CHANNELS
 if TYPE_CHECKING:
     from bemt.drive.bench_map import BenchMap
 
-__all__ = ["bench_map", "box_plot", "curves"]
-
 Array = NDArray[np.float64]
 # Okabe and Ito (2008): colours that colour-blind readers tell apart
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#000000")

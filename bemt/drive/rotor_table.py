@@ -14,8 +14,6 @@ from bemt.base.errors import Fault, InputError
 from bemt.case import Case
 from bemt.case.prepare import prepare_case
 
-__all__ = ["RotorMap", "from_case", "from_coefficients", "quadratic"]
-
 Array = NDArray[np.float64]
 
 

@@ -25,8 +25,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.errors import Fault, InputError
 
-__all__ = ["Allocation", "Thruster", "allocate", "attainable", "effectiveness", "moment_at"]
-
 Array = NDArray[np.float64]
 
 

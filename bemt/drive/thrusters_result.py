@@ -14,8 +14,6 @@ from bemt.base.toml import Axis, Span, Table, axis_values, entry, read_model
 from bemt.drive import outputs, picture
 from bemt.drive.thrusters import Allocation, Thruster, allocate, attainable, moment_at
 
-__all__ = ["share"]
-
 KGF = 9.80665
 RESULTS = ("thrusters.json", "mounting.csv", "thrusters.png")
 MOST = 1e6

@@ -20,8 +20,6 @@ from numpy.typing import ArrayLike, NDArray
 from bemt.base.errors import Fault, InputError
 from bemt.drive.drive_model import Drive
 
-__all__ = ["FirstOrder", "History", "first_order", "simulate", "time_to"]
-
 Array = NDArray[np.float64]
 
 

@@ -13,8 +13,6 @@ from bemt.drive import identify, transient
 from bemt.drive.drive_model import Battery, Drive, Esc, Motor
 from bemt.drive.rotor_table import quadratic
 
-__all__ = ["MapCheck", "Step", "StepCheck", "check_map", "check_steps", "other_battery", "step_drive"]
-
 Array = NDArray[np.float64]
 
 

@@ -21,8 +21,6 @@ from bemt.dataset import Dataset
 from bemt.drive import identify, map_points, picture, validation
 from bemt.drive.drive_model import Drive
 
-__all__ = ["compare", "maps", "steps"]
-
 Array = NDArray[np.float64]
 KGF = 9.80665
 VOLTS = 15.82

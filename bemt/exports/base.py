@@ -151,37 +151,17 @@ class Export(ABC):
         out = []
         for word in job.hold:
             if word not in self.features:
+                got, wanted = f"the target {self.id}: {self.holds}", f"a target that holds {FEATURES[word]}"
                 others = f"It holds {', '.join(sorted(self.features)) or 'shape only'}"
-                out.append(
-                    Fault(
-                        job.file,
-                        f"--hold {word}",
-                        f"the target {self.id}: {self.holds}",
-                        f"a target that holds {FEATURES[word]}",
-                        others,
-                    )
-                )
+                out.append(Fault(job.file, f"--hold {word}", got, wanted, others))
+        where = f"--format {self.id}"
         if job.case.ducted and self.kind != "loads" and "duct" not in self.features:
-            out.append(
-                Fault(
-                    job.file,
-                    f"--format {self.id}",
-                    "a rotor in a duct",
-                    "an open rotor",
-                    f"The target holds {self.holds}",
-                )
-            )
+            holds = f"The target holds {self.holds}"
+            out.append(Fault(job.file, where, "a rotor in a duct", "an open rotor", holds))
         for name in self.needs:
             if importlib.util.find_spec(name) is None:
-                out.append(
-                    Fault(
-                        "",
-                        f"--format {self.id}",
-                        f"no package {name}",
-                        "the extra of this target",
-                        "pip install 'bemt[simulators]'",
-                    )
-                )
+                got, hint = f"no package {name}", "pip install 'bemt[simulators]'"
+                out.append(Fault("", where, got, "the extra of this target", hint))
         return out
 
     @abstractmethod
@@ -304,15 +284,8 @@ class DiskExport(Export):
         """Refuse a point at rest where the target cannot hold it, and a rotor that is no propeller there."""
         out = super().faults(job)
         if not self.at_rest and not job.airspeed > 0.0:
-            out.append(
-                Fault(
-                    job.file,
-                    f"--format {self.id}",
-                    f"an airspeed of {job.airspeed:g} m/s",
-                    "a speed above 0",
-                    f"{self.holds}; give --airspeed",
-                )
-            )
+            got, hint = f"an airspeed of {job.airspeed:g} m/s", f"{self.holds}; give --airspeed"
+            out.append(Fault(job.file, f"--format {self.id}", got, "a speed above 0", hint))
         return out
 
     def checked(self, job: Job, files: Files) -> dict[str, Any]:

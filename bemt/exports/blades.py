@@ -13,8 +13,6 @@ from bemt.sections.polars import Polar
 if TYPE_CHECKING:
     from bemt.exports.base import Job
 
-__all__ = ["MOST_STATIONS", "Frozen", "anchors_of", "baked", "stations"]
-
 Array = NDArray[np.float64]
 MOST_STATIONS = 60
 """Stations that the tools take: QPROP 81, XROTOR and DFDC 60 to 100 by compilation."""

@@ -19,8 +19,6 @@ from geometry.common import GeometryError
 from geometry.export import MANIFEST, SCHEMA, export
 from geometry.mesh import Options
 
-__all__ = ["export_case", "export_cases", "text"]
-
 NAMES = {
     "rpm": "--rpm",
     "airspeed_m_s": "--airspeed",

@@ -14,16 +14,6 @@ from bemt.exports.performance import Performance, table_loads
 if TYPE_CHECKING:
     from bemt.exports.base import Job
 
-__all__ = [
-    "TABLE_CODE",
-    "header",
-    "inertia_estimate",
-    "plain_name",
-    "static_fit",
-    "table_document",
-    "table_of_document",
-]
-
 Array = NDArray[np.float64]
 
 BLADE_DENSITY = 1400.0

@@ -15,17 +15,7 @@ if TYPE_CHECKING:
 
     from bemt.bem.model import Model
     from bemt.case import Case
-
-__all__ = [
-    "StatedBand",
-    "Loading",
-    "Performance",
-    "PointLoads",
-    "band_of",
-    "loading_of",
-    "performance_of",
-    "solve_points",
-]
+    from bemt.dataset import Dataset
 
 Array = NDArray[np.float64]
 
@@ -36,14 +26,6 @@ N_J = 25
 """Steps from J = 0 to the greatest J of zero thrust."""
 BELOW, BEYOND = 3, 5
 """Steps below J = 0 and beyond zero thrust: simulators hold the end of a table."""
-
-
-@dataclass(frozen=True, eq=False)
-class PointLoads:
-    """Thrust [N] and torque [N m] at (P,) points."""
-
-    thrust_N: Array
-    torque_Nm: Array
 
 
 def _prepared(case: Case, overrides: Mapping[str, Any] | None = None) -> Model:
@@ -58,7 +40,7 @@ def solve_points(
     airspeed_m_s: ArrayLike,
     overrides: Mapping[str, Any] | None = None,
     ready: Model | None = None,
-) -> PointLoads:
+) -> Dataset:
     """Solve points of a case; the one place of the exports that asks the solver for loads."""
     rpm, V = np.broadcast_arrays(np.asarray(rpm, dtype=float), np.asarray(airspeed_m_s, dtype=float))
     found = (ready or _prepared(case, overrides)).solve(rpm.ravel(), V.ravel(), case.air(overrides))
@@ -67,7 +49,7 @@ def solve_points(
         where = f"{found.rpm[bad]:g} rev/min, {found.airspeed_m_s[bad]:g} m/s"
         words = "; ".join(found.flags[bad]) or "not converged"
         raise InputError(Fault(case.path.as_posix(), where, words, "a converged point", "Nothing was written"))
-    return PointLoads(found.thrust_N, found.torque_Nm)
+    return found
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,8 +12,6 @@ from bemt.exports.blades import MOST_STATIONS, anchors_of, stations
 from bemt.exports.parts import plain_name
 from bemt.sections.parametric import XrotorSection, fit_xrotor
 
-__all__ = ["XrotorExport", "section_lines", "sections_of"]
-
 
 class XrotorExport(BladeExport):
     """File for XROTOR's LOAD."""

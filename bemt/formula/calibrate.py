@@ -33,8 +33,6 @@ from bemt.formula.text import text
 
 Array = NDArray[np.float64]
 
-__all__ = ["SCHEMA", "calibrate", "document", "read", "write"]
-
 SCHEMA = "bemt.calibration/1"
 MODELS = {"compact_pitch": "pitch", "compact": "chord", "compact_no_chord": "label"}
 """Compact models by what they are given, of `bemt.formula.refit.GIVEN`."""

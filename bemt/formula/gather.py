@@ -27,8 +27,6 @@ from bemt.formula.points import FitPoints, MeasuredPropeller, Rows, join
 from bemt.readers import apc, uiuc
 from bemt.readers._uiuc_names import parse_file_name
 
-__all__ = ["LAW_M_TIP", "RHO", "files", "load"]
-
 Array = NDArray[np.float64]
 
 RHO = 1.225

@@ -184,9 +184,7 @@ class Propeller:
             Advance ratios; 0 to 0.9 when neither these nor `airspeed_m_s` are given. [-]
         airspeed_m_s : array_like, optional
             Airspeeds instead. [m/s]
-        density_kg_m3 : float, optional
-            Of the air. [kg/m3]
-        bands : bool
+        density_kg_m3, bands : optional
             As for :meth:`solve`.
 
         Returns
@@ -219,14 +217,8 @@ class Propeller:
 
         Parameters
         ----------
-        rpm : float, optional
-            Speed of rotation; the case's by default. [rev/min]
-        airspeed_m_s : float, optional
-            Axial speed; the case's by default. [m/s]
-        J : float, optional
-            Advance ratio instead. [-]
-        density_kg_m3 : float, optional
-            Of the air. [kg/m3]
+        rpm, airspeed_m_s, J, density_kg_m3 : optional
+            As for :meth:`solve`, one number each.
 
         Returns
         -------
@@ -279,12 +271,8 @@ class Propeller:
 
         Parameters
         ----------
-        rpm : float, optional
-            Speed of rotation; the case's by default. [rev/min]
-        airspeed_m_s : float, optional
-            Axial speed; the case's by default. [m/s]
-        J : float, optional
-            Advance ratio instead. [-]
+        rpm, airspeed_m_s, J : optional
+            As for :meth:`solve`, one number each.
 
         Returns
         -------

@@ -15,12 +15,14 @@ The extension of a file decides nothing. When two sniffers claim a file, that is
 
 from __future__ import annotations
 
+import gzip
 import hashlib
 import importlib
 import math
 import os
 import pkgutil
 import re
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -32,7 +34,7 @@ import numpy as np
 
 from bemt.base.errors import Fault, InputError
 
-__all__ = ["HEAD_BYTES", "SourceText", "detect", "head_text", "importers", "load_text", "number", "read"]
+__all__ = ["HEAD_BYTES", "SourceText", "decode", "detect", "head_text", "importers", "load_text", "number", "read"]
 
 HEAD_BYTES = 16384
 """Bytes of a file that a sniffer sees."""
@@ -64,27 +66,47 @@ class SourceText:
         return self.text.splitlines()
 
 
-_WIDE = (b"\xff\xfe", b"\xfe\xff")
+GZIP = b"\x1f\x8b"
+WIDE = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}
+MAX_BYTES = 1 << 30
+"""Largest text, unpacked."""
 
 
 def _binary(raw: bytes) -> bool:
     """Whether bytes are no text: NUL outside UTF-16 with its mark."""
-    return b"\0" in raw and raw[:2] not in _WIDE
+    return b"\0" in raw and raw[:2] not in WIDE
 
 
-def _decode(raw: bytes) -> str:
-    if raw[:2] in _WIDE:  # a head may end inside a character
-        return raw[: len(raw) // 2 * 2].decode("utf-16", errors="replace")
-    for encoding in ("utf-8-sig", "latin-1"):
-        try:
-            return raw.decode(encoding)
-        except UnicodeDecodeError:
-            continue
-    raise AssertionError("Latin-1 decodes any bytes")  # pragma: no cover
+def decode(raw: bytes) -> str:
+    r"""Text of bytes, or of the head of a file.
+
+    Parameters
+    ----------
+    raw : bytes
+        UTF-8, UTF-16 with its mark, or Latin-1; the last character may be cut.
+
+    Returns
+    -------
+    str
+        Text without a byte order mark.
+
+    Examples
+    --------
+    >>> decode("\ufeff°".encode("utf-16-le")), decode(b"\xb0")
+    ('°', '°')
+    """
+    if raw[:2] in WIDE:
+        return raw[2:].decode(WIDE[raw[:2]], errors="replace")
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        if error.start > len(raw) - 4 and "unexpected end" in error.reason:
+            return raw[: error.start].decode("utf-8-sig")
+        return raw.decode("latin-1")
 
 
 def load_text(path: str | os.PathLike[str]) -> SourceText:
-    """Read one file whole.
+    """Read one file whole, unpacking gzip; the hash is that of the file as it lies there.
 
     Parameters
     ----------
@@ -99,16 +121,26 @@ def load_text(path: str | os.PathLike[str]) -> SourceText:
     Raises
     ------
     InputError
-        When the file cannot be read or is binary (holds NUL bytes).
+        When the file cannot be read, is damaged gzip data, larger than :data:`MAX_BYTES`, or binary (holds NUL bytes).
     """
     name = os.fspath(path)
     try:
         raw = Path(path).read_bytes()
     except OSError as error:
         raise InputError(Fault(name, "", error.strerror or str(error), "a readable file", "Check the path")) from error
+    digest = hashlib.sha256(raw).hexdigest()
+    if raw[:2] == GZIP:
+        try:
+            with gzip.open(Path(path), "rb") as stream:
+                raw = stream.read(MAX_BYTES + 1)
+        except (OSError, EOFError, zlib.error) as error:
+            fault = Fault(name, "", f"damaged gzip data ({error})", "a whole gzip file", "Copy it again")
+            raise InputError(fault) from error
+    if len(raw) > MAX_BYTES:
+        raise InputError(Fault(name, "", f"{len(raw)} bytes or more", f"at most {MAX_BYTES}", "Export less"))
     if _binary(raw):
         raise InputError(Fault(name, "", "binary data (NUL bytes)", "a text file", "Export the data as plain text"))
-    return SourceText(name, _decode(raw), hashlib.sha256(raw).hexdigest())
+    return SourceText(name, decode(raw), digest)
 
 
 def head_text(head: bytes | str) -> str:
@@ -131,7 +163,7 @@ def head_text(head: bytes | str) -> str:
     """
     if isinstance(head, str):
         return head.removeprefix("\ufeff")
-    return "" if _binary(head) else _decode(head)
+    return "" if _binary(head) else decode(head)
 
 
 def number(token: str) -> float | None:

@@ -8,8 +8,6 @@ import re
 from bemt.base.errors import Fault
 from bemt.readers import SourceText
 
-__all__ = ["designation", "parse_designation", "provenance"]
-
 SOURCE = "APC Propellers (Landing Products), published data file"
 
 

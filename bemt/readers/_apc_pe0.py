@@ -17,8 +17,6 @@ from bemt.base.errors import Fault, InputError
 from bemt.readers import SourceText, load_text, number
 from bemt.readers._apc_common import designation, provenance
 
-__all__ = ["ApcBlade", "read_pe0"]
-
 Array = NDArray[np.float64]
 
 

@@ -15,8 +15,6 @@ from bemt.dataset import Dataset
 from bemt.readers import SourceText, load_text, number
 from bemt.readers._apc_common import designation, provenance
 
-__all__ = ["ApcPerformance", "read_per3"]
-
 _PER3_COLUMNS = "V J Pe Ct Cp PWR Torque Thrust PWR Torque Thrust THR/PWR Mach Reyn FOM".lower().split()
 _TOKEN = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:NaN|Inf(?:inity)?)|\*+", re.IGNORECASE)
 

@@ -15,8 +15,6 @@ from bemt.readers import SourceText, number
 from bemt.sections.parametric import QpropSection, XrotorSection
 from bemt.sections.polars import DEFAULT_RE, Polar
 
-__all__ = ["BladeFile", "case_text", "checked", "lines_of", "values", "whole"]
-
 Array = NDArray[np.float64]
 SPAN_DEG = (-20.0, 25.0)
 """Angles of the written tables; beyond them flat-plate laws continue."""

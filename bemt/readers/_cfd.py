@@ -7,46 +7,24 @@ for NaN becomes NaN with a warning; a last row that may be cut is left out; noth
 
 from __future__ import annotations
 
-import gzip
-import hashlib
-import os
 import re
 import zlib
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
-from bemt.readers import SourceText, number
-
-__all__ = [
-    "Column",
-    "ExportRow",
-    "ExportTable",
-    "cells_of",
-    "decode",
-    "head_lines",
-    "load",
-    "numeric_table",
-    "si_unit",
-    "slug",
-    "unique",
-]
+from bemt.readers import GZIP, WIDE, SourceText, decode, number
 
 Array = NDArray[np.float64]
 
-MAX_BYTES = 1 << 30
-"""Largest text, unpacked."""
 _NAN = re.compile(r"[+-]?(nan|n/a|-?1\.#(qnan|snan|ind|inf)\w*|inf(inity)?|null|\*+)(\(\w*\))?", re.IGNORECASE)
 _COMMA = re.compile(r"[+-]?\d+,\d+([eEdD][+-]?\d+)?")
 _HUGE = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)[eEdD]\+?\d+")
 _FIXED = re.compile(r"\d\.\d+[eEdD][+-]\d\d+")
-_GZIP = b"\x1f\x8b"
-_WIDE = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}
 _UNITS = {
     "n": "N", "nm": "Nm", "n-m": "Nm", "n m": "Nm", "pa": "Pa", "pascal": "Pa", "m": "m", "s": "s", "k": "K", "w": "W",
     "m s^-1": "m_s", "m/s": "m_s", "kg m^-3": "kg_m3", "kg/m^3": "kg_m3", "kg/m3": "kg_m3", "radian s^-1": "rad_s",
@@ -81,23 +59,6 @@ class ExportTable:
     warnings: tuple[str, ...] = field(default=())  # Rows left out and why
 
 
-def decode(raw: bytes) -> str:
-    r"""Text of bytes: UTF-8, UTF-16 with its mark, else Latin-1; gzip is unpacked as far as it goes.
-
-    >>> decode("\ufeff°".encode("utf-16-le")), decode(b"\xb0")
-    ('°', '°')
-    """
-    wide = _WIDE.get(raw[:2])
-    if wide:
-        return raw[2:].decode(wide, errors="replace")
-    try:
-        return raw.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        if error.start > len(raw) - 4 and "unexpected end" in error.reason:  # a head may end inside a character
-            return raw[: error.start].decode("utf-8-sig")
-        return raw.decode("latin-1")
-
-
 def head_lines(head: bytes | str, count: int = 40) -> list[str]:
     r"""First lines of a file that are not blank, stripped, for sniffers; none for binary data.
 
@@ -105,38 +66,16 @@ def head_lines(head: bytes | str, count: int = 40) -> list[str]:
     ['a', 'b']
     """
     if isinstance(head, bytes):
-        if head[:2] == _GZIP:
+        if head[:2] == GZIP:
             try:
                 head = zlib.decompressobj(31).decompress(head, 1 << 16)
             except zlib.error:
                 return []
-        if b"\0" in head and head[:2] not in _WIDE:
+        if b"\0" in head and head[:2] not in WIDE:
             return []
         head = decode(head)
     lines = (line.strip() for line in head.removeprefix("\ufeff").splitlines())
     return [line for line in lines if line][:count]
-
-
-def load(path: str | os.PathLike[str]) -> SourceText:
-    """Read one file whole, unpacking gzip; the hash is that of the file as it lies there."""
-    name = os.fspath(path)
-    try:
-        raw = Path(path).read_bytes()
-    except OSError as error:
-        raise InputError(Fault(name, "", error.strerror or str(error), "a readable file", "Check the path")) from error
-    digest = hashlib.sha256(raw).hexdigest()
-    if raw[:2] == _GZIP:
-        try:
-            with gzip.open(Path(path), "rb") as stream:
-                raw = stream.read(MAX_BYTES + 1)
-        except (OSError, EOFError, zlib.error) as error:
-            fault = Fault(name, "", f"damaged gzip data ({error})", "a whole gzip file", "Copy it again")
-            raise InputError(fault) from error
-    if len(raw) > MAX_BYTES:
-        raise InputError(Fault(name, "", f"{len(raw)} bytes or more", f"at most {MAX_BYTES}", "Export less"))
-    if b"\0" in raw and raw[:2] not in _WIDE:
-        raise InputError(Fault(name, "", "binary data (NUL bytes)", "a text file", "Export the data as plain text"))
-    return SourceText(name, decode(raw), digest)
 
 
 def cells_of(line: str, separator: str | None) -> tuple[str, ...]:

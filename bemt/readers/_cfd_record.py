@@ -14,8 +14,6 @@ from bemt.readers import SourceText
 from bemt.readers._cfd import Column, ExportTable, unique
 from bemt.readers._columns import Channel, dataset
 
-__all__ = ["fields", "history"]
-
 Array = NDArray[np.float64]
 
 

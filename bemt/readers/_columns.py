@@ -14,8 +14,6 @@ from bemt.base.averaging import Mean
 from bemt.dataset import Dataset
 from bemt.dataset.channels import channel_fault, unit_in
 
-__all__ = ["Channel", "channels_of", "dataset"]
-
 Array = NDArray[np.float64]
 
 

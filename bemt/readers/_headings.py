@@ -11,8 +11,6 @@ from dataclasses import dataclass, replace
 
 from bemt.base import units
 
-__all__ = ["Heading", "heading", "slug", "unit_of"]
-
 _SAME = {
     "sec": "s", "seconds": "s", "msec": "ms", "rev/min": "rpm", "1/min": "rpm", "min-1": "rpm", "min^-1": "rpm",
     "r/min": "rpm", "u/min": "rpm", "rad/s": "rad_s", "rev/s": "rev_s", "rps": "rev_s", "m/s": "m_s", "km/h": "km_h",

@@ -20,8 +20,6 @@ from bemt.base.errors import InputError
 from bemt.readers import SourceText
 from bemt.readers._split import MOST_ODD, SplitTable, column_numbers, decimal_mark, split_line, split_table
 
-__all__ = ["NumberTable", "large_table"]
-
 LARGE = 4 << 20
 """Size of a file from which it is read in blocks. [bytes]"""
 BLOCK = 4 << 20

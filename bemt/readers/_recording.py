@@ -24,8 +24,6 @@ from bemt.readers._headings import Heading, slug
 from bemt.readers._large import NumberTable
 from bemt.readers._split import MOST_ODD, SplitTable, some
 
-__all__ = ["Builder", "slip", "spikes"]
-
 Array = NDArray[np.float64]
 _WITH_UNIT = re.compile(r"[+-]?[\d.]+\s*([^\W\d][\w/·]{0,6}|%)")
 BLOCK = 1 << 17

@@ -18,8 +18,6 @@ from bemt.base.errors import Fault, InputError
 from bemt.readers import SourceText, number
 from bemt.readers._headings import unit_of
 
-__all__ = ["SplitTable", "decimal_mark", "find_delimiter", "find_start", "some", "split_line", "split_table"]
-
 DELIMITERS = (";", "\t", ",", "|")
 MAX_FAULTS = 20
 NO_VALUE = frozenset({"", "nan", "na", "n/a", "-", "--", "null", "none"})

@@ -29,8 +29,6 @@ import math
 import re
 from dataclasses import dataclass
 
-__all__ = ["FAMILIES", "MM_ABOVE", "NAMED_DIAMETERS_IN", "VARIABLE_PITCH", "UiucFile", "UiucName", "parse_file_name"]
-
 MM_ABOVE = 40.0
 """A diameter in a name above this is in millimetres: the archive's largest propeller has 21 in, the smallest 45 mm."""
 

@@ -14,11 +14,6 @@ from bemt.base.errors import Fault, InputError
 from bemt.readers import SourceText, head_text, load_text, number
 from bemt.readers._uiuc_names import parse_file_name
 
-__all__ = [
-    "UiucGeometry", "UiucLine", "UiucStatic", "UiucThickness", "read_geometry", "read_line", "read_static",
-    "read_thickness", "role_of", "sniff",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 _COLUMNS = {
     "geom": ("r/R", "c/R", "beta"),

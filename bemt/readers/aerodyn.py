@@ -23,8 +23,6 @@ from bemt.readers import SourceText, head_text, load_text, number, polar_aerodyn
 from bemt.readers._blade import BladeFile, checked, values, whole
 from bemt.sections.polars import Polar
 
-__all__ = ["BLADE", "KIND", "read", "sniff"]
-
 KIND = "aerodyn"
 BLADE = True
 

@@ -18,12 +18,10 @@ from dataclasses import replace
 
 from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
-from bemt.readers import SourceText
-from bemt.readers._cfd import Column, ExportRow, cells_of, head_lines, load, numeric_table, si_unit, slug
+from bemt.readers import SourceText, load_text
+from bemt.readers._cfd import Column, ExportRow, cells_of, head_lines, numeric_table, si_unit, slug
 from bemt.readers._cfd_record import fields, history
 from bemt.readers._columns import Channel, channels_of, dataset
-
-__all__ = ["KIND", "read", "sniff"]
 
 KIND = "cfd_post_csv"
 
@@ -55,7 +53,7 @@ def _heading(text: str) -> Column:
 
 def read(path: str | os.PathLike[str]) -> Dataset:
     """Read a CSV of CFD-Post."""
-    source = load(path)
+    source = load_text(path)
     data: list[tuple[str, list[ExportRow]]] = []
     section, name = "", ""
     skipped: set[str] = set()

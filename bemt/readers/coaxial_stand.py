@@ -23,8 +23,6 @@ from bemt.readers._headings import Heading
 from bemt.readers._recording import Builder
 from bemt.readers._split import split_table
 
-__all__ = ["KIND", "read", "sniff"]
-
 KIND = "coaxial_stand"
 _SIDES = ("left", "right")
 _COLUMNS = {

@@ -21,8 +21,6 @@ from bemt.readers._headings import Heading
 from bemt.readers._recording import Builder
 from bemt.readers._split import split_table
 
-__all__ = ["KIND", "read", "sniff"]
-
 KIND = "crazyflie_bench"
 FULL = 65535.0
 """Largest command. [counts]"""

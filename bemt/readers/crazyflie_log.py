@@ -23,8 +23,6 @@ from bemt.base.units import G0
 from bemt.dataset import Dataset
 from bemt.readers._columns import Channel, dataset
 
-__all__ = ["KIND", "read", "sniff"]
-
 KIND = "crazyflie_log"
 MAGIC = 0xBC
 _TIMES = {1: struct.Struct("<HI"), 2: struct.Struct("<HQ")}

@@ -12,8 +12,6 @@ from bemt.readers import SourceText, head_text, load_text
 from bemt.readers._blade import BladeFile, checked, lines_of, values, whole
 from bemt.readers.xrotor import read_section
 
-__all__ = ["BLADE", "KIND", "read", "sniff"]
-
 KIND = "dfdc"
 BLADE = True
 _HEAD = re.compile(r"\s*DFDC\s+Version", re.I)

@@ -21,8 +21,6 @@ from bemt.readers._headings import Heading, heading
 from bemt.readers._recording import Builder
 from bemt.readers._split import split_table
 
-__all__ = ["KIND", "read", "sniff"]
-
 KIND = "drivecalc"
 _PROPELLERS = {"Name", "Dia", "Pitch", "a", "b", "c", "d", "n10N", "n100W"}
 _POINTS = {"motor_id", "motor", "kV", "Rm", "U_V", "n_rpm", "I_A", "no_load"}

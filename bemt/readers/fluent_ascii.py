@@ -16,10 +16,9 @@ from dataclasses import replace
 
 from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
-from bemt.readers._cfd import Column, ExportRow, cells_of, head_lines, load, numeric_table
+from bemt.readers import load_text
+from bemt.readers._cfd import Column, ExportRow, cells_of, head_lines, numeric_table
 from bemt.readers._cfd_record import fields
-
-__all__ = ["KIND", "read", "sniff"]
 
 KIND = "fluent_ascii"
 
@@ -38,7 +37,7 @@ def sniff(head: bytes | str) -> bool:
 
 def read(path: str | os.PathLike[str]) -> Dataset:
     """Read an ASCII export."""
-    source = load(path)
+    source = load_text(path)
     lines = [(k, text.strip()) for k, text in enumerate(source.lines, 1) if text.strip()]
     if not lines or not lines[0][1].lower().lstrip('"').startswith(_FIRST):
         got = repr(lines[0][1][:60]) if lines else "no text"

@@ -26,11 +26,9 @@ import numpy as np
 from bemt.base.averaging import Mean
 from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
-from bemt.readers import SourceText, number
-from bemt.readers._cfd import head_lines, load, si_unit, slug, unique
+from bemt.readers import SourceText, load_text, number
+from bemt.readers._cfd import head_lines, si_unit, slug, unique
 from bemt.readers._columns import Channel, dataset
-
-__all__ = ["KIND", "Entry", "blocks", "read", "sniff"]
 
 KIND = "fluent_forces"
 
@@ -186,7 +184,7 @@ def _channels(entries: Sequence[Entry]) -> dict[str, Channel]:
 
 def read(path: str | os.PathLike[str]) -> Dataset:
     """Read a force report."""
-    source = load(path)
+    source = load_text(path)
     entries: list[Entry] = []
     notes: list[str] = []
     faults: list[Fault] = []

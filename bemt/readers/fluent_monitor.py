@@ -14,11 +14,10 @@ import re
 
 from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
-from bemt.readers._cfd import ExportRow, head_lines, load, numeric_table
+from bemt.readers import load_text
+from bemt.readers._cfd import ExportRow, head_lines, numeric_table
 from bemt.readers._cfd_record import history
 from bemt.readers.fluent_report import column_of
-
-__all__ = ["KIND", "read", "sniff"]
 
 KIND = "fluent_monitor"
 
@@ -44,7 +43,7 @@ def sniff(head: bytes | str) -> bool:
 
 def read(path: str | os.PathLike[str]) -> Dataset:
     """Read a monitor."""
-    source = load(path)
+    source = load_text(path)
     title: str | None = None
     names: list[str] | None = None
     rows: list[ExportRow] = []

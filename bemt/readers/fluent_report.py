@@ -20,10 +20,9 @@ import re
 
 from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
-from bemt.readers._cfd import Column, ExportRow, head_lines, load, numeric_table, si_unit
+from bemt.readers import load_text
+from bemt.readers._cfd import Column, ExportRow, head_lines, numeric_table, si_unit
 from bemt.readers._cfd_record import history
-
-__all__ = ["KIND", "column_of", "read", "sniff"]
 
 KIND = "fluent_report"
 
@@ -66,7 +65,7 @@ def sniff(head: bytes | str) -> bool:
 
 def read(path: str | os.PathLike[str]) -> Dataset:
     """Read a report file."""
-    source = load(path)
+    source = load_text(path)
     title = ""
     names: list[str] | None = None
     rows: list[ExportRow] = []

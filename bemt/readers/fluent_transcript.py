@@ -25,12 +25,10 @@ import numpy as np
 from bemt.base.averaging import Mean, keep_last
 from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
-from bemt.readers import SourceText, number
-from bemt.readers._cfd import head_lines, load, si_unit, slug
+from bemt.readers import SourceText, load_text, number
+from bemt.readers._cfd import head_lines, si_unit, slug
 from bemt.readers._columns import Channel, dataset
 from bemt.readers.fluent_forces import blocks
-
-__all__ = ["KIND", "read", "sniff"]
 
 KIND = "fluent_transcript"
 
@@ -129,7 +127,7 @@ def _history(columns: Mapping[str, list[float]], steps: list[float]) -> dict[str
 
 def read(path: str | os.PathLike[str]) -> Dataset:
     """Read a transcript."""
-    source = load(path)
+    source = load_text(path)
     notes: list[str] = []
     channels: dict[str, Channel] = {}
     columns, steps, damaged = _residuals(source)

@@ -18,13 +18,11 @@ from dataclasses import replace
 
 from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
-from bemt.readers import SourceText
-from bemt.readers._cfd import Column, ExportRow, head_lines, load, numeric_table, unique
+from bemt.readers import SourceText, load_text
+from bemt.readers._cfd import Column, ExportRow, head_lines, numeric_table, unique
 from bemt.readers._cfd_record import history
 from bemt.readers._columns import Channel, channels_of, dataset
 from bemt.readers.fluent_report import column_of
-
-__all__ = ["KIND", "read", "sniff"]
 
 KIND = "fluent_xy"
 
@@ -45,7 +43,7 @@ def sniff(head: bytes | str) -> bool:
 
 def read(path: str | os.PathLike[str]) -> Dataset:
     """Read an XY plot."""
-    source = load(path)
+    source = load_text(path)
     title = ""
     labels: list[str] = []
     zones: list[tuple[str, list[ExportRow]]] = []

@@ -23,8 +23,6 @@ from bemt.readers._large import NumberTable, large_table
 from bemt.readers._recording import Builder, spikes
 from bemt.readers._split import SplitTable, decimal_mark, find_start, split_line, split_table
 
-__all__ = ["FALLBACK", "KIND", "convert", "read", "sniff"]
-
 KIND = "table"
 FALLBACK = True
 SETUP = re.compile(r"prop|motor|combination|setup|set-up|config|rotor|luftschraube|helice|h[ée]lice")

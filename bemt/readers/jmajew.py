@@ -28,8 +28,6 @@ from bemt.readers._headings import Heading, heading
 from bemt.readers._recording import Builder, slip, spikes
 from bemt.readers._split import split_table
 
-__all__ = ["KIND", "read", "sniff"]
-
 KIND = "jmajew"
 _TABLE = ("out", "th", "th_err", "tq", "tq_err", "rpm", "rpm_err", "v", "v_err", "a", "a_err", "pin", "theff")
 _UNITS = {

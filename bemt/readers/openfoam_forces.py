@@ -27,12 +27,10 @@ import numpy as np
 from bemt.base.averaging import Mean
 from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
-from bemt.readers import SourceText
-from bemt.readers._cfd import Column, ExportRow, ExportTable, head_lines, load, numeric_table
+from bemt.readers import SourceText, load_text
+from bemt.readers._cfd import Column, ExportRow, ExportTable, head_lines, numeric_table
 from bemt.readers._cfd_record import history
 from bemt.readers._columns import Channel, dataset
-
-__all__ = ["KIND", "read", "sniff"]
 
 KIND = "openfoam_forces"
 
@@ -76,7 +74,7 @@ def _columns(header: str, title: str) -> tuple[list[Column], str, list[tuple[str
 
 def read(path: str | os.PathLike[str]) -> Dataset:
     """Read a table of ``postProcessing``."""
-    source = load(path)
+    source = load_text(path)
     title = ""
     about: dict[str, str] = {}
     header: str | None = None

@@ -19,8 +19,6 @@ from bemt.readers import SourceText, head_text, load_text, number
 from bemt.readers.polar_csv import PolarRow, assemble
 from bemt.sections.polars import Polar
 
-__all__ = ["KIND", "read", "sniff"]
-
 KIND = "polar_aerodyn"
 
 _V15 = re.compile(r"^\s*\S+\s+NumTabs\b", re.M)

@@ -23,8 +23,6 @@ from bemt.readers import SourceText, head_text, load_text, number
 from bemt.readers.polar_csv import PolarRow, assemble
 from bemt.sections.polars import Polar
 
-__all__ = ["KIND", "read", "resembles", "sniff"]
-
 KIND = "polar_c81"
 
 WIDTH = 7

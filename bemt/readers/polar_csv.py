@@ -21,8 +21,6 @@ from bemt.readers import SourceText, head_text, load_text, number
 from bemt.sections.extrapolation import ExtrapolatedTable, from_tables
 from bemt.sections.polars import Polar
 
-__all__ = ["KIND", "PolarRow", "assemble", "read", "sniff"]
-
 KIND = "polar_csv"
 
 NO_RE = 1e5

@@ -33,8 +33,6 @@ from bemt.readers import SourceText, head_text, load_text, number
 from bemt.readers.polar_csv import PolarRow, assemble
 from bemt.sections.polars import Polar
 
-__all__ = ["KIND", "read", "read_many", "sniff"]
-
 KIND = "polar_xfoil"
 
 _TITLE = re.compile(r"Calculated polar for:[ \t]*(.*?)[ \t]*$", re.M)

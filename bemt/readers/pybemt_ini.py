@@ -19,8 +19,6 @@ from bemt.dataset import Dataset
 from bemt.readers import head_text, load_text, number
 from bemt.readers._columns import Channel, dataset
 
-__all__ = ["KIND", "read", "sniff"]
-
 KIND = "pybemt_ini"
 _LISTS = ("radius", "chord", "pitch")
 _SCALARS: dict[str, dict[str, tuple[str, float, float]]] = {  # section -> key -> (constant, low, high)

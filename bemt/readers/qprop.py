@@ -12,8 +12,6 @@ from bemt.readers import head_text, load_text
 from bemt.readers._blade import BladeFile, checked, lines_of, values, whole
 from bemt.sections.parametric import QpropSection
 
-__all__ = ["BLADE", "KIND", "read", "sniff"]
-
 KIND = "qprop"
 BLADE = True
 HEAD = (

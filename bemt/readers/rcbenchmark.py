@@ -34,8 +34,6 @@ from bemt.readers._headings import heading
 from bemt.readers._recording import Array, Builder, slip, spikes
 from bemt.readers._split import SplitTable, split_table
 
-__all__ = ["KIND", "read", "sniff"]
-
 KIND = "rcbenchmark"
 MOST_RPM_PER_V = 8000.0
 """Speed over supply voltage that no usual motor reaches. [(rev/min)/V]"""

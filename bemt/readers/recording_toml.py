@@ -18,7 +18,8 @@ from pydantic import create_model
 from bemt.air import Air
 from bemt.base import units
 from bemt.base.errors import Fault, InputError
-from bemt.base.toml import Collector, Table, entry, load_toml, shown, validated
+from bemt.base.toml import Table, entry, shown, validated
+from bemt.base.toml_text import Collector, load_toml
 from bemt.dataset import Dataset
 from bemt.readers import head_text, load_text
 from bemt.readers._columns import Channel, dataset

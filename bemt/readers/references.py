@@ -31,8 +31,6 @@ from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
 from bemt.readers import head_text, load_text, number
 
-__all__ = ["COLUMNS", "CONDITIONS", "KIND", "KINDS", "QUANTITIES", "Reference", "read", "sniff", "to_series"]
-
 KIND = "references"
 KINDS = ("cfd", "bench", "vendor", "k1k2_printed", "k1k2", "bemt", "flight", "other")
 COLUMNS = ("quantity", "value", "unit", "uncertainty", "kind", "source", "remark")

@@ -18,10 +18,9 @@ import numpy as np
 
 from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
-from bemt.readers._cfd import Column, ExportRow, ExportTable, cells_of, head_lines, load, numeric_table
+from bemt.readers import load_text
+from bemt.readers._cfd import Column, ExportRow, ExportTable, cells_of, head_lines, numeric_table
 from bemt.readers._cfd_record import history
-
-__all__ = ["KIND", "read", "sniff"]
 
 KIND = "su2_history"
 
@@ -40,7 +39,7 @@ def sniff(head: bytes | str) -> bool:
 
 def read(path: str | os.PathLike[str]) -> Dataset:
     """Read a history."""
-    source = load(path)
+    source = load_text(path)
     names: tuple[str, ...] | None = None
     rows: list[ExportRow] = []
     repeated = 0

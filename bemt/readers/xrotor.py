@@ -13,8 +13,6 @@ from bemt.readers import SourceText, head_text, load_text
 from bemt.readers._blade import BladeFile, checked, lines_of, values, whole
 from bemt.sections.parametric import XrotorSection
 
-__all__ = ["BLADE", "KIND", "read", "read_section", "sniff"]
-
 KIND = "xrotor"
 BLADE = True
 _HEAD = re.compile(r"\s*XROTOR\s+VERSION", re.I)

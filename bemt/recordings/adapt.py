@@ -21,8 +21,6 @@ from bemt.readers.apc import ApcPerformance
 from bemt.readers.references import Reference
 from bemt.sections.polars import Polar
 
-__all__ = ["adapt", "damaged_export", "recognised"]
-
 _KIND = {"apc": "vendor", "uiuc": "bench", "references": "table"}
 _GEOMETRY = ("ApcBlade", "BladeFile", "UiucGeometry", "UiucThickness")
 _EXPORT = "Export report files, monitors, force reports or CSV"
@@ -51,7 +49,7 @@ _INSIDE: tuple[tuple[re.Pattern[bytes], str, str], ...] = (
 
 
 def recognised(path: str | os.PathLike[str]) -> tuple[str, str] | None:
-    """Say what a file is that no reader takes."""
+    """Identify a file that no reader takes: what it is, and a hint."""
     try:
         with Path(path).open("rb") as stream:
             head = stream.read(16384)

@@ -17,8 +17,6 @@ from typing import Any
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import file_hash
 
-__all__ = ["MAX_ARCHIVE", "MAX_FILES", "MAX_UNPACKED", "download", "unpacked"]
-
 MAX_ARCHIVE = 500_000_000
 """Bytes that an archive may have."""
 MAX_UNPACKED = 1_000_000_000

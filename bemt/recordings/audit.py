@@ -30,8 +30,6 @@ from typing import Any
 
 from bemt.formula.k1k2 import ZERO_THRUST_MEASURED
 
-__all__ = ["MEASURED", "STATUSES", "AuditLine", "CfdFacts", "audit", "audit_document", "combined"]
-
 STATUSES = ("fine", "doubtful", "fault", "not stated")
 
 MEASURED = {"compressible": 0.063, "compressible_M_tip": 0.625, "buffer_layer": 0.012, "turbulence": 0.016}

@@ -10,8 +10,6 @@ from typing import Any
 
 from bemt.recordings.audit import CfdFacts, audit, audit_document
 
-__all__ = ["audit_rows", "facts_from_remark"]
-
 _PHRASES: tuple[tuple[str, dict[str, Any]], ...] = (
     (r"cylinder of the (propeller|rotor|fan)'s (own )?diameter", {"domain_over_D": 1.0}),
     (r"\bincompressible\b", {"compressible": False}),

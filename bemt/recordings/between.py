@@ -16,8 +16,6 @@ from statistics import median
 from bemt.recordings.findings import Finding
 from bemt.recordings.slips import ALIKE, Slip, slips
 
-__all__ = ["Level", "odd_ones"]
-
 TOGETHER, FAR, NEAR = 0.35, math.log(2.0), 0.25
 """Logarithms of ratios: within which levels agree, from which they differ, within which a difference is a slip's."""
 SPREADS = 3.0

@@ -17,8 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 from bemt.base import units
 from bemt.dataset import Dataset
 
-__all__ = ["LOADS", "MEASURED", "Lost", "dropped", "file_name", "lost", "named", "runs_of", "shaft_power", "stated"]
-
 Array = NDArray[np.float64]
 HUGE = 1e9
 """Magnitude in SI above which no reading of a stand is physical."""

@@ -14,8 +14,6 @@ from bemt.base.averaging import Average, Mean, keep_last, revolution_average
 from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
 
-__all__ = ["Choice", "asked", "averaged", "chosen"]
-
 Array = NDArray[np.float64]
 
 

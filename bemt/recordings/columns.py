@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 from bemt.air import LIQUID
 from bemt.recordings.findings import Facts, Finding, check_for
 
-__all__: list[str] = []
-
 Array = NDArray[np.float64]
 SENSORS = (
     "thrust_N", "duct_thrust_N", "torque_Nm", "voltage_V", "current_A", "electrical_rpm", "optical_rpm", "rpm",
@@ -72,7 +70,7 @@ def duplicates(facts: Facts) -> Iterator[Finding]:
 
 @check_for("constant")
 def constant(facts: Facts) -> Iterator[Finding]:
-    """A channel that stays the same while others change; all zeros are a sensor that was not there."""
+    """A channel that stays the same while others change; all zeros mean that there was no sensor."""
     asked = ("rpm", "thrust_N", "torque_Nm", "current_A", "pwm_s", "throttle", "power_W", "voltage_V", "CT")
     moving = [k for k in asked if k in facts.values and _varies(facts.values[k])]
     if not moving or len(facts) < 5:

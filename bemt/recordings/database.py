@@ -22,8 +22,6 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.tables import file_hash, json_text
 from bemt.recordings.archive import download, unpacked
 
-__all__ = ["RECORD", "SCHEMA", "URLS", "folder_of", "get", "text"]
-
 SCHEMA = "bemt.data/1"
 RECORD = ".bemt-data.json"
 URLS = {"uiuc": "https://m-selig.ae.illinois.edu/props/download/UIUC-propDB.zip"}
@@ -124,7 +122,7 @@ def get(
 
 
 def text(doc: dict[str, Any]) -> str:
-    """Say what is where."""
+    """Tell where the data lie and where they came from."""
     said = {
         "first use": "first use: the publisher gives no hash, so this one is trusted and recorded",
         "as recorded": "as recorded at its first use",

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 from bemt.dataset import Dataset
 from bemt.recordings.channels import named
 
-__all__ = ["CHECKS", "MANY", "SEVERITIES", "Facts", "Finding", "check_for", "facts_of"]
-
 Array = NDArray[np.float64]
 SEVERITIES = ("error", "warning", "note")
 ENOUGH = 200_000
@@ -75,7 +73,7 @@ class Facts:
         return np.where((v > 0.2) & (v < 2.0), v, LIKELY_RHO)
 
     def sampled(self, most: int = ENOUGH) -> Facts:
-        """Every so many rows of a long log: medians need no more."""
+        """Every nth row of a long log: medians need no more."""
         step = -(-len(self) // most)
         if step == 1:
             return self

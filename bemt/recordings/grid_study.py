@@ -28,8 +28,6 @@ from dataclasses import dataclass
 
 from bemt.base.errors import Fault, InputError
 
-__all__ = ["FS_THREE", "FS_TWO", "GridStudy", "cell_size", "grid_study", "ratios"]
-
 FS_THREE = 1.25
 """Safety factor with three grids."""
 FS_TWO = 3.0
@@ -105,7 +103,7 @@ def _order(e21: float, e32: float, r21: float, r32: float) -> float | None:
 def grid_study(
     values: Sequence[float], ratios: Sequence[float], formal_order: float = 2.0, safety: float | None = None
 ) -> GridStudy:
-    """Estimate what a value still owes to the grid.
+    """Estimate the discretization error of a value.
 
     >>> s = grid_study([0.97050, 0.96854, 0.96178], [2, 2])
     >>> f"{s.order:.4f} {s.extrapolated:.5f} {s.gci_fine:.4%} {s.gci_coarse:.4%} {s.asymptotic:.3f}"

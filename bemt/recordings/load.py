@@ -40,7 +40,7 @@ __all__ = ["SCHEMA", "Choice", "as_dataset", "averaged", "chosen", "document", "
 
 SCHEMA = "bemt.import/1"
 INTERNAL = "internal error of this program"
-"""How the error of a file begins that a reader failed on."""
+"""Start of the error of a file on which a reader failed."""
 SETTLED = 0.01
 """Drift above which a mean is called unsettled."""
 _RESTART = re.compile(r"(.+?)((?:_\d+)+)(\.[^.]*)?(?:\.gz)?")
@@ -259,7 +259,7 @@ def exit_code(found: Mapping[str, Any]) -> int:
 
 
 def check_format(name: str | None) -> None:
-    """Refuse a reader that there is none of."""
+    """Refuse the name of an unknown reader."""
     if name is not None and name not in importers.importers():
         raise InputError(Fault("", "--format", repr(name), f"one of {', '.join(importers.importers())}"))
 

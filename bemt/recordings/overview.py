@@ -13,8 +13,6 @@ from bemt.dataset import Dataset
 from bemt.recordings.check import Finding, check
 from bemt.recordings.reduce import reduce, reduction
 
-__all__ = ["findings", "is_recording", "points_text", "reduction_document", "reduction_of"]
-
 SHOWN = ("run", "pwm_s", "throttle", "rpm", "airspeed_m_s", "J", "thrust_N", "torque_Nm", "power_W",
          "electrical_power_W", "CT", "CP", "eta", "FM")  # fmt: skip
 """Channels of the table of points, as far as they are there."""

@@ -29,8 +29,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.errors import Fault, InputError
 
-__all__ = ["Dropped", "Plateau", "Plateaus", "find", "standard_error"]
-
 Array = NDArray[np.float64]
 OUTLIER = 6.0
 """Robust standard deviations from which a sample is an outlier."""

@@ -19,8 +19,6 @@ from bemt.recordings.channels import LOADS, Lost, file_name, lost, runs_of, stat
 from bemt.recordings.rows import at_rest, command_of
 from bemt.recordings.tare import Rest
 
-__all__ = ["Found", "Point", "from_rows", "from_samples"]
-
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 SIGNALS = ("thrust_N", "torque_Nm", "rpm", "power_W", "current_A", "electrical_power_W", "CT", "CP")

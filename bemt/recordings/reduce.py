@@ -29,8 +29,6 @@ from bemt.recordings.scatter import Hysteresis, hysteresis, repeats, session
 from bemt.recordings.site_air import AirOfPoints, air_of
 from bemt.recordings.tare import TARED, TareZero, from_rest
 
-__all__ = ["Reduction", "reduce", "reduction"]
-
 Array = NDArray[np.float64]
 _SCATTERED = ("thrust_N", "duct_thrust_N", "torque_Nm")
 
@@ -129,7 +127,7 @@ def _joined(parts: Sequence[Dataset]) -> Dataset:
 
 
 def _trusted(rec: Dataset) -> Dataset:
-    """Without sensors that saw nothing, and without a computed shaft power that its factors contradict."""
+    """Leave out sensors that saw nothing, and a computed shaft power that its factors contradict."""
     values, notes = dict(rec.values), list(rec.notes)
     for name in ("rpm", "power_W", "electrical_power_W", "voltage_V", "current_A", "density_kg_m3"):
         v = values.get(name)
@@ -187,7 +185,7 @@ def _outliers(rec: Dataset, found: Found) -> None:
 
 
 def _shared(values: Mapping[str, Array], u: Mapping[str, Array]) -> list[str]:
-    """Say of stated errors that do not know how large the load is that they look shared."""
+    """Note stated errors that are the same at any load: they look like a zero that all rows share."""
     out = []
     for name in set(_SCATTERED) & u.keys() & values.keys():
         e, v = u[name][np.isfinite(u[name])], np.abs(values[name])

@@ -25,8 +25,6 @@ from numpy.typing import NDArray
 from bemt.dataset import Dataset
 from bemt.recordings.channels import stated
 
-__all__ = ["at_rest", "command_of", "is_samples"]
-
 Array = NDArray[np.float64]
 FEWEST = 12
 MOST_POINTS, UNLIKE = 400, 0.02

@@ -12,8 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Hysteresis", "Repeats", "Session", "hysteresis", "repeats", "session"]
-
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 SAME_SPEED = 0.005

@@ -12,8 +12,6 @@ from bemt import coefficients as co
 from bemt.recordings.channels import shaft_power
 from bemt.recordings.findings import MANY, Facts, Finding, check_for
 
-__all__: list[str] = []
-
 Array = NDArray[np.float64]
 
 

@@ -16,8 +16,6 @@ from bemt.air import GAMMA, R_DRY, Air
 from bemt.base.errors import InputError
 from bemt.base.units import ZERO_CELSIUS
 
-__all__ = ["AirOfPoints", "air_of"]
-
 Array = NDArray[np.float64]
 
 

@@ -12,8 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["TARED", "Rest", "TareZero", "from_rest"]
-
 Array = NDArray[np.float64]
 TARED = ("thrust_N", "duct_thrust_N", "torque_Nm")
 """Channels of load cells."""

@@ -179,12 +179,19 @@ def row_shift(section: Airfoil, solidity: Array, stagger: Array) -> tuple[Array,
     Cubic between rows solved at fixed nodes, so that a station does not depend on its neighbours; held at solidity 4,
     stagger 85 deg and where blades would nearly touch.
     """
-    x = np.clip(solidity, 0.0, _LAST[0] * _STEP[0]) / _STEP[0]
-    y = np.clip(stagger, -_LAST[1] * _STEP[1], _LAST[1] * _STEP[1]) / _STEP[1]
+    x, y = (np.asarray(v, dtype=float) for v in (solidity, stagger))
+    slope, zero = _shifts(_Shape(section), x.tobytes(), y.tobytes())
+    return slope.copy(), zero.copy()
+
+
+@lru_cache(maxsize=256)
+def _shifts(shape: _Shape, solidity: bytes, stagger: bytes) -> tuple[Array, Array]:
+    """The same of one blade, which is asked for again with every effect on it."""
+    x = np.clip(np.frombuffer(solidity), 0.0, _LAST[0] * _STEP[0]) / _STEP[0]
+    y = np.clip(np.frombuffer(stagger), -_LAST[1] * _STEP[1], _LAST[1] * _STEP[1]) / _STEP[1]
     i = np.clip(np.floor(x).astype(int) - 1, 0, _LAST[0] - 3)
     j = np.clip(np.floor(y).astype(int) - 1, -_LAST[1], _LAST[1] - 3)
     wx, wy = _cubic(x - i), _cubic(y - j)
-    shape = _Shape(section)
     nodes = {(m, n) for a, b in zip(i, j, strict=True) for m in range(a, a + 4) for n in range(b, b + 4)}
     found = {node: _node(shape, int(node[0]), int(node[1])) for node in nodes}
     out = np.zeros((2, x.size))

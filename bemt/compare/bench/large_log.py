@@ -12,8 +12,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["document", "table", "write_log"]
-
 STEP_S, RATE_HZ, LAG_S = 10.0, 1000.0, 0.15
 """Duration of a step of the speed, samples per second, lag of the rotor."""
 BLOCK = 50_000

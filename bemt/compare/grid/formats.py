@@ -19,8 +19,6 @@ from numpy.typing import NDArray
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import csv_block, file_hash
 
-__all__ = ["FORMATS", "Block", "encode", "join", "require_extra"]
-
 FORMATS = ("csv", "parquet")
 ROW_GROUP = 50_000
 """Rows of a row group of Parquet, about, at least: small blocks are put together, or the footer outgrows the data."""

@@ -9,8 +9,6 @@ from pathlib import Path
 
 import bemt
 
-__all__ = ["program_hash"]
-
 
 @lru_cache(maxsize=1)
 def program_hash() -> str:

@@ -8,8 +8,6 @@ from typing import Any
 
 from bemt.base.tables import number_text
 
-__all__ = ["agreement", "known", "needed"]
-
 
 def _u(c: Mapping[str, Any], name: str) -> float:
     value = c.get(name, 0.0)

@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from bemt.air import Air
     from bemt.dataset import Dataset
 
-__all__ = ["ROW_SOURCES", "solve_case", "spread"]
-
 ROW_SOURCES = ("bemt", "k1k2", "cfd", "bench", "vendor")
 COMPARED = {
     "thrust_N": "N", "torque_Nm": "N m", "power_W": "W", "exhaust_speed_m_s": "m/s", "duct_share": "-", "CT": "-",

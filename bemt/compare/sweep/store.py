@@ -21,10 +21,6 @@ from bemt.compare.grid.formats import FORMATS
 from bemt.compare.grid.identity import program_hash
 from bemt.compare.sweep.text import case_text, overview_text, rows_csv
 
-__all__ = [
-    "OVERVIEW", "SCHEMA", "clear_overview", "fingerprint", "keep", "keep_overview", "locked", "remove_result", "reuse",
-]  # fmt: skip
-
 SCHEMA = "bemt.sweep/1"
 OVERVIEW = ("sweep.csv", "sweep.txt", "sweep.json")
 """Files over all cases, in the order in which they are written."""

@@ -12,8 +12,6 @@ from bemt.compare.sweep.agreement import known, needed
 from bemt.compare.sweep.case import ROW_SOURCES
 from bemt.compare.sweep.text import with_nan
 
-__all__ = ["summary"]
-
 WIDTH, ROWS = 80, 22
 """Columns of the screen, and rows of the table: the rest is counted."""
 

@@ -10,8 +10,6 @@ from typing import Any
 from bemt.base.tables import csv_text, number_text, text_table
 from bemt.compare.sweep.case import ROW_SOURCES
 
-__all__ = ["case_text", "overview_text", "rows_csv", "with_nan"]
-
 WIDTH = 118
 CSV_COLUMNS = (
     "case", "source", "label", "rpm", "airspeed_m_s", "density_kg_m3", "thrust_N", "thrust_kgf", "u", "u_num",

@@ -15,7 +15,8 @@ import numpy as np
 
 from bemt.base.errors import Fault, InputError, needs
 from bemt.base.tables import write_atomic
-from bemt.base.toml import Collector, Table, check_field, entry
+from bemt.base.toml import Table, check_field, entry
+from bemt.base.toml_text import Collector
 from bemt.case import Case
 from bemt.case.schema import AIRSPEED, RPM
 from bemt.exports.openfoam.case import case_files

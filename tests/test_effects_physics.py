@@ -1,4 +1,4 @@
-"""The promise of effects that act on points of a recording: known limits, right directions, nothing invented."""
+"""What effects do: published forms at their known limits, right signs, nothing invented."""
 
 from __future__ import annotations
 
@@ -12,11 +12,15 @@ import pytest
 from bemt import effects
 from bemt.air import Air
 from bemt.bem import model as bem
+from bemt.bem import solver
+from bemt.effects import compressibility, drag_divergence, stall_delay
 from bemt.effects.air_density import AirDensity
 from bemt.effects.airspeed_offset import AirspeedOffset
 from bemt.effects.base import Effect, Flow, Loads, Reading
 from bemt.effects.battery_sag import BatterySag
+from bemt.effects.compressibility import Compressibility
 from bemt.effects.cross_talk import CrossTalk
+from bemt.effects.drag_divergence import DragDivergence
 from bemt.effects.drift import ThrustDrift
 from bemt.effects.gain import ThrustGain
 from bemt.effects.ground_effect import FORMS, GroundEffect
@@ -25,18 +29,176 @@ from bemt.effects.lip_separation import LipSeparation
 from bemt.effects.motor_heating import MotorHeating
 from bemt.effects.nacelle import Nacelle
 from bemt.effects.oblique_inflow import ObliqueInflow
+from bemt.effects.pitch_offset import PitchOffset
+from bemt.effects.post_stall import PostStall
 from bemt.effects.recirculation import Recirculation
 from bemt.effects.rotor_inertia import RotorInertia, slope
 from bemt.effects.rpm_scale import RpmScale
+from bemt.effects.section import Section
+from bemt.effects.stall_delay import StallDelay
 from bemt.effects.supply_voltage import SupplyVoltage
 from bemt.effects.tip_gap import TipGap
 from bemt.effects.tunnel_blockage import TunnelBlockage
 from bemt.effects.unit_slip import UnitSlip
 from bemt.effects.untwist import Untwist
 from bemt.effects.zero import ThrustZero
-from bemt.sections.polars import linear_polar
+from bemt.sections.extrapolation import ExtrapolatedTable, from_tables
+from bemt.sections.polars import ALPHA_GRID, Polar, linear_polar
 from geometry.laws import helix
 from geometry.rotor import Rotor
+
+STALL = np.radians(13.0)
+DEG = np.degrees(ALPHA_GRID)
+
+
+@cache
+def table(cd_max: float = 1.3) -> Polar:
+    """Section whose data end at its stall, 13 deg on both sides; Viterna beyond."""
+    alpha = np.radians(np.linspace(-13.0, 13.0, 53))
+    cl = 5.9 * (alpha + np.radians(2.0))
+    return from_tables([ExtrapolatedTable(alpha, cl, 0.012 + 0.008 * cl**2)], cd_max=cd_max)
+
+
+@cache
+def rotor(pitch: float = 0.127) -> Rotor:
+    return Rotor(helix(0.254, pitch, hub=0.1), 2)
+
+
+def tab(*chosen: Effect, polar: Polar | None = None) -> np.ndarray:
+    """Tables cl, cd of the middle station at Mach 0, (Na, 2)."""
+    prep = solver.prepare(rotor(), [(0.7, polar or table())], chosen, n_stations=9)
+    return np.asarray(prep.tables[4, 0, 0])
+
+
+def loads(*more: Effect, rpm: float = 6000.0, V: float = 0.0, pitch: float = 0.127) -> tuple[float, float]:
+    on = (*effects.without(effects.standard(), [e.id for e in more]), *more)
+    s = solver.solve(solver.prepare(rotor(pitch), [(0.7, table())], on, n_stations=20), rpm, V, Air.from_density(1.2))
+    assert s.converged.all()
+    return float(s.T[0]), float(s.Q[0])
+
+
+def test_viterna_of_another_cd_max_is_the_table_made_with_it() -> None:
+    there, wanted = tab(PostStall("viterna", 1.8)), tab(polar=table(1.8))
+    # within the stall angle of 180 deg the table joins straight lines, which the effect leaves alone
+    told = np.abs(DEG) <= 165.0
+    np.testing.assert_allclose(there[told], wanted[told], rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("form", ["viterna", "plate"])
+def test_post_stall_reaches_its_drag_at_90_deg_and_leaves_attached_flow_alone(form: str) -> None:
+    before, after = tab(), tab(PostStall(form, 1.9))
+    for side in (-90.0, 90.0):
+        assert after[np.argmin(np.abs(DEG - side)), 1] == pytest.approx(1.9)
+    attached = np.abs(DEG) <= 13.0
+    assert np.array_equal(after[attached], before[attached])
+    # joined without a jump: the change grows from the stall on, and drag stays positive
+    near = np.argmin(np.abs(DEG - 13.5))
+    assert np.all(np.abs(after[near] - before[near]) < 0.05)
+    assert np.all(after[:, 1] > 0.0)
+
+
+def test_a_stalled_blade_pays_in_torque() -> None:
+    for form in ("viterna", "plate"):
+        high, low = (loads(PostStall(form, c), pitch=0.4) for c in (2.0, 1.1))
+        assert high[1] > 1.02 * low[1]
+    (T, Q), (T0, Q0) = loads(PostStall("viterna", 2.0), V=10.0), loads(V=10.0)
+    assert [T, Q] == pytest.approx([T0, Q0], rel=1e-3), "attached blade"
+
+
+def test_camber_shifts_the_zero_lift_angle_by_twice_itself() -> None:
+    before, after = tab(), tab(Section(camber=0.01, drag=1.0))
+    near = np.abs(DEG) < 6.0
+
+    def zero(t: np.ndarray) -> float:
+        return float(np.interp(0.0, t[near, 0], ALPHA_GRID[near]))
+
+    assert zero(after) - zero(before) == pytest.approx(-0.02, rel=1e-3)
+    assert np.array_equal(after[:, 1], before[:, 1])
+    peak = np.argmax(before[np.abs(DEG) < 30.0, 0]), np.argmax(after[np.abs(DEG) < 30.0, 0])
+    assert peak[0] == peak[1], "the stall angle stays"
+    rough = tab(Section(camber=0.0, drag=1.5))
+    np.testing.assert_allclose(rough[np.abs(DEG) <= 15.0, 1], 1.5 * before[np.abs(DEG) <= 15.0, 1])
+    assert np.array_equal(rough[np.abs(DEG) >= 30.0], before[np.abs(DEG) >= 30.0])
+
+
+def test_pitch_moves_the_speed_of_zero_thrust() -> None:
+    speeds = np.linspace(12.0, 18.0, 25)
+
+    def zero(*more: Effect) -> float:
+        return float(np.interp(0.0, [-loads(*more, V=float(V))[0] for V in speeds], speeds))
+
+    assert zero(PitchOffset(-1.0)) < zero() < zero(PitchOffset(1.0))
+    a, b = tab(PitchOffset(1.0)), tab()
+    assert np.array_equal(a, b), "the section is the same"
+
+
+def test_karman_and_tsien_tend_to_prandtl_and_glauert_for_small_pressures() -> None:
+    pg, kt = (Compressibility(form=f) for f in compressibility.FORMS)
+    M = np.linspace(0.0, 0.75, 16)
+    np.testing.assert_allclose(pg.growth(M), 1.0 / np.sqrt(1.0 - M**2))
+    np.testing.assert_allclose(kt.growth(M, 1e-9, 1e-9), pg.growth(M), rtol=1e-7)
+    thick = np.asarray(kt.growth(M, 0.5, 0.12))
+    assert np.all(thick[1:] > np.asarray(pg.growth(M))[1:]) and thick[0] == 1.0
+    assert np.all(thick <= 1.5 * np.asarray(pg.growth(M)) + 1e-12)
+
+
+def test_karman_and_tsien_act_on_both_sides_of_the_section() -> None:
+    M, cl, tc = 0.6, 0.7, 0.1
+    b = np.sqrt(1.0 - M**2)
+
+    def pressure(cp: float) -> float:
+        return float(cp / (b + M**2 / (1.0 + b) * cp / 2.0))
+
+    lower, upper = pressure(-2.0 * tc + cl / 2.0), pressure(-2.0 * tc - cl / 2.0)
+    assert Compressibility(form="karman_tsien").growth(M, cl, tc) == pytest.approx((lower - upper) / cl, rel=1e-12)
+
+
+def test_form_and_amplitude_reach_the_thrust() -> None:
+    # inside the range of both forms, tip Mach 0.59: Karman-Tsien lifts more, and amplitude 0 is no Mach number at all
+    fast = {f: loads(Compressibility(form=f), rpm=15000.0)[0] for f in compressibility.FORMS}
+    none = loads(Compressibility(amplitude=0.0), rpm=15000.0)[0]
+    assert none < fast["prandtl_glauert"] < fast["karman_tsien"] < 1.3 * none
+
+
+def test_wave_drag_has_the_published_values_at_divergence() -> None:
+    lock, cubic = (DragDivergence(form=f) for f in drag_divergence.FORMS)
+    h = 1e-6
+    slope = (float(lock.rise(0.75 + h, 0.75)) - float(lock.rise(0.75 - h, 0.75))) / (2.0 * h)
+    assert slope == pytest.approx(0.1, rel=1e-6)  # the definition of M_dd behind 20 (M - M_cr)^4
+    assert float(cubic.rise(0.75, 0.75)) == pytest.approx(0.002)
+    for e in (lock, cubic):
+        assert float(e.rise(0.6, 0.75)) == 0.0
+        assert np.all(np.diff(np.asarray(e.rise(np.linspace(0.7, 0.9, 30), 0.75))) > 0.0)
+    for form in drag_divergence.FORMS:
+        early, late = (loads(DragDivergence(k, form), rpm=20000.0)[1] for k in (0.80, 0.95))
+        assert early > 1.01 * late
+
+
+def test_stall_delay_forms_at_published_strength() -> None:
+    x = np.array([0.25, 0.5, 0.75, 1.0])
+    c = np.array([0.6, 0.4, 0.2, 0.05])
+    beta = np.radians([40.0, 25.0, 16.0, 10.0])
+    whole, snel, du_selig = (np.asarray(StallDelay(form=f).weight(c, x, beta)) for f in stall_delay.FORMS)
+    np.testing.assert_allclose(whole, 2.2 * c * np.cos(beta) ** 4)
+    np.testing.assert_allclose(snel, 3.0 * c**2)
+    power = c ** (1.0 / x)
+    np.testing.assert_allclose(du_selig, (1.6 * c / 0.1267 * (1 - power) / (1 + power) - 1.0) / (2.0 * np.pi))
+    assert du_selig[-1] < 0.0, "taken as none at the tip"
+    np.testing.assert_allclose(StallDelay(1.5, form="du_selig").weight(c, x, beta), 0.5 * du_selig)
+
+
+@pytest.mark.parametrize("form", stall_delay.FORMS)
+def test_stall_delay_lifts_stalled_sections_only(form: str) -> None:
+    prep = [solver.prepare(rotor(), [(0.7, table())], e, n_stations=9) for e in ((StallDelay(form=form),), ())]
+    gain = prep[0].tables[:, 0, 0, :, 0] - prep[1].tables[:, 0, 0, :, 0]
+    stalled = (DEG > 14.0) & (DEG < 50.0)
+    assert np.all(gain[0, stalled] > 0.0) and np.all(gain >= 0.0)
+    assert np.max(np.abs(gain[:, np.abs(DEG) <= 13.0])) < 1e-9
+    assert np.all(gain[0, stalled] >= gain[-1, stalled]), "inboard most"
+
+
+# The promise of effects that act on points of a recording: known limits, right directions, nothing invented.
+
 
 Array = np.ndarray
 FULL = {"thrust_N": 40.0, "torque_Nm": 0.8, "rpm": 9000.0}
@@ -51,7 +213,7 @@ def recorded(rpm: Array | list[float], V: Array | list[float] | float = 0.0, **e
     return bem.flow_of(model().prepared(effects.standard()), rpm, V, Air.from_density(1.2), extra)
 
 
-def loads(flow: Flow, *more: Effect) -> tuple[Array, Array]:
+def flow_loads(flow: Flow, *more: Effect) -> tuple[Array, Array]:
     found, _, ok = bem.respond(model().prepared, (*effects.standard(), *more), flow)
     assert ok.all()
     return found.T, found.Q
@@ -89,9 +251,9 @@ def test_clock_starts_with_every_run_and_order_of_rows_does_not_matter() -> None
 @pytest.mark.parametrize("form", FORMS)
 def test_a_wall_raises_thrust_at_rest_and_less_with_speed_and_distance(form: str) -> None:
     flow = recorded([6000.0] * 4, [0.0, 2.0, 4.0, 8.0])
-    gain = loads(flow, GroundEffect(form=form, z_over_R=0.6))[0] / loads(flow)[0] - 1.0
+    gain = flow_loads(flow, GroundEffect(form=form, z_over_R=0.6))[0] / flow_loads(flow)[0] - 1.0
     assert np.all(gain > 0.0) and np.all(np.diff(gain) < 0.0) and gain[3] < 0.3 * gain[0]
-    far = loads(flow, GroundEffect(form=form, z_over_R=3.0))[0] / loads(flow)[0] - 1.0
+    far = flow_loads(flow, GroundEffect(form=form, z_over_R=3.0))[0] / flow_loads(flow)[0] - 1.0
     assert np.all(far < 0.35 * gain) and np.all(far >= 0.0)
 
 
@@ -139,7 +301,7 @@ def test_recirculation_grows_from_the_start_of_a_run() -> None:
     flow = recorded([6000.0] * 4, time_s=t)
     V = met(flow, Recirculation(k=0.1, tau_s=10.0)).V
     np.testing.assert_allclose(V / flow.induced, 0.1 * (1.0 - np.exp(-t / 10.0)), atol=1e-15)
-    T = loads(flow, Recirculation(k=0.1, tau_s=10.0))[0]
+    T = flow_loads(flow, Recirculation(k=0.1, tau_s=10.0))[0]
     assert T[0] == flow.T0[0] and np.all(np.diff(T) < 0.0)
     assert "time_s" in Recirculation().applies(recorded([6000.0]))
 
@@ -149,20 +311,20 @@ def test_blockage_is_glauert_s() -> None:
     V = met(flow, TunnelBlockage(area_ratio=0.06)).V
     tau = flow.T0[1:] / (flow.rho[1:] * flow.area * flow.V[1:] ** 2)
     np.testing.assert_allclose(V[1:] / flow.V[1:], 1.0 - 0.06 * tau / (2.0 * np.sqrt(1.0 + 2.0 * tau)), rtol=1e-12)
-    T, T0 = loads(flow, TunnelBlockage(area_ratio=0.06))[0], loads(flow)[0]
+    T, T0 = flow_loads(flow, TunnelBlockage(area_ratio=0.06))[0], flow_loads(flow)[0]
     assert T[0] == T0[0] and np.all(T[1:] > T0[1:])
 
 
 def test_a_nacelle_costs_drag_and_slows_the_root() -> None:
     flow = recorded([6000.0] * 3, [0.0, 4.0, 8.0])
     body = Nacelle(deficit=0.0, cd=0.8)
-    T, Q = loads(flow, body)
-    T0, Q0 = loads(flow)
+    T, Q = flow_loads(flow, body)
+    T0, Q0 = flow_loads(flow)
     np.testing.assert_allclose(T0 - T, 0.8 * 0.5 * 1.2 * flow.V**2 * np.pi * flow.Rhub**2, rtol=1e-9, atol=1e-12)
     assert np.array_equal(Q, Q0)
-    slow, wide = (loads(flow, Nacelle(deficit=0.2, cd=0.0, body_over_R=b))[0] for b in (0.0, 0.4))
+    slow, wide = (flow_loads(flow, Nacelle(deficit=0.2, cd=0.0, body_over_R=b))[0] for b in (0.0, 0.4))
     assert slow[0] == wide[0] == T0[0] and np.all(T0[1:] < slow[1:]) and np.all(slow[1:] < wide[1:])
-    drag = T0 - loads(flow, Nacelle(deficit=0.0, cd=0.8, body_over_R=0.4))[0]
+    drag = T0 - flow_loads(flow, Nacelle(deficit=0.0, cd=0.8, body_over_R=0.4))[0]
     np.testing.assert_allclose(drag, 0.8 * 0.5 * 1.2 * flow.V**2 * np.pi * (0.4 * flow.R) ** 2, rtol=1e-9, atol=1e-12)
 
 
@@ -179,14 +341,14 @@ def test_skewed_flow_is_axial_at_0_and_keeps_glauert_s_balance() -> None:
         assert m.rpm[0] == flow.rpm[0] and np.all(m.rpm[1:] > flow.rpm[1:])
     turned = recorded([6000.0], [8.0], sideslip_rad=np.array([math.radians(40.0)]))
     assert met(turned, ObliqueInflow(5.0)).V == pytest.approx(met(recorded([6000.0], [8.0]), ObliqueInflow(40.0)).V)
-    T = [float(loads(recorded([6000.0], [8.0]), ObliqueInflow(a))[0][0]) for a in (0.0, 30.0, 60.0, 90.0)]
+    T = [float(flow_loads(recorded([6000.0], [8.0]), ObliqueInflow(a))[0][0]) for a in (0.0, 30.0, 60.0, 90.0)]
     assert np.all(np.diff(T) > 0.0)
 
 
 def test_density_moves_thrust_and_torque_alike() -> None:
     flow = recorded([6000.0, 6000.0], [0.0, 5.0])
-    T, Q = loads(flow, AirDensity(-0.2))
-    T0, Q0 = loads(flow)
+    T, Q = flow_loads(flow, AirDensity(-0.2))
+    T0, Q0 = flow_loads(flow)
     np.testing.assert_allclose(T / T0, 0.8, rtol=1e-6)  # sections without a Reynolds number
     np.testing.assert_allclose(Q / Q0, 0.8, rtol=1e-6)
 
@@ -369,11 +531,11 @@ def test_untwist_is_measured_at_the_hardest_point() -> None:
     flow = recorded([3000.0, 6000.0, 9000.0])
     share = Untwist().share(flow)
     np.testing.assert_allclose(share, [1 / 9, 4 / 9, 1.0])
-    CT, CT0 = (loads(flow, *e)[0] / flow.rpm**2 for e in ((Untwist(2.0),), ()))
+    CT, CT0 = (flow_loads(flow, *e)[0] / flow.rpm**2 for e in ((Untwist(2.0),), ()))
     fall = 1.0 - CT / CT0
     assert np.all(fall > 0.0) and np.all(np.diff(fall) > 0.0)
     np.testing.assert_allclose(fall / fall[2], share, rtol=0.08)
-    assert np.all(loads(flow, Untwist(-1.0))[0] > loads(flow)[0])
+    assert np.all(flow_loads(flow, Untwist(-1.0))[0] > flow_loads(flow)[0])
 
 
 def test_gaps_of_a_recording_are_in_proportion_to_the_largest() -> None:
