@@ -12,9 +12,9 @@ from diagnosing import case, diagnose, left_out, points, recording
 
 from bemt.asbuilt.latents import AsBuilt
 from bemt.dataset import Dataset
-from bemt.diagnose import another_rotor, chain, rules, verdict
+from bemt.diagnose import another_rotor, chain, verdict
 from bemt.diagnose.document import text
-from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
+from bemt.diagnose.explanation import Explanation
 from bemt.diagnose.record import Record, from_series
 
 
@@ -92,16 +92,3 @@ def test_a_level_beside_a_reference_asks_for_the_weather_of_both_days() -> None:
     )
     assert said.decision.verdict in ("none", "insufficient")
     assert "temperature and pressure" in step(said)[0] and "--air-a" in step(said)[1]
-
-
-def test_what_is_asked_of_a_name_is_asked_of_something_unknown() -> None:
-    asked = SimpleNamespace(
-        first=Explanation.of("section"),
-        p_value=0.002,
-        P={NONE: 0.05, Explanation.of("section"): 0.05, UNKNOWN: 0.9},
-        vague=5.0,
-    )
-    asked.says = lambda v, why, **_: verdict.Decision(v, (), Explanation.of(), 0.9, 0.0, (), why)
-    assert rules.decide(cast("verdict.Asked", asked)).verdict == "insufficient"
-    asked.vague = 12.0
-    assert rules.decide(cast("verdict.Asked", asked)).verdict == "unknown"

@@ -296,7 +296,7 @@ def test_import_compiles_nothing() -> None:
         "from numba.core import event\n"
         "with event.install_recorder('numba:compile') as record:\n"
         "    import bemt.bem.solver, bemt.bem.kernel as K\n"
-        "assert not record.buffer and not K.entry(False, \"plain\").signatures"
+        'assert not record.buffer and not K.entry(False, "plain").signatures'
     )
     subprocess.run([sys.executable, "-c", code], check=True)
 

@@ -310,6 +310,17 @@ RULES: tuple[Rule, ...] = (
         "declared after a proof named the law of a duct, and of stall delay, where only the solver was another",
     ),
     Rule(
+        "two in the air, and no reference",
+        lambda a: a.real and a.leading.pair and all(effects.catalogue()[i].kind == "air" for i in a.leading),
+        lambda a: a.says(
+            "insufficient",
+            f"{' and '.join(a.leading)} together fit best; of a rotor that no reference shows the model's own error "
+            "looks the same",
+        ),
+        "",
+        "declared: the label case of a propeller without a cause was named oblique inflow and untwist (0.99)",
+    ),
+    Rule(
         "several are sure",
         lambda a: len(a.sure) > 1,
         lambda a: a.names(a.sure, min(a.share[i] for i in a.sure)),
