@@ -156,13 +156,8 @@ def asked(**changed: Any) -> Any:
         "first": lead, "leading": lead, "rest": 0.0, "odds": 100.0, "needed": 8.0, "p_value": 0.002, "on": False,
         "expected": False, "paired": False, "sure": ("reynolds",), "group": ("reynolds",), "beside": (), "few": (),
         "P": {NONE: 0.0, UNKNOWN: 0.0, lead: 1.0}, "share": {"reynolds": 1.0}, "unlisted": 0.0, "roughness": 1.0,
-<<<<<<< HEAD
-        "vague": 0.0, "alone": True, "level": 0.0, "another_blade": False,
-        "factor": False, "parameters": {"reynolds": {}},
-=======
         "vague": 0.0, "alone": True, "level": 0.0, "another_blade": False, "factor": False, "real": False,
         "parameters": {"reynolds": {}},
->>>>>>> wK1
     }  # fmt: skip
     return SimpleNamespace(
         **(plain | changed), found=SimpleNamespace(log_bayes=lambda _: 100.0, probability={lead: 1.0})
