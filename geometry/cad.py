@@ -55,8 +55,8 @@ def planar_sections(rotor: Rotor, options: Options | None = None) -> list[tuple[
     curves = np.stack([wrapped_outline(blade, float(r), fine) for r in rho])
     angle = curves[..., 0] / rho[:, None]
     if np.abs(angle).max() > 1.3:
-        raise GeometryError([("chord", f"a section that reaches {math.degrees(np.abs(angle).max()):.0f} deg round the "
-                              "shaft", "75 deg or less for a CAD solid", "Less chord or a larger hub")])  # fmt: skip
+        got = f"a section that reaches {math.degrees(np.abs(angle).max()):.0f} deg round the shaft"
+        raise GeometryError([("chord", got, "75 deg or less for a CAD solid", "Less chord or a larger hub")])
     # Inside the hub the root section goes on; outside the tip the last two rings are continued.
     outside, slope = [], (curves[-1] - curves[-2]) / (rho[-1] - rho[-2])
     reach = rotor.R * (1 / math.cos(float(np.abs(angle[-1]).max())) - 1) + step
@@ -196,13 +196,13 @@ def blade_solid(rotor: Rotor, options: Options | None = None) -> tuple[Any, Arra
         raise
     except Exception as error:  # the CAD kernel raises its own kinds
         name = type(error).__name__
-        raise GeometryError([("blade", f"a failure of the CAD kernel ({name})", "sections that can be lofted",
-                              "Use the mesh formats, which need no loft")]) from error  # fmt: skip
+        got, hint = f"a failure of the CAD kernel ({name})", "Use the mesh formats, which need no loft"
+        raise GeometryError([("blade", got, "sections that can be lofted", hint)]) from error
     expected = blade_volume(rotor.blade, options) * MM**3
     if abs(solid.Volume() / expected - 1) > TOLERANCE:
         off = 100 * (solid.Volume() / expected - 1)
-        raise GeometryError([("blade", f"a CAD solid whose volume is {off:+.2f} % off the integral of its sections",
-                              "at most 0.5 %", "Use the mesh formats, which need no loft")])  # fmt: skip
+        got = f"a CAD solid whose volume is {off:+.2f} % off the integral of its sections"
+        raise GeometryError([("blade", got, "at most 0.5 %", "Use the mesh formats, which need no loft")])
     return solid, profile
 
 

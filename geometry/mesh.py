@@ -143,8 +143,8 @@ def hub_profile(rotor: Rotor, root: Array) -> Array:
         rotor.hub_extent if rotor.hub_length is not None else max(rotor.hub_extent, 1.04 * need + 0.02 * rotor.Rhub)
     )
     if length < need:
-        raise GeometryError([("hub_length", f"{length:g} m", f"at least {need:g} m, which the blade's root takes",
-                              "Leave it out to have it fitted")])  # fmt: skip
+        wanted = f"at least {need:g} m, which the blade's root takes"
+        raise GeometryError([("hub_length", f"{length:g} m", wanted, "Leave it out to have it fitted")])
     back, front = middle - 0.5 * length, middle + 0.5 * length
     points = [(0.0, back), (rotor.Rhub, back), (rotor.Rhub, front)]
     if rotor.spinner_length > 0:
@@ -189,8 +189,9 @@ def _rotor(rotor: Rotor, options: Options) -> tuple[Mesh, dict[str, float]]:
     check_closed(mesh, "rotor", bodies=1)
     if abs(mesh.volume / expected - 1) > VOLUME_TOLERANCE:
         gap = 100 * (mesh.volume / expected - 1)
-        raise GeometryError([("rotor", f"a solid whose volume is {gap:+.2f} % off the integral of its sections",
-                              "blades that do not run into each other", "Fewer blades, less chord or a larger hub")])  # fmt: skip  # noqa: E501
+        got = f"a solid whose volume is {gap:+.2f} % off the integral of its sections"
+        wanted, hint = "blades that do not run into each other", "Fewer blades, less chord or a larger hub"
+        raise GeometryError([("rotor", got, wanted, hint)])
     tip = float(np.hypot(mesh.vertices[:, 0], mesh.vertices[:, 1]).max())
     if abs(tip / rotor.R - 1) > 1e-6:
         raise GeometryError([("rotor", f"a tip radius of {tip:g} m", f"R = {rotor.R:g} m", "")])
@@ -279,11 +280,12 @@ def build(rotor: Rotor, duct: Duct | None = None, options: Options | None = None
     facet = duct.inner_radius * (math.pi / (1.5 * options.segments)) ** 2 / 2
     if gap <= 2 * facet:
         k = int(np.argmin(room))
-        raise GeometryError([("duct.gap", f"{gap * 1e3:.4g} mm between blades and wall, {x[inside][k] * 1e3:.4g} mm "
-                              f"behind the lip", f"more than {2 * facet * 1e3:.2g} mm, what facets take",
-                              "A larger gap, or a diffuser or nozzle that starts behind the blades")])  # fmt: skip
+        got = f"{gap * 1e3:.4g} mm between blades and wall, {x[inside][k] * 1e3:.4g} mm behind the lip"
+        wanted = f"more than {2 * facet * 1e3:.2g} mm, what facets take"
+        hint = "A larger gap, or a diffuser or nozzle that starts behind the blades"
+        raise GeometryError([("duct.gap", got, wanted, hint)])
     if abs(x[rho > 0.98 * rotor.R] - 0.5 * duct.length).max() > 0.5 * duct.length:
-        raise GeometryError([("duct.rotor_x", f"{duct._rotor * 1e3:.4g} mm, blade tips outside the duct",
-                              "blade tips inside the duct", "Move the rotor or lengthen the duct")])  # fmt: skip
+        got, hint = f"{duct._rotor * 1e3:.4g} mm, blade tips outside the duct", "Move the rotor or lengthen the duct"
+        raise GeometryError([("duct.rotor_x", got, "blade tips inside the duct", hint)])
     checks["gap"] = gap
     return MeshModel(mesh, standing, checks)

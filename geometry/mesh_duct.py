@@ -6,6 +6,7 @@ Frame as in :mod:`geometry.mesh`: z upstream along the shaft, the blades' pitch 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,26 +19,16 @@ CLEARANCE = 0.04  # axial distance of hub and centre body over the bore radius
 THICKNESS = 0.10  # symmetric NACA section of vanes that have none: an assumption
 
 
+@dataclass(frozen=True, eq=False)
 class StatorPlan:
-    """Where the vanes and their centre body lie.
+    """Where the vanes and their centre body lie."""
 
-    Parameters
-    ----------
-    stator : Stator
-        The vanes.
-    front, back : float
-        Axial position of leading and trailing edge behind the lip. [m]
-    body_front, body_radius : float
-        Where the centre body starts behind the lip, and its radius. [m]
-    section : Airfoil
-        Vane section.
-    """
-
-    def __init__(
-        self, stator: Stator, front: float, back: float, body_front: float, body_radius: float, section: Airfoil
-    ) -> None:
-        self.stator, self.front, self.back = stator, front, back
-        self.body_front, self.body_radius, self.section = body_front, body_radius, section
+    stator: Stator
+    front: float  # Leading edge behind the lip [m]
+    back: float  # Trailing edge behind the lip [m]
+    body_front: float  # Start of the centre body behind the lip [m]
+    body_radius: float  # Of the centre body [m]
+    section: Airfoil
 
     def outline(self, n: int) -> Array:
         """Return the vane's outline (n, 2): tangential coordinate and distance x behind the lip [m]."""

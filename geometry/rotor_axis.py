@@ -191,9 +191,12 @@ def pick(points: Array, faces: Faces) -> tuple[Faces, int, float, Array, Array, 
             if row[0] < 0.02:
                 break
     if best is None or best[0] > 0.5:
-        raise GeometryError([("mesh", f"{len(parts)} bodies, none with two or more equal blades that stand free about "
-                              "an axis", "a propeller or fan with free blade tips",
-                              "A single blade, a closed rim or an open mesh cannot be read")])  # fmt: skip
+        got = f"{len(parts)} bodies, none with two or more equal blades that stand free about an axis"
+        wanted, hint = (
+            "a propeller or fan with free blade tips",
+            "A single blade, a closed rim or an open mesh cannot be read",
+        )
+        raise GeometryError([("mesh", got, wanted, hint)])
     spread, count, centre, axis = best
     if spread > 1e-3:  # a hub that is not alike on all sides moves the centroid: ask the blades alone
         moved, turned = centre, axis

@@ -13,11 +13,11 @@ import pytest
 from bemt.__main__ import main
 from bemt.asbuilt.conditioning import condition
 from bemt.asbuilt.fit import MeasuredRotor, objective
-from bemt.asbuilt.latents import NAMES, Prior
+from bemt.asbuilt.latents import NAMES, Prior, Sensed
 from bemt.asbuilt.mixture import LEVELS, half_width, inside
 from bemt.asbuilt.model import coefficients
 from bemt.asbuilt.population import WEIGHTS, population
-from bemt.asbuilt.predict import Prediction, Sensed, predict
+from bemt.asbuilt.predict import Prediction, predict
 from bemt.asbuilt.reference import ReferenceRun, noise_of_run, scatter
 from bemt.base.errors import InputError
 from bemt.case import load_case
@@ -58,7 +58,7 @@ def _sensed(n: int = 12, seed: int = 0) -> Sensed:
     f = np.array([0.10 * (1.0 - x), 0.04 * (1.0 - 0.5 * x)])
     top = np.repeat(f[:, :1], n, axis=1)
     T = random.normal(size=(2, K, n)) * top[:, None] * 0.1
-    return Sensed(0.254, x, np.full(n, 6e4), f, top, T)
+    return Sensed(0.254, 0.6, x, np.full(n, 6e4), f, top, T)
 
 
 def test_half_width_is_the_inverse_of_inside() -> None:
@@ -96,10 +96,25 @@ def test_intervals_hold_what_they_say_of_rotors_drawn_from_the_population() -> N
     for _ in range(n):
         size, rough = random.choice(prior.sizes, p=prior.weights), random.choice(p.rest_sizes, p=WEIGHTS)
         z = prior.mean + size * half @ random.normal(size=K)
-        y = at.f + p.bias(at.x, at.top) + np.einsum("ckp,k->cp", at.T, z)
+        y = at.f + p.bias(at) + np.einsum("ckp,k->cp", at.T, z)
         y = y + (rough * root @ random.normal(size=root.shape[0])).reshape(2, -1)
         held += [np.mean(np.abs(y - found.mean) <= found.half_width(level, noise=True)) for level in LEVELS]
     assert held / n == pytest.approx(LEVELS, abs=0.015)
+
+
+def test_what_the_solver_lacks_is_drag_of_the_hub_and_lift_over_Re() -> None:
+    p, at = population(), replace(_sensed(), Re=np.full(12, 4e5))
+    lacking = p.bias(at)
+    # from 3e5 on no lift is known to lack: the drag of a disk of 0.15 D, off thrust only, J = 0.6 x
+    area = math.pi / 4.0 * 0.15**2
+    assert lacking[0] == pytest.approx(-0.5 * p.hub_cd * area * (0.6 * at.x) ** 2, abs=1e-15)
+    assert lacking[1] == pytest.approx(0.0, abs=1e-15)
+    assert 0.5 < p.hub_cd < 1.5  # a bluff body (Hoerner 1965)
+    low, high = (p.bias(replace(at, Re=np.full(12, Re))) - lacking for Re in (3e4, 1e5))
+    assert low == pytest.approx(-high, abs=1e-12)
+    # less of it at rest than near zero thrust
+    share = np.abs(high / at.T[:, NAMES.index("lift")])
+    assert np.all(np.diff(share) > 0.0)
 
 
 def _after_a_run(y: np.ndarray, at: Sensed, run: np.ndarray) -> tuple[Prediction, Prediction]:
@@ -109,7 +124,7 @@ def _after_a_run(y: np.ndarray, at: Sensed, run: np.ndarray) -> tuple[Prediction
     x, Re, f, top = at.x[run], at.Re[run], at.f[:, run], at.top[:, run]
     T = np.moveaxis(at.T[:, :, run], 1, 2).reshape(2 * run.size, K)
     noise = noise_of_run(p, at.diameter_m, (x, Re), f, top, y, p.noise_sd(f, top))
-    bias = p.bias(x, top).reshape(-1)
+    bias = p.bias(at)[:, run].reshape(-1)
     found = condition(
         lambda z: f.reshape(-1) + T @ z + bias, prior, y.reshape(-1), noise, p.rest_sizes, WEIGHTS, most=1
     )
@@ -121,14 +136,14 @@ def _after_a_run(y: np.ndarray, at: Sensed, run: np.ndarray) -> tuple[Prediction
 def test_a_run_that_fits_narrows_and_one_that_no_rotor_could_make_does_not() -> None:
     at, p = _sensed(), population()
     run = np.arange(5)
-    fair = (at.f + p.bias(at.x, at.top))[:, run]
+    fair = (at.f + p.bias(at))[:, run]
     before, after = _after_a_run(fair, at, run)
     assert np.all(after.half_width()[:, 6:] < before.half_width()[:, 6:])
     wild = fair * np.array([1.25, 0.8, 1.3, 0.75, 1.2])  # up and down from point to point
     _, misled = _after_a_run(wild, at, run)
     assert np.all(misled.half_width()[:, run] > after.half_width()[:, run])
     assert np.median(misled.half_width()[:, 6:] / after.half_width()[:, 6:]) > 1.0
-    held = np.abs(misled.mean - (at.f + p.bias(at.x, at.top))) <= misled.half_width(LEVELS[1])
+    held = np.abs(misled.mean - (at.f + p.bias(at))) <= misled.half_width(LEVELS[1])
     assert held[:, 6:].mean() > 0.9
 
 

@@ -115,3 +115,30 @@ class Prior:
             k = NAMES.index(name)
             factor[k] = sd / max(float(self.sd[k]), 1e-12)
         return replace(self, cov=self.cov * np.outer(factor, factor))
+
+
+@dataclass(frozen=True, eq=False)
+class Sensed:
+    """The solver at points of one rotor, with its slopes.
+
+    Attributes
+    ----------
+    diameter_m : float
+        Diameter [m].
+    J0 : float
+        Advance ratio at which the solver's thrust vanishes [1].
+    x, Re : (P,) float
+        J over J0; Reynolds number at 0.75 R [1].
+    f, top : (2, P) float
+        CT and CP, and those at rest at the same rpm [1].
+    T : (2, K, P) float
+        Slopes of CT and CP with the latent numbers [1 over their units].
+    """
+
+    diameter_m: float
+    J0: float
+    x: Array
+    Re: Array
+    f: Array
+    top: Array
+    T: Array

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.asbuilt.conditioning import tangents
-from bemt.asbuilt.latents import NAMES, Prior
+from bemt.asbuilt.latents import NAMES, Prior, Sensed
 from bemt.asbuilt.mixture import LEVELS, half_width
 from bemt.asbuilt.population import WEIGHTS, Population
 from bemt.asbuilt.reference import ReferenceRun
@@ -20,30 +20,6 @@ Solve = Callable[[Array, Array, Array, NDArray[np.intp]], Array]
 """(K,) latent numbers, (P,) rpm, (P,) advance ratio and the points whose air holds, (P,), to (2, P) CT and CP."""
 
 _SCAN = np.linspace(0.05, 2.5, 50)
-
-
-@dataclass(frozen=True, eq=False)
-class Sensed:
-    """The solver at points of one rotor, with its slopes.
-
-    Attributes
-    ----------
-    diameter_m : float
-        Diameter [m].
-    x, Re : (P,) float
-        J over the solver's zero-thrust J; Reynolds number at 0.75 R [1].
-    f, top : (2, P) float
-        CT and CP, and those at rest at the same rpm [1].
-    T : (2, K, P) float
-        Slopes of CT and CP with the latent numbers [1 over their units].
-    """
-
-    diameter_m: float
-    x: Array
-    Re: Array
-    f: Array
-    top: Array
-    T: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +90,7 @@ def sense(solve: Solve, diameter_m: float, rpm: Array, J: Array, Re: Array, z: A
     slopes = tangents(lambda at: solve(at, rpm, J, points).reshape(-1), z)
     J0 = zero_thrust(solve, z, float(np.median(rpm)), int(np.argsort(rpm)[rpm.size // 2]))
     T = slopes.reshape(2, rpm.size, -1).transpose(0, 2, 1)
-    return Sensed(diameter_m, J / J0, Re, f, top, T)
+    return Sensed(diameter_m, J0, J / J0, Re, f, top, T)
 
 
 def predict(
@@ -124,7 +100,7 @@ def predict(
     T = at.T
     if mean is None:
         mean = at.f + np.einsum("ckp,k->cp", T, prior.mean)
-    mean = mean + p.bias(at.x, at.top)
+    mean = mean + p.bias(at)
     rest = p.rest_sd(at.diameter_m, at.f, at.top)
     if reference is not None:
         shift, T, left = reference.near(p, at.x, at.Re, rest, T)

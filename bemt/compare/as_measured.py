@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from bemt import coefficients as co
 from bemt.asbuilt.conditioning import Conditioned, condition
-from bemt.asbuilt.latents import NAMES, Prior
+from bemt.asbuilt.latents import Prior
 from bemt.asbuilt.model import air_fields, air_of_points, coefficients
 from bemt.asbuilt.population import WEIGHTS, population
-from bemt.asbuilt.predict import zero_thrust
+from bemt.asbuilt.predict import sense
 from bemt.asbuilt.reference import SESSION, ReferenceRun, noise_of_run, scatter
 
 if TYPE_CHECKING:
@@ -72,19 +72,17 @@ def as_measured(
     rpm_, J_ = mean(rpm), mean(J)
     solve = coefficients(ready, state)
     points = np.arange(rpm_.size)
-    drawn = np.zeros(len(NAMES))
     speed = J_ * rpm_ / 60.0 * ready.diameter_m
     Re = np.asarray(co.Re75(ready.chord75_m, rpm_ / 60.0, ready.diameter_m, speed, state.rho, state.mu))
-    f = solve(drawn, rpm_, J_, points)
-    top = solve(drawn, rpm_, np.zeros_like(J_), points)
-    x = J_ / zero_thrust(solve, drawn, float(np.median(rpm_)), int(np.argsort(rpm_)[rpm_.size // 2]))
+    at = sense(solve, ready.diameter_m, rpm_, J_, Re)
+    f, top, x = at.f, at.top, at.x
     y = np.array([mean(CT), mean(CP)])
     still = np.abs(J_) < _STILL
     rough = np.array([[scatter(a, Re[still])] for a in (y - f)[:, still]]) * still
     single = np.maximum(np.hypot(np.array([mean(u_CT), mean(u_CP)]), people.noise_sd(f, top)) * share, rough)
     noise = noise_of_run(people, ready.diameter_m, (x, Re), f, top, y, single, gain)
     target = y.reshape(-1)
-    bias = people.bias(x, top).reshape(-1)
+    bias = people.bias(at).reshape(-1)
     found = condition(
         lambda z: solve(z, rpm_, J_, points).reshape(-1) + bias, prior, target, noise, people.rest_sizes, WEIGHTS
     )

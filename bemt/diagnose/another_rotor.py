@@ -17,6 +17,7 @@ from bemt.base.tables import number_text
 from bemt.base.units import INCH
 from bemt.diagnose.blade import AsLabelled
 from bemt.diagnose.record import CHANNELS
+from bemt.diagnose.rules import BESIDE_IT
 from bemt.effects import catalogue
 from bemt.effects.base import Baking, Effect
 
@@ -163,7 +164,8 @@ def judged(problem: Problem, decision: Decision) -> Decision:
         return replace(decision, verdict="insufficient", effects=(), classes=(), why=why)
     if decision.verdict == "unknown" and _impossible(problem):
         return replace(decision, verdict="insufficient", classes=(), why=_CONTRADICTED)
-    slip = decision.verdict in ("named", "sensor") and set(decision.effects) & set(_SLIPS)
+    sure = decision.effects[:1] if decision.rule == BESIDE_IT else decision.effects
+    slip = (decision.verdict in ("named", "sensor") or decision.rule == BESIDE_IT) and set(sure) & set(_SLIPS)
     if slip or not _suspicious(levels(problem)):
         return decision
     why = f"the loads are off by more than a factor of {FACTOR:g}: first make sure that the case is this rotor"

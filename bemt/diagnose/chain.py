@@ -192,6 +192,8 @@ def _diagnose(
     found = evidence.weigh(problem, candidates)
     say("bootstrapped nulls")
     p = gate.p_value(found, nulls)
+    for state in found.states:  # factors that only nulls ask for are the largest arrays there are
+        state.rivals.clear()
     asked = verdict.Asked(found, p)
     decision = another_rotor.judged(problem, rules.decide(asked))
     best, parameters = asked.refined(decision.leading)

@@ -54,7 +54,7 @@ def _of_points(parts: Sequence[Part], rpm: Array, J: Array, Re: Array) -> Array:
     f, top, T = (np.nan_to_num(v) for v in (here.f, here.top, here.T))
     top = np.where(top == 0.0, _NOTHING, top)
     # that the population is not centred at the case is one more thing that is not known of this rotor
-    usual = p.bias(here.x, top).reshape(-1)
+    usual = np.nan_to_num(p.bias(here)).reshape(-1)
     C = p.rest(model.diameter_m, here.x, Re, f, top)
     if not any(q.record.reference for q in parts):  # it shows the blade itself
         slopes = T.transpose(0, 2, 1).reshape(2 * rpm.size, -1)

@@ -207,17 +207,17 @@ RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "a smooth rest is left",
-        lambda a: a.rest > max(LEFT_OVER, SMALL * a.found.log_bayes(a.first)),
+        lambda a: a.rest > max(LEFT_OVER, (1.0 if a.factor else SMALL) * a.found.log_bayes(a.first)),
         _left,
         "LEFT_OVER, SMALL",
-        "declared; the same rival beside the best effect",
+        "declared; the same rival beside the best effect; a real rotor leaves one beside a proven slip of a unit, too",
     ),
     Rule(
         "not much better than nothing",
         lambda a: a.odds < a.needed,
         lambda a: a.says("insufficient", "the best explanation is not much better than none"),
         "ENOUGH, EXPECTED, PROVEN",
-        "declared; 8 nats are 4 sigma",
+        "declared; 8 nats are 4 sigma; of a real rotor that no reference shows, 8 to 16 named what was not there",
     ),
     Rule(
         "does not predict",
@@ -326,7 +326,8 @@ RULES: tuple[Rule, ...] = (
     Rule(
         BESIDE_IT,
         lambda a: (
-            not a.paired and (len(a.group) <= 1 if a.sure else a.beside and not a.on and mass(a.found, a.group) >= SURE)
+            not a.paired
+            and (len(a.group) <= 1 if a.sure else bool(a.beside) and not a.on and mass(a.found, a.group) >= SURE)
         ),
         lambda a: replace(
             a.says(

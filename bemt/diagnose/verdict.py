@@ -222,7 +222,7 @@ class Asked:
     @property
     def needed(self) -> float:
         """Log odds over nothing from which it counts."""
-        return PROVEN if self.on else EXPECTED if self.expected else ENOUGH
+        return PROVEN if self.on else EXPECTED if self.expected else PROVEN if self.real else ENOUGH
 
     @cached_property
     def unlisted(self) -> float:
@@ -238,6 +238,17 @@ class Asked:
     def alone(self) -> bool:
         """Whether there is no reference."""
         return bool(self.found.problem.free.all())
+
+    @property
+    def real(self) -> bool:
+        """Whether there is no reference, and the readings are those of a rotor as far off as real ones are."""
+        return self.alone and self.found.states[0].hyper.real > 0.0
+
+    @property
+    def factor(self) -> bool:
+        """Whether a slip of a unit is in the lead, proven, of a rotor that no reference shows."""
+        slips = [i for i in self.first if effects.catalogue()[i].fault == "unit"]
+        return self.alone and any(self.found.log_bayes(Explanation.of(i)) > PROVEN for i in slips)
 
     @cached_property
     def roughness(self) -> float:

@@ -196,66 +196,39 @@ def relations(facts: Facts) -> list[Relation]:
         out.append(Relation(name, powers, value, float(span[0]), float(span[1]), *bounds, *usual, exact))
 
     tau = 2.0 * math.pi
-    shaft = {"Q": 1.0, "n": 1.0}
-    alike = (1 - EXACT, 1 + EXACT)
+    shaft, minus = {"Q": 1.0, "n": 1.0}, {k: -p for k, p in electric.items()}
+    alike, near, close = (1 - EXACT, 1 + EXACT), (0.9, 1.1), (1.0, 1.02)
     any_row = facts.loaded
     add("shaft power over torque x speed", {"P": 1.0, "Q": -1.0, "n": -1.0}, 1 / tau, alike, (1.0, 1.01), any_row, True)
     if not product:
-        add("electrical power over voltage x current", {"E": 1.0, "U": -1.0, "I": -1.0}, 1.0, (0.85, 1.15), (1.0, 1.05),
-            any_row, True)  # fmt: skip
-    minus = {k: -p for k, p in electric.items()}
-    add("thrust over (efficacy x electrical power)", {"T": 1.0, "H": -1.0, **minus}, 1.0, (0.9, 1.1), (1.0, 1.02),
-        any_row, True)  # fmt: skip
-    add(
-        "thrust over (efficacy x shaft power)",
-        {"T": 1.0, "G": -1.0, "P": -1.0},
-        1.0,
-        (0.9, 1.1),
-        (1.0, 1.02),
-        any_row,
-        True,
-    )
+        powers = {"E": 1.0, "U": -1.0, "I": -1.0}
+        add("electrical power over voltage x current", powers, 1.0, (0.85, 1.15), (1.0, 1.05), any_row, True)
+    add("thrust over (efficacy x electrical power)", {"T": 1.0, "H": -1.0, **minus}, 1.0, near, close, any_row, True)
+    add("thrust over (efficacy x shaft power)", {"T": 1.0, "G": -1.0, "P": -1.0}, 1.0, near, close, any_row, True)
     add("one speed over the other", {"n": 1.0, "n2": -1.0}, 1.0, (0.95, 1.05), (1.0, 1.01), any_row, True)
     add("CT", {"T": 1.0, "n": -2.0, "D": -4.0}, 1 / rho, (0.015, 2.0 if duct else 0.42), (0.11, 1.4))
-    add("CQ", {"Q": 1.0, "n": -2.0, "D": -5.0}, 1 / rho, (1e-3, 0.3 if duct else 0.06), (0.009, 1.7))
-    add(
-        "CQ from shaft power",
-        {"P": 1.0, "n": -3.0, "D": -5.0},
-        1 / (tau * rho),
-        (1e-3, 0.3 if duct else 0.06),
-        (0.009, 1.7),
-    )
+    CQ = (1e-3, 0.3 if duct else 0.06)
+    add("CQ", {"Q": 1.0, "n": -2.0, "D": -5.0}, 1 / rho, CQ, (0.009, 1.7))
+    add("CQ from shaft power", {"P": 1.0, "n": -3.0, "D": -5.0}, 1 / (tau * rho), CQ, (0.009, 1.7))
     add("torque over thrust x diameter", {"Q": 1.0, "T": -1.0, "D": -1.0}, 1.0, (0.025, 0.4), (0.08, 1.4))
-    area = 2.0 * math.pi / 4.0 * rho
+    area = np.sqrt(2.0 * math.pi / 4.0 * rho)
     merit = math.sqrt(2.0 * 1.3) if duct else 1.05
-    usual = (0.5, 1.4)
+    # without a diameter the one that makes CT = 0.1 stands in; it enters with the fourth root only
+    guess, told = (0.1 * rho) ** 0.25 / area, "diameter guessed by CT = 0.1"
     for words, power in (("torque x speed", shaft), ("shaft power", {"P": 1.0})):
         inverse = {k: -p for k, p in power.items()}
-        scale = 1 / tau if power is shaft else 1.0
+        scale, name = 1 / tau if power is shaft else 1.0, f"figure of merit from {words}"
         if "D" in q:
-            add(
-                f"figure of merit from {words}",
-                {"T": 1.5, "D": -1.0, **inverse},
-                scale / np.sqrt(area),
-                (0.11, merit),
-                usual,
-            )
-        elif "n" in q:  # the diameter that makes CT = 0.1 stands in; it enters with the fourth root only
-            powers = {"T": 1.25, **inverse}
-            powers["n"] = powers.get("n", 0.0) + 0.5
-            add(f"figure of merit from {words}, diameter guessed by CT = 0.1", powers,
-                scale / np.sqrt(area) * (0.1 * rho) ** 0.25, (0.11, 2.4 if duct else 1.4), usual)  # fmt: skip
+            add(name, {"T": 1.5, "D": -1.0, **inverse}, scale / area, (0.11, merit), (0.5, 1.4))
+        elif "n" in q:
+            powers = {"T": 1.25, **inverse, "n": inverse.get("n", 0.0) + 0.5}
+            add(f"{name}, {told}", powers, scale * guess, (0.11, 2.4 if duct else 1.4), (0.5, 1.4))
+    name = "figure of merit from electrical power"
     if "D" in q:
-        add(
-            "figure of merit from electrical power",
-            {"T": 1.5, "D": -1.0, **minus},
-            1 / np.sqrt(area),
-            (0.02, merit),
-            (0.33, 1.8),
-        )
+        add(name, {"T": 1.5, "D": -1.0, **minus}, 1 / area, (0.02, merit), (0.33, 1.8))
     elif "n" in q:
-        add("figure of merit from electrical power, diameter guessed by CT = 0.1", {"T": 1.25, "n": 0.5, **minus},
-            (0.1 * rho) ** 0.25 / np.sqrt(area), (0.02, 2.0 if duct else 1.2), (0.33, 1.8))  # fmt: skip
+        powers = {"T": 1.25, "n": 0.5, **minus}
+        add(f"{name}, {told}", powers, guess, (0.02, 2.0 if duct else 1.2), (0.33, 1.8))
     add("torque x speed over electrical power", {**shaft, **minus}, tau, (0.02, 1.05), (0.6, 1.5), any_row)
     add("shaft power over electrical power", {"P": 1.0, **minus}, 1.0, (0.02, 1.05), (0.6, 1.5), any_row)
     add("tip Mach number", {"n": 1.0, "D": 1.0}, math.pi / 343.0, (0.02, 1.1), (0.3, 2.0), any_row)
@@ -266,8 +239,8 @@ def relations(facts: Facts) -> list[Relation]:
         ratio = float(q["D"][0] / q["p"][0])
         if empirical.D_OVER_P_USABLE[0] <= ratio <= empirical.D_OVER_P_USABLE[1]:
             model = np.asarray(empirical.thrust(q["D"][0], q["p"][0], 60.0, 0.0, rho), dtype=float)  # at 1 rev/s
-            add("thrust over that of the K1/K2 formula", {"T": 1.0, "n": -2.0, "D": -3.5},
-                q["D"] ** 3.5 / model, (0.35, 2.5), (1.0, 1.25))  # fmt: skip
+            powers = {"T": 1.0, "n": -2.0, "D": -3.5}
+            add("thrust over that of the K1/K2 formula", powers, q["D"] ** 3.5 / model, (0.35, 2.5), (1.0, 1.25))
     return out
 
 

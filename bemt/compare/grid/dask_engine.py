@@ -123,8 +123,8 @@ def _solver(token: str, packed: bytes) -> GridSolver:
 
 def _check(address: str, where: str, got: str, expected: str, hint: str) -> None:
     if got != expected:
-        raise InputError(Fault(f"worker {address}", where, f"other bits ({got[:12]})", f"those of this machine "
-                               f"({expected[:12]}), so that the answer is the same", hint))  # fmt: skip
+        wanted = f"those of this machine ({expected[:12]}), so that the answer is the same"
+        raise InputError(Fault(f"worker {address}", where, f"other bits ({got[:12]})", wanted, hint))
 
 
 def _solve(token: str, packed: bytes, number: int) -> Solved:
@@ -133,19 +133,9 @@ def _solve(token: str, packed: bytes, number: int) -> Solved:
 
 
 class Cluster:
-    """Engine on a Dask cluster, an existing one or one of processes on this machine.
+    """Engine on a Dask cluster: at the address of a scheduler, or local processes, started when first needed.
 
-    Parameters
-    ----------
-    scheduler : str, optional
-        Address of a scheduler; by default a local cluster is started when the first grid needs it.
-    workers : int, optional
-        Processes of the local cluster; by default one per core.
-
-    Raises
-    ------
-    InputError
-        When the scheduler does not answer.
+    Raises InputError when the scheduler does not answer.
     """
 
     def __init__(self, scheduler: str | None = None, workers: int | None = None) -> None:
@@ -187,9 +177,9 @@ class Cluster:
             self._client.wait_for_workers(1, timeout=PATIENCE)
         except (OSError, ValueError, TimeoutError) as error:
             self.__exit__(None, None, None)
-            raise InputError(Fault("", "--scheduler", f"{self.scheduler} ({_first_line(error)})",
-                                   "the address of a running Dask scheduler with a worker, as in tcp://host:8786",
-                                   "Start `dask scheduler` and `dask worker ADDRESS`")) from error  # fmt: skip
+            got, hint = f"{self.scheduler} ({_first_line(error)})", "Start `dask scheduler` and `dask worker ADDRESS`"
+            expected = "the address of a running Dask scheduler with a worker, as in tcp://host:8786"
+            raise InputError(Fault("", "--scheduler", got, expected, hint)) from error
         return self._client
 
     def __call__(self, case: Case, grid: Grid, numbers: Sequence[int], form: str | None) -> Generator[Solved]:
@@ -227,8 +217,9 @@ class Cluster:
         except (ImportError, RuntimeError) as error:
             if isinstance(error, RuntimeError) and "deserializ" not in str(error):
                 raise
-            raise InputError(Fault("", "--engine dask", f"a cluster that cannot load the work ({_first_line(error)})",
-                                   "bemt of this version on the scheduler and on every worker")) from error  # fmt: skip
+            got = f"a cluster that cannot load the work ({_first_line(error)})"
+            expected = "bemt of this version on the scheduler and on every worker"
+            raise InputError(Fault("", "--engine dask", got, expected)) from error
         finally:
             client.cancel([*out, work])
 

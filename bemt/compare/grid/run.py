@@ -88,19 +88,7 @@ Engine = Callable[[Case, Grid, Sequence[int], str | None], Generator[Solved]]
 
 
 class GridSolver:
-    """Evaluates stretches of a grid; remembers the last geometry and states of the air.
-
-    Parameters
-    ----------
-    case : Case
-        The case.
-    grid : Grid
-        Its grid.
-    threads : int
-        Threads of the solver.
-    form : str or None
-        Format of the chunks; None makes statistics only.
-    """
+    """Evaluates stretches of a grid; remembers the last geometry and states of the air. No `form`: statistics only."""
 
     def __init__(self, case: Case, grid: Grid, threads: int = 1, form: str | None = "csv") -> None:
         self.case, self.grid, self.threads, self.form = case, grid, threads, form

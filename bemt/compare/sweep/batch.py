@@ -86,8 +86,8 @@ def run_case(
         folder = None if out is None else out / case.name
         if folder is not None:
             if folder.resolve() == case.folder.resolve():
-                raise InputError(Fault("--out", "", f"the folder of the case {case.name} itself", "another folder",
-                                       "Results would stand among its files"))  # fmt: skip
+                got, hint = f"the folder of the case {case.name} itself", "Results would stand among its files"
+                raise InputError(Fault("--out", "", got, "another folder", hint))
             remove_stale(folder)
             kept = store.reuse(folder, mark, form) if resume else None
             if kept is not None:
@@ -103,8 +103,8 @@ def run_case(
         if fingerprint(case.content_hash()) != mark:  # no telling which of them the numbers are of
             if folder is not None:
                 store.remove_result(folder)
-            raise InputError(Fault(case.path.as_posix(), "", "files that changed while they were solved",
-                                   "files that stay", "Run it again"))  # fmt: skip
+            got = "files that changed while they were solved"
+            raise InputError(Fault(case.path.as_posix(), "", got, "files that stay", "Run it again"))
         if folder is not None:
             store.keep(folder, mark, document)
         return document

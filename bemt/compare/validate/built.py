@@ -92,7 +92,7 @@ def conditioned(seen: Observed, p: Population, on: str) -> Expected:
     still = m.static[run]
     rough = np.array([[scatter(a, Re[still])] for a in (y - f)[:, still]]) * still
     noise = noise_of_run(p, m.diameter_m, (x, Re), f, top, y, np.hypot(p.noise_sd(f, top), rough))
-    bias = p.bias(x, top).reshape(-1)
+    bias = p.bias(m)[:, run].reshape(-1)
     found = condition(
         lambda z: seen.solve(z, rpm[run], J[run]).reshape(-1) + bias, prior, y.reshape(-1), noise, p.rest_sizes, WEIGHTS
     )
