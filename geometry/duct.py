@@ -120,10 +120,6 @@ class Duct:
         """Return the area swept by the blades, pi (R^2 - Rhub^2) [m^2]."""
         return rotor.annulus_area
 
-    def passage_area(self, rotor: Rotor) -> float:
-        """Return the flow area in the rotor plane, the gap included: pi (inner_radius^2 - Rhub^2) [m^2]."""
-        return math.pi * (self.inner_radius**2 - rotor.Rhub**2)
-
     def area_ratio(self, rotor: Rotor) -> float:
         """Return exit area over swept annulus area, the wake area ratio of duct momentum theory [-]."""
         return self.exit_area / rotor.annulus_area

@@ -160,11 +160,6 @@ def battery_of(points: Dataset) -> tuple[float, float]:
     return _battery(current, voltage, {})
 
 
-def thrust_error(drive: Drive, points: Dataset, full_thrust_N: float) -> Array:
-    """Thrust over pulse width, model minus recording, (N,) [1]."""
-    return np.asarray((drive.steady(points.pulse_us).thrust_N - points.thrust_N) / full_thrust_N)
-
-
 def fit_inertia(
     drive: Drive, time_s: ArrayLike, thrust_N: ArrayLike, before_us: float, after_us: float
 ) -> tuple[float, float]:
