@@ -7,6 +7,7 @@ people; their READMEs say how.
 from __future__ import annotations
 
 import argparse
+import csv
 import json
 import subprocess
 import sys
@@ -27,6 +28,28 @@ DIAGNOSES = {
        for what in ("compressible", "pitch", "duct", "plate")},
 }  # fmt: skip
 
+RECORDINGS = {"reference": "incompressible", **{w: w for w in ("compressible", "pitch", "duct", "plate")}}
+GIVEN = ("rpm", "airspeed_m_s", "thrust_N", "torque_Nm", "density_kg_m3", "temperature_C", "wall_distance_m")
+
+
+def recording(what: str, campaign: str) -> None:
+    """Write the converged runs of a campaign as a recording; u is scatter and drift of their iterations."""
+    folder = ROOT / "reports" / "cfd" / f"prop_8x5_{campaign}"
+    with (folder / "recording.csv").open(encoding="utf-8", newline="") as file:
+        rows = [r for r in csv.DictReader(file) if r["converged"] == "1"]
+    names = [n for n in GIVEN if n != "wall_distance_m" or rows[0][n]]
+    units = {"thrust": "N", "torque": "Nm"}
+    with (ROOT / "reports" / "diagnosis" / f"cfd_{what}.csv").open("w", encoding="utf-8", newline="") as file:
+        said = "converged runs; u: scatter and drift of the iterations only, the grid's error is common to all"
+        print(f"# {folder.name}: {said}", file=file)
+        out = csv.writer(file, lineterminator="\n")
+        out.writerow([*names[:4], *(f"u_{load}_{unit}" for load, unit in units.items()), *names[4:]])
+        for row in rows:
+            shares = (max(abs(float(row[f"{k}_{load}"])) for k in ("drift", "scatter")) for load in units)
+            u = [f"{max(share, 1e-3) * float(row[f'{load}_{units[load]}']):.6g}"
+                 for load, share in zip(units, shares, strict=True)]  # fmt: skip
+            out.writerow([*(row[n] for n in names[:4]), *u, *(row[n] for n in names[4:])])
+
 
 def bemt(*words: str) -> None:
     """Run one command; what it says of the physics (exit code 1) is no failure."""
@@ -40,6 +63,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--data", type=Path, help="folder with uiuc/volume-1 and uiuc/volume-2")
     data = parser.parse_args().data
+    for what, campaign in RECORDINGS.items():
+        recording(what, campaign)
     for name, words in DIAGNOSES.items():
         bemt("diagnose", *words, "--out", f"reports/diagnosis/{name}")
     bemt("motor", "reports/drive/motor_mn4006", "--out", "reports/drive/motor_mn4006/result")
