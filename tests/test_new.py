@@ -45,6 +45,26 @@ def test_a_new_folder_runs_at_once(words: list[str], name: str, capsys: pytest.C
         assert found["assumed"] and found["steady"]["thrust_N"][-1] > 1.0
 
 
+@pytest.mark.parametrize(("unit", "metres"), [("in", 0.0254), ("mm", 1e-3), ("m", 1.0)])
+def test_stations_in_lengths_are_those_in_shares_of_the_radius(unit: str, metres: float, here: Path) -> None:
+    rows = [[float(c) for c in row.split(",")] for row in STATIONS.split()[1:]]
+    lengths = [f"{b:g},{0.127 * x / metres:.8g},{0.127 * c / metres:.8g},7" for x, c, b in rows]
+    (here / "lengths.csv").write_text("\n".join([f"beta_deg,r_{unit},chord_{unit},thickness_over_c", *lengths]))
+    for file in ("blade.csv", "lengths.csv"):
+        assert main(["new", "--stations", file, "--diameter-mm", "254"]) == 0
+    shares, same = load_case("blade"), load_case("lengths")
+    assert same.hub_diameter_m == pytest.approx(shares.hub_diameter_m)
+    one, other = shares.rotor().blade, same.rotor().blade
+    assert other.chord == pytest.approx(one.chord, rel=1e-6) and other.beta == pytest.approx(one.beta, rel=1e-6)
+
+
+def test_an_angle_that_may_be_twist_is_refused(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (here / "twist.csv").write_text(STATIONS.replace("beta_deg", "twist_deg"))
+    assert main(["new", "--stations", "twist.csv", "--diameter-mm", "254"]) == 2
+    told = capsys.readouterr().err
+    assert "twist.csv" in told and "beta_deg" in told and not (here / "twist").exists()
+
+
 SIX = """schema = "bemt.case/1"
 name = "prop_10x5"
 rotor.blades = 2

@@ -11,7 +11,7 @@ import numpy as np
 
 from bemt.air import Air, isa_pressure
 from bemt.base.errors import Fault, InputError
-from bemt.base.units import ZERO_CELSIUS
+from bemt.base.units import ZERO_CELSIUS, suffixes, to_si
 from bemt.case.schema import AirTable, CaseFile
 from geometry.airfoil import Airfoil, naca, naca4
 from geometry.airfoil_file import parse_dat
@@ -21,10 +21,10 @@ from geometry.duct import Duct, Stator, around
 from geometry.laws import from_laws
 from geometry.rotor import Rotor
 
-__all__ = ["build_air", "build_duct", "build_rotor"]
+__all__ = ["build_air", "build_duct", "build_rotor", "read_stations"]
 
 T = TypeVar("T")
-_STATION_COLUMNS = ("r_over_R", "chord_over_R", "beta_deg")
+_STATION_COLUMNS = "r_over_R, chord_over_R and beta_deg; r and chord may be lengths, such as r_mm"
 
 
 def _as_input(file: str, where: str, make: Callable[[], T]) -> T:
@@ -75,32 +75,44 @@ def _dat(path: Path) -> Airfoil:
     return _as_input(path.as_posix(), "", lambda: parse_dat(text, path.stem))
 
 
-def _read_stations(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Columns r/R, c/R and beta [rad] of a stations CSV; faults carry line and column."""
+def _station_columns(header: list[str], R: float) -> list[tuple[int, float]] | None:
+    """Places of r, chord and beta in a header, and what makes shares of the tip radius of them; None: not all there."""
+    found = []
+    for name in ("r", "chord"):
+        scales = {f"{name}_over_R": 1.0, **{f"{name}_{unit}": to_si(1.0, unit) / R for unit in suffixes("length")}}
+        found.append([(i, scales[cell]) for i, cell in enumerate(header) if cell in scales])
+    found.append([(i, 1.0) for i, cell in enumerate(header) if cell == "beta_deg"])
+    return [places[0] for places in found] if all(found) else None
+
+
+def read_stations(path: Path, R: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Columns r/R, c/R and beta [rad] of a stations CSV, others are left; faults carry line and column."""
     from bemt.readers import load_text, number
 
     faults: list[Fault] = []
     rows: list[list[float]] = []
-    header: list[str] | None = None
+    places: list[tuple[int, float]] | None = None
+    width = 0
     file = path.as_posix()
     for i, line in enumerate(load_text(path).lines, 1):
         cells = [cell.strip() for cell in line.split("#", 1)[0].split(",")]
         if cells == [""]:
             continue
-        if header is None:
-            header = cells
-            if tuple(cells) != _STATION_COLUMNS:
-                raise InputError(Fault(file, f"{i}", f"the header {line.strip()!r}", ",".join(_STATION_COLUMNS)))
+        if places is None:
+            places, width = _station_columns(cells, R), len(cells)
+            if places is None:
+                hint = "An angle to the plane of rotation is beta_deg; twist may count from elsewhere"
+                raise InputError(Fault(file, f"{i}", f"the header {line.strip()!r}", _STATION_COLUMNS, hint))
             continue
-        if len(cells) != len(header):
-            faults.append(Fault(file, f"{i}", f"{len(cells)} values", f"{len(header)}, as the header has"))
+        if len(cells) != width:
+            faults.append(Fault(file, f"{i}", f"{len(cells)} values", f"{width}, as the header has"))
             continue
-        values = [number(cell) for cell in cells]
-        for j, value in enumerate(values, 1):
+        values = [number(cells[j]) for j, _ in places]
+        for (j, _), value in zip(places, values, strict=True):
             if value is None:
-                faults.append(Fault(file, f"{i}:{j}", repr(cells[j - 1]), "a number"))
+                faults.append(Fault(file, f"{i}:{j + 1}", repr(cells[j]), "a number"))
         if None not in values:
-            rows.append([float(v) for v in values if v is not None])
+            rows.append([float(v) * scale for v, (_, scale) in zip(values, places, strict=True) if v is not None])
     if not faults and len(rows) < 2:
         faults.append(Fault(file, "", f"{len(rows)} stations", "two or more"))
     if faults:
@@ -147,7 +159,7 @@ def _stations(case: CaseFile, path: Path) -> tuple[np.ndarray, np.ndarray, np.nd
     """Columns r/R, c/R and beta [rad] of whichever file of stations the case names."""
     blade = case.blade
     if blade.stations is not None:
-        return _read_stations(path.parent / blade.stations)
+        return read_stations(path.parent / blade.stations, 0.5 * case.rotor.diameter_m)
     if blade.uiuc is not None:
         from bemt.readers._uiuc_tables import read_geometry
 

@@ -133,7 +133,7 @@ diameter_mm = {1e3 * diameter_m:.6g}
 hub_ratio = {hub_ratio:.4g}
 
 [blade]
-{key} = "{file}"  # columns r_over_R,chord_over_R,beta_deg
+{key} = "{file}"
 
 [blade.section]
 camber = 0.035
@@ -193,16 +193,16 @@ recovery = 0.8
 {_operating(told, 0.0, rpm is not None).replace("120", "180")}{ranges}{_blocks(*FAN, *SURFACE, AIR)}"""
 
 
-def of_stations(file: Path) -> tuple[float, str]:
+def of_stations(file: Path, diameter_m: float) -> tuple[float, str]:
     """Hub ratio and key of a file of stations: our own CSV, a geometry file of UIUC, or an APC PE0 file."""
     from bemt.readers import load_text
 
     head = load_text(file).text[:4000]
     first = head.lstrip().partition("\n")[0]
     if "," in first:
-        cells = [row.split(",")[0].strip() for row in head.splitlines() if not row.lstrip().startswith("#")]
-        inner = min((float(c) for c in cells[1:] if re.fullmatch(r"0?\.\d+", c)), default=0.15)
-        return max(min(inner, 0.3), 0.05), "stations"
+        from bemt.case.build import read_stations
+
+        return max(min(float(read_stations(file, 0.5 * diameter_m)[0].min()), 0.3), 0.05), "stations"
     if re.match(r"\s*r/R\b", first):
         rows = [float(row.split()[0]) for row in head.splitlines()[1:] if row.split()]
         return max(min(min(rows, default=0.15), 0.3), 0.05), "uiuc"

@@ -178,7 +178,9 @@ class BladeTable(Table):
     )
     taper: float | None = entry("tip over root chord, with linear_taper", "", 0.05, 3)
     chord_scale: float = entry("factor on every chord", "", 0.1, 10, _percent("chord_scale", 20.0), default=1.0)
-    stations: str | None = entry("CSV r_over_R,chord_over_R,beta_deg", words=FILE)
+    stations: str | None = entry(
+        "CSV r_over_R,chord_over_R,beta_deg; r and chord may be lengths, such as r_mm", words=FILE
+    )
     uiuc: str | None = entry("geometry file of UIUC", words=FILE)
     apc: str | None = entry("PE0 file of APC", words=FILE)
     beta_offset_deg: float = entry("turns the whole blade", "deg", -45, 45, default=0.0)

@@ -18,7 +18,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     label = "diameter x pitch in inches, blades if not 2: 10x5, 8x4.5x3; with --fan the diameter alone: 70mm"
     parser.add_argument("label", nargs="?", metavar="LABEL", help=label)
-    table = "blade in a file: CSV r_over_R,chord_over_R,beta_deg; UIUC geometry; APC PE0"
+    table = "blade in a file: CSV r_over_R,chord_over_R,beta_deg (or r_mm,chord_mm); UIUC geometry; APC PE0"
     solid = "blade in a scan or CAD model (STL, OBJ, STEP); LABEL then names the case"
     parser.add_argument("--scan", metavar="FILE", help=solid)
     parser.add_argument("--unit", choices=("mm", "m", "in"), help="with --scan: of a file that does not state it")

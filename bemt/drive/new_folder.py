@@ -91,7 +91,7 @@ def _files(w: Wanted) -> dict[str, bytes]:
         return {name: text.encode() for name, text in texts.items()}
     if w.stations is not None and w.diameter_mm is not None:
         file = Path(w.stations)
-        hub, key = fresh.of_stations(file)
+        hub, key = fresh.of_stations(file, w.diameter_mm * 1e-3)
         text = fresh.stations_text(file.name, w.diameter_mm * 1e-3, w.blades or 2, w.rpm, w.airspeed_m_s, hub, key)
         return {file.name: file.read_bytes(), "case.toml": text.encode()}
     return {"case.toml": _label_text(w, w.label or "").encode()}

@@ -443,8 +443,8 @@ def propeller(
     label : str, optional
         Diameter x pitch in inches, blades if not two: ``"10x5"``, ``"8x4.5x3"``.
     stations : str or path, optional
-        Instead of the label: a CSV with ``r_over_R,chord_over_R,beta_deg``, a geometry file of the UIUC database or
-        an APC PE0 file.
+        Instead of the label: a CSV with ``r_over_R,chord_over_R,beta_deg`` (r and chord may be lengths, such as
+        ``r_mm``), a geometry file of the UIUC database or an APC PE0 file.
     diameter_m : float, optional
         With `stations`: diameter. [m]
     blades : int, optional
@@ -501,7 +501,8 @@ def propeller(
         return Propeller(case_of(text), text)
     assert stations is not None and diameter_m is not None
     file = Path(stations)
-    text = fresh.stations_text(file.name, diameter_m, blades or 2, rpm, airspeed_m_s, *fresh.of_stations(file))
+    hub, key = fresh.of_stations(file, diameter_m)
+    text = fresh.stations_text(file.name, diameter_m, blades or 2, rpm, airspeed_m_s, hub, key)
     return Propeller(case_of(text, file.parent), text)
 
 
