@@ -207,10 +207,14 @@ RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "a smooth rest is left",
-        lambda a: a.rest > max(LEFT_OVER, (1.0 if a.factor else SMALL) * a.found.log_bayes(a.first)),
+        lambda a: (
+            a.rest > max(LEFT_OVER, (1.0 if a.factor else SMALL) * a.found.log_bayes(a.first))
+            and a.rest + a.found.log_bayes(a.first) >= ENOUGH
+        ),
         _left,
-        "LEFT_OVER, SMALL",
-        "declared; the same rival beside the best effect; a real rotor leaves one beside a proven slip of a unit, too",
+        "LEFT_OVER, SMALL, ENOUGH",
+        "declared; the same rival beside the best effect, as sure as a name has to be; a real rotor leaves one beside "
+        "a proven slip of a unit, too",
     ),
     Rule(
         "not much better than nothing",
