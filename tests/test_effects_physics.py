@@ -615,3 +615,19 @@ def test_a_recorded_voltage_is_taken_as_it_is() -> None:
     np.testing.assert_allclose(y * 1.0 + 0.03 * y**2, 1.03 * volts / 16.0, rtol=1e-12)
     late = recorded([9000.0] * 3, time_s=np.array([0.0, 60.0, 120.0]))
     np.testing.assert_allclose(np.diff(shown(late, BatterySag(sag=0.0, discharge=0.1))["rpm"]) < 0.0, True)
+
+
+def test_noise_of_a_voltmeter_does_not_reach_the_speed() -> None:
+    """Where one resistance and the charge drawn explain the voltage; a supply that jumps is taken as recorded."""
+    rng = np.random.default_rng(3)
+    t, amps = np.linspace(0.0, 600.0, 80), np.tile([10.0, 20.0, 40.0, 60.0], 20)
+    true = 22.0 - 0.02 * amps - 1.5 * t / 600.0
+    common = {"time_s": t, "current_A": amps, "pwm_s": np.full(80, 1.6e-3)}
+
+    def speed(volts: np.ndarray) -> np.ndarray:
+        return shown(recorded([9000.0] * 80, voltage_V=volts, **common), BatterySag(copper=0.03))["rpm"]
+
+    noisy = true * (1.0 + 0.001 * rng.standard_normal(80))
+    assert np.std(speed(noisy) / speed(true)) < 0.4e-3
+    jumps = np.where(t > 300.0, 0.8, 1.0) * true
+    assert speed(jumps)[-1] / speed(true)[-1] == pytest.approx(0.8, abs=0.02)

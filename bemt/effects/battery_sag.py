@@ -8,6 +8,9 @@ import numpy as np
 
 from bemt.effects.base import Array, Effect, Flow, Parameter, Reading
 
+# Readings for each number of the circuit, and the largest scatter about it that is a meter's noise, a share [1].
+_ROWS, _METER = 4, 0.003
+
 
 @dataclass(frozen=True)
 class BatterySag(Effect):
@@ -16,7 +19,8 @@ class BatterySag(Effect):
     Notes
     -----
     Equivalent circuit of a battery with one resistance (Tremblay and Dessaint 2009, World Electric Vehicle J. 3:289,
-    without its exponential zone; not checked).  Recorded ``voltage_V`` is used as it is, against its largest value.
+    without its exponential zone; not checked).  Recorded ``voltage_V`` counts against its largest value; where that
+    circuit fits it over a run, the fit is taken, without the noise of the meter, else the voltage as it is.
     Otherwise the lost share is ``sag`` at the largest current (recorded ``current_A``, else shaft power), in
     proportion, plus ``discharge`` in proportion to the charge drawn, whole at the end of the run.  The speed follows
     from (1 - lost) (1 + u) = y + u y^2, the motor at constant duty with torque as speed squared and copper drop u over
@@ -52,13 +56,25 @@ class BatterySag(Effect):
 
     def _lost(self, flow: Flow) -> Array:
         """Share of the voltage that is lost, (P,) [1]."""
-        if "voltage_V" in flow.extra:
-            volts = flow.extra["voltage_V"]
-            return np.nan_to_num(1.0 - volts / np.nanmax(volts))
         power = np.nan_to_num(np.maximum(flow.extra.get("current_A", flow.Q0 * flow.omega), 0.0))
+        power = power / max(float(np.max(power)), 1e-30)
         charge = np.zeros_like(power)
         for run in flow.runs:
             t = flow.extra["time_s"][run]
             drawn = np.r_[0.0, np.cumsum(np.diff(t) * 0.5 * (power[run][1:] + power[run][:-1]))]
             charge[run] = drawn / max(float(drawn[-1]), 1e-30)
-        return np.asarray(self.sag * power / max(float(np.max(power)), 1e-30) + self.discharge * charge)
+        if "voltage_V" not in flow.extra:
+            return np.asarray(self.sag * power + self.discharge * charge)
+        volts = flow.extra["voltage_V"].copy()
+        for run in flow.runs:
+            volts[run] = _circuit(volts[run], power[run], charge[run])
+        return np.nan_to_num(1.0 - volts / np.nanmax(volts))
+
+
+def _circuit(volts: Array, current: Array, charge: Array) -> Array:
+    """Voltage of an open-circuit voltage over charge and one resistance, where that fits the recorded one. [V]"""
+    x = np.column_stack([np.ones_like(charge), current, charge, charge**2, charge**3])
+    if len(volts) < _ROWS * x.shape[1] or not np.isfinite(volts).all():
+        return volts
+    fit = x @ np.linalg.lstsq(x, volts, rcond=None)[0]
+    return fit if float(np.std(fit - volts)) < _METER * float(np.mean(volts)) else volts
