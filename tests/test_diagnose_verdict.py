@@ -75,6 +75,17 @@ def test_physics_that_is_on_is_wrong_at_the_end_of_its_range(
     assert rules._leaves_its_range(asked) == beyond
 
 
+@pytest.mark.parametrize("end", [True, False])
+def test_the_duct_of_the_case_is_on_though_it_is_no_effect(end: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    p = effects.catalogue()["duct"].parameters[0]
+    setting = {p.name: p.high if end else 0.5 * (p.low + p.high)}
+    monkeypatch.setattr(fit, "fit", lambda *_: SimpleNamespace(settings=(setting,)))
+    asked: Any = SimpleNamespace(
+        found=SimpleNamespace(problem=SimpleNamespace(baseline=())), leading=Explanation.of("duct")
+    )
+    assert rules._leaves_its_range(asked) == end
+
+
 @pytest.mark.parametrize(
     ("first", "adds", "rest", "left"),
     [("unit_slip", 20.0, 3.9, "unit_slip__untwist"), ("unit_slip", 20.0, 4.1, "unit_slip"),

@@ -82,7 +82,8 @@ def _leaves_its_range(a: Asked) -> bool:
     best = fitting.fit(a.found, a.leading).settings[0]
     for p in effects.catalogue()[name].parameters:
         value = best.get(p.name)
-        if value is not None and value not in (getattr(on[name], p.name), p.off) and not p.low < value < p.high:
+        own = getattr(on.get(name), p.name, p.off)  # the case's own duct is on and no effect
+        if value is not None and value not in (own, p.off) and not p.low < value < p.high:
             return True
     return False
 

@@ -49,6 +49,10 @@ class CoaxialNeighbour(Effect):
         """Refuse unknown sides."""
         choice("side", self.side, _SIDES)
 
+    def applies(self, flow: Flow) -> str:
+        """The law is that of two open disks."""
+        return super().applies(flow) or ("the rotor has a duct" if flow.ducted else "")
+
     def flow(self, flow: Flow) -> None:
         """Add what the neighbour induces."""
         flow.V = flow.V + self.mean() * self._speed(flow)
