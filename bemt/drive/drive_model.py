@@ -241,12 +241,16 @@ class Drive:
 
     def pulse_for(self, thrust_N: float, soc: float = 1.0, temperature_C: float | None = None) -> float:
         """Pulse width that gives a thrust. [us]"""
-        lo, hi = self.esc.pulse_min_us, self.esc.pulse_max_us
+        return float(self.pulses_for(thrust_N, np.array([soc]), temperature_C)[0])
+
+    def pulses_for(self, thrust_N: float, soc: Array, temperature_C: float | None = None) -> Array:
+        """Pulse widths that give a thrust at (N,) states of charge, NaN where none does. [us]"""
+        lo, hi = np.full(soc.shape, self.esc.pulse_min_us), np.full(soc.shape, self.esc.pulse_max_us)
+        out_of_reach, row = np.zeros(soc.shape, dtype=bool), np.arange(soc.size)
         for _ in range(6):  # thrust rises with pulse width: 40 parts at a time
-            grid = np.linspace(lo, hi, 41)
-            enough = self.steady(grid, soc, temperature_C).thrust_N >= thrust_N
-            if not enough[-1]:
-                return math.nan
-            i = int(np.argmax(enough))
-            lo, hi = float(grid[max(i - 1, 0)]), float(grid[i])
-        return hi
+            grid = np.linspace(lo, hi, 41, axis=-1)
+            enough = self.steady(grid, soc[:, None], temperature_C).thrust_N >= thrust_N
+            out_of_reach |= ~enough[:, -1]
+            i = np.argmax(enough, axis=1)
+            lo, hi = grid[row, np.maximum(i - 1, 0)], grid[row, i]
+        return np.where(out_of_reach, np.nan, hi)

@@ -66,12 +66,12 @@ def endurance(drive: Drive, mass_kg: float, rotors: int, soc: float, soc_min: fl
     """Time in hover until the charge is used, or the drive no longer carries the weight."""
     wanted = mass_kg * G0 / rotors
 
-    def drawn(c: float) -> float:
-        pulse = drive.pulse_for(wanted, c)
-        return math.nan if math.isnan(pulse) else float(drive.steady(pulse, c).battery_A[0])
+    def drawn(c: Array) -> Array:
+        pulse = drive.pulses_for(wanted, c)
+        return np.where(np.isfinite(pulse), drive.steady(pulse, c).battery_A, np.nan)
 
     charge = np.linspace(soc, soc_min, 21)
-    amps = np.array([drawn(float(c)) for c in charge])
+    amps = drawn(charge)
     good = int(np.argmax(~np.isfinite(amps))) if np.any(~np.isfinite(amps)) else len(amps)
     if good < 1:
         return math.nan, soc
@@ -79,10 +79,10 @@ def endurance(drive: Drive, mass_kg: float, rotors: int, soc: float, soc_min: fl
         lo, hi = charge[good], charge[good - 1]
         for _ in range(20):
             mid = 0.5 * (lo + hi)
-            carries = math.isfinite(drawn(float(mid)))
+            carries = bool(np.isfinite(drawn(np.array([mid])))[0])
             lo, hi = (lo, mid) if carries else (mid, hi)
         charge = np.append(charge[:good], hi)
-        amps = np.append(amps[:good], drawn(float(hi)))
+        amps = np.append(amps[:good], drawn(np.array([hi])))
     share = 3600.0 * drive.battery.capacity_Ah
     time = float(np.sum(-np.diff(charge) * 0.5 * (1.0 / amps[1:] + 1.0 / amps[:-1]))) * share
     return time, float(charge[-1])

@@ -8,6 +8,7 @@ import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -102,6 +103,12 @@ def _outline(rotor: Rotor, duct: Duct, model: MeshModel) -> np.ndarray | None:
     return None if plan is None else centre_body(duct, plan)
 
 
+@lru_cache(maxsize=4)
+def _mesh(rotor: Rotor, duct: Duct | None, options: Options | None) -> MeshModel:
+    """Mesh of a rotor, which is one object per geometry: the points of a campaign share it."""
+    return build(rotor, duct, options)
+
+
 def settings_of(case: Case, run: Run, options: Options | None = None) -> tuple[Settings, dict[str, Any]]:
     """Work out the settings of a run."""
     file = case.path.as_posix()
@@ -116,7 +123,7 @@ def settings_of(case: Case, run: Run, options: Options | None = None) -> tuple[S
     parts = {"half": 2, "blade": rotor.B}.get(sector, 1)
     duct, left_out = _standing(whole, parts)
     try:
-        model = build(rotor, duct, options)
+        model = _mesh(rotor, duct, options)
         body = None if whole is None else _outline(rotor, whole, model)
     except GeometryError as error:
         raise InputError([Fault(file, *fault) for fault in error.faults]) from error
