@@ -33,6 +33,8 @@ Array = NDArray[np.float64]
 _DROP = 8.0
 _KEEP = 6
 _PAIR_LEADERS = 60
+# Single effects of which the best pairs are looked for under every covariance, and pairs that are weighed there.
+_FIRST = 3
 # Leading pairs that are solved together: what one effect changes depends on the other.
 _TOGETHER, _ROUNDS = 24, 6
 FOR_NULLS = 3
@@ -211,7 +213,10 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
     best: dict[Hyper, dict[Explanation, float]] = {}
     top = -np.inf
     for h, C in noise.covariances(problem):
-        best[h] = coarse.state(h, C, top - _DROP).log_z
+        state = coarse.state(h, C, top - _DROP)
+        if pairs and state.half.size:
+            _best_pairs(state, coarse.spans, coarse.log_w)
+        best[h] = state.log_z
         top = max(top, max(best[h].values()) + np.log(h.weight))
     fine = _Table(problem, S, log_w, spans, candidates, modes, None)
     rivals = noise.rivals(problem)
@@ -357,15 +362,35 @@ class _Table:
 
 
 def _leading(log_z: dict[Hyper, dict[Explanation, float]]) -> list[Hyper]:
-    """Settings of the covariance under which some explanation is good."""
+    """Settings of the covariance under which some explanation is good, the best ones of one, two and no effects."""
     hypers = list(log_z)
     weight = np.log([h.weight for h in hypers])
-    score = np.array([max(log_z[h].values()) for h in hypers]) + weight
-    order = np.argsort(-score)[:_KEEP]
-    chosen = [int(i) for i in order if score[i] > score[order[0]] - _DROP]
-    # the best setting for "none" stays in, so that "none" is judged at its best
-    none = int(np.argmax(np.array([log_z[h][NONE] for h in hypers]) + weight))
-    return [hypers[i] for i in dict.fromkeys([*chosen, none])]
+
+    def score(effects: int) -> Array:
+        z = [max((v for k, v in log_z[h].items() if len(k) == effects), default=-np.inf) for h in hypers]
+        return np.array(z) + weight
+
+    none, single, pair = (score(n) for n in (0, 1, 2))
+    together = np.maximum(np.maximum(single, pair), none)
+    order = np.argsort(-together)[:_KEEP]
+    chosen = [int(i) for i in order if together[i] > together[order[0]] - _DROP]
+    # each is judged at its best: two effects explain what one leaves to a wider error of the solver
+    own = [int(np.argmax(s)) for s in (none, single, pair) if np.isfinite(s).any()]
+    return [hypers[i] for i in dict.fromkeys([*chosen, *own])]
+
+
+def _best_pairs(state: State, spans: Mapping[str, slice], log_w: Array) -> None:
+    """Evidence of the best pairs that hold one of the best single effects: enough to see which covariances matter."""
+    gain = state.S.T @ state.r - state.half + log_w
+    names, starts = list(spans), np.array([s.start for s in spans.values()])
+    found: dict[Explanation, float] = {}
+    for a in sorted(names, key=lambda i: -state.log_z[Explanation.of(i)])[:_FIRST]:
+        A = spans[a]
+        total = gain[A][:, None] + gain[None, :] - state.S[:, A].T @ state.S
+        top = np.maximum.reduceat(np.max(total, axis=0), starts)
+        found |= {Explanation.of(a, b): float(v) for b, v in zip(names, top, strict=True) if b != a}
+    for pair in sorted(found, key=lambda k: -found[k])[:_FIRST]:
+        state.log_z[pair] = _log_z(state, pair, spans, log_w)
 
 
 def _pairs(state: State, spans: dict[str, slice], log_w: Array) -> None:

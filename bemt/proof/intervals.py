@@ -1,12 +1,13 @@
 """How far intervals of parameters miss on a development set, and the factors that make them hold.
 
-Items are those of kept proofs.  Each is weighed with its true cause alone: what is asked
-for is how wide its parameter is, not whether it is found.  The score of an item is how many half-widths the truth lies
-away; the factor is the quantile of the scores that a new item stays below in nine cases of ten (split conformal).
+Items are those of kept proofs whose cause was named: only then does anybody read an interval.  Each is weighed with
+its true cause alone.  The score of an item is how many half-widths the truth lies away; the factor is the quantile of
+the scores that a new item stays below in nine cases of ten (split conformal).
 """
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -34,7 +35,7 @@ _LOWEST, _HIGHEST = 0.7, 3.0
 def misses(folder: Path, say: Callable[[str], None] = lambda _: None) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     """Open the key of a kept proof; say what set it is, and how many half-widths each true parameter lies off."""
     key = seal.unseal(folder)
-    chosen = [e for e in key["items"] if _useful(e)]
+    chosen = [e for e in key["items"] if _useful(e) and _named(folder, e)]
     out: list[dict[str, Any]] = []
     for k, entry in enumerate(chosen):
         (cause,) = entry["causes"]
@@ -55,6 +56,12 @@ def _useful(entry: Mapping[str, Any]) -> bool:
     cls = effects.catalogue()[entry["causes"][0]]
     told = set(entry["parameters"][entry["causes"][0]])
     return bool(told) and told <= {p.name for p in cls.parameters} - set(cls.discrete)
+
+
+def _named(folder: Path, entry: Mapping[str, Any]) -> bool:
+    """Whether the kept answer names the cause."""
+    answer = json.loads((folder / "answers" / f"{entry['folder']}.json").read_text(encoding="utf-8"))["answer"]
+    return bool(answer) and answer["effects"] == entry["causes"] and answer["verdict"] in ("named", "sensor")
 
 
 def _estimated(folder: Path, cause: str) -> Mapping[str, Mapping[str, float]]:
