@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
     taken = ""
     with _terminal.progress() as say:
         if args.calibrate_intervals:
-            return _intervals(args.calibrate_intervals, args.out, say)
+            return _intervals(args.calibrate_intervals, args.out)
         found = prove(args.out, args.size, args.seed, args.jobs, say, _terminal.complain)
         if args.follow:
             taken = follow.text(follow.follow(Path(args.out), args.jobs or os.cpu_count() or 1, say))
@@ -56,12 +56,12 @@ def run(args: argparse.Namespace) -> int:
     return EXIT_OK if all(row["met"] is not False for row in found["score"]) else EXIT_UNCONVERGED
 
 
-def _intervals(folders: list[str], out: str | None, say: Callable[[str], None]) -> int:
+def _intervals(folders: list[str], out: str | None) -> int:
     """Write the factors on the intervals."""
     from bemt.base.tables import json_text, write_atomic
     from bemt.diagnose.interval_scales import FILE
     from bemt.proof.intervals import calibrate, misses
 
-    sets, found = zip(*(misses(Path(folder), say) for folder in folders), strict=True)
+    sets, found = zip(*(misses(Path(folder)) for folder in folders), strict=True)
     write_atomic(Path(out or ".") / FILE, json_text(calibrate([m for some in found for m in some], sets)))
     return EXIT_OK

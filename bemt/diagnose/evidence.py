@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 _DROP = 8.0
 _KEEP = 6
 _PAIR_LEADERS = 60
-# Single effects of which the best pairs are looked for under every covariance, and pairs that are weighed there.
+# Single effects of which the best pair is looked for under every covariance.
 _FIRST = 3
 # Leading pairs that are solved together: what one effect changes depends on the other.
 _TOGETHER, _ROUNDS = 24, 6
@@ -210,16 +210,19 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
     modes = form.form_modes(problem, candidates)
     # a few settings of each effect are enough to see which covariances matter
     coarse = _Table(problem, S, log_w, spans, candidates, modes, _few(candidates))
+    rivals = noise.rivals(problem)
+    shapes = np.array([k.modes().T for k in rivals if np.array_equal(k.mine, problem.free)])
     best: dict[Hyper, dict[Explanation, float]] = {}
     top = -np.inf
     for h, C in noise.covariances(problem):
         state = coarse.state(h, C, top - _DROP)
-        if pairs and state.half.size:
-            _best_pairs(state, coarse.spans, coarse.log_w)
+        if state.half.size:
+            state.log_z[UNKNOWN] = state.log_z[NONE] + _smooth(state, shapes)
+            if pairs:
+                _best_pair(state, coarse.spans, coarse.log_w)
         best[h] = state.log_z
         top = max(top, max(best[h].values()) + np.log(h.weight))
     fine = _Table(problem, S, log_w, spans, candidates, modes, None)
-    rivals = noise.rivals(problem)
     states: list[State] = []
     for h in _leading(best):
         C = noise.covariance(problem, h)
@@ -362,25 +365,42 @@ class _Table:
 
 
 def _leading(log_z: dict[Hyper, dict[Explanation, float]]) -> list[Hyper]:
-    """Settings of the covariance under which some explanation is good, the best ones of one, two and no effects."""
+    """Settings of the covariance under which some explanation is good, and that of each kind of explanation."""
     hypers = list(log_z)
     weight = np.log([h.weight for h in hypers])
 
-    def score(effects: int) -> Array:
-        z = [max((v for k, v in log_z[h].items() if len(k) == effects), default=-np.inf) for h in hypers]
+    def score(kind: object) -> Array:
+        z = [max((v for k, v in log_z[h].items() if _kind(k) == kind), default=-np.inf) for h in hypers]
         return np.array(z) + weight
 
-    none, single, pair = (score(n) for n in (0, 1, 2))
-    together = np.maximum(np.maximum(single, pair), none)
+    each = np.array([score(kind) for kind in (_kind(NONE), _kind(UNKNOWN), 1, 2)])
+    together = each.max(axis=0)
     order = np.argsort(-together)[:_KEEP]
     chosen = [int(i) for i in order if together[i] > together[order[0]] - _DROP]
-    # each is judged at its best: two effects explain what one leaves to a wider error of the solver
-    own = [int(np.argmax(s)) for s in (none, single, pair) if np.isfinite(s).any()]
+    # each is judged at its best: two effects, or a smooth one, explain what one leaves to a wider error of the solver
+    own = [int(np.argmax(s)) for s in each if np.isfinite(s).any()]
     return [hypers[i] for i in dict.fromkeys([*chosen, *own])]
 
 
-def _best_pairs(state: State, spans: Mapping[str, slice], log_w: Array) -> None:
-    """Evidence of the best pairs that hold one of the best single effects: enough to see which covariances matter."""
+def _kind(what: Explanation) -> object:
+    """Nothing, something unknown, one effect, two."""
+    return what if what in (NONE, UNKNOWN) else len(what)
+
+
+def _smooth(state: State, shapes: Array) -> float:
+    """Log evidence over that of "none" of an unknown smooth effect in all channels, for modes (K, q, M)."""
+    if not shapes.size:
+        return 0.0
+    K, q, M = shapes.shape
+    B = state.white.changes(shapes.reshape(-1, M).T).T.reshape(K, q, -1)
+    gram = np.eye(q) + B @ B.transpose(0, 2, 1)
+    x = B @ state.r
+    gains = 0.5 * np.sum(x * np.linalg.solve(gram, x[..., None])[..., 0], axis=1) - 0.5 * np.linalg.slogdet(gram)[1]
+    return float(log_mean(gains, np.full(K, -np.log(K))))
+
+
+def _best_pair(state: State, spans: Mapping[str, slice], log_w: Array) -> None:
+    """Evidence of the best pair that holds one of the best single effects: enough to see which covariances matter."""
     gain = state.S.T @ state.r - state.half + log_w
     names, starts = list(spans), np.array([s.start for s in spans.values()])
     found: dict[Explanation, float] = {}
@@ -389,7 +409,8 @@ def _best_pairs(state: State, spans: Mapping[str, slice], log_w: Array) -> None:
         total = gain[A][:, None] + gain[None, :] - state.S[:, A].T @ state.S
         top = np.maximum.reduceat(np.max(total, axis=0), starts)
         found |= {Explanation.of(a, b): float(v) for b, v in zip(names, top, strict=True) if b != a}
-    for pair in sorted(found, key=lambda k: -found[k])[:_FIRST]:
+    if found:
+        pair = max(found, key=lambda k: found[k])
         state.log_z[pair] = _log_z(state, pair, spans, log_w)
 
 

@@ -57,6 +57,8 @@ _FORM_LENGTH = 0.7
 # Unknown smooth effect: lengths over the spread of a variable, sizes as a share of the largest coefficient.
 _RIVAL_LENGTHS = (0.15, 0.5)
 _RIVAL_SIZES = (0.03, 0.12)
+# Largest modes of a kernel that are kept where only the order of magnitude of it counts.
+_MODES = 16
 # A balance or mount that stays behind while its load falls (hysteresis as ISO 376 and OIML R 60 define it, decreasing
 # less increasing load; not checked): shares of the largest reading, length over the load, least fall that is one, and
 # fewest points of either kind.
@@ -319,6 +321,14 @@ class Rival:
     mine: NDArray[np.bool_]
     kernel: Array
     size: float
+
+    def modes(self) -> Array:
+        """Smooth changes of the readings that add up to it, but for what is too rough to matter, (M, q)."""
+        value, vector = np.linalg.eigh(self.kernel)
+        first = np.argsort(-value)[:_MODES]
+        out = np.zeros((self.mine.size, first.size))
+        out[self.mine] = self.size * vector[:, first] * np.sqrt(np.maximum(value[first], 0.0))
+        return out
 
     @property
     def covariance(self) -> Array:
