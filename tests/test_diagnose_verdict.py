@@ -12,7 +12,19 @@ from diagnosing import case, diagnose, left_out, points, recording
 
 from bemt import effects
 from bemt.bem import model as bem
-from bemt.diagnose import blocks, chain, confusion, fit, interval_scales, noise, prior, rules, signatures, verdict
+from bemt.diagnose import (
+    blocks,
+    chain,
+    confusion,
+    evidence,
+    fit,
+    interval_scales,
+    noise,
+    prior,
+    rules,
+    signatures,
+    verdict,
+)
 from bemt.diagnose.assemble import build
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
 from bemt.diagnose.record import from_series
@@ -306,3 +318,11 @@ def test_two_effects_are_weighed_as_they_act_together(answer: chain.Diagnosis) -
         total = state.both(pair, found.spans, found.log_w)[i - A.start, j - B.start]
         expected = 0.5 * state.r @ state.r - 0.5 * rest @ rest + found.log_w[i] + found.log_w[j]
         assert total == pytest.approx(expected, abs=1e-6)
+
+
+def test_every_kind_of_explanation_is_judged_under_its_best_covariance() -> None:
+    one, two = Explanation.of("untwist"), Explanation.of("untwist", "thrust_zero")
+    best = {NONE: 0.0, UNKNOWN: 40.0, one: 70.0, two: 100.0}
+    each = {k: noise.Hyper(1.0, 0.0, 0.01 * n, 1.0, 0.25) for n, k in enumerate(best, 1)}
+    kept = evidence._leading({each[k]: {**dict.fromkeys(best, -50.0), k: z} for k, z in best.items()})
+    assert set(kept) == set(each.values())
