@@ -126,18 +126,15 @@ def _sizes(name: str, told: Mapping[str, Mapping[str, Any]]) -> int:
 
 def _pair(a: Asked) -> Decision:
     """Two effects at work: a set for each cause; names where the sets have one member."""
-    sure = [i for i in a.leading if a.share[i] >= SURE]
-    if len(sure) == len(a.leading):
-        return a.names(sure, min(a.share[i] for i in sure))
     known = a.known_sets
     total = sum(v for k, v in a.P.items() if k.pair)
     inside = sum(a.P.get(Explanation.of(i, j), 0.0) for i in known[0] for j in known[-1])
     members = tuple(dict.fromkeys(i for s in known for i in s))
     if len(members) <= LARGEST and inside >= SURE * total:
-        why = (
-            "two effects are at work; one of them has look-alikes" if sure else "two are at work, each has look-alikes"
-        )
         open_sets = tuple(s for s in known if len(s) > 1)
+        words = ("two effects are at work; one of them has look-alikes" if a.sure
+                 else "two are at work, each has look-alikes")  # fmt: skip
+        why = words if open_sets else "two effects are at work, likeliest these, but not for sure"
         return replace(a.says("class", why, members, inside, open_sets), sets=known)
     return a.says("insufficient", "two effects or more, not told apart")
 
@@ -329,8 +326,8 @@ RULES: tuple[Rule, ...] = (
         "several are sure",
         lambda a: len(a.sure) > 1,
         lambda a: a.names(a.sure, min(a.share[i] for i in a.sure)),
-        "SURE",
-        "declared",
+        "SURE, BOTH",
+        "declared; of two each must be surer, so that both are",
     ),
     Rule(
         "one is sure",

@@ -34,6 +34,8 @@ GATE = 0.01
 """Largest p-value at which a mismatch counts as one [1]."""
 SURE = 0.85
 """Probability from which an effect, or a class of them, is named [1]."""
+BOTH = SURE**0.5
+"""The same of each of two, so that both together are as sure [1]."""
 LEFT_OVER = 4.0
 """Log odds of a smooth rest beside the best listed effect over no rest, from which the cause is unknown [1]."""
 SMALL = 0.1
@@ -263,7 +265,8 @@ class Asked:
     @cached_property
     def sure(self) -> tuple[str, ...]:
         """Effects that are in nearly all of the probability."""
-        return tuple(i for i, p in self.share.items() if p >= SURE)
+        least = BOTH if self.paired else SURE
+        return tuple(i for i, p in self.share.items() if p >= least)
 
     @cached_property
     def group(self) -> tuple[str, ...]:
@@ -283,7 +286,7 @@ class Asked:
         """One set of effects per cause of the leading pair; a sure effect is a set of its own."""
         sets = credible_sets(self.P, self.leading)
         for i in self.leading:
-            if self.share[i] >= SURE:
+            if i in self.sure:
                 other = next((s for s in sets if i not in s), tuple(self.leading.without(i)))
                 return (i,), other
         return sets
