@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Callable
 from pathlib import Path
 
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError

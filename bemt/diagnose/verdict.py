@@ -34,8 +34,8 @@ GATE = 0.01
 """Largest p-value at which a mismatch counts as one [1]."""
 SURE = 0.85
 """Probability from which an effect, or a class of them, is named [1]."""
-BOTH = SURE**0.5
-"""The same of each of two, so that both together are as sure [1]."""
+BOTH = 0.92
+"""The same of each of two, about its root, so that both together are as sure [1]."""
 LEFT_OVER = 4.0
 """Log odds of a smooth rest beside the best listed effect over no rest, from which the cause is unknown [1]."""
 SMALL = 0.1

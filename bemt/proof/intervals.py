@@ -29,7 +29,7 @@ _LOWEST, _HIGHEST = 0.7, 3.0
 
 
 def misses(folder: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """Open the key of a kept proof, answered with the factors in use; how many half-widths each true parameter is off."""
+    """Open the key of a kept proof, answered with the factors in use; half-widths that each true parameter is off."""
     key = seal.unseal(folder)
     out: list[dict[str, Any]] = []
     for entry in key["items"]:
