@@ -34,7 +34,7 @@ _DROP = 8.0
 _KEEP = 6
 _PAIR_LEADERS = 60
 # Single effects of which the best pair is looked for under every covariance.
-_FIRST = 3
+_FIRST = 2
 # Leading pairs that are solved together: what one effect changes depends on the other.
 _TOGETHER, _ROUNDS = 24, 6
 FOR_NULLS = 3
@@ -211,13 +211,13 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
     # a few settings of each effect are enough to see which covariances matter
     coarse = _Table(problem, S, log_w, spans, candidates, modes, _few(candidates))
     rivals = noise.rivals(problem)
-    shapes = np.array([k.modes().T for k in rivals if np.array_equal(k.mine, problem.free)])
+    shapes = noise.shapes(rivals, problem.free)
     best: dict[Hyper, dict[Explanation, float]] = {}
     top = -np.inf
     for h, C in noise.covariances(problem):
         state = coarse.state(h, C, top - _DROP)
         if state.half.size:
-            state.log_z[UNKNOWN] = state.log_z[NONE] + _smooth(state, shapes)
+            state.log_z[UNKNOWN] = state.log_z[NONE] + _smooth(state, *shapes)
             if pairs:
                 _best_pair(state, coarse.spans, coarse.log_w)
         best[h] = state.log_z
@@ -387,16 +387,17 @@ def _kind(what: Explanation) -> object:
     return what if what in (NONE, UNKNOWN) else len(what)
 
 
-def _smooth(state: State, shapes: Array) -> float:
-    """Log evidence over that of "none" of an unknown smooth effect in all channels, for modes (K, q, M)."""
+def _smooth(state: State, shapes: Array, sizes: Array) -> float:
+    """Log evidence over that of "none" of an unknown smooth effect in all channels, for modes (K, q, M) of size 1."""
     if not shapes.size:
         return 0.0
     K, q, M = shapes.shape
     B = state.white.changes(shapes.reshape(-1, M).T).T.reshape(K, q, -1)
-    gram = np.eye(q) + B @ B.transpose(0, 2, 1)
-    x = B @ state.r
-    gains = 0.5 * np.sum(x * np.linalg.solve(gram, x[..., None])[..., 0], axis=1) - 0.5 * np.linalg.slogdet(gram)[1]
-    return float(log_mean(gains, np.full(K, -np.log(K))))
+    s = sizes[:, None, None, None]
+    root = np.linalg.cholesky(np.eye(q) + s**2 * (B @ B.transpose(0, 2, 1)))
+    p = np.linalg.solve(root, s * (B @ state.r)[..., None])[..., 0]
+    gains = 0.5 * np.sum(p * p, axis=2) - np.sum(np.log(np.diagonal(root, axis1=2, axis2=3)), axis=2)
+    return float(log_mean(gains.ravel(), np.full(gains.size, -np.log(gains.size))))
 
 
 def _best_pair(state: State, spans: Mapping[str, slice], log_w: Array) -> None:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from bemt.diagnose.problem import Problem
     from bemt.effects.base import Effect
 
-__all__ = ["Conditional", "Hyper", "Rival", "Whitener", "conditional", "discrepancy", "hypers", "rivals", "unlike",
+__all__ = ["Conditional", "Hyper", "Rival", "Whitener", "conditional", "discrepancy", "hypers", "rivals", "shapes", "unlike",
            "whitener"]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -322,14 +322,6 @@ class Rival:
     kernel: Array
     size: float
 
-    def modes(self) -> Array:
-        """Smooth changes of the readings that add up to it, but for what is too rough to matter, (M, q)."""
-        value, vector = np.linalg.eigh(self.kernel)
-        first = np.argsort(-value)[:_MODES]
-        out = np.zeros((self.mine.size, first.size))
-        out[self.mine] = self.size * vector[:, first] * np.sqrt(np.maximum(value[first], 0.0))
-        return out
-
     @property
     def covariance(self) -> Array:
         """Covariance of all readings, (M, M)."""
@@ -394,6 +386,18 @@ def rivals(problem: Problem) -> tuple[Rival, ...]:
         label = " and ".join(words[k] for k in group)
         out += [Rival(f"{label} while the load falls: {size:.0%}", mine, kernel, size) for size in _BEHIND]
     return tuple(out)
+
+
+def shapes(chosen: Sequence[Rival], mine: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Largest modes of the kernels of rivals that change all of some readings, (K, q, M), and the sizes they have."""
+    every = [k for k in chosen if np.array_equal(k.mine, mine)]
+    kernels = {id(k.kernel): k.kernel for k in every}
+    out = np.zeros((len(kernels), min(_MODES, int(np.count_nonzero(mine))), mine.size))
+    for modes, kernel in zip(out, kernels.values(), strict=True):
+        value, vector = np.linalg.eigh(kernel)
+        first = slice(value.size - modes.shape[0], None)
+        modes[:, mine] = (vector[:, first] * np.sqrt(np.maximum(value[first], 0.0))).T
+    return out, np.unique([k.size for k in every])
 
 
 def _loading(problem: Problem) -> tuple[Array, NDArray[np.bool_]]:
