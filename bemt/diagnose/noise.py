@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from bemt.diagnose.problem import Problem
     from bemt.effects.base import Effect
 
-__all__ = ["Conditional", "Hyper", "Rival", "Whitener", "conditional", "discrepancy", "hypers", "rivals", "shapes", "unlike",
-           "whitener"]  # fmt: skip
+__all__ = ["Conditional", "Hyper", "Rival", "Whitener", "conditional", "discrepancy", "hypers", "rivals", "shapes",
+           "unlike", "whitener"]  # fmt: skip
 
 Array = NDArray[np.float64]
 
