@@ -26,7 +26,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--jobs", type=_options.positive, metavar="N", help=jobs)
     steps = "with --size real and --out: take the steps that silent answers recommend, where the data have them"
     parser.add_argument("--follow", action="store_true", help=steps)
-    kept = "folders of kept proofs: write factors on the intervals of parameters to --out instead"
+    kept = "folders of kept proofs, answered with the present factors on intervals: write new factors to --out instead"
     parser.add_argument("--calibrate-intervals", metavar="DIR", help=kept, **_options.MANY)
     _options.add_json(parser, "bemt.proof/1")
     _options.add_quiet(parser, "no tables")

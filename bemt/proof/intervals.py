@@ -7,7 +7,6 @@ that a new item stays below in nine cases of ten (split conformal).  Half-widths
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -47,8 +46,8 @@ def _told(folder: Path, entry: Mapping[str, Any]) -> Mapping[str, Any]:
     """Parameters that the kept answer gives where it names the causes and the plan can see them."""
     if not entry["causes"] or entry["set"] == "unlisted" or min(entry["separation"]) < VISIBLE:
         return {}
-    answer = json.loads((folder / "answers" / f"{entry['folder']}.json").read_text(encoding="utf-8"))["answer"]
-    if not judge(entry, answer).right or set(answer["effects"]) != set(entry["causes"]):
+    answer = seal.answer(folder / "answers" / f"{entry['folder']}.json")
+    if not answer or not judge(entry, answer).right or set(answer["effects"]) != set(entry["causes"]):
         return {}
     listed = {frozenset(str(r["effect"]).split("+")): r["parameters"] for r in answer["ranking"]}
     found: Mapping[str, Any] = listed.get(frozenset(entry["causes"]), {})

@@ -108,7 +108,7 @@ def diagnose_all(out: Path, jobs: int, say: Callable[[str], None] | None = None)
     Answers go to ``answers/<folder>.json`` and ``answers_with_reference/<folder>.json``.
     """
     _diagnose_folders(sorted((out / "items").iterdir()), out / "answers", jobs, _teller("diagnosed", say))
-    asked = [f for f in sorted((out / ASKED).glob("*")) if asks(_stored(out / "answers" / f"{f.name}.json"))]
+    asked = [f for f in sorted((out / ASKED).glob("*")) if asks(seal.answer(out / "answers" / f"{f.name}.json"))]
     _diagnose_folders(asked, out / f"answers_{ASKED}", jobs, _teller("reference given", say))
 
 
@@ -118,12 +118,6 @@ def asks(answer: Mapping[str, Any] | None) -> bool:
         return False
     step = answer.get("next_measurement") or {}
     return answer["verdict"] in ("insufficient", "unknown") and step.get("kind") == "reference"
-
-
-def _stored(file: Path) -> dict[str, Any] | None:
-    """Answer in a file; None where there is none."""
-    found: dict[str, Any] | None = json.loads(file.read_text(encoding="utf-8"))["answer"] if file.exists() else None
-    return found
 
 
 def _diagnose_folders(folders: Sequence[Path], answers: Path, jobs: int, tell: Callable[[int, int], None]) -> None:
@@ -156,7 +150,7 @@ def proof(out: Path, digest: str | None = None) -> dict[str, Any]:
         stored: Mapping[str, Any] = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
         judged.append(score.judge(entry, stored.get("answer")))
         if made and asks(judged[-1].answer) and (out / ASKED / entry["folder"]).exists():
-            second = _stored(out / f"answers_{ASKED}" / f"{entry['folder']}.json")
+            second = seal.answer(out / f"answers_{ASKED}" / f"{entry['folder']}.json")
             again.append(score.judge(entry, second))
         if made and judged[-1].answer:
             settles = resolve.resolves(found[entry["rig"], entry["plan"]], entry, judged[-1].answer)

@@ -11,7 +11,7 @@ from typing import Any
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import json_text, write_atomic
 
-__all__ = ["KEY", "SEAL", "sha256", "seal", "unseal"]
+__all__ = ["KEY", "SEAL", "answer", "sha256", "seal", "unseal"]
 
 KEY, SEAL = "key.json", "key.sha256"
 
@@ -61,3 +61,9 @@ def unseal(folder: Path, digest: str | None = None) -> dict[str, Any]:
     if faults:
         raise InputError(faults)
     return key
+
+
+def answer(file: Path) -> dict[str, Any] | None:
+    """Answer in a file; None where there is none."""
+    found: dict[str, Any] | None = json.loads(file.read_text(encoding="utf-8"))["answer"] if file.exists() else None
+    return found
