@@ -58,6 +58,27 @@ def test_stations_in_lengths_are_those_in_shares_of_the_radius(unit: str, metres
     assert other.chord == pytest.approx(one.chord, rel=1e-6) and other.beta == pytest.approx(one.beta, rel=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("header", "diameter", "where", "hint"),
+    [
+        ("r_mm,chord_mm,beta_deg", "150", "r_mm", "75 mm"),
+        ("r_mm,chord_mm,beta_deg", "400", "r_mm", "200 mm"),
+        ("r_mm,chord_mm,r_over_R,beta_deg", "200", "1", "r_mm and r_over_R"),
+        ("r_mm,chord_over_R,beta_deg", "200", "chord_over_R", "Divide the chord"),
+    ],
+)
+def test_stations_that_cannot_be_of_this_rotor(
+    header: str, diameter: str, where: str, hint: str, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    columns = {"r_mm": (20, 60, 100), "r_over_R": (0.2, 0.6, 1.0), "beta_deg": (30, 20, 12)}
+    rows = zip(*(columns.get(name, (20, 20, 10)) for name in header.split(",")), strict=True)
+    (here / "odd.csv").write_text("\n".join([header, *(",".join(map(str, row)) for row in rows)]))
+    assert main(["new", "--stations", "odd.csv", "--diameter-mm", diameter]) == 2
+    (said,) = capsys.readouterr().err.strip().splitlines()
+    assert said.startswith(f"odd.csv: {where}: got ") and hint in said
+    assert not (here / "odd").exists()
+
+
 def test_an_angle_that_may_be_twist_is_refused(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (here / "twist.csv").write_text(STATIONS.replace("beta_deg", "twist_deg"))
     assert main(["new", "--stations", "twist.csv", "--diameter-mm", "254"]) == 2

@@ -75,14 +75,13 @@ def _dat(path: Path) -> Airfoil:
     return _as_input(path.as_posix(), "", lambda: parse_dat(text, path.stem))
 
 
-def _station_columns(header: list[str], R: float) -> list[tuple[int, float]] | None:
-    """Places of r, chord and beta in a header, and what makes shares of the tip radius of them; None: not all there."""
+def _station_columns(header: list[str], R: float) -> list[list[tuple[int, float]]]:
+    """Places of r, chord and beta in a header, each with what makes shares of the tip radius of its values."""
     found = []
     for name in ("r", "chord"):
         scales = {f"{name}_over_R": 1.0, **{f"{name}_{unit}": to_si(1.0, unit) / R for unit in suffixes("length")}}
         found.append([(i, scales[cell]) for i, cell in enumerate(header) if cell in scales])
-    found.append([(i, 1.0) for i, cell in enumerate(header) if cell == "beta_deg"])
-    return [places[0] for places in found] if all(found) else None
+    return [*found, [(i, 1.0) for i, cell in enumerate(header) if cell == "beta_deg"]]
 
 
 def read_stations(path: Path, R: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -91,21 +90,24 @@ def read_stations(path: Path, R: float) -> tuple[np.ndarray, np.ndarray, np.ndar
 
     faults: list[Fault] = []
     rows: list[list[float]] = []
-    places: list[tuple[int, float]] | None = None
-    width = 0
+    places: list[tuple[int, float]] = []
+    header: list[str] = []
     file = path.as_posix()
     for i, line in enumerate(load_text(path).lines, 1):
         cells = [cell.strip() for cell in line.split("#", 1)[0].split(",")]
         if cells == [""]:
             continue
-        if places is None:
-            places, width = _station_columns(cells, R), len(cells)
-            if places is None:
+        if not places:
+            header, found = cells, _station_columns(cells, R)
+            if not all(found):
                 hint = "An angle to the plane of rotation is beta_deg; twist may count from elsewhere"
                 raise InputError(Fault(file, f"{i}", f"the header {line.strip()!r}", _STATION_COLUMNS, hint))
+            for twice in (columns for columns in found if len(columns) > 1):
+                faults.append(Fault(file, f"{i}", " and ".join(cells[j] for j, _ in twice), "one of them"))
+            places = [columns[0] for columns in found]
             continue
-        if len(cells) != width:
-            faults.append(Fault(file, f"{i}", f"{len(cells)} values", f"{width}, as the header has"))
+        if len(cells) != len(header):
+            faults.append(Fault(file, f"{i}", f"{len(cells)} values", f"{len(header)}, as the header has"))
             continue
         values = [number(cells[j]) for j, _ in places]
         for (j, _), value in zip(places, values, strict=True):
@@ -118,13 +120,14 @@ def read_stations(path: Path, R: float) -> tuple[np.ndarray, np.ndarray, np.ndar
     if faults:
         raise InputError(faults)
     x, c, beta = np.array(rows).T
-    for name, column, limit, hint in (
-        ("r_over_R", x, 1.001, "Divide the radius by the tip radius"),
-        ("chord_over_R", c, 3.0, "Divide the chord by the tip radius"),
-        ("beta_deg", np.abs(beta), 90.0, ""),
-    ):
-        if column.max() > limit:
-            faults.append(Fault(file, name, f"{column.max():g}", f"at most {limit:g}", hint))
+    is_length = places[0][1] != 1.0
+    limits = ((x.max(), 0.75 if is_length else 0.0, 1.001), (c.max(), 0.0, 3.0), (np.abs(beta).max(), 0.0, 90.0))
+    radius = f"Is the tip radius {1e3 * R:g} mm?" if is_length else "Divide the radius by the tip radius"
+    hints = (radius, "" if places[1][1] != 1.0 else "Divide the chord by the tip radius", "")
+    for (at, scale), (value, low, high), hint in zip(places, limits, hints, strict=True):
+        if not low <= value <= high:
+            expected = f"at most {high / scale:.4g}" if value > high else f"{low / scale:.4g} or more at the outermost"
+            faults.append(Fault(file, header[at], f"{value / scale:.4g}", expected, hint))
     if np.abs(beta).max() < 1.6:
         faults.append(Fault(file, "beta_deg", f"angles up to {np.abs(beta).max():g}", "degrees", "Looks like radians"))
     if faults:

@@ -36,7 +36,7 @@ def run(args: argparse.Namespace) -> int:
         document = from_blade_file.document(blade, path)
         print(json_text(document) if args.json else from_blade_file.text(blade, path, args.out), end="")
         return EXIT_OK
-    found, scale, words = from_solid.read_stations(path, args.unit)
+    found, scale, words = from_solid.find_stations(path, args.unit)
     if args.out is not None:
         from_solid.write(found, scale, path, Path(args.out))
     if args.json:

@@ -21,7 +21,11 @@ from bemt.compare.scaling import Judgement, judge, weigh
 from bemt.compare.scaling_laws import FAMILY, law
 from bemt.compare.stand_run import StandRun
 
-DAYS = "note temperature and pressure of both days; density is the first thing that differs between days"
+AIR_OF_BOTH = "--air-a TEMPERATURE,PRESSURE --air-b TEMPERATURE,PRESSURE"
+DAYS = (
+    "note temperature and pressure of both days, with units as in 20C,1013hPa; density is the first thing that differs "
+    "between days"
+)
 """What tells two runs apart whose loads differ by a share."""
 SCHEMA = "bemt.comparison/1"
 # Recorded densities are this good: a barometer, a thermometer and nobody's humidity, share.
@@ -270,7 +274,7 @@ def next_step(change: RunChange, files: Sequence[str]) -> dict[str, str]:
     density = likely.get("air_density", 0.0) * _FIRST >= max(likely.values(), default=1.0)
     small = max((abs(math.log(r["ratio"])) for r in loads), default=1.0) < _DAY
     if density and small and math.isnan(change.density_ratio):
-        return {"text": DAYS, "command": f"{ask} {a} {b} --air-a 20C,1013hPa --air-b 20C,1013hPa"}
+        return {"text": DAYS, "command": f"{ask} {a} {b} {AIR_OF_BOTH}"}
     if not _TORQUES & change.ratios.keys() and change.loads is said:
         text = "record torque in both runs: without it gain, air and blade look alike"
         return {"text": text, "command": f"{ask} A_WITH_TORQUE.csv B_WITH_TORQUE.csv"}

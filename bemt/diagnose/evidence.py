@@ -428,9 +428,11 @@ def _solve_pairs(
     score = {k: max(s.log_z[k] + np.log(s.hyper.weight) for s in states) + v for k, v in before.items() if k.pair}
     for pair in sorted(score, key=lambda k: -score[k])[:_TOGETHER]:
         state = max(states, key=lambda s: s.log_z[pair] + np.log(s.hyper.weight))
+        settled = False
         for _ in range(_ROUNDS):
             best = state.best_of(pair, spans, log_w)
-            if best == state.mixed.get(pair, (None, None, None))[1:]:
+            settled = best == state.mixed.get(pair, (None, None, None))[1:]
+            if settled:
                 break
             a, b = (effect_of(k, of[k].settings[c - spans[k].start]) for k, c in zip(pair, best, strict=True))
             extra = problem.signature((a, b)) - problem.signature((a,)) - problem.signature((b,))
@@ -438,7 +440,7 @@ def _solve_pairs(
                 break
             for s in states:
                 s.mixed[pair] = s.white.changes(extra), *best
-        else:  # it does not settle: what was solved does not say what holds at the best setting
+        if not settled:  # what was solved does not say what holds at the best setting
             for s in states:
                 s.mixed.pop(pair, None)
         for s in states:

@@ -13,7 +13,7 @@ from bemt import effects
 from bemt.air import R_DRY
 from bemt.base.units import ZERO_CELSIUS
 from bemt.bem import model as bem
-from bemt.compare.recordings import DAYS
+from bemt.compare.recordings import AIR_OF_BOTH, DAYS
 from bemt.diagnose import noise
 from bemt.diagnose.assemble import assemble
 from bemt.diagnose.nuisance import PRIORS
@@ -75,8 +75,7 @@ class Given:
 
     def of_days(self) -> tuple[str, ...]:
         """Command that compares with each reference in the air of both days."""
-        air = "--air-a 20C,1013hPa --air-b 20C,1013hPa"
-        return tuple(f"{self.comparison(file)} {air}" for file in self.references or ("REFERENCE",))
+        return tuple(f"{self.comparison(file)} {AIR_OF_BOTH}" for file in self.references or ("REFERENCE",))
 
 
 @dataclass(frozen=True)

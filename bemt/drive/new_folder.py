@@ -84,7 +84,7 @@ def _faults(w: Wanted) -> list[Fault]:
 def _files(w: Wanted) -> dict[str, bytes]:
     """Content of the folder by name."""
     if w.scan is not None:
-        found, scale, _ = from_solid.read_stations(Path(w.scan), w.unit)
+        found, scale, _ = from_solid.find_stations(Path(w.scan), w.unit)
         name = fresh.case_name(w.label or Path(w.scan).stem)
         source = re.sub(r'["\\\n]', "_", Path(w.scan).name)
         texts = from_solid.case_files(found, scale, name, source, "scan", w.rpm, w.airspeed_m_s)
