@@ -36,6 +36,7 @@ class MeasuredRotor(Sensed):
     gap_deg: float
     static: NDArray[np.bool_]
     y: Array
+    chord: float = math.nan  # At 0.75 R over the radius [1]
 
 
 def binned(m: MeasuredRotor) -> MeasuredRotor:
@@ -64,7 +65,8 @@ Statistica Sinica 21, 2011, not checked): the whole tells the correlations, sing
 
 # The latent numbers have expectation zero: the section rule was calibrated to have no bias at rest, and free means
 # make families left out worse (static CT 5.2 to 5.8 %, CP 7.6 to 7.8 in the median).  What the solver lacks is `bias`:
-# the hub's drag starts at a bluff body's (0.8 to 1.1: Hoerner 1965, Fluid-Dynamic Drag, ch. 3, not checked).
+# the hub's drag starts at a bluff body's (0.8 to 1.1: Hoerner 1965, Fluid-Dynamic Drag, ch. 3, not checked).  Drag over
+# chord starts at what thickness over chord (APC's PE0 files) and drag over thickness (the section tables) make of it.
 # Numbers of the search: name, start, centre and width of the prior that keeps what the data do not know.  The widths of
 # stations, label and families are narrow: measured propellers tell the sum of their variances, not its parts; optical
 # stations are off by about a degree (blades turned to their measured zero-thrust J scatter by 0.7 to 1.5).  The growth
@@ -84,7 +86,7 @@ _FREE: tuple[tuple[str, float, float, float], ...] = (
     ("ln_length_J", math.log(0.4), math.log(0.4), 0.4), ("ln_length_Re", math.log(0.7), math.log(0.7), 0.4),
     ("ln_reach", math.log(0.3), math.log(0.3), 0.3),
     ("rho", 0.3, 0.3, 1.0), ("ln_noise", math.log(0.012), math.log(0.012), 0.15),
-    ("hub_cd", 0.8, 0.8, 0.4), ("lift_Re", 0.0, 0.0, 0.1),
+    ("hub_cd", 0.8, 0.8, 0.4), ("lift_Re", 0.0, 0.0, 0.1), ("drag_chord", -0.3, -0.3, 0.3),
     ("ln_nu", math.log(4.0), math.log(4.0), 0.4),
     ("ln_nu_rest", math.log(4.0), math.log(4.0), 0.4),
 )  # fmt: skip
@@ -115,16 +117,15 @@ def _population(theta: Array) -> Population:
         rest_CT=math.exp(d["ln_rest_CT"]),
         rest_CP=math.exp(d["ln_rest_CP"]), rest_small=d["rest_small"], rest_share=d["rest_share"],
         length_J=math.exp(d["ln_length_J"]), length_ln_Re=math.exp(d["ln_length_Re"]), reach=math.exp(d["ln_reach"]),
-        hub_cd=d["hub_cd"], lift_Re=d["lift_Re"],
+        hub_cd=d["hub_cd"], lift_Re=d["lift_Re"], drag_chord=d["drag_chord"],
         rest_correlation=math.tanh(d["rho"]), noise=math.exp(d["ln_noise"]), nu=math.exp(d["ln_nu"]),
         nu_rest=math.exp(d["ln_nu_rest"]),
     )  # fmt: skip
 
 
-def law(p: Population, m: MeasuredRotor) -> tuple[Array, Array]:
-    """Mean and covariance of the latent numbers of a propeller that was measured, stations given."""
-    prior = p.prior("stations", m.diameter_m, m.gap_deg, m.family, m.section)
-    return prior.mean, prior.cov
+def law(p: Population, m: MeasuredRotor) -> Prior:
+    """What is known of a propeller before it is measured, stations given."""
+    return p.prior("stations", m.diameter_m, m.gap_deg, m.family, m.section, chord=m.chord)
 
 
 def _noise(p: Population, m: MeasuredRotor) -> Array:
@@ -221,9 +222,9 @@ def objective(theta: Array, rotors: Sequence[MeasuredRotor]) -> tuple[float, Arr
     total = -_gaps(p, rotors)
     gradient = np.array([-(_gaps(q, rotors) + total) / _STEP if i in _GAPS else 0.0 for i, q in enumerate(steps)])
     for m in rotors:
-        mean, cov = law(p, m)
+        prior = law(p, m)
         noise, bias = _noise(p, m), p.bias(m)
-        g = _rotor(m, mean, cov, noise, bias, s2, t2)
+        g = _rotor(m, prior.mean, prior.cov, noise, bias, s2, t2)
         total -= g.value
         for i, q in enumerate(steps):
             if i in _BIAS:
@@ -232,8 +233,9 @@ def objective(theta: Array, rotors: Sequence[MeasuredRotor]) -> tuple[float, Arr
             elif i in _REST:
                 gradient[i] -= float((g.noise * (_noise(q, m) - noise)).sum()) / _STEP
             elif i not in (_NU, _NU_REST):
-                mean_q, cov_q = law(q, m)
-                gradient[i] -= (g.mean @ (mean_q - mean) + float((g.cov * (cov_q - cov)).sum())) / _STEP
+                other = law(q, m)
+                change = g.mean @ (other.mean - prior.mean) + float((g.cov * (other.cov - prior.cov)).sum())
+                gradient[i] -= change / _STEP
         gradient[_NU] -= float(g.s2 @ ds2)
         gradient[_NU_REST] -= float(g.t2 @ dt2)
     away = (theta - _CENTRE) / _WIDTH
@@ -270,7 +272,7 @@ def offsets(p: Population, rows: Sequence[MeasuredRotor]) -> dict[str, tuple[flo
             continue
         # blade angle from its performance, no label: the stations' part of the posterior shift of the angle
         own = (p.stations_deg * p.growth(m.diameter_m)) ** 2
-        free = p.prior("stations", m.diameter_m, section=m.section)
+        free = p.prior("stations", m.diameter_m, section=m.section, chord=m.chord)
         mean, cov = posterior(p, m, free.mean, free.cov)
         part = own / free.cov[i, i]
         shift = part * (mean[i] - free.mean[i])

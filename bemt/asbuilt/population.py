@@ -53,11 +53,16 @@ LIFT_RE, LIFT_SHAPE = (1e4, 3e4, 1e5, 3e5), (0.0, -1.0, 1.0, 0.0)
 """Mean lift that section tables do not know, linear in ln Re: laminar separation reattaches from 30,000 on and closes
 to a shorter bubble from 70,000 (Carmichael 1981, NASA CR 165803, not checked), while tables at n_crit 3 have most of
 that step below 30,000.  Nothing was measured above 126,000; from 3e5 the tables are those of another n_crit [1]."""
-LIFT_AT_REST = 0.25
-"""Share of it at rest, where angles are large; linear in J/J0.  Chosen by the three mean log scores (families left out,
-volumes left out): 0.757, 1.011, 0.524 for 0; 0.764, 1.018, 0.521; 0.763, 1.016, 0.517 for 0.5 [1]."""
+LIFT_ANGLE = 24.0
+"""Angle of attack at 0.75 R, induction left out, at which none of it is left, linear: about 12 deg with induction,
+where sections stall.  Chosen: of 15 to 30, those from 23 to 26 predict families left out best [deg]."""
 HUB = 0.15
 """Hub over the diameter of the rotor that `Population.hub_cd` counts on: CT = pi/8 cd (HUB J)^2 [1]."""
+CHORD_RANGE = (0.10, 0.28)
+"""Chords at 0.75 R over the radius at which t/c = 0.101 (chord / 0.144)^-1.2, fitted to 17 blades of APC (PE0 files),
+stays inside their 4 to 15 %; farther out the thickness, and its drag, is taken as at the ends [1]."""
+RULE_CHORD = 0.15
+"""Chord over the radius at which the rule's thickness of 9 % is taken as right [1]."""
 SECTIONS = ("published", "calibrated", "rule", "given")
 """What a section may be: coordinates of the maker, camber calibrated on its family, the general rule, or declared."""
 _QUANTILES = np.array([0.02, 0.1, 0.3, 0.5, 0.7, 0.9])
@@ -113,7 +118,10 @@ class Population:
     hub_cd : float
         Drag coefficient of the hub in flight, on a disk of `HUB` diameters [1].
     lift_Re : float
-        Expectation of ln(lift) at small angles (J near J0) and Re 100,000, with the opposite sign at 30,000 [1].
+        Expectation of ln(lift) at small angles of attack and Re 100,000, with the opposite sign at 30,000 [1].
+    drag_chord : float
+        Exponent of the chord in the expectation of the drag of sections whose thickness nobody published: narrow
+        blades are thicker (`CHORD_RANGE`) [1].
     rest_correlation : float
         Of the rest between CT and CP [1].
     noise : float
@@ -144,6 +152,7 @@ class Population:
     reach: float
     hub_cd: float
     lift_Re: float
+    drag_chord: float
     rest_correlation: float
     noise: float
     nu: float
@@ -179,8 +188,9 @@ class Population:
     def prior(
         self, known_from: str, diameter_m: float, gap_deg: float = math.nan, family: str | None = None,
         section: str = "given", declared: Collection[str] = (), sds: Mapping[str, float] | None = None,
+        chord: float = math.nan,
     ) -> Prior:  # fmt: skip
-        """What is known of one rotor."""
+        """What is known of one rotor; ``chord`` at 0.75 R over the radius where the thickness is not known [1]."""
         if known_from not in KNOWN_FROM or known_from == "reference" or section not in SECTIONS:
             raise ValueError(f"got {known_from!r}, {section!r}; expected one of {KNOWN_FROM[:-1]} and of {SECTIONS}")
         growth = self.growth(diameter_m)
@@ -190,6 +200,8 @@ class Population:
             shift, variance = self.angle(known_from, growth, gap_deg, family)
             mean[i] += shift
             cov[i, i] += variance
+        if known_from == "stations" and section in ("calibrated", "rule") and math.isfinite(chord):
+            mean[drag] += self.drag_chord * math.log(float(np.clip(chord, *CHORD_RANGE)) / RULE_CHORD)
         if section == "rule" and "camber" not in declared:
             cov[camber, camber] += CAMBER_SD**2
             cov[drag, drag] += SECTION_DRAG_SD**2
@@ -229,7 +241,8 @@ class Population:
 
     def bias(self, at: Sensed) -> Array:
         """What the solver lacks in the mean, (2, P): drag of the hub (Hoerner 1965, ch. 3), lift over Re [1]."""
-        small_angles = LIFT_AT_REST + (1.0 - LIFT_AT_REST) * np.clip(at.x, 0.0, 1.0)
+        alpha = np.degrees(np.arctan(at.J0 / (0.75 * np.pi)) - np.arctan(at.J0 * at.x / (0.75 * np.pi)))
+        small_angles = np.clip(1.0 - alpha / LIFT_ANGLE, 0.0, 1.0)
         lift = self.lift_Re * small_angles * np.interp(np.log(at.Re), np.log(LIFT_RE), LIFT_SHAPE)
         bias = at.T[:, NAMES.index("lift")] * lift
         bias[0] -= math.pi / 8.0 * self.hub_cd * (HUB * at.J0 * at.x) ** 2

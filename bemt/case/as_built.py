@@ -76,7 +76,8 @@ def as_built_of(file: CaseFile, folder: Path, rotor: Rotor, counting_assumptions
     blade, stated = file.blade, file.blade.as_built
     if stated is not None and stated.file is not None:
         return _posterior(folder / stated.file)
-    moved = {item.key for item in file.assumptions} if counting_assumptions else set()
+    assumed = {item.key for item in file.assumptions}
+    moved = assumed if counting_assumptions else set()
     declared = {what for what, keys in MOVED.items() if moved & set(keys)}
     source = known_from(blade)
     drawn_section = blade.section is not None and blade.section.dat is not None
@@ -88,7 +89,10 @@ def as_built_of(file: CaseFile, folder: Path, rotor: Rotor, counting_assumptions
         for name, sd in named.items():
             if getattr(stated, sd) is not None:
                 sds[name] = getattr(stated, sd)
-    prior = population().prior(source, rotor.D, _gap_deg(blade, rotor), blade.family, section, declared, sds)
+    thickness_known = file.rotor.kind != "propeller" or "blade.section.thickness" not in assumed
+    chord = math.nan if thickness_known else float(rotor.blade.at(0.75 * rotor.R)[0]) / rotor.R
+    gap = _gap_deg(blade, rotor)
+    prior = population().prior(source, rotor.D, gap, blade.family, section, declared, sds, chord)
     stated_mean = np.where(drawn != 0.0, drawn, prior.mean)
     return CaseAsBuilt(Prior(stated_mean, prior.cov, prior.sizes, prior.weights, source), drawn)
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.asbuilt.conditioning import condition
-from bemt.asbuilt.fit import MeasuredRotor
+from bemt.asbuilt.fit import MeasuredRotor, law
 from bemt.asbuilt.latents import Prior
 from bemt.asbuilt.mixture import LEVELS, half_width, inside
 from bemt.asbuilt.population import WEIGHTS, Population, label_angle_deg
@@ -69,7 +69,7 @@ def observe(propeller: UiucPropeller, effects: Sequence[Effect], stations: Stati
     y = np.array([drawn.CT[here], drawn.CP[here]])
     source = section_rule.source(family)
     record = MeasuredRotor(**vars(at), name=propeller.name, family=propeller.family, section=source, gap_deg=gap,
-                      static=drawn.static[here], y=y)  # fmt: skip
+                      static=drawn.static[here], y=y, chord=chord / rotor.R)  # fmt: skip
     return Observed(propeller, solve, drawn, record)
 
 
@@ -87,7 +87,7 @@ def conditioned(seen: Observed, p: Population, on: str) -> Expected:
     run = run[np.unique(np.linspace(0, run.size - 1, min(run.size, RUN_POINTS)).round().astype(int))]
     if on.endswith("_and_one"):
         run = np.append(run, np.argmin(np.where(m.static, np.inf, np.abs(m.x - 0.5))))
-    prior = p.prior("stations", m.diameter_m, m.gap_deg, m.family, m.section)
+    prior = law(p, m)
     x, Re, f, top, y = m.x[run], m.Re[run], m.f[:, run], m.top[:, run], m.y[:, run]
     still = m.static[run]
     rough = np.array([[scatter(a, Re[still])] for a in (y - f)[:, still]]) * still
@@ -104,8 +104,7 @@ def conditioned(seen: Observed, p: Population, on: str) -> Expected:
 
 def expect(seen: Observed, p: Population) -> Expected:
     """Expectation of a propeller and how its points lie in it."""
-    m = seen.record
-    return _lying(seen, p, p.prior("stations", m.diameter_m, m.gap_deg, m.family, m.section))
+    return _lying(seen, p, law(p, seen.record))
 
 
 def _lying(seen: Observed, p: Population, prior: Prior, reference: ReferenceRun | None = None) -> Expected:
