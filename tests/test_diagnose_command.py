@@ -185,6 +185,16 @@ def test_a_reversed_cell_is_said_before_physics_and_named(tmp_path: Path, capsys
     assert "sign_flipped (thrust_N)" in answer["findings"][0]
 
 
+def test_the_log_of_a_stand_gives_the_sense_of_rotation_by_the_sign_of_the_torque(tmp_path: Path) -> None:
+    series = recording(case(), points("static"))
+    heads = "Time (s),ESC signal (µs),Torque (N·m),Thrust (gf),Motor Electrical Speed (RPM)"
+    rows = zip(-series["torque_Nm"], series["thrust_N"] / 9.80665e-3, series["rpm"], strict=True)
+    lines = [f"{2.0 * k},{1200 + 10 * k},{q},{t},{n}" for k, (q, t, n) in enumerate(rows)]
+    (tmp_path / "StepsTestV2_2022-01-18_153833.csv").write_text("\n".join([heads, *lines]) + "\n", encoding="utf-8")
+    made = load(str(tmp_path / "StepsTestV2_2022-01-18_153833.csv"), case())
+    assert np.all(made.measured["torque_Nm"] > 0.0) and any("sense of rotation" in n for n in made.notes)
+
+
 @pytest.mark.parametrize("order", ["speed first", "wind first", "shuffled", "half of the thrusts empty"])
 def test_many_points_say_the_same_in_any_order(order: str) -> None:
     """They are averaged with alike ones, as coefficients."""

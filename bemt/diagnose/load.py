@@ -75,6 +75,9 @@ def load(
     findings = check(imported, diameter_m=case.diameter_m, blades=int(case.get("rotor.blades")), ducted=ducted)
     found = tuple(f"{Path(path).name}: {f}" for f in findings if f.severity != "note")
     rows = named(imported)
+    # in the log of a stand the sign is the hand of the rotor; in somebody's own table it may be a slip
+    log = imported.provenance["format"] != "table"
+    hand = log and any(f.id == "sign_flipped" and f.severity == "note" for f in findings)
     if {"CT", "CP", "CQ"} & set(imported.values):
         made = records.from_series(_points(imported, rows, path), case)
     else:
@@ -85,8 +88,9 @@ def load(
             points = _scattered(_points(imported, rows, path), points)
         elif _step_responses(imported, rows, points):
             points = replace(_points(imported, rows, path), notes=("short log: every row counts, transients too",))
-        made = records.from_series(points, case, shared)
-    notes = (*made.notes, *imported.notes, *rows.notes, *_unused(imported, rows, case))
+        made = records.from_series(_turned(points) if hand else points, case, shared)
+    turned = ("torque_Nm: negative under load, which is the sense of rotation: turned here",) if hand else ()
+    notes = (*made.notes, *turned, *imported.notes, *rows.notes, *_unused(imported, rows, case))
     return replace(made, findings=found, notes=notes)
 
 
@@ -127,6 +131,11 @@ def _scattered(series: Dataset, reduced: Dataset) -> Dataset:
         for rows, value in zip(reduction(reduced).rows, seen, strict=True):
             u[name][rows] = np.hypot(value, floor * full)
     return replace(series, u=u)
+
+
+def _turned(points: Dataset) -> Dataset:
+    """Torque of a rotor of the other hand, whose sign is the sense of rotation."""
+    return replace(points, values={**points.values, "torque_Nm": -points["torque_Nm"]})
 
 
 def _same_rotor(imported: Dataset, case: Case, path: str) -> None:
