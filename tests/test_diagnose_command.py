@@ -185,6 +185,12 @@ def test_a_reversed_cell_is_said_before_physics_and_named(tmp_path: Path, capsys
     assert "sign_flipped (thrust_N)" in answer["findings"][0]
 
 
+def test_rows_of_propellers_of_several_diameters_are_refused(tmp_path: Path) -> None:
+    sizes = np.where(np.arange(RPM.size) % 2, 8.0, 9.0)
+    with pytest.raises(InputError, match="2 set-ups: 0.2032, 0.2286"):
+        load(_table(tmp_path / "all.csv", LOADS | {"D_in": sizes}), case())
+
+
 def test_the_log_of_a_stand_gives_the_sense_of_rotation_by_the_sign_of_the_torque(tmp_path: Path) -> None:
     series = recording(case(), points("static"))
     heads = "Time (s),ESC signal (µs),Torque (N·m),Thrust (gf),Motor Electrical Speed (RPM)"

@@ -249,7 +249,7 @@ def _one_setup(imported: Dataset, path: str) -> None:
     """Refuse a table of several propellers or motors: their points are no one curve."""
     from bemt.readers.generic_csv import setups
 
-    for name, kinds in setups(imported.texts).items():
+    for name, kinds in setups(imported.texts, imported.values).items():
         got = f"{len(kinds)} set-ups: {', '.join(kinds[:4])}" + (", ..." if len(kinds) > 4 else "")
         hint = "Put the rows of each into a file of its own"
         raise InputError(Fault(path, name, got, "one propeller with one motor", hint))
