@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from diagnosing import CASES, case, points, recording
 
+from bemt.base.errors import InputError
 from bemt.case import load_case
 from bemt.case.prepare import prepare_case
 from bemt.commands.cli import build_parser, main
