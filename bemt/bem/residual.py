@@ -150,9 +150,8 @@ def lookup_plain(alpha, lre0, W2, base, tab, g):
 
 
 @inlined
-def lookup_full(alpha, lre0, W2, base, tab, g):
-    """Like :func:`lookup_plain`, linear in alpha, ln Re and Mach number squared, held at the ends of both."""
-    i, wa, inv = _alpha_cell(alpha, g)
+def _flow_cell(lre0, W2, g):
+    """Lower index, weight and slope in ln W on the axes of ln Re and of the squared Mach number, held at their ends."""
     x = (lre0 + 0.5 * log(W2 if W2 > 1e-12 else 1e-12) - g[7]) * g[8]
     r_slope = g[8] if (x > 0.0 and x < g[9]) else 0.0
     x = x if x > 0.0 else 0.0
@@ -166,6 +165,14 @@ def lookup_full(alpha, lre0, W2, base, tab, g):
     e = y if y < g[11] - 1.0 else g[11] - 1.0
     m = np.int32(e)
     wm = y - m
+    return j, wr, r_slope, m, wm, m_slope
+
+
+@inlined
+def lookup_full(alpha, lre0, W2, base, tab, g):
+    """Like :func:`lookup_plain`, linear in alpha, ln Re and Mach number squared, held at the ends of both."""
+    i, wa, inv = _alpha_cell(alpha, g)
+    j, wr, r_slope, m, wm, m_slope = _flow_cell(lre0, W2, g)
     p0 = base + m * np.int32(g[12]) + j * np.int32(g[13]) + 2 * i
     l00, sl00, d00, sd00 = _cell(tab, p0, wa)
     l01, sl01, d01, sd01 = _cell(tab, p0 + np.int32(g[13]), wa)
@@ -190,19 +197,7 @@ def lookup_full(alpha, lre0, W2, base, tab, g):
 def lookup_factored(alpha, lre0, W2, base, tab, g):
     """Like :func:`lookup_full`, from cl0(Re) times a factor of Mach number, and cd0(Re) plus an addition of it."""
     i, wa, inv = _alpha_cell(alpha, g)
-    x = (lre0 + 0.5 * log(W2 if W2 > 1e-12 else 1e-12) - g[7]) * g[8]
-    r_slope = g[8] if (x > 0.0 and x < g[9]) else 0.0
-    x = x if x > 0.0 else 0.0
-    x = x if x < g[9] else g[9]
-    e = x if x < g[9] - 1.0 else g[9] - 1.0
-    j = np.int32(e)
-    wr = x - j
-    y = W2 * g[10]
-    m_slope = 2.0 * y if y < g[11] else 0.0
-    y = y if y < g[11] else g[11]
-    e = y if y < g[11] - 1.0 else g[11] - 1.0
-    m = np.int32(e)
-    wm = y - m
+    j, wr, r_slope, m, wm, m_slope = _flow_cell(lre0, W2, g)
     p0 = base + j * np.int32(g[13]) + 2 * i
     q0 = base + np.int32(g[14]) + m * np.int32(g[12]) + 2 * i
     a0, a1, d0, sd0 = _ends(tab, p0)
