@@ -188,7 +188,7 @@ def test_a_reversed_cell_is_said_before_physics_and_named(tmp_path: Path, capsys
 
 def test_rows_of_propellers_of_several_diameters_are_refused(tmp_path: Path) -> None:
     sizes = np.where(np.arange(RPM.size) % 2, 8.0, 9.0)
-    with pytest.raises(InputError, match="2 set-ups: 0.2032, 0.2286"):
+    with pytest.raises(InputError, match="D_in: got 2 set-ups: 0.2032 m, 0.2286 m"):
         load(_table(tmp_path / "all.csv", LOADS | {"D_in": sizes}), case())
 
 

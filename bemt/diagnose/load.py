@@ -252,4 +252,5 @@ def _one_setup(imported: Dataset, path: str) -> None:
     for name, kinds in setups(imported.texts, imported.values).items():
         got = f"{len(kinds)} set-ups: {', '.join(kinds[:4])}" + (", ..." if len(kinds) > 4 else "")
         hint = "Put the rows of each into a file of its own"
-        raise InputError(Fault(path, name, got, "one propeller with one motor", hint))
+        heading = imported.provenance.get("headings", {}).get(name, name)
+        raise InputError(Fault(path, heading, got, "one propeller with one motor", hint))

@@ -142,7 +142,7 @@ def setups(
     for name, column in (values or {}).items():
         sizes = np.unique(column[np.isfinite(column) & (column > 0.0)])
         if SIZE.match(name) and 1 < sizes.size <= max(2, column.size // 2):
-            found[name] = [f"{v:.4g}" for v in sizes]
+            found[name] = [f"{v:.4g} m" for v in sizes]
     for name, cells in texts.items():
         kinds = list(dict.fromkeys(c.strip() for c in cells if c.strip()))
         if SETUP.search(name.lower()) and 1 < len(kinds) <= max(2, len(cells) // 2):
