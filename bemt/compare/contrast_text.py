@@ -80,13 +80,12 @@ _FAMILY_WORD = {
 
 def headline(doc: Mapping[str, Any]) -> str:
     """What an engineer would say first."""
-    shares = [
-        (_WORD[c], math.log(r["ratio"] * r["density_ratio"]))
-        for c, r in doc["ratios"].items()
-        if r["kind"] in ("thrust", "torque")
-    ]
-    moved = " and ".join(f"{word} {_share(math.exp(x))}" for word, x in shares)
     effects, verdict = list(doc["effects"]), doc["verdict"]
+    # a cause in the drive has moved the drive, not the loads
+    drive = {FAMILY.get(k, k) for k in effects} == {"drive"}
+    kinds = ("speed", "voltage", "electrical") if drive else ("thrust", "torque")
+    by_kind = {r["kind"]: f"{_WORD[c]} {_share(r['ratio'] * r['density_ratio'])}" for c, r in doc["ratios"].items()}
+    moved = " and ".join([by_kind[k] for k in kinds if k in by_kind][:2])
     if verdict == "none":
         return f"Nothing changed beyond what two set-ups differ by ({moved or 'drive alone'})."
     if verdict == "unknown":
