@@ -32,6 +32,7 @@ class DuctEffect(Effect):
 
     id = "duct"
     inviscid = True
+    evident = True
     title = "thrust of a duct"
     sign = "more thrust for the same torque, fading with advance ratio"
     parameters = (
