@@ -131,6 +131,21 @@ def test_a_change_that_no_cause_makes_is_not_named(tmp_path: Path) -> None:
     assert compare(*pair(tmp_path, wave)).verdict in ("unknown", "insufficient")
 
 
+@pytest.mark.parametrize(("volts", "verdicts"), [(True, {"insufficient"}), (False, {"unknown", "insufficient"})])
+def test_electrical_power_for_torque_claims_nothing_unlisted(tmp_path: Path, volts: bool, verdicts: set[str]) -> None:
+    """At like voltage it stands for torque, with the losses of the motor in it."""
+    files = []
+    for name, seed, size in (("a.csv", 1, 0.0), ("b.csv", 2, 0.4)):
+        table = stand(seed)
+        table["thrust_N"] = table["thrust_N"] * (1.0 + size * np.sin(table["rpm"] / 700.0))
+        table["electrical_power_W"] = 1.4 * table.pop("torque_Nm") * table["rpm"] * np.pi / 30.0
+        table |= {"voltage_V": np.full(17, 12.0), "throttle": table["rpm"] / 8000.0} if volts else {}
+        files.append(written(tmp_path / name, table))
+    answer = compare(*files)
+    assert any("stands for it" in line for line in answer.document["assumed"]) == volts
+    assert answer.verdict in verdicts
+
+
 def test_recorded_density_is_the_cause_when_the_coefficients_agree(tmp_path: Path) -> None:
     a, b = stand(1), stand(2, scaled(thrust_N=1.1, torque_Nm=1.1))
     files = [

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from diagnosing import CASES, case, points, recording
 
+from bemt.base.errors import InputError
 from bemt.case import load_case
 from bemt.case.prepare import prepare_case
 from bemt.commands.cli import build_parser, main
@@ -183,6 +184,22 @@ def test_a_reversed_cell_is_said_before_physics_and_named(tmp_path: Path, capsys
     slip = answer["ranking"][0]["parameters"]
     assert (slip["channel"]["value"], slip["factor"]["value"]) == ("thrust_N", -1.0)
     assert "sign_flipped (thrust_N)" in answer["findings"][0]
+
+
+def test_rows_of_propellers_of_several_diameters_are_refused(tmp_path: Path) -> None:
+    sizes = np.where(np.arange(RPM.size) % 2, 8.0, 9.0)
+    with pytest.raises(InputError, match="D_in: got 2 set-ups: 0.2032 m, 0.2286 m"):
+        load(_table(tmp_path / "all.csv", LOADS | {"D_in": sizes}), case())
+
+
+def test_the_log_of_a_stand_gives_the_sense_of_rotation_by_the_sign_of_the_torque(tmp_path: Path) -> None:
+    series = recording(case(), points("static"))
+    heads = "Time (s),ESC signal (µs),Torque (N·m),Thrust (gf),Motor Electrical Speed (RPM)"
+    rows = zip(-series["torque_Nm"], series["thrust_N"] / 9.80665e-3, series["rpm"], strict=True)
+    lines = [f"{2.0 * k},{1200 + 10 * k},{q},{t},{n}" for k, (q, t, n) in enumerate(rows)]
+    (tmp_path / "StepsTestV2_2022-01-18_153833.csv").write_text("\n".join([heads, *lines]) + "\n", encoding="utf-8")
+    made = load(str(tmp_path / "StepsTestV2_2022-01-18_153833.csv"), case())
+    assert np.all(made.measured["torque_Nm"] > 0.0) and any("sense of rotation" in n for n in made.notes)
 
 
 @pytest.mark.parametrize("order", ["speed first", "wind first", "shuffled", "half of the thrusts empty"])

@@ -22,6 +22,8 @@ _WORD = {
     "rpm": "speed at equal command",
     "voltage_V": "voltage at equal command",
 }
+# Runs at nearly one speed say nothing of a change over it: error per doubling from which it is not shown [1].
+_NO_SLOPE = 1.0
 _ROWS, _NOTES = 8, 4
 
 
@@ -52,7 +54,7 @@ def text(doc: Mapping[str, Any], details: bool = False) -> str:
     for channel, r in doc["ratios"].items():
         raw = r["ratio"] * r["density_ratio"]
         slope = "-"
-        if "slope" in r and r["kind"] not in ("speed", "voltage"):
+        if "slope" in r and r["kind"] not in ("speed", "voltage") and r["slope_error"] < _NO_SLOPE:
             slope = f"{r['slope']:+.1%} +- {r['slope_error']:.1%}"
         more = [slope, f"{r['scatter']:.1%}", "{}, {}".format(*r["points"])]
         rows.append([_WORD.get(channel, channel), f"{raw:.4f}", *_ends(r, r["density_ratio"]), *more])
@@ -78,13 +80,12 @@ _FAMILY_WORD = {
 
 def headline(doc: Mapping[str, Any]) -> str:
     """What an engineer would say first."""
-    shares = [
-        (_WORD[c], math.log(r["ratio"] * r["density_ratio"]))
-        for c, r in doc["ratios"].items()
-        if r["kind"] in ("thrust", "torque")
-    ]
-    moved = " and ".join(f"{word} {_share(math.exp(x))}" for word, x in shares)
     effects, verdict = list(doc["effects"]), doc["verdict"]
+    # a cause in the drive has moved the drive, not the loads
+    drive = {FAMILY.get(k, k) for k in effects} == {"drive"}
+    kinds = ("speed", "voltage", "electrical") if drive else ("thrust", "torque")
+    by_kind = {r["kind"]: f"{_WORD[c]} {_share(r['ratio'] * r['density_ratio'])}" for c, r in doc["ratios"].items()}
+    moved = " and ".join([by_kind[k] for k in kinds if k in by_kind][:2])
     if verdict == "none":
         return f"Nothing changed beyond what two set-ups differ by ({moved or 'drive alone'})."
     if verdict == "unknown":

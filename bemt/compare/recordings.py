@@ -109,7 +109,7 @@ def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> RunChange
     verdict = _NO_TALK
     if loads:
         verdict = judge(*weigh(loads, (rotor.free, rotor.steady), ("air", "stand"), known, _speeds(ratios)))
-        verdict = _far_off(_far_apart(_with_density(verdict, a, b, loads), ratios), ratios)
+        verdict = _far_off(_far_apart(_with_density(_by_proxy(verdict, loads), a, b, loads), ratios), ratios)
     found = RunChange(
         a,
         b,
@@ -146,6 +146,15 @@ def _with_voltage(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> J
     probability = {"battery_sag": 1.0 - said.probability.get("unknown", 0.0)}
     left = {k: p for k, p in said.probability.items() if k not in ("none", "battery_sag")}
     return Judgement("named", ("battery_sag",), probability | left, {"battery_sag": (volts, 0.0)}, why)
+
+
+def _by_proxy(said: Judgement, loads: Mapping[str, MatchedChannel]) -> Judgement:
+    """No claim of something unlisted where electrical power stands for torque: the motor's losses are in it."""
+    if said.verdict != "unknown" or "torque" not in loads or loads["torque"].channel != "electrical_power_W":
+        return said
+    return replace(
+        said, verdict="insufficient", why="electrical power stands for torque, and the losses of the motor are in it"
+    )
 
 
 def _far_apart(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> Judgement:

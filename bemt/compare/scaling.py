@@ -355,4 +355,9 @@ def judge(probability: Mapping[str, float], size: Mapping[str, tuple[float, floa
         return answer("insufficient", (), f"{first} is likely ({listed[first]:.2f}) but not sure")
     if len(credible) == 1:
         return answer("insufficient", (), f"{first} ({listed[first]:.2f}) leads, but unknown keeps {unknown:.2f}")
-    return answer("insufficient", (), f"{len(credible)} causes scale like that in these channels")
+    why = f"{len(credible)} causes scale like that in these channels"
+    if probability[NONE] > RIVAL:
+        why = f"it is hardly beyond scatter and set-up ({probability[NONE]:.2f} for none), and {why}"
+    elif few:
+        why = f"something that is not listed may have made it ({unknown:.2f}), and {why}"
+    return answer("insufficient", (), why)

@@ -27,6 +27,8 @@ __all__ = ["SCHEMA", "document", "explanation", "headline", "text"]
 SCHEMA = "bemt.diagnosis/1"
 
 _CHANNEL = {"thrust_N": "Thrust", "torque_Nm": "Torque", "rpm": "Speed of rotation"}
+# Share of a parameter's range that its interval may take before nothing is said of it [1].
+_OPEN = 0.95
 _VARIABLE = {
     "J": ("advance ratio", "", 2), "M_tip": ("tip Mach number", "", 2), "Re": ("Reynolds number", "", 0),
     "rpm": ("speed of rotation", " rev/min", 0), "time_s": ("time", " s", 0), "temperature_K": ("temperature", " K", 1),
@@ -129,12 +131,16 @@ def _gain(d: Diagnosis) -> str:
 def _parameters(d: Diagnosis) -> str:
     words = []
     for i, found in d.parameters.items():
+        ranges, left = {p.name: p.high - p.low for p in effects.catalogue()[i].parameters}, []
         for k, v in found.items():
-            if isinstance(v["value"], float):
+            if isinstance(v["value"], float) and v["high"] - v["low"] > _OPEN * ranges.get(k, np.inf):
+                left.append(k)
+            elif isinstance(v["value"], float):
                 unit = "" if v["unit"] in ("1", "") else f" {v['unit']}"
                 words.append(f"{i} {k} {v['value']:.3g} ({v['low']:.3g} to {v['high']:.3g}){unit}{_odds(v)}")
             elif v["value"] is not None:
                 words.append(f"{i} {k} {v['value']}{_odds(v)}")
+        words += [f"{i} {' and '.join(left)} left open"] if left else []
     return ", ".join(words)
 
 

@@ -75,6 +75,9 @@ def load(
     findings = check(imported, diameter_m=case.diameter_m, blades=int(case.get("rotor.blades")), ducted=ducted)
     found = tuple(f"{Path(path).name}: {f}" for f in findings if f.severity != "note")
     rows = named(imported)
+    # in the log of a stand the sign is the hand of the rotor; in somebody's own table it may be a slip
+    log = imported.provenance["format"] != "table"
+    hand = log and any(f.id == "sign_flipped" and f.severity == "note" for f in findings)
     if {"CT", "CP", "CQ"} & set(imported.values):
         made = records.from_series(_points(imported, rows, path), case)
     else:
@@ -85,8 +88,9 @@ def load(
             points = _scattered(_points(imported, rows, path), points)
         elif _step_responses(imported, rows, points):
             points = replace(_points(imported, rows, path), notes=("short log: every row counts, transients too",))
-        made = records.from_series(points, case, shared)
-    notes = (*made.notes, *imported.notes, *rows.notes, *_unused(imported, rows, case))
+        made = records.from_series(_turned(points) if hand else points, case, shared)
+    turned = ("torque_Nm: negative under load, which is the sense of rotation: turned here",) if hand else ()
+    notes = (*made.notes, *turned, *imported.notes, *rows.notes, *_unused(imported, rows, case))
     return replace(made, findings=found, notes=notes)
 
 
@@ -127,6 +131,11 @@ def _scattered(series: Dataset, reduced: Dataset) -> Dataset:
         for rows, value in zip(reduction(reduced).rows, seen, strict=True):
             u[name][rows] = np.hypot(value, floor * full)
     return replace(series, u=u)
+
+
+def _turned(points: Dataset) -> Dataset:
+    """Torque of a rotor of the other hand, whose sign is the sense of rotation."""
+    return replace(points, values={**points.values, "torque_Nm": -points["torque_Nm"]})
 
 
 def _same_rotor(imported: Dataset, case: Case, path: str) -> None:
@@ -240,7 +249,8 @@ def _one_setup(imported: Dataset, path: str) -> None:
     """Refuse a table of several propellers or motors: their points are no one curve."""
     from bemt.readers.generic_csv import setups
 
-    for name, kinds in setups(imported.texts).items():
+    for name, kinds in setups(imported.texts, imported.values).items():
         got = f"{len(kinds)} set-ups: {', '.join(kinds[:4])}" + (", ..." if len(kinds) > 4 else "")
         hint = "Put the rows of each into a file of its own"
-        raise InputError(Fault(path, name, got, "one propeller with one motor", hint))
+        heading = imported.provenance.get("headings", {}).get(name, name)
+        raise InputError(Fault(path, heading, got, "one propeller with one motor", hint))

@@ -433,8 +433,21 @@ class Effect:
     def momentum(self, bake: Baking) -> None:
         """Set kernel numbers; the base does nothing."""
 
-    def duct(self) -> Mapping[str, float] | None:
-        """Numbers of :class:`bemt.bem.duct.DuctFlow` that the effect sets, which ducts an open rotor; None: none."""
+    def duct(self, R: float, stated: bool) -> Mapping[str, float] | None:
+        """Numbers of :class:`bemt.bem.duct.DuctFlow` that the effect sets, which ducts an open rotor; None: none.
+
+        Parameters
+        ----------
+        R : float
+            Tip radius [m].
+        stated : bool
+            Whether the case has a duct of its own.
+
+        Returns
+        -------
+        mapping or None
+            Attributes by name, in their units.
+        """
         return None
 
     def flow(self, flow: Flow) -> None:

@@ -15,6 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bemt.dataset import Dataset
 from bemt.readers import head_text, load_text, number
@@ -27,6 +28,8 @@ KIND = "table"
 FALLBACK = True
 SETUP = re.compile(r"prop|motor|combination|setup|set-up|config|rotor|luftschraube|helice|h[ée]lice")
 """Headings of text that name what was on the stand."""
+SIZE = re.compile(r"(prop(eller)?_?)?(d|dia|diam|diameter|pitch)_m$", re.IGNORECASE)
+"""Channels that say how large it was."""
 DOUBTFUL_RPM = 20000.0
 """Speed above which a column called rpm may count electrical revolutions."""
 
@@ -131,9 +134,15 @@ def _electrical(build: Builder) -> None:
         build.warnings.append(f"{name} is voltage times current: electrical power, not that of the shaft")
 
 
-def setups(texts: Mapping[str, Sequence[str]]) -> dict[str, list[str]]:
-    """Columns of text that tell several propellers or motors apart, and what they name."""
+def setups(
+    texts: Mapping[str, Sequence[str]], values: Mapping[str, NDArray[np.float64]] | None = None
+) -> dict[str, list[str]]:
+    """Columns that tell several propellers or motors apart, by a word or by diameter and pitch, and what they name."""
     found = {}
+    for name, column in (values or {}).items():
+        sizes = np.unique(column[np.isfinite(column) & (column > 0.0)])
+        if SIZE.match(name) and 1 < sizes.size <= max(2, column.size // 2):
+            found[name] = [f"{v:.4g} m" for v in sizes]
     for name, cells in texts.items():
         kinds = list(dict.fromkeys(c.strip() for c in cells if c.strip()))
         if SETUP.search(name.lower()) and 1 < len(kinds) <= max(2, len(cells) // 2):
