@@ -210,19 +210,16 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
     modes = form.form_modes(problem, candidates)
     # a few settings of each effect are enough to see which covariances matter
     coarse = _Table(problem, S, log_w, spans, candidates, modes, _few(candidates))
-    rivals = noise.rivals(problem)
-    shapes = noise.shapes(rivals, problem.free)
     best: dict[Hyper, dict[Explanation, float]] = {}
     top = -np.inf
     for h, C in noise.covariances(problem):
         state = coarse.state(h, C, top - _DROP)
-        if state.half.size:
-            state.log_z[UNKNOWN] = state.log_z[NONE] + _smooth(state, *shapes)
-            if pairs:
-                _best_pair(state, coarse.spans, coarse.log_w)
+        if pairs and state.half.size:
+            _best_pair(state, coarse.spans, coarse.log_w)
         best[h] = state.log_z
         top = max(top, max(best[h].values()) + np.log(h.weight))
     fine = _Table(problem, S, log_w, spans, candidates, modes, None)
+    rivals = noise.rivals(problem)
     states: list[State] = []
     for h in _leading(best):
         C = noise.covariance(problem, h)
@@ -365,39 +362,27 @@ class _Table:
 
 
 def _leading(log_z: dict[Hyper, dict[Explanation, float]]) -> list[Hyper]:
-    """Settings of the covariance under which some explanation is good, and that of each kind of explanation."""
+    """Settings of the covariance under which some explanation is good, and the best of none, one effect and two."""
     hypers = list(log_z)
     weight = np.log([h.weight for h in hypers])
 
-    def score(kind: object) -> Array:
-        z = [max((v for k, v in log_z[h].items() if _kind(k) == kind), default=-np.inf) for h in hypers]
+    def score(effects: int) -> Array:
+        z = [max((v for k, v in log_z[h].items() if _effects(k) == effects), default=-np.inf) for h in hypers]
         return np.array(z) + weight
 
-    each = np.array([score(kind) for kind in (_kind(NONE), _kind(UNKNOWN), 1, 2)])
+    each = np.array([score(effects) for effects in (0, 1, 2)])
     together = each.max(axis=0)
     order = np.argsort(-together)[:_KEEP]
     chosen = [int(i) for i in order if together[i] > together[order[0]] - _DROP]
-    # each is judged at its best: two effects, or a smooth one, explain what one leaves to a wider error of the solver
+    # each is judged at its best: two effects explain what one leaves to a wider error of the solver.  Something unknown
+    # is not asked: under the least noise it also fits what the few settings of a listed effect leave between them.
     own = [int(np.argmax(s)) for s in each if np.isfinite(s).any()]
     return [hypers[i] for i in dict.fromkeys([*chosen, *own])]
 
 
-def _kind(what: Explanation) -> object:
-    """Nothing, something unknown, one effect, two."""
-    return what if what in (NONE, UNKNOWN) else len(what)
-
-
-def _smooth(state: State, shapes: Array, sizes: Array) -> float:
-    """Log evidence over that of "none" of an unknown smooth effect in all channels, for modes (K, q, M) of size 1."""
-    if not shapes.size:
-        return 0.0
-    K, q, M = shapes.shape
-    B = state.white.changes(shapes.reshape(-1, M).T).T.reshape(K, q, -1)
-    s = sizes[:, None, None, None]
-    root = np.linalg.cholesky(np.eye(q) + s**2 * (B @ B.transpose(0, 2, 1)))
-    p = np.linalg.solve(root, s * (B @ state.r)[..., None])[..., 0]
-    gains = 0.5 * np.sum(p * p, axis=2) - np.sum(np.log(np.diagonal(root, axis1=2, axis2=3)), axis=2)
-    return float(log_mean(gains.ravel(), np.full(gains.size, -np.log(gains.size))))
+def _effects(what: Explanation) -> int:
+    """Number of effects at work."""
+    return 0 if what == NONE else len(what)
 
 
 def _best_pair(state: State, spans: Mapping[str, slice], log_w: Array) -> None:

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from bemt.diagnose.problem import Problem
     from bemt.effects.base import Effect
 
-__all__ = ["Conditional", "Hyper", "Rival", "Whitener", "conditional", "discrepancy", "hypers", "rivals", "shapes",
-           "unlike", "whitener"]  # fmt: skip
+__all__ = ["Conditional", "Hyper", "Rival", "Whitener", "conditional", "discrepancy", "hypers", "rivals", "unlike",
+           "whitener"]  # fmt: skip
 
 Array = NDArray[np.float64]
 
@@ -57,8 +57,6 @@ _FORM_LENGTH = 0.7
 # Unknown smooth effect: lengths over the spread of a variable, sizes as a share of the largest coefficient.
 _RIVAL_LENGTHS = (0.15, 0.5)
 _RIVAL_SIZES = (0.03, 0.12)
-# Largest modes of a kernel that are kept where only the order of magnitude of it counts.
-_MODES = 16
 # A balance or mount that stays behind while its load falls (hysteresis as ISO 376 and OIML R 60 define it, decreasing
 # less increasing load; not checked): shares of the largest reading, length over the load, least fall that is one, and
 # fewest points of either kind.
@@ -386,18 +384,6 @@ def rivals(problem: Problem) -> tuple[Rival, ...]:
         label = " and ".join(words[k] for k in group)
         out += [Rival(f"{label} while the load falls: {size:.0%}", mine, kernel, size) for size in _BEHIND]
     return tuple(out)
-
-
-def shapes(chosen: Sequence[Rival], mine: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Largest modes of the kernels of rivals that change all of some readings, (K, q, M), and the sizes they have."""
-    every = [k for k in chosen if np.array_equal(k.mine, mine)]
-    kernels = {id(k.kernel): k.kernel for k in every}
-    out = np.zeros((len(kernels), min(_MODES, int(np.count_nonzero(mine))), mine.size))
-    for modes, kernel in zip(out, kernels.values(), strict=True):
-        value, vector = np.linalg.eigh(kernel)
-        first = slice(value.size - modes.shape[0], None)
-        modes[:, mine] = (vector[:, first] * np.sqrt(np.maximum(value[first], 0.0))).T
-    return out, np.unique([k.size for k in every])
 
 
 def _loading(problem: Problem) -> tuple[Array, NDArray[np.bool_]]:
