@@ -36,9 +36,9 @@ class DuctEffect(Effect):
     title = "thrust of a duct"
     sign = "more thrust for the same torque, fading with advance ratio"
     parameters = (
-        Parameter("wake_ratio", "1", 0.8, 1.3, "exit over disk area; Pereira 2008"),
+        Parameter("wake_ratio", "1", 0.8, 1.3, "exit over disk area; Pereira 2008", 3),
         Parameter("lip_loss", "1", 0.0, 0.5, "over 1/2 rho w^2, frictionless to sharp-edged; Crane TP-410, p. A-29", 3),
-        Parameter("gap_R", "1", 0.0, 0.03, "tip gap over radius; Pereira 2008, not checked", 2),
+        Parameter("gap_R", "1", 0.0, 0.03, "tip gap over radius; Pereira 2008, not checked", 0),
         Parameter("outer_drag", "1", 0.0, 0.2, "drag area over disk area; Hoerner 1965, not checked", 2),
     )
     on_by_default = False
