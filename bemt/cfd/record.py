@@ -117,12 +117,14 @@ def grid_studies(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 
 def grid_uncertainty(studies: Sequence[Mapping[str, Any]], row: Mapping[str, Any]) -> dict[str, float]:
-    """Look up the standard uncertainty by the grid, of a row's level and solver. [1]"""
-    level = f"{row['level']:g}"
-    found = [study for study in studies if level in study["thrust_N"]["u_relative"]]
-    if not found:
-        return {}
-    return {key: max(float(study[key]["u_relative"][level]) for study in found) for key in ("thrust_N", "torque_Nm")}
+    """Standard uncertainty by the grid at a row's level: the largest of the studies, linear between their levels. [1]"""
+    found: dict[str, float] = {}
+    for key in ("thrust_N", "torque_Nm"):
+        for study in studies:
+            levels, u = zip(*sorted((float(k), float(v)) for k, v in study[key]["u_relative"].items()), strict=True)
+            if levels[0] <= row["level"] <= levels[-1]:
+                found[key] = max(found.get(key, 0.0), float(np.interp(row["level"], levels, u)))
+    return found
 
 
 class CampaignRecord:
