@@ -117,7 +117,7 @@ def grid_studies(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 
 def grid_uncertainty(studies: Sequence[Mapping[str, Any]], row: Mapping[str, Any]) -> dict[str, float]:
-    """Standard uncertainty by the grid at a row's level: the largest of the studies, linear between their levels. [1]"""
+    """Standard uncertainty by the grid at a row's level: the largest of the studies, linear between levels. [1]"""
     found: dict[str, float] = {}
     for key in ("thrust_N", "torque_Nm"):
         for study in studies:
