@@ -83,11 +83,11 @@ def test_our_campaigns_name_nothing_wrong(project: Path) -> None:
         campaign = load_campaign(path.with_name("campaign.toml"))
         with path.with_name("recording.csv").open(encoding="utf-8") as stream:
             solver_of = {row["run"]: row["solver"] for row in csv.DictReader(stream)}
+        solver_of["e9d7473b3a56"] = "compressible"  # the DS-30 that leaked: its loads stay, its row is gone
         for solved, off in (("compressible", []), ("incompressible", ["compressibility", "drag_divergence"])):
             case = campaign.case.replaced({"model.effects_off": off})
             for run, found in along(case, path).items():
-                holds = TRUE.get(path.parent.name, set()) & set(found.named)  # a class that holds the cause is right
-                if solver_of.get(run) == solved and found.named and not holds:
+                if solver_of[run] == solved and not set(found.named) <= TRUE.get(path.parent.name, set()):
                     said[f"{path.parent.name} {run}"] = found.named
     assert not said
 

@@ -18,16 +18,14 @@ class DuctEffect(Effect):
     T / T_rotor = 2 sigma_w at rest, sigma_w exit over disk area; fades with speed (McCormick 1967, Aerodynamics of
     V/STOL Flight, ch. 9; Pereira 2008, PhD thesis Univ. of Maryland, eq. 2.20-2.40; see :mod:`bemt.bem.duct`).  A case
     with a duct has it from its geometry and not from here; ``effects_off = ["duct"]`` leaves it out.  A case's own
-    duct keeps its lip, walls and gap.  One that nobody stated may have any: an inlet from well rounded to sharp-edged
-    loses 0.04 to 0.5 of 1/2 rho w^2 (Crane TP-410, p. A-29, not checked), which takes the duct's share from a half of
-    the thrust to a quarter; gaps of models run to 3 % of the radius (Pereira 2008, ch. 3, not checked); the outer wall
-    costs friction alone, or what a blunt ring a tenth of the radius thick does (Hoerner 1965, Fluid-Dynamic Drag,
-    ch. 3, not checked).
+    duct keeps its lip, walls and gap.  One that nobody stated may have any lip and wall: an inlet from well rounded to
+    sharp-edged loses 0.04 to 0.5 of 1/2 rho w^2 (Crane TP-410, p. A-29, not checked), which takes the duct's share from
+    a half of the thrust to a quarter; the outer wall costs friction alone, or what a blunt ring a tenth of the radius
+    thick does (Hoerner 1965, Fluid-Dynamic Drag, ch. 3, not checked).
     """
 
     wake_ratio: float = 1.0
     lip_loss: float = 0.0
-    gap_R: float = 0.0
     outer_drag: float = 0.0
 
     id = "duct"
@@ -38,7 +36,6 @@ class DuctEffect(Effect):
     parameters = (
         Parameter("wake_ratio", "1", 0.8, 1.3, "exit over disk area; Pereira 2008", 3),
         Parameter("lip_loss", "1", 0.0, 0.5, "over 1/2 rho w^2, frictionless to sharp-edged; Crane TP-410, p. A-29", 3),
-        Parameter("gap_R", "1", 0.0, 0.03, "tip gap over radius; Pereira 2008, not checked", 0),
         Parameter("outer_drag", "1", 0.0, 0.2, "drag area over disk area; Hoerner 1965, not checked", 2),
     )
     on_by_default = False
@@ -47,5 +44,5 @@ class DuctEffect(Effect):
         """Exit area ratio of the duct, and what a case would state of it."""
         if stated:
             return {"wake_ratio": self.wake_ratio}
-        return {"wake_ratio": self.wake_ratio, "lip_loss": self.lip_loss, "gap": self.gap_R * R,
-                "drag_area": self.outer_drag * math.pi * R**2}  # fmt: skip
+        drag_area = self.outer_drag * math.pi * R**2
+        return {"wake_ratio": self.wake_ratio, "lip_loss": self.lip_loss, "drag_area": drag_area}
