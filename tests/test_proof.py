@@ -663,3 +663,10 @@ def test_without_the_extra_it_says_so(bench: Bench, monkeypatch: pytest.MonkeyPa
     monkeypatch.setitem(__import__("sys").modules, "wisdem.ccblade.ccblade", None)
     with pytest.raises(InputError, match="wisdem"):
         bench.measure(bench.plain(), Stand())
+
+
+@pytest.mark.slow
+def test_the_items_of_a_seed_do_not_depend_on_the_number_of_processes() -> None:
+    size = draw.Size({**TINY.items, "underpowered": 0}, ((False, ("static_sweep",)), (False, ("static_sweep", "wall"))))
+    one, two = (list(draw.draw_items(size, 5, set(catalogue()), (), jobs=jobs)) for jobs in (1, 2))
+    assert [(i.files, i.reference) for i in one] == [(i.files, i.reference) for i in two]

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -86,11 +87,55 @@ def _strength(name: str, k: int, rng: np.random.Generator) -> float:
     return float(f**0.35) if name in _PHYSICAL else f
 
 
+@dataclass(frozen=True)
+class Drawn:
+    """One item that was drawn and not yet measured: its bench by number, and what :func:`make_item` takes."""
+
+    bench: int
+    ids: tuple[str, ...]
+    strengths: tuple[float, ...]
+    seed: int
+    kind: str
+
+
 def draw_items(
     size: Size, seed: int, known: Collection[str], standard: Collection[str],
-    tell: Callable[[int, int], None] = lambda i, n: None,
+    tell: Callable[[int, int], None] = lambda i, n: None, jobs: int = 1,
 ) -> Iterator[Item]:  # fmt: skip
-    """Draw and measure all items of a run, in mixed order."""
+    """Draw and measure all items of a run, in mixed order; the same items whatever the number of processes."""
+    found, drawn = _drawn(size, seed)
+    # a bench keeps what it has solved, so all its items are made in one place
+    mine = {b: [k for k, d in enumerate(drawn) if d.bench == b] for b in sorted({d.bench for d in drawn})}
+    work = [(found[b], [drawn[k] for k in ks], known, standard) for b, ks in mine.items()]
+    made: list[Item | None] = [None] * len(drawn)
+    done = 0
+    for ks, items in zip(mine.values(), _measured(work, jobs), strict=True):
+        for k, item in zip(ks, items, strict=True):
+            made[k] = item
+        done += len(ks)
+        tell(done, len(drawn))
+    yield from (item for item in made if item is not None)
+
+
+def _measured(work: Sequence[tuple[Any, ...]], jobs: int) -> Iterator[list[Item]]:
+    """Items of every bench, in order."""
+    if jobs == 1:
+        yield from map(_of_bench, work)
+        return
+    import multiprocessing
+    from concurrent.futures import ProcessPoolExecutor
+
+    with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
+        yield from pool.map(_of_bench, work)
+
+
+def _of_bench(work: tuple[Bench, list[Drawn], Collection[str], Collection[str]]) -> list[Item]:
+    bench, drawn, known, standard = work
+    return [make_item(bench, d.ids, d.strengths, d.seed, d.kind, known, standard) for d in drawn]
+
+
+def _drawn(size: Size, seed: int) -> tuple[list[Bench], list[Drawn]]:
+    """Benches, and all items in mixed order."""
     first, second = np.random.SeedSequence(seed).spawn(2)
     found = benches(size, first)
     rng = np.random.default_rng(second)
@@ -126,7 +171,9 @@ def draw_items(
             bench = _pick(found, (), rng, good)
             assert bench is not None
             jobs.append((kind, (), (), bench))
-    for j, at in enumerate(rng.permutation(len(jobs))):
+    number = {id(bench): k for k, bench in enumerate(found)}
+    drawn = []
+    for at in rng.permutation(len(jobs)):
         kind, ids, strengths, bench = jobs[int(at)]
-        yield make_item(bench, ids, strengths, int(rng.integers(2**62)), kind, known, standard)
-        tell(j + 1, len(jobs))
+        drawn.append(Drawn(number[id(bench)], ids, strengths, int(rng.integers(2**62)), kind))
+    return found, drawn

@@ -36,7 +36,9 @@ ASKED = "with_reference"
 TIME_LIMIT_S = 900.0
 
 
-def conceal(out: Path, size: str, seed: int, say: Callable[[str], None] | None = None) -> str:
+def conceal(
+    out: Path, size: str, seed: int, say: Callable[[str], None] | None = None, jobs: int = 1
+) -> str:  # fmt: skip
     """Draw and write all items, and the sealed key."""
     from bemt import effects
 
@@ -47,7 +49,7 @@ def conceal(out: Path, size: str, seed: int, say: Callable[[str], None] | None =
     entries = []
     drawn: Iterable[items.Item] = (
         real.draw_real(np.random.default_rng(seed)) if size == REAL
-        else draw.draw_items(draw.SIZES[size], seed, known, standard, _teller("concealed", say))
+        else draw.draw_items(draw.SIZES[size], seed, known, standard, _teller("concealed", say), jobs)
     )  # fmt: skip
     for k, item in enumerate(drawn):
         name = f"{k:04d}"
@@ -197,6 +199,7 @@ def prove(
 
     ``say`` takes passing lines of progress, ``tell`` the hash of the key, once it is sealed.
     """
+    jobs = jobs or os.cpu_count() or 1
     with tempfile.TemporaryDirectory(prefix="bemt-proof-") as spare:
         folder = Path(out) if out else Path(spare)
         began = time.monotonic()
@@ -204,12 +207,12 @@ def prove(
             digest = (folder / seal.SEAL).read_text(encoding="utf-8").strip()
             words = f"going on with the sealed key of size {seal.unseal(folder, digest)['size']}, SHA-256 {digest}"
         else:
-            digest = conceal(folder, size, secrets.randbits(63) if seed is None else seed, say)
+            digest = conceal(folder, size, secrets.randbits(63) if seed is None else seed, say, jobs)
             words = f"key sealed, SHA-256 {digest}"
         if tell:
             tell(words)
         sealed = time.monotonic()
-        diagnose_all(folder, jobs or os.cpu_count() or 1, say)
+        diagnose_all(folder, jobs, say)
         document = proof(folder, digest)
         document["seconds"] = {"conceal": sealed - began, "diagnose": time.monotonic() - sealed}
         if out:
