@@ -256,12 +256,13 @@ def test_a_pair_has_one_set_for_each_cause() -> None:
     assert {frozenset(s) for s in sets} == {frozenset(one), frozenset({"thrust_zero"})}
 
 
-def _said(word: str, *ids: str) -> chain.Diagnosis:
-    """Outcome of which only the decision is looked at."""
+def _said(word: str, *ids: str, likely: str = "untwist") -> chain.Diagnosis:
+    """Outcome of which only the decision is looked at, and, of an open one, what is likely."""
     nothing: Any = None
+    found: Any = SimpleNamespace(probability={NONE: 0.3, Explanation.of(likely): 0.6, UNKNOWN: 0.1})
     decision = verdict.Decision(word, ids, Explanation.of(*ids), 0.95, 0.0, (), "")
     return chain.Diagnosis(
-        nothing, decision, nothing, {}, 0.002, nothing, {}, "", nothing, nothing, nothing, nothing, {}
+        found, decision, nothing, {}, 0.002, nothing, {}, "", nothing, nothing, nothing, nothing, {}
     )
 
 
@@ -276,6 +277,14 @@ def test_air_that_changes_with_time_moves_the_motor_too() -> None:
     both = chain._together(_said("named", "recirculation"), _said("named", "motor_heating"))
     apart = chain._together(_said("named", "pitch_offset"), _said("named", "motor_heating"))
     assert both.decision.effects == ("recirculation",) and apart.decision.effects == ("pitch_offset", "motor_heating")
+
+
+def test_a_load_that_may_change_with_time_gives_the_drive_no_name() -> None:
+    """A recording with recirculation was called a hot motor: the speed at a pulse width rose as the load fell."""
+    for word in ("unknown", "insufficient"):
+        answer = chain._together(_said(word, likely="recirculation"), _said("named", "motor_heating"))
+        assert answer.decision.verdict == word and not answer.decision.effects
+        assert answer.systems["drive"] == {"verdict": "named", "effects": ["motor_heating"]}
 
 
 def test_intervals_are_widened_by_their_factor_and_end_at_the_range() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -157,13 +157,24 @@ def diagnose(
     return rotor if motor is None else _together(rotor, motor)
 
 
+def _load_moves(rotor: Diagnosis) -> bool:
+    """Whether the loads are likelier to change with time than not, by a cause that is named or by one left open."""
+
+    def moves(ids: Iterable[str]) -> bool:
+        return any("time_s" in effects.catalogue()[i].along and effects.catalogue()[i].kind == "air" for i in ids)
+
+    if rotor.decision.effects or rotor.decision.verdict == "none":
+        return moves(rotor.decision.effects)
+    listed = {k: p for k, p in rotor.found.probability.items() if k}
+    return sum(p for k, p in listed.items() if moves(k)) > 0.5 * sum(listed.values())
+
+
 def _together(rotor: Diagnosis, motor: Diagnosis) -> Diagnosis:
     """One answer: what the loads say, and what the motor says where they name nothing or name a cause, too."""
-    if not rotor.decision.effects and motor.decision.verdict in ("named", "class"):
-        return replace(motor, drive=motor, loads=rotor, absent=rotor.absent)
     # air that changes with time changes the load, and with it the speed at a pulse width
-    moved = any("time_s" in effects.catalogue()[i].along and effects.catalogue()[i].kind == "air"
-                for i in rotor.decision.effects)  # fmt: skip
+    moved = _load_moves(rotor)
+    if not rotor.decision.effects and motor.decision.verdict in ("named", "class") and not moved:
+        return replace(motor, drive=motor, loads=rotor, absent=rotor.absent)
     both = rotor.decision.verdict in ("named", "sensor") and motor.decision.verdict == "named" and not moved
     decision = rotor.decision
     if both:
