@@ -178,6 +178,7 @@ def asked(**changed: Any) -> Any:
     plain = {
         "first": lead, "leading": lead, "rest": 0.0, "odds": 100.0, "needed": 8.0, "p_value": 0.002, "on": False,
         "expected": False, "paired": False, "sure": ("reynolds",), "group": ("reynolds",), "beside": (), "few": (),
+        "likely": ("reynolds",),
         "P": {NONE: 0.0, UNKNOWN: 0.0, lead: 1.0}, "share": {"reynolds": 1.0}, "unlisted": 0.0, "roughness": 1.0,
         "vague": 0.0, "alone": True, "level": 0.0, "another_blade": False, "factor": False, "real": False,
         "parameters": {"reynolds": {}},
@@ -221,6 +222,7 @@ ROWS: dict[str, dict[str, Any]] = {
     },
     "several are sure": {"sure": ("reynolds", "duct")},
     "one is sure": {},
+    "one is nearly sure": {"likely": ("reynolds", "duct")},
     "one is sure, another may be there": {"beside": ("duct",)},
     "two at work": {"paired": True},
     "on already, among others": {

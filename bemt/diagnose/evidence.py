@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt import effects
 from bemt.diagnose import form, noise, prior
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
 from bemt.diagnose.form import Form, Forms
@@ -37,6 +38,9 @@ _PAIR_LEADERS = 60
 _FIRST = 2
 # Leading pairs that are solved together: what one effect changes depends on the other.
 _TOGETHER, _ROUNDS = 24, 6
+DETAIL = 0.1
+"""Share of what one effect explains (log odds) that two must explain on top: by so much its law may be off beyond what
+the error of its form holds.  As of a smooth rest beside it, which is no other cause either [1]."""
 FOR_NULLS = 3
 """Settings of the covariance, best first, that nulls are weighed under; only these keep what rivals need [1]."""
 
@@ -239,7 +243,8 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
     before = prior.log_priors(prior.prior_weights(problem, list(spans)), pairs)
     if pairs:
         _solve_pairs(problem, candidates, states, spans, log_w, before)
-    probability = _posterior(states, before)
+    price = _details(problem, states, modes)
+    probability = _posterior(states, {k: v - price.get(k, 0.0) for k, v in before.items()})
     states.sort(key=_standing)
     return Evidence(problem, tuple(candidates), tuple(states), probability, spans, log_w, rivals)
 
@@ -477,6 +482,23 @@ def _solve_pairs(
                 s.mixed.pop(pair, None)
         for s in states:
             s.log_z[pair] = _log_z(s, pair, spans, log_w)
+
+
+def _details(
+    problem: Problem, states: Sequence[State], modes: Mapping[str, Array]
+) -> dict[Explanation, float]:  # fmt: skip
+    """What each pair must explain on top of the best single effect, log odds, where that one's law has a form.
+
+    An effect that shows along a recorded variable of its own (time, gap, wall) is no detail of another one's law.
+    """
+    weight = np.log([s.hyper.weight for s in states])
+    none = float(log_mean(np.array([s.log_z[NONE] for s in states]), weight))
+    alone = {i: float(log_mean(np.array([s.log_z[Explanation.of(i)] for s in states]), weight)) - none for i in modes}
+    best = max(alone, key=lambda i: alone[i], default="")
+    if not best or not modes[best].shape[1] or alone[best] <= 0.0:
+        return {}
+    own = {i for i in alone if any(v in problem.covariates for v in effects.catalogue()[i].along)}
+    return {k: DETAIL * alone[best] for k in states[0].log_z if k.pair and min(k, key=lambda i: alone[i]) not in own}
 
 
 def _posterior(states: Sequence[State], before: dict[Explanation, float]) -> dict[Explanation, float]:

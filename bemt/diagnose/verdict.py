@@ -33,7 +33,9 @@ Array = NDArray[np.float64]
 GATE = 0.01
 """Largest p-value at which a mismatch counts as one [1]."""
 SURE = 0.85
-"""Probability from which an effect, or a class of them, is named [1]."""
+"""Probability from which a class of effects is an answer [1]."""
+NAMED = 0.95
+"""The same of a single name: between the two, of the claims of one proof, four in ten were wrong [1]."""
 BOTH = 0.92
 """The same of each of two, about its root, so that both together are as sure [1]."""
 LEFT_OVER = 4.0
@@ -42,13 +44,16 @@ SMALL = 0.1
 """A rest this small beside what the effect explains (both as log odds) is a detail of it, not another cause [1]."""
 EARNED = 8.0
 """Log odds that each effect of a pair must add to the other alone: small model errors are not a second cause [1]."""
-ENOUGH, EXPECTED = 8.0, 2.5
-"""Log odds over none from which a name is given at all (about 4 sigma); of physics known to be left out [1]."""
+ENOUGH, LEAST, EXPECTED = 8.0, 5.0, 2.5
+"""Log odds over none (about 4 sigma) from which something unknown counts, a name is given at all, and physics known to
+be left out is named [1]."""
 PROVEN, PREDICTS = 20.0, 0.9
 """Below the first (log odds) an explanation must lower the error on left-out blocks to the second, a ratio; physics
 that is on already needs the first in any case, to be on differently [1]."""
 PARTNER, MOST = 0.1, 3
 """Probability from which a second effect beside a sure one is mentioned; most members of an open answer [1]."""
+RARE = 0.02
+"""Members of a class are at least this share as likely as the likeliest [1]."""
 NEAR = 5.0
 """Effects of a class may be this far (natural logarithm of the evidence) behind the best one [1]."""
 
@@ -224,7 +229,7 @@ class Asked:
     @property
     def needed(self) -> float:
         """Log odds over nothing from which it counts."""
-        return PROVEN if self.on else EXPECTED if self.expected else PROVEN if self.real else ENOUGH
+        return PROVEN if self.on else EXPECTED if self.expected else PROVEN if self.real else LEAST
 
     @cached_property
     def unlisted(self) -> float:
@@ -296,6 +301,14 @@ class Asked:
         """Fewest of the likeliest effects, at most :data:`MOST`, that hold nearly all of the probability."""
         some = tuple(self.share)
         return next((some[:n] for n in range(2, MOST + 1) if mass(self.found, some[:n]) >= SURE), ())
+
+    @cached_property
+    def likely(self) -> tuple[str, ...]:
+        """The likeliest effect, alone where it is sure enough for a name, else with what it may be mistaken for."""
+        share = list(self.share.items())[:MOST]
+        if not share or share[0][1] >= NAMED:
+            return tuple(i for i, _ in share[:1])
+        return tuple(i for i, p in share if p > RARE * share[0][1])
 
     def says(
         self, verdict: str, why: str, effects: Sequence[str] = (), probability: float | None = None,
@@ -386,7 +399,7 @@ def _earned(
 
 def _class(found: Evidence, first: str, share: Mapping[str, float]) -> tuple[str, ...]:
     P = {i: found.probability[Explanation.of(i)] for i in found.spans}
-    others = [i for i in alike(found, first) if P[i] > 0.02 * P[first]]
+    others = [i for i in alike(found, first) if P[i] > RARE * P[first]]
     return (first, *sorted(others, key=lambda i: -share[i]))
 
 
