@@ -23,6 +23,9 @@ def pytest_configure(config: pytest.Config) -> None:
     A table is found by the hash of all that decides it, so an old one cannot be taken for a new one; a fresh folder
     each time would only cost NeuralFoil's time again. Set before any test, so that child processes inherit it.
     """
+    if getattr(config.option, "numprocesses", None):
+        for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+            os.environ.setdefault(name, "1")  # a worker a core: more threads only wait for each other
     cache = getattr(config, "cache", None)  # absent under -p no:cacheprovider: the user's cache serves then
     if cache is not None:
         os.environ.setdefault("BEMT_CACHE", str(cache.mkdir("bemt")))

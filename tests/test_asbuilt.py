@@ -271,7 +271,7 @@ def test_gradient_of_the_likelihood() -> None:
             **vars(at), name=f"a{i}", family="a", section="rule", gap_deg=gap, static=at.x == 0.0, y=y * (1 + 0.01 * i)
         )
         for i, gap in enumerate((0.3, 1.8, math.nan))
-    ]  # fmt: skip
+    ]
     from bemt.asbuilt import fit
 
     theta = fit.START + 0.05 * np.random.default_rng(6).normal(size=fit.START.size)

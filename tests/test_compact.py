@@ -167,7 +167,7 @@ def test_more_blades_give_more_thrust_but_less_each():
         ({"diameter_m": 3 * INCH, "pitch_m": 2 * INCH}, "give the chord, small propellers are wider"),
         ({"pitch_m": 20 * INCH}, "P/D 2.00 outside the data"),
     ],
-)  # fmt: skip
+)
 def test_outside_the_data_is_flagged(kwargs, flag):
     base = {"diameter_m": 10 * INCH, "pitch_m": 5 * INCH, "blades": 2, "rpm": 6000.0}
     assert estimate.estimate(**base).flags == ((),)

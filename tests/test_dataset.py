@@ -30,9 +30,7 @@ def test_all_faults_at_once() -> None:
             {"eta": [0.1], "J": [-1.0]}, flags=((), ()),
         )  # fmt: skip
     places = [fault.where for fault in caught.value.faults]
-    assert places == [
-        "kind", "values.thrust_kgf", "values.CT", "values.speed", "values.J", "flags", "u.eta", "u.J"
-    ]  # fmt: skip
+    assert places == ["kind", "values.thrust_kgf", "values.CT", "values.speed", "values.J", "flags", "u.eta", "u.J"]
     assert "Convert it with units.to_si(..., 'kgf')" in str(caught.value)
 
 

@@ -262,14 +262,15 @@ def test_the_commands_of_the_documents_exist(project: Path, document: str) -> No
 
 @pytest.fixture
 def pages(project: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A folder with the cases, whose bemt/effects and bemt/importers are scanned like the project's own."""
-    from bemt import commands, effects
+    """A folder with the cases, whose plug-ins are scanned like the project's own."""
+    from bemt import commands, effects, exports
     from bemt import readers as importers
 
     shutil.copytree(project / "cases", tmp_path / "cases")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(commands, "__path__", [*commands.__path__, str(tmp_path / "bemt" / "commands")])
-    for package, known in ((effects, effects.catalogue), (importers, importers.importers)):
+    scanned = ((effects, effects.catalogue), (importers, importers.importers), (exports, exports.exports))
+    for package, known in scanned:
         folder = tmp_path.joinpath(*package.__name__.split("."))
         monkeypatch.setattr(package, "__path__", [*package.__path__, str(folder)])
         known.cache_clear()
@@ -277,8 +278,8 @@ def pages(project: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Ite
     monkeypatch.undo()
     for path in tmp_path.glob("bemt/*/*.py"):
         sys.modules.pop(f"bemt.{path.parent.name}.{path.stem}", None)
-    effects.catalogue.cache_clear()
-    importers.importers.cache_clear()
+    for _, known in scanned:
+        known.cache_clear()
 
 
 @pytest.mark.parametrize("document", DOCUMENTS)

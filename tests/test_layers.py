@@ -335,7 +335,7 @@ def test_a_planted_fault_is_found(tree: dict[str, str], module: str, line: str, 
         ("bemt.base", "from bemt.commands import data", "bemt.base.folders:1: bemt.commands.data is not below it"),
         ("bemt.proof", "from bemt.bem import solver", "bemt.proof.truth:1: must not see bemt.bem.solver"),
     ],
-)  # fmt: skip
+)
 def test_what_a_package_brings_along_counts(tree: dict[str, str], package: str, line: str, complaint: str) -> None:
     assert complaint in set(violations({**tree, package: line})) - set(violations(tree))
 

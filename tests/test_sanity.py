@@ -290,8 +290,7 @@ def stepped(interval: float, lag: float, late: int = 0) -> dict[str, np.ndarray]
     for i in range(1, rpm.size):
         rpm[i] += (rpm[i - 1] - rpm[i]) * math.exp(-interval / lag)
     rpm = np.r_[np.full(late, rpm[0]), rpm[: rpm.size - late]] * (1 + 1e-3 * np.sin(np.arange(rpm.size)))
-    return {"time_s": interval * np.arange(rpm.size), "pulse_width_s": command, "rpm": rpm,
-            "thrust_N": 1.2e-7 * rpm**2}  # fmt: skip
+    return {"time_s": interval * np.arange(rpm.size), "pulse_width_s": command, "rpm": rpm, "thrust_N": 1.2e-7 * rpm**2}
 
 
 @pytest.mark.parametrize(("scale", "words"), [(1e3, "ms taken for s"), (1e6, "us taken for s")])
