@@ -1,4 +1,4 @@
-"""CT, CP and efficiency over J of a blade defined by stations; then the best pitch of a 10 in propeller at 8 m/s, 2 N."""
+"""CT, CP and efficiency over J of a blade from stations; then the best pitch of a 10 in propeller at 8 m/s, 2 N."""
 
 from pathlib import Path
 
