@@ -21,9 +21,11 @@ class AirDensity(Effect):
 
     id = "air_density"
     exact = True
-    title = "density of the air"
-    check = "read barometer and thermometer beside the stand and work the density out"
-    sign = "thrust and torque off by the same share at every speed and advance ratio; one cell's gain moves one of them"
+    title = "wrong air density"
+    check = "read barometer and thermometer at the stand and compute the density"
+    sign = (
+        "thrust and torque off by the same share at every speed and advance ratio; a cell gain moves only one of them"
+    )
     parameters = (
         Parameter("change", "1", -0.35, 0.5, "weather +-3 %; altitude to 3500 m, forgotten or wrongly stated", 7, 0.0),
     )

@@ -22,9 +22,9 @@ class AirspeedOffset(Effect):
     offset_m_s: float = 0.5
 
     id = "airspeed_offset"
-    title = "airspeed other than recorded"
-    check = "read the pitot with the fan of the tunnel off, and beside a second one"
-    sign = "shift of J that fades as 1/n at high speed of rotation; a blade angle would shift every speed alike"
+    title = "airspeed offset"
+    check = "read the pitot with the tunnel fan off, and compare it with a second one"
+    sign = "shift of J that fades as 1/n at high speed of rotation; a wrong blade angle shifts every speed equally"
     kind = "stand"
     fault = "zero"
     sensor = "airspeed_m_s"

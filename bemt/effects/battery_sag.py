@@ -32,9 +32,11 @@ class BatterySag(Effect):
     copper: float = 0.15
 
     id = "battery_sag"
-    title = "battery voltage gives way"
+    title = "battery voltage sag"
     along = ("time_s",)
-    sign = "speed at one pulse width lacks most at full power and late in a run; thrust at the measured speed stays"
+    sign = (
+        "speed at one pulse width drops most at full power and late in a run; thrust at the measured speed is unchanged"
+    )
     kind = "drive"
     needs = ("pwm_s",)
     parameters = (

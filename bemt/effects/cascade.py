@@ -59,8 +59,10 @@ class Cascade(Effect):
 
     id = "cascade"
     inviscid = True
-    title = "interference between blades at high solidity"
-    sign = "less thrust and less torque by shares that grow with solidity and hardly know the speed; rotors above 0.3"
+    title = "blade interference at high solidity (cascade)"
+    sign = (
+        "less thrust and less torque by shares that grow with solidity and hardly depend on speed; solidity above 0.3"
+    )
     parameters = (
         Parameter("zero_lift", "1", 0.0, 1.0, "1: the row's zero-lift angle; 0: the single section's", steps=0),
         Parameter("secondary", "1", 0.010, 0.030, "Howell 1945: 0.018", steps=0),

@@ -35,8 +35,8 @@ class CoaxialNeighbour(Effect):
     inviscid = True
     title = "second rotor on the same axis"
     sign = (
-        "less thrust at the same speed, as if the rotor flew into its neighbour's wake; most at rest, fading with "
-        "airspeed; the neighbour stopped, it is gone"
+        "less thrust at the same speed, as in the wake of another rotor; strongest in static runs, fading with "
+        "airspeed; gone when the other rotor stops"
     )
     check = "stop the other rotor"
     parameters = (

@@ -37,8 +37,10 @@ class Compressibility(Effect):
     form: str = "prandtl_glauert"
 
     id = "compressibility"
-    title = "compressible lift"
-    sign = "thrust coefficient grows as 1 + M^2/2 of the tip; colder air at the same speed moves it, density does not"
+    title = "compressibility (lift)"
+    sign = (
+        "thrust coefficient grows as 1 + M^2/2 of the tip; depends on air temperature at the same speed, not on density"
+    )
     parameters = (
         Parameter("amplitude", "1", 0.6, 1.4, "1 is the published form; those differ by a fifth", 5, 0.0),
         Parameter("kappa", "1", 0.80, 0.95, "0.87 NACA sections, 0.95 supercritical (Mason 1990)", 0),

@@ -79,9 +79,7 @@ class ThrustDrift(Drift):
 
     id = "thrust_drift"
     title = "drift of the thrust cell"
-    sign = (
-        "thrust follows clock or temperature, not the condition: the same point reads otherwise later; torque does not"
-    )
+    sign = "thrust depends on time or temperature: the same point reads differently later; torque does not"
     sensor = "thrust_N"
 
 
@@ -90,7 +88,5 @@ class TorqueDrift(Drift):
 
     id = "torque_drift"
     title = "drift of the torque cell"
-    sign = (
-        "torque follows clock or temperature, not the condition: the same point reads otherwise later; thrust does not"
-    )
+    sign = "torque depends on time or temperature: the same point reads differently later; thrust does not"
     sensor = "torque_Nm"

@@ -31,7 +31,7 @@ class DuctEffect(Effect):
     id = "duct"
     inviscid = True
     evident = True
-    title = "thrust of a duct"
+    title = "duct thrust"
     sign = "more thrust for the same torque, fading with advance ratio"
     parameters = (
         Parameter("wake_ratio", "1", 0.8, 1.3, "exit over disk area; Pereira 2008", 3),

@@ -39,11 +39,11 @@ class GroundEffect(Effect):
     id = "ground_effect"
     inviscid = True
     title = "wall behind the propeller"
-    check = "measure the distance of the nearest wall behind the propeller"
+    check = "measure the distance to the nearest wall behind the propeller"
     along = ("wall_distance_m",)
     sign = (
-        "more thrust at the same speed and torque; with airspeed it fades, as no load-cell gain does, unless the wall "
-        "stops the wind as well"
+        "more thrust at the same speed and torque; fades with airspeed, unlike a cell gain, unless the wall also "
+        "blocks the wind"
     )
     parameters = (
         Parameter("z_over_R", "1", 0.5, 3.0, "validity of Cheeseman and Bennett 1955"),

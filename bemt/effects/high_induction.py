@@ -20,7 +20,7 @@ class HighInduction(Effect):
     id = "high_induction"
     inviscid = True
     title = "turbulent windmill and vortex-ring state"
-    sign = "windmilling and descent only; never a propeller that drives air its own way"
+    sign = "only in windmilling and descent, never in normal propeller operation"
     diagnosed = False
 
     def momentum(self, bake: Baking) -> None:

@@ -44,8 +44,8 @@ class LiftingSurface(Effect):
 
     id = "lifting_surface"
     inviscid = True
-    title = "lifting-surface loss of lift at wide tips"
-    sign = "less thrust and torque by nearly one share at every advance ratio, the more the wider the tip"
+    title = "lift loss at wide tips (lifting surface)"
+    sign = "less thrust and torque by nearly the same share at every advance ratio, more for wider tips"
     diagnosed = False
     parameters = (Parameter("strength", "1", 0.0, 1.2, "1 is the closed form", 0, 0.0),)
     order = 46

@@ -36,8 +36,11 @@ class LipSeparation(Effect):
     by: str = "load"
 
     id = "lip_separation"
-    title = "separation at the lip of the duct"
-    sign = "thrust falls beyond one loading and returns below a lower one, torque stays; Mach effects return at once"
+    title = "flow separation at the duct lip"
+    sign = (
+        "thrust drops above one loading and recovers below a lower one, torque is unchanged; Mach effects have no "
+        "hysteresis"
+    )
     parameters = (
         Parameter("onset", "1", 0.01, 0.95, "declared; share of the largest duct thrust", 4),
         Parameter("loss", "1", 0.0, 1.0, "share of the duct's thrust, Martin and Tung 2004", 3, 0.0),

@@ -31,9 +31,9 @@ class MotorHeating(Effect):
     copper: float = 0.15
 
     id = "motor_heating"
-    title = "winding and magnets of the motor get warm"
+    title = "motor heating (winding and magnets)"
     along = ("time_s",)
-    sign = "speed at the same pulse width creeps with time under load; thrust at the measured speed does not change"
+    sign = "speed at the same pulse width drifts with time under load; thrust at the measured speed is unchanged"
     kind = "drive"
     needs = ("pwm_s", "time_s")
     parameters = (

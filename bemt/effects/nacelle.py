@@ -32,8 +32,8 @@ class Nacelle(Effect):
     id = "nacelle"
     inviscid = True
     title = "body behind the propeller"
-    check = "run without the propeller at the same airspeeds and take that drag off"
-    sign = "thrust lacks an amount that grows with V^2 (in the slipstream with the load, too), torque hardly moves"
+    check = "run without the propeller at the same airspeeds and subtract that drag"
+    sign = "thrust is low by an amount that grows with V^2 (in the slipstream also with load), torque hardly changes"
     parameters = (
         Parameter("deficit", "1", 0.0, 0.6, "0.25 on the axis of a half-body, more of a blunt one", 4, 0.0),
         Parameter("cd", "1", 0.0, 1.2, "spinner to bluff motor, on hub area, Hoerner 1965", 4, 0.0),

@@ -27,12 +27,12 @@ class ObliqueInflow(Effect):
 
     id = "oblique_inflow"
     inviscid = True
-    title = "airspeed at an angle to the shaft"
+    title = "inflow at an angle to the shaft"
     check = "check with a laser that shaft and tunnel axis are parallel"
     along = ("sideslip_rad",)
     sign = (
-        "thrust and torque up with airspeed as if J were lower, and a force in the plane of the disk; none at rest; a "
-        "pitot that reads high by 1 / cos(angle) looks alike"
+        "thrust and torque rise with airspeed as if J were lower, with a force in the plane of the disk; no change "
+        "in static runs; a pitot that reads high by 1 / cos(angle) looks the same"
     )
     parameters = (Parameter("angle_deg", "deg", 0.0, 90.0, "full turn of the stand", 7, 0.0),)
     on_by_default = False

@@ -22,9 +22,9 @@ class PitchOffset(Effect):
     offset_deg: float = 1.0
 
     id = "pitch_offset"
-    title = "blade angle other than stated"
-    check = "measure the blade angle at 0.75 R against the plane of rotation"
-    sign = "moves the advance ratio of zero thrust, the same at every speed; a gain or density leaves it where it is"
+    title = "wrong blade angle"
+    check = "measure the blade angle at 0.75 R relative to the plane of rotation"
+    sign = "shifts the advance ratio of zero thrust equally at every speed; a gain or density error does not shift it"
     parameters = (Parameter("offset_deg", "deg", -8.0, 8.0, "declared: workshop, or another label", 9, 0.0, 1.0),)
     on_by_default = False
 

@@ -35,7 +35,10 @@ class PostStall(Effect):
 
     id = "post_stall"
     title = "lift and drag of stalled sections"
-    sign = "only where the blade stalls (low advance ratio, high pitch): torque up, thrust on a plateau; none unstalled"
+    sign = (
+        "only where the blade stalls (low advance ratio, high pitch): more torque, thrust on a plateau; no change "
+        "unstalled"
+    )
     parameters = (Parameter("cd_max", "1", 1.1, 2.0, "1.11 + 0.018 AR to flat plate, Viterna 1982"),)
     order = 12
     on_by_default = False

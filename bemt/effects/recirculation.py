@@ -26,10 +26,13 @@ class Recirculation(Effect):
     before_s: float = 0.0
 
     id = "recirculation"
-    title = "slipstream that returns through the room"
-    check = "let smoke out behind the propeller, or repeat with a door open and after a pause"
+    title = "recirculation in the room"
+    check = "release smoke behind the propeller, or repeat with a door open and after a pause"
     along = ("time_s",)
-    sign = "thrust decays within seconds of each start and at low advance ratio only; a drifting cell knows no speed"
+    sign = (
+        "thrust decays within seconds of each start, only at low advance ratio; drift of a cell does not depend on "
+        "speed"
+    )
     needs = ("time_s",)
     parameters = (
         Parameter("k", "1", 0.0, 0.25, "declared; share of the induced speed", 4, 0.0),

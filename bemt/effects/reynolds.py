@@ -31,8 +31,8 @@ class Reynolds(Effect):
     lift_exponent: float = 0.0
 
     id = "reynolds"
-    title = "Reynolds number of the sections"
-    sign = "torque coefficient falls and thrust coefficient rises with speed, and both collapse on the Reynolds number"
+    title = "Reynolds number effect on the sections"
+    sign = "torque coefficient falls and thrust coefficient rises with speed; both collapse on the Reynolds number"
     parameters = (
         Parameter("amount", "1", 0.0, 3.0, "1: the tables; declared range", 4),
         Parameter("exponent", "1", 0.0, 0.6, "0.2 turbulent, 0.5 laminar flat plate", steps=0),

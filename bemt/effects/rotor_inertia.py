@@ -30,9 +30,9 @@ class RotorInertia(Effect):
     ratio: float = 1.0
 
     id = "rotor_inertia"
-    title = "inertia of the rotor"
+    title = "rotor inertia"
     along = ("time_s",)
-    sign = "torque only and in transients only: it leads while the speed rises, lags while it falls, zero on plateaus"
+    sign = "only torque and only in transients: high while the speed rises, low while it falls, zero on plateaus"
     needs = ("time_s",)
     parameters = (Parameter("ratio", "1", 0.0, 10.0, "declared, blades alone to heavy bell", 3, 0.0),)
     on_by_default = False

@@ -30,11 +30,11 @@ class RpmScale(Effect):
     eps: float = 0.01
 
     id = "rpm_scale"
-    title = "speed of rotation other than indicated"
-    check = "count the turns with an optical tachometer, and the pole pairs or blades set in the counter"
+    title = "wrong speed of rotation"
+    check = "count the revolutions with an optical tachometer; check the pole pairs or blades set in the counter"
     sign = (
-        "thrust and torque off by the same square and airspeed effects come at another J: a rational ratio of pole or "
-        "blade counts; density leaves J alone"
+        "thrust and torque off by the same square, and airspeed effects appear at another J; a rational ratio of "
+        "pole or blade counts; density does not change J"
     )
     kind = "stand"
     fault = "scale"

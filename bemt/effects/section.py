@@ -28,12 +28,11 @@ class Section(Effect):
     id = "section"
     title = "camber and drag level of the blade section"
     check = (
-        "take the section at 0.75 R from the blade (a cast, or a cut through a broken one) and"
-        " compare it with that of the case"
+        "copy the section at 0.75 R from the blade (a cast, or a cut through a broken one) and compare it with the case"
     )
     sign = (
-        "lift moves by the same amount at every advance ratio and drag by one factor, whatever the speed; neither "
-        "follows Reynolds number, Mach number or time"
+        "lift changes by a constant amount at every advance ratio and drag by one factor, at any speed; neither "
+        "depends on Reynolds number, Mach number or time"
     )
     parameters = (
         Parameter("camber", "1", -0.02, 0.02, "camber of small propellers is known to about 2 % of chord", 5, 0.0),

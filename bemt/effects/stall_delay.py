@@ -38,7 +38,8 @@ class StallDelay(Effect):
     id = "stall_delay"
     title = "rotational stall delay"
     sign = (
-        "more thrust than tables give where the root stalls: low advance ratio and high pitch, inboard; none unstalled"
+        "more thrust than the tables give where the root stalls: low advance ratio and high pitch, inboard; no "
+        "change unstalled"
     )
     parameters = (
         Parameter("coefficient", "1", 1.0, 4.0, "3 is the published strength of each form", 5, 0.0),

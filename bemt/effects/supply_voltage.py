@@ -25,8 +25,11 @@ class SupplyVoltage(Effect):
     copper: float = 0.15
 
     id = "supply_voltage"
-    title = "supply at another voltage"
-    sign = "speed at one pulse width changes by nearly one share, at light load and at full; thrust at the speed stays"
+    title = "different supply voltage"
+    sign = (
+        "speed at one pulse width changes by nearly the same share at light and full load; thrust at the measured "
+        "speed is unchanged"
+    )
     kind = "drive"
     needs = ("pwm_s",)
     check = "read the voltage at the controller"

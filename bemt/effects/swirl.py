@@ -19,8 +19,10 @@ class Swirl(Effect):
 
     id = "swirl"
     inviscid = True
-    title = "rotation of the slipstream"
-    sign = "thrust and torque off at heavy loading by constant shares; their ratio tells it from density or speed"
+    title = "slipstream swirl"
+    sign = (
+        "thrust and torque off by constant shares at heavy loading; their ratio distinguishes it from density or speed"
+    )
 
     def momentum(self, bake: Baking) -> None:
         """Switch the tangential balance on."""

@@ -26,7 +26,7 @@ class TipCut(Effect):
 
     id = "tip_cut"
     title = "blades shorter than stated"
-    sign = "less thrust and still less torque at every speed, the advance ratio of zero thrust nearly where it was"
+    sign = "less thrust and even less torque at every speed; the advance ratio of zero thrust hardly moves"
     check = "measure the diameter"
     parameters = (Parameter("cut", "1", 0.0, 0.15, "declared, share of the radius", 4, 0.0),)
     on_by_default = False

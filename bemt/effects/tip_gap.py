@@ -29,10 +29,10 @@ class TipGap(Effect):
 
     id = "tip_gap"
     inviscid = True
-    title = "leakage through the tip gap of a ducted rotor"
-    check = "measure the gap with a feeler gauge, hot and at speed if it can be"
+    title = "tip gap leakage in a duct"
+    check = "measure the gap with a feeler gauge, hot and at speed if possible"
     along = ("tip_gap_m",)
-    sign = "thrust and pressure rise fall in proportion to gap over span; an open rotor has none"
+    sign = "thrust and pressure rise drop in proportion to gap over span; no change on an open rotor"
     parameters = (
         Parameter("loss", "1", 1.0, 2.0, "Wisler 1985; Cumpsty 1989, not checked", 3),
         Parameter("scale", "1", 0.02, 0.10, "declared", 0),

@@ -28,8 +28,11 @@ class TipLoss(Effect):
 
     id = "tip_loss"
     inviscid = True
-    title = "tip loss of a finite number of blades"
-    sign = "less thrust than torque lost, more of both the heavier the loading: follows J and blade count, not speed"
+    title = "tip loss (finite number of blades)"
+    sign = (
+        "less thrust, and less torque by a smaller share; grows with loading; depends on J and blade count, not on "
+        "speed"
+    )
     parameters = (Parameter("strength", "1", 0.5, 1.3, "shared effect table of the project; 1 is Prandtl"),)
 
     def __post_init__(self) -> None:

@@ -47,9 +47,9 @@ class UnitSlip(Effect):
     unit: str = "kgf"
 
     id = "unit_slip"
-    title = "number in another unit than its label, or with the other sign"
-    check = "look at the unit in the settings of the stand and in the heading of the file"
-    sign = "one channel off by exactly the ratio of two units, or by -1, at every point; no physics keeps such a factor"
+    title = "wrong unit or sign"
+    check = "check the unit in the settings of the stand and in the heading of the file"
+    sign = "one channel off by exactly the ratio of two units, or by -1, at every point; no physics gives such a factor"
     kind = "stand"
     fault = "unit"
     discrete = ("factor",)

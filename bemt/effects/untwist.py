@@ -25,11 +25,11 @@ class Untwist(Effect):
     tip_deg: float = 1.0
 
     id = "untwist"
-    title = "elastic twist of the blades"
-    check = "film the tip from the side, standing still and at full speed"
+    title = "elastic blade twist"
+    check = "film the tip from the side, stopped and at full speed"
     sign = (
-        "thrust coefficient falls (or rises) with rho Omega^2 and not with Mach number: another density at the same "
-        "speed moves it, another air temperature does not"
+        "thrust coefficient falls (or rises) with rho Omega^2 and not with Mach number: depends on density at the "
+        "same speed, not on air temperature"
     )
     parameters = (
         Parameter("tip_deg", "deg", -4.0, 5.0, "declared; plastic blades 1 to 3 deg either way", 7, 0.0, 1.5),

@@ -22,8 +22,8 @@ class WiderGap(Effect):
 
     id = "wider_gap"
     inviscid = True
-    title = "tip gap other than stated"
-    sign = "thrust of a ducted rotor falls at every speed, torque less; an open rotor shows nothing"
+    title = "wrong tip gap"
+    sign = "thrust of a ducted rotor drops at every speed, torque by less; no change on an open rotor"
     check = "measure the gap with a feeler gauge"
     parameters = (Parameter("extra_mm", "mm", -1.0, 4.0, "declared; printed and moulded ducts", 6, 0.0, 0.5),)
     on_by_default = False
