@@ -241,7 +241,7 @@ RULES: tuple[Rule, ...] = (
         "twin faults",
         lambda a: twins(a.leading),
         lambda a: a.says(
-            "unknown", "two instruments with the same fault at once; one cause that is not in the library is more likely"
+            "unknown", "two instruments with the same fault at once; one cause outside the library is more likely"
         ),
         "",
         "declared: two independent faults of one kind are rare",
