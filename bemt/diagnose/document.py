@@ -166,9 +166,7 @@ def explanation(d: Diagnosis) -> list[str]:
     if decision.verdict == "none":
         lines.append(f"Why: {decision.why} (p = {d.p_value:.2g}).")
         if max((abs(v) for v in level.values()), default=0.0) > _WORTH_SAYING:
-            lines.append(
-                f"The level is off ({off}), within what gain, blade angle and solver allow; no cause is visible."
-            )
+            lines.append(f"The level is off ({off}), within what gain, blade angle and solver allow; no cause shows.")
         return [*lines, _gain(d), *_next(d), *_not_tried(d)]
     lines += _unexplained(d) if decision.verdict in ("unknown", "insufficient") else [_where(d.where)]
     if decision.verdict in ("named", "sensor"):
