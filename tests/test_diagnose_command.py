@@ -121,7 +121,7 @@ LOADS: dict[str, object] = {"rpm": RPM, "thrust_N": 6.8e-8 * RPM**2, "torque_Nm"
         ({"temperature_K": np.r_[np.full(11, 290.0), 20.0]}, ["temperature_K, point 12: got 20", "Celsius"]),
         ({"temperature_K": 290.0, "pressure_Pa": 29.9}, ["pressure_Pa, point 1, 2, 3, 4, 5 ...: got 29.9"]),
         ({"J": 0.3, "airspeed_m_s": 0.36 * RPM / 60 * 0.2032}, ["J: got airspeed over n D is 1.2 times it"]),
-        ({"thrust_N": 1e9}, ["times what the case gives", "Another unit, or another case?"]),
+        ({"thrust_N": 1e9}, ["times what the case gives", "unit, or wrong case?"]),
     ],
 )
 def test_what_cannot_be_is_refused(
@@ -165,7 +165,7 @@ def test_a_speed_that_a_table_lacks_is_as_told(tmp_path: Path, column: str, told
     assert np.all((made.rpm if column == "rpm" else made.V) == told)
     own = load(_table(tmp_path / "own.csv", has), case(), **options)
     assert not np.any((own.rpm if column == "rpm" else own.V) == told)  # the file knows better
-    assert any("not as told" in note for note in own.notes)
+    assert any("ignored" in note for note in own.notes)
 
 
 def test_humid_air_is_thinner_than_dry(tmp_path: Path) -> None:
