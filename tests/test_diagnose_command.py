@@ -136,7 +136,7 @@ def test_what_cannot_be_is_refused(
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"torque_Nm": 0.0}, "torque_Nm is 0 in every row: no measurement, left out"),
+        ({"torque_Nm": 0.0}, "torque_Nm is 0 in every row: not measured"),
         ({"thrust": 3.0}, "no unit known, none assumed, for 'thrust'"),
         ({"vibration_V": 3.0}, "not used: vibration_V"),
         ({"Power (W)": 30.0}, "power_W: taken as shaft power; if a wattmeter read it"),

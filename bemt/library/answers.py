@@ -257,7 +257,7 @@ def drive(
     rotors : int
         That carry it and share the battery.
     capacity_Ah : float, optional
-        Of the battery, for the time aloft. [A h]
+        Capacity of the battery, for the flight time. [A h]
     airspeed_m_s : float
         Speed of flight. [m/s]
 
