@@ -25,7 +25,7 @@ class AirspeedGain(Effect):
     id = "airspeed_gain"
     title = "gain error of the airspeed sensor"
     sign = (
-        "J scaled by one factor at every speed of rotation, no change in static runs; wind at an angle of acos(1 / "
+        "scales J by one factor at every speed of rotation, no change in static runs; wind at an angle of acos(1 / "
         "factor) looks the same, an offset would fade as 1/n"
     )
     kind = "stand"
