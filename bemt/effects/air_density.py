@@ -13,8 +13,9 @@ class AirDensity(Effect):
 
     Notes
     -----
-    rho (1 + change).  +-3 % is weather (CIPM-2007, Picard et al. 2008, Metrologia 45:149: 1 % per 3 K or 10 hPa); -30 %
-    is 3500 m of the U.S. Standard Atmosphere (1976).  Viscosity and sound speed stay: they know the temperature only.
+    rho (1 + change). +-3 % is weather (CIPM-2007, Picard et al. 2008, Metrologia 45:149: 1 % per 3 K or 10 hPa); -30 %
+    is 3500 m of the U.S. Standard Atmosphere (1976). Viscosity and speed of sound stay the same: they depend on
+    temperature only.
     """
 
     change: float = -0.10

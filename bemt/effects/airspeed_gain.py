@@ -15,9 +15,9 @@ class AirspeedGain(Effect):
 
     Notes
     -----
-    A pitot tube gives V = C sqrt(2 q / rho), C within 1 % of 1 for a standard tube along the stream (ISO 3966:2020; not
-    checked); a tube near the rotor or the wall, a transducer's factor or the density put in by hand are off by more.
-    +-20 % is declared.  Rest stays rest.
+    A pitot tube gives V = C sqrt(2 q / rho), C within 1 % of 1 for a standard tube aligned with the flow (ISO
+    3966:2020; not checked); a tube near the rotor or the wall, a transducer gain or a manually entered density are off
+    by more. +-20 % is declared. Static points stay static.
     """
 
     gain: float = 0.1

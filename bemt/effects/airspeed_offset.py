@@ -15,8 +15,8 @@ class AirspeedOffset(Effect):
 
     Notes
     -----
-    Draught of a hall or zero of a pitot's transducer: 0.15 Pa is 0.5 m/s at rest.  Range +-1 m/s is declared.  Points
-    recorded at V = 0 are static by decision and stay; a speed below zero counts as zero.
+    Draught in the hall or zero of the pitot transducer: 0.15 Pa is 0.5 m/s in still air. Range +-1 m/s is declared.
+    Points recorded at V = 0 are treated as static and stay so; a negative speed counts as zero.
     """
 
     offset_m_s: float = 0.5

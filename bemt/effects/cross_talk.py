@@ -17,8 +17,8 @@ class CrossTalk(Effect):
     Notes
     -----
     Off-diagonal term of a balance's calibration matrix (AIAA R-091A-2020; Barlow, Rae and Pope 1999, Low-Speed Wind
-    Tunnel Testing, ch. 7; not checked).  The lever R makes k a pure number; 5 % is declared: an axis that misses the
-    cell by R/20; seldom far more.  Its sign turns with the direction of rotation.
+    Tunnel Testing, ch. 7; not checked). The lever R makes k a pure number; 5 % is declared: an axis that misses the
+    cell by R/20, seldom much more. Its sign reverses with the direction of rotation.
     """
 
     form: str = "torque_in_thrust"

@@ -13,9 +13,9 @@ class Gain(Effect):
 
     Notes
     -----
-    Linear calibration error of a load cell (ISO 376:2011 states it as a relative error; not checked).  Some
-    percent as a rule, far more at times (wrong arm, wrong calibration mass, another cell's factor), a heavy-tailed
-    prior; declared.
+    Linear calibration error of a load cell (ISO 376:2011 states it as a relative error; not checked). Typically a few
+    percent, sometimes far more (wrong arm, wrong calibration mass, factor of another cell). Hence a heavy-tailed prior;
+    declared.
     """
 
     gain: float = 0.03

@@ -14,7 +14,7 @@ class HighInduction(Effect):
     Notes
     -----
     Buhl (2005), NREL/TP-500-36834, eq. 18 between turbine induction 0.4 and 1, continued to descent by a C1 bridge of
-    our own (see :func:`bemt.bem.residual.mass_flow`).  Never acts on a propeller that drives air its own way.
+    our own (see :func:`bemt.bem.residual.mass_flow`). Never acts in normal propeller operation.
     """
 
     id = "high_induction"

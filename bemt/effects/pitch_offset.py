@@ -15,8 +15,8 @@ class PitchOffset(Effect):
 
     Notes
     -----
-    beta + offset at every station.  Settings by hand and moulded blades are off by a degree
-    or so, a wrong label or reference line (chord, lower side) by several: a heavy-tailed prior, both declared.
+    beta + offset at every station. Manual settings and moulded blades are off by about a degree, a wrong label or
+    reference line (chord or underside) by several. Hence a heavy-tailed prior; both declared.
     """
 
     offset_deg: float = 1.0

@@ -22,9 +22,9 @@ class RotorInertia(Effect):
 
     Notes
     -----
-    Euler's law of a rotating body (Euler 1765).  I = B rho_b 0.068 c^2 R^3 / 3 from the chord at 0.75 R with 1300
-    kg/m3 (declared); ``ratio`` takes in what that misses, above all the bell of the motor: 0 to 10.  Slopes by central
-    differences, one-sided at kinks, within runs whose points are less than 1 s apart.
+    Euler's law of a rotating body (Euler 1765). I = B rho_b 0.068 c^2 R^3 / 3 from the chord at 0.75 R with 1300 kg/m3
+    (declared); ``ratio`` covers what this misses, mainly the bell of the motor: 0 to 10. Slopes by central differences,
+    one-sided at kinks, within runs whose points are less than 1 s apart.
     """
 
     ratio: float = 1.0

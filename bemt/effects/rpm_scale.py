@@ -21,9 +21,9 @@ class RpmScale(Effect):
 
     Notes
     -----
-    Electronic speed controllers count electrical turns, pole pairs times the mechanical ones; optical tachometers count
-    blades: a wrong setting is a rational factor (the counts that occur are declared).  ``eps``: clock error of cheap
-    counters, +-1 % (declared).  The rotor turns at the indicated speed over the factor.
+    Electronic speed controllers count electrical revolutions (pole pairs times mechanical), optical tachometers count
+    blades. A wrong setting gives a rational factor (the possible counts are declared). ``eps``: clock error of cheap
+    counters, +-1 % (declared). The rotor turns at the indicated speed over the factor.
     """
 
     factor: float = 1.0

@@ -13,8 +13,8 @@ class Swirl(Effect):
 
     Notes
     -----
-    Glauert (1935), Airplane Propellers, ch. VII; Ning (2014) eq. 12.  Off means that the blade meets no tangential
-    induction (axial momentum theory).
+    Glauert (1935), Airplane Propellers, ch. VII; Ning (2014) eq. 12. Off means no tangential induction (axial momentum
+    theory).
     """
 
     id = "swirl"

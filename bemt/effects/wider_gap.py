@@ -13,9 +13,9 @@ class WiderGap(Effect):
 
     Notes
     -----
-    Geometry only: the gap grows by a length, and `tip_gap` says what that costs (Wisler 1985 and Cumpsty 1989 there).
-    A worn or cut tip, a printed duct that shrank or went oval, a rotor that grows under load.  A gap does not fall
-    below zero.
+    Geometry only: the gap grows by a length, and `tip_gap` gives the loss (Wisler 1985 and Cumpsty 1989 there). A
+    worn or cut tip, a printed duct that shrank or went oval, a rotor that grows under load. The gap is never below
+    zero.
     """
 
     extra_mm: float = 0.5

@@ -13,9 +13,9 @@ class Zero(Effect):
 
     Notes
     -----
-    Zero error of a load cell (ISO 376:2011; not checked): falls as 1/n^2 in the coefficient.  Full scale is the largest
-    reading of the recording.  No tare, cable pull, weight of the motor: some percent as a rule, far more at times,
-    a heavy-tailed prior; declared.
+    Zero error of a load cell (ISO 376:2011; not checked): falls as 1/n^2 in the coefficient. Full scale is the largest
+    reading of the recording. No tare, cable pull, weight of the motor: typically a few percent, sometimes far more.
+    Hence a heavy-tailed prior; declared.
     """
 
     zero: float = 0.01
