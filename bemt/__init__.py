@@ -1,10 +1,10 @@
-"""Propeller and ducted-fan aerodynamics: blade element momentum theory beside CFD, bench and empirical models.
+"""Propeller and ducted-fan aerodynamics: blade element momentum theory, compared with CFD, bench and empirical data.
 
 >>> import bemt
 >>> bemt.propeller("10x5").solve(rpm=6000).thrust_N.round(1)
 array([4.8])
 
-Everything is loaded when it is first used.
+Names are loaded on first use.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from bemt.library import validate as validate
 
 _HOMES = {"InputError": "bemt.base.errors", "Dataset": "bemt.dataset"}
-_ROOMS = ("compare", "diagnose", "drive")  # rooms that are called like functions
+_ROOMS = ("compare", "diagnose", "drive")  # packages that can be called like functions
 _NAMES = (
     "Answer", "Dataset", "InputError", "Propeller", "compare", "diagnose", "drive", "load", "propeller", "read",
     "validate",
@@ -36,7 +36,7 @@ __all__ = ["__version__", *_NAMES]
 
 
 def __getattr__(name: str) -> Any:
-    """Load a name of the public face when it is first used."""
+    """Load a name of the public API on first use."""
     if name not in _NAMES:
         raise AttributeError(f"module 'bemt' has no attribute {name!r}; it offers {', '.join(_NAMES)}")
     import importlib

@@ -158,7 +158,7 @@ def test_a_label_with_its_motor_needs_no_file(capsys: pytest.CaptureFixture[str]
     words = ["drive", "10x4.5", "--kv", "900", "--cells", "3", "--mass", "1.4", "--rotors", "4", "--capacity", "3"]
     assert main(words) == 0
     shown = capsys.readouterr().out
-    assert all(word in shown for word in ("thrust", "current", "gf/W", "throttle", "time aloft", "motor's sheet", "±"))
+    assert all(word in shown for word in ("thrust", "current", "gf/W", "throttle", "flight time", "motor's sheet", "±"))
     assert max(map(len, shown.splitlines())) <= 120 and len(shown.splitlines()) <= 30
     assert main([*words, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)

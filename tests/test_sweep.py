@@ -486,9 +486,9 @@ def test_one_screen_says_what_differs_most(project: Path, capsys: pytest.Capture
     assert len(lines) <= 45 and max(map(len, lines)) <= 80
     text = "\n".join(lines)
     assert all(name.name in text for name in (project / "cases").iterdir() if (name / "case.toml").exists())
-    assert "Differs most: ds30" in text and "--details" in text and "diagnose" in text
+    assert "Largest difference: ds30" in text and "--details" in text and "diagnose" in text
     assert main(["sweep", str(project / "cases" / "ds30"), "--details"]) == 0
-    assert "assumed, because the source does not give it" in capsys.readouterr().out
+    assert "assumed (not stated by the source)" in capsys.readouterr().out
 
 
 def test_a_difference_near_zero_thrust_is_a_share_of_the_largest_and_no_thousand_percent() -> None:

@@ -21,25 +21,25 @@ FAN_RANGES = """
 [[assumptions]]
 key = "rotor.blades"
 values = [{blades_low}, {blades}, {blades_high}]
-why = "blade count not known for certain; count them and delete this"
+why = "blade count not certain; count the blades and delete this entry"
 
 [[assumptions]]
 key = "blade.pitch_in"
 low = {pitch_low:.4g}
 high = {pitch_high:.4g}
-why = "pitch not known; fans of this kind have about 1.2 to 1.7 diameters per turn"
+why = "pitch not known; such fans have about 1.2 to 1.7 diameters per turn"
 
 [[assumptions]]
 key = "duct.tip_gap_mm"
 low = {gap_low:.3g}
 high = {gap_high:.3g}
-why = "gap not known; 0.3 to 1 % of the diameter is usual"
+why = "gap not known; typically 0.3 to 1 % of the diameter"
 
 [[assumptions]]
 key = "duct.exit_area_ratio"
 low = 0.85
 high = 1.0
-why = "nozzle not known; 85 % of the swept annulus to all of it"
+why = "nozzle not known; 85 to 100 % of the swept annulus"
 """
 
 
@@ -69,11 +69,11 @@ def _rpm(diameter_m: float, rpm: float | None, tip_speed: float = TIP_SPEED) -> 
 
 
 def _operating(rpm: float, airspeed_m_s: float, told: bool) -> str:
-    why = "" if told else "  # a tip speed near 120 m/s; yours?"
+    why = "" if told else "  # gives a tip speed near 120 m/s; replace it with yours"
     return f"""
 [operating]
 rpm = {rpm:.6g}{why}
-airspeed_m_s = {airspeed_m_s:g}  # 0: on the bench
+airspeed_m_s = {airspeed_m_s:g}  # 0: static
 
 [air]
 density_kg_m3 = 1.225  # or temperature_C and pressure_hPa
@@ -86,12 +86,12 @@ def label_text(label: str, blades: int | None = None, rpm: float | None = None, 
     name = case_name(f"prop_{D:g}x{pitch:g}" + (f"x{B}" if B != 2 else ""))
     chord = label_chord(D * INCH)
     unknowns = _blocks(HUB, OFFSET, chord, *SECTION, *SURFACE, AIR)
-    return f"""# A {D:g}x{pitch:g} propeller, known by its label. [[assumptions]] are declared unknowns with ranges:
-# `bemt sweep` says what each does to the thrust. Put in what you measure and delete its assumption.
+    return f"""# A {D:g}x{pitch:g} propeller from its label. Each [[assumptions]] entry is an unknown with a range.
+# `bemt sweep --details` prints its effect on the thrust. When you measure a value, enter it and delete the assumption.
 schema = "bemt.case/1"
 name = "{name}"
 title = "{D:g}x{pitch:g} propeller, {B} blades"
-# references = "references.csv"  # measured values beside the case: quantity,value,unit,uncertainty,kind,source,...
+# references = "references.csv"  # measured values in this folder: quantity,value,unit,uncertainty,kind,source,...
 
 [rotor]
 kind = "propeller"
@@ -121,7 +121,7 @@ def stations_text(
     key: str = "stations",
 ) -> str:
     """Write the case of a blade whose chord and angle stand in a file beside it."""
-    return f"""# A propeller with the stations of {file}. What is not known is an assumption with its range.
+    return f"""# A propeller with the stations of {file}. Each unknown is an assumption with a range.
 schema = "bemt.case/1"
 name = "{case_name(Path(file).stem)}"
 title = "{blades} blades, {1e3 * diameter_m:.4g} mm, stations of {file}"
@@ -160,7 +160,7 @@ def fan_text(
     if blades:  # counted: no assumption
         ranges = "\n[[assumptions]]" + ranges.split("[[assumptions]]", 2)[2]
     told = _rpm(diameter_m, rpm, 180.0)
-    return f"""# A ducted fan of {mm:.4g} mm. Everything below [[assumptions]] is a declared unknown with its range.
+    return f"""# A ducted fan of {mm:.4g} mm. Each entry [[assumptions]] is an unknown with a range.
 schema = "bemt.case/1"
 name = "fan_{mm:.0f}"
 title = "ducted fan, {mm:.4g} mm, {B} blades"
@@ -209,4 +209,4 @@ def of_stations(file: Path, diameter_m: float) -> tuple[float, str]:
     if "STATION" in head and "CHORD" in head:
         return 0.15, "apc"
     got, expected = repr(first.strip()[:60]), "r_over_R,chord_over_R,beta_deg, a UIUC geometry file or an APC PE0 file"
-    raise InputError(Fault(file.as_posix(), "1", got, expected, "A recording is read by `bemt import`"))
+    raise InputError(Fault(file.as_posix(), "1", got, expected, "Read recordings with `bemt import`"))

@@ -91,7 +91,12 @@ def _check_files(out: Collector, document: Mapping[str, Any], folder: Path) -> N
         places += [(f"polars[{i}].file", p.get("file")) for i, p in enumerate(polars) if isinstance(p, Mapping)]
     for where, value in places:
         if isinstance(value, str) and value.strip() and not (folder / value).is_file():
-            out.add(where, f"{value!r}, which does not exist", "the name of a file beside the case", "Check the name")
+            out.add(
+                where,
+                f"{value!r}, which does not exist",
+                "the name of a file in the folder of the case",
+                "Check the name",
+            )
 
 
 def _given(table: Table, *names: str) -> list[str]:
@@ -133,7 +138,7 @@ def _check_blade(out: Collector, case: CaseFile) -> None:
         (source,) = _given(blade, "stations", "uiuc", "apc")
         for key in (*pitches, *_given(blade, "max_chord_over_R", "taper", "pitch_law", "tip_relief")):
             hint = "Use beta_offset_deg to turn the blade" if key in pitches else ""
-            out.add(f"blade.{key}", shown(getattr(blade, key)), f"nothing beside {source}, which gives it", hint)
+            out.add(f"blade.{key}", shown(getattr(blade, key)), f"nothing, because {source} gives it", hint)
     posterior = blade.as_built is not None and blade.as_built.file is not None
     if (blade.known_from == "reference") != posterior:
         got = 'known_from = "reference" without as_built.file' if not posterior else "as_built.file"
@@ -202,7 +207,7 @@ def _check_sweep(out: Collector, case: CaseFile) -> None:
     sweep = case.sweep.axes()
     if "density_kg_m3" in sweep and ("altitude_m" in sweep or "temperature_C" in sweep):
         other = "altitude_m" if "altitude_m" in sweep else "temperature_C"
-        out.add("sweep.density_kg_m3", f"an axis beside {other}", f"density_kg_m3 or {other}, not both")
+        out.add("sweep.density_kg_m3", f"an axis together with {other}", f"density_kg_m3 or {other}, not both")
     if "temperature_C" in sweep and case.air.density_kg_m3 is not None and "altitude_m" not in sweep:
         out.add(
             "sweep.temperature_C",
@@ -240,7 +245,7 @@ def _check_assumption(
 ) -> None:
     if "values" in item:
         if "low" in item or "high" in item:
-            out.add(where, "values beside low or high", "values, or low and high")
+            out.add(where, "values together with low or high", "values, or low and high")
         if not isinstance(item["values"], list) or len(item["values"]) < 2 or nominal not in item["values"]:
             out.add(f"{where}.values", shown(item["values"]), f"two or more values, one of them {shown(nominal)}")
             return

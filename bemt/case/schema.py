@@ -88,7 +88,7 @@ _PITCH_IN = Limits("in", 0.1, 120, _inch("pitch_in", 120.1))
 _DIAMETER_IN = Limits("in", 0.5, 200, _inch("diameter_in", 200.1))
 _GAP = Limits("mm", 0, 50, _metres("tip_gap_mm", 0.005))
 _FRACTION_OF_HUMIDITY = _looks((1e-9, 0.999, "a fraction", lambda v: v * 100, "humidity_pct"))
-FILE = "the name of a file beside the case"
+FILE = "the name of a file in the folder of the case"
 
 KnownFrom = Literal["cad", "scan", "stations", "label", "reference"]
 Rotations = Literal["right", "left"]
@@ -105,18 +105,18 @@ def _metres_of(inch: float | None, millimetre: float | None, metre: float | None
 
 
 class RotorTable(Table):
-    """[rotor]: what turns."""
+    """[rotor]: rotor and hub."""
 
-    kind: Literal["propeller", "fan"] = entry("open rotor, or fan; fan where there is a [duct]", default="propeller")
+    kind: Literal["propeller", "fan"] = entry("open rotor or fan; fan if there is a [duct]", default="propeller")
     blades: int = entry("number of blades", low=1, high=64, required=True)
     diameter_in: float | None = entry("tip diameter", _DIAMETER_IN)
     diameter_mm: float | None = entry("tip diameter", "mm", 10, 6000, _metres("diameter_mm", 6.0))
     diameter_m_: float | None = entry("tip diameter", "m", 0.01, 6, alias="diameter_m")
-    hub_ratio: float | None = entry("hub over tip radius", "", 0.01, 0.95, _percent("hub_ratio"))
+    hub_ratio: float | None = entry("hub radius over tip radius", "", 0.01, 0.95, _percent("hub_ratio"))
     hub_diameter_mm: float | None = entry("hub diameter", "mm", 0.5, 3000, _metres("hub_diameter_mm", 0.499))
     hub_diameter_in: float | None = entry("hub diameter", "in", 0.02, 120)
-    spinner_mm: float = entry("length of the nose ahead of the hub; 0 is a flat face", "mm", 0, 3000, default=0.0)
-    rotation: Rotations = entry("hand, seen from behind", default="right")
+    spinner_mm: float = entry("length of the nose ahead of the hub; 0: flat face", "mm", 0, 3000, default=0.0)
+    rotation: Rotations = entry("sense of rotation, seen from behind", default="right")
 
     @property
     def diameter_m(self) -> float:
@@ -135,25 +135,25 @@ class SectionTable(Table):
     """[blade.section]: one section, or one per r_over_R."""
 
     naca: Texts = entry("NACA digits, such as 4412")
-    dat: Texts = entry("files of coordinates beside the case")
+    dat: Texts = entry("coordinate files in the folder of the case")
     camber: float | tuple[float, ...] = entry(
-        "largest height of the camber line", "of the chord", -0.2, 0.2, _percent("camber", 0.9), default=0.0
+        "maximum camber", "of the chord", -0.2, 0.2, _percent("camber", 0.9), default=0.0
     )
     camber_position: float | tuple[float, ...] = entry(
-        "where the camber is largest", "of the chord", 0.1, 0.8, _percent("camber_position"), default=0.4
+        "position of maximum camber", "of the chord", 0.1, 0.8, _percent("camber_position"), default=0.4
     )
-    thickness: Numbers = entry("largest thickness", "of the chord", 0.01, 0.5, _percent("thickness", 1.5))
+    thickness: Numbers = entry("maximum thickness", "of the chord", 0.01, 0.5, _percent("thickness", 1.5))
     camber_scale: float = entry("factor on the camber", "", 0, 5, default=1.0)
     thickness_scale: float = entry("factor on the thickness", "", 0.1, 5, default=1.0)
-    r_over_R: tuple[float, ...] | None = entry("radii of lists above", "", 0, 1, _percent("r_over_R", 2.0))
+    r_over_R: tuple[float, ...] | None = entry("radii of the lists above", "", 0, 1, _percent("r_over_R", 2.0))
 
 
 class AsBuiltTable(Table):
-    """[blade.as_built]: what is known of this very rotor beyond its drawing, expectations and standard deviations."""
+    """[blade.as_built]: what is known about this rotor beyond its drawing: expected values and standard deviations."""
 
-    angle_deg: float | None = entry("expected blade angle above the drawn one", "deg", -20, 20)
+    angle_deg: float | None = entry("expected blade angle minus the drawn one", "deg", -20, 20)
     angle_sd_deg: float | None = entry("its standard deviation", "deg", 0, 20)
-    camber_deg: float | None = entry("expected lowering of the zero-lift angle", "deg", -20, 20)
+    camber_deg: float | None = entry("expected reduction of the zero-lift angle", "deg", -20, 20)
     camber_sd_deg: float | None = entry("its standard deviation", "deg", 0, 20)
     lift: float | None = entry("expected change of ln(cl)", "", -1, 1)
     lift_sd: float | None = entry("its standard deviation", "", 0, 1, _percent("lift_sd"))
@@ -163,29 +163,31 @@ class AsBuiltTable(Table):
 
 
 class BladeTable(Table):
-    """[blade]: pitch and chord by a law, or stations from a file; how well it is known."""
+    """[blade]: pitch and chord from a law or a station file, and how well they are known."""
 
-    pitch_in: float | None = entry("advance per turn", _PITCH_IN)
-    pitch_mm: float | None = entry("advance per turn", "mm", 2.5, 3000, _metres("pitch_mm", 2.0))
-    pitch_ratio: float | None = entry("advance per turn over diameter", "", 0.01, 10)
-    pitch_law: Literal["helix", "tip_relieved"] = entry("pitch over the radius", default="helix")
+    pitch_in: float | None = entry("advance per revolution", _PITCH_IN)
+    pitch_mm: float | None = entry("advance per revolution", "mm", 2.5, 3000, _metres("pitch_mm", 2.0))
+    pitch_ratio: float | None = entry("advance per revolution over diameter", "", 0.01, 10)
+    pitch_law: Literal["helix", "tip_relieved"] = entry("pitch law along the radius", default="helix")
     tip_relief: float | None = entry(
-        "share of the pitch that the tip lacks, with tip_relieved", "", 0, 0.6, _percent("tip_relief")
+        "share by which the pitch is reduced at the tip, with tip_relieved", "", 0, 0.6, _percent("tip_relief")
     )
-    chord_law: str | None = entry("chord over the radius", choices=CHORD_LAWS)
+    chord_law: str | None = entry("chord law along the radius", choices=CHORD_LAWS)
     max_chord_over_R: float | None = entry(
-        "largest chord", "of the tip radius", 0.005, 2, _percent("max_chord_over_R", 3.0)
+        "maximum chord", "of the tip radius", 0.005, 2, _percent("max_chord_over_R", 3.0)
     )
     taper: float | None = entry("tip over root chord, with linear_taper", "", 0.05, 3)
     chord_scale: float = entry("factor on every chord", "", 0.1, 10, _percent("chord_scale", 20.0), default=1.0)
     stations: str | None = entry(
         "CSV r_over_R,chord_over_R,beta_deg; r and chord may be lengths, such as r_mm", words=FILE
     )
-    uiuc: str | None = entry("geometry file of UIUC", words=FILE)
-    apc: str | None = entry("PE0 file of APC", words=FILE)
-    beta_offset_deg: float = entry("turns the whole blade", "deg", -45, 45, default=0.0)
-    known_from: KnownFrom | None = entry("how the shape is known; sets its uncertainty", choices=KNOWN_FROM)
-    label_pitch_in: float | None = entry("pitch printed on it", "in", 0.1, 120, _inch("label_pitch_in", 120.1))
+    uiuc: str | None = entry("UIUC geometry file", words=FILE)
+    apc: str | None = entry("APC PE0 file", words=FILE)
+    beta_offset_deg: float = entry("rotation of the whole blade", "deg", -45, 45, default=0.0)
+    known_from: KnownFrom | None = entry("source of the blade shape; sets its uncertainty", choices=KNOWN_FROM)
+    label_pitch_in: float | None = entry(
+        "pitch printed on the propeller", "in", 0.1, 120, _inch("label_pitch_in", 120.1)
+    )
     family: str | None = entry("maker's series")
     as_built: AsBuiltTable | None = None
     section: SectionTable | None = None
@@ -203,7 +205,7 @@ class StatorTable(Table):
     blades: int = entry("number of vanes", low=1, high=64, required=True)
     chord_mm: float = entry("chord", "mm", 1, 1000, _metres("chord_mm", 0.999), required=True)
     angle_deg: float = entry("vane angle from the axis, for geometry and CFD", "deg", 0, 60, default=0.0)
-    recovery: float | None = entry("share of the swirl that is taken out", "", 0, 1, _percent("recovery", 1.5))
+    recovery: float | None = entry("share of the swirl that is recovered", "", 0, 1, _percent("recovery", 1.5))
 
 
 class DuctTable(Table):
@@ -211,14 +213,16 @@ class DuctTable(Table):
 
     inner_diameter_mm: float | None = entry("bore", "mm", 10, 6000, _metres("inner_diameter_mm", 6.0))
     inner_diameter_in: float | None = entry("bore", "in", 0.5, 240)
-    tip_gap_mm: float | None = entry("between blade tip and wall", _GAP)
-    length_mm: float = entry("inlet to exit", "mm", 1, 10_000, _metres("length_mm", 0.999), required=True)
-    lip_radius_mm: float = entry("of the inlet lip", "mm", 0, 1000, default=0.0)
+    tip_gap_mm: float | None = entry("gap between blade tip and wall", _GAP)
+    length_mm: float = entry("length from inlet to exit", "mm", 1, 10_000, _metres("length_mm", 0.999), required=True)
+    lip_radius_mm: float = entry("radius of the inlet lip", "mm", 0, 1000, default=0.0)
     lip_loss: float | None = entry("loss coefficient of the inlet lip", "", 0, 1, _percent("lip_loss", 1.5))
-    rotor_position_mm: float | None = entry("rotor behind the inlet", "mm", -1000, 10_000)
-    exit_area_ratio: float | None = entry("exit area over swept annulus", "", 0.3, 3, _percent("exit_area_ratio", 20.0))
-    exit_diameter_mm: float | None = entry("of the exit", "mm", 5, 6000, _metres("exit_diameter_mm", 4.9))
-    exit_hub_diameter_mm: float = entry("of the centre body at the exit", "mm", 0, 6000, default=0.0)
+    rotor_position_mm: float | None = entry("distance of the rotor behind the inlet", "mm", -1000, 10_000)
+    exit_area_ratio: float | None = entry(
+        "exit area over swept annulus area", "", 0.3, 3, _percent("exit_area_ratio", 20.0)
+    )
+    exit_diameter_mm: float | None = entry("diameter of the exit", "mm", 5, 6000, _metres("exit_diameter_mm", 4.9))
+    exit_hub_diameter_mm: float = entry("diameter of the centre body at the exit", "mm", 0, 6000, default=0.0)
     stator: StatorTable | None = None
 
     @property
@@ -228,10 +232,10 @@ class DuctTable(Table):
 
 
 class OperatingTable(Table):
-    """[operating]: the case's own point."""
+    """[operating]: operating point of the case."""
 
     rpm: float = entry("speed of rotation", RPM, required=True)
-    airspeed_m_s: float = entry("axial speed of flight", AIRSPEED, default=0.0)
+    airspeed_m_s: float = entry("axial flight speed", AIRSPEED, default=0.0)
 
 
 class AirTable(Table):
@@ -260,23 +264,23 @@ class AirTable(Table):
 
 
 class ModelTable(Table):
-    """[model]: physics that is on, section tables, blade elements."""
+    """[model]: active effects, section tables, blade elements."""
 
-    effects_on: tuple[str, ...] = entry("effects to add, as name or name(parameter=value)", default=())
-    effects_off: tuple[str, ...] = entry("effects to leave out", default=())
-    also_without: tuple[str, ...] = entry("effects that the sweep also shows left out", default=())
-    n_crit: float = entry("amplification at transition (e^N)", "", 0.1, 14, default=N_CRIT)
+    effects_on: tuple[str, ...] = entry("effects to switch on, as name or name(parameter=value)", default=())
+    effects_off: tuple[str, ...] = entry("effects to switch off", default=())
+    also_without: tuple[str, ...] = entry("effects that the sweep also shows switched off", default=())
+    n_crit: float = entry("critical amplification factor (e^N transition)", "", 0.1, 14, default=N_CRIT)
     drag_level: float = entry(
         "factor on the profile drag of the section rule", "", 0.3, 3, _percent("drag_level", 20.0), default=DRAG_LEVEL
     )
-    stations: int = entry("blade elements", low=5, high=1000, default=40)
+    stations: int = entry("number of blade elements", low=5, high=1000, default=40)
 
 
 class SweepTable(Table):
-    """[sweep]: axes of a parameter grid, lists or {start, stop, num}."""
+    """[sweep]: axes of a parameter grid, as lists or {start, stop, num}."""
 
     rpm: Axis = entry("speeds of rotation", RPM)
-    airspeed_m_s: Axis = entry("speeds of flight", AIRSPEED)
+    airspeed_m_s: Axis = entry("flight speeds", AIRSPEED)
     altitude_m: Axis = entry("altitudes", _ALTITUDE)
     density_kg_m3: Axis = entry("densities", _DENSITY)
     temperature_C: Axis = entry("temperatures", _TEMPERATURE)
@@ -293,28 +297,30 @@ class AssumptionTable(Table):
     """[[assumptions]]: a value that the source does not give, with its range."""
 
     key: str = entry("dotted key of the value, such as rotor.hub_ratio", required=True)
-    low: float | None = entry("lower end, in the unit of the key")
-    high: float | None = entry("upper end")
-    values: tuple[Any, ...] | None = entry("all values that it may take, instead of low and high")
-    why: str = entry("where value and range come from", required=True)
+    low: float | None = entry("lower limit, in the unit of the key")
+    high: float | None = entry("upper limit")
+    values: tuple[Any, ...] | None = entry("all possible values, instead of low and high")
+    why: str = entry("source of value and range", required=True)
 
 
 class PolarTable(Table):
-    """[[polars]]: a section table of the user's own."""
+    """[[polars]]: your own section table."""
 
     file: str = entry("table of lift and drag", required=True, words=FILE)
-    r_over_R: float = entry("radius at which it holds", "", 0, 1, _percent("r_over_R", 2.0), required=True)
-    format: Literal["csv", "xfoil", "c81", "aerodyn"] | None = entry("of the file; told by its content if left out")
+    r_over_R: float = entry("radius of the section", "", 0, 1, _percent("r_over_R", 2.0), required=True)
+    format: Literal["csv", "xfoil", "c81", "aerodyn"] | None = entry(
+        "file format; detected from the content if omitted"
+    )
 
 
 class CaseFile(Table):
     """A whole case file."""
 
     schema_: Literal["bemt.case/1"] = entry("version of the format", required=True, alias="schema")
-    name: str = entry("names the folder of results: letters, digits, dot, dash, underscore", required=True)
-    title: str = entry("one line for people", default="")
-    notes: str = entry("anything", default="")
-    origin: str = entry("where the case comes from", default="")
+    name: str = entry("name of the result folder: letters, digits, dot, dash, underscore", required=True)
+    title: str = entry("one-line title", default="")
+    notes: str = entry("free text", default="")
+    origin: str = entry("source of the case", default="")
     references: str | None = entry("recorded values", words=FILE)
     rotor: RotorTable
     blade: BladeTable

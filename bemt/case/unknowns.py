@@ -40,8 +40,8 @@ class Unknown:
         )
 
 
-HUB = Unknown("rotor.hub_ratio", 0.15, 0.10, 0.20, "hub not known; hubs and spinners of small propellers")
-_UNDERSIDE = "a label's pitch is that of the chord line (0) or of the flat underside (up to 1.4 deg more)"
+HUB = Unknown("rotor.hub_ratio", 0.15, 0.10, 0.20, "hub not known; typical of hubs and spinners of small propellers")
+_UNDERSIDE = "a label states the pitch of the chord line (0) or of the flat underside (up to 1.4 deg more)"
 OFFSET = Unknown("blade.beta_offset_deg", 0.7, 0.0, 1.4, _UNDERSIDE)
 THICKNESS = Unknown("blade.section.thickness", 0.09, 0.06, 0.12, "section not known")
 SECTION = (
@@ -50,7 +50,7 @@ SECTION = (
         0.035,
         0.02,
         0.05,
-        "section not known; measured families of propellers have 3 to 5 %, slow flyers more",
+        "section not known; measured propeller families have 3 to 5 %, slow flyers more",
     ),
     THICKNESS,
 )
@@ -66,9 +66,9 @@ SURFACE = (
 )
 AIR = Unknown("air.density_kg_m3", 1.225, 1.16, 1.29, "air not stated; 30 to 0 C at sea level")
 FAN = (
-    Unknown("rotor.hub_ratio", 0.37, 0.30, 0.45, "hub not known; hubs of ducted fans"),
-    Unknown("blade.max_chord_over_R", 0.45, 0.30, 0.60, "chord not known, law fan; range of that law"),
-    Unknown("blade.section.camber", 0.05, 0.03, 0.07, "section not known; cambered compressor-like sections"),
+    Unknown("rotor.hub_ratio", 0.37, 0.30, 0.45, "hub not known; typical of ducted fans"),
+    Unknown("blade.max_chord_over_R", 0.45, 0.30, 0.60, "chord not known; range of the chord law fan"),
+    Unknown("blade.section.camber", 0.05, 0.03, 0.07, "section not known; typical of cambered compressor sections"),
     THICKNESS,
 )
 HUBS = ("hub_ratio", "hub_diameter_mm", "hub_diameter_in")
@@ -81,7 +81,7 @@ def label_chord(diameter_m: float) -> Unknown:
     far = math.exp(math.sqrt(3.0) * chord_sd(diameter_m))
     chord = min(max(CHORD * (diameter_m / INCH / 10.0) ** CHORD_EXPONENT, low), high)
     least, most = (float(f"{value:.2g}") for value in (max(chord / far, low), min(chord * far, high)))
-    why = "chord not known, law apc_like; 87 measured propellers of 2.2 to 19 in. Measure it: nothing narrows more"
+    why = "chord not known; range of 87 measured propellers, 2.2 to 19 in. Measuring it narrows the band most"
     return Unknown("blade.max_chord_over_R", float(f"{chord:.3g}"), least, most, why)
 
 

@@ -23,22 +23,22 @@ __all__ = ["Campaign", "CampaignFile", "CampaignPoint", "load_campaign"]
 
 
 class PointTable(RunRanges):
-    """[defaults], [[points]] and, as lists, [axes]: one CFD run; what is left out is the case's."""
+    """[defaults], [[points]] and, as lists, [axes]: one CFD run; omitted values come from the case."""
 
     J: float | None = entry("advance ratio, with rpm and instead of airspeed_m_s", low=0, high=5)
-    pitch_offset_deg: float | None = entry("turns the whole blade", "deg", -30, 30)
+    pitch_offset_deg: float | None = entry("rotation of the whole blade", "deg", -30, 30)
     tip_gap_pct_R: float | None = entry("tip gap, with a duct", "% of R", 0.1, 10)
     wall_distance_over_R: float | None = entry("round plate behind the rotor", "R", 0.2, 20)
     plate_radius_over_R: float | None = entry("radius of that plate", "R", 0.5, 5)
-    solver: Literal["incompressible", "compressible"] | None = entry("left out: by the tip Mach number")
-    gas: str | None = entry("of the compressible solver", choices=GASES)
-    sector: str | None = entry("part of the disk that is meshed; the smallest that fits if left out", choices=SECTORS)
+    solver: Literal["incompressible", "compressible"] | None = entry("by the tip Mach number if omitted")
+    gas: str | None = entry("gas model of the compressible solver", choices=GASES)
+    sector: str | None = entry("meshed part of the disk; the smallest possible if omitted", choices=SECTORS)
     domain: str | None = entry("free air, or a pipe of the rotor's diameter", choices=DOMAINS)
     turbulence: str | None = entry("model", choices=TURBULENCE)
-    iterations: int | None = entry("of the solver", low=20, high=100_000)
-    average: int | None = entry("last iterations that are averaged", low=10, high=100_000)
-    start: Literal["neighbour", "slipstream"] | None = entry("run on the same grid, or momentum theory")
-    zone: str | None = entry("how the rotating zone is bounded", choices=ZONES)
+    iterations: int | None = entry("iterations of the solver", low=20, high=100_000)
+    average: int | None = entry("number of last iterations to average", low=10, high=100_000)
+    start: Literal["neighbour", "slipstream"] | None = entry("initial flow: run on the same grid, or momentum theory")
+    zone: str | None = entry("ends of the rotating zone", choices=ZONES)
 
 
 def _listed(field: FieldInfo) -> Any:
@@ -52,11 +52,11 @@ AxesTable: Any = create_model(
 
 
 class CampaignDuct(Table):
-    """[duct]: for runs with tip_gap_pct_R of a case without one."""
+    """[duct]: for runs with tip_gap_pct_R if the case has no duct."""
 
-    length_mm: float = entry("inlet to exit", "mm", 1, 10_000, required=True)
-    lip_radius_mm: float | None = entry("of the inlet lip", "mm", 0, 1000)
-    rotor_position_mm: float | None = entry("rotor behind the inlet", "mm", -1000, 10_000)
+    length_mm: float = entry("length from inlet to exit", "mm", 1, 10_000, required=True)
+    lip_radius_mm: float | None = entry("radius of the inlet lip", "mm", 0, 1000)
+    rotor_position_mm: float | None = entry("distance of the rotor behind the inlet", "mm", -1000, 10_000)
     exit_area_ratio: float = entry("exit area over swept annulus", "", 0.3, 3, required=True)
 
 
@@ -64,9 +64,9 @@ class CampaignFile(Table):
     """campaign.toml: CFD runs of one case, every combination of [axes] and each of [[points]]."""
 
     schema_: Literal["bemt.cfd/1"] = entry("version of the format", required=True, alias="schema")
-    name: str = entry("names the folder of the runs", required=True)
-    title: str | None = entry("one line for people")
-    case: str = entry("case.toml, from here", required=True)
+    name: str = entry("name of the folder of the runs", required=True)
+    title: str | None = entry("one-line title")
+    case: str = entry("path to case.toml", required=True)
     grid_study: str | None = entry("folder of the campaign that gives the numerical uncertainty")
     defaults: PointTable = PointTable()
     axes: AxesTable = AxesTable()

@@ -1,4 +1,4 @@
-"""Options that several subcommands share, and their types."""
+"""Options shared by several subcommands, and their types."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import argparse
 from contextlib import suppress
 from typing import Any
 
-# Options of several words: `--case A B` and `--case A --case B` are the same, none is dropped without a word.
+# Options with several values: `--case A B` and `--case A --case B` are equivalent; no value is dropped silently.
 MANY: dict[str, Any] = {"action": "extend", "nargs": "+"}
 REPEATABLE: dict[str, Any] = {"action": "append", "default": []}
 

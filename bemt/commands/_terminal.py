@@ -19,14 +19,14 @@ SAID = (
     (RED, r"^ *! error\b:?"),
     (YELLOW, r"^ *! (?:warning\b:?)?"),
 )
-"""Colour and what of a line of output it is for; the first that fits holds."""
+"""Colour and the part of an output line that gets it; the first match wins."""
 REFUSED = ((YELLOW, r"^\S*[Ww]arning: "), (RED, r"^.*?: (?=got )|^.*?: error: |^internal error.*|^interrupted$"))
-"""The same of stderr."""
+"""The same for stderr."""
 
 
 @contextmanager
 def progress(quiet: bool = False) -> Iterator[Callable[[str], None]]:
-    """Give a function that shows a line; it does nothing when told to be quiet or when nobody watches."""
+    """Give a function that shows a line; does nothing if quiet, or if stderr is not a terminal."""
     shown = sys.stderr.isatty() and not quiet
 
     def say(line: str) -> None:
@@ -43,7 +43,7 @@ def progress(quiet: bool = False) -> Iterator[Callable[[str], None]]:
 
 
 def complain(what: object) -> None:
-    """Print one line of trouble on stderr."""
+    """Print one line on stderr."""
     print(what, file=sys.stderr, flush=True)
 
 
@@ -54,7 +54,7 @@ def called() -> str:
 
 
 class _Painted:
-    """Stream that colours what the patterns name."""
+    """Stream that colours what the patterns match."""
 
     def __init__(self, stream: Any, patterns: tuple[tuple[str, str], ...]) -> None:
         self._stream, self._colours = stream, [colour for colour, _ in patterns]
@@ -73,7 +73,7 @@ class _Painted:
 
 @contextmanager
 def coloured() -> Iterator[None]:
-    """Colour stdout and stderr where a terminal shows them and nobody asked for none (https://no-color.org)."""
+    """Colour stdout and stderr on a terminal, unless NO_COLOR is set (https://no-color.org)."""
     plain = bool(os.environ.get("NO_COLOR")) or os.environ.get("TERM") == "dumb"
     before = sys.stdout, sys.stderr
     try:

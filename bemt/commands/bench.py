@@ -17,8 +17,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     _options.add_json(parser, "bemt.bench/1")
     parser.add_argument("--quick", action="store_true", help="fewer repetitions")
-    parser.add_argument("--work", metavar="DIR", help="time the work in this folder instead of the shipped one")
-    log = "time import and diagnose over a made-up log of N rows instead, and their memory"
+    parser.add_argument("--work", metavar="DIR", help="use the benchmark in this folder instead of the shipped one")
+    log = "time import and diagnose on a generated log of N rows instead, with memory"
     parser.add_argument("--log", type=_options.positive, metavar="N", help=log)
 
 

@@ -8,17 +8,17 @@ from bemt.base.errors import EXIT_OK
 from bemt.commands import _options, _terminal
 
 NAME = "calibrate"
-HELP = "refit K1 and K2 on measured propellers, beside the compact formula"
+HELP = "refit K1/K2 and the compact formula on measured propellers"
 GROUP = "Models and checks"
 EXAMPLE = "calibrate uiuc --out calibration"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    which = "files or folders with diameter, pitch, rpm and thrust or CT (default: uiuc, the data found)"
+    which = "files or folders with diameter, pitch, rpm and thrust or CT (default: uiuc, the installed data)"
     parser.add_argument("files", nargs="*", metavar="FILES", help=which)
-    parser.add_argument("--test", metavar="FILES", help="held out: scored, never fitted", **_options.MANY)
-    parser.add_argument("--out", metavar="DIR", help="write the tables, JSON and a figure there")
+    parser.add_argument("--test", metavar="FILES", help="held-out data: scored, never fitted", **_options.MANY)
+    parser.add_argument("--out", metavar="DIR", help="write tables, JSON and a figure to this folder")
     _options.add_json(parser, "bemt.calibration/1")
     _options.add_quiet(parser)
 

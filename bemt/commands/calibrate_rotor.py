@@ -8,23 +8,23 @@ from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
 from bemt.commands import _options, _terminal
 
 NAME = "calibrate-rotor"
-HELP = "learn a rotor's blade as built from a reference run"
+HELP = "learn a rotor's blade as built from a reference run of it"
 GROUP = "Recordings"
 EXAMPLE = "calibrate-rotor static.csv --case cases/prop_10x5 --out measured_10x5"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    run = "recordings of this very rotor without anything else that may differ: a clean stand or tunnel"
+    run = "recordings of this rotor on a clean stand or in a tunnel, with nothing else changed"
     parser.add_argument("reference", nargs="+", metavar="REFERENCE", help=run)
     parser.add_argument("--case", required=True, metavar="CASE", help="case of the rotor")
-    parser.add_argument("--out", metavar="DIR", help="write the case with the rotor as measured there")
+    parser.add_argument("--out", metavar="DIR", help="write the case of the rotor as measured to this folder")
     _options.add_json(parser, "bemt.rotor_calibration/1")
     _options.add_quiet(parser, "neither progress nor answer")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Condition, write, print; 1 when the point did not stand still."""
+    """Condition, write, print; 1 if the fit did not converge."""
     from bemt.base.tables import json_text
     from bemt.diagnose.rotor_calibration import calibrate, document, text, write
 

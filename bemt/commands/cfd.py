@@ -8,27 +8,27 @@ from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
 from bemt.commands import _options, _terminal
 
 NAME = "cfd"
-HELP = "run a campaign of OpenFOAM cases and record what comes out"
+HELP = "run a campaign of OpenFOAM cases and record the results"
 GROUP = "Solids and CFD"
 EXAMPLE = "cfd campaign.toml --ranks 4"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    plans = "campaign.toml or its folder; a folder of campaigns is summed up"
+    plans = "campaign.toml or its folder; for a folder of campaigns print a summary"
     parser.add_argument("campaign", metavar="CAMPAIGN", help=plans)
-    only = "run point N alone, even if it is recorded"
+    only = "run only point N, even if it is recorded"
     parser.add_argument("--only", type=_options.positive, metavar="N", help=only)
-    ranks = "processes of a run (default 2)"
+    ranks = "processes per run (default 2)"
     parser.add_argument("--ranks", type=_options.positive, default=2, metavar="N", help=ranks)
-    parser.add_argument("--work", metavar="DIR", help="folder of grids and runs (default: a temporary one)")
+    parser.add_argument("--work", metavar="DIR", help="folder for grids and runs (default: temporary)")
     parser.add_argument("--keep", action="store_true", help="keep the work folder")
-    _options.add_json(parser, "bemt.cfd-run/1; of a folder of campaigns bemt.cfd-summary/1")
+    _options.add_json(parser, "bemt.cfd-run/1; for a folder of campaigns bemt.cfd-summary/1")
     _options.add_quiet(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run what is not recorded yet, or sum a folder of campaigns up; 1 when a point did not converge."""
+    """Run what is not recorded yet, or summarise a folder of campaigns; 1 if a point did not converge."""
     from bemt.base.tables import json_text
     from bemt.cfd import campaign as campaigns
 

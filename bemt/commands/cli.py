@@ -26,12 +26,12 @@ __all__ = ["build_parser", "commands", "main"]
 
 EXIT_INTERRUPTED = 130
 GROUPS = ("Propellers and fans", "Recordings", "Drive", "Solids and CFD", "Models and checks")
-"""Groups of the help in their order; a group that is not named here comes after them."""
+"""Groups of the help in order; other groups come after them."""
 CODES = "Exit codes: 0 fine, 1 out of tolerance or unconverged, 2 usage or input, 3 internal."
 
 
 class _Once(argparse.Action):
-    """Option with one value: given again it is refused, for the last one would win without a word."""
+    """Option with one value; a second one is refused, because the last would silently win."""
 
     def __call__(
         self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any, option: str | None = None
@@ -44,7 +44,7 @@ class _Once(argparse.Action):
 
 
 class _Parser(argparse.ArgumentParser):
-    """Parser that takes options by their whole name, each once, and says what a mistyped one might have been."""
+    """Parser that takes full option names, each once, and suggests a correction for a typo."""
 
     def __init__(self, **more: Any) -> None:
         super().__init__(**{**more, "allow_abbrev": False})
@@ -80,7 +80,7 @@ class _Top(_Parser):
         return "\n".join([*lines, "", f"{self.prog} COMMAND --help lists the options. {CODES}", ""])
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Parse; an unknown option is answered by the command it was given to."""
+        """Parse; the command that got an unknown option answers."""
         known, extra = self.parse_known_args(args, namespace)
         if extra:
             parser = self.parsers.get(getattr(known, "command", None) or "", self)
@@ -114,13 +114,13 @@ def build_parser() -> argparse.ArgumentParser:
     >>> args.command, args.paths, args.jobs
     ('sweep', ['cases/'], 2)
     """
-    what = "Propeller and ducted-fan aerodynamics: BEMT beside the K1/K2 model, CFD and bench recordings."
+    what = "Propeller and ducted-fan aerodynamics: BEMT, compared with the K1/K2 model, CFD and bench recordings."
     parser = _Top(prog=called(), description=what)
     parser.add_argument("--version", action="version", version=f"bemt {__version__}")
     adder = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=_Parser)
     parser.found, parser.parsers = commands(), {}
     for name, module in parser.found.items():
-        # a percent sign in help is argparse's own
+        # percent signs in help belong to argparse
         one = adder.add_parser(
             name,
             help=module.HELP,
@@ -133,7 +133,7 @@ def build_parser() -> argparse.ArgumentParser:
 
 
 def _check_folders(args: argparse.Namespace) -> None:
-    """Refuse a file where a folder is wanted, before minutes of work end at it."""
+    """Refuse a file in place of a folder before the work starts, not after it."""
     faults = []
     for name in ("out", "work", "dir"):
         near = getattr(args, name, None) or "."
@@ -152,7 +152,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _main(argv: list[str]) -> int:
-    for stream in (sys.stdout, sys.stderr):  # a terminal that is not UTF-8 must not end a run
+    for stream in (sys.stdout, sys.stderr):  # a terminal without UTF-8 must not end a run
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
     parser = build_parser()
@@ -173,11 +173,11 @@ def _main(argv: list[str]) -> int:
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return EXIT_INTERRUPTED
-    except BrokenPipeError:  # the reader of our output has gone, as in `| head`
+    except BrokenPipeError:  # the reader of our output is gone, as in `| head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return EXIT_OK
     except Exception as error:
-        if isinstance(error, OSError) and error.strerror:  # the system's word; others come from libraries
+        if isinstance(error, OSError) and error.strerror:  # a system error; others come from libraries
             print(system_fault(error), file=sys.stderr)
             return EXIT_INPUT
         if isinstance(error, ImportError) and (error.name or "").partition(".")[0] == "geometry":

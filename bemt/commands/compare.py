@@ -20,18 +20,18 @@ EXAMPLE = "compare monday.csv tuesday.csv --case cases/prop_8x5"
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument("a", metavar="A", help="recording before, or without")
-    parser.add_argument("b", metavar="B", help="recording after, or with")
-    known = "the rotor: B is diagnosed with A as its reference (default: causes that scale like the ratios)"
+    parser.add_argument("a", metavar="A", help="first recording (before, or without the change)")
+    parser.add_argument("b", metavar="B", help="second recording (after, or with the change)")
+    known = "case of the rotor: diagnose B with A as its reference (default: causes that scale like the ratios)"
     parser.add_argument("--case", metavar="CASE", help=known)
-    parser.add_argument("--label", metavar="LABEL", help="label such as 10x5: the diameter, for the advance ratio")
-    rows = "rows of {} that are meant: column=text, column=number, column=low:high, rotor=left; repeatable"
+    parser.add_argument("--label", metavar="LABEL", help="label such as 10x5; gives the diameter for the advance ratio")
+    rows = "rows of {} to use: column=text, column=number, column=low:high, rotor=left; repeatable"
     parser.add_argument("--rows-a", metavar="CONDITION", help=rows.format("A"), **_options.REPEATABLE)
     parser.add_argument("--rows-b", metavar="CONDITION", help=rows.format("B"), **_options.REPEATABLE)
-    air = "air of {}, in place of what it records: 22C,1013hPa, or 22C alone, or 1.19kg/m3"
+    air = "air of {}, overrides the recording: 22C,1013hPa, or only 22C, or 1.19kg/m3"
     parser.add_argument("--air-a", metavar="AIR", help=air.format("A"))
     parser.add_argument("--air-b", metavar="AIR", help=air.format("B"))
-    parser.add_argument("--out", metavar="DIR", help="write comparison.json, its text and a picture there")
+    parser.add_argument("--out", metavar="DIR", help="write comparison.json, its text and a picture to this folder")
     parser.add_argument("--no-figures", action="store_true", help="with --out: no picture")
     parser.add_argument("--details", action="store_true", help="print ranking, sub-systems and all notes")
     _options.add_json(parser, "bemt.comparison/1")

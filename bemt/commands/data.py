@@ -8,7 +8,7 @@ from bemt.base.errors import EXIT_OK
 from bemt.commands import _options, _terminal
 
 NAME = "data"
-HELP = "fetch a public database of measured propellers into the cache"
+HELP = "download a public database of measured propellers into the cache"
 GROUP = "Recordings"
 EXAMPLE = "data uiuc"
 
@@ -16,15 +16,15 @@ EXAMPLE = "data uiuc"
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument("kind", choices=("uiuc",), help="uiuc: UIUC Propeller Database")
-    parser.add_argument("--from", dest="source", metavar="FILE.zip", help="take this archive instead of fetching it")
+    parser.add_argument("--from", dest="source", metavar="FILE.zip", help="use this archive instead of downloading it")
     parser.add_argument("--dir", metavar="DIR", help="folder for the data (default: the cache)")
-    parser.add_argument("--url", metavar="URL", help="fetch from this mirror instead of the publisher")
-    parser.add_argument("--refresh", action="store_true", help="fetch again what is there already")
+    parser.add_argument("--url", metavar="URL", help="download from this mirror instead of the publisher")
+    parser.add_argument("--refresh", action="store_true", help="download again even if the data are there")
     _options.add_json(parser, "bemt.data/1")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Fetch what is not there yet."""
+    """Download what is not there yet."""
     from bemt.base.tables import json_text
     from bemt.recordings import database
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from bemt.diagnose.suggest import Given
 
 NAME = "diagnose"
-HELP = "say what physics was left out when recording and simulation differ"
+HELP = "say which physics or stand fault explains why a recording differs from the model"
 GROUP = "Recordings"
 _CHANNELS = {"thrust": "thrust_N", "torque": "torque_Nm", "speed": "rpm"}
 EXAMPLE = "diagnose log.csv --case cases/prop_8x5"
@@ -23,25 +23,27 @@ EXAMPLE = "diagnose log.csv --case cases/prop_8x5"
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument("recordings", nargs="+", metavar="RECORDING", help="tables or logs, analysed together")
-    case = "case of all recordings, or one each"
+    case = "case of all recordings, or one per recording"
     parser.add_argument("--case", required=True, metavar="CASE", help=case, **_options.MANY)
-    off = "leave out of the baseline; repeatable"
+    off = "leave this effect out of the baseline; repeatable"
     parser.add_argument("--off", metavar="EFFECT", help=off, **_options.REPEATABLE)
-    known = "recordings without the cause: how far model and stand differ anyway"
+    known = "recordings without the cause; show how far model and stand differ anyway"
     parser.add_argument("--reference", default=[], metavar="RECORDING", help=known, **_options.MANY)
-    model = "model that is compared with the recordings (default bemt; k1k2: thrust only)"
+    model = "model to compare with the recordings (default bemt; k1k2: thrust only)"
     parser.add_argument("--baseline", choices=("bemt", "k1k2"), default="bemt", help=model)
-    only = "consider these effects only (default: all)"
+    only = "consider only these effects (default: all)"
     parser.add_argument("--only", metavar="EFFECT", help=only, **_options.MANY)
-    blade = "loads along the blade (radial.csv of a campaign) beside those of the first case"
+    blade = "blade loads (radial.csv of a campaign), compared with the first case"
     parser.add_argument("--along", metavar="FILE", help=blade)
-    seen = "look at these only (default: all that were measured)"
+    seen = "use only these channels (default: all that were measured)"
     parser.add_argument("--channels", choices=tuple(_CHANNELS), help=seen, **_options.MANY)
-    speed = "speed of files that have none, one for all or one each [rev/min]"
+    speed = "speed for files without one: one for all, or one per file [rev/min]"
     parser.add_argument("--rpm", type=float, default=[], metavar="N", help=speed, **_options.MANY)
-    wind = "airspeed of files that have none, one for all or one each [m/s] (default: the case's)"
+    wind = "airspeed for files without one: one for all, or one per file [m/s] (default: from the case)"
     parser.add_argument("--airspeed", type=float, default=[], metavar="V", help=wind, **_options.MANY)
-    parser.add_argument("--out", metavar="DIR", help="write diagnosis.json, figures and the improved cases there")
+    parser.add_argument(
+        "--out", metavar="DIR", help="write diagnosis.json, figures and the improved cases to this folder"
+    )
     parser.add_argument("--no-figures", action="store_true", help="with --out: no figures")
     _options.add_json(parser, "bemt.diagnosis/1")
     _options.add_quiet(parser, "neither progress nor answer")

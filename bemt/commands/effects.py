@@ -8,7 +8,7 @@ from bemt.base.errors import EXIT_OK
 from bemt.commands import _options
 
 NAME = "effects"
-HELP = "list every physical effect: parameters, ranges, sources, signs"
+HELP = "list every effect: parameters, ranges, sources, signature"
 GROUP = "Models and checks"
 EXAMPLE = "effects"
 
@@ -16,7 +16,7 @@ EXAMPLE = "effects"
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     style = parser.add_mutually_exclusive_group()
-    style.add_argument("--markdown", action="store_true", help="as the page docs/effects.md")
+    style.add_argument("--markdown", action="store_true", help="print the page docs/effects.md")
     _options.add_json(style, "bemt.effects/1")
 
 

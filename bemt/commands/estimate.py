@@ -8,25 +8,27 @@ from bemt.base.errors import EXIT_OK
 from bemt.commands import _options
 
 NAME = "estimate"
-HELP = "thrust and power from a label such as 10x5, with bands, beside K1/K2"
+HELP = "thrust and power from a label such as 10x5, with bands; K1/K2 for comparison"
 GROUP = "Propellers and fans"
 EXAMPLE = "estimate 10x5 --rpm 6000"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument("label", metavar="LABEL", help="diameter x pitch in inches, blades if not 2: 10x4.7, 8x5x3")
+    parser.add_argument("label", metavar="LABEL", help="diameter x pitch in inches, and blades if not 2: 10x4.7, 8x5x3")
     speed = {"type": float, **_options.MANY}
     parser.add_argument("--rpm", required=True, metavar="N", help="one or more [rev/min]", **speed)
     parser.add_argument("--airspeed", metavar="V", help="one or more (default 0) [m/s]", **speed)
-    blades = "number (default: of the label, else 2)"
+    blades = "number of blades (default: from the label, else 2)"
     parser.add_argument("--blades", type=_options.positive, metavar="B", help=blades)
-    parser.add_argument("--chord-mm", type=float, metavar="C", help="at 0.75 R: by far the best fourth number")
-    twist = "2 pi r tan(blade angle) at r = 0.75 R: the fifth"
+    parser.add_argument("--chord-mm", type=float, metavar="C", help="chord at 0.75 R; improves the estimate most")
+    twist = "measured pitch, 2 pi r tan(blade angle) at r = 0.75 R"
     parser.add_argument("--measured-pitch-in", type=float, metavar="P", help=twist)
-    parser.add_argument("--series", metavar="NAME", help='maker and series, as "APC Thin Electric" or apce')
-    parser.add_argument("--density", type=float, default=1.225, metavar="RHO", help="of the air [kg/m3]")
-    parser.add_argument("--ducted", action="store_true", help="flagged only: neither formula knows a duct")
+    parser.add_argument("--series", metavar="NAME", help='maker and series, such as "APC Thin Electric" or apce')
+    parser.add_argument(
+        "--density", type=float, default=1.225, metavar="RHO", help="air density [kg/m3] (default 1.225)"
+    )
+    parser.add_argument("--ducted", action="store_true", help="flag the result: neither formula models a duct")
     _options.add_json(parser, "bemt.estimate/1")
 
 

@@ -16,25 +16,29 @@ EXAMPLE = "export cases/prop_8x5 --out solids --format stl step"
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument("case", metavar="CASE", help="case file, its folder, or a folder of cases")
-    parser.add_argument("--out", required=True, metavar="DIR", help="folder of the files and manifest.json")
+    parser.add_argument("--out", required=True, metavar="DIR", help="folder for the files and manifest.json")
     from bemt.exports import target_ids
 
     kinds = target_ids()
     what = f"one or more (default stl): {', '.join(kinds)}"
     parser.add_argument("--format", choices=kinds, metavar="TARGET", help=what, **_options.MANY)
-    parser.add_argument("--unit", choices=("mm", "m"), default="mm", help="of the files; openfoam is always in m")
+    parser.add_argument(
+        "--unit", choices=("mm", "m"), default="mm", help="unit of the files (default mm; openfoam is always in m)"
+    )
     parser.add_argument("--fillet-mm", type=float, default=0.0, metavar="R", help="fillet of blade and hub (default 0)")
-    thin = "refuse blades that are thinner somewhere (default 0: none)"
+    thin = "refuse a blade that is thinner than this anywhere (default 0: no check)"
     parser.add_argument("--min-thickness-mm", type=float, default=0.0, metavar="T", help=thin)
-    top = "greatest speed of tables and fits, speed of a disk or of openfoam (default: the case's) [rev/min]"
+    top = "highest speed of tables and fits; speed of a disk or openfoam (default: from the case) [rev/min]"
     parser.add_argument("--rpm", type=float, metavar="N", help=top)
-    wind = "axial speed of disks, blades and openfoam (default: the case's) [m/s]"
+    wind = "axial speed of disks, blades and openfoam (default: from the case) [m/s]"
     parser.add_argument("--airspeed", type=float, metavar="V", help=wind)
     words = "torque, airspeed, windmill, reynolds, mach, density, rest, duct, sections"
-    held = f"refuse targets that cannot hold it: {words}"
+    held = f"refuse targets that cannot represent it: {words}"
     parser.add_argument("--hold", metavar="WHAT", help=held, **_options.MANY)
-    parser.add_argument("--sideslip-deg", type=float, default=0.0, metavar="A", help="openfoam: shaft to wind, 0 to 90")
-    grid = "openfoam: cells on the blade are R/2^(level+2), all others scale (default 6; 5 is quick)"
+    parser.add_argument(
+        "--sideslip-deg", type=float, default=0.0, metavar="A", help="openfoam: angle between shaft and wind, 0 to 90"
+    )
+    grid = "openfoam: cells on the blade are R/2^(level+2), all others scale (default 6; 5 is faster)"
     parser.add_argument("--level", type=float, default=6.0, help=grid)
     domain = "openfoam: free field, or a cylinder of the propeller's diameter"
     parser.add_argument("--domain", choices=("free", "pipe"), default="free", help=domain)
@@ -51,7 +55,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write every case that can be; 2 when one was refused."""
+    """Write every valid case; 2 if one was refused."""
     from bemt.base.tables import json_text
     from bemt.exports import folder
     from bemt.exports.openfoam.write import Run

@@ -8,26 +8,28 @@ from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
 from bemt.commands import _options
 
 NAME = "map"
-HELP = "bench recording to a map pulse width - thrust and its inverse"
+HELP = "fit a map from pulse width to thrust and its inverse to a bench recording"
 GROUP = "Drive"
 EXAMPLE = "map bench.csv --out map"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument("files", nargs="+", metavar="FILE", help="recordings of one drive, of one or more batteries")
-    parser.add_argument("--sign", type=int, choices=(1, -1), default=1, help="-1 turns the thrust round (default 1)")
-    rows = "rows of the tables (default 41)"
+    parser.add_argument("files", nargs="+", metavar="FILE", help="recordings of one drive, with one or more batteries")
+    parser.add_argument(
+        "--sign", type=int, choices=(1, -1), default=1, help="-1 reverses the sign of the thrust (default 1)"
+    )
+    rows = "number of table rows (default 41)"
     parser.add_argument("--nodes", type=_options.positive, default=41, metavar="N", help=rows)
-    parser.add_argument("--name", help="name of the files and of the C tables (default: the first recording's)")
+    parser.add_argument("--name", help="name of the files and of the C tables (default: that of the first recording)")
     parser.add_argument("--thrust", type=float, metavar="N", help="print the pulse width for this thrust [N]")
     parser.add_argument("--voltage", type=float, metavar="V", help="battery voltage for --thrust [V]")
-    parser.add_argument("--out", metavar="DIR", help="write CSV, JSON, a C header and a picture there")
+    parser.add_argument("--out", metavar="DIR", help="write CSV, JSON, a C header and a picture to this folder")
     _options.add_json(parser, "bemt.map/1")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Fit, write, print; 1 when the wanted thrust is more than the drive gives."""
+    """Fit, write, print; 1 if the drive cannot give the requested thrust."""
     from bemt.base.tables import json_text
     from bemt.drive import map_result
 

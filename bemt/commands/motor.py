@@ -8,21 +8,21 @@ from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
 from bemt.commands import _options
 
 NAME = "motor"
-HELP = "motor constant from data sheet, back-EMF and torque sensor, compared"
+HELP = "compare the motor constant from data sheet, back-EMF and torque sensor"
 GROUP = "Drive"
 EXAMPLE = "motor motor.toml"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument("file", nargs="?", metavar="FILE", help="motor.toml, or a folder that holds one")
-    made = "write generated trials (labelled so) and their motor.toml into DIR"
+    parser.add_argument("file", nargs="?", metavar="FILE", help="motor.toml or its folder")
+    made = "write generated trials (labelled as generated) and their motor.toml to DIR"
     parser.add_argument("--generate", metavar="DIR", help=made)
-    parser.add_argument("--seed", type=int, metavar="N", help="of --generate (default 0)")
-    plant = "with --generate: plant a systematic error, e.g. torque.shunt=1.04; repeatable"
+    parser.add_argument("--seed", type=int, metavar="N", help="with --generate: random seed (default 0)")
+    plant = "with --generate: add a systematic error, e.g. torque.shunt=1.04; repeatable"
     parser.add_argument("--plant", metavar="NAME=SIZE", help=plant, **_options.REPEATABLE)
-    parser.add_argument("--out", metavar="DIR", help="write JSON, trials as CSV and a box plot there")
-    _options.add_json(parser, "bemt.motor.result/1; with --generate alone bemt.motor.generated/1")
+    parser.add_argument("--out", metavar="DIR", help="write JSON, trials as CSV and a box plot to this folder")
+    _options.add_json(parser, "bemt.motor.result/1; with only --generate bemt.motor.generated/1")
 
 
 def run(args: argparse.Namespace) -> int:

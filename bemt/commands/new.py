@@ -9,32 +9,40 @@ from bemt.commands import _options
 from bemt.commands._terminal import called
 
 NAME = "new"
-HELP = "write a case folder from a label, stations, a scan or a fan's diameter"
+HELP = "write a case folder from a label, stations, a scan or the diameter of a fan"
 GROUP = "Propellers and fans"
 EXAMPLE = "new 10x5 --kv 1000 --cells 3"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    label = "diameter x pitch in inches, blades if not 2: 10x5, 8x4.5x3; with --fan the diameter alone: 70mm"
+    label = "diameter x pitch in inches, and blades if not 2: 10x5, 8x4.5x3; with --fan only the diameter: 70mm"
     parser.add_argument("label", nargs="?", metavar="LABEL", help=label)
-    table = "blade in a file: CSV r_over_R,chord_over_R,beta_deg (or r_mm,chord_mm); UIUC geometry; APC PE0"
-    solid = "blade in a scan or CAD model (STL, OBJ, STEP); LABEL then names the case"
+    table = "file with blade stations: CSV r_over_R,chord_over_R,beta_deg (or r_mm,chord_mm); UIUC geometry; APC PE0"
+    solid = "scan or CAD model of the blade (STL, OBJ, STEP); LABEL is then the name of the case"
     parser.add_argument("--scan", metavar="FILE", help=solid)
-    parser.add_argument("--unit", choices=("mm", "m", "in"), help="with --scan: of a file that does not state it")
+    parser.add_argument("--unit", choices=("mm", "m", "in"), help="with --scan: unit, if the file does not state it")
     parser.add_argument("--stations", metavar="FILE", help=table)
     parser.add_argument("--diameter-mm", type=float, metavar="D", help="with --stations: diameter [mm]")
     parser.add_argument("--fan", action="store_true", help="a ducted fan")
-    parser.add_argument("--blades", type=_options.positive, metavar="B", help="number (default: of the label, else 2)")
-    parser.add_argument("--rpm", type=float, metavar="N", help="operating point (default: a usual tip speed) [rev/min]")
-    parser.add_argument("--airspeed", type=float, default=0.0, metavar="V", help="operating point [m/s] (default 0)")
-    parser.add_argument("--kv", type=float, metavar="KV", help="motor: also write drive.toml [rev/min/V]")
-    parser.add_argument("--cells", type=_options.positive, metavar="S", help="LiPo cells in series, with --kv")
-    parser.add_argument("--out", metavar="DIR", help="folder (default: the label's name, here)")
+    parser.add_argument(
+        "--blades", type=_options.positive, metavar="B", help="number of blades (default: from the label, else 2)"
+    )
+    parser.add_argument(
+        "--rpm", type=float, metavar="N", help="speed of the operating point (default: a typical tip speed) [rev/min]"
+    )
+    parser.add_argument(
+        "--airspeed", type=float, default=0.0, metavar="V", help="airspeed of the operating point [m/s] (default 0)"
+    )
+    parser.add_argument(
+        "--kv", type=float, metavar="KV", help="speed constant of the motor; also writes drive.toml [rev/min/V]"
+    )
+    parser.add_argument("--cells", type=_options.positive, metavar="S", help="with --kv: LiPo cells in series")
+    parser.add_argument("--out", metavar="DIR", help="folder to write (default: named after the label)")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write the folder and say how to go on."""
+    """Write the folder and print the next command."""
     import shlex
 
     from bemt.drive import new_folder

@@ -8,7 +8,7 @@ from bemt.base.errors import EXIT_OK
 from bemt.commands import _options, _terminal
 
 NAME = "plan"
-HELP = "say which effects a test plan can see, before anyone measures"
+HELP = "say which effects a test plan can see, before you measure"
 GROUP = "Recordings"
 EXAMPLE = "plan --case cases/prop_8x5 --plan points.csv"
 
@@ -17,15 +17,15 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument("--case", required=True, metavar="CASE", help="case file or its folder")
     parser.add_argument("--plan", required=True, metavar="CSV", help="table of points: rpm, airspeed_m_s, time_s, ...")
-    off = "leave out of the baseline; repeatable"
+    off = "leave this effect out of the baseline; repeatable"
     parser.add_argument("--off", metavar="EFFECT", help=off, **_options.REPEATABLE)
-    parser.add_argument("--out", metavar="DIR", help="write plan.json there")
+    parser.add_argument("--out", metavar="DIR", help="write plan.json to this folder")
     _options.add_json(parser, "bemt.plan/1")
     _options.add_quiet(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Look ahead, print, write."""
+    """Predict, print, write."""
     from pathlib import Path
 
     from bemt.base.tables import json_text, write_atomic

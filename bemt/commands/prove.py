@@ -10,30 +10,30 @@ from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
 from bemt.commands import _options, _terminal
 
 NAME = "prove"
-HELP = "conceal causes, let the diagnosis find them, score it"
+HELP = "hide causes in recordings, diagnose them, score the answers"
 GROUP = "Models and checks"
 EXAMPLE = "prove --seed 1"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    size = "41 or 605 made cases (default small), 68 made by CCBlade (extra wisdem), published recordings as found"
+    size = "41 (small, default) or 605 generated items, 68 by CCBlade (extra wisdem), or published recordings"
     parser.add_argument("--size", choices=("small", "full", "ccblade", "real"), default="small", help=size)
-    seed = "of everything (default: from the operating system)"
+    seed = "random seed (default: from the operating system)"
     parser.add_argument("--seed", type=_options.seed, metavar="N", help=seed)
-    parser.add_argument("--out", metavar="DIR", help="keep items, key, answers and score there")
-    jobs = "diagnoses at a time (default: one per core)"
+    parser.add_argument("--out", metavar="DIR", help="keep items, key, answers and score in this folder")
+    jobs = "parallel diagnoses (default: one per core)"
     parser.add_argument("--jobs", type=_options.positive, metavar="N", help=jobs)
-    steps = "with --size real and --out: take the steps that silent answers recommend, where the data have them"
+    steps = "with --size real and --out: also take the steps that open answers recommend, if the data allow"
     parser.add_argument("--follow", action="store_true", help=steps)
-    kept = "folders of kept proofs, answered with the present factors on intervals: write new factors to --out instead"
+    kept = "folders of kept proofs made with the current interval factors: write new factors to --out instead"
     parser.add_argument("--calibrate-intervals", metavar="DIR", help=kept, **_options.MANY)
     _options.add_json(parser, "bemt.proof/1")
     _options.add_quiet(parser, "no tables")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Conceal, diagnose, score; 0 when every target is met, 1 when some are missed."""
+    """Hide, diagnose, score; 0 if every target is met, 1 if some are missed."""
     from bemt.base.tables import json_text
     from bemt.proof import follow, proof_text
     from bemt.proof.prove import prove

@@ -7,7 +7,7 @@ import argparse
 from bemt.commands import _options, _terminal
 
 NAME = "report"
-HELP = "write the validation report: one HTML file, and a summary"
+HELP = "write the validation report: one HTML file and a summary"
 GROUP = "Propellers and fans"
 EXAMPLE = "report cases/ --out reports"
 
@@ -15,13 +15,15 @@ EXAMPLE = "report cases/ --out reports"
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     _options.add_cases(parser)
-    parser.add_argument("--out", required=True, metavar="DIR", help="folder of the report and of the sweep behind it")
+    parser.add_argument("--out", required=True, metavar="DIR", help="folder for the report and its sweep")
     parser.add_argument(
-        "--title", metavar="TEXT", help="title (default: that of the only case, else Validation report)"
+        "--title", metavar="TEXT", help="title (default: that of the case if there is one, else Validation report)"
     )
-    parser.add_argument("--author", metavar="TEXT", help="who answers for it, shown under the title")
+    parser.add_argument("--author", metavar="TEXT", help="author, shown under the title")
     parser.add_argument("--date", metavar="TEXT", help="date under the title (default: today)")
-    parser.add_argument("--commit", metavar="TEXT", help="revision under the title (default: of the cases' checkout)")
+    parser.add_argument(
+        "--commit", metavar="TEXT", help="revision under the title (default: of the checkout with the cases)"
+    )
     _options.add_quiet(parser, "neither progress nor file names")
 
 

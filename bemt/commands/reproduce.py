@@ -8,7 +8,7 @@ from bemt.base.errors import EXIT_OK
 from bemt.commands import _options
 
 NAME = "reproduce"
-HELP = "print every number of the source thesis beside ours"
+HELP = "compare every number of the source thesis with ours"
 GROUP = "Models and checks"
 EXAMPLE = "reproduce"
 

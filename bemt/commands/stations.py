@@ -8,7 +8,7 @@ from bemt.base.errors import EXIT_OK
 from bemt.commands import _options
 
 NAME = "stations"
-HELP = "blades of a CAD model, a scan or a design tool's file: a case to solve"
+HELP = "turn the blade of a CAD model, scan or design file into a case"
 GROUP = "Solids and CFD"
 EXAMPLE = "stations rotor.stl --unit mm --out cases/mine"
 
@@ -16,8 +16,8 @@ EXAMPLE = "stations rotor.stl --unit mm --out cases/mine"
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument("file", metavar="FILE", help="STL, OBJ, STEP; XROTOR, QPROP, DFDC or an AeroDyn driver")
-    parser.add_argument("--unit", choices=("mm", "m", "in"), help="of an STL or OBJ that does not state it")
-    parser.add_argument("--out", metavar="DIR", help="write case.toml, stations.csv and section files there")
+    parser.add_argument("--unit", choices=("mm", "m", "in"), help="unit of an STL or OBJ that does not state it")
+    parser.add_argument("--out", metavar="DIR", help="write case.toml, stations.csv and section files to this folder")
     _options.add_json(parser, "bemt.stations/1")
 
 

@@ -9,7 +9,7 @@ from bemt.base.errors import EXIT_UNCONVERGED
 from bemt.commands import _options, _terminal
 
 NAME = "sweep"
-HELP = "solve cases and print them beside their recorded values"
+HELP = "solve cases and compare them with recorded values"
 GROUP = "Propellers and fans"
 EXAMPLE = "sweep cases/"
 
@@ -17,27 +17,29 @@ EXAMPLE = "sweep cases/"
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     _options.add_cases(parser)
-    parser.add_argument("--out", metavar="DIR", help="write tables, grids and sweep.json there, and resume from there")
+    parser.add_argument(
+        "--out", metavar="DIR", help="write tables, grids and sweep.json to this folder, and resume from it"
+    )
     parser.add_argument("--json", action="store_true", help="print one JSON document (bemt.sweep/1), no tables")
-    jobs = "solve N cases at a time in processes (default: one case, its grid on all cores); dask: N local workers"
+    jobs = "solve N cases in parallel (default: one case, its grid on all cores); with dask: N local workers"
     parser.add_argument("--jobs", type=_options.positive, metavar="N", help=jobs)
-    parser.add_argument("--details", action="store_true", help="print every case in full, not one screen")
+    parser.add_argument("--details", action="store_true", help="print every case in full instead of one screen")
     _options.add_quiet(parser)
-    strict = "exit 1 when a point is unconverged or BEMT is off a reference by more than --tolerance"
+    strict = "exit 1 if a point is unconverged or BEMT differs from a reference by more than --tolerance"
     parser.add_argument("--strict", action="store_true", help=strict)
-    tolerance = "tolerance of --strict on thrust, %% of the reference (default 15)"
+    tolerance = "thrust tolerance of --strict, %% of the reference (default 15)"
     parser.add_argument("--tolerance", type=_options.not_negative, default=15.0, metavar="PCT", help=tolerance)
     parser.add_argument("--no-resume", action="store_true", help="do not reuse results found in --out")
-    engine = "where grids are solved: this machine, or a Dask cluster (default local); the answer is the same"
+    engine = "where to solve grids: this machine or a Dask cluster (default local); the results are identical"
     parser.add_argument("--engine", choices=("local", "dask"), default="local", help=engine)
-    address = "with --engine dask: an existing cluster, as in tcp://host:8786 (default: processes of this machine)"
+    address = "with --engine dask: an existing cluster such as tcp://host:8786 (default: processes on this machine)"
     parser.add_argument("--scheduler", metavar="ADDRESS", help=address)
-    form = "csv with 7 digits (default), or parquet with all"
+    form = "csv with 7 digits (default), or parquet with full precision"
     parser.add_argument("--grid-format", choices=("csv", "parquet"), default="csv", help=form)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Solve, print, and with ``--strict`` hold BEMT against the recorded values."""
+    """Solve, print, and with ``--strict`` check BEMT against the recorded values."""
     from bemt.base.tables import json_text
     from bemt.compare.sweep.batch import off_tolerance, sweep
     from bemt.compare.sweep.summary import summary

@@ -8,22 +8,24 @@ from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
 from bemt.commands import _options
 
 NAME = "thrusters"
-HELP = "share force and roll moment among thrusters on a body"
+HELP = "allocate force and roll moment to the thrusters of a vehicle"
 GROUP = "Drive"
 EXAMPLE = "thrusters thrusters.toml --force 40"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument("file", metavar="FILE", help="thrusters.toml, or a folder that holds one")
-    parser.add_argument("--force", type=float, metavar="N", help="wanted force (default: the file's) [N]")
-    parser.add_argument("--moment", type=float, metavar="NM", help="wanted roll moment (default: the file's) [N m]")
-    parser.add_argument("--out", metavar="DIR", help="write JSON, CSV and a picture there")
+    parser.add_argument("file", metavar="FILE", help="thrusters.toml or its folder")
+    parser.add_argument("--force", type=float, metavar="N", help="requested force (default: from the file) [N]")
+    parser.add_argument(
+        "--moment", type=float, metavar="NM", help="requested roll moment (default: from the file) [N m]"
+    )
+    parser.add_argument("--out", metavar="DIR", help="write JSON, CSV and a picture to this folder")
     _options.add_json(parser, "bemt.thrusters.result/1")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Allocate, write, print; 1 when the command is beyond the thrusters."""
+    """Allocate, write, print; 1 if the command is beyond the thrusters."""
     from bemt.base.tables import json_text
     from bemt.drive import thrusters_result
 

@@ -8,7 +8,7 @@ from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
 from bemt.commands import _options, _terminal
 
 NAME = "validate"
-HELP = "compare with a folder of measured propellers (UIUC layout)"
+HELP = "compare BEMT with a folder of measured propellers (UIUC layout)"
 GROUP = "Models and checks"
 EXAMPLE = "validate uiuc"
 
@@ -27,22 +27,22 @@ def reynolds(text: str) -> float:
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    found = "folder with geometry, static and J files, or uiuc for the data found"
+    found = "folder with geometry, static and J files, or uiuc for the installed data"
     parser.add_argument("dir", metavar="DIR", help=found)
     _options.add_json(parser, "bemt.validation/1")
     parser.add_argument("--polar", type=reynolds, metavar="fixed:RE", help="section tables at one Reynolds number")
     parser.add_argument("--off", metavar="EFFECT", help="switch an effect off; repeatable", **_options.REPEATABLE)
-    turned = "also with each blade turned to the measured zero-thrust J: an experiment that uses the measurement"
+    turned = "also turn each blade to the measured zero-thrust J (an experiment that uses the measurement)"
     parser.add_argument("--match-J0", action="store_true", help=turned)
-    drawn = "solver on the stations as given, without the population of rotors as built"
+    drawn = "use the stations as given, without the population of rotors as built"
     parser.add_argument("--as-drawn", action="store_true", help=drawn)
-    fitted = "fit the population of rotors as built to the folder and write it"
+    fitted = "fit the population of rotors as built to the folder and write it to FILE"
     parser.add_argument("--fit-population", metavar="FILE", help=fitted)
-    left = "predict each family by a population fitted without it"
+    left = "predict each family with a population fitted without it"
     parser.add_argument("--leave-family-out", action="store_true", help=left)
-    beside = "run another solver on the same propellers, paired: ccblade"
+    beside = "run another solver (ccblade) on the same propellers for a paired comparison"
     parser.add_argument("--peer", metavar="NAME", help=beside)
-    parser.add_argument("--out", metavar="DIR", help="write the tables there as well")
+    parser.add_argument("--out", metavar="DIR", help="also write the tables to this folder")
 
 
 def run(args: argparse.Namespace) -> int:

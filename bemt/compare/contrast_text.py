@@ -60,7 +60,7 @@ def text(doc: Mapping[str, Any], details: bool = False) -> str:
         rows.append([_WORD.get(channel, channel), f"{raw:.4f}", *_ends(r, r["density_ratio"]), *more])
         if abs(r["density_ratio"] - 1.0) > 1e-6:
             coefficient = "CT" if channel == "thrust_N" else "CP"
-            rows.append([f"  {coefficient} (density taken out)", f"{r['ratio']:.4f}", *_ends(r), "", "", ""])
+            rows.append([f"  {coefficient} (corrected for density)", f"{r['ratio']:.4f}", *_ends(r), "", "", ""])
     header = ["B over A", "ratio", "68 %", "95 %", "change per doubling of n", "scatter", "points"]
     lines += ["", text_table(header, rows, left=(0,), indent="  ")]
     if details:
@@ -72,7 +72,7 @@ def text(doc: Mapping[str, Any], details: bool = False) -> str:
 
 
 _FAMILY_WORD = {
-    "blade": "another blade, pitch or diameter", "surroundings": "what stands around the rotor",
+    "blade": "another blade, pitch or diameter", "surroundings": "the surroundings of the rotor",
     "airspeed": "the airspeed", "load cell": "a load cell", "drive": "the drive", "air_density": "the density",
     "rpm_scale": "the speed reading", "unit_slip": "a unit",
 }  # fmt: skip
@@ -87,9 +87,9 @@ def headline(doc: Mapping[str, Any]) -> str:
     by_kind = {r["kind"]: f"{_WORD[c]} {_share(r['ratio'] * r['density_ratio'])}" for c, r in doc["ratios"].items()}
     moved = " and ".join([by_kind[k] for k in kinds if k in by_kind][:2])
     if verdict == "none":
-        return f"Nothing changed beyond what two set-ups differ by ({moved or 'drive alone'})."
+        return f"No change beyond the difference between two set-ups ({moved or 'drive only'})."
     if verdict == "unknown":
-        return f"Something changed ({moved}) that none of the listed causes makes."
+        return f"Something changed ({moved}), and no listed cause explains it."
     if verdict == "insufficient":
         return f"These recordings cannot say what changed ({moved})."
     titles: dict[str, list[str]] = {FAMILY.get(k, k): [] for k in effects}
@@ -122,15 +122,15 @@ def _said(doc: Mapping[str, Any]) -> list[str]:
     first = next((r for r in doc["ratios"].values() if r["kind"] in ("thrust", "torque")), None)
     out = []
     if first is not None:
-        where = "carried over to one speed" if first["extrapolated"] else _range(first)
+        where = "extrapolated to one speed" if first["extrapolated"] else _range(first)
         out.append(f"B against A at equal speed, {where}: {', '.join(words)}; 95 % in brackets.")
         grows = [_WORD[c] for c, r in doc["ratios"].items() if r["kind"] in ("thrust", "torque") and r["depends_on"]]
         if grows:
-            out.append(f"The ratio of {' and '.join(grows)} changes with speed or advance.")
+            out.append(f"The ratio of {' and '.join(grows)} changes with speed or advance ratio.")
     density = doc["density"]["ratio"]
     if density and abs(density - 1.0) > 0.003:
         a, b = doc["density"]["A"], doc["density"]["B"]
-        ends = f"Recorded density: {a:.4g} to {b:.4g} kg/m3" if a and b else "Density by the recorded temperatures"
+        ends = f"Recorded density: {a:.4g} to {b:.4g} kg/m3" if a and b else "Density from the recorded temperatures"
         out.append(f"{ends} ({density - 1:+.1%}).")
     out += (
         [_verdict(doc)] if "diagnosis" not in doc else [f"The case {doc['case']}, with A as reference:", *doc["told"]]
@@ -139,7 +139,7 @@ def _said(doc: Mapping[str, Any]) -> list[str]:
     if drive and drive["effects"] and drive["effects"] != doc["effects"]:
         out.append(f"Drive: {drive['verdict']}: {', '.join(_title(k) for k in drive['effects'])}.")
     elif drive and doc["verdict"] != "none" and drive["verdict"] == "none":
-        out.append("Drive: nothing beyond scatter.")
+        out.append("Drive: no change beyond scatter.")
     step = doc.get("next_measurement") or {}
     if step.get("text"):
         out.append(f"Next: {step['text']}.")
@@ -154,14 +154,14 @@ def _verdict(doc: Mapping[str, Any]) -> str:
     p = doc.get("probability")
     sure = f" ({p:.2f})" if p else ""
     if doc["verdict"] == "none":
-        return f"Nothing changed: {doc['rule']}."
+        return f"No change: {doc['rule']}."
     if doc["verdict"] in ("named", "sensor"):
         lead = "The stand" if doc["verdict"] == "sensor" else "What changed"
         return f"{lead}: {names[0]}{sure}: {doc['rule']}."
     if doc["verdict"] == "class":
-        return f"One of these, which scale alike here{sure}: {', '.join(names)}."
+        return f"One of these, which scale in the same way here{sure}: {', '.join(names)}."
     if doc["verdict"] == "unknown":
-        return f"Something else: {doc['rule']}."
+        return f"Unknown: {doc['rule']}."
     first = [r["effect"] for r in doc["ranking"] if r["effect"] not in ("none", "unknown")][:4]
     if doc["rule"] == OTHER_STAND:  # no cause of the list is meant
         first = []

@@ -110,5 +110,5 @@ def text(doc: dict[str, Any]) -> str:
     notes = [f"do not trust: {flag}" for flag in words]
     more = [f"--{key.replace('_', '-')}" for key in ("chord_mm", "measured_pitch_in") if doc["given"][key] is None]
     if more:
-        notes.append(f"narrower bands with {' and '.join(more)}, both at 0.75 R")
+        notes.append(f"for narrower bands give {' and '.join(more)} (at 0.75 R)")
     return "\n".join([text_table(head, table, left=()), *notes]) + "\n"

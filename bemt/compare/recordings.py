@@ -43,7 +43,7 @@ _TOLD = ("density as recorded", "by the thermometers", "voltage as recorded")
 _MOVED, _WIDE = 2.5, 1.4
 # Thrust of a propeller of 2.3 times the diameter at one speed: no stand takes both. [1]
 _FAR_OFF = 30.0
-OTHER_STAND = "no change on one stand moves every load by so much: look at the units and the speeds of both files"
+OTHER_STAND = "no change on one stand moves every load by this much: check units and speeds of both files"
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +125,9 @@ def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> RunChange
         motor = judge(*weigh(drive, (behind.free, behind.steady), ("drive",)))
         found = replace(found, drive=_with_voltage(motor, ratios))
     elif drive:
-        found = replace(found, drive=replace(_NO_TALK, why="the load changed or may have, and the drive follows it"))
+        found = replace(
+            found, drive=replace(_NO_TALK, why="the load changed or may have changed, and the drive follows it")
+        )
     return found
 
 
@@ -153,7 +155,7 @@ def _by_proxy(said: Judgement, loads: Mapping[str, MatchedChannel]) -> Judgement
     if said.verdict != "unknown" or "torque" not in loads or loads["torque"].channel != "electrical_power_W":
         return said
     return replace(
-        said, verdict="insufficient", why="electrical power stands for torque, and the losses of the motor are in it"
+        said, verdict="insufficient", why="electrical power replaces torque and includes the losses of the motor"
     )
 
 
@@ -164,7 +166,7 @@ def _far_apart(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> Judg
     if not loads or not wide or said.effects == ("rpm_scale",):
         return said
     return Judgement(
-        "insufficient", (), said.probability, said.size, "the two runs have no speed and advance in common"
+        "insufficient", (), said.probability, said.size, "the two runs have no common speed and advance ratio"
     )
 
 
@@ -233,9 +235,11 @@ def _assumed(a: StandRun, b: StandRun, diameter: float, loads: Mapping[str, Matc
     if still:
         out.append(f"airspeed is not recorded in {' and '.join(still)}: taken as still air")
     if "torque" not in loads and "thrust" in loads:
-        out.append("torque is not recorded in both: gain, air and blade scale alike in thrust alone")
+        out.append("torque is not recorded in both: gain, air and blade scale alike in thrust")
     if "torque" in loads and loads["torque"].channel == "electrical_power_W":
-        out.append("torque is not recorded: electrical power stands for it, with one motor and controller in both")
+        out.append(
+            "torque is not recorded: electrical power replaces it, assuming the same motor and controller in both"
+        )
     told = all("J" in r.points for r in (a, b))
     if not told and not math.isfinite(diameter) and any(c.advance_moves() for c in loads.values()):
         out.append("no diameter: compared at equal advance per turn, V/n; --label 10x5 gives J")
@@ -245,16 +249,16 @@ def _assumed(a: StandRun, b: StandRun, diameter: float, loads: Mapping[str, Matc
 def _notes(a: StandRun, b: StandRun, channels: Mapping[str, MatchedChannel], strays: Mapping[str, int]) -> list[str]:
     out = [note for c in channels.values() for note in c.notes]
     out += [
-        f"{n} reading{'s' if n > 1 else ''} of {channels[k].channel} far from all others left out"
+        f"{n} reading{'s' if n > 1 else ''} of {channels[k].channel} far from all others dropped"
         for k, n in strays.items()
     ]
     for c in channels.values():
         low, high = c.common()
         if low > high and c.name in fits.LOADS:
             gap = math.exp(low - high) - 1.0
-            out.append(f"{c.channel}: no speed that both have, {gap:.0%} apart; carried over by the law of the speed")
+            out.append(f"{c.channel}: no common speed, {gap:.0%} apart; extrapolated by the law of the speed")
     if a.command and b.command and a.command != b.command:
-        out.append(f"commands differ in kind ({a.command}, {b.command}): the drive is not compared")
+        out.append(f"different types of command ({a.command}, {b.command}): the drive is not compared")
     return list(dict.fromkeys([*out, *(f"A: {n}" for n in a.points.notes), *(f"B: {n}" for n in b.points.notes)]))
 
 
@@ -266,7 +270,7 @@ def next_step(change: RunChange, files: Sequence[str]) -> dict[str, str]:
     rows = [row for k in said.effects if (row := law(k)) is not None]
     loads = [r for r in change.ratios.values() if r["kind"] in fits.LOADS]
     if said.verdict == "none":
-        text = "to see smaller changes, repeat each run once after taking the propeller off"
+        text = "to see smaller changes, remove the propeller, mount it again and repeat each run once"
         return {"text": text, "command": ""}
     if said.why.startswith(_TOLD):
         return {"text": "", "command": ""}
@@ -291,7 +295,7 @@ def next_step(change: RunChange, files: Sequence[str]) -> dict[str, str]:
         firsts = {FAMILY.get(row.id, row.id): row.settles for row in reversed(rows)}
         text = "; or ".join(reversed(firsts.values()))
         return {"text": text, "command": f"{ask} {a} {b} --case CASE"}
-    text = "repeat the run of A and compare it with A: what they differ by is no cause"
+    text = "repeat the run of A and compare it with A; their difference is not a cause"
     return {"text": text, "command": f"{ask} {a} A_AGAIN.csv"}
 
 

@@ -332,9 +332,9 @@ def judge(probability: Mapping[str, float], size: Mapping[str, tuple[float, floa
     listed = {k: p for k, p in probability.items() if k not in _PRIOR}
     mass, unknown = sum(listed.values()), probability[UNKNOWN]
     if unknown > 0.5:
-        return answer("unknown", (), f"no listed cause moves these channels like that ({unknown:.2f})")
+        return answer("unknown", (), f"no listed cause changes these channels like that ({unknown:.2f})")
     if not listed or mass <= 0.5:
-        return answer("insufficient", (), "the change is too small to be told from none")
+        return answer("insufficient", (), "the change is too small to be distinguished from none")
     best = max(listed.values())
     credible = [k for k, p in sorted(listed.items(), key=lambda kv: -kv[1]) if p >= best / NEAR]
     first = credible[0]
@@ -350,14 +350,14 @@ def judge(probability: Mapping[str, float], size: Mapping[str, tuple[float, floa
     families = {FAMILY.get(k, k) for k in credible}
     few = len(credible) <= MOST or len(families) <= FAMILIES
     if len(credible) > 1 and few and unknown <= DOUBT and probability[NONE] <= RIVAL:
-        return answer("class", credible, f"these scale alike ({mass:.2f})")
+        return answer("class", credible, f"these scale in the same way ({mass:.2f})")
     if len(credible) == 1 and listed[first] < SURE:
         return answer("insufficient", (), f"{first} is likely ({listed[first]:.2f}) but not sure")
     if len(credible) == 1:
-        return answer("insufficient", (), f"{first} ({listed[first]:.2f}) leads, but unknown keeps {unknown:.2f}")
+        return answer("insufficient", (), f"{first} ({listed[first]:.2f}) fits best, but unknown has {unknown:.2f}")
     why = f"{len(credible)} causes scale like that in these channels"
     if probability[NONE] > RIVAL:
         why = f"it is hardly beyond scatter and set-up ({probability[NONE]:.2f} for none), and {why}"
     elif few:
-        why = f"something that is not listed may have made it ({unknown:.2f}), and {why}"
+        why = f"a cause that is not listed may have caused it ({unknown:.2f}), and {why}"
     return answer("insufficient", (), why)

@@ -38,7 +38,7 @@ class ScalingLaw:
     # voltage ratio at equal command, or 1 where it is not recorded.
     terms: tuple[Term, ...]
     says: str  # Why this cause, in a sentence
-    settles: str  # Measurement that tells it from others
+    settles: str  # Measurement that distinguishes it from others
     source: str  # Of the scaling
     kind: str = "air"  # air, stand or drive
     sizes: tuple[float, ...] = _SIZES  # Standard deviations of the first term, share; they share the prior [1]
@@ -50,7 +50,7 @@ _T, _Q = "thrust", "torque"
 LAWS: tuple[ScalingLaw, ...] = (
     ScalingLaw(
         "air_density",
-        "density of the air",
+        "air density",
         ((1.0, {_T: {"all": 1.0}, _Q: {"all": 1.0}}),),
         "thrust and torque change by the same share at every speed",
         "read barometer and thermometer in both runs",
@@ -60,9 +60,9 @@ LAWS: tuple[ScalingLaw, ...] = (
     ),
     ScalingLaw(
         "rpm_scale",
-        "speed of rotation other than indicated",
+        "wrong speed of rotation",
         ((1.0, {_T: {"all": 2.0, "slope": -1.0}, _Q: {"all": 2.0, "slope": -1.0}}),),
-        "thrust and torque change by the same square, whatever the speed",
+        "thrust and torque change by the same square at any speed",
         "check the speed with an optical tachometer",
         "T and Q go with n^2 at fixed CT, CQ; J with 1/n",
         "stand",
@@ -70,7 +70,7 @@ LAWS: tuple[ScalingLaw, ...] = (
     ),
     ScalingLaw(
         "diameter",
-        "another diameter, or a cut tip",
+        "different diameter or cut tip",
         (
             (1.0, {_T: {"all": 4.0, "slope": -1.0}, _Q: {"all": 5.0, "slope": -1.0}}),
             (0.5, {_T: {"all": 1.0}}),
@@ -83,22 +83,22 @@ LAWS: tuple[ScalingLaw, ...] = (
     ),
     ScalingLaw(
         "pitch_offset",
-        "another pitch or blade angle",
+        "different pitch or blade angle",
         (
             (1.0, {_T: {"all": 1.0, "slope": -1.0}, _Q: {"all": 1.5, "slope": -1.0}}),
             (0.8, {_Q: {"all": 1.0}}),
             (0.15, {_T: {"slope": 1.0}, _Q: {"slope": 1.0}}),
         ),
-        "torque changes more than thrust, at every speed, and the advance ratio of zero thrust moves",
+        "torque changes more than thrust at every speed, and the advance ratio of zero thrust shifts",
         "measure the blade angle; record a run with airspeed",
         "momentum theory: P ~ T^1.5 at equal figure of merit; blades near stall add torque and no thrust",
         sizes=(*_SIZES, 0.5),
     ),
     ScalingLaw(
         "section",
-        "another blade section or surface",
+        "different blade section or surface",
         ((1.0, {_T: {"all": 0.5}}), (1.0, {_Q: {"all": 1.0}})),
-        "torque and thrust change by constant shares of their own",
+        "torque and thrust change by different constant shares",
         "compare the blades by weight and shape",
         "lift and drag of the section move CT and CP apart",
     ),
@@ -112,14 +112,14 @@ LAWS: tuple[ScalingLaw, ...] = (
             (0.15, {_Q: {"n2": 1.0}}),
             (0.5, {_T: {"slope": 1.0}, _Q: {"slope": 1.0}}),
         ),
-        "both loads change by large shares of their own: pitch, blades, chord and section at once",
+        "both loads change by large, different shares: pitch, blades, chord and section at once",
         "compare label, blade count and weight",
         "CT and CP of another blade",
         sizes=(0.07, 0.2, 0.6, 1.5),
     ),
     ScalingLaw(
         "untwist",
-        "elastic twist of the blades",
+        "elastic blade twist",
         ((1.0, {_T: {"n2": 1.0}, _Q: {"n2": 1.3}}),),
         "the change grows with the square of the speed",
         "run a stiffer blade of the same shape",
@@ -128,17 +128,17 @@ LAWS: tuple[ScalingLaw, ...] = (
     ),
     ScalingLaw(
         "duct",
-        "a duct, or none",
+        "duct added or removed",
         ((1.0, {_T: {"still": 1.0}, _Q: {"still": -0.7}}), (0.7, {_Q: {"still": 1.0}})),
-        "thrust rises at the same speed while torque falls or stays, fading with airspeed",
-        "weigh rotor and duct apart",
+        "thrust rises at the same speed while torque falls or stays the same; fades with airspeed",
+        "weigh rotor and duct separately",
         "momentum theory of the ducted fan: T/T_rotor = 2 sigma at rest",
     ),
     ScalingLaw(
         "ground_effect",
-        "a wall behind or before the propeller",
+        "wall behind or in front of the propeller",
         ((1.0, {_T: {"still": 1.0}}), (0.2, {_Q: {"still": 1.0}})),
-        "thrust changes at the same speed while torque stays, fading with airspeed",
+        "thrust changes at the same speed while torque stays the same; fades with airspeed",
         "measure at twice the distance",
         "Cheeseman and Bennett, ARC R&M 3021, 1955",
         sizes=_WALLS,
@@ -147,25 +147,25 @@ LAWS: tuple[ScalingLaw, ...] = (
         "coaxial_neighbour",
         "slipstream of another rotor",
         ((1.0, {_T: {"all": -1.0}, _Q: {"all": -0.3}}), (0.35, {_Q: {"all": 1.0}}), (0.3, {_T: {"n2": 1.0}})),
-        "thrust falls at the same speed and torque far less",
+        "thrust falls at the same speed, torque much less",
         "run the rotor alone",
-        "a rotor in a slipstream climbs: thrust falls, power hardly",
+        "a rotor in a slipstream works as in climb: thrust falls, power hardly",
         sizes=(*_SIZES, 0.5),
     ),
     ScalingLaw(
         "recirculation",
-        "slipstream that returns through the room",
+        "recirculation in the room",
         ((1.0, {_T: {"still": -1.0}, _Q: {"still": -0.2}}), (0.3, {_Q: {"still": 1.0}})),
         "thrust falls at low advance ratio, torque less",
         "run in the open, or watch the first seconds of a start",
-        "onset flow lowers the angle of attack as a climb does",
+        "onset flow lowers the angle of attack, as in climb",
         sizes=(0.02, 0.07),
     ),
     ScalingLaw(
         "airspeed_offset",
-        "airspeed other than recorded",
+        "airspeed offset",
         ((1.0, {_T: {"slip": 1.0}, _Q: {"slip": 1.0}}),),
-        "both loads move as if J were another, most at low airspeed",
+        "both loads move as at another J, most at low airspeed",
         "use a second pitot tube",
         "J = V/(n D)",
         "stand",
@@ -173,9 +173,9 @@ LAWS: tuple[ScalingLaw, ...] = (
     ),
     ScalingLaw(
         "airspeed_gain",
-        "airspeed by another factor",
+        "gain error of the airspeed sensor",
         ((1.0, {_T: {"slope": 1.0}, _Q: {"slope": 1.0}}),),
-        "both loads move as if J were another by one factor",
+        "both loads move as if J were scaled by one factor",
         "use a second pitot tube",
         "J = V/(n D)",
         "stand",
@@ -183,17 +183,17 @@ LAWS: tuple[ScalingLaw, ...] = (
     ),
     ScalingLaw(
         "nacelle",
-        "drag of what hangs in the stream",
+        "drag of parts in the stream",
         ((1.0, {_T: {"drag": 1.0}}),),
-        "thrust changes with V^2, whatever the speed, torque stays",
-        "run the stand without propeller in the stream",
+        "thrust changes with V^2 at any speed, torque stays the same",
+        "run the stand in the stream without propeller",
         "D = q S CD",
         flow=True,
         sizes=_ZEROS,
     ),
     ScalingLaw(
         "thrust_gain",
-        "calibration of the thrust cell",
+        "gain of the thrust cell",
         ((1.0, {_T: {"all": 1.0}}),),
         "thrust changes by one factor and torque does not",
         "hang dead weights on the cell",
@@ -203,7 +203,7 @@ LAWS: tuple[ScalingLaw, ...] = (
     ),
     ScalingLaw(
         "torque_gain",
-        "calibration of the torque cell",
+        "gain of the torque cell",
         ((1.0, {_Q: {"all": 1.0}}),),
         "torque changes by one factor and thrust does not",
         "hang a known lever and weight",
@@ -213,7 +213,7 @@ LAWS: tuple[ScalingLaw, ...] = (
     ),
     ScalingLaw(
         "thrust_zero",
-        "zero of the thrust cell",
+        "zero offset of the thrust cell",
         ((1.0, {_T: {"zero": 1.0}}),),
         "thrust is off by a constant, which falls as 1/n^2",
         "note the zero before and after the run",
@@ -223,7 +223,7 @@ LAWS: tuple[ScalingLaw, ...] = (
     ),
     ScalingLaw(
         "torque_zero",
-        "zero of the torque cell",
+        "zero offset of the torque cell",
         ((1.0, {_Q: {"zero": 1.0}}),),
         "torque is off by a constant, which falls as 1/n^2",
         "note the zero before and after the run",
@@ -235,7 +235,7 @@ LAWS: tuple[ScalingLaw, ...] = (
         "battery_sag",
         "supply or battery voltage",
         ((1.0, {"speed": {"volts": 1.0}}), (0.5, {"electrical": {"volts": 1.0}})),
-        "speed at one command goes with the voltage; loads at the measured speed stay",
+        "speed at one command follows the voltage; loads at the measured speed are unchanged",
         "log voltage at the controller",
         "n ~ command x V less I R",
         "drive",
@@ -243,7 +243,7 @@ LAWS: tuple[ScalingLaw, ...] = (
     ),
     ScalingLaw(
         "motor_heating",
-        "winding and magnets of the motor get warm",
+        "motor heating (winding and magnets)",
         ((1.0, {"speed": {"all": -0.5}, "electrical": {"all": 1.0}}), (0.4, {"electrical": {"all": 1.0}})),
         "more electrical power for the same speed and load, and less speed at one command",
         "repeat after a pause",
@@ -253,14 +253,14 @@ LAWS: tuple[ScalingLaw, ...] = (
     ),
     ScalingLaw(
         "motor",
-        "another motor, controller or setting",
+        "different motor, controller or setting",
         (
             (1.0, {"speed": {"all": 1.0}}),
             (1.0, {"electrical": {"all": 1.0}}),
             (0.5, {"speed": {"ramp": 1.0}}),
             (0.5, {"electrical": {"ramp": 1.0}}),
         ),
-        "speed at one command and electrical power change, loads at the measured speed stay",
+        "speed at one command and electrical power change, loads at the measured speed are unchanged",
         "compare motor, controller and its settings",
         "shares of their own",
         "drive",

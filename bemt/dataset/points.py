@@ -1,12 +1,12 @@
-"""Dataset: the one currency in which BEMT, K1/K2, CFD, bench and vendor numbers meet.
+"""Dataset: the common format of BEMT, K1/K2, CFD, bench and vendor numbers.
 
 A dataset holds N points as named channels. A channel name ends in its SI unit (``thrust_N``, ``airspeed_m_s``), except
 for ``rpm`` [rev/min] and dimensionless channels (``CT``, ``CP``, ``CQ``, ``J``, ``eta``, ...). Coefficients are in the
 PROPELLER convention: CT = T/(rho n^2 D^4), CQ = Q/(rho n^2 D^5), CP = P/(rho n^3 D^5) = 2 pi CQ, J = V/(n D), n in
 rev/s; :meth:`Dataset.from_rotor_convention` takes the helicopter convention. Torque and power are those of the shaft.
 
-Standard uncertainties (one sigma) go with each channel; NaN means unknown, which is not zero. Where their origin is
-known they are split by :data:`ORIGINS`, and the total is the root of the sum of squares.
+Each channel can have a standard uncertainty (one sigma); NaN means unknown, which is not zero. If the origin is known,
+it is split by :data:`ORIGINS`, and the total is the root sum square.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _KIND = re.compile(r"[a-z][a-z0-9_]*")
 
 
 def _still(array: NDArray[Any]) -> bool:
-    """Whether nobody can write to an array, nor to what it is a view of."""
+    """Whether an array and everything it is a view of are read-only."""
     part = array.base
     while part is not None:
         if not isinstance(part, np.ndarray) or part.flags.writeable:
@@ -48,7 +48,7 @@ def _still(array: NDArray[Any]) -> bool:
 
 
 def _frozen(array: ArrayLike) -> Array:
-    """Read-only array; one that nobody can write to is shared, since a log may have millions of rows."""
+    """Read-only array; an array that is already read-only is shared, because a log may have millions of rows."""
     if isinstance(array, np.ndarray) and array.dtype == np.float64 and _still(array):
         return array
     out = np.array(array, dtype=float)
@@ -70,26 +70,26 @@ class Dataset:
     name : str
         What was measured or computed.
     values : mapping of str to (N,) array
-        Channels; at least one. NaN marks a value that does not exist (unconverged, not recorded).
+        Channels; at least one. NaN marks a missing value (unconverged, not recorded).
     u : mapping of str to (N,) array or float
         Standard uncertainty by channel, in its unit; absent or NaN: unknown.
     flags : tuple of tuple of str
-        Per point; empty: no flags.
+        Flags per point; empty: no flags.
     provenance : mapping
-        ``source``, ``file``, ``sha256``, ``remark`` and more, as far as known.
+        ``source``, ``file``, ``sha256``, ``remark`` and others, if known.
     labels : tuple of str
-        Per point, where it comes from (``file:row``); empty: none.
+        Source of each point (``file:row``); empty: none.
     u_by : mapping of str to mapping of str to (N,) array or float
         Parts of ``u`` by origin (:data:`ORIGINS`), then channel, in its unit. Channels without an entry in ``u`` get
-        the root of the sum of squares of their parts.
+        the root sum square of their parts.
     notes : tuple of str
         What was assumed, dropped or averaged.
     units : mapping of str to str
-        Unit of channels whose name does not end in it, as a file has them; "": not known.
+        Unit of channels whose name does not end in a unit, as in the file; "": unknown.
     lines : range or tuple of int
-        Line of each point in its file, from 1; empty: not known.
+        Line of each point in its file, from 1; empty: unknown.
     texts : mapping of str to tuple of str
-        Columns of text, by name, one entry per point.
+        Text columns by name, one entry per point.
 
     Raises
     ------
@@ -180,26 +180,26 @@ class Dataset:
                 yield (what, f"{len(items)} entries", f"{n}, one per point", "")
 
     def __len__(self) -> int:
-        """Give the number of points."""
+        """Number of points."""
         return len(next(iter(self.values.values())))
 
     def __getitem__(self, channel: str) -> Array:
-        """Give one channel, (N,), read-only."""
+        """One channel, (N,), read-only."""
         if channel not in self.values:
             raise KeyError(f"no channel {channel!r}; there are {', '.join(self.values)}")
         channel_values: Array = self.values[channel]
         return channel_values
 
     def __contains__(self, channel: object) -> bool:
-        """Tell whether a channel is there."""
+        """Whether a channel exists."""
         return channel in self.values
 
     def __repr__(self) -> str:
-        """Say what it holds in a line; to_pandas() shows the numbers."""
+        """One-line summary; to_pandas() shows the numbers."""
         return f"Dataset({self.kind!r}, {self.name!r}, {len(self)} points: {', '.join(self.values)})"
 
     def _repr_html_(self) -> str:
-        """Show the points in a notebook: each value with its standard uncertainty, where one is known."""
+        """Show the points in a notebook, with standard uncertainties if known."""
         return tables.to_html(self)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -211,7 +211,7 @@ class Dataset:
 
     @property
     def converged(self) -> NDArray[np.bool_]:
-        """Points whose channels that were computed are all numbers, (N,).
+        """Whether all computed channels of each point are finite, (N,).
 
         Examples
         --------
@@ -222,24 +222,24 @@ class Dataset:
         return np.asarray(np.all(np.isfinite(loads or list(self.values.values())), axis=0))
 
     def __getattr__(self, channel: str) -> Array:
-        """Give a channel as an attribute, as in ``d.thrust_N``."""
+        """Access a channel as an attribute, such as ``d.thrust_N``."""
         values = self.__dict__.get("values", {})
         if channel in values:
             return values[channel]  # type: ignore[no-any-return]
         raise AttributeError(f"no channel {channel!r}; there are {', '.join(values)}")
 
     def unit(self, channel: str) -> str:
-        """Give the unit of a channel.
+        """Unit of a channel.
 
         Parameters
         ----------
         channel : str
-            Its name.
+            Name of the channel.
 
         Returns
         -------
         str
-            SI suffix, ``rpm``, "-" without dimension, or what the file says; "" when it is not known.
+            SI suffix, ``rpm``, "-" for dimensionless, or the unit in the file; "" if unknown.
 
         Examples
         --------
@@ -253,7 +253,7 @@ class Dataset:
 
     @classmethod
     def from_rotor_convention(cls, kind: str, name: str, values: Mapping[str, ArrayLike], **kwargs: Any) -> Dataset:
-        """Make a series from helicopter coefficients.
+        """Create a dataset from helicopter coefficients.
 
         Parameters
         ----------
@@ -261,7 +261,7 @@ class Dataset:
             As for the class.
         values : mapping of str to (N,) array
             Channels; ``CT_rotor`` = T/(rho A (Omega R)^2), ``CP_rotor`` = ``CQ_rotor`` = P/(rho A (Omega R)^3) and
-            ``mu_axial`` = V/(Omega R) are converted, others pass.
+            ``mu_axial`` = V/(Omega R) are converted; others pass unchanged.
         **kwargs
             ``u`` (of the same channels), ``flags``, ``provenance``, ``labels``.
 
@@ -291,14 +291,14 @@ class Dataset:
         return cls(kind, name, convert(values), u, **kwargs)
 
     def derive(self, diameter_m: float, density_kg_m3: ArrayLike | None = None) -> Dataset:
-        """Add every channel that follows from the ones that are there; none is replaced.
+        """Add every channel that follows from existing ones; none is replaced.
 
         Parameters
         ----------
         diameter_m : float
             Diameter. [m]
         density_kg_m3 : float or (N,) array or None
-            Density [kg/m3], NaN: unknown; None takes the channel ``density_kg_m3`` (without it only J, airspeed, CQ-CP,
+            Density [kg/m3], NaN: unknown; None uses the channel ``density_kg_m3`` (without it only J, airspeed, CQ-CP,
             torque-power and eta are derived).
 
         Returns
@@ -309,13 +309,13 @@ class Dataset:
         Raises
         ------
         InputError
-            When the diameter or a density is not positive.
+            If the diameter or a density is not positive.
 
         Notes
         -----
         Uncertainties are propagated to first order from the measured quantity alone: diameter, density, rpm and
         airspeed count as exact, because their uncertainty belongs to u_input of a comparison (ASME V&V 20), not to
-        u_D. For eta, those of CT and CP are taken as independent. Unknown stays unknown.
+        u_D. For eta, CT and CP are assumed independent. Unknown stays unknown.
         """
         rho = self.values.get("density_kg_m3") if density_kg_m3 is None else np.asarray(density_kg_m3, dtype=float)
         faults = []
@@ -358,7 +358,7 @@ class Dataset:
         return replace(self, values=values, u=u)
 
     def select(self, where: ArrayLike | slice | Callable[[Dataset], ArrayLike]) -> Dataset:
-        """Take some points.
+        """Select points.
 
         Parameters
         ----------
@@ -390,13 +390,13 @@ class Dataset:
         )
 
     def to_pandas(self) -> pd.DataFrame:
-        """Give the points as a table.
+        """Convert to a table.
 
         Returns
         -------
         pandas.DataFrame
-            A column per channel, ``u_<channel>`` where its uncertainty is known somewhere, ``u_<origin>_<channel>`` for
-            its parts, ``flags`` (joined by "; ") where there are any; ``attrs`` holds kind, name, provenance and notes.
+            A column per channel, ``u_<channel>`` if its uncertainty is known for some points, ``u_<origin>_<channel>``
+            for its parts, ``flags`` (joined by "; ") if any; ``attrs`` has kind, name, provenance and notes.
 
         Examples
         --------
@@ -407,7 +407,7 @@ class Dataset:
         return tables.to_pandas(self)
 
     def to_xarray(self) -> xr.Dataset:
-        """Give the points as an xarray dataset over the dimension ``point``.
+        """Convert to an xarray dataset over the dimension ``point``.
 
         Returns
         -------
@@ -417,7 +417,7 @@ class Dataset:
         Raises
         ------
         InputError
-            When xarray is not installed.
+            If xarray is not installed.
 
         Examples
         --------
@@ -428,26 +428,26 @@ class Dataset:
         return tables.to_xarray(self)
 
     def plot(self, x: str | None = None, y: Sequence[str] = (), ax: Any = None) -> Any:
-        """Draw channels over another one, with bands where uncertainties are known.
+        """Plot channels over another one, with bands if uncertainties are known.
 
         Parameters
         ----------
         x : str, optional
-            Channel of the abscissa; what varies of J, airspeed and rpm by default.
+            Channel of the x axis; by default the one of J, airspeed and rpm that varies.
         y : sequence of str
-            Channels to draw; CT and CP, or thrust, by default.
+            Channels to plot; CT and CP, or thrust, by default.
         ax : matplotlib axes, optional
-            Where to draw, beside what is there: a channel keeps its colour. A new figure by default.
+            Existing axes to add to (a channel keeps its colour). A new figure by default.
 
         Returns
         -------
         matplotlib axes
-            With a line for each channel, and for each speed of rotation where J or airspeed is the abscissa.
+            One line per channel, and per speed of rotation if J or airspeed is on the x axis.
 
         Raises
         ------
         InputError
-            For a channel that is not there.
+            For a missing channel.
 
         Examples
         --------
@@ -458,12 +458,12 @@ class Dataset:
         return pictures.plot(self, x, y, ax)
 
     def to_rows(self) -> list[dict[str, Any]]:
-        """Give one plain dictionary per point, fit for JSON.
+        """Convert to one plain dictionary per point, for JSON.
 
         Returns
         -------
         list of dict
-            ``source`` (the kind), ``name``, one key per channel, ``u`` (per channel), ``flags``, and ``label`` where
+            ``source`` (the kind), ``name``, one key per channel, ``u`` (per channel), ``flags``, and ``label`` if
             there are labels. NaN becomes None: no value, or uncertainty unknown.
 
         Examples

@@ -103,7 +103,7 @@ class Comparison:
             rows.append("  No single effect explains it.")
         else:
             limits = "thrust by {:.0%} and torque by {:.0%}".format(*self.fine)
-            rows.append(f"  Nothing to explain: the recording may be off in {limits}.")
+            rows.append(f"  Nothing to explain: the recording's own uncertainty is {limits}.")
         return "\n".join(rows)
 
     def document(self) -> dict[str, Any]:

@@ -38,7 +38,7 @@ _POLE_PAIRS = (2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 14, 16, 18, 20, 21)
 _ANGLES_DEG = (-12.0, -9.0, -6.0, -3.0, 3.0, 6.0, 9.0, 12.0, 16.0)
 _BLADES = (1, 2, 3, 4, 5, 6, 8, 12)
 _ERROR = ": error: "
-_CONTRADICTED = "a recording contradicts itself: what physics leaves over cannot be told from that"
+_CONTRADICTED = "a recording contradicts itself; a physical residual cannot be distinguished from that"
 # Effects that are such a slip themselves.
 _SLIPS = ("unit_slip", "rpm_scale")
 
@@ -94,12 +94,12 @@ def _slips(problem: Problem, found: dict[str, float]) -> Iterator[tuple[str, str
     powers = {c: p for c, p in ((T, 4.0), (Q, 5.0)) if c in found}
     k = sum(p * found[c] for c, p in powers.items()) / sum(p * p for p in powers.values())
     off = abs(k - math.log(2.0)) < 0.1, abs(k + math.log(2.0)) < 0.1
-    hint = ", a radius taken for the diameter" if any(off) else ""
+    hint = ", the radius given as diameter" if any(off) else ""
     size = math.exp(k) * D
     yield "diameter", f"diameter {size:.3g} m ({size / INCH:.3g} in){hint}", {c: p * k for c, p in powers.items()}, 0.5
     for pairs in _POLE_PAIRS:
         both = dict.fromkeys(found, -2.0 * math.log(pairs))
-        yield "poles", f"electrical revolutions for mechanical, {pairs} pole pairs", both, 0.5
+        yield "poles", f"electrical instead of mechanical revolutions, {pairs} pole pairs", both, 0.5
     for factor, words in ((60.0 / (2.0 * math.pi), "rad/s"), (60.0, "rev/s")):
         yield "speed", f"speed in {words} for rev/min", dict.fromkeys(found, 2.0 * math.log(factor)), 1.0
     for setting in catalogue()["unit_slip"]().variants() or ():
@@ -107,7 +107,7 @@ def _slips(problem: Problem, found: dict[str, float]) -> Iterator[tuple[str, str
         if channel in found and factor > 0.0:
             yield channel, f"{channel} in another unit ({setting['unit']})", {channel: math.log(factor)}, 1.0
     changes: list[tuple[str, str, Effect, float]] = [
-        ("pitch", f"blade angle {a:+.0f} deg (another pitch)", AsLabelled(angle_deg=a), 0.5) for a in _ANGLES_DEG
+        ("pitch", f"blade angle {a:+.0f} deg (different pitch)", AsLabelled(angle_deg=a), 0.5) for a in _ANGLES_DEG
     ]
     blades = part.flow.B
     changes += [("blades", f"{n} blades for {blades}", _Blades(n), 0.5 + math.log(n / blades) ** 2)
@@ -137,7 +137,7 @@ def to_mend(problem: Problem, decision: Decision) -> str:
         return ""
     if _suspicious(levels(problem)):
         slips = "; ".join(f"{k}. {s.words}" for k, s in enumerate(suspects(problem)[:_SHOWN], 1))
-        return f"make sure that the case is this rotor; what else would explain the loads: {slips}"
+        return f"check that the case describes this rotor; other explanations for the loads: {slips}"
     wrong = _impossible(problem)
     alone = all(not part.record.reference for part in problem.parts)
     if not wrong or not (alone or decision.why == _CONTRADICTED):
@@ -154,13 +154,13 @@ def finding(problem: Problem) -> str:
         return f"at one speed the readings differ, {told}: what changes between them is not recorded" if told else ""
     off = " and ".join(f"{names[c]} is {number_text(v, 3)} times" for c, v in found.items())
     ranked = "; ".join(f"{k}. {s.words}" for k, s in enumerate(suspects(problem)[:_SHOWN], 1))
-    return f"{off} what the case gives. Is it this rotor? Likeliest: {ranked}"
+    return f"{off} what the case gives. Is it this rotor? Most likely: {ranked}"
 
 
 def judged(problem: Problem, decision: Decision) -> Decision:
     """Decision that names no physics for loads that cannot be those of the case's rotor."""
     if _restless(problem) and decision.verdict not in ("none", "unknown"):
-        why = "repeats at one condition differ by more than any stand's: what changes between them is not recorded"
+        why = "repeats at one condition differ by more than those of any stand: something that is not recorded changes"
         return replace(decision, verdict="insufficient", effects=(), classes=(), why=why)
     if decision.verdict == "unknown" and _impossible(problem):
         return replace(decision, verdict="insufficient", classes=(), why=_CONTRADICTED)
@@ -168,7 +168,7 @@ def judged(problem: Problem, decision: Decision) -> Decision:
     slip = (decision.verdict in ("named", "sensor") or decision.rule == BESIDE_IT) and set(sure) & set(_SLIPS)
     if slip or not _suspicious(levels(problem)):
         return decision
-    why = f"the loads are off by more than a factor of {FACTOR:g}: first make sure that the case is this rotor"
+    why = f"the loads are off by more than a factor of {FACTOR:g}: first check that the case describes this rotor"
     return replace(decision, verdict="insufficient", effects=(), classes=(), why=why)
 
 
@@ -180,5 +180,7 @@ def of_recorded(
     told = any(p.record.air_recorded for p in problem.parts if not p.record.reference)
     if decision.effects != ("unit_slip",) or channel != "density_kg_m3" or told:
         return decision
-    why = "every load is off alike, as by a slip of the density, which is not recorded: look at units, speed and size"
+    why = (
+        "every load is off by the same share, as by a wrong density, which is not recorded: check units, speed and size"
+    )
     return replace(decision, verdict="insufficient", effects=(), classes=(), why=why)

@@ -87,14 +87,14 @@ def build(records: Sequence[Record], cases: Sequence[Case], baseline: str = "bem
     order = sorted(groups, key=lambda k: k[0])
     problem = assemble(tuple(_part(merged(groups[k][1]), groups[k][0], baseline) for k in order))
     if problem.y.size < _FEWEST:
-        got = f"{problem.y.size} readings beside a converged baseline"
+        got = f"{problem.y.size} readings with a converged baseline"
         raise InputError(Fault(records[0].name, "", got, f"{_FEWEST} or more"))
     for k, name in enumerate(CHANNELS):
         mine = problem.channel == k
         ratio = float(np.median(np.abs(problem.y[mine])) / np.median(np.abs(problem.f0[mine]))) if mine.any() else 1.0
         if not 1.0 / _FARTHEST < ratio < _FARTHEST:
             raise InputError(Fault(records[0].name, name, f"{ratio:.2g} times what the case gives",
-                                   "readings of this rotor", "Another unit, or another case?"))  # fmt: skip
+                                   "readings of this rotor", "Wrong unit, or wrong case?"))  # fmt: skip
     odd = _between(problem, [groups[k][1] for k in order], records)
     problem, found = _calibrated(problem, [groups[k][0] for k in order])
     return replace(problem, between=(*odd, *found))
@@ -168,7 +168,7 @@ def assemble(parts: tuple[Part, ...], blade: CalibratedBlade = PLAIN) -> Problem
     notes = [f"{p.record.name}: {note}" for p in parts for note in p.record.notes]
     lost = int(np.isfinite(y).sum() - kept.sum())
     if lost:
-        notes.append(f"{lost} readings left out: the baseline does not converge there")
+        notes.append(f"{lost} readings dropped: the baseline does not converge there")
     scale = np.concatenate([_scale(p) for p in parts])
     problem = Problem(
         parts, y[kept], f0[kept], u[kept], scale[kept], False, channel[kept], point[kept],
@@ -216,7 +216,7 @@ def _with_noise(problem: Problem) -> Problem:
         sigma[every] = np.where(known[every], np.hypot(sigma[every], seen), seen)
         known = known | every
         shares[name] = float(np.median(seen / np.maximum(np.abs(problem.y[every]), 1e-12)))
-        beside = " beside what is stated" if told is not None else ""
+        beside = " in addition to the stated uncertainty" if told is not None else ""
         notes.append(f"{name}: {dof} repeats scatter by {a:.2%} of the reading and {b:.2%} of full scale{beside}")
     return replace(problem, u=sigma, u_known=bool(known.mean() > 0.5), notes=tuple(notes), scatter=shares)
 

@@ -85,12 +85,12 @@ def calibrated(problem: Problem, prior: Prior) -> tuple[CalibratedBlade | None, 
     )
     if abs(found.mean[0]) > FARTHEST_DEG:
         return None, "", (
-            f"the reference asks for a blade turned by {found.mean[0]:+.0f} deg: another rotor than the case's, or "
-            "another diameter, number of blades or unit. The blade was left as the case has it"
+            f"the reference fits a blade turned by {found.mean[0]:+.0f} deg: another rotor, or a wrong "
+            "diameter, number of blades or unit. The blade of the case was kept"
         )  # fmt: skip
     rest, start = y - solve(found.mean), y - solve(prior.mean)
     if not np.isfinite(rest).all() or _misfit(tables[chosen], rest) > _misfit(tables[chosen], start):
-        return None, "no blade fits the reference better than that of the case, which was left as it is", ""
+        return None, "no blade fits the reference better than that of the case, which was kept", ""
     size = float(np.sqrt(found.weights @ found.sizes**2))
     note = f"blade calibrated on the reference (known from {prior.known_from}): {words or 'as the case has it'}"
     return CalibratedBlade(found.mean, prior.mean, size * root, kind), note, ""

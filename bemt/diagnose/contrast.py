@@ -183,12 +183,12 @@ def _agreed(said: dict[str, Any], ratios: dict[str, Any], found: RunChange) -> d
         return said | mine | {"rule": f"{by_ratio.why}; the model misses the same in both"}
     if said["verdict"] not in _CLAIMS:
         sees = decided or (said["verdict"] == "none" and by_ratio.probability.get("none", 1.0) < _UNLIKELY)
-        return _by_ratios(said, mine, "errors of the model that cannot be told from it") if sees else said
+        return _by_ratios(said, mine, "errors of the model that cannot be distinguished from it") if sees else said
     if not by_ratio.probability:
         return said
     least = _IMPOSSIBLE * max(by_ratio.probability.values())
     struck = [k for k in said["effects"] if by_ratio.probability.get(k, 1.0) < least]
-    why = f"{' and '.join(struck)} cannot make these ratios of thrust and torque"
+    why = f"{' and '.join(struck)} cannot cause these ratios of thrust and torque"
     left = [k for k in said["effects"] if k not in struck]
     if not decided:
         if not struck:
@@ -204,7 +204,7 @@ def _agreed(said: dict[str, Any], ratios: dict[str, Any], found: RunChange) -> d
         if len(both) > 1 or not other or rank[both[0]] >= max(rank[k] for k in other):
             return said
     if not both and not lone:
-        return _by_ratios(said, mine, why if struck else f"{', '.join(left)} would scale otherwise")
+        return _by_ratios(said, mine, why if struck else f"{', '.join(left)} would scale differently")
     effects = [*both, *lone, *(other if both else by_ratio.effects)]
     if len(effects) == 1:
         return said | {"effects": effects}

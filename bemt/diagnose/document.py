@@ -113,7 +113,7 @@ def _unexplained(d: Diagnosis) -> list[str]:
     lines = [_where(seen)]
     if (seen.channel, seen.size > 0) != (rest.channel, rest.size > 0):
         words = _where(rest)
-        lines.append(f"Beyond what gains, blade angles and the solver may be: {words[0].lower()}{words[1:]}")
+        lines.append(f"Beyond the uncertainty of gains, blade angle and solver: {words[0].lower()}{words[1:]}")
     return lines
 
 
@@ -123,7 +123,7 @@ def _gain(d: Diagnosis) -> str:
         most = s["largest"] or 1.0
         words.append(
             f"{_CHANNEL[channel].lower()} {s['holdout_before'] / most:.1%} to {s['holdout_after'] / most:.1%} "
-            f"(noise {s['noise'] / most:.1%}, smooth curve without physics {s['gp_only'] / most:.1%})"
+            f"(noise {s['noise'] / most:.1%}, smooth fit without physics {s['gp_only'] / most:.1%})"
         )
     return f"Error on held-out {d.blocks}, of the largest value: " + "; ".join(words) + "."
 
@@ -140,7 +140,7 @@ def _parameters(d: Diagnosis) -> str:
                 words.append(f"{i} {k} {v['value']:.3g} ({v['low']:.3g} to {v['high']:.3g}){unit}{_odds(v)}")
             elif v["value"] is not None:
                 words.append(f"{i} {k} {v['value']}{_odds(v)}")
-        words += [f"{i} {' and '.join(left)} left open"] if left else []
+        words += [f"{i} {' and '.join(left)} not determined"] if left else []
     return ", ".join(words)
 
 
@@ -160,13 +160,13 @@ def explanation(d: Diagnosis) -> list[str]:
     level = d.problem.level
     off = " and ".join(f"{_CHANNEL[c].lower()} by {v:+.0%}" for c, v in level.items())
     if not d.problem.findings and level and min(abs(v) for v in level.values()) > _ANOTHER_ROTOR:
-        lines.append(f"Before any physics: off the case {off}. Are diameter, pitch and blades those of this rotor?")
+        lines.append(f"Before any physics: the case is off ({off}). Do diameter, pitch and blades match this rotor?")
     if len(d.problem.findings) > _FINDINGS:
         lines[-1] += f" And {len(d.problem.findings) - _FINDINGS} more; `import` shows all."
     if decision.verdict == "none":
         lines.append(f"Why: {decision.why} (p = {d.p_value:.2g}).")
         if max((abs(v) for v in level.values()), default=0.0) > _WORTH_SAYING:
-            lines.append(f"The level is off ({off}), which gains, blade angles and the solver may be; no cause shows.")
+            lines.append(f"The level is off ({off}), within what gain, blade angle and solver allow; no cause shows.")
         return [*lines, _gain(d), *_next(d), *_not_tried(d)]
     lines += _unexplained(d) if decision.verdict in ("unknown", "insufficient") else [_where(d.where)]
     if decision.verdict in ("named", "sensor"):
@@ -176,25 +176,25 @@ def explanation(d: Diagnosis) -> list[str]:
         )
         signs = [catalogue[i].sign for i in decision.effects if catalogue[i].sign]
         if signs:
-            lines.append("Because: " + "; ".join(signs) + ".")
+            lines.append("Signature: " + "; ".join(signs) + ".")
     elif decision.verdict == "class":
-        lead = "One of these, which this plan cannot tell apart" if decision.classes else decision.why.capitalize()
+        lead = "One of these, which this plan cannot distinguish" if decision.classes else decision.why.capitalize()
         if len(decision.sets) > 1 and decision.rule != BESIDE_IT:
             sets = " and ".join("{" + " or ".join(s) + "}" for s in decision.sets)
-            lines.append(f"One of each ({decision.probability:.2f}): {sets}.")
+            lines.append(f"One of each set ({decision.probability:.2f}): {sets}.")
         lines.append(f"{lead} ({decision.probability:.2f}): "
                      + ", ".join(f"{i} ({catalogue[i].title})" for i in decision.effects) + ".")  # fmt: skip
     elif decision.verdict == "unknown":
         kernel = d.found.states[0].best_rival
-        lines.append(f"Something that is not in the library: {decision.why}. It looks like {kernel}.")
+        lines.append(f"The cause is not in the library: {decision.why}. It looks like {kernel}.")
     else:
         lines.append(f"No name is given (p = {d.p_value:.2g}): {decision.why}.")
     lines.append(_gain(d))
     others = [i for group in decision.classes for i in group if i not in decision.effects]
     if others:
-        lines.append(f"Cannot be told from: {', '.join(others)}.")
+        lines.append(f"Cannot be distinguished from: {', '.join(others)}.")
     if d.loads is not None and d.loads.decision.verdict != "none":
-        lines.append(f"Thrust and torque at the measured speed are a question of their own: {headline(d.loads)}")
+        lines.append(f"Thrust and torque at the measured speed, judged separately: {headline(d.loads)}")
     lines += [*_next(d), *_not_tried(d)]
     return [line for line in lines if line]
 
@@ -227,24 +227,24 @@ def headline(d: Diagnosis) -> str:
     titles = [catalogue[i].title for i in said.effects]
     off = " and ".join(f"{_CHANNEL[c].lower()} {_share(v)}" for c, v in d.off.items())
     if said.verdict == "none" and max((abs(v) for v in d.problem.level.values()), default=0.0) > LEVEL:
-        return f"Recording and model differ ({off}), no more than calibration, blade and solver may; no cause shows."
+        return f"Recording and model differ ({off}), within the uncertainty of calibration, blade and solver; no cause."
     if said.verdict == "none":
-        return "Recording and model agree within noise, calibration and what the model may be off anyway."
+        return "Recording and model agree within noise, calibration and the uncertainty of the model."
     if said.verdict == "named":
-        return f"The model leaves something out: {' and '.join(titles)}."
+        return f"Cause found: {' and '.join(titles)}."
     if said.verdict == "sensor":
-        return f"The stand is at fault, not the air: {' and '.join(titles)}."
+        return f"Cause found in the stand, not the air: {' and '.join(titles)}."
     if said.verdict == "class":
         if said.rule == BESIDE_IT:
-            return f"{titles[0].capitalize()} is at work; whether {' or '.join(titles[1:])} is, too, is left open."
+            return f"Cause found: {titles[0]}. Possibly also: {' or '.join(titles[1:])}."
         if len(said.sets) > 1:
-            return f"Two things are at work: {' and '.join(_one_of(s) for s in said.sets)}."
-        return f"It is {' or '.join(titles)}; these readings do not say which."
+            return f"Two causes: {' and '.join(_one_of(s) for s in said.sets)}."
+        return f"The cause is {' or '.join(titles)}; these readings cannot distinguish them."
     if said.verdict == "unknown":
-        return f"Recording and model differ ({off}), and no effect of the library explains it."
+        return f"Recording and model differ ({off}), and no effect in the library explains it."
     best = next((catalogue[i].title for i in d.best.ids), "")
-    guess = f"; the best guess is {best}" if best else ""
-    return f"Recording and model differ ({off}), and these readings do not show why{guess}."
+    guess = f"; best guess: {best}" if best else ""
+    return f"Recording and model differ ({off}), but these readings do not show why{guess}."
 
 
 def _one_of(ids: Sequence[str]) -> str:
@@ -278,10 +278,10 @@ def text(d: Diagnosis) -> str:
     ]
     kinds = ("before", "after", "noise", "holdout_before", "holdout_after", "gp_only")
     rows = [[c, *(f"{s[k] / s['largest']:.2%}" for k in kinds)] for c, s in d.scores.items()]
-    header = ["RMSE over largest reading", "before", "after", "noise", "held out: before", "after", "smooth curve only"]
+    header = ["RMSE over largest reading", "before", "after", "noise", "held out: before", "after", "smooth fit only"]
     out += ["", text_table(header, rows, left=(0,), indent="  ")]
     h = found.states[0].hyper
-    beside = "of what is stated or seen" if d.problem.u_known else "of a usual stand's (none is stated)"
+    beside = "the stated or observed noise" if d.problem.u_known else "that of a typical stand (none is stated)"
     out.append(f"\n  p = {d.p_value:.3g}; noise x{h.scale:g} {beside}, correlation {h.ar:g}, "
                f"solver error {h.model:.0%}; {d.problem.y.size} readings")  # fmt: skip
     out += [f"  note: {note}" for note in d.problem.notes]

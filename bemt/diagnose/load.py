@@ -89,7 +89,7 @@ def load(
         elif _step_responses(imported, rows, points):
             points = replace(_points(imported, rows, path), notes=("short log: every row counts, transients too",))
         made = records.from_series(_turned(points) if hand else points, case, shared)
-    turned = ("torque_Nm: negative under load, which is the sense of rotation: turned here",) if hand else ()
+    turned = ("torque_Nm: negative under load (sense of rotation): sign reversed here",) if hand else ()
     notes = (*made.notes, *turned, *imported.notes, *rows.notes, *_unused(imported, rows, case))
     return replace(made, findings=found, notes=notes)
 
@@ -104,7 +104,7 @@ def _filled(imported: Dataset, rpm: float | None, airspeed_m_s: float | None) ->
         own = next((k for k in same if k in known), None)
         if own is None:
             told[name] = np.full(len(imported), float(value))
-        notes.append(f"{name}: {value:g} as told" if own is None else f"{name}: not as told, the file has {own}")
+        notes.append(f"{name}: {value:g} as told" if own is None else f"{name}: ignored, the file has {own}")
     values = {**imported.values, **told}
     units = {k: unit for k, unit in imported.units.items() if k not in told}
     return replace(imported, values=values, units=units, notes=(*imported.notes, *notes)) if notes else imported
@@ -152,7 +152,7 @@ def _same_rotor(imported: Dataset, case: Case, path: str) -> None:
         ratio = ratio[np.isfinite(ratio) & (v["J"] > _SLOW)]
         if ratio.size and abs(float(np.median(ratio)) - 1.0) > _SAME:
             faults.append(Fault(path, "J", f"airspeed over n D is {np.median(ratio):.3g} times it", "the same number",
-                                "Another diameter than the case's, or another unit of the airspeed?"))  # fmt: skip
+                                "Wrong diameter in the case, or wrong unit of the airspeed?"))  # fmt: skip
     if faults:
         raise InputError(faults)
 
@@ -251,6 +251,6 @@ def _one_setup(imported: Dataset, path: str) -> None:
 
     for name, kinds in setups(imported.texts, imported.values).items():
         got = f"{len(kinds)} set-ups: {', '.join(kinds[:4])}" + (", ..." if len(kinds) > 4 else "")
-        hint = "Put the rows of each into a file of its own"
+        hint = "Put the rows of each into a separate file"
         heading = imported.provenance.get("headings", {}).get(name, name)
         raise InputError(Fault(path, heading, got, "one propeller with one motor", hint))

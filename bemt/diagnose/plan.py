@@ -1,4 +1,4 @@
-"""Before anyone measures: which effects a test plan can see, and which it cannot tell apart."""
+"""Before the measurement: which effects a test plan can see, and which it cannot distinguish."""
 
 from __future__ import annotations
 
@@ -182,13 +182,13 @@ def text(answer: Plan) -> str:
         rows.append([c.ids[a], effects.catalogue()[c.ids[a]].title, f"{answer.size[a]:.1f}", answer.sight[c.ids[a]],
                      f"{nearest[1]} ({nearest[0]:.1f})" if near else "-"])  # fmt: skip
     header = ["effect", "", "size", "sight", "nearest look-alike"]
-    out = [f"plan of {answer.points} points: size of each effect at ordinary strength, in standard deviations",
+    out = [f"plan of {answer.points} points: size of each effect at typical strength, in standard deviations",
            text_table(header, rows, left=(0, 1, 3, 4), indent="  ")]  # fmt: skip
     for group in c.classes():
-        out.append(f"  not told apart: {', '.join(group)}")
+        out.append(f"  cannot be distinguished: {', '.join(group)}")
     if answer.added is not None:
         a = answer.added
         out.append(f"  to add: {a.text} (separates {' from '.join(a.separates)}: {a.before:.1f} to {a.after:.1f})")
-    out += [f"  cannot show: {i}: {why}" for i, why in answer.absent.items()]
+    out += [f"  not visible: {i}: {why}" for i, why in answer.absent.items()]
     out += [f"  note: {note}" for note in answer.notes]
     return "\n".join(out)

@@ -42,8 +42,8 @@ _COPIED = 0.2
 _SAME_SPEED = 0.02
 # Channel, lowest and highest value of a room, a sky or a pressure tunnel, hint.
 _AIR_LIMITS = (
-    ("temperature_K", 150.0, 400.0, "Celsius under a heading in kelvin, or a sensor that was not there?"),
-    ("pressure_Pa", 1e3, 2.5e6, "Another unit than the heading says?"),
+    ("temperature_K", 150.0, 400.0, "Celsius under a heading in kelvin, or no sensor connected?"),
+    ("pressure_Pa", 1e3, 2.5e6, "Wrong unit in the heading?"),
 )
 # More points than this tell no more of their scatter.
 _MOST_COMPARED = 2000
@@ -140,7 +140,7 @@ def from_series(series: Dataset, case: Case, correlated: Mapping[str, Mapping[st
     for name in ("thrust_N", "torque_Nm"):
         if name in got and np.isfinite(got[name]).any():
             if not np.any(np.nan_to_num(got[name])):
-                notes.append(f"{name} is 0 in every row: no measurement, left out")
+                notes.append(f"{name} is 0 in every row: not measured, ignored")
                 continue
             measured[name], u[name] = got[name].copy(), np.asarray(filled.u[name], dtype=float).copy()
     if not measured:
@@ -163,18 +163,16 @@ def from_series(series: Dataset, case: Case, correlated: Mapping[str, Mapping[st
         full = extra["pwm_s"] > _FULL_THROTTLE
         if full.any() and not full.all():
             measured["rpm"][full] = np.nan
-            notes.append(f"{int(full.sum())} speeds at full throttle were left out: the pulse width does not set them")
+            notes.append(f"{int(full.sum())} speeds at full throttle were dropped: the pulse width does not set them")
     loads = np.any([np.isfinite(measured[k]) for k in measured if k != "rpm"], axis=0)
     keep = np.isfinite(rpm) & (rpm > 0) & np.isfinite(V) & loads
     kinks = _kinks(rpm, extra)
     if kinks.any():
-        notes.append(
-            f"{int(kinks.sum())} points where the speed sets off or stops were left out: no acceleration there"
-        )
+        notes.append(f"{int(kinks.sum())} points where the rotor starts or stops were dropped: no acceleration there")
         for reading in measured.values():
             reading[kinks] = np.nan
     if (~keep).any():
-        notes.append(f"{int((~keep).sum())} of {n} points without speed or load were left out")
+        notes.append(f"{int((~keep).sum())} of {n} points without speed or load were dropped")
     again = _repeated(keep, [rpm, V, *measured.values(), *(v for k, v in extra.items() if k != "run")])
     if again.any():
         notes.append(f"{int(again.sum())} rows repeat others digit by digit: counted once")
@@ -307,7 +305,7 @@ def _thinned(record: Record) -> Record:
     seen = {} if dense(record) else {c: _scatter(record, c, unit[c], block) for c in unit if c in record.measured}
     record = replace(record, u=dict(record.u) | {c: v for c, v in seen.items() if v is not None})
     # neighbours share slow errors: their mean is taken to be no better than one of them
-    note = f"{P} points averaged to {rpm.size} of like conditions"
+    note = f"{P} points averaged to {rpm.size} of similar conditions"
     return replace(
         record, rpm=rpm, V=mean(record.V), air=air_of({k: mean(getattr(record.air, k)) for k in _AIR}),
         measured={k: mean(v / unit[k]) * rho * rpm**2 if k in unit else mean(v) for k, v in record.measured.items()},

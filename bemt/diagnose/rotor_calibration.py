@@ -99,7 +99,7 @@ def text(doc: dict[str, Any]) -> str:
         "angle_deg": "blade angle", "lift": "lift (ln)", "drag": "drag (ln)",
         "low_re_lift": "lift at low Reynolds number (ln per ln)", "camber_deg": "zero-lift angle lower by",
     }  # fmt: skip
-    state = "stands still" if doc["converged"] else "DID NOT SETTLE"
+    state = "stands still" if doc["converged"] else "DID NOT CONVERGE"
     lines = [f"{doc['case']}: {doc['points']} points of {', '.join(doc['reference'])}; {state}, steps: {doc['steps']}"]
     lines.append(
         f"{'rotor as built, beyond its ' + doc['known_from']:42} {'before':>8} {'u':>7}   {'after':>8} {'u':>7}"
@@ -109,10 +109,12 @@ def text(doc: dict[str, Any]) -> str:
         cells = f"{n['before']:+8.3f} {n['u_before']:7.3f}   {n['after']:+8.3f} {n['u_after']:7.3f}"
         lines.append(f"{words[name] + unit:42} {cells}")
     if doc["size"] > 2.0:
-        lines.append(f"This rotor is {doc['size']:.1f} times as far from its description as is usual: check the case.")
+        lines.append(f"This rotor is {doc['size']:.1f} times as far from its description as usual: check the case.")
     if doc["excess"] > 1.0:
         times = number_text(math.sqrt(doc["excess"]), 2)
-        lines.append(f"No such rotor gives these readings: they count as {times} times as rough. Check the recording.")
+        lines.append(
+            f"No rotor of this kind gives these readings: noise taken as {times} times larger. Check the recording."
+        )
     return "\n".join(lines)
 
 

@@ -133,11 +133,11 @@ def _pair(a: Asked) -> Decision:
     members = tuple(dict.fromkeys(i for s in known for i in s))
     if len(members) <= LARGEST and inside >= SURE * total:
         open_sets = tuple(s for s in known if len(s) > 1)
-        words = ("two effects are at work; one of them has look-alikes" if a.sure
-                 else "two are at work, each has look-alikes")  # fmt: skip
-        why = words if open_sets else "two effects are at work, likeliest these, but not for sure"
+        words = ("two effects are present; one of them has look-alikes" if a.sure
+                 else "two effects are present, each with look-alikes")  # fmt: skip
+        why = words if open_sets else "two effects are present, most likely these, but not for sure"
         return replace(a.says("class", why, members, inside, open_sets), sets=known)
-    return a.says("insufficient", "two effects or more, not told apart")
+    return a.says("insufficient", "two or more effects that cannot be distinguished")
 
 
 def _nothing(a: Asked, why: str, verdict: str = "none") -> Decision:
@@ -145,11 +145,11 @@ def _nothing(a: Asked, why: str, verdict: str = "none") -> Decision:
 
 
 def _by_chance(a: Asked) -> str:
-    return f"nulls of the same plan look as much like a cause in {a.p_value:.0%} of draws"
+    return f"in {a.p_value:.0%} of simulated recordings without a cause the mismatch is as large"
 
 
 def _left(a: Asked) -> Decision:
-    return a.says("unknown", "a smooth mismatch remains when the best listed effect is taken away",
+    return a.says("unknown", "a smooth residual is left after the best listed effect",
                   probability=max(a.P[UNKNOWN], 1.0 - a.P[a.first]), leading=a.first)  # fmt: skip
 
 
@@ -157,7 +157,7 @@ RULES: tuple[Rule, ...] = (
     Rule(
         "no effect can be seen",
         lambda a: not a.first,
-        lambda a: a.says("insufficient", "no effect can be seen in these readings", probability=1.0, leading=NONE),
+        lambda a: a.says("insufficient", "no effect is visible in these readings", probability=1.0, leading=NONE),
         "",
         "by definition",
     ),
@@ -188,7 +188,7 @@ RULES: tuple[Rule, ...] = (
     Rule(
         "unknown, and not much better than nothing",
         lambda a: a.P[UNKNOWN] > 0.5 and a.vague < ENOUGH,
-        lambda a: a.says("insufficient", "something smooth that is not in the library leads, but not by enough"),
+        lambda a: a.says("insufficient", "a smooth effect that is not in the library fits best, but not by enough"),
         "0.5, ENOUGH",
         "as of a name: stands differed from cases of a label by 5 and were called unknown",
     ),
@@ -197,7 +197,7 @@ RULES: tuple[Rule, ...] = (
         lambda a: a.P[UNKNOWN] > 0.5,
         lambda a: a.says(
             "unknown",
-            "a smooth effect that is not in the library explains the readings better than any that is",
+            "a smooth effect that is not in the library explains the readings better than any listed effect",
             probability=max(a.P[UNKNOWN], 1.0 - a.P[a.first]),
             leading=a.first,
         ),
@@ -226,7 +226,7 @@ RULES: tuple[Rule, ...] = (
     Rule(
         "does not predict",
         lambda a: not a.expected and a.odds < PROVEN and a.vague > VAGUE and not _predicts(a),
-        lambda a: a.says("insufficient", "the best explanation does not predict what it has not seen"),
+        lambda a: a.says("insufficient", "the best explanation does not predict held-out readings"),
         "PROVEN, VAGUE, PREDICTS",
         "declared; left-out blocks, DIAGNOSIS 2.9; in any case it cost right names (7)",
     ),
@@ -234,7 +234,7 @@ RULES: tuple[Rule, ...] = (
         "on, and out of its range",
         lambda a: a.on and not a.leading.pair and _leaves_its_range(a),
         lambda a: a.says(
-            "unknown", f"{a.leading} is on and would have to leave its range, so the law itself does not fit"
+            "unknown", f"{a.leading} is in the model already and would have to leave its range, so its law does not fit"
         ),
         "range of the parameter",
         "declared with the effect",
@@ -243,7 +243,7 @@ RULES: tuple[Rule, ...] = (
         "twin faults",
         lambda a: twins(a.leading),
         lambda a: a.says(
-            "unknown", "two instruments with the same fault at once: one cause that is not in the library is likelier"
+            "unknown", "two instruments with the same fault at once; one cause outside the library is more likely"
         ),
         "",
         "declared: two independent faults of one kind are rare",
@@ -253,7 +253,7 @@ RULES: tuple[Rule, ...] = (
         lambda a: levels_only(a.leading),
         lambda a: a.says(
             "insufficient",
-            "thrust and torque are off by two different shares at all points: two faults at once, or another rotor "
+            "thrust and torque are off by two different factors at all points: two faults at once, or a rotor other "
             "than that of the case or the reference",
         ),
         "",
@@ -262,7 +262,7 @@ RULES: tuple[Rule, ...] = (
     Rule(
         "unknown is nearly as likely",
         lambda a: a.unlisted > BESIDE * mass(a.found, (*a.group, *a.leading)),
-        lambda a: a.says("insufficient", "something that is not in the library explains the readings nearly as well"),
+        lambda a: a.says("insufficient", "an effect that is not in the library explains the readings nearly as well"),
         "BESIDE",
         "DIAGNOSIS 7: lost no right name and stopped the wrong ones",
     ),
@@ -271,7 +271,7 @@ RULES: tuple[Rule, ...] = (
         lambda a: a.roughness > ROUGH and a.alone,
         lambda a: a.says(
             "insufficient",
-            f"the readings scatter {a.roughness:g} times as much as the recording states; no effect does that",
+            f"the readings scatter {a.roughness:g} times as much as the recording states; no effect explains that",
         ),
         "ROUGH",
         "declared: end of the prior; hysteresis and resonance show so, and beside a reference they would be in both",
@@ -279,7 +279,7 @@ RULES: tuple[Rule, ...] = (
     Rule(
         "may as well be absent",
         lambda a: not a.leading.pair and len(a.group) <= 1 and holds_off(*next(iter(a.parameters.items()))),
-        lambda a: a.says("insufficient", f"{a.leading} leads, but what the readings say of its size includes none"),
+        lambda a: a.says("insufficient", f"{a.leading} fits best, but the interval of its size includes zero"),
         "90 % interval",
         "DIAGNOSIS 7: 4 of 5 wrong names, 0 of 42 right ones",
     ),
@@ -288,7 +288,7 @@ RULES: tuple[Rule, ...] = (
         lambda a: a.another_blade and len(a.group) <= 1,
         lambda a: a.says(
             "insufficient",
-            f"all loads are far off, which {a.leading} would explain, and density, speed of rotation or "
+            f"all loads are far off; {a.leading} would explain that, but density, speed of rotation or "
             "diameter nearly as well",
         ),
         "ANOTHER",
@@ -298,7 +298,7 @@ RULES: tuple[Rule, ...] = (
         "at the end of its range",
         lambda a: any(at_end(i, told) and (a.leading.pair or _sizes(i, told) > 1) for i, told in a.parameters.items()),
         lambda a: a.says(
-            "insufficient", f"{' and '.join(a.leading)}: fits only with a number at the end of its physical range"
+            "insufficient", f"{' and '.join(a.leading)}: fits only with a parameter at the end of its physical range"
         ),
         "END",
         "declared: where one number cannot go further, another makes up for something else",
@@ -308,7 +308,7 @@ RULES: tuple[Rule, ...] = (
         lambda a: a.on and a.alone,
         lambda a: a.says(
             "insufficient",
-            f"{a.leading} leads, which the model has already: without a reference an error of its law looks the same",
+            f"{a.leading} fits best, but is in the model already; without a reference an error of its law looks alike",
         ),
         "",
         "declared after a proof named the law of a duct, and of stall delay, where only the solver was another",
@@ -318,8 +318,8 @@ RULES: tuple[Rule, ...] = (
         lambda a: a.real and a.leading.pair and all(effects.catalogue()[i].kind == "air" for i in a.leading),
         lambda a: a.says(
             "insufficient",
-            f"{' and '.join(a.leading)} together fit best; of a rotor that no reference shows the model's own error "
-            "looks the same",
+            f"{' and '.join(a.leading)} together fit best; without a reference run the model's own error on this rotor "
+            "looks alike",
         ),
         "",
         "declared: the label case of a propeller without a cause was named oblique inflow and untwist (0.99)",
@@ -356,7 +356,7 @@ RULES: tuple[Rule, ...] = (
         lambda a: replace(
             a.says(
                 "class",
-                f"{' or '.join(a.group)} is at work; whether another effect is, too, is left open",
+                f"{' or '.join(a.group)} is present; whether another effect is also present is left open",
                 (*a.group, *a.beside[: MOST - 1]),
                 mass(a.found, a.group),
             ),
@@ -371,7 +371,8 @@ RULES: tuple[Rule, ...] = (
         lambda a: a.on and not a.sure,
         lambda a: a.says(
             "insufficient",
-            f"{a.leading} leads, which is on: its law may be off for this blade, or another cause looks so",
+            f"{a.leading} fits best, but is in the model already: its law may be off for this blade, or another cause "
+            "looks similar",
         ),
         "PRESENT, SURE",
         "declared: what is on is a cause only where nothing else is left",
@@ -411,7 +412,7 @@ RULES: tuple[Rule, ...] = (
         lambda a: True,
         lambda a: a.says(
             "insufficient",
-            "several explanations are left that are not alike",
+            "several different explanations are possible",
             classes=(a.group,) if len(a.group) > 1 else (),
         ),
         "",

@@ -133,7 +133,7 @@ def candidates(
             continue
         candidate = _candidate(problem, name, cls)
         if candidate is None:
-            absent[name] = "it changes nothing in these readings"
+            absent[name] = "no change in these readings"
         else:
             found.append(candidate)
     return tuple(found), absent

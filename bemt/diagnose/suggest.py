@@ -29,8 +29,8 @@ __all__ = ["LEVEL", "REFERENCE", "Given", "Suggestion", "nothing_called_for", "s
 Array = NDArray[np.float64]
 
 REFERENCE = (
-    "a reference: the same rotor on the same stand at the same points, without what is suspected (before the change, "
-    "or another rotor of the kind that is known to be right)"
+    "a reference run: the same rotor, stand and points without the suspected cause (before the change, or another "
+    "rotor of this type that is known to be right)"
 )
 """The run that settles most: it shows how far model and stand differ anyway."""
 
@@ -222,12 +222,12 @@ def _distance(problem: Problem, covariance_of: noise.Hyper, a: Array, b: Array) 
 def nothing_called_for(found: Evidence) -> Suggestion:
     """What is left to say after "none": nothing to do, and what would show fainter causes."""
     if _referenced(found):
-        return weather(found) or Suggestion("no further run is called for", (), (), 0.0, 0.0, "")
+        return weather(found) or Suggestion("no further run is needed", (), (), 0.0, 0.0, "")
     level = max((abs(v) for v in found.problem.level.values()), default=0.0)
     if level > LEVEL:
-        text = f"{REFERENCE}; it says whether the level is the blade's, the stand's or the model's"
+        text = f"{REFERENCE}; it shows whether the level comes from blade, stand or model"
         return Suggestion(text, (), (), 0.0, 0.0, "reference")
-    text = "no further run is called for; with a reference (the same rotor before the change) fainter causes would show"
+    text = "no further run is needed; with a reference run (the same rotor before the change) weaker causes would show"
     return Suggestion(text, (), (), 0.0, 0.0, "reference")
 
 
@@ -301,7 +301,7 @@ def suggest(
             return Suggestion(REFERENCE, (), names, now, max(gained, now), "reference")
     look = _look(names, found)
     if best[1] is None or (best[0] < _ENOUGH and look) or (best[0] < now + 0.5 and look):
-        text = look or "more repeats of the same points: no other affordable run separates them better"
+        text = look or "more repeats of the same points; no other practical run separates them better"
         return Suggestion(text, (), names, now, max(best[0], _ENOUGH) if look else best[0], "look" if look else "run")
     return Suggestion(best[1].text, _points(problem.parts[0].record, best[1]), names, now, best[0])
 
@@ -315,9 +315,7 @@ def _look(names: Sequence[str], found: Evidence) -> str:
     kinds = {effects.catalogue()[n].kind for n in names if n in effects.catalogue()}
     if "stand" in kinds and {"thrust_gain", "torque_gain", "thrust_zero", "torque_zero"} & set(names):
         share = PRIORS["thrust gain"]
-        return (
-            f"hang dead weights on the cells before and after a run: the gain is then known better than {share / 4:.2%}"
-        )
+        return f"hang dead weights on the cells before and after a run: the gain is then known to {share / 4:.2%}"
     return ""
 
 

@@ -20,14 +20,14 @@ def _slip_mohm(value: float) -> str:
 
 
 class BatteryTable(Table):
-    """[battery]: of the whole vehicle."""
+    """[battery]: battery of the whole vehicle."""
 
-    cells: int = entry("in series", low=1, high=60, required=True)
-    capacity_Ah: float = entry("charge", "A h", 0.01, 1000.0, required=True)
-    resistance_mohm: float = entry("of the pack with leads", "mohm", 0.0, 5000.0, _slip_mohm, required=True)
+    cells: int = entry("cells in series", low=1, high=60, required=True)
+    capacity_Ah: float = entry("capacity", "A h", 0.01, 1000.0, required=True)
+    resistance_mohm: float = entry("resistance of the pack with leads", "mohm", 0.0, 5000.0, _slip_mohm, required=True)
     soc: float = entry("state of charge at the start", "", 0.01, 1.0, default=1.0)
-    soc_min: float = entry("state of charge where a flight ends", "", 0.0, 0.99, default=0.2)
-    soc_table: tuple[float, ...] = entry("states of charge of ocv_cell_V, rising", "", 0.0, 1.0, default=LIPO_SOC)
+    soc_min: float = entry("state of charge at the end of a flight", "", 0.0, 0.99, default=0.2)
+    soc_table: tuple[float, ...] = entry("states of charge for ocv_cell_V, ascending", "", 0.0, 1.0, default=LIPO_SOC)
     ocv_cell_V: tuple[float, ...] = entry("open-circuit voltages of a cell", "V", 0.5, 5.0, default=LIPO_V)
 
     def rules(self) -> Iterable[tuple[str, ...]]:
@@ -41,19 +41,19 @@ class BatteryTable(Table):
 
 
 class EscTable(Table):
-    """[esc]: controller."""
+    """[esc]: speed controller."""
 
-    name: str | None = entry("of the controller")
-    pulse_min_us: float = entry("pulse width of no throttle", "us", 0.0, 5000.0, default=1000.0)
-    pulse_max_us: float = entry("pulse width of full throttle", "us", 1.0, 5000.0, default=2000.0)
-    exponent: float = entry("duty = share of the pulse width to this power", "", 0.2, 5.0, default=1.0)
-    resistance_mohm: float = entry("of the switches", "mohm", 0.0, 1000.0, _slip_mohm, default=0.0)
-    idle_A: float = entry("own current", "A", 0.0, 5.0, default=0.0)
-    current_limit_A: float | None = entry("of the battery side; no limit if left out", "A", 0.1, 1000.0)
-    braking: Literal["yes", "no"] = entry("complementary switching (yes) or diodes (no)", default="yes")
-    brake_on_stop: float = entry("brake force at no throttle; 0: the rotor coasts", "", 0.0, 1.0, default=1.0)
+    name: str | None = entry("name of the controller")
+    pulse_min_us: float = entry("pulse width at zero throttle", "us", 0.0, 5000.0, default=1000.0)
+    pulse_max_us: float = entry("pulse width at full throttle", "us", 1.0, 5000.0, default=2000.0)
+    exponent: float = entry("duty = throttle share to this power", "", 0.2, 5.0, default=1.0)
+    resistance_mohm: float = entry("resistance of the switches", "mohm", 0.0, 1000.0, _slip_mohm, default=0.0)
+    idle_A: float = entry("current of the controller itself", "A", 0.0, 5.0, default=0.0)
+    current_limit_A: float | None = entry("limit of the battery current; none if omitted", "A", 0.1, 1000.0)
+    braking: Literal["yes", "no"] = entry("synchronous switching (yes) or freewheeling diodes (no)", default="yes")
+    brake_on_stop: float = entry("braking strength at zero throttle; 0: the rotor coasts", "", 0.0, 1.0, default=1.0)
     pwm_kHz: float | None = entry(
-        "switching frequency; with motor.inductance_uH: when a current through diodes stops", "kHz", 0.1, 1000.0
+        "switching frequency; with motor.inductance_uH it sets when the diode current stops", "kHz", 0.1, 1000.0
     )
 
     def rules(self) -> Iterable[tuple[str, ...]]:
@@ -63,19 +63,23 @@ class EscTable(Table):
 
 
 class MotorTable(Table):
-    """[motor]: machine."""
+    """[motor]: electric motor."""
 
-    name: str | None = entry("of the motor")
+    name: str | None = entry("name of the motor")
     kv_rpm_V: float = entry("speed constant", "rev/min/V", 1.0, 50000.0, required=True)
-    resistance_mohm: float = entry("between two leads", "mohm", 0.01, 50000.0, _slip_mohm, required=True)
-    no_load_A: float = entry("current without load", "A", 0.0, 100.0, required=True)
-    inertia_kg_mm2: float = entry("of the turning part", "kg mm2", 0.0, 1e7, required=True)
-    heat_capacity_J_K: float | None = entry("of the winding; it stays cold if left out", "J/K", 0.01, 1e6)
-    thermal_K_W: float | None = entry("winding to air; with heat_capacity_J_K", "K/W", 0.001, 1000.0)
-    ambient_C: float = entry("air around it", "C", -60.0, 60.0, default=25.0)
-    max_temperature_C: float | None = entry("of the winding", "C", 20.0, 400.0)
-    inductance_uH: float | None = entry("between two leads", "uH", 0.01, 1e5)
-    pole_pairs: int | None = entry("for the reactance of the winding", low=1, high=200)
+    resistance_mohm: float = entry(
+        "winding resistance between two leads", "mohm", 0.01, 50000.0, _slip_mohm, required=True
+    )
+    no_load_A: float = entry("no-load current", "A", 0.0, 100.0, required=True)
+    inertia_kg_mm2: float = entry("inertia of the rotating part", "kg mm2", 0.0, 1e7, required=True)
+    heat_capacity_J_K: float | None = entry("heat capacity of the winding; stays cold if omitted", "J/K", 0.01, 1e6)
+    thermal_K_W: float | None = entry(
+        "thermal resistance from winding to air; with heat_capacity_J_K", "K/W", 0.001, 1000.0
+    )
+    ambient_C: float = entry("ambient temperature", "C", -60.0, 60.0, default=25.0)
+    max_temperature_C: float | None = entry("highest temperature of the winding", "C", 20.0, 400.0)
+    inductance_uH: float | None = entry("inductance between two leads", "uH", 0.01, 1e5)
+    pole_pairs: int | None = entry("pole pairs, for the reactance of the winding", low=1, high=200)
 
     def rules(self) -> Iterable[tuple[str, ...]]:
         """Heat needs both numbers, reactance needs the inductance."""
@@ -86,23 +90,23 @@ class MotorTable(Table):
 
 
 class TurningTable(Table):
-    """[rotor]: what the case does not say of it."""
+    """[rotor]: rotor data that the case does not have."""
 
-    inertia_kg_mm2: float = entry("of the rotor", "kg mm2", 0.0, 1e7, required=True)
+    inertia_kg_mm2: float = entry("inertia of the rotor", "kg mm2", 0.0, 1e7, required=True)
 
 
 class VehicleTable(Table):
-    """[vehicle]: what flies."""
+    """[vehicle]: mass and rotor count."""
 
-    mass_kg: float = entry("of all", "kg", 0.001, 1e5, required=True)
-    rotors: int = entry("that share the battery", low=1, high=64, required=True)
+    mass_kg: float = entry("total mass", "kg", 0.001, 1e5, required=True)
+    rotors: int = entry("number of rotors on the battery", low=1, high=64, required=True)
 
 
 class AssumedTable(Table):
-    """[[assumed]]: a value of this file that no source states."""
+    """[[assumed]]: a value in this file that no source states."""
 
-    key: str = entry("dotted key, as motor.kv_rpm_V", required=True)
-    why: str = entry("where it comes from", required=True)
+    key: str = entry("dotted key, such as motor.kv_rpm_V", required=True)
+    why: str = entry("source of the value", required=True)
 
 
 class DriveToml(Table):

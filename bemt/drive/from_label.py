@@ -46,8 +46,8 @@ class DriveUnknown:
 
 _USED = "3582 points of 1088 motors with a propeller, Drive Calculator"
 POPULATION: Mapping[str, DriveUnknown] = {
-    "winding_drop": DriveUnknown(0.14, 0.07, 0.24, "share of the voltage that the motor's winding takes", _USED),
-    "idle_share": DriveUnknown(0.073, 0.049, 0.11, "share of the current that friction and iron take", _USED),
+    "winding_drop": DriveUnknown(0.14, 0.07, 0.24, "share of the voltage lost in the winding of the motor", _USED),
+    "idle_share": DriveUnknown(0.073, 0.049, 0.11, "share of the current lost to friction and iron losses", _USED),
     "battery_sag": DriveUnknown(
         0.06, 0.03, 0.10, "share of its voltage that the pack loses at full throttle", "declared"
     ),
@@ -270,20 +270,20 @@ def _notes(case: Case, kv: float, cells: int, nominal: Mapping[str, float]) -> t
         fit = [v / per_m / INCH for v in TIPS[:2]]
         rare = tips > TIPS[3]
         slower = [v / (math.pi * case.diameter_m * loaded) * 60.0 for v in TIPS[:2]]
-        first = "no usual combination" if rare else "a fast combination"
+        first = "unusual combination" if rare else "fast combination"
         notes.append(
-            f"{first}: without load the tips would run at {tips:.0f} m/s; 95 % of 1088 recorded motors stay below "
+            f"{first}: without load the tip speed would be {tips:.0f} m/s; 95 % of 1088 recorded motors are below "
             f"{TIPS[2]:.0f}.\n  {kv:g} rev/min/V on {cells}S suits propellers of {fit[0]:.1f} to {fit[1]:.1f} in; a "
             f"propeller of {case.diameter_m / INCH:.3g} in suits {slower[0]:.0f} to {slower[1]:.0f} rev/min/V.\n  "
             + (
-                "A usual motor would be overloaded and burn: the numbers are those of one large enough not to."
+                "A typical motor would overload and burn out; the numbers assume a motor that is large enough."
                 if rare
-                else "Racing propellers are run so; the motor gets hot at full throttle."
+                else "This is common for racing; the motor gets hot at full throttle."
             )
         )
     mach = math.pi * case.diameter_m * nominal["full.rpm"] / 60.0 / case.air().a_sound
     if mach > 0.8:
-        notes.append(f"the tips run at Mach {mach:.2f}: beyond where section tables are good")
+        notes.append(f"tip Mach number {mach:.2f}: beyond the range of the section tables")
     return tuple(notes)
 
 
@@ -322,20 +322,20 @@ def text(found: DriveEstimate) -> str:
     lines.append(f"{'throttle':<12}{'100 %':<28}{_shown(hover['throttle'], '%', 100.0)}")
     if not found.reached:
         lines.append(
-            f"no hover: each rotor must give {hover['thrust_N'].value:.1f} N and gives {full['thrust_N'].value:.1f} N"
+            f"no hover: each rotor needs {hover['thrust_N'].value:.1f} N; its maximum is {full['thrust_N'].value:.1f} N"
         )
     else:
-        aloft = "min" if given["capacity_Ah"] is not None else "min for each A h of capacity"
-        lines.append(f"{'time aloft':<12}{'':<28}{_shown(hover['minutes'], aloft)}")
+        aloft = "min" if given["capacity_Ah"] is not None else "min per A h of capacity"
+        lines.append(f"{'flight time':<12}{'':<28}{_shown(hover['minutes'], aloft)}")
     a, b = (1e2 * v / full["battery_A"].value for v in (full["battery_A"].u, full["battery_A"].u_with_sheet))
     lines += [
         "",
         f"assumed: winding {given['resistance_mohm']:.0f} mohm, no-load current {given['no_load_A']:.2g} A: typical of "
-        "motors under a",
-        f"propeller. With both from the motor's sheet the current is known to {b:.0f} % instead of {a:.0f} %: write a",
-        "case with `bemt new`, put them into its drive.toml and run `bemt drive` on it.",
+        "such motors.",
+        f"With both from the motor's sheet the current is known to {b:.0f} % instead of {a:.0f} %: write a",
+        "case with `bemt new`, enter them in its drive.toml and run `bemt drive` on it.",
     ]
     ask = [name for key, name in (("mass_kg", "--mass"), ("capacity_Ah", "--capacity")) if given[key] is None]
     if ask:
-        lines.append(f"more with {' and '.join(ask)}")
+        lines.append(f"for more results give {' and '.join(ask)}")
     return "\n".join(lines) + "\n"

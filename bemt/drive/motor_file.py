@@ -29,22 +29,22 @@ _PCT = Limits("%", 0.0, 50.0)
 class MotorHead(Table):
     """[motor]: the machine and its data sheet."""
 
-    name: str = entry("of the motor", required=True)
-    winding: Literal["wye", "delta"] = entry("how the phases are joined", required=True)
-    kv_rpm_V: float | None = entry("speed constant: the method data sheet", "rev/min/V", 1.0, 50000.0)
-    kv_tolerance_pct: float | None = entry("half-width, stated or assumed; unknown if left out", _PCT)
-    kv_measure: Volt = entry("which volt K_v means", default="peak")
-    kv_between: Between = entry("where that volt is measured", default="line")
-    pole_pairs: int | None = entry("needed by waveforms", low=1, high=60)
-    data: str = entry("what the trials are", default="")
-    source: str | None = entry("where they come from")
+    name: str = entry("name of the motor", required=True)
+    winding: Literal["wye", "delta"] = entry("connection of the phases", required=True)
+    kv_rpm_V: float | None = entry("speed constant, for the data sheet method", "rev/min/V", 1.0, 50000.0)
+    kv_tolerance_pct: float | None = entry("half-width, stated or assumed; unknown if omitted", _PCT)
+    kv_measure: Volt = entry("voltage measure that K_v refers to", default="peak")
+    kv_between: Between = entry("where that voltage is measured", default="line")
+    pole_pairs: int | None = entry("required with waveforms", low=1, high=60)
+    data: str = entry("description of the trials", default="")
+    source: str | None = entry("source of the trials")
 
 
 class ResultTable(Table):
-    """[result]: convention of K_t."""
+    """[result]: convention for K_t."""
 
-    current: Ampere = entry("K_t is torque per this current", default="q_power_invariant")
-    between: Between = entry("in a winding (phase) or a lead (line)", default="phase")
+    current: Ampere = entry("current that K_t refers to", default="q_power_invariant")
+    between: Between = entry("current in a winding (phase) or a lead (line)", default="phase")
 
 
 class BackEmfTable(Table):
@@ -52,7 +52,7 @@ class BackEmfTable(Table):
 
     file: str | None = entry("columns trial, rpm, one in V")
     waveforms: tuple[str, ...] | None = entry("oscilloscope traces, one trial each")
-    measure: Volt | None = entry("what the column in V is")
+    measure: Volt | None = entry("voltage measure in the column in V")
     between: Between = entry("where it is measured", required=True)
     u_gain_pct: float | None = entry("standard uncertainty common to all trials", _PCT)
 
@@ -67,18 +67,18 @@ class BackEmfTable(Table):
 
 
 class TorqueTable(Table):
-    """[torque]: trials with a torque sensor that drives a current loop."""
+    """[torque]: trials with a torque sensor on a current loop."""
 
     file: str = entry("columns trial, one in A, one in V", required=True)
     shunt_ohm: float = entry(
-        "resistance that turns the loop's current into the column in V", "ohm", 0.01, 1e5, required=True
+        "shunt that converts the loop current into the column in V", "ohm", 0.01, 1e5, required=True
     )
     u_shunt_pct: float = entry("its standard uncertainty", _PCT, default=0.0)
     low_mA: float = entry("current at torque_low_Nm", "mA", 0.0, 100.0, default=4.0)
     high_mA: float = entry("current at torque_high_Nm", "mA", 0.1, 100.0, default=20.0)
-    torque_low_Nm: float = entry("lower end of the sensor", "N m", -1e4, 1e4, default=0.0)
-    torque_high_Nm: float = entry("upper end of the sensor", "N m", 1e-4, 1e4, default=2.0)
-    current: Ampere = entry("what the column in A is", required=True)
+    torque_low_Nm: float = entry("lower limit of the sensor", "N m", -1e4, 1e4, default=0.0)
+    torque_high_Nm: float = entry("upper limit of the sensor", "N m", 1e-4, 1e4, default=2.0)
+    current: Ampere = entry("current measure in the column in A", required=True)
     between: Between = entry("where it is measured", required=True)
     u_gain_pct: float | None = entry("standard uncertainty common to all trials", _PCT)
 
@@ -89,7 +89,7 @@ class TorqueTable(Table):
 
 
 class StatedTable(Table):
-    """[[stated]]: a value of others, drawn beside ours."""
+    """[[stated]]: a published value, plotted for comparison."""
 
     name: str = entry("whose", required=True)
     Kt_Nm_A: float = entry("torque constant", "N m/A", 1e-7, 1e3, required=True)

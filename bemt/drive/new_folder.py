@@ -113,19 +113,19 @@ def _label_text(w: Wanted, label: str) -> str:
 def _drive_text(case: Case, kv: float, cells: int) -> str:
     """A drive.toml with the typical motor of this K_v under this rotor; every number assumed is named."""
     given = from_label.estimate(case, kv, cells).given
-    typical = "not known: typical of measured motors under a propeller; take it from the motor's sheet"
+    typical = "not known; typical of measured motors with a propeller. Take it from the data sheet of the motor"
     assumed = {
         "motor.resistance_mohm": typical,
         "motor.no_load_A": typical,
-        "motor.inertia_kg_mm2": "not known; it only decides how fast thrust follows the throttle",
+        "motor.inertia_kg_mm2": "not known; only affects how fast thrust follows the throttle",
         "rotor.inertia_kg_mm2": "not known; blades of plastic, 0.06 kg per m2 of diameter squared",
-        "battery.capacity_Ah": "yours?",
-        "battery.resistance_mohm": "not known: 6 % of the voltage at full throttle",
+        "battery.capacity_Ah": "not known; enter yours",
+        "battery.resistance_mohm": "not known; 6 % of the voltage at full throttle",
     }
     # two slender blades: m R^2 / 3, their mass nearer to the hub than that: a third of it
     inertia = 0.06 * case.diameter_m**2 * (0.5 * case.diameter_m) ** 2 / 9.0 * 1e6 * case.file.rotor.blades
     rows = "".join(f'\n[[assumed]]\nkey = "{key}"\nwhy = "{text}"\n' for key, text in assumed.items())
-    return f"""# Drive of {case.name}: K_v and cells as told, everything else assumed, see below. Replace what you know.
+    return f"""# Drive of {case.name}: K_v and cells as given, the rest assumed (see below). Replace what you know.
 schema = "bemt.drive/1"
 
 [battery]
@@ -146,7 +146,7 @@ inertia_kg_mm2 = {max(1.0, 0.3 * inertia):.3g}
 [rotor]
 inertia_kg_mm2 = {inertia:.3g}
 
-# [vehicle]  # for hover and time aloft
+# [vehicle]  # for hover and flight time
 # mass_kg = 1.5
 # rotors = 4
 {rows}"""

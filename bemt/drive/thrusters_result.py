@@ -21,17 +21,17 @@ MOST = 1e6
 
 
 class BodyTable(Table):
-    """[body]: what the thrusters stand on."""
+    """[body]: the vehicle that carries the thrusters."""
 
-    name: str = entry("of the body", required=True)
-    mass_kg: float | None = entry("of the body", "kg", 0.001, 1e6)
+    name: str = entry("name of the body", required=True)
+    mass_kg: float | None = entry("mass of the body", "kg", 0.001, 1e6)
 
 
 class ThrusterTable(Table):
-    """[[thruster]]: place and limits of one of them; x forward, y left, z up from the centre of mass."""
+    """[[thruster]]: position and limits of one thruster; x forward, y left, z up from the centre of mass."""
 
-    name: str = entry("of the thruster", default="")
-    y_m: float = entry("to the left", "m", -50.0, 50.0, required=True)
+    name: str = entry("name of the thruster", default="")
+    y_m: float = entry("position, positive to the left", "m", -50.0, 50.0, required=True)
     z_m: float = entry("up", "m", -50.0, 50.0, default=0.0)
     thrust_max_N: float = entry("upper limit", "N", 1e-3, 1e6, required=True)
     thrust_min_N: float = entry("lower limit", "N", -1e6, 1e6, default=0.0)
@@ -44,17 +44,17 @@ class ThrusterTable(Table):
 
 
 class CommandTable(Table):
-    """[command]: what is wanted."""
+    """[command]: requested force and moment."""
 
     force_N: float = entry("force upwards", "N", -MOST, MOST, required=True)
     moment_Nm: float = entry("roll moment", "N m", -MOST, MOST, required=True)
-    priority: Literal["moment", "force"] = entry("what is met first beyond the limits", default="moment")
+    priority: Literal["moment", "force"] = entry("what has priority beyond the limits", default="moment")
 
 
 class MountingTable(Table):
-    """[mounting]: distances of a pair to compare."""
+    """[mounting]: mounting distances of a pair to compare."""
 
-    distance_m: Axis = entry("from the centre", "m", 0.0, 50.0, required=True)
+    distance_m: Axis = entry("distance from the centre", "m", 0.0, 50.0, required=True)
 
 
 class ThrustersFile(Table):

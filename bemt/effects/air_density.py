@@ -13,17 +13,20 @@ class AirDensity(Effect):
 
     Notes
     -----
-    rho (1 + change).  +-3 % is weather (CIPM-2007, Picard et al. 2008, Metrologia 45:149: 1 % per 3 K or 10 hPa); -30 %
-    is 3500 m of the U.S. Standard Atmosphere (1976).  Viscosity and sound speed stay: they know the temperature only.
+    rho (1 + change). +-3 % is weather (CIPM-2007, Picard et al. 2008, Metrologia 45:149: 1 % per 3 K or 10 hPa); -30 %
+    is 3500 m of the U.S. Standard Atmosphere (1976). Viscosity and speed of sound stay the same: they depend on
+    temperature only.
     """
 
     change: float = -0.10
 
     id = "air_density"
     exact = True
-    title = "density of the air"
-    check = "read barometer and thermometer beside the stand and work the density out"
-    sign = "thrust and torque off by the same share at every speed and advance ratio; one cell's gain moves one of them"
+    title = "wrong air density"
+    check = "read barometer and thermometer at the stand and compute the density"
+    sign = (
+        "thrust and torque off by the same share at every speed and advance ratio; a cell gain moves only one of them"
+    )
     parameters = (
         Parameter("change", "1", -0.35, 0.5, "weather +-3 %; altitude to 3500 m, forgotten or wrongly stated", 7, 0.0),
     )

@@ -15,23 +15,23 @@ class AirspeedGain(Effect):
 
     Notes
     -----
-    A pitot tube gives V = C sqrt(2 q / rho), C within 1 % of 1 for a standard tube along the stream (ISO 3966:2020; not
-    checked); a tube near the rotor or the wall, a transducer's factor or the density put in by hand are off by more.
-    +-20 % is declared.  Rest stays rest.
+    A pitot tube gives V = C sqrt(2 q / rho), C within 1 % of 1 for a standard tube aligned with the flow (ISO
+    3966:2020; not checked); a tube near the rotor or the wall, a transducer gain or a manually entered density are off
+    by more. +-20 % is declared. Static points stay static.
     """
 
     gain: float = 0.1
 
     id = "airspeed_gain"
-    title = "calibration factor of the airspeed meter"
+    title = "gain error of the airspeed sensor"
     sign = (
-        "all of J stretched by one factor at every speed of rotation, nothing at rest; wind at an angle by "
-        "acos(1 / factor) looks alike, an offset would fade as 1/n"
+        "scales J by one factor at every speed of rotation, no change in static runs; wind at an angle of acos(1 / "
+        "factor) looks the same, an offset would fade as 1/n"
     )
     kind = "stand"
     fault = "gain"
     sensor = "airspeed_m_s"
-    check = "pitot against a second one, or a run with the wind tunnel empty"
+    check = "compare the pitot with a second one, or run with the wind tunnel empty"
     parameters = (Parameter("gain", "1", -0.2, 0.2, "declared, pitot and transducer", 5, 0.0),)
     on_by_default = False
 

@@ -15,16 +15,16 @@ class AirspeedOffset(Effect):
 
     Notes
     -----
-    Draught of a hall or zero of a pitot's transducer: 0.15 Pa is 0.5 m/s at rest.  Range +-1 m/s is declared.  Points
-    recorded at V = 0 are static by decision and stay; a speed below zero counts as zero.
+    Draught in the hall or zero of the pitot transducer: 0.15 Pa is 0.5 m/s in still air. Range +-1 m/s is declared.
+    Points recorded at V = 0 are treated as static and stay so; a negative speed counts as zero.
     """
 
     offset_m_s: float = 0.5
 
     id = "airspeed_offset"
-    title = "airspeed other than recorded"
-    check = "read the pitot with the fan of the tunnel off, and beside a second one"
-    sign = "shift of J that fades as 1/n at high speed of rotation; a blade angle would shift every speed alike"
+    title = "airspeed offset"
+    check = "read the pitot with the tunnel fan off, and compare it with a second one"
+    sign = "shift of J that fades as 1/n at high speed of rotation; a wrong blade angle shifts every speed equally"
     kind = "stand"
     fault = "zero"
     sensor = "airspeed_m_s"

@@ -1,11 +1,11 @@
-"""What an effect is, and the working records that effects change.
+"""The contract for effects, and the records that effects change.
 
-An effect is a frozen dataclass with an ``id`` and hooks that are called in a fixed order.  The solver calls, once per
+An effect is a frozen dataclass with an ``id`` and hooks that are called in a fixed order. The solver calls, once per
 rotor: ``blade`` (adds to beta) -> ``inflow`` (scales and adds to Vx, Vy) -> ``section`` (changes cl, cd tables) ->
-``momentum`` (sets the few numbers of the compiled kernel).  The model of a recording (:mod:`bemt.bem.model`) calls,
-once per set of points: ``flow`` (what the rotor meets) before the solver, ``loads`` (thrust and torque) and ``reading``
-(what the instruments show) after it.  A hook that an effect does not have is not called.
-Each file of this folder that defines a subclass of :class:`Effect` is found by :func:`bemt.effects.catalogue`.
+``momentum`` (sets numbers of the compiled kernel). The model of a recording (:mod:`bemt.bem.model`) calls, once per set
+of points: ``flow`` (conditions at the rotor) before the solver, ``loads`` (thrust and torque) and ``reading``
+(instrument readings) after it. Hooks that an effect does not define are not called. Each file in this folder that
+defines a subclass of :class:`Effect` is found by :func:`bemt.effects.catalogue`.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number of an effect: what it is called, its unit and the physical range it may take.
+    """A parameter of an effect: name, unit and physical range.
 
     Parameters
     ----------
@@ -35,14 +35,14 @@ class Parameter:
     low, high : float
         Physical prior range, in the unit of the parameter.
     source : str
-        Where range and default come from.
+        Source of range and default.
     steps : int
-        Values of the range at which a diagnosis solves (it interpolates between them); 0: it leaves the default [1].
+        Number of values at which a diagnosis solves (it interpolates between them); 0: it keeps the default [1].
     off : float, optional
-        Value at which nothing is changed; an effect with several such parameters is nothing at all of them together,
-        in the unit of the parameter.
+        Value at which the effect vanishes; an effect with several such parameters vanishes if all have this value.
+        In the unit of the parameter.
     usual : float, optional
-        Size that is usual, where the range goes far beyond it; None: all values are alike (unit of the parameter).
+        Typical size, if the range extends far beyond it; None: all values are equally likely (unit of the parameter).
     """
 
     name: str
@@ -55,9 +55,9 @@ class Parameter:
     usual: float | None = None
 
     def density(self, value: float) -> float:
-        """Prior density of a value, of any scale: the same over the range, or heavy-tailed about "off".
+        """Unnormalised prior density of a value: uniform over the range, or heavy-tailed around "off".
 
-        Student's t with three degrees of freedom: most faults are of the usual size, some are many times that.
+        Student's t with three degrees of freedom: most faults have the typical size, some are many times larger.
         """
         if self.usual is None or self.off is None:
             return 1.0
@@ -65,19 +65,19 @@ class Parameter:
 
 
 def choice(name: str, value: str, lawful: tuple[str, ...]) -> None:
-    """Refuse a word that a field of an effect does not know.
+    """Raise an error for a word that a field of an effect does not accept.
 
     Parameters
     ----------
     name, value : str
-        Field and what it got.
+        Field and its value.
     lawful : tuple of str
-        What it knows.
+        Accepted words.
 
     Raises
     ------
     ValueError
-        If the word is another one.
+        If the word is not accepted.
     """
     if value not in lawful:
         raise ValueError(f"{name}={value!r}; expected {', '.join(lawful)}")
@@ -85,20 +85,20 @@ def choice(name: str, value: str, lawful: tuple[str, ...]) -> None:
 
 @dataclass(slots=True)
 class KernelNumbers:
-    """The numbers that effects may set for the compiled kernel; a name that is not here is an error.
+    """Numbers that effects may set for the compiled kernel; any other name is an error.
 
     Attributes
     ----------
     tip, hub : float
         Factors on the exponents of the tip and hub losses; 0: no loss [1].
     far_wake : float
-        1: the sheets of the tip loss follow the helix of the far wake, 0: that at the disk [1].
+        1: the vortex sheets of the tip loss follow the far-wake helix, 0: the helix at the disk [1].
     swirl : float
-        1: the swirl is taken up by the momentum balance, 0: it is left out [1].
+        1: swirl is part of the momentum balance, 0: it is neglected [1].
     bridge : float
-        1: an empirical curve where momentum theory fails, 0: momentum theory throughout [1].
+        1: an empirical curve where momentum theory fails, 0: momentum theory everywhere [1].
     gap_share : float
-        Ducted rotor: share of the open tip's loss, 0 sealed to 1 [1].
+        Ducted rotor: share of the open tip loss, 0 (sealed) to 1 [1].
     gap_loss : float
         Ducted rotor: share of the blade force lost through the gap [1].
     """
@@ -131,9 +131,9 @@ class Baking:
     M2 : (Nm,) float
         Grid of the squared Mach number [1].
     cl, cd : (N, Nm or 1, Nr, Na) float
-        Section tables; one Mach number until an effect tells them apart (:meth:`scale_lift`, :meth:`add_drag`) [1].
+        Section tables; one Mach number unless an effect depends on it (:meth:`scale_lift`, :meth:`add_drag`) [1].
     mach_lift, mach_drag : (N, Nm, 1, Na) float or None
-        Factor on cl and addition to cd that are kept apart from the tables; None: they are in them [1].
+        Factor on cl and addition to cd that are kept separate from the tables; None: they are in the tables [1].
     alpha0, cla : (N, Nr) float
         Zero-lift angle [rad] and lift slope [1/rad] of the incompressible table.
     num : KernelNumbers
@@ -141,20 +141,20 @@ class Baking:
     Vx_factor, Vy_factor : (N,) float
         Factors on the axial and tangential onset speed of every point [1].
     Vx_add, Vy_add : (N,) float
-        What is added to them then [m/s].
+        Increments that are then added to them [m/s].
     thickness : (N,) float
-        Largest thickness over chord [1].
+        Maximum thickness over chord [1].
     own_mach : (N,) float
-        Share of the station's table that brings its own Mach dependence, 0 to 1 [1].
+        Share of the station's table that already depends on Mach number, 0 to 1 [1].
     gap : float
         Tip gap of a ducted rotor [m], NaN for an open one.
     ducted : bool
         Whether there is a duct.
     level : float
-        Share of an effect whose size differs from point to point, see :meth:`Effect.share`; the effect that uses it
-        sets it back to 1 [1].
+        Strength of an effect that varies from point to point, see :meth:`Effect.share`; the effect that uses it
+        resets it to 1 [1].
     sections : tuple of (float, geometry.airfoil.Airfoil)
-        Shapes at r/R, ascending; empty where they are not known.
+        Section shapes at r/R, ascending; empty if unknown.
     """
 
     r: Array
@@ -194,14 +194,14 @@ class Baking:
             self.cl *= factor
 
     def add_drag(self, drag: Array) -> None:
-        """Add to cd what may depend on Mach number, (N or 1, Nm or 1, Nr or 1, Na or 1) [1]."""
+        """Add to cd a value that may depend on Mach number, (N or 1, Nm or 1, Nr or 1, Na or 1) [1]."""
         if self._apart(drag):
             self.mach_drag = drag if self.mach_drag is None else self.mach_drag + drag
         else:
             self.cd += drag
 
     def spread(self) -> None:
-        """Write out the tables over every Mach number, for effects that change them in another way."""
+        """Expand the tables over all Mach numbers, for effects that change them in another way."""
         shape = (self.cl.shape[0], self.M2.size, *self.cl.shape[2:])
         if self.cl.shape != shape:
             self.cl = np.multiply(self.cl, 1.0 if self.mach_lift is None else self.mach_lift, out=np.empty(shape))
@@ -210,11 +210,11 @@ class Baking:
 
     @property
     def mach_apart(self) -> bool:
-        """Whether changes of Mach number wait beside the tables."""
+        """Whether changes over Mach number are kept separate from the tables."""
         return self.mach_lift is not None or self.mach_drag is not None
 
     def _apart(self, values: Array) -> bool:
-        """Whether the change is of Mach number and not of Reynolds number, and the tables know neither."""
+        """Whether the change depends on Mach but not on Reynolds number, and the tables have no Mach axis yet."""
         if self.cl.shape[1] == self.M2.size:
             return False
         if values.shape[2] > 1:
@@ -224,7 +224,7 @@ class Baking:
 
     @property
     def fast(self) -> slice:
-        """The one Reynolds number, nearest to 5e5, that stands for the blades whose Mach number matters."""
+        """The Reynolds number nearest to 5e5, which represents blades where the Mach number matters."""
         i = int(np.argmin(np.abs(np.log(self.Re / 5e5))))
         return slice(i, i + 1)
 
@@ -236,7 +236,7 @@ class Baking:
 
 @dataclass
 class Flow:
-    """What the rotor meets at P points of a recording; the hook ``flow`` changes it before the solver runs.
+    """Conditions at the rotor for P points of a recording; the hook ``flow`` changes them before the solver runs.
 
     Attributes
     ----------
@@ -253,7 +253,7 @@ class Flow:
     dT_dV, dQ_dV : (P,) float
         Their slopes with the axial onset speed [N s/m], [N s].
     extra : mapping of str to (P,) float
-        What else the recording carries, SI by name: time_s, temperature_K, pressure_Pa, voltage_V, current_A, pwm_s,
+        Other channels of the recording, SI by name: time_s, temperature_K, pressure_Pa, voltage_V, current_A, pwm_s,
         tip_gap_m, wall_distance_m, sideslip_rad, run.  Absent: not recorded.
     """
 
@@ -295,7 +295,7 @@ class Flow:
 
     @property
     def warming(self) -> Array:
-        """Temperature less that at the start of the run, (P,), zero where it is not recorded [K]."""
+        """Temperature rise since the start of the run, (P,), zero if not recorded [K]."""
         if "temperature_K" not in self.extra:
             return np.zeros_like(self.rpm)
         T = self.extra["temperature_K"]
@@ -311,7 +311,7 @@ class Flow:
 
     @property
     def runs(self) -> list[NDArray[np.intp]]:
-        """Points of each run (of the only one, if runs are not recorded) in the order of time; [] without time_s."""
+        """Points of each run (one run if runs are not recorded) in order of time; [] without time_s."""
         if "time_s" not in self.extra:
             return []
         t = self.extra["time_s"]
@@ -321,7 +321,7 @@ class Flow:
 
     @property
     def clock(self) -> Array:
-        """Time since the first point of the run, (P,), zero where it is not recorded [s]."""
+        """Time since the first point of the run, (P,), zero if not recorded [s]."""
         t = np.zeros_like(self.rpm)
         for run in self.runs:
             t[run] = self.extra["time_s"][run] - self.extra["time_s"][run[0]]
@@ -331,7 +331,7 @@ class Flow:
     def induced(self) -> Array:
         """Induced speed of the baseline's thrust by momentum theory of the open disk, (P,) [m/s].
 
-        v = sqrt(V^2/4 + T/(2 rho A)) - V/2 (Glauert 1935, eq. VII 2.3), zero for a thrust that is not positive.
+        v = sqrt(V^2/4 + T/(2 rho A)) - V/2 (Glauert 1935, eq. VII 2.3), zero unless the thrust is positive.
         """
         load = np.maximum(self.T0, 0.0) / (2.0 * self.rho * self.area)
         half = 0.5 * np.abs(self.V)
@@ -345,7 +345,7 @@ class Loads:
     Attributes
     ----------
     T, Q : (P,) float
-        Thrust, with a duct the total [N]; shaft torque [N m].
+        Thrust (total thrust with a duct) [N]; shaft torque [N m].
     T_duct : (P,) float
         Thrust of the duct, zero without one [N].
     """
@@ -357,14 +357,14 @@ class Loads:
 
 @dataclass
 class Reading:
-    """What the instruments show at P points; the hook ``reading`` changes it.
+    """Instrument readings at P points; the hook ``reading`` changes them.
 
     Attributes
     ----------
     values : dict of str to (P,) float
-        Channels: thrust_N and torque_Nm; also ``rpm`` where the recording has a pulse width to set it by.
+        Channels: thrust_N and torque_Nm; also ``rpm`` if the recording has a pulse width.
     full_scale : mapping of str to float
-        Largest magnitude of each channel over the baseline, for errors stated as a share of full scale.
+        Largest magnitude of each channel in the baseline, for errors given as a share of full scale.
     """
 
     values: dict[str, Array]
@@ -372,13 +372,13 @@ class Reading:
 
 
 class Effect:
-    """Base of all effects; subclasses are frozen dataclasses whose fields are the parameters."""
+    """Base class of all effects; subclasses are frozen dataclasses whose fields are the parameters."""
 
     id: ClassVar[str] = ""
     title: ClassVar[str] = ""
-    # What an engineer would say of it: where it shows and why it cannot be something else.
+    # Signature: where it shows and what distinguishes it from other effects.
     sign: ClassVar[str] = ""
-    # "air" (the flow), "stand" (instruments and what was written down) or "drive" (motor, battery).
+    # "air" (the flow), "stand" (instruments and records) or "drive" (motor, battery).
     kind: ClassVar[str] = "air"
     # What is wrong with an instrument ("gain", "zero", "drift", "unit", ...) and the channel that it gives; "" where
     # the setting says which, or where nothing is wrong with one.
@@ -389,15 +389,15 @@ class Effect:
     # Law of a flow without friction and compressibility: by similarity (Buckingham 1914) its dimensionless form may
     # depend on the advance ratio and on `along`, not on speed or density.
     inviscid: ClassVar[bool] = False
-    # Something that anybody at the stand would see.
+    # Anyone at the stand would see it.
     evident: ClassVar[bool] = False
-    # A number that was written down wrongly: what it changes follows from the definition, and no law can be off.
+    # A wrongly recorded number: its effect follows from the definition, so the law cannot be off.
     exact: ClassVar[bool] = False
-    # What one would look at to be sure, without a run.
+    # How to check it without a run.
     check: ClassVar[str] = ""
-    # Parameters that take a few values only (a ratio of units), nothing between them.
+    # Parameters with a few discrete values (such as a ratio of units).
     discrete: ClassVar[tuple[str, ...]] = ()
-    # Names in Flow.extra without which it cannot be seen.
+    # Names in Flow.extra that are required to see it.
     needs: ClassVar[tuple[str, ...]] = ()
     # Whether a diagnosis may name it.
     diagnosed: ClassVar[bool] = True
@@ -409,7 +409,7 @@ class Effect:
     on_by_default: ClassVar[bool] = True
 
     def __init_subclass__(cls) -> None:
-        """Refuse a parameter that would hide a hook; an effect without notes has those of the one it comes from."""
+        """Refuse a parameter that would hide a hook; an effect without notes inherits those of its base class."""
         if "    Notes\n" not in (cls.__doc__ or ""):
             notes = next((n for b in cls.__mro__[1:] if (n := (b.__doc__ or "").partition("    Notes\n")[2])), "")
             cls.__doc__ = (cls.__doc__ or "") + (f"\n\n    Notes\n{notes}" if notes else "")
@@ -422,26 +422,26 @@ class Effect:
             )
 
     def blade(self, bake: Baking) -> None:
-        """Change blade angles; the base does nothing."""
+        """Change blade angles; does nothing by default."""
 
     def inflow(self, bake: Baking) -> None:
-        """Scale and add to the onset speeds of the stations; the base does nothing."""
+        """Change the onset speeds of the stations; does nothing by default."""
 
     def section(self, bake: Baking) -> None:
-        """Change section tables; the base does nothing."""
+        """Change section tables; does nothing by default."""
 
     def momentum(self, bake: Baking) -> None:
-        """Set kernel numbers; the base does nothing."""
+        """Set kernel numbers; does nothing by default."""
 
     def duct(self, R: float, stated: bool) -> Mapping[str, float] | None:
-        """Numbers of :class:`bemt.bem.duct.DuctFlow` that the effect sets, which ducts an open rotor; None: none.
+        """Numbers of :class:`bemt.bem.duct.DuctFlow` that the effect sets to duct an open rotor; None: no duct.
 
         Parameters
         ----------
         R : float
             Tip radius [m].
         stated : bool
-            Whether the case has a duct of its own.
+            Whether the case itself has a duct.
 
         Returns
         -------
@@ -451,32 +451,32 @@ class Effect:
         return None
 
     def flow(self, flow: Flow) -> None:
-        """Change what the rotor meets; the base does nothing."""
+        """Change the conditions at the rotor; does nothing by default."""
 
     def loads(self, loads: Loads, flow: Flow) -> None:
-        """Change thrust and torque; the base does nothing.
+        """Change thrust and torque; does nothing by default.
 
         Parameters
         ----------
         loads : Loads
             Thrust and torque, changed in place.
         flow : Flow
-            What the rotor meets.
+            Conditions at the rotor.
         """
 
     def reading(self, reading: Reading, flow: Flow) -> None:
-        """Change what instruments show; the base does nothing.
+        """Change instrument readings; does nothing by default.
 
         Parameters
         ----------
         reading : Reading
-            What instruments show, changed in place.
+            Instrument readings, changed in place.
         flow : Flow
-            What the rotor meets.
+            Conditions at the rotor.
         """
 
     def share(self, flow: Flow) -> Array | None:
-        """Size of the effect at each point of a recording for effects of the solver that differ between points.
+        """Strength of the effect at each point of a recording, for solver effects that vary between points.
 
         Parameters
         ----------
@@ -486,12 +486,12 @@ class Effect:
         Returns
         -------
         (P,) float or None
-            Between 0 and 1, the ``level`` at which the hooks of the solver shall act; None: 1 everywhere [1].
+            Between 0 and 1: the ``level`` at which the solver hooks act; None: 1 everywhere [1].
         """
         return None
 
     def applies(self, flow: Flow) -> str:
-        """Reason why the effect cannot be at work in a recording, "" when it can.
+        """Reason why the effect cannot be present in a recording, "" if it can.
 
         Parameters
         ----------
@@ -507,11 +507,11 @@ class Effect:
         return f"the recording has no {', '.join(missing)}" if missing else ""
 
     def variants(self) -> tuple[dict[str, Any], ...] | None:
-        """Discrete settings that a diagnosis tries instead of the ranges of ``parameters``; None: the ranges."""
+        """Discrete settings that a diagnosis tries instead of the ranges of ``parameters``; None: use the ranges."""
         return None
 
     def plausible(self, flow: Flow) -> bool:
-        """Whether the world has such a thing at these points, however the effect came about; the base says yes."""
+        """Whether such an effect is physically plausible at these points; True by default."""
         return True
 
     def describe(self) -> dict[str, Any]:

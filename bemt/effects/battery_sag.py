@@ -19,12 +19,12 @@ class BatterySag(Effect):
     Notes
     -----
     Equivalent circuit of a battery with one resistance (Tremblay and Dessaint 2009, World Electric Vehicle J. 3:289,
-    without its exponential zone; not checked).  Recorded ``voltage_V`` counts against its largest value; where that
-    circuit fits it over a run, the fit is taken, without the noise of the meter, else the voltage as it is.
+    without its exponential zone; not checked). Recorded ``voltage_V`` is taken relative to its largest value. If that
+    circuit fits it over a run, the fit is used, without the noise of the meter; otherwise the voltage as recorded.
     Otherwise the lost share is ``sag`` at the largest current (recorded ``current_A``, else shaft power), in
-    proportion, plus ``discharge`` in proportion to the charge drawn, whole at the end of the run.  The speed follows
+    proportion, plus ``discharge`` in proportion to the charge drawn, whole at the end of the run. The speed follows
     from (1 - lost) (1 + u) = y + u y^2, the motor at constant duty with torque as speed squared and copper drop u over
-    back-EMF, ``copper`` at the largest Q / Omega.  Loads at the measured speed stay.
+    back-EMF, ``copper`` at the largest Q / Omega. Loads at the measured speed are unchanged.
     """
 
     sag: float = 0.08
@@ -32,9 +32,11 @@ class BatterySag(Effect):
     copper: float = 0.15
 
     id = "battery_sag"
-    title = "battery voltage gives way"
+    title = "battery voltage sag"
     along = ("time_s",)
-    sign = "speed at one pulse width lacks most at full power and late in a run; thrust at the measured speed stays"
+    sign = (
+        "speed at one pulse width drops most at full power and late in a run; thrust at the measured speed is unchanged"
+    )
     kind = "drive"
     needs = ("pwm_s",)
     parameters = (

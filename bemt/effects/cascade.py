@@ -32,24 +32,24 @@ class Cascade(Effect):
 
     Notes
     -----
-    A row turns the flow at most to its own exit angle, which single sections do not know: at solidity 1 they turn it
-    half as far again.  ``form = "potential"``: slope and zero-lift angle of the row of the blade's own sections, thick
-    and cambered (:func:`bemt.sections.row.row_shift`), over those of the section alone; the table is read at the angle
-    at which the single section carries the same share of its lift, alpha_0 + K (alpha - alpha_0 - shift).  Drag and
-    stall go with the lift.  A blade without sections has one of the table's zero-lift angle.  ``form = "carter"``:
-    Weinig's slope of flat plates; the zero-lift angle lets a circular arc met along its camber line leave by Carter's
-    deviation, m theta sqrt(s/c) with m = 0.23 + 0.1 beta_2 / 50 deg (Carter 1950, ARC R&M 2804; as quoted in Cohen,
-    Rogers and Saravanamuttoo, Gas Turbine Theory, sec. 5.9; not checked), in rows of solidity above 0.6, faded in
-    from 0.3.  ``zero_lift`` is the share of the row's shift of the zero-lift angle; 0 keeps the single section's.  At
-    the solidity of a two-blade propeller (below 0.1) K differs from 1 by less than 1 %.
+    A row turns the flow at most to its own exit angle. Isolated sections do not know that: at solidity 1 they turn it
+    50 % too far. ``form = "potential"``: slope and zero-lift angle of the row of the blade's own sections, thick and
+    cambered (:func:`bemt.sections.row.row_shift`), over those of the isolated section. The table is read at the angle
+    where the isolated section carries the same share of its lift, alpha_0 + K (alpha - alpha_0 - shift). Drag and stall
+    move with the lift. A blade without section shapes uses one with the zero-lift angle of the table. ``form =
+    "carter"``: Weinig's slope of flat plates; the zero-lift angle makes a circular arc at zero incidence leave with
+    Carter's deviation, m theta sqrt(s/c) with m = 0.23 + 0.1 beta_2 / 50 deg (Carter 1950, ARC R&M 2804; as quoted in
+    Cohen, Rogers and Saravanamuttoo, Gas Turbine Theory, sec. 5.9; not checked), in rows of solidity above 0.6, faded
+    in from 0.3. ``zero_lift`` is the share of the row's shift of the zero-lift angle; 0 keeps that of the isolated
+    section. At the solidity of a two-blade propeller (below 0.1) K differs from 1 by less than 1 %.
 
-    Losses of compressor rows, faded in likewise: drag is at least that of Lieblein's wake momentum thickness
-    theta/c = 0.004 / (1 - 1.17 ln D_eq), D_eq = cos(b2) / cos(b1) (1.12 + 0.61 cos^2(b1) / sigma (tan(b1) - tan(b2)))
-    (Lieblein 1959, J. Basic Eng. 81:387; not checked).  A ducted row also pays for the walls: secondary
-    loss 0.018 cl^2 (Howell 1945, Proc. IMechE 153:441) and annulus loss 0.010 s/h with spacing s and blade height h:
-    friction of both walls, 2 cf s/h with the cf of the duct's own walls.  Howell's 0.020 s/h is that of compressors of
-    many stages, with thick layers on their walls (as quoted in Cohen, Rogers and Saravanamuttoo; not checked against
-    the paper); with it four wide blades in nozzle 19A take up to twice the torque they are known to.
+    Losses of compressor rows are faded in over the same range: drag is at least that of Lieblein's wake momentum
+    thickness theta/c = 0.004 / (1 - 1.17 ln D_eq), D_eq = cos(b2) / cos(b1) (1.12 + 0.61 cos^2(b1) / sigma (tan(b1) -
+    tan(b2))) (Lieblein 1959, J. Basic Eng. 81:387; not checked). A ducted row also has wall losses: secondary loss
+    0.018 cl^2 (Howell 1945, Proc. IMechE 153:441) and annulus loss 0.010 s/h with spacing s and blade height h:
+    friction of both walls, 2 cf s/h with the cf of the duct's own walls. Howell's 0.020 s/h applies to multi-stage
+    compressors with thick wall boundary layers (as quoted in Cohen, Rogers and Saravanamuttoo; not checked against the
+    paper); with it, four wide blades in nozzle 19A would take up to twice their known torque.
     """
 
     zero_lift: float = 1.0
@@ -59,8 +59,10 @@ class Cascade(Effect):
 
     id = "cascade"
     inviscid = True
-    title = "interference between blades at high solidity"
-    sign = "less thrust and less torque by shares that grow with solidity and hardly know the speed; rotors above 0.3"
+    title = "blade interference at high solidity (cascade)"
+    sign = (
+        "less thrust and less torque by shares that grow with solidity and hardly depend on speed; solidity above 0.3"
+    )
     parameters = (
         Parameter("zero_lift", "1", 0.0, 1.0, "1: the row's zero-lift angle; 0: the single section's", steps=0),
         Parameter("secondary", "1", 0.010, 0.030, "Howell 1945: 0.018", steps=0),

@@ -18,12 +18,12 @@ class CoaxialNeighbour(Effect):
     Notes
     -----
     On the axis of a semi-infinite vortex cylinder the induced speed is v (1 + s / sqrt(1 + s^2)), s = z/R counted
-    downstream (McCormick 1967, Aerodynamics of V/STOL Flight; not checked against the book).  Continuity contracts the
-    wake to the share a^2 = 1 / (1 + s / sqrt(1 + s^2)) of the disk.  A rotor downstream meets that speed inside the
-    wake and none outside; its loads are taken at the mean weighted as blade loads are, by r^2 (declared): v a.  A rotor
-    upstream meets v (1 - s / sqrt(1 + s^2)).  ``load`` is the neighbour's thrust over that of this rotor; its v
-    follows from momentum theory of the open disk, `Flow.induced`.  Swirl of the neighbour is left out: a
-    contra-rotating pair has gains of a few per cent from it.
+    downstream (McCormick 1967, Aerodynamics of V/STOL Flight; not checked against the book). Continuity contracts the
+    wake to the share a^2 = 1 / (1 + s / sqrt(1 + s^2)) of the disk. A rotor downstream sees that speed inside the wake
+    and none outside. Its loads are computed at the mean, weighted by r^2 like blade loads (declared): v a. A rotor
+    upstream sees v (1 - s / sqrt(1 + s^2)). ``load`` is the neighbour's thrust over that of this rotor; its v follows
+    from momentum theory of the open disk, `Flow.induced`. The swirl of the neighbour is neglected; a contra-rotating
+    pair gains a few per cent from it.
     """
 
     side: str = "upstream"
@@ -35,8 +35,8 @@ class CoaxialNeighbour(Effect):
     inviscid = True
     title = "second rotor on the same axis"
     sign = (
-        "less thrust at the same speed, as if the rotor flew into its neighbour's wake; most at rest, fading with "
-        "airspeed; the neighbour stopped, it is gone"
+        "less thrust at the same speed, as in the wake of another rotor; strongest in static runs, fading with "
+        "airspeed; gone when the other rotor stops"
     )
     check = "stop the other rotor"
     parameters = (

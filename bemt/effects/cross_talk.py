@@ -17,8 +17,8 @@ class CrossTalk(Effect):
     Notes
     -----
     Off-diagonal term of a balance's calibration matrix (AIAA R-091A-2020; Barlow, Rae and Pope 1999, Low-Speed Wind
-    Tunnel Testing, ch. 7; not checked).  The lever R makes k a pure number; 5 % is declared: an axis that misses the
-    cell by R/20; seldom far more.  Its sign turns with the direction of rotation.
+    Tunnel Testing, ch. 7; not checked). The lever R makes k a pure number; 5 % is declared: an axis that misses the
+    cell by R/20, seldom much more. Its sign reverses with the direction of rotation.
     """
 
     form: str = "torque_in_thrust"
@@ -26,8 +26,8 @@ class CrossTalk(Effect):
 
     id = "cross_talk"
     title = "cross-talk between thrust and torque cell"
-    check = "hang a dead weight on each cell alone and read both"
-    sign = "one channel follows the other's load over advance ratio; a pair of opposite rotation turns its sign"
+    check = "hang a dead weight on each cell separately and read both"
+    sign = "one channel follows the load of the other over advance ratio; the sign reverses with the sense of rotation"
     kind = "stand"
     fault = "cross-talk"
     parameters = (Parameter("k", "1", -0.2, 0.2, "declared, arm error of R/20, seldom R/5", off=0.0, usual=0.05),)

@@ -18,9 +18,9 @@ class Drift(Effect):
     Notes
     -----
     zero (1 - exp(-t/tau)) + thermal (T - T_0), shares of full scale, T_0 at the start of the run: creep and warm-up of
-    strain-gauge cells (OIML R 60:2017 bounds both: creep in 30 min, zero in %/5 K; not checked).  Ranges are declared,
-    wide enough for hobby cells beside a hot motor.  ``tared = "once"``: t counts from the start of the recording, for a
-    cell that is not set to zero again before each run.
+    strain-gauge cells (OIML R 60:2017 bounds both: creep in 30 min, zero in %/5 K; not checked). Ranges are declared,
+    wide enough for hobby cells next to a hot motor. ``tared = "once"``: t counts from the start of the recording, for a
+    cell that is not tared before each run.
     """
 
     zero: float = 0.02
@@ -79,9 +79,7 @@ class ThrustDrift(Drift):
 
     id = "thrust_drift"
     title = "drift of the thrust cell"
-    sign = (
-        "thrust follows clock or temperature, not the condition: the same point reads otherwise later; torque does not"
-    )
+    sign = "thrust depends on time or temperature: the same point reads differently later; torque does not"
     sensor = "thrust_N"
 
 
@@ -90,7 +88,5 @@ class TorqueDrift(Drift):
 
     id = "torque_drift"
     title = "drift of the torque cell"
-    sign = (
-        "torque follows clock or temperature, not the condition: the same point reads otherwise later; thrust does not"
-    )
+    sign = "torque depends on time or temperature: the same point reads differently later; thrust does not"
     sensor = "torque_Nm"

@@ -16,12 +16,12 @@ class DuctEffect(Effect):
     Notes
     -----
     T / T_rotor = 2 sigma_w at rest, sigma_w exit over disk area; fades with speed (McCormick 1967, Aerodynamics of
-    V/STOL Flight, ch. 9; Pereira 2008, PhD thesis Univ. of Maryland, eq. 2.20-2.40; see :mod:`bemt.bem.duct`).  A case
-    with a duct has it from its geometry and not from here; ``effects_off = ["duct"]`` leaves it out.  A case's own
-    duct keeps its lip, walls and gap.  One that nobody stated may have any lip and wall: an inlet from well rounded to
+    V/STOL Flight, ch. 9; Pereira 2008, PhD thesis Univ. of Maryland, eq. 2.20-2.40; see :mod:`bemt.bem.duct`). A case
+    with a duct takes it from its geometry, not from this effect; ``effects_off = ["duct"]`` removes it. The duct of a
+    case keeps its lip, walls and gap. An unstated duct may have any lip and wall: an inlet from well rounded to
     sharp-edged loses 0.04 to 0.5 of 1/2 rho w^2 (Crane TP-410, p. A-29, not checked), which takes the duct's share from
-    a half of the thrust to a quarter; the outer wall costs friction alone, or what a blunt ring a tenth of the radius
-    thick does (Hoerner 1965, Fluid-Dynamic Drag, ch. 3, not checked).
+    a half of the thrust to a quarter; the outer wall has friction drag only, or up to the drag of a blunt ring with a
+    thickness of a tenth of the radius (Hoerner 1965, Fluid-Dynamic Drag, ch. 3, not checked).
     """
 
     wake_ratio: float = 1.0
@@ -31,7 +31,7 @@ class DuctEffect(Effect):
     id = "duct"
     inviscid = True
     evident = True
-    title = "thrust of a duct"
+    title = "duct thrust"
     sign = "more thrust for the same torque, fading with advance ratio"
     parameters = (
         Parameter("wake_ratio", "1", 0.8, 1.3, "exit over disk area; Pereira 2008", 3),

@@ -13,9 +13,9 @@ class Gain(Effect):
 
     Notes
     -----
-    Linear calibration error of a load cell (ISO 376:2011 states it as a relative error; not checked).  Some
-    percent as a rule, far more at times (wrong arm, wrong calibration mass, another cell's factor), a heavy-tailed
-    prior; declared.
+    Linear calibration error of a load cell (ISO 376:2011 states it as a relative error; not checked). Typically a few
+    percent, sometimes far more (wrong arm, wrong calibration mass, factor of another cell). Hence a heavy-tailed prior;
+    declared.
     """
 
     gain: float = 0.03
@@ -34,8 +34,8 @@ class ThrustGain(Gain):
     """The thrust cell shows (1 + gain) times the thrust."""
 
     id = "thrust_gain"
-    title = "calibration factor of the thrust cell"
-    sign = "thrust off by one factor at every speed and airspeed while torque is right; air would move both"
+    title = "gain error of the thrust cell"
+    sign = "thrust off by one factor at every speed and airspeed while torque is right; air density would move both"
     sensor = "thrust_N"
 
 
@@ -43,6 +43,6 @@ class TorqueGain(Gain):
     """The torque cell shows (1 + gain) times the torque."""
 
     id = "torque_gain"
-    title = "calibration factor of the torque cell"
-    sign = "torque off by one factor at every speed and airspeed while thrust is right; air would move both"
+    title = "gain error of the torque cell"
+    sign = "torque off by one factor at every speed and airspeed while thrust is right; air density would move both"
     sensor = "torque_Nm"

@@ -17,18 +17,18 @@ class GroundEffect(Effect):
 
     Notes
     -----
-    ``form = "cheeseman_bennett"``: T/T_inf = 1 / (1 - (R/4z)^2) at constant power, and less with speed by 1 / (1 +
-    (V/v)^2) (Cheeseman and Bennett 1955, ARC R&M 3021).  Constant power is v/v_inf = 1 - (R/4z)^2, and at equal thrust,
-    as v_inf goes with the root of thrust, v/v_inf = (1 - (R/4z)^2)^(3/2).  ``form = "hayden"``: induced power at equal
+    ``form = "cheeseman_bennett"``: T/T_inf = 1 / (1 - (R/4z)^2) at constant power, fading with speed as 1 / (1 +
+    (V/v)^2) (Cheeseman and Bennett 1955, ARC R&M 3021). Constant power is v/v_inf = 1 - (R/4z)^2, and at equal thrust,
+    as v_inf goes with the root of thrust, v/v_inf = (1 - (R/4z)^2)^(3/2). ``form = "hayden"``: induced power at equal
     thrust times 1 / (0.9926 + 0.0379 (2R/z)^2), a fit of flight tests (Hayden 1976, 32nd AHS Forum), fading in the same
-    way.  Coefficients checked against public codes, not against the papers; the fading belongs to edgewise flow there
-    and is used for axial flow here.  The rotor meets V - share v.  A recorded ``wall_distance_m`` replaces z_over_R;
+    way. Coefficients checked against public codes, not against the papers; the fading belongs to edgewise flow there
+    and is used for axial flow here. The rotor sees V - share v. A recorded ``wall_distance_m`` replaces z_over_R;
     closer than R/2 counts as R/2.
 
-    Wind along the axis is dammed by the wall as well.  Ahead of a disk of radius a, on its axis, a stream V is
-    V (1 - (2/pi) (acot(zeta) - zeta / (1 + zeta^2))), zeta = z/a (potential of a disk moving broadside on, Lamb 1932,
-    Hydrodynamics, art. 108, superposed on the stream; derived here from the potential).  Used only where the distance
-    of the wall is recorded; ``plate_radius_over_R`` is a, and 0 leaves the wind as it is.
+    The wall also decelerates wind along the axis. Ahead of a disk of radius a, on its axis, a stream V is V (1 - (2/pi)
+    (acot(zeta) - zeta / (1 + zeta^2))), zeta = z/a (potential of a disk moving broadside on, Lamb 1932, Hydrodynamics,
+    art. 108, superposed on the stream; derived here from the potential). Used only if the wall distance is recorded;
+    ``plate_radius_over_R`` is a, and 0 leaves the wind unchanged.
     """
 
     form: str = "cheeseman_bennett"
@@ -39,11 +39,11 @@ class GroundEffect(Effect):
     id = "ground_effect"
     inviscid = True
     title = "wall behind the propeller"
-    check = "measure the distance of the nearest wall behind the propeller"
+    check = "measure the distance to the nearest wall behind the propeller"
     along = ("wall_distance_m",)
     sign = (
-        "more thrust at the same speed and torque; with airspeed it fades, as no load-cell gain does, unless the wall "
-        "stops the wind as well"
+        "more thrust at the same speed and torque; fades with airspeed, unlike a cell gain, unless the wall also "
+        "blocks the wind"
     )
     parameters = (
         Parameter("z_over_R", "1", 0.5, 3.0, "validity of Cheeseman and Bennett 1955"),

@@ -14,13 +14,13 @@ class HighInduction(Effect):
     Notes
     -----
     Buhl (2005), NREL/TP-500-36834, eq. 18 between turbine induction 0.4 and 1, continued to descent by a C1 bridge of
-    our own (see :func:`bemt.bem.residual.mass_flow`).  Never acts on a propeller that drives air its own way.
+    our own (see :func:`bemt.bem.residual.mass_flow`). Never acts in normal propeller operation.
     """
 
     id = "high_induction"
     inviscid = True
     title = "turbulent windmill and vortex-ring state"
-    sign = "windmilling and descent only; never a propeller that drives air its own way"
+    sign = "only in windmilling and descent, never in normal propeller operation"
     diagnosed = False
 
     def momentum(self, bake: Baking) -> None:

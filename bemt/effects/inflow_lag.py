@@ -29,7 +29,7 @@ class InflowLag(Effect):
     id = "inflow_lag"
     title = "lag of the induced flow"
     along = ("time_s",)
-    sign = "thrust overshoots when the speed rises and undershoots when it falls, torque with it; nothing on plateaus"
+    sign = "thrust and torque overshoot when the speed rises and undershoot when it falls; no change on plateaus"
     needs = ("time_s",)
     parameters = (Parameter("tau_s", "s", 0.01, 0.2, "apparent mass of the disk, Carpenter and Fridovich", 5, 0.0),)
     on_by_default = False

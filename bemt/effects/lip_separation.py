@@ -16,17 +16,16 @@ class LipSeparation(Effect):
 
     Notes
     -----
-    The suction of the lip carries the duct's thrust, so its limit is stated as the duct's thrust over the largest of
-    the recording: beyond ``onset`` the share ``loss`` of it goes, in proportion, whole at the largest.  Small lip
-    radii (below 6 % of the diameter) separate early and lose up to half of the thrust: Martin and Tung (2004), 60th
-    AHS Forum; Pereira (2008), PhD thesis Univ. of Maryland, ch. 4 (not checked).  Proportion and hysteresis are
-    declared: once separated, the flow attaches again below onset (1 - hysteresis), seen only when the recording has
-    time.
+    The suction of the lip carries the duct's thrust, so its limit is expressed as duct thrust over the largest duct
+    thrust of the recording. Beyond ``onset`` a share of it is lost in proportion, up to ``loss`` at the largest. Small
+    lip radii (below 6 % of the diameter) separate early and lose up to half of the thrust: Martin and Tung (2004), 60th
+    AHS Forum; Pereira (2008), PhD thesis Univ. of Maryland, ch. 4 (not checked). Proportion and hysteresis are
+    declared: once separated, the flow reattaches below onset (1 - hysteresis), visible only if the recording has time.
 
-    A lip also stalls by the direction of the stream, whatever the load: the stagnation point wanders outside as V/(nD)
-    falls, and the suction peak is sharpest at rest (Kuchemann and Weber 1953, Aerodynamics of Propulsion, ch. 4; not
-    checked).  ``by`` = "advance" takes 1 - J / Jmax in place of the load: ``onset`` is then that share of the way from
-    the largest J of the recording to rest.
+    A lip also stalls because of the flow direction, at any load: the stagnation point moves outside as V/(nD) falls,
+    and the suction peak is sharpest at rest (Kuchemann and Weber 1953, Aerodynamics of Propulsion, ch. 4; not checked).
+    ``by`` = "advance" uses 1 - J / Jmax instead of the load: ``onset`` is then that share of the range from the largest
+    J of the recording to J = 0.
     """
 
     onset: float = 0.7
@@ -36,8 +35,11 @@ class LipSeparation(Effect):
     by: str = "load"
 
     id = "lip_separation"
-    title = "separation at the lip of the duct"
-    sign = "thrust falls beyond one loading and returns below a lower one, torque stays; Mach effects return at once"
+    title = "flow separation at the duct lip"
+    sign = (
+        "thrust drops above one loading and recovers below a lower one, torque is unchanged; Mach effects have no "
+        "hysteresis"
+    )
     parameters = (
         Parameter("onset", "1", 0.01, 0.95, "declared; share of the largest duct thrust", 4),
         Parameter("loss", "1", 0.0, 1.0, "share of the duct's thrust, Martin and Tung 2004", 3, 0.0),

@@ -17,13 +17,13 @@ class MotorHeating(Effect):
 
     Notes
     -----
-    Direct-current motor at constant duty: d V = k Omega + (R/k) Q, Q proportional to Omega^2.  R grows by 0.39 %/K
-    (copper, IEC 60034-1), k falls by 0.1 %/K (NdFeB remanence, typical data sheet; not checked).  With u the copper
-    drop over the back-EMF when cold, b = 1 - 0.001 dT and r = 1 + 0.0039 dT the speed changes by y of (1 + u) = b y +
-    (u r / b) y^2. u is ``copper`` at the largest Q / Omega of the recording, elsewhere in proportion.  One heat
-    capacity, one time constant (declared): tau d(dT)/dt = c (Q / Qmax)^2 - dT, from cold, with c such that the warmest
-    point of the recording is warmer by ``rise_K``.  Between runs on one clock the motor stands and cools; a clock that
-    starts again starts cold.  Loads at the measured speed stay.
+    Direct-current motor at constant duty: d V = k Omega + (R/k) Q, Q proportional to Omega^2. R grows by 0.39 %/K
+    (copper, IEC 60034-1), k falls by 0.1 %/K (NdFeB remanence, typical data sheet; not checked). With u the copper drop
+    over the back-EMF when cold, b = 1 - 0.001 dT and r = 1 + 0.0039 dT the speed changes by y of (1 + u) = b y + (u r /
+    b) y^2. u is ``copper`` at the largest Q / Omega of the recording, elsewhere in proportion. One heat capacity, one
+    time constant (declared): tau d(dT)/dt = c (Q / Qmax)^2 - dT, from cold, with c such that the warmest point of the
+    recording is warmer by ``rise_K``. Between runs on one clock the motor is stopped and cools; a restarted clock
+    starts cold. Loads at the measured speed are unchanged.
     """
 
     rise_K: float = 40.0
@@ -31,9 +31,9 @@ class MotorHeating(Effect):
     copper: float = 0.15
 
     id = "motor_heating"
-    title = "winding and magnets of the motor get warm"
+    title = "motor heating (winding and magnets)"
     along = ("time_s",)
-    sign = "speed at the same pulse width creeps with time under load; thrust at the measured speed does not change"
+    sign = "speed at the same pulse width drifts with time under load; thrust at the measured speed is unchanged"
     kind = "drive"
     needs = ("pwm_s", "time_s")
     parameters = (

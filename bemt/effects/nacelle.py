@@ -15,13 +15,13 @@ class Nacelle(Effect):
 
     Notes
     -----
-    Half-body of radius a, that of the hub where ``body_over_R`` is smaller: a source of flux pi a^2 V one radius behind
-    the disk slows the axial flow there by
-    V deficit (1 + (r/a)^2)^-1.5, deficit 1/4 on the axis (Rankine 1871; Katz and Plotkin 2001, Low-Speed Aerodynamics,
-    sec. 3.10; not checked), at each station its own.  The balance reads the drag cd 1/2 rho W^2 pi a^2; 0.1 a spinner
-    to 1.2 a bluff motor (Hoerner 1965, Fluid-Dynamic Drag, ch. 3; not checked).  W = V + wash v: a body behind the disk
-    stands in the slipstream, whose induced speed is v at the disk and 2 v in the far wake (Glauert 1935, ch. VII).  A
-    rotor without hub counts a = R/10.  Motors, balances and fairings are often wider than the hub.
+    Half-body of radius a, or hub radius where ``body_over_R`` is smaller: a source of flux pi a^2 V one radius behind
+    the disk slows the axial flow there by V deficit (1 + (r/a)^2)^-1.5, deficit 1/4 on the axis (Rankine 1871; Katz and
+    Plotkin 2001, Low-Speed Aerodynamics, sec. 3.10; not checked), evaluated at each station. The balance reads the drag
+    cd 1/2 rho W^2 pi a^2; 0.1 a spinner to 1.2 a bluff motor (Hoerner 1965, Fluid-Dynamic Drag, ch. 3; not checked). W
+    = V + wash v: a body behind the disk stands in the slipstream, whose induced speed is v at the disk and 2 v in the
+    far wake (Glauert 1935, ch. VII). A rotor without hub uses a = R/10. Motors, balances and fairings are often wider
+    than the hub.
     """
 
     deficit: float = 0.10
@@ -32,8 +32,8 @@ class Nacelle(Effect):
     id = "nacelle"
     inviscid = True
     title = "body behind the propeller"
-    check = "run without the propeller at the same airspeeds and take that drag off"
-    sign = "thrust lacks an amount that grows with V^2 (in the slipstream with the load, too), torque hardly moves"
+    check = "run without the propeller at the same airspeeds and subtract that drag"
+    sign = "thrust is low by an amount that grows with V^2 (in the slipstream also with load), torque hardly changes"
     parameters = (
         Parameter("deficit", "1", 0.0, 0.6, "0.25 on the axis of a half-body, more of a blunt one", 4, 0.0),
         Parameter("cd", "1", 0.0, 1.2, "spinner to bluff motor, on hub area, Hoerner 1965", 4, 0.0),

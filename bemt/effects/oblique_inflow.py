@@ -16,10 +16,10 @@ class ObliqueInflow(Effect):
     Notes
     -----
     Momentum in skewed flow: T = 2 rho A v sqrt((Vx + v)^2 + Vy^2), Vx = V cos, Vy = V sin (Glauert 1926, ARC R&M 1111;
-    Johnson 1980, Helicopter Theory, sec. 4-1.1).  At the baseline's thrust it gives the flow w = Vx + v through the
-    disk; the rotor meets the axial onset speed that makes the same w, w - T / (2 rho A w).  The mean square of the
+    Johnson 1980, Helicopter Theory, sec. 4-1.1). At the baseline's thrust it gives the flow w = Vx + v through the
+    disk; the rotor sees the axial onset speed that gives the same w, w - T / (2 rho A w). The mean square of the
     tangential speed raises the thrust by 1 + 3/2 mu^2, mu = Vy / (Omega R) (blade-element thrust at constant pitch,
-    Johnson 1980, sec. 5-2; equation numbers not checked), entered as a higher speed of rotation.  A recorded
+    Johnson 1980, sec. 5-2; equation numbers not checked), modelled as a higher speed of rotation. A recorded
     ``sideslip_rad`` replaces ``angle_deg``.
     """
 
@@ -27,12 +27,12 @@ class ObliqueInflow(Effect):
 
     id = "oblique_inflow"
     inviscid = True
-    title = "airspeed at an angle to the shaft"
+    title = "inflow at an angle to the shaft"
     check = "check with a laser that shaft and tunnel axis are parallel"
     along = ("sideslip_rad",)
     sign = (
-        "thrust and torque up with airspeed as if J were lower, and a force in the plane of the disk; none at rest; a "
-        "pitot that reads high by 1 / cos(angle) looks alike"
+        "thrust and torque rise with airspeed as if J were lower, with a force in the plane of the disk; no change "
+        "in static runs; a pitot that reads high by 1 / cos(angle) looks the same"
     )
     parameters = (Parameter("angle_deg", "deg", 0.0, 90.0, "full turn of the stand", 7, 0.0),)
     on_by_default = False

@@ -15,16 +15,16 @@ class PitchOffset(Effect):
 
     Notes
     -----
-    beta + offset at every station.  Settings by hand and moulded blades are off by a degree
-    or so, a wrong label or reference line (chord, lower side) by several: a heavy-tailed prior, both declared.
+    beta + offset at every station. Manual settings and moulded blades are off by about a degree, a wrong label or
+    reference line (chord or underside) by several. Hence a heavy-tailed prior; both declared.
     """
 
     offset_deg: float = 1.0
 
     id = "pitch_offset"
-    title = "blade angle other than stated"
-    check = "measure the blade angle at 0.75 R against the plane of rotation"
-    sign = "moves the advance ratio of zero thrust, the same at every speed; a gain or density leaves it where it is"
+    title = "wrong blade angle"
+    check = "measure the blade angle at 0.75 R relative to the plane of rotation"
+    sign = "shifts the advance ratio of zero thrust equally at every speed; a gain or density error does not shift it"
     parameters = (Parameter("offset_deg", "deg", -8.0, 8.0, "declared: workshop, or another label", 9, 0.0, 1.0),)
     on_by_default = False
 

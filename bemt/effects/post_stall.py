@@ -23,11 +23,11 @@ class PostStall(Effect):
     Notes
     -----
     ``form = "viterna"``: cl = cd_max/2 sin 2a + A2 cos^2 a / sin a and cd = cd_max sin^2 a + B2 cos a with A2, B2 from
-    the stall point (Viterna and Janetzke 1982, NASA TM-82944; equation numbers not checked).  They are linear in
-    cd_max, so the change from the table's own drag at 90 deg is added and vanishes at the stall.
-    ``form = "plate"``: beyond the stall the section becomes a separated flat plate within 10 deg, force normal to the
-    chord, cl = cd_max sin a cos a and cd = cd_max sin^2 a (Hoerner 1965, Fluid-Dynamic Drag, ch. 3; not checked).
-    cd_max = 1.11 + 0.018 AR (Viterna and Janetzke 1982) to 2.0 of the plate without ends.  Off: the tables' own.
+    the stall point (Viterna and Janetzke 1982, NASA TM-82944; equation numbers not checked). They are linear in cd_max,
+    so the change from the table's own drag at 90 deg is added and vanishes at the stall. ``form = "plate"``: beyond the
+    stall the section becomes a separated flat plate within 10 deg, force normal to the chord, cl = cd_max sin a cos a
+    and cd = cd_max sin^2 a (Hoerner 1965, Fluid-Dynamic Drag, ch. 3; not checked). cd_max = 1.11 + 0.018 AR (Viterna
+    and Janetzke 1982) to 2.0 for an infinite plate. Off: post-stall data of the tables.
     """
 
     form: str = "viterna"
@@ -35,7 +35,10 @@ class PostStall(Effect):
 
     id = "post_stall"
     title = "lift and drag of stalled sections"
-    sign = "only where the blade stalls (low advance ratio, high pitch): torque up, thrust on a plateau; none unstalled"
+    sign = (
+        "only where the blade stalls (low advance ratio, high pitch): more torque, thrust on a plateau; no change "
+        "unstalled"
+    )
     parameters = (Parameter("cd_max", "1", 1.1, 2.0, "1.11 + 0.018 AR to flat plate, Viterna 1982"),)
     order = 12
     on_by_default = False

@@ -16,9 +16,9 @@ class Recirculation(Effect):
     Notes
     -----
     First-order growth from the start of each run, ``before_s`` before its first point, v the induced speed of the
-    baseline; ventilated by airspeed as 1 / (1 + (V/v)^2).  That small rotors in closed rooms change within seconds
-    of the start: Stephenson, Weitsman and Zawodny (2019), J. Acoust. Soc. Am. 145:1153 (not checked); form and
-    ranges are declared.  Needs time: recirculation that is always there cannot be told from a smaller thrust.
+    baseline; ventilated by airspeed as 1 / (1 + (V/v)^2). Small rotors in closed rooms change within seconds of the
+    start: Stephenson, Weitsman and Zawodny (2019), J. Acoust. Soc. Am. 145:1153 (not checked); form and ranges are
+    declared. Needs time: permanent recirculation cannot be distinguished from lower thrust.
     """
 
     k: float = 0.05
@@ -26,10 +26,13 @@ class Recirculation(Effect):
     before_s: float = 0.0
 
     id = "recirculation"
-    title = "slipstream that returns through the room"
-    check = "let smoke out behind the propeller, or repeat with a door open and after a pause"
+    title = "recirculation in the room"
+    check = "release smoke behind the propeller, or repeat with a door open and after a pause"
     along = ("time_s",)
-    sign = "thrust decays within seconds of each start and at low advance ratio only; a drifting cell knows no speed"
+    sign = (
+        "thrust decays within seconds of each start, only at low advance ratio; drift of a cell does not depend on "
+        "speed"
+    )
     needs = ("time_s",)
     parameters = (
         Parameter("k", "1", 0.0, 0.25, "declared; share of the induced speed", 4, 0.0),

@@ -17,12 +17,12 @@ class Reynolds(Effect):
 
     Notes
     -----
-    ``form = "table"`` takes lift and drag from the section tables over Reynolds number; ``amount`` stretches what they
-    change from Re0 = 1e5, because such tables disagree by as much at the low end (Selig et al. 1989, Airfoils at Low
-    Speeds, SoarTech 8; not checked).  ``form = "power"`` keeps the table at Re0 and scales drag by (Re0/Re)^exponent
-    and attached lift by (Re/Re0)^lift_exponent: drag exponents are 0.5 for a laminar, 0.2 for a turbulent flat plate
+    ``form = "table"`` takes lift and drag from the section tables over Reynolds number; ``amount`` scales their change
+    from Re0 = 1e5, because such tables disagree by that much at low Re (Selig et al. 1989, Airfoils at Low Speeds,
+    SoarTech 8; not checked). ``form = "power"`` keeps the table at Re0 and scales drag by (Re0/Re)^exponent and
+    attached lift by (Re/Re0)^lift_exponent: drag exponents are 0.5 for a laminar, 0.2 for a turbulent flat plate
     (Schlichting 1979, Boundary-Layer Theory, eq. 7.34 and 21.12, exponents there), up to 0.6 with laminar bubbles
-    (Hoerner 1965, Fluid-Dynamic Drag, ch. 6; not checked), which cost lift too (range declared).  Off: Re0 everywhere.
+    (Hoerner 1965, Fluid-Dynamic Drag, ch. 6; not checked), which cost lift too (range declared). Off: Re0 everywhere.
     """
 
     form: str = "table"
@@ -31,8 +31,8 @@ class Reynolds(Effect):
     lift_exponent: float = 0.0
 
     id = "reynolds"
-    title = "Reynolds number of the sections"
-    sign = "torque coefficient falls and thrust coefficient rises with speed, and both collapse on the Reynolds number"
+    title = "Reynolds number effect on the sections"
+    sign = "torque coefficient falls and thrust coefficient rises with speed; both collapse on the Reynolds number"
     parameters = (
         Parameter("amount", "1", 0.0, 3.0, "1: the tables; declared range", 4),
         Parameter("exponent", "1", 0.0, 0.6, "0.2 turbulent, 0.5 laminar flat plate", steps=0),

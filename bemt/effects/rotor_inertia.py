@@ -22,17 +22,17 @@ class RotorInertia(Effect):
 
     Notes
     -----
-    Euler's law of a rotating body (Euler 1765).  I = B rho_b 0.068 c^2 R^3 / 3 from the chord at 0.75 R with 1300
-    kg/m3 (declared); ``ratio`` takes in what that misses, above all the bell of the motor: 0 to 10.  Slopes by central
-    differences, one-sided at kinks, within runs whose points are less than 1 s apart.
+    Euler's law of a rotating body (Euler 1765). I = B rho_b 0.068 c^2 R^3 / 3 from the chord at 0.75 R with 1300 kg/m3
+    (declared); ``ratio`` covers what this misses, mainly the bell of the motor: 0 to 10. Slopes by central differences,
+    one-sided at kinks, within runs whose points are less than 1 s apart.
     """
 
     ratio: float = 1.0
 
     id = "rotor_inertia"
-    title = "inertia of the rotor"
+    title = "rotor inertia"
     along = ("time_s",)
-    sign = "torque only and in transients only: it leads while the speed rises, lags while it falls, zero on plateaus"
+    sign = "only torque and only in transients: high while the speed rises, low while it falls, zero on plateaus"
     needs = ("time_s",)
     parameters = (Parameter("ratio", "1", 0.0, 10.0, "declared, blades alone to heavy bell", 3, 0.0),)
     on_by_default = False

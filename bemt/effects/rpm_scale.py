@@ -21,20 +21,20 @@ class RpmScale(Effect):
 
     Notes
     -----
-    Electronic speed controllers count electrical turns, pole pairs times the mechanical ones; optical tachometers count
-    blades: a wrong setting is a rational factor (the counts that occur are declared).  ``eps``: clock error of cheap
-    counters, +-1 % (declared).  The rotor turns at the indicated speed over the factor.
+    Electronic speed controllers count electrical revolutions (pole pairs times mechanical), optical tachometers count
+    blades. A wrong setting gives a rational factor (the possible counts are declared). ``eps``: clock error of cheap
+    counters, +-1 % (declared). The rotor turns at the indicated speed over the factor.
     """
 
     factor: float = 1.0
     eps: float = 0.01
 
     id = "rpm_scale"
-    title = "speed of rotation other than indicated"
-    check = "count the turns with an optical tachometer, and the pole pairs or blades set in the counter"
+    title = "wrong speed of rotation"
+    check = "count the revolutions with an optical tachometer; check the pole pairs or blades set in the counter"
     sign = (
-        "thrust and torque off by the same square and airspeed effects come at another J: a rational ratio of pole or "
-        "blade counts; density leaves J alone"
+        "thrust and torque off by the same square, and airspeed effects appear at another J; a rational ratio of "
+        "pole or blade counts; density does not change J"
     )
     kind = "stand"
     fault = "scale"

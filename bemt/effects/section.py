@@ -16,10 +16,10 @@ class Section(Effect):
     Notes
     -----
     Thin-aerofoil theory gives a parabolic camber line of height f (share of the chord) the zero-lift angle -2 f
-    (Glauert 1926, Elements of Aerofoil and Airscrew Theory, ch. 7); the lift of the attached section moves by its
-    slope times 2 camber and its stall angle stays, other than with a pitch error, which moves both.  ``drag``
-    multiplies the drag of the attached section: about 2 with standard roughness, 0.7 with laminar flow kept (Abbott
-    and von Doenhoff 1959, Theory of Wing Sections, ch. 7; not checked).  Both fade out between 15 and 30 deg.
+    (Glauert 1926, Elements of Aerofoil and Airscrew Theory, ch. 7); the lift of the attached section changes by its
+    slope times 2 camber and its stall angle stays, unlike a pitch error, which moves both. ``drag`` multiplies the drag
+    of the attached section: about 2 with standard roughness, 0.7 with laminar flow kept (Abbott and von Doenhoff 1959,
+    Theory of Wing Sections, ch. 7; not checked). Both fade out between 15 and 30 deg.
     """
 
     camber: float = 0.01
@@ -28,12 +28,11 @@ class Section(Effect):
     id = "section"
     title = "camber and drag level of the blade section"
     check = (
-        "take the section at 0.75 R from the blade (a cast, or a cut through a broken one) and"
-        " compare it with that of the case"
+        "copy the section at 0.75 R from the blade (a cast, or a cut through a broken one) and compare it with the case"
     )
     sign = (
-        "lift moves by the same amount at every advance ratio and drag by one factor, whatever the speed; neither "
-        "follows Reynolds number, Mach number or time"
+        "lift changes by a constant amount at every advance ratio and drag by one factor, at any speed; neither "
+        "depends on Reynolds number, Mach number or time"
     )
     parameters = (
         Parameter("camber", "1", -0.02, 0.02, "camber of small propellers is known to about 2 % of chord", 5, 0.0),

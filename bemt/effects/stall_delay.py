@@ -21,14 +21,14 @@ class StallDelay(Effect):
     -----
     ``form = "chaviaropoulos"``: weight = 2.2 (c/r) cos^4(beta), beta the blade angle, times coefficient / 3
     (Chaviaropoulos and Hansen 2000, J. Fluids Eng. 122:330: a = 2.2, h = 1, n = 4 from quasi-three-dimensional
-    Navier-Stokes solutions; not checked against the paper). It reaches further out than the other two.
-    ``form = "snel"``: weight = coefficient (c/r)^2, 3 in Snel, Houwink and Bosschers (1994), ECN-C--93-052, eq. 6.2.
-    ``form = "du_selig"``: weight = (1.6 (c/r)/0.1267 (1 - (c/r)^e) / (1 + (c/r)^e) - 1) / (2 pi), e = R/r, times
-    coefficient / 3 and not below zero (Du and Selig 1998, AIAA-98-0021, with a = b = d = 1 and Lambda = 1, the limit
-    of a tip that is fast against the airspeed; c/r held at 0.75, declared). Checked against public codes, not against
-    the reports. cl_pot is the straight line through the zero-lift angle with the table's own slope. Faded out between
-    30 and 50 deg and applied to positive stall only. What rotation adds is a force normal to the chord (Lindenburg
-    2003, ECN-C--03-025; not checked against the report), so drag grows by ``normal`` times gain times tan(alpha).
+    Navier-Stokes solutions; not checked against the paper). It acts further outboard than the other two. ``form =
+    "snel"``: weight = coefficient (c/r)^2, 3 in Snel, Houwink and Bosschers (1994), ECN-C--93-052, eq. 6.2. ``form =
+    "du_selig"``: weight = (1.6 (c/r)/0.1267 (1 - (c/r)^e) / (1 + (c/r)^e) - 1) / (2 pi), e = R/r, times coefficient / 3
+    and not below zero (Du and Selig 1998, AIAA-98-0021, with a = b = d = 1 and Lambda = 1, the limit of a tip speed
+    well above the airspeed; c/r held at 0.75, declared). Checked against public codes, not against the reports. cl_pot
+    is the straight line through the zero-lift angle with the table's own slope. Faded out between 30 and 50 deg and
+    applied to positive stall only. What rotation adds is a force normal to the chord (Lindenburg 2003, ECN-C--03-025;
+    not checked against the report), so drag grows by ``normal`` times gain times tan(alpha).
     """
 
     coefficient: float = 3.0
@@ -38,7 +38,8 @@ class StallDelay(Effect):
     id = "stall_delay"
     title = "rotational stall delay"
     sign = (
-        "more thrust than tables give where the root stalls: low advance ratio and high pitch, inboard; none unstalled"
+        "more thrust than the tables give where the root stalls: low advance ratio and high pitch, inboard; no "
+        "change unstalled"
     )
     parameters = (
         Parameter("coefficient", "1", 1.0, 4.0, "3 is the published strength of each form", 5, 0.0),

@@ -16,17 +16,20 @@ class SupplyVoltage(Effect):
     Notes
     -----
     Direct-current motor at constant duty: V = Omega / k + R I, I = k Q (Drela 2007, First-Order DC Electric Motor
-    Model, MIT, eq. 1 and 2; not checked), Q as the square of the speed.  With u the copper drop over the back-EMF the
+    Model, MIT, eq. 1 and 2; not checked), Q as the square of the speed. With u the copper drop over the back-EMF the
     speed changes by y of (1 + change) (1 + u) = y + u y^2; u is ``copper`` at the largest Q / Omega of the recording,
-    elsewhere in proportion.  A battery that gives way under load is `battery_sag`.  Loads at the measured speed stay.
+    elsewhere in proportion. Voltage sag under load is `battery_sag`. Loads at the measured speed are unchanged.
     """
 
     change: float = 0.1
     copper: float = 0.15
 
     id = "supply_voltage"
-    title = "supply at another voltage"
-    sign = "speed at one pulse width changes by nearly one share, at light load and at full; thrust at the speed stays"
+    title = "different supply voltage"
+    sign = (
+        "speed at one pulse width changes by nearly the same share at light and full load; thrust at the measured "
+        "speed is unchanged"
+    )
     kind = "drive"
     needs = ("pwm_s",)
     check = "read the voltage at the controller"

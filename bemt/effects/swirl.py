@@ -13,14 +13,16 @@ class Swirl(Effect):
 
     Notes
     -----
-    Glauert (1935), Airplane Propellers, ch. VII; Ning (2014) eq. 12.  Off means that the blade meets no tangential
-    induction (axial momentum theory).
+    Glauert (1935), Airplane Propellers, ch. VII; Ning (2014) eq. 12. Off means no tangential induction (axial momentum
+    theory).
     """
 
     id = "swirl"
     inviscid = True
-    title = "rotation of the slipstream"
-    sign = "thrust and torque off at heavy loading by constant shares; their ratio tells it from density or speed"
+    title = "slipstream swirl"
+    sign = (
+        "thrust and torque off by constant shares at heavy loading; their ratio distinguishes it from density or speed"
+    )
 
     def momentum(self, bake: Baking) -> None:
         """Switch the tangential balance on."""

@@ -16,17 +16,17 @@ class TipCut(Effect):
     Notes
     -----
     Geometry only: beyond the new radius there is no blade, and the tip vortex leaves there (Prandtl's F takes the new
-    radius).  Blade elements are those of the shorter blade, each with the section of the element whose place it takes.
-    Thrust falls faster than any section drag or gain explains, about as the fourth power of the radius, torque
-    as the fifth (Buckingham 1914 for similar blades; a cut blade keeps its chord at the new tip and loses less).  Up to
-    15 % is declared: to fit a duct, after a strike.
+    radius). Blade elements are those of the shorter blade, each with the section of the element that it replaces.
+    Thrust falls faster than any section drag or gain explains, about as the fourth power of the radius, torque as the
+    fifth (Buckingham 1914 for similar blades; a cut blade keeps its chord at the new tip and loses less). Range up to
+    15 % (declared): cut to fit a duct, or damaged.
     """
 
     cut: float = 0.05
 
     id = "tip_cut"
     title = "blades shorter than stated"
-    sign = "less thrust and still less torque at every speed, the advance ratio of zero thrust nearly where it was"
+    sign = "less thrust and even less torque at every speed; the advance ratio of zero thrust hardly moves"
     check = "measure the diameter"
     parameters = (Parameter("cut", "1", 0.0, 0.15, "declared, share of the radius", 4, 0.0),)
     on_by_default = False

@@ -16,12 +16,12 @@ class TipGap(Effect):
 
     Notes
     -----
-    Two parts.  The wall mirrors the tip vortex, so Prandtl's deficit 1 - F is scaled by 1 - exp(-gap / (scale R)):
-    none when sealed, whole when the wall is far (declared rule, between two limits that are known).  Leakage costs
-    pressure rise in proportion to gap over span, ``loss`` points per point: 1 to 2 in Wisler (1985), J. Turbomach.
-    107:372, and Cumpsty (1989), Compressor Aerodynamics, ch. 8 (not checked against the books).  Off means a sealed
-    tip.  In a recording with ``tip_gap_m`` the gap of the case stands for the largest recorded one, the others are in
-    proportion, see :meth:`share`.
+    Two parts. The wall mirrors the tip vortex, so Prandtl's deficit 1 - F is scaled by 1 - exp(-gap / (scale R)): zero
+    if sealed, full if the wall is far away (declared rule between two known limits). Leakage costs pressure rise in
+    proportion to gap over span, ``loss`` points per point: 1 to 2 in Wisler (1985), J. Turbomach. 107:372, and Cumpsty
+    (1989), Compressor Aerodynamics, ch. 8 (not checked against the books). Off means a sealed tip. In a recording with
+    ``tip_gap_m`` the gap of the case corresponds to the largest recorded one, the others are in proportion; see
+    :meth:`share`.
     """
 
     loss: float = 1.5
@@ -29,10 +29,10 @@ class TipGap(Effect):
 
     id = "tip_gap"
     inviscid = True
-    title = "leakage through the tip gap of a ducted rotor"
-    check = "measure the gap with a feeler gauge, hot and at speed if it can be"
+    title = "tip gap leakage in a duct"
+    check = "measure the gap with a feeler gauge, hot and at speed if possible"
     along = ("tip_gap_m",)
-    sign = "thrust and pressure rise fall in proportion to gap over span; an open rotor has none"
+    sign = "thrust and pressure rise drop in proportion to gap over span; no change on an open rotor"
     parameters = (
         Parameter("loss", "1", 1.0, 2.0, "Wisler 1985; Cumpsty 1989, not checked", 3),
         Parameter("scale", "1", 0.02, 0.10, "declared", 0),

@@ -24,9 +24,9 @@ class TunnelBlockage(Effect):
 
     id = "tunnel_blockage"
     inviscid = True
-    title = "blockage of a closed wind tunnel"
-    check = "compare disk and test section: above 5 % the airspeed needs a correction"
-    sign = "more thrust and torque the higher the loading at airspeed: the shift of J grows with thrust, not with V"
+    title = "wind tunnel blockage"
+    check = "compare disk area and test section: above 5 % the airspeed needs a correction"
+    sign = "thrust and torque rise with loading at airspeed: the shift of J grows with thrust, not with V"
     parameters = (Parameter("area_ratio", "1", 0.0, 0.25, "disk over test-section area", 5, 0.0),)
     on_by_default = False
 

@@ -38,8 +38,8 @@ class UnitSlip(Effect):
     Notes
     -----
     Exact ratios of units by definition (pound, inch and standard gravity: BIPM 2019, SI Brochure 9th ed., and NIST SP
-    811, 2008, appendix B).  Thrust and torque read otherwise; speed, airspeed and density are what the rotor truly
-    met, recorded value over the factor.  ``unit`` names the pair for the reader and changes nothing.
+    811, 2008, appendix B). Thrust and torque are read in another unit; true speed, airspeed and density are the
+    recorded value over the factor. ``unit`` names the pair for the reader and has no effect.
     """
 
     channel: str = "thrust_N"
@@ -47,9 +47,9 @@ class UnitSlip(Effect):
     unit: str = "kgf"
 
     id = "unit_slip"
-    title = "number in another unit than its label, or with the other sign"
-    check = "look at the unit in the settings of the stand and in the heading of the file"
-    sign = "one channel off by exactly the ratio of two units, or by -1, at every point; no physics keeps such a factor"
+    title = "wrong unit or sign"
+    check = "check the unit in the settings of the stand and in the heading of the file"
+    sign = "one channel off by exactly the ratio of two units, or by -1, at every point; no physics gives such a factor"
     kind = "stand"
     fault = "unit"
     discrete = ("factor",)

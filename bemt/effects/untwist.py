@@ -18,18 +18,18 @@ class Untwist(Effect):
     Centrifugal ("propeller") moment, which turns sections towards flat pitch, and aerodynamic moment of cambered
     sections (nose down) both grow as the square of the speed; lift ahead of the elastic axis turns the nose up.
     Flexible propellers do both: Sodja, Drazumeric, Kosel and Marzocca (2014), J. Aircraft 51:117 (not checked); shape
-    and proportion to rho Omega^2 are declared.  Positive: nose down (untwist).  Parameters belong to the point with
-    the largest rho Omega^2 of a recording, see :meth:`share`; without a recording they hold as they are.
+    and proportion to rho Omega^2 are declared. Positive: nose down (untwist). Parameters refer to the point with the
+    largest rho Omega^2 of a recording; see :meth:`share`; without a recording they apply directly.
     """
 
     tip_deg: float = 1.0
 
     id = "untwist"
-    title = "elastic twist of the blades"
-    check = "film the tip from the side, standing still and at full speed"
+    title = "elastic blade twist"
+    check = "film the tip from the side, stopped and at full speed"
     sign = (
-        "thrust coefficient falls (or rises) with rho Omega^2 and not with Mach number: another density at the same "
-        "speed moves it, another air temperature does not"
+        "thrust coefficient falls (or rises) with rho Omega^2 and not with Mach number: depends on density at the "
+        "same speed, not on air temperature"
     )
     parameters = (
         Parameter("tip_deg", "deg", -4.0, 5.0, "declared; plastic blades 1 to 3 deg either way", 7, 0.0, 1.5),

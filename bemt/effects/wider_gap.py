@@ -13,17 +13,17 @@ class WiderGap(Effect):
 
     Notes
     -----
-    Geometry only: the gap grows by a length, and `tip_gap` says what that costs (Wisler 1985 and Cumpsty 1989 there).
-    A worn or cut tip, a printed duct that shrank or went oval, a rotor that grows under load.  A gap does not fall
-    below zero.
+    Geometry only: the gap grows by a length, and `tip_gap` gives the loss (Wisler 1985 and Cumpsty 1989 there). A
+    worn or cut tip, a printed duct that shrank or went oval, a rotor that grows under load. The gap is never below
+    zero.
     """
 
     extra_mm: float = 0.5
 
     id = "wider_gap"
     inviscid = True
-    title = "tip gap other than stated"
-    sign = "thrust of a ducted rotor falls at every speed, torque less; an open rotor shows nothing"
+    title = "wrong tip gap"
+    sign = "thrust of a ducted rotor drops at every speed, torque by less; no change on an open rotor"
     check = "measure the gap with a feeler gauge"
     parameters = (Parameter("extra_mm", "mm", -1.0, 4.0, "declared; printed and moulded ducts", 6, 0.0, 0.5),)
     on_by_default = False

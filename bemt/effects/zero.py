@@ -13,9 +13,9 @@ class Zero(Effect):
 
     Notes
     -----
-    Zero error of a load cell (ISO 376:2011; not checked): falls as 1/n^2 in the coefficient.  Full scale is the largest
-    reading of the recording.  No tare, cable pull, weight of the motor: some percent as a rule, far more at times,
-    a heavy-tailed prior; declared.
+    Zero error of a load cell (ISO 376:2011; not checked): falls as 1/n^2 in the coefficient. Full scale is the largest
+    reading of the recording. No tare, cable pull, weight of the motor: typically a few percent, sometimes far more.
+    Hence a heavy-tailed prior; declared.
     """
 
     zero: float = 0.01
@@ -34,8 +34,8 @@ class ThrustZero(Zero):
     """The thrust cell shows the thrust plus a constant share of full scale."""
 
     id = "thrust_zero"
-    title = "zero of the thrust cell"
-    sign = "thrust off by a constant, which falls as 1/n^2 in the coefficient, whatever airspeed; torque is right"
+    title = "zero offset of the thrust cell"
+    sign = "thrust off by a constant, which falls as 1/n^2 in the coefficient, at any airspeed; torque is right"
     sensor = "thrust_N"
 
 
@@ -43,6 +43,6 @@ class TorqueZero(Zero):
     """The torque cell shows the torque plus a constant share of full scale."""
 
     id = "torque_zero"
-    title = "zero of the torque cell"
-    sign = "torque off by a constant, which falls as 1/n^2 in the coefficient, whatever airspeed; thrust is right"
+    title = "zero offset of the torque cell"
+    sign = "torque off by a constant, which falls as 1/n^2 in the coefficient, at any airspeed; thrust is right"
     sensor = "torque_Nm"

@@ -1,8 +1,7 @@
-"""What `import bemt` offers: propellers and fans, their curves, recordings, diagnoses, drives.
+"""The public API, `import bemt`: propellers and fans, their curves, recordings, diagnoses, drives.
 
-Every function here takes and gives plain things: a label or a file, numbers in the unit of their name, a
-:class:`bemt.dataset.Dataset` out. Nothing prints; bad input raises :class:`bemt.base.errors.InputError`, which says
-file, place and remedy.
+Functions take a label, a file or numbers in the unit of their name, and return a :class:`bemt.dataset.Dataset` or a
+small object. Nothing prints. Bad input raises :class:`bemt.base.errors.InputError` with file, location and remedy.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Questions of the public face: read, diagnose, compare, drive, validate."""
+"""Functions of the public API: read, diagnose, compare, drive, validate."""
 
 from __future__ import annotations
 
@@ -29,25 +29,25 @@ __all__ = ["Answer", "compare", "diagnose", "drive", "read", "validate"]
 
 
 def read(path: str | os.PathLike[str], format: str | None = None) -> Dataset:  # noqa: A002
-    r"""Read a recording: a bench log, a table, an export of CFD, a vendor's file.
+    r"""Read a recording: a bench log, a table, a CFD export, a vendor file.
 
     Parameters
     ----------
     path : str or path
         The file.
     format : str, optional
-        Name of the reader; found by content by default.
+        Name of the reader; detected from the content by default.
 
     Returns
     -------
     Dataset
-        Steady points of a log; the rows of a table of points; one point of means of a CFD history. ``notes`` say what
-        was decided on the way and what looks wrong; nothing suspicious is corrected.
+        Steady points of a log, rows of a table of points, or one point with the means of a CFD history. ``notes`` list
+        the decisions made and what looks wrong. Suspicious data are not corrected.
 
     Raises
     ------
     InputError
-        When the file is not understood, with the line to write.
+        If the file cannot be interpreted; the message says what to write.
 
     Examples
     --------
@@ -65,18 +65,18 @@ def read(path: str | os.PathLike[str], format: str | None = None) -> Dataset:  #
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What a diagnosis says; :func:`diagnose` makes one.
+    """Result of a diagnosis, returned by :func:`diagnose`.
 
     Parameters
     ----------
     diagnosis : bemt.diagnose.chain.Diagnosis
-        All of it.
+        The complete result.
     propeller : Propeller
-        What was compared with the recording.
+        The propeller that was compared with the recording.
 
     Examples
     --------
-    The blades of this recording stand 1.5 deg steeper than those of its reference:
+    The blades of this recording are 1.5 deg steeper than those of its reference:
 
     >>> import numpy as np
     >>> from bemt.library import propeller
@@ -89,7 +89,7 @@ class Answer:
     >>> answer.verdict, answer.effects, answer.to_dict()["schema"]
     ('named', ('pitch_offset',), 'bemt.diagnosis/1')
     >>> print(answer.text.splitlines()[0])
-    The model leaves something out: blade angle other than stated.
+    Cause found: wrong blade angle.
     >>> improved = answer.improved.solve(rpm, J=J, bands=False)
     >>> bool(np.max(np.abs(improved.thrust_N / turned.thrust_N - 1)) < 0.02)
     True
@@ -116,26 +116,26 @@ class Answer:
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Effects of the verdict; of a class all members."""
+        """Effects of the verdict; for a class, all members."""
         return self.diagnosis.decision.effects
 
     @property
     def text(self) -> str:
-        """The answer in words, as the command line prints it."""
+        """The answer as text, as on the command line."""
         from bemt.diagnose.document import text
 
         return text(self.diagnosis)
 
     @property
     def improved(self) -> Propeller | None:
-        """The propeller with what was found switched on; None when nothing that can be simulated was named."""
+        """The propeller with the named effects switched on; None if nothing was named that can be simulated."""
         from bemt.diagnose.improve import improved_case
 
         text = improved_case(self.diagnosis, self.propeller.case, self.propeller.text)
         return Propeller(case_of(text, self.propeller.case.folder), text) if text else None
 
     def to_dict(self) -> dict[str, Any]:
-        """Give the answer as plain values.
+        """Convert the answer to plain values.
 
         Returns
         -------
@@ -152,7 +152,7 @@ class Answer:
         Parameters
         ----------
         folder : str or path
-            Where the PNG files go.
+            Folder for the PNG files.
 
         Returns
         -------
@@ -173,18 +173,18 @@ def diagnose(
     reference: str | os.PathLike[str] | Dataset | pd.DataFrame | Sequence[Any] | None = None,
     only: Sequence[str] | None = None, progress: Callable[[str], None] | None = None,
 ) -> Answer:  # fmt: skip
-    """Say what physics was left out where a recording and the simulation differ.
+    """Find the physics or the stand fault that explains why a recording differs from the model.
 
     Parameters
     ----------
     recording : path, Dataset, DataFrame, or sequence of these
-        What was measured; columns of a frame carry units (``thrust_N``, ``thrust_gf``, ``torque_Nm``).
+        The measurement; columns of a frame carry units (``thrust_N``, ``thrust_gf``, ``torque_Nm``).
     propeller : Propeller or str
-        What it was measured on; a label or a case will do.
+        The propeller that was measured; a label or a case is enough.
     reference : path, Dataset, DataFrame, or sequence of these, optional
-        Recordings of the same stand without the cause in question: how far model and stand differ anyway.
+        Recordings from the same stand without the suspected cause; they show how far model and stand differ anyway.
     only : sequence of str, optional
-        Consider these effects only.
+        Consider only these effects.
     progress : callable, optional
         Called with a line of text.
 
@@ -196,11 +196,11 @@ def diagnose(
     Raises
     ------
     InputError
-        For recordings without a load, and effects that nobody knows.
+        For recordings without a load and for unknown effects.
 
     Examples
     --------
-    Points at rest that the model itself made: nothing is left out.
+    Static points made by the model itself: nothing is missing.
 
     >>> import bemt
     >>> p = bemt.propeller("10x5")
@@ -242,7 +242,7 @@ def drive(
     propeller: Propeller | str, *, kv: float, cells: int, mass_kg: float | None = None, rotors: int = 1,
     capacity_Ah: float | None = None, airspeed_m_s: float = 0.0,
 ) -> DriveEstimate:  # fmt: skip
-    """Estimate what a motor makes of a propeller when its K_v and the battery are all that is known.
+    """Estimate the performance of a propeller with a motor, given only the motor K_v and the battery.
 
     Parameters
     ----------
@@ -253,23 +253,23 @@ def drive(
     cells : int
         LiPo cells in series.
     mass_kg : float, optional
-        Of the vehicle, for the hover point. [kg]
+        Mass of the vehicle, for the hover point. [kg]
     rotors : int
-        That carry it and share the battery.
+        Number of rotors that carry the vehicle and share the battery.
     capacity_Ah : float, optional
-        Of the battery, for the time aloft. [A h]
+        Capacity of the battery, for the flight time. [A h]
     airspeed_m_s : float
-        Speed of flight. [m/s]
+        Flight speed. [m/s]
 
     Returns
     -------
     bemt.drive.from_label.DriveEstimate
-        ``.full``, ``.hover``, ``.text``, ``.to_dict()``; every number with its band.
+        ``.full``, ``.hover``, ``.text``, ``.to_dict()``; each value with its band.
 
     Raises
     ------
     InputError
-        For impossible numbers.
+        For impossible values.
 
     Examples
     --------
@@ -291,26 +291,26 @@ def compare(
     a: str | os.PathLike[str], b: str | os.PathLike[str], *, case: str | os.PathLike[str] | None = None,
     diameter_m: float | None = None,
 ) -> Contrast:  # fmt: skip
-    r"""Say what changed between two recordings of one stand.
+    r"""Find what changed between two recordings from one stand.
 
     Parameters
     ----------
     a, b : str or path
-        Recordings before and after, or without and with.
+        Recordings before and after a change, or without and with it.
     case : str or path, optional
-        The rotor: `b` is then diagnosed with `a` as its reference.
+        Case of the rotor; `b` is then diagnosed with `a` as its reference.
     diameter_m : float, optional
-        Of the rotor where there is no case, for the advance ratio. [m]
+        Rotor diameter for the advance ratio, if there is no case. [m]
 
     Returns
     -------
     bemt.diagnose.contrast.Contrast
-        ``.document`` is the answer as ``bemt.comparison/1``.
+        ``.document`` is the answer in the format ``bemt.comparison/1``.
 
     Raises
     ------
     InputError
-        For files that are no recordings, or have no point in common.
+        For files that are not recordings or have no point in common.
 
     Examples
     --------
@@ -325,7 +325,7 @@ def compare(
     >>> found.verdict, found.effects
     ('class', ('thrust_gain', 'ground_effect'))
     >>> print(found.text.splitlines()[0])
-    Calibration of the thrust cell or a wall behind or before the propeller (thrust -10.0% and torque +0.0%).
+    Gain of the thrust cell or wall behind or in front of the propeller (thrust -10.0% and torque +0.0%).
     """
     from bemt.diagnose import contrast
 
@@ -337,12 +337,12 @@ def compare(
 
 
 def validate(folder: str | os.PathLike[str]) -> dict[str, Any]:
-    """Compare BEMT with a folder of measured propellers in the layout of the UIUC database.
+    """Compare BEMT with a folder of measured propellers in UIUC layout.
 
     Parameters
     ----------
     folder : str or path
-        The folder, or ``"uiuc"`` for the data found.
+        The folder, or ``"uiuc"`` for the installed data.
 
     Returns
     -------
@@ -352,7 +352,7 @@ def validate(folder: str | os.PathLike[str]) -> dict[str, Any]:
     Raises
     ------
     InputError
-        When it holds no propeller that can be compared.
+        If it contains no propeller that can be compared.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""What callers hand over, checked: numbers and paths."""
+"""Checks of numbers and paths that callers pass in."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["numbers", "path_text"]
 
 
 def numbers(name: str, value: Any) -> NDArray[np.float64]:
-    """Finite numbers, one or more, of what somebody hands over."""
+    """One or more finite numbers from a caller."""
     try:
         found = np.asarray(value, dtype=float)
     except (TypeError, ValueError):
@@ -27,7 +27,7 @@ def numbers(name: str, value: Any) -> NDArray[np.float64]:
 
 
 def path_text(name: str, value: Any) -> str:
-    """Path as text; anything else is refused."""
+    """Path as text; anything else is an error."""
     if isinstance(value, (str, os.PathLike)) and os.fspath(value):
         return os.fspath(value)
     raise InputError(Fault("", name, f"{type(value).__name__} {value!r:.40}", "the path of a file or folder"))

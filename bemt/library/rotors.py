@@ -1,4 +1,4 @@
-"""Propellers and fans of the public face: made of a label, of stations or of a case; solved into Datasets."""
+"""Propellers and fans of the public API: from a label, from stations or from a case; solved into Datasets."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ BANDED = ("thrust_N", "torque_Nm", "power_W", "CT", "CP", "eta")
 
 @dataclass(frozen=True, eq=False)
 class Propeller:
-    """A propeller or fan that can be solved; :func:`propeller` and :func:`load` make one.
+    """A propeller or fan that can be solved; create one with :func:`propeller` or :func:`load`.
 
     Parameters
     ----------
     case : bemt.case.Case
         Geometry, air, model and declared unknowns.
     text : str
-        The case as a file has it, which :meth:`write` writes.
+        The case as text, as written by :meth:`write`.
 
     Examples
     --------
@@ -58,12 +58,12 @@ class Propeller:
     text: str
 
     def __repr__(self) -> str:
-        """Say what it is in a line."""
+        """One-line summary."""
         kind = "fan" if self.case.ducted else "propeller"
         return f"<{kind} {self.name}: {self.diameter_m:.4g} m, {self.blades} blades, {len(self.unknowns)} unknowns>"
 
     def _repr_html_(self) -> str:
-        """Show it in a notebook: size, point of operation, declared unknowns."""
+        """Show it in a notebook: size, operating point, declared unknowns."""
         head = f"{'fan' if self.case.ducted else 'propeller'} {self.name}"
         size = {"diameter": f"{self.diameter_m:.4g} m", "blades": f"{self.blades}"}
         point = f"{self.case.rpm:g} rev/min, {self.case.airspeed_m_s:g} m/s"
@@ -72,7 +72,7 @@ class Propeller:
 
     @property
     def name(self) -> str:
-        """Name of its case.
+        """Name of the case.
 
         Examples
         --------
@@ -105,7 +105,7 @@ class Propeller:
 
     @property
     def unknowns(self) -> dict[str, str]:
-        """Declared unknowns and their ranges; bands come from these.
+        """Declared unknowns and their ranges, which contribute to the bands.
 
         Examples
         --------
@@ -123,15 +123,15 @@ class Propeller:
         Parameters
         ----------
         rpm : array_like, optional
-            Speed of rotation; the case's by default. [rev/min]
+            Speed of rotation; from the case by default. [rev/min]
         airspeed_m_s : array_like, optional
-            Axial speed; the case's by default. Broadcast with `rpm`. [m/s]
+            Axial speed; from the case by default. Broadcast with `rpm`. [m/s]
         J : array_like, optional
             Advance ratio V/(n D) instead of `airspeed_m_s`. [-]
         density_kg_m3 : float, optional
-            Of the air; the case's by default. [kg/m3]
+            Air density; from the case by default. [kg/m3]
         bands : bool
-            Also move every declared unknown through its range: the standard uncertainty of what comes out.
+            Also compute standard uncertainties: every declared unknown is varied over its range.
 
         Returns
         -------
@@ -141,7 +141,7 @@ class Propeller:
         Raises
         ------
         InputError
-            When both `airspeed_m_s` and `J` are given, or numbers are not finite.
+            If both `airspeed_m_s` and `J` are given, or numbers are not finite.
 
         Examples
         --------
@@ -165,7 +165,7 @@ class Propeller:
         parts: dict[str, dict[str, Array]] = {"model": u_model} if bands else {}
         if bands and self.case.assumptions:
             parts["input"] = {key: np.sqrt(v) for key, v in variance.items() if key in u_model}
-        notes = ("bands, one standard deviation: declared unknowns (input), real rotors against BEMT (model)",)
+        notes = ("bands, one standard deviation: declared unknowns (input), real rotors compared with BEMT (model)",)
         about = {"source": "bemt", "file": self.case.path.as_posix()}
         return Dataset("bemt", self.name, values, flags=flags, provenance=about, u_by=parts,
                        notes=notes if bands else ())  # fmt: skip
@@ -174,23 +174,23 @@ class Propeller:
         self, rpm: ArrayLike | None = None, J: ArrayLike | None = None, *, airspeed_m_s: ArrayLike | None = None,
         density_kg_m3: float | None = None, bands: bool = True,
     ) -> Dataset:  # fmt: skip
-        """Solve every speed of rotation with every advance ratio or airspeed.
+        """Solve every combination of speed of rotation and advance ratio or airspeed.
 
         Parameters
         ----------
         rpm : array_like, optional
-            Speeds of rotation; the case's by default. [rev/min]
+            Speeds of rotation; from the case by default. [rev/min]
         J : array_like, optional
-            Advance ratios; 0 to 0.9 when neither these nor `airspeed_m_s` are given. [-]
+            Advance ratios; 0 to 0.9 if neither these nor `airspeed_m_s` are given. [-]
         airspeed_m_s : array_like, optional
-            Airspeeds instead. [m/s]
+            Airspeeds instead of advance ratios. [m/s]
         density_kg_m3, bands : optional
             As for :meth:`solve`.
 
         Returns
         -------
         Dataset
-            One point for each pair, the speeds of rotation outermost.
+            One point per pair, with the speed of rotation as the outer loop.
 
         Examples
         --------
@@ -213,7 +213,7 @@ class Propeller:
         self, rpm: float | None = None, airspeed_m_s: float | None = None, *, J: float | None = None,
         density_kg_m3: float | None = None,
     ) -> pd.DataFrame:  # fmt: skip
-        """Solve one operating point and show it along the blade.
+        """Solve one operating point and return the distribution along the blade.
 
         Parameters
         ----------
@@ -224,18 +224,18 @@ class Propeller:
         -------
         pandas.DataFrame
             A row per blade element, from hub to tip: ``r_m``, ``chord_m``, ``beta_deg``, ``alpha_deg``, ``cl``, ``cd``,
-            ``Re``, ``M``, ``axial_m_s`` and ``swirl_m_s`` (speeds of the air at the disk), ``thrust_per_radius_N_m``,
-            ``torque_per_radius_Nm_m`` (all blades together). NaN where the point does not converge.
+            ``Re``, ``M``, ``axial_m_s`` and ``swirl_m_s`` (air velocity at the disk), ``thrust_per_radius_N_m``,
+            ``torque_per_radius_Nm_m`` (all blades together). NaN if the point does not converge.
 
         Raises
         ------
         InputError
-            For more than one point, and as for :meth:`solve`.
+            For more than one point; otherwise as :meth:`solve`.
 
         Notes
         -----
-        Effects that act on points (a wall behind, the body of the vehicle) change the whole rotor's loads in
-        :meth:`solve` and are not distributed here.
+        Effects that act on points (a wall behind, the body of the vehicle) change the loads of the whole rotor in
+        :meth:`solve` and are not distributed along the blade here.
 
         Examples
         --------
@@ -277,9 +277,9 @@ class Propeller:
         Returns
         -------
         Gradient
-            ``thrust_N``, ``torque_Nm`` and the derivatives of both by every element's ``chord`` [1/m] and ``beta``
-            [1/rad], (2, N), and by ``pitch`` [1/rad], ``rpm``, ``airspeed`` and ``density``, (2,). Thrust of the rotor
-            alone, without duct and stator.
+            ``thrust_N``, ``torque_Nm`` and the derivatives of both with respect to every element's ``chord`` [1/m] and
+            ``beta`` [1/rad], (2, N), and to ``pitch`` [1/rad], ``rpm``, ``airspeed`` and ``density``, (2,). Thrust of
+            the rotor alone, without duct and stator.
 
         Raises
         ------
@@ -307,7 +307,7 @@ class Propeller:
         return prepare_case(self.case)
 
     def replaced(self, changes: Mapping[str, Any]) -> Propeller:
-        """Set values of the case; one that was a declared unknown is known then.
+        """Change values of the case; a declared unknown that is set becomes known.
 
         Parameters
         ----------
@@ -317,7 +317,7 @@ class Propeller:
         Returns
         -------
         Propeller
-            A new one.
+            A new propeller.
 
         Examples
         --------
@@ -338,22 +338,22 @@ class Propeller:
         return Propeller(case_of(text, self.case.folder), text)
 
     def write(self, folder: str | os.PathLike[str]) -> Path:
-        """Write the case into a new folder, for the command line.
+        """Write the case to a new folder, for use on the command line.
 
         Parameters
         ----------
         folder : str or path
-            Where ``case.toml`` goes; it must not hold one.
+            Folder for ``case.toml``; it must not contain one.
 
         Returns
         -------
         Path
-            The file.
+            The written file.
 
         Raises
         ------
         InputError
-            When there is a case already, or the folder cannot be written.
+            If there is a case already, or the folder cannot be written.
 
         Examples
         --------
@@ -367,7 +367,7 @@ class Propeller:
 
         file = Path(path_text("folder", folder)) / "case.toml"
         if file.exists():
-            raise InputError(Fault(file.as_posix(), "", "a file that is there", "a new folder"))
+            raise InputError(Fault(file.as_posix(), "", "an existing file", "a new folder"))
         try:
             write_atomic(file, self.text)
         except OSError as error:
@@ -415,7 +415,7 @@ class Propeller:
 def _solved(
     case: Case, rpm: Array, V: Array, air: Air, bands: bool = False
 ) -> tuple[dict[str, Array], tuple[tuple[str, ...], ...], dict[str, Array]]:
-    """Channels, flags and the model's own uncertainty of points: the one place where this face meets the solver."""
+    """Channels, flags and model uncertainty of points; the only place where the public API calls the solver."""
     from bemt.case.prepare import prepare_case
 
     model = prepare_case(case)
@@ -436,33 +436,33 @@ def propeller(
     label: str | None = None, *, stations: str | os.PathLike[str] | None = None, diameter_m: float | None = None,
     blades: int | None = None, rpm: float | None = None, airspeed_m_s: float = 0.0,
 ) -> Propeller:  # fmt: skip
-    """Make a propeller of a label, or of a file of blade stations.
+    """Create a propeller from a label or from a file of blade stations.
 
     Parameters
     ----------
     label : str, optional
-        Diameter x pitch in inches, blades if not two: ``"10x5"``, ``"8x4.5x3"``.
+        Diameter x pitch in inches, and blades if not two: ``"10x5"``, ``"8x4.5x3"``.
     stations : str or path, optional
         Instead of the label: a CSV with ``r_over_R,chord_over_R,beta_deg`` (r and chord may be lengths, such as
-        ``r_mm``), a geometry file of the UIUC database or an APC PE0 file.
+        ``r_mm``), a UIUC geometry file or an APC PE0 file.
     diameter_m : float, optional
-        With `stations`: diameter. [m]
+        Diameter, required with `stations`. [m]
     blades : int, optional
-        Number of blades; 2 unless the label says.
+        Number of blades; by default from the label, else 2.
     rpm : float, optional
-        Speed at which :meth:`Propeller.solve` works when it is told none. [rev/min]
+        Default speed of :meth:`Propeller.solve`. [rev/min]
     airspeed_m_s : float
-        The same for the airspeed. [m/s]
+        Default airspeed of :meth:`Propeller.solve`. [m/s]
 
     Returns
     -------
     Propeller
-        What is not known is a declared unknown with its range, see :attr:`Propeller.unknowns`.
+        Everything that is not given is a declared unknown with a range, see :attr:`Propeller.unknowns`.
 
     Raises
     ------
     InputError
-        For an unreadable label or file, or numbers that make no propeller.
+        For an unreadable label or file, or values that do not define a propeller.
 
     Examples
     --------

@@ -3,14 +3,14 @@
 A reader is a module of this package (its name does not start with ``_``) that defines
 
 * ``KIND`` : str, the name used in ``format = "..."``;
-* ``sniff(head) -> bool`` : True when the head of a file (:data:`HEAD_BYTES` bytes, or text) is of this format;
+* ``sniff(head) -> bool`` : True if the head of a file (:data:`HEAD_BYTES` bytes, or text) has this format;
 * ``read(path) -> Dataset`` : the rows of the file, samples or points, in SI, or :class:`bemt.base.errors.InputError`
-  with all its faults; :class:`bemt.readers._recording.Builder` and :func:`bemt.readers._columns.dataset` make it. Files
-  of blades and polars give the object of their room instead;
-* optionally ``sniff_folder(path) -> bool`` : True when ``read`` also takes that folder;
-* optionally ``FALLBACK = True`` : its claim counts only when no other importer claims the file.
+  with all its faults. Use :class:`bemt.readers._recording.Builder` or :func:`bemt.readers._columns.dataset`. Readers of
+  blades and polars return the object of their own package instead;
+* optionally ``sniff_folder(path) -> bool`` : True if ``read`` also takes that folder;
+* optionally ``FALLBACK = True`` : used only if no other reader claims the file.
 
-The extension of a file decides nothing. When two sniffers claim a file, that is an error that asks for ``format =``.
+The file extension is ignored. If two readers claim a file, that is an error that asks for ``format =``.
 """
 
 from __future__ import annotations
@@ -37,14 +37,14 @@ from bemt.base.errors import Fault, InputError
 __all__ = ["HEAD_BYTES", "SourceText", "decode", "detect", "head_text", "importers", "load_text", "number", "read"]
 
 HEAD_BYTES = 16384
-"""Bytes of a file that a sniffer sees."""
+"""Number of bytes passed to ``sniff``."""
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
 
 
 @dataclass(frozen=True)
 class SourceText:
-    """Text of one input file with what provenance needs.
+    """Text of one input file, with its provenance.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class SourceText:
 
     @property
     def lines(self) -> list[str]:
-        """Lines without their ends; line numbers in faults count from 1."""
+        """Lines without line ends; line numbers in faults count from 1."""
         return self.text.splitlines()
 
 
@@ -106,7 +106,7 @@ def decode(raw: bytes) -> str:
 
 
 def load_text(path: str | os.PathLike[str]) -> SourceText:
-    """Read one file whole, unpacking gzip; the hash is that of the file as it lies there.
+    """Read a whole file, unpacking gzip; the hash is that of the file as stored.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def load_text(path: str | os.PathLike[str]) -> SourceText:
     Raises
     ------
     InputError
-        When the file cannot be read, is damaged gzip data, larger than :data:`MAX_BYTES`, or binary (holds NUL bytes).
+        If the file cannot be read, is damaged gzip data, larger than :data:`MAX_BYTES`, or binary (contains NUL bytes).
     """
     name = os.fspath(path)
     try:
@@ -177,7 +177,7 @@ def number(token: str) -> float | None:
     Returns
     -------
     float or None
-        The value, in the unit of the column; None when the text is not a finite number (``nan``, ``1,5``, ``0.34-NaN``,
+        The value, in the unit of the column; None if the text is not a finite number (``nan``, ``1,5``, ``0.34-NaN``,
         ``1_000``).
 
     Examples
@@ -194,7 +194,7 @@ def number(token: str) -> float | None:
 
 @cache
 def importers() -> Mapping[str, ModuleType]:
-    """Find the importers of this folder.
+    """Find the readers in this folder.
 
     Returns
     -------
@@ -204,7 +204,7 @@ def importers() -> Mapping[str, ModuleType]:
     Raises
     ------
     TypeError
-        When a module lacks KIND, sniff or read, or repeats a kind (a bug, not an input error).
+        If a module lacks KIND, sniff or read, or repeats a kind (a bug, not an input error).
     """
     found: dict[str, ModuleType] = {}
     for info in pkgutil.iter_modules(__path__):
@@ -221,7 +221,7 @@ def importers() -> Mapping[str, ModuleType]:
 
 
 def detect(path: str | os.PathLike[str]) -> str:
-    """Find the format of a file or folder by its content.
+    """Detect the format of a file or folder from its content.
 
     Parameters
     ----------
@@ -231,12 +231,12 @@ def detect(path: str | os.PathLike[str]) -> str:
     Returns
     -------
     str
-        Kind of the one importer that claims it.
+        Kind of the only reader that claims it.
 
     Raises
     ------
     InputError
-        When it cannot be read, when no importer claims it, or when two or more do (then give ``format =``).
+        If it cannot be read, if no reader claims it, or if two or more do (then give ``format =``).
     """
     name = os.fspath(path)
     target = Path(path)
@@ -273,19 +273,19 @@ def detect(path: str | os.PathLike[str]) -> str:
 
 
 def read(path: str | os.PathLike[str], format: str | None = None) -> Any:  # noqa: A002 - the key of the case file
-    """Read a file or folder with the importer of its format.
+    """Read a file or folder with the reader of its format.
 
     Parameters
     ----------
     path : str or path
         File or folder.
     format : str or None
-        Kind of the importer; None finds it by content.
+        Kind of the reader; None detects it from the content.
 
     Returns
     -------
     Dataset or object
-        What that reader's ``read`` returns.
+        The return value of that reader's ``read``.
 
     Raises
     ------

@@ -50,12 +50,12 @@ def _nothing_left(sign: float) -> str:
 
 
 class ColumnTable(Table):
-    """[columns]: where a channel stands, its unit, sign and the uncertainty of its instrument."""
+    """[columns]: column, unit, sign and instrument uncertainty of each channel."""
 
     column: int | str = entry(
-        "where it stands", low=1, required=True, words="a heading, or the number of a column from 1"
+        "column of the channel", low=1, required=True, words="a heading, or the number of a column from 1"
     )
-    unit: str = entry("of the column", required=True)
+    unit: str = entry("unit of the column", required=True)
     sign: int = entry("factor on every value", "", -1, 1, _nothing_left, default=1, words="1 or -1")
     u_gain_pct: float | None = entry("standard uncertainty of the scale", "%", 0.0, 50.0)
     u_zero: float | None = entry("standard uncertainty of the zero, in the unit of the column", low=0.0)
@@ -65,7 +65,7 @@ class ColumnTable(Table):
 def _column_of(dimension: str) -> type[ColumnTable]:
     choices = units.suffixes(dimension) + (("-",) if dimension == "fraction" else ())
     suspect = _mass_for_force if dimension == "force" else None
-    unit = entry("of the column", suspect=suspect, required=True, choices=choices)
+    unit = entry("unit of the column", suspect=suspect, required=True, choices=choices)
     return create_model("ColumnTable", __base__=ColumnTable, unit=(str, unit))
 
 
@@ -76,17 +76,19 @@ ColumnsTable: Any = create_model("ColumnsTable", __base__=Table, **_COLUMNS)
 
 
 class RecordingHead(Table):
-    """[recording]: the tables and how they are written."""
+    """[recording]: the tables and their format."""
 
-    file: str | tuple[str, ...] = entry("table beside this file, or tables in the order of their runs", required=True)
-    session: str | None = entry("runs of one session share their zero and gain")
-    remark: str | None = entry("anything")
-    decimal: Literal[".", ","] = entry("mark of decimals", default=".", words='"." or ","')
-    delimiter: Literal[",", ";", "\t", "|", " "] | None = entry(
-        "between cells; found if left out", words='one of ",", ";", "|", tab, space'
+    file: str | tuple[str, ...] = entry(
+        "table in the folder of this file, or several in the order of the runs", required=True
     )
-    header: bool | None = entry("false: the first line is data; found if left out")
-    uncertainty_source: str | None = entry("where the uncertainties come from")
+    session: str | None = entry("name of the session; its runs share zero and gain")
+    remark: str | None = entry("anything")
+    decimal: Literal[".", ","] = entry("decimal separator", default=".", words='"." or ","')
+    delimiter: Literal[",", ";", "\t", "|", " "] | None = entry(
+        "cell separator; detected if omitted", words='one of ",", ";", "|", tab, space'
+    )
+    header: bool | None = entry("false: the first line is data; detected if omitted")
+    uncertainty_source: str | None = entry("source of the uncertainties")
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -97,7 +99,7 @@ class RecordingHead(Table):
         """Tables lie beside this file."""
         for name in self.files:
             if Path(name).is_absolute() or ".." in Path(name).parts:
-                yield "file", repr(name), "the name of a file beside this one"
+                yield "file", repr(name), "the name of a file in the same folder"
 
 
 class _Constants(Table):
@@ -121,19 +123,21 @@ class _Constants(Table):
 
 
 class RotorFacts(_Constants):
-    """[rotor]: what turned."""
+    """[rotor]: the tested rotor."""
 
-    pole_pairs: int | None = entry("of the motor; needed by electrical_rpm, refused without it", low=1, high=60)
+    pole_pairs: int | None = entry(
+        "pole pairs of the motor; required with electrical_rpm, refused otherwise", low=1, high=60
+    )
     blades: int | None = entry("number of blades", low=1, high=64)
-    name: str | None = entry("of the rotor")
+    name: str | None = entry("name of the rotor")
     motor: str | None = entry("name of the motor")
-    ducted: Literal["yes", "no"] | None = entry("whether there was a duct")
+    ducted: Literal["yes", "no"] | None = entry("whether the rotor was ducted")
     diameter_in: float | None = entry("tip diameter", "in", 0.2, 480)
     diameter_mm: float | None = entry("tip diameter", "mm", 5, 12_000)
     diameter_m: float | None = entry("tip diameter", "m", 0.005, 12.0)
-    pitch_in: float | None = entry("advance per turn", "in", 0.04, 800)
-    pitch_mm: float | None = entry("advance per turn", "mm", 1, 20_000)
-    pitch_m: float | None = entry("advance per turn", "m", 0.001, 20.0)
+    pitch_in: float | None = entry("advance per revolution", "in", 0.04, 800)
+    pitch_mm: float | None = entry("advance per revolution", "mm", 1, 20_000)
+    pitch_m: float | None = entry("advance per revolution", "m", 0.001, 20.0)
     gap_in: float | None = entry("tip gap", "in", 0, 8)
     gap_mm: float | None = entry("tip gap", "mm", 0, 200)
     gap_m: float | None = entry("tip gap", "m", 0.0, 0.2)
@@ -174,15 +178,15 @@ class AirFacts(Table):
 
 
 class StandFacts(_Constants):
-    """[stand]: what stood around it."""
+    """[stand]: the surroundings."""
 
-    name: str | None = entry("of the stand")
-    wall_distance_in: float | None = entry("rotor to the wall behind it", "in", 0.4, 4000)
-    wall_distance_mm: float | None = entry("rotor to the wall behind it", "mm", 10, 100_000)
-    wall_distance_m: float | None = entry("rotor to the wall behind it", "m", 0.01, 100.0)
-    ground_distance_in: float | None = entry("axis to the ground", "in", 0.4, 4000)
-    ground_distance_mm: float | None = entry("axis to the ground", "mm", 10, 100_000)
-    ground_distance_m: float | None = entry("axis to the ground", "m", 0.01, 100.0)
+    name: str | None = entry("name of the stand")
+    wall_distance_in: float | None = entry("distance from the rotor to the wall behind it", "in", 0.4, 4000)
+    wall_distance_mm: float | None = entry("distance from the rotor to the wall behind it", "mm", 10, 100_000)
+    wall_distance_m: float | None = entry("distance from the rotor to the wall behind it", "m", 0.01, 100.0)
+    ground_distance_in: float | None = entry("distance from the axis to the ground", "in", 0.4, 4000)
+    ground_distance_mm: float | None = entry("distance from the axis to the ground", "mm", 10, 100_000)
+    ground_distance_m: float | None = entry("distance from the axis to the ground", "m", 0.01, 100.0)
 
 
 class RecordingToml(Table):

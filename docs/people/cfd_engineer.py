@@ -1,4 +1,4 @@
-"""Loads along the blade of the 8x5 beside those of a CFD run, and what two CFD campaigns differ by."""
+"""Blade loads of the 8x5 compared with a CFD run, and the difference between two CFD campaigns."""
 
 import pandas as pd
 

@@ -1,4 +1,4 @@
-"""CT, CP and efficiency over J of a blade given by stations; then the pitch of a 10 in propeller for 8 m/s and 2 N."""
+"""CT, CP and efficiency over J of a blade from stations; then the best pitch of a 10 in propeller at 8 m/s, 2 N."""
 
 from pathlib import Path
 
@@ -28,4 +28,4 @@ def power(pitch_in: float) -> float:
 
 
 best = minimize_scalar(power, bounds=(4.0, 9.0), method="bounded", options={"xatol": 0.05})
-print(f"least power at a pitch of {best.x:.1f} in: {best.fun:.1f} W")
+print(f"minimum power {best.fun:.1f} W at a pitch of {best.x:.1f} in")

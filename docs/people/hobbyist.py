@@ -1,4 +1,4 @@
-"""10x4.5, 900 rev/min/V, 3S: thrust and power over speed at rest, then the whole drive of a quadrotor of 1.4 kg."""
+"""10x4.5, 900 rev/min/V, 3S: static thrust and power over speed, then the whole drive of a 1.4 kg quadrotor."""
 
 import bemt
 

@@ -1,4 +1,4 @@
-"""The 8x5 beside a recording of it: CT, CP and efficiency over J, and what the difference can mean."""
+"""The 8x5 compared with a recording: CT, CP and efficiency over J, and possible causes of the difference."""
 
 import bemt
 

@@ -39,6 +39,6 @@ def agreement(c: Mapping[str, Any]) -> str:
     if math.isfinite(u_D):
         return "not distinguishable from noise" if E <= math.hypot(own, u_D) else "differs"
     if E <= own:
-        return "u_D unknown; inside the model's own band"
+        return "u_D unknown; within the uncertainty of the model"
     share = f" ({100.0 * needed(c) / abs(c['D']):.2g} %)" if c.get("D") else ""
     return f"u_D unknown; agrees only if it is {number_text(needed(c), 2)} {c['unit']}{share} or more"

@@ -95,10 +95,10 @@ def _table(solved: Sequence[Mapping[str, Any]], found: Sequence[Mapping[str, Any
     lines = [line.rstrip() for line in text_table(header, shown, left=(0, len(header) - 1)).splitlines()]
     left = len({id(c) for c in found}) - sum(1 for row in shown if row[-3] != "-")
     if left > 0 or len(body) > len(shown):
-        lines.append(f"and {max(left, len(body) - len(shown))} more, nearer to what was recorded or further down")
+        lines.append(f"and {max(left, len(body) - len(shown))} more rows (--details shows all)")
     if found:
-        lines.append("±, u: one standard uncertainty (BEMT: of inputs and of the model); %: of the")
-        lines.append("largest recording; u > X: they agree if the recording's u is above X N")
+        lines.append("±, u: one standard uncertainty (BEMT: inputs and model); %: of the largest")
+        lines.append("recorded value; u > X: the two agree if the u of the recording is above X N")
     return lines
 
 
@@ -107,28 +107,30 @@ def _worst(found: Sequence[Mapping[str, Any]]) -> list[str]:
         return []
     c = found[0]
     case = c["case"]
-    words = f"Differs most: {case['name']}, BEMT {number_text(c['S'], 3)} N against {c['reference']}: {c['E']:+.3g} N."
+    words = (
+        f"Largest difference: {case['name']}, BEMT {number_text(c['S'], 3)} N minus {c['reference']}: {c['E']:+.3g} N."
+    )
     if abs(c["E"]) <= c["known"]:
-        words += " BEMT's own uncertainty explains as much."
+        words += " This is within the uncertainty of BEMT."
     elif not math.isfinite(c["u_D"]) and math.isfinite(needed(c)):
-        words += f" Nobody states its u: the two agree if that is above {number_text(needed(c), 2)} N."
+        words += f" The recording states no u: the two agree if it is above {number_text(needed(c), 2)} N."
     audit = next((a for a in case.get("audit", []) if a["reference"] == c["reference"]), None)
     faults = [line["finding"] for line in (audit or {"lines": []})["lines"] if line["status"] == "fault"]
     if faults:
-        words += f" Set-up of the recording: {'; '.join(faults)}."
+        words += f" Faults of its set-up: {'; '.join(faults)}."
     return textwrap.wrap(words, WIDTH)
 
 
 def _ducts(solved: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Why K1/K2 is far off beside a ducted fan."""
+    """Why K1/K2 is far off for a ducted fan."""
     told = []
     for result in solved:
         own, simple = (next((r for r in result["rows"] if r["source"] == s), None) for s in ("bemt", "k1k2"))
         if result.get("kind") == "fan" and own and simple and own["thrust_N"] > 0.0:
             told.append(f"{number_text(simple['thrust_N'] / own['thrust_N'], 2)} of BEMT on {result['name'][:30]}")
     words = (
-        f"K1/K2 gives {', '.join(told[:3])}: it is a fit to open propellers, knows their diameter and pitch only, and "
-        "leaves out what lifts a fan: many blades and the duct."
+        f"K1/K2 gives {', '.join(told[:3])}: it is a fit to open propellers with diameter and pitch only. It ignores "
+        "the duct and the number of blades."
     )
     return textwrap.wrap(words, WIDTH) if told else []
 
@@ -144,7 +146,7 @@ def _unknowns(solved: Sequence[Mapping[str, Any]]) -> list[str]:
             while len(", ".join(told)) > WIDTH - 20:
                 told.pop()
             lines.append(f"  {result['name'][:16]:<18}{', '.join(told)}")
-    return ["What would narrow BEMT most (u of the thrust from it):", *lines] if lines else []
+    return ["Unknowns that widen BEMT most (their part of u in thrust):", *lines] if lines else []
 
 
 def _flags(solved: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -169,12 +171,12 @@ def _grids(solved: Sequence[Mapping[str, Any]]) -> list[str]:
 
 def _next(called: str, compared: bool) -> list[str]:
     lines = [
-        "Read on: --details (every case in full), --out DIR (tables), --json,",
+        "More: --details (every case in full), --out DIR (tables), --json,",
         f"  {called} report CASES --out DIR (figures)",
     ]
     if compared:
         lines[-1] += ","
-        lines.append(f"  {called} diagnose LOG --case CASE (what physics is missing)")
+        lines.append(f"  {called} diagnose LOG --case CASE (what the model leaves out)")
     return lines
 
 

@@ -75,7 +75,7 @@ def _assumption_table(result: Mapping[str, Any]) -> str:
          _ends(a["thrust_N"]), _n(a["u_thrust_N"], 2), a["why"]]
         for a in result["assumptions"]
     ]  # fmt: skip
-    header = ["assumed, because the source does not give it", "value", "range", "T N over the range", "u N", "why"]
+    header = ["assumed (not stated by the source)", "value", "range", "T N over the range", "u N", "why"]
     shown = [row[:-1] for row in rows]
     table = text_table(header[:-1], shown, left=(0,), indent="  ").split("\n")
     reasons = [_wrap(str(row[-1]), "      ") for row in rows]
@@ -99,7 +99,7 @@ def _comparison_lines(result: Mapping[str, Any]) -> list[str]:
 
 
 def _audit_lines(result: Mapping[str, Any]) -> list[str]:
-    """What the set-up of every recorded CFD value does to its uncertainty."""
+    """How the set-up of every recorded CFD value affects its uncertainty."""
     out: list[str] = []
     for item in result.get("audit", []):
         whole, known = _share(item["u_relative"]), item["u_relative_known"]
@@ -138,7 +138,7 @@ def _grid_lines(grid: Mapping[str, Any] | None) -> list[str]:
         return []
     axes = ", ".join(f"{k} {v['num']} x {v['min']:g} .. {v['max']:g}" for k, v in grid["axes"].items())
     low, high = grid["thrust_N"]
-    where = f"; {grid['file']}" if grid["file"] else "; --out DIR keeps it"
+    where = f"; {grid['file']}" if grid["file"] else "; saved with --out DIR"
     slow, fast = grid["M_tip"]
     line = (
         f"grid: {axes}: {grid['points']} points, {grid['unconverged']} unconverged, "
@@ -170,7 +170,7 @@ def case_text(result: Mapping[str, Any]) -> str:
         low, high = bemt["thrust_N_range"]
         lines += ["", _assumption_table(result)]
         parts = ", ".join(f"{k} {_n(bemt[k], 3)} N" for k in ("u_input", "u_model", "u_num"))
-        lines += [f"  together: {parts}; one at a time the thrust runs from {_n(low)} to {_n(high)} N"]
+        lines += [f"  together: {parts}; varied one at a time, thrust is {_n(low)} to {_n(high)} N"]
     lines += _grid_lines(result.get("grid"))
     lines += [_wrap(note, "  ", "note: ") for note in result["notes"]]
     return "\n".join(lines)
