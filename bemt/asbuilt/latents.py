@@ -62,8 +62,10 @@ class AsBuilt(Effect):
         if self.camber_deg:
             whole = np.clip((_SEPARATED - np.abs(bake.alpha)) / (_SEPARATED - _ATTACHED), 0.0, 1.0)
             at = bake.alpha + math.radians(self.camber_deg) * whole
-            rows = bake.cl.reshape(-1, bake.alpha.size)
-            bake.cl = np.stack([np.interp(at, bake.alpha, row) for row in rows]).reshape(bake.cl.shape)
+            place = np.interp(at, bake.alpha, np.arange(float(at.size)))
+            left = np.minimum(place.astype(np.intp), at.size - 2)
+            low = bake.cl[..., left]
+            bake.cl = low + (place - left) * (bake.cl[..., left + 1] - low)
         low = np.maximum(np.log(LOW_RE / bake.Re), 0.0)[None, None, :, None]
         bake.cl = bake.cl * np.exp(self.lift + self.low_re_lift * low)
         bake.cd = bake.cd * math.exp(self.drag)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 
 from bemt import effects
 
@@ -31,6 +32,7 @@ class Explanation:
     smooth: bool = False
 
     @classmethod
+    @cache
     def of(cls, *ids: str) -> Explanation:
         """Explanation by effects."""
         return cls(frozenset(ids))
