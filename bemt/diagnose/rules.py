@@ -219,9 +219,9 @@ RULES: tuple[Rule, ...] = (
         "not much better than nothing",
         lambda a: a.odds < a.needed,
         lambda a: a.says("insufficient", "the best explanation is not much better than none"),
-        "LEAST, EXPECTED, PROVEN",
-        "declared after a proof in which all that led with 5 to 8 and nine tenths of the probability was at work; of a "
-        "real rotor that no reference shows, 8 to 16 named what was not there",
+        "ENOUGH, LEAST, EXPECTED, PROVEN",
+        "declared: 8 nats are 4 sigma; 5 where no error of the solver looks like it (in a proof these were all at "
+        "work); of a real rotor that no reference shows, 8 to 16 named what was not there",
     ),
     Rule(
         "does not predict",

@@ -45,8 +45,8 @@ SMALL = 0.1
 EARNED = 8.0
 """Log odds that each effect of a pair must add to the other alone: small model errors are not a second cause [1]."""
 ENOUGH, LEAST, EXPECTED = 8.0, 5.0, 2.5
-"""Log odds over none (about 4 sigma) from which something unknown counts, a name is given at all, and physics known to
-be left out is named [1]."""
+"""Log odds over none (about 4 sigma) from which a name is given at all; of what no error of the solver can look like,
+since there is a reference or it follows a recorded variable of its own; of physics known to be left out [1]."""
 PROVEN, PREDICTS = 20.0, 0.9
 """Below the first (log odds) an explanation must lower the error on left-out blocks to the second, a ratio; physics
 that is on already needs the first in any case, to be on differently [1]."""
@@ -229,7 +229,13 @@ class Asked:
     @property
     def needed(self) -> float:
         """Log odds over nothing from which it counts."""
-        return PROVEN if self.on else EXPECTED if self.expected else PROVEN if self.real else LEAST
+        if self.on or self.expected:
+            return PROVEN if self.on else EXPECTED
+        recorded = self.found.problem.covariates
+        apart = all(any(v in recorded for v in effects.catalogue()[i].along) for i in self.leading)
+        if self.real:
+            return ENOUGH if apart else PROVEN
+        return LEAST if apart or not self.alone else ENOUGH
 
     @cached_property
     def unlisted(self) -> float:
