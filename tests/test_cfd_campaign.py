@@ -39,7 +39,9 @@ PROGRAMS = {
     "checkMesh": "echo '    cells:            1234'",
     "simpleFoam": """
 w=$(grep -o 'omega [-0-9.]*' constant/MRFProperties | cut -d' ' -f2)
-if [ -n "$SLEEP_ABOVE" ] && awk "BEGIN {exit !($w > $SLEEP_ABOVE)}"; then touch asleep; sleep 600; fi
+if [ -n "$SLEEP_ABOVE" ] && awk "BEGIN {exit !($w > $SLEEP_ABOVE)}"; then
+    echo $$ > pid; mv pid asleep; exec sleep 600
+fi
 mkdir -p postProcessing/forces/0
 awk -v w=$w 'BEGIN {
     f = "postProcessing/forces/0/force.dat"; m = "postProcessing/forces/0/moment.dat"
@@ -242,8 +244,10 @@ def test_a_killed_campaign_goes_on(project: Path, tmp_path: Path, programs: Path
         time.sleep(0.1)
     asleep = list((tmp_path / "w").glob("run-*/asleep"))
     assert asleep, "the second run never began"
+    solver = int(asleep[0].read_text())
     os.killpg(process.pid, signal.SIGKILL)
     process.wait()
+    os.kill(solver, signal.SIGKILL)  # it has a session of its own
     before = rows_of(path.parent)
     assert [row["rpm"] for row in before] == ["6000"]
     json.loads((path.parent / "manifest.json").read_text())

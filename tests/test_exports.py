@@ -36,8 +36,7 @@ from geometry.rotor import Rotor
 from geometry.slicing import find_rotor
 
 NUMBERS = [word for word in target_ids() if word not in ("stl", "obj", "step", "openfoam")]
-LOADS = [word for word in NUMBERS if word in ("jsbsim", "mujoco", "rotorpy", "gazebo", "px4", "ardupilot", "simulink",
-                                              "table", "fmu")]  # fmt: skip
+LOADS = [word for word in NUMBERS if exports()[word].kind == "loads"]
 TABLES = ("jsbsim", "mujoco", "simulink", "table", "fmu")
 
 

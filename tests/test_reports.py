@@ -19,8 +19,10 @@ def test_committed_sweep_is_what_the_cases_give(project: Path) -> None:
     call = [sys.executable, "-m", "bemt", "sweep", "cases/", "--json", "--quiet"]
     fresh = json.loads(subprocess.run(call, cwd=project, capture_output=True, text=True, check=True).stdout)
     kept = json.loads((project / "reports" / "sweep.json").read_text(encoding="utf-8"))
-    assert [c["name"] for c in fresh["cases"]] == [c["name"] for c in kept["cases"]]
-    for new, old in zip(fresh["cases"], kept["cases"], strict=True):
+    shipped = [c["name"] for c in kept["cases"]]
+    found = [c for c in fresh["cases"] if c["name"] in shipped]  # a case of one's own may lie beside them
+    assert [c["name"] for c in found] == shipped
+    for new, old in zip(found, kept["cases"], strict=True):
         assert len(new["rows"]) == len(old["rows"])
         for a, b in zip(new["rows"], old["rows"], strict=True):
             assert (a["source"], a["label"]) == (b["source"], b["label"])
@@ -31,11 +33,24 @@ def test_committed_sweep_is_what_the_cases_give(project: Path) -> None:
                     assert a[key] == pytest.approx(b[key], rel=5 * TOLERANCE if key == "u" else TOLERANCE), key
 
 
-@pytest.mark.parametrize("volume", [1, 2])
-def test_committed_validation_is_what_the_data_give(project: Path, shared_data: Path, volume: int) -> None:
+# UIUC volume 1 is what the rule was calibrated on, volume 2 what it is reported on. The bounds are what it reaches: the
+# targets of 6 % (CT), 10 % (CP) and 20 % (90th percentile of CT) are met on volume 1 at rest, missed on volume 2; see
+# reports/validation.
+@pytest.mark.parametrize(
+    ("volume", "static", "forward"),
+    [(1, (0.040, 0.115, 0.055), (0.075, 0.25, 0.060)), (2, (0.085, 0.30, 0.125), (0.105, 0.42, 0.135))],
+)
+def test_committed_validation_is_what_the_data_give_and_within_its_bounds(
+    project: Path, shared_data: Path, volume: int, static: tuple[float, ...], forward: tuple[float, ...]
+) -> None:
     folder = project / "reports" / "validation" / f"uiuc_volume_{volume}"
     kept = json.loads((folder / "validation.json").read_text(encoding="utf-8"))
     fresh = validate(shared_data / "uiuc" / f"volume-{volume}", match_J0=True)
+    assert fresh["unconverged"] == 0 and not fresh["faults"]
+    for kind, bound in (("static", static), ("forward", forward)):
+        assert fresh[kind]["CT"]["median_abs"] < bound[0]
+        assert fresh[kind]["CT"]["p90_abs"] < bound[1]
+        assert fresh[kind]["CP"]["median_abs"] < bound[2]
     for old, new in ((kept, fresh), (kept["matched_J0"], fresh["matched_J0"])):
         for kind in ("static", "forward"):
             assert new[kind]["points"] == old[kind]["points"]
