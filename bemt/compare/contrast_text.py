@@ -92,15 +92,18 @@ def headline(doc: Mapping[str, Any]) -> str:
         return f"Something changed ({moved}) that none of the listed causes makes."
     if verdict == "insufficient":
         return f"These recordings cannot say what changed ({moved})."
-    titles: dict[str, list[str]] = {FAMILY.get(k, k): [] for k in effects}
+    likely = {r["effect"]: r["probability"] for r in doc["ranking"]}
+    titles: dict[str, list[str]] = {}
     for k in effects:
-        titles[FAMILY.get(k, k)].append(k)
+        titles.setdefault(FAMILY.get(k, k), []).append(k)
     if len(effects) == 1:
         row = law(effects[0])
         lead = "The stand, not the rotor" if verdict == "sensor" else "What changed"
         return f"{lead}: {row.title if row else effects[0]} ({moved or 'drive alone'})."
-    words = [_FAMILY_WORD.get(k, k) if len(v) > 1 else _plain(v[0]) for k, v in titles.items()]
-    return f"{' or '.join(words)} ({moved or 'drive alone'}).".capitalize()
+    families = sorted(titles, key=lambda f: -sum(likely.get(k, 0.0) for k in titles[f]))
+    words = [_FAMILY_WORD.get(f, f) if len(titles[f]) > 1 else _plain(titles[f][0]) for f in families]
+    several = f"{', '.join(words[:-1])} or {words[-1]}" if len(words) > 1 else words[0]
+    return f"{several[0].upper()}{several[1:]} ({moved or 'drive alone'})."
 
 
 def _plain(name: str) -> str:

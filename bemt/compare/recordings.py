@@ -43,6 +43,11 @@ _TOLD = ("density as recorded", "by the thermometers", "voltage as recorded")
 _MOVED, _WIDE = 2.5, 1.4
 # Thrust of a propeller of 2.3 times the diameter at one speed: no stand takes both. [1]
 _FAR_OFF = 30.0
+# Scatter of readings at one speed, share, that no stand has: something else changes from reading to reading.
+_RESTLESS = 0.10
+# Standard deviations, set-up included, from which a load has changed.
+_CHANGED = 3.0
+OTHERWISE = "something else changes from reading to reading"
 OTHER_STAND = "no change on one stand moves every load by so much: look at the units and the speeds of both files"
 
 
@@ -110,6 +115,7 @@ def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> RunChange
     if loads:
         verdict = judge(*weigh(loads, (rotor.free, rotor.steady), ("air", "stand"), known, _speeds(ratios)))
         verdict = _far_off(_far_apart(_with_density(_by_proxy(verdict, loads), a, b, loads), ratios), ratios)
+        verdict = _restless(_all_loads(verdict, loads, ratios), loads)
     found = RunChange(
         a,
         b,
@@ -174,6 +180,34 @@ def _far_off(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> Judgem
     if min(loads) < math.log(_FAR_OFF) or said.effects in (("rpm_scale",), ("unit_slip",)):
         return said
     return Judgement("insufficient", (), said.probability, said.size, OTHER_STAND)
+
+
+def _all_loads(
+    said: Judgement, loads: Mapping[str, MatchedChannel], ratios: Mapping[str, Mapping[str, Any]]
+) -> Judgement:
+    """No cause that leaves a load alone which has clearly changed."""
+    rows = [law(k) for k in said.effects]
+    moved = {name for row in rows if row is not None for _, term in row.terms for name in term}
+    if not rows or None in rows or not moved:
+        return said
+    for name, c in loads.items():
+        r = ratios[c.channel]
+        unsure = math.hypot(math.log(r["high95"] / r["ratio"]) / 1.96, c.session)
+        if name not in moved and abs(math.log(r["ratio"])) > _CHANGED * unsure:
+            why = f"{' and '.join(said.effects)} would leave the {name} alone, which changed as well"
+            return Judgement("insufficient", (), said.probability, said.size, why)
+    return said
+
+
+def _restless(said: Judgement, loads: Mapping[str, MatchedChannel]) -> Judgement:
+    """No answer where readings at one speed differ by more than those of any stand."""
+    for name, c in loads.items():
+        for run, here in (("A", ~c.second), ("B", c.second)):
+            scatter = float(np.median(c.u[here]))
+            if scatter > _RESTLESS:
+                why = f"{name} in {run} differs by {scatter:.0%} at one speed: {OTHERWISE}"
+                return Judgement("insufficient", (), said.probability, said.size, why)
+    return said
 
 
 def _speeds(ratios: Mapping[str, Mapping[str, Any]]) -> tuple[float, float] | None:
@@ -273,6 +307,12 @@ def next_step(change: RunChange, files: Sequence[str]) -> dict[str, str]:
     if said.verdict in ("named", "sensor"):
         text = rows[0].settles if rows else "read the label of the channel"
         return {"text": f"to be sure, {text}", "command": f"{ask} {a} {b} --case CASE"}
+    if OTHERWISE in said.why:
+        letter, run = ("a", change.a) if " in A differs" in said.why else ("b", change.b)
+        column = run.conditions[0] if run.conditions else "COLUMN"
+        others = f" (the file has {', '.join(run.conditions[:4])})" if run.conditions else ""
+        text = f"choose the rows of {letter.upper()} in which nothing else changes{others}"
+        return {"text": text, "command": f"{ask} {a} {b} --rows-{letter} {shlex.quote(column)}=LOW:HIGH"}
     if loads and all(r["extrapolated"] for r in loads):
         v = change.a.points
         where = "where A was measured"

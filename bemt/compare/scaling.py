@@ -38,6 +38,9 @@ _EXACT = {1.0: 1.0}
 NEAR, MOST, FAMILIES = 20.0, 6, 3
 """An effect this many times less likely than the leading one is still in its class, which has at most so many members,
 or members of at most so many families: a law is rougher than its evidence."""
+ENOUGH, WIDEST, KINDS = 0.85, 8, 4
+"""Without so few: a wider class where its members hold this much of all probability, so many at most, of so many
+families: what is ruled out by then is half of the list."""
 _OWN_SHAPE, _FURTHER = "propeller", 20.0
 RIVAL, DOUBT = 0.1, 0.3
 """An effect beside which the unknown keeps more than the first is not named; a class beside the second is not given."""
@@ -351,6 +354,9 @@ def judge(probability: Mapping[str, float], size: Mapping[str, tuple[float, floa
     few = len(credible) <= MOST or len(families) <= FAMILIES
     if len(credible) > 1 and few and unknown <= DOUBT and probability[NONE] <= RIVAL:
         return answer("class", credible, f"these scale alike ({mass:.2f})")
+    wide = _wider(listed)
+    if wide and len(credible) > 1 and unknown <= DOUBT and probability[NONE] <= RIVAL:
+        return answer("class", wide, f"these scale alike ({sum(listed[k] for k in wide):.2f})")
     if len(credible) == 1 and listed[first] < SURE:
         return answer("insufficient", (), f"{first} is likely ({listed[first]:.2f}) but not sure")
     if len(credible) == 1:
@@ -361,3 +367,14 @@ def judge(probability: Mapping[str, float], size: Mapping[str, tuple[float, floa
     elif few:
         why = f"something that is not listed may have made it ({unknown:.2f}), and {why}"
     return answer("insufficient", (), why)
+
+
+def _wider(listed: Mapping[str, float]) -> list[str]:
+    """Likeliest effects that hold enough of the probability together; none where these are too many."""
+    chosen: list[str] = []
+    for name in sorted(listed, key=lambda k: -listed[k]):
+        chosen.append(name)
+        if sum(listed[k] for k in chosen) >= ENOUGH:
+            few = len(chosen) <= WIDEST and len({FAMILY.get(k, k) for k in chosen}) <= KINDS
+            return chosen if few else []
+    return []

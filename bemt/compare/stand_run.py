@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from bemt.air import Air
 from bemt.base.errors import Fault, InputError
-from bemt.base.units import ZERO_CELSIUS
+from bemt.base.units import ZERO_CELSIUS, split_suffix
 from bemt.dataset import DIMENSIONLESS, Dataset
-from bemt.recordings.channels import named
+from bemt.recordings.channels import LOADS, MEASURED, named
 from bemt.recordings.reduce import reduce, reduction
 
 Array = NDArray[np.float64]
@@ -58,6 +58,8 @@ class StandRun:
     temperature_K: float = math.nan  # Mean of the air [K]; NaN: not recorded
     # Scatter between the runs of this recording at equal speed, share, by channel, where it shows
     session: Mapping[str, float] = field(default_factory=dict)
+    # Columns that tell rows apart and are no channel of the rotor, as conditions may name them
+    conditions: tuple[str, ...] = ()
     # What lag or hysteresis shifts a load by, standard deviation as a share of its largest value, by channel [1]
     shift: Mapping[str, float] = field(default_factory=dict)
 
@@ -94,21 +96,37 @@ def _kept(imported: Dataset, column: str, wanted: str, where: str) -> NDArray[np
     return np.asarray(kept)
 
 
+def _words(name: str) -> list[str]:
+    """Words of the name of a channel, without its unit: the A of a current in ampere names no rotor."""
+    return split_suffix(name)[0].split("_")
+
+
+def rotors_of(imported: Dataset) -> list[str]:
+    """Rotors that the columns of a file tell apart.
+
+    >>> rotors_of(Dataset("bench", "table", {"T_A_N": [1.0], "T_B_N": [2.0], "current_A": [3.0]}))
+    ['A', 'B']
+    >>> rotors_of(Dataset("bench", "table", {"thrust_N": [1.0], "current_A": [3.0]}))
+    []
+    """
+    return [w for w in _ROTOR_WORDS if any(w in _words(name) for name in imported.values)]
+
+
 def _of_rotor(imported: Dataset, word: str, where: str) -> Dataset:
     """Columns of one of several rotors under their plain names; columns of the others go."""
 
-    def parts(name: str) -> list[str]:
-        return name.split("_")
-
-    known = [w for w in _ROTOR_WORDS if any(w in parts(name) for name in imported.values)]
+    known = rotors_of(imported)
+    if not known and any(f"only the {word} rotor" in note for note in imported.notes):
+        return imported
     if word not in known:
         raise InputError(Fault(where, _ROTOR, word, f"one of {', '.join(known)}" if known else "a file of one rotor"))
     others = set(known) - {word}
     kept: dict[str, str] = {}
     for name in imported.values:
-        own = parts(name)
+        own = _words(name)
         if word in own:
-            kept["_".join(p for p in own if p != word)] = name
+            base = "_".join(p for p in own if p != word)
+            kept[base + name[len("_".join(own)) :] if base else name.removeprefix(f"{word}_")] = name
         elif not others & set(own):
             kept.setdefault(name, name)
     values = {new: imported[old] for new, old in kept.items()}
@@ -182,6 +200,7 @@ def stand_run(imported: Dataset, name: str, diameter_m: float | None = None) -> 
     """Reduce one recording for a comparison."""
     units = {k: unit for k, unit in imported.units.items() if unit or k not in DIMENSIONLESS}
     imported = replace(imported, units=units)  # a throttle has none
+    _one_rotor(imported, name)
     series, ramp = _reduced(imported, diameter_m)
     values = {k: series[k] for k in _WANTED if k in series}
     if not {"thrust_N", "torque_Nm", "power_W"} & values.keys() and "rpm" not in values and "J" not in values:
@@ -213,8 +232,31 @@ def stand_run(imported: Dataset, name: str, diameter_m: float | None = None) -> 
         diameter,
         float(warm.mean()) if warm.size else math.nan,
         {k: float(v["session"]) for k, v in reduction(series).correlated.items() if v.get("session")},
+        conditions_of(imported),
         _shifts(series, bool(ramp)),
     )
+
+
+def _one_rotor(imported: Dataset, name: str) -> None:
+    """Refuse the loads of several rotors, of which one has to be chosen."""
+    several = rotors_of(imported)
+    if len(several) > 1 and not set(LOADS) & named(imported).values.keys():
+        got = f"loads of several rotors: {', '.join(several)}"
+        raise InputError(Fault(name, "", got, "one of them", f"Choose it with --rows-a or --rows-b rotor={several[0]}"))
+
+
+def conditions_of(imported: Dataset) -> tuple[str, ...]:
+    """Columns that may tell one condition from another: no load, no speed, no clock, and not the same in every row.
+
+    >>> made = Dataset("bench", "table", {"rpm": [4e3, 5e3, 6e3], "gap_ratio": [1.0, 1.0, 2.0]})
+    >>> conditions_of(made)
+    ('gap_ratio',)
+    """
+    texts = [k for k, v in imported.texts.items() if 1 < len(set(v)) < len(v)]
+    known = {*MEASURED, *named(imported).provenance["names"].values()}
+    known |= {k for k in imported.values if k.startswith("u_") or {"err", "rpm"} & set(k.split("_"))}
+    numbers = [k for k, v in imported.values.items() if k not in known and _moves(v)]
+    return (*texts, *numbers)
 
 
 def _shifts(points: Dataset, ramp: bool) -> dict[str, float]:

@@ -160,7 +160,7 @@ def _diagnosed(
     from bemt.diagnose.load import load
 
     a, b = (load(name, case, imported) for name, imported in zip(names, read, strict=True))
-    answer = diagnose([b, replace(a, reference=True)], [case], None, progress)
+    answer = diagnose([b, replace(a, reference=True)], [case], None, progress, ratios=False)
     said = diagnosis(answer)
     keys = ("verdict", "effects", "probability", "ranking", "rule")
     told = [line for line in explanation(answer) if not line.startswith(_REMARK)]
