@@ -47,7 +47,6 @@ _FAR_OFF = 30.0
 _RESTLESS = 0.10
 # Standard deviations, set-up included, from which a load has changed.
 _CHANGED = 3.0
-OTHERWISE = "something else changes from reading to reading"
 OTHER_STAND = "no change on one stand moves every load by so much: look at the units and the speeds of both files"
 
 
@@ -73,6 +72,11 @@ class RunChange:
         """Recorded density of B over that of A, by thermometers alone if need be; NaN unless both tell."""
         log_ratio, unsure = fits.density_change(self.a, self.b)
         return math.exp(log_ratio) if unsure else self.b.density / self.a.density
+
+    @property
+    def loads_by_name(self) -> dict[str, MatchedChannel]:
+        """What acts on the rotor, by thrust and torque."""
+        return {c.name: c for c in self.channels.values() if c.name in fits.LOADS}
 
     @property
     def leading(self) -> Judgement:
@@ -113,9 +117,10 @@ def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> RunChange
     ratios = {c.channel: _ratio(c, scatter[n]) for n, c in {**loads, **drive}.items()}
     verdict = _NO_TALK
     if loads:
-        verdict = judge(*weigh(loads, (rotor.free, rotor.steady), ("air", "stand"), known, _speeds(ratios)))
+        weighed = weigh(loads, (rotor.free, rotor.steady), ("air", "stand"), known, _speeds(ratios))
+        verdict = judge(*weighed, max(abs(math.log(r["ratio"])) for r in ratios.values() if r["kind"] in fits.LOADS))
         verdict = _far_off(_far_apart(_with_density(_by_proxy(verdict, loads), a, b, loads), ratios), ratios)
-        verdict = _restless(_all_loads(verdict, loads, ratios), loads)
+        verdict = _all_loads(verdict, loads, ratios)
     found = RunChange(
         a,
         b,
@@ -199,15 +204,15 @@ def _all_loads(
     return said
 
 
-def _restless(said: Judgement, loads: Mapping[str, MatchedChannel]) -> Judgement:
-    """No answer where readings at one speed differ by more than those of any stand."""
-    for name, c in loads.items():
-        for run, here in (("A", ~c.second), ("B", c.second)):
-            scatter = float(np.median(c.u[here]))
-            if scatter > _RESTLESS:
-                why = f"{name} in {run} differs by {scatter:.0%} at one speed: {OTHERWISE}"
-                return Judgement("insufficient", (), said.probability, said.size, why)
-    return said
+def _restless(change: RunChange) -> str:
+    """Letter of the recording whose readings at one speed differ by more than those of any stand; "" where none do."""
+    for name in fits.LOADS:
+        c = change.loads_by_name.get(name)
+        if c is not None:
+            for letter, here in (("b", c.second), ("a", ~c.second)):
+                if float(np.median(c.u[here])) > _RESTLESS:
+                    return letter
+    return ""
 
 
 def _speeds(ratios: Mapping[str, Mapping[str, Any]]) -> tuple[float, float] | None:
@@ -307,8 +312,8 @@ def next_step(change: RunChange, files: Sequence[str]) -> dict[str, str]:
     if said.verdict in ("named", "sensor"):
         text = rows[0].settles if rows else "read the label of the channel"
         return {"text": f"to be sure, {text}", "command": f"{ask} {a} {b} --case CASE"}
-    if OTHERWISE in said.why:
-        letter, run = ("a", change.a) if " in A differs" in said.why else ("b", change.b)
+    if said.verdict in ("insufficient", "unknown") and (letter := _restless(change)):
+        run = change.a if letter == "a" else change.b
         column = run.conditions[0] if run.conditions else "COLUMN"
         others = f" (the file has {', '.join(run.conditions[:4])})" if run.conditions else ""
         text = f"choose the rows of {letter.upper()} in which nothing else changes{others}"

@@ -38,9 +38,9 @@ _EXACT = {1.0: 1.0}
 NEAR, MOST, FAMILIES = 20.0, 6, 3
 """An effect this many times less likely than the leading one is still in its class, which has at most so many members,
 or members of at most so many families: a law is rougher than its evidence."""
-ENOUGH, WIDEST, KINDS = 0.85, 8, 4
+ENOUGH, WIDEST, KINDS, CLEAR = 0.85, 8, 4, 0.1
 """Without so few: a wider class where its members hold this much of all probability, so many at most, of so many
-families: what is ruled out by then is half of the list."""
+families, of a load that changed by this much [ln]: half of the list is ruled out then; no stand repeats as badly."""
 _OWN_SHAPE, _FURTHER = "propeller", 20.0
 RIVAL, DOUBT = 0.1, 0.3
 """An effect beside which the unknown keeps more than the first is not named; a class beside the second is not given."""
@@ -324,8 +324,11 @@ def _any_change(
     return float(np.logaddexp.reduce(found)) - math.log(len(found))
 
 
-def judge(probability: Mapping[str, float], size: Mapping[str, tuple[float, float]]) -> Judgement:
-    """Say what the evidence allows: the order of the questions is the order of caution."""
+def judge(probability: Mapping[str, float], size: Mapping[str, tuple[float, float]], largest: float = 0.0) -> Judgement:
+    """Say what the evidence allows: the order of the questions is the order of caution.
+
+    ``largest``: of the changes of the loads, natural logarithm.
+    """
 
     def answer(verdict: str, effects: Sequence[str], why: str) -> Judgement:
         return Judgement(verdict, tuple(effects), probability, size, why)
@@ -347,14 +350,14 @@ def judge(probability: Mapping[str, float], size: Mapping[str, tuple[float, floa
         row = law(first)
         kind = "sensor" if first == "unit_slip" or (row is not None and row.kind == "stand") else "named"
         return answer(kind, (first,), row.says if row is not None else "the ratio is exactly that of two units")
-    if 1 < len(credible) and {FAMILY.get(k) for k in credible} == {"blade"}:  # which of them is hard to say
+    if 1 < len(credible) and "blade" in {FAMILY.get(k) for k in credible}:  # which of them is hard to say
         least = best / (NEAR * _FURTHER)
         credible += [k for k, p in listed.items() if FAMILY.get(k) == "blade" and p >= least and k not in credible]
     families = {FAMILY.get(k, k) for k in credible}
     few = len(credible) <= MOST or len(families) <= FAMILIES
     if len(credible) > 1 and few and unknown <= DOUBT and probability[NONE] <= RIVAL:
         return answer("class", credible, f"these scale alike ({mass:.2f})")
-    wide = _wider(listed)
+    wide = _wider(listed) if largest >= CLEAR else []
     if wide and len(credible) > 1 and unknown <= DOUBT and probability[NONE] <= RIVAL:
         return answer("class", wide, f"these scale alike ({sum(listed[k] for k in wide):.2f})")
     if len(credible) == 1 and listed[first] < SURE:

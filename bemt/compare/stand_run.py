@@ -14,7 +14,7 @@ from bemt.air import Air
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS, split_suffix
 from bemt.dataset import DIMENSIONLESS, Dataset
-from bemt.recordings.channels import LOADS, MEASURED, named
+from bemt.recordings.channels import MEASURED, named
 from bemt.recordings.reduce import reduce, reduction
 
 Array = NDArray[np.float64]
@@ -114,7 +114,6 @@ def rotors_of(imported: Dataset) -> list[str]:
 
 def _of_rotor(imported: Dataset, word: str, where: str) -> Dataset:
     """Columns of one of several rotors under their plain names; columns of the others go."""
-
     known = rotors_of(imported)
     if not known and any(f"only the {word} rotor" in note for note in imported.notes):
         return imported
@@ -240,7 +239,7 @@ def stand_run(imported: Dataset, name: str, diameter_m: float | None = None) -> 
 def _one_rotor(imported: Dataset, name: str) -> None:
     """Refuse the loads of several rotors, of which one has to be chosen."""
     several = rotors_of(imported)
-    if len(several) > 1 and not set(LOADS) & named(imported).values.keys():
+    if len(several) > 1 and not set(_LOADS) & named(imported).values.keys():
         got = f"loads of several rotors: {', '.join(several)}"
         raise InputError(Fault(name, "", got, "one of them", f"Choose it with --rows-a or --rows-b rotor={several[0]}"))
 

@@ -9,6 +9,7 @@ holds what the ratios allow and what the diagnosis holds likely and no scaling l
 from __future__ import annotations
 
 import math
+import os
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,11 +20,12 @@ import numpy as np
 from bemt.base.errors import InputError
 from bemt.compare.contrast_text import headline
 from bemt.compare.recordings import RunChange, changed, document, next_step
-from bemt.compare.scaling_laws import law
-from bemt.compare.stand_run import StandRun
+from bemt.compare.scaling_laws import LAWS
+from bemt.compare.stand_run import StandRun, stand_run
 from bemt.dataset import Dataset
 from bemt.diagnose.suggest import Suggestion
 from bemt.effects import catalogue
+from bemt.recordings.load import import_file
 
 if TYPE_CHECKING:
     from bemt.diagnose.chain import Diagnosis
@@ -38,6 +40,7 @@ _LARGE = 0.08
 _AGREE, _WOULD = 0.03, 0.1
 # Probability in the diagnosis from which an effect that no scaling law describes is in the class.
 _LIKELY = 0.1
+_SAME_ROTOR = "make sure that the case is this rotor: both recordings are off it alike"
 _LOADS = {"thrust_N": "thrust", "torque_Nm": "torque"}
 
 
@@ -66,7 +69,8 @@ def beside(
     if len(records) != 2 or pair[0] is None or pair[1] is None or _transient(answer):
         return None
     try:
-        found = changed(_run(pair[0], diameter_m), _run(pair[1], diameter_m), diameter_m)
+        runs = [_run(r, diameter_m, f) for r, f in zip(pair, _paths(files) or (None, None), strict=True)]
+        found = changed(runs[0], runs[1], diameter_m)
     except InputError:
         return None
     said, ratios = answer.decision, found.loads
@@ -78,18 +82,21 @@ def beside(
             return None
         why = f"{' and '.join(said.effects)} would change {too_large}"
         told = f"Recording and reference agree, {ratios.why}; {why}."
-        return Beside("none", (), ratios.probability["none"], why, words, told, ranking, None)
+        known = Suggestion(_SAME_ROTOR, (), (), 0.0, 0.0, "look")
+        return Beside("none", (), ratios.probability["none"], why, words, told, ranking, known)
     if said.verdict not in ("insufficient", "unknown") or ratios.verdict not in _CLAIMS:
         return None
     largest = max(abs(math.log(r["ratio"])) for r in found.ratios.values() if r["kind"] in ("thrust", "torque"))
     if said.verdict == "unknown" and largest < _LARGE:
         return None
     likely = {i: sum(p for k, p in answer.found.probability.items() if i in k.ids) for i in answer.found.spans}
-    lone = [i for i, p in sorted(likely.items(), key=lambda kv: -kv[1]) if p >= _LIKELY and law(i) is None]
+    weighed = {*ratios.probability, *(row.id for row in LAWS)}
+    lone = [i for i, p in sorted(likely.items(), key=lambda kv: -kv[1]) if p >= _LIKELY and i not in weighed]
     effects = (*ratios.effects, *lone)
     verdict = ratios.verdict if not lone else "class"
-    titles = " or ".join(catalogue()[i].title for i in lone)
-    words = f"{words[:-1]}; the model also allows {titles}." if lone else words
+    # a cut tip is another diameter
+    titles = " or ".join(catalogue()[i].title for i in lone if i != "tip_cut" or "diameter" not in ratios.effects)
+    words = f"{words[:-1]}; the model also allows {titles}." if titles else words
     told = f"The ratios to the reference: {ratios.why}. The diagnosis with the case: {said.verdict}: {said.why}."
     chance = sum(ratios.probability.get(k, 0.0) for k in ratios.effects)
     return Beside(verdict, effects, chance, ratios.why, words, told, ranking, _next(found, files))
@@ -97,7 +104,7 @@ def beside(
 
 def _next(found: RunChange, files: Sequence[str] | None) -> Suggestion | None:
     """Step of the comparison, without asking for the case that is there."""
-    names = [shlex.split(f)[0] for f in files] if files and len(files) == 2 else ["REFERENCE", "RECORDING"]
+    names = _paths(files) or ["REFERENCE", "RECORDING"]
     step = next_step(found, names)
     command = () if "CASE" in step["command"] or not step["command"] else (step["command"],)
     text = step["text"].removeprefix("to be sure, ")
@@ -109,8 +116,16 @@ def _transient(answer: Diagnosis) -> bool:
     return bool({"inflow_lag", "rotor_inertia"} - answer.absent.keys())
 
 
-def _run(record: Record, diameter_m: float) -> StandRun:
-    """Points of a record as a comparison takes them."""
+def _paths(files: Sequence[str] | None) -> list[str]:
+    """Files without the quotes that a command needs; none where they are not both there."""
+    names = [shlex.split(f)[0] for f in files or ()]
+    return names if len(names) == 2 and all(os.path.exists(n) for n in names) else []
+
+
+def _run(record: Record, diameter_m: float, file: str | None = None) -> StandRun:
+    """Points of a record as a comparison takes them: of its file where that is known, which says more."""
+    if file is not None:
+        return stand_run(import_file(file), file, diameter_m)
     loads = [k for k in _LOADS if k in record.measured]
     values = {"rpm": record.rpm, "airspeed_m_s": record.V, **{k: record.measured[k] for k in loads}}
     u = {k: np.nan_to_num(record.u[k]) for k in loads}
@@ -132,4 +147,3 @@ def _too_large(answer: Diagnosis, found: RunChange) -> str:
         if abs(would) > _WOULD:
             return f"{word} by {would:+.0%}; it differs by {r['ratio'] - 1.0:+.1%}"
     return ""
-
