@@ -17,7 +17,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
 from bemt.compare import matched as fits
 from bemt.compare.matched import MatchedChannel, Scatter
-from bemt.compare.scaling import Judgement, judge, weigh
+from bemt.compare.scaling import CLEAR, OWN_SHAPE, UNKNOWN, Judgement, judge, weigh
 from bemt.compare.scaling_laws import FAMILY, law
 from bemt.compare.stand_run import StandRun
 
@@ -45,6 +45,8 @@ _MOVED, _WIDE = 2.5, 1.4
 _FAR_OFF = 30.0
 # Scatter of readings at one speed, share, that no stand has: something else changes from reading to reading.
 _RESTLESS = 0.10
+# Odds (ln) of any smooth change over one factor from which a load did not change by one.
+_BENT = 3.0
 # Standard deviations, set-up included, from which a load has changed.
 _CHANGED = 3.0
 OTHER_STAND = "no change on one stand moves every load by so much: look at the units and the speeds of both files"
@@ -118,7 +120,10 @@ def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> RunChange
     verdict = _NO_TALK
     if loads:
         weighed = weigh(loads, (rotor.free, rotor.steady), ("air", "stand"), known, _speeds(ratios))
-        verdict = judge(*weighed, max(abs(math.log(r["ratio"])) for r in ratios.values() if r["kind"] in fits.LOADS))
+        largest = max(abs(math.log(r["ratio"])) for r in ratios.values() if r["kind"] in fits.LOADS)
+        if largest >= CLEAR and max(rotor.bent[n] for n in loads) < _BENT:
+            weighed = (_by_factors(weighed[0]), weighed[1])
+        verdict = judge(*weighed, largest)
         verdict = _far_off(_far_apart(_with_density(_by_proxy(verdict, loads), a, b, loads), ratios), ratios)
         verdict = _all_loads(verdict, loads, ratios)
     found = RunChange(
@@ -185,6 +190,14 @@ def _far_off(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> Judgem
     if min(loads) < math.log(_FAR_OFF) or said.effects in (("rpm_scale",), ("unit_slip",)):
         return said
     return Judgement("insufficient", (), said.probability, said.size, OTHER_STAND)
+
+
+def _by_factors(probability: Mapping[str, float]) -> dict[str, float]:
+    """Probabilities where every load changed by one large factor: that is another propeller, and nothing unlisted."""
+    if OWN_SHAPE not in probability:
+        return dict(probability)
+    moved = {OWN_SHAPE: probability[OWN_SHAPE] + probability[UNKNOWN], UNKNOWN: 0.0}
+    return dict(sorted({**probability, **moved}.items(), key=lambda kv: -kv[1]))
 
 
 def _all_loads(

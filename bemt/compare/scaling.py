@@ -41,7 +41,7 @@ or members of at most so many families: a law is rougher than its evidence."""
 ENOUGH, WIDEST, KINDS, CLEAR = 0.85, 8, 4, 0.1
 """Without so few: a wider class where its members hold this much of all probability, so many at most, of so many
 families, of a load that changed by this much [ln]: half of the list is ruled out then; no stand repeats as badly."""
-_OWN_SHAPE, _FURTHER = "propeller", 20.0
+OWN_SHAPE, _FURTHER = "propeller", 20.0
 RIVAL, DOUBT = 0.1, 0.3
 """An effect beside which the unknown keeps more than the first is not named; a class beside the second is not given."""
 # Speed at equal command of one motor, in ln: battery and load change it by no more.
@@ -268,11 +268,11 @@ def _weighed(
     if slips:
         z, mean = _shifted([m for _, m in slips], white, r, none, len(slips))
         score["unit_slip"], size["unit_slip"] = z, (mean, 0.0)
-    blades = _OWN_SHAPE in score
+    blades = OWN_SHAPE in score
     score[UNKNOWN] = _any_change(channels, base, none, _UNKNOWN_KINDS if blades else _WITHOUT_BLADES)
     if blades:
         own = _any_change(channels, base, none, _BLADE_KINDS)
-        score[_OWN_SHAPE] = float(np.logaddexp(score[_OWN_SHAPE], own)) - math.log(2.0)
+        score[OWN_SHAPE] = float(np.logaddexp(score[OWN_SHAPE], own)) - math.log(2.0)
     return score, size
 
 
@@ -344,7 +344,7 @@ def judge(probability: Mapping[str, float], size: Mapping[str, tuple[float, floa
     best = max(listed.values())
     credible = [k for k, p in sorted(listed.items(), key=lambda kv: -kv[1]) if p >= best / NEAR]
     first = credible[0]
-    if credible == [_OWN_SHAPE]:  # curves of its own fit anything: what comes near is not ruled out
+    if credible == [OWN_SHAPE]:  # curves of its own fit anything: what comes near is not ruled out
         credible = [k for k, p in sorted(listed.items(), key=lambda kv: -kv[1]) if p >= best / (NEAR * _FURTHER)]
     if len(credible) == 1 and listed[first] >= SURE and unknown <= RIVAL:
         row = law(first)
