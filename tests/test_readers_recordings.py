@@ -144,7 +144,8 @@ def test_a_heading_says_name_and_unit(text: str, name: str, unit: str) -> None:
     ("text", "name", "unit"),
     [
         ("Thrust force [N]", "thrust_N", "N"), ("Static Thrust (lbf)", "thrust_N", "N"),
-        ("F_thrust [gf]", "thrust_N", "N"), ("mean thrust [N]", "thrust_N", "N"), ("Propeller Torque (mNm)", "torque_Nm", "Nm"),
+        ("F_thrust [gf]", "thrust_N", "N"), ("mean thrust [N]", "thrust_N", "N"),
+        ("Propeller Torque (mNm)", "torque_Nm", "Nm"),
         ("Torque (in-lb)", "torque_Nm", "Nm"), ("Torque [oz-in]", "torque_Nm", "Nm"),
         ("RPM Upper", "upper_rpm", "rpm"),
         ("Total Thrust [N]", "total_thrust_N", "N"), ("Thrust Upper (N)", "thrust_upper_N", "N"),

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from bemt.air import Air
 from bemt.base.errors import Fault, InputError
-from bemt.base.units import ZERO_CELSIUS, split_suffix
+from bemt.base.units import KNOT, MPH, ZERO_CELSIUS, split_suffix
 from bemt.dataset import DIMENSIONLESS, Dataset
 from bemt.recordings.channels import MEASURED, named
 from bemt.recordings.reduce import reduce, reduction
@@ -32,7 +32,7 @@ _WANTED = (
     "run",
     "temperature_K",
 )
-_AIR = re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(C|K|hPa|Pa|kg/m3)")
+_AIR = re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(C|F|K|hPa|Pa|kg/m3|m/s|kt|mph|km/h)")
 _CONDITION = re.compile(r"\s*([^=]+?)\s*=\s*(.+?)\s*")
 _RANGE = re.compile(r"([-+.\deE]+):([-+.\deE]+)")
 _ROTOR = "rotor"
@@ -156,10 +156,12 @@ def selected(imported: Dataset, conditions: Sequence[str], where: str) -> Datase
 
 
 _AIR_UNITS = {
-    "C": ("temperature_K", 1.0, ZERO_CELSIUS), "K": ("temperature_K", 1.0, 0.0), "hPa": ("pressure_Pa", 100.0, 0.0),
-    "Pa": ("pressure_Pa", 1.0, 0.0), "kg/m3": ("density_kg_m3", 1.0, 0.0),
+    "C": ("temperature_K", 1.0, ZERO_CELSIUS), "F": ("temperature_K", 5.0 / 9.0, ZERO_CELSIUS - 160.0 / 9.0), "K": ("temperature_K", 1.0, 0.0), "hPa": ("pressure_Pa", 100.0, 0.0),
+    "Pa": ("pressure_Pa", 1.0, 0.0), "kg/m3": ("density_kg_m3", 1.0, 0.0), "m/s": ("airspeed_m_s", 1.0, 0.0),
+    "kt": ("airspeed_m_s", KNOT, 0.0), "mph": ("airspeed_m_s", MPH, 0.0), "km/h": ("airspeed_m_s", 1.0 / 3.6, 0.0),
 }  # fmt: skip
-_AIR_RANGES = {"temperature_K": (_COLD, _HOT), "pressure_Pa": (4e4, 1.1e5), "density_kg_m3": (0.4, 1.6)}
+_AIR_RANGES = {"temperature_K": (_COLD, _HOT), "pressure_Pa": (4e4, 1.1e5), "density_kg_m3": (0.4, 1.6),
+               "airspeed_m_s": (0.0, 200.0)}  # fmt: skip
 
 
 def with_air(imported: Dataset, told: str | None, where: str) -> Dataset:
@@ -179,19 +181,23 @@ def with_air(imported: Dataset, told: str | None, where: str) -> Dataset:
         low, high = _AIR_RANGES.get(name, (0.0, 0.0))
         if not low <= value <= high:
             hint = "A temperature alone takes one pressure for both runs"
-            faults.append(
-                Fault(where, "", repr(part), "a number with C, K, hPa, Pa or kg/m3, such as 22C,1013hPa", hint)
-            )
+            expected = "a number with C, F, K, hPa, Pa, kg/m3 or, of a wind, m/s, kt, such as 22C,1013hPa"
+            faults.append(Fault(where, "", repr(part), expected, hint))
         known[name] = value
+    wind = known.pop("airspeed_m_s", None)
     if set(known) == {"pressure_Pa"}:
         faults.append(Fault(where, "", repr(told), "a temperature too, or a density"))
     if faults:
         raise InputError(faults)
     if known.keys() >= {"temperature_K", "pressure_Pa"}:
         known["density_kg_m3"] = Air.from_state(known["pressure_Pa"], known["temperature_K"] - ZERO_CELSIUS).rho
-    left = {k: v for k, v in imported.values.items() if k not in _AIR_RANGES}
+    gone = {*known, *(_AIR_RANGES if known else ()), *(("airspeed_m_s", "V_m_s", "J") if wind is not None else ())}
+    gone -= {"airspeed_m_s"} if wind is None else set()
+    left = {k: v for k, v in imported.values.items() if k not in gone}
+    if wind is not None:
+        left["airspeed_m_s"] = np.full(len(imported), wind)
     u = {k: v for k, v in imported.u.items() if k in left}
-    constants = {k: v for k, v in imported.provenance.get("constants", {}).items() if k not in _AIR_RANGES}
+    constants = {k: v for k, v in imported.provenance.get("constants", {}).items() if k not in gone}
     return replace(imported, values=left, u=u, provenance={**imported.provenance, "constants": constants | known})
 
 
@@ -199,7 +205,7 @@ def stand_run(imported: Dataset, name: str, diameter_m: float | None = None) -> 
     """Reduce one recording for a comparison."""
     units = {k: unit for k, unit in imported.units.items() if unit or k not in DIMENSIONLESS}
     imported = replace(imported, units=units)  # a throttle has none
-    _one_rotor(imported, name)
+    one_rotor(imported, name)
     series, ramp = _reduced(imported, diameter_m)
     values = {k: series[k] for k in _WANTED if k in series}
     if not {"thrust_N", "torque_Nm", "power_W"} & values.keys() and "rpm" not in values and "J" not in values:
@@ -236,12 +242,12 @@ def stand_run(imported: Dataset, name: str, diameter_m: float | None = None) -> 
     )
 
 
-def _one_rotor(imported: Dataset, name: str) -> None:
+def one_rotor(imported: Dataset, name: str, how: str = "Choose it with --rows-a or --rows-b rotor={}") -> None:
     """Refuse the loads of several rotors, of which one has to be chosen."""
     several = rotors_of(imported)
     if len(several) > 1 and not set(_LOADS) & named(imported).values.keys():
         got = f"loads of several rotors: {', '.join(several)}"
-        raise InputError(Fault(name, "", got, "one of them", f"Choose it with --rows-a or --rows-b rotor={several[0]}"))
+        raise InputError(Fault(name, "", got, "one of them", how.format(several[0])))
 
 
 def conditions_of(imported: Dataset) -> tuple[str, ...]:
