@@ -309,3 +309,24 @@ def test_a_rotor_of_several_is_asked_for_and_found(tmp_path: Path) -> None:
     assert thrust["ratio"] == pytest.approx(0.7, rel=0.03)
     with pytest.raises(InputError, match="a file of one rotor"):
         compare(alone, both, rows_a=["rotor=A"], rows_b=["rotor=A"])
+
+
+def test_the_wind_of_files_that_have_none_is_told(tmp_path: Path) -> None:
+    """One rotor at two airspeeds: no change, once both are known."""
+    files = []
+    for name, seed, V in (("a.csv", 11, 3.0), ("b.csv", 12, 4.0)):
+        table = stand(seed, airspeed=np.full(17, V))
+        del table["airspeed_m_s"]
+        files.append(written(tmp_path / name, table))
+    told = compare(*files, diameter_m=D, air_a="3m/s", air_b="14.4km/h")
+    assert told.verdict == "none"
+    with pytest.raises(InputError, match="--air-b"):
+        compare(*files, air_b="300m/s")
+
+
+def test_one_file_twice_says_which_column_parts_it(tmp_path: Path) -> None:
+    a, b = stand(7), stand(8)
+    both = {k: np.concatenate([a[k], b[k]]) for k in a} | {"spacing_ratio": np.repeat([0.5, 1.0], 17)}
+    file = written(tmp_path / "both.csv", both)
+    with pytest.raises(InputError, match="--rows-a spacing_ratio=0.5 --rows-b spacing_ratio=1"):
+        compare(file, file)

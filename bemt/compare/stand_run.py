@@ -32,7 +32,7 @@ _WANTED = (
     "run",
     "temperature_K",
 )
-_AIR = re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(C|F|K|hPa|Pa|kg/m3|m/s|kt|mph|km/h)")
+_AIR = re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(C|K|hPa|Pa|kg/m3|m/s|kt|mph|km/h)")
 _CONDITION = re.compile(r"\s*([^=]+?)\s*=\s*(.+?)\s*")
 _RANGE = re.compile(r"([-+.\deE]+):([-+.\deE]+)")
 _ROTOR = "rotor"
@@ -156,7 +156,8 @@ def selected(imported: Dataset, conditions: Sequence[str], where: str) -> Datase
 
 
 _AIR_UNITS = {
-    "C": ("temperature_K", 1.0, ZERO_CELSIUS), "F": ("temperature_K", 5.0 / 9.0, ZERO_CELSIUS - 160.0 / 9.0), "K": ("temperature_K", 1.0, 0.0), "hPa": ("pressure_Pa", 100.0, 0.0),
+    "C": ("temperature_K", 1.0, ZERO_CELSIUS), "K": ("temperature_K", 1.0, 0.0),
+    "hPa": ("pressure_Pa", 100.0, 0.0),
     "Pa": ("pressure_Pa", 1.0, 0.0), "kg/m3": ("density_kg_m3", 1.0, 0.0), "m/s": ("airspeed_m_s", 1.0, 0.0),
     "kt": ("airspeed_m_s", KNOT, 0.0), "mph": ("airspeed_m_s", MPH, 0.0), "km/h": ("airspeed_m_s", 1.0 / 3.6, 0.0),
 }  # fmt: skip
@@ -181,7 +182,7 @@ def with_air(imported: Dataset, told: str | None, where: str) -> Dataset:
         low, high = _AIR_RANGES.get(name, (0.0, 0.0))
         if not low <= value <= high:
             hint = "A temperature alone takes one pressure for both runs"
-            expected = "a number with C, F, K, hPa, Pa, kg/m3 or, of a wind, m/s, kt, such as 22C,1013hPa"
+            expected = "a number with C, K, hPa, Pa, kg/m3 or, of a wind, m/s, kt, such as 22C,1013hPa"
             faults.append(Fault(where, "", repr(part), expected, hint))
         known[name] = value
     wind = known.pop("airspeed_m_s", None)

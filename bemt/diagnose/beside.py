@@ -65,8 +65,8 @@ def beside(
 
     ``files``: reference and test as a command names them.
     """
-    pair = [next((r for r in records if r.reference is known), None) for known in (True, False)]
-    if len(records) != 2 or pair[0] is None or pair[1] is None or _transient(answer):
+    pair = [r for known in (True, False) for r in records if r.reference is known]
+    if len(pair) != 2 or not pair[0].reference or pair[1].reference or _transient(answer):
         return None
     try:
         runs = [_run(r, diameter_m, f) for r, f in zip(pair, _paths(files) or (None, None), strict=True)]
