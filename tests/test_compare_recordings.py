@@ -271,3 +271,62 @@ def test_every_answer_that_is_not_sure_has_a_step_and_its_command(tmp_path: Path
             assert step["text"] and step["command"].startswith("python -m bemt compare ")
         first = answer.text.splitlines()[0]
         assert not first.startswith("verdict") and "thrust" in first
+
+
+def test_a_cause_that_leaves_a_changed_load_alone_is_not_given(tmp_path: Path) -> None:
+    """Thrust that scatters by half hides its change from the weighing, not from the ratio."""
+    rng = np.random.default_rng(5)
+    a, b = stand(1), stand(2, scaled(thrust_N=0.6, torque_Nm=0.85))
+    b = {k: np.tile(v, 4) for k, v in b.items()}
+    b["thrust_N"] = b["thrust_N"] * np.exp(0.3 * rng.standard_normal(68))
+    b["torque_Nm"] = b["torque_Nm"] - 0.02 * b["torque_Nm"].max()
+    answer = compare(written(tmp_path / "a.csv", a), written(tmp_path / "b.csv", b))
+    assert not answer.effects or not set(answer.effects) <= {"torque_zero", "torque_gain"}
+
+
+def test_a_large_change_in_one_load_is_a_class_of_what_scales_like_it(tmp_path: Path) -> None:
+    """Without torque a fifth more thrust has many causes, and as many that it rules out."""
+    files = []
+    for name, seed, f in (("a.csv", 1, 1.0), ("b.csv", 2, 1.2)):
+        table = stand(seed, scaled(thrust_N=f))
+        table["electrical_power_W"] = 1.4 * f**1.3 * table.pop("torque_Nm") * table["rpm"] * np.pi / 30.0
+        table |= {"voltage_V": np.full(17, 12.0), "throttle": table["rpm"] / 8000.0}
+        files.append(written(tmp_path / name, table))
+    answer = compare(*files)
+    assert answer.verdict == "class" and {"propeller", "pitch_offset"} <= set(answer.effects)
+    assert not {"thrust_gain", "nacelle", "battery_sag"} & set(answer.effects)
+
+
+def test_a_rotor_of_several_is_asked_for_and_found(tmp_path: Path) -> None:
+    a, b = stand(1), stand(2, scaled(thrust_N=0.7))
+    two = {"rpm_A": a["rpm"], "rpm_B": b["rpm"], "T_A (N)": a["thrust_N"], "T_B (N)": b["thrust_N"],
+           "Q_A (Nm)": a["torque_Nm"], "Q_B (Nm)": b["torque_Nm"], "current (A)": a["rpm"] / 500.0}  # fmt: skip
+    alone, both = written(tmp_path / "alone.csv", stand(3)), written(tmp_path / "both.csv", two)
+    with pytest.raises(InputError, match=r"loads of several rotors: A, B.*rotor=A"):
+        compare(alone, both)
+    assert compare(alone, both, rows_b=["rotor=A"]).verdict == "none"
+    thrust = compare(alone, both, rows_b=["rotor=B"]).document["ratios"]["thrust_N"]
+    assert thrust["ratio"] == pytest.approx(0.7, rel=0.03)
+    with pytest.raises(InputError, match="a file of one rotor"):
+        compare(alone, both, rows_a=["rotor=A"], rows_b=["rotor=A"])
+
+
+def test_the_wind_of_files_that_have_none_is_told(tmp_path: Path) -> None:
+    """One rotor at two airspeeds: no change, once both are known."""
+    files = []
+    for name, seed, V in (("a.csv", 11, 3.0), ("b.csv", 12, 4.0)):
+        table = stand(seed, airspeed=np.full(17, V))
+        del table["airspeed_m_s"]
+        files.append(written(tmp_path / name, table))
+    told = compare(*files, diameter_m=D, air_a="3m/s", air_b="14.4km/h")
+    assert told.verdict == "none"
+    with pytest.raises(InputError, match="--air-b"):
+        compare(*files, air_b="300m/s")
+
+
+def test_one_file_twice_says_which_column_parts_it(tmp_path: Path) -> None:
+    a, b = stand(7), stand(8)
+    both = {k: np.concatenate([a[k], b[k]]) for k in a} | {"spacing_ratio": np.repeat([0.5, 1.0], 17)}
+    file = written(tmp_path / "both.csv", both)
+    with pytest.raises(InputError, match="--rows-a spacing_ratio=0.5 --rows-b spacing_ratio=1"):
+        compare(file, file)

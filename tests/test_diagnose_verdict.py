@@ -263,9 +263,7 @@ def _said(word: str, *ids: str, likely: str = "untwist") -> chain.Diagnosis:
     nothing: Any = None
     found: Any = SimpleNamespace(probability={NONE: 0.3, Explanation.of(likely): 0.6, UNKNOWN: 0.1})
     decision = verdict.Decision(word, ids, Explanation.of(*ids), 0.95, 0.0, (), "")
-    return chain.Diagnosis(
-        found, decision, nothing, {}, 0.002, nothing, {}, "", nothing, nothing, nothing, nothing, {}
-    )
+    return chain.Diagnosis(found, decision, nothing, {}, 0.002, nothing, {}, "", nothing, nothing, nothing, nothing, {})
 
 
 def test_loads_that_stay_open_do_not_veto_the_drive() -> None:

@@ -140,6 +140,23 @@ def test_a_heading_says_name_and_unit(text: str, name: str, unit: str) -> None:
     assert (got.name, got.unit_name) == (name, unit)
 
 
+@pytest.mark.parametrize(
+    ("text", "name", "unit"),
+    [
+        ("Thrust force [N]", "thrust_N", "N"), ("Static Thrust (lbf)", "thrust_N", "N"),
+        ("F_thrust [gf]", "thrust_N", "N"), ("mean thrust [N]", "thrust_N", "N"),
+        ("Propeller Torque (mNm)", "torque_Nm", "Nm"),
+        ("Torque (in-lb)", "torque_Nm", "Nm"), ("Torque [oz-in]", "torque_Nm", "Nm"),
+        ("RPM Upper", "upper_rpm", "rpm"),
+        ("Total Thrust [N]", "total_thrust_N", "N"), ("Thrust Upper (N)", "thrust_upper_N", "N"),
+    ],
+)  # fmt: skip
+def test_words_beside_thrust_and_torque_change_nothing(text: str, name: str, unit: str) -> None:
+    """Tables of theses qualify their headings; a total of several rotors is another quantity."""
+    got = heading(text)
+    assert (got.name, got.unit_name) == (name, unit)
+
+
 @pytest.mark.parametrize("text", ["Thrust (kg)", "load_g", "Thrust (lb)", "Torque (kg·cm)", "T [G]"])
 def test_a_mass_is_no_force(text: str, write: Write) -> None:
     got = importers.read(write(f"Time (s),{text},RPM\n" + "".join(f"{k},{k + 1},{3000 + k}\n" for k in range(5))))

@@ -226,6 +226,30 @@ def test_negative_thrust() -> None:
     assert not said(check(recording(flying), diameter_m=10 * INCH), "negative_thrust")
 
 
+def test_a_few_misread_rows_of_a_log_are_no_contradiction() -> None:
+    n = 200
+    rpm = np.linspace(4000.0, 8000.0, n)
+    torque = 2e-9 * rpm**2
+    values = {"rpm": rpm, "torque_Nm": torque, "electrical_power_W": 1.4 * torque * rpm * units.RPM}
+    for rows, severity in ((8, "warning"), (80, "error")):
+        odd = values["torque_Nm"].copy()
+        odd[n - rows :] *= 2.0
+        (finding,) = said(check(recording(values | {"torque_Nm": odd})), "power_above_input")
+        assert finding.severity == severity
+
+
+def test_flagged_spikes_are_no_contradiction() -> None:
+    """A log flags what one sample misread; a slip of the whole column is none."""
+    rpm = np.linspace(4000.0, 8000.0, 60)
+    odd = rpm.copy()
+    odd[::10] = 40000.0
+    flags = tuple(("spike of rpm",) if k % 10 == 0 else () for k in range(60))
+    log = replace(recording({"rpm": odd, "thrust_N": 1e-7 * rpm**2}), flags=flags)
+    assert not said(check(log, diameter_m=10 * INCH), "tip_mach")
+    everywhere = replace(recording({"rpm": 8.0 * rpm, "thrust_N": 1e-7 * rpm**2}), flags=(("spike of rpm",),) * 60)
+    assert check(everywhere, diameter_m=10 * INCH)
+
+
 def test_power_above_the_electrical_input() -> None:
     values = stand()
     values["current_A"] = values["current_A"] * 0.6

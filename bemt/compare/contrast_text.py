@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from bemt.base.tables import number_text, text_table
@@ -25,6 +25,8 @@ _WORD = {
 # Runs at nearly one speed say nothing of a change over it: error per doubling from which it is not shown [1].
 _NO_SLOPE = 1.0
 _ROWS, _NOTES = 8, 4
+# Probability from which a cause is said as a guess.
+_GUESS = 0.1
 
 
 def _share(x: float) -> str:
@@ -91,16 +93,25 @@ def headline(doc: Mapping[str, Any]) -> str:
     if verdict == "unknown":
         return f"Something changed ({moved}), and no listed cause explains it."
     if verdict == "insufficient":
-        return f"These recordings cannot say what changed ({moved})."
-    titles: dict[str, list[str]] = {FAMILY.get(k, k): [] for k in effects}
-    for k in effects:
-        titles[FAMILY.get(k, k)].append(k)
+        guess = _families([r["effect"] for r in doc["ranking"] if r["probability"] >= _GUESS], doc["ranking"])
+        return f"These recordings cannot say what changed ({moved})" + (f"; likeliest {guess}." if guess else ".")
     if len(effects) == 1:
         row = law(effects[0])
         lead = "The stand, not the rotor" if verdict == "sensor" else "What changed"
         return f"{lead}: {row.title if row else effects[0]} ({moved or 'drive alone'})."
-    words = [_FAMILY_WORD.get(k, k) if len(v) > 1 else _plain(v[0]) for k, v in titles.items()]
-    return f"{' or '.join(words)} ({moved or 'drive alone'}).".capitalize()
+    several = _families(effects, doc["ranking"])
+    return f"{several[0].upper()}{several[1:]} ({moved or 'drive alone'})."
+
+
+def _families(effects: Sequence[str], ranking: Sequence[Mapping[str, Any]]) -> str:
+    """What an engineer would look at, the likeliest first; "" where nothing is listed."""
+    likely = {r["effect"]: r["probability"] for r in ranking}
+    titles: dict[str, list[str]] = {}
+    for k in effects:
+        if k not in ("none", "unknown"):
+            titles.setdefault(FAMILY.get(k, k), []).append(k)
+    families = sorted(titles, key=lambda f: -sum(likely.get(k, 0.0) for k in titles[f]))
+    return ", or ".join(_FAMILY_WORD.get(f, f) if len(titles[f]) > 1 else _plain(titles[f][0]) for f in families)
 
 
 def _plain(name: str) -> str:

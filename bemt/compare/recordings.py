@@ -17,7 +17,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
 from bemt.compare import matched as fits
 from bemt.compare.matched import MatchedChannel, Scatter
-from bemt.compare.scaling import Judgement, judge, weigh
+from bemt.compare.scaling import CLEAR, OWN_SHAPE, UNKNOWN, Judgement, judge, weigh
 from bemt.compare.scaling_laws import FAMILY, law
 from bemt.compare.stand_run import StandRun
 
@@ -43,6 +43,12 @@ _TOLD = ("density as recorded", "by the thermometers", "voltage as recorded")
 _MOVED, _WIDE = 2.5, 1.4
 # Thrust of a propeller of 2.3 times the diameter at one speed: no stand takes both. [1]
 _FAR_OFF = 30.0
+# Scatter of readings at one speed, share, that no stand has: something else changes from reading to reading.
+_RESTLESS = 0.10
+# Odds (ln) of any smooth change over one factor from which a load did not change by one.
+_BENT = 3.0
+# Standard deviations, set-up included, from which a load has changed.
+_CHANGED = 3.0
 OTHER_STAND = "no change on one stand moves every load by this much: check units and speeds of both files"
 
 
@@ -68,6 +74,11 @@ class RunChange:
         """Recorded density of B over that of A, by thermometers alone if need be; NaN unless both tell."""
         log_ratio, unsure = fits.density_change(self.a, self.b)
         return math.exp(log_ratio) if unsure else self.b.density / self.a.density
+
+    @property
+    def loads_by_name(self) -> dict[str, MatchedChannel]:
+        """What acts on the rotor, by thrust and torque."""
+        return {c.name: c for c in self.channels.values() if c.name in fits.LOADS}
 
     @property
     def leading(self) -> Judgement:
@@ -108,8 +119,13 @@ def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> RunChange
     ratios = {c.channel: _ratio(c, scatter[n]) for n, c in {**loads, **drive}.items()}
     verdict = _NO_TALK
     if loads:
-        verdict = judge(*weigh(loads, (rotor.free, rotor.steady), ("air", "stand"), known, _speeds(ratios)))
+        weighed = weigh(loads, (rotor.free, rotor.steady), ("air", "stand"), known, _speeds(ratios))
+        largest = max(abs(math.log(r["ratio"])) for r in ratios.values() if r["kind"] in fits.LOADS)
+        if largest >= CLEAR and max(rotor.bent[n] for n in loads) < _BENT:
+            weighed = (_by_factors(weighed[0]), weighed[1])
+        verdict = judge(*weighed, largest)
         verdict = _far_off(_far_apart(_with_density(_by_proxy(verdict, loads), a, b, loads), ratios), ratios)
+        verdict = _all_loads(verdict, loads, ratios)
     found = RunChange(
         a,
         b,
@@ -176,6 +192,42 @@ def _far_off(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> Judgem
     if min(loads) < math.log(_FAR_OFF) or said.effects in (("rpm_scale",), ("unit_slip",)):
         return said
     return Judgement("insufficient", (), said.probability, said.size, OTHER_STAND)
+
+
+def _by_factors(probability: Mapping[str, float]) -> dict[str, float]:
+    """Probabilities where every load changed by one large factor: that is another propeller, and nothing unlisted."""
+    if OWN_SHAPE not in probability:
+        return dict(probability)
+    moved = {OWN_SHAPE: probability[OWN_SHAPE] + probability[UNKNOWN], UNKNOWN: 0.0}
+    return dict(sorted({**probability, **moved}.items(), key=lambda kv: -kv[1]))
+
+
+def _all_loads(
+    said: Judgement, loads: Mapping[str, MatchedChannel], ratios: Mapping[str, Mapping[str, Any]]
+) -> Judgement:
+    """No cause that leaves a load alone which has clearly changed."""
+    rows = [law(k) for k in said.effects]
+    moved = {name for row in rows if row is not None for _, term in row.terms for name in term}
+    if not rows or None in rows or not moved:
+        return said
+    for name, c in loads.items():
+        r = ratios[c.channel]
+        unsure = math.hypot(math.log(r["high95"] / r["ratio"]) / 1.96, c.session)
+        if name not in moved and abs(math.log(r["ratio"])) > _CHANGED * unsure:
+            why = f"{' and '.join(said.effects)} would leave the {name} alone, which changed as well"
+            return Judgement("insufficient", (), said.probability, said.size, why)
+    return said
+
+
+def _restless(change: RunChange) -> str:
+    """Letter of the recording whose readings at one speed differ by more than those of any stand; "" where none do."""
+    for name in fits.LOADS:
+        c = change.loads_by_name.get(name)
+        if c is not None:
+            for letter, here in (("b", c.second), ("a", ~c.second)):
+                if float(np.median(c.u[here])) > _RESTLESS:
+                    return letter
+    return ""
 
 
 def _speeds(ratios: Mapping[str, Mapping[str, Any]]) -> tuple[float, float] | None:
@@ -277,6 +329,12 @@ def next_step(change: RunChange, files: Sequence[str]) -> dict[str, str]:
     if said.verdict in ("named", "sensor"):
         text = rows[0].settles if rows else "read the label of the channel"
         return {"text": f"to be sure, {text}", "command": f"{ask} {a} {b} --case CASE"}
+    if said.verdict in ("insufficient", "unknown") and (letter := _restless(change)):
+        run = change.a if letter == "a" else change.b
+        column = run.conditions[0] if run.conditions else "COLUMN"
+        others = f" (the file has {', '.join(run.conditions[:4])})" if run.conditions else ""
+        text = f"choose the rows of {letter.upper()} in which nothing else changes{others}"
+        return {"text": text, "command": f"{ask} {a} {b} --rows-{letter} {shlex.quote(column)}=LOW:HIGH"}
     if loads and all(r["extrapolated"] for r in loads):
         v = change.a.points
         where = "where A was measured"

@@ -38,7 +38,10 @@ _EXACT = {1.0: 1.0}
 NEAR, MOST, FAMILIES = 20.0, 6, 3
 """An effect this many times less likely than the leading one is still in its class, which has at most so many members,
 or members of at most so many families: a law is rougher than its evidence."""
-_OWN_SHAPE, _FURTHER = "propeller", 20.0
+ENOUGH, WIDEST, KINDS, CLEAR = 0.85, 8, 4, 0.1
+"""Without so few: a wider class where its members hold this much of all probability, so many at most, of so many
+families, of a load that changed by this much [ln]: half of the list is ruled out then; no stand repeats as badly."""
+OWN_SHAPE, _FURTHER = "propeller", 20.0
 RIVAL, DOUBT = 0.1, 0.3
 """An effect beside which the unknown keeps more than the first is not named; a class beside the second is not given."""
 # Speed at equal command of one motor, in ln: battery and load change it by no more.
@@ -265,11 +268,11 @@ def _weighed(
     if slips:
         z, mean = _shifted([m for _, m in slips], white, r, none, len(slips))
         score["unit_slip"], size["unit_slip"] = z, (mean, 0.0)
-    blades = _OWN_SHAPE in score
+    blades = OWN_SHAPE in score
     score[UNKNOWN] = _any_change(channels, base, none, _UNKNOWN_KINDS if blades else _WITHOUT_BLADES)
     if blades:
         own = _any_change(channels, base, none, _BLADE_KINDS)
-        score[_OWN_SHAPE] = float(np.logaddexp(score[_OWN_SHAPE], own)) - math.log(2.0)
+        score[OWN_SHAPE] = float(np.logaddexp(score[OWN_SHAPE], own)) - math.log(2.0)
     return score, size
 
 
@@ -321,8 +324,11 @@ def _any_change(
     return float(np.logaddexp.reduce(found)) - math.log(len(found))
 
 
-def judge(probability: Mapping[str, float], size: Mapping[str, tuple[float, float]]) -> Judgement:
-    """Say what the evidence allows: the order of the questions is the order of caution."""
+def judge(probability: Mapping[str, float], size: Mapping[str, tuple[float, float]], largest: float = 0.0) -> Judgement:
+    """Say what the evidence allows: the order of the questions is the order of caution.
+
+    ``largest``: of the changes of the loads, natural logarithm.
+    """
 
     def answer(verdict: str, effects: Sequence[str], why: str) -> Judgement:
         return Judgement(verdict, tuple(effects), probability, size, why)
@@ -338,19 +344,22 @@ def judge(probability: Mapping[str, float], size: Mapping[str, tuple[float, floa
     best = max(listed.values())
     credible = [k for k, p in sorted(listed.items(), key=lambda kv: -kv[1]) if p >= best / NEAR]
     first = credible[0]
-    if credible == [_OWN_SHAPE]:  # curves of its own fit anything: what comes near is not ruled out
+    if credible == [OWN_SHAPE]:  # curves of its own fit anything: what comes near is not ruled out
         credible = [k for k, p in sorted(listed.items(), key=lambda kv: -kv[1]) if p >= best / (NEAR * _FURTHER)]
     if len(credible) == 1 and listed[first] >= SURE and unknown <= RIVAL:
         row = law(first)
         kind = "sensor" if first == "unit_slip" or (row is not None and row.kind == "stand") else "named"
         return answer(kind, (first,), row.says if row is not None else "the ratio is exactly that of two units")
-    if 1 < len(credible) and {FAMILY.get(k) for k in credible} == {"blade"}:  # which of them is hard to say
+    if 1 < len(credible) and "blade" in {FAMILY.get(k) for k in credible}:  # which of them is hard to say
         least = best / (NEAR * _FURTHER)
         credible += [k for k, p in listed.items() if FAMILY.get(k) == "blade" and p >= least and k not in credible]
     families = {FAMILY.get(k, k) for k in credible}
     few = len(credible) <= MOST or len(families) <= FAMILIES
     if len(credible) > 1 and few and unknown <= DOUBT and probability[NONE] <= RIVAL:
         return answer("class", credible, f"these scale in the same way ({mass:.2f})")
+    wide = _wider(listed) if largest >= CLEAR else []
+    if wide and len(credible) > 1 and unknown <= DOUBT and probability[NONE] <= RIVAL:
+        return answer("class", wide, f"these scale in the same way ({sum(listed[k] for k in wide):.2f})")
     if len(credible) == 1 and listed[first] < SURE:
         return answer("insufficient", (), f"{first} is likely ({listed[first]:.2f}) but not sure")
     if len(credible) == 1:
@@ -361,3 +370,14 @@ def judge(probability: Mapping[str, float], size: Mapping[str, tuple[float, floa
     elif few:
         why = f"a cause that is not listed may have caused it ({unknown:.2f}), and {why}"
     return answer("insufficient", (), why)
+
+
+def _wider(listed: Mapping[str, float]) -> list[str]:
+    """Likeliest effects that hold enough of the probability together; none where these are too many."""
+    chosen: list[str] = []
+    for name in sorted(listed, key=lambda k: -listed[k]):
+        chosen.append(name)
+        if sum(listed[k] for k in chosen) >= ENOUGH:
+            few = len(chosen) <= WIDEST and len({FAMILY.get(k, k) for k in chosen}) <= KINDS
+            return chosen if few else []
+    return []

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from bemt.air import Air
 from bemt.base.errors import Fault, InputError
-from bemt.base.units import ZERO_CELSIUS
+from bemt.base.units import KNOT, MPH, ZERO_CELSIUS, split_suffix
 from bemt.dataset import DIMENSIONLESS, Dataset
-from bemt.recordings.channels import named
+from bemt.recordings.channels import MEASURED, named
 from bemt.recordings.reduce import reduce, reduction
 
 Array = NDArray[np.float64]
@@ -32,7 +32,7 @@ _WANTED = (
     "run",
     "temperature_K",
 )
-_AIR = re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(C|K|hPa|Pa|kg/m3)")
+_AIR = re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(C|K|hPa|Pa|kg/m3|m/s|kt|mph|km/h)")
 _CONDITION = re.compile(r"\s*([^=]+?)\s*=\s*(.+?)\s*")
 _RANGE = re.compile(r"([-+.\deE]+):([-+.\deE]+)")
 _ROTOR = "rotor"
@@ -58,6 +58,8 @@ class StandRun:
     temperature_K: float = math.nan  # Mean of the air [K]; NaN: not recorded
     # Scatter between the runs of this recording at equal speed, share, by channel, where it shows
     session: Mapping[str, float] = field(default_factory=dict)
+    # Columns that tell rows apart and are no channel of the rotor, as conditions may name them
+    conditions: tuple[str, ...] = ()
     # What lag or hysteresis shifts a load by, standard deviation as a share of its largest value, by channel [1]
     shift: Mapping[str, float] = field(default_factory=dict)
 
@@ -94,21 +96,36 @@ def _kept(imported: Dataset, column: str, wanted: str, where: str) -> NDArray[np
     return np.asarray(kept)
 
 
+def _words(name: str) -> list[str]:
+    """Words of the name of a channel, without its unit: the A of a current in ampere names no rotor."""
+    return split_suffix(name)[0].split("_")
+
+
+def rotors_of(imported: Dataset) -> list[str]:
+    """Rotors that the columns of a file tell apart.
+
+    >>> rotors_of(Dataset("bench", "table", {"T_A_N": [1.0], "T_B_N": [2.0], "current_A": [3.0]}))
+    ['A', 'B']
+    >>> rotors_of(Dataset("bench", "table", {"thrust_N": [1.0], "current_A": [3.0]}))
+    []
+    """
+    return [w for w in _ROTOR_WORDS if any(w in _words(name) for name in imported.values)]
+
+
 def _of_rotor(imported: Dataset, word: str, where: str) -> Dataset:
     """Columns of one of several rotors under their plain names; columns of the others go."""
-
-    def parts(name: str) -> list[str]:
-        return name.split("_")
-
-    known = [w for w in _ROTOR_WORDS if any(w in parts(name) for name in imported.values)]
+    known = rotors_of(imported)
+    if not known and any(f"only the {word} rotor" in note for note in imported.notes):
+        return imported
     if word not in known:
         raise InputError(Fault(where, _ROTOR, word, f"one of {', '.join(known)}" if known else "a file of one rotor"))
     others = set(known) - {word}
     kept: dict[str, str] = {}
     for name in imported.values:
-        own = parts(name)
+        own = _words(name)
         if word in own:
-            kept["_".join(p for p in own if p != word)] = name
+            base = "_".join(p for p in own if p != word)
+            kept[base + name[len("_".join(own)) :] if base else name.removeprefix(f"{word}_")] = name
         elif not others & set(own):
             kept.setdefault(name, name)
     values = {new: imported[old] for new, old in kept.items()}
@@ -139,10 +156,13 @@ def selected(imported: Dataset, conditions: Sequence[str], where: str) -> Datase
 
 
 _AIR_UNITS = {
-    "C": ("temperature_K", 1.0, ZERO_CELSIUS), "K": ("temperature_K", 1.0, 0.0), "hPa": ("pressure_Pa", 100.0, 0.0),
-    "Pa": ("pressure_Pa", 1.0, 0.0), "kg/m3": ("density_kg_m3", 1.0, 0.0),
+    "C": ("temperature_K", 1.0, ZERO_CELSIUS), "K": ("temperature_K", 1.0, 0.0),
+    "hPa": ("pressure_Pa", 100.0, 0.0),
+    "Pa": ("pressure_Pa", 1.0, 0.0), "kg/m3": ("density_kg_m3", 1.0, 0.0), "m/s": ("airspeed_m_s", 1.0, 0.0),
+    "kt": ("airspeed_m_s", KNOT, 0.0), "mph": ("airspeed_m_s", MPH, 0.0), "km/h": ("airspeed_m_s", 1.0 / 3.6, 0.0),
 }  # fmt: skip
-_AIR_RANGES = {"temperature_K": (_COLD, _HOT), "pressure_Pa": (4e4, 1.1e5), "density_kg_m3": (0.4, 1.6)}
+_AIR_RANGES = {"temperature_K": (_COLD, _HOT), "pressure_Pa": (4e4, 1.1e5), "density_kg_m3": (0.4, 1.6),
+               "airspeed_m_s": (0.0, 200.0)}  # fmt: skip
 
 
 def with_air(imported: Dataset, told: str | None, where: str) -> Dataset:
@@ -162,19 +182,23 @@ def with_air(imported: Dataset, told: str | None, where: str) -> Dataset:
         low, high = _AIR_RANGES.get(name, (0.0, 0.0))
         if not low <= value <= high:
             hint = "A temperature alone takes one pressure for both runs"
-            faults.append(
-                Fault(where, "", repr(part), "a number with C, K, hPa, Pa or kg/m3, such as 22C,1013hPa", hint)
-            )
+            expected = "a number with C, K, hPa, Pa, kg/m3 or, of a wind, m/s, kt, such as 22C,1013hPa"
+            faults.append(Fault(where, "", repr(part), expected, hint))
         known[name] = value
+    wind = known.pop("airspeed_m_s", None)
     if set(known) == {"pressure_Pa"}:
         faults.append(Fault(where, "", repr(told), "a temperature too, or a density"))
     if faults:
         raise InputError(faults)
     if known.keys() >= {"temperature_K", "pressure_Pa"}:
         known["density_kg_m3"] = Air.from_state(known["pressure_Pa"], known["temperature_K"] - ZERO_CELSIUS).rho
-    left = {k: v for k, v in imported.values.items() if k not in _AIR_RANGES}
+    gone = {*known, *(_AIR_RANGES if known else ()), *(("airspeed_m_s", "V_m_s", "J") if wind is not None else ())}
+    gone -= {"airspeed_m_s"} if wind is None else set()
+    left = {k: v for k, v in imported.values.items() if k not in gone}
+    if wind is not None:
+        left["airspeed_m_s"] = np.full(len(imported), wind)
     u = {k: v for k, v in imported.u.items() if k in left}
-    constants = {k: v for k, v in imported.provenance.get("constants", {}).items() if k not in _AIR_RANGES}
+    constants = {k: v for k, v in imported.provenance.get("constants", {}).items() if k not in gone}
     return replace(imported, values=left, u=u, provenance={**imported.provenance, "constants": constants | known})
 
 
@@ -182,6 +206,7 @@ def stand_run(imported: Dataset, name: str, diameter_m: float | None = None) -> 
     """Reduce one recording for a comparison."""
     units = {k: unit for k, unit in imported.units.items() if unit or k not in DIMENSIONLESS}
     imported = replace(imported, units=units)  # a throttle has none
+    one_rotor(imported, name)
     series, ramp = _reduced(imported, diameter_m)
     values = {k: series[k] for k in _WANTED if k in series}
     if not {"thrust_N", "torque_Nm", "power_W"} & values.keys() and "rpm" not in values and "J" not in values:
@@ -213,8 +238,31 @@ def stand_run(imported: Dataset, name: str, diameter_m: float | None = None) -> 
         diameter,
         float(warm.mean()) if warm.size else math.nan,
         {k: float(v["session"]) for k, v in reduction(series).correlated.items() if v.get("session")},
+        conditions_of(imported),
         _shifts(series, bool(ramp)),
     )
+
+
+def one_rotor(imported: Dataset, name: str, how: str = "Choose it with --rows-a or --rows-b rotor={}") -> None:
+    """Refuse the loads of several rotors, of which one has to be chosen."""
+    several = rotors_of(imported)
+    if len(several) > 1 and not set(_LOADS) & named(imported).values.keys():
+        got = f"loads of several rotors: {', '.join(several)}"
+        raise InputError(Fault(name, "", got, "one of them", how.format(several[0])))
+
+
+def conditions_of(imported: Dataset) -> tuple[str, ...]:
+    """Columns that may tell one condition from another: no load, no speed, no clock, and not the same in every row.
+
+    >>> made = Dataset("bench", "table", {"rpm": [4e3, 5e3, 6e3], "gap_ratio": [1.0, 1.0, 2.0]})
+    >>> conditions_of(made)
+    ('gap_ratio',)
+    """
+    texts = [k for k, v in imported.texts.items() if 1 < len(set(v)) < len(v)]
+    known = {*MEASURED, *named(imported).provenance["names"].values()}
+    known |= {k for k in imported.values if k.startswith("u_") or {"err", "rpm"} & set(k.split("_"))}
+    numbers = [k for k, v in imported.values.items() if k not in known and _moves(v)]
+    return (*texts, *numbers)
 
 
 def _shifts(points: Dataset, ramp: bool) -> dict[str, float]:

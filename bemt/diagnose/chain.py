@@ -10,11 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import effects
+from bemt.compare.scaling_laws import law
 from bemt.diagnose import another_rotor, blocks, confusion, evidence, gate, interval_scales, rules, signatures, verdict
 from bemt.diagnose import fit as fitting
 from bemt.diagnose import locate as location
 from bemt.diagnose import suggest as suggestion
 from bemt.diagnose.assemble import build
+from bemt.diagnose.beside import Beside, beside
 from bemt.diagnose.explanation import NONE, Explanation
 from bemt.diagnose.problem import Problem
 from bemt.diagnose.record import CHANNELS
@@ -63,6 +65,8 @@ class Diagnosis:
         Of the motor's speed over pulse width, a problem of its own; None where it was not recorded.
     loads : Diagnosis or None
         Of thrust and torque, where they name nothing and the answer is that of the drive.
+    ratios : Beside or None
+        Answer of the ratios to the one reference, where the diagnosis has none or none that they allow.
     """
 
     found: evidence.Evidence
@@ -80,13 +84,14 @@ class Diagnosis:
     absent: dict[str, str]
     drive: Diagnosis | None = None
     loads: Diagnosis | None = None
+    ratios: Beside | None = None
 
     @property
     def systems(self) -> dict[str, dict[str, Any]]:
         """Verdict and effects of air, stand and drive, each for itself."""
-        said = self.decision
+        said: verdict.Decision | Beside = self.ratios or self.decision
         listed = said.verdict in ("named", "class", "sensor")
-        kinds = {i: effects.catalogue()[i].kind for i in said.effects}
+        kinds = {i: _kind(i) for i in said.effects}
         out: dict[str, dict[str, Any]] = {}
         for system in ("air", "stand", "drive"):
             mine = [i for i, kind in kinds.items() if kind == system]
@@ -119,6 +124,14 @@ class Diagnosis:
         return None if self.decision.verdict == "none" else self.where
 
 
+def _kind(name: str) -> str:
+    """Sub-system of an effect; of a cause that only the comparison knows, that of its scaling law."""
+    if name in effects.catalogue():
+        return effects.catalogue()[name].kind
+    row = law(name)
+    return "air" if row is None else row.kind
+
+
 def diagnose(
     records: Sequence[Record],
     cases: Sequence[Case],
@@ -128,8 +141,9 @@ def diagnose(
     baseline: str = "bemt",
     given: suggestion.Given | None = None,
     channels: Sequence[str] | None = None,
+    ratios: bool = True,
 ) -> Diagnosis:
-    """Say what was left out."""
+    """Say what was left out; with ``ratios``, those to the one reference answer where the case leaves it open."""
     say = progress or (lambda _: None)
     speed = CHANNELS[2]
     each = list(cases) * len(records) if len(cases) == 1 else list(cases)
@@ -144,7 +158,7 @@ def diagnose(
     def tested(some: Sequence[tuple[Record, Case]]) -> bool:
         return any(not r.reference for r, _ in some)
 
-    with evidence.one_thread():
+    def answered() -> Diagnosis:
         if not turns:
             return chain(told, only)
         ids = [i for i in effects.catalogue() if only is None or i in only]
@@ -154,7 +168,21 @@ def diagnose(
         if not tested(loads):
             return motor or chain(told, only)
         rotor = chain(loads, [i for i in ids if i not in drives])
-    return rotor if motor is None else _together(rotor, motor)
+        return rotor if motor is None else _together(rotor, motor)
+
+    with evidence.one_thread():
+        answer = answered()
+        free = ratios and only is None and channels is None and baseline == "bemt"
+        return _compared(answer, records, each[0], given) if free else answer
+
+
+def _compared(answer: Diagnosis, records: Sequence[Record], case: Case, given: suggestion.Given | None) -> Diagnosis:
+    """Answer with that of the ratios to the one reference, where it has none or none that they allow."""
+    files = None if given is None else (*given.references[:1], *given.recordings[:1])
+    ratios = None if answer.drive is answer else beside(answer, records, case.diameter_m, files)
+    if ratios is None or ratios.next is None:
+        return replace(answer, ratios=ratios)
+    return replace(answer, ratios=ratios, next=ratios.next)
 
 
 def _load_moves(rotor: Diagnosis) -> bool:

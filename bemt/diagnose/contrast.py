@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import os
+import shlex
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,7 +15,7 @@ from bemt import __version__
 from bemt.base.errors import Fault, InputError
 from bemt.base.face import as_html
 from bemt.compare.recordings import RunChange, changed, document, next_step
-from bemt.compare.stand_run import selected, stand_run, with_air
+from bemt.compare.stand_run import conditions_of, selected, stand_run, with_air
 from bemt.effects import catalogue
 
 if TYPE_CHECKING:
@@ -27,6 +29,8 @@ _IMPOSSIBLE = 1e-4
 # "None" in the ratios less likely than this is no answer of the diagnosis either.
 _UNLIKELY = 0.15
 _CLAIMS = ("named", "sensor", "class")
+# Rows and number of the values of a column that tells parts of one file apart.
+_ROWS, _KINDS = 3, 20
 
 __all__ = ["Contrast", "compare", "label_diameter"]
 
@@ -111,7 +115,7 @@ def compare(
                 "",
                 "the same recording twice",
                 "two recordings, or two choices of rows",
-                "Its scatter would count as agreement",
+                _two_choices(names[0]),
             )
         )
     read: list[Dataset] = []
@@ -136,8 +140,29 @@ def compare(
     doc = document(found) | {"version": __version__, "recordings": names, "rows": {"A": rows_a, "B": rows_b}}
     if case is not None:
         doc |= _agreed(_diagnosed(names, read, case, progress), doc, found)
-    doc["next_measurement"] = next_step(found, names) if case is None else _after(doc, names, case)
+    own = case is not None and doc["verdict"] == doc["diagnosis"]["verdict"] and doc["rule"] == doc["diagnosis"]["rule"]
+    step = _after(doc) if own else next_step(found, names)
+    asked = case is not None and step["command"].endswith("--case CASE")  # as it was
+    doc["next_measurement"] = step | {"command": ""} if asked else step
     return Contrast(found, doc)
+
+
+def _two_choices(name: str) -> str:
+    """How to choose two parts of one file, with a column that tells them apart."""
+    from bemt.recordings.load import import_file
+
+    how = "Its scatter would count as agreement"
+    try:
+        found = import_file(name)
+    except InputError:
+        return how
+    cells = {**found.texts, **{k: tuple(f"{v:g}" for v in found[k]) for k in conditions_of(found) if k in found.values}}
+    for column, kinds in cells.items():
+        told = [k for k, n in Counter(kinds).items() if n >= _ROWS and k.strip() not in ("", "nan")]
+        if 2 <= len(told) <= _KINDS:
+            one, two = (shlex.quote(f"{column}={k}") for k in told[:2])
+            return f"{how}; choose as in --rows-a {one} --rows-b {two}"
+    return how
 
 
 def _case(path: str) -> Case:
@@ -158,9 +183,11 @@ def _diagnosed(
     from bemt.diagnose.document import document as diagnosis
     from bemt.diagnose.document import explanation
     from bemt.diagnose.load import load
+    from bemt.diagnose.suggest import Given
 
     a, b = (load(name, case, imported) for name, imported in zip(names, read, strict=True))
-    answer = diagnose([b, replace(a, reference=True)], [case], None, progress)
+    given = Given((shlex.quote(names[1]),), (shlex.quote(names[0]),), f"--case {shlex.quote(case.path.as_posix())}")
+    answer = diagnose([b, replace(a, reference=True)], [case], None, progress, given=given, ratios=False)
     said = diagnosis(answer)
     keys = ("verdict", "effects", "probability", "ranking", "rule")
     told = [line for line in explanation(answer) if not line.startswith(_REMARK)]
@@ -218,11 +245,11 @@ def _by_ratios(said: dict[str, Any], mine: dict[str, Any], why: str) -> dict[str
     return said | mine | {"told": told}
 
 
-def _after(doc: dict[str, Any], names: Sequence[str], case: Case) -> dict[str, Any]:
+def _after(doc: dict[str, Any]) -> dict[str, Any]:
     """Run that the diagnosis recommends, and the command that takes it in."""
     told = dict(doc["diagnosis"].get("next_measurement") or {})
-    command = f"python -m bemt diagnose {names[1]} NEW.csv --reference {names[0]} --case {case.path.as_posix()}"
-    return {**told, "command": command if told.get("text") else ""}
+    commands = told.get("commands") or [""]
+    return {**told, "command": commands[0]}
 
 
 def label_diameter(label: str | None) -> float | None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from bemt import __version__, effects
 from bemt.base.tables import text_table
+from bemt.compare.scaling_laws import law
 from bemt.diagnose import fit as fitting
 from bemt.diagnose.confusion import nearest
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
@@ -59,19 +60,22 @@ def document(d: Diagnosis) -> dict[str, Any]:
         flat = {(f"{i}.{k}" if name.pair else k): v for i, q in parameters.items() for k, v in q.items()}
         ranking.append({"effect": str(name), "probability": p, "parameters": flat})
     state = found.states[0]
+    said = d.ratios or d.decision
+    own = {"verdict": d.decision.verdict, "effects": list(d.decision.effects), "rule": d.decision.why}
     return {
         "schema": SCHEMA,
         "version": __version__,
-        "verdict": d.decision.verdict,
-        "effects": list(d.decision.effects),
-        "probability": d.decision.probability,
+        "verdict": said.verdict,
+        "effects": list(said.effects),
+        "probability": said.probability,
         "systems": d.systems,
-        "ranking": ranking,
+        "ranking": ranking if d.ratios is None else list(d.ratios.ranking),
+        "by_the_case": None if d.ratios is None else own | {"ranking": ranking},
         "inclusion": {k: v for k, v in inclusion(found).items() if v > 1e-3},
         "location": d.where.document(),
         "fit": {c: {k: _number(v) for k, v in s.items()} for c, s in d.scores.items()},
         "blocks": d.blocks,
-        "sets": [list(s) for s in d.decision.sets],
+        "sets": [list(s) for s in d.decision.sets] if d.ratios is None else [],
         "classes": [list(c) for c in d.decision.classes] or d.alike.classes(),
         "next_measurement": d.next.document(),
         "p_value": d.p_value,
@@ -82,8 +86,8 @@ def document(d: Diagnosis) -> dict[str, Any]:
                        "solver_error": state.hyper.model},
         "baseline": [effects.to_text(e) for e in d.problem.baseline],
         "not_tried": dict(d.absent),
-        "rule": d.decision.why,
-        "rule_name": d.decision.rule,
+        "rule": said.why,
+        "rule_name": d.decision.rule if d.ratios is None else "ratios to the reference",
         "headline": headline(d),
         "left_over": _number(d.decision.left_over),
         "findings": list(d.problem.findings),
@@ -163,6 +167,10 @@ def explanation(d: Diagnosis) -> list[str]:
         lines.append(f"Before any physics: the case is off ({off}). Do diameter, pitch and blades match this rotor?")
     if len(d.problem.findings) > _FINDINGS:
         lines[-1] += f" And {len(d.problem.findings) - _FINDINGS} more; `import` shows all."
+    if d.ratios is not None:
+        members = ", ".join(f"{i} ({_title(i)})" for i in d.ratios.effects)
+        lines += [f"One of these ({d.ratios.probability:.2f}): {members}."] if d.ratios.verdict == "class" else []
+        return [*lines, d.ratios.told, *_next(d), *_not_tried(d)]
     if decision.verdict == "none":
         lines.append(f"Why: {decision.why} (p = {d.p_value:.2g}).")
         if max((abs(v) for v in level.values()), default=0.0) > _WORTH_SAYING:
@@ -221,8 +229,18 @@ def _not_tried(d: Diagnosis) -> list[str]:
     return [f"Not tried: {'; '.join(words)}."] if words else []
 
 
+def _title(name: str) -> str:
+    """Title of a cause; of one that only the comparison knows, that of its scaling law."""
+    if name in effects.catalogue():
+        return effects.catalogue()[name].title
+    row = law(name)
+    return name if row is None else row.title
+
+
 def headline(d: Diagnosis) -> str:
     """What an engineer would say first."""
+    if d.ratios is not None:
+        return d.ratios.headline
     said, catalogue = d.decision, effects.catalogue()
     titles = [catalogue[i].title for i in said.effects]
     off = " and ".join(f"{_CHANNEL[c].lower()} {_share(v)}" for c, v in d.off.items())
@@ -260,8 +278,9 @@ def text(d: Diagnosis) -> str:
     """Lines, and the tables behind them."""
     found = d.found
     first, *rest = explanation(d)
-    named = f" {', '.join(d.decision.effects)}" if d.decision.effects else ""
-    out = [textwrap.fill(first, 110), f"verdict: {d.decision.verdict}{named}"]
+    said = d.ratios or d.decision
+    named = f" {', '.join(said.effects)}" if said.effects else ""
+    out = [textwrap.fill(first, 110), f"verdict: {said.verdict}{named}"]
     # a command stays in one line, to be copied
     out += [f"  {line}" if line.startswith("  ") else
             textwrap.fill(line, 110, initial_indent="  ", subsequent_indent="    ") for line in rest]  # fmt: skip

@@ -17,6 +17,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
 from bemt.case import find_cases, load_case
 from bemt.case.prepare import prepare_case
+from bemt.compare.stand_run import one_rotor
 from bemt.dataset import Dataset
 from bemt.diagnose import cfd_points
 from bemt.diagnose import record as records
@@ -66,6 +67,7 @@ def load(
     if imported is None:
         imported = import_file(path)
         _one_setup(imported, path)
+        one_rotor(imported, path, "`compare A B --rows-b rotor={} --case CASE` takes one of them")
     if cfd_points.has_forces(imported):
         made = records.from_series(cfd_points.point_of(imported, path, rpm, airspeed_m_s), case)
         return replace(made, notes=(*made.notes, *imported.notes))

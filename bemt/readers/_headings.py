@@ -100,6 +100,13 @@ _GOES: dict[str, tuple[str, ...]] = {  # what a suffix may be: T_A is rotor A's 
     "Q": ("torque",), "M": ("torque",), "P": ("power", "pressure", "length"), "I": ("current",), "U": ("voltage",),
     "V": ("voltage", "speed"), "n": ("angular_speed",), "D": ("length",), "R": ("length",), "r": ("length",),
 }  # fmt: skip
+_QUALIFIED = re.compile(
+    r"(?:(?:static|measured|mean|average|avg|propeller|prop|motor|rotor|output) )*(thrust|torque)"
+    r"(?: (?:force|static|mean|average|avg|measured))*|(?:f|t) (thrust)|(?:q|m) (torque)|(thrust) t|(torque) q"
+)
+"""Words that a thrust or a torque goes with and that make no other quantity of it."""
+_TORQUES = {"oz": "ozf", "lb": "lbf", "lbs": "lbf"}
+"""Pounds and ounces are forces in the usual names of units of torque: in-lb, oz-in."""
 _PULSE = re.compile(r"(esc )?(throttle|signal|pwm|pulse( width)?|esc)( signal| input| command)?")
 _SEPARATORS = (r"\s+[-–—]\s+", r"\s*,\s*", r"\s+in\s+", r"\s*/\s*", r"\s+")
 _MOJIBAKE = (("Âµ", "µ"), ("Î¼", "µ"), ("Â·", "·"), ("â‹…", "·"), ("Â°", "°"), ("Â²", "²"), ("Â³", "³"))
@@ -227,7 +234,27 @@ def heading(text: str) -> Heading:
     if parts and unit and _THRUSTS.fullmatch(_plain(parts[1])):
         found = heading(f"{parts[1]} ({unit})")
         return replace(found, text=text, told=f"{text!r} is read as gram-force, as stands mean it: 1 g is 0.00981 N")
+    if parts and (qualified := _QUALIFIED.fullmatch(_plain(parts[1]))):
+        name = next(word for word in qualified.groups() if word)
+        unit = _weight(parts[2]) if name == "torque" else ""
+        found = _heading(f"{name} ({unit or parts[2]})")
+        if found.unit is not None and unit:
+            told = f"{text!r} is read as {unit.replace(' ', ' times ')}: a weight, as stands mean it"
+            return replace(found, text=text, told=told)
+        if found.unit is not None:
+            return replace(found, text=text)
     return _heading(text)
+
+
+def _weight(text: str) -> str:
+    """Unit of a torque that is written as a mass times a length, with the weight for the mass; "" for any other."""
+    words = re.split(r"[\s·⋅*.\-/]+", text.strip())
+    if len(words) != 2:
+        return ""
+    masses = [w for w in words if w in _TORQUES]
+    lengths = [w for w in words if w in ("cm", "m", "in", "ft", "mm")]
+    unit = f"{_TORQUES[masses[0]]} {lengths[0]}" if len(masses) == 1 == len(lengths) else ""
+    return unit if isinstance(unit_of(unit), units.Unit) else ""
 
 
 def _heading(text: str) -> Heading:
@@ -268,7 +295,7 @@ def _heading(text: str) -> Heading:
             doubt = f"{core!r} is a ratio, or a quantity and its unit: write the unit in brackets"
         elif "rotor convention" in text and core in ("CT", "CP", "CQ"):
             base, unit = f"{core}_rotor", units.Unit("", "none", 1.0)
-        elif re.fullmatch(r"rpm(_\w+)?|\w+_rpm", core, re.IGNORECASE):
+        elif re.fullmatch(r"rpm([_ ]\w+)?|\w+[_ ]rpm", core, re.IGNORECASE):
             base, unit = core, units.UNITS["rpm"]
     word = _WORDS.get(base.lower().replace("_", " "))
     if unit is not None and unit.dimension == "time" and _PULSE.fullmatch(base.lower().replace("_", " ")):
@@ -285,6 +312,7 @@ def _heading(text: str) -> Heading:
             unit = units.Unit("", "angular_speed", unit.factor / units.RPM)
     if unit.dimension == "angular_speed" and unit.suffix in ("rpm", ""):
         flat = re.sub(r"^(speed|n)$|_?rpm_?", "", slug(base), flags=re.IGNORECASE)
+        flat = re.sub(r"^[A-Z][a-z]{2,}$", lambda word: word[0].lower(), flat)
         if flat.lower() == "e":
             flat = "electrical"
         return Heading(text, f"{flat}_rpm" if flat else "rpm", unit)

@@ -15,6 +15,8 @@ from bemt.readers import SourceText, head_text, load_text, number
 from bemt.readers._uiuc_names import parse_file_name
 
 Array = NDArray[np.float64]
+NO_SPEED = "no rpm in the file name"
+"""What is missing where a line over advance ratio has no name of the database."""
 _COLUMNS = {
     "geom": ("r/R", "c/R", "beta"),
     "static": ("RPM", "CT", "CP"),
@@ -203,7 +205,7 @@ def read_line(path: str | os.PathLike[str], rpm: float | None = None) -> UiucLin
     faults: list[Fault] = []
     speed = rpm if rpm is not None else (name.rpm if name and name.role == "line" else None)
     if speed is None or not 100.0 <= speed <= 200000.0:
-        got = "no rpm in the file name" if speed is None else f"rpm {speed:g}"
+        got = NO_SPEED if speed is None else f"rpm {speed:g}"
         hint = "Name the file <family>_<size>_<run>_<rpm>.txt"
         faults.append(Fault(source.name, "", got, "rpm from 100 to 200000 as the last number of the name", hint))
     try:

@@ -34,7 +34,14 @@ MEASURED = (
 _ALIASES = {
     "T_N": "thrust_N", "F_N": "thrust_N", "Q_Nm": "torque_Nm", "M_Nm": "torque_Nm", "U_V": "voltage_V",
     "I_A": "current_A", "pulse_width_s": "pwm_s", "V_m_s": "airspeed_m_s", "gap_m": "tip_gap_m",
-    "mechanical_power_W": "power_W", "shaft_power_W": "power_W",
+    "mechanical_power_W": "power_W", "shaft_power_W": "power_W", "T_K": "temperature_K", "P_Pa": "pressure_Pa",
+    "air_temperature_K": "temperature_K", "air_pressure_Pa": "pressure_Pa", "rho_kg_m3": "density_kg_m3",
+    "air_density_kg_m3": "density_kg_m3", "P_el_W": "electrical_power_W", "P_in_W": "electrical_power_W",
+    "input_power_W": "electrical_power_W", "P_mech_W": "power_W", "P_shaft_W": "power_W",
+    "speed_m_s": "airspeed_m_s", "velocity_m_s": "airspeed_m_s", "U_inf_m_s": "airspeed_m_s",
+    "V_inf_m_s": "airspeed_m_s", "Vinf_m_s": "airspeed_m_s", "wind_speed_m_s": "airspeed_m_s",
+    "wind_m_s": "airspeed_m_s", "tunnel_speed_m_s": "airspeed_m_s", "freestream_velocity_m_s": "airspeed_m_s",
+    "freestream_m_s": "airspeed_m_s",
 }  # fmt: skip
 _SPEEDS = ("optical_rpm", "electrical_rpm")
 # Says neither whose power it is.
@@ -138,6 +145,7 @@ def named(d: Dataset) -> Dataset:
             u[base] = np.where(column < 0.0, np.nan, column)
         else:
             notes.append(f"{name}: uncertainty of a channel that the file has not; left out")
+    _angular(d, values, names, notes)
     _speed(values, names, notes)
     _power(values, names, notes, d.values.get("P_W"))
     bare = d.provenance.get("headings", {}).get("power_W", "")
@@ -151,6 +159,16 @@ def named(d: Dataset) -> Dataset:
     return replace(
         d, values=values or {"run": np.ones(n)}, u=u, u_by={}, provenance=about, notes=tuple(notes), units=own, texts={}
     )
+
+
+def _angular(d: Dataset, values: dict[str, Array], names: dict[str, str], notes: list[str]) -> None:
+    """Speed of rotation from an angular speed, where the file has no other."""
+    found = [
+        k for k in d.values if d.unit(k) == "rad_s" and re.match(r"(omega|angular|rotation|motor|w|speed)", k, re.I)
+    ]
+    if len(found) == 1 and not {"rpm", *_SPEEDS} & values.keys():
+        values["rpm"], names["rpm"] = d[found[0]] / units.RPM, found[0]
+        notes.append(f"rpm is {found[0]} in rev/min")
 
 
 def _speed(values: dict[str, Array], names: dict[str, str], notes: list[str]) -> None:

@@ -20,6 +20,8 @@ MANY, GAP = 50, 50
 """Rows from which a recording is a log with fast and slow channels; rows over which a slow one is interpolated."""
 LIKELY_RHO = 1.2
 """Density for windows so wide that its true value does not matter. [kg/m3]"""
+# Share of flagged rows from which they are no spikes but a slip of the whole channel.
+_SPIKES = 0.5
 
 
 @dataclass(frozen=True)
@@ -141,11 +143,21 @@ def check_for(name: str) -> Callable[[Check], Check]:
     return register
 
 
+def _without_spikes(rec: Dataset) -> Dataset:
+    """Channels without their flagged spikes: what one row misread is no contradiction of the recording."""
+    values = dict(rec.values)
+    for channel, own in rec.provenance["names"].items():
+        odd = np.array([f"spike of {own}" in flags for flags in rec.flags or ()], dtype=bool)
+        if odd.any() and odd.mean() < _SPIKES:
+            values[channel] = np.where(odd, np.nan, values[channel])
+    return replace(rec, values=values)
+
+
 def facts_of(
     source: Dataset, diameter_m: float | None, pitch_m: float | None, blades: int | None, ducted: bool
 ) -> Facts:
     """Gather the facts of a recording or a series."""
-    rec = named(source)
+    rec = _without_spikes(named(source))
     raw = {k: np.where(far, np.nan, v) if (far := np.abs(v) > 1e12).any() else v for k, v in source.values.items()}
     said, about = source.provenance.get("constants", {}), source.provenance
     own = int(said["blades"]) if "blades" in said else None

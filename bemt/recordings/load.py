@@ -31,6 +31,7 @@ from bemt.base.averaging import Mean, relation
 from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError, system_fault
 from bemt.dataset import Dataset
 from bemt.dataset.channels import channel_fault
+from bemt.readers._uiuc_tables import NO_SPEED
 from bemt.recordings.adapt import adapt, damaged_export, recognised
 from bemt.recordings.choice import Choice, averaged, chosen
 from bemt.recordings.overview import findings, is_recording, points_text, reduction_document, reduction_of
@@ -64,7 +65,13 @@ def import_file(path: str | os.PathLike[str], format: str | None = None, choice:
         if damaged:
             hint = "Its head is cut or altered; export it again, or give --format"
             raise InputError(Fault(name, "", f"what looks like {damaged}", "a whole file", hint))
-    found = importers.read(path, kind)
+    try:
+        found = importers.read(path, kind)
+    except InputError as error:  # the columns of a UIUC line under a name of one's own: a table without a speed
+        if format is not None or kind != "uiuc" or not any(f.got == NO_SPEED for f in error.faults):
+            raise
+        kind = "table"
+        found = importers.read(path, kind)
     record = adapt(found, kind, name)
     if record is not found:  # made from a series, a polar, a geometry: no recording of a stand
         record = replace(record, provenance={**record.provenance, "adapted": type(found).__name__})

@@ -21,9 +21,19 @@ def _where(facts: Facts, rows: Array | NDArray[np.intp]) -> str:
     return f"line{'s' if len(rows) > 1 else ''} {', '.join(lines)}{more}"
 
 
+# Rows from which a recording is a log, and share of those under load that are misread in one.
+_LOG, _FEW = 100, 0.2
+
+
 def _enough(odd: NDArray[np.bool_], among: NDArray[np.bool_]) -> bool:
     """Whether rows are more than the transients and spikes of a log: one in a table, 1 % of many."""
     return bool(np.any(odd)) and float(odd.sum()) > 0.01 * (float(among.sum()) if len(odd) >= MANY else 0.0)
+
+
+def _contradicts(odd: NDArray[np.bool_], among: NDArray[np.bool_]) -> str:
+    """Severity of what cannot be so: a few rows of a log are misread, a table or much of a log contradicts itself."""
+    few = len(odd) >= _LOG and float(odd.sum()) < _FEW * float(among.sum())
+    return "warning" if few else "error"
 
 
 def _rows(mask: NDArray[np.bool_]) -> tuple[int, ...]:
@@ -112,7 +122,7 @@ def power_above_input(facts: Facts) -> Iterator[Finding]:
         text = f"{words} exceeds the electrical power in {len(rows)} of {int(facts.loaded.sum())} rows under load "
         text += f"({_where(facts, rows)}), {np.max(ratio[odd]):.4g} times at most"
         fix = "unit or gain of the torque, electrical revolutions taken for mechanical, or unit of voltage or current"
-        yield Finding("power_above_input", words, text, fix, _rows(odd), "error")
+        yield Finding("power_above_input", words, text, fix, _rows(odd), _contradicts(odd, facts.loaded))
 
 
 @check_for("merit")
@@ -141,7 +151,8 @@ def merit_above_one(facts: Facts) -> Iterator[Finding]:
         text = f"figure of merit {np.max(fm[odd]):.4g} at most in {len(rows)} rows ({_where(facts, rows)}); "
         text += f"{words} stays below {limit:.3g}"
         fix = "unit or gain of thrust or torque, diameter, or a zero that was not subtracted"
-        yield Finding("fm_above_1", facts.named("thrust_N" if T is not None else "CT"), text, fix, _rows(odd), "error")
+        named, severity = facts.named("thrust_N" if T is not None else "CT"), _contradicts(odd, facts.loaded)
+        yield Finding("fm_above_1", named, text, fix, _rows(odd), severity)
 
 
 @check_for("tip_mach")

@@ -1,0 +1,62 @@
+"""`diagnose --reference`: where the case leaves it open, how the loads changed from the reference answers."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bemt.base.errors import EXIT_OK
+from bemt.commands.cli import main
+
+ROOT = Path(__file__).resolve().parent.parent
+D = 0.254
+
+
+def written(path: Path, seed: int, thrust: float = 1.0, torque: float = 1.0, level: float = 1.0) -> str:
+    """A 10 in propeller whose CT bends as that of no blade element code, at rest."""
+    rng = np.random.default_rng(seed)
+    n = np.linspace(50.0, 125.0, 15)
+    CT = level * thrust * 0.105 * (1.0 + 0.12 * np.sin(n / 9.0))
+    CQ = level * torque * 0.0075 * (1.0 + 0.12 * np.cos(n / 7.0))
+    T, Q = CT * 1.2 * n**2 * D**4, CQ * 1.2 * n**2 * D**5
+    noisy = [v * (1.0 + 0.004 * rng.standard_normal(15)) for v in (T, Q)]
+    rows = "".join(f"{60 * a:.1f},{b:.5f},{c:.6f}\n" for a, b, c in zip(n, *noisy, strict=True))
+    path.write_text("rpm,thrust_N,torque_Nm\n" + rows, "utf-8")
+    return str(path)
+
+
+def asked(capsys: pytest.CaptureFixture[str], a: str, b: str, *more: str) -> dict[str, Any]:
+    case = str(ROOT / "cases" / "prop_10x5")
+    assert main(["diagnose", b, "--reference", a, "--case", case, "--json", *more]) == EXIT_OK
+    found: dict[str, Any] = json.loads(capsys.readouterr().out)
+    return found
+
+
+def test_loads_that_clearly_changed_are_a_class_where_the_case_cannot_say(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    a, b = written(tmp_path / "a.csv", 1), written(tmp_path / "b.csv", 2, 1.2, 0.85)
+    found = asked(capsys, a, b)
+    if found["by_the_case"] is None:
+        pytest.fail(f"the case answered: {found['verdict']} {found['effects']}")
+    assert found["by_the_case"]["verdict"] in ("insufficient", "unknown")
+    assert found["verdict"] == "class" and "duct" in found["effects"]
+    assert "thrust +" in found["headline"] and "torque -" in found["headline"]
+    assert found["next_measurement"]["text"]
+    capsys.readouterr()
+    assert main(["diagnose", b, "--reference", a, "--case", str(ROOT / "cases" / "prop_10x5")]) == EXIT_OK
+    shown = capsys.readouterr().out
+    assert "verdict: class" in shown and "The ratios to the reference" in shown
+
+
+def test_two_recordings_that_agree_name_nothing_however_far_they_are_off_the_case(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Both are of a rotor whose loads are an eighth of the case's: no slip of one of them."""
+    a, b = (written(tmp_path / f"{k}.csv", k, level=0.12) for k in (1, 2))
+    found = asked(capsys, a, b)
+    assert not found["effects"], found["headline"]
