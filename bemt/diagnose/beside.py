@@ -90,7 +90,7 @@ def beside(
     if said.verdict == "unknown" and largest < _LARGE:
         return None
     likely = {i: sum(p for k, p in answer.found.probability.items() if i in k.ids) for i in answer.found.spans}
-    # one name alone is not the ratios' to give: they know no blade, and what the diagnosis holds likely stands beside it
+    # a single name is not for the ratios to give: they know no blade, and what the diagnosis holds likely may be it
     weighed = {*ratios.probability, *(row.id for row in LAWS)} if ratios.verdict == "class" else set(ratios.effects)
     lone = [i for i, p in sorted(likely.items(), key=lambda kv: -kv[1]) if p >= _LIKELY and i not in weighed]
     effects = (*ratios.effects, *lone)
@@ -113,7 +113,7 @@ def _next(found: RunChange, files: Sequence[str] | None) -> Suggestion | None:
 
 
 def _of_label(answer: Diagnosis) -> bool:
-    """Whether the case was made from a label: a blade that is better known speaks for itself, also when it is silent."""
+    """Whether the case was made from a label. A blade that is better known speaks for itself, silent or not."""
     built = [p.as_built for p in answer.problem.parts]
     return any(b is not None and b.prior.known_from == "label" for b in built)
 
