@@ -14,8 +14,8 @@ from bemt.report.values import Section, sections
 __all__ = ["FIDELITY_WORDS", "fidelities", "fidelity_sections"]
 
 FIDELITY_WORDS = (
-    "The disk prescribes BEMT's load and shows what the wake does with it; resolved blades find their own. "
-    "BEMT's wake far behind is drawn without contraction. CPU seconds, other work beside them."
+    "The disk prescribes BEMT's load and shows what the wake does with it; resolved blades compute their own. "
+    "The far wake of BEMT is drawn without contraction. CPU seconds; other work ran at the same time."
 )
 
 
