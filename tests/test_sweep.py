@@ -537,7 +537,7 @@ def test_the_formula_has_its_measured_error_and_none_where_nobody_measured_it(so
     line = next(c for c in solved["comparisons"] if c["model"] == "k1k2" and c["quantity"] == "thrust_N")
     assert line["u_model"] == pytest.approx(U_MEASURED * line["S"])
     ducted = {**solved, "kind": "fan"}
-    assert "knows their" in " ".join(summary([ducted]).split()) and "K1/K2 gives" not in summary([solved])
+    assert "open propellers" in " ".join(summary([ducted]).split()) and "K1/K2 gives" not in summary([solved])
 
 
 # Promise: a folder of results holds what the cases give now, whole, or nothing, and serves one sweep at a time.
