@@ -628,7 +628,7 @@ def test_rows_whose_time_falls_are_left_out_and_noted() -> None:
     t[40] = -3.0
     thrust[40] = 1.4
     got = find(t, {"thrust_N": thrust}, "thrust_N", command)
-    assert got.notes == ("rows left out because their time falls: 40",) and every_row_once(got)
+    assert got.notes == ("rows dropped because their time decreases: 40",) and every_row_once(got)
     with pytest.raises(InputError, match="split it where its clock restarts"):
         find(np.concatenate([t, t]), {"thrust_N": np.concatenate([thrust, thrust])}, "thrust_N")
 

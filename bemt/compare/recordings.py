@@ -140,11 +140,11 @@ def _with_voltage(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> J
     if not volts:
         return said
     if abs(volts) < _TOLD_VOLTAGE and said.effects == ("battery_sag",):
-        why = f"speeds go with the recorded voltages, which are {math.expm1(volts):+.1%} apart"
+        why = f"speeds follow the recorded voltages, which are {math.expm1(volts):+.1%} apart"
         return replace(said, verdict="none", effects=(), why=why)
     if said.verdict not in ("none", "insufficient") or abs(volts) < _TOLD_VOLTAGE or not follows:
         return said
-    why = f"voltage as recorded, {math.expm1(volts):+.1%} at equal command; the speed goes with it"
+    why = f"voltage as recorded, {math.expm1(volts):+.1%} at equal command; the speed follows it"
     probability = {"battery_sag": 1.0 - said.probability.get("unknown", 0.0)}
     left = {k: p for k, p in said.probability.items() if k not in ("none", "battery_sag")}
     return Judgement("named", ("battery_sag",), probability | left, {"battery_sag": (volts, 0.0)}, why)

@@ -68,7 +68,7 @@ def fit(
     chart = bench_map.fit(points)
     off = bench_map.misfit(points, chart)
     if off > UNFIT:
-        got = f"thrust that lies {100 * off:.0f} % of its greatest value off any rising curve"
+        got = f"thrust that deviates by {100 * off:.0f} % of its largest value from any rising curve"
         hint = "Is there a propeller, and did the motor run through? Different drives do not share a map"
         raise InputError(Fault(", ".join(files), "thrust_N", got, "thrust that rises with the pulse width", hint))
     trip = bench_map.held_out(points)

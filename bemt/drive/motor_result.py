@@ -61,7 +61,7 @@ def generate(
     faults += outputs.faults("--generate", folder, texts, inputs)
     if out:
         faults += outputs.faults("--out", Path(out), RESULTS, [*inputs, *(folder / name for name in texts)])
-    hint = "Name another folder: what was measured is not replaced by invented numbers"
+    hint = "Name another folder: measured data are not replaced by generated data"
     for name in texts:
         if (folder / name).exists() and not _generated(folder / name):
             faults.append(Fault((folder / name).as_posix(), "", "a file that was not generated", "none, or one", hint))

@@ -137,7 +137,7 @@ def named(d: Dataset) -> Dataset:
             out += lost(d, np.flatnonzero(column < 0.0), f"u_{base}", "a negative uncertainty")
             u[base] = np.where(column < 0.0, np.nan, column)
         else:
-            notes.append(f"{name}: uncertainty of a channel that the file has not; left out")
+            notes.append(f"{name}: uncertainty of a channel that the file does not have; ignored")
     _speed(values, names, notes)
     _power(values, names, notes, d.values.get("P_W"))
     bare = d.provenance.get("headings", {}).get("power_W", "")
@@ -190,7 +190,7 @@ def _power(values: dict[str, Array], names: dict[str, str], notes: list[str], ba
                 notes.append(f"P_W is {name}: it goes with the product of its factors{times}")
                 break
         else:
-            notes.append("P_W: shaft or electrical power? Left out; name it power_W or electrical_power_W")
+            notes.append("P_W: shaft or electrical power? Ignored; name it power_W or electrical_power_W")
     if {"voltage_V", "current_A"} <= values.keys() and "electrical_power_W" not in values:
         values["electrical_power_W"] = values["voltage_V"] * values["current_A"]
         names["electrical_power_W"] = "voltage_V x current_A"

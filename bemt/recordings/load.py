@@ -107,7 +107,7 @@ def _restart_notes(paths: Sequence[str], records: Mapping[str, Dataset]) -> dict
         if record is None or record.provenance.get("clock") not in ("time", "iteration"):
             continue
         for other in _earlier(Path(path), paths, records):
-            text = f"beside {other}: not joined"
+            text = f"next to {other}: not joined"
             if other in records:
                 how = relation(_clock(records[other]), _clock(record))
                 text = f"restart of {other} ({how}): not joined"

@@ -49,6 +49,6 @@ def fidelity_sections(found: Mapping[str, Any]) -> list[Section]:
                     Trace(name + places.get(at, ""), x, y, None, SERIES[i % len(SERIES)], DASHES[i % len(DASHES)])
                 )
         if len(traces) > 1:
-            title = f"Axial speed {behind} R behind the rotor, beside BEMT"
+            title = f"Axial speed {behind} R behind the rotor, compared with BEMT"
             plots.append(figure(Plot(title, "r/R [-]", "axial speed [m/s]", traces)))
     return sections(("Loads and cost", [("table", table(heads, rows))] if rows else []), ("Wake", [("figures", plots)]))
