@@ -88,7 +88,7 @@ def test_a_case_of_the_users_own_is_not_replaced(tmp_path: Path, capsys: pytest.
     before = {p.name: p.read_bytes() for p in own.iterdir()}
     arguments = ["diagnose", file, "--case", str(own), "--off", "compressibility", "--out", str(own), "--quiet"]
     assert main(arguments) == 2
-    assert "--out: got a folder with a file of its own" in capsys.readouterr().err
+    assert "--out: got a folder with an existing file" in capsys.readouterr().err
     assert {p.name: p.read_bytes() for p in own.iterdir()} == before
 
 
