@@ -114,7 +114,7 @@ def test_a_load_is_refused_where_nothing_is_done_to_it(
 ) -> None:
     path = put("q.out", history())
     assert main(["import", str(path), "--load", "torqe"]) == 2  # neither dropped nor its slip passed over
-    assert capsys.readouterr().err.startswith("--load: got torqe; expected --sign -1 or --sector N beside it")
+    assert capsys.readouterr().err.startswith("--load: got torqe; expected --sign -1 or --sector N as well")
     assert main(["import", str(path), "--load", "torque", "--sign", "-1"]) == 0
 
 

@@ -456,7 +456,7 @@ def comparison(E: float, u_val: float | None, source: str = "bench") -> dict[str
         (1.0, 2.0, "same", "Not distinguishable from noise"),
         (3.0, 2.0, "differs", "more than the validation uncertainty"),
         (3.0, None, "unknown", "is at least this uncertain: bench 2.8 N"),
-        (0.5, math.nan, "same", "whatever the recording's uncertainty"),
+        (0.5, math.nan, "same", "whatever the uncertainty of the recording"),
     ],
 )
 def test_verdicts_follow_validation_uncertainty(E: float, u_val: float | None, kind: str, words: str) -> None:

@@ -28,7 +28,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     rows = "rows of {} to use: column=text, column=number, column=low:high, rotor=left; repeatable"
     parser.add_argument("--rows-a", metavar="CONDITION", help=rows.format("A"), **_options.REPEATABLE)
     parser.add_argument("--rows-b", metavar="CONDITION", help=rows.format("B"), **_options.REPEATABLE)
-    air = "air of {}, overrides the recording: 22C,1013hPa, or only 22C, or 1.19kg/m3"
+    air = "air of {}, in place of what it records: 22C,1013hPa, or 22C alone, or 1.19kg/m3"
     parser.add_argument("--air-a", metavar="AIR", help=air.format("A"))
     parser.add_argument("--air-b", metavar="AIR", help=air.format("B"))
     parser.add_argument("--out", metavar="DIR", help="write comparison.json, its text and a picture to this folder")

@@ -43,7 +43,7 @@ _TOLD = ("density as recorded", "by the thermometers", "voltage as recorded")
 _MOVED, _WIDE = 2.5, 1.4
 # Thrust of a propeller of 2.3 times the diameter at one speed: no stand takes both. [1]
 _FAR_OFF = 30.0
-OTHER_STAND = "no change on one stand moves every load by this much: check units and speeds of both files"
+OTHER_STAND = "no change on one stand moves every load by so much: look at the units and the speeds of both files"
 
 
 @dataclass(frozen=True, eq=False)

@@ -350,7 +350,7 @@ def judge(probability: Mapping[str, float], size: Mapping[str, tuple[float, floa
     families = {FAMILY.get(k, k) for k in credible}
     few = len(credible) <= MOST or len(families) <= FAMILIES
     if len(credible) > 1 and few and unknown <= DOUBT and probability[NONE] <= RIVAL:
-        return answer("class", credible, f"these scale in the same way ({mass:.2f})")
+        return answer("class", credible, f"these scale alike ({mass:.2f})")
     if len(credible) == 1 and listed[first] < SURE:
         return answer("insufficient", (), f"{first} is likely ({listed[first]:.2f}) but not sure")
     if len(credible) == 1:

@@ -128,7 +128,7 @@ LAWS: tuple[ScalingLaw, ...] = (
     ),
     ScalingLaw(
         "duct",
-        "duct added or removed",
+        "a duct put on or taken off",
         ((1.0, {_T: {"still": 1.0}, _Q: {"still": -0.7}}), (0.7, {_Q: {"still": 1.0}})),
         "thrust rises at the same speed while torque falls or stays the same; fades with airspeed",
         "weigh rotor and duct separately",

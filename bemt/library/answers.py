@@ -116,7 +116,7 @@ class Answer:
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Effects of the verdict; for a class, all members."""
+        """Effects of the verdict; of a class all members."""
         return self.diagnosis.decision.effects
 
     @property

@@ -137,7 +137,7 @@ def named(d: Dataset) -> Dataset:
             out += lost(d, np.flatnonzero(column < 0.0), f"u_{base}", "a negative uncertainty")
             u[base] = np.where(column < 0.0, np.nan, column)
         else:
-            notes.append(f"{name}: uncertainty of a channel that the file does not have; ignored")
+            notes.append(f"{name}: uncertainty of a channel that the file has not; left out")
     _speed(values, names, notes)
     _power(values, names, notes, d.values.get("P_W"))
     bare = d.provenance.get("headings", {}).get("power_W", "")
