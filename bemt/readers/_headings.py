@@ -213,7 +213,7 @@ def heading(text: str) -> Heading:
     >>> heading("Drehzahl [1/min]").name, heading("Poussée (N)").name, heading("Thrust (g)").name
     ('rpm', 'thrust_N', 'thrust_N')
     >>> heading("thrust_g").name, heading("thrust_g").told
-    ('thrust_N', "'thrust_g' is read as gram-force, as usual on stands: 1 g is 0.00981 N")
+    ('thrust_N', "'thrust_g' is read as gram-force, as stands mean it: 1 g is 0.00981 N")
     """
     text = " ".join(text.split())
     parts = re.fullmatch(r"(.*?)\s*[\(\[]\s*([^()\[\]]*?)\s*[\)\]]\s*", text)
@@ -226,7 +226,7 @@ def heading(text: str) -> Heading:
     unit = _OF_A_STAND.get(parts[2]) if parts else None
     if parts and unit and _THRUSTS.fullmatch(_plain(parts[1])):
         found = heading(f"{parts[1]} ({unit})")
-        return replace(found, text=text, told=f"{text!r} is read as gram-force, as usual on stands: 1 g is 0.00981 N")
+        return replace(found, text=text, told=f"{text!r} is read as gram-force, as stands mean it: 1 g is 0.00981 N")
     return _heading(text)
 
 
