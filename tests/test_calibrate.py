@@ -366,7 +366,7 @@ def test_a_file_is_fitted_once_and_never_held_out_too(tmp_path, capsys):
         ((stand, str(tmp_path / "link.csv")), "link.csv: got files that FILES"),
         ((stand, "--test", stand), f"--test: {stand}: got files that FILES {stand} holds too"),
         ((str(root), "--test", volume), f"--test: {volume}: got files that FILES {root} holds too (2: c_11x7_static_"),
-        ((volume, "--test", str(root)), "Held out is only what is not fitted."),
+        ((volume, "--test", str(root)), "Held-out data must not be fitted."),
         ((str(root / "volume-1"), "--test", volume, stand), f"--test: {stand}: got files that --test {volume} holds"),
     ):
         out = tmp_path / "out"

@@ -142,7 +142,7 @@ def test_electrical_power_for_torque_claims_nothing_unlisted(tmp_path: Path, vol
         table |= {"voltage_V": np.full(17, 12.0), "throttle": table["rpm"] / 8000.0} if volts else {}
         files.append(written(tmp_path / name, table))
     answer = compare(*files)
-    assert any("stands for it" in line for line in answer.document["assumed"]) == volts
+    assert any("electrical power replaces it" in line for line in answer.document["assumed"]) == volts
     assert answer.verdict in verdicts
 
 

@@ -313,7 +313,7 @@ def test_a_mirror_beside_a_local_archive_is_refused(tmp_path, capsys):
     archive.write_bytes(zipped(FILES))
     words = ["data", "uiuc", "--from", str(archive), "--url", "http://localhost/a.zip", "--dir", str(tmp_path / "d")]
     assert cli.main(words) == 2
-    assert "--url: got http://localhost/a.zip; expected none beside --from" in capsys.readouterr().err
+    assert "--url: got http://localhost/a.zip; expected none with --from" in capsys.readouterr().err
     assert left(tmp_path) == {"a.zip"}
 
 

@@ -78,7 +78,7 @@ def test_cases_of_one_name_have_no_folder_each(tmp_path: Path, capsys: pytest.Ca
     two = ["--case", str(CASES / "prop_8x5"), str(tmp_path / "own"), "--out", str(tmp_path / "out")]
     assert main(["diagnose", *files, *two, "--quiet"]) == 2
     first = (CASES / "prop_8x5" / "case.toml").as_posix()
-    assert f"name: got 'prop_8x5' as in {first}; expected a name of its own" in capsys.readouterr().err
+    assert f"name: got 'prop_8x5' as in {first}; expected a unique name" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 
@@ -88,7 +88,7 @@ def test_a_case_of_the_users_own_is_not_replaced(tmp_path: Path, capsys: pytest.
     before = {p.name: p.read_bytes() for p in own.iterdir()}
     arguments = ["diagnose", file, "--case", str(own), "--off", "compressibility", "--out", str(own), "--quiet"]
     assert main(arguments) == 2
-    assert "--out: got a folder with a file of its own" in capsys.readouterr().err
+    assert "--out: got a folder with an existing file" in capsys.readouterr().err
     assert {p.name: p.read_bytes() for p in own.iterdir()} == before
 
 
@@ -370,7 +370,7 @@ def test_of_two_recordings_the_one_nearer_the_case_is_taken_to_be_right() -> Non
     for odd in (0, 1):
         records = [_of(f"{k}.csv", k, thrust_N=1 / 4.4482216 if k == odd else 1.0) for k in range(2)]
         (found,) = assemble.build(records, [case()]).findings
-        assert found.startswith(f"{odd}.csv: ") and found.endswith(f"Or {1 - odd}.csv is the one in another unit")
+        assert found.startswith(f"{odd}.csv: ") and found.endswith(f"Or {1 - odd}.csv is the one in a different unit")
 
 
 @pytest.mark.parametrize(

@@ -230,7 +230,7 @@ def test_recordings_without_a_map_in_them_are_refused(shared_data: Path, capsys:
     broken = shared_data / "rcbenchmark" / "StepsTest_2020-06-16_214537.csv"
     for path in (bare, broken):
         assert main(["map", str(path)]) == 2
-        assert "off any rising curve" in capsys.readouterr().err
+        assert "from any rising curve" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -264,7 +264,7 @@ def test_bad_options_are_refused_and_nothing_is_written(
 def test_thrust_out_of_reach_is_told_by_the_exit_code(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = str(log(tmp_path))
     assert main(["map", path, "--thrust", "1e9"]) == 1
-    assert "1e+09 N: pulse width more than this drive gives" in capsys.readouterr().out
+    assert "1e+09 N: pulse width more than this drive can give" in capsys.readouterr().out
     assert main(["map", path, "--thrust", "1e9", "--json", "--out", str(tmp_path / "out")]) == 1
     doc = json.loads(capsys.readouterr().out)
     assert doc["answer"]["pulse_us"] is None and doc == json.loads((tmp_path / "out" / "log.map.json").read_text())

@@ -359,7 +359,7 @@ def test_an_airspeed_beyond_the_drive_is_answered(
     assert main(["drive", case, "--airspeed", airspeed]) == 1
     words = capsys.readouterr().out
     assert "does not hold this airspeed" in words and "runs away" not in words
-    assert ("gives none that is known" in words) is not known and " nan " not in words
+    assert ("gives an unknown maximum" in words) is not known and " nan " not in words
 
 
 def test_results_never_replace_the_drive_file(

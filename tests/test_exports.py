@@ -568,7 +568,7 @@ def test_cases_of_one_name_are_refused_before_anything_is_written(
     assert main(["export", str(folder), "--out", str(out)]) == 2
     told = capsys.readouterr().err.splitlines()
     assert [line.split("/cases/")[1].split("/")[0] for line in told] == ["c", "d", "e"]
-    assert f"name: got 'q' as in {folder.as_posix()}/b/case.toml; expected a name of its own." in told[1]
+    assert f"name: got 'q' as in {folder.as_posix()}/b/case.toml; expected a unique name." in told[1]
     assert not out.exists()
     for name in "cde":
         shutil.rmtree(folder / name)

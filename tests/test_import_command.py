@@ -95,7 +95,7 @@ def test_restart_files_are_named_and_never_joined(put: Callable[..., Path]) -> N
     assert any("(other clock): not joined; the same steps mean other times" in w for w in found[1]["warnings"])
     assert not any("joined" in w for w in found[0]["warnings"])
     alone = document([b])["files"][0]
-    assert any(f"beside {a}: not joined" in w for w in alone["warnings"])
+    assert any(f"next to {a}: not joined" in w for w in alone["warnings"])
     c = put("other-rfile.out", history())
     d = put("other-rfile_1_300.out", history(start=3.0, first=301))
     assert any("(continues): not joined" in w for w in document([c, d])["files"][1]["warnings"])
@@ -114,7 +114,7 @@ def test_a_load_is_refused_where_nothing_is_done_to_it(
 ) -> None:
     path = put("q.out", history())
     assert main(["import", str(path), "--load", "torqe"]) == 2  # neither dropped nor its slip passed over
-    assert capsys.readouterr().err.startswith("--load: got torqe; expected --sign -1 or --sector N beside it")
+    assert capsys.readouterr().err.startswith("--load: got torqe; expected --sign -1 or --sector N as well")
     assert main(["import", str(path), "--load", "torque", "--sign", "-1"]) == 0
 
 

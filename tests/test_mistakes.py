@@ -84,7 +84,7 @@ RUNS: dict[str, tuple[Callable[[Put], list[str]], int, tuple[str, ...]]] = {
     "two propellers in one file": (
         lambda put: ["diagnose", "--case", "mine", "--", put("two.csv", "Prop,rpm,thrust_N\n" + "".join(
             f"{p},{n},{n / 2000}\n" for p in ("8x5", "9x5") for n in (4000, 6000, 8000)))], 2,
-        ("two.csv", "2 set-ups", "a file of its own")),
+        ("two.csv", "2 set-ups", "a separate file")),
     "UIUC geometry given to stations": (lambda put: ["stations", put("x_geom.txt", "r/R c/R beta\n0.2 0.1 30\n")], 2,
                                         ("x_geom.txt", "bemt new --stations")),
     "validate without data": (lambda put: ["validate", "uiuc"], 2, ("uiuc", "bemt data uiuc")),

@@ -290,7 +290,7 @@ def test_units_that_the_table_contradicts_are_doubted(write: Write) -> None:
 
 def test_rpm_of_the_raw_record_is_traced_to_telemetry(write: Write) -> None:
     got = jmajew.read(write(raw_text()))
-    assert got.provenance["form"] == "raw" and said(got, "over 7 pole pairs, not a sensor of its own")
+    assert got.provenance["form"] == "raw" and said(got, "over 7 pole pairs, not a separate sensor")
     assert got.unit("Strain_Gauge_Thrust") == "" and got.unit("ESCT_RPM") == ""
     assert not said(jmajew.read(write(raw_text().replace(",600,", ",500,"), "b.csv")), "telemetry of")
 
@@ -576,7 +576,7 @@ def test_the_published_logs_show_their_known_faults(shared_data: Path) -> None:
     assert {rpm[k] for k, f in enumerate(flags) if "spike of electrical_rpm" in f} >= {61525.0, 66434.0}
     assert all(any("is 0" in w for w in flags[k]) for k in np.flatnonzero(rpm == 0.0))
     raw = importers.read(shared_data / "jmajew" / "raw" / "curr_cal.csv")
-    assert said(raw, "over 7 pole pairs, not a sensor of its own")
+    assert said(raw, "over 7 pole pairs, not a separate sensor")
     assert [k for k, f in enumerate(raw.flags) if "spike of torque_Nm" in f] == [831]
 
 

@@ -72,7 +72,7 @@ def test_condition_columns_are_optional(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("row", "expected"),
     [
-        ("thrust,2.6,kg,unknown,cfd,x,,,,", "2:3: got unit 'kg'; expected one of N, mN, kN, kgf, gf, lbf, ozf. A mass is no force: write kgf."),
+        ("thrust,2.6,kg,unknown,cfd,x,,,,", "2:3: got unit 'kg'; expected one of N, mN, kN, kgf, gf, lbf, ozf. A mass is not a force: write kgf."),
         ("thrust,2.6,,unknown,cfd,x,,,,", "2:3: got no unit; expected one of N, mN, kN, kgf, gf, lbf, ozf."),
         ("thrust,2.6,Nm,unknown,cfd,x,,,,", "2:3: got unit 'Nm'; expected one of N, mN, kN, kgf, gf, lbf, ozf. Did you mean N?"),
         ("CT,0.1,N,unknown,cfd,x,,,,", "2:3: got unit 'N'; expected - (dimensionless)."),

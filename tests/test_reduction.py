@@ -141,7 +141,7 @@ def test_a_speed_of_zero_under_load_is_no_reading() -> None:
     values = log()
     values["rpm"][250:255] = 0.0
     got = reduce(recording(values))
-    gone = [d.lines for d in reduction(got).dropped if d.channel == "rpm" and "no reading" in d.reason]
+    gone = [d.lines for d in reduction(got).dropped if d.channel == "rpm" and "not a reading" in d.reason]
     assert {line for lines in gone for line in lines} >= {*range(252, 257)}
     assert np.allclose(got["rpm"][:4], [3000, 5000, 7000, 9000], rtol=2e-3)
 
@@ -628,7 +628,7 @@ def test_rows_whose_time_falls_are_left_out_and_noted() -> None:
     t[40] = -3.0
     thrust[40] = 1.4
     got = find(t, {"thrust_N": thrust}, "thrust_N", command)
-    assert got.notes == ("rows left out because their time falls: 40",) and every_row_once(got)
+    assert got.notes == ("rows dropped because their time decreases: 40",) and every_row_once(got)
     with pytest.raises(InputError, match="split it where its clock restarts"):
         find(np.concatenate([t, t]), {"thrust_N": np.concatenate([thrust, thrust])}, "thrust_N")
 

@@ -332,7 +332,7 @@ def test_a_diagnosis_is_shown_with_its_figures_and_none_from_outside(
     attach_diagnoses(book, tmp_path)
     page = book_html(book)
     assert_harmless(page)
-    assert "Diagnosis: what physics was left out" in page and "Weigh the duct alone." in page
+    assert "Diagnosis: what the model leaves out" in page and "Weigh the duct alone." in page
     assert "residual map" in page and "duct = ground_effect" in page
 
 
@@ -455,8 +455,8 @@ def comparison(E: float, u_val: float | None, source: str = "bench") -> dict[str
     [
         (1.0, 2.0, "same", "Not distinguishable from noise"),
         (3.0, 2.0, "differs", "more than the validation uncertainty"),
-        (3.0, None, "unknown", "at least this uncertain, which nobody states: bench 2.8 N"),
-        (0.5, math.nan, "same", "whatever the recording's uncertainty"),
+        (3.0, None, "unknown", "is at least this uncertain: bench 2.8 N"),
+        (0.5, math.nan, "same", "whatever the uncertainty of the recording"),
     ],
 )
 def test_verdicts_follow_validation_uncertainty(E: float, u_val: float | None, kind: str, words: str) -> None:

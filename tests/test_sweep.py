@@ -270,7 +270,7 @@ def test_two_cases_of_one_name_are_refused(tmp_path: Path) -> None:
     shutil.copytree(tmp_path / "one", tmp_path / "two")
     document = sweep([tmp_path])
     assert [case["exit_code"] for case in document["cases"]] == [0, 2]
-    assert "a name of its own" in document["cases"][1]["faults"][0]
+    assert "a unique name" in document["cases"][1]["faults"][0]
     text = (tmp_path / "two" / "case.toml").read_text()
     (tmp_path / "two" / "case.toml").write_text(text + "# another case under the name of the first\n")
     sweep([tmp_path], tmp_path / "out")
@@ -537,7 +537,7 @@ def test_the_formula_has_its_measured_error_and_none_where_nobody_measured_it(so
     line = next(c for c in solved["comparisons"] if c["model"] == "k1k2" and c["quantity"] == "thrust_N")
     assert line["u_model"] == pytest.approx(U_MEASURED * line["S"])
     ducted = {**solved, "kind": "fan"}
-    assert "knows their" in " ".join(summary([ducted]).split()) and "K1/K2 gives" not in summary([solved])
+    assert "open propellers" in " ".join(summary([ducted]).split()) and "K1/K2 gives" not in summary([solved])
 
 
 # Promise: a folder of results holds what the cases give now, whole, or nothing, and serves one sweep at a time.
@@ -666,7 +666,7 @@ def test_a_second_sweep_is_refused_and_leaves_the_first_alone(
         patch.setattr(grid_module, "solve_chunk", meanwhile)
         assert sweep([path], out)["exit_code"] == 0
     assert codes == [2]
-    assert capsys.readouterr() == ("", f"{out}: got a folder in which another sweep is at work; expected one for this "
+    assert capsys.readouterr() == ("", f"{out}: got a folder in use by another sweep; expected one for this "
                                        "sweep. Wait for the other one, or give another --out.\n")  # fmt: skip
     sweep([path], tmp_path / "alone")
     assert tree(out) == tree(tmp_path / "alone")
@@ -857,7 +857,7 @@ def test_names_that_would_share_a_file_are_refused(tmp_path: Path) -> None:
         ("one", 0), ("ONE", 2), ("Sweep.JSON", 2),
     ]  # fmt: skip
     assert [case["faults"][0].split(": ", 1)[1] for case in document["cases"][1:]] == [
-        f"name: got 'ONE' as in {(tmp_path / 'cases' / '1' / 'case.toml').as_posix()}; expected a name of its own.",
+        f"name: got 'ONE' as in {(tmp_path / 'cases' / '1' / 'case.toml').as_posix()}; expected a unique name.",
         "name: got 'Sweep.JSON'; expected another name. The sweep writes a file of that name.",
     ]
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["one", "sweep.csv", "sweep.json", "sweep.txt"]

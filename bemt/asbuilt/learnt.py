@@ -45,11 +45,11 @@ class Learnt:
         away = max(low / diameter_m, diameter_m / high, 1.0)
         size = min(away**0.5, MOST)
         fast = np.clip(1.0 + (M_tip - known) / (1.0 - known), 1.0, MOST)
-        same = [f"diameter {diameter_m:.3g} m (learnt from {low:.2g} to {high:.2g})"] if away > 1.01 else []
+        same = [f"diameter {diameter_m:.3g} m (data: {low:.2g} to {high:.2g})"] if away > 1.01 else []
         same += ["a duct"] if ducted else []
         factor = (DUCT if ducted else 1.0) * (size if away > 1.01 else 1.0) * fast
         flags = []
         for i in range(M_tip.size):
-            why = [*same, *([f"tip Mach {M_tip[i]:.2f} (learnt to {self.M_tip:.2f})"] if M_tip[i] > known else [])]
-            flags.append(f"u_model times {factor[i]:.2g}, beyond measured rotors: {', '.join(why)}" if why else "")
+            why = [*same, *([f"tip Mach {M_tip[i]:.2f} (data: up to {self.M_tip:.2f})"] if M_tip[i] > known else [])]
+            flags.append(f"u_model times {factor[i]:.2g}, outside the measured rotors: {', '.join(why)}" if why else "")
         return np.asarray(factor, dtype=float), tuple(flags)

@@ -461,7 +461,7 @@ def _words(
     if behind and prep.duct is not None:
         words.append("onset flow from behind the duct: exit and lip losses are not known in that direction")
     if fast:
-        words.append(f"helical tip Mach above {prep.mach_top:.2f}: section tables held")
+        words.append(f"helical tip Mach above {prep.mach_top:.2f}: section tables held at their last Mach number")
     return tuple(words)
 
 

@@ -93,7 +93,7 @@ def case_files(
     known = f'\nknown_from = "{known_from}"' if known_from else ""
     quoted = ", ".join(f'"{n}"' for n in names)
     files["case.toml"] = f"""# Blade stations cut from {source}.
-# Not in the geometry: rpm (a tip speed near {TIP_SPEED:g} m/s unless told), speed, and what [[assumptions]] declare.
+# Not in the geometry: rpm (a tip speed near {TIP_SPEED:g} m/s unless given), speed, and what [[assumptions]] declare.
 schema = "bemt.case/1"
 name = "{name}"
 title = "{found.B} blades, {2e3 * found.R * scale:.4g} mm, from {source}"
@@ -155,7 +155,7 @@ def text(found: FoundRotor, scale: float, path: Path, words: str, out: str | Non
     lines = [head, f"thrust along ({axis})", *(f"note: {note}" for note in found.notes)]
     lines.append(text_table(["r/R", "r mm", "chord mm", "beta deg", "t/c %", "camber %"], rows, left=()).rstrip())
     if out is not None:
-        lines.append(f"case in {Path(out) / 'case.toml'}: its rpm is not from the geometry, set it")
+        lines.append(f"case in {Path(out) / 'case.toml'}: the rpm is not from the geometry: set it")
     return "\n".join(lines)
 
 

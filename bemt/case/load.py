@@ -320,7 +320,7 @@ def find_cases(paths: Iterable[str | Path]) -> list[Path]:
                 else sorted(item.glob(f"*/{FILE_NAME}"), key=_natural)
             )
             if not here:
-                hint = "`bemt new 10x5` writes one; stations.csv alone is no case"
+                hint = "`bemt new 10x5` writes one; stations.csv alone is not a case"
                 faults.append(Fault(item.as_posix(), "", "no case", f"a folder with <name>/{FILE_NAME}", hint))
             found += here
         elif item.is_file() and item.suffix.lower() in (".csv", ".txt", ".dat", ".xlsx", ".stl", ".step", ".out"):
@@ -346,5 +346,5 @@ def repeated_names(cases: Mapping[int, Case]) -> dict[int, Fault]:
         file = case.path.as_posix()
         earlier = first.setdefault(case.name.casefold(), file)
         if earlier != file:
-            faults[i] = Fault(file, "name", f"{case.name!r} as in {earlier}", "a name of its own")
+            faults[i] = Fault(file, "name", f"{case.name!r} as in {earlier}", "a unique name")
     return faults

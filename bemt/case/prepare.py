@@ -85,7 +85,7 @@ def _user_polars(case: Case, given: Sequence[PolarTable]) -> list[tuple[float, p
         if isinstance(read, polars.Polar):
             out.append((x, read))
         else:
-            got = f"a file of another kind ({type(read).__name__})"
+            got = f"a different type of file ({type(read).__name__})"
             faults.append(Fault(paths[0].as_posix(), "", got, "a polar: CSV, XFOIL, C81 or AeroDyn"))
     if faults:
         raise InputError(faults)

@@ -183,7 +183,7 @@ def _main(argv: list[str]) -> int:
         if isinstance(error, ImportError) and (error.name or "").partition(".")[0] == "geometry":
             found = importlib.util.find_spec("geometry")
             where = found.origin if found else "none"
-            hint = "Install bemt into an environment of its own"
+            hint = "Install bemt into a separate environment"
             print(Fault("geometry", "", f"another package, {where}", "the one of bemt", hint), file=sys.stderr)
             return EXIT_INPUT
         import traceback

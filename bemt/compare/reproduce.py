@@ -85,8 +85,8 @@ def _model(f: th.ThesisFacts, uiuc: dict[str, Any] | None) -> None:
     f.check("K1 = 1/3.29546", "0.3034", k.K1)
     f.given("K2, set by trial", "1.5")
     f.given("vendor points behind K1", "149", "points", "not published, so the fit cannot be repeated")
-    f.given("claim: 68 % of points within", "13", "%", "held against UIUC data below")
-    f.given("claim: 95 % of points within", "26", "%", "held against UIUC data below")
+    f.given("claim: 68 % of points within", "13", "%", "compared with UIUC data below")
+    f.given("claim: 95 % of points within", "26", "%", "compared with UIUC data below")
     f.given("usable D/p, from", "0.5")
     f.given("usable D/p, to", "2.5")
     f.given("best D/p, from", "0.8")
@@ -179,10 +179,10 @@ def _cfd(f: th.ThesisFacts) -> None:
     f.check("mean of the four printed errors", "5.21", float(np.mean([float(r[4]) for r in th.PROPS])), "%")
     f.word("K1/K2 against Fluent, 8, 10, 12, 14 in", "low low high high", " ".join(signs))
     f.word("supersonic tips", "14x8", " ".join(blind["supersonic"]) or "none")
-    knows = "knows no Mach number" if blind["CT_spread"] < 1e-9 else "depends on the Mach number"
+    knows = "has no Mach number effects" if blind["CT_spread"] < 1e-9 else "depends on the Mach number"
     f.word(
         "K1/K2 and the Mach number",
-        "knows no Mach number",
+        "has no Mach number effects",
         knows,
         note=f"CT from tip Mach 0.05 to 1.5 changes by {blind['CT_spread']:.0e}",
     )
@@ -239,7 +239,7 @@ def _fan(f: th.ThesisFacts) -> None:
         "factor below the claim",
         "9.81",
         found["slip_factor"],
-        note=(f"ratio at pitch = diameter {found['ratio']:.2f}; nearest slip of units: {found['slip']}"),
+        note=(f"ratio at pitch = diameter {found['ratio']:.2f}; nearest unit error: {found['slip']}"),
     )
     f.check("vendor thrust over K1/K2 ('about ten')", "10", s["thrust_N"] / found["K1K2_at_pitch_equal_diameter_N"])
     f.check("momentum check, rho A v^2", "30.2", k.RHO_FIXED * annulus * s["exhaust_m_s"] ** 2, "N",

@@ -78,7 +78,7 @@ LAWS: tuple[ScalingLaw, ...] = (
         ),
         "torque changes a little more than thrust, both at every speed",
         "measure the diameter",
-        "T ~ D^4, Q ~ D^5 at fixed CT, CQ; the shape of another blade adds some per cent",
+        "T ~ D^4, Q ~ D^5 at fixed CT, CQ; the shape of another blade adds a few per cent",
         sizes=(0.01, 0.03, 0.1),
     ),
     ScalingLaw(
@@ -128,11 +128,11 @@ LAWS: tuple[ScalingLaw, ...] = (
     ),
     ScalingLaw(
         "duct",
-        "duct added or removed",
+        "a duct put on or taken off",
         ((1.0, {_T: {"still": 1.0}, _Q: {"still": -0.7}}), (0.7, {_Q: {"still": 1.0}})),
         "thrust rises at the same speed while torque falls or stays the same; fades with airspeed",
         "weigh rotor and duct separately",
-        "momentum theory of the ducted fan: T/T_rotor = 2 sigma at rest",
+        "momentum theory of the ducted fan: T/T_rotor = 2 sigma in static operation",
     ),
     ScalingLaw(
         "ground_effect",

@@ -143,7 +143,7 @@ def to_mend(problem: Problem, decision: Decision) -> str:
     if not wrong or not (alone or decision.why == _CONTRADICTED):
         return ""
     file, _, what = wrong[0].partition(_ERROR)
-    return f"mend {file} before any run: {what.partition('Correction: ')[2] or what}"
+    return f"correct {file} before any run: {what.partition('Correction: ')[2] or what}"
 
 
 def finding(problem: Problem) -> str:

@@ -65,7 +65,7 @@ def check(folder: str | None, cases: Sequence[Case]) -> None:
             if copy.is_file() and copy.read_bytes() != file.read_bytes():
                 lost.append(copy)
     if lost:
-        raise InputError([Fault("--out", "", f"a folder with a file of its own, {p.as_posix()}", "a folder without one",
+        raise InputError([Fault("--out", "", f"a folder with an existing file, {p.as_posix()}", "a folder without one",
                                 "The improved case would replace it") for p in lost])  # fmt: skip
 
 

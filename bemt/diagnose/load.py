@@ -106,7 +106,7 @@ def _filled(imported: Dataset, rpm: float | None, airspeed_m_s: float | None) ->
         own = next((k for k in same if k in known), None)
         if own is None:
             told[name] = np.full(len(imported), float(value))
-        notes.append(f"{name}: {value:g} as told" if own is None else f"{name}: ignored, the file has {own}")
+        notes.append(f"{name}: {value:g} as given" if own is None else f"{name}: ignored, the file has {own}")
     values = {**imported.values, **told}
     units = {k: unit for k, unit in imported.units.items() if k not in told}
     return replace(imported, values=values, units=units, notes=(*imported.notes, *notes)) if notes else imported
@@ -146,7 +146,7 @@ def _same_rotor(imported: Dataset, case: Case, path: str) -> None:
     told = imported.provenance.get("constants", {}).get("diameter_m")
     if told and abs(told / case.diameter_m - 1.0) > _SAME:
         faults.append(Fault(path, "diameter_m", f"{told:.4g}", f"{case.diameter_m:.4g} as in the case {case.name}",
-                            "The case of another rotor?"))  # fmt: skip
+                            "Case of a different rotor?"))  # fmt: skip
     v = named(imported).values
     if {"J", "airspeed_m_s", "rpm"} <= v.keys():
         with np.errstate(divide="ignore", invalid="ignore"):

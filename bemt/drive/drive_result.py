@@ -133,8 +133,8 @@ def text(result: DriveResult) -> str:
             )
             lines.append(f"endurance: {doc['endurance_s'] / 60.0:.1f} min, to a charge of {doc['soc_end']:.0%}")
         else:
-            gives = f"{h['full_N']:.1f} N" if math.isfinite(h["full_N"]) else "none that is known"
-            lines.append(f"no hover: each rotor must give {h['wanted_N']:.1f} N and gives {gives}")
+            gives = f"{h['full_N']:.1f} N" if math.isfinite(h["full_N"]) else "an unknown maximum"
+            lines.append(f"no hover: each rotor needs {h['wanted_N']:.1f} N and gives {gives}")
     for s in doc["response"]:
         lines.append(f"thrust {s['before_N']:.2f} to {s['after_N']:.2f} N: 63 % after {1e3 * s['time63_s']:.1f} ms")
     lines += [f"! assumed: {key}: {why}" for key, why in file.assumed.items()] + [f"! {note}" for note in doc["notes"]]

@@ -51,8 +51,8 @@ POPULATION: Mapping[str, DriveUnknown] = {
     "battery_sag": DriveUnknown(
         0.06, 0.03, 0.10, "share of its voltage that the pack loses at full throttle", "declared"
     ),
-    "model_thrust": DriveUnknown(1.0, 0.93, 1.07, "thrust of a real propeller over BEMT", "UIUC volume 1 at rest"),
-    "model_torque": DriveUnknown(1.0, 0.90, 1.10, "torque of a real propeller over BEMT", "UIUC volume 1 at rest"),
+    "model_thrust": DriveUnknown(1.0, 0.93, 1.07, "thrust of a real propeller over BEMT", "UIUC volume 1, static"),
+    "model_torque": DriveUnknown(1.0, 0.90, 1.10, "torque of a real propeller over BEMT", "UIUC volume 1, static"),
 }
 MOTOR = ("winding_drop", "idle_share")
 """What a motor sheet tells."""

@@ -99,7 +99,7 @@ def _reduced(got: Dataset, command: Array, data: dict[str, Array], notes: list[s
     found = plateaus.find(got.values.get("time_s"), data, "thrust_N", command)
     kept = [p for p in found.plateaus if "not settled" not in p.flags]
     if lost := len(found.plateaus) - len(kept):
-        notes.append(f"{lost} plateaus that do not settle were left out")
+        notes.append(f"{lost} plateaus that do not settle were dropped")
     pulse = np.array([p.command for p in kept], dtype=float)
     return map_points(pulse, {key: np.array([p.mean.get(key, np.nan) for p in kept]) for key in data}, run, notes)
 

@@ -52,7 +52,7 @@ def fit(
             got = importers.read(file)
             own = _sources(Path(file), got)
             if twice := next((read[path] for path in own if path in read), None):
-                hint = "A recording that counts twice makes the map look surer than it is"
+                hint = "A recording that counts twice makes the map look more certain than it is"
                 raise InputError(Fault(file, "", f"the recording of {twice} again", "each recording once", hint))
             read |= dict.fromkeys(own, file)
             if not isinstance(got, Dataset):
@@ -68,7 +68,7 @@ def fit(
     chart = bench_map.fit(points)
     off = bench_map.misfit(points, chart)
     if off > UNFIT:
-        got = f"thrust that lies {100 * off:.0f} % of its greatest value off any rising curve"
+        got = f"thrust that deviates by {100 * off:.0f} % of its largest value from any rising curve"
         hint = "Is there a propeller, and did the motor run through? Different drives do not share a map"
         raise InputError(Fault(", ".join(files), "thrust_N", got, "thrust that rises with the pulse width", hint))
     trip = bench_map.held_out(points)
@@ -102,20 +102,20 @@ def text(result: MapResult) -> str:
     worst, rms = (100 * trip[f"{key}_of_full_thrust"] for key in ("worst", "rms"))
     lines.append(f"held out: {trip['points']} points, worst {worst:.2f} %, rms {rms:.2f} % of full thrust")
     if np.isfinite(spread):
-        lines.append(f"the recording itself differs by up to {100 * spread:.2f} % of full thrust at equal pulse width")
+        lines.append(f"the recording itself scatters by up to {100 * spread:.2f} % of full thrust at equal pulse width")
     if speed["points"]:
         worst, rms = (100 * speed[f"{key}_of_full_thrust"] for key in ("worst", "rms"))
         lines.append(
-            f"with its speed known thrust would still miss by {worst:.2f} %, rms {rms:.2f} %: scatter of the readings"
+            f"with known speed the thrust error would still be {worst:.2f} %, rms {rms:.2f} %: scatter of the readings"
         )
     if chart.with_voltage:
         m = chart.curves["thrust"].exponent
         low, high = chart.voltage_range
-        law = f"thrust goes with (V / {chart.voltage_ref:.2f} V)^{m:.2f}"
+        law = f"thrust scales with (V / {chart.voltage_ref:.2f} V)^{m:.2f}"
         lines.append(f"{law}, recorded from {low:.2f} to {high:.2f} V")
     lines += [f"! {note}" for note in chart.notes]
     if answer is not None:
-        shown = number_text(answer["pulse_us"], 6, none="more than this drive gives")
+        shown = number_text(answer["pulse_us"], 6, none="more than this drive can give")
         lines.append(f"{answer['thrust_N']:g} N: pulse width {shown}{' us' if np.isfinite(answer['pulse_us']) else ''}")
     return "\n".join(lines) + "\n"
 
@@ -124,7 +124,7 @@ def _option_faults(thrust: float | None, voltage: float | None, nodes: int, name
     """What is wrong with the options."""
     faults = []
     if thrust is not None and not 0.0 <= thrust < math.inf:
-        hint = "--sign -1 turns the recorded thrust round" if thrust < 0.0 else ""
+        hint = "--sign -1 reverses the recorded thrust" if thrust < 0.0 else ""
         faults.append(Fault("", "--thrust", f"{thrust:g}", "a finite number of 0 or more [N]", hint))
     if voltage is not None and not 0.0 < voltage < math.inf:
         faults.append(Fault("", "--voltage", f"{voltage:g}", "a finite number above 0 [V]"))

@@ -106,7 +106,7 @@ name = "{b.name}"
 winding = "delta"
 kv_rpm_V = {kv}
 kv_tolerance_pct = {b.kv_tolerance_pct}
-data = "generated trials, seed {seed}: nobody measured them"
+data = "generated trials, seed {seed}: not measured"
 
 [result]
 current = "q_power_invariant"

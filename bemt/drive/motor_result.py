@@ -61,7 +61,7 @@ def generate(
     faults += outputs.faults("--generate", folder, texts, inputs)
     if out:
         faults += outputs.faults("--out", Path(out), RESULTS, [*inputs, *(folder / name for name in texts)])
-    hint = "Name another folder: what was measured is not replaced by invented numbers"
+    hint = "Name another folder: measured data are not replaced by generated data"
     for name in texts:
         if (folder / name).exists() and not _generated(folder / name):
             faults.append(Fault((folder / name).as_posix(), "", "a file that was not generated", "none, or one", hint))
@@ -144,7 +144,7 @@ def verdict_text(made: dict[str, Any]) -> list[str]:
         return [f"the methods agree (p = {made['p_of_agreement']:.2g}); this does not exclude an error common to all"]
     lines = [f"the methods do not agree (p = {made['p_of_agreement']:.1g})"]
     if not made["explanations"]:
-        return [*lines, "no offset, resistor, convention factor or gain, nor a pair of errors, explains it"]
+        return [*lines, "no offset, resistor, convention factor or gain, nor any pair of them, explains it"]
     for e in made["explanations"]:
         parts = []
         for name, size, u in zip(e["errors"], e["sizes"], e["u_sizes"], strict=True):
@@ -154,11 +154,13 @@ def verdict_text(made: dict[str, Any]) -> list[str]:
                 parts.append(f"{name}: its value is {size:.4g} times too large")
         lines.append(f"explained by {' and '.join(parts)}: K_t = {e['Kt']:.4f} ± {1.96 * e['u_Kt']:.1g} N m/A")
     if len(made["explanations"]) > 1:
-        lines.append("these explain the trials equally well: the trials cannot tell them apart, none is named")
+        lines.append("these explain the trials equally well; the trials cannot distinguish them, so none is named")
     if any(name.endswith("gain") for e in made["explanations"] for name in e["errors"]):
-        lines.append("a gain is no offset, resistor or convention: look for a calibration that is wrong")
+        lines.append("a gain error is not an offset, resistor or convention error: look for a wrong calibration")
     if any("torque.offset" in e["errors"] for e in made["explanations"]):
-        lines.append("an offset of torque is the sensor's zero, friction or cogging: the trials alone do not say which")
+        lines.append(
+            "a torque offset is the zero of the sensor, friction or cogging: the trials alone do not show which"
+        )
     return lines
 
 

@@ -65,13 +65,13 @@ def _faults(w: Wanted) -> list[Fault]:
     if w.label is None and w.stations is None and w.scan is None:
         faults.append(Fault("", "LABEL, --stations", "neither", "one of them, or --scan", "As in: new 10x5"))
     if w.fan and (w.stations is not None or w.scan is not None):
-        faults.append(Fault("", "--fan", "beside a file of the blade", "--fan with the diameter as LABEL"))
+        faults.append(Fault("", "--fan", "together with a blade file", "--fan with the diameter as LABEL"))
     if w.scan is not None and w.blades is not None:
         faults.append(Fault("", "--blades", str(w.blades), "nothing with --scan, which shows them"))
     if w.unit is not None and w.scan is None:
         faults.append(Fault("", "--unit", w.unit, "nothing without --scan"))
     if w.stations is not None and w.diameter_mm is None:
-        faults.append(Fault("", "--diameter-mm", "nothing", "the diameter beside --stations"))
+        faults.append(Fault("", "--diameter-mm", "nothing", "the diameter, with --stations"))
     if w.diameter_mm is not None and (w.stations is None or not 5.0 <= w.diameter_mm <= 10000.0):
         expected = "5 to 10000 mm" if w.stations else "nothing without --stations"
         faults.append(Fault("", "--diameter-mm", f"{w.diameter_mm:g}", expected, "In m? Times 1000"))

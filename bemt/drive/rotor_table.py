@@ -107,7 +107,7 @@ def from_case(
     if np.count_nonzero(ok) < max(4, points // 2):
         got_text = f"{np.count_nonzero(ok)} of {points} speeds up to {rpm_max:.0f} rev/min converge"
         raise InputError(Fault(case.path.as_posix(), "", got_text, "a rotor that can be solved over its speed range"))
-    notes = [] if np.all(ok) else [f"{points - np.count_nonzero(ok)} of {points} speeds do not converge: left out"]
+    notes = [] if np.all(ok) else [f"{points - np.count_nonzero(ok)} of {points} speeds do not converge: dropped"]
     omega = rpm[ok] * math.pi / 30.0
     area = math.pi / 4.0 * (ready.diameter_m**2 - (ready.hub_diameter_m**2 if ready.ducted else 0.0))
     rho = float(state.rho)

@@ -139,14 +139,14 @@ def _text(body: BodyTable, thrusters: list[Thruster], got: Allocation, rows: lis
     lines = [body.name, text_table(["thruster", "y [m]", "limit [N]", "thrust [N]", ""], table, left=(0, 4))]
     words = "met" if got.met else "beyond the thrusters"
     lines.append(
-        f"wanted {got.wanted_force_N:g} N and {got.wanted_moment_Nm:g} N m: {words}; "
+        f"requested {got.wanted_force_N:g} N and {got.wanted_moment_Nm:g} N m: {words}; "
         f"given {number_text(got.force_N)} N and {number_text(got.moment_Nm)} N m"
     )
     if body.mass_kg is not None:
         total, weight = sum(t.thrust_max_N * math.cos(t.cant_rad) for t in thrusters), body.mass_kg * KGF
-        lines.append(f"all together {total:.1f} N on a weight of {weight:.1f} N: {total / weight:.2f}")
+        lines.append(f"total {total:.1f} N for a weight of {weight:.1f} N: {total / weight:.2f}")
     cells = [[number_text(v) for v in r.values()] for r in rows]
-    lines.append(text_table(["distance [m]", "one alone [N m]", "[kgf m]", "at the force [N m]"], cells, left=()))
+    lines.append(text_table(["distance [m]", "one thruster [N m]", "[kgf m]", "at the force [N m]"], cells, left=()))
     return "\n".join(lines)
 
 

@@ -1,4 +1,4 @@
-"""What an export is: one target in one file of this folder, a class of :class:`Export`."""
+"""The contract for exports: one target per file in this folder, a subclass of :class:`Export`."""
 
 from __future__ import annotations
 
@@ -37,35 +37,35 @@ Files = Mapping[str, str | bytes]
 """Content by path below the folder of the export."""
 
 FEATURES = {
-    "torque": "shaft torque beside thrust",
+    "torque": "shaft torque as well as thrust",
     "airspeed": "thrust that falls with axial airspeed",
-    "windmill": "thrust below zero beyond the advance ratio of zero thrust",
+    "windmill": "negative thrust beyond the advance ratio of zero thrust",
     "reynolds": "coefficients that change with speed of rotation (Reynolds number)",
     "mach": "coefficients that change with tip Mach number",
-    "density": "loads that follow the air density of the simulation",
-    "rest": "the rotor at rest in the air (J = 0)",
-    "duct": "thrust of a duct beside that of the rotor",
+    "density": "loads that scale with the air density of the simulation",
+    "rest": "static operation (J = 0)",
+    "duct": "thrust of the duct as well as the rotor",
     "sections": "section polars, so that the target solves the inflow itself",
 }
-"""What a user may ask a target to hold (``--hold``), in words."""
+"""Features that a user can require of a target (``--hold``), in words."""
 
 CONVENTION = "CT = T/(rho n^2 D^4), CP = P/(rho n^3 D^5), J = V/(n D), n in rev/s (propeller convention); SI units"
 
 
 @dataclass(frozen=True)
 class Job:
-    """What is asked of an export.
+    """Request to an export.
 
     Parameters
     ----------
     case : Case
-        The case, changes included.
+        The case, including changes.
     rpm : float or None
-        Greatest speed of the tables and fits, speed of a disk; None is the case's. [rev/min]
+        Highest speed of tables and fits, speed of a disk; None: from the case. [rev/min]
     airspeed_m_s : float or None
-        Axial speed of a disk and of frozen polars; None is the case's. [m/s]
+        Axial speed of a disk and of frozen polars; None: from the case. [m/s]
     hold : tuple of str
-        Keys of :data:`FEATURES` that the target must hold.
+        Keys of :data:`FEATURES` that the target must support.
     """
 
     case: Case
@@ -75,7 +75,7 @@ class Job:
 
     @property
     def rpm_top(self) -> float:
-        """Greatest speed. [rev/min]"""
+        """Highest speed. [rev/min]"""
         return self.case.rpm if self.rpm is None else float(self.rpm)
 
     @property
@@ -95,14 +95,14 @@ class Job:
 
     @cached_property
     def band(self) -> StatedBand:
-        """Standard uncertainty of the prediction at rest and at half the speed of zero thrust."""
+        """Standard uncertainty of the prediction, static and at half the airspeed of zero thrust."""
         t = self.performance
         top = float(t.rpm[-1])
         return band_of(self.case, top, (0.0, 0.5 * float(t.J_zero[-1]) * top / 60.0 * t.diameter_m))
 
     @cached_property
     def band_at_point(self) -> StatedBand:
-        """Standard uncertainty of the prediction at rest and at the single point."""
+        """Standard uncertainty of the prediction, static and at the single point."""
         return band_of(self.case, self.rpm_top, (0.0, self.airspeed))
 
     @cached_property
@@ -114,9 +114,9 @@ class Job:
 class Export(ABC):
     """A target: a simulator, a disk of a flow solver, a design tool, a solid.
 
-    A subclass in a module of ``bemt/exports/`` is found by scanning; its ``id`` is the word of ``--format``.
+    A subclass in a module of ``bemt/exports/`` is found by scanning; its ``id`` is the value of ``--format``.
 
-    What a class states: ``id`` (word of the command line) and ``title``; ``kind``: ``solid``, ``loads`` (thrust and
+    A class defines ``id`` (name on the command line) and ``title``; ``kind``: ``solid``, ``loads`` (thrust and
     torque of a simulator), ``disk`` (a flow solver) or ``blade`` (a design tool); ``holds``: the model class, as a
     formula where there is one; ``features``: keys of :data:`FEATURES`; ``conventions``: signs, axes and units of the
     written numbers; ``source`` of format and formula; ``needs``: Python packages beyond the installation; ``uses``:
@@ -134,7 +134,7 @@ class Export(ABC):
     uses: ClassVar[frozenset[str]] = frozenset()
 
     def faults(self, job: Job) -> list[Fault]:
-        """What is asked and cannot be held; overriding methods add to this list.
+        """Requests that the target cannot meet; overriding methods add to this list.
 
         Parameters
         ----------
@@ -152,11 +152,11 @@ class Export(ABC):
         for word in job.hold:
             if word not in self.features:
                 got, wanted = f"the target {self.id}: {self.holds}", f"a target that holds {FEATURES[word]}"
-                others = f"It holds {', '.join(sorted(self.features)) or 'shape only'}"
+                others = f"It represents {', '.join(sorted(self.features)) or 'shape only'}"
                 out.append(Fault(job.file, f"--hold {word}", got, wanted, others))
         where = f"--format {self.id}"
         if job.case.ducted and self.kind != "loads" and "duct" not in self.features:
-            holds = f"The target holds {self.holds}"
+            holds = f"The target represents {self.holds}"
             out.append(Fault(job.file, where, "a rotor in a duct", "an open rotor", holds))
         for name in self.needs:
             if importlib.util.find_spec(name) is None:
@@ -166,12 +166,12 @@ class Export(ABC):
 
     @abstractmethod
     def write(self, job: Job) -> Files:
-        """Make the files.
+        """Create the files.
 
         Parameters
         ----------
         job : Job
-            What is asked; its `faults` are none.
+            The request; `faults` is empty.
 
         Returns
         -------
@@ -181,11 +181,11 @@ class Export(ABC):
         Raises
         ------
         InputError
-            When the case cannot be solved there.
+            If the case cannot be solved there.
         """
 
     def notes(self, job: Job) -> list[str]:
-        """What a user of the files must know.
+        """Notes for the user of the files.
 
         Parameters
         ----------

@@ -172,7 +172,7 @@ def performance_of(case: Case, rpm_top: float) -> Performance:
                 case.path.as_posix(),
                 "operating",
                 got,
-                "a rotor that makes thrust at rest and none at speed",
+                "a rotor with static thrust and none at speed",
                 "A table over J has no end without it",
             )
         )

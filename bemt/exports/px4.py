@@ -41,7 +41,7 @@ class Px4Export(LoadsExport):
             for k, value in enumerate(fit)
         ]
         lines += [
-            "# Lifting rotor of the SIH: greatest thrust [N] and torque [N m] at rest",
+            "# Lifting rotor of the SIH: largest static thrust [N] and torque [N m]",
             f"param set-default SIH_T_MAX {kT * W**2:.9g}",
             f"param set-default SIH_Q_MAX {kQ * W**2:.9g}",
             "# Control allocation, rotor 0: T = CT u^2 [N], Q = KM T; u is the share of full speed",

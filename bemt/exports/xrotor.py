@@ -56,7 +56,11 @@ class XrotorExport(BladeExport):
         return [
             *section_notes(job, section_errors(job, [s for _, s in sections_of(job)])),
             "tip loss, swirl and wake are XROTOR's own; stall delay and cascade are not in the file",
-            *(["at rest: Vel is 1 % of the tip speed, XROTOR has no rest"] if job.airspeed <= 0.0 else []),
+            *(
+                ["static: Vel is 1 % of the tip speed, because XROTOR has no static case"]
+                if job.airspeed <= 0.0
+                else []
+            ),
         ]
 
 

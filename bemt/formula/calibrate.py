@@ -153,7 +153,7 @@ def _resolved(name: str) -> frozenset[Path]:
 def _twice(option: str, names: Iterable[str], seen: dict[Path, str]) -> list[Fault]:
     """Names that stand for files seen before; what they stand for is added to those."""
     faults = []
-    hint = "Held out is only what is not fitted" if option == "--test" else "FitPoints that count twice weigh twice"
+    hint = "Held-out data must not be fitted" if option == "--test" else "FitPoints that count twice weigh twice"
     for name in names:
         own = _resolved(name)
         again = sorted(own & seen.keys())

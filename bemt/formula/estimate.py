@@ -80,7 +80,7 @@ def validity_flags(
     >>> validity_flags(0.254, 0.5, 2, 5e4, 0.2, 0.3)
     ()
     >>> validity_flags(0.3556, 0.57, 2, 3e5, 1.09, 0.0)[-1]
-    'tip Mach 1.09 is supersonic: extrapolated, the formula knows no Mach number'
+    'tip Mach 1.09 is supersonic: extrapolated, the formula has no Mach number effects'
     """
     out = []
     low, high = DIAMETER_RANGE
@@ -95,9 +95,9 @@ def validity_flags(
     if np.isfinite(Re) and not RE_RANGE[0] <= Re <= RE_RANGE[1]:
         out.append(f"Reynolds number {Re:.2g} outside the data ({RE_RANGE[0]:.2g}-{RE_RANGE[1]:.2g})")
     if M_tip >= 1.0:
-        out.append(f"tip Mach {M_tip:.2f} is supersonic: extrapolated, the formula knows no Mach number")
+        out.append(f"tip Mach {M_tip:.2f} is supersonic: extrapolated, the formula has no Mach number effects")
     elif M_tip > M_TIP_LIMIT:
-        out.append(f"tip Mach {M_tip:.2f} above {M_TIP_LIMIT:g}: extrapolated, the formula knows no Mach number")
+        out.append(f"tip Mach {M_tip:.2f} above {M_TIP_LIMIT:g}: extrapolated, the formula has no Mach number effects")
     elif M_tip > M_TIP_DATA:
         out.append(f"tip Mach {M_tip:.2f} beyond the data ({M_TIP_DATA:g})")
     if ducted:

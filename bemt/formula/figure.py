@@ -59,7 +59,7 @@ def draw(sets: Mapping[str, tuple[FitPoints, Mapping[str, Array]]], path: Path) 
         for limit in (NEAR, FAR):
             left.axvline(100 * limit, color="0.6", linewidth=0.8)
         left.set(xlim=(0, 60), ylim=(0, 100), xlabel="error of static thrust, not above [%]", ylabel="points [%]")
-        left.set_title(f"At rest: {titles[name]}")
+        left.set_title(f"Static: {titles[name]}")
         right.axhspan(0.9, 1.1, color="0.9", zorder=0)
         right.axhline(1.0, color="0.6", linewidth=0.8)
         right.set(xlim=(0, 1), ylim=(0, 1.8), xlabel="J/(P/D) [-]", ylabel="thrust, made/measured [-]")
@@ -67,7 +67,7 @@ def draw(sets: Mapping[str, tuple[FitPoints, Mapping[str, Array]]], path: Path) 
         for axis in (left, right):
             if axis.get_legend_handles_labels()[0]:
                 axis.legend(frameon=False, fontsize=8, loc="lower right" if axis is left else "best")
-    figure.supxlabel("Legend: points within 13 % at rest. Shade: 68 % of the points; grey: within 10 %.", fontsize=8)
+    figure.supxlabel("Legend: static points within 13 %. Shade: 68 % of the points; grey: within 10 %.", fontsize=8)
     page = io.BytesIO()
     figure.savefig(page, format="png", dpi=110)
     write_atomic(path, page.getvalue())

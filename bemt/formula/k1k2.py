@@ -170,7 +170,7 @@ def validity_flags(d_over_p: float, M_tip: float = 0.0, J: float = 0.0, ducted: 
     >>> validity_flags(1.6, 0.63)
     ()
     >>> validity_flags(1.75, 1.09)
-    ('tip Mach 1.09 is supersonic: K1/K2 knows no Mach number',)
+    ('tip Mach 1.09 is supersonic: K1/K2 has no Mach number effects',)
     """
     out = []
     low, high = D_OVER_P_USABLE
@@ -181,9 +181,9 @@ def validity_flags(d_over_p: float, M_tip: float = 0.0, J: float = 0.0, ducted: 
     elif not best_low - tol <= d_over_p <= best_high + tol:
         out.append(f"D/p {d_over_p:.2f} outside the best range {best_low:g}-{best_high:g}")
     if M_tip >= 1.0:
-        out.append(f"tip Mach {M_tip:.2f} is supersonic: K1/K2 knows no Mach number")
+        out.append(f"tip Mach {M_tip:.2f} is supersonic: K1/K2 has no Mach number effects")
     elif M_tip > M_TIP_LIMIT:
-        out.append(f"tip Mach {M_tip:.2f} above {M_TIP_LIMIT:g}: K1/K2 knows no Mach number")
+        out.append(f"tip Mach {M_tip:.2f} above {M_TIP_LIMIT:g}: K1/K2 has no Mach number effects")
     if ducted:
         out.append("ducted: K1/K2 is a fit to open propellers (no duct, cascade or stator)")
     x = J * d_over_p
@@ -211,7 +211,7 @@ def estimate(
     >>> from bemt.base.units import KGF
     >>> e = estimate(14 * 0.0254, 8 * 0.0254, 20000.0)
     >>> (e.thrust_N / KGF).round(3), e.flags[0]
-    (array([22.025]), ('tip Mach 1.09 is supersonic: K1/K2 knows no Mach number',))
+    (array([22.025]), ('tip Mach 1.09 is supersonic: K1/K2 has no Mach number effects',))
     """
     air = Air.from_density() if air is None else air
     names = (diameter_m, pitch_m, rpm, V, air.rho, air.a_sound, hub_diameter_m)

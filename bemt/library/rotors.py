@@ -68,7 +68,7 @@ class Propeller:
         size = {"diameter": f"{self.diameter_m:.4g} m", "blades": f"{self.blades}"}
         point = f"{self.case.rpm:g} rev/min, {self.case.airspeed_m_s:g} m/s"
         unknowns = {f"unknown {key}": text for key, text in self.unknowns.items()}
-        return table_html(head, {**size, "solved at, unless told": point, **unknowns})
+        return table_html(head, {**size, "default operating point": point, **unknowns})
 
     @property
     def name(self) -> str:
@@ -478,7 +478,7 @@ def propeller(
         got = "neither" if label is None else "both"
         faults.append(Fault("", "label, stations", got, "one of them", 'As in propeller("10x5")'))
     if stations is not None and diameter_m is None:
-        faults.append(Fault("", "diameter_m", "nothing", "the diameter [m] beside stations"))
+        faults.append(Fault("", "diameter_m", "nothing", "the diameter [m], with stations"))
     name: object = label
     if name is not None and not isinstance(name, str):
         faults.append(Fault("", "label", repr(label), "a text: diameter x pitch in inches", 'As in propeller("10x5")'))
@@ -493,7 +493,7 @@ def propeller(
         hint = "Is that in mm? Divide by 1000" if 10.0 < diameter_m <= 1e4 else ""
         faults.append(Fault("", "diameter_m", f"{diameter_m:g}", "0.01 to 10 m", hint))
     if label is not None and diameter_m is not None:
-        faults.append(Fault("", "diameter_m", f"{diameter_m:g}", "nothing beside a label, which states it"))
+        faults.append(Fault("", "diameter_m", f"{diameter_m:g}", "nothing, because the label states it"))
     if faults:
         raise InputError(faults)
     if label is not None:

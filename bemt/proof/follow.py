@@ -102,7 +102,7 @@ def text(document: Mapping[str, Any]) -> str:
         some = [r["after"] for r in found if r["set"] == kind]
         rows.append([kind, str(len(some)), *(str(some.count(w)) for w in words)])
     right = sum(r["after"] in ("found", "class") for r in found)
-    head = f"{len(found)} silent answers followed by the step they recommend: {right} right or in a class"
+    head = f"{len(found)} open answers followed by the step they recommend: {right} right or in a class"
     each = [[r["set"], r["rig"], r["before"], r["step"], f"{r['after']}: {', '.join(r['said'].get('effects', ()))}"]
             for r in found]  # fmt: skip
     return "\n\n".join([

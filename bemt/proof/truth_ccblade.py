@@ -67,7 +67,7 @@ def solve(
     except ImportError as error:
         raise InputError(Fault("", "wisdem", "not installed", "CCBlade", "pip install 'bemt[wisdem]'")) from error
     if "duct" in extra or np.any(extra.get("axial", 0.0)) or np.any(np.asarray(extra.get("induction", 1.0)) != 1.0):
-        raise ValueError("CCBlade knows uniform axial flow only")
+        raise ValueError("CCBlade models uniform axial flow only")
     P, N, R = rpm.size, rotor.x.size, rotor.radius
     rho, mu, sound = truth.air(temperature_C, pressure_Pa)
     omega = rpm * (2.0 * np.pi / 60.0)

@@ -131,7 +131,7 @@ class Builder:
         if comma and decimal == ".":
             where = f"{self.line(comma[0])}:{index + 1}"
             got = f"{cells[comma[0]]!r} ({len(comma)} such cells of {label!r})"
-            hint = 'State decimal = "," in a recording.toml beside the file, or export with decimal points'
+            hint = 'State decimal = "," in a recording.toml in the same folder, or export with decimal points'
             if all(_THOUSANDS.fullmatch(cells[i]) for i in comma):
                 hint = f"A comma between thousands? Export without. If not: {hint[0].lower()}{hint[1:]}"
             self.faults.append(Fault(self.table.source.name, where, got, "a number with a decimal point", hint))

@@ -81,7 +81,7 @@ def read(path: str | os.PathLike[str]) -> Dataset:
         imported = convert(*large)
     beside = Path(path).with_name("recording.toml")
     if beside.is_file() and Path(path).name in beside.read_text(encoding="utf-8", errors="replace"):
-        more = f"{beside.name} beside it names this file: import {beside.name} for what it says"
+        more = f"{beside.name} in the same folder names this file: import {beside.name} to use it"
         imported = replace(imported, notes=(*imported.notes, more))
     return imported
 
@@ -154,4 +154,4 @@ def _several(build: Builder) -> None:
     """Say that a table holds several propellers or motors."""
     for name, kinds in setups(build.texts).items():
         shown = ", ".join(kinds[:4]) + (", ..." if len(kinds) > 4 else "")
-        build.warnings.append(f"{len(kinds)} set-ups in one file, told apart by {name!r}: {shown}")
+        build.warnings.append(f"{len(kinds)} set-ups in one file, distinguished by {name!r}: {shown}")

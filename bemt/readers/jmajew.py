@@ -74,7 +74,7 @@ def read(path: str | os.PathLike[str]) -> Dataset:
             (_check_raw if raw else _check_table)(build)
         build.flag(np.flatnonzero(build.channels["rpm"].values == 0.0), "rpm is 0")
         if said.get("propeller") == "none":
-            build.warnings.append("recorded without a propeller: a tare of the stand, no performance data")
+            build.warnings.append("recorded without a propeller: a tare of the stand, not performance data")
         build.check_magnitudes()
     return build.finish(said)
 
@@ -163,7 +163,7 @@ def _check_raw(build: Builder) -> None:
                 text = f"rpm is ESCT RPM x {usual:.5g} in all rows: ESC telemetry"
                 near = abs(pairs - round(pairs)) < 0.01
                 whole = f" of electrical speed over {round(pairs)} pole pairs" if near else ""
-                build.warnings.append(text + whole + ", not a sensor of its own")
+                build.warnings.append(text + whole + ", not a separate sensor")
     build.warnings.append("no time in a raw record: rows are in order of sampling")
     for name in ("thrust_N", "torque_Nm", "rpm"):
         build.flag(np.flatnonzero(spikes(c[name])), f"spike of {name}")

@@ -108,7 +108,10 @@ def read(path: str | os.PathLike[str]) -> Dataset:
     if header is None:
         raise InputError(Fault(source.name, "", "no header", "a header such as # Time total_x total_y total_z"))
     if "bins" in about or re.search(r"\[\d+\]\(|_\d+_[xyz]\b", header):
-        got, hint = "forces in bins along a direction", "Their sum is in the forces or force and moment file beside it"
+        got, hint = (
+            "forces in bins along a direction",
+            "Their sum is in the forces (or force and moment) file in the same folder",
+        )
         raise InputError(Fault(source.name, "", got, "forces of the whole", hint))
     notes = [f"header repeated {repeated} times: the run was restarted"] if repeated else []
     if header.split()[0] == "patch":

@@ -143,7 +143,7 @@ def _read_v13(source: SourceText, faults: list[Fault]) -> list[PolarRow]:
                 found += 1
                 inside = True
                 if tables > 1 and not stated:
-                    hint = "Tables told apart by an id are not read"
+                    hint = "Tables distinguished by an id are not supported"
                     faults.append(Fault(source.name, str(i), "a table without Re", "Reynolds number in millions", hint))
             if len(cells) > 5:
                 got = f"{len(cells)} columns"

@@ -92,7 +92,7 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
                 )
             )
     if math.isfinite(R) and R > 1.5 * r[-1]:
-        beside = f"R = {R:g} m beside a last radius of {r[-1]:g} m"
+        beside = f"R = {R:g} m with a last radius of {r[-1]:g} m"
         faults.append(Fault(source.name, str(rows[1][0]), beside, "a tip near it", "R takes no Rfac: metres"))
     if blades != whole(blades):
         faults.append(Fault(source.name, str(rows[1][0]), f"{blades:g} blades", "a whole number"))

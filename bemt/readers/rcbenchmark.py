@@ -150,7 +150,7 @@ def _speeds(build: Builder) -> None:
         v = _at(build, name)
         assert v is not None
         if not np.any(v[np.isfinite(v)] != 0.0):
-            build.warnings.append(f"{name} is 0 in every row: that sensor saw nothing; it is no measurement")
+            build.warnings.append(f"{name} is 0 in every row: the sensor measured nothing; ignored")
             continue
         seen += 1
         zero = v == 0.0

@@ -130,7 +130,7 @@ def _unit_factor(quantity: str, written: str) -> tuple[float, tuple[str, str, st
     if key in known:
         factor = units.UNITS[key].factor
         return (factor / units.RPM if quantity == "rpm" else factor), None
-    hint = f"A mass is no force: write {_MASS[key]}" if dimension == "force" and key in _MASS else _near(key, known)
+    hint = f"A mass is not a force: write {_MASS[key]}" if dimension == "force" and key in _MASS else _near(key, known)
     return math.nan, (f"unit {written!r}", f"one of {', '.join(known)}", hint)
 
 

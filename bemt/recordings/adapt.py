@@ -35,7 +35,7 @@ _MARKS: tuple[tuple[bytes, str, str], ...] = (
     (b"$MeshFormat", "a mesh", _EXPORT),
     (b"<?xml", "XML", "Export as CSV"),
     (b"# vtk", "a VTK file", _EXPORT),
-    (b"version https://git-lfs", "a pointer of Git LFS in place of the file", "Fetch it: git lfs pull"),
+    (b"version https://git-lfs", "a Git LFS pointer instead of the file", "Fetch it: git lfs pull"),
     (b"{", "JSON, or a program's settings", "Save the numbers as CSV with a line of headings"),
     (b"<!DOCTYPE", "a web page", "Download the file that it shows, or save its table as CSV"),
     (b"<html", "a web page", "Download the file that it shows, or save its table as CSV"),
@@ -75,12 +75,12 @@ def recognised(path: str | os.PathLike[str]) -> tuple[str, str] | None:
             return (got, hint)
     if polar_c81.resembles(head.decode("latin-1")):
         hint = "Fields are 7 characters wide, nine values after the first; or write alpha_deg, cl, cd, mach as CSV"
-        return ("a C81 table whose columns have another width", hint)
+        return ("a C81 table with a different column width", hint)
     lines = [line for line in head.decode("latin-1").splitlines() if line.strip()]
     if len(lines) == 1 and len(re.split(r"[,;\t]", lines[0])) > 1:
         return ("one line and no rows", "Did the logger write any?")
     if len(lines) > 2 and not any(re.search(r"[\s,;|]", line.strip()) for line in lines):
-        return ("a single column", "One column says nothing alone: export time, speed or setting beside it")
+        return ("a single column", "One column alone is not enough: also export time, speed or setting")
     words = head.decode("latin-1").split()
     numbers = sum(word.strip("(),;").lstrip("+-").replace(".", "", 1)[:1].isdigit() for word in words)
     if len(words) > 20 and numbers < 0.2 * len(words):

@@ -47,7 +47,7 @@ def _get(url: str, part: Path, progress: Progress | None) -> None:
         go_on = answer.status_code == 206 and said.get("Content-Range", "").startswith(f"bytes {have}-")
         if answer.status_code == 206 and not go_on:
             part.unlink(missing_ok=True)
-            raise InputError(Fault(url, "", "another part than the one asked for", "the rest of the file", "Try again"))
+            raise InputError(Fault(url, "", "a different part than requested", "the rest of the file", "Try again"))
         have = have if go_on else 0
         length = said.get("Content-Length", "")
         total = have + int(length) if length.isdigit() else 0
@@ -96,7 +96,10 @@ def download(url: str, target: Path, known_sha256: str | None = None, progress: 
     except (requests.RequestException, OSError) as error:
         if isinstance(error, OSError) and not isinstance(error, requests.RequestException) and error.errno is not None:
             raise InputError(Fault(os.fspath(target), "", str(error), "room and permission to write")) from error
-        got, hint = str(error).split("(Caused")[0].strip()[:200], "Fetch it by hand and give it with --from FILE.zip"
+        got, hint = (
+            str(error).split("(Caused")[0].strip()[:200],
+            "Download it manually and give it with --from FILE.zip",
+        )
         raise InputError(Fault(url, "", got or type(error).__name__, "an archive to fetch", hint)) from error
     except ValueError as error:  # pooch: the hash differs
         hint = "The archive has changed since its first use: delete the folder of the data to accept the new one"

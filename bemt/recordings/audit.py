@@ -99,7 +99,7 @@ def _domain(f: CfdFacts) -> Judged:
     a = 1.0 / f.domain_over_D**2
     words = f"domain {f.domain_over_D:.3g} disk diameters wide, blockage {a:.2g}"
     if f.domain_over_D < 1.5:
-        says = "a rotor in a pipe, no free propeller: no entrainment, no far field"
+        says = "a rotor in a pipe, not a free propeller: no entrainment, no far field"
         return "fault", words, f"{says}; the one-dimensional correction does not hold", math.nan
     status = "fine" if f.domain_over_D >= DOMAIN_WIDE else "doubtful"
     J0 = ZERO_THRUST_MEASURED * f.pitch_over_D
@@ -128,7 +128,7 @@ def _compressibility(f: CfdFacts) -> Judged:
         return "fine", words, f"thrust at most {bias:.1%} low (own runs, M^2)", bias
     told = f.compressible is False
     if M > M_TIP_KNOWN:
-        shocks = "shocks and wave drag are left out: " if told else ""
+        shocks = "shocks and wave drag are missing: " if told else ""
         return "fault" if told else "not stated", words, f"{shocks}beyond the measured rule", math.nan
     if f.ducted:
         return "fault" if told else "not stated", words, "no rule measured for ducted rotors", math.nan
@@ -157,7 +157,7 @@ def _drift(f: CfdFacts) -> Judged:
     size = abs(f.drift)
     status = "fine" if size <= 0.005 else "doubtful" if size <= 0.02 else "fault"
     words = f"thrust drifts by {round(f.drift, 4) + 0.0:+.2%} over the averaged part"
-    return status, words, "taken whole as its standard uncertainty", size
+    return status, words, "taken in full as the standard uncertainty", size
 
 
 def _wall(f: CfdFacts) -> Judged:
@@ -206,7 +206,7 @@ def _thrust(f: CfdFacts) -> Judged:
         "node": (
             "fault",
             "one node behind the propeller",
-            "one point of a wake that is not uniform: no integral of anything",
+            "one point of a non-uniform wake, not an integral",
         ),
     }
     return *table.get(f.thrust_from, ("not stated", "not stated", "unknown")), math.nan
@@ -220,12 +220,12 @@ def _balance(f: CfdFacts) -> Judged:
     )
     open_ones = [name for name, size in known.items() if size > BALANCE_LIMIT]
     if open_ones:
-        consequence = f"{' and '.join(open_ones)} made or lost in the domain: the loads are those of another flow"
+        consequence = f"{' and '.join(open_ones)} created or lost in the domain: the loads belong to a different flow"
         return "fault", words, consequence, math.nan
     if len(known) < len(parts):
-        return "not stated", words, "a leak is not excluded: one of 11 % went unseen here", math.nan
+        return "not stated", words, "a leak is not excluded: a leak of 11 % went unnoticed here", math.nan
     u = max(known.values())
-    return "fine", words, "the larger taken whole as a standard uncertainty", u
+    return "fine", words, "the larger one taken in full as the standard uncertainty", u
 
 
 def _frame(f: CfdFacts) -> Judged:
@@ -236,7 +236,7 @@ def _frame(f: CfdFacts) -> Judged:
     words = f"rotating frame, inflow {f.skew_deg:.3g} deg off the shaft"
     if abs(f.skew_deg) <= SKEW_LIMIT:
         return "fine", words, "none: steady in that frame", 0.0
-    return "fault", words, "blades stand still at one azimuth: the once-per-turn loads are left out", math.nan
+    return "fault", words, "blades are frozen at one azimuth: once-per-revolution loads are missing", math.nan
 
 
 JUDGES: Mapping[str, Callable[[CfdFacts], Judged]] = {

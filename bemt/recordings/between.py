@@ -114,4 +114,4 @@ def _evidence(odd: _Odd) -> str:
 def _fix(odd: _Odd, likely: Sequence[Slip], also: Sequence[str] = ()) -> str:
     others = [*(s.words for s in likely[1:]), *also]
     fix = likely[0].words + (". Fits as well: " + "; ".join(others) if others else "")
-    return fix + (f". Or {odd.rest[0].name} is the one in another unit" if len(odd.rest) == 1 else "")
+    return fix + (f". Or {odd.rest[0].name} is the one in a different unit" if len(odd.rest) == 1 else "")

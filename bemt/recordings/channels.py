@@ -208,7 +208,7 @@ def _power(values: dict[str, Array], names: dict[str, str], notes: list[str], ba
                 notes.append(f"P_W is {name}: it goes with the product of its factors{times}")
                 break
         else:
-            notes.append("P_W: shaft or electrical power? Left out; name it power_W or electrical_power_W")
+            notes.append("P_W: shaft or electrical power? Ignored; name it power_W or electrical_power_W")
     if {"voltage_V", "current_A"} <= values.keys() and "electrical_power_W" not in values:
         values["electrical_power_W"] = values["voltage_V"] * values["current_A"]
         names["electrical_power_W"] = "voltage_V x current_A"

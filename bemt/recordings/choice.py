@@ -98,7 +98,7 @@ def chosen(record: Dataset, choice: Choice) -> Dataset:
             values[name] = values[name] * factor
             if (old := means.get(name)) is not None:
                 means[name] = Mean(old.value * factor, f"{old.over}, times {factor}", old.drift)
-        text = f"sign {choice.sign:+d}, {choice.sector} sectors, as told: {len(loads)} channels times {factor}"
+        text = f"sign {choice.sign:+d}, {choice.sector} sectors, as given: {len(loads)} channels times {factor}"
         notes.append(text + ("; holds only for axisymmetric flow" if choice.sector > 1 else ""))
     about = {**record.provenance, **({"means": means} if means else {})}
     return replace(record, values=values, units=own, provenance=about, notes=tuple(notes))
@@ -126,7 +126,7 @@ def _add_zones(
         hint = f"Zones: {', '.join(known)}" if known else "This file does not tell zones apart"
         raise InputError(Fault(file, "--zones", ", ".join(absent), "zones of the file", hint))
     if "Net" in zones and len(zones) > 1:
-        raise InputError(Fault(file, "--zones", "Net beside other zones", "Net alone, or zones", "Net holds them all"))
+        raise InputError(Fault(file, "--zones", "Net with other zones", "Net alone, or zones", "Net holds them all"))
     for base, group in groups.items():
         parts = [group[zone] for zone in zones if zone in group]
         if len(parts) != len(zones) or len(zones) < 2:
@@ -162,13 +162,13 @@ def asked(
     if revolutions is not None and not 1 <= revolutions <= 10**6:
         faults.append(Fault("", "--revolutions", str(revolutions), "a whole number of 1 or more"))
     if revolutions is not None and rpm is None and period is None:
-        faults.append(Fault("", "--revolutions", "no speed", "--rpm or --period beside it"))
+        faults.append(Fault("", "--revolutions", "no speed", "--rpm or --period as well"))
     if sign not in (1, -1):
         faults.append(Fault("", "--sign", str(sign), "+1 or -1"))
     if not 1 <= sector <= 100:
         faults.append(Fault("", "--sector", str(sector), "the number of equal sectors, 1 to 100"))
     if loads and sign == sector == 1:
-        faults.append(Fault("", "--load", ", ".join(loads), "--sign -1 or --sector N beside it, which it belongs to"))
+        faults.append(Fault("", "--load", ", ".join(loads), "--sign -1 or --sector N as well, which it belongs to"))
     if faults:
         raise InputError(faults)
     return Choice(60.0 / rpm if rpm is not None else period, revolutions, sign, sector, tuple(zones), tuple(loads))

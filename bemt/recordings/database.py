@@ -76,7 +76,7 @@ def get(
     from bemt.readers.uiuc import scan_folder
 
     if source is not None and url is not None:
-        raise InputError(Fault("", "--url", url, "none beside --from, which fetches nothing", "Give one of the two"))
+        raise InputError(Fault("", "--url", url, "none with --from, which downloads nothing", "Give one of the two"))
     known = _record(folder)
     if known is None and folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         hint = "Name an empty or new folder with --dir"
@@ -126,7 +126,7 @@ def text(doc: dict[str, Any]) -> str:
     said = {
         "first use": "first use: the publisher gives no hash, so this one is trusted and recorded",
         "as recorded": "as recorded at its first use",
-        "replaced": "another archive than before, as asked by --from",
+        "replaced": "a different archive than before, as given by --from",
     }
     lines = [
         f"{doc['kind']}: {doc['propellers']} propellers, {doc['files']} files in {doc['folder']}",

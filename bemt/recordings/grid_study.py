@@ -154,17 +154,17 @@ def _three(e21: float, e32: float, r: tuple[float, ...], formal_order: float) ->
     """Order of three grids with its flags, and whether the index must not be trusted."""
     if e21 == 0.0 or e32 == 0.0:
         which = "the two finest grids agree exactly" if e21 == 0.0 else "the two coarser grids agree exactly"
-        return None, [f"{which}: no order can be told"], True
+        return None, [f"{which}: no order can be determined"], True
     if not math.isfinite(e32 / e21) or e32 / e21 == 0.0:
-        return None, ["differences of unlike size: no order can be told"], True
+        return None, ["differences of unlike size: no order can be determined"], True
     if e32 / e21 < 0.0:
-        return None, ["oscillatory: the values do not fall into line; no order can be told"], True
+        return None, ["oscillatory: the values do not converge monotonically; no order can be determined"], True
     # equal orders on both sides of the threshold: |e32/e21| = (r32^p - 1) r21^p / (r21^p - 1) falls to ln r32/ln r21
     if abs(e32 / e21) <= math.log(r[1]) / math.log(r[0]):
-        return None, ["divergent: the change grows with refinement; no order can be told"], True
+        return None, ["divergent: the change grows with refinement; no order can be determined"], True
     p = _order(e21, e32, *r)
     if p is None:
-        return None, ["an order above 60: no order can be told"], True
+        return None, ["an order above 60: no order can be determined"], True
     low, high = ORDERS[0], ORDERS[1] * formal_order
     if not low <= p <= high:
         return p, [f"implausible order {p:.3g}: expected {low:g} to {high:g} (formal order {formal_order:g})"], True

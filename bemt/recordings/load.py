@@ -78,7 +78,7 @@ def import_file(path: str | os.PathLike[str], format: str | None = None, choice:
     if choice.period is not None:
         record = averaged(record, choice.period, choice.revolutions)
     elif record.provenance.get("clock") == "time":
-        note = "mean over all rows, start-up included: give --rpm or --period for whole revolutions"
+        note = "mean over all rows, including start-up; give --rpm or --period for whole revolutions"
         record = replace(record, notes=(*record.notes, note))
     record = chosen(record, choice)
     return replace(record, notes=(*record.notes, *_unsettled(record)))
@@ -114,7 +114,7 @@ def _restart_notes(paths: Sequence[str], records: Mapping[str, Dataset]) -> dict
         if record is None or record.provenance.get("clock") not in ("time", "iteration"):
             continue
         for other in _earlier(Path(path), paths, records):
-            text = f"beside {other}: not joined"
+            text = f"next to {other}: not joined"
             if other in records:
                 how = relation(_clock(records[other]), _clock(record))
                 text = f"restart of {other} ({how}): not joined"
@@ -249,7 +249,7 @@ def _file_text(file: Mapping[str, Any]) -> str:
     lines += [f"  ! {text}" for text in file["warnings"]]
     for f in file["findings"]:
         lines.append(
-            f"  ! {f['severity']}: {f['id']} in {f['channel']}: {f['evidence']}. Would take: {f['correction']}"
+            f"  ! {f['severity']}: {f['id']} in {f['channel']}: {f['evidence']}. Suggestion: {f['correction']}"
         )
     return "\n".join(lines)
 
@@ -284,7 +284,7 @@ def as_dataset(record: Dataset) -> Dataset:
     means: Mapping[str, Mean] = record.provenance.get("means", {})
     whole = [k for k in fit if k in means] if record.provenance.get("clock") in ("time", "iteration") else []
     left = [name for name in record.values if name not in (whole or fit)]
-    notes += [f"left out, no quantity in a known unit: {', '.join(left)}"] if left else []
+    notes += [f"ignored, no known unit: {', '.join(left)}"] if left else []
     if not fit:
         got = f"channels {', '.join(list(record.values)[:8])}"
         raise InputError(Fault(file, "", got, "a quantity in a known unit", "Name units, as in thrust_N"))

@@ -95,7 +95,7 @@ def points_text(found: Mapping[str, Any], indent: str = "  ") -> list[str]:
                 row.append(tables.number_text(_number(p["u"].get(name)), 2))
         rows.append([*row, ", ".join(p["flags"]) or "-"])
     many = "" if len(points) <= MOST else f", the first {MOST} of them"
-    what = "each row one" if found["mode"] == "points" else "means of plateaus"
+    what = "one per row" if found["mode"] == "points" else "means of plateaus"
     out = [f"{indent}{len(points)} steady point{'s' if len(points) > 1 else ''}, {what}{many}:"]
     out.append(tables.text_table([*head, "flags"], rows, (len(head),), indent + "  "))
     reasons: dict[tuple[str, str], list[tuple[int, int]]] = {}

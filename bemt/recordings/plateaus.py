@@ -165,7 +165,7 @@ def find(
     n = len(t)
     notes: list[str] = []
     if back := _backwards(t):
-        notes.append(f"rows left out because their time falls: {', '.join(map(str, back))}")
+        notes.append(f"rows dropped because their time decreases: {', '.join(map(str, back))}")
         t = np.maximum.accumulate(t)
         data = {name: np.where(np.isin(np.arange(n), back), np.nan, v) for name, v in data.items()}
     good = np.isfinite(data[signal])

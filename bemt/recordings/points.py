@@ -59,10 +59,10 @@ def _clean(rec: Dataset, rest: NDArray[np.bool_], found: Found) -> dict[str, Arr
     data = {name: v for name, v in rec.values.items() if name not in _SKIP}
     if "rpm" in data:
         failed = np.flatnonzero((data["rpm"] == 0.0) & ~rest)
-        found.lost += lost(rec, failed, "rpm", "reads 0 while the rotor turns: no reading")
+        found.lost += lost(rec, failed, "rpm", "reads 0 while the rotor turns: not a reading")
         slow = np.flatnonzero((np.abs(data["rpm"]) < SLOWEST) & (data["rpm"] != 0.0))
         for i in slow:
-            found.lost += lost(rec, [i], "rpm", f"{data['rpm'][i]:.3g} rev/min is no speed of a rotor")
+            found.lost += lost(rec, [i], "rpm", f"{data['rpm'][i]:.3g} rev/min is not a rotor speed")
         data["rpm"] = _without(data["rpm"], [*failed, *slow])
     return data
 
@@ -87,7 +87,7 @@ def _rest(rows: Rows, data: Mapping[str, Array], when: float) -> Rest:
 
 
 def _note_rest(found: Found, rec: Dataset, rows: Rows) -> None:
-    found.lost += lost(rec, rows, "", "at rest: a zero of the stand, no point")
+    found.lost += lost(rec, rows, "", "motor stopped: zero of the stand, not a point")
 
 
 def from_samples(rec: Dataset, name: str) -> Found:
@@ -129,7 +129,7 @@ def from_samples(rec: Dataset, name: str) -> Found:
                 still, moving = own_rows[rest[own_rows]], own_rows[~rest[own_rows]]
                 found.rests.setdefault(run, []).append(_rest(still, data, middle))
                 _note_rest(found, rec, still)
-                found.lost += lost(rec, moving, "", "coming to rest, or starting")
+                found.lost += lost(rec, moving, "", "stopping or starting")
                 continue
             for channel, outliers in p.outliers.items():
                 reason = f"outlier: more than {plateaus.OUTLIER:g} robust standard deviations from its neighbours"

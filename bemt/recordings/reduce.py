@@ -133,7 +133,7 @@ def _trusted(rec: Dataset) -> Dataset:
         v = values.get(name)
         if v is not None and np.any(np.isfinite(v)) and not np.any(np.nan_to_num(v)):
             del values[name]
-            notes.append(f"{file_name(rec, name)} is 0 in every row: no measurement, left out")
+            notes.append(f"{file_name(rec, name)} is 0 in every row: not measured, ignored")
     product, told = shaft_power(values), values.get("power_W")
     if product is not None and told is not None:
         size = np.abs(product)
@@ -241,9 +241,9 @@ def _subtract(
         if rows.size:
             take(from_rest(when[rows], rests, top), rows)
     if not found.rests:
-        notes.append("no rows at rest: the zero of the load cells is unknown and nothing was subtracted")
+        notes.append("no rows with the motor stopped: the zero of the load cells is unknown, nothing was subtracted")
     elif bare := sorted(set(runs.tolist()) - found.rests.keys()):
-        notes.append(f"runs without rest, nothing subtracted there: {', '.join(f'{r:g}' for r in bare)}")
+        notes.append(f"runs without a motor stop, nothing subtracted: {', '.join(f'{r:g}' for r in bare)}")
     return drift
 
 

@@ -65,7 +65,7 @@ def _unlike(rec: Dataset) -> bool:
 def is_samples(rec: Dataset) -> tuple[bool, str]:
     """Decide what the rows are."""
     if stated(rec):
-        return False, "rows are points: they have uncertainties of their own"
+        return False, "rows are points: they have their own uncertainties"
     if len(rec) < FEWEST:
         return False, f"rows are points: fewer than {FEWEST}"
     found = command_of(rec)

@@ -282,7 +282,7 @@ def find_slips(facts: Facts) -> Iterator[Finding]:
     certain = any(r.exact for r in broken)
     if not fits:
         channels = sorted({_told(q, facts) for r in broken for q in r.powers if q in _QUANTITY or q == "D"})
-        text = "no single slip of a unit repairs it: check " + ", ".join(channels)
+        text = "no single unit error explains it: check " + ", ".join(channels)
         yield Finding(
             "inconsistent", channels[0] if len(channels) == 1 else "+".join(channels), evidence, text, (), "warning"
         )

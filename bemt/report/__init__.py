@@ -69,7 +69,7 @@ def book_html(book: Mapping[str, Any]) -> str:
     about, only = book.get("about", {}), book["cases"]
     made = " · ".join(filter(None, (about.get("author"), about.get("date"), about.get("revision"))))
     lead = (
-        "Propellers and ducted fans: blade element momentum theory beside the K1/K2 formula, CFD, bench and vendor. "
+        "Propellers and ducted fans: blade element momentum theory, the K1/K2 formula, CFD, bench and vendor data. "
         "Nothing here is fitted to the value it is compared with."
     )
     foot = (

@@ -25,7 +25,7 @@ def audit_parts(audit: Mapping[str, Any]) -> list[Part]:
         rows.append([str(line["topic"]), Cell(status, badge=KIND.get(status, "unknown")), str(line["finding"]),
                      str(line["consequence"]), num(None if u is None else 100 * u, 2, none="unknown")])  # fmt: skip
     known = audit["u_relative_known"]
-    rest = f"the parts that are known make {_share(known)} together" if known else "no part of it is known"
+    rest = f"the known parts make {_share(known)} together" if known else "no part of it is known"
     words = f"{audit['reference']}: uncertainty of the thrust {_share(audit['u_relative'])}; {rest}."
     head = ["setting", "status", "what is known", "consequence for the thrust", "u %"]
     return [("words", words), ("table", table(head, rows))]

@@ -87,8 +87,8 @@ def _inputs(page: Mapping[str, Any]) -> Section:
     )
     files = [[f["name"], Cell(f["sha256"], code=True)] for f in page["files"]]
     told = (
-        "The source does not give the following. Each is declared as a range; the last columns show what the range "
-        "does to the thrust when it alone is changed."
+        "The source does not state the following values. Each is declared as a range; the last columns show the effect "
+        "on the thrust when only this value is changed."
     )
     lines: list[Sequence[object]] = []
     for a in result["assumptions"]:
@@ -140,8 +140,8 @@ def _performance(page: Mapping[str, Any]) -> Section:
         title = f"{title} at {own['airspeed_m_s']:g} m/s"
         plots.append(Plot(title, "rotational speed [rev/min]", label, traces, x_zero=True))
     words = (
-        "Bands: one standard uncertainty from the declared assumptions and of the model on real rotors; of efficiency "
-        "from the assumptions alone. Points: recorded values; a value without a bar states no uncertainty."
+        "Bands: one standard uncertainty from the declared assumptions and from the model on real rotors (efficiency: "
+        "assumptions only). Points: recorded values; a value without a bar states no uncertainty."
     )
     return "Performance", [("words", words), ("figures", [figure(p) for p in plots])]
 
@@ -222,7 +222,7 @@ def _validation(result: Mapping[str, Any]) -> Section:
                      Cell(word, badge=kind)])  # fmt: skip
     words = (
         "After ASME V&V 20: E = S − D, u_val² = u_num² + u_input² + u_model² + u_D². The two agree where |E| ≤ u_val. "
-        "Where nobody states u_D, the last column gives the least u_D with which they would, as a share of D."
+        "If u_D is not stated, the last column gives the smallest u_D for which they would agree, as a share of D."
     )
     head = ["model", "against", "quantity", "S", "D", "E %", *us, "agreement"]
     return "Validation", [("words", words), ("table", table(head, rows))]
@@ -290,7 +290,7 @@ def case_sections(page: Mapping[str, Any], reproduction: Sequence[Mapping[str, A
     return sections(
         _validation(result), _geometry(page), _performance(page), _radial(page), _fan(result),
         ("Audit of the CFD", audits), _verification(page),
-        ("Diagnosis: what physics was left out", diagnosis_parts(told) if told else []),
+        ("Diagnosis: what the model leaves out", diagnosis_parts(told) if told else []),
         _inputs(page), _limits(page),
         ("Reproduction of the thesis", [("more", ("Its numbers for this case", [("table", items)]))] if items else []),
     )  # fmt: skip

@@ -15,7 +15,7 @@ __all__ = ["CFD_WORDS", "cfd_sections"]
 
 CFD_WORDS = (
     "OpenFOAM runs on the solids of the cases: rotating frame, wall functions, forces integrated over the blades. "
-    "Each run is audited like anybody else's."
+    "Each run is audited like any other CFD result."
 )
 
 VARIED = (("J", "J [-]"), ("wall_distance_m", "distance of the plate [m]"), ("tip_gap_mm", "tip gap [mm]"),

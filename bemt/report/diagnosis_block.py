@@ -71,7 +71,7 @@ def diagnosis_parts(item: Mapping[str, Any]) -> list[Part]:
     classes = [c for c in _list(d.get("classes")) if isinstance(c, list) and len(c) > 1]
     if classes:
         told = "; ".join(" = ".join(str(e) for e in c) for c in classes[:12])
-        out.append(("words", f"Not told apart by these data: {told}."))
+        out.append(("words", f"Not distinguished by these data: {told}."))
     step = _mapping(d.get("next_measurement"))
     if step.get("text"):
         out.append(("words", f"Next measurement: {step['text']}."))

@@ -14,8 +14,8 @@ from bemt.report.values import Section, sections
 __all__ = ["FIDELITY_WORDS", "fidelities", "fidelity_sections"]
 
 FIDELITY_WORDS = (
-    "The disk prescribes BEMT's load and shows what the wake does with it; resolved blades find their own. "
-    "BEMT's wake far behind is drawn without contraction. CPU seconds, other work beside them."
+    "The disk prescribes BEMT's load and shows what the wake does with it; resolved blades compute their own. "
+    "The far wake of BEMT is drawn without contraction. CPU seconds; other work ran at the same time."
 )
 
 
@@ -49,6 +49,6 @@ def fidelity_sections(found: Mapping[str, Any]) -> list[Section]:
                     Trace(name + places.get(at, ""), x, y, None, SERIES[i % len(SERIES)], DASHES[i % len(DASHES)])
                 )
         if len(traces) > 1:
-            title = f"Axial speed {behind} R behind the rotor, beside BEMT"
+            title = f"Axial speed {behind} R behind the rotor, compared with BEMT"
             plots.append(figure(Plot(title, "r/R [-]", "axial speed [m/s]", traces)))
     return sections(("Loads and cost", [("table", table(heads, rows))] if rows else []), ("Wake", [("figures", plots)]))

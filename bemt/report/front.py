@@ -25,15 +25,15 @@ SOURCES = {
 SHOWN = (0.4, 2.0)
 """Ratios that the chart holds; others stand at its edge with their value."""
 NOTE = (
-    "Bars: one standard uncertainty; of BEMT inputs, model and numerics, of K1/K2 what was found against the UIUC "
-    "database at rest, of own CFD its grid study. No bar: unknown. Reference: the first recorded CFD value, "
+    "Bars: one standard uncertainty (BEMT: inputs, model and numerics; K1/K2: scatter against static UIUC "
+    "data; own CFD: grid study). No bar: unknown. Reference: the first recorded CFD value, "
     "else bench, else vendor. A triangle at the edge points to a value beyond it."
 )
 NEEDS = (
     "“Needs u_D ≥ 8 %”: the recording states no uncertainty, and the two agree only if its own is at least that large. "
-    "“Inside the model's band”: they agree whatever it is."
+    "“Inside the model's band”: they agree for any uncertainty of the recording."
 )
-OF_TABLE = "Thrust at the operating point of each case; the first value of each source. Headings sort."
+OF_TABLE = "Thrust at the operating point of each case; first value of each source. Click a heading to sort."
 
 
 def answers(book: Mapping[str, Any], ids: Sequence[str]) -> list[dict[str, Any]]:

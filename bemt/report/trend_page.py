@@ -55,7 +55,7 @@ def _families(f: Mapping[str, Any], results: Sequence[Mapping[str, Any]]) -> Sec
     by_pitch = [Mark(D / high, wide, beyond="below"), Mark(D / low, narrow, beyond="above")]
     by_speed = [Mark(M_TIP_LIMIT / per_rpm, over), Mark(1.0 / per_rpm, sonic, beyond="above")]
     by_mach = [Mark(M_TIP_LIMIT, over), Mark(1.0, sonic, beyond="above")]
-    note = "The recorded propellers have pitches of their own. " if size.x else ""
+    note = "The recorded propellers have different pitches. " if size.x else ""
     T, label = "thrust [N]", f"{D:.3g}x{p:.3g} in"
     plots = [
         Plot(f"Thrust over diameter, pitch {p:.3g} in, {rpm:g} rev/min", "diameter [in]", T,
@@ -63,7 +63,7 @@ def _families(f: Mapping[str, Any], results: Sequence[Mapping[str, Any]]) -> Sec
              note + "Shaded: outside of section theory."),
         Plot(f"Thrust over pitch, {D:.3g} in, {rpm:g} rev/min", "pitch [in]", T,
              _pair(f["pitch"]["pitch_in"], f["pitch"]), by_pitch,
-             "BEMT sees the blades stall where the formula goes on. Shaded: outside of the formula's range."),
+             "BEMT predicts stall where the formula continues. Shaded: outside the range of the formula."),
         Plot(f"Thrust over rotational speed, {label}", "rotational speed [rev/min]", T,
              _pair(f["rpm"]["rpm"], f["rpm"]), by_speed),
         Plot(f"Thrust over tip Mach number, {label}", "tip Mach number [-]", T,
@@ -99,9 +99,9 @@ def _choice(rows: Sequence[Mapping[str, Any]]) -> Section:
               f"{n} drives over {m:g} kg", f"drives for {wanted:g} kgf"]  # fmt: skip
     fan = ROBOT["fan_mass_kg"]
     words = (
-        f"A ducted fan buys its small diameter with power: compare thrust per watt and disk loading. Masses are "
+        f"A ducted fan pays for its small diameter with power: compare thrust per watt and disk loading. Masses are "
         f"given for the DS-30 only ({fan:g} kg with motor: 27 N is {27 / (fan * 9.80665):.1f} times its weight); for "
-        f"the propellers none is, so the choice is made on the robot's weight."
+        f"the propellers they are not, so the choice is based on the weight of the robot."
     )
     return "Choice of a drive by thrust to weight", [
         ("words", words),
@@ -125,7 +125,7 @@ def _moments(d: Mapping[str, Any]) -> Section:
     at = [(arm, arm * T, None, f"{label}: {T:.4g} N at {arm:g} m = {arm * T:.3g} N m") for label, _, T, _ in d["lines"]]
     traces.append(points(f"at {arm:g} m", at, "other", "circle"))
     note = (
-        f"One drive of the pair pushes, the other rests. The thesis: 27 N at 0.2 m = 5.4 N m. Here {arm:g} m gives "
+        f"One drive of the pair pushes, the other is off. The thesis: 27 N at 0.2 m = 5.4 N m. Here {arm:g} m gives "
         + "; ".join(f"{label} {arm * T:.3g} N m" for label, _, T, _ in d["lines"])
         + "."
     )

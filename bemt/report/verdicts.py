@@ -114,9 +114,11 @@ def _open(lines: Sequence[Mapping[str, Any]]) -> list[str]:
     ]
     told = []
     if inside:
-        told.append(f"Inside BEMT's own band, whatever the recording's uncertainty: {', '.join(inside)}.")
+        told.append(f"Within BEMT's own band, whatever the uncertainty of the recording: {', '.join(inside)}.")
     if wanted:
-        told.append(f"Agreement needs a recording at least this uncertain, which nobody states: {', '.join(wanted)}.")
+        told.append(
+            f"Agrees only if the recording (no uncertainty stated) is at least this uncertain: {', '.join(wanted)}."
+        )
     return told
 
 

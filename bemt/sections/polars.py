@@ -163,7 +163,7 @@ class Polar:
         cl, cd, sure = self._interpolate((self.cl, self.cd, everywhere), *axes)
         notes = self.notes
         if self.Re.size == 1:
-            notes += (f"one Reynolds number ({self.Re[0]:.3g}) stands for all",)
+            notes += (f"one Reynolds number ({self.Re[0]:.3g}) is used for all",)
         elif re[0] < self.Re[0] * 0.999 or re[-1] > self.Re[-1] * 1.001:
             notes += (f"held constant outside Re {self.Re[0]:.3g} to {self.Re[-1]:.3g}",)
         kept = None if self.confidence is None else sure[:, :, 0]

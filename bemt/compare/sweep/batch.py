@@ -86,7 +86,7 @@ def run_case(
         folder = None if out is None else out / case.name
         if folder is not None:
             if folder.resolve() == case.folder.resolve():
-                got, hint = f"the folder of the case {case.name} itself", "Results would stand among its files"
+                got, hint = f"the folder of the case {case.name} itself", "Results would be mixed with its files"
                 raise InputError(Fault("--out", "", got, "another folder", hint))
             remove_stale(folder)
             kept = store.reuse(folder, mark, form) if resume else None

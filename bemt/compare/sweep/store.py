@@ -92,7 +92,7 @@ def locked(folder: Path) -> Iterator[None]:
     try:
         lock.acquire()
     except Timeout:
-        got, hint = "a folder in which another sweep is at work", "Wait for the other one, or give another --out"
+        got, hint = "a folder in use by another sweep", "Wait for the other one, or give another --out"
         raise InputError(Fault(str(folder), "", got, "one for this sweep", hint)) from None
     try:
         yield

@@ -31,7 +31,7 @@ LARGE_IN = 8.9
 _STEPS_LEFT_OUT = 15
 _WORDS = {
     "as_drawn": "solver on the stations as given", "declared": "as built",
-    "general_section": "as built, calibrated sections taken for unknown",
+    "general_section": "as built, calibrated sections treated as unknown",
     "as_drawn_large": "solver, 9 in and more", "declared_large": "as built, 9 in and more",
     "on_static": "conditioned on the rotor's static run",
     "on_static_and_one": "on its static run and one forward point", "on_forward": "conditioned on its forward runs",
@@ -126,7 +126,7 @@ def log_score(total: dict[str, Any]) -> float:
 def table(document: dict[str, Any]) -> str:
     """Document of `leave_out` for people."""
     head = (
-        f"{'each family left out of the population':60} {'median':>7} {'p90':>6} {'68 %':>6} {'95 %':>6} {'width':>6}"
+        f"{'each family held out of the population':60} {'median':>7} {'p90':>6} {'68 %':>6} {'95 %':>6} {'width':>6}"
     )
     lines = [head]
     named = [(document[key], text) for key, text in _WORDS.items()]
@@ -151,8 +151,8 @@ def table(document: dict[str, Any]) -> str:
         "",
         f"Percent of the measured value; {len(document['families'])} families; static {n['static']['points']} points of"
         f" {n['static']['propellers']} propellers, forward {n['forward']['points']} of {n['forward']['propellers']}.",
-        f"Mean log score of families left out and of each volume: {', '.join(f'{s:.3f}' for s in scores)}.",
-        "68 %, 95 %: share of the points inside those intervals; width: half of the 68 % interval, median.",
+        f"Mean log score of held-out families and of each volume: {', '.join(f'{s:.3f}' for s in scores)}.",
+        "68 %, 95 %: share of the points inside those intervals; width: median half width of the 68 % interval.",
     ]
     return "\n".join(lines)
 

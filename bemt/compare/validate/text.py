@@ -19,16 +19,16 @@ def _totals(name: str, doc: dict[str, Any]) -> str:
 
 
 def _coverage_lines(doc: dict[str, Any]) -> list[str]:
-    """What the intervals hold, and how wide they are."""
-    out = ["Rotors as built: expectation and intervals of the population (bemt.asbuilt), stations and labels weighed."]
+    """Coverage and width of the intervals."""
+    out = ["Rotors as built: expectation and intervals of the population (bemt.asbuilt), stations and labels combined."]
     for kind in ("static", "forward"):
         for q in ("CT", "CP"):
             s = doc[kind][q]
             held = s["coverage"]
             if held["68"] is not None:
                 out.append(
-                    f"  {kind} {q}: 68 % interval holds {100 * held['68']:.0f} %, 95 % one {100 * held['95']:.0f} %;"
-                    f" half width {100 * s['width68']:.1f} % in the median"
+                    f"  {kind} {q}: 68 % interval contains {100 * held['68']:.0f} %, 95 % one {100 * held['95']:.0f} %;"
+                    f" median half width {100 * s['width68']:.1f} %"
                 )
     return out
 
@@ -51,7 +51,7 @@ def text(doc: dict[str, Any]) -> str:
     lines.append(_totals("all points", doc))
     drawn = doc.get("as_drawn")
     if drawn:
-        lines.append(_totals("stations as they are", drawn))
+        lines.append(_totals("stations as given", drawn))
     turned = doc.get("matched_J0")
     if turned and turned["propellers"]:
         lines.append(_totals(f"turned to measured J0, {turned['propellers']}", turned))
@@ -69,8 +69,8 @@ def text(doc: dict[str, Any]) -> str:
     if turned and turned["propellers"]:
         low, mid, high = turned["shift_deg_p10_p50_p90"]
         lines.append(
-            f"Turned: blades of {turned['propellers']} propellers by {mid:+.1f} deg in the median ({low:+.1f} to "
-            f"{high:+.1f}, 80 %), to the measured zero-thrust J; an experiment that uses the measurement."
+            f"Turned: blades of {turned['propellers']} propellers by {mid:+.1f} deg (median; {low:+.1f} to "
+            f"{high:+.1f} for 80 %) to the measured zero-thrust J; an experiment that uses the measurement."
         )
     p = doc["polar"]
     lines.append(
@@ -79,7 +79,7 @@ def text(doc: dict[str, Any]) -> str:
     )
     lines.append("Effects on: " + ", ".join(e["id"] for e in doc["effects"]) + ".")
     if doc["unconverged"]:
-        lines.append(f"NOT CONVERGED: {doc['unconverged']} points (counted as infinitely wrong).")
+        lines.append(f"NOT CONVERGED: {doc['unconverged']} points (counted as infinite error).")
     if doc["skipped"]:
         lines.append(f"Skipped: {len(doc['skipped'])} propellers without stations or without measurements.")
     lines += [f"fault: {f}" for f in doc["faults"]]
