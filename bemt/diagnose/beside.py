@@ -90,7 +90,7 @@ def beside(
     if said.verdict == "unknown" and largest < _LARGE:
         return None
     likely = {i: sum(p for k, p in answer.found.probability.items() if i in k.ids) for i in answer.found.spans}
-    # one name alone is not the ratios' to give: they know no blade, and what the diagnosis holds likely stands beside it
+    # one name alone is not the ratios' to give: they know no blade; what the diagnosis holds likely stands beside it
     weighed = {*ratios.probability, *(row.id for row in LAWS)} if ratios.verdict == "class" else set(ratios.effects)
     lone = [i for i, p in sorted(likely.items(), key=lambda kv: -kv[1]) if p >= _LIKELY and i not in weighed]
     effects = (*ratios.effects, *lone)
