@@ -70,7 +70,7 @@ LAWS: tuple[ScalingLaw, ...] = (
     ),
     ScalingLaw(
         "diameter",
-        "another diameter, or a cut tip",
+        "another diameter or a cut tip",
         (
             (1.0, {_T: {"all": 4.0, "slope": -1.0}, _Q: {"all": 5.0, "slope": -1.0}}),
             (0.5, {_T: {"all": 1.0}}),
