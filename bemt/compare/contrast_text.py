@@ -116,7 +116,7 @@ def _families(effects: Sequence[str], ranking: Sequence[Mapping[str, Any]]) -> s
 
 def _plain(name: str) -> str:
     row = law(name)
-    return row.title if row else name
+    return row.title if row else _FAMILY_WORD.get(name, name)
 
 
 def _ends(r: Mapping[str, Any], factor: float = 1.0) -> list[str]:

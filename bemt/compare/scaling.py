@@ -344,6 +344,9 @@ def judge(probability: Mapping[str, float], size: Mapping[str, tuple[float, floa
     best = max(listed.values())
     credible = [k for k, p in sorted(listed.items(), key=lambda kv: -kv[1]) if p >= best / NEAR]
     first = credible[0]
+    if largest >= CLEAR:  # that an instrument is exact and a blade is not says little of what made a large change
+        further = [k for k, p in sorted(listed.items(), key=lambda kv: -kv[1]) if p >= best / (NEAR * _FURTHER)]
+        credible = further if _few(further) else credible
     if credible == [OWN_SHAPE]:  # curves of its own fit anything: what comes near is not ruled out
         credible = [k for k, p in sorted(listed.items(), key=lambda kv: -kv[1]) if p >= best / (NEAR * _FURTHER)]
     if len(credible) == 1 and listed[first] >= SURE and unknown <= RIVAL:
@@ -353,8 +356,7 @@ def judge(probability: Mapping[str, float], size: Mapping[str, tuple[float, floa
     if 1 < len(credible) and "blade" in {FAMILY.get(k) for k in credible}:  # which of them is hard to say
         least = best / (NEAR * _FURTHER)
         credible += [k for k, p in listed.items() if FAMILY.get(k) == "blade" and p >= least and k not in credible]
-    families = {FAMILY.get(k, k) for k in credible}
-    few = len(credible) <= MOST or len(families) <= FAMILIES
+    few = _few(credible)
     if len(credible) > 1 and few and unknown <= DOUBT and probability[NONE] <= RIVAL:
         return answer("class", credible, f"these scale in the same way ({mass:.2f})")
     wide = _wider(listed) if largest >= CLEAR else []
@@ -370,6 +372,11 @@ def judge(probability: Mapping[str, float], size: Mapping[str, tuple[float, floa
     elif few:
         why = f"a cause that is not listed may have caused it ({unknown:.2f}), and {why}"
     return answer("insufficient", (), why)
+
+
+def _few(names: Sequence[str]) -> bool:
+    """Whether effects are few enough for a class, or of few kinds."""
+    return len(names) <= MOST or len({FAMILY.get(k, k) for k in names}) <= FAMILIES
 
 
 def _wider(listed: Mapping[str, float]) -> list[str]:

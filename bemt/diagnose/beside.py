@@ -132,7 +132,9 @@ def _paths(files: Sequence[str] | None) -> list[str]:
 def _run(record: Record, diameter_m: float, file: str | None = None) -> StandRun:
     """Points of a record as a comparison takes them: of its file where that is known, which says more."""
     if file is not None:
-        return stand_run(import_file(file), file, diameter_m)
+        whole = stand_run(import_file(file), file, diameter_m)
+        if {"airspeed_m_s", "J"} & whole.points.values.keys() or not np.any(record.V > 0.0):
+            return whole
     loads = [k for k in _LOADS if k in record.measured]
     values = {"rpm": record.rpm, "airspeed_m_s": record.V, **{k: record.measured[k] for k in loads}}
     u = {k: np.nan_to_num(record.u[k]) for k in loads}
