@@ -36,7 +36,7 @@ COMMANDS: dict[str, list[str]] = {
        for n in ("pitch", "plate", "duct", "compressible")},
     "plan": ["plan", "--case", "cases/prop_8x5", "--plan", "reports/diagnosis/cfd_pitch.csv", "--json"],
     "drive": ["drive", "cases/ds30", "--json"],
-    "map": ["map", f"{D}/thrust_map/xNova-SR-steps.csv", "--json"],
+    "map": ["map", f"{D}/thrust_map/xNova-SR-steps.csv", "--sign", "-1", "--json"],
     "motor": ["motor", "reports/drive/motor_mn4006", "--json"],
     "cfd": ["cfd", "reports/cfd", "--json"],
     "calibrate": ["calibrate", f"{D}/uiuc/volume-1", "--test", f"{D}/uiuc/volume-2", "--json"],
