@@ -214,19 +214,26 @@ def test_widths_are_those_of_the_prior() -> None:
 
 def test_best_line_from_static_finds_a_rule_that_is_one() -> None:
     random = np.random.default_rng(10)
-    rotors = []
+    rotors, told = [], []
     for i in range(12):
         at = _sensed(14, i)
         a = random.normal(0.0, 0.1)
+        told.append(0.5 * a)
         y = at.f.copy()
         y[0] = at.f[0] / (1.0 - a * (1.0 + 0.5 * at.x) * np.where(at.x > 0.0, 1.0, 1.0 / (1.0 + 0.5 * at.x)))
         rotors.append(
             MeasuredRotor(**vars(at), name=f"r{i}", family="a", section="rule", gap_deg=0.0, static=at.x == 0.0, y=y)
         )
-    found = from_static(rotors)
+    found = from_static(rotors, told)["CT"]
     for m in rotors:
         assert m.static.sum() == 1
     assert found["rotors"] == 12 and found["seen"]["median_abs"] < 0.03
+    # a zero-thrust J that goes with the error at rest is told, one of its own is not
+    own = random.normal(0.0, 0.05, 12)
+    own[3] = np.nan
+    J0 = [from_static(rotors, errors)["J0"] for errors in (told, own)]
+    assert J0[0]["left_out"]["median_abs"] < 0.1 * J0[0]["constant"]["median_abs"]
+    assert J0[1]["rotors"] == 11 and J0[1]["left_out"]["median_abs"] > 0.7 * J0[1]["constant"]["median_abs"]
     plain = np.median(np.abs(np.concatenate([(m.y[0] - m.f[0])[~m.static] / m.y[0][~m.static] for m in rotors])))
     assert found["left_out"]["median_abs"] < 0.6 * plain
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from bemt.compare.validate.folder import Folder
     from bemt.effects import Effect
 
-SCHEMA = "bemt.left_out/1"
+SCHEMA = "bemt.left_out/2"
 LARGE_IN = 8.9
 """Propellers of 9 in and more are reported beside all [in]."""
 # Steps of the search with a family left out, from the numbers of all families.
@@ -36,6 +36,11 @@ _WORDS = {
     "on_static": "conditioned on the rotor's static run",
     "on_static_and_one": "on its static run and one forward point", "on_forward": "conditioned on its forward runs",
 }  # fmt: skip
+_LIMITS = {
+    "constant": "{}, best without a static run, answers known",
+    "seen": "{}, best line from the static run, answers known",
+    "left_out": "{}, best line from the static run, rotor left out",
+}
 Say = Callable[[str], None] | None
 
 
@@ -99,7 +104,12 @@ def leave_out(
                 found = expect(other, p)
                 pools["general_section"].add(found.rows, found)
     out = {"schema": SCHEMA, "folder": name, "families": families} | {k: pool.total() for k, pool in pools.items()}
-    return out | {"transfer": transfer(seen, say), "static_limit": from_static([s.record for s in seen])}
+    return out | {"transfer": transfer(seen, say), "static_limit": static_limit(seen)}
+
+
+def static_limit(seen: Sequence[Observed]) -> dict[str, Any]:
+    """What the static runs can tell of flight at best."""
+    return from_static([s.record for s in seen], [s.drawn.J0_bemt / s.drawn.J0 - 1.0 for s in seen])
 
 
 def transfer(seen: Sequence[Observed], say: Say = None) -> dict[str, Any]:
@@ -142,9 +152,12 @@ def table(document: dict[str, Any]) -> str:
                 shown = [f"{'-':>6}" if v is None else f"{100 * v:6.1f}" for v in cells]
                 lines.append(f"{text + ', ' + kind + ' ' + q:60}  {' '.join(shown)}")
     limit = document["static_limit"]
-    for key, text in (("seen", "answers known to it"), ("left_out", "rotor left out")):
-        errors = f"{100 * limit[key]['median_abs']:6.1f} {100 * limit[key]['p90_abs']:6.1f}"
-        lines.append(f"{'best line from static to forward CT, ' + text:60}  {errors}")
+    for q, name in (("CT", "forward CT"), ("CP", "forward CP"), ("J0", "zero-thrust J")):
+        for key, text in _LIMITS.items():
+            if limit[q][key]["median_abs"] is None:
+                continue
+            errors = f"{100 * limit[q][key]['median_abs']:6.1f} {100 * limit[q][key]['p90_abs']:6.1f}"
+            lines.append(f"{text.format(name):60}  {errors}")
     n = document["declared"]
     scores = [log_score(total) for total in (n, *document["transfer"].values())]
     lines += [
