@@ -47,7 +47,7 @@ def _tables(document: Mapping[str, Any]) -> list[tuple[str, list[str], list[list
          "class: " + ", ".join(m["effects"]) if m["verdict"] == "class" else m["said"]]
         for m in document["misses"]
     ]  # fmt: skip
-    return [
+    tables = [
         ("Score", _HEADER, _rows(document["score"])),
         ("Answers by set", ["set", *kinds], answers),
         ("Simpler rules on the same data", _HEADER, _rows(document["baselines"])),
@@ -56,6 +56,7 @@ def _tables(document: Mapping[str, Any]) -> list[tuple[str, list[str], list[list
         ("What was there, and what was said", ["there", "said"], confusion),
         ("Misses", ["item", "set", "there", "plan", "sigma", "said"], misses),
     ]
+    return [t for t in tables if t[2] or t[0] == "Misses"]
 
 
 def text(document: Mapping[str, Any]) -> str:

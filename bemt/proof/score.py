@@ -177,7 +177,7 @@ def _share(what: str, flags: Iterable[bool], target: str, limit: float, low_is_g
     values = list(flags)
     hits, n = sum(values), len(values)
     value = hits / n if n else math.nan
-    met = None if not n else (value <= limit if low_is_good else value >= limit)
+    met = None if not (n and target) else (value <= limit if low_is_good else value >= limit)
     return ScoreRow(what, hits, n, value, *wilson(hits, n), target, met)
 
 
@@ -275,6 +275,8 @@ def score(
         _share("right when it claims", (j.right for j in with_cause), ">= 98 %", 0.98),
         _share("claims that name only what is not at work", (_beside(j) for j in with_cause), "<= 3 %", 0.03, True),
         _share("claims on visible", (j.claims for j in visible), ">= 75 %", 0.75),
+        *(_share(f"claims on visible, {word} a reference", (j.claims for j in visible if is_one(j)), "", 0.0)
+          for word, is_one in (("with", _referenced), ("without", lambda j: not _referenced(j)))),
         _share("wrong claims on what the plan cannot see", (j.claims and not j.right for j in hidden), "<= 2 %", 0.02,
                True),
         _share("pairs named exactly, rpm x J", (j.right and j.answer["verdict"] != "class" for j in pairs), ">= 75 %",
@@ -293,6 +295,11 @@ def score(
         *_with_reference([j for j in again if j.answer]),
         _share("failed", (not j.answer for j in (*judged, *again)), "0", 0.0, True),
     ]  # fmt: skip
+
+
+def _referenced(j: Judged) -> bool:
+    """Whether the item came with a run without its cause."""
+    return bool(j.entry.get("referenced"))
 
 
 def _with_reference(again: Sequence[Judged]) -> list[ScoreRow]:
