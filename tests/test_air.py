@@ -43,7 +43,8 @@ def test_viscosity_of_the_standard_atmosphere(T, mu):
 
 @given(st.floats(-4999, 31999))
 def test_pressure_is_hydrostatic(H):
-    dp = (isa_pressure(H + 0.5)[0] - isa_pressure(H - 0.5)[0]) / 1.0
+    # a step so short that the bend of the temperature at the tropopause does not count
+    dp = (isa_pressure(H + 0.005)[0] - isa_pressure(H - 0.005)[0]) / 0.01
     assert dp == pytest.approx(-9.80665 * Air.isa(H).rho, rel=1e-6)
 
 

@@ -254,9 +254,9 @@ def one_rotor(imported: Dataset, name: str, how: str = "Choose it with --rows-a 
 def conditions_of(imported: Dataset) -> tuple[str, ...]:
     """Columns that may tell one condition from another: no load, no speed, no clock, and not the same in every row.
 
-    >>> made = Dataset("bench", "table", {"rpm": [4e3, 5e3, 6e3], "gap_ratio": [1.0, 1.0, 2.0]})
+    >>> made = Dataset("bench", "table", {"rpm": [4e3, 5e3, 6e3], "spacing_m": [0.1, 0.1, 0.2]})
     >>> conditions_of(made)
-    ('gap_ratio',)
+    ('spacing_m',)
     """
     texts = [k for k, v in imported.texts.items() if 1 < len(set(v)) < len(v)]
     known = {*MEASURED, *named(imported).provenance["names"].values()}
