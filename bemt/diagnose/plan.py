@@ -126,7 +126,7 @@ def _plan(record: Record, case: Case, progress: Callable[[str], None] | None) ->
         settings = {c.id: c.settings[c.middle] for c in candidates}
         added = suggestion.suggest(found, (a, settings[a]), (b, settings[b]))
     weight = prior.prior_weights(whole, alike.ids)
-    bar = np.array([verdict.EXPECTED if weight[i] > 1.0 else verdict.LEAST for i in alike.ids])
+    bar = np.array([verdict.EXPECTED if weight[i] > 1.0 else verdict.ENOUGH for i in alike.ids])
     return Plan(alike, size, best, bar, absent, added, len(record), record.notes)
 
 
