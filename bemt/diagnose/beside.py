@@ -34,8 +34,6 @@ if TYPE_CHECKING:
 __all__ = ["Beside", "beside"]
 
 _CLAIMS = ("named", "sensor", "class")
-# Change of a load, natural logarithm, from which ratios answer where the diagnosis found something unknown.
-_LARGE = 0.08
 # Loads that agree to the first while an effect would change one by the second, natural logarithm.
 _AGREE, _WOULD = 0.03, 0.1
 # Probability in the diagnosis from which an effect that no scaling law describes is in the class.
@@ -84,10 +82,7 @@ def beside(
         told = f"Recording and reference agree, {ratios.why}; {why}."
         known = Suggestion(_SAME_ROTOR, (), (), 0.0, 0.0, "look")
         return Beside("none", (), ratios.probability["none"], why, words, told, ranking, known)
-    if said.verdict not in ("insufficient", "unknown") or ratios.verdict not in _CLAIMS or not _of_label(answer):
-        return None
-    largest = max(abs(math.log(r["ratio"])) for r in found.ratios.values() if r["kind"] in ("thrust", "torque"))
-    if said.verdict == "unknown" and largest < _LARGE:
+    if said.verdict != "insufficient" or ratios.verdict not in _CLAIMS or not _of_label(answer):
         return None
     likely = {i: sum(p for k, p in answer.found.probability.items() if i in k.ids) for i in answer.found.spans}
     # a single name is not for the ratios to give: they know no blade, and what the diagnosis holds likely may be it
