@@ -223,7 +223,7 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
         best[h] = state.log_z
         top = max(top, max(best[h].values()) + np.log(h.weight))
     fine = _Table(problem, S, log_w, spans, candidates, modes, None)
-    rivals = noise.rivals(problem)
+    rivals = noise.rivals(problem, _told(candidates))
     states: list[State] = []
     for h in _leading(best):
         C = noise.covariance(problem, h)
@@ -247,6 +247,12 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
     probability = _posterior(states, {k: v - price.get(k, 0.0) for k, v in before.items()})
     states.sort(key=_standing)
     return Evidence(problem, tuple(candidates), tuple(states), probability, spans, log_w, rivals)
+
+
+def _told(candidates: Sequence[Candidate]) -> list[str]:
+    """Variables that one effect alone follows: what changes along a wall's distance is the wall, whatever its law."""
+    along = [v for c in candidates for v in effects.catalogue()[c.id].along]
+    return [v for v in along if along.count(v) == 1]
 
 
 def _standing(state: State) -> float:

@@ -9,7 +9,7 @@ declared: a rotor whose curves have the right shape may still be off by a consta
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -341,11 +341,11 @@ def unlike(covariance: Array, u: Array, chosen: Sequence[Rival]) -> list[tuple[C
     return out
 
 
-def rivals(problem: Problem) -> tuple[Rival, ...]:
-    """Unknown smooth effects of the test: along each recorded variable, and pairs of them."""
+def rivals(problem: Problem, told: Collection[str] = ()) -> tuple[Rival, ...]:
+    """Unknown smooth effects of the test: along each recorded variable but those ``told``, and pairs of them."""
     X: dict[str, Array] = {}
     for name, values in problem.covariates.items():
-        if name in ("run", "Re", "M_tip", "pressure_Pa"):
+        if name in ("run", "Re", "M_tip", "pressure_Pa", *told):
             continue
         x = np.log(values) if name == "rpm" and np.all(values > 0) else values
         spread = float(np.ptp(x))

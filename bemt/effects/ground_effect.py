@@ -47,7 +47,7 @@ class GroundEffect(Effect):
     )
     parameters = (
         Parameter("z_over_R", "1", 0.5, 3.0, "validity of Cheeseman and Bennett 1955"),
-        Parameter("strength", "1", 0.0, 1.5, "1 is the published form", steps=0, off=0.0),
+        Parameter("strength", "1", 0.0, 3.0, "1 is the published form; 3: below the ideal tube", steps=0, off=0.0),
         Parameter("plate_radius_over_R", "1", 0.0, 3.0, "radius of plates of stands", steps=0, off=0.0),
     )
     on_by_default = False
@@ -84,7 +84,7 @@ class GroundEffect(Effect):
         """Both forms at twelve distances as published; weaker, stronger and behind plates at three."""
         settings = [(f, z, 1.0, 0.0) for f in FORMS for z in map(float, np.geomspace(0.5, 3.0, 12))]
         settings += [
-            (f, z, s, a) for f in FORMS for z in (0.7, 1.2, 2.0) for s in (0.6, 1.0, 1.5) for a in (0.0, 1.0, 2.0)
+            (f, z, s, a) for f in FORMS for z in (0.7, 1.2, 2.0) for s in (0.6, 1.0, 1.7, 3.0) for a in (0.0, 1.0, 2.0)
             if (s, a) != (1.0, 0.0)
         ]  # fmt: skip
         names = ("form", "z_over_R", "strength", "plate_radius_over_R")
