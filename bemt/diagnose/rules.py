@@ -20,6 +20,7 @@ from bemt.diagnose.verdict import (
     ENOUGH,
     GATE,
     LARGEST,
+    LEAST,
     LEFT_OVER,
     MOST,
     NAMED,
@@ -187,10 +188,11 @@ RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "unknown, and not much better than nothing",
-        lambda a: a.P[UNKNOWN] > 0.5 and a.vague < ENOUGH,
+        lambda a: a.P[UNKNOWN] > 0.5 and a.vague < (ENOUGH if a.real else LEAST),
         lambda a: a.says("insufficient", "a smooth effect that is not in the library fits best, but not by enough"),
-        "0.5, ENOUGH",
-        "as of a name: stands differed from cases of a label by 5 and were called unknown",
+        "0.5, ENOUGH, LEAST",
+        "as of a name; the first of a real rotor that no reference shows: stands differed from cases of a label by 5 "
+        "and were called unknown",
     ),
     Rule(
         "unknown is likelier than all",
@@ -261,7 +263,7 @@ RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "unknown is nearly as likely",
-        lambda a: a.unlisted > BESIDE * mass(a.found, (*a.group, *a.leading)),
+        lambda a: a.unlisted > BESIDE * mass(a.found, (*a.group, *a.leading, *a.few)),
         lambda a: a.says("insufficient", "an effect that is not in the library explains the readings nearly as well"),
         "BESIDE",
         "DIAGNOSIS 7: lost no right name and stopped the wrong ones",

@@ -65,7 +65,7 @@ BESIDE = 0.1
 """Share of an effect's probability that "unknown" may keep beside it and the effect still be named [1]."""
 ROUGH = 3.0
 """Noise over what the recording states from which on something else is at work than any effect explains [1]."""
-IN_SET, LARGEST = 0.85, 6
+IN_SET, LARGEST = 0.95, 6
 """Share of the probability of one cause that its set holds; most effects of the sets of a pair together [1]."""
 END = 0.01
 """As near to an end of its range, a share of it, a parameter of a pair is at the end [1]."""
@@ -366,7 +366,8 @@ def twins(what: Explanation) -> bool:
 def levels_only(what: Explanation) -> bool:
     """Whether two effects each move whole channels by one share: together they fit any two levels."""
     chosen = [effects.catalogue()[i] for i in what]
-    return len(chosen) > 1 and all(e.exact or e.fault in _SHARES for e in chosen)
+    shares = [e.exact or (e.fault in _SHARES and e.sensor in ("", *_BALANCE)) for e in chosen]
+    return len(chosen) > 1 and all(shares)
 
 
 def holds_off(name: str, told: Mapping[str, Mapping[str, Any]]) -> bool:
