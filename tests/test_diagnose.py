@@ -11,6 +11,7 @@ from diagnosing import case, diagnose, left_out, points, recording
 from bemt import effects
 from bemt.dataset import Dataset
 from bemt.diagnose import assemble, document, noise, plan, record, signatures
+from bemt.diagnose.explanation import UNKNOWN
 
 GRID = points("grid")
 
@@ -66,6 +67,22 @@ def test_a_parameter_that_the_recording_replaces_is_no_parameter(walls: tuple[fl
     assert all({"form", "strength"} <= s.keys() for s in wall.settings)
     # at rest there is no wind for a plate to dam
     assert not any("plate_radius_over_R" in s for s in wall.settings if s["strength"] != 1.0)
+
+
+class Tube(effects.catalogue()["ground_effect"]):  # type: ignore[misc]
+    """The wall as the image of an ideal vortex tube (Knight and Hefner 1941, NACA TN 835), a third of it."""
+
+    def relief(self, z_over_R: np.ndarray) -> np.ndarray:
+        z = np.where(np.isnan(z_over_R), np.inf, z_over_R)
+        return 0.35 * (1.0 - 2.0 / np.sqrt(1.0 + z**-2) + 2.0 / np.sqrt(4.0 + z**-2))
+
+
+def test_a_wall_with_a_law_of_its_own_is_the_wall() -> None:
+    """No effect but the wall follows its recorded distance, so something unknown along it is the wall, too."""
+    given = dict(points("static")) | {"wall_distance_m": np.tile([0.07, 0.1, 0.15, 0.3, 0.8], 4)[:17]}
+    answer = diagnose(recording(case(), given, (Tube(),)), case())
+    assert answer.decision.effects == ("ground_effect",), document.text(answer)
+    assert answer.found.probability[UNKNOWN] < 0.01
 
 
 def test_torque_in_other_units_is_a_slip_of_units() -> None:

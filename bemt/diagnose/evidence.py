@@ -153,7 +153,7 @@ class Evidence:
     candidates : tuple of Candidate
         Effects.
     states : tuple of State
-        Settings of the covariance that matter, best first.
+        Settings of the covariance that matter, best for the likeliest explanation first.
     probability : dict of Explanation to float
         Posterior probability [1].
     spans : dict of str to slice
@@ -238,14 +238,16 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
         if pairs:
             _pairs(state, spans, log_w)
         states.append(state)
-        for s in sorted(states, key=_standing)[FOR_NULLS:]:
-            s.rivals = []
+        state.rivals = []  # the largest arrays there are
     before = prior.log_priors(prior.prior_weights(problem, list(spans)), pairs)
     if pairs:
         _solve_pairs(problem, candidates, states, spans, log_w, before)
     price = _details(problem, states, modes)
     probability = _posterior(states, {k: v - price.get(k, 0.0) for k, v in before.items()})
-    states.sort(key=_standing)
+    likeliest = max(probability, key=lambda k: probability[k])
+    states.sort(key=lambda s: -(s.log_z[likeliest] + np.log(s.hyper.weight)))
+    for s in states[:FOR_NULLS]:
+        s.rivals = noise.unlike(noise.covariance(problem, s.hyper), problem.u, rivals)
     return Evidence(problem, tuple(candidates), tuple(states), probability, spans, log_w, rivals)
 
 
@@ -253,11 +255,6 @@ def _told(candidates: Sequence[Candidate]) -> list[str]:
     """Variables that one effect alone follows: what changes along a wall's distance is the wall, whatever its law."""
     along = [v for c in candidates for v in effects.catalogue()[c.id].along]
     return [v for v in along if along.count(v) == 1]
-
-
-def _standing(state: State) -> float:
-    """Place of a setting of the covariance among others: smallest first."""
-    return -float(max(state.log_z.values()) + np.log(state.hyper.weight))
 
 
 def _stacked(problem: Problem, candidates: Sequence[Candidate]) -> tuple[dict[str, slice], Array, Array]:

@@ -50,8 +50,10 @@ since there is a reference or it follows a recorded variable of its own; of phys
 PROVEN, PREDICTS = 20.0, 0.9
 """Below the first (log odds) an explanation must lower the error on left-out blocks to the second, a ratio; physics
 that is on already needs the first in any case, to be on differently [1]."""
-PARTNER, MOST = 0.1, 3
-"""Probability from which a second effect beside a sure one is mentioned; most members of an open answer [1]."""
+PARTNER, LIKE, MOST = 0.05, 0.1, 3
+"""Probability of all pairs with a sure effect from which a second one is mentioned (of one set of concealed causes four
+single names had more, all of them of two causes); the same beside look-alikes, and the share of the likeliest second
+one that others mentioned with it have at least; most members of an open answer [1]."""
 RARE = 0.02
 """Members of a class are at least this share as likely as the likeliest [1]."""
 NEAR = 5.0
@@ -287,10 +289,15 @@ class Asked:
 
     @cached_property
     def beside(self) -> tuple[str, ...]:
-        """Effects that may be at work beside the one that is sure, or one of its look-alikes."""
+        """Effects one of which may be at work beside the one that is sure, or one of its look-alikes."""
         others = [i for i in inclusion(self.found) if i not in self.group]
         together = {i: sum(self.P.get(Explanation.of(g, i), 0.0) for g in self.group) for i in others}
-        return tuple(i for i, p in together.items() if p >= PARTNER)
+        least = PARTNER if self.sure else LIKE
+        if sum(together.values()) < least:
+            return ()
+        ranked = sorted(together, key=lambda i: -together[i])
+        likely = [i for i in ranked if together[i] >= LIKE * together[ranked[0]]]
+        return tuple(likely[: max(LARGEST - len(self.group), 1)])
 
     @cached_property
     def known_sets(self) -> tuple[tuple[str, ...], ...]:
@@ -304,9 +311,10 @@ class Asked:
 
     @cached_property
     def few(self) -> tuple[str, ...]:
-        """Fewest of the likeliest effects, at most :data:`MOST`, that hold nearly all of the probability."""
+        """Fewest of the likeliest effects that are as sure as a name, or :data:`MOST` as sure as a class; or none."""
         some = tuple(self.share)
-        return next((some[:n] for n in range(2, MOST + 1) if mass(self.found, some[:n]) >= SURE), ())
+        found = next((some[:n] for n in range(2, MOST) if mass(self.found, some[:n]) >= NAMED), some[:MOST])
+        return found if mass(self.found, found) >= SURE else ()
 
     @cached_property
     def likely(self) -> tuple[str, ...]:
