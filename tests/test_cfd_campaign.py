@@ -255,7 +255,7 @@ def test_a_killed_campaign_goes_on(project: Path, tmp_path: Path, programs: Path
     before = rows_of(path.parent)
     assert [row["rpm"] for row in before] == ["6000"]
     json.loads((path.parent / "manifest.json").read_text())
-    assert subprocess.run(command, cwd=project, timeout=120).returncode == 0
+    assert main(command[3:]) == 0
     after = rows_of(path.parent)
     assert [row["rpm"] for row in after] == ["6000", "9000"] and after[0] == before[0]
     assert calls(programs, "simpleFoam") == 3, "the first once, the second twice"
