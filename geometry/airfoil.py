@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geometry.common import Array, Faults, GeometryError, frozen, pchip
+from geometry.common import Array, Faults, GeometryError, frozen, pchip, pchip_slopes
 
 
 def _spaced(n: int) -> Array:
@@ -78,13 +78,20 @@ class Airfoil:
             out.append((x[keep], y[keep]))
         return out[0], out[1]
 
+    @cached_property
+    def _angles(self) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+        """(angle, slopes of y over it) of the points of both sides."""
+        out = []
+        for x, y in self._sides:
+            theta = np.arccos(np.clip(1.0 - 2.0 * (x - x[0]) / (x[-1] - x[0]), -1.0, 1.0))
+            out.append((theta, pchip_slopes(theta, y.reshape(len(y), 1))))
+        return out[0], out[1]
+
     def _side(self, which: int, s: ArrayLike) -> tuple[Array, Array]:
         """Points of one side at fractions s of its own x extent; PCHIP in the angle, which is smooth at the nose."""
-        x, y = self._sides[which]
-        span = x[-1] - x[0]
-        theta = np.arccos(np.clip(1.0 - 2.0 * (x - x[0]) / span, -1.0, 1.0))
+        (x, y), (theta, slopes) = self._sides[which], self._angles[which]
         s = np.clip(np.asarray(s, dtype=np.float64), 0.0, 1.0)
-        return x[0] + span * s, pchip(theta, y, np.arccos(1.0 - 2.0 * s))
+        return x[0] + (x[-1] - x[0]) * s, pchip(theta, y, np.arccos(1.0 - 2.0 * s), slopes)
 
     def surfaces(self, x: ArrayLike) -> tuple[Array, Array]:
         """Interpolate both sides. [-]"""
@@ -130,9 +137,17 @@ class Airfoil:
 
     def repanel(self, n: int = 161) -> Airfoil:
         """Resample both sides with cosine spacing."""
-        s = _spaced(_half(n))
-        (xu, yu), (xl, yl) = self._side(0, s), self._side(1, s)
-        return Airfoil(self.name, _join(xu, xl), _join(yu, yl))
+        found = self._resampled.get(n)
+        if found is None:  # a blade asks for the same points at each of its rings
+            s = _spaced(_half(n))
+            (xu, yu), (xl, yl) = self._side(0, s), self._side(1, s)
+            found = self._resampled[n] = Airfoil(self.name, _join(xu, xl), _join(yu, yl))
+        return found
+
+    @cached_property
+    def _resampled(self) -> dict[int, Airfoil]:
+        """Results of :meth:`repanel` by number of points."""
+        return {}
 
     def __repr__(self) -> str:
         return f"Airfoil({self.name!r}, {self.x.size} points, t/c {self.thickness:.4f}, camber {self.camber:+.4f})"

@@ -8,6 +8,7 @@ A loft through these planar sections is the same blade. Frame as in :mod:`geomet
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -76,31 +77,29 @@ def planar_sections(rotor: Rotor, options: Options | None = None) -> list[tuple[
         )
     planes = np.unique(np.concatenate([[root], rho[(rho > 1.01 * root) & (rho < rotor.R)], [rotor.R + 0.4 * step]]))
     planes = planes[np.concatenate([[True], np.diff(planes) > 1e-4 * rotor.R])]
-    out = []
-    for plane in planes:
-        section = np.empty((curves.shape[1], 2))
-        for j in range(curves.shape[1]):
-            at = float(np.interp(plane, x[:, j], table))
-            section[j] = _cubic(table, y[:, j], at), _cubic(table, curves[:, j, 1], at)
-            for _ in range(
-                2
-            ):  # the straight table misses the plane by a trifle: two corrections along the point's path  # noqa: E501
-                miss = plane - _cubic(table, x[:, j], at)
-                at += miss
-                section[j] = _cubic(table, y[:, j], at), _cubic(table, curves[:, j, 1], at)
-        out.append((float(plane), section))
+    out = [(float(plane), np.empty((curves.shape[1], 2))) for plane in planes]
+    radius = table.tolist()  # plain numbers: there are a few at a time, which arrays are slow at
+    for j in range(curves.shape[1]):
+        along, across, axial = x[:, j].tolist(), y[:, j].tolist(), curves[:, j, 1].tolist()
+        for (plane, section), start in zip(out, np.interp(planes, x[:, j], table).tolist(), strict=True):
+            at = start
+            for _ in range(2):  # the straight table misses the plane by a trifle: two corrections along the path
+                at += plane - _cubic(radius, along, at)
+            section[j] = _cubic(radius, across, at), _cubic(radius, axial, at)
     return out
 
 
-def _cubic(x: Array, y: Array, at: float) -> float:
+def _cubic(x: list[float], y: list[float], at: float) -> float:
     """Interpolate by the cubic through the four nearest points."""
-    i = int(np.clip(np.searchsorted(x, at) - 2, 0, len(x) - 4))
-    xs, ys = x[i : i + 4], y[i : i + 4]
-    total = 0.0
-    for k in range(4):
-        others = np.delete(xs, k)
-        total += float(ys[k] * np.prod((at - others) / (xs[k] - others)))
-    return total
+    i = min(max(bisect_left(x, at) - 2, 0), len(x) - 4)
+    a, b, c, d = x[i : i + 4]
+    w, s, t, u = at - a, at - b, at - c, at - d
+    return (
+        y[i] * (s / (a - b) * (t / (a - c)) * (u / (a - d)))
+        + y[i + 1] * (w / (b - a) * (t / (b - c)) * (u / (b - d)))
+        + y[i + 2] * (w / (c - a) * (s / (c - b)) * (u / (c - d)))
+        + y[i + 3] * (w / (d - a) * (s / (d - b)) * (t / (d - c)))
+    )
 
 
 def _inner_plane(root: Array, hub: float) -> float:

@@ -42,8 +42,9 @@ def export(
     name: str = "rotor",
     unit: str = "mm",
     options: Options | None = None,
+    model: MeshModel | None = None,
 ) -> dict[str, Any]:
-    """Write the solids of a rotor and its duct."""
+    """Write the solids of a rotor and its duct; `model` is their mesh with these options, if there is one already."""
     faults = Faults()
     for word in formats:
         if word not in FORMATS:
@@ -52,7 +53,7 @@ def export(
         faults.add("unit", repr(unit), "mm or m")
     faults.check()
     options = options or Options()
-    model = build(rotor, duct, options)
+    model = build(rotor, duct, options) if model is None else model
     fresh = not out.exists()
     out.mkdir(parents=True, exist_ok=True)
     work = Path(tempfile.mkdtemp(prefix=".export-", dir=out))

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import os
+from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from bemt.sections.polars import Polar
+    from geometry.duct import Duct
+    from geometry.mesh import MeshModel, Options
     from geometry.rotor import Rotor
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -58,6 +62,38 @@ def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         cache.clear_memory()
         yield folder
     cache.clear_memory()
+
+
+def _content(item: Any) -> object:
+    """All that an object holds, every bit: equal content, equal solids."""
+    if is_dataclass(item):
+        return type(item), tuple(_content(getattr(item, field.name)) for field in fields(item))
+    if isinstance(item, np.ndarray):
+        return item.shape, item.dtype.str, item.tobytes()
+    if isinstance(item, tuple | list):
+        return tuple(map(_content, item))
+    assert item is None or isinstance(item, str | int | float), f"content of {item!r} is not known"
+    return repr(item)
+
+
+_SOLIDS: dict[object, MeshModel] = {}
+
+
+@pytest.fixture
+def equal_solids_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Mesh a rotor that is bit for bit one that was meshed before no second time; a command reads its case anew."""
+    from bemt.exports.openfoam import write
+    from geometry import export
+    from geometry.mesh import build
+
+    def once(rotor: Rotor, duct: Duct | None = None, options: Options | None = None) -> MeshModel:
+        key = _content((rotor, duct, options))
+        if key not in _SOLIDS:
+            _SOLIDS[key] = build(rotor, duct, options)
+        return _SOLIDS[key]
+
+    monkeypatch.setattr(write, "build", once)
+    monkeypatch.setattr(export, "build", once)
 
 
 @pytest.fixture(scope="session")

@@ -29,6 +29,8 @@ from bemt.cfd.worker import point_key, radial_of
 from bemt.commands.cli import main
 from bemt.exports.openfoam.write import settings_of
 
+pytestmark = pytest.mark.usefixtures("equal_solids_once")
+
 HEAD = 'schema = "bemt.cfd/1"\nname = "t"\ncase = "{case}"\n'
 TWO = "[defaults]\nlevel = 4\niterations = 30\naverage = 10\n[axes]\nrpm = [6000, 9000]\n"
 
@@ -56,8 +58,9 @@ awk -v w=$w 'BEGIN {
 w=$(awk "BEGIN {print 1e-5 * $w * $w}")
 """ + """
 surface() {  # function object, field, patch, columns of one face, at every iteration that is balanced
+    s=postProcessing/$1_$3/surface
+    mkdir -p $s/21 $s/22 $s/23 $s/24 $s/25 $s/26 $s/27 $s/28 $s/29 $s/30 postProcessing/$1_$3/0
     for t in 21 22 23 24 25 26 27 28 29 30; do
-        mkdir -p postProcessing/$1_$3/surface/$t postProcessing/$1_$3/0
         printf '# %s  FACE_DATA 1\\n# x y z\\n%s\\n' "$2" "$4" > postProcessing/$1_$3/surface/$t/$2_patch_$3.raw
         echo "$t 0" >> postProcessing/$1_$3/0/surfaceFieldValue.dat
     done
@@ -65,7 +68,8 @@ surface() {  # function object, field, patch, columns of one face, at every iter
 load() {  # function object: nothing on it
     mkdir -p postProcessing/$1/0
     for t in 21 22 23 24 25 26 27 28 29 30; do
-        echo "$t (0 0 0) (0 0 0) (0 0 0)" | tee -a postProcessing/$1/0/force.dat >> postProcessing/$1/0/moment.dat
+        echo "$t (0 0 0) (0 0 0) (0 0 0)" >> postProcessing/$1/0/force.dat
+        echo "$t (0 0 0) (0 0 0) (0 0 0)" >> postProcessing/$1/0/moment.dat
     done
 }
 # a flow of 1 m3/s comes in at rest and leaves with the momentum of the thrust, LEAK of it made at the sides
@@ -251,7 +255,7 @@ def test_a_killed_campaign_goes_on(project: Path, tmp_path: Path, programs: Path
     before = rows_of(path.parent)
     assert [row["rpm"] for row in before] == ["6000"]
     json.loads((path.parent / "manifest.json").read_text())
-    assert subprocess.run(command, cwd=project, timeout=120).returncode == 0
+    assert main(command[3:]) == 0
     after = rows_of(path.parent)
     assert [row["rpm"] for row in after] == ["6000", "9000"] and after[0] == before[0]
     assert calls(programs, "simpleFoam") == 3, "the first once, the second twice"

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
+from bemt.commands.cli import main
 from bemt.compare.validate.propellers import validate
 
 # Section tables come from a network whose releases differ in the last digits.
 TOLERANCE = 2e-3
 
 
-def test_committed_sweep_is_what_the_cases_give(project: Path) -> None:
-    call = [sys.executable, "-m", "bemt", "sweep", "cases/", "--json", "--quiet"]
-    fresh = json.loads(subprocess.run(call, cwd=project, capture_output=True, text=True, check=True).stdout)
+def test_committed_sweep_is_what_the_cases_give(
+    project: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(project)
+    assert main(["sweep", "cases/", "--json", "--quiet"]) == 0
+    fresh = json.loads(capsys.readouterr().out)
     kept = json.loads((project / "reports" / "sweep.json").read_text(encoding="utf-8"))
     shipped = [c["name"] for c in kept["cases"]]
     found = [c for c in fresh["cases"] if c["name"] in shipped]  # a case of one's own may lie beside them

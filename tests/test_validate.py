@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +11,7 @@ import pytest
 from bemt import effects
 from bemt.base.errors import InputError
 from bemt.base.tables import json_text
+from bemt.commands.cli import main
 from bemt.compare.validate import match, points, propellers, text
 from bemt.readers import uiuc
 from bemt.sections import rule as section_rule
@@ -115,16 +114,16 @@ def test_unconverged_points_are_never_shown_as_zero(tmp_path: Path) -> None:
     assert line.split("|")[1].split() == ["inf", "inf", "-"]
 
 
-def test_command_prints_json_and_names_unknown_effects(tmp_path: Path) -> None:
+def test_command_prints_json_and_names_unknown_effects(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     _folder(tmp_path)
-    call = [sys.executable, "-m", "bemt", "validate", str(tmp_path)]
-    good = subprocess.run([*call, "--json", "--off", "stall_delay"], capture_output=True, text=True, check=False)
-    assert good.returncode == 0
-    doc = json.loads(good.stdout)
+    call = ["validate", str(tmp_path)]
+    assert main([*call, "--json", "--off", "stall_delay"]) == 0
+    doc = json.loads(capsys.readouterr().out)
     assert set(doc["static"]) == {"propellers", "points", "CT", "CP"}
     assert "stall_delay" not in [e["id"] for e in doc["effects"]]
-    bad = subprocess.run([*call, "--off", "nonsense"], capture_output=True, text=True, check=False)
-    assert bad.returncode == 2 and "nonsense" in bad.stderr and "Traceback" not in bad.stderr
+    assert main([*call, "--off", "nonsense"]) == 2
+    said = capsys.readouterr().err
+    assert "nonsense" in said and "Traceback" not in said
 
 
 def test_a_file_for_the_folder_is_called_a_file(tmp_path: Path) -> None:

@@ -170,13 +170,15 @@ def settings_of(case: Case, run: Run, options: Options | None = None) -> tuple[S
         notes.append("oblique flow with a frozen rotor is an approximation: one azimuth of the blades")
     if compressible and run.gas == "perfect":
         notes.append("energy equation without the work of the turning frame: temperatures at the blade are wrong")
-    return settings, {"rotor": rotor, "duct": duct, "tail": tail, "notes": notes}
+    return settings, {"rotor": rotor, "duct": duct, "tail": tail, "notes": notes, "model": model}
 
 
 def write_openfoam(case: Case, out: Path, run: Run, options: Options | None = None) -> dict[str, Any]:
     """Write a whole case: ``cd OUT && ./Allrun`` runs it."""
     settings, parts = settings_of(case, run, options)
-    manifest = export(parts["rotor"], parts["duct"], out, ["openfoam"], name=case.name, options=options)
+    manifest = export(
+        parts["rotor"], parts["duct"], out, ["openfoam"], name=case.name, options=options, model=parts["model"]
+    )
     if parts["tail"] is not None:
         trimesh = needs("trimesh", "cad")
 
