@@ -253,8 +253,9 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
 
 def _told(candidates: Sequence[Candidate]) -> list[str]:
     """Variables that one effect alone follows: what changes along a wall's distance is the wall, whatever its law."""
-    along = [v for c in candidates for v in effects.catalogue()[c.id].along]
-    return [v for v in along if along.count(v) == 1]
+    along = [(v, e.id) for e in effects.catalogue().values() for v in e.along]
+    tried = {c.id for c in candidates}
+    return [v for v, i in along if i in tried and [w for w, _ in along].count(v) == 1]
 
 
 def _stacked(problem: Problem, candidates: Sequence[Candidate]) -> tuple[dict[str, slice], Array, Array]:
