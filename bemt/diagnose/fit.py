@@ -325,10 +325,9 @@ def smooth(found: Evidence, best: Fit) -> Array:
     return np.asarray(systematic @ noise.whitener(C, problem.u).solve(problem.residual - best.signature))
 
 
-def left_over(found: Evidence, what: Explanation) -> float:
+def left_over(found: Evidence, best: Fit) -> float:
     """Logarithm of the odds that something smooth is left when an explanation is taken away. [1]"""
     problem = found.problem
-    best = fit(found, what)
     C = noise.covariance(problem, found.states[0].hyper) + form_covariance(found, best)
     gains = unknown(noise.unlike(C, problem.u, found.rivals), problem.residual - best.signature)
     return float(log_mean(gains, np.full(gains.size, -np.log(gains.size)))) if gains.size else float("-inf")

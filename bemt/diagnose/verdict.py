@@ -147,8 +147,11 @@ class Asked:
 
     @cached_property
     def rest(self) -> float:
-        """Log odds of something smooth beside it."""
-        return fitting.left_over(self.found, self.first) if self.first else -np.inf
+        """Log odds of something smooth beside it, where its settings are too coarse beside the best one between them."""
+        if not self.first:
+            return -np.inf
+        rest = fitting.left_over(self.found, fitting.fit(self.found, self.first))
+        return rest if rest <= LEFT_OVER else min(rest, fitting.left_over(self.found, self.refined(self.first)[0]))
 
     @cached_property
     def _kept(self) -> tuple[Explanation, dict[str, float]]:
