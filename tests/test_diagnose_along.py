@@ -79,7 +79,7 @@ TRUE = {"prop_8x5_pipe": {"duct"}, "prop_8x5_duct": {"duct"}, "prop_8x5_pitch": 
 def test_our_campaigns_name_nothing_wrong(project: Path) -> None:
     """Every converged run beside its case, with or without effects of the Mach number as it was run.
 
-    Where several stay open, as angle and camber at J 0.6, where both turn the zero-lift line, the true one is among them.
+    Where several stay open, as angle and camber at J 0.6 (both turn the zero-lift line), the true one is among them.
     """
     said = {}
     for path in sorted((project / "reports" / "cfd").glob("*/radial.csv")):

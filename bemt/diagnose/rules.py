@@ -22,7 +22,6 @@ from bemt.diagnose.verdict import (
     LARGEST,
     LEAST,
     LEFT_OVER,
-    MOST,
     NAMED,
     PREDICTS,
     PROVEN,

@@ -147,7 +147,7 @@ class Asked:
 
     @cached_property
     def rest(self) -> float:
-        """Log odds of something smooth beside it, where its settings are too coarse beside the best one between them."""
+        """Log odds of something smooth beside it; if the settings are too coarse, beside the best one between them."""
         if not self.first:
             return -np.inf
         rest = fitting.left_over(self.found, fitting.fit(self.found, self.first))
