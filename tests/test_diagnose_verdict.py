@@ -178,7 +178,7 @@ def asked(**changed: Any) -> Any:
     plain = {
         "first": lead, "leading": lead, "rest": 0.0, "odds": 100.0, "needed": 8.0, "p_value": 0.002, "on": False,
         "expected": False, "paired": False, "sure": ("reynolds",), "group": ("reynolds",), "beside": (), "few": (),
-        "likely": ("reynolds",),
+        "likely": ("reynolds",), "wide": ("reynolds",),
         "P": {NONE: 0.0, UNKNOWN: 0.0, lead: 1.0}, "share": {"reynolds": 1.0}, "unlisted": 0.0, "roughness": 1.0,
         "vague": 0.0, "alone": True, "level": 0.0, "another_blade": False, "factor": False, "real": False,
         "parameters": {"reynolds": {}},

@@ -382,10 +382,16 @@ RULES: tuple[Rule, ...] = (
         "look-alikes",
         lambda a: len(a.group) > 1 and mass(a.found, a.group) >= SURE,
         lambda a: replace(
-            a.says("class", "these look alike in this plan", a.group, mass(a.found, a.group), (a.group,)),
-            sets=(a.group,),
+            a.says(
+                "class",
+                "these look alike in this plan" + ("" if a.wide == a.group else ", or are not much less likely"),
+                a.wide,
+                mass(a.found, a.wide),
+                (a.group,),
+            ),
+            sets=(a.wide,),
         ),
-        "SURE, NEAR, ALIKE",
+        "SURE, NEAR, ALIKE, NAMED, PARTNER",
         "DIAGNOSIS 2.7: distance below 3 sigma",
     ),
     Rule(

@@ -51,9 +51,9 @@ PROVEN, PREDICTS = 20.0, 0.9
 """Below the first (log odds) an explanation must lower the error on left-out blocks to the second, a ratio; physics
 that is on already needs the first in any case, to be on differently [1]."""
 PARTNER, LIKE, MOST = 0.05, 0.1, 3
-"""Probability of all pairs with a sure effect from which a second one is mentioned (of one set of concealed causes four
-single names had more, all of them of two causes); the same beside look-alikes, and the share of the likeliest second
-one that others mentioned with it have at least; most members of an open answer [1]."""
+"""Probability beside a sure effect from which a second one is mentioned (three single names of one set of concealed
+causes had such a second one, and all were of two causes); the same beside look-alikes, and the share of the likeliest
+second one that others mentioned with it have at least; most members of an open answer [1]."""
 RARE = 0.02
 """Members of a class are at least this share as likely as the likeliest [1]."""
 NEAR = 5.0
@@ -291,14 +291,21 @@ class Asked:
         return _class(self.found, first, self.share)
 
     @cached_property
+    def wide(self) -> tuple[str, ...]:
+        """The group and, while it is not as sure as a name, what is as likely as a second effect has to be."""
+        if mass(self.found, self.group) >= NAMED:
+            return self.group
+        others = (i for i, p in self.share.items() if i not in self.group and p >= PARTNER)
+        return (*self.group, *others)[:LARGEST]
+
+    @cached_property
     def beside(self) -> tuple[str, ...]:
         """Effects one of which may be at work beside the one that is sure, or one of its look-alikes."""
         others = [i for i in inclusion(self.found) if i not in self.group]
         together = {i: sum(self.P.get(Explanation.of(g, i), 0.0) for g in self.group) for i in others}
-        least = PARTNER if self.sure else LIKE
-        if sum(together.values()) < least:
-            return ()
         ranked = sorted(together, key=lambda i: -together[i])
+        if not ranked or together[ranked[0]] < (PARTNER if self.sure else LIKE):
+            return ()
         likely = [i for i in ranked if together[i] >= LIKE * together[ranked[0]]]
         return tuple(likely[: max(LARGEST - len(self.group), 1)])
 
