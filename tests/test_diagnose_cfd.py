@@ -63,27 +63,16 @@ QUESTIONS = {
 }  # fmt: skip
 
 
-MISSED = {
-    "ground_effect": "the wall lowers the torque by less than two grids differ by",
-    "duct": "a lip of cells of 0.4 of its radius: 5 to 7 N on it, 12.5 N by the solver",
-    "pitch_offset": "left open with untwist and section: 0.845 on the three, 0.85 needed",
-    "oblique_inflow": "a frozen rotor hardly shows the angle of the wind (under 2 % at J 0.2)",
-}
-
-
-@pytest.mark.parametrize(
-    "cause",
-    [pytest.param(c, marks=pytest.mark.xfail(reason=MISSED[c]) if c in MISSED else ()) for c in QUESTIONS],
-)
-def test_what_a_campaign_has_is_told(cause: str) -> None:
-    answer = told(ABSOLUTE, *QUESTIONS[cause]())
-    assert cause in answer.decision.effects, document.text(answer)
-
-
-@pytest.mark.parametrize("cause", sorted(QUESTIONS))
-def test_no_campaign_is_given_a_wrong_name(cause: str) -> None:
-    answer = told(ABSOLUTE, *QUESTIONS[cause]())
-    assert not answer.decision.effects or cause in answer.decision.effects, document.text(answer)
+def test_what_the_campaigns_have_is_told_in_four_of_five() -> None:
+    said = {}
+    for cause, question in QUESTIONS.items():
+        answer = told(ABSOLUTE, *question())
+        said[cause] = (answer.decision.verdict, answer.decision.effects)
+        print(cause, document.text(answer), sep="\n")
+    right = [cause for cause, (_, ids) in said.items() if cause in ids]
+    wrong = [cause for cause, (_, ids) in said.items() if ids and cause not in ids]
+    # a frozen rotor hardly shows the angle of the wind (under 2 % at J 0.2)
+    assert set(right) >= {"compressibility", "ground_effect", "duct", "pitch_offset"} and not wrong, said
 
 
 def test_nothing_is_named_on_the_campaign_without_a_cause() -> None:

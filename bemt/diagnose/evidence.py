@@ -228,8 +228,7 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
     for h in _leading(best):
         C = noise.covariance(problem, h)
         state = fine.state(h, C)
-        state.rivals = noise.unlike(C, problem.u, rivals)
-        gains = unknown(state.rivals, problem.residual)
+        gains = unknown(noise.unlike(C, problem.u, rivals), problem.residual)  # not kept: the largest arrays there are
         if gains.size:
             state.best_rival = rivals[int(np.argmax(gains))].name
             state.log_z[UNKNOWN] = state.log_z[NONE] + float(log_mean(gains, np.full(gains.size, -np.log(gains.size))))
@@ -238,7 +237,6 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
         if pairs:
             _pairs(state, spans, log_w)
         states.append(state)
-        state.rivals = []  # the largest arrays there are
     before = prior.log_priors(prior.prior_weights(problem, list(spans)), pairs)
     if pairs:
         _solve_pairs(problem, candidates, states, spans, log_w, before)
