@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +11,8 @@ import pytest
 from bemt.air import Air
 from bemt.bem import solver
 from bemt.bem.duct import DuctFlow
+from bemt.case import load_case
+from bemt.case.prepare import prepare_case
 from bemt.effects import Effect, standard, without
 from bemt.sections.polars import Polar, linear_polar
 from geometry.blade import Blade, from_stations
@@ -75,6 +78,17 @@ def test_radial_output_does_not_matter_and_sums_up(ready: solver.Prepared, batch
 def test_a_second_preparation_is_the_same(ready: solver.Prepared, batch: solver.Solution, polar: Polar) -> None:
     again = solver.prepare(ready.rotor, [(0.7, polar)], ready.effects, ready.duct, n_stations=25)
     assert same(solver.solve(again, RPM, V, AIR), batch)
+
+
+@pytest.mark.parametrize("case", ["ds30", "prop_8x5"])
+@pytest.mark.parametrize("rpm", [300.0, 6000.0, 20000.0])
+def test_tables_that_are_not_reached_do_not_matter(project: Path, case: str, rpm: float) -> None:
+    model = prepare_case(load_case(project / "cases" / case))
+    at = rpm, rpm / 1000.0, AIR
+    whole, less = model.solve(*at), model.at_speeds(*at).solve(*at)
+    assert np.isfinite(whole.thrust_N).all()
+    for channel in ("thrust_N", "torque_Nm"):
+        assert getattr(less, channel) == pytest.approx(getattr(whole, channel), rel=1e-9)
 
 
 def test_direction_of_rotation_does_not_matter(rotor: Rotor, polar: Polar) -> None:

@@ -22,9 +22,9 @@ from bemt.bem import solver
 from bemt.bem.duct import DuctFlow, duct_flow
 from bemt.dataset import Dataset
 from bemt.effects import standard, to_text
-from bemt.effects.base import Effect, Flow, Loads
+from bemt.effects.base import RE_FAST, Effect, Flow, Loads
 from bemt.sections.neuralfoil import neuralfoil_polar
-from bemt.sections.polars import Polar
+from bemt.sections.polars import RE_FIXED, Polar
 
 if TYPE_CHECKING:
     from geometry.duct import Duct
@@ -36,6 +36,8 @@ Array = NDArray[np.float64]
 
 # Slope of the loads with onset speed: central difference over this share of the tip speed.
 _SPEED_STEP = 2e-3
+# Section speeds over those without induction; tables beyond them are left out.
+_SLOWEST, _FASTEST = 0.4, 1.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +116,19 @@ class Model:
     def exit_area_m2(self) -> float:
         """Exit area of the duct, NaN without one [m2]."""
         return math.nan if self.duct is None else self.duct.wake_ratio * self.rotor.annulus_area
+
+    def at_speeds(self, rpm: ArrayLike, V: ArrayLike, air: Air) -> Model:
+        """Model with the tables of the Reynolds numbers that these points reach: the same loads, prepared sooner.
+
+        rpm [rev/min], V [m/s] and air broadcast together.
+        """
+        blade = self.rotor.blade
+        omega, onset = np.multiply(rpm, math.pi / 30.0), np.abs(V)
+        per_m = np.broadcast_arrays(omega, onset, np.asarray(air.rho) / air.mu)
+        Re = np.hypot(per_m[0][..., None] * blade.r, per_m[1][..., None]) * blade.chord * per_m[2][..., None]
+        # effects read the tables at two Reynolds numbers besides
+        low, high = min(_SLOWEST * float(Re.min()), RE_FIXED), max(_FASTEST * float(Re.max()), RE_FAST)
+        return replace(self, re_range=(low, high), _kept={})
 
     @property
     def prep(self) -> solver.Prepared:

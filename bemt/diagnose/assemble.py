@@ -62,11 +62,8 @@ def _part(record: Record, case: Case, baseline: str) -> Part:
     omega = record.rpm * np.pi / 30.0
     speed = np.hypot(omega * R, record.V)
     top = min(1.25, float(np.max(speed / record.air.a_sound)) * 1.12 + 0.03)
-    chord = model.rotor.blade.chord
-    ratio = record.air.rho / record.air.mu
-    re_low = 0.15 * float(np.min(speed * ratio)) * float(np.min(chord))
-    re_high = 1.3 * float(np.max(speed * ratio)) * float(np.max(chord))
-    model = replace(model, mach_max=top, re_range=(re_low, re_high), _kept=_Recent())
+    reached = model.at_speeds(record.rpm, record.V, record.air)
+    model = replace(reached, mach_max=top, _kept=_Recent())
     plain = [e for e in model.effects if not bem.acts_on_points(e)]
     flow = bem.flow_of(model.prepared(plain), record.rpm, record.V, record.air, record.extra, model.chord75_m)
     part = Part(record, model, model.effects, flow, case.content_hash(), tuple(case.get("model.effects_off")))

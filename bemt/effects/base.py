@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+# Reynolds number that represents blades where the Mach number matters.
+RE_FAST = 5e5
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -224,8 +227,8 @@ class Baking:
 
     @property
     def fast(self) -> slice:
-        """The Reynolds number nearest to 5e5, which represents blades where the Mach number matters."""
-        i = int(np.argmin(np.abs(np.log(self.Re / 5e5))))
+        """The Reynolds number nearest to RE_FAST."""
+        i = int(np.argmin(np.abs(np.log(self.Re / RE_FAST))))
         return slice(i, i + 1)
 
     @property

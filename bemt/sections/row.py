@@ -115,9 +115,9 @@ def _others(z: NDArray[np.complex128], period: complex) -> Array:
     out = np.zeros((z.size, z.size))
     for x, w in zip(0.5 * (1.0 + _GAUSS_X), 0.5 * _GAUSS_W, strict=True):
         zeta = (1j * np.pi / period) * (z[:, None] - (a + x * d)[None, :])
-        small = np.abs(zeta) < 1e-6
-        zeta = np.where(small, 1.0, zeta)
-        value = np.where(small, 0.0, np.log(np.abs(np.sinh(zeta) / zeta))) * (w * L)
+        size2 = zeta.real**2 + zeta.imag**2
+        ratio2 = (np.sinh(zeta.real) ** 2 + np.sin(zeta.imag) ** 2) / np.maximum(size2, 1e-12)
+        value = 0.5 * np.log(np.where(size2 < 1e-12, 1.0, ratio2)) * (w * L)
         out[:, :-1] += (1.0 - x) * value
         out[:, 1:] += x * value
     return out

@@ -155,8 +155,9 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
 
     def run(changed: Case, stations: int | None = None, what: str = "") -> tuple[Any, Dataset]:
         nonlocal done
-        ready = prepare_case(changed, None, stations)
-        result = ready.solve(*_conditions(case, points, changed), threads)
+        at = _conditions(case, points, changed)
+        ready = prepare_case(changed, None, stations).at_speeds(*at)
+        result = ready.solve(*at, threads)
         done += 1
         if progress is not None:
             progress(done, steps, what)
