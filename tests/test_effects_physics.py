@@ -518,6 +518,19 @@ def test_the_lip_by_advance_separates_at_rest_first() -> None:
     assert np.array_equal(found.T, T0)
 
 
+def test_the_lip_by_turning_is_that_of_a_straight_duct() -> None:
+    # a straight duct by momentum: jet speed Ve, thrust rho A Ve (Ve - V), of which the rotor's is rho A (Ve^2 - V^2) / 2
+    flow, _ = ducted([0.0] * 3, V=[0.0, 8.0, 16.0])
+    jet = np.array([20.0, 20.0, 16.0])
+    mass = flow.rho * flow.area
+    rotor, whole = 0.5 * mass * (jet**2 - flow.V**2), mass * jet * (jet - flow.V)
+    found = Loads(whole.copy(), flow.Q0.copy(), whole - rotor)
+    np.testing.assert_allclose(whole - rotor, 0.5 * mass * (jet - flow.V) ** 2, atol=1e-12)
+    LipSeparation(onset=0.01, loss=0.6, width=1.0, by="turning").loads(found, flow)
+    np.testing.assert_allclose(whole - found.T, 0.6 * (whole - rotor), atol=1e-9)
+    assert np.array_equal(found.Q, flow.Q0)
+
+
 def test_the_lip_remembers() -> None:
     up_down = [2.0, 5.5, 8.0, 10.0, 8.0, 5.5, 2.0]
     flow, found = ducted(up_down, time_s=np.arange(7.0))

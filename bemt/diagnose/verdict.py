@@ -46,7 +46,8 @@ EARNED = 8.0
 """Log odds that each effect of a pair must add to the other alone: small model errors are not a second cause [1]."""
 ENOUGH, LEAST, EXPECTED = 8.0, 5.0, 2.5
 """Log odds over none (about 4 sigma) from which a name is given at all; of what no error of the solver can look like,
-since there is a reference or it follows a recorded variable of its own; of physics known to be left out [1]."""
+since there is a reference or it follows a recorded variable of its own, other than a drift; of physics known to be
+left out [1]."""
 PROVEN, PREDICTS = 20.0, 0.9
 """Below the first (log odds) an explanation must lower the error on left-out blocks to the second, a ratio; physics
 that is on already needs the first in any case, to be on differently [1]."""
@@ -237,10 +238,13 @@ class Asked:
         if self.on or self.expected:
             return PROVEN if self.on else EXPECTED
         recorded = self.found.problem.covariates
-        apart = all(any(v in recorded for v in effects.catalogue()[i].along) for i in self.leading)
+        chosen = [effects.catalogue()[i] for i in self.leading]
+        apart = all(any(v in recorded for v in e.along) for e in chosen)
         if self.real:
             return ENOUGH if apart else PROVEN
-        return LEAST if apart or not self.alone else ENOUGH
+        # noise with a memory looks like a drift
+        creeps = any(e.fault == "drift" for e in chosen)
+        return LEAST if not self.alone or (apart and not creeps) else ENOUGH
 
     @cached_property
     def unlisted(self) -> float:

@@ -25,7 +25,9 @@ class LipSeparation(Effect):
     A lip also stalls because of the flow direction, at any load: the stagnation point moves outside as V/(nD) falls,
     and the suction peak is sharpest at rest (Kuchemann and Weber 1953, Aerodynamics of Propulsion, ch. 4; not checked).
     ``by`` = "advance" uses 1 - J / Jmax instead of the load: ``onset`` is then that share of the range from the largest
-    J of the recording to J = 0.
+    J of the recording to J = 0. ``by`` = "turning" asks the flow that turns into the mouth instead of the duct's thrust,
+    which in flight is what wall and exit leave of it: a lip's suction is rho A w^2 / 2, as of a straight duct by
+    momentum, with w = T / (rho A (V_e - V)) - V and V_e^2 = V^2 + 2 (T - T_duct) / (rho A).
     """
 
     onset: float = 0.7
@@ -50,7 +52,7 @@ class LipSeparation(Effect):
 
     def __post_init__(self) -> None:
         """Refuse unknown measures."""
-        choice("by", self.by, ("load", "advance"))
+        choice("by", self.by, ("load", "advance", "turning"))
 
     def applies(self, flow: Flow) -> str:
         """An open rotor has no lip."""
@@ -58,10 +60,12 @@ class LipSeparation(Effect):
 
     def loads(self, loads: Loads, flow: Flow) -> None:
         """Take the lost share off the duct's thrust."""
-        top = np.max(loads.T_duct, initial=0.0, where=np.isfinite(loads.T_duct))
+        suction = _suction(loads, flow) if self.by == "turning" else loads.T_duct
+        top = np.max(suction, initial=0.0, where=np.isfinite(suction))
         if not (flow.ducted and top > 0.0):
             return
-        load = np.maximum(loads.T_duct / top, 0.0)
+        suction = np.maximum(suction, 0.0)
+        load = suction / top
         if self.by == "advance":
             fastest = float(np.max(flow.J, initial=0.0))
             if not fastest > 0.0:
@@ -69,7 +73,7 @@ class LipSeparation(Effect):
             load = 1.0 - np.clip(flow.J / fastest, 0.0, 1.0)
         low = np.where(self._separated(load, flow), self.onset * (1.0 - self.hysteresis), self.onset)
         span = self.width * low if self.width > 0.0 else 1.0 - low
-        lost = self.loss * np.clip((load - low) / span, 0.0, 1.0) * np.maximum(loads.T_duct, 0.0)
+        lost = self.loss * np.clip((load - low) / span, 0.0, 1.0) * suction
         loads.T = loads.T - lost
         loads.T_duct = loads.T_duct - lost
 
@@ -84,11 +88,11 @@ class LipSeparation(Effect):
         return state
 
     def variants(self) -> tuple[dict[str, str | float], ...]:
-        """Seven onsets and six losses in ratio, at once and bit by bit, with and without hysteresis; four by V/(nD)."""
-        losses = (0.1, 0.2, 0.35, 0.5, 0.7, 1.0)
+        """Seven onsets and six losses in ratio, at once and bit by bit, the load's with hysteresis; four by V/(nD)."""
+        onsets, losses = (0.02, 0.04, 0.08, 0.16, 0.32, 0.6, 0.85), (0.1, 0.2, 0.35, 0.5, 0.7, 1.0)
         by_load: tuple[dict[str, str | float], ...] = tuple(
             {"onset": o, "loss": k, "hysteresis": h, "width": w, "by": "load"}
-            for o in (0.02, 0.04, 0.08, 0.16, 0.32, 0.6, 0.85)
+            for o in onsets
             for k in losses
             for h in (0.0, 0.2)
             for w in (0.0, 1.0)
@@ -97,4 +101,16 @@ class LipSeparation(Effect):
             {"onset": o, "loss": k, "hysteresis": 0.0, "width": 0.0, "by": "advance"}
             for o in (0.1, 0.35, 0.6, 0.85) for k in losses
         )  # fmt: skip
-        return by_load + by_advance
+        by_turning: tuple[dict[str, str | float], ...] = tuple(
+            {"onset": o, "loss": k, "hysteresis": 0.0, "width": w, "by": "turning"}
+            for o in onsets for k in losses for w in (0.0, 1.0)
+        )  # fmt: skip
+        return by_load + by_advance + by_turning
+
+
+def _suction(loads: Loads, flow: Flow) -> Array:
+    """Thrust of the lip of a straight duct, by momentum, (P,) [N]."""
+    mass, V = flow.rho * flow.area, np.maximum(flow.V, 0.0)
+    rise = np.sqrt(V**2 + 2.0 * np.maximum(loads.T - loads.T_duct, 0.0) / mass) - V
+    through = np.divide(np.maximum(loads.T, 0.0), mass * rise, out=V.copy(), where=rise > 0.0)
+    return np.asarray(0.5 * mass * np.maximum(through - V, 0.0) ** 2)
