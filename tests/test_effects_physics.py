@@ -519,7 +519,7 @@ def test_the_lip_by_advance_separates_at_rest_first() -> None:
 
 
 def test_the_lip_by_turning_is_that_of_a_straight_duct() -> None:
-    # a straight duct by momentum: jet speed Ve, thrust rho A Ve (Ve - V), of which the rotor's is rho A (Ve^2 - V^2) / 2
+    # momentum: thrust rho A Ve (Ve - V) at jet speed Ve, of which the rotor's is rho A (Ve^2 - V^2) / 2
     flow, _ = ducted([0.0] * 3, V=[0.0, 8.0, 16.0])
     jet = np.array([20.0, 20.0, 16.0])
     mass = flow.rho * flow.area

@@ -25,9 +25,9 @@ class LipSeparation(Effect):
     A lip also stalls because of the flow direction, at any load: the stagnation point moves outside as V/(nD) falls,
     and the suction peak is sharpest at rest (Kuchemann and Weber 1953, Aerodynamics of Propulsion, ch. 4; not checked).
     ``by`` = "advance" uses 1 - J / Jmax instead of the load: ``onset`` is then that share of the range from the largest
-    J of the recording to J = 0. ``by`` = "turning" asks the flow that turns into the mouth instead of the duct's thrust,
-    which in flight is what wall and exit leave of it: a lip's suction is rho A w^2 / 2, as of a straight duct by
-    momentum, with w = T / (rho A (V_e - V)) - V and V_e^2 = V^2 + 2 (T - T_duct) / (rho A).
+    J of the recording to J = 0. ``by`` = "turning" uses the flow that turns into the mouth, since in flight the duct's
+    thrust is what wall and exit leave of it: the suction of a lip is rho A w^2 / 2, by momentum as of a straight duct,
+    with w = T / (rho A (V_e - V)) - V and V_e^2 = V^2 + 2 (T - T_duct) / (rho A).
     """
 
     onset: float = 0.7
