@@ -8,6 +8,9 @@ import numpy as np
 
 from bemt.effects.base import Effect, Flow, Parameter
 
+# Advance ratio up to which the air is at rest.
+_STILL = 0.03
+
 
 @dataclass(frozen=True)
 class TunnelBlockage(Effect):
@@ -17,7 +20,8 @@ class TunnelBlockage(Effect):
     -----
     V'/V = 1 - tau alpha / (2 sqrt(1 + 2 tau)), tau = T / (rho A V^2), alpha disk over test-section area (Glauert 1935,
     Airplane Propellers, ch. VIII; in this form in Barlow, Rae and Pope 1999, Low-Speed Wind Tunnel Testing; not checked
-    against the books).  Acts where V > 0: a static test has no free airspeed to correct.
+    against the books). A static test has no free airspeed to correct; below J = 0.03 an airspeed is the noise of its
+    sensor (declared), and the correction would be largest there.
     """
 
     area_ratio: float = 0.05
@@ -32,10 +36,10 @@ class TunnelBlockage(Effect):
 
     def applies(self, flow: Flow) -> str:
         """Only airspeed can be corrected."""
-        return "" if np.any(flow.V > 0.0) else "no point has airspeed"
+        return "" if np.any(flow.J > _STILL) else "no point has airspeed"
 
     def flow(self, flow: Flow) -> None:
         """Lower the airspeed to the equivalent free one."""
         load = flow.T0 / (flow.rho * flow.area)
         root = np.sqrt(np.maximum(flow.V**2 + 2.0 * load, 0.25 * flow.V**2 + 1e-12))
-        flow.V = flow.V - np.where(flow.V > 0.0, 0.5 * self.area_ratio * load / root, 0.0)
+        flow.V = flow.V - np.where(flow.J > _STILL, 0.5 * self.area_ratio * load / root, 0.0)
