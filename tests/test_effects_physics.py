@@ -313,6 +313,8 @@ def test_blockage_is_glauert_s() -> None:
     np.testing.assert_allclose(V[1:] / flow.V[1:], 1.0 - 0.06 * tau / (2.0 * np.sqrt(1.0 + 2.0 * tau)), rtol=1e-12)
     T, T0 = flow_loads(flow, TunnelBlockage(area_ratio=0.06))[0], flow_loads(flow)[0]
     assert T[0] == T0[0] and np.all(T[1:] > T0[1:])
+    still = recorded([6000.0] * 3, [0.0, 0.05, 0.2])  # what a pitot reads in a room
+    assert np.array_equal(met(still, TunnelBlockage(area_ratio=0.06)).V, still.V)
 
 
 def test_a_nacelle_costs_drag_and_slows_the_root() -> None:
