@@ -54,6 +54,23 @@ def test_an_inviscid_law_errs_over_advance_ratio_only() -> None:
     assert noise.law_of(effects.catalogue()["thrust_gain"]) == ()
 
 
+@pytest.mark.parametrize("slope", [0.0, 2e-4, -1e-3])
+def test_noise_of_the_thermometer_is_no_air(slope: float) -> None:
+    """Predicted loads follow the air, and it does not flicker; what really changes stays."""
+    t = np.linspace(0.0, 600.0, 60)
+    truth = 290.0 + slope * t
+    given = {"rpm": np.tile(np.linspace(4000.0, 9000.0, 6), 10), "time_s": t, "thrust_N": np.ones(60)}
+
+    def air(temperature: np.ndarray) -> np.ndarray:
+        values = {**given, "temperature_K": temperature}
+        return np.asarray(record.from_series(Dataset("bench", "x", values), case()).air.temperature_K)
+
+    noisy = truth + 0.1 * np.random.default_rng(3).standard_normal(60)
+    assert np.sqrt(np.mean((air(noisy) - truth) ** 2)) < 0.35 * 0.1
+    steps = truth + np.where(t > 200.0, 4.0, 0.0) + np.where(t > 400.0, -7.0, 0.0)  # a door, then a heater
+    assert np.array_equal(air(steps), steps)
+
+
 @pytest.mark.parametrize("walls", [None, (0.1, 0.4)])
 def test_a_parameter_that_the_recording_replaces_is_no_parameter(walls: tuple[float, float] | None) -> None:
     """The recorded distance of a wall stands for the assumed one; what the readings do not know is not reported."""

@@ -45,6 +45,8 @@ _AIR_LIMITS = (
     ("temperature_K", 150.0, 400.0, "Celsius under a heading in kelvin, or no sensor connected?"),
     ("pressure_Pa", 1e3, 2.5e6, "Wrong unit in the heading?"),
 )
+# Noise of a thermometer: rows of a run that show it, von Neumann's ratio (2 of noise, 0 of a curve), largest size [K].
+_AIR_ROWS, _AIR_RATIO, _AIR_NOISE = 12, 1.5, 0.5
 # More points than this tell no more of their scatter.
 _MOST_COMPARED = 2000
 MAX_POINTS = 160
@@ -128,6 +130,7 @@ def from_series(series: Dataset, case: Case, correlated: Mapping[str, Mapping[st
     """Points of a series with the conditions that the case adds."""
     notes: list[str] = []
     n = len(series)
+    series = _without_flicker(series)
     values = {key: np.asarray(v, dtype=float) for key, v in series.values.items()}
     if "rpm" not in values:
         values["rpm"] = np.full(n, case.rpm)
@@ -186,6 +189,26 @@ def from_series(series: Dataset, case: Case, correlated: Mapping[str, Mapping[st
         {k: float(v["zero"]) for k, v in correlated.items() if v.get("zero")}, recorded, tuple(notes),
     ).take(np.flatnonzero(keep))  # fmt: skip
     return _thinned(record)
+
+
+def _without_flicker(series: Dataset) -> Dataset:
+    """Series whose air has no noise of the thermometer, which would enter every predicted load by the density."""
+    T, t = series.values.get("temperature_K"), series.values.get("time_s")
+    if T is None or t is None or not (np.isfinite(T).all() and np.isfinite(t).all()):
+        return series
+    T = np.array(T, dtype=float)
+    run = np.asarray(series.values.get("run", np.zeros(T.size)))
+    for label in np.unique(run):
+        rows = np.flatnonzero(run == label)
+        rows = rows[np.argsort(t[rows], kind="stable")]
+        x = t[rows] - t[rows[0]]
+        if rows.size < _AIR_ROWS or not x[-1] > 0.0:
+            continue
+        slow = np.polynomial.Polynomial.fit(x, T[rows], 2)(x)
+        rest = T[rows] - slow
+        if np.std(rest) < _AIR_NOISE and np.sum(np.diff(rest) ** 2) > _AIR_RATIO * np.sum(rest**2):
+            T[rows] = slow
+    return replace(series, values={**series.values, "temperature_K": T})
 
 
 def _repeated(keep: NDArray[np.bool_], columns: Sequence[Array]) -> NDArray[np.bool_]:
