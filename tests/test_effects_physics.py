@@ -361,6 +361,15 @@ def test_airspeed_offset_leaves_static_points_alone_and_never_blows_backwards() 
     assert met(flow, AirspeedOffset(-0.5)).V.tolist() == [0.0, 0.0, 5.5]
 
 
+def test_a_pitot_that_reads_nothing_at_rest_does_not_read_too_much() -> None:
+    live = recorded([6000.0] * 3, [0.01, -0.02, 6.0])
+    assert [AirspeedOffset(v).plausible(live) for v in (-1.0, -0.2, 0.0, 1.0)] == [False, True, True, True]
+    low = recorded([6000.0] * 2, [-0.7, 5.3])  # its zero is 0.7 m/s too low
+    assert met(low, AirspeedOffset(0.7)).V.tolist() == [0.0, 6.0]
+    assert AirspeedOffset(-1.0).plausible(recorded([6000.0] * 2, [0.0, 6.0])), "typed as static"
+    assert AirspeedOffset(-1.0).plausible(recorded([6000.0] * 2, [1.1, 6.0])), "it reads too much at rest"
+
+
 # ---- what is written down
 
 

@@ -8,6 +8,9 @@ import numpy as np
 
 from bemt.effects.base import Effect, Flow, Parameter
 
+# Air that may blow back at a rotor at rest [m/s].
+_DRAUGHT = 0.3
+
 
 @dataclass(frozen=True)
 class AirspeedOffset(Effect):
@@ -16,7 +19,8 @@ class AirspeedOffset(Effect):
     Notes
     -----
     Draught in the hall or zero of the pitot transducer: 0.15 Pa is 0.5 m/s in still air. Range +-1 m/s is declared.
-    Points recorded at V = 0 are treated as static and stay so; a negative speed counts as zero.
+    Points recorded at V = 0 are treated as static and stay so; a wind does not turn round. A live sensor that reads
+    nearly nothing at rest does not read too much.
     """
 
     offset_m_s: float = 0.5
@@ -37,4 +41,10 @@ class AirspeedOffset(Effect):
 
     def flow(self, flow: Flow) -> None:
         """Shift the airspeed."""
-        flow.V = np.where(flow.V > 0.0, np.maximum(flow.V + self.offset_m_s, 0.0), flow.V)
+        shifted = flow.V + self.offset_m_s
+        flow.V = np.select([flow.V > 0.0, flow.V < 0.0], [np.maximum(shifted, 0.0), shifted], flow.V)
+
+    def plausible(self, flow: Flow) -> bool:
+        """No live reading becomes a wind against the rotor."""
+        live = flow.V[flow.V != 0.0]
+        return live.size == 0 or self.offset_m_s >= -max(float(np.min(live)), 0.0) - _DRAUGHT
