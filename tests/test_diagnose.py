@@ -71,6 +71,17 @@ def test_noise_of_the_thermometer_is_no_air(slope: float) -> None:
     assert np.array_equal(air(steps), steps)
 
 
+def test_settings_that_are_joined_stand_for_what_they_were_solved_with() -> None:
+    """Where a recording cannot tell two onsets from each other, neither of them becomes the default."""
+    given = {k: v[:6] for k, v in points("static").items()}
+    duct = case("ds30")
+    built = assemble.build([record.from_series(recording(duct, given), duct)], [duct])
+    (lip,) = signatures.candidates(built, ["lip_separation"])[0]
+    for k, setting in enumerate(lip.settings):
+        again = built.signature((signatures.effect_of("lip_separation", setting),))
+        np.testing.assert_allclose(again, lip.signatures[:, k], atol=1e-9 * np.abs(built.y).max())
+
+
 @pytest.mark.parametrize("walls", [None, (0.1, 0.4)])
 def test_a_parameter_that_the_recording_replaces_is_no_parameter(walls: tuple[float, float] | None) -> None:
     """The recorded distance of a wall stands for the assumed one; what the readings do not know is not reported."""

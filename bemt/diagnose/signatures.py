@@ -168,16 +168,29 @@ def _candidate(problem: Problem, name: str, cls: type[Effect]) -> Candidate | No
 
 
 def _merged(columns: Sequence[_Column]) -> list[_Column]:
-    """Join settings that change the readings alike; a parameter in which they differ is not at work and is dropped."""
+    """Join settings that change the readings alike; a parameter that nowhere matters is not at work and is dropped."""
     groups: dict[bytes, list[int]] = {}
     for k, column in enumerate(columns):
         groups.setdefault(column[1].tobytes(), []).append(k)
+    shared = [(columns[group[0]][0], [columns[k][0] for k in group]) for group in groups.values()]
+    differing = {n for first, some in shared for n, v in first.items() if any(q.get(n) != v for q in some)}
+    idle = {n for n in differing if _idle(n, columns)}
     out = []
     for group in groups.values():
         setting, signature, solved, _ = columns[group[0]]
-        same = {n: v for n, v in setting.items() if all(columns[k][0].get(n) == v for k in group)}
-        out.append((same, signature, solved, sum(columns[k][3] for k in group)))
+        told = {n: v for n, v in setting.items() if n not in idle}
+        out.append((told, signature, solved, sum(columns[k][3] for k in group)))
     return out
+
+
+def _idle(name: str, columns: Sequence[_Column]) -> bool:
+    """Whether settings that differ in one parameter only change the readings alike, all of them."""
+    seen: dict[tuple[Any, ...], bytes] = {}
+    for setting, signature, *_ in columns:
+        others = tuple(sorted((n, v) for n, v in setting.items() if n != name))
+        if seen.setdefault(others, signature.tobytes()) != signature.tobytes():
+            return False
+    return True
 
 
 def _grid(problem: Problem, cls: type[Effect], axes: Sequence[Any]) -> Iterator[_Column]:

@@ -27,7 +27,8 @@ class LipSeparation(Effect):
     ``by`` = "advance" uses 1 - J / Jmax instead of the load: ``onset`` is then that share of the range from the largest
     J of the recording to J = 0. ``by`` = "turning" uses the flow that turns into the mouth, since in flight the duct's
     thrust is what wall and exit leave of it: the suction of a lip is rho A w^2 / 2, by momentum as of a straight duct,
-    with w = T / (rho A (V_e - V)) - V and V_e^2 = V^2 + 2 (T - T_duct) / (rho A).
+    with w = T / (rho A (V_e - V)) - V and V_e^2 = V^2 + 2 (T - T_duct) / (rho A). ``onset`` is a share of the largest
+    w^2, so that thinner air does not change it.
     """
 
     onset: float = 0.7
@@ -43,10 +44,10 @@ class LipSeparation(Effect):
         "hysteresis"
     )
     parameters = (
-        Parameter("onset", "1", 0.01, 0.95, "declared; share of the largest duct thrust", 4),
+        Parameter("onset", "1", 0.005, 0.95, "declared; share of the largest duct thrust", 4),
         Parameter("loss", "1", 0.0, 1.0, "share of the duct's thrust, Martin and Tung 2004", 3, 0.0),
         Parameter("hysteresis", "1", 0.0, 0.3, "declared", 2),
-        Parameter("width", "1", 0.0, 2.0, "declared; a lip stalls at once or bit by bit", 2),
+        Parameter("width", "1", 0.0, 4.0, "declared; a lip stalls at once or bit by bit", 2),
     )
     on_by_default = False
 
@@ -60,12 +61,13 @@ class LipSeparation(Effect):
 
     def loads(self, loads: Loads, flow: Flow) -> None:
         """Take the lost share off the duct's thrust."""
-        suction = _suction(loads, flow) if self.by == "turning" else loads.T_duct
-        top = np.max(suction, initial=0.0, where=np.isfinite(suction))
+        gained = _gained(loads, flow)
+        suction = 0.5 * flow.rho * flow.area * gained**2 if self.by == "turning" else loads.T_duct
+        measure = gained**2 if self.by == "turning" else suction
+        top = np.max(measure, initial=0.0, where=np.isfinite(measure))
         if not (flow.ducted and top > 0.0):
             return
-        suction = np.maximum(suction, 0.0)
-        load = suction / top
+        suction, load = np.maximum(suction, 0.0), np.maximum(measure, 0.0) / top
         if self.by == "advance":
             fastest = float(np.max(flow.J, initial=0.0))
             if not fastest > 0.0:
@@ -88,29 +90,26 @@ class LipSeparation(Effect):
         return state
 
     def variants(self) -> tuple[dict[str, str | float], ...]:
-        """Seven onsets and six losses in ratio, at once and bit by bit, the load's with hysteresis; four by V/(nD)."""
+        """Onsets and losses in ratio: by the load with hysteresis, by V/(nD), by turning at once and bit by bit."""
         onsets, losses = (0.02, 0.04, 0.08, 0.16, 0.32, 0.6, 0.85), (0.1, 0.2, 0.35, 0.5, 0.7, 1.0)
         by_load: tuple[dict[str, str | float], ...] = tuple(
-            {"onset": o, "loss": k, "hysteresis": h, "width": w, "by": "load"}
-            for o in onsets
-            for k in losses
-            for h in (0.0, 0.2)
-            for w in (0.0, 1.0)
-        )
+            {"onset": o, "loss": k, "hysteresis": h, "width": 0.0, "by": "load"}
+            for o in onsets for k in losses for h in (0.0, 0.2)
+        )  # fmt: skip
         by_advance: tuple[dict[str, str | float], ...] = tuple(
             {"onset": o, "loss": k, "hysteresis": 0.0, "width": 0.0, "by": "advance"}
             for o in (0.1, 0.35, 0.6, 0.85) for k in losses
         )  # fmt: skip
         by_turning: tuple[dict[str, str | float], ...] = tuple(
             {"onset": o, "loss": k, "hysteresis": 0.0, "width": w, "by": "turning"}
-            for o in onsets for k in losses for w in (0.0, 1.0)
+            for o in (0.01, *onsets) for k in losses for w in (0.0, 1.0, 3.0)
         )  # fmt: skip
         return by_load + by_advance + by_turning
 
 
-def _suction(loads: Loads, flow: Flow) -> Array:
-    """Thrust of the lip of a straight duct, by momentum, (P,) [N]."""
+def _gained(loads: Loads, flow: Flow) -> Array:
+    """Speed that the flow gains on its way into a straight duct, by momentum, (P,) [m/s]."""
     mass, V = flow.rho * flow.area, np.maximum(flow.V, 0.0)
     rise = np.sqrt(V**2 + 2.0 * np.maximum(loads.T - loads.T_duct, 0.0) / mass) - V
     through = np.divide(np.maximum(loads.T, 0.0), mass * rise, out=V.copy(), where=rise > 0.0)
-    return np.asarray(0.5 * mass * np.maximum(through - V, 0.0) ** 2)
+    return np.asarray(np.maximum(through - V, 0.0))
