@@ -69,7 +69,7 @@ def _references(case: Case) -> list[reference_file.Reference]:
 def spread(discrete: bool, nominal: Array, at: Sequence[Array]) -> Array:
     """Give the standard uncertainty from one assumption, (P,)."""
     if discrete:
-        return np.asarray(np.std(at, axis=0))
+        return np.asarray(np.std(np.subtract(at, nominal), axis=0))  # equal values have no spread, to the last bit
     low, high = at
     slope, sag = 0.5 * (high - low), 0.5 * (high + low) - nominal
     return np.asarray(np.sqrt(slope**2 / 3.0 + 4.0 * sag**2 / 45.0))
