@@ -44,7 +44,7 @@ class LipSeparation(Effect):
         "hysteresis"
     )
     parameters = (
-        Parameter("onset", "1", 0.005, 0.95, "declared; share of the largest duct thrust", 4),
+        Parameter("onset", "1", 0.005, 0.95, "declared; share of the largest value of what ``by`` asks", 4),
         Parameter("loss", "1", 0.0, 1.0, "share of the duct's thrust, Martin and Tung 2004", 3, 0.0),
         Parameter("hysteresis", "1", 0.0, 0.3, "declared", 2),
         Parameter("width", "1", 0.0, 4.0, "declared; a lip stalls at once or bit by bit", 2),
