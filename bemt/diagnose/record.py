@@ -130,7 +130,7 @@ def from_series(series: Dataset, case: Case, correlated: Mapping[str, Mapping[st
     """Points of a series with the conditions that the case adds."""
     notes: list[str] = []
     n = len(series)
-    series = _without_flicker(series)
+    series = _without_flicker(series, notes)
     values = {key: np.asarray(v, dtype=float) for key, v in series.values.items()}
     if "rpm" not in values:
         values["rpm"] = np.full(n, case.rpm)
@@ -191,13 +191,14 @@ def from_series(series: Dataset, case: Case, correlated: Mapping[str, Mapping[st
     return _thinned(record)
 
 
-def _without_flicker(series: Dataset) -> Dataset:
+def _without_flicker(series: Dataset, notes: list[str]) -> Dataset:
     """Series whose air has no noise of the thermometer, which would enter every predicted load by the density."""
     T, t = series.values.get("temperature_K"), series.values.get("time_s")
     if T is None or t is None or not (np.isfinite(T).all() and np.isfinite(t).all()):
         return series
     T = np.array(T, dtype=float)
     run = np.asarray(series.values.get("run", np.zeros(T.size)))
+    largest = 0.0
     for label in np.unique(run):
         rows = np.flatnonzero(run == label)
         rows = rows[np.argsort(t[rows], kind="stable")]
@@ -208,6 +209,10 @@ def _without_flicker(series: Dataset) -> Dataset:
         rest = T[rows] - slow
         if np.std(rest) < _AIR_NOISE and np.sum(np.diff(rest) ** 2) > _AIR_RATIO * np.sum(rest**2):
             T[rows] = slow
+            largest = max(largest, float(np.std(rest)))
+    if not largest > 0.0:
+        return series
+    notes.append(f"temperature: scatter of {largest:.2g} K is the thermometer's; the slow course of each run is used")
     return replace(series, values={**series.values, "temperature_K": T})
 
 

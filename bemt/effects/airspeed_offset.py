@@ -18,7 +18,7 @@ class AirspeedOffset(Effect):
 
     Notes
     -----
-    Draught in the hall or zero of the pitot transducer: 0.15 Pa is 0.5 m/s in still air. Range +-1 m/s is declared.
+    Draught in the hall or zero of the pitot transducer: 0.15 Pa is 0.5 m/s in still air. The range is declared.
     Points recorded at V = 0 are treated as static and stay so; a wind does not turn round. A live sensor that reads
     nearly nothing at rest does not read too much.
     """
