@@ -81,7 +81,7 @@ def test_a_second_preparation_is_the_same(ready: solver.Prepared, batch: solver.
 
 
 @pytest.mark.parametrize("case", ["ds30", "prop_8x5"])
-@pytest.mark.parametrize("rpm", [300.0, 6000.0, 20000.0])
+@pytest.mark.parametrize("rpm", [300.0, 6000.0, 20000.0, 34000.0])
 def test_tables_that_are_not_reached_do_not_matter(project: Path, case: str, rpm: float) -> None:
     model = prepare_case(load_case(project / "cases" / case))
     at = rpm, rpm / 1000.0, AIR

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import lru_cache
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, cast
 
@@ -38,11 +39,16 @@ def coefficients(model: Model, air: Air) -> Solve:
     drawn = tuple(e for e in model.effects if not isinstance(e, AsBuilt))
     states = air_fields(air)
 
+    @lru_cache(maxsize=2)  # rotors of a difference are used once
+    def built(z: bytes) -> Model:
+        numbers = np.frombuffer(z)
+        if numbers.any():
+            return replace(model, effects=(*drawn, as_built(numbers)), _kept={})
+        return model if len(drawn) == len(model.effects) else replace(model, effects=drawn, _kept={})
+
     def solve(z: Array, rpm: Array, J: Array, which: NDArray[np.intp]) -> Array:
         at = air_of_points({k: v[which] if v.size > 1 else v for k, v in states.items()})
-        effects = (*drawn, as_built(z)) if z.any() else drawn
-        # its own shelf of prepared rotors: those of a difference are used once
-        found = replace(model, effects=effects, _kept={}).solve(rpm, J * rpm / 60.0 * model.diameter_m, at)
+        found = built(z.tobytes()).solve(rpm, J * rpm / 60.0 * model.diameter_m, at)
         return np.array([found.CT, found.CP])
 
     return solve

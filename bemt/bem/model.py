@@ -118,7 +118,7 @@ class Model:
         return math.nan if self.duct is None else self.duct.wake_ratio * self.rotor.annulus_area
 
     def at_speeds(self, rpm: ArrayLike, V: ArrayLike, air: Air) -> Model:
-        """Model with the tables of the Reynolds numbers that these points reach: the same loads, prepared sooner.
+        """Model with the tables of the Reynolds and Mach numbers that these points reach: same loads, prepared sooner.
 
         rpm [rev/min], V [m/s] and air broadcast together.
         """
@@ -128,7 +128,8 @@ class Model:
         Re = np.hypot(per_m[0][..., None] * blade.r, per_m[1][..., None]) * blade.chord * per_m[2][..., None]
         # effects read the tables at two Reynolds numbers besides
         low, high = min(_SLOWEST * float(Re.min()), RE_FIXED), max(_FASTEST * float(Re.max()), RE_FAST)
-        return replace(self, re_range=(low, high), _kept={})
+        mach = _FASTEST * float(np.max(np.hypot(omega * blade.R, onset) / air.a_sound))
+        return replace(self, re_range=(low, high), mach_max=min(mach, self.mach_max), _kept={})
 
     @property
     def prep(self) -> solver.Prepared:
