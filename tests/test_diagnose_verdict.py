@@ -205,6 +205,10 @@ ROWS: dict[str, dict[str, Any]] = {
         "leading": Explanation.of("untwist"),
         "parameters": {"untwist": {"tip_deg": {"low": -0.1, "high": 0.5}}},
     },
+    "a wrong unit, but which": {
+        "leading": Explanation.of("unit_slip"),
+        "parameters": {"unit_slip": {"factor": {"value": 3.28, "odds": [[3.28, 0.5], [3.6, 0.48]]}}},
+    },
     "another blade, or anything that scales all loads": {"another_blade": True},
     "at the end of its range": {
         "leading": Explanation.of("untwist", "duct"),

@@ -14,13 +14,16 @@ from bemt.effects.duct import DuctEffect
 if TYPE_CHECKING:
     from bemt.diagnose.problem import Problem
 
-__all__ = ["EVIDENT", "LEFT_OUT", "PRESENT", "PRIOR", "log_priors", "present", "prior_weights"]
+__all__ = ["BOTH", "EVIDENT", "LEFT_OUT", "PRESENT", "PRIOR", "log_priors", "present", "prior_weights"]
 
 PRIOR = {"none": 0.35, "single": 0.55, "pair": 0.05, "unknown": 0.05}
 """Prior probability of the kinds of explanation; shared within a kind by the weights of the effects. [1]"""
 LEFT_OUT, PRESENT = 50.0, 0.2
 """Weight of an effect of every real rotor that the baseline leaves out, and of one that the baseline has, with other
 parameters, beside 1 for all others [1]."""
+BOTH = 0.01
+"""The same of what blade and air do in every run, where the baseline has it and a reference is given: two runs do not
+differ in it [1]."""
 EVIDENT = 0.2
 """The same of what anybody at the stand would see: a second rotor is seldom overlooked [1]."""
 
@@ -30,7 +33,10 @@ def prior_weights(problem: Problem, ids: Sequence[str]) -> dict[str, float]:
     usual = {e.id for e in effects.standard()} | {i for p in problem.parts for i in p.left_out}
     on = present(problem)
     rest = {i: EVIDENT if effects.catalogue()[i].evident else 1.0 for i in ids}
-    return {i: PRESENT if i in on else LEFT_OUT if i in usual else rest[i] for i in ids}
+    there = dict.fromkeys(on, PRESENT)
+    if any(p.record.reference for p in problem.parts):
+        there |= {e.id: BOTH for e in effects.standard() if e.id in on and not e.along}
+    return {i: there[i] if i in on else LEFT_OUT if i in usual else rest[i] for i in ids}
 
 
 def present(problem: Problem) -> set[str]:

@@ -35,6 +35,7 @@ from bemt.diagnose.verdict import (
     levels_only,
     mass,
     twins,
+    unsettled,
 )
 
 __all__ = ["BESIDE_IT", "RULES", "Rule", "decide"]
@@ -283,6 +284,16 @@ RULES: tuple[Rule, ...] = (
         lambda a: a.says("insufficient", f"{a.leading} fits best, but the interval of its size includes zero"),
         "90 % interval",
         "DIAGNOSIS 7: 4 of 5 wrong names, 0 of 42 right ones",
+    ),
+    Rule(
+        "a wrong unit, but which",
+        lambda a: not a.leading.pair and len(a.group) <= 1 and unsettled(*next(iter(a.parameters.items()))),
+        lambda a: a.says(
+            "insufficient",
+            "a wrong unit fits best, but the readings do not say which; a cause of any size may be between two of them",
+        ),
+        "SETTLED",
+        "declared after a proof: a slip of the airspeed by 3.3 or 3.6 was wind from the side",
     ),
     Rule(
         "another blade, or anything that scales all loads",

@@ -70,6 +70,8 @@ ROUGH = 3.0
 """Noise over what the recording states from which on something else is at work than any effect explains [1]."""
 IN_SET, LARGEST = 0.95, 6
 """Share of the probability of one cause that its set holds; most effects of the sets of a pair together [1]."""
+SETTLED = 0.67
+"""Probability of one ratio of units from which a slip is named: between two ratios lies what is no slip [1]."""
 END = 0.01
 """As near to an end of its range, a share of it, a parameter of a pair is at the end [1]."""
 
@@ -403,6 +405,12 @@ def holds_off(name: str, told: Mapping[str, Mapping[str, Any]]) -> bool:
     if len(free) != 1:
         return False
     return all(told[p.name]["low"] <= p.off <= told[p.name]["high"] for p in sizes if p.off is not None)
+
+
+def unsettled(name: str, told: Mapping[str, Mapping[str, Any]]) -> bool:
+    """Whether a wrong unit fits, but the readings do not say which one."""
+    odds = told.get("factor", {}).get("odds", ())
+    return effects.catalogue()[name].fault == "unit" and bool(odds) and max(p for _, p in odds) < SETTLED
 
 
 def mass(found: Evidence, group: Sequence[str]) -> float:

@@ -392,6 +392,8 @@ class Effect:
     # Law of a flow without friction and compressibility: by similarity (Buckingham 1914) its dimensionless form may
     # depend on the advance ratio and on `along`, not on speed or density.
     inviscid: ClassVar[bool] = False
+    # It only changes the shape of the blade or the direction of the flow; the solver itself works out the rest.
+    geometric: ClassVar[bool] = False
     # Anyone at the stand would see it.
     evident: ClassVar[bool] = False
     # A wrongly recorded number: its effect follows from the definition, so the law cannot be off.

@@ -26,6 +26,7 @@ class ObliqueInflow(Effect):
     angle_deg: float = 20.0
 
     id = "oblique_inflow"
+    geometric = True
     inviscid = True
     title = "inflow at an angle to the shaft"
     check = "check with a laser that shaft and tunnel axis are parallel"

@@ -22,6 +22,7 @@ class PitchOffset(Effect):
     offset_deg: float = 1.0
 
     id = "pitch_offset"
+    geometric = True
     title = "wrong blade angle"
     check = "measure the blade angle at 0.75 R relative to the plane of rotation"
     sign = "shifts the advance ratio of zero thrust equally at every speed; a gain or density error does not shift it"

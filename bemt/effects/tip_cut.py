@@ -25,6 +25,7 @@ class TipCut(Effect):
     cut: float = 0.05
 
     id = "tip_cut"
+    geometric = True
     title = "blades shorter than stated"
     sign = "less thrust and even less torque at every speed; the advance ratio of zero thrust hardly moves"
     check = "measure the diameter"

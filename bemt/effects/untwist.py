@@ -25,6 +25,7 @@ class Untwist(Effect):
     tip_deg: float = 1.0
 
     id = "untwist"
+    geometric = True
     title = "elastic blade twist"
     check = "film the tip from the side, stopped and at full speed"
     sign = (
