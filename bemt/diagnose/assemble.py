@@ -84,8 +84,8 @@ def build(records: Sequence[Record], cases: Sequence[Case], baseline: str = "bem
     order = sorted(groups, key=lambda k: k[0])
     problem = assemble(tuple(_part(merged(groups[k][1]), groups[k][0], baseline) for k in order))
     if problem.y.size < _FEWEST:
-        got = f"{problem.y.size} readings with a converged baseline"
-        raise InputError(Fault(records[0].name, "", got, f"{_FEWEST} or more"))
+        got = f"{problem.y.size} with a converged baseline"
+        raise InputError(Fault(records[0].name, "readings", got, f"{_FEWEST} or more"))
     for k, name in enumerate(CHANNELS):
         mine = problem.channel == k
         ratio = float(np.median(np.abs(problem.y[mine])) / np.median(np.abs(problem.f0[mine]))) if mine.any() else 1.0
