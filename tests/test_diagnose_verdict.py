@@ -207,7 +207,12 @@ ROWS: dict[str, dict[str, Any]] = {
     },
     "a wrong unit, but which": {
         "leading": Explanation.of("unit_slip"),
-        "parameters": {"unit_slip": {"factor": {"value": 3.28, "odds": [[3.28, 0.5], [3.6, 0.48]]}}},
+        "parameters": {
+            "unit_slip": {
+                "channel": {"value": "airspeed_m_s"},
+                "factor": {"value": 3.28, "odds": [[3.28, 0.5], [3.6, 0.48]]},
+            }
+        },
     },
     "another blade, or anything that scales all loads": {"another_blade": True},
     "at the end of its range": {

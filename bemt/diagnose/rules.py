@@ -290,7 +290,7 @@ RULES: tuple[Rule, ...] = (
         lambda a: not a.leading.pair and len(a.group) <= 1 and unsettled(*next(iter(a.parameters.items()))),
         lambda a: a.says(
             "insufficient",
-            "a wrong unit fits best, but the readings do not say which; a cause of any size may be between two of them",
+            "a wrong unit of the airspeed fits best, but the readings do not say which one; oblique inflow looks alike",
         ),
         "SETTLED",
         "declared after a proof: a slip of the airspeed by 3.3 or 3.6 was wind from the side",

@@ -71,7 +71,7 @@ ROUGH = 3.0
 IN_SET, LARGEST = 0.95, 6
 """Share of the probability of one cause that its set holds; most effects of the sets of a pair together [1]."""
 SETTLED = 0.67
-"""Probability of one ratio of units from which a slip is named: between two ratios lies what is no slip [1]."""
+"""Probability of one ratio of units from which a slip of the airspeed is named: what lies between two is no slip [1]."""
 END = 0.01
 """As near to an end of its range, a share of it, a parameter of a pair is at the end [1]."""
 
@@ -408,9 +408,13 @@ def holds_off(name: str, told: Mapping[str, Mapping[str, Any]]) -> bool:
 
 
 def unsettled(name: str, told: Mapping[str, Mapping[str, Any]]) -> bool:
-    """Whether a wrong unit fits, but the readings do not say which one."""
-    odds = told.get("factor", {}).get("odds", ())
-    return effects.catalogue()[name].fault == "unit" and bool(odds) and max(p for _, p in odds) < SETTLED
+    """Whether a wrong unit of the airspeed fits, but the readings do not say which one.
+
+    Wind from the side divides the airspeed along the axis by any number; no cause does that to a load.
+    """
+    if effects.catalogue()[name].fault != "unit" or told["channel"]["value"] != "airspeed_m_s":
+        return False
+    return max(p for _, p in told["factor"]["odds"]) < SETTLED
 
 
 def mass(found: Evidence, group: Sequence[str]) -> float:
