@@ -38,7 +38,7 @@ _CLAIMS = ("named", "sensor", "class")
 _AGREE, _WOULD = 0.03, 0.1
 # Probability in the diagnosis from which an effect that no scaling law describes is in the class.
 _LIKELY = 0.1
-_SAME_ROTOR = "make sure that the case is this rotor: both recordings are off it alike"
+_SAME_ROTOR = "make sure that the case is this rotor: both recordings differ from it in the same way"
 _LOADS = {"thrust_N": "thrust", "torque_Nm": "torque"}
 
 
@@ -64,7 +64,7 @@ def beside(
     ``files``: reference and test as a command names them.
     """
     pair = [r for known in (True, False) for r in records if r.reference is known]
-    if len(pair) != 2 or not pair[0].reference or pair[1].reference or _transient(answer):
+    if len(pair) != 2 or not pair[0].reference or pair[1].reference or _transient(answer) or _turned(pair):
         return None
     try:
         runs = [_run(r, diameter_m, f) for r, f in zip(pair, _paths(files) or (None, None), strict=True)]
@@ -116,6 +116,12 @@ def _of_label(answer: Diagnosis) -> bool:
 def _transient(answer: Diagnosis) -> bool:
     """Whether the speed changes within a second in what was recorded: these rows are no steady points."""
     return bool({"inflow_lag", "rotor_inertia"} - answer.absent.keys())
+
+
+def _turned(pair: Sequence[Record]) -> bool:
+    """Whether a load changed its sign: ratios are those of sizes."""
+    sums = [[float(np.nansum(r.measured[k])) for r in pair] for k in _LOADS if all(k in r.measured for r in pair)]
+    return any(a * b < 0.0 for a, b in sums)
 
 
 def _paths(files: Sequence[str] | None) -> list[str]:

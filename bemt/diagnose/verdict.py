@@ -71,7 +71,7 @@ ROUGH = 3.0
 IN_SET, LARGEST = 0.95, 6
 """Share of the probability of one cause that its set holds; most effects of the sets of a pair together [1]."""
 SETTLED = 0.67
-"""Probability of one ratio of units from which a slip of the airspeed is named: what lies between two is no slip [1]."""
+"""Probability of one ratio of units from which a slip of the airspeed is named: between two of them is no slip [1]."""
 END = 0.01
 """As near to an end of its range, a share of it, a parameter of a pair is at the end [1]."""
 
