@@ -60,3 +60,9 @@ def test_two_recordings_that_agree_name_nothing_however_far_they_are_off_the_cas
     a, b = (written(tmp_path / f"{k}.csv", k, level=0.12) for k in (1, 2))
     found = asked(capsys, a, b)
     assert not found["effects"], found["headline"]
+
+
+def test_a_load_that_changed_its_sign_is_not_the_same(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Ratios compare sizes, so they must not say that such recordings agree."""
+    found = asked(capsys, written(tmp_path / "a.csv", 1), written(tmp_path / "b.csv", 2, thrust=-1.0))
+    assert found["verdict"] != "none" and "No change" not in found["headline"], found["headline"]

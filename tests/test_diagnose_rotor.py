@@ -27,7 +27,7 @@ def slipped(what: str) -> Dataset:
 
 
 @pytest.mark.parametrize(
-    ("what", "words"), [("diameter", "diameter 0.2"), ("radius", "radius given as diameter"), ("poles", "7 pole")]
+    ("what", "words"), [("diameter", "diameter 0.2"), ("radius", "twice the diameter"), ("poles", "7 pole")]
 )
 def test_a_rotor_off_by_a_factor_is_a_question_with_the_likely_slip(what: str, words: str) -> None:
     problem = build([from_series(slipped(what), case())], [case()])

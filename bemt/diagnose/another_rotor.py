@@ -93,8 +93,8 @@ def _slips(problem: Problem, found: dict[str, float]) -> Iterator[tuple[str, str
     # loads go with D^4 and D^5 (coefficients stay): least squares over what was measured
     powers = {c: p for c, p in ((T, 4.0), (Q, 5.0)) if c in found}
     k = sum(p * found[c] for c, p in powers.items()) / sum(p * p for p in powers.values())
-    off = abs(k - math.log(2.0)) < 0.1, abs(k + math.log(2.0)) < 0.1
-    hint = ", the radius given as diameter" if any(off) else ""
+    twice, half = abs(k - math.log(2.0)) < 0.1, abs(k + math.log(2.0)) < 0.1
+    hint = ", the case has the radius as diameter" if twice else ", the case has twice the diameter" if half else ""
     size = math.exp(k) * D
     yield "diameter", f"diameter {size:.3g} m ({size / INCH:.3g} in){hint}", {c: p * k for c, p in powers.items()}, 0.5
     for pairs in _POLE_PAIRS:

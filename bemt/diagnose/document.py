@@ -22,6 +22,7 @@ from bemt.diagnose.verdict import inclusion
 if TYPE_CHECKING:
     from bemt.diagnose.chain import Diagnosis
     from bemt.diagnose.locate import Location
+    from bemt.effects import Parameter
 
 __all__ = ["SCHEMA", "document", "explanation", "headline", "text"]
 
@@ -102,7 +103,7 @@ def _where(w: Location) -> str:
     sign = "high" if w.size > 0 else "low"
     both = f"{w.low:.{digits}f} to {w.high:.{digits}f}{unit}" if w.high > w.low else f"{w.low:.{digits}f}{unit}"
     error = abs(w.size / w.z) if w.z else float("nan")
-    spread = "" if not np.isfinite(error) else f" +- {max(error, 1e-4):.1%}"
+    spread = "" if not np.isfinite(error) else f" +- {max(error, 1e-3):.1%}"
     most = "of its largest value" if w.variable == "rpm" and w.high > w.low else "of its largest value at that speed"
     return f"{_CHANNEL[w.channel]} is {sign} by {abs(w.size):.1%}{spread} {most}, at {name} {both}."
 
@@ -126,26 +127,58 @@ def _gain(d: Diagnosis) -> str:
     for channel, s in d.scores.items():
         most = s["largest"] or 1.0
         words.append(
-            f"{_CHANNEL[channel].lower()} {s['holdout_before'] / most:.1%} to {s['holdout_after'] / most:.1%} "
-            f"(noise {s['noise'] / most:.1%}, smooth fit without physics {s['gp_only'] / most:.1%})"
+            f"{_CHANNEL[channel].lower()} {s['holdout_before'] / most:.1%} before, {s['holdout_after'] / most:.1%} "
+            f"after (noise {s['noise'] / most:.1%}, smooth fit without physics {s['gp_only'] / most:.1%})"
         )
-    return f"Error on held-out {d.blocks}, of the largest value: " + "; ".join(words) + "."
+    return f"Prediction error on {d.blocks} left out of the fit, of the largest value: " + "; ".join(words) + "."
 
 
 def _parameters(d: Diagnosis) -> str:
-    words = []
+    """What the parameters may be: effect by effect, named where there are two."""
+    each = []
     for i, found in d.parameters.items():
-        ranges, left = {p.name: p.high - p.low for p in effects.catalogue()[i].parameters}, []
+        of = {p.name: p for p in effects.catalogue()[i].parameters}
+        words, left = [], []
         for k, v in found.items():
-            if isinstance(v["value"], float) and v["high"] - v["low"] > _OPEN * ranges.get(k, np.inf):
+            if isinstance(v["value"], float) and v["high"] - v["low"] > _OPEN * (of[k].high - of[k].low):
                 left.append(k)
             elif isinstance(v["value"], float):
-                unit = "" if v["unit"] in ("1", "") else f" {v['unit']}"
-                words.append(f"{i} {k} {v['value']:.3g} ({v['low']:.3g} to {v['high']:.3g}){unit}{_odds(v)}")
+                low, value, high = (_sized(of[k], v[part]) for part in ("low", "value", "high"))
+                words.append(f"{k} {value} ({low} to {high}){_in_units(d, i, k, v['value'])}{_odds(v)}")
             elif v["value"] is not None:
-                words.append(f"{i} {k} {v['value']}{_odds(v)}")
-        words += [f"{i} {' and '.join(left)} not determined"] if left else []
-    return ", ".join(words)
+                words.append(f"{k} {v['value']}{_odds(v)}")
+        words += [f"{' and '.join(left)} not determined"] if left else []
+        if words:
+            each.append((f"{i} " if len(d.parameters) > 1 else "") + ", ".join(words))
+    return "; ".join(each)
+
+
+def _sized(p: Parameter, value: float, form: str = ".3g") -> str:
+    """Number with its unit; a share of something in percent."""
+    if p.unit == "1" and p.off == 0.0 and max(abs(p.low), abs(p.high)) <= 0.5:
+        return f"{100.0 * value:{form}} %"
+    return f"{value:{form}}" if p.unit in ("1", "") else f"{value:{form}} {p.unit}"
+
+
+def _with_size(d: Diagnosis, name: str) -> str:
+    """Title of a named effect and, where one number is its size, that number."""
+    cls, found = effects.catalogue()[name], d.parameters.get(name, {})
+    if cls.fault == "unit" and "unit" in found:
+        return f"{cls.title} ({found['channel']['value']}: {found['unit']['value']})"
+    sizes = [(p, found[p.name]["value"]) for p in cls.parameters if p.off is not None and p.steps and p.name in found]
+    if len(sizes) != 1 or not isinstance(sizes[0][1], float):
+        return cls.title
+    return f"{cls.title} ({_sized(*sizes[0], '+.3g')})"
+
+
+def _in_units(d: Diagnosis, name: str, parameter: str, value: float) -> str:
+    """The same of a shifted cell, in the unit of its channel."""
+    channel = effects.catalogue()[name].sensor
+    scales = [p.full_scale for p in d.problem.parts if not p.record.reference]
+    if parameter != "zero" or not scales or channel not in scales[0]:
+        return ""
+    unit = {"thrust_N": "N", "torque_Nm": "N m", "rpm": "rev/min"}[channel]
+    return f" of the largest reading, {value * max(s[channel] for s in scales):.3g} {unit}"
 
 
 def _odds(told: dict[str, Any]) -> str:
@@ -180,7 +213,8 @@ def explanation(d: Diagnosis) -> list[str]:
     if decision.verdict in ("named", "sensor"):
         told = _parameters(d)
         lines.append(
-            f"Named: {', '.join(decision.effects)} ({decision.probability:.2f})." + (f" {told}." if told else "")
+            f"Named: {', '.join(decision.effects)} (probability {decision.probability:.2f})"
+            + (f": {told}." if told else ".")
         )
         signs = [catalogue[i].sign for i in decision.effects if catalogue[i].sign]
         if signs:
@@ -194,7 +228,7 @@ def explanation(d: Diagnosis) -> list[str]:
                      + ", ".join(f"{i} ({catalogue[i].title})" for i in decision.effects) + ".")  # fmt: skip
     elif decision.verdict == "unknown":
         kernel = d.found.states[0].best_rival
-        lines.append(f"The cause is not in the library: {decision.why}. It looks like {kernel}.")
+        lines.append(f"The cause is not in the library: {decision.why}. It shows in {kernel}.")
     else:
         lines.append(f"No name is given (p = {d.p_value:.2g}): {decision.why}.")
     lines.append(_gain(d))
@@ -214,9 +248,8 @@ def _next(d: Diagnosis) -> list[str]:
         return []
     gain = ""
     if step.separates:
-        gain = (
-            f" (separates {' from '.join(step.separates)}: {step.before:.1f} to {step.after:.1f} standard deviations)"
-        )
+        both = f"{step.after:.1f} instead of {step.before:.1f}"
+        gain = f" (tells {' from '.join(step.separates)} at {both} standard deviations)"
     return [f"Next: {step.text}{gain}.", *(f"  {command}" for command in step.commands)]
 
 
@@ -248,10 +281,9 @@ def headline(d: Diagnosis) -> str:
         return f"Recording and model differ ({off}), within the uncertainty of calibration, blade and solver; no cause."
     if said.verdict == "none":
         return "Recording and model agree within noise, calibration and the uncertainty of the model."
-    if said.verdict == "named":
-        return f"Cause found: {' and '.join(titles)}."
-    if said.verdict == "sensor":
-        return f"Cause found in the stand, not the air: {' and '.join(titles)}."
+    if said.verdict in ("named", "sensor"):
+        where = "" if said.verdict == "named" else " in the stand, not the air"
+        return f"Cause found{where}: {' and '.join(_with_size(d, i) for i in said.effects)}."
     if said.verdict == "class":
         if said.rule == BESIDE_IT:
             return f"Cause found: {titles[0]}. Possibly also: {' or '.join(titles[1:])}."
@@ -278,12 +310,15 @@ def text(d: Diagnosis) -> str:
     """Lines, and the tables behind them."""
     found = d.found
     first, *rest = explanation(d)
+    # it explains little and takes lines
+    last = [line for line in rest if line.startswith("Not tried: ")]
     said = d.ratios or d.decision
     named = f" {', '.join(said.effects)}" if said.effects else ""
     out = [textwrap.fill(first, 110), f"verdict: {said.verdict}{named}"]
     # a command stays in one line, to be copied
     out += [f"  {line}" if line.startswith("  ") else
-            textwrap.fill(line, 110, initial_indent="  ", subsequent_indent="    ") for line in rest]  # fmt: skip
+            textwrap.fill(line, 110, initial_indent="  ", subsequent_indent="    ")
+            for line in rest if line not in last]  # fmt: skip
     size = dict(zip(d.alike.ids, d.alike.size, strict=True))
     rows = []
     for name, p in sorted(found.probability.items(), key=lambda kv: -kv[1])[:_SHOWN]:
@@ -304,4 +339,5 @@ def text(d: Diagnosis) -> str:
     out.append(f"\n  p = {d.p_value:.3g}; noise x{h.scale:g} {beside}, correlation {h.ar:g}, "
                f"solver error {h.model:.0%}; {d.problem.y.size} readings")  # fmt: skip
     out += [f"  note: {note}" for note in d.problem.notes]
+    out += [textwrap.fill(line, 110, initial_indent="  ", subsequent_indent="    ") for line in last]
     return "\n".join(out)

@@ -188,7 +188,8 @@ def text(answer: Plan) -> str:
         out.append(f"  cannot be distinguished: {', '.join(group)}")
     if answer.added is not None:
         a = answer.added
-        out.append(f"  to add: {a.text} (separates {' from '.join(a.separates)}: {a.before:.1f} to {a.after:.1f})")
+        both = f"{a.after:.1f} instead of {a.before:.1f}"
+        out.append(f"  to add: {a.text} (tells {' from '.join(a.separates)} at {both} standard deviations)")
     out += [f"  not visible: {i}: {why}" for i, why in answer.absent.items()]
     out += [f"  note: {note}" for note in answer.notes]
     return "\n".join(out)

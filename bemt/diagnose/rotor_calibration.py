@@ -99,8 +99,8 @@ def text(doc: dict[str, Any]) -> str:
         "angle_deg": "blade angle", "lift": "lift (ln)", "drag": "drag (ln)",
         "low_re_lift": "lift at low Reynolds number (ln per ln)", "camber_deg": "zero-lift angle lower by",
     }  # fmt: skip
-    state = "stands still" if doc["converged"] else "DID NOT CONVERGE"
-    lines = [f"{doc['case']}: {doc['points']} points of {', '.join(doc['reference'])}; {state}, steps: {doc['steps']}"]
+    state = f"{'converged' if doc['converged'] else 'NOT CONVERGED'} after {doc['steps']} iterations"
+    lines = [f"{doc['case']}: {doc['points']} points of {', '.join(doc['reference'])}; {state}"]
     lines.append(
         f"{'rotor as built, beyond its ' + doc['known_from']:42} {'before':>8} {'u':>7}   {'after':>8} {'u':>7}"
     )

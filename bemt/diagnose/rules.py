@@ -146,7 +146,7 @@ def _nothing(a: Asked, why: str, verdict: str = "none") -> Decision:
 
 
 def _by_chance(a: Asked) -> str:
-    return f"in {a.p_value:.0%} of simulated recordings without a cause the mismatch is as large"
+    return f"a mismatch as large occurs by chance in {a.p_value:.0%} of simulated recordings without a cause"
 
 
 def _left(a: Asked) -> Decision:

@@ -414,7 +414,7 @@ def unsettled(name: str, told: Mapping[str, Mapping[str, Any]]) -> bool:
     """
     if effects.catalogue()[name].fault != "unit" or told["channel"]["value"] != "airspeed_m_s":
         return False
-    return max(p for _, p in told["factor"]["odds"]) < SETTLED
+    return bool(max(p for _, p in told["factor"]["odds"]) < SETTLED)
 
 
 def mass(found: Evidence, group: Sequence[str]) -> float:
