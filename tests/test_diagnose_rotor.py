@@ -47,6 +47,16 @@ def test_one_channel_in_another_unit_stays_a_finding_of_its_own() -> None:
     assert all(abs(share) <= 1.0 for share in answer.off.values()) and abs(answer.where.size) <= 1.0
 
 
+def test_a_speed_in_another_unit_is_solved_at_the_speed_that_it_was() -> None:
+    """Tables for the recorded speeds only would leave a rest, and a second cause for it."""
+    base = case()
+    series, plain = recording(base, points("grid"), noise=0.005), recording(base, points("grid"), noise=0.005, seed=1)
+    slow = Dataset("bench", "log", {**series.values, "rpm": series.values["rpm"] * np.pi / 30.0}, dict(series.u))
+    answer = chain.diagnose([from_series(slow, base), replace(from_series(plain, base), reference=True)], [base])
+    assert answer.decision.effects == ("unit_slip",)
+    assert answer.parameters["unit_slip"]["unit"]["value"] == "rad/s"
+
+
 @pytest.mark.parametrize(("thrust", "torque", "said"), [(0.78, 0.78, ("air_density",)), (0.815, 0.676, ())])
 def test_density_moves_thrust_and_torque_by_the_same_share(thrust: float, torque: float, said: tuple[str, ...]) -> None:
     """Another propeller than that of the reference moves them by two shares: no density does, and nothing is named."""

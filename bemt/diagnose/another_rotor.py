@@ -34,6 +34,8 @@ RESTLESS = 0.10
 # What loads of the right rotor may be off by, natural logarithm; how unusual a slip is adds to its square.
 _OFF = 0.25
 _SHOWN = 3
+# A slip this much farther from the loads than the nearest one may still be it.
+_NEARLY = 1.0
 _POLE_PAIRS = (2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 14, 16, 18, 20, 21)
 _ANGLES_DEG = (-12.0, -9.0, -6.0, -3.0, 3.0, 6.0, 9.0, 12.0, 16.0)
 _BLADES = (1, 2, 3, 4, 5, 6, 8, 12)
@@ -45,8 +47,9 @@ _SLIPS = ("unit_slip", "rpm_scale")
 
 @dataclass(frozen=True)
 class Suspect:
-    """A slip in words, and how far it leaves the loads (root of a chi-square) [1]."""
+    """A slip: its kind, in words, and how far it leaves the loads (root of a chi-square) [1]."""
 
+    kind: str
     words: str
     distance: float
 
@@ -81,7 +84,7 @@ def suspects(problem: Problem) -> list[Suspect]:
     for kind, words, shift, rarity in _slips(problem, found):
         square = sum((found[c] - shift.get(c, 0.0)) ** 2 for c in found) / _OFF**2 + rarity
         if kind not in out or square < out[kind].distance ** 2:
-            out[kind] = Suspect(words, math.sqrt(square))
+            out[kind] = Suspect(kind, words, math.sqrt(square))
     return sorted(out.values(), key=lambda s: s.distance)
 
 
@@ -152,7 +155,8 @@ def finding(problem: Problem) -> str:
     if not _suspicious(found):
         told = " and ".join(f"{names[c]} by {s:.0%}" for c, s in _restless(problem).items())
         return f"at one speed the readings differ, {told}: what changes between them is not recorded" if told else ""
-    off = " and ".join(f"{names[c]} is {number_text(v, 3)} times" for c, v in found.items())
+    turned = {c: " of the other sign," if v < 0.0 else "" for c, v in found.items()}
+    off = " and ".join(f"{names[c]} is{turned[c]} {number_text(abs(v), 3)} times" for c, v in found.items())
     ranked = "; ".join(f"{k}. {s.words}" for k, s in enumerate(suspects(problem)[:_SHOWN], 1))
     return f"{off} what the case gives. Is it this rotor? Most likely: {ranked}"
 
@@ -166,10 +170,19 @@ def judged(problem: Problem, decision: Decision) -> Decision:
         return replace(decision, verdict="insufficient", classes=(), why=_CONTRADICTED)
     sure = decision.effects[:1] if decision.rule == BESIDE_IT else decision.effects
     slip = (decision.verdict in ("named", "sensor") or decision.rule == BESIDE_IT) and set(sure) & set(_SLIPS)
-    if slip or not _suspicious(levels(problem)):
+    if not _suspicious(levels(problem)) or (slip and not _odd_speed(problem, slip)):
         return decision
     why = f"the loads are off by more than a factor of {FACTOR:g}: first check that the case describes this rotor"
     return replace(decision, verdict="insufficient", effects=(), classes=(), why=why)
+
+
+def _odd_speed(problem: Problem, slip: set[str]) -> bool:
+    """Whether a wrong speed is named that is none of pole pairs or units, while another rotor explains the loads."""
+    if "rpm_scale" not in slip:
+        return False
+    ranked = suspects(problem)
+    speed = min((s.distance for s in ranked if s.kind in ("poles", "speed")), default=math.inf)
+    return speed > ranked[0].distance + _NEARLY
 
 
 def of_recorded(

@@ -23,6 +23,9 @@ __all__ = ["Part", "Problem"]
 
 Array = NDArray[np.float64]
 
+# Speeds over the recorded ones beyond which the tables of these do not reach.
+_SLOWER, _FASTER = 0.7, 1.1
+
 
 @dataclass(frozen=True, eq=False)
 class Part:
@@ -71,7 +74,8 @@ class Part:
         # instruments do not change the flow: what they show of the same flow needs no new solution
         key = tuple(e for e in effects if not bem.only_reads(e))
         if key not in self._solved:
-            loads, met, ok = bem.respond(self.model.prepared, key, self.flow)
+            model = self._whole if self._far(key) else self.model
+            loads, met, ok = bem.respond(model.prepared, key, self.flow)
             nan = np.where(ok, 1.0, np.nan)
             self._solved[key] = loads.T * nan, loads.Q * nan, met
         T, Q, met = self._solved[key]
@@ -82,6 +86,23 @@ class Part:
         for e in effects:
             e.reading(reading, met)
         return np.concatenate([reading.values[c] for c in self.channels])
+
+    @cached_property
+    def _whole(self) -> bem.Model:
+        """Model with the tables of all speeds."""
+        return replace(self.model, re_range=None, mach_max=bem.Model.mach_max, _kept={})
+
+    def _far(self, effects: Sequence[Effect]) -> bool:
+        """Whether what an instrument got wrong takes the rotor to speeds that the tables of the recorded ones lack."""
+        wrong = [e for e in effects if e.kind == "stand" and not bem.only_reads(e)]
+        if not wrong:
+            return False
+        flow = self.flow
+        met = replace(flow, rpm=flow.rpm.copy(), V=flow.V.copy(), rho=flow.rho.copy())
+        for e in wrong:
+            e.flow(met)
+        recorded, real = (np.hypot(f.omega * f.R, f.V) for f in (flow, met))
+        return bool(np.max(real) > _FASTER * np.max(recorded) or np.min(real) < _SLOWER * np.min(recorded))
 
     def turned(self, blade: Effect) -> tuple[Effect, ...]:
         """Baseline with another blade."""
