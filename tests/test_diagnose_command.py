@@ -44,6 +44,19 @@ def test_an_improved_case_stands_as_long_as_its_answer_does(tmp_path: Path) -> N
     assert not (out / "case.toml").exists()
 
 
+def test_the_speed_of_the_case_in_place_of_a_recorded_one_is_the_first_remark(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "log.csv"
+    file.write_text("airspeed_m_s,thrust_N\n" + "".join(f"{v},{6 - v / 4}\n" for v in range(8)))
+    command = ["diagnose", str(file), "--case", str(CASES / "prop_8x5"), "--only", "thrust_gain"]
+    assert main(command) == 0
+    remarks = [line for line in capsys.readouterr().out.splitlines() if line.startswith("  ")]
+    assert "log.csv: rpm: not recorded;" in remarks[0] and "rev/min of the case" in remarks[0]
+    assert main([*command, "--rpm", "6000"]) == 0
+    assert "not recorded; 6000" not in capsys.readouterr().out
+
+
 def test_each_case_has_its_improved_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Only that of the first was written. Those of an earlier answer go, whatever cases it had."""
     names, out = ["prop_8x5", "prop_10x5"], tmp_path / "out"

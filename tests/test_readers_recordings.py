@@ -628,6 +628,35 @@ def test_a_heading_that_is_not_understood_gets_its_nearest_meaning_and_the_line_
     assert said(got, "'Trust' thrust") and said(got, '[columns] thrust = { column = "Trust", unit = "N" }')
 
 
+@pytest.mark.parametrize(("more", "lines"), [
+    ("", ("'speed' rpm or airspeed", 'rpm = { column = "speed", unit = "rpm" }',
+          'airspeed = { column = "speed", unit = "m_s" }')),
+    ("airspeed_m_s", ("'speed' rpm.",)), ("rpm", ("'speed' airspeed.",)),
+])  # fmt: skip
+def test_a_bare_speed_is_offered_as_the_one_that_is_missing(more: str, lines: tuple[str, ...], write: Write) -> None:
+    got = importers.read(write(f"speed,thrust_N,{more or 'torque_Nm'}\n400,3,4000\n600,7,6000\n"))
+    assert all(said(got, line) for line in lines)
+
+
+@pytest.mark.parametrize(("heading", "cell", "words"), [
+    ("speed", "{}", "a speed without a unit"), ("n (1/s)", "{}", "a speed without a unit"),
+    ("speed", "{} rad/s", "a speed as text"), ("rpm_12_magnets", "{}", "a speed under a name of its own"),
+])  # fmt: skip
+def test_a_speed_in_doubt_is_never_replaced_by_that_of_the_case(
+    heading: str, cell: str, words: str, write: Write, project: Path
+) -> None:
+    from bemt.case import load_case
+    from bemt.diagnose.load import load
+
+    rows = "".join(f"{cell.format(n)},{n * n / 1e5:.3f},{n * n / 4e6:.4f}\n" for n in range(500, 1500, 100))
+    file, case = str(write(f"{heading},thrust_N,torque_Nm\n{rows}")), load_case(project / "cases" / "prop_10x5")
+    with pytest.raises(InputError) as caught:
+        load(file, case)
+    (fault,) = caught.value.faults
+    assert fault.file == file and fault.where == f"column {heading}" and fault.got.startswith(words)
+    assert load(file, case, rpm=6000.0).rpm.tolist() == [6000.0] * 10, "stated, it is no guess"
+
+
 def test_electrical_rpm_is_asked_about_only_where_the_numbers_leave_doubt(write: Write) -> None:
     text = "rpm,thrust_N\n{},1\n{},4\n"
     slow, fast = (importers.read(write(text.format(top / 2, top), f"{top}.csv")) for top in (9000, 60000))
