@@ -17,7 +17,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
 from bemt.case import find_cases, load_case
 from bemt.case.prepare import prepare_case
-from bemt.compare.stand_run import one_rotor
+from bemt.compare.stand_run import one_rotor, speed_in_doubt
 from bemt.dataset import Dataset
 from bemt.diagnose import cfd_points
 from bemt.diagnose import record as records
@@ -72,7 +72,7 @@ def load(
         made = records.from_series(cfd_points.point_of(imported, path, rpm, airspeed_m_s), case)
         return replace(made, notes=(*made.notes, *imported.notes))
     imported = _filled(imported, rpm, airspeed_m_s)
-    _speed_in_doubt(imported, path)
+    speed_in_doubt(imported, path)
     _same_rotor(imported, case, path)
     ducted = case.ducted
     findings = check(imported, diameter_m=case.diameter_m, blades=int(case.get("rotor.blades")), ducted=ducted)
@@ -111,42 +111,6 @@ def _filled(imported: Dataset, rpm: float | None, airspeed_m_s: float | None) ->
     values = {**imported.values, **told}
     units = {k: unit for k, unit in imported.units.items() if k not in told}
     return replace(imported, values=values, units=units, notes=(*imported.notes, *notes)) if notes else imported
-
-
-def _speed_in_doubt(imported: Dataset, path: str) -> None:
-    """Refuse a file whose speed is there but cannot be read: the speed of the case would replace it."""
-    from bemt.readers._headings import may_be_shaft_speed
-
-    if "rpm" in named(imported).values:
-        return
-    headings, faults = imported.provenance.get("headings", {}), []
-    for name, v in imported.values.items():
-        heading, unit = headings.get(name) or name, imported.unit(name)
-        apart = name.startswith("u_") or "err" in name.split("_") or not np.any(np.nan_to_num(v))
-        if not apart and not unit and may_be_shaft_speed(heading):
-            faults.append(_no_unit(path, heading, "a speed without a unit"))
-        elif not apart and unit in ("rpm", "rad_s"):
-            line = f'[columns] rpm = {{ column = "{heading}", unit = "{unit}" }}'
-            hint = f"If it is the speed of this rotor, head it rpm, or write in recording.toml: {line}"
-            hint += "; electrical_rpm with pole_pairs if it counts electrical revolutions"
-            got, expected = f"a speed under a name of its own ({name})", "one column that is the speed of the rotor"
-            faults.append(Fault(path, f"column {heading}", got, expected, hint))
-    for name, cells in imported.texts.items():
-        heading = headings.get(name) or name
-        if may_be_shaft_speed(heading) and sum(cell.strip()[:1].isdigit() for cell in cells) > len(cells) / 2:
-            faults.append(_no_unit(path, heading, f"a speed as text, such as {cells[0].strip()[:20]!r}"))
-    if faults:
-        raise InputError(faults)
-
-
-def _no_unit(path: str, heading: str, got: str) -> Fault:
-    base = heading.split("(")[0].split("[")[0].strip()
-    hint = (
-        f"Head it {base} (rev/min) or {base} (rad/s). If it is the airspeed, head it airspeed_m_s. --rpm N states one "
-        "speed for all rows"
-    )
-    expected = "numbers with a unit in the heading, or a recording.toml that names column and unit"
-    return Fault(path, f"column {heading}", got, expected, hint)
 
 
 def _step_responses(imported: Dataset, rows: Dataset, points: Dataset) -> bool:

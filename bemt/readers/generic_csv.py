@@ -96,7 +96,7 @@ def convert(table: SplitTable | NumberTable, decimal: str = ".") -> Dataset:
     for k, head in enumerate(heads):
         build.add(k, head, decimal)
     if not table.headings:
-        build.warnings.append("no heading line: columns are numbered")
+        build.warnings.append("no heading line: columns are numbered; a recording.toml with header = false names them")
     if decimal == ",":
         build.warnings.append("decimal commas read as decimal points")
     build.flag_time()
