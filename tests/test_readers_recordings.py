@@ -657,6 +657,18 @@ def test_a_speed_in_doubt_is_never_replaced_by_that_of_the_case(
     assert load(file, case, rpm=6000.0).rpm.tolist() == [6000.0] * 10, "stated, it is no guess"
 
 
+@pytest.mark.parametrize("head", [
+    "value_N_or_Nm", "reading_ozf_or_ozf_in", "load (N or Nm)", "load [gf or N]",
+    "thrust_N_or_gf", "speed rpm or rad_s",
+    "thrust_N_or_torque_Nm",
+])  # fmt: skip
+def test_a_heading_with_two_units_has_none(head: str, write: Write) -> None:
+    got = importers.read(write(f"rpm,{head}\n4000,3\n6000,7\n"))
+    (name,) = set(got.values) - {"rpm"}
+    assert got.unit(name) == "" and got[name].tolist() == [3.0, 7.0]
+    assert said(got, repr(head)) and said(got, "one column holds one unit")
+
+
 def test_electrical_rpm_is_asked_about_only_where_the_numbers_leave_doubt(write: Write) -> None:
     text = "rpm,thrust_N\n{},1\n{},4\n"
     slow, fast = (importers.read(write(text.format(top / 2, top), f"{top}.csv")) for top in (9000, 60000))

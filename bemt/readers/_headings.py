@@ -305,7 +305,30 @@ def _weight(text: str) -> str:
     return unit if isinstance(unit_of(unit), units.Unit) else ""
 
 
+def _unit_at_end(text: str) -> str:
+    """Longest end of a text that is a unit, or a mass or the like that stands for one; "" without one."""
+    parts = re.split(r"[_ (\[]+", text.strip(" )]"))
+    ends = ("_".join(parts[k:]) for k in range(len(parts)))
+    return next((end for end in ends if unit_of(end) != ""), "")
+
+
+def _either(text: str) -> str:
+    """Doubt about a heading that names two units with an "or" between them; "" for any other.
+
+    >>> _either("value_N_or_Nm")
+    'N or Nm: one column holds one unit; give each quantity a column of its own'
+    >>> _either("CT_or_CP")
+    ''
+    """
+    first, *rest = (_unit_at_end(part) for part in re.split(r"[_ ]or[_ ]", text, flags=re.IGNORECASE))
+    if not rest or not first or not all(rest):
+        return ""
+    return f"{' or '.join([first, *rest])}: one column holds one unit; give each quantity a column of its own"
+
+
 def _heading(text: str) -> Heading:
+    if either := _either(text):
+        return Heading(text, slug(text), None, either)
     base, unit, doubt = text, None, ""
     found = re.fullmatch(r"(.*?)\s*[\(\[]\s*([^()\[\]]*?)\s*[\)\]]\s*", text)
     if found:
