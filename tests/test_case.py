@@ -134,6 +134,27 @@ def test_units_are_only_another_way_to_write_the_same(tmp_path: Path, old: str, 
     assert other.key() == one.key()
 
 
+@pytest.mark.parametrize(("name", "diameter", "pitch", "where", "hint"), [
+    ("mine", "diameter_mm = 10", "pitch_in = 6", "rotor.diameter_mm", "inches: write diameter_in = 10 or"),
+    ("mine", "diameter_in = 10", "pitch_mm = 6", "blade.pitch_mm", "inches: write pitch_in = 6 or pitch_mm = 152.4"),
+    ("mine", "diameter_m = 0.254", "pitch_mm = 6", "blade.pitch_mm", "inches: write pitch_in = 6"),
+    ("mine", "diameter_in = 10", "pitch_in = 100", "blade.pitch_in", "millimetres: write pitch_mm = 100"),
+    ("mine", "diameter_mm = 51", "pitch_in = 20", "blade.pitch_in", "diameter_mm = 1295; or pitch_in"),
+    ("mine", "diameter_in = 10", "pitch_in = 0.3", "blade.pitch_in", ""),
+    ("prop_10x6", "diameter_mm = 10", "pitch_in = 6", "rotor.diameter_mm", "inches: write diameter_in = 10"),
+    ("prop_10x6", "diameter_mm = 10", "pitch_mm = 6", "rotor.diameter_mm", "inches: write diameter_in = 10"),
+    ("prop_5x4", "diameter_in = 127", "pitch_mm = 3000", "rotor.diameter_in", "millimetres: write diameter_mm = 127"),
+])  # fmt: skip
+def test_the_length_with_the_wrong_unit_is_the_one_that_is_named(
+    tmp_path: Path, name: str, diameter: str, pitch: str, where: str, hint: str
+) -> None:
+    text = f'schema = "bemt.case/1"\nname = "{name}"\nrotor.blades = 2\nrotor.{diameter}\nblade.{pitch}\n'
+    with pytest.raises(InputError) as caught:
+        load_case(write(tmp_path, text + "operating.rpm = 1000\n"))
+    (fault,) = caught.value.faults
+    assert fault.where == where and hint in fault.hint and bool(fault.hint) == bool(hint)
+
+
 def test_override_replaces_the_quantity_in_whatever_unit_it_was(tmp_path: Path) -> None:
     case = load_case(write(tmp_path, GOOD.replace("diameter_in = 10", "diameter_mm = 254")))
     changed = case.replaced({"rotor.diameter_in": 8.0, "operating.rpm": 1234.0})
