@@ -134,6 +134,32 @@ def test_units_are_only_another_way_to_write_the_same(tmp_path: Path, old: str, 
     assert other.key() == one.key()
 
 
+@pytest.mark.parametrize(("old", "new", "said"), [
+    ("rpm = 6000", "rpm = 942 rad/s", "the number alone, in rev/min. 942 rad/s = 8995 rev/min: write rpm = 8995."),
+    ("rpm = 6000", "rpm = 6000rpm  # no blank", "the number alone, in rev/min. Write rpm = 6000."),
+    ("rpm = 6000", 'rpm = "942 rad/s"', "a number from 10 to 300000 rev/min. 942 rad/s = 8995 rev/min"),
+    ("pitch_in = 5", "pitch_in = 127 mm", "the number alone, in inches. 127 mm = 5 inches: write pitch_in = 5."),
+    ("pitch_in = 5", 'pitch_in = 5"', "expected the number alone, in inches. Write pitch_in = 5."),
+    ("pitch_in = 5", "pitch_in = 5 kg", "The unit of pitch is inches, as its key says."),
+    ("blades = 2", "blades = 2 pcs", "got more text after a value"),
+])  # fmt: skip
+def test_a_unit_behind_a_number_is_refused_with_the_number_that_the_key_wants(
+    tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    assert GOOD.count(old) == 1
+    with pytest.raises(InputError) as caught:
+        load_case(write(tmp_path, GOOD.replace(old, new)))
+    (fault,) = caught.value.faults
+    assert said in str(fault)
+
+
+def test_all_units_behind_numbers_are_told_at_once(tmp_path: Path) -> None:
+    text = GOOD.replace("diameter_in = 10", "diameter_in = 10 in").replace("rpm = 6000", "rpm = 100 rev/s")
+    with pytest.raises(InputError, match="write rpm = 6000") as caught:
+        load_case(write(tmp_path, text))
+    assert len(caught.value.faults) == 2
+
+
 @pytest.mark.parametrize(("name", "diameter", "pitch", "where", "hint"), [
     ("mine", "diameter_mm = 10", "pitch_in = 6", "rotor.diameter_mm", "inches: write diameter_in = 10 or"),
     ("mine", "diameter_in = 10", "pitch_mm = 6", "blade.pitch_mm", "inches: write pitch_in = 6 or pitch_mm = 152.4"),
