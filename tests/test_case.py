@@ -258,7 +258,7 @@ def test_hash_follows_every_file_and_no_path(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("make", "got"),
-    [(lambda p: p / "nothing", "nothing there"), (lambda p: p, "no case")],
+    [(lambda p: p / "nothing", "no such file or folder"), (lambda p: p, "no case")],
 )
 def test_paths_without_a_case(tmp_path: Path, make: object, got: str) -> None:
     with pytest.raises(InputError) as caught:
