@@ -249,6 +249,31 @@ def test_rpm_zero_and_spikes_are_kept_and_flagged(write: Write) -> None:
     assert got["electrical_rpm"][[0, 12, 20]].tolist() == [66434.0, 0.0, 99999.0]
 
 
+def test_a_flag_of_a_row_is_one_of_its_point(write: Write) -> None:
+    """A spike that is kept says so in the table of points; what a reduction drops is not called kept."""
+    lines = rc_text(4).split("\n")
+    cells = lines[1].split(",")
+    cells[RC_HEAD.split(",").index("Motor Electrical Speed (RPM)")] = "400000"
+    lines[1] = ",".join(cells)
+    got = rcbenchmark.read(write("\n".join(lines)))
+    assert said(got, "spike of electrical_rpm in 1 row (line 2): flagged") and not said(got, "kept")
+    points = reduce(got)
+    assert points["rpm"][0] == 400000.0 and points.flags[0] == ("spike of electrical_rpm",)
+    assert not any(points.flags[1:])
+
+
+def test_a_stopped_motor_whose_load_cell_is_off_is_not_under_thrust(write: Write) -> None:
+    column = {name: RC_HEAD.split(",").index(name) for name in ("Motor Electrical Speed (RPM)", "Current (A)")}
+    lines = rc_text().split("\n")
+    for row, ampere in ((12, None), (13, "0")):
+        cells = lines[row + 1].split(",")
+        cells[column["Motor Electrical Speed (RPM)"]] = "0"
+        cells[column["Current (A)"]] = ampere or cells[column["Current (A)"]]
+        lines[row + 1] = ",".join(cells)
+    got = rcbenchmark.read(write("\n".join(lines)))
+    assert got.flags[12] == ("electrical_rpm is 0 under thrust",) and got.flags[13] == ("electrical_rpm is 0",)
+
+
 def test_signs_and_backward_time_are_reported_not_repaired(write: Write) -> None:
     text = rc_text(torque=-1.0).replace("\n3.5,", "\n-0.2,")
     got = rcbenchmark.read(write(text))

@@ -104,13 +104,13 @@ class Builder:
         return self.table.lines[row]
 
     def flag(self, rows: Iterable[int], what: str, why: str = "") -> None:
-        """Flag rows and warn once; rows are kept."""
+        """Flag rows and warn once; rows are kept, what a reduction leaves of them is its own remark."""
         hit = [int(r) for r in rows]
         for r in hit:
             self.flags.setdefault(r, []).append(what)
         if hit:
             where = f"{len(hit)} row{'s' if len(hit) > 1 else ''} (line {some(map(self.line, hit))})"
-            self.warnings.append(f"{what} in {where}, kept and flagged{why}")
+            self.warnings.append(f"{what} in {where}: flagged{why}")
 
     def free(self, name: str) -> str:
         """Name that no channel or text has yet."""
