@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 import struct
 import zlib
 from collections import Counter
@@ -692,6 +693,31 @@ def test_a_heading_with_two_units_has_none(head: str, write: Write) -> None:
     (name,) = set(got.values) - {"rpm"}
     assert got.unit(name) == "" and got[name].tolist() == [3.0, 7.0]
     assert said(got, repr(head)) and said(got, "one column holds one unit")
+
+
+def test_a_recording_toml_that_is_there_is_the_file_to_give(write: Write, project: Path) -> None:
+    from bemt.case import load_case
+    from bemt.diagnose.load import load
+
+    file = write("speed,thrust_N,torque_Nm\n400,3,0.04\n600,7,0.09\n800,12,0.16\n")
+    told = file.with_name("recording.toml")
+    told.write_text(f'[recording]\nfile = "{file.name}"\n[columns]\nrpm = {{ column = "speed", unit = "rad_s" }}\n')
+    case = load_case(project / "cases" / "prop_10x5")
+    for given in (file, file.parent):
+        with pytest.raises(InputError, match=f"(?i)give ({re.escape(told.as_posix())}|that instead)") as caught:
+            load(str(given), case)
+        assert told.as_posix() in str(caught.value)
+    assert load(str(told), case).rpm[0] == pytest.approx(400 / units.RPM)
+
+
+def test_a_speed_under_a_name_of_its_own_comes_with_the_line_to_write(write: Write) -> None:
+    got = importers.read(write("rpm_12_magnets,thrust_N\n4000,1\n8000,4\n"))
+    assert said(got, '[columns] rpm = { column = "rpm_12_magnets", unit = "rpm" }')
+    for known in ("rpm", "erpm", "rpm_A,rpm_B"):
+        text = f"{known},thrust_N\n" + "".join(
+            f"{','.join([n] * (known.count(',') + 1))},1\n" for n in ("4000", "8000")
+        )
+        assert not said(importers.read(write(text, "b.csv")), "speed of the rotor")
 
 
 def test_electrical_rpm_is_asked_about_only_where_the_numbers_leave_doubt(write: Write) -> None:

@@ -294,6 +294,9 @@ def speed_in_doubt(imported: Dataset, path: str) -> None:
         heading = headings.get(name) or name
         if may_be_shaft_speed(heading) and sum(cell.strip()[:1].isdigit() for cell in cells) > len(cells) / 2:
             faults.append(_no_unit(path, heading, f"a speed as text, such as {cells[0].strip()[:20]!r}"))
+    beside = Path(path).with_name("recording.toml")
+    if faults and any("names this file" in note for note in imported.notes):
+        faults = [replace(f, hint=f"{beside.as_posix()} names this file: give that instead") for f in faults]
     if faults:
         raise InputError(faults)
 
