@@ -284,7 +284,7 @@ def speed_in_doubt(imported: Dataset, path: str) -> None:
         apart = name.startswith("u_") or "err" in name.split("_") or not np.any(np.nan_to_num(v))
         if not apart and not unit and may_be_shaft_speed(heading):
             faults.append(_no_unit(path, heading, "a speed without a unit"))
-        elif not apart and unit in ("rpm", "rad_s"):
+        elif not apart and (unit == "rpm" or (unit == "rad_s" and may_be_shaft_speed(heading))):
             line = f'[columns] rpm = {{ column = "{heading}", unit = "{unit}" }}'
             hint = f"If it is the speed of this rotor, head it rpm, or write in recording.toml: {line}"
             hint += "; electrical_rpm with pole_pairs if it counts electrical revolutions"

@@ -192,7 +192,7 @@ def _no_current(build: Builder) -> np.ndarray:
     ampere = _at(build, "current_A")
     if ampere is None or not np.any(np.isfinite(ampere)):
         return np.zeros(len(build.table), dtype=bool)
-    return np.abs(ampere) <= 0.005 * np.nanmax(np.abs(ampere))
+    return np.asarray(np.abs(ampere) <= 0.005 * np.nanmax(np.abs(ampere)))
 
 
 def _wild(v: Array, load: Array | None) -> np.ndarray:
