@@ -15,7 +15,7 @@ from bemt.air import Air
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import KNOT, MPH, ZERO_CELSIUS, split_suffix
 from bemt.dataset import DIMENSIONLESS, Dataset
-from bemt.readers._headings import may_be_shaft_speed
+from bemt.readers._headings import may_be_shaft_speed, surely_shaft_speed
 from bemt.recordings.channels import MEASURED, named
 from bemt.recordings.reduce import reduce, reduction
 
@@ -303,10 +303,9 @@ def speed_in_doubt(imported: Dataset, path: str) -> None:
 
 def _no_unit(path: str, heading: str, got: str) -> Fault:
     base = heading.split("(")[0].split("[")[0].strip()
-    hint = (
-        f"Head it {base} (rev/min) or {base} (rad/s). If it is the airspeed, head it airspeed_m_s. `diagnose --rpm N` "
-        "states one speed for all rows"
-    )
+    hint = f"Head it {base} (rev/min) or {base} (rad/s). "
+    hint += "" if surely_shaft_speed(heading) else "If it is the airspeed, head it airspeed_m_s. "
+    hint += "`diagnose --rpm N` states one speed for all rows"
     expected = "numbers with a unit in the heading, or a recording.toml that names column and unit"
     return Fault(path, f"column {heading}", got, expected, hint)
 
