@@ -373,4 +373,9 @@ def test_a_file_is_fitted_once_and_never_held_out_too(tmp_path, capsys):
         # with all other faults at once, and nothing written
         assert cli.main(["calibrate", *words, str(tmp_path / "absent"), "--out", str(out)]) == 2
         said = capsys.readouterr()
-        assert message in said.err and "absent: got nothing there" in said.err and not said.out and not out.exists()
+        assert (
+            message in said.err
+            and "absent: got no such file or folder" in said.err
+            and not said.out
+            and not out.exists()
+        )

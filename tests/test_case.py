@@ -134,6 +134,53 @@ def test_units_are_only_another_way_to_write_the_same(tmp_path: Path, old: str, 
     assert other.key() == one.key()
 
 
+@pytest.mark.parametrize(("old", "new", "said"), [
+    ("rpm = 6000", "rpm = 942 rad/s", "the number alone, in rev/min. 942 rad/s = 8995 rev/min: write rpm = 8995."),
+    ("rpm = 6000", "rpm = 6000rpm  # no blank", "the number alone, in rev/min. Write rpm = 6000."),
+    ("rpm = 6000", 'rpm = "942 rad/s"', "a number from 10 to 300000 rev/min. 942 rad/s = 8995 rev/min"),
+    ("pitch_in = 5", "pitch_in = 127 mm", "the number alone, in inches. 127 mm = 5 inches: write pitch_in = 5."),
+    ("pitch_in = 5", 'pitch_in = 5"', "expected the number alone, in inches. Write pitch_in = 5."),
+    ("pitch_in = 5", "pitch_in = 5 kg", "The unit of pitch is inches, as its key says."),
+    ("blades = 2", "blades = 2 pcs", "got more text after a value"),
+])  # fmt: skip
+def test_a_unit_behind_a_number_is_refused_with_the_number_that_the_key_wants(
+    tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    assert GOOD.count(old) == 1
+    with pytest.raises(InputError) as caught:
+        load_case(write(tmp_path, GOOD.replace(old, new)))
+    (fault,) = caught.value.faults
+    assert said in str(fault)
+
+
+def test_all_units_behind_numbers_are_told_at_once(tmp_path: Path) -> None:
+    text = GOOD.replace("diameter_in = 10", "diameter_in = 10 in").replace("rpm = 6000", "rpm = 100 rev/s")
+    with pytest.raises(InputError, match="write rpm = 6000") as caught:
+        load_case(write(tmp_path, text))
+    assert len(caught.value.faults) == 2
+
+
+@pytest.mark.parametrize(("name", "diameter", "pitch", "where", "hint"), [
+    ("mine", "diameter_mm = 10", "pitch_in = 6", "rotor.diameter_mm", "inches: write diameter_in = 10 or"),
+    ("mine", "diameter_in = 10", "pitch_mm = 6", "blade.pitch_mm", "inches: write pitch_in = 6 or pitch_mm = 152.4"),
+    ("mine", "diameter_m = 0.254", "pitch_mm = 6", "blade.pitch_mm", "inches: write pitch_in = 6"),
+    ("mine", "diameter_in = 10", "pitch_in = 100", "blade.pitch_in", "millimetres: write pitch_mm = 100"),
+    ("mine", "diameter_mm = 51", "pitch_in = 20", "blade.pitch_in", "diameter_mm = 1295; or pitch_in"),
+    ("mine", "diameter_in = 10", "pitch_in = 0.3", "blade.pitch_in", ""),
+    ("prop_10x6", "diameter_mm = 10", "pitch_in = 6", "rotor.diameter_mm", "inches: write diameter_in = 10"),
+    ("prop_10x6", "diameter_mm = 10", "pitch_mm = 6", "rotor.diameter_mm", "inches: write diameter_in = 10"),
+    ("prop_5x4", "diameter_in = 127", "pitch_mm = 3000", "rotor.diameter_in", "millimetres: write diameter_mm = 127"),
+])  # fmt: skip
+def test_the_length_with_the_wrong_unit_is_the_one_that_is_named(
+    tmp_path: Path, name: str, diameter: str, pitch: str, where: str, hint: str
+) -> None:
+    text = f'schema = "bemt.case/1"\nname = "{name}"\nrotor.blades = 2\nrotor.{diameter}\nblade.{pitch}\n'
+    with pytest.raises(InputError) as caught:
+        load_case(write(tmp_path, text + "operating.rpm = 1000\n"))
+    (fault,) = caught.value.faults
+    assert fault.where == where and hint in fault.hint and bool(fault.hint) == bool(hint)
+
+
 def test_override_replaces_the_quantity_in_whatever_unit_it_was(tmp_path: Path) -> None:
     case = load_case(write(tmp_path, GOOD.replace("diameter_in = 10", "diameter_mm = 254")))
     changed = case.replaced({"rotor.diameter_in": 8.0, "operating.rpm": 1234.0})
@@ -211,7 +258,7 @@ def test_hash_follows_every_file_and_no_path(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("make", "got"),
-    [(lambda p: p / "nothing", "nothing there"), (lambda p: p, "no case")],
+    [(lambda p: p / "nothing", "no such file or folder"), (lambda p: p, "no case")],
 )
 def test_paths_without_a_case(tmp_path: Path, make: object, got: str) -> None:
     with pytest.raises(InputError) as caught:

@@ -231,7 +231,7 @@ def test_missing_path_is_2() -> None:
     done = bemt("sweep", "no/such/folder")
     assert done.returncode == 2
     assert done.stderr == (
-        "no/such/folder: got nothing there; expected a case file or a folder of cases. Check the path.\n"
+        "no/such/folder: got no such file or folder; expected a case file or a folder of cases. Check the path.\n"
     )
 
 

@@ -297,6 +297,32 @@ def test_a_large_change_in_one_load_is_a_class_of_what_scales_like_it(tmp_path: 
     assert not {"thrust_gain", "nacelle", "battery_sag"} & set(answer.effects)
 
 
+@pytest.mark.parametrize("command", ["compare", "diagnose"])
+def test_a_table_without_headings_is_no_file_of_several_rotors(
+    command: str, tmp_path: Path, project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The lines that the message gives make a file of it that is read."""
+    run = stand(1)
+    run = {k: run[k] for k in ("rpm", "thrust_N", "torque_Nm")}
+    bare, good = tmp_path / "bare.txt", written(tmp_path / "good.csv", stand(2))
+    bare.write_text("".join(" ".join(f"{v:.5f}" for v in row) + "\n" for row in zip(*run.values(), strict=True)))
+    case = ["--case", str(project / "cases" / "prop_10x5")]
+    files = [good, str(bare)] if command == "compare" else [str(bare), *case]
+    assert main([command, *files]) == 2
+    said = capsys.readouterr().err
+    assert "got a table of 3 columns without headings" in said and "rotors" not in said
+    (tmp_path / "recording.toml").write_text(said[said.index("[recording]") :])
+    assert main(["compare", good, str(tmp_path / "recording.toml")]) == 0
+
+
+def test_a_speed_in_doubt_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run = stand(1)
+    run["rpm_12_magnets"] = run.pop("rpm")
+    assert main(["compare", written(tmp_path / "a.csv", run), written(tmp_path / "b.csv", stand(2))]) == 2
+    said = capsys.readouterr().err
+    assert "column rpm_12_magnets" in said and 'rpm = { column = "rpm_12_magnets", unit = "rpm" }' in said
+
+
 def test_a_rotor_of_several_is_asked_for_and_found(tmp_path: Path) -> None:
     a, b = stand(1), stand(2, scaled(thrust_N=0.7))
     two = {"rpm_A": a["rpm"], "rpm_B": b["rpm"], "T_A (N)": a["thrust_N"], "T_B (N)": b["thrust_N"],

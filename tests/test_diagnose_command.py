@@ -44,6 +44,40 @@ def test_an_improved_case_stands_as_long_as_its_answer_does(tmp_path: Path) -> N
     assert not (out / "case.toml").exists()
 
 
+def test_the_speed_of_the_case_in_place_of_a_recorded_one_is_the_first_remark(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "log.csv"
+    file.write_text("airspeed_m_s,thrust_N\n" + "".join(f"{v},{6 - v / 4}\n" for v in range(8)))
+    command = ["diagnose", str(file), "--case", str(CASES / "prop_8x5"), "--only", "thrust_gain"]
+    assert main(command) == 0
+    remarks = [line for line in capsys.readouterr().out.splitlines() if line.startswith("  ")]
+    assert "log.csv: rpm: not recorded;" in remarks[0] and "rev/min of the case" in remarks[0]
+    assert main([*command, "--rpm", "6000"]) == 0
+    assert "not recorded; 6000" not in capsys.readouterr().out
+
+
+def test_a_sweep_takes_a_case_and_its_improved_one_beside_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(CASES / "prop_8x5", tmp_path / "prop_8x5")
+    file = _recorded(tmp_path / "log.csv", 0)
+    run = [
+        "diagnose",
+        file,
+        "--case",
+        str(tmp_path / "prop_8x5"),
+        "--off",
+        "compressibility",
+        "--no-figures",
+        "--quiet",
+    ]
+    assert main([*run, "--out", str(tmp_path / "diagnosis")]) == 0
+    assert main(["sweep", str(tmp_path), "--json"]) == 0
+    names = [result["name"] for result in json.loads(capsys.readouterr().out)["cases"]]
+    assert sorted(names) == ["prop_8x5", "prop_8x5_improved"]
+
+
 def test_each_case_has_its_improved_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Only that of the first was written. Those of an earlier answer go, whatever cases it had."""
     names, out = ["prop_8x5", "prop_10x5"], tmp_path / "out"
@@ -60,12 +94,14 @@ def test_each_case_has_its_improved_one(tmp_path: Path, capsys: pytest.CaptureFi
     assert not (out / "case.toml").exists()
     for name in names:
         improved = load_case(out / name)
-        assert improved.name == name and "compressibility" in [e.id for e in prepare_case(improved).effects]
+        assert improved.name == f"{name}_improved" and "compressibility" in [
+            e.id for e in prepare_case(improved).effects
+        ]
         assert main(["sweep", str(out / name), "--quiet"]) == 0
     # the next answer is of one case: the folders of the two are no answer any more
     alone = ["diagnose", files[0], "--case", str(CASES / names[0]), "--off", "compressibility", *plain]
     assert main(alone) == 0
-    assert load_case(out).name == names[0]
+    assert load_case(out).name == f"{names[0]}_improved"
     assert not any((out / n / "case.toml").exists() for n in names)
     (out / names[1] / "case.toml").write_text((CASES / names[1] / "case.toml").read_text())
     assert main(["diagnose", *files, *both, *plain]) == 2

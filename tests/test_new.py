@@ -21,6 +21,13 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+def test_a_folder_that_exists_is_said_to(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "notes.txt").write_text("mine")
+    assert main(["new", "10x5", "--out", str(tmp_path / "mine")]) == 2
+    assert "mine: got a folder that already exists; expected a new folder." in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("words", "name"),
     [

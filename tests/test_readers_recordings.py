@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 import struct
 import zlib
 from collections import Counter
@@ -247,6 +248,31 @@ def test_rpm_zero_and_spikes_are_kept_and_flagged(write: Write) -> None:
         0: ("spike of electrical_rpm",), 12: ("electrical_rpm is 0 under thrust",), 20: ("spike of electrical_rpm",),
     }  # fmt: skip
     assert got["electrical_rpm"][[0, 12, 20]].tolist() == [66434.0, 0.0, 99999.0]
+
+
+def test_a_flag_of_a_row_is_one_of_its_point(write: Write) -> None:
+    """A spike that is kept says so in the table of points; what a reduction drops is not called kept."""
+    lines = rc_text(4).split("\n")
+    cells = lines[1].split(",")
+    cells[RC_HEAD.split(",").index("Motor Electrical Speed (RPM)")] = "400000"
+    lines[1] = ",".join(cells)
+    got = rcbenchmark.read(write("\n".join(lines)))
+    assert said(got, "spike of electrical_rpm in 1 row (line 2): flagged") and not said(got, "kept")
+    points = reduce(got)
+    assert points["rpm"][0] == 400000.0 and points.flags[0] == ("spike of electrical_rpm",)
+    assert not any(points.flags[1:])
+
+
+def test_a_stopped_motor_whose_load_cell_is_off_is_not_under_thrust(write: Write) -> None:
+    column = {name: RC_HEAD.split(",").index(name) for name in ("Motor Electrical Speed (RPM)", "Current (A)")}
+    lines = rc_text().split("\n")
+    for row, ampere in ((12, None), (13, "0")):
+        cells = lines[row + 1].split(",")
+        cells[column["Motor Electrical Speed (RPM)"]] = "0"
+        cells[column["Current (A)"]] = ampere or cells[column["Current (A)"]]
+        lines[row + 1] = ",".join(cells)
+    got = rcbenchmark.read(write("\n".join(lines)))
+    assert got.flags[12] == ("electrical_rpm is 0 under thrust",) and got.flags[13] == ("electrical_rpm is 0",)
 
 
 def test_signs_and_backward_time_are_reported_not_repaired(write: Write) -> None:
@@ -626,6 +652,72 @@ def test_several_set_ups_in_one_file_are_said_and_not_diagnosed_together(write: 
 def test_a_heading_that_is_not_understood_gets_its_nearest_meaning_and_the_line_to_write(write: Write) -> None:
     got = importers.read(write("rpm,Trust,wibble\n4000,3,1\n6000,7,2\n"))
     assert said(got, "'Trust' thrust") and said(got, '[columns] thrust = { column = "Trust", unit = "N" }')
+
+
+@pytest.mark.parametrize(("more", "lines"), [
+    ("", ("'speed' rpm or airspeed", 'rpm = { column = "speed", unit = "rpm" }',
+          'airspeed = { column = "speed", unit = "m_s" }')),
+    ("airspeed_m_s", ("'speed' rpm.",)), ("rpm", ("'speed' airspeed.",)),
+])  # fmt: skip
+def test_a_bare_speed_is_offered_as_the_one_that_is_missing(more: str, lines: tuple[str, ...], write: Write) -> None:
+    got = importers.read(write(f"speed,thrust_N,{more or 'torque_Nm'}\n400,3,4000\n600,7,6000\n"))
+    assert all(said(got, line) for line in lines)
+
+
+@pytest.mark.parametrize(("heading", "cell", "words"), [
+    ("speed", "{}", "a speed without a unit"), ("n (1/s)", "{}", "a speed without a unit"),
+    ("speed", "{} rad/s", "a speed as text"), ("rpm_12_magnets", "{}", "a speed under a name of its own"),
+])  # fmt: skip
+def test_a_speed_in_doubt_is_never_replaced_by_that_of_the_case(
+    heading: str, cell: str, words: str, write: Write, project: Path
+) -> None:
+    from bemt.case import load_case
+    from bemt.diagnose.load import load
+
+    rows = "".join(f"{cell.format(n)},{n * n / 1e5:.3f},{n * n / 4e6:.4f}\n" for n in range(500, 1500, 100))
+    file, case = str(write(f"{heading},thrust_N,torque_Nm\n{rows}")), load_case(project / "cases" / "prop_10x5")
+    with pytest.raises(InputError) as caught:
+        load(file, case)
+    (fault,) = caught.value.faults
+    assert fault.file == file and fault.where == f"column {heading}" and fault.got.startswith(words)
+    assert load(file, case, rpm=6000.0).rpm.tolist() == [6000.0] * 10, "stated, it is no guess"
+
+
+@pytest.mark.parametrize("head", [
+    "value_N_or_Nm", "reading_ozf_or_ozf_in", "load (N or Nm)", "load [gf or N]",
+    "thrust_N_or_gf", "speed rpm or rad_s",
+    "thrust_N_or_torque_Nm",
+])  # fmt: skip
+def test_a_heading_with_two_units_has_none(head: str, write: Write) -> None:
+    got = importers.read(write(f"rpm,{head}\n4000,3\n6000,7\n"))
+    (name,) = set(got.values) - {"rpm"}
+    assert got.unit(name) == "" and got[name].tolist() == [3.0, 7.0]
+    assert said(got, repr(head)) and said(got, "one column holds one unit")
+
+
+def test_a_recording_toml_that_is_there_is_the_file_to_give(write: Write, project: Path) -> None:
+    from bemt.case import load_case
+    from bemt.diagnose.load import load
+
+    file = write("speed,thrust_N,torque_Nm\n400,3,0.04\n600,7,0.09\n800,12,0.16\n")
+    told = file.with_name("recording.toml")
+    told.write_text(f'[recording]\nfile = "{file.name}"\n[columns]\nrpm = {{ column = "speed", unit = "rad_s" }}\n')
+    case = load_case(project / "cases" / "prop_10x5")
+    for given in (file, file.parent):
+        with pytest.raises(InputError, match=f"(?i)give ({re.escape(told.as_posix())}|that instead)") as caught:
+            load(str(given), case)
+        assert told.as_posix() in str(caught.value)
+    assert load(str(told), case).rpm[0] == pytest.approx(400 / units.RPM)
+
+
+def test_a_speed_under_a_name_of_its_own_comes_with_the_line_to_write(write: Write) -> None:
+    got = importers.read(write("rpm_12_magnets,thrust_N\n4000,1\n8000,4\n"))
+    assert said(got, '[columns] rpm = { column = "rpm_12_magnets", unit = "rpm" }')
+    for known in ("rpm", "erpm", "rpm_A,rpm_B"):
+        text = f"{known},thrust_N\n" + "".join(
+            f"{','.join([n] * (known.count(',') + 1))},1\n" for n in ("4000", "8000")
+        )
+        assert not said(importers.read(write(text, "b.csv")), "speed of the rotor")
 
 
 def test_electrical_rpm_is_asked_about_only_where_the_numbers_leave_doubt(write: Write) -> None:

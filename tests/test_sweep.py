@@ -504,6 +504,26 @@ def test_one_screen_says_what_differs_most(project: Path, capsys: pytest.Capture
     assert "assumed (not stated by the source)" in capsys.readouterr().out
 
 
+def test_cases_of_one_name_are_told_apart_and_remarks_are_whole_in_a_pipe(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from bemt.commands.cli import main
+    from bemt.compare.sweep.summary import summary
+
+    monkeypatch.chdir(tmp_path)
+    for folder in ("one", "two"):
+        Path(folder).mkdir()
+        Path(folder, "case.toml").write_text('schema = "bemt.case/1"\nname = "same"\n')
+    assert main(["sweep", "one", "two"]) == 2
+    said = capsys.readouterr().out
+    assert "same (one/case.toml): not solved" in said and "same (two/case.toml): not solved" in said
+    row = {"source": "bemt", "label": "bemt", "u": 0.5, "airspeed_m_s": 0.0, "rpm": 6000.0, "thrust_N": 1.0}
+    flag = "a remark of many words " * 8 + "to the end"
+    result = {"name": "long", "rows": [{**row, "flags": [flag]}], "faults": [], "assumptions": [], "audit": [],
+              "grid": None, "comparisons": []}  # fmt: skip
+    assert flag in " ".join(summary([result], cut=False).split()) and "to the end" not in summary([result])
+
+
 def test_a_difference_near_zero_thrust_is_a_share_of_the_largest_and_no_thousand_percent() -> None:
     from bemt.compare.sweep.summary import summary
 

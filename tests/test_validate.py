@@ -128,7 +128,7 @@ def test_command_prints_json_and_names_unknown_effects(tmp_path: Path, capsys: p
 
 def test_a_file_for_the_folder_is_called_a_file(tmp_path: Path) -> None:
     (tmp_path / "file.txt").write_text("x")
-    for name, got in (("file.txt", "a file"), ("absent", "nothing there")):
+    for name, got in (("file.txt", "a file"), ("absent", "no such folder")):
         with pytest.raises(InputError) as caught:
             propellers.validate(tmp_path / name)
         assert str(caught.value) == f"{tmp_path / name}: got {got}; expected a folder in UIUC layout. Check the path."

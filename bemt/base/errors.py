@@ -153,8 +153,8 @@ def needs(module: str, extra: str) -> Any:
     >>> needs("no_such_library", "cad")
     Traceback (most recent call last):
         ...
-    bemt.base.errors.InputError: no_such_library: got no such library; expected the extra [cad]. Install it with
-    python -m pip install "bemt[cad]".
+    bemt.base.errors.InputError: no_such_library: got a library that is not installed; expected the extra [cad].
+    Install it with python -m pip install "bemt[cad]".
     """
     try:
         return importlib.import_module(module)
@@ -162,7 +162,7 @@ def needs(module: str, extra: str) -> Any:
         if error.name is None or not module.startswith(error.name):
             raise
         hint = f'Install it with python -m pip install "bemt[{extra}]"'
-        raise InputError(Fault(module, "", "no such library", f"the extra [{extra}]", hint)) from error
+        raise InputError(Fault(module, "", "a library that is not installed", f"the extra [{extra}]", hint)) from error
 
 
 class BemtWarning(UserWarning):

@@ -35,7 +35,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError, core_schema
 
 from bemt.base.errors import InputError
-from bemt.base.toml_text import Collector, load_toml
+from bemt.base.toml_text import Collector, load_toml, unit_hint
 
 AXIS = "a list of distinct numbers, or {start, stop, num}"
 _UNIT_TAIL = re.compile(r"_(in|mm|cm|m|m_s|kg_m3|hPa|C|pct|deg)$")
@@ -244,7 +244,10 @@ def _hint(where: str, value: Any, kind: Any, limits: Limits) -> str:
         choices = limits.choices or next((get_args(k) for k in parts if get_origin(k) is Literal), ())
         if choices:
             return (limits.suspect(value) if limits.suspect else "") or _did_you_mean(value, choices)
-        return "Drop the quotes" if {int, float} & set(parts) and _quoted_number(value) else ""
+        if not {int, float} & set(parts):
+            return ""
+        told = unit_hint(name, value)
+        return "Drop the quotes" if _quoted_number(value) else told[1] if told else ""
     if isinstance(value, Mapping) and next(_models(parts[0]), None) and get_origin(parts[0]) is tuple:
         return f"Write [[{name}]] with two brackets"
     if not _is_number(value) or not math.isfinite(value):

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from bemt.base.errors import Fault
+from bemt.base.units import UNITS, convert, split_suffix
 
 
 class Collector:
@@ -42,8 +43,71 @@ def load_toml(path: str | Path, out: Collector) -> dict[str, Any] | None:
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        out.add(*_syntax_fault(str(error), text))
+        fault = _syntax_fault(str(error), text)
+        for found in _units_in(text, int(fault[0].partition(":")[0] or 0)) or [fault]:
+            out.add(*found)
         return None
+
+
+_SAID = {
+    "in": "inches", "rpm": "rev/min", "rad_s": "rad/s", "rev_s": "rev/s", "m_s": "m/s", "km_h": "km/h", "ft_s": "ft/s",
+    "pct": "%", "kg_m3": "kg/m3", "g_cm3": "g/cm3", "Pa_s": "Pa s", "kgf_cm": "kgf cm", "gf_cm": "gf cm",
+}  # fmt: skip
+_WRITTEN = {
+    "1/min": "rpm", "r/min": "rpm", "u/min": "rpm", "rps": "rev_s", '"': "in", "''": "in", "inch": "in", "degc": "C",
+    "celsius": "C", "degf": "F", "kelvin": "K", "knots": "kt", "kn": "kt", "percent": "pct", "degrees": "deg",
+    "degree": "deg", "kph": "km_h", "kg/m^3": "kg_m3", "metres": "m", "meters": "m",
+}  # fmt: skip
+"""Units as we say them, and as others write them; by suffix, and to it."""
+_QUANTITY = re.compile(r"([+-]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\d\s.,][^#,]*?)\s*")
+_LINE = re.compile(rf"\s*([\w.-]+?)\s*=\s*{_QUANTITY.pattern}(?:#.*)?")
+
+
+def _suffix(text: str) -> str:
+    """Suffix of a unit as somebody writes it; "" for an unknown one."""
+    t = text.strip().replace("°", "deg").replace("³", "3").replace("%", "pct")
+    known = {said: suffix for suffix, said in _SAID.items()}
+    for way in (t, known.get(t, ""), t.replace("/", "_").replace(" ", "_"), _WRITTEN.get(t.lower(), ""), t.lower()):
+        if way in UNITS:
+            return way
+    return ""
+
+
+def unit_hint(key: str, value: str) -> tuple[str, str] | None:
+    """What a key with a unit wants in place of a number with a unit behind it, and the number; None for any other.
+
+    >>> unit_hint("rpm", "942 rad/s")
+    ('the number alone, in rev/min', '942 rad/s = 8995 rev/min: write rpm = 8995')
+    >>> unit_hint("diameter_in", "10 in")
+    ('the number alone, in inches', 'Write diameter_in = 10')
+    >>> unit_hint("blades", "2 mm") is unit_hint("rpm", "fast") is None
+    True
+    """
+    name, unit = split_suffix(key)
+    found = _QUANTITY.fullmatch(value.strip())
+    if unit is None or found is None:
+        return None
+    said, expected = _SAID.get(unit.suffix, unit.suffix), "the number alone, in {}"
+    other = _suffix(found[2])
+    if not other or UNITS[other].dimension != unit.dimension:
+        return expected.format(said), f"The unit of {name} is {said}, as its key says" if name != key else ""
+    if other == unit.suffix:
+        return expected.format(said), f"Write {key} = {found[1]}"
+    number = f"{convert(float(found[1]), other, unit.suffix):.4g}"
+    return expected.format(said), f"{found[1]} {found[2]} = {number} {said}: write {key} = {number}"
+
+
+def _units_in(text: str, line: int) -> list[tuple[str, str, str, str]]:
+    """Faults of a line with a unit behind its number and of all such lines below; none if it is otherwise faulty."""
+    out: list[tuple[str, str, str, str]] = []
+    for k, source in enumerate(text.splitlines(), 1):
+        found = _LINE.fullmatch(source) if k >= line > 0 else None
+        told = unit_hint(found[1].rpartition(".")[2], f"{found[2]} {found[3]}") if found else None
+        if found and told:
+            out.append((f"{k}:{found.start(3) + 1}", f"a unit behind the number in `{source.strip()[:60]}`", *told))
+        if not out and k >= line or '"""' in text or "'''" in text:
+            break
+    return out
 
 
 _SYNTAX = {

@@ -332,7 +332,9 @@ def find_cases(paths: Iterable[str | Path]) -> list[Path]:
         else:
             label = re.fullmatch(r"[\d.]+x[\d.]+(x\d+)?", item.as_posix())
             hint = f"A label? `bemt new {item.as_posix()}` writes its case" if label else "Check the path"
-            faults.append(Fault(item.as_posix(), "", "nothing there", "a case file or a folder of cases", hint))
+            faults.append(
+                Fault(item.as_posix(), "", "no such file or folder", "a case file or a folder of cases", hint)
+            )
     if faults:
         raise InputError(faults)
     return list(dict.fromkeys(found))

@@ -17,6 +17,7 @@ __all__ = ["check_case", "check_shape", "table_at", "value_at"]
 A_SOUND = 340.3  # only to refuse impossible tip speeds
 MAX_TIP_MACH = 2.0
 MAX_GRID = 50_000_000
+_USUAL = (0.03, 3.0)  # diameters of propellers; only to tell which of two lengths has the wrong unit [m]
 
 
 def check_case(out: Collector, document: Mapping[str, Any], folder: Path) -> CaseFile | None:
@@ -115,6 +116,13 @@ def _check_rotor(out: Collector, case: CaseFile) -> None:
     if abs(told - 2.0) < 0.01:
         got = f"a diameter of {rotor.diameter_m * 1e3:.5g} mm in the case {case.name}"
         out.add("rotor", got, f"{told * rotor.diameter_m * 1e3:.5g} mm, as its name says", "Is that the radius?")
+    size = _given(rotor, "diameter_in", "diameter_mm", "diameter_m")[0]
+    for unit, factor in (("in", 25.4), ("mm", 1.0 / 25.4)):
+        if abs(told / factor - 1.0) < 0.01 and size == {"in": "diameter_mm", "mm": "diameter_in"}[unit]:
+            value = getattr(rotor, size)
+            expected = f"{value * factor:.4g}, as the name of the case says, {case.name}"
+            looks = {"in": "inches", "mm": "millimetres"}[unit]
+            out.add(f"rotor.{size}", shown(value), expected, f"Looks like {looks}: write diameter_{unit} = {value:g}")
     mach = math.pi * rotor.diameter_m * case.operating.rpm / 60 / A_SOUND
     if mach > MAX_TIP_MACH:
         rpm = shown(case.operating.rpm)
@@ -151,14 +159,36 @@ def _check_blade(out: Collector, case: CaseFile) -> None:
 def _check_pitch(out: Collector, case: CaseFile) -> None:
     blade, diameter = case.blade, case.rotor.diameter_m
     given = _given(blade, "pitch_in", "pitch_mm")
-    if not given or 0.05 <= blade.pitch_m(diameter) / diameter <= 5:
+    pitch = blade.pitch_m(diameter)
+    if not given or 0.05 <= pitch / diameter <= 5 or any(f.where.startswith("rotor.diameter") for f in out.faults):
         return
-    (key,) = given
-    value = getattr(blade, key)
-    metric, hint = value / 25.4, ""
-    if key == "pitch_in" and 0.1 <= metric * INCH / diameter <= 3:
-        hint = f"Looks like millimetres: write pitch_mm = {value:g} or pitch_in = {metric:.4g}"
-    out.add(f"blade.{key}", shown(value), "a pitch of 0.05 to 5 diameters", hint)
+    (key,), (size,) = given, _given(case.rotor, "diameter_in", "diameter_mm", "diameter_m")
+    fixes = []  # what one other unit makes of it: key, value, hint, diameter then
+    for where, name, value, other in (
+        ("rotor", size, float(getattr(case.rotor, size if size != "diameter_m" else "diameter_m_")), pitch),
+        ("blade", key, float(getattr(blade, key)), diameter),
+    ):
+        stem, _, unit = name.rpartition("_")
+        swapped = {"in": "mm", "mm": "in"}.get(unit)
+        if swapped is None:
+            continue
+        length = value * (1e-3 if swapped == "mm" else INCH)
+        ratio = other / length if where == "rotor" else length / other
+        if 0.1 <= ratio <= 3:
+            converted = length / (INCH if unit == "in" else 1e-3)
+            looks = {"in": "inches", "mm": "millimetres"}[swapped]
+            hint = f"Looks like {looks}: write {stem}_{swapped} = {value:g} or {name} = {converted:.4g}"
+            fixes.append((f"{where}.{name}", shown(value), hint, length if where == "rotor" else diameter))
+    fixes = [fix for fix in fixes if _USUAL[0] <= fix[3] <= _USUAL[1]]
+    place, got = f"blade.{key}", shown(getattr(blade, key))
+    if len(fixes) == 1:
+        place, got, hint, _ = fixes[0]
+    else:
+        hint = "; or ".join(f"{where.rpartition('.')[2]}: {text[0].lower()}{text[1:]}" for where, _, text, _ in fixes)
+    expected = "a pitch of 0.05 to 5 diameters"
+    if place.startswith("rotor"):
+        expected = f"a diameter that goes with the pitch, {pitch * 1e3:.4g} mm: 0.2 to 20 times it"
+    out.add(place, got, expected, hint)
 
 
 def _check_section(out: Collector, section: SectionTable) -> None:

@@ -41,6 +41,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Solve, print, and with ``--strict`` check BEMT against the recorded values."""
     from bemt.base.tables import json_text
+    from bemt.case import find_cases
     from bemt.compare.sweep.batch import off_tolerance, sweep
     from bemt.compare.sweep.summary import summary
     from bemt.compare.sweep.text import case_text, overview_text
@@ -55,7 +56,8 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         sys.stdout.write(json_text(document))
     elif not args.quiet and not args.details:
-        print(summary(document["cases"], _terminal.called()))
+        files = find_cases(args.paths)
+        print(summary(document["cases"], _terminal.called(), files, cut=sys.stdout.isatty()))
     elif not args.quiet:
         solved = [case_text(result) for result in document["cases"]]
         print("\n\n".join([*solved, overview_text(document["cases"])]))

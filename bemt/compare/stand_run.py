@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from bemt.air import Air
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import KNOT, MPH, ZERO_CELSIUS, split_suffix
 from bemt.dataset import DIMENSIONLESS, Dataset
+from bemt.readers._headings import may_be_shaft_speed, surely_shaft_speed
 from bemt.recordings.channels import MEASURED, named
 from bemt.recordings.reduce import reduce, reduction
 
@@ -44,6 +46,8 @@ _ENOUGH, _ROWS, _WINDOW, _JUMP, _RATE = 8, 20, 7, 0.03, 0.25
 _LAG = 0.02
 # Temperatures that air of a stand can have [K].
 _COLD, _HOT = 230.0, 330.0
+# Name of a column without a heading: its number is that of no rotor.
+_NUMBERED = re.compile(r"column_\d+")
 _ROTOR_WORDS = ("left", "right", "upper", "lower", "front", "rear", "A", "B", "C", "D", "1", "2", "3", "4")
 
 
@@ -109,7 +113,8 @@ def rotors_of(imported: Dataset) -> list[str]:
     >>> rotors_of(Dataset("bench", "table", {"thrust_N": [1.0], "current_A": [3.0]}))
     []
     """
-    return [w for w in _ROTOR_WORDS if any(w in _words(name) for name in imported.values)]
+    names = [_words(name) for name in imported.values if not _NUMBERED.fullmatch(name)]
+    return [w for w in _ROTOR_WORDS if any(w in words for words in names)]
 
 
 def _of_rotor(imported: Dataset, word: str, where: str) -> Dataset:
@@ -207,6 +212,7 @@ def stand_run(imported: Dataset, name: str, diameter_m: float | None = None) -> 
     units = {k: unit for k, unit in imported.units.items() if unit or k not in DIMENSIONLESS}
     imported = replace(imported, units=units)  # a throttle has none
     one_rotor(imported, name)
+    speed_in_doubt(imported, name)
     series, ramp = _reduced(imported, diameter_m)
     values = {k: series[k] for k in _WANTED if k in series}
     if not {"thrust_N", "torque_Nm", "power_W"} & values.keys() and "rpm" not in values and "J" not in values:
@@ -243,12 +249,65 @@ def stand_run(imported: Dataset, name: str, diameter_m: float | None = None) -> 
     )
 
 
+def _with_headings(imported: Dataset, name: str) -> None:
+    """Refuse a table without headings: which column is which quantity is not known."""
+    headings = imported.provenance.get("headings", {})
+    if not imported.values or any(headings.get(k) or not _NUMBERED.fullmatch(k) for k in imported.values):
+        return
+    path = Path(name)
+    hint = (
+        f"Write {path.with_name('recording.toml').as_posix()}, with your own columns and units, and give that file "
+        f'instead:\n[recording]\nfile = "{path.name}"\nheader = false\n[columns]\n'
+        'rpm = { column = 1, unit = "rpm" }\n'
+        'thrust = { column = 2, unit = "N" }\n# units: rpm, rad_s; N, gf, kgf, lbf; Nm, mNm; s, us'
+    )
+    expected = "a heading with a unit for each column, or a recording.toml that names them"
+    raise InputError(Fault(name, "", f"a table of {len(imported.values)} columns without headings", expected, hint))
+
+
 def one_rotor(imported: Dataset, name: str, how: str = "Choose it with --rows-a or --rows-b rotor={}") -> None:
-    """Refuse the loads of several rotors, of which one has to be chosen."""
+    """Refuse the loads of several rotors, of which one has to be chosen, and columns that have no names."""
+    _with_headings(imported, name)
     several = rotors_of(imported)
     if len(several) > 1 and not set(_LOADS) & named(imported).values.keys():
         got = f"loads of several rotors: {', '.join(several)}"
         raise InputError(Fault(name, "", got, "one of them", how.format(several[0])))
+
+
+def speed_in_doubt(imported: Dataset, path: str) -> None:
+    """Refuse a file whose speed cannot be read: it must not be left out, nor replaced by that of a case."""
+    if "rpm" in named(imported).values:
+        return
+    headings, faults = imported.provenance.get("headings", {}), []
+    for name, v in imported.values.items():
+        heading, unit = headings.get(name) or name, imported.unit(name)
+        apart = name.startswith("u_") or "err" in name.split("_") or not np.any(np.nan_to_num(v))
+        if not apart and not unit and may_be_shaft_speed(heading):
+            faults.append(_no_unit(path, heading, "a speed without a unit"))
+        elif not apart and (unit == "rpm" or (unit == "rad_s" and may_be_shaft_speed(heading))):
+            line = f'[columns] rpm = {{ column = "{heading}", unit = "{unit}" }}'
+            hint = f"If it is the speed of this rotor, head it rpm, or write in recording.toml: {line}"
+            hint += "; electrical_rpm with pole_pairs if it counts electrical revolutions"
+            got, expected = f"a speed under a name of its own ({name})", "one column that is the speed of the rotor"
+            faults.append(Fault(path, f"column {heading}", got, expected, hint))
+    for name, cells in imported.texts.items():
+        heading = headings.get(name) or name
+        if may_be_shaft_speed(heading) and sum(cell.strip()[:1].isdigit() for cell in cells) > len(cells) / 2:
+            faults.append(_no_unit(path, heading, f"a speed as text, such as {cells[0].strip()[:20]!r}"))
+    beside = Path(path).with_name("recording.toml")
+    if faults and any("names this file" in note for note in imported.notes):
+        faults = [replace(f, hint=f"{beside.as_posix()} names this file: give that instead") for f in faults]
+    if faults:
+        raise InputError(faults)
+
+
+def _no_unit(path: str, heading: str, got: str) -> Fault:
+    base = heading.split("(")[0].split("[")[0].strip()
+    hint = f"Head it {base} (rev/min) or {base} (rad/s). "
+    hint += "" if surely_shaft_speed(heading) else "If it is the airspeed, head it airspeed_m_s. "
+    hint += "`diagnose --rpm N` states one speed for all rows"
+    expected = "numbers with a unit in the heading, or a recording.toml that names column and unit"
+    return Fault(path, f"column {heading}", got, expected, hint)
 
 
 def conditions_of(imported: Dataset) -> tuple[str, ...]:

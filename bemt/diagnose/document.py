@@ -15,6 +15,7 @@ from bemt.diagnose import fit as fitting
 from bemt.diagnose.confusion import nearest
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
 from bemt.diagnose.locate import bare
+from bemt.diagnose.record import NO_SPEED
 from bemt.diagnose.rules import BESIDE_IT
 from bemt.diagnose.suggest import LEVEL
 from bemt.diagnose.verdict import inclusion
@@ -192,7 +193,7 @@ def _odds(told: dict[str, Any]) -> str:
 def explanation(d: Diagnosis) -> list[str]:
     """Say the answer in a few sentences."""
     decision, catalogue = d.decision, effects.catalogue()
-    lines = [headline(d)]
+    lines = [headline(d), *(f"Before any physics: {note}." for note in d.problem.notes if NO_SPEED in note)]
     lines += [f"Before any physics: {f}" for f in d.problem.findings[:_FINDINGS]]
     level = d.problem.level
     off = " and ".join(f"{_CHANNEL[c].lower()} by {v:+.0%}" for c, v in level.items())

@@ -17,7 +17,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
 from bemt.case import find_cases, load_case
 from bemt.case.prepare import prepare_case
-from bemt.compare.stand_run import one_rotor
+from bemt.compare.stand_run import one_rotor, speed_in_doubt
 from bemt.dataset import Dataset
 from bemt.diagnose import cfd_points
 from bemt.diagnose import record as records
@@ -72,6 +72,7 @@ def load(
         made = records.from_series(cfd_points.point_of(imported, path, rpm, airspeed_m_s), case)
         return replace(made, notes=(*made.notes, *imported.notes))
     imported = _filled(imported, rpm, airspeed_m_s)
+    speed_in_doubt(imported, path)
     _same_rotor(imported, case, path)
     ducted = case.ducted
     findings = check(imported, diameter_m=case.diameter_m, blades=int(case.get("rotor.blades")), ducted=ducted)

@@ -119,6 +119,8 @@ class Record:
 
 
 _AIR = ("rho", "mu", "a_sound", "temperature_K")
+NO_SPEED = "rpm: not recorded"
+"""Start of the note of a recording that takes the speed of the case."""
 
 
 def air_of(fields: Mapping[str, Array]) -> Air:
@@ -134,7 +136,7 @@ def from_series(series: Dataset, case: Case, correlated: Mapping[str, Mapping[st
     values = {key: np.asarray(v, dtype=float) for key, v in series.values.items()}
     if "rpm" not in values:
         values["rpm"] = np.full(n, case.rpm)
-        notes.append(f"rpm: not recorded; {case.rpm:g} rev/min of the case")
+        notes.append(f"{NO_SPEED}; {case.rpm:g} rev/min of the case")
     air, recorded = _states(values, case, notes, series.name)
     filled = series.derive(case.diameter_m, air.rho) if "rpm" in series else _with_rpm(series, case, air)
     got = {key: np.asarray(v, dtype=float) for key, v in filled.values.items()}

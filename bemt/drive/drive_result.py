@@ -53,7 +53,7 @@ def solve(
     path = Path(case_path)
     if not path.exists():
         hint = "Check the path; a label needs its motor: drive 10x5 --kv 900 --cells 3"
-        raise InputError([*wrong, Fault(case_path, "", "nothing there", "a case file or its folder", hint)])
+        raise InputError([*wrong, Fault(case_path, "", "no such file or folder", "a case file or its folder", hint)])
     path = path / "case.toml" if path.is_dir() else path
     try:  # what is wrong with the files comes with what is wrong with the options
         case = load_case(path)

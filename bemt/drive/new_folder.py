@@ -47,9 +47,8 @@ def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str]]:
             raise InputError([replace(f, file=f.file.removeprefix(place)) for f in error.faults]) from None
         folder = Path(out) if out else Path(case.name)
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-            raise InputError(
-                Fault(folder.as_posix(), "", "something there already", "a new folder", "Choose --out DIR")
-            )
+            got = f"a {'folder' if folder.is_dir() else 'file'} that already exists"
+            raise InputError(Fault(folder.as_posix(), "", got, "a new folder", "Choose --out DIR"))
         if wanted.kv is not None and wanted.cells is not None:
             files["drive.toml"] = _drive_text(case, wanted.kv, wanted.cells).encode()
     for name in sorted(files, key=lambda name: name == "case.toml"):  # last: what it names is there

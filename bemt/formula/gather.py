@@ -235,7 +235,7 @@ def load(paths: Iterable[str | os.PathLike[str]], without: frozenset[Path] = fro
     for item in paths:
         path = Path(item)
         if not path.exists():
-            faults.append(Fault(os.fspath(item), "", "nothing there", "a file or folder", "Check the path"))
+            faults.append(Fault(os.fspath(item), "", "no such file or folder", "a file or folder", "Check the path"))
             continue
         made, why, note = _folder(path, without) if path.is_dir() else _file(path)
         if not made:

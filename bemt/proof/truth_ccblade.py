@@ -65,7 +65,9 @@ def solve(
     try:
         from wisdem.ccblade.ccblade import CCBlade
     except ImportError as error:
-        raise InputError(Fault("", "wisdem", "not installed", "CCBlade", "pip install 'bemt[wisdem]'")) from error
+        raise InputError(
+            Fault("", "wisdem", "a package that is not installed", "CCBlade", "pip install 'bemt[wisdem]'")
+        ) from error
     if "duct" in extra or np.any(extra.get("axial", 0.0)) or np.any(np.asarray(extra.get("induction", 1.0)) != 1.0):
         raise ValueError("CCBlade models uniform axial flow only")
     P, N, R = rpm.size, rotor.x.size, rotor.radius

@@ -264,7 +264,9 @@ def detect(path: str | os.PathLike[str]) -> str:
     if not kinds and target.is_dir():
         whole = ", ".join(k for k, m in known.items() if hasattr(m, "sniff_folder"))
         expected = f"a file, or a folder that a reader takes whole ({whole})"
-        raise InputError(Fault(name, "", "a folder", expected, "Name the files in it"))
+        inside = target / "recording.toml"
+        hint = f"Give {inside.as_posix()}" if inside.is_file() else "Name the files in it"
+        raise InputError(Fault(name, "", "a folder", expected, hint))
     if not kinds:
         hint = "Give --format (format = in a case) if its head is unusual"
         raise InputError(Fault(name, "", "content of no known format", f"one of {', '.join(known)}", hint))

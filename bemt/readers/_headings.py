@@ -111,6 +111,26 @@ _PULSE = re.compile(r"(esc )?(throttle|signal|pwm|pulse( width)?|esc)( signal| i
 _SEPARATORS = (r"\s+[-–—]\s+", r"\s*,\s*", r"\s+in\s+", r"\s*/\s*", r"\s+")
 _MOJIBAKE = (("Âµ", "µ"), ("Î¼", "µ"), ("Â·", "·"), ("â‹…", "·"), ("Â°", "°"), ("Â²", "²"), ("Â³", "³"))
 """UTF-8 that a program took for Latin-1 or its Windows form."""
+_SHAFT_LETTERS = {"n", "ω"}
+_SHAFT_WORDS = {
+    "speed",
+    "omega",
+    "rotation",
+    "rotational",
+    "rev",
+    "revs",
+    "revolution",
+    "revolutions",
+    "rps",
+    "rpm",
+    "krpm",
+}
+_SHAFT_PARTS = {"motor", "rotor", "shaft", "prop", "propeller", "fan"}
+_OTHER_SPEEDS = {
+    "air", "airspeed", "wind", "flow", "tip", "sound", "stream", "freestream", "tunnel", "flight", "ground", "vehicle",
+    "climb", "err", "error", "u", "std", "sd",
+}  # fmt: skip
+"""Words of a heading that make it a speed of rotation, and of other speeds or of an uncertainty."""
 _GRAVITY = units.Unit("m_s2", "acceleration", units.G0)
 
 
@@ -210,6 +230,34 @@ def _plain(text: str) -> str:
     return " ".join(bare.lower().replace("_", " ").split())
 
 
+def _spoken(text: str) -> tuple[str, set[str]]:
+    """What stands before the unit of a heading, in plain English, and its words."""
+    base = re.split(r"[(\[]", _plain(text))[0].strip()
+    return base, set(re.findall(r"[^\W\d]+", _TONGUES.get(base, base)))
+
+
+def may_be_shaft_speed(text: str) -> bool:
+    """Tell whether the words of a heading fit a speed of rotation; its unit is not looked at.
+
+    >>> [may_be_shaft_speed(t) for t in ("speed", "n (1/s)", "Drehzahl", "motor speed [Hz]", "wind speed", "thrust")]
+    [True, True, True, True, False, False]
+    """
+    base, words = _spoken(text)
+    turning = words & _SHAFT_PARTS and words & {"hz", "freq", "frequency"}
+    return base in _SHAFT_LETTERS or bool((words & _SHAFT_WORDS or turning) and not words & _OTHER_SPEEDS)
+
+
+def surely_shaft_speed(text: str) -> bool:
+    """Tell whether such a heading names no airspeed.
+
+    >>> surely_shaft_speed("omega"), surely_shaft_speed("speed")
+    (True, False)
+    """
+    base, words = _spoken(text)
+    named = base in _SHAFT_LETTERS or words & (_SHAFT_PARTS | _SHAFT_WORDS) - {"speed"}
+    return may_be_shaft_speed(text) and bool(named)
+
+
 def heading(text: str) -> Heading:
     """Read one heading, in English, German, French or Spanish.
 
@@ -257,7 +305,30 @@ def _weight(text: str) -> str:
     return unit if isinstance(unit_of(unit), units.Unit) else ""
 
 
+def _unit_at_end(text: str) -> str:
+    """Longest end of a text that is a unit, or a mass or the like that stands for one; "" without one."""
+    parts = re.split(r"[_ (\[]+", text.strip(" )]"))
+    ends = ("_".join(parts[k:]) for k in range(len(parts)))
+    return next((end for end in ends if unit_of(end) != ""), "")
+
+
+def _either(text: str) -> str:
+    """Doubt about a heading that names two units with an "or" between them; "" for any other.
+
+    >>> _either("value_N_or_Nm")
+    'N or Nm: one column holds one unit; give each quantity a column of its own'
+    >>> _either("CT_or_CP")
+    ''
+    """
+    first, *rest = (_unit_at_end(part) for part in re.split(r"[_ ]or[_ ]", text, flags=re.IGNORECASE))
+    if not rest or not first or not all(rest):
+        return ""
+    return f"{' or '.join([first, *rest])}: one column holds one unit; give each quantity a column of its own"
+
+
 def _heading(text: str) -> Heading:
+    if either := _either(text):
+        return Heading(text, slug(text), None, either)
     base, unit, doubt = text, None, ""
     found = re.fullmatch(r"(.*?)\s*[\(\[]\s*([^()\[\]]*?)\s*[\)\]]\s*", text)
     if found:

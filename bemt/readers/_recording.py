@@ -20,7 +20,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
 from bemt.readers._clock import clock_seconds
 from bemt.readers._columns import Channel, dataset
-from bemt.readers._headings import Heading, slug
+from bemt.readers._headings import Heading, may_be_shaft_speed, slug, surely_shaft_speed
 from bemt.readers._large import NumberTable
 from bemt.readers._split import MOST_ODD, SplitTable, some
 
@@ -104,13 +104,13 @@ class Builder:
         return self.table.lines[row]
 
     def flag(self, rows: Iterable[int], what: str, why: str = "") -> None:
-        """Flag rows and warn once; rows are kept."""
+        """Flag rows and warn once; rows are kept, what a reduction leaves of them is its own remark."""
         hit = [int(r) for r in rows]
         for r in hit:
             self.flags.setdefault(r, []).append(what)
         if hit:
             where = f"{len(hit)} row{'s' if len(hit) > 1 else ''} (line {some(map(self.line, hit))})"
-            self.warnings.append(f"{what} in {where}, kept and flagged{why}")
+            self.warnings.append(f"{what} in {where}: flagged{why}")
 
     def free(self, name: str) -> str:
         """Name that no channel or text has yet."""
@@ -233,7 +233,7 @@ class Builder:
         if self.words:
             self.warnings.append(f"text, kept as such, in {len(self.words)} columns: {some(self.words, 8)}")
         if self.unitless:
-            hint = "Name units in the headings or in a recording.toml" + _nearest(self.unitless)
+            hint = "Name units in the headings or in a recording.toml" + _nearest(self.unitless, self.channels)
             self.warnings.append(f"no unit known, none assumed, for {some(self.unitless, 8)}. {hint}")
         said = {"file": self.table.source.name, "sha256": self.table.source.sha256, **(provenance or {})}
         flags: list[tuple[str, ...]] = [()] * len(self.table) if self.flags else []
@@ -268,23 +268,41 @@ _MEANINGS = ("rpm", "thrust", "torque", "voltage", "current", "power", "time", "
              "temperature", "density", "humidity")  # fmt: skip
 
 
-def _nearest(headings: Sequence[str]) -> str:
+def _nearest(headings: Sequence[str], channels: Iterable[str] = ()) -> str:
     r"""What headings without a unit may mean, and the line of a recording.toml that says so; empty: nothing is near.
+
+    A bare ``speed`` is that of the shaft or of the air, whichever the file has not.
 
     >>> _nearest(["'Trust'", "'x'"])
     '; nearest meaning: \'Trust\' thrust. The line: [columns] thrust = { column = "Trust", unit = "N" }'
+    >>> _nearest(["'speed'"], ["airspeed_m_s"])  # doctest: +ELLIPSIS
+    '; nearest meaning: \'speed\' rpm. The line: [columns] rpm = { column = "speed", unit = "rpm" } (or ...)'
     """
-    units = {"rpm": "rpm", "thrust": "N", "torque": "Nm", "voltage": "V", "current": "A", "power": "W", "time": "s",
-             "airspeed": "m/s", "throttle": "pct"}  # fmt: skip
-    near = {}
+    near: dict[str, list[str]] = {}
     for label in headings:
         name = label.split("'")[1] if "'" in label else label
         word = re.split(r"[\s_(\[]", name.strip().lower())[0]
-        found = difflib.get_close_matches(word, _MEANINGS, 1, 0.75)
+        found = _speeds_meant(name, channels) if may_be_shaft_speed(name) else None
+        if found is None:
+            found = difflib.get_close_matches(word, _MEANINGS, 1, 0.75)
         if found:
-            near[name] = found[0]
+            near[name] = found
     if not near:
         return ""
-    name, meaning = next(iter(near.items()))
-    line = f'[columns] {meaning} = {{ column = "{name}", unit = "{units.get(meaning, "...")}" }}'
-    return f"; nearest meaning: {', '.join(f'{k!r} {v}' for k, v in near.items())}. The line: {line}"
+    name, meanings = next(iter(near.items()))
+    lines = [f'{m} = {{ column = "{name}", unit = "{_UNITS_MEANT.get(m, "...")}" }}' for m in meanings]
+    lines = [line + (' (or "rad_s", "rev_s")' if line.startswith("rpm") else "") for line in lines]
+    told = ", ".join(f"{k!r} {' or '.join(v)}" for k, v in near.items())
+    return f"; nearest meaning: {told}. The line: [columns] {', or '.join(lines)}"
+
+
+_UNITS_MEANT = {"rpm": "rpm", "thrust": "N", "torque": "Nm", "voltage": "V", "current": "A", "power": "W", "time": "s",
+                "airspeed": "m_s", "throttle": "pct"}  # fmt: skip
+
+
+def _speeds_meant(name: str, channels: Iterable[str]) -> list[str]:
+    """Speeds that a heading may mean, of those that the file has not yet."""
+    known = list(channels)
+    turning = any(re.search(r"(^|_)rpm|rad_s$", k) for k in known)
+    moving = any(k == "J" or k.endswith("_m_s") for k in known)
+    return [*([] if turning else ["rpm"]), *([] if moving or surely_shaft_speed(name) else ["airspeed"])]

@@ -96,7 +96,7 @@ def convert(table: SplitTable | NumberTable, decimal: str = ".") -> Dataset:
     for k, head in enumerate(heads):
         build.add(k, head, decimal)
     if not table.headings:
-        build.warnings.append("no heading line: columns are numbered")
+        build.warnings.append("no heading line: columns are numbered; a recording.toml with header = false names them")
     if decimal == ",":
         build.warnings.append("decimal commas read as decimal points")
     build.flag_time()
@@ -110,6 +110,12 @@ def convert(table: SplitTable | NumberTable, decimal: str = ".") -> Dataset:
         for name, channel in build.channels.items():
             if name != "time_s" and channel.unit not in ("", "-"):
                 build.flag(np.flatnonzero(spikes(channel.values)), f"spike of {name}")
+    if len(speeds) == 1 and speeds[0] not in ("rpm", "electrical_rpm", "optical_rpm"):
+        own = build.headings[speeds[0]]
+        line = f'[columns] rpm = {{ column = "{own}", unit = "rpm" }}'
+        build.warnings.append(
+            f"{own!r} is not taken for the speed of the rotor; if it is, head it rpm, or write {line}"
+        )
     _electrical(build)
     _several(build)
     build.check_magnitudes()

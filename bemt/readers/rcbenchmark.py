@@ -155,7 +155,7 @@ def _speeds(build: Builder) -> None:
         seen += 1
         zero = v == 0.0
         if load is not None and np.any(np.isfinite(load)):
-            loaded = zero & (np.abs(load) > 0.05 * np.nanmax(np.abs(load)))
+            loaded = zero & (np.abs(load) > 0.05 * np.nanmax(np.abs(load))) & ~_no_current(build)
             build.flag(np.flatnonzero(loaded), f"{name} is 0 under thrust")
             zero &= ~loaded
         build.flag(np.flatnonzero(zero), f"{name} is 0")
@@ -185,6 +185,14 @@ def _speeds(build: Builder) -> None:
             near = round(ratio) if ratio > 1 else 1
             whole = near > 1 and abs(ratio / near - 1) < 0.05
             build.warnings.append(text + (f"; were {near} pole pairs left out?" if whole else ""))
+
+
+def _no_current(build: Builder) -> np.ndarray:
+    """Rows in which the motor draws no current: a load there is the zero of the cell."""
+    ampere = _at(build, "current_A")
+    if ampere is None or not np.any(np.isfinite(ampere)):
+        return np.zeros(len(build.table), dtype=bool)
+    return np.asarray(np.abs(ampere) <= 0.005 * np.nanmax(np.abs(ampere)))
 
 
 def _wild(v: Array, load: Array | None) -> np.ndarray:

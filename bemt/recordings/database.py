@@ -93,7 +93,7 @@ def get(
     else:
         archive = Path(source)
         if not archive.is_file():
-            raise InputError(Fault(os.fspath(source), "", "no file", "a zip archive", "Check the path"))
+            raise InputError(Fault(os.fspath(source), "", "no such file", "a zip archive", "Check the path"))
         digest = file_hash(archive)
     try:
         with unpacked(archive, folder) as fresh:

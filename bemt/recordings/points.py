@@ -207,8 +207,7 @@ def from_rows(rec: Dataset) -> Found:
         if time is not None:
             values["time_s"] = float(time[i])
         u = {name: float(v[i]) for name, v in told.items()}
-        flags = tuple(f for f in rec.flags[i] if not f.startswith("spike of "))
-        found.points.append(Point(values, u, np.array([i]), when, run, way, flags))
+        found.points.append(Point(values, u, np.array([i]), when, run, way, tuple(rec.flags[i])))
     for run in list(at):
         _close(rec, data, time, at, run, found)
     return found

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from bemt.base.tables import number_text, text_table
@@ -16,20 +17,25 @@ WIDTH, ROWS = 80, 22
 """Columns of the screen, and rows of the table: the rest is counted."""
 
 
-def summary(results: Sequence[Mapping[str, Any]], called: str = "python -m bemt") -> str:
-    """Summary of all cases, at most 45 lines of 80 columns."""
+def summary(
+    results: Sequence[Mapping[str, Any]], called: str = "python -m bemt", files: Sequence[Path] = (), cut: bool = True
+) -> str:
+    """Summary of all cases, at most 45 lines of 80 columns; without `cut` long lines go on in the next one.
+
+    ``files`` are those of the results: two cases may have one name.
+    """
     solved = [with_nan(r) for r in results if r["rows"]]
-    failed = [r for r in results if not r["rows"]]
+    where = [f" ({path.as_posix()})" for path in files] or [""] * len(results)
+    failed = [(r["name"] + place, len(r["faults"])) for r, place in zip(results, where, strict=True) if not r["rows"]]
     lines: list[str] = []
     found = sorted((c for r in solved for c in _compared(r)), key=lambda c: -c["rank"])
     if solved:
         lines += _table(solved, found)
-    for result in failed[:6]:
-        n = len(result["faults"])
-        lines.append(_short(f"{result['name']}: not solved, {n} {'fault' if n == 1 else 'faults'} (see the messages)"))
+    for name, n in failed[:6]:
+        lines += _short(f"{name}: not solved, {n} {'fault' if n == 1 else 'faults'} (see the messages)", cut)
     if len(failed) > 6:
         lines.append(f"and {len(failed) - 6} more that were not solved")
-    for words in (_worst(found), _ducts(solved), _unknowns(solved), _flags(solved), _grids(solved)):
+    for words in (_worst(found), _ducts(solved), _unknowns(solved), _flags(solved, cut), _grids(solved, cut)):
         lines += ["", *words] if words else []
     return "\n".join([*lines, "", *_next(called, bool(found))] if solved else lines)
 
@@ -149,24 +155,25 @@ def _unknowns(solved: Sequence[Mapping[str, Any]]) -> list[str]:
     return ["Unknowns that widen BEMT most (their part of u in thrust):", *lines] if lines else []
 
 
-def _flags(solved: Sequence[Mapping[str, Any]]) -> list[str]:
+def _flags(solved: Sequence[Mapping[str, Any]], cut: bool) -> list[str]:
     told: dict[str, list[str]] = {}
     for result in solved:
         for row in result["rows"]:
             if row["source"] == "bemt":
                 for flag in row["flags"]:
                     told.setdefault(flag, []).append(result["name"])
-    return [_short(f"! {', '.join(dict.fromkeys(names))}: {flag}") for flag, names in list(told.items())[:4]]
+    lines = [f"! {', '.join(dict.fromkeys(names))}: {flag}" for flag, names in list(told.items())[:4]]
+    return [part for line in lines for part in _short(line, cut)]
 
 
-def _grids(solved: Sequence[Mapping[str, Any]]) -> list[str]:
+def _grids(solved: Sequence[Mapping[str, Any]], cut: bool) -> list[str]:
     lines = []
     for result in solved:
         if grid := result.get("grid"):
             where = f", {grid['file']}" if grid["file"] else ", kept with --out DIR"
             told = f"grid of {result['name']}: {grid['points']} points, {grid['unconverged']} unconverged{where}"
-            lines.append(_short(told))
-    return lines[:4]
+            lines.append(told)
+    return [part for line in lines[:4] for part in _short(line, cut)]
 
 
 def _next(called: str, compared: bool) -> list[str]:
@@ -180,5 +187,8 @@ def _next(called: str, compared: bool) -> list[str]:
     return lines
 
 
-def _short(line: str) -> str:
-    return line if len(line) <= WIDTH else line[: WIDTH - 3] + "..."
+def _short(line: str, cut: bool) -> list[str]:
+    """One line of the screen, cut to its width; or all of it, on as many lines as it takes."""
+    if not cut:
+        return textwrap.wrap(line, WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
+    return [line if len(line) <= WIDTH else line[: WIDTH - 3] + "..."]

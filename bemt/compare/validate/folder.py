@@ -34,7 +34,7 @@ def read_folder(folder: Path) -> Folder:
     from bemt.readers import uiuc
 
     if not folder.is_dir():
-        got = "a file" if folder.exists() else "nothing there"
+        got = "a file" if folder.exists() else "no such folder"
         raise InputError([Fault(str(folder), "", got, "a folder in UIUC layout", "Check the path")])
     scan = uiuc.scan_folder(folder)
     pe0, notes = _pe0_stations(folder)

@@ -51,7 +51,9 @@ def solve(rotor: Rotor, tables: Sequence[tuple[float, Polar]], rpm: Array, J: Ar
         from wisdem.ccblade.ccblade import CCBlade
     except ImportError as error:
         hint = "pip install 'bemt[wisdem]'"
-        raise InputError(Fault("--peer", "ccblade", "not installed", "the package wisdem", hint)) from error
+        raise InputError(
+            Fault("--peer", "ccblade", "a package that is not installed", "the package wisdem", hint)
+        ) from error
     s = rotor.blade.midpoints(STATIONS)
     at = np.array([x for x, _ in tables])
     grids = [p.on_grid() for _, p in tables]
