@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shlex
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -330,3 +331,42 @@ def test_one_file_twice_says_which_column_parts_it(tmp_path: Path) -> None:
     file = written(tmp_path / "both.csv", both)
     with pytest.raises(InputError, match="--rows-a spacing_ratio=0.5 --rows-b spacing_ratio=1"):
         compare(file, file)
+
+
+def test_the_printed_command_runs_with_the_rotor_that_was_chosen(
+    shared_data: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Readings of all spacings of two rotors: the step chooses a spacing, and keeps the rotor."""
+    folder = shared_data / "contrasts" / "coax_spacing_15in_11in"
+    names = ("single_rotor__20210721_170209", "map10x10_zD_01__20210722_080607")
+    files = [str(folder / f"15in_400kv_22V_U5_{name}.csv") for name in names]
+    assert main(["compare", *files, "--rows-b", "rotor=right"]) == 0
+    command = next(line for line in capsys.readouterr().out.splitlines() if "python -m bemt" in line)
+    words = shlex.split(command)
+    assert words[3:8] == ["compare", *files, "--rows-b", "rotor=right"]
+    assert "speed_ratio=LOW:HIGH" in words
+    assert main([w.replace("LOW:HIGH", "0.95:1.05") for w in words[3:]]) == 0
+    again = next(line for line in capsys.readouterr().out.splitlines() if "python -m bemt" in line)
+    assert {"rotor=right", "speed_ratio=0.95:1.05", "CASE"} <= set(shlex.split(again))
+
+
+@pytest.mark.parametrize(
+    ("change", "case"),
+    [
+        (scaled(thrust_N=1.12), None),
+        (scaled(thrust_N=1.04, torque_Nm=1.04), None),
+        (scaled(torque_Nm=1.3), "cases/prop_10x5"),
+    ],
+)
+def test_the_step_of_an_answer_keeps_rows_air_and_label(
+    tmp_path: Path, change: Callable[[dict[str, Array]], None], case: str | None
+) -> None:
+    given = {"rows_a": ["rpm=3500:9000"], "rows_b": ["rpm=3400:9000"], "air_a": "1m/s", "air_b": "1m/s"}
+    doc = compare(*pair(tmp_path, change), case, label="10x5", **given).document
+    step = doc["next_measurement"]
+    told = [line for line in doc.get("told", []) if line.lstrip().startswith("python -m bemt compare")]
+    for command in [*told, *([step["command"]] if step["command"] else [])]:
+        words = shlex.split(command)
+        assert {"rpm=3500:9000", "rpm=3400:9000", "--label"} <= set(words)
+        assert sum("1m/s" in w for w in words) == 2
+        assert case is None or case in words

@@ -6,8 +6,7 @@ No case and no blade is needed. What is not recorded is assumed to be equal in b
 from __future__ import annotations
 
 import math
-import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -16,6 +15,7 @@ import numpy as np
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
 from bemt.compare import matched as fits
+from bemt.compare.asked import Asked
 from bemt.compare.matched import MatchedChannel, Scatter
 from bemt.compare.scaling import CLEAR, OWN_SHAPE, UNKNOWN, Judgement, judge, weigh
 from bemt.compare.scaling_laws import FAMILY, law
@@ -314,11 +314,10 @@ def _notes(a: StandRun, b: StandRun, channels: Mapping[str, MatchedChannel], str
     return list(dict.fromkeys([*out, *(f"A: {n}" for n in a.points.notes), *(f"B: {n}" for n in b.points.notes)]))
 
 
-def next_step(change: RunChange, files: Sequence[str]) -> dict[str, str]:
-    """Run or reading that would settle the answer, and the command to give then."""
+def next_step(change: RunChange, asked: Asked) -> dict[str, str]:
+    """Run or reading that would settle the answer, and the command to give then, with all that was asked."""
     said = change.leading
-    a, b = (shlex.quote(f) for f in files)
-    ask = "python -m bemt compare"
+    with_case = asked.command(case=asked.case or "CASE")
     rows = [row for k in said.effects if (row := law(k)) is not None]
     loads = [r for r in change.ratios.values() if r["kind"] in fits.LOADS]
     if said.verdict == "none":
@@ -328,33 +327,34 @@ def next_step(change: RunChange, files: Sequence[str]) -> dict[str, str]:
         return {"text": "", "command": ""}
     if said.verdict in ("named", "sensor"):
         text = rows[0].settles if rows else "read the label of the channel"
-        return {"text": f"to be sure, {text}", "command": f"{ask} {a} {b} --case CASE"}
+        return {"text": f"to be sure, {text}", "command": with_case}
     if said.verdict in ("insufficient", "unknown") and (letter := _restless(change)):
         run = change.a if letter == "a" else change.b
         column = run.conditions[0] if run.conditions else "COLUMN"
         others = f" (the file has {', '.join(run.conditions[:4])})" if run.conditions else ""
         text = f"choose the rows of {letter.upper()} in which nothing else changes{others}"
-        return {"text": text, "command": f"{ask} {a} {b} --rows-{letter} {shlex.quote(column)}=LOW:HIGH"}
+        return {"text": text, "command": asked.with_rows(letter, column)}
     if loads and all(r["extrapolated"] for r in loads):
         v = change.a.points
         where = "where A was measured"
         if "rpm" in v:
             where = f"at the speeds of A, {np.nanmin(v['rpm']):.0f} to {np.nanmax(v['rpm']):.0f} rev/min"
-        return {"text": f"run B again {where}, and at its airspeeds", "command": f"{ask} {a} B_AGAIN.csv"}
+        return {"text": f"run B again {where}, and at its airspeeds", "command": asked.command(b="B_AGAIN.csv")}
     likely = {k: p for k, p in said.probability.items() if law(k) is not None}
     density = likely.get("air_density", 0.0) * _FIRST >= max(likely.values(), default=1.0)
     small = max((abs(math.log(r["ratio"])) for r in loads), default=1.0) < _DAY
     if density and small and math.isnan(change.density_ratio):
-        return {"text": DAYS, "command": f"{ask} {a} {b} {AIR_OF_BOTH}"}
+        return {"text": DAYS, "command": asked.with_days()}
     if not _TORQUES & change.ratios.keys() and change.loads is said:
         text = "record torque in both runs: without it gain, air and blade look alike"
-        return {"text": text, "command": f"{ask} A_WITH_TORQUE.csv B_WITH_TORQUE.csv"}
+        return {"text": text, "command": asked.command(a="A_WITH_TORQUE.csv", b="B_WITH_TORQUE.csv")}
     if rows:
         firsts = {FAMILY.get(row.id, row.id): row.settles for row in reversed(rows)}
         text = "; or ".join(reversed(firsts.values()))
-        return {"text": text, "command": f"{ask} {a} {b} --case CASE"}
+        return {"text": text, "command": with_case}
     text = "repeat the run of A and compare it with A; their difference is not a cause"
-    return {"text": text, "command": f"{ask} {a} A_AGAIN.csv"}
+    again = asked.command(b="A_AGAIN.csv", rows_b=asked.rows_a, air_b=asked.air_a)
+    return {"text": text, "command": again}
 
 
 def document(change: RunChange) -> dict[str, Any]:

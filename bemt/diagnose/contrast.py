@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from bemt import __version__
 from bemt.base.errors import Fault, InputError
 from bemt.base.face import as_html
+from bemt.compare.asked import Asked
 from bemt.compare.recordings import RunChange, changed, document, next_step
 from bemt.compare.stand_run import conditions_of, selected, stand_run, with_air
 from bemt.effects import catalogue
@@ -21,6 +22,7 @@ from bemt.effects import catalogue
 if TYPE_CHECKING:
     from bemt.case import Case
     from bemt.dataset import Dataset
+    from bemt.diagnose.suggest import Given
 
 # Remarks on the files come first in an explanation; `import` shows them.
 _REMARK = "Before any physics"
@@ -87,6 +89,7 @@ def compare(
     case: Case | str | os.PathLike[str] | None = None,
     *,
     diameter_m: float | None = None,
+    label: str | None = None,
     rows_a: Sequence[str] = (),
     rows_b: Sequence[str] = (),
     air_a: str | None = None,
@@ -95,7 +98,8 @@ def compare(
 ) -> Contrast:
     """Say what changed between two recordings of one stand.
 
-    ``air_a`` and ``air_b`` say what the files do not: ``"22C,1013hPa"``, ``"22C"`` or ``"1.19kg/m3"``.
+    ``label``, such as ``"10x5"``, gives the diameter. ``air_a`` and ``air_b`` say what the files do not:
+    ``"22C,1013hPa"``, ``"22C"``, ``"1.19kg/m3"``, ``"18m/s"``.
 
     Notes
     -----
@@ -104,9 +108,14 @@ def compare(
     """
     from bemt.recordings.load import import_file
 
+    names = [os.fspath(a), os.fspath(b)]
+    asked = Asked(
+        names[0], names[1], tuple(rows_a), tuple(rows_b), air_a, air_b, label,
+        None if case is None else os.fspath(case) if isinstance(case, str | os.PathLike) else case.path.as_posix(),
+    )  # fmt: skip
+    diameter_m = label_diameter(label) if diameter_m is None else diameter_m
     if isinstance(case, str | os.PathLike):
         case = _case(os.fspath(case))
-    names = [os.fspath(a), os.fspath(b)]
     conditions = [list(rows_a), list(rows_b)]
     if Path(names[0]).resolve() == Path(names[1]).resolve() and sorted(rows_a) == sorted(rows_b):
         raise InputError(
@@ -139,11 +148,10 @@ def compare(
     found = changed(runs[0], runs[1], math.nan if D is None else D)
     doc = document(found) | {"version": __version__, "recordings": names, "rows": {"A": rows_a, "B": rows_b}}
     if case is not None:
-        doc |= _agreed(_diagnosed(names, read, case, progress), doc, found)
+        doc |= _agreed(_diagnosed(asked, read, case, progress), doc, found)
     own = case is not None and doc["verdict"] == doc["diagnosis"]["verdict"] and doc["rule"] == doc["diagnosis"]["rule"]
-    step = _after(doc) if own else next_step(found, names)
-    asked = case is not None and step["command"].endswith("--case CASE")  # as it was
-    doc["next_measurement"] = step | {"command": ""} if asked else step
+    step = _after(doc) if own else next_step(found, asked)
+    doc["next_measurement"] = step | {"command": ""} if step["command"] == asked.command() else step
     return Contrast(found, doc)
 
 
@@ -176,22 +184,40 @@ def _case(path: str) -> Case:
 
 
 def _diagnosed(
-    names: Sequence[str], read: Sequence[Dataset], case: Case, progress: Callable[[str], None] | None
+    asked: Asked, read: Sequence[Dataset], case: Case, progress: Callable[[str], None] | None
 ) -> dict[str, Any]:
     """Verdict of the diagnosis of B with A as reference."""
     from bemt.diagnose.chain import diagnose
     from bemt.diagnose.document import document as diagnosis
     from bemt.diagnose.document import explanation
     from bemt.diagnose.load import load
-    from bemt.diagnose.suggest import Given
 
-    a, b = (load(name, case, imported) for name, imported in zip(names, read, strict=True))
-    given = Given((shlex.quote(names[1]),), (shlex.quote(names[0]),), f"--case {shlex.quote(case.path.as_posix())}")
+    a, b = (load(name, case, imported) for name, imported in zip((asked.a, asked.b), read, strict=True))
+    given = _given(asked)
     answer = diagnose([b, replace(a, reference=True)], [case], None, progress, given=given, ratios=False)
     said = diagnosis(answer)
     keys = ("verdict", "effects", "probability", "ranking", "rule")
     told = [line for line in explanation(answer) if not line.startswith(_REMARK)]
     return {k: said[k] for k in keys} | {"diagnosis": said, "case": case.name, "told": told}
+
+
+def _given(asked: Asked) -> Given:
+    """Commands of the diagnosis that carry what was asked; rows and air are taken by a comparison alone."""
+    from bemt.diagnose.suggest import Given
+
+    class _Pair(Given):
+        def command(self, run: str = "", reference: str = "") -> str:
+            if not asked.chosen:
+                return super().command(run, reference)
+            return asked.command(a=reference) if reference else asked.command(b=run or asked.b)
+
+        def comparison(self, reference: str) -> str:
+            return asked.command(a=reference, case=None)
+
+        def of_days(self) -> tuple[str, ...]:
+            return (asked.with_days(),)
+
+    return _Pair((shlex.quote(asked.b),), (shlex.quote(asked.a),), f"--case {shlex.quote(asked.case or 'CASE')}")
 
 
 def _agreed(said: dict[str, Any], ratios: dict[str, Any], found: RunChange) -> dict[str, Any]:
