@@ -285,6 +285,19 @@ def test_a_cause_that_leaves_a_changed_load_alone_is_not_given(tmp_path: Path) -
     assert not answer.effects or not set(answer.effects) <= {"torque_zero", "torque_gain"}
 
 
+def test_the_first_line_names_no_cause_that_the_text_rules_out(shared_data: Path) -> None:
+    """Torque looks like a zero offset, but the thrust has changed as well."""
+    folder = shared_data / "contrasts" / "coax_spacing_15in_11in"
+    names = ("single_rotor__20210721_170209", "map10x10_zD_01__20210722_080607")
+    answer = compare(*(folder / f"15in_400kv_22V_U5_{name}.csv" for name in names), rows_b=["rotor=right"])
+    assert answer.document["rule"] == "torque_zero would leave the thrust alone, which changed as well"
+    assert not {"torque_zero", "torque_gain"} & {r["effect"] for r in answer.document["ranking"]}
+    assert sum(r["probability"] for r in answer.document["ranking"]) == pytest.approx(1.0, abs=0.01)
+    first, rest = answer.text.split("verdict:")
+    assert "likeliest" not in first
+    assert "Still possible: propeller, " in " ".join(rest.split())
+
+
 def test_a_large_change_in_one_load_is_a_class_of_what_scales_like_it(tmp_path: Path) -> None:
     """Without torque a fifth more thrust has many causes, and as many that it rules out."""
     files = []

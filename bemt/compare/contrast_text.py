@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from bemt.base.tables import number_text, text_table
-from bemt.compare.recordings import OTHER_STAND
+from bemt.compare.recordings import NOT_ALONE, OTHER_STAND
 from bemt.compare.scaling_laws import FAMILY, law
 
 _WORD = {
@@ -93,7 +93,9 @@ def headline(doc: Mapping[str, Any]) -> str:
     if verdict == "unknown":
         return f"Something changed ({moved}), and no listed cause explains it."
     if verdict == "insufficient":
-        guess = _families([r["effect"] for r in doc["ranking"] if r["probability"] >= _GUESS], doc["ranking"])
+        likely = [r["effect"] for r in doc["ranking"] if r["probability"] >= _GUESS]
+        no_guess = doc["rule"] == OTHER_STAND or doc["rule"].endswith(NOT_ALONE)
+        guess = "" if no_guess else _families(likely, doc["ranking"])
         return f"These recordings cannot say what changed ({moved})" + (f"; likeliest {guess}." if guess else ".")
     if len(effects) == 1:
         row = law(effects[0])
@@ -176,7 +178,8 @@ def _verdict(doc: Mapping[str, Any]) -> str:
     first = [r["effect"] for r in doc["ranking"] if r["effect"] not in ("none", "unknown")][:4]
     if doc["rule"] == OTHER_STAND:  # no cause of the list is meant
         first = []
-    return f"There is a change, but {doc['rule']}" + (f": {', '.join(first)} ..." if first else "") + "."
+    lead = "Still possible" if doc["rule"].endswith(NOT_ALONE) else "Likeliest"
+    return f"There is a change, but {doc['rule']}" + (f". {lead}: {', '.join(first)}" if first else "") + "."
 
 
 def _tables(doc: Mapping[str, Any]) -> list[str]:

@@ -6,7 +6,7 @@ No case and no blade is needed. What is not recorded is assumed to be equal in b
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -49,6 +49,8 @@ _RESTLESS = 0.10
 _BENT = 3.0
 # Standard deviations, set-up included, from which a load has changed.
 _CHANGED = 3.0
+NOT_ALONE = "alone, which changed as well"
+"""End of the reason where the likeliest cause is ruled out; what is left was unlikely beside it."""
 OTHER_STAND = "no change on one stand moves every load by this much: check units and speeds of both files"
 
 
@@ -205,18 +207,29 @@ def _by_factors(probability: Mapping[str, float]) -> dict[str, float]:
 def _all_loads(
     said: Judgement, loads: Mapping[str, MatchedChannel], ratios: Mapping[str, Mapping[str, Any]]
 ) -> Judgement:
-    """No cause that leaves a load alone which has clearly changed."""
-    rows = [law(k) for k in said.effects]
-    moved = {name for row in rows if row is not None for _, term in row.terms for name in term}
-    if not rows or None in rows or not moved:
+    """No cause that leaves a load alone which has clearly changed; probabilities are those of the others then."""
+    moved = _moved(said.effects)
+    if not moved:
         return said
+    changed_too = []
     for name, c in loads.items():
         r = ratios[c.channel]
         unsure = math.hypot(math.log(r["high95"] / r["ratio"]) / 1.96, c.session)
-        if name not in moved and abs(math.log(r["ratio"])) > _CHANGED * unsure:
-            why = f"{' and '.join(said.effects)} would leave the {name} alone, which changed as well"
-            return Judgement("insufficient", (), said.probability, said.size, why)
-    return said
+        if abs(math.log(r["ratio"])) > _CHANGED * unsure:
+            changed_too.append(name)
+    missed = next((name for name in changed_too if name not in moved), None)
+    if missed is None:
+        return said
+    why = f"{' and '.join(said.effects)} would leave the {missed} {NOT_ALONE}"
+    left = {k: p for k, p in said.probability.items() if not (of := _moved((k,))) or of.issuperset(changed_too)}
+    total = sum(left.values())
+    return Judgement("insufficient", (), {k: p / total for k, p in left.items()} if total else left, said.size, why)
+
+
+def _moved(effects: Sequence[str]) -> set[str]:
+    """Loads that effects move by their laws; empty where there is no law of one of them."""
+    rows = [law(k) for k in effects]
+    return set() if None in rows else {name for row in rows if row for _, term in row.terms for name in term}
 
 
 def _restless(change: RunChange) -> str:
