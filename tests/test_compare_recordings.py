@@ -383,3 +383,17 @@ def test_the_step_of_an_answer_keeps_rows_air_and_label(
         assert {"rpm=3500:9000", "rpm=3400:9000", "--label"} <= set(words)
         assert sum("1m/s" in w for w in words) == 2
         assert case is None or case in words
+
+
+def test_what_cannot_be_so_in_a_recording_is_said(tmp_path: Path) -> None:
+    """More power at the shaft than goes into the motor, in B."""
+    files = []
+    for name, seed, electric in (("a.csv", 1, 1.5), ("b.csv", 2, 0.7)):
+        table = stand(seed)
+        power = table["torque_Nm"] * table["rpm"] * math.pi / 30.0
+        files.append(written(tmp_path / name, table | {"electrical_power_W": electric * power}))
+    answer = compare(*files)
+    (error,) = (note for note in answer.document["notes"] if note.startswith("error in "))
+    assert error.startswith("error in B: power_above_input") and "1.429 times at most" in error
+    assert "error in B: power_above_input" in answer.text.split("B against A")[0]
+    assert f"note: {error}" not in answer.text

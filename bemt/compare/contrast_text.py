@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from bemt.base.tables import number_text, text_table
-from bemt.compare.recordings import NOT_ALONE, OTHER_STAND
+from bemt.compare.recordings import ERROR_IN, NOT_ALONE, OTHER_STAND
 from bemt.compare.scaling_laws import FAMILY, law
 
 _WORD = {
@@ -51,6 +51,8 @@ def text(doc: Mapping[str, Any], details: bool = False) -> str:
     """Lines of a comparison."""
     lines = textwrap.wrap(headline(doc), 110)
     lines += [f"verdict: {doc['verdict']}" + (f" {', '.join(doc['effects'])}" if doc["effects"] else "")]
+    errors = [n for n in doc["notes"] if n.startswith(ERROR_IN)]
+    lines += [textwrap.fill(n, 110, initial_indent="  ", subsequent_indent="    ") for n in errors]
     lines += _said(doc)
     rows = []
     for channel, r in doc["ratios"].items():
@@ -68,7 +70,8 @@ def text(doc: Mapping[str, Any], details: bool = False) -> str:
     if details:
         lines += _tables(doc)
     lines += [f"  assumed: {a}" for a in doc["assumed"]]
-    notes = doc["notes"] if details else [n for n in doc["notes"] if not n.startswith(("A: ", "B: "))][:_NOTES]
+    notes = [n for n in doc["notes"] if n not in errors]
+    notes = notes if details else [n for n in notes if not n.startswith(("A: ", "B: "))][:_NOTES]
     lines += [f"  note: {n}" for n in notes]
     return "\n".join(lines)
 

@@ -28,6 +28,8 @@ DAYS = (
 )
 """What tells two runs apart whose loads differ by a share."""
 SCHEMA = "bemt.comparison/1"
+ERROR_IN = "error in "
+"""Start of a note on what cannot be so in A or B."""
 # Recorded densities are this good: a barometer, a thermometer and nobody's humidity, share.
 _TOLD_DENSITY, _BAROMETER, _SURE = 0.012, 0.004, 2.0
 # A battery or supply: voltage that was read apart by more than this at equal command, share; loads that do not matter.

@@ -15,7 +15,7 @@ from bemt import __version__
 from bemt.base.errors import Fault, InputError
 from bemt.base.face import as_html
 from bemt.compare.asked import Asked
-from bemt.compare.recordings import RunChange, changed, document, next_step
+from bemt.compare.recordings import ERROR_IN, RunChange, changed, document, next_step
 from bemt.compare.stand_run import conditions_of, selected, stand_run, with_air
 from bemt.effects import catalogue
 
@@ -147,12 +147,26 @@ def compare(
         raise InputError(faults)
     found = changed(runs[0], runs[1], math.nan if D is None else D)
     doc = document(found) | {"version": __version__, "recordings": names, "rows": {"A": rows_a, "B": rows_b}}
+    doc["notes"] = [*_errors(read, D, case is not None and case.ducted), *doc["notes"]]
     if case is not None:
         doc |= _agreed(_diagnosed(asked, read, case, progress), doc, found)
     own = case is not None and doc["verdict"] == doc["diagnosis"]["verdict"] and doc["rule"] == doc["diagnosis"]["rule"]
     step = _after(doc) if own else next_step(found, asked)
     doc["next_measurement"] = step | {"command": ""} if step["command"] == asked.command() else step
     return Contrast(found, doc)
+
+
+def _errors(read: Sequence[Dataset], diameter_m: float | None, ducted: bool) -> list[str]:
+    """What cannot be so in either recording, as ``import`` and ``diagnose`` find it."""
+    from bemt.recordings.check import check
+
+    out = []
+    for letter, imported in zip("AB", read, strict=True):
+        if imported.kind in ("bench", "table"):
+            for f in check(imported, diameter_m=diameter_m, ducted=ducted):
+                told = f.evidence if f.evidence.startswith(f.channel) else f"{f.channel}: {f.evidence}"
+                out += [f"{ERROR_IN}{letter}: {f.id}: {told}"] if f.severity == "error" else []
+    return out
 
 
 def _two_choices(name: str) -> str:
