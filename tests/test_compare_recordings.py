@@ -397,3 +397,21 @@ def test_what_cannot_be_so_in_a_recording_is_said(tmp_path: Path) -> None:
     assert error.startswith("error in B: power_above_input") and "1.429 times at most" in error
     assert "error in B: power_above_input" in answer.text.split("B against A")[0]
     assert f"note: {error}" not in answer.text
+
+
+def test_with_a_case_the_text_says_the_answer_and_what_the_case_adds(tmp_path: Path) -> None:
+    """The ratios decide where an error of the model could look like the change; nothing ends in a colon."""
+    a, b = pair(tmp_path, scaled(torque_Nm=1.15))
+    for case in ("cases/prop_10x5", "cases/prop_8x5"):
+        answer = compare(a, b, case)
+        lines = answer.text.split("\n\n")[0].splitlines()
+        joined = " ".join(" ".join(lines).split())
+        for line, after in zip(lines, [*lines[1:], ""], strict=True):
+            assert not line.endswith("as reference:") or after.startswith("  ") and not after.startswith("  Next:")
+        assert "cannot be distinguished from it" not in joined and "The ratios say" not in joined
+        assert joined.count("Next: ") <= 1
+        if answer.document["diagnosis"]["verdict"] not in ("named", "sensor", "class"):
+            assert answer.verdict == "class"
+            assert "One of these; the data cannot tell them apart (probability " in joined
+            case_says = answer.document["diagnosis"]["verdict"]
+            assert f"A as reference, does not decide: it says {case_says}, because an error" in joined

@@ -148,15 +148,14 @@ def _said(doc: Mapping[str, Any]) -> list[str]:
         a, b = doc["density"]["A"], doc["density"]["B"]
         ends = f"Recorded density: {a:.4g} to {b:.4g} kg/m3" if a and b else "Density from the recorded temperatures"
         out.append(f"{ends} ({density - 1:+.1%}).")
-    out += (
-        [_verdict(doc)] if "diagnosis" not in doc else [f"The case {doc['case']}, with A as reference:", *doc["told"]]
-    )
+    step = doc.get("next_measurement") or {}
+    told = doc["told"] if "diagnosis" in doc else [sentence(doc)]
+    out += [t for t in told if not (step.get("text") and t.lstrip().startswith(("Next: ", "python -m bemt ")))]
     drive = (doc.get("subsystems") or {}).get("drive")
     if drive and drive["effects"] and drive["effects"] != doc["effects"]:
         out.append(f"Drive: {drive['verdict']}: {', '.join(_title(k) for k in drive['effects'])}.")
     elif drive and doc["verdict"] != "none" and drive["verdict"] == "none":
         out.append("Drive: no change beyond scatter.")
-    step = doc.get("next_measurement") or {}
     if step.get("text"):
         out.append(f"Next: {step['text']}.")
     out = [textwrap.fill(line, 110, initial_indent="  ", subsequent_indent="    ") for line in out]
@@ -165,17 +164,18 @@ def _said(doc: Mapping[str, Any]) -> list[str]:
     return out
 
 
-def _verdict(doc: Mapping[str, Any]) -> str:
-    names = [_title(k) for k in doc["effects"]]
+def sentence(doc: Mapping[str, Any]) -> str:
+    """Verdict and reason."""
+    names = ", ".join(_title(k) for k in doc["effects"])
     p = doc.get("probability")
-    sure = f" ({p:.2f})" if p else ""
+    sure = f" (probability {p:.2f})" if p else ""
     if doc["verdict"] == "none":
-        return f"No change: {doc['rule']}."
+        return f"{doc['rule'][0].upper()}{doc['rule'][1:]}."
     if doc["verdict"] in ("named", "sensor"):
         lead = "The stand" if doc["verdict"] == "sensor" else "What changed"
-        return f"{lead}: {names[0]}{sure}: {doc['rule']}."
+        return f"{lead}: {names}{sure}: {doc['rule']}."
     if doc["verdict"] == "class":
-        return f"One of these, which scale in the same way here{sure}: {', '.join(names)}."
+        return f"One of these; the data cannot tell them apart{sure}: {names}."
     if doc["verdict"] == "unknown":
         return f"Unknown: {doc['rule']}."
     first = [r["effect"] for r in doc["ranking"] if r["effect"] not in ("none", "unknown")][:4]

@@ -334,7 +334,7 @@ def judge(probability: Mapping[str, float], size: Mapping[str, tuple[float, floa
         return Judgement(verdict, tuple(effects), probability, size, why)
 
     if probability[NONE] >= 0.5:
-        return answer("none", (), f"no change beyond scatter and set-up ({probability[NONE]:.2f})")
+        return answer("none", (), f"no change beyond scatter and set-up (probability {probability[NONE]:.2f})")
     listed = {k: p for k, p in probability.items() if k not in _PRIOR}
     mass, unknown = sum(listed.values()), probability[UNKNOWN]
     if unknown > 0.5:

@@ -15,6 +15,7 @@ from bemt import __version__
 from bemt.base.errors import Fault, InputError
 from bemt.base.face import as_html
 from bemt.compare.asked import Asked
+from bemt.compare.contrast_text import sentence
 from bemt.compare.recordings import ERROR_IN, RunChange, changed, document, next_step
 from bemt.compare.stand_run import conditions_of, selected, stand_run, with_air
 from bemt.effects import catalogue
@@ -212,6 +213,7 @@ def _diagnosed(
     said = diagnosis(answer)
     keys = ("verdict", "effects", "probability", "ranking", "rule")
     told = [line for line in explanation(answer) if not line.startswith(_REMARK)]
+    told = [f"The case {case.name}, with A as reference:", *told] if told else []
     return {k: said[k] for k in keys} | {"diagnosis": said, "case": case.name, "told": told}
 
 
@@ -245,12 +247,13 @@ def _agreed(said: dict[str, Any], ratios: dict[str, Any], found: RunChange) -> d
     mine = {k: ratios[k] for k in ("verdict", "effects", "probability", "ranking", "rule")}
     decided = by_ratio.verdict in _CLAIMS
     if by_ratio.verdict == said["verdict"] == "none" and found.leading is found.drive:
-        return said | mine | {"told": [f"The loads agree; the drive does not: {ratios['rule']}."]}
+        return said | mine | {"told": ["The loads agree; the drive does not.", sentence(ratios)]}
     if by_ratio.verdict == "none" and said["verdict"] == "unknown":
-        return said | mine | {"rule": f"{by_ratio.why}; the model misses the same in both"}
+        rule = f"{by_ratio.why}; the model of the case {said['case']} differs from both in the same way"
+        return said | mine | {"rule": rule, "told": [sentence(ratios | {"rule": rule})]}
     if said["verdict"] not in _CLAIMS:
         sees = decided or (said["verdict"] == "none" and by_ratio.probability.get("none", 1.0) < _UNLIKELY)
-        return _by_ratios(said, mine, "errors of the model that cannot be distinguished from it") if sees else said
+        return _by_ratios(said, mine, "because an error of the model could look like this change") if sees else said
     if not by_ratio.probability:
         return said
     least = _IMPOSSIBLE * max(by_ratio.probability.values())
@@ -262,7 +265,7 @@ def _agreed(said: dict[str, Any], ratios: dict[str, Any], found: RunChange) -> d
             return said
         if left and said["verdict"] == "class":
             return said | {"effects": left, "rule": f"{said['rule']}; {why}"}
-        return _by_ratios(said, mine, why)
+        return _by_ratios(said, mine, f"but {why}")
     both = [k for k in left if k in by_ratio.effects]
     lone = [k for k in left if k not in by_ratio.probability]
     other = [k for k in by_ratio.effects if k not in catalogue()]
@@ -271,7 +274,7 @@ def _agreed(said: dict[str, Any], ratios: dict[str, Any], found: RunChange) -> d
         if len(both) > 1 or not other or rank[both[0]] >= max(rank[k] for k in other):
             return said
     if not both and not lone:
-        return _by_ratios(said, mine, why if struck else f"{', '.join(left)} would scale differently")
+        return _by_ratios(said, mine, f"but {why}" if struck else f"but {', '.join(left)} would scale differently")
     effects = [*both, *lone, *(other if both else by_ratio.effects)]
     if len(effects) == 1:
         return said | {"effects": effects}
@@ -281,8 +284,9 @@ def _agreed(said: dict[str, Any], ratios: dict[str, Any], found: RunChange) -> d
 
 def _by_ratios(said: dict[str, Any], mine: dict[str, Any], why: str) -> dict[str, Any]:
     """The answer of the ratios in place of that of the diagnosis."""
-    told = [f"The ratios say: {mine['rule']}. The diagnosis said {said['verdict']}: {why}."]
-    return said | mine | {"told": told}
+    found = " ".join([said["verdict"], ", ".join(said["effects"])]).strip()
+    told = f"The diagnosis with the case {said['case']}, A as reference, does not decide: it says {found}, {why}."
+    return said | mine | {"told": [sentence(mine), told]}
 
 
 def _after(doc: dict[str, Any]) -> dict[str, Any]:
