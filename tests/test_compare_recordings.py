@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from bemt.base.errors import InputError
 from bemt.commands.cli import main
+from bemt.compare.contrast_text import text
 from bemt.compare.scaling_laws import LAWS
 from bemt.diagnose.contrast import compare
 from bemt.effects import catalogue
@@ -415,3 +416,15 @@ def test_with_a_case_the_text_says_the_answer_and_what_the_case_adds(tmp_path: P
             assert "One of these; the data cannot tell them apart (probability " in joined
             case_says = answer.document["diagnosis"]["verdict"]
             assert f"A as reference, does not decide: it says {case_says}, because an error" in joined
+
+
+def test_the_answer_says_things_once_and_in_one_notation(tmp_path: Path) -> None:
+    none = " ".join(compare(*pair(tmp_path, scaled())).text.split())
+    assert "No change beyond scatter and set-up (probability " in none and "No change: no change" not in none
+    doc = compare(*pair(tmp_path, scaled(thrust_N=2.1, torque_Nm=2.4))).document
+    wide = {**doc["ratios"]["thrust_N"], "ratio": 2.1, "low95": 1.7, "high95": 2.6}
+    said = text(doc | {"ratios": {**doc["ratios"], "thrust_N": wide}})
+    assert "thrust x2.10 (x1.70 to x2.60), torque x2.36 (x2.28 to x2.44)" in " ".join(said.split())
+    a, b = stand(1), stand(2, scaled(torque_Nm=-1.0))
+    turned = compare(written(tmp_path / "a.csv", a), written(tmp_path / "b.csv", b)).document["notes"]
+    assert "torque_Nm: changed sign between A and B; sizes are compared" in turned

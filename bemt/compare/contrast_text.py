@@ -10,6 +10,7 @@ from typing import Any
 from bemt.base.tables import number_text, text_table
 from bemt.compare.recordings import ERROR_IN, NOT_ALONE, OTHER_STAND
 from bemt.compare.scaling_laws import FAMILY, law
+from bemt.effects import catalogue
 
 _WORD = {
     "thrust_N": "thrust",
@@ -29,13 +30,24 @@ _ROWS, _NOTES = 8, 4
 _GUESS = 0.1
 
 
-def _share(x: float) -> str:
-    return f"{x - 1.0:+.1%}" if 0.4 < x < 2.5 else f"x{number_text(x, 3)}"
+def _shares(*values: float) -> list[str]:
+    """Changes in one notation: percent, or factors where one of them is far from 1.
+
+    >>> _shares(2.09, 1.66, 2.63), _shares(1.0, 0.9)
+    (['x2.09', 'x1.66', 'x2.63'], ['+0.0%', '-10.0%'])
+    """
+    near = all(0.4 < x < 2.5 for x in values)
+    return [f"{x - 1.0:+.1%}" if near else f"x{number_text(x, 3)}" for x in values]
+
+
+def _intervals(channels: Sequence[Mapping[str, Any]]) -> list[list[str]]:
+    """Change of each channel as measured and the ends of its 95 % interval, all in one notation."""
+    said = _shares(*(r[k] * r["density_ratio"] for r in channels for k in ("ratio", "low95", "high95")))
+    return [said[i : i + 3] for i in range(0, len(said), 3)]
 
 
 def _title(name: str) -> str:
-    row = law(name)
-    return f"{name} ({row.title})" if row else name
+    return f"{name} ({_plain(name)})" if law(name) or name in catalogue() else name
 
 
 def _range(entry: Mapping[str, Any]) -> str:
@@ -89,8 +101,10 @@ def headline(doc: Mapping[str, Any]) -> str:
     # a cause in the drive has moved the drive, not the loads
     drive = {FAMILY.get(k, k) for k in effects} == {"drive"}
     kinds = ("speed", "voltage", "electrical") if drive else ("thrust", "torque")
-    by_kind = {r["kind"]: f"{_WORD[c]} {_share(r['ratio'] * r['density_ratio'])}" for c, r in doc["ratios"].items()}
-    moved = " and ".join([by_kind[k] for k in kinds if k in by_kind][:2])
+    loads = {r["kind"]: (_WORD[c], r) for c, r in doc["ratios"].items()}
+    shown = [loads[k] for k in kinds if k in loads][:2]
+    shares = _intervals([r for _, r in shown])
+    moved = " and ".join(f"{word} {share[0]}" for (word, _), share in zip(shown, shares, strict=True))
     if verdict == "none":
         return f"No change beyond the difference between two set-ups ({moved or 'drive only'})."
     if verdict == "unknown":
@@ -101,9 +115,8 @@ def headline(doc: Mapping[str, Any]) -> str:
         guess = "" if no_guess else _families(likely, doc["ranking"])
         return f"These recordings cannot say what changed ({moved})" + (f"; likeliest {guess}." if guess else ".")
     if len(effects) == 1:
-        row = law(effects[0])
         lead = "The stand, not the rotor" if verdict == "sensor" else "What changed"
-        return f"{lead}: {row.title if row else effects[0]} ({moved or 'drive alone'})."
+        return f"{lead}: {_plain(effects[0])} ({moved or 'drive alone'})."
     several = _families(effects, doc["ranking"])
     return f"{several[0].upper()}{several[1:]} ({moved or 'drive alone'})."
 
@@ -120,7 +133,8 @@ def _families(effects: Sequence[str], ranking: Sequence[Mapping[str, Any]]) -> s
 
 
 def _plain(name: str) -> str:
-    row = law(name)
+    """Title of a cause: of its scaling law, or of an effect that has none."""
+    row = law(name) or catalogue().get(name)
     return row.title if row else _FAMILY_WORD.get(name, name)
 
 
@@ -129,18 +143,15 @@ def _ends(r: Mapping[str, Any], factor: float = 1.0) -> list[str]:
 
 
 def _said(doc: Mapping[str, Any]) -> list[str]:
-    words = []
-    for channel, r in doc["ratios"].items():
-        if r["kind"] in ("thrust", "torque"):
-            f = r["density_ratio"]
-            ends = f"{_share(r['low95'] * f)} to {_share(r['high95'] * f)}"
-            words.append(f"{_WORD[channel]} {_share(r['ratio'] * f)} ({ends})")
-    first = next((r for r in doc["ratios"].values() if r["kind"] in ("thrust", "torque")), None)
+    loads = {c: r for c, r in doc["ratios"].items() if r["kind"] in ("thrust", "torque")}
+    intervals = _intervals(list(loads.values()))
+    words = [f"{_WORD[c]} {at} ({low} to {high})" for c, (at, low, high) in zip(loads, intervals, strict=True)]
+    first = next(iter(loads.values()), None)
     out = []
     if first is not None:
         where = "extrapolated to one speed" if first["extrapolated"] else _range(first)
         out.append(f"B against A at equal speed, {where}: {', '.join(words)}; 95 % in brackets.")
-        grows = [_WORD[c] for c, r in doc["ratios"].items() if r["kind"] in ("thrust", "torque") and r["depends_on"]]
+        grows = [_WORD[c] for c, r in loads.items() if r["depends_on"]]
         if grows:
             out.append(f"The ratio of {' and '.join(grows)} changes with speed or advance ratio.")
     density = doc["density"]["ratio"]

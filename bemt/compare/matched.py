@@ -192,7 +192,7 @@ def matched(a: StandRun, b: StandRun, name: str, diameter: float = math.nan) -> 
         return None
     notes = []
     if one["sign"][0] != two["sign"][0]:
-        notes.append(f"{channel}: the sign turned between A and B; sizes are compared")
+        notes.append(f"{channel}: changed sign between A and B; sizes are compared")
     parts = [_averaged(one), _averaged(two)]
     for part, run in zip(parts, (a, b), strict=True):
         if part["lost"][0] > 0.5 * len(run):

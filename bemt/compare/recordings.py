@@ -302,7 +302,7 @@ def _assumed(a: StandRun, b: StandRun, diameter: float, loads: Mapping[str, Matc
     if still:
         out.append(f"airspeed is not recorded in {' and '.join(still)}: taken as still air")
     if "torque" not in loads and "thrust" in loads:
-        out.append("torque is not recorded in both: gain, air and blade scale alike in thrust")
+        out.append("torque is not recorded in both: thrust alone cannot tell gain, air and blade apart")
     if "torque" in loads and loads["torque"].channel == "electrical_power_W":
         out.append(
             "torque is not recorded: electrical power replaces it, assuming the same motor and controller in both"
@@ -361,7 +361,7 @@ def next_step(change: RunChange, asked: Asked) -> dict[str, str]:
     if density and small and math.isnan(change.density_ratio):
         return {"text": DAYS, "command": asked.with_days()}
     if not _TORQUES & change.ratios.keys() and change.loads is said:
-        text = "record torque in both runs: without it gain, air and blade look alike"
+        text = "record torque in both runs: thrust alone cannot tell gain, air and blade apart"
         return {"text": text, "command": asked.command(a="A_WITH_TORQUE.csv", b="B_WITH_TORQUE.csv")}
     if rows:
         firsts = {FAMILY.get(row.id, row.id): row.settles for row in reversed(rows)}

@@ -39,7 +39,7 @@ _CLAIMS = ("named", "sensor", "class")
 _AGREE, _WOULD = 0.03, 0.1
 # Probability in the diagnosis from which an effect that no scaling law describes is in the class.
 _LIKELY = 0.1
-_SAME_ROTOR = "make sure that the case is this rotor: both recordings are off it alike"
+_SAME_ROTOR = "make sure that the case is this rotor: both runs differ from it in the same way"
 _LOADS = {"thrust_N": "thrust", "torque_Nm": "torque"}
 
 
