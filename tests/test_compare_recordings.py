@@ -428,3 +428,34 @@ def test_the_answer_says_things_once_and_in_one_notation(tmp_path: Path) -> None
     a, b = stand(1), stand(2, scaled(torque_Nm=-1.0))
     turned = compare(written(tmp_path / "a.csv", a), written(tmp_path / "b.csv", b)).document["notes"]
     assert "torque_Nm: changed sign between A and B; sizes are compared" in turned
+
+
+@pytest.mark.parametrize("wind", [None, "5m/s"])
+@pytest.mark.parametrize(("share", "words"), [(0.2, "check the speed sensor of B"), (0.36, "mostly noise")])
+def test_speeds_that_no_rotor_can_have_do_not_carry_the_ratio(
+    tmp_path: Path, wind: str | None, share: float, words: str
+) -> None:
+    """Three times the speed at low command and little power: the sensor of B misreads, whatever wind is stated."""
+    files = []
+    for name, seed, false in (("a.csv", 1, 0.0), ("b.csv", 2, share)):
+        table = {k: np.tile(v, 3) for k, v in stand(seed).items() if k != "airspeed_m_s"}
+        table["pulse_width_us"] = 1100.0 + 800.0 * (table["rpm"] - 3000.0) / 5000.0
+        table["electrical_power_W"] = 1.4 * table["torque_Nm"] * table["rpm"] * np.pi / 30.0
+        slow = table["pulse_width_us"] < np.quantile(table["pulse_width_us"], false)
+        table["rpm"] = np.where(slow, 11000.0 + 10.0 * np.arange(51), table["rpm"])
+        files.append(written(tmp_path / name, table))
+    doc = compare(*files, diameter_m=D, air_a=wind, air_b=wind).document
+    assert doc["ratios"]["rpm"]["ratio"] == pytest.approx(1.0, abs=0.02)
+    (note,) = (n for n in doc["notes"] if "speeds of B left out" in n)
+    assert note.startswith("rpm: ") and words in note
+
+
+def test_the_speed_at_equal_command_does_not_depend_on_the_air_that_is_stated(shared_data: Path) -> None:
+    folder = shared_data / "contrasts" / "pitch_diameter_wvu_tunnel"
+    files = [folder / "run05_18x10_45kt.csv", folder / "run03_18x12_45kt.csv"]
+    plain = compare(*files).document
+    windy = compare(*files, label="18x10", air_a="1m/s", air_b="1m/s").document
+    ratios = [doc["ratios"]["rpm"]["ratio"] for doc in (plain, windy)]
+    assert ratios[0] == pytest.approx(ratios[1], rel=0.005) and 0.91 < ratios[0] < 0.97
+    for doc in (plain, windy):
+        assert any("speeds of B left out" in note for note in doc["notes"])

@@ -45,6 +45,8 @@ _TOLD = ("density as recorded", "by the thermometers", "voltage as recorded")
 _MOVED, _WIDE = 2.5, 1.4
 # Thrust of a propeller of 2.3 times the diameter at one speed: no stand takes both. [1]
 _FAR_OFF = 30.0
+# Share of misread speeds from which the sensor is doubtful, and from which the others are no good either.
+_DOUBTFUL, _NOISE = 0.05, 0.3
 # Scatter of readings at one speed, share, that no stand has: something else changes from reading to reading.
 _RESTLESS = 0.10
 # Odds (ln) of any smooth change over one factor from which a load did not change by one.
@@ -314,7 +316,8 @@ def _assumed(a: StandRun, b: StandRun, diameter: float, loads: Mapping[str, Matc
 
 
 def _notes(a: StandRun, b: StandRun, channels: Mapping[str, MatchedChannel], strays: Mapping[str, int]) -> list[str]:
-    out = [note for c in channels.values() for note in c.notes]
+    out = [_misread(letter, run) for letter, run in (("A", a), ("B", b)) if run.misread[0]]
+    out += [note for c in channels.values() for note in c.notes]
     out += [
         f"{n} reading{'s' if n > 1 else ''} of {channels[k].channel} far from all others dropped"
         for k, n in strays.items()
@@ -327,6 +330,15 @@ def _notes(a: StandRun, b: StandRun, channels: Mapping[str, MatchedChannel], str
     if a.command and b.command and a.command != b.command:
         out.append(f"different types of command ({a.command}, {b.command}): the drive is not compared")
     return list(dict.fromkeys([*out, *(f"A: {n}" for n in a.points.notes), *(f"B: {n}" for n in b.points.notes)]))
+
+
+def _misread(letter: str, run: StandRun) -> str:
+    """What is said of speeds that were left out."""
+    n, total = run.misread
+    words = f"rpm: {n} of {total} speeds of {letter} left out: no rotor can turn like that at such a command and load"
+    if n > _NOISE * total:
+        return f"{words}; the speed channel of {letter} is mostly noise, do not trust what is left"
+    return words + (f"; check the speed sensor of {letter}" if n > _DOUBTFUL * total else "")
 
 
 def next_step(change: RunChange, asked: Asked) -> dict[str, str]:
