@@ -335,6 +335,9 @@ def test_the_wind_of_files_that_have_none_is_told(tmp_path: Path) -> None:
         files.append(written(tmp_path / name, table))
     told = compare(*files, diameter_m=D, air_a="3m/s", air_b="14.4km/h")
     assert told.verdict == "none"
+    assumed = " ".join(compare(*files, air_b="3m/s").document["assumed"])
+    assert "airspeed is not recorded in A: taken as still air; --air-a 18m/s states a wind" in assumed
+    assert "taken as equal; --air-a 22C,1013hPa --air-b 22C,1013hPa states it" in assumed
     with pytest.raises(InputError, match="--air-b"):
         compare(*files, air_b="300m/s")
 

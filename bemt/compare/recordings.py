@@ -299,10 +299,15 @@ def _assumed(a: StandRun, b: StandRun, diameter: float, loads: Mapping[str, Matc
     if unknown and fits.density_change(a, b)[1]:
         out.append("air pressure is not recorded in both: taken as equal within 1 %")
     elif unknown and any(c.channel in ("thrust_N", "torque_Nm", "power_W") for c in loads.values()):
-        out.append(f"air density is not recorded in {' and '.join(unknown)}: taken as equal")
+        how = " ".join(f"--air-{n.lower()} 22C,1013hPa" for n in unknown)
+        out.append(f"air density is not recorded in {' and '.join(unknown)}: taken as equal; {how} states it")
     still = [n for n, r in (("A", a), ("B", b)) if not {"airspeed_m_s", "J"} & r.points.values.keys()]
     if still:
-        out.append(f"airspeed is not recorded in {' and '.join(still)}: taken as still air")
+        how = " ".join(f"--air-{n.lower()} 18m/s" for n in still)
+        out.append(
+            f"airspeed is not recorded in {' and '.join(still)}: taken as still air; {how} states a wind"
+            " (with the air: 22C,1013hPa,18m/s)"
+        )
     if "torque" not in loads and "thrust" in loads:
         out.append("torque is not recorded in both: thrust alone cannot tell gain, air and blade apart")
     if "torque" in loads and loads["torque"].channel == "electrical_power_W":
