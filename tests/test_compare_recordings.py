@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from bemt.base.errors import InputError
 from bemt.commands.cli import main
+from bemt.compare.contrast_figure import picture
 from bemt.compare.contrast_text import text
 from bemt.compare.scaling_laws import LAWS
 from bemt.diagnose.contrast import compare
@@ -462,3 +463,30 @@ def test_the_speed_at_equal_command_does_not_depend_on_the_air_that_is_stated(sh
     assert ratios[0] == pytest.approx(ratios[1], rel=0.005) and 0.91 < ratios[0] < 0.97
     for doc in (plain, windy):
         assert any("speeds of B left out" in note for note in doc["notes"])
+
+
+def test_the_picture_names_what_is_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Electrical power in place of torque, over a pulse width in microseconds; files in full, the answer in words."""
+    from matplotlib.figure import Figure
+
+    files = []
+    for name, seed in (("a_very_long_name_of_a_recording_that_was_made_on_monday__20210721.csv", 1), ("b.csv", 2)):
+        table = stand(seed)
+        table["electrical_power_W"] = 1.4 * table.pop("torque_Nm") * table["rpm"] * np.pi / 30.0
+        table |= {"voltage_V": np.full(17, 12.0), "pulse_width_us": 1100.0 + 0.1 * table["rpm"]}
+        files.append(written(tmp_path / name, table))
+    answer, drawn = compare(*files), []
+    monkeypatch.setattr(Figure, "savefig", lambda figure, *_, **__: drawn.append(figure))
+    picture(answer.change, answer.document)
+    (figure,) = drawn
+    labels = [(axis.get_xlabel(), axis.get_ylabel()) for axis in figure.axes]
+    assert labels[2] == ("speed of rotation [rev/min]", "electrical power / n³ [W s³]")
+    assert labels[3][1] == "electrical power: B / A"
+    assert [x for x, _ in labels[4:]] == ["pulse width [µs]"] * 2
+    left = figure.axes[4].lines[0].get_xdata()
+    assert 1300.0 < min(left) < max(left) < 2000.0
+    electric = figure.axes[2].lines[0].get_ydata()
+    assert max(electric) == pytest.approx(1.4 * 0.008 * 1.2 * D**5 * 2.0 * np.pi, rel=0.05)
+    head = figure.get_suptitle().splitlines()
+    assert head[0] == "A: a_very_long_name_of_a_recording_that_was_made_on_monday__20210721.csv"
+    assert head[2].startswith(("No change", "These recordings"))

@@ -12,7 +12,7 @@ from bemt.compare.recordings import ERROR_IN, NOT_ALONE, OTHER_STAND
 from bemt.compare.scaling_laws import FAMILY, law
 from bemt.effects import catalogue
 
-_WORD = {
+WORD = {
     "thrust_N": "thrust",
     "torque_Nm": "torque",
     "power_W": "shaft power",
@@ -73,7 +73,7 @@ def text(doc: Mapping[str, Any], details: bool = False) -> str:
         if "slope" in r and r["kind"] not in ("speed", "voltage") and r["slope_error"] < _NO_SLOPE:
             slope = f"{r['slope']:+.1%} +- {r['slope_error']:.1%}"
         more = [slope, f"{r['scatter']:.1%}", "{}, {}".format(*r["points"])]
-        rows.append([_WORD.get(channel, channel), f"{raw:.4f}", *_ends(r, r["density_ratio"]), *more])
+        rows.append([WORD.get(channel, channel), f"{raw:.4f}", *_ends(r, r["density_ratio"]), *more])
         if abs(r["density_ratio"] - 1.0) > 1e-6:
             coefficient = "CT" if channel == "thrust_N" else "CP"
             rows.append([f"  {coefficient} (corrected for density)", f"{r['ratio']:.4f}", *_ends(r), "", "", ""])
@@ -101,19 +101,20 @@ def headline(doc: Mapping[str, Any]) -> str:
     # a cause in the drive has moved the drive, not the loads
     drive = {FAMILY.get(k, k) for k in effects} == {"drive"}
     kinds = ("speed", "voltage", "electrical") if drive else ("thrust", "torque")
-    loads = {r["kind"]: (_WORD[c], r) for c, r in doc["ratios"].items()}
+    loads = {r["kind"]: (WORD[c], r) for c, r in doc["ratios"].items()}
     shown = [loads[k] for k in kinds if k in loads][:2]
     shares = _intervals([r for _, r in shown])
     moved = " and ".join(f"{word} {share[0]}" for (word, _), share in zip(shown, shares, strict=True))
     if verdict == "none":
         return f"No change beyond the difference between two set-ups ({moved or 'drive only'})."
     if verdict == "unknown":
-        return f"Something changed ({moved}), and no listed cause explains it."
+        return "Something changed" + (f" ({moved})" if moved else "") + ", and no listed cause explains it."
     if verdict == "insufficient":
         likely = [r["effect"] for r in doc["ranking"] if r["probability"] >= _GUESS]
         no_guess = doc["rule"] == OTHER_STAND or doc["rule"].endswith(NOT_ALONE)
         guess = "" if no_guess else _families(likely, doc["ranking"])
-        return f"These recordings cannot say what changed ({moved})" + (f"; likeliest {guess}." if guess else ".")
+        size = f" ({moved})" if moved else ""
+        return f"These recordings cannot say what changed{size}" + (f"; likeliest {guess}." if guess else ".")
     if len(effects) == 1:
         lead = "The stand, not the rotor" if verdict == "sensor" else "What changed"
         return f"{lead}: {_plain(effects[0])} ({moved or 'drive alone'})."
@@ -145,13 +146,13 @@ def _ends(r: Mapping[str, Any], factor: float = 1.0) -> list[str]:
 def _said(doc: Mapping[str, Any]) -> list[str]:
     loads = {c: r for c, r in doc["ratios"].items() if r["kind"] in ("thrust", "torque")}
     intervals = _intervals(list(loads.values()))
-    words = [f"{_WORD[c]} {at} ({low} to {high})" for c, (at, low, high) in zip(loads, intervals, strict=True)]
+    words = [f"{WORD[c]} {at} ({low} to {high})" for c, (at, low, high) in zip(loads, intervals, strict=True)]
     first = next(iter(loads.values()), None)
     out = []
     if first is not None:
         where = "extrapolated to one speed" if first["extrapolated"] else _range(first)
         out.append(f"B against A at equal speed, {where}: {', '.join(words)}; 95 % in brackets.")
-        grows = [_WORD[c] for c, r in loads.items() if r["depends_on"]]
+        grows = [WORD[c] for c, r in loads.items() if r["depends_on"]]
         if grows:
             out.append(f"The ratio of {' and '.join(grows)} changes with speed or advance ratio.")
     density = doc["density"]["ratio"]
