@@ -490,3 +490,21 @@ def test_the_picture_names_what_is_drawn(tmp_path: Path, monkeypatch: pytest.Mon
     head = figure.get_suptitle().splitlines()
     assert head[0] == "A: a_very_long_name_of_a_recording_that_was_made_on_monday__20210721.csv"
     assert head[2].startswith(("No change", "These recordings"))
+
+
+def test_a_rotor_that_has_just_set_off_is_no_misreading(tmp_path: Path) -> None:
+    """It turns slowly, at a current as large as that of a faster one; it may."""
+    files = []
+    for name, seed in (("a.csv", 1), ("b.csv", 2)):
+        table = {k: np.tile(v, 2) for k, v in stand(seed).items()}
+        table["electrical_power_W"] = 20.0 + 1.4 * table["torque_Nm"] * table["rpm"] * np.pi / 30.0
+        table["pulse_width_us"] = 1100.0 + 800.0 * (table["rpm"] - 3000.0) / 5000.0
+        start = {
+            "rpm": 900.0,
+            "thrust_N": 0.01,
+            "torque_Nm": 1e-3,
+            "electrical_power_W": 40.0,
+            "pulse_width_us": 1250.0,
+        }
+        files.append(written(tmp_path / name, {k: np.append(v, start.get(k, 0.0)) for k, v in table.items()}))
+    assert not any("left out: no rotor" in note for note in compare(*files).document["notes"])

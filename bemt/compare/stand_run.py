@@ -42,7 +42,7 @@ _SAME_NUMBER = 1e-6
 _ENOUGH, _ROWS, _WINDOW, _JUMP, _RATE = 8, 20, 7, 0.03, 0.25
 # Load of a ramp over full scale that a lag of 0.2 s leaves when it takes ten seconds.
 _LAG = 0.02
-# Times that a speed may differ from those at higher or lower commands; readings to compare with, fewest and most.
+# Times that a speed may exceed those at higher commands; readings to compare with, fewest and most.
 _ODD, _FEWEST, _MOST = 1.5, 6, 500
 # What airspeeds of one wind differ by [m/s], and as a share.
 _STEADY_WIND, _LIKE_WIND = 0.5, 0.1
@@ -254,9 +254,10 @@ def stand_run(imported: Dataset, name: str, diameter_m: float | None = None) -> 
 
 
 def _misread(values: Mapping[str, Array]) -> NDArray[np.bool_]:
-    """Speeds that no rotor can have: faster than most at higher command with less load, or slower with more.
+    """Speeds that no rotor can have: much faster than most at the same or higher command, with less load.
 
     A change of battery or propeller moves speed and load in other ways; only readings at one airspeed are compared.
+    A slow one may be a rotor that has just set off.
 
     >>> table = {"command": [1.0, 1.0, *[2.0] * 8], "rpm": [9e3, 3e3, *[5e3] * 8], "thrust_N": [1.0, 1.0, *[4.0] * 8]}
     >>> _misread({k: np.array(v) for k, v in table.items()}).tolist()[:3]
@@ -275,12 +276,10 @@ def _misread(values: Mapping[str, Array]) -> NDArray[np.bool_]:
     some = np.argsort(command, kind="stable")[every]
     V = np.nan_to_num(values.get("airspeed_m_s", np.zeros(none.size)))[rows]
     one_wind = np.abs(V[some] - V[:, None]) <= _STEADY_WIND + _LIKE_WIND * np.abs(V[:, None])
-    for way in (1.0, -1.0):  # too fast, too slow
-        beyond = one_wind & (way * (command[some] - command[:, None]) >= 0.0)
-        contradict = beyond & (way * (speed[:, None] - speed[some]) > math.log(_ODD))
-        contradict &= way * (load[some] - load[:, None]) > 0.0
-        votes = contradict.sum(axis=1)
-        none[rows] |= (votes >= _FEWEST) & (votes > 0.5 * beyond.sum(axis=1))
+    beyond = one_wind & (command[some] >= command[:, None])
+    contradict = beyond & (speed[:, None] - speed[some] > math.log(_ODD)) & (load[some] > load[:, None])
+    votes = contradict.sum(axis=1)
+    none[rows] = (votes >= _FEWEST) & (votes > 0.5 * beyond.sum(axis=1))
     return none
 
 
