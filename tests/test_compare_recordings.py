@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shlex
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -13,6 +14,8 @@ from numpy.typing import NDArray
 
 from bemt.base.errors import InputError
 from bemt.commands.cli import main
+from bemt.compare.contrast_figure import picture
+from bemt.compare.contrast_text import text
 from bemt.compare.scaling_laws import LAWS
 from bemt.diagnose.contrast import compare
 from bemt.effects import catalogue
@@ -284,6 +287,19 @@ def test_a_cause_that_leaves_a_changed_load_alone_is_not_given(tmp_path: Path) -
     assert not answer.effects or not set(answer.effects) <= {"torque_zero", "torque_gain"}
 
 
+def test_the_first_line_names_no_cause_that_the_text_rules_out(shared_data: Path) -> None:
+    """Torque looks like a zero offset, but the thrust has changed as well."""
+    folder = shared_data / "contrasts" / "coax_spacing_15in_11in"
+    names = ("single_rotor__20210721_170209", "map10x10_zD_01__20210722_080607")
+    answer = compare(*(folder / f"15in_400kv_22V_U5_{name}.csv" for name in names), rows_b=["rotor=right"])
+    assert answer.document["rule"] == "torque_zero would leave the thrust alone, which changed as well"
+    assert not {"torque_zero", "torque_gain"} & {r["effect"] for r in answer.document["ranking"]}
+    assert sum(r["probability"] for r in answer.document["ranking"]) == pytest.approx(1.0, abs=0.01)
+    first, rest = answer.text.split("verdict:")
+    assert "likeliest" not in first
+    assert "Still possible: propeller, " in " ".join(rest.split())
+
+
 def test_a_large_change_in_one_load_is_a_class_of_what_scales_like_it(tmp_path: Path) -> None:
     """Without torque a fifth more thrust has many causes, and as many that it rules out."""
     files = []
@@ -346,6 +362,9 @@ def test_the_wind_of_files_that_have_none_is_told(tmp_path: Path) -> None:
         files.append(written(tmp_path / name, table))
     told = compare(*files, diameter_m=D, air_a="3m/s", air_b="14.4km/h")
     assert told.verdict == "none"
+    assumed = " ".join(compare(*files, air_b="3m/s").document["assumed"])
+    assert "airspeed is not recorded in A: taken as still air; --air-a 18m/s states a wind" in assumed
+    assert "taken as equal; --air-a 22C,1013hPa --air-b 22C,1013hPa states it" in assumed
     with pytest.raises(InputError, match="--air-b"):
         compare(*files, air_b="300m/s")
 
@@ -356,3 +375,162 @@ def test_one_file_twice_says_which_column_parts_it(tmp_path: Path) -> None:
     file = written(tmp_path / "both.csv", both)
     with pytest.raises(InputError, match="--rows-a spacing_ratio=0.5 --rows-b spacing_ratio=1"):
         compare(file, file)
+
+
+def test_the_printed_command_runs_with_the_rotor_that_was_chosen(
+    shared_data: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Readings of all spacings of two rotors: the step chooses a spacing, and keeps the rotor."""
+    folder = shared_data / "contrasts" / "coax_spacing_15in_11in"
+    names = ("single_rotor__20210721_170209", "map10x10_zD_01__20210722_080607")
+    files = [str(folder / f"15in_400kv_22V_U5_{name}.csv") for name in names]
+    assert main(["compare", *files, "--rows-b", "rotor=right"]) == 0
+    command = next(line for line in capsys.readouterr().out.splitlines() if "python -m bemt" in line)
+    words = shlex.split(command)
+    assert words[3:8] == ["compare", *files, "--rows-b", "rotor=right"]
+    assert "speed_ratio=LOW:HIGH" in words
+    assert main([w.replace("LOW:HIGH", "0.95:1.05") for w in words[3:]]) == 0
+    again = next(line for line in capsys.readouterr().out.splitlines() if "python -m bemt" in line)
+    assert {"rotor=right", "speed_ratio=0.95:1.05", "CASE"} <= set(shlex.split(again))
+
+
+@pytest.mark.parametrize(
+    ("change", "case"),
+    [
+        (scaled(thrust_N=1.12), None),
+        (scaled(thrust_N=1.04, torque_Nm=1.04), None),
+        (scaled(torque_Nm=1.3), "cases/prop_10x5"),
+    ],
+)
+def test_the_step_of_an_answer_keeps_rows_air_and_label(
+    tmp_path: Path, change: Callable[[dict[str, Array]], None], case: str | None
+) -> None:
+    given = {"rows_a": ["rpm=3500:9000"], "rows_b": ["rpm=3400:9000"], "air_a": "1m/s", "air_b": "1m/s"}
+    doc = compare(*pair(tmp_path, change), case, label="10x5", **given).document
+    step = doc["next_measurement"]
+    told = [line for line in doc.get("told", []) if line.lstrip().startswith("python -m bemt compare")]
+    for command in [*told, *([step["command"]] if step["command"] else [])]:
+        words = shlex.split(command)
+        assert {"rpm=3500:9000", "rpm=3400:9000", "--label"} <= set(words)
+        assert sum("1m/s" in w for w in words) == 2
+        assert case is None or case in words
+
+
+def test_what_cannot_be_so_in_a_recording_is_said(tmp_path: Path) -> None:
+    """More power at the shaft than goes into the motor, in B."""
+    files = []
+    for name, seed, electric in (("a.csv", 1, 1.5), ("b.csv", 2, 0.7)):
+        table = stand(seed)
+        power = table["torque_Nm"] * table["rpm"] * math.pi / 30.0
+        files.append(written(tmp_path / name, table | {"electrical_power_W": electric * power}))
+    answer = compare(*files)
+    (error,) = (note for note in answer.document["notes"] if note.startswith("error in "))
+    assert error.startswith("error in B: power_above_input") and "1.429 times at most" in error
+    assert "error in B: power_above_input" in answer.text.split("B against A")[0]
+    assert f"note: {error}" not in answer.text
+
+
+def test_with_a_case_the_text_says_the_answer_and_what_the_case_adds(tmp_path: Path) -> None:
+    """The ratios decide where an error of the model could look like the change; nothing ends in a colon."""
+    a, b = pair(tmp_path, scaled(torque_Nm=1.15))
+    for case in ("cases/prop_10x5", "cases/prop_8x5"):
+        answer = compare(a, b, case)
+        lines = answer.text.split("\n\n")[0].splitlines()
+        joined = " ".join(" ".join(lines).split())
+        for line, after in zip(lines, [*lines[1:], ""], strict=True):
+            assert not line.endswith("as reference:") or after.startswith("  ") and not after.startswith("  Next:")
+        assert "cannot be distinguished from it" not in joined and "The ratios say" not in joined
+        assert joined.count("Next: ") <= 1
+        if answer.document["diagnosis"]["verdict"] not in ("named", "sensor", "class"):
+            assert answer.verdict == "class"
+            assert "One of these; the data cannot tell them apart (probability " in joined
+            case_says = answer.document["diagnosis"]["verdict"]
+            assert f"A as reference, does not decide: it says {case_says}, because an error" in joined
+
+
+def test_the_answer_says_things_once_and_in_one_notation(tmp_path: Path) -> None:
+    none = " ".join(compare(*pair(tmp_path, scaled())).text.split())
+    assert "No change beyond scatter and set-up (probability " in none and "No change: no change" not in none
+    doc = compare(*pair(tmp_path, scaled(thrust_N=2.1, torque_Nm=2.4))).document
+    wide = {**doc["ratios"]["thrust_N"], "ratio": 2.1, "low95": 1.7, "high95": 2.6}
+    said = text(doc | {"ratios": {**doc["ratios"], "thrust_N": wide}})
+    assert "thrust x2.10 (x1.70 to x2.60), torque x2.36 (x2.28 to x2.44)" in " ".join(said.split())
+    a, b = stand(1), stand(2, scaled(torque_Nm=-1.0))
+    turned = compare(written(tmp_path / "a.csv", a), written(tmp_path / "b.csv", b)).document["notes"]
+    assert "torque_Nm: changed sign between A and B; sizes are compared" in turned
+
+
+@pytest.mark.parametrize("wind", [None, "5m/s"])
+@pytest.mark.parametrize(("share", "words"), [(0.2, "check the speed sensor of B"), (0.36, "mostly noise")])
+def test_speeds_that_no_rotor_can_have_do_not_carry_the_ratio(
+    tmp_path: Path, wind: str | None, share: float, words: str
+) -> None:
+    """Three times the speed at low command and little power: the sensor of B misreads, whatever wind is stated."""
+    files = []
+    for name, seed, false in (("a.csv", 1, 0.0), ("b.csv", 2, share)):
+        table = {k: np.tile(v, 3) for k, v in stand(seed).items() if k != "airspeed_m_s"}
+        table["pulse_width_us"] = 1100.0 + 800.0 * (table["rpm"] - 3000.0) / 5000.0
+        table["electrical_power_W"] = 1.4 * table["torque_Nm"] * table["rpm"] * np.pi / 30.0
+        slow = table["pulse_width_us"] < np.quantile(table["pulse_width_us"], false)
+        table["rpm"] = np.where(slow, 11000.0 + 10.0 * np.arange(51), table["rpm"])
+        files.append(written(tmp_path / name, table))
+    doc = compare(*files, diameter_m=D, air_a=wind, air_b=wind).document
+    assert doc["ratios"]["rpm"]["ratio"] == pytest.approx(1.0, abs=0.02)
+    (note,) = (n for n in doc["notes"] if "speeds of B left out" in n)
+    assert note.startswith("rpm: ") and words in note
+
+
+def test_the_speed_at_equal_command_does_not_depend_on_the_air_that_is_stated(shared_data: Path) -> None:
+    folder = shared_data / "contrasts" / "pitch_diameter_wvu_tunnel"
+    files = [folder / "run05_18x10_45kt.csv", folder / "run03_18x12_45kt.csv"]
+    plain = compare(*files).document
+    windy = compare(*files, label="18x10", air_a="1m/s", air_b="1m/s").document
+    ratios = [doc["ratios"]["rpm"]["ratio"] for doc in (plain, windy)]
+    assert ratios[0] == pytest.approx(ratios[1], rel=0.005) and 0.91 < ratios[0] < 0.97
+    for doc in (plain, windy):
+        assert any("speeds of B left out" in note for note in doc["notes"])
+
+
+def test_the_picture_names_what_is_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Electrical power in place of torque, over a pulse width in microseconds; files in full, the answer in words."""
+    from matplotlib.figure import Figure
+
+    files = []
+    for name, seed in (("a_very_long_name_of_a_recording_that_was_made_on_monday__20210721.csv", 1), ("b.csv", 2)):
+        table = stand(seed)
+        table["electrical_power_W"] = 1.4 * table.pop("torque_Nm") * table["rpm"] * np.pi / 30.0
+        table |= {"voltage_V": np.full(17, 12.0), "pulse_width_us": 1100.0 + 0.1 * table["rpm"]}
+        files.append(written(tmp_path / name, table))
+    answer, drawn = compare(*files), []
+    monkeypatch.setattr(Figure, "savefig", lambda figure, *_, **__: drawn.append(figure))
+    picture(answer.change, answer.document)
+    (figure,) = drawn
+    labels = [(axis.get_xlabel(), axis.get_ylabel()) for axis in figure.axes]
+    assert labels[2] == ("speed of rotation [rev/min]", "electrical power / n³ [W s³]")
+    assert labels[3][1] == "electrical power: B / A"
+    assert [x for x, _ in labels[4:]] == ["pulse width [µs]"] * 2
+    left = figure.axes[4].lines[0].get_xdata()
+    assert 1300.0 < min(left) < max(left) < 2000.0
+    electric = figure.axes[2].lines[0].get_ydata()
+    assert max(electric) == pytest.approx(1.4 * 0.008 * 1.2 * D**5 * 2.0 * np.pi, rel=0.05)
+    head = figure.get_suptitle().splitlines()
+    assert head[0] == "A: a_very_long_name_of_a_recording_that_was_made_on_monday__20210721.csv"
+    assert head[2].startswith(("No change", "These recordings"))
+
+
+def test_a_rotor_that_has_just_set_off_is_no_misreading(tmp_path: Path) -> None:
+    """It turns slowly, at a current as large as that of a faster one; it may."""
+    files = []
+    for name, seed in (("a.csv", 1), ("b.csv", 2)):
+        table = {k: np.tile(v, 2) for k, v in stand(seed).items()}
+        table["electrical_power_W"] = 20.0 + 1.4 * table["torque_Nm"] * table["rpm"] * np.pi / 30.0
+        table["pulse_width_us"] = 1100.0 + 800.0 * (table["rpm"] - 3000.0) / 5000.0
+        start = {
+            "rpm": 900.0,
+            "thrust_N": 0.01,
+            "torque_Nm": 1e-3,
+            "electrical_power_W": 40.0,
+            "pulse_width_us": 1250.0,
+        }
+        files.append(written(tmp_path / name, {k: np.append(v, start.get(k, 0.0)) for k, v in table.items()}))
+    assert not any("left out: no rotor" in note for note in compare(*files).document["notes"])

@@ -42,12 +42,11 @@ def run(args: argparse.Namespace) -> int:
     """Compare, write, print."""
     from bemt.base.tables import json_text
     from bemt.compare.contrast_text import text
-    from bemt.diagnose.contrast import compare, label_diameter
+    from bemt.diagnose.contrast import compare
 
-    diameter = label_diameter(args.label)
     with _terminal.progress(args.quiet or args.json) as say:
         answer = compare(
-            args.a, args.b, args.case, diameter_m=diameter, rows_a=args.rows_a, rows_b=args.rows_b, air_a=args.air_a,
+            args.a, args.b, args.case, label=args.label, rows_a=args.rows_a, rows_b=args.rows_b, air_a=args.air_a,
             air_b=args.air_b, progress=say,
         )  # fmt: skip
     if args.out:

@@ -3,24 +3,37 @@
 from __future__ import annotations
 
 import io
-import math
-from collections.abc import Mapping
+import textwrap
+from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
+
+from bemt.compare.contrast_text import WORD, headline
+from bemt.compare.matched import POWER_OF_SPEED
 
 if TYPE_CHECKING:
+    from bemt.compare.matched import MatchedChannel
     from bemt.compare.recordings import RunChange
+
+Array = NDArray[np.float64]
 
 # Okabe and Ito 2008, Color Universal Design.
 _A, _B, _BAND, _GREY = "#0072B2", "#D55E00", "#56B4E9", "#8a8a8a"
 _LABEL = {
-    "thrust": "thrust / n² [N s²]",
-    "torque": "torque / n² [Nm s²]",
-    "speed": "speed [rev/min]",
-    "electrical": "electrical power / n³ [W s³]",
-    "voltage": "voltage [V]",
+    "thrust_N": "thrust / n² [N s²]",
+    "torque_Nm": "torque / n² [N m s²]",
+    "power_W": "shaft power / n³ [W s³]",
+    "electrical_power_W": "electrical power / n³ [W s³]",
+    "rpm": "speed of rotation [rev/min]",
+    "voltage_V": "voltage [V]",
 }
+_COMMAND = {"pwm_s": ("pulse width [µs]", 1e6), "throttle": ("throttle [-]", 1.0)}
+_OVER_COMMAND = ("speed", "voltage")
+# Characters in a line of the title.
+_WIDE = 110
 _STYLE: dict[Any, Any] = {
     "font.size": 9.0,
     "axes.titlesize": 9.0,
@@ -48,47 +61,65 @@ def picture(change: RunChange, doc: Mapping[str, Any]) -> bytes:
         axes = figure.subplots(len(shown), 2, squeeze=False)
         for row, c in zip(axes, shown, strict=True):
             _readings(row[0], change, c)
-            _ratio(row[1], change.ratios[c.channel], c.name)
-        said = doc["verdict"] + (": " + ", ".join(doc["effects"]) if doc["effects"] else "")
-        figure.suptitle(f"A: {_short(change.a.points.name)}    B: {_short(change.b.points.name)}\n{said}", fontsize=9.5)
+            _ratio(row[1], change, c)
+        figure.suptitle(title(doc), fontsize=9.5)
         buffer = io.BytesIO()
         figure.savefig(buffer, format="png", dpi=150)
     return buffer.getvalue()
 
 
-def _short(name: str) -> str:
-    tail = name.rsplit("/", 1)[-1]
-    return tail if len(tail) <= 46 else tail[:22] + "…" + tail[-22:]
+def title(doc: Mapping[str, Any]) -> str:
+    """Both files, with the rows that were chosen, and the answer.
+
+    >>> doc = {"recordings": ["mon/a.csv", "tue/a.csv"], "rows": {"A": [], "B": ["rotor=left"]}}
+    >>> print(title(doc | {"verdict": "unknown", "effects": [], "ratios": {}, "ranking": []}))
+    A: mon/a.csv
+    B: tue/a.csv (rotor=left)
+    Something changed, and no listed cause explains it.
+    """
+    paths = [Path(name) for name in doc["recordings"]]
+    names = [path.name for path in paths]
+    if names[0] == names[1] and paths[0] != paths[1]:
+        names = [str(path.relative_to(path.parent.parent)) for path in paths]
+    lines = []
+    for letter, name in zip("AB", names, strict=True):
+        rows = ", ".join(doc["rows"][letter])
+        lines.append(f"{letter}: {name}" + (f" ({rows})" if rows else ""))
+    return "\n".join(part for line in (*lines, headline(doc)) for part in textwrap.wrap(line, _WIDE))
 
 
-def _abscissa(c: Any) -> Any:
-    return c.x[:, 0] if c.name in ("speed", "voltage") else np.exp(c.x[:, 0])
+def _axis(change: RunChange, c: MatchedChannel) -> tuple[str, Callable[[Array], Array]]:
+    """Label of the abscissa, and the coordinate in its unit."""
+    if c.name in _OVER_COMMAND:
+        label, factor = _COMMAND[change.a.command]
+        return label, lambda x: x * factor
+    return _LABEL["rpm"], np.exp
 
 
-def _readings(axis: Any, change: RunChange, c: Any) -> None:
+def _readings(axis: Any, change: RunChange, c: MatchedChannel) -> None:
     shift = np.where(c.second, c.log_density, 0.0)
-    power = {"thrust_N": 2, "torque_Nm": 2, "power_W": 3, "electrical_power_W": 3}.get(c.channel, 0)
-    density = change.a.density if math.isfinite(change.a.density) and c.log_density else 1.0
-    y = np.exp(c.y + shift) * 60.0**power
-    del density
-    x = _abscissa(c)
+    y = np.exp(c.y + shift) * 60.0 ** POWER_OF_SPEED.get(c.channel, 0.0)
+    label, scaled = _axis(change, c)
+    x = scaled(c.x[:, 0])
     for side, colour, mark, name in ((False, _A, "o", "A"), (True, _B, "s", "B")):
         own = c.second == side
         axis.plot(x[own], y[own], mark, color=colour, ms=3.5, mfc="none" if side else colour, label=name)
-    axis.set_ylabel(_LABEL[c.name] if c.channel not in ("CT", "CP", "CQ") else c.channel)
-    axis.set_xlabel("command" if c.name in ("speed", "voltage") else "speed of rotation [rev/min]")
+    axis.set_ylabel(_LABEL.get(c.channel, c.channel))
+    axis.set_xlabel(label)
     axis.legend(loc="best")
     axis.ticklabel_format(axis="y", style="sci", scilimits=(-2, 4))
 
 
-def _ratio(axis: Any, r: Mapping[str, Any], name: str) -> None:
+def _ratio(axis: Any, change: RunChange, c: MatchedChannel) -> None:
+    r = change.ratios[c.channel]
     curve = np.array(r["curve"]) * np.array([1.0, 1.0, r["density_ratio"], r["density_ratio"], r["density_ratio"]])
-    x = curve[:, 0] if name in ("speed", "voltage") else np.exp(curve[:, 0])
+    label, scaled = _axis(change, c)
+    x = scaled(curve[:, 0])
     axis.fill_between(x, curve[:, 3], curve[:, 4], color=_BAND, alpha=0.3, lw=0.0, label="95 %")
     axis.plot(x, curve[:, 2], color=_A, label="B over A")
     axis.axhline(1.0, color=_GREY, lw=0.8)
     if r["density_ratio"] != 1.0:
         axis.axhline(r["density_ratio"], color=_B, lw=1.0, ls="--", label="recorded density")
-    axis.set_ylabel(f"{name}: B / A")
-    axis.set_xlabel("command" if name in ("speed", "voltage") else "speed of rotation [rev/min]")
+    axis.set_ylabel(f"{WORD[c.channel].removesuffix(' at equal command')}: B / A")
+    axis.set_xlabel(label)
     axis.legend(loc="best")

@@ -8,10 +8,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from bemt.base.tables import number_text, text_table
-from bemt.compare.recordings import OTHER_STAND
+from bemt.compare.recordings import ERROR_IN, NOT_ALONE, OTHER_STAND
 from bemt.compare.scaling_laws import FAMILY, law
+from bemt.effects import catalogue
 
-_WORD = {
+WORD = {
     "thrust_N": "thrust",
     "torque_Nm": "torque",
     "power_W": "shaft power",
@@ -29,13 +30,24 @@ _ROWS, _NOTES = 8, 4
 _GUESS = 0.1
 
 
-def _share(x: float) -> str:
-    return f"{x - 1.0:+.1%}" if 0.4 < x < 2.5 else f"x{number_text(x, 3)}"
+def _shares(*values: float) -> list[str]:
+    """Changes in one notation: percent, or factors where one of them is far from 1.
+
+    >>> _shares(2.09, 1.66, 2.63), _shares(1.0, 0.9)
+    (['x2.09', 'x1.66', 'x2.63'], ['+0.0%', '-10.0%'])
+    """
+    near = all(0.4 < x < 2.5 for x in values)
+    return [f"{x - 1.0:+.1%}" if near else f"x{number_text(x, 3)}" for x in values]
+
+
+def _intervals(channels: Sequence[Mapping[str, Any]]) -> list[list[str]]:
+    """Change of each channel as measured and the ends of its 95 % interval, all in one notation."""
+    said = _shares(*(r[k] * r["density_ratio"] for r in channels for k in ("ratio", "low95", "high95")))
+    return [said[i : i + 3] for i in range(0, len(said), 3)]
 
 
 def _title(name: str) -> str:
-    row = law(name)
-    return f"{name} ({row.title})" if row else name
+    return f"{name} ({_plain(name)})" if law(name) or name in catalogue() else name
 
 
 def _range(entry: Mapping[str, Any]) -> str:
@@ -51,6 +63,8 @@ def text(doc: Mapping[str, Any], details: bool = False) -> str:
     """Lines of a comparison."""
     lines = textwrap.wrap(headline(doc), 110)
     lines += [f"verdict: {doc['verdict']}" + (f" {', '.join(doc['effects'])}" if doc["effects"] else "")]
+    errors = [n for n in doc["notes"] if n.startswith(ERROR_IN)]
+    lines += [textwrap.fill(n, 110, initial_indent="  ", subsequent_indent="    ") for n in errors]
     lines += _said(doc)
     rows = []
     for channel, r in doc["ratios"].items():
@@ -59,7 +73,7 @@ def text(doc: Mapping[str, Any], details: bool = False) -> str:
         if "slope" in r and r["kind"] not in ("speed", "voltage") and r["slope_error"] < _NO_SLOPE:
             slope = f"{r['slope']:+.1%} +- {r['slope_error']:.1%}"
         more = [slope, f"{r['scatter']:.1%}", "{}, {}".format(*r["points"])]
-        rows.append([_WORD.get(channel, channel), f"{raw:.4f}", *_ends(r, r["density_ratio"]), *more])
+        rows.append([WORD.get(channel, channel), f"{raw:.4f}", *_ends(r, r["density_ratio"]), *more])
         if abs(r["density_ratio"] - 1.0) > 1e-6:
             coefficient = "CT" if channel == "thrust_N" else "CP"
             rows.append([f"  {coefficient} (corrected for density)", f"{r['ratio']:.4f}", *_ends(r), "", "", ""])
@@ -68,7 +82,8 @@ def text(doc: Mapping[str, Any], details: bool = False) -> str:
     if details:
         lines += _tables(doc)
     lines += [f"  assumed: {a}" for a in doc["assumed"]]
-    notes = doc["notes"] if details else [n for n in doc["notes"] if not n.startswith(("A: ", "B: "))][:_NOTES]
+    notes = [n for n in doc["notes"] if n not in errors]
+    notes = notes if details else [n for n in notes if not n.startswith(("A: ", "B: "))][:_NOTES]
     lines += [f"  note: {n}" for n in notes]
     return "\n".join(lines)
 
@@ -86,19 +101,23 @@ def headline(doc: Mapping[str, Any]) -> str:
     # a cause in the drive has moved the drive, not the loads
     drive = {FAMILY.get(k, k) for k in effects} == {"drive"}
     kinds = ("speed", "voltage", "electrical") if drive else ("thrust", "torque")
-    by_kind = {r["kind"]: f"{_WORD[c]} {_share(r['ratio'] * r['density_ratio'])}" for c, r in doc["ratios"].items()}
-    moved = " and ".join([by_kind[k] for k in kinds if k in by_kind][:2])
+    loads = {r["kind"]: (WORD[c], r) for c, r in doc["ratios"].items()}
+    shown = [loads[k] for k in kinds if k in loads][:2]
+    shares = _intervals([r for _, r in shown])
+    moved = " and ".join(f"{word} {share[0]}" for (word, _), share in zip(shown, shares, strict=True))
     if verdict == "none":
         return f"No change beyond the difference between two set-ups ({moved or 'drive only'})."
     if verdict == "unknown":
-        return f"Something changed ({moved}), and no listed cause explains it."
+        return "Something changed" + (f" ({moved})" if moved else "") + ", and no listed cause explains it."
     if verdict == "insufficient":
-        guess = _families([r["effect"] for r in doc["ranking"] if r["probability"] >= _GUESS], doc["ranking"])
-        return f"These recordings cannot say what changed ({moved})" + (f"; likeliest {guess}." if guess else ".")
+        likely = [r["effect"] for r in doc["ranking"] if r["probability"] >= _GUESS]
+        no_guess = doc["rule"] == OTHER_STAND or doc["rule"].endswith(NOT_ALONE)
+        guess = "" if no_guess else _families(likely, doc["ranking"])
+        size = f" ({moved})" if moved else ""
+        return f"These recordings cannot say what changed{size}" + (f"; likeliest {guess}." if guess else ".")
     if len(effects) == 1:
-        row = law(effects[0])
         lead = "The stand, not the rotor" if verdict == "sensor" else "What changed"
-        return f"{lead}: {row.title if row else effects[0]} ({moved or 'drive alone'})."
+        return f"{lead}: {_plain(effects[0])} ({moved or 'drive alone'})."
     several = _families(effects, doc["ranking"])
     return f"{several[0].upper()}{several[1:]} ({moved or 'drive alone'})."
 
@@ -115,7 +134,8 @@ def _families(effects: Sequence[str], ranking: Sequence[Mapping[str, Any]]) -> s
 
 
 def _plain(name: str) -> str:
-    row = law(name)
+    """Title of a cause: of its scaling law, or of an effect that has none."""
+    row = law(name) or catalogue().get(name)
     return row.title if row else _FAMILY_WORD.get(name, name)
 
 
@@ -124,18 +144,15 @@ def _ends(r: Mapping[str, Any], factor: float = 1.0) -> list[str]:
 
 
 def _said(doc: Mapping[str, Any]) -> list[str]:
-    words = []
-    for channel, r in doc["ratios"].items():
-        if r["kind"] in ("thrust", "torque"):
-            f = r["density_ratio"]
-            ends = f"{_share(r['low95'] * f)} to {_share(r['high95'] * f)}"
-            words.append(f"{_WORD[channel]} {_share(r['ratio'] * f)} ({ends})")
-    first = next((r for r in doc["ratios"].values() if r["kind"] in ("thrust", "torque")), None)
+    loads = {c: r for c, r in doc["ratios"].items() if r["kind"] in ("thrust", "torque")}
+    intervals = _intervals(list(loads.values()))
+    words = [f"{WORD[c]} {at} ({low} to {high})" for c, (at, low, high) in zip(loads, intervals, strict=True)]
+    first = next(iter(loads.values()), None)
     out = []
     if first is not None:
         where = "extrapolated to one speed" if first["extrapolated"] else _range(first)
         out.append(f"B against A at equal speed, {where}: {', '.join(words)}; 95 % in brackets.")
-        grows = [_WORD[c] for c, r in doc["ratios"].items() if r["kind"] in ("thrust", "torque") and r["depends_on"]]
+        grows = [WORD[c] for c, r in loads.items() if r["depends_on"]]
         if grows:
             out.append(f"The ratio of {' and '.join(grows)} changes with speed or advance ratio.")
     density = doc["density"]["ratio"]
@@ -143,15 +160,14 @@ def _said(doc: Mapping[str, Any]) -> list[str]:
         a, b = doc["density"]["A"], doc["density"]["B"]
         ends = f"Recorded density: {a:.4g} to {b:.4g} kg/m3" if a and b else "Density from the recorded temperatures"
         out.append(f"{ends} ({density - 1:+.1%}).")
-    out += (
-        [_verdict(doc)] if "diagnosis" not in doc else [f"The case {doc['case']}, with A as reference:", *doc["told"]]
-    )
+    step = doc.get("next_measurement") or {}
+    told = doc["told"] if "diagnosis" in doc else [sentence(doc)]
+    out += [t for t in told if not (step.get("text") and t.lstrip().startswith(("Next: ", "python -m bemt ")))]
     drive = (doc.get("subsystems") or {}).get("drive")
     if drive and drive["effects"] and drive["effects"] != doc["effects"]:
         out.append(f"Drive: {drive['verdict']}: {', '.join(_title(k) for k in drive['effects'])}.")
     elif drive and doc["verdict"] != "none" and drive["verdict"] == "none":
         out.append("Drive: no change beyond scatter.")
-    step = doc.get("next_measurement") or {}
     if step.get("text"):
         out.append(f"Next: {step['text']}.")
     out = [textwrap.fill(line, 110, initial_indent="  ", subsequent_indent="    ") for line in out]
@@ -160,23 +176,25 @@ def _said(doc: Mapping[str, Any]) -> list[str]:
     return out
 
 
-def _verdict(doc: Mapping[str, Any]) -> str:
-    names = [_title(k) for k in doc["effects"]]
+def sentence(doc: Mapping[str, Any]) -> str:
+    """Verdict and reason."""
+    names = ", ".join(_title(k) for k in doc["effects"])
     p = doc.get("probability")
-    sure = f" ({p:.2f})" if p else ""
+    sure = f" (probability {p:.2f})" if p else ""
     if doc["verdict"] == "none":
-        return f"No change: {doc['rule']}."
+        return f"{doc['rule'][0].upper()}{doc['rule'][1:]}."
     if doc["verdict"] in ("named", "sensor"):
         lead = "The stand" if doc["verdict"] == "sensor" else "What changed"
-        return f"{lead}: {names[0]}{sure}: {doc['rule']}."
+        return f"{lead}: {names}{sure}: {doc['rule']}."
     if doc["verdict"] == "class":
-        return f"One of these, which scale in the same way here{sure}: {', '.join(names)}."
+        return f"One of these; the data cannot tell them apart{sure}: {names}."
     if doc["verdict"] == "unknown":
         return f"Unknown: {doc['rule']}."
     first = [r["effect"] for r in doc["ranking"] if r["effect"] not in ("none", "unknown")][:4]
     if doc["rule"] == OTHER_STAND:  # no cause of the list is meant
         first = []
-    return f"There is a change, but {doc['rule']}" + (f": {', '.join(first)} ..." if first else "") + "."
+    lead = "Still possible" if doc["rule"].endswith(NOT_ALONE) else "Likeliest"
+    return f"There is a change, but {doc['rule']}" + (f". {lead}: {', '.join(first)}" if first else "") + "."
 
 
 def _tables(doc: Mapping[str, Any]) -> list[str]:

@@ -192,11 +192,11 @@ def matched(a: StandRun, b: StandRun, name: str, diameter: float = math.nan) -> 
         return None
     notes = []
     if one["sign"][0] != two["sign"][0]:
-        notes.append(f"{channel}: the sign turned between A and B; sizes are compared")
+        notes.append(f"{channel}: changed sign between A and B; sizes are compared")
     parts = [_averaged(one), _averaged(two)]
-    for part, run in zip(parts, (a, b), strict=True):
+    for part, run, letter in zip(parts, (a, b), "AB", strict=True):
         if part["lost"][0] > 0.5 * len(run):
-            notes.append(f"{channel}: {part['lost'][0]:.0f} of {len(run)} points of {run.points.name} are near zero")
+            notes.append(f"{channel}: {part['lost'][0]:.0f} of {len(run)} points of {letter} left out: near zero")
     log_density, unsure = density_change(a, b) if name in LOADS and channel not in _COEFFICIENTS else (0.0, 0.0)
     shift = [0.0, log_density]
     codes = [np.unique(p["run"], return_inverse=True)[1] for p in parts]

@@ -6,7 +6,6 @@ No case and no blade is needed. What is not recorded is assumed to be equal in b
 from __future__ import annotations
 
 import math
-import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -16,6 +15,7 @@ import numpy as np
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
 from bemt.compare import matched as fits
+from bemt.compare.asked import Asked
 from bemt.compare.matched import MatchedChannel, Scatter
 from bemt.compare.scaling import CLEAR, OWN_SHAPE, UNKNOWN, Judgement, judge, weigh
 from bemt.compare.scaling_laws import FAMILY, law
@@ -28,6 +28,8 @@ DAYS = (
 )
 """What tells two runs apart whose loads differ by a share."""
 SCHEMA = "bemt.comparison/1"
+ERROR_IN = "error in "
+"""Start of a note on what cannot be so in A or B."""
 # Recorded densities are this good: a barometer, a thermometer and nobody's humidity, share.
 _TOLD_DENSITY, _BAROMETER, _SURE = 0.012, 0.004, 2.0
 # A battery or supply: voltage that was read apart by more than this at equal command, share; loads that do not matter.
@@ -43,12 +45,16 @@ _TOLD = ("density as recorded", "by the thermometers", "voltage as recorded")
 _MOVED, _WIDE = 2.5, 1.4
 # Thrust of a propeller of 2.3 times the diameter at one speed: no stand takes both. [1]
 _FAR_OFF = 30.0
+# Share of misread speeds from which the sensor is doubtful, and from which the others are no good either.
+_DOUBTFUL, _NOISE = 0.05, 0.3
 # Scatter of readings at one speed, share, that no stand has: something else changes from reading to reading.
 _RESTLESS = 0.10
 # Odds (ln) of any smooth change over one factor from which a load did not change by one.
 _BENT = 3.0
 # Standard deviations, set-up included, from which a load has changed.
 _CHANGED = 3.0
+NOT_ALONE = "alone, which changed as well"
+"""End of the reason where the likeliest cause is ruled out; what is left was unlikely beside it."""
 OTHER_STAND = "no change on one stand moves every load by this much: check units and speeds of both files"
 
 
@@ -205,18 +211,29 @@ def _by_factors(probability: Mapping[str, float]) -> dict[str, float]:
 def _all_loads(
     said: Judgement, loads: Mapping[str, MatchedChannel], ratios: Mapping[str, Mapping[str, Any]]
 ) -> Judgement:
-    """No cause that leaves a load alone which has clearly changed."""
-    rows = [law(k) for k in said.effects]
-    moved = {name for row in rows if row is not None for _, term in row.terms for name in term}
-    if not rows or None in rows or not moved:
+    """No cause that leaves a load alone which has clearly changed; probabilities are those of the others then."""
+    moved = _moved(said.effects)
+    if not moved:
         return said
+    changed_too = []
     for name, c in loads.items():
         r = ratios[c.channel]
         unsure = math.hypot(math.log(r["high95"] / r["ratio"]) / 1.96, c.session)
-        if name not in moved and abs(math.log(r["ratio"])) > _CHANGED * unsure:
-            why = f"{' and '.join(said.effects)} would leave the {name} alone, which changed as well"
-            return Judgement("insufficient", (), said.probability, said.size, why)
-    return said
+        if abs(math.log(r["ratio"])) > _CHANGED * unsure:
+            changed_too.append(name)
+    missed = next((name for name in changed_too if name not in moved), None)
+    if missed is None:
+        return said
+    why = f"{' and '.join(said.effects)} would leave the {missed} {NOT_ALONE}"
+    left = {k: p for k, p in said.probability.items() if not (of := _moved((k,))) or of.issuperset(changed_too)}
+    total = sum(left.values())
+    return Judgement("insufficient", (), {k: p / total for k, p in left.items()} if total else left, said.size, why)
+
+
+def _moved(effects: Sequence[str]) -> set[str]:
+    """Loads that effects move by their laws; empty where there is no law of one of them."""
+    rows = [law(k) for k in effects]
+    return set() if None in rows else {name for row in rows if row for _, term in row.terms for name in term}
 
 
 def _restless(change: RunChange) -> str:
@@ -282,12 +299,17 @@ def _assumed(a: StandRun, b: StandRun, diameter: float, loads: Mapping[str, Matc
     if unknown and fits.density_change(a, b)[1]:
         out.append("air pressure is not recorded in both: taken as equal within 1 %")
     elif unknown and any(c.channel in ("thrust_N", "torque_Nm", "power_W") for c in loads.values()):
-        out.append(f"air density is not recorded in {' and '.join(unknown)}: taken as equal")
+        how = " ".join(f"--air-{n.lower()} 22C,1013hPa" for n in unknown)
+        out.append(f"air density is not recorded in {' and '.join(unknown)}: taken as equal; {how} states it")
     still = [n for n, r in (("A", a), ("B", b)) if not {"airspeed_m_s", "J"} & r.points.values.keys()]
     if still:
-        out.append(f"airspeed is not recorded in {' and '.join(still)}: taken as still air")
+        how = " ".join(f"--air-{n.lower()} 18m/s" for n in still)
+        out.append(
+            f"airspeed is not recorded in {' and '.join(still)}: taken as still air; {how} states a wind"
+            " (with the air: 22C,1013hPa,18m/s)"
+        )
     if "torque" not in loads and "thrust" in loads:
-        out.append("torque is not recorded in both: gain, air and blade scale alike in thrust")
+        out.append("torque is not recorded in both: thrust alone cannot tell gain, air and blade apart")
     if "torque" in loads and loads["torque"].channel == "electrical_power_W":
         out.append(
             "torque is not recorded: electrical power replaces it, assuming the same motor and controller in both"
@@ -299,7 +321,8 @@ def _assumed(a: StandRun, b: StandRun, diameter: float, loads: Mapping[str, Matc
 
 
 def _notes(a: StandRun, b: StandRun, channels: Mapping[str, MatchedChannel], strays: Mapping[str, int]) -> list[str]:
-    out = [note for c in channels.values() for note in c.notes]
+    out = [_misread(letter, run) for letter, run in (("A", a), ("B", b)) if run.misread[0]]
+    out += [note for c in channels.values() for note in c.notes]
     out += [
         f"{n} reading{'s' if n > 1 else ''} of {channels[k].channel} far from all others dropped"
         for k, n in strays.items()
@@ -314,11 +337,19 @@ def _notes(a: StandRun, b: StandRun, channels: Mapping[str, MatchedChannel], str
     return list(dict.fromkeys([*out, *(f"A: {n}" for n in a.points.notes), *(f"B: {n}" for n in b.points.notes)]))
 
 
-def next_step(change: RunChange, files: Sequence[str]) -> dict[str, str]:
-    """Run or reading that would settle the answer, and the command to give then."""
+def _misread(letter: str, run: StandRun) -> str:
+    """What is said of speeds that were left out."""
+    n, total = run.misread
+    words = f"rpm: {n} of {total} speeds of {letter} left out: no rotor can turn like that at such a command and load"
+    if n > _NOISE * total:
+        return f"{words}; the speed channel of {letter} is mostly noise, do not trust what is left"
+    return words + (f"; check the speed sensor of {letter}" if n > _DOUBTFUL * total else "")
+
+
+def next_step(change: RunChange, asked: Asked) -> dict[str, str]:
+    """Run or reading that would settle the answer, and the command to give then, with all that was asked."""
     said = change.leading
-    a, b = (shlex.quote(f) for f in files)
-    ask = "python -m bemt compare"
+    with_case = asked.command(case=asked.case or "CASE")
     rows = [row for k in said.effects if (row := law(k)) is not None]
     loads = [r for r in change.ratios.values() if r["kind"] in fits.LOADS]
     if said.verdict == "none":
@@ -328,33 +359,34 @@ def next_step(change: RunChange, files: Sequence[str]) -> dict[str, str]:
         return {"text": "", "command": ""}
     if said.verdict in ("named", "sensor"):
         text = rows[0].settles if rows else "read the label of the channel"
-        return {"text": f"to be sure, {text}", "command": f"{ask} {a} {b} --case CASE"}
+        return {"text": f"to be sure, {text}", "command": with_case}
     if said.verdict in ("insufficient", "unknown") and (letter := _restless(change)):
         run = change.a if letter == "a" else change.b
         column = run.conditions[0] if run.conditions else "COLUMN"
         others = f" (the file has {', '.join(run.conditions[:4])})" if run.conditions else ""
         text = f"choose the rows of {letter.upper()} in which nothing else changes{others}"
-        return {"text": text, "command": f"{ask} {a} {b} --rows-{letter} {shlex.quote(column)}=LOW:HIGH"}
+        return {"text": text, "command": asked.with_rows(letter, column)}
     if loads and all(r["extrapolated"] for r in loads):
         v = change.a.points
         where = "where A was measured"
         if "rpm" in v:
             where = f"at the speeds of A, {np.nanmin(v['rpm']):.0f} to {np.nanmax(v['rpm']):.0f} rev/min"
-        return {"text": f"run B again {where}, and at its airspeeds", "command": f"{ask} {a} B_AGAIN.csv"}
+        return {"text": f"run B again {where}, and at its airspeeds", "command": asked.command(b="B_AGAIN.csv")}
     likely = {k: p for k, p in said.probability.items() if law(k) is not None}
     density = likely.get("air_density", 0.0) * _FIRST >= max(likely.values(), default=1.0)
     small = max((abs(math.log(r["ratio"])) for r in loads), default=1.0) < _DAY
     if density and small and math.isnan(change.density_ratio):
-        return {"text": DAYS, "command": f"{ask} {a} {b} {AIR_OF_BOTH}"}
+        return {"text": DAYS, "command": asked.with_days()}
     if not _TORQUES & change.ratios.keys() and change.loads is said:
-        text = "record torque in both runs: without it gain, air and blade look alike"
-        return {"text": text, "command": f"{ask} A_WITH_TORQUE.csv B_WITH_TORQUE.csv"}
+        text = "record torque in both runs: thrust alone cannot tell gain, air and blade apart"
+        return {"text": text, "command": asked.command(a="A_WITH_TORQUE.csv", b="B_WITH_TORQUE.csv")}
     if rows:
         firsts = {FAMILY.get(row.id, row.id): row.settles for row in reversed(rows)}
         text = "; or ".join(reversed(firsts.values()))
-        return {"text": text, "command": f"{ask} {a} {b} --case CASE"}
+        return {"text": text, "command": with_case}
     text = "repeat the run of A and compare it with A; their difference is not a cause"
-    return {"text": text, "command": f"{ask} {a} A_AGAIN.csv"}
+    again = asked.command(b="A_AGAIN.csv", rows_b=asked.rows_a, air_b=asked.air_a)
+    return {"text": text, "command": again}
 
 
 def document(change: RunChange) -> dict[str, Any]:

@@ -334,11 +334,11 @@ def judge(probability: Mapping[str, float], size: Mapping[str, tuple[float, floa
         return Judgement(verdict, tuple(effects), probability, size, why)
 
     if probability[NONE] >= 0.5:
-        return answer("none", (), f"no change beyond scatter and set-up ({probability[NONE]:.2f})")
+        return answer("none", (), f"no change beyond scatter and set-up (probability {probability[NONE]:.2f})")
     listed = {k: p for k, p in probability.items() if k not in _PRIOR}
     mass, unknown = sum(listed.values()), probability[UNKNOWN]
     if unknown > 0.5:
-        return answer("unknown", (), f"no listed cause changes these channels like that ({unknown:.2f})")
+        return answer("unknown", (), f"no listed cause changes these channels like that (probability {unknown:.2f})")
     if not listed or mass <= 0.5:
         return answer("insufficient", (), "the change is too small to be distinguished from none")
     best = max(listed.values())
@@ -358,19 +358,25 @@ def judge(probability: Mapping[str, float], size: Mapping[str, tuple[float, floa
         credible += [k for k, p in listed.items() if FAMILY.get(k) == "blade" and p >= least and k not in credible]
     few = _few(credible)
     if len(credible) > 1 and few and unknown <= DOUBT and probability[NONE] <= RIVAL:
-        return answer("class", credible, f"these scale in the same way ({mass:.2f})")
+        return answer("class", credible, f"the data cannot tell these apart (probability {mass:.2f})")
     wide = _wider(listed) if largest >= CLEAR else []
     if wide and len(credible) > 1 and unknown <= DOUBT and probability[NONE] <= RIVAL:
-        return answer("class", wide, f"these scale in the same way ({sum(listed[k] for k in wide):.2f})")
+        return answer(
+            "class", wide, f"the data cannot tell these apart (probability {sum(listed[k] for k in wide):.2f})"
+        )
     if len(credible) == 1 and listed[first] < SURE:
-        return answer("insufficient", (), f"{first} is likely ({listed[first]:.2f}) but not sure")
+        return answer("insufficient", (), f"{first} is likely (probability {listed[first]:.2f}) but not sure")
     if len(credible) == 1:
-        return answer("insufficient", (), f"{first} ({listed[first]:.2f}) fits best, but unknown has {unknown:.2f}")
-    why = f"{len(credible)} causes scale like that in these channels"
+        return answer(
+            "insufficient",
+            (),
+            f"{first} fits best (probability {listed[first]:.2f}), but one that is not listed has {unknown:.2f}",
+        )
+    why = f"{len(credible)} listed causes change these channels in this way"
     if probability[NONE] > RIVAL:
-        why = f"it is hardly beyond scatter and set-up ({probability[NONE]:.2f} for none), and {why}"
+        why = f"it is hardly beyond scatter and set-up (probability of no change {probability[NONE]:.2f}), and {why}"
     elif few:
-        why = f"a cause that is not listed may have caused it ({unknown:.2f}), and {why}"
+        why = f"a cause that is not listed may have caused it (probability {unknown:.2f}), and {why}"
     return answer("insufficient", (), why)
 
 

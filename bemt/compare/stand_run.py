@@ -44,6 +44,10 @@ _SAME_NUMBER = 1e-6
 _ENOUGH, _ROWS, _WINDOW, _JUMP, _RATE = 8, 20, 7, 0.03, 0.25
 # Load of a ramp over full scale that a lag of 0.2 s leaves when it takes ten seconds.
 _LAG = 0.02
+# Times that a speed may exceed those at higher commands; readings to compare with, fewest and most.
+_ODD, _FEWEST, _MOST = 1.5, 6, 500
+# What airspeeds of one wind differ by [m/s], and as a share.
+_STEADY_WIND, _LIKE_WIND = 0.5, 0.1
 # Temperatures that air of a stand can have [K].
 _COLD, _HOT = 230.0, 330.0
 # Name of a column without a heading: its number is that of no rotor.
@@ -66,6 +70,7 @@ class StandRun:
     conditions: tuple[str, ...] = ()
     # What lag or hysteresis shifts a load by, standard deviation as a share of its largest value, by channel [1]
     shift: Mapping[str, float] = field(default_factory=dict)
+    misread: tuple[int, int] = (0, 0)  # Speeds that no rotor can have at their command or load, and all
 
     def __len__(self) -> int:
         """Give the number of points."""
@@ -222,6 +227,10 @@ def stand_run(imported: Dataset, name: str, diameter_m: float | None = None) -> 
         values["command"] = series[command]
     if "power_W" in values and "torque_Nm" in values:
         del values["power_W"]
+    gone = [x for x in reduction(series).dropped if x.channel == "rpm" and x.reason.startswith("misread")]
+    false = _misread(values)
+    if false.any():
+        values["rpm"] = np.where(false, np.nan, values["rpm"])
     constants = imported.provenance.get("constants", {})
     rho = values.get("density_kg_m3", np.full(1, np.nan))
     density = float(np.nanmean(rho)) if np.isfinite(rho).any() else math.nan
@@ -246,6 +255,7 @@ def stand_run(imported: Dataset, name: str, diameter_m: float | None = None) -> 
         {k: float(v["session"]) for k, v in reduction(series).correlated.items() if v.get("session")},
         conditions_of(imported),
         _shifts(series, bool(ramp)),
+        (int(false.sum()) + len(gone), (int(np.isfinite(series["rpm"]).sum()) if "rpm" in series else 0) + len(gone)),
     )
 
 
@@ -263,6 +273,36 @@ def _with_headings(imported: Dataset, name: str) -> None:
     )
     expected = "a heading with a unit for each column, or a recording.toml that names them"
     raise InputError(Fault(name, "", f"a table of {len(imported.values)} columns without headings", expected, hint))
+
+
+def _misread(values: Mapping[str, Array]) -> NDArray[np.bool_]:
+    """Speeds that no rotor can have: much faster than most at the same or higher command, with less load.
+
+    A change of battery or propeller moves speed and load in other ways; only readings at one airspeed are compared.
+    A slow one may be a rotor that has just set off.
+
+    >>> table = {"command": [1.0, 1.0, *[2.0] * 8], "rpm": [9e3, 3e3, *[5e3] * 8], "thrust_N": [1.0, 1.0, *[4.0] * 8]}
+    >>> _misread({k: np.array(v) for k, v in table.items()}).tolist()[:3]
+    [True, False, False]
+    """
+    load = next((np.abs(values[k]) for k in ("electrical_power_W", "torque_Nm", "thrust_N") if k in values), None)
+    none = np.zeros(max((v.size for v in values.values()), default=0), dtype=bool)
+    if load is None or not {"rpm", "command"} <= values.keys():
+        return none
+    good = np.isfinite(values["command"]) & (values["rpm"] > 0.0) & np.isfinite(load)
+    rows = np.flatnonzero(good)
+    if rows.size < _FEWEST:
+        return none
+    command, speed, load = values["command"][rows], np.log(values["rpm"][rows]), load[rows]
+    every = np.unique(np.linspace(0, rows.size - 1, min(rows.size, _MOST)).astype(int))
+    some = np.argsort(command, kind="stable")[every]
+    V = np.nan_to_num(values.get("airspeed_m_s", np.zeros(none.size)))[rows]
+    one_wind = np.abs(V[some] - V[:, None]) <= _STEADY_WIND + _LIKE_WIND * np.abs(V[:, None])
+    beyond = one_wind & (command[some] >= command[:, None])
+    contradict = beyond & (speed[:, None] - speed[some] > math.log(_ODD)) & (load[some] > load[:, None])
+    votes = contradict.sum(axis=1)
+    none[rows] = (votes >= _FEWEST) & (votes > 0.5 * beyond.sum(axis=1))
+    return none
 
 
 def one_rotor(imported: Dataset, name: str, how: str = "Choose it with --rows-a or --rows-b rotor={}") -> None:

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bemt.base.errors import InputError
+from bemt.compare.asked import Asked
 from bemt.compare.contrast_text import headline
 from bemt.compare.recordings import RunChange, changed, document, next_step
 from bemt.compare.scaling_laws import LAWS
@@ -38,7 +39,7 @@ _CLAIMS = ("named", "sensor", "class")
 _AGREE, _WOULD = 0.03, 0.1
 # Probability in the diagnosis from which an effect that no scaling law describes is in the class.
 _LIKELY = 0.1
-_SAME_ROTOR = "make sure that the case is this rotor: both recordings differ from it in the same way"
+_SAME_ROTOR = "make sure that the case is this rotor: both runs differ from it in the same way"
 _LOADS = {"thrust_N": "thrust", "torque_Nm": "torque"}
 
 
@@ -100,8 +101,8 @@ def beside(
 
 def _next(found: RunChange, files: Sequence[str] | None) -> Suggestion | None:
     """Step of the comparison, without asking for the case that is there."""
-    names = _paths(files) or ["REFERENCE", "RECORDING"]
-    step = next_step(found, names)
+    reference, test = _paths(files) or ["REFERENCE", "RECORDING"]
+    step = next_step(found, Asked(reference, test))
     command = () if "CASE" in step["command"] or not step["command"] else (step["command"],)
     text = step["text"].removeprefix("to be sure, ")
     return Suggestion(text, (), (), 0.0, 0.0, "look", command) if text else None

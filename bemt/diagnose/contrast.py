@@ -14,13 +14,16 @@ from typing import TYPE_CHECKING, Any
 from bemt import __version__
 from bemt.base.errors import Fault, InputError
 from bemt.base.face import as_html
-from bemt.compare.recordings import RunChange, changed, document, next_step
+from bemt.compare.asked import Asked
+from bemt.compare.contrast_text import sentence
+from bemt.compare.recordings import ERROR_IN, RunChange, changed, document, next_step
 from bemt.compare.stand_run import conditions_of, selected, stand_run, with_air
 from bemt.effects import catalogue
 
 if TYPE_CHECKING:
     from bemt.case import Case
     from bemt.dataset import Dataset
+    from bemt.diagnose.suggest import Given
 
 # Remarks on the files come first in an explanation; `import` shows them.
 _REMARK = "Before any physics"
@@ -87,6 +90,7 @@ def compare(
     case: Case | str | os.PathLike[str] | None = None,
     *,
     diameter_m: float | None = None,
+    label: str | None = None,
     rows_a: Sequence[str] = (),
     rows_b: Sequence[str] = (),
     air_a: str | None = None,
@@ -95,7 +99,8 @@ def compare(
 ) -> Contrast:
     """Say what changed between two recordings of one stand.
 
-    ``air_a`` and ``air_b`` say what the files do not: ``"22C,1013hPa"``, ``"22C"`` or ``"1.19kg/m3"``.
+    ``label``, such as ``"10x5"``, gives the diameter. ``air_a`` and ``air_b`` say what the files do not:
+    ``"22C,1013hPa"``, ``"22C"``, ``"1.19kg/m3"``, ``"18m/s"``.
 
     Notes
     -----
@@ -104,9 +109,14 @@ def compare(
     """
     from bemt.recordings.load import import_file
 
+    names = [os.fspath(a), os.fspath(b)]
+    asked = Asked(
+        names[0], names[1], tuple(rows_a), tuple(rows_b), air_a, air_b, label,
+        None if case is None else os.fspath(case) if isinstance(case, str | os.PathLike) else case.path.as_posix(),
+    )  # fmt: skip
+    diameter_m = label_diameter(label) if diameter_m is None else diameter_m
     if isinstance(case, str | os.PathLike):
         case = _case(os.fspath(case))
-    names = [os.fspath(a), os.fspath(b)]
     conditions = [list(rows_a), list(rows_b)]
     if Path(names[0]).resolve() == Path(names[1]).resolve() and sorted(rows_a) == sorted(rows_b):
         raise InputError(
@@ -138,13 +148,26 @@ def compare(
         raise InputError(faults)
     found = changed(runs[0], runs[1], math.nan if D is None else D)
     doc = document(found) | {"version": __version__, "recordings": names, "rows": {"A": rows_a, "B": rows_b}}
+    doc["notes"] = [*_errors(read, D, case is not None and case.ducted), *doc["notes"]]
     if case is not None:
-        doc |= _agreed(_diagnosed(names, read, case, progress), doc, found)
+        doc |= _agreed(_diagnosed(asked, read, case, progress), doc, found)
     own = case is not None and doc["verdict"] == doc["diagnosis"]["verdict"] and doc["rule"] == doc["diagnosis"]["rule"]
-    step = _after(doc) if own else next_step(found, names)
-    asked = case is not None and step["command"].endswith("--case CASE")  # as it was
-    doc["next_measurement"] = step | {"command": ""} if asked else step
+    step = _after(doc) if own else next_step(found, asked)
+    doc["next_measurement"] = step | {"command": ""} if step["command"] == asked.command() else step
     return Contrast(found, doc)
+
+
+def _errors(read: Sequence[Dataset], diameter_m: float | None, ducted: bool) -> list[str]:
+    """What cannot be so in either recording, as ``import`` and ``diagnose`` find it."""
+    from bemt.recordings.check import check
+
+    out = []
+    for letter, imported in zip("AB", read, strict=True):
+        if imported.kind in ("bench", "table"):
+            for f in check(imported, diameter_m=diameter_m, ducted=ducted):
+                told = f.evidence if f.evidence.startswith(f.channel) else f"{f.channel}: {f.evidence}"
+                out += [f"{ERROR_IN}{letter}: {f.id}: {told}"] if f.severity == "error" else []
+    return out
 
 
 def _two_choices(name: str) -> str:
@@ -176,22 +199,41 @@ def _case(path: str) -> Case:
 
 
 def _diagnosed(
-    names: Sequence[str], read: Sequence[Dataset], case: Case, progress: Callable[[str], None] | None
+    asked: Asked, read: Sequence[Dataset], case: Case, progress: Callable[[str], None] | None
 ) -> dict[str, Any]:
     """Verdict of the diagnosis of B with A as reference."""
     from bemt.diagnose.chain import diagnose
     from bemt.diagnose.document import document as diagnosis
     from bemt.diagnose.document import explanation
     from bemt.diagnose.load import load
-    from bemt.diagnose.suggest import Given
 
-    a, b = (load(name, case, imported) for name, imported in zip(names, read, strict=True))
-    given = Given((shlex.quote(names[1]),), (shlex.quote(names[0]),), f"--case {shlex.quote(case.path.as_posix())}")
+    a, b = (load(name, case, imported) for name, imported in zip((asked.a, asked.b), read, strict=True))
+    given = _given(asked)
     answer = diagnose([b, replace(a, reference=True)], [case], None, progress, given=given, ratios=False)
     said = diagnosis(answer)
     keys = ("verdict", "effects", "probability", "ranking", "rule")
     told = [line for line in explanation(answer) if not line.startswith(_REMARK)]
+    told = [f"The case {case.name}, with A as reference:", *told] if told else []
     return {k: said[k] for k in keys} | {"diagnosis": said, "case": case.name, "told": told}
+
+
+def _given(asked: Asked) -> Given:
+    """Commands of the diagnosis that carry what was asked; rows and air are taken by a comparison alone."""
+    from bemt.diagnose.suggest import Given
+
+    class _Pair(Given):
+        def command(self, run: str = "", reference: str = "") -> str:
+            if not asked.chosen:
+                return super().command(run, reference)
+            return asked.command(a=reference) if reference else asked.command(b=run or asked.b)
+
+        def comparison(self, reference: str) -> str:
+            return asked.command(a=reference, case=None)
+
+        def of_days(self) -> tuple[str, ...]:
+            return (asked.with_days(),)
+
+    return _Pair((shlex.quote(asked.b),), (shlex.quote(asked.a),), f"--case {shlex.quote(asked.case or 'CASE')}")
 
 
 def _agreed(said: dict[str, Any], ratios: dict[str, Any], found: RunChange) -> dict[str, Any]:
@@ -205,12 +247,13 @@ def _agreed(said: dict[str, Any], ratios: dict[str, Any], found: RunChange) -> d
     mine = {k: ratios[k] for k in ("verdict", "effects", "probability", "ranking", "rule")}
     decided = by_ratio.verdict in _CLAIMS
     if by_ratio.verdict == said["verdict"] == "none" and found.leading is found.drive:
-        return said | mine | {"told": [f"The loads agree; the drive does not: {ratios['rule']}."]}
+        return said | mine | {"told": ["The loads agree; the drive does not.", sentence(ratios)]}
     if by_ratio.verdict == "none" and said["verdict"] == "unknown":
-        return said | mine | {"rule": f"{by_ratio.why}; the model misses the same in both"}
+        rule = f"{by_ratio.why}; the model of the case {said['case']} differs from both in the same way"
+        return said | mine | {"rule": rule, "told": [sentence(ratios | {"rule": rule})]}
     if said["verdict"] not in _CLAIMS:
         sees = decided or (said["verdict"] == "none" and by_ratio.probability.get("none", 1.0) < _UNLIKELY)
-        return _by_ratios(said, mine, "errors of the model that cannot be distinguished from it") if sees else said
+        return _by_ratios(said, mine, "because an error of the model could look like this change") if sees else said
     if not by_ratio.probability:
         return said
     least = _IMPOSSIBLE * max(by_ratio.probability.values())
@@ -222,7 +265,7 @@ def _agreed(said: dict[str, Any], ratios: dict[str, Any], found: RunChange) -> d
             return said
         if left and said["verdict"] == "class":
             return said | {"effects": left, "rule": f"{said['rule']}; {why}"}
-        return _by_ratios(said, mine, why)
+        return _by_ratios(said, mine, f"but {why}")
     both = [k for k in left if k in by_ratio.effects]
     lone = [k for k in left if k not in by_ratio.probability]
     other = [k for k in by_ratio.effects if k not in catalogue()]
@@ -231,7 +274,7 @@ def _agreed(said: dict[str, Any], ratios: dict[str, Any], found: RunChange) -> d
         if len(both) > 1 or not other or rank[both[0]] >= max(rank[k] for k in other):
             return said
     if not both and not lone:
-        return _by_ratios(said, mine, why if struck else f"{', '.join(left)} would scale differently")
+        return _by_ratios(said, mine, f"but {why}" if struck else f"but {', '.join(left)} would scale differently")
     effects = [*both, *lone, *(other if both else by_ratio.effects)]
     if len(effects) == 1:
         return said | {"effects": effects}
@@ -241,8 +284,9 @@ def _agreed(said: dict[str, Any], ratios: dict[str, Any], found: RunChange) -> d
 
 def _by_ratios(said: dict[str, Any], mine: dict[str, Any], why: str) -> dict[str, Any]:
     """The answer of the ratios in place of that of the diagnosis."""
-    told = [f"The ratios say: {mine['rule']}. The diagnosis said {said['verdict']}: {why}."]
-    return said | mine | {"told": told}
+    found = " ".join([said["verdict"], ", ".join(said["effects"])]).strip()
+    told = f"The diagnosis with the case {said['case']}, A as reference, does not decide: it says {found}, {why}."
+    return said | mine | {"told": [sentence(mine), told]}
 
 
 def _after(doc: dict[str, Any]) -> dict[str, Any]:

@@ -75,7 +75,9 @@ def reduce(
     if not set(LOADS) & rec.values.keys():
         got = "no thrust, torque, power, current or coefficient with a unit"
         raise InputError(Fault(name, "", got, "one of them", "Name units in the headings or in a recording.toml"))
-    samples, reason = is_samples(rec) if steady is None else (not steady, "as told")
+    samples, reason = (
+        is_samples(rec) if steady is None else (not steady, f"rows are taken as {'points' if steady else 'samples'}")
+    )
     found = from_samples(rec, name) if samples else from_rows(rec)
     _outliers(rec, found)
     if not found.points:
