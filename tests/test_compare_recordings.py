@@ -534,3 +534,10 @@ def test_a_rotor_that_has_just_set_off_is_no_misreading(tmp_path: Path) -> None:
         }
         files.append(written(tmp_path / name, {k: np.append(v, start.get(k, 0.0)) for k, v in table.items()}))
     assert not any("left out: no rotor" in note for note in compare(*files).document["notes"])
+
+
+def test_thrust_of_the_other_sign_and_the_same_size_is_a_fault_of_the_stand(tmp_path: Path) -> None:
+    found = compare(*pair(tmp_path, scaled(thrust_N=-1.0))).document
+    assert (found["verdict"], found["effects"]) == ("sensor", ["unit_slip"])
+    turned = compare(*pair(tmp_path, scaled(torque_Nm=-1.0))).document
+    assert turned["verdict"] == "none"  # either hand of rotation is usual

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from bemt.base.tables import number_text, text_table
-from bemt.compare.recordings import ERROR_IN, NOT_ALONE, OTHER_STAND
+from bemt.compare.recordings import ERROR_IN, NOT_ALONE, OTHER_STAND, REVERSED
 from bemt.compare.scaling_laws import FAMILY, law
 from bemt.effects import catalogue
 
@@ -105,6 +105,8 @@ def headline(doc: Mapping[str, Any]) -> str:
     shown = [loads[k] for k in kinds if k in loads][:2]
     shares = _intervals([r for _, r in shown])
     moved = " and ".join(f"{word} {share[0]}" for (word, _), share in zip(shown, shares, strict=True))
+    if doc["rule"] == REVERSED:
+        return f"{REVERSED[0].upper()}{REVERSED[1:]} ({moved}): the cell is reversed, or the rotor turns the other way."
     if verdict == "none":
         return f"No change beyond the difference between two set-ups ({moved or 'drive only'})."
     if verdict == "unknown":

@@ -77,6 +77,7 @@ class MatchedChannel:
     notes: tuple[str, ...] = ()  # What was left out
     # (N,) standard deviation of the shift of a run by lag or hysteresis, share of full scale [1]
     shift: Array | None = None
+    turned: bool = False  # Whether B has the other sign
 
     def common(self) -> tuple[float, float]:
         """Range of the first coordinate that both recordings have; low above high: none."""
@@ -191,7 +192,8 @@ def matched(a: StandRun, b: StandRun, name: str, diameter: float = math.nan) -> 
     else:
         return None
     notes = []
-    if one["sign"][0] != two["sign"][0]:
+    turned = bool(one["sign"][0] != two["sign"][0])
+    if turned:
         notes.append(f"{channel}: changed sign between A and B; sizes are compared")
     parts = [_averaged(one), _averaged(two)]
     for part, run, letter in zip(parts, (a, b), "AB", strict=True):
@@ -215,6 +217,7 @@ def matched(a: StandRun, b: StandRun, name: str, diameter: float = math.nan) -> 
         math.hypot(max(_set_up(name, channel, a, b), *seen), unsure),
         tuple(notes),
         np.repeat([a.shift.get(channel, 0.0), b.shift.get(channel, 0.0)], [p["y"].size for p in parts]),
+        turned,
     )
 
 

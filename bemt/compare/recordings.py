@@ -28,6 +28,8 @@ DAYS = (
 )
 """What tells two runs apart whose loads differ by a share."""
 SCHEMA = "bemt.comparison/1"
+REVERSED = "thrust has the other sign in B, and its size is the same"
+"""Verdict of a reversed cell, or of a rotor that is mounted or turns the other way round."""
 ERROR_IN = "error in "
 """Start of a note on what cannot be so in A or B."""
 # Recorded densities are this good: a barometer, a thermometer and nobody's humidity, share.
@@ -132,6 +134,8 @@ def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> RunChange
         verdict = judge(*weighed, largest)
         verdict = _far_off(_far_apart(_with_density(_by_proxy(verdict, loads), a, b, loads), ratios), ratios)
         verdict = _all_loads(verdict, loads, ratios)
+        if verdict.verdict == "none" and any(c.turned for c in loads.values() if c.name == "thrust"):
+            verdict = Judgement("sensor", ("unit_slip",), {"unit_slip": 1.0}, {}, REVERSED)
     found = RunChange(
         a,
         b,

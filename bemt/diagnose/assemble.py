@@ -228,8 +228,10 @@ def _scale(part: Part) -> Array:
             out.append(np.abs(part.steady_rpm))
         else:
             coefficient = np.abs(y / unit[c])
+            coefficient = coefficient[np.isfinite(coefficient)]
             # where nearly all readings are 0 the largest stands for the size
-            out.append(unit[c] * float(np.nanquantile(coefficient, 0.9) or np.nanmax(coefficient)))
+            size = np.quantile(coefficient, 0.9) or np.max(coefficient) if coefficient.size else np.nan
+            out.append(unit[c] * float(size))
     return np.concatenate(out)
 
 

@@ -166,7 +166,9 @@ def _errors(read: Sequence[Dataset], diameter_m: float | None, ducted: bool) -> 
         if imported.kind in ("bench", "table"):
             for f in check(imported, diameter_m=diameter_m, ducted=ducted):
                 told = f.evidence if f.evidence.startswith(f.channel) else f"{f.channel}: {f.evidence}"
-                out += [f"{ERROR_IN}{letter}: {f.id}: {told}"] if f.severity == "error" else []
+                # a propeller that windmills pulls the other way; signs have a note of their own
+                wrong = f.severity == "error" and f.id != "sign_flipped"
+                out += [f"{ERROR_IN}{letter}: {f.id}: {told}"] if wrong else []
     return out
 
 
