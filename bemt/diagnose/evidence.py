@@ -41,8 +41,7 @@ _TOGETHER, _ROUNDS = 24, 6
 DETAIL, GEOMETRY = 0.1, 0.03
 """Share of what one effect explains (log odds) that two must explain on top: by so much its law may be off beyond what
 the error of its form holds.  As of a smooth rest beside it, which is no other cause either.  The second of an effect
-whose law is geometry and the solver: where one led alone in three proofs, 1 of 56 had another with more, and 5 nats [1].
-"""
+whose law is geometry and the solver: of 56 that led alone in three proofs, one had another of more, and 5 nats [1]."""
 FOR_NULLS = 3
 """Settings of the covariance, best first, that nulls are weighed under; only these keep what rivals need [1]."""
 
