@@ -154,9 +154,14 @@ def _parameters(d: Diagnosis) -> str:
     return "; ".join(each)
 
 
+def _is_share(p: Parameter) -> bool:
+    """Whether a number without a unit is a share of something."""
+    return p.unit == "1" and p.off == 0.0 and max(abs(p.low), abs(p.high)) <= 0.5
+
+
 def _sized(p: Parameter, value: float, form: str = ".3g") -> str:
-    """Number with its unit; a share of something in percent."""
-    if p.unit == "1" and p.off == 0.0 and max(abs(p.low), abs(p.high)) <= 0.5:
+    """Number with its unit; a share in percent."""
+    if _is_share(p):
         return f"{100.0 * value:{form}} %"
     return f"{value:{form}}" if p.unit in ("1", "") else f"{value:{form}} {p.unit}"
 
@@ -166,10 +171,11 @@ def _with_size(d: Diagnosis, name: str) -> str:
     cls, found = effects.catalogue()[name], d.parameters.get(name, {})
     if cls.fault == "unit" and "unit" in found:
         return f"{cls.title} ({found['channel']['value']}: {found['unit']['value']})"
-    sizes = [(p, found[p.name]["value"]) for p in cls.parameters if p.off is not None and p.steps and p.name in found]
-    if len(sizes) != 1 or not isinstance(sizes[0][1], float):
+    sizes = [p for p in cls.parameters if p.off is not None and p.steps and p.name in found]
+    value = found[sizes[0].name]["value"] if len(sizes) == 1 else None
+    if not isinstance(value, float) or (sizes[0].unit == "1" and not _is_share(sizes[0])):
         return cls.title
-    return f"{cls.title} ({_sized(*sizes[0], '+.3g')})"
+    return f"{cls.title} ({_sized(sizes[0], value, '+.3g')})"
 
 
 def _in_units(d: Diagnosis, name: str, parameter: str, value: float) -> str:
