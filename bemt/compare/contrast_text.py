@@ -105,8 +105,6 @@ def headline(doc: Mapping[str, Any]) -> str:
     shown = [loads[k] for k in kinds if k in loads][:2]
     shares = _intervals([r for _, r in shown])
     moved = " and ".join(f"{word} {share[0]}" for (word, _), share in zip(shown, shares, strict=True))
-    if doc["rule"] == REVERSED:
-        return f"{REVERSED[0].upper()}{REVERSED[1:]} ({moved}): the cell is reversed, or the rotor turns the other way."
     if verdict == "none":
         return f"No change beyond the difference between two set-ups ({moved or 'drive only'})."
     if verdict == "unknown":
@@ -117,6 +115,8 @@ def headline(doc: Mapping[str, Any]) -> str:
         guess = "" if no_guess else _families(likely, doc["ranking"])
         size = f" ({moved})" if moved else ""
         return f"These recordings cannot say what changed{size}" + (f"; likeliest {guess}." if guess else ".")
+    if doc["rule"] == REVERSED:
+        return f"{REVERSED[0].upper()}{REVERSED[1:]} ({moved}): the cell is reversed, or the rotor turns the other way."
     if len(effects) == 1:
         lead = "The stand, not the rotor" if verdict == "sensor" else "What changed"
         return f"{lead}: {_plain(effects[0])} ({moved or 'drive alone'})."
