@@ -130,7 +130,7 @@ def answer(result: Mapping[str, Any]) -> str:
     ...        "E_pct": 13.5, "u_num": 0.1, "u_input": 13.0, "u_model": 0.0, "u_val": None}
     >>> audit = {"reference": "cfd", "u_relative_known": 0.041}
     >>> answer({"rows": [row], "comparisons": [cfd], "audit": [audit]})
-    'BEMT 119.1 ± 13 N, CFD 104.9 N (BEMT +13.5 %): they agree if the CFD is uncertain by 5.4 % or more; the audit of the CFD finds 4.1 % at least.'
+    'BEMT 119.1 ± 13 N, CFD 104.9 N (BEMT +13.5 %): they agree if the CFD is uncertain by 5.4 % or more; our audit of the recording finds an error of 4.1 % or more.'
     """  # noqa: E501
     if (unsolved := _unsolved(result)) is not None:
         return unsolved[2]
@@ -171,7 +171,7 @@ def _audited(result: Mapping[str, Any], c: Mapping[str, Any]) -> str:
     """What the audit of a recorded CFD value knows of its uncertainty."""
     audit = next((a for a in result.get("audit", []) if a.get("reference") == c.get("reference")), None)
     share: Any = audit.get("u_relative_known") if audit else None
-    return f"; the audit of the CFD finds {100.0 * share:.2g} % at least" if _finite(share) and share > 0 else ""
+    return f"; our audit of the recording finds an error of {100.0 * share:.2g} % or more" if _finite(share) and share > 0 else ""
 
 
 def headline(result: Mapping[str, Any]) -> str:
