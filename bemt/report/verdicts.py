@@ -171,7 +171,9 @@ def _audited(result: Mapping[str, Any], c: Mapping[str, Any]) -> str:
     """What the audit of a recorded CFD value knows of its uncertainty."""
     audit = next((a for a in result.get("audit", []) if a.get("reference") == c.get("reference")), None)
     share: Any = audit.get("u_relative_known") if audit else None
-    return f"; our audit of the recording finds an error of {100.0 * share:.2g} % or more" if _finite(share) and share > 0 else ""
+    if not _finite(share) or share <= 0:
+        return ""
+    return f"; our audit of the recording finds an error of {100.0 * share:.2g} % or more"
 
 
 def headline(result: Mapping[str, Any]) -> str:
