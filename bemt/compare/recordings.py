@@ -15,7 +15,7 @@ import numpy as np
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
 from bemt.compare import matched as fits
-from bemt.compare.asked import Asked
+from bemt.compare.invocation import Invocation
 from bemt.compare.matched import MatchedChannel, Scatter
 from bemt.compare.scaling import CLEAR, OWN_SHAPE, UNKNOWN, Judgement, judge, weigh
 from bemt.compare.scaling_laws import FAMILY, law
@@ -350,7 +350,7 @@ def _misread(letter: str, run: StandRun) -> str:
     return words + (f"; check the speed sensor of {letter}" if n > _DOUBTFUL * total else "")
 
 
-def next_step(change: RunChange, asked: Asked) -> dict[str, str]:
+def next_step(change: RunChange, asked: Invocation) -> dict[str, str]:
     """Run or reading that would settle the answer, and the command to give then, with all that was asked."""
     said = change.leading
     with_case = asked.command(case=asked.case or "CASE")

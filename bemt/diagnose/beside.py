@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bemt.base.errors import InputError
-from bemt.compare.asked import Asked
 from bemt.compare.contrast_text import headline
+from bemt.compare.invocation import Invocation
 from bemt.compare.recordings import RunChange, changed, document, next_step
 from bemt.compare.scaling_laws import LAWS
 from bemt.compare.stand_run import StandRun, stand_run
@@ -102,7 +102,7 @@ def beside(
 def _next(found: RunChange, files: Sequence[str] | None) -> Suggestion | None:
     """Step of the comparison, without asking for the case that is there."""
     reference, test = _paths(files) or ["REFERENCE", "RECORDING"]
-    step = next_step(found, Asked(reference, test))
+    step = next_step(found, Invocation(reference, test))
     command = () if "CASE" in step["command"] or not step["command"] else (step["command"],)
     text = step["text"].removeprefix("to be sure, ")
     return Suggestion(text, (), (), 0.0, 0.0, "look", command) if text else None

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 from bemt import __version__
 from bemt.base.errors import Fault, InputError
 from bemt.base.face import as_html
-from bemt.compare.asked import Asked
 from bemt.compare.contrast_text import sentence
+from bemt.compare.invocation import Invocation
 from bemt.compare.recordings import ERROR_IN, RunChange, changed, document, next_step
 from bemt.compare.stand_run import conditions_of, selected, stand_run, with_air
 from bemt.effects import catalogue
@@ -110,7 +110,7 @@ def compare(
     from bemt.recordings.load import import_file
 
     names = [os.fspath(a), os.fspath(b)]
-    asked = Asked(
+    asked = Invocation(
         names[0], names[1], tuple(rows_a), tuple(rows_b), air_a, air_b, label,
         None if case is None else os.fspath(case) if isinstance(case, str | os.PathLike) else case.path.as_posix(),
     )  # fmt: skip
@@ -201,7 +201,7 @@ def _case(path: str) -> Case:
 
 
 def _diagnosed(
-    asked: Asked, read: Sequence[Dataset], case: Case, progress: Callable[[str], None] | None
+    asked: Invocation, read: Sequence[Dataset], case: Case, progress: Callable[[str], None] | None
 ) -> dict[str, Any]:
     """Verdict of the diagnosis of B with A as reference."""
     from bemt.diagnose.chain import diagnose
@@ -219,7 +219,7 @@ def _diagnosed(
     return {k: said[k] for k in keys} | {"diagnosis": said, "case": case.name, "told": told}
 
 
-def _given(asked: Asked) -> Given:
+def _given(asked: Invocation) -> Given:
     """Commands of the diagnosis that carry what was asked; rows and air are taken by a comparison alone."""
     from bemt.diagnose.suggest import Given
 

@@ -1,4 +1,4 @@
-"""What a user gave to `compare`, so that every command that is recommended carries it."""
+"""How `compare` was called, so that every command that is recommended carries it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ PLACE = {"temperature": "TEMPERATURE", "pressure": "PRESSURE"}
 
 
 @dataclass(frozen=True)
-class Asked:
+class Invocation:
     """Files and options of a comparison, as a command line has them."""
 
     a: str = "A"  # First recording
@@ -32,7 +32,7 @@ class Asked:
     def command(self, **other: Any) -> str:
         """Command that asks this, some of it replaced.
 
-        >>> Asked("a.csv", "b.csv", rows_b=("rotor=right",), label="10x5").command(case="CASE")
+        >>> Invocation("a.csv", "b.csv", rows_b=("rotor=right",), label="10x5").command(case="CASE")
         'python -m bemt compare a.csv b.csv --rows-b rotor=right --label 10x5 --case CASE'
         """
         given = replace(self, **other)
@@ -51,7 +51,7 @@ class Asked:
     def with_days(self) -> str:
         """Command with the air of both days; what was not given is the user's to fill in.
 
-        >>> Asked("a.csv", "b.csv", air_a="45kt", air_b="1.2kg/m3").with_days()
+        >>> Invocation("a.csv", "b.csv", air_a="45kt", air_b="1.2kg/m3").with_days()
         'python -m bemt compare a.csv b.csv --air-a TEMPERATURE,PRESSURE,45kt --air-b 1.2kg/m3'
         """
         return self.command(air_a=_with_places(self.air_a), air_b=_with_places(self.air_b))
