@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from diagnosing import case, diagnose, left_out, points, recording
 
 from bemt import effects
 from bemt.dataset import Dataset
-from bemt.diagnose import assemble, document, noise, plan, record, signatures
+from bemt.diagnose import assemble, chain, document, figures, noise, plan, record, signatures
 from bemt.diagnose.explanation import UNKNOWN
 
 GRID = points("grid")
@@ -111,6 +112,17 @@ def test_a_wall_with_a_law_of_its_own_is_the_wall() -> None:
     answer = diagnose(recording(case(), given, (Tube(),)), case())
     assert answer.decision.effects == ("ground_effect",), document.text(answer)
     assert answer.found.probability[UNKNOWN] < 0.01
+
+
+def test_a_reference_without_a_wall_leaves_its_distance_a_variable() -> None:
+    """What only the run records is what changed it."""
+    given = dict(points("static")) | {"wall_distance_m": np.tile([0.07, 0.1, 0.15, 0.3, 0.8], 4)[:17]}
+    run = record.from_series(recording(case(), given, (Tube(),)), case())
+    free = replace(record.from_series(recording(case(), points("static"), seed=3), case()), reference=True)
+    answer = chain.diagnose([run, free], [case()])
+    assert answer.decision.effects == ("ground_effect",), document.text(answer)
+    assert answer.marked is not None and answer.marked.variable == "wall_distance_m"
+    assert figures.residual(answer).axes[0].get_xlabel().startswith("wall distance")
 
 
 def test_torque_in_other_units_is_a_slip_of_units() -> None:

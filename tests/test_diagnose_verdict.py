@@ -267,6 +267,19 @@ def test_a_pair_has_one_set_for_each_cause() -> None:
     assert {frozenset(s) for s in sets} == {frozenset(one), frozenset({"thrust_zero"})}
 
 
+def test_one_of_each_set_holds_nearly_all_of_two_causes() -> None:
+    """Pairs with nothing in common with the leading one count, too; a tail that no set can hold is not padded with."""
+    pairs = {("nacelle", "torque_gain"): 0.72, ("pitch_offset", "thrust_gain"): 0.13, ("nacelle", "thrust_gain"): 0.11}
+    share = {Explanation.of(*k): v for k, v in pairs.items()} | {Explanation.of("nacelle"): 0.04}
+    a, b = verdict.credible_sets(share, Explanation.of("nacelle", "torque_gain"))
+    assert sum(v for (i, j), v in pairs.items() if (i in a) != (j in a) and (i in b) != (j in b)) >= 0.95 * 0.96
+    alone = verdict.credible_sets(share, Explanation.of("nacelle", "torque_gain"), "nacelle")
+    assert alone[0] == ("nacelle",) and set(alone[1]) == {"torque_gain", "thrust_gain"}
+    tail = {Explanation.of("duct", i): 5e-4 for i in ("tip_cut", "section", "reynolds", "untwist", "nacelle")}
+    few = verdict.credible_sets(tail | {Explanation.of("duct", "thrust_zero"): 0.05}, Explanation.of("duct", "thrust_zero"))
+    assert few == (("duct",), ("thrust_zero",))
+
+
 def _said(word: str, *ids: str, likely: str = "untwist") -> chain.Diagnosis:
     """Outcome of which only the decision is looked at, and, of an open one, what is likely."""
     nothing: Any = None

@@ -106,11 +106,14 @@ def _channels(answer: Diagnosis) -> list[int]:
 
 
 def _across(answer: Diagnosis) -> str:
-    """Covariate to draw over: that of the mismatch if it is no condition, else J, else another that varies."""
+    """Covariate to draw over: that of the mismatch if it is no condition, else the first that varies in the test."""
     X, where = answer.problem.covariates, answer.marked
     if where is not None and where.variable in X and where.variable not in _CONDITIONS:
         return where.variable
-    return next((name for name in dict.fromkeys((*_CONDITIONS, *_AXIS)) if name in X and _varies(X[name])), "rpm")
+    judged = np.unique(answer.problem.point[answer.problem.free])
+    return next(
+        (name for name in dict.fromkeys((*_CONDITIONS, *_AXIS)) if name in X and _varies(X[name][judged])), "rpm"
+    )
 
 
 def _lines(x: Array) -> Index:
@@ -138,7 +141,7 @@ def residual(answer: Diagnosis) -> Figure:
     x = _across(answer)
     y = where.variable if where is not None and where.variable in ("M_tip", "Re") else "rpm"
     judged = np.unique(answer.problem.point[answer.problem.free])
-    if x == "J" and judged.size and _varies(X["rpm"][judged]):
+    if x == "J" and _varies(X["rpm"][judged]):
         return _map(answer, x, y)
     return _strip(answer, y if x in ("rpm", "M_tip", "Re") else x)
 
@@ -235,6 +238,8 @@ def _groups(answer: Diagnosis, name: str) -> list[tuple[str, NDArray[np.bool_], 
         "J" if _varies(X["J"]) else "")  # fmt: skip
     found = []
     for i, p in enumerate(problem.parts):
+        if name not in (*_CONDITIONS, *p.record.extra):
+            continue  # a reference without it
         mine = part == i
         tag = p.record.name if len(problem.parts) > 1 else ""
         line = np.zeros(P, dtype=np.intp)

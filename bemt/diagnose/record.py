@@ -417,9 +417,16 @@ def owners(records: Sequence[Record], whole: Record) -> NDArray[np.intp]:
 
 
 def concatenated(records: Sequence[Record]) -> dict[str, Array]:
-    """Covariates that all records share, joined, with runs numbered through."""
-    names = [n for n in COVARIATES if all(n in r.extra for r in records)]
-    joined = {n: np.concatenate([r.extra[n] for r in records]) for n in names}
+    """Covariates of all records that are judged, joined, with runs numbered through.
+
+    A reference may lack one, as a run without a wall has no distance of it: there it is the median of the others.
+    """
+    judged = [r for r in records if not r.reference] or records
+    names = [n for n in COVARIATES if all(n in r.extra for r in judged)]
+    joined = {}
+    for n in names:
+        usual = np.median(np.concatenate([r.extra[n] for r in records if n in r.extra]))
+        joined[n] = np.concatenate([r.extra.get(n, np.full(len(r), usual)) for r in records])
     runs, offset = [], 0.0
     for r in records:
         own = r.extra.get("run", np.zeros(len(r)))

@@ -69,14 +69,11 @@ BESIDE = 0.1
 ROUGH = 3.0
 """Noise over what the recording states from which on something else is at work than any effect explains [1]."""
 IN_SET, LARGEST = 0.95, 6
-"""Share of the probability of one cause that its set holds; most effects of the sets of a pair together [1]."""
+"""Share of the probability of two causes that their sets hold; most effects of both together [1]."""
 SETTLED = 0.67
 """Probability of one ratio of units from which a slip of the airspeed is named: between two of them is no slip [1]."""
 END = 0.01
 """As near to an end of its range, a share of it, a parameter of a pair is at the end [1]."""
-
-# Turns of two sets that follow each other; they settle in two or three.
-_TURNS = 20
 
 _BALANCE = ("thrust_N", "torque_Nm")
 # Faults of a cell that shift its reading: one stays, the other creeps.
@@ -318,12 +315,7 @@ class Asked:
     @cached_property
     def known_sets(self) -> tuple[tuple[str, ...], ...]:
         """One set of effects per cause of the leading pair; a sure effect is a set of its own."""
-        sets = credible_sets(self.P, self.leading)
-        for i in self.leading:
-            if i in self.sure:
-                other = next((s for s in sets if i not in s), tuple(self.leading.without(i)))
-                return (i,), other
-        return sets
+        return credible_sets(self.P, self.leading, next((i for i in self.leading if i in self.sure), ""))
 
     @cached_property
     def few(self) -> tuple[str, ...]:
@@ -444,42 +436,36 @@ def _class(found: Evidence, first: str, share: Mapping[str, float]) -> tuple[str
     return (first, *sorted(others, key=lambda i: -share[i]))
 
 
-def credible_sets(probability: Mapping[Explanation, float], pair: Explanation) -> tuple[tuple[str, ...], ...]:
+def credible_sets(
+    probability: Mapping[Explanation, float], pair: Explanation, sure: str = ""
+) -> tuple[tuple[str, ...], ...]:
     """One set of effects per cause of a pair, likeliest first: with one effect of each set nearly all pairs are there.
 
-    A sum of single effects (Wang, Sarkar, Carbonetto and Stephens 2020, J. R. Statist. Soc. B 82:1273): what may stand
-    for one cause, given the other set, in turns until it stays. What could be in both sets is where it is likelier.
+    Credible sets of causes as Wang, Sarkar, Carbonetto and Stephens (2020, J. R. Statist. Soc. B 82:1273) have them,
+    of the pairs together: from the leading pair the sets grow by what adds most per member, on one side or on both.
+    The set of an effect that is sure does not.
     """
-    pairs = {k: v for k, v in probability.items() if k.pair}
-    weight: dict[str, dict[str, float]] = {}
+    pairs = {k: v for k, v in probability.items() if k.pair and (not sure or sure in k.ids)}
+    ids = sorted({i for k in pairs for i in k})
+    P = np.zeros((len(ids), len(ids)))
     for k, v in pairs.items():
-        a, b = k
-        weight.setdefault(a, {})[b] = v
-        weight.setdefault(b, {})[a] = v
-    first, second = ({i: 1.0} for i in pair)
-    for _ in range(_TURNS):
-        second = _given(weight, first)
-        first = _given(weight, second)
-    both = set(first) & set(second)
-    for i in both:
-        (first if first[i] < second[i] else second).pop(i)
-    return _tomass(first), _tomass(second)
-
-
-def _given(weight: Mapping[str, Mapping[str, float]], other: Mapping[str, float]) -> dict[str, float]:
-    """Probability of each effect to be the one beside a set."""
-    out: dict[str, float] = {}
-    for i, p in other.items():
-        for k, v in weight.get(i, {}).items():
-            if k not in other:
-                out[k] = out.get(k, 0.0) + p * v
-    total = sum(out.values()) or 1.0
-    # what hardly ever stands there is not carried along
-    return {k: v / total for k, v in out.items() if v > 0.01 * total}
-
-
-def _tomass(share: Mapping[str, float]) -> tuple[str, ...]:
-    """Fewest effects that hold nearly all of a set."""
-    ranked = sorted(share, key=lambda i: -share[i])
-    mass = np.cumsum([share[i] for i in ranked])
-    return tuple(ranked[: int(np.searchsorted(mass, IN_SET * mass[-1])) + 1]) if ranked else ()
+        i, j = (ids.index(name) for name in k)
+        P[i, j] = P[j, i] = v
+    A, B = ([ids.index(i)] for i in pair)
+    if sure:
+        A, B = sorted((A, B), key=lambda side: ids[side[0]] != sure)
+    while P[np.ix_(A, B)].sum() < IN_SET * sum(pairs.values()) and len(A) + len(B) < LARGEST:
+        free = np.ones(len(ids), dtype=bool)
+        free[[*A, *B]] = False
+        to_a, to_b = (np.where(free, P[:, side].sum(axis=1), 0.0) for side in (B, A))
+        i, j = int(np.argmax(to_a)), int(np.argmax(to_b))
+        steps = [(to_b[j], [], [j])] if sure else [(to_b[j], [], [j]), (to_a[i], [i], [])]
+        if not sure and len(A) + len(B) + 2 <= LARGEST:
+            both = np.where(np.outer(free, free), 0.5 * (to_a[:, None] + to_b[None, :] + P), 0.0)
+            i, j = np.unravel_index(int(np.argmax(both)), both.shape)
+            steps.append((both[i, j], [int(i)], [int(j)]))
+        gain, a, b = max(steps, key=lambda step: step[0])
+        if gain < RARE * probability[pair]:
+            break
+        A, B = A + a, B + b
+    return tuple(ids[i] for i in A), tuple(ids[i] for i in B)
