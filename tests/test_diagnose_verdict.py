@@ -276,7 +276,9 @@ def test_one_of_each_set_holds_nearly_all_of_two_causes() -> None:
     alone = verdict.credible_sets(share, Explanation.of("nacelle", "torque_gain"), "nacelle")
     assert alone[0] == ("nacelle",) and set(alone[1]) == {"torque_gain", "thrust_gain"}
     tail = {Explanation.of("duct", i): 5e-4 for i in ("tip_cut", "section", "reynolds", "untwist", "nacelle")}
-    few = verdict.credible_sets(tail | {Explanation.of("duct", "thrust_zero"): 0.05}, Explanation.of("duct", "thrust_zero"))
+    few = verdict.credible_sets(
+        tail | {Explanation.of("duct", "thrust_zero"): 0.05}, Explanation.of("duct", "thrust_zero")
+    )
     assert few == (("duct",), ("thrust_zero",))
 
 
