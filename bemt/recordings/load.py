@@ -17,6 +17,8 @@ from __future__ import annotations
 import math
 import os
 import re
+import shlex
+import textwrap
 import traceback
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, replace
@@ -44,6 +46,7 @@ INTERNAL = "internal error of this program"
 """Start of the error of a file on which a reader failed."""
 SETTLED = 0.01
 """Drift above which a mean is called unsettled."""
+_LOADS = {"thrust_N", "torque_Nm", "CT", "CP"}
 _RESTART = re.compile(r"(.+?)((?:_\d+)+)(\.[^.]*)?(?:\.gz)?")
 
 
@@ -238,12 +241,19 @@ def _file_text(file: Mapping[str, Any]) -> str:
     if file["error"] is not None:
         return f"{file['path']}: refused\n  " + str(file["error"]).replace("\n", "\n  ")
     lines = [f"{file['path']}: {file['format']} ({file['kind']}), {file['rows']} rows"]
-    rows = []
+    rows, plain = [], []
     for name, channel in file["channels"].items():
+        if channel["mean"] is None:
+            plain.append(f"{name} [{channel['unit']}]" if channel["unit"] not in ("", "-", "1") else name)
+            continue
         drift = "-" if channel["drift"] is None else f"{channel['drift']:+.2%}"
         mean = tables.number_text(channel["mean"], 6)
-        rows.append([name, channel["unit"] or "-", mean, drift, channel["averaged_over"] or "-"])
-    lines.append(tables.text_table(["channel", "unit", "mean", "drift", "averaged over"], rows, (0, 1, 4), "  "))
+        rows.append([name, channel["unit"] or "-", mean, drift, channel["averaged_over"]])
+    if rows:
+        lines.append(tables.text_table(["channel", "unit", "mean", "drift", "averaged over"], rows, (0, 1, 4), "  "))
+    if plain:
+        lead = "  not averaged: " if rows else "  channels: "
+        lines.append(textwrap.fill(", ".join(plain), 110, initial_indent=lead, subsequent_indent="    "))
     if file["reduction"] is not None:
         lines += points_text(file["reduction"])
     lines += [f"  ! {text}" for text in file["warnings"]]
@@ -255,8 +265,15 @@ def _file_text(file: Mapping[str, Any]) -> str:
 
 
 def text(found: Mapping[str, Any]) -> str:
-    """Lay a document out for a terminal."""
-    return "\n\n".join(_file_text(file) for file in found["files"]) + "\n"
+    """Lay a document out for a terminal, with what to do next with recordings of a rotor."""
+    lines = [_file_text(file) + "\n" for file in found["files"]]
+    loaded = [str(f["path"]) for f in found["files"] if "rpm" in f["channels"] and _LOADS & set(f["channels"])]
+    if loaded:
+        first, *others = (shlex.quote(path) for path in loaded)
+        lines.append(f"Next: python -m bemt diagnose {first} --case CASE   (a case: python -m bemt new 10x5)\n")
+        if len(others) == 1:
+            lines[-1] += f"      python -m bemt compare {first} {others[0]}\n"
+    return "\n".join(lines)
 
 
 def exit_code(found: Mapping[str, Any]) -> int:
