@@ -23,6 +23,7 @@ from bemt.diagnose import (
     prior,
     rules,
     signatures,
+    thresholds,
     verdict,
 )
 from bemt.diagnose.assemble import build
@@ -68,7 +69,7 @@ def test_a_few_explanations_are_an_answer_and_many_are_not(answer: chain.Diagnos
 
 def test_what_is_on_already_is_not_what_was_left_out(answer: chain.Diagnosis) -> None:
     assert "tip_loss" in {e.id for e in answer.problem.baseline}
-    assert answer.found.log_bayes(Explanation.of("tip_loss")) < verdict.PROVEN
+    assert answer.found.log_bayes(Explanation.of("tip_loss")) < thresholds.PROVEN
     assert told(answer, tip_loss=0.99).verdict in ("insufficient", "unknown")
 
 

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from bemt.diagnose.form import Form, Forms, columns, form_modes
 
 if TYPE_CHECKING:
-    from bemt.diagnose.evidence import Evidence, State
+    from bemt.diagnose.evidence import Evidence
+    from bemt.diagnose.state import State
 
 __all__ = ["ALIKE", "Confusion", "confusion", "distance", "nearest"]
 

@@ -7,9 +7,9 @@ done for all settings of the covariance and added up with their prior weights.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,30 +18,22 @@ from numpy.typing import NDArray
 from bemt import effects
 from bemt.diagnose import form, noise, prior
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
-from bemt.diagnose.form import Form, Forms
-from bemt.diagnose.signatures import effect_of
+from bemt.diagnose.form import Forms
+from bemt.diagnose.pair_evidence import best_pair, every_pair, price, solve_together
+from bemt.diagnose.state import State, log_mean
 
 if TYPE_CHECKING:
     from bemt.diagnose.noise import Conditional, Hyper, Rival, Whitener
     from bemt.diagnose.problem import Problem
     from bemt.diagnose.signatures import Candidate
 
-__all__ = ["Evidence", "State", "weigh"]
+__all__ = ["Evidence", "weigh"]
 
 Array = NDArray[np.float64]
 
 # Settings of the covariance this far (in natural logarithm) below the best are dropped.
 _DROP = 8.0
 _KEEP = 6
-_PAIR_LEADERS = 60
-# Single effects of which the best pair is looked for under every covariance.
-_FIRST = 2
-# Leading pairs that are solved together: what one effect changes depends on the other.
-_TOGETHER, _ROUNDS = 24, 6
-DETAIL, GEOMETRY = 0.1, 0.03
-"""Share of what one effect explains (log odds) that two must explain on top: by so much its law may be off beyond what
-the error of its form holds.  As of a smooth rest beside it, which is no other cause either.  The second of an effect
-whose law is geometry and the solver: of 56 that led alone in three proofs, one had another of more, and 5 nats [1]."""
 FOR_NULLS = 3
 """Settings of the covariance, best first, that nulls are weighed under; only these keep what rivals need [1]."""
 
@@ -57,90 +49,6 @@ def one_thread() -> Iterator[None]:
 
     with threadpool_limits(1, "blas"):
         yield
-
-
-def log_mean(log_values: Array, log_weights: Array, axis: int = -1) -> Array:
-    """Logarithm of a weighted sum of exponentials."""
-    total = log_values + log_weights
-    top = np.max(total, axis=axis, keepdims=True)
-    top = np.where(np.isfinite(top), top, 0.0)
-    with np.errstate(divide="ignore"):
-        return np.asarray(np.squeeze(top, axis) + np.log(np.sum(np.exp(total - top), axis=axis)))
-
-
-@dataclass(eq=False)
-class State:
-    """Readings and signatures whitened by one setting of the covariance, those of the test given the reference.
-
-    Attributes
-    ----------
-    hyper : Hyper
-        The setting.
-    white : Conditional
-        Its factors.
-    r : (M,) float
-        Whitened residual [1].
-    S : (M, G) float
-        Whitened signatures of all settings of all candidates [1].
-    half : (G,) float
-        Half of their squared lengths [1].
-    forms : dict of str to Form
-        Error of the form of each candidate, at its best setting.
-    rivals : list of (Conditional, Whitener)
-        Factors without and with each unknown smooth effect.
-    log_z : dict of Explanation to float
-        Logarithm of the evidence per explanation.
-    best_rival : str
-        Unknown smooth effect of largest evidence.
-    mixed : dict of Explanation to (float array, int, int)
-        What two effects change together beyond the sum of both, whitened, and the columns at which it was solved.
-    """
-
-    hyper: Hyper
-    white: Conditional
-    r: Array
-    S: Array
-    half: Array
-    forms: dict[str, Form] = field(default_factory=dict)
-    rivals: list[tuple[Conditional, Whitener]] = field(default_factory=list)
-    log_z: dict[Explanation, float] = field(default_factory=dict)
-    best_rival: str = ""
-    mixed: dict[Explanation, tuple[Array, int, int]] = field(default_factory=dict)
-
-    def both(self, pair: Explanation, spans: Mapping[str, slice], log_w: Array) -> Array:
-        """Log likelihood over that of "none" of all settings of two effects, priors included, forms left out, (A, B).
-
-        Signatures are added; what they change together, where it was solved, grows as the product of their sizes.
-        """
-        A, B = (spans[i] for i in pair)
-        a, b = (self.S[:, x].T @ self.r - self.half[x] + log_w[x] for x in (A, B))
-        total = a[:, None] + b[None, :] - self.S[:, A].T @ self.S[:, B]
-        if pair in self.mixed:
-            extra, i, j = self.mixed[pair]
-            share = np.outer(self.S[:, A].T @ self.S[:, i] / (2.0 * self.half[i]),
-                             self.S[:, B].T @ self.S[:, j] / (2.0 * self.half[j]))  # fmt: skip
-            met = (extra @ self.S[:, A])[:, None] + (extra @ self.S[:, B])[None, :]
-            total += share * (extra @ self.r - met) - 0.5 * share**2 * (extra @ extra)
-        return np.asarray(total)
-
-    def best_of(self, pair: Explanation, spans: Mapping[str, slice], log_w: Array) -> tuple[int, int]:
-        """Columns of the best setting of two effects."""
-        total = self.both(pair, spans, log_w)
-        i, j = np.unravel_index(int(np.argmax(total)), total.shape)
-        A, B = (spans[k] for k in pair)
-        return A.start + int(i), B.start + int(j)
-
-    def gains(self, name: str, span: slice, R: Array) -> Array:
-        """Log likelihood over that of "none" of every setting of a candidate for whitened residuals. [1]"""
-        S = self.S[:, span]
-        out = S.T @ R - self.half[span][:, None]
-        form = self.forms.get(name)
-        if form is not None and form.B.shape[1]:
-            pS, pR = form.project(S), form.project(R)
-            out += (
-                0.5 * np.sum(pS * pS, axis=0)[:, None] - pS.T @ pR + 0.5 * np.sum(pR * pR, axis=0) - form.half_log_det
-            )
-        return np.asarray(out)
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,7 +128,7 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
     for h, C in noise.covariances(problem):
         state = coarse.state(h, C, top - _DROP)
         if pairs and state.half.size:
-            _best_pair(state, coarse.spans, coarse.log_w)
+            best_pair(state, coarse.spans, coarse.log_w)
         best[h] = state.log_z
         top = max(top, max(best[h].values()) + np.log(h.weight))
     fine = _Table(problem, S, log_w, spans, candidates, modes, None)
@@ -236,13 +144,13 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
         else:
             state.log_z[UNKNOWN] = state.log_z[NONE]
         if pairs:
-            _pairs(state, spans, log_w)
+            every_pair(state, spans, log_w)
         states.append(state)
     before = prior.log_priors(prior.prior_weights(problem, list(spans)), pairs)
     if pairs:
-        _solve_pairs(problem, candidates, states, spans, log_w, before)
-    price = _details(problem, states, modes)
-    probability = _posterior(states, {k: v - price.get(k, 0.0) for k, v in before.items()})
+        solve_together(problem, candidates, states, spans, log_w, before)
+    added = price(problem, states, modes)
+    probability = _posterior(states, {k: v - added.get(k, 0.0) for k, v in before.items()})
     likeliest = max(probability, key=lambda k: probability[k])
     states.sort(key=lambda s: -(s.log_z[likeliest] + np.log(s.hyper.weight)))
     for s in states[:FOR_NULLS]:
@@ -391,118 +299,6 @@ def _leading(log_z: dict[Hyper, dict[Explanation, float]]) -> list[Hyper]:
 def _effects(what: Explanation) -> int:
     """Number of effects at work."""
     return 0 if what == NONE else len(what)
-
-
-def _best_pair(state: State, spans: Mapping[str, slice], log_w: Array) -> None:
-    """Evidence of the best pair that holds one of the best single effects: enough to see which covariances matter."""
-    gain = state.S.T @ state.r - state.half + log_w
-    names, starts = list(spans), np.array([s.start for s in spans.values()])
-    found: dict[Explanation, float] = {}
-    for a in sorted(names, key=lambda i: -state.log_z[Explanation.of(i)])[:_FIRST]:
-        A = spans[a]
-        total = gain[A][:, None] + gain[None, :] - state.S[:, A].T @ state.S
-        top = np.maximum.reduceat(np.max(total, axis=0), starts)
-        found |= {Explanation.of(a, b): float(v) for b, v in zip(names, top, strict=True) if b != a}
-    if found:
-        pair = max(found, key=lambda k: found[k])
-        state.log_z[pair] = _log_z(state, pair, spans, log_w)
-
-
-def _pairs(state: State, spans: dict[str, slice], log_w: Array) -> None:
-    """Evidence of two effects at a time, signatures added.
-
-    The error of both forms is worked out for the leading pairs only, at their best settings; others cannot matter.
-    """
-    gain = state.S.T @ state.r - state.half + log_w
-    none = state.log_z[NONE]
-    names, ends = list(spans), list(spans.values())
-    starts = np.array([s.start for s in ends])
-
-    def together(A: slice, B: slice) -> Array:
-        return np.asarray(gain[A][:, None] + gain[B][None, :] - state.S[:, A].T @ state.S[:, B])
-
-    upper: dict[Explanation, float] = {}
-    for i, a in enumerate(names[:-1]):
-        others = slice(ends[i].stop, ends[-1].stop)
-        total, at = together(ends[i], others), starts[i + 1 :] - others.start
-        top = np.max(np.maximum.reduceat(total, at, axis=1), axis=0)
-        total -= np.repeat(top, np.diff([*at, total.shape[1]]))
-        log_sum = top + np.log(np.add.reduceat(np.sum(np.exp(total, out=total), axis=0), at))
-        for b, value in zip(names[i + 1 :], log_sum, strict=True):
-            pair = Explanation.of(a, b)
-            state.log_z[pair] = none + float(value)
-            upper[pair] = max(state.log_z[Explanation.of(k)] for k in (a, b))
-            upper[pair] = max(upper[pair], state.log_z[pair])
-    for pair in sorted(upper, key=lambda k: -upper[k])[:_PAIR_LEADERS]:
-        state.log_z[pair] = _log_z(state, pair, spans, log_w)
-
-
-def _log_z(state: State, pair: Explanation, spans: Mapping[str, slice], log_w: Array) -> float:
-    """Logarithm of the evidence of two effects, with the error of both forms at their best settings."""
-    total = state.both(pair, spans, log_w)
-    out = state.log_z[NONE] + float(log_mean(total.ravel(), np.zeros(total.size)))
-    forms = [state.forms[i] for i in pair]
-    both = np.concatenate([f.B for f in forms], axis=1)
-    if not both.shape[1]:
-        return out
-    joint = Form(both, np.linalg.cholesky(np.eye(both.shape[1]) + both.T @ both))
-    k, m = np.unravel_index(int(np.argmax(total)), total.shape)
-    A, B = (spans[i] for i in pair)
-    i, j = A.start + int(k), B.start + int(m)
-    d = state.r - state.S[:, i] - state.S[:, j]
-    if pair in state.mixed:
-        extra, at, to = state.mixed[pair]
-        share = (state.S[:, i] @ state.S[:, at]) * (state.S[:, j] @ state.S[:, to])
-        d -= share / (4.0 * state.half[at] * state.half[to]) * extra
-    p = joint.project(d)
-    chosen = sum(float(np.log(form.FORM.get(f.size, 1.0))) for f in forms)
-    return out + 0.5 * float(p @ p) - joint.half_log_det + chosen
-
-
-def _solve_pairs(
-    problem: Problem, candidates: Sequence[Candidate], states: Sequence[State], spans: Mapping[str, slice],
-    log_w: Array, before: Mapping[Explanation, float],
-) -> None:  # fmt: skip
-    """Solve the leading pairs with both effects on and weigh them again."""
-    of = {c.id: c for c in candidates}
-    score = {k: max(s.log_z[k] + np.log(s.hyper.weight) for s in states) + v for k, v in before.items() if k.pair}
-    for pair in sorted(score, key=lambda k: -score[k])[:_TOGETHER]:
-        state = max(states, key=lambda s: s.log_z[pair] + np.log(s.hyper.weight))
-        settled = False
-        for _ in range(_ROUNDS):
-            best = state.best_of(pair, spans, log_w)
-            settled = best == state.mixed.get(pair, (None, None, None))[1:]
-            if settled:
-                break
-            a, b = (effect_of(k, of[k].settings[c - spans[k].start]) for k, c in zip(pair, best, strict=True))
-            extra = problem.signature((a, b)) - problem.signature((a,)) - problem.signature((b,))
-            if not np.isfinite(extra).all() or not min(state.half[list(best)]) > 0.0:
-                break
-            for s in states:
-                s.mixed[pair] = s.white.changes(extra), *best
-        if not settled:  # what was solved does not say what holds at the best setting
-            for s in states:
-                s.mixed.pop(pair, None)
-        for s in states:
-            s.log_z[pair] = _log_z(s, pair, spans, log_w)
-
-
-def _details(
-    problem: Problem, states: Sequence[State], modes: Mapping[str, Array]
-) -> dict[Explanation, float]:  # fmt: skip
-    """What each pair must explain on top of the best single effect, log odds, where that one's law has a form.
-
-    An effect that shows along a recorded variable of its own (time, gap, wall) is no detail of another one's law.
-    """
-    weight = np.log([s.hyper.weight for s in states])
-    none = float(log_mean(np.array([s.log_z[NONE] for s in states]), weight))
-    alone = {i: float(log_mean(np.array([s.log_z[Explanation.of(i)] for s in states]), weight)) - none for i in modes}
-    best = max(alone, key=lambda i: alone[i], default="")
-    if not best or not modes[best].shape[1] or alone[best] <= 0.0:
-        return {}
-    own = {i for i in alone if any(v in problem.covariates for v in effects.catalogue()[i].along)}
-    share = GEOMETRY if effects.catalogue()[best].geometric else DETAIL
-    return {k: share * alone[best] for k in states[0].log_z if k.pair and min(k, key=lambda i: alone[i]) not in own}
 
 
 def _posterior(states: Sequence[State], before: dict[Explanation, float]) -> dict[Explanation, float]:

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.diagnose import noise
-from bemt.diagnose.evidence import log_mean, unknown
+from bemt.diagnose.evidence import unknown
 from bemt.diagnose.explanation import Explanation
 from bemt.diagnose.form import FORM, form_modes
 from bemt.diagnose.signatures import effect_of
+from bemt.diagnose.state import log_mean
 
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence

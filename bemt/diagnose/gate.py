@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from bemt.diagnose import evidence as ev
 from bemt.diagnose import noise, prior
 from bemt.diagnose.explanation import UNKNOWN, Explanation
+from bemt.diagnose.state import log_mean
 
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence
@@ -49,9 +50,9 @@ def statistic(found: Evidence, residuals: Array) -> Array:
         if s.rivals:
             rival = ev.unknown(s.rivals, residuals)
             share = np.full(rival.shape, -np.log(rival.shape[0]))
-            gains.append(ev.log_mean(rival, share, axis=0) + before[UNKNOWN])
+            gains.append(log_mean(rival, share, axis=0) + before[UNKNOWN])
         stack = np.array(gains)
-        some.append(ev.log_mean(stack, np.zeros_like(stack), axis=0) + w)
+        some.append(log_mean(stack, np.zeros_like(stack), axis=0) + w)
         none.append(w)
     a, b = np.array(some), np.array(none)
-    return np.asarray(ev.log_mean(a, np.zeros_like(a), axis=0) - ev.log_mean(b, np.zeros_like(b), axis=0))
+    return np.asarray(log_mean(a, np.zeros_like(a), axis=0) - log_mean(b, np.zeros_like(b), axis=0))

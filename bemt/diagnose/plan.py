@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from bemt import effects
 from bemt.base.tables import text_table
 from bemt.diagnose import confusion as look
-from bemt.diagnose import evidence, noise, prior, problem, signatures, verdict
+from bemt.diagnose import evidence, noise, prior, problem, signatures, thresholds
 from bemt.diagnose import suggest as suggestion
 from bemt.diagnose.assemble import assemble, build
 from bemt.diagnose.record import Record
+from bemt.diagnose.state import log_mean
 
 if TYPE_CHECKING:
     from bemt.case import Case
@@ -126,7 +127,7 @@ def _plan(record: Record, case: Case, progress: Callable[[str], None] | None) ->
         settings = {c.id: c.settings[c.middle] for c in candidates}
         added = suggestion.suggest(found, (a, settings[a]), (b, settings[b]))
     weight = prior.prior_weights(whole, alike.ids)
-    bar = np.array([verdict.EXPECTED if weight[i] > 1.0 else verdict.ENOUGH for i in alike.ids])
+    bar = np.array([thresholds.EXPECTED if weight[i] > 1.0 else thresholds.ENOUGH for i in alike.ids])
     return Plan(alike, size, best, bar, absent, added, len(record), record.notes)
 
 
@@ -152,7 +153,7 @@ def _sizes(
     for k, true in enumerate(own):
         for i, c in enumerate(candidates):
             apart = true(c.signatures - shown[:, i, None])
-            least[k, i] += evidence.log_mean(-0.5 * np.sum(apart**2, axis=0), np.log(c.weight))
+            least[k, i] += log_mean(-0.5 * np.sum(apart**2, axis=0), np.log(c.weight))
     return [np.asarray(row) for row in np.sqrt(2.0 * np.maximum(least, 0.0))]
 
 

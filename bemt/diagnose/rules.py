@@ -14,7 +14,7 @@ from bemt.diagnose import blocks
 from bemt.diagnose import fit as fitting
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
 from bemt.diagnose.suggest import LEVEL
-from bemt.diagnose.verdict import (
+from bemt.diagnose.thresholds import (
     BESIDE,
     END,
     ENOUGH,
@@ -29,14 +29,8 @@ from bemt.diagnose.verdict import (
     SMALL,
     SURE,
     VAGUE,
-    Asked,
-    Decision,
-    holds_off,
-    levels_only,
-    mass,
-    twins,
-    unsettled,
 )
+from bemt.diagnose.verdict import Asked, Decision, holds_off, levels_only, mass, twins, unsettled
 
 __all__ = ["BESIDE_IT", "RULES", "Rule", "decide"]
 

@@ -1,0 +1,104 @@
+"""Readings and signatures under one setting of the covariance, whitened, and what they are worth there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.diagnose.explanation import Explanation
+from bemt.diagnose.form import Form
+
+if TYPE_CHECKING:
+    from bemt.diagnose.noise import Conditional, Hyper, Whitener
+
+__all__ = ["State", "log_mean"]
+
+Array = NDArray[np.float64]
+
+
+def log_mean(log_values: Array, log_weights: Array, axis: int = -1) -> Array:
+    """Logarithm of a weighted sum of exponentials."""
+    total = log_values + log_weights
+    top = np.max(total, axis=axis, keepdims=True)
+    top = np.where(np.isfinite(top), top, 0.0)
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.squeeze(top, axis) + np.log(np.sum(np.exp(total - top), axis=axis)))
+
+
+@dataclass(eq=False)
+class State:
+    """Readings and signatures whitened by one setting of the covariance, those of the test given the reference.
+
+    Attributes
+    ----------
+    hyper : Hyper
+        The setting.
+    white : Conditional
+        Its factors.
+    r : (M,) float
+        Whitened residual [1].
+    S : (M, G) float
+        Whitened signatures of all settings of all candidates [1].
+    half : (G,) float
+        Half of their squared lengths [1].
+    forms : dict of str to Form
+        Error of the form of each candidate, at its best setting.
+    rivals : list of (Conditional, Whitener)
+        Factors without and with each unknown smooth effect.
+    log_z : dict of Explanation to float
+        Logarithm of the evidence per explanation.
+    best_rival : str
+        Unknown smooth effect of largest evidence.
+    mixed : dict of Explanation to (float array, int, int)
+        What two effects change together beyond the sum of both, whitened, and the columns at which it was solved.
+    """
+
+    hyper: Hyper
+    white: Conditional
+    r: Array
+    S: Array
+    half: Array
+    forms: dict[str, Form] = field(default_factory=dict)
+    rivals: list[tuple[Conditional, Whitener]] = field(default_factory=list)
+    log_z: dict[Explanation, float] = field(default_factory=dict)
+    best_rival: str = ""
+    mixed: dict[Explanation, tuple[Array, int, int]] = field(default_factory=dict)
+
+    def both(self, pair: Explanation, spans: Mapping[str, slice], log_w: Array) -> Array:
+        """Log likelihood over that of "none" of all settings of two effects, priors included, forms left out, (A, B).
+
+        Signatures are added; what they change together, where it was solved, grows as the product of their sizes.
+        """
+        A, B = (spans[i] for i in pair)
+        a, b = (self.S[:, x].T @ self.r - self.half[x] + log_w[x] for x in (A, B))
+        total = a[:, None] + b[None, :] - self.S[:, A].T @ self.S[:, B]
+        if pair in self.mixed:
+            extra, i, j = self.mixed[pair]
+            share = np.outer(self.S[:, A].T @ self.S[:, i] / (2.0 * self.half[i]),
+                             self.S[:, B].T @ self.S[:, j] / (2.0 * self.half[j]))  # fmt: skip
+            met = (extra @ self.S[:, A])[:, None] + (extra @ self.S[:, B])[None, :]
+            total += share * (extra @ self.r - met) - 0.5 * share**2 * (extra @ extra)
+        return np.asarray(total)
+
+    def best_of(self, pair: Explanation, spans: Mapping[str, slice], log_w: Array) -> tuple[int, int]:
+        """Columns of the best setting of two effects."""
+        total = self.both(pair, spans, log_w)
+        i, j = np.unravel_index(int(np.argmax(total)), total.shape)
+        A, B = (spans[k] for k in pair)
+        return A.start + int(i), B.start + int(j)
+
+    def gains(self, name: str, span: slice, R: Array) -> Array:
+        """Log likelihood over that of "none" of every setting of a candidate for whitened residuals. [1]"""
+        S = self.S[:, span]
+        out = S.T @ R - self.half[span][:, None]
+        form = self.forms.get(name)
+        if form is not None and form.B.shape[1]:
+            pS, pR = form.project(S), form.project(R)
+            out += (
+                0.5 * np.sum(pS * pS, axis=0)[:, None] - pS.T @ pR + 0.5 * np.sum(pR * pR, axis=0) - form.half_log_det
+            )
+        return np.asarray(out)
