@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from bemt.base.tables import number_text, text_table
-from bemt.compare.recordings import ERROR_IN, NOT_ALONE, OTHER_STAND, REVERSED
+from bemt.compare.recordings import ERROR_IN, IN_WIND, NOT_ALONE, NOTHING_SHARED, OTHER_STAND, REVERSED
 from bemt.compare.scaling_laws import FAMILY, law
 from bemt.effects import catalogue
 
@@ -110,6 +110,8 @@ def headline(doc: Mapping[str, Any]) -> str:
     if verdict == "unknown":
         return "Something changed" + (f" ({moved})" if moved else "") + ", and no listed cause explains it."
     if verdict == "insufficient":
+        if doc["rule"].endswith((IN_WIND, NOTHING_SHARED)):
+            return f"These recordings cannot be compared: {doc['rule']}."
         likely = [r["effect"] for r in doc["ranking"] if r["probability"] >= _GUESS]
         no_guess = doc["rule"] == OTHER_STAND or doc["rule"].endswith(NOT_ALONE)
         guess = "" if no_guess else _families(likely, doc["ranking"])
@@ -193,8 +195,8 @@ def sentence(doc: Mapping[str, Any]) -> str:
     if doc["verdict"] == "unknown":
         return f"Unknown: {doc['rule']}."
     first = [r["effect"] for r in doc["ranking"] if r["effect"] not in ("none", "unknown")][:4]
-    if doc["rule"] == OTHER_STAND:  # no cause of the list is meant
-        first = []
+    if doc["rule"] == OTHER_STAND or doc["rule"].endswith((IN_WIND, NOTHING_SHARED)):
+        return f"No cause can be given: {doc['rule']}."
     lead = "Still possible" if doc["rule"].endswith(NOT_ALONE) else "Likeliest"
     return f"There is a change, but {doc['rule']}" + (f". {lead}: {', '.join(first)}" if first else "") + "."
 

@@ -56,6 +56,8 @@ _FLOORS = (0.0, 0.0007, 0.002, 0.005, 0.012)
 _WIGGLES = (0.0, 0.004, 0.01, 0.02)
 _BENDS = (0.02, 0.1, 0.3, 1.0)
 _FAR, _MARGIN, _LIKE = 3.5, 0.06, 0.1
+# Runs whose speeds of rotation are this close, natural logarithm, are runs at one speed.
+_ONE_SPEED = 0.02
 _LOCAL = 3.0
 
 
@@ -82,7 +84,10 @@ class MatchedChannel:
     def common(self) -> tuple[float, float]:
         """Range of the first coordinate that both recordings have; low above high: none."""
         a, b = self.x[~self.second, 0], self.x[self.second, 0]
-        return max(float(a.min()), float(b.min())), min(float(a.max()), float(b.max()))
+        low, high = max(float(a.min()), float(b.min())), min(float(a.max()), float(b.max()))
+        if self.name not in ("speed", "voltage") and high < low < high + _ONE_SPEED:
+            return high, low
+        return low, high
 
     def common_advance(self) -> tuple[float, float]:
         """Range of the second coordinate that both recordings have; low above high: none."""
@@ -113,7 +118,7 @@ def _like_voltage(a: StandRun, b: StandRun) -> bool:
     return bool(abs(math.log(v[1] / v[0])) < _LIKE) if all(x > 0.0 for x in v) else False
 
 
-def _advance(run: StandRun, diameter: float) -> Array:
+def advance(run: StandRun, diameter: float) -> Array:
     """V/(n D), or V/n [m] without a diameter; zero where no airspeed was recorded."""
     if "J" in run.points:
         return np.asarray(np.nan_to_num(run.points["J"]))
@@ -149,7 +154,7 @@ def _readings(run: StandRun, name: str, channel: str, diameter: float) -> dict[s
     stated = run.points.u[channel] / size
     return {
         "y": np.log(scaled[good]),
-        "x": np.column_stack([first, _advance(run, diameter) if not over_command else np.zeros(len(run))])[good],
+        "x": np.column_stack([first, advance(run, diameter) if not over_command else np.zeros(len(run))])[good],
         "floor": top / size[good],
         "u": np.nan_to_num(stated[good]),
         "sign": np.full(int(good.sum()), sign),
@@ -395,7 +400,8 @@ def ratio_of(c: MatchedChannel, s: Scatter) -> dict[str, Any]:
     ends = [np.exp(d[rows] + q * e[rows]) for q in (0.0, -1.96, 1.96)]
     out["curve"] = np.column_stack([c.x[keep], *ends]).tolist()
     slow, fast = c.common_advance()
-    out["extrapolated"] = bool(apart or slow > fast + _MARGIN * float(np.ptp(c.x[:, 1])))
+    out["apart"] = bool(slow > fast + _MARGIN * float(np.ptp(c.x[:, 1])))
+    out["extrapolated"] = apart or out["apart"]
     out["range"] = [low, high]
     out["advance_range"] = [slow, fast]
     out["scatter"] = s.share

@@ -53,10 +53,16 @@ _DOUBTFUL, _NOISE = 0.05, 0.3
 _RESTLESS = 0.10
 # Odds (ln) of any smooth change over one factor from which a load did not change by one.
 _BENT = 3.0
+# Difference of the mean advance ratios, share of the largest, from which the drive has another load.
+_OTHER_WIND = 0.1
 # Standard deviations, set-up included, from which a load has changed.
 _CHANGED = 3.0
 NOT_ALONE = "alone, which changed as well"
 """End of the reason where the likeliest cause is ruled out; what is left was unlikely beside it."""
+NOTHING_SHARED = "the two runs have no common speed and advance ratio"
+"""Reason where every ratio would be one of two extrapolations."""
+IN_WIND = "as in wind, and no airspeed is recorded"
+"""End of the reason where one recording shows a wind that it does not state."""
 OTHER_STAND = "no change on one stand moves every load by this much: check units and speeds of both files"
 
 
@@ -111,6 +117,11 @@ def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> RunChange
     behind = fits.prepared(a, b, [k for k, names in fits.DRIVE.items() if not spoken & set(names)], diameter)
     drive = behind.channels
     if not loads and not drive:
+        silent = [r for r in (a, b) if not {"rpm", "J"} & r.points.values.keys()]
+        if silent:
+            hint = "Head the column rpm; nothing can be compared but at equal speed"
+            expected = "a speed of rotation, or J"
+            raise InputError([Fault(r.points.name, "", _told(r), expected, hint) for r in silent])
         got = f"{_told(a)} in A, {_told(b)} in B"
         raise InputError(
             Fault(
@@ -134,6 +145,7 @@ def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> RunChange
         verdict = judge(*weighed, largest)
         verdict = _far_off(_far_apart(_with_density(_by_proxy(verdict, loads), a, b, loads), ratios), ratios)
         verdict = _all_loads(verdict, loads, ratios)
+        verdict = _wind(verdict, a, b)
         if verdict.verdict == "none" and any(c.turned for c in loads.values() if c.name == "thrust"):
             verdict = Judgement("sensor", ("unit_slip",), {"unit_slip": 1.0}, {}, REVERSED)
     found = RunChange(
@@ -147,7 +159,9 @@ def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> RunChange
         tuple(_assumed(a, b, diameter, loads)),
         tuple(_notes(a, b, {**loads, **drive}, {**rotor.strays, **behind.strays})),
     )
-    if drive and (verdict.verdict == "none" or found.near):
+    if drive and _unloaded(a, b, diameter):
+        found = replace(found, drive=replace(_NO_TALK, why="the advance ratios differ, and the drive follows the load"))
+    elif drive and (verdict.verdict == "none" or found.near):
         motor = judge(*weigh(drive, (behind.free, behind.steady), ("drive",)))
         found = replace(found, drive=_with_voltage(motor, ratios))
     elif drive:
@@ -155,6 +169,14 @@ def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> RunChange
             found, drive=replace(_NO_TALK, why="the load changed or may have changed, and the drive follows it")
         )
     return found
+
+
+def _unloaded(a: StandRun, b: StandRun, diameter: float) -> bool:
+    """Whether the rotor takes another load at one command because it meets another wind."""
+    if not all("rpm" in run.points for run in (a, b)):
+        return False
+    one, two = (fits.advance(run, diameter)[np.isfinite(run.points["rpm"])] for run in (a, b))
+    return bool(abs(np.median(two) - np.median(one)) > _OTHER_WIND * max(one.max(), two.max()))
 
 
 def _with_voltage(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> Judgement:
@@ -186,14 +208,22 @@ def _by_proxy(said: Judgement, loads: Mapping[str, MatchedChannel]) -> Judgement
 
 
 def _far_apart(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> Judgement:
-    """No answer where the runs share no speeds, unless a ratio of pole pairs explains just that."""
+    """No answer where the runs share no advance ratio or no speed, unless a ratio of pole pairs explains just that."""
     loads = [r for r in ratios.values() if r["kind"] in fits.LOADS]
-    wide = all(r["extrapolated"] and r["high95"] / r["low95"] > _WIDE for r in loads)
+    wide = all(r["extrapolated"] and (r["apart"] or r["high95"] / r["low95"] > _WIDE) for r in loads)
     if not loads or not wide or said.effects == ("rpm_scale",):
         return said
-    return Judgement(
-        "insufficient", (), said.probability, said.size, "the two runs have no common speed and advance ratio"
-    )
+    return Judgement("insufficient", (), said.probability, said.size, NOTHING_SHARED)
+
+
+def _wind(said: Judgement, a: StandRun, b: StandRun) -> Judgement:
+    """No answer where one of the runs windmills, the other does not, and nobody says in what wind."""
+    zero = {letter: run.zero_thrust_rpm for letter, run in (("A", a), ("B", b)) if math.isfinite(run.zero_thrust_rpm)}
+    if len(zero) != 1 or said.verdict == "none":
+        return said
+    ((letter, rpm),) = zero.items()
+    why = f"thrust of {letter} is negative below {rpm:.0f} rev/min, {IN_WIND}"
+    return Judgement("insufficient", (), said.probability, said.size, why)
 
 
 def _far_off(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> Judgement:
@@ -364,18 +394,25 @@ def next_step(change: RunChange, asked: Invocation) -> dict[str, str]:
     if said.verdict in ("named", "sensor"):
         text = rows[0].settles if rows else "read the label of the channel"
         return {"text": f"to be sure, {text}", "command": with_case}
+    if said.why.endswith(IN_WIND):
+        letter = "a" if math.isfinite(change.a.zero_thrust_rpm) else "b"
+        air = getattr(asked, f"air_{letter}")
+        there = {f"air_{letter}": ",".join([*filter(None, [air]), "AIRSPEED"])}
+        text = f"state the airspeed of {letter.upper()}, with its unit as in 18m/s"
+        return {"text": text, "command": asked.command(**there)}
+    if loads and all(r["extrapolated"] for r in loads):
+        where = "where A was measured"
+        c = next(iter(change.loads_by_name.values()))
+        if "rpm" in change.a.points:
+            low, high = (math.exp(f(c.x[~c.second, 0])) for f in (np.min, np.max))
+            where = f"at the speeds of A, {low:.0f} to {high:.0f} rev/min"
+        return {"text": f"run B again {where}, and at its airspeeds", "command": asked.command(b="B_AGAIN.csv")}
     if said.verdict in ("insufficient", "unknown") and (letter := _restless(change)):
         run = change.a if letter == "a" else change.b
         column = run.conditions[0] if run.conditions else "COLUMN"
         others = f" (the file has {', '.join(run.conditions[:4])})" if run.conditions else ""
         text = f"choose the rows of {letter.upper()} in which nothing else changes{others}"
         return {"text": text, "command": asked.with_rows(letter, column)}
-    if loads and all(r["extrapolated"] for r in loads):
-        v = change.a.points
-        where = "where A was measured"
-        if "rpm" in v:
-            where = f"at the speeds of A, {np.nanmin(v['rpm']):.0f} to {np.nanmax(v['rpm']):.0f} rev/min"
-        return {"text": f"run B again {where}, and at its airspeeds", "command": asked.command(b="B_AGAIN.csv")}
     likely = {k: p for k, p in said.probability.items() if law(k) is not None}
     density = likely.get("air_density", 0.0) * _FIRST >= max(likely.values(), default=1.0)
     small = max((abs(math.log(r["ratio"])) for r in loads), default=1.0) < _DAY

@@ -18,6 +18,7 @@ from bemt.dataset import DIMENSIONLESS, Dataset
 from bemt.readers._headings import may_be_shaft_speed, surely_shaft_speed
 from bemt.recordings.channels import MEASURED, named
 from bemt.recordings.reduce import reduce, reduction
+from bemt.recordings.windmilling import zero_thrust_speed
 
 Array = NDArray[np.float64]
 
@@ -71,6 +72,8 @@ class StandRun:
     # What lag or hysteresis shifts a load by, standard deviation as a share of its largest value, by channel [1]
     shift: Mapping[str, float] = field(default_factory=dict)
     misread: tuple[int, int] = (0, 0)  # Speeds that no rotor can have at their command or load, and all
+    # Speed below which thrust is negative as in a wind that is not recorded [rev/min]; NaN: no such wind
+    zero_thrust_rpm: float = math.nan
 
     def __len__(self) -> int:
         """Give the number of points."""
@@ -139,7 +142,10 @@ def _of_rotor(imported: Dataset, word: str, where: str) -> Dataset:
         elif not others & set(own):
             kept.setdefault(name, name)
     values = {new: imported[old] for new, old in kept.items()}
-    return replace(imported, values=values, u={}, u_by={}, units={new: imported.unit(old) for new, old in kept.items()})
+    units = {new: imported.unit(old) for new, old in kept.items()}
+    return replace(
+        imported, values=values, u={}, u_by={}, units=units, provenance={**imported.provenance, _ROTOR: word}
+    )
 
 
 def selected(imported: Dataset, conditions: Sequence[str], where: str) -> Dataset:
@@ -256,6 +262,7 @@ def stand_run(imported: Dataset, name: str, diameter_m: float | None = None) -> 
         conditions_of(imported),
         _shifts(series, bool(ramp)),
         (int(false.sum()) + len(gone), (int(np.isfinite(series["rpm"]).sum()) if "rpm" in series else 0) + len(gone)),
+        math.nan if (zero := wind_of(imported)) is None else zero,
     )
 
 
@@ -341,6 +348,17 @@ def speed_in_doubt(imported: Dataset, path: str) -> None:
         raise InputError(faults)
 
 
+def wind_of(imported: Dataset) -> float | None:
+    """Speed of no thrust of a recording in a wind that it does not state [rev/min]; None: no such wind.
+
+    One of several rotors may be in the slipstream of another.
+    """
+    told = named(imported).values
+    if _ROTOR in imported.provenance or {"airspeed_m_s", "J"} & told.keys() or not {"rpm", "thrust_N"} <= told.keys():
+        return None
+    return zero_thrust_speed(told["rpm"], told["thrust_N"])
+
+
 def _no_unit(path: str, heading: str, got: str) -> Fault:
     base = heading.split("(")[0].split("[")[0].strip()
     hint = f"Head it {base} (rev/min) or {base} (rad/s). "
@@ -359,7 +377,7 @@ def conditions_of(imported: Dataset) -> tuple[str, ...]:
     """
     texts = [k for k, v in imported.texts.items() if 1 < len(set(v)) < len(v)]
     known = {*MEASURED, *named(imported).provenance["names"].values()}
-    known |= {k for k in imported.values if k.startswith("u_") or {"err", "rpm"} & set(k.split("_"))}
+    known |= {k for k in imported.values if k.startswith("u_") or {"err", "rpm", "vibration"} & set(k.split("_"))}
     numbers = [k for k, v in imported.values.items() if k not in known and _moves(v)]
     return (*texts, *numbers)
 

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from bemt.case import Case
     from bemt.dataset import Dataset
     from bemt.diagnose.suggest import Given
+    from bemt.recordings.findings import Finding
 
 # Remarks on the files come first in an explanation; `import` shows them.
 _REMARK = "Before any physics"
@@ -32,6 +33,8 @@ _IMPOSSIBLE = 1e-4
 # "None" in the ratios less likely than this is no answer of the diagnosis either.
 _UNLIKELY = 0.15
 _CLAIMS = ("named", "sensor", "class")
+# Findings on a column that repeats itself or another one.
+_NO_MEASUREMENT = ("constant_column", "duplicate_column")
 # Rows and number of the values of a column that tells parts of one file apart.
 _ROWS, _KINDS = 3, 20
 
@@ -138,6 +141,8 @@ def compare(
     if faults:
         raise InputError(faults)
     D = case.diameter_m if case is not None and diameter_m is None else diameter_m
+    findings = [_findings(imported, D, case is not None and case.ducted) for imported in read]
+    read = [_sound(imported, found) for imported, found in zip(read, findings, strict=True)]
     runs = []
     for name, rows, imported in zip(names, conditions, read, strict=True):
         try:
@@ -148,7 +153,7 @@ def compare(
         raise InputError(faults)
     found = changed(runs[0], runs[1], math.nan if D is None else D)
     doc = document(found) | {"version": __version__, "recordings": names, "rows": {"A": rows_a, "B": rows_b}}
-    doc["notes"] = [*_errors(read, D, case is not None and case.ducted), *doc["notes"]]
+    doc["notes"] = [*_errors(findings), *doc["notes"]]
     if case is not None:
         doc |= _agreed(_diagnosed(asked, read, case, progress), doc, found)
     own = case is not None and doc["verdict"] == doc["diagnosis"]["verdict"] and doc["rule"] == doc["diagnosis"]["rule"]
@@ -157,18 +162,31 @@ def compare(
     return Contrast(found, doc)
 
 
-def _errors(read: Sequence[Dataset], diameter_m: float | None, ducted: bool) -> list[str]:
-    """What cannot be so in either recording, as ``import`` and ``diagnose`` find it."""
+def _findings(imported: Dataset, diameter_m: float | None, ducted: bool) -> tuple[Finding, ...]:
+    """What cannot be so in a recording, as ``import`` and ``diagnose`` find it."""
     from bemt.recordings.check import check
 
+    found = check(imported, diameter_m=diameter_m, ducted=ducted) if imported.kind in ("bench", "table") else ()
+    # a propeller that windmills pulls the other way; signs have a note of their own
+    return tuple(f for f in found if f.severity == "error" and f.id != "sign_flipped")
+
+
+def _sound(imported: Dataset, findings: Sequence[Finding]) -> Dataset:
+    """The recording without columns that are no measurement."""
+    gone = {f.channel for f in findings if f.id in _NO_MEASUREMENT}
+    if not gone:
+        return imported
+    values = {k: v for k, v in imported.values.items() if k not in gone}
+    return replace(imported, values=values, u={k: v for k, v in imported.u.items() if k in values}, u_by={})
+
+
+def _errors(findings: Sequence[Sequence[Finding]]) -> list[str]:
+    """Notes on what cannot be so in A and B."""
     out = []
-    for letter, imported in zip("AB", read, strict=True):
-        if imported.kind in ("bench", "table"):
-            for f in check(imported, diameter_m=diameter_m, ducted=ducted):
-                told = f.evidence if f.evidence.startswith(f.channel) else f"{f.channel}: {f.evidence}"
-                # a propeller that windmills pulls the other way; signs have a note of their own
-                wrong = f.severity == "error" and f.id != "sign_flipped"
-                out += [f"{ERROR_IN}{letter}: {f.id}: {told}"] if wrong else []
+    for letter, found in zip("AB", findings, strict=True):
+        for f in found:
+            told = f.evidence if f.evidence.startswith(f.channel) else f"{f.channel}: {f.evidence}"
+            out.append(f"{ERROR_IN}{letter}: {f.id}: {told}" + ("; left out" if f.id in _NO_MEASUREMENT else ""))
     return out
 
 

@@ -17,7 +17,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
 from bemt.case import find_cases, load_case
 from bemt.case.prepare import prepare_case
-from bemt.compare.stand_run import one_rotor, speed_in_doubt
+from bemt.compare.stand_run import one_rotor, speed_in_doubt, wind_of
 from bemt.dataset import Dataset
 from bemt.diagnose import cfd_points
 from bemt.diagnose import record as records
@@ -39,6 +39,8 @@ _SAME, _SLOW = 0.05, 0.02
 _NAMED = 8
 # Rows up to which a log is kept whole for its transients, and share of them in steady points from which it is not.
 _SHORT, _STEADY = 200, 0.75
+# Largest over smallest thrust that a wall, a gap or the air may make at one speed in still air.
+_ONE_SPEED = 2.0
 
 
 def cases_of(paths: Sequence[str], off: Sequence[str], n: int) -> list[Case]:
@@ -73,6 +75,8 @@ def load(
         return replace(made, notes=(*made.notes, *imported.notes))
     imported = _filled(imported, rpm, airspeed_m_s)
     speed_in_doubt(imported, path)
+    _speed_missing(imported, path)
+    _airspeed_in_doubt(imported, path)
     _same_rotor(imported, case, path)
     ducted = case.ducted
     findings = check(imported, diameter_m=case.diameter_m, blades=int(case.get("rotor.blades")), ducted=ducted)
@@ -95,6 +99,29 @@ def load(
     turned = ("torque_Nm: negative under load (sense of rotation): sign reversed here",) if hand else ()
     notes = (*made.notes, *turned, *imported.notes, *rows.notes, *_unused(imported, rows, case))
     return replace(made, findings=found, notes=notes)
+
+
+def _speed_missing(imported: Dataset, path: str) -> None:
+    """Refuse loads without a speed that cannot be those of one speed."""
+    told = named(imported).values
+    thrust = np.abs(told.get("thrust_N", np.zeros(0)))
+    thrust = thrust[np.isfinite(thrust)]
+    if {"rpm", "J", "airspeed_m_s"} & told.keys() or not thrust.size:
+        return
+    low, high = float(thrust.min()), float(thrust.max())
+    if high > _ONE_SPEED * low:
+        got = f"no speed of rotation, and thrust from {low:.3g} to {high:.3g} N"
+        hint = "Head the column rpm; `--rpm N` states one speed for all rows"
+        raise InputError(Fault(path, "rpm", got, "the speed of every row", hint))
+
+
+def _airspeed_in_doubt(imported: Dataset, path: str) -> None:
+    """Refuse thrust that passes zero as in a wind that nobody stated: everything would be blamed on the rotor."""
+    zero = wind_of(imported)
+    if zero is not None:
+        got = f"thrust that is negative below {zero:.0f} rev/min, as in wind, and no airspeed"
+        hint = "State it: --airspeed V; in still air the zero of the load cell is off: --airspeed 0"
+        raise InputError(Fault(path, "airspeed_m_s", got, "the airspeed", hint))
 
 
 def _filled(imported: Dataset, rpm: float | None, airspeed_m_s: float | None) -> Dataset:

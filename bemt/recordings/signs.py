@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from bemt import coefficients as co
 from bemt.recordings.channels import shaft_power
 from bemt.recordings.findings import MANY, Facts, Finding, check_for
+from bemt.recordings.windmilling import zero_thrust_speed
 
 Array = NDArray[np.float64]
 
@@ -60,11 +61,19 @@ def flipped(facts: Facts) -> Iterator[Finding]:
             more = "; or the rotor turns the other way" if name == "torque_Nm" else ""
             yield Finding("sign_flipped", facts.named(name), text, fix + more, (), habit)
             continue
+        if name in ("thrust_N", "torque_Nm", "power_W") and _wind(facts) is not None:
+            continue
         odd = _mirrored(facts, name, v, loaded, -1.0 if share > 0.5 else 1.0)
         if np.any(odd):
             rows = np.flatnonzero(odd)
             text = f"the sign changes in {len(rows)} rows ({_where(facts, rows)}) whose magnitude fits the others"
             yield Finding("sign_flipped", facts.named(name), text, "multiply those rows by -1", _rows(odd), "error")
+
+
+def _wind(facts: Facts) -> float | None:
+    """Speed of no thrust, as in a wind that is not recorded [rev/min]; None: no such wind."""
+    rpm, thrust = facts.get("rpm"), facts.get("thrust_N")
+    return None if rpm is None or thrust is None else zero_thrust_speed(rpm, thrust)
 
 
 def _mirrored(facts: Facts, name: str, v: Array, loaded: NDArray[np.bool_], sign: float) -> NDArray[np.bool_]:
@@ -91,7 +100,12 @@ def negative_thrust(facts: Facts) -> Iterator[Finding]:
     top = float(np.nanpercentile(v, 95))
     if top <= 0.0 or np.mean(np.nan_to_num(v) < 0.0) > 0.5:
         return
-    rpm = facts.get("rpm")
+    rpm, zero = facts.get("rpm"), _wind(facts)
+    if zero is not None:
+        text = f"thrust grows with the speed and changes its sign at {zero:.0f} rev/min: a propeller in wind does that"
+        fix = "state the airspeed: --airspeed V in diagnose, --air-a V or --air-b V in compare"
+        yield Finding("negative_thrust", facts.named("thrust_N"), text, fix, (), "warning")
+        return
     turning = np.ones(len(v), dtype=bool) if rpm is None else np.nan_to_num(rpm) > 0.3 * np.nanpercentile(rpm, 95)
     odd = (v < -0.03 * top) & turning & facts.still
     if _enough(odd, turning):
