@@ -25,7 +25,19 @@ if TYPE_CHECKING:
     from bemt.diagnose.problem import Problem
     from bemt.diagnose.verdict import Decision
 
-__all__ = ["FACTOR", "RESTLESS", "Suspect", "finding", "judged", "levels", "of_recorded", "suspects", "to_mend"]
+__all__ = [
+    "FACTOR",
+    "RESTLESS",
+    "Suspect",
+    "contradiction",
+    "finding",
+    "foreign",
+    "judged",
+    "levels",
+    "of_recorded",
+    "suspects",
+    "to_mend",
+]
 
 FACTOR = 3.0
 """Thrust or torque over that of the case, or under it, from which on the question comes first [1]."""
@@ -71,6 +83,11 @@ class _Blades(Effect):
 def levels(problem: Problem) -> dict[str, float]:
     """Median of each load of the test over that of the case [1]."""
     return {channel: 1.0 + level for channel, level in problem.level.items()}
+
+
+def foreign(problem: Problem) -> bool:
+    """Whether the loads are too far off to be those of the case's rotor."""
+    return _suspicious(levels(problem))
 
 
 def _suspicious(found: dict[str, float]) -> bool:
@@ -141,12 +158,20 @@ def to_mend(problem: Problem, decision: Decision) -> str:
     if _suspicious(levels(problem)):
         slips = "; ".join(f"{k}. {s.words}" for k, s in enumerate(suspects(problem)[:_SHOWN], 1))
         return f"check that the case describes this rotor; other explanations for the loads: {slips}"
+    file, _, correction = contradiction(problem, decision)
+    return f"correct {file} before any run: {correction}" if file else ""
+
+
+def contradiction(problem: Problem, decision: Decision) -> tuple[str, str, str]:
+    """File that cannot be so, what in it and the correction, where that comes before any cause; empty elsewhere."""
     wrong = _impossible(problem)
     alone = all(not part.record.reference for part in problem.parts)
-    if not wrong or not (alone or decision.why == _CONTRADICTED):
-        return ""
-    file, _, what = wrong[0].partition(_ERROR)
-    return f"correct {file} before any run: {what.partition('Correction: ')[2] or what}"
+    if decision.verdict != "insufficient" or not wrong or not (alone or decision.why == _CONTRADICTED):
+        return "", "", ""
+    file, _, said = wrong[0].partition(_ERROR)
+    what, _, correction = said.partition(". Correction: ")
+    _, _, channel = what.partition(" (")
+    return file, channel.replace("): ", ": ", 1) or what, correction or said
 
 
 def finding(problem: Problem) -> str:

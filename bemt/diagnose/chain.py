@@ -112,11 +112,10 @@ class Diagnosis:
 
     @property
     def off(self) -> dict[str, float]:
-        """Mean mismatch of each channel, share of the largest value at that speed [1]."""
+        """Median of each channel over what the case gives, less 1 [1]."""
         p = self.problem
-        share = p.residual / p.largest
-        rows = {name: (p.channel == c) & p.free for c, name in enumerate(CHANNELS)}
-        return {name: float(np.mean(share[here])) for name, here in rows.items() if here.any()}
+        rows = {name: (p.channel == c) & p.free & (p.f0 != 0.0) for c, name in enumerate(CHANNELS)}
+        return {name: float(np.median(p.y[here] / p.f0[here])) - 1.0 for name, here in rows.items() if here.any()}
 
     @property
     def marked(self) -> location.Location | None:

@@ -11,6 +11,7 @@ import numpy as np
 from bemt import __version__, effects
 from bemt.base.tables import text_table
 from bemt.compare.scaling_laws import law
+from bemt.diagnose import another_rotor
 from bemt.diagnose import fit as fitting
 from bemt.diagnose.confusion import nearest
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
@@ -45,6 +46,8 @@ _FINDINGS = 3
 _ANOTHER_ROTOR = 0.25
 # Level that is said even where no cause shows.
 _WORTH_SAYING = 0.05
+# Ratios between these are said in percent.
+_PERCENT = (0.5, 2.0)
 
 
 def _number(x: float) -> float | None:
@@ -202,7 +205,9 @@ def explanation(d: Diagnosis) -> list[str]:
     lines = [headline(d), *(f"Before any physics: {note}." for note in d.problem.notes if NO_SPEED in note)]
     lines += [f"Before any physics: {f}" for f in d.problem.findings[:_FINDINGS]]
     level = d.problem.level
-    off = " and ".join(f"{_CHANNEL[c].lower()} by {v:+.0%}" for c, v in level.items())
+    off = " and ".join(
+        f"{_CHANNEL[c].lower()} by {_share(v) if abs(v) > 1.0 else f'{v:+.0%}'}" for c, v in level.items()
+    )
     if not d.problem.findings and level and min(abs(v) for v in level.values()) > _ANOTHER_ROTOR:
         lines.append(f"Before any physics: the case is off ({off}). Do diameter, pitch and blades match this rotor?")
     if len(d.problem.findings) > _FINDINGS:
@@ -284,6 +289,13 @@ def headline(d: Diagnosis) -> str:
     said, catalogue = d.decision, effects.catalogue()
     titles = [catalogue[i].title for i in said.effects]
     off = " and ".join(f"{_CHANNEL[c].lower()} {_share(v)}" for c, v in d.off.items())
+    if said.verdict == "insufficient" and another_rotor.foreign(d.problem):
+        return f"These are not the loads of this case ({off}): check diameter, blades, units and speed first."
+    file, wrong, _ = another_rotor.contradiction(d.problem, said)
+    if file:
+        return f"{file} cannot be right: {wrong}. Mend that before any cause is looked for."
+    if said.verdict == "none" and not d.problem.free.all():
+        return f"No cause: the recording differs from the reference by no more than runs do; from the model, {off}."
     if said.verdict == "none" and max((abs(v) for v in d.problem.level.values()), default=0.0) > LEVEL:
         return f"Recording and model differ ({off}), within the uncertainty of calibration, blade and solver; no cause."
     if said.verdict == "none":
@@ -310,7 +322,12 @@ def _one_of(ids: Sequence[str]) -> str:
 
 
 def _share(v: float) -> str:
-    return f"{v:+.1%}".replace("%", " %")
+    """Change of a load, less 1: in percent, as a factor where it is large.
+
+    >>> _share(0.123), _share(1.5), _share(-0.9), _share(-2.4)
+    ('+12.3 %', 'x2.5', 'x0.1', 'x-1.4')
+    """
+    return f"{v:+.1%}".replace("%", " %") if _PERCENT[0] < 1.0 + v < _PERCENT[1] else f"x{1.0 + v:.3g}"
 
 
 def text(d: Diagnosis) -> str:

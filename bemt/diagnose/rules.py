@@ -143,6 +143,11 @@ def _by_chance(a: Asked) -> str:
     return f"a mismatch as large occurs by chance in {a.p_value:.0%} of simulated recordings without a cause"
 
 
+def _too_little(a: Asked) -> str:
+    needed = f"{a.needed:g} needed" + (", as no reference shows this rotor" if a.real else "")
+    return f"the best explanation is not much better than none (ln odds {a.odds:.1f}; {needed})"
+
+
 def _left(a: Asked) -> Decision:
     return a.says("unknown", "a smooth residual is left after the best listed effect",
                   probability=max(a.P[UNKNOWN], 1.0 - a.P[a.first]), leading=a.first)  # fmt: skip
@@ -214,7 +219,7 @@ RULES: tuple[Rule, ...] = (
     Rule(
         "not much better than nothing",
         lambda a: a.odds < a.needed,
-        lambda a: a.says("insufficient", "the best explanation is not much better than none"),
+        lambda a: a.says("insufficient", _too_little(a)),
         "ENOUGH, LEAST, EXPECTED, PROVEN",
         "declared: 8 nats are 4 sigma; 5 where no error of the solver looks like it (in a proof these were all at "
         "work); of a real rotor that no reference shows, 8 to 16 named what was not there",
