@@ -541,3 +541,76 @@ def test_thrust_of_the_other_sign_and_the_same_size_is_a_fault_of_the_stand(tmp_
     assert (found["verdict"], found["effects"]) == ("sensor", ["unit_slip"])
     turned = compare(*pair(tmp_path, scaled(torque_Nm=-1.0))).document
     assert turned["verdict"] == "none"  # either hand of rotation is usual
+
+
+def _tunnel(n: float, J: Array, seed: int) -> dict[str, Array]:
+    """Coefficients of one run at one speed of rotation, as tunnels publish them."""
+    e = np.random.default_rng(seed).standard_normal((2, J.size))
+    CT, CP = 0.11 * (1.0 - 0.9 * J - 0.4 * J**2), 0.05 * (1.0 - 0.1 * J - 0.7 * J**2)
+    return {"rpm": np.full(J.size, n), "J": J, "CT": CT * (1.0 + 0.003 * e[0]), "CP": CP * (1.0 + 0.003 * e[1])}
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_run_that_continues_another_one_is_no_change(tmp_path: Path, seed: int) -> None:
+    """Low advance ratios at 5,003 rev/min, high ones at 5,006: one speed, and what they share agrees."""
+    a = written(tmp_path / "a.csv", _tunnel(5003.0, np.linspace(0.1, 0.55, 14), seed))
+    b = written(tmp_path / "b.csv", _tunnel(5006.0, np.linspace(0.45, 0.8, 12), seed + 50))
+    answer = compare(a, b)
+    assert answer.verdict == "none" and not answer.document["ratios"]["CT"]["extrapolated"]
+
+
+def test_runs_of_uiuc_that_continue_each_other_are_no_change(shared_data: Path) -> None:
+    folder = shared_data / "uiuc" / "volume-1"
+    pairs = (
+        ("apcsf_10x7_kt0831_5003", "apcsf_10x7_kt0832_5006"),
+        ("ance_8.5x6_2851cm_5986", "ance_8.5x6_2852cm_6009"),
+        ("ance_8.5x6_2853cm_6928", "ance_8.5x6_2854cm_6914"),
+        ("apce_10x5_kt0823_6005", "apce_10x5_kt0824_6018"),
+    )
+    for a, b in pairs:
+        assert compare(folder / f"{a}.txt", folder / f"{b}.txt").verdict == "none", a
+
+
+def test_runs_without_a_common_advance_ratio_name_nothing(tmp_path: Path) -> None:
+    a = written(tmp_path / "a.csv", _tunnel(5003.0, np.linspace(0.05, 0.3, 12), 1))
+    b = written(tmp_path / "b.csv", _tunnel(5003.0, np.linspace(0.5, 0.8, 12), 2))
+    answer = compare(a, b)
+    assert answer.verdict == "insufficient" and "%" not in text(answer.document).splitlines()[0]
+    assert "B again" in answer.document["next_measurement"]["text"]
+
+
+def _blown(table: dict[str, Array]) -> None:
+    """The same propeller in a wind that the file does not state."""
+    n, V = table["rpm"] / 60.0, 14.0
+    J = V / (n * D)
+    for name, own in (("thrust_N", 1.0 - 0.9 * J - 0.4 * J**2), ("torque_Nm", 1.0 - 0.1 * J - 0.7 * J**2)):
+        table[name] = table[name] * own
+
+
+def test_a_wind_that_is_not_stated_is_neither_the_blade_nor_the_drive(tmp_path: Path) -> None:
+    a, b = stand(3), stand(4, _blown)
+    for table in (a, b):
+        del table["airspeed_m_s"]
+        table["throttle"] = np.linspace(0.3, 0.9, 17)
+    b["rpm"] = b["rpm"] * 1.06  # the motor unloads
+    answer = compare(written(tmp_path / "a.csv", a), written(tmp_path / "b.csv", b))
+    assert answer.verdict == "insufficient" and "as in wind" in answer.document["rule"]
+    assert "--air-b" in answer.document["next_measurement"]["command"]
+    told = compare(tmp_path / "a.csv", tmp_path / "b.csv", air_b="14m/s")
+    assert told.verdict == "insufficient" and not told.document["subsystems"]["drive"]["effects"]
+
+
+def test_a_column_that_is_stuck_is_no_change(tmp_path: Path) -> None:
+    a, b = stand(5), stand(6)
+    b["torque_Nm"] = np.full(17, b["torque_Nm"][3])
+    answer = compare(written(tmp_path / "a.csv", a), written(tmp_path / "b.csv", b))
+    assert answer.verdict == "none" and set(answer.document["ratios"]) == {"thrust_N"}
+    assert any("constant_column" in note and "left out" in note for note in answer.document["notes"])
+
+
+def test_a_recording_without_a_speed_is_said_to_have_none(tmp_path: Path) -> None:
+    a, b = stand(7), stand(8)
+    del b["rpm"]
+    with pytest.raises(InputError) as caught:
+        compare(written(tmp_path / "a.csv", a), written(tmp_path / "b.csv", b))
+    assert [(Path(f.file).name, f.expected) for f in caught.value.faults] == [("b.csv", "a speed of rotation, or J")]

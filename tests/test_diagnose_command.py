@@ -314,6 +314,65 @@ def test_a_level_that_no_cause_explains_is_said(tmp_path: Path, diameter_in: int
     assert words in " ".join(document.explanation(answer))
 
 
+@pytest.mark.parametrize("far", [1.0, 0.5])
+def test_the_first_line_says_how_far_the_case_is_off(far: float) -> None:
+    """As a median, or how far where only some readings are off."""
+    series = recording(case(), points("grid"))
+    share = 1.3 if far == 1.0 else np.where(series["rpm"] > 17000.0, 1.3, 1.0)
+    values = {**series.values, "thrust_N": series["thrust_N"] * share}
+    made = record.from_series(Dataset("bench", "log", values, dict(series.u)), case())
+    line = document.headline(replace(chain.diagnose([made], [case()], nulls=20, only=["hub_loss"])))
+    told = re.search(r"thrust (up to )?\+(\d+\.\d) %", line)
+    assert told is not None and (told[1] is None) == (far == 1.0) and float(told[2]) == pytest.approx(30.0, abs=3.0), (
+        line
+    )
+
+
+def test_a_reference_that_the_run_agrees_with_is_the_first_word() -> None:
+    """The model may be far off both: what counts is that nothing changed between them."""
+    series = recording(case(), points("grid"))
+    values = {**series.values, "torque_Nm": 1.3 * series["torque_Nm"]}
+    made = record.from_series(Dataset("bench", "log", values, dict(series.u)), case())
+    answer = chain.diagnose([made, replace(made, reference=True)], [case()], nulls=20)
+    assert document.headline(answer).startswith("No cause: the recording differs from the reference by no more than")
+
+
+def test_a_file_that_cannot_be_right_is_the_first_word(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = _table(tmp_path / "log.csv", LOADS | {"torque_Nm": 0.08})
+    assert main(["diagnose", file, "--case", str(CASES / "prop_8x5")]) == 0
+    first = capsys.readouterr().out.splitlines()[0]
+    assert "cannot be right: torque_Nm" in first and "guess" not in first
+
+
+def test_faults_of_all_files_and_the_case_are_said_at_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bare = tmp_path / "bare.csv"
+    bare.write_text("Drehzahl,Schub,Moment\n" + "".join(f"{n},{n / 3000},0.03\n" for n in range(4000, 9000, 500)))
+    slow = _table(tmp_path / "slow.csv", {k: v for k, v in LOADS.items() if k != "rpm"})
+    windy = _table(tmp_path / "windy.csv", LOADS | {"thrust_N": 6.8e-8 * RPM * (RPM - 9000.0)})
+    assert main(["diagnose", str(bare), slow, windy, "--case", str(CASES / "prop_8x5"), "--quiet"]) == 2
+    said = capsys.readouterr().err
+    told = (
+        "column Drehzahl: got a speed",
+        "column Schub: got a thrust",
+        "column Moment: got a torque",
+        "slow.csv: rpm: got no speed of rotation",
+        "windy.csv: airspeed_m_s: got thrust that is negative",
+    )
+    for words in told:
+        assert words in said, said
+    gone = [
+        "diagnose",
+        str(tmp_path / "gone.csv"),
+        "--case",
+        str(tmp_path / "no"),
+        "--reference",
+        str(tmp_path / "nor"),
+    ]
+    assert main(gone) == 2
+    said = capsys.readouterr().err
+    assert all(f"{tmp_path / name}: got no such file" in said for name in ("gone.csv", "no", "nor")), said
+
+
 @pytest.mark.parametrize("channel", ["thrust_N", "torque_Nm"])
 def test_without_an_explanation_the_first_sentence_is_what_the_recording_shows(channel: str) -> None:
     """A load 15 % up above 13000 rpm, which nothing explains: what calibration leaves of it is low at low speed."""

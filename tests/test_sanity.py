@@ -226,6 +226,20 @@ def test_negative_thrust() -> None:
     assert not said(check(recording(flying), diameter_m=10 * INCH), "negative_thrust")
 
 
+@pytest.mark.parametrize("share", [0.0, 0.12])
+def test_thrust_that_is_negative_at_low_speed_is_wind_and_no_sign(share: float) -> None:
+    """A windmill, some speeds misread; rows of any speed with the other sign stay what they are."""
+    values = stand(rows=60, seed=2)
+    n = values["rpm"] / 60.0
+    values["thrust_N"] = values["thrust_N"] * (1.0 - 70.0 / n)
+    values["rpm"] = np.where(np.random.default_rng(3).random(60) < share, 14000.0, values["rpm"])
+    found = check(recording(values))
+    assert not said(found, "sign_flipped") and "in wind" in said(found, "negative_thrust")[0].evidence
+    turned = stand(rows=60, seed=2)
+    turned["thrust_N"] = np.where(np.arange(60) % 3 == 0, -1.0, 1.0) * turned["thrust_N"]
+    assert said(check(recording(turned)), "sign_flipped")
+
+
 def test_a_few_misread_rows_of_a_log_are_no_contradiction() -> None:
     n = 200
     rpm = np.linspace(4000.0, 8000.0, n)

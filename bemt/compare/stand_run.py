@@ -23,6 +23,7 @@ from bemt.recordings.windmilling import zero_thrust_speed
 Array = NDArray[np.float64]
 
 _LOADS = ("thrust_N", "torque_Nm", "power_W", "CT", "CP", "CQ")
+_UNITS_OF = {"thrust": ("N", "gf"), "torque": ("N m", "N mm"), "power": ("W",)}
 _WANTED = (
     *_LOADS,
     "rpm",
@@ -323,7 +324,8 @@ def one_rotor(imported: Dataset, name: str, how: str = "Choose it with --rows-a 
 
 def speed_in_doubt(imported: Dataset, path: str) -> None:
     """Refuse a file whose speed cannot be read: it must not be left out, nor replaced by that of a case."""
-    if "rpm" in named(imported).values:
+    told = named(imported).values
+    if "rpm" in told:
         return
     headings, faults = imported.provenance.get("headings", {}), []
     for name, v in imported.values.items():
@@ -341,6 +343,13 @@ def speed_in_doubt(imported: Dataset, path: str) -> None:
         heading = headings.get(name) or name
         if may_be_shaft_speed(heading) and sum(cell.strip()[:1].isdigit() for cell in cells) > len(cells) / 2:
             faults.append(_no_unit(path, heading, f"a speed as text, such as {cells[0].strip()[:20]!r}"))
+    if faults and not set(_LOADS) & told.keys():  # said with the speed, not after it
+        for name, units in _UNITS_OF.items():
+            if name in imported.values and not imported.unit(name):
+                heading = headings.get(name) or name
+                hint = "Head it " + " or ".join(f"{heading} ({unit})" for unit in units)
+                got, expected = f"a {name} without a unit", "a unit in the heading, or in a recording.toml"
+                faults.append(Fault(path, f"column {heading}", got, expected, hint))
     beside = Path(path).with_name("recording.toml")
     if faults and any("names this file" in note for note in imported.notes):
         faults = [replace(f, hint=f"{beside.as_posix()} names this file: give that instead") for f in faults]

@@ -111,13 +111,6 @@ class Diagnosis:
         return self.found.problem
 
     @property
-    def off(self) -> dict[str, float]:
-        """Median of each channel over what the case gives, less 1 [1]."""
-        p = self.problem
-        rows = {name: (p.channel == c) & p.free & (p.f0 != 0.0) for c, name in enumerate(CHANNELS)}
-        return {name: float(np.median(p.y[here] / p.f0[here])) - 1.0 for name, here in rows.items() if here.any()}
-
-    @property
     def marked(self) -> location.Location | None:
         """Location of the mismatch; None without one."""
         return None if self.decision.verdict == "none" else self.where

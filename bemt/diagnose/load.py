@@ -5,8 +5,9 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -224,7 +225,9 @@ def load_all(
 ) -> tuple[list[Case], list[Record]]:  # fmt: skip
     """Cases and recordings, the references last; ``before`` may refuse the cases before any recording is read."""
     _told_twice([*recordings, *references], only)
-    found = cases_of(cases, off, len(recordings))
+    found = _together(
+        lambda: cases_of(cases, off, len(recordings)), *(partial(_there, p) for p in (*recordings, *references))
+    )[0]
     if before:
         before(found)
     for case in found:
@@ -233,11 +236,31 @@ def load_all(
     counts = (len(recordings), len(recordings) + len(references))
     speeds, winds = _each("--rpm", rpm, *counts), _each("--airspeed", airspeed_m_s, *counts)
     files = list(zip([*recordings, *references], [*chosen, *found[:1] * len(references)], speeds, winds, strict=True))
-    loaded = [load(p, c, None, n, v) for p, c, n, v in files[: len(recordings)]]
     if references and len(found) > 1:
         raise InputError(Fault("--reference", "", f"{len(found)} cases", "one case for all when there are references"))
-    known = (load(p, c, None, n, v) for p, c, n, v in files[len(recordings) :])
-    return found, [*loaded, *(replace(r, reference=True) for r in known)]
+    read = _together(*(partial(load, p, c, None, n, v) for p, c, n, v in files))
+    known = [replace(r, reference=True) for r in read[len(recordings) :]]
+    return found, [*read[: len(recordings)], *known]
+
+
+def _together(*steps: Callable[[], Any]) -> list[Any]:
+    """Results of some steps; the faults of all of them at once."""
+    out: list[Any] = []
+    faults: list[Fault] = []
+    for step in steps:
+        try:
+            out.append(step())
+        except InputError as error:
+            faults += error.faults
+    if faults:
+        raise InputError(faults)
+    return out
+
+
+def _there(path: str) -> None:
+    """Refuse a recording that does not exist."""
+    if not Path(path).exists():
+        raise InputError(Fault(path, "", "no such file or folder", "a recording", "Check the path"))
 
 
 def _each(option: str, given: Sequence[float], recordings: int, n: int) -> list[float | None]:
