@@ -305,6 +305,16 @@ def test_constant_columns_and_dead_sensors(channel: str) -> None:
     assert finding.channel == channel and finding.severity == "note"
 
 
+@pytest.mark.parametrize("factor", [1000.0, 1.0 / 9.80665])
+def test_a_unit_that_changes_within_a_column(factor: float) -> None:
+    values = stand()
+    values["torque_Nm"] = np.where(np.arange(15) < 7, 1.0, factor) * values["torque_Nm"]
+    (finding,) = said(check(recording(values)), "units_within")
+    assert finding.rows == tuple(range(7, 15)) and "line 9" in finding.evidence
+    values["torque_Nm"] = 0.02 + stand()["torque_Nm"]  # a zero is no unit
+    assert not said(check(recording(values)), "units_within")
+
+
 def test_a_line_of_constant_speed_is_no_stuck_sensor() -> None:
     J = np.linspace(0.1, 0.7, 13)
     line = Dataset("bench", "line", {"rpm": np.full(13, 5000.0), "J": J, "CT": 0.1 - 0.1 * J, "CP": 0.05 - 0.02 * J})

@@ -21,6 +21,8 @@ STUCK = ("thrust_N", "duct_thrust_N", "torque_Nm", "current_A", "power_W", "elec
 """Channels that cannot stay the same while others change."""
 SLOWEST_S = 10.0
 """Time in which any rotor has followed a step of its command by two thirds, slow controllers included. [s]"""
+# Rows of either unit, least factor between two units, and most that a load over the square of the speed varies in one.
+_FEW, _JUMP, _STEADY = 3, 9.0, 3.0
 HELD, STEPS = 6, 2
 """Rows for which a command is held after a step; steps that are looked at, at least. [1]"""
 
@@ -95,6 +97,32 @@ def constant(facts: Facts) -> Iterator[Finding]:
             fix = "the sensor is stuck, or the column was filled in: leave it out or record it again"
             severity = "note" if name == "voltage_V" else "error"  # a set value of a supply
             yield Finding("constant_column", own, text, fix, (), severity)
+
+
+@check_for("units_within")
+def units_within(facts: Facts) -> Iterator[Finding]:
+    """A load over the square of the speed that jumps by a power of ten, or more, from one row on: two units."""
+    rpm = facts.get("rpm")
+    if rpm is None or facts.bare:
+        return
+    for name in ("thrust_N", "torque_Nm"):
+        v = facts.get(name)
+        if v is None:
+            continue
+        with np.errstate(all="ignore"):
+            level = np.log(np.abs(v) / rpm**2)
+        rows = np.flatnonzero(np.isfinite(level))
+        if rows.size < 2 * _FEW or not facts.still[rows].all():
+            continue
+        y = level[rows]
+        k = _FEW + int(np.argmax(np.abs(np.diff(y))[_FEW - 1 : 1 - _FEW]))
+        parts = y[:k], y[k:]
+        jump = float(np.median(parts[1]) - np.median(parts[0]))
+        if abs(jump) > np.log(_JUMP) and all(np.ptp(part) < np.log(_STEADY) for part in parts):
+            line = facts.lines[int(rows[k])]
+            text = f"over the square of the speed {np.exp(jump):.3g} times what it was, from line {line} on"
+            fix = "the unit changes within the column: write both parts in one unit"
+            yield Finding("units_within", facts.named(name), text, fix, tuple(int(r) for r in rows[k:]), "error")
 
 
 @check_for("time")

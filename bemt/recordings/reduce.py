@@ -74,7 +74,12 @@ def reduce(
     constants = {k: v for record in reversed(records) for k, v in record.provenance.get("constants", {}).items()}
     if not set(LOADS) & rec.values.keys():
         got = "no thrust, torque, power, current or coefficient with a unit"
-        raise InputError(Fault(name, "", got, "one of them", "Name units in the headings or in a recording.toml"))
+        hint = "Name units in the headings or in a recording.toml"
+        if records[0].kind == "flight":
+            hint = (
+                "Nothing on board weighs the thrust: give a table with thrust_N, mass times acceleration per propeller"
+            )
+        raise InputError(Fault(name, "", got, "one of them", hint))
     samples, reason = (
         is_samples(rec) if steady is None else (not steady, f"rows are taken as {'points' if steady else 'samples'}")
     )
