@@ -6,6 +6,7 @@ import warnings
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -180,3 +181,30 @@ def test_every_recording_has_a_line_among_those_shown() -> None:
     assert figures._chosen([0, 1, 1, 1, 1, 1], [2, 4, 4, 4, 4, 4]) == [0, 1, 3, 5]
     assert figures._chosen([0] * 6, [4] * 6) == [0, 2, 3, 5]
     assert figures._chosen([0, 1], [1, 1]) == [0, 1]
+
+
+def test_a_reference_has_no_held_out_curve(named: chain.Diagnosis, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its readings are never left out: what is predicted for them is the case before calibration."""
+    slow = named.problem.covariates["rpm"][named.problem.point] < 10000.0
+    monkeypatch.setattr(type(named.problem), "free", property(lambda self: ~slow))
+    axes = figures._before_after(named).axes
+    assert {axis.get_title() for axis in axes} >= {"8000 rev/min", "15000 rev/min", "22000 rev/min"}
+    held = {a.get_title(): next(line for line in a.lines if "held out" in str(line.get_label())) for a in axes[:3]}
+    assert [np.size(held[f"{n} rev/min"].get_xdata()) for n in (8000, 15000, 22000)] == [0, 4, 4]
+
+
+class OneRecord(list[float]):
+    """Points of one recording."""
+
+    name, extra = "all", ()
+
+
+def test_a_static_sweep_beside_runs_in_wind_is_one_line_over_the_speed() -> None:
+    J = np.r_[np.linspace(0.1, 0.9, 9), np.zeros(7)]
+    rpm = np.r_[np.full(9, 5003.0), np.linspace(2000.0, 7000.0, 7)]
+    parts = [SimpleNamespace(record=OneRecord(rpm))]
+    answer = SimpleNamespace(problem=SimpleNamespace(parts=parts, covariates={"J": J, "rpm": rpm}))
+    found = figures._groups(cast("chain.Diagnosis", answer), "J")
+    assert [(line.words, line.over, int(line.points.sum())) for line in found] == [
+        ("5003 rev/min", "J", 9), ("J = 0.00", "rpm", 7),
+    ]  # fmt: skip
