@@ -10,13 +10,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from bemt.base.errors import InputError
 from bemt.commands.cli import main
 from bemt.compare.contrast_figure import picture
 from bemt.compare.contrast_text import text
+from bemt.compare.recordings import RunChange, changed, document
 from bemt.compare.scaling_laws import LAWS
+from bemt.compare.stand_run import StandRun
+from bemt.dataset import Dataset
 from bemt.diagnose.contrast import compare
 from bemt.effects import catalogue
 
@@ -614,3 +619,38 @@ def test_a_recording_without_a_speed_is_said_to_have_none(tmp_path: Path) -> Non
     with pytest.raises(InputError) as caught:
         compare(written(tmp_path / "a.csv", a), written(tmp_path / "b.csv", b))
     assert [(Path(f.file).name, f.expected) for f in caught.value.faults] == [("b.csv", "a speed of rotation, or J")]
+
+
+def panels(change: RunChange, monkeypatch: pytest.MonkeyPatch) -> list[Axes]:
+    """Axes of the picture, row by row."""
+    figures: list[Figure] = []
+    saved = Figure.savefig
+    monkeypatch.setattr(Figure, "savefig", lambda f, *a, **k: (figures.append(f), saved(f, *a, **k))[1])
+    picture(change, document(change) | {"recordings": ["a.csv", "b.csv"], "rows": {"A": [], "B": []}})
+    return list(figures[0].axes)
+
+
+def at_one_speed(airspeeds: Array, seed: int) -> StandRun:
+    rpm = np.full(airspeeds.size, 5000.0 + seed)
+    J = airspeeds / (rpm / 60.0 * D)
+    scatter = 1.0 + 0.003 * np.random.default_rng(seed).standard_normal((2, J.size))
+    values = {"rpm": rpm, "J": J, "CT": (0.11 - 0.05 * J) * scatter[0], "CP": (0.05 - 0.01 * J) * scatter[1]}
+    return StandRun(Dataset("bench", f"run {seed}", values), "", 1.2, D)
+
+
+def test_runs_in_wind_at_one_speed_are_drawn_over_the_advance_ratio(monkeypatch: pytest.MonkeyPatch) -> None:
+    change = changed(at_one_speed(np.linspace(2.0, 12.0, 14), 1), at_one_speed(np.linspace(8.0, 19.0, 14), 2), D)
+    for axis in panels(change, monkeypatch):
+        assert "advance ratio" in axis.get_xlabel()
+    readings, ratio = panels(change, monkeypatch)[:2]
+    assert "5001 rev/min" in readings.get_legend_handles_labels()[1][0]
+    curve = np.asarray(ratio.lines[0].get_xdata(), dtype=float)
+    assert np.all(np.diff(curve) >= 0.0) and curve[0] > 0.37 and curve[-1] < 0.57
+
+
+def test_no_ratio_is_drawn_without_a_common_advance_ratio(monkeypatch: pytest.MonkeyPatch) -> None:
+    rest, wind = (stand(k, airspeed=V) for k, V in ((1, np.zeros(17)), (2, np.full(17, 12.0))))
+    runs = [StandRun(Dataset("bench", "run", table), "", 1.2, D) for table in (rest, wind)]
+    readings, ratio = panels(changed(runs[0], runs[1], D), monkeypatch)[:2]
+    assert [label[:3] for label in readings.get_legend_handles_labels()[1]] == ["A, ", "B, "]
+    assert not ratio.lines and "no advance ratio J in common" in ratio.texts[0].get_text()

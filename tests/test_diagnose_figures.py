@@ -6,9 +6,11 @@ import warnings
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from bemt.case import load_case
 from bemt.case.prepare import prepare_case
@@ -180,3 +182,62 @@ def test_every_recording_has_a_line_among_those_shown() -> None:
     assert figures._chosen([0, 1, 1, 1, 1, 1], [2, 4, 4, 4, 4, 4]) == [0, 1, 3, 5]
     assert figures._chosen([0] * 6, [4] * 6) == [0, 2, 3, 5]
     assert figures._chosen([0, 1], [1, 1]) == [0, 1]
+
+
+def test_a_reference_has_no_held_out_curve(named: chain.Diagnosis, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its readings are never left out: what is predicted for them is the case before calibration."""
+    slow = named.problem.covariates["rpm"][named.problem.point] < 10000.0
+    monkeypatch.setattr(type(named.problem), "free", property(lambda self: ~slow))
+    axes = figures._before_after(named).axes
+    assert {axis.get_title() for axis in axes} >= {"8000 rev/min", "15000 rev/min", "22000 rev/min"}
+    held = {a.get_title(): next(line for line in a.lines if "held out" in str(line.get_label())) for a in axes[:3]}
+    assert [np.size(held[f"{n} rev/min"].get_xdata()) for n in (8000, 15000, 22000)] == [0, 4, 4]
+
+
+def rows_of(figure: Figure) -> set[str]:
+    return {label.get_text().removesuffix(", as found") for label in figure.axes[0].get_yticklabels()}
+
+
+def test_effects_that_lead_the_ranking_are_in_the_matrix_before_others(
+    named: chain.Diagnosis, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ids = named.alike.ids
+    monkeypatch.setattr(figures_effects, "_MOST_EFFECTS", 2)
+    pair = ("pitch_offset", "thrust_gain")
+    odds = {Explanation.of(*pair): 0.6, Explanation.of(LEFT_OUT): 0.3, NONE: 0.1}
+    alike = replace(named.alike, size=np.array([5.0 if i in pair else 9.0 for i in ids]))
+    drawn = figures_effects.matrix(replace(named, alike=alike, found=replace(named.found, probability=odds)))
+    assert drawn is not None and rows_of(drawn) == set(pair)
+
+
+def test_a_leading_effect_too_faint_at_usual_strength_is_shown_as_found_or_said(
+    named: chain.Diagnosis, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ids = named.alike.ids
+    odds = {Explanation.of(LEFT_OUT): 0.6, NONE: 0.4}
+    alike = replace(named.alike, size=np.array([0.5 if i == LEFT_OUT else 9.0 for i in ids]))
+    faint = replace(named, alike=alike, found=replace(named.found, probability=odds))
+    for strength in (9.0, 1.0):
+        known = replace(faint.alike, size=np.array([strength if i == LEFT_OUT else 9.0 for i in ids]))
+        monkeypatch.setattr(confusion, "confusion", lambda found, at, known=known: known)
+        drawn = figures_effects.matrix(faint)
+        assert drawn is not None
+        shown, said = LEFT_OUT in rows_of(drawn), LEFT_OUT in drawn.axes[0].get_title()
+        assert (shown, said) == ((True, False) if strength > confusion.ALIKE else (False, True))
+
+
+class OneRecord(list[float]):
+    """Points of one recording."""
+
+    name, extra = "all", ()
+
+
+def test_a_static_sweep_beside_runs_in_wind_is_one_line_over_the_speed() -> None:
+    J = np.r_[np.linspace(0.1, 0.9, 9), np.zeros(7)]
+    rpm = np.r_[np.full(9, 5003.0), np.linspace(2000.0, 7000.0, 7)]
+    parts = [SimpleNamespace(record=OneRecord(rpm))]
+    answer = SimpleNamespace(problem=SimpleNamespace(parts=parts, covariates={"J": J, "rpm": rpm}))
+    found = figures._groups(cast("chain.Diagnosis", answer), "J")
+    assert [(line.words, line.over, int(line.points.sum())) for line in found] == [
+        ("5003 rev/min", "J", 9), ("J = 0.00", "rpm", 7),
+    ]  # fmt: skip

@@ -12,7 +12,7 @@ from diagnosing import case, diagnose, left_out, points, recording
 
 from bemt.asbuilt.latents import AsBuilt
 from bemt.dataset import Dataset
-from bemt.diagnose import another_rotor, chain, verdict
+from bemt.diagnose import another_rotor, chain, suggest, verdict
 from bemt.diagnose.document import text
 from bemt.diagnose.explanation import Explanation
 from bemt.diagnose.record import Record, from_series
@@ -58,10 +58,14 @@ def test_beside_a_reference_at_other_speeds_it_is_none_either(grid: dict[str, np
     assert "no further run" in step(said)[0]
 
 
-def test_a_named_effect_has_a_step_and_a_command(grid: dict[str, np.ndarray]) -> None:
-    said = diagnose(recording(case(), grid), left_out("compressibility", case()))
-    assert said.decision.verdict == "named"
-    assert len(step(said)) > 1
+@pytest.fixture(scope="module")
+def compared(grid: dict[str, np.ndarray]) -> chain.Diagnosis:
+    return diagnose(recording(case(), grid), left_out("compressibility", case()))
+
+
+def test_a_named_effect_has_a_step_and_a_command(compared: chain.Diagnosis) -> None:
+    assert compared.decision.verdict == "named"
+    assert len(step(compared)) > 1
 
 
 def test_a_recording_that_contradicts_itself_is_mended_first(grid: dict[str, np.ndarray]) -> None:
@@ -92,3 +96,39 @@ def test_a_level_beside_a_reference_asks_for_the_weather_of_both_days() -> None:
     )
     assert said.decision.verdict in ("none", "insufficient")
     assert "temperature and pressure" in step(said)[0] and "--air-a" in step(said)[1]
+
+
+@pytest.mark.parametrize(
+    ("factor", "found", "words"),
+    [(-1.0, "the other sign", "reverse the sign of thrust_N"), (1.0 / 9.80665, "kgf", "check the unit")],
+)
+def test_a_slip_of_unit_or_sign_is_put_right_without_a_run(factor: float, found: str, words: str) -> None:
+    series = recording(case(), points("static"))
+    said = told(of(replace(series, values={**series.values, "thrust_N": factor * series["thrust_N"]})))
+    assert (said.decision.verdict, said.decision.effects) == ("sensor", ("unit_slip",))
+    assert said.parameters["unit_slip"]["unit"]["value"] == found
+    assert (said.next.kind, said.next.points) == ("look", ()) and words in step(said)[0]
+    assert "tells" not in text(said) and "new_run" not in step(said)[1]
+
+
+@pytest.mark.parametrize(
+    ("now", "after", "kind", "lead"),
+    [(15.1, 15.7, "look", "cross_talk"), (15.1, 60.0, "look", "cross_talk"), (2.5, 9.0, "run", "cross_talk"),
+     (2.5, 2.9, "look", "cross_talk"), (7.6, 9.0, "", "compressibility"), (7.6, 12.0, "run", "compressibility")],
+)  # fmt: skip
+def test_a_run_is_recommended_where_it_is_worth_its_time(
+    monkeypatch: pytest.MonkeyPatch, compared: chain.Diagnosis, now: float, after: float, kind: str, lead: str
+) -> None:
+    alone = len(compared.problem.parts[0].record)
+    monkeypatch.setattr(suggest, "_options", lambda part, of=suggest._options: of(part)[:1])
+    monkeypatch.setattr(
+        suggest, "_distance", lambda problem, *_: now if problem.covariates["rpm"].size == alone else after
+    )
+    rival = "hub_loss" if lead == "compressibility" else "rpm_scale"
+    settings = {"rpm_scale": {"factor": 1.02, "eps": 0.0}}
+    chosen = suggest.suggest(compared.found, (lead, {}), (rival, settings.get(rival, {})))
+    assert chosen.kind == kind
+    if kind == "run":
+        assert chosen.separates == (lead, rival) and chosen.points
+    else:
+        assert not chosen.separates and not chosen.points

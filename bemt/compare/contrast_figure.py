@@ -1,8 +1,9 @@
-"""One picture of two recordings: the loads over speed, and what lies between them."""
+"""One picture of two recordings: the loads over speed or advance ratio, and what lies between them."""
 
 from __future__ import annotations
 
 import io
+import math
 import textwrap
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -32,6 +33,8 @@ _LABEL = {
 }
 _COMMAND = {"pwm_s": ("pulse width [µs]", 1e6), "throttle": ("throttle [-]", 1.0)}
 _OVER_COMMAND = ("speed", "voltage")
+# Speeds that vary by less than this share are one.
+_STEADY = 0.05
 # Characters in a line of the title.
 _WIDE = 110
 _STYLE: dict[Any, Any] = {
@@ -88,21 +91,49 @@ def title(doc: Mapping[str, Any]) -> str:
     return "\n".join(part for line in (*lines, headline(doc)) for part in textwrap.wrap(line, _WIDE))
 
 
+def _along(c: MatchedChannel) -> int:
+    """Coordinate of the abscissa: the advance ratio where it alone varies."""
+    steady = c.name not in _OVER_COMMAND and float(np.ptp(c.x[:, 0])) < _STEADY
+    return 1 if steady and c.advance_moves() else 0
+
+
 def _axis(change: RunChange, c: MatchedChannel) -> tuple[str, Callable[[Array], Array]]:
     """Label of the abscissa, and the coordinate in its unit."""
+    if _along(c):
+        return _advance(change)[0], lambda x: x
     if c.name in _OVER_COMMAND:
         label, factor = _COMMAND[change.a.command]
         return label, lambda x: x * factor
     return _LABEL["rpm"], np.exp
 
 
+def _advance(change: RunChange) -> tuple[str, str, str]:
+    """Label of the second coordinate of the loads, and its symbol and unit in a legend."""
+    known = math.isfinite(change.diameter_m) or all("J" in run.points for run in (change.a, change.b))
+    return ("advance ratio J [-]", "J", "") if known else ("advance per turn V/n [m]", "V/n", " m")
+
+
+def _range(change: RunChange, c: MatchedChannel, side: bool) -> str:
+    """The coordinate that is not drawn, of one recording, where it varies."""
+    if not c.advance_moves():
+        return ""
+    own = c.x[c.second == side]
+    if _along(c):
+        ends = [f"{np.exp(end(own[:, 0])):.0f}" for end in (np.min, np.max)]
+        return f", {' to '.join(dict.fromkeys(ends))} rev/min"
+    _, symbol, unit = _advance(change)
+    ends = [f"{end(own[:, 1]):.2f}" for end in (np.min, np.max)]
+    return f", {symbol} {' to '.join(dict.fromkeys(ends))}{unit}"
+
+
 def _readings(axis: Any, change: RunChange, c: MatchedChannel) -> None:
     shift = np.where(c.second, c.log_density, 0.0)
     y = np.exp(c.y + shift) * 60.0 ** POWER_OF_SPEED.get(c.channel, 0.0)
     label, scaled = _axis(change, c)
-    x = scaled(c.x[:, 0])
+    x = scaled(c.x[:, _along(c)])
     for side, colour, mark, name in ((False, _A, "o", "A"), (True, _B, "s", "B")):
         own = c.second == side
+        name += _range(change, c, side)
         axis.plot(x[own], y[own], mark, color=colour, ms=3.5, mfc="none" if side else colour, label=name)
     axis.set_ylabel(_LABEL.get(c.channel, c.channel))
     axis.set_xlabel(label)
@@ -112,14 +143,29 @@ def _readings(axis: Any, change: RunChange, c: MatchedChannel) -> None:
 
 def _ratio(axis: Any, change: RunChange, c: MatchedChannel) -> None:
     r = change.ratios[c.channel]
+    word = WORD[c.channel].removesuffix(" at equal command")
+    (low, high), (slow, fast) = c.common(), c.common_advance()
+    if r["extrapolated"] and slow > fast:
+        axis.set_axis_off()
+        told = f"{word}: no ratio B / A, since A and B have\nno {_advance(change)[0].partition(' [')[0]} in common"
+        axis.text(0.5, 0.5, told, ha="center", va="center", transform=axis.transAxes)
+        return
     curve = np.array(r["curve"]) * np.array([1.0, 1.0, r["density_ratio"], r["density_ratio"], r["density_ratio"]])
     label, scaled = _axis(change, c)
-    x = scaled(curve[:, 0])
+    curve = curve[np.argsort(curve[:, _along(c)], kind="stable")]
+    shared = (curve[:, 1] >= slow) & (curve[:, 1] <= fast)
+    if _along(c) and shared.sum() > 1:
+        curve = curve[shared]
+    x = scaled(curve[:, _along(c)])
     axis.fill_between(x, curve[:, 3], curve[:, 4], color=_BAND, alpha=0.3, lw=0.0, label="95 %")
     axis.plot(x, curve[:, 2], color=_A, label="B over A")
     axis.axhline(1.0, color=_GREY, lw=0.8)
     if r["density_ratio"] != 1.0:
         axis.axhline(r["density_ratio"], color=_B, lw=1.0, ls="--", label="recorded density")
-    axis.set_ylabel(f"{WORD[c.channel].removesuffix(' at equal command')}: B / A")
+    if c.name not in _OVER_COMMAND:
+        both = f"equal speed and {_advance(change)[0].partition(' [')[0]}" if c.advance_moves() else "equal speed"
+        far = low > high + _STEADY
+        axis.set_title("no common speed: extrapolated" if far else f"at {both}")
+    axis.set_ylabel(f"{word}: B / A")
     axis.set_xlabel(label)
     axis.legend(loc="best")

@@ -272,11 +272,13 @@ def _next(
 ) -> suggestion.Suggestion:
     """What settles the question, and what to type then."""
     chosen = _settling(found, decision, best)
-    file = "reference.csv" if chosen.kind == "reference" else "new_run.csv"
     if chosen.kind == "reference":
+        file = "reference.csv"
         commands: tuple[str, ...] = (given.command(reference=file), given.comparison(file))
-    elif chosen.kind in ("run", "look"):
-        commands = (given.command(run=file),)
+    elif chosen.kind == "run":
+        commands = (given.command(run="new_run.csv"),)
+    elif chosen.kind == "look":
+        commands = (given.command(),)
     elif chosen.kind == "air":
         commands = given.of_days()
     elif chosen.kind == "mend":
@@ -298,6 +300,10 @@ def _settling(found: evidence.Evidence, decision: verdict.Decision, best: fittin
         return suggestion.Suggestion(suggestion.REFERENCE, (), (), 0.0, 0.0, "reference")
     if decision.verdict == "insufficient" and (note := suggestion.weather(found)):
         return note
+    sure = decision.effects[:1] if decision.rule == rules.BESIDE_IT else decision.effects
+    claimed = decision.verdict in ("named", "sensor") or decision.rule == rules.BESIDE_IT
+    if claimed and (mended := suggestion.correction(sure, dict(zip(best.ids, best.settings, strict=True)))):
+        return mended
     lead = best.ids[0] if best.ids else singles[0]
     rivals = [i for i in (*decision.effects, *(j for g in decision.classes for j in g), *singles) if i != lead]
     first = (lead, fitting.fit(found, Explanation.of(lead)).settings[0])

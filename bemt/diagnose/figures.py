@@ -6,7 +6,7 @@ import io
 import textwrap
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +45,8 @@ _AXIS = {
     "pwm_s": "pulse width [s]", "pressure_Pa": "pressure [Pa]", "run": "run",
 }  # fmt: skip
 _CONDITIONS = ("J", "rpm", "M_tip", "Re", "density_kg_m3")
-_MOST_LINES = 4
+# Most panels, fewest points of a curve, and how far advance ratios of one line are apart.
+_MOST_LINES, _LONG, _ONE_J = 4, 3, 0.02
 
 
 def draw(answer: Diagnosis, out: Path) -> list[Path]:
@@ -229,8 +230,17 @@ def _strip(answer: Diagnosis, name: str) -> Figure:
 # Before and after
 
 
-def _groups(answer: Diagnosis, name: str) -> list[tuple[str, NDArray[np.bool_], int]]:
-    """Lines of points to draw over a covariate: what else was held, in words, which points, which recording."""
+class _Line(NamedTuple):
+    """Points to draw in one panel."""
+
+    words: str  # What else was held
+    points: NDArray[np.bool_]
+    recording: int
+    over: str  # Covariate of the abscissa
+
+
+def _groups(answer: Diagnosis, name: str) -> list[_Line]:
+    """Lines of points to draw over a covariate; of advance ratios with too few of its points, over the speed."""
     problem = answer.problem
     X, P = problem.covariates, problem.covariates["rpm"].size
     part = np.concatenate([np.full(len(p.record), i) for i, p in enumerate(problem.parts)])
@@ -245,15 +255,41 @@ def _groups(answer: Diagnosis, name: str) -> list[tuple[str, NDArray[np.bool_], 
         line = np.zeros(P, dtype=np.intp)
         if held and _varies(X[held][mine]):
             line[mine] = _lines(X[held][mine])
-        for k in np.unique(line[mine]):
-            here = mine & (line == k)
-            found.append((", ".join(t for t in (tag, _label(held, X[held][here]) if held else "") if t), here, i))
+        own = [mine & (line == k) for k in np.unique(line[mine])]
+        sweeps = _sweeps(X, mine, own) if name == "J" else []
+        drawn = np.any(sweeps, axis=0) if sweeps else np.zeros(P, dtype=bool)
+        own = [here for here in own if _count(X[name][here]) >= _LONG or not drawn[here].all()]
+        for over, what, lines in ((name, held, own), ("rpm", "J", sweeps)):
+            for here in lines:
+                words = ", ".join(t for t in (tag, _label(what, X[what][here]) if what else "") if t)
+                found.append(_Line(words, here, i, over))
     return found
+
+
+def _sweeps(X: dict[str, Array], mine: NDArray[np.bool_], lines: list[NDArray[np.bool_]]) -> list[NDArray[np.bool_]]:
+    """Points of a recording at one advance ratio and many speeds, which are no line over the advance ratio."""
+    J = X["J"]
+    rest = np.any([here for here in lines if _count(J[here]) < _LONG] or [np.zeros_like(mine)], axis=0)
+    if not rest.any():
+        return []
+    line = np.full(J.size, -1)
+    line[rest] = _lines(J[rest])
+    found = []
+    for k in np.unique(line[rest]):
+        low, high = float(J[line == k].min()), float(J[line == k].max())
+        here = mine & (low <= J) & (high >= J)
+        if high - low <= _ONE_J and _count(X["rpm"][here]) >= _LONG:
+            found.append(here)
+    return found
+
+
+def _count(x: Array) -> int:
+    return int(np.unique(x.round(12)).size)
 
 
 def _chosen(parts: list[int], sizes: list[int]) -> list[int]:
     """Lines to show of recordings and positions: long ones evenly picked, and one of each recording that has none."""
-    long = [i for i, size in enumerate(sizes) if size >= 3]
+    long = [i for i, size in enumerate(sizes) if size >= _LONG]
     own = {p: max((i for i, q in enumerate(parts) if q == p), key=lambda i: sizes[i]) for p in dict.fromkeys(parts)}
     lone = [i for p, i in own.items() if all(parts[k] != p for k in long)][:_MOST_LINES]
     room = _MOST_LINES - len(lone)
@@ -280,36 +316,40 @@ def _coefficients(answer: Diagnosis) -> Array:
 
 
 def _before_after(answer: Diagnosis) -> Figure:
-    problem, channels, name = answer.problem, _channels(answer), _across(answer)
-    groups = _groups(answer, name)
-    sizes = [np.unique(problem.covariates[name][here].round(12)).size for _, here, _ in groups]
-    shown = [groups[i][:2] for i in _chosen([part for _, _, part in groups], sizes)]
-    figure, axes = blank(0.9 + 2.2 * len(channels), len(channels), len(shown), sharex=True, sharey="row")
+    problem, channels = answer.problem, _channels(answer)
+    groups = _groups(answer, _across(answer))
+    sizes = [_count(problem.covariates[g.over][g.points]) for g in groups]
+    shown = [groups[i] for i in _chosen([g.recording for g in groups], sizes)]
+    height = 0.9 + 2.2 * len(channels)
+    figure, axes = blank(height, len(channels), len(shown), sharex="col", sharey="row")
     unit, factor = _coefficients(answer), answer.found.states[0].hyper.scale
-    what = " + ".join(answer.best.ids) or "calibration only"
+    what, everywhere = " + ".join(answer.best.ids) or "calibration only", np.ones_like(problem.free)
     models = (
-        ("baseline", problem.f0, RED, "--"), (f"improved ({what})", answer.after, BLUE, "-"),
-        (f"improved, {answer.blocks} held out", answer.held, GREEN, ":"),
-    )  # fmt: skip
+        ("baseline", problem.f0, RED, "--", everywhere),
+        (f"improved ({what})", answer.after, BLUE, "-", everywhere),
+        # a reference is never held out
+        (f"improved, {answer.blocks} held out", answer.held, GREEN, ":", problem.free),
+    )
     for row, c in zip(axes, channels, strict=True):
-        for axis, (label, points) in zip(row, shown, strict=True):
-            here = (problem.channel == c) & points[problem.point]
-            x = problem.covariates[name][problem.point[here]]
+        for axis, line in zip(row, shown, strict=True):
+            here = (problem.channel == c) & line.points[problem.point]
+            x = problem.covariates[line.over][problem.point]
             u = (factor * problem.u * unit)[here]
-            axis.errorbar(x, (problem.y * unit)[here], u, fmt="o", color=BLACK, markersize=3, elinewidth=0.8,
+            axis.errorbar(x[here], (problem.y * unit)[here], u, fmt="o", color=BLACK, markersize=3, elinewidth=0.8,
                           label="recording, standard uncertainty", zorder=2)  # fmt: skip
-            for words, model, colour, style in models:
-                curve = _curve(x, (model * unit)[here])
+            for words, model, colour, style, told in models:
+                curve = _curve(x[here & told], (model * unit)[here & told])
                 single = "_" if curve[0].size == 1 else ""
                 axis.plot(*curve, style, color=colour, label=words, zorder=3, marker=single, markersize=14)
             if c == channels[0]:
-                axis.set_title(_title(label, len(shown)))
+                axis.set_title(_title(line.words, len(shown)))
                 axis.margins(x=0.08)
             if c == channels[-1]:
-                axis.set_xlabel(_AXIS.get(name, name))
+                axis.set_xlabel(_AXIS.get(line.over, line.over))
                 if len(shown) > 2:
                     axis.locator_params(axis="x", nbins=4)
         row[0].set_ylabel(_COEFFICIENT[CHANNELS[c]])
+    _one_range(axes[0], [line.over for line in shown])
     handles, labels = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=2)
     if len(shown) < len(groups):
@@ -317,8 +357,19 @@ def _before_after(answer: Diagnosis) -> Figure:
     return figure
 
 
+def _one_range(axes: NDArray[Any], over: list[str]) -> None:
+    """Panels over the same covariate from and to the same value."""
+    for name in dict.fromkeys(over):
+        same = [axis for axis, own in zip(axes, over, strict=True) if own == name]
+        ends = np.array([axis.get_xlim() for axis in same])
+        for axis in same:
+            axis.set_xlim(ends[:, 0].min(), ends[:, 1].max())
+
+
 def _curve(x: Array, y: Array) -> tuple[Array, Array]:
     """Means of y over equal x, in the order of x."""
+    if not x.size:
+        return x, y
     order = np.argsort(x, kind="stable")
     step = np.diff(x[order]) > 5e-3 * max(float(np.ptp(x)), 1e-12)
     group = np.cumsum(np.r_[0, step])

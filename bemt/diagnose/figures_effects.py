@@ -14,6 +14,7 @@ from bemt.bem import solver
 from bemt.diagnose import confusion
 from bemt.diagnose.canvas import BLACK, BLUE, GREY, ORANGE, PURPLE, RED, SKY, blank
 from bemt.diagnose.explanation import NONE, Explanation
+from bemt.diagnose.fit import fit
 from bemt.diagnose.record import CHANNELS
 from bemt.diagnose.signatures import effect_of
 
@@ -30,6 +31,8 @@ Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 _MOST_EFFECTS, _MOST_BARS = 15, 8
+# Probability of an explanation from which its effects lead the ranking.
+_LEADING = 0.05
 
 
 def _representative(answer: Diagnosis) -> int:
@@ -96,18 +99,39 @@ def radius(answer: Diagnosis) -> Figure | None:
     return figure
 
 
+def _likely(answer: Diagnosis) -> dict[str, float]:
+    """Effects of the ranking with the probability of the likeliest explanation that each is in, likeliest first."""
+    share: dict[str, float] = {}
+    for what, p in sorted(answer.found.probability.items(), key=lambda kv: -kv[1]):
+        for i in what.ids:
+            share.setdefault(i, p)
+    return share
+
+
+def _as_found(answer: Diagnosis) -> confusion.Confusion:
+    """Distances, those of the leading effects that are too faint at usual strength at the strength that was found."""
+    alike, found = answer.alike, answer.found
+    sizes = dict(zip(alike.ids, alike.size, strict=True))
+    faint = [i for i, p in _likely(answer).items() if p >= _LEADING and sizes.get(i, np.inf) < confusion.ALIKE]
+    if not faint:
+        return alike
+    at = {i: fit(found, Explanation.of(i)).columns[0] - found.spans[i].start for i in faint}
+    return confusion.confusion(found, at)
+
+
 def matrix(answer: Diagnosis) -> Figure | None:
-    """Draw which effects look alike in this plan."""
+    """Draw which effects look alike in this plan: the likely ones first, at the strength that was found."""
     from matplotlib.colors import LinearSegmentedColormap, TwoSlopeNorm
     from matplotlib.patches import Rectangle
 
-    alike, share = answer.alike, answer.found.probability
+    alike, share = _as_found(answer), _likely(answer)
     seen = np.flatnonzero(alike.size >= confusion.ALIKE)
     if seen.size < 2:
         return None
-    strongest = sorted(seen, key=lambda i: (-round(share.get(Explanation.of(alike.ids[i]), 0.0), 3), -alike.size[i]))[
-        :_MOST_EFFECTS
-    ]
+    strongest = sorted(seen, key=lambda i: (-round(share.get(alike.ids[i], 0.0), 3), -alike.size[i]))[:_MOST_EFFECTS]
+    drawn = {alike.ids[i] for i in seen}
+    hidden = [i for i, p in share.items() if p >= _LEADING and i not in drawn]
+    usual = dict(zip(answer.alike.ids, answer.alike.size, strict=True))
     rows = _neighbours(alike.distance, np.array(sorted(strongest)))
     D = alike.distance[np.ix_(rows, rows)]
     names, n = [alike.ids[i] for i in rows], rows.size
@@ -128,12 +152,13 @@ def matrix(answer: Diagnosis) -> Figure | None:
             if D[i, j] < confusion.ALIKE:
                 axis.add_patch(Rectangle((j - 0.47, i - 0.46), 0.94, 0.92, fill=False, linewidth=1.1))
     axis.set_xticks(range(n), names, rotation=40, ha="right", rotation_mode="anchor")
-    axis.set_yticks(range(n), names)
+    axis.set_yticks(range(n), [f"{i}, as found" if usual[i] < confusion.ALIKE else i for i in names])
     axis.tick_params(length=0)
     axis.spines[:].set_visible(False)
     axis.set(xlabel="from the nearest setting of", ylabel="distance of")
     left = "" if seen.size <= n else f"; {n} of {seen.size} visible effects"
-    axis.set_title(f"Framed: closer than {confusion.ALIKE:g} standard deviations, alike in this plan{left}")
+    faint = f"\nLikely, but too faint in this plan to be told from nothing: {', '.join(hidden)}" if hidden else ""
+    axis.set_title(f"Framed: closer than {confusion.ALIKE:g} standard deviations, alike in this plan{left}{faint}")
     bar = figure.colorbar(image, ax=axis, label="distance [standard deviations]", extend="max", pad=0.02)
     bar.set_ticks([0.0, 1.0, 2.0, confusion.ALIKE, 6.0, 9.0, top])
     bar.ax.axhline(confusion.ALIKE, color=BLACK, linewidth=1.6)

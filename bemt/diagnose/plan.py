@@ -190,7 +190,8 @@ def text(answer: Plan) -> str:
     if answer.added is not None:
         a = answer.added
         both = f"{a.after:.1f} instead of {a.before:.1f}"
-        out.append(f"  to add: {a.text} (tells {' from '.join(a.separates)} at {both} standard deviations)")
+        gain = f" (tells {' from '.join(a.separates)} at {both} standard deviations)" if a.separates else ""
+        out.append(f"  to add: {a.text}{gain}")
     out += [f"  not visible: {i}: {why}" for i, why in answer.absent.items()]
     out += [f"  note: {note}" for note in answer.notes]
     return "\n".join(out)

@@ -184,13 +184,15 @@ def _merged(columns: Sequence[_Column]) -> list[_Column]:
 
 
 def _idle(name: str, columns: Sequence[_Column]) -> bool:
-    """Whether settings that differ in one parameter only change the readings alike, all of them."""
-    seen: dict[tuple[Any, ...], bytes] = {}
+    """Whether settings that differ in one parameter only change the readings alike, all of them.
+
+    Of a parameter that never differs alone, as a factor from the name of its unit, that is not known.
+    """
+    seen: dict[tuple[Any, ...], set[bytes]] = {}
     for setting, signature, *_ in columns:
         others = tuple(sorted((n, v) for n, v in setting.items() if n != name))
-        if seen.setdefault(others, signature.tobytes()) != signature.tobytes():
-            return False
-    return True
+        seen.setdefault(others, set()).add(signature.tobytes())
+    return len(seen) < len(columns) and all(len(some) == 1 for some in seen.values())
 
 
 def _grid(problem: Problem, cls: type[Effect], axes: Sequence[Any]) -> Iterator[_Column]:

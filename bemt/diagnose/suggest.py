@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,7 @@ from bemt.bem import model as bem
 from bemt.compare.recordings import AIR_OF_BOTH, DAYS
 from bemt.diagnose import noise
 from bemt.diagnose.assemble import assemble
+from bemt.diagnose.confusion import ALIKE
 from bemt.diagnose.nuisance import PRIORS
 from bemt.diagnose.problem import Part, Problem
 from bemt.diagnose.record import Record, air_of
@@ -24,7 +25,9 @@ from bemt.diagnose.signatures import effect_of
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence
 
-__all__ = ["LEVEL", "REFERENCE", "Given", "Suggestion", "nothing_called_for", "suggest", "weather"]
+__all__ = [
+    "LEVEL", "REFERENCE", "Given", "Suggestion", "correction", "nothing_called_for", "suggest", "weather",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 
@@ -41,7 +44,9 @@ LEVEL = 0.1
 """A load off the case by more than this, at usual, is no agreement, even if calibration may be that far off [1]."""
 
 _POINTS = 4
-_ENOUGH = 3.0
+_ENOUGH = ALIKE
+# A run is worth its time if it takes two explanations this much farther apart, and out of the reach of being alike.
+_WORTH = 1.3
 # A reference does more than to separate two explanations: it is chosen unless a run separates them this much better.
 _BETTER = 1.5
 
@@ -63,7 +68,7 @@ class Given:
     rest: str = "--case CASE"
 
     def command(self, run: str = "", reference: str = "") -> str:
-        """Command that diagnoses the same with one more file."""
+        """Command that diagnoses the same again, or with one more file."""
         files = [*self.recordings, *([run] if run else [])]
         known = [*self.references, *([reference] if reference else [])]
         words = ["python -m bemt diagnose", *files, *(["--reference", *known] if known else []), self.rest]
@@ -93,8 +98,8 @@ class Suggestion:
     before, after : float
         Distance of the two in standard deviations, now and with the run [1].
     kind : str
-        "run", "reference" (a run without the cause), "look" (without a run), "mend" (the recording), "air" (write it
-        down), or "" when nothing is called for.
+        "run", "reference" (a run without the cause), "look" (a check or a correction without a run), "mend" (the
+        recording), "air" (write it down), or "" when nothing is called for.
     commands : tuple of str
         What to type then.
     """
@@ -266,7 +271,10 @@ def suggest(
     found: Evidence, first: tuple[str, dict[str, Any]], second: tuple[str, dict[str, Any]] | None,
     reference: bool = False,
 ) -> Suggestion:  # fmt: skip
-    """Choose the run that separates two explanations best."""
+    """Choose the run that separates two explanations best, or a check where no run is worth its time.
+
+    With ``reference`` the question is open: a run without the cause may settle more than any other.
+    """
     pair = [effect_of(*first)] + ([effect_of(*second)] if second else [])
     names = (first[0], second[0] if second else "nothing")
     hyper = found.states[0].hyper
@@ -282,9 +290,9 @@ def suggest(
     # all runs are solved with the same few dozen rotors: each is prepared once
     part = problem.parts[0]
     part = replace(part, model=replace(part.model, _kept={}))
-    for option in _options(part):
+    for tried in _options(part):
         try:
-            extended = _extended(part, option)
+            extended = _extended(part, tried)
             a, b = signatures(extended)
         except (ValueError, FloatingPointError):
             continue
@@ -292,28 +300,45 @@ def suggest(
             continue
         gained = _distance(extended, hyper, a, b)
         if gained > best[0]:
-            best = (gained, option)
+            best = (gained, tried)
     if reference and not _referenced(found):
         known = _with_reference(part)
         a, b = signatures(known)
         gained = _distance(known, hyper, a, b) if np.isfinite(a).all() and np.isfinite(b).all() else now
         if best[0] < _BETTER * max(gained, now) or best[0] < _ENOUGH:
             return Suggestion(REFERENCE, (), names, now, max(gained, now), "reference")
-    look = _look(names, found)
-    if best[1] is None or (best[0] < _ENOUGH and look) or (best[0] < now + 0.5 and look):
-        text = look or "more repeats of the same points; no other practical run separates them better"
-        return Suggestion(text, (), names, now, max(best[0], _ENOUGH) if look else best[0], "look" if look else "run")
-    return Suggestion(best[1].text, _points(problem.parts[0].record, best[1]), names, now, best[0])
+    after, option = best
+    apart, worth = now >= _ENOUGH and not reference, after >= _WORTH * now
+    look = next((f"for {n}, {check}" for n in names if (check := _check(n))), "")
+    # what is told apart already, or would still be alike, is rather looked at than run
+    if option is not None and worth and not (look and (apart or after < _ENOUGH)):
+        return Suggestion(option.text, _points(problem.parts[0].record, option), names, now, after)
+    if look:
+        return Suggestion(look, (), (), now, now, "look")
+    if apart:
+        return Suggestion("no further run is needed; none would tell more", (), (), now, now, "")
+    return Suggestion("more repeats of the same points; no other practical run separates them better", (), (), now, now)
 
 
-def _look(names: Sequence[str], found: Evidence) -> str:
-    """What to look at without a run, for the first of the effects that says so."""
+def correction(names: Sequence[str], settings: Mapping[str, Mapping[str, Any]]) -> Suggestion | None:
+    """What to put right in the stand or the file, where effects of the stand were found at such settings."""
     for name in names:
         cls = effects.catalogue().get(name)
-        if cls is not None and cls.check:
-            return cls.check
-    kinds = {effects.catalogue()[n].kind for n in names if n in effects.catalogue()}
-    if "stand" in kinds and {"thrust_gain", "torque_gain", "thrust_zero", "torque_zero"} & set(names):
+        if cls is None or cls.kind != "stand" or not _check(name):
+            continue
+        text, found = _check(name), settings.get(name, {})
+        if float(found.get("factor", 1.0)) < 0.0 and "channel" in found:
+            text = f"reverse the sign of {found['channel']} (sign = -1 in a recording.toml), or turn the sensor round"
+        return Suggestion(text, (), (), 0.0, 0.0, "look")
+    return None
+
+
+def _check(name: str) -> str:
+    """How to check an effect without a run."""
+    cls = effects.catalogue().get(name)
+    if cls is not None and cls.check:
+        return cls.check
+    if name in ("thrust_gain", "torque_gain", "thrust_zero", "torque_zero"):
         share = PRIORS["thrust gain"]
         return f"hang dead weights on the cells before and after a run: the gain is then known to {share / 4:.2%}"
     return ""
