@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from bemt.base.errors import InputError
 from bemt.commands.cli import main
+from bemt.compare.change_document import document
 from bemt.compare.contrast_figure import picture
 from bemt.compare.contrast_text import text
-from bemt.compare.recordings import RunChange, changed, document
+from bemt.compare.recordings import RunChange, changed
 from bemt.compare.scaling_laws import LAWS
 from bemt.compare.stand_run import StandRun
 from bemt.dataset import Dataset
@@ -27,6 +28,7 @@ from bemt.effects import catalogue
 
 Array = NDArray[np.float64]
 D = 0.254
+CASES = Path(__file__).resolve().parent.parent / "cases"
 
 
 def stand(
@@ -601,6 +603,8 @@ def test_a_wind_that_is_not_stated_is_neither_the_blade_nor_the_drive(tmp_path: 
     answer = compare(written(tmp_path / "a.csv", a), written(tmp_path / "b.csv", b))
     assert answer.verdict == "insufficient" and "as in wind" in answer.document["rule"]
     assert "--air-b" in answer.document["next_measurement"]["command"]
+    with_case = compare(tmp_path / "a.csv", tmp_path / "b.csv", case=CASES / "prop_10x5")
+    assert with_case.verdict == "insufficient" and with_case.document["rule"] == answer.document["rule"]
     told = compare(tmp_path / "a.csv", tmp_path / "b.csv", air_b="14m/s")
     assert told.verdict == "insufficient" and not told.document["subsystems"]["drive"]["effects"]
 

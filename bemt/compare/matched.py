@@ -1,22 +1,13 @@
-"""Two recordings of one stand, channel by channel at equal speed: a smooth fit and what it leaves between them.
+"""Two recordings of one stand, channel by channel at equal speed.
 
 A load divided by its own power of the speed (thrust by n^2, torque by n^2, power by n^3) hardly changes with speed,
-so that its logarithm is a smooth curve g over ln n and advance ratio. Both recordings follow the same curve; the second
-lies ``d`` above it. All of it is one Gaussian model,
-
-    y = g(x) + [second] d(x) + s(run, x) + e,
-
-with a wide prior for g (linear, plus a Gaussian process), a session term s (level, slow bend and a shift of the zero
-of every run), and scatter e of a share and a part of full scale, which is as large as the readings make likeliest
-(Rasmussen and Williams, Gaussian Processes for Machine Learning, MIT Press 2006, eq. 2.30 and 2.37 to 2.42).
+so that its logarithm is a smooth curve over ln n and advance ratio.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,19 +37,14 @@ this. Repeated runs of one stand that were set up anew differ by 1 % in thrust a
 Propeller Database and of J. Majewski's stand, seen here)."""
 # Electrical power for torque: efficiency of a drive that is warm or cold; speed where the voltage is known.
 _BY_POWER, _AT_KNOWN_VOLTAGE = 0.03, 0.01
-_BEND, _ZERO, _STEEP = 0.7, 0.0015, 0.15
 BY_THERMOMETER = 0.012
 """Standard deviation of the density ratio of two days at one site where temperatures alone are known: pressures of days
 differ by 8 hPa. [1]"""
-_LENGTH_SPEED, _LENGTH_ADVANCE = 0.5, 0.35
-_SHARES = (0.001, 0.002, 0.004, 0.008, 0.015, 0.03, 0.06, 0.1)
-_FLOORS = (0.0, 0.0007, 0.002, 0.005, 0.012)
-_WIGGLES = (0.0, 0.004, 0.01, 0.02)
-_BENDS = (0.02, 0.1, 0.3, 1.0)
-_FAR, _MARGIN, _LIKE = 3.5, 0.06, 0.1
+_LIKE = 0.1
+MARGIN = 0.06
+"""What a range of speed (natural logarithm) or of advance (share of its width) may be exceeded by. [1]"""
 # Runs whose speeds of rotation are this close, natural logarithm, are runs at one speed.
 _ONE_SPEED = 0.02
-_LOCAL = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,19 +83,6 @@ class MatchedChannel:
     def advance_moves(self) -> bool:
         """Whether advance ratio differs between points."""
         return bool(np.ptp(self.x[:, 1]) > 1e-9)
-
-
-@dataclass(frozen=True)
-class Scatter:
-    """Of single readings: ``share`` of the reading, ``floor`` of full scale.
-
-    ``wiggle`` is what neighbours in speed share within a run, ``bend`` the size of the bends of the common curve.
-    """
-
-    share: float
-    floor: float
-    wiggle: float
-    bend: float
 
 
 def _like_voltage(a: StandRun, b: StandRun) -> bool:
@@ -251,223 +224,20 @@ def _set_up(name: str, channel: str, a: StandRun, b: StandRun) -> float:
     return SESSION[name]
 
 
-def _lengths(c: MatchedChannel) -> Array:
-    """Length scales of the curve, in the coordinates of the channel."""
-    first = _LENGTH_SPEED if c.name not in ("speed", "voltage") else 0.4 * max(float(np.ptp(c.x[:, 0])), 1e-12)
-    return np.array([first, _LENGTH_ADVANCE * max(float(np.ptp(c.x[:, 1])), 1e-9)])
-
-
-def unit_coordinates(c: MatchedChannel) -> Array:
-    """First and second coordinate from their means, in length scales, (N, 2)."""
-    return np.asarray((c.x - c.x.mean(axis=0)) / _lengths(c))
-
-
-def smooth_kernel(c: MatchedChannel, shorter: float = 1.0) -> Array:
-    """Squared-exponential kernel of unit variance over the coordinates, (N, N)."""
-    z = unit_coordinates(c) * shorter
-    return np.asarray(np.exp(-0.5 * ((z[:, None, :] - z[None, :, :]) ** 2).sum(axis=2)))
-
-
-def covariance(c: MatchedChannel, s: Scatter) -> Array:
-    """Covariance of y where nothing was changed: curve, sessions, zeros, scatter, (N, N)."""
-    z = unit_coordinates(c)
-    K = smooth_kernel(c)
-    same = (c.run[:, None] == c.run[None, :]).astype(float)
-    # a coefficient changes little with speed (Reynolds, Mach), anyhow with advance; the drive changes anyhow
-    steep = _STEEP**2 if c.name in LOADS else 4.0
-    wide = 100.0 + steep * np.outer(z[:, 0], z[:, 0]) + 4.0 * np.outer(z[:, 1], z[:, 1])
-    wide += 4.0 * np.outer(z[:, 1] ** 2, z[:, 1] ** 2)
-    side = (c.second[:, None] == c.second[None, :]).astype(float)
-    # the level is the stand's, set up once per recording; half of its variance goes with the single run
-    level = c.session**2 * (0.7 * side + 0.3 * same + _BEND**2 * same * K)
-    shift = c.floor * (_ZERO if c.shift is None else np.maximum(c.shift, _ZERO))
-    zero = same * np.outer(shift, shift) if c.name in LOADS else 0.0
-    spread = s.share**2 + (s.floor * c.floor) ** 2 + c.u**2
-    local = s.wiggle**2 * same * smooth_kernel(c, _LOCAL) if s.wiggle else 0.0
-    return np.asarray(wide + s.bend**2 * K + level + zero + local + np.diag(spread))
-
-
-def _level(c: MatchedChannel) -> float:
-    """Prior standard deviation of ln B/A: wider where levels are far apart, or a large ratio would pass for scatter."""
-    return max(0.3, 0.5 * abs(float(c.y[c.second].mean() - c.y[~c.second].mean())))
-
-
-def change_of_any_kind(c: MatchedChannel, level: float = 1.0, bend: float = 0.1, local: float = 0.06) -> Array:
-    """Prior covariance of a change d at all points, whichever recording they are of, (N, N)."""
-    z = unit_coordinates(c)
-    line = (level * _level(c)) ** 2 + 0.2**2 * (np.outer(z[:, 0], z[:, 0]) + np.outer(z[:, 1], z[:, 1]))
-    wave = local**2 * smooth_kernel(c, _LOCAL) if local else 0.0
-    return np.asarray(line + bend**2 * smooth_kernel(c) + wave)
-
-
-def free_change(c: MatchedChannel, level: float = 1.0, bend: float = 0.1, local: float = 0.06) -> Array:
-    """Covariance of a change of any smooth kind between the recordings, (N, N)."""
-    b = c.second.astype(float)
-    return np.asarray(change_of_any_kind(c, level, bend, local) * np.outer(b, b))
-
-
-def log_likelihood(K: Array, y: Array) -> float:
-    """Logarithm of the Gaussian density (Rasmussen and Williams, eq. 2.30)."""
-    from scipy.linalg import cho_solve, cholesky
-
-    L = cholesky(K, lower=True, check_finite=False)
-    alpha = cho_solve((L, True), y, check_finite=False)
-    return float(-0.5 * y @ alpha - np.log(np.diag(L)).sum() - 0.5 * y.size * math.log(2.0 * math.pi))
-
-
-def steady_change(c: MatchedChannel) -> Array:
-    """Covariance of a change by one factor, or nearly so, between the recordings, (N, N)."""
-    z, b = unit_coordinates(c), c.second.astype(float)
-    line = _level(c) ** 2 + 0.03**2 * (np.outer(z[:, 0], z[:, 0]) + np.outer(z[:, 1], z[:, 1]))
-    return np.asarray(line * np.outer(b, b))
-
-
-def scatter_of(c: MatchedChannel, change: Array | None = None) -> tuple[Scatter, float]:
-    """Scatter and bend that make the readings likeliest with such a change, and the logarithm of that likelihood."""
-    change, y = free_change(c) if change is None else change, c.y - c.y.mean()
-    ways = {
-        "share": _SHARES if not c.u.any() else (0.0005, *_SHARES),
-        "bend": _BENDS,
-        "wiggle": _WIGGLES,
-        "floor": _FLOORS if c.name in LOADS else (0.0,),
-    }
-    best, score = Scatter(0.008, 0.0, 0.0, 0.1), -math.inf
-    for _ in range(2):
-        for name, values in ways.items():
-            for value in values:
-                tried = replace(best, **{name: value})
-                z = log_likelihood(covariance(c, tried) + change, y)
-                if z > score:
-                    best, score = tried, z
-    return best, score
-
-
-def without_strays(c: MatchedChannel) -> tuple[MatchedChannel, int]:
-    """Leave out readings that all others contradict (left-one-out, Rasmussen and Williams, eq. 5.12)."""
-    n = 0
-    for _ in range(3):
-        s, _ = scatter_of(c)
-        y = c.y - c.y.mean()
-        inverse = np.linalg.inv(covariance(c, s) + free_change(c))
-        z = (inverse @ y) / np.sqrt(np.diag(inverse))
-        worst = np.abs(z) > _FAR
-        if not worst.any() or worst.sum() > max(1, 0.1 * y.size) or y.size - worst.sum() < 6:
-            break
-        n += int(worst.sum())
-        keep = ~worst
-        if min(keep[c.second].sum(), keep[~c.second].sum()) < 2:
-            break
-        c = taken(c, keep)
-    return c, n
-
-
 def taken(c: MatchedChannel, keep: NDArray[np.bool_]) -> MatchedChannel:
     """Some of the points."""
     columns = ("y", "x", "second", "run", "floor", "u", "shift")
     return replace(c, **{k: v[keep] for k in columns if (v := getattr(c, k)) is not None})
 
 
-def ratio_of(c: MatchedChannel, s: Scatter) -> dict[str, Any]:
-    """Ratio of B to A at equal speed."""
-    from scipy.linalg import cho_factor, cho_solve
-
-    free, y = free_change(c), c.y - c.y.mean()
-    C = covariance(c, s) + free
-    factor = cho_factor(C, lower=True)
-    low, high = c.common()
-    apart = low > high
-    if apart:
-        low, high = high, low
-    inside = (c.x[:, 0] >= low - 0.01) & (c.x[:, 0] <= high + 0.01)
-    at = np.flatnonzero(inside) if inside.any() else np.arange(y.size)
-    b = c.second.astype(float)
-    shape = change_of_any_kind(c)
-    cross = shape[at] * b[None, :]
-    d = cross @ cho_solve(factor, y)
-    cov = shape[np.ix_(at, at)] - cross @ cho_solve(factor, cross.T)
-    n = at.size
-    weight = np.full(n, 1.0 / n)
-    mean, sd = float(weight @ d), math.sqrt(max(float(weight @ cov @ weight), 0.0))
-    out: dict[str, Any] = {"ratio": math.exp(mean)}
-    for name, q in (("68", 1.0), ("95", 1.96)):
-        out[f"low{name}"], out[f"high{name}"] = math.exp(mean - q * sd), math.exp(mean + q * sd)
-    out |= _slopes(c, at, d, cov)
-    order = at[np.argsort(c.x[at, 0])]
-    back = {int(i): k for k, i in enumerate(at)}
-    keep = order[np.unique(np.linspace(0, n - 1, min(n, 25)).round().astype(int))]
-    e = np.sqrt(np.maximum(np.diag(cov), 0.0))
-    rows = [back[int(i)] for i in keep]
-    ends = [np.exp(d[rows] + q * e[rows]) for q in (0.0, -1.96, 1.96)]
-    out["curve"] = np.column_stack([c.x[keep], *ends]).tolist()
-    slow, fast = c.common_advance()
-    out["apart"] = bool(slow > fast + _MARGIN * float(np.ptp(c.x[:, 1])))
-    out["extrapolated"] = apart or out["apart"]
-    out["range"] = [low, high]
-    out["advance_range"] = [slow, fast]
-    out["scatter"] = s.share
-    out["points"] = [int((~c.second).sum()), int(c.second.sum())]
-    return out
-
-
-def _slopes(c: MatchedChannel, at: NDArray[np.intp], d: Array, cov: Array) -> dict[str, float]:
-    """Least-squares slopes of d over ln n (per doubling) or the command, and over advance, with their errors."""
-    out: dict[str, float] = {}
-    names = ("slope", "advance_slope")
-    unit = (
-        math.log(2.0) if c.name not in ("speed", "voltage") else max(float(np.ptp(c.x[at, 0])), 1e-12),
-        max(float(np.ptp(c.x[at, 1])), 1e-12),
-    )
-    columns = [k for k in (0, 1) if np.ptp(c.x[at, k]) > 1e-6]
-    X = np.column_stack([np.ones(at.size), *((c.x[at, k] - c.x[at, k].mean()) / unit[k] for k in columns)])
-    back = np.linalg.pinv(X)
-    for j, k in enumerate(columns, 1):
-        out[names[k]] = float(back[j] @ d)
-        out[f"{names[k]}_error"] = math.sqrt(max(float(back[j] @ cov @ back[j]), 0.0))
-    return out
-
-
 def in_common(c: MatchedChannel) -> MatchedChannel:
     """Points where both recordings were, with a margin; all where they have no range in common."""
     low, high = c.common()
-    margin = _MARGIN if c.name not in ("speed", "voltage") else _MARGIN * float(np.ptp(c.x[:, 0]))
+    margin = MARGIN if c.name not in ("speed", "voltage") else MARGIN * float(np.ptp(c.x[:, 0]))
     keep = (c.x[:, 0] >= low - margin) & (c.x[:, 0] <= high + margin)
     slow, fast = c.common_advance()
     if slow < fast:
-        margin = _MARGIN * float(np.ptp(c.x[:, 1]))
+        margin = MARGIN * float(np.ptp(c.x[:, 1]))
         keep &= (c.x[:, 1] >= slow - margin) & (c.x[:, 1] <= fast + margin)
     enough = min(keep[c.second].sum(), keep[~c.second].sum()) >= 2
     return taken(c, keep) if low <= high and enough else c
-
-
-@dataclass(frozen=True, eq=False)
-class MatchedRuns:
-    """Channels of one kind that both recordings have."""
-
-    channels: Mapping[str, MatchedChannel]  # By name
-    # Likeliest scatter if anything smooth, or one factor, changed between the recordings
-    free: Mapping[str, Scatter]
-    steady: Mapping[str, Scatter]
-    likelier: Mapping[str, Scatter]  # The better of the two
-    strays: Mapping[str, int]  # Readings that were left out
-    bent: Mapping[str, float]  # Logarithm of the likelihood of any smooth change over that of one factor
-
-
-def prepared(a: StandRun, b: StandRun, names: Sequence[str], diameter: float) -> MatchedRuns:
-    """Match channels, and find their scatter."""
-    channels: dict[str, MatchedChannel] = {}
-    free: dict[str, Scatter] = {}
-    steady: dict[str, Scatter] = {}
-    likelier: dict[str, Scatter] = {}
-    strays: dict[str, int] = {}
-    bent: dict[str, float] = {}
-    for name in names:
-        found = matched(a, b, name, diameter)
-        if found is not None:
-            channels[name], n = without_strays(in_common(found))
-            free[name], loose = scatter_of(channels[name])
-            steady[name], stiff = scatter_of(channels[name], steady_change(channels[name]))
-            likelier[name] = free[name] if loose > stiff else steady[name]
-            bent[name] = loose - stiff
-            if n:
-                strays[name] = n
-    return MatchedRuns(channels, free, steady, likelier, strays, bent)

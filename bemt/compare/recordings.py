@@ -14,20 +14,13 @@ import numpy as np
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
-from bemt.compare import matched as fits
-from bemt.compare.invocation import Invocation
-from bemt.compare.matched import MatchedChannel, Scatter
+from bemt.compare import smooth_change as fits
+from bemt.compare.matched import DRIVE, LOADS, MatchedChannel, advance, density_change
 from bemt.compare.scaling import CLEAR, OWN_SHAPE, UNKNOWN, Judgement, judge, weigh
-from bemt.compare.scaling_laws import FAMILY, law
+from bemt.compare.scaling_laws import law
+from bemt.compare.smooth_change import Scatter
 from bemt.compare.stand_run import StandRun
 
-AIR_OF_BOTH = "--air-a TEMPERATURE,PRESSURE --air-b TEMPERATURE,PRESSURE"
-DAYS = (
-    "note temperature and pressure of both days, with units as in 20C,1013hPa; density is the first thing that differs "
-    "between days"
-)
-"""What tells two runs apart whose loads differ by a share."""
-SCHEMA = "bemt.comparison/1"
 REVERSED = "thrust has the other sign in B, and its size is the same"
 """Verdict of a reversed cell, or of a rotor that is mounted or turns the other way round."""
 ERROR_IN = "error in "
@@ -37,20 +30,11 @@ _TOLD_DENSITY, _BAROMETER, _SURE = 0.012, 0.004, 2.0
 # A battery or supply: voltage that was read apart by more than this at equal command, share; loads that do not matter.
 _TOLD_VOLTAGE, _FOLLOWS, _SAME_LOAD = 0.03, 0.3, 0.1
 _NO_TALK = Judgement("insufficient", (), {}, {}, "not recorded in both")
-_TORQUES = {"torque_Nm", "power_W", "CP", "CQ"}
-# Density is asked for unless it is this many times less likely than the likeliest cause.
-_FIRST = 5.0
-# Change of a load that days of one site can make, in ln.
-_DAY = 0.12
-# Start of a verdict that rests on what both recordings state.
-_TOLD = ("density as recorded", "by the thermometers", "voltage as recorded")
 _MOVED, _WIDE = 2.5, 1.4
 # Thrust of a propeller of 2.3 times the diameter at one speed: no stand takes both. [1]
 _FAR_OFF = 30.0
 # Share of misread speeds from which the sensor is doubtful, and from which the others are no good either.
 _DOUBTFUL, _NOISE = 0.05, 0.3
-# Scatter of readings at one speed, share, that no stand has: something else changes from reading to reading.
-_RESTLESS = 0.10
 # Odds (ln) of any smooth change over one factor from which a load did not change by one.
 _BENT = 3.0
 # Difference of the mean advance ratios, share of the largest, from which the drive has another load.
@@ -75,7 +59,7 @@ class RunChange:
     b: StandRun
     diameter_m: float  # Of the rotor [m]; NaN: unknown
     channels: Mapping[str, MatchedChannel]  # What both recorded
-    # B over A by channel: of :func:`bemt.compare.matched.ratio_of`, and ``density_ratio``
+    # B over A by channel: of :func:`bemt.compare.smooth_change.ratio_of`, and ``density_ratio``
     ratios: Mapping[str, Mapping[str, Any]]
     # Verdict on what acts on the rotor, and on motor, controller and battery
     loads: Judgement
@@ -86,13 +70,13 @@ class RunChange:
     @property
     def density_ratio(self) -> float:
         """Recorded density of B over that of A, by thermometers alone if need be; NaN unless both tell."""
-        log_ratio, unsure = fits.density_change(self.a, self.b)
+        log_ratio, unsure = density_change(self.a, self.b)
         return math.exp(log_ratio) if unsure else self.b.density / self.a.density
 
     @property
     def loads_by_name(self) -> dict[str, MatchedChannel]:
         """What acts on the rotor, by thrust and torque."""
-        return {c.name: c for c in self.channels.values() if c.name in fits.LOADS}
+        return {c.name: c for c in self.channels.values() if c.name in LOADS}
 
     @property
     def leading(self) -> Judgement:
@@ -103,7 +87,7 @@ class RunChange:
     @property
     def near(self) -> bool:
         """Whether no load differs so much that the drive would follow it."""
-        loads = [abs(math.log(r["ratio"])) for r in self.ratios.values() if r["kind"] in fits.LOADS]
+        loads = [abs(math.log(r["ratio"])) for r in self.ratios.values() if r["kind"] in LOADS]
         return bool(loads) and max(loads) < _SAME_LOAD
 
 
@@ -111,10 +95,10 @@ def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> RunChange
     """Compare two recordings."""
     told = [d for d in (diameter_m, a.diameter_m, b.diameter_m) if math.isfinite(d)]
     diameter = told[0] if told else math.nan
-    rotor = fits.prepared(a, b, tuple(fits.LOADS), diameter)
+    rotor = fits.prepared(a, b, tuple(LOADS), diameter)
     loads = rotor.channels
     spoken = {c.channel for c in loads.values()}
-    behind = fits.prepared(a, b, [k for k, names in fits.DRIVE.items() if not spoken & set(names)], diameter)
+    behind = fits.prepared(a, b, [k for k, names in DRIVE.items() if not spoken & set(names)], diameter)
     drive = behind.channels
     if not loads and not drive:
         silent = [r for r in (a, b) if not {"rpm", "J"} & r.points.values.keys()]
@@ -132,14 +116,14 @@ def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> RunChange
                 "Name units in the headings, or use a recording.toml",
             )
         )
-    told_density, unsure = fits.density_change(a, b)
+    told_density, unsure = density_change(a, b)
     known = math.hypot(_BAROMETER, unsure) if told_density or math.isfinite(a.density + b.density) else None
     scatter = {**rotor.likelier, **behind.likelier}
     ratios = {c.channel: _ratio(c, scatter[n]) for n, c in {**loads, **drive}.items()}
     verdict = _NO_TALK
     if loads:
         weighed = weigh(loads, (rotor.free, rotor.steady), ("air", "stand"), known, _speeds(ratios))
-        largest = max(abs(math.log(r["ratio"])) for r in ratios.values() if r["kind"] in fits.LOADS)
+        largest = max(abs(math.log(r["ratio"])) for r in ratios.values() if r["kind"] in LOADS)
         if largest >= CLEAR and max(rotor.bent[n] for n in loads) < _BENT:
             weighed = (_by_factors(weighed[0]), weighed[1])
         verdict = judge(*weighed, largest)
@@ -175,7 +159,7 @@ def _unloaded(a: StandRun, b: StandRun, diameter: float) -> bool:
     """Whether the rotor takes another load at one command because it meets another wind."""
     if not all("rpm" in run.points for run in (a, b)):
         return False
-    one, two = (fits.advance(run, diameter)[np.isfinite(run.points["rpm"])] for run in (a, b))
+    one, two = (advance(run, diameter)[np.isfinite(run.points["rpm"])] for run in (a, b))
     return bool(abs(np.median(two) - np.median(one)) > _OTHER_WIND * max(one.max(), two.max()))
 
 
@@ -209,7 +193,7 @@ def _by_proxy(said: Judgement, loads: Mapping[str, MatchedChannel]) -> Judgement
 
 def _far_apart(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> Judgement:
     """No answer where the runs share no advance ratio or no speed, unless a ratio of pole pairs explains just that."""
-    loads = [r for r in ratios.values() if r["kind"] in fits.LOADS]
+    loads = [r for r in ratios.values() if r["kind"] in LOADS]
     wide = all(r["extrapolated"] and (r["apart"] or r["high95"] / r["low95"] > _WIDE) for r in loads)
     if not loads or not wide or said.effects == ("rpm_scale",):
         return said
@@ -228,7 +212,7 @@ def _wind(said: Judgement, a: StandRun, b: StandRun) -> Judgement:
 
 def _far_off(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> Judgement:
     """No answer where loads differ by more than one stand can measure."""
-    loads = [abs(math.log(r["ratio"])) for r in ratios.values() if r["kind"] in fits.LOADS]
+    loads = [abs(math.log(r["ratio"])) for r in ratios.values() if r["kind"] in LOADS]
     if min(loads) < math.log(_FAR_OFF) or said.effects in (("rpm_scale",), ("unit_slip",)):
         return said
     return Judgement("insufficient", (), said.probability, said.size, OTHER_STAND)
@@ -270,17 +254,6 @@ def _moved(effects: Sequence[str]) -> set[str]:
     return set() if None in rows else {name for row in rows if row for _, term in row.terms for name in term}
 
 
-def _restless(change: RunChange) -> str:
-    """Letter of the recording whose readings at one speed differ by more than those of any stand; "" where none do."""
-    for name in fits.LOADS:
-        c = change.loads_by_name.get(name)
-        if c is not None:
-            for letter, here in (("b", c.second), ("a", ~c.second)):
-                if float(np.median(c.u[here])) > _RESTLESS:
-                    return letter
-    return ""
-
-
 def _speeds(ratios: Mapping[str, Mapping[str, Any]]) -> tuple[float, float] | None:
     """Logarithm of the speed of B over A at equal command, and its 95 % error."""
     found = next((r for r in ratios.values() if r["kind"] == "speed"), None)
@@ -310,7 +283,7 @@ def _ratio(c: MatchedChannel, s: Scatter) -> dict[str, Any]:
 def _with_density(said: Judgement, a: StandRun, b: StandRun, loads: Mapping[str, MatchedChannel]) -> Judgement:
     """The recorded densities as the cause, where nothing else is left."""
     size = max((abs(c.log_density) for c in loads.values()), default=0.0)
-    log_ratio, unsure = fits.density_change(a, b)
+    log_ratio, unsure = density_change(a, b)
     if said.verdict != "none" or size < max(_TOLD_DENSITY, _SURE * unsure):
         return said
     why = f"density as recorded, {a.density:.4g} to {b.density:.4g} kg/m3; the coefficients agree"
@@ -330,7 +303,7 @@ def _with_density(said: Judgement, a: StandRun, b: StandRun, loads: Mapping[str,
 def _assumed(a: StandRun, b: StandRun, diameter: float, loads: Mapping[str, MatchedChannel]) -> list[str]:
     out = []
     unknown = [n for n, r in (("A", a), ("B", b)) if not math.isfinite(r.density)]
-    if unknown and fits.density_change(a, b)[1]:
+    if unknown and density_change(a, b)[1]:
         out.append("air pressure is not recorded in both: taken as equal within 1 %")
     elif unknown and any(c.channel in ("thrust_N", "torque_Nm", "power_W") for c in loads.values()):
         how = " ".join(f"--air-{n.lower()} 22C,1013hPa" for n in unknown)
@@ -363,7 +336,7 @@ def _notes(a: StandRun, b: StandRun, channels: Mapping[str, MatchedChannel], str
     ]
     for c in channels.values():
         low, high = c.common()
-        if low > high and c.name in fits.LOADS:
+        if low > high and c.name in LOADS:
             gap = math.exp(low - high) - 1.0
             out.append(f"{c.channel}: no common speed, {gap:.0%} apart; extrapolated by the law of the speed")
     if a.command and b.command and a.command != b.command:
@@ -378,101 +351,3 @@ def _misread(letter: str, run: StandRun) -> str:
     if n > _NOISE * total:
         return f"{words}; the speed channel of {letter} is mostly noise, do not trust what is left"
     return words + (f"; check the speed sensor of {letter}" if n > _DOUBTFUL * total else "")
-
-
-def next_step(change: RunChange, asked: Invocation) -> dict[str, str]:
-    """Run or reading that would settle the answer, and the command to give then, with all that was asked."""
-    said = change.leading
-    with_case = asked.command(case=asked.case or "CASE")
-    rows = [row for k in said.effects if (row := law(k)) is not None]
-    loads = [r for r in change.ratios.values() if r["kind"] in fits.LOADS]
-    if said.verdict == "none":
-        text = "to see smaller changes, remove the propeller, mount it again and repeat each run once"
-        return {"text": text, "command": ""}
-    if said.why.startswith(_TOLD):
-        return {"text": "", "command": ""}
-    if said.verdict in ("named", "sensor"):
-        text = rows[0].settles if rows else "read the label of the channel"
-        return {"text": f"to be sure, {text}", "command": with_case}
-    if said.why.endswith(IN_WIND):
-        letter = "a" if math.isfinite(change.a.zero_thrust_rpm) else "b"
-        air = getattr(asked, f"air_{letter}")
-        there = {f"air_{letter}": ",".join([*filter(None, [air]), "AIRSPEED"])}
-        text = f"state the airspeed of {letter.upper()}, with its unit as in 18m/s"
-        return {"text": text, "command": asked.command(**there)}
-    if loads and all(r["extrapolated"] for r in loads):
-        where = "where A was measured"
-        c = next(iter(change.loads_by_name.values()))
-        if "rpm" in change.a.points:
-            low, high = (math.exp(f(c.x[~c.second, 0])) for f in (np.min, np.max))
-            where = f"at the speeds of A, {low:.0f} to {high:.0f} rev/min"
-        return {"text": f"run B again {where}, and at its airspeeds", "command": asked.command(b="B_AGAIN.csv")}
-    if said.verdict in ("insufficient", "unknown") and (letter := _restless(change)):
-        run = change.a if letter == "a" else change.b
-        column = run.conditions[0] if run.conditions else "COLUMN"
-        others = f" (the file has {', '.join(run.conditions[:4])})" if run.conditions else ""
-        text = f"choose the rows of {letter.upper()} in which nothing else changes{others}"
-        return {"text": text, "command": asked.with_rows(letter, column)}
-    likely = {k: p for k, p in said.probability.items() if law(k) is not None}
-    density = likely.get("air_density", 0.0) * _FIRST >= max(likely.values(), default=1.0)
-    small = max((abs(math.log(r["ratio"])) for r in loads), default=1.0) < _DAY
-    if density and small and math.isnan(change.density_ratio):
-        return {"text": DAYS, "command": asked.with_days()}
-    if not _TORQUES & change.ratios.keys() and change.loads is said:
-        text = "record torque in both runs: thrust alone cannot tell gain, air and blade apart"
-        return {"text": text, "command": asked.command(a="A_WITH_TORQUE.csv", b="B_WITH_TORQUE.csv")}
-    if rows:
-        firsts = {FAMILY.get(row.id, row.id): row.settles for row in reversed(rows)}
-        text = "; or ".join(reversed(firsts.values()))
-        return {"text": text, "command": with_case}
-    text = "repeat the run of A and compare it with A; their difference is not a cause"
-    again = asked.command(b="A_AGAIN.csv", rows_b=asked.rows_a, air_b=asked.air_a)
-    return {"text": text, "command": again}
-
-
-def document(change: RunChange) -> dict[str, Any]:
-    """The document ``bemt.comparison/1`` without a case."""
-    said = change.leading
-    return {
-        "schema": SCHEMA,
-        "verdict": said.verdict,
-        "effects": list(said.effects),
-        "probability": sum(said.probability.get(k, 0.0) for k in said.effects) or said.probability.get(said.verdict),
-        "rule": said.why,
-        "ranking": _ranking(said),
-        "subsystems": {
-            name: {"verdict": j.verdict, "effects": list(j.effects), "rule": j.why, "ranking": _ranking(j)}
-            for name, j in (("loads", change.loads), ("drive", change.drive))
-        },
-        "ratios": {k: dict(v) for k, v in change.ratios.items()},
-        "density": {
-            "A": _finite(change.a.density),
-            "B": _finite(change.b.density),
-            "ratio": _finite(change.density_ratio),
-        },
-        "diameter_m": _finite(change.diameter_m),
-        "points": {"A": len(change.a), "B": len(change.b)},
-        "assumed": list(change.assumed),
-        "notes": list(change.notes),
-    }
-
-
-def _finite(x: float) -> float | None:
-    return float(x) if math.isfinite(x) else None
-
-
-def _ranking(said: Judgement) -> list[dict[str, Any]]:
-    out = []
-    for name, p in list(said.probability.items())[:12]:
-        parameters = {}
-        if name in said.size and p > 1e-3:
-            value, error = said.size[name]
-            unit = "of full scale" if name.endswith("_zero") or name == "nacelle" else "1"
-            ends = [value + k * 1.645 * error for k in (-1.0, 1.0)]
-            if unit == "1":
-                value, ends = math.exp(value), [math.exp(e) for e in ends]
-            parameters = {
-                "ratio" if unit == "1" else "share": {"value": value, "low": ends[0], "high": ends[1], "unit": unit}
-            }
-        out.append({"effect": name, "probability": p, "parameters": parameters})
-    return out

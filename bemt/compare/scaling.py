@@ -1,9 +1,9 @@
 """Which change can make the ratios of two recordings, without any blade: how loads scale, weighed by their evidence.
 
 Every row of :mod:`bemt.compare.scaling_laws` says how thrust, torque or the drive move together and with what they
-grow. A row is a linear Gaussian model on top of :func:`bemt.compare.matched.covariance`, so its evidence has a closed
-form (Rasmussen and Williams 2006, eq. 2.30 and 2.40 to 2.43). Two rivals always compete: nothing, and a smooth change
-of every channel on its own. What a blade would do in detail is not known here; with a case,
+grow. A row is a linear Gaussian model on top of :func:`bemt.compare.smooth_change.covariance`, so its evidence has a
+closed form (Rasmussen and Williams 2006, eq. 2.30 and 2.40 to 2.43). Two rivals always compete: nothing, and a smooth
+change of every channel on its own. What a blade would do in detail is not known here; with a case,
 :mod:`bemt.diagnose.contrast` asks the solver.
 """
 
@@ -16,9 +16,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.compare import matched as fits
-from bemt.compare.matched import MatchedChannel, Scatter
+from bemt.compare import smooth_change as fits
+from bemt.compare.matched import LOADS, POWER_OF_SPEED, MatchedChannel
 from bemt.compare.scaling_laws import FAMILY, LAWS, ScalingLaw, law
+from bemt.compare.smooth_change import Scatter
 
 Array = NDArray[np.float64]
 
@@ -75,7 +76,7 @@ def _bases(c: MatchedChannel, volts: float | Array = 1.0) -> dict[str, Array]:
         X = np.column_stack([np.ones(b.size), b, J, J**2])  # at one airspeed J and n are one coordinate
         fit = np.linalg.lstsq(X, c.y, rcond=None)[0]
         slope = J * (fit[2] + 2.0 * fit[3] * J)
-    square = np.exp(2.0 * (c.x[:, 0] - c.x[:, 0].max())) if c.name in fits.LOADS else np.ones(b.size)
+    square = np.exp(2.0 * (c.x[:, 0] - c.x[:, 0].max())) if c.name in LOADS else np.ones(b.size)
     load = np.exp(c.y - c.y.max())
     ramp = fits.unit_coordinates(c)[:, 0]
     ramp = ramp / max(float(np.abs(ramp).max()), 1e-12)
@@ -175,7 +176,7 @@ def _at_speed(c: MatchedChannel, factor: float) -> MatchedChannel:
     x = c.x.copy()
     if not c.advance_moves():
         x[c.second, 0] += math.log(factor)
-    return replace(c, x=x, y=c.y - fits.POWER_OF_SPEED.get(c.channel, 2.0) * math.log(factor) * c.second)
+    return replace(c, x=x, y=c.y - POWER_OF_SPEED.get(c.channel, 2.0) * math.log(factor) * c.second)
 
 
 def _by_poles(

@@ -18,9 +18,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bemt.base.errors import InputError
+from bemt.compare.change_document import document, next_step
 from bemt.compare.contrast_text import headline
 from bemt.compare.invocation import Invocation
-from bemt.compare.recordings import RunChange, changed, document, next_step
+from bemt.compare.recordings import RunChange, changed
 from bemt.compare.scaling_laws import LAWS
 from bemt.compare.stand_run import StandRun, stand_run
 from bemt.dataset import Dataset

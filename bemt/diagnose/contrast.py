@@ -14,10 +14,12 @@ from typing import TYPE_CHECKING, Any
 from bemt import __version__
 from bemt.base.errors import Fault, InputError
 from bemt.base.face import as_html
+from bemt.compare.change_document import document, next_step
 from bemt.compare.contrast_text import sentence
 from bemt.compare.invocation import Invocation
-from bemt.compare.recordings import ERROR_IN, RunChange, changed, document, next_step
-from bemt.compare.stand_run import conditions_of, selected, stand_run, with_air
+from bemt.compare.recordings import ERROR_IN, IN_WIND, RunChange, changed
+from bemt.compare.selection import conditions_of, selected, with_air
+from bemt.compare.stand_run import stand_run
 from bemt.effects import catalogue
 
 if TYPE_CHECKING:
@@ -154,9 +156,9 @@ def compare(
     found = changed(runs[0], runs[1], math.nan if D is None else D)
     doc = document(found) | {"version": __version__, "recordings": names, "rows": {"A": rows_a, "B": rows_b}}
     doc["notes"] = [*_errors(findings), *doc["notes"]]
-    if case is not None:
+    if case is not None and not found.loads.why.endswith(IN_WIND):
         doc |= _agreed(_diagnosed(asked, read, case, progress), doc, found)
-    own = case is not None and doc["verdict"] == doc["diagnosis"]["verdict"] and doc["rule"] == doc["diagnosis"]["rule"]
+    own = "diagnosis" in doc and all(doc[k] == doc["diagnosis"][k] for k in ("verdict", "rule"))
     step = _after(doc) if own else next_step(found, asked)
     doc["next_measurement"] = step | {"command": ""} if step["command"] == asked.command() else step
     return Contrast(found, doc)

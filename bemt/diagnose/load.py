@@ -18,7 +18,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
 from bemt.case import find_cases, load_case
 from bemt.case.prepare import prepare_case
-from bemt.compare.stand_run import one_rotor, speed_in_doubt, wind_of
+from bemt.compare.doubts import one_rotor, speed_in_doubt, wind_of
 from bemt.dataset import Dataset
 from bemt.diagnose import cfd_points
 from bemt.diagnose import record as records
@@ -77,7 +77,7 @@ def load(
     imported = _filled(imported, rpm, airspeed_m_s)
     speed_in_doubt(imported, path)
     _speed_missing(imported, path)
-    _airspeed_in_doubt(imported, path)
+    _airspeed_in_doubt(imported, case, path)
     _same_rotor(imported, case, path)
     ducted = case.ducted
     findings = check(imported, diameter_m=case.diameter_m, blades=int(case.get("rotor.blades")), ducted=ducted)
@@ -116,12 +116,12 @@ def _speed_missing(imported: Dataset, path: str) -> None:
         raise InputError(Fault(path, "rpm", got, "the speed of every row", hint))
 
 
-def _airspeed_in_doubt(imported: Dataset, path: str) -> None:
+def _airspeed_in_doubt(imported: Dataset, case: Case, path: str) -> None:
     """Refuse thrust that passes zero as in a wind that nobody stated: everything would be blamed on the rotor."""
     zero = wind_of(imported)
-    if zero is not None:
+    if zero is not None and not case.airspeed_m_s:
         got = f"thrust that is negative below {zero:.0f} rev/min, as in wind, and no airspeed"
-        hint = "State it: --airspeed V; in still air the zero of the load cell is off: --airspeed 0"
+        hint = "State it: --airspeed V (compare: --air-a or --air-b); in still air, where the cell's zero is off: 0"
         raise InputError(Fault(path, "airspeed_m_s", got, "the airspeed", hint))
 
 

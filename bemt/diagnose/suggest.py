@@ -13,7 +13,7 @@ from bemt import effects
 from bemt.air import R_DRY
 from bemt.base.units import ZERO_CELSIUS
 from bemt.bem import model as bem
-from bemt.compare.recordings import AIR_OF_BOTH, DAYS
+from bemt.compare.change_document import AIR_OF_BOTH, DAYS
 from bemt.diagnose import noise
 from bemt.diagnose.assemble import assemble
 from bemt.diagnose.confusion import ALIKE

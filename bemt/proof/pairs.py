@@ -159,7 +159,8 @@ def _flight(path: Path, mass_kg: float) -> dict[str, Array]:
 
 def _read(path: Path, how: Mapping[str, Any]) -> dict[str, Array]:
     """Steady points of one recording, in SI."""
-    from bemt.compare.stand_run import selected, stand_run
+    from bemt.compare.selection import selected
+    from bemt.compare.stand_run import stand_run
     from bemt.recordings.load import import_file
 
     if "mass_kg" in how:

@@ -1,0 +1,140 @@
+"""The document ``bemt.comparison/1`` of two recordings without a case, and the step that would settle it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from bemt.compare.invocation import Invocation
+from bemt.compare.matched import LOADS
+from bemt.compare.recordings import IN_WIND, RunChange
+from bemt.compare.scaling import Judgement
+from bemt.compare.scaling_laws import FAMILY, law
+
+AIR_OF_BOTH = "--air-a TEMPERATURE,PRESSURE --air-b TEMPERATURE,PRESSURE"
+DAYS = (
+    "note temperature and pressure of both days, with units as in 20C,1013hPa; density is the first thing that differs "
+    "between days"
+)
+"""What tells two runs apart whose loads differ by a share."""
+SCHEMA = "bemt.comparison/1"
+_TORQUES = {"torque_Nm", "power_W", "CP", "CQ"}
+# Density is asked for unless it is this many times less likely than the likeliest cause.
+_FIRST = 5.0
+# Change of a load that days of one site can make, in ln.
+_DAY = 0.12
+# Start of a verdict that rests on what both recordings state.
+_TOLD = ("density as recorded", "by the thermometers", "voltage as recorded")
+# Scatter of readings at one speed, share, that no stand has: something else changes from reading to reading.
+_RESTLESS = 0.10
+
+
+def next_step(change: RunChange, asked: Invocation) -> dict[str, str]:
+    """Run or reading that would settle the answer, and the command to give then, with all that was asked."""
+    said = change.leading
+    with_case = asked.command(case=asked.case or "CASE")
+    rows = [row for k in said.effects if (row := law(k)) is not None]
+    loads = [r for r in change.ratios.values() if r["kind"] in LOADS]
+    if said.verdict == "none":
+        text = "to see smaller changes, remove the propeller, mount it again and repeat each run once"
+        return {"text": text, "command": ""}
+    if said.why.startswith(_TOLD):
+        return {"text": "", "command": ""}
+    if said.verdict in ("named", "sensor"):
+        text = rows[0].settles if rows else "read the label of the channel"
+        return {"text": f"to be sure, {text}", "command": with_case}
+    if said.why.endswith(IN_WIND):
+        letter = "a" if math.isfinite(change.a.zero_thrust_rpm) else "b"
+        air = getattr(asked, f"air_{letter}")
+        there = {f"air_{letter}": ",".join([*filter(None, [air]), "AIRSPEED"])}
+        text = f"state the airspeed of {letter.upper()}, with its unit as in 18m/s"
+        return {"text": text, "command": asked.command(**there)}
+    if loads and all(r["extrapolated"] for r in loads):
+        where = "where A was measured"
+        c = next(iter(change.loads_by_name.values()))
+        if "rpm" in change.a.points:
+            low, high = (math.exp(f(c.x[~c.second, 0])) for f in (np.min, np.max))
+            where = f"at the speeds of A, {low:.0f} to {high:.0f} rev/min"
+        return {"text": f"run B again {where}, and at its airspeeds", "command": asked.command(b="B_AGAIN.csv")}
+    if said.verdict in ("insufficient", "unknown") and (letter := _restless(change)):
+        run = change.a if letter == "a" else change.b
+        column = run.conditions[0] if run.conditions else "COLUMN"
+        others = f" (the file has {', '.join(run.conditions[:4])})" if run.conditions else ""
+        text = f"choose the rows of {letter.upper()} in which nothing else changes{others}"
+        return {"text": text, "command": asked.with_rows(letter, column)}
+    likely = {k: p for k, p in said.probability.items() if law(k) is not None}
+    density = likely.get("air_density", 0.0) * _FIRST >= max(likely.values(), default=1.0)
+    small = max((abs(math.log(r["ratio"])) for r in loads), default=1.0) < _DAY
+    if density and small and math.isnan(change.density_ratio):
+        return {"text": DAYS, "command": asked.with_days()}
+    if not _TORQUES & change.ratios.keys() and change.loads is said:
+        text = "record torque in both runs: thrust alone cannot tell gain, air and blade apart"
+        return {"text": text, "command": asked.command(a="A_WITH_TORQUE.csv", b="B_WITH_TORQUE.csv")}
+    if rows:
+        firsts = {FAMILY.get(row.id, row.id): row.settles for row in reversed(rows)}
+        text = "; or ".join(reversed(firsts.values()))
+        return {"text": text, "command": with_case}
+    text = "repeat the run of A and compare it with A; their difference is not a cause"
+    again = asked.command(b="A_AGAIN.csv", rows_b=asked.rows_a, air_b=asked.air_a)
+    return {"text": text, "command": again}
+
+
+def _restless(change: RunChange) -> str:
+    """Letter of the recording whose readings at one speed differ by more than those of any stand; "" where none do."""
+    for name in LOADS:
+        c = change.loads_by_name.get(name)
+        if c is not None:
+            for letter, here in (("b", c.second), ("a", ~c.second)):
+                if float(np.median(c.u[here])) > _RESTLESS:
+                    return letter
+    return ""
+
+
+def document(change: RunChange) -> dict[str, Any]:
+    """The document ``bemt.comparison/1`` without a case."""
+    said = change.leading
+    return {
+        "schema": SCHEMA,
+        "verdict": said.verdict,
+        "effects": list(said.effects),
+        "probability": sum(said.probability.get(k, 0.0) for k in said.effects) or said.probability.get(said.verdict),
+        "rule": said.why,
+        "ranking": _ranking(said),
+        "subsystems": {
+            name: {"verdict": j.verdict, "effects": list(j.effects), "rule": j.why, "ranking": _ranking(j)}
+            for name, j in (("loads", change.loads), ("drive", change.drive))
+        },
+        "ratios": {k: dict(v) for k, v in change.ratios.items()},
+        "density": {
+            "A": _finite(change.a.density),
+            "B": _finite(change.b.density),
+            "ratio": _finite(change.density_ratio),
+        },
+        "diameter_m": _finite(change.diameter_m),
+        "points": {"A": len(change.a), "B": len(change.b)},
+        "assumed": list(change.assumed),
+        "notes": list(change.notes),
+    }
+
+
+def _finite(x: float) -> float | None:
+    return float(x) if math.isfinite(x) else None
+
+
+def _ranking(said: Judgement) -> list[dict[str, Any]]:
+    out = []
+    for name, p in list(said.probability.items())[:12]:
+        parameters = {}
+        if name in said.size and p > 1e-3:
+            value, error = said.size[name]
+            unit = "of full scale" if name.endswith("_zero") or name == "nacelle" else "1"
+            ends = [value + k * 1.645 * error for k in (-1.0, 1.0)]
+            if unit == "1":
+                value, ends = math.exp(value), [math.exp(e) for e in ends]
+            parameters = {
+                "ratio" if unit == "1" else "share": {"value": value, "low": ends[0], "high": ends[1], "unit": unit}
+            }
+        out.append({"effect": name, "probability": p, "parameters": parameters})
+    return out

@@ -1,0 +1,187 @@
+"""Which rows, rotor and air of a file a comparison means."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.air import Air
+from bemt.base.errors import Fault, InputError
+from bemt.base.units import KNOT, MPH, ZERO_CELSIUS, split_suffix
+from bemt.dataset import Dataset
+from bemt.recordings.channels import MEASURED, named
+
+Array = NDArray[np.float64]
+
+_AIR = re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(C|K|hPa|Pa|kg/m3|m/s|kt|mph|km/h)")
+_CONDITION = re.compile(r"\s*([^=]+?)\s*=\s*(.+?)\s*")
+_RANGE = re.compile(r"([-+.\deE]+):([-+.\deE]+)")
+ROTOR = "rotor"
+# Two numbers of a table that differ by less are the same number.
+_SAME_NUMBER = 1e-6
+# Temperatures that air of a stand can have [K].
+COLD, HOT = 230.0, 330.0
+# Name of a column without a heading: its number is that of no rotor.
+NUMBERED = re.compile(r"column_\d+")
+_ROTOR_WORDS = ("left", "right", "upper", "lower", "front", "rear", "A", "B", "C", "D", "1", "2", "3", "4")
+
+
+def _kept(imported: Dataset, column: str, wanted: str, where: str) -> NDArray[np.bool_]:
+    """Rows of one condition: a text, a number, or a range of numbers."""
+    names = {h: k for k, h in imported.provenance.get("headings", {}).items()}
+    name = column if column in imported or column in imported.texts else names.get(column, column)
+    if name in imported.texts:
+        found = np.array([cell.strip() == wanted for cell in imported.texts[name]])
+        if not found.any():
+            known = ", ".join(list(dict.fromkeys(c.strip() for c in imported.texts[name]))[:8])
+            raise InputError(Fault(where, column, f"no row with {wanted}", f"one of {known}"))
+        return found
+    values = imported.values.get(name)
+    if values is None:
+        known = ", ".join([*imported.texts, *imported.values][:12])
+        raise InputError(Fault(where, column, "no such column", f"one of {known}"))
+    span = _RANGE.fullmatch(wanted)
+    try:
+        low, high = (float(span[1]), float(span[2])) if span else (float(wanted), float(wanted))
+    except ValueError:
+        raise InputError(Fault(where, column, wanted, "a number, or a range such as 0.9:1.1")) from None
+    slack = _SAME_NUMBER * max(abs(low), abs(high), 1e-12)
+    kept = (values >= low - slack) & (values <= high + slack)
+    if not kept.any():
+        v = values[np.isfinite(values)]
+        told = f"{v.min():g} to {v.max():g} in SI" if v.size else "a number"
+        raise InputError(Fault(where, column, f"no row with {wanted}", told))
+    return np.asarray(kept)
+
+
+def _words(name: str) -> list[str]:
+    """Words of the name of a channel, without its unit: the A of a current in ampere names no rotor."""
+    return split_suffix(name)[0].split("_")
+
+
+def rotors_of(imported: Dataset) -> list[str]:
+    """Rotors that the columns of a file tell apart.
+
+    >>> rotors_of(Dataset("bench", "table", {"T_A_N": [1.0], "T_B_N": [2.0], "current_A": [3.0]}))
+    ['A', 'B']
+    >>> rotors_of(Dataset("bench", "table", {"thrust_N": [1.0], "current_A": [3.0]}))
+    []
+    """
+    names = [_words(name) for name in imported.values if not NUMBERED.fullmatch(name)]
+    return [w for w in _ROTOR_WORDS if any(w in words for words in names)]
+
+
+def _of_rotor(imported: Dataset, word: str, where: str) -> Dataset:
+    """Columns of one of several rotors under their plain names; columns of the others go."""
+    known = rotors_of(imported)
+    if not known and any(f"only the {word} rotor" in note for note in imported.notes):
+        return imported
+    if word not in known:
+        raise InputError(Fault(where, ROTOR, word, f"one of {', '.join(known)}" if known else "a file of one rotor"))
+    others = set(known) - {word}
+    kept: dict[str, str] = {}
+    for name in imported.values:
+        own = _words(name)
+        if word in own:
+            base = "_".join(p for p in own if p != word)
+            kept[base + name[len("_".join(own)) :] if base else name.removeprefix(f"{word}_")] = name
+        elif not others & set(own):
+            kept.setdefault(name, name)
+    values = {new: imported[old] for new, old in kept.items()}
+    units = {new: imported.unit(old) for new, old in kept.items()}
+    return replace(imported, values=values, u={}, u_by={}, units=units, provenance={**imported.provenance, ROTOR: word})
+
+
+def selected(imported: Dataset, conditions: Sequence[str], where: str) -> Dataset:
+    """Keep the rows, or the rotor, that a user means.
+
+    >>> made = Dataset("bench", "table", {"rpm": [4e3, 5e3]}, lines=(2, 3))
+    >>> selected(made, ["rpm=4500:6000"], "a.csv").lines
+    (3,)
+    """
+    keep = np.ones(len(imported), dtype=bool)
+    for text in conditions:
+        found = _CONDITION.fullmatch(text)
+        if not found:
+            raise InputError(Fault(where, text, "no condition", "COLUMN=VALUE, COLUMN=LOW:HIGH or rotor=NAME"))
+        if found[1] == ROTOR and ROTOR not in imported:
+            imported = _of_rotor(imported, found[2], where)
+        else:
+            keep &= _kept(imported, found[1], found[2], where)
+    if keep.all():
+        return imported
+    if not keep.any():
+        raise InputError(Fault(where, ", ".join(conditions), "no row that meets all", "one or more"))
+    return imported.select(keep)
+
+
+_AIR_UNITS = {
+    "C": ("temperature_K", 1.0, ZERO_CELSIUS), "K": ("temperature_K", 1.0, 0.0),
+    "hPa": ("pressure_Pa", 100.0, 0.0),
+    "Pa": ("pressure_Pa", 1.0, 0.0), "kg/m3": ("density_kg_m3", 1.0, 0.0), "m/s": ("airspeed_m_s", 1.0, 0.0),
+    "kt": ("airspeed_m_s", KNOT, 0.0), "mph": ("airspeed_m_s", MPH, 0.0), "km/h": ("airspeed_m_s", 1.0 / 3.6, 0.0),
+}  # fmt: skip
+_AIR_RANGES = {"temperature_K": (COLD, HOT), "pressure_Pa": (4e4, 1.1e5), "density_kg_m3": (0.4, 1.6),
+               "airspeed_m_s": (0.0, 200.0)}  # fmt: skip
+
+
+def with_air(imported: Dataset, told: str | None, where: str) -> Dataset:
+    """Add the air of the day that a user tells, such as ``22C,1013hPa``, in place of what is recorded.
+
+    >>> told = with_air(Dataset("bench", "table", {"rpm": [4e3]}), "22C, 1013hPa", "--air-a").provenance
+    >>> round(told["constants"]["density_kg_m3"], 3)
+    1.196
+    """
+    if told is None:
+        return imported
+    known, faults = {}, []
+    for part in told.split(","):
+        found = _AIR.fullmatch(part.strip())
+        name, factor, offset = _AIR_UNITS[found[2]] if found else ("", 1.0, 0.0)
+        value = float(found[1]) * factor + offset if found else math.nan
+        low, high = _AIR_RANGES.get(name, (0.0, 0.0))
+        if not low <= value <= high:
+            hint = "A temperature alone takes one pressure for both runs"
+            expected = "a number with C, K, hPa, Pa, kg/m3 or, of a wind, m/s, kt, such as 22C,1013hPa"
+            faults.append(Fault(where, "", repr(part), expected, hint))
+        known[name] = value
+    wind = known.pop("airspeed_m_s", None)
+    if set(known) == {"pressure_Pa"}:
+        faults.append(Fault(where, "", repr(told), "a temperature too, or a density"))
+    if faults:
+        raise InputError(faults)
+    if known.keys() >= {"temperature_K", "pressure_Pa"}:
+        known["density_kg_m3"] = Air.from_state(known["pressure_Pa"], known["temperature_K"] - ZERO_CELSIUS).rho
+    gone = {*known, *(_AIR_RANGES if known else ()), *(("airspeed_m_s", "V_m_s", "J") if wind is not None else ())}
+    gone -= {"airspeed_m_s"} if wind is None else set()
+    left = {k: v for k, v in imported.values.items() if k not in gone}
+    if wind is not None:
+        left["airspeed_m_s"] = np.full(len(imported), wind)
+    u = {k: v for k, v in imported.u.items() if k in left}
+    constants = {k: v for k, v in imported.provenance.get("constants", {}).items() if k not in gone}
+    return replace(imported, values=left, u=u, provenance={**imported.provenance, "constants": constants | known})
+
+
+def conditions_of(imported: Dataset) -> tuple[str, ...]:
+    """Columns that may tell one condition from another: no load, no speed, no clock, and not the same in every row.
+
+    >>> made = Dataset("bench", "table", {"rpm": [4e3, 5e3, 6e3], "spacing_m": [0.1, 0.1, 0.2]})
+    >>> conditions_of(made)
+    ('spacing_m',)
+    """
+    texts = [k for k, v in imported.texts.items() if 1 < len(set(v)) < len(v)]
+    known = {*MEASURED, *named(imported).provenance["names"].values()}
+    known |= {k for k in imported.values if k.startswith("u_") or {"err", "rpm", "vibration"} & set(k.split("_"))}
+    numbers = [k for k, v in imported.values.items() if k not in known and moves(v)]
+    return (*texts, *numbers)
+
+
+def moves(v: Array) -> bool:
+    """Whether a column has more than one value."""
+    finite = v[np.isfinite(v)]
+    return finite.size > 1 and float(np.ptp(finite)) > 0.0
