@@ -309,7 +309,8 @@ def suggest(
             return Suggestion(REFERENCE, (), names, now, max(gained, now), "reference")
     after, option = best
     apart, worth = now >= _ENOUGH and not reference, after >= _WORTH * now
-    look = next((f"for {n}, {check}" for n in names if (check := _check(n))), "")
+    aims = ("confirm", "rule out")
+    look = next((f"to {aim} {n}, {check}" for aim, n in zip(aims, names, strict=True) if (check := _check(n))), "")
     # what is told apart already, or would still be alike, is rather looked at than run
     if option is not None and worth and not (look and (apart or after < _ENOUGH)):
         return Suggestion(option.text, _points(problem.parts[0].record, option), names, now, after)
