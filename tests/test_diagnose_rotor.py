@@ -44,7 +44,7 @@ def test_one_channel_in_another_unit_stays_a_finding_of_its_own() -> None:
     answer = chain.diagnose([from_series(slipped("unit"), case())], [case()], nulls=200)
     assert answer.decision.effects == ("unit_slip",)
     # a tenth of the load is low by nine tenths of the largest value, not by 900 %
-    assert all(abs(share) <= 1.0 for share in answer.off.values()) and abs(answer.where.size) <= 1.0
+    assert all(abs(share) <= 1.0 for share, _ in answer.off.values()) and abs(answer.where.size) <= 1.0
 
 
 def test_a_speed_in_another_unit_is_solved_at_the_speed_that_it_was() -> None:

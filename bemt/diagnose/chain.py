@@ -30,6 +30,10 @@ __all__ = ["Diagnosis", "diagnose"]
 Array = NDArray[np.float64]
 
 
+# Computed loads below this share of the largest have no ratio; departures above it are said where the median is small.
+_NEAR_ZERO, _FAR = 0.1, 0.05
+
+
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
     """Everything that was found.
@@ -109,6 +113,21 @@ class Diagnosis:
     def problem(self) -> Problem:
         """Readings, baseline, nuisances."""
         return self.found.problem
+
+    @property
+    def off(self) -> dict[str, tuple[float, bool]]:
+        """How far each channel is from the case: median of the ratio, less 1 [1]; or how far most go, and True."""
+        p, out = self.problem, {}
+        for c, name in enumerate(CHANNELS):
+            here = (p.channel == c) & p.free
+            here &= np.abs(p.f0) > _NEAR_ZERO * np.max(np.abs(p.f0), where=here, initial=0.0)
+            if here.any():
+                change = p.y[here] / p.f0[here] - 1.0
+                order = np.argsort(np.abs(change))
+                median, far = float(np.median(change)), float(change[order[int(0.9 * (change.size - 1))]])
+                wide = abs(far) > _FAR and abs(median) < 0.5 * abs(far)
+                out[name] = (far if wide else median), wide
+        return out
 
     @property
     def marked(self) -> location.Location | None:

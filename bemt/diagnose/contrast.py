@@ -35,8 +35,8 @@ _IMPOSSIBLE = 1e-4
 # "None" in the ratios less likely than this is no answer of the diagnosis either.
 _UNLIKELY = 0.15
 _CLAIMS = ("named", "sensor", "class")
-# Findings on a column that repeats itself or another one.
-_NO_MEASUREMENT = ("constant_column", "duplicate_column")
+# Finding on a column that is no measurement; two columns with one ratio may be computed ones.
+_STUCK = "constant_column"
 # Rows and number of the values of a column that tells parts of one file apart.
 _ROWS, _KINDS = 3, 20
 
@@ -175,7 +175,7 @@ def _findings(imported: Dataset, diameter_m: float | None, ducted: bool) -> tupl
 
 def _sound(imported: Dataset, findings: Sequence[Finding]) -> Dataset:
     """The recording without columns that are no measurement."""
-    gone = {f.channel for f in findings if f.id in _NO_MEASUREMENT}
+    gone = {f.channel for f in findings if f.id == _STUCK}
     if not gone:
         return imported
     values = {k: v for k, v in imported.values.items() if k not in gone}
@@ -188,7 +188,7 @@ def _errors(findings: Sequence[Sequence[Finding]]) -> list[str]:
     for letter, found in zip("AB", findings, strict=True):
         for f in found:
             told = f.evidence if f.evidence.startswith(f.channel) else f"{f.channel}: {f.evidence}"
-            out.append(f"{ERROR_IN}{letter}: {f.id}: {told}" + ("; left out" if f.id in _NO_MEASUREMENT else ""))
+            out.append(f"{ERROR_IN}{letter}: {f.id}: {told}" + ("; left out" if f.id == _STUCK else ""))
     return out
 
 

@@ -16,7 +16,7 @@ from bemt.diagnose import fit as fitting
 from bemt.diagnose.confusion import nearest
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
 from bemt.diagnose.locate import bare
-from bemt.diagnose.record import CHANNELS, NO_SPEED
+from bemt.diagnose.record import NO_SPEED
 from bemt.diagnose.rules import BESIDE_IT
 from bemt.diagnose.suggest import LEVEL
 from bemt.diagnose.verdict import inclusion
@@ -46,8 +46,6 @@ _FINDINGS = 3
 _ANOTHER_ROTOR = 0.25
 # Level that is said even where no cause shows.
 _WORTH_SAYING = 0.05
-# Computed loads below this share of the largest have no ratio.
-_NEAR_ZERO = 0.1
 # Ratios between these are said in percent.
 _PERCENT = (0.5, 2.0)
 
@@ -324,18 +322,8 @@ def _one_of(ids: Sequence[str]) -> str:
 
 
 def _off(d: Diagnosis) -> str:
-    """By how much each channel differs from the case: the median, or how far where that says little."""
-    p, words = d.problem, []
-    for c, name in enumerate(CHANNELS):
-        here = (p.channel == c) & p.free
-        here &= np.abs(p.f0) > _NEAR_ZERO * np.max(np.abs(p.f0), where=here, initial=0.0)
-        if here.any():
-            change = p.y[here] / p.f0[here] - 1.0
-            order = np.argsort(np.abs(change))
-            median, far = float(np.median(change)), float(change[order[int(0.9 * (change.size - 1))]])
-            wide = abs(far) > _WORTH_SAYING and abs(median) < 0.5 * abs(far)
-            told = f"up to {_share(far)}" if wide else _share(median)
-            words.append(f"{_CHANNEL[name].lower()} {told}")
+    """By how much each channel differs from the case."""
+    words = (f"{_CHANNEL[c].lower()} {'up to ' if wide else ''}{_share(v)}" for c, (v, wide) in d.off.items())
     return " and ".join(words)
 
 
