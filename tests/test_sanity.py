@@ -235,6 +235,8 @@ def test_thrust_that_is_negative_at_low_speed_is_wind_and_no_sign(share: float) 
     values["rpm"] = np.where(np.random.default_rng(3).random(60) < share, 14000.0, values["rpm"])
     found = check(recording(values))
     assert not said(found, "sign_flipped") and "in wind" in said(found, "negative_thrust")[0].evidence
+    stated = check(recording(values | {"airspeed_m_s": np.full(60, 12.0)}))
+    assert not said(stated, "negative_thrust") and not said(stated, "sign_flipped")
     turned = stand(rows=60, seed=2)
     turned["thrust_N"] = np.where(np.arange(60) % 3 == 0, -1.0, 1.0) * turned["thrust_N"]
     assert said(check(recording(turned)), "sign_flipped")

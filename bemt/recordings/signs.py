@@ -73,7 +73,9 @@ def flipped(facts: Facts) -> Iterator[Finding]:
 def _wind(facts: Facts) -> float | None:
     """Speed of no thrust, as in a wind that is not recorded [rev/min]; None: no such wind."""
     rpm, thrust = facts.get("rpm"), facts.get("thrust_N")
-    return None if rpm is None or thrust is None else zero_thrust_speed(rpm, thrust)
+    if rpm is None or thrust is None:
+        return None
+    return zero_thrust_speed(rpm[facts.still], thrust[facts.still])
 
 
 def _mirrored(facts: Facts, name: str, v: Array, loaded: NDArray[np.bool_], sign: float) -> NDArray[np.bool_]:
