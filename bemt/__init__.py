@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from bemt.library import validate as validate
 
 _HOMES = {"InputError": "bemt.base.errors", "Dataset": "bemt.dataset"}
-_ROOMS = ("compare", "diagnose", "drive")  # packages that can be called like functions
+_ROOMS = ("compare", "diagnose", "drive", "validate")  # packages that can be called like functions
 _NAMES = (
     "Answer", "Dataset", "InputError", "Propeller", "compare", "diagnose", "drive", "load", "propeller", "read",
     "validate",

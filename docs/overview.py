@@ -18,7 +18,7 @@ from matplotlib.lines import Line2D
 
 from bemt.case import load_case
 from bemt.case.prepare import k1k2_case, prepare_case
-from bemt.compare.sweep import sweep
+from bemt.sweep import sweep
 
 ROOT = Path(__file__).resolve().parents[1]
 TARGET = ROOT / "docs" / "img" / "overview.png"

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from diagnosing import case, left_out, points, recording
 
-from bemt.asbuilt.latents import AsBuilt
 from bemt.dataset import Dataset
 from bemt.diagnose import chain, noise
 from bemt.diagnose.assemble import build
@@ -17,6 +16,7 @@ from bemt.diagnose.load import load
 from bemt.diagnose.record import from_series
 from bemt.diagnose.repeats import conditions, noise_sizes, projected_out, spread_sizes
 from bemt.effects.ground_effect import GroundEffect
+from bemt.rotors.latents import AsBuilt
 
 
 @pytest.mark.parametrize(("a", "b"), [(0.01, 0.0), (0.0, 0.004), (0.006, 0.003)])

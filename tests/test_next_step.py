@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from diagnosing import case, diagnose, left_out, points, recording
 
-from bemt.asbuilt.latents import AsBuilt
 from bemt.dataset import Dataset
 from bemt.diagnose import another_rotor, chain, suggest, verdict
 from bemt.diagnose.document import text
 from bemt.diagnose.explanation import Explanation
 from bemt.diagnose.record import Record, from_series
+from bemt.rotors.latents import AsBuilt
 
 
 def of(series: Dataset, reference: bool = False, findings: tuple[str, ...] = ()) -> Record:

@@ -13,12 +13,12 @@ import pytest
 from bemt import bem
 from bemt.case import load_case
 from bemt.case.prepare import prepare_case
-from bemt.compare.validate.propellers import validate
 from bemt.effects import catalogue, standard
 from bemt.sections import neuralfoil
 from bemt.sections import rule as section_rule
 from bemt.sections.neuralfoil import tunnel_polar
 from bemt.sections.polars import DEFAULT_RE, Polar
+from bemt.validate.propellers import validate
 from geometry.airfoil import Airfoil, naca
 from geometry.laws import helix
 from geometry.rotor import Rotor

@@ -26,13 +26,13 @@ from bemt.bem import Model
 from bemt.case import load_case
 from bemt.case.prepare import prepare_case
 from bemt.commands.cli import main
-from bemt.compare.grid import run as grid_module
-from bemt.compare.sweep import batch, fingerprint, sweep
-from bemt.compare.sweep import batch as sweep_module
-from bemt.compare.sweep.agreement import agreement, known, needed
-from bemt.compare.sweep.case import solve_case
-from bemt.compare.sweep.summary import summary
 from bemt.formula.k1k2 import U_MEASURED
+from bemt.sweep import batch, fingerprint, sweep
+from bemt.sweep import batch as sweep_module
+from bemt.sweep.agreement import agreement, known, needed
+from bemt.sweep.case import solve_case
+from bemt.sweep.grid import run as grid_module
+from bemt.sweep.summary import summary
 
 ROOT = Path(__file__).resolve().parents[1]
 KGF = 9.80665
@@ -508,7 +508,7 @@ def test_cases_of_one_name_are_told_apart_and_remarks_are_whole_in_a_pipe(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     from bemt.commands.cli import main
-    from bemt.compare.sweep.summary import summary
+    from bemt.sweep.summary import summary
 
     monkeypatch.chdir(tmp_path)
     for folder in ("one", "two"):
@@ -525,7 +525,7 @@ def test_cases_of_one_name_are_told_apart_and_remarks_are_whole_in_a_pipe(
 
 
 def test_a_difference_near_zero_thrust_is_a_share_of_the_largest_and_no_thousand_percent() -> None:
-    from bemt.compare.sweep.summary import summary
+    from bemt.sweep.summary import summary
 
     row = {"source": "bemt", "label": "bemt", "u": 0.5, "airspeed_m_s": 12.0, "flags": []}
     known = {"u_num": 0.0, "u_input": 0.5, "u_D": math.nan, "u_val": math.nan, "model": "bemt", "quantity": "thrust_N"}
@@ -543,7 +543,7 @@ def test_a_difference_near_zero_thrust_is_a_share_of_the_largest_and_no_thousand
 
 
 def test_a_screen_of_many_cases_is_still_one_screen() -> None:
-    from bemt.compare.sweep.summary import summary
+    from bemt.sweep.summary import summary
 
     row = {"source": "bemt", "label": "bemt", "u": 0.5, "airspeed_m_s": 0.0, "flags": ["a flag"], "rpm": 6000.0}
     one = {"faults": [], "assumptions": [], "audit": [], "grid": None, "comparisons": []}

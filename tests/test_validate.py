@@ -12,9 +12,9 @@ from bemt import effects
 from bemt.base.errors import InputError
 from bemt.base.tables import json_text
 from bemt.commands.cli import main
-from bemt.compare.validate import match, points, propellers, text
 from bemt.readers import uiuc
 from bemt.sections import rule as section_rule
+from bemt.validate import match, points, propellers, text
 
 R_R = np.linspace(0.15, 1.0, 18)
 C_R = 0.12 + 0.08 * np.sin(np.pi * R_R) - 0.06 * R_R

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.asbuilt.latents import NAMES, AsBuilt, Prior, as_built
-from bemt.asbuilt.population import label_angle_deg, population
-from bemt.asbuilt.reference import ReferenceRun
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
+from bemt.rotors.latents import NAMES, AsBuilt, Prior, as_built
+from bemt.rotors.population import label_angle_deg, population
+from bemt.rotors.reference import ReferenceRun
 from bemt.sections import rule as section_rule
 
 if TYPE_CHECKING:

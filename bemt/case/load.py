@@ -29,7 +29,7 @@ from bemt.case.unknowns import completed
 
 if TYPE_CHECKING:
     from bemt.air import Air
-    from bemt.asbuilt.latents import AsBuilt
+    from bemt.rotors.latents import AsBuilt
     from geometry.duct import Duct
     from geometry.rotor import Rotor
 

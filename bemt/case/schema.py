@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.air import LIQUID
-from bemt.asbuilt.latents import KNOWN_FROM
 from bemt.base.toml import Axis, Limits, Table, axis_values, entry, expected, shown
+from bemt.rotors.latents import KNOWN_FROM
 from bemt.sections.rule import DRAG_LEVEL, N_CRIT
 from geometry.laws import CHORD_LAWS as GEOMETRY_CHORD_LAWS
 

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from bemt.asbuilt.population import chord_sd
 from bemt.base.units import INCH
+from bemt.rotors.population import chord_sd
 from bemt.sections.rule import DRAG_LEVEL, N_CRIT
 
 __all__ = ["AIR", "FAN", "HUB", "OFFSET", "SECTION", "SURFACE", "Unknown", "completed", "label_chord"]

@@ -42,9 +42,9 @@ def run(args: argparse.Namespace) -> int:
     """Solve, print, and with ``--strict`` check BEMT against the recorded values."""
     from bemt.base.tables import json_text
     from bemt.case import find_cases
-    from bemt.compare.sweep.batch import off_tolerance, sweep
-    from bemt.compare.sweep.summary import summary
-    from bemt.compare.sweep.text import case_text, overview_text
+    from bemt.sweep.batch import off_tolerance, sweep
+    from bemt.sweep.summary import summary
+    from bemt.sweep.text import case_text, overview_text
 
     with _terminal.progress(args.quiet) as say:
         document = sweep(args.paths, args.out, jobs=args.jobs, resume=not args.no_resume, progress=say,

@@ -48,8 +48,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Compare; 1 when points did not converge."""
     from bemt.base.tables import json_text
-    from bemt.compare.validate.propellers import effects_without, validate, where, write
-    from bemt.compare.validate.text import text
+    from bemt.validate.propellers import effects_without, validate, where, write
+    from bemt.validate.text import text
 
     effects = effects_without(args.off)
     if args.fit_population or args.leave_family_out or args.peer:
@@ -68,9 +68,9 @@ def _population(args: argparse.Namespace) -> int:
     from pathlib import Path
 
     from bemt.base.tables import json_text, write_atomic
-    from bemt.compare.validate import left_out, paired, peers
-    from bemt.compare.validate.folder import read_folder
-    from bemt.compare.validate.propellers import effects_without, where
+    from bemt.validate import left_out, paired, peers
+    from bemt.validate.folder import read_folder
+    from bemt.validate.propellers import effects_without, where
 
     effects = effects_without(args.off)
     if args.peer:

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import coefficients as co
-from bemt.asbuilt.conditioning import Conditioned, condition
-from bemt.asbuilt.latents import Prior
-from bemt.asbuilt.model import air_fields, air_of_points, coefficients
-from bemt.asbuilt.population import WEIGHTS, population
-from bemt.asbuilt.predict import sense
-from bemt.asbuilt.reference import SESSION, ReferenceRun, noise_of_run, scatter
+from bemt.rotors.conditioning import Conditioned, condition
+from bemt.rotors.latents import Prior
+from bemt.rotors.model import air_fields, air_of_points, coefficients
+from bemt.rotors.population import WEIGHTS, population
+from bemt.rotors.predict import sense
+from bemt.rotors.reference import SESSION, ReferenceRun, noise_of_run, scatter
 
 if TYPE_CHECKING:
     from bemt.air import Air

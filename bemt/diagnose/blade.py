@@ -1,7 +1,7 @@
 """The rotor of a reference: its blade as built, found on the real solver and kept in the baseline.
 
 y = f(c) + T (z - c), c the calibrated rotor, T its tangents there.  The prior stays at the case: residuals refer to
-f(c) - T (c - mean of the prior), signatures of effects to f(c) itself, and nothing counts twice (`bemt.asbuilt`).
+f(c) - T (c - mean of the prior), signatures of effects to f(c) itself, and nothing counts twice (`bemt.rotors`).
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.asbuilt.latents import NAMES, STEP, AsBuilt, Prior
 from bemt.case.as_built import as_built_of, known_from
 from bemt.case.prepare import prepare_case
+from bemt.rotors.latents import NAMES, STEP, AsBuilt, Prior
 
 if TYPE_CHECKING:
     from bemt.case import Case

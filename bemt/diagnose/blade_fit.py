@@ -1,4 +1,4 @@
-"""The blade of a reference, found on the real solver by the steps of `bemt.asbuilt`."""
+"""The blade of a reference, found on the real solver by the steps of `bemt.rotors`."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.asbuilt.conditioning import condition, tangents
-from bemt.asbuilt.latents import NAMES, UNITS, AsBuilt, Prior
 from bemt.diagnose import noise
 from bemt.diagnose.blade import AsLabelled, CalibratedBlade
+from bemt.rotors.conditioning import condition, tangents
+from bemt.rotors.latents import NAMES, UNITS, AsBuilt, Prior
 
 if TYPE_CHECKING:
     from bemt.diagnose.problem import Problem

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.asbuilt.latents import NAMES, AsBuilt
 from bemt.diagnose.noise import law_of, smooth_modes
 from bemt.diagnose.record import CHANNELS
 from bemt.effects.base import Effect
 from bemt.effects.duct import DuctEffect
+from bemt.rotors.latents import NAMES, AsBuilt
 
 if TYPE_CHECKING:
     from bemt.diagnose.problem import Part, Problem

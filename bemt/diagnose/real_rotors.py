@@ -1,4 +1,4 @@
-"""What real rotors differ by from the solver, as the population of measured propellers shows it (`bemt.asbuilt`).
+"""What real rotors differ by from the solver, as the population of measured propellers shows it (`bemt.rotors`).
 
 Without a reference nothing else says how far blade and solver may be off: of 26 propellers of UIUC, flown as published,
 calibration alone called 14 unknown and named a cause of 5.
@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.asbuilt.model import coefficients
-from bemt.asbuilt.population import population
-from bemt.asbuilt.predict import sense
 from bemt.diagnose.record import CHANNELS, air_of
+from bemt.rotors.model import coefficients
+from bemt.rotors.population import population
+from bemt.rotors.predict import sense
 
 if TYPE_CHECKING:
     from bemt.diagnose.problem import Part, Problem

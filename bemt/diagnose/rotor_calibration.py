@@ -12,9 +12,6 @@ import tomlkit
 
 from bemt import __version__
 from bemt.air import Air
-from bemt.asbuilt.latents import NAMES, UNITS
-from bemt.asbuilt.model import air_fields, air_of_points
-from bemt.asbuilt.reference import SESSION
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import json_text, number_text, plain, write_atomic
 from bemt.case import Case
@@ -24,6 +21,9 @@ from bemt.compare.as_measured import AsMeasured, as_measured
 from bemt.diagnose.another_rotor import FACTOR
 from bemt.diagnose.improve import beside, elsewhere
 from bemt.diagnose.load import cases_of, load
+from bemt.rotors.latents import NAMES, UNITS
+from bemt.rotors.model import air_fields, air_of_points
+from bemt.rotors.reference import SESSION
 
 SCHEMA = "bemt.rotor_calibration/1"
 POSTERIOR = "as_built.json"

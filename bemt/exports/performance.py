@@ -224,8 +224,8 @@ class StatedBand:
 
 def band_of(case: Case, rpm: float, airspeed_m_s: tuple[float, float]) -> StatedBand:
     """Spread of the loads over the assumptions of a case, and of rotors as built around what is known of them."""
-    from bemt.compare.sweep.case import spread
-    from bemt.compare.sweep.model_error import u_model
+    from bemt.sweep.case import spread
+    from bemt.sweep.model_error import u_model
 
     n, V = np.full(2, float(rpm)), np.array(airspeed_m_s, dtype=float)
     names = ("thrust_N", "torque_Nm")

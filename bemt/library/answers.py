@@ -361,6 +361,6 @@ def validate(folder: str | os.PathLike[str]) -> dict[str, Any]:
         ...
     bemt.base.errors.InputError: no/such/folder: got ...
     """
-    from bemt.compare.validate import propellers
+    from bemt.validate import propellers
 
     return propellers.validate(propellers.where(path_text("folder", folder)))

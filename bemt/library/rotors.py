@@ -155,7 +155,7 @@ class Propeller:
         values, flags, u_model = _solved(self.case, n, V, air, bands)
         variance = {key: np.zeros(n.size) for key in BANDED}
         if bands:
-            from bemt.compare.sweep.case import spread
+            from bemt.sweep.case import spread
 
             for item in self.case.assumptions:
                 at = [values if v == item.nominal else _solved(self.case.replaced({item.key: v}), n, V, air)[0]
@@ -424,7 +424,7 @@ def _solved(
     more = DUCTED if case.ducted else ()
     u: dict[str, Array] = {}
     if bands:
-        from bemt.compare.sweep.model_error import beyond, u_model
+        from bemt.sweep.model_error import beyond, u_model
 
         u = {key: value for key, value in u_model(case, model, found, air).items() if key in BANDED}
         wider = beyond(case, found)[1]

@@ -12,10 +12,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from bemt.compare.sweep.agreement import agreement
 from bemt.readers import number
 from bemt.recordings.audit import CfdFacts, audit, audit_document
 from bemt.report.found_files import read_json, safe_files
+from bemt.sweep.agreement import agreement
 
 __all__ = ["attach", "cfd_runs", "is_plain", "operating_run", "radial_of", "read_rows", "value"]
 

@@ -1,6 +1,6 @@
 """What a case page plots: geometry, performance over J and rpm with bands, radial loading, refinement of the stations.
 
-The bands are the standard uncertainty from the declared assumptions, propagated as in `bemt.compare.sweep`: one at a
+The bands are the standard uncertainty from the declared assumptions, propagated as in `bemt.sweep`: one at a
 time through its range, and of the model itself on real rotors (efficiency: of the assumptions alone).
 """
 
@@ -58,8 +58,8 @@ def _grids(case: Case, pitch_over_D: float) -> tuple[Array, Array, int]:
 def case_curves(case: Case) -> dict[str, Any]:
     """Performance over J and over rpm, BEMT with bands and K1/K2."""
     from bemt.case.prepare import k1k2_case, prepare_case
-    from bemt.compare.sweep.case import spread
-    from bemt.compare.sweep.model_error import u_model
+    from bemt.sweep.case import spread
+    from bemt.sweep.model_error import u_model
 
     ready = prepare_case(case)
     rpm, V, cut = _grids(case, ready.pitch_m / ready.diameter_m)

@@ -29,7 +29,7 @@ ALL_BYTES = 4_000_000
 
 def gather(paths: Sequence[str | Path], out: Path, progress: Progress | None = None) -> dict[str, Any]:
     """Solve the cases (or take up the results of a sweep in `out`) and compute what the report plots."""
-    from bemt.compare.sweep import sweep
+    from bemt.sweep import sweep
 
     tell = progress or (lambda line: None)
     document = sweep(paths, out, progress=tell)

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from bemt.base.tables import number_text
-from bemt.compare.sweep.agreement import needed
+from bemt.sweep.agreement import needed
 
 __all__ = ["answer", "headline", "recorded", "stand", "verdict"]
 

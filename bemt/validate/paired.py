@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.asbuilt.population import population
-from bemt.compare.validate.built import Observed, expect
-from bemt.compare.validate.peers import peer
-from bemt.compare.validate.points import KINDS, counted
+from bemt.rotors.population import population
 from bemt.sections.neuralfoil import neuralfoil_polar, tunnel_polar
+from bemt.validate.built import Observed, expect
+from bemt.validate.peers import peer
+from bemt.validate.points import KINDS, counted
 
 Array = NDArray[np.float64]
 

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from bemt.asbuilt.mixture import LEVELS
-from bemt.compare.validate.built import Expected
-from bemt.compare.validate.points import KINDS, Array, Rows, errors, statistics
+from bemt.rotors.mixture import LEVELS
+from bemt.validate.built import Expected
+from bemt.validate.points import KINDS, Array, Rows, errors, statistics
 
 
 class Pool:

@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.asbuilt.latents import AsBuilt, Prior, as_built
-from bemt.asbuilt.population import population
-from bemt.asbuilt.predict import Prediction, Solve, predict, sense
+from bemt.rotors.latents import AsBuilt, Prior, as_built
+from bemt.rotors.population import population
+from bemt.rotors.predict import Prediction, Solve, predict, sense
 
 if TYPE_CHECKING:
     from bemt.air import Air
-    from bemt.asbuilt.reference import ReferenceRun
     from bemt.bem.model import Model
     from bemt.dataset import Dataset
+    from bemt.rotors.reference import ReferenceRun
 
 Array = NDArray[np.float64]
 

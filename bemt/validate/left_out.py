@@ -8,21 +8,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bemt import __version__
-from bemt.asbuilt.fit import fit
-from bemt.asbuilt.learnt import Learnt
-from bemt.asbuilt.population import Population
 from bemt.base.tables import plain
 from bemt.base.units import INCH
 from bemt.coefficients import M_tip
-from bemt.compare.validate.built import Observed, conditioned, expect, observe
-from bemt.compare.validate.points import KINDS
-from bemt.compare.validate.pool import Pool
-from bemt.compare.validate.static_limit import from_static
+from bemt.rotors.fit import fit
+from bemt.rotors.learnt import Learnt
+from bemt.rotors.population import Population
 from bemt.sections import rule as section_rule
+from bemt.validate.built import Observed, conditioned, expect, observe
+from bemt.validate.points import KINDS
+from bemt.validate.pool import Pool
+from bemt.validate.static_limit import from_static
 
 if TYPE_CHECKING:
-    from bemt.compare.validate.folder import Folder
     from bemt.effects import Effect
+    from bemt.validate.folder import Folder
 
 SCHEMA = "bemt.left_out/2"
 LARGE_IN = 8.9

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.asbuilt.model import predict_model
-from bemt.asbuilt.population import population
+from bemt.rotors.model import predict_model
+from bemt.rotors.population import population
 
 if TYPE_CHECKING:
     from bemt.air import Air

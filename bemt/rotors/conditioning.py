@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.asbuilt.latents import STEP, Prior
+from bemt.rotors.latents import STEP, Prior
 
 Array = NDArray[np.float64]
 Readings = Callable[[Array], Array]

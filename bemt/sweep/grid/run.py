@@ -24,7 +24,7 @@ from bemt.air import air_arrays
 from bemt.base.tables import plain, write_atomic
 from bemt.case import Case
 from bemt.case.prepare import prepare_case
-from bemt.compare.grid.formats import Block, encode, join
+from bemt.sweep.grid.formats import Block, encode, join
 
 if TYPE_CHECKING:
     from bemt.air import Air

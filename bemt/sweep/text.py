@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from bemt.base.tables import csv_text, number_text, text_table
-from bemt.compare.sweep.case import ROW_SOURCES
+from bemt.sweep.case import ROW_SOURCES
 
 WIDTH = 118
 CSV_COLUMNS = (

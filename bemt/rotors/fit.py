@@ -15,9 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.asbuilt.conditioning import condition
-from bemt.asbuilt.latents import NAMES, Prior, Sensed
-from bemt.asbuilt.population import WEIGHTS, Population, sizes
+from bemt.rotors.conditioning import condition
+from bemt.rotors.latents import NAMES, Prior, Sensed
+from bemt.rotors.population import WEIGHTS, Population, sizes
 
 Array = NDArray[np.float64]
 

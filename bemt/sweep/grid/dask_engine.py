@@ -29,8 +29,8 @@ from bemt.base import cache
 from bemt.base.errors import Fault, InputError
 from bemt.case import Case
 from bemt.case.schema import CaseFile
-from bemt.compare.grid.identity import program_hash
-from bemt.compare.grid.run import Grid, GridSolver, Solved, solve_chunk
+from bemt.sweep.grid.identity import program_hash
+from bemt.sweep.grid.run import Grid, GridSolver, Solved, solve_chunk
 
 IN_FLIGHT = 2
 """Chunks per worker thread that are out at a time: one at work, one waiting; this bounds the memory."""

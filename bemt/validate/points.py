@@ -111,8 +111,8 @@ class Solver:
 
     def __call__(self, z: Array, rpm: Array, J: Array, which: Any = None) -> Array:
         """(2, P) CT and CP, NaN where not converged."""
-        from bemt.asbuilt.latents import as_built
         from bemt.bem import solver
+        from bemt.rotors.latents import as_built
 
         key = z.tobytes()
         if self._last[0] != key:
@@ -136,7 +136,7 @@ def compare(
 
 def rows(propeller: UiucPropeller, solve: Solver, z: Array | None = None) -> Rows:
     """Measured points beside the solver with some latent numbers, those of the drawing by default."""
-    from bemt.asbuilt.latents import NAMES
+    from bemt.rotors.latents import NAMES
 
     static, rpm, J, CT, CP = measured(propeller)
     CT_bemt, CP_bemt = solve(np.zeros(len(NAMES)) if z is None else z, rpm, J)

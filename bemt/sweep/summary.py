@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from bemt.base.tables import number_text, text_table
-from bemt.compare.sweep.agreement import known, needed
-from bemt.compare.sweep.case import ROW_SOURCES
-from bemt.compare.sweep.text import with_nan
+from bemt.sweep.agreement import known, needed
+from bemt.sweep.case import ROW_SOURCES
+from bemt.sweep.text import with_nan
 
 WIDTH, ROWS = 80, 22
 """Columns of the screen, and rows of the table: the rest is counted."""

@@ -20,7 +20,7 @@ def _totals(name: str, doc: dict[str, Any]) -> str:
 
 def _coverage_lines(doc: dict[str, Any]) -> list[str]:
     """Coverage and width of the intervals."""
-    out = ["Rotors as built: expectation and intervals of the population (bemt.asbuilt), stations and labels combined."]
+    out = ["Rotors as built: expectation and intervals of the population (bemt.rotors), stations and labels combined."]
     for kind in ("static", "forward"):
         for q in ("CT", "CP"):
             s = doc[kind][q]

@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.compare.validate.points import statistics
+from bemt.validate.points import statistics
 
 if TYPE_CHECKING:
-    from bemt.asbuilt.fit import MeasuredRotor
+    from bemt.rotors.fit import MeasuredRotor
 
 Array = NDArray[np.float64]
 

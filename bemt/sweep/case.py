@@ -4,7 +4,7 @@ Uncertainty after ASME V&V 20: E = S - D, u_val^2 = u_num^2 + u_input^2 + u_mode
 result when the blade elements are doubled. u_input moves one declared assumption at a time through its range, taken as
 uniform: with the results at both ends and in the middle on a parabola, the variance is s^2/3 + 4 q^2/45 (half
 difference s, sagitta q), which is (high - low)/sqrt(12) times the slope when the response is straight. u_model is what
-measured propellers of such a description differ from the solver by (`bemt.asbuilt`).
+measured propellers of such a description differ from the solver by (`bemt.rotors`).
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from bemt import __version__, effects
 from bemt.air import air_arrays
 from bemt.base import units
 from bemt.case import Assumption, Case
-from bemt.compare.sweep.agreement import agreement
-from bemt.compare.sweep.model_error import beyond, u_model
 from bemt.readers import references as reference_file
 from bemt.recordings import audit_remarks
+from bemt.sweep.agreement import agreement
+from bemt.sweep.model_error import beyond, u_model
 
 if TYPE_CHECKING:
     from bemt.air import Air

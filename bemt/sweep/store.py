@@ -17,9 +17,9 @@ from typing import Any
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import file_hash, json_text, write_atomic
-from bemt.compare.grid.formats import FORMATS
-from bemt.compare.grid.identity import program_hash
-from bemt.compare.sweep.text import case_text, overview_text, rows_csv
+from bemt.sweep.grid.formats import FORMATS
+from bemt.sweep.grid.identity import program_hash
+from bemt.sweep.text import case_text, overview_text, rows_csv
 
 SCHEMA = "bemt.sweep/1"
 OVERVIEW = ("sweep.csv", "sweep.txt", "sweep.json")

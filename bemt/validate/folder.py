@@ -10,7 +10,7 @@ import numpy as np
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
-from bemt.compare.validate.points import Stations
+from bemt.validate.points import Stations
 
 if TYPE_CHECKING:
     from bemt.readers.uiuc import UiucPropeller

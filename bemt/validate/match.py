@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bemt.compare.validate.points import Rows, Stations, compare
+from bemt.validate.points import Rows, Stations, compare
 
 if TYPE_CHECKING:
     from bemt.effects import Effect

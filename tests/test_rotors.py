@@ -11,18 +11,18 @@ import numpy as np
 import pytest
 
 from bemt.__main__ import main
-from bemt.asbuilt.conditioning import condition
-from bemt.asbuilt.fit import MeasuredRotor, objective
-from bemt.asbuilt.latents import NAMES, Prior, Sensed
-from bemt.asbuilt.mixture import LEVELS, half_width, inside
-from bemt.asbuilt.model import coefficients
-from bemt.asbuilt.population import WEIGHTS, population
-from bemt.asbuilt.predict import Prediction, predict
-from bemt.asbuilt.reference import ReferenceRun, noise_of_run, scatter
 from bemt.base.errors import InputError
 from bemt.case import load_case
 from bemt.case.prepare import prepare_case
-from bemt.compare.validate.static_limit import from_static
+from bemt.rotors.conditioning import condition
+from bemt.rotors.fit import MeasuredRotor, objective
+from bemt.rotors.latents import NAMES, Prior, Sensed
+from bemt.rotors.mixture import LEVELS, half_width, inside
+from bemt.rotors.model import coefficients
+from bemt.rotors.population import WEIGHTS, population
+from bemt.rotors.predict import Prediction, predict
+from bemt.rotors.reference import ReferenceRun, noise_of_run, scatter
+from bemt.validate.static_limit import from_static
 
 K = len(NAMES)
 CASE = """schema = "bemt.case/1"
@@ -279,7 +279,7 @@ def test_gradient_of_the_likelihood() -> None:
         )
         for i, gap in enumerate((0.3, 1.8, math.nan))
     ]
-    from bemt.asbuilt import fit
+    from bemt.rotors import fit
 
     theta = fit.START + 0.05 * np.random.default_rng(6).normal(size=fit.START.size)
     _, gradient = objective(theta, rotors)
@@ -370,7 +370,7 @@ def test_population_says_where_it_comes_from() -> None:
 
 
 def test_paired_difference_knows_its_chance() -> None:
-    from bemt.compare.validate.paired import difference
+    from bemt.validate.paired import difference
 
     random = np.random.default_rng(8)
     theirs = random.uniform(0.05, 0.2, 60)
@@ -388,8 +388,8 @@ def test_peer_agrees_with_the_solver_on_the_same_physics() -> None:
     from bemt import effects
     from bemt.air import Air
     from bemt.bem.model import Model
-    from bemt.compare.validate.peers import peer
     from bemt.sections.neuralfoil import neuralfoil_polar
+    from bemt.validate.peers import peer
     from geometry.airfoil import naca
     from geometry.laws import from_laws
     from geometry.rotor import Rotor

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.asbuilt.conditioning import condition
-from bemt.asbuilt.fit import MeasuredRotor, law
-from bemt.asbuilt.latents import Prior
-from bemt.asbuilt.mixture import LEVELS, half_width, inside
-from bemt.asbuilt.population import WEIGHTS, Population, label_angle_deg
-from bemt.asbuilt.predict import predict, sense
-from bemt.asbuilt.reference import ReferenceRun, noise_of_run, scatter
-from bemt.compare.validate.points import Rows, Solver, Stations, counted, rows
+from bemt.rotors.conditioning import condition
+from bemt.rotors.fit import MeasuredRotor, law
+from bemt.rotors.latents import Prior
+from bemt.rotors.mixture import LEVELS, half_width, inside
+from bemt.rotors.population import WEIGHTS, Population, label_angle_deg
+from bemt.rotors.predict import predict, sense
+from bemt.rotors.reference import ReferenceRun, noise_of_run, scatter
 from bemt.sections import rule as section_rule
+from bemt.validate.points import Rows, Solver, Stations, counted, rows
 
 if TYPE_CHECKING:
     from bemt.effects import Effect

@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bemt.asbuilt.population import population
 from bemt.base.errors import Fault, InputError
 from bemt.base.folders import find_data
 from bemt.base.tables import json_text, write_atomic
-from bemt.compare.validate.built import expect, observe
-from bemt.compare.validate.folder import read_folder
-from bemt.compare.validate.match import matched
-from bemt.compare.validate.points import J_SHARE, compare, statistics
-from bemt.compare.validate.pool import Pool
-from bemt.compare.validate.text import text
+from bemt.rotors.population import population
+from bemt.validate.built import expect, observe
+from bemt.validate.folder import read_folder
+from bemt.validate.match import matched
+from bemt.validate.points import J_SHARE, compare, statistics
+from bemt.validate.pool import Pool
+from bemt.validate.text import text
 
 if TYPE_CHECKING:
     from bemt.effects import Effect

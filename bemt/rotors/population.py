@@ -1,9 +1,9 @@
 """The population of measured propellers: what their latent numbers and the solver's rest scatter by.
 
-A rotor's readings are f(z) + rest + noise.  The latent numbers z of `bemt.asbuilt.latents` scatter around a common mean
+A rotor's readings are f(z) + rest + noise.  The latent numbers z of `bemt.rotors.latents` scatter around a common mean
 with a covariance whose size differs from rotor to rotor (a mixture of sizes at quantiles of Student's t: heavy tails);
 the rest is a smooth Gaussian process over (J/J0, ln Re), shared by static points and flight and correlated between CT
-and CP.  All of it is fitted by maximum likelihood to measured propellers (`bemt.asbuilt.fit`); the file beside this
+and CP.  All of it is fitted by maximum likelihood to measured propellers (`bemt.rotors.fit`); the file beside this
 module holds the numbers and where they come from.
 
 What the label says of the blade angle is weighed against the stations by their variances: stations err by s, the label
@@ -24,8 +24,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.asbuilt.latents import KNOWN_FROM, NAMES, Prior, Sensed
-from bemt.asbuilt.learnt import Learnt
+from bemt.rotors.latents import KNOWN_FROM, NAMES, Prior, Sensed
+from bemt.rotors.learnt import Learnt
 
 Array = NDArray[np.float64]
 
@@ -276,5 +276,5 @@ class Population:
 @cache
 def population() -> Population:
     """The committed population."""
-    text = resources.files("bemt.asbuilt").joinpath("population.json").read_text(encoding="utf-8")
+    text = resources.files("bemt.rotors").joinpath("population.json").read_text(encoding="utf-8")
     return Population.of(json.loads(text))

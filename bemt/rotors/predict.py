@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.asbuilt.conditioning import tangents
-from bemt.asbuilt.latents import NAMES, Prior, Sensed
-from bemt.asbuilt.mixture import LEVELS, half_width
-from bemt.asbuilt.population import WEIGHTS, Population
-from bemt.asbuilt.reference import ReferenceRun
+from bemt.rotors.conditioning import tangents
+from bemt.rotors.latents import NAMES, Prior, Sensed
+from bemt.rotors.mixture import LEVELS, half_width
+from bemt.rotors.population import WEIGHTS, Population
+from bemt.rotors.reference import ReferenceRun
 
 Array = NDArray[np.float64]
 Solve = Callable[[Array, Array, Array, NDArray[np.intp]], Array]

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.asbuilt.conditioning import Conditioned
-from bemt.asbuilt.population import Population
+from bemt.rotors.conditioning import Conditioned
+from bemt.rotors.population import Population
 
 Array = NDArray[np.float64]
 

@@ -1,1 +1,0 @@
-"""BEMT against folders of measured propellers (`command` joins the rest)."""
