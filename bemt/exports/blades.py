@@ -15,15 +15,15 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 MOST_STATIONS = 60
-"""Stations that the tools take: QPROP 81, XROTOR and DFDC 60 to 100 by compilation."""
+"""Stations that QPROP (81) and XROTOR (60 to 100, by compilation) take."""
 
 
-def stations(job: Job) -> tuple[Array, Array, Array, bool]:
+def stations(job: Job, most: int = MOST_STATIONS) -> tuple[Array, Array, Array, bool]:
     """Radius [m], chord [m] and angle [rad] of the stations, with what effects do to the blade; whether thinned."""
     blade, p = job.case.rotor().blade, job.loading
-    r, thin = blade.r, blade.r.size > MOST_STATIONS
+    r, thin = blade.r, blade.r.size > most
     if thin:
-        r = np.linspace(blade.r[0], blade.r[-1], MOST_STATIONS)
+        r = np.linspace(blade.r[0], blade.r[-1], most)
     chord, beta = blade.at(r)
     turned = p.beta - blade.at(p.r)[1]  # by effects such as pitch_offset
     return r, chord, beta + np.interp(r, p.r, turned), thin

@@ -22,7 +22,7 @@ class JsbsimExport(LoadsExport):
     id = "jsbsim"
     title = "JSBSim propeller with a stand"
     holds = "tables CT(J, rpm), CP(J, rpm), linear, held at the ends; density of the simulation"
-    features = frozenset({"torque", "airspeed", "windmill", "reynolds", "density", "rest"})
+    features = frozenset({"torque", "airspeed", "windmill", "reynolds", "density", "rest", "rotation"})
     conventions = (
         "C_THRUST = T/(rho n^2 D^4), C_POWER = P/(rho n^3 D^5), J = V/(n D); sense +1 is clockwise seen from behind; "
         "the column of a table is rpm/1000, passed on as blade-angle by the system file"

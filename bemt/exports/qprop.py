@@ -30,7 +30,12 @@ class QpropExport(BladeExport):
         r, c, b, _ = stations(job)
         found = _sections(job)
         first = found[0][1]
-        rows = [f"{job.case.name}, bemt {__version__}", "", f" {p.blades} {p.R:.10g}  ! Nblades [ R ]", ""]
+        rows = [
+            f"{job.case.name}, {job.rotation}, bemt {__version__}",
+            "",
+            f" {p.blades} {p.R:.10g}  ! Nblades [ R ]",
+            "",
+        ]
         rows += [
             f" {first.cl0:.12g} {first.cla:.12g}  ! CL0 CL_a",
             f" {first.clmin:.12g} {first.clmax:.12g}  ! CLmin CLmax",

@@ -28,7 +28,7 @@ class XrotorExport(BladeExport):
         p = job.loading
         r, c, b, _ = stations(job)
         V = max(p.airspeed_m_s, 0.01 * p.omega * p.R)
-        rows = ["XROTOR VERSION:  7.55", f"{job.case.name}, bemt {__version__}"[:80]]
+        rows = ["XROTOR VERSION:  7.55", f"{job.case.name}, {job.rotation}, bemt {__version__}"[:80]]
         rows += [
             "!         Rho          Vso          Rmu           Alt",
             f" {p.rho:.9g} {p.a_sound:.9g} {p.mu:.9g} 999.0",
@@ -103,12 +103,12 @@ def section_errors(job: Job, sections: list[Any]) -> list[dict[str, float]]:
     return out
 
 
-def section_notes(job: Job, errors: list[dict[str, float]]) -> list[str]:
+def section_notes(job: Job, errors: list[dict[str, float]], most: int = MOST_STATIONS) -> list[str]:
     """What a fit of sections leaves out."""
-    thin = stations(job)[3]
+    thin = stations(job, most)[3]
     worst = ", ".join(f"r/R {e['r_over_R']:.2f}: cl {e['cl']:.3f}, cd {e['cd_pct']:.0f} %" for e in errors)
     return [
         f"sections are fits at the Reynolds numbers of the operating point; worst between the stalls: {worst}",
         "mcrit 0.8 and the pitching moment 0 are not from the case; what is read back gets this project's own effects",
-        *([f"{MOST_STATIONS} stations instead of {job.case.rotor().blade.r.size}"] if thin else []),
+        *([f"{most} stations instead of {job.case.rotor().blade.r.size}"] if thin else []),
     ]
