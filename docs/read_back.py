@@ -1,8 +1,8 @@
 """What the exports wrote, run in the programs that read them: ``python docs/read_back.py`` rewrites docs/exports.md.
 
-``python docs/read_back.py TARGET [TARGET ...]`` runs these targets, in processes of their own, and keeps what it measured
-in docs/read_back.json with version and date; without a target, the page is written from there. A program runs the export
-of a right-handed and of a left-handed rotor at the same operating points as BEMT. Needs ``pip install
+``python docs/read_back.py TARGET [TARGET ...]`` runs these targets, in processes of their own, and keeps what it
+measured in docs/read_back.json with version and date; without a target, the page is written from there. A program runs
+the export of a right-handed and of a left-handed rotor at the same operating points as BEMT. Needs ``pip install
 'bemt[simulators]'``, and from Debian ``ignition-tools`` with ``libsdformat-dev`` (Gazebo) and ``openfoam``.
 """
 
@@ -112,8 +112,8 @@ def jsbsim(job: Job, folder: Path) -> Ran:
         fdm["forces/hold-down"] = 1
         fdm["atmosphere/wind-north-fps"] = -V / 0.3048
         fdm["propulsion/set-running"] = -1
-        fdm["fcs/throttle-cmd-norm"] = throttle
-        for _ in range(6000):
+        for step in range(8000):
+            fdm["fcs/throttle-cmd-norm"] = 0.3 if step < 1000 else throttle  # from rest, no wind turns a propeller up
             rpm = fdm["propulsion/engine/propeller-rpm"]  # the loads of a step are those of the speed before it
             fdm.run()
         power = fdm["propulsion/engine/propeller-power-ftlbps"] * 1.3558179483314
@@ -145,7 +145,7 @@ def mujoco(job: Job, folder: Path) -> Ran:
         program.mj_forward(model, data)
         T.append(data.qfrc_actuator[2])
         about.append(data.qfrc_actuator[5])
-    # z is the thrust's axis: a right-handed rotor, clockwise seen from behind, turns about +z and is turned back about -z
+    # a right-handed rotor, clockwise seen from behind, turns about the thrust (+z); its reaction is about -z
     sense = -int(np.sign(about[1]))
     return Ran(rpm, V, T, -sense * np.array(about), sense)
 
@@ -238,7 +238,7 @@ def _field(path: Path) -> np.ndarray:
 
 
 def flow360(job: Job, folder: Path) -> Ran:
-    """The disk as the package's own BETDisk, which checks shapes and units; it solves nothing, so there are no loads."""
+    """The disk as the package's own BETDisk, which checks shapes and units; it solves nothing."""
     import flow360 as program
 
     disk = json.loads((_save("flow360", job, folder) / "bet_disk.json").read_text(encoding="utf-8"))["BETDisks"][0]
@@ -285,6 +285,7 @@ class Program:
     loads: bool = True  # Whether the program itself computes thrust and torque
 
 
+OPENFOAM = ["sh", "-c", "WM_PROJECT_DIR=${WM_PROJECT_DIR:-/usr/share/openfoam} blockMesh"]
 PROGRAMS = {
     "table": Program(table, _first(["cc", "--version"], r"(\d+\.\d+\.\d+)", "GCC"), tools=("cc",)),
     "jsbsim": Program(jsbsim, _package("jsbsim"), ("jsbsim",)),
@@ -293,7 +294,7 @@ PROGRAMS = {
     "fmu": Program(fmu, lambda: f"{_package('fmpy')()}, {_package('pythonfmu')()}", ("fmpy", "pythonfmu")),
     "gazebo": Program(gazebo, _first(["ign", "sdf", "--versions"], r"(\d+\.\d+\.\d+)", "libsdformat"), tools=("ign",),
                       loads=False),
-    "rotor-disk": Program(rotor_disk, _first(["simpleFoam", "-help"], r"OpenFOAM-([\w.]+)", "OpenFOAM"),
+    "rotor-disk": Program(rotor_disk, _first(OPENFOAM, r"Version:\s+(\w+)", "OpenFOAM"),
                           tools=("simpleFoam", "blockMesh")),
     "flow360": Program(flow360, _package("flow360"), ("flow360",), loads=False),
 }  # fmt: skip
@@ -306,7 +307,7 @@ def installed(word: str) -> bool:
 
 
 def compared(word: str, job: Job) -> dict[str, Any]:
-    """One run beside BEMT and beside the target's own formula; loads over the greatest at the same speed, in per cent."""
+    """One run beside BEMT and beside the target's own formula; loads in per cent of the greatest at that speed."""
     with tempfile.TemporaryDirectory() as place:
         ran = PROGRAMS[word].run(job, Path(place))
     out: dict[str, Any] = {"points": len(ran.rpm), "sense_kept": ran.sense == job.case.rotor().rotation}
@@ -335,7 +336,7 @@ def example(rotation: str = "right") -> Job:
 
 
 def measured(word: str) -> dict[str, Any]:
-    """Both directions of rotation, run in a process of their own: the programs' libraries do not all bear each other."""
+    """Both directions of rotation, run in a process of their own: not all libraries bear each other."""
     call = [sys.executable, str(DOCS / "read_back.py"), "--child", word]
     out = subprocess.run(call, capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(DOCS.parent)})
     found = [line for line in out.stdout.splitlines() if line.startswith("measured ")]
@@ -353,8 +354,8 @@ def _child(word: str) -> dict[str, Any]:
 
 
 SEEN = {
-    "dfdc": ("DFDC 0.70, built from its source", "2026-11-23", "a file of 30 stations converges in 16 iterations; with 40 "
-             "or 60 it is NaN. Thrust and torque were not compared: DFDC has no stator's recovery and no tip gap here"),
+    "dfdc": ("DFDC 0.70, built from its source", "2026-11-23", "a file of 30 stations converges in 16 iterations; with "
+             "40 or 60 it is NaN. Loads were not compared: the file has neither stator nor tip gap"),
     "xrotor": ("XROTOR 7.55, built from its source", "2026-11-23", "10x5: thrust +1.5 to +2.9 %, torque +5 to +16 % of "
                "BEMT's; at one speed XROTOR settled on a stalled root"),
 }  # fmt: skip
@@ -439,8 +440,8 @@ model class and that of the file. Where it says "text only", no program has read
 {line}--|--|
 {chr(10).join(kinds["loads"])}
 
-The errors of the model class are from static to zero thrust, at points that are no nodes of the table. The programs with
-a table were also run in descent and as a windmill. For targets with one or three numbers for all speeds, the error
+The errors of the model class are from static to zero thrust, at points that are no nodes of the table. The programs
+with a table were also run in descent and as a windmill. For targets with one or three numbers for all speeds, the error
 includes the change of the coefficients from 2,500 to 10,000 rev/min (Reynolds number): give `--rpm` near the speed you
 fly. A single constant (`gazebo`) is right in static operation and off by the whole thrust in flight. That is a limit of
 the model, not of the fit.

@@ -401,32 +401,22 @@ class BladeExport(Export):
         """The case that what is read back is compared with."""
         return job.case
 
-    def checked(self, job: Job, files: Files) -> dict[str, Any]:
-        """Loads of the file read back, at the operating point and over J at its speed, beside those of the case."""
-        import tempfile
-        from pathlib import Path
+    def sections(self, job: Job) -> list[Any] | None:
+        """Fitted section of each anchor; None where the target holds the tables themselves."""
+        return None
 
-        p = job.loading
-        J = np.concatenate([[p.J], job.J_zero * np.array([0.0, 0.25, 0.5, 0.75, 0.95])])
-        V = J * p.rpm / 60.0 * 2.0 * p.R
-        truth = solve_points(self.compared(job), p.rpm, V)
-        with tempfile.TemporaryDirectory() as folder:
-            back = self.read_back(job, files, Path(folder))
-            got = solve_points(back, p.rpm, V)
-        errors: dict[str, Any] = {}
-        for name, x, y in (("thrust", got.thrust_N, truth.thrust_N), ("torque", got.torque_Nm, truth.torque_Nm)):
-            share = 100.0 * np.abs(x - y) / np.abs(y).max()
-            errors[name] = {"at_point": float(share[0]), "flight": float(share.max())}
+    def checked(self, job: Job, files: Files) -> dict[str, Any]:
+        """Loads of the case at the operating point, and how far fitted sections are off its tables."""
+        from bemt.exports.blades import section_errors
+
+        p, fitted = job.loading, self.sections(job)
+        errors = None if fitted is None else section_errors(job, fitted)
+        worst = None if errors is None else {key: max(e[key] for e in errors) for key in ("cl", "cd_pct")}
         return {
             "point": p.document(),
-            "fit_error_pct": errors | {"of": "the greatest load at this rpm, read back and solved by this project"},
+            "section_error": worst if worst is None else worst | {"of": "cl, and cd relative, between the stalls"},
             "band": job.band_at_point.document(),
-            "range": {
-                "rpm": p.rpm,
-                "airspeed_m_s": p.airspeed_m_s,
-                "density_kg_m3": p.rho,
-                "flight": "J from 0 to zero thrust at this rpm",
-            },
+            "range": {"rpm": p.rpm, "airspeed_m_s": p.airspeed_m_s, "density_kg_m3": p.rho},
         }
 
 

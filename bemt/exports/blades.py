@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,24 @@ def anchors_of(job: Job) -> list[tuple[float, Polar, float]]:
         (x, polar, float(np.interp(where, point.r / point.R, point.Re)))
         for (x, polar), where in zip(found, at, strict=True)
     ]
+
+
+def section_errors(job: Job, sections: list[Any]) -> list[dict[str, float]]:
+    """Greatest error of cl and of cd relative to cd, from the negative to the positive stall, per anchor."""
+    out = []
+    for (x, polar, Re), s in zip(anchors_of(job), sections, strict=True):
+        a = polar.alpha[(polar.alpha >= polar.stall(Re, side=-1)[0]) & (polar.alpha <= polar.stall(Re)[0])]
+        cl, cd = polar.lookup(a, Re)
+        got_l, got_d = s.cl_cd(a, Re)
+        out.append(
+            {
+                "r_over_R": float(x),
+                "Re": Re,
+                "cl": float(np.abs(got_l - cl).max()),
+                "cd_pct": float(100.0 * np.abs(got_d / cd - 1.0).max()),
+            }
+        )
+    return out
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from bemt import __version__
 from bemt.base.errors import Fault
 from bemt.exports.base import BladeExport, Files, Job
-from bemt.exports.blades import stations
+from bemt.exports.blades import section_errors, stations
 from bemt.exports.parts import plain_name
-from bemt.exports.xrotor import section_errors, section_lines, section_notes, sections_of
+from bemt.exports.xrotor import section_lines, section_notes, sections_of
 
 if TYPE_CHECKING:
     from bemt.case import Case
@@ -93,10 +93,14 @@ class DfdcExport(BladeExport):
             gone["duct.tip_gap_mm"] = 0.0
         return job.case.replaced(gone) if gone else job.case
 
+    def sections(self, job: Job) -> list[Any]:
+        """As XROTOR's."""
+        return [s for _, s in sections_of(job)]
+
     def notes(self, job: Job) -> list[str]:
         """What DFDC does not hold of the case."""
         return [
-            *section_notes(job, section_errors(job, [s for _, s in sections_of(job)]), MOST_STATIONS),
+            *section_notes(job, section_errors(job, self.sections(job)), MOST_STATIONS),
             "the stator and its recovery of swirl are left out",
             "the centre body is a cylinder of the hub's radius with an elliptic nose: not from the case",
             "the tip gap is left out: the wall is drawn in to the blade tip",

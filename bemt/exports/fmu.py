@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import tempfile
 from pathlib import Path
@@ -97,7 +98,8 @@ class FmuExport(LoadsExport):
         name = plain_name(job.case.name)
         text = table_module(job, "FMU of a propeller") + _SLAVE.format(name=name, rotation=job.rotation)
         with tempfile.TemporaryDirectory() as folder:
-            script = Path(folder) / f"{name}_fmu.py"
+            # two units with modules of one name in one process would share the tables of the first
+            script = Path(folder) / f"{name}_{hashlib.sha256(text.encode()).hexdigest()[:12]}.py"
             script.write_text(text, encoding="utf-8")
             FmuBuilder.build_FMU(script, dest=folder)
             made = next(Path(folder).glob("*.fmu"))

@@ -320,6 +320,9 @@ def _targets_text(manifest: dict[str, Any], out: Path) -> list[str]:
             shown_errors.append(f"{word} {'not held' if worst is None else number_text(worst, 3) + ' %'}")
         if error:
             lines.append(f"  greatest error {', '.join(shown_errors)} (of {error['of']})")
+        if item.get("section_error"):
+            cl, cd = (number_text(item["section_error"][key], 2) for key in ("cl", "cd_pct"))
+            lines.append(f"  sections: cl within {cl}, cd within {cd} % between the stalls")
         if "band" in item:
             band = item["band"]
             speeds = dict.fromkeys(zip(band["airspeed_m_s"], band["thrust_pct"], band["torque_pct"], strict=True))
