@@ -43,8 +43,8 @@ def coefficients(model: Model, air: Air) -> Solve:
     def built(z: bytes) -> Model:
         numbers = np.frombuffer(z)
         if numbers.any():
-            return replace(model, effects=(*drawn, as_built(numbers)), _kept={})
-        return model if len(drawn) == len(model.effects) else replace(model, effects=drawn, _kept={})
+            return replace(model, effects=(*drawn, as_built(numbers)))
+        return model if len(drawn) == len(model.effects) else replace(model, effects=drawn)
 
     def solve(z: Array, rpm: Array, J: Array, which: NDArray[np.intp]) -> Array:
         at = air_of_points({k: v[which] if v.size > 1 else v for k, v in states.items()})
