@@ -80,6 +80,7 @@ class Model:
     re_range: tuple[float, float] | None = None
     effects: tuple[Effect, ...] = field(default_factory=standard)
     notes: tuple[str, ...] = ()
+    _reaching: dict[Any, Model] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def diameter_m(self) -> float:
@@ -135,8 +136,17 @@ class Model:
         Re = np.hypot(per_m[0][..., None] * blade.r, per_m[1][..., None]) * blade.chord * per_m[2][..., None]
         # effects read the tables at two Reynolds numbers besides
         low, high = min(_SLOWEST * float(Re.min()), RE_FIXED), max(_FASTEST * float(Re.max()), RE_FAST)
-        mach = _FASTEST * float(np.max(np.hypot(omega * blade.R, onset) / air.a_sound))
-        return replace(self, re_range=(low, high), mach_max=min(mach, self.mach_max))
+        mach = min(_FASTEST * float(np.max(np.hypot(omega * blade.R, onset) / air.a_sound)), self.mach_max)
+        nodes = arrays.mach_nodes(mach), arrays.re_nodes((low, high))
+        if nodes not in self._reaching:  # few: nodes of the tables
+            self._reaching[nodes] = replace(self, re_range=(low, high), mach_max=mach)
+        return self._reaching[nodes]
+
+    def with_effects(self, effects: Sequence[Effect]) -> Model:
+        """Model with other physics on."""
+        other = replace(self, effects=tuple(effects))
+        other.__dict__["_content"] = self._content  # which leaves effects out
+        return other
 
     @property
     def prep(self) -> solver.Prepared:
@@ -146,15 +156,15 @@ class Model:
     @cached_property
     def _content(self) -> tuple[Hashable, ...]:
         """What decides a prepared rotor besides effects and stations: values, never identities."""
-        blade = self.rotor.blade
+        rotor, blade = self.rotor, self.rotor.blade
+        lines = [np.asarray(v) for v in (blade.sweep, blade.rake) if v is not None]
         shapes = [v for x, a in blade.anchors for v in (x, a.x, a.y)]
-        columns = [blade.r, *blade.at(blade.r), *(np.asarray(v) for v in (blade.sweep, blade.rake) if v is not None)]
-        geometry = content_key(
-            *columns, blade.R, blade.Rhub, blade.axis, blade.interpolation, self.rotor.key(), *shapes
-        )
+        sizes = (blade.R, blade.Rhub, blade.axis, blade.interpolation, rotor.B, rotor.rotation, rotor.name)
+        hub = (rotor.hub_length, rotor.spinner_length)
+        geometry = content_key(blade.r, blade.chord, blade.beta, len(lines), *lines, sizes, hub, *shapes)
         tables = tuple((x, polar.key) for x, polar in self.polars)
         reach = (arrays.mach_nodes(self.mach_max), arrays.re_nodes(self.re_range))
-        return geometry, self.rotor.name, tables, repr(self.duct), self.n_stations, *reach
+        return geometry, tables, repr(self.duct), self.n_stations, *reach
 
     def prepared(
         self, effects: Sequence[Effect], level: float = 1.0, stations: Stations | None = None
