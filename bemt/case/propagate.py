@@ -183,10 +183,11 @@ def propagate(
         "model": _loads(found, factor * _model_error(case, model, found, points.conditions(case)[2])),
         "numerics": {key: np.abs(refined[key] - v) for key, v in nominal.items()},
     }
-    lost = found.converged & np.isnan(parts["input"]["thrust_N"])
+    answer = replace(found, u={}, u_by=parts)
+    lost = found.converged & np.isnan(answer.u["thrust_N"])
     why = ("unconverged somewhere in the range of the assumptions: u unknown",)
     flags = tuple((*f, *(why if bad else ())) for f, bad in zip(flags, lost, strict=True))
-    return Propagated(replace(found, u={}, u_by=parts, flags=flags), nominal, moved, refined, model)
+    return Propagated(replace(answer, flags=flags), nominal, moved, refined, model)
 
 
 def _model_error(case: Case, model: Model, points: Dataset, air: Air) -> Array:
@@ -227,7 +228,7 @@ def validity_of(case: Case, points: Dataset) -> tuple[Array, tuple[tuple[str, ..
             own = Validity.of_rotor(*size, run.x, run.Re, known.M_tip)
             known, ducted = Validity.of_rotors((known, own)), False
         factor, words = known.at(*size, x, points.Re75, points.M_tip, ducted)
-    tip = ((f"tip Mach {m:.2f}: supersonic, beyond section theory",) if m >= 1.0 else () for m in points.M_tip)
+    tip = ((f"supersonic tip: Mach {m:.2f}, beyond section theory",) if m >= 1.0 else () for m in points.M_tip)
     return factor, tuple((*a, *b) for a, b in zip(words, tip, strict=True))
 
 

@@ -20,9 +20,9 @@ from bemt.base.face import as_html
 from bemt.base.tables import number_text
 from bemt.base.units import INCH, KGF
 from bemt.case import Case
+from bemt.case.propagate import spread
 from bemt.drive import mission, rotor_table
 from bemt.drive.drive_model import Battery, Drive, Esc, Motor
-from bemt.case.propagate import spread
 
 SCHEMA = "bemt.drive.estimate/1"
 TIPS = (126.0, 190.0, 218.0, 310.0)
