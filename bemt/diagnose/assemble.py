@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,21 +39,6 @@ _FARTHEST = 1e6
 _U_DEFAULT = 0.01
 _U_RPM = 0.003
 _U_FLOOR = 0.002
-# Prepared rotors that are kept at a time.
-_PREPARED = 30
-
-
-class _Recent(dict[Any, Any]):
-    """The last few prepared rotors: each holds megabytes of tables, and what they gave is kept by the part itself."""
-
-    def __getitem__(self, key: Any) -> Any:
-        self[key] = value = super().pop(key)
-        return value
-
-    def __setitem__(self, key: Any, value: Any) -> None:
-        super().__setitem__(key, value)
-        if len(self) > _PREPARED:
-            del self[next(iter(self))]
 
 
 def _part(record: Record, case: Case, baseline: str) -> Part:
@@ -63,7 +48,7 @@ def _part(record: Record, case: Case, baseline: str) -> Part:
     speed = np.hypot(omega * R, record.V)
     top = min(1.25, float(np.max(speed / record.air.a_sound)) * 1.12 + 0.03)
     reached = model.at_speeds(record.rpm, record.V, record.air)
-    model = replace(reached, mach_max=top, _kept=_Recent())
+    model = replace(reached, mach_max=top)
     plain = [e for e in model.effects if not bem.acts_on_points(e)]
     flow = bem.flow_of(model.prepared(plain), record.rpm, record.V, record.air, record.extra, model.chord75_m)
     part = Part(record, model, model.effects, flow, case.content_hash(), tuple(case.get("model.effects_off")))

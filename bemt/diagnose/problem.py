@@ -90,7 +90,7 @@ class Part:
     @cached_property
     def _whole(self) -> bem.Model:
         """Model with the tables of all speeds."""
-        return replace(self.model, re_range=None, mach_max=bem.Model.mach_max, _kept={})
+        return replace(self.model, re_range=None, mach_max=bem.Model.mach_max)
 
     def _far(self, effects: Sequence[Effect]) -> bool:
         """Whether what an instrument got wrong takes the rotor to speeds that the tables of the recorded ones lack."""

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base import cache
+from bemt.base.kept import Kept
 from bemt.sections import rule
 from bemt.sections.extrapolation import METHODS, extend, viterna_cd_max
 from bemt.sections.polars import ALPHA_GRID, DEFAULT_RE, Polar, first_stall
@@ -55,7 +56,17 @@ def _confident_range(alpha: Array, cl: Array, confidence: Array, past_stall: flo
 
 
 def neuralfoil_polar(airfoil: Airfoil, n_crit: float = rule.N_CRIT, drag_level: float = rule.DRAG_LEVEL) -> Polar:
-    """Section table of a propeller blade by the general rule of :mod:`bemt.sections.rule`."""
+    """Section table of a propeller blade by the general rule (:mod:`bemt.sections.rule`); one object for equal ones."""
+    key = airfoil.key(), airfoil.name, float(n_crit), float(drag_level)
+    if cache.watched():  # whoever collects the tables that are used is to see them
+        return _by_rule(airfoil, n_crit, drag_level)
+    return _POLARS.get(key, lambda: _by_rule(airfoil, n_crit, drag_level))
+
+
+_POLARS: Kept[Polar] = Kept(128, lambda _: 1.0)
+
+
+def _by_rule(airfoil: Airfoil, n_crit: float, drag_level: float) -> Polar:
     small = tunnel_polar(airfoil, n_crit=n_crit, lift_floor=0.0)
     large = tunnel_polar(airfoil, n_crit=max(n_crit, rule.N_CRIT_LARGE))
     w = np.clip(np.log(DEFAULT_RE / rule.SMALL_RE) / np.log(2.0), 0.0, 1.0)[None, :, None]
