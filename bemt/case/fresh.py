@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
 from bemt.case.unknowns import AIR, FAN, HUB, OFFSET, SECTION, SURFACE, Unknown, label_chord
 from geometry.common import GeometryError
-from geometry.designation import parse_designation
+from geometry.designation import Designation, parse_designation
 
-__all__ = ["case_name", "fan_text", "label_parts", "label_text", "of_stations", "stations_text"]
+__all__ = ["case_name", "fan_text", "label_text", "of_stations", "read_label", "stations_text"]
 
 TIP_SPEED = 120.0
 """Speed of the blade tips at the operating point of a new case, for want of a better one. [m/s]"""
@@ -47,15 +48,15 @@ def _blocks(*unknowns: Unknown) -> str:
     return "".join(item.block() for item in unknowns)
 
 
-def label_parts(label: str, blades: int | None = None) -> tuple[float, float, int]:
-    """Diameter and pitch [in] and blades (2 unless told) of ``10x5``, ``8x4.5x3``."""
+def read_label(label: str, blades: int | None = None) -> Designation:
+    """What a label such as ``10x5`` or ``APC 8x4.5x3`` says, with the blades filled in: as told, else two."""
     try:
-        D, pitch, marked = parse_designation(label)
+        found = parse_designation(label)
     except GeometryError as error:
         raise InputError([Fault("LABEL", *fault) for fault in error.faults]) from None
-    if blades and marked and blades != marked:
-        raise InputError(Fault("--blades", "", str(blades), f"{marked}, as in {label}"))
-    return D, pitch, blades or marked or 2
+    if blades and found.blades and blades != found.blades:
+        raise InputError(Fault("--blades", "", str(blades), f"{found.blades}, as in {label}"))
+    return replace(found, blades=blades or found.blades or 2)
 
 
 def case_name(text: str) -> str:

@@ -90,6 +90,7 @@ _GAP = Limits("mm", 0, 50, _metres("tip_gap_mm", 0.005))
 _FRACTION_OF_HUMIDITY = _looks((1e-9, 0.999, "a fraction", lambda v: v * 100, "humidity_pct"))
 FILE = "the name of a file in the folder of the case"
 
+BladeClass = Literal["electric", "slow_flyer", "multirotor", "folding", "sport", "fpv"]
 KnownFrom = Literal["cad", "scan", "stations", "label", "reference"]
 Rotations = Literal["right", "left"]
 Numbers = float | tuple[float, ...] | None
@@ -188,7 +189,8 @@ class BladeTable(Table):
     label_pitch_in: float | None = entry(
         "pitch printed on the propeller", "in", 0.1, 120, _inch("label_pitch_in", 120.1)
     )
-    family: str | None = entry("maker's series")
+    family: str | None = entry("maker's series, such as apce or gwssf")
+    class_: BladeClass | None = entry("kind of blade, as its label says", alias="class")
     as_built: AsBuiltTable | None = None
     section: SectionTable | None = None
 

@@ -10,9 +10,9 @@ from typing import Any
 
 from bemt.base.units import INCH
 from bemt.rotors.population import chord_sd
-from bemt.sections.rule import DRAG_LEVEL, N_CRIT
+from bemt.sections.rule import DRAG_LEVEL, N_CRIT, section_at
 
-__all__ = ["AIR", "FAN", "HUB", "OFFSET", "SECTION", "SURFACE", "Unknown", "completed", "label_chord"]
+__all__ = ["AIR", "FAN", "HUB", "OFFSET", "SECTION", "SURFACE", "Unknown", "completed", "label_chord", "section_of"]
 
 
 CHORD, CHORD_EXPONENT = 0.2, -0.2
@@ -44,16 +44,8 @@ HUB = Unknown("rotor.hub_ratio", 0.15, 0.10, 0.20, "hub not known; typical of hu
 _UNDERSIDE = "a label states the pitch of the chord line (0) or of the flat underside (up to 1.4 deg more)"
 OFFSET = Unknown("blade.beta_offset_deg", 0.7, 0.0, 1.4, _UNDERSIDE)
 THICKNESS = Unknown("blade.section.thickness", 0.09, 0.06, 0.12, "section not known")
-SECTION = (
-    Unknown(
-        "blade.section.camber",
-        0.035,
-        0.02,
-        0.05,
-        "section not known; measured propeller families have 3 to 5 %, slow flyers more",
-    ),
-    THICKNESS,
-)
+_CAMBER = "section not known; measured propeller families have 3 to 5 %, slow flyers more"
+SECTION = (Unknown("blade.section.camber", 0.035, 0.02, 0.05, _CAMBER), THICKNESS)
 SURFACE = (
     Unknown("model.n_crit", N_CRIT, 1.0, 5.0, "transition not known; 3 is the rule for disturbed flow"),
     Unknown(
@@ -73,6 +65,15 @@ FAN = (
 )
 HUBS = ("hub_ratio", "hub_diameter_mm", "hub_diameter_in")
 CHORDS = ("chord_law", "stations", "uiuc", "apc")
+
+
+def section_of(blade_class: str | None) -> tuple[Unknown, ...]:
+    """Section of a class of blades: slow flyers are cambered as the measured ones are."""
+    if blade_class != "slow_flyer":
+        return SECTION
+    camber = section_at(0.75, "apcsf").camber
+    why = "section not known; slow flyers of two makers have 5 to 8 %"
+    return Unknown("blade.section.camber", camber, camber - 0.02, camber + 0.02, why), THICKNESS
 
 
 def label_chord(diameter_m: float) -> Unknown:
@@ -115,7 +116,7 @@ def completed(document: Mapping[str, Any]) -> dict[str, Any]:
             blade["chord_law"] = "fan" if fan else "apc_like"
             unknowns += FAN[1:2] if fan else [OFFSET, label_chord(_diameter_m(rotor))]
         if "section" not in blade:
-            unknowns += [*(FAN[2:] if fan else SECTION), *SURFACE]
+            unknowns += [*(FAN[2:] if fan else section_of(blade.get("class"))), *SURFACE]
     if "air" not in made:
         unknowns.append(AIR)
     if not isinstance(declared, list):
