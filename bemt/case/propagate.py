@@ -153,7 +153,9 @@ def propagate(
     from bemt.case.prepare import prepare_case
 
     points = Points.of(case, rpm, airspeed_m_s, density_kg_m3)
-    declared = case.assumptions if unknowns is None else tuple(unknowns)
+    # the motor's unknowns move no load at a given speed
+    own = tuple(item for item in case.assumptions if not item.key.startswith("drive."))
+    declared = own if unknowns is None else tuple(unknowns)
     steps, done = 3 + sum(len(item.values) for item in declared), 0
 
     def solved(changed: Case, what: str, stations: int | None = None) -> tuple[Model, Dataset]:

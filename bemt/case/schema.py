@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from bemt.air import LIQUID
 from bemt.base.toml import Axis, Limits, Table, axis_values, entry, expected, shown
+from bemt.case.drive_schema import DriveTable
 from bemt.rotors.latents import KNOWN_FROM
 from bemt.sections.rule import DRAG_LEVEL, N_CRIT
 from geometry.laws import CHORD_LAWS as GEOMETRY_CHORD_LAWS
@@ -329,6 +330,7 @@ class CaseFile(Table):
     duct: DuctTable | None = None
     operating: OperatingTable
     air: AirTable
+    drive: DriveTable | None = None
     model: ModelTable = ModelTable()
     sweep: SweepTable = SweepTable()
     assumptions: tuple[AssumptionTable, ...] = ()

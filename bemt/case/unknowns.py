@@ -12,7 +12,7 @@ from bemt.base.units import INCH
 from bemt.rotors.population import chord_sd
 from bemt.sections.rule import DRAG_LEVEL, N_CRIT, section_at
 
-__all__ = ["AIR", "FAN", "HUB", "OFFSET", "SECTION", "SURFACE", "Unknown", "completed", "label_chord", "section_of"]
+__all__ = ["AIR", "DRIVE", "FAN", "HUB", "OFFSET", "SECTION", "SURFACE", "Unknown", "completed", "label_chord", "section_of"]
 
 
 CHORD, CHORD_EXPONENT = 0.2, -0.2
@@ -57,12 +57,20 @@ SURFACE = (
     ),
 )
 AIR = Unknown("air.density_kg_m3", 1.225, 1.16, 1.29, "air not stated; 30 to 0 C at sea level")
+_MOTORS = " in two of three of 1088 measured motors with a propeller"
 FAN = (
     Unknown("rotor.hub_ratio", 0.37, 0.30, 0.45, "hub not known; typical of ducted fans"),
     Unknown("blade.max_chord_over_R", 0.45, 0.30, 0.60, "chord not known; range of the chord law fan"),
     Unknown("blade.section.camber", 0.05, 0.03, 0.07, "section not known; typical of cambered compressor sections"),
     THICKNESS,
 )
+DRIVE = (
+    Unknown("drive.battery.sag", 0.06, 0.01, 0.13, "battery not known; loses 3 to 10 % of its voltage at full throttle"),
+    Unknown("drive.motor.winding_drop", 0.14, 0.02, 0.31, f"motor not known; the winding takes 7 to 24 % of the voltage{_MOTORS}"),
+    Unknown("drive.motor.idle_share", 0.073, 0.03, 0.14, f"motor not known; losses take 5 to 11 % of the current{_MOTORS}"),
+)
+_STATED = {"drive.battery.sag": "resistance_mohm", "drive.motor.winding_drop": "resistance_mohm",
+           "drive.motor.idle_share": "no_load_A"}  # fmt: skip
 HUBS = ("hub_ratio", "hub_diameter_mm", "hub_diameter_in")
 CHORDS = ("chord_law", "stations", "uiuc", "apc")
 
@@ -84,6 +92,12 @@ def label_chord(diameter_m: float) -> Unknown:
     least, most = (float(f"{value:.2g}") for value in (max(chord / far, low), min(chord * far, high)))
     why = "chord not known; range of 87 measured propellers, 2.2 to 19 in. Measuring it narrows the band most"
     return Unknown("blade.max_chord_over_R", float(f"{chord:.3g}"), least, most, why)
+
+
+def _drive_states(drive: Mapping[str, Any], key: str) -> bool:
+    """Whether a table [drive] has the value itself, of which the key is a typical share."""
+    table = drive.get(key.split(".")[1], {})
+    return isinstance(table, dict) and _STATED[key] in table
 
 
 def _diameter_m(rotor: Any) -> float:
@@ -119,6 +133,8 @@ def completed(document: Mapping[str, Any]) -> dict[str, Any]:
             unknowns += [*(FAN[2:] if fan else section_of(blade.get("class"))), *SURFACE]
     if "air" not in made:
         unknowns.append(AIR)
+    if isinstance(made.get("drive"), dict):
+        unknowns += [item for item in DRIVE if not _drive_states(made["drive"], item.key)]
     if not isinstance(declared, list):
         return made
     named = {str(item.get("key")): item for item in declared if isinstance(item, dict)}

@@ -29,6 +29,7 @@ import math
 import re
 from dataclasses import dataclass
 
+from bemt.base.errors import Fault, InputError
 from geometry.designation import blade_class
 
 MM_ABOVE = 40.0
@@ -69,6 +70,19 @@ def family_of(maker: str, kind: str | None) -> str | None:
     names = (key for key, name in FAMILIES.items() if name.casefold().startswith(maker.casefold().split()[0]))
     found = [key for key in names if class_of(key) == kind]
     return found[0] if len(found) == 1 else None
+
+
+def find_family(series: str) -> str:
+    """Family of a maker's series, by its short or its long name.
+
+    >>> find_family("GWS Slow Flyer"), find_family("apce")
+    ('gwssf', 'apce')
+    """
+    for key, name in FAMILIES.items():
+        if series.casefold() in (key, name.casefold()):
+            return key
+    known = ", ".join(f"{key} ({name})" for key, name in FAMILIES.items())
+    raise InputError(Fault("", "--series", repr(series), f"one of {known}", "Leave it out if it is none of them"))
 
 
 def class_of(family: str | None) -> str | None:
