@@ -163,6 +163,13 @@ class Case:
             self._built[key] = make(case)
         return self._built[key]
 
+    def kept(self, what: str, make: Callable[[], float]) -> float:
+        """Give a number of the whole case, computed once."""
+        key = (what, self.file.model_dump_json())
+        if key not in self._built:
+            self._built[key] = make()
+        return float(self._built[key])
+
     def rotor(self, overrides: Mapping[str, Any] | None = None) -> Rotor:
         """Give the rotor, built once per geometry; overrides as in :meth:`replaced`."""
         rotor: Rotor = self._once(

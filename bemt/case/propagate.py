@@ -1,10 +1,10 @@
-"""A case at operating points, with bands: the one place where declared unknowns and the model's own error are propagated.
+"""A case at operating points, with bands: the one place that propagates declared unknowns and the model's own error.
 
-Three origins, added as squares (ASME V&V 20). *input*: one declared unknown at a time moves through its range, taken as
-uniform; with the results at both ends and in the middle on a parabola, the variance is s^2/3 + 4 q^2/45 (half difference
-s, sagitta q), which is (high - low)/sqrt(12) times the slope where the response is straight. *model*: how far measured
-rotors of such a description are from the solver (`bemt.rotors`), wider where none was measured (`bemt.rotors.validity`).
-*numerics*: change of the result when the blade elements are doubled.
+Three origins, added as squares (ASME V&V 20). *input*: one declared unknown at a time moves through its range, taken
+as uniform; with the results at both ends and in the middle on a parabola, the variance is s^2/3 + 4 q^2/45 (half
+difference s, sagitta q), which is (high - low)/sqrt(12) times the slope where the response is straight. *model*: how
+far measured rotors of such a description are from the solver (`bemt.rotors`), wider where none was measured
+(`bemt.rotors.validity`). *numerics*: change of the result when the blade elements are doubled.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 from bemt.air import air_arrays
 from bemt.rotors.model import coefficients
 from bemt.rotors.population import population
-from bemt.rotors.predict import predict, sense
+from bemt.rotors.predict import predict, sense, zero_thrust
+from bemt.rotors.validity import Validity
 
 if TYPE_CHECKING:
     from bemt.air import Air
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from bemt.case.load import Assumption, Case
     from bemt.dataset import Dataset
 
-__all__ = ["BANDED", "Moved", "Points", "Propagated", "propagate", "spread", "vary"]
+__all__ = ["BANDED", "Moved", "Points", "Propagated", "propagate", "spread", "validity_of", "vary"]
 
 Array = NDArray[np.float64]
 Answers = Mapping[str, Array]
@@ -39,7 +40,7 @@ BANDED = ("thrust_N", "torque_Nm", "power_W", "CT", "CP", "eta", "exhaust_speed_
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Operating points of a case, (P,) each; those that share its speed, airspeed or air follow it when it is changed."""
+    """Operating points of a case, (P,) each; what they share with it follows when it is changed."""
 
     case: Case
     rpm: Array  # [rev/min]
@@ -172,18 +173,16 @@ def propagate(
         return {key: np.asarray(found[key], dtype=float) for key in BANDED}
 
     model, found = solved(case, "nominal")
-    air = points.conditions(case)[2]
-    x, half_width = _model_error(case, model, found, air, bands)
-    factor, flags = _validity(case, model, found, x)
-    flags = tuple((*a, *b) for a, b in zip(found.flags, flags, strict=True))
+    factor, words = validity_of(case, found)
+    flags = tuple((*a, *b) for a, b in zip(found.flags, words, strict=True))
     nominal = channels(found)
     if not bands:
         return Propagated(replace(found, flags=flags), nominal, (), None, model)
     refined = channels(solved(case, "twice the stations", 2 * case.file.model.stations)[1])
     moved = vary(case, nominal, lambda changed, what: channels(solved(changed, what)[1]), declared)
     parts = {
-        "input": {key: np.sqrt(sum((one.u[key] ** 2 for one in moved), np.zeros(x.size))) for key in nominal},
-        "model": _loads(found, factor * half_width),
+        "input": {key: np.sqrt(sum((one.u[key] ** 2 for one in moved), np.zeros(len(found)))) for key in nominal},
+        "model": _loads(found, factor * _model_error(case, model, found, points.conditions(case)[2])),
         "numerics": {key: np.abs(refined[key] - v) for key, v in nominal.items()},
     }
     lost = found.converged & np.isnan(parts["input"]["thrust_N"])
@@ -192,28 +191,46 @@ def propagate(
     return Propagated(replace(found, u={}, u_by=parts, flags=flags), nominal, moved, refined, model)
 
 
-def _model_error(case: Case, model: Model, points: Dataset, air: Air, bands: bool) -> tuple[Array, Array]:
-    """J over J of zero thrust, (P,), and 68 % half widths of CT and CP about the nominal result, (2, P).
+def _model_error(case: Case, model: Model, points: Dataset, air: Air) -> Array:
+    """Half widths of the 68 % intervals of CT and CP about the nominal result, (2, P).
 
     What the population expects beside the nominal result counts too, as a root sum of squares.
     """
     known = case.as_built()
     solve = coefficients(model, air)
     at = sense(solve, model.diameter_m, points.rpm, points.J, points.Re75, known.drawn)
+    at = replace(at, J0=_zero_thrust_J(case), x=points.J / _zero_thrust_J(case))  # whatever other points are asked for
     mean = solve(known.prior.mean, points.rpm, points.J, np.arange(points.rpm.size))
     found = predict(population(), known.prior, at, mean, known.reference)
-    return at.x, np.hypot(found.half_width(), found.mean - np.array([points.CT, points.CP]))
+    return np.asarray(np.hypot(found.half_width(), found.mean - np.array([points.CT, points.CP])))
 
 
-def _validity(case: Case, model: Model, points: Dataset, x: Array) -> tuple[Array, tuple[tuple[str, ...], ...]]:
-    """Factor on the model's own error, (P,), and for each point the words that say why."""
-    learnt = population().learnt
-    tip = [(f"tip Mach {m:.2f}: supersonic, beyond what section theory covers",) if m >= 1.0 else () for m in
-           points.M_tip]  # fmt: skip
-    if learnt is None or case.as_built().reference is not None:
-        return np.ones(x.size), tuple(tip)
-    factor, words = learnt.beyond(case.diameter_m, points.M_tip, case.ducted)
-    return factor, tuple((*a, *filter(None, [b])) for a, b in zip(tip, words, strict=True))
+def _zero_thrust_J(case: Case) -> float:
+    """Advance ratio at which thrust vanishes at the case's own speed and air, found once."""
+
+    def find() -> float:
+        from bemt.case.prepare import prepare_case
+
+        return zero_thrust(coefficients(prepare_case(case), case.air()), case.as_built().drawn, case.rpm)
+
+    return case.kept("J of zero thrust", find)
+
+
+def validity_of(case: Case, points: Dataset) -> tuple[Array, tuple[tuple[str, ...], ...]]:
+    """Factor on the model's own error at solved points, (P,), and for each why it is wider or where the method ends."""
+    known = population().validity
+    words: tuple[tuple[str, ...], ...]
+    factor, words = np.ones(len(points)), ((),) * len(points)
+    x = points.J / _zero_thrust_J(case)
+    if known is not None:
+        size = (case.diameter_m, int(case.file.rotor.blades), case.rotor().blade.pitch_m() / case.diameter_m)
+        ducted, run = case.ducted, case.as_built().reference
+        if run is not None:  # a rotor that was measured itself, in its duct
+            own = Validity.of_rotor(*size, run.x, run.Re, known.M_tip)
+            known, ducted = Validity.of_rotors((known, own)), False
+        factor, words = known.at(*size, x, points.Re75, points.M_tip, ducted)
+    tip = ((f"tip Mach {m:.2f}: supersonic, beyond section theory",) if m >= 1.0 else () for m in points.M_tip)
+    return factor, tuple((*a, *b) for a, b in zip(words, tip, strict=True))
 
 
 def _loads(points: Dataset, u: Array) -> dict[str, Array]:

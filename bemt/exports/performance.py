@@ -224,23 +224,16 @@ class StatedBand:
 
 def band_of(case: Case, rpm: float, airspeed_m_s: tuple[float, float]) -> StatedBand:
     """Spread of the loads over the assumptions of a case, and of rotors as built around what is known of them."""
-    from bemt.sweep.case import spread
-    from bemt.sweep.model_error import u_model
+    from bemt.case.propagate import propagate
 
     n, V = np.full(2, float(rpm)), np.array(airspeed_m_s, dtype=float)
-    names = ("thrust_N", "torque_Nm")
-    model, air = _prepared(case), case.air()
-    points = model.solve(n, V, air)
-    base = solve_points(case, n, V, ready=model)
-    own = u_model(case, model, points, air)
-    variance = np.array([own[name] for name in names]) ** 2
-    for assumption in case.assumptions:
-        runs = [solve_points(case, n, V, {assumption.key: value}) for value in assumption.values]
-        for k, name in enumerate(names):
-            nominal = getattr(base, name)
-            variance[k] += spread(assumption.discrete, nominal, [getattr(run, name) for run in runs]) ** 2
+    found = propagate(case, n, V).points
+    lost = np.flatnonzero(np.isnan(found.u["thrust_N"]))
+    if lost.size:
+        where, words = f"{rpm:g} rev/min, {V[lost[0]]:g} m/s", "; ".join(found.flags[lost[0]]) or "not converged"
+        raise InputError(Fault(case.path.as_posix(), where, words, "a converged point", "Nothing was written"))
     with np.errstate(divide="ignore"):
-        u = np.sqrt(variance) / np.abs([base.thrust_N, base.torque_Nm])
+        u = np.array([found.u[name] / np.abs(found[name]) for name in ("thrust_N", "torque_Nm")])
     origin = f"{len(case.assumptions)} declared assumptions of the case and the spread of rotors as built"
     (T0, T1), (Q0, Q1) = u.tolist()
     return StatedBand((T0, T1), (Q0, Q1), float(rpm), (float(V[0]), float(V[1])), origin)
