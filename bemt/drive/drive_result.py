@@ -189,12 +189,20 @@ def solve(case: Case, airspeed_m_s: float = 0.0, off: Sequence[str] = ()) -> Dri
 
 def full_throttle(case: Case, airspeed_m_s: float = 0.0, bands: bool = True) -> dict[str, Band]:
     """Speed, thrust, current and power at full throttle and the stated charge: what every other command takes as most."""
-    found = _carried(case, airspeed_m_s, (), _full, bands)[2]
+    found = _carried(case, airspeed_m_s, (), _full, bands, rotor_table.UPPER)[2]
     return {key.partition(".")[2]: band for key, band in found.items()}
 
 
-def full_text(case: Case, full: Mapping[str, Band]) -> str:
-    """Full throttle in a line."""
+def full_document(case: Case) -> dict[str, Any] | None:
+    """Full throttle as plain values with its line of text, None for a case without a motor."""
+    if case.file.drive is None:
+        return None
+    full, t = full_throttle(case), case.file.drive
+    return {"kv": t.kv, "cells": t.cells, "soc": t.soc, "text": _line(case, full),
+            **{k: {"value": b.value, "u": b.u} for k, b in full.items()}}  # fmt: skip
+
+
+def _line(case: Case, full: Mapping[str, Band]) -> str:
     t = case_drive.drive_table(case)
     return (
         f"full throttle, {t.kv:g} rev/min/V on {t.cells}S at {t.soc:.0%} charge: "
@@ -206,10 +214,11 @@ Ask = Callable[[Case, Drive], dict[str, Array]]
 
 
 def _carried(
-    case: Case, airspeed_m_s: float, off: Sequence[str], ask: Ask, bands: bool = True
+    case: Case, airspeed_m_s: float, off: Sequence[str], ask: Ask, bands: bool = True,
+    speeds: Array = rotor_table.SPEEDS,
 ) -> tuple[Propagated, Drive, dict[str, Band], dict[str, Array]]:
     """Answers with their bands: unknowns and errors of the rotor through the drive, then unknowns of the drive."""
-    rpm, V = rotor_table.points(case.diameter_m, 1.02 * case_drive.rpm_max(case), airspeed_m_s)
+    rpm, V = rotor_table.points(case.diameter_m, 1.02 * case_drive.rpm_max(case), airspeed_m_s, speeds)
     found = propagate(case, rpm, V, bands=bands)
     rho, inertia = float(case.air().rho), case_drive.inertia_kg_m2(case)
 

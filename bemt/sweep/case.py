@@ -21,6 +21,7 @@ from bemt import __version__, effects
 from bemt.air import air_arrays
 from bemt.base import units
 from bemt.case import Assumption, Case
+from bemt.drive.drive_result import full_document
 from bemt.readers import references as reference_file
 from bemt.recordings import audit_remarks
 from bemt.sweep.agreement import agreement
@@ -237,6 +238,7 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
         "assumptions": [_assumption(a, m) for a, m in zip(case.assumptions, bemt.by_assumption, strict=True)],
         "references": [{"quantity": r.quantity, "kind": r.kind, "printed": r.printed, "value": r.value, "u": r.u,
                         "channel": r.channel, "source": r.source, "remark": r.remark} for r in refs],
+        "drive": full_document(case),
         "fan": _fan(case, ready, nominal, bemt) if case.ducted else None,
         "notes": [*([case.file.notes.strip()] if case.file.notes else []), *ready.notes],
         "faults": [],
