@@ -10,7 +10,7 @@ import pytest
 from bemt.base.errors import InputError
 from bemt.base.units import INCH
 from bemt.commands import cli
-from bemt.formula import k1k2 as empirical
+from bemt.rotors import k1k2 as empirical
 from bemt.formula.estimate import estimate
 
 

@@ -32,10 +32,9 @@ ROOMS: tuple[str, ...] = (
     "sections|sections.*",
     "effects|effects.*",
     "bem|bem.*",
-    "formula.k1k2|formula.compact",  # the laws; their fits need recordings
+    "rotors.k1k2",  # the law; its fit needs recordings
     "readers|readers.*",
     "recordings|recordings.*",
-    "formula|formula.*",
     "rotors|rotors.*",
     "case|case.*",
     "drive|drive.*",
@@ -61,7 +60,7 @@ MAY: dict[str, set[str]] = {
     "bemt.rotors.population": {"files"},
     "bemt.readers|bemt.readers.*": {"files"},
     "bemt.recordings.adapt|bemt.recordings.archive|bemt.recordings.database|bemt.recordings.load": {"files"},
-    "bemt.formula.gather": {"files"},
+    "bemt.rotors.k1k2_points|bemt.rotors.k1k2_calibration": {"files"},
     "bemt.sweep.grid.*|bemt.sweep.store|bemt.validate.folder": {"files"},
     "bemt.sweep.batch": {"files", "environment"},
     "bemt.compare.bench.*": {"files", "clock", "environment"},

@@ -122,7 +122,13 @@ def _tail(
     """Operating point, air, drive and assumptions."""
     drive, more = ("", ()) if motor is None else (drive_text(*motor), DRIVE)
     full = rpm is None and motor is not None
-    why = "" if rpm is not None else "full throttle; see [drive]" if full else f"gives a tip speed near {TIP_SPEED:g} m/s; "
+    why = (
+        ""
+        if rpm is not None
+        else "full throttle; see [drive]"
+        if full
+        else f"gives a tip speed near {TIP_SPEED:g} m/s; "
+    )
     why += "" if rpm is not None or full else "replace it with yours"
     n = full_rpm(*motor) if full and motor is not None else _rpm(diameter_m, rpm)
     return _operating(n, airspeed_m_s, why) + drive + _blocks(*unknowns, *more)

@@ -79,7 +79,9 @@ def _faults(w: Wanted) -> list[Fault]:
     if w.unit is not None and w.scan is None:
         faults.append(Fault("", "--unit", w.unit, "nothing without --scan"))
     if w.stations is not None and w.diameter_mm is None and w.label is None:
-        faults.append(Fault("", "--diameter-mm", "nothing", "the diameter, with --stations", "Or the propeller's label"))
+        faults.append(
+            Fault("", "--diameter-mm", "nothing", "the diameter, with --stations", "Or the propeller's label")
+        )
     if w.diameter_mm is not None and (w.stations is None or not 5.0 <= w.diameter_mm <= 10000.0):
         expected = "5 to 10000 mm" if w.stations else "nothing without --stations"
         faults.append(Fault("", "--diameter-mm", f"{w.diameter_mm:g}", expected, "In m? Times 1000"))
@@ -105,9 +107,7 @@ def _files(w: Wanted) -> dict[str, bytes]:
         D = (w.diameter_mm or 0.0) * 1e-3 if told is None or w.diameter_mm is not None else told.diameter_in * INCH
         hub, key = fresh.of_stations(file, D)
         blades = w.blades or (told.blades if told else None) or 2
-        text = fresh.stations_text(
-            file.name, D, blades, w.rpm, w.airspeed_m_s, hub, key, told, w.family, w.motor
-        )
+        text = fresh.stations_text(file.name, D, blades, w.rpm, w.airspeed_m_s, hub, key, told, w.family, w.motor)
         return {file.name: file.read_bytes(), "case.toml": text.encode()}
     return {"case.toml": _label_text(w, w.label or "").encode()}
 

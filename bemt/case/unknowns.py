@@ -12,7 +12,19 @@ from bemt.base.units import INCH
 from bemt.rotors.population import chord_sd
 from bemt.sections.rule import DRAG_LEVEL, N_CRIT, section_at
 
-__all__ = ["AIR", "DRIVE", "FAN", "HUB", "OFFSET", "SECTION", "SURFACE", "Unknown", "completed", "label_chord", "section_of"]
+__all__ = [
+    "AIR",
+    "DRIVE",
+    "FAN",
+    "HUB",
+    "OFFSET",
+    "SECTION",
+    "SURFACE",
+    "Unknown",
+    "completed",
+    "label_chord",
+    "section_of",
+]
 
 
 CHORD, CHORD_EXPONENT = 0.2, -0.2
@@ -65,9 +77,19 @@ FAN = (
     THICKNESS,
 )
 DRIVE = (
-    Unknown("drive.battery.sag", 0.06, 0.01, 0.13, "battery not known; loses 3 to 10 % of its voltage at full throttle"),
-    Unknown("drive.motor.winding_drop", 0.14, 0.02, 0.31, f"motor not known; the winding takes 7 to 24 % of the voltage{_MOTORS}"),
-    Unknown("drive.motor.idle_share", 0.073, 0.03, 0.14, f"motor not known; losses take 5 to 11 % of the current{_MOTORS}"),
+    Unknown(
+        "drive.battery.sag", 0.06, 0.01, 0.13, "battery not known; loses 3 to 10 % of its voltage at full throttle"
+    ),
+    Unknown(
+        "drive.motor.winding_drop",
+        0.14,
+        0.02,
+        0.31,
+        f"motor not known; the winding takes 7 to 24 % of the voltage{_MOTORS}",
+    ),
+    Unknown(
+        "drive.motor.idle_share", 0.073, 0.03, 0.14, f"motor not known; losses take 5 to 11 % of the current{_MOTORS}"
+    ),
 )
 _STATED = {"drive.battery.sag": "resistance_mohm", "drive.motor.winding_drop": "resistance_mohm",
            "drive.motor.idle_share": "no_load_A"}  # fmt: skip

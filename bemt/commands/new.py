@@ -23,7 +23,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scan", metavar="FILE", help=solid)
     parser.add_argument("--unit", choices=("mm", "m", "in"), help="with --scan: unit, if the file does not state it")
     parser.add_argument("--stations", metavar="FILE", help=table)
-    parser.add_argument("--diameter-mm", type=float, metavar="D", help="with --stations, without a label: diameter [mm]")
+    parser.add_argument(
+        "--diameter-mm", type=float, metavar="D", help="with --stations, without a label: diameter [mm]"
+    )
     parser.add_argument("--fan", action="store_true", help="a ducted fan")
     parser.add_argument(
         "--blades", type=_options.positive, metavar="B", help="number of blades (default: from the label, else 2)"

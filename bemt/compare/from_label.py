@@ -13,8 +13,8 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_text, text_table
 from bemt.base.units import INCH
 from bemt.case.schema import AIRSPEED, RPM
-from bemt.formula import k1k2 as empirical
 from bemt.formula.estimate import POSSIBLE, estimate, length_faults
+from bemt.rotors import k1k2 as empirical
 from geometry.common import GeometryError
 from geometry.designation import parse_designation
 

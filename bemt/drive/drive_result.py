@@ -214,7 +214,11 @@ Ask = Callable[[Case, Drive], dict[str, Array]]
 
 
 def _carried(
-    case: Case, airspeed_m_s: float, off: Sequence[str], ask: Ask, bands: bool = True,
+    case: Case,
+    airspeed_m_s: float,
+    off: Sequence[str],
+    ask: Ask,
+    bands: bool = True,
     speeds: Array = rotor_table.SPEEDS,
 ) -> tuple[Propagated, Drive, dict[str, Band], dict[str, Array]]:
     """Answers with their bands: unknowns and errors of the rotor through the drive, then unknowns of the drive."""

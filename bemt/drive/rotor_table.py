@@ -100,7 +100,13 @@ def points(diameter_m: float, rpm_max: float, airspeed_m_s: float, speeds: Array
 
 
 def from_loads(
-    case: Case, rpm: Array, airspeed_m_s: Array, thrust_N: Array, torque_Nm: Array, rho: float, inertia_kg_m2: float = 0.0
+    case: Case,
+    rpm: Array,
+    airspeed_m_s: Array,
+    thrust_N: Array,
+    torque_Nm: Array,
+    rho: float,
+    inertia_kg_m2: float = 0.0,
 ) -> RotorMap:
     """Rotor of a case from its loads at `points`; loads that are NaN are dropped."""
     from scipy.interpolate import PchipInterpolator
@@ -123,9 +129,7 @@ def from_loads(
         float(airspeed_m_s[0]), inertia_kg_m2, tuple(notes),
     )  # fmt: skip
     if case.ducted or np.count_nonzero(both) < 4:
-        why = (
-            "the inflow of a duct follows the fan at once here" if case.ducted else "no slope of thrust over airspeed"
-        )
+        why = "the inflow of a duct follows the fan at once here" if case.ducted else "no slope of thrust over airspeed"
         return _with(table, None, (*notes, f"{why}: no lag of the inflow"))
     # slope at fixed induced speed from the solver's, whose induced speed follows (bemt.effects.inflow_lag)
     w = rpm[:half][both] * math.pi / 30.0

@@ -58,7 +58,6 @@ FAMILIES = {
 """Maker and series by family, as the site heads them; other families import too."""
 
 
-
 def family_of(maker: str, kind: str | None) -> str | None:
     """Family of a maker's class of blades, None where the label does not say which series it is.
 

@@ -35,7 +35,14 @@ def summary(
         lines += _short(f"{name}: not solved, {n} {'fault' if n == 1 else 'faults'} (see the messages)", cut)
     if len(failed) > 6:
         lines.append(f"and {len(failed) - 6} more that were not solved")
-    for words in (_drives(solved), _worst(found), _ducts(solved), _unknowns(solved), _flags(solved, cut), _grids(solved, cut)):
+    for words in (
+        _drives(solved),
+        _worst(found),
+        _ducts(solved),
+        _unknowns(solved),
+        _flags(solved, cut),
+        _grids(solved, cut),
+    ):
         lines += ["", *words] if words else []
     return "\n".join([*lines, "", *_next(called, bool(found))] if solved else lines)
 
@@ -111,7 +118,9 @@ def _table(solved: Sequence[Mapping[str, Any]], found: Sequence[Mapping[str, Any
 def _drives(solved: Sequence[Mapping[str, Any]]) -> list[str]:
     """Most thrust of the cases that have a motor."""
     told = [(r["name"], r["drive"]["text"]) for r in solved if r.get("drive")]
-    lines = [line for name, text in told[:4] for line in textwrap.wrap(f"{name}, {text}", WIDTH, subsequent_indent="  ")]
+    lines = [
+        line for name, text in told[:4] for line in textwrap.wrap(f"{name}, {text}", WIDTH, subsequent_indent="  ")
+    ]
     return lines + ([f"and {len(told) - 4} more cases with a motor (--details)"] if len(told) > 4 else [])
 
 
