@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bemt.air import air_arrays
+from bemt.rotors.mixture import LEVELS
 from bemt.rotors.model import coefficients
 from bemt.rotors.population import population
 from bemt.rotors.predict import predict, sense, zero_thrust
@@ -88,6 +89,13 @@ class Propagated:
     moved: tuple[Moved, ...]
     refined: Answers | None  # With twice the blade elements
     model: Model  # The rotor of the case, prepared
+    model95: Answers  # 95 % half widths from the model's own error
+
+    def half_width95(self, channel: str) -> Array:
+        """Half width of the 95 % interval, (P,): twice the u of inputs and numerics, the model's error with its tail."""
+        parts = self.points.u_by
+        rest = sum((parts[origin][channel] ** 2 for origin in ("input", "numerics") if origin in parts), 0.0)
+        return np.asarray(np.sqrt(4.0 * rest + self.model95[channel] ** 2))
 
     def carry(self, answer: Callable[[Answers], Answers]) -> tuple[dict[str, Array], dict[str, dict[str, Array]]]:
         """Carry the bands through any function of the channels at all points: its values, and their u by origin.
@@ -154,7 +162,9 @@ def propagate(
     from bemt.case.prepare import prepare_case
 
     points = Points.of(case, rpm, airspeed_m_s, density_kg_m3)
-    declared = case.assumptions if unknowns is None else tuple(unknowns)
+    # the motor's unknowns move no load at a given speed
+    own = tuple(item for item in case.assumptions if not item.key.startswith("drive."))
+    declared = own if unknowns is None else tuple(unknowns)
     steps, done = 3 + sum(len(item.values) for item in declared), 0
 
     def solved(changed: Case, what: str, stations: int | None = None) -> tuple[Model, Dataset]:
@@ -175,23 +185,25 @@ def propagate(
     flags = tuple((*a, *b) for a, b in zip(found.flags, words, strict=True))
     nominal = channels(found)
     if not bands:
-        return Propagated(replace(found, flags=flags), nominal, (), None, model)
+        nothing = {key: np.full(len(found), np.nan) for key in nominal}
+        return Propagated(replace(found, flags=flags), nominal, (), None, model, nothing)
     refined = channels(solved(case, "twice the stations", 2 * case.file.model.stations)[1])
     moved = vary(case, nominal, lambda changed, what: channels(solved(changed, what)[1]), declared)
+    narrow, wide = (_loads(found, factor * u) for u in _model_error(case, model, found, points.conditions(case)[2]))
     parts = {
         "input": {key: np.sqrt(sum((one.u[key] ** 2 for one in moved), np.zeros(len(found)))) for key in nominal},
-        "model": _loads(found, factor * _model_error(case, model, found, points.conditions(case)[2])),
+        "model": narrow,
         "numerics": {key: np.abs(refined[key] - v) for key, v in nominal.items()},
     }
     answer = replace(found, u={}, u_by=parts)
     lost = found.converged & np.isnan(answer.u["thrust_N"])
     why = ("unconverged somewhere in the range of the assumptions: u unknown",)
     flags = tuple((*f, *(why if bad else ())) for f, bad in zip(flags, lost, strict=True))
-    return Propagated(replace(answer, flags=flags), nominal, moved, refined, model)
+    return Propagated(replace(answer, flags=flags), nominal, moved, refined, model, wide)
 
 
-def _model_error(case: Case, model: Model, points: Dataset, air: Air) -> Array:
-    """Half widths of the 68 % intervals of CT and CP about the nominal result, (2, P).
+def _model_error(case: Case, model: Model, points: Dataset, air: Air) -> tuple[Array, Array]:
+    """Half widths of the 68 and 95 % intervals of CT and CP about the nominal result, (2, P) each.
 
     What the population expects beside the nominal result counts too, as a root sum of squares.
     """
@@ -201,7 +213,8 @@ def _model_error(case: Case, model: Model, points: Dataset, air: Air) -> Array:
     at = replace(at, J0=_zero_thrust_J(case), x=points.J / _zero_thrust_J(case))  # whatever other points are asked for
     mean = solve(known.prior.mean, points.rpm, points.J, np.arange(points.rpm.size))
     found = predict(population(), known.prior, at, mean, known.reference)
-    return np.asarray(np.hypot(found.half_width(), found.mean - np.array([points.CT, points.CP])))
+    off = found.mean - np.array([points.CT, points.CP])
+    return np.hypot(found.half_width(), off), np.hypot(found.half_width(LEVELS[1]), 2.0 * off)
 
 
 def _zero_thrust_J(case: Case) -> float:

@@ -70,6 +70,7 @@ def _inputs(page: Mapping[str, Any]) -> Section:
     rows: list[Sequence[object]] = [
         ["rotational speed", num(c["rpm"], 6), "rev/min"],
         ["airspeed", num(c["airspeed_m_s"]), "m/s"],
+        *([["full throttle", drive["text"], ""]] if (drive := result.get("drive")) else []),
         ["density", num(c["density_kg_m3"]), "kg/m³"],
         ["temperature", num(c["temperature_C"], 3), "°C"],
         ["diameter", num(c["diameter_m"]), "m"],

@@ -19,6 +19,7 @@ from bemt.base import units
 from bemt.case import Case
 from bemt.case.propagate import BANDED, Moved, Points, propagate, vary
 from bemt.dataset import Dataset
+from bemt.drive.drive_result import full_document
 from bemt.readers import references as reference_file
 from bemt.recordings import audit_remarks
 from bemt.rotors.validity import serious
@@ -164,6 +165,7 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
         "assumptions": [_assumption(moved) for moved in found.moved],
         "references": [{"quantity": r.quantity, "kind": r.kind, "printed": r.printed, "value": r.value, "u": r.u,
                         "channel": r.channel, "source": r.source, "remark": r.remark} for r in refs],
+        "drive": full_document(case),
         "fan": _fan(case, ready, nominal) if case.ducted else None,
         "notes": [*([case.file.notes.strip()] if case.file.notes else []), *ready.notes],
         "faults": [],

@@ -38,7 +38,7 @@ def summary(
     if len(failed) > 6:
         lines.append(f"and {len(failed) - 6} more that were not solved")
     end = ["", *_next(called, bool(found))] if solved else []
-    for words in (_worst(found), _ducts(solved), _unknowns(solved), _grids(solved, cut)):
+    for words in (_drives(solved), _worst(found), _ducts(solved), _unknowns(solved), _grids(solved, cut)):
         lines += ["", *words] if words else []
     flags = _flags(solved, SCREEN - len(lines) - len(end) - 1)
     return "\n".join([*lines, *(["", *flags] if flags else []), *end])
@@ -116,6 +116,15 @@ def _table(solved: Sequence[Mapping[str, Any]], found: Sequence[Mapping[str, Any
         if any(c.get("doubts") for c in found):
             lines.append("!: do not take it for agreement; the flag below says why")
     return lines
+
+
+def _drives(solved: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Most thrust of the cases that have a motor."""
+    told = [(r["name"], r["drive"]["text"]) for r in solved if r.get("drive")]
+    lines = [
+        line for name, text in told[:4] for line in textwrap.wrap(f"{name}, {text}", WIDTH, subsequent_indent="  ")
+    ]
+    return lines + ([f"and {len(told) - 4} more cases with a motor (--details)"] if len(told) > 4 else [])
 
 
 def _worst(found: Sequence[Mapping[str, Any]]) -> list[str]:
