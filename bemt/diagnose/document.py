@@ -10,16 +10,17 @@ import numpy as np
 
 from bemt import __version__, effects
 from bemt.base.tables import text_table
+from bemt.compare.change_document import document as change_document
+from bemt.compare.contrast_text import headline as change_headline
 from bemt.compare.scaling_laws import law
-from bemt.diagnose import another_rotor
 from bemt.diagnose import fit as fitting
+from bemt.diagnose import wrong_rotor_check
 from bemt.diagnose.confusion import nearest
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
 from bemt.diagnose.locate import bare
 from bemt.diagnose.record import NO_SPEED
-from bemt.diagnose.rules import BESIDE_IT
 from bemt.diagnose.suggest import LEVEL
-from bemt.diagnose.verdict import inclusion
+from bemt.diagnose.verdict import BESIDE_IT, inclusion
 
 if TYPE_CHECKING:
     from bemt.diagnose.chain import Diagnosis
@@ -65,7 +66,7 @@ def document(d: Diagnosis) -> dict[str, Any]:
         flat = {(f"{i}.{k}" if name.pair else k): v for i, q in parameters.items() for k, v in q.items()}
         ranking.append({"effect": str(name), "probability": p, "parameters": flat})
     state = found.states[0]
-    said = d.ratios or d.decision
+    said = d.said
     own = {"verdict": d.decision.verdict, "effects": list(d.decision.effects), "rule": d.decision.why}
     return {
         "schema": SCHEMA,
@@ -74,13 +75,13 @@ def document(d: Diagnosis) -> dict[str, Any]:
         "effects": list(said.effects),
         "probability": said.probability,
         "systems": d.systems,
-        "ranking": ranking if d.ratios is None else list(d.ratios.ranking),
-        "by_the_case": None if d.ratios is None else own | {"ranking": ranking},
+        "ranking": list(_by_ratios(d)["ranking"]) if d.by_ratios else ranking,
+        "by_the_case": own | {"ranking": ranking} if d.by_ratios else None,
         "inclusion": {k: v for k, v in inclusion(found).items() if v > 1e-3},
         "location": d.where.document(),
         "fit": {c: {k: _number(v) for k, v in s.items()} for c, s in d.scores.items()},
         "blocks": d.blocks,
-        "sets": [list(s) for s in d.decision.sets] if d.ratios is None else [],
+        "sets": [list(s) for s in said.sets],
         "classes": [list(c) for c in d.decision.classes] or d.alike.classes(),
         "next_measurement": d.next.document(),
         "p_value": d.p_value,
@@ -92,7 +93,7 @@ def document(d: Diagnosis) -> dict[str, Any]:
         "baseline": [effects.to_text(e) for e in d.problem.baseline],
         "not_tried": dict(d.absent),
         "rule": said.why,
-        "rule_name": d.decision.rule if d.ratios is None else "ratios to the reference",
+        "rule_name": said.rule,
         "headline": headline(d),
         "left_over": _number(d.decision.left_over),
         "findings": list(d.problem.findings),
@@ -212,10 +213,12 @@ def explanation(d: Diagnosis) -> list[str]:
         lines.append(f"Before any physics: the case is off ({off}). Do diameter, pitch and blades match this rotor?")
     if len(d.problem.findings) > _FINDINGS:
         lines[-1] += f" And {len(d.problem.findings) - _FINDINGS} more; `import` shows all."
-    if d.ratios is not None:
-        members = ", ".join(f"{i} ({_title(i)})" for i in d.ratios.effects)
-        lines += [f"One of these ({d.ratios.probability:.2f}): {members}."] if d.ratios.verdict == "class" else []
-        return [*lines, d.ratios.told, *_next(d), *_not_tried(d)]
+    if d.by_ratios:
+        members = ", ".join(f"{i} ({_title(i)})" for i in d.said.effects)
+        lines += [f"One of these ({d.said.probability:.2f}): {members}."] if d.said.verdict == "class" else []
+        lines += [f"The ratios to the reference: {d.said.why}. The diagnosis with the case: {decision.verdict}: "
+                  f"{decision.why}."]  # fmt: skip
+        return [*lines, *_next(d), *_not_tried(d)]
     if decision.verdict == "none":
         lines.append(f"Why: {decision.why} (p = {d.p_value:.2g}).")
         if max((abs(v) for v in level.values()), default=0.0) > _WORTH_SAYING:
@@ -274,6 +277,12 @@ def _not_tried(d: Diagnosis) -> list[str]:
     return [f"Not tried: {'; '.join(words)}."] if words else []
 
 
+def _by_ratios(d: Diagnosis) -> dict[str, Any]:
+    """Document of the change from the reference."""
+    assert d.change is not None
+    return change_document(d.change)
+
+
 def _title(name: str) -> str:
     """Title of a cause; of one that only the comparison knows, that of its scaling law."""
     if name in effects.catalogue():
@@ -284,14 +293,19 @@ def _title(name: str) -> str:
 
 def headline(d: Diagnosis) -> str:
     """What an engineer would say first."""
-    if d.ratios is not None:
-        return d.ratios.headline
+    if d.by_ratios:
+        words = change_headline(_by_ratios(d))
+        listed = d.change.loads.effects if d.change is not None else ()
+        # a cut tip is another diameter
+        lone = [i for i in d.said.effects if i not in listed and (i != "tip_cut" or "diameter" not in listed)]
+        also = " or ".join(_title(i) for i in lone)
+        return f"{words[:-1]}; the model also allows {also}." if also else words
     said, catalogue = d.decision, effects.catalogue()
     titles = [catalogue[i].title for i in said.effects]
     off = _off(d)
-    if said.verdict == "insufficient" and another_rotor.foreign(d.problem):
+    if said.verdict == "insufficient" and wrong_rotor_check.foreign(d.problem):
         return f"These are not the loads of this case ({off}): check diameter, blades, units and speed first."
-    file, wrong, _ = another_rotor.contradiction(d.problem, said)
+    file, wrong, _ = wrong_rotor_check.contradiction(d.problem, said)
     if file:
         return f"{file} cannot be right: {wrong}. Mend that before any cause is looked for."
     if said.verdict == "none" and not d.problem.free.all():
@@ -342,7 +356,7 @@ def text(d: Diagnosis) -> str:
     first, *rest = explanation(d)
     # it explains little and takes lines
     last = [line for line in rest if line.startswith("Not tried: ")]
-    said = d.ratios or d.decision
+    said = d.said
     named = f" {', '.join(said.effects)}" if said.effects else ""
     out = [textwrap.fill(first, 110), f"verdict: {said.verdict}{named}"]
     # a command stays in one line, to be copied
