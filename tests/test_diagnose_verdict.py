@@ -299,7 +299,7 @@ def revised(name: str, said: verdict.Decision, **changed: Any) -> verdict.Decisi
     problem = SimpleNamespace(level={"thrust_N": 0.0}, scatter={}, findings=(), parts=(part,))
     slip = {"unit_slip": {"channel": {"value": "density_kg_m3"}}}
     plain: dict[str, Any] = {
-        "answer": said, "of_loads": said, "drive": None, "load_moves": False, "change": None, "of_label": True,
+        "answer": said, "of_loads": said, "drive": None, "load_moves": False, "change": None, "alone": False,
         "P": {NONE: 0.1, Explanation.of("oblique_inflow"): 0.4},
         "refined": lambda _: (SimpleNamespace(signature=np.array([0.2])), slip),
         "found": SimpleNamespace(problem=problem, spans={"oblique_inflow": None}),
@@ -332,7 +332,7 @@ REVISIONS: dict[str, tuple[verdict.Decision, dict[str, Any], str]] = {
 # Rules that need a solved problem: tested on one.
 BY_MODEL = (
     "does not predict", "on, and out of its range", "a few are left", "many are left",
-    "the ratios to the reference forbid it",
+    "the ratios to the reference forbid a none",
 )  # fmt: skip
 
 

@@ -83,7 +83,7 @@ class Diagnosis:
     loads : Diagnosis or None
         Of thrust and torque, where they name nothing and the answer is that of the drive.
     change : RunChange or None
-        Change from the one reference, where a rule asked for it.
+        Change from the references, where there is one recording beside them.
     """
 
     found: evidence.Evidence
@@ -251,12 +251,12 @@ def _diagnose(
     step = _next(found, decision, best, given)
     if said.by == "ratios" and query.change is not None:
         files = (*given.references[:1], *given.recordings[:1])
-        step = ratio_check.next_of(query.change, said, files) or step
+        step = ratio_check.next_of(query.change, files) or step
     if said.by == "both" and motor is not None:
         decision, parameters = said, parameters | motor.parameters
     return Diagnosis(
         found, decision, said, best, parameters, p, where, _scores(found, after, held, gp_only), words, after, held,
-        step, confusion.confusion(found), absent, motor, None, vars(query).get("change"),
+        step, confusion.confusion(found), absent, motor, None, query.change,
     )  # fmt: skip
 
 

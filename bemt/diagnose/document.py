@@ -45,6 +45,8 @@ _SHOWN = 8
 _FINDINGS = 3
 # All loads off the case by more than this share: first the question whether it is the rotor of the case.
 _ANOTHER_ROTOR = 0.25
+# Least probability of a guess.
+_GUESS = 0.3
 # Level that is said even where no cause shows.
 _WORTH_SAYING = 0.05
 # Ratios between these are said in percent.
@@ -160,7 +162,7 @@ def _parameters(d: Diagnosis) -> str:
 
 def _is_share(p: Parameter) -> bool:
     """Whether a number without a unit is a share of something."""
-    return p.unit == "1" and p.off == 0.0 and max(abs(p.low), abs(p.high)) <= 0.5
+    return p.unit == "1" and p.off == 0.0 and max(abs(p.low), abs(p.high)) < 1.0
 
 
 def _sized(p: Parameter, value: float, form: str = ".3g") -> str:
@@ -309,7 +311,8 @@ def headline(d: Diagnosis) -> str:
     if file:
         return f"{file} cannot be right: {wrong}. Mend that before any cause is looked for."
     if said.verdict == "none" and not d.problem.free.all():
-        return f"No cause: the recording differs from the reference by no more than runs do; from the model, {off}."
+        apart = _from_reference(d) or "the recording differs from the reference"
+        return f"No cause: {apart}, no more than runs do; from the model, {off}."
     if said.verdict == "none" and max((abs(v) for v in d.problem.level.values()), default=0.0) > LEVEL:
         return f"Recording and model differ ({off}), within the uncertainty of calibration, blade and solver; no cause."
     if said.verdict == "none":
@@ -324,10 +327,27 @@ def headline(d: Diagnosis) -> str:
             return f"Two causes: {' and '.join(_one_of(s) for s in said.sets)}."
         return f"The cause is {' or '.join(titles)}; these readings cannot distinguish them."
     if said.verdict == "unknown":
-        return f"Recording and model differ ({off}), and no effect in the library explains it."
-    best = next((catalogue[i].title for i in d.best.ids), "")
-    guess = f"; best guess: {best}" if best else ""
-    return f"Recording and model differ ({off}), but these readings do not show why{guess}."
+        what = _from_reference(d) or f"Recording and model differ ({off})"
+        return f"{what[0].upper()}{what[1:]}, and no effect in the library explains it."
+    what = _from_reference(d) or f"Recording and model differ ({off})"
+    return f"{what[0].upper()}{what[1:]}, but these readings do not show why{_guess(d)}."
+
+
+def _guess(d: Diagnosis) -> str:
+    """Title of the likeliest effect, where it is likely enough to be worth a look."""
+    chance = d.found.probability.get(Explanation.of(*d.best.ids), 0.0) if d.best.ids else 0.0
+    if chance < _GUESS or chance < d.found.probability[UNKNOWN]:
+        return ""
+    return f"; best guess: {' and '.join(_title(i) for i in d.best.ids)} (probability {chance:.2f})"
+
+
+def _from_reference(d: Diagnosis) -> str:
+    """Loads of the recording over those of the reference; "" where they were not compared."""
+    if d.change is None:
+        return ""
+    loads = [(c.name, d.change.ratios[c.channel]["ratio"]) for c in d.change.loads_by_name.values()]
+    words = " and ".join(f"{name} by {_share(ratio - 1.0)}" for name, ratio in loads)
+    return f"the recording differs from the reference ({words} at equal speed)" if words else ""
 
 
 def _one_of(ids: Sequence[str]) -> str:

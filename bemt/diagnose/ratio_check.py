@@ -19,51 +19,47 @@ import numpy as np
 from bemt.base.errors import InputError
 from bemt.compare.change_document import next_step
 from bemt.compare.invocation import Invocation
+from bemt.compare.matched import LOADS
 from bemt.compare.recordings import RunChange, changed
 from bemt.compare.stand_run import StandRun, stand_run
 from bemt.dataset import Dataset
+from bemt.diagnose.record import merged
 from bemt.diagnose.suggest import Suggestion
 from bemt.recordings.load import import_file
 
 if TYPE_CHECKING:
-    from bemt.diagnose.problem import Array, Problem
     from bemt.diagnose.record import Record
-    from bemt.diagnose.verdict import Decision
 
-__all__ = ["change_of", "next_of", "too_large"]
+__all__ = ["change_of", "clear_changes", "next_of"]
 
-# Loads that agree to the first while an effect would change one by the second, natural logarithm.
-_AGREE, _WOULD = 0.03, 0.1
-_SAME_ROTOR = "make sure that the case is this rotor: both runs differ from it in the same way"
+# Standard deviations from which a load has changed.
+_CLEAR = 3.0
 _LOADS = {"thrust_N": "thrust", "torque_Nm": "torque"}
 
 
 def change_of(
     records: Sequence[Record], diameter_m: float, absent: Collection[str], files: Sequence[str] | None = None
 ) -> RunChange | None:
-    """Change of the one recording from its one reference; None where ratios are no measure of it.
+    """Change of the one recording from its references; None where ratios are no measure of it.
 
     ``absent``: effects that cannot show; ``files``: reference and test as a command names them.
     """
-    pair = [r for known in (True, False) for r in records if r.reference is known]
-    if len(pair) != 2 or not pair[0].reference or pair[1].reference or _transient(absent) or _turned(pair):
+    known, tested = [[r for r in records if r.reference is which] for which in (True, False)]
+    if len(tested) != 1 or not known or _transient(absent):
+        return None
+    pair = [merged(known), tested[0]]
+    if _turned(pair):
         return None
     try:
-        runs = [_run(r, diameter_m, f) for r, f in zip(pair, _paths(files) or (None, None), strict=True)]
+        whole = _paths(files) if len(known) == 1 else []
+        runs = [_run(r, diameter_m, f) for r, f in zip(pair, whole or (None, None), strict=True)]
         return changed(runs[0], runs[1], diameter_m)
     except InputError:
         return None
 
 
-def next_of(change: RunChange, said: Decision, files: Sequence[str] | None) -> Suggestion | None:
+def next_of(found: RunChange, files: Sequence[str] | None) -> Suggestion | None:
     """What settles an answer of the ratios; None where the step of the diagnosis stands."""
-    if said.verdict == "none":
-        return Suggestion(_SAME_ROTOR, (), (), 0.0, 0.0, "look")
-    return _next(change, files)
-
-
-def _next(found: RunChange, files: Sequence[str] | None) -> Suggestion | None:
-    """Step of the comparison, without asking for the case that is there."""
     reference, test = _paths(files) or ["REFERENCE", "RECORDING"]
     step = next_step(found, Invocation(reference, test))
     command = () if "CASE" in step["command"] or not step["command"] else (step["command"],)
@@ -103,14 +99,14 @@ def _run(record: Record, diameter_m: float, file: str | None = None) -> StandRun
     return StandRun(Dataset("bench", record.name, values, u), "", density, diameter_m)
 
 
-def too_large(problem: Problem, signature: Array, found: RunChange) -> str:
-    """Load that an effect of this signature would change and that did not change; "" where there is none."""
-    for c, (name, word) in enumerate(_LOADS.items()):
-        here = (problem.channel == c) & problem.free
-        r = found.ratios.get(name)
-        if r is None or not here.any() or abs(math.log(r["ratio"])) > _AGREE:
+def clear_changes(change: RunChange) -> str:
+    """Loads that changed by more than three standard deviations, set-up included; "" where there is none."""
+    words = []
+    for c in change.channels.values():
+        r = change.ratios[c.channel]
+        if c.name not in LOADS or r["extrapolated"]:
             continue
-        would = float(np.median(signature[here] / problem.f0[here]))
-        if abs(would) > _WOULD:
-            return f"{word} by {would:+.0%}; it differs by {r['ratio'] - 1.0:+.1%}"
-    return ""
+        unsure = math.hypot(math.log(r["high95"] / r["ratio"]) / 1.96, c.session)
+        if abs(math.log(r["ratio"])) > _CLEAR * unsure:
+            words.append(f"{c.name} differs by {r['ratio'] - 1.0:+.1%}".replace("%", " %"))
+    return " and ".join(words)
