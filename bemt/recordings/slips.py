@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base import units
-from bemt.formula import k1k2 as empirical
 from bemt.recordings.findings import Facts, Finding, check_for
+from bemt.rotors import k1k2 as empirical
 
 Array = NDArray[np.float64]
 EXACT = 0.03
