@@ -92,7 +92,7 @@ class Propagated:
     model95: Answers  # 95 % half widths from the model's own error
 
     def half_width95(self, channel: str) -> Array:
-        """Half width of the 95 % interval, (P,): twice the u of inputs and numerics, the model's error with its tail."""
+        """Half width of the 95 % interval, (P,): twice the u of inputs and numerics, the model's own tail."""
         parts = self.points.u_by
         rest = sum((parts[origin][channel] ** 2 for origin in ("input", "numerics") if origin in parts), 0.0)
         return np.asarray(np.sqrt(4.0 * rest + self.model95[channel] ** 2))
@@ -195,10 +195,11 @@ def propagate(
         "model": narrow,
         "numerics": {key: np.abs(refined[key] - v) for key, v in nominal.items()},
     }
-    lost = found.converged & np.isnan(parts["input"]["thrust_N"])
+    answer = replace(found, u={}, u_by=parts)
+    lost = found.converged & np.isnan(answer.u["thrust_N"])
     why = ("unconverged somewhere in the range of the assumptions: u unknown",)
     flags = tuple((*f, *(why if bad else ())) for f, bad in zip(flags, lost, strict=True))
-    return Propagated(replace(found, u={}, u_by=parts, flags=flags), nominal, moved, refined, model, wide)
+    return Propagated(replace(answer, flags=flags), nominal, moved, refined, model, wide)
 
 
 def _model_error(case: Case, model: Model, points: Dataset, air: Air) -> tuple[Array, Array]:
@@ -240,7 +241,7 @@ def validity_of(case: Case, points: Dataset) -> tuple[Array, tuple[tuple[str, ..
             own = Validity.of_rotor(*size, run.x, run.Re, known.M_tip)
             known, ducted = Validity.of_rotors((known, own)), False
         factor, words = known.at(*size, x, points.Re75, points.M_tip, ducted)
-    tip = ((f"tip Mach {m:.2f}: supersonic, beyond section theory",) if m >= 1.0 else () for m in points.M_tip)
+    tip = ((f"supersonic tip: Mach {m:.2f}, beyond section theory",) if m >= 1.0 else () for m in points.M_tip)
     return factor, tuple((*a, *b) for a, b in zip(words, tip, strict=True))
 
 
