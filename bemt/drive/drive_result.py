@@ -140,9 +140,8 @@ class DriveResult:
 
 def case_for(what: str | None, **given: float | None) -> Case:
     """Case of a label or a file, with the numbers of `OPTIONS` that are given; all faults by the options' names."""
-    if not what:
-        raise InputError(Fault("", "CASE", "nothing", "a case file, its folder, or a label such as 10x5"))
-    case = load_case(find_cases([what])[0]) if Path(what).exists() else case_of(fresh.label_text(what))
+    path = Path(what or ".")
+    case = load_case(find_cases([path])[0]) if path.exists() else case_of(fresh.label_text(str(what)))
     return with_drive(case, **given)
 
 
@@ -299,9 +298,9 @@ def _unusual(case: Case) -> list[str]:
     slower = [v / (math.pi * case.diameter_m * loaded) * 60.0 for v in TIPS[:2]]
     return [
         f"{'unusual' if rare else 'fast'} combination: without load the tip speed would be {tips:.0f} m/s; 95 % of "
-        f"1088 recorded motors are below {TIPS[2]:.0f}.\n  {table.kv:g} rev/min/V on {table.cells}S suits propellers of "
-        f"{fit[0]:.1f} to {fit[1]:.1f} in; a propeller of {case.diameter_m / INCH:.3g} in suits {slower[0]:.0f} to "
-        f"{slower[1]:.0f} rev/min/V.\n  "
+        f"1088 recorded motors are below {TIPS[2]:.0f}.\n  {table.kv:g} rev/min/V on {table.cells}S suits "
+        f"propellers of {fit[0]:.1f} to {fit[1]:.1f} in; one of {case.diameter_m / INCH:.3g} in suits "
+        f"{slower[0]:.0f} to {slower[1]:.0f} rev/min/V.\n  "
         + ("A typical motor would overload and burn out; the numbers assume a motor that is large enough." if rare
            else "This is common for racing; the motor gets hot at full throttle.")
     ]  # fmt: skip
