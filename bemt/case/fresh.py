@@ -142,7 +142,7 @@ def label_text(
     family: str | None = None,
     motor: tuple[float, int] | None = None,
 ) -> str:
-    """Write the case of a label such as ``10x5``, with the series of its maker and K_v and cells of a motor if known."""
+    """Write the case of a label such as ``10x5``, with its maker's series and K_v and cells of a motor if known."""
     told = read_label(label, blades)
     D, B = told.diameter_in, told.blades
     chord, section = label_chord(D * INCH), section_of(told.blade_class)
