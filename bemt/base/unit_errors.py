@@ -122,6 +122,7 @@ _TABLE: dict[str, tuple[tuple[str, str, float], ...]] = {
         ("kgf", "N", 0.0), ("lbf", "N", 0.0), ("gf", "N", 0.0), ("kgf", "gf", 0.0), ("kgf", "lbf", 1.0),
         ("lbf", "gf", 1.0), ("ozf", "N", 2.0),
     ),
+    "length": (("mm", "m", 0.5), ("in", "m", 0.5), ("in", "mm", 0.5), ("cm", "m", 1.0)),
     "rotation": (
         ("rad_s", "rpm", 0.0), ("rev_s", "rpm", 0.0), ("rev_s", "rad_s", 2.0), ("1000 rev/min", "rpm", 2.0),
         ("deg/s", "rpm", 3.0),
@@ -143,7 +144,6 @@ _TABLE: dict[str, tuple[tuple[str, str, float], ...]] = {
     "electrical_power": (("kW", "W", 1.0),),
     "current": (("A", "mA", 0.5),),
     "voltage": (("V", "mV", 0.5),),
-    "length": (("mm", "m", 0.5), ("in", "m", 0.5), ("in", "mm", 0.5), ("cm", "m", 1.0)),
     "diameter": (("radius", "diameter", 1.0),),
     "efficacy": (("kgf", "N", 5.0), ("lbf", "N", 5.0), ("gf", "N", 5.0), ("kgf", "gf", 5.0)),  # thrust over power
     "pressure": (("hPa", "Pa", 0.0), ("kPa", "Pa", 0.5), ("bar", "Pa", 1.0), ("inHg", "Pa", 1.0)),
@@ -198,7 +198,7 @@ def symmetric() -> dict[str, float]:
     for e in (e for kind in _TABLE for e in errors(kind)[::2] if not e.offset and kind != "motor_constant"):
         factor = max(e.factor, e.repair)
         if all(abs(factor / other - 1.0) > 1e-9 for other in out.values()):
-            out[f"{e.actual} <-> {e.stated}"] = factor
+            out["kilo" if math.isclose(factor, 1e3) else f"{e.actual} <-> {e.stated}"] = factor
     return out
 
 
