@@ -101,22 +101,6 @@ def _table() -> dict[str, Unit]:
 UNITS: dict[str, Unit] = _table()
 """Every known suffix and its `Unit`."""
 
-SLIP_FACTORS: dict[str, float] = {
-    "kgf <-> N": KGF,
-    "lbf <-> N": LBF,
-    "kgf <-> lbf": KGF / LBF,
-    "ozf <-> N": 1.0 / OZF,
-    "kilo (gf <-> kgf, mm <-> m)": 1000.0,
-    "inch <-> mm": 25.4,
-    "rev/min <-> rev/s": 60.0,
-    "rev/s <-> rad/s": 2.0 * math.pi,
-    "rev/min <-> rad/s": 1.0 / RPM,
-    "deg <-> rad": 1.0 / DEG,
-    "diameter <-> radius": 2.0,
-    "percent <-> fraction": 100.0,
-}
-"""Usual slips of units as pure numbers [-]; either direction.  Used to search for the cause of a wrong number."""
-
 
 def _get(unit: str) -> Unit:
     try:

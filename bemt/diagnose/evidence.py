@@ -34,6 +34,8 @@ Array = NDArray[np.float64]
 # Settings of the covariance this far (in natural logarithm) below the best are dropped.
 _DROP = 8.0
 _KEEP = 6
+# Error of the solver, share of the largest coefficient, within which a ratio is looked for.
+_ROUGH = 0.03
 FOR_NULLS = 3
 """Settings of the covariance, best first, that nulls are weighed under; only these keep what rivals need [1]."""
 
@@ -122,7 +124,7 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
     spans, S, log_w = _stacked(problem, candidates)
     modes = form.form_modes(problem, candidates)
     # a few settings of each effect are enough to see which covariances matter
-    coarse = _Table(problem, S, log_w, spans, candidates, modes, _few(candidates))
+    coarse = _Table(problem, S, log_w, spans, candidates, modes, _few(problem, candidates))
     best: dict[Hyper, dict[Explanation, float]] = {}
     top = -np.inf
     for h, C in noise.covariances(problem):
@@ -182,15 +184,21 @@ def bare(problem: Problem, candidates: Sequence[Candidate], hyper: Hyper) -> Evi
     return Evidence(problem, tuple(candidates), (state,), {}, spans, log_w)
 
 
-def _few(candidates: Sequence[Candidate], most: int = 9) -> NDArray[np.intp]:
+def _few(problem: Problem, candidates: Sequence[Candidate], most: int = 9) -> NDArray[np.intp]:
     """Columns that stand for each candidate: some of the settings that were solved, evenly chosen.
 
-    Where settings are not alike beforehand, ends and quantiles of their prior.
+    Where settings are not alike beforehand, ends and quantiles of their prior. Of ratios that are exact, those nearest
+    to the readings: no other ratio stands for the right one.
     """
     out, start = [], 0
+    rough = np.hypot(problem.u, _ROUGH * problem.scale)[:, None]
     for c in candidates:
         solved = np.flatnonzero(c.solved)
-        if np.ptp(c.weight) < 1e-12:
+        cls = effects.catalogue()[c.id]
+        if cls.kind == "stand" and cls.discrete:
+            apart = np.sum(((problem.residual[:, None] - c.signatures) / rough) ** 2, axis=0)
+            chosen = np.sort(np.argsort(apart, kind="stable")[:most])
+        elif np.ptp(c.weight) < 1e-12:
             chosen = solved[np.unique(np.linspace(0, solved.size - 1, most).round().astype(int))]
         else:
             before = np.cumsum(c.weight) - 0.5 * c.weight

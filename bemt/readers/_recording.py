@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.base import units
+from bemt.base import unit_errors
 from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
 from bemt.readers._clock import clock_seconds
@@ -257,7 +257,7 @@ _PLAUSIBLE: dict[str, tuple[float, float, str]] = {
 
 def slip(ratio: float) -> str:
     """Slip of units that a ratio looks like, as words to append; "" when none fits."""
-    for name, factor in units.SLIP_FACTORS.items():
+    for name, factor in unit_errors.symmetric().items():
         for value in (factor, 1.0 / factor):
             if abs(abs(ratio) / value - 1.0) < SLIP:
                 return f" (the factor of {name})"
