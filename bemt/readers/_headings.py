@@ -320,8 +320,8 @@ def heading(text: str) -> Heading:
         told = f"{text!r} is read as {_FORCES[unit]}: 1 {parts[2]} weighs {units.UNITS[unit].factor:.4g} N"
         return replace(found, text=text, told=told)
     if parts and parts[2] in ("Hz", "1/s") and (said := _spoken(parts[1])[1]) & _TURNS and "electrical" not in said:
-        unit = units.Unit("", "angular_speed", 60.0)
-        return Heading(text, "rpm", unit, told=f"{text!r} is read as revolutions per second")
+        turns = units.Unit("", "angular_speed", 60.0)
+        return Heading(text, "rpm", turns, told=f"{text!r} is read as revolutions per second")
     if parts and re.fullmatch(r"[gG]/W", parts[2]):
         return replace(_heading(f"{parts[1]} (gf/W)"), text=text, told=f"{text!r} is read as gf/W")
     if parts and (qualified := _QUALIFIED.fullmatch(_plain(parts[1]))):
