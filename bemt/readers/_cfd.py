@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
-from bemt.readers import GZIP, WIDE, SourceText, decode, number
+from bemt.readers import WIDE, SourceText, decode, number
+from bemt.readers._packed import GZIP
 
 Array = NDArray[np.float64]
 
