@@ -73,7 +73,8 @@ class Job:
     case : Case
         The case, including changes.
     rpm : float or None
-        Highest speed of tables and fits, speed of a disk; None: from the case. [rev/min]
+        Highest speed of tables and fits, speed of a disk; None: from the case, tables up to full throttle of its motor.
+        [rev/min]
     airspeed_m_s : float or None
         Axial speed of a disk and of frozen polars; None: from the case. [m/s]
     hold : tuple of str
@@ -101,9 +102,17 @@ class Job:
         return self.case.path.as_posix()
 
     @cached_property
+    def full_throttle(self) -> dict[str, Any] | None:
+        """Speed and thrust at full throttle with their u, where the case has a motor."""
+        from bemt.drive.drive_result import full_document
+
+        return full_document(self.case)
+
+    @cached_property
     def performance(self) -> Performance:
-        """Thrust and torque over rpm and advance ratio; solved once."""
-        return performance_of(self.case, self.rpm_top)
+        """Thrust and torque over rpm and advance ratio, up to full throttle where the case has a motor; solved once."""
+        full = self.full_throttle if self.rpm is None else None
+        return performance_of(self.case, full["rpm"]["value"] if full else self.rpm_top)
 
     @cached_property
     def J_zero(self) -> float:
@@ -469,6 +478,8 @@ def entry(export: Export, job: Job, files: Files) -> dict[str, Any]:
         "source": export.source,
     }
     found |= export.checked(job, files)
+    if export.kind == "loads" and job.rpm is None and job.full_throttle is not None:
+        found["full_throttle"] = job.full_throttle
     found["notes"] = export.notes(job) + _lost(export, job)
     found["files"] = [
         {"path": name, "bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}

@@ -331,6 +331,7 @@ def _targets_text(manifest: dict[str, Any], out: Path) -> list[str]:
                 for v, t, q in speeds
             )
             lines.append(f"  standard uncertainty of the prediction: {words} ({band['origin']})")
+            lines += [f"  ! {flag}" for flag in band["flags"]]
         lines += [f"  note: {note}" for note in item["notes"]]
     if manifest.get("kept"):
         lines.append(f"kept from an earlier export into {out}: {', '.join(manifest['kept'])}")

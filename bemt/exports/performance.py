@@ -11,8 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 from bemt.base.errors import Fault, InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from bemt.air import Air
     from bemt.bem.model import Model
     from bemt.case import Case
@@ -35,29 +33,29 @@ SLOW_DESCENT = 8
 """Steps through the descent of an open rotor, down to twice the induced speed at rest."""
 
 
-def _prepared(case: Case, overrides: Mapping[str, Any] | None = None) -> Model:
+def _prepared(case: Case) -> Model:
     from bemt.case.prepare import prepare_case
 
-    return prepare_case(case, overrides)
+    return prepare_case(case)
 
 
 def solve_points(
-    case: Case,
-    rpm: ArrayLike,
-    airspeed_m_s: ArrayLike,
-    overrides: Mapping[str, Any] | None = None,
-    ready: Model | None = None,
-    air: Air | None = None,
+    case: Case, rpm: ArrayLike, airspeed_m_s: ArrayLike, ready: Model | None = None, air: Air | None = None
 ) -> Dataset:
-    """Solve points of a case, in its own air unless another is given; a point without a solution is refused."""
+    """Solve points of a case without bands, in its own air unless another is given; an unsolved point is refused."""
     rpm, V = np.broadcast_arrays(np.asarray(rpm, dtype=float), np.asarray(airspeed_m_s, dtype=float))
-    found = (ready or _prepared(case, overrides)).solve(rpm.ravel(), V.ravel(), air or case.air(overrides))
-    if not found.converged.all():
-        bad = int(np.flatnonzero(~found.converged)[0])
+    found = (ready or _prepared(case)).solve(rpm.ravel(), V.ravel(), air or case.air())
+    _refuse(case, found, found.converged)
+    return found
+
+
+def _refuse(case: Case, found: Dataset, good: NDArray[np.bool_]) -> None:
+    """Refuse to write anything of points that are not good."""
+    if not good.all():
+        bad = int(np.flatnonzero(~good)[0])
         where = f"{found.rpm[bad]:g} rev/min, {found.airspeed_m_s[bad]:g} m/s"
         words = "; ".join(found.flags[bad]) or "not converged"
         raise InputError(Fault(case.path.as_posix(), where, words, "a converged point", "Nothing was written"))
-    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,41 +265,46 @@ def thinner_air(case: Case, rpm: float) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class StatedBand:
-    """Relative standard uncertainty of thrust and torque at two airspeeds. [-]"""
+    """Thrust and torque at two airspeeds with their relative standard uncertainty [1], and what is wrong there."""
 
     thrust: tuple[float, float]
     torque: tuple[float, float]
+    thrust_N: tuple[float, float]
+    torque_Nm: tuple[float, float]
     rpm: float
     airspeed_m_s: tuple[float, float]
     origin: str
+    flags: tuple[str, ...]  # Of both points, each once
 
     def document(self) -> dict[str, Any]:
-        """For the manifest, in per cent."""
+        """For the manifest, uncertainties in per cent."""
         return {
             "rpm": self.rpm,
             "airspeed_m_s": list(self.airspeed_m_s),
+            "thrust_N": list(self.thrust_N),
             "thrust_pct": [100.0 * u for u in self.thrust],
+            "torque_Nm": list(self.torque_Nm),
             "torque_pct": [100.0 * u for u in self.torque],
             "level": "one standard uncertainty",
             "origin": self.origin,
+            "flags": list(self.flags),
         }
 
 
 def band_of(case: Case, rpm: float, airspeed_m_s: tuple[float, float]) -> StatedBand:
-    """Spread of the loads over the assumptions of a case, and of rotors as built around what is known of them."""
+    """Loads at a speed and two airspeeds with the band of `bemt.case.propagate`."""
     from bemt.case.propagate import propagate
 
-    n, V = np.full(2, float(rpm)), np.array(airspeed_m_s, dtype=float)
-    found = propagate(case, n, V).points
-    lost = np.flatnonzero(np.isnan(found.u["thrust_N"]))
-    if lost.size:
-        where, words = f"{rpm:g} rev/min, {V[lost[0]]:g} m/s", "; ".join(found.flags[lost[0]]) or "not converged"
-        raise InputError(Fault(case.path.as_posix(), where, words, "a converged point", "Nothing was written"))
+    found = propagate(case, rpm, airspeed_m_s).points
+    _refuse(case, found, np.isfinite(found.u["thrust_N"]) & np.isfinite(found.u["torque_Nm"]))
+    (T0, T1), (Q0, Q1) = ((float(v[0]), float(v[1])) for v in (found.thrust_N, found.torque_Nm))
     with np.errstate(divide="ignore"):
-        u = np.array([found.u[name] / np.abs(found[name]) for name in ("thrust_N", "torque_Nm")])
+        u = [found.u[name] / np.abs(found[name]) for name in ("thrust_N", "torque_Nm")]
+    thrust, torque = ((float(v[0]), float(v[1])) for v in u)
     origin = f"{len(case.assumptions)} declared assumptions of the case and the spread of rotors as built"
-    (T0, T1), (Q0, Q1) = u.tolist()
-    return StatedBand((T0, T1), (Q0, Q1), float(rpm), (float(V[0]), float(V[1])), origin)
+    flags = tuple(dict.fromkeys(flag for point in found.flags for flag in point))
+    V0, V1 = airspeed_m_s
+    return StatedBand(thrust, torque, (T0, T1), (Q0, Q1), float(rpm), (float(V0), float(V1)), origin, flags)
 
 
 @dataclass(frozen=True, eq=False)
