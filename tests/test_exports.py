@@ -62,6 +62,7 @@ def script(project: Path, name: str) -> Any:
     spec = importlib.util.spec_from_file_location(f"docs_{name}", project / f"docs/{name}.py")
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # dataclasses look their module up
     spec.loader.exec_module(module)
     return module
 
@@ -341,7 +342,7 @@ def test_the_direction_of_rotation_is_held_or_said(word: str, job: Job, fan: Job
 
 
 def test_px4_commands_what_its_simulator_gives(project: Path, job: Job) -> None:
-    """The controller inverts THR_MDL_FAC; the simulated rotor gives T_MAX u: together, the thrust that was asked for."""
+    """The controller inverts THR_MDL_FAC, the simulated rotor gives T_MAX u: together, the thrust asked for."""
     from bemt.exports.px4 import parameters
 
     files = written("px4", job)
