@@ -483,11 +483,30 @@ def test_a_fan_that_dfdc_holds_comes_back_with_its_duct(fan: Job, tmp_path: Path
         assert got.torque_Nm / scale == pytest.approx(want.torque_Nm / scale, abs=1e-6)
 
 
+def test_dfdc_puts_the_rotor_where_the_case_has_it(fan: Job, tmp_path: Path) -> None:
+    """Behind the lip, wherever the origin of the file lies; a third of the length unless the case says more."""
+    from bemt.readers import dfdc
+
+    for stated, x in ((None, 20.0), (25.0, 25.0)):
+        case = fan.case if stated is None else fan.case.replaced({"duct.rotor_position_mm": stated})
+        text = str(exports()["dfdc"].write(Job(case, fan.rpm, 20.0))["ds30.case"])
+        (tmp_path / "a.case").write_text(text)
+        duct = dfdc.read(tmp_path / "a.case").duct
+        assert duct is not None and duct["rotor_position_mm"] == pytest.approx(x, abs=1e-6)
+        head, geometry = text.split("GEOM\n", 1)
+        name, *rows = geometry.split("ENDGEOM")[0].splitlines()
+        moved = [row if "999" in row else f" {float(row.split()[0]) + 0.5:.10f} {row.split()[1]}" for row in rows]
+        head = re.sub(r"(Nblds\s+NRPdef\n )([\d.]+)", lambda m: f"{m[1]}{float(m[2]) + 0.5:.9g}", head)
+        (tmp_path / "b.case").write_text(head + "\n".join(["GEOM", name, *moved, "ENDGEOM", ""]))
+        assert dfdc.read(tmp_path / "b.case").duct == pytest.approx(duct, abs=1e-5)
+
+
 def test_what_dfdc_holds_of_a_fan_is_near_the_fan(fan: Job, tmp_path: Path) -> None:
     """Fitted sections and thinned stations, solved by one solver: no statement on DFDC."""
     got, want = _again("dfdc", fan.case, tmp_path, fan.rpm_top, fan.airspeed)
-    assert got.thrust_N == pytest.approx(want.thrust_N, rel=0.1)
-    assert got.torque_Nm == pytest.approx(want.torque_Nm, rel=0.1)
+    most = solve_points(exports()["dfdc"].compared(fan), fan.rpm_top, 0.0)  # type: ignore[attr-defined]
+    assert got.thrust_N == pytest.approx(want.thrust_N, abs=0.1 * most.thrust_N[0])
+    assert got.torque_Nm == pytest.approx(want.torque_Nm, abs=0.1 * most.torque_Nm[0])
 
 
 # The promise of the files: whole, named, with their unit, never half written; stations read back make a case.
