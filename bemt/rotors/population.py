@@ -18,7 +18,7 @@ import json
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, field
-from functools import cache
+from functools import cache, lru_cache
 from importlib import resources
 from typing import Any
 
@@ -82,6 +82,7 @@ def chord_sd(diameter_m: float) -> float:
     return CHORD_SD if diameter_m >= SMALL_IN * 0.0254 * (1.0 - 1e-9) else CHORD_SD_SMALL
 
 
+@lru_cache(maxsize=64)
 def sizes(nu: float) -> Array:
     """Factors on standard deviations whose mixture by `WEIGHTS` is nearly Student's t with nu degrees of freedom."""
     from scipy.special import gammaincinv
@@ -237,13 +238,15 @@ class Population:
         w = own / (own + second)
         return mean - w * (gap_deg + mean - offset), own * (1.0 - w)
 
-    def section(self, growth: float, section: str, blade_class: str | None, chord: float) -> tuple[Array, Array]:
+    def section(
+        self, known_from: str, growth: float, section: str, blade_class: str | None, chord: float
+    ) -> tuple[Array, Array]:
         """Mean and covariance of ln(drag) and zero-lift angle before the family is known, (2,) and (2, 2)."""
         mean, variance = np.zeros(2), np.array([self.drag, self.camber_deg]) ** 2
         if section == "rule":
             variance += np.array([self.unknown_drag, self.unknown_camber_deg]) ** 2
             mean += [self.usual_drag, self.usual_camber_deg + (blade_class == "slow_flyer") * self.slow_flyer_deg]
-            if math.isfinite(chord):
+            if known_from == "stations" and math.isfinite(chord):
                 mean[0] += self.drag_chord * math.log(float(np.clip(chord, *CHORD_RANGE)) / RULE_CHORD)
         cross = self.camber_drag * math.sqrt(variance[0] * variance[1])
         return mean, np.array([[variance[0], cross], [cross, variance[1]]]) * growth**2
@@ -259,7 +262,7 @@ class Population:
         growth, kin = float(_growth(diameter_m, self.small)), self.families.get(family or "")
         mean, cov = np.zeros(len(NAMES)), np.zeros((len(NAMES), len(NAMES)))
         both = np.ix_([_DRAG, _CAMBER], [_DRAG, _CAMBER])
-        mean[[_DRAG, _CAMBER]], cov[both] = self.section(growth, section, blade_class, chord)
+        mean[[_DRAG, _CAMBER]], cov[both] = self.section(known_from, growth, section, blade_class, chord)
         cov[_LIFT, _LIFT] = (self.lift * growth) ** 2
         if kin is not None:
             own = np.sqrt(1.0 - np.array(self.between[1:]))
