@@ -21,7 +21,6 @@ from bemt.library.given import numbers, path_text
 if TYPE_CHECKING:
     import pandas as pd
 
-    from bemt.air import Air
     from bemt.bem.gradient import Gradient
     from bemt.bem.model import Model
 

@@ -90,16 +90,6 @@ def sizes(nu: float) -> Array:
     return np.asarray(np.sqrt(0.5 * nu / gammaincinv(0.5 * nu, _QUANTILES)))
 
 
-def class_of(text: str | None) -> str | None:
-    """Class of blade that a name or a label's letters stand for; None where they stand for none.
-
-    >>> class_of("APC Slow Flyer"), class_of("SF"), class_of("APC Thin Electric")
-    ('slow_flyer', 'slow_flyer', None)
-    """
-    words = (text or "").casefold()
-    return "slow_flyer" if words == "sf" or "slow fly" in words or "slowfly" in words else None
-
-
 @dataclass(frozen=True, eq=False)
 class Family:
     """What measured propellers of one family have in common, from the population's spread between families.

@@ -17,7 +17,8 @@ from the data, each departure adding its own part, with no step at the edge:
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -36,8 +37,45 @@ LENGTH_X = 0.34
 """Length of the fitted residual over J/J0 [1]."""
 SAID = 1.01
 """Smallest factor that a single departure is named for [1]."""
-DOUBTFUL = 2.0
+DOUBTFUL = 2.5
 """Factor from which a point is called one not to be trusted, declared [1]."""
+
+OUTSIDE, DOUBT = "outside the measured rotors", "do not trust it"
+
+
+def serious(flags: Sequence[str]) -> tuple[str, ...]:
+    """Flags that forbid to call a point one that agrees, without their numbers; a band that is a little wider does not.
+
+    >>> serious(["supersonic tip: Mach 1.09", "outside the measured rotors: 5 blades (2 to 4): model error times 1.1"])
+    ('supersonic tip',)
+    """
+    return tuple(kind(f) for f in flags if not f.startswith(OUTSIDE) or f.endswith(DOUBT))
+
+
+def kind(flag: str) -> str:
+    """What a flag is about: its words up to the numbers.
+
+    >>> kind("not converged at r/R 0.31: no root"), kind("supersonic tip: Mach 1.09, beyond section theory")
+    ('not converged', 'supersonic tip')
+    """
+    return re.split(r":| on \d| at r/R", flag)[0]
+
+
+def counted(flags: Sequence[Sequence[str]]) -> tuple[str, ...]:
+    """Flags of many points, those of one kind together: how many points have it, and the words of the last.
+
+    >>> counted([(), ("supersonic tip: Mach 1.05",), ("supersonic tip: Mach 1.09",)])
+    ('2 of 3 points: supersonic tip: Mach 1.09',)
+    >>> counted([("a duct",)])
+    ('a duct',)
+    """
+    found: dict[str, list[str]] = {}
+    for point in flags:
+        for flag in point:
+            found.setdefault(kind(flag), []).append(flag)
+    if len(flags) == 1:
+        return tuple(flags[0])
+    return tuple(f"{len(all_)} of {len(flags)} points: {all_[-1]}" for all_ in found.values())
 
 
 @dataclass(frozen=True)
@@ -124,12 +162,12 @@ class Validity:
         said = []
         for i in range(P):
             why = [
-                f"{text.format(float(np.broadcast_to(value, P)[i]))} (measured: {known})"
+                f"{text.format(_three(float(np.broadcast_to(value, P)[i])))} ({known})"
                 for part, (_, text, value, known) in zip(more, parts, strict=True)
                 if part[i] > SAID**2 - 1.0
             ]
-            doubt = "; do not trust it" if factor[i] >= DOUBTFUL else ""
-            words = f"outside the measured rotors: {', '.join(why)}; model error times {factor[i]:.2g}{doubt}"
+            doubt = f"; {DOUBT}" if factor[i] >= DOUBTFUL else ""
+            words = f"{OUTSIDE}: {', '.join(why)}: model error times {factor[i]:.2g}{doubt}"
             said.append((words,) if why else ())
         return np.asarray(factor, dtype=float), tuple(said)
 
@@ -140,6 +178,11 @@ def _folds(value: ArrayLike, known: tuple[float, float]) -> Array:
     return np.asarray(np.log(np.maximum(np.maximum(known[0] / v, v / known[1]), 1.0)))
 
 
+def _three(value: float) -> float:
+    """To three digits."""
+    return float(f"{value:.3g}")
+
+
 def _ends(known: tuple[float, float]) -> str:
-    low, high = (f"{v:,.0f}" if v >= 1e3 or float(v).is_integer() else f"{v:.2g}" for v in known)
+    low, high = (f"{_three(v):,.0f}" if v >= 1e3 or float(v).is_integer() else f"{v:.2g}" for v in known)
     return f"{low} to {high}"

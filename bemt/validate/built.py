@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.readers._uiuc_names import class_of
 from bemt.rotors.conditioning import condition
 from bemt.rotors.fit import MeasuredRotor, law
 from bemt.rotors.latents import Prior
 from bemt.rotors.mixture import LEVELS, half_width, inside
-from bemt.rotors.population import WEIGHTS, Population, class_of, label_angle_deg
+from bemt.rotors.population import WEIGHTS, Population, label_angle_deg
 from bemt.rotors.predict import predict, sense
 from bemt.rotors.reference import ReferenceRun, noise_of_run, scatter
 from bemt.sections import rule as section_rule
@@ -67,7 +68,7 @@ def observe(propeller: UiucPropeller, effects: Sequence[Effect], stations: Stati
     y = np.array([drawn.CT[here], drawn.CP[here]])
     record = MeasuredRotor(
         **vars(at), name=propeller.name, family=propeller.family, section=section_rule.source(propeller.family),
-        gap_deg=gap, static=drawn.static[here], y=y, chord=chord / rotor.R, blade_class=class_of(propeller.label),
+        gap_deg=gap, static=drawn.static[here], y=y, chord=chord / rotor.R, blade_class=class_of(propeller.family),
     )  # fmt: skip
     return Observed(propeller, solve, drawn, record)
 
