@@ -39,7 +39,7 @@ _FREE: tuple[tuple[str, str, float, float], ...] = (
     ("stations_deg", "ln", 0.7, 0.3), ("label_deg", "ln", 0.8, 0.1), ("family_deg", "ln", 1.0, 0.1),
     ("offset_deg", "", 0.7, 0.15), ("lift", "ln", 0.03, 0.5), ("drag", "ln", 0.1, 0.3), ("camber_deg", "ln", 0.3, 0.3),
     ("unknown_drag", "ln", 0.15, 0.5), ("unknown_camber_deg", "ln", 1.0, 0.5), ("camber_drag", "tanh", 0.0, 1.0),
-    ("usual_drag", "", 0.0, 0.1), ("usual_camber_deg", "", 0.0, 0.3), ("slow_flyer_deg", "", 1.5, 1.5),
+    ("slow_flyer_deg", "", 1.5, 1.5),
     ("drag_chord", "", -0.3, 0.3), ("small", "", 0.5, 0.2), ("nu", "ln", 4.0, 0.4), ("nu_rest", "ln", 4.0, 0.4),
     ("hub_cd", "", 0.8, 0.4), ("lift_Re", "", 0.0, 0.1),
     ("rest_small", "", 0.5, 0.2), ("local_camber_deg", "ln", 0.5, 0.5), ("local_drag", "ln", 0.15, 0.5),

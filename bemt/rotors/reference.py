@@ -88,6 +88,12 @@ class ReferenceRun:
         variance = p.rest_sd(at).reshape(-1) ** 2 - np.einsum("ij,ij->i", gain, k)
         return shift, slopes, np.sqrt(np.maximum(variance, 0.0)).reshape(2, P)
 
+    def rest(self, p: Population, at: Sensed, other: Sensed | None = None) -> Array:
+        """Covariance of the rest between points once the run is known, (2 P, 2 Q)."""
+        k = p.rest(at, self.at)
+        q = k if other is None else p.rest(other, self.at)
+        return np.asarray(p.rest(at, other) - k @ np.linalg.solve(self.noise, q.T))
+
     @staticmethod
     def given(at: Sensed, noise: Array, y: Array, found: Conditioned) -> ReferenceRun:
         """Reference of a conditioned rotor; rows that are not finite tell nothing."""
