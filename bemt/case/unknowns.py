@@ -33,10 +33,10 @@ pairs the one that predicts 87 propellers of UIUC from their labels best in the 
 chords alone give 0.218 and -0.4 with families alike in weight, which is 13 to 31 % too much thrust and power below 9 in
 [1]."""
 SLOW_FLYER_CHORD = 1.4
-"""Chord of slow flyers over that of others: eleven of two makers have 1.5 times the law's, others of their size 1.1; from
-their labels the factor moves the mean log score of 175 propellers from 0.042 to 0.086 [1]."""
+"""Chord of slow flyers over that of others: eleven of two makers have 1.5 times the law's, others of their size 1.1;
+the factor moves the mean log score of 175 propellers known from their labels from 0.042 to 0.086 [1]."""
 DEG_PER_CAMBER = 104.0
-"""Zero-lift angle over camber of a NACA four-digit mean line, largest camber at 40 % chord: thin-airfoil theory [deg]."""
+"""Zero-lift angle over camber of a NACA four-digit mean line, camber at 40 % chord: thin-airfoil theory [deg]."""
 _CHORD_LAW = (0.05, 1.0)  # chords over the radius that a propeller may have
 
 

@@ -55,7 +55,9 @@ def run(args: argparse.Namespace) -> int:
     if args.fit_population or args.leave_family_out or args.peer:
         return _population(args)
     with _terminal.progress() as say:
-        document = validate([where(name) for name in args.dir], effects, args.polar, say, match_J0=args.match_J0, as_drawn=args.as_drawn)
+        document = validate(
+            [where(name) for name in args.dir], effects, args.polar, say, match_J0=args.match_J0, as_drawn=args.as_drawn
+        )
     if args.out:
         write(document, args.out)
     # an infinite error (not converged) becomes null: JSON has no infinity

@@ -40,7 +40,7 @@ _FREE: tuple[tuple[str, str, float, float], ...] = (
     ("offset_deg", "", 0.7, 0.15), ("lift", "ln", 0.03, 0.5), ("drag", "ln", 0.1, 0.3), ("camber_deg", "ln", 0.3, 0.3),
     ("unknown_drag", "ln", 0.15, 0.5), ("unknown_camber_deg", "ln", 1.0, 0.5), ("camber_drag", "tanh", 0.0, 1.0),
     ("slow_flyer_deg", "", 1.5, 1.5),
-    ("drag_chord", "", -0.3, 0.3), ("small", "", 0.5, 0.2), ("nu", "ln", 4.0, 0.4), ("nu_rest", "ln", 4.0, 0.4),
+    ("drag_chord", "", -0.3, 0.3), ("small", "", 0.5, 0.2), ("nu", "ln", 3.0, 0.15), ("nu_rest", "ln", 4.0, 0.4),
     ("hub_cd", "", 0.8, 0.4), ("lift_Re", "", 0.0, 0.1),
     ("rest_small", "", 0.5, 0.2), ("local_camber_deg", "ln", 0.5, 0.5), ("local_drag", "ln", 0.15, 0.5),
     ("local_correlation", "tanh", -0.4, 0.5), ("local_deg", "ln", 3.5, 0.4), ("local_ln_Re", "ln", 1.0, 0.5),
@@ -205,7 +205,9 @@ def objective(theta: Array, rows: Rotors) -> float:
     """Negative log-likelihood with the priors of the search's numbers."""
     p = _population(theta)
     away = (theta - START) / _WIDTH
-    return float(0.5 * away @ away - _gaps(p, rows.rotors) - rows.weight @ rows.log_likelihood(p, theta[_REST].tobytes()))
+    return float(
+        0.5 * away @ away - _gaps(p, rows.rotors) - rows.weight @ rows.log_likelihood(p, theta[_REST].tobytes())
+    )
 
 
 def fit(
@@ -248,7 +250,9 @@ def _told(p: Population, rows: Rotors) -> list[tuple[Array, Array, float]]:
         for a, b in zip(s2, t2, strict=True):
             S = a * T @ C @ T.T + b * np.eye(r.size)
             left = r - T @ z
-            logs.append(-0.5 * (left @ np.linalg.solve(S, left) + np.linalg.slogdet(S)[1] - (~real).sum() * math.log(b)))
+            logs.append(
+                -0.5 * (left @ np.linalg.solve(S, left) + np.linalg.slogdet(S)[1] - (~real).sum() * math.log(b))
+            )
         chance = np.exp(np.array(logs) + log_w - max(np.array(logs) + log_w))
         chance /= chance.sum()
         rough, size = float(chance @ t2), float(chance @ s2)

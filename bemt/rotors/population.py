@@ -277,7 +277,9 @@ class Population:
     def _amplitudes(self, at: Sensed) -> tuple[Array, Array]:
         """Standard deviations of remainder and of the part at rest, (..., 2, P) each [1]."""
         growth, top = _growth(at.diameter_m, self.rest_small)[..., None, None], np.abs(at.top)
-        level, hover = (np.array(pair)[:, None] for pair in ((self.rest_CT, self.rest_CP), (self.hover_CT, self.hover_CP)))
+        level, hover = (
+            np.array(pair)[:, None] for pair in ((self.rest_CT, self.rest_CP), (self.hover_CT, self.hover_CP))
+        )
         share = np.clip(np.abs(at.f) / top, 0.05, 2.0) ** self.rest_share
         return growth * level * top * share, growth * hover * top * np.exp(-((at.J / AT_REST_J) ** 2))[..., None, :]
 

@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 SESSION = 0.01
 """Gain of a stand that all points of a run share, where the recording does not state it: retests of a propeller in one
 tunnel repeat CT to about a percent (Brandt and Selig 2011, AIAA 2011-1255, not checked) [1]."""
+IN_FLIGHT_J = 0.1
+"""Advance ratio beyond which a point is in flight: none of the part of the rest that belongs to hover is left [1]."""
 _BLIND = 1e6
 _FEWEST = 5
 
@@ -72,6 +74,11 @@ class ReferenceRun:
     left: Array
     noise: Array
     size: float = 1.0
+
+    @property
+    def in_flight(self) -> bool:
+        """Whether the run has a point in flight; without one it tells little of it: hover and flight differ by rotor."""
+        return bool(np.any(np.abs(self.at.J) > IN_FLIGHT_J))
 
     def near(self, p: Population, at: Sensed) -> tuple[Array, Array, Array]:
         """Shift of the expectation, slopes and remaining rest at other points: (2, P), (2, K, P), (2, P).
