@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from geometry.common import Faults, GeometryError
 
 BLADE_CLASSES = ("electric", "slow_flyer", "multirotor", "folding", "sport", "fpv")
-"""Kinds of blades that a label tells apart: thin electric, slow flyer, multirotor, folding, sport (glow), FPV racing."""
+"""Kinds of blades that a label tells apart; sport is for glow engines."""
 
 # Letters behind the size (makers' catalogues): class, and whether they mean the opposite rotation.
 _SUFFIXES: dict[str, tuple[str | None, bool]] = {

@@ -129,6 +129,11 @@ def watched() -> bool:
     return bool(_watched)
 
 
+def is_installed(package: str) -> bool:
+    """Whether a package could be imported."""
+    return find_spec(package) is not None
+
+
 @lru_cache(maxsize=16)
 def installed_version(package: str) -> str:
     """Version of an installed package, found without importing it.

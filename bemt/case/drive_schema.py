@@ -1,4 +1,4 @@
-"""[drive] of a case file: battery, ESC, motor and vehicle that turn the rotor, and what is typical where a part is silent.
+"""[drive] of a case file: battery, ESC, motor and vehicle that turn the rotor.
 
 A motor's label gives its K_v only. What is known of resistance and no-load current is how loaded motors are in use: the
 share of the voltage that the winding takes, and the share of the current that friction and iron take, both near full

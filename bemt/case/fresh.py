@@ -142,7 +142,7 @@ def label_text(
     family: str | None = None,
     motor: tuple[float, int] | None = None,
 ) -> str:
-    """Write the case of a label such as ``10x5``, with the series of its maker and K_v and cells of a motor if known."""
+    """Write the case of a label such as ``10x5``, with its maker's series and K_v and cells of a motor if known."""
     told = read_label(label, blades)
     D, B = told.diameter_in, told.blades
     chord, section = label_chord(D * INCH), section_of(told.blade_class)
@@ -295,7 +295,7 @@ def of_stations(file: Path, diameter_m: float) -> tuple[float, str]:
     head = load_text(file).text[:4000]
     first = head.lstrip().partition("\n")[0]
     if "," in first:
-        from bemt.case.build import read_stations
+        from bemt.readers._stations import read_stations
 
         return max(min(float(read_stations(file, 0.5 * diameter_m)[0].min()), 0.3), 0.05), "stations"
     if re.match(r"\s*r/R\b", first):

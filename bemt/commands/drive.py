@@ -15,7 +15,8 @@ EXAMPLE = "drive 10x4.5 --kv 900 --cells 3"
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument("case", nargs="?", metavar="CASE", help="case file, its folder, or a label such as 10x5")
+    what = "case file, its folder, or a label such as 10x5 (default: this folder)"
+    parser.add_argument("case", nargs="?", metavar="CASE", help=what)
     _options.add_motor(parser)
     parser.add_argument("--mass", type=float, metavar="KG", help="mass of the vehicle, for hover [kg]")
     many = "number of rotors on the battery (default: from the case, else 1)"

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bemt.base import unit_errors
 from bemt.base.tables import number_text
 from bemt.base.units import INCH
 from bemt.diagnose.blade import AsLabelled
 from bemt.diagnose.record import CHANNELS
-from bemt.effects import catalogue
 from bemt.effects.base import Baking, Effect
 
 if TYPE_CHECKING:
@@ -38,7 +38,6 @@ _OFF = 0.25
 _SHOWN = 3
 # A slip this much farther from the loads than the nearest one may still be it.
 _NEARLY = 1.0
-_POLE_PAIRS = (2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 14, 16, 18, 20, 21)
 _ANGLES_DEG = (-12.0, -9.0, -6.0, -3.0, 3.0, 6.0, 9.0, 12.0, 16.0)
 _BLADES = (1, 2, 3, 4, 5, 6, 8, 12)
 _ERROR = ": error: "
@@ -108,15 +107,20 @@ def _slips(problem: Problem, found: dict[str, float]) -> Iterator[tuple[str, str
     hint = ", the case has the radius as diameter" if twice else ", the case has twice the diameter" if half else ""
     size = math.exp(k) * D
     yield "diameter", f"diameter {size:.3g} m ({size / INCH:.3g} in){hint}", {c: p * k for c, p in powers.items()}, 0.5
-    for pairs in _POLE_PAIRS:
-        both = dict.fromkeys(found, -2.0 * math.log(pairs))
-        yield "poles", f"electrical instead of mechanical revolutions, {pairs} pole pairs", both, 0.5
-    for factor, words in ((60.0 / (2.0 * math.pi), "rad/s"), (60.0, "rev/s")):
-        yield "speed", f"speed in {words} for rev/min", dict.fromkeys(found, 2.0 * math.log(factor)), 1.0
-    for setting in catalogue()["unit_slip"]().variants() or ():
-        channel, factor = str(setting["channel"]), float(setting["factor"])
-        if channel in found and factor > 0.0:
-            yield channel, f"{channel} in another unit ({setting['unit']})", {channel: math.log(factor)}, 1.0
+    for miscount in unit_errors.speed_ratios(rarest=1.0):
+        if 1 in (miscount.true, miscount.set):
+            off = -2.0 * math.log(miscount.ratio)
+            yield (
+                "poles" if miscount.set == 1 else "divided twice",
+                miscount.words,
+                dict.fromkeys(found, off),
+                0.5 + miscount.rarity,
+            )
+    for error in unit_errors.errors("rotation"):
+        yield "speed", f"rpm: {error.words}", dict.fromkeys(found, -2.0 * math.log(error.factor)), 1.0 + error.rarity
+    for channel, kind in ((T, "force"), (Q, "torque")):
+        for error in unit_errors.errors(kind) if channel in found else ():
+            yield channel, f"{channel}: {error.words}", {channel: math.log(error.factor)}, 1.0 + error.rarity
     changes: list[tuple[str, str, Effect, float]] = [
         ("pitch", f"blade angle {a:+.0f} deg (different pitch)", AsLabelled(angle_deg=a), 0.5) for a in _ANGLES_DEG
     ]

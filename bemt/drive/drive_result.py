@@ -1,4 +1,4 @@
-"""What motor and battery make of a rotor: thrust over pulse width, full throttle, hover, flight time, response, with bands.
+"""What motor and battery make of a rotor: thrust over pulse width, hover, flight time, response, with bands.
 
 One road for a label and for a case: the rotor by `bemt.case.propagate`, the motor by the case's table [drive]. Declared
 unknowns of rotor, motor and battery and the model's own error are carried through to every answer.
@@ -140,9 +140,8 @@ class DriveResult:
 
 def case_for(what: str | None, **given: float | None) -> Case:
     """Case of a label or a file, with the numbers of `OPTIONS` that are given; all faults by the options' names."""
-    if not what:
-        raise InputError(Fault("", "CASE", "nothing", "a case file, its folder, or a label such as 10x5"))
-    case = load_case(find_cases([what])[0]) if Path(what).exists() else case_of(fresh.label_text(what))
+    path = Path(what or ".")
+    case = load_case(find_cases([path])[0]) if path.exists() else case_of(fresh.label_text(str(what)))
     return with_drive(case, **given)
 
 
@@ -188,7 +187,7 @@ def solve(case: Case, airspeed_m_s: float = 0.0, off: Sequence[str] = ()) -> Dri
 
 
 def full_throttle(case: Case, airspeed_m_s: float = 0.0, bands: bool = True) -> dict[str, Band]:
-    """Speed, thrust, current and power at full throttle and the stated charge: what every other command takes as most."""
+    """Speed, thrust, current and power at full throttle and the stated charge: the one source of maximum thrust."""
     found = _carried(case, airspeed_m_s, (), _full, bands, rotor_table.UPPER)[2]
     return {key.partition(".")[2]: band for key, band in found.items()}
 
@@ -298,10 +297,10 @@ def _unusual(case: Case) -> list[str]:
     rare = tips > TIPS[3]
     slower = [v / (math.pi * case.diameter_m * loaded) * 60.0 for v in TIPS[:2]]
     return [
-        f"{'unusual' if rare else 'fast'} combination: without load the tip speed would be {tips:.0f} m/s; 95 % of 1088 "
-        f"recorded motors are below {TIPS[2]:.0f}.\n  {table.kv:g} rev/min/V on {table.cells}S suits propellers of "
-        f"{fit[0]:.1f} to {fit[1]:.1f} in; a propeller of {case.diameter_m / INCH:.3g} in suits {slower[0]:.0f} to "
-        f"{slower[1]:.0f} rev/min/V.\n  "
+        f"{'unusual' if rare else 'fast'} combination: without load the tip speed would be {tips:.0f} m/s; 95 % of "
+        f"1088 recorded motors are below {TIPS[2]:.0f}.\n  {table.kv:g} rev/min/V on {table.cells}S suits "
+        f"propellers of {fit[0]:.1f} to {fit[1]:.1f} in; one of {case.diameter_m / INCH:.3g} in suits "
+        f"{slower[0]:.0f} to {slower[1]:.0f} rev/min/V.\n  "
         + ("A typical motor would overload and burn out; the numbers assume a motor that is large enough." if rare
            else "This is common for racing; the motor gets hot at full throttle.")
     ]  # fmt: skip
@@ -357,8 +356,9 @@ def text(found: DriveResult) -> str:
         a, b = (1e2 * v / full["battery_A"].value for v in (full["battery_A"].u, full["battery_A"].u_with_sheet))
         lines += [
             f"assumed     winding {1e3 * drive.motor.resistance_ohm:.0f} mohm, no-load current "
-            f"{drive.motor.no_load_A:.2g} A: typical of such motors. With both from the",
-            f"            motor's sheet, in [drive.motor] of a case, the current is known to {b:.0f} % instead of {a:.0f} %",
+            f"{drive.motor.no_load_A:.2g} A: typical of such motors. With both from",
+            f"            the motor's sheet, in [drive.motor] of a case, the current is known to {b:.0f} % instead of "
+            f"{a:.0f} %",
         ]
     ask = [name for name, v in (("--mass", mass), ("--capacity", t.battery.capacity_Ah)) if v is None]
     if ask:
