@@ -150,8 +150,9 @@ def test_clarke_transform_by_numbers():
     assert th.clarke_factor() == pytest.approx((1.5**0.5, 1.5**0.5), rel=1e-12)
 
 
-@pytest.mark.parametrize(("ratio", "name"), [(1 / 9.81, "kgf <-> N"), (25.4, "inch <-> mm"), (57.3, "deg <-> rad"),
-                                             (6.28, "rev/s <-> rad/s"), (60.0, "rev/min <-> rev/s")])  # fmt: skip
+@pytest.mark.parametrize(("ratio", "name"), [(1 / 9.81, "kgf <-> N"), (25.4, "in <-> mm"), (57.3, "deg <-> rad"),
+                                             (6.28, "rev/s (Hz) <-> rad/s"),
+                                             (60.0, "rev/s (Hz) <-> rev/min")])  # fmt: skip
 def test_nearest_slip(ratio, name):
     assert th.nearest_slip(ratio)[0] == name
 

@@ -295,7 +295,7 @@ def of_stations(file: Path, diameter_m: float) -> tuple[float, str]:
     head = load_text(file).text[:4000]
     first = head.lstrip().partition("\n")[0]
     if "," in first:
-        from bemt.case.build import read_stations
+        from bemt.readers._stations import read_stations
 
         return max(min(float(read_stations(file, 0.5 * diameter_m)[0].min()), 0.3), 0.05), "stations"
     if re.match(r"\s*r/R\b", first):

@@ -20,9 +20,9 @@ from bemt.case import Case
 from bemt.case.as_built import MOVED, posterior_document
 from bemt.case.prepare import prepare_case
 from bemt.compare.as_measured import AsMeasured, as_measured
-from bemt.diagnose.another_rotor import FACTOR
 from bemt.diagnose.improve import beside, elsewhere
 from bemt.diagnose.load import cases_of, load
+from bemt.diagnose.wrong_rotor_check import FACTOR
 from bemt.rotors.k1k2 import ZERO_THRUST_MEASURED
 from bemt.rotors.latents import NAMES, UNITS
 from bemt.rotors.model import air_fields, air_of_points

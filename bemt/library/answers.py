@@ -112,12 +112,12 @@ class Answer:
     @property
     def verdict(self) -> str:
         """One of none, named, class, sensor, unknown, insufficient."""
-        return (self.diagnosis.ratios or self.diagnosis.decision).verdict
+        return self.diagnosis.said.verdict
 
     @property
     def effects(self) -> tuple[str, ...]:
         """Effects of the verdict; for a class, all members."""
-        return (self.diagnosis.ratios or self.diagnosis.decision).effects
+        return self.diagnosis.said.effects
 
     @property
     def text(self) -> str:

@@ -272,6 +272,8 @@ def _limits(page: Mapping[str, Any]) -> Section:
     for row in [*result["rows"], *result["variants"]]:
         for flag in row["flags"]:
             flags.setdefault(f"{row['label']}: {flag}")
+    for flag in page["curves"]["flags"] if page.get("curves") else ():
+        flags.setdefault(f"curves: {flag}")
     general = [
         "Blade elements are independent: no sweep, no radial flow, no blade-vortex interaction, no unsteady loads.",
         "Section tables come from a network trained on XFOIL, weak near stall at low Reynolds numbers; beyond stall "

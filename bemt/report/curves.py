@@ -60,6 +60,7 @@ def case_curves(case: Case) -> dict[str, Any]:
     """Performance over J and over rpm, BEMT with bands and K1/K2."""
     from bemt.case.prepare import k1k2_case
     from bemt.case.propagate import propagate
+    from bemt.rotors.validity import counted
 
     rotor = case.rotor()
     rpm, V, cut = _grids(case, rotor.blade.pitch_m() / rotor.D)
@@ -74,11 +75,12 @@ def case_curves(case: Case) -> dict[str, Any]:
         "k1k2_thrust_N": simple.thrust_N,
         "k1k2_CT": simple.CT,
     }
+    shown = [*range(keep := _until_windmill(found.CT[:cut])), *range(cut, len(found))]
     over_J = {name: v[:cut] for name, v in whole.items()}
-    keep = _until_windmill(over_J["CT"])
     return {
         "over_J": {name: v[:keep] for name, v in over_J.items()},
         "over_rpm": {name: v[cut:] for name, v in whole.items()},
+        "flags": counted([found.flags[i] for i in shown]),
     }
 
 

@@ -17,6 +17,7 @@ from the data, each departure adding its own part, with no step at the edge:
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -48,7 +49,33 @@ def serious(flags: Sequence[str]) -> tuple[str, ...]:
     >>> serious(["supersonic tip: Mach 1.09", "outside the measured rotors: 5 blades (2 to 4): model error times 1.1"])
     ('supersonic tip',)
     """
-    return tuple(f.partition(":")[0] for f in flags if not f.startswith(OUTSIDE) or f.endswith(DOUBT))
+    return tuple(kind(f) for f in flags if not f.startswith(OUTSIDE) or f.endswith(DOUBT))
+
+
+def kind(flag: str) -> str:
+    """What a flag is about: its words up to the numbers.
+
+    >>> kind("not converged at r/R 0.31: no root"), kind("supersonic tip: Mach 1.09, beyond section theory")
+    ('not converged', 'supersonic tip')
+    """
+    return re.split(r":| on \d| at r/R", flag)[0]
+
+
+def counted(flags: Sequence[Sequence[str]]) -> tuple[str, ...]:
+    """Flags of many points, those of one kind together: how many points have it, and the words of the last.
+
+    >>> counted([(), ("supersonic tip: Mach 1.05",), ("supersonic tip: Mach 1.09",)])
+    ('2 of 3 points: supersonic tip: Mach 1.09',)
+    >>> counted([("a duct",)])
+    ('a duct',)
+    """
+    found: dict[str, list[str]] = {}
+    for point in flags:
+        for flag in point:
+            found.setdefault(kind(flag), []).append(flag)
+    if len(flags) == 1:
+        return tuple(flags[0])
+    return tuple(f"{len(all_)} of {len(flags)} points: {all_[-1]}" for all_ in found.values())
 
 
 @dataclass(frozen=True)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import re
 import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from bemt.base.tables import number_text, text_table
-from bemt.rotors.validity import serious
+from bemt.rotors.validity import kind, serious
 from bemt.sweep.agreement import known, needed
 from bemt.sweep.case import ROW_SOURCES
 from bemt.sweep.text import with_nan
@@ -190,7 +189,7 @@ def _flags(solved: Sequence[Mapping[str, Any]], room: int) -> list[str]:
         if not rest and len(lines) + len(part) <= max(room - 3, 3):
             lines += part
         else:
-            rest.setdefault(re.split(r":| on \d| at r/R", flag)[0], []).extend(names)
+            rest.setdefault(kind(flag), []).extend(names)
     for head, names in rest.items():
         some = _some(list(dict.fromkeys(names)))
         lines += textwrap.wrap(f"! {len(names)} more: {head} ({some}; --details)", WIDTH, subsequent_indent="  ")
