@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from bemt.base.units import INCH
-from bemt.rotors.population import chord_sd
-from bemt.sections.rule import DRAG_LEVEL, N_CRIT, section_at
+from bemt.rotors.population import chord_sd, population
+from bemt.sections.rule import DRAG_LEVEL, N_CRIT
 
 __all__ = [
     "AIR",
@@ -32,6 +32,8 @@ CHORD, CHORD_EXPONENT = 0.2, -0.2
 pairs the one that predicts 87 propellers of UIUC from their labels best in the median, at rest and in flight.  Their
 chords alone give 0.218 and -0.4 with families alike in weight, which is 13 to 31 % too much thrust and power below 9 in
 [1]."""
+DEG_PER_CAMBER = 104.0
+"""Zero-lift angle over camber of a NACA four-digit mean line, largest camber at 40 % chord: thin-airfoil theory [deg]."""
 _CHORD_LAW = (0.05, 1.0)  # chords over the radius that a propeller may have
 
 
@@ -101,9 +103,9 @@ def section_of(blade_class: str | None) -> tuple[Unknown, ...]:
     """Section of a class of blades: slow flyers are cambered as the measured ones are."""
     if blade_class != "slow_flyer":
         return SECTION
-    camber = section_at(0.75, "apcsf").camber
-    why = "section not known; slow flyers of two makers have 5 to 8 %"
-    return Unknown("blade.section.camber", camber, camber - 0.02, camber + 0.02, why), THICKNESS
+    camber = round(SECTION[0].value + population().slow_flyer_deg / DEG_PER_CAMBER, 3)
+    why = "section not known; slow flyers of two makers have 5 to 7 %"
+    return Unknown("blade.section.camber", camber, camber - 0.015, camber + 0.015, why), THICKNESS
 
 
 def label_chord(diameter_m: float) -> Unknown:

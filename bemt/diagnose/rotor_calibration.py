@@ -104,7 +104,7 @@ def text(doc: dict[str, Any]) -> str:
     """Document for people."""
     words = {
         "angle_deg": "blade angle", "lift": "lift (ln)", "drag": "drag (ln)",
-        "low_re_lift": "lift at low Reynolds number (ln per ln)", "camber_deg": "zero-lift angle lower by",
+        "camber_deg": "zero-lift angle lower by",
     }  # fmt: skip
     state = f"{'converged' if doc['converged'] else 'NOT CONVERGED'} after {doc['steps']} iterations"
     lines = [f"{doc['case']}: {doc['points']} points of {', '.join(doc['reference'])}; {state}"]
