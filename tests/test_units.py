@@ -1,7 +1,5 @@
 """Units: exact definitions, round trips, suffixes, refusals."""
 
-import math
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -81,11 +79,3 @@ def test_units_of_different_dimension_are_refused():
         u.convert(1.0, "kgf", "kg")
     with pytest.raises(InputError, match="unit: got 'furlong'; expected one of A, "):
         u.to_si(1.0, "furlong")
-
-
-def test_slip_factors_follow_from_the_table():
-    assert u.SLIP_FACTORS["kgf <-> N"] == u.UNITS["kgf"].factor
-    assert u.SLIP_FACTORS["lbf <-> N"] == u.UNITS["lbf"].factor
-    assert u.SLIP_FACTORS["rev/min <-> rad/s"] == pytest.approx(30 / math.pi)
-    assert u.SLIP_FACTORS["inch <-> mm"] == pytest.approx(u.convert(1.0, "in", "mm"))
-    assert all(f > 1 for f in u.SLIP_FACTORS.values())

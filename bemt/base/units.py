@@ -67,7 +67,7 @@ def _table() -> dict[str, Unit]:
         "area": {"m2": 1.0, "cm2": 1e-4, "mm2": 1e-6, "in2": INCH**2},
         "angle": {"rad": 1.0, "deg": DEG},
         "speed": {"m_s": 1.0, "km_h": 1.0 / 3.6, "kt": KNOT, "mph": MPH, "ft_s": FOOT},
-        "angular_speed": {"rad_s": 1.0, "rpm": RPM, "rev_s": 2.0 * math.pi},
+        "angular_speed": {"rad_s": 1.0, "rpm": RPM, "krpm": 1e3 * RPM, "rev_s": 2.0 * math.pi},
         "mass": {"kg": 1.0, "g": 1e-3, "lb": POUND, "oz": POUND / 16.0},
         "density": {"kg_m3": 1.0, "g_cm3": 1e3},
         "force": {"N": 1.0, "mN": 1e-3, "kN": 1e3, "kgf": KGF, "gf": KGF * 1e-3, "lbf": LBF, "ozf": OZF},
@@ -84,7 +84,16 @@ def _table() -> dict[str, Unit]:
             "ozf_in": OZF * INCH,
         },
         "power": {"W": 1.0, "kW": 1e3, "hp": HP},
-        "pressure": {"Pa": 1.0, "hPa": 1e2, "mbar": 1e2, "kPa": 1e3, "bar": 1e5},
+        "pressure": {
+            "Pa": 1.0,
+            "hPa": 1e2,
+            "mbar": 1e2,
+            "kPa": 1e3,
+            "bar": 1e5,
+            "inHg": 3386.389,
+            "mmHg": 133.3224,
+            "psi": LBF / INCH**2,
+        },
         "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0},
         "voltage": {"V": 1.0, "mV": 1e-3},
         "current": {"A": 1.0, "mA": 1e-3},
@@ -100,22 +109,6 @@ def _table() -> dict[str, Unit]:
 
 UNITS: dict[str, Unit] = _table()
 """Every known suffix and its `Unit`."""
-
-SLIP_FACTORS: dict[str, float] = {
-    "kgf <-> N": KGF,
-    "lbf <-> N": LBF,
-    "kgf <-> lbf": KGF / LBF,
-    "ozf <-> N": 1.0 / OZF,
-    "kilo (gf <-> kgf, mm <-> m)": 1000.0,
-    "inch <-> mm": 25.4,
-    "rev/min <-> rev/s": 60.0,
-    "rev/s <-> rad/s": 2.0 * math.pi,
-    "rev/min <-> rad/s": 1.0 / RPM,
-    "deg <-> rad": 1.0 / DEG,
-    "diameter <-> radius": 2.0,
-    "percent <-> fraction": 100.0,
-}
-"""Usual slips of units as pure numbers [-]; either direction.  Used to search for the cause of a wrong number."""
 
 
 def _get(unit: str) -> Unit:

@@ -296,6 +296,18 @@ def case_of(text: str, folder: str | Path = ".") -> Case:
     return _checked(path, tomllib.loads(text), Collector(path.as_posix()))
 
 
+def with_changes(case: Case, changes: Mapping[str, Any]) -> Case:
+    """The case with values set by dotted key, completed and checked anew, as if its file said so."""
+    written = copy.deepcopy(dict(case.written))
+    for key, value in changes.items():
+        *tables, name = key.split(".")
+        table = written
+        for part in tables:
+            table = table.setdefault(part, {})
+        table[name] = value
+    return _checked(case.path, written, Collector(case.path.as_posix()))
+
+
 def _checked(path: Path, document: dict[str, Any], out: Collector) -> Case:
     document = completed(document)
     file = check_case(out, document, path.parent)

@@ -15,7 +15,7 @@ from bemt.base import cache
 from bemt.base.errors import Fault, InputError
 from bemt.bem.duct import DuctFlow, duct_flow
 from bemt.bem.model import Model
-from bemt.formula import k1k2
+from bemt.rotors import k1k2
 from bemt.sections import polars
 from bemt.sections.neuralfoil import neuralfoil_polar
 

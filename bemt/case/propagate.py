@@ -11,13 +11,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bemt import coefficients as co
 from bemt.air import air_arrays
-from bemt.rotors.model import coefficients
+from bemt.rotors.mixture import LEVELS
+from bemt.rotors.model import beta75_deg, coefficients
 from bemt.rotors.population import population
 from bemt.rotors.predict import predict, sense, zero_thrust
 from bemt.rotors.validity import Validity
@@ -88,6 +90,13 @@ class Propagated:
     moved: tuple[Moved, ...]
     refined: Answers | None  # With twice the blade elements
     model: Model  # The rotor of the case, prepared
+    model95: Answers  # 95 % half widths from the model's own error
+
+    def half_width95(self, channel: str) -> Array:
+        """Half width of the 95 % interval, (P,): twice the u of inputs and numerics, the model's with its tail."""
+        parts = self.points.u_by
+        rest = sum((parts[origin][channel] ** 2 for origin in ("input", "numerics") if origin in parts), 0.0)
+        return np.asarray(np.sqrt(4.0 * rest + self.model95[channel] ** 2))
 
     def carry(self, answer: Callable[[Answers], Answers]) -> tuple[dict[str, Array], dict[str, dict[str, Array]]]:
         """Carry the bands through any function of the channels at all points: its values, and their u by origin.
@@ -154,7 +163,9 @@ def propagate(
     from bemt.case.prepare import prepare_case
 
     points = Points.of(case, rpm, airspeed_m_s, density_kg_m3)
-    declared = case.assumptions if unknowns is None else tuple(unknowns)
+    # the motor's unknowns move no load at a given speed
+    own = tuple(item for item in case.assumptions if not item.key.startswith("drive."))
+    declared = own if unknowns is None else tuple(unknowns)
     steps, done = 3 + sum(len(item.values) for item in declared), 0
 
     def solved(changed: Case, what: str, stations: int | None = None) -> tuple[Model, Dataset]:
@@ -171,36 +182,40 @@ def propagate(
         return {key: np.asarray(found[key], dtype=float) for key in BANDED}
 
     model, found = solved(case, "nominal")
-    factor, words = validity_of(case, found)
+    factor, words = validity_of(case, found.J, found.Re75, found.M_tip)
     flags = tuple((*a, *b) for a, b in zip(found.flags, words, strict=True))
     nominal = channels(found)
     if not bands:
-        return Propagated(replace(found, flags=flags), nominal, (), None, model)
+        nothing = {key: np.full(len(found), np.nan) for key in nominal}
+        return Propagated(replace(found, flags=flags), nominal, (), None, model, nothing)
     refined = channels(solved(case, "twice the stations", 2 * case.file.model.stations)[1])
     moved = vary(case, nominal, lambda changed, what: channels(solved(changed, what)[1]), declared)
+    widths = _model_error(case, model, found, points.conditions(case)[2])
+    narrow, wide = (_loads(found, model.diameter_m, factor * u) for u in widths)
     parts = {
         "input": {key: np.sqrt(sum((one.u[key] ** 2 for one in moved), np.zeros(len(found)))) for key in nominal},
-        "model": _loads(found, factor * _model_error(case, model, found, points.conditions(case)[2])),
+        "model": narrow,
         "numerics": {key: np.abs(refined[key] - v) for key, v in nominal.items()},
     }
-    lost = found.converged & np.isnan(parts["input"]["thrust_N"])
+    answer = replace(found, u={}, u_by=parts)
+    lost = found.converged & np.isnan(answer.u["thrust_N"])
     why = ("unconverged somewhere in the range of the assumptions: u unknown",)
     flags = tuple((*f, *(why if bad else ())) for f, bad in zip(flags, lost, strict=True))
-    return Propagated(replace(found, u={}, u_by=parts, flags=flags), nominal, moved, refined, model)
+    return Propagated(replace(answer, flags=flags), nominal, moved, refined, model, wide)
 
 
-def _model_error(case: Case, model: Model, points: Dataset, air: Air) -> Array:
-    """Half widths of the 68 % intervals of CT and CP about the nominal result, (2, P).
+def _model_error(case: Case, model: Model, points: Dataset, air: Air) -> tuple[Array, Array]:
+    """Half widths of the 68 and 95 % intervals of CT and CP about the nominal result, (2, P) each.
 
     What the population expects beside the nominal result counts too, as a root sum of squares.
     """
     known = case.as_built()
     solve = coefficients(model, air)
-    at = sense(solve, model.diameter_m, points.rpm, points.J, points.Re75, known.drawn)
-    at = replace(at, J0=_zero_thrust_J(case), x=points.J / _zero_thrust_J(case))  # whatever other points are asked for
+    at = sense(solve, model.diameter_m, beta75_deg(model), points.rpm, points.J, points.Re75, known.drawn)
     mean = solve(known.prior.mean, points.rpm, points.J, np.arange(points.rpm.size))
     found = predict(population(), known.prior, at, mean, known.reference)
-    return np.asarray(np.hypot(found.half_width(), found.mean - np.array([points.CT, points.CP])))
+    off = found.mean - np.array([points.CT, points.CP])
+    return np.hypot(found.half_width(), off), np.hypot(found.half_width(LEVELS[1]), 2.0 * off)
 
 
 def _zero_thrust_J(case: Case) -> float:
@@ -214,36 +229,36 @@ def _zero_thrust_J(case: Case) -> float:
     return case.kept("J of zero thrust", find)
 
 
-def validity_of(case: Case, points: Dataset) -> tuple[Array, tuple[tuple[str, ...], ...]]:
-    """Factor on the model's own error at solved points, (P,), and for each why it is wider or where the method ends."""
-    known = population().validity
-    words: tuple[tuple[str, ...], ...]
-    factor, words = np.ones(len(points)), ((),) * len(points)
-    x = points.J / _zero_thrust_J(case)
+def validity_of(case: Case, J: Array, Re75: Array, M_tip: Array) -> tuple[Array, tuple[tuple[str, ...], ...]]:
+    """Factor on the model's own error at points, (P,), and for each why it is wider or where the method ends."""
+    known, factor = population().validity, np.ones(J.size)
+    words: tuple[tuple[str, ...], ...] = ((),) * J.size
     if known is not None:
         size = (case.diameter_m, int(case.file.rotor.blades), case.rotor().blade.pitch_m() / case.diameter_m)
         ducted, run = case.ducted, case.as_built().reference
         if run is not None:  # a rotor that was measured itself, in its duct
-            own = Validity.of_rotor(*size, run.x, run.Re, known.M_tip)
+            own = Validity.of_rotor(*size, run.at.J / _zero_thrust_J(case), run.at.Re, known.M_tip)
             known, ducted = Validity.of_rotors((known, own)), False
-        factor, words = known.at(*size, x, points.Re75, points.M_tip, ducted)
-    tip = ((f"tip Mach {m:.2f}: supersonic, beyond section theory",) if m >= 1.0 else () for m in points.M_tip)
+        factor, words = known.at(*size, J / _zero_thrust_J(case), Re75, M_tip, ducted)
+    tip = ((f"supersonic tip: Mach {m:.2f}, beyond section theory",) if m >= 1.0 else () for m in M_tip)
     return factor, tuple((*a, *b) for a, b in zip(words, tip, strict=True))
 
 
-def _loads(points: Dataset, u: Array) -> dict[str, Array]:
+def _loads(points: Dataset, D: float, u: Array) -> dict[str, Array]:
     """Standard uncertainties of all channels from those of CT and CP, (2, P).
 
     Exhaust speed follows thrust by momentum, T = m V_e - m V, so that dV_e/V_e = (V_e - V)/(2 V_e - V) dT/T. The duct's
     share has none: no population tells of it. Efficiency takes CT and CP as independent.
     """
+    rho, n, V, exit_speed = points.density_kg_m3, points.rpm / 60.0, points.airspeed_m_s, points.exhaust_speed_m_s
+    thrust = np.asarray(co.thrust(u[0], rho, n, D))
+    power = np.asarray(co.power(u[1], rho, n, D))
     with np.errstate(divide="ignore", invalid="ignore"):
-        thrust, power = np.abs(u / np.array([points.CT, points.CP]))
-        V, exit_speed = points.airspeed_m_s, points.exhaust_speed_m_s
-        exhaust = np.abs(exit_speed - V) / np.abs(2.0 * exit_speed - V) * thrust * np.abs(exit_speed)
+        torque = power / (2.0 * np.pi * n)
+        exhaust = np.abs((exit_speed - V) / (2.0 * exit_speed - V) * exit_speed * thrust / points.thrust_N)
         eta = np.hypot(points.J * u[0], points.eta * u[1]) / np.abs(points.CP)
-    relative: dict[str, Any] = {"thrust_N": thrust, "torque_Nm": power, "power_W": power}
     return {
-        **{key: share * np.abs(points[key]) for key, share in relative.items()},
-        "CT": u[0], "CP": u[1], "eta": eta, "exhaust_speed_m_s": exhaust, "duct_share": np.zeros_like(V),
+        "thrust_N": thrust, "torque_Nm": torque, "power_W": power, "CT": u[0], "CP": u[1],
+        "eta": np.where(np.isfinite(eta), eta, np.nan), "duct_share": np.zeros_like(V),
+        "exhaust_speed_m_s": np.where(np.isfinite(exhaust), exhaust, np.nan),
     }  # fmt: skip

@@ -12,10 +12,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base import unit_errors
+from bemt.base.unit_errors import SpeedRatio
 from bemt.compare import smooth_change as fits
 from bemt.compare.matched import LOADS, POWER_OF_SPEED, MatchedChannel
 from bemt.compare.scaling_laws import FAMILY, LAWS, ScalingLaw, law
@@ -49,8 +52,8 @@ RIVAL, DOUBT = 0.1, 0.3
 _SAME_DRIVE = 0.06
 # No battery changes the speed at equal command by more than this, in ln.
 _ODD_SPEED = 0.4
-# Pole pairs left out, and one more or less than set.
-_POLE_PAIRS = (*((p, 1) for p in range(2, 15)), *((p + 1, p) for p in range(2, 9)))
+# A nearer ratio than 9 : 8 is a small error of the speed, which the law has.
+_RATIOS = unit_errors.speed_ratios(rarest=1.0, nearest=Fraction(9, 8))
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,8 +146,8 @@ def _columns(
     return joined[:, used]
 
 
-def _slips(channels: Mapping[str, MatchedChannel]) -> list[tuple[str, Array]]:
-    """Changes by ratios of units, (unit, (M,) mean)."""
+def _slips(channels: Mapping[str, MatchedChannel]) -> list[tuple[float, Array]]:
+    """Changes by ratios of units, (share of the prior, (M,) mean)."""
     from bemt.effects.unit_slip import UnitSlip
 
     start, out = 0, []
@@ -155,17 +158,17 @@ def _slips(channels: Mapping[str, MatchedChannel]) -> list[tuple[str, Array]]:
             if way["channel"] == c.channel and factor > 0.0:
                 mean = np.zeros(total)
                 mean[start : start + c.y.size] = math.log(factor) * c.second
-                out.append((str(way["unit"]), mean))
+                out.append((UnitSlip(c.channel, factor).odds(), mean))
         start += c.y.size
     return out
 
 
-def _pole_slips(speeds: tuple[float, float] | None) -> list[float]:
-    """Ratios of pole pairs that may have been set, as the true speed of B over the indicated one."""
-    ratios = [f for p, q in _POLE_PAIRS for f in (p / q, q / p)]
-    if speeds is not None:  # one motor at one command: what is indicated changes by the same ratio
-        ratios = [f for f in ratios if abs(math.log(f) + speeds[0]) < _SAME_DRIVE + speeds[1]]
-    return ratios
+def _miscounts(speeds: tuple[float, float] | None) -> list[SpeedRatio]:
+    """Ratios by which the speed of B may be miscounted."""
+    if speeds is None:
+        return list(_RATIOS)
+    # one motor at one command: what is indicated changes by the same ratio
+    return [r for r in _RATIOS if abs(speeds[0] - math.log(r.ratio)) < _SAME_DRIVE + speeds[1]]
 
 
 def _at_speed(c: MatchedChannel, factor: float) -> MatchedChannel:
@@ -183,16 +186,18 @@ def _by_poles(
     channels: Mapping[str, MatchedChannel], scatter: Mapping[str, Scatter], speeds: tuple[float, float] | None
 ) -> tuple[float, float] | None:
     """Log evidence of a wrong number of poles, and the logarithm of the likeliest ratio."""
-    ratios = _pole_slips(speeds)
+    ratios = _miscounts(speeds)
     if not ratios:
         return None
     terms = []
-    for factor in ratios:
-        there = {k: _at_speed(c, factor) for k, c in channels.items()}
-        terms.append(sum(_likelihood(fits.covariance(c, scatter[k]), c.y) for k, c in there.items()))
+    for ratio in ratios:
+        there = {k: _at_speed(c, 1.0 / ratio.ratio) for k, c in channels.items()}
+        each = sum(_likelihood(fits.covariance(c, scatter[k]), c.y) for k, c in there.items())
+        terms.append(each + math.log(ratio.weight))
     odd = speeds is not None and abs(speeds[0]) > _ODD_SPEED
-    ways = len(ratios) if odd else 2 * len(_POLE_PAIRS)
-    return float(np.logaddexp.reduce(terms)) - math.log(ways), math.log(ratios[int(np.argmax(terms))])
+    ways = sum(r.weight for r in (ratios if odd else _RATIOS))
+    best = ratios[int(np.argmax(terms))]
+    return float(np.logaddexp.reduce(terms)) - math.log(ways), -math.log(best.ratio)
 
 
 def _likelihood(K: Array, y: Array) -> float:
@@ -267,7 +272,7 @@ def _weighed(
             score["rpm_scale"] = float(np.logaddexp(score["rpm_scale"], poles[0])) - math.log(2.0)
     slips = _slips(channels) if "stand" in kinds else []
     if slips:
-        z, mean = _shifted([m for _, m in slips], white, r, none, len(slips))
+        z, mean = _shifted(slips, white, r, none)
         score["unit_slip"], size["unit_slip"] = z, (mean, 0.0)
     blades = OWN_SHAPE in score
     score[UNKNOWN] = _any_change(channels, base, none, _UNKNOWN_KINDS if blades else _WITHOUT_BLADES)
@@ -278,12 +283,13 @@ def _weighed(
 
 
 def _shifted(
-    means: Sequence[Array], white: Callable[[Array], Array], r: Array, none: float, ways: int
+    known: Sequence[tuple[float, Array]], white: Callable[[Array], Array], r: Array, none: float
 ) -> tuple[float, float]:
-    """Log evidence of known changes, of so many that share the prior, and the likeliest one."""
-    terms = [0.5 * float(r @ r) - 0.5 * float(np.sum((r - white(m)) ** 2)) for m in means]
-    mean = means[int(np.argmax(terms))]
-    return none + float(np.logaddexp.reduce(terms)) - math.log(ways), float(mean[np.argmax(np.abs(mean))])
+    """Log evidence of known changes, each with its share of the prior, and the likeliest one."""
+    terms = [0.5 * float(r @ r) - 0.5 * float(np.sum((r - white(m)) ** 2)) + math.log(w) for w, m in known]
+    mean = known[int(np.argmax(terms))][1]
+    total = math.log(sum(w for w, _ in known))
+    return none + float(np.logaddexp.reduce(terms)) - total, float(mean[np.argmax(np.abs(mean))])
 
 
 def _evidence(row: ScalingLaw, A: Array, r: Array, size: float) -> tuple[float, float, float]:

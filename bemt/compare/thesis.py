@@ -17,8 +17,9 @@ from typing import Any
 import numpy as np
 
 from bemt import coefficients as co
-from bemt.base.units import G0, INCH, KGF, LBF, SLIP_FACTORS
-from bemt.formula import k1k2 as k
+from bemt.base import unit_errors
+from bemt.base.units import G0, INCH, KGF, LBF
+from bemt.rotors import k1k2 as k
 
 ORIGIN = "Cahill 2025"
 """What a case of the thesis states as its ``origin``."""
@@ -152,7 +153,7 @@ def nearest_slip(ratio: float) -> tuple[str, float, float]:
     ('kgf <-> N', 9.80665, -0.0027)
     """
     r = max(ratio, 1.0 / ratio)
-    name, f = min(((n, max(v, 1.0 / v)) for n, v in SLIP_FACTORS.items()), key=lambda nv: abs(math.log(r / nv[1])))
+    name, f = min(unit_errors.symmetric().items(), key=lambda nv: abs(math.log(r / nv[1])))
     return name, f, r / f - 1.0
 
 

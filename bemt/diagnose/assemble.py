@@ -9,19 +9,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt import coefficients as co
 from bemt.base.errors import Fault, InputError
 from bemt.bem import model as bem
 from bemt.case.as_built import as_built_of
 from bemt.case.prepare import k1k2_case, prepare_case
+from bemt.case.propagate import validity_of
 from bemt.diagnose import repeats
 from bemt.diagnose.blade import PLAIN, CalibratedBlade, prior_of
 from bemt.diagnose.blade_fit import calibrated
 from bemt.diagnose.noise import in_time
 from bemt.diagnose.nuisance import nuisances
-from bemt.diagnose.problem import Part, Problem
+from bemt.diagnose.problem import Part, Problem, SpeedCurve
 from bemt.diagnose.record import CHANNELS, Record, concatenated, dense, merged, owners
 from bemt.effects.base import Effect
 from bemt.recordings.between import Level, odd_ones
+from bemt.rotors.validity import counted
 
 if TYPE_CHECKING:
     from bemt.case import Case
@@ -67,7 +70,7 @@ def build(records: Sequence[Record], cases: Sequence[Case], baseline: str = "bem
     for r, c in zip(records, chosen, strict=True):
         groups.setdefault((r.reference, c.content_hash()), (c, []))[1].append(r)
     order = sorted(groups, key=lambda k: k[0])
-    problem = assemble(tuple(_part(merged(groups[k][1]), groups[k][0], baseline) for k in order))
+    problem = assemble(_one_drive([_part(merged(groups[k][1]), groups[k][0], baseline) for k in order]))
     if problem.y.size < _FEWEST:
         got = f"{problem.y.size} with a converged baseline"
         raise InputError(Fault(records[0].name, "readings", got, f"{_FEWEST} or more"))
@@ -79,7 +82,29 @@ def build(records: Sequence[Record], cases: Sequence[Case], baseline: str = "bem
                                    "readings of this rotor", "Wrong unit, or wrong case?"))  # fmt: skip
     odd = _between(problem, [groups[k][1] for k in order], records)
     problem, found = _calibrated(problem, [groups[k][0] for k in order])
-    return replace(problem, between=(*odd, *found))
+    outside = tuple(_outside(p, groups[k][0]) for p, k in zip(problem.parts, order, strict=True))
+    return replace(problem, between=(*odd, *found), validity=tuple(dict.fromkeys(sum(outside, ()))))
+
+
+def _outside(part: Part, case: Case) -> tuple[str, ...]:
+    """Where a recording leaves what the solver was measured against."""
+    if part.instead is not None:  # K1/K2
+        return ()
+    flow = part.flow
+    n, D = flow.n, 2.0 * flow.R
+    Re = np.asarray(co.Re75(flow.chord, n, D, flow.V, flow.rho, flow.mu))
+    J, M_tip = np.asarray(co.J(flow.V, n, D)), np.asarray(co.M_tip(n, D, flow.a_sound))
+    return counted(validity_of(case, J, Re, M_tip)[1])
+
+
+def _one_drive(parts: Sequence[Part]) -> tuple[Part, ...]:
+    """Parts whose speed over pulse width is measured against that of the references, where these show it."""
+    shown = [p.record for p in parts if p.record.reference and "rpm" in p.channels]
+    if not shown:
+        return tuple(parts)
+    join = np.concatenate
+    curve = SpeedCurve.of(join([r.extra["pwm_s"] for r in shown]), join([r.measured["rpm"] for r in shown]))
+    return tuple(replace(p, drive=curve) if "rpm" in p.channels else p for p in parts)
 
 
 def _calibrated(problem: Problem, cases: Sequence[Case]) -> tuple[Problem, tuple[str, ...]]:

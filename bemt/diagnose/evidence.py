@@ -34,6 +34,8 @@ Array = NDArray[np.float64]
 # Settings of the covariance this far (in natural logarithm) below the best are dropped.
 _DROP = 8.0
 _KEEP = 6
+# Error of the solver, share of the largest coefficient, within which a ratio is looked for.
+_ROUGH = 0.03
 FOR_NULLS = 3
 """Settings of the covariance, best first, that nulls are weighed under; only these keep what rivals need [1]."""
 
@@ -122,13 +124,13 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
     spans, S, log_w = _stacked(problem, candidates)
     modes = form.form_modes(problem, candidates)
     # a few settings of each effect are enough to see which covariances matter
-    coarse = _Table(problem, S, log_w, spans, candidates, modes, _few(candidates))
+    coarse = _Table(problem, S, log_w, spans, candidates, modes, _few(problem, candidates))
     best: dict[Hyper, dict[Explanation, float]] = {}
     top = -np.inf
     for h, C in noise.covariances(problem):
         state = coarse.state(h, C, top - _DROP)
         if pairs and state.half.size:
-            best_pair(state, coarse.spans, coarse.log_w)
+            best_pair(state, coarse.spans, coarse.log_w, coarse.shape)
         best[h] = state.log_z
         top = max(top, max(best[h].values()) + np.log(h.weight))
     fine = _Table(problem, S, log_w, spans, candidates, modes, None)
@@ -144,11 +146,11 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
         else:
             state.log_z[UNKNOWN] = state.log_z[NONE]
         if pairs:
-            every_pair(state, spans, log_w)
+            every_pair(state, spans, log_w, fine.shape)
         states.append(state)
     before = prior.log_priors(prior.prior_weights(problem, list(spans)), pairs)
     if pairs:
-        solve_together(problem, candidates, states, spans, log_w, before)
+        solve_together(problem, candidates, states, spans, log_w, before, fine.shape)
     added = price(problem, states, modes)
     probability = _posterior(states, {k: v - added.get(k, 0.0) for k, v in before.items()})
     likeliest = max(probability, key=lambda k: probability[k])
@@ -182,15 +184,21 @@ def bare(problem: Problem, candidates: Sequence[Candidate], hyper: Hyper) -> Evi
     return Evidence(problem, tuple(candidates), (state,), {}, spans, log_w)
 
 
-def _few(candidates: Sequence[Candidate], most: int = 9) -> NDArray[np.intp]:
+def _few(problem: Problem, candidates: Sequence[Candidate], most: int = 9) -> NDArray[np.intp]:
     """Columns that stand for each candidate: some of the settings that were solved, evenly chosen.
 
-    Where settings are not alike beforehand, ends and quantiles of their prior.
+    Where settings are not alike beforehand, ends and quantiles of their prior. Of ratios that are exact, those nearest
+    to the readings: no other ratio stands for the right one.
     """
     out, start = [], 0
+    rough = np.hypot(problem.u, _ROUGH * problem.scale)[:, None]
     for c in candidates:
         solved = np.flatnonzero(c.solved)
-        if np.ptp(c.weight) < 1e-12:
+        cls = effects.catalogue()[c.id]
+        if cls.kind == "stand" and cls.discrete:
+            apart = np.sum(((problem.residual[:, None] - c.signatures) / rough) ** 2, axis=0)
+            chosen = np.sort(np.argsort(apart, kind="stable")[:most])
+        elif np.ptp(c.weight) < 1e-12:
             chosen = solved[np.unique(np.linspace(0, solved.size - 1, most).round().astype(int))]
         else:
             before = np.cumsum(c.weight) - 0.5 * c.weight
@@ -268,6 +276,10 @@ class _Table:
             setting = int(self.columns[at] - self.first[k])
             self._own[(k, at)] = form.columns(self.candidates[k], setting, self.modes[k])
         return self._own[(k, at)]
+
+    def shape(self, name: str, at: int) -> tuple[int, Array]:
+        """Number of modes and columns of the error of an effect's law at a column of the table."""
+        return self._columns(list(self.spans).index(name), at)
 
     def _add(self, gain: Array, base: Array, forms: Forms, rest: Array, which: NDArray[np.intp]) -> None:
         """Put in the log likelihood over that of "none" of every setting, its form taken into account."""

@@ -146,8 +146,11 @@ def _candidate(problem: Problem, name: str, cls: type[Effect]) -> Candidate | No
     if given is not None:
         sizes = {p.name: p for p in cls.parameters if p.usual is not None}
         for setting in given:
-            share = float(np.prod([p.density(float(setting[k])) for k, p in sizes.items()])) / len(given)
-            columns.append((dict(setting), problem.signature((cls(**setting),)), True, share))
+            effect = cls(**setting)
+            share = (
+                effect.odds() * float(np.prod([p.density(float(setting[k])) for k, p in sizes.items()])) / len(given)
+            )
+            columns.append((dict(setting), problem.signature((effect,)), True, share))
     else:
         axes = [p for p in cls.parameters if p.steps > 0]
         if not axes:

@@ -25,6 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base import unit_errors
 from bemt.drive.motor_constant import Line
 
 Array = NDArray[np.float64]
@@ -32,12 +33,8 @@ METHODS = ("data_sheet", "back_emf", "torque")
 ALPHA = 0.001
 """Probability at which agreement is rejected."""
 FACTORS = {
-    "sqrt(3/2)": math.sqrt(1.5),
-    "sqrt(3)": math.sqrt(3.0),
-    "2": 2.0,
-    "1/sqrt(3/2)": 1.0 / math.sqrt(1.5),
-    "1/sqrt(3)": 1.0 / math.sqrt(3.0),
-    "1/2": 0.5,
+    e.stated if e.actual == "1" else f"1/{e.actual}": e.factor
+    for e in sorted(unit_errors.errors("motor_constant"), key=lambda e: e.actual != "1")
 }
 """Convention factors: what a method's value may be too large by."""
 NEAR = 6.0

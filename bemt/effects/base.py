@@ -515,6 +515,10 @@ class Effect:
         """Discrete settings that a diagnosis tries instead of the ranges of ``parameters``; None: use the ranges."""
         return None
 
+    def odds(self) -> float:
+        """Prior odds of this setting among those of `variants`, over those of the commonest; 1 by default. [1]"""
+        return 1.0
+
     def plausible(self, flow: Flow) -> bool:
         """Whether such an effect is physically plausible at these points; True by default."""
         return True

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 
+from bemt.base import unit_errors
 from bemt.effects.base import Effect, Flow, Parameter
 
-# Magnet pole pairs of outrunners and in-runners; blade or mark counts set on an optical tachometer.
-_POLE_PAIRS = (2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 14, 16, 18, 20, 21)
-_COUNTS = (1, 2, 3, 4, 5, 6)
 _EPS = tuple(e / 400.0 for e in range(-16, 17) if e)
-# Nearer ratios (11 : 12) are within what the level of a model may be off.
-_NEIGHBOURS = ((6, 7), (7, 8), (12, 14))
+# Rarer ones are left to the scaling laws; nearer ones (11 : 12) are within what the level of a model may be off.
+_RATIOS = unit_errors.speed_ratios(rarest=1.0, nearest=Fraction(8, 7))
 
 
 @dataclass(frozen=True)
@@ -22,7 +20,7 @@ class RpmScale(Effect):
     Notes
     -----
     Electronic speed controllers count electrical revolutions (pole pairs times mechanical), optical tachometers count
-    blades. A wrong setting gives a rational factor (the possible counts are declared). ``eps``: clock error of cheap
+    blades. A wrong setting gives a rational factor (`bemt.base.unit_errors`, declared). ``eps``: clock error of cheap
     counters, +-1 % (declared). The rotor turns at the indicated speed over the factor.
     """
 
@@ -52,8 +50,9 @@ class RpmScale(Effect):
 
     def variants(self) -> tuple[dict[str, float], ...]:
         """Small errors, then the rational factors."""
-        ratios = {Fraction(p, 1) for p in _POLE_PAIRS} | {Fraction(1, p) for p in _POLE_PAIRS}
-        ratios |= {Fraction(p, q) for p in _COUNTS for q in _COUNTS}
-        ratios |= {Fraction(p, q) for pair in _NEIGHBOURS for p, q in (pair, pair[::-1])}
         small = [{"factor": 1.0, "eps": e} for e in _EPS]
-        return (*small, *({"factor": float(f), "eps": 0.0} for f in sorted(ratios - {Fraction(1)})))
+        return (*small, *({"factor": f, "eps": 0.0} for f in sorted(r.ratio for r in _RATIOS)))
+
+    def odds(self) -> float:
+        """Relative frequency of the ratio."""
+        return next((r.weight for r in _RATIOS if r.ratio == self.factor), 1.0)

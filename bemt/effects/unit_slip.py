@@ -4,31 +4,30 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
+from bemt.base import unit_errors
 from bemt.effects.base import Effect, Flow, Parameter, Reading, choice
 
 _SIGNED = ("thrust_N", "torque_Nm", "airspeed_m_s")
-CHANNELS = ("thrust_N", "torque_Nm", "rpm", "airspeed_m_s", "density_kg_m3")
-_G, _LB, _INCH = 9.80665, 0.45359237, 0.0254
-_LBF, _OZF = _G * _LB, _G * _LB / 16.0
+_KINDS = {"thrust_N": "force", "torque_Nm": "torque", "rpm": "rotation", "airspeed_m_s": "airspeed",
+          "density_kg_m3": "density"}  # fmt: skip
+CHANNELS = tuple(_KINDS)
+_KGF = unit_errors.named("kgf", "N")
+_Setting = dict[str, str | float]
 
-# What one SI unit is in each of the units that get mixed up with it; the slip may go either way.
-# A ratio nearer to 1 than this (natural logarithm) is a gain, not a slip.
-_LARGE = 0.25
-_UNITS: dict[str, dict[str, float]] = {
-    "thrust_N": {
-        "kgf": 1.0 / _G, "gf": 1000.0 / _G, "lbf": 1.0 / _LBF, "ozf": 1.0 / _OZF, "kN": 1e-3, "lb for kg": _LB,
-    },
-    "torque_Nm": {
-        "kgf m": 1.0 / _G, "kgf cm": 100.0 / _G, "gf cm": 1e5 / _G, "ozf in": 1.0 / (_OZF * _INCH),
-        "lbf in": 1.0 / (_LBF * _INCH), "lbf ft": 1.0 / (_LBF * 12.0 * _INCH), "N mm": 1000.0, "N cm": 100.0,
-        "N in": 1.0 / _INCH, "power over rev/s": 2.0 * math.pi, "power over rev/min": math.pi / 30.0,
-        "rev/min for rev/s": 60.0, "mm for in": 25.4, "lb for kg": _LB, "lbf for N": 1.0 / _LBF,
-    },
-    "rpm": {"rad/s": math.pi / 30.0, "rev/s": 1.0 / 60.0, "deg/s": 6.0, "1000 rpm": 1e-3},
-    "airspeed_m_s": {"km/h": 3.6, "mph": 1.0 / 0.44704, "kn": 3600.0 / 1852.0, "ft/s": 1.0 / 0.3048, "cm/s": 100.0},
-    "density_kg_m3": {"lb/ft3": 0.3048**3 / _LB, "slug/ft3": 0.3048**4 / _LBF, "g/cm3": 1e-3},
-}  # fmt: skip
+
+@cache
+def _settings() -> dict[tuple[str, float], tuple[_Setting, float]]:
+    """Setting and relative frequency by channel and factor; units of one size are one."""
+    out: dict[tuple[str, float], tuple[_Setting, float]] = {}
+    for channel, kind in _KINDS.items():
+        for e in unit_errors.errors(kind):
+            factor = next((f for c, f in out if c == channel and math.isclose(f, e.factor, rel_tol=1e-9)), e.factor)
+            first, weight = out.get((channel, factor), ({"channel": channel, "factor": factor, "unit": e.short}, 0.0))
+            out[channel, factor] = first, max(weight, e.weight)
+    signs: list[_Setting] = [{"channel": c, "factor": -1.0, "unit": "the other sign"} for c in _SIGNED]
+    return out | {(str(s["channel"]), -1.0): (s, 1.0) for s in signs}
 
 
 @dataclass(frozen=True)
@@ -38,13 +37,14 @@ class UnitSlip(Effect):
     Notes
     -----
     Exact ratios of units by definition (pound, inch and standard gravity: BIPM 2019, SI Brochure 9th ed., and NIST SP
-    811, 2008, appendix B). Thrust and torque are read in another unit; true speed, airspeed and density are the
-    recorded value over the factor. ``unit`` names the pair for the reader and has no effect.
+    811, 2008, appendix B), all in `bemt.base.unit_errors`. Thrust and torque are read in another unit; true speed,
+    airspeed and density are the recorded value over the factor. ``unit`` names the pair for the reader and has no
+    effect. How common each error is, is declared.
     """
 
     channel: str = "thrust_N"
-    factor: float = 1.0 / _G
-    unit: str = "kgf"
+    factor: float = _KGF.factor
+    unit: str = _KGF.short
 
     id = "unit_slip"
     title = "wrong unit or sign"
@@ -76,14 +76,8 @@ class UnitSlip(Effect):
 
     def variants(self) -> tuple[dict[str, str | float], ...]:
         """Every pair of units of every channel, both ways, and the sign of what a stand may count the other way."""
-        signs: tuple[dict[str, str | float], ...] = tuple(
-            {"channel": c, "factor": -1.0, "unit": "the other sign"} for c in _SIGNED
-        )
-        slips: tuple[dict[str, str | float], ...] = tuple(
-            {"channel": channel, "factor": f, "unit": words}
-            for channel, units in _UNITS.items()
-            for unit, factor in units.items()
-            for f, words in ((factor, unit), (1.0 / factor, f"taken for {unit}"))
-            if abs(math.log(f)) > _LARGE
-        )
-        return slips + signs
+        return tuple(setting for setting, _ in _settings().values())
+
+    def odds(self) -> float:
+        """Relative frequency of the error."""
+        return _settings().get((self.channel, self.factor), ({}, 1.0))[1]

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from bemt.base import unit_errors
 from bemt.proof.rigs import DUCTED_PLANS, OPEN_PLANS, UNDERPOWERED, Rig
 from bemt.proof.stand import Stand
 from bemt.proof.truth_world import Conditions, World
@@ -141,9 +142,9 @@ def _inertia(f: float, rig: Rig, c: Conditions, rng: np.random.Generator) -> Cha
 
 
 def _unit(f: float, rig: Rig, c: Conditions, rng: np.random.Generator) -> Change:
-    channel, factors = [("thrust", (1 / 9.80665, 1 / 4.4482216, 1000 / 9.80665)),
-                        ("torque", (100.0, 1000.0, 1 / 9.80665, 8.8507458))][int(rng.integers(2))]  # fmt: skip
-    factor = float(rng.choice(factors))
+    channel, of, units = [("thrust", "N", ("kgf", "lbf", "gf")),
+                          ("torque", "Nm", ("Ncm", "mNm", "kgf_m", "lbf_in"))][int(rng.integers(2))]  # fmt: skip
+    factor = float(rng.choice([unit_errors.named(unit, of).factor for unit in units]))
     return Change(stand={"unit_slip": factor, "unit_channel": channel}, parameters={"factor": (factor, "1")})
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.air import LIQUID
+from bemt.base import unit_errors
 from bemt.recordings.findings import Facts, Finding, check_for
 
 Array = NDArray[np.float64]
@@ -182,16 +183,14 @@ def slow_rotor(facts: Facts) -> Iterator[Finding]:
         return
     text = f"{response} has followed {len(followed)} steps of the command by {np.median(followed):.0%} only, "
     text += f"{np.median(waited):.4g} s after them, in the median; a rotor takes less than {SLOWEST_S:g} s"
-    ms = 1e-3 * float(np.median(waited)) < SLOWEST_S
-    fix = "ms taken for s: multiply by 0.001" if ms else "us taken for s: multiply by 1e-06"
+    units = [e for e in unit_errors.errors("time") if e.stated == "s"]
+    fix = next((e for e in units if e.repair * float(np.median(waited)) < SLOWEST_S), units[-1]).words
     yield Finding("time_unit", facts.named("time_s"), text, fix, (), "warning")
 
 
 @check_for("lengths")
 def lengths(facts: Facts) -> Iterator[Finding]:
     """Lengths that only another unit makes sense of."""
-    scales = ((1e-3, "mm taken for m"), (0.0254, "in taken for m"), (25.4, "in taken for mm"),
-              (1 / 25.4, "mm taken for in"), (1e3, "m taken for mm"), (1 / 0.0254, "m taken for in"))  # fmt: skip
     D, pitch = facts.diameter_m, facts.pitch_m
     asked: list[tuple[str, float, float, float]] = []
     if D is not None:
@@ -214,7 +213,7 @@ def lengths(facts: Facts) -> Iterator[Finding]:
     for name, value, low, high in asked:
         if low <= value <= high:
             continue
-        fits = [f"{words}: multiply by {f:.6g}" for f, words in scales if low <= value * f <= high]
+        fits = [e.words for e in unit_errors.errors("length", rarest=0.5) if low <= value * e.repair <= high]
         text = f"{value:.5g} m is outside {low:.3g} to {high:.3g} m" + (
             f" for a rotor of {D:.4g} m" if D is not None and name != "diameter_m" else ""
         )
@@ -224,29 +223,15 @@ def lengths(facts: Facts) -> Iterator[Finding]:
 @check_for("air")
 def air_units(facts: Facts) -> Iterator[Finding]:
     """Pressure, temperature and humidity in another unit than their heading says."""
-    asked: tuple[tuple[str, float, float, tuple[tuple[float, float, str], ...]], ...] = (
-        ("pressure_Pa", 3e4, 1.2e5, (
-            (100.0, 0.0, "hPa taken for Pa: multiply by 100"), (1e3, 0.0, "kPa taken for Pa: multiply by 1000"),
-            (0.01, 0.0, "Pa taken for hPa: multiply by 0.01"),
-        )),
-        ("temperature_K", 220.0, 340.0, (
-            (1.0, 273.15, "Celsius taken for kelvin: add 273.15"),
-            (1.0, -273.15, "kelvin taken for Celsius: subtract 273.15"),
-            (5 / 9, 255.372, "Fahrenheit taken for kelvin"),
-        )),
-        ("density_kg_m3", 0.2, 2.0, (
-            (1e3, 0.0, "g/cm3 taken for kg/m3: multiply by 1000"),
-            (1e-3, 0.0, "g/m3 taken for kg/m3: multiply by 0.001"),
-        )),
-        ("humidity", 0.0, 1.0, ((0.01, 0.0, "per cent taken for a fraction: multiply by 0.01"),)),
-    )  # fmt: skip
-    for name, low, high, ways in asked:
+    asked = (("pressure_Pa", "pressure", 3e4, 1.2e5), ("temperature_K", "temperature", 220.0, 340.0),
+             ("density_kg_m3", "density", 0.2, 2.0), ("humidity", "fraction", 0.0, 1.0))  # fmt: skip
+    for name, kind, low, high in asked:
         v = facts.get(name)
         if v is None:
             continue
         value = float(np.nanmedian(v))
         if low <= value <= high or (name == "density_kg_m3" and LIQUID[0] <= value <= LIQUID[1]):
             continue
-        fits = [words for factor, offset, words in ways if low <= value * factor + offset <= high]
+        fits = [e.words for e in unit_errors.errors(kind) if low <= value * e.repair + e.offset <= high]
         text = f"median {value:.5g} is outside {low:g} to {high:g}"
         yield Finding("air_unit", facts.named(name), text, "; or ".join(fits) or "check the sensor", (), "warning")

@@ -15,13 +15,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.base import units
-from bemt.formula import k1k2 as empirical
+from bemt.base import unit_errors
 from bemt.recordings.findings import Facts, Finding, check_for
+from bemt.rotors import k1k2 as empirical
 
 Array = NDArray[np.float64]
 EXACT = 0.03
@@ -29,6 +30,7 @@ EXACT = 0.03
 ALIKE = 4.0
 """Difference in score (chi-square) within which slips are told together."""
 
+ELECTRICAL = "rpm_electrical"
 EFFICIENCY, SAME_DIGITS = (0.2, 0.95), 0.001
 """Range of a motor's efficiency under load; scatter of a product that the file itself formed. [1]"""
 
@@ -88,61 +90,26 @@ _QUANTITY = {
 }  # fmt: skip
 
 
-def _both_ways(id_: str, q: str, table: Mapping[str, tuple[float, float]]) -> list[Slip]:
-    out = []
-    for words, (factor, rarity) in table.items():
-        wrong, right = words.split(" taken for ")
-        out.append(Slip(id_, q, factor, f"{wrong} taken for {right}: multiply by {factor:.6g}", rarity))
-        out.append(Slip(id_, q, 1 / factor, f"{right} taken for {wrong}: multiply by {1 / factor:.6g}", rarity))
-    return out
+# Kinds of unit errors of each quantity, and what a finding is called.
+_KINDS = {
+    "T": ("thrust_unit", "force"), "Q": ("torque_unit", "torque"), "n": ("rpm_unit", "rotation"),
+    "P": ("power_unit", "power"), "E": ("electrical_power_unit", "electrical_power"), "I": ("current_unit", "current"),
+    "U": ("voltage_unit", "voltage"), "D": ("diameter_unit", "length", "diameter"), "H": ("efficacy_unit", "efficacy"),
+    "G": ("efficacy_unit", "efficacy"),
+}  # fmt: skip
 
 
+@cache
 def slips() -> tuple[Slip, ...]:
-    """List the usual slips.
+    """List the unit errors and miscounts of each quantity.
 
     >>> next(s.words for s in slips() if s.quantity == "T")
     'kgf taken for N: multiply by 9.80665'
     """
-    u = {k: unit.factor for k, unit in units.UNITS.items()}
-    found = _both_ways("thrust_unit", "T", {
-        "kgf taken for N": (u["kgf"], 0.0), "lbf taken for N": (u["lbf"], 0.0), "gf taken for N": (u["gf"], 0.0),
-        "kgf taken for gf": (1000.0, 0.0), "kgf taken for lbf": (u["kgf"] / u["lbf"], 1.0),
-        "lbf taken for gf": (u["lbf"] / u["gf"], 1.0), "ozf taken for N": (u["ozf"], 2.0),
-    })  # fmt: skip
-    found += _both_ways("torque_unit", "Q", {
-        "mNm taken for Nm": (1e-3, 0.0), "kgf cm taken for Nm": (u["kgf_cm"], 0.0),
-        "gf cm taken for Nm": (u["gf_cm"], 0.0), "kgf m taken for Nm": (u["kgf_m"], 0.0),
-        "lbf in taken for Nm": (u["lbf_in"], 0.0), "lbf ft taken for Nm": (u["lbf_ft"], 1.0),
-        "ozf in taken for Nm": (u["ozf_in"], 1.0), "Ncm taken for Nm": (1e-2, 1.0),
-    })  # fmt: skip
-    found += [
-        Slip("rpm_electrical", q, 1 / p, f"electrical revolutions taken for mechanical: divide by {p} pole pairs",
-             0.0 if p in (6, 7, 11, 12, 14) else 0.5) for q in ("n", "n2") for p in range(2, 31)
-    ]  # fmt: skip
-    found += _both_ways("rpm_unit", "n", {
-        "rad/s taken for rev/min": (1 / units.RPM, 0.0), "rev/s (Hz) taken for rev/min": (60.0, 0.0),
-    })  # fmt: skip
-    found += _both_ways("power_unit", "P", {
-        "kW taken for W": (1e3, 0.5), "hp taken for W": (u["hp"], 0.5),
-        "torque x rev/s taken for torque x rad/s": (2.0 * math.pi, 0.5),
-        "torque x rev/min taken for torque x rad/s": (units.RPM, 0.5),
-    })  # fmt: skip
-    found += _both_ways("electrical_power_unit", "E", {"kW taken for W": (1e3, 1.0)})
-    found += _both_ways("current_unit", "I", {"A taken for mA": (1e3, 0.5)})
-    found += _both_ways("voltage_unit", "U", {"V taken for mV": (1e3, 0.5)})
-    found += _both_ways("diameter_unit", "D", {
-        "mm taken for m": (1e-3, 0.5), "in taken for m": (units.INCH, 0.5), "in taken for mm": (25.4, 0.5),
-        "cm taken for m": (1e-2, 1.0), "radius taken for diameter": (2.0, 1.0),
-    })  # fmt: skip
-    for q, words in (("H", "thrust per electrical power"), ("G", "thrust per shaft power")):
-        found += [
-            Slip("efficacy_unit", q, f, f"{words} in another unit: multiply by {f:.6g}", 5.0)
-            for k in ("kgf", "lbf", "gf")
-            for f in (u[k], 1 / u[k])
-        ]
-        found += [
-            Slip("efficacy_unit", q, f, f"{words} in another unit: multiply by {f:.6g}", 5.0) for f in (1e3, 1e-3)
-        ]
+    found = [Slip(id_, q, e.repair, e.words, e.rarity) for q, (id_, *kinds) in _KINDS.items()
+             for kind in kinds for e in unit_errors.errors(kind)]  # fmt: skip
+    found += [Slip(ELECTRICAL if r.set == 1 else "rpm_ratio", q, 1.0 / r.ratio, r.words, r.rarity)
+              for q in ("n", "n2") for r in unit_errors.speed_ratios(rarest=2.0)]  # fmt: skip
     return tuple(found)
 
 
@@ -323,8 +290,8 @@ def _electrical(facts: Facts, broken: list[Relation]) -> tuple[float, float, flo
 
 def _listed(others: list[Slip], facts: Facts) -> list[str]:
     """Alternatives in words; pole pairs as one range."""
-    poles = sorted(round(1 / s.factor) for s in others if s.id == "rpm_electrical")
-    out = [f"{_told(s.quantity, facts)}: {s.words}" for s in others if s.id != "rpm_electrical"][:5]
+    poles = sorted(round(1 / s.factor) for s in others if s.id == ELECTRICAL)
+    out = [f"{_told(s.quantity, facts)}: {s.words}" for s in others if s.id != ELECTRICAL][:5]
     if poles:
         span = f"{poles[0]}" if len(poles) == 1 else f"{poles[0]} to {poles[-1]}"
         out.insert(0, f"{_told('n', facts)}: electrical revolutions over {span} pole pairs")

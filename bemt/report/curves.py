@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from bemt.base.errors import InputError
 from bemt.case import Case
+from bemt.drive.drive_result import full_throttle
 
 __all__ = ["case_curves", "geometry_curves", "radial_curves", "refinement"]
 
@@ -41,9 +42,12 @@ def geometry_curves(case: Case, n: int = 41) -> dict[str, Any]:
 
 
 def _grids(case: Case, pitch_over_D: float) -> tuple[Array, Array, int]:
-    """Points of the curves: a line of J at the case's rpm, then a line of rpm at its airspeed."""
+    """Points of the curves: a line of J at the case's rpm, then a line of rpm at its airspeed, to full throttle."""
     J = np.linspace(0.0, 1.45 * pitch_over_D, N_J)
     rpm = np.linspace(0.2, 1.1, N_RPM) * case.rpm
+    if case.file.drive is not None:
+        full = full_throttle(case, bands=False)["rpm"].value
+        rpm = np.linspace(0.2, 1.0, N_RPM) * np.fmax(full, case.rpm)
     speeds = J * case.rpm / 60.0 * case.diameter_m
     return (
         np.concatenate([np.full(N_J, case.rpm), rpm]),
@@ -56,6 +60,7 @@ def case_curves(case: Case) -> dict[str, Any]:
     """Performance over J and over rpm, BEMT with bands and K1/K2."""
     from bemt.case.prepare import k1k2_case
     from bemt.case.propagate import propagate
+    from bemt.rotors.validity import counted
 
     rotor = case.rotor()
     rpm, V, cut = _grids(case, rotor.blade.pitch_m() / rotor.D)
@@ -70,11 +75,12 @@ def case_curves(case: Case) -> dict[str, Any]:
         "k1k2_thrust_N": simple.thrust_N,
         "k1k2_CT": simple.CT,
     }
+    shown = [*range(keep := _until_windmill(found.CT[:cut])), *range(cut, len(found))]
     over_J = {name: v[:cut] for name, v in whole.items()}
-    keep = _until_windmill(over_J["CT"])
     return {
         "over_J": {name: v[:keep] for name, v in over_J.items()},
         "over_rpm": {name: v[cut:] for name, v in whole.items()},
+        "flags": counted([found.flags[i] for i in shown]),
     }
 
 

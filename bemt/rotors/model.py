@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from functools import lru_cache
 from types import SimpleNamespace
@@ -53,11 +54,16 @@ def coefficients(model: Model, air: Air) -> Solve:
     return solve
 
 
+def beta75_deg(model: Model) -> float:
+    """Blade angle at 0.75 R as drawn [deg]."""
+    return math.degrees(float(model.rotor.blade.at(0.75 * model.rotor.R)[1]))
+
+
 def predict_model(
     model: Model, prior: Prior, points: Dataset, air: Air, drawn: Array, reference: ReferenceRun | None = None
 ) -> Prediction:
     """Expectation and scatter of CT and CP of a rotor as built at points that were solved as ``drawn``."""
     solve = coefficients(model, air)
-    at = sense(solve, model.diameter_m, points.rpm, points.J, points.Re75, drawn)
+    at = sense(solve, model.diameter_m, beta75_deg(model), points.rpm, points.J, points.Re75, drawn)
     mean = solve(prior.mean, points.rpm, points.J, np.arange(points.rpm.size))
     return predict(population(), prior, at, mean, reference)
