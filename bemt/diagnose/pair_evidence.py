@@ -10,9 +10,9 @@ import numpy as np
 from bemt import effects
 from bemt.diagnose import form
 from bemt.diagnose.explanation import NONE, Explanation
-from bemt.diagnose.form import Form
 from bemt.diagnose.signatures import effect_of
-from bemt.diagnose.state import Array, State, log_mean
+from bemt.diagnose.state import Array, State
+from bemt.gaussian.evidence import LinearTerms, log_sum
 
 if TYPE_CHECKING:
     from bemt.diagnose.problem import Problem
@@ -78,12 +78,12 @@ def every_pair(state: State, spans: dict[str, slice], log_w: Array) -> None:
 def _log_z(state: State, pair: Explanation, spans: Mapping[str, slice], log_w: Array) -> float:
     """Logarithm of the evidence of two effects, with the error of both forms at their best settings."""
     total = state.both(pair, spans, log_w)
-    out = state.log_z[NONE] + float(log_mean(total.ravel(), np.zeros(total.size)))
+    out = state.log_z[NONE] + float(log_sum(total.ravel()))
     forms = [state.forms[i] for i in pair]
     both = np.concatenate([f.B for f in forms], axis=1)
     if not both.shape[1]:
         return out
-    joint = Form(both, np.linalg.cholesky(np.eye(both.shape[1]) + both.T @ both))
+    joint = LinearTerms.of(both)
     k, m = np.unravel_index(int(np.argmax(total)), total.shape)
     A, B = (spans[i] for i in pair)
     i, j = A.start + int(k), B.start + int(m)
@@ -92,9 +92,7 @@ def _log_z(state: State, pair: Explanation, spans: Mapping[str, slice], log_w: A
         extra, at, to = state.mixed[pair]
         share = (state.S[:, i] @ state.S[:, at]) * (state.S[:, j] @ state.S[:, to])
         d -= share / (4.0 * state.half[at] * state.half[to]) * extra
-    p = joint.project(d)
-    chosen = sum(float(np.log(form.FORM.get(f.size, 1.0))) for f in forms)
-    return out + 0.5 * float(p @ p) - joint.half_log_det + chosen
+    return out + float(joint.gain(d)) + sum(float(np.log(form.FORM.get(f.size, 1.0))) for f in forms)
 
 
 def solve_together(
@@ -133,8 +131,8 @@ def price(
     An effect that shows along a recorded variable of its own (time, gap, wall) is no detail of another one's law.
     """
     weight = np.log([s.hyper.weight for s in states])
-    none = float(log_mean(np.array([s.log_z[NONE] for s in states]), weight))
-    alone = {i: float(log_mean(np.array([s.log_z[Explanation.of(i)] for s in states]), weight)) - none for i in modes}
+    none = float(log_sum([s.log_z[NONE] for s in states], weight))
+    alone = {i: float(log_sum([s.log_z[Explanation.of(i)] for s in states], weight)) - none for i in modes}
     best = max(alone, key=lambda i: alone[i], default="")
     if not best or not modes[best].shape[1] or alone[best] <= 0.0:
         return {}

@@ -23,6 +23,8 @@ from numpy.typing import NDArray
 from bemt.formula.points import FitPoints
 from bemt.formula.refit import MIN_PROPELLERS, has
 from bemt.formula.score import FAR, NEAR
+from bemt.gaussian.kernels import alike, smooth
+from bemt.gaussian.whitening import log_density
 
 Array = NDArray[np.float64]
 
@@ -49,12 +51,11 @@ def _features(points: FitPoints, given: str) -> Array:
 
 
 def _kernel(A: Array, B: Array, h: Array) -> Array:
-    d = (A[:, None, :] - B[None, :, :]) / np.exp(h[3:])
-    return np.asarray(np.exp(2.0 * h[0] - 0.5 * np.sum(d * d, axis=-1)))
+    return float(np.exp(2.0 * h[0])) * smooth(*zip(A.T, np.exp(h[3:]), strict=True), to=tuple(B.T))
 
 
 def _covariance(X: Array, group: NDArray[np.intp], h: Array) -> Array:
-    own = np.exp(2.0 * h[1]) * (group[:, None] == group[None, :])
+    own = np.exp(2.0 * h[1]) * alike(group)
     return np.asarray(_kernel(X, X, h) + own + (np.exp(2.0 * h[2]) + _JITTER) * np.eye(group.size))
 
 
@@ -85,11 +86,10 @@ def limit(points: FitPoints, given: str) -> dict[str, Any] | None:
     def cost(h: Array) -> float:
         # the diagonal makes the matrix positive definite; a failure of arithmetic counts as the worst
         try:
-            L = np.linalg.cholesky(_covariance(train, group[rows], h))
+            likely = log_density(_covariance(train, group[rows], h), target, constant=False)
         except np.linalg.LinAlgError:
             return 1e9
-        z = np.linalg.solve(L, target)
-        return float(0.5 * z @ z + np.sum(np.log(np.diag(L))) + 0.5 * np.sum((h / _PRIOR) ** 2))
+        return float(0.5 * np.sum((h / _PRIOR) ** 2) - likely)
 
     start = np.concatenate([_START, np.full(X.shape[1], np.log(2.0))])
     with threadpool_limits(1):  # small matrices: threads only wait for each other
