@@ -16,6 +16,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import get_origin
 
+from bemt.drive.drive_file import DriveToml
+
 from bemt.base.toml import Limits, Table, expected, limits_of
 from bemt.case import Case, load_case
 from bemt.case.prepare import prepare_case
@@ -23,7 +25,6 @@ from bemt.case.schema import GROUPS, CaseFile
 from bemt.case.unknowns import completed
 from bemt.cfd.schema import AxesTable, CampaignFile
 from bemt.diagnose.nuisance import PRIORS
-from bemt.drive.drive_file import DriveToml
 from bemt.drive.motor_file import MotorToml
 from bemt.drive.thrusters_result import ThrustersFile
 from bemt.readers.recording_toml import ColumnsTable, ColumnTable, RecordingToml

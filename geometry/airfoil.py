@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -38,6 +38,8 @@ class Airfoil:
     # (N,) coordinates in Selig order over the chord [-]
     x: Array
     y: Array
+    # Camber, its position and thickness of a NACA four-digit section with its own trailing edge; None for any other [-]
+    four_digit: tuple[float, float, float] | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "x", frozen(self.x))
@@ -165,12 +167,14 @@ def _join(upper: Array, lower: Array) -> Array:
     return np.concatenate([upper[::-1], lower[1:]])
 
 
-def _from_lines(name: str, x: Array, mean: Array, slope: Array, half: Array) -> Airfoil:
+def _from_lines(
+    name: str, x: Array, mean: Array, slope: Array, half: Array, four_digit: tuple[float, float, float] | None = None
+) -> Airfoil:
     """Lay half thicknesses across the camber line (Abbott and von Doenhoff, eq. 6.1)."""
     theta = np.arctan(slope)
     xu, xl = x - half * np.sin(theta), x + half * np.sin(theta)
     yu, yl = mean + half * np.cos(theta), mean - half * np.cos(theta)
-    return Airfoil(name, _join(xu, xl), _join(yu, yl))
+    return Airfoil(name, _join(xu, xl), _join(yu, yl), four_digit)
 
 
 def _naca_half(x: Array, thickness: float, te_gap: float | None) -> Array:
@@ -206,7 +210,8 @@ def naca4(camber: float, position: float, thickness: float, n: int = 161, te_gap
         mean = np.where(x < p, scale * x * (2 * p - x), scale * (1 - 2 * p + x * (2 * p - x)))
         slope = 2 * scale * (p - x)
     name = f"naca4:{camber:.3f},{position:.2f},{thickness:.3f}"
-    return _from_lines(name, x, mean, slope, _naca_half(x, thickness, te_gap))
+    own = (float(camber), float(position), float(thickness)) if te_gap is None else None
+    return _from_lines(name, x, mean, slope, _naca_half(x, thickness, te_gap), own)
 
 
 # Camber lines of the five-digit family at design cl 0.3: second digit -> (r, k1) plain, (r, k1, k2/k1) reflexed.
@@ -236,7 +241,7 @@ def naca(digits: str, n: int = 161) -> Airfoil:
         if m > 0 and p == 0:
             raise GeometryError([("naca", repr(digits), expected, "Camber needs a position: the second digit is 0")])
         shape = naca4(m, p or 0.4, t, n)
-        return Airfoil(f"naca{code}", shape.x, shape.y)
+        return replace(shape, name=f"naca{code}")
     line, kind, cl = int(code[1]), int(code[2]), 0.15 * int(code[0])
     if cl == 0 or kind > 1 or line not in (_FIVE, _REFLEX)[kind]:
         raise GeometryError([("naca", repr(digits), expected, "Known camber lines: 10 to 50 plain, 21 to 51 reflexed")])

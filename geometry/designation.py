@@ -1,42 +1,166 @@
-"""Propeller designations such as 8x5: diameter x pitch in inches."""
+"""Propeller labels as people type them: 8x5, APC 10x4.5MR, HQ5x4.3x3, 5045, Gemfan 51466, T-Motor 28x9.2."""
 
 from __future__ import annotations
 
 import math
 import re
+from dataclasses import dataclass
 
 from geometry.common import Faults, GeometryError
 
+BLADE_CLASSES = ("electric", "slow_flyer", "multirotor", "folding", "sport", "fpv")
+"""Kinds of blades that a label tells apart; sport is for glow engines."""
 
-def parse_designation(text: str) -> tuple[float, float, int | None]:
-    """Read a propeller designation: diameter x pitch in inches, with an optional blade count.
+# Letters behind the size (makers' catalogues): class, and whether they mean the opposite rotation.
+_SUFFIXES: dict[str, tuple[str | None, bool]] = {
+    "": (None, False), "e": ("electric", False), "ep": ("electric", True), "sf": ("slow_flyer", False),
+    "sfp": ("slow_flyer", True), "mr": ("multirotor", False), "mrp": ("multirotor", True), "f": ("folding", False),
+    "p": (None, True), "r": (None, True), "cw": (None, False), "ccw": (None, False), "bn": ("fpv", False),
+    "s": (None, False), "c": (None, False), "w": (None, False), "n": (None, False),
+}  # fmt: skip
+# Words before or behind the size; the first that matches.
+_WORDS: tuple[tuple[str, str], ...] = (
+    (r"slow\W?fl(?:y|i)(?:er)?\b|\bslo\W?fly|\bsf\b", "slow_flyer"), (r"multi\W?rotor|\bmr\b", "multirotor"),
+    (r"\bfold", "folding"),
+    (r"thin electric|\belectric\b|\be\W?prop", "electric"), (r"\bsport\b|\bglow\b", "sport"),
+    (r"\b(?:hq|hqprop|gemfan|dalprop|dal|hurricane|ethix|azure|fpv)\b|bull\W?nose", "fpv"),
+)  # fmt: skip
+_FPV_LARGEST = 7.0  # diameter of FPV propellers; more blades than two on one this small are of that class [in]
+_RATIO = (0.1, 2.5)  # pitch over diameter of any propeller
+_USUAL_RATIO = (0.2, 1.6)  # of those whose label has no point
+_EXPECTED = "diameter x pitch in inches, such as 8x5, 10x4.7SF, 8x5x3 or 5045"
+_NUMBER = r"(\d+(?:\.\d*)?|\.\d+)"
+_SIZE = re.compile(
+    rf"(?P<before>(?:[^\d\s.,-][^\d,]*)?){_NUMBER}\s*[x×*]\s*{_NUMBER}(?:\s*[x×*-]\s*B?(?P<blades>\d+))?"
+    r"(?P<after>\s*[A-Za-z].*)?",
+    re.IGNORECASE,
+)
+_DIGITS = re.compile(
+    r"(?P<before>(?:[^\d\s.,-][^\d,]*)?)(?P<digits>\d{4,5})(?:\s*[x×*-]\s*B?(?P<blades>\d))?(?P<after>\s*[A-Za-z].*)?",
+    re.IGNORECASE,
+)
 
-    >>> parse_designation("10x4.7"), parse_designation("8x5x3")
-    ((10.0, 4.7, None), (8.0, 5.0, 3))
-    >>> parse_designation("10x47")
+
+@dataclass(frozen=True)
+class Designation:
+    """What a label says; None where it says nothing.
+
+    Parameters
+    ----------
+    diameter_in, pitch_in : float
+        Size. [in]
+    blades : int or None
+        Number of blades.
+    blade_class : str or None
+        One of `BLADE_CLASSES`.
+    maker : str
+        Words before the size, empty without any.
+    reverse : bool
+        Whether it is the pusher or counter-rotating one of a pair.
+    """
+
+    diameter_in: float
+    pitch_in: float
+    blades: int | None = None
+    blade_class: str | None = None
+    maker: str = ""
+    reverse: bool = False
+
+    @property
+    def size(self) -> str:
+        """Diameter x pitch, with the blades where they are not two.
+
+        >>> parse_designation("HQ5x4.3x3").size
+        '5x4.3x3'
+        """
+        blades = f"x{self.blades}" if self.blades not in (None, 2) else ""
+        return f"{self.diameter_in:g}x{self.pitch_in:g}{blades}"
+
+
+def blade_class(text: str) -> str | None:
+    """Class of blade that words such as a maker's series state, None where they state none.
+
+    >>> blade_class("GWS Slow Flyer"), blade_class("APC Thin Electric"), blade_class("Graupner CAM Slim")
+    ('slow_flyer', 'electric', None)
+    """
+    return next((name for pattern, name in _WORDS if re.search(pattern, text, re.IGNORECASE)), None)
+
+
+def parse_designation(text: str) -> Designation:
+    """Read a propeller label: diameter x pitch in inches, with maker, blade count and kind of blade where it has them.
+
+    A pitch without a point that no propeller has is tenths of an inch (``13x65``), and four or five digits are both
+    sizes without points (``5045``, ``51466``); five digits mean an FPV propeller, which has three blades.
+
+    >>> parse_designation("10x4.7").size, parse_designation("8x5x3").blades, parse_designation("13x65").pitch_in
+    ('10x4.7', 3, 6.5)
+    >>> found = parse_designation("APC 10x4.5MR")
+    >>> found.maker, found.size, found.blade_class
+    ('APC', '10x4.5', 'multirotor')
+    >>> parse_designation("5045").size, parse_designation("1045").size, parse_designation("Gemfan 51466").size
+    ('5x4.5', '10x4.5', '5.1x4.66x3')
+    >>> parse_designation("10x100")
     Traceback (most recent call last):
         ...
-    geometry.common.GeometryError: '10x47': got pitch/diameter 4.7; expected a ratio from 0.1 to 2.5. Meant 10x4.7?
+    geometry.common.GeometryError: '10x100': got pitch/diameter 10; expected a ratio from 0.1 to 2.5. Meant 10x10?
     """
-    number = r"(\d+(?:\.\d*)?|\.\d+)"
-    match = re.fullmatch(rf"\s*{number}\s*[x×*]\s*{number}(?:\s*[x×*-]\s*(\d+))?\s*([A-Za-z]*)\s*", text, re.IGNORECASE)
-    expected = "diameter x pitch in inches, such as 8x5, 10x4.7 or 8x5x3"
-    where = repr(text)
+    plain, where = text.strip(), repr(text)
+    digits, sized = _DIGITS.fullmatch(plain), _SIZE.fullmatch(plain)
+    match = digits or sized
     if match is None:
         hint = "Decimal point, not comma" if "," in text else ""
-        raise GeometryError([(where, "unreadable text", expected, hint)])
-    if match[4]:
-        raise GeometryError([(where, f"a suffix '{match[4]}'", expected, "Leave the letters out")])
+        raise GeometryError([(where, "unreadable text", _EXPECTED, hint)])
+    before, after = match["before"].strip(" -_"), (match["after"] or "").strip(" -_")
+    count = re.search(r"-\s*B?(\d)$", after, re.IGNORECASE)  # 5152S-3
+    after = after[: count.start()] if count else after
+    told = match["blades"] or (count[1] if count else None)
+    blades = int(told) if told else None
+    if digits:
+        D, pitch = _from_digits(digits["digits"], where)
+        blades = 3 if blades is None and len(digits["digits"]) == 5 and D <= _FPV_LARGEST else blades
+    else:
+        D, pitch = _sized(match[2], match[3], where, blades)
+    suffix = re.sub(r"V\d\w*$", "", after, flags=re.IGNORECASE).strip().lower()  # the version of a mould
+    kind, reverse = _SUFFIXES.get(suffix, (blade_class(after), False))
+    if suffix not in _SUFFIXES and kind is None:
+        known = ", ".join(key.upper() for key in _SUFFIXES if key)
+        raise GeometryError([(where, f"a suffix {after!r}", f"one of {known}, or nothing", "Leave the letters out")])
+    kind = kind or blade_class(before)
+    if kind is None and D <= _FPV_LARGEST and (digits or (blades or 2) > 2):
+        kind = "fpv"
+    return Designation(D, pitch, blades, kind, before, reverse)
+
+
+def _sized(diameter: str, pitch: str, where: str, blades: int | None) -> tuple[float, float]:
+    """Diameter and pitch of ``DxP``; all faults at once. [in]"""
     faults = Faults()
-    d, p, blades = float(match[1]), float(match[2]), int(match[3]) if match[3] else None
-    lost = "." not in match[1] and d > 120
-    faults.number(where, d, 0.5, 120.0, "in", f"Meant {d / 10:g}? Millimetres need division by 25.4" if lost else "")
-    ratio = p / d if d > 0 else math.inf
-    if not 0.1 <= ratio <= 2.5:
-        meant = "." not in match[2] and 0.1 <= ratio / 10 <= 2.5
-        hint = f"Meant {d:g}x{p / 10:g}?" if meant else "Diameter comes first"
-        faults.add(where, f"pitch/diameter {ratio:.3g}", "a ratio from 0.1 to 2.5", hint)
+    D, p = float(diameter), float(pitch)
+    lost = "." not in diameter and D > 120
+    faults.number(where, D, 0.5, 120.0, "in", f"Meant {D / 10:g}? Millimetres need division by 25.4" if lost else "")
+    low, high = _RATIO
+    ratio = p / D if D > 0 else math.inf
+    tenths = "." not in pitch and low <= ratio / 10 <= high
+    if ratio > high and tenths and len(pitch) == 2 and not pitch.endswith("0"):
+        p /= 10.0
+    elif not low <= ratio <= high:
+        hint = f"Meant {D:g}x{p / 10:g}?" if tenths else "Diameter comes first"
+        faults.add(where, f"pitch/diameter {ratio:.3g}", f"a ratio from {low:g} to {high:g}", hint)
     if blades is not None:
         faults.number(where, blades, 1, 16, "blades")
     faults.check()
-    return d, p, blades
+    return D, p
+
+
+def _from_digits(digits: str, where: str) -> tuple[float, float]:
+    """Diameter and pitch of ``5045`` or ``51466``: the one reading that is a propeller. [in]"""
+    a, b = float(digits[:2]), float(digits[2:])
+    small, large = (a / 10.0, b / 10.0 ** (len(digits) - 3)), (a, b / 10.0)
+    if len(digits) == 5:
+        large = (float(digits[:3]) / 10.0, float(digits[3:]) / 10.0)
+    low, high = _USUAL_RATIO
+    found = [(D, p) for D, p in (small, large) if 1.5 <= D <= 40.0 and low <= p / D <= high]
+    if len(found) != 1:
+        got = "digits that fit no propeller" if not found else "digits that fit two propellers"
+        names = " or ".join(f"{D:g}x{p:g}" for D, p in (small, large))
+        raise GeometryError([(where, got, _EXPECTED, f"Write {names}")])
+    return found[0]

@@ -44,7 +44,7 @@ def test_cache_hit_equals_cold_bit_for_bit(fresh: Path, monkeypatch: pytest.Monk
     cold = tunnel_polar(SECTIONS["4412"])
     assert not [f for f in (fresh / "polar").iterdir() if f.suffix != ".npz" or f.name.startswith(".")]
     cache.clear_memory()
-    monkeypatch.setattr(polars_neuralfoil, "_make_neuralfoil", lambda *a: pytest.fail("the disk entry was not used"))
+    monkeypatch.setattr(polars_neuralfoil, "_make", lambda *a: pytest.fail("the disk entry was not used"))
     warm = tunnel_polar(SECTIONS["4412"])
     assert bits(warm) == bits(cold) and warm.key == cold.key
     assert bits(tunnel_polar(SECTIONS["4412"])) == bits(cold)

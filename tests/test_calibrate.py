@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bemt.formula import calibrate, compact, fit, gather, limit, refit, score
+from bemt.formula import points as reading
+from bemt.formula.points import FitPoints, MeasuredPropeller
 
 from bemt import coefficients as co
 from bemt.base.errors import InputError
 from bemt.commands import cli
-from bemt.formula import calibrate, compact, fit, gather, limit, refit, score
-from bemt.formula import points as reading
-from bemt.formula.points import FitPoints, MeasuredPropeller
 
 INCH = 0.0254
 SIZES = [(8, 4), (8, 6), (9, 4.5), (9, 7), (10, 5), (10, 7), (11, 5.5), (11, 8), (12, 6), (12, 10), (14, 5), (14, 8)]

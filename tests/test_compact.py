@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bemt.formula import compact, estimate, gather, refit, score
+from bemt.formula.points import FitPoints
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bemt import coefficients as co
 from bemt.air import Air
 from bemt.base.errors import InputError
-from bemt.formula import compact, estimate, gather, refit, score
-from bemt.formula.points import FitPoints
 
 INCH = 0.0254
 QUICK = settings(deadline=None, max_examples=40)

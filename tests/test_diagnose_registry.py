@@ -89,6 +89,6 @@ def test_correlated_noise_and_a_stand_within_its_calibration_name_nothing() -> N
             e[:, i] = 0.8 * e[:, i - 1] + 0.6 * e[:, i]
         y = plain.f0 + plain.u * e[plain.channel, plain.point] + stand @ rng.standard_normal(stand.shape[1])
         found = evidence.weigh(replace(plain, y=y), candidates)
-        said = rules.decide(verdict.Asked(found, gate.p_value(found, 200)))
+        said = rules.decide(verdict.VerdictQuery(found, gate.p_value(found, 200)))
         named += [said.effects] if said.effects else []
     assert len(named) <= SHARE * NULLS, named

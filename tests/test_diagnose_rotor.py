@@ -9,7 +9,7 @@ import pytest
 from diagnosing import case, points, recording
 
 from bemt.dataset import Dataset
-from bemt.diagnose import another_rotor, chain
+from bemt.diagnose import chain, wrong_rotor_check
 from bemt.diagnose.assemble import build
 from bemt.diagnose.record import from_series
 
@@ -31,11 +31,11 @@ def slipped(what: str) -> Dataset:
 )
 def test_a_rotor_off_by_a_factor_is_a_question_with_the_likely_slip(what: str, words: str) -> None:
     problem = build([from_series(slipped(what), case())], [case()])
-    ranked = another_rotor.suspects(problem)
+    ranked = wrong_rotor_check.suspects(problem)
     assert any(words in s.words for s in ranked[:3]), ranked[:5]
     assert np.all(np.diff([s.distance for s in ranked]) >= 0.0)
     answer = chain.diagnose([from_series(slipped(what), case())], [case()], nulls=200)
-    assert answer.problem.findings[0] == another_rotor.finding(problem)
+    assert answer.problem.findings[0] == wrong_rotor_check.finding(problem)
     if what != "poles":  # a ratio of pole pairs is a cause of its own, and may be named
         assert (answer.decision.verdict, answer.decision.effects) == ("insufficient", ())
 
@@ -69,7 +69,7 @@ def test_density_moves_thrust_and_torque_by_the_same_share(thrust: float, torque
 
 
 def test_a_rotor_that_is_the_case_is_not_asked_for() -> None:
-    assert another_rotor.finding(build([from_series(recording(case(), points("grid")), case())], [case()])) == ""
+    assert wrong_rotor_check.finding(build([from_series(recording(case(), points("grid")), case())], [case()])) == ""
 
 
 def test_repeats_that_differ_as_no_stand_does_name_nothing() -> None:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from bemt.air import Air
 from bemt.base.errors import InputError
-from bemt.formula import k1k2 as k
+from bemt.rotors import k1k2 as k
 
 INCH, KGF = 0.0254, 9.80665
 lengths = st.floats(0.02, 3.0)

@@ -6,12 +6,12 @@ import json
 
 import numpy as np
 import pytest
+from bemt.formula.estimate import estimate
 
 from bemt.base.errors import InputError
 from bemt.base.units import INCH
 from bemt.commands import cli
-from bemt.formula import k1k2 as empirical
-from bemt.formula.estimate import estimate
+from bemt.rotors import k1k2 as empirical
 
 
 def told(capsys: pytest.CaptureFixture[str], *words: str) -> dict[str, object]:

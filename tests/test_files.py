@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from bemt.drive.drive_file import DriveToml
 
 from bemt.base.toml import Limits, Table, limits_of, validated
 from bemt.base.toml_text import Collector
 from bemt.case.schema import CaseFile
 from bemt.cfd.schema import CampaignFile
-from bemt.drive.drive_file import DriveToml
 from bemt.drive.motor_file import MotorToml
 from bemt.drive.thrusters_result import ThrustersFile
 from bemt.readers.recording_toml import RecordingToml

@@ -11,7 +11,7 @@ import pytest
 from diagnosing import case, diagnose, left_out, points, recording
 
 from bemt.dataset import Dataset
-from bemt.diagnose import another_rotor, chain, suggest, verdict
+from bemt.diagnose import chain, rules, suggest, verdict, wrong_rotor_check
 from bemt.diagnose.document import text
 from bemt.diagnose.explanation import Explanation
 from bemt.diagnose.record import Record, from_series
@@ -72,9 +72,10 @@ def test_a_recording_that_contradicts_itself_is_mended_first(grid: dict[str, np.
     wrong = "log.csv: error: power_above_input (torque x speed): 1.5 times. Correction: unit or gain of the torque"
     problem = SimpleNamespace(findings=(wrong,), scatter={}, level={"thrust_N": 0.0}, parts=())
     found = verdict.Decision("unknown", (), Explanation.of(), 0.9, 5.0, (), "a smooth rest")
-    said = another_rotor.judged(cast("chain.Problem", problem), found)
-    assert said.verdict == "insufficient"
-    assert "unit or gain of the torque" in another_rotor.to_mend(cast("chain.Problem", problem), said)
+    query = cast("verdict.VerdictQuery", SimpleNamespace(found=SimpleNamespace(problem=problem), answer=found))
+    said = next(r.ask(query) for r in rules.RULES if r.name == "a recording contradicts itself")
+    assert said is not None and said.verdict == "insufficient"
+    assert "unit or gain of the torque" in wrong_rotor_check.to_mend(cast("chain.Problem", problem), said)
 
 
 def test_the_loads_of_another_rotor_bring_the_question_first(grid: dict[str, np.ndarray]) -> None:

@@ -12,6 +12,7 @@ from bemt.case import load_case
 from bemt.case.prepare import prepare_case
 from bemt.commands.cli import main
 from bemt.readers import aerodyn, detect, dfdc, qprop, xrotor
+from bemt.readers._stations import read_stations
 from bemt.sections.parametric import QpropSection, XrotorSection, fit_qprop, fit_xrotor
 
 QPROP = """
@@ -286,3 +287,48 @@ def test_parts_of_an_aerodyn_model_are_told_apart(turbine: Path) -> None:
     blade.write_text(blade.read_text().replace("0.03 2", "0.03 7"))
     with pytest.raises(InputError, match="BlAFID"):
         aerodyn.read(turbine)
+
+
+_ROWS = ((0.2, 0.16, 30.0), (0.6, 0.18, 15.0), (1.0, 0.06, 8.0))  # r/R, c/R, beta [deg]
+
+
+def _table(head: str, mark: str = ",", scales: tuple[float, float, float] = (1.0, 1.0, 1.0), point: str = ".") -> str:
+    rows = [[f"{v * s:.6g}".replace(".", point) for v, s in zip(row, scales, strict=True)] for row in _ROWS]
+    return "\n".join([head, *(mark.join(row) for row in rows)]) + "\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        _table("r_over_R,chord_over_R,beta_deg"), _table("r/R,c/R,beta (deg)"), _table("r/R c/R beta_deg", " "),
+        _table("r/R;c/R;beta_deg", ";"), _table("r/R;c/R;beta_deg", ";", point=","), _table("r/R\tc/R\tbeta_deg", "\t"),
+        _table("r_mm,chord_mm,beta_deg", scales=(127.0, 127.0, 1.0)),
+        _table("Radius (in),Chord (in),Blade angle (deg)", scales=(5.0, 5.0, 1.0)),
+        _table("r (mm);c (mm);beta (°)", ";", (127.0, 127.0, 1.0), ","),
+        _table("r/R,c/D,beta [deg]", scales=(1.0, 0.5, 1.0)), _table("x/R,chord/D,theta (deg)", scales=(1.0, 0.5, 1.0)),
+        _table("r/R,c/R,beta (rad)", scales=(1.0, 1.0, np.pi / 180.0)),
+        "# blade 7, scanned\n" + _table("r/R,c/R,beta_deg,t/c").replace(".16,30", ".16,30,0.1").replace(
+            ".18,15", ".18,15,0.09").replace(".06,8", ".06,8,0.08"),
+    ],
+)  # fmt: skip
+def test_stations_are_the_same_blade_however_they_are_written(text: str, tmp_path: Path) -> None:
+    (tmp_path / "blade.csv").write_text(text)
+    x, c, beta = read_stations(tmp_path / "blade.csv", 0.127)
+    for got, want in zip((x, c, np.degrees(beta)), np.transpose(_ROWS), strict=True):
+        assert np.allclose(got, want, rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("text", "hint"),
+    [
+        (_table("r/R,c/R,beta_deg", scales=(1.0, 8.0, 1.0)), "tip radius"),  # 1.4 R wide: a chord in another unit
+        (_table("r/R,c/R,beta_deg", scales=(1.0, 1.0, np.pi / 180.0)), "radians"),
+        (_table("r/R,c/R,twist_deg"), "beta_deg"), (_table("r/R,c/R,beta"), "beta_deg"),
+        (_table("r_mm,chord_mm,beta_deg", scales=(5.0, 5.0, 1.0)), "tip radius 127 mm"),
+        (_table("r/R,c/R,c/D,beta_deg"), "one of them"),
+    ],
+)  # fmt: skip
+def test_stations_in_doubt_are_refused_with_the_likely_reason(text: str, hint: str, tmp_path: Path) -> None:
+    (tmp_path / "blade.csv").write_text(text)
+    with pytest.raises(InputError, match=hint):
+        read_stations(tmp_path / "blade.csv", 0.127)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import random
 import re
 import struct
@@ -22,6 +23,7 @@ from bemt.dataset import Dataset
 from bemt.readers import _large, generic_csv, jmajew, pybemt_ini, rcbenchmark
 from bemt.readers._headings import heading
 from bemt.readers._split import NO_VALUE
+from bemt.recordings.channels import named
 from bemt.recordings.load import import_file
 from bemt.recordings.reduce import reduce, reduction
 
@@ -158,13 +160,99 @@ def test_words_beside_thrust_and_torque_change_nothing(text: str, name: str, uni
     assert (got.name, got.unit_name) == (name, unit)
 
 
-@pytest.mark.parametrize("text", ["Thrust (kg)", "load_g", "Thrust (lb)", "Torque (kg·cm)", "T [G]"])
-def test_a_mass_is_no_force(text: str, write: Write) -> None:
+@pytest.mark.parametrize(
+    ("text", "force"),
+    [("Thrust (kg)", 9.80665), ("load_g", 9.80665e-3), ("Thrust (lb)", 4.4482216), ("T [G]", 9.80665e-3),
+     ("Load cell [oz]", 0.27801385), ("Propeller thrust kg", 9.80665), ("F (kg)", 9.80665), ("thrust_lb", 4.4482216)],
+)  # fmt: skip
+def test_a_mass_in_a_column_of_thrust_is_what_it_weighs(text: str, force: float, write: Write) -> None:
     got = importers.read(write(f"Time (s),{text},RPM\n" + "".join(f"{k},{k + 1},{3000 + k}\n" for k in range(5))))
-    name = next(name for name in got.values if name not in ("time_s", "rpm"))
-    assert got.unit(name) == ""
-    assert np.array_equal(got[name], np.arange(1.0, 6.0))  # as written: not converted
-    assert said(got, "no unit known, none assumed") and said(got, "f")
+    thrust = named(got)["thrust_N"]
+    assert np.allclose(thrust, force * np.arange(1.0, 6.0), rtol=1e-7) and said(got, "-force")
+
+
+@pytest.mark.parametrize(
+    ("text", "cell", "channel", "value"),
+    [
+        ("kRPM", "5", "rpm", 5000.0), ("RPM x1000", "5", "rpm", 5000.0), ("rpm (k)", "5", "rpm", 5000.0),
+        ("Speed [1000 rpm]", "5", "rpm", 5000.0), ("U/min", "5000", "rpm", 5000.0), ("1/min", "5000", "rpm", 5000.0),
+        ("rpm [ rev min^-1 ]", "5000", "rpm", 5000.0), ("Prop RPM", "5000", "rpm", 5000.0),
+        ("Motor RPM", "5000", "rpm", 5000.0), ("ESC RPM", "5000", "rpm", 5000.0),
+        ("Rotation frequency (Hz)", "100", "rpm", 6000.0), ("omega (rad/s)", "100", "rpm", 954.9297),
+        ("RPM (electrical)", "35000", "electrical_rpm", 35000.0), ("Optical RPM", "5000", "optical_rpm", 5000.0),
+        ("Ambient temperature (C)", "15", "temperature_K", 288.15), ("Tamb [K]", "290", "temperature_K", 290.0),
+        ("T_amb (°C)", "15", "temperature_K", 288.15), ("Air temp (F)", "59", "temperature_K", 288.15),
+        ("OAT (C)", "15", "temperature_K", 288.15), ("Room temp. [degC]", "15", "temperature_K", 288.15),
+        ("Umgebungstemperatur (°C)", "15", "temperature_K", 288.15), ("Baro (mbar)", "1013", "pressure_Pa", 101300.0),
+        ("Ambient pressure (hPa)", "1013", "pressure_Pa", 101300.0), ("p_amb [Pa]", "101300", "pressure_Pa", 101300.0),
+        ("Barometric pressure (inHg)", "29.92", "pressure_Pa", 101320.76),
+        ("Atmospheric pressure [mmHg]", "760", "pressure_Pa", 101325.0),
+        ("Air pressure (kPa)", "101.3", "pressure_Pa", 1.013e5),
+        ("RH (%)", "45", "humidity", 0.45), ("Relative humidity [%]", "45", "humidity", 0.45),
+        ("Air density (kg/m3)", "1.2", "density_kg_m3", 1.2), ("rho [kg/m^3]", "1.2", "density_kg_m3", 1.2),
+        ("Torque (kg-cm)", "1", "torque_Nm", 0.0980665), ("Torque (g·cm)", "1000", "torque_Nm", 0.0980665),
+        ("Throttle (%)", "50", "throttle", 0.5), ("PWM (us)", "1500", "pwm_s", 1.5e-3),
+        ("Wind speed (km/h)", "36", "airspeed_m_s", 10.0), ("Pull (g)", "1000", "thrust_N", 9.80665),
+    ],
+)  # fmt: skip
+def test_a_column_as_people_head_it_is_the_channel_in_si(
+    text: str, cell: str, channel: str, value: float, write: Write
+) -> None:
+    got = named(importers.read(write(f"{text},x_A\n" + f"{cell},1\n" * 3)))
+    assert np.allclose(got[channel], value, rtol=1e-5)
+
+
+def test_a_pressure_reduced_to_sea_level_is_not_that_of_the_air(write: Write) -> None:
+    got = importers.read(write("rpm,QNH (hPa)\n" + "5000,1013\n" * 3))
+    assert "pressure_Pa" not in named(got) and said(got, "sea level")
+
+
+def _packed(folder: Path, form: str, rows: list[list[object]], more: int = 0) -> Path:
+    """A table as gzip or as a workbook."""
+    text = "\n".join(",".join(map(str, row)) for row in rows) + "\n"
+    if form == "gz":
+        (folder / "log.csv.gz").write_bytes(gzip.compress(text.encode()))
+        return folder / "log.csv.gz"
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    for row in rows:
+        book.active.append(row)
+    book.create_sheet("notes").append(["calm day", "stand 2"])
+    for k in range(more):
+        sheet = book.create_sheet(f"run {k}")
+        for row in rows:
+            sheet.append(row)
+    book.save(folder / "log.xlsx")
+    return folder / "log.xlsx"
+
+
+@pytest.mark.parametrize("form", ["gz", "xlsx"])
+def test_a_packed_table_is_the_table(form: str, tmp_path: Path) -> None:
+    rows: list[list[object]] = [["RPM", "Thrust (g)"], *([3000 + k, 100.5 + k] for k in range(6))]
+    got = importers.read(_packed(tmp_path, form, rows))
+    assert np.allclose(got["rpm"], 3000.0 + np.arange(6))
+    assert np.allclose(got["thrust_N"], 9.80665e-3 * (100.5 + np.arange(6)))
+
+
+def test_a_workbook_with_two_tables_is_not_guessed_at(tmp_path: Path) -> None:
+    rows: list[list[object]] = [["RPM", "Thrust (g)"], *([3000 + k, 100.5 + k] for k in range(6))]
+    with pytest.raises(InputError, match="run 0"):
+        importers.read(_packed(tmp_path, "xlsx", rows, more=1))
+
+
+def test_a_damaged_workbook_is_refused(tmp_path: Path) -> None:
+    whole = _packed(tmp_path, "xlsx", [["RPM", "T (N)"], [1, 2.5], [2, 3.5]])
+    (tmp_path / "cut.xlsx").write_bytes(whole.read_bytes()[:-200])
+    with pytest.raises(InputError, match="damaged"):
+        importers.read(tmp_path / "cut.xlsx")
+
+
+@pytest.mark.parametrize("mark", ["#DIV/0!", "#N/A", "-", "#VALUE!"])
+def test_what_a_spreadsheet_could_not_compute_is_an_empty_cell(mark: str, write: Write) -> None:
+    cells = ["1.5", mark, mark, "2.5", mark, "3.5"]  # more than the share of odd cells that makes a column text
+    got = importers.read(write("rpm,thrust_N\n" + "".join(f"{3000 + k},{c}\n" for k, c in enumerate(cells))))
+    assert np.allclose(got["thrust_N"], [1.5, np.nan, np.nan, 2.5, np.nan, 3.5], equal_nan=True)
+    assert mark == "-" or said(got, "3 cells")
 
 
 def test_the_same_run_in_any_unit_is_the_same_thrust(write: Write) -> None:
@@ -651,12 +739,15 @@ def test_several_set_ups_in_one_file_are_said_and_not_diagnosed_together(write: 
 
 def test_a_heading_that_is_not_understood_gets_its_nearest_meaning_and_the_line_to_write(write: Write) -> None:
     got = importers.read(write("rpm,Trust,wibble\n4000,3,1\n6000,7,2\n"))
-    assert said(got, "'Trust' thrust") and said(got, '[columns] thrust = { column = "Trust", unit = "N" }')
+    assert said(got, "'Trust' thrust") and said(got, '[columns] thrust = { column = "Trust", unit = "..." }')
+    line = '[recording]\nfile = "t.csv"\n[columns]\nthrust = { column = "Trust", unit = "..." }\n'
+    with pytest.raises(InputError, match="gf"):  # followed to the letter, it asks for the unit
+        importers.read(write(line, "r.toml"))
 
 
 @pytest.mark.parametrize(("more", "lines"), [
-    ("", ("'speed' rpm or airspeed", 'rpm = { column = "speed", unit = "rpm" }',
-          'airspeed = { column = "speed", unit = "m_s" }')),
+    ("", ("'speed' rpm or airspeed", 'rpm = { column = "speed", unit = "..." }',
+          'airspeed = { column = "speed", unit = "..." }')),
     ("airspeed_m_s", ("'speed' rpm.",)), ("rpm", ("'speed' airspeed.",)),
 ])  # fmt: skip
 def test_a_bare_speed_is_offered_as_the_one_that_is_missing(more: str, lines: tuple[str, ...], write: Write) -> None:
@@ -845,7 +936,7 @@ def test_a_point_at_which_the_vendors_code_failed_is_a_flagged_row(write: Write)
         ("Vibration (m/s²)", "vibration_m_s2", "m/s2"),
         # ratios, rotors and ambiguous units stay what they are
         ("r/R", "r/R", "-"), ("P/D", "P/D", "-"), ("Thrust A", "Thrust_A", ""), ("Current A", "Current_A", ""),
-        ("Q/N", "Q/N", ""), ("n (1/s)", "n_1/s", ""), ("Thrust - g", "Thrust_g", ""), ("Force - X", "Force_X", ""),
+        ("Q/N", "Q/N", ""), ("n (1/s)", "n_1/s", ""), ("Thrust - g", "thrust_N", "N"), ("Force - X", "Force_X", ""),
     ],
 )  # fmt: skip
 def test_headings_as_people_write_them(text: str, name: str, unit: str) -> None:

@@ -17,9 +17,9 @@ from bemt.case.prepare import prepare_case
 from bemt.rotors.conditioning import condition
 from bemt.rotors.fit import MeasuredRotor, objective
 from bemt.rotors.latents import NAMES, Prior, Sensed
-from bemt.rotors.mixture import LEVELS, half_width, inside
+from bemt.rotors.mixture import LEVELS, half_width, inside, pair_half_width
 from bemt.rotors.model import coefficients
-from bemt.rotors.population import WEIGHTS, population
+from bemt.rotors.population import WEIGHTS, population, sizes
 from bemt.rotors.predict import Prediction, predict
 from bemt.rotors.reference import ReferenceRun, noise_of_run, scatter
 from bemt.validate.static_limit import from_static
@@ -67,6 +67,19 @@ def test_half_width_is_the_inverse_of_inside() -> None:
         assert inside(half_width(level, sds, WEIGHTS), sds, WEIGHTS) == pytest.approx(level, abs=1e-9)
     with_equal = half_width(LEVELS[1], np.full((1, 6), 1.5), WEIGHTS)
     assert with_equal == pytest.approx(3.0, abs=1e-6)  # one normal law: two standard deviations
+
+
+@pytest.mark.parametrize("nu", [(2.05, 2.05), (9.3, 4.6), (3.0, 200.0)])
+def test_half_width_of_a_sum_is_that_of_all_pairs_of_sizes(nu: tuple[float, float]) -> None:
+    first, second = np.random.default_rng(2).lognormal(0.0, 2.0, (2, 200))
+    first[0], second[1], first[2], second[2] = 0.0, 0.0, 0.0, 0.0
+    s, t = sizes(nu[0]), sizes(nu[1])
+    pairs = np.hypot((first[:, None] * s)[:, :, None], (second[:, None] * t)[:, None, :]).reshape(200, -1)
+    for level in LEVELS:
+        found = pair_half_width(level, first, second, (s, t), (WEIGHTS, WEIGHTS))
+        assert found == pytest.approx(
+            half_width(level, pairs, np.outer(WEIGHTS, WEIGHTS).ravel()), rel=1e-7, abs=1e-140
+        )
 
 
 def test_better_knowledge_is_never_wider() -> None:

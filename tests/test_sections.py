@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from pathlib import Path
 
@@ -134,6 +135,8 @@ SECTIONS = {
     "sharp": naca4(0.06, 0.4, 0.04),
     "23015": naca("23015"),
 }
+# as outlines: NeuralFoil itself is asked, not the shipped table of its answers
+SECTIONS = {name: dataclasses.replace(shape, four_digit=None) for name, shape in SECTIONS.items()}
 
 
 @pytest.fixture(scope="module", params=sorted(SECTIONS))

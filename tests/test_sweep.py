@@ -26,7 +26,7 @@ from bemt.bem import Model
 from bemt.case import load_case
 from bemt.case.prepare import prepare_case
 from bemt.commands.cli import main
-from bemt.formula.k1k2 import U_MEASURED
+from bemt.rotors.k1k2 import U_MEASURED
 from bemt.sweep import batch, fingerprint, sweep
 from bemt.sweep import batch as sweep_module
 from bemt.sweep.agreement import agreement, known, needed

@@ -124,6 +124,16 @@ def used() -> Iterator[dict[tuple[str, str], Arrays]]:
         _watched[:] = [held for held in _watched if held is not entries]
 
 
+def watched() -> bool:
+    """Whether somebody collects the entries that are asked for (:func:`used`)."""
+    return bool(_watched)
+
+
+def is_installed(package: str) -> bool:
+    """Whether a package could be imported."""
+    return find_spec(package) is not None
+
+
 @lru_cache(maxsize=16)
 def installed_version(package: str) -> str:
     """Version of an installed package, found without importing it.

@@ -113,7 +113,7 @@ def loads(
     model: Model, effects: Sequence[Effect], rpm: float, airspeed_m_s: float, air: Air, stations: Stations
 ) -> tuple[float, float]:
     """Thrust [N] and torque [N m] of the rotor with these stations."""
-    both = _elements(_prepared(model, _inside(effects), stations), [rpm], [airspeed_m_s], [air.rho], air)
+    both = _elements(model.prepared(_inside(effects), stations=stations), [rpm], [airspeed_m_s], [air.rho], air)
     return float(both[0].sum()), float(both[1].sum())
 
 
@@ -126,27 +126,18 @@ class _Moved(NamedTuple):
 
 
 def _moved(model: Model, effects: Sequence[Effect], stations: Stations | None, step: float) -> _Moved:
-    """Prepared once per geometry: the model keeps those of its own stations."""
+    """Rotors around the one to be differentiated."""
     chosen = _inside(effects)
     s = stations if stations is not None else model.rotor.blade.midpoints(model.n_stations, spacing="cosine")
 
     def made(s: Stations) -> Prepared:
-        return _prepared(model, chosen, s)
+        return model.prepared(chosen, stations=s)
 
     def pair(key: str, width: Array) -> tuple[Prepared, Prepared, Array]:
         low, high = (made(s._replace(**{key: getattr(s, key) + sign * width})) for sign in (-1.0, 1.0))
         return low, high, 2.0 * width
 
-    def all_of_them() -> _Moved:
-        return _Moved(made(s), pair("chord", step * s.chord), pair("beta", np.full(s.beta.shape, step)))
-
-    if stations is not None:
-        return all_of_them()
-    key = ("moved", chosen, step)
-    if key not in model._kept:
-        model._kept[key] = all_of_them()
-    found: _Moved = model._kept[key]
-    return found
+    return _Moved(made(s), pair("chord", step * s.chord), pair("beta", np.full(s.beta.shape, step)))
 
 
 def _inside(effects: Sequence[Effect]) -> tuple[Effect, ...]:
@@ -155,13 +146,6 @@ def _inside(effects: Sequence[Effect]) -> tuple[Effect, ...]:
     if around:
         raise InputError(Fault("", "effects", ", ".join(around), "effects inside the rotor", "Differentiate without"))
     return tuple(sorted((e for e in effects if acts_on_rotor(e)), key=lambda e: (e.order, e.id)))
-
-
-def _prepared(model: Model, effects: Sequence[Effect], stations: Stations) -> Prepared:
-    return solver.prepare(
-        model.rotor, model.polars, effects, model.duct, stations=stations,
-        mach_max=model.mach_max, re_range=model.re_range,
-    )  # fmt: skip
 
 
 def _elements(prep: Prepared, rpm: ArrayLike, V: ArrayLike, rho: ArrayLike, air: Air) -> Array:

@@ -7,7 +7,7 @@ inflow, wrong density) act here, around it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import SimpleNamespace
@@ -18,6 +18,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from bemt import coefficients as co
 from bemt.air import Air
+from bemt.base.cache import content_key
+from bemt.base.kept import Kept
+from bemt.bem import packing as arrays
 from bemt.bem import solver
 from bemt.bem.duct import DuctFlow, duct_flow
 from bemt.dataset import Dataset
@@ -27,6 +30,7 @@ from bemt.sections.neuralfoil import neuralfoil_polar
 from bemt.sections.polars import RE_FIXED, Polar
 
 if TYPE_CHECKING:
+    from geometry.blade import Stations
     from geometry.duct import Duct
     from geometry.rotor import Rotor
 
@@ -40,9 +44,13 @@ _SPEED_STEP = 2e-3
 _SLOWEST, _FASTEST = 0.4, 1.5
 
 
+PREPARED: Kept[solver.Prepared] = Kept(256e6, lambda made: made.st.nbytes + made.tab.nbytes)
+"""Prepared rotors of this process, by geometry, section tables, duct, effects and range: a quarter of a gigabyte."""
+
+
 @dataclass(frozen=True, eq=False)
 class Model:
-    """Everything from which a rotor is solved with any set of effects; prepared rotors are kept.
+    """Everything from which a rotor is solved with any set of effects; prepared rotors are kept (:data:`PREPARED`).
 
     Parameters
     ----------
@@ -72,7 +80,7 @@ class Model:
     re_range: tuple[float, float] | None = None
     effects: tuple[Effect, ...] = field(default_factory=standard)
     notes: tuple[str, ...] = ()
-    _kept: dict[Any, Any] = field(default_factory=dict, repr=False)
+    _reaching: dict[Any, Model] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def diameter_m(self) -> float:
@@ -128,25 +136,49 @@ class Model:
         Re = np.hypot(per_m[0][..., None] * blade.r, per_m[1][..., None]) * blade.chord * per_m[2][..., None]
         # effects read the tables at two Reynolds numbers besides
         low, high = min(_SLOWEST * float(Re.min()), RE_FIXED), max(_FASTEST * float(Re.max()), RE_FAST)
-        mach = _FASTEST * float(np.max(np.hypot(omega * blade.R, onset) / air.a_sound))
-        return replace(self, re_range=(low, high), mach_max=min(mach, self.mach_max), _kept={})
+        mach = min(_FASTEST * float(np.max(np.hypot(omega * blade.R, onset) / air.a_sound)), self.mach_max)
+        nodes = arrays.mach_nodes(mach), arrays.re_nodes((low, high))
+        if nodes not in self._reaching:  # few: nodes of the tables
+            self._reaching[nodes] = replace(self, re_range=(low, high), mach_max=mach)
+        return self._reaching[nodes]
+
+    def with_effects(self, effects: Sequence[Effect]) -> Model:
+        """Model with other physics on."""
+        other = replace(self, effects=tuple(effects))
+        other.__dict__["_content"] = self._content  # which leaves effects out
+        return other
 
     @property
     def prep(self) -> solver.Prepared:
         """Rotor with the effects that are on, as the solver consumes it."""
         return self.prepared(self.effects)
 
-    def prepared(self, effects: Sequence[Effect], level: float = 1.0) -> solver.Prepared:
-        """Rotor with these effects (those of points left out), at a share of the ones that differ between points."""
+    @cached_property
+    def _content(self) -> tuple[Hashable, ...]:
+        """What decides a prepared rotor besides effects and stations: values, never identities."""
+        rotor, blade = self.rotor, self.rotor.blade
+        lines = [np.asarray(v) for v in (blade.sweep, blade.rake) if v is not None]
+        shapes = [v for x, a in blade.anchors for v in (x, a.x, a.y)]
+        sizes = (blade.R, blade.Rhub, blade.axis, blade.interpolation, rotor.B, rotor.rotation, rotor.name)
+        hub = (rotor.hub_length, rotor.spinner_length)
+        geometry = content_key(blade.r, blade.chord, blade.beta, len(lines), *lines, sizes, hub, *shapes)
+        tables = tuple((x, polar.key) for x, polar in self.polars)
+        reach = (arrays.mach_nodes(self.mach_max), arrays.re_nodes(self.re_range))
+        return geometry, tables, repr(self.duct), self.n_stations, *reach
+
+    def prepared(
+        self, effects: Sequence[Effect], level: float = 1.0, stations: Stations | None = None
+    ) -> solver.Prepared:
+        """Rotor with these effects (those of points left out), at a share of the ones that differ between points.
+
+        ``stations`` replaces the blade elements.
+        """
         chosen = tuple(sorted((e for e in effects if acts_on_rotor(e)), key=lambda e: (e.order, e.id)))
-        key = (chosen, level)
-        if key not in self._kept:
-            self._kept[key] = solver.prepare(
-                self.rotor, self.polars, chosen, self.duct, self.n_stations, mach_max=self.mach_max,
-                level=level, re_range=self.re_range,
-            )  # fmt: skip
-        kept: solver.Prepared = self._kept[key]
-        return kept
+        key = (self._content, chosen, level, None if stations is None else content_key(*stations))
+        return PREPARED.get(key, lambda: solver.prepare(
+            self.rotor, self.polars, chosen, self.duct, self.n_stations, stations, self.mach_max,
+            level=level, re_range=self.re_range,
+        ))  # fmt: skip
 
     def solve(self, rpm: ArrayLike, V: ArrayLike = 0.0, air: Air | None = None, threads: int = 1) -> Dataset:
         """Solve operating points."""

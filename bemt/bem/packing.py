@@ -39,9 +39,22 @@ _FINE_LO = round((ALPHA_FINE_LO + math.pi) / ALPHA_COARSE_STEP)
 _FINE_HI = _FINE_LO + round((ALPHA_FINE_HI - ALPHA_FINE_LO) / ALPHA_FINE_STEP)
 
 
+def mach_nodes(mach_max: float) -> int:
+    """How many Mach numbers are tabulated, two or more [1]."""
+    return max(2, math.ceil(mach_max**2 / M2_STEP) + 1)
+
+
 def mach_grid(mach_max: float) -> Array:
-    """Squares of the tabulated Mach numbers, two or more [1]."""
-    return np.arange(max(2, math.ceil(mach_max**2 / M2_STEP) + 1), dtype=np.float64) * M2_STEP
+    """Squares of the tabulated Mach numbers [1]."""
+    return np.arange(mach_nodes(mach_max), dtype=np.float64) * M2_STEP
+
+
+def re_nodes(re_range: tuple[float, float] | None, re: Array = DEFAULT_RE) -> tuple[int, int]:
+    """First and last node of the Reynolds axis that a range needs [1]."""
+    if re_range is None or re.size == 1:
+        return 0, re.size - 1
+    first = min(max(int(np.searchsorted(re, re_range[0], side="right")) - 1, 0), re.size - 2)
+    return first, max(int(np.searchsorted(re, re_range[1])), first + 1)
 
 
 def common_grid(
@@ -49,10 +62,8 @@ def common_grid(
 ) -> tuple[Array, Array, Array]:
     """Reynolds axis (of ``re_range`` only) and cl, cd of all polars as (P, Nm, Nr, Na); one number stays one."""
     re = DEFAULT_RE if any(p.Re.size > 1 for p in polars) else polars[0].Re[:1]
-    if re_range is not None and re.size > 1:
-        first = min(max(int(np.searchsorted(re, re_range[0], side="right")) - 1, 0), re.size - 2)
-        last = max(int(np.searchsorted(re, re_range[1])), first + 1)
-        re = re[first : last + 1]
+    first, last = re_nodes(re_range, re)
+    re = re[first : last + 1]
     cl = np.empty((len(polars), M.size, re.size, ALPHA_GRID.size))
     cd = np.empty_like(cl)
     for i, p in enumerate(polars):

@@ -11,7 +11,7 @@ import numpy as np
 
 from bemt.air import Air, isa_pressure
 from bemt.base.errors import Fault, InputError
-from bemt.base.units import ZERO_CELSIUS, suffixes, to_si
+from bemt.base.units import ZERO_CELSIUS
 from bemt.case.schema import AirTable, CaseFile
 from geometry.airfoil import Airfoil, naca, naca4
 from geometry.airfoil_file import parse_dat
@@ -21,10 +21,9 @@ from geometry.duct import Duct, Stator, around
 from geometry.laws import from_laws
 from geometry.rotor import Rotor
 
-__all__ = ["build_air", "build_duct", "build_rotor", "read_stations"]
+__all__ = ["build_air", "build_duct", "build_rotor"]
 
 T = TypeVar("T")
-_STATION_COLUMNS = "r_over_R, chord_over_R and beta_deg; r and chord may be lengths, such as r_mm"
 
 
 def _as_input(file: str, where: str, make: Callable[[], T]) -> T:
@@ -75,66 +74,6 @@ def _dat(path: Path) -> Airfoil:
     return _as_input(path.as_posix(), "", lambda: parse_dat(text, path.stem))
 
 
-def _station_columns(header: list[str], R: float) -> list[list[tuple[int, float]]]:
-    """Places of r, chord and beta in a header, each with what makes shares of the tip radius of its values."""
-    found = []
-    for name in ("r", "chord"):
-        scales = {f"{name}_over_R": 1.0, **{f"{name}_{unit}": to_si(1.0, unit) / R for unit in suffixes("length")}}
-        found.append([(i, scales[cell]) for i, cell in enumerate(header) if cell in scales])
-    return [*found, [(i, 1.0) for i, cell in enumerate(header) if cell == "beta_deg"]]
-
-
-def read_stations(path: Path, R: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Columns r/R, c/R and beta [rad] of a stations CSV, others are left; faults carry line and column."""
-    from bemt.readers import load_text, number
-
-    faults: list[Fault] = []
-    rows: list[list[float]] = []
-    places: list[tuple[int, float]] = []
-    header: list[str] = []
-    file = path.as_posix()
-    for i, line in enumerate(load_text(path).lines, 1):
-        cells = [cell.strip() for cell in line.split("#", 1)[0].split(",")]
-        if cells == [""]:
-            continue
-        if not places:
-            header, found = cells, _station_columns(cells, R)
-            if not all(found):
-                hint = "An angle to the plane of rotation is beta_deg; twist may count from elsewhere"
-                raise InputError(Fault(file, f"{i}", f"the header {line.strip()!r}", _STATION_COLUMNS, hint))
-            for twice in (columns for columns in found if len(columns) > 1):
-                faults.append(Fault(file, f"{i}", " and ".join(cells[j] for j, _ in twice), "one of them"))
-            places = [columns[0] for columns in found]
-            continue
-        if len(cells) != len(header):
-            faults.append(Fault(file, f"{i}", f"{len(cells)} values", f"{len(header)}, as the header has"))
-            continue
-        values = [number(cells[j]) for j, _ in places]
-        for (j, _), value in zip(places, values, strict=True):
-            if value is None:
-                faults.append(Fault(file, f"{i}:{j + 1}", repr(cells[j]), "a number"))
-        if None not in values:
-            rows.append([float(v) * scale for v, (_, scale) in zip(values, places, strict=True) if v is not None])
-    if not faults and len(rows) < 2:
-        faults.append(Fault(file, "", f"{len(rows)} stations", "two or more"))
-    if faults:
-        raise InputError(faults)
-    x, c, beta = np.array(rows).T
-    is_length = places[0][1] != 1.0
-    limits = ((x.max(), 0.75 if is_length else 0.0, 1.001), (c.max(), 0.0, 3.0), (np.abs(beta).max(), 0.0, 90.0))
-    radius = f"Is the tip radius {1e3 * R:g} mm?" if is_length else "Divide the radius by the tip radius"
-    hints = (radius, "" if places[1][1] != 1.0 else "Divide the chord by the tip radius", "")
-    for (at, scale), (value, low, high), hint in zip(places, limits, hints, strict=True):
-        if not low <= value <= high:
-            expected = f"at most {high / scale:.4g}" if value > high else f"{low / scale:.4g} or more at the outermost"
-            faults.append(Fault(file, header[at], f"{value / scale:.4g}", expected, hint))
-    if np.abs(beta).max() < 1.6:
-        faults.append(Fault(file, "beta_deg", f"angles up to {np.abs(beta).max():g}", "degrees", "Looks like radians"))
-    if faults:
-        raise InputError(faults)
-    return np.minimum(x, 1.0), c, np.radians(beta)
-
-
 def _blade(case: CaseFile, path: Path) -> Blade:
     blade = case.blade
     R = 0.5 * case.rotor.diameter_m
@@ -162,6 +101,8 @@ def _stations(case: CaseFile, path: Path) -> tuple[np.ndarray, np.ndarray, np.nd
     """Columns r/R, c/R and beta [rad] of whichever file of stations the case names."""
     blade = case.blade
     if blade.stations is not None:
+        from bemt.readers._stations import read_stations
+
         return read_stations(path.parent / blade.stations, 0.5 * case.rotor.diameter_m)
     if blade.uiuc is not None:
         from bemt.readers._uiuc_tables import read_geometry

@@ -4,18 +4,26 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
-from bemt.case.unknowns import AIR, FAN, HUB, OFFSET, SECTION, SURFACE, Unknown, label_chord
+from bemt.case.drive_schema import LIPO_SOC, LIPO_V
+from bemt.case.unknowns import AIR, DRIVE, FAN, HUB, OFFSET, SURFACE, Unknown, label_chord, section_of
+from bemt.readers._uiuc_names import family_of
 from geometry.common import GeometryError
-from geometry.designation import parse_designation
+from geometry.designation import Designation, parse_designation
 
-__all__ = ["case_name", "fan_text", "label_parts", "label_text", "of_stations", "stations_text"]
+__all__ = ["case_name", "fan_text", "full_rpm", "label_text", "of_stations", "read_label", "stations_text"]
 
 TIP_SPEED = 120.0
 """Speed of the blade tips at the operating point of a new case, for want of a better one. [m/s]"""
+
+SOC = 0.5
+"""Charge at which a new case states full throttle and hover: the middle of a flight."""
 
 FAN_RANGES = """
 [[assumptions]]
@@ -47,15 +55,15 @@ def _blocks(*unknowns: Unknown) -> str:
     return "".join(item.block() for item in unknowns)
 
 
-def label_parts(label: str, blades: int | None = None) -> tuple[float, float, int]:
-    """Diameter and pitch [in] and blades (2 unless told) of ``10x5``, ``8x4.5x3``."""
+def read_label(label: str, blades: int | None = None) -> Designation:
+    """What a label such as ``10x5`` or ``APC 8x4.5x3`` says, with the blades filled in: as told, else two."""
     try:
-        D, pitch, marked = parse_designation(label)
+        found = parse_designation(label)
     except GeometryError as error:
         raise InputError([Fault("LABEL", *fault) for fault in error.faults]) from None
-    if blades and marked and blades != marked:
-        raise InputError(Fault("--blades", "", str(blades), f"{marked}, as in {label}"))
-    return D, pitch, blades or marked or 2
+    if blades and found.blades and blades != found.blades:
+        raise InputError(Fault("--blades", "", str(blades), f"{found.blades}, as in {label}"))
+    return replace(found, blades=blades or found.blades or 2)
 
 
 def case_name(text: str) -> str:
@@ -68,11 +76,10 @@ def _rpm(diameter_m: float, rpm: float | None, tip_speed: float = TIP_SPEED) -> 
     return float(f"{60.0 * tip_speed / (math.pi * diameter_m):.2g}") if rpm is None else rpm
 
 
-def _operating(rpm: float, airspeed_m_s: float, told: bool) -> str:
-    why = "" if told else "  # gives a tip speed near 120 m/s; replace it with yours"
+def _operating(rpm: float, airspeed_m_s: float, why: str) -> str:
     return f"""
 [operating]
-rpm = {rpm:.6g}{why}
+rpm = {rpm:.6g}{f"  # {why}" if why else ""}
 airspeed_m_s = {airspeed_m_s:g}  # 0: static
 
 [air]
@@ -80,17 +87,70 @@ density_kg_m3 = 1.225  # or temperature_C and pressure_hPa
 """
 
 
-def label_text(label: str, blades: int | None = None, rpm: float | None = None, airspeed_m_s: float = 0.0) -> str:
-    """Write the case of a label such as ``10x5``."""
-    D, pitch, B = label_parts(label, blades)
-    name = case_name(f"prop_{D:g}x{pitch:g}" + (f"x{B}" if B != 2 else ""))
-    chord = label_chord(D * INCH)
-    unknowns = _blocks(HUB, OFFSET, chord, *SECTION, *SURFACE, AIR)
-    return f"""# A {D:g}x{pitch:g} propeller from its label. Each [[assumptions]] entry is an unknown with a range.
+def drive_text(kv: float, cells: int) -> str:
+    """Table [drive] of a motor of which the label is known."""
+    sag, drop, idle = (item.value for item in DRIVE)
+    return f"""
+[drive]
+kv = {kv:g}  # rev/min/V
+cells = {cells}
+soc = {SOC:g}  # charge at which full throttle and hover are stated
+
+[drive.battery]
+sag = {sag:g}  # or resistance_mohm, of the pack with leads
+# capacity_Ah = 2.2  # for the flight time
+
+[drive.motor]  # instead of each share what the motor's sheet says: resistance_mohm and no_load_A
+winding_drop = {drop:g}
+idle_share = {idle:g}
+
+# [drive.vehicle]  # for hover
+# mass_kg = 1.4
+# rotors = 4
+"""
+
+
+def full_rpm(kv: float, cells: int) -> float:
+    """Speed at full throttle of a motor of which the label is known, by its typical losses. [rev/min]"""
+    sag, drop, _ = (item.value for item in DRIVE)
+    return float(f"{kv * cells * float(np.interp(SOC, LIPO_SOC, LIPO_V)) * (1.0 - sag) * (1.0 - drop):.5g}")
+
+
+def _tail(
+    diameter_m: float, rpm: float | None, airspeed_m_s: float, motor: tuple[float, int] | None, *unknowns: Unknown
+) -> str:
+    """Operating point, air, drive and assumptions."""
+    drive, more = ("", ()) if motor is None else (drive_text(*motor), DRIVE)
+    full = rpm is None and motor is not None
+    why = (
+        ""
+        if rpm is not None
+        else "full throttle; see [drive]"
+        if full
+        else f"gives a tip speed near {TIP_SPEED:g} m/s; "
+    )
+    why += "" if rpm is not None or full else "replace it with yours"
+    n = full_rpm(*motor) if full and motor is not None else _rpm(diameter_m, rpm)
+    return _operating(n, airspeed_m_s, why) + drive + _blocks(*unknowns, *more)
+
+
+def label_text(
+    label: str,
+    blades: int | None = None,
+    rpm: float | None = None,
+    airspeed_m_s: float = 0.0,
+    family: str | None = None,
+    motor: tuple[float, int] | None = None,
+) -> str:
+    """Write the case of a label such as ``10x5``, with its maker's series and K_v and cells of a motor if known."""
+    told = read_label(label, blades)
+    D, B = told.diameter_in, told.blades
+    chord, section = label_chord(D * INCH), section_of(told.blade_class)
+    return f"""# A {told.size} propeller from its label. Each [[assumptions]] entry is an unknown with a range.
 # `bemt sweep --details` prints its effect on the thrust. When you measure a value, enter it and delete the assumption.
 schema = "bemt.case/1"
-name = "{name}"
-title = "{D:g}x{pitch:g} propeller, {B} blades"
+name = "{_label_name(told)}"
+title = "{_title(told)}"
 # references = "references.csv"  # measured values in this folder: quantity,value,unit,uncertainty,kind,source,...
 
 [rotor]
@@ -98,17 +158,38 @@ kind = "propeller"
 blades = {B}
 diameter_in = {D:g}
 hub_ratio = 0.15
-
+{_sense(told)}
 [blade]
-pitch_in = {pitch:g}
+pitch_in = {told.pitch_in:g}
 beta_offset_deg = 0.7
 chord_law = "apc_like"
 max_chord_over_R = {chord.value:.3g}
-
+{_series(told, family)}
 [blade.section]
-camber = 0.035
+camber = {section[0].value:g}
 thickness = 0.09
-{_operating(_rpm(D * INCH, rpm), airspeed_m_s, rpm is not None)}{unknowns}"""
+{_tail(D * INCH, rpm, airspeed_m_s, motor, HUB, OFFSET, chord, *section, *SURFACE, AIR)}"""
+
+
+def _label_name(told: Designation) -> str:
+    kind = f"_{told.blade_class}" if told.blade_class else ""
+    return case_name(f"prop_{told.size}{kind}")
+
+
+def _title(told: Designation) -> str:
+    kind = f", {told.blade_class.replace('_', ' ')}" if told.blade_class else ""
+    return f"{told.maker} {told.size} propeller, {told.blades} blades{kind}".replace('"', "").strip()
+
+
+def _sense(told: Designation) -> str:
+    return 'rotation = "left"\n' if told.reverse else ""
+
+
+def _series(told: Designation | None, family: str | None) -> str:
+    """Keys of [blade] that say of which kind a blade is."""
+    kind = told.blade_class if told else None
+    family = family or (family_of(told.maker, kind) if told else None)
+    return (f'class = "{kind}"\n' if kind else "") + (f'family = "{family}"\n' if family else "")
 
 
 def stations_text(
@@ -119,31 +200,42 @@ def stations_text(
     airspeed_m_s: float = 0.0,
     hub_ratio: float = 0.15,
     key: str = "stations",
+    label: Designation | None = None,
+    family: str | None = None,
+    motor: tuple[float, int] | None = None,
 ) -> str:
-    """Write the case of a blade whose chord and angle stand in a file beside it."""
+    """Write the case of a blade whose chord and angle stand in a file beside it, with what its label says if known.
+
+    The population of measured rotors weighs the pitch of the label against the angles of the stations.
+    """
+    section = section_of(label.blade_class if label else None)
+    pitch = f"label_pitch_in = {label.pitch_in:g}\n" if label else ""
+    name = _label_name(label) if label else case_name(Path(file).stem)
+    title = _title(label) if label else f"{blades} blades, {1e3 * diameter_m:.4g} mm"
     return f"""# A propeller with the stations of {file}. Each unknown is an assumption with a range.
 schema = "bemt.case/1"
-name = "{case_name(Path(file).stem)}"
-title = "{blades} blades, {1e3 * diameter_m:.4g} mm, stations of {file}"
+name = "{name}"
+title = "{title}, stations of {file}"
 
 [rotor]
 kind = "propeller"
 blades = {blades}
 diameter_mm = {1e3 * diameter_m:.6g}
 hub_ratio = {hub_ratio:.4g}
-
+{_sense(label) if label else ""}
 [blade]
 {key} = "{file}"
-
+{pitch}{_series(label, family)}
 [blade.section]
-camber = 0.035
+camber = {section[0].value:g}
 thickness = 0.09
-{_operating(_rpm(diameter_m, rpm), airspeed_m_s, rpm is not None)}{_blocks(*SECTION, *SURFACE, AIR)}"""
+{_tail(diameter_m, rpm, airspeed_m_s, motor, *section, *SURFACE, AIR)}"""
 
 
 def fan_text(
-    diameter_m: float, pitch_in: float | None = None, blades: int | None = None, rpm: float | None = None
-) -> str:
+    diameter_m: float, pitch_in: float | None = None, blades: int | None = None, rpm: float | None = None,
+    motor: tuple[float, int] | None = None,
+) -> str:  # fmt: skip
     """Write the case of a ducted fan of which the diameter is known."""
     D, B = diameter_m / INCH, blades or 11
     P = pitch_in or 1.45 * D
@@ -159,7 +251,10 @@ def fan_text(
     )
     if blades:  # counted: no assumption
         ranges = "\n[[assumptions]]" + ranges.split("[[assumptions]]", 2)[2]
-    told = _rpm(diameter_m, rpm, 180.0)
+    drive, more = ("", ()) if motor is None else (drive_text(*motor), DRIVE)
+    if motor is not None and rpm is None:
+        rpm = full_rpm(*motor)
+    told, why = _rpm(diameter_m, rpm, 180.0), "" if rpm else "gives a tip speed near 180 m/s; replace it with yours"
     return f"""# A ducted fan of {mm:.4g} mm. Each entry [[assumptions]] is an unknown with a range.
 schema = "bemt.case/1"
 name = "fan_{mm:.0f}"
@@ -190,7 +285,7 @@ exit_area_ratio = 0.925
 blades = 5
 chord_mm = {0.29 * mm:.3g}
 recovery = 0.8
-{_operating(told, 0.0, rpm is not None).replace("120", "180")}{ranges}{_blocks(*FAN, *SURFACE, AIR)}"""
+{_operating(told, 0.0, why)}{drive}{ranges}{_blocks(*FAN, *SURFACE, AIR, *more)}"""
 
 
 def of_stations(file: Path, diameter_m: float) -> tuple[float, str]:
@@ -200,7 +295,7 @@ def of_stations(file: Path, diameter_m: float) -> tuple[float, str]:
     head = load_text(file).text[:4000]
     first = head.lstrip().partition("\n")[0]
     if "," in first:
-        from bemt.case.build import read_stations
+        from bemt.readers._stations import read_stations
 
         return max(min(float(read_stations(file, 0.5 * diameter_m)[0].min()), 0.3), 0.05), "stations"
     if re.match(r"\s*r/R\b", first):

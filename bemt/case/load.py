@@ -10,10 +10,10 @@ import copy
 import hashlib
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +37,19 @@ __all__ = ["Assumption", "Case", "check_name", "find_cases", "load_case"]
 
 FILE_NAME = "case.toml"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
+
+
+T = TypeVar("T")
+# Changed cases that a case keeps.
+_MOST = 256
+
+
+def _frozen(value: Any) -> Hashable | None:
+    """Value of a key that tells equal values of different types apart; None for what is not plain."""
+    if isinstance(value, (list, tuple)):
+        parts = tuple(map(_frozen, value))
+        return None if None in parts else (type(value).__name__, *parts)
+    return (type(value).__name__, value) if isinstance(value, (bool, int, float, str)) else None
 
 
 @dataclass(frozen=True)
@@ -68,7 +81,8 @@ class Case:
     written: Mapping[str, Any]  # The document as the file has it, without defaults
     file: CaseFile  # The same, typed, with defaults
     assumptions: tuple[Assumption, ...] = ()  # Declared unknowns
-    _built: dict[Any, Any] = field(default_factory=dict, repr=False)
+    _built: dict[Any, Any] = field(default_factory=dict, repr=False)  # Shared by the cases that `replaced` gives
+    _own: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)  # Of this very case
 
     @property
     def name(self) -> str:
@@ -135,6 +149,21 @@ class Case:
         """Case with some values changed, by dotted key; keys of the same quantity in another unit are dropped."""
         if not overrides:
             return self
+        given = tuple((key, _frozen(value)) for key, value in overrides.items())
+        if any(value is None for _, value in given):
+            return self._replaced(overrides)
+        if len(self._own) > _MOST:
+            self._own.clear()
+        return self.once(("replaced", given), lambda: self._replaced(overrides))
+
+    def once(self, key: Hashable, make: Callable[[], T]) -> T:
+        """Give what depends on nothing but this very case, made once."""
+        if key not in self._own:
+            self._own[key] = make()
+        found: T = self._own[key]
+        return found
+
+    def _replaced(self, overrides: Mapping[str, Any]) -> Case:
         written = copy.deepcopy(dict(self.written))
         for key, value in overrides.items():
             table_name, _, name = key.rpartition(".")
@@ -163,6 +192,13 @@ class Case:
             self._built[key] = make(case)
         return self._built[key]
 
+    def kept(self, what: str, make: Callable[[], float]) -> float:
+        """Give a number of the whole case, computed once."""
+        key = (what, self.file.model_dump_json())
+        if key not in self._built:
+            self._built[key] = make()
+        return float(self._built[key])
+
     def rotor(self, overrides: Mapping[str, Any] | None = None) -> Rotor:
         """Give the rotor, built once per geometry; overrides as in :meth:`replaced`."""
         rotor: Rotor = self._once(
@@ -189,7 +225,8 @@ class Case:
 
     def air(self, overrides: Mapping[str, Any] | None = None) -> Air:
         """Give the state of the air; overrides as in :meth:`replaced`."""
-        return build_air(self.replaced(overrides).file.air)
+        case = self.replaced(overrides)
+        return case.once("air", lambda: build_air(case.file.air))
 
     def axes(self) -> dict[str, NDArray[np.float64]]:
         """Axes of the parameter sweep in the order of the file: name (with its unit) to values, (N,)."""
@@ -257,6 +294,18 @@ def case_of(text: str, folder: str | Path = ".") -> Case:
     """Case of the text of a case file; files that it names are looked for in the folder. Raises as `load_case`."""
     path = Path(folder) / FILE_NAME
     return _checked(path, tomllib.loads(text), Collector(path.as_posix()))
+
+
+def with_changes(case: Case, changes: Mapping[str, Any]) -> Case:
+    """The case with values set by dotted key, completed and checked anew, as if its file said so."""
+    written = copy.deepcopy(dict(case.written))
+    for key, value in changes.items():
+        *tables, name = key.split(".")
+        table = written
+        for part in tables:
+            table = table.setdefault(part, {})
+        table[name] = value
+    return _checked(case.path, written, Collector(case.path.as_posix()))
 
 
 def _checked(path: Path, document: dict[str, Any], out: Collector) -> Case:

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import effects
+from bemt.base import cache
 from bemt.base.errors import Fault, InputError
 from bemt.bem.duct import DuctFlow, duct_flow
 from bemt.bem.model import Model
-from bemt.formula import k1k2
+from bemt.rotors import k1k2
 from bemt.sections import polars
 from bemt.sections.neuralfoil import neuralfoil_polar
 
@@ -104,6 +105,12 @@ def _duct_flow(case: Case, rotor: Rotor) -> DuctFlow | None:
 def prepare_case(case: Case, overrides: Mapping[str, Any] | None = None, n_stations: int | None = None) -> Model:
     """Rotor, section tables, duct and effects of a case; InputError if the changed values make none."""
     case = case.replaced(overrides)
+    if case.file.polars or case.file.blade.as_built is not None or cache.watched():
+        return _model(case, n_stations)  # of files that may have changed
+    return case.once(("model", n_stations), lambda: _model(case, n_stations))
+
+
+def _model(case: Case, n_stations: int | None) -> Model:
     rotor = case.rotor()
     tables = _polars(case, rotor.blade.anchors)
     duct = None if "duct" in case.file.model.effects_off else _duct_flow(case, rotor)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from bemt.air import LIQUID
 from bemt.base.toml import Axis, Limits, Table, axis_values, entry, expected, shown
+from bemt.case.drive_schema import DriveTable
 from bemt.rotors.latents import KNOWN_FROM
 from bemt.sections.rule import DRAG_LEVEL, N_CRIT
 from geometry.laws import CHORD_LAWS as GEOMETRY_CHORD_LAWS
@@ -90,6 +91,7 @@ _GAP = Limits("mm", 0, 50, _metres("tip_gap_mm", 0.005))
 _FRACTION_OF_HUMIDITY = _looks((1e-9, 0.999, "a fraction", lambda v: v * 100, "humidity_pct"))
 FILE = "the name of a file in the folder of the case"
 
+BladeClass = Literal["electric", "slow_flyer", "multirotor", "folding", "sport", "fpv"]
 KnownFrom = Literal["cad", "scan", "stations", "label", "reference"]
 Rotations = Literal["right", "left"]
 Numbers = float | tuple[float, ...] | None
@@ -188,7 +190,8 @@ class BladeTable(Table):
     label_pitch_in: float | None = entry(
         "pitch printed on the propeller", "in", 0.1, 120, _inch("label_pitch_in", 120.1)
     )
-    family: str | None = entry("maker's series")
+    family: str | None = entry("maker's series, such as apce or gwssf")
+    class_: BladeClass | None = entry("kind of blade, as its label says", alias="class")
     as_built: AsBuiltTable | None = None
     section: SectionTable | None = None
 
@@ -327,6 +330,7 @@ class CaseFile(Table):
     duct: DuctTable | None = None
     operating: OperatingTable
     air: AirTable
+    drive: DriveTable | None = None
     model: ModelTable = ModelTable()
     sweep: SweepTable = SweepTable()
     assumptions: tuple[AssumptionTable, ...] = ()

@@ -10,9 +10,21 @@ from typing import Any
 
 from bemt.base.units import INCH
 from bemt.rotors.population import chord_sd
-from bemt.sections.rule import DRAG_LEVEL, N_CRIT
+from bemt.sections.rule import DRAG_LEVEL, N_CRIT, section_at
 
-__all__ = ["AIR", "FAN", "HUB", "OFFSET", "SECTION", "SURFACE", "Unknown", "completed", "label_chord"]
+__all__ = [
+    "AIR",
+    "DRIVE",
+    "FAN",
+    "HUB",
+    "OFFSET",
+    "SECTION",
+    "SURFACE",
+    "Unknown",
+    "completed",
+    "label_chord",
+    "section_of",
+]
 
 
 CHORD, CHORD_EXPONENT = 0.2, -0.2
@@ -44,16 +56,8 @@ HUB = Unknown("rotor.hub_ratio", 0.15, 0.10, 0.20, "hub not known; typical of hu
 _UNDERSIDE = "a label states the pitch of the chord line (0) or of the flat underside (up to 1.4 deg more)"
 OFFSET = Unknown("blade.beta_offset_deg", 0.7, 0.0, 1.4, _UNDERSIDE)
 THICKNESS = Unknown("blade.section.thickness", 0.09, 0.06, 0.12, "section not known")
-SECTION = (
-    Unknown(
-        "blade.section.camber",
-        0.035,
-        0.02,
-        0.05,
-        "section not known; measured propeller families have 3 to 5 %, slow flyers more",
-    ),
-    THICKNESS,
-)
+_CAMBER = "section not known; measured propeller families have 3 to 5 %, slow flyers more"
+SECTION = (Unknown("blade.section.camber", 0.035, 0.02, 0.05, _CAMBER), THICKNESS)
 SURFACE = (
     Unknown("model.n_crit", N_CRIT, 1.0, 5.0, "transition not known; 3 is the rule for disturbed flow"),
     Unknown(
@@ -65,14 +69,41 @@ SURFACE = (
     ),
 )
 AIR = Unknown("air.density_kg_m3", 1.225, 1.16, 1.29, "air not stated; 30 to 0 C at sea level")
+_MOTORS = " in two of three of 1088 measured motors with a propeller"
 FAN = (
     Unknown("rotor.hub_ratio", 0.37, 0.30, 0.45, "hub not known; typical of ducted fans"),
     Unknown("blade.max_chord_over_R", 0.45, 0.30, 0.60, "chord not known; range of the chord law fan"),
     Unknown("blade.section.camber", 0.05, 0.03, 0.07, "section not known; typical of cambered compressor sections"),
     THICKNESS,
 )
+DRIVE = (
+    Unknown(
+        "drive.battery.sag", 0.06, 0.01, 0.13, "battery not known; loses 3 to 10 % of its voltage at full throttle"
+    ),
+    Unknown(
+        "drive.motor.winding_drop",
+        0.14,
+        0.02,
+        0.31,
+        f"motor not known; the winding takes 7 to 24 % of the voltage{_MOTORS}",
+    ),
+    Unknown(
+        "drive.motor.idle_share", 0.073, 0.03, 0.14, f"motor not known; losses take 5 to 11 % of the current{_MOTORS}"
+    ),
+)
+_STATED = {"drive.battery.sag": "resistance_mohm", "drive.motor.winding_drop": "resistance_mohm",
+           "drive.motor.idle_share": "no_load_A"}  # fmt: skip
 HUBS = ("hub_ratio", "hub_diameter_mm", "hub_diameter_in")
 CHORDS = ("chord_law", "stations", "uiuc", "apc")
+
+
+def section_of(blade_class: str | None) -> tuple[Unknown, ...]:
+    """Section of a class of blades: slow flyers are cambered as the measured ones are."""
+    if blade_class != "slow_flyer":
+        return SECTION
+    camber = section_at(0.75, "apcsf").camber
+    why = "section not known; slow flyers of two makers have 5 to 8 %"
+    return Unknown("blade.section.camber", camber, camber - 0.02, camber + 0.02, why), THICKNESS
 
 
 def label_chord(diameter_m: float) -> Unknown:
@@ -83,6 +114,12 @@ def label_chord(diameter_m: float) -> Unknown:
     least, most = (float(f"{value:.2g}") for value in (max(chord / far, low), min(chord * far, high)))
     why = "chord not known; range of 87 measured propellers, 2.2 to 19 in. Measuring it narrows the band most"
     return Unknown("blade.max_chord_over_R", float(f"{chord:.3g}"), least, most, why)
+
+
+def _drive_states(drive: Mapping[str, Any], key: str) -> bool:
+    """Whether a table [drive] has the value itself, of which the key is a typical share."""
+    table = drive.get(key.split(".")[1], {})
+    return isinstance(table, dict) and _STATED[key] in table
 
 
 def _diameter_m(rotor: Any) -> float:
@@ -115,9 +152,11 @@ def completed(document: Mapping[str, Any]) -> dict[str, Any]:
             blade["chord_law"] = "fan" if fan else "apc_like"
             unknowns += FAN[1:2] if fan else [OFFSET, label_chord(_diameter_m(rotor))]
         if "section" not in blade:
-            unknowns += [*(FAN[2:] if fan else SECTION), *SURFACE]
+            unknowns += [*(FAN[2:] if fan else section_of(blade.get("class"))), *SURFACE]
     if "air" not in made:
         unknowns.append(AIR)
+    if isinstance(made.get("drive"), dict):
+        unknowns += [item for item in DRIVE if not _drive_states(made["drive"], item.key)]
     if not isinstance(declared, list):
         return made
     named = {str(item.get("key")): item for item in declared if isinstance(item, dict)}

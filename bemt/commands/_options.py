@@ -49,3 +49,10 @@ def add_cases(parser: argparse.ArgumentParser) -> None:
     """Add the cases to solve."""
     what = "case files, or folders of <name>/case.toml (default: this folder)"
     parser.add_argument("paths", nargs="*", default=["."], metavar="CASES", help=what)
+
+
+def add_motor(parser: argparse.ArgumentParser) -> None:
+    """Add the motor and battery that a label tells."""
+    kv = "speed constant of the motor [rev/min/V]"
+    parser.add_argument("--kv", type=float, metavar="KV", help=kv)
+    parser.add_argument("--cells", type=positive, metavar="S", help="LiPo cells in series, with --kv")

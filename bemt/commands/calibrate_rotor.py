@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import shlex
+from pathlib import Path
 
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
 from bemt.commands import _options, _terminal
@@ -30,11 +32,18 @@ def run(args: argparse.Namespace) -> int:
 
     with _terminal.progress(args.quiet or args.json) as say:
         case, found = calibrate(args.reference, args.case, say)
-    if args.out:
-        write(case, found, args.reference, args.out)
+    written = write(case, found, args.reference, args.out) if args.out else []
     shown = document(case, found, args.reference)
     if args.json:
         print(json_text(shown), end="")
     elif not args.quiet:
         print(text(shown))
+        if written:
+            folder = shlex.quote(Path(args.out).as_posix())
+            print(f"{Path(args.out).as_posix()}: {', '.join(written)}")
+            print(f"next: {_terminal.called()} sweep {folder}")
+            if case.file.drive is not None:
+                print(f"      {_terminal.called()} drive {folder}")
+        else:
+            print("nothing written; --out DIR writes the case with this rotor")
     return EXIT_OK if found.found.converged else EXIT_UNCONVERGED

@@ -15,29 +15,27 @@ EXAMPLE = "estimate 10x5 --rpm 6000"
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument("label", metavar="LABEL", help="diameter x pitch in inches, and blades if not 2: 10x4.7, 8x5x3")
+    parser.add_argument("label", metavar="LABEL", help="as on the propeller: 10x4.7, APC 10x4.7SF, 8x5x3, 5045")
     speed = {"type": float, **_options.MANY}
     parser.add_argument("--rpm", required=True, metavar="N", help="one or more [rev/min]", **speed)
     parser.add_argument("--airspeed", metavar="V", help="one or more (default 0) [m/s]", **speed)
     blades = "number of blades (default: from the label, else 2)"
     parser.add_argument("--blades", type=_options.positive, metavar="B", help=blades)
-    parser.add_argument("--chord-mm", type=float, metavar="C", help="chord at 0.75 R; improves the estimate most")
+    parser.add_argument("--chord-mm", type=float, metavar="C", help="chord at 0.75 R; narrows the band most")
     twist = "measured pitch, 2 pi r tan(blade angle) at r = 0.75 R"
     parser.add_argument("--measured-pitch-in", type=float, metavar="P", help=twist)
     parser.add_argument("--series", metavar="NAME", help='maker and series, such as "APC Thin Electric" or apce')
-    parser.add_argument(
-        "--density", type=float, default=1.225, metavar="RHO", help="air density [kg/m3] (default 1.225)"
-    )
-    parser.add_argument("--ducted", action="store_true", help="flag the result: neither formula models a duct")
-    _options.add_json(parser, "bemt.estimate/1")
+    air = "air density [kg/m3] (default 1.225, 1.16 to 1.29 in the band)"
+    parser.add_argument("--density", type=float, metavar="RHO", help=air)
+    _options.add_json(parser, "bemt.estimate/2")
 
 
 def run(args: argparse.Namespace) -> int:
     """Print the estimate."""
     from bemt.base.tables import json_text
-    from bemt.compare.from_label import document, text
+    from bemt.case.estimate import document, text
 
     found = document(args.label, args.rpm, args.airspeed or (), args.blades, args.chord_mm, args.measured_pitch_in,
-                     args.series, args.density, args.ducted)  # fmt: skip
+                     args.series, args.density)  # fmt: skip
     print(json_text(found) if args.json else text(found), end="")
     return EXIT_OK

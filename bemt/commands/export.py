@@ -32,7 +32,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--rpm", type=float, metavar="N", help=top)
     wind = "axial speed of disks, blades and openfoam (default: from the case) [m/s]"
     parser.add_argument("--airspeed", type=float, metavar="V", help=wind)
-    words = "torque, airspeed, windmill, reynolds, mach, density, rest, duct, sections"
+    words = "torque, airspeed, windmill, reynolds, mach, density, rest, duct, sections, rotation"
     held = f"refuse targets that cannot represent it: {words}"
     parser.add_argument("--hold", metavar="WHAT", help=held, **_options.MANY)
     parser.add_argument(
@@ -55,7 +55,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write every valid case; 2 if one was refused."""
+    """Write every valid target of every valid case; 2 if one was refused."""
     from bemt.base.tables import json_text
     from bemt.exports import folder
     from bemt.exports.openfoam.write import Run

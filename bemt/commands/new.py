@@ -16,14 +16,16 @@ EXAMPLE = "new 10x5 --kv 1000 --cells 3"
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    label = "diameter x pitch in inches, and blades if not 2: 10x5, 8x4.5x3; with --fan only the diameter: 70mm"
+    label = "label of the propeller: 10x5, APC 10x4.7SF, 8x4.5x3, 5045; with --fan only the diameter: 70mm"
     parser.add_argument("label", nargs="?", metavar="LABEL", help=label)
     table = "file with blade stations: CSV r_over_R,chord_over_R,beta_deg (or r_mm,chord_mm); UIUC geometry; APC PE0"
     solid = "scan or CAD model of the blade (STL, OBJ, STEP); LABEL is then the name of the case"
     parser.add_argument("--scan", metavar="FILE", help=solid)
     parser.add_argument("--unit", choices=("mm", "m", "in"), help="with --scan: unit, if the file does not state it")
     parser.add_argument("--stations", metavar="FILE", help=table)
-    parser.add_argument("--diameter-mm", type=float, metavar="D", help="with --stations: diameter [mm]")
+    parser.add_argument(
+        "--diameter-mm", type=float, metavar="D", help="with --stations, without a label: diameter [mm]"
+    )
     parser.add_argument("--fan", action="store_true", help="a ducted fan")
     parser.add_argument(
         "--blades", type=_options.positive, metavar="B", help="number of blades (default: from the label, else 2)"
@@ -34,10 +36,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--airspeed", type=float, default=0.0, metavar="V", help="airspeed of the operating point [m/s] (default 0)"
     )
-    parser.add_argument(
-        "--kv", type=float, metavar="KV", help="speed constant of the motor; also writes drive.toml [rev/min/V]"
-    )
-    parser.add_argument("--cells", type=_options.positive, metavar="S", help="with --kv: LiPo cells in series")
+    parser.add_argument("--series", metavar="NAME", help='maker and series, such as "APC Thin Electric" or apce')
+    _options.add_motor(parser)
     parser.add_argument("--out", metavar="DIR", help="folder to write (default: named after the label)")
 
 
@@ -45,13 +45,13 @@ def run(args: argparse.Namespace) -> int:
     """Write the folder and print the next command."""
     import shlex
 
-    from bemt.drive import new_folder
+    from bemt.case import new_folder
 
     told = {name: value for name, value in vars(args).items() if name in new_folder.Wanted.__dataclass_fields__}
     folder, files = new_folder.write(new_folder.Wanted(**told, airspeed_m_s=args.airspeed), args.out)
     print(f"{folder.as_posix()}: {', '.join(files)}")
     typed = shlex.quote(folder.as_posix())
     print(f"next: {called()} sweep {typed}")
-    if "drive.toml" in files:
+    if args.kv is not None:
         print(f"      {called()} drive {typed}")
     return EXIT_OK

@@ -22,7 +22,7 @@ from bemt.air import Air
 from bemt.base.folders import find_data
 from bemt.base.units import INCH, KGF, RPM
 from bemt.compare import thesis as th
-from bemt.formula import k1k2 as k
+from bemt.rotors import k1k2 as k
 
 SCHEMA = "bemt.reproduce/1"
 WIDTH = 100

@@ -19,7 +19,7 @@ import numpy as np
 from bemt import coefficients as co
 from bemt.base import unit_errors
 from bemt.base.units import G0, INCH, KGF, LBF
-from bemt.formula import k1k2 as k
+from bemt.rotors import k1k2 as k
 
 ORIGIN = "Cahill 2025"
 """What a case of the thesis states as its ``origin``."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from bemt.diagnose.blade import PLAIN, CalibratedBlade, prior_of
 from bemt.diagnose.blade_fit import calibrated
 from bemt.diagnose.noise import in_time
 from bemt.diagnose.nuisance import nuisances
-from bemt.diagnose.problem import Part, Problem
+from bemt.diagnose.problem import Part, Problem, SpeedCurve
 from bemt.diagnose.record import CHANNELS, Record, concatenated, dense, merged, owners
 from bemt.effects.base import Effect
 from bemt.recordings.between import Level, odd_ones
@@ -39,21 +39,6 @@ _FARTHEST = 1e6
 _U_DEFAULT = 0.01
 _U_RPM = 0.003
 _U_FLOOR = 0.002
-# Prepared rotors that are kept at a time.
-_PREPARED = 30
-
-
-class _Recent(dict[Any, Any]):
-    """The last few prepared rotors: each holds megabytes of tables, and what they gave is kept by the part itself."""
-
-    def __getitem__(self, key: Any) -> Any:
-        self[key] = value = super().pop(key)
-        return value
-
-    def __setitem__(self, key: Any, value: Any) -> None:
-        super().__setitem__(key, value)
-        if len(self) > _PREPARED:
-            del self[next(iter(self))]
 
 
 def _part(record: Record, case: Case, baseline: str) -> Part:
@@ -63,7 +48,7 @@ def _part(record: Record, case: Case, baseline: str) -> Part:
     speed = np.hypot(omega * R, record.V)
     top = min(1.25, float(np.max(speed / record.air.a_sound)) * 1.12 + 0.03)
     reached = model.at_speeds(record.rpm, record.V, record.air)
-    model = replace(reached, mach_max=top, _kept=_Recent())
+    model = replace(reached, mach_max=top)
     plain = [e for e in model.effects if not bem.acts_on_points(e)]
     flow = bem.flow_of(model.prepared(plain), record.rpm, record.V, record.air, record.extra, model.chord75_m)
     part = Part(record, model, model.effects, flow, case.content_hash(), tuple(case.get("model.effects_off")))
@@ -82,7 +67,7 @@ def build(records: Sequence[Record], cases: Sequence[Case], baseline: str = "bem
     for r, c in zip(records, chosen, strict=True):
         groups.setdefault((r.reference, c.content_hash()), (c, []))[1].append(r)
     order = sorted(groups, key=lambda k: k[0])
-    problem = assemble(tuple(_part(merged(groups[k][1]), groups[k][0], baseline) for k in order))
+    problem = assemble(_one_drive([_part(merged(groups[k][1]), groups[k][0], baseline) for k in order]))
     if problem.y.size < _FEWEST:
         got = f"{problem.y.size} with a converged baseline"
         raise InputError(Fault(records[0].name, "readings", got, f"{_FEWEST} or more"))
@@ -95,6 +80,16 @@ def build(records: Sequence[Record], cases: Sequence[Case], baseline: str = "bem
     odd = _between(problem, [groups[k][1] for k in order], records)
     problem, found = _calibrated(problem, [groups[k][0] for k in order])
     return replace(problem, between=(*odd, *found))
+
+
+def _one_drive(parts: Sequence[Part]) -> tuple[Part, ...]:
+    """Parts whose speed over pulse width is measured against that of the references, where these show it."""
+    shown = [p.record for p in parts if p.record.reference and "rpm" in p.channels]
+    if not shown:
+        return tuple(parts)
+    join = np.concatenate
+    curve = SpeedCurve.of(join([r.extra["pwm_s"] for r in shown]), join([r.measured["rpm"] for r in shown]))
+    return tuple(replace(p, drive=curve) if "rpm" in p.channels else p for p in parts)
 
 
 def _calibrated(problem: Problem, cases: Sequence[Case]) -> tuple[Problem, tuple[str, ...]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -11,18 +11,29 @@ from numpy.typing import NDArray
 
 from bemt import effects
 from bemt.compare.scaling_laws import law
-from bemt.diagnose import another_rotor, blocks, confusion, evidence, gate, interval_scales, rules, signatures, verdict
+from bemt.diagnose import (
+    blocks,
+    confusion,
+    evidence,
+    gate,
+    interval_scales,
+    ratio_check,
+    rules,
+    signatures,
+    verdict,
+    wrong_rotor_check,
+)
 from bemt.diagnose import fit as fitting
 from bemt.diagnose import locate as location
 from bemt.diagnose import suggest as suggestion
 from bemt.diagnose.assemble import build
-from bemt.diagnose.beside import Beside, beside
 from bemt.diagnose.explanation import NONE, Explanation
 from bemt.diagnose.problem import Problem
 from bemt.diagnose.record import CHANNELS
 
 if TYPE_CHECKING:
     from bemt.case import Case
+    from bemt.compare.recordings import RunChange
     from bemt.diagnose.record import Record
 
 __all__ = ["Diagnosis", "diagnose"]
@@ -43,7 +54,9 @@ class Diagnosis:
     found : Evidence
         Outcome of the weighing, with the problem in it.
     decision : Decision
-        Verdict.
+        Verdict of the evidence in the case.
+    said : Decision
+        What is said in the end: the same, unless the ratios to the reference answer.
     best : Fit
         Leading explanation at its best setting.
     parameters : dict
@@ -69,12 +82,13 @@ class Diagnosis:
         Of the motor's speed over pulse width, a problem of its own; None where it was not recorded.
     loads : Diagnosis or None
         Of thrust and torque, where they name nothing and the answer is that of the drive.
-    ratios : Beside or None
-        Answer of the ratios to the one reference, where the diagnosis has none or none that they allow.
+    change : RunChange or None
+        Change from the references, where there is one recording beside them.
     """
 
     found: evidence.Evidence
     decision: verdict.Decision
+    said: verdict.Decision
     best: fitting.Fit
     parameters: dict[str, dict[str, dict[str, Any]]]
     p_value: float
@@ -88,12 +102,17 @@ class Diagnosis:
     absent: dict[str, str]
     drive: Diagnosis | None = None
     loads: Diagnosis | None = None
-    ratios: Beside | None = None
+    change: RunChange | None = None
+
+    @property
+    def by_ratios(self) -> bool:
+        """Whether the ratios to the reference answer."""
+        return self.said.by == "ratios"
 
     @property
     def systems(self) -> dict[str, dict[str, Any]]:
         """Verdict and effects of air, stand and drive, each for itself."""
-        said: verdict.Decision | Beside = self.ratios or self.decision
+        said = self.said
         listed = said.verdict in ("named", "class", "sensor")
         kinds = {i: _kind(i) for i in said.effects}
         out: dict[str, dict[str, Any]] = {}
@@ -162,66 +181,35 @@ def diagnose(
     loads = [(r.only(CHANNELS[:2]), c) for r, c in told if set(r.measured) - {speed}]
     turns = [(r.only((speed,)), c) for r, c in told if speed in r.measured]
 
-    def chain(some: Sequence[tuple[Record, Case]], ids: Sequence[str] | None) -> Diagnosis:
+    files = None if given is None else (*given.references[:1], *given.recordings[:1])
+    free = ratios and only is None and channels is None and baseline == "bemt"
+
+    def chain(
+        some: Sequence[tuple[Record, Case]], ids: Sequence[str] | None, motor: Diagnosis | None = None,
+        compared: bool = False,
+    ) -> Diagnosis:  # fmt: skip
+        def change(absent: Collection[str]) -> RunChange | None:
+            return ratio_check.change_of(records, each[0].diameter_m, absent, files) if compared and free else None
+
         return _diagnose([r for r, _ in some], [c for _, c in some], ids, say, nulls, baseline,
-                         given or suggestion.Given())  # fmt: skip
+                         given or suggestion.Given(), motor, change)  # fmt: skip
 
     def tested(some: Sequence[tuple[Record, Case]]) -> bool:
         return any(not r.reference for r, _ in some)
 
-    def answered() -> Diagnosis:
+    with evidence.one_thread():
         if not turns:
-            return chain(told, only)
+            return chain(told, only, compared=True)
         ids = [i for i in effects.catalogue() if only is None or i in only]
         # what drives the rotor cannot be seen in the loads at the measured speed, nor loads in the speed of a motor
         drives = [i for i in ids if effects.catalogue()[i].kind == "drive"]
         motor = chain(turns, drives) if drives and tested(turns) else None
         if not tested(loads):
             return motor or chain(told, only)
-        rotor = chain(loads, [i for i in ids if i not in drives])
-        return rotor if motor is None else _together(rotor, motor)
-
-    with evidence.one_thread():
-        answer = answered()
-        free = ratios and only is None and channels is None and baseline == "bemt"
-        return _compared(answer, records, each[0], given) if free else answer
-
-
-def _compared(answer: Diagnosis, records: Sequence[Record], case: Case, given: suggestion.Given | None) -> Diagnosis:
-    """Answer with that of the ratios to the one reference, where it has none or none that they allow."""
-    files = None if given is None else (*given.references[:1], *given.recordings[:1])
-    ratios = None if answer.drive is answer else beside(answer, records, case.diameter_m, files)
-    if ratios is None or ratios.next is None:
-        return replace(answer, ratios=ratios)
-    return replace(answer, ratios=ratios, next=ratios.next)
-
-
-def _load_moves(rotor: Diagnosis) -> bool:
-    """Whether the loads are likelier to change with time than not, by a cause that is named or by one left open."""
-
-    def moves(ids: Iterable[str]) -> bool:
-        return any("time_s" in effects.catalogue()[i].along and effects.catalogue()[i].kind == "air" for i in ids)
-
-    if rotor.decision.effects or rotor.decision.verdict == "none":
-        return moves(rotor.decision.effects)
-    listed = {k: p for k, p in rotor.found.probability.items() if k}
-    return sum(p for k, p in listed.items() if moves(k)) > 0.5 * sum(listed.values())
-
-
-def _together(rotor: Diagnosis, motor: Diagnosis) -> Diagnosis:
-    """One answer: what the loads say, and what the motor says where they name nothing or name a cause, too."""
-    # air that changes with time changes the load, and with it the speed at a pulse width
-    moved = _load_moves(rotor)
-    if not rotor.decision.effects and motor.decision.verdict in ("named", "class") and not moved:
-        return replace(motor, drive=motor, loads=rotor, absent=rotor.absent)
-    both = rotor.decision.verdict in ("named", "sensor") and motor.decision.verdict == "named" and not moved
-    decision = rotor.decision
-    if both:
-        chance = min(decision.probability, motor.decision.probability)
-        decision = replace(decision, verdict="named", effects=(*decision.effects, *motor.decision.effects),
-                           probability=chance)  # fmt: skip
-    parameters = rotor.parameters | (motor.parameters if both else {})
-    return replace(rotor, decision=decision, parameters=parameters, drive=motor)
+        rotor = chain(loads, [i for i in ids if i not in drives], motor, compared=True)
+        if motor is not None and rotor.said.by == "drive":
+            return replace(motor, drive=motor, loads=rotor, absent=rotor.absent)
+        return rotor
 
 
 def _diagnose(
@@ -232,10 +220,12 @@ def _diagnose(
     nulls: int,
     baseline: str,
     given: suggestion.Given,
+    motor: Diagnosis | None,
+    change: Callable[[Collection[str]], RunChange | None],
 ) -> Diagnosis:
     say("baseline and nuisances")
     problem = build(records, cases, baseline)
-    if question := another_rotor.finding(problem):
+    if question := wrong_rotor_check.finding(problem):
         problem = replace(problem, between=(question, *problem.between))
     candidates, absent = signatures.candidates(problem, only, lambda name: say(f"solving with {name}"))
     say("weighing explanations")
@@ -244,10 +234,9 @@ def _diagnose(
     p = gate.p_value(found, nulls)
     for state in found.states:  # factors that only nulls ask for are the largest arrays there are
         state.rivals.clear()
-    asked = verdict.Asked(found, p)
-    decision = another_rotor.judged(problem, rules.decide(asked))
-    best, parameters = asked.refined(decision.leading)
-    decision = another_rotor.of_recorded(problem, decision, parameters)
+    query = verdict.VerdictQuery(found, p, None if motor is None else motor.decision, lambda: change(absent.keys()))
+    said, decision = rules.decide(query), query.of_loads
+    best, parameters = query.refined(decision.leading)
     parameters = interval_scales.widened(parameters)
     say("held-out blocks")
     words, held, gp_only = blocks.held_out(found, decision.leading if decision.verdict != "unknown" else NONE)
@@ -259,9 +248,15 @@ def _diagnose(
     listed = max((k for k in found.probability if k), key=lambda k: found.probability[k], default=None)
     where = location.locate(found, best if best.ids or listed is None else fitting.fit(found, listed))
     say("next measurement")
+    step = _next(found, decision, best, given)
+    if said.by == "ratios" and query.change is not None:
+        files = (*given.references[:1], *given.recordings[:1])
+        step = ratio_check.next_of(query.change, files) or step
+    if said.by == "both" and motor is not None:
+        decision, parameters = said, parameters | motor.parameters
     return Diagnosis(
-        found, decision, best, parameters, p, where, _scores(found, after, held, gp_only), words, after, held,
-        _next(found, decision, best, given), confusion.confusion(found), absent,
+        found, decision, said, best, parameters, p, where, _scores(found, after, held, gp_only), words, after, held,
+        step, confusion.confusion(found), absent, motor, None, query.change,
     )  # fmt: skip
 
 
@@ -313,14 +308,14 @@ def _settling(found: evidence.Evidence, decision: verdict.Decision, best: fittin
     singles = sorted(single, key=lambda i: -single[i])
     if decision.verdict == "none":
         return suggestion.nothing_called_for(found)
-    if mend := another_rotor.to_mend(found.problem, decision):
+    if mend := wrong_rotor_check.to_mend(found.problem, decision):
         return suggestion.Suggestion(mend, (), (), 0.0, 0.0, "mend")
     if not singles:
         return suggestion.Suggestion(suggestion.REFERENCE, (), (), 0.0, 0.0, "reference")
     if decision.verdict == "insufficient" and (note := suggestion.weather(found)):
         return note
-    sure = decision.effects[:1] if decision.rule == rules.BESIDE_IT else decision.effects
-    claimed = decision.verdict in ("named", "sensor") or decision.rule == rules.BESIDE_IT
+    sure = decision.effects[:1] if decision.rule == verdict.BESIDE_IT else decision.effects
+    claimed = decision.verdict in ("named", "sensor") or decision.rule == verdict.BESIDE_IT
     if claimed and (mended := suggestion.correction(sure, dict(zip(best.ids, best.settings, strict=True)))):
         return mended
     lead = best.ids[0] if best.ids else singles[0]

@@ -327,6 +327,6 @@ def label_diameter(label: str | None) -> float | None:
     if label is None:
         return None
     try:
-        return float(parse_designation(label)[0]) * INCH
+        return parse_designation(label).diameter_in * INCH
     except GeometryError as error:
         raise InputError([Fault("--label", *fault) for fault in error.faults]) from error

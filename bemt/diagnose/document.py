@@ -10,16 +10,17 @@ import numpy as np
 
 from bemt import __version__, effects
 from bemt.base.tables import text_table
+from bemt.compare.change_document import document as change_document
+from bemt.compare.contrast_text import headline as change_headline
 from bemt.compare.scaling_laws import law
-from bemt.diagnose import another_rotor
 from bemt.diagnose import fit as fitting
+from bemt.diagnose import wrong_rotor_check
 from bemt.diagnose.confusion import nearest
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
 from bemt.diagnose.locate import bare
 from bemt.diagnose.record import NO_SPEED
-from bemt.diagnose.rules import BESIDE_IT
 from bemt.diagnose.suggest import LEVEL
-from bemt.diagnose.verdict import inclusion
+from bemt.diagnose.verdict import BESIDE_IT, inclusion
 
 if TYPE_CHECKING:
     from bemt.diagnose.chain import Diagnosis
@@ -44,6 +45,8 @@ _SHOWN = 8
 _FINDINGS = 3
 # All loads off the case by more than this share: first the question whether it is the rotor of the case.
 _ANOTHER_ROTOR = 0.25
+# Least probability of a guess.
+_GUESS = 0.3
 # Level that is said even where no cause shows.
 _WORTH_SAYING = 0.05
 # Ratios between these are said in percent.
@@ -65,7 +68,7 @@ def document(d: Diagnosis) -> dict[str, Any]:
         flat = {(f"{i}.{k}" if name.pair else k): v for i, q in parameters.items() for k, v in q.items()}
         ranking.append({"effect": str(name), "probability": p, "parameters": flat})
     state = found.states[0]
-    said = d.ratios or d.decision
+    said = d.said
     own = {"verdict": d.decision.verdict, "effects": list(d.decision.effects), "rule": d.decision.why}
     return {
         "schema": SCHEMA,
@@ -74,13 +77,13 @@ def document(d: Diagnosis) -> dict[str, Any]:
         "effects": list(said.effects),
         "probability": said.probability,
         "systems": d.systems,
-        "ranking": ranking if d.ratios is None else list(d.ratios.ranking),
-        "by_the_case": None if d.ratios is None else own | {"ranking": ranking},
+        "ranking": list(_by_ratios(d)["ranking"]) if d.by_ratios else ranking,
+        "by_the_case": own | {"ranking": ranking} if d.by_ratios else None,
         "inclusion": {k: v for k, v in inclusion(found).items() if v > 1e-3},
         "location": d.where.document(),
         "fit": {c: {k: _number(v) for k, v in s.items()} for c, s in d.scores.items()},
         "blocks": d.blocks,
-        "sets": [list(s) for s in d.decision.sets] if d.ratios is None else [],
+        "sets": [list(s) for s in said.sets],
         "classes": [list(c) for c in d.decision.classes] or d.alike.classes(),
         "next_measurement": d.next.document(),
         "p_value": d.p_value,
@@ -92,7 +95,7 @@ def document(d: Diagnosis) -> dict[str, Any]:
         "baseline": [effects.to_text(e) for e in d.problem.baseline],
         "not_tried": dict(d.absent),
         "rule": said.why,
-        "rule_name": d.decision.rule if d.ratios is None else "ratios to the reference",
+        "rule_name": said.rule,
         "headline": headline(d),
         "left_over": _number(d.decision.left_over),
         "findings": list(d.problem.findings),
@@ -159,7 +162,7 @@ def _parameters(d: Diagnosis) -> str:
 
 def _is_share(p: Parameter) -> bool:
     """Whether a number without a unit is a share of something."""
-    return p.unit == "1" and p.off == 0.0 and max(abs(p.low), abs(p.high)) <= 0.5
+    return p.unit == "1" and p.off == 0.0 and max(abs(p.low), abs(p.high)) < 1.0
 
 
 def _sized(p: Parameter, value: float, form: str = ".3g") -> str:
@@ -212,10 +215,12 @@ def explanation(d: Diagnosis) -> list[str]:
         lines.append(f"Before any physics: the case is off ({off}). Do diameter, pitch and blades match this rotor?")
     if len(d.problem.findings) > _FINDINGS:
         lines[-1] += f" And {len(d.problem.findings) - _FINDINGS} more; `import` shows all."
-    if d.ratios is not None:
-        members = ", ".join(f"{i} ({_title(i)})" for i in d.ratios.effects)
-        lines += [f"One of these ({d.ratios.probability:.2f}): {members}."] if d.ratios.verdict == "class" else []
-        return [*lines, d.ratios.told, *_next(d), *_not_tried(d)]
+    if d.by_ratios:
+        members = ", ".join(f"{i} ({_title(i)})" for i in d.said.effects)
+        lines += [f"One of these ({d.said.probability:.2f}): {members}."] if d.said.verdict == "class" else []
+        lines += [f"The ratios to the reference: {d.said.why}. The diagnosis with the case: {decision.verdict}: "
+                  f"{decision.why}."]  # fmt: skip
+        return [*lines, *_next(d), *_not_tried(d)]
     if decision.verdict == "none":
         lines.append(f"Why: {decision.why} (p = {d.p_value:.2g}).")
         if max((abs(v) for v in level.values()), default=0.0) > _WORTH_SAYING:
@@ -274,6 +279,12 @@ def _not_tried(d: Diagnosis) -> list[str]:
     return [f"Not tried: {'; '.join(words)}."] if words else []
 
 
+def _by_ratios(d: Diagnosis) -> dict[str, Any]:
+    """Document of the change from the reference."""
+    assert d.change is not None
+    return change_document(d.change)
+
+
 def _title(name: str) -> str:
     """Title of a cause; of one that only the comparison knows, that of its scaling law."""
     if name in effects.catalogue():
@@ -284,18 +295,24 @@ def _title(name: str) -> str:
 
 def headline(d: Diagnosis) -> str:
     """What an engineer would say first."""
-    if d.ratios is not None:
-        return d.ratios.headline
+    if d.by_ratios:
+        words = change_headline(_by_ratios(d))
+        listed = d.change.loads.effects if d.change is not None else ()
+        # a cut tip is another diameter
+        lone = [i for i in d.said.effects if i not in listed and (i != "tip_cut" or "diameter" not in listed)]
+        also = " or ".join(_title(i) for i in lone)
+        return f"{words[:-1]}; the model also allows {also}." if also else words
     said, catalogue = d.decision, effects.catalogue()
     titles = [catalogue[i].title for i in said.effects]
     off = _off(d)
-    if said.verdict == "insufficient" and another_rotor.foreign(d.problem):
+    if said.verdict == "insufficient" and wrong_rotor_check.foreign(d.problem):
         return f"These are not the loads of this case ({off}): check diameter, blades, units and speed first."
-    file, wrong, _ = another_rotor.contradiction(d.problem, said)
+    file, wrong, _ = wrong_rotor_check.contradiction(d.problem, said)
     if file:
         return f"{file} cannot be right: {wrong}. Mend that before any cause is looked for."
     if said.verdict == "none" and not d.problem.free.all():
-        return f"No cause: the recording differs from the reference by no more than runs do; from the model, {off}."
+        apart = _from_reference(d) or "the recording differs from the reference"
+        return f"No cause: {apart}, no more than runs do; from the model, {off}."
     if said.verdict == "none" and max((abs(v) for v in d.problem.level.values()), default=0.0) > LEVEL:
         return f"Recording and model differ ({off}), within the uncertainty of calibration, blade and solver; no cause."
     if said.verdict == "none":
@@ -310,10 +327,27 @@ def headline(d: Diagnosis) -> str:
             return f"Two causes: {' and '.join(_one_of(s) for s in said.sets)}."
         return f"The cause is {' or '.join(titles)}; these readings cannot distinguish them."
     if said.verdict == "unknown":
-        return f"Recording and model differ ({off}), and no effect in the library explains it."
-    best = next((catalogue[i].title for i in d.best.ids), "")
-    guess = f"; best guess: {best}" if best else ""
-    return f"Recording and model differ ({off}), but these readings do not show why{guess}."
+        what = _from_reference(d) or f"Recording and model differ ({off})"
+        return f"{what[0].upper()}{what[1:]}, and no effect in the library explains it."
+    what = _from_reference(d) or f"Recording and model differ ({off})"
+    return f"{what[0].upper()}{what[1:]}, but these readings do not show why{_guess(d)}."
+
+
+def _guess(d: Diagnosis) -> str:
+    """Title of the likeliest effect, where it is likely enough to be worth a look."""
+    chance = d.found.probability.get(Explanation.of(*d.best.ids), 0.0) if d.best.ids else 0.0
+    if chance < _GUESS or chance < d.found.probability[UNKNOWN]:
+        return ""
+    return f"; best guess: {' and '.join(_title(i) for i in d.best.ids)} (probability {chance:.2f})"
+
+
+def _from_reference(d: Diagnosis) -> str:
+    """Loads of the recording over those of the reference; "" where they were not compared."""
+    if d.change is None:
+        return ""
+    loads = [(c.name, d.change.ratios[c.channel]["ratio"]) for c in d.change.loads_by_name.values()]
+    words = " and ".join(f"{name} by {_share(ratio - 1.0)}" for name, ratio in loads)
+    return f"the recording differs from the reference ({words} at equal speed)" if words else ""
 
 
 def _one_of(ids: Sequence[str]) -> str:
@@ -342,7 +376,7 @@ def text(d: Diagnosis) -> str:
     first, *rest = explanation(d)
     # it explains little and takes lines
     last = [line for line in rest if line.startswith("Not tried: ")]
-    said = d.ratios or d.decision
+    said = d.said
     named = f" {', '.join(said.effects)}" if said.effects else ""
     out = [textwrap.fill(first, 110), f"verdict: {said.verdict}{named}"]
     # a command stays in one line, to be copied

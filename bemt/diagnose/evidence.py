@@ -132,7 +132,7 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
     for h, C in noise.covariances(problem):
         state = coarse.state(h, C, top - _DROP)
         if pairs and state.half.size:
-            best_pair(state, coarse.spans, coarse.log_w)
+            best_pair(state, coarse.spans, coarse.log_w, coarse.shape)
         best[h] = state.log_z
         top = max(top, max(best[h].values()) + np.log(h.weight))
     fine = _Table(problem, S, log_w, spans, candidates, modes, None)
@@ -148,11 +148,11 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
         else:
             state.log_z[UNKNOWN] = state.log_z[NONE]
         if pairs:
-            every_pair(state, spans, log_w)
+            every_pair(state, spans, log_w, fine.shape)
         states.append(state)
     before = prior.log_priors(prior.prior_weights(problem, list(spans)), pairs)
     if pairs:
-        solve_together(problem, candidates, states, spans, log_w, before)
+        solve_together(problem, candidates, states, spans, log_w, before, fine.shape)
     added = price(problem, states, modes)
     probability = _posterior(states, {k: v - added.get(k, 0.0) for k, v in before.items()})
     likeliest = max(probability, key=lambda k: probability[k])
@@ -278,6 +278,10 @@ class _Table:
             setting = int(self.columns[at] - self.first[k])
             self._own[(k, at)] = form.columns(self.candidates[k], setting, self.modes[k])
         return self._own[(k, at)]
+
+    def shape(self, name: str, at: int) -> tuple[int, Array]:
+        """Number of modes and columns of the error of an effect's law at a column of the table."""
+        return self._columns(list(self.spans).index(name), at)
 
     def _add(self, gain: Array, base: Array, forms: Forms, rest: Array, which: NDArray[np.intp]) -> None:
         """Put in the log likelihood over that of "none" of every setting, its form taken into account."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +13,7 @@ from bemt.diagnose import form
 from bemt.diagnose.explanation import NONE, Explanation
 from bemt.diagnose.signatures import effect_of
 from bemt.diagnose.state import Array, State
-from bemt.gaussian.evidence import LinearTerms, log_sum
+from bemt.gaussian.evidence import log_sum
 
 if TYPE_CHECKING:
     from bemt.diagnose.problem import Problem
@@ -20,7 +21,12 @@ if TYPE_CHECKING:
 
 __all__ = ["DETAIL", "GEOMETRY", "best_pair", "every_pair", "price", "solve_together"]
 
+Shape = Callable[[str, int], tuple[int, Array]]
+"""Number of modes and columns of the error of an effect's law at one of its settings, not whitened."""
+
 _PAIR_LEADERS = 60
+# Times that the error of two laws follows the best setting.
+_FOLLOWED = 2
 # Single effects of which the best pair is looked for under every covariance.
 _FIRST = 2
 # Leading pairs that are solved together: what one effect changes depends on the other.
@@ -31,7 +37,7 @@ the error of its form holds.  As of a smooth rest beside it, which is no other c
 whose law is geometry and the solver: of 56 that led alone in three proofs, one had another of more, and 5 nats [1]."""
 
 
-def best_pair(state: State, spans: Mapping[str, slice], log_w: Array) -> None:
+def best_pair(state: State, spans: Mapping[str, slice], log_w: Array, shape: Shape) -> None:
     """Evidence of the best pair that holds one of the best single effects: enough to see which covariances matter."""
     gain = state.S.T @ state.r - state.half + log_w
     names, starts = list(spans), np.array([s.start for s in spans.values()])
@@ -43,10 +49,10 @@ def best_pair(state: State, spans: Mapping[str, slice], log_w: Array) -> None:
         found |= {Explanation.of(a, b): float(v) for b, v in zip(names, top, strict=True) if b != a}
     if found:
         pair = max(found, key=lambda k: found[k])
-        state.log_z[pair] = _log_z(state, pair, spans, log_w)
+        state.log_z[pair] = _log_z(state, pair, spans, log_w, shape)
 
 
-def every_pair(state: State, spans: dict[str, slice], log_w: Array) -> None:
+def every_pair(state: State, spans: dict[str, slice], log_w: Array, shape: Shape) -> None:
     """Evidence of two effects at a time, signatures added.
 
     The error of both forms is worked out for the leading pairs only, at their best settings; others cannot matter.
@@ -72,32 +78,71 @@ def every_pair(state: State, spans: dict[str, slice], log_w: Array) -> None:
             upper[pair] = max(state.log_z[Explanation.of(k)] for k in (a, b))
             upper[pair] = max(upper[pair], state.log_z[pair])
     for pair in sorted(upper, key=lambda k: -upper[k])[:_PAIR_LEADERS]:
-        state.log_z[pair] = _log_z(state, pair, spans, log_w)
+        state.log_z[pair] = _log_z(state, pair, spans, log_w, shape)
 
 
-def _log_z(state: State, pair: Explanation, spans: Mapping[str, slice], log_w: Array) -> float:
-    """Logarithm of the evidence of two effects, with the error of both forms at their best settings."""
+def _log_z(state: State, pair: Explanation, spans: Mapping[str, slice], log_w: Array, shape: Shape) -> float:
+    """Logarithm of the evidence of two effects: all settings summed, the error of both laws in each, as of one effect.
+
+    The columns of that error follow the best setting of the two together, which depends on them.
+    """
     total = state.both(pair, spans, log_w)
-    out = state.log_z[NONE] + float(log_sum(total.ravel()))
-    forms = [state.forms[i] for i in pair]
-    both = np.concatenate([f.B for f in forms], axis=1)
-    if not both.shape[1]:
-        return out
-    joint = LinearTerms.of(both)
-    k, m = np.unravel_index(int(np.argmax(total)), total.shape)
+    at, value = _largest(total), total
+    for _ in range(_FOLLOWED):
+        shapes = [shape(name, spans[name].start + k) for name, k in zip(pair, at, strict=True)]
+        value = total + _form_gain(state, pair, spans, shapes, at)
+        if (again := _largest(value)) == at:
+            break
+        at = again
+    return state.log_z[NONE] + float(log_sum(value.ravel()))
+
+
+def _largest(total: Array) -> tuple[int, int]:
+    """Row and column of the largest entry."""
+    i, j = np.unravel_index(int(np.argmax(total)), total.shape)
+    return int(i), int(j)
+
+
+def _form_gain(
+    state: State, pair: Explanation, spans: Mapping[str, slice], shapes: Sequence[tuple[int, Array]],
+    at: tuple[int, int],
+) -> Array:  # fmt: skip
+    """What the error of both laws adds to the log likelihood of every two settings, at its likeliest sizes, (A, B)."""
     A, B = (spans[i] for i in pair)
-    i, j = A.start + int(k), B.start + int(m)
-    d = state.r - state.S[:, i] - state.S[:, j]
+    widths = [x.shape[1] for _, x in shapes]
+    if not sum(widths):
+        return np.zeros((1, 1))
+    plain = state.white.changes(np.concatenate([x for _, x in shapes], axis=1))
+    rest, of_a, of_b = plain.T @ state.r, plain.T @ state.S[:, A], plain.T @ state.S[:, B]
+    gram, found = plain.T @ plain, []
+    choices = [(tuple(form.FORM) if modes else (min(form.FORM),)) if width else (1.0,)
+               for (modes, _), width in zip(shapes, widths, strict=True)]  # fmt: skip
+    for sizes in product(*choices):
+        scale = np.concatenate([
+            np.where(np.arange(width) < modes, size, 1.0)
+            for (modes, _), width, size in zip(shapes, widths, sizes, strict=True)
+        ])  # fmt: skip
+        root = np.linalg.cholesky(np.eye(scale.size) + scale[:, None] * gram * scale)
+        chosen = sum(float(np.log(form.FORM.get(s, 1.0))) for s, w in zip(sizes, widths, strict=True) if w)
+        level = chosen - float(np.sum(np.log(np.diag(root))))
+        d = np.linalg.solve(root, scale * (rest - of_a[:, at[0]] - of_b[:, at[1]]))
+        found.append((0.5 * float(d @ d) + level, level, root, scale))
+    _, level, root, scale = max(found, key=lambda f: f[0])
+    r, a, b = (np.linalg.solve(root, scale[:, None] * v) for v in (rest[:, None], of_a, of_b))
+    left = r - a
+    out = 0.5 * np.sum(left * left, axis=0)[:, None] + 0.5 * np.sum(b * b, axis=0)[None, :] - left.T @ b + level
     if pair in state.mixed:
-        extra, at, to = state.mixed[pair]
-        share = (state.S[:, i] @ state.S[:, at]) * (state.S[:, j] @ state.S[:, to])
-        d -= share / (4.0 * state.half[at] * state.half[to]) * extra
-    return out + float(joint.gain(d)) + sum(float(np.log(form.FORM.get(f.size, 1.0))) for f in forms)
+        extra, i, j = state.mixed[pair]
+        share = np.outer(state.S[:, A].T @ state.S[:, i] / (2.0 * state.half[i]),
+                         state.S[:, B].T @ state.S[:, j] / (2.0 * state.half[j]))  # fmt: skip
+        e = np.linalg.solve(root, scale * (plain.T @ extra))
+        out += 0.5 * share**2 * float(e @ e) - share * ((e @ left)[:, None] - (e @ b)[None, :])
+    return np.asarray(out)
 
 
 def solve_together(
     problem: Problem, candidates: Sequence[Candidate], states: Sequence[State], spans: Mapping[str, slice],
-    log_w: Array, before: Mapping[Explanation, float],
+    log_w: Array, before: Mapping[Explanation, float], shape: Shape,
 ) -> None:  # fmt: skip
     """Solve the leading pairs with both effects on and weigh them again."""
     of = {c.id: c for c in candidates}
@@ -120,7 +165,7 @@ def solve_together(
             for s in states:
                 s.mixed.pop(pair, None)
         for s in states:
-            s.log_z[pair] = _log_z(s, pair, spans, log_w)
+            s.log_z[pair] = _log_z(s, pair, spans, log_w, shape)
 
 
 def price(

@@ -19,12 +19,36 @@ from bemt.effects.base import Effect, Flow, Reading
 if TYPE_CHECKING:
     from bemt.case.as_built import CaseAsBuilt
 
-__all__ = ["Part", "Problem"]
+__all__ = ["Part", "Problem", "SpeedCurve"]
 
 Array = NDArray[np.float64]
 
 # Speeds over the recorded ones beyond which the tables of these do not reach.
 _SLOWER, _FASTER = 0.7, 1.1
+
+
+@dataclass(frozen=True, eq=False)
+class SpeedCurve:
+    """Speed as a parabola over the pulse width.
+
+    More terms would follow what drifts within a few settings of the pulse width, as steps.
+    """
+
+    coefficients: Array
+    middle: float  # of the pulse widths [s]
+    span: float  # of the pulse widths [s]
+
+    @classmethod
+    def of(cls, pulse: Array, rpm: Array) -> SpeedCurve:
+        """Fit readings (N,) [s], [rev/min]."""
+        good = np.isfinite(rpm)
+        degree = min(2, np.unique(np.round(pulse[good], 6)).size - 1)
+        middle, span = float(pulse.mean()), max(float(np.ptp(pulse)), 1e-12)
+        return cls(np.polyfit((pulse[good] - middle) / span, rpm[good], degree), middle, span)
+
+    def __call__(self, pulse: Array) -> Array:
+        """Speed [rev/min]."""
+        return np.asarray(np.polyval(self.coefficients, (pulse - self.middle) / self.span))
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +73,8 @@ class Part:
         How well the rotor is known; None where the population of real rotors says nothing of the baseline.
     instead : (C P,) float or None
         Baseline of another model, to which effects add what share they change in ours [N], [N m], [rev/min].
+    drive : SpeedCurve or None
+        Speed over pulse width as the reference shows it; None: as this recording itself does.
     """
 
     record: Record
@@ -59,6 +85,7 @@ class Part:
     left_out: tuple[str, ...] = ()
     as_built: CaseAsBuilt | None = None
     instead: Array | None = None
+    drive: SpeedCurve | None = None
     _solved: dict[tuple[Effect, ...], tuple[Array, Array, Flow]] = field(default_factory=dict, repr=False)
 
     def predict(self, effects: Sequence[Effect]) -> Array:
@@ -90,7 +117,7 @@ class Part:
     @cached_property
     def _whole(self) -> bem.Model:
         """Model with the tables of all speeds."""
-        return replace(self.model, re_range=None, mach_max=bem.Model.mach_max, _kept={})
+        return replace(self.model, re_range=None, mach_max=bem.Model.mach_max)
 
     def _far(self, effects: Sequence[Effect]) -> bool:
         """Whether what an instrument got wrong takes the rotor to speeds that the tables of the recorded ones lack."""
@@ -115,15 +142,9 @@ class Part:
 
     @cached_property
     def steady_rpm(self) -> Array:
-        """Speed as a parabola over the pulse width, the baseline of the drive [rev/min].
-
-        More terms would follow what drifts within a few settings of the pulse width, as steps.
-        """
-        p, rpm = self.record.extra["pwm_s"], self.record.measured["rpm"]
-        good = np.isfinite(rpm)
-        degree = min(2, np.unique(np.round(p[good], 6)).size - 1)
-        x = (p - p.mean()) / max(float(np.ptp(p)), 1e-12)
-        return np.asarray(np.polyval(np.polyfit(x[good], rpm[good], degree), x))
+        """Baseline of the drive: speed over the pulse width, of the reference where there is one [rev/min]."""
+        pulse = self.record.extra["pwm_s"]
+        return (self.drive or SpeedCurve.of(pulse, self.record.measured["rpm"]))(pulse)
 
     @cached_property
     def full_scale(self) -> dict[str, float]:

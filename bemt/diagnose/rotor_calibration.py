@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import math
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,15 +20,18 @@ from bemt.case import Case
 from bemt.case.as_built import MOVED, posterior_document
 from bemt.case.prepare import prepare_case
 from bemt.compare.as_measured import AsMeasured, as_measured
-from bemt.diagnose.another_rotor import FACTOR
 from bemt.diagnose.improve import beside, elsewhere
 from bemt.diagnose.load import cases_of, load
+from bemt.diagnose.wrong_rotor_check import FACTOR
+from bemt.rotors.k1k2 import ZERO_THRUST_MEASURED
 from bemt.rotors.latents import NAMES, UNITS
 from bemt.rotors.model import air_fields, air_of_points
 from bemt.rotors.reference import SESSION
 
 SCHEMA = "bemt.rotor_calibration/1"
 POSTERIOR = "as_built.json"
+FLIGHT_X = 0.2
+"""J over that of zero thrust above which a point tells of flight [1]."""
 # Assumptions that a run of the rotor settles, besides those that move a latent number.
 _SETTLED = {"model.drag_level", "model.n_crit", "blade.section.thickness", "blade.section.thickness_scale"}
 
@@ -85,10 +90,12 @@ def document(case: Case, found: AsMeasured, paths: Sequence[str]) -> dict[str, A
         for k, name in enumerate(NAMES)
     }  # fmt: skip
     size = float(found.found.weights @ found.prior.sizes)
+    airspeed = flight_point(case, found)
     out: dict[str, Any] = plain({
         "schema": SCHEMA, "case": case.name, "reference": [Path(p).name for p in paths], "points": found.points,
         "converged": found.found.converged, "steps": found.found.steps, "log_evidence": found.found.log_evidence,
         "size": size, "excess": found.found.excess, "known_from": found.prior.known_from, "numbers": numbers,
+        "recommended_airspeed_m_s": airspeed, "rpm": case.rpm,
     })  # fmt: skip
     return out
 
@@ -115,33 +122,65 @@ def text(doc: dict[str, Any]) -> str:
         lines.append(
             f"No rotor of this kind gives these readings: noise taken as {times} times larger. Check the recording."
         )
+    if doc["recommended_airspeed_m_s"] is not None:
+        lines.append(
+            "All points are at rest, which leaves flight uncertain. Recommended: one flight point too, such as\n"
+            f"{doc['recommended_airspeed_m_s']:.0f} m/s at {doc['rpm']:g} rev/min; name both recordings as REFERENCE."
+        )
     return "\n".join(lines)
 
 
-def write(case: Case, found: AsMeasured, paths: Sequence[str], folder: str | Path) -> None:
-    """Write the case with the rotor as measured, and the files beside it."""
+def write(case: Case, found: AsMeasured, paths: Sequence[str], folder: str | Path) -> list[str]:
+    """Write the case with the rotor as measured, under a name of its own, and the files beside it: their names."""
     out = Path(folder)
     if out.resolve() == case.folder.resolve():
         raise InputError(Fault("--out", "", "the folder of the case itself", "another folder", "It would be replaced"))
-    source: Any = tomlkit.parse(case.path.read_text(encoding="utf-8-sig"))
+    source = _source(case)
+    source["name"] = measured_name(case.name)
     blade: Any = source["blade"]
     blade["known_from"] = "reference"
     blade.pop("as_built", None)
     blade["as_built"] = {"file": POSTERIOR}
     settled = _SETTLED.union(*MOVED.values())
-    kept = [item for item in source.get("assumptions", []) if item["key"] not in settled]
+    kept = [item for item in case.written.get("assumptions", []) if item["key"] not in settled]
     source.pop("assumptions", None)
     if kept:
         array = tomlkit.aot()
         for item in kept:
-            array.append(item)
+            array.append(tomlkit.item(item))
         source["assumptions"] = array
     elsewhere(source, case)
     names = ", ".join(Path(p).name for p in paths)
     head = f"# {case.name} with its rotor as `python -m bemt calibrate-rotor` found it from {names}"
-    for file in beside(case):
-        write_atomic(out / file.relative_to(case.folder), file.read_bytes())
+    files = {file.relative_to(case.folder): file.read_bytes() for file in beside(case) if file.name != POSTERIOR}
+    for name, data in files.items():
+        write_atomic(out / name, data)
     provenance = {"case": case.name, "reference": [Path(p).name for p in paths], "points": found.points,
                   "version": __version__}  # fmt: skip
     write_atomic(out / POSTERIOR, json_text(posterior_document(found.posterior, found.reference, provenance)))
     write_atomic(out / "case.toml", f"{head}\n{tomlkit.dumps(source).rstrip()}\n")
+    return [*(name.as_posix() for name in files), POSTERIOR, "case.toml"]
+
+
+def measured_name(name: str) -> str:
+    """Name of the calibrated case: its own, or a sweep of both could not tell them apart.
+
+    >>> measured_name("prop_10x5"), measured_name("prop_10x5_measured"), measured_name("prop_10x5_measured_2")
+    ('prop_10x5_measured', 'prop_10x5_measured_2', 'prop_10x5_measured_3')
+    """
+    match = re.fullmatch(r"(.*_measured)(?:_([1-9]\d*))?", name)
+    return f"{match[1]}_{int(match[2] or 1) + 1}" if match else f"{name}_measured"
+
+
+def _source(case: Case) -> Any:
+    """Document of the case file, with its comments; a short case in full, or its unknowns would come back."""
+    source: Any = tomlkit.parse(case.path.read_text(encoding="utf-8-sig"))
+    return source if source.unwrap() == case.written else copy.deepcopy(dict(case.written))
+
+
+def flight_point(case: Case, found: AsMeasured) -> float | None:
+    """Airspeed at which one more point would settle flight, at the case's speed; None if the run has one. [m/s]"""
+    if np.max(found.reference.x, initial=0.0) > FLIGHT_X:
+        return None
+    pitch = case.rotor().blade.pitch_m()
+    return 0.5 * ZERO_THRUST_MEASURED * pitch * case.rpm / 60.0

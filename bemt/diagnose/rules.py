@@ -1,4 +1,7 @@
-"""Rules of the verdict, in the order of caution: the first that holds answers."""
+"""Rules of the verdict in one ordered list: the first that holds answers, the last ones see that and may revise it.
+
+Nothing alters a verdict after the list. The docstring of a rule says where it comes from.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import effects
-from bemt.diagnose import blocks
+from bemt.compare.scaling_laws import LAWS
+from bemt.diagnose import blocks, ratio_check, wrong_rotor_check
 from bemt.diagnose import fit as fitting
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
 from bemt.diagnose.suggest import LEVEL
@@ -22,56 +26,86 @@ from bemt.diagnose.thresholds import (
     LARGEST,
     LEAST,
     LEFT_OVER,
+    LIKELY,
+    MOST,
     NAMED,
     PREDICTS,
     PROVEN,
+    RARE,
     ROUGH,
     SMALL,
     SURE,
+    UNCHANGED,
     VAGUE,
 )
-from bemt.diagnose.verdict import Asked, Decision, holds_off, levels_only, mass, twins, unsettled
+from bemt.diagnose.verdict import (
+    BESIDE_IT,
+    CLAIMS,
+    Decision,
+    VerdictQuery,
+    holds_off,
+    levels_only,
+    mass,
+    twins,
+    unsettled,
+)
 
-__all__ = ["BESIDE_IT", "RULES", "Rule", "decide"]
-
-BESIDE_IT = "one is sure, another may be there"
-"""Rule after which the second cause may as well be absent."""
+__all__ = ["RULES", "Rule", "decide"]
 
 
 @dataclass(frozen=True)
 class Rule:
-    """One row of the table.
+    """One row of the list.
 
     Attributes
     ----------
     name : str
         What it asks.
-    holds : callable
-        Whether it applies.
-    answer : callable
-        What is said then.
+    ask : callable
+        Its answer; None where it does not apply. Its docstring is its source.
     threshold : str
         Names of the numbers it asks with.
-    source : str
-        Where it comes from.
+    revises : bool
+        Whether it sees the answer of the rows before it, and only then is asked.
     """
 
     name: str
-    holds: Callable[[Asked], bool]
-    answer: Callable[[Asked], Decision]
-    threshold: str
-    source: str
+    ask: Callable[[VerdictQuery], Decision | None]
+    threshold: str = ""
+    revises: bool = False
+
+    @property
+    def source(self) -> str:
+        """Where it comes from."""
+        return str(self.ask.__doc__)
 
 
-def decide(asked: Asked) -> Decision:
-    """Decide."""
+_Ask = Callable[[VerdictQuery], Decision | None]
+
+RULES: list[Rule] = []
+"""The rows, in the order in which they are asked: cautious ones first."""
+
+
+def _rule(name: str, threshold: str = "", revises: bool = False) -> Callable[[_Ask], _Ask]:
+    """Append a function to the list."""
+
+    def append(ask: _Ask) -> _Ask:
+        RULES.append(Rule(name, ask, threshold, revises))
+        return ask
+
+    return append
+
+
+def decide(query: VerdictQuery) -> Decision:
+    """Go through the list."""
     for rule in RULES:
-        if rule.holds(asked):
-            return replace(rule.answer(asked), rule=rule.name)
-    raise AssertionError("the last rule always holds")
+        if rule.revises == (query.said is not None) and (answer := rule.ask(query)) is not None:
+            query.steps.append(replace(answer, rule=rule.name))
+    assert query.said is not None, "the last rule that does not revise always holds"
+    return query.said
 
 
-def _leaves_its_range(a: Asked) -> bool:
+def _leaves_its_range(a: VerdictQuery) -> bool:
     """Whether physics that is on explains the readings best at the end of the range of a parameter, not as it is on."""
     (name,) = a.leading
     on = {e.id: e for e in a.found.problem.baseline}
@@ -84,7 +118,7 @@ def _leaves_its_range(a: Asked) -> bool:
     return False
 
 
-def _predicts(a: Asked) -> bool:
+def _predicts(a: VerdictQuery) -> bool:
     """Whether an explanation brings left-out blocks nearer than calibration alone does, along some variable.
 
     What does not change along a variable is learnt from the other lines of it without any cause.
@@ -120,7 +154,7 @@ def _sizes(name: str, told: Mapping[str, Mapping[str, Any]]) -> int:
     return sum(p.off is not None and p.name in told for p in effects.catalogue()[name].parameters)
 
 
-def _pair(a: Asked) -> Decision:
+def _pair(a: VerdictQuery) -> Decision:
     """Two effects at work: a set for each cause; names where the sets have one member."""
     known = a.known_sets
     total = sum(v for k, v in a.P.items() if k.pair)
@@ -135,236 +169,260 @@ def _pair(a: Asked) -> Decision:
     return a.says("insufficient", "two or more effects that cannot be distinguished")
 
 
-def _nothing(a: Asked, why: str, verdict: str = "none") -> Decision:
+def _nothing(a: VerdictQuery, why: str, verdict: str = "none") -> Decision:
     return a.says(verdict, why, leading=NONE)
 
 
-def _by_chance(a: Asked) -> str:
+def _by_chance(a: VerdictQuery) -> str:
     return f"a mismatch as large occurs by chance in {a.p_value:.0%} of simulated recordings without a cause"
 
 
-def _too_little(a: Asked) -> str:
+def _too_little(a: VerdictQuery) -> str:
     needed = f"{a.needed:g} needed" + (", as no reference shows this rotor" if a.real else "")
     return f"the best explanation is not much better than none (ln odds {a.odds:.1f}; {needed})"
 
 
-def _left(a: Asked) -> Decision:
+def _left(a: VerdictQuery) -> Decision:
     return a.says("unknown", "a smooth residual is left after the best listed effect",
                   probability=max(a.P[UNKNOWN], 1.0 - a.P[a.first]), leading=a.first)  # fmt: skip
 
 
-RULES: tuple[Rule, ...] = (
-    Rule(
-        "no effect can be seen",
-        lambda a: not a.first,
-        lambda a: a.says("insufficient", "no effect is visible in these readings", probability=1.0, leading=NONE),
-        "",
-        "by definition",
-    ),
-    Rule(
-        "nulls look like it",
-        lambda a: (
-            a.p_value > GATE
-            and (a.P[NONE] > 0.5 or (a.p_value > 5.0 * GATE and a.level < LEVEL) or (not a.alone and a.likeliest_none))
-        ),
-        lambda a: _nothing(a, _by_chance(a)),
-        "GATE, LEVEL",
-        "DIAGNOSIS 2.3: p-value of the whole chain, 1 in 100; a reference has the level in it",
-    ),
-    Rule(
-        "nulls nearly look like it",
-        lambda a: a.p_value > GATE,
-        lambda a: _nothing(a, _by_chance(a), "insufficient"),
-        "GATE",
-        "the same, between 1 and 5 in 100, or where all loads are far off the case",
-    ),
-    Rule(
-        "nothing is likelier than anything",
-        lambda a: a.P[NONE] > 0.5,
-        lambda a: _nothing(a, "nothing explains the readings better than the noise"),
-        "0.5",
-        "posterior odds",
-    ),
-    Rule(
-        "unknown, and not much better than nothing",
-        lambda a: a.P[UNKNOWN] > 0.5 and a.vague < (ENOUGH if a.real else LEAST),
-        lambda a: a.says("insufficient", "a smooth effect that is not in the library fits best, but not by enough"),
-        "0.5, ENOUGH, LEAST",
-        "as of a name; the first of a real rotor that no reference shows: stands differed from cases of a label by 5 "
-        "and were called unknown",
-    ),
-    Rule(
-        "unknown is likelier than all",
-        lambda a: a.P[UNKNOWN] > 0.5,
-        lambda a: a.says(
+@_rule("no effect can be seen")
+def _no_effect_can_be_seen(a: VerdictQuery) -> Decision | None:
+    """By definition."""
+    if not a.first:
+        return a.says("insufficient", "no effect is visible in these readings", probability=1.0, leading=NONE)
+    return None
+
+
+@_rule("nulls look like it", "GATE, LEVEL")
+def _nulls_look_like_it(a: VerdictQuery) -> Decision | None:
+    """DIAGNOSIS 2.3: p-value of the whole chain, 1 in 100; a reference has the level in it."""
+    if a.p_value > GATE and (
+        a.P[NONE] > 0.5 or (a.p_value > 5.0 * GATE and a.level < LEVEL) or (not a.alone and a.likeliest_none)
+    ):
+        return _nothing(a, _by_chance(a))
+    return None
+
+
+@_rule("nulls nearly look like it", "GATE")
+def _nulls_nearly_look_like_it(a: VerdictQuery) -> Decision | None:
+    """The same, between 1 and 5 in 100, or where all loads are far off the case."""
+    if a.p_value > GATE:
+        return _nothing(a, _by_chance(a), "insufficient")
+    return None
+
+
+@_rule("nothing is likelier than anything", "0.5")
+def _nothing_is_likelier_than_anything(a: VerdictQuery) -> Decision | None:
+    """Posterior odds."""
+    if a.P[NONE] > 0.5:
+        return _nothing(a, "nothing explains the readings better than the noise")
+    return None
+
+
+@_rule("unknown, and not much better than nothing", "0.5, ENOUGH, LEAST")
+def _unknown_and_not_much_better_than_nothing(a: VerdictQuery) -> Decision | None:
+    """As of a name; the first of a real rotor that no reference shows: stands differed from cases of a label by 5 and
+    were called unknown.
+    """
+    if a.P[UNKNOWN] > 0.5 and a.vague < (ENOUGH if a.real else LEAST):
+        return a.says("insufficient", "a smooth effect that is not in the library fits best, but not by enough")
+    return None
+
+
+@_rule("unknown is likelier than all", "0.5")
+def _unknown_is_likelier_than_all(a: VerdictQuery) -> Decision | None:
+    """DIAGNOSIS 2.6: the second rival."""
+    if a.P[UNKNOWN] > 0.5:
+        return a.says(
             "unknown",
             "a smooth effect that is not in the library explains the readings better than any listed effect",
             probability=max(a.P[UNKNOWN], 1.0 - a.P[a.first]),
             leading=a.first,
-        ),
-        "0.5",
-        "DIAGNOSIS 2.6: the second rival",
-    ),
-    Rule(
-        "a smooth rest is left",
-        lambda a: (
-            a.rest > max(LEFT_OVER, (1.0 if a.factor else SMALL) * a.found.log_bayes(a.first))
-            and a.rest + a.found.log_bayes(a.first) >= ENOUGH
-        ),
-        _left,
-        "LEFT_OVER, SMALL, ENOUGH",
-        "declared; the same rival beside the best effect, as sure as a name has to be; a real rotor leaves one beside "
-        "a proven slip of a unit, too",
-    ),
-    Rule(
-        "not much better than nothing",
-        lambda a: a.odds < a.needed,
-        lambda a: a.says("insufficient", _too_little(a)),
-        "ENOUGH, LEAST, EXPECTED, PROVEN",
-        "declared: 8 nats are 4 sigma; 5 where no error of the solver looks like it (in a proof these were all at "
-        "work); of a real rotor that no reference shows, 8 to 16 named what was not there",
-    ),
-    Rule(
-        "does not predict",
-        lambda a: not a.expected and a.odds < PROVEN and a.vague > VAGUE and not _predicts(a),
-        lambda a: a.says("insufficient", "the best explanation does not predict held-out readings"),
-        "PROVEN, VAGUE, PREDICTS",
-        "declared; left-out blocks, DIAGNOSIS 2.9; in any case it cost right names (7)",
-    ),
-    Rule(
-        "on, and out of its range",
-        lambda a: a.on and not a.leading.pair and _leaves_its_range(a),
-        lambda a: a.says(
+        )
+    return None
+
+
+@_rule("a smooth rest is left", "LEFT_OVER, SMALL, ENOUGH")
+def _a_smooth_rest_is_left(a: VerdictQuery) -> Decision | None:
+    """Declared; the same rival beside the best effect, as sure as a name has to be; a real rotor leaves one beside a
+    proven slip of a unit, too.
+    """
+    if (
+        a.rest > max(LEFT_OVER, (1.0 if a.factor else SMALL) * a.found.log_bayes(a.first))
+        and a.rest + a.found.log_bayes(a.first) >= ENOUGH
+    ):
+        return _left(a)
+    return None
+
+
+@_rule("not much better than nothing", "ENOUGH, LEAST, EXPECTED, PROVEN")
+def _not_much_better_than_nothing(a: VerdictQuery) -> Decision | None:
+    """Declared: 8 nats are 4 sigma; 5 where no error of the solver looks like it (in a proof these were all at work);
+    of a real rotor that no reference shows, 8 to 16 named what was not there.
+    """
+    if a.odds < a.needed:
+        return a.says("insufficient", _too_little(a))
+    return None
+
+
+@_rule("does not predict", "PROVEN, VAGUE, PREDICTS")
+def _does_not_predict(a: VerdictQuery) -> Decision | None:
+    """Declared; left-out blocks, DIAGNOSIS 2.9; in any case it cost right names (7)."""
+    if not a.expected and a.odds < PROVEN and a.vague > VAGUE and not _predicts(a):
+        return a.says("insufficient", "the best explanation does not predict held-out readings")
+    return None
+
+
+@_rule("on, and out of its range", "range of the parameter")
+def _on_and_out_of_its_range(a: VerdictQuery) -> Decision | None:
+    """Declared with the effect."""
+    if a.on and not a.leading.pair and _leaves_its_range(a):
+        return a.says(
             "unknown", f"{a.leading} is in the model already and would have to leave its range, so its law does not fit"
-        ),
-        "range of the parameter",
-        "declared with the effect",
-    ),
-    Rule(
-        "twin faults",
-        lambda a: twins(a.leading),
-        lambda a: a.says(
+        )
+    return None
+
+
+@_rule("twin faults")
+def _twin_faults(a: VerdictQuery) -> Decision | None:
+    """Declared: two independent faults of one kind are rare."""
+    if twins(a.leading):
+        return a.says(
             "unknown", "two instruments with the same fault at once; one cause outside the library is more likely"
-        ),
-        "",
-        "declared: two independent faults of one kind are rare",
-    ),
-    Rule(
-        "two levels",
-        lambda a: levels_only(a.leading),
-        lambda a: a.says(
+        )
+    return None
+
+
+@_rule("two levels")
+def _two_levels(a: VerdictQuery) -> Decision | None:
+    """Declared: two shares fit any two levels; density moves both alike, one gain moves one."""
+    if levels_only(a.leading):
+        return a.says(
             "insufficient",
             "thrust and torque are off by two different factors at all points: two faults at once, or a rotor other "
             "than that of the case or the reference",
-        ),
-        "",
-        "declared: two shares fit any two levels; density moves both alike, one gain moves one",
-    ),
-    Rule(
-        "unknown is nearly as likely",
-        lambda a: a.unlisted > BESIDE * mass(a.found, (*a.group, *a.leading, *a.few)),
-        lambda a: a.says("insufficient", "an effect that is not in the library explains the readings nearly as well"),
-        "BESIDE",
-        "DIAGNOSIS 7: lost no right name and stopped the wrong ones",
-    ),
-    Rule(
-        "far rougher than stated",
-        lambda a: a.roughness > ROUGH and a.alone,
-        lambda a: a.says(
+        )
+    return None
+
+
+@_rule("unknown is nearly as likely", "BESIDE")
+def _unknown_is_nearly_as_likely(a: VerdictQuery) -> Decision | None:
+    """DIAGNOSIS 7: lost no right name and stopped the wrong ones."""
+    if a.unlisted > BESIDE * mass(a.found, (*a.group, *a.leading, *a.few)):
+        return a.says("insufficient", "an effect that is not in the library explains the readings nearly as well")
+    return None
+
+
+@_rule("far rougher than stated", "ROUGH")
+def _far_rougher_than_stated(a: VerdictQuery) -> Decision | None:
+    """Declared: end of the prior; hysteresis and resonance show so, and beside a reference they would be in both."""
+    if a.roughness > ROUGH and a.alone:
+        return a.says(
             "insufficient",
             f"the readings scatter {a.roughness:g} times as much as the recording states; no effect explains that",
-        ),
-        "ROUGH",
-        "declared: end of the prior; hysteresis and resonance show so, and beside a reference they would be in both",
-    ),
-    Rule(
-        "may as well be absent",
-        lambda a: not a.leading.pair and len(a.group) <= 1 and holds_off(*next(iter(a.parameters.items()))),
-        lambda a: a.says("insufficient", f"{a.leading} fits best, but the interval of its size includes zero"),
-        "90 % interval",
-        "DIAGNOSIS 7: 4 of 5 wrong names, 0 of 42 right ones",
-    ),
-    Rule(
-        "a wrong unit, but which",
-        lambda a: not a.leading.pair and len(a.group) <= 1 and unsettled(*next(iter(a.parameters.items()))),
-        lambda a: a.says(
+        )
+    return None
+
+
+@_rule("may as well be absent", "90 % interval")
+def _may_as_well_be_absent(a: VerdictQuery) -> Decision | None:
+    """DIAGNOSIS 7: 4 of 5 wrong names, 0 of 42 right ones."""
+    if not a.leading.pair and len(a.group) <= 1 and holds_off(*next(iter(a.parameters.items()))):
+        return a.says("insufficient", f"{a.leading} fits best, but the interval of its size includes zero")
+    return None
+
+
+@_rule("a wrong unit, but which", "SETTLED")
+def _a_wrong_unit_but_which(a: VerdictQuery) -> Decision | None:
+    """Declared after a proof: a slip of the airspeed by 3.3 or 3.6 was wind from the side."""
+    if not a.leading.pair and len(a.group) <= 1 and unsettled(*next(iter(a.parameters.items()))):
+        return a.says(
             "insufficient",
             "a wrong unit of the airspeed fits best, but the readings do not say which one; oblique inflow looks alike",
-        ),
-        "SETTLED",
-        "declared after a proof: a slip of the airspeed by 3.3 or 3.6 was wind from the side",
-    ),
-    Rule(
-        "another blade, or anything that scales all loads",
-        lambda a: a.another_blade and len(a.group) <= 1,
-        lambda a: a.says(
+        )
+    return None
+
+
+@_rule("another blade, or anything that scales all loads", "ANOTHER")
+def _another_blade_or_anything_that_scales_all_loads(a: VerdictQuery) -> Decision | None:
+    """Declared: real recordings at another density than the case's were named section."""
+    if a.another_blade and len(a.group) <= 1:
+        return a.says(
             "insufficient",
             f"all loads are far off; {a.leading} would explain that, but density, speed of rotation or "
             "diameter nearly as well",
-        ),
-        "ANOTHER",
-        "declared: real recordings at another density than the case's were named section",
-    ),
-    Rule(
-        "at the end of its range",
-        lambda a: any(at_end(i, told) and (a.leading.pair or _sizes(i, told) > 1) for i, told in a.parameters.items()),
-        lambda a: a.says(
+        )
+    return None
+
+
+@_rule("at the end of its range", "END")
+def _at_the_end_of_its_range(a: VerdictQuery) -> Decision | None:
+    """Declared: where one number cannot go further, another makes up for something else."""
+    if any(at_end(i, told) and (a.leading.pair or _sizes(i, told) > 1) for i, told in a.parameters.items()):
+        return a.says(
             "insufficient", f"{' and '.join(a.leading)}: fits only with a parameter at the end of its physical range"
-        ),
-        "END",
-        "declared: where one number cannot go further, another makes up for something else",
-    ),
-    Rule(
-        "on already, and no reference",
-        lambda a: a.on and a.alone,
-        lambda a: a.says(
+        )
+    return None
+
+
+@_rule("on already, and no reference")
+def _on_already_and_no_reference(a: VerdictQuery) -> Decision | None:
+    """Declared after a proof named the law of a duct, and of stall delay, where only the solver was another."""
+    if a.on and a.alone:
+        return a.says(
             "insufficient",
             f"{a.leading} fits best, but is in the model already; without a reference an error of its law looks alike",
-        ),
-        "",
-        "declared after a proof named the law of a duct, and of stall delay, where only the solver was another",
-    ),
-    Rule(
-        "two in the air, and no reference",
-        lambda a: a.real and a.leading.pair and all(effects.catalogue()[i].kind == "air" for i in a.leading),
-        lambda a: a.says(
+        )
+    return None
+
+
+@_rule("two in the air, and no reference")
+def _two_in_the_air_and_no_reference(a: VerdictQuery) -> Decision | None:
+    """Declared: the label case of a propeller without a cause was named oblique inflow and untwist (0.99)."""
+    if a.real and a.leading.pair and all(effects.catalogue()[i].kind == "air" for i in a.leading):
+        return a.says(
             "insufficient",
             f"{' and '.join(a.leading)} together fit best; without a reference run the model's own error on this rotor "
             "looks alike",
-        ),
-        "",
-        "declared: the label case of a propeller without a cause was named oblique inflow and untwist (0.99)",
-    ),
-    Rule(
-        "several are sure",
-        lambda a: len(a.sure) > 1,
-        lambda a: a.names(a.sure, min(a.share[i] for i in a.sure)),
-        "SURE, BOTH",
-        "declared; of two each must be surer, so that both are",
-    ),
-    Rule(
-        "one is sure",
-        lambda a: bool(a.sure) and not a.paired and len(a.group) <= 1 and not a.beside and len(a.likely) <= 1,
-        lambda a: a.names(a.sure, a.share[a.sure[0]]),
-        "NAMED, PARTNER",
-        "declared after a proof: names below it were wrong in four of ten",
-    ),
-    Rule(
-        "one is nearly sure",
-        lambda a: bool(a.sure) and not a.paired and len(a.group) <= 1 and not a.beside,
-        lambda a: a.says(
+        )
+    return None
+
+
+@_rule("several are sure", "SURE, BOTH")
+def _several_are_sure(a: VerdictQuery) -> Decision | None:
+    """Declared; of two each must be surer, so that both are."""
+    if len(a.sure) > 1:
+        return a.names(a.sure, min(a.share[i] for i in a.sure))
+    return None
+
+
+@_rule("one is sure", "NAMED, PARTNER")
+def _one_is_sure(a: VerdictQuery) -> Decision | None:
+    """Declared after a proof: names below it were wrong in four of ten."""
+    if bool(a.sure) and not a.paired and len(a.group) <= 1 and not a.beside and len(a.likely) <= 1:
+        return a.names(a.sure, a.share[a.sure[0]])
+    return None
+
+
+@_rule("one is nearly sure", "SURE, NAMED, MOST")
+def _one_is_nearly_sure(a: VerdictQuery) -> Decision | None:
+    """The same."""
+    if bool(a.sure) and not a.paired and len(a.group) <= 1 and not a.beside:
+        return a.says(
             "class", f"{a.leading} is likely, but not sure enough to be named alone", a.likely, mass(a.found, a.likely)
-        ),
-        "SURE, NAMED, MOST",
-        "the same",
-    ),
-    Rule(
-        BESIDE_IT,
-        lambda a: (
-            not a.paired
-            and (len(a.group) <= 1 if a.sure else bool(a.beside) and not a.on and mass(a.found, a.group) >= SURE)
-        ),
-        lambda a: replace(
+        )
+    return None
+
+
+@_rule(BESIDE_IT, "SURE, PARTNER, LIKE, LARGEST")
+def _one_is_sure_another_may_be_there(a: VerdictQuery) -> Decision | None:
+    """Declared."""
+    if not a.paired and (
+        len(a.group) <= 1 if a.sure else bool(a.beside) and not a.on and mass(a.found, a.group) >= SURE
+    ):
+        return replace(
             a.says(
                 "class",
                 f"{' or '.join(a.group)} is present; whether another effect is also present is left open",
@@ -372,26 +430,35 @@ RULES: tuple[Rule, ...] = (
                 mass(a.found, a.group),
             ),
             sets=(a.group, a.beside),
-        ),
-        "SURE, PARTNER, LIKE, LARGEST",
-        "declared",
-    ),
-    Rule("two at work", lambda a: a.paired, _pair, "SURE", "declared"),
-    Rule(
-        "on already, among others",
-        lambda a: a.on and not a.sure,
-        lambda a: a.says(
+        )
+    return None
+
+
+@_rule("two at work", "SURE")
+def _two_at_work(a: VerdictQuery) -> Decision | None:
+    """Declared."""
+    if a.paired:
+        return _pair(a)
+    return None
+
+
+@_rule("on already, among others", "PRESENT, SURE")
+def _on_already_among_others(a: VerdictQuery) -> Decision | None:
+    """Declared: what is on is a cause only where nothing else is left."""
+    if a.on and not a.sure:
+        return a.says(
             "insufficient",
             f"{a.leading} fits best, but is in the model already: its law may be off for this blade, or another cause "
             "looks similar",
-        ),
-        "PRESENT, SURE",
-        "declared: what is on is a cause only where nothing else is left",
-    ),
-    Rule(
-        "look-alikes",
-        lambda a: len(a.group) > 1 and mass(a.found, a.group) >= SURE,
-        lambda a: replace(
+        )
+    return None
+
+
+@_rule("look-alikes", "SURE, NEAR, ALIKE, NAMED, PARTNER")
+def _look_alikes(a: VerdictQuery) -> Decision | None:
+    """DIAGNOSIS 2.7: distance below 3 sigma."""
+    if len(a.group) > 1 and mass(a.found, a.group) >= SURE:
+        return replace(
             a.says(
                 "class",
                 "these look alike in this plan" + ("" if a.wide == a.group else ", or are not much less likely"),
@@ -400,39 +467,141 @@ RULES: tuple[Rule, ...] = (
                 (a.group,),
             ),
             sets=(a.wide,),
-        ),
-        "SURE, NEAR, ALIKE, NAMED, PARTNER",
-        "DIAGNOSIS 2.7: distance below 3 sigma",
-    ),
-    Rule(
-        "sure with its pairs",
-        lambda a: mass(a.found, a.group) >= NAMED,
-        lambda a: a.names(a.group, mass(a.found, a.group)),
-        "NAMED",
-        "declared",
-    ),
-    Rule(
-        "a few are left",
-        lambda a: bool(a.few),
-        lambda a: a.says(
+        )
+    return None
+
+
+@_rule("sure with its pairs", "NAMED")
+def _sure_with_its_pairs(a: VerdictQuery) -> Decision | None:
+    """Declared."""
+    if mass(a.found, a.group) >= NAMED:
+        return a.names(a.group, mass(a.found, a.group))
+    return None
+
+
+@_rule("a few are left", "SURE, MOST")
+def _a_few_are_left(a: VerdictQuery) -> Decision | None:
+    """Declared."""
+    if bool(a.few):
+        return a.says(
             "class",
             "the readings leave these open",
             a.few,
             mass(a.found, a.few),
             (a.group,) if len(a.group) > 1 else (),
-        ),
-        "SURE, MOST",
-        "declared",
-    ),
-    Rule(
-        "many are left",
-        lambda a: True,
-        lambda a: a.says(
-            "insufficient",
-            "several different explanations are possible",
-            classes=(a.group,) if len(a.group) > 1 else (),
-        ),
-        "",
-        "the rest",
-    ),
-)
+        )
+    return None
+
+
+@_rule("many are left")
+def _many_are_left(a: VerdictQuery) -> Decision | None:
+    """The rest."""
+    return a.says(
+        "insufficient",
+        "several different explanations are possible",
+        classes=(a.group,) if len(a.group) > 1 else (),
+    )
+
+
+@_rule("another rotor than the case's", "FACTOR", revises=True)
+def _wrong_rotor_check(a: VerdictQuery) -> Decision | None:
+    """Declared: loads off by a factor of three are those of another rotor, unit or speed before any physics."""
+    said, problem = a.answer, a.found.problem
+    sure = said.effects[:1] if said.rule == BESIDE_IT else said.effects
+    slip = (
+        set(sure) & set(wrong_rotor_check.SLIPS)
+        if said.verdict in ("named", "sensor") or said.rule == BESIDE_IT
+        else ()
+    )
+    if not wrong_rotor_check.foreign(problem) or (slip and not wrong_rotor_check.odd_speed(problem, slip)):
+        return None
+    factor = wrong_rotor_check.FACTOR
+    why = f"the loads are off by more than a factor of {factor:g}: first check that the case describes this rotor"
+    return replace(said, verdict="insufficient", effects=(), classes=(), why=why)
+
+
+@_rule("repeats differ as those of no stand", "UNREPEATABLE", revises=True)
+def _unrepeatable(a: VerdictQuery) -> Decision | None:
+    """Declared: a tenth of the reading between repeats is something that changes and is not recorded."""
+    if not wrong_rotor_check.unrepeatable(a.found.problem) or a.answer.verdict in ("none", "unknown"):
+        return None
+    why = "repeats at one condition differ by more than those of any stand: something that is not recorded changes"
+    return replace(a.answer, verdict="insufficient", effects=(), classes=(), why=why)
+
+
+@_rule("a recording contradicts itself", revises=True)
+def _contradicted(a: VerdictQuery) -> Decision | None:
+    """By definition: what cannot be so is no unknown physics."""
+    if a.answer.verdict != "unknown" or not wrong_rotor_check.impossible(a.found.problem):
+        return None
+    return replace(a.answer, verdict="insufficient", classes=(), why=wrong_rotor_check.CONTRADICTED)
+
+
+@_rule("a wrong density that nobody recorded", revises=True)
+def _density_not_recorded(a: VerdictQuery) -> Decision | None:
+    """By definition: a number that is not in the file has no unit; it only stands for loads off alike."""
+    if a.answer.effects != ("unit_slip",) or any(
+        p.record.air_recorded for p in a.found.problem.parts if not p.record.reference
+    ):
+        return None
+    told = a.refined(a.answer.leading)[1]
+    if told.get("unit_slip", {}).get("channel", {}).get("value") != "density_kg_m3":
+        return None
+    why = (
+        "every load is off by the same share, as by a wrong density, which is not recorded: check units, speed and size"
+    )
+    return replace(a.answer, verdict="insufficient", effects=(), classes=(), why=why)
+
+
+@_rule("the drive changed, the loads say nothing", revises=True)
+def _drive_alone(a: VerdictQuery) -> Decision | None:
+    """Declared: loads that stay open do not veto the drive, unless what changes with time may have loaded the motor."""
+    if a.drive is None or a.answer.effects or a.drive.verdict not in ("named", "class") or a.load_moves:
+        return None
+    return replace(a.drive, by="drive")
+
+
+@_rule("the drive changed as well", revises=True)
+def _drive_too(a: VerdictQuery) -> Decision | None:
+    """Declared: both are measured apart, the loads at the measured speed and the speed at the pulse width."""
+    said, drive = a.answer, a.drive
+    if drive is None or said.by != "model" or said.verdict not in ("named", "sensor"):
+        return None
+    if drive.verdict != "named" or a.load_moves:
+        return None
+    chance = min(said.probability, drive.probability)
+    return replace(said, verdict="named", effects=(*said.effects, *drive.effects), probability=chance, by="both")
+
+
+@_rule("the ratios to the reference forbid a none", "UNCHANGED", revises=True)
+def _ratios_forbid_none(a: VerdictQuery) -> Decision | None:
+    """Documented changes of real stands (cut tips, ducts, density) ended in "none": the case was too uncertain."""
+    said = a.answer
+    if said.by != "model" or said.verdict != "none" or a.alone or a.change is None:
+        return None
+    if a.change.loads.probability.get("none", 1.0) > UNCHANGED or not (moved := ratio_check.clear_changes(a.change)):
+        return None
+    why = f"{moved} from the reference, more than runs do, but no effect explains it better than the case's uncertainty"
+    return replace(said, verdict="insufficient", why=why)
+
+
+@_rule("the ratios to the reference answer", revises=True)
+def _ratios_fill(a: VerdictQuery) -> Decision | None:
+    """Declared: how loads changed between two runs is measured and needs no blade; only some causes scale like that."""
+    said = a.answer
+    if said.by != "model" or said.verdict != "insufficient" or a.alone or a.change is None:
+        return None
+    if a.change.loads.verdict not in CLAIMS:
+        return None
+    ratios = a.change.loads
+    likely = {i: sum(p for k, p in a.P.items() if i in k.ids) for i in a.found.spans}
+    # a single name is not for the ratios to give: they know no blade, and what the diagnosis holds likely may be it
+    several = ratios.verdict == "class"
+    weighed = {*ratios.probability, *(row.id for row in LAWS)} if several else set(ratios.effects)
+    least = LIKELY if several else RARE
+    lone = [i for i, p in sorted(likely.items(), key=lambda kv: -kv[1]) if p >= least and i not in weighed]
+    chance = sum(ratios.probability.get(k, 0.0) for k in ratios.effects)
+    return replace(
+        said, verdict="class" if lone else ratios.verdict, effects=(*ratios.effects, *lone[:MOST]), probability=chance,
+        classes=(), sets=(), why=ratios.why, by="ratios",
+    )  # fmt: skip

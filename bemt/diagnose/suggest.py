@@ -288,9 +288,7 @@ def suggest(
     alone = assemble_alone(problem)
     now = _distance(alone, hyper, *signatures(alone))
     best: tuple[float, _Option | None] = (now, None)
-    # all runs are solved with the same few dozen rotors: each is prepared once
     part = problem.parts[0]
-    part = replace(part, model=replace(part.model, _kept={}))
     for tried in _options(part):
         try:
             extended = _extended(part, tried)

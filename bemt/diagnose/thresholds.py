@@ -2,8 +2,8 @@
 
 __all__ = [
     "ANOTHER", "BESIDE", "BOTH", "EARNED", "END", "ENOUGH", "EXPECTED", "GATE", "IN_SET", "LARGEST", "LEAST",
-    "LEFT_OVER", "LIKE", "MOST", "NAMED", "NEAR", "PARTNER", "PREDICTS", "PROVEN", "RARE", "ROUGH", "SETTLED",
-    "SMALL", "SURE", "VAGUE",
+    "LEFT_OVER", "LIKE", "LIKELY", "MOST", "NAMED", "NEAR", "PARTNER", "PREDICTS", "PROVEN", "RARE", "ROUGH", "SETTLED",
+    "SMALL", "SURE", "UNCHANGED", "VAGUE",
 ]  # fmt: skip
 
 GATE = 0.01
@@ -50,3 +50,6 @@ SETTLED = 0.67
 """Probability of one ratio of units from which a slip of the airspeed is named: between two of them is no slip [1]."""
 END = 0.01
 """As near to an end of its range, a share of it, a parameter of a pair is at the end [1]."""
+UNCHANGED, LIKELY = 0.15, 0.1
+"""Probability of no change in the ratios to the reference below which "none" is no answer; probability in the diagnosis
+from which an effect that no scaling law describes joins the class of the ratios [1]."""

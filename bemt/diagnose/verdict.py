@@ -8,7 +8,7 @@ plan, or a second effect that may be there, too?  Only then is a name given; wit
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -45,9 +45,15 @@ from bemt.diagnose.thresholds import (
 from bemt.effects.base import Effect
 
 if TYPE_CHECKING:
+    from bemt.compare.recordings import RunChange
     from bemt.diagnose.evidence import Evidence
 
-__all__ = ["Asked", "Decision"]
+__all__ = ["BESIDE_IT", "CLAIMS", "Decision", "VerdictQuery"]
+
+BESIDE_IT = "one is sure, another may be there"
+"""Rule after which the second cause may as well be absent."""
+CLAIMS = ("named", "sensor", "class")
+"""Verdicts that give a cause."""
 
 Array = NDArray[np.float64]
 
@@ -82,6 +88,8 @@ class Decision:
         Name of the rule that decided.
     sets : tuple of tuple of str
         One set of effects per cause: one of each is at work.
+    by : str
+        Whose evidence it is: of the "model", of the "drive", of "both", or of the "ratios" to the reference.
     """
 
     verdict: str
@@ -93,10 +101,11 @@ class Decision:
     why: str
     rule: str = ""
     sets: tuple[tuple[str, ...], ...] = ()
+    by: str = "model"
 
 
 @dataclass(eq=False)
-class Asked:
+class VerdictQuery:
     """What the rules ask of an outcome, each worked out when it is first asked.
 
     Attributes
@@ -105,11 +114,59 @@ class Asked:
         Outcome of the weighing.
     p_value : float
         Of the gate [1].
+    drive : Decision or None
+        On the speed over pulse width, where it was recorded.
+    ratios : callable or None
+        Gives the change from the reference, where there is one recording and one reference.
+    steps : list of Decision
+        Answers of the rules so far, the last one in force.
     """
 
     found: Evidence
     p_value: float
+    drive: Decision | None = None
+    ratios: Callable[[], RunChange | None] | None = None
+    steps: list[Decision] = field(default_factory=list)
     _refined: dict[Explanation, tuple[fitting.Fit, dict[str, dict[str, dict[str, Any]]]]] = field(default_factory=dict)
+
+    @property
+    def said(self) -> Decision | None:
+        """Answer so far."""
+        return self.steps[-1] if self.steps else None
+
+    @property
+    def answer(self) -> Decision:
+        """The same, for rules that revise it."""
+        return self.steps[-1]
+
+    @property
+    def of_loads(self) -> Decision:
+        """Answer of the model alone, before drive and ratios."""
+        return next(d for d in reversed(self.steps) if d.by == "model")
+
+    @cached_property
+    def change(self) -> RunChange | None:
+        """Change from the reference."""
+        return None if self.ratios is None else self.ratios()
+
+    @property
+    def of_label(self) -> bool:
+        """Whether the case was made from a label. A blade that is better known speaks for itself, silent or not."""
+        built = [p.as_built for p in self.found.problem.parts]
+        return any(b is not None and b.prior.known_from == "label" for b in built)
+
+    @property
+    def load_moves(self) -> bool:
+        """Whether the loads are likelier to change with time than not, by a cause that is named or by one left open."""
+
+        def moves(ids: Iterable[str]) -> bool:
+            return any("time_s" in effects.catalogue()[i].along and effects.catalogue()[i].kind == "air" for i in ids)
+
+        own = self.of_loads
+        if own.effects or own.verdict == "none":
+            return moves(own.effects)
+        listed = {k: p for k, p in self.P.items() if k}
+        return sum(p for k, p in listed.items() if moves(k)) > 0.5 * sum(listed.values())
 
     @property
     def P(self) -> Mapping[Explanation, float]:

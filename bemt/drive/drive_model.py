@@ -38,15 +38,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bemt.case.drive_schema import LIPO_SOC, LIPO_V
 from bemt.drive.rotor_table import RotorMap
 from bemt.effects.motor_heating import COPPER, MAGNET
 
 Array = NDArray[np.float64]
 EFFECTS = ("battery_sag", "motor_heating", "rotor_inertia", "inflow_lag")
 """Effects of the drive that can be switched off; ids of the diagnosis."""
-LIPO_SOC = (0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
-LIPO_V = (3.27, 3.61, 3.69, 3.73, 3.77, 3.80, 3.84, 3.87, 3.95, 4.02, 4.11, 4.20)
-"""Open-circuit voltage of a lithium polymer cell, as printed on hobby charts: declared, not measured here. [V]"""
 REFERENCE_C = 25.0
 
 

@@ -1,141 +1,384 @@
-"""Thrust over pulse width, hover, endurance and response of a case with its drive: document, files, text."""
+"""What motor and battery make of a rotor: thrust over pulse width, hover, flight time, response, with bands.
+
+One road for a label and for a case: the rotor by `bemt.case.propagate`, the motor by the case's table [drive]. Declared
+unknowns of rotor, motor and battery and the model's own error are carried through to every answer.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
-from bemt.base.tables import csv_text, json_text, number_text, text_table, write_atomic
-from bemt.case import load_case
+from bemt.base.face import as_html
+from bemt.base.tables import csv_text, json_text, number_text, write_atomic
+from bemt.base.units import INCH, KGF
+from bemt.case import Case, case_of, find_cases, fresh, load_case
+from bemt.case.load import with_changes
+from bemt.case.propagate import Propagated, propagate, vary
 from bemt.case.schema import AIRSPEED
-from bemt.drive import drive_file, mission, outputs, picture, rotor_table
+from bemt.drive import case_drive, mission, outputs, picture, rotor_table
 from bemt.drive.drive_model import EFFECTS, Drive, Steady
+from bemt.drive.rotor_table import RotorMap
 
-COLUMNS = {"pulse_us": "pulse [us]", "rpm": "rpm", "thrust_N": "T [N]", "battery_A": "I [A]", "voltage_V": "V [V]",
-           "power_W": "P [W]", "efficiency": "eta"}  # fmt: skip
+Array = NDArray[np.float64]
+SCHEMA = "bemt.drive.result/2"
+COLUMNS = ("pulse_us", "rpm", "thrust_N", "battery_A", "voltage_V", "power_W", "efficiency")
+CARRIED = ("rpm", "thrust_N", "battery_A", "power_W")
 RESULTS = ("drive.json", "drive.csv", "drive.png")
 LOW, HIGH = 0.2, 0.8
 """Shares of full thrust of the step."""
+HOVER_SHARE = 0.5
+"""Hover point as a share of full thrust where no mass is given: a thrust-to-weight ratio of 2."""
+TIPS = (126.0, 190.0, 218.0, 310.0)
+"""Tip speed of K_v times the loaded voltage, without load: 68 % of 1088 motors; 95 % and 99 % below. [m/s]"""
+SHEET = ("drive.motor.winding_drop", "drive.motor.idle_share")
+"""What a motor sheet tells."""
+OPTIONS = {
+    "kv": "drive.kv", "cells": "drive.cells", "mass_kg": "drive.vehicle.mass_kg", "rotors": "drive.vehicle.rotors",
+    "capacity_Ah": "drive.battery.capacity_Ah",
+}  # fmt: skip
+"""Arguments that set values of the table [drive]."""
 
 
 @dataclasses.dataclass(frozen=True)
+class Band:
+    """Value with its standard uncertainty, and that which would be left with a motor sheet."""
+
+    value: float
+    u: float
+    u_with_sheet: float
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
 class DriveResult:
-    """Result of a drive; ``reached`` is False when hover or airspeed is beyond the drive, or a point is unconverged."""
+    """A rotor with its motor and battery; NaN where the drive does not get there.
 
-    document: dict[str, Any]
+    Parameters
+    ----------
+    case : Case
+        With its table [drive].
+    airspeed_m_s : float
+        Of flight. [m/s]
+    full, hover : mapping of str to Band
+        ``rpm``, ``thrust_N``, ``battery_A``, ``power_W``, ``g_per_W`` and, in hover, ``throttle`` [-] and
+        ``minutes`` (of the capacity, or per A h where none is given).
+    steady : bemt.drive.drive_model.Steady
+        Thrust, current and power at pulse widths, (21,).
+    u : mapping of str to (21,) float
+        Standard uncertainty of rpm, thrust_N, battery_A and power_W of `steady`.
+    drive : bemt.drive.drive_model.Drive
+        Battery, ESC, motor and rotor as solved.
+    notes : tuple of str
+        What does not fit, or lies outside of what was measured.
+
+    Examples
+    --------
+    >>> import bemt
+    >>> found = bemt.drive("10x5", kv=1000, cells=3, mass_kg=1.2, rotors=4)
+    >>> found.reached, 0.3 < found.hover["throttle"].value < 0.8, found.to_dict()["schema"]
+    (True, True, 'bemt.drive.result/2')
+    >>> print(found.text.splitlines()[0])
+    prop_10x5, 1000 rev/min/V, 3S at 50% charge, ± one standard deviation
+    """
+
+    case: Case
+    airspeed_m_s: float
+    full: Mapping[str, Band]
+    hover: Mapping[str, Band]
     steady: Steady
+    u: Mapping[str, Array]
     drive: Drive
-    file: drive_file.DriveFile
-    reached: bool
+    response: tuple[mission.Response, ...]
+    course: Any  # the simulated step, None where there is none
+    settled_C: float  # where the winding settles at full throttle [C]
+    notes: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        """Say what is known in a line."""
+        t = case_drive.drive_table(self.case)
+        return f"<drive of {self.case.name}: {t.kv:g} rev/min/V, {t.cells}S, {shown(self.full['thrust_N'], 'N')}>"
+
+    def _repr_html_(self) -> str:
+        """Show the result in a notebook."""
+        return as_html(repr(self)[1:-1], self.text)
+
+    @property
+    def text(self) -> str:
+        """The result for a terminal."""
+        return text(self)
+
+    @property
+    def reached(self) -> bool:
+        """Whether the drive holds airspeed and hover, and every point converged."""
+        settled = bool(np.all(self.steady.converged)) and self.course is not None and bool(self.course.converged)
+        return settled and math.isfinite(self.hover["power_W"].value)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, ``bemt.drive.result/2``; thrust over power in gf/W."""
+        t = case_drive.drive_table(self.case)
+        motor, battery = self.drive.motor, self.drive.battery
+        given = {"kv": t.kv, "cells": t.cells, "soc": t.soc, "airspeed_m_s": self.airspeed_m_s,
+                 "mass_kg": t.vehicle.mass_kg, "rotors": t.vehicle.rotors, "capacity_Ah": t.battery.capacity_Ah,
+                 "resistance_mohm": 1e3 * motor.resistance_ohm, "no_load_A": motor.no_load_A,
+                 "battery_mohm": 1e3 * battery.resistance_ohm}  # fmt: skip
+        parts = {name: {k: vars(b) for k, b in getattr(self, name).items()} for name in ("full", "hover")}
+        steady = {f.name: getattr(self.steady, f.name) for f in dataclasses.fields(Steady)}
+        return {"schema": SCHEMA, "case": self.case.name, "given": given, "off": sorted(self.drive.off), **parts,
+                "steady": steady | {f"u_{k}": v for k, v in self.u.items()},
+                "full_thrust_settled_temperature_C": self.settled_C,
+                "response": [dataclasses.asdict(s) for s in self.response],
+                "unknowns": {item.key: f"{item.range_text} ({item.why})" for item in self.case.assumptions},
+                "notes": list(self.notes)}  # fmt: skip
 
 
-def solve(
-    case_path: str | None,
-    drive_path: str | None = None,
-    off: Sequence[str] = (),
-    airspeed: float = 0.0,
-    out: str | None = None,
-) -> DriveResult:
-    """Solve a case with its drive, ``bemt.drive.result/1``; faults of options, case and drive.toml come at once."""
-    if not case_path:
-        raise InputError(Fault("", "CASE", "nothing", "a case file or its folder", "Or --validate DIR"))
-    wrong = [Fault("", "--off", repr(n), f"one of {', '.join(EFFECTS)}") for n in off if n not in EFFECTS]
-    if not AIRSPEED.low <= airspeed <= AIRSPEED.high:
-        hint = "" if not AIRSPEED.high < airspeed < 3.6 * AIRSPEED.high else "km/h? Divide by 3.6"
-        expected = f"a number from {AIRSPEED.low:g} to {AIRSPEED.high:g} m/s"
-        wrong.append(Fault("", "--airspeed", f"{airspeed:g}", expected, hint))
-    path = Path(case_path)
-    if not path.exists():
-        hint = "Check the path; a label needs its motor: drive 10x5 --kv 900 --cells 3"
-        raise InputError([*wrong, Fault(case_path, "", "no such file or folder", "a case file or its folder", hint)])
-    path = path / "case.toml" if path.is_dir() else path
-    try:  # what is wrong with the files comes with what is wrong with the options
-        case = load_case(path)
-        beside = Path(drive_path) if drive_path else case.folder / "drive.toml"
-        if not beside.is_file():
-            hint = "Without one: --kv and --cells, as in drive 10x5 --kv 900 --cells 3"
-            raise InputError(Fault(beside.as_posix(), "", "no such file", "a drive.toml", hint))
-        file = drive_file.read(beside)
+def case_for(what: str | None, **given: float | None) -> Case:
+    """Case of a label or a file, with the numbers of `OPTIONS` that are given; all faults by the options' names."""
+    path = Path(what or ".")
+    case = load_case(find_cases([path])[0]) if path.exists() else case_of(fresh.label_text(str(what)))
+    return with_drive(case, **given)
+
+
+def with_drive(case: Case, **given: float | None) -> Case:
+    """The case with the numbers of `OPTIONS` that are given in its table [drive], typical losses where it is silent."""
+    changes = {OPTIONS[name]: v for name, v in given.items() if v is not None}
+    if case.file.drive is None and not {"drive.kv", "drive.cells"} <= set(changes):
+        missing = [f"--{name}" for name in ("kv", "cells") if OPTIONS[name] not in changes]
+        hint = "As in: drive 10x5 --kv 900 --cells 3; or a table [drive] in the case"
+        raise InputError([Fault("", name, "nothing", "--kv and --cells together", hint) for name in missing])
+    names = {key: f"--{name.split('_')[0]}" for name, key in OPTIONS.items()}
+    try:
+        return with_changes(case, changes) if changes else case
     except InputError as error:
-        raise InputError([*wrong, *error.faults]) from None
+        raise InputError(
+            [dataclasses.replace(f, file="", where=names[f.where]) if f.where in names else f for f in error.faults]
+        ) from None
+
+
+def solve(case: Case, airspeed_m_s: float = 0.0, off: Sequence[str] = ()) -> DriveResult:
+    """Solve a case with a table [drive]; impossible options come at once."""
+    wrong = [Fault("", "--off", repr(n), f"one of {', '.join(EFFECTS)}") for n in off if n not in EFFECTS]
+    if not AIRSPEED.low <= airspeed_m_s <= AIRSPEED.high:
+        hint = "" if not AIRSPEED.high < airspeed_m_s < 3.6 * AIRSPEED.high else "km/h? Divide by 3.6"
+        expected = f"a number from {AIRSPEED.low:g} to {AIRSPEED.high:g} m/s"
+        wrong.append(Fault("", "--airspeed", f"{airspeed_m_s:g}", expected, hint))
     if wrong:
         raise InputError(wrong)
-    if out:
-        outputs.check("--out", Path(out), RESULTS, [*case.files(), file.path])
-    rotor = rotor_table.from_case(case, 1.02 * file.rpm_max, airspeed, case.air(), file.rotor_inertia_kg_m2)
-    drive = file.drive(rotor).without(*off)
-    pulse = np.linspace(drive.esc.pulse_min_us, drive.esc.pulse_max_us, 21)
-    steady = drive.steady(pulse, file.soc)
-    steps, course = mission.response(drive, LOW, HIGH, file.soc)
-    notes = list(rotor.notes)
+    found, drive, bands, u = _carried(case, airspeed_m_s, off, _answers)
+    table = case_drive.drive_table(case)
+    steady = drive.steady(_pulses(drive), table.soc)
+    steps, course = mission.response(drive, LOW, HIGH, table.soc)
+    notes = [*_unusual(case), *_validity(found, bands["full.rpm"].value), *drive.rotor.notes]
     if course is None:
         full = float(steady.thrust_N[-1])
         got = f"full pulse width gives {full:.2f} N" if math.isfinite(full) else "the air turns it beyond its table"
-        notes.append(f"at {airspeed:g} m/s {got}: the drive does not hold this airspeed, no step")
-    hover = duration = None
-    if math.isfinite(file.mass_kg):
-        hover = mission.hover(drive, file.mass_kg, file.rotors, file.soc)
-        duration = mission.endurance(drive, file.mass_kg, file.rotors, file.soc, file.soc_min)
-    full_pulse = drive.esc.pulse_max_us
-    document: dict[str, Any] = {
-        "schema": "bemt.drive.result/1", "case": case.name, "drive": file.path.as_posix(), "off": sorted(drive.off),
-        "airspeed_m_s": airspeed, "soc": file.soc,
-        "steady": {f.name: getattr(steady, f.name) for f in dataclasses.fields(Steady)},
-        "full_thrust_settled_temperature_C": mission.settled_temperature(drive, full_pulse, file.soc),
-        "hover": dataclasses.asdict(hover) if hover else None,
-        "endurance_s": duration[0] if duration else None, "soc_end": duration[1] if duration else None,
-        "response": [dataclasses.asdict(s) for s in steps], "assumed": dict(file.assumed), "notes": notes,
-    }  # fmt: skip
-    if out:
-        folder = Path(out)
-        rows = [{k: float(getattr(steady, k)[i]) for k in COLUMNS} for i in range(len(pulse))]
-        write_atomic(folder / RESULTS[0], json_text(document))
-        write_atomic(folder / RESULTS[1], csv_text(list(COLUMNS), rows))
-        panels = [
-            {"x": "pulse width [µs]", "y": "thrust [N]", "series": [("", pulse, steady.thrust_N, "-")]},
-            {"x": "pulse width [µs]", "y": "battery current [A]", "series": [("", pulse, steady.battery_A, "-")]},
+        notes.append(f"at {airspeed_m_s:g} m/s {got}: the drive does not hold this airspeed, no step")
+    full_b, hover = (
+        {key.partition(".")[2]: b for key, b in bands.items() if key.startswith(head)} for head in ("full.", "hover.")
+    )
+    settled = mission.settled_temperature(drive, drive.esc.pulse_max_us, table.soc)
+    return DriveResult(case, airspeed_m_s, full_b, hover, steady, u, drive, tuple(steps), course, settled, tuple(notes))
+
+
+def full_throttle(case: Case, airspeed_m_s: float = 0.0, bands: bool = True) -> dict[str, Band]:
+    """Speed, thrust, current and power at full throttle and the stated charge: the one source of maximum thrust."""
+    found = _carried(case, airspeed_m_s, (), _full, bands, rotor_table.UPPER)[2]
+    return {key.partition(".")[2]: band for key, band in found.items()}
+
+
+def full_document(case: Case) -> dict[str, Any] | None:
+    """Full throttle as plain values with its line of text, None for a case without a motor."""
+    if case.file.drive is None:
+        return None
+    full, t = full_throttle(case), case.file.drive
+    return {"kv": t.kv, "cells": t.cells, "soc": t.soc, "text": _line(case, full),
+            **{k: {"value": b.value, "u": b.u} for k, b in full.items()}}  # fmt: skip
+
+
+def _line(case: Case, full: Mapping[str, Band]) -> str:
+    t = case_drive.drive_table(case)
+    return (
+        f"full throttle, {t.kv:g} rev/min/V on {t.cells}S at {t.soc:.0%} charge: "
+        f"{shown(full['thrust_N'], 'N')} at {shown(full['rpm'], 'rev/min')}, {shown(full['battery_A'], 'A')}"
+    )
+
+
+Ask = Callable[[Case, Drive], dict[str, Array]]
+
+
+def _carried(
+    case: Case,
+    airspeed_m_s: float,
+    off: Sequence[str],
+    ask: Ask,
+    bands: bool = True,
+    speeds: Array = rotor_table.SPEEDS,
+) -> tuple[Propagated, Drive, dict[str, Band], dict[str, Array]]:
+    """Answers with their bands: unknowns and errors of the rotor through the drive, then unknowns of the drive."""
+    rpm, V = rotor_table.points(case.diameter_m, 1.02 * case_drive.rpm_max(case), airspeed_m_s, speeds)
+    found = propagate(case, rpm, V, bands=bands)
+    rho, inertia = float(case.air().rho), case_drive.inertia_kg_m2(case)
+
+    def rotor(loads: Mapping[str, Array]) -> RotorMap:
+        return rotor_table.from_loads(case, rpm, V, loads["thrust_N"], loads["torque_Nm"], rho, inertia)
+
+    own = rotor(found.nominal)
+    drive = case_drive.drive_of(case, own).without(*off)
+    if bands:
+        values, by_origin = found.carry(lambda loads: ask(case, dataclasses.replace(drive, rotor=rotor(loads))))
+    else:
+        values, by_origin = ask(case, drive), {}
+    unknown = [item for item in case.assumptions if item.key.startswith("drive.")] if bands else []
+    moved = vary(case, values, lambda c, _: ask(c, case_drive.drive_of(c, own).without(*off)), unknown)
+    nan = {key: np.full(np.shape(v), math.nan) for key, v in values.items()}
+    rest = {key: sum((part[key] ** 2 for part in by_origin.values()), np.zeros(np.shape(v))) if bands else nan[key]
+            for key, v in values.items()}  # fmt: skip
+    sheet = {key: rest[key] + sum(m.u[key] ** 2 for m in moved if m.unknown.key not in SHEET) for key in values}
+    both = {key: rest[key] + sum(m.u[key] ** 2 for m in moved) for key in values}
+    made = {key: Band(float(v[0]), math.sqrt(both[key][0]), math.sqrt(sheet[key][0]))
+            for key, v in values.items() if not key.startswith("steady.")}  # fmt: skip
+    u = {key.partition(".")[2]: np.sqrt(both[key]) for key in values if key.startswith("steady.")}
+    return found, drive, made, u
+
+
+def _pulses(drive: Drive) -> Array:
+    return np.linspace(drive.esc.pulse_min_us, drive.esc.pulse_max_us, 21)
+
+
+def _full(case: Case, drive: Drive) -> dict[str, Array]:
+    full = drive.steady(drive.esc.pulse_max_us, case_drive.drive_table(case).soc)
+    out = {f"full.{key}": np.asarray(getattr(full, key)) for key in CARRIED}
+    with np.errstate(divide="ignore", invalid="ignore"):
+        out["full.g_per_W"] = 1e3 * out["full.thrust_N"] / KGF / out["full.power_W"]
+    return out
+
+
+def _answers(case: Case, drive: Drive) -> dict[str, Array]:
+    """Full throttle, hover and the curve over pulse width."""
+    table = case_drive.drive_table(case)
+    out = _full(case, drive)
+    curve = drive.steady(_pulses(drive), table.soc)
+    out |= {f"steady.{key}": np.asarray(getattr(curve, key)) for key in CARRIED}
+    mass, rotors, soc = table.vehicle.mass_kg, table.vehicle.rotors, table.soc
+    one = HOVER_SHARE * float(out["full.thrust_N"][0]) / KGF if mass is None else mass / rotors
+    h = mission.hover(drive, one, 1, soc)
+    span = drive.esc.pulse_max_us - drive.esc.pulse_min_us
+    hover = {"thrust_N": h.wanted_N, "rpm": h.rpm, "battery_A": h.battery_A, "power_W": h.power_W,
+             "g_per_W": h.g_per_W, "throttle": (h.pulse_us - drive.esc.pulse_min_us) / span}  # fmt: skip
+    if table.battery.capacity_Ah is None:
+        hover["minutes"] = 60.0 * (1.0 - table.soc_min) / (h.battery_A * rotors)
+    else:
+        hover["minutes"] = mission.endurance(drive, one, 1, 1.0, table.soc_min)[0] / 60.0
+    return out | {f"hover.{key}": np.array([value]) for key, value in hover.items()}
+
+
+def _validity(found: Propagated, rpm: float) -> tuple[str, ...]:
+    """Words of the population at the solved point nearest to full throttle."""
+    if not math.isfinite(rpm):
+        return ()
+    return tuple(found.points.flags[int(np.argmin(np.abs(found.points.rpm - rpm)))])
+
+
+def _unusual(case: Case) -> list[str]:
+    """Say when K_v, cells and diameter seldom go together."""
+    table = case_drive.drive_table(case)
+    loaded = float(case_drive.battery_of(table).voc(table.soc)) * (1.0 - (table.battery.sag or 0.06))
+    per_m = math.pi * table.kv * loaded / 60.0
+    tips = case.diameter_m * per_m
+    if tips <= TIPS[2] or case.ducted:
+        return []
+    fit = [v / per_m / INCH for v in TIPS[:2]]
+    rare = tips > TIPS[3]
+    slower = [v / (math.pi * case.diameter_m * loaded) * 60.0 for v in TIPS[:2]]
+    return [
+        f"{'unusual' if rare else 'fast'} combination: without load the tip speed would be {tips:.0f} m/s; 95 % of "
+        f"1088 recorded motors are below {TIPS[2]:.0f}.\n  {table.kv:g} rev/min/V on {table.cells}S suits "
+        f"propellers of {fit[0]:.1f} to {fit[1]:.1f} in; one of {case.diameter_m / INCH:.3g} in suits "
+        f"{slower[0]:.0f} to {slower[1]:.0f} rev/min/V.\n  "
+        + ("A typical motor would overload and burn out; the numbers assume a motor that is large enough." if rare
+           else "This is common for racing; the motor gets hot at full throttle.")
+    ]  # fmt: skip
+
+
+def shown(band: Band, unit: str, scale: float = 1.0) -> str:
+    """Value ± u with digits that u deserves."""
+    value, u = band.value * scale, band.u * scale
+    if not math.isfinite(value):
+        return "-"
+    if not u > 0.0:
+        return f"{number_text(value)} {unit}"
+    digits = min(max(0, 1 - math.floor(math.log10(u))), 2)
+    if u >= 100.0:
+        value, u, digits = round(value, -1), round(u, -1), 0
+    return f"{value:.{digits}f} ± {u:.{digits}f} {unit}"
+
+
+def text(found: DriveResult) -> str:
+    """Lay a result out: one screen."""
+    t, full, hover, drive = case_drive.drive_table(found.case), found.full, found.hover, found.drive
+    lines = [f"{found.case.name}, {t.kv:g} rev/min/V, {t.cells}S at {t.soc:.0%} charge, ± one standard deviation"]
+    lines += [*(f"! {note}" for note in found.notes), ""]
+    mass, rotors = t.vehicle.mass_kg, t.vehicle.rotors
+    where = "half of that thrust" if mass is None else f"hover of {mass:g} kg"
+    one = " (one rotor)" if rotors > 1 else ""
+    lines.append(f"{'':<12}{'full throttle' + one:<28}{where + one}")
+    rows = (
+        ("speed", "rpm", "rev/min", 1.0), ("thrust", "thrust_N", "N", 1.0), ("", "thrust_N", "gf", 1e3 / KGF),
+        ("current", "battery_A", "A", 1.0), ("power", "power_W", "W", 1.0), ("", "g_per_W", "gf/W", 1.0),
+    )  # fmt: skip
+    lines += [f"{name:<12}{shown(full[key], unit, k):<28}{shown(hover[key], unit, k)}" for name, key, unit, k in rows]
+    lines.append(f"{'throttle':<12}{'100 %':<28}{shown(hover['throttle'], '%', 100.0)}")
+    if math.isfinite(hover["power_W"].value):
+        aloft = "min" if t.battery.capacity_Ah is not None else "min per A h of capacity"
+        lines.append(f"{'flight time':<12}{'':<28}{shown(hover['minutes'], aloft)}")
+    else:
+        gives = f"{full['thrust_N'].value:.1f} N" if math.isfinite(full["thrust_N"].value) else "an unknown maximum"
+        lines.append(f"no hover: each rotor needs {hover['thrust_N'].value:.1f} N and gives {gives}")
+    at = range(4, 21, 4)
+    curve = [shown(Band(float(found.steady.thrust_N[i]), float(found.u["thrust_N"][i]), 0.0), "N") for i in at]
+    lines += ["", "thrust at   " + ", ".join(f"{5 * i} %: {words}" for i, words in zip(at, curve, strict=True))]
+    lines += [f"response    thrust {s.before_N:.2f} to {s.after_N:.2f} N: 63 % after {1e3 * s.time63_s:.0f} ms"
+              for s in found.response[:1]]  # fmt: skip
+    if np.any(found.steady.limited):
+        lines.append(f"the ESC's limit of {drive.esc.current_limit_A:g} A acts at full throttle")
+    if drive.motor.thermal_K_W > 0.0 and found.steady.converged[-1]:
+        words = f"{found.settled_C:.0f} C" if math.isfinite(found.settled_C) else "no temperature (it runs away)"
+        over = " above its limit" if not found.settled_C <= (t.motor.max_temperature_C or math.inf) else ""
+        lines.append(f"at full throttle the winding settles at {words}{over}")
+    unknown = {item.key for item in found.case.assumptions}
+    if unknown & set(SHEET):
+        a, b = (1e2 * v / full["battery_A"].value for v in (full["battery_A"].u, full["battery_A"].u_with_sheet))
+        lines += [
+            f"assumed     winding {1e3 * drive.motor.resistance_ohm:.0f} mohm, no-load current "
+            f"{drive.motor.no_load_A:.2g} A: typical of such motors. With both from",
+            f"            the motor's sheet, in [drive.motor] of a case, the current is known to {b:.0f} % instead of "
+            f"{a:.0f} %",
         ]
-        if course is not None:
-            series = [("", course.time_s, course.thrust_N, "-")]
-            panels.append({"x": "time [s]", "y": "thrust [N]", "series": series})
-        write_atomic(folder / RESULTS[2], picture.curves(panels, case.name))
-    reached = hover is None or math.isfinite(hover.pulse_us)
-    settled = bool(np.all(steady.converged)) and course is not None and course.converged
-    return DriveResult(document, steady, drive, file, reached and settled)
-
-
-def text(result: DriveResult) -> str:
-    """Lay a result out for a terminal."""
-    doc, steady, drive, file = result.document, result.steady, result.drive, result.file
-    rows = [[number_text(float(getattr(steady, k)[i])) for k in COLUMNS] for i in range(len(steady.rpm))]
-    lines = [
-        f"{doc['case']}: {file.path.as_posix()}, charge {file.soc:.0%}",
-        text_table(list(COLUMNS.values()), rows, left=()),
-    ]
-    if np.any(steady.limited):
-        lines.append(f"the ESC's limit of {drive.esc.current_limit_A:g} A acts in {int(steady.limited.sum())} rows")
-    warm = doc["full_thrust_settled_temperature_C"]
-    if drive.motor.thermal_K_W > 0.0 and steady.converged[-1]:
-        words = f"{warm:.0f} C" if math.isfinite(warm) else "no temperature (it runs away)"
-        over = " above its limit" if warm > file.max_temperature_C or not math.isfinite(warm) else ""
-        lines.append(f"at full pulse width the winding settles at {words}{over}")
-    if (h := doc["hover"]) is not None:
-        if math.isfinite(h["pulse_us"]):
-            lines.append(
-                f"hover: {h['wanted_N']:.2f} N of each rotor at {h['pulse_us']:.0f} us, {h['rpm']:.0f} rpm, "
-                f"{h['battery_A']:.2f} A, {h['power_W']:.1f} W, {h['g_per_W']:.2f} gf/W"
-            )
-            lines.append(f"endurance: {doc['endurance_s'] / 60.0:.1f} min, to a charge of {doc['soc_end']:.0%}")
-        else:
-            gives = f"{h['full_N']:.1f} N" if math.isfinite(h["full_N"]) else "an unknown maximum"
-            lines.append(f"no hover: each rotor needs {h['wanted_N']:.1f} N and gives {gives}")
-    for s in doc["response"]:
-        lines.append(f"thrust {s['before_N']:.2f} to {s['after_N']:.2f} N: 63 % after {1e3 * s['time63_s']:.1f} ms")
-    lines += [f"! assumed: {key}: {why}" for key, why in file.assumed.items()] + [f"! {note}" for note in doc["notes"]]
+    ask = [name for name, v in (("--mass", mass), ("--capacity", t.battery.capacity_Ah)) if v is None]
+    if ask:
+        lines.append(f"for more results give {' and '.join(ask)}, or mass_kg and capacity_Ah in [drive]")
     return "\n".join(lines) + "\n"
+
+
+def write(found: DriveResult, out: str | Path) -> None:
+    """Write document, curve and picture to a folder, never over a file of the case."""
+    folder, steady = Path(out), found.steady
+    outputs.check("--out", folder, RESULTS, found.case.files())
+    rows = [{k: float(getattr(steady, k)[i]) for k in COLUMNS} | {f"u_{k}": float(v[i]) for k, v in found.u.items()}
+            for i in range(steady.rpm.size)]  # fmt: skip
+    write_atomic(folder / RESULTS[0], json_text(found.to_dict()))
+    write_atomic(folder / RESULTS[1], csv_text(list(rows[0]), rows))
+    panels: list[dict[str, Any]] = [
+        {"x": "pulse width [µs]", "y": "thrust [N]", "series": [("", steady.pulse_us, steady.thrust_N, "-")]},
+        {"x": "pulse width [µs]", "y": "battery current [A]", "series": [("", steady.pulse_us, steady.battery_A, "-")]},
+    ]
+    if found.course is not None:
+        series = [("", found.course.time_s, found.course.thrust_N, "-")]
+        panels.append({"x": "time [s]", "y": "thrust [N]", "series": series})
+    write_atomic(folder / RESULTS[2], picture.curves(panels, found.case.name))

@@ -9,10 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bemt.air import Air
 from bemt.base.errors import Fault, InputError
 from bemt.case import Case
-from bemt.case.prepare import prepare_case
 
 Array = NDArray[np.float64]
 
@@ -86,49 +84,58 @@ def quadratic(
     return RotorMap(math.inf, lambda w: kT * w**2, lambda w: kQ * w**2, slope, R, A, rho, 0.0, inertia_kg_m2)
 
 
-def from_case(
+SPEEDS = np.linspace(0.04, 1.0, 33)
+"""Speeds of the table of a rotor over the greatest."""
+
+
+UPPER = SPEEDS[8::3]
+"""Speeds that are enough for full throttle."""
+
+
+def points(diameter_m: float, rpm_max: float, airspeed_m_s: float, speeds: Array = SPEEDS) -> tuple[Array, Array]:
+    """Speeds [rev/min] and airspeeds [m/s] of which `from_loads` makes a table: each speed twice, the second faster."""
+    rpm = speeds * rpm_max
+    step = 0.02 * math.pi * diameter_m * rpm[-1] / 60.0
+    return np.tile(rpm, 2), airspeed_m_s + np.repeat([0.0, step], rpm.size)
+
+
+def from_loads(
     case: Case,
-    rpm_max: float,
-    airspeed_m_s: float = 0.0,
-    air: Air | None = None,
+    rpm: Array,
+    airspeed_m_s: Array,
+    thrust_N: Array,
+    torque_Nm: Array,
+    rho: float,
     inertia_kg_m2: float = 0.0,
-    points: int = 33,
 ) -> RotorMap:
-    """Rotor of a case by BEMT."""
+    """Rotor of a case from its loads at `points`; loads that are NaN are dropped."""
     from scipy.interpolate import PchipInterpolator
 
-    ready = prepare_case(case)
-    state = air if air is not None else Air.isa(0.0)
-    rpm = np.linspace(0.04, 1.0, points) * rpm_max
-    step = 0.02 * math.pi * ready.diameter_m * rpm[-1] / 60.0
-    got = ready.solve(rpm, airspeed_m_s, state)
-    fast = ready.solve(rpm, airspeed_m_s + step, state)
-    ok = got.converged & np.isfinite(got.thrust_N) & np.isfinite(got.torque_Nm)
-    if np.count_nonzero(ok) < max(4, points // 2):
-        got_text = f"{np.count_nonzero(ok)} of {points} speeds up to {rpm_max:.0f} rev/min converge"
+    half = rpm.size // 2
+    step = airspeed_m_s[-1] - airspeed_m_s[0]
+    known = np.isfinite(thrust_N) & np.isfinite(torque_Nm)
+    ok, both = known[:half], known[:half] & known[half:]
+    if np.count_nonzero(ok) < max(4, half // 2):
+        got_text = f"{np.count_nonzero(ok)} of {half} speeds up to {rpm[-1]:.0f} rev/min converge"
         raise InputError(Fault(case.path.as_posix(), "", got_text, "a rotor that can be solved over its speed range"))
-    notes = [] if np.all(ok) else [f"{points - np.count_nonzero(ok)} of {points} speeds do not converge: dropped"]
-    omega = rpm[ok] * math.pi / 30.0
-    area = math.pi / 4.0 * (ready.diameter_m**2 - (ready.hub_diameter_m**2 if ready.ducted else 0.0))
-    rho = float(state.rho)
-    T, Q = got.thrust_N[ok], got.torque_Nm[ok]
-    tT, tQ = PchipInterpolator(omega, T / omega**2), PchipInterpolator(omega, Q / omega**2)
+    notes = [] if np.all(ok) else [f"{half - np.count_nonzero(ok)} of {half} speeds do not converge: dropped"]
+    omega = rpm[:half][ok] * math.pi / 30.0
+    area = math.pi / 4.0 * (case.diameter_m**2 - (case.hub_diameter_m**2 if case.ducted else 0.0))
+    T, Q = thrust_N[:half], torque_Nm[:half]
+    tT, tQ = PchipInterpolator(omega, T[ok] / omega**2), PchipInterpolator(omega, Q[ok] / omega**2)
     table = RotorMap(
         float(omega[-1]), lambda w: tT(np.clip(w, omega[0], omega[-1])) * w**2,
-        lambda w: tQ(np.clip(w, omega[0], omega[-1])) * w**2, None, 0.5 * ready.diameter_m, area, rho, airspeed_m_s,
-        inertia_kg_m2, tuple(notes),
+        lambda w: tQ(np.clip(w, omega[0], omega[-1])) * w**2, None, 0.5 * case.diameter_m, area, rho,
+        float(airspeed_m_s[0]), inertia_kg_m2, tuple(notes),
     )  # fmt: skip
-    both = ok & fast.converged & np.isfinite(fast.thrust_N)
-    if ready.ducted or np.count_nonzero(both) < 4:
-        why = (
-            "the inflow of a duct follows the fan at once here" if ready.ducted else "no slope of thrust over airspeed"
-        )
+    if case.ducted or np.count_nonzero(both) < 4:
+        why = "the inflow of a duct follows the fan at once here" if case.ducted else "no slope of thrust over airspeed"
         return _with(table, None, (*notes, f"{why}: no lag of the inflow"))
     # slope at fixed induced speed from the solver's, whose induced speed follows (bemt.effects.inflow_lag)
-    w = rpm[both] * math.pi / 30.0
-    dT_dV = (fast.thrust_N[both] - got.thrust_N[both]) / step
-    v = table.induced(got.thrust_N[both])
-    follow = (dT_dV / (2.0 * rho * area) - v) / np.maximum(airspeed_m_s + 2.0 * v, 1e-9)
+    w = rpm[:half][both] * math.pi / 30.0
+    dT_dV = (thrust_N[half:][both] - T[both]) / step
+    v = table.induced(T[both])
+    follow = (dT_dV / (2.0 * rho * area) - v) / np.maximum(airspeed_m_s[0] + 2.0 * v, 1e-9)
     law = PchipInterpolator(w, dT_dV / np.maximum(1.0 + follow, 0.1) / w)
     return _with(table, lambda x: law(np.clip(x, w[0], w[-1])) * x, tuple(notes))
 

@@ -51,7 +51,7 @@ class ArdupilotExport(LoadsExport):
             "pwmMin": 1000,
             "pwmMax": 2000,
         }
-        lines = [f"# {line}" for line in header(job, "ArduPilot frame")]
+        lines = [f"# {line}" for line in header(job, "ArduPilot frame")] + [f"# {job.rotation}"]
         lines += [
             "# mass, num_motors and hoverThrOut are a stand-in: four rotors at half of full thrust. Keep them and",
             "# refVoltage x refCurrent together: SITL works the outflow speed and the effective area out of them.",
@@ -67,7 +67,8 @@ class ArdupilotExport(LoadsExport):
             "of the propeller",
             "MOT_THST_EXPO is for a command that is the share of full speed; ESCs that control duty need less: see "
             "`map`",
-            "no torque and no rpm in this model class",
+            "no torque and no rpm in this model class; yaw comes from the frame's motor table, whose order says which "
+            "motor turns how: a right-handed rotor turns counter-clockwise seen from above",
         ]
 
     def loads(self, files: Files, rpm: Array, airspeed_m_s: Array) -> tuple[Array, Array]:

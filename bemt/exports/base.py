@@ -13,7 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.errors import Fault
-from bemt.exports.performance import Loading, Performance, StatedBand, band_of, loading_of, performance_of, solve_points
+from bemt.exports.performance import (
+    THINNER,
+    Loading,
+    Performance,
+    StatedBand,
+    band_of,
+    loading_of,
+    performance_of,
+    solve_points,
+    thinner_air,
+    zero_thrust,
+)
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -46,6 +57,7 @@ FEATURES = {
     "rest": "static operation (J = 0)",
     "duct": "thrust of the duct as well as the rotor",
     "sections": "section polars, so that the target solves the inflow itself",
+    "rotation": "direction of rotation, which gives the torque its sign",
 }
 """Features that a user can require of a target (``--hold``), in words."""
 
@@ -61,7 +73,8 @@ class Job:
     case : Case
         The case, including changes.
     rpm : float or None
-        Highest speed of tables and fits, speed of a disk; None: from the case. [rev/min]
+        Highest speed of tables and fits, speed of a disk; None: from the case, tables up to full throttle of its motor.
+        [rev/min]
     airspeed_m_s : float or None
         Axial speed of a disk and of frozen polars; None: from the case. [m/s]
     hold : tuple of str
@@ -89,16 +102,39 @@ class Job:
         return self.case.path.as_posix()
 
     @cached_property
+    def full_throttle(self) -> dict[str, Any] | None:
+        """Speed and thrust at full throttle with their u, where the case has a motor."""
+        from bemt.drive.drive_result import full_document
+
+        return full_document(self.case)
+
+    @cached_property
     def performance(self) -> Performance:
-        """Thrust and torque over rpm and advance ratio; solved once."""
-        return performance_of(self.case, self.rpm_top)
+        """Thrust and torque over rpm and advance ratio, up to full throttle where the case has a motor; solved once."""
+        full = self.full_throttle if self.rpm is None else None
+        return performance_of(self.case, full["rpm"]["value"] if full else self.rpm_top)
+
+    @cached_property
+    def J_zero(self) -> float:
+        """Advance ratio of zero thrust at the highest speed. [-]"""
+        return float(zero_thrust(self.case, np.array([self.rpm_top]))[0])
+
+    @cached_property
+    def thinner(self) -> tuple[float, float]:
+        """Change of static CT and CP in air of `THINNER` times the density; solved once. [-]"""
+        return thinner_air(self.case, self.rpm_top)
+
+    @property
+    def rotation(self) -> str:
+        """Direction of rotation in words."""
+        right = self.case.rotor().rotation > 0
+        return f"{'right' if right else 'left'}-handed, {'' if right else 'counter-'}clockwise seen from behind"
 
     @cached_property
     def band(self) -> StatedBand:
         """Standard uncertainty of the prediction, static and at half the airspeed of zero thrust."""
-        t = self.performance
-        top = float(t.rpm[-1])
-        return band_of(self.case, top, (0.0, 0.5 * float(t.J_zero[-1]) * top / 60.0 * t.diameter_m))
+        top = self.rpm_top
+        return band_of(self.case, top, (0.0, 0.5 * self.J_zero * top / 60.0 * self.case.diameter_m))
 
     @cached_property
     def band_at_point(self) -> StatedBand:
@@ -374,34 +410,44 @@ class BladeExport(Export):
         """The case that what is read back is compared with."""
         return job.case
 
-    def checked(self, job: Job, files: Files) -> dict[str, Any]:
-        """Loads of the file read back, at the operating point and over J at its speed, beside those of the case."""
-        import tempfile
-        from pathlib import Path
+    def sections(self, job: Job) -> list[Any] | None:
+        """Fitted section of each anchor; None where the target holds the tables themselves."""
+        return None
 
-        p = job.loading
-        zero = float(job.performance.J_zero[-1])
-        J = np.concatenate([[p.J], zero * np.array([0.0, 0.25, 0.5, 0.75, 0.95])])
-        V = J * p.rpm / 60.0 * 2.0 * p.R
-        truth = solve_points(self.compared(job), p.rpm, V)
-        with tempfile.TemporaryDirectory() as folder:
-            back = self.read_back(job, files, Path(folder))
-            got = solve_points(back, p.rpm, V)
-        errors: dict[str, Any] = {}
-        for name, x, y in (("thrust", got.thrust_N, truth.thrust_N), ("torque", got.torque_Nm, truth.torque_Nm)):
-            share = 100.0 * np.abs(x - y) / np.abs(y).max()
-            errors[name] = {"at_point": float(share[0]), "flight": float(share.max())}
+    def checked(self, job: Job, files: Files) -> dict[str, Any]:
+        """Loads of the case at the operating point, and how far fitted sections are off its tables."""
+        from bemt.exports.blades import section_errors
+
+        p, fitted = job.loading, self.sections(job)
+        errors = None if fitted is None else section_errors(job, fitted)
+        worst = None if errors is None else {key: max(e[key] for e in errors) for key in ("cl", "cd_pct")}
         return {
             "point": p.document(),
-            "fit_error_pct": errors | {"of": "the greatest load at this rpm, read back and solved by this project"},
+            "section_error": worst if worst is None else worst | {"of": "cl, and cd relative, between the stalls"},
             "band": job.band_at_point.document(),
-            "range": {
-                "rpm": p.rpm,
-                "airspeed_m_s": p.airspeed_m_s,
-                "density_kg_m3": p.rho,
-                "flight": "J from 0 to zero thrust at this rpm",
-            },
+            "range": {"rpm": p.rpm, "airspeed_m_s": p.airspeed_m_s, "density_kg_m3": p.rho},
         }
+
+
+def _lost(export: Export, job: Job) -> list[str]:
+    """What the target does not hold, for its notes: direction of rotation, Reynolds number, the end of a table."""
+    out = []
+    if "rotation" not in export.features:
+        out.append(f"the direction of rotation is not in the file: this rotor is {job.rotation}")
+    if export.kind != "loads":
+        return out
+    air, (thrust, torque) = job.case.air(), job.thinner
+    out.append(
+        f"the coefficients hold the Reynolds numbers of the case's air ({air.rho:.4g} kg/m3): at {THINNER:g} of that "
+        f"density, static CT would be {100 * thrust:+.2g} %, CP {100 * torque:+.2g} %"
+    )
+    if {"windmill", "reynolds"} <= export.features:
+        t = job.performance
+        out.append(
+            f"the table covers each speed up to {t.range_document()['airspeed_m_s_greatest']:.3g} m/s and descent to J "
+            f"{t.J[0]:.2g}; beyond, the last coefficient is held, so the drag of a windmill stops growing with airspeed"
+        )
+    return out
 
 
 def entry(export: Export, job: Job, files: Files) -> dict[str, Any]:
@@ -428,10 +474,13 @@ def entry(export: Export, job: Job, files: Files) -> dict[str, Any]:
         "holds": export.holds,
         "features": sorted(export.features),
         "conventions": export.conventions,
+        "rotation": job.rotation,
         "source": export.source,
     }
     found |= export.checked(job, files)
-    found["notes"] = export.notes(job)
+    if export.kind == "loads" and job.rpm is None and job.full_throttle is not None:
+        found["full_throttle"] = job.full_throttle
+    found["notes"] = export.notes(job) + _lost(export, job)
     found["files"] = [
         {"path": name, "bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
         for name, data in ((n, d.encode() if isinstance(d, str) else d) for n, d in files.items())

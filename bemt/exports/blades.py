@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,15 +15,15 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 MOST_STATIONS = 60
-"""Stations that the tools take: QPROP 81, XROTOR and DFDC 60 to 100 by compilation."""
+"""Stations that QPROP (81) and XROTOR (60 to 100, by compilation) take."""
 
 
-def stations(job: Job) -> tuple[Array, Array, Array, bool]:
+def stations(job: Job, most: int = MOST_STATIONS) -> tuple[Array, Array, Array, bool]:
     """Radius [m], chord [m] and angle [rad] of the stations, with what effects do to the blade; whether thinned."""
     blade, p = job.case.rotor().blade, job.loading
-    r, thin = blade.r, blade.r.size > MOST_STATIONS
+    r, thin = blade.r, blade.r.size > most
     if thin:
-        r = np.linspace(blade.r[0], blade.r[-1], MOST_STATIONS)
+        r = np.linspace(blade.r[0], blade.r[-1], most)
     chord, beta = blade.at(r)
     turned = p.beta - blade.at(p.r)[1]  # by effects such as pitch_offset
     return r, chord, beta + np.interp(r, p.r, turned), thin
@@ -41,6 +41,24 @@ def anchors_of(job: Job) -> list[tuple[float, Polar, float]]:
         (x, polar, float(np.interp(where, point.r / point.R, point.Re)))
         for (x, polar), where in zip(found, at, strict=True)
     ]
+
+
+def section_errors(job: Job, sections: list[Any]) -> list[dict[str, float]]:
+    """Greatest error of cl and of cd relative to cd, from the negative to the positive stall, per anchor."""
+    out = []
+    for (x, polar, Re), s in zip(anchors_of(job), sections, strict=True):
+        a = polar.alpha[(polar.alpha >= polar.stall(Re, side=-1)[0]) & (polar.alpha <= polar.stall(Re)[0])]
+        cl, cd = polar.lookup(a, Re)
+        got_l, got_d = s.cl_cd(a, Re)
+        out.append(
+            {
+                "r_over_R": float(x),
+                "Re": Re,
+                "cl": float(np.abs(got_l - cl).max()),
+                "cd_pct": float(100.0 * np.abs(got_d / cd - 1.0).max()),
+            }
+        )
+    return out
 
 
 @dataclass(frozen=True, eq=False)

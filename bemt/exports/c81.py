@@ -28,7 +28,7 @@ class C81Export(BladeExport):
     id = "c81"
     title = "C81 airfoil tables along the blade"
     holds = "cl, cd over angle of attack and Mach number; one Reynolds number per station"
-    features = frozenset({"torque", "airspeed", "windmill", "mach", "density", "rest", "sections"})
+    features = frozenset({"torque", "airspeed", "windmill", "mach", "density", "rest", "sections", "rotation"})
     conventions = "degrees, -180 to 180; 7-character columns, nine values per line; the moment block is zero"
     source = "C81 format as its users write it: A30,6I2 / 7X,9F7.0 / 10F7.0"
 

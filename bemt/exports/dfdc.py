@@ -10,14 +10,16 @@ from numpy.typing import NDArray
 from bemt import __version__
 from bemt.base.errors import Fault
 from bemt.exports.base import BladeExport, Files, Job
-from bemt.exports.blades import stations
+from bemt.exports.blades import section_errors, stations
 from bemt.exports.parts import plain_name
-from bemt.exports.xrotor import section_errors, section_lines, section_notes, sections_of
+from bemt.exports.xrotor import section_lines, section_notes, sections_of
 
 if TYPE_CHECKING:
     from bemt.case import Case
 
 Array = NDArray[np.float64]
+MOST_STATIONS = 30
+"""IRX of DFDC.INC; a file with more is read and gives NaN."""
 
 
 class DfdcExport(BladeExport):
@@ -28,7 +30,7 @@ class DfdcExport(BladeExport):
     holds = "stations, sections as XROTOR's, duct and centre body as outlines; no stator"
     features = frozenset({"torque", "airspeed", "reynolds", "mach", "density", "rest", "duct", "sections"})
     conventions = "metres, x downstream from the lip, beta in degrees from the plane of rotation, RPM in rev/min"
-    source = "DFDC 0.70 documentation (dfdc_doc.txt) and sample cases"
+    source = "DFDC 0.70 documentation (dfdc_doc.txt), sample cases, DFDC.INC (IRX = 30)"
 
     def faults(self, job: Job) -> list[Fault]:
         """Refuse a rotor without walls."""
@@ -43,13 +45,13 @@ class DfdcExport(BladeExport):
         """OPER, AERO, ROTOR and GEOM."""
         p, rotor, duct = job.loading, job.case.rotor(), self.compared(job).duct()
         assert duct is not None
-        r, c, b, _ = stations(job)
+        r, c, b, _ = stations(job, MOST_STATIONS)
         x = duct.rotor_x if duct.rotor_x is not None else duct.length / 3.0
         found = sections_of(job)
         V_ref = max(p.airspeed_m_s, 0.2 * p.omega * p.R)
         rows = [
             "DFDC Version  0.70",
-            f"{job.case.name}, bemt {__version__}"[:80],
+            f"{job.case.name}, {job.rotation}, bemt {__version__}"[:80],
             "",
             "OPER",
             "!        Vinf         Vref          RPM",
@@ -91,10 +93,14 @@ class DfdcExport(BladeExport):
             gone["duct.tip_gap_mm"] = 0.0
         return job.case.replaced(gone) if gone else job.case
 
+    def sections(self, job: Job) -> list[Any]:
+        """As XROTOR's."""
+        return [s for _, s in sections_of(job)]
+
     def notes(self, job: Job) -> list[str]:
         """What DFDC does not hold of the case."""
         return [
-            *section_notes(job, section_errors(job, [s for _, s in sections_of(job)])),
+            *section_notes(job, section_errors(job, self.sections(job)), MOST_STATIONS),
             "the stator and its recovery of swirl are left out",
             "the centre body is a cylinder of the hub's radius with an elliptic nose: not from the case",
             "the tip gap is left out: the wall is drawn in to the blade tip",

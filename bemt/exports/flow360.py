@@ -20,7 +20,9 @@ class Flow360Export(DiskExport):
     id = "flow360"
     title = "Flow360 BET disk"
     holds = "stations and cl, cd over angle of attack, Reynolds and Mach number"
-    features = frozenset({"torque", "airspeed", "windmill", "reynolds", "mach", "density", "rest", "sections", "duct"})
+    features = frozenset(
+        {"torque", "airspeed", "windmill", "reynolds", "mach", "density", "rest", "sections", "duct", "rotation"}
+    )
     conventions = (
         "grid unit 1 m: lengths in m, omega = Omega (1 m)/a; twist in degrees from the plane of rotation; axis "
         "along the thrust; polars [Mach][Re][alpha], alpha from -180 to 180"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import tempfile
 from pathlib import Path
@@ -16,14 +17,25 @@ Array = NDArray[np.float64]
 
 _SLAVE = '''
 
-from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
+from xml.etree.ElementTree import Element, SubElement
+
+from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real
+
+
+UNITS = {{
+    "rpm": ("rev/min", {{"s": "-1", "rad": "1", "factor": "0.10471975511965977"}}, "speed of rotation"),
+    "airspeed_m_s": ("m/s", {{"m": "1", "s": "-1"}}, "axial speed through the air, along the thrust"),
+    "density_kg_m3": ("kg/m3", {{"kg": "1", "m": "-3"}}, "air density"),
+    "thrust_N": ("N", {{"kg": "1", "m": "1", "s": "-2"}}, "thrust"),
+    "torque_Nm": ("N.m", {{"kg": "1", "m": "2", "s": "-2"}}, "shaft torque; the vehicle gets -sense of it"),
+}}
 
 
 class {name}(Fmi2Slave):
     """Inputs rpm, airspeed, density; outputs thrust, torque."""
 
     author = "bemt"
-    description = "propeller table"
+    description = "propeller table, {rotation}"
 
     def __init__(self, **kwargs):
         super().__init__(**kwargs)
@@ -32,10 +44,33 @@ class {name}(Fmi2Slave):
         self.density_kg_m3 = DENSITY
         self.thrust_N = 0.0
         self.torque_Nm = 0.0
-        for word in ("rpm", "airspeed_m_s", "density_kg_m3"):
-            self.register_variable(Real(word, causality=Fmi2Causality.input, variability=Fmi2Variability.continuous))
-        for word in ("thrust_N", "torque_Nm"):
-            self.register_variable(Real(word, causality=Fmi2Causality.output, variability=Fmi2Variability.continuous))
+        self.sense = SENSE
+        for word, (_, _, what) in UNITS.items():
+            kind = Fmi2Causality.output if word in ("thrust_N", "torque_Nm") else Fmi2Causality.input
+            self.register_variable(
+                Real(word, causality=kind, variability=Fmi2Variability.continuous, description=what))
+        self.register_variable(Integer("sense", causality=Fmi2Causality.output, variability=Fmi2Variability.constant,
+                                       description="+1 right-handed, clockwise seen from behind; -1 left-handed"))
+
+    def to_xml(self, model_options=dict()):
+        """Description of the model with the units and initial unknowns that pythonfmu leaves out."""
+        root = super().to_xml(model_options)
+        definitions = Element("UnitDefinitions")
+        for name in dict.fromkeys(unit for unit, _, _ in UNITS.values()):
+            base = next(base for unit, base, _ in UNITS.values() if unit == name)
+            SubElement(SubElement(definitions, "Unit", name=name), "BaseUnit", base)
+        root.insert(list(root).index(root.find("CoSimulation")) + 1, definitions)
+        for variable in root.iter("ScalarVariable"):
+            if variable.get("name") in UNITS:
+                variable.find("Real").set("unit", UNITS[variable.get("name")][0])
+        unknowns = SubElement(root.find("ModelStructure"), "InitialUnknowns")
+        for index, variable in enumerate(root.iter("ScalarVariable"), 1):
+            if variable.get("causality") == "output" and variable.get("variability") != "constant":
+                SubElement(unknowns, "Unknown", index=str(index))
+        return root
+
+    def exit_initialization_mode(self):
+        self.do_step(0.0, 0.0)
 
     def do_step(self, current_time, step_size):
         self.thrust_N, self.torque_Nm = loads(self.rpm, self.airspeed_m_s, self.density_kg_m3)
@@ -49,9 +84,9 @@ class FmuExport(LoadsExport):
     id = "fmu"
     title = "FMU, FMI 2.0 co-simulation"
     holds = "table CT(J, rpm), CP(J, rpm) in Python; density is an input"
-    features = frozenset({"torque", "airspeed", "windmill", "reynolds", "density", "rest", "duct"})
+    features = frozenset({"torque", "airspeed", "windmill", "reynolds", "density", "rest", "duct", "rotation"})
     conventions = (
-        "inputs rpm [rev/min], airspeed_m_s, density_kg_m3; outputs thrust_N, torque_Nm; loads follow at each step"
+        "inputs rpm [rev/min], airspeed_m_s, density_kg_m3; outputs thrust_N, torque_Nm, sense; loads follow each step"
     )
     source = "pythonfmu 0.7; the machine that runs the FMU needs Python with pythonfmu"
     needs = ("pythonfmu",)
@@ -61,9 +96,10 @@ class FmuExport(LoadsExport):
         from pythonfmu.builder import FmuBuilder
 
         name = plain_name(job.case.name)
-        text = table_module(job, "FMU of a propeller") + _SLAVE.format(name=name)
+        text = table_module(job, "FMU of a propeller") + _SLAVE.format(name=name, rotation=job.rotation)
         with tempfile.TemporaryDirectory() as folder:
-            script = Path(folder) / f"{name}_fmu.py"
+            # two units with modules of one name in one process would share the tables of the first
+            script = Path(folder) / f"{name}_{hashlib.sha256(text.encode()).hexdigest()[:12]}.py"
             script.write_text(text, encoding="utf-8")
             FmuBuilder.build_FMU(script, dest=folder)
             made = next(Path(folder).glob("*.fmu"))
@@ -80,4 +116,4 @@ class FmuExport(LoadsExport):
     def loads(self, files: Files, rpm: Array, airspeed_m_s: Array) -> tuple[Array, Array]:
         """The lookup in the unit's source."""
         text = str(next(t for n, t in files.items() if n.endswith("_fmu.py")))
-        return run_module(text.split("\nfrom pythonfmu")[0], rpm, airspeed_m_s)
+        return run_module(text.split("\nfrom xml")[0], rpm, airspeed_m_s)

@@ -32,6 +32,14 @@ NAMES = {
 """Options that say at which point and what a target is to compute."""
 
 
+class PartlyRefused(InputError):
+    """Some targets were refused; the others are written, and `manifest` speaks of them."""
+
+    def __init__(self, faults: list[Fault], manifest: dict[str, Any]) -> None:
+        super().__init__(faults)
+        self.manifest = manifest
+
+
 def export_case(
     case: Case,
     out: Path,
@@ -41,38 +49,105 @@ def export_case(
     flow: Run | None = None,
     hold: tuple[str, ...] = (),
 ) -> dict[str, Any]:
-    """Write one case for one or more targets."""
-    earlier = _listed(out)
-    run = flow or Run()
-    targets, contents = _targets(case, formats, run, hold)
-    solid = [word for word in dict.fromkeys(formats) if exports()[word].kind == "solid"]
-    others = [word for word in solid if word != "openfoam"]
-    if "openfoam" in formats:
-        settings_of(case, run, options)  # its faults come before anything is written
-    try:
-        solids = (
-            export(case.rotor(), case.duct(), out, others, name=case.name, unit=unit, options=options) if others else {}
-        )
-    except GeometryError as error:
-        raise InputError([Fault(case.path.as_posix(), *fault) for fault in error.faults]) from error
-    manifest = solids
-    if "openfoam" in formats:
-        manifest = write_openfoam(case, out, run, options)
-        if solids:
-            manifest |= {"volumes_m3": solids["volumes_m3"], "files": [*solids["files"], *manifest["files"]]}
-            write_atomic(out / MANIFEST, json.dumps(manifest, indent=1) + "\n")
-    if targets:
-        manifest = (manifest or {"schema": SCHEMA, "name": case.name, "files": []}) | {"targets": plain(targets)}
-        (out / MANIFEST).unlink(missing_ok=True)  # a manifest never speaks of files that are being replaced
-        for name, data in contents.items():
-            write_atomic(out / name, data)
-            if str(data)[:2] == "#!":
-                os.chmod(out / name, 0o755)
-        write_atomic(out / MANIFEST, json.dumps(manifest, indent=1) + "\n")
+    """Write one case for one or more targets; each is whole or not there.
+
+    Formats of an earlier export of the same case stay, in the folder and in its manifest.
+
+    Returns
+    -------
+    dict
+        Manifest of what was written now; ``kept``: formats that stay from before, ``stale``: those of them that were
+        written from another state of the case.
+
+    Raises
+    ------
+    PartlyRefused
+        If some targets were refused; the others are written.
+    InputError
+        If all were, or the folder holds another case; nothing is written.
+    """
+    run, before = flow or Run(), _manifest(out)
+    if before.get("name", case.name) != case.name:
+        got, wanted = f"the export of {before['name']!r}", f"a folder without an export, or with one of {case.name!r}"
+        raise InputError(Fault((out / MANIFEST).as_posix(), "name", got, wanted, "Give each case an --out of its own"))
+    words = list(dict.fromkeys(formats))
+    solid = [word for word in words if exports()[word].kind == "solid" and word != "openfoam"]
+    manifest, faults = _targets(case, out, words, run, hold)
+    if solid:
+        try:
+            made = export(case.rotor(), case.duct(), out, solid, name=case.name, unit=unit, options=options)
+            manifest = _joined(manifest, made)
+        except GeometryError as error:
+            faults += [Fault(case.path.as_posix(), *fault) for fault in error.faults]
+    if "openfoam" in words:
+        try:
+            settings_of(case, run, options)  # its faults come before anything is written
+            manifest = _joined(manifest, write_openfoam(case, out, run, options))
+        except InputError as error:
+            faults += error.faults
     if manifest:
-        now = _hashes(manifest)
-        _remove(out, {path: digest for path, digest in earlier.items() if path not in now})
+        content = case.content_hash()
+        kept = _kept(before, manifest, out)
+        stale = sorted(word for word, digest in kept["case_sha256"].items() if digest != content)
+        manifest["case_sha256"] = dict.fromkeys(_formats(manifest), content)
+        write_atomic(out / MANIFEST, json.dumps(_joined(kept, manifest), indent=1) + "\n")
+        now = _hashes(_joined(kept, manifest))
+        _remove(out, {path: digest for path, digest in _listed(before).items() if path not in now})
+        manifest |= {"kept": sorted(kept["case_sha256"]), "stale": stale}
+    told = list(dict.fromkeys(faults))
+    if told and not manifest:
+        raise InputError(told)
+    if told:
+        raise PartlyRefused(told, manifest)
     return manifest
+
+
+def _formats(manifest: Mapping[str, Any]) -> list[str]:
+    """Formats that a manifest speaks of."""
+    out = [item["format"] for item in manifest["files"] if item["format"] != "openfoam"]
+    out += ["openfoam"] if "openfoam" in manifest else []
+    return list(dict.fromkeys(out + [item["target"] for item in manifest.get("targets", [])]))
+
+
+def _joined(first: dict[str, Any], second: dict[str, Any]) -> dict[str, Any]:
+    """Both manifests in one; the second is the newer."""
+    joined = {**first, **second}
+    for key in ("volumes_m3", "case_sha256"):
+        if key in first or key in second:
+            joined[key] = {**first.get(key, {}), **second.get(key, {})}
+    for key in ("files", "targets"):
+        if key in first or key in second:
+            joined[key] = [*first.get(key, []), *second.get(key, [])]
+    return joined
+
+
+def _kept(before: dict[str, Any], manifest: dict[str, Any], out: Path) -> dict[str, Any]:
+    """What stays of the manifest before: formats that were not asked for again and whose files are as they were."""
+    gone, digests = set(_formats(manifest)), before.get("case_sha256", {})
+
+    def there(files: Mapping[str, str], folder: str = "") -> bool:
+        return all(_unchanged(out, folder + path, digest) for path, digest in files.items())
+
+    kept = {key: value for key, value in before.items() if key not in ("files", "targets", "openfoam", "case_sha256")}
+    flow = before.get("openfoam")
+    if flow is not None and "openfoam" not in gone and there(flow.get("files", {})):
+        kept["openfoam"] = flow
+    kept["files"] = [
+        item
+        for item in before.get("files", [])
+        if item.get("format", "openfoam") not in gone
+        and (item.get("format") != "openfoam" or "openfoam" in kept)
+        and "format" in item
+        and there({item["path"]: item["sha256"]})
+    ]
+    targets = [
+        item
+        for item in before.get("targets", [])
+        if item["target"] not in gone and there({f["path"]: f["sha256"] for f in item["files"]}, f"{item['target']}/")
+    ]
+    if targets:
+        kept["targets"] = targets
+    return kept | {"case_sha256": {word: digests.get(word, "") for word in _formats(kept)}}
 
 
 def _hashes(manifest: Mapping[str, Any]) -> dict[str, str]:
@@ -84,25 +159,42 @@ def _hashes(manifest: Mapping[str, Any]) -> dict[str, str]:
     return files | dict(manifest.get("openfoam", {}).get("files", {}))
 
 
-def _listed(out: Path) -> dict[str, str]:
-    """Files of the export that is in a folder; none when its manifest is not one of ours."""
+def _manifest(out: Path) -> dict[str, Any]:
+    """Manifest of the export that is in a folder; empty when it is not one of ours."""
     try:
         manifest = json.loads((out / MANIFEST).read_text(encoding="utf-8"))
-        found = _hashes(manifest) if manifest["schema"] == SCHEMA else {}
-        return {Path(path).as_posix(): digest for path, digest in found.items() if "\0" not in path}
+        _hashes(manifest)
+        known = manifest["schema"] == SCHEMA and all(
+            isinstance(manifest.get(key, {}), dict) for key in ("openfoam", "volumes_m3", "case_sha256")
+        )
+        return dict(manifest) if known else {}
     except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return {}
+
+
+def _listed(manifest: Mapping[str, Any]) -> dict[str, str]:
+    """Files of an earlier export, and what was in them."""
+    found = _hashes(manifest) if manifest else {}
+    return {Path(path).as_posix(): digest for path, digest in found.items() if "\0" not in path}
+
+
+def _unchanged(out: Path, name: str, digest: str) -> bool:
+    """Whether a file of the manifest is below the folder, no link, and as it was written."""
+    if "\0" in name:
+        return False
+    home = out.resolve()
+    path = (home / name).parent.resolve() / Path(name).name
+    inside = path.is_relative_to(home) and not path.is_symlink() and path.is_file()  # anybody may edit a manifest
+    return inside and file_hash(path) == digest
 
 
 def _remove(out: Path, files: Mapping[str, str]) -> None:
     """Remove files of an earlier export that are below a folder and unchanged, and folders that they leave empty."""
     home = out.resolve()
     for name, digest in files.items():
-        path = (home / name).parent.resolve() / Path(name).name
-        if not path.is_relative_to(home) or path.is_symlink() or not path.is_file():
-            continue  # a manifest is a file that anybody may have edited
-        if file_hash(path) != digest:
+        if not _unchanged(out, name, digest):
             continue
+        path = (home / name).parent.resolve() / Path(name).name
         path.unlink()
         for folder in path.parents:
             if folder == home or any(folder.iterdir()):
@@ -111,21 +203,34 @@ def _remove(out: Path, files: Mapping[str, str]) -> None:
 
 
 def _targets(
-    case: Case, formats: list[str], run: Run, hold: tuple[str, ...]
-) -> tuple[list[dict[str, Any]], dict[str, str | bytes]]:
-    """Manifest entries and files of all targets that are no solids; all faults at once, before anything is written."""
-    chosen = [exports()[word] for word in dict.fromkeys(formats) if exports()[word].kind != "solid"]
+    case: Case, out: Path, formats: list[str], run: Run, hold: tuple[str, ...]
+) -> tuple[dict[str, Any], list[Fault]]:
+    """Write the targets that are no solids; manifest of those that could be written, and why the others were not."""
     job = Job(case, run.rpm, run.airspeed_m_s, hold)
-    faults = [fault for target in chosen for fault in target.faults(job)]
-    if faults:
-        raise InputError(faults)
     entries: list[dict[str, Any]] = []
-    contents: dict[str, str | bytes] = {}
-    for target in chosen:
-        files = target.write(job)
-        entries.append(entry(target, job, files))
-        contents |= {f"{target.id}/{name}": data for name, data in files.items()}
-    return entries, contents
+    faults: list[Fault] = []
+    for target in (exports()[word] for word in formats if exports()[word].kind != "solid"):
+        found = target.faults(job)
+        try:
+            if not found:
+                files = target.write(job)
+                made = plain(entry(target, job, files))
+        except InputError as error:
+            found = list(error.faults)
+        if found:
+            faults += found
+            continue
+        if not entries:
+            (out / MANIFEST).unlink(missing_ok=True)  # a manifest never speaks of files that are being replaced
+        for name, data in files.items():
+            path = out / target.id / name
+            write_atomic(path, data)
+            if str(data)[:2] == "#!":
+                os.chmod(path, 0o755)
+        entries.append(made)
+    if not entries:
+        return {}, faults
+    return {"schema": SCHEMA, "name": case.name, "files": [], "targets": entries}, faults
 
 
 def export_cases(
@@ -140,8 +245,8 @@ def export_cases(
 ) -> tuple[list[tuple[dict[str, Any], Path]], list[InputError]]:
     """Write a case for its targets, or all cases of a folder, each into a folder of its own.
 
-    Returns manifests with their folders, and why others were refused. Faults of the options are raised before anything
-    is written.
+    Returns manifests with their folders, and why cases or targets were refused. Faults of the options are raised before
+    anything is written.
     """
     flow = flow or Run()
     faults = check_run(flow, NAMES) + _unused(flow, formats, hold)
@@ -166,6 +271,9 @@ def export_cases(
         folder = Path(out) / case.name if len(paths) > 1 else Path(out)
         try:
             made.append((export_case(case, folder, formats, unit, options, flow, hold), folder))
+        except PartlyRefused as error:
+            made.append((error.manifest, folder))
+            refused.append(error)
         except InputError as error:
             refused.append(error)
     return made, refused
@@ -212,6 +320,9 @@ def _targets_text(manifest: dict[str, Any], out: Path) -> list[str]:
             shown_errors.append(f"{word} {'not held' if worst is None else number_text(worst, 3) + ' %'}")
         if error:
             lines.append(f"  greatest error {', '.join(shown_errors)} (of {error['of']})")
+        if item.get("section_error"):
+            cl, cd = (number_text(item["section_error"][key], 2) for key in ("cl", "cd_pct"))
+            lines.append(f"  sections: cl within {cl}, cd within {cd} % between the stalls")
         if "band" in item:
             band = item["band"]
             speeds = dict.fromkeys(zip(band["airspeed_m_s"], band["thrust_pct"], band["torque_pct"], strict=True))
@@ -220,7 +331,12 @@ def _targets_text(manifest: dict[str, Any], out: Path) -> list[str]:
                 for v, t, q in speeds
             )
             lines.append(f"  standard uncertainty of the prediction: {words} ({band['origin']})")
+            lines += [f"  ! {flag}" for flag in band["flags"]]
         lines += [f"  note: {note}" for note in item["notes"]]
+    if manifest.get("kept"):
+        lines.append(f"kept from an earlier export into {out}: {', '.join(manifest['kept'])}")
+    if manifest.get("stale"):
+        lines.append(f"  of another state of the case, export them again: {', '.join(manifest['stale'])}")
     return lines
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.exports.base import Files, Job, LoadsExport
-from bemt.exports.parts import header, plain_name, static_fit
+from bemt.exports.parts import header, inertia_estimate, plain_name, static_fit
 
 Array = NDArray[np.float64]
 
@@ -19,35 +19,50 @@ class GazeboExport(LoadsExport):
     id = "gazebo"
     title = "Gazebo multicopter motor model (SDF)"
     holds = "T = motorConstant W^2, Q = momentConstant T; no airspeed, density baked in"
-    features = frozenset({"torque", "rest"})
+    features = frozenset({"torque", "rest", "rotation"})
     conventions = "motorConstant in N/(rad/s)^2, momentConstant Q/T in m; turningDirection ccw seen from above"
     source = "gz-sim MulticopterMotorModel.cc; rotors_simulator gazebo_motor_model.cpp"
 
     def write(self, job: Job) -> Files:
-        """SDF fragment fitted at rest."""
+        """SDF model of a stand whose plugin is fitted at rest."""
         t, name = job.performance, plain_name(job.case.name)
-        kT, kQ = static_fit(t)
+        (kT, kQ), izz = static_fit(t), inertia_estimate(job)
         comment = "\n".join(f"<!-- {line.replace('--', '-')} -->" for line in header(job, "Gazebo motor model"))
         text = f"""<?xml version="1.0"?>
 {comment}
-<!-- motorNumber, joint, link, topic and time constants are the vehicle's, not the propeller's: set them -->
-<plugin filename="gz-sim-multicopter-motor-model-system" name="gz::sim::systems::MulticopterMotorModel">
- <jointName>rotor_0_joint</jointName>
- <linkName>rotor_0</linkName>
- <turningDirection>{"ccw" if t.sense > 0 else "cw"}</turningDirection>
- <maxRotVelocity>{t.rpm[-1] * np.pi / 30.0:.9g}</maxRotVelocity>
- <motorConstant>{kT:.12e}</motorConstant>
- <momentConstant>{kQ / kT:.12e}</momentConstant>
- <rotorDragCoefficient>0</rotorDragCoefficient>
- <rollingMomentCoefficient>0</rollingMomentCoefficient>
- <motorType>velocity</motorType>
-</plugin>
+<!-- a stand: move the plugin into your vehicle and set motorNumber, joint, link, topic and time constants -->
+<sdf version="1.9">
+ <model name="{name}_stand">
+  <link name="base"><inertial><mass>1</mass></inertial></link>
+  <link name="rotor_0">
+   <inertial>
+    <mass>0.01</mass>
+    <inertia><ixx>{izz:.6g}</ixx><iyy>{izz:.6g}</iyy><izz>{izz:.6g}</izz></inertia>
+   </inertial>
+  </link>
+  <joint name="rotor_0_joint" type="revolute">
+   <parent>base</parent><child>rotor_0</child><axis><xyz>0 0 1</xyz></axis>
+  </joint>
+  <plugin filename="gz-sim-multicopter-motor-model-system" name="gz::sim::systems::MulticopterMotorModel">
+   <jointName>rotor_0_joint</jointName>
+   <linkName>rotor_0</linkName>
+   <turningDirection>{"ccw" if t.sense > 0 else "cw"}</turningDirection>
+   <maxRotVelocity>{t.rpm[-1] * np.pi / 30.0:.9g}</maxRotVelocity>
+   <motorConstant>{kT:.12e}</motorConstant>
+   <momentConstant>{kQ / kT:.12e}</momentConstant>
+   <rotorDragCoefficient>0</rotorDragCoefficient>
+   <rollingMomentCoefficient>0</rollingMomentCoefficient>
+   <motorType>velocity</motorType>
+  </plugin>
+ </model>
+</sdf>
 """
         return {f"{name}_motor.sdf": text}
 
     def notes(self, job: Job) -> list[str]:
         """What this model class leaves out."""
         return [
+            "base, rotor link and joint are a stand: the plugin is what goes into your vehicle",
             "the constants hold at rest; thrust does not fall with airspeed here: see fit_error_pct.thrust.flight",
             "rotorDragCoefficient and rollingMomentCoefficient are 0: flow across the shaft is not in the case",
             "a right-handed propeller turns clockwise seen from behind, which is from below on a multicopter: ccw from "
@@ -58,6 +73,6 @@ class GazeboExport(LoadsExport):
     def loads(self, files: Files, rpm: Array, airspeed_m_s: Array) -> tuple[Array, Array]:
         """Motor model at speed W, whatever the airspeed."""
         root = ET.fromstring(str(next(iter(files.values()))))
-        k, m = (float(root.findtext(key) or "nan") for key in ("motorConstant", "momentConstant"))
+        k, m = (float(root.findtext(f".//{key}") or "nan") for key in ("motorConstant", "momentConstant"))
         T = k * (rpm * np.pi / 30.0) ** 2
         return T, m * T

@@ -22,9 +22,10 @@ class JsbsimExport(LoadsExport):
     id = "jsbsim"
     title = "JSBSim propeller with a stand"
     holds = "tables CT(J, rpm), CP(J, rpm), linear, held at the ends; density of the simulation"
-    features = frozenset({"torque", "airspeed", "windmill", "reynolds", "density", "rest"})
+    features = frozenset({"torque", "airspeed", "windmill", "reynolds", "density", "rest", "rotation"})
     conventions = (
-        "C_THRUST = T/(rho n^2 D^4), C_POWER = P/(rho n^3 D^5), J = V/(n D); sense +1 is clockwise seen from behind; "
+        "C_THRUST = T/(rho n^2 D^4), C_POWER = P/(rho n^3 D^5), J = V/(n D); sense in the thruster of "
+        "the aircraft, +1 clockwise seen from behind; "
         "the column of a table is rpm/1000, passed on as blade-angle by the system file"
     )
     source = "JSBSim 1.3 FGPropeller.cpp: GetThrust, GetPowerRequired; blade-angle is free with constspeed 0"
@@ -54,7 +55,6 @@ class JsbsimExport(LoadsExport):
  <minpitch> 0 </minpitch>
  <maxpitch> {2.0 * top:.9g} </maxpitch>
  <constspeed> 0 </constspeed>
- <sense> {t.sense} </sense>
  <p_factor> 0 </p_factor>
 {table("C_THRUST", t.CT)}
 {table("C_POWER", t.CP)}
@@ -80,7 +80,7 @@ class JsbsimExport(LoadsExport):
             f"engine/{name}_propeller.xml": propeller,
             f"engine/{name}_motor.xml": motor,
             f"systems/{name}_speed.xml": system,
-            f"aircraft/{name}_stand/{name}_stand.xml": _stand(name),
+            f"aircraft/{name}_stand/{name}_stand.xml": _stand(name, t.sense),
         }
 
     def notes(self, job: Job) -> list[str]:
@@ -89,6 +89,8 @@ class JsbsimExport(LoadsExport):
             "ixx is an estimate from the blades' sections at 1400 kg/m3, hub and motor left out: replace it",
             "the power of the motor is 1.3 times the greatest shaft power; it limits nothing below",
             "the system file serves engine 0; repeat it for others",
+            "sense stands in the thruster element of the aircraft file, where JSBSim reads it: take it into yours",
+            "a stopped propeller (0 rev/min) has neither thrust nor drag in JSBSim",
             "tip Mach number changes with speed at the air of the table only",
         ]
 
@@ -108,7 +110,7 @@ class JsbsimExport(LoadsExport):
         return table_loads(speeds, J, CT, tables["C_POWER"][2], rho, D, rpm, airspeed_m_s)
 
 
-def _stand(name: str) -> str:
+def _stand(name: str, sense: int) -> str:
     """An aircraft that only carries the propeller; no aerodynamics, 1 kg."""
     return f"""<?xml version="1.0"?>
 <fdm_config name="{name}_stand" version="2.0" release="BETA">
@@ -126,6 +128,7 @@ def _stand(name: str) -> str:
  <propulsion>
   <engine file="{name}_motor">
    <thruster file="{name}_propeller">
+    <sense> {sense} </sense>
     <location unit="M"> <x> 0 </x> <y> 0 </y> <z> 0 </z> </location>
     <orient unit="DEG"> <roll> 0 </roll> <pitch> 0 </pitch> <yaw> 0 </yaw> </orient>
    </thruster>

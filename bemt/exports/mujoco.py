@@ -55,7 +55,7 @@ class MujocoExport(LoadsExport):
     id = "mujoco"
     title = "MuJoCo site, actuators and table"
     holds = "table CT(J, rpm), CP(J, rpm) by a Python call before each step; density of the simulation"
-    features = frozenset({"torque", "airspeed", "windmill", "reynolds", "density", "rest"})
+    features = frozenset({"torque", "airspeed", "windmill", "reynolds", "density", "rest", "rotation"})
     conventions = (
         "force along +z of the site, reaction torque -sense Q about it; gear 1, so data.ctrl is in N and N m; a plain "
         "site motor with a torque gear would hold Q proportional to T only"

@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from bemt.base.errors import Fault, InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
+    from bemt.air import Air
     from bemt.bem.model import Model
     from bemt.case import Case
     from bemt.dataset import Dataset
@@ -25,31 +24,38 @@ N_RPM = 16
 N_J = 25
 """Steps from J = 0 to the greatest J of zero thrust."""
 BELOW, BEYOND = 3, 5
-"""Steps below J = 0 and beyond zero thrust: simulators hold the end of a table."""
+"""Steps of that size below J = 0 and beyond zero thrust."""
+DIVE = 1.2
+"""Airspeed up to which each speed of a table is covered, over that of zero thrust at the greatest speed."""
+GROWTH = 1.05
+"""Ratio of neighbouring J in the windmill, where coefficients grow as J^2: linear between them within 0.1 %."""
+SLOW_DESCENT = 8
+"""Steps through the descent of an open rotor, down to twice the induced speed at rest."""
 
 
-def _prepared(case: Case, overrides: Mapping[str, Any] | None = None) -> Model:
+def _prepared(case: Case) -> Model:
     from bemt.case.prepare import prepare_case
 
-    return prepare_case(case, overrides)
+    return prepare_case(case)
 
 
 def solve_points(
-    case: Case,
-    rpm: ArrayLike,
-    airspeed_m_s: ArrayLike,
-    overrides: Mapping[str, Any] | None = None,
-    ready: Model | None = None,
+    case: Case, rpm: ArrayLike, airspeed_m_s: ArrayLike, ready: Model | None = None, air: Air | None = None
 ) -> Dataset:
-    """Solve points of a case; the one place of the exports that asks the solver for loads."""
+    """Solve points of a case without bands, in its own air unless another is given; an unsolved point is refused."""
     rpm, V = np.broadcast_arrays(np.asarray(rpm, dtype=float), np.asarray(airspeed_m_s, dtype=float))
-    found = (ready or _prepared(case, overrides)).solve(rpm.ravel(), V.ravel(), case.air(overrides))
-    if not found.converged.all():
-        bad = int(np.flatnonzero(~found.converged)[0])
+    found = (ready or _prepared(case)).solve(rpm.ravel(), V.ravel(), air or case.air())
+    _refuse(case, found, found.converged)
+    return found
+
+
+def _refuse(case: Case, found: Dataset, good: NDArray[np.bool_]) -> None:
+    """Refuse to write anything of points that are not good."""
+    if not good.all():
+        bad = int(np.flatnonzero(~good)[0])
         where = f"{found.rpm[bad]:g} rev/min, {found.airspeed_m_s[bad]:g} m/s"
         words = "; ".join(found.flags[bad]) or "not converged"
         raise InputError(Fault(case.path.as_posix(), where, words, "a converged point", "Nothing was written"))
-    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +114,8 @@ class Performance:
             "tip_mach_greatest": float(np.pi * n[-1] * self.diameter_m / self.a_sound),
             "density_kg_m3": self.rho,
             "diameter_m": self.diameter_m,
-            "flight": "J from 0 to zero thrust; axial flow, steady; beyond it the momentum theory is doubtful",
+            "airspeed_m_s_greatest": float(self.J[-1] * n[0] * self.diameter_m),
+            "flight": "J from 0 to zero thrust; axial flow, steady; doubtful in descent and as a windmill",
         }
 
 
@@ -132,7 +139,7 @@ def table_loads(
     return np.asarray(ct * scale), np.asarray(cp * scale * D / (2.0 * np.pi))
 
 
-def _zero_thrust(J: Array, CT: Array) -> float:
+def _crossing(J: Array, CT: Array) -> float:
     """First J above 0 where CT falls through zero, NaN without one."""
     ahead = J >= 0.0
     j, c = J[ahead], CT[ahead]
@@ -143,44 +150,83 @@ def _zero_thrust(J: Array, CT: Array) -> float:
     return float(j[k] + c[k] * (j[k + 1] - j[k]) / (c[k] - c[k + 1]))
 
 
+def zero_thrust(case: Case, rpm: Array) -> Array:
+    """Advance ratio at which thrust vanishes at each speed [rev/min], (R,); refused where there is none [-]."""
+    ready, air = _prepared(case), case.air()
+
+    def thrust(J: Array) -> Array:
+        """Thrust at J (R, K)."""
+        n = np.broadcast_to(rpm[:, None], J.shape)
+        found = ready.solve(n.ravel(), (J * n / 60.0 * ready.diameter_m).ravel(), air)
+        return np.where(found.converged, found.thrust_N, np.nan).reshape(J.shape)
+
+    for reach in (4.0, 16.0):  # blades that are all but feathered lose their thrust late
+        J = np.broadcast_to(np.linspace(0.0, reach, 161), (rpm.size, 161))
+        first = np.array([_crossing(j, row) for j, row in zip(J, thrust(J), strict=True)])
+        if not np.isnan(first).any():
+            break
+    if np.isnan(first).any():
+        got = f"no zero of thrust below J = {reach:g} at {rpm[int(np.flatnonzero(np.isnan(first))[0])]:.0f} rev/min"
+        wanted, hint = "a rotor with static thrust and none at speed", "A table over J has no end without it"
+        raise InputError(Fault(case.path.as_posix(), "operating", got, wanted, hint))
+    near = np.maximum(first[:, None] + reach / 160.0 * np.linspace(-1.0, 1.0, 33), 0.0)
+    closer = np.array([_crossing(j, row) for j, row in zip(near, thrust(near), strict=True)])
+    return np.where(np.isnan(closer), first, closer)
+
+
+def _nodes(J_zero: float, CT_rest: float, ducted: bool) -> Array:
+    """Advance ratios of a table (K,): even through the flight range, wider in descent and in the windmill.
+
+    Programs hold the ends of a table, so the ends lie where a simulated aircraft hardly gets: up to the J of the lowest
+    speed at `DIVE` times the airspeed at which the greatest speed has no thrust; down to the descent at twice the
+    induced speed at rest (J of the induced speed: sqrt(2 CT / pi), momentum theory), where the vortex ring state ends.
+    A duct from behind is not modelled: its table ends just below J = 0.
+    """
+    step = J_zero / N_J
+    near = step * np.arange(-BELOW, N_J + BEYOND + 1)
+    last = DIVE * J_zero / LOWEST
+    far = np.geomspace(near[-1], last, 1 + int(np.ceil(np.log(last / near[-1]) / np.log(GROWTH))))[1:]
+    J = np.concatenate([near, far])
+    deepest = -2.0 * np.sqrt(2.0 * max(CT_rest, 0.0) / np.pi)
+    if not ducted and deepest < near[0] - step:
+        J = np.concatenate([np.linspace(deepest, near[0], SLOW_DESCENT + 1)[:-1], J])
+    J[int(np.argmin(np.abs(J)))] = 0.0
+    return J
+
+
 def performance_of(case: Case, rpm_top: float) -> Performance:
-    """Tabulate a case from a quarter of a speed up to it, from below J = 0 to beyond zero thrust."""
+    """Tabulate a case from a quarter of a speed up to it, from descent to the windmill.
+
+    Inside the flight range (`BELOW` steps under J = 0 to `BEYOND` steps over zero thrust) every point must converge.
+    Outside, from the first point of a row that does not, or whose tip is sonic, the force of the point before goes on:
+    with the square of the airspeed in the windmill, constant in descent.
+    """
     ready = _prepared(case)
     D, air = ready.diameter_m, case.air()
     rpm = np.asarray(
         rpm_top * np.linspace(LOWEST, 1.0, N_RPM), dtype=float
     )  # equal steps: Mach number matters at the upper end
-
-    def solve(J: Array, speeds: Array) -> tuple[Array, Array]:
-        n, j = np.meshgrid(speeds, J, indexing="ij")
-        found = solve_points(case, n, j * n / 60.0 * D, ready=ready)
-        return found.thrust_N.reshape(n.shape), found.torque_Nm.reshape(n.shape)
-
-    def zeros(J: Array) -> Array:
-        T, _ = solve(J, rpm)
-        return np.array([_zero_thrust(J, row) for row in T])
-
-    for reach in (4.0, 16.0):  # blades that are all but feathered lose their thrust late
-        wide = np.linspace(0.0, reach, 161)
-        first = zeros(wide)
-        if not np.isnan(first).any():
-            break
-    if np.isnan(first).any():
-        got = f"no zero of thrust below J = {wide[-1]:g} at {rpm[int(np.flatnonzero(np.isnan(first))[0])]:.0f} rev/min"
-        raise InputError(
-            Fault(
-                case.path.as_posix(),
-                "operating",
-                got,
-                "a rotor with static thrust and none at speed",
-                "A table over J has no end without it",
-            )
-        )
-    step = float(first.max()) / N_J
-    J = np.asarray(step * np.arange(-BELOW, N_J + BEYOND + 1), dtype=float)
-    J[BELOW] = 0.0
-    T, Q = solve(J, rpm)
-    fine = np.linspace(0.0, 1.02 * float(first.max()), 409)
+    J_zero = zero_thrust(case, rpm)
+    greatest = float(J_zero.max())
+    rest = float(solve_points(case, rpm_top, 0.0, ready=ready).thrust_N[0])
+    J = _nodes(greatest, rest / (air.rho * (rpm_top / 60.0) ** 2 * D**4), case.ducted)
+    n, j = np.meshgrid(rpm, J, indexing="ij")
+    V = j * n / 60.0 * D
+    step = greatest / N_J
+    flight = (j > -(BELOW + 0.5) * step) & (j < (N_J + BEYOND + 0.5) * step)
+    T, Q = np.full(n.shape, np.nan), np.full(n.shape, np.nan)
+    inside = solve_points(case, n[flight], V[flight], ready=ready)
+    T[flight], Q[flight] = inside.thrust_N, inside.torque_Nm
+    found = ready.solve(n[~flight], V[~flight], air)
+    good = found.converged & (np.hypot(np.pi * n[~flight] / 60.0 * D, V[~flight]) < air.a_sound)
+    T[~flight], Q[~flight] = (np.where(good, load, np.nan) for load in (found.thrust_N, found.torque_Nm))
+    for row in range(rpm.size):
+        held = np.flatnonzero(np.isnan(T[row]))
+        ends = (np.min(held[J[held] > 0.0], initial=J.size), np.max(held[J[held] < 0.0], initial=-1))
+        up, down = slice(ends[0], None), slice(0, ends[1] + 1)
+        for load in (T, Q):
+            load[row, up] = load[row, ends[0] - 1] * (J[up] / J[ends[0] - 1]) ** 2
+            load[row, down] = load[row, ends[1] + 1]
     scale = air.rho * (rpm[:, None] / 60.0) ** 2 * D**4
     return Performance(
         name=case.name,
@@ -190,7 +236,7 @@ def performance_of(case: Case, rpm_top: float) -> Performance:
         torque_Nm=Q,
         CT=T / scale,
         CP=2.0 * np.pi * Q / (scale * D),
-        J_zero=zeros(fine),
+        J_zero=J_zero,
         diameter_m=D,
         rho=float(air.rho),
         a_sound=float(air.a_sound),
@@ -200,50 +246,65 @@ def performance_of(case: Case, rpm_top: float) -> Performance:
     )
 
 
+THINNER = 0.75
+"""Density for :func:`thinner_air` over that of the case: about 2,900 m higher."""
+
+
+def thinner_air(case: Case, rpm: float) -> tuple[float, float]:
+    """Change of static CT and CP where the density alone falls to `THINNER` of the case's: Reynolds number [-]."""
+    from dataclasses import replace
+
+    air, ready = case.air(), _prepared(case)
+    base = solve_points(case, rpm, 0.0, ready=ready)
+    thin = solve_points(case, rpm, 0.0, ready=ready, air=replace(air, rho=THINNER * air.rho))
+    thrust, torque = (
+        float(getattr(thin, name)[0] / (THINNER * getattr(base, name)[0]) - 1.0) for name in ("thrust_N", "torque_Nm")
+    )
+    return thrust, torque
+
+
 @dataclass(frozen=True)
 class StatedBand:
-    """Relative standard uncertainty of thrust and torque at two airspeeds. [-]"""
+    """Thrust and torque at two airspeeds with their relative standard uncertainty [1], and what is wrong there."""
 
     thrust: tuple[float, float]
     torque: tuple[float, float]
+    thrust_N: tuple[float, float]
+    torque_Nm: tuple[float, float]
     rpm: float
     airspeed_m_s: tuple[float, float]
     origin: str
+    flags: tuple[str, ...]  # Of both points, each once
 
     def document(self) -> dict[str, Any]:
-        """For the manifest, in per cent."""
+        """For the manifest, uncertainties in per cent."""
         return {
             "rpm": self.rpm,
             "airspeed_m_s": list(self.airspeed_m_s),
+            "thrust_N": list(self.thrust_N),
             "thrust_pct": [100.0 * u for u in self.thrust],
+            "torque_Nm": list(self.torque_Nm),
             "torque_pct": [100.0 * u for u in self.torque],
             "level": "one standard uncertainty",
             "origin": self.origin,
+            "flags": list(self.flags),
         }
 
 
 def band_of(case: Case, rpm: float, airspeed_m_s: tuple[float, float]) -> StatedBand:
-    """Spread of the loads over the assumptions of a case, and of rotors as built around what is known of them."""
-    from bemt.sweep.case import spread
-    from bemt.sweep.model_error import u_model
+    """Loads at a speed and two airspeeds with the band of `bemt.case.propagate`."""
+    from bemt.case.propagate import propagate
 
-    n, V = np.full(2, float(rpm)), np.array(airspeed_m_s, dtype=float)
-    names = ("thrust_N", "torque_Nm")
-    model, air = _prepared(case), case.air()
-    points = model.solve(n, V, air)
-    base = solve_points(case, n, V, ready=model)
-    own = u_model(case, model, points, air)
-    variance = np.array([own[name] for name in names]) ** 2
-    for assumption in case.assumptions:
-        runs = [solve_points(case, n, V, {assumption.key: value}) for value in assumption.values]
-        for k, name in enumerate(names):
-            nominal = getattr(base, name)
-            variance[k] += spread(assumption.discrete, nominal, [getattr(run, name) for run in runs]) ** 2
+    found = propagate(case, rpm, airspeed_m_s).points
+    _refuse(case, found, np.isfinite(found.u["thrust_N"]) & np.isfinite(found.u["torque_Nm"]))
+    (T0, T1), (Q0, Q1) = ((float(v[0]), float(v[1])) for v in (found.thrust_N, found.torque_Nm))
     with np.errstate(divide="ignore"):
-        u = np.sqrt(variance) / np.abs([base.thrust_N, base.torque_Nm])
+        u = [found.u[name] / np.abs(found[name]) for name in ("thrust_N", "torque_Nm")]
+    thrust, torque = ((float(v[0]), float(v[1])) for v in u)
     origin = f"{len(case.assumptions)} declared assumptions of the case and the spread of rotors as built"
-    (T0, T1), (Q0, Q1) = u.tolist()
-    return StatedBand((T0, T1), (Q0, Q1), float(rpm), (float(V[0]), float(V[1])), origin)
+    flags = tuple(dict.fromkeys(flag for point in found.flags for flag in point))
+    V0, V1 = airspeed_m_s
+    return StatedBand(thrust, torque, (T0, T1), (Q0, Q1), float(rpm), (float(V0), float(V1)), origin, flags)
 
 
 @dataclass(frozen=True, eq=False)

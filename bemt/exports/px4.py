@@ -10,6 +10,8 @@ from bemt.exports.parts import header, plain_name, static_fit
 
 Array = NDArray[np.float64]
 INCH = 0.0254
+MOST_CT = 100.0
+"""Greatest CA_ROTORi_CT that the firmware takes (control_allocator/module.yaml)."""
 
 
 class Px4Export(LoadsExport):
@@ -18,19 +20,29 @@ class Px4Export(LoadsExport):
     id = "px4"
     title = "PX4 parameters (SIH, control allocation)"
     holds = "forward propeller: CT(J), CP(J) quadratic, concave (CT2, CP2 <= 0); lifting rotor: T_MAX u, Q_MAX u"
-    features = frozenset({"torque", "airspeed", "windmill", "density", "rest"})
+    features = frozenset({"torque", "airspeed", "windmill", "density", "rest", "rotation"})
     conventions = "CT = T/(rho n^2 D^4), CP = P/(rho n^3 D^5), J = V/(n D); diameter in inches, RPM_MAX in rev/min"
-    source = "PX4 1.17 simulator_sih: sih_params.yaml (ranges), documentation of the SIH propeller model"
+    source = "PX4 1.17 simulator_sih: sih.cpp, sih_params.yaml (ranges); control_allocator/module.yaml"
 
     def write(self, job: Job) -> Files:
-        """Parameter lines as QGroundControl and airframe scripts take them."""
+        """Parameter lines as airframe scripts take them: one file for the simulator, one for the vehicle."""
         t, name = job.performance, plain_name(job.case.name)
         ct, cp = fits(job)
         kT, kQ = static_fit(t)
         W = t.rpm[-1] * np.pi / 30.0
         f = thrust_factor(t.rpm, t.thrust_N[:, t.at_rest])
-        lines = [f"# {line}" for line in header(job, "PX4 parameters")]
-        lines += ["# Forward propeller of the SIH (fixed wing, tailsitter, pusher)"]
+        head = [f"# {line}" for line in header(job, "PX4 parameters")]
+        allocation = [
+            "# Control allocation, rotor 0: T = CT u^2 [N], Q = KM T; KM > 0 turns counter-clockwise from above"
+        ]
+        if kT * W**2 <= MOST_CT:
+            allocation.append(f"param set-default CA_ROTOR0_CT {kT * W**2:.9g}")
+        else:
+            allocation.append(
+                f"# CA_ROTOR0_CT is left at its default: {kT * W**2:.6g} N is above the {MOST_CT:g} that PX4 takes"
+            )
+        allocation.append(f"param set-default CA_ROTOR0_KM {t.sense * kQ / kT:.9g}")
+        lines = [*head, "# Forward propeller of the SIH (fixed wing, tailsitter, pusher)"]
         lines += [
             f"param set-default SIH_F_DIA_INCH {t.diameter_m / INCH:.9g}",
             f"param set-default SIH_F_RPM_MAX {t.rpm[-1]:.9g}",
@@ -41,36 +53,47 @@ class Px4Export(LoadsExport):
             for k, value in enumerate(fit)
         ]
         lines += [
-            "# Lifting rotor of the SIH: largest static thrust [N] and torque [N m]",
+            "# Lifting rotor of the SIH, T = SIH_T_MAX u, Q = SIH_Q_MAX u: largest static thrust [N] and torque [N m]",
             f"param set-default SIH_T_MAX {kT * W**2:.9g}",
             f"param set-default SIH_Q_MAX {kQ * W**2:.9g}",
-            "# Control allocation, rotor 0: T = CT u^2 [N], Q = KM T; u is the share of full speed",
-            f"param set-default CA_ROTOR0_CT {kT * W**2:.9g}",
-            f"param set-default CA_ROTOR0_KM {t.sense * kQ / kT:.9g}",
-            "# Thrust curve T/T_max = f u^2 + (1 - f) u",
-            f"param set-default THR_MDL_FAC {f:.6g}",
+            "# Thrust is linear in u here, so the thrust curve is the straight one",
+            "param set-default THR_MDL_FAC 0",
         ]
-        return {f"{name}.params": "\n".join(lines) + "\n"}
+        vehicle = [*head, "# Thrust curve T/T_max = f u^2 + (1 - f) u, u the share of full speed; not for the SIH"]
+        vehicle += [f"param set-default THR_MDL_FAC {f:.6g}"]
+        return {
+            f"{name}_sih.params": "\n".join([*lines, *allocation]) + "\n",
+            f"{name}_vehicle.params": "\n".join([*vehicle, *allocation]) + "\n",
+        }
 
     def notes(self, job: Job) -> list[str]:
         """Ranges and what u means."""
         return [
             "PX4 admits CT2 and CP2 up to 0 only: where the best quadratic bends upwards, a straight line is written",
-            "u of THR_MDL_FAC and CA_ROTOR0_CT is the share of full speed (an ESC that controls speed); for an ESC "
-            "that controls duty fit THR_MDL_FAC to a bench map (`map`)",
-            "the sign of KM is for a rotor that turns as the case says; PX4 counts ccw from above as positive",
+            "two files: thrust in the SIH is linear in u, so THR_MDL_FAC is 0; the vehicle gets the rotor's curve",
+            "u of the vehicle's THR_MDL_FAC is the share of full speed (an ESC that controls speed); for an ESC that "
+            "controls duty fit it to a bench map (`map`)",
+            "the sign of KM is for a rotor that turns as the case says; PX4 counts ccw from above as positive. The SIH "
+            "fixes the directions of its own rotors and takes no direction for the forward propeller",
+            f"CA_ROTOR0_CT is written up to the {MOST_CT:g} that PX4 takes; the allocation is normalised, so with "
+            "equal rotors the value does not matter",
             "one quadratic for all speeds: Reynolds and Mach number are averaged over the table",
         ]
 
     def loads(self, files: Files, rpm: Array, airspeed_m_s: Array) -> tuple[Array, Array]:
         """Forward propeller of the SIH at the density of the table."""
-        text = str(next(iter(files.values())))
-        p = {w[2]: float(w[3]) for w in (line.split() for line in text.splitlines()) if w[:1] == ["param"]}
+        text = str(next(t for n, t in files.items() if n.endswith("_sih.params")))
+        p = parameters(text)
         rho = float(text.split("density ")[1].split()[0])
         n, D = rpm / 60.0, p["SIH_F_DIA_INCH"] * INCH
         J = airspeed_m_s / (n * D)
         ct, cp = (sum(p[f"SIH_F_C{word}{k}"] * J**k for k in range(3)) for word in "TP")
         return ct * rho * n**2 * D**4, cp * rho * n**2 * D**5 / (2.0 * np.pi)
+
+
+def parameters(text: str) -> dict[str, float]:
+    """Values that a file sets."""
+    return {w[2]: float(w[3]) for w in (line.split() for line in text.splitlines()) if w[:1] == ["param"]}
 
 
 def fits(job: Job) -> tuple[Array, Array]:

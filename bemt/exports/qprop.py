@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from bemt import __version__
 from bemt.exports.base import BladeExport, Files, Job
-from bemt.exports.blades import anchors_of, stations
+from bemt.exports.blades import anchors_of, section_errors, stations
 from bemt.exports.parts import plain_name
-from bemt.exports.xrotor import section_errors, section_notes
+from bemt.exports.xrotor import section_notes
 from bemt.sections.parametric import QpropSection, fit_qprop
 
 Anchors = list[tuple[float, QpropSection]]
@@ -30,7 +32,12 @@ class QpropExport(BladeExport):
         r, c, b, _ = stations(job)
         found = _sections(job)
         first = found[0][1]
-        rows = [f"{job.case.name}, bemt {__version__}", "", f" {p.blades} {p.R:.10g}  ! Nblades [ R ]", ""]
+        rows = [
+            f"{job.case.name}, {job.rotation}, bemt {__version__}",
+            "",
+            f" {p.blades} {p.R:.10g}  ! Nblades [ R ]",
+            "",
+        ]
         rows += [
             f" {first.cl0:.12g} {first.cla:.12g}  ! CL0 CL_a",
             f" {first.clmin:.12g} {first.clmax:.12g}  ! CLmin CLmax",
@@ -45,10 +52,14 @@ class QpropExport(BladeExport):
             rows.append(row)
         return {f"{plain_name(job.case.name)}.qprop": "\n".join(rows) + "\n"}
 
+    def sections(self, job: Job) -> list[Any]:
+        """Fitted at the Reynolds number of the operating point."""
+        return [s for _, s in _sections(job)]
+
     def notes(self, job: Job) -> list[str]:
         """How well the sections hold."""
         return [
-            *section_notes(job, section_errors(job, [s for _, s in _sections(job)])),
+            *section_notes(job, section_errors(job, self.sections(job))),
             "QPROP has no hub radius: the blade begins at the first station",
             "wake and tip loss are QPROP's own",
         ]

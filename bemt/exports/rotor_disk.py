@@ -48,7 +48,7 @@ class RotorDiskExport(DiskExport):
     id = "rotor-disk"
     title = "OpenFOAM rotorDisk with BEMT's load"
     holds = "T'(r), Q'(r) of one operating point, prescribed; the flow does not change them"
-    features = frozenset({"torque", "rest", "reynolds", "mach"})
+    features = frozenset({"torque", "rest", "reynolds", "mach", "rotation"})
     conventions = (
         "axis +z along the thrust, free stream along -z, origin in the disk, metres; profile rows are (deg Cd Cl), "
         "blade rows (profile (r deg chord)); the solver prints lift = thrust/rho, its drag is no torque"

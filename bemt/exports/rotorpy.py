@@ -17,8 +17,11 @@ class RotorpyExport(LoadsExport):
     id = "rotorpy"
     title = "RotorPy rotor parameters"
     holds = "T = k_eta W^2 - k_z W V (CT linear in J, needs aero=True), Q = k_m W^2; density baked in"
-    features = frozenset({"torque", "airspeed", "rest"})
-    conventions = "N/(rad/s)^2, N m/(rad/s)^2, N/(rad/s)/(m/s); speeds in rad/s; V along the body's z"
+    features = frozenset({"torque", "airspeed", "rest", "rotation"})
+    conventions = (
+        "N/(rad/s)^2, N m/(rad/s)^2, N/(rad/s)/(m/s); speeds in rad/s; V along the body's z; rotor_direction: the "
+        "sign of the reaction about z (up)"
+    )
     source = "rotorpy 3.0 vehicles/multirotor.py, compute_body_wrench"
 
     def write(self, job: Job) -> Files:
@@ -36,6 +39,9 @@ rotor_params = {{
     "k_m": {k_m:.12e},  # Q = k_m W^2  [N m/(rad/s)^2]
     "rotor_speed_max": {t.rpm[-1] * np.pi / 30.0:.9g},  # end of the table [rad/s]
 }}
+# Entry of this rotor in quad_params["rotor_directions"]: the sign of the yaw moment on the vehicle (z up). A
+# right-handed rotor turns counter-clockwise seen from above, so its reaction is clockwise: -1.
+rotor_direction = {-t.sense}
 """
         return {f"{name}_rotor_params.py": text}
 

@@ -20,7 +20,7 @@ class SimulinkExport(LoadsExport):
     id = "simulink"
     title = "Simulink lookup tables (.mat)"
     holds = "tables CT(rpm, J), CP(rpm, J), linear, held at the ends"
-    features = frozenset({"torque", "airspeed", "windmill", "reynolds", "density", "rest", "duct"})
+    features = frozenset({"torque", "airspeed", "windmill", "reynolds", "density", "rest", "duct", "rotation"})
     source = "MATLAB documentation: n-D Lookup Table, interpolation linear, extrapolation clip"
 
     def write(self, job: Job) -> Files:

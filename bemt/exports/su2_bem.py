@@ -30,7 +30,7 @@ class Su2BemExport(DiskExport):
         alpha = degrees[keep]
         angle = float(np.degrees(job.case.rotor().blade.at(0.75 * p.R)[1]))
         rows = [
-            "# Geometric parameters of propeller",
+            f"# Geometric parameters of propeller: {job.rotation}",
             f"{p.blades}           : number of blades",
             f"{2.0 * p.R:.9g}       : diameter (m)",
             f"{p.Rhub:.9g}     : radius of hub  (m)",

@@ -28,6 +28,7 @@ class Su2DiskExport(DiskExport):
         body = "\n".join(f" {a:.8f} {t:.9e} {q:.9e} 0.0" for a, t, q in zip(x, ct, cp, strict=True))
         scale = p.rho * n**2 * D**4
         text = f"""# {job.case.name}: {p.rpm:.9g} rev/min, {p.airspeed_m_s:.9g} m/s, {p.rho:.9g} kg/m3; load by BEMT
+# {job.rotation}
 # CT = {p.thrust_N / scale:.9g}, CP = {2 * np.pi * p.torque_Nm / (scale * D):.9g} (rotor alone)
 MARKER_ACTDISK= DISK DISK_BACK
 CENTER= 0.0 0.0 0.0

@@ -46,7 +46,7 @@ class TableExport(LoadsExport):
     id = "table"
     title = "tables as CSV, JSON and a C header"
     holds = "tables CT(rpm, J), CP(rpm, J), linear, held at the ends"
-    features = frozenset({"torque", "airspeed", "windmill", "reynolds", "density", "rest", "duct"})
+    features = frozenset({"torque", "airspeed", "windmill", "reynolds", "density", "rest", "duct", "rotation"})
     source = "own format"
 
     def write(self, job: Job) -> Files:
@@ -90,6 +90,7 @@ def _c_header(job: Job, p: str) -> str:
         f"#define {P}_TABLE_H",
         f"#define {P}_DIAMETER_M {t.diameter_m:.12g}",
         f"#define {P}_DENSITY_KG_M3 {t.rho:.12g}",
+        f"#define {P}_SENSE {t.sense} /* +1 right-handed: the reaction on the vehicle is -SENSE x torque */",
         f"#define {P}_N_RPM {t.rpm.size}",
         f"#define {P}_N_J {t.J.size}",
         f"static const double {p}_rpm[{t.rpm.size}] = {row(t.rpm)};",

@@ -8,7 +8,7 @@ import numpy as np
 
 from bemt import __version__
 from bemt.exports.base import BladeExport, Files, Job
-from bemt.exports.blades import MOST_STATIONS, anchors_of, stations
+from bemt.exports.blades import MOST_STATIONS, anchors_of, section_errors, stations
 from bemt.exports.parts import plain_name
 from bemt.sections.parametric import XrotorSection, fit_xrotor
 
@@ -28,7 +28,7 @@ class XrotorExport(BladeExport):
         p = job.loading
         r, c, b, _ = stations(job)
         V = max(p.airspeed_m_s, 0.01 * p.omega * p.R)
-        rows = ["XROTOR VERSION:  7.55", f"{job.case.name}, bemt {__version__}"[:80]]
+        rows = ["XROTOR VERSION:  7.55", f"{job.case.name}, {job.rotation}, bemt {__version__}"[:80]]
         rows += [
             "!         Rho          Vso          Rmu           Alt",
             f" {p.rho:.9g} {p.a_sound:.9g} {p.mu:.9g} 999.0",
@@ -51,10 +51,14 @@ class XrotorExport(BladeExport):
         rows += ["!      URDuct", " 1.0"]
         return {f"{plain_name(job.case.name)}.xrotor": "\n".join(rows) + "\n"}
 
+    def sections(self, job: Job) -> list[Any]:
+        """Fitted at the Reynolds number of the operating point."""
+        return [s for _, s in sections_of(job)]
+
     def notes(self, job: Job) -> list[str]:
         """How well the sections hold."""
         return [
-            *section_notes(job, section_errors(job, [s for _, s in sections_of(job)])),
+            *section_notes(job, section_errors(job, self.sections(job))),
             "tip loss, swirl and wake are XROTOR's own; stall delay and cascade are not in the file",
             *(
                 ["static: Vel is 1 % of the tip speed, because XROTOR has no static case"]
@@ -85,30 +89,12 @@ def section_lines(x: float, s: XrotorSection) -> list[str]:
     ]
 
 
-def section_errors(job: Job, sections: list[Any]) -> list[dict[str, float]]:
-    """Greatest error of cl and of cd relative to cd, from the negative to the positive stall, per anchor."""
-    out = []
-    for (x, polar, Re), s in zip(anchors_of(job), sections, strict=True):
-        a = polar.alpha[(polar.alpha >= polar.stall(Re, side=-1)[0]) & (polar.alpha <= polar.stall(Re)[0])]
-        cl, cd = polar.lookup(a, Re)
-        got_l, got_d = s.cl_cd(a, Re)
-        out.append(
-            {
-                "r_over_R": float(x),
-                "Re": Re,
-                "cl": float(np.abs(got_l - cl).max()),
-                "cd_pct": float(100.0 * np.abs(got_d / cd - 1.0).max()),
-            }
-        )
-    return out
-
-
-def section_notes(job: Job, errors: list[dict[str, float]]) -> list[str]:
+def section_notes(job: Job, errors: list[dict[str, float]], most: int = MOST_STATIONS) -> list[str]:
     """What a fit of sections leaves out."""
-    thin = stations(job)[3]
+    thin = stations(job, most)[3]
     worst = ", ".join(f"r/R {e['r_over_R']:.2f}: cl {e['cl']:.3f}, cd {e['cd_pct']:.0f} %" for e in errors)
     return [
         f"sections are fits at the Reynolds numbers of the operating point; worst between the stalls: {worst}",
         "mcrit 0.8 and the pitching moment 0 are not from the case; what is read back gets this project's own effects",
-        *([f"{MOST_STATIONS} stations instead of {job.case.rotor().blade.r.size}"] if thin else []),
+        *([f"{most} stations instead of {job.case.rotor().blade.r.size}"] if thin else []),
     ]

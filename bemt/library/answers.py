@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from bemt.diagnose.chain import Diagnosis
     from bemt.diagnose.contrast import Contrast
     from bemt.diagnose.record import Record
-    from bemt.drive.from_label import DriveEstimate
+    from bemt.drive.drive_result import DriveResult
 
 __all__ = ["Answer", "compare", "diagnose", "drive", "read", "validate"]
 
@@ -112,12 +112,12 @@ class Answer:
     @property
     def verdict(self) -> str:
         """One of none, named, class, sensor, unknown, insufficient."""
-        return (self.diagnosis.ratios or self.diagnosis.decision).verdict
+        return self.diagnosis.said.verdict
 
     @property
     def effects(self) -> tuple[str, ...]:
         """Effects of the verdict; for a class, all members."""
-        return (self.diagnosis.ratios or self.diagnosis.decision).effects
+        return self.diagnosis.said.effects
 
     @property
     def text(self) -> str:
@@ -239,22 +239,22 @@ def _several(given: Any) -> list[Any]:
 
 
 def drive(
-    propeller: Propeller | str, *, kv: float, cells: int, mass_kg: float | None = None, rotors: int = 1,
-    capacity_Ah: float | None = None, airspeed_m_s: float = 0.0,
-) -> DriveEstimate:  # fmt: skip
-    """Estimate the performance of a propeller with a motor, given only the motor K_v and the battery.
+    propeller: Propeller | str, *, kv: float | None = None, cells: int | None = None, mass_kg: float | None = None,
+    rotors: int | None = None, capacity_Ah: float | None = None, airspeed_m_s: float = 0.0,
+) -> DriveResult:  # fmt: skip
+    """Solve a propeller with its motor and battery.
 
     Parameters
     ----------
     propeller : Propeller or str
         Propeller, case or label.
-    kv : float
-        Speed constant of the motor. [rev/min/V]
-    cells : int
+    kv : float, optional
+        Speed constant of the motor; from the case's table [drive] by default, like all that follows. [rev/min/V]
+    cells : int, optional
         LiPo cells in series.
     mass_kg : float, optional
         Mass of the vehicle, for the hover point. [kg]
-    rotors : int
+    rotors : int, optional
         Number of rotors that carry the vehicle and share the battery.
     capacity_Ah : float, optional
         Capacity of the battery, for the flight time. [A h]
@@ -263,13 +263,13 @@ def drive(
 
     Returns
     -------
-    bemt.drive.from_label.DriveEstimate
+    bemt.drive.drive_result.DriveResult
         ``.full``, ``.hover``, ``.text``, ``.to_dict()``; each value with its band.
 
     Raises
     ------
     InputError
-        For impossible values.
+        For impossible values, and without K_v and cells from either side.
 
     Examples
     --------
@@ -278,13 +278,13 @@ def drive(
     >>> bool(7.0 < d.full["thrust_N"].value < 13.0)
     True
     """
-    from bemt.drive import from_label
+    from bemt.drive import drive_result
 
-    for name, value in (("kv", kv), ("cells", cells), ("mass_kg", mass_kg), ("rotors", rotors),
-                        ("capacity_Ah", capacity_Ah), ("airspeed_m_s", airspeed_m_s)):  # fmt: skip
+    given = {"kv": kv, "cells": cells, "mass_kg": mass_kg, "rotors": rotors, "capacity_Ah": capacity_Ah}
+    for name, value in (*given.items(), ("airspeed_m_s", airspeed_m_s)):
         if value is not None and (isinstance(value, bool) or not isinstance(value, (int, float, np.number))):
             raise InputError(Fault("", name, repr(value), "a number"))
-    return from_label.estimate(rotor_of(propeller).case, kv, cells, mass_kg, rotors, capacity_Ah, airspeed_m_s)
+    return drive_result.solve(drive_result.with_drive(rotor_of(propeller).case, **given), float(airspeed_m_s))
 
 
 def compare(

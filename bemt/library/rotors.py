@@ -21,7 +21,6 @@ from bemt.library.given import numbers, path_text
 if TYPE_CHECKING:
     import pandas as pd
 
-    from bemt.air import Air
     from bemt.bem.gradient import Gradient
     from bemt.bem.model import Model
 
@@ -33,7 +32,6 @@ CHANNELS = (
 )  # fmt: skip
 DUCTED = ("rotor_thrust_N", "duct_thrust_N", "stator_thrust_N", "exhaust_speed_m_s", "duct_share")
 RPM_MAX, AIRSPEED_MAX = 300000.0, 300.0  # as in a case file [rev/min], [m/s]
-BANDED = ("thrust_N", "torque_Nm", "power_W", "CT", "CP", "eta")
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,12 +129,14 @@ class Propeller:
         density_kg_m3 : float, optional
             Air density; from the case by default. [kg/m3]
         bands : bool
-            Also compute standard uncertainties: every declared unknown is varied over its range.
+            Also compute standard uncertainties: every declared unknown is varied over its range. An unknown air,
+            speed or airspeed acts at points that share the case's own.
 
         Returns
         -------
         Dataset
-            Kind ``bemt``. A point without a solution is NaN and flagged, never zero.
+            Kind ``bemt``. A point without a solution is NaN and flagged, never zero. A point that no measured rotor
+            covers is flagged, and its band is wider.
 
         Raises
         ------
@@ -149,26 +149,18 @@ class Propeller:
         >>> d.thrust_N.round(1), d.power_W.round(0)
         (array([ 4.8, 11. ]), array([ 46., 156.]))
         """
+        from bemt.case.propagate import propagate
+
         n, V = self._conditions(rpm, airspeed_m_s, J)
         density = None if density_kg_m3 is None else float(numbers("density_kg_m3", density_kg_m3))
-        air = self.case.air(None if density is None else {"air.density_kg_m3": density})
-        values, flags, u_model = _solved(self.case, n, V, air, bands)
-        variance = {key: np.zeros(n.size) for key in BANDED}
-        if bands:
-            from bemt.sweep.case import spread
-
-            for item in self.case.assumptions:
-                at = [values if v == item.nominal else _solved(self.case.replaced({item.key: v}), n, V, air)[0]
-                      for v in item.values]  # fmt: skip
-                for key in BANDED:
-                    variance[key] += spread(item.discrete, values[key], [run[key] for run in at]) ** 2
-        parts: dict[str, dict[str, Array]] = {"model": u_model} if bands else {}
-        if bands and self.case.assumptions:
-            parts["input"] = {key: np.sqrt(v) for key, v in variance.items() if key in u_model}
-        notes = ("bands, one standard deviation: declared unknowns (input), real rotors compared with BEMT (model)",)
+        found = propagate(self.case, n, V, density, bands=bands).points
+        names = [key for key in (*CHANNELS, *(DUCTED if self.case.ducted else ())) if key in found]
+        by = {origin: {key: v for key, v in part.items() if key in names} for origin, part in found.u_by.items()}
+        notes = ("bands, one standard deviation: declared unknowns (input), real rotors compared with BEMT (model), "
+                 "blade elements (numerics)",)  # fmt: skip
         about = {"source": "bemt", "file": self.case.path.as_posix()}
-        return Dataset("bemt", self.name, values, flags=flags, provenance=about, u_by=parts,
-                       notes=notes if bands else ())  # fmt: skip
+        return Dataset("bemt", self.name, {key: found[key] for key in names}, flags=found.flags, provenance=about,
+                       u_by=by, notes=notes if bands else ())  # fmt: skip
 
     def curve(
         self, rpm: ArrayLike | None = None, J: ArrayLike | None = None, *, airspeed_m_s: ArrayLike | None = None,
@@ -410,26 +402,6 @@ class Propeller:
             V = found.get("airspeed_m_s", np.asarray(self.case.airspeed_m_s, dtype=float))
         n, V = np.broadcast_arrays(n, V)
         return np.atleast_1d(n).astype(float).ravel(), np.atleast_1d(V).astype(float).ravel()
-
-
-def _solved(
-    case: Case, rpm: Array, V: Array, air: Air, bands: bool = False
-) -> tuple[dict[str, Array], tuple[tuple[str, ...], ...], dict[str, Array]]:
-    """Channels, flags and model uncertainty of points; the only place where the public API calls the solver."""
-    from bemt.case.prepare import prepare_case
-
-    model = prepare_case(case)
-    found = model.solve(rpm, V, air)
-    flags = found.flags
-    more = DUCTED if case.ducted else ()
-    u: dict[str, Array] = {}
-    if bands:
-        from bemt.sweep.model_error import beyond, u_model
-
-        u = {key: value for key, value in u_model(case, model, found, air).items() if key in BANDED}
-        wider = beyond(case, found)[1]
-        flags = tuple((*f, *filter(None, [w])) for f, w in zip(flags, wider, strict=True))
-    return {key: np.asarray(found[key], dtype=float) for key in (*CHANNELS, *more)}, flags, u
 
 
 def propeller(

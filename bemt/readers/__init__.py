@@ -15,14 +15,12 @@ The file extension is ignored. If two readers claim a file, that is an error tha
 
 from __future__ import annotations
 
-import gzip
 import hashlib
 import importlib
 import math
 import os
 import pkgutil
 import re
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -33,6 +31,7 @@ from typing import Any
 import numpy as np
 
 from bemt.base.errors import Fault, InputError
+from bemt.readers._packed import MAX_BYTES, packed, unpacked
 
 __all__ = ["HEAD_BYTES", "SourceText", "decode", "detect", "head_text", "importers", "load_text", "number", "read"]
 
@@ -66,10 +65,7 @@ class SourceText:
         return self.text.splitlines()
 
 
-GZIP = b"\x1f\x8b"
 WIDE = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}
-MAX_BYTES = 1 << 30
-"""Largest text, unpacked."""
 
 
 def _binary(raw: bytes) -> bool:
@@ -106,7 +102,7 @@ def decode(raw: bytes) -> str:
 
 
 def load_text(path: str | os.PathLike[str]) -> SourceText:
-    """Read a whole file, unpacking gzip; the hash is that of the file as stored.
+    """Read a whole file, unpacking gzip and workbooks; the hash is that of the file as stored.
 
     Parameters
     ----------
@@ -121,7 +117,7 @@ def load_text(path: str | os.PathLike[str]) -> SourceText:
     Raises
     ------
     InputError
-        If the file cannot be read, is damaged gzip data, larger than :data:`MAX_BYTES`, or binary (contains NUL bytes).
+        If the file cannot be read, is damaged, larger than :data:`MAX_BYTES`, or binary (contains NUL bytes).
     """
     name = os.fspath(path)
     try:
@@ -129,13 +125,7 @@ def load_text(path: str | os.PathLike[str]) -> SourceText:
     except OSError as error:
         raise InputError(Fault(name, "", error.strerror or str(error), "a readable file", "Check the path")) from error
     digest = hashlib.sha256(raw).hexdigest()
-    if raw[:2] == GZIP:
-        try:
-            with gzip.open(Path(path), "rb") as stream:
-                raw = stream.read(MAX_BYTES + 1)
-        except (OSError, EOFError, zlib.error) as error:
-            fault = Fault(name, "", f"damaged gzip data ({error})", "a whole gzip file", "Copy it again")
-            raise InputError(fault) from error
+    raw = unpacked(raw, name)
     if len(raw) > MAX_BYTES:
         raise InputError(Fault(name, "", f"{len(raw)} bytes or more", f"at most {MAX_BYTES}", "Export less"))
     if _binary(raw):
@@ -247,6 +237,8 @@ def detect(path: str | os.PathLike[str]) -> str:
         try:
             with target.open("rb") as stream:
                 head = stream.read(HEAD_BYTES)
+                if packed(head):
+                    head = unpacked(head + stream.read(), name, HEAD_BYTES)
         except OSError as error:
             fault = Fault(name, "", error.strerror or str(error), "a readable file or folder", "Check the path")
             raise InputError(fault) from error

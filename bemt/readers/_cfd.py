@@ -16,8 +16,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base import units
 from bemt.base.errors import Fault, InputError
-from bemt.readers import GZIP, WIDE, SourceText, decode, number
+from bemt.readers import WIDE, SourceText, decode, number
+from bemt.readers._packed import GZIP
 
 Array = NDArray[np.float64]
 
@@ -26,10 +28,13 @@ _COMMA = re.compile(r"[+-]?\d+,\d+([eEdD][+-]?\d+)?")
 _HUGE = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)[eEdD]\+?\d+")
 _FIXED = re.compile(r"\d\.\d+[eEdD][+-]\d\d+")
 _UNITS = {
-    "n": "N", "nm": "Nm", "n-m": "Nm", "n m": "Nm", "pa": "Pa", "pascal": "Pa", "m": "m", "s": "s", "k": "K", "w": "W",
-    "m s^-1": "m_s", "m/s": "m_s", "kg m^-3": "kg_m3", "kg/m^3": "kg_m3", "kg/m3": "kg_m3", "radian s^-1": "rad_s",
-    "m^2": "m2", "rad": "rad", "kg": "kg", "pa s": "Pa_s",
+    "n": "N", "newton": "N", "nm": "Nm", "pa": "Pa", "pascal": "Pa", "m": "m", "s": "s", "k": "K", "w": "W", "j": "Nm",
+    "rad": "rad", "kg": "kg", "rpm": "rpm", "kn": "kN", "kgf": "kgf", "lbf": "lbf", "hz": "rev_s", "u/min": "rpm",
+    "lb-f": "lbf", "lbf-ft": "lbf_ft", "lbf-in": "lbf_in", "lb-ft": "lbf_ft", "lb-in": "lbf_in",
 }  # fmt: skip
+"""Units as programs write them, without blanks, in small letters."""
+_POWERS = re.compile(r"(?<=[a-z])\^?(-?[1-9])$")
+_TURNS = {"rev": "rev", "revolution": "rev", "u": "rev", "r": "rev", "": "rev", "radian": "rad", "meter": "m"}
 
 
 @dataclass(frozen=True)
@@ -89,13 +94,43 @@ def cells_of(line: str, separator: str | None) -> tuple[str, ...]:
     return tuple(cells[:-1] if len(cells) > 1 and not cells[-1] else cells)
 
 
-def si_unit(text: str) -> str | None:
-    """Suffix of an SI unit as programs write it, None for one that is unknown (or not SI).
+def unit_of(text: str) -> units.Unit | None:
+    """Unit as programs write it, None for one that is unknown.
 
-    >>> si_unit("N m"), si_unit(" m s^-1 "), si_unit("n-m"), si_unit("lbf")
-    ('Nm', 'm_s', 'Nm', None)
+    >>> [unit_of(t).suffix for t in ("N m", "n-m", " m s^-1 ", "rev min^-1", "radian s^-1", "lbf", "kg m^-3", "m^2")]
+    ['Nm', 'Nm', 'm_s', 'rpm', 'rad_s', 'lbf', 'kg_m3', 'm2']
+    >>> unit_of("furlong") is None and unit_of("") is None
+    True
     """
-    return _UNITS.get(" ".join(text.strip().strip("[]()").split()).lower())
+    plain = " ".join(text.strip().strip("[]()").split())
+    if plain in units.UNITS:
+        return units.UNITS[plain]
+    low = plain.lower()
+    word = _UNITS.get(low.replace(" ", "")) or _UNITS.get(low.replace("-", "").replace(" ", ""))
+    if word is None:
+        over: list[str] = []
+        under: list[str] = []
+        for k, part in enumerate(re.split(r"[ *.·]|(?=/)", low)):
+            below, part = part.startswith("/"), part.lstrip("/")
+            power = _POWERS.search(part)
+            size = int(power[1]) if power else 1
+            base = _TURNS.get(_POWERS.sub("", part), _POWERS.sub("", part)) if part not in ("1",) or k else "rev"
+            tail = str(abs(size)) if abs(size) > 1 else ""
+            (under if below or size < 0 else over).append(base + tail)
+        word = "_".join(["".join(over), "".join(under)]) if under else "".join(over)
+        word = {"rev_min": "rpm", "n_m": "Nm", "nm": "Nm", "m_s": "m_s", "pas": "Pa_s"}.get(word, word)
+    return units.UNITS.get(word)
+
+
+def si_unit(text: str) -> str | None:
+    """Suffix of an SI unit (or rpm) as programs write it, None for one that is unknown or not SI.
+
+    >>> si_unit("N m"), si_unit(" m s^-1 "), si_unit("n-m"), si_unit("lbf"), si_unit("rev min^-1")
+    ('Nm', 'm_s', 'Nm', None, 'rpm')
+    """
+    found = unit_of(text)
+    si = found is not None and (found.suffix == "rpm" or (found.factor == 1.0 and not found.offset))
+    return found.suffix if found is not None and si else None
 
 
 def slug(text: str) -> str:

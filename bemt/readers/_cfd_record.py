@@ -2,19 +2,84 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.averaging import Average, Mean, keep_last, steady_average
+from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
-from bemt.readers import SourceText
-from bemt.readers._cfd import Column, ExportTable, unique
+from bemt.readers import SourceText, load_text
+from bemt.readers._cfd import Column, ExportRow, ExportTable, numeric_table, unique
 from bemt.readers._columns import Channel, dataset
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How one program writes a history; reading it is the same for all."""
+
+    kind: str  # of the reader
+    example: str  # of a header, for messages
+    header: Callable[[str], Sequence[str] | None]  # names on a line of headings; None on any other line
+    cells: Callable[[str], tuple[str, ...]]  # of a row
+    column: Callable[[str], Column]  # of a name
+    skip: Callable[[str], bool] = lambda line: False  # lines that are neither headings nor rows
+    notes: tuple[str, ...] = ()
+    commas: bool = True  # whether a decimal comma is possible
+    hint: str = "Is the header damaged?"  # where a row comes before the headings
+    finish: Callable[[list[Column], ExportTable, list[str]], tuple[list[Column], ExportTable]] | None = None
+
+
+def read_history(path: str | os.PathLike[str], layout: Layout) -> Dataset:
+    """Read a history: headings that may be repeated by a restart, rows, lines to skip."""
+    source = load_text(path)
+    names: list[str] | None = None
+    title, rows, repeated = "", list[ExportRow](), list[int]()
+    for line, raw in enumerate(source.lines, 1):
+        text = raw.strip()
+        found = layout.header(text) if text else None
+        if found is not None:
+            if names is not None and list(found) != names:
+                got, expected = f"another header ({', '.join(found)})", f"the first one ({', '.join(names)})"
+                raise InputError(Fault(source.name, str(line), got, expected, "Split the file there"))
+            repeated += [line] if names is not None else []
+            names = list(found)
+        elif not text or layout.skip(text):
+            title = title or text.strip('"# ')
+        elif names is None:
+            expected = f"a header such as {layout.example}"
+            raise InputError(Fault(source.name, str(line), repr(text[:60]), expected, layout.hint))
+        else:
+            rows.append(ExportRow(line, layout.cells(text)))
+    if names is None:
+        raise InputError(Fault(source.name, "", "no header", f"a line such as {layout.example}"))
+    if not rows:
+        got = f"a header ({', '.join(names)}) and no rows"
+        raise InputError(Fault(source.name, "", got, "one row or more", "Did the run write a step?"))
+    columns = [layout.column(name) for name in names]
+    table = numeric_table(source, columns, rows, layout.commas)
+    notes = [f"header repeated in line {', '.join(map(str, repeated[:5]))}: the run was restarted"] if repeated else []
+    notes += layout.notes
+    if layout.finish is not None:
+        columns, table = layout.finish(columns, table, notes)
+    return history(layout.kind, source, columns, table, notes, {"title": title})
+
+
+def outermost(columns: list[Column], table: ExportTable, notes: list[str]) -> tuple[list[Column], ExportTable]:
+    """Let the outermost counter that counts be the step; rows of inner iterations of one time step repeat it."""
+    counters = [k for k, c in enumerate(columns) if c.role == "counter"]
+    counting = [k for k in counters if len(np.unique(table.values[:, k])) > 1]
+    steps = counting[:1] or counters[-1:]
+    if len(counting) > 1:
+        notes.append(f"the last {columns[counting[-1]].name} of each {columns[counting[0]].name} is taken")
+    for k in counters:
+        columns[k] = Column(columns[k].name, "", "step" if k in steps else "counter")
+    return columns, table
 
 
 def _spikes(column: Column, values: Array) -> list[str]:

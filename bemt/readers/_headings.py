@@ -1,6 +1,7 @@
 """Headings of columns: the name of the channel and the unit, from the text alone.
 
-A heading without a unit, or with one that has two meanings (``g``), gives unit None: nothing is assumed.
+A heading without a unit, or with one that has two meanings (``Hz``), gives unit None: nothing is assumed. A mass in a
+column of thrust is the force that it weighs, and a line says so.
 """
 
 from __future__ import annotations
@@ -24,6 +25,8 @@ _SAME = {
     "kilogram force": "kgf", "pound force": "lbf", "g f": "gf", "kg f": "kgf", "second": "s", "ampere": "A",
     "amperes": "A", "rad/sec": "rad_s", "m/sec": "m_s", "rev/sec": "rev_s", "percent": "pct", "tr/min": "rpm",
     "t/min": "rpm", "rad/seg": "rad_s", "vueltas/min": "rpm", "umdr/min": "rpm", "upm": "rpm", "tr mn": "rpm",
+    "rev/minute": "rpm", "revs/min": "rpm", "k rpm": "krpm", "krpm": "krpm", "in hg": "inHg", "inhg": "inHg",
+    "mm hg": "mmHg", "mmhg": "mmHg", "torr": "mmHg", "millibar": "mbar", "mb": "mbar",
 }  # fmt: skip
 _TWO_MEANINGS = {
     "g": "gram-force, gram or standard gravity: write gf, or say it in recording.toml",
@@ -91,9 +94,16 @@ _TONGUES = {  # German, French, Spanish: what stands before the unit, without ac
     "voltaje": "voltage", "corriente": "current", "potencia": "power", "potencia electrica": "electrical power",
     "potencia mecanica": "mechanical power", "tiempo": "time", "presion": "pressure", "acelerador": "throttle",
 }  # fmt: skip
-_OF_A_STAND = {"g": "gf", "G": "gf", "grams": "gf", "gram": "gf", "gr": "gf", "gramm": "gf"}
-"""Mass units that a thrust has on many stands: the force that this mass weighs, gram-force."""
-_THRUSTS = re.compile(r"(motor |propeller |prop |static |max )?(thrust|lift|pull|force)( static)?")
+_WEIGHTS = {
+    "g": "gf", "G": "gf", "grams": "gf", "gram": "gf", "gr": "gf", "gramm": "gf", "kg": "kgf", "Kg": "kgf", "KG": "kgf",
+    "kgs": "kgf", "kilograms": "kgf", "lb": "lbf", "lbs": "lbf", "pounds": "lbf", "oz": "ozf", "ounces": "ozf",
+}  # fmt: skip
+"""Units of mass in which stands state a force: that which the mass weighs."""
+_FORCES = {"gf": "gram-force", "kgf": "kilogram-force", "lbf": "pound-force", "ozf": "ounce-force"}
+_THRUSTS = re.compile(
+    r"((motor|propeller|prop|rotor|static|max|mean|average|avg|measured|total) )*"
+    r"(thrust|lift|pull|force|load|load ?cell)( (static|force|mean|average|measured))*|t|f"
+)
 _GOES: dict[str, tuple[str, ...]] = {  # what a suffix may be: T_A is rotor A's thrust, not a current
     "thrust": ("force",), "lift": ("force",), "torque": ("torque",), "power": ("power",), "rpm": ("angular_speed",),
     "voltage": ("voltage",), "current": ("current",), "T": ("force", "temperature", "time"), "F": ("force",),
@@ -105,8 +115,6 @@ _QUALIFIED = re.compile(
     r"(?: (?:force|static|mean|average|avg|measured))*|(?:f|t) (thrust)|(?:q|m) (torque)|(thrust) t|(torque) q"
 )
 """Words that a thrust or a torque goes with and that make no other quantity of it."""
-_TORQUES = {"oz": "ozf", "lb": "lbf", "lbs": "lbf"}
-"""Pounds and ounces are forces in the usual names of units of torque: in-lb, oz-in."""
 _PULSE = re.compile(r"(esc )?(throttle|signal|pwm|pulse( width)?|esc)( signal| input| command)?")
 _SEPARATORS = (r"\s+[-–—]\s+", r"\s*,\s*", r"\s+in\s+", r"\s*/\s*", r"\s+")
 _MOJIBAKE = (("Âµ", "µ"), ("Î¼", "µ"), ("Â·", "·"), ("â‹…", "·"), ("Â°", "°"), ("Â²", "²"), ("Â³", "³"))
@@ -132,6 +140,26 @@ _OTHER_SPEEDS = {
 }  # fmt: skip
 """Words of a heading that make it a speed of rotation, and of other speeds or of an uncertainty."""
 _GRAVITY = units.Unit("m_s2", "acceleration", units.G0)
+_THOUSANDS = re.compile(
+    r"(?P<of>.*?)[\s_]*(?:[\[(]?\s*k[ -]?rpm\s*[\])]?"
+    r"|rpm\s*(?:[\[(]\s*[x×*/]?|[x×*/])\s*(?:1000|1e3|10\^3|10³|k|thousands?)\s*[\])]?"
+    r"|[\[(]?\s*(?:1000|1e3|10\^3|10³)\s*[x×*]?\s*rpm\s*[\])]?)",
+    re.IGNORECASE,
+)
+"""Speeds in thousands: ``kRPM``, ``RPM x1000``, ``rpm (k)``, ``Speed [1000 rpm]``."""
+_SHAFT_RPM = re.compile(r"(prop|propeller|rotor|shaft|fan|mechanical)[ _]?rpm", re.IGNORECASE)
+"""Headings that name the speed of the rotor and no other."""
+_TURNS = {
+    "rotation", "rotational", "rev", "revs", "revolution", "revolutions", "shaft", "prop", "propeller", "rotor", "fan",
+}  # fmt: skip
+"""Words with which a frequency counts revolutions; that of a motor may count electrical periods."""
+_AROUND = {
+    "ambient", "amb", "tamb", "pamb", "air", "room", "lab", "laboratory", "outside", "outdoor", "oat", "atmospheric",
+    "atmosphere", "atm", "baro", "barometer", "barometric", "environment", "environmental", "tunnel", "tair",
+    "umgebung", "umgebungstemperatur", "umgebungsdruck", "raumtemperatur", "ambiante", "ambiente",
+}  # fmt: skip
+"""Words that make a temperature, pressure, humidity or density that of the air around the rotor."""
+_SEA_LEVEL = "a pressure reduced to sea level: give that of the station (QFE)"
 
 
 @dataclass(frozen=True)
@@ -268,20 +296,34 @@ def heading(text: str) -> Heading:
     >>> heading("Drehzahl [1/min]").name, heading("Poussée (N)").name, heading("Thrust (g)").name
     ('rpm', 'thrust_N', 'thrust_N')
     >>> heading("thrust_g").name, heading("thrust_g").told
-    ('thrust_N', "'thrust_g' is read as gram-force, as stands mean it: 1 g is 0.00981 N")
+    ('thrust_N', "'thrust_g' is read as gram-force: 1 g weighs 0.009807 N")
+    >>> heading("Ambient Temp (C)").name, heading("RPM x1000").name, heading("Prop RPM").name
+    ('temperature_K', 'rpm', 'rpm')
     """
     text = " ".join(text.split())
+    if thousands := _THOUSANDS.fullmatch(text):
+        found = _heading(f"{thousands['of']} (rpm)" if thousands["of"] else "rpm")
+        told = f"{text!r} is read as thousands of revolutions per minute"
+        return replace(found, text=text, unit=units.Unit("", "angular_speed", 1e3), told=told)
+    if _SHAFT_RPM.fullmatch(text):
+        return Heading(text, "rpm", units.UNITS["rpm"])
     parts = re.fullmatch(r"(.*?)\s*[\(\[]\s*([^()\[\]]*?)\s*[\)\]]\s*", text)
-    if not parts and (loose := re.fullmatch(r"(.+)[_ ](\w+)", text)) and loose[2] in _OF_A_STAND:
-        parts = loose  # thrust_g
+    if not parts and (loose := re.fullmatch(r"(.+?)(?:[_ ]| - |, ?)(\w+)", text)) and loose[2] in _WEIGHTS:
+        parts = loose  # thrust_g, Thrust kg
     english = _TONGUES.get(_plain(parts[1] if parts else text), "")
     if english:
         found = heading(f"{english} ({parts[2]})" if parts else english)
         return replace(found, text=text, told=found.told.replace(found.text, text))
-    unit = _OF_A_STAND.get(parts[2]) if parts else None
+    unit = _WEIGHTS.get(parts[2]) if parts else None
     if parts and unit and _THRUSTS.fullmatch(_plain(parts[1])):
         found = heading(f"{parts[1]} ({unit})")
-        return replace(found, text=text, told=f"{text!r} is read as gram-force, as stands mean it: 1 g is 0.00981 N")
+        told = f"{text!r} is read as {_FORCES[unit]}: 1 {parts[2]} weighs {units.UNITS[unit].factor:.4g} N"
+        return replace(found, text=text, told=told)
+    if parts and parts[2] in ("Hz", "1/s") and (said := _spoken(parts[1])[1]) & _TURNS and "electrical" not in said:
+        turns = units.Unit("", "angular_speed", 60.0)
+        return Heading(text, "rpm", turns, told=f"{text!r} is read as revolutions per second")
+    if parts and re.fullmatch(r"[gG]/W", parts[2]):
+        return replace(_heading(f"{parts[1]} (gf/W)"), text=text, told=f"{text!r} is read as gf/W")
     if parts and (qualified := _QUALIFIED.fullmatch(_plain(parts[1]))):
         name = next(word for word in qualified.groups() if word)
         unit = _weight(parts[2]) if name == "torque" else ""
@@ -299,9 +341,9 @@ def _weight(text: str) -> str:
     words = re.split(r"[\s·⋅*.\-/]+", text.strip())
     if len(words) != 2:
         return ""
-    masses = [w for w in words if w in _TORQUES]
+    masses = [w for w in words if w in _WEIGHTS]
     lengths = [w for w in words if w in ("cm", "m", "in", "ft", "mm")]
-    unit = f"{_TORQUES[masses[0]]} {lengths[0]}" if len(masses) == 1 == len(lengths) else ""
+    unit = f"{_WEIGHTS[masses[0]]} {lengths[0]}" if len(masses) == 1 == len(lengths) else ""
     return unit if isinstance(unit_of(unit), units.Unit) else ""
 
 
@@ -326,6 +368,20 @@ def _either(text: str) -> str:
     return f"{' or '.join([first, *rest])}: one column holds one unit; give each quantity a column of its own"
 
 
+def _of_the_air(base: str, unit: units.Unit) -> str:
+    """Quantity of the air around the rotor that a heading names; "qnh" for a pressure that is no local one; "" none."""
+    words = set(re.findall(r"[^\W\d_]+", _plain(base)))
+    if unit.dimension == "pressure" and words & {"qnh", "slp"}:
+        return "qnh"
+    if unit.dimension == "fraction" and (words & {"humidity", "rh", "luftfeuchte", "luftfeuchtigkeit", "humedad"}):
+        return "humidity"
+    if unit.dimension in ("temperature", "pressure") and (words & _AROUND or words in ({"t", "inf"}, {"p", "inf"})):
+        return unit.dimension
+    if unit.dimension == "density" and words & {"rho", "density", "luftdichte"}:
+        return "density"
+    return ""
+
+
 def _heading(text: str) -> Heading:
     if either := _either(text):
         return Heading(text, slug(text), None, either)
@@ -338,7 +394,7 @@ def _heading(text: str) -> Heading:
         elif stated:
             base, doubt = found[1], f"{found[2]!r} is {stated}"
     core = re.split(r"[(\[=]", base)[0].strip() if unit is None and not doubt else base
-    if found and found[2].strip().lower() == "erpm":
+    if found and (found[2].strip().lower() in ("erpm", "electrical") and "rpm" in text.lower()):
         return Heading(text, "electrical_rpm", units.UNITS["rpm"])
     alone = _ALONE.get(core.lower())
     ending = _tail(core) if unit is None and not doubt else None
@@ -373,6 +429,12 @@ def _heading(text: str) -> Heading:
         word = ("pulse_width", "time")
     if word and word[1] == "acceleration" and doubt.startswith("'g'"):
         unit, doubt = _GRAVITY, ""
+    if unit is None and not doubt and unit_of(core) == units.UNITS["rpm"]:
+        base, unit = "rpm", units.UNITS["rpm"]  # U/min, 1/min
+    if unit is not None and (around := _of_the_air(base, unit)):
+        if around == "qnh":
+            return Heading(text, slug(text), None, _SEA_LEVEL)
+        base, word = around, None
     if unit is None:
         return Heading(text, slug(text) or "column", None, doubt)
     if unit.offset and base.startswith("u_"):  # an uncertainty in Celsius is one in kelvin

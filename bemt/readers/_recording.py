@@ -22,7 +22,7 @@ from bemt.readers._clock import clock_seconds
 from bemt.readers._columns import Channel, dataset
 from bemt.readers._headings import Heading, may_be_shaft_speed, slug, surely_shaft_speed
 from bemt.readers._large import NumberTable
-from bemt.readers._split import MOST_ODD, SplitTable, some
+from bemt.readers._split import MOST_ODD, SHEET_ERRORS, SplitTable, some
 
 Array = NDArray[np.float64]
 _WITH_UNIT = re.compile(r"[+-]?[\d.]+\s*([^\W\d][\w/·]{0,6}|%)")
@@ -124,6 +124,8 @@ class Builder:
         values, bad, empty = self.table.numbers(index, decimal)
         cells = {i: self.table.cell(i, index) for i in bad}
         label = head.text or f"column {index + 1}"
+        if empty and (errors := sum(cell.lower() in SHEET_ERRORS for cell in self.table.cells(index))):
+            self.warnings.append(f"column {label!r}: {errors} cells with an error of the spreadsheet are empty")
         if empty == len(values):
             self.empty.append(repr(label))
             return ""
@@ -273,10 +275,10 @@ def _nearest(headings: Sequence[str], channels: Iterable[str] = ()) -> str:
 
     A bare ``speed`` is that of the shaft or of the air, whichever the file has not.
 
-    >>> _nearest(["'Trust'", "'x'"])
-    '; nearest meaning: \'Trust\' thrust. The line: [columns] thrust = { column = "Trust", unit = "N" }'
+    >>> _nearest(["'Trust'", "'x'"])  # doctest: +ELLIPSIS
+    '; nearest meaning: \'Trust\' thrust. The line: [columns] thrust = { column = "Trust", unit = "..." }, unit N, ...'
     >>> _nearest(["'speed'"], ["airspeed_m_s"])  # doctest: +ELLIPSIS
-    '; nearest meaning: \'speed\' rpm. The line: [columns] rpm = { column = "speed", unit = "rpm" } (or ...)'
+    '; nearest meaning: \'speed\' rpm. The line: [columns] rpm = { column = "speed", unit = "..." }, unit rpm, ...'
     """
     near: dict[str, list[str]] = {}
     for label in headings:
@@ -290,14 +292,27 @@ def _nearest(headings: Sequence[str], channels: Iterable[str] = ()) -> str:
     if not near:
         return ""
     name, meanings = next(iter(near.items()))
-    lines = [f'{m} = {{ column = "{name}", unit = "{_UNITS_MEANT.get(m, "...")}" }}' for m in meanings]
-    lines = [line + (' (or "rad_s", "rev_s")' if line.startswith("rpm") else "") for line in lines]
+    lines = [f'{m} = {{ column = "{name}", unit = "..." }}, unit {_UNITS_MEANT[m]}' for m in meanings]
     told = ", ".join(f"{k!r} {' or '.join(v)}" for k, v in near.items())
     return f"; nearest meaning: {told}. The line: [columns] {', or '.join(lines)}"
 
 
-_UNITS_MEANT = {"rpm": "rpm", "thrust": "N", "torque": "Nm", "voltage": "V", "current": "A", "power": "W", "time": "s",
-                "airspeed": "m_s", "throttle": "pct"}  # fmt: skip
+_UNITS_MEANT = {
+    "rpm": "rpm, krpm, rev_s or rad_s",
+    "thrust": "N, kgf, gf, lbf or ozf",
+    "torque": "Nm, mNm, kgf_cm, gf_cm or lbf_in",
+    "voltage": "V or mV",
+    "current": "A or mA",
+    "power": "W or kW",
+    "time": "s or ms",
+    "airspeed": "m_s, km_h, kt or mph",
+    "throttle": "pct",
+    "pressure": "Pa, hPa or mbar",
+    "temperature": "C, K or F",
+    "density": "kg_m3",
+    "humidity": "pct",
+}
+"""Units that a column of each meaning usually has; which, the file does not say."""
 
 
 def _speeds_meant(name: str, channels: Iterable[str]) -> list[str]:

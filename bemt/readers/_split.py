@@ -20,7 +20,9 @@ from bemt.readers._headings import unit_of
 
 DELIMITERS = (";", "\t", ",", "|")
 MAX_FAULTS = 20
-NO_VALUE = frozenset({"", "nan", "na", "n/a", "-", "--", "null", "none"})
+SHEET_ERRORS = frozenset({"#div/0!", "#n/a", "#value!", "#ref!", "#num!", "#name?", "#null!"})
+"""What a spreadsheet writes into a cell that it could not compute."""
+NO_VALUE = frozenset({"", "nan", "na", "n/a", "-", "--", "\u2013", "\u2014", "null", "none"}) | SHEET_ERRORS
 """Cells that say "no value", in lower case."""
 MOST_ODD = 0.1
 """Share of cells that are no numbers from which a column is text."""

@@ -29,6 +29,9 @@ import math
 import re
 from dataclasses import dataclass
 
+from bemt.base.errors import Fault, InputError
+from geometry.designation import blade_class
+
 MM_ABOVE = 40.0
 """A diameter in a name above this is in millimetres: the archive's largest propeller has 21 in, the smallest 45 mm."""
 
@@ -53,6 +56,42 @@ FAMILIES = {
     "union": "Union", "vp": "Vapor", "zin": "Zingali",
 }  # fmt: skip
 """Maker and series by family, as the site heads them; other families import too."""
+
+
+def family_of(maker: str, kind: str | None) -> str | None:
+    """Family of a maker's class of blades, None where the label does not say which series it is.
+
+    >>> family_of("APC", "electric"), family_of("gws", "slow_flyer"), family_of("APC", None)
+    ('apce', 'gwssf', None)
+    """
+    if not maker or kind is None:
+        return None
+    names = (key for key, name in FAMILIES.items() if name.casefold().startswith(maker.casefold().split()[0]))
+    found = [key for key in names if class_of(key) == kind]
+    return found[0] if len(found) == 1 else None
+
+
+def find_family(series: str) -> str:
+    """Family of a maker's series, by its short or its long name.
+
+    >>> find_family("GWS Slow Flyer"), find_family("apce")
+    ('gwssf', 'apce')
+    """
+    for key, name in FAMILIES.items():
+        if series.casefold() in (key, name.casefold()):
+            return key
+    known = ", ".join(f"{key} ({name})" for key, name in FAMILIES.items())
+    raise InputError(Fault("", "--series", repr(series), f"one of {known}", "Leave it out if it is none of them"))
+
+
+def class_of(family: str | None) -> str | None:
+    """Class of blade (:data:`geometry.designation.BLADE_CLASSES`) that the name of a family states.
+
+    >>> class_of("gwssf"), class_of("ancf"), class_of("grcsp")
+    ('slow_flyer', 'folding', None)
+    """
+    return blade_class(FAMILIES.get((family or "").lower(), ""))
+
 
 _N = r"(\d+(?:\.\d+)?)"
 _SIZE = re.compile(rf"{_N}x{_N}(?:[x-](\d))?([a-z]*)", re.IGNORECASE)

@@ -22,6 +22,7 @@ from bemt.readers import SourceText, load_text
 from bemt.readers._cfd import Column, ExportRow, cells_of, head_lines, numeric_table, si_unit, slug
 from bemt.readers._cfd_record import fields, history
 from bemt.readers._columns import Channel, channels_of, dataset
+from bemt.readers._headings import may_be_shaft_speed
 
 KIND = "cfd_post_csv"
 
@@ -48,6 +49,8 @@ def _heading(text: str) -> Column:
     if unit is None:
         return Column(text if match[2].strip() else slug(match[1]), match[2].strip())
     role = "time" if unit == "s" and slug(match[1]) in ("time", "flow_time", "physical_time") else "value"
+    if unit == "rpm" and may_be_shaft_speed(match[1]):
+        return Column("rpm", unit)
     return Column(f"{slug(match[1])}_{unit}", unit, role)
 
 

@@ -18,11 +18,9 @@ from __future__ import annotations
 import os
 import re
 
-from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
-from bemt.readers import load_text
-from bemt.readers._cfd import Column, ExportRow, head_lines, numeric_table, si_unit
-from bemt.readers._cfd_record import history
+from bemt.readers._cfd import Column, ExportTable, head_lines, si_unit
+from bemt.readers._cfd_record import Layout, read_history
 
 KIND = "fluent_report"
 
@@ -63,43 +61,22 @@ def sniff(head: bytes | str) -> bool:
     return any(line.startswith('("') or line.endswith(' etc.."') for line in lines[1:])
 
 
-def read(path: str | os.PathLike[str]) -> Dataset:
-    """Read a report file."""
-    source = load_text(path)
-    title = ""
-    names: list[str] | None = None
-    rows: list[ExportRow] = []
-    repeated: list[int] = []
-    for line, raw in enumerate(source.lines, 1):
-        text = raw.strip()
-        if not text:
-            continue
-        if _HEADER.fullmatch(text):
-            found = [name.strip() for name in _QUOTED.findall(text)]
-            if names is not None and found != names:
-                got, expected = f"another header ({', '.join(found)})", f"the first one ({', '.join(names)})"
-                raise InputError(Fault(source.name, str(line), got, expected, "Split the file there"))
-            if names is not None:
-                repeated.append(line)
-            names = found
-        elif text.startswith('"'):
-            title = title or text.strip('"')
-        elif names is None:
-            hint = "Line 3 of a report file lists all names; line 2 is abbreviated"
-            expected = 'a header such as ("Time Step" "thrust" "flow-time")'
-            raise InputError(Fault(source.name, str(line), repr(text[:60]), expected, hint))
-        else:
-            rows.append(ExportRow(line, tuple(text.split())))
-    if names is None:
-        raise InputError(Fault(source.name, "", "no header", 'a line such as ("Time Step" "thrust" "flow-time")'))
-    columns = [column_of(name) for name in names]
-    if not rows:
-        hint = "Did the run write a step?"
-        raise InputError(Fault(source.name, "", f"a header ({', '.join(names)}) and no rows", "one row or more", hint))
-    table = numeric_table(source, columns, rows)
-    notes = [f"header repeated in line {', '.join(map(str, repeated[:5]))}: the run was restarted"] if repeated else []
+def _checked(columns: list[Column], table: ExportTable, notes: list[str]) -> tuple[list[Column], ExportTable]:
     if any(c.role == "value" and not c.unit for c in columns):
         notes.append("report files state no units, reference values, sector or sign convention: check them")
     if not any(c.role in ("step", "time") for c in columns):
         notes.append("no column counts steps or time: rows are taken in their order")
-    return history(KIND, source, columns, table, notes, {"title": title})
+    return columns, table
+
+
+_LAYOUT = Layout(
+    KIND, '("Time Step" "thrust" "flow-time") in line 3',
+    lambda line: [name.strip() for name in _QUOTED.findall(line)] if _HEADER.fullmatch(line) else None,
+    lambda line: tuple(line.split()), column_of, lambda line: line.startswith('"'),
+    hint="Line 3 of a report file lists all names; line 2 is abbreviated", finish=_checked,
+)  # fmt: skip
+
+
+def read(path: str | os.PathLike[str]) -> Dataset:
+    """Read a report file."""
+    return read_history(path, _LAYOUT)

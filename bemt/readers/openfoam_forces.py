@@ -38,6 +38,11 @@ _TIME = re.compile(r"#\s*Time\b(.*)")
 _PROBE = re.compile(r"#\s*Probe\s+(\d+)\s+\(([^()]*)\)")
 _NESTED = re.compile(r"(\w+)\(([^()]*)\)")
 _SETTING = re.compile(r"#\s*(\w+)\s*:\s*(.+)")
+_PROPELLER: dict[str, tuple[str, str, float]] = {
+    "n": ("rpm", "rpm", 60.0), "URef": ("airspeed_m_s", "m_s", 1.0), "J": ("J", "-", 1.0), "KT": ("CT", "-", 1.0),
+    "10*KQ": ("CQ", "-", 0.1), "eta0": ("eta", "-", 1.0),
+}  # fmt: skip
+"""Columns of ``propellerInfo``: channel, unit, factor."""
 _VECTOR = re.compile(r"\(\s*((?:\w+_[xyz]\s*){3})\)")
 
 
@@ -122,6 +127,10 @@ def read(path: str | os.PathLike[str]) -> Dataset:
     table = numeric_table(source, columns, _rows(rows, layout, len(columns), groups), commas=False)
     if groups:
         columns, table = _totals(columns, table, groups)
+    if {"KT", "10*KQ"} <= {c.name for c in columns}:
+        own = [_PROPELLER.get(c.name, (c.name, c.unit, 1.0)) for c in columns]
+        table = replace(table, values=table.values * np.array([factor for _, _, factor in own]))
+        columns = [replace(c, name=name, unit=unit) for c, (name, unit, _) in zip(columns, own, strict=True)]
     return _record(source, columns, table, {"title": title, **about}, notes)
 
 

@@ -41,9 +41,15 @@ _ALIASES = {
     "speed_m_s": "airspeed_m_s", "velocity_m_s": "airspeed_m_s", "U_inf_m_s": "airspeed_m_s",
     "V_inf_m_s": "airspeed_m_s", "Vinf_m_s": "airspeed_m_s", "wind_speed_m_s": "airspeed_m_s",
     "wind_m_s": "airspeed_m_s", "tunnel_speed_m_s": "airspeed_m_s", "freestream_velocity_m_s": "airspeed_m_s",
-    "freestream_m_s": "airspeed_m_s",
+    "freestream_m_s": "airspeed_m_s", "pull_N": "thrust_N", "force_N": "thrust_N", "load_N": "thrust_N",
+    "load_cell_N": "thrust_N", "loadcell_N": "thrust_N",
 }  # fmt: skip
 _SPEEDS = ("optical_rpm", "electrical_rpm")
+_DRIVE_SPEEDS = {
+    "motor_rpm": "right only if the motor turns the propeller without a gear",
+    "ESC_rpm": "right only if the ESC was given the pole count and there is no gear",
+}
+"""Speeds that are the rotor's where there is no other, and on what condition."""
 # Says neither whose power it is.
 _BARE_POWER = re.compile(r"\s*power\s*[\[(]\s*w(atts?)?\s*[\])]\s*", re.IGNORECASE)
 
@@ -146,7 +152,7 @@ def named(d: Dataset) -> Dataset:
         else:
             notes.append(f"{name}: uncertainty of a channel that the file has not; left out")
     _angular(d, values, names, notes)
-    _speed(values, names, notes)
+    _speed(d, values, names, notes)
     _power(values, names, notes, d.values.get("P_W"))
     bare = d.provenance.get("headings", {}).get("power_W", "")
     if names.get("power_W") == "power_W" and _BARE_POWER.fullmatch(bare):
@@ -171,7 +177,7 @@ def _angular(d: Dataset, values: dict[str, Array], names: dict[str, str], notes:
         notes.append(f"rpm is {found[0]} in rev/min")
 
 
-def _speed(values: dict[str, Array], names: dict[str, str], notes: list[str]) -> None:
+def _speed(d: Dataset, values: dict[str, Array], names: dict[str, str], notes: list[str]) -> None:
     """Choose the speed of the rotor among those that the file has."""
     if "rpm" in values:
         return
@@ -180,6 +186,11 @@ def _speed(values: dict[str, Array], names: dict[str, str], notes: list[str]) ->
             values["rpm"], names["rpm"] = values[name], names[name]
             how = "" if name == "optical_rpm" else ": right only if the pole count set in the stand was right"
             notes.append(f"rpm is {name}{how}")
+            return
+    for name, condition in _DRIVE_SPEEDS.items():
+        if name in d.values and _alive(d[name]):
+            values["rpm"], names["rpm"] = d[name], name
+            notes.append(f"rpm is {name}: {condition}")
             return
 
 

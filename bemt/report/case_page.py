@@ -70,6 +70,7 @@ def _inputs(page: Mapping[str, Any]) -> Section:
     rows: list[Sequence[object]] = [
         ["rotational speed", num(c["rpm"], 6), "rev/min"],
         ["airspeed", num(c["airspeed_m_s"]), "m/s"],
+        *([["full throttle", drive["text"], ""]] if (drive := result.get("drive")) else []),
         ["density", num(c["density_kg_m3"]), "kg/m³"],
         ["temperature", num(c["temperature_C"], 3), "°C"],
         ["diameter", num(c["diameter_m"]), "m"],
@@ -271,6 +272,8 @@ def _limits(page: Mapping[str, Any]) -> Section:
     for row in [*result["rows"], *result["variants"]]:
         for flag in row["flags"]:
             flags.setdefault(f"{row['label']}: {flag}")
+    for flag in page["curves"]["flags"] if page.get("curves") else ():
+        flags.setdefault(f"curves: {flag}")
     general = [
         "Blade elements are independent: no sweep, no radial flow, no blade-vortex interaction, no unsteady loads.",
         "Section tables come from a network trained on XFOIL, weak near stall at low Reynolds numbers; beyond stall "

@@ -1,7 +1,6 @@
 """What a case page plots: geometry, performance over J and rpm with bands, radial loading, refinement of the stations.
 
-The bands are the standard uncertainty from the declared assumptions, propagated as in `bemt.sweep`: one at a
-time through its range, and of the model itself on real rotors (efficiency: of the assumptions alone).
+The bands are those of `bemt.case.propagate`, as everywhere.
 """
 
 from __future__ import annotations
@@ -14,14 +13,13 @@ from numpy.typing import NDArray
 
 from bemt.base.errors import InputError
 from bemt.case import Case
+from bemt.drive.drive_result import full_throttle
 
 __all__ = ["case_curves", "geometry_curves", "radial_curves", "refinement"]
 
 Array = NDArray[np.float64]
 
 N_J, N_RPM = 29, 21
-COARSE = 20
-"""Blade elements of runs whose differences alone count."""
 REFINED = (10, 20, 40, 80)
 CHANNELS = ("CT", "CP", "eta", "thrust_N", "torque_Nm", "power_W")
 
@@ -44,9 +42,12 @@ def geometry_curves(case: Case, n: int = 41) -> dict[str, Any]:
 
 
 def _grids(case: Case, pitch_over_D: float) -> tuple[Array, Array, int]:
-    """Points of the curves: a line of J at the case's rpm, then a line of rpm at its airspeed."""
+    """Points of the curves: a line of J at the case's rpm, then a line of rpm at its airspeed, to full throttle."""
     J = np.linspace(0.0, 1.45 * pitch_over_D, N_J)
     rpm = np.linspace(0.2, 1.1, N_RPM) * case.rpm
+    if case.file.drive is not None:
+        full = full_throttle(case, bands=False)["rpm"].value
+        rpm = np.linspace(0.2, 1.0, N_RPM) * np.fmax(full, case.rpm)
     speeds = J * case.rpm / 60.0 * case.diameter_m
     return (
         np.concatenate([np.full(N_J, case.rpm), rpm]),
@@ -57,48 +58,29 @@ def _grids(case: Case, pitch_over_D: float) -> tuple[Array, Array, int]:
 
 def case_curves(case: Case) -> dict[str, Any]:
     """Performance over J and over rpm, BEMT with bands and K1/K2."""
-    from bemt.case.prepare import k1k2_case, prepare_case
-    from bemt.sweep.case import spread
-    from bemt.sweep.model_error import u_model
+    from bemt.case.prepare import k1k2_case
+    from bemt.case.propagate import propagate
+    from bemt.rotors.validity import counted
 
-    ready = prepare_case(case)
-    rpm, V, cut = _grids(case, ready.pitch_m / ready.diameter_m)
-    air = case.air()
-    nominal = ready.solve(rpm, V, air)
-    values_of = {name: np.asarray(getattr(nominal, name), float) for name in CHANNELS}
-    rough = prepare_case(case, None, COARSE).solve(rpm, V, air)
-    base = {name: np.asarray(getattr(rough, name), float) for name in CHANNELS}
-    variance = {name: np.zeros_like(v) for name, v in base.items()}
-    for assumption in case.assumptions:
-        runs: list[dict[str, Array]] = []
-        for value in assumption.values:
-            if value == assumption.nominal:
-                runs.append(base)
-                continue
-            changes = {assumption.key: value}
-            state = case.air(changes) if assumption.key.startswith("air.") else air
-            points = prepare_case(case, changes, COARSE).solve(rpm, V, state)
-            runs.append({name: np.asarray(getattr(points, name), float) for name in CHANNELS})
-        for name, values in base.items():
-            variance[name] = variance[name] + spread(assumption.discrete, values, [run[name] for run in runs]) ** 2
-    for name, u in u_model(case, ready, nominal, air).items():
-        if name in variance:
-            variance[name] = variance[name] + u**2
-    simple = k1k2_case(case, None, rpm, V, air)
+    rotor = case.rotor()
+    rpm, V, cut = _grids(case, rotor.blade.pitch_m() / rotor.D)
+    found = propagate(case, rpm, V).points
+    simple = k1k2_case(case, None, rpm, V, case.air())
     whole: dict[str, Array] = {
-        **values_of,
-        **{f"u_{name}": np.sqrt(v) for name, v in variance.items()},
-        "J": nominal.J,
+        **{name: found[name] for name in CHANNELS},
+        **{f"u_{name}": found.u[name] for name in CHANNELS},
+        "J": found.J,
         "rpm": rpm,
-        "M_tip": nominal.M_tip,
+        "M_tip": found.M_tip,
         "k1k2_thrust_N": simple.thrust_N,
         "k1k2_CT": simple.CT,
     }
+    shown = [*range(keep := _until_windmill(found.CT[:cut])), *range(cut, len(found))]
     over_J = {name: v[:cut] for name, v in whole.items()}
-    keep = _until_windmill(over_J["CT"])
     return {
         "over_J": {name: v[:keep] for name, v in over_J.items()},
         "over_rpm": {name: v[cut:] for name, v in whole.items()},
+        "flags": counted([found.flags[i] for i in shown]),
     }
 
 

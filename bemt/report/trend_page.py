@@ -8,10 +8,10 @@ from typing import Any
 
 from bemt.base.page import num, table
 from bemt.base.units import INCH
-from bemt.formula.k1k2 import D_OVER_P_USABLE, M_TIP_LIMIT
 from bemt.report.plot import COLOURS, DASHES, Mark, Plot, Trace, figure, points
 from bemt.report.trends import ROBOT
 from bemt.report.values import Section, sections
+from bemt.rotors.k1k2 import D_OVER_P_USABLE, M_TIP_LIMIT
 
 __all__ = ["trend_sections"]
 

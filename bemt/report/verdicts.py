@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from bemt.base.tables import number_text
-from bemt.sweep.agreement import needed
+from bemt.sweep.agreement import doubted, needed
 
 __all__ = ["answer", "headline", "recorded", "stand", "verdict"]
 
@@ -33,7 +33,14 @@ def stand(c: Mapping[str, Any]) -> tuple[str, str]:
 
     >>> stand({"E": 14.2, "D": 104.9, "u_num": 0.1, "u_input": 13.0, "u_model": 0.0, "u_val": None})
     ('unknown', 'needs u_D ≥ 5.4 %')
+    >>> stand({"E": 1.0, "D": 9.0, "u_num": 0.1, "u_input": 2.0, "u_model": 0.0, "doubts": ["supersonic tip"]})
+    ('unknown', "inside the model's band, but supersonic tip")
     """
+    kind, words = _stand(c)
+    return ("unknown" if c.get("doubts") and kind == "same" else kind), words + doubted(c)
+
+
+def _stand(c: Mapping[str, Any]) -> tuple[str, str]:
     if not _finite(c.get("E")):
         return "fault", "no result"
     if _finite(c.get("u_val")):
@@ -100,6 +107,7 @@ def verdict(result: Mapping[str, Any]) -> tuple[str, str, str]:
     if near:
         told.append(f"Not distinguishable from noise against {', '.join(near)}: |E| is within u_val.")
     told += _open([c for c in lines if c not in judged])
+    told += [f"Flagged: {flag}." for flag in row.get("flags", ())]
     main = next((c for c in lines if c in far), (judged or lines)[0])
     return (*stand(main), " ".join(told))
 
@@ -157,6 +165,10 @@ def answer(result: Mapping[str, Any]) -> str:
 
 def _hangs(c: Mapping[str, Any], name: str) -> str:
     """What the agreement of one comparison hangs on."""
+    return _hangs_on(c, name) + doubted(c)
+
+
+def _hangs_on(c: Mapping[str, Any], name: str) -> str:
     if _finite(c.get("u_val")):
         far = abs(c["E"]) / c["u_val"] if c["u_val"] else math.inf
         return "they agree within u_val" if far <= 1.0 else f"they differ by {far:.1f} times u_val"

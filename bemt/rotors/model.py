@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import lru_cache
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, cast
@@ -39,12 +38,12 @@ def coefficients(model: Model, air: Air) -> Solve:
     drawn = tuple(e for e in model.effects if not isinstance(e, AsBuilt))
     states = air_fields(air)
 
-    @lru_cache(maxsize=2)  # rotors of a difference are used once
+    @lru_cache(maxsize=32)
     def built(z: bytes) -> Model:
         numbers = np.frombuffer(z)
         if numbers.any():
-            return replace(model, effects=(*drawn, as_built(numbers)), _kept={})
-        return model if len(drawn) == len(model.effects) else replace(model, effects=drawn, _kept={})
+            return model.with_effects((*drawn, as_built(numbers)))
+        return model if len(drawn) == len(model.effects) else model.with_effects(drawn)
 
     def solve(z: Array, rpm: Array, J: Array, which: NDArray[np.intp]) -> Array:
         at = air_of_points({k: v[which] if v.size > 1 else v for k, v in states.items()})

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.rotors.latents import KNOWN_FROM, NAMES, Prior, Sensed
-from bemt.rotors.learnt import Learnt
+from bemt.rotors.validity import Validity
 
 Array = NDArray[np.float64]
 
@@ -132,7 +132,7 @@ class Population:
         Offset of each family at hand and its standard deviation [deg].
     provenance : mapping
         Folders, propellers, points, command, version.
-    learnt : Learnt
+    validity : Validity
         Ranges of the propellers it was fitted to.
     """
 
@@ -159,7 +159,7 @@ class Population:
     nu_rest: float
     offsets: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
-    learnt: Learnt | None = None
+    validity: Validity | None = None
 
     @property
     def rest_sizes(self) -> Array:
@@ -267,8 +267,8 @@ class Population:
         if tuple(plain.pop("latents")) != NAMES:
             raise ValueError(f"got latent numbers {document['latents']}; expected {NAMES}")
         plain |= {name: np.array(plain[name], float) for name in ("mean", "cov")}
-        if plain.get("learnt") is not None:
-            plain["learnt"] = Learnt(tuple(plain["learnt"]["diameter_m"]), float(plain["learnt"]["M_tip"]))
+        if plain.get("validity") is not None:
+            plain["validity"] = Validity.of(plain["validity"])
         plain["offsets"] = {k: (float(a), float(b)) for k, (a, b) in plain["offsets"].items()}
         return Population(**plain)
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bemt.rotors.conditioning import tangents
 from bemt.rotors.latents import NAMES, Prior, Sensed
-from bemt.rotors.mixture import LEVELS, half_width
+from bemt.rotors.mixture import LEVELS, pair_half_width
 from bemt.rotors.population import WEIGHTS, Population
 from bemt.rotors.reference import ReferenceRun
 
@@ -67,7 +67,9 @@ class Prediction:
 
     def half_width(self, level: float = LEVELS[0], noise: bool = False) -> Array:
         """Half width of the interval that holds the rotor's own coefficient (with noise: a reading), (2, P) [1]."""
-        return half_width(level, self.sds(noise), self.chances)
+        still = np.hypot(self.rest_sd, self.noise_sd) if noise else self.rest_sd
+        sizes, weights = (self.sizes, self.rest_sizes), (self.weights, self.rest_weights)
+        return pair_half_width(level, self.latent_sd, still, sizes, weights)
 
 
 def zero_thrust(solve: Solve, z: Array, rpm: float, which: int = 0) -> float:

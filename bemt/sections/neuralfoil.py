@@ -1,5 +1,8 @@
 """Section tables from NeuralFoil: kept within what it knows, continued to +-180 degrees, cached by content.
 
+Sections of the rule come from the shipped table of its answers (:mod:`bemt.sections.four_digit`); any other needs
+NeuralFoil itself, the extra ``[neuralfoil]``.
+
 :func:`neuralfoil_polar` is what the section of a propeller gets (the rule of :mod:`bemt.sections.rule`),
 :func:`tunnel_polar` a smooth section in an ordinary wind tunnel.
 """
@@ -7,14 +10,18 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base import cache
-from bemt.sections import rule
+from bemt.base.errors import needs
+from bemt.base.kept import Kept
+from bemt.sections import four_digit, rule
 from bemt.sections.extrapolation import METHODS, extend, viterna_cd_max
+from bemt.sections.four_digit import RawPolar
 from bemt.sections.polars import ALPHA_GRID, DEFAULT_RE, Polar, first_stall
 
 if TYPE_CHECKING:
@@ -24,7 +31,7 @@ __all__ = ["neuralfoil_polar", "tunnel_polar"]
 
 Array = NDArray[np.float64]
 
-TABLE_VERSION = 4
+TABLE_VERSION = 5
 """Raise when the making of tables changes: older cache entries are then ignored."""
 RAW_LIMIT_DEG = 20.0
 """NeuralFoil is used up to this |alpha| at most (beyond 20-25 deg it has no training data)."""
@@ -55,7 +62,17 @@ def _confident_range(alpha: Array, cl: Array, confidence: Array, past_stall: flo
 
 
 def neuralfoil_polar(airfoil: Airfoil, n_crit: float = rule.N_CRIT, drag_level: float = rule.DRAG_LEVEL) -> Polar:
-    """Section table of a propeller blade by the general rule of :mod:`bemt.sections.rule`."""
+    """Section table of a propeller blade by the general rule (:mod:`bemt.sections.rule`); one object for equal ones."""
+    key = airfoil.key(), airfoil.name, airfoil.four_digit, float(n_crit), float(drag_level)
+    if cache.watched():  # whoever collects the tables that are used is to see them
+        return _by_rule(airfoil, n_crit, drag_level)
+    return _POLARS.get(key, lambda: _by_rule(airfoil, n_crit, drag_level))
+
+
+_POLARS: Kept[Polar] = Kept(128, lambda _: 1.0)
+
+
+def _by_rule(airfoil: Airfoil, n_crit: float, drag_level: float) -> Polar:
     small = tunnel_polar(airfoil, n_crit=n_crit, lift_floor=0.0)
     large = tunnel_polar(airfoil, n_crit=max(n_crit, rule.N_CRIT_LARGE))
     w = np.clip(np.log(DEFAULT_RE / rule.SMALL_RE) / np.log(2.0), 0.0, 1.0)[None, :, None]
@@ -103,39 +120,71 @@ def tunnel_polar(
     settings: dict[str, Any] = {"n_crit": float(n_crit), "xtr": [float(xtr_upper), float(xtr_lower)], "model": model,
                                 "cd_max": top, "method": method, "past_stall": float(past_stall),
                                 "lift_floor": float(lift_floor)}  # fmt: skip
-    version = cache.installed_version("neuralfoil")
-    key = cache.content_key(TABLE_VERSION, version, airfoil.key(), settings, re, ALPHA_GRID)
-    made = cache.cached_arrays("polar", key, lambda: _make_neuralfoil(airfoil, re, settings))
-    source = f"NeuralFoil {version} {model}, n_crit {n_crit:g}, xtr {xtr_upper:g}/{xtr_lower:g}"
+    shape = airfoil.four_digit if _tabulated(airfoil, re, settings) else None
+    asked = four_digit.table().made_with if shape else f"NeuralFoil {_version()} {model}"
+    key = cache.content_key(TABLE_VERSION, asked, shape, airfoil.key(), settings, re, ALPHA_GRID)
+    made = cache.cached_arrays("polar", key, lambda: _make(airfoil, re, settings))
+    source = f"{asked}{', tabulated' if shape else ''}, n_crit {n_crit:g}, xtr {xtr_upper:g}/{xtr_lower:g}"
     return Polar(ALPHA_GRID, re, np.zeros(1), made["cl"][:, :, None], made["cd"][:, :, None], made["confidence"],
                  airfoil.name, f"{source}; {method} cd_max {top:g}")  # fmt: skip
 
 
-def _make_neuralfoil(airfoil: Airfoil, wanted: Array, settings: dict[str, Any]) -> dict[str, Array]:
-    """Tables (Na, Nr) from one vectorised NeuralFoil call."""
-    import neuralfoil as nf
+RAW_DEG = np.arange(-2 * (RAW_LIMIT_DEG + BLEND_DEG), 2 * (RAW_LIMIT_DEG + BLEND_DEG) + 1) / 2.0
+"""Angles of attack at which the network is asked [deg]."""
 
-    re = np.unique(np.maximum(wanted, RE_LOWEST))
-    reach = RAW_LIMIT_DEG + BLEND_DEG
-    raw_deg = np.arange(-2 * reach, 2 * reach + 1) / 2.0
-    a, r = np.meshgrid(raw_deg, np.append(re, RE_REFERENCE), indexing="ij")
+
+def _version() -> str:
+    if not cache.is_installed("neuralfoil"):
+        needs("neuralfoil", "neuralfoil")
+    return cache.installed_version("neuralfoil")
+
+
+def _tabulated(airfoil: Airfoil, re: Array, settings: dict[str, Any]) -> bool:
+    """Whether the shipped table answers."""
+    ordinary = settings["xtr"] == [1.0, 1.0] and settings["model"] == "xlarge"
+    if not ordinary or not four_digit.covers(airfoil.four_digit, settings["n_crit"]):
+        return False
+    return bool(np.all(np.isin(_asked(re), four_digit.table().Re)))
+
+
+def _asked(wanted: Array) -> Array:
+    return np.unique(np.maximum(wanted, RE_LOWEST))
+
+
+def ask(
+    airfoil: Airfoil, re: Array, n_crit: float, xtr: Sequence[float] = (1.0, 1.0), model: str = "xlarge"
+) -> RawPolar:
+    """Ask NeuralFoil for cl, cd and confidence at `RAW_DEG` and Reynolds numbers, (Na, Nr) each [1]."""
+    nf = needs("neuralfoil", "neuralfoil")
+    a, r = np.meshgrid(RAW_DEG, re, indexing="ij")
+    outline = np.column_stack([airfoil.x, airfoil.y])
     aero = nf.get_aero_from_coordinates(
-        np.column_stack([airfoil.x, airfoil.y]),
-        a.ravel(),
-        r.ravel(),
-        n_crit=settings["n_crit"],
-        xtr_upper=settings["xtr"][0],
-        xtr_lower=settings["xtr"][1],
-        model_size=settings["model"],
+        outline, a.ravel(), r.ravel(), n_crit=n_crit, xtr_upper=xtr[0], xtr_lower=xtr[1], model_size=model
     )
-    cl, cd, conf = (np.asarray(aero[k], dtype=float).reshape(a.shape) for k in ("CL", "CD", "analysis_confidence"))
+    return RawPolar(*(np.asarray(aero[k], dtype=float).reshape(a.shape) for k in ("CL", "CD", "analysis_confidence")))
+
+
+def _raw(airfoil: Airfoil, re: Array, settings: dict[str, Any]) -> RawPolar:
+    """The network's answers, from the shipped table where it has them; the last column is at RE_REFERENCE."""
+    if not _tabulated(airfoil, re, settings):
+        return ask(airfoil, np.append(re, RE_REFERENCE), settings["n_crit"], settings["xtr"], settings["model"])
+    assert airfoil.four_digit is not None  # the table covers it
+    held = four_digit.raw_polar(airfoil.four_digit, settings["n_crit"])
+    columns = np.argmax(four_digit.table().Re == re[:, None], axis=1)
+    return RawPolar(*(np.column_stack([v[:, columns], v[:, -1]]) for v in held))
+
+
+def _make(airfoil: Airfoil, wanted: Array, settings: dict[str, Any]) -> dict[str, Array]:
+    """Tables (Na, Nr) from one set of the network's answers."""
+    re = _asked(wanted)
+    cl, cd, conf = _raw(airfoil, re, settings)
     if settings["lift_floor"] > 0.0:
         up, down, keep = np.maximum(cl[:, -1:], 0.0), np.minimum(cl[:, -1:], 0.0), settings["lift_floor"]
         sane = np.clip(cl, keep * up + down / keep - LIFT_SLACK, keep * down + up / keep + LIFT_SLACK)
         cl = np.where(np.append(re, np.inf) < RE_REFERENCE, sane, cl)
     cl, cd, conf = cl[:, :-1], cd[:, :-1], conf[:, :-1]
     cd = np.maximum(cd, 2.656 / np.sqrt(re))
-    alpha = np.deg2rad(raw_deg)
+    alpha = np.deg2rad(RAW_DEG)
     out = {name: np.zeros((ALPHA_GRID.size, re.size)) for name in ("cl", "cd", "confidence")}
     half = np.deg2rad(BLEND_DEG)
     for j in range(re.size):

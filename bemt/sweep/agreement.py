@@ -29,8 +29,21 @@ def needed(c: Mapping[str, Any]) -> float:
     return math.nan if math.isnan(own) else math.sqrt(max(_u(c, "E") ** 2 - own**2, 0.0))
 
 
+def doubted(c: Mapping[str, Any]) -> str:
+    """Why agreement means little at this point, to be added to it; empty where nothing is flagged.
+
+    >>> doubted({"doubts": ["supersonic tip"]}), doubted({})
+    (', but supersonic tip', '')
+    """
+    return "".join(f", but {words}" for words in c.get("doubts", ()))
+
+
 def agreement(c: Mapping[str, Any]) -> str:
     """Say how a comparison stands, or what the recording's uncertainty would have to be."""
+    return _words(c) + doubted(c)
+
+
+def _words(c: Mapping[str, Any]) -> str:
     E, own, u_D = abs(_u(c, "E")), known(c), _u(c, "u_D")
     if math.isnan(E):
         return "no result"

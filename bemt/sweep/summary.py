@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from bemt.base.tables import number_text, text_table
+from bemt.rotors.validity import kind, serious
 from bemt.sweep.agreement import known, needed
 from bemt.sweep.case import ROW_SOURCES
 from bemt.sweep.text import with_nan
 
-WIDTH, ROWS = 80, 22
-"""Columns of the screen, and rows of the table: the rest is counted."""
+WIDTH, ROWS, SCREEN = 80, 20, 45
+"""Columns of the screen, rows of the table and lines of the screen: the rest is counted."""
 
 
 def summary(
@@ -35,9 +36,11 @@ def summary(
         lines += _short(f"{name}: not solved, {n} {'fault' if n == 1 else 'faults'} (see the messages)", cut)
     if len(failed) > 6:
         lines.append(f"and {len(failed) - 6} more that were not solved")
-    for words in (_worst(found), _ducts(solved), _unknowns(solved), _flags(solved, cut), _grids(solved, cut)):
+    end = ["", *_next(called, bool(found))] if solved else []
+    for words in (_drives(solved), _worst(found), _ducts(solved), _unknowns(solved), _grids(solved, cut)):
         lines += ["", *words] if words else []
-    return "\n".join([*lines, "", *_next(called, bool(found))] if solved else lines)
+    flags = _flags(solved, SCREEN - len(lines) - len(end) - 1)
+    return "\n".join([*lines, *(["", *flags] if flags else []), *end])
 
 
 def _compared(result: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -60,7 +63,11 @@ def _compared(result: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def _agreement(c: Mapping[str, Any]) -> str:
-    """Whether model and recording agree, or how good the recording would have to be."""
+    """Whether model and recording agree, or how good the recording would have to be; "!" where a flag forbids it."""
+    return _judged(c) + (" !" if c.get("doubts") else "")
+
+
+def _judged(c: Mapping[str, Any]) -> str:
     if not math.isfinite(c["E"]):
         return "no result"
     if not math.isfinite(c["known"]):
@@ -104,8 +111,19 @@ def _table(solved: Sequence[Mapping[str, Any]], found: Sequence[Mapping[str, Any
         lines.append(f"and {max(left, len(body) - len(shown))} more rows (--details shows all)")
     if found:
         lines.append("±, u: one standard uncertainty (BEMT: inputs and model); %: of the largest")
-        lines.append("recorded value; u > X: the two agree if the u of the recording is above X N")
+        lines.append("recorded value; u > X: they agree only if the recording's own u exceeds X N")
+        if any(c.get("doubts") for c in found):
+            lines.append("!: do not take it for agreement; the flag below says why")
     return lines
+
+
+def _drives(solved: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Most thrust of the cases that have a motor."""
+    told = [(r["name"], r["drive"]["text"]) for r in solved if r.get("drive")]
+    lines = [
+        line for name, text in told[:4] for line in textwrap.wrap(f"{name}, {text}", WIDTH, subsequent_indent="  ")
+    ]
+    return lines + ([f"and {len(told) - 4} more cases with a motor (--details)"] if len(told) > 4 else [])
 
 
 def _worst(found: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -119,7 +137,7 @@ def _worst(found: Sequence[Mapping[str, Any]]) -> list[str]:
     if abs(c["E"]) <= c["known"]:
         words += " This is within the uncertainty of BEMT."
     elif not math.isfinite(c["u_D"]) and math.isfinite(needed(c)):
-        words += f" The recording states no u: the two agree if it is above {number_text(needed(c), 2)} N."
+        words += f" The recording states no u: they agree only if it exceeds {number_text(needed(c), 2)} N."
     audit = next((a for a in case.get("audit", []) if a["reference"] == c["reference"]), None)
     faults = [line["finding"] for line in (audit or {"lines": []})["lines"] if line["status"] == "fault"]
     if faults:
@@ -155,15 +173,32 @@ def _unknowns(solved: Sequence[Mapping[str, Any]]) -> list[str]:
     return ["Unknowns that widen BEMT most (their part of u in thrust):", *lines] if lines else []
 
 
-def _flags(solved: Sequence[Mapping[str, Any]], cut: bool) -> list[str]:
+def _flags(solved: Sequence[Mapping[str, Any]], room: int) -> list[str]:
+    """Every flag of BEMT, the serious ones first; those that do not fit the lines are named in short and counted."""
     told: dict[str, list[str]] = {}
     for result in solved:
         for row in result["rows"]:
             if row["source"] == "bemt":
                 for flag in row["flags"]:
                     told.setdefault(flag, []).append(result["name"])
-    lines = [f"! {', '.join(dict.fromkeys(names))}: {flag}" for flag, names in list(told.items())[:4]]
-    return [part for line in lines for part in _short(line, cut)]
+    lines: list[str] = []
+    rest: dict[str, list[str]] = {}
+    for flag in sorted(told, key=lambda f: not serious([f])):
+        names = list(dict.fromkeys(told[flag]))
+        part = textwrap.wrap(f"! {_some(names)}: {flag}", WIDTH, subsequent_indent="  ", break_on_hyphens=False)
+        if not rest and len(lines) + len(part) <= max(room - 3, 3):
+            lines += part
+        else:
+            rest.setdefault(kind(flag), []).extend(names)
+    for head, names in rest.items():
+        some = _some(list(dict.fromkeys(names)))
+        lines += textwrap.wrap(f"! {len(names)} more: {head} ({some}; --details)", WIDTH, subsequent_indent="  ")
+    return lines
+
+
+def _some(names: Sequence[str]) -> str:
+    """First names, and how many more there are."""
+    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
 
 
 def _grids(solved: Sequence[Mapping[str, Any]], cut: bool) -> list[str]:

@@ -164,6 +164,8 @@ def case_text(result: Mapping[str, Any]) -> str:
         _wrap(head, "  "),
         _wrap("effects: " + ", ".join(c["effects"]), "  "),
     ]
+    if result.get("drive"):
+        lines += ["", _wrap(result["drive"]["text"], "  "), ""]
     lines += [_main_table(result), *_fan_lines(result["fan"]), *_comparison_lines(result), *_audit_lines(result)]
     if result["assumptions"]:
         bemt = result["rows"][0]

@@ -12,8 +12,8 @@ from bemt.base.tables import plain
 from bemt.base.units import INCH
 from bemt.coefficients import M_tip
 from bemt.rotors.fit import fit
-from bemt.rotors.learnt import Learnt
 from bemt.rotors.population import Population
+from bemt.rotors.validity import Validity
 from bemt.sections import rule as section_rule
 from bemt.validate.built import Observed, conditioned, expect, observe
 from bemt.validate.points import KINDS
@@ -65,10 +65,15 @@ def fit_population(seen: Sequence[Observed], name: str) -> tuple[Population, Any
         "command": f"python -m bemt validate {name} --fit-population FILE",
         "source": "UIUC Propeller Database (Brandt, Deters, Ananda, Dantsker, Selig)",
     }
-    D = [s.record.diameter_m for s in seen]
-    fastest = max(float(M_tip(s.drawn.rpm.max() / 60.0, s.record.diameter_m, s.solve.air.a_sound)) for s in seen)
     p, numbers = fit([s.record for s in seen], provenance=provenance)
-    return replace(p, learnt=Learnt((min(D), max(D)), fastest)), numbers
+    return replace(p, validity=Validity.of_rotors(map(_covered, seen))), numbers
+
+
+def _covered(one: Observed) -> Validity:
+    """Ranges that the points of one propeller cover."""
+    rotor, m = one.solve.rotor, one.record
+    fastest = M_tip(one.drawn.rpm.max() / 60.0, m.diameter_m, one.solve.air.a_sound)
+    return Validity.of_rotor(m.diameter_m, rotor.B, rotor.blade.pitch_m() / rotor.D, m.x, m.Re, fastest)
 
 
 def leave_out(

@@ -2,15 +2,15 @@
 
 UIUC folders and files, APC performance files (the vendor's computation), Drive Calculator's table (power laws, taken at
 three tip speeds), and any table with the columns (or ``recording.toml`` constants) diameter, pitch, rpm and thrust or
-CT; further columns are airspeed or J, power, torque or CP, density, blades, chord and measured pitch (at 0.75 R),
-ducted (0 or 1), name.
+CT; further columns are airspeed or J, density, blades, ducted (0 or 1), name.
 """
 
 from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,6 @@ from bemt.air import Air, isa_pressure
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH, ZERO_CELSIUS
 from bemt.dataset import Dataset
-from bemt.formula.points import FitPoints, MeasuredPropeller, Rows, join
 from bemt.readers import apc, uiuc
 from bemt.readers._uiuc_names import parse_file_name
 
@@ -37,19 +36,93 @@ _BLADES = re.compile(r"(\d)\s*-?\s*(?:blatt|blades?|bl\b)", re.IGNORECASE)
 _DUCTED = re.compile(r"impeller|\bedf\b|ducted", re.IGNORECASE)
 
 
+@dataclass(frozen=True)
+class MeasuredPropeller:
+    """One propeller of the data."""
+
+    # As the data name it; the family that is left out together; where it comes from
+    name: str
+    maker: str
+    source: str
+    # Nominal [m]
+    diameter_m: float
+    pitch_m: float
+    blades: int = 2  # Number of blades
+    ducted: bool = False  # In a duct: scored, never fitted
+
+
+@dataclass(frozen=True, eq=False)
+class FitPoints:
+    """N measured points of K propellers."""
+
+    propellers: tuple[MeasuredPropeller, ...]  # K propellers
+    index: NDArray[np.intp]  # (N,) propeller of each point
+    rpm: Array  # (N,) rotational speed [rev/min]
+    # (N,) propeller convention [-]
+    J: Array
+    CT: Array
+    refused: tuple[str, ...] = ()  # Files or propellers left out, with the reason
+    notes: tuple[str, ...] = ()  # What a user has to know of the sources
+
+    def of(self, name: str) -> Array:
+        """Number of the propeller at each point, by field name, (N,)."""
+        return np.array([float(getattr(p, name)) for p in self.propellers])[self.index]
+
+    @property
+    def P_D(self) -> Array:
+        """Pitch over diameter. [-]"""
+        return self.of("pitch_m") / self.of("diameter_m")
+
+    @property
+    def x(self) -> Array:
+        """J/(P/D). [-]"""
+        return self.J / self.P_D
+
+    @property
+    def ducted(self) -> NDArray[np.bool_]:
+        """Whether the rotor runs in a duct."""
+        return np.array([p.ducted for p in self.propellers])[self.index]
+
+    @property
+    def M_tip(self) -> Array:
+        """Rotational tip Mach number in standard air. [-]"""
+        return np.asarray(co.M_tip(self.rpm / 60.0, self.of("diameter_m"), Air.from_density().a_sound))
+
+    def select(self, where: NDArray[np.bool_]) -> FitPoints:
+        """Part of the points, propellers kept."""
+        arrays = {name: getattr(self, name)[where] for name in ("index", "rpm", "J", "CT")}
+        return replace(self, **arrays)
+
+
+Rows = tuple[MeasuredPropeller, Array, Array, Array]
+"""Propeller, speed [rev/min], advance ratio and thrust coefficient of a run."""
+
+
+def join(rows: Sequence[Rows], refused: Sequence[str] = (), notes: Sequence[str] = ()) -> FitPoints:
+    """Make points of rows per propeller and run; rows of equal propellers are joined."""
+    numbers: dict[str, int] = {}
+    unique: list[MeasuredPropeller] = []
+    parts: list[tuple[Array, ...]] = []
+    for made, *arrays in rows:
+        k = numbers.setdefault(repr(made), len(unique))
+        if k == len(unique):
+            unique.append(made)
+        rpm, J, CT = (np.asarray(a, dtype=float) for a in arrays)
+        ok = np.isfinite(rpm) & (rpm > 0) & np.isfinite(J) & np.isfinite(CT)
+        parts.append((np.full(int(ok.sum()), k), rpm[ok], J[ok], CT[ok]))
+    joined = [np.concatenate(column) for column in zip(*parts, strict=True)] if parts else [np.empty(0)] * 4
+    if joined[0].size == 0:
+        raise InputError(Fault("", "", "no finite point", "rows with rpm, J and CT"))
+    rpm, J, CT = joined[1:]
+    return FitPoints(tuple(unique), joined[0].astype(np.intp), rpm, J, CT, tuple(refused), tuple(notes))
+
+
 def _from_uiuc(p: uiuc.UiucPropeller) -> tuple[list[Rows], list[str]]:
     if p.pitch_in is None:
         return [], [f"{p.name}: no nominal pitch"]
-    chord = pitch = float("nan")
-    if p.geometry is not None and p.geometry.r_R[0] <= 0.75 <= p.geometry.r_R[-1]:
-        chord = float(np.interp(0.75, p.geometry.r_R, p.geometry.c_R)) * p.diameter_m / 2.0
-        beta = np.radians(np.interp(0.75, p.geometry.r_R, p.geometry.beta_deg))
-        pitch = 0.75 * np.pi * p.diameter_m * float(np.tan(beta))
-    made = MeasuredPropeller(
-        p.name, p.family, "UIUC", p.diameter_m, p.pitch_in * INCH, p.blades, chord, measured_pitch_m=pitch
-    )
-    rows: list[Rows] = [(made, s.rpm, np.zeros_like(s.rpm), s.CT, s.CP) for s in p.statics]
-    rows += [(made, np.full_like(line.J, line.rpm), line.J, line.CT, line.CP) for line in p.lines]
+    made = MeasuredPropeller(p.name, p.family, "UIUC", p.diameter_m, p.pitch_in * INCH, p.blades)
+    rows: list[Rows] = [(made, s.rpm, np.zeros_like(s.rpm), s.CT) for s in p.statics]
+    rows += [(made, np.full_like(line.J, line.rpm), line.J, line.CT) for line in p.lines]
     return rows, [] if rows else [f"{p.name}: geometry only"]
 
 
@@ -61,16 +134,16 @@ def _from_uiuc_table(path: Path, table: Any) -> tuple[list[Rows], list[str]]:
     assert name.diameter_in is not None and name.pitch_in is not None
     made = MeasuredPropeller(name.name, name.family, "UIUC", name.diameter_in * INCH, name.pitch_in * INCH, name.blades)
     if isinstance(table, uiuc.UiucStatic):
-        return [(made, table.rpm, np.zeros_like(table.rpm), table.CT, table.CP)], []
+        return [(made, table.rpm, np.zeros_like(table.rpm), table.CT)], []
     if isinstance(table, uiuc.UiucLine):
-        return [(made, np.full_like(table.J, table.rpm), table.J, table.CT, table.CP)], []
+        return [(made, np.full_like(table.J, table.rpm), table.J, table.CT)], []
     return [], [f"{path}: geometry only"]
 
 
 def _from_apc(found: apc.ApcPerformance) -> list[Rows]:
     s = found.series
     made = MeasuredPropeller(found.name, "APC", "APC, computed", found.diameter_m, found.pitch_m, found.blades)
-    return [(made, s["rpm"], s["J"], s["CT"], s["CP"])]
+    return [(made, s["rpm"], s["J"], s["CT"])]
 
 
 def _from_drivecalc(path: Path, found: Dataset) -> list[Rows]:
@@ -94,16 +167,13 @@ def _from_drivecalc(path: Path, found: Dataset) -> list[Rows]:
         rpm = rpm[rpm <= limit] if limit > 0 else rpm
         n = rpm / 60.0
         T = a * (rpm / 1000.0) ** b
-        CT = np.asarray(co.CT(T, _density(c, "thrust", i), n, D))
-        p, q = c.get("power_law_W", nothing)[i], c.get("power_exponent", nothing)[i]
-        P = p * (rpm / 1000.0) ** q if p > 0 else np.full_like(rpm, np.nan)
-        CP = np.asarray(co.CP(P, _density(c, "power", i), n, D))
-        rows.append((made, rpm, np.zeros_like(rpm), CT, CP))
+        CT = np.asarray(co.CT(T, _density(c, i), n, D))
+        rows.append((made, rpm, np.zeros_like(rpm), CT))
     return rows
 
 
-def _density(c: Mapping[str, Array], what: str, i: int) -> float:
-    h, T = (c[f"{what}_{k}"][i] if f"{what}_{k}" in c else float("nan") for k in ("altitude_m", "temperature_K"))
+def _density(c: Mapping[str, Array], i: int) -> float:
+    h, T = (c[f"thrust_{k}"][i] if f"thrust_{k}" in c else float("nan") for k in ("altitude_m", "temperature_K"))
     if not (np.isfinite(h) and -500.0 <= h <= 5000.0):
         return RHO
     p, T_isa = isa_pressure(float(h))
@@ -132,7 +202,6 @@ def _from_table(path: Path, found: Dataset) -> tuple[list[Rows], list[str], list
     notes = []
     n = rpm / 60.0
     rho = column("density_kg_m3", "rho_kg_m3")
-    P, Q, CP = column("power_W", "shaft_power_W"), column("torque_Nm"), column("CP")
     if rho is None:
         rho = np.full(N, RHO)
         if CT is None:
@@ -140,21 +209,14 @@ def _from_table(path: Path, found: Dataset) -> tuple[list[Rows], list[str], list
     if CT is None:
         assert T is not None
         CT = np.asarray(co.CT(T, rho, n, D))
-    if CP is None and P is None and Q is not None:
-        P = 2.0 * np.pi * n * Q
-    if CP is None:
-        CP = np.full(N, np.nan) if P is None else np.asarray(co.CP(P, rho, n, D))
     J, V = column("J"), column("airspeed_m_s", "V_m_s")
     if J is None:
         J = np.zeros(N) if V is None else np.asarray(co.J(V, n, D))
-    B, chord, duct = column("blades", "B"), column("chord_m", "chord75_m"), column("ducted")
-    measured = column("measured_pitch_m", "pitch75_m")
+    B, duct = column("blades", "B"), column("ducted")
     if B is None:
         B = np.full(N, 2.0)
         notes.append(f"{path}: no column blades, 2 assumed")
-    chord = np.full(N, np.nan) if chord is None else chord
     duct = np.zeros(N) if duct is None else duct
-    measured = np.full(N, np.nan) if measured is None else measured
     names = found.texts.get("name") or found.texts.get("propeller") or (path.stem,) * N
     groups: dict[tuple[Any, ...], list[int]] = {}
     bad = 0
@@ -163,15 +225,13 @@ def _from_table(path: Path, found: Dataset) -> tuple[list[Rows], list[str], list
         if not (all(np.isfinite(v) and v > 0 for v in values) and B[i] == round(B[i])):
             bad += 1
             continue
-        more = (None if np.isnan(v) else float(v) for v in (chord[i], measured[i]))  # NaN never equals NaN
-        key = (names[i], *values, *more, bool(duct[i] > 0))
+        key = (names[i], *values, bool(duct[i] > 0))
         groups.setdefault(key, []).append(i)
     rows: list[Rows] = []
-    for (name, d, p, b, c, q, inside), at in groups.items():
+    for (name, d, p, b, inside), at in groups.items():
         maker = str(name).split("_")[0].split(" ")[0]
-        own_chord, own_pitch = (float("nan") if v is None else v for v in (c, q))
-        made = MeasuredPropeller(str(name), maker, path.name, float(d), float(p), int(b), own_chord, inside, own_pitch)
-        rows.append((made, rpm[at], J[at], CT[at], CP[at]))
+        made = MeasuredPropeller(str(name), maker, path.name, float(d), float(p), int(b), inside)
+        rows.append((made, rpm[at], J[at], CT[at]))
     return rows, [f"{path}: {bad} rows without a positive diameter, pitch and blade count"] if bad else [], notes
 
 

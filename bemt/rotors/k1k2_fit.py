@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
-from bemt.formula import k1k2 as empirical
-from bemt.formula.points import FitPoints
+from bemt.rotors import k1k2 as empirical
+from bemt.rotors.k1k2_points import FitPoints
 
 Array = NDArray[np.float64]
 

@@ -7,9 +7,9 @@ blades, a unit or the speed is another one.  The question comes before the physi
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,7 +18,6 @@ from bemt.base.tables import number_text
 from bemt.base.units import INCH
 from bemt.diagnose.blade import AsLabelled
 from bemt.diagnose.record import CHANNELS
-from bemt.diagnose.rules import BESIDE_IT
 from bemt.effects.base import Baking, Effect
 
 if TYPE_CHECKING:
@@ -26,22 +25,13 @@ if TYPE_CHECKING:
     from bemt.diagnose.verdict import Decision
 
 __all__ = [
-    "FACTOR",
-    "RESTLESS",
-    "Suspect",
-    "contradiction",
-    "finding",
-    "foreign",
-    "judged",
-    "levels",
-    "of_recorded",
-    "suspects",
-    "to_mend",
-]
+    "CONTRADICTED", "FACTOR", "SLIPS", "UNREPEATABLE", "Suspect", "contradiction", "finding", "foreign", "impossible",
+    "levels", "odd_speed", "suspects", "to_mend", "unrepeatable",
+]  # fmt: skip
 
 FACTOR = 3.0
 """Thrust or torque over that of the case, or under it, from which on the question comes first [1]."""
-RESTLESS = 0.10
+UNREPEATABLE = 0.10
 """Scatter of repeats, share of the reading, that no stand has: something that is not recorded changes [1]."""
 # What loads of the right rotor may be off by, natural logarithm; how unusual a slip is adds to its square.
 _OFF = 0.25
@@ -51,9 +41,10 @@ _NEARLY = 1.0
 _ANGLES_DEG = (-12.0, -9.0, -6.0, -3.0, 3.0, 6.0, 9.0, 12.0, 16.0)
 _BLADES = (1, 2, 3, 4, 5, 6, 8, 12)
 _ERROR = ": error: "
-_CONTRADICTED = "a recording contradicts itself; a physical residual cannot be distinguished from that"
-# Effects that are such a slip themselves.
-_SLIPS = ("unit_slip", "rpm_scale")
+CONTRADICTED = "a recording contradicts itself; a physical residual cannot be distinguished from that"
+"""Why nothing unknown is claimed of it."""
+SLIPS = ("unit_slip", "rpm_scale")
+"""Effects that are such a slip themselves."""
 
 
 @dataclass(frozen=True)
@@ -145,12 +136,12 @@ def _slips(problem: Problem, found: dict[str, float]) -> Iterator[tuple[str, str
             yield kind, words, {c: math.log(ratio[c]) for c in found}, rarity
 
 
-def _restless(problem: Problem) -> dict[str, float]:
+def unrepeatable(problem: Problem) -> dict[str, float]:
     """Channels whose repeats differ by more than any stand's, with their scatter [1]."""
-    return {c: s for c, s in problem.scatter.items() if s > RESTLESS}
+    return {c: s for c, s in problem.scatter.items() if s > UNREPEATABLE}
 
 
-def _impossible(problem: Problem) -> tuple[str, ...]:
+def impossible(problem: Problem) -> tuple[str, ...]:
     """What recordings show that cannot be so."""
     return tuple(f for f in problem.findings if _ERROR in f)
 
@@ -168,9 +159,9 @@ def to_mend(problem: Problem, decision: Decision) -> str:
 
 def contradiction(problem: Problem, decision: Decision) -> tuple[str, str, str]:
     """File that cannot be so, what in it and the correction, where that comes before any cause; empty elsewhere."""
-    wrong = _impossible(problem)
+    wrong = impossible(problem)
     alone = all(not part.record.reference for part in problem.parts)
-    if decision.verdict != "insufficient" or not wrong or not (alone or decision.why == _CONTRADICTED):
+    if decision.verdict != "insufficient" or not wrong or not (alone or decision.why == CONTRADICTED):
         return "", "", ""
     file, _, said = wrong[0].partition(_ERROR)
     what, _, correction = said.partition(". Correction: ")
@@ -182,7 +173,7 @@ def finding(problem: Problem) -> str:
     """Question to the user, "" where the loads may be those of the case's rotor, at rest but for what is recorded."""
     found, names = levels(problem), {"thrust_N": "thrust", "torque_Nm": "torque"}
     if not _suspicious(found):
-        told = " and ".join(f"{names[c]} by {s:.0%}" for c, s in _restless(problem).items())
+        told = " and ".join(f"{names[c]} by {s:.0%}" for c, s in unrepeatable(problem).items())
         return f"at one speed the readings differ, {told}: what changes between them is not recorded" if told else ""
     turned = {c: " of the other sign," if v < 0.0 else "" for c, v in found.items()}
     off = " and ".join(f"{names[c]} is{turned[c]} {number_text(abs(v), 3)} times" for c, v in found.items())
@@ -190,39 +181,10 @@ def finding(problem: Problem) -> str:
     return f"{off} what the case gives. Is it this rotor? Most likely: {ranked}"
 
 
-def judged(problem: Problem, decision: Decision) -> Decision:
-    """Decision that names no physics for loads that cannot be those of the case's rotor."""
-    if _restless(problem) and decision.verdict not in ("none", "unknown"):
-        why = "repeats at one condition differ by more than those of any stand: something that is not recorded changes"
-        return replace(decision, verdict="insufficient", effects=(), classes=(), why=why)
-    if decision.verdict == "unknown" and _impossible(problem):
-        return replace(decision, verdict="insufficient", classes=(), why=_CONTRADICTED)
-    sure = decision.effects[:1] if decision.rule == BESIDE_IT else decision.effects
-    slip = (decision.verdict in ("named", "sensor") or decision.rule == BESIDE_IT) and set(sure) & set(_SLIPS)
-    if not _suspicious(levels(problem)) or (slip and not _odd_speed(problem, slip)):
-        return decision
-    why = f"the loads are off by more than a factor of {FACTOR:g}: first check that the case describes this rotor"
-    return replace(decision, verdict="insufficient", effects=(), classes=(), why=why)
-
-
-def _odd_speed(problem: Problem, slip: set[str]) -> bool:
+def odd_speed(problem: Problem, slip: set[str]) -> bool:
     """Whether a wrong speed is named that is none of pole pairs or units, while another rotor explains the loads."""
     if "rpm_scale" not in slip:
         return False
     ranked = suspects(problem)
     speed = min((s.distance for s in ranked if s.kind in ("poles", "speed")), default=math.inf)
     return speed > ranked[0].distance + _NEARLY
-
-
-def of_recorded(
-    problem: Problem, decision: Decision, parameters: Mapping[str, Mapping[str, Mapping[str, Any]]]
-) -> Decision:
-    """Decision that names no slip of a density that nobody wrote down: it only stands for loads off alike."""
-    channel = parameters.get("unit_slip", {}).get("channel", {}).get("value")
-    told = any(p.record.air_recorded for p in problem.parts if not p.record.reference)
-    if decision.effects != ("unit_slip",) or channel != "density_kg_m3" or told:
-        return decision
-    why = (
-        "every load is off by the same share, as by a wrong density, which is not recorded: check units, speed and size"
-    )
-    return replace(decision, verdict="insufficient", effects=(), classes=(), why=why)

@@ -1,4 +1,4 @@
-"""Folder of a new case: case.toml, the stations it names, and drive.toml where the motor's K_v is known."""
+"""Folder of a new case: case.toml and the stations it names."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from pathlib import Path
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import write_atomic
 from bemt.base.units import INCH
-from bemt.case import Case, case_of, find_cases, fresh, from_solid, load_case
-from bemt.drive import from_label
+from bemt.case import fresh, from_solid, load_case
+from bemt.readers._uiuc_names import find_family
 
 
 @dataclass(frozen=True)
@@ -27,8 +27,19 @@ class Wanted:
     blades: int | None = None
     rpm: float | None = None
     airspeed_m_s: float = 0.0
+    series: str | None = None
     kv: float | None = None
     cells: int | None = None
+
+    @property
+    def motor(self) -> tuple[float, int] | None:
+        """K_v and cells. [rev/min/V]"""
+        return None if self.kv is None or self.cells is None else (self.kv, self.cells)
+
+    @property
+    def family(self) -> str | None:
+        """Family of the series."""
+        return None if self.series is None else find_family(self.series)
 
 
 def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str]]:
@@ -49,8 +60,6 @@ def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str]]:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             got = f"a {'folder' if folder.is_dir() else 'file'} that already exists"
             raise InputError(Fault(folder.as_posix(), "", got, "a new folder", "Choose --out DIR"))
-        if wanted.kv is not None and wanted.cells is not None:
-            files["drive.toml"] = _drive_text(case, wanted.kv, wanted.cells).encode()
     for name in sorted(files, key=lambda name: name == "case.toml"):  # last: what it names is there
         write_atomic(folder / name, files[name])
     return folder, sorted(files)
@@ -59,8 +68,8 @@ def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str]]:
 def _faults(w: Wanted) -> list[Fault]:
     """What does not go together."""
     faults = []
-    if w.stations is not None and (w.label is not None or w.scan is not None):
-        faults.append(Fault("", "LABEL, --stations", "both", "one of them", "As in: new 10x5"))
+    if w.stations is not None and w.scan is not None:
+        faults.append(Fault("", "--scan, --stations", "both", "one of them"))
     if w.label is None and w.stations is None and w.scan is None:
         faults.append(Fault("", "LABEL, --stations", "neither", "one of them, or --scan", "As in: new 10x5"))
     if w.fan and (w.stations is not None or w.scan is not None):
@@ -69,11 +78,15 @@ def _faults(w: Wanted) -> list[Fault]:
         faults.append(Fault("", "--blades", str(w.blades), "nothing with --scan, which shows them"))
     if w.unit is not None and w.scan is None:
         faults.append(Fault("", "--unit", w.unit, "nothing without --scan"))
-    if w.stations is not None and w.diameter_mm is None:
-        faults.append(Fault("", "--diameter-mm", "nothing", "the diameter, with --stations"))
+    if w.stations is not None and w.diameter_mm is None and w.label is None:
+        faults.append(
+            Fault("", "--diameter-mm", "nothing", "the diameter, with --stations", "Or the propeller's label")
+        )
     if w.diameter_mm is not None and (w.stations is None or not 5.0 <= w.diameter_mm <= 10000.0):
         expected = "5 to 10000 mm" if w.stations else "nothing without --stations"
         faults.append(Fault("", "--diameter-mm", f"{w.diameter_mm:g}", expected, "In m? Times 1000"))
+    if w.kv is not None and w.scan is not None:
+        faults.append(Fault("", "--kv", "together with --scan", "a label or stations", "Write [drive] into the case"))
     if (w.kv is None) != (w.cells is None):
         given = "--kv" if w.kv is not None else "--cells"
         faults.append(Fault("", given, "alone", "--kv and --cells together"))
@@ -88,86 +101,26 @@ def _files(w: Wanted) -> dict[str, bytes]:
         source = re.sub(r'["\\\n]', "_", Path(w.scan).name)
         texts = from_solid.case_files(found, scale, name, source, "scan", w.rpm, w.airspeed_m_s)
         return {name: text.encode() for name, text in texts.items()}
-    if w.stations is not None and w.diameter_mm is not None:
+    if w.stations is not None:
         file = Path(w.stations)
-        hub, key = fresh.of_stations(file, w.diameter_mm * 1e-3)
-        text = fresh.stations_text(file.name, w.diameter_mm * 1e-3, w.blades or 2, w.rpm, w.airspeed_m_s, hub, key)
+        told = None if w.label is None else fresh.read_label(w.label, w.blades)
+        D = (w.diameter_mm or 0.0) * 1e-3 if told is None or w.diameter_mm is not None else told.diameter_in * INCH
+        hub, key = fresh.of_stations(file, D)
+        blades = w.blades or (told.blades if told else None) or 2
+        text = fresh.stations_text(file.name, D, blades, w.rpm, w.airspeed_m_s, hub, key, told, w.family, w.motor)
         return {file.name: file.read_bytes(), "case.toml": text.encode()}
     return {"case.toml": _label_text(w, w.label or "").encode()}
 
 
 def _label_text(w: Wanted, label: str) -> str:
     if not w.fan:
-        return fresh.label_text(label, w.blades, w.rpm, w.airspeed_m_s)
+        return fresh.label_text(label, w.blades, w.rpm, w.airspeed_m_s, w.family, w.motor)
     size = re.fullmatch(r"(\d+(?:\.\d+)?)\s*(mm|in)?", label.strip())
     if size is None:
         if "x" in label.lower():
-            D, pitch, told = fresh.label_parts(label, w.blades)
-            return fresh.fan_text(D * INCH, pitch, told if told > 2 else w.blades, w.rpm)
+            told = fresh.read_label(label, w.blades)
+            blades = told.blades if (told.blades or 2) > 2 else w.blades
+            return fresh.fan_text(told.diameter_in * INCH, told.pitch_in, blades, w.rpm, w.motor)
         raise InputError(Fault("LABEL", "", repr(label), "a diameter, as in 70mm", "Or diameter x pitch in inches"))
     value = float(size[1])
-    return fresh.fan_text(value * INCH if size[2] == "in" else value * 1e-3, None, w.blades, w.rpm)
-
-
-def _drive_text(case: Case, kv: float, cells: int) -> str:
-    """A drive.toml with the typical motor of this K_v under this rotor; every number assumed is named."""
-    given = from_label.estimate(case, kv, cells).given
-    typical = "not known; typical of measured motors with a propeller. Take it from the data sheet of the motor"
-    assumed = {
-        "motor.resistance_mohm": typical,
-        "motor.no_load_A": typical,
-        "motor.inertia_kg_mm2": "not known; only affects how fast thrust follows the throttle",
-        "rotor.inertia_kg_mm2": "not known; blades of plastic, 0.06 kg per m2 of diameter squared",
-        "battery.capacity_Ah": "not known; enter yours",
-        "battery.resistance_mohm": "not known; 6 % of the voltage at full throttle",
-    }
-    # two slender blades: m R^2 / 3, their mass nearer to the hub than that: a third of it
-    inertia = 0.06 * case.diameter_m**2 * (0.5 * case.diameter_m) ** 2 / 9.0 * 1e6 * case.file.rotor.blades
-    rows = "".join(f'\n[[assumed]]\nkey = "{key}"\nwhy = "{text}"\n' for key, text in assumed.items())
-    return f"""# Drive of {case.name}: K_v and cells as given, the rest assumed (see below). Replace what you know.
-schema = "bemt.drive/1"
-
-[battery]
-cells = {cells}
-capacity_Ah = 2.2
-resistance_mohm = {given["battery_mohm"]:.3g}
-
-[esc]
-pulse_min_us = 1000
-pulse_max_us = 2000
-
-[motor]
-kv_rpm_V = {kv:g}
-resistance_mohm = {given["resistance_mohm"]:.3g}
-no_load_A = {given["no_load_A"]:.3g}
-inertia_kg_mm2 = {max(1.0, 0.3 * inertia):.3g}
-
-[rotor]
-inertia_kg_mm2 = {inertia:.3g}
-
-# [vehicle]  # for hover and flight time
-# mass_kg = 1.5
-# rotors = 4
-{rows}"""
-
-
-def estimate_of(
-    what: str | None,
-    kv: float | None,
-    cells: int | None,
-    mass_kg: float | None = None,
-    rotors: int = 1,
-    capacity_Ah: float | None = None,
-    airspeed_m_s: float = 0.0,
-) -> from_label.DriveEstimate:
-    """Estimate of a label, or of a case, as the command line names it."""
-    faults = []
-    if what is None:
-        faults.append(Fault("", "CASE", "nothing", "a label such as 10x5, or a case"))
-    for name, value in (("--kv", kv), ("--cells", cells)):
-        if value is None:
-            faults.append(Fault("", name, "nothing", "--kv and --cells together", "As in: --kv 900 --cells 3"))
-    if faults or what is None or kv is None or cells is None:
-        raise InputError(faults)
-    case = load_case(find_cases([what])[0]) if Path(what).exists() else case_of(fresh.label_text(what))
-    return from_label.estimate(case, kv, cells, mass_kg, rotors, capacity_Ah, airspeed_m_s)
+    return fresh.fan_text(value * INCH if size[2] == "in" else value * 1e-3, None, w.blades, w.rpm, w.motor)

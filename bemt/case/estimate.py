@@ -1,0 +1,167 @@
+"""Thrust and power from a label such as 10x5: BEMT on the label's case, with bands, and K1/K2 beside it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from bemt.base.errors import Fault, InputError
+from bemt.base.tables import number_text, text_table
+from bemt.base.units import INCH
+from bemt.case import Case, case_of, fresh
+from bemt.case.load import with_changes
+from bemt.case.prepare import k1k2_case
+from bemt.case.propagate import propagate
+from bemt.case.schema import AIRSPEED, RPM
+from bemt.readers._uiuc_names import find_family
+from geometry.designation import Designation
+
+SCHEMA = "bemt.estimate/2"
+UNITS = {"mm": 1e-3, "in": INCH, "cm": 1e-2, "m": 1.0}
+"""Units in which a length may have been meant. [m]"""
+POSSIBLE = {"pitch": (0.1, 2.5), "chord": (0.02, 0.4)}
+"""Over the diameter; outside, a propeller is no propeller, mostly one unit has been taken for another. [1]"""
+DENSITY = (0.01, 10.0)
+WIDTH = 118
+
+
+def length_fault(option: str, value: float, unit: str, diameter_m: float, limits: tuple[float, float]) -> list[Fault]:
+    """Refuse a length that no propeller of this diameter has, with the unit that would fit.
+
+    >>> print(*length_fault("--chord-mm", 0.8, "mm", 0.2032, (0.02, 0.4)))
+    --chord-mm: got 0.8; expected 0.02 to 0.4 diameters, 4.06 to 81.3 mm. 0.8 in would be 0.1 diameters.
+    """
+    low, high = limits
+    ratio = value * UNITS[unit] / diameter_m
+    if low <= ratio <= high:
+        return []
+    meant = [(name, value * m / diameter_m) for name, m in UNITS.items() if name != unit]
+    fits = [(name, share) for name, share in meant if 1.5 * low <= share <= high]
+    hint = f"{value:g} {fits[0][0]} would be {fits[0][1]:.2g} diameters" if fits else ""
+    ends = " to ".join(f"{end * diameter_m / UNITS[unit]:.3g}" for end in limits)
+    return [Fault(option, "", f"{value:g}", f"{low:g} to {high:g} diameters, {ends} {unit}", hint)]
+
+
+def case_of_label(
+    label: str,
+    blades: int | None = None,
+    chord_mm: float | None = None,
+    measured_pitch_in: float | None = None,
+    series: str | None = None,
+    density: float | None = None,
+) -> Case:
+    """Case of a label with what else was measured of the propeller; a measured value is no unknown any more.
+
+    A chord at 0.75 R scales the chord law; a pitch measured there replaces that of the label, which the population of
+    measured rotors then weighs against it.
+    """
+    case = case_of(fresh.label_text(label, blades, family=None if series is None else find_family(series)))
+    changes: dict[str, Any] = {}
+    known: set[str] = set()
+    if chord_mm is not None:
+        own = float(case.rotor().blade.at(0.375 * case.diameter_m)[0])
+        changes["blade.max_chord_over_R"] = case.get("blade.max_chord_over_R") * chord_mm * 1e-3 / own
+        known.add("blade.max_chord_over_R")
+    if measured_pitch_in is not None:
+        changes |= {"blade.pitch_in": measured_pitch_in, "blade.label_pitch_in": case.get("blade.pitch_in"),
+                    "blade.beta_offset_deg": 0.0, "blade.known_from": "stations"}  # fmt: skip
+        known.add("blade.beta_offset_deg")
+    if density is not None:
+        changes["air.density_kg_m3"] = density
+        known.add("air.density_kg_m3")
+    left = [item for item in case.written["assumptions"] if item["key"] not in known]
+    return with_changes(case, changes | {"assumptions": left}) if changes else case
+
+
+def document(
+    label: str,
+    speeds: Sequence[float],
+    airspeeds: Sequence[float] = (),
+    blades: int | None = None,
+    chord_mm: float | None = None,
+    measured_pitch_in: float | None = None,
+    series: str | None = None,
+    density: float | None = None,
+) -> dict[str, Any]:
+    """Estimate every speed [rev/min] with every airspeed [m/s]: ``bemt.estimate/2``; unknown numbers are null.
+
+    An unreadable label, impossible numbers and an unknown series are refused, all at once.
+    """
+    told, faults = _label(label, blades)
+    D = told.diameter_in * INCH if told else math.nan
+    lengths = (("--chord-mm", chord_mm, "mm", "chord"), ("--measured-pitch-in", measured_pitch_in, "in", "pitch"))
+    for option, value, unit, name in lengths:
+        if value is not None and not math.isfinite(value):
+            faults.append(Fault(option, "", f"{value:g}", f"a length [{unit}]"))
+        elif value is not None and told:
+            faults += length_fault(option, value, unit, D, POSSIBLE[name])
+    if density is not None and not DENSITY[0] <= density <= DENSITY[1]:
+        hint = "In g/m3? Divide by 1000" if 10.0 < density < 2000.0 else ""
+        faults.append(Fault("--density", "", f"{density:g}", "0.01 to 10 kg/m3", hint))
+    rows: tuple[tuple[str, Sequence[float], float, float, str], ...] = (
+        ("--rpm", speeds, RPM.low, RPM.high, "rev/min"), ("--airspeed", airspeeds, AIRSPEED.low, AIRSPEED.high, "m/s"),
+    )  # fmt: skip
+    faults += [
+        Fault(option, "", f"{value:g}", f"{low:g} to {high:g} {unit}")
+        for option, values, low, high, unit in rows
+        for value in values
+        if not low <= value <= high
+    ]
+    if series is not None:
+        try:
+            find_family(series)
+        except InputError as error:
+            faults += error.faults
+    if faults or told is None:
+        raise InputError(faults)
+    case = case_of_label(label, blades, chord_mm, measured_pitch_in, series, density)
+    rpm, V = (v.ravel() for v in np.meshgrid(speeds, list(airspeeds) or [0.0], indexing="ij"))
+    found = propagate(case, rpm, V)
+    points, simple = found.points, k1k2_case(case, None, rpm, V, case.air())
+    columns = {
+        "rpm": rpm, "airspeed_m_s": V, "thrust_N": points.thrust_N, "u_thrust_N": points.u["thrust_N"],
+        "u95_thrust_N": found.half_width95("thrust_N"), "power_W": points.power_W, "u_power_W": points.u["power_W"],
+        "u95_power_W": found.half_width95("power_W"), "J": points.J, "CT": points.CT, "CP": points.CP,
+        "M_tip": points.M_tip, "Re75": points.Re75, "k1k2_thrust_N": simple.thrust_N,
+    }  # fmt: skip
+    given = {"label": label, "diameter_in": told.diameter_in, "pitch_in": told.pitch_in, "blades": told.blades,
+             "class": told.blade_class, "chord_mm": chord_mm, "measured_pitch_in": measured_pitch_in,
+             "series": case.file.blade.family, "density_kg_m3": float(case.air().rho)}  # fmt: skip
+    return {"schema": SCHEMA, "case": case.name, "given": given, "rows": [
+        {name: float(column[i]) if math.isfinite(column[i]) else None for name, column in columns.items()}
+        | {"flags": list(points.flags[i])} for i in range(rpm.size)
+    ]}  # fmt: skip
+
+
+def _label(label: str, blades: int | None) -> tuple[Designation | None, list[Fault]]:
+    try:
+        return fresh.read_label(label, blades), []
+    except InputError as error:
+        return None, list(error.faults)
+
+
+def text(doc: dict[str, Any]) -> str:
+    """Give the rows as a table, with what not to trust below."""
+
+    def shown(value: float | None, digits: int = 4) -> str:
+        return number_text(math.nan if value is None else value, digits)
+
+    head = ["rpm", "V [m/s]", "T [N]", "± 68 %", "± 95 %", "P [W]", "± 68 %", "± 95 %", "K1/K2 [N]", "J", "M tip"]
+    keys = ("rpm", "airspeed_m_s", "thrust_N", "u_thrust_N", "u95_thrust_N", "power_W", "u_power_W", "u95_power_W",
+            "k1k2_thrust_N", "J", "M_tip")  # fmt: skip
+    table = [
+        [shown(row[key], 2 if key.startswith("u") else 6 if key == "rpm" else 4) for key in keys] for row in doc["rows"]
+    ]
+    counts: dict[str, int] = {}
+    for row in doc["rows"]:
+        for flag in row["flags"]:
+            counts[flag] = counts.get(flag, 0) + 1
+    several = len(doc["rows"]) > 1
+    notes = [f"! {flag}" + (f" ({n} of {len(doc['rows'])} rows)" if several else "") for flag, n in counts.items()]
+    more = [f"--{key.replace('_', '-')}" for key in ("chord_mm", "measured_pitch_in") if doc["given"][key] is None]
+    if more:
+        notes.append(f"for narrower bands give {' and '.join(more)} (at 0.75 R)")
+    return "\n".join([text_table(head, table, left=()), *notes]) + "\n"

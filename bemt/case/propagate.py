@@ -1,0 +1,265 @@
+"""A case at operating points, with bands: the one place that propagates declared unknowns and the model's own error.
+
+Three origins, added as squares (ASME V&V 20). *input*: one declared unknown at a time moves through its range, taken
+as uniform; with the results at both ends and in the middle on a parabola, the variance is s^2/3 + 4 q^2/45 (half
+difference s, sagitta q), which is (high - low)/sqrt(12) times the slope where the response is straight. *model*: how
+far measured rotors of such a description are from the solver (`bemt.rotors`), wider where none was measured
+(`bemt.rotors.validity`). *numerics*: change of the result when the blade elements are doubled.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bemt import coefficients as co
+from bemt.air import air_arrays
+from bemt.rotors.mixture import LEVELS
+from bemt.rotors.model import coefficients
+from bemt.rotors.population import population
+from bemt.rotors.predict import predict, sense, zero_thrust
+from bemt.rotors.validity import Validity
+
+if TYPE_CHECKING:
+    from bemt.air import Air
+    from bemt.bem.model import Model
+    from bemt.case.load import Assumption, Case
+    from bemt.dataset import Dataset
+
+__all__ = ["BANDED", "Moved", "Points", "Propagated", "propagate", "spread", "validity_of", "vary"]
+
+Array = NDArray[np.float64]
+Answers = Mapping[str, Array]
+Progress = Callable[[int, int, str], None]
+
+BANDED = ("thrust_N", "torque_Nm", "power_W", "CT", "CP", "eta", "exhaust_speed_m_s", "duct_share")
+"""Channels that get a band."""
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Operating points of a case, (P,) each; what they share with it follows when it is changed."""
+
+    case: Case
+    rpm: Array  # [rev/min]
+    airspeed_m_s: Array  # [m/s]
+    density_kg_m3: Array  # [kg/m3]
+
+    @staticmethod
+    def of(
+        case: Case, rpm: ArrayLike | None = None, airspeed_m_s: ArrayLike | None = None,
+        density_kg_m3: ArrayLike | None = None,
+    ) -> Points:  # fmt: skip
+        """Points that broadcast together; what is not given is the case's own."""
+        own = (case.rpm, case.airspeed_m_s, case.air().rho)
+        given = (own[i] if v is None else v for i, v in enumerate((rpm, airspeed_m_s, density_kg_m3)))
+        n, V, rho = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, dtype=float)) for v in given))
+        return Points(case, n.ravel(), V.ravel(), rho.ravel())
+
+    def conditions(self, changed: Case) -> tuple[Array, Array, Air]:
+        """Speed, airspeed and air at the points in a changed case."""
+        own, air = self.case.air().rho, changed.air()
+        rpm = np.where(self.rpm == self.case.rpm, changed.rpm, self.rpm)
+        V = np.where(self.airspeed_m_s == self.case.airspeed_m_s, changed.airspeed_m_s, self.airspeed_m_s)
+        if np.all(self.density_kg_m3 == own):
+            return rpm, V, air
+        states, which = np.unique(self.density_kg_m3, return_inverse=True)
+        airs = [air if rho == own else changed.air({"air.density_kg_m3": float(rho)}) for rho in states]
+        return rpm, V, air_arrays(airs, which.reshape(-1))
+
+
+@dataclass(frozen=True, eq=False)
+class Moved:
+    """Answers at the values of one declared unknown."""
+
+    unknown: Assumption
+    runs: tuple[Answers, ...]  # One for each of `unknown.values`
+    u: Answers  # Standard uncertainty of each answer from this unknown alone
+
+
+@dataclass(frozen=True, eq=False)
+class Propagated:
+    """A case solved at points, with what the bands were made of."""
+
+    points: Dataset  # Values, bands by origin ("input", "model", "numerics"), flags
+    nominal: Answers  # The banded channels of the points
+    moved: tuple[Moved, ...]
+    refined: Answers | None  # With twice the blade elements
+    model: Model  # The rotor of the case, prepared
+    model95: Answers  # 95 % half widths from the model's own error
+
+    def half_width95(self, channel: str) -> Array:
+        """Half width of the 95 % interval, (P,): twice the u of inputs and numerics, the model's with its tail."""
+        parts = self.points.u_by
+        rest = sum((parts[origin][channel] ** 2 for origin in ("input", "numerics") if origin in parts), 0.0)
+        return np.asarray(np.sqrt(4.0 * rest + self.model95[channel] ** 2))
+
+    def carry(self, answer: Callable[[Answers], Answers]) -> tuple[dict[str, Array], dict[str, dict[str, Array]]]:
+        """Carry the bands through any function of the channels at all points: its values, and their u by origin.
+
+        The model's own error moves thrust at all points together, then torque and power; both count as independent.
+        """
+        nominal = dict(self.nominal)
+        values = {key: np.asarray(v, dtype=float) for key, v in answer(nominal).items()}
+        squares = {origin: {key: np.zeros_like(v) for key, v in values.items()} for origin in self.points.u_by}
+        for one in self.moved:
+            runs = [values if run is self.nominal else answer(run) for run in one.runs]
+            for key, v in values.items():
+                squares["input"][key] += spread(one.unknown.discrete, v, [np.asarray(run[key]) for run in runs]) ** 2
+        if "numerics" in squares and self.refined is not None:
+            other = answer(self.refined)
+            for key, v in values.items():
+                squares["numerics"][key] += (np.asarray(other[key]) - v) ** 2
+        for together in (("thrust_N", "CT"), ("torque_Nm", "power_W", "CP")) if "model" in squares else ():
+            u = self.points.u_by["model"]
+            ends = [answer(nominal | {k: nominal[k] + sign * u[k] for k in together}) for sign in (-1.0, 1.0)]
+            for key in values:
+                squares["model"][key] += (0.5 * (np.asarray(ends[1][key]) - np.asarray(ends[0][key]))) ** 2
+        return values, {origin: {k: np.sqrt(v) for k, v in part.items()} for origin, part in squares.items()}
+
+
+def spread(discrete: bool, nominal: Array, at: Sequence[Array]) -> Array:
+    """Standard uncertainty from one unknown, (P,), of the results at its values.
+
+    >>> spread(False, np.array([1.0]), [np.array([0.0]), np.array([2.0])]).round(3)
+    array([0.577])
+    """
+    if discrete:
+        return np.asarray(np.std(np.subtract(at, nominal), axis=0))  # equal values have no spread, to the last bit
+    low, high = at
+    slope, sag = 0.5 * (high - low), 0.5 * (high + low) - nominal
+    return np.asarray(np.sqrt(slope**2 / 3.0 + 4.0 * sag**2 / 45.0))
+
+
+def vary(
+    case: Case, nominal: Answers, answer: Callable[[Case, str], Answers], unknowns: Sequence[Assumption] | None = None
+) -> tuple[Moved, ...]:
+    """Move one declared unknown at a time; the case's own unless others are given."""
+    out = []
+    for unknown in case.assumptions if unknowns is None else unknowns:
+        runs = tuple(
+            nominal if v == unknown.nominal else answer(case.replaced({unknown.key: v}), unknown.key)
+            for v in unknown.values
+        )
+        u = {key: spread(unknown.discrete, v, [run[key] for run in runs]) for key, v in nominal.items()}
+        out.append(Moved(unknown, runs, u))
+    return tuple(out)
+
+
+def propagate(
+    case: Case, rpm: ArrayLike | None = None, airspeed_m_s: ArrayLike | None = None,
+    density_kg_m3: ArrayLike | None = None, *, unknowns: Sequence[Assumption] | None = None, bands: bool = True,
+    threads: int = 1, progress: Progress | None = None,
+) -> Propagated:  # fmt: skip
+    """Solve a case at points [rev/min], [m/s], [kg/m3], by default its own, with bands and flags.
+
+    Whatever a point shares with the case - speed, airspeed, air - follows an unknown that is that quantity. ``bands``
+    False leaves the uncertainties unknown; the flags stay.
+    """
+    from bemt.case.prepare import prepare_case
+
+    points = Points.of(case, rpm, airspeed_m_s, density_kg_m3)
+    # the motor's unknowns move no load at a given speed
+    own = tuple(item for item in case.assumptions if not item.key.startswith("drive."))
+    declared = own if unknowns is None else tuple(unknowns)
+    steps, done = 3 + sum(len(item.values) for item in declared), 0
+
+    def solved(changed: Case, what: str, stations: int | None = None) -> tuple[Model, Dataset]:
+        nonlocal done
+        at = points.conditions(changed)
+        model = prepare_case(changed, None, stations).at_speeds(*at)
+        found = model.solve(*at, threads)
+        done += 1
+        if progress is not None:
+            progress(done, steps, what)
+        return model, found
+
+    def channels(found: Dataset) -> dict[str, Array]:
+        return {key: np.asarray(found[key], dtype=float) for key in BANDED}
+
+    model, found = solved(case, "nominal")
+    factor, words = validity_of(case, found.J, found.Re75, found.M_tip)
+    flags = tuple((*a, *b) for a, b in zip(found.flags, words, strict=True))
+    nominal = channels(found)
+    if not bands:
+        nothing = {key: np.full(len(found), np.nan) for key in nominal}
+        return Propagated(replace(found, flags=flags), nominal, (), None, model, nothing)
+    refined = channels(solved(case, "twice the stations", 2 * case.file.model.stations)[1])
+    moved = vary(case, nominal, lambda changed, what: channels(solved(changed, what)[1]), declared)
+    widths = _model_error(case, model, found, points.conditions(case)[2])
+    narrow, wide = (_loads(found, model.diameter_m, factor * u) for u in widths)
+    parts = {
+        "input": {key: np.sqrt(sum((one.u[key] ** 2 for one in moved), np.zeros(len(found)))) for key in nominal},
+        "model": narrow,
+        "numerics": {key: np.abs(refined[key] - v) for key, v in nominal.items()},
+    }
+    answer = replace(found, u={}, u_by=parts)
+    lost = found.converged & np.isnan(answer.u["thrust_N"])
+    why = ("unconverged somewhere in the range of the assumptions: u unknown",)
+    flags = tuple((*f, *(why if bad else ())) for f, bad in zip(flags, lost, strict=True))
+    return Propagated(replace(answer, flags=flags), nominal, moved, refined, model, wide)
+
+
+def _model_error(case: Case, model: Model, points: Dataset, air: Air) -> tuple[Array, Array]:
+    """Half widths of the 68 and 95 % intervals of CT and CP about the nominal result, (2, P) each.
+
+    What the population expects beside the nominal result counts too, as a root sum of squares.
+    """
+    known = case.as_built()
+    solve = coefficients(model, air)
+    at = sense(solve, model.diameter_m, points.rpm, points.J, points.Re75, known.drawn)
+    at = replace(at, J0=_zero_thrust_J(case), x=points.J / _zero_thrust_J(case))  # whatever other points are asked for
+    mean = solve(known.prior.mean, points.rpm, points.J, np.arange(points.rpm.size))
+    found = predict(population(), known.prior, at, mean, known.reference)
+    off = found.mean - np.array([points.CT, points.CP])
+    return np.hypot(found.half_width(), off), np.hypot(found.half_width(LEVELS[1]), 2.0 * off)
+
+
+def _zero_thrust_J(case: Case) -> float:
+    """Advance ratio at which thrust vanishes at the case's own speed and air, found once."""
+
+    def find() -> float:
+        from bemt.case.prepare import prepare_case
+
+        return zero_thrust(coefficients(prepare_case(case), case.air()), case.as_built().drawn, case.rpm)
+
+    return case.kept("J of zero thrust", find)
+
+
+def validity_of(case: Case, J: Array, Re75: Array, M_tip: Array) -> tuple[Array, tuple[tuple[str, ...], ...]]:
+    """Factor on the model's own error at points, (P,), and for each why it is wider or where the method ends."""
+    known, factor = population().validity, np.ones(J.size)
+    words: tuple[tuple[str, ...], ...] = ((),) * J.size
+    if known is not None:
+        size = (case.diameter_m, int(case.file.rotor.blades), case.rotor().blade.pitch_m() / case.diameter_m)
+        ducted, run = case.ducted, case.as_built().reference
+        if run is not None:  # a rotor that was measured itself, in its duct
+            own = Validity.of_rotor(*size, run.x, run.Re, known.M_tip)
+            known, ducted = Validity.of_rotors((known, own)), False
+        factor, words = known.at(*size, J / _zero_thrust_J(case), Re75, M_tip, ducted)
+    tip = ((f"supersonic tip: Mach {m:.2f}, beyond section theory",) if m >= 1.0 else () for m in M_tip)
+    return factor, tuple((*a, *b) for a, b in zip(words, tip, strict=True))
+
+
+def _loads(points: Dataset, D: float, u: Array) -> dict[str, Array]:
+    """Standard uncertainties of all channels from those of CT and CP, (2, P).
+
+    Exhaust speed follows thrust by momentum, T = m V_e - m V, so that dV_e/V_e = (V_e - V)/(2 V_e - V) dT/T. The duct's
+    share has none: no population tells of it. Efficiency takes CT and CP as independent.
+    """
+    rho, n, V, exit_speed = points.density_kg_m3, points.rpm / 60.0, points.airspeed_m_s, points.exhaust_speed_m_s
+    thrust = np.asarray(co.thrust(u[0], rho, n, D))
+    power = np.asarray(co.power(u[1], rho, n, D))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        torque = power / (2.0 * np.pi * n)
+        exhaust = np.abs((exit_speed - V) / (2.0 * exit_speed - V) * exit_speed * thrust / points.thrust_N)
+        eta = np.hypot(points.J * u[0], points.eta * u[1]) / np.abs(points.CP)
+    return {
+        "thrust_N": thrust, "torque_Nm": torque, "power_W": power, "CT": u[0], "CP": u[1],
+        "eta": np.where(np.isfinite(eta), eta, np.nan), "duct_share": np.zeros_like(V),
+        "exhaust_speed_m_s": np.where(np.isfinite(exhaust), exhaust, np.nan),
+    }  # fmt: skip

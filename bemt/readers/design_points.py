@@ -1,0 +1,77 @@
+r"""Design points of Ansys Workbench as CSV: one operating point a row.
+
+::
+
+    # The parameters defined in the project are:
+    # ,P1 - rpm [rev min^-1],P2 - thrust [N]
+    # The following header line defines the name of the columns by reference to the parameters.
+    Name,P1,P2
+    DP 0,8000,3.6
+
+or, as the parametric study of Fluent saves it, ``Design Points,rpm,thrust-op`` without units.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+
+from bemt.base.errors import Fault, InputError
+from bemt.dataset import Dataset
+from bemt.readers import load_text
+from bemt.readers._cfd import Column, ExportRow, cells_of, head_lines, numeric_table, si_unit, unique
+from bemt.readers._columns import Channel, dataset
+
+KIND = "design_points"
+
+_HEAD = re.compile(r"(Name\s*[,;]\s*P\d|Design Points?\s*[,;])", re.IGNORECASE)
+_PARAMETER = re.compile(r"\s*(P\d+) - (.*?)\s*(?:\[([^\]]*)\])?\s*")
+
+
+def sniff(head: bytes | str) -> bool:
+    r"""Tell whether the first line that is no comment heads a table of design points.
+
+    >>> sniff("# ,P1 - rpm [rev min^-1]\nName,P1\nDP 0,8000"), sniff("Design Points,rpm,T-op\nDP1,1,2"), sniff("Name,a")
+    (True, True, False)
+    """
+    lines = [line for line in head_lines(head) if not line.startswith("#")]
+    return bool(lines) and _HEAD.match(lines[0]) is not None
+
+
+def read(path: str | os.PathLike[str]) -> Dataset:
+    """Read design points; one that failed is NaN."""
+    source = load_text(path)
+    told: dict[str, tuple[str, str]] = {}
+    names: tuple[str, ...] = ()
+    rows: list[ExportRow] = []
+    labels: list[str] = []
+    mark = ","
+    for line, raw in enumerate(source.lines, 1):
+        text = raw.strip()
+        if text.startswith("#"):
+            for part in text.lstrip("# ").split(","):
+                if match := _PARAMETER.fullmatch(part):
+                    told[match[1]] = (match[2], match[3] or "")
+        elif text and not names:
+            mark = ";" if ";" in text and "," not in text else ","
+            names = cells_of(text, mark)[1:]
+        elif text:
+            label, *cells = cells_of(text, mark) if not text.endswith(mark) else (*cells_of(text, mark), "")
+            labels.append(label)
+            rows.append(ExportRow(line, tuple(cell or "nan" for cell in cells)))
+    if not names:
+        raise InputError(Fault(source.name, "", "no header", "a line such as Name,P1,P2"))
+    columns = []
+    for name in names:
+        words, unit = told.get(name, (name, ""))
+        columns.append(Column(words, si_unit(unit) or unit))
+    table = numeric_table(source, columns, rows, mark != ",")
+    keys = unique([c.name for c in columns])
+    channels = {key: Channel(table.values[:, k], c.unit) for k, (key, c) in enumerate(zip(keys, columns, strict=True))}
+    notes = [*table.warnings]
+    bare = [c.name for c in columns if not c.unit]
+    if bare:
+        notes.append(f"no unit stated for {', '.join(bare[:6])}")
+    about = {"file": source.name, "sha256": source.sha256, "clock": "none"}
+    texts = {"name": tuple(labels)} if len(labels) == len(table.values) else {}
+    return dataset(KIND, "cfd", channels, notes, about, lines=table.lines, texts=texts)

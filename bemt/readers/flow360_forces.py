@@ -1,0 +1,48 @@
+r"""Flow360 force histories (``total_forces_v2.csv``): coefficients by physical and pseudo step.
+
+::
+
+    physical_step, pseudo_step, CL, CD, CFx, CFy, CFz, CMx, CMy, CMz, CLPressure, ...
+    0, 0, -1.480, 12.750, ...
+
+A steady run counts pseudo steps; of a transient one the last pseudo step of each physical step holds. Coefficients rest
+on the reference area, lengths and velocity of the case, which the file does not state.
+"""
+
+from __future__ import annotations
+
+import os
+
+from bemt.dataset import Dataset
+from bemt.readers._cfd import Column, cells_of, head_lines
+from bemt.readers._cfd_record import Layout, outermost, read_history
+
+KIND = "flow360_forces"
+
+_STEPS = ("physical_step", "pseudo_step")
+
+
+def sniff(head: bytes | str) -> bool:
+    r"""Tell whether the first line names physical and pseudo steps.
+
+    >>> sniff("physical_step, pseudo_step, CL, CD\n0, 0, 1, 2"), sniff("step,CL\n0,1")
+    (True, False)
+    """
+    return any(_names(line) is not None for line in head_lines(head, 1))
+
+
+def _names(line: str) -> tuple[str, ...] | None:
+    cells = cells_of(line, ",")
+    return cells if cells[:2] == _STEPS else None
+
+
+_LAYOUT = Layout(
+    KIND, "physical_step, pseudo_step, CL, CD", _names, lambda line: cells_of(line, ","),
+    lambda name: Column(name or "unnamed", "", "counter" if name in _STEPS else "value"),
+    notes=("coefficients rest on reference values that the file does not state",), commas=False, finish=outermost,
+)  # fmt: skip
+
+
+def read(path: str | os.PathLike[str]) -> Dataset:
+    """Read a history."""
+    return read_history(path, _LAYOUT)
