@@ -27,7 +27,7 @@ from bemt.readers.cfd_run import QUANTITIES, RunColumn, RunToml
 from bemt.recordings.cfd_setup import with_grid_floor
 from bemt.recordings.grid_study import COVERAGE
 
-__all__ = ["DUCT", "PROGRAMS", "assemble", "cfd_files", "document", "is_run", "run_text", "settled"]
+__all__ = ["DUCT", "PROGRAMS", "assemble", "cfd_files", "document", "is_run", "run_at", "run_text", "settled"]
 
 Array = NDArray[np.float64]
 PROGRAMS: Mapping[str, str] = {
@@ -97,6 +97,39 @@ def cfd_files(folder: Path) -> tuple[Path, ...]:
         except InputError:
             continue
     return tuple(out)
+
+
+_BESIDE = {"force.dat": "moment.dat", "moment.dat": "force.dat"}  # files that OpenFOAM writes beside each other
+
+
+def run_at(path: str, rpm: float | None = None, airspeed_m_s: float | None = None) -> Dataset | None:
+    """Run of a run.toml, a folder or an export at a stated speed; None for anything that is no CFD."""
+    at = Path(path)
+    told = {k: v for k, v in (("rpm", rpm), ("airspeed_m_s", airspeed_m_s)) if v is not None}
+    made = at / "run.toml" if (at / "run.toml").is_file() else at
+    if made.is_dir():
+        files = cfd_files(made)
+    elif not made.is_file():
+        return None
+    else:
+        try:
+            kind = readers.detect(made)
+        except InputError:  # said where the file is read
+            return None
+        if kind == "cfd_run":
+            run = readers.read(made, kind)
+            twice = [k for k in told if getattr(run.run, k) not in (None, told[k])]
+            if twice:
+                got = ", ".join(f"{k} {told[k]:g}, where the run has {getattr(run.run, k):g}" for k in twice)
+                raise InputError(Fault(path, "run", got, "one operating point", "Leave out the option"))
+            run = run.model_copy(update={"run": run.run.model_copy(update=told)})
+            return assemble(run, made.parent, path)
+        files = (made,) if kind in PROGRAMS else ()
+        other = made.with_name(_BESIDE.get(made.name, made.name))
+        files += (other,) if files and other != made and other.is_file() else ()
+    if not files:
+        return None
+    return assemble(RunToml.model_validate({"run": {"files": tuple(map(str, files)), **told}}), Path(), path)
 
 
 def is_run(record: Dataset) -> bool:
@@ -399,8 +432,8 @@ def _counted(run: _Run, quantity: str, pool: Mapping[str, _Found]) -> tuple[list
         known = [z for z in head.zones if z in pool]
         if "Net" in head.zones and len(head.zones) > 1:
             run.faults.append(Fault(run.name, "zones", "Net with other zones", "Net alone, or zones", "Net holds them all"))
-        if not known and len(pool) == 1:
-            return [(1.0, next(iter(pool)))], []
+        if torque and not known and list(pool) == [""]:
+            return [(1.0, "")], []
         if absent := [z for z in head.zones if z not in pool]:
             if not torque or not known:
                 hint = f"Zones: {', '.join(z or 'the whole' for z in pool)}"

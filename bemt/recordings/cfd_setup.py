@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bemt.base.tables import number_text
 from bemt.dataset import Dataset
+from bemt.readers.references import Reference
 from bemt.recordings.audit import AuditLine, CfdFacts, audit
 
 if TYPE_CHECKING:
@@ -16,7 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "CONDITIONS", "GRID_FLOOR", "GRID_FLOOR_SOURCE", "audit_of", "conditions_of", "conditions_that_differ", "grid_floor",
-    "grid_that_differs", "with_grid_floor",
+    "faults_first", "grid_that_differs", "references_of", "remark_of", "with_grid_floor",
 ]  # fmt: skip
 
 CONDITIONS = (
@@ -144,7 +146,8 @@ def grid_that_differs(a: Dataset, b: Dataset) -> str:
     Before any physics: on another grid the same flow gives other loads.
     """
     differ = {k: v for k, v in conditions_that_differ(a, b).items() if k in _GRID}
-    if not differ:
+    levels = [conditions_of(d).get("grid_level") for d in (a, b)]
+    if not differ or (all(levels) and "grid_level" not in differ):  # on one level another geometry has other cells
         return ""
     words = {"grid_level": "level", "cells": "cells"}
     return "the grid differs: " + "; ".join(f"{words[k]} {one} and {two}" for k, (one, two) in differ.items())
@@ -194,6 +197,47 @@ def audit_of(
         mass_balance=_number(get("balance_mass")), momentum_balance=_number(get("balance_momentum")), ducted=ducted,
     )  # fmt: skip
     return audit(facts)
+
+
+def remark_of(conditions: Mapping[str, Any]) -> str:
+    """Set-up of a run in the set phrases that the audit of references reads.
+
+    >>> remark_of({"steady": True, "turbulence": "k-omega SST", "cells": 2e6, "drift_thrust": 0.004})
+    'MRF; k-omega SST; 2000000 cells; drift 0.4 %; forces integrated'
+    """
+    walls = {"function": "wall functions", "scalable": "scalable wall functions", "automatic": "automatic wall functions"}
+    steady, compressible = conditions.get("steady"), conditions.get("compressible")
+    known: list[tuple[Any, str]] = [
+        (conditions.get("program"), "{}"),
+        ({True: "MRF", False: "sliding mesh"}.get(steady) if steady is not None else None, "{}"),
+        (conditions.get("turbulence"), "{}"), (walls.get(str(conditions.get("wall"))), "{}"),
+        ({True: "compressible", False: "incompressible"}.get(compressible) if compressible is not None else None, "{}"),
+        (conditions.get("domain_over_D"), "domain {:g} D"), (conditions.get("y_plus"), "y+ {:g}"),
+        (conditions.get("cells"), "{:.0f} cells"),
+        ("no grid study" if conditions.get("grids", 2) < 2 and "u_grid" not in conditions else None, "{}"),
+        (100.0 * conditions["u_grid"] if "u_grid" in conditions else None, "u_grid {:.3g} %"),
+        (100.0 * abs(conditions["drift_thrust"]) if "drift_thrust" in conditions else None, "drift {:.3g} %"),
+        ("forces integrated" if conditions.get("thrust_from", "forces") == "forces" else None, "{}"),
+    ]  # fmt: skip
+    return "; ".join(form.format(value) for value, form in known if value is not None)
+
+
+def references_of(run: Dataset, where: str) -> list[Reference]:
+    """Points of a run as recorded values of a case: thrust, torque, the duct's part."""
+    out = []
+    remark = remark_of(run.provenance.get("conditions", {}))
+    for quantity, channel, unit in (("thrust", "thrust_N", "N"), ("torque", "torque_Nm", "N m"),
+                                    ("duct_thrust", "duct_thrust_N", "N"), ("CT", "CT", "-"), ("CQ", "CQ", "-")):  # fmt: skip
+        for i in range(len(run) if channel in run else 0):
+            value = float(run[channel][i])
+            if not math.isfinite(value):
+                continue
+            state = {k: float(run[k][i]) for k in ("rpm", "airspeed_m_s", "density_kg_m3") if k in run}
+            out.append(Reference(
+                quantity, value, float(run.u[channel][i]), channel, "cfd", run.name, remark, f"{number_text(value, 4)} {unit}",
+                where=f"{where}:{i + 1}", sha256=str(run.provenance.get("sha256", "")), **state,
+            ))  # fmt: skip
+    return out
 
 
 def _number(value: Any, other: float = math.nan) -> float:
