@@ -29,6 +29,22 @@ class Wanted:
     airspeed_m_s: float = 0.0
     kv: float | None = None
     cells: int | None = None
+    campaign: bool = False
+
+
+_CAMPAIGN = """\
+# OpenFOAM runs of this case: python -m bemt cfd {name}/cfd
+schema = "bemt.cfd/1"
+name = "{name}"
+case = "../case.toml"
+
+[defaults]
+airspeed_m_s = {V:g}
+
+[axes]                    # every combination; three grids show what a grid is worth
+rpm = [{rpm:g}]
+level = [5, 5.5, 6]       # cells on the blade R / 2^(level + 2): about 35,000, 65,000 and 115,000 for half a rotor
+"""
 
 
 def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str]]:
@@ -51,6 +67,8 @@ def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str]]:
             raise InputError(Fault(folder.as_posix(), "", got, "a new folder", "Choose --out DIR"))
         if wanted.kv is not None and wanted.cells is not None:
             files["drive.toml"] = _drive_text(case, wanted.kv, wanted.cells).encode()
+        if wanted.campaign:
+            files["cfd/campaign.toml"] = _CAMPAIGN.format(name=case.name, rpm=case.rpm, V=case.airspeed_m_s).encode()
     for name in sorted(files, key=lambda name: name == "case.toml"):  # last: what it names is there
         write_atomic(folder / name, files[name])
     return folder, sorted(files)

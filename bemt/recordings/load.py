@@ -225,10 +225,10 @@ def _runs(names: Sequence[str], run: RunToml | None, insist: bool) -> tuple[list
     whole = run.model_copy(update={"run": head}) if run else RunToml(run=head)
     try:
         return [*runs, cfd_run.document(cfd_run.assemble(whole, Path(), " + ".join(Path(e).name for e in exports[:3])))], None
-    except InputError as error:
+    except Exception as error:
         if insist:
             raise
-        return runs, str(error)
+        return runs, str(error) if isinstance(error, InputError) else None  # the file's own entry says the other
 
 
 def _refusal(error: Exception) -> str:
