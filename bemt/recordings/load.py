@@ -37,8 +37,8 @@ from bemt.dataset.channels import channel_fault
 from bemt.readers._uiuc_tables import NO_SPEED
 from bemt.readers.cfd_run import KIND as RUN
 from bemt.readers.cfd_run import RunToml
-from bemt.recordings.adapt import adapt, damaged_export, recognised
 from bemt.recordings import cfd_run
+from bemt.recordings.adapt import adapt, damaged_export, recognised
 from bemt.recordings.choice import Choice, averaged
 from bemt.recordings.overview import findings, is_recording, points_text, reduction_document, reduction_of
 from bemt.recordings.reduce import reduction
