@@ -80,11 +80,13 @@ def _population(args: argparse.Namespace) -> int:
     folder, names = read_folders([where(name) for name in args.dir]), " ".join(args.dir)
     with _terminal.progress() as say:
         seen = left_out.watch(folder, effects, say)
+        if args.fit_population or args.leave_family_out:
+            fitted = left_out.fit_population(seen, names)
         if args.fit_population:
-            document = left_out.document_of(left_out.fit_population(seen, names)[0])
+            document = left_out.document_of(fitted[0])
             write_atomic(Path(args.fit_population), json_text(document))
         if args.leave_family_out:
-            document = left_out.leave_out(seen, names, say)
+            document = left_out.leave_out(seen, names, fitted, say)
             if args.out:
                 write_atomic(Path(args.out) / "left_out.json", json_text(document))
                 write_atomic(Path(args.out) / "left_out.txt", left_out.table(document) + "\n")

@@ -1,7 +1,8 @@
 """The population fitted by maximum likelihood to measured propellers, through the solver's own slopes.
 
-Each rotor counts by a few single readings, so that a long line counts no more than a short one. Its likelihood is that
-of a mixture of normal laws over the sizes of latent numbers and rest. All rotors are evaluated at once, so that
+Each rotor counts by a few single readings, so that a long line counts no more than a short one, and each family as
+much as any other, since its rotors are alike. The likelihood of a rotor is that of a mixture of normal laws over the
+sizes of latent numbers and rest. All rotors are evaluated at once, so that
 differences are gradient enough.
 """
 
@@ -25,9 +26,6 @@ STATIC, FORWARD = 4, 10
 MARGINAL = 0.5
 """Weight of single rows beside the rotor as a whole in the likelihood (composite likelihood, Varin, Reid and Firth,
 Statistica Sinica 21, 2011, not checked): the whole tells the correlations, single rows how wide an interval is [1]."""
-
-FAMILY = 0.5
-"""A family of n rotors counts as n^(1 - 0.5): its rotors are alike, by more than the model of one rotor knows [1]."""
 
 # Numbers of the search: attribute of the population, how the search counts it, and the prior that keeps what the data do
 # not know: centre and width, the width in the search's own count.  Widths of stations, label and families are narrow:
@@ -119,7 +117,7 @@ class Rotors:
         # slopes, readings less the solver, columns of the bias, all over the coefficients at rest: (R, 2 P, K + 3)
         self.columns = np.concatenate([slopes, sides], axis=-1) / self.top[..., None] * self.real[..., None]
         families = [m.family for m in rotors]
-        weight = np.array([families.count(f) ** -FAMILY for f in families])
+        weight = np.array([1.0 / families.count(f) for f in families])
         self.weight = weight / weight.mean()
         self._kept: tuple[bytes, tuple[Array, Array, Array]] = (b"", (np.empty(0),) * 3)
 

@@ -72,9 +72,9 @@ def _covered(one: Observed) -> Validity:
     return Validity.of_rotor(m.diameter_m, rotor.B, rotor.blade.pitch_m() / rotor.D, x, m.Re, fastest)
 
 
-def leave_out(seen: Sequence[Observed], name: str, say: Say = None) -> dict[str, Any]:
+def leave_out(seen: Sequence[Observed], name: str, fitted: tuple[Population, Any], say: Say = None) -> dict[str, Any]:
     """Every family predicted by a population fitted without it and its group, sections unknown unless published."""
-    everything, numbers = fit_population(seen, name)
+    everything, numbers = fitted
     pools = {key: Pool() for key in _WORDS}
     families = sorted({s.record.family for s in seen})
     for group in (families[i::GROUPS] for i in range(min(GROUPS, len(families)))):
