@@ -28,7 +28,7 @@ def reynolds(text: str) -> float:
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     found = "folder with geometry, static and J files, or uiuc for the installed data"
-    parser.add_argument("dir", metavar="DIR", nargs="+", help=found)
+    parser.add_argument("folders", metavar="DIR", nargs="+", help=found)
     _options.add_json(parser, "bemt.validation/1")
     parser.add_argument("--polar", type=reynolds, metavar="fixed:RE", help="section tables at one Reynolds number")
     parser.add_argument("--off", metavar="EFFECT", help="switch an effect off; repeatable", **_options.REPEATABLE)
@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
         return _population(args)
     with _terminal.progress() as say:
         document = validate(
-            [where(name) for name in args.dir], effects, args.polar, say, match_J0=args.match_J0, as_drawn=args.as_drawn
+            [where(name) for name in args.folders], effects, args.polar, say, match_J0=args.match_J0, as_drawn=args.as_drawn
         )
     if args.out:
         write(document, args.out)
@@ -77,7 +77,7 @@ def _population(args: argparse.Namespace) -> int:
     effects = effects_without(args.off)
     if args.peer:
         peers.peer(args.peer)
-    folder, names = read_folders([where(name) for name in args.dir]), " ".join(args.dir)
+    folder, names = read_folders([where(name) for name in args.folders]), " ".join(args.folders)
     with _terminal.progress() as say:
         seen = left_out.watch(folder, effects, say)
         if args.fit_population or args.leave_family_out:

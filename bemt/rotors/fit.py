@@ -38,7 +38,7 @@ _FREE: tuple[tuple[str, str, float, float], ...] = (
     ("offset_deg", "", 0.7, 0.15), ("lift", "ln", 0.03, 0.5), ("drag", "ln", 0.1, 0.3), ("camber_deg", "ln", 0.3, 0.3),
     ("unknown_drag", "ln", 0.15, 0.5), ("unknown_camber_deg", "ln", 1.0, 0.5), ("camber_drag", "tanh", 0.0, 1.0),
     ("slow_flyer_deg", "", 1.5, 1.5),
-    ("drag_chord", "", -0.3, 0.3), ("small", "", 0.5, 0.2), ("nu", "ln", 3.0, 0.15), ("nu_rest", "ln", 4.0, 0.4),
+    ("drag_chord", "", -0.3, 0.3), ("nu", "ln", 3.0, 0.15), ("nu_rest", "ln", 4.0, 0.4),
     ("hub_cd", "", 0.8, 0.4), ("lift_Re", "", 0.0, 0.1),
     ("rest_small", "", 0.5, 0.2), ("local_camber_deg", "ln", 0.5, 0.5), ("local_drag", "ln", 0.15, 0.5),
     ("local_correlation", "tanh", -0.4, 0.5), ("local_deg", "ln", 3.5, 0.4), ("local_ln_Re", "ln", 1.0, 0.5),
@@ -211,7 +211,7 @@ def objective(theta: Array, rows: Rotors) -> float:
 def fit(
     rotors: Sequence[MeasuredRotor],
     start: Array | None = None,
-    most: int = 60,
+    most: int = 40,
     provenance: Mapping[str, Any] | None = None,
 ) -> tuple[Population, Array]:
     """Fit a population; gives it with its parameters, (P,)."""

@@ -28,7 +28,7 @@ SCHEMA = "bemt.left_out/3"
 GROUPS = 6
 """Families are left out in so many groups, dealt out by name."""
 # Steps of the search with a family left out, from the numbers of all families.
-_STEPS_LEFT_OUT = 15
+_STEPS_LEFT_OUT = 10
 _WORDS = {
     "as_drawn": "solver on the stations as given",
     "family_known": "as built, its family in the population",
