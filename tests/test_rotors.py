@@ -6,6 +6,7 @@ import json
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,9 +20,10 @@ from bemt.rotors.fit import MeasuredRotor, Rotors, with_families
 from bemt.rotors.latents import NAMES, Prior, Sensed
 from bemt.rotors.mixture import LEVELS, half_width, inside, pair_half_width
 from bemt.rotors.model import RealRotor, coefficients
-from bemt.rotors.population import WEIGHTS, population, sizes
+from bemt.rotors.population import WEIGHTS, Population, population, sizes
 from bemt.rotors.predict import Prediction, predict
 from bemt.rotors.reference import ReferenceRun, noise_of_run, scatter
+from bemt.rotors.validity import Validity
 
 K = len(NAMES)
 CASE = """schema = "bemt.case/1"
@@ -202,6 +204,66 @@ def test_density_integrates_to_one_and_agrees_with_the_intervals() -> None:
     assert density.sum() * step == pytest.approx(1.0, abs=1e-4)
     inner = np.abs(y[::20] - found.mean[0, 0]) <= found.half_width(LEVELS[0], noise=True)[0, 0]
     assert density[inner].sum() * step == pytest.approx(LEVELS[0], abs=0.02)
+
+
+Array = np.ndarray[Any, Any]
+COVERED = Validity((0.05, 0.5), (0.0, 0.9), (4e3, 1.4e5), 0.28, (2, 4), (0.3, 1.1))
+INSIDE: dict[str, Any] = {"diameter_m": 0.25, "blades": 2, "pitch_over_D": 0.5, "x": 0.4, "Re": 6e4, "M_tip": 0.2,
+                          "ducted": False}  # fmt: skip
+
+
+def _factor(**changes: Any) -> tuple[Any, Any]:
+    at = INSIDE | changes
+    size = max(np.size(v) for v in at.values())
+    arrays = {k: np.broadcast_to(np.asarray(at[k], float), size) for k in ("x", "Re", "M_tip")}
+    factor, words = COVERED.at(**(at | arrays))
+    return factor, [" ".join(w) for w in words]
+
+
+def test_inside_the_measured_rotors_nothing_is_widened_nor_said() -> None:
+    assert _factor() == (np.ones(1), [""])
+    edge = {"x": 0.9, "Re": 1.4e5, "M_tip": 0.28, "blades": 4, "pitch_over_D": 1.1, "diameter_m": 0.5}
+    assert _factor(**edge) == (np.ones(1), [""])
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "word"),
+    [
+        ("x", np.linspace(0.9, 100.0, 2000), "zero thrust"),
+        ("x", np.linspace(0.0, -3.0, 200), "zero thrust"),
+        ("Re", np.geomspace(4e3, 10.0, 200), "Re "),
+        ("Re", np.geomspace(1.4e5, 1e8, 200), "Re "),
+        ("M_tip", np.linspace(0.28, 1.3, 200), "tip Mach"),
+    ],
+)
+def test_outside_the_band_grows_with_the_distance_without_a_jump_and_says_why(
+    name: str, values: Array, word: str
+) -> None:
+    factor, words = _factor(**{name: values})
+    assert factor[0] == 1.0 and np.all(np.diff(factor) >= 0.0) and np.max(np.diff(factor)) < 0.1
+    assert factor[-1] > 1.5 and word in words[-1] and f"times {factor[-1]:.2g}" in words[-1]
+
+
+@pytest.mark.parametrize(
+    ("near", "far"),
+    [({"blades": 5}, {"blades": 8}), ({"diameter_m": 0.6}, {"diameter_m": 2.0}),
+     ({"diameter_m": 0.04}, {"diameter_m": 0.01}), ({"pitch_over_D": 1.3}, {"pitch_over_D": 2.2})],
+)  # fmt: skip
+def test_a_rotor_farther_from_the_measured_ones_is_less_certain(near: dict[str, Any], far: dict[str, Any]) -> None:
+    assert 1.0 < _factor(**near)[0] < _factor(**far)[0]
+
+
+def test_every_departure_is_named_and_widens() -> None:
+    duct, fast = _factor(ducted=True), _factor(M_tip=0.9)
+    both, words = _factor(ducted=True, M_tip=0.9)
+    assert both > max(duct[0], fast[0]) and "a duct" in words[0] and "tip Mach" in words[0]
+    assert "do not trust" in _factor(x=100.0)[1][0] and "do not trust" not in fast[1][0]
+
+
+def test_ranges_of_a_population_survive_its_file() -> None:
+    p = population()
+    assert p.validity is not None and Population.of(json.loads(json.dumps(p.document()))).validity == p.validity
+    assert Validity.of_rotors([COVERED, COVERED]) == COVERED
 
 
 def test_widths_are_those_of_the_prior() -> None:
