@@ -93,7 +93,7 @@ def as_built_of(file: CaseFile, folder: Path, rotor: Rotor, counting_assumptions
     thickness_known = file.rotor.kind != "propeller" or "blade.section.thickness" not in assumed
     chord = math.nan if thickness_known else float(rotor.blade.at(0.75 * rotor.R)[0]) / rotor.R
     gap = _gap_deg(blade, rotor)
-    kind = blade.class_ or class_of(blade.family)
+    kind = None if blade.section is not None else blade.class_ or class_of(blade.family)  # the rule knows no classes
     prior = population().prior(source, rotor.D, gap, blade.family, section, declared, sds, chord, kind)
     stated_mean = np.where(drawn != 0.0, drawn, prior.mean)
     return CaseAsBuilt(Prior(stated_mean, prior.cov, prior.sizes, prior.weights, source), drawn)
