@@ -54,10 +54,9 @@ def run(args: argparse.Namespace) -> int:
     effects = effects_without(args.off)
     if args.fit_population or args.leave_family_out or args.peer:
         return _population(args)
+    found = [where(name) for name in args.folders]
     with _terminal.progress() as say:
-        document = validate(
-            [where(name) for name in args.folders], effects, args.polar, say, match_J0=args.match_J0, as_drawn=args.as_drawn
-        )
+        document = validate(found, effects, args.polar, say, match_J0=args.match_J0, as_drawn=args.as_drawn)
     if args.out:
         write(document, args.out)
     # an infinite error (not converged) becomes null: JSON has no infinity

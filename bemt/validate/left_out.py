@@ -137,8 +137,9 @@ def table(document: dict[str, Any]) -> str:
     scores = [log_score(total) for total in (n, *document["transfer"].values())]
     lines += [
         "",
-        f"Percent of the measured value; {len(document['families'])} families in {GROUPS} groups; static {n['static']['points']} points of"
-        f" {n['static']['propellers']} propellers, forward {n['forward']['points']} of {n['forward']['propellers']}.",
+        f"Percent of the measured value; {len(document['families'])} families in {GROUPS} groups; static"
+        f" {n['static']['points']} points of {n['static']['propellers']} propellers, forward"
+        f" {n['forward']['points']} of {n['forward']['propellers']}.",
         f"Mean log score of held-out families and of each volume: {', '.join(f'{s:.3f}' for s in scores)}.",
         "68 %, 95 %: share of the points inside those intervals; width: median half width of the 68 % interval.",
     ]
