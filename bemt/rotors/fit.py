@@ -28,8 +28,8 @@ MARGINAL = 0.5
 Statistica Sinica 21, 2011, not checked): the whole tells the correlations, single rows how wide an interval is [1]."""
 
 # Numbers of the search: attribute of the population, how the search counts it, and the prior that keeps what the data
-# do not know: centre and width, the width in the search's own count.  Widths of stations, label and families are narrow:
-# measured propellers tell the sum of their variances, not its parts; optical stations are off by about a degree (blades
+# do not know: centre and width, the width in the search's own count.  Widths of label and families are narrow: measured
+# propellers tell the sum of their variances, not its parts; optical stations are off by about a degree (blades
 # turned to their measured zero-thrust J scatter by 0.7 to 1.5).  The hub's drag starts at a bluff body's (0.8 to 1.1:
 # Hoerner 1965, Fluid-Dynamic Drag, ch. 3, not checked), drag over chord at what thickness over chord (APC's PE0 files)
 # and drag over thickness (the section tables) make of it.
