@@ -31,14 +31,13 @@ Statistica Sinica 21, 2011, not checked): the whole tells the correlations, sing
 # do not know: centre and width, the width in the search's own count.  Widths of label and families are narrow: measured
 # propellers tell the sum of their variances, not its parts; optical stations are off by about a degree (blades
 # turned to their measured zero-thrust J scatter by 0.7 to 1.5).  The hub's drag starts at a bluff body's (0.8 to 1.1:
-# Hoerner 1965, Fluid-Dynamic Drag, ch. 3, not checked), drag over chord at what thickness over chord (APC's PE0 files)
-# and drag over thickness (the section tables) make of it.
+# Hoerner 1965, Fluid-Dynamic Drag, ch. 3, not checked).
 _FREE: tuple[tuple[str, str, float, float], ...] = (
     ("stations_deg", "ln", 0.7, 0.3), ("label_deg", "ln", 0.8, 0.1), ("family_deg", "ln", 1.0, 0.1),
     ("offset_deg", "", 0.7, 0.15), ("lift", "ln", 0.03, 0.5), ("drag", "ln", 0.1, 0.3), ("camber_deg", "ln", 0.3, 0.3),
     ("unknown_drag", "ln", 0.15, 0.5), ("unknown_camber_deg", "ln", 1.0, 0.5), ("camber_drag", "tanh", 0.0, 1.0),
     ("slow_flyer_deg", "", 1.5, 1.5),
-    ("drag_chord", "", -0.3, 0.3), ("nu", "ln", 3.0, 0.15), ("nu_rest", "ln", 4.0, 0.4),
+    ("nu", "ln", 3.0, 0.15), ("nu_rest", "ln", 4.0, 0.4),
     ("hub_cd", "", 0.8, 0.4), ("lift_Re", "", 0.0, 0.1),
     ("rest_small", "", 0.5, 0.2), ("local_camber_deg", "ln", 0.5, 0.5), ("local_drag", "ln", 0.15, 0.5),
     ("local_correlation", "tanh", -0.4, 0.5), ("local_deg", "ln", 3.5, 0.4), ("local_ln_Re", "ln", 1.0, 0.5),
@@ -68,14 +67,13 @@ class MeasuredRotor(Sensed):
     gap_deg: float
     static: NDArray[np.bool_]
     y: Array
-    chord: float = math.nan  # At 0.75 R over the radius [1]
     blade_class: str | None = None
     known_from: str = "stations"
 
 
 def law(p: Population, m: MeasuredRotor) -> Prior:
     """What is known of a propeller before it is measured."""
-    return p.prior(m.known_from, m.diameter_m, m.gap_deg, m.family, m.section, chord=m.chord, blade_class=m.blade_class)
+    return p.prior(m.known_from, m.diameter_m, m.gap_deg, m.family, m.section, blade_class=m.blade_class)
 
 
 def counted(m: MeasuredRotor) -> NDArray[np.intp]:
@@ -272,7 +270,7 @@ def with_families(p: Population, rows: Rotors) -> Population:
     groups: dict[str, list[tuple[Array, Array, Array, Array]]] = {}
     for m, (precision, value, size) in zip(rows.rotors, told, strict=True):
         prior = replace(p, families={}).prior(
-            m.known_from, m.diameter_m, math.nan, None, m.section, chord=m.chord, blade_class=m.blade_class
+            m.known_from, m.diameter_m, math.nan, None, m.section, blade_class=m.blade_class
         )
         mean, cov = prior.mean[mine], prior.cov[np.ix_(mine, mine)]
         groups.setdefault(m.family, []).append((precision, value - precision @ mean, cov, size * np.ones(1)))
