@@ -168,7 +168,7 @@ class Validity:
                 if part[i] > SAID**2 - 1.0
             ]
             doubt = f"; {DOUBT}" if factor[i] >= DOUBTFUL else ""
-            words = f"{OUTSIDE}: {', '.join(why)}: model error times {factor[i]:.2g}{doubt}"
+            words = f"{OUTSIDE}: {', '.join(why)}: model error times {factor[i]:.3g}{doubt}"
             said.append((words,) if why else ())
         return np.asarray(factor, dtype=float), tuple(said)
 
