@@ -160,8 +160,8 @@ class Validity:
         ]  # fmt: skip
         more = [np.broadcast_to(np.nan_to_num(part), P) for part, *_ in parts]
         factor = np.sqrt(1.0 + np.sum(more, axis=0) - np.minimum(size, Reynolds))
-        said = []
-        for i in range(P):
+        said: list[tuple[str, ...]] = [()] * P
+        for i in np.flatnonzero(np.max(more, axis=0) > SAID**2 - 1.0).tolist():
             why = [
                 f"{text.format(_three(float(np.broadcast_to(value, P)[i])))} ({known})"
                 for part, (_, text, value, known) in zip(more, parts, strict=True)
@@ -169,7 +169,7 @@ class Validity:
             ]
             doubt = f"; {DOUBT}" if factor[i] >= DOUBTFUL else ""
             words = f"{OUTSIDE}: {', '.join(why)}: model error times {factor[i]:.3g}{doubt}"
-            said.append((words,) if why else ())
+            said[i] = (words,)
         return np.asarray(factor, dtype=float), tuple(said)
 
 
