@@ -11,7 +11,7 @@ import pytest
 from diagnosing import case, left_out, points, recording
 
 from bemt.dataset import Dataset
-from bemt.diagnose import chain
+from bemt.diagnose import chain, noise
 from bemt.diagnose.assemble import build
 from bemt.diagnose.load import load
 from bemt.diagnose.record import from_series
