@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
+from bemt.readers._uiuc_names import class_of
 from bemt.rotors.latents import NAMES, AsBuilt, Prior, as_built
 from bemt.rotors.population import label_angle_deg, population
 from bemt.rotors.reference import ReferenceRun
@@ -92,7 +93,8 @@ def as_built_of(file: CaseFile, folder: Path, rotor: Rotor, counting_assumptions
     thickness_known = file.rotor.kind != "propeller" or "blade.section.thickness" not in assumed
     chord = math.nan if thickness_known else float(rotor.blade.at(0.75 * rotor.R)[0]) / rotor.R
     gap = _gap_deg(blade, rotor)
-    prior = population().prior(source, rotor.D, gap, blade.family, section, declared, sds, chord)
+    kind = blade.class_ or class_of(blade.family)
+    prior = population().prior(source, rotor.D, gap, blade.family, section, declared, sds, chord, kind)
     stated_mean = np.where(drawn != 0.0, drawn, prior.mean)
     return CaseAsBuilt(Prior(stated_mean, prior.cov, prior.sizes, prior.weights, source), drawn)
 

@@ -23,7 +23,8 @@ KIND = "su2_history"
 
 _STEPS = ("Time_Iter", "Outer_Iter", "Inner_Iter", "Iteration")
 _START = re.compile(
-    r'(VARIABLES\s*=\s*)?"\s*((Time|Outer|Inner)_Iter\s*"\s*,|Iteration\s*",(?=.*"\s*(C[DL]|Res_|rms\[)))', re.IGNORECASE
+    r'(VARIABLES\s*=\s*)?"\s*((Time|Outer|Inner)_Iter\s*"\s*,|Iteration\s*",(?=.*"\s*(C[DL]|Res_|rms\[)))',
+    re.IGNORECASE,
 )
 
 
