@@ -393,7 +393,7 @@ def _program(word: str, kept: dict[str, Any]) -> str:
     if word in SEEN:
         program, date, _ = SEEN[word]
         return f"by hand: {program} | see below | see below | {held} | {date} |"
-    return f"text only: {TEXT[word]} | - | - | {held} | - |"
+    return f"text only: {TEXT.get(word, 'formula of its source')} | - | - | {held} | - |"
 
 
 def page() -> str:

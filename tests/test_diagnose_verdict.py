@@ -311,9 +311,10 @@ def revised(name: str, said: verdict.Decision, **changed: Any) -> verdict.Decisi
     return next(r.ask(a) for r in rules.RULES if r.name == name)
 
 
-def ratios(word: str, *ids: str) -> Any:
+def ratios(word: str, *ids: str, drive: str = "") -> Any:
     loads = SimpleNamespace(verdict=word, effects=ids, probability={"none": 0.9, **dict.fromkeys(ids, 0.4)}, why="seen")
-    return SimpleNamespace(loads=loads, leading=loads, ratios={})
+    motor = SimpleNamespace(verdict="named", effects=(drive,), probability={drive: 0.9}, why="seen")
+    return SimpleNamespace(loads=loads, drive=motor, leading=motor if drive else loads, ratios={}, channels={})
 
 
 REVISIONS: dict[str, tuple[verdict.Decision, dict[str, Any], str]] = {
@@ -323,6 +324,8 @@ REVISIONS: dict[str, tuple[verdict.Decision, dict[str, Any], str]] = {
     "a wrong density that nobody recorded": (_said("sensor", "unit_slip"), {}, "insufficient"),
     "the drive changed, the loads say nothing": (_said("none"), {"drive": _said("named", "battery_sag")}, "named"),
     "the drive changed as well": (_said("sensor", "thrust_gain"), {"drive": _said("named", "battery_sag")}, "named"),
+    "the ratios to the reference show no change": (_said("unknown"), {"change": ratios("none")}, "none"),
+    "the loads agree, the drive does not": (_said("none"), {"change": ratios("none", drive="battery_sag")}, "named"),
     "the ratios to the reference answer": (
         _said("insufficient"),
         {"change": ratios("class", "duct")},

@@ -214,8 +214,9 @@ def test_most_thrust_is_one_at_every_door(here: Path, capsys: pytest.CaptureFixt
         assert one == pytest.approx(found[0], rel=1e-3)
     row = swept["rows"][0]  # type: ignore[index]
     assert row["thrust_N"] == pytest.approx(found[0][1], rel=2e-3)  # the case's own speed is that of full throttle
-    text = next(Path("out").rglob("*.params")).read_text()
-    assert float(re.findall(r"SIH_F_RPM_MAX (\S+)", text)[0]) == pytest.approx(found[0][0], rel=1e-3)
+    text = next(Path("out").rglob("*_sih.params")).read_text()
+    assert float(re.findall(r"set-default SIH_T_MAX (\S+)", text)[0]) == pytest.approx(found[0][1], rel=1e-3)
+    assert float(re.findall(r"set-default SIH_F_RPM_MAX (\S+)", text)[0]) == pytest.approx(found[0][0], rel=1e-3)
 
 
 def test_a_class_of_blades_brings_its_camber_and_its_family(here: Path) -> None:

@@ -19,7 +19,7 @@ from bemt.rotors.conditioning import condition
 from bemt.rotors.fit import MeasuredRotor, Rotors, with_families
 from bemt.rotors.latents import NAMES, Prior, Sensed
 from bemt.rotors.mixture import LEVELS, half_width, inside, pair_half_width
-from bemt.rotors.model import coefficients
+from bemt.rotors.model import RealRotor, coefficients
 from bemt.rotors.population import WEIGHTS, Population, population, sizes
 from bemt.rotors.predict import Prediction, predict
 from bemt.rotors.reference import ReferenceRun, noise_of_run, scatter
@@ -303,9 +303,8 @@ def test_likelihood_of_all_rotors_at_once_is_that_of_a_mixture_of_normal_laws() 
     from bemt.rotors import fit
 
     p, rotors = population(), [*_family("a", 1.0, 2, 3), *_family("b", 0.5, 1, 7)]
-    rotors[1] = replace(
-        rotors[1], **vars(rotors[1].part(np.arange(6))), static=rotors[1].static[:6], y=rotors[1].y[:, :6]
-    )
+    short = vars(rotors[1].part(np.arange(6)))
+    rotors[1] = replace(rotors[1], **short, static=rotors[1].static[:6], y=rotors[1].y[:, :6])
     together = Rotors(rotors).log_likelihood(p)
     for m, value in zip(rotors, together, strict=True):
         at, law = m.part(fit.counted(m)), fit.law(p, m)
@@ -329,6 +328,35 @@ def test_slow_flyers_have_more_camber_whoever_made_them() -> None:
     slow, usual = (p.prior("stations", 0.254, section="rule", blade_class=c).mean[camber] for c in ("slow_flyer", None))
     assert 1.0 < slow - usual < 4.0
     assert p.prior("stations", 0.254, section="published", blade_class="slow_flyer").mean[camber] == 0.0
+
+
+def test_a_real_rotor_says_the_same_by_covariance_and_by_prediction() -> None:
+    """Its intervals are the diagonal of its covariance; a run conditions it as a Gaussian process does."""
+    p, at = population(), _sensed(10)
+    prior = p.prior("stations", 0.254)
+
+    def solve(z: np.ndarray, rpm: np.ndarray, J: np.ndarray, which: np.ndarray) -> np.ndarray:
+        rows = np.searchsorted(at.J, J)
+        return at.f[:, rows] + np.einsum("ckp,k->cp", at.T[:, :, rows], z)
+
+    rotor = RealRotor(solve, 0.254, 14.0, prior, np.zeros(K))
+    here = rotor.at(np.full(10, 5000.0), at.J, at.Re)
+    found, C = rotor.predict(here), rotor.covariance(here)
+    assert np.diag(C).reshape(2, -1) == pytest.approx(found.latent_sd**2 + found.rest_sd**2, rel=1e-9)
+    assert rotor.covariance(here, here.part(np.arange(3))) == pytest.approx(C[:, [0, 1, 2, 10, 11, 12]], rel=1e-9)
+    run = here.part(np.arange(4))
+    noise = noise_of_run(p, run, run.f, p.noise_sd(run), (0.0, 0.0))
+    T = run.T.transpose(0, 2, 1).reshape(8, K)
+    one, start = np.ones(1), (run.f + p.bias(run)).reshape(-1)
+    told = condition(lambda z: start + T @ z, replace(prior, sizes=one, weights=one), run.f.reshape(-1), noise, most=1)
+    after = RealRotor(solve, 0.254, 14.0, Prior(told.mean, told.cov, np.ones(1), np.ones(1)), np.zeros(K),
+                      ReferenceRun.given(run, noise, run.f.reshape(-1), told))  # fmt: skip
+    k = rotor.covariance(here, run)
+    S = rotor.covariance(run) + np.diag(p.noise_sd(run).reshape(-1) ** 2)
+    assert after.covariance(here) == pytest.approx(C - k @ np.linalg.solve(S, k.T), rel=1e-6, abs=1e-12)
+    mean = (here.f + p.bias(here)).reshape(-1) + rotor.tangents(here) @ prior.mean
+    left = run.f.reshape(-1) - mean.reshape(2, -1)[:, :4].reshape(-1)
+    assert after.expected(here).reshape(-1) == pytest.approx(mean + k @ np.linalg.solve(S, left), rel=1e-6)
 
 
 def test_condition_is_exact_for_a_linear_solver() -> None:

@@ -19,9 +19,9 @@ from numpy.typing import ArrayLike, NDArray
 from bemt import coefficients as co
 from bemt.air import air_arrays
 from bemt.rotors.mixture import LEVELS
-from bemt.rotors.model import beta75_deg, coefficients
+from bemt.rotors.model import RealRotor, coefficients
 from bemt.rotors.population import population
-from bemt.rotors.predict import predict, sense, zero_thrust
+from bemt.rotors.predict import zero_thrust
 from bemt.rotors.validity import Validity
 
 if TYPE_CHECKING:
@@ -210,10 +210,9 @@ def _model_error(case: Case, model: Model, points: Dataset, air: Air) -> tuple[A
     What the population expects beside the nominal result counts too, as a root sum of squares.
     """
     known = case.as_built()
-    solve = coefficients(model, air)
-    at = sense(solve, model.diameter_m, beta75_deg(model), points.rpm, points.J, points.Re75, known.drawn)
-    mean = solve(known.prior.mean, points.rpm, points.J, np.arange(points.rpm.size))
-    found = predict(population(), known.prior, at, mean, known.reference)
+    rotor = RealRotor.of(model, air, known.prior, known.drawn, known.reference)
+    mean = rotor.solve(known.prior.mean, points.rpm, points.J, np.arange(points.rpm.size))
+    found = rotor.predict(rotor.at(points.rpm, points.J, points.Re75), mean)
     off = found.mean - np.array([points.CT, points.CP])
     return np.hypot(found.half_width(), off), np.hypot(found.half_width(LEVELS[1]), 2.0 * off)
 

@@ -25,7 +25,8 @@ __all__ = ["PLAIN", "AsLabelled", "CalibratedBlade", "prior_of"]
 
 Array = NDArray[np.float64]
 
-# Standard deviations without a reference, in the order of NAMES: angle [deg], lift, drag [1], camber [deg].  Working calibrations; a wide blade without a reference would swallow slips of speed and unit.
+# Standard deviations without a reference, in the order of NAMES: angle [deg], lift, drag [1], camber [deg].  Working
+# calibrations; a wide blade without a reference would swallow slips of speed and unit.
 _PLAIN = (0.3, 0.03, 0.10, 0.0)
 # With a reference, by how the blade is known.  One degree and more between published stations and blades (zero-thrust
 # advance ratios of UIUC volumes 1 and 2); a label leaves the section and the law of the blade angle open as well.

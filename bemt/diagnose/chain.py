@@ -171,9 +171,9 @@ def diagnose(
     baseline: str = "bemt",
     given: suggestion.Given | None = None,
     channels: Sequence[str] | None = None,
-    ratios: bool = True,
+    change: RunChange | None = None,
 ) -> Diagnosis:
-    """Say what was left out; with ``ratios``, those to the one reference answer where the case leaves it open."""
+    """Say what was left out; ``change`` from the reference to the recording, where it was compared already."""
     say = progress or (lambda _: None)
     speed = CHANNELS[2]
     each = list(cases) * len(records) if len(cases) == 1 else list(cases)
@@ -182,17 +182,19 @@ def diagnose(
     turns = [(r.only((speed,)), c) for r, c in told if speed in r.measured]
 
     files = None if given is None else (*given.references[:1], *given.recordings[:1])
-    free = ratios and only is None and channels is None and baseline == "bemt"
+    free = only is None and channels is None and baseline == "bemt"
 
     def chain(
         some: Sequence[tuple[Record, Case]], ids: Sequence[str] | None, motor: Diagnosis | None = None,
         compared: bool = False,
     ) -> Diagnosis:  # fmt: skip
-        def change(absent: Collection[str]) -> RunChange | None:
-            return ratio_check.change_of(records, each[0].diameter_m, absent, files) if compared and free else None
+        def ratios(absent: Collection[str]) -> RunChange | None:
+            if not (compared and free):
+                return None
+            return change or ratio_check.change_of(records, each[0].diameter_m, absent, files)
 
         return _diagnose([r for r, _ in some], [c for _, c in some], ids, say, nulls, baseline,
-                         given or suggestion.Given(), motor, change)  # fmt: skip
+                         given or suggestion.Given(), motor, ratios)  # fmt: skip
 
     def tested(some: Sequence[tuple[Record, Case]]) -> bool:
         return any(not r.reference for r, _ in some)

@@ -15,12 +15,10 @@ from bemt import __version__
 from bemt.base.errors import Fault, InputError
 from bemt.base.face import as_html
 from bemt.compare.change_document import document, next_step
-from bemt.compare.contrast_text import sentence
 from bemt.compare.invocation import Invocation
 from bemt.compare.recordings import ERROR_IN, IN_WIND, RunChange, changed
 from bemt.compare.selection import conditions_of, selected, with_air
 from bemt.compare.stand_run import stand_run
-from bemt.effects import catalogue
 
 if TYPE_CHECKING:
     from bemt.case import Case
@@ -30,11 +28,6 @@ if TYPE_CHECKING:
 
 # Remarks on the files come first in an explanation; `import` shows them.
 _REMARK = "Before any physics"
-# An effect whose scaling is so much less likely than the best cannot have made the ratios.
-_IMPOSSIBLE = 1e-4
-# "None" in the ratios less likely than this is no answer of the diagnosis either.
-_UNLIKELY = 0.15
-_CLAIMS = ("named", "sensor", "class")
 # Finding on a column that is no measurement; two columns with one ratio may be computed ones.
 _STUCK = "constant_column"
 # Rows and number of the values of a column that tells parts of one file apart.
@@ -157,9 +150,8 @@ def compare(
     doc = document(found) | {"version": __version__, "recordings": names, "rows": {"A": rows_a, "B": rows_b}}
     doc["notes"] = [*_errors(findings), *doc["notes"]]
     if case is not None and not found.loads.why.endswith(IN_WIND):
-        doc |= _agreed(_diagnosed(asked, read, case, progress), doc, found)
-    own = "diagnosis" in doc and all(doc[k] == doc["diagnosis"][k] for k in ("verdict", "rule"))
-    step = _after(doc) if own else next_step(found, asked)
+        doc |= _diagnosed(asked, read, case, found, progress)
+    step = _after(doc) if "diagnosis" in doc else next_step(found, asked)
     doc["next_measurement"] = step | {"command": ""} if step["command"] == asked.command() else step
     return Contrast(found, doc)
 
@@ -221,7 +213,7 @@ def _case(path: str) -> Case:
 
 
 def _diagnosed(
-    asked: Invocation, read: Sequence[Dataset], case: Case, progress: Callable[[str], None] | None
+    asked: Invocation, read: Sequence[Dataset], case: Case, found: RunChange, progress: Callable[[str], None] | None
 ) -> dict[str, Any]:
     """Verdict of the diagnosis of B with A as reference."""
     from bemt.diagnose.chain import diagnose
@@ -230,8 +222,7 @@ def _diagnosed(
     from bemt.diagnose.load import load
 
     a, b = (load(name, case, imported) for name, imported in zip((asked.a, asked.b), read, strict=True))
-    given = _given(asked)
-    answer = diagnose([b, replace(a, reference=True)], [case], None, progress, given=given, ratios=False)
+    answer = diagnose([b, replace(a, reference=True)], [case], None, progress, given=_given(asked), change=found)
     said = diagnosis(answer)
     keys = ("verdict", "effects", "probability", "ranking", "rule")
     told = [line for line in explanation(answer) if not line.startswith(_REMARK)]
@@ -256,59 +247,6 @@ def _given(asked: Invocation) -> Given:
             return (asked.with_days(),)
 
     return _Pair((shlex.quote(asked.b),), (shlex.quote(asked.a),), f"--case {shlex.quote(asked.case or 'CASE')}")
-
-
-def _agreed(said: dict[str, Any], ratios: dict[str, Any], found: RunChange) -> dict[str, Any]:
-    """One answer of the diagnosis and of the ratios.
-
-    The ratios know no blade and cannot be misled by one; the diagnosis knows what this blade does. Where one cannot
-    judge an effect the other's word stands: the diagnosis knows no other propeller, the ratios no skewed inflow. An
-    effect that cannot make the ratios is struck; where they agree within scatter and set-up there is nothing unknown.
-    """
-    by_ratio = found.loads
-    mine = {k: ratios[k] for k in ("verdict", "effects", "probability", "ranking", "rule")}
-    decided = by_ratio.verdict in _CLAIMS
-    if by_ratio.verdict == said["verdict"] == "none" and found.leading is found.drive:
-        return said | mine | {"told": ["The loads agree; the drive does not.", sentence(ratios)]}
-    if by_ratio.verdict == "none" and said["verdict"] == "unknown":
-        rule = f"{by_ratio.why}; the model of the case {said['case']} differs from both in the same way"
-        return said | mine | {"rule": rule, "told": [sentence(ratios | {"rule": rule})]}
-    if said["verdict"] not in _CLAIMS:
-        sees = decided or (said["verdict"] == "none" and by_ratio.probability.get("none", 1.0) < _UNLIKELY)
-        return _by_ratios(said, mine, "because an error of the model could look like this change") if sees else said
-    if not by_ratio.probability:
-        return said
-    least = _IMPOSSIBLE * max(by_ratio.probability.values())
-    struck = [k for k in said["effects"] if by_ratio.probability.get(k, 1.0) < least]
-    why = f"{' and '.join(struck)} cannot cause these ratios of thrust and torque"
-    left = [k for k in said["effects"] if k not in struck]
-    if not decided:
-        if not struck:
-            return said
-        if left and said["verdict"] == "class":
-            return said | {"effects": left, "rule": f"{said['rule']}; {why}"}
-        return _by_ratios(said, mine, f"but {why}")
-    both = [k for k in left if k in by_ratio.effects]
-    lone = [k for k in left if k not in by_ratio.probability]
-    other = [k for k in by_ratio.effects if k not in catalogue()]
-    if said["verdict"] != "class" and both == list(said["effects"]):
-        rank = by_ratio.probability
-        if len(both) > 1 or not other or rank[both[0]] >= max(rank[k] for k in other):
-            return said
-    if not both and not lone:
-        return _by_ratios(said, mine, f"but {why}" if struck else f"but {', '.join(left)} would scale differently")
-    effects = [*both, *lone, *(other if both else by_ratio.effects)]
-    if len(effects) == 1:
-        return said | {"effects": effects}
-    rule = f"{said['rule']}; {ratios['rule']}" + (f"; {why}" if struck else "")
-    return said | {"verdict": "class", "effects": effects, "rule": rule}
-
-
-def _by_ratios(said: dict[str, Any], mine: dict[str, Any], why: str) -> dict[str, Any]:
-    """The answer of the ratios in place of that of the diagnosis."""
-    found = " ".join([said["verdict"], ", ".join(said["effects"])]).strip()
-    told = f"The diagnosis with the case {said['case']}, A as reference, does not decide: it says {found}, {why}."
-    return said | mine | {"told": [sentence(mine), told]}
 
 
 def _after(doc: dict[str, Any]) -> dict[str, Any]:

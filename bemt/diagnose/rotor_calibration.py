@@ -30,8 +30,6 @@ from bemt.rotors.reference import SESSION
 
 SCHEMA = "bemt.rotor_calibration/1"
 POSTERIOR = "as_built.json"
-FLIGHT_X = 0.2
-"""J over that of zero thrust above which a point tells of flight [1]."""
 # Assumptions that a run of the rotor settles, besides those that move a latent number.
 _SETTLED = {"model.drag_level", "model.n_crit", "blade.section.thickness", "blade.section.thickness_scale"}
 
@@ -180,7 +178,7 @@ def _source(case: Case) -> Any:
 
 def flight_point(case: Case, found: AsMeasured) -> float | None:
     """Airspeed at which one more point would settle flight, at the case's speed; None if the run has one. [m/s]"""
-    if np.max(found.reference.x, initial=0.0) > FLIGHT_X:
+    if found.reference.in_flight:
         return None
     pitch = case.rotor().blade.pitch_m()
     return 0.5 * ZERO_THRUST_MEASURED * pitch * case.rpm / 60.0

@@ -585,6 +585,19 @@ def _ratios_forbid_none(a: VerdictQuery) -> Decision | None:
     return replace(said, verdict="insufficient", why=why)
 
 
+@_rule("the ratios to the reference show no change", "SURE", revises=True)
+def _ratios_show_none(a: VerdictQuery) -> Decision | None:
+    """By definition: what differs from the model in the same way in both runs is no cause that came between them."""
+    said = a.answer
+    if said.by != "model" or said.verdict != "unknown" or a.alone or a.change is None:
+        return None
+    loads = a.change.loads
+    if loads.verdict != "none" or loads.probability["none"] < SURE:
+        return None
+    why = f"{loads.why}; the model of the case differs from both in the same way"
+    return replace(said, verdict="none", why=why, probability=loads.probability["none"])
+
+
 @_rule("the ratios to the reference answer", revises=True)
 def _ratios_fill(a: VerdictQuery) -> Decision | None:
     """Declared: how loads changed between two runs is measured and needs no blade; only some causes scale like that."""
@@ -605,3 +618,16 @@ def _ratios_fill(a: VerdictQuery) -> Decision | None:
         said, verdict="class" if lone else ratios.verdict, effects=(*ratios.effects, *lone[:MOST]), probability=chance,
         classes=(), sets=(), why=ratios.why, by="ratios",
     )  # fmt: skip
+
+
+@_rule("the loads agree, the drive does not", revises=True)
+def _drive_by_ratios(a: VerdictQuery) -> Decision | None:
+    """By definition: speed or power at one command changed, where no pulse width lets the drive be modelled."""
+    said, change = a.answer, a.change
+    if said.by != "model" or said.verdict != "none" or a.drive is not None or a.alone or change is None:
+        return None
+    if change.leading is not change.drive or change.drive.verdict not in CLAIMS:
+        return None
+    drive = change.drive
+    chance = sum(drive.probability.get(k, 0.0) for k in drive.effects)
+    return replace(said, verdict=drive.verdict, effects=drive.effects, probability=chance, why=drive.why, by="ratios")

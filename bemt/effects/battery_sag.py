@@ -21,7 +21,7 @@ class BatterySag(Effect):
     Equivalent circuit of a battery with one resistance (Tremblay and Dessaint 2009, World Electric Vehicle J. 3:289,
     without its exponential zone; not checked). Recorded ``voltage_V`` is taken relative to its largest value. If that
     circuit fits it over a run, the fit is used, without the noise of the meter; otherwise the voltage as recorded.
-    Otherwise the lost share is ``sag`` at the largest current (recorded ``current_A``, else shaft power), in
+    Otherwise the lost share is ``sag`` at the largest current (recorded ``current_A``, else power of shaft and copper), in
     proportion, plus ``discharge`` in proportion to the charge drawn, whole at the end of the run. The speed follows
     from (1 - lost) (1 + u) = y + u y^2, the motor at constant duty with torque as speed squared and copper drop u over
     back-EMF, ``copper`` at the largest Q / Omega. Loads at the measured speed are unchanged.
@@ -52,13 +52,14 @@ class BatterySag(Effect):
             return
         lever = np.maximum(np.nan_to_num(flow.Q0), 0.0) / flow.omega
         u = self.copper * lever / max(float(np.max(lever)), 1e-30)
-        c = (1.0 - self._lost(flow)) * (1.0 + u)
+        c = (1.0 - self._lost(flow, u)) * (1.0 + u)
         y = 2.0 * c / (1.0 + np.sqrt(1.0 + 4.0 * u * c))
         reading.values["rpm"] = reading.values["rpm"] * y
 
-    def _lost(self, flow: Flow) -> Array:
+    def _lost(self, flow: Flow, u: Array) -> Array:
         """Share of the voltage that is lost, (P,) [1]."""
-        power = np.nan_to_num(np.maximum(flow.extra.get("current_A", flow.Q0 * flow.omega), 0.0))
+        # the battery gives what the shaft takes and what the copper loses
+        power = np.nan_to_num(np.maximum(flow.extra.get("current_A", flow.Q0 * flow.omega * (1.0 + u)), 0.0))
         power = power / max(float(np.max(power)), 1e-30)
         charge = np.zeros_like(power)
         for run in flow.runs:

@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 SESSION = 0.01
 """Gain of a stand that all points of a run share, where the recording does not state it: retests of a propeller in one
 tunnel repeat CT to about a percent (Brandt and Selig 2011, AIAA 2011-1255, not checked) [1]."""
+IN_FLIGHT_J = 0.1
+"""Advance ratio beyond which a point is in flight: none of the part of the rest that belongs to hover is left [1]."""
 _BLIND = 1e6
 _FEWEST = 5
 
@@ -73,6 +75,11 @@ class ReferenceRun:
     noise: Array
     size: float = 1.0
 
+    @property
+    def in_flight(self) -> bool:
+        """Whether the run has a point in flight; without one it tells little of it: hover and flight differ by rotor."""
+        return bool(np.any(np.abs(self.at.J) > IN_FLIGHT_J))
+
     def near(self, p: Population, at: Sensed) -> tuple[Array, Array, Array]:
         """Shift of the expectation, slopes and remaining rest at other points: (2, P), (2, K, P), (2, P).
 
@@ -87,6 +94,12 @@ class ReferenceRun:
         slopes = at.T - (gain @ run).reshape(2, P, -1).transpose(0, 2, 1)
         variance = p.rest_sd(at).reshape(-1) ** 2 - np.einsum("ij,ij->i", gain, k)
         return shift, slopes, np.sqrt(np.maximum(variance, 0.0)).reshape(2, P)
+
+    def rest(self, p: Population, at: Sensed, other: Sensed | None = None) -> Array:
+        """Covariance of the rest between points once the run is known, (2 P, 2 Q)."""
+        k = p.rest(at, self.at)
+        q = k if other is None else p.rest(other, self.at)
+        return np.asarray(p.rest(at, other) - k @ np.linalg.solve(self.noise, q.T))
 
     @staticmethod
     def given(at: Sensed, noise: Array, y: Array, found: Conditioned) -> ReferenceRun:

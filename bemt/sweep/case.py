@@ -22,6 +22,8 @@ from bemt.dataset import Dataset
 from bemt.drive.drive_result import full_document
 from bemt.readers import references as reference_file
 from bemt.recordings import audit_remarks
+from bemt.recordings.cfd_setup import references_of
+from bemt.recordings.load import import_file
 from bemt.rotors.validity import serious
 from bemt.sweep.agreement import agreement
 
@@ -45,11 +47,11 @@ def _points(case: Case, refs: Sequence[reference_file.Reference]) -> list[tuple[
 
 
 def _references(case: Case) -> list[reference_file.Reference]:
-    """Recorded values, open conditions filled in from the case."""
-    if case.references_path is None:
-        return []
+    """Recorded values of the references and of the CFD runs beside the case, open conditions filled in from the case."""
     own = {"rpm": case.rpm, "airspeed_m_s": case.airspeed_m_s, "density_kg_m3": case.air().rho}
-    read = reference_file.read(case.references_path)
+    read = [] if case.references_path is None else reference_file.read(case.references_path)
+    for path in case.run_paths:
+        read += references_of(import_file(path), str(path))
     return [replace(r, **{k: v for k, v in own.items() if math.isnan(getattr(r, k))}) for r in read]  # type: ignore[arg-type]
 
 

@@ -71,12 +71,8 @@ def validate(
             shifts.extend([] if fit is None else [fit[0]])
         rows.append(row)
     j0 = np.array([r["J0_bemt"] / r["J0"] - 1.0 for r in rows if r["J0"] and r["J0_bemt"]])
-    doc: dict[str, Any] = {
-        "schema": SCHEMA,
-        "folder": " ".join(f.name for f in folders),
-        "J_share": J_SHARE,
-        **pool.total(),
-    }
+    names = " ".join(f.name for f in folders)
+    doc: dict[str, Any] = {"schema": SCHEMA, "folder": names, "J_share": J_SHARE, **pool.total()}
     if built:
         doc["as_drawn"] = drawn.total()
         doc["population"] = dict(population().provenance)
