@@ -63,10 +63,10 @@ def _sensed(n: int = 12, seed: int = 0) -> Sensed:
 
 
 def test_half_width_is_the_inverse_of_inside() -> None:
-    sds = np.random.default_rng(1).uniform(0.1, 3.0, (40, 6))
+    sds = np.random.default_rng(1).uniform(0.1, 3.0, (40, WEIGHTS.size))
     for level in LEVELS:
         assert inside(half_width(level, sds, WEIGHTS), sds, WEIGHTS) == pytest.approx(level, abs=1e-9)
-    with_equal = half_width(LEVELS[1], np.full((1, 6), 1.5), WEIGHTS)
+    with_equal = half_width(LEVELS[1], np.full((1, WEIGHTS.size), 1.5), WEIGHTS)
     assert with_equal == pytest.approx(3.0, abs=1e-6)  # one normal law: two standard deviations
 
 
