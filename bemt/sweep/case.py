@@ -83,7 +83,7 @@ def _compare(
         "model": model, "reference": row["label"], "source": row["source"], "quantity": channel,
         "unit": COMPARED[channel], "S": S, "D": recorded, "E": E, "E_pct": 100.0 * E / recorded if recorded else None,
         "u_num": u_num, "u_input": u_input, "u_model": u_model, "u_D": u_D, "u_val": u_val,
-        "doubts": [] if model == "k1k2" else list(serious(values.flags[at])),
+        "doubts": list(serious(values.flags[at])),
     }  # fmt: skip
     return line | {"verdict": agreement(line)}
 
