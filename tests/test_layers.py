@@ -55,6 +55,7 @@ ROOMS: tuple[str, ...] = (
 MAY: dict[str, set[str]] = {
     "bemt.commands.*": {"print", "files", "environment", "clock"},  # and nothing else prints
     "bemt.base.cache": {"files", "environment"},
+    "bemt.base.checkout": {"files"},
     "bemt.base.folders": {"environment"},
     "bemt.base.tables|bemt.base.toml_text": {"files"},
     "bemt.case|bemt.case.*": {"files"},
