@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bemt.base.errors import InputError
 from bemt.commands.cli import main
 from bemt.recordings.choice import Choice
 from bemt.recordings.load import document, import_file

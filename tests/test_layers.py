@@ -61,6 +61,7 @@ MAY: dict[str, set[str]] = {
     "bemt.rotors.population": {"files"},
     "bemt.readers|bemt.readers.*": {"files"},
     "bemt.recordings.adapt|bemt.recordings.archive|bemt.recordings.database|bemt.recordings.load": {"files"},
+    "bemt.recordings.cfd_options|bemt.recordings.cfd_run": {"files"},
     "bemt.formula.gather": {"files"},
     "bemt.sweep.grid.*|bemt.sweep.store|bemt.validate.folder": {"files"},
     "bemt.sweep.batch": {"files", "environment"},

@@ -38,7 +38,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--kv", type=float, metavar="KV", help="speed constant of the motor; also writes drive.toml [rev/min/V]"
     )
     parser.add_argument("--cells", type=_options.positive, metavar="S", help="with --kv: LiPo cells in series")
-    parser.add_argument("--campaign", action="store_true", help="also write cfd/campaign.toml: OpenFOAM runs on three grids")
+    parser.add_argument(
+        "--campaign", action="store_true", help="also write cfd/campaign.toml: OpenFOAM runs on three grids"
+    )
     parser.add_argument("--out", metavar="DIR", help="folder to write (default: named after the label)")
 
 

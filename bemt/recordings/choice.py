@@ -10,7 +10,6 @@ from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
 
 
-
 @dataclass(frozen=True)
 class Choice:
     """What only the user knows."""
