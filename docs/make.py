@@ -26,6 +26,7 @@ from bemt.diagnose.nuisance import PRIORS
 from bemt.drive.drive_file import DriveToml
 from bemt.drive.motor_file import MotorToml
 from bemt.drive.thrusters_result import ThrustersFile
+from bemt.readers.cfd_run import RunColumn, RunColumns, RunToml
 from bemt.readers.recording_toml import ColumnsTable, ColumnTable, RecordingToml
 from bemt.report import effects_list
 
@@ -95,6 +96,7 @@ CFD = [
 FILES: dict[str, tuple[type[Table], str]] = {
     "case": (CaseFile, "A propeller or fan: all inputs of the solver. Six lines are enough:"),
     "recording": (RecordingToml, "Next to a table of measurements, if its headings do not say enough:"),
+    "run": (RunToml, "One CFD run; `bemt import FILES --out run.toml` writes it, every command takes it:"),
     "drive": (DriveToml, "Next to a case.toml; `bemt drive` reads it, `bemt new 10x5 --kv 900 --cells 3` writes one:"),
     "motor": (MotorToml, "Measurements of a motor constant, for `bemt motor`:"),
     "thrusters": (ThrustersFile, "For `bemt thrusters`:"),
@@ -109,6 +111,9 @@ def tables(model: type[Table], name: str = "") -> Iterator[tuple[str, type[Table
     yield name, model
     if model is ColumnsTable:
         yield "columns.NAME", ColumnTable
+        return
+    if model is RunColumns:
+        yield "columns.NAME", RunColumn
         return
     for key in model.named():
         inner = model.inner(key)

@@ -127,7 +127,10 @@ def compare_run(
         "audit": [asdict(line) for line in faults_first(lines)], "audit_u_relative_known": known,
         "averaged": dict(imported.provenance.get("averaged", {})), "notes": list(dict.fromkeys(notes)),
     }  # fmt: skip
-    return document | {"sentence": _sentence(out), "next": _next(document, name, str(made.path))}
+    return document | {
+        "sentence": _sentence(out),
+        "next": _next(document, name, made.path.as_posix() if isinstance(case, Case) else os.fspath(case)),
+    }
 
 
 def _case(name: str) -> Case:
@@ -271,13 +274,19 @@ def text(document: Mapping[str, Any], details: bool = False) -> str:
         for line in document["audit"] if details else document["audit"][:7]:
             words = f"{line['topic']}: {line['finding']}" + (f": {line['consequence']}" if line["consequence"] else "")
             lead = f"  {line['status']:11s}"
-            lines.append(textwrap.fill(words, 120, initial_indent=lead, subsequent_indent=" " * len(lead)))
+            lines.append(_filled(words, lead, " " * len(lead)))
     notes = [n for n in document["notes"]] if details else document["notes"][:4]
     flags = dict.fromkeys(f for p in document["points"] for f in p["flags"])
-    lines += ["", *(f"! {n}" for n in notes), *(f"! BEMT: {f}" for f in (flags if details else list(flags)[:2]))]
-    lines += ["No cause is named from one point." if len(document["points"]) == 1 else "No cause is named here.",
-              f"Next: {document['next']}"]  # fmt: skip
+    said = [*(f"! {n}" for n in notes), *(f"! BEMT: {f}" for f in (flags if details else list(flags)[:2]))]
+    said.append("No cause is named from one point." if len(document["points"]) == 1 else "No cause is named here.")
+    lines += ["", *map(_filled, [*said, f"Next: {document['next']}"])]
     return "\n".join(lines)
+
+
+def _filled(words: str, lead: str = "", indent: str = "  ") -> str:
+    return textwrap.fill(
+        words, 120, initial_indent=lead, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
+    )
 
 
 def _pm(value: float, u: float) -> str:

@@ -104,7 +104,7 @@ class ReferenceTable(Table):
 
 
 class SetupTable(Table):
-    """[setup]: how the run was computed; nothing of it changes a number."""
+    """[setup]: how the run was computed; no load depends on it, only gci_pct sets an uncertainty."""
 
     program: str | None = entry("program")
     solver: str | None = entry("solver")

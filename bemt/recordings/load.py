@@ -325,7 +325,14 @@ def _file_text(file: Mapping[str, Any]) -> str:
 
 def text(found: Mapping[str, Any], wrote: str = "") -> str:
     """Lay a document out for a terminal, with what to do next with recordings of a rotor."""
-    lines = [_file_text(file) + "\n" for file in found["files"] if file["format"] != RUN or file["error"]]
+    own = {name for run in found["runs"] for name in run["files"]}
+    lines = [
+        f"{file['path']}: {file['format']} ({file['kind']}), {file['rows']} rows"
+        if file["path"] in own
+        else _file_text(file) + "\n"
+        for file in found["files"]
+        if file["format"] != RUN or file["error"]
+    ]
     lines += [cfd_run.run_text(run) + "\n" for run in found["runs"]]
     if found["to_do"]:
         steps = "\n".join(f"  ! {line}" for line in found["to_do"].splitlines())
