@@ -82,3 +82,18 @@ def test_repeats_that_differ_as_no_stand_does_name_nothing() -> None:
     reference = replace(from_series(plain, base), reference=True)
     answer = chain.diagnose([test, reference], [base], nulls=200)
     assert answer.decision.effects == () and any("not recorded" in f for f in answer.problem.findings)
+
+
+def test_an_exact_relation_names_the_fault_that_the_loads_leave_open(tmp_path: Path) -> None:
+    """Power is torque times speed: a speed of 7/6 was called inconsistent, and no unit error explained it."""
+    rng = np.random.default_rng(0)
+    n = np.linspace(65.0, 150.0, 12)
+    T, Q = 0.105 * 1.2 * n**2 * 0.254**4, 0.0075 * 1.2 * n**2 * 0.254**5
+    rows = zip(
+        70.0 * n, *(v * (1.0 + 0.003 * rng.standard_normal(12)) for v in (T, Q, 2.0 * np.pi * n * Q)), strict=True
+    )
+    text = "".join(",".join(f"{x:.7g}" for x in row) + "\n" for row in rows)
+    (tmp_path / "log.csv").write_text("rpm,thrust_N,torque_Nm,power_W\n" + text, encoding="utf-8")
+    known = load_case(CASES / "prop_10x5")
+    said = chain.diagnose([load(str(tmp_path / "log.csv"), known)], [known], nulls=100).said
+    assert (said.verdict, said.effects) == ("sensor", ("rpm_scale",)) and "must be 1" in said.why
