@@ -10,12 +10,13 @@ import pytest
 from diagnosing import case, left_out, points, recording
 
 from bemt.dataset import Dataset
-from bemt.diagnose import chain, noise
+from bemt.diagnose import chain
 from bemt.diagnose.assemble import build
 from bemt.diagnose.load import load
 from bemt.diagnose.record import from_series
 from bemt.diagnose.repeats import conditions, noise_sizes, projected_out, spread_sizes
 from bemt.effects.ground_effect import GroundEffect
+from bemt.gaussian.whitening import conditional, whitener
 from bemt.rotors.latents import AsBuilt
 
 
@@ -136,7 +137,7 @@ def test_readings_given_the_others_are_as_likely_as_all() -> None:
     root = rng.standard_normal((12, 12))
     C, u, mine = root @ root.T + np.eye(12), np.full(12, 0.1), np.arange(12) % 3 > 0
     r, s = rng.standard_normal(12), np.where(mine, rng.standard_normal(12), 0.0)
-    whole, part = noise.whitener(C, u), noise.conditional(C, u, mine)
+    whole, part = whitener(C, u), conditional(C, u, mine)
     assert part.log_det == pytest.approx(whole.log_det)
     for change in (0.0 * s, s):
         left = whole(r - change)

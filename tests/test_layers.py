@@ -26,6 +26,7 @@ COMPILED = "bem.kernel|bem.residual|bem.vecmath"  # the only files with numba at
 # A room is patterns of module names below `bemt.` (`|` joins two); the first that matches holds.
 ROOMS: tuple[str, ...] = (
     "base|base.*",
+    "gaussian|gaussian.*",
     "air",
     "coefficients",
     "dataset|dataset.*",

@@ -169,6 +169,29 @@ def test_electrical_beside_optical_speed() -> None:
     assert "divide by 7" in finding.correction and "one speed over the other is 0.1429" in finding.evidence
 
 
+@pytest.mark.parametrize(("true", "set_"), [(6, 7), (7, 6), (3, 2), (12, 11)])
+def test_two_speeds_whose_ratio_is_that_of_two_windings_name_the_count(true: int, set_: int) -> None:
+    """A controller that is set to another motor's pole pairs: no load says so, the optical counter does."""
+    values = stand()
+    speed = values.pop("rpm")
+    seen = {"optical_rpm": speed, "electrical_rpm": speed * true / set_ * (1 + 1e-3 * np.sin(np.arange(15)))}
+    (finding,) = check(recording(values | seen), diameter_m=10 * INCH)
+    assert finding.severity == "error" and finding.id == "rpm_ratio", finding
+    assert (
+        f"set to {set_} instead of {true}" in finding.correction
+        or f"set to {true} instead of {set_}" in finding.correction
+    )
+
+
+def test_loads_that_are_off_by_any_factor_are_no_miscounted_speed() -> None:
+    """Small numbers have a ratio near anything: only a second speed is evidence of one."""
+    for factor in (2.0, 1.5, 0.6):
+        values = stand()
+        values["thrust_N"] = values["thrust_N"] * factor
+        values["torque_Nm"] = values["torque_Nm"] * factor
+        assert not any("instead of" in f.correction for f in check(recording(values), diameter_m=10 * INCH))
+
+
 @pytest.mark.parametrize("factor", [25.4, 1 / 25.4, 1 / INCH, 1e3])
 def test_a_diameter_in_another_unit(factor: float) -> None:
     found = check(recording(stand()), diameter_m=10 * INCH * factor)

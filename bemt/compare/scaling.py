@@ -23,6 +23,8 @@ from bemt.compare import smooth_change as fits
 from bemt.compare.matched import LOADS, POWER_OF_SPEED, MatchedChannel
 from bemt.compare.scaling_laws import FAMILY, LAWS, ScalingLaw, law
 from bemt.compare.smooth_change import Scatter
+from bemt.gaussian.evidence import LinearTerms, log_sum, shares
+from bemt.gaussian.whitening import log_density, whitener
 
 Array = NDArray[np.float64]
 
@@ -192,17 +194,12 @@ def _by_poles(
     terms = []
     for ratio in ratios:
         there = {k: _at_speed(c, 1.0 / ratio.ratio) for k, c in channels.items()}
-        each = sum(_likelihood(fits.covariance(c, scatter[k]), c.y) for k, c in there.items())
+        each = sum(log_density(fits.covariance(c, scatter[k]), c.y - c.y.mean(), False) for k, c in there.items())
         terms.append(each + math.log(ratio.weight))
     odd = speeds is not None and abs(speeds[0]) > _ODD_SPEED
     ways = sum(r.weight for r in (ratios if odd else _RATIOS))
     best = ratios[int(np.argmax(terms))]
-    return float(np.logaddexp.reduce(terms)) - math.log(ways), -math.log(best.ratio)
-
-
-def _likelihood(K: Array, y: Array) -> float:
-    """Log likelihood but for the constant that all explanations share."""
-    return fits.log_likelihood(K, y - y.mean()) + 0.5 * y.size * math.log(2.0 * math.pi)
+    return float(log_sum(terms)) - math.log(ways), -math.log(best.ratio)
 
 
 def weigh(
@@ -215,14 +212,12 @@ def weigh(
     """Evidence of every explanation; ``density``: how well the ratio of the densities is known [1]."""
     found = [_weighed(channels, scatter, kinds, density, speeds) for scatter in scatters]
     names = list(found[0][0])
-    score = {k: float(np.logaddexp.reduce([z[k] for z, _ in found])) for k in names}
+    score = {k: float(log_sum([z[k] for z, _ in found])) for k in names}
     size = {k: max(found, key=lambda f: f[0][k])[1][k] for k in names if k in found[0][1]}
     listed = [k for k in score if k not in _PRIOR]
     log_prior = {k: math.log(_PRIOR.get(k, (1.0 - sum(_PRIOR.values())) / max(len(listed), 1))) for k in score}
-    top = max(score[k] + log_prior[k] for k in score)
-    weight = {k: math.exp(score[k] + log_prior[k] - top) for k in score}
-    total = sum(weight.values())
-    return dict(sorted(((k, w / total) for k, w in weight.items()), key=lambda kv: -kv[1])), size
+    share = shares([score[k] + log_prior[k] for k in score]).tolist()
+    return dict(sorted(zip(score, share, strict=True), key=lambda kv: -kv[1])), size
 
 
 def _weighed(
@@ -233,20 +228,16 @@ def _weighed(
     speeds: tuple[float, float] | None,
 ) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
     """Log evidence of every explanation at one setting of the scatter, and sizes."""
-    from scipy.linalg import block_diag, cholesky, solve_triangular
+    from scipy.linalg import block_diag
 
     volts = _volts(channels)
     if volts:  # a condition then, no answer
         channels = {k: c for k, c in channels.items() if k != "voltage"}
     base = {k: fits.covariance(c, scatter[k]) for k, c in channels.items()}
     y = np.concatenate([c.y - c.y.mean() for c in channels.values()])
-    L = cholesky(block_diag(*base.values()), lower=True)
-
-    def white(v: Array) -> Array:
-        return np.asarray(solve_triangular(L, v, lower=True, check_finite=False))
-
+    white = whitener(block_diag(*base.values()))
     r = white(y)
-    none = -0.5 * float(r @ r) - float(np.log(np.diag(L)).sum())
+    none = -0.5 * float(r @ r) - white.log_det
     score: dict[str, float] = {NONE: none}
     size: dict[str, tuple[float, float]] = {}
     moving = any(c.advance_moves() for c in channels.values())
@@ -261,7 +252,7 @@ def _weighed(
                     z, value, error = _evidence(row, A, r, s)
                     found.append((z + weight, value, error))
         if found:
-            score[row.id] = none + float(np.logaddexp.reduce([z for z, _, _ in found])) + 0.5 * float(r @ r)
+            score[row.id] = none + float(log_sum([z for z, _, _ in found]))
             best = max(found, key=lambda f: f[0])
             size[row.id] = best[1], best[2]
     if "rpm_scale" in score:
@@ -289,11 +280,11 @@ def _shifted(
     terms = [0.5 * float(r @ r) - 0.5 * float(np.sum((r - white(m)) ** 2)) + math.log(w) for w, m in known]
     mean = known[int(np.argmax(terms))][1]
     total = math.log(sum(w for w, _ in known))
-    return none + float(np.logaddexp.reduce(terms)) - total, float(mean[np.argmax(np.abs(mean))])
+    return none + float(log_sum(terms)) - total, float(mean[np.argmax(np.abs(mean))])
 
 
 def _evidence(row: ScalingLaw, A: Array, r: Array, size: float) -> tuple[float, float, float]:
-    """Log evidence, first coefficient and its error.
+    """Log evidence over that of none, first coefficient and its error.
 
     Terms of weight 1 or more stand on their own; the others are shares of what these turn out to be.
     """
@@ -301,17 +292,10 @@ def _evidence(row: ScalingLaw, A: Array, r: Array, size: float) -> tuple[float, 
     b = np.where(free, size, 0.0)
     for _ in range(3):
         sd = np.where(free, size, np.maximum(float(np.abs(b[free]).max()), 1e-5))
-        z, b, error = _linear(A, r, sd)
-    return z, float(b[0]), error
-
-
-def _linear(A: Array, r: Array, sd: Array) -> tuple[float, Array, float]:
-    """Log evidence, coefficients and the error of the first, of r = A b + e with b ~ N(0, sd^2), e ~ N(0, 1)."""
-    G = A.T @ A + np.diag(1.0 / sd**2)
-    b = np.asarray(np.linalg.solve(G, A.T @ r), dtype=float)
-    _, log_det = np.linalg.slogdet(G)
-    z = -0.5 * float(r @ r) + 0.5 * float(b @ (A.T @ r)) - 0.5 * float(log_det) - float(np.log(sd).sum())
-    return z, b, math.sqrt(float(np.linalg.inv(G)[0, 0]))
+        terms = LinearTerms.of(A * sd)
+        mean, error = terms.posterior(r)
+        b = sd * mean
+    return float(terms.gain(r)), float(b[0]), float(sd[0] * error[0])
 
 
 def _any_change(
@@ -326,9 +310,9 @@ def _any_change(
         total = none
         for name, c in channels.items():
             y, free = c.y - c.y.mean(), size**2 * fits.free_change(c, level, bend, local)
-            total += fits.log_likelihood(base[name] + free, y) - fits.log_likelihood(base[name], y)
+            total += log_density(base[name] + free, y) - log_density(base[name], y)
         found.append(total)
-    return float(np.logaddexp.reduce(found)) - math.log(len(found))
+    return float(log_sum(found)) - math.log(len(found))
 
 
 def judge(probability: Mapping[str, float], size: Mapping[str, tuple[float, float]], largest: float = 0.0) -> Judgement:

@@ -21,6 +21,8 @@ from numpy.typing import NDArray
 
 from bemt.compare.matched import LOADS, MARGIN, MatchedChannel, in_common, matched, taken
 from bemt.compare.stand_run import StandRun
+from bemt.gaussian.kernels import alike, smooth
+from bemt.gaussian.whitening import leave_one_out, log_density, whitener
 
 Array = NDArray[np.float64]
 
@@ -59,20 +61,18 @@ def unit_coordinates(c: MatchedChannel) -> Array:
 
 def smooth_kernel(c: MatchedChannel, shorter: float = 1.0) -> Array:
     """Squared-exponential kernel of unit variance over the coordinates, (N, N)."""
-    z = unit_coordinates(c) * shorter
-    return np.asarray(np.exp(-0.5 * ((z[:, None, :] - z[None, :, :]) ** 2).sum(axis=2)))
+    return smooth(*((z, 1.0 / shorter) for z in unit_coordinates(c).T))
 
 
 def covariance(c: MatchedChannel, s: Scatter) -> Array:
     """Covariance of y where nothing was changed: curve, sessions, zeros, scatter, (N, N)."""
     z = unit_coordinates(c)
     K = smooth_kernel(c)
-    same = (c.run[:, None] == c.run[None, :]).astype(float)
+    same, side = (alike(label).astype(float) for label in (c.run, c.second))
     # a coefficient changes little with speed (Reynolds, Mach), anyhow with advance; the drive changes anyhow
     steep = _STEEP**2 if c.name in LOADS else 4.0
     wide = 100.0 + steep * np.outer(z[:, 0], z[:, 0]) + 4.0 * np.outer(z[:, 1], z[:, 1])
     wide += 4.0 * np.outer(z[:, 1] ** 2, z[:, 1] ** 2)
-    side = (c.second[:, None] == c.second[None, :]).astype(float)
     # the level is the stand's, set up once per recording; half of its variance goes with the single run
     level = c.session**2 * (0.7 * side + 0.3 * same + _BEND**2 * same * K)
     shift = c.floor * (_ZERO if c.shift is None else np.maximum(c.shift, _ZERO))
@@ -101,15 +101,6 @@ def free_change(c: MatchedChannel, level: float = 1.0, bend: float = 0.1, local:
     return np.asarray(change_of_any_kind(c, level, bend, local) * np.outer(b, b))
 
 
-def log_likelihood(K: Array, y: Array) -> float:
-    """Logarithm of the Gaussian density (Rasmussen and Williams, eq. 2.30)."""
-    from scipy.linalg import cho_solve, cholesky
-
-    L = cholesky(K, lower=True, check_finite=False)
-    alpha = cho_solve((L, True), y, check_finite=False)
-    return float(-0.5 * y @ alpha - np.log(np.diag(L)).sum() - 0.5 * y.size * math.log(2.0 * math.pi))
-
-
 def steady_change(c: MatchedChannel) -> Array:
     """Covariance of a change by one factor, or nearly so, between the recordings, (N, N)."""
     z, b = unit_coordinates(c), c.second.astype(float)
@@ -131,21 +122,19 @@ def scatter_of(c: MatchedChannel, change: Array | None = None) -> tuple[Scatter,
         for name, values in ways.items():
             for value in values:
                 tried = replace(best, **{name: value})
-                z = log_likelihood(covariance(c, tried) + change, y)
+                z = log_density(covariance(c, tried) + change, y)
                 if z > score:
                     best, score = tried, z
     return best, score
 
 
 def without_strays(c: MatchedChannel) -> tuple[MatchedChannel, int]:
-    """Leave out readings that all others contradict (left-one-out, Rasmussen and Williams, eq. 5.12)."""
+    """Leave out readings that all others contradict (each predicted by the rest)."""
     n = 0
     for _ in range(3):
         s, _ = scatter_of(c)
         y = c.y - c.y.mean()
-        inverse = np.linalg.inv(covariance(c, s) + free_change(c))
-        z = (inverse @ y) / np.sqrt(np.diag(inverse))
-        worst = np.abs(z) > _FAR
+        worst = np.abs(leave_one_out(covariance(c, s) + free_change(c), y)) > _FAR
         if not worst.any() or worst.sum() > max(1, 0.1 * y.size) or y.size - worst.sum() < 6:
             break
         n += int(worst.sum())
@@ -158,11 +147,8 @@ def without_strays(c: MatchedChannel) -> tuple[MatchedChannel, int]:
 
 def ratio_of(c: MatchedChannel, s: Scatter) -> dict[str, Any]:
     """Ratio of B to A at equal speed."""
-    from scipy.linalg import cho_factor, cho_solve
-
-    free, y = free_change(c), c.y - c.y.mean()
-    C = covariance(c, s) + free
-    factor = cho_factor(C, lower=True)
+    y = c.y - c.y.mean()
+    white = whitener(covariance(c, s) + free_change(c))
     low, high = c.common()
     apart = low > high
     if apart:
@@ -172,8 +158,9 @@ def ratio_of(c: MatchedChannel, s: Scatter) -> dict[str, Any]:
     b = c.second.astype(float)
     shape = change_of_any_kind(c)
     cross = shape[at] * b[None, :]
-    d = cross @ cho_solve(factor, y)
-    cov = shape[np.ix_(at, at)] - cross @ cho_solve(factor, cross.T)
+    d = cross @ white.solve(y)
+    known = white(cross.T)
+    cov = shape[np.ix_(at, at)] - known.T @ known
     n = at.size
     weight = np.full(n, 1.0 / n)
     mean, sd = float(weight @ d), math.sqrt(max(float(weight @ cov @ weight), 0.0))

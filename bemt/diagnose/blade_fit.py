@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from bemt.diagnose import noise
 from bemt.diagnose.blade import AsLabelled, CalibratedBlade
+from bemt.gaussian.whitening import log_density
 from bemt.rotors.conditioning import condition, tangents
 from bemt.rotors.latents import NAMES, UNITS, AsBuilt, Prior
 
@@ -45,12 +46,7 @@ def _misfit(C: Array, r: Array) -> float:
 
 def _likeliest(tables: Sequence[Array], r: Array, B: Array) -> int:
     """Covariance under which a residual is likeliest when the blade is free."""
-    scores = []
-    for C in tables:
-        L = np.linalg.cholesky(C + B @ B.T)
-        w = np.linalg.solve(L, r)
-        scores.append(-0.5 * float(w @ w) - float(np.sum(np.log(np.diag(L)))))
-    return int(np.argmax(scores))
+    return int(np.argmax([log_density(C + B @ B.T, r, constant=False) for C in tables]))
 
 
 def calibrated(problem: Problem, prior: Prior) -> tuple[CalibratedBlade | None, str, str]:

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from bemt.diagnose import noise
 from bemt.diagnose.fit import fit, form_covariance
+from bemt.gaussian.evidence import shares
+from bemt.gaussian.whitening import whitener
 
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence
@@ -79,14 +81,14 @@ def held_out(
         test, train = member == b, member != b
         if not train.any():
             continue
-        white = noise.whitener((C + own)[np.ix_(train, train)], problem.u[train])
+        white = whitener((C + own)[np.ix_(train, train)], problem.u[train])
         w = white(np.column_stack([r[train], S[train]]))
         gain = w[:, 1:].T @ w[:, 0] - 0.5 * np.sum(w[:, 1:] ** 2, axis=0) + log_w
-        p = _normal(gain) if gain.size else np.zeros(0)
+        p = shares(gain) if gain.size else np.zeros(0)
         expected = S @ p if gain.size else np.zeros_like(r)
         cross = (systematic + own)[np.ix_(test, train)]
         after[test] += expected[test] + cross @ white.solve((r - expected)[train])
-        white = noise.whitener((C + K)[np.ix_(train, train)], problem.u[train])
+        white = whitener((C + K)[np.ix_(train, train)], problem.u[train])
         smooth_part[test] += (systematic + K)[np.ix_(test, train)] @ white.solve(r[train])
     return words, after, smooth_part
 
@@ -110,8 +112,3 @@ def _columns(found: Evidence, what: Explanation) -> tuple[Array, Array]:
             rows.append(a.signatures[:, k] + b.signatures[:, m] + interaction)
             weight.append(np.log(a.weight[k] * b.weight[m]))
     return np.stack(rows, axis=1), np.array(weight)
-
-
-def _normal(log_p: Array) -> Array:
-    p = np.exp(log_p - log_p.max())
-    return np.asarray(p / p.sum())

@@ -20,12 +20,15 @@ from bemt.diagnose import form, noise, prior
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
 from bemt.diagnose.form import Forms
 from bemt.diagnose.pair_evidence import best_pair, every_pair, price, solve_together
-from bemt.diagnose.state import State, log_mean
+from bemt.diagnose.state import State
+from bemt.gaussian.evidence import log_sum, shares
+from bemt.gaussian.whitening import conditional
 
 if TYPE_CHECKING:
-    from bemt.diagnose.noise import Conditional, Hyper, Rival, Whitener
+    from bemt.diagnose.noise import Hyper, Rival
     from bemt.diagnose.problem import Problem
     from bemt.diagnose.signatures import Candidate
+    from bemt.gaussian.whitening import Conditional, Whitener
 
 __all__ = ["Evidence", "weigh"]
 
@@ -89,10 +92,9 @@ class Evidence:
 
     def log_bayes(self, what: Explanation) -> float:
         """Natural logarithm of the odds of the readings under an explanation over "none"."""
-        top = np.array([s.log_z[NONE] for s in self.states])
-        mine = np.array([s.log_z.get(what, -np.inf) for s in self.states])
         w = np.log([s.hyper.weight for s in self.states])
-        return float(log_mean(mine, w) - log_mean(top, w))
+        mine, none = ([s.log_z.get(k, -np.inf) for s in self.states] for k in (what, NONE))
+        return float(log_sum(mine, w) - log_sum(none, w))
 
 
 def singles(state: State, R: Array, spans: dict[str, slice], log_w: Array) -> dict[str, Array]:
@@ -100,7 +102,7 @@ def singles(state: State, R: Array, spans: dict[str, slice], log_w: Array) -> di
     out = {}
     for name, span in spans.items():
         gain = state.gains(name, span, R)
-        out[name] = log_mean(gain, np.broadcast_to(log_w[span][:, None], gain.shape), axis=0)
+        out[name] = log_sum(gain, log_w[span][:, None], axis=0)
     return out
 
 
@@ -142,7 +144,7 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
         gains = unknown(noise.unlike(C, problem.u, rivals), problem.residual)  # not kept: the largest arrays there are
         if gains.size:
             state.best_rival = rivals[int(np.argmax(gains))].name
-            state.log_z[UNKNOWN] = state.log_z[NONE] + float(log_mean(gains, np.full(gains.size, -np.log(gains.size))))
+            state.log_z[UNKNOWN] = state.log_z[NONE] + float(log_sum(gains)) - float(np.log(gains.size))
         else:
             state.log_z[UNKNOWN] = state.log_z[NONE]
         if pairs:
@@ -178,7 +180,7 @@ def _stacked(problem: Problem, candidates: Sequence[Candidate]) -> tuple[dict[st
 def bare(problem: Problem, candidates: Sequence[Candidate], hyper: Hyper) -> Evidence:
     """Whitened signatures under one covariance, without weighing: all that a plan needs."""
     spans, S, log_w = _stacked(problem, candidates)
-    white = noise.conditional(noise.covariance(problem, hyper), problem.u, problem.free)
+    white = conditional(noise.covariance(problem, hyper), problem.u, problem.free)
     Sw = white.changes(S)
     state = State(hyper, white, white(problem.residual), Sw, 0.5 * np.sum(Sw * Sw, axis=0))
     return Evidence(problem, tuple(candidates), (state,), {}, spans, log_w)
@@ -231,7 +233,7 @@ class _Table:
 
     def state(self, h: Hyper, C: Array, least: float = -np.inf) -> State:
         """Whitened readings and the evidence of none and, unless all must be below a score, of every single effect."""
-        white = noise.conditional(C, self.problem.u, self.problem.free)
+        white = conditional(C, self.problem.u, self.problem.free)
         r = white(self.residual)
         reach = -white.log_det - float(white.misfit(self.residual))
         none = reach - 0.5 * float(r @ r)
@@ -316,6 +318,5 @@ def _effects(what: Explanation) -> int:
 def _posterior(states: Sequence[State], before: dict[Explanation, float]) -> dict[Explanation, float]:
     names = list(states[0].log_z)
     table = np.array([[s.log_z[name] + np.log(s.hyper.weight) for s in states] for name in names])
-    log_post = log_mean(table, np.zeros_like(table), axis=1) + np.array([before[name] for name in names])
-    p = np.exp(log_post - log_post.max())
-    return {name: float(v) for name, v in zip(names, p / p.sum(), strict=True)}
+    p = shares(log_sum(table, axis=1) + [before[name] for name in names])
+    return dict(zip(names, p.tolist(), strict=True))

@@ -14,7 +14,8 @@ from bemt.diagnose.evidence import unknown
 from bemt.diagnose.explanation import Explanation
 from bemt.diagnose.form import FORM, form_modes
 from bemt.diagnose.signatures import effect_of
-from bemt.diagnose.state import log_mean
+from bemt.gaussian.evidence import log_sum
+from bemt.gaussian.whitening import whitener
 
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence
@@ -150,7 +151,7 @@ def refined(found: Evidence, best: Fit, share: float = 0.9) -> tuple[Fit, dict[s
     # what the form does to the scale of a law looks like its parameter: no fit shows it, so its prior size holds
     C = noise.covariance(problem, found.states[0].hyper)
     C = C + form_covariance(found, best, _FORM_SIZE) + _scale(found, best)
-    white = noise.whitener(C, problem.u)
+    white = whitener(C, problem.u)
     settings = [dict(s) for s in best.settings]
     low, high = np.array([_ends(found, best.ids[k], p) for k, p in where]).reshape(-1, 2).T
     # as wide as the prior: uniform, or heavy-tailed, whose standard deviation is root 3 of its scale
@@ -223,7 +224,7 @@ def _by_state(
     for q, w in zip(states, np.exp(log_w - log_w.max()), strict=True):
         if w < _RARE:
             continue
-        white = noise.whitener(noise.covariance(found.problem, q.hyper) + extra, found.problem.u)
+        white = whitener(noise.covariance(found.problem, q.hyper) + extra, found.problem.u)
         J = white(tangent)
         # of the readings alone, but for a prior so wide that it only keeps directions that they do not see finite
         H = J.T @ J + np.diag(0.1 / span**2)
@@ -323,7 +324,7 @@ def smooth(found: Evidence, best: Fit) -> Array:
     problem, hyper = found.problem, found.states[0].hyper
     C = noise.covariance(problem, hyper) + form_covariance(found, best)
     systematic = C - hyper.scale**2 * noise.noise(problem, hyper.ar)
-    return np.asarray(systematic @ noise.whitener(C, problem.u).solve(problem.residual - best.signature))
+    return np.asarray(systematic @ whitener(C, problem.u).solve(problem.residual - best.signature))
 
 
 def left_over(found: Evidence, best: Fit) -> float:
@@ -331,4 +332,4 @@ def left_over(found: Evidence, best: Fit) -> float:
     problem = found.problem
     C = noise.covariance(problem, found.states[0].hyper) + form_covariance(found, best)
     gains = unknown(noise.unlike(C, problem.u, found.rivals), problem.residual - best.signature)
-    return float(log_mean(gains, np.full(gains.size, -np.log(gains.size)))) if gains.size else float("-inf")
+    return float(log_sum(gains)) - float(np.log(gains.size)) if gains.size else float("-inf")

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from bemt import effects
 from bemt.diagnose import noise
+from bemt.gaussian.evidence import LinearTerms
 
 if TYPE_CHECKING:
-    from bemt.diagnose.noise import Conditional
     from bemt.diagnose.problem import Problem
     from bemt.diagnose.signatures import Candidate
+    from bemt.gaussian.whitening import Conditional
 
 __all__ = ["FORM", "Form", "Forms", "columns", "form_modes"]
 
@@ -27,37 +28,21 @@ differ by that, of some by half [1]."""
 
 
 @dataclass(frozen=True, eq=False)
-class Form:
+class Form(LinearTerms):
     """Error of the form of one effect, whitened: published laws of one effect differ by a share of its own size.
-
-    Adds B B^T to the whitened covariance; everything follows from the projection of :meth:`project` (Woodbury).
 
     Attributes
     ----------
-    B : (M, q) float
-        Whitened modes, none for instruments, whose laws are exact [1].
-    root : (q, q) float
-        Cholesky factor of 1 + B^T B [1].
     size : float
-        Standard deviation of the form, share of the effect's size [1].
+        Standard deviation of the form, share of the effect's size; columns for instruments: none, they are exact [1].
     """
 
-    B: Array
-    root: Array
     size: float = 0.0
-
-    def project(self, x: Array) -> Array:
-        """Part of whitened vectors (M,) or (M, n) that the form may explain, (q,) or (q, n)."""
-        from scipy.linalg import solve_triangular
-
-        if not self.B.shape[1]:
-            return np.zeros((0, *x.shape[1:]))
-        return np.asarray(solve_triangular(self.root, self.B.T @ x, lower=True, check_finite=False))
 
     @property
     def half_log_det(self) -> float:
-        """Half the logarithm of the determinant of 1 + B^T B, less that of the prior weight of the size."""
-        return float(np.sum(np.log(np.diag(self.root)))) - float(np.log(FORM.get(self.size, 1.0)))
+        """Half the logarithm of the determinant of 1 + B B^T, less that of the prior weight of the size."""
+        return super().half_log_det - float(np.log(FORM.get(self.size, 1.0)))
 
 
 @dataclass(frozen=True, eq=False)

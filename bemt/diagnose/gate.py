@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from bemt.diagnose import evidence as ev
 from bemt.diagnose import noise, prior
 from bemt.diagnose.explanation import UNKNOWN, Explanation
-from bemt.diagnose.state import log_mean
+from bemt.gaussian.evidence import log_sum
+from bemt.gaussian.whitening import whitener
 
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence
@@ -33,7 +34,7 @@ def p_value(found: Evidence, nulls: int = NULLS, seed: int = 0) -> float:
     rng = np.random.default_rng(seed)
     source = found.states[0]
     problem, M = found.problem, found.problem.y.size
-    factor = noise.whitener(noise.covariance(problem, source.hyper), problem.u).factor
+    factor = whitener(noise.covariance(problem, source.hyper), problem.u).factor
     draws = factor @ rng.standard_normal((M, nulls))
     return float((1 + np.sum(statistic(found, draws) >= float(statistic(found, found.problem.residual[:, None])[0])))
                  / (1 + nulls))  # fmt: skip
@@ -49,10 +50,7 @@ def statistic(found: Evidence, residuals: Array) -> Array:
         gains = [g + before[Explanation.of(name)] for name, g in ev.singles(s, r, found.spans, found.log_w).items()]
         if s.rivals:
             rival = ev.unknown(s.rivals, residuals)
-            share = np.full(rival.shape, -np.log(rival.shape[0]))
-            gains.append(log_mean(rival, share, axis=0) + before[UNKNOWN])
-        stack = np.array(gains)
-        some.append(log_mean(stack, np.zeros_like(stack), axis=0) + w)
+            gains.append(log_sum(rival, axis=0) - np.log(len(rival)) + before[UNKNOWN])
+        some.append(log_sum(gains, axis=0) + w)
         none.append(w)
-    a, b = np.array(some), np.array(none)
-    return np.asarray(log_mean(a, np.zeros_like(a), axis=0) - log_mean(b, np.zeros_like(b), axis=0))
+    return np.asarray(log_sum(some, axis=0) - log_sum(none, axis=0))

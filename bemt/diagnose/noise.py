@@ -17,13 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.diagnose.record import CHANNELS
+from bemt.gaussian.kernels import alike, modes, smooth
+from bemt.gaussian.whitening import Conditional, Whitener, conditional, whitener
 
 if TYPE_CHECKING:
     from bemt.diagnose.problem import Problem
     from bemt.effects.base import Effect
 
-__all__ = ["Conditional", "Hyper", "Rival", "Whitener", "conditional", "discrepancy", "hypers", "rivals", "unlike",
-           "whitener"]  # fmt: skip
+__all__ = ["Hyper", "Rival", "discrepancy", "hypers", "rivals", "unlike"]
 
 Array = NDArray[np.float64]
 
@@ -138,7 +139,7 @@ def noise(problem: Problem, ar: float) -> Array:
         return np.diag(problem.u**2)
     run, place = in_time(problem.covariates)
     p, c = problem.point, problem.channel
-    same = (run[p][:, None] == run[p][None, :]) & (c[:, None] == c[None, :])
+    same = alike(run[p], c)
     correlation = np.where(same, ar ** np.abs(place[p][:, None] - place[p][None, :]), 0.0)
     correlation = (1.0 - _WHITE) * correlation + _WHITE * np.eye(p.size)
     return np.asarray(correlation * problem.u[:, None] * problem.u[None, :])
@@ -149,111 +150,11 @@ def discrepancy(problem: Problem) -> Array:
     J = problem.covariates["J"][problem.point]
     n = np.log(problem.covariates["rpm"][problem.point])
     spread = max(float(np.ptp(J)), 0.6)
-    apart = ((J[:, None] - J[None, :]) / spread) ** 2
-    kernel = (1.0 - _MODEL_FINE) * np.exp(-0.5 * apart / _LENGTH_J**2) + _MODEL_FINE * np.exp(
-        -0.5 * apart / _LENGTH_FINE**2
-    )
-    kernel *= 1.0 - _MODEL_RPM + _MODEL_RPM * np.exp(-0.5 * ((n[:, None] - n[None, :]) / _LENGTH_RPM) ** 2)
-    same = (problem.channel[:, None] == problem.channel[None, :]) & (problem.rotor[:, None] == problem.rotor[None, :])
+    kernel = (1.0 - _MODEL_FINE) * smooth((J, spread * _LENGTH_J)) + _MODEL_FINE * smooth((J, spread * _LENGTH_FINE))
+    kernel *= 1.0 - _MODEL_RPM + _MODEL_RPM * smooth((n, _LENGTH_RPM))
+    same = alike(problem.channel, problem.rotor)
     load = (problem.channel < 2)[:, None] & (problem.channel < 2)[None, :]
     return np.asarray(np.where(same & load, kernel, 0.0) * problem.scale[:, None] * problem.scale[None, :])
-
-
-@dataclass(frozen=True, eq=False)
-class Whitener:
-    """Cholesky factor of one covariance.
-
-    Attributes
-    ----------
-    factor : (M, M) float
-        Lower triangular [units of the readings].
-    log_det : float
-        Sum of the logarithms of its diagonal [1].
-    """
-
-    factor: Array
-    log_det: float
-
-    def __call__(self, vectors: Array) -> Array:
-        """Whiten vectors or columns."""
-        from scipy.linalg import solve_triangular
-
-        return np.asarray(solve_triangular(self.factor, vectors, lower=True, check_finite=False))
-
-    def solve(self, vectors: Array) -> Array:
-        """Inverse of the covariance times vectors or columns."""
-        from scipy.linalg import solve_triangular
-
-        return np.asarray(solve_triangular(self.factor, self(vectors), lower=True, trans="T", check_finite=False))
-
-
-def whitener(covariance: Array, u: Array) -> Whitener:
-    """Factor a covariance."""
-    jitter = np.diag((1e-4 * u) ** 2)
-    factor = np.asarray(np.linalg.cholesky(covariance + jitter), dtype=float)
-    return Whitener(factor, float(np.sum(np.log(np.diag(factor)))))
-
-
-@dataclass(frozen=True, eq=False)
-class Conditional:
-    """Some readings given all others: causes change only these, so the others enter once and not with every cause.
-
-    Attributes
-    ----------
-    rows, others : (N,), (M - N,) int
-        The readings, and those that are given.
-    gain : (N, M - N) float
-        Expected change of the readings for one of the others [unit/unit].
-    covariance : (N, N) float
-        Of what remains [square of the units of the readings].
-    white : Whitener
-        Its factor.
-    outside : Whitener
-        Factor of the covariance of the others.
-    """
-
-    rows: NDArray[np.intp]
-    others: NDArray[np.intp]
-    gain: Array
-    covariance: Array
-    white: Whitener
-    outside: Whitener
-
-    @property
-    def log_det(self) -> float:
-        """Sum of the logarithms of the diagonal of the factor of all readings [1]."""
-        return self.white.log_det + self.outside.log_det
-
-    def rest(self, vectors: Array) -> Array:
-        """What the others leave of vectors or columns."""
-        return np.asarray(vectors[self.rows] - self.gain @ vectors[self.others])
-
-    def __call__(self, vectors: Array) -> Array:
-        """Whiten what the others leave of vectors or columns."""
-        return self.white(self.rest(vectors))
-
-    def changes(self, vectors: Array) -> Array:
-        """Whiten vectors or columns that are zero but in these rows."""
-        return self.white(vectors[self.rows])
-
-    def misfit(self, vectors: Array) -> Array:
-        """Half the squared whitened length of the others."""
-        w = self.outside(vectors[self.others])
-        return np.asarray(0.5 * np.sum(w * w, axis=0))
-
-
-def conditional(covariance: Array, u: Array, mine: NDArray[np.bool_]) -> Conditional:
-    """Condition some readings on the others, jointly normal."""
-    from scipy.linalg import solve_triangular
-
-    rows, others = np.flatnonzero(mine), np.flatnonzero(~mine)
-    rest, gain = covariance[np.ix_(rows, rows)], np.zeros((rows.size, others.size))
-    outside = whitener(covariance[np.ix_(others, others)], u[others])
-    if others.size:
-        cross = outside(covariance[np.ix_(others, rows)])
-        rest = rest - cross.T @ cross
-        gain = np.asarray(solve_triangular(outside.factor, cross, lower=True, trans="T", check_finite=False)).T
-    return Conditional(rows, others, gain, rest, whitener(rest, u[rows]), outside)
 
 
 def sessions(problem: Problem) -> Array:
@@ -263,15 +164,13 @@ def sessions(problem: Problem) -> Array:
         return np.zeros((run.size, run.size))
     n = np.log(problem.covariates["rpm"][problem.point])
     J = problem.covariates["J"][problem.point]
-    kernel = np.exp(
-        -0.5 * ((n[:, None] - n[None, :]) / _LENGTH_RPM) ** 2 - 0.5 * ((J[:, None] - J[None, :]) / _LENGTH_J) ** 2
-    )
-    same = (run[:, None] == run[None, :]) & (problem.channel[:, None] == problem.channel[None, :])
+    kernel = smooth((n, _LENGTH_RPM), (J, _LENGTH_J))
+    same = alike(run, problem.channel)
     # a tachometer has no cells: what the speed at a pulse width does from run to run is what the drive does
     same &= (problem.channel != CHANNELS.index("rpm"))[:, None]
-    smooth = kernel * problem.scale[:, None] * problem.scale[None, :]
+    bent = kernel * problem.scale[:, None] * problem.scale[None, :]
     gain = problem.y[:, None] * problem.y[None, :]
-    return np.asarray(np.where(same, _SESSION_GAIN * gain + (1.0 - _SESSION_GAIN) * smooth, 0.0))
+    return np.asarray(np.where(same, _SESSION_GAIN * gain + (1.0 - _SESSION_GAIN) * bent, 0.0))
 
 
 def covariance(problem: Problem, h: Hyper) -> Array:
@@ -365,10 +264,8 @@ def rivals(problem: Problem, told: Collection[str] = ()) -> tuple[Rival, ...]:
         for length in _RIVAL_LENGTHS:
             for group in groups:
                 mine = free & np.isin(c, group)
-                kernel = np.equal.outer(c[mine], c[mine]) * np.multiply.outer(problem.scale[mine], problem.scale[mine])
-                for name in names:
-                    x = X[name][p[mine]]
-                    kernel *= np.exp(-0.5 * ((x[:, None] - x[None, :]) / length) ** 2)
+                kernel = smooth(*((X[name][p[mine]], length) for name in names)) * alike(c[mine])
+                kernel *= np.multiply.outer(problem.scale[mine], problem.scale[mine])
                 for size in _RIVAL_SIZES:
                     label = " and ".join(words[k] for k in group)
                     out.append(Rival(f"{label} over {', '.join(names)}: {size:.0%}", mine, kernel, size))
@@ -379,8 +276,7 @@ def rivals(problem: Problem, told: Collection[str] = ()) -> tuple[Rival, ...]:
         if min(np.count_nonzero(mine), np.count_nonzero(here & ~falling)) < _FEW * len(group):
             continue
         most = np.array([np.max(np.abs(problem.y[c == k])) for k in present])[np.searchsorted(present, c[mine])]
-        kernel = np.equal.outer(c[mine], c[mine]) * np.multiply.outer(most, most)
-        kernel *= np.exp(-0.5 * (np.subtract.outer(load[mine], load[mine]) / _BEHIND_LENGTH) ** 2)
+        kernel = smooth((load[mine], _BEHIND_LENGTH)) * alike(c[mine]) * np.multiply.outer(most, most)
         label = " and ".join(words[k] for k in group)
         out += [Rival(f"{label} while the load falls: {size:.0%}", mine, kernel, size) for size in _BEHIND]
     return tuple(out)
@@ -406,15 +302,13 @@ def law_of(effect: Effect | type[Effect]) -> tuple[str, ...]:
 
 def smooth_modes(problem: Problem, besides: Sequence[str] = (), flow: Sequence[str] = tuple(_FLOW)) -> Array:
     """Modes of a smooth function of unit variance, each channel for itself, (M, q) [1]."""
-    P = problem.covariates["rpm"].size
-    apart = np.zeros((P, P))
+    axes = []
     for name, least in (_FLOW | _BESIDES).items():
         if name in (*flow, *besides) and name in problem.covariates:
             x = problem.covariates[name]
             x = np.log(x) if name in _LOGARITHMIC else x
-            apart += ((x[:, None] - x[None, :]) / (_FORM_LENGTH * max(float(np.ptp(x)), least))) ** 2
-    value, vector = np.linalg.eigh(np.exp(-0.5 * apart))
-    keep = value > 0.02 * value[-1]
-    modes = (vector[:, keep] * np.sqrt(value[keep]))[problem.point]
+            axes.append((x, _FORM_LENGTH * max(float(np.ptp(x)), least)))
+    P = problem.covariates["rpm"].size
+    found = modes(smooth(*axes) if axes else np.ones((P, P)), 0.02)[problem.point]
     channels = np.unique(problem.channel)
-    return np.concatenate([np.where((problem.channel == c)[:, None], modes, 0.0) for c in channels], axis=1)
+    return np.concatenate([np.where((problem.channel == c)[:, None], found, 0.0) for c in channels], axis=1)

@@ -12,7 +12,8 @@ from bemt import effects
 from bemt.diagnose import form
 from bemt.diagnose.explanation import NONE, Explanation
 from bemt.diagnose.signatures import effect_of
-from bemt.diagnose.state import Array, State, log_mean
+from bemt.diagnose.state import Array, State
+from bemt.gaussian.evidence import log_sum
 
 if TYPE_CHECKING:
     from bemt.diagnose.problem import Problem
@@ -93,7 +94,7 @@ def _log_z(state: State, pair: Explanation, spans: Mapping[str, slice], log_w: A
         if (again := _largest(value)) == at:
             break
         at = again
-    return state.log_z[NONE] + float(log_mean(value.ravel(), np.zeros(value.size)))
+    return state.log_z[NONE] + float(log_sum(value.ravel()))
 
 
 def _largest(total: Array) -> tuple[int, int]:
@@ -175,8 +176,8 @@ def price(
     An effect that shows along a recorded variable of its own (time, gap, wall) is no detail of another one's law.
     """
     weight = np.log([s.hyper.weight for s in states])
-    none = float(log_mean(np.array([s.log_z[NONE] for s in states]), weight))
-    alone = {i: float(log_mean(np.array([s.log_z[Explanation.of(i)] for s in states]), weight)) - none for i in modes}
+    none = float(log_sum([s.log_z[NONE] for s in states], weight))
+    alone = {i: float(log_sum([s.log_z[Explanation.of(i)] for s in states], weight)) - none for i in modes}
     best = max(alone, key=lambda i: alone[i], default="")
     if not best or not modes[best].shape[1] or alone[best] <= 0.0:
         return {}

@@ -16,7 +16,8 @@ from bemt.diagnose import evidence, noise, prior, problem, signatures, threshold
 from bemt.diagnose import suggest as suggestion
 from bemt.diagnose.assemble import assemble, build
 from bemt.diagnose.record import Record
-from bemt.diagnose.state import log_mean
+from bemt.gaussian.evidence import log_sum
+from bemt.gaussian.whitening import whitener
 
 if TYPE_CHECKING:
     from bemt.case import Case
@@ -142,10 +143,10 @@ def _sizes(
     shown = np.zeros((whole.y.size, len(candidates)))
     for k, c in enumerate(candidates):
         shown[:, k] = c.signatures[:, c.middle]
-    own = [noise.whitener(noise.covariance(whole, h), whole.u) for h in truths]
+    own = [whitener(noise.covariance(whole, h), whole.u) for h in truths]
     least = np.full((len(truths), len(candidates)), np.inf)
     for _, C in noise.covariances(whole):
-        white = noise.whitener(C, whole.u)
+        white = whitener(C, whole.u)
         gain = 0.5 * np.sum(white(shown) ** 2, axis=0)
         for k, true in enumerate(own):
             price = 0.5 * (float(np.sum(white(true.factor) ** 2)) - whole.y.size) + white.log_det - true.log_det
@@ -153,7 +154,7 @@ def _sizes(
     for k, true in enumerate(own):
         for i, c in enumerate(candidates):
             apart = true(c.signatures - shown[:, i, None])
-            least[k, i] += log_mean(-0.5 * np.sum(apart**2, axis=0), np.log(c.weight))
+            least[k, i] += log_sum(-0.5 * np.sum(apart**2, axis=0), np.log(c.weight))
     return [np.asarray(row) for row in np.sqrt(2.0 * np.maximum(least, 0.0))]
 
 

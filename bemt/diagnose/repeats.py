@@ -12,6 +12,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.gaussian.reml import Restricted
+
 __all__ = ["FEWEST", "conditions", "noise_sizes", "projected_out", "spread_sizes"]
 
 Array = NDArray[np.float64]
@@ -64,29 +66,13 @@ def noise_sizes(
     e: Array, y: Array, full: Array, fixed: Array, stated: Array | None = None
 ) -> tuple[float, float, int] | None:
     """Find a and b beside what is stated. [1]"""
-    # columns of one length: what is projected out has no size
-    norm = np.linalg.norm(fixed, axis=0)
-    q, s, _ = np.linalg.svd(fixed[:, norm > 0] / norm[norm > 0], full_matrices=True)
-    K = q[:, int(np.sum(s > 1e-8 * s[0])) if s.size else 0 :]
-    if K.shape[1] < FEWEST:
+    left = Restricted.of(e, fixed, stated, y, full)
+    if left is None or left.z.size < FEWEST:
         return None
-    z = K.T @ e
-    base = np.zeros((z.size, z.size)) if stated is None else K.T @ (stated[:, None] ** 2 * K)
-    gain, zero = K.T @ (y[:, None] ** 2 * K), K.T @ (full[:, None] ** 2 * K)
-    tiny = (1e-9 * float(np.max(full))) ** 2 * np.eye(z.size)
-
-    def misfit(a: float, b: float) -> float:
-        try:
-            L = np.linalg.cholesky(base + a**2 * gain + b**2 * zero + tiny)
-        except np.linalg.LinAlgError:
-            return np.inf
-        w = np.linalg.solve(L, z)
-        return float(0.5 * (w @ w) + np.sum(np.log(np.diag(L))))
-
-    a, b = _likeliest(misfit)
-    if stated is not None and misfit(0.0, 0.0) < misfit(a, b) + _DOUBT:
+    a, b = _likeliest(left.misfit)
+    if stated is not None and left.misfit(0.0, 0.0) < left.misfit(a, b) + _DOUBT:
         a, b = 0.0, 0.0
-    return a, b, int(z.size)
+    return a, b, int(left.z.size)
 
 
 def spread_sizes(y: Array, unit: Array, block: NDArray[np.intp]) -> tuple[float, float] | None:

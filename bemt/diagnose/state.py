@@ -13,20 +13,12 @@ from bemt.diagnose.explanation import Explanation
 from bemt.diagnose.form import Form
 
 if TYPE_CHECKING:
-    from bemt.diagnose.noise import Conditional, Hyper, Whitener
+    from bemt.diagnose.noise import Hyper
+    from bemt.gaussian.whitening import Conditional, Whitener
 
-__all__ = ["State", "log_mean"]
+__all__ = ["State"]
 
 Array = NDArray[np.float64]
-
-
-def log_mean(log_values: Array, log_weights: Array, axis: int = -1) -> Array:
-    """Logarithm of a weighted sum of exponentials."""
-    total = log_values + log_weights
-    top = np.max(total, axis=axis, keepdims=True)
-    top = np.where(np.isfinite(top), top, 0.0)
-    with np.errstate(divide="ignore"):
-        return np.asarray(np.squeeze(top, axis) + np.log(np.sum(np.exp(total - top), axis=axis)))
 
 
 @dataclass(eq=False)

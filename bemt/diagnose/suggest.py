@@ -21,6 +21,7 @@ from bemt.diagnose.nuisance import PRIORS
 from bemt.diagnose.problem import Part, Problem
 from bemt.diagnose.record import Record, air_of
 from bemt.diagnose.signatures import effect_of
+from bemt.gaussian.whitening import whitener
 
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence
@@ -220,7 +221,7 @@ def _relative(u: Array, y: Array) -> float:
 
 
 def _distance(problem: Problem, covariance_of: noise.Hyper, a: Array, b: Array) -> float:
-    d = noise.whitener(noise.covariance(problem, covariance_of), problem.u)(a - b)
+    d = whitener(noise.covariance(problem, covariance_of), problem.u)(a - b)
     return float(np.sqrt(d @ d))
 
 

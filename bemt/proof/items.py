@@ -233,7 +233,7 @@ def make_item(
         "stand": {k: v for k, v in vars(stand).items() if k in _QUALITY},
     }
     if len(parts) > 1:  # how far the weaker of a pair stands out when the stronger may take what it can
-        vectors = [rule.whole @ rule.stack(s) for s in signed]
+        vectors = [rule.whole(rule.stack(s)) for s in signed]
         entry["separation_together"] = [_across(vectors[k], vectors[1 - k]) for k in (0, 1)]
     return Item(files, entry, reference)
 

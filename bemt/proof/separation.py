@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.gaussian.whitening import Whitener, whitener
 from bemt.proof.stand import Stand, covariance, full_scales
 from bemt.proof.truth_world import TrueLoads, World
 
@@ -34,13 +35,13 @@ class Yardstick:
     ----------
     channels : tuple of str
         Columns in the order of the stacked signature.
-    noise, whole : (M, M) float
-        Inverse of the Cholesky factor of the covariance: noise; noise and nuisances. [1/unit]
+    noise, whole : Whitener
+        Of the covariance: noise; noise and nuisances.
     """
 
     channels: tuple[str, ...]
-    noise: Array
-    whole: Array
+    noise: Whitener
+    whole: Whitener
 
     def stack(self, columns: Mapping[str, Array]) -> Array:
         """Signature as one vector, (M,)."""
@@ -48,14 +49,14 @@ class Yardstick:
 
     def separation(self, signature: Array) -> tuple[float, float]:
         """Length of a signature over noise, and over noise and nuisances. [1]"""
-        return float(np.linalg.norm(self.noise @ signature)), float(np.linalg.norm(self.whole @ signature))
+        return float(np.linalg.norm(self.noise(signature))), float(np.linalg.norm(self.whole(signature)))
 
     def alike(self, own: Array, others: Mapping[str, Array], limit: float = 3.0) -> list[str]:
         """Causes whose signature this one cannot be told from: its part across theirs is shorter than ``limit``."""
-        a = self.whole @ own
+        a = self.whole(own)
         found = []
         for name, signature in others.items():
-            b = self.whole @ signature
+            b = self.whole(signature)
             length = float(np.linalg.norm(b))
             if length > 1e-9:
                 across = a - (a @ b) / length**2 * b
@@ -89,7 +90,7 @@ def yardstick(
         cov[k * n : (k + 1) * n, k * n : (k + 1) * n] = covariance(np.nan_to_num(value), run, scale, stand)
     for k, (name, value) in enumerate(electric.items(), start=2):
         cov[k * n : (k + 1) * n, k * n : (k + 1) * n] = np.diag((_RELATIVE[name] * value) ** 2 + 1e-12)
-    noise = np.linalg.inv(np.linalg.cholesky(cov))
+    noise = whitener(cov)
     wide = cov.copy()
     rows = [np.concatenate([np.nan_to_num(t[c]) if c in t else np.zeros(n) for c in channels]) for t in tangents]
     for k, (value, scale) in enumerate(zip((loads.thrust, loads.torque), scales, strict=True)):
@@ -103,4 +104,4 @@ def yardstick(
         rows.append(row)
     for row in rows:
         wide += np.outer(row, row)
-    return Yardstick(channels, noise, np.linalg.inv(np.linalg.cholesky(wide)))
+    return Yardstick(channels, noise, whitener(wide))

@@ -14,13 +14,13 @@ from dataclasses import dataclass
 from statistics import median
 
 from bemt.recordings.findings import Finding
-from bemt.recordings.slips import ALIKE, Slip, slips
+from bemt.recordings.slips import ALIKE, MISCOUNT, Slip, slips
 
 TOGETHER, FAR, NEAR = 0.35, math.log(2.0), 0.25
 """Logarithms of ratios: within which levels agree, from which they differ, within which a difference is a slip's."""
 SPREADS = 3.0
 """Spreads of the companions that a slip is away from them at least."""
-_SIGMA = 0.1
+_SIGMA, _COMMON = 0.1, 1.0
 _QUANTITY = {"thrust_N": "T", "torque_Nm": "Q"}
 
 
@@ -52,7 +52,9 @@ def odd_ones(levels: Sequence[Level]) -> list[tuple[Level, Finding]]:
         if len(mine) == 2 and abs(by[0] - by[1]) <= NEAR:  # by one factor: what both are divided by, first of all
             odd = mine["thrust_N"]
             speed = _likely("n", 0.5 * odd.by)
-            units = {c: _likely(q, -o.by) for (c, q), o in zip(_QUANTITY.items(), mine.values(), strict=True)}
+            # two errors at once are believed of common units only
+            units = {c: [s for s in _likely(q, -o.by) if s.rarity <= _COMMON]
+                     for (c, q), o in zip(_QUANTITY.items(), mine.values(), strict=True)}  # fmt: skip
             if speed:
                 text = f"{_evidence(odd)}, and so are those of torque_Nm"
                 also = [", ".join(f"{c}: {s[0].words}" for c, s in units.items())] if all(units.values()) else []
@@ -99,7 +101,7 @@ def _likely(quantity: str, log_factor: float) -> list[Slip]:
     fits = [
         (((log_factor - math.log(s.factor)) / _SIGMA) ** 2 + s.rarity, k, s)
         for k, s in enumerate(slips())
-        if s.quantity == quantity and abs(log_factor - math.log(s.factor)) <= NEAR
+        if s.quantity == quantity and s.id != MISCOUNT and abs(log_factor - math.log(s.factor)) <= NEAR
     ]
     best = min(fits, default=(0.0,))[0]
     return [s for score, _, s in sorted(fits) if score - best < ALIKE]

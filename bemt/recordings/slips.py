@@ -30,7 +30,7 @@ EXACT = 0.03
 ALIKE = 4.0
 """Difference in score (chi-square) within which slips are told together."""
 
-ELECTRICAL = "rpm_electrical"
+ELECTRICAL, MISCOUNT = "rpm_electrical", "rpm_ratio"
 EFFICIENCY, SAME_DIGITS = (0.2, 0.95), 0.001
 """Range of a motor's efficiency under load; scatter of a product that the file itself formed. [1]"""
 
@@ -108,7 +108,7 @@ def slips() -> tuple[Slip, ...]:
     """
     found = [Slip(id_, q, e.repair, e.words, e.rarity) for q, (id_, *kinds) in _KINDS.items()
              for kind in kinds for e in unit_errors.errors(kind)]  # fmt: skip
-    found += [Slip(ELECTRICAL if r.set == 1 else "rpm_ratio", q, 1.0 / r.ratio, r.words, r.rarity)
+    found += [Slip(ELECTRICAL if r.set == 1 else MISCOUNT, q, 1.0 / r.ratio, r.words, r.rarity)
               for q in ("n", "n2") for r in unit_errors.speed_ratios(rarest=2.0)]  # fmt: skip
     return tuple(found)
 
@@ -230,8 +230,11 @@ def find_slips(facts: Facts) -> Iterator[Finding]:
         return
     quantities = {q for r in known for q in r.powers}
     fits: list[tuple[float, Slip]] = []
+    two_speeds = any("n2" in r.powers for r in broken)
     for slip in slips() if broken else ():
-        if slip.quantity not in quantities or facts.diameter_m is None and slip.quantity == "D":
+        if slip.id == MISCOUNT and not two_speeds:
+            continue  # some ratio of small numbers is near any factor
+        if slip.quantity not in quantities or (facts.diameter_m is None and slip.quantity == "D"):
             continue
         shift = {slip.quantity: slip.factor}
         if all(r.holds(shift) for r in known if r in broken or slip.quantity in r.powers):
@@ -283,7 +286,8 @@ def _electrical(facts: Facts, broken: list[Relation]) -> tuple[float, float, flo
         return None
     digits = float(np.median(np.abs(ratio / middle - 1.0))) < SAME_DIGITS
     repairs = {"Q": 1.0 / middle, "n": 1.0 / middle, "P": middle}
-    if digits and any(abs(s.factor / repairs[s.quantity] - 1.0) < 0.005 for s in slips() if s.quantity in repairs):
+    units = (s for s in slips() if s.quantity in repairs and s.id != MISCOUNT)
+    if digits and any(abs(s.factor / repairs[s.quantity] - 1.0) < 0.005 for s in units):
         return None
     return low, middle, high
 

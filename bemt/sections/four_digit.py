@@ -3,8 +3,8 @@
 Made by ``reports/studies/section_table.py``: our own runs over camber, thickness, n_crit, Reynolds number and angle of
 attack, camber position 0.40 (the rule's) and 0.45 (fans); no weights of the network. Cubic in camber, thickness and
 n_crit between the nodes; angles and Reynolds numbers are those of the tables themselves. The nodes hold the rule's
-section and the ends of its ranges. There only rounding is left: cl 1e-4, cd 0.025 %, at most 0.01 % of the static CT and
-CP of the shipped cases. Between them (60 random sections, ``section_table.py check``), cl and ln cd from -4 to 10 deg
+section and the ends of its ranges. There only rounding is left: cl 1e-4, cd 0.025 %, at most 0.01 % of the static CT and CP
+of the shipped cases. Between them (60 random sections, ``section_table.py check``), cl and ln cd from -4 to 10 deg
 and Re 3e4 to 1e6 are off by 4e-4 and 1.4e-3 in the median, 95 % within 8e-3 and 2e-2. CT and CP of a 10x5 with that
 section, over those at rest, are off by 0.03 % in the median, 95 % within 0.5 %, 2.2 % at worst (3,000 rev/min, where
 laminar separation sets in).

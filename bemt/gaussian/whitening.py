@@ -1,0 +1,158 @@
+"""One covariance, factored once: whitened vectors, densities, and some readings given all others."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Conditional", "Whitener", "conditional", "leave_one_out", "log_density", "whitener"]
+
+Array = NDArray[np.float64]
+
+_JITTER = 1e-4  # of the stated standard deviation, so that a covariance of tangents alone has a factor
+
+
+@dataclass(frozen=True, eq=False)
+class Whitener:
+    """Cholesky factor of one covariance C = L L^T.
+
+    Attributes
+    ----------
+    factor : (M, M) float
+        L, lower triangular [units of the readings].
+    log_det : float
+        Sum of the logarithms of its diagonal, half of ln det C [1].
+    """
+
+    factor: Array
+    log_det: float
+
+    def __call__(self, vectors: Array) -> Array:
+        """Whiten vectors (M,) or columns (M, n): L^-1 x."""
+        from scipy.linalg import solve_triangular
+
+        return np.asarray(solve_triangular(self.factor, vectors, lower=True, check_finite=False))
+
+    def back(self, vectors: Array) -> Array:
+        """L^-T x of whitened vectors or columns."""
+        from scipy.linalg import solve_triangular
+
+        return np.asarray(solve_triangular(self.factor, vectors, lower=True, trans="T", check_finite=False))
+
+    def solve(self, vectors: Array) -> Array:
+        """C^-1 x of vectors or columns."""
+        return self.back(self(vectors))
+
+    def log_density(self, x: Array, constant: bool = True) -> float:
+        """Logarithm of the normal density of a vector; without its constant -M/2 ln 2 pi if so asked [1].
+
+        Rasmussen and Williams, Gaussian Processes for Machine Learning, MIT Press 2006, eq. 2.30.
+
+        >>> one = whitener(np.array([[4.0]]))
+        >>> round(one.log_density(np.array([2.0])), 6) == round(-0.5 - math.log(2.0) - 0.5 * math.log(2 * math.pi), 6)
+        True
+        """
+        w = self(x)
+        out = -0.5 * float(w @ w) - self.log_det
+        return out - 0.5 * x.size * math.log(2.0 * math.pi) if constant else out
+
+
+def whitener(covariance: Array, u: Array | None = None) -> Whitener:
+    """Factor a covariance, (M, M).
+
+    Parameters
+    ----------
+    covariance : (M, M) float
+        Symmetric, positive definite.
+    u : (M,) float, optional
+        Standard deviations of the readings; 1e-4 of them is added, so that a singular one has a factor.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If the covariance is not positive definite.
+    """
+    if u is not None:
+        covariance = covariance + np.diag((_JITTER * u) ** 2)
+    factor = np.asarray(np.linalg.cholesky(covariance), dtype=float)
+    return Whitener(factor, float(np.sum(np.log(np.diag(factor)))))
+
+
+def log_density(covariance: Array, x: Array, constant: bool = True) -> float:
+    """Logarithm of the normal density of one vector; see `Whitener.log_density`."""
+    return whitener(covariance).log_density(x, constant)
+
+
+def leave_one_out(covariance: Array, x: Array) -> Array:
+    """What each value differs by from its prediction by all others, over the standard deviation of that, (M,) [1].
+
+    Rasmussen and Williams 2006, eq. 5.12.
+
+    >>> leave_one_out(np.diag([1.0, 4.0]), np.array([2.0, 2.0])).tolist()
+    [2.0, 1.0]
+    """
+    inverse = np.linalg.inv(covariance)
+    return np.asarray((inverse @ x) / np.sqrt(np.diag(inverse)))
+
+
+@dataclass(frozen=True, eq=False)
+class Conditional:
+    """Some readings given all others: causes change only these, so the others enter once and not with every cause.
+
+    Attributes
+    ----------
+    rows, others : (N,), (M - N,) int
+        The readings, and those that are given.
+    gain : (N, M - N) float
+        Expected change of the readings for one of the others [unit/unit].
+    covariance : (N, N) float
+        Of what remains [square of the units of the readings].
+    white : Whitener
+        Its factor.
+    outside : Whitener
+        Factor of the covariance of the others.
+    """
+
+    rows: NDArray[np.intp]
+    others: NDArray[np.intp]
+    gain: Array
+    covariance: Array
+    white: Whitener
+    outside: Whitener
+
+    @property
+    def log_det(self) -> float:
+        """Sum of the logarithms of the diagonal of the factor of all readings [1]."""
+        return self.white.log_det + self.outside.log_det
+
+    def rest(self, vectors: Array) -> Array:
+        """What the others leave of vectors or columns."""
+        return np.asarray(vectors[self.rows] - self.gain @ vectors[self.others])
+
+    def __call__(self, vectors: Array) -> Array:
+        """Whiten what the others leave of vectors or columns."""
+        return self.white(self.rest(vectors))
+
+    def changes(self, vectors: Array) -> Array:
+        """Whiten vectors or columns that are zero but in these rows."""
+        return self.white(vectors[self.rows])
+
+    def misfit(self, vectors: Array) -> Array:
+        """Half the squared whitened length of the others."""
+        w = self.outside(vectors[self.others])
+        return np.asarray(0.5 * np.sum(w * w, axis=0))
+
+
+def conditional(covariance: Array, u: Array, mine: NDArray[np.bool_]) -> Conditional:
+    """Condition some readings on the others, jointly normal (Rasmussen and Williams 2006, eq. A.6)."""
+    rows, others = np.flatnonzero(mine), np.flatnonzero(~mine)
+    rest, gain = covariance[np.ix_(rows, rows)], np.zeros((rows.size, others.size))
+    outside = whitener(covariance[np.ix_(others, others)], u[others])
+    if others.size:
+        cross = outside(covariance[np.ix_(others, rows)])
+        rest = rest - cross.T @ cross
+        gain = outside.back(cross).T
+    return Conditional(rows, others, gain, rest, whitener(rest, u[rows]), outside)
