@@ -294,7 +294,7 @@ PROGRAMS = {
     "fmu": Program(fmu, lambda: f"{_package('fmpy')()}, {_package('pythonfmu')()}", ("fmpy", "pythonfmu")),
     "gazebo": Program(gazebo, _first(["ign", "sdf", "--versions"], r"(\d+\.\d+\.\d+)", "libsdformat"), tools=("ign",),
                       loads=False),
-    "rotor-disk": Program(rotor_disk, _first(OPENFOAM, r"Version:\s+(\w+)", "OpenFOAM"),
+    "rotor-disk": Program(rotor_disk, _first(OPENFOAM, r"OPENFOAM=(\w+)", "OpenFOAM"),
                           tools=("simpleFoam", "blockMesh")),
     "flow360": Program(flow360, _package("flow360"), ("flow360",), loads=False),
 }  # fmt: skip
