@@ -54,8 +54,8 @@ AT_REST_J = 0.05
 """Advance ratio within which the part of the rest that belongs to hover fades, as exp(-(J / 0.05)^2), declared [1]."""
 TURNED_DEG = 8.0
 """Length of the rest over a turn of the blade in its hub, calibrated on twelve pairs of 3D-printed blades turned by 5
-deg (NR640, DA4052), one measured, the other predicted: mean log scores 1.02 and 0.95 at 10 deg, 1.09 and 0.82 at 6, with
-the rest carried over as if nothing had changed -0.15 and -0.07 [deg]."""
+deg (NR640, DA4052), one measured, the other predicted: mean log scores 1.02 and 0.95 at 10 deg, 1.09 and 0.82 at 6;
+with the rest carried over as if nothing had changed, -0.15 and -0.07 [deg]."""
 SECTIONS = ("published", "rule", "given")
 """What a section may be: coordinates of the maker, the general rule, or declared."""
 SHARED = ("angle_deg", "drag", "camber_deg")
