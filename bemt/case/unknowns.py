@@ -156,7 +156,7 @@ def completed(document: Mapping[str, Any]) -> dict[str, Any]:
     if isinstance(blade, dict):
         if not any(key in blade for key in CHORDS):
             blade["chord_law"] = "fan" if fan else "apc_like"
-            unknowns += FAN[1:2] if fan else [OFFSET, label_chord(_diameter_m(rotor))]
+            unknowns += FAN[1:2] if fan else [OFFSET, label_chord(_diameter_m(rotor), blade.get("class"))]
         if "section" not in blade:
             unknowns += [*(FAN[2:] if fan else section_of(blade.get("class"))), *SURFACE]
     if "air" not in made:
