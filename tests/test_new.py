@@ -9,6 +9,7 @@ import pytest
 
 import bemt
 from bemt.case import case_of, fresh, load_case
+from bemt.case.unknowns import section_of
 from bemt.commands.cli import main
 
 STATIONS = "r_over_R,chord_over_R,beta_deg\n0.2,0.14,35\n0.5,0.19,22\n0.75,0.16,15\n1.0,0.06,10\n"
@@ -219,16 +220,14 @@ def test_most_thrust_is_one_at_every_door(here: Path, capsys: pytest.CaptureFixt
     assert float(re.findall(r"set-default SIH_F_RPM_MAX (\S+)", text)[0]) == pytest.approx(found[0][0], rel=1e-3)
 
 
-def test_a_class_of_blades_brings_its_section_and_its_family(here: Path) -> None:
-    def shape(text: str) -> tuple[float, float]:
-        blade = case_of(text).file.blade
-        return blade.section.camber, blade.max_chord_over_R  # type: ignore[union-attr, return-value]
-
-    plain = shape(fresh.label_text("10x5"))
-    for label, family in (("APC 10x5SF", "apcsf"), ("GWS 10x5 slow flyer", "gwssf"), ("10x5SF", None)):
-        text = fresh.label_text(label)
-        assert case_of(text).file.blade.family == family
-        assert shape(text) == shape(SIX + 'blade.class = "slow_flyer"\n') > plain  # by class, not by family
+def test_a_class_of_blades_brings_its_camber_and_its_family(here: Path) -> None:
+    for label, family in (("APC 10x4.7SF", "apcsf"), ("GWS 10x4.7 slow flyer", "gwssf"), ("10x4.7", None)):
+        case = case_of(fresh.label_text(label))
+        assert case.file.blade.family == family
+        assert case.file.blade.section.camber == section_of("slow_flyer" if family else None)[0].value  # type: ignore[union-attr]
+    short = case_of(SIX + 'blade.class = "slow_flyer"\n')
+    assert short.file.blade.section.camber > 0.05  # type: ignore[union-attr]
+    assert short.file.blade.max_chord_over_R > 1.3 * case_of(SIX).file.blade.max_chord_over_R  # type: ignore[operator]
 
 
 def test_stations_and_label_are_one_case_that_weighs_both(here: Path) -> None:

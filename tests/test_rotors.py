@@ -63,10 +63,10 @@ def _sensed(n: int = 12, seed: int = 0) -> Sensed:
 
 
 def test_half_width_is_the_inverse_of_inside() -> None:
-    sds = np.random.default_rng(1).uniform(0.1, 3.0, (40, 6))
+    sds = np.random.default_rng(1).uniform(0.1, 3.0, (40, WEIGHTS.size))
     for level in LEVELS:
         assert inside(half_width(level, sds, WEIGHTS), sds, WEIGHTS) == pytest.approx(level, abs=1e-9)
-    with_equal = half_width(LEVELS[1], np.full((1, 6), 1.5), WEIGHTS)
+    with_equal = half_width(LEVELS[1], np.full((1, WEIGHTS.size), 1.5), WEIGHTS)
     assert with_equal == pytest.approx(3.0, abs=1e-6)  # one normal law: two standard deviations
 
 
@@ -87,7 +87,8 @@ def test_better_knowledge_is_never_wider() -> None:
     p = population()
     sds = [p.prior(known, 0.254).sd[0] for known in ("cad", "scan", "stations", "label")]
     assert sds == sorted(sds) and sds[0] < sds[-1]
-    assert np.all(p.prior("stations", 0.0762).sd >= p.prior("stations", 0.254).sd)  # small ones are known worse
+    small, usual = (p.rest_sd(replace(_sensed(), diameter_m=D)) for D in (0.0762, 0.254))
+    assert np.all(small > usual)  # small ones are known worse
     assert np.all(p.prior("label", 0.254, declared=("angle", "chord")).sd <= p.prior("label", 0.254).sd)
     # the label narrows the stations' angle and pulls it towards itself, by a share below one
     alone, beside = p.prior("stations", 0.254), p.prior("stations", 0.254, gap_deg=p.offset_deg + 2.0)
@@ -95,21 +96,6 @@ def test_better_knowledge_is_never_wider() -> None:
     assert p.prior("stations", 0.254, gap_deg=p.offset_deg).mean == pytest.approx(alone.mean)
     stated = p.prior("stations", 0.254, sds={"angle_deg": 0.2})
     assert stated.sd[0] == pytest.approx(0.2) and stated.sd[1:] == pytest.approx(alone.sd[1:])
-
-
-def test_narrow_blades_of_unknown_thickness_have_more_drag() -> None:
-    p, drag = population(), NAMES.index("drag")
-
-    def expected(chord: float, known_from: str = "stations", section: str = "rule") -> float:
-        return float(p.prior(known_from, 0.254, section=section, chord=chord).mean[drag])
-
-    chords = np.array([0.05, 0.10, 0.12, 0.15, 0.20, 0.28, 0.40])
-    values = np.array([expected(c) for c in chords]) - expected(math.nan)
-    assert np.all(np.diff(values[1:6]) < 0.0) and values[3] == pytest.approx(0.0, abs=1e-12)
-    assert values[0] == values[1] and values[5] == values[6]  # no thickness beyond the published ones
-    # a thickness that is known, or a chord that is not, shifts nothing
-    for known_from, section in (("stations", "published"), ("stations", "given"), ("label", "rule"), ("cad", "given")):
-        assert expected(0.10, known_from, section) == expected(math.nan, known_from, section)
 
 
 def test_intervals_hold_what_they_say_of_rotors_drawn_from_the_population() -> None:
@@ -240,7 +226,7 @@ def test_outside_the_band_grows_with_the_distance_without_a_jump_and_says_why(
 ) -> None:
     factor, words = _factor(**{name: values})
     assert factor[0] == 1.0 and np.all(np.diff(factor) >= 0.0) and np.max(np.diff(factor)) < 0.1
-    assert factor[-1] > 1.5 and word in words[-1] and f"times {factor[-1]:.2g}" in words[-1]
+    assert factor[-1] > 1.5 and word in words[-1] and f"times {factor[-1]:.3g}" in words[-1]
 
 
 @pytest.mark.parametrize(

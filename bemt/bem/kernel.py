@@ -14,7 +14,6 @@ steps.  Every operating point is solved for itself: its result depends neither o
 from __future__ import annotations
 
 import math
-import os
 import sys
 from functools import cache
 from types import FunctionType
@@ -24,6 +23,7 @@ import numpy as np
 from numba import carray, types
 from numba.core import cgutils
 
+from bemt.base.cache import always_compile
 from bemt.bem import residual
 from bemt.bem import vecmath as vecmath
 from bemt.bem.residual import (
@@ -455,7 +455,7 @@ class Entry:
 
     def __init__(self, ducted: bool, tables: str, compiled) -> None:
         self.kind, self.compiled = (ducted, tables), compiled
-        self._fast = os.environ.get("BEMT_COMPILE", "") == "always"
+        self._fast = always_compile()
         self._left = INTERPRETED
 
     def __call__(self, points, st, tab, par, out, radial) -> None:

@@ -46,8 +46,8 @@ _SLOWEST, _FASTEST = 0.4, 1.5
 _MANY = 64
 
 
-PREPARED: Kept[solver.Prepared] = Kept(256e6, lambda made: made.st.nbytes + made.tab.nbytes)
-"""Prepared rotors of this process, by geometry, section tables, duct, effects and range: a quarter of a gigabyte."""
+PREPARED: Kept[solver.Prepared] = Kept(512e6, lambda made: made.st.nbytes + made.tab.nbytes)
+"""Prepared rotors of this process, by geometry, section tables, duct, effects and range: up to half a gigabyte."""
 
 
 @dataclass(frozen=True, eq=False)

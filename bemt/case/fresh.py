@@ -13,7 +13,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
 from bemt.case.drive_schema import LIPO_SOC, LIPO_V
 from bemt.case.unknowns import AIR, DRIVE, FAN, HUB, OFFSET, SURFACE, Unknown, label_chord, section_of
-from bemt.readers._uiuc_names import family_of
+from bemt.readers._uiuc_names import class_of, family_of
 from geometry.common import GeometryError
 from geometry.designation import Designation, parse_designation
 
@@ -208,7 +208,7 @@ def stations_text(
 
     The population of measured rotors weighs the pitch of the label against the angles of the stations.
     """
-    section = section_of(label.blade_class if label else None)
+    section = section_of((label.blade_class if label else None) or class_of(family))
     pitch = f"label_pitch_in = {label.pitch_in:g}\n" if label else ""
     name = _label_name(label) if label else case_name(Path(file).stem)
     title = _title(label) if label else f"{blades} blades, {1e3 * diameter_m:.4g} mm"

@@ -1,7 +1,8 @@
 """The population fitted by maximum likelihood to measured propellers, through the solver's own slopes.
 
-Each rotor counts by a few single readings, so that a long line counts no more than a short one. Its likelihood is that
-of a mixture of normal laws over the sizes of latent numbers and rest. All rotors are evaluated at once, so that
+Each rotor counts by a few single readings, so that a long line counts no more than a short one, and each family as
+much as any other, since its rotors are alike. The likelihood of a rotor is that of a mixture of normal laws over the
+sizes of latent numbers and rest. All rotors are evaluated at once, so that
 differences are gradient enough.
 """
 
@@ -26,21 +27,17 @@ MARGINAL = 0.5
 """Weight of single rows beside the rotor as a whole in the likelihood (composite likelihood, Varin, Reid and Firth,
 Statistica Sinica 21, 2011, not checked): the whole tells the correlations, single rows how wide an interval is [1]."""
 
-FAMILY = 0.5
-"""A family of n rotors counts as n^(1 - 0.5): its rotors are alike, by more than the model of one rotor knows [1]."""
-
-# Numbers of the search: attribute of the population, how the search counts it, and the prior that keeps what the data do
-# not know: centre and width, the width in the search's own count.  Widths of stations, label and families are narrow:
-# measured propellers tell the sum of their variances, not its parts; optical stations are off by about a degree (blades
+# Numbers of the search: attribute of the population, how the search counts it, and the prior that keeps what the data
+# do not know: centre and width, the width in the search's own count.  Widths of label and families are narrow: measured
+# propellers tell the sum of their variances, not its parts; optical stations are off by about a degree (blades
 # turned to their measured zero-thrust J scatter by 0.7 to 1.5).  The hub's drag starts at a bluff body's (0.8 to 1.1:
-# Hoerner 1965, Fluid-Dynamic Drag, ch. 3, not checked), drag over chord at what thickness over chord (APC's PE0 files)
-# and drag over thickness (the section tables) make of it.
+# Hoerner 1965, Fluid-Dynamic Drag, ch. 3, not checked).
 _FREE: tuple[tuple[str, str, float, float], ...] = (
     ("stations_deg", "ln", 0.7, 0.3), ("label_deg", "ln", 0.8, 0.1), ("family_deg", "ln", 1.0, 0.1),
     ("offset_deg", "", 0.7, 0.15), ("lift", "ln", 0.03, 0.5), ("drag", "ln", 0.1, 0.3), ("camber_deg", "ln", 0.3, 0.3),
     ("unknown_drag", "ln", 0.15, 0.5), ("unknown_camber_deg", "ln", 1.0, 0.5), ("camber_drag", "tanh", 0.0, 1.0),
     ("slow_flyer_deg", "", 1.5, 1.5),
-    ("drag_chord", "", -0.3, 0.3), ("small", "", 0.5, 0.2), ("nu", "ln", 3.0, 0.15), ("nu_rest", "ln", 4.0, 0.4),
+    ("nu", "ln", 3.0, 0.15), ("nu_rest", "ln", 4.0, 0.4),
     ("hub_cd", "", 0.8, 0.4), ("lift_Re", "", 0.0, 0.1),
     ("rest_small", "", 0.5, 0.2), ("local_camber_deg", "ln", 0.5, 0.5), ("local_drag", "ln", 0.15, 0.5),
     ("local_correlation", "tanh", -0.4, 0.5), ("local_deg", "ln", 3.5, 0.4), ("local_ln_Re", "ln", 1.0, 0.5),
@@ -70,14 +67,13 @@ class MeasuredRotor(Sensed):
     gap_deg: float
     static: NDArray[np.bool_]
     y: Array
-    chord: float = math.nan  # At 0.75 R over the radius [1]
     blade_class: str | None = None
     known_from: str = "stations"
 
 
 def law(p: Population, m: MeasuredRotor) -> Prior:
     """What is known of a propeller before it is measured."""
-    return p.prior(m.known_from, m.diameter_m, m.gap_deg, m.family, m.section, chord=m.chord, blade_class=m.blade_class)
+    return p.prior(m.known_from, m.diameter_m, m.gap_deg, m.family, m.section, blade_class=m.blade_class)
 
 
 def counted(m: MeasuredRotor) -> NDArray[np.intp]:
@@ -119,7 +115,7 @@ class Rotors:
         # slopes, readings less the solver, columns of the bias, all over the coefficients at rest: (R, 2 P, K + 3)
         self.columns = np.concatenate([slopes, sides], axis=-1) / self.top[..., None] * self.real[..., None]
         families = [m.family for m in rotors]
-        weight = np.array([families.count(f) ** -FAMILY for f in families])
+        weight = np.array([1.0 / families.count(f) for f in families])
         self.weight = weight / weight.mean()
         self._kept: tuple[bytes, tuple[Array, Array, Array]] = (b"", (np.empty(0),) * 3)
 
@@ -213,7 +209,7 @@ def objective(theta: Array, rows: Rotors) -> float:
 def fit(
     rotors: Sequence[MeasuredRotor],
     start: Array | None = None,
-    most: int = 60,
+    most: int = 40,
     provenance: Mapping[str, Any] | None = None,
 ) -> tuple[Population, Array]:
     """Fit a population; gives it with its parameters, (P,)."""
@@ -266,7 +262,7 @@ def _told(p: Population, rows: Rotors) -> list[tuple[Array, Array, float]]:
 def with_families(p: Population, rows: Rotors) -> Population:
     """Population with the share of the spread between families, and what each family at hand has in common.
 
-    Random effects: a rotor's `SHARED` numbers are the usual ones, a shift of its family and one of its own, both normal.
+    Random effects: a rotor's `SHARED` numbers are the usual ones, a shift of its family and one of its own.
     The shares are the likeliest of a grid; the family's shift is shrunk towards none accordingly.
     """
     told = _told(p, rows)
@@ -274,7 +270,7 @@ def with_families(p: Population, rows: Rotors) -> Population:
     groups: dict[str, list[tuple[Array, Array, Array, Array]]] = {}
     for m, (precision, value, size) in zip(rows.rotors, told, strict=True):
         prior = replace(p, families={}).prior(
-            m.known_from, m.diameter_m, math.nan, None, m.section, chord=m.chord, blade_class=m.blade_class
+            m.known_from, m.diameter_m, math.nan, None, m.section, blade_class=m.blade_class
         )
         mean, cov = prior.mean[mine], prior.cov[np.ix_(mine, mine)]
         groups.setdefault(m.family, []).append((precision, value - precision @ mean, cov, size * np.ones(1)))

@@ -122,5 +122,5 @@ class RealRotor:
         return np.asarray(self.tangents(at) @ self.prior.cov @ S.T + self.rest(at, other))
 
     def predict(self, at: Sensed, mean: Array | None = None) -> Prediction:
-        """Expectation and scatter at points; ``mean`` (2, P) is the solver at the prior's mean where that was solved."""
+        """Expectation and scatter at points; ``mean`` (2, P): the solver at the prior's mean, where that was solved."""
         return predict(population(), self._from_drawn, at, mean, self.reference)

@@ -31,7 +31,7 @@ from bemt.rotors.validity import Validity
 Array = NDArray[np.float64]
 
 SMALL_IN = 7.0
-"""Diameter below which everything scatters more [in]."""
+"""Diameter below which the rest, and the chord of a label, scatter more [in]."""
 ANGLE_SD = {"cad": 0.1, "scan": 0.5}
 """Standard deviation of the blade angle where the blade was drawn or scanned [deg], declared: CAD as meshed; scans half
 as far off as optical stations.  Those of stations and labels are part of the fit."""
@@ -50,11 +50,6 @@ LIFT_ANGLE = 12.0
 """Angle of attack at 0.75 R at which none of it is left, linear: sections stall [deg]."""
 HUB = 0.15
 """Hub over the diameter of the rotor that `Population.hub_cd` counts on: CT = pi/8 cd (HUB J)^2 [1]."""
-CHORD_RANGE = (0.10, 0.28)
-"""Chords at 0.75 R over the radius at which t/c = 0.101 (chord / 0.144)^-1.2, fitted to 17 blades of APC (PE0 files),
-stays inside their 4 to 15 %; farther out the thickness, and its drag, is taken as at the ends [1]."""
-RULE_CHORD = 0.15
-"""Chord over the radius at which the rule's thickness of 9 % is taken as right [1]."""
 AT_REST_J = 0.05
 """Advance ratio within which the part of the rest that belongs to hover fades, as exp(-(J / 0.05)^2), declared [1]."""
 SECTIONS = ("published", "rule", "given")
@@ -124,11 +119,8 @@ class Population:
         Correlation of zero-lift angle and ln(drag) [1].
     slow_flyer_deg : float
         Further zero-lift angle of slow flyers [deg].
-    drag_chord : float
-        Exponent of the chord in the expectation of the drag of sections whose thickness nobody published: narrow
-        blades are thicker (`CHORD_RANGE`) [1].
-    small, rest_small : float
-        Exponents of (7 in / D) on the standard deviations of smaller propellers: latent numbers; rest and noise [1].
+    rest_small : float
+        Exponent of (7 in / D) on the rest of smaller propellers [1].
     local_camber_deg, local_drag, local_correlation : float
         Errors of the section tables that change with the angle of attack: zero-lift angle [deg], ln(drag) [1].
     local_deg, local_ln_Re : float
@@ -171,8 +163,6 @@ class Population:
     unknown_drag: float
     camber_drag: float
     slow_flyer_deg: float
-    drag_chord: float
-    small: float
     rest_small: float
     local_camber_deg: float
     local_drag: float
@@ -203,9 +193,7 @@ class Population:
         """Factors on the rest of a rotor, to be weighed by `WEIGHTS` [1]."""
         return sizes(self.nu_rest)
 
-    def angle(
-        self, known_from: str, growth: float, gap_deg: float = math.nan, family: Family | None = None
-    ) -> tuple[float, float]:
+    def angle(self, known_from: str, gap_deg: float = math.nan, family: Family | None = None) -> tuple[float, float]:
         """Mean and variance of the error of the stated blade angle [deg], [deg^2]."""
         offset, tau = (self.offset_deg, self.family_deg)
         if family is not None:
@@ -215,7 +203,7 @@ class Population:
             return (-(gap_deg - offset) if math.isfinite(gap_deg) else 0.0), second
         if known_from in ANGLE_SD:
             return 0.0, ANGLE_SD[known_from] ** 2
-        mean, own = 0.0, (self.stations_deg * growth) ** 2
+        mean, own = 0.0, self.stations_deg**2
         if family is not None:
             mean, own = float(family.mean[0]), (1.0 - self.between[0]) * own + float(family.cov[0, 0])
         if not math.isfinite(gap_deg):
@@ -223,41 +211,37 @@ class Population:
         w = own / (own + second)
         return mean - w * (gap_deg + mean - offset), own * (1.0 - w)
 
-    def section(
-        self, known_from: str, growth: float, section: str, blade_class: str | None, chord: float
-    ) -> tuple[Array, Array]:
+    def section(self, section: str, blade_class: str | None) -> tuple[Array, Array]:
         """Mean and covariance of ln(drag) and zero-lift angle before the family is known, (2,) and (2, 2)."""
         mean, variance = np.zeros(2), np.array([self.drag, self.camber_deg]) ** 2
         if section == "rule":
             variance += np.array([self.unknown_drag, self.unknown_camber_deg]) ** 2
             mean[1] = self.slow_flyer_deg if blade_class == "slow_flyer" else 0.0
-            if known_from == "stations" and math.isfinite(chord):
-                mean[0] += self.drag_chord * math.log(float(np.clip(chord, *CHORD_RANGE)) / RULE_CHORD)
         cross = self.camber_drag * math.sqrt(variance[0] * variance[1])
-        return mean, np.array([[variance[0], cross], [cross, variance[1]]]) * growth**2
+        return mean, np.array([[variance[0], cross], [cross, variance[1]]])
 
     def prior(
         self, known_from: str, diameter_m: float, gap_deg: float = math.nan, family: str | None = None,
         section: str = "given", declared: Collection[str] = (), sds: Mapping[str, float] | None = None,
-        chord: float = math.nan, blade_class: str | None = None,
+        blade_class: str | None = None,
     ) -> Prior:  # fmt: skip
-        """What is known of one rotor; ``chord`` at 0.75 R over the radius where the thickness is not known [1]."""
+        """What is known of one rotor."""
         if known_from not in KNOWN_FROM or known_from == "reference" or section not in SECTIONS:
             raise ValueError(f"got {known_from!r}, {section!r}; expected one of {KNOWN_FROM[:-1]} and of {SECTIONS}")
-        growth, kin = float(_growth(diameter_m, self.small)), self.families.get(family or "")
+        kin = self.families.get(family or "")
         mean, cov = np.zeros(len(NAMES)), np.zeros((len(NAMES), len(NAMES)))
         both = np.ix_([_DRAG, _CAMBER], [_DRAG, _CAMBER])
-        mean[[_DRAG, _CAMBER]], cov[both] = self.section(known_from, growth, section, blade_class, chord)
-        cov[_LIFT, _LIFT] = (self.lift * growth) ** 2
+        mean[[_DRAG, _CAMBER]], cov[both] = self.section(section, blade_class)
+        cov[_LIFT, _LIFT] = self.lift**2
         if kin is not None:
             own = np.sqrt(1.0 - np.array(self.between[1:]))
             mean[[_DRAG, _CAMBER]] += kin.mean[1:]
             cov[both] = cov[both] * np.outer(own, own) + kin.cov[1:, 1:]
         if "camber" in declared:
             mean[_CAMBER], cov[_CAMBER], cov[:, _CAMBER] = 0.0, 0.0, 0.0
-            cov[_CAMBER, _CAMBER] = (self.camber_deg * growth) ** 2
+            cov[_CAMBER, _CAMBER] = self.camber_deg**2
         if "angle" not in declared:
-            mean[_ANGLE], cov[_ANGLE, _ANGLE] = self.angle(known_from, growth, gap_deg, kin)
+            mean[_ANGLE], cov[_ANGLE, _ANGLE] = self.angle(known_from, gap_deg, kin)
         if known_from == "label" and "chord" not in declared:
             # a wider blade is more lift and more drag by the same share
             cov[np.ix_([_LIFT, _DRAG], [_LIFT, _DRAG])] += chord_sd(diameter_m) ** 2

@@ -77,7 +77,7 @@ class ReferenceRun:
 
     @property
     def in_flight(self) -> bool:
-        """Whether the run has a point in flight; without one it tells little of it: hover and flight differ by rotor."""
+        """Whether the run has a point in flight; at rest alone it tells little of it, as hover and flight differ."""
         return bool(np.any(np.abs(self.at.J) > IN_FLIGHT_J))
 
     def near(self, p: Population, at: Sensed) -> tuple[Array, Array, Array]:

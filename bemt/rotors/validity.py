@@ -146,7 +146,9 @@ class Validity:
         P = np.size(x)
         M_tip = np.asarray(M_tip, dtype=float)
         mach = (1.0 + np.maximum(M_tip - max(self.M_tip, FREE_MACH), 0.0) / (1.0 - FREE_MACH)) ** 2 - 1.0
-        beyond = np.maximum(np.maximum(self.x[0] - x, x - self.x[1]), 0.0)
+        ahead, behind = (
+            self.x[1] / LENGTH_X * np.log1p(np.maximum(far, 0.0) / self.x[1]) for far in (x - self.x[1], self.x[0] - x)
+        )
         size, Reynolds = _folds(diameter_m, self.diameter_m), _folds(Re, self.Re)
         parts: list[tuple[ArrayLike, str, ArrayLike, str]] = [
             (size, "diameter {:.3g} m", diameter_m, _ends(self.diameter_m)),
@@ -154,12 +156,12 @@ class Validity:
             (_folds(blades, self.blades), "{:.0f} blades", blades, _ends(self.blades)),
             (_folds(pitch_over_D, self.pitch_over_D), "pitch/D {:.2f}", pitch_over_D, _ends(self.pitch_over_D)),
             (DUCT**2 - 1.0 if ducted else 0.0, "a duct", 0.0, "none"),
-            (self.x[1] / LENGTH_X * np.log1p(beyond / self.x[1]), "J {:.3g} times that of zero thrust", x,
-             _ends(self.x)),
+            (ahead, "J {:.3g} times that of zero thrust", x, _ends(self.x)),
+            (behind, "descent at J {:.3g} times that of zero thrust", x, _ends(self.x)),
             (mach, "tip Mach {:.2f}", M_tip, f"up to {self.M_tip:.2f}"),
         ]  # fmt: skip
         more = [np.broadcast_to(np.nan_to_num(part), P) for part, *_ in parts]
-        factor = np.sqrt(1.0 + np.sum(more, axis=0) - np.minimum(size, Reynolds))
+        factor = np.sqrt(1.0 + np.sum(more, axis=0) - np.minimum(more[0], more[1]))
         said: list[tuple[str, ...]] = [()] * P
         for i in np.flatnonzero(np.max(more, axis=0) > SAID**2 - 1.0).tolist():
             why = [
@@ -168,7 +170,7 @@ class Validity:
                 if part[i] > SAID**2 - 1.0
             ]
             doubt = f"; {DOUBT}" if factor[i] >= DOUBTFUL else ""
-            words = f"{OUTSIDE}: {', '.join(why)}: model error times {factor[i]:.2g}{doubt}"
+            words = f"{OUTSIDE}: {', '.join(why)}: model error times {factor[i]:.3g}{doubt}"
             said[i] = (words,)
         return np.asarray(factor, dtype=float), tuple(said)
 

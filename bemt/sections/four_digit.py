@@ -13,11 +13,12 @@ laminar separation sets in).
 from __future__ import annotations
 
 from functools import cache
-from importlib import resources
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from bemt.base.cache import shipped_arrays
 
 Array = NDArray[np.float64]
 
@@ -75,9 +76,9 @@ def unpack(packed: NDArray[np.uint8]) -> NDArray[np.float32]:
 @cache
 def table() -> Table:
     """The shipped table, read once."""
-    with resources.files("bemt.sections").joinpath(FILE).open("rb") as stream, np.load(stream) as found:
-        axes = tuple(found[name] for name in AXES)
-        return Table(axes, found["alpha_deg"], found["Re"], unpack(found["packed"]), str(found["made_with"]))
+    found = shipped_arrays("bemt.sections", FILE)
+    axes = tuple(found[name] for name in AXES)
+    return Table(axes, found["alpha_deg"], found["Re"], unpack(found["packed"]), str(found["made_with"]))
 
 
 def covers(shape: tuple[float, float, float] | None, n_crit: float) -> bool:

@@ -68,7 +68,7 @@ def observe(propeller: UiucPropeller, effects: Sequence[Effect], stations: Stati
     y = np.array([drawn.CT[here], drawn.CP[here]])
     record = MeasuredRotor(
         **vars(at), name=propeller.name, family=propeller.family, section=section_rule.source(propeller.family),
-        gap_deg=gap, static=drawn.static[here], y=y, chord=chord / rotor.R, blade_class=class_of(propeller.family),
+        gap_deg=gap, static=drawn.static[here], y=y, blade_class=class_of(propeller.family),
     )  # fmt: skip
     return Observed(propeller, solve, drawn, record)
 

@@ -28,7 +28,7 @@ SCHEMA = "bemt.left_out/3"
 GROUPS = 6
 """Families are left out in so many groups, dealt out by name."""
 # Steps of the search with a family left out, from the numbers of all families.
-_STEPS_LEFT_OUT = 15
+_STEPS_LEFT_OUT = 10
 _WORDS = {
     "as_drawn": "solver on the stations as given",
     "family_known": "as built, its family in the population",
@@ -72,9 +72,9 @@ def _covered(one: Observed) -> Validity:
     return Validity.of_rotor(m.diameter_m, rotor.B, rotor.blade.pitch_m() / rotor.D, x, m.Re, fastest)
 
 
-def leave_out(seen: Sequence[Observed], name: str, say: Say = None) -> dict[str, Any]:
+def leave_out(seen: Sequence[Observed], name: str, fitted: tuple[Population, Any], say: Say = None) -> dict[str, Any]:
     """Every family predicted by a population fitted without it and its group, sections unknown unless published."""
-    everything, numbers = fit_population(seen, name)
+    everything, numbers = fitted
     pools = {key: Pool() for key in _WORDS}
     families = sorted({s.record.family for s in seen})
     for group in (families[i::GROUPS] for i in range(min(GROUPS, len(families)))):
@@ -137,8 +137,9 @@ def table(document: dict[str, Any]) -> str:
     scores = [log_score(total) for total in (n, *document["transfer"].values())]
     lines += [
         "",
-        f"Percent of the measured value; {len(document['families'])} families in {GROUPS} groups; static {n['static']['points']} points of"
-        f" {n['static']['propellers']} propellers, forward {n['forward']['points']} of {n['forward']['propellers']}.",
+        f"Percent of the measured value; {len(document['families'])} families in {GROUPS} groups; static"
+        f" {n['static']['points']} points of {n['static']['propellers']} propellers, forward"
+        f" {n['forward']['points']} of {n['forward']['propellers']}.",
         f"Mean log score of held-out families and of each volume: {', '.join(f'{s:.3f}' for s in scores)}.",
         "68 %, 95 %: share of the points inside those intervals; width: median half width of the 68 % interval.",
     ]
