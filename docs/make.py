@@ -25,6 +25,7 @@ from bemt.cfd.schema import AxesTable, CampaignFile
 from bemt.diagnose.nuisance import PRIORS
 from bemt.drive.motor_file import MotorToml
 from bemt.drive.thrusters_result import ThrustersFile
+from bemt.readers.cfd_run import RunColumn, RunColumns, RunToml
 from bemt.readers.recording_toml import ColumnsTable, ColumnTable, RecordingToml
 from bemt.report import effects_list
 
@@ -94,6 +95,7 @@ CFD = [
 FILES: dict[str, tuple[type[Table], str]] = {
     "case": (CaseFile, "A propeller or fan: all inputs of the solver. Six lines are enough:"),
     "recording": (RecordingToml, "Next to a table of measurements, if its headings do not say enough:"),
+    "run": (RunToml, "One CFD run; `bemt import FILES --out run.toml` writes it, every command takes it:"),
     "motor": (MotorToml, "Measurements of a motor constant, for `bemt motor`:"),
     "thrusters": (ThrustersFile, "For `bemt thrusters`:"),
     "campaign": (CampaignFile, "OpenFOAM runs of one case, for `bemt cfd`:"),
@@ -120,6 +122,9 @@ def tables(model: type[Table], name: str = "") -> Iterator[tuple[str, type[Table
     yield name, model
     if model is ColumnsTable:
         yield "columns.NAME", ColumnTable
+        return
+    if model is RunColumns:
+        yield "columns.NAME", RunColumn
         return
     for key in model.named():
         inner = model.inner(key)

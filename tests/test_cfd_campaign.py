@@ -327,17 +327,23 @@ def test_the_default_work_folder_is_private_and_held_by_one_campaign(
     assert {p.name for p in folder.iterdir()} == {"notes"}
 
 
-def test_a_row_whose_settings_changed_is_replaced_and_u_has_a_floor(project: Path, tmp_path: Path, programs: Path) -> None:
+def test_a_row_whose_settings_changed_is_replaced_and_u_has_a_floor(
+    project: Path, tmp_path: Path, programs: Path
+) -> None:
     path = write(tmp_path / "c", project, TWO)
     command = ["cfd", str(path), "--ranks", "1", "--work", str(tmp_path / "w"), "--quiet"]
     assert main(command) == 0
     before = rows_of(path.parent)
     for row in before:  # one grid, loads that do not move: nothing smaller than the floor can be claimed
-        assert float(row["u_thrust_N"]) == pytest.approx(GRID_FLOOR["rest"]["thrust_N"] * float(row["thrust_N"]), rel=1e-3)
+        assert float(row["u_thrust_N"]) == pytest.approx(
+            GRID_FLOOR["rest"]["thrust_N"] * float(row["thrust_N"]), rel=1e-3
+        )
     write(path.parent, project, TWO.replace("average = 10", "average = 12"))
     assert main(command) == 0
     after = rows_of(path.parent)
-    assert [row["rpm"] for row in after] == ["6000", "9000"] and {r["run"] for r in after}.isdisjoint(r["run"] for r in before)
+    assert [row["rpm"] for row in after] == ["6000", "9000"] and {r["run"] for r in after}.isdisjoint(
+        r["run"] for r in before
+    )
 
 
 @pytest.mark.parametrize("name", ["a/../h/deadly", "..", "/h", ".hidden", "a b", "x\\n", "-x"])

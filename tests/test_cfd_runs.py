@@ -6,6 +6,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -56,7 +57,8 @@ def foam(put: Callable[..., Path]) -> list[str]:
     for file, axis in (("force", T), ("moment", -Q)):
         names = " ".join(f"{p}_{a}" for p in ("total", "pressure", "viscous") for a in "xyz")
         rows = "".join(
-            f"{k}\t0.01 -0.01 {v:.8e}\t0.01 -0.01 {0.9 * v:.8e}\t0 0 {0.1 * v:.8e}\n" for k, v in enumerate(steady(axis), 1)
+            f"{k}\t0.01 -0.01 {v:.8e}\t0.01 -0.01 {0.9 * v:.8e}\t0 0 {0.1 * v:.8e}\n"
+            for k, v in enumerate(steady(axis), 1)
         )
         put(f"postProcessing/forces/0/{file}.dat", f"# {file.title()}\n# CofR : (0 0 0)\n#\n# Time \t{names}\n{rows}")
     put("postProcessing/outlet/0/surfaceFieldValue.dat",
@@ -81,14 +83,25 @@ FORCE = 0.5 * RHO * SPEED**2 * AREA
 def su2(put: Callable[..., Path]) -> list[str]:
     head = '"Time_Iter","Outer_Iter","Inner_Iter",     "rms[Rho]"     ,   "RefForce"   ,   "CFx"   ,   "CFy"   ,   "CFz"   ,   "CMx"   ,   "CMy"   ,   "CMz"   \n'
     rows = zip(steady(T / FORCE), steady(Q / FORCE / LENGTH), strict=True)
-    put("history.csv", head + "".join(f"0, 0, {k}, -5.0, {FORCE:.9g}, 0, 0, {f:.9g}, 0, 0, {m:.9g}\n" for k, (f, m) in enumerate(rows)))
+    put(
+        "history.csv",
+        head
+        + "".join(f"0, 0, {k}, -5.0, {FORCE:.9g}, 0, 0, {f:.9g}, 0, 0, {m:.9g}\n" for k, (f, m) in enumerate(rows)),
+    )
     return ["history.csv"]
 
 
 def flow360(put: Callable[..., Path]) -> list[str]:
     rows = zip(steady(T / FORCE), steady(Q / FORCE / LENGTH), strict=True)
     text = "physical_step, pseudo_step, CL, CD, CFx, CFy, CFz, CMx, CMy, CMz, HeatTransfer\n"
-    put("total_forces_v2.csv", text + "".join(f"0, {10 * k}, 0, 0, 0, 0, {f:.9g}, 0, 0, {m:.9g}, 0,\n".replace(", 0,\n", ", 0\n") for k, (f, m) in enumerate(rows)))
+    put(
+        "total_forces_v2.csv",
+        text
+        + "".join(
+            f"0, {10 * k}, 0, 0, 0, 0, {f:.9g}, 0, 0, {m:.9g}, 0,\n".replace(", 0,\n", ", 0\n")
+            for k, (f, m) in enumerate(rows)
+        ),
+    )
     return ["total_forces_v2.csv"]
 
 
@@ -100,18 +113,27 @@ def post(put: Callable[..., Path]) -> list[str]:
 
 def workbench(put: Callable[..., Path]) -> list[str]:
     head = "# 5/22/2017 3:33:44 PM\n# The parameters defined in the project are:\n# ,P1 - rpm [rev min^-1],P2 - thrust-op [N],P3 - torque-op [N m]\n#\n# The following header line defines the name of the columns by reference to the parameters.\nName,P1,P2,P3\n"
-    rows = "".join(f"DP {k},{n},{-T * (n / RPM) ** 2:.7g},{Q * (n / RPM) ** 2:.7g}\n" for k, n in enumerate((4000, 6000, 8000)))
+    rows = "".join(
+        f"DP {k},{n},{-T * (n / RPM) ** 2:.7g},{Q * (n / RPM) ** 2:.7g}\n" for k, n in enumerate((4000, 6000, 8000))
+    )
     put("points.csv", head + rows + "DP 3,10000,,\n")
     return ["points.csv"]
 
 
 def force_report(put: Callable[..., Path]) -> list[str]:
     text = '                  "Force Report"\n'
-    for title, unit, total in (("Forces - Direction Vector (0 0 1)", "Forces [N]", T), ("Moments - Moment Center (0 0 0) Moment Axis (0 0 1)", "Moments [N m]", Q)):
+    for title, unit, total in (
+        ("Forces - Direction Vector (0 0 1)", "Forces [N]", T),
+        ("Moments - Moment Center (0 0 0) Moment Axis (0 0 1)", "Moments [N m]", Q),
+    ):
         zones = {"blade": 0.7 * total, "hub": 0.1 * total, "duct": 0.2 * total}
         rows = [f"{z}    {0.9 * v:.8g}   {0.1 * v:.8g}   {v:.8g}" for z, v in [*zones.items(), ("Net", total)]]
         rule = "------ ------ ------ ------"
-        text += f"\n{title}\n          {unit}\nZone      Pressure   Viscous   Total\n" + "\n".join([*rows[:3], rule, rows[3]]) + "\n"
+        text += (
+            f"\n{title}\n          {unit}\nZone      Pressure   Viscous   Total\n"
+            + "\n".join([*rows[:3], rule, rows[3]])
+            + "\n"
+        )
     put("report.txt", text)
     return ["report.txt"]
 
@@ -144,7 +166,6 @@ def put(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Path]:
     return write
 
 
-
 @pytest.mark.parametrize("name", RUNS)
 def test_every_program_becomes_the_same_run(
     name: str, put: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -170,7 +191,9 @@ def load_run(path: str) -> Any:
     return import_file(path)
 
 
-def test_what_no_file_says_is_asked_for_all_at_once_and_as_it_is_typed(put: Callable[..., Path], capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_no_file_says_is_asked_for_all_at_once_and_as_it_is_typed(
+    put: Callable[..., Path], capsys: pytest.CaptureFixture[str]
+) -> None:
     files = fluent(put)
     assert main(["import", *files]) == 0
     said = capsys.readouterr().out
@@ -276,7 +299,10 @@ def test_the_start_up_is_cut_and_a_run_that_moves_says_so(put: Callable[..., Pat
 
 def test_propeller_info_of_openfoam_gives_coefficients(put: Callable[..., Path]) -> None:
     rows = "".join(f"{k}\t25\t2.5\t0.5\t0.2\t0.3\t0.53\n" for k in range(1, 40))
-    put("propellerPerformance.dat", f"# Propeller performance\n# Radius : 0.1\n#\n# Time\tn\tURef\tJ\tKT\t10*KQ\teta0\n{rows}")
+    put(
+        "propellerPerformance.dat",
+        f"# Propeller performance\n# Radius : 0.1\n#\n# Time\tn\tURef\tJ\tKT\t10*KQ\teta0\n{rows}",
+    )
     run = run_of(["propellerPerformance.dat"], {})
     found = {k: float(v[0]) for k, v in run.values.items()}
     assert found == pytest.approx({"rpm": 1500.0, "airspeed_m_s": 2.5, "CT": 0.2, "CQ": 0.03, "J": 0.5})
@@ -299,7 +325,10 @@ def _tuples(value: Any) -> Any:
 
 
 def test_a_run_toml_says_all_its_faults(put: Callable[..., Path], capsys: pytest.CaptureFixture[str]) -> None:
-    put("run.toml", '[run]\nfiles = ["absent.out"]\nsector = 0\n[columns]\nthrust = { unit = "kg", sign = 2 }\ntork = {}\n')
+    put(
+        "run.toml",
+        '[run]\nfiles = ["absent.out"]\nsector = 0\n[columns]\nthrust = { unit = "kg", sign = 2 }\ntork = {}\n',
+    )
     assert main(["import", "run.toml"]) == 2
     said = capsys.readouterr().out
     assert all(word in said for word in ("run.sector", "columns.thrust", "columns.tork"))
@@ -310,7 +339,9 @@ def test_a_run_toml_says_all_its_faults(put: Callable[..., Path], capsys: pytest
     [(b"\x89HDF\r\n\x1a\n" + bytes(64), "HDF5"), (b"FORMAT\ntype: ensight gold\n\nGEOMETRY\nmodel: a.geo\n", "EnSight"),
      (b"# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\n", "VTK"), (b'<?xml version="1.0"?>\n<VTKFile type="PolyData">\n', "VTK")],
 )  # fmt: skip
-def test_fields_get_one_sentence_with_the_export_to_make(head: bytes, word: str, put: Callable[..., Path], capsys: pytest.CaptureFixture[str]) -> None:
+def test_fields_get_one_sentence_with_the_export_to_make(
+    head: bytes, word: str, put: Callable[..., Path], capsys: pytest.CaptureFixture[str]
+) -> None:
     put("field.dat", "").write_bytes(head)
     assert main(["import", "field.dat"]) == 2
     said = capsys.readouterr().out
@@ -320,7 +351,17 @@ def test_fields_get_one_sentence_with_the_export_to_make(head: bytes, word: str,
 def test_the_grid_is_named_before_any_physics(put: Callable[..., Path], capsys: pytest.CaptureFixture[str]) -> None:
     files = fluent(put)
     for name, cells in (("coarse", "1e6"), ("fine", "4e6")):
-        args = ["--rpm", "8000", "--unit", "thrust=N", "--unit", "torque=N m", "--setup", f"cells={cells}", f"grid_level={name}"]
+        args = [
+            "--rpm",
+            "8000",
+            "--unit",
+            "thrust=N",
+            "--unit",
+            "torque=N m",
+            "--setup",
+            f"cells={cells}",
+            f"grid_level={name}",
+        ]
         assert main(["import", *files, *args, "--out", f"{name}.toml"]) == 0
     a, b = load_run("coarse.toml"), load_run("fine.toml")
     assert conditions_that_differ(a, b) == {"grid_level": ("coarse", "fine"), "cells": ("1,000,000", "4,000,000")}
@@ -328,7 +369,9 @@ def test_the_grid_is_named_before_any_physics(put: Callable[..., Path], capsys: 
     capsys.readouterr()
     assert main(["compare", "coarse.toml", "fine.toml", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
-    assert (found["verdict"], found["effects"]) == ("insufficient", []) and found["rule"].startswith("the grid differs: level coarse and fine")
+    assert (found["verdict"], found["effects"]) == ("insufficient", []) and found["rule"].startswith(
+        "the grid differs: level coarse and fine"
+    )
     assert found["ratios"]["thrust_N"]["ratio"] == pytest.approx(1.0)
 
 
@@ -362,3 +405,109 @@ def test_the_floor_is_what_our_own_grids_differ_by(project: Path) -> None:
         thrust, torque = np.sqrt(np.mean(np.square(pairs), axis=0))
         assert GRID_FLOOR[state]["thrust_N"] == pytest.approx(thrust, abs=6e-4)
         assert GRID_FLOOR[state]["torque_Nm"] == pytest.approx(torque, abs=6e-4)
+
+
+def ds30(put: Callable[..., Path], folder: str = "") -> list[str]:
+    """The fan of the thesis as a transient run of Fluent writes it: two zones in one file, 55,000 rev/min, 1 deg a step."""
+    period = 60.0 / 55000.0
+    t = period / 360.0 * np.arange(1, 360 * 6 + 1)
+    ripple = 1.0 + 0.01 * np.sin(2 * math.pi * 11 * t / period) + 4.0 * np.exp(-t / (0.3 * period))
+    rows = "".join(
+        f"{k} {-17.0 * r:.7g} {-6.5 * r:.7g} {c:.7g}\n" for k, (r, c) in enumerate(zip(ripple, t, strict=True), 1)
+    )
+    head = (
+        '"thrust-rfile"\n"Time Step" "thrust(rotor) etc.."\n("Time Step" "thrust(rotor)" "thrust(duct)" "flow-time")\n'
+    )
+    put(f"{folder}thrust-rfile.out", head + rows)
+    put(f"{folder}torque-rfile.out", rfile("torque", 0.285 * ripple, t))
+    return [f"{folder}thrust-rfile.out", f"{folder}torque-rfile.out"]
+
+
+DS30 = ["--rpm", "55000", "--unit", "thrust=N", "--unit", "torque=N m", "--zones", "rotor,duct", "--airspeed", "0"]
+
+
+def test_one_point_stands_beside_bemt_on_one_screen(
+    put: Callable[..., Path], project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    case = str(project / "cases" / "ds30")
+    assert main(["import", *ds30(put), *DS30, "--out", "run.toml"]) == 0
+    capsys.readouterr()
+    assert main(["compare", "run.toml", "--case", case, "--out", "out", "--quiet"]) == 0
+    found = json.loads(Path("out/comparison.json").read_text())
+    (point,) = found["points"]
+    loads = point["loads"]
+    assert loads["thrust_N"]["cfd"] == pytest.approx(23.5, rel=1e-3) and loads["torque_Nm"]["cfd"] == pytest.approx(
+        0.285, rel=1e-3
+    )
+    assert loads["duct_share"]["cfd"] == pytest.approx(6.5 / 23.5, rel=1e-3)
+    for load in loads.values():
+        assert load["u_cfd"] > 0 and load["u_bemt"] > 0 and set(load["u_bemt_by"]) == {"input", "model", "numerics"}
+        assert load["u_both"] == pytest.approx(math.hypot(load["u_cfd"], load["u_bemt"]))
+    assert {"grid study", "domain against disk"} <= {line["topic"] for line in found["audit"]}
+    from bemt.compare import one_run
+
+    screen = one_run.text(found)
+    assert len(screen.splitlines()) <= 40 and max(map(len, screen.splitlines())) <= 120
+    assert "no grid study: at least" in screen and "No cause is named from one point" in screen
+    assert not {"verdict", "effects"} & found.keys()
+
+
+@pytest.mark.slow
+def test_the_fan_of_the_thesis_goes_the_whole_road(
+    put: Callable[..., Path], project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    case = tmp_path / "ds30"
+    shutil.copytree(project / "cases" / "ds30", case)
+    assert main(["import", *ds30(put), *DS30, "--out", str(case / "run.toml")]) == 0
+    assert main(["compare", str(case / "run.toml"), "--case", str(case)]) == 0
+    capsys.readouterr()
+    assert main(["diagnose", str(case / "run.toml"), "--case", str(case), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["verdict"] == "insufficient"
+    assert main(["sweep", str(case), "--json"]) == 0
+    (result,) = json.loads(capsys.readouterr().out)["cases"]
+    (row,) = [r for r in result["rows"] if r["source"] == "cfd" and r["origin"] == "run.toml"]
+    assert row["thrust_N"] == pytest.approx(23.5, rel=1e-3) and row["torque_Nm"] == pytest.approx(0.285, rel=1e-3)
+    assert any(a["reference"] == row["label"] for a in result["audit"])
+    assert main(["report", str(case), "--out", "page", "--quiet"]) == 0
+    assert "run.toml" in next(Path("page").glob("*.html")).read_text()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [n for n in RUNS if n != "Fluent, transient"])
+def test_every_program_goes_from_import_to_diagnose(
+    name: str, put: Callable[..., Path], project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    make, options = RUNS[name]
+    case = str(project / "cases" / "prop_8x5")
+    assert main(["import", *make(put), *options, "--out", "run.toml"]) == 0
+    assert main(["compare", "run.toml", "--case", case]) == 0
+    assert main(["diagnose", "run.toml", "--case", case]) == 0
+
+
+def test_the_shared_exports_become_runs(shared_data: Path) -> None:
+    folder = shared_data / "cfd_exports"
+    screw = {"columns": {"torque": {"column": "report-def-0", "unit": "N m"}}}
+    run = assemble(
+        RunToml.model_validate({"run": {"files": ("screw/report-def-0-rfile_1_1.out",), "rpm": 130.2}, **screw}), folder
+    )
+    assert run["torque_Nm"][0] == pytest.approx(0.17547, abs=5e-6)
+    run = assemble(
+        RunToml.model_validate(
+            {"run": {"files": ("openfoam_propeller/force.dat", "openfoam_propeller/moment.dat"), "rpm": 900.0}}
+        ),
+        folder,
+    )
+    assert run["thrust_N"][0] == pytest.approx(878.467, rel=1e-4) and run.u["thrust_N"][0] > 0.072 * 878.0
+    points = {"columns": {"rpm": {"unit": "rad/s"}, "torque": {"unit": "N m"}}}
+    run = assemble(RunToml.model_validate({"run": {"files": ("axial_fan/DesignPoints.csv",)}, **points}), folder)
+    assert run["rpm"] == pytest.approx(1485.24, rel=1e-4) and run["torque_Nm"][0] == 0.0597
+    run = assemble(
+        RunToml.model_validate({"run": {"files": ("force_report/FX", "force_report/MX"), "rpm": 100.0}}), folder
+    )
+    assert run["thrust_N"][0] == pytest.approx(412.506, rel=1e-5)
+    sphere = {"files": ("openfoam_old/0/forces.dat", "openfoam_old/100/forces.dat"), "rpm": 100.0, "axis": "x"}
+    with pytest.raises(InputError, match="a run that has converged"):  # two starts of one history, joined
+        assemble(RunToml.model_validate({"run": sphere}), folder)
+    with pytest.raises(InputError, match="another clock"):
+        files = ("screw/report-def-0-rfile.out", "screw/report-def-0-rfile_1_1.out")
+        assemble(RunToml.model_validate({"run": {"files": files, "rpm": 130.2}, **screw}), folder)

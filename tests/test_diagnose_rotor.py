@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
-from diagnosing import case, points, recording
+from diagnosing import CASES, case, points, recording
 
+from bemt.case import load_case
 from bemt.dataset import Dataset
 from bemt.diagnose import chain, wrong_rotor_check
 from bemt.diagnose.assemble import build
+from bemt.diagnose.load import load
 from bemt.diagnose.record import from_series
 
 
@@ -82,3 +85,16 @@ def test_repeats_that_differ_as_no_stand_does_name_nothing() -> None:
     reference = replace(from_series(plain, base), reference=True)
     answer = chain.diagnose([test, reference], [base], nulls=200)
     assert answer.decision.effects == () and any("not recorded" in f for f in answer.problem.findings)
+
+
+def test_an_exact_relation_names_the_fault_that_the_loads_leave_open(tmp_path: Path) -> None:
+    """Two counters of one shaft are 6/7 apart: a speed of 7/6 was called inconsistent and nothing was named."""
+    rng = np.random.default_rng(0)
+    n = np.linspace(65.0, 150.0, 12)
+    T, Q = 0.105 * 1.2 * n**2 * 0.254**4, 0.0075 * 1.2 * n**2 * 0.254**5
+    rows = zip(60.0 * n, 70.0 * n, *(v * (1.0 + 0.003 * rng.standard_normal(12)) for v in (T, Q)), strict=True)
+    text = "".join(",".join(f"{x:.7g}" for x in row) + "\n" for row in rows)
+    (tmp_path / "log.csv").write_text("electrical_rpm,optical_rpm,thrust_N,torque_Nm\n" + text, encoding="utf-8")
+    known = load_case(CASES / "prop_10x5")
+    said = chain.diagnose([load(str(tmp_path / "log.csv"), known)], [known], nulls=100).said
+    assert (said.verdict, said.effects) == ("sensor", ("rpm_scale",)) and "must be 1" in said.why

@@ -179,7 +179,7 @@ def asked(**changed: Any) -> Any:
     plain = {
         "first": lead, "leading": lead, "rest": 0.0, "odds": 100.0, "needed": 8.0, "p_value": 0.002, "on": False,
         "expected": False, "paired": False, "sure": ("reynolds",), "group": ("reynolds",), "beside": (), "few": (),
-        "likely": ("reynolds",), "wide": ("reynolds",),
+        "likely": ("reynolds",), "wide": ("reynolds",), "drive_only": False,
         "P": {NONE: 0.0, UNKNOWN: 0.0, lead: 1.0}, "share": {"reynolds": 1.0}, "unlisted": 0.0, "roughness": 1.0,
         "vague": 0.0, "alone": True, "level": 0.0, "another_blade": False, "factor": False, "real": False,
         "parameters": {"reynolds": {}},
@@ -199,6 +199,12 @@ ROWS: dict[str, dict[str, Any]] = {
     "nulls look like it": {"p_value": 0.2},
     "nulls nearly look like it": {"p_value": 0.03},
     "nothing is likelier than anything": {"P": {NONE: 0.6, UNKNOWN: 0.0}},
+    "a drive that changed smoothly": {
+        "P": {NONE: 0.0, UNKNOWN: 0.6, REYNOLDS: 0.4},
+        "vague": 104.0,
+        "drive_only": True,
+        "alone": False,
+    },
     "unknown, and not much better than nothing": {"P": {NONE: 0.0, UNKNOWN: 0.6}, "vague": 4.9},
     "unknown is likelier than all": {"P": {NONE: 0.0, UNKNOWN: 0.6, REYNOLDS: 0.4}, "vague": 20.0},
     "a smooth rest is left": {"rest": 10.5},
@@ -332,8 +338,9 @@ REVISIONS: dict[str, tuple[verdict.Decision, dict[str, Any], str]] = {
         "class",
     ),
 }
-# Rules that need a solved problem: tested on one.
+# Rules that need a solved problem or a file: tested on one.
 BY_MODEL = (
+    "an exact relation in the file",
     "does not predict", "on, and out of its range", "a few are left", "many are left",
     "the ratios to the reference forbid a none",
 )  # fmt: skip

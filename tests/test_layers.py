@@ -55,6 +55,7 @@ ROOMS: tuple[str, ...] = (
 MAY: dict[str, set[str]] = {
     "bemt.commands.*": {"print", "files", "environment", "clock"},  # and nothing else prints
     "bemt.base.cache": {"files", "environment"},
+    "bemt.base.checkout": {"files"},
     "bemt.base.folders": {"environment"},
     "bemt.base.tables|bemt.base.toml_text": {"files"},
     "bemt.case|bemt.case.*": {"files"},
@@ -62,6 +63,7 @@ MAY: dict[str, set[str]] = {
     "bemt.readers|bemt.readers.*": {"files"},
     "bemt.recordings.adapt|bemt.recordings.archive|bemt.recordings.database|bemt.recordings.load": {"files"},
     "bemt.rotors.k1k2_points|bemt.rotors.k1k2_calibration": {"files"},
+    "bemt.recordings.cfd_options|bemt.recordings.cfd_run": {"files"},
     "bemt.sweep.grid.*|bemt.sweep.store|bemt.validate.folder": {"files"},
     "bemt.sweep.batch": {"files", "environment"},
     "bemt.compare.bench.*": {"files", "clock", "environment"},

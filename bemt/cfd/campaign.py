@@ -188,7 +188,9 @@ def _locked(folder: Path) -> Iterator[None]:
         lock.acquire(timeout=0)
     except Timeout:
         hint = "Wait for it, or give another folder: --work DIR"
-        raise InputError(Fault(folder.as_posix(), "", "a work folder in use by another campaign", "a free one", hint)) from None
+        raise InputError(
+            Fault(folder.as_posix(), "", "a work folder in use by another campaign", "a free one", hint)
+        ) from None
     try:
         yield
     finally:

@@ -218,15 +218,21 @@ class CampaignRecord:
         for run in gone:
             (self.folder / "histories" / f"{run}.csv").unlink(missing_ok=True)
         asked = [row for row in self.rows if row["run"] in order]
-        self.rows = [row for row in self.rows if row["run"] in order or not any(_same_point(row, other) for other in asked)]
+        self.rows = [
+            row for row in self.rows if row["run"] in order or not any(_same_point(row, other) for other in asked)
+        ]
         studies = self.studies()
         for row in self.rows:
             grid = {k: grid_floor(k, row["airspeed_m_s"] > 0.0) for k in ("thrust_N", "torque_Nm")}
             grid |= grid_uncertainty(studies, row)
             for key in ("thrust_N", "torque_Nm"):
                 name = key.partition("_")[0]
-                relative = math.hypot(row[f"scatter_{name}"], row[f"drift_{name}"], grid.get(key, 0.0))
-                row[f"u_{key}"] = abs(row[key]) * relative if row["converged"] == 1 else math.nan
+                written = (
+                    float(f"{row[k]:.7g}") for k in (f"scatter_{name}", f"drift_{name}", key)
+                )  # reading changes nothing
+                scatter, drift, load = written
+                relative = math.hypot(scatter, drift, grid[key])
+                row[f"u_{key}"] = abs(load) * relative if row["converged"] == 1 else math.nan
         write_atomic(self.path, csv_text(COLUMNS, _short(self.rows)))
         names = set(order)
         done = [row for row in self.rows if row["run"] in names]

@@ -176,8 +176,8 @@ class Worker:
         with (folder / f"out.{step}").open("wb") as stream:
             process = subprocess.Popen(["./Allrun", step], cwd=folder, stdout=stream, stderr=subprocess.STDOUT,
                                        env={**os.environ, "NP": str(self.ranks)}, start_new_session=True)  # fmt: skip
-            watch = subprocess.Popen(["/bin/sh", "-c", _WATCH, "sh", str(process.pid)], stdin=subprocess.PIPE,
-                                     stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)  # fmt: skip
+            quiet: Any = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "start_new_session": True}
+            watch = subprocess.Popen(["/bin/sh", "-c", _WATCH, "sh", str(process.pid)], stdin=subprocess.PIPE, **quiet)
             try:
                 return process.wait()
             except BaseException:
@@ -347,7 +347,9 @@ def _means(values: dict[str, Any], history: Array, s: Settings, code: int, balan
         if not abs(drift) <= DRIFT_LIMIT:
             why.append(f"{key} drifts by {drift:+.1%} over the last {s.average} iterations (limit {DRIFT_LIMIT:.0%})")
         if not scatter <= SCATTER_LIMIT:
-            why.append(f"{key} scatters by {scatter:.1%} over the last {s.average} iterations (limit {SCATTER_LIMIT:.0%})")
+            why.append(
+                f"{key} scatters by {scatter:.1%} over the last {s.average} iterations (limit {SCATTER_LIMIT:.0%})"
+            )
     if code == 0 and balanced and not why:
         parts = {"thrust_rotor_N": 1, "thrust_standing_N": 3}
         values |= {"thrust_N": means["thrust"], "torque_Nm": means["torque"], "converged": 1}

@@ -26,19 +26,25 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     run.add_argument("--unit", metavar="NAME=UNIT", help="unit of a quantity or column: thrust=N, report-def-0='N m'",
                      **_options.REPEATABLE)  # fmt: skip
     run.add_argument("--column", metavar="NAME=COLUMN", help="column of a quantity: thrust=fz", **_options.REPEATABLE)
-    run.add_argument("--sign", metavar="NAME=-1", help="sign of a load: torque=-1; -1 alone: of all (default: positive)",
+    run.add_argument("--sign", metavar="NAME=-1", help="sign of a load: torque=-1; -1 alone: all (default: positive)",
                      **_options.REPEATABLE)  # fmt: skip
     sector = "the model is one of N equal sectors: multiply loads by N"
     run.add_argument("--sector", type=_options.positive, metavar="N", help=sector)
-    run.add_argument("--zones", default=[], metavar="ZONE", help="zones whose loads count: blade,hub,duct", **_options.MANY)
+    run.add_argument(
+        "--zones", default=[], metavar="ZONE", help="zones whose loads count: blade,hub,duct", **_options.MANY
+    )
     run.add_argument("--axis", choices=("x", "y", "z"), help="axis of the shaft (default: the largest force)")
     run.add_argument("--airspeed", type=float, metavar="V", help="speed of flight [m/s]")
     run.add_argument("--density", type=float, metavar="RHO", help="density of the fluid [kg/m3]")
     reference = "what coefficients rest on: area=A,length=L,speed=V,density=RHO [m2, m, m/s, kg/m3]"
     run.add_argument("--reference", default=[], metavar="NAME=X", help=reference, **_options.MANY)
-    setup = "how it was computed: cells=2.1e6 grid_level=fine turbulence='k-omega SST' solver=pressure steady=no gci_pct=2"
+    setup = (
+        "how it was computed: cells=2.1e6 grid_level=fine turbulence='k-omega SST' solver=pressure steady=no gci_pct=2"
+    )
     run.add_argument("--setup", default=[], metavar="NAME=X", help=setup, **_options.MANY)
-    run.add_argument("--out", metavar="RUN.TOML", help="write the run here; every command takes it in place of the files")
+    run.add_argument(
+        "--out", metavar="RUN.TOML", help="write the run here; every command takes it in place of the files"
+    )
 
 
 def run(args: argparse.Namespace) -> int:

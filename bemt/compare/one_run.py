@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import os
+import textwrap
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -31,6 +32,7 @@ SCHEMA = "bemt.run-comparison/1"
 _LOADS = {"thrust_N": "thrust [N]", "torque_Nm": "torque [N m]", "duct_share": "duct's share"}
 _ROWS = 6  # points on one screen
 _WIDE = 2.0  # combined standard uncertainties within which nothing is shown to differ
+_FAR = 1.5  # ratio of the loads beyond which a slip is likelier than physics
 _NAMES = {"program": "", "cells": "cells", "grid_level": "grid", "turbulence": "", "solver": "", "domain": "domain"}
 
 
@@ -42,13 +44,17 @@ def cfd_points(path: str) -> tuple[Dataset, Dataset]:
     if is_run(imported):
         return imported, imported
     if imported.kind == "cfd" and imported.provenance.get("clock") in ("time", "iteration", "none"):
-        hint = f"`python -m bemt import {path}` says what it needs to be one: --rpm, units, zones; --out run.toml keeps it"
+        hint = (
+            f"`python -m bemt import {path}` says what it needs to be one: --rpm, units, zones; --out run.toml keeps it"
+        )
         raise InputError(Fault(path, "", "exports of CFD, not yet a run", "a run.toml", hint))
     points = named(as_dataset(imported))
     known = points.values.keys() & {"thrust_N", "torque_Nm", "CT", "CQ", "CP"}
     if not known or ("rpm" not in points and "thrust_N" in points):
         got = f"channels {', '.join(list(imported.values)[:8])}"
-        raise InputError(Fault(path, "", got, "a speed and a load", "`python -m bemt import` shows how each column was read"))
+        raise InputError(
+            Fault(path, "", got, "a speed and a load", "`python -m bemt import` shows how each column was read")
+        )
     if conditions_of(imported):
         u = {}
         flies = np.nan_to_num(points.values.get("airspeed_m_s", np.zeros(len(points)))) > 0.5
@@ -89,8 +95,10 @@ def compare_run(
     points, imported = cfd_points(name)
     notes = list(points.notes)
     for channel, words, value in (
-        ("rpm", "rev/min", made.rpm), ("airspeed_m_s", "m/s", made.airspeed_m_s), ("density_kg_m3", "kg/m3", made.air().rho),
-    ):  # fmt: skip
+        ("rpm", "rev/min", made.rpm),
+        ("airspeed_m_s", "m/s", made.airspeed_m_s),
+        ("density_kg_m3", "kg/m3", made.air().rho),
+    ):
         if channel not in points and not (channel == "airspeed_m_s" and "J" in points):
             notes.append(f"{channel.split('_')[0]}: not stated; {value:.6g} {words} of the case")
             points = _with(points, channel, float(value))
@@ -100,7 +108,9 @@ def compare_run(
     if not rows.size:
         raise InputError(Fault(name, "", "no point with a speed and a load", "one or more"))
     step = None if progress is None else (lambda i, n, what: progress(f"{what} ({i}/{n})"))
-    solved = propagate(made, full["rpm"][rows], full["airspeed_m_s"][rows], full["density_kg_m3"][rows], progress=step).points
+    solved = propagate(
+        made, full["rpm"][rows], full["airspeed_m_s"][rows], full["density_kg_m3"][rows], progress=step
+    ).points
     out = [_point(full, solved, int(i), k) for k, i in enumerate(rows)]
     lines = []
     if imported.kind == "cfd" or conditions_of(imported):
@@ -117,7 +127,10 @@ def compare_run(
         "audit": [asdict(line) for line in faults_first(lines)], "audit_u_relative_known": known,
         "averaged": dict(imported.provenance.get("averaged", {})), "notes": list(dict.fromkeys(notes)),
     }  # fmt: skip
-    return document | {"sentence": _sentence(out), "next": _next(document, name, str(made.path))}
+    return document | {
+        "sentence": _sentence(out),
+        "next": _next(document, name, made.path.as_posix() if isinstance(case, Case) else os.fspath(case)),
+    }
 
 
 def _case(name: str) -> Case:
@@ -148,7 +161,9 @@ def _point(cfd: Dataset, bemt: Dataset, i: int, k: int) -> dict[str, Any]:
             loads[name] = _load(float(cfd[name][i]), float(cfd.u[name][i]), bemt, name, k)
     if "duct_thrust_N" in cfd and "thrust_N" in loads and "duct_share" in bemt:
         T, part = loads["thrust_N"]["cfd"], float(cfd["duct_thrust_N"][i])
-        u = float(cfd.u["duct_thrust_N"][i]) / abs(T)  # the total is the rotor's and the duct's: their errors go together
+        u = float(cfd.u["duct_thrust_N"][i]) / abs(
+            T
+        )  # the total is the rotor's and the duct's: their errors go together
         loads["duct_share"] = _load(part / T, u, bemt, "duct_share", k)
     state = {key: float(cfd[key][i]) for key in ("rpm", "airspeed_m_s", "density_kg_m3")}
     J = state["airspeed_m_s"] / (state["rpm"] / 60.0) if state["rpm"] > 0 else math.nan
@@ -161,8 +176,8 @@ def _load(value: float, u: float, bemt: Dataset, name: str, k: int) -> dict[str,
     both = math.hypot(u if math.isfinite(u) else 0.0, band)
     parts = {origin: float(part[name][k]) for origin, part in bemt.u_by.items() if name in part}
     return {
-        "cfd": value, "u_cfd": u, "bemt": ours, "u_bemt": band, "u_bemt_by": parts, "difference": ours - value, "u_both": both,
-        "verdict": _verdict(ours - value, both),
+        "cfd": value, "u_cfd": u, "bemt": ours, "u_bemt": band, "u_bemt_by": parts, "difference": ours - value,
+        "u_both": both, "verdict": _verdict(ours - value, both),
     }  # fmt: skip
 
 
@@ -187,7 +202,10 @@ def _sentence(points: list[dict[str, Any]]) -> str:
         times = abs(load["difference"]) / load["u_both"]
         count = f" in {len(off)} of {len(every)} values" if len(every) > 1 else ""
         word = _LOADS[k].split(" [")[0]
-        return f"CFD and BEMT differ{count}: {word} of BEMT is {_percent(load)}, {times:.1f} times what both bands allow.{tail}"
+        ratio = abs(load["bemt"] / load["cfd"]) if load["cfd"] else math.inf
+        tail += " First check unit, sector, zones and speed." if not 1.0 / _FAR < ratio < _FAR else ""
+        size = f"{word} of BEMT is {_percent(load)}, {times:.1f} times both bands together"
+        return f"CFD and BEMT differ{count}: {size}.{tail}"
     words = "within twice both bands" if near else "within both bands"
     return f"CFD and BEMT agree {words}.{tail}"
 
@@ -203,7 +221,9 @@ def _next(document: Mapping[str, Any], name: str, case: str) -> str:
         steps.append("two more speeds or airspeeds: one point fits any cause; then "
                      f"`python -m bemt diagnose {name} OTHER_RUNS --case {case}`")  # fmt: skip
     else:
-        steps.append(f"`python -m bemt diagnose {name} --case {case}` names what fits all points, or says that it cannot")
+        steps.append(
+            f"`python -m bemt diagnose {name} --case {case}` names what fits all points, or says that it cannot"
+        )
     return "; ".join(steps)
 
 
@@ -225,7 +245,11 @@ def text(document: Mapping[str, Any], details: bool = False) -> str:
     told = document["conditions"]
     set_up = [f"{told[k]}{' ' + word if word else ''}" for k, word in _NAMES.items() if k in told]
     set_up += [{"yes": "steady", "no": "transient"}[told["steady"]]] if told.get("steady") in ("yes", "no") else []
-    lines = [document["sentence"], "", f"{Path(document['run']).name} ({', '.join(set_up) or 'set-up not stated'}) and case {document['case']}"]
+    lines = [
+        document["sentence"],
+        "",
+        f"{Path(document['run']).name} ({', '.join(set_up) or 'set-up not stated'}) and case {document['case']}",
+    ]
     shown = document["points"] if details else document["points"][:_ROWS]
     rows = []
     for p in shown:
@@ -242,20 +266,27 @@ def text(document: Mapping[str, Any], details: bool = False) -> str:
         lines.append(f"  ... {len(document['points']) - len(shown)} more points (--details)")
     first = next(iter(document["points"][0]["loads"].values()))
     parts = ", ".join(f"{k} {number_text(v, 2)}" for k, v in first["u_bemt_by"].items())
-    lines.append(f"  ± one standard uncertainty; BEMT's, first line: {parts}; \"in u\": over both bands together")
+    lines.append(f'  ± one standard uncertainty; BEMT\'s, first line: {parts}; "in u": over both bands together')
     for over in dict.fromkeys(document["averaged"].values()):
         lines.append(f"  averaged: {', '.join(k for k, v in document['averaged'].items() if v == over)}: {over}")
     if document["audit"]:
         lines += ["", "Audit of the CFD run"]
-        rows = [[line["status"], line["topic"], line["finding"] + (f": {line['consequence']}" if line["consequence"] else "")]
-                for line in (document["audit"] if details else document["audit"][:7])]  # fmt: skip
-        lines += [f"  {a:11s}{b}: {c}" for a, b, c in rows]
+        for line in document["audit"] if details else document["audit"][:7]:
+            words = f"{line['topic']}: {line['finding']}" + (f": {line['consequence']}" if line["consequence"] else "")
+            lead = f"  {line['status']:11s}"
+            lines.append(_filled(words, lead, " " * len(lead)))
     notes = [n for n in document["notes"]] if details else document["notes"][:4]
     flags = dict.fromkeys(f for p in document["points"] for f in p["flags"])
-    lines += ["", *(f"! {n}" for n in notes), *(f"! BEMT: {f}" for f in (flags if details else list(flags)[:2]))]
-    lines += ["No cause is named from one point." if len(document["points"]) == 1 else "No cause is named here.",
-              f"Next: {document['next']}"]  # fmt: skip
+    said = [*(f"! {n}" for n in notes), *(f"! BEMT: {f}" for f in (flags if details else list(flags)[:2]))]
+    said.append("No cause is named from one point." if len(document["points"]) == 1 else "No cause is named here.")
+    lines += ["", *map(_filled, [*said, f"Next: {document['next']}"])]
     return "\n".join(lines)
+
+
+def _filled(words: str, lead: str = "", indent: str = "  ") -> str:
+    return textwrap.fill(
+        words, 120, initial_indent=lead, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
+    )
 
 
 def _pm(value: float, u: float) -> str:

@@ -70,8 +70,8 @@ class Judgement:
     why: str = ""  # The rule that decided
 
 
-def _bases(c: MatchedChannel, volts: float | Array = 1.0) -> dict[str, Array]:
-    """Columns that a law may use, for the points of B."""
+def _bases(c: MatchedChannel, volts: float | Array = 1.0, other: MatchedChannel | None = None) -> dict[str, Array]:
+    """Columns that a law may use, for the points of B; ``other``: the other load, of the same points."""
     b = c.second.astype(float)
     advance = c.x[:, 1]
     top = float(np.max(np.abs(advance)))
@@ -82,6 +82,10 @@ def _bases(c: MatchedChannel, volts: float | Array = 1.0) -> dict[str, Array]:
         fit = np.linalg.lstsq(X, c.y, rcond=None)[0]
         slope = J * (fit[2] + 2.0 * fit[3] * J)
     square = np.exp(2.0 * (c.x[:, 0] - c.x[:, 0].max())) if c.name in LOADS else np.ones(b.size)
+    slower = np.exp(c.x[:, 0].mean() - c.x[:, 0]) if c.name in LOADS else np.ones(b.size)
+    talk = np.zeros(b.size)
+    if other is not None and other.y.size == b.size:
+        talk = np.exp((other.y - c.y) - float(np.max(other.y - c.y)))
     load = np.exp(c.y - c.y.max())
     ramp = fits.unit_coordinates(c)[:, 0]
     ramp = ramp / max(float(np.abs(ramp).max()), 1e-12)
@@ -90,7 +94,9 @@ def _bases(c: MatchedChannel, volts: float | Array = 1.0) -> dict[str, Array]:
         "zero": b * c.floor,
         "still": b * (1.0 - np.abs(J)),
         "slope": b * slope,
-        "slip": b * np.divide(slope, J, out=np.zeros_like(J), where=np.abs(J) > 1e-9),
+        # d ln C / dJ times the shift of J, which an offset of the airspeed makes larger at low speed of rotation
+        "slip": b * np.divide(slope, J, out=np.zeros_like(J), where=np.abs(J) > 1e-9) * slower,
+        "talk": b * talk,
         "drag": b * J**2 / load,
         "n2": b * square,
         "ramp": b * ramp,
@@ -131,14 +137,16 @@ def _columns(
     shapes = () if row.kind == "stand" or row.exact else ("ramp", "bow", "advance")
     parts = []
     for name, c in channels.items():
-        basis = _bases(c, volts.get(name, 1.0))
+        basis = _bases(
+            c, volts.get(name, 1.0), next((o for k, o in channels.items() if k != name and k in LOADS), None)
+        )
         columns = [
             w * sum((f * basis[k] for k, f in term.get(name, {}).items()), np.zeros(c.y.size)) for w, term in row.terms
         ]
         moved = sum((np.abs(v) for v, (w, _) in zip(columns, row.terms, strict=True) if w >= 1.0), np.zeros(c.y.size))
         scale = form * float(moved.max())
-        for other in channels:
-            columns += [scale * (other == name) * basis[k] for k in shapes]
+        for which in channels:
+            columns += [scale * (which == name) * basis[k] for k in shapes]
         parts.append(np.column_stack(columns))
     joined = np.vstack(parts)
     if np.abs(joined[:, 0]).max() <= 1e-9:

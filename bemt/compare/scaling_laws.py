@@ -16,8 +16,8 @@ _ZEROS = (0.004, 0.015, 0.05)
 FAMILY = {
     **dict.fromkeys(("diameter", "pitch_offset", "section", "propeller", "untwist"), "blade"),
     **dict.fromkeys(("duct", "ground_effect", "coaxial_neighbour", "recirculation"), "surroundings"),
-    **dict.fromkeys(("airspeed_offset", "airspeed_gain", "nacelle"), "airspeed"),
-    **dict.fromkeys(("thrust_gain", "torque_gain", "thrust_zero", "torque_zero"), "load cell"),
+    **dict.fromkeys(("airspeed_offset", "airspeed_gain", "nacelle", "oblique_inflow"), "airspeed"),
+    **dict.fromkeys(("thrust_gain", "torque_gain", "thrust_zero", "torque_zero", "cross_talk"), "load cell"),
     **dict.fromkeys(("battery_sag", "motor_heating", "motor"), "drive"),
 }
 """What an engineer would look at, at once; an effect that is not listed is a family of its own."""
@@ -34,7 +34,8 @@ class ScalingLaw:
     title: str  # In words
     # Size relative to the first term, and channel to basis to weight. Bases: ``all`` 1; ``zero`` full scale over
     # reading; ``still`` 1 at rest, fading to 0 at the largest advance; ``slope`` the channel's own derivative with
-    # respect to ln J; ``slip`` that over V; ``drag`` V^2 over thrust; ``n2`` square of the speed; ``volts`` ln of the
+    # respect to ln J; ``slip`` that over V; ``talk`` the other load over this one;
+    # ``drag`` V^2 over thrust; ``n2`` square of the speed; ``volts`` ln of the
     # voltage ratio at equal command, or 1 where it is not recorded.
     terms: tuple[Term, ...]
     says: str  # Why this cause, in a sentence
@@ -165,10 +166,31 @@ LAWS: tuple[ScalingLaw, ...] = (
         "airspeed_offset",
         "airspeed offset",
         ((1.0, {_T: {"slip": 1.0}, _Q: {"slip": 1.0}}),),
-        "both loads move as at another J, most at low airspeed",
+        "both loads move as at another J, most at low speed of rotation",
         "use a second pitot tube",
-        "J = V/(n D)",
+        "J = V/(n D): an offset of V moves it by dV/(n D)",
         "stand",
+        flow=True,
+    ),
+    ScalingLaw(
+        "oblique_inflow",
+        "inflow at an angle to the shaft",
+        ((1.0, {_T: {"slope": 1.0}, _Q: {"slope": 1.0}}),),
+        "both loads move as if J were smaller by one factor",
+        "measure the angle between shaft and wind",
+        "the rotor sees V cos(alpha) along its axis",
+        flow=True,
+        exact=True,
+    ),
+    ScalingLaw(
+        "cross_talk",
+        "cross-talk between thrust and torque cell",
+        ((1.0, {_T: {"talk": 1.0}}), (1.0, {_Q: {"talk": 1.0}})),
+        "one cell shows a share of the other load, which shows where their ratio changes with airspeed",
+        "hang a dead weight on each cell separately and read both",
+        "T' = T + k Q / R, Q' = Q + k T R",
+        "stand",
+        _GAINS,
         flow=True,
     ),
     ScalingLaw(

@@ -48,7 +48,8 @@ def compare_grids(a: str, b: str, rows_a: Sequence[str] = (), rows_b: Sequence[s
     rest = GRID_FLOOR["rest"]
     told = [
         f"{words[0].upper()}{words[1:]}. No physics is named before the grid is the same.",
-        f"The next grid alone changes thrust by {rest['thrust_N']:.0%} and torque by {rest['torque_Nm']:.0%} ({GRID_FLOOR_SOURCE}).",
+        f"The next grid alone changes thrust by {rest['thrust_N']:.0%} and torque by {rest['torque_Nm']:.0%} "
+        f"({GRID_FLOOR_SOURCE}).",
     ]
     also = {k: v for k, v in differ.items() if k not in ("grid_level", "cells")}
     if also:
@@ -57,7 +58,7 @@ def compare_grids(a: str, b: str, rows_a: Sequence[str] = (), rows_b: Sequence[s
         "schema": "bemt.comparison/1", "version": __version__, "recordings": [a, b],
         "rows": {"A": list(rows_a), "B": list(rows_b)}, "verdict": "insufficient", "effects": [], "rule": words,
         "conditions": {k: list(v) for k, v in differ.items()}, "ratios": ratios, "told": told,
-        "next_measurement": {"text": "Compare runs on one grid, or state the u of a grid study with both", "command": ""},
+        "next_measurement": {"text": "Compare runs on one grid, or state the u of a grid study", "command": ""},
     }  # fmt: skip
 
 

@@ -321,7 +321,8 @@ def _settling(found: evidence.Evidence, decision: verdict.Decision, best: fittin
     if claimed and (mended := suggestion.correction(sure, dict(zip(best.ids, best.settings, strict=True)))):
         return mended
     lead = best.ids[0] if best.ids else singles[0]
-    rivals = [i for i in (*decision.effects, *(j for g in decision.classes for j in g), *singles) if i != lead]
+    listed = (*decision.effects, *(j for g in decision.classes for j in g), *singles)
+    rivals = [i for i in listed if i != lead and i in found.spans]
     first = (lead, fitting.fit(found, Explanation.of(lead)).settings[0])
     likelier = bool(rivals) and single[rivals[0]] > found.probability[NONE]
     open_ = decision.verdict in ("class", "unknown", "insufficient")

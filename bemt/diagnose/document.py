@@ -244,7 +244,7 @@ def explanation(d: Diagnosis) -> list[str]:
             sets = " and ".join("{" + " or ".join(s) + "}" for s in decision.sets)
             lines.append(f"One of each set ({decision.probability:.2f}): {sets}.")
         lines.append(f"{lead} ({decision.probability:.2f}): "
-                     + ", ".join(f"{i} ({catalogue[i].title})" for i in decision.effects) + ".")  # fmt: skip
+                     + ", ".join(f"{i} ({_title(i)})" for i in decision.effects) + ".")  # fmt: skip
     elif decision.verdict == "unknown":
         kernel = d.found.states[0].best_rival
         lines.append(f"The cause is not in the library: {decision.why}. It shows in {kernel}.")
@@ -304,8 +304,8 @@ def headline(d: Diagnosis) -> str:
         lone = [i for i in d.said.effects if i not in listed and (i != "tip_cut" or "diameter" not in listed)]
         also = " or ".join(_title(i) for i in lone)
         return f"{words[:-1]}; the model also allows {also}." if also else words
-    said, catalogue = d.decision, effects.catalogue()
-    titles = [catalogue[i].title for i in said.effects]
+    said = d.decision
+    titles = [_title(i) for i in said.effects]
     off = _off(d)
     if said.verdict == "insufficient" and wrong_rotor_check.foreign(d.problem):
         return f"These are not the loads of this case ({off}): check diameter, blades, units and speed first."
@@ -353,7 +353,7 @@ def _from_reference(d: Diagnosis) -> str:
 
 
 def _one_of(ids: Sequence[str]) -> str:
-    titles = [effects.catalogue()[i].title for i in ids]
+    titles = [_title(i) for i in ids]
     return titles[0] if len(titles) == 1 else f"one of ({' / '.join(titles)})"
 
 

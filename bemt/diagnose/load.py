@@ -99,7 +99,8 @@ def load(
         made = records.from_series(_turned(points) if hand else points, case, shared)
     turned = ("torque_Nm: negative under load (sense of rotation): sign reversed here",) if hand else ()
     notes = (*made.notes, *turned, *imported.notes, *rows.notes, *_unused(imported, rows, case))
-    return replace(made, findings=found, notes=notes)
+    broken = tuple(f for f in findings if f.severity == "error" or (f.id == "sign_flipped" and f.severity == "warning"))
+    return replace(made, findings=found, contradictions=broken, notes=notes)
 
 
 def _speed_missing(imported: Dataset, path: str) -> None:

@@ -18,6 +18,7 @@ from bemt.diagnose.repeats import conditions, spread_sizes
 if TYPE_CHECKING:
     from bemt.case import Case
     from bemt.dataset import Dataset
+    from bemt.recordings.findings import Finding
 
 __all__ = ["CHANNELS", "COVARIATES", "Record", "air_of", "concatenated", "from_series", "merged", "owners"]
 
@@ -81,6 +82,8 @@ class Record:
         Known to be without the cause that is looked for: shows how far model and stand differ anyway.
     findings : tuple of str
         What looks wrong in the file before any physics, the file named in front; nothing was corrected.
+    contradictions : tuple of Finding
+        Those of them that cannot be so.
     """
 
     name: str
@@ -96,6 +99,7 @@ class Record:
     notes: tuple[str, ...] = ()
     reference: bool = False
     findings: tuple[str, ...] = ()
+    contradictions: tuple[Finding, ...] = ()
 
     def __len__(self) -> int:
         """Give the number of points."""
@@ -405,6 +409,7 @@ def merged(records: Sequence[Record]) -> Record:
         {n: max(r.zero.get(n, 0.0) for r in records) for n in names if any(n in r.zero for r in records)},
         all(r.air_recorded for r in records), notes, records[0].reference,
         tuple(dict.fromkeys(f for r in records for f in r.findings)),
+        tuple(dict.fromkeys(f for r in records for f in r.contradictions)),
     ))  # fmt: skip
 
 

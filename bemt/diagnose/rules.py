@@ -22,6 +22,7 @@ from bemt.diagnose.thresholds import (
     BESIDE,
     END,
     ENOUGH,
+    EXACT,
     GATE,
     LARGEST,
     LEAST,
@@ -29,6 +30,7 @@ from bemt.diagnose.thresholds import (
     LIKELY,
     MOST,
     NAMED,
+    NEAR,
     PREDICTS,
     PROVEN,
     RARE,
@@ -51,6 +53,10 @@ from bemt.diagnose.verdict import (
 )
 
 __all__ = ["RULES", "Rule", "decide"]
+
+
+MOTOR = "motor"
+"""Another motor, controller or setting, as the scaling laws name it: no effect of the catalogue describes it."""
 
 
 @dataclass(frozen=True)
@@ -195,6 +201,20 @@ def _no_effect_can_be_seen(a: VerdictQuery) -> Decision | None:
     return None
 
 
+@_rule("an exact relation in the file", "EXACT")
+def _exact_relation(a: VerdictQuery) -> Decision | None:
+    """By definition: power is torque times speed, two counters of one shaft agree, thrust of a rotor pulls one way."""
+    for name, finding in wrong_rotor_check.exact_faults(a.found.problem):
+        what = Explanation.of(name)
+        if name in a.found.spans and a.found.log_bayes(what) > -NEAR:
+            odds = EXACT * a.P[what] / max(1.0 - a.P[what], 1e-12)
+            if odds > 1.0:
+                chance = odds / (1.0 + odds)
+                said = a.says("sensor", f"{finding.evidence}, by definition", (name,), chance, leading=what)
+                return replace(said, sets=((name,),))
+    return None
+
+
 @_rule("nulls look like it", "GATE, LEVEL")
 def _nulls_look_like_it(a: VerdictQuery) -> Decision | None:
     """DIAGNOSIS 2.3: p-value of the whole chain, 1 in 100; a reference has the level in it."""
@@ -219,6 +239,17 @@ def _nothing_is_likelier_than_anything(a: VerdictQuery) -> Decision | None:
     if a.P[NONE] > 0.5:
         return _nothing(a, "nothing explains the readings better than the noise")
     return None
+
+
+@_rule("a drive that changed smoothly", "PROVEN, NEAR, BESIDE")
+def _drive_changed_smoothly(a: VerdictQuery) -> Decision | None:
+    """By definition: beside a reference only supply, heat, motor and controller change the speed at a pulse width."""
+    if a.alone or not a.drive_only or not a.P[UNKNOWN] > BESIDE * (1.0 - a.P[NONE]):
+        return None
+    if a.found.log_bayes(a.first) < max(PROVEN, a.vague - NEAR):
+        return None
+    chance = 1.0 - a.P[NONE]
+    return a.says("class", "these look alike in the speed over pulse width", (*a.first, MOTOR), chance, leading=a.first)
 
 
 @_rule("unknown, and not much better than nothing", "0.5, ENOUGH, LEAST")

@@ -1,7 +1,7 @@
 """Numbers that the rules of the verdict ask with: how much is enough for which answer."""
 
 __all__ = [
-    "ANOTHER", "BESIDE", "BOTH", "EARNED", "END", "ENOUGH", "EXPECTED", "GATE", "IN_SET", "LARGEST", "LEAST",
+    "ANOTHER", "BESIDE", "BOTH", "EARNED", "END", "ENOUGH", "EXACT", "EXPECTED", "GATE", "IN_SET", "LARGEST", "LEAST",
     "LEFT_OVER", "LIKE", "LIKELY", "MOST", "NAMED", "NEAR", "PARTNER", "PREDICTS", "PROVEN", "RARE", "ROUGH", "SETTLED",
     "SMALL", "SURE", "UNCHANGED", "VAGUE",
 ]  # fmt: skip
@@ -53,3 +53,6 @@ END = 0.01
 UNCHANGED, LIKELY = 0.15, 0.1
 """Probability of no change in the ratios to the reference below which "none" is no answer; probability in the diagnosis
 from which an effect that no scaling law describes joins the class of the ratios [1]."""
+EXACT = 1e4
+"""Odds that a relation of one file which must hold, and holds after one listed repair to 0.1 %, was broken by that: as
+many ratios fit in between [1]."""

@@ -21,6 +21,7 @@ from bemt.diagnose import confusion as look
 from bemt.diagnose import fit as fitting
 from bemt.diagnose import prior
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
+from bemt.diagnose.record import CHANNELS
 from bemt.diagnose.thresholds import (
     ANOTHER,
     BOTH,
@@ -292,6 +293,11 @@ class VerdictQuery:
     def alone(self) -> bool:
         """Whether there is no reference."""
         return bool(self.found.problem.free.all())
+
+    @property
+    def drive_only(self) -> bool:
+        """Whether the readings are those of the speed over pulse width."""
+        return bool(np.all(self.found.problem.channel == CHANNELS.index("rpm")))
 
     @property
     def real(self) -> bool:

@@ -23,10 +23,11 @@ from bemt.effects.base import Baking, Effect
 if TYPE_CHECKING:
     from bemt.diagnose.problem import Problem
     from bemt.diagnose.verdict import Decision
+    from bemt.recordings.findings import Finding
 
 __all__ = [
-    "CONTRADICTED", "FACTOR", "SLIPS", "UNREPEATABLE", "Suspect", "contradiction", "finding", "foreign", "impossible",
-    "levels", "odd_speed", "suspects", "to_mend", "unrepeatable",
+    "CONTRADICTED", "FACTOR", "SLIPS", "UNREPEATABLE", "Suspect", "contradiction", "exact_faults", "finding",
+    "foreign", "impossible", "levels", "odd_speed", "suspects", "to_mend", "unrepeatable",
 ]  # fmt: skip
 
 FACTOR = 3.0
@@ -144,6 +145,16 @@ def unrepeatable(problem: Problem) -> dict[str, float]:
 def impossible(problem: Problem) -> tuple[str, ...]:
     """What recordings show that cannot be so."""
     return tuple(f for f in problem.findings if _ERROR in f)
+
+
+def exact_faults(problem: Problem) -> Iterator[tuple[str, Finding]]:
+    """Effects that broken relations inside a recording of the test stand for, and the findings."""
+    for part in problem.parts:
+        for f in () if part.record.reference else part.record.contradictions:
+            if f.id in ("sign_flipped", "thrust_unit", "torque_unit", "rpm_unit"):
+                yield "unit_slip", f
+            elif f.id.startswith("rpm_"):
+                yield "rpm_scale", f
 
 
 def to_mend(problem: Problem, decision: Decision) -> str:

@@ -16,7 +16,17 @@ from bemt.base.toml import Table, entry, read_model
 from bemt.readers import head_text
 from bemt.readers._cfd import unit_of
 
-__all__ = ["KIND", "QUANTITIES", "ReferenceTable", "RunColumn", "RunColumns", "RunHead", "RunToml", "SetupTable", "toml_text"]
+__all__ = [
+    "KIND",
+    "QUANTITIES",
+    "ReferenceTable",
+    "RunColumn",
+    "RunColumns",
+    "RunHead",
+    "RunToml",
+    "SetupTable",
+    "toml_text",
+]
 
 KIND = "cfd_run"
 QUANTITIES: dict[str, tuple[str, str]] = {
@@ -60,7 +70,12 @@ class RunColumns(Table):
             dimension, usual = QUANTITIES[name]
             if unit is not None and unit.dimension != dimension:
                 hint = f"{unit.suffix} is a mass: write {unit.suffix}f" if unit.dimension == "mass" else ""
-                yield f"{name}.unit", repr(column.unit), f"a unit of {dimension.replace('_', ' ')} such as {usual}", hint
+                yield (
+                    f"{name}.unit",
+                    repr(column.unit),
+                    f"a unit of {dimension.replace('_', ' ')} such as {usual}",
+                    hint,
+                )
 
 
 class RunHead(Table):
@@ -70,7 +85,9 @@ class RunHead(Table):
     rpm: float | None = entry("speed of rotation, if no column has it", "rev/min", 1.0, 1e6)
     airspeed_m_s: float | None = entry("speed of flight", "m/s", 0.0, 400.0)
     density_kg_m3: float | None = entry("density of the fluid", "kg/m3", 0.01, 1100.0)
-    revolutions: int | None = entry("last revolutions to average; 4, or half of the run, if omitted", low=1, high=100_000)
+    revolutions: int | None = entry(
+        "last revolutions to average; 4, or half of the run, if omitted", low=1, high=100_000
+    )
     sector: int | None = entry("the model is one of so many equal sectors: loads are multiplied", low=1, high=100)
     axis: Literal["x", "y", "z"] | None = entry("axis of the shaft; the largest force if omitted")
     zones: tuple[str, ...] | None = entry("zones whose loads count, duct included")
@@ -87,7 +104,7 @@ class ReferenceTable(Table):
 
 
 class SetupTable(Table):
-    """[setup]: how the run was computed; nothing of it changes a number."""
+    """[setup]: how the run was computed; no load depends on it, only gci_pct sets an uncertainty."""
 
     program: str | None = entry("program")
     solver: str | None = entry("solver")

@@ -54,7 +54,8 @@ def _column(name: str) -> Column:
 _LAYOUT = Layout(
     KIND, '"Time_Iter","Inner_Iter","CD"', _names, lambda line: cells_of(line, ","), _column,
     lambda line: re.match(r"(TITLE|ZONE)\b", line) is not None,
-    ("coefficients rest on reference values that the history does not state",), False, outermost,
+    ("coefficients rest on reference values that the history does not state",), commas=False,
+    finish=outermost,
 )  # fmt: skip
 
 

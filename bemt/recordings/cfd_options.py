@@ -28,7 +28,9 @@ def _pairs(option: str, given: Iterable[str], faults: list[Fault]) -> dict[str, 
     for text in given:
         name, mark, value = text.partition("=")
         if not mark or not name.strip() or not value.strip():
-            faults.append(Fault("", option, text, "NAME=VALUE", f"As in {option} thrust=N" if option == "--unit" else ""))
+            faults.append(
+                Fault("", option, text, "NAME=VALUE", f"As in {option} thrust=N" if option == "--unit" else "")
+            )
         elif name.strip() in out:
             faults.append(Fault("", option, f"{name.strip()} twice", "each once"))
         else:
@@ -48,7 +50,8 @@ def _quantity(name: str, unit: str) -> str | None:
 
 def run_from(
     files: Sequence[str], *, rpm: float | None = None, airspeed_m_s: float | None = None,
-    density_kg_m3: float | None = None, revolutions: int | None = None, sector: int | None = None, axis: str | None = None,
+    density_kg_m3: float | None = None, revolutions: int | None = None, sector: int | None = None,
+    axis: str | None = None,
     zones: Sequence[str] = (), unit: Sequence[str] = (), column: Sequence[str] = (), sign: Sequence[str] = (),
     reference: Sequence[str] = (), setup: Sequence[str] = (),
 ) -> RunToml:  # fmt: skip
@@ -88,12 +91,15 @@ def run_from(
             continue
         quantity = by_column.get(name, name)
         if mark and quantity not in QUANTITIES:
-            faults.append(Fault("", "--sign", name, f"one of {', '.join(_LOADS)}, or a column named by --unit or --column"))
+            faults.append(
+                Fault("", "--sign", name, f"one of {', '.join(_LOADS)}, or a column named by --unit or --column")
+            )
             continue
         for q in (quantity,) if mark else _LOADS[:1] + _LOADS[2:]:
             columns.setdefault(q, {})["sign"] = int(value)
     head = {"files": tuple(files), "rpm": rpm, "airspeed_m_s": airspeed_m_s, "density_kg_m3": density_kg_m3,
-            "revolutions": revolutions, "sector": sector, "axis": axis, "zones": tuple(_split(zones)) or None}  # fmt: skip
+            "revolutions": revolutions, "sector": sector, "axis": axis,
+            "zones": tuple(_split(zones)) or None}  # fmt: skip
     document = {
         "run": {k: v for k, v in head.items() if v is not None}, "columns": columns,
         "reference": _numbers(reference, faults), "setup": _setup(setup, faults),
@@ -147,7 +153,11 @@ def write_run(run: RunToml, out: str) -> Path:
     path = path if path.suffix == ".toml" else path / "run.toml"
     path.parent.mkdir(parents=True, exist_ok=True)
     files = tuple(Path(os.path.relpath(f, path.parent)).as_posix() for f in run.run.files)
-    document: Mapping[str, Any] = run.model_dump(exclude_unset=True) | {"run": run.run.model_dump(exclude_unset=True) | {"files": files}}
-    text = toml_text(RunToml.model_validate(document), "One CFD run, written by bemt import. Give this file in place of the exports.")
+    document: Mapping[str, Any] = run.model_dump(exclude_unset=True) | {
+        "run": run.run.model_dump(exclude_unset=True) | {"files": files}
+    }
+    text = toml_text(
+        RunToml.model_validate(document), "One CFD run, written by bemt import. Give this file in place of the exports."
+    )
     write_atomic(path, text)
     return path

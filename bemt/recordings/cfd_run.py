@@ -53,6 +53,7 @@ _WORDS: dict[str, str] = {
     "thrust": r"thrust|\bforce|^f[xyz]?$|axial[_ -]?load|schub|traction|empuje",
     "torque": r"torque|moment|^m[xyz]?$|couple|drehmoment|par[_ ]motor",
     "power": r"power|leistung",
+    "duct_thrust": r"duct|shroud|nozzle",
     "airspeed": r"air_?speed|inlet[-_ ]?velocity|free_?stream|^[vu]_?inf|advance[-_ ](speed|velocity)|flight[-_ ]speed",
     "density": r"density|^rho\b|^rho_kg",
 }
@@ -177,7 +178,9 @@ def _read(paths: Sequence[Path]) -> list[tuple[str, Dataset]]:
             found = readers.read(path)
             if not isinstance(found, Dataset) or found.kind != "cfd":
                 got = f"a {found.kind if isinstance(found, Dataset) else type(found).__name__}, no export of CFD"
-                raise InputError(Fault(str(path), "", got, f"an export of {', '.join(dict.fromkeys(PROGRAMS.values()))}"))
+                raise InputError(
+                    Fault(str(path), "", got, f"an export of {', '.join(dict.fromkeys(PROGRAMS.values()))}")
+                )
             read.append((str(path), found))
         except InputError as error:
             faults += error.faults
@@ -189,10 +192,9 @@ def _read(paths: Sequence[Path]) -> list[tuple[str, Dataset]]:
 def _joined(read: list[tuple[str, Dataset]]) -> list[tuple[str, Dataset]]:
     out: list[tuple[str, Dataset]] = []
     for name, record in read:
-        home = (record.provenance["format"], _zone_of(Path(name), str(record.provenance["format"])), tuple(record.values))
-        at = next((k for k, (file, other) in enumerate(out) if record.provenance.get("clock") in ("time", "iteration")
-                   and home == (other.provenance["format"], _zone_of(Path(file), home[0]), tuple(other.values))), None)  # fmt: skip
-        if at is None:
+        home = _home(name, record)
+        at = next((k for k, (file, other) in enumerate(out) if home == _home(file, other)), None)
+        if at is None or record.provenance.get("clock") not in ("time", "iteration"):
             out.append((name, record))
             continue
         file, before = out[at]
@@ -203,13 +205,24 @@ def _joined(read: list[tuple[str, Dataset]]) -> list[tuple[str, Dataset]]:
             before, record, how = record, before, relation(_clock(record), _clock(before))
         if how == "other clock":
             got = f"the same columns as {Path(file).name} on another clock"
-            raise InputError(Fault(name, "", got, "parts of one history", "A restart with a clock of its own: give it alone"))
+            raise InputError(
+                Fault(name, "", got, "parts of one history", "A restart with a clock of its own: give it alone")
+            )
         cut = _clock(record)[0][0]
         kept = _clock(before)[0] < cut
         values = {k: np.concatenate([before[k][kept], record[k]]) for k in before.values}
         note = f"{Path(name).name} {how} {Path(file).name}: joined at step {cut:g}"
-        out[at] = (file, replace(before, values=values, u={}, flags=(), lines=(), texts={}, notes=(*before.notes, note)))
+        out[at] = (
+            file,
+            replace(before, values=values, u={}, flags=(), lines=(), texts={}, notes=(*before.notes, note)),
+        )
     return out
+
+
+def _home(name: str, record: Dataset) -> tuple[str, str, tuple[str, ...]]:
+    """What the parts of one history have in common: format, function object, columns."""
+    form = str(record.provenance["format"])
+    return form, _zone_of(Path(name), form), tuple(record.values)
 
 
 def _clock(record: Dataset) -> tuple[Array, Array]:
@@ -222,15 +235,21 @@ def _clock(record: Dataset) -> tuple[Array, Array]:
 def _one_base(read: Sequence[tuple[str, Dataset]]) -> None:
     """Refuse histories that do not overlap: they are not one run."""
     for kind in ("time", "iteration"):
-        own = [(n, c) for n, r in read if r.provenance.get("clock") == kind and (c := _clock(r)[kind == "time"]).size > 1]
+        own = [
+            (n, c) for n, r in read if r.provenance.get("clock") == kind and (c := _clock(r)[kind == "time"]).size > 1
+        ]
         for (a, x), (b, y) in zip(own, own[1:], strict=False):
             shared = min(x[-1], y[-1]) - max(x[0], y[0])
             if shared < 0.5 * min(x[-1] - x[0], y[-1] - y[0]):
                 got = f"{kind} {y[0]:g} to {y[-1]:g}, where {Path(a).name} has {x[0]:g} to {x[-1]:g}"
-                raise InputError(Fault(b, "", got, "files of one run, over the same steps", "Import each run by itself"))
+                raise InputError(
+                    Fault(b, "", got, "files of one run, over the same steps", "Import each run by itself")
+                )
 
 
-def settled(values: Array, record: Dataset, period: float, revolutions: int | None, end: float = math.inf) -> _Settled | str:
+def settled(
+    values: Array, record: Dataset, period: float, revolutions: int | None, end: float = math.inf
+) -> _Settled | str:
     """Settled part of a history: whole revolutions by time, else the last fifth; text: why there is none."""
     clock = record.provenance.get("clock")
     if clock == "time":
@@ -300,11 +319,10 @@ class _Run:
                 continue
             word = re.sub(r"-op$|-rfile$", "", c.stem)
             if quantity == "rpm":
-                fits = may_be_shaft_speed(word) or (unit is not None and c.name != "time_s")
+                fits = may_be_shaft_speed(word) or unit is not None
             else:
-                fits = c.part == {"thrust": "force", "torque": "moment"}.get(quantity) or re.search(
-                    _WORDS[quantity], word, re.IGNORECASE
-                )
+                part = {"thrust": "force", "torque": "moment"}.get(quantity)
+                fits = c.part == part or re.search(_WORDS[quantity], word, re.IGNORECASE) is not None
             if fits:
                 out.append(c)
         return out
@@ -323,7 +341,8 @@ class _Run:
             return None if factor is None else c.record[c.name] * factor
         if unit is None:
             usual = QUANTITIES[quantity][1]
-            hint = f'--unit {quantity}="{usual}" if that is its unit; run.toml: [columns] {quantity} = {{ unit = "{usual}" }}'
+            hint = f'--unit {quantity}="{usual}" if that is its unit; '
+            hint += f'run.toml: [columns] {quantity} = {{ unit = "{usual}" }}'
             got = f"no unit ({c.unit!r} is none that is known)" if c.unit else "no unit"
             self.faults.append(Fault(c.file, c.name, got, f"the unit of the {quantity}", hint))
             return None
@@ -363,7 +382,9 @@ class _Run:
         told = self.fact("rpm")
         if own and head.rpm is not None and told.column is None:
             stated = [c for c in own if unit_of(c.unit) is not None]
-            own = stated or [c for c in own if np.unique(c.record[c.name]).size > 1 and c.record.provenance.get("clock") == "none"]
+            own = stated or [
+                c for c in own if np.unique(c.record[c.name]).size > 1 and c.record.provenance.get("clock") == "none"
+            ]
             if own:
                 v = np.unique(own[0].record[own[0].name])
                 got = f"--rpm {head.rpm:g}, where {own[0].name} has {', '.join(f'{x:g}' for x in v[:4])}"
@@ -372,7 +393,11 @@ class _Run:
         if own and head.rpm is None:
             values = self.si("rpm", own[0])
             if values is not None:
-                found = settled(values, own[0].record, math.nan, None) if own[0].record.provenance.get("clock") != "time" else None
+                found = (
+                    settled(values, own[0].record, math.nan, None)
+                    if own[0].record.provenance.get("clock") != "time"
+                    else None
+                )
                 return np.abs(found.values if isinstance(found, _Settled) else values[-1:])
             return np.array([math.nan])
         if head.rpm is None:
@@ -394,7 +419,9 @@ def _axis(run: _Run, forces: Sequence[_Found], moments: Sequence[_Found]) -> str
     side = max((v for a, v in size.items() if a != axis), default=0.0)
     if size[axis] < _ALONG * side:
         got = ", ".join(f"{a} {v:.4g}" for a, v in size.items())
-        run.faults.append(Fault(lead[0].file, "axis", got, "one component that stands out", "Name the shaft's: --axis z"))
+        run.faults.append(
+            Fault(lead[0].file, "axis", got, "one component that stands out", "Name the shaft's: --axis z")
+        )
     return axis
 
 
@@ -409,8 +436,14 @@ def _pool(run: _Run, quantity: str) -> dict[str, _Found]:
         axis = _axis(run, forces, vectors["moment"])
         found = [c for c in vectors[part] if c.axis == axis]
         run.notes.append(f"{quantity} along {axis}" + (", the largest force" if not run.run.run.axis else ""))
-    total = [c for c in found if re.fullmatch(r"(total[-_ ]?)?(thrust|torque)([-_ ](total|op))*", c.stem, re.IGNORECASE) and not c.zone]
-    labels = [c.zone or (c.stem if len({(f.stem, f.zone) for f in found}) > 1 and c not in total[:1] else "") for c in found]
+    total = [
+        c
+        for c in found
+        if re.fullmatch(r"(total[-_ ]?)?(thrust|torque)([-_ ](total|op))*", c.stem, re.IGNORECASE) and not c.zone
+    ]
+    labels = [
+        c.zone or (c.stem if len({(f.stem, f.zone) for f in found}) > 1 and c not in total[:1] else "") for c in found
+    ]
     out: dict[str, _Found] = {}
     twice = 0
     for label, c in zip(labels, found, strict=True):
@@ -431,7 +464,9 @@ def _counted(run: _Run, quantity: str, pool: Mapping[str, _Found]) -> tuple[list
     if head.zones is not None:
         known = [z for z in head.zones if z in pool]
         if "Net" in head.zones and len(head.zones) > 1:
-            run.faults.append(Fault(run.name, "zones", "Net with other zones", "Net alone, or zones", "Net holds them all"))
+            run.faults.append(
+                Fault(run.name, "zones", "Net with other zones", "Net alone, or zones", "Net holds them all")
+            )
         if torque and not known and list(pool) == [""]:
             return [(1.0, "")], []
         if absent := [z for z in head.zones if z not in pool]:
@@ -456,10 +491,10 @@ def _counted(run: _Run, quantity: str, pool: Mapping[str, _Found]) -> tuple[list
 
 
 def _sum(parts: Sequence[tuple[float, _Settled]]) -> _Settled:
-    drifts = [s.drift for _, s in parts]
+    over = parts[0][1].over + (f", {len(parts)} zones" if len(parts) > 1 else "")
     return _Settled(
         np.sum([k * s.values for k, s in parts], axis=0), sum(k * s.drift for k, s in parts),
-        math.hypot(*(s.scatter for _, s in parts)), parts[0][1].over + (f", {len(parts)} zones" if len(drifts) > 1 else ""),
+        math.hypot(*(s.scatter for _, s in parts)), over,
     )  # fmt: skip
 
 
@@ -488,7 +523,9 @@ def assemble(run: RunToml, folder: Path = Path(), name: str = "run") -> Dataset:
     paths = [folder / f for f in run.run.files]
     read = _read(paths)
     _one_base(read)
-    homes = {_zone_of(Path(f), str(r.provenance["format"])) for f, r in read if any(n.startswith("force_") for n in r.values)}
+    homes = {
+        _zone_of(Path(f), str(r.provenance["format"])) for f, r in read if any(n.startswith("force_") for n in r.values)
+    }
     columns = [c for file, record in read for c in _columns(file, record, len(homes) > 1)]
     work = _Run(run, name, columns)
     work.notes += [n for _, r in read for n in r.notes if "restart" in n or "joined" in n or "left out" in n]
@@ -507,7 +544,10 @@ def assemble(run: RunToml, folder: Path = Path(), name: str = "run") -> Dataset:
         if not pool:
             continue
         counted, ducts = _counted(work, quantity, pool)
-        found = {z: work.mean(quantity, pool[z]) for z in {*(z for _, z in counted), *(ducts if quantity == "thrust" else ())}}
+        found = {
+            z: work.mean(quantity, pool[z])
+            for z in {*(z for _, z in counted), *(ducts if quantity == "thrust" else ())}
+        }
         if any(v is None for v in found.values()):
             continue
         known = {z: v for z, v in found.items() if v is not None}
@@ -518,8 +558,8 @@ def assemble(run: RunToml, folder: Path = Path(), name: str = "run") -> Dataset:
         if quantity == "thrust" and [z for _, z in counted] != [""]:
             work.notes.append(f"thrust is that of {' + '.join(z or 'the whole' for _, z in counted)}")
     if run.columns.duct_thrust is not None:
-        for c in work.named("duct_thrust")[:1]:
-            if (own := work.mean("duct_thrust", c)) is not None:
+        for column in work.named("duct_thrust")[:1]:
+            if (own := work.mean("duct_thrust", column)) is not None:
                 loads["duct_thrust"] = own
     values, u, about = _applied(work, rpm, loads, read)
     if work.faults:
@@ -541,18 +581,25 @@ def _applied(
     head = work.run.run
     sector = head.sector or 1
     values: dict[str, Array] = {"rpm": rpm}
-    for name, quantity, given in (("airspeed_m_s", "airspeed", head.airspeed_m_s), ("density_kg_m3", "density", head.density_kg_m3)):
+    for name, quantity, given in (
+        ("airspeed_m_s", "airspeed", head.airspeed_m_s),
+        ("density_kg_m3", "density", head.density_kg_m3),
+    ):
         own = [] if given is not None else work.named(quantity)
         if given is not None:
             values[name] = np.array([given])
-        elif own and (unit_of(own[0].unit) or work.fact(quantity).unit) and (v := work.si(quantity, own[0])) is not None:
+        elif (
+            own and (unit_of(own[0].unit) or work.fact(quantity).unit) and (v := work.si(quantity, own[0])) is not None
+        ):
             values[name] = v[-1:] if own[0].record.provenance.get("clock") in ("time", "iteration") else v
     u: dict[str, Array] = {}
     over: dict[str, str] = {}
     drift: dict[str, float] = {}
     turned = 1.0
     for quantity, found in loads.items():
-        name = {"thrust": "thrust_N", "duct_thrust": "duct_thrust_N", "torque": "torque_Nm", "power": "power_W"}[quantity]
+        name = {"thrust": "thrust_N", "duct_thrust": "duct_thrust_N", "torque": "torque_Nm", "power": "power_W"}[
+            quantity
+        ]
         told = work.fact(quantity).sign
         if quantity == "duct_thrust" and told is None:
             sign = turned
@@ -560,7 +607,9 @@ def _applied(
             middle = np.nanmedian(found.values) if np.isfinite(found.values).any() else 0.0
             sign = -1.0 if middle < 0 else 1.0
             if sign < 0:
-                work.notes.append(f"{name} is {middle:.4g} in the file: taken as positive (--sign {quantity}=1 keeps it)")
+                work.notes.append(
+                    f"{name} is {middle:.4g} in the file: taken as positive (--sign {quantity}=1 keeps it)"
+                )
         else:
             sign = float(told)
         turned = sign if quantity == "thrust" else turned
@@ -573,7 +622,9 @@ def _applied(
             drift[name] = found.drift / mean
             if abs(drift[name]) > LOST:
                 got = f"a mean that drifts by {drift[name]:+.0%}"
-                work.faults.append(Fault(work.name, quantity, got, "a run that has converged", "Run on, or start later"))
+                work.faults.append(
+                    Fault(work.name, quantity, got, "a run that has converged", "Run on, or start later")
+                )
             elif abs(drift[name]) > MOVING:
                 work.notes.append(f"not settled: {quantity} drifts by {drift[name]:+.1%} over the averaged part; in u")
     if sector > 1:
@@ -627,10 +678,14 @@ def _dataset(
         "sha256": "+".join(str(r.provenance.get("sha256", "")) for _, r in read),
     }  # fmt: skip
     if rows == 1:
-        provenance["means"] = {k: Mean(float(full[k][0]), about["averaged"][k], about["drift"].get(k)) for k in about["averaged"]}
+        provenance["means"] = {
+            k: Mean(float(full[k][0]), about["averaged"][k], about["drift"].get(k)) for k in about["averaged"]
+        }
     made = Dataset("cfd", Path(name).name, full, {k: np.broadcast_to(v, (rows,)) for k, v in u.items()}, (), provenance,
                    labels, notes=tuple(dict.fromkeys(work.notes)))  # fmt: skip
-    keep = np.any([np.isfinite(full[k]) for k in full if k not in ("rpm", "airspeed_m_s", "density_kg_m3", "J")], axis=0)
+    keep = np.any(
+        [np.isfinite(full[k]) for k in full if k not in ("rpm", "airspeed_m_s", "density_kg_m3", "J")], axis=0
+    )
     if not keep.all():
         index = np.flatnonzero(keep)
         made = Dataset("cfd", made.name, {k: v[index] for k, v in full.items()}, {k: made.u[k][index] for k in u}, (),
@@ -661,14 +716,21 @@ def run_text(found: Mapping[str, Any]) -> str:
     rows = []
     for p in points:
         u = {k: p.get(f"u_{k}", math.nan) for k in names}
-        rows.append([number_text(p[k], 5) + (f" ± {number_text(u[k], 2)}" if math.isfinite(u[k]) else "") for k in names])
+        rows.append(
+            [number_text(p[k], 5) + (f" ± {number_text(u[k], 2)}" if math.isfinite(u[k]) else "") for k in names]
+        )
     lines = [f"one run: {', '.join(Path(f).name for f in found['files'])}"]
     lines.append(text_table([_SHOWN[k] for k in names], rows, (), "  "))
     for over in dict.fromkeys(found["averaged"].values()):
         own = [k.rsplit("_", 1)[0] for k, v in found["averaged"].items() if v == over]
-        drift = ", ".join(f"{k.rsplit('_', 1)[0]} {v:+.2%}" for k, v in found["drift"].items() if found["averaged"].get(k) == over)
+        drift = ", ".join(
+            f"{k.rsplit('_', 1)[0]} {v:+.2%}" for k, v in found["drift"].items() if found["averaged"].get(k) == over
+        )
         lines.append(f"  {', '.join(own)}: {over}" + (f"; drift {drift}" if drift else ""))
     shown = {k: v for k, v in found["conditions"].items() if k not in ("thrust_from", "drift_thrust", "u_grid")}
-    words = [f"{k.replace('_', ' ')} {'yes' if v is True else 'no' if v is False else f'{v:,.0f}' if k == 'cells' else v}" for k, v in shown.items()]
+    words = [
+        f"{k.replace('_', ' ')} {'yes' if v is True else 'no' if v is False else f'{v:,.0f}' if k == 'cells' else v}"
+        for k, v in shown.items()
+    ]
     lines.append(f"  set-up: {', '.join(words)}")
     return "\n".join([*lines, *(f"  ! {note}" for note in found["notes"])])

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 __all__ = [
-    "CONDITIONS", "GRID_FLOOR", "GRID_FLOOR_SOURCE", "audit_of", "conditions_of", "conditions_that_differ", "grid_floor",
-    "faults_first", "grid_that_differs", "references_of", "remark_of", "with_grid_floor",
+    "CONDITIONS", "GRID_FLOOR", "GRID_FLOOR_SOURCE", "audit_of", "conditions_of", "conditions_that_differ",
+    "faults_first", "floor_note", "grid_floor", "grid_that_differs", "references_of", "remark_of", "with_grid_floor",
 ]  # fmt: skip
 
 CONDITIONS = (
@@ -56,9 +56,10 @@ def _flies(d: Dataset) -> NDArray[np.bool_]:
     """Rows with an airspeed."""
     V, J = d.values.get("airspeed_m_s"), d.values.get("J")
     out = np.zeros(len(d), dtype=bool)
-    for v, least in ((V, 0.5), (J, 0.02)):
-        if v is not None:
-            out |= np.nan_to_num(v) > least
+    if V is not None:
+        out |= np.nan_to_num(V) > 0.5
+    if J is not None:
+        out |= np.nan_to_num(J) > 0.02
     return out
 
 
@@ -72,7 +73,11 @@ def with_grid_floor(d: Dataset, u_grid: float = math.nan) -> Dataset:
             least = np.array([grid_floor(name, bool(f)) for f in flies])
             numerics[name] = np.abs(d[name]) * (least if math.isnan(u_grid) else u_grid)
     parts = {"random": {k: np.nan_to_num(v) for k, v in random.items() if k in numerics}, "numerics": numerics}
-    note = floor_note(bool(flies.any()), bool(flies.all())) if math.isnan(u_grid) else f"u of the grid {u_grid:.2%}, as stated"
+    note = (
+        floor_note(bool(flies.any()), bool(flies.all()))
+        if math.isnan(u_grid)
+        else f"u of the grid {u_grid:.2%}, as stated"
+    )
     kept = {k: v for k, v in random.items() if k not in numerics}
     return Dataset(d.kind, d.name, d.values, kept, d.flags, d.provenance, d.labels, parts, (note, *d.notes), d.units,
                    d.lines, d.texts)  # fmt: skip
@@ -82,14 +87,17 @@ def floor_note(some_fly: bool, all_fly: bool) -> str:
     """What a run without a grid study is told."""
     states = [s for s, wanted in (("rest", not all_fly), ("flight", some_fly)) if wanted]
     words = "; ".join(f"in {s}" if s == "flight" else "at rest" for s in states)
-    sizes = "; ".join(f"thrust {GRID_FLOOR[s]['thrust_N']:.1%}, torque {GRID_FLOOR[s]['torque_Nm']:.1%}" for s in states)
+    sizes = "; ".join(
+        f"thrust {GRID_FLOOR[s]['thrust_N']:.1%}, torque {GRID_FLOOR[s]['torque_Nm']:.1%}" for s in states
+    )
     return f"no grid study: at least {sizes} ({words}; {GRID_FLOOR_SOURCE})"
 
 
 def conditions_of(d: Dataset) -> dict[str, tuple[str, ...]]:
     """Conditions of a CFD recording as texts, each with all values that its rows have; {} where none is stated."""
     out: dict[str, tuple[str, ...]] = {}
-    for name, value in d.provenance.get("conditions", {}).items():
+    stated: Mapping[str, Any] = d.provenance.get("conditions", {})
+    for name, value in stated.items():
         if name in CONDITIONS and value not in (None, "") and value == value:
             out[name] = (_text(value),)
     for name, cells in d.texts.items():
@@ -107,7 +115,8 @@ def _text(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, (int, float, np.floating)):
-        return f"{value:,.0f}" if abs(value) >= 1e4 else f"{value:g}"
+        number = float(value)
+        return f"{number:,.0f}" if abs(number) >= 1e4 else f"{number:g}"
     return str(value)
 
 
@@ -205,7 +214,11 @@ def remark_of(conditions: Mapping[str, Any]) -> str:
     >>> remark_of({"steady": True, "turbulence": "k-omega SST", "cells": 2e6, "drift_thrust": 0.004})
     'MRF; k-omega SST; 2000000 cells; drift 0.4 %; forces integrated'
     """
-    walls = {"function": "wall functions", "scalable": "scalable wall functions", "automatic": "automatic wall functions"}
+    walls = {
+        "function": "wall functions",
+        "scalable": "scalable wall functions",
+        "automatic": "automatic wall functions",
+    }
     steady, compressible = conditions.get("steady"), conditions.get("compressible")
     known: list[tuple[Any, str]] = [
         (conditions.get("program"), "{}"),
@@ -226,16 +239,17 @@ def references_of(run: Dataset, where: str) -> list[Reference]:
     """Points of a run as recorded values of a case: thrust, torque, the duct's part."""
     out = []
     remark = remark_of(run.provenance.get("conditions", {}))
-    for quantity, channel, unit in (("thrust", "thrust_N", "N"), ("torque", "torque_Nm", "N m"),
-                                    ("duct_thrust", "duct_thrust_N", "N"), ("CT", "CT", "-"), ("CQ", "CQ", "-")):  # fmt: skip
+    loads = (("thrust", "thrust_N", "N"), ("torque", "torque_Nm", "N m"), ("duct_thrust", "duct_thrust_N", "N"))
+    sha256 = str(run.provenance.get("sha256", ""))
+    for quantity, channel, unit in (*loads, ("CT", "CT", "-"), ("CQ", "CQ", "-")):
         for i in range(len(run) if channel in run else 0):
             value = float(run[channel][i])
             if not math.isfinite(value):
                 continue
             state = {k: float(run[k][i]) for k in ("rpm", "airspeed_m_s", "density_kg_m3") if k in run}
             out.append(Reference(
-                quantity, value, float(run.u[channel][i]), channel, "cfd", run.name, remark, f"{number_text(value, 4)} {unit}",
-                where=f"{where}:{i + 1}", sha256=str(run.provenance.get("sha256", "")), **state,
+                quantity, value, float(run.u[channel][i]), channel, "cfd", run.name, remark,
+                f"{number_text(value, 4)} {unit}", where=f"{where}:{i + 1}", sha256=sha256, **state,
             ))  # fmt: skip
     return out
 

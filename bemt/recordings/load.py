@@ -5,12 +5,12 @@ shown as they are, and then as one run (`bemt.recordings.cfd_run`): joined, with
 the user states.
 
 Schema ``bemt.import/1``: ``runs`` is a list of CFD runs (``name``, ``files``, ``points``, ``averaged``, ``drift``,
-``conditions``, ``notes``), ``to_do`` what would make the files one run (null: nothing, or they are none). ``files`` is a list of ``path``, ``format``, ``kind``, ``rows``, ``channels`` (name to
-``unit``, ``mean``, ``averaged_over``, ``drift``), ``warnings``, ``error`` (null when the file was read), ``findings``
-(``id``, ``channel``, ``evidence``, ``correction``, ``rows``, ``severity``; nothing is corrected) and ``reduction``
-(null unless it is a recording: ``mode``, ``points``, ``correlated``, ``dropped`` with first ``line`` and ``last``,
-``channel`` and ``reason``, ``notes``, ``error``). A channel of a recording has a mean only where the recording is one
-steady point.
+``conditions``, ``notes``), ``to_do`` what would make the files one run (null: nothing, or they are none). ``files`` is
+a list of ``path``, ``format``, ``kind``, ``rows``, ``channels`` (name to ``unit``, ``mean``, ``averaged_over``,
+``drift``), ``warnings``, ``error`` (null when the file was read), ``findings`` (``id``, ``channel``, ``evidence``,
+``correction``, ``rows``, ``severity``; nothing is corrected) and ``reduction`` (null unless it is a recording:
+``mode``, ``points``, ``correlated``, ``dropped`` with first ``line`` and ``last``, ``channel`` and ``reason``,
+``notes``, ``error``). A channel of a recording has a mean only where the recording is one steady point.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ def import_file(path: str | os.PathLike[str], format: str | None = None, choice:
 
 
 def _run_in(folder: Path) -> Dataset | RunToml | None:
-    """CFD run of a folder: its run.toml, else all exports in it; None where a reader takes the folder or none is there."""
+    """CFD run of a folder: its run.toml, else all exports in it; None where a reader takes the folder."""
     if (folder / "run.toml").is_file():
         return import_file(folder / "run.toml")
     if any(hasattr(m, "sniff_folder") and m.sniff_folder(folder) for m in importers.importers().values()):
@@ -181,10 +181,14 @@ def document(
     run: RunToml | None = None,
     insist: bool = False,
 ) -> dict[str, Any]:
-    """Read files and give the document ``bemt.import/1``; with ``insist`` they must be the CFD run that ``run`` says."""
+    """Read files and give the document ``bemt.import/1``; with ``insist`` they must be the CFD run of ``run``."""
     names = [os.fspath(path) for path in paths]
     runs, to_do = _runs(names, run, insist)
-    names = [name for name in names if not Path(name).is_dir() or not cfd_run.cfd_files(Path(name))] if runs or to_do else names
+    names = (
+        [name for name in names if not Path(name).is_dir() or not cfd_run.cfd_files(Path(name))]
+        if runs or to_do
+        else names
+    )
     records: dict[str, Dataset] = {}
     errors: dict[str, str] = {}
     for name in names:
@@ -221,10 +225,15 @@ def _runs(names: Sequence[str], run: RunToml | None, insist: bool) -> tuple[list
         raise InputError(Fault("", "", "options of a CFD run", "exports of a CFD run", hint))
     if not exports:
         return runs, None
-    head = (run.run if run else RunToml.model_validate({"run": {"files": ()}}).run).model_copy(update={"files": tuple(exports)})
+    head = (run.run if run else RunToml.model_validate({"run": {"files": ()}}).run).model_copy(
+        update={"files": tuple(exports)}
+    )
     whole = run.model_copy(update={"run": head}) if run else RunToml(run=head)
     try:
-        return [*runs, cfd_run.document(cfd_run.assemble(whole, Path(), " + ".join(Path(e).name for e in exports[:3])))], None
+        return [
+            *runs,
+            cfd_run.document(cfd_run.assemble(whole, Path(), " + ".join(Path(e).name for e in exports[:3]))),
+        ], None
     except Exception as error:
         if insist:
             raise
@@ -316,15 +325,32 @@ def _file_text(file: Mapping[str, Any]) -> str:
 
 def text(found: Mapping[str, Any], wrote: str = "") -> str:
     """Lay a document out for a terminal, with what to do next with recordings of a rotor."""
-    lines = [_file_text(file) + "\n" for file in found["files"] if file["format"] != RUN or file["error"]]
+    own = {name for run in found["runs"] for name in run["files"]}
+    lines = [
+        f"{file['path']}: {file['format']} ({file['kind']}), {file['rows']} rows"
+        if file["path"] in own
+        else _file_text(file) + "\n"
+        for file in found["files"]
+        if file["format"] != RUN or file["error"]
+    ]
     lines += [cfd_run.run_text(run) + "\n" for run in found["runs"]]
     if found["to_do"]:
         steps = "\n".join(f"  ! {line}" for line in found["to_do"].splitlines())
         lines.append(f"To use it as a CFD run, and --out run.toml to keep it:\n{steps}\n")
     if wrote or found["runs"]:
-        typed = shlex.quote(wrote or (found["runs"][0]["name"] if found["runs"][0]["name"].endswith(".toml") else "run.toml"))
-        lead = f"{wrote} written. " if wrote else "" if typed.strip("'") == found["runs"][0]["name"] else "With --out run.toml: "
-        return "\n".join([*lines, f"{lead}Next: python -m bemt compare {typed} --case CASE   (a case: python -m bemt new 10x5)\n"])
+        typed = shlex.quote(
+            wrote or (found["runs"][0]["name"] if found["runs"][0]["name"].endswith(".toml") else "run.toml")
+        )
+        lead = (
+            f"{wrote} written. "
+            if wrote
+            else ""
+            if typed.strip("'") == found["runs"][0]["name"]
+            else "With --out run.toml: "
+        )
+        return "\n".join(
+            [*lines, f"{lead}Next: python -m bemt compare {typed} --case CASE   (a case: python -m bemt new 10x5)\n"]
+        )
     loaded = [str(f["path"]) for f in found["files"] if "rpm" in f["channels"] and _LOADS & set(f["channels"])]
     if loaded:
         first, *others = (shlex.quote(path) for path in loaded)

@@ -226,24 +226,34 @@ def _close(
 
 
 def _wild(rec: Dataset, data: dict[str, Array], rest: NDArray[np.bool_], found: Found) -> None:
-    """Leave out speeds of a static table that the load of their row contradicts.
+    """Leave out readings of a static table that the rest of their row contradicts.
 
     Load goes with the square of the speed; a factor of more than 2.5 in speed against the rest of the table is a
-    misreading. A row whose load is odd is kept: that may be physics.
+    misreading: of the one load where the other agrees with the speed, else of the speed.
     """
     speed, v = data.get("rpm"), data.get("airspeed_m_s")
-    load = next((data[k] for k in ("thrust_N", "torque_Nm") if k in data and _moves(data[k])), None)
-    if speed is None or load is None or (v is not None and np.any(np.abs(np.nan_to_num(v)) > 0.5)):
+    loads = {k: np.abs(data[k]) for k in ("thrust_N", "torque_Nm") if k in data and _moves(data[k])}
+    if speed is None or not loads or (v is not None and np.any(np.abs(np.nan_to_num(v)) > 0.5)):
         return
-    size = np.abs(load)
-    good = np.isfinite(size) & (speed > 0.0) & ~rest & (size > 0.05 * np.nanmax(np.append(size, 0.0)))
+    good = np.isfinite(speed) & (speed > 0.0) & ~rest
+    for size in loads.values():
+        good &= np.isfinite(size) & (size > 0.05 * float(np.nanquantile(np.append(size, 0.0), 0.9)))
     if np.count_nonzero(good) < 6:
         return
     with np.errstate(all="ignore"):
-        k = np.sqrt(size[good]) / speed[good]
-        ratio = k / float(np.median(k))
-    for j in np.flatnonzero((ratio > WILD) | (ratio < 1.0 / WILD)):
+        each = {name: np.sqrt(size[good]) / speed[good] for name, size in loads.items()}
+        times = {name: k / float(np.median(k)) for name, k in each.items()}
+    wild = {name: (r > WILD) | (r < 1.0 / WILD) for name, r in times.items()}
+    every = np.logical_and.reduce(list(wild.values()))
+    for name, odd in wild.items():
+        for j in np.flatnonzero(odd & ~every):
+            i = int(np.flatnonzero(good)[j])
+            found.lost += lost(
+                rec, [i], name, f"misread: {times[name][j] ** 2:.3g} times what its row and the rest show"
+            )
+            data[name] = _without(data[name], [i])
+    ratio = next(iter(times.values()))
+    for j in np.flatnonzero(every):
         i = int(np.flatnonzero(good)[j])
-        times = 1.0 / ratio[j]
-        found.lost += lost(rec, [i], "rpm", f"misread: {times:.3g} times what the load of its row needs")
+        found.lost += lost(rec, [i], "rpm", f"misread: {1.0 / ratio[j]:.3g} times what the load of its row needs")
         data["rpm"] = _without(data["rpm"], [i])

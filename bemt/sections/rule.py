@@ -1,13 +1,12 @@
 """The declared general rule for blade sections, which hardly anybody publishes.
 
 Propellers come with a diameter, a pitch and at best stations; sections, surface and transition are unknown.  The rule
-gives every one of them the same answer unless its family is known to differ or has published its section.  Its
-numbers were calibrated on UIUC volume 1 (51 propellers with stations, static and wind-tunnel data); UIUC volume 2 is
-what it is reported on (``reports/validation``): held out of every fit, though looked at on the way.
+gives every one of them the same answer unless its family has published its section.  Its numbers were calibrated on
+UIUC volume 1 (51 propellers with stations, static and wind-tunnel data).  How far the section of a family may be from
+it, and what slow flyers have more, is part of the population of measured rotors (`bemt.rotors`).
 
 * RuleSection: NACA four-digit, camber 3.5 % at 40 % chord, thickness 9 %; six of the nine families of volume 1 with two
-  or more propellers come out at 3.0 to 3.5 %.  Families that do not are in :data:`FAMILIES`, and so are families whose
-  section is published, with its coordinates.  APC publishes sections too (its PE0 files: E63 to NACA 4412, or Clark Y,
+  or more propellers come out at 3.0 to 3.5 %.  APC publishes sections too (its PE0 files: E63 to NACA 4412, or Clark Y,
   scaled); with them static CT of volume 1 is off by 5.3 % in the median, with the rule by 3.7 %: not taken.
 * Transition: n_crit 3.  Rotating small blades keep their lift down to Re 20,000, which n_crit 9 does not (static CT
   at Re 20,000-30,000 relative to the same propellers' top speed: -14 to -16 % with n_crit 9, -3 to +3 % with 3).

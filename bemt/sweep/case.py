@@ -47,7 +47,7 @@ def _points(case: Case, refs: Sequence[reference_file.Reference]) -> list[tuple[
 
 
 def _references(case: Case) -> list[reference_file.Reference]:
-    """Recorded values of the references and of the CFD runs beside the case, open conditions filled in from the case."""
+    """Recorded values: references and CFD runs in the case's folder; open conditions filled in from the case."""
     own = {"rpm": case.rpm, "airspeed_m_s": case.airspeed_m_s, "density_kg_m3": case.air().rho}
     read = [] if case.references_path is None else reference_file.read(case.references_path)
     for path in case.run_paths:
