@@ -6,13 +6,12 @@ the whole chain, from the blade to the simulator. Needs ``pip install 'bemt[simu
 
 from __future__ import annotations
 
-import tempfile
 from pathlib import Path
 
 import mujoco
 
-from bemt.base.tables import write_atomic
 from bemt.case import load_case
+from bemt.case.load import with_changes
 from bemt.drive import drive_result
 from bemt.exports import exports
 from bemt.exports.base import Job
@@ -20,30 +19,13 @@ from bemt.exports.base import Job
 CASE = Path(__file__).resolve().parent.parent / "cases/prop_10x5/case.toml"
 MASS = 1.8  # of the vehicle [kg]
 SECONDS = 2.0
-DRIVE = f"""
-schema = "bemt.drive/1"
-[battery]
-cells = 4
-capacity_Ah = 5.0
-resistance_mohm = 15
-[esc]
-pulse_min_us = 1000
-pulse_max_us = 2000
-resistance_mohm = 5
-idle_A = 0.05
-current_limit_A = 40
-[motor]
-name = "a 900 rpm/V motor"
-kv_rpm_V = 900
-resistance_mohm = 70
-no_load_A = 0.7
-inertia_kg_mm2 = 10
-[rotor]
-inertia_kg_mm2 = 40
-[vehicle]
-mass_kg = {MASS}
-rotors = 4
-"""
+DRIVE = {
+    "drive.kv": 900.0, "drive.cells": 4, "drive.soc": 1.0, "drive.rotor_inertia_kg_mm2": 40.0,
+    "drive.battery.capacity_Ah": 5.0, "drive.battery.resistance_mohm": 15.0, "drive.esc.resistance_mohm": 5.0,
+    "drive.esc.idle_A": 0.05, "drive.esc.current_limit_A": 40.0, "drive.motor.resistance_mohm": 70.0,
+    "drive.motor.no_load_A": 0.7, "drive.motor.inertia_kg_mm2": 10.0, "drive.vehicle.mass_kg": MASS,
+    "drive.vehicle.rotors": 4,
+}  # fmt: skip
 
 
 def vehicle(one: str, name: str) -> str:
@@ -62,11 +44,9 @@ def vehicle(one: str, name: str) -> str:
 
 def main() -> dict[str, float]:
     """Predict, export, fly; the numbers that are printed."""
-    with tempfile.TemporaryDirectory() as folder:
-        drive = Path(folder) / "drive.toml"
-        write_atomic(drive, DRIVE)
-        hover = drive_result.solve(CASE.as_posix(), drive.as_posix()).document["hover"]
-    job = Job(load_case(CASE), rpm=1.5 * hover["rpm"])
+    hover = drive_result.solve(with_changes(load_case(CASE), DRIVE)).hover
+    rpm = hover["rpm"].value
+    job = Job(load_case(CASE), rpm=1.5 * rpm)
     files = exports()["mujoco"].write(job)
     space: dict[str, object] = {}
     exec(str(files["prop_10x5_mujoco.py"]), space)
@@ -74,13 +54,13 @@ def main() -> dict[str, float]:
     data = mujoco.MjData(model)
     propellers = [space["Propeller"](model, f"prop_10x5_{k}") for k in range(4)]  # type: ignore[operator]
     for k, propeller in enumerate(propellers):
-        propeller.rpm = hover["rpm"]
+        propeller.rpm = rpm
         propeller.sense *= -1 if k in (1, 2) else 1
     while data.time < SECONDS:
         for propeller in propellers:
             propeller(model, data)
         mujoco.mj_step(model, data)
-    return {"rpm": hover["rpm"], "pulse_us": hover["pulse_us"], "climb_m_s": float(data.qvel[2]),
+    return {"rpm": rpm, "pulse_us": 1000.0 + 1000.0 * hover["throttle"].value, "climb_m_s": float(data.qvel[2]),
             "height_m": float(data.qpos[2]) - 10.0, "yaw_rate_rad_s": float(data.qvel[5])}  # fmt: skip
 
 

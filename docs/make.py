@@ -16,8 +16,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import get_origin
 
-from bemt.drive.drive_file import DriveToml
-
 from bemt.base.toml import Limits, Table, expected, limits_of
 from bemt.case import Case, load_case
 from bemt.case.prepare import prepare_case
@@ -27,6 +25,7 @@ from bemt.cfd.schema import AxesTable, CampaignFile
 from bemt.diagnose.nuisance import PRIORS
 from bemt.drive.motor_file import MotorToml
 from bemt.drive.thrusters_result import ThrustersFile
+from bemt.readers.cfd_run import RunColumn, RunColumns, RunToml
 from bemt.readers.recording_toml import ColumnsTable, ColumnTable, RecordingToml
 from bemt.report import effects_list
 
@@ -96,13 +95,26 @@ CFD = [
 FILES: dict[str, tuple[type[Table], str]] = {
     "case": (CaseFile, "A propeller or fan: all inputs of the solver. Six lines are enough:"),
     "recording": (RecordingToml, "Next to a table of measurements, if its headings do not say enough:"),
-    "drive": (DriveToml, "Next to a case.toml; `bemt drive` reads it, `bemt new 10x5 --kv 900 --cells 3` writes one:"),
+    "run": (RunToml, "One CFD run; `bemt import FILES --out run.toml` writes it, every command takes it:"),
     "motor": (MotorToml, "Measurements of a motor constant, for `bemt motor`:"),
     "thrusters": (ThrustersFile, "For `bemt thrusters`:"),
     "campaign": (CampaignFile, "OpenFOAM runs of one case, for `bemt cfd`:"),
 }
 """Files on the reference page: model, and what the file is for."""
-_TAKEN = completed({"rotor": {}, "blade": {}})
+_TAKEN = completed({"rotor": {}, "blade": {}, "drive": {}})
+DRIVE = """```toml
+[drive]                         # `bemt new 10x5 --kv 900 --cells 3` writes one
+kv = 900
+cells = 3
+battery.capacity_Ah = 2.2
+motor.resistance_mohm = 70      # from the motor's sheet, else typical shares are assumed
+motor.no_load_A = 0.7
+vehicle.mass_kg = 1.4
+vehicle.rotors = 4
+```
+
+`drive`, `sweep`, `report` and `export` take the greatest speed and thrust from it, at the charge `soc`. An unknown of
+the drive is declared like any other: `[[assumptions]]` with `key = "drive.battery.resistance_mohm"`."""
 
 
 def tables(model: type[Table], name: str = "") -> Iterator[tuple[str, type[Table]]]:
@@ -110,6 +122,9 @@ def tables(model: type[Table], name: str = "") -> Iterator[tuple[str, type[Table
     yield name, model
     if model is ColumnsTable:
         yield "columns.NAME", ColumnTable
+        return
+    if model is RunColumns:
+        yield "columns.NAME", RunColumn
         return
     for key in model.named():
         inner = model.inner(key)
@@ -179,6 +194,7 @@ def files() -> str:
                 array = table in model.named() and get_origin(model.named()[table].annotation) is tuple
                 head = f"[[{table}]]" if array else f"[{table}]"
                 lines += [f"### `{head}`", "", words[:1].upper() + words[1:], ""] if table else []
+                lines += [DRIVE, ""] if model is CaseFile and table == "drive" else []
                 lines += ["| key | type | unit | default | range | meaning |", "|---|---|---|---|---|---|"]
                 lines += [f"| {' | '.join(row)} |" for row in body] + [""]
     return "\n".join(lines)

@@ -355,7 +355,8 @@ def _child(word: str) -> dict[str, Any]:
 
 SEEN = {
     "dfdc": ("DFDC 0.70, built from its source", "2026-11-23", "a file of 30 stations converges in 16 iterations; with "
-             "40 or 60 it is NaN. Loads were not compared: the file has neither stator nor tip gap"),
+             "40 or 60 it is NaN. Loads were not compared: the file has neither stator nor tip gap, and its sections "
+             "were those of an earlier fit"),
     "xrotor": ("XROTOR 7.55, built from its source", "2026-11-23", "10x5: thrust +1.5 to +2.9 %, torque +5 to +16 % of "
                "BEMT's; at one speed XROTOR settled on a stalled root"),
 }  # fmt: skip
@@ -377,7 +378,9 @@ TEXT = {
 def _percent(value: Any) -> str:
     if isinstance(value, dict):
         value = value.get("flight")
-    return "-" if value is None else f"{value:.2g} %" if value > 1e-3 else "< 0.001 %"
+    if value is None:
+        return "-"
+    return f"{value:.0f} %" if value >= 10.0 else f"{value:.2g} %" if value > 1e-3 else "< 0.001 %"
 
 
 def _program(word: str, kept: dict[str, Any]) -> str:
@@ -393,7 +396,7 @@ def _program(word: str, kept: dict[str, Any]) -> str:
     if word in SEEN:
         program, date, _ = SEEN[word]
         return f"by hand: {program} | see below | see below | {held} | {date} |"
-    return f"text only: {TEXT[word]} | - | - | {held} | - |"
+    return f"text only: {TEXT.get(word, 'formula of its source')} | - | - | {held} | - |"
 
 
 def page() -> str:

@@ -25,7 +25,7 @@ API = {  # page: title, introduction, names
         "bemt.library.rotors.propeller", "bemt.library.rotors.load", "bemt.library.rotors.Propeller")),
     "api_answers.md": ("Questions", "Each is `bemt.read`, `bemt.diagnose` and so on.", (
         *(f"bemt.library.answers.{n}" for n in ("read", "diagnose", "Answer", "compare", "drive", "validate")),
-        "bemt.diagnose.contrast.Contrast", "bemt.drive.from_label.DriveEstimate", "bemt.drive.from_label.Band")),
+        "bemt.diagnose.contrast.Contrast", "bemt.drive.drive_result.DriveResult", "bemt.drive.drive_result.Band")),
     "api_dataset.md": ("Dataset", "What every source gives and every question takes.", (
         "bemt.dataset.points", "bemt.dataset.make", "bemt.base.errors.InputError",
         "bemt.base.errors.Fault")),
@@ -34,7 +34,7 @@ API = {  # page: title, introduction, names
 }  # fmt: skip
 PARTS = {  # navigation; a name ending in * stands for all pages of that name
     "Start": ("index.md", "quickstart.md", "people.md", "gallery.md"),
-    "How to": ("notebooks/*", "exports.md", "adding.md", "scaling.md"),
+    "How to": ("notebooks/*", "exports.md", "adding.md", "scaling.md", "trust.md"),
     "Python": tuple(API),
     "Commands and files": ("commands.md", "reference_*", "mistakes.md", "nomenclature.md"),
     "Theory": ("theory.md", "effects.md", "diagnosis.md"),

@@ -70,7 +70,6 @@ def main() -> None:
     bemt("motor", "reports/drive/motor_mn4006", "--out", "reports/drive/motor_mn4006/result")
     if data is not None:
         uiuc = data.resolve() / "uiuc"
-        bemt("calibrate", f"{uiuc}/volume-1", "--test", f"{uiuc}/volume-2", "--out", "reports/calibration")
         for k in (1, 2):
             bemt("validate", f"{uiuc}/volume-{k}", "--match-J0", "--out", f"reports/validation/uiuc_volume_{k}")
     proof = json.loads((ROOT / "reports" / "proof" / "proof.json").read_text(encoding="utf-8"))

@@ -30,6 +30,7 @@ def pytest_configure(config: pytest.Config) -> None:
     if getattr(config.option, "numprocesses", None):
         for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
             os.environ.setdefault(name, "1")  # a worker a core: more threads only wait for each other
+    os.environ.setdefault("BEMT_COMPILE", "always")  # equal to the last bit, whichever call is the first
     cache = getattr(config, "cache", None)  # absent under -p no:cacheprovider: the user's cache serves then
     if cache is not None:
         os.environ.setdefault("BEMT_CACHE", str(cache.mkdir("bemt")))

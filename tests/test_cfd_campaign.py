@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from filelock import FileLock
 
 from bemt.base.errors import InputError
 from bemt.cfd.balance import BALANCE_LIMIT, balance_of
@@ -28,6 +29,7 @@ from bemt.cfd.summary import summary
 from bemt.cfd.worker import point_key, radial_of
 from bemt.commands.cli import main
 from bemt.exports.openfoam.write import settings_of
+from bemt.recordings.cfd_setup import GRID_FLOOR
 
 pytestmark = pytest.mark.usefixtures("equal_solids_once")
 
@@ -239,6 +241,12 @@ def test_a_campaign_is_recorded(
     assert tree(Path(work)) == kept, "what was kept stays, the new run's folder goes"
 
 
+def _alive(pid: int) -> bool:
+    """Whether a process runs; one that only waits to be collected does not."""
+    stat = Path(f"/proc/{pid}/stat")
+    return stat.is_file() and stat.read_text().rsplit(")", 1)[1].split()[0] != "Z"
+
+
 def test_a_killed_campaign_goes_on(project: Path, tmp_path: Path, programs: Path) -> None:
     path = write(tmp_path / "c", project, TWO)
     command = [sys.executable, "-m", "bemt", "cfd", str(path), "--ranks", "1", "--work", str(tmp_path / "w"), "--quiet"]
@@ -251,7 +259,9 @@ def test_a_killed_campaign_goes_on(project: Path, tmp_path: Path, programs: Path
     solver = int(asleep[0].read_text())
     os.killpg(process.pid, signal.SIGKILL)
     process.wait()
-    os.kill(solver, signal.SIGKILL)  # it has a session of its own
+    while _alive(solver) and time.monotonic() < end:
+        time.sleep(0.1)
+    assert not _alive(solver), "kill -9 leaves no solver behind"
     before = rows_of(path.parent)
     assert [row["rpm"] for row in before] == ["6000"]
     json.loads((path.parent / "manifest.json").read_text())
@@ -294,23 +304,46 @@ def test_the_work_folder_loses_nothing_that_the_campaign_did_not_make(
     assert not (tmp_path / "new").exists(), "a folder that was not there is not left behind"
 
 
-def test_the_default_work_folder_is_left_as_it_was(
-    project: Path, tmp_path: Path, programs: Path, monkeypatch: pytest.MonkeyPatch
+def test_the_default_work_folder_is_private_and_held_by_one_campaign(
+    project: Path, tmp_path: Path, programs: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.delenv("BEMT_CFD_WORK", raising=False)
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "tmp"))
-    (tmp_path / "tmp").mkdir()
+    monkeypatch.setenv("BEMT_CACHE", str(tmp_path / "cache"))
     path = write(tmp_path / "c", project, TWO)
     command = ["cfd", str(path), "--ranks", "1", "--quiet"]
+    home = tmp_path / "cache" / "cfd"
     assert main([*command, "--only", "1"]) == 0
-    assert [p.name for p in (tmp_path / "tmp").iterdir()] == ["bemt-cfd-t"]
+    (folder,) = home.iterdir()
+    assert folder.name.startswith("t-") and home.stat().st_mode & 0o077 == 0
+    with FileLock(home / f".{folder.name}.lock"):
+        assert main(command) == 2
+        assert "in use by another campaign" in capsys.readouterr().err
     assert main(command) == 0 and calls(programs, "blockMesh") == 1
-    assert not list((tmp_path / "tmp").iterdir())
+    assert not [p for p in home.iterdir() if p.is_dir()]
     (path.parent / "recording.csv").unlink()
-    (tmp_path / "tmp" / "bemt-cfd-t").mkdir()
-    (tmp_path / "tmp" / "bemt-cfd-t" / "notes").write_text("mine")
+    folder.mkdir()
+    (folder / "notes").write_text("mine")
     assert main(command) == 0
-    assert tree(tmp_path / "tmp") == {"bemt-cfd-t", "bemt-cfd-t/notes"}
+    assert {p.name for p in folder.iterdir()} == {"notes"}
+
+
+def test_a_row_whose_settings_changed_is_replaced_and_u_has_a_floor(
+    project: Path, tmp_path: Path, programs: Path
+) -> None:
+    path = write(tmp_path / "c", project, TWO)
+    command = ["cfd", str(path), "--ranks", "1", "--work", str(tmp_path / "w"), "--quiet"]
+    assert main(command) == 0
+    before = rows_of(path.parent)
+    for row in before:  # one grid, loads that do not move: nothing smaller than the floor can be claimed
+        assert float(row["u_thrust_N"]) == pytest.approx(
+            GRID_FLOOR["rest"]["thrust_N"] * float(row["thrust_N"]), rel=1e-3
+        )
+    write(path.parent, project, TWO.replace("average = 10", "average = 12"))
+    assert main(command) == 0
+    after = rows_of(path.parent)
+    assert [row["rpm"] for row in after] == ["6000", "9000"] and {r["run"] for r in after}.isdisjoint(
+        r["run"] for r in before
+    )
 
 
 @pytest.mark.parametrize("name", ["a/../h/deadly", "..", "/h", ".hidden", "a b", "x\\n", "-x"])

@@ -277,8 +277,9 @@ def test_the_improved_case_runs_however_the_case_is_written(tmp_path: Path, form
         text = re.sub(r"^also_without.*$", "", text, flags=re.M)
         text = text.replace("[rotor]", "model.n_crit = 3\nmodel.drag_level = 1.1\n\n[rotor]", 1)
     if form == "references elsewhere":
-        (own / "references.csv").rename(tmp_path / "shared.csv")
-        text = text.replace('references = "references.csv"', 'references = "../shared.csv"')
+        (own / "measured").mkdir()
+        (own / "references.csv").rename(own / "measured" / "shared.csv")
+        text = text.replace('references = "references.csv"', 'references = "measured/shared.csv"')
     (own / "case.toml").write_text(("\ufeff" if form == "byte order mark" else "") + text, encoding="utf-8")
     off = [] if form == "several lines" else ["--off", "compressibility"]
     run = ["diagnose", _recorded(tmp_path / "log.csv", 0), "--case", str(own), *off, "--out", str(out), "--no-figures"]

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from diagnosing import case, left_out, points, recording
 
 from bemt.dataset import Dataset
-from bemt.diagnose import chain
+from bemt.diagnose import chain, noise
 from bemt.diagnose.assemble import build
 from bemt.diagnose.load import load
 from bemt.diagnose.record import from_series
@@ -172,3 +173,20 @@ def test_a_balance_that_stays_behind_is_nothing_in_the_library() -> None:
     answer = chain.diagnose([record], [case()])
     assert answer.decision.verdict == "unknown"
     assert answer.found.states[0].best_rival.split(":")[0].endswith("while the load falls")
+
+
+def test_levels_differ_from_run_to_run_on_cells_and_not_on_a_tachometer() -> None:
+    """Thrust and torque of one run share a level; a tachometer has none, and no two channels share theirs."""
+    channel = np.repeat([0, 1, 2], 4)  # thrust, torque, rpm
+    point = np.tile(np.arange(4), 3)
+    y = np.repeat([5.0, 0.1, 6000.0], 4)
+    problem = SimpleNamespace(
+        covariates={"run": np.array([0.0, 0.0, 1.0, 1.0]), "rpm": np.full(4, 6000.0), "J": np.zeros(4)},
+        point=point, channel=channel, y=y, scale=y,
+    )  # fmt: skip
+    found = noise.sessions(problem)  # type: ignore[arg-type]
+    assert np.all(found[channel == 2] == 0.0) and np.all(found[:, channel == 2] == 0.0)
+    for k, size in ((0, 5.0), (1, 0.1)):
+        block = found[np.ix_(channel == k, channel == k)] / size**2
+        assert block == pytest.approx(np.kron(np.eye(2), np.ones((2, 2))), abs=1e-12)
+    assert np.all(found[np.ix_(channel == 0, channel == 1)] == 0.0)

@@ -14,9 +14,11 @@ import pytest
 from diagnosing import left_out
 
 from bemt.case import Case, load_case
+from bemt.case.unknowns import section_of
 from bemt.dataset import Dataset
 from bemt.diagnose import chain, document, record
 from bemt.diagnose.load import load
+from bemt.readers._uiuc_names import class_of
 from bemt.sections import rule as section_rule
 
 pytestmark = pytest.mark.slow
@@ -51,7 +53,7 @@ hub_ratio = 0.1
 [blade]
 uiuc = "geom.txt"
 [blade.section]
-camber = {section.camber}
+camber = {section_of(class_of(family))[0].value if section.shape == "naca4" else section.camber}
 camber_position = {section.position}
 thickness = {section.thickness}
 [operating]

@@ -225,7 +225,9 @@ def test_the_rotor_of_a_case_is_the_solver_s(project: Path) -> None:
     case = load_case(project / "cases" / "prop_8x5" / "case.toml")
     rpm = np.array([4000.0, 9000.0, 20000.0])
     points = prepare_case(case).solve(rpm, 0.0, case.air())
-    table = rotor_table.from_case(case, 20000.0, air=case.air(), points=17)
+    at, V = rotor_table.points(case.diameter_m, 20000.0, 0.0)
+    loads = prepare_case(case).solve(at, V, case.air())
+    table = rotor_table.from_loads(case, at, V, loads.thrust_N, loads.torque_Nm, 1.225)
     assert np.allclose(table.thrust(rpm * math.pi / 30.0), points.thrust_N, rtol=5e-3)
     assert np.allclose(table.torque(rpm * math.pi / 30.0), points.torque_Nm, rtol=5e-3)
     assert table.slope_law is not None and np.all(table.slope_law(rpm * math.pi / 30.0) < 0.0)
@@ -235,28 +237,37 @@ def test_command_on_the_fan(project: Path, tmp_path: Path, capsys: pytest.Captur
     out = tmp_path / "out"
     assert main(["drive", str(project / "cases" / "ds30"), "--json", "--out", str(out)]) == 1  # it cannot hover
     doc = json.loads(capsys.readouterr().out)
-    assert doc["schema"] == "bemt.drive.result/1" and doc["hover"]["pulse_us"] is None
-    assert doc["hover"]["wanted_N"] == pytest.approx(6.5 * 9.80665 / 2)
-    assert "motor.kv_rpm_V" in doc["assumed"] and len(doc["steady"]["thrust_N"]) == 21
+    assert doc["schema"] == "bemt.drive.result/2" and doc["hover"]["throttle"]["value"] is None
+    assert doc["hover"]["thrust_N"]["value"] == pytest.approx(6.5 * 9.80665 / 2)
+    assert "drive.motor.resistance_mohm" in doc["unknowns"] and len(doc["steady"]["thrust_N"]) == 21
     assert {p.name for p in out.iterdir()} == {"drive.json", "drive.csv", "drive.png"}
 
 
-def test_faults_of_drive_toml_come_all_at_once(
+def fan(project: Path, folder: Path, *changes: tuple[str, str]) -> str:
+    """Copy of the fan's case with parts of its text changed."""
+    text = (project / "cases" / "ds30" / "case.toml").read_text()
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    folder.mkdir(exist_ok=True)
+    (folder / "case.toml").write_text(text.replace('references = "references.csv"\n', ""))
+    return str(folder)
+
+
+def test_faults_of_the_drive_come_all_at_once(
     project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    text = (project / "cases" / "ds30" / "drive.toml").read_text()
-    bad = text.replace("cells = 6", "cells = 0").replace("resistance_mohm = 9", "resistance_mohm = 0.009")
-    bad = bad.replace("thermal_K_W = 1.0", "thermal = 1").replace('key = "esc.resistance_mohm"', 'key = "esc.r"')
-    (tmp_path / "drive.toml").write_text(bad)
-    case = str(project / "cases" / "ds30")
-    assert main(["drive", case, "--drive", str(tmp_path / "drive.toml")]) == 2
+    bad = fan(project, tmp_path / "bad", ("cells = 6", "cells = 0"), ("resistance_mohm = 9", "resistance_mohm = 0.009"),
+              ("thermal_K_W = 1.0 ", "thermal = 1 "))  # fmt: skip
+    assert main(["drive", bad]) == 2
     words = capsys.readouterr().err
-    assert all(w in words for w in ("battery.cells", "motor.resistance_mohm", "Write milliohm", "motor.thermal"))
-    (tmp_path / "drive.toml").write_text(text.replace('key = "esc.resistance_mohm"', 'key = "esc.r"'))
-    assert main(["drive", case, "--drive", str(tmp_path / "drive.toml")]) == 2
-    assert "assumed[9].key" in capsys.readouterr().err
-    assert main(["drive", case, "--off", "wind"]) == 2
-    assert main(["drive"]) == 2
+    assert all(w in words for w in ("drive.cells", "motor.resistance_mohm", "Write milliohm", "motor.thermal"))
+    both = fan(project, tmp_path / "both", ("no_load_A = 3.5", "no_load_A = 3.5\nidle_share = 0.1"))
+    assert main(["drive", both]) == 2
+    assert "drive.motor.idle_share: got 0.1; expected nothing" in capsys.readouterr().err
+    assert main(["drive", str(project / "cases" / "ds30"), "--off", "wind"]) == 2
+    assert main(["drive", str(project / "cases" / "prop_8x5")]) == 2  # no motor
+    assert "--kv: got nothing" in capsys.readouterr().err
 
 
 def test_steps_need_something_that_turns() -> None:
@@ -328,18 +339,11 @@ def test_an_airspeed_that_nothing_flies_at_is_refused_with_all_other_faults(
     project: Path, tmp_path: Path, airspeed: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     case, out = str(project / "cases" / "ds30"), tmp_path / "out"
-    text = (project / "cases" / "ds30" / "drive.toml").read_text()
-    (tmp_path / "drive.toml").write_text(text.replace("cells = 6", "cells = -6"))
-    wrong = [f"--airspeed={airspeed}", "--off", "wind", "--drive", str(tmp_path / "drive.toml"), "--out", str(out)]
-    assert main(["drive", case, *wrong]) == 2
+    assert main(["drive", case, f"--airspeed={airspeed}", "--off", "wind", "--out", str(out)]) == 2
     words = capsys.readouterr().err
     assert f"--airspeed: got {airspeed}; expected a number from -100 to 300 m/s" in words
     assert ("km/h?" in words) == (airspeed == "300.1")
-    assert "--off: got 'wind'" in words and "battery.cells: got -6" in words
-    assert main(["drive", case, f"--airspeed={airspeed}", "--out", str(out)]) == 2 and not out.exists()
-    assert main(["drive", str(tmp_path / "none"), f"--airspeed={airspeed}"]) == 2
-    words = capsys.readouterr().err
-    assert "--airspeed: got" in words and "none" in words
+    assert "--off: got 'wind'" in words and not out.exists()
 
 
 @pytest.mark.parametrize(("airspeed", "known"), [("100", True), ("200", False), ("300", False)])
@@ -349,7 +353,7 @@ def test_an_airspeed_beyond_the_drive_is_answered(
     case = str(project / "cases" / "ds30")
     assert main(["drive", case, "--airspeed", airspeed, "--json", "--out", str(tmp_path / "out")]) == 1
     doc = json.loads(capsys.readouterr().out)
-    assert doc["response"] == [] and doc["hover"]["pulse_us"] is None
+    assert doc["response"] == [] and doc["hover"]["throttle"]["value"] is None
     full = doc["steady"]["thrust_N"][-1]
     # 100 m/s turns the fan faster than the battery does: drag; above, faster than its table reaches
     assert (full is not None and full < 0.0) if known else full is None
@@ -362,14 +366,11 @@ def test_an_airspeed_beyond_the_drive_is_answered(
     assert ("gives an unknown maximum" in words) is not known and " nan " not in words
 
 
-def test_results_never_replace_the_drive_file(
-    project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    file = tmp_path / "drive.json"  # TOML inside: the name is the user's
-    file.write_text((project / "cases" / "ds30" / "drive.toml").read_text())
+def test_results_never_replace_the_case(project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    fan(project, tmp_path)
+    file = (tmp_path / "case.toml").rename(tmp_path / "drive.json")  # TOML inside: the name is the user's
     before = file.read_text()
-    case = str(project / "cases" / "ds30")
-    assert main(["drive", case, "--drive", str(file), "--out", str(tmp_path)]) == 2
+    assert main(["drive", str(file), "--out", str(tmp_path)]) == 2
     assert "drive.json, which this run reads" in capsys.readouterr().err
     assert file.read_text() == before and len(list(tmp_path.iterdir())) == 1
 

@@ -29,6 +29,8 @@ from bemt.bem.model import Model
 from bemt.case import load_case
 from bemt.case.prepare import prepare_case
 from geometry.duct import Duct
+from geometry.laws import helix
+from geometry.rotor import Rotor
 
 HEAD = 'schema = "bemt.case/1"\nname = "published"\n'
 
@@ -71,6 +73,24 @@ def test_nozzles_squeeze_the_jet_and_the_stream_does_where_the_duct_tapers() -> 
     assert at[0].at_rest < at[1].at_rest < at[2].at_rest
     assert at[0].in_stream < at[1].in_stream < at[2].in_stream
     assert all(jet.in_stream < jet.at_rest for jet in at)
+
+
+def test_the_stream_leaves_a_steep_boattail() -> None:
+    """Outer walls that fall by 18 to 24 degrees: from attached to left, with base pressure on what faces back."""
+    found = []
+    for angle in (15.0, 21.0, 30.0, 40.0):
+        fall = 0.03 * math.tan(math.radians(angle))  # from the end of the lip to the exit
+        duct = Duct(0.1, 0.04, 0.01, exit_radius=0.12 - fall - 0.001, rotor_x=0.02, te_thickness=0.001)
+        x = np.linspace(0.0, duct.length, 201)
+        r = duct.outer(x)
+        assert math.degrees(math.atan2(r.max() - r[-1], x[-1] - x[r.argmax()])) == pytest.approx(angle, abs=1.0)
+        flow = duct_model.duct_flow(duct, Rotor(helix(0.2, 0.1), 4))
+        skin = duct_model.WALL_FRICTION * duct_model.FORM_FACTOR * 2.0 * math.pi * 0.11 * duct.length
+        base = duct_model.BASE_PRESSURE * math.pi * float(r.max() ** 2 - r[-1] ** 2)
+        jet = jet_area(duct, 0.0)
+        found.append((flow.drag_area - skin) / base)
+        assert flow.capture == pytest.approx(jet.in_stream + found[-1] * (jet.at_rest - jet.in_stream), abs=5e-3)
+    assert found == pytest.approx([0.0, 0.5, 1.0, 1.0], abs=1e-6)
 
 
 def test_the_lip_loss_lies_in_the_range_of_its_sources() -> None:

@@ -381,6 +381,22 @@ def test_electrical_speed_is_pole_pairs_times_the_true_one() -> None:
     assert {7.0, 1 / 7.0, 2 / 3, 6 / 7, 12 / 14, 0.5, 1.0} <= ratios
 
 
+def test_a_counter_that_reads_too_much_turns_the_rotor_slower() -> None:
+    assert met(recorded([6120.0]), RpmScale(factor=1.0, eps=0.02)).rpm[0] == pytest.approx(6000.0, rel=1e-12)
+    assert met(recorded([5880.0]), RpmScale(factor=1.0, eps=-0.02)).rpm[0] == pytest.approx(6000.0, rel=1e-12)
+
+
+def test_what_instruments_got_wrong_comes_before_the_flow() -> None:
+    """The pitot was off in the tunnel: the tunnel turns the true airspeed, whatever order the effects are named in."""
+    flow = recorded([6000.0], [6.0])
+    pitot, askew = AirspeedOffset(2.0), ObliqueInflow(angle_deg=60.0)
+    want = met(met(flow, pitot), askew).V
+    assert not np.allclose(want, met(met(flow, askew), pitot).V)
+    for order in ((pitot, askew), (askew, pitot)):
+        _, found, _ = bem.respond(model().prepared, (*effects.standard(), *order), flow)
+        assert pytest.approx(want, rel=1e-12) == found.V
+
+
 @pytest.mark.parametrize(
     ("channel", "factor"),
     [

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from bemt.drive.drive_file import DriveToml
 
 from bemt.base.toml import Limits, Table, limits_of, validated
 from bemt.base.toml_text import Collector
@@ -21,7 +20,6 @@ from bemt.readers.recording_toml import RecordingToml
 
 MODELS: dict[str, type[Table]] = {
     "campaign": CampaignFile,
-    "drive": DriveToml,
     "motor": MotorToml,
     "recording": RecordingToml,
     "thrusters": ThrustersFile,

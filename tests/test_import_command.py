@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bemt.base.errors import InputError
 from bemt.commands.cli import main
 from bemt.recordings.choice import Choice
 from bemt.recordings.load import document, import_file
@@ -109,49 +108,6 @@ def test_openfoam_start_folders_are_restarts_too(put: Callable[..., Path]) -> No
     assert any("not joined" in w for w in found[1]["warnings"]) and not any("joined" in w for w in found[0]["warnings"])
 
 
-def test_a_load_is_refused_where_nothing_is_done_to_it(
-    put: Callable[..., Path], capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = put("q.out", history())
-    assert main(["import", str(path), "--load", "torqe"]) == 2  # neither dropped nor its slip passed over
-    assert capsys.readouterr().err.startswith("--load: got torqe; expected --sign -1 or --sector N as well")
-    assert main(["import", str(path), "--load", "torque", "--sign", "-1"]) == 0
-
-
-def test_sign_and_sector_are_applied_only_where_told(put: Callable[..., Path]) -> None:
-    path = put("q.out", history())
-    with pytest.raises(InputError, match="Name them: --load NAME"):
-        import_file(path, choice=Choice(sector=4))
-    with pytest.raises(InputError, match="names of channels"):
-        import_file(path, choice=Choice(sector=4, loads=("thrust",)))
-    record = import_file(path, choice=Choice(PERIOD, sign=-1, sector=4, loads=("torque",)))
-    means = record.provenance["means"]
-    assert (means["torque"].value, means["volume"].value) == pytest.approx((0.8, 0.25))
-    assert means["torque"].over.endswith(", times -4")
-    assert any("holds only for axisymmetric flow" in w for w in record.notes)
-
-
-def report() -> str:
-    head = "Forces - Direction Vector (1 0 0)\n             Forces (n)\nZone      Pressure   Viscous   Total\n"
-    return (
-        head
-        + "blade   -10  -1  -11\nhub   2  -0.5   1.5\nduct  -4  -0.25  -4.25\n---- ---- ----\nNet   -12  -1.75  -13.75\n"
-    )
-
-
-def test_zones_are_added_up_only_when_named(put: Callable[..., Path]) -> None:
-    path = put("forces", report())
-    plain = import_file(path)
-    assert not any("+" in name for name in plain.values)
-    record = import_file(path, choice=Choice(sign=-1, zones=("blade", "hub")))
-    assert record.provenance["means"]["force_total_N along (1 0 0) (blade+hub)"].value == 9.5
-    assert record.provenance["means"]["force_total_N along (1 0 0) (duct)"].value == 4.25
-    with pytest.raises(InputError, match="Zones: blade, hub, duct, Net"):
-        import_file(path, choice=Choice(zones=("rotor",)))
-    with pytest.raises(InputError, match="Net holds them all"):
-        import_file(path, choice=Choice(zones=("blade", "Net")))
-
-
 def test_a_refused_file_is_2_and_the_others_are_shown(
     put: Callable[..., Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -174,6 +130,10 @@ def test_a_refused_file_is_2_and_the_others_are_shown(
         (["--revolutions", "2"], "--revolutions: got no speed"),
         (["--format", "nonsense"], "--format: got 'nonsense'; expected one of"),
         (["--sector", "1000"], "--sector: got 1000"),
+        (["--sign", "2"], "--sign: got 2"),
+        (["--unit", "torque"], "--unit: got torque; expected NAME=VALUE"),
+        (["--unit", "torque=N"], "--unit torque: got 'N'; expected a unit of torque"),
+        (["--setup", "colour=red"], "--setup: got an unknown key"),
     ],
 )
 def test_wrong_options(

@@ -100,8 +100,8 @@ RUNS: dict[str, tuple[Callable[[Put], list[str]], int, tuple[str, ...]]] = {
                        ("l.csv", "thrust", "unit")),
     "N mm for N m": (lambda put: ["import", put("q.csv", TABLE.replace("0.0", ""))], 0,
                      ("torque_Nm", "mNm taken for Nm")),
-    "no motor": (lambda put: ["drive", "mine"], 2, ("drive.toml", "--kv")),
-    "pitch without a point": (lambda put: ["drive", "10x45", "--kv", "900", "--cells", "3"], 2, ("Meant 10x4.5?",)),
+    "no motor": (lambda put: ["drive", "mine"], 2, ("[drive]", "--kv")),
+    "pitch without a point": (lambda put: ["drive", "10x100", "--kv", "900", "--cells", "3"], 2, ("Meant 10x10?",)),
     "no torque": (lambda put: ["import", put("t.csv", "rpm,thrust_N\n4000,1.1\n6000,2.4\n")], 0, ("thrust_N",)),
 }  # fmt: skip
 

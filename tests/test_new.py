@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 import bemt
-from bemt.case import load_case
+from bemt.case import case_of, fresh, load_case
+from bemt.case.unknowns import section_of
 from bemt.commands.cli import main
 
 STATIONS = "r_over_R,chord_over_R,beta_deg\n0.2,0.14,35\n0.5,0.19,22\n0.75,0.16,15\n1.0,0.06,10\n"
@@ -36,6 +37,8 @@ def test_a_folder_that_exists_is_said_to(tmp_path: Path, capsys: pytest.CaptureF
         (["10x4.5", "--kv", "900", "--cells", "3"], "prop_10x4.5"),
         (["70mm", "--fan"], "fan_70"),
         (["--stations", "blade.csv", "--diameter-mm", "254"], "blade"),
+        (["10x5E", "--stations", "blade.csv", "--kv", "900", "--cells", "3"], "prop_10x5_electric"),
+        (["APC 10x4.7SF"], "prop_10x4.7_slow_flyer"),
     ],
 )
 def test_a_new_folder_runs_at_once(words: list[str], name: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -49,7 +52,7 @@ def test_a_new_folder_runs_at_once(words: list[str], name: str, capsys: pytest.C
     if "--kv" in words:
         assert main(["drive", name, "--json"]) == 0
         found = json.loads(capsys.readouterr().out)
-        assert found["assumed"] and found["steady"]["thrust_N"][-1] > 1.0
+        assert found["unknowns"] and found["steady"]["thrust_N"][-1] > 1.0
 
 
 @pytest.mark.parametrize(("unit", "metres"), [("in", 0.0254), ("mm", 1e-3), ("m", 1.0)])
@@ -166,10 +169,10 @@ def test_a_label_with_its_motor_needs_no_file(capsys: pytest.CaptureFixture[str]
     assert main(words) == 0
     shown = capsys.readouterr().out
     assert all(word in shown for word in ("thrust", "current", "gf/W", "throttle", "flight time", "motor's sheet", "±"))
-    assert max(map(len, shown.splitlines())) <= 120 and len(shown.splitlines()) <= 30
+    assert max(map(len, shown.splitlines())) <= 120 and len(shown.splitlines()) <= 24
     assert main([*words, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
-    assert found["schema"] == "bemt.drive.estimate/1" and found["hover"]["minutes"]["u"] > 0
+    assert found["schema"] == "bemt.drive.result/2" and found["hover"]["minutes"]["u"] > 0
     assert main(["drive", "10x4.5", "--kv", "900", "--cells", "3", "--mass", "30"]) == 1
     assert "no hover" in capsys.readouterr().out
 
@@ -182,4 +185,79 @@ def test_a_motor_for_a_smaller_propeller_is_called_one(capsys: pytest.CaptureFix
 
 def test_an_estimate_of_the_drive_is_written_where_it_is_told(tmp_path: Path) -> None:
     assert main(["drive", "10x5", "--kv", "900", "--cells", "3", "--out", str(tmp_path / "out")]) == 0
-    assert json.loads((tmp_path / "out" / "drive.json").read_text())["schema"] == "bemt.drive.estimate/1"
+    assert json.loads((tmp_path / "out" / "drive.json").read_text())["schema"] == "bemt.drive.result/2"
+
+
+def test_most_thrust_is_one_at_every_door(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of a 10x4.5 with 920 rev/min/V on 4 cells there were four: 9.7, 10.2, 16.7 and 19.6 N."""
+    import re
+
+    words = ["10x4.5", "--kv", "920", "--cells", "4"]
+    assert main(["new", *words]) == 0
+    case = "prop_10x4.5"
+    capsys.readouterr()
+
+    def of(*args: str) -> dict[str, object]:
+        assert main([*args, "--json"]) == 0
+        return dict(json.loads(capsys.readouterr().out))
+
+    label, own = of("drive", *words), of("drive", case)
+    (swept,) = of("sweep", case)["cases"]  # type: ignore[misc]
+    (exported,) = of("export", case, "--format", "px4", "--out", "out")["cases"]  # type: ignore[misc]
+    target = exported["targets"][0]  # type: ignore[index]
+    library = bemt.drive("10x4.5", kv=920, cells=4)
+    found = [
+        (d["rpm"]["value"], d["thrust_N"]["value"], d["thrust_N"]["u"])  # type: ignore[index]
+        for d in (label["full"], own["full"], swept["drive"], target["full_throttle"])  # type: ignore[index]
+    ]
+    found.append((library.full["rpm"].value, library.full["thrust_N"].value, library.full["thrust_N"].u))
+    for one in found[1:]:
+        assert one == pytest.approx(found[0], rel=1e-3)
+    row = swept["rows"][0]  # type: ignore[index]
+    assert row["thrust_N"] == pytest.approx(found[0][1], rel=2e-3)  # the case's own speed is that of full throttle
+    text = next(Path("out").rglob("*_sih.params")).read_text()
+    assert float(re.findall(r"set-default SIH_T_MAX (\S+)", text)[0]) == pytest.approx(found[0][1], rel=1e-3)
+    assert float(re.findall(r"set-default SIH_F_RPM_MAX (\S+)", text)[0]) == pytest.approx(found[0][0], rel=1e-3)
+
+
+def test_a_class_of_blades_brings_its_camber_and_its_family(here: Path) -> None:
+    for label, family in (("APC 10x4.7SF", "apcsf"), ("GWS 10x4.7 slow flyer", "gwssf"), ("10x4.7", None)):
+        case = case_of(fresh.label_text(label))
+        assert case.file.blade.family == family
+        assert case.file.blade.section.camber == section_of("slow_flyer" if family else None)[0].value  # type: ignore[union-attr]
+    short = case_of(SIX + 'blade.class = "slow_flyer"\n')
+    assert short.file.blade.section.camber > 0.05  # type: ignore[union-attr]
+    assert short.file.blade.max_chord_over_R > 1.3 * case_of(SIX).file.blade.max_chord_over_R  # type: ignore[operator]
+
+
+def test_stations_and_label_are_one_case_that_weighs_both(here: Path) -> None:
+    assert main(["new", "10x5", "--stations", "blade.csv"]) == 0
+    both = load_case("prop_10x5")
+    assert both.diameter_m == pytest.approx(0.254) and both.file.blade.label_pitch_in == 5
+    assert main(["new", "--stations", "blade.csv", "--diameter-mm", "254"]) == 0
+    alone = load_case("blade")
+    assert both.rotor().blade.beta == pytest.approx(alone.rotor().blade.beta)
+    # the stations are steeper than the label: the population expects a flatter blade than they say
+    assert both.as_built().prior.mean[0] < alone.as_built().prior.mean[0]
+    assert both.as_built().prior.sd[0] < alone.as_built().prior.sd[0]
+
+
+def test_a_calibrated_case_keeps_its_things_under_a_name_of_its_own(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (here / "case.toml").write_text(
+        SIX + 'drive.kv = 900\ndrive.cells = 3\nreferences = "references.csv"\nnotes = "mine"\n'
+    )
+    header = "quantity,value,unit,uncertainty,kind,source,rpm,airspeed_m_s,density_kg_m3,remark"
+    (here / "references.csv").write_text(f"{header}\nthrust,4.9,N,0.1,bench,stand,6000,0,1.225,\n")
+    (here / "run.csv").write_text("rpm,thrust_N,torque_Nm\n5000,3.4,0.055\n6000,4.9,0.079\n7000,6.8,0.107\n")
+    assert main(["calibrate-rotor", "run.csv", "--case", ".", "--out", "measured"]) == 0
+    shown = capsys.readouterr().out
+    assert "one flight point" in shown and "next:" in shown and "measured: references.csv" in shown
+    known = load_case("measured")
+    assert known.name == "prop_10x5_measured" and known.file.drive is not None and known.file.notes == "mine"
+    assert not any(item.key.startswith("blade.") for item in known.assumptions)
+    assert main(["sweep", "case.toml", "measured", "--json"]) == 0  # no double name
+    u = [case["rows"][0]["u"] for case in json.loads(capsys.readouterr().out)["cases"]]
+    assert u[1] < u[0]
+    assert main(["drive", "measured"]) == 0

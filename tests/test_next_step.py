@@ -36,7 +36,7 @@ def step(d: chain.Diagnosis) -> list[str]:
     ]
 
 
-REAL = AsBuilt(angle_deg=1.0, lift=-0.06, drag=0.2, low_re_lift=0.05, camber_deg=0.5)
+REAL = AsBuilt(angle_deg=1.0, lift=-0.06, drag=0.2, camber_deg=0.5)
 
 
 @pytest.fixture(scope="module")

@@ -143,6 +143,14 @@ def test_a_heading_says_name_and_unit(text: str, name: str, unit: str) -> None:
     assert (got.name, got.unit_name) == (name, unit)
 
 
+@pytest.mark.parametrize(("text", "factor"), [("u_temp_C", 1.0), ("u_temp (F)", 5.0 / 9.0), ("u_temp_K", 1.0)])
+def test_an_uncertainty_of_a_temperature_is_a_difference(text: str, factor: float) -> None:
+    got = heading(text)
+    assert got.name == "u_temp_K" and got.unit is not None
+    assert (got.unit.factor, got.unit.offset) == (pytest.approx(factor), 0.0)
+    assert heading("temp_C").unit.offset == pytest.approx(273.15)  # type: ignore[union-attr]
+
+
 @pytest.mark.parametrize(
     ("text", "name", "unit"),
     [
@@ -336,6 +344,18 @@ def test_rpm_zero_and_spikes_are_kept_and_flagged(write: Write) -> None:
         0: ("spike of electrical_rpm",), 12: ("electrical_rpm is 0 under thrust",), 20: ("spike of electrical_rpm",),
     }  # fmt: skip
     assert got["electrical_rpm"][[0, 12, 20]].tolist() == [66434.0, 0.0, 99999.0]
+
+
+@pytest.mark.parametrize(("times", "flagged"), [(2.0, False), (2.4, False), (2.7, True), (3.5, True)])
+def test_a_first_speed_is_misread_where_its_thrust_needs_a_fraction_of_it(
+    write: Write, times: float, flagged: bool
+) -> None:
+    """At the start of a ramp neighbours cannot tell: 2.5 times what the rest of the file needs for that thrust."""
+    lines = rc_text().split("\n")
+    cells = lines[1].split(",")
+    cells[RC_HEAD.split(",").index("Motor Electrical Speed (RPM)")] = f"{3000.0 * times:g}"
+    lines[1] = ",".join(cells)
+    assert (rcbenchmark.read(write("\n".join(lines))).flags[0] == ("spike of electrical_rpm",)) == flagged
 
 
 def test_a_flag_of_a_row_is_one_of_its_point(write: Write) -> None:

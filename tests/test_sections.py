@@ -74,6 +74,18 @@ def test_derived_quantities_of_a_known_curve() -> None:
     assert p.stall(1e5, side=-1)[1] == pytest.approx(-6.0 * deg(8)[0], abs=1e-6)
 
 
+def test_zero_lift_is_the_crossing_nearest_to_the_chord_line() -> None:
+    """A stalled section may rise through zero again, at -12 degrees here; the crossing is linear between nodes."""
+    a = np.deg2rad(np.arange(-20.0, 20.5, 1.0))
+    cl = 5.0 * (a + np.deg2rad(2.6))
+    early = a < np.deg2rad(-8.5)
+    cl[early] = 5.0 * (a[early] + np.deg2rad(12.0))
+    p = from_tables([ExtrapolatedTable(a, cl, np.full(a.size, 0.02))])
+    assert p.alpha0(1e5) == pytest.approx(np.deg2rad(-2.6), abs=1e-9)
+    mirrored = from_tables([ExtrapolatedTable(a, -cl[::-1], np.full(a.size, 0.02))])
+    assert mirrored.alpha0(1e5) == pytest.approx(np.deg2rad(2.6), abs=1e-9)
+
+
 def test_bad_tables_are_refused() -> None:
     good = P.linear_polar()
     bad = {

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import os
 import subprocess
 import sys
+import tempfile
 from typing import Any
 
 import numpy as np
@@ -296,7 +298,7 @@ def test_import_compiles_nothing() -> None:
         "from numba.core import event\n"
         "with event.install_recorder('numba:compile') as record:\n"
         "    import bemt.bem.solver, bemt.bem.kernel as K\n"
-        'assert not record.buffer and not K.entry(False, "plain").signatures'
+        'assert not record.buffer and not K.entry(False, "plain").compiled.signatures'
     )
     subprocess.run([sys.executable, "-c", code], check=True)
 
@@ -304,13 +306,42 @@ def test_import_compiles_nothing() -> None:
 def test_the_disk_cache_sees_changes_of_other_files() -> None:
     before = vecmath.fingerprint(residual, vecmath)
     assert before == vecmath.fingerprint(residual, vecmath)
-    assert before in [c.cell_contents for c in kernel.entry(True, "full").py_func.__closure__]  # type: ignore[attr-defined]
+    assert before in [c.cell_contents for c in kernel.entry(True, "full").compiled.py_func.__closure__]
     kept = residual._EPS
     try:
         residual._EPS = 2.0 * kept
         assert vecmath.fingerprint(residual, vecmath) != before
     finally:
         residual._EPS = kept
+
+
+@pytest.mark.parametrize("ducted", [False, True])
+def test_interpreted_points_equal_compiled_ones(rotor: Rotor, polar: Polar, ducted: bool) -> None:
+    duct = DuctFlow(0.95, wall_loss=0.05, lip_loss=0.1, stator=0.5, gap=1e-3) if ducted else None
+    prep = solver.prepare(rotor, [(0.7, polar)], None, duct, n_stations=10)
+    entry, *constant = prep.kernel
+    assert isinstance(entry, kernel.Entry)
+    rpm, V = np.array([500.0, 4000.0, 9000.0, 6000.0, 3000.0]), np.array([0.0, 2.0, -4.0, 30.0, 12.0])
+    points = np.column_stack([rpm * np.pi / 30.0, V, *(np.full(5, v) for v in (AIR.rho, AIR.mu, AIR.a_sound))])
+    found = []
+    for run in (entry.compiled, lambda *given: kernel.interpret(*entry.kind, *given)):
+        out, radial = np.empty((5, kernel.N_OUT)), np.empty((5, 10, kernel.N_RADIAL))
+        run(points, *constant, out, radial)
+        found.append((out, radial))
+    np.testing.assert_allclose(found[0][0], found[1][0], rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(found[0][1], found[1][1], rtol=1e-10, atol=1e-12)
+
+
+def test_a_few_points_are_interpreted_and_many_compiled() -> None:
+    code = (
+        "import bemt\nfrom bemt.bem import kernel as K\n"
+        'p = bemt.propeller("10x5")\np.solve(6000, bands=False)\n'
+        'compiled = K.entry(False, "factored").compiled\nassert not compiled.signatures\n'
+        "p.solve([5000.0 + i for i in range(400)], bands=False)\nassert compiled.signatures"
+    )
+    with tempfile.TemporaryDirectory() as empty:
+        env = os.environ | {"BEMT_COMPILE": "", "NUMBA_CACHE_DIR": empty}
+        subprocess.run([sys.executable, "-c", code], check=True, env=env)
 
 
 def test_broadcasting_of_speeds_and_air(rotor: Rotor, polar: Polar) -> None:

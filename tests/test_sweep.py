@@ -521,7 +521,34 @@ def test_cases_of_one_name_are_told_apart_and_remarks_are_whole_in_a_pipe(
     flag = "a remark of many words " * 8 + "to the end"
     result = {"name": "long", "rows": [{**row, "flags": [flag]}], "faults": [], "assumptions": [], "audit": [],
               "grid": None, "comparisons": []}  # fmt: skip
-    assert flag in " ".join(summary([result], cut=False).split()) and "to the end" not in summary([result])
+    assert all(flag in " ".join(summary([result], cut=cut).split()) for cut in (False, True))
+
+
+def test_no_flag_is_dropped_from_the_screen() -> None:
+    row = {"source": "bemt", "label": "bemt", "u": 0.5, "airspeed_m_s": 0.0, "rpm": 6000.0, "thrust_N": 1.0}
+    kinds = ("outside the measured rotors", "not converged", "supersonic tip")
+    flags = [f"{kind}: {i} {'and so on ' * 9}" for i, kind in enumerate(kinds * 5)]
+    results = [
+        {"name": f"case_{i}", "rows": [{**row, "flags": [flag]}], "faults": [], "assumptions": [], "audit": [],
+         "grid": None, "comparisons": []}
+        for i, flag in enumerate(flags)
+    ]  # fmt: skip
+    said = summary(results)
+    assert said.count("\n") < 45
+    words = " ".join(said.split("!", 1)[1].split())
+    counted = [int(n) for n in re.findall(r"(\d+) more: ", words)]
+    whole = [flag for flag in flags if flag.split(" and ")[0] + " and so on" in words]
+    assert len(whole) + sum(counted) == len(flags) and all(kind in words for kind in kinds)
+    assert words.index("not converged") < words.index("outside the measured rotors")
+
+
+def test_a_flagged_point_is_no_plain_agreement() -> None:
+    from bemt.report.verdicts import stand
+
+    line = {"E": 1.0, "D": 100.0, "u_num": 0.0, "u_input": 5.0, "u_model": 0.0, "u_D": 0.5, "u_val": 5.1, "unit": "N"}
+    plain, flagged = line | {"doubts": []}, line | {"doubts": ["supersonic tip"]}
+    assert stand(plain)[0] == "same" and stand(flagged)[0] != "same" and "supersonic tip" in stand(flagged)[1]
+    assert "supersonic tip" in agreement(flagged) and "supersonic tip" not in agreement(plain)
 
 
 def test_a_difference_near_zero_thrust_is_a_share_of_the_largest_and_no_thousand_percent() -> None:

@@ -18,6 +18,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
+from importlib import resources
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -122,6 +123,17 @@ def used() -> Iterator[dict[tuple[str, str], Arrays]]:
         yield entries
     finally:
         _watched[:] = [held for held in _watched if held is not entries]
+
+
+def shipped_arrays(package: str, file: str) -> Arrays:
+    """Arrays of a file that lies beside the modules of a package."""
+    with resources.files(package).joinpath(file).open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
+        return {name: archive[name] for name in archive.files}
+
+
+def always_compile() -> bool:
+    """Whether ``BEMT_COMPILE=always`` asks for compiled code even for a few points: equal to the last bit."""
+    return os.environ.get("BEMT_COMPILE", "") == "always"
 
 
 def watched() -> bool:

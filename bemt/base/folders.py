@@ -1,4 +1,4 @@
-"""Where published data are found: the one place that knows."""
+"""Where published data are found, and whether a name stays in its folder."""
 
 from __future__ import annotations
 
@@ -23,3 +23,15 @@ def find_data(kind: str) -> Path | None:
     True
     """
     return next((root / kind for root in data_roots() if (root / kind).is_dir()), None)
+
+
+def inside(folder: Path, name: str) -> bool:
+    """Whether a file that a case names lies in its folder, links followed.
+
+    >>> inside(Path("case"), "sections/root.dat"), inside(Path("case"), "../other.dat"), inside(Path("case"), "/etc/x")
+    (True, False, False)
+    """
+    try:
+        return (folder / name).resolve().is_relative_to(folder.resolve())
+    except (OSError, ValueError, RuntimeError):  # a loop of links, a name that is none
+        return False

@@ -81,17 +81,37 @@ def text_table(
 
 
 def csv_text(columns: Sequence[str], rows: Iterable[Mapping[str, Any]]) -> str:
-    """Give rows as CSV; lists are joined by "; ", missing values are empty."""
+    r"""Give rows as CSV; lists are joined by "; ", missing values are empty.
+
+    A text that a spreadsheet would calculate, one that begins with = + - @, begins with an apostrophe instead (OWASP,
+    CSV Injection); numbers stay numbers.
+
+    >>> csv_text(["name", "T"], [{"name": "=1+1", "T": -1.5}])
+    "name,T\n'=1+1,-1.5\n"
+    """
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(columns)
+    writer.writerow([_inert(name) for name in columns])
     for row in rows:
         cells = []
         for name in columns:
             value = plain(row.get(name))
-            cells.append("" if value is None else "; ".join(map(str, value)) if isinstance(value, list) else value)
+            value = "; ".join(map(str, value)) if isinstance(value, list) else value
+            cells.append("" if value is None else _inert(value) if isinstance(value, str) else value)
         writer.writerow(cells)
     return out.getvalue()
+
+
+def _inert(text: str) -> str:
+    """Text that no spreadsheet calculates; a carriage return would begin a row of its own."""
+    text = text.replace("\r", " ")
+    if not text.startswith(("=", "+", "-", "@", "\t", " =", " +", " -", " @")):
+        return text
+    try:
+        float(text)
+    except ValueError:
+        return f"'{text}"
+    return text
 
 
 def _axis_cells(values: NDArray[np.float64], index: NDArray[np.intp]) -> NDArray[np.uint8]:

@@ -14,13 +14,16 @@ steps.  Every operating point is solved for itself: its result depends neither o
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+import sys
+from functools import cache
+from types import FunctionType
 from typing import Any
 
 import numpy as np
 from numba import carray, types
 from numba.core import cgutils
 
+from bemt.base.cache import always_compile
 from bemt.bem import residual
 from bemt.bem import vecmath as vecmath
 from bemt.bem.residual import (
@@ -405,10 +408,78 @@ def _entries(stamp: int) -> dict[tuple[bool, str], Any]:
     }  # fmt: skip
 
 
-_ENTRIES = _entries(fingerprint(residual, vecmath))
+_PARTS: dict[tuple[bool, str], tuple[str, str, str]] = {
+    (ducted, tables): (f"{kind}_rotor", f"_guess_{kind}", f"lookup_{tables}")
+    for ducted, kind in ((False, "open"), (True, "ducted")) for tables in ("plain", "full", "factored")
+}  # fmt: skip
+
+INTERPRETED = 6000
+"""Blade elements times points that a process interprets before it compiles, which takes as long as 15,000."""
 
 
-def entry(ducted: bool, tables: str) -> Callable[..., None]:
-    """Entry point that solves a batch of operating points; compiled when first called."""
-    found: Callable[..., None] = _ENTRIES[ducted, tables]
-    return found
+@cache
+def _source() -> dict[str, Any]:
+    """The functions of the kernel as plain Python, in a namespace of their own."""
+    space: dict[str, Any] = {}
+    for module in (vecmath, residual, sys.modules[__name__]):
+        space |= vars(module)
+    for name, item in list(space.items()):
+        source = getattr(item, "py_func", None)
+        if source is not None:
+            # numpy's numbers divide by zero as the compiled ones do
+            code = source.__code__
+            consts = tuple(np.float64(c) if type(c) is float else c for c in code.co_consts)
+            space[name] = FunctionType(code.replace(co_consts=consts), space, name, source.__defaults__)
+        elif type(item) is float:
+            space[name] = np.float64(item)
+    space.update(log=np.log, wide=lambda: None)
+    return space
+
+
+def interpret(ducted: bool, tables: str, points, st, tab, par, out, radial) -> None:
+    """Solve a few points without compiling: the same steps, equal to rounding."""
+    space = _source()
+    element, guess, lookup = (space[name] for name in _PARTS[ducted, tables])
+    w = np.zeros(_ROWS * LANES)
+    with np.errstate(all="ignore"):
+        for p in range(points.shape[0]):
+            space["_point"](element, guess, lookup, w, points[p], st, tab, par, out[p], radial[p])
+
+
+class Entry:
+    """Entry point of the kernel for one kind of rotor and tables.
+
+    Compiling takes seconds, more than all that a first question needs: as long as no compiled code lies on the disk,
+    the first few points are interpreted.
+    """
+
+    def __init__(self, ducted: bool, tables: str, compiled) -> None:
+        self.kind, self.compiled = (ducted, tables), compiled
+        self._fast = always_compile()
+        self._left = INTERPRETED
+
+    def __call__(self, points, st, tab, par, out, radial) -> None:
+        """Solve a batch of operating points."""
+        if not self._fast:
+            self._left -= points.shape[0] * st.shape[0]
+            self._fast = self._left < 0 or bool(self.compiled.signatures) or _on_disk(self.compiled)
+        if self._fast:
+            self.compiled(points, st, tab, par, out, radial)
+        else:
+            interpret(*self.kind, points, st, tab, par, out, radial)
+
+
+def _on_disk(compiled) -> bool:
+    """Whether numba's cache holds compiled code of this source."""
+    try:
+        return bool(compiled._cache._cache_file._load_index())
+    except Exception:  # numba's own, and private: if in doubt, it is not there
+        return False
+
+
+_ENTRIES = {kind: Entry(*kind, made) for kind, made in _entries(fingerprint(residual, vecmath)).items()}
+
+
+def entry(ducted: bool, tables: str) -> Entry:
+    """Entry point that solves a batch of operating points."""
+    return _ENTRIES[ducted, tables]

@@ -42,10 +42,12 @@ Array = NDArray[np.float64]
 _SPEED_STEP = 2e-3
 # Section speeds over those without induction; tables beyond them are left out.
 _SLOWEST, _FASTEST = 0.4, 1.5
+# More points than these are not looked at one by one.
+_MANY = 64
 
 
-PREPARED: Kept[solver.Prepared] = Kept(256e6, lambda made: made.st.nbytes + made.tab.nbytes)
-"""Prepared rotors of this process, by geometry, section tables, duct, effects and range: a quarter of a gigabyte."""
+PREPARED: Kept[solver.Prepared] = Kept(512e6, lambda made: made.st.nbytes + made.tab.nbytes)
+"""Prepared rotors of this process, by geometry, section tables, duct, effects and range: up to half a gigabyte."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,6 +134,9 @@ class Model:
         """
         blade = self.rotor.blade
         omega, onset = np.multiply(rpm, math.pi / 30.0), np.abs(V)
+        if np.size(omega) > _MANY and np.ndim(air.rho) == 0:
+            # their extremes hold them all
+            omega, onset = (np.array([np.min(v), np.max(v)]) for v in (omega, onset))
         per_m = np.broadcast_arrays(omega, onset, np.asarray(air.rho) / air.mu)
         Re = np.hypot(per_m[0][..., None] * blade.r, per_m[1][..., None]) * blade.chord * per_m[2][..., None]
         # effects read the tables at two Reynolds numbers besides

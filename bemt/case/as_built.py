@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
+from bemt.readers._uiuc_names import class_of
 from bemt.rotors.latents import NAMES, AsBuilt, Prior, as_built
 from bemt.rotors.population import label_angle_deg, population
 from bemt.rotors.reference import ReferenceRun
@@ -31,7 +32,7 @@ MOVED = {
     "chord": ("blade.max_chord_over_R", "blade.chord_scale", "blade.chord_law"),
     "camber": ("blade.section.camber", "blade.section.camber_scale", "blade.section.naca", "blade.section.dat"),
 }
-_SCHEMA = "bemt.as_built/1"
+_SCHEMA = "bemt.as_built/2"
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,8 +77,7 @@ def as_built_of(file: CaseFile, folder: Path, rotor: Rotor, counting_assumptions
     blade, stated = file.blade, file.blade.as_built
     if stated is not None and stated.file is not None:
         return _posterior(folder / stated.file)
-    assumed = {item.key for item in file.assumptions}
-    moved = assumed if counting_assumptions else set()
+    moved = {item.key for item in file.assumptions} if counting_assumptions else set()
     declared = {what for what, keys in MOVED.items() if moved & set(keys)}
     source = known_from(blade)
     drawn_section = blade.section is not None and blade.section.dat is not None
@@ -89,10 +89,9 @@ def as_built_of(file: CaseFile, folder: Path, rotor: Rotor, counting_assumptions
         for name, sd in named.items():
             if getattr(stated, sd) is not None:
                 sds[name] = getattr(stated, sd)
-    thickness_known = file.rotor.kind != "propeller" or "blade.section.thickness" not in assumed
-    chord = math.nan if thickness_known else float(rotor.blade.at(0.75 * rotor.R)[0]) / rotor.R
     gap = _gap_deg(blade, rotor)
-    prior = population().prior(source, rotor.D, gap, blade.family, section, declared, sds, chord)
+    kind = None if blade.section is not None else blade.class_ or class_of(blade.family)  # the rule knows no classes
+    prior = population().prior(source, rotor.D, gap, blade.family, section, declared, sds, kind)
     stated_mean = np.where(drawn != 0.0, drawn, prior.mean)
     return CaseAsBuilt(Prior(stated_mean, prior.cov, prior.sizes, prior.weights, source), drawn)
 

@@ -13,7 +13,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
 from bemt.case.drive_schema import LIPO_SOC, LIPO_V
 from bemt.case.unknowns import AIR, DRIVE, FAN, HUB, OFFSET, SURFACE, Unknown, label_chord, section_of
-from bemt.readers._uiuc_names import family_of
+from bemt.readers._uiuc_names import class_of, family_of
 from geometry.common import GeometryError
 from geometry.designation import Designation, parse_designation
 
@@ -145,7 +145,7 @@ def label_text(
     """Write the case of a label such as ``10x5``, with its maker's series and K_v and cells of a motor if known."""
     told = read_label(label, blades)
     D, B = told.diameter_in, told.blades
-    chord, section = label_chord(D * INCH), section_of(told.blade_class)
+    chord, section = label_chord(D * INCH, told.blade_class), section_of(told.blade_class)
     return f"""# A {told.size} propeller from its label. Each [[assumptions]] entry is an unknown with a range.
 # `bemt sweep --details` prints its effect on the thrust. When you measure a value, enter it and delete the assumption.
 schema = "bemt.case/1"
@@ -208,7 +208,7 @@ def stations_text(
 
     The population of measured rotors weighs the pitch of the label against the angles of the stations.
     """
-    section = section_of(label.blade_class if label else None)
+    section = section_of((label.blade_class if label else None) or class_of(family))
     pitch = f"label_pitch_in = {label.pitch_in:g}\n" if label else ""
     name = _label_name(label) if label else case_name(Path(file).stem)
     title = _title(label) if label else f"{blades} blades, {1e3 * diameter_m:.4g} mm"

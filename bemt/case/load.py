@@ -126,6 +126,11 @@ class Case:
         return None if name is None else self.folder / name
 
     @property
+    def run_paths(self) -> tuple[Path, ...]:
+        """CFD runs in the folder of the case (``run*.toml``): recorded values like those of the references."""
+        return tuple(sorted(self.folder.glob("run*.toml"))) if self.path.is_file() else ()
+
+    @property
     def diameter_m(self) -> float:
         """Rotor diameter. [m]"""
         return self.file.rotor.diameter_m
@@ -245,7 +250,8 @@ class Case:
         names += dat if isinstance(dat, tuple) else [dat]
         names += [polar.file for polar in self.file.polars]
         names += [blade.as_built.file] if blade.as_built is not None else []
-        return [self.path, *(self.folder / name for name in names if name)]
+        runs = [p for run in self.run_paths for p in (run, *_exports(run)) if p.is_file()]
+        return [self.path, *(self.folder / name for name in names if name), *runs]
 
     def content_hash(self) -> str:
         """SHA-256 over the content of all files of the case; it does not depend on where the case lies."""
@@ -255,6 +261,16 @@ class Case:
             data = repr(self.written).encode() if made_here else path.read_bytes()
             digest.update(f"{path.name}\0{len(data)}\0".encode() + data)
         return digest.hexdigest()
+
+
+def _exports(run: Path) -> list[Path]:
+    """Files of a CFD run; none where its run.toml cannot be read, which the sweep says."""
+    from bemt.readers.cfd_run import read
+
+    try:
+        return [run.parent / name for name in read(run).run.files]
+    except InputError:
+        return []
 
 
 def _assumptions(case: CaseFile) -> tuple[Assumption, ...]:

@@ -30,6 +30,7 @@ class Wanted:
     series: str | None = None
     kv: float | None = None
     cells: int | None = None
+    campaign: bool = False
 
     @property
     def motor(self) -> tuple[float, int] | None:
@@ -40,6 +41,21 @@ class Wanted:
     def family(self) -> str | None:
         """Family of the series."""
         return None if self.series is None else find_family(self.series)
+
+
+_CAMPAIGN = """\
+# OpenFOAM runs of this case: python -m bemt cfd {name}/cfd
+schema = "bemt.cfd/1"
+name = "{name}"
+case = "../case.toml"
+
+[defaults]
+airspeed_m_s = {V:g}
+
+[axes]                    # every combination; three grids show what a grid is worth
+rpm = [{rpm:g}]
+level = [5, 5.5, 6]       # cells on the blade R / 2^(level + 2): about 35,000, 65,000 and 115,000 for half a rotor
+"""
 
 
 def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str]]:
@@ -60,6 +76,8 @@ def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str]]:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             got = f"a {'folder' if folder.is_dir() else 'file'} that already exists"
             raise InputError(Fault(folder.as_posix(), "", got, "a new folder", "Choose --out DIR"))
+        if wanted.campaign:
+            files["cfd/campaign.toml"] = _CAMPAIGN.format(name=case.name, rpm=case.rpm, V=case.airspeed_m_s).encode()
     for name in sorted(files, key=lambda name: name == "case.toml"):  # last: what it names is there
         write_atomic(folder / name, files[name])
     return folder, sorted(files)

@@ -19,9 +19,9 @@ from numpy.typing import ArrayLike, NDArray
 from bemt import coefficients as co
 from bemt.air import air_arrays
 from bemt.rotors.mixture import LEVELS
-from bemt.rotors.model import coefficients
+from bemt.rotors.model import RealRotor, coefficients
 from bemt.rotors.population import population
-from bemt.rotors.predict import predict, sense, zero_thrust
+from bemt.rotors.predict import zero_thrust
 from bemt.rotors.validity import Validity
 
 if TYPE_CHECKING:
@@ -210,11 +210,9 @@ def _model_error(case: Case, model: Model, points: Dataset, air: Air) -> tuple[A
     What the population expects beside the nominal result counts too, as a root sum of squares.
     """
     known = case.as_built()
-    solve = coefficients(model, air)
-    at = sense(solve, model.diameter_m, points.rpm, points.J, points.Re75, known.drawn)
-    at = replace(at, J0=_zero_thrust_J(case), x=points.J / _zero_thrust_J(case))  # whatever other points are asked for
-    mean = solve(known.prior.mean, points.rpm, points.J, np.arange(points.rpm.size))
-    found = predict(population(), known.prior, at, mean, known.reference)
+    rotor = RealRotor.of(model, air, known.prior, known.drawn, known.reference)
+    mean = rotor.solve(known.prior.mean, points.rpm, points.J, np.arange(points.rpm.size))
+    found = rotor.predict(rotor.at(points.rpm, points.J, points.Re75), mean)
     off = found.mean - np.array([points.CT, points.CP])
     return np.hypot(found.half_width(), off), np.hypot(found.half_width(LEVELS[1]), 2.0 * off)
 
@@ -238,7 +236,7 @@ def validity_of(case: Case, J: Array, Re75: Array, M_tip: Array) -> tuple[Array,
         size = (case.diameter_m, int(case.file.rotor.blades), case.rotor().blade.pitch_m() / case.diameter_m)
         ducted, run = case.ducted, case.as_built().reference
         if run is not None:  # a rotor that was measured itself, in its duct
-            own = Validity.of_rotor(*size, run.x, run.Re, known.M_tip)
+            own = Validity.of_rotor(*size, run.at.J / _zero_thrust_J(case), run.at.Re, known.M_tip)
             known, ducted = Validity.of_rotors((known, own)), False
         factor, words = known.at(*size, J / _zero_thrust_J(case), Re75, M_tip, ducted)
     tip = ((f"supersonic tip: Mach {m:.2f}, beyond section theory",) if m >= 1.0 else () for m in M_tip)

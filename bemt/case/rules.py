@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from bemt.base.folders import inside
 from bemt.base.toml import Table, check_field, shown, validated
 from bemt.base.toml_text import Collector
 from bemt.case.schema import GROUPS, INCH, CaseFile, SectionTable
@@ -91,13 +92,13 @@ def _check_files(out: Collector, document: Mapping[str, Any], folder: Path) -> N
     if isinstance(polars, list):
         places += [(f"polars[{i}].file", p.get("file")) for i, p in enumerate(polars) if isinstance(p, Mapping)]
     for where, value in places:
-        if isinstance(value, str) and value.strip() and not (folder / value).is_file():
-            out.add(
-                where,
-                f"{value!r}, which does not exist",
-                "the name of a file in the folder of the case",
-                "Check the name",
-            )
+        if not isinstance(value, str) or not value.strip():
+            continue
+        expected = "the name of a file in the folder of the case"
+        if not inside(folder, value):
+            out.add(where, f"{value!r}, which lies outside it", expected, "Copy the file there")
+        elif not (folder / value).is_file():
+            out.add(where, f"{value!r}, which does not exist", expected, "Check the name")
 
 
 def _given(table: Table, *names: str) -> list[str]:

@@ -3,20 +3,29 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import os
 import shutil
 import signal
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from filelock import FileLock, Timeout
+
+from bemt.base.cache import cache_dir
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_text, remove_stale, text_table
+from bemt.case.prepare import prepare_case
 from bemt.cfd.record import CampaignRecord
 from bemt.cfd.schema import Campaign, load_campaign
 from bemt.cfd.worker import Worker, point_key
+from bemt.dataset import Dataset
+from bemt.dataset.channels import channel_fault
+from bemt.recordings.cfd_setup import audit_of, faults_first, floor_note
 
 if TYPE_CHECKING:
     from bemt.exports.openfoam import Settings
@@ -97,7 +106,31 @@ def text(record: CampaignRecord) -> str:
                      number_text(r["u_thrust_N"], 2), number_text(r["torque_Nm"]), r["solver"], number_text(r["level"]),
                      f"{r['cells']:.0f}", number_text(drift, 2), number_text(r["yplus_avg"], 3),
                      number_text(r["seconds"], 3)])  # fmt: skip
-    return f"{record.campaign.name}: {record.campaign.title}\n{text_table(head, rows, left=(0, 6))}"
+    lines = [f"{record.campaign.name}: {record.campaign.title}", text_table(head, rows, left=(0, 6))]
+    return "\n".join([*lines, *_audit_lines(record)])
+
+
+def _audit_lines(record: CampaignRecord) -> list[str]:
+    """What the audit of other people's CFD says of our own, and what u is where there is no grid study."""
+    solved = [row for row in record.rows if row["converged"] == 1]
+    if not solved:
+        return []
+    case = record.campaign.case
+    flies = [row["airspeed_m_s"] > 0 for row in solved]
+    out = [] if record.studies() else [floor_note(any(flies), all(flies))]
+    found = named_rows(solved[:1])
+    pitch = float(prepare_case(case).pitch_m)
+    lines = audit_of(found, case.diameter_m, pitch, case.ducted, float(case.air().a_sound))
+    lines = tuple(x for x in lines if not (record.studies() and x.topic == "grid study"))
+    return [*out, *(f"audit, {x.status}: {x.topic}: {x.finding}: {x.consequence}" for x in faults_first(lines))]
+
+
+def named_rows(rows: Sequence[Mapping[str, Any]]) -> Dataset:
+    """Rows of a campaign as a recording."""
+    texts = {k: tuple(str(r[k]) for r in rows) for k in rows[0] if isinstance(rows[0][k], str)}
+    numbers = {k: np.array([float(r[k]) for r in rows]) for k in rows[0] if k not in texts}
+    units = {k: "" for k in numbers if channel_fault(k)}
+    return Dataset("cfd", "campaign", numbers, units=units, texts=texts)
 
 
 def document(record: CampaignRecord) -> dict[str, Any]:
@@ -121,12 +154,45 @@ def run(
             hint = "Debian and Ubuntu: the package openfoam"
             raise InputError(Fault("", "", f"no program {program}", "OpenFOAM", hint))
     named = work or os.environ.get("BEMT_CFD_WORK")
-    folder = Path(named) if named else Path(tempfile.gettempdir()) / f"bemt-cfd-{campaign.name}"
+    folder = Path(named) if named else _own_folder(campaign)
     before = signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))  # so that the solver ends with us
     try:
-        record = run_campaign(campaign, folder, only, ranks, tell, keep)
+        with _locked(folder):
+            record = run_campaign(campaign, folder, only, ranks, tell, keep)
     finally:
         signal.signal(signal.SIGTERM, before)
     if not named and not keep:
         _remove_empty(folder)  # made by us, now or before we were stopped
     return record
+
+
+def _own_folder(campaign: Campaign) -> Path:
+    """Work folder of a campaign, in the cache, which is the user's own; without a cache a new private one."""
+    cache = cache_dir()
+    if cache is None:
+        return Path(tempfile.mkdtemp(prefix="bemt-cfd-"))
+    where = hashlib.sha256(str(campaign.path.resolve()).encode()).hexdigest()[:12]
+    folder = cache / "cfd" / f"{campaign.name}-{where}"
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    folder.parent.chmod(0o700)
+    return folder
+
+
+@contextlib.contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """Hold a work folder for one campaign at a time."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    place = folder.parent / f".{folder.name}.lock"
+    lock = FileLock(place)
+    try:
+        lock.acquire(timeout=0)
+    except Timeout:
+        hint = "Wait for it, or give another folder: --work DIR"
+        raise InputError(
+            Fault(folder.as_posix(), "", "a work folder in use by another campaign", "a free one", hint)
+        ) from None
+    try:
+        yield
+    finally:
+        place.unlink(missing_ok=True)
+        lock.release()

@@ -19,6 +19,7 @@ from bemt.cfd.balance import BALANCE_LIMIT
 from bemt.cfd.schema import Campaign
 from bemt.cfd.worker import DRIFT_LIMIT, RESIDUALS, SCATTER_LIMIT, Outcome
 from bemt.readers import number
+from bemt.recordings.cfd_setup import GRID_FLOOR_SOURCE, grid_floor
 from bemt.recordings.grid_study import grid_study, ratios
 
 __all__ = ["COLUMNS", "CampaignRecord", "grid_studies", "grid_uncertainty"]
@@ -34,6 +35,8 @@ TEXTS = {"run", "solver", "gas", "domain", "sector", "turbulence", "start", "not
 RADIAL = ("run", "r_m", "thrust_per_radius_N_m", "torque_per_radius_Nm_m")
 SAME = ("rpm", "airspeed_m_s", "wall_distance_m", "tip_gap_mm", "sideslip_deg", "pitch_offset_deg", "solver", "gas",
         "domain", "sector", "turbulence")  # fmt: skip
+POINT = (*SAME[:6], "level")
+"""What a run is of; solver, domain, turbulence and iterations are how it was computed."""
 HISTORY_ROWS = 400
 NO_BALANCE = "not recorded: made before the balance check"
 NOT_ENDED = "not recorded: the run did not come to its end"
@@ -44,6 +47,11 @@ def _same(a: Any, b: Any) -> bool:
     if isinstance(a, float) and isinstance(b, float):
         return (math.isnan(a) and math.isnan(b)) or math.isclose(a, b, rel_tol=1e-6, abs_tol=1e-9)
     return bool(a == b)
+
+
+def _same_point(a: Mapping[str, Any], b: Mapping[str, Any]) -> bool:
+    """Whether two runs are of one point on one grid, whatever their settings: the newer one replaces the other."""
+    return all(_same(a.get(k), b.get(k)) for k in POINT)
 
 
 def _read(path: Path) -> list[dict[str, Any]]:
@@ -209,13 +217,22 @@ class CampaignRecord:
         self.rows = [row for row in self.rows if row["run"] not in gone]
         for run in gone:
             (self.folder / "histories" / f"{run}.csv").unlink(missing_ok=True)
+        asked = [row for row in self.rows if row["run"] in order]
+        self.rows = [
+            row for row in self.rows if row["run"] in order or not any(_same_point(row, other) for other in asked)
+        ]
         studies = self.studies()
         for row in self.rows:
-            grid = grid_uncertainty(studies, row)
+            grid = {k: grid_floor(k, row["airspeed_m_s"] > 0.0) for k in ("thrust_N", "torque_Nm")}
+            grid |= grid_uncertainty(studies, row)
             for key in ("thrust_N", "torque_Nm"):
                 name = key.partition("_")[0]
-                relative = math.hypot(row[f"scatter_{name}"], row[f"drift_{name}"], grid.get(key, 0.0))
-                row[f"u_{key}"] = abs(row[key]) * relative if row["converged"] == 1 else math.nan
+                written = (
+                    float(f"{row[k]:.7g}") for k in (f"scatter_{name}", f"drift_{name}", key)
+                )  # reading changes nothing
+                scatter, drift, load = written
+                relative = math.hypot(scatter, drift, grid[key])
+                row[f"u_{key}"] = abs(load) * relative if row["converged"] == 1 else math.nan
         write_atomic(self.path, csv_text(COLUMNS, _short(self.rows)))
         names = set(order)
         done = [row for row in self.rows if row["run"] in names]
@@ -231,7 +248,7 @@ class CampaignRecord:
             **_balances(done),
             "rule": {"drift_limit": DRIFT_LIMIT, "scatter_limit": SCATTER_LIMIT, "balance_limit": BALANCE_LIMIT,
                      "u": "hypot of standard deviation and drift over the averaged iterations, and the grid study",
-                     "grid_study": bool(studies)},
+                     "grid_study": bool(studies), **({} if studies else {"grid_floor": GRID_FLOOR_SOURCE})},
             "grid_studies": grid_studies(self.rows), "seconds": float(np.nansum([r["seconds"] for r in self.rows])),
         }  # fmt: skip
         write_atomic(self.folder / "manifest.json", json.dumps(plain(manifest), indent=1) + "\n")

@@ -43,6 +43,8 @@ NOTE_LENGTH = 800
 """Characters of a program's last lines that a note keeps."""
 GRID_FILES = ("system/blockMeshDict", "system/snappyHexMeshDict", "system/topoSetDict", "system/createPatchDict",
               "constant/triSurface/lines.obj")  # fmt: skip
+_WATCH = 'read word || { kill -TERM -"$1"; sleep 2; kill -KILL -"$1"; }'
+"""Ends the processes of a solver when ours is gone without a word, as after kill -9."""
 Array = NDArray[np.float64]
 
 
@@ -174,12 +176,16 @@ class Worker:
         with (folder / f"out.{step}").open("wb") as stream:
             process = subprocess.Popen(["./Allrun", step], cwd=folder, stdout=stream, stderr=subprocess.STDOUT,
                                        env={**os.environ, "NP": str(self.ranks)}, start_new_session=True)  # fmt: skip
+            quiet: Any = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "start_new_session": True}
+            watch = subprocess.Popen(["/bin/sh", "-c", _WATCH, "sh", str(process.pid)], stdin=subprocess.PIPE, **quiet)
             try:
                 return process.wait()
             except BaseException:
                 os.killpg(process.pid, signal.SIGTERM)
                 process.wait()
                 raise
+            finally:
+                watch.communicate(b"ended\n")
 
     def _places(self, folder: Path) -> list[Path]:
         return [folder] if self.ranks == 1 else sorted(folder.glob("processor*"))
@@ -270,7 +276,8 @@ class Worker:
             history = history_of(folder, settings)
             said = _balanced(values, folder, settings, len(history))
             failed = " ".join(words for words in (failed, said) if words)
-            _means(values, history, settings, code, not said)
+            moving = _means(values, history, settings, code, not said)
+            failed = " ".join(words for words in (failed, moving) if words)
             values["yplus_avg"] = _y_plus(folder)
             radial = radial_of(folder, settings, settings.average)
             if code == 0:
@@ -319,26 +326,32 @@ def _balanced(values: dict[str, Any], folder: Path, s: Settings, done: int) -> s
     return f"does not balance: {'; '.join(found.leaks)}" if found.leaks else ""
 
 
-def _means(values: dict[str, Any], history: Array, s: Settings, code: int, balanced: bool) -> None:
-    """Fill in means, drift and scatter; the means stay NaN unless the run converged and balances."""
+def _means(values: dict[str, Any], history: Array, s: Settings, code: int, balanced: bool) -> str:
+    """Fill in means, drift and scatter; the means stay NaN unless the run converged and balances. Says what moves."""
     values["iterations"] = len(history)
     if len(history) < s.average:
-        return
+        return ""
     share = s.average / len(history)
     total = history[:, 1] + history[:, 3]
-    fine = code == 0 and balanced
+    why: list[str] = []
     means = {}
     for key, series in (("thrust", total), ("torque", history[:, 2])):
         average = steady_average(series, share)
         if average.mean is None:
-            return
+            return f"{key}: {average.problem}"
         scale = max(abs(average.mean), 1e-12)
         drift = math.nan if average.drift is None else average.drift
         scatter = float(np.std(series[-s.average :])) / scale
         values[f"drift_{key}"], values[f"scatter_{key}"] = drift, scatter
         means[key] = average.mean
-        fine = fine and abs(drift) <= DRIFT_LIMIT and scatter <= SCATTER_LIMIT
-    if fine:
+        if not abs(drift) <= DRIFT_LIMIT:
+            why.append(f"{key} drifts by {drift:+.1%} over the last {s.average} iterations (limit {DRIFT_LIMIT:.0%})")
+        if not scatter <= SCATTER_LIMIT:
+            why.append(
+                f"{key} scatters by {scatter:.1%} over the last {s.average} iterations (limit {SCATTER_LIMIT:.0%})"
+            )
+    if code == 0 and balanced and not why:
         parts = {"thrust_rotor_N": 1, "thrust_standing_N": 3}
         values |= {"thrust_N": means["thrust"], "torque_Nm": means["torque"], "converged": 1}
         values |= {key: float(history[-s.average :, k].mean()) for key, k in parts.items()}
+    return "; ".join(why)

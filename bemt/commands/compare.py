@@ -1,10 +1,10 @@
-"""``python -m bemt compare A B``: what changed between two recordings of one stand."""
+"""``python -m bemt compare A B``: what changed between two recordings; ``RUN --case C``: one run and BEMT."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from bemt.base.errors import EXIT_OK
 from bemt.commands import _options, _terminal
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from bemt.diagnose.contrast import Contrast
 
 NAME = "compare"
-HELP = "say what changed between two recordings of one stand"
+HELP = "say what changed between two recordings, or put one CFD run beside BEMT (RUN --case CASE)"
 GROUP = "Recordings"
 EXAMPLE = "compare monday.csv tuesday.csv --case cases/prop_8x5"
 
@@ -21,7 +21,8 @@ EXAMPLE = "compare monday.csv tuesday.csv --case cases/prop_8x5"
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument("a", metavar="A", help="first recording (before, or without the change)")
-    parser.add_argument("b", metavar="B", help="second recording (after, or with the change)")
+    second = "second recording (after, or with the change); without it A is one CFD run, shown beside BEMT of --case"
+    parser.add_argument("b", metavar="B", nargs="?", help=second)
     known = "case of the rotor: diagnose B with A as its reference (default: causes that scale like the ratios)"
     parser.add_argument("--case", metavar="CASE", help=known)
     parser.add_argument("--label", metavar="LABEL", help="label such as 10x5; gives the diameter for the advance ratio")
@@ -41,9 +42,15 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Compare, write, print."""
     from bemt.base.tables import json_text
+    from bemt.compare import two_grids
     from bemt.compare.contrast_text import text
     from bemt.diagnose.contrast import compare
 
+    if args.b is None:
+        return _one_run(args)
+    grids = two_grids.compare_grids(args.a, args.b, args.rows_a, args.rows_b)
+    if grids is not None:
+        return _show(args, grids, two_grids.text(grids), two_grids.text(grids))
     with _terminal.progress(args.quiet or args.json) as say:
         answer = compare(
             args.a, args.b, args.case, label=args.label, rows_a=args.rows_a, rows_b=args.rows_b, air_a=args.air_a,
@@ -55,6 +62,35 @@ def run(args: argparse.Namespace) -> int:
         print(json_text(answer.document), end="")
     elif not args.quiet:
         print(text(answer.document, details=args.details))
+    return EXIT_OK
+
+
+def _one_run(args: argparse.Namespace) -> int:
+    """One CFD run beside the model of a case."""
+    from bemt.base.errors import Fault, InputError
+    from bemt.compare import one_run
+
+    if not args.case:
+        hint = "Two recordings, A B, need none"
+        raise InputError(Fault("--case", "", "no case and one recording", "the case to put it beside", hint))
+    with _terminal.progress(args.quiet or args.json) as say:
+        document = one_run.compare_run(args.a, args.case, say)
+    return _show(args, document, one_run.text(document, details=args.details), one_run.text(document, details=True))
+
+
+def _show(args: argparse.Namespace, document: dict[str, Any], screen: str, whole: str) -> int:
+    """Write and print an answer that has no picture."""
+    from bemt.base.tables import json_text, write_atomic
+
+    if args.out:
+        out = Path(args.out)
+        out.mkdir(parents=True, exist_ok=True)
+        write_atomic(out / "comparison.json", json_text(document))
+        write_atomic(out / "comparison.txt", whole + "\n")
+    if args.json:
+        print(json_text(document), end="")
+    elif not args.quiet:
+        print(screen)
     return EXIT_OK
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import shlex
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -51,6 +52,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Diagnose, write, print."""
+    from bemt.base.errors import InputError
     from bemt.base.tables import json_text
     from bemt.diagnose import folder
     from bemt.diagnose.along_blade import along
@@ -63,9 +65,14 @@ def run(args: argparse.Namespace) -> int:
                                  airspeed_m_s=args.airspeed)  # fmt: skip
     with _terminal.progress(args.quiet or args.json) as say:
         channels = [_CHANNELS[c] for c in args.channels or ()] or None
-        answer = diagnose(
-            recordings, cases, args.only or None, say, baseline=args.baseline, given=_given(args), channels=channels
-        )
+        try:
+            answer = diagnose(
+                recordings, cases, args.only or None, say, baseline=args.baseline, given=_given(args), channels=channels
+            )
+        except InputError as error:
+            if len(args.recordings) > 1 or any(f.where != "readings" for f in error.faults):
+                raise
+            return _too_few(args, str(error.faults[0].got), say)
     blade = along(cases[0], Path(args.along)) if args.along else {}
     found = document(answer) | {"recordings": list(args.recordings), "cases": [c.name for c in cases]}
     if blade:
@@ -76,6 +83,19 @@ def run(args: argparse.Namespace) -> int:
         print(json_text(found), end="")
     elif not args.quiet:
         print("\n\n".join([text(answer), *(c.text() for c in blade.values())]))
+    return EXIT_OK
+
+
+def _too_few(args: argparse.Namespace, got: str, say: Callable[[str], None] | None) -> int:
+    """One point cannot be diagnosed: it is shown with the model, and what would decide."""
+    from bemt.base.tables import json_text
+    from bemt.compare import one_run
+
+    document = one_run.compare_run(args.recordings[0], args.case[0], say) | {"verdict": "insufficient", "effects": []}
+    if args.json:
+        print(json_text(document), end="")
+    elif not args.quiet:
+        print(f"Too few readings for a diagnosis ({got}).\n{one_run.text(document)}")
     return EXIT_OK
 
 

@@ -22,24 +22,50 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     speed.add_argument("--period", type=float, metavar="S", help="duration of a revolution [s]")
     last = "average the last N revolutions (default 4, or half)"
     parser.add_argument("--revolutions", type=_options.positive, metavar="N", help=last)
-    parser.add_argument(
-        "--sign", type=int, choices=(1, -1), default=1, help="-1 reverses the sign of the loads (default 1)"
+    run = parser.add_argument_group("one CFD run", "what its files do not say; with --out it is kept in a run.toml")
+    run.add_argument("--unit", metavar="NAME=UNIT", help="unit of a quantity or column: thrust=N, report-def-0='N m'",
+                     **_options.REPEATABLE)  # fmt: skip
+    run.add_argument("--column", metavar="NAME=COLUMN", help="column of a quantity: thrust=fz", **_options.REPEATABLE)
+    run.add_argument("--sign", metavar="NAME=-1", help="sign of a load: torque=-1; -1 alone: all (default: positive)",
+                     **_options.REPEATABLE)  # fmt: skip
+    sector = "the model is one of N equal sectors: multiply loads by N"
+    run.add_argument("--sector", type=_options.positive, metavar="N", help=sector)
+    run.add_argument(
+        "--zones", default=[], metavar="ZONE", help="zones whose loads count: blade,hub,duct", **_options.MANY
     )
-    sector = "the model is one of N equal sectors: multiply loads by N (default 1)"
-    parser.add_argument("--sector", type=_options.positive, default=1, metavar="N", help=sector)
-    parser.add_argument("--zones", metavar="ZONE", help="sum the loads of these zones", **_options.MANY)
-    loads = "channel that --sign and --sector apply to; repeatable (default: all in N or Nm)"
-    parser.add_argument("--load", action="append", metavar="NAME", help=loads)
+    run.add_argument("--axis", choices=("x", "y", "z"), help="axis of the shaft (default: the largest force)")
+    run.add_argument("--airspeed", type=float, metavar="V", help="speed of flight [m/s]")
+    run.add_argument("--density", type=float, metavar="RHO", help="density of the fluid [kg/m3]")
+    reference = "what coefficients rest on: area=A,length=L,speed=V,density=RHO [m2, m, m/s, kg/m3]"
+    run.add_argument("--reference", default=[], metavar="NAME=X", help=reference, **_options.MANY)
+    setup = (
+        "how it was computed: cells=2.1e6 grid_level=fine turbulence='k-omega SST' solver=pressure steady=no gci_pct=2"
+    )
+    run.add_argument("--setup", default=[], metavar="NAME=X", help=setup, **_options.MANY)
+    run.add_argument(
+        "--out", metavar="RUN.TOML", help="write the run here; every command takes it in place of the files"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
-    """Read and show every file; the worst result sets the exit code."""
+    """Read and show every file, and the CFD run that they make; the worst result sets the exit code."""
     from bemt.base.tables import json_text
-    from bemt.recordings import load
+    from bemt.recordings import cfd_options, load
     from bemt.recordings.choice import asked
 
-    choice = asked(args.rpm, args.period, args.revolutions, args.sign, args.sector, args.zones or (), args.load or ())
+    choice = asked(args.rpm, args.period, args.revolutions)
     load.check_format(args.format)
-    found = load.document(args.files, args.format, choice)
-    print(json_text(found) if args.json else load.text(found), end="")
+    names = ("unit", "column", "sign", "sector", "zones", "axis", "airspeed", "density", "reference", "setup", "out")
+    insist = any(getattr(args, name) for name in names)
+    made = cfd_options.run_from(
+        args.files, rpm=None if choice.period is None else 60.0 / choice.period, revolutions=args.revolutions,
+        airspeed_m_s=args.airspeed, density_kg_m3=args.density, sector=args.sector, axis=args.axis, zones=args.zones,
+        unit=args.unit, column=args.column, sign=args.sign, reference=args.reference, setup=args.setup,
+    )  # fmt: skip
+    found = load.document(args.files, args.format, choice, made, insist)
+    wrote = ""
+    if args.out and found["runs"]:
+        made = made.model_copy(update={"run": made.run.model_copy(update={"files": tuple(found["runs"][-1]["files"])})})
+        wrote = cfd_options.write_run(made, args.out).as_posix()
+    print(json_text(found) if args.json else load.text(found, wrote), end="")
     return load.exit_code(found)

@@ -38,6 +38,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--series", metavar="NAME", help='maker and series, such as "APC Thin Electric" or apce')
     _options.add_motor(parser)
+    parser.add_argument(
+        "--campaign", action="store_true", help="also write cfd/campaign.toml: OpenFOAM runs on three grids"
+    )
     parser.add_argument("--out", metavar="DIR", help="folder to write (default: named after the label)")
 
 
@@ -54,4 +57,6 @@ def run(args: argparse.Namespace) -> int:
     print(f"next: {called()} sweep {typed}")
     if args.kv is not None:
         print(f"      {called()} drive {typed}")
+    if args.campaign:
+        print(f"      {called()} cfd {typed}/cfd")
     return EXIT_OK

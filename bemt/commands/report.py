@@ -22,7 +22,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--author", metavar="TEXT", help="author, shown under the title")
     parser.add_argument("--date", metavar="TEXT", help="date under the title (default: today)")
     parser.add_argument(
-        "--commit", metavar="TEXT", help="revision under the title (default: of the checkout with the cases)"
+        "--commit", metavar="TEXT", help="revision under the title (default: last commit where the cases lie)"
     )
     _options.add_quiet(parser, "neither progress nor file names")
 
@@ -30,20 +30,13 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def _about(args: argparse.Namespace) -> dict[str, str]:
     """Title, author, date and, where the cases lie in a git checkout, its commit."""
     import datetime
-    import subprocess
     from pathlib import Path
+
+    from bemt.base.checkout import commit as checked_out
 
     about = {"title": args.title or "", "author": args.author or ""}
     about["date"] = args.date if args.date is not None else datetime.date.today().isoformat()
-    folder = Path(args.paths[0])
-    command = ["git", "-C", str(folder if folder.is_dir() else folder.parent), "describe", "--always", "--dirty"]
-    commit = args.commit
-    if commit is None:
-        try:
-            done = subprocess.run(command, capture_output=True, text=True, timeout=10)
-            commit = done.stdout.strip() if done.returncode == 0 else ""
-        except (OSError, subprocess.TimeoutExpired):
-            commit = ""
+    commit = args.commit if args.commit is not None else checked_out(Path(args.paths[0]))
     return about | ({"revision": f"commit {commit}"} if commit else {})
 
 

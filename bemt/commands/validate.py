@@ -28,7 +28,7 @@ def reynolds(text: str) -> float:
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     found = "folder with geometry, static and J files, or uiuc for the installed data"
-    parser.add_argument("dir", metavar="DIR", help=found)
+    parser.add_argument("folders", metavar="DIR", nargs="+", help=found)
     _options.add_json(parser, "bemt.validation/1")
     parser.add_argument("--polar", type=reynolds, metavar="fixed:RE", help="section tables at one Reynolds number")
     parser.add_argument("--off", metavar="EFFECT", help="switch an effect off; repeatable", **_options.REPEATABLE)
@@ -54,8 +54,9 @@ def run(args: argparse.Namespace) -> int:
     effects = effects_without(args.off)
     if args.fit_population or args.leave_family_out or args.peer:
         return _population(args)
+    found = [where(name) for name in args.folders]
     with _terminal.progress() as say:
-        document = validate(where(args.dir), effects, args.polar, say, match_J0=args.match_J0, as_drawn=args.as_drawn)
+        document = validate(found, effects, args.polar, say, match_J0=args.match_J0, as_drawn=args.as_drawn)
     if args.out:
         write(document, args.out)
     # an infinite error (not converged) becomes null: JSON has no infinity
@@ -69,20 +70,22 @@ def _population(args: argparse.Namespace) -> int:
 
     from bemt.base.tables import json_text, write_atomic
     from bemt.validate import left_out, paired, peers
-    from bemt.validate.folder import read_folder
+    from bemt.validate.folder import read_folders
     from bemt.validate.propellers import effects_without, where
 
     effects = effects_without(args.off)
     if args.peer:
         peers.peer(args.peer)
-    folder = read_folder(where(args.dir))
+    folder, names = read_folders([where(name) for name in args.folders]), " ".join(args.folders)
     with _terminal.progress() as say:
         seen = left_out.watch(folder, effects, say)
+        if args.fit_population or args.leave_family_out:
+            fitted = left_out.fit_population(seen, names)
         if args.fit_population:
-            document = left_out.document_of(left_out.fit_population(seen, args.dir)[0])
+            document = left_out.document_of(fitted[0])
             write_atomic(Path(args.fit_population), json_text(document))
         if args.leave_family_out:
-            document = left_out.leave_out(folder, seen, effects, args.dir, say)
+            document = left_out.leave_out(seen, names, fitted, say)
             if args.out:
                 write_atomic(Path(args.out) / "left_out.json", json_text(document))
                 write_atomic(Path(args.out) / "left_out.txt", left_out.table(document) + "\n")

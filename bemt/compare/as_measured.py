@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bemt import coefficients as co
 from bemt.rotors.conditioning import Conditioned, condition
 from bemt.rotors.latents import Prior
-from bemt.rotors.model import air_fields, air_of_points, coefficients
+from bemt.rotors.model import air_fields, air_of_points, beta75_deg, coefficients
 from bemt.rotors.population import WEIGHTS, population
 from bemt.rotors.predict import sense
 from bemt.rotors.reference import SESSION, ReferenceRun, noise_of_run, scatter
@@ -74,19 +74,17 @@ def as_measured(
     points = np.arange(rpm_.size)
     speed = J_ * rpm_ / 60.0 * ready.diameter_m
     Re = np.asarray(co.Re75(ready.chord75_m, rpm_ / 60.0, ready.diameter_m, speed, state.rho, state.mu))
-    at = sense(solve, ready.diameter_m, rpm_, J_, Re)
-    f, top, x = at.f, at.top, at.x
+    at = sense(solve, ready.diameter_m, beta75_deg(ready), rpm_, J_, Re)
     y = np.array([mean(CT), mean(CP)])
     still = np.abs(J_) < _STILL
-    rough = np.array([[scatter(a, Re[still])] for a in (y - f)[:, still]]) * still
-    single = np.maximum(np.hypot(np.array([mean(u_CT), mean(u_CP)]), people.noise_sd(f, top)) * share, rough)
-    noise = noise_of_run(people, ready.diameter_m, (x, Re), f, top, y, single, gain)
+    rough = np.array([[scatter(a, Re[still])] for a in (y - at.f)[:, still]]) * still
+    single = np.maximum(np.hypot(np.array([mean(u_CT), mean(u_CP)]), people.noise_sd(at)) * share, rough)
+    noise = noise_of_run(people, at, y, single, gain)
     target = y.reshape(-1)
     bias = people.bias(at).reshape(-1)
     found = condition(
         lambda z: solve(z, rpm_, J_, points).reshape(-1) + bias, prior, target, noise, people.rest_sizes, WEIGHTS
     )
     posterior = Prior(found.mean, found.cov, np.ones(1), np.ones(1), "reference")
-    amplitude = people.rest_sd(ready.diameter_m, f, top).reshape(-1)
-    reference = ReferenceRun.given(x, Re, amplitude, noise, target, found)
+    reference = ReferenceRun.given(at, noise, target, found)
     return AsMeasured(prior, posterior, reference, found, int(keep.size))

@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt import coefficients as co
 from bemt.base.errors import Fault, InputError
 from bemt.bem import model as bem
 from bemt.case.as_built import as_built_of
 from bemt.case.prepare import k1k2_case, prepare_case
+from bemt.case.propagate import validity_of
 from bemt.diagnose import repeats
 from bemt.diagnose.blade import PLAIN, CalibratedBlade, prior_of
 from bemt.diagnose.blade_fit import calibrated
@@ -22,6 +24,7 @@ from bemt.diagnose.problem import Part, Problem, SpeedCurve
 from bemt.diagnose.record import CHANNELS, Record, concatenated, dense, merged, owners
 from bemt.effects.base import Effect
 from bemt.recordings.between import Level, odd_ones
+from bemt.rotors.validity import counted
 
 if TYPE_CHECKING:
     from bemt.case import Case
@@ -79,7 +82,19 @@ def build(records: Sequence[Record], cases: Sequence[Case], baseline: str = "bem
                                    "readings of this rotor", "Wrong unit, or wrong case?"))  # fmt: skip
     odd = _between(problem, [groups[k][1] for k in order], records)
     problem, found = _calibrated(problem, [groups[k][0] for k in order])
-    return replace(problem, between=(*odd, *found))
+    outside = tuple(_outside(p, groups[k][0]) for p, k in zip(problem.parts, order, strict=True))
+    return replace(problem, between=(*odd, *found), validity=tuple(dict.fromkeys(sum(outside, ()))))
+
+
+def _outside(part: Part, case: Case) -> tuple[str, ...]:
+    """Where a recording leaves what the solver was measured against."""
+    if part.instead is not None:  # K1/K2
+        return ()
+    flow = part.flow
+    n, D = flow.n, 2.0 * flow.R
+    Re = np.asarray(co.Re75(flow.chord, n, D, flow.V, flow.rho, flow.mu))
+    J, M_tip = np.asarray(co.J(flow.V, n, D)), np.asarray(co.M_tip(n, D, flow.a_sound))
+    return counted(validity_of(case, J, Re, M_tip)[1])
 
 
 def _one_drive(parts: Sequence[Part]) -> tuple[Part, ...]:

@@ -25,14 +25,14 @@ __all__ = ["PLAIN", "AsLabelled", "CalibratedBlade", "prior_of"]
 
 Array = NDArray[np.float64]
 
-# Standard deviations without a reference, in the order of NAMES: angle [deg], lift, drag, low-Reynolds lift [1], camber
-# [deg].  Working calibrations; a wide blade without a reference would swallow slips of speed and unit.
-_PLAIN = (0.3, 0.03, 0.10, 0.0, 0.0)
+# Standard deviations without a reference, in the order of NAMES: angle [deg], lift, drag [1], camber [deg].  Working
+# calibrations; a wide blade without a reference would swallow slips of speed and unit.
+_PLAIN = (0.3, 0.03, 0.10, 0.0)
 # With a reference, by how the blade is known.  One degree and more between published stations and blades (zero-thrust
 # advance ratios of UIUC volumes 1 and 2); a label leaves the section and the law of the blade angle open as well.
 _SD = {
-    "cad": (0.1, 0.02, 0.05, 0.02, 0.1), "scan": (0.5, 0.05, 0.12, 0.1, 0.5), "stations": (1.0, 0.06, 0.15, 0.1, 0.7),
-    "label": (4.0, 0.08, 0.15, 0.15, 1.0), "reference": (0.3, 0.03, 0.10, 0.05, 0.3),
+    "cad": (0.1, 0.02, 0.05, 0.1), "scan": (0.5, 0.05, 0.12, 0.5), "stations": (1.0, 0.06, 0.15, 0.7),
+    "label": (4.0, 0.08, 0.15, 1.0), "reference": (0.3, 0.03, 0.10, 0.3),
 }  # fmt: skip
 # Heavy tail: factors on all of them, with their probabilities.
 _SIZES, _WEIGHTS = (0.8, 1.2, 2.2), (0.5, 0.4, 0.1)

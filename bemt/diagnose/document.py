@@ -103,6 +103,7 @@ def document(d: Diagnosis) -> dict[str, Any]:
         "left_over": _number(d.decision.left_over),
         "findings": list(d.problem.findings),
         "notes": list(d.problem.notes),
+        "validity": list(d.problem.validity),
         "readings": int(d.problem.y.size),
         "explanation": " ".join(line.strip() for line in explanation(d)),
     }  # fmt: skip
@@ -210,6 +211,7 @@ def explanation(d: Diagnosis) -> list[str]:
     decision, catalogue = d.decision, effects.catalogue()
     lines = [headline(d), *(f"Before any physics: {note}." for note in d.problem.notes if NO_SPEED in note)]
     lines += [f"Before any physics: {f}" for f in d.problem.findings[:_FINDINGS]]
+    lines += [f"Model: {words}." for words in d.problem.validity]
     level = d.problem.level
     off = " and ".join(
         f"{_CHANNEL[c].lower()} by {_share(v) if abs(v) > 1.0 else f'{v:+.0%}'}" for c, v in level.items()

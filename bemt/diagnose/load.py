@@ -20,7 +20,6 @@ from bemt.case import find_cases, load_case
 from bemt.case.prepare import prepare_case
 from bemt.compare.doubts import one_rotor, speed_in_doubt, wind_of
 from bemt.dataset import Dataset
-from bemt.diagnose import cfd_points
 from bemt.diagnose import record as records
 from bemt.recordings.channels import file_name, named, stated
 from bemt.recordings.check import check
@@ -64,15 +63,16 @@ def load(
     airspeed_m_s: float | None = None,
 ) -> Record:  # fmt: skip
     """Read one recording, whatever its format."""
+    from bemt.recordings.cfd_run import is_run, run_at
     from bemt.recordings.load import import_file
     from bemt.recordings.reduce import reduce, reduction
 
     if imported is None:
-        imported = import_file(path)
+        imported = run_at(path, rpm, airspeed_m_s) or import_file(path)
         _one_setup(imported, path)
         one_rotor(imported, path, "`compare A B --rows-b rotor={} --case CASE` takes one of them")
-    if cfd_points.has_forces(imported):
-        made = records.from_series(cfd_points.point_of(imported, path, rpm, airspeed_m_s), case)
+    if is_run(imported):
+        made = records.from_series(imported, case)
         return replace(made, notes=(*made.notes, *imported.notes))
     imported = _filled(imported, rpm, airspeed_m_s)
     speed_in_doubt(imported, path)

@@ -185,6 +185,8 @@ class Problem:
         Which of them are errors of the solver itself.
     notes : tuple of str
         What was assumed or left out.
+    validity : tuple of str
+        Where the recording leaves what the solver was measured against, or its method, in the words of every command.
     between : tuple of str
         What looks wrong in a recording beside the others, its file named in front.
     scatter : dict of str to float
@@ -212,6 +214,7 @@ class Problem:
     names: tuple[str, ...]
     own: NDArray[np.bool_]
     notes: tuple[str, ...] = ()
+    validity: tuple[str, ...] = ()
     between: tuple[str, ...] = ()
     scatter: dict[str, float] = field(default_factory=dict)
     blade: CalibratedBlade = PLAIN

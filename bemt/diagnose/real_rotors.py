@@ -7,13 +7,14 @@ calibration alone called 14 unknown and named a cause of 5.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bemt.diagnose.record import CHANNELS, air_of
-from bemt.rotors.model import coefficients
+from bemt.rotors.model import beta75_deg, coefficients
 from bemt.rotors.population import population
 from bemt.rotors.predict import sense
 
@@ -50,12 +51,12 @@ def _of_points(parts: Sequence[Part], rpm: Array, J: Array, Re: Array) -> Array:
     p, known, model = population(), parts[0].as_built, parts[0].model
     assert known is not None
     state = {k: np.concatenate([getattr(q.record.air, k) for q in parts]) for k in _AIR}
-    here = sense(coefficients(model, air_of(state)), model.diameter_m, rpm, J, Re, known.drawn)
+    here = sense(coefficients(model, air_of(state)), model.diameter_m, beta75_deg(model), rpm, J, Re, known.drawn)
     f, top, T = (np.nan_to_num(v) for v in (here.f, here.top, here.T))
-    top = np.where(top == 0.0, _NOTHING, top)
+    here = replace(here, f=f, top=np.where(top == 0.0, _NOTHING, top), T=T)
     # that the population is not centred at the case is one more thing that is not known of this rotor
-    usual = np.nan_to_num(p.bias(here)).reshape(-1)
-    C = p.rest(model.diameter_m, here.x, Re, f, top)
+    usual = p.bias(here).reshape(-1)
+    C = p.rest(here)
     if not any(q.record.reference for q in parts):  # it shows the blade itself
         slopes = T.transpose(0, 2, 1).reshape(2 * rpm.size, -1)
         C += slopes @ known.prior.cov @ slopes.T

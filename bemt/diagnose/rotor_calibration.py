@@ -20,7 +20,7 @@ from bemt.case import Case
 from bemt.case.as_built import MOVED, posterior_document
 from bemt.case.prepare import prepare_case
 from bemt.compare.as_measured import AsMeasured, as_measured
-from bemt.diagnose.improve import beside, elsewhere
+from bemt.diagnose.improve import beside
 from bemt.diagnose.load import cases_of, load
 from bemt.diagnose.wrong_rotor_check import FACTOR
 from bemt.rotors.k1k2 import ZERO_THRUST_MEASURED
@@ -30,8 +30,6 @@ from bemt.rotors.reference import SESSION
 
 SCHEMA = "bemt.rotor_calibration/1"
 POSTERIOR = "as_built.json"
-FLIGHT_X = 0.2
-"""J over that of zero thrust above which a point tells of flight [1]."""
 # Assumptions that a run of the rotor settles, besides those that move a latent number.
 _SETTLED = {"model.drag_level", "model.n_crit", "blade.section.thickness", "blade.section.thickness_scale"}
 
@@ -104,7 +102,7 @@ def text(doc: dict[str, Any]) -> str:
     """Document for people."""
     words = {
         "angle_deg": "blade angle", "lift": "lift (ln)", "drag": "drag (ln)",
-        "low_re_lift": "lift at low Reynolds number (ln per ln)", "camber_deg": "zero-lift angle lower by",
+        "camber_deg": "zero-lift angle lower by",
     }  # fmt: skip
     state = f"{'converged' if doc['converged'] else 'NOT CONVERGED'} after {doc['steps']} iterations"
     lines = [f"{doc['case']}: {doc['points']} points of {', '.join(doc['reference'])}; {state}"]
@@ -149,7 +147,6 @@ def write(case: Case, found: AsMeasured, paths: Sequence[str], folder: str | Pat
         for item in kept:
             array.append(tomlkit.item(item))
         source["assumptions"] = array
-    elsewhere(source, case)
     names = ", ".join(Path(p).name for p in paths)
     head = f"# {case.name} with its rotor as `python -m bemt calibrate-rotor` found it from {names}"
     files = {file.relative_to(case.folder): file.read_bytes() for file in beside(case) if file.name != POSTERIOR}
@@ -180,7 +177,7 @@ def _source(case: Case) -> Any:
 
 def flight_point(case: Case, found: AsMeasured) -> float | None:
     """Airspeed at which one more point would settle flight, at the case's speed; None if the run has one. [m/s]"""
-    if np.max(found.reference.x, initial=0.0) > FLIGHT_X:
+    if found.reference.in_flight:
         return None
     pitch = case.rotor().blade.pitch_m()
     return 0.5 * ZERO_THRUST_MEASURED * pitch * case.rpm / 60.0

@@ -21,7 +21,7 @@ from bemt.base.tables import csv_text, json_text, number_text, write_atomic
 from bemt.base.units import INCH, KGF
 from bemt.case import Case, case_of, find_cases, fresh, load_case
 from bemt.case.load import with_changes
-from bemt.case.propagate import Propagated, propagate, vary
+from bemt.case.propagate import propagate, vary
 from bemt.case.schema import AIRSPEED
 from bemt.drive import case_drive, mission, outputs, picture, rotor_table
 from bemt.drive.drive_model import EFFECTS, Drive, Steady
@@ -170,11 +170,11 @@ def solve(case: Case, airspeed_m_s: float = 0.0, off: Sequence[str] = ()) -> Dri
         wrong.append(Fault("", "--airspeed", f"{airspeed_m_s:g}", expected, hint))
     if wrong:
         raise InputError(wrong)
-    found, drive, bands, u = _carried(case, airspeed_m_s, off, _answers)
+    drive, bands, u = _carried(case, airspeed_m_s, off, _answers)
     table = case_drive.drive_table(case)
     steady = drive.steady(_pulses(drive), table.soc)
     steps, course = mission.response(drive, LOW, HIGH, table.soc)
-    notes = [*_unusual(case), *_validity(found, bands["full.rpm"].value), *drive.rotor.notes]
+    notes = [*_unusual(case), *_validity(case, bands["full.rpm"].value, airspeed_m_s), *drive.rotor.notes]
     if course is None:
         full = float(steady.thrust_N[-1])
         got = f"full pulse width gives {full:.2f} N" if math.isfinite(full) else "the air turns it beyond its table"
@@ -188,7 +188,7 @@ def solve(case: Case, airspeed_m_s: float = 0.0, off: Sequence[str] = ()) -> Dri
 
 def full_throttle(case: Case, airspeed_m_s: float = 0.0, bands: bool = True) -> dict[str, Band]:
     """Speed, thrust, current and power at full throttle and the stated charge: the one source of maximum thrust."""
-    found = _carried(case, airspeed_m_s, (), _full, bands, rotor_table.UPPER)[2]
+    found = _carried(case, airspeed_m_s, (), _full, bands, rotor_table.UPPER)[1]
     return {key.partition(".")[2]: band for key, band in found.items()}
 
 
@@ -219,7 +219,7 @@ def _carried(
     ask: Ask,
     bands: bool = True,
     speeds: Array = rotor_table.SPEEDS,
-) -> tuple[Propagated, Drive, dict[str, Band], dict[str, Array]]:
+) -> tuple[Drive, dict[str, Band], dict[str, Array]]:
     """Answers with their bands: unknowns and errors of the rotor through the drive, then unknowns of the drive."""
     rpm, V = rotor_table.points(case.diameter_m, 1.02 * case_drive.rpm_max(case), airspeed_m_s, speeds)
     found = propagate(case, rpm, V, bands=bands)
@@ -244,7 +244,7 @@ def _carried(
     made = {key: Band(float(v[0]), math.sqrt(both[key][0]), math.sqrt(sheet[key][0]))
             for key, v in values.items() if not key.startswith("steady.")}  # fmt: skip
     u = {key.partition(".")[2]: np.sqrt(both[key]) for key in values if key.startswith("steady.")}
-    return found, drive, made, u
+    return drive, made, u
 
 
 def _pulses(drive: Drive) -> Array:
@@ -278,11 +278,11 @@ def _answers(case: Case, drive: Drive) -> dict[str, Array]:
     return out | {f"hover.{key}": np.array([value]) for key, value in hover.items()}
 
 
-def _validity(found: Propagated, rpm: float) -> tuple[str, ...]:
-    """Words of the population at the solved point nearest to full throttle."""
+def _validity(case: Case, rpm: float, airspeed_m_s: float) -> tuple[str, ...]:
+    """Flags of the rotor at full throttle."""
     if not math.isfinite(rpm):
         return ()
-    return tuple(found.points.flags[int(np.argmin(np.abs(found.points.rpm - rpm)))])
+    return propagate(case, rpm, airspeed_m_s, bands=False).points.flags[0]
 
 
 def _unusual(case: Case) -> list[str]:

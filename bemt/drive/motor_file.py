@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from bemt import readers as importers
 from bemt.base.errors import Fault, InputError
+from bemt.base.folders import inside
 from bemt.base.toml import Limits, Table, entry, read_model
 from bemt.dataset import Dataset
 from bemt.drive import motor_constant as mc
@@ -140,6 +141,12 @@ def read(path: str | Path) -> MotorTrials:
             u_sheet = sheet * motor.kv_tolerance_pct / 100.0 / math.sqrt(3.0)
         else:
             notes.append("no tolerance of K_v is stated: the data sheet only bears on convention factors")
+    names = {"back_emf.file": emf_table and emf_table.file, "torque.file": torque_table and torque_table.file}
+    names |= {f"back_emf.waveforms[{i}]": n for i, n in enumerate((emf_table and emf_table.waveforms) or ())}
+    far = {where: name for where, name in names.items() if name and not inside(file.parent, name)}
+    if far:
+        expected = "the name of a file in the folder of the motor.toml"
+        raise InputError([Fault(file.as_posix(), k, repr(v), expected, "Copy it there") for k, v in far.items()])
     faults: list[Fault] = []
     emf = torque = loop = None
     try:
@@ -162,12 +169,8 @@ def read(path: str | Path) -> MotorTrials:
     where = "a winding" if result.between == "phase" else "a line"
     convention = f"torque per {result.current.replace('_', ' ')} current in {where}, {winding}"
     stated = {item.name: item.Kt_Nm_A for item in made.stated}
-    names = [
-        *((emf_table.file, *(emf_table.waveforms or ())) if emf_table else ()),
-        torque_table.file if torque_table else None,
-    ]
     to_kt = mc.ke_to_kt(1.0, result.current, result.between, winding)
-    files = (file, *(file.parent / name for name in names if name))
+    files = (file, *(file.parent / name for name in names.values() if name))
     return MotorTrials(motor.name, motor.data, measured, to_kt, convention, stated, tuple(notes), files)
 
 

@@ -44,9 +44,9 @@ class DfdcExport(BladeExport):
     def write(self, job: Job) -> Files:
         """OPER, AERO, ROTOR and GEOM."""
         p, rotor, duct = job.loading, job.case.rotor(), self.compared(job).duct()
-        assert duct is not None
+        assert duct is not None and duct.rotor_x is not None
         r, c, b, _ = stations(job, MOST_STATIONS)
-        x = duct.rotor_x if duct.rotor_x is not None else duct.length / 3.0
+        x = duct.rotor_x
         found = sections_of(job)
         V_ref = max(p.airspeed_m_s, 0.2 * p.omega * p.R)
         rows = [

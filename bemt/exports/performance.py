@@ -295,13 +295,14 @@ def band_of(case: Case, rpm: float, airspeed_m_s: tuple[float, float]) -> Stated
     """Loads at a speed and two airspeeds with the band of `bemt.case.propagate`."""
     from bemt.case.propagate import propagate
 
-    found = propagate(case, rpm, airspeed_m_s).points
+    made = propagate(case, rpm, airspeed_m_s)
+    found = made.points
     _refuse(case, found, np.isfinite(found.u["thrust_N"]) & np.isfinite(found.u["torque_Nm"]))
     (T0, T1), (Q0, Q1) = ((float(v[0]), float(v[1])) for v in (found.thrust_N, found.torque_Nm))
     with np.errstate(divide="ignore"):
         u = [found.u[name] / np.abs(found[name]) for name in ("thrust_N", "torque_Nm")]
     thrust, torque = ((float(v[0]), float(v[1])) for v in u)
-    origin = f"{len(case.assumptions)} declared assumptions of the case and the spread of rotors as built"
+    origin = f"{len(made.moved)} declared assumptions of the case and the spread of rotors as built"
     flags = tuple(dict.fromkeys(flag for point in found.flags for flag in point))
     V0, V1 = airspeed_m_s
     return StatedBand(thrust, torque, (T0, T1), (Q0, Q1), float(rpm), (float(V0), float(V1)), origin, flags)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.exports.base import Files, Job, LoadsExport
-from bemt.exports.parts import header, plain_name, static_fit
+from bemt.exports.parts import header, plain_name
 
 Array = NDArray[np.float64]
 INCH = 0.0254
@@ -28,20 +28,19 @@ class Px4Export(LoadsExport):
         """Parameter lines as airframe scripts take them: one file for the simulator, one for the vehicle."""
         t, name = job.performance, plain_name(job.case.name)
         ct, cp = fits(job)
-        kT, kQ = static_fit(t)
-        W = t.rpm[-1] * np.pi / 30.0
+        T, Q = (float(loads[-1, t.at_rest]) for loads in (t.thrust_N, t.torque_Nm))  # at full speed, not of a fit
         f = thrust_factor(t.rpm, t.thrust_N[:, t.at_rest])
         head = [f"# {line}" for line in header(job, "PX4 parameters")]
         allocation = [
             "# Control allocation, rotor 0: T = CT u^2 [N], Q = KM T; KM > 0 turns counter-clockwise from above"
         ]
-        if kT * W**2 <= MOST_CT:
-            allocation.append(f"param set-default CA_ROTOR0_CT {kT * W**2:.9g}")
+        if T <= MOST_CT:
+            allocation.append(f"param set-default CA_ROTOR0_CT {T:.9g}")
         else:
             allocation.append(
-                f"# CA_ROTOR0_CT is left at its default: {kT * W**2:.6g} N is above the {MOST_CT:g} that PX4 takes"
+                f"# CA_ROTOR0_CT is left at its default: {T:.6g} N is above the {MOST_CT:g} that PX4 takes"
             )
-        allocation.append(f"param set-default CA_ROTOR0_KM {t.sense * kQ / kT:.9g}")
+        allocation.append(f"param set-default CA_ROTOR0_KM {t.sense * Q / T:.9g}")
         lines = [*head, "# Forward propeller of the SIH (fixed wing, tailsitter, pusher)"]
         lines += [
             f"param set-default SIH_F_DIA_INCH {t.diameter_m / INCH:.9g}",
@@ -54,8 +53,8 @@ class Px4Export(LoadsExport):
         ]
         lines += [
             "# Lifting rotor of the SIH, T = SIH_T_MAX u, Q = SIH_Q_MAX u: largest static thrust [N] and torque [N m]",
-            f"param set-default SIH_T_MAX {kT * W**2:.9g}",
-            f"param set-default SIH_Q_MAX {kQ * W**2:.9g}",
+            f"param set-default SIH_T_MAX {T:.9g}",
+            f"param set-default SIH_Q_MAX {Q:.9g}",
             "# Thrust is linear in u here, so the thrust curve is the straight one",
             "param set-default THR_MDL_FAC 0",
         ]

@@ -149,11 +149,11 @@ class Propeller:
         >>> d.thrust_N.round(1), d.power_W.round(0)
         (array([ 4.8, 11. ]), array([ 46., 156.]))
         """
-        from bemt.case.propagate import propagate
+        from bemt.case import lattice
 
         n, V = self._conditions(rpm, airspeed_m_s, J)
         density = None if density_kg_m3 is None else float(numbers("density_kg_m3", density_kg_m3))
-        found = propagate(self.case, n, V, density, bands=bands).points
+        found = lattice.solve(self.case, n, V, density, bands)
         names = [key for key in (*CHANNELS, *(DUCTED if self.case.ducted else ())) if key in found]
         by = {origin: {key: v for key, v in part.items() if key in names} for origin, part in found.u_by.items()}
         notes = ("bands, one standard deviation: declared unknowns (input), real rotors compared with BEMT (model), "

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from bemt import __version__
+from bemt.base.checkout import commit
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import json_text, write_atomic
 from bemt.proof import draw, items, proof_text, real, resolve, score, seal
@@ -182,13 +183,14 @@ def proof(out: Path, digest: str | None = None) -> dict[str, Any]:
 def _commit() -> str:
     """Commit of the checkout, with a plus sign when files differ; empty outside of one."""
     here = Path(__file__).resolve().parents[2]
-    words: list[str] = []
-    for command in (["git", "rev-parse", "--short=12", "HEAD"], ["git", "status", "--porcelain"]):
-        try:
-            words.append(subprocess.run(command, cwd=here, capture_output=True, text=True, check=True).stdout.strip())
-        except (OSError, subprocess.CalledProcessError):
-            return ""
-    return words[0] + ("+" if words[1] else "")
+    if not (here / ".git").exists():  # installed: a checkout further up is somebody else's
+        return ""
+    command = ["git", "-c", "core.fsmonitor=", "-c", "core.hooksPath=/dev/null", "status", "--porcelain"]
+    try:
+        changed = subprocess.run(command, cwd=here, capture_output=True, text=True, check=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        return ""
+    return commit(here) + ("+" if changed else "")
 
 
 def prove(

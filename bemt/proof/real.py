@@ -18,8 +18,10 @@ from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.folders import data_roots, find_data
+from bemt.case.unknowns import section_of
 from bemt.proof.items import Item, recording_text
 from bemt.proof.pairs import draw_pairs
+from bemt.readers._uiuc_names import class_of
 from bemt.sections import rule as section_rule
 
 if TYPE_CHECKING:
@@ -106,7 +108,8 @@ def _uiuc_case(
     assert g is not None
     s = section_rule.section_at(0.75, p.family)
     rotor = {"kind": "propeller", "blades": p.blades, "diameter_in": p.diameter_in, "hub_ratio": 0.1}
-    section = {"camber": s.camber, "camber_position": s.position, "thickness": s.thickness}
+    camber = section_of(class_of(p.family))[0].value if s.shape == "naca4" else s.camber
+    section = {"camber": camber, "camber_position": s.position, "thickness": s.thickness}
     keep = (g.r_R <= 1.0) & (g.r_R > 0.1)
     name = p.name.replace(".", "p")
     return (_case(name, rotor, section, rpm, air, off),

@@ -5,8 +5,8 @@ r"""STAR-CCM+ monitors and plots saved as CSV: quoted headings with the unit in 
     "Iteration","Thrust 1 Monitor: Thrust (N)","Torque 1 Monitor: Moment (N-m)"
     1,12.5,0.31
 
-Steady runs count "Iteration"; implicit unsteady ones have "Physical Time: Physical Time (s)". A monitor is named by what
-stands before " Monitor:".
+Steady runs count "Iteration"; implicit unsteady ones have "Physical Time: Physical Time (s)". A monitor is named by
+what stands before " Monitor:".
 """
 
 from __future__ import annotations

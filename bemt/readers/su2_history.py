@@ -23,7 +23,8 @@ KIND = "su2_history"
 
 _STEPS = ("Time_Iter", "Outer_Iter", "Inner_Iter", "Iteration")
 _START = re.compile(
-    r'(VARIABLES\s*=\s*)?"\s*((Time|Outer|Inner)_Iter\s*"\s*,|Iteration\s*",(?=.*"\s*(C[DL]|Res_|rms\[)))', re.IGNORECASE
+    r'(VARIABLES\s*=\s*)?"\s*((Time|Outer|Inner)_Iter\s*"\s*,|Iteration\s*",(?=.*"\s*(C[DL]|Res_|rms\[)))',
+    re.IGNORECASE,
 )
 
 
@@ -53,7 +54,8 @@ def _column(name: str) -> Column:
 _LAYOUT = Layout(
     KIND, '"Time_Iter","Inner_Iter","CD"', _names, lambda line: cells_of(line, ","), _column,
     lambda line: re.match(r"(TITLE|ZONE)\b", line) is not None,
-    ("coefficients rest on reference values that the history does not state",), False, outermost,
+    ("coefficients rest on reference values that the history does not state",), commas=False,
+    finish=outermost,
 )  # fmt: skip
 
 

@@ -23,7 +23,10 @@ from bemt.sections.polars import Polar
 
 _KIND = {"apc": "vendor", "uiuc": "bench", "references": "table"}
 _GEOMETRY = ("ApcBlade", "BladeFile", "UiucGeometry", "UiucThickness")
-_EXPORT = "Export report files, monitors, force reports or CSV"
+_EXPORT = (
+    "Fields and meshes hold no loads: write a report file of thrust and torque (Fluent), save the monitors as CSV "
+    "(STAR-CCM+), or use the function object forces (OpenFOAM)"
+)
 _MARKS: tuple[tuple[bytes, str, str], ...] = (
     (b"\x89HDF", "HDF5 data (a case, mesh or field file)", _EXPORT),
     (b"PK\x03\x04", "a zip archive or an Excel workbook", "Unpack it, or save the sheet as CSV"),
@@ -33,6 +36,8 @@ _MARKS: tuple[tuple[bytes, str, str], ...] = (
     (b"(rp (", "solver settings of Fluent (no results)", "Settings hold no results; export the report files"),
     (b"FoamFile", "an OpenFOAM dictionary or field", "Import postProcessing/*/*/*.dat"),
     (b"$MeshFormat", "a mesh", _EXPORT),
+    (b"C Binary", "an EnSight file", _EXPORT),
+    (b"#!TDV", "a Tecplot binary file", _EXPORT),
     (b"<?xml", "XML", "Export as CSV"),
     (b"# vtk", "a VTK file", _EXPORT),
     (b"version https://git-lfs", "a Git LFS pointer instead of the file", "Fetch it: git lfs pull"),
@@ -41,6 +46,7 @@ _MARKS: tuple[tuple[bytes, str, str], ...] = (
     (b"<html", "a web page", "Download the file that it shows, or save its table as CSV"),
 )
 _INSIDE: tuple[tuple[re.Pattern[bytes], str, str], ...] = (
+    (re.compile(rb"^\s*(#.*\s+)*FORMAT\s+type:\s*ensight", re.IGNORECASE), "an EnSight case file", _EXPORT),
     (re.compile(rb"APC Propeller .*(Predictions|RPM Range)"), "a summary of APC over many propellers (PER2)",
      "Import the propeller's own file, PER3_*.dat"),
     (re.compile(rb"^\s*Force vector: \(", re.MULTILINE), "a force report of Fluent 6 or older",
@@ -57,6 +63,8 @@ def recognised(path: str | os.PathLike[str]) -> tuple[str, str] | None:
         return None
     if not head.strip():
         return ("an empty file", "Did the export finish?")
+    if b"<VTKFile " in head[:2000]:
+        return ("a VTK file", _EXPORT)
     for mark, got, hint in _MARKS:
         if head.lstrip()[: len(mark)] == mark:
             return (got, hint)

@@ -1,15 +1,16 @@
 r"""What is in a file of results, with honest means.
 
-Nothing is guessed. A mean over revolutions needs the speed (``--rpm`` or ``--period``); the sign, the sector of a
-one-blade model and the zones that count are the user's (``--sign``, ``--sector``, ``--zones``, ``--load``), and
-appear in ``averaged_over`` and in the warnings. Files are never joined: a restart file is named as such.
+Nothing is guessed. A mean over revolutions needs the speed (``--rpm`` or ``--period``). The files of one CFD run are
+shown as they are, and then as one run (`bemt.recordings.cfd_run`): joined, with the units, sign, sector and zones that
+the user states.
 
-Schema ``bemt.import/1``: ``files`` is a list of ``path``, ``format``, ``kind``, ``rows``, ``channels`` (name to
-``unit``, ``mean``, ``averaged_over``, ``drift``), ``warnings``, ``error`` (null when the file was read), ``findings``
-(``id``, ``channel``, ``evidence``, ``correction``, ``rows``, ``severity``; nothing is corrected) and ``reduction``
-(null unless it is a recording: ``mode``, ``points``, ``correlated``, ``dropped`` with first ``line`` and ``last``,
-``channel`` and ``reason``, ``notes``, ``error``). A channel of a recording has a mean only where the recording is one
-steady point.
+Schema ``bemt.import/1``: ``runs`` is a list of CFD runs (``name``, ``files``, ``points``, ``averaged``, ``drift``,
+``conditions``, ``notes``), ``to_do`` what would make the files one run (null: nothing, or they are none). ``files`` is
+a list of ``path``, ``format``, ``kind``, ``rows``, ``channels`` (name to ``unit``, ``mean``, ``averaged_over``,
+``drift``), ``warnings``, ``error`` (null when the file was read), ``findings`` (``id``, ``channel``, ``evidence``,
+``correction``, ``rows``, ``severity``; nothing is corrected) and ``reduction`` (null unless it is a recording:
+``mode``, ``points``, ``correlated``, ``dropped`` with first ``line`` and ``last``, ``channel`` and ``reason``,
+``notes``, ``error``). A channel of a recording has a mean only where the recording is one steady point.
 """
 
 from __future__ import annotations
@@ -34,12 +35,15 @@ from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputErr
 from bemt.dataset import Dataset
 from bemt.dataset.channels import channel_fault
 from bemt.readers._uiuc_tables import NO_SPEED
+from bemt.readers.cfd_run import KIND as RUN
+from bemt.readers.cfd_run import RunToml
+from bemt.recordings import cfd_run
 from bemt.recordings.adapt import adapt, damaged_export, recognised
-from bemt.recordings.choice import Choice, averaged, chosen
+from bemt.recordings.choice import Choice, averaged
 from bemt.recordings.overview import findings, is_recording, points_text, reduction_document, reduction_of
 from bemt.recordings.reduce import reduction
 
-__all__ = ["SCHEMA", "Choice", "as_dataset", "averaged", "chosen", "document", "exit_code", "import_file", "text"]
+__all__ = ["SCHEMA", "Choice", "as_dataset", "averaged", "document", "exit_code", "import_file", "text"]
 
 SCHEMA = "bemt.import/1"
 INTERNAL = "internal error of this program"
@@ -56,6 +60,8 @@ def import_file(path: str | os.PathLike[str], format: str | None = None, choice:
     name = os.fspath(path)
     if (Path(path) / "case.toml").is_file():
         raise InputError(Fault(name, "", "a folder with a case", "a recording", "`bemt sweep` solves cases"))
+    if format is None and Path(path).is_dir() and (inside := _run_in(Path(path))) is not None:
+        return inside if isinstance(inside, Dataset) else cfd_run.assemble(inside, Path(), name)
     try:
         kind = importers.detect(path) if format is None else format
     except InputError as error:
@@ -75,6 +81,8 @@ def import_file(path: str | os.PathLike[str], format: str | None = None, choice:
             raise
         kind = "table"
         found = importers.read(path, kind)
+    if isinstance(found, RunToml):
+        return cfd_run.assemble(found, Path(path).parent, name)
     record = adapt(found, kind, name)
     if record is not found:  # made from a series, a polar, a geometry: no recording of a stand
         record = replace(record, provenance={**record.provenance, "adapted": type(found).__name__})
@@ -83,8 +91,17 @@ def import_file(path: str | os.PathLike[str], format: str | None = None, choice:
     elif record.provenance.get("clock") == "time":
         note = "mean over all rows, including start-up; give --rpm or --period for whole revolutions"
         record = replace(record, notes=(*record.notes, note))
-    record = chosen(record, choice)
     return replace(record, notes=(*record.notes, *_unsettled(record)))
+
+
+def _run_in(folder: Path) -> Dataset | RunToml | None:
+    """CFD run of a folder: its run.toml, else all exports in it; None where a reader takes the folder."""
+    if (folder / "run.toml").is_file():
+        return import_file(folder / "run.toml")
+    if any(hasattr(m, "sniff_folder") and m.sniff_folder(folder) for m in importers.importers().values()):
+        return None
+    files = cfd_run.cfd_files(folder)
+    return RunToml.model_validate({"run": {"files": tuple(map(str, files))}}) if files else None
 
 
 def _unsettled(record: Dataset) -> list[str]:
@@ -161,9 +178,17 @@ def document(
     paths: Iterable[str | os.PathLike[str]],
     format: str | None = None,
     choice: Choice | None = None,  # noqa: A002
+    run: RunToml | None = None,
+    insist: bool = False,
 ) -> dict[str, Any]:
-    """Read files and give the document ``bemt.import/1``."""
+    """Read files and give the document ``bemt.import/1``; with ``insist`` they must be the CFD run of ``run``."""
     names = [os.fspath(path) for path in paths]
+    runs, to_do = _runs(names, run, insist)
+    names = (
+        [name for name in names if not Path(name).is_dir() or not cfd_run.cfd_files(Path(name))]
+        if runs or to_do
+        else names
+    )
     records: dict[str, Dataset] = {}
     errors: dict[str, str] = {}
     for name in names:
@@ -178,7 +203,41 @@ def document(
             files.append(_entry(name, records.get(name), format, notes.get(name, []), errors.get(name)))
         except Exception as error:
             files.append(_entry(name, None, format, [], _refusal(error)))
-    return {"schema": SCHEMA, "files": files}
+    return {"schema": SCHEMA, "files": files, "runs": runs, "to_do": to_do}
+
+
+def _runs(names: Sequence[str], run: RunToml | None, insist: bool) -> tuple[list[dict[str, Any]], str | None]:
+    """CFD runs among the paths: a run.toml each, and the exports together; what they need to become one."""
+    runs, exports = [], list[str]()
+    for name in names:
+        try:
+            if Path(name).is_dir() and not (Path(name) / "run.toml").is_file():
+                exports += map(str, cfd_run.cfd_files(Path(name)))
+            elif Path(name).is_dir() or importers.detect(name) == RUN:
+                runs.append(cfd_run.document(import_file(name)))
+            elif importers.detect(name) in cfd_run.PROGRAMS:
+                exports.append(name)
+        except (InputError, OSError):
+            if insist:
+                raise
+    if insist and not exports:
+        hint = "A run.toml has its own" if runs else ""
+        raise InputError(Fault("", "", "options of a CFD run", "exports of a CFD run", hint))
+    if not exports:
+        return runs, None
+    head = (run.run if run else RunToml.model_validate({"run": {"files": ()}}).run).model_copy(
+        update={"files": tuple(exports)}
+    )
+    whole = run.model_copy(update={"run": head}) if run else RunToml(run=head)
+    try:
+        return [
+            *runs,
+            cfd_run.document(cfd_run.assemble(whole, Path(), " + ".join(Path(e).name for e in exports[:3]))),
+        ], None
+    except Exception as error:
+        if insist:
+            raise
+        return runs, str(error) if isinstance(error, InputError) else None  # the file's own entry says the other
 
 
 def _refusal(error: Exception) -> str:
@@ -264,9 +323,34 @@ def _file_text(file: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def text(found: Mapping[str, Any]) -> str:
+def text(found: Mapping[str, Any], wrote: str = "") -> str:
     """Lay a document out for a terminal, with what to do next with recordings of a rotor."""
-    lines = [_file_text(file) + "\n" for file in found["files"]]
+    own = {name for run in found["runs"] for name in run["files"]}
+    lines = [
+        f"{file['path']}: {file['format']} ({file['kind']}), {file['rows']} rows"
+        if file["path"] in own
+        else _file_text(file) + "\n"
+        for file in found["files"]
+        if file["format"] != RUN or file["error"]
+    ]
+    lines += [cfd_run.run_text(run) + "\n" for run in found["runs"]]
+    if found["to_do"]:
+        steps = "\n".join(f"  ! {line}" for line in found["to_do"].splitlines())
+        lines.append(f"To use it as a CFD run, and --out run.toml to keep it:\n{steps}\n")
+    if wrote or found["runs"]:
+        typed = shlex.quote(
+            wrote or (found["runs"][0]["name"] if found["runs"][0]["name"].endswith(".toml") else "run.toml")
+        )
+        lead = (
+            f"{wrote} written. "
+            if wrote
+            else ""
+            if typed.strip("'") == found["runs"][0]["name"]
+            else "With --out run.toml: "
+        )
+        return "\n".join(
+            [*lines, f"{lead}Next: python -m bemt compare {typed} --case CASE   (a case: python -m bemt new 10x5)\n"]
+        )
     loaded = [str(f["path"]) for f in found["files"] if "rpm" in f["channels"] and _LOADS & set(f["channels"])]
     if loaded:
         first, *others = (shlex.quote(path) for path in loaded)
@@ -290,6 +374,8 @@ def check_format(name: str | None) -> None:
 
 def as_dataset(record: Dataset) -> Dataset:
     """Points of what was read: steady points of a recording, rows of a table, else one point of means."""
+    if cfd_run.is_run(record):
+        return record
     notes = [*record.notes, *(f"{f.severity}: {f.id} in {f.channel}: {f.evidence}" for f in findings(record))]
     reduced = _reduced(record)
     if isinstance(reduced, Dataset):

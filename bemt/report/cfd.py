@@ -15,6 +15,7 @@ from typing import Any
 from bemt.readers import number
 from bemt.recordings.audit import CfdFacts, audit, audit_document
 from bemt.report.found_files import read_json, safe_files
+from bemt.rotors.validity import serious
 from bemt.sweep.agreement import agreement
 
 __all__ = ["attach", "cfd_runs", "is_plain", "operating_run", "radial_of", "read_rows", "value"]
@@ -199,6 +200,7 @@ def attach(book: dict[str, Any]) -> None:
         parts = {k: math.nan if bemt.get(k) is None else bemt[k] for k in ("u_num", "u_input", "u_model")}
         line = {"model": "bemt", "reference": f"own CFD, {run['solver']}", "source": "openfoam", "quantity": "thrust_N",
                 "unit": "N", "S": S, "D": D, "E": S - D, "E_pct": 100 * (S - D) / D if D else None, **parts,
-                "u_D": u_D, "u_val": math.hypot(*parts.values(), u_D)}  # fmt: skip
+                "u_D": u_D, "u_val": math.hypot(*parts.values(), u_D),
+                "doubts": list(serious(bemt.get("flags", ())))}  # fmt: skip
         line["verdict"] = agreement(line)
         page["result"] = {**result, "comparisons": [*result["comparisons"], line]}

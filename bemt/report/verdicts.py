@@ -34,7 +34,7 @@ def stand(c: Mapping[str, Any]) -> tuple[str, str]:
     >>> stand({"E": 14.2, "D": 104.9, "u_num": 0.1, "u_input": 13.0, "u_model": 0.0, "u_val": None})
     ('unknown', 'needs u_D ≥ 5.4 %')
     >>> stand({"E": 1.0, "D": 9.0, "u_num": 0.1, "u_input": 2.0, "u_model": 0.0, "doubts": ["supersonic tip"]})
-    ('unknown', "inside the model's band, but supersonic tip")
+    ('unknown', "inside the model's band, but flagged: supersonic tip")
     """
     kind, words = _stand(c)
     return ("unknown" if c.get("doubts") and kind == "same" else kind), words + doubted(c)

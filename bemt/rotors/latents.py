@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-LOW_RE = 1.0e5
-"""Reynolds number below which the lift of a section is uncertain by a share of its own [1]."""
 KNOWN_FROM = ("cad", "scan", "stations", "label", "reference")
 """How the blade of a case is known; ``reference``: from a run of this very rotor."""
 
@@ -36,8 +34,6 @@ class AsBuilt(Effect):
         Turn of the whole blade [deg].
     lift, drag : float
         Natural logarithm of the factor on cl and on cd [1].
-    low_re_lift : float
-        Further change of ln cl per unit of ln Re below `LOW_RE` [1].
     camber_deg : float
         Lowering of the zero-lift angle at the same drag [deg].
     """
@@ -45,7 +41,6 @@ class AsBuilt(Effect):
     angle_deg: float = 0.0
     lift: float = 0.0
     drag: float = 0.0
-    low_re_lift: float = 0.0
     camber_deg: float = 0.0
 
     id = "as_built"
@@ -66,15 +61,14 @@ class AsBuilt(Effect):
             left = np.minimum(place.astype(np.intp), at.size - 2)
             low = bake.cl[..., left]
             bake.cl = low + (place - left) * (bake.cl[..., left + 1] - low)
-        low = np.maximum(np.log(LOW_RE / bake.Re), 0.0)[None, None, :, None]
-        bake.cl = bake.cl * np.exp(self.lift + self.low_re_lift * low)
+        bake.cl = bake.cl * math.exp(self.lift)
         bake.cd = bake.cd * math.exp(self.drag)
 
 
 NAMES: tuple[str, ...] = tuple(f.name for f in fields(AsBuilt))
 """Latent numbers, in the order of every mean, covariance and tangent."""
-UNITS = {"angle_deg": "deg", "lift": "1", "drag": "1", "low_re_lift": "1", "camber_deg": "deg"}
-STEP = np.array([0.5, 0.05, 0.1, 0.1, 0.5])
+UNITS = {"angle_deg": "deg", "lift": "1", "drag": "1", "camber_deg": "deg"}
+STEP = np.array([0.5, 0.05, 0.1, 0.5])
 """Half steps of the central differences, in the units of the numbers."""
 
 
@@ -127,10 +121,8 @@ class Sensed:
     ----------
     diameter_m : float
         Diameter [m].
-    J0 : float
-        Advance ratio at which the solver's thrust vanishes [1].
-    x, Re : (P,) float
-        J over J0; Reynolds number at 0.75 R [1].
+    J, alpha_deg, Re : (P,) float
+        Advance ratio; angle of attack at 0.75 R with the momentum theory's induction [deg]; Reynolds number there.
     f, top : (2, P) float
         CT and CP, and those at rest at the same rpm [1].
     T : (2, K, P) float
@@ -138,9 +130,23 @@ class Sensed:
     """
 
     diameter_m: float
-    J0: float
-    x: Array
+    J: Array
+    alpha_deg: Array
     Re: Array
     f: Array
     top: Array
     T: Array
+
+    def part(self, points: NDArray[np.intp] | NDArray[np.bool_]) -> Sensed:
+        """Some of the points."""
+        return Sensed(self.diameter_m, *(getattr(self, f.name)[..., points] for f in fields(Sensed)[1:]))
+
+
+def angle_of_attack_deg(beta75_deg: float, J: Array, CT: Array) -> Array:
+    """Angle of attack at 0.75 R from the blade angle there and the induction of CT, CT = pi/2 (J + l) l, (P,) [deg].
+
+    Thrust below zero induces none here: what is asked for is a place on the section's polar, no load.
+    """
+    induced = -0.5 * J + np.sqrt(0.25 * J**2 + 2.0 / math.pi * np.maximum(np.nan_to_num(CT), 0.0))
+    induced = np.where(J >= 0.0, induced, np.sqrt(2.0 / math.pi * np.maximum(np.nan_to_num(CT), 0.0)))
+    return np.asarray(beta75_deg - np.degrees(np.arctan((J + induced) / (0.75 * math.pi))))

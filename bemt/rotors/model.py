@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, cast
@@ -10,14 +12,13 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.rotors.latents import AsBuilt, Prior, as_built
+from bemt.rotors.latents import AsBuilt, Prior, Sensed, as_built
 from bemt.rotors.population import population
 from bemt.rotors.predict import Prediction, Solve, predict, sense
 
 if TYPE_CHECKING:
     from bemt.air import Air
     from bemt.bem.model import Model
-    from bemt.dataset import Dataset
     from bemt.rotors.reference import ReferenceRun
 
 Array = NDArray[np.float64]
@@ -53,11 +54,73 @@ def coefficients(model: Model, air: Air) -> Solve:
     return solve
 
 
-def predict_model(
-    model: Model, prior: Prior, points: Dataset, air: Air, drawn: Array, reference: ReferenceRun | None = None
-) -> Prediction:
-    """Expectation and scatter of CT and CP of a rotor as built at points that were solved as ``drawn``."""
-    solve = coefficients(model, air)
-    at = sense(solve, model.diameter_m, points.rpm, points.J, points.Re75, drawn)
-    mean = solve(prior.mean, points.rpm, points.J, np.arange(points.rpm.size))
-    return predict(population(), prior, at, mean, reference)
+def beta75_deg(model: Model) -> float:
+    """Blade angle at 0.75 R as drawn [deg]."""
+    return math.degrees(float(model.rotor.blade.at(0.75 * model.rotor.R)[1]))
+
+
+@dataclass(frozen=True, eq=False)
+class RealRotor:
+    """A real rotor at any points: expectation, tangents and covariance of CT and CP, before or after a run of it.
+
+    Attributes
+    ----------
+    solve : Solve
+        The solver with any latent numbers.
+    diameter_m, beta75_deg : float
+        Diameter [m]; blade angle at 0.75 R as drawn [deg].
+    prior : Prior
+        What is known of the latent numbers, after the run if there is one.
+    drawn : (K,) float
+        Latent numbers with which slopes are taken [units of `bemt.rotors.latents.NAMES`].
+    reference : ReferenceRun or None
+        The run's rows.
+
+    Notes
+    -----
+    Readings of rotors of this description have the mean `expected` and, at size 1 of the heavy tails (`Prior.sizes`,
+    `Population.rest_sizes`), the covariance ``T prior.cov T^T + rest``, T and rest as `tangents` and `rest` give them.
+    """
+
+    solve: Solve
+    diameter_m: float
+    beta75_deg: float
+    prior: Prior
+    drawn: Array
+    reference: ReferenceRun | None = None
+
+    @staticmethod
+    def of(model: Model, air: Air, prior: Prior, drawn: Array, reference: ReferenceRun | None = None) -> RealRotor:
+        """Rotor of a model in air of one state or one per point."""
+        return RealRotor(coefficients(model, air), model.diameter_m, beta75_deg(model), prior, drawn, reference)
+
+    def at(self, rpm: Array, J: Array, Re: Array) -> Sensed:
+        """The solver at points, (P,) each: rpm [rev/min], advance ratio and Reynolds number at 0.75 R [1]."""
+        return sense(self.solve, self.diameter_m, self.beta75_deg, rpm, J, Re, self.drawn)
+
+    def expected(self, at: Sensed) -> Array:
+        """Expectation of CT and CP with the solver taken as linear around ``drawn``, (2, P) [1]."""
+        return predict(population(), self._from_drawn, at, None, self.reference).mean
+
+    @property
+    def _from_drawn(self) -> Prior:
+        return replace(self.prior, mean=self.prior.mean - self.drawn)
+
+    def tangents(self, at: Sensed) -> Array:
+        """Slopes with the latent numbers, less what the run tells of them, CT rows first, (2 P, K) [1 over units]."""
+        T = at.T if self.reference is None else self.reference.near(population(), at)[1]
+        return np.asarray(T.transpose(0, 2, 1).reshape(2 * at.J.size, -1))
+
+    def rest(self, at: Sensed, other: Sensed | None = None) -> Array:
+        """Covariance of what no latent number explains, between points of this rotor, CT rows first, (2 P, 2 Q) [1]."""
+        p, run = population(), self.reference
+        return p.rest(at, other) if run is None else run.rest(p, at, other)
+
+    def covariance(self, at: Sensed, other: Sensed | None = None) -> Array:
+        """Covariance of CT and CP over rotors of this description at size 1, CT rows first, (2 P, 2 Q) [1]."""
+        S = self.tangents(at if other is None else other)
+        return np.asarray(self.tangents(at) @ self.prior.cov @ S.T + self.rest(at, other))
+
+    def predict(self, at: Sensed, mean: Array | None = None) -> Prediction:
+        """Expectation and scatter at points; ``mean`` (2, P): the solver at the prior's mean, where that was solved."""
+        return predict(population(), self._from_drawn, at, mean, self.reference)

@@ -1,10 +1,11 @@
-"""The population of measured propellers: what their latent numbers and the solver's rest scatter by.
+"""The population of measured propellers: by how much real rotors differ from the solver.
 
-A rotor's readings are f(z) + rest + noise.  The latent numbers z of `bemt.rotors.latents` scatter around a common mean
-with a covariance whose size differs from rotor to rotor (a mixture of sizes at quantiles of Student's t: heavy tails);
-the rest is a smooth Gaussian process over (J/J0, ln Re), shared by static points and flight and correlated between CT
-and CP.  All of it is fitted by maximum likelihood to measured propellers (`bemt.rotors.fit`); the file beside this
-module holds the numbers and where they come from.
+A reading is f(z) + bias + rest + noise. The latent numbers z of `bemt.rotors.latents` scatter by family and by rotor
+with a size that differs from rotor to rotor (a mixture of sizes at quantiles of Student's t: heavy tails). The rest is
+a Gaussian process over the angle of attack at 0.75 R and ln Re: errors of the section tables, which enter as a change
+of zero-lift angle and of ln(drag) through the solver's own slopes, a remainder of CT and CP, and a part at rest that
+flight does not share. All numbers are fitted by maximum likelihood to measured propellers (`bemt.rotors.fit`); the file
+beside this module holds them and where they come from.
 
 What the label says of the blade angle is weighed against the stations by their variances: stations err by s, the label
 lies below the blade angle by the offset usual for its family (known to tau where the family is unknown) and errs by l.
@@ -17,7 +18,7 @@ import json
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, field
-from functools import cache
+from functools import cache, lru_cache
 from importlib import resources
 from typing import Any
 
@@ -30,43 +31,35 @@ from bemt.rotors.validity import Validity
 Array = NDArray[np.float64]
 
 SMALL_IN = 7.0
-"""Diameter below which everything scatters more [in]."""
+"""Diameter below which the rest, and the chord of a label, scatter more [in]."""
 ANGLE_SD = {"cad": 0.1, "scan": 0.5}
 """Standard deviation of the blade angle where the blade was drawn or scanned [deg], declared: CAD as meshed; scans half
 as far off as optical stations.  Those of stations and labels are part of the fit."""
-CHORD_SD, CHORD_SD_SMALL = 0.21, 0.45
-"""Scatter of ln(lift) and ln(drag) for a chord that only the label tells, from 7 in up and below, calibrated: of 87
-propellers of UIUC the chord itself scatters by 0.17 and 0.25 around a power of the diameter (each family left out
-of it), but from the label alone these widths predict them better (log score -0.09 a point for -0.12), as the blade's
-law is unknown too [1]."""
+CHORD_SD, CHORD_SD_SMALL = 0.15, 0.35
+"""Scatter of ln(lift) and ln(drag) for a chord that only the label tells, from 7 in up and below, calibrated: of six
+pairs the one that predicts 175 propellers of UIUC from their labels best (mean log score, families by the root of their
+size); their chords scatter by 0.17 around the law [1]."""
 LABEL_NU = 2.9
 """Degrees of freedom of Student's t fitted to the differences of stations and labels of 87 propellers of UIUC (scale
 1.02 deg, centre 0.68): a label is now and then wrong by six degrees [1]."""
-CAMBER_SD = 1.2
-"""Zero-lift angle of a section that nobody published, around the rule's [deg]: the ten families whose camber was
-calibrated lie at 3.5 to 6.5 % of the chord (rms 1.5 % from the rule's 3.5, less without slow flyers), 1.04 deg per
-percent in thin-airfoil theory (NACA four-digit mean line, largest camber at 40 % chord)."""
-SECTION_DRAG_SD = 0.2
-"""Scatter of ln(drag) of a section that nobody published, declared: its thickness may be 6 to 12 % and its surface is
-unknown."""
 LIFT_RE, LIFT_SHAPE = (1e4, 3e4, 1e5, 3e5), (0.0, -1.0, 1.0, 0.0)
 """Mean lift that section tables do not know, linear in ln Re: laminar separation reattaches from 30,000 on and closes
 to a shorter bubble from 70,000 (Carmichael 1981, NASA CR 165803, not checked), while tables at n_crit 3 have most of
 that step below 30,000.  Nothing was measured above 126,000; from 3e5 the tables are those of another n_crit [1]."""
-LIFT_ANGLE = 24.0
-"""Angle of attack at 0.75 R, induction left out, at which none of it is left, linear: about 12 deg with induction,
-where sections stall.  Chosen: of 15 to 30, those from 23 to 26 predict families left out best [deg]."""
+LIFT_ANGLE = 12.0
+"""Angle of attack at 0.75 R at which none of it is left, linear: sections stall [deg]."""
 HUB = 0.15
 """Hub over the diameter of the rotor that `Population.hub_cd` counts on: CT = pi/8 cd (HUB J)^2 [1]."""
-CHORD_RANGE = (0.10, 0.28)
-"""Chords at 0.75 R over the radius at which t/c = 0.101 (chord / 0.144)^-1.2, fitted to 17 blades of APC (PE0 files),
-stays inside their 4 to 15 %; farther out the thickness, and its drag, is taken as at the ends [1]."""
-RULE_CHORD = 0.15
-"""Chord over the radius at which the rule's thickness of 9 % is taken as right [1]."""
-SECTIONS = ("published", "calibrated", "rule", "given")
-"""What a section may be: coordinates of the maker, camber calibrated on its family, the general rule, or declared."""
-_QUANTILES = np.array([0.02, 0.1, 0.3, 0.5, 0.7, 0.9])
-WEIGHTS = np.array([0.04, 0.12, 0.24, 0.2, 0.2, 0.2])
+AT_REST_J = 0.05
+"""Advance ratio within which the part of the rest that belongs to hover fades, as exp(-(J / 0.05)^2), declared [1]."""
+SECTIONS = ("published", "rule", "given")
+"""What a section may be: coordinates of the maker, the general rule, or declared."""
+SHARED = ("angle_deg", "drag", "camber_deg")
+"""Latent numbers that the rotors of a family have in common."""
+_QUANTILES = np.array([0.005, 0.03, 0.12, 0.3, 0.5, 0.7, 0.9])
+WEIGHTS = np.array([0.01, 0.04, 0.14, 0.21, 0.2, 0.2, 0.2])
+_ANGLE, _LIFT, _DRAG, _CAMBER = (NAMES.index(n) for n in ("angle_deg", "lift", "drag", "camber_deg"))
+_SHARED = [NAMES.index(n) for n in SHARED]
 
 
 def label_angle_deg(pitch_m: float, diameter_m: float) -> float:
@@ -83,6 +76,7 @@ def chord_sd(diameter_m: float) -> float:
     return CHORD_SD if diameter_m >= SMALL_IN * 0.0254 * (1.0 - 1e-9) else CHORD_SD_SMALL
 
 
+@lru_cache(maxsize=64)
 def sizes(nu: float) -> Array:
     """Factors on standard deviations whose mixture by `WEIGHTS` is nearly Student's t with nu degrees of freedom."""
     from scipy.special import gammaincinv
@@ -91,73 +85,106 @@ def sizes(nu: float) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
+class Family:
+    """What measured propellers of one family have in common, from the population's spread between families.
+
+    Attributes
+    ----------
+    offset_deg, offset_sd_deg : float
+        Blade angle over the label's and its standard deviation [deg].
+    mean, cov : (3,), (3, 3) float
+        Shift of `SHARED` from what is usual, and its covariance [units of `NAMES`].
+    """
+
+    offset_deg: float
+    offset_sd_deg: float
+    mean: Array
+    cov: Array
+
+
+@dataclass(frozen=True, eq=False)
 class Population:
     """Fitted numbers of the population.
 
     Attributes
     ----------
-    mean : (K,) float
-        Expectation of the latent numbers for a blade whose stations are right, in the order and units of `NAMES`.
-    cov : (K, K) float
-        Their covariance at size 1 with the angle as stated: the solver's own errors [their units, squared].
     stations_deg, label_deg, family_deg, offset_deg : float
         Error of the stations' angle, of the label's, scatter of the offset between families, and the offset: blade
         angle at 0.75 R over the label's [deg].
-    small : float
-        Exponent of (7 in / D) on all standard deviations of smaller propellers [1].
-    rest_CT, rest_CP : float
-        Standard deviation of the rest over the coefficient at rest [1].
+    camber_deg, drag, lift : float
+        Standard deviations of zero-lift angle [deg], ln(drag) and ln(lift) of a known section [1].
+    unknown_camber_deg, unknown_drag : float
+        The same of a section that nobody published, besides.
+    camber_drag : float
+        Correlation of zero-lift angle and ln(drag) [1].
+    slow_flyer_deg : float
+        Further zero-lift angle of slow flyers [deg].
     rest_small : float
-        Exponent of (7 in / D) on it [1].
+        Exponent of (7 in / D) on the rest of smaller propellers [1].
+    local_camber_deg, local_drag, local_correlation : float
+        Errors of the section tables that change with the angle of attack: zero-lift angle [deg], ln(drag) [1].
+    local_deg, local_ln_Re : float
+        Their lengths in angle of attack [deg] and in ln Re.
+    rest_CT, rest_CP, rest_correlation, rest_deg, rest_ln_Re : float
+        Remainder over the coefficient at rest, correlation of CT and CP [1], lengths as above.
     rest_share : float
-        The rest is as large as f^share f0^(1 - share), f the coefficient and f0 that at rest: 0 is constant over J, 1 a
-        share of the coefficient itself [1].
-    length_J, length_ln_Re, reach : float
-        Lengths of the rest in J/J0 and in ln Re and exponent of its rational quadratic covariance, (1 + d^2 / 2 a)^-a
-        (Rasmussen and Williams 2006, eq. 4.19): the smaller, the more lengths it has at once [1].
+        The remainder is as large as f^share f0^(1 - share), f the coefficient and f0 that at rest [1].
+    reach : float
+        Exponent of the rational quadratic covariance, (1 + d^2 / 2 a)^-a (Rasmussen and Williams 2006, eq. 4.19): the
+        smaller, the more lengths it has at once [1].
+    hover_CT, hover_CP : float
+        Part of the rest that flight does not share with hover, over the coefficient at rest [1].
+    noise : float
+        Scatter of single readings, of the coefficient [1].
     hub_cd : float
         Drag coefficient of the hub in flight, on a disk of `HUB` diameters [1].
     lift_Re : float
         Expectation of ln(lift) at small angles of attack and Re 100,000, with the opposite sign at 30,000 [1].
-    drag_chord : float
-        Exponent of the chord in the expectation of the drag of sections whose thickness nobody published: narrow
-        blades are thicker (`CHORD_RANGE`) [1].
-    rest_correlation : float
-        Of the rest between CT and CP [1].
-    noise : float
-        Scatter of single readings, of the coefficient [1].
     nu, nu_rest : float
         Degrees of freedom of the heavy tails: latent numbers; rest and noise, which also differ in size by rotor [1].
-    offsets : mapping of str to (float, float)
-        Offset of each family at hand and its standard deviation [deg].
+    between : tuple of float
+        Share of the variances of `SHARED` that is between families [1].
+    families : mapping of str to Family
+        Families at hand.
     provenance : mapping
         Folders, propellers, points, command, version.
     validity : Validity
         Ranges of the propellers it was fitted to.
     """
 
-    mean: Array
-    cov: Array
     stations_deg: float
     label_deg: float
     family_deg: float
     offset_deg: float
-    small: float
+    camber_deg: float
+    drag: float
+    lift: float
+    unknown_camber_deg: float
+    unknown_drag: float
+    camber_drag: float
+    slow_flyer_deg: float
+    rest_small: float
+    local_camber_deg: float
+    local_drag: float
+    local_correlation: float
+    local_deg: float
+    local_ln_Re: float
     rest_CT: float
     rest_CP: float
-    rest_small: float
+    rest_correlation: float
+    rest_deg: float
+    rest_ln_Re: float
     rest_share: float
-    length_J: float
-    length_ln_Re: float
     reach: float
+    hover_CT: float
+    hover_CP: float
+    noise: float
     hub_cd: float
     lift_Re: float
-    drag_chord: float
-    rest_correlation: float
-    noise: float
     nu: float
     nu_rest: float
-    offsets: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    between: tuple[float, ...] = (0.5, 0.5, 0.5)
+    families: Mapping[str, Family] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
     validity: Validity | None = None
 
@@ -166,49 +193,58 @@ class Population:
         """Factors on the rest of a rotor, to be weighed by `WEIGHTS` [1]."""
         return sizes(self.nu_rest)
 
-    def growth(self, diameter_m: float) -> float:
-        """Factor on the standard deviations of the latent numbers of small propellers."""
-        return math.exp(self.small * max(0.0, math.log(SMALL_IN * 0.0254 / diameter_m)))
-
-    def angle(
-        self, known_from: str, growth: float, gap_deg: float = math.nan, family: str | None = None
-    ) -> tuple[float, float]:
+    def angle(self, known_from: str, gap_deg: float = math.nan, family: Family | None = None) -> tuple[float, float]:
         """Mean and variance of the error of the stated blade angle [deg], [deg^2]."""
-        label = math.isfinite(gap_deg)
-        offset, tau = self.offsets.get(family or "", (self.offset_deg, self.family_deg))
+        offset, tau = (self.offset_deg, self.family_deg)
+        if family is not None:
+            offset, tau = family.offset_deg, family.offset_sd_deg
         second = self.label_deg**2 + tau**2
         if known_from == "label":
-            return (-(gap_deg - offset) if label else 0.0), second
-        own = (ANGLE_SD.get(known_from) or self.stations_deg * growth) ** 2
-        if not label or known_from != "stations":
-            return 0.0, own
+            return (-(gap_deg - offset) if math.isfinite(gap_deg) else 0.0), second
+        if known_from in ANGLE_SD:
+            return 0.0, ANGLE_SD[known_from] ** 2
+        mean, own = 0.0, self.stations_deg**2
+        if family is not None:
+            mean, own = float(family.mean[0]), (1.0 - self.between[0]) * own + float(family.cov[0, 0])
+        if not math.isfinite(gap_deg):
+            return mean, own
         w = own / (own + second)
-        return -w * (gap_deg - offset), own * (1.0 - w)
+        return mean - w * (gap_deg + mean - offset), own * (1.0 - w)
+
+    def section(self, section: str, blade_class: str | None) -> tuple[Array, Array]:
+        """Mean and covariance of ln(drag) and zero-lift angle before the family is known, (2,) and (2, 2)."""
+        mean, variance = np.zeros(2), np.array([self.drag, self.camber_deg]) ** 2
+        if section == "rule":
+            variance += np.array([self.unknown_drag, self.unknown_camber_deg]) ** 2
+            mean[1] = self.slow_flyer_deg if blade_class == "slow_flyer" else 0.0
+        cross = self.camber_drag * math.sqrt(variance[0] * variance[1])
+        return mean, np.array([[variance[0], cross], [cross, variance[1]]])
 
     def prior(
         self, known_from: str, diameter_m: float, gap_deg: float = math.nan, family: str | None = None,
         section: str = "given", declared: Collection[str] = (), sds: Mapping[str, float] | None = None,
-        chord: float = math.nan,
+        blade_class: str | None = None,
     ) -> Prior:  # fmt: skip
-        """What is known of one rotor; ``chord`` at 0.75 R over the radius where the thickness is not known [1]."""
+        """What is known of one rotor."""
         if known_from not in KNOWN_FROM or known_from == "reference" or section not in SECTIONS:
             raise ValueError(f"got {known_from!r}, {section!r}; expected one of {KNOWN_FROM[:-1]} and of {SECTIONS}")
-        growth = self.growth(diameter_m)
-        mean, cov = self.mean.copy(), self.cov * growth**2
-        i, drag, camber = (NAMES.index(name) for name in ("angle_deg", "drag", "camber_deg"))
+        kin = self.families.get(family or "")
+        mean, cov = np.zeros(len(NAMES)), np.zeros((len(NAMES), len(NAMES)))
+        both = np.ix_([_DRAG, _CAMBER], [_DRAG, _CAMBER])
+        mean[[_DRAG, _CAMBER]], cov[both] = self.section(section, blade_class)
+        cov[_LIFT, _LIFT] = self.lift**2
+        if kin is not None:
+            own = np.sqrt(1.0 - np.array(self.between[1:]))
+            mean[[_DRAG, _CAMBER]] += kin.mean[1:]
+            cov[both] = cov[both] * np.outer(own, own) + kin.cov[1:, 1:]
+        if "camber" in declared:
+            mean[_CAMBER], cov[_CAMBER], cov[:, _CAMBER] = 0.0, 0.0, 0.0
+            cov[_CAMBER, _CAMBER] = self.camber_deg**2
         if "angle" not in declared:
-            shift, variance = self.angle(known_from, growth, gap_deg, family)
-            mean[i] += shift
-            cov[i, i] += variance
-        if known_from == "stations" and section in ("calibrated", "rule") and math.isfinite(chord):
-            mean[drag] += self.drag_chord * math.log(float(np.clip(chord, *CHORD_RANGE)) / RULE_CHORD)
-        if section == "rule" and "camber" not in declared:
-            cov[camber, camber] += CAMBER_SD**2
-            cov[drag, drag] += SECTION_DRAG_SD**2
+            mean[_ANGLE], cov[_ANGLE, _ANGLE] = self.angle(known_from, gap_deg, kin)
         if known_from == "label" and "chord" not in declared:
             # a wider blade is more lift and more drag by the same share
-            both = [NAMES.index("lift"), NAMES.index("drag")]
-            cov[np.ix_(both, both)] += chord_sd(diameter_m) ** 2
+            cov[np.ix_([_LIFT, _DRAG], [_LIFT, _DRAG])] += chord_sd(diameter_m) ** 2
         prior = Prior(mean, cov, sizes(self.nu), WEIGHTS.copy(), known_from)
         return prior.scaled(sds) if sds else prior
 
@@ -219,45 +255,66 @@ class Population:
         """
         nu = np.full(len(NAMES), self.nu)
         if known_from == "label":
-            nu[NAMES.index("angle_deg")] = LABEL_NU
+            nu[_ANGLE] = LABEL_NU
         return self.prior(known_from, diameter_m, section=section).sd, nu
 
-    def rest_sd(self, diameter_m: float, f: Array, top: Array) -> Array:
-        """Standard deviation of the rest at points, (2, P): f and top as in `rest` [1]."""
-        growth = math.exp(self.rest_small * max(0.0, math.log(SMALL_IN * 0.0254 / diameter_m)))
-        level = growth * np.array([[self.rest_CT], [self.rest_CP]])
-        top = np.abs(top)
-        return np.asarray(level * top * np.clip(np.abs(f) / top, 0.05, 2.0) ** self.rest_share)
+    def _amplitudes(self, at: Sensed) -> tuple[Array, Array]:
+        """Standard deviations of remainder and of the part at rest, (..., 2, P) each [1]."""
+        growth, top = _growth(at.diameter_m, self.rest_small)[..., None, None], np.abs(at.top)
+        level, hover = (
+            np.array(pair)[:, None] for pair in ((self.rest_CT, self.rest_CP), (self.hover_CT, self.hover_CP))
+        )
+        share = np.clip(np.abs(at.f) / top, 0.05, 2.0) ** self.rest_share
+        return growth * level * top * share, growth * hover * top * np.exp(-((at.J / AT_REST_J) ** 2))[..., None, :]
 
-    def noise_sd(self, f: Array, top: Array) -> Array:
-        """Scatter of single readings, (2, P) [1]."""
-        return np.asarray(0.5 * self.noise * (np.abs(f) + np.abs(top)))
+    def _local(self, at: Sensed) -> tuple[Array, Array]:
+        """Slopes with errors of the section tables, (..., 2, 2, P), and the covariance of those, (..., 2, 2)."""
+        sd = np.array([self.local_drag, self.local_camber_deg])
+        cov = np.outer(sd, sd) * np.where(np.eye(2) == 1.0, 1.0, self.local_correlation)
+        return at.T[..., [_DRAG, _CAMBER], :], cov * _growth(at.diameter_m, self.rest_small)[..., None, None] ** 2
 
-    def nearness(self, x: Array, Re: Array, x_other: Array, Re_other: Array) -> Array:
-        """Correlation of the rest between points, CT rows first, (2 P, 2 Q)."""
-        far = ((x[:, None] - x_other) / self.length_J) ** 2 + (np.log(Re[:, None] / Re_other) / self.length_ln_Re) ** 2
-        both = np.array([[1.0, self.rest_correlation], [self.rest_correlation, 1.0]])
-        return np.asarray(np.kron(both, (1.0 + far / (2.0 * self.reach)) ** -self.reach))
+    def rest_sd(self, at: Sensed) -> Array:
+        """Standard deviation of the rest at points, (..., 2, P) [1]."""
+        remainder, hover = self._amplitudes(at)
+        T, cov = self._local(at)
+        return np.asarray(np.sqrt(remainder**2 + hover**2 + np.einsum("...ckp,...kl,...clp->...cp", T, cov, T)))
+
+    def rest(self, at: Sensed, other: Sensed | None = None) -> Array:
+        """Covariance of the rest between points of a rotor, CT rows first, (..., 2 P, 2 Q) [1]."""
+        b = at if other is None else other
+        angle = at.alpha_deg[..., :, None] - b.alpha_deg[..., None, :]
+        Re = np.log(at.Re[..., :, None] / b.Re[..., None, :])
+
+        def near(deg: float, ln_Re: float) -> Array:
+            far = (angle / deg) ** 2 + (Re / ln_Re) ** 2
+            return np.asarray((1.0 + far / (2.0 * self.reach)) ** -self.reach)[..., None, :, None, :]
+
+        (A, H), (B, G), (T, cov) = self._amplitudes(at), self._amplitudes(b), self._local(at)
+        S = self._local(b)[0]
+        loads = np.where(np.eye(2) == 1.0, 1.0, self.rest_correlation)[:, None, :, None]
+        tables = np.einsum("...ckp,...kl,...dlq->...cpdq", T, cov, S)
+        out = tables * near(self.local_deg, self.local_ln_Re)
+        out += loads * near(self.rest_deg, self.rest_ln_Re) * A[..., :, :, None, None] * B[..., None, None, :, :]
+        out += loads * H[..., :, :, None, None] * G[..., None, None, :, :]
+        P, Q = at.J.shape[-1], b.J.shape[-1]
+        return np.asarray(out.reshape(*out.shape[:-4], 2 * P, 2 * Q))
+
+    def noise_sd(self, at: Sensed) -> Array:
+        """Scatter of single readings, (..., 2, P) [1]."""
+        return np.asarray(0.5 * self.noise * (np.abs(at.f) + np.abs(at.top)))
 
     def bias(self, at: Sensed) -> Array:
-        """What the solver lacks in the mean, (2, P): drag of the hub (Hoerner 1965, ch. 3), lift over Re [1]."""
-        alpha = np.degrees(np.arctan(at.J0 / (0.75 * np.pi)) - np.arctan(at.J0 * at.x / (0.75 * np.pi)))
-        small_angles = np.clip(1.0 - alpha / LIFT_ANGLE, 0.0, 1.0)
-        lift = self.lift_Re * small_angles * np.interp(np.log(at.Re), np.log(LIFT_RE), LIFT_SHAPE)
-        bias = at.T[:, NAMES.index("lift")] * lift
-        bias[0] -= math.pi / 8.0 * self.hub_cd * (HUB * at.J0 * at.x) ** 2
-        return np.asarray(bias)
-
-    def rest(self, diameter_m: float, x: Array, Re: Array, f: Array, top: Array) -> Array:
-        """Covariance of the smooth rest. [1]"""
-        amplitude = self.rest_sd(diameter_m, f, top).reshape(-1)
-        return np.asarray(self.nearness(x, Re, x, Re) * np.outer(amplitude, amplitude))
+        """What the solver lacks in the mean, (..., 2, P): drag of the hub (Hoerner 1965, ch. 3), lift over Re [1]."""
+        hub, lift = bias_columns(at)
+        return self.hub_cd * hub + self.lift_Re * lift
 
     def document(self) -> dict[str, Any]:
         """Plain values for the file."""
         plain = asdict(self)
         plain["latents"] = list(NAMES)
-        plain |= {name: getattr(self, name).tolist() for name in ("mean", "cov")}
+        plain["families"] = {
+            name: {k: np.asarray(v).tolist() for k, v in vars(one).items()} for name, one in self.families.items()
+        }
         return plain
 
     @staticmethod
@@ -266,11 +323,27 @@ class Population:
         plain = dict(document)
         if tuple(plain.pop("latents")) != NAMES:
             raise ValueError(f"got latent numbers {document['latents']}; expected {NAMES}")
-        plain |= {name: np.array(plain[name], float) for name in ("mean", "cov")}
         if plain.get("validity") is not None:
             plain["validity"] = Validity.of(plain["validity"])
-        plain["offsets"] = {k: (float(a), float(b)) for k, (a, b) in plain["offsets"].items()}
+        plain["between"] = tuple(plain["between"])
+        plain["families"] = {
+            name: Family(one["offset_deg"], one["offset_sd_deg"], np.array(one["mean"]), np.array(one["cov"]))
+            for name, one in plain["families"].items()
+        }
         return Population(**plain)
+
+
+def _growth(diameter_m: float | Array, exponent: float) -> Array:
+    """Factor on the standard deviations of small propellers."""
+    return np.exp(exponent * np.maximum(0.0, np.log(SMALL_IN * 0.0254 / np.asarray(diameter_m))))
+
+
+def bias_columns(at: Sensed) -> tuple[Array, Array]:
+    """Drag of a hub of drag coefficient 1, and a change of ln(lift) of 1 at Re 100,000, (..., 2, P) each [1]."""
+    small_angles = np.clip(1.0 - at.alpha_deg / LIFT_ANGLE, 0.0, 1.0)
+    lift = small_angles * np.interp(np.log(at.Re), np.log(LIFT_RE), LIFT_SHAPE)
+    drag = -math.pi / 8.0 * (HUB * at.J) ** 2
+    return np.stack([drag, np.zeros_like(drag)], axis=-2), at.T[..., _LIFT, :] * lift[..., None, :]
 
 
 @cache

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.rotors.conditioning import tangents
-from bemt.rotors.latents import NAMES, Prior, Sensed
+from bemt.rotors.latents import NAMES, Prior, Sensed, angle_of_attack_deg
 from bemt.rotors.mixture import LEVELS, pair_half_width
 from bemt.rotors.population import WEIGHTS, Population
 from bemt.rotors.reference import ReferenceRun
@@ -83,16 +83,18 @@ def zero_thrust(solve: Solve, z: Array, rpm: float, which: int = 0) -> float:
     return float(_SCAN[i] + (_SCAN[i + 1] - _SCAN[i]) * CT[i] / (CT[i] - CT[i + 1]))
 
 
-def sense(solve: Solve, diameter_m: float, rpm: Array, J: Array, Re: Array, z: Array | None = None) -> Sensed:
-    """Solve points and take the slopes there, 2 K + 3 calls."""
+def sense(
+    solve: Solve, diameter_m: float, beta75_deg: float, rpm: Array, J: Array, Re: Array, z: Array | None = None
+) -> Sensed:
+    """Solve points and take the slopes there, 2 K + 2 calls; ``beta75_deg`` is the blade angle as drawn."""
     z = np.zeros(len(NAMES)) if z is None else z
     points = np.arange(rpm.size)
     f = solve(z, rpm, J, points)
     top = solve(z, rpm, np.zeros_like(J), points)
     slopes = tangents(lambda at: solve(at, rpm, J, points).reshape(-1), z)
-    J0 = zero_thrust(solve, z, float(np.median(rpm)), int(np.argsort(rpm)[rpm.size // 2]))
     T = slopes.reshape(2, rpm.size, -1).transpose(0, 2, 1)
-    return Sensed(diameter_m, J0, J / J0, Re, f, top, T)
+    alpha = angle_of_attack_deg(beta75_deg + z[NAMES.index("angle_deg")], J, f[0])
+    return Sensed(diameter_m, J, alpha, Re, f, top, T)
 
 
 def predict(
@@ -103,14 +105,13 @@ def predict(
     if mean is None:
         mean = at.f + np.einsum("ckp,k->cp", T, prior.mean)
     mean = mean + p.bias(at)
-    rest = p.rest_sd(at.diameter_m, at.f, at.top)
+    rest = p.rest_sd(at)
     if reference is not None:
-        shift, T, left = reference.near(p, at.x, at.Re, rest, T)
+        shift, T, left = reference.near(p, at)
         # near the run the rest is as large as it was there, if that is more than usual; far from it, as large as is
         # usual
         usual = float(np.sqrt(WEIGHTS @ p.rest_sizes**2))
         told = 1.0 - np.divide(left, rest, out=np.ones_like(rest), where=rest > 0.0) ** 2
         mean, rest = mean + shift, left * np.sqrt(told * max(reference.size / usual, 1.0) ** 2 + 1.0 - told)
     latent = np.sqrt(np.maximum(np.einsum("ckp,kj,cjp->cp", T, prior.cov, T), 0.0))
-    noise = p.noise_sd(at.f, at.top)
-    return Prediction(mean, latent, rest, noise, prior.sizes, prior.weights, p.rest_sizes, WEIGHTS)
+    return Prediction(mean, latent, rest, p.noise_sd(at), prior.sizes, prior.weights, p.rest_sizes, WEIGHTS)

@@ -3,8 +3,8 @@
 Made by ``reports/studies/section_table.py``: our own runs over camber, thickness, n_crit, Reynolds number and angle of
 attack, camber position 0.40 (the rule's) and 0.45 (fans); no weights of the network. Cubic in camber, thickness and
 n_crit between the nodes; angles and Reynolds numbers are those of the tables themselves. The nodes hold the rule's
-section and the ends of its ranges. There only rounding is left: cl 1e-4, cd 0.025 %, at most 0.01 % of the static CT and CP
-of the shipped cases. Between them (60 random sections, ``section_table.py check``), cl and ln cd from -4 to 10 deg
+section and the ends of its ranges. There only rounding is left: cl 1e-4, cd 0.025 %, up to 0.01 % of the static CT and
+CP of the shipped cases. Between them (60 random sections, ``section_table.py check``), cl and ln cd from -4 to 10 deg
 and Re 3e4 to 1e6 are off by 4e-4 and 1.4e-3 in the median, 95 % within 8e-3 and 2e-2. CT and CP of a 10x5 with that
 section, over those at rest, are off by 0.03 % in the median, 95 % within 0.5 %, 2.2 % at worst (3,000 rev/min, where
 laminar separation sets in).
@@ -13,11 +13,12 @@ laminar separation sets in).
 from __future__ import annotations
 
 from functools import cache
-from importlib import resources
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from bemt.base.cache import shipped_arrays
 
 Array = NDArray[np.float64]
 
@@ -75,9 +76,9 @@ def unpack(packed: NDArray[np.uint8]) -> NDArray[np.float32]:
 @cache
 def table() -> Table:
     """The shipped table, read once."""
-    with resources.files("bemt.sections").joinpath(FILE).open("rb") as stream, np.load(stream) as found:
-        axes = tuple(found[name] for name in AXES)
-        return Table(axes, found["alpha_deg"], found["Re"], unpack(found["packed"]), str(found["made_with"]))
+    found = shipped_arrays("bemt.sections", FILE)
+    axes = tuple(found[name] for name in AXES)
+    return Table(axes, found["alpha_deg"], found["Re"], unpack(found["packed"]), str(found["made_with"]))
 
 
 def covers(shape: tuple[float, float, float] | None, n_crit: float) -> bool:

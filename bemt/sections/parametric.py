@@ -19,9 +19,9 @@ __all__ = ["QpropSection", "XrotorSection", "fit_qprop", "fit_xrotor"]
 Array = NDArray[np.float64]
 LOW, HIGH = np.radians(-16.0), np.radians(22.0)
 """Angles of attack that a fit of lift looks at [rad]."""
-ZERO_LIFT = np.radians(1.0)
-"""How far the zero-lift angle of a fit may lie from the section's: programs scale slope and angle by Mach number and
-solidity, so they must be those of the section, not numbers that fit its stall [rad]."""
+WIDEST_STALL = 0.3
+"""Greatest dcl_stall of a fit. A wider stall reaches into the linear range: slope and zero-lift angle are then numbers
+that fit the stall, no longer those of the section, which XROTOR and DFDC scale by Mach number and solidity [-]."""
 
 
 @dataclass(frozen=True)
@@ -147,11 +147,7 @@ def fit_xrotor(polar: Polar, Re: float) -> XrotorSection:
         return np.asarray(make(*p, 0.01, 0.0, 0.0, Re, 0.0).lift(alpha)[0] - cl)
 
     start = [a0, slope, top, bottom, 0.1, 0.1]
-    low_, high_ = (
-        [a0 - ZERO_LIFT, 0.9 * slope, 0.05, -4.0, -3.0, 5e-3],
-        [a0 + ZERO_LIFT, 1.1 * slope, 4.0, -0.01, 3.0, 1.0],
-    )
-    p = _solve(lift, start, low_, high_)
+    p = _solve(lift, start, [-0.6, 1.0, 0.05, -4.0, -3.0, 5e-3], [0.6, 14.0, 4.0, -0.01, 3.0, WIDEST_STALL])
     used = np.zeros(alpha.size, dtype=bool)
     used[down : up + 1] = True
     got, limiter = make(*p, 0.01, 0.0, 0.0, Re, 0.0).lift(alpha[used])

@@ -1,13 +1,12 @@
 """The declared general rule for blade sections, which hardly anybody publishes.
 
 Propellers come with a diameter, a pitch and at best stations; sections, surface and transition are unknown.  The rule
-gives every one of them the same answer unless its family is known to differ or has published its section.  Its
-numbers were calibrated on UIUC volume 1 (51 propellers with stations, static and wind-tunnel data); UIUC volume 2 is
-what it is reported on (``reports/validation``): held out of every fit, though looked at on the way.
+gives every one of them the same answer unless its family has published its section.  Its numbers were calibrated on
+UIUC volume 1 (51 propellers with stations, static and wind-tunnel data).  How far the section of a family may be from
+it, and what slow flyers have more, is part of the population of measured rotors (`bemt.rotors`).
 
 * RuleSection: NACA four-digit, camber 3.5 % at 40 % chord, thickness 9 %; six of the nine families of volume 1 with two
-  or more propellers come out at 3.0 to 3.5 %.  Families that do not are in :data:`FAMILIES`, and so are families whose
-  section is published, with its coordinates.  APC publishes sections too (its PE0 files: E63 to NACA 4412, or Clark Y,
+  or more propellers come out at 3.0 to 3.5 %.  APC publishes sections too (its PE0 files: E63 to NACA 4412, or Clark Y,
   scaled); with them static CT of volume 1 is off by 5.3 % in the median, with the rule by 3.7 %: not taken.
 * Transition: n_crit 3.  Rotating small blades keep their lift down to Re 20,000, which n_crit 9 does not (static CT
   at Re 20,000-30,000 relative to the same propellers' top speed: -14 to -16 % with n_crit 9, -3 to +3 % with 3).
@@ -32,8 +31,6 @@ if TYPE_CHECKING:
 
 N_CRIT = 3.0
 DRAG_LEVEL = 1.1
-# Range of the camber over all propellers of volume 1, for u_input of a blade that nobody measured.
-CAMBER_RANGE = (0.025, 0.065)
 # Above this Reynolds number the blade is no small moulded propeller; the smooth section's drag and an ordinary wind
 # tunnel's n_crit are used from twice this on, blended in log Re between.
 SMALL_RE = 3.0e5
@@ -58,8 +55,7 @@ def _one(camber: float, thickness: float = 0.09) -> tuple[RuleSection, ...]:
 
 DEFAULT = _one(0.035)
 
-# Deters, Ananda and Selig (2014), AIAA 2014-2151: SDA1075 over the whole blade of DA4002 and DA4022.  That DA4052, of
-# the same designers, has it too is an assumption.
+# Deters, Ananda and Selig (2014), AIAA 2014-2151: SDA1075 over the whole blade of DA4002 and DA4022.
 _SDA1075 = (RuleSection(0.75, 0.0196, 0.4, 0.11996, "sda1075"),)
 
 # Clark Y thinned towards the tip: the standard propeller 5868-9 of NACA Report 640, which the UIUC family nr640 copies
@@ -68,30 +64,17 @@ _CLARK_Y_640 = (0.2, 0.3, 0.45, 0.6, 0.75, 0.95), (0.25, 0.20, 0.13, 0.10, 0.085
 # A root thicker than this is part of the hub, and no section.
 _THICKEST = 0.25
 
-FAMILIES: dict[str, tuple[RuleSection, ...]] = {
-    "apcsf": _one(0.065),  # slow flyers and old wooden-style blades: strongly cambered (calibrated on volume 1)
-    "mae": _one(0.065),
-    "apcsp": _one(0.050),
-    "apc29ff": _one(0.045),
-    "da4002": _SDA1075,
-    "da4022": _SDA1075,
-    "da4052": _SDA1075,
-}
-
-
-# Families of volume 1 whose camber came out at the general rule's, 3.0 to 3.5 %: as good as calibrated.
-_CHECKED = frozenset({"apce", "grcp", "grcsp", "grsn", "gwsdd", "mas"})
+FAMILIES: dict[str, tuple[RuleSection, ...]] = {"da4002": _SDA1075, "da4022": _SDA1075}
+"""Families whose makers published their section, besides nr640."""
 
 
 def source(family: str | None) -> str:
-    """Where the section of a family comes from: ``published``, ``calibrated``, or ``rule`` for one nobody knows.
+    """Where the section of a family comes from: ``published``, or ``rule`` for one nobody knows.
 
-    >>> source("da4002"), source("apcsf"), source("somebody")
-    ('published', 'calibrated', 'rule')
+    >>> source("da4002"), source("apcsf")
+    ('published', 'rule')
     """
-    if family == "nr640" or any(s.shape != "naca4" for s in FAMILIES.get(family or "", ())):
-        return "published"
-    return "calibrated" if family in FAMILIES or family in _CHECKED else "rule"
+    return "published" if family == "nr640" or family in FAMILIES else "rule"
 
 
 def _clark_y(r_R: ArrayLike, thickness: ArrayLike) -> tuple[RuleSection, ...]:
@@ -107,8 +90,8 @@ def _clark_y(r_R: ArrayLike, thickness: ArrayLike) -> tuple[RuleSection, ...]:
 def sections(family: str | None = None, law: tuple[ArrayLike, ArrayLike] | None = None) -> tuple[RuleSection, ...]:
     """Sections of the rule, root first; ``law`` is a thickness file's r/R and t/c, for families that scale a section.
 
-    >>> sections("apcsf")[0].camber, sections("somebody")[0].camber
-    (0.065, 0.035)
+    >>> sections("da4002")[0].shape, sections("somebody")[0].camber
+    ('sda1075', 0.035)
     >>> [(round(s.r_R, 2), round(s.thickness, 3)) for s in sections("nr640")][-2:]
     [(0.8, 0.083), (0.95, 0.075)]
     """

@@ -33,9 +33,9 @@ def doubted(c: Mapping[str, Any]) -> str:
     """Why agreement means little at this point, to be added to it; empty where nothing is flagged.
 
     >>> doubted({"doubts": ["supersonic tip"]}), doubted({})
-    (', but supersonic tip', '')
+    (', but flagged: supersonic tip', '')
     """
-    return "".join(f", but {words}" for words in c.get("doubts", ()))
+    return f", but flagged: {', '.join(c['doubts'])}" if c.get("doubts") else ""
 
 
 def agreement(c: Mapping[str, Any]) -> str:

@@ -22,6 +22,8 @@ from bemt.dataset import Dataset
 from bemt.drive.drive_result import full_document
 from bemt.readers import references as reference_file
 from bemt.recordings import audit_remarks
+from bemt.recordings.cfd_setup import references_of
+from bemt.recordings.load import import_file
 from bemt.rotors.validity import serious
 from bemt.sweep.agreement import agreement
 
@@ -45,11 +47,11 @@ def _points(case: Case, refs: Sequence[reference_file.Reference]) -> list[tuple[
 
 
 def _references(case: Case) -> list[reference_file.Reference]:
-    """Recorded values, open conditions filled in from the case."""
-    if case.references_path is None:
-        return []
+    """Recorded values: references and CFD runs in the case's folder; open conditions filled in from the case."""
     own = {"rpm": case.rpm, "airspeed_m_s": case.airspeed_m_s, "density_kg_m3": case.air().rho}
-    read = reference_file.read(case.references_path)
+    read = [] if case.references_path is None else reference_file.read(case.references_path)
+    for path in case.run_paths:
+        read += references_of(import_file(path), str(path))
     return [replace(r, **{k: v for k, v in own.items() if math.isnan(getattr(r, k))}) for r in read]  # type: ignore[arg-type]
 
 
@@ -81,7 +83,7 @@ def _compare(
         "model": model, "reference": row["label"], "source": row["source"], "quantity": channel,
         "unit": COMPARED[channel], "S": S, "D": recorded, "E": E, "E_pct": 100.0 * E / recorded if recorded else None,
         "u_num": u_num, "u_input": u_input, "u_model": u_model, "u_D": u_D, "u_val": u_val,
-        "doubts": [] if model == "k1k2" else list(serious(values.flags[at])),
+        "doubts": list(serious(values.flags[at])),
     }  # fmt: skip
     return line | {"verdict": agreement(line)}
 

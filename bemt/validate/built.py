@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.readers._uiuc_names import class_of
 from bemt.rotors.conditioning import condition
 from bemt.rotors.fit import MeasuredRotor, law
 from bemt.rotors.latents import Prior
@@ -18,14 +19,13 @@ from bemt.rotors.population import WEIGHTS, Population, label_angle_deg
 from bemt.rotors.predict import predict, sense
 from bemt.rotors.reference import ReferenceRun, noise_of_run, scatter
 from bemt.sections import rule as section_rule
-from bemt.validate.points import Rows, Solver, Stations, counted, rows
+from bemt.validate.points import J_SHARE, Rows, Solver, Stations, counted, rows
 
 if TYPE_CHECKING:
     from bemt.effects import Effect
     from bemt.readers.uiuc import UiucPropeller
 
 Array = NDArray[np.float64]
-GENERAL = "general rule"
 RUN_POINTS = 24
 """Points of a run on which a rotor is conditioned [1]."""
 
@@ -51,10 +51,9 @@ class Expected:
     log_density: dict[str, dict[str, Array]]  # (P,) logarithm of the predictive density of the reading over itself [1]
 
 
-def observe(propeller: UiucPropeller, effects: Sequence[Effect], stations: Stations, general: bool = False) -> Observed:
-    """Solve one propeller at its points with the slopes; ``general``: as if its family were unknown to the rule."""
-    family = GENERAL if general else propeller.family
-    solve = Solver(replace(propeller, family=family), effects, None, stations)
+def observe(propeller: UiucPropeller, effects: Sequence[Effect], stations: Stations) -> Observed:
+    """Solve one propeller at its points with the slopes."""
+    solve = Solver(propeller, effects, None, stations)
     drawn = rows(propeller, solve)
     here = np.logical_or.reduce(list(counted(drawn).values())) & np.isfinite(drawn.CT_bemt)
     rotor = solve.rotor
@@ -62,14 +61,15 @@ def observe(propeller: UiucPropeller, effects: Sequence[Effect], stations: Stati
     n, D = drawn.rpm[here] / 60.0, rotor.D
     speed = n * D * np.hypot(0.75 * math.pi, drawn.J[here])
     Re = solve.air.rho * speed * chord / solve.air.mu
-    at = sense(solve, D, drawn.rpm[here], drawn.J[here], Re)
+    at = sense(solve, D, math.degrees(beta), drawn.rpm[here], drawn.J[here], Re)
     gap = math.nan
     if propeller.pitch_in:
         gap = math.degrees(beta) - label_angle_deg(propeller.pitch_in, propeller.diameter_in)
     y = np.array([drawn.CT[here], drawn.CP[here]])
-    source = section_rule.source(family)
-    record = MeasuredRotor(**vars(at), name=propeller.name, family=propeller.family, section=source, gap_deg=gap,
-                      static=drawn.static[here], y=y, chord=chord / rotor.R)  # fmt: skip
+    record = MeasuredRotor(
+        **vars(at), name=propeller.name, family=propeller.family, section=section_rule.source(propeller.family),
+        gap_deg=gap, static=drawn.static[here], y=y, blade_class=class_of(propeller.family),
+    )  # fmt: skip
     return Observed(propeller, solve, drawn, record)
 
 
@@ -86,18 +86,17 @@ def conditioned(seen: Observed, p: Population, on: str) -> Expected:
     run = np.flatnonzero(good[on.removesuffix("_and_one")][here])
     run = run[np.unique(np.linspace(0, run.size - 1, min(run.size, RUN_POINTS)).round().astype(int))]
     if on.endswith("_and_one"):
-        run = np.append(run, np.argmin(np.where(m.static, np.inf, np.abs(m.x - 0.5))))
-    prior = law(p, m)
-    x, Re, f, top, y = m.x[run], m.Re[run], m.f[:, run], m.top[:, run], m.y[:, run]
+        middle = 0.5 * (drawn.J0_bemt if math.isfinite(drawn.J0_bemt) else float(m.J.max()) / J_SHARE)
+        run = np.append(run, np.argmin(np.where(m.static, np.inf, np.abs(m.J - middle))))
+    prior, at, y = law(p, m), m.part(run), m.y[:, run]
     still = m.static[run]
-    rough = np.array([[scatter(a, Re[still])] for a in (y - f)[:, still]]) * still
-    noise = noise_of_run(p, m.diameter_m, (x, Re), f, top, y, np.hypot(p.noise_sd(f, top), rough))
+    rough = np.array([[scatter(a, at.Re[still])] for a in (y - at.f)[:, still]]) * still
+    noise = noise_of_run(p, at, y, np.hypot(p.noise_sd(at), rough))
     bias = p.bias(m)[:, run].reshape(-1)
     found = condition(
         lambda z: seen.solve(z, rpm[run], J[run]).reshape(-1) + bias, prior, y.reshape(-1), noise, p.rest_sizes, WEIGHTS
     )
-    amplitude = p.rest_sd(m.diameter_m, f, top).reshape(-1)
-    reference = ReferenceRun.given(x, Re, amplitude, noise, y.reshape(-1), found)
+    reference = ReferenceRun.given(at, noise, y.reshape(-1), found)
     posterior = Prior(found.mean, found.cov, np.ones(1), np.ones(1), "reference")
     return _lying(seen, p, posterior, reference)
 

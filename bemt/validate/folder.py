@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -27,6 +28,13 @@ class Folder:
     propellers: tuple[tuple[UiucPropeller, Stations], ...]
     skipped: tuple[tuple[str, str], ...]  # Name and reason of those that cannot be compared
     faults: tuple[str, ...]  # What could not be read
+
+
+def read_folders(folders: Sequence[Path]) -> Folder:
+    """Several folders as one."""
+    found = [read_folder(folder) for folder in folders]
+    parts = zip(*((one.propellers, one.skipped, one.faults) for one in found), strict=True)
+    return Folder(*(tuple(item for part in parts_ for item in part) for parts_ in parts))
 
 
 def read_folder(folder: Path) -> Folder:

@@ -2,44 +2,39 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from bemt import __version__
 from bemt.base.tables import plain
-from bemt.base.units import INCH
 from bemt.coefficients import M_tip
 from bemt.rotors.fit import fit
 from bemt.rotors.population import Population
 from bemt.rotors.validity import Validity
-from bemt.sections import rule as section_rule
 from bemt.validate.built import Observed, conditioned, expect, observe
 from bemt.validate.points import KINDS
 from bemt.validate.pool import Pool
-from bemt.validate.static_limit import from_static
 
 if TYPE_CHECKING:
     from bemt.effects import Effect
     from bemt.validate.folder import Folder
 
-SCHEMA = "bemt.left_out/2"
-LARGE_IN = 8.9
-"""Propellers of 9 in and more are reported beside all [in]."""
+SCHEMA = "bemt.left_out/3"
+GROUPS = 6
+"""Families are left out in so many groups, dealt out by name."""
 # Steps of the search with a family left out, from the numbers of all families.
-_STEPS_LEFT_OUT = 15
+_STEPS_LEFT_OUT = 10
 _WORDS = {
-    "as_drawn": "solver on the stations as given", "declared": "as built",
-    "general_section": "as built, calibrated sections treated as unknown",
-    "as_drawn_large": "solver, 9 in and more", "declared_large": "as built, 9 in and more",
-    "on_static": "conditioned on the rotor's static run",
-    "on_static_and_one": "on its static run and one forward point", "on_forward": "conditioned on its forward runs",
-}  # fmt: skip
-_LIMITS = {
-    "constant": "{}, best without a static run, answers known",
-    "seen": "{}, best line from the static run, answers known",
-    "left_out": "{}, best line from the static run, rotor left out",
+    "as_drawn": "solver on the stations as given",
+    "family_known": "as built, its family in the population",
+    "unseen": "as built, family and section unknown",
+    "on_static": "the same, after its static run",
+    "on_static_and_one": "the same, after static run and one flight point",
 }
 Say = Callable[[str], None] | None
 
@@ -58,7 +53,7 @@ def fit_population(seen: Sequence[Observed], name: str) -> tuple[Population, Any
     """Population of measured propellers and the numbers of its search."""
     provenance = {
         "propellers": len(seen),
-        "points": int(sum(s.record.x.size for s in seen)),
+        "points": int(sum(s.record.J.size for s in seen)),
         "folder": name,
         "families": sorted({s.record.family for s in seen}),
         "version": __version__,
@@ -71,65 +66,47 @@ def fit_population(seen: Sequence[Observed], name: str) -> tuple[Population, Any
 
 def _covered(one: Observed) -> Validity:
     """Ranges that the points of one propeller cover."""
-    rotor, m = one.solve.rotor, one.record
+    rotor, m, J0 = one.solve.rotor, one.record, one.drawn.J0_bemt
     fastest = M_tip(one.drawn.rpm.max() / 60.0, m.diameter_m, one.solve.air.a_sound)
-    return Validity.of_rotor(m.diameter_m, rotor.B, rotor.blade.pitch_m() / rotor.D, m.x, m.Re, fastest)
+    x = m.J / J0 if math.isfinite(J0) else np.zeros(1)
+    return Validity.of_rotor(m.diameter_m, rotor.B, rotor.blade.pitch_m() / rotor.D, x, m.Re, fastest)
 
 
-def leave_out(
-    folder: Folder, seen: Sequence[Observed], effects: Sequence[Effect], name: str, say: Say = None
-) -> dict[str, Any]:
-    """Every family predicted by a population fitted without it.
-
-    ``declared`` keeps the section rule as it is, whose cambers of a few families were calibrated on volume 1;
-    ``general_section`` takes those families for unknown, which is what a new family meets.
-    """
-    _, numbers = fit_population(seen, name)
+def leave_out(seen: Sequence[Observed], name: str, fitted: tuple[Population, Any], say: Say = None) -> dict[str, Any]:
+    """Every family predicted by a population fitted without it and its group, sections unknown unless published."""
+    everything, numbers = fitted
     pools = {key: Pool() for key in _WORDS}
     families = sorted({s.record.family for s in seen})
-    stations = {p.name: s for p, s in folder.propellers}
-    for i, family in enumerate(families):
+    for group in (families[i::GROUPS] for i in range(min(GROUPS, len(families)))):
         if say:
-            say(f"{i + 1}/{len(families)} without {family}")
-        p, _ = fit([s.record for s in seen if s.record.family != family], numbers, _STEPS_LEFT_OUT)
-        for one in (s for s in seen if s.record.family == family):
-            found = expect(one, p)
-            for other_kind, on in (("forward", "static"), ("forward", "static_and_one"), ("static", "forward")):
-                if one.record.static.any() and not one.record.static.all():
-                    pools[f"on_{on}"].add_kind(conditioned(one, p, on), other_kind)
-            large = one.record.diameter_m >= LARGE_IN * INCH
-            for key in ("declared", *(["declared_large"] if large else [])):
+            say(f"without {', '.join(group)}")
+        p, _ = fit([s.record for s in seen if s.record.family not in group], numbers, _STEPS_LEFT_OUT)
+        for one in (s for s in seen if s.record.family in group):
+            for key, population in (("family_known", everything), ("unseen", p)):
+                found = expect(one, population)
                 pools[key].add(found.rows, found)
-            for key in ("as_drawn", *(["as_drawn_large"] if large else [])):
-                pools[key].add(one.drawn)
-            if section_rule.source(family) == "published":
-                pools["general_section"].add(found.rows, found)
-            else:
-                other = observe(one.propeller, effects, stations[one.record.name], general=True)
-                found = expect(other, p)
-                pools["general_section"].add(found.rows, found)
+            pools["as_drawn"].add(one.drawn)
+            if one.record.static.any() and not one.record.static.all():
+                for on in ("static", "static_and_one"):
+                    pools[f"on_{on}"].add_kind(conditioned(one, p, on), "forward")
     out = {"schema": SCHEMA, "folder": name, "families": families} | {k: pool.total() for k, pool in pools.items()}
-    return out | {"transfer": transfer(seen, say), "static_limit": static_limit(seen)}
+    return out | {"transfer": transfer(seen, numbers, say)}
 
 
-def static_limit(seen: Sequence[Observed]) -> dict[str, Any]:
-    """What the static runs can tell of flight at best."""
-    return from_static([s.record for s in seen], [s.drawn.J0_bemt / s.drawn.J0 - 1.0 for s in seen])
-
-
-def transfer(seen: Sequence[Observed], say: Say = None) -> dict[str, Any]:
-    """Each volume (folder of the data) predicted by a population fitted to the others."""
-    volumes = sorted({s.propeller.folder for s in seen})
+def transfer(seen: Sequence[Observed], numbers: Any, say: Say = None) -> dict[str, Any]:
+    """Each volume of the data predicted by a population fitted to the others, families of the volume unknown."""
+    volumes = sorted({Path(s.propeller.folder).name for s in seen})
     out = {}
-    for folder in volumes if len(volumes) > 1 else []:
+    for volume in volumes if len(volumes) > 1 else []:
         if say:
-            say(f"without {Path(folder).name}")
-        p, _ = fit([s.record for s in seen if s.propeller.folder != folder])
+            say(f"without {volume}")
+        mine = [s for s in seen if Path(s.propeller.folder).name == volume]
+        p, _ = fit([s.record for s in seen if s not in mine], numbers, _STEPS_LEFT_OUT)
         pool = Pool()
-        for one in (s for s in seen if s.propeller.folder == folder):
-            found = expect(one, p)
+        for one in mine:
+            found = expect(one, replace(p, families={}))
             pool.add(found.rows, found)
-        out[Path(folder).name] = pool.total()
+        out[volume] = pool.total()
     return out
 
 
@@ -156,19 +133,13 @@ def table(document: dict[str, Any]) -> str:
                 cells = [s["median_abs"], s["p90_abs"], held["68"], held["95"], s.get("width68")]
                 shown = [f"{'-':>6}" if v is None else f"{100 * v:6.1f}" for v in cells]
                 lines.append(f"{text + ', ' + kind + ' ' + q:60}  {' '.join(shown)}")
-    limit = document["static_limit"]
-    for q, name in (("CT", "forward CT"), ("CP", "forward CP"), ("J0", "zero-thrust J")):
-        for key, text in _LIMITS.items():
-            if limit[q][key]["median_abs"] is None:
-                continue
-            errors = f"{100 * limit[q][key]['median_abs']:6.1f} {100 * limit[q][key]['p90_abs']:6.1f}"
-            lines.append(f"{text.format(name):60}  {errors}")
-    n = document["declared"]
+    n = document["unseen"]
     scores = [log_score(total) for total in (n, *document["transfer"].values())]
     lines += [
         "",
-        f"Percent of the measured value; {len(document['families'])} families; static {n['static']['points']} points of"
-        f" {n['static']['propellers']} propellers, forward {n['forward']['points']} of {n['forward']['propellers']}.",
+        f"Percent of the measured value; {len(document['families'])} families in {GROUPS} groups; static"
+        f" {n['static']['points']} points of {n['static']['propellers']} propellers, forward"
+        f" {n['forward']['points']} of {n['forward']['propellers']}.",
         f"Mean log score of held-out families and of each volume: {', '.join(f'{s:.3f}' for s in scores)}.",
         "68 %, 95 %: share of the points inside those intervals; width: median half width of the 68 % interval.",
     ]

@@ -17,7 +17,7 @@ from bemt.base.folders import find_data
 from bemt.base.tables import json_text, write_atomic
 from bemt.rotors.population import population
 from bemt.validate.built import expect, observe
-from bemt.validate.folder import read_folder
+from bemt.validate.folder import read_folders
 from bemt.validate.match import matched
 from bemt.validate.points import J_SHARE, compare, statistics
 from bemt.validate.pool import Pool
@@ -30,7 +30,7 @@ SCHEMA = "bemt.validation/1"
 
 
 def validate(
-    folder: Path,
+    folder: Path | Sequence[Path],
     effects: Sequence[Effect] | None = None,
     fixed_re: float | None = None,
     progress: Callable[[str], None] | None = None,
@@ -41,7 +41,8 @@ def validate(
     from bemt import effects as registry
     from bemt.sections import rule as section_rule
 
-    found = read_folder(folder)
+    folders = [folder] if isinstance(folder, Path) else list(folder)
+    found = read_folders(folders)
     eff = registry.standard() if effects is None else tuple(effects)
     built = not as_drawn and fixed_re is None and {e.id for e in eff} == {e.id for e in registry.standard()}
     rows: list[dict[str, Any]] = []
@@ -70,7 +71,8 @@ def validate(
             shifts.extend([] if fit is None else [fit[0]])
         rows.append(row)
     j0 = np.array([r["J0_bemt"] / r["J0"] - 1.0 for r in rows if r["J0"] and r["J0_bemt"]])
-    doc: dict[str, Any] = {"schema": SCHEMA, "folder": folder.name, "J_share": J_SHARE, **pool.total()}
+    names = " ".join(f.name for f in folders)
+    doc: dict[str, Any] = {"schema": SCHEMA, "folder": names, "J_share": J_SHARE, **pool.total()}
     if built:
         doc["as_drawn"] = drawn.total()
         doc["population"] = dict(population().provenance)

@@ -1,0 +1,88 @@
+"""Many points of a case with bands: solved one by one, their uncertainties interpolated from a fixed lattice.
+
+A band takes some thirty solutions of the rotor; in coefficients it is a smooth function of the inflow angle and of the
+speed. The lattice does not depend on the points, so that neither does a point's band on its neighbours.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.case.propagate import propagate
+
+if TYPE_CHECKING:
+    from bemt.case.load import Case
+    from bemt.dataset import Dataset
+
+__all__ = ["solve"]
+
+Array = NDArray[np.float64]
+
+FEW = 300
+"""Up to so many points each has its band solved for itself."""
+ANGLE_STEP, SPEED_STEP = 0.01, 0.1
+"""Steps of the lattice: inflow angle at 0.75 R without induction [rad], ln(rev/min) [1]. Bands are met within 1 %."""
+_ROW = 1 << 20  # more speeds than there are
+_UNEVEN = 1.6  # largest over smallest band around a cell that is interpolated
+_POWERS = {"thrust_N": 2, "torque_Nm": 2, "power_W": 3, "exhaust_speed_m_s": 1}  # of the speed that bands grow with
+
+
+def solve(case: Case, rpm: Array, airspeed_m_s: Array, density_kg_m3: float | None, bands: bool = True) -> Dataset:
+    """Solve points [rev/min], [m/s], (P,), in one air [kg/m3], with bands and flags."""
+    own = any(item.key.startswith("operating.") for item in case.assumptions)
+    if not bands or own or rpm.size <= FEW:
+        return propagate(case, rpm, airspeed_m_s, density_kg_m3, bands=bands).points
+    per_angle = 0.75 * math.pi * case.diameter_m / 60.0  # V = per_angle rpm tan(angle)
+    x = np.arctan2(airspeed_m_s, per_angle * rpm) / ANGLE_STEP
+    y = np.log(rpm) / SPEED_STEP
+    i, j = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
+    cells, cell = np.unique(i * _ROW + j, return_inverse=True)  # one number a cell
+    nodes, at = np.unique(cells[:, None] + np.array([0, 1, _ROW, _ROW + 1]), return_inverse=True)
+    if nodes.size > rpm.size // 2:  # scattered: nothing is saved
+        return propagate(case, rpm, airspeed_m_s, density_kg_m3).points
+    at = at.reshape(-1, 4)  # nodes of each cell
+    along, speed = np.divmod(nodes, _ROW)
+    n = np.exp(speed * SPEED_STEP)
+    V = per_angle * n * np.tan(along * ANGLE_STEP)
+    around = propagate(case, n, V, density_kg_m3).points
+    found = propagate(case, rpm, airspeed_m_s, density_kg_m3, bands=False).points
+    a, b = x - i, y - j
+    share = np.stack([(1.0 - a) * (1.0 - b), (1.0 - a) * b, a * (1.0 - b), a * b], axis=1)
+    u_by = {origin: {key: _between(key, u, n, rpm, at[cell], share) for key, u in part.items()}
+            for origin, part in around.u_by.items()}  # fmt: skip
+    found = replace(found, u={}, u_by=u_by)
+    rough = np.any([_rough(u / n ** _POWERS.get(key, 0), at) for key, u in around.u.items()], axis=0)
+    rough = np.flatnonzero(rough[cell] | (found.converged & np.isnan(found.u["thrust_N"])))
+    return _exact(case, found, rough, density_kg_m3) if rough.size else found
+
+
+def _between(key: str, u: Array, n: Array, rpm: Array, at: NDArray[np.int64], share: Array) -> Array:
+    """Standard uncertainty of one channel at points: its square over the loads' own scale, linear between the nodes."""
+    power = _POWERS.get(key, 0)
+    return np.asarray(np.sqrt(((u / n**power)[at] ** 2 * share).sum(axis=1)) * rpm**power)
+
+
+def _rough(u: Array, at: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Cells with nodes of which some have no band, or much larger ones than others: efficiency near zero torque."""
+    corners = u[at]
+    missing = np.isnan(corners)
+    uneven = np.fmax.reduce(corners, axis=1) > _UNEVEN * np.fmin.reduce(corners, axis=1)
+    return np.asarray((missing.any(axis=1) & ~missing.all(axis=1)) | (uneven & ~missing.any(axis=1)))
+
+
+def _exact(case: Case, found: Dataset, which: NDArray[np.int64], density_kg_m3: float | None) -> Dataset:
+    """The same, with some points solved with bands of their own."""
+    own = propagate(case, found.rpm[which], found.airspeed_m_s[which], density_kg_m3).points
+    u_by = {origin: {key: u.copy() for key, u in part.items()} for origin, part in found.u_by.items()}
+    for origin, part in own.u_by.items():
+        for key, u in part.items():
+            u_by[origin][key][which] = u
+    flags = list(found.flags)
+    for k, words in zip(which.tolist(), own.flags, strict=True):
+        flags[k] = words
+    return replace(found, u={}, u_by=u_by, flags=tuple(flags))

@@ -1,0 +1,293 @@
+"""One CFD run and the model at its points: loads with both bands, the duct's share, what the audit of the run finds.
+
+No physics is named: one point cannot tell causes apart. `bemt.diagnose` does, from several.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import textwrap
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bemt import __version__
+from bemt.base.errors import Fault, InputError
+from bemt.base.tables import number_text, text_table
+from bemt.case import Case
+from bemt.case.propagate import propagate
+from bemt.dataset import Dataset
+from bemt.recordings.audit import combined
+from bemt.recordings.cfd_run import is_run
+from bemt.recordings.cfd_setup import audit_of, conditions_of, faults_first, floor_note, grid_floor
+from bemt.recordings.channels import named
+
+__all__ = ["SCHEMA", "cfd_points", "compare_run", "text"]
+
+SCHEMA = "bemt.run-comparison/1"
+_LOADS = {"thrust_N": "thrust [N]", "torque_Nm": "torque [N m]", "duct_share": "duct's share"}
+_ROWS = 6  # points on one screen
+_WIDE = 2.0  # combined standard uncertainties within which nothing is shown to differ
+_FAR = 1.5  # ratio of the loads beyond which a slip is likelier than physics
+_NAMES = {"program": "", "cells": "cells", "grid_level": "grid", "turbulence": "", "solver": "", "domain": "domain"}
+
+
+def cfd_points(path: str) -> tuple[Dataset, Dataset]:
+    """Points of a CFD recording, and the file as it was read: a run, or a table of runs such as a campaign's."""
+    from bemt.recordings.load import as_dataset, import_file
+
+    imported = import_file(path)
+    if is_run(imported):
+        return imported, imported
+    if imported.kind == "cfd" and imported.provenance.get("clock") in ("time", "iteration", "none"):
+        hint = (
+            f"`python -m bemt import {path}` says what it needs to be one: --rpm, units, zones; --out run.toml keeps it"
+        )
+        raise InputError(Fault(path, "", "exports of CFD, not yet a run", "a run.toml", hint))
+    points = named(as_dataset(imported))
+    known = points.values.keys() & {"thrust_N", "torque_Nm", "CT", "CQ", "CP"}
+    if not known or ("rpm" not in points and "thrust_N" in points):
+        got = f"channels {', '.join(list(imported.values)[:8])}"
+        raise InputError(
+            Fault(path, "", got, "a speed and a load", "`python -m bemt import` shows how each column was read")
+        )
+    if conditions_of(imported):
+        u = {}
+        flies = np.nan_to_num(points.values.get("airspeed_m_s", np.zeros(len(points)))) > 0.5
+        for k in known:
+            least = np.abs(points[k]) * np.array([grid_floor(k, bool(f)) for f in flies])
+            u[k] = np.fmax(points.u[k], least)
+        points = Dataset("cfd", points.name, points.values, u, (), points.provenance, points.labels, notes=points.notes)
+    return points, imported
+
+
+def compare_run(
+    path: str | os.PathLike[str], case: Case | str | os.PathLike[str], progress: Callable[[str], None] | None = None
+) -> dict[str, Any]:
+    """Put one run and the model of a case side by side.
+
+    Parameters
+    ----------
+    path : str or path
+        run.toml, a folder of exports, or a table of CFD points.
+    case : Case or path
+        Case of the rotor.
+    progress : callable, optional
+        Told what is being solved.
+
+    Returns
+    -------
+    dict
+        ``bemt.run-comparison/1``: ``points`` (each with ``loads``: cfd, u_cfd, bemt, u_bemt by origin, difference,
+        u_both), ``audit``, ``notes``, ``sentence``, ``next``.
+
+    Raises
+    ------
+    InputError
+        If the file is no run, or of another rotor.
+    """
+    name = os.fspath(path)
+    made = case if isinstance(case, Case) else _case(os.fspath(case))
+    points, imported = cfd_points(name)
+    notes = list(points.notes)
+    for channel, words, value in (
+        ("rpm", "rev/min", made.rpm),
+        ("airspeed_m_s", "m/s", made.airspeed_m_s),
+        ("density_kg_m3", "kg/m3", made.air().rho),
+    ):
+        if channel not in points and not (channel == "airspeed_m_s" and "J" in points):
+            notes.append(f"{channel.split('_')[0]}: not stated; {value:.6g} {words} of the case")
+            points = _with(points, channel, float(value))
+    full = points.derive(made.diameter_m)
+    keep = np.any([np.isfinite(full[k]) for k in ("thrust_N", "torque_Nm") if k in full], axis=0)
+    rows = np.flatnonzero(keep & np.isfinite(full["rpm"]))
+    if not rows.size:
+        raise InputError(Fault(name, "", "no point with a speed and a load", "one or more"))
+    step = None if progress is None else (lambda i, n, what: progress(f"{what} ({i}/{n})"))
+    solved = propagate(
+        made, full["rpm"][rows], full["airspeed_m_s"][rows], full["density_kg_m3"][rows], progress=step
+    ).points
+    out = [_point(full, solved, int(i), k) for k, i in enumerate(rows)]
+    lines = []
+    if imported.kind == "cfd" or conditions_of(imported):
+        at = int(rows[0])
+        lines = [*audit_of(imported if len(imported) == len(full) else full, made.diameter_m, _pitch(made), made.ducted,
+                           float(made.air().a_sound), at)]  # fmt: skip
+        if not is_run(imported):
+            flies = full["airspeed_m_s"][rows] > 0.5
+            notes.insert(0, "u of the file, and " + floor_note(bool(flies.any()), bool(flies.all())))
+    known = combined(lines)[1] if lines else math.nan
+    document = {
+        "schema": SCHEMA, "version": __version__, "run": name, "case": made.name,
+        "conditions": {k: ", ".join(v) for k, v in conditions_of(imported).items()}, "points": out,
+        "audit": [asdict(line) for line in faults_first(lines)], "audit_u_relative_known": known,
+        "averaged": dict(imported.provenance.get("averaged", {})), "notes": list(dict.fromkeys(notes)),
+    }  # fmt: skip
+    return document | {
+        "sentence": _sentence(out),
+        "next": _next(document, name, made.path.as_posix() if isinstance(case, Case) else os.fspath(case)),
+    }
+
+
+def _case(name: str) -> Case:
+    from bemt.case import find_cases, load_case
+
+    files = find_cases([name])
+    if len(files) != 1:
+        raise InputError(Fault("--case", "", f"{len(files)} cases", "the case of the rotor"))
+    return load_case(files[0])
+
+
+def _with(d: Dataset, channel: str, value: float) -> Dataset:
+    values = {**d.values, channel: np.full(len(d), value)}
+    return Dataset(d.kind, d.name, values, d.u, d.flags, d.provenance, d.labels, notes=d.notes, units=d.units)
+
+
+def _pitch(case: Case) -> float:
+    from bemt.case.prepare import prepare_case
+
+    return float(prepare_case(case).pitch_m)
+
+
+def _point(cfd: Dataset, bemt: Dataset, i: int, k: int) -> dict[str, Any]:
+    """Loads at one point."""
+    loads: dict[str, Any] = {}
+    for name in ("thrust_N", "torque_Nm"):
+        if name in cfd and math.isfinite(cfd[name][i]):
+            loads[name] = _load(float(cfd[name][i]), float(cfd.u[name][i]), bemt, name, k)
+    if "duct_thrust_N" in cfd and "thrust_N" in loads and "duct_share" in bemt:
+        T, part = loads["thrust_N"]["cfd"], float(cfd["duct_thrust_N"][i])
+        u = float(cfd.u["duct_thrust_N"][i]) / abs(
+            T
+        )  # the total is the rotor's and the duct's: their errors go together
+        loads["duct_share"] = _load(part / T, u, bemt, "duct_share", k)
+    state = {key: float(cfd[key][i]) for key in ("rpm", "airspeed_m_s", "density_kg_m3")}
+    J = state["airspeed_m_s"] / (state["rpm"] / 60.0) if state["rpm"] > 0 else math.nan
+    label = cfd.labels[i] if cfd.labels else ""
+    return {"label": label, **state, "V_over_n_m": J, "loads": loads, "flags": list(bemt.flags[k])}
+
+
+def _load(value: float, u: float, bemt: Dataset, name: str, k: int) -> dict[str, Any]:
+    ours, band = float(bemt[name][k]), float(bemt.u[name][k])
+    both = math.hypot(u if math.isfinite(u) else 0.0, band)
+    parts = {origin: float(part[name][k]) for origin, part in bemt.u_by.items() if name in part}
+    return {
+        "cfd": value, "u_cfd": u, "bemt": ours, "u_bemt": band, "u_bemt_by": parts, "difference": ours - value,
+        "u_both": both, "verdict": _verdict(ours - value, both),
+    }  # fmt: skip
+
+
+def _verdict(E: float, u: float) -> str:
+    if not (math.isfinite(E) and math.isfinite(u)):
+        return "no result"
+    return "agrees" if abs(E) <= u else "within 2 u" if abs(E) <= _WIDE * u else "differs"
+
+
+def _percent(load: Mapping[str, Any]) -> str:
+    return f"{100.0 * load['difference'] / load['cfd']:+.0f} %" if load["cfd"] else "-"
+
+
+def _sentence(points: list[dict[str, Any]]) -> str:
+    every = [(k, load) for p in points for k, load in p["loads"].items()]
+    off = [(k, load) for k, load in every if load["verdict"] == "differs"]
+    near = [(k, load) for k, load in every if load["verdict"] == "within 2 u"]
+    lost = sum(load["verdict"] == "no result" for _, load in every)
+    tail = f" {lost} values have no result." if lost else ""
+    if off:
+        k, load = max(off, key=lambda x: abs(x[1]["difference"]) / x[1]["u_both"])
+        times = abs(load["difference"]) / load["u_both"]
+        count = f" in {len(off)} of {len(every)} values" if len(every) > 1 else ""
+        word = _LOADS[k].split(" [")[0]
+        ratio = abs(load["bemt"] / load["cfd"]) if load["cfd"] else math.inf
+        tail += " First check unit, sector, zones and speed." if not 1.0 / _FAR < ratio < _FAR else ""
+        size = f"{word} of BEMT is {_percent(load)}, {times:.1f} times both bands together"
+        return f"CFD and BEMT differ{count}: {size}.{tail}"
+    words = "within twice both bands" if near else "within both bands"
+    return f"CFD and BEMT agree {words}.{tail}"
+
+
+def _next(document: Mapping[str, Any], name: str, case: str) -> str:
+    """What would tell more."""
+    topics = {line["topic"] for line in document["audit"] if line["status"] in ("fault", "not stated")}
+    steps = []
+    if "grid study" in topics:
+        steps.append("the same point on a finer grid (cells x 2 or more): its change is the u of the grid")
+    readings = sum(len([k for k in p["loads"] if k != "duct_share"]) for p in document["points"])
+    if readings < 3:
+        steps.append("two more speeds or airspeeds: one point fits any cause; then "
+                     f"`python -m bemt diagnose {name} OTHER_RUNS --case {case}`")  # fmt: skip
+    else:
+        steps.append(
+            f"`python -m bemt diagnose {name} --case {case}` names what fits all points, or says that it cannot"
+        )
+    return "; ".join(steps)
+
+
+def text(document: Mapping[str, Any], details: bool = False) -> str:
+    """Lay a comparison out on one screen.
+
+    Parameters
+    ----------
+    document : mapping
+        Of :func:`compare_run`.
+    details : bool
+        All points, notes and settings.
+
+    Returns
+    -------
+    str
+        Lines of at most 120 characters, where names allow it.
+    """
+    told = document["conditions"]
+    set_up = [f"{told[k]}{' ' + word if word else ''}" for k, word in _NAMES.items() if k in told]
+    set_up += [{"yes": "steady", "no": "transient"}[told["steady"]]] if told.get("steady") in ("yes", "no") else []
+    lines = [
+        document["sentence"],
+        "",
+        f"{Path(document['run']).name} ({', '.join(set_up) or 'set-up not stated'}) and case {document['case']}",
+    ]
+    shown = document["points"] if details else document["points"][:_ROWS]
+    rows = []
+    for p in shown:
+        head = [number_text(p["rpm"], 6), number_text(p["airspeed_m_s"], 4)]
+        for name, load in p["loads"].items():
+            times = abs(load["difference"]) / load["u_both"] if load["u_both"] else math.nan
+            rows.append([
+                *head, _LOADS[name], _pm(load["cfd"], load["u_cfd"]), _pm(load["bemt"], load["u_bemt"]),
+                f"{number_text(load['difference'], 3)} ({_percent(load)})", number_text(times, 2), load["verdict"],
+            ])  # fmt: skip
+            head = ["", ""]
+    lines.append(text_table(["rev/min", "V [m/s]", "", "CFD", "BEMT", "BEMT - CFD", "in u", ""], rows, (2, 7), "  "))
+    if len(shown) < len(document["points"]):
+        lines.append(f"  ... {len(document['points']) - len(shown)} more points (--details)")
+    first = next(iter(document["points"][0]["loads"].values()))
+    parts = ", ".join(f"{k} {number_text(v, 2)}" for k, v in first["u_bemt_by"].items())
+    lines.append(f'  ± one standard uncertainty; BEMT\'s, first line: {parts}; "in u": over both bands together')
+    for over in dict.fromkeys(document["averaged"].values()):
+        lines.append(f"  averaged: {', '.join(k for k, v in document['averaged'].items() if v == over)}: {over}")
+    if document["audit"]:
+        lines += ["", "Audit of the CFD run"]
+        for line in document["audit"] if details else document["audit"][:7]:
+            words = f"{line['topic']}: {line['finding']}" + (f": {line['consequence']}" if line["consequence"] else "")
+            lead = f"  {line['status']:11s}"
+            lines.append(_filled(words, lead, " " * len(lead)))
+    notes = [n for n in document["notes"]] if details else document["notes"][:4]
+    flags = dict.fromkeys(f for p in document["points"] for f in p["flags"])
+    said = [*(f"! {n}" for n in notes), *(f"! BEMT: {f}" for f in (flags if details else list(flags)[:2]))]
+    said.append("No cause is named from one point." if len(document["points"]) == 1 else "No cause is named here.")
+    lines += ["", *map(_filled, [*said, f"Next: {document['next']}"])]
+    return "\n".join(lines)
+
+
+def _filled(words: str, lead: str = "", indent: str = "  ") -> str:
+    return textwrap.fill(
+        words, 120, initial_indent=lead, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
+    )
+
+
+def _pm(value: float, u: float) -> str:
+    return number_text(value, 4) + (f" ± {number_text(u, 2)}" if math.isfinite(u) else " ± ?")

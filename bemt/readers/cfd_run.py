@@ -1,0 +1,171 @@
+"""``run.toml``: the files of one CFD run, and what they do not say of themselves.
+
+``bemt import FILES --out run.toml`` writes it; every command takes it in place of the files. A reader that is given one
+returns the checked document; `bemt.recordings.cfd_run` makes the points of it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, Literal
+
+from bemt.base.toml import Table, entry, read_model
+from bemt.readers import head_text
+from bemt.readers._cfd import unit_of
+
+__all__ = [
+    "KIND",
+    "QUANTITIES",
+    "ReferenceTable",
+    "RunColumn",
+    "RunColumns",
+    "RunHead",
+    "RunToml",
+    "SetupTable",
+    "toml_text",
+]
+
+KIND = "cfd_run"
+QUANTITIES: dict[str, tuple[str, str]] = {
+    "thrust": ("force", "N"), "duct_thrust": ("force", "N"), "torque": ("torque", "N m"), "power": ("power", "W"),
+    "rpm": ("angular_speed", "rpm"), "airspeed": ("speed", "m/s"), "density": ("density", "kg/m3"),
+}  # fmt: skip
+"""What a column of a run may be: dimension, usual unit."""
+
+
+class RunColumn(Table):
+    """[columns]: where a quantity stands, its unit and sign."""
+
+    column: str | None = entry("heading in the files; found by its words if omitted")
+    unit: str | None = entry("unit, if the file states none", words='a unit such as "N", "lbf", "N m", "rev/min"')
+    sign: int | None = entry(
+        "factor on every value; turned to positive, and said, if omitted", "", -1, 1, lambda v: "" if v else "1 or -1",
+        words="1 or -1",
+    )  # fmt: skip
+
+    def rules(self) -> Iterable[tuple[str, ...]]:
+        """A unit that is known."""
+        if self.unit is not None and unit_of(self.unit) is None:
+            yield "unit", repr(self.unit), "a known unit", "As in N, kN, lbf, N m, N mm, lbf in, rpm, rad/s, m/s, kg/m3"
+
+
+class RunColumns(Table):
+    """[columns]: the quantities of the run."""
+
+    thrust: RunColumn | None = entry("thrust of all that is on the mount")
+    duct_thrust: RunColumn | None = entry("part of the thrust that the duct carries")
+    torque: RunColumn | None = entry("shaft torque")
+    power: RunColumn | None = entry("shaft power")
+    rpm: RunColumn | None = entry("speed of rotation")
+    airspeed: RunColumn | None = entry("speed of flight")
+    density: RunColumn | None = entry("density of the fluid")
+
+    def rules(self) -> Iterable[tuple[str, ...]]:
+        """Units of the right dimension."""
+        for name, column in self.given().items():
+            unit = unit_of(column.unit) if column is not None and column.unit else None
+            dimension, usual = QUANTITIES[name]
+            if unit is not None and unit.dimension != dimension:
+                hint = f"{unit.suffix} is a mass: write {unit.suffix}f" if unit.dimension == "mass" else ""
+                yield (
+                    f"{name}.unit",
+                    repr(column.unit),
+                    f"a unit of {dimension.replace('_', ' ')} such as {usual}",
+                    hint,
+                )
+
+
+class RunHead(Table):
+    """[run]: files and operating point."""
+
+    files: tuple[str, ...] = entry("exports of the run, relative to this file", required=True)
+    rpm: float | None = entry("speed of rotation, if no column has it", "rev/min", 1.0, 1e6)
+    airspeed_m_s: float | None = entry("speed of flight", "m/s", 0.0, 400.0)
+    density_kg_m3: float | None = entry("density of the fluid", "kg/m3", 0.01, 1100.0)
+    revolutions: int | None = entry(
+        "last revolutions to average; 4, or half of the run, if omitted", low=1, high=100_000
+    )
+    sector: int | None = entry("the model is one of so many equal sectors: loads are multiplied", low=1, high=100)
+    axis: Literal["x", "y", "z"] | None = entry("axis of the shaft; the largest force if omitted")
+    zones: tuple[str, ...] | None = entry("zones whose loads count, duct included")
+    duct_zones: tuple[str, ...] | None = entry("those of the zones that are the duct; by their names if omitted")
+
+
+class ReferenceTable(Table):
+    """[reference]: what force and moment coefficients rest on."""
+
+    area_m2: float | None = entry("area", "m2", 1e-8, 1e6)
+    length_m: float | None = entry("length of moments", "m", 1e-6, 1e4)
+    speed_m_s: float | None = entry("speed", "m/s", 1e-3, 2000.0)
+    density_kg_m3: float | None = entry("density", "kg/m3", 0.01, 1100.0)
+
+
+class SetupTable(Table):
+    """[setup]: how the run was computed; no load depends on it, only gci_pct sets an uncertainty."""
+
+    program: str | None = entry("program")
+    solver: str | None = entry("solver")
+    turbulence: str | None = entry("turbulence model")
+    steady: bool | None = entry("true: frozen rotor; false: the mesh turns")
+    compressible: bool | None = entry("whether the density followed the pressure")
+    grid_level: str | None = entry("name of the grid")
+    cells: float | None = entry("cells of the grid", low=10, high=1e12)
+    grids: int | None = entry("grids of the grid study; 0 or 1 is none", low=0, high=20)
+    gci_pct: float | None = entry("grid convergence index of the thrust", "%", 0.0, 200.0)
+    domain_over_D: float | None = entry("diameter of the domain over that of the disk", low=0.5, high=1000)
+    wall: Literal["function", "scalable", "automatic", "resolved"] | None = entry("wall treatment")
+    y_plus: float | None = entry("mean distance of the first cell in wall units", low=0.0, high=1e5)
+
+
+class RunToml(Table):
+    """run.toml: one CFD run."""
+
+    run: RunHead
+    columns: RunColumns = RunColumns()
+    reference: ReferenceTable = ReferenceTable()
+    setup: SetupTable = SetupTable()
+
+
+def sniff(head: bytes | str) -> bool:
+    r"""Tell whether a text has the table of a run. [run]
+
+    >>> sniff('[run]\nfiles = ["thrust.out"]\n'), sniff("[recording]\n")
+    (True, False)
+    """
+    return any(line.split("#")[0].strip() == "[run]" for line in head_text(head).splitlines())
+
+
+def read(path: str | os.PathLike[str]) -> RunToml:
+    """Read a run.toml; its files are not opened."""
+    return read_model(RunToml, Path(path))
+
+
+def toml_text(run: RunToml, comment: str = "") -> str:
+    """Write a run as TOML.
+
+    >>> print(toml_text(RunToml(run=RunHead(files=("t.out",), rpm=6000.0))).strip())
+    [run]
+    files = ["t.out"]
+    rpm = 6000.0
+    """
+    blocks = [f"# {line}" for line in comment.splitlines()]
+    for name, table in run.given().items():
+        lines = []
+        for key, value in table.given().items():
+            if isinstance(value, Table):
+                inner = ", ".join(f"{k} = {_value(v)}" for k, v in value.given().items() if v is not None)
+                lines.append(f"{key} = {{ {inner} }}")
+            elif value is not None:
+                lines.append(f"{key} = {_value(value)}")
+        if lines:
+            blocks += ["", f"[{name}]", *lines]
+    return "\n".join(blocks).lstrip("\n") + "\n"
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, tuple):
+        return "[" + ", ".join(map(_value, value)) + "]"
+    return json.dumps(value, ensure_ascii=False) if isinstance(value, (str, bool)) else repr(value)

@@ -1,0 +1,163 @@
+"""A run of CFD from what a user types: units, signs, zones and set-up of the options become a `RunToml`."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from bemt.base.errors import Fault, InputError
+from bemt.base.tables import write_atomic
+from bemt.base.toml import validated
+from bemt.base.toml_text import Collector
+from bemt.readers._cfd import unit_of
+from bemt.readers.cfd_run import QUANTITIES, ReferenceTable, RunToml, SetupTable, toml_text
+from bemt.recordings.cfd_run import DUCT
+
+__all__ = ["run_from", "write_run"]
+
+_REFERENCE = {re.sub(r"_(m2|m|m_s|kg_m3)$", "", k): k for k in ReferenceTable.model_fields}
+_LOADS = ("thrust", "duct_thrust", "torque", "power")
+_WORDS = {"true": True, "yes": True, "false": False, "no": False}
+
+
+def _pairs(option: str, given: Iterable[str], faults: list[Fault]) -> dict[str, str]:
+    out: dict[str, str] = {}
+    for text in given:
+        name, mark, value = text.partition("=")
+        if not mark or not name.strip() or not value.strip():
+            faults.append(
+                Fault("", option, text, "NAME=VALUE", f"As in {option} thrust=N" if option == "--unit" else "")
+            )
+        elif name.strip() in out:
+            faults.append(Fault("", option, f"{name.strip()} twice", "each once"))
+        else:
+            out[name.strip()] = value.strip()
+    return out
+
+
+def _quantity(name: str, unit: str) -> str | None:
+    """Quantity of a column by the dimension of its unit."""
+    if name in QUANTITIES:
+        return name
+    known = unit_of(unit)
+    dimension = "" if known is None else known.dimension
+    found = [q for q, (own, _) in QUANTITIES.items() if own == dimension]
+    return ("duct_thrust" if DUCT.search(name) else "thrust") if dimension == "force" else found[0] if found else None
+
+
+def run_from(
+    files: Sequence[str], *, rpm: float | None = None, airspeed_m_s: float | None = None,
+    density_kg_m3: float | None = None, revolutions: int | None = None, sector: int | None = None,
+    axis: str | None = None,
+    zones: Sequence[str] = (), unit: Sequence[str] = (), column: Sequence[str] = (), sign: Sequence[str] = (),
+    reference: Sequence[str] = (), setup: Sequence[str] = (),
+) -> RunToml:  # fmt: skip
+    """Make a run of options; all their faults at once.
+
+    >>> run = run_from(["a.out"], rpm=6000, unit=["thrust=N", "report-def-0=N m"], sign=["torque=-1"])
+    >>> run.columns.thrust.unit, run.columns.torque
+    ('N', RunColumn(column='report-def-0', unit='N m', sign=-1))
+    """
+    faults: list[Fault] = []
+    columns: dict[str, dict[str, Any]] = {}
+    several: dict[str, list[str]] = {}
+    for name, text in _pairs("--unit", unit, faults).items():
+        quantity = _quantity(name, text)
+        if quantity is None or unit_of(text) is None:
+            usual = ", ".join(dict.fromkeys(u for _, u in QUANTITIES.values()))
+            faults.append(Fault("", "--unit", f"{name}={text}", f"a unit of a load or a speed, such as {usual}"))
+            continue
+        columns.setdefault(quantity, {})["unit"] = text
+        if name not in QUANTITIES:
+            several.setdefault(quantity, []).append(name)
+    for quantity, names in several.items():
+        if len(names) == 1:
+            columns[quantity]["column"] = names[0]
+        else:
+            zones = [*zones, *names]
+    for name, text in _pairs("--column", column, faults).items():
+        if name not in QUANTITIES:
+            faults.append(Fault("", "--column", name, f"one of {', '.join(QUANTITIES)}", "As in --column thrust=NAME"))
+        else:
+            columns.setdefault(name, {})["column"] = text
+    by_column = {c["column"]: q for q, c in columns.items() if "column" in c}
+    for text in sign:
+        name, mark, value = text.rpartition("=")
+        if value.lstrip("+") not in ("1", "-1") or (mark and not name):
+            faults.append(Fault("", "--sign", text, "NAME=-1, NAME=1, or -1 for all loads"))
+            continue
+        quantity = by_column.get(name, name)
+        if mark and quantity not in QUANTITIES:
+            faults.append(
+                Fault("", "--sign", name, f"one of {', '.join(_LOADS)}, or a column named by --unit or --column")
+            )
+            continue
+        for q in (quantity,) if mark else _LOADS[:1] + _LOADS[2:]:
+            columns.setdefault(q, {})["sign"] = int(value)
+    head = {"files": tuple(files), "rpm": rpm, "airspeed_m_s": airspeed_m_s, "density_kg_m3": density_kg_m3,
+            "revolutions": revolutions, "sector": sector, "axis": axis,
+            "zones": tuple(_split(zones)) or None}  # fmt: skip
+    document = {
+        "run": {k: v for k, v in head.items() if v is not None}, "columns": columns,
+        "reference": _numbers(reference, faults), "setup": _setup(setup, faults),
+    }  # fmt: skip
+    out = Collector("")
+    made = validated(RunToml, document, out)
+    faults += [Fault("", _option(f.where), f.got, f.expected, f.hint) for f in out.faults]
+    if faults or made is None:
+        raise InputError(faults)
+    return made
+
+
+def _option(where: str) -> str:
+    if where.startswith("columns."):
+        return f"--{where.rsplit('.', 1)[1]} {where.split('.')[1]}"
+    return "--" + where.removeprefix("run.").split(".")[0].replace("_m_s", "").replace("_kg_m3", "").replace("_", "-")
+
+
+def _split(texts: Sequence[str]) -> list[str]:
+    return [part.strip() for text in texts for part in text.split(",") if part.strip()]
+
+
+def _numbers(texts: Sequence[str], faults: list[Fault]) -> dict[str, Any]:
+    out: dict[str, Any] = {}
+    for name, text in _pairs("--reference", _split(texts), faults).items():
+        key = _REFERENCE.get(name, name)
+        try:
+            out[key] = float(text)
+        except ValueError:
+            faults.append(Fault("", "--reference", f"{name}={text}", f"a number for one of {', '.join(_REFERENCE)}"))
+    return out
+
+
+def _setup(texts: Sequence[str], faults: list[Fault]) -> dict[str, Any]:
+    out: dict[str, Any] = {}
+    for name, text in _pairs("--setup", texts, faults).items():
+        kind = SetupTable.model_fields.get(name)
+        value: Any = text
+        if kind is not None and "str" not in str(kind.annotation) and "Literal" not in str(kind.annotation):
+            try:
+                value = _WORDS[text.lower()] if text.lower() in _WORDS else float(text)
+            except ValueError:
+                value = text
+        out[name] = value
+    return out
+
+
+def write_run(run: RunToml, out: str) -> Path:
+    """Write ``run.toml``; its files are named relative to it."""
+    path = Path(out)
+    path = path if path.suffix == ".toml" else path / "run.toml"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    files = tuple(Path(os.path.relpath(f, path.parent)).as_posix() for f in run.run.files)
+    document: Mapping[str, Any] = run.model_dump(exclude_unset=True) | {
+        "run": run.run.model_dump(exclude_unset=True) | {"files": files}
+    }
+    text = toml_text(
+        RunToml.model_validate(document), "One CFD run, written by bemt import. Give this file in place of the exports."
+    )
+    write_atomic(path, text)
+    return path

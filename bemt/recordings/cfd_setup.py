@@ -1,0 +1,268 @@
+"""How a CFD run was computed: its conditions, what a grid is worth at least, and the audit of any CFD recording."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bemt.base.tables import number_text
+from bemt.dataset import Dataset
+from bemt.readers.references import Reference
+from bemt.recordings.audit import AuditLine, CfdFacts, audit
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = [
+    "CONDITIONS", "GRID_FLOOR", "GRID_FLOOR_SOURCE", "audit_of", "conditions_of", "conditions_that_differ",
+    "faults_first", "floor_note", "grid_floor", "grid_that_differs", "references_of", "remark_of", "with_grid_floor",
+]  # fmt: skip
+
+CONDITIONS = (
+    "grid_level", "cells", "program", "solver", "gas", "turbulence", "domain", "domain_over_D", "sector", "steady",
+    "compressible", "wall", "y_plus",
+)  # fmt: skip
+"""What a CFD number depends on besides the physics; the grid first."""
+_GRID = ("grid_level", "cells")
+_ALIAS = {"level": "grid_level", "grid": "grid_level", "mesh": "grid_level", "grid level": "grid_level"}
+_LIKE_CELLS, _LIKE_SIZE = 0.02, 0.02
+GRID_FLOOR: Mapping[str, Mapping[str, float]] = {
+    "rest": {"thrust_N": 0.057, "torque_Nm": 0.080},
+    "flight": {"thrust_N": 0.100, "torque_Nm": 0.082},
+}
+"""Least standard uncertainty of a load on a grid without a grid study, share of it [1].
+
+Root mean square of the change from one grid to the next in our own runs (``reports/cfd``: no observed order,
+so nothing smaller can be claimed): at rest ten pairs of neighbouring grids, 35,000 to 494,000 cells (``prop_8x5_grid``,
+``prop_8x5_rest``, ``prop_8x5_zone``, ``ds30_spinner``, ``ds30_vanes``); in flight the one pair there is
+(``prop_8x5_zone``, J 0.4: 16.64 and 14.97 N, 0.342 and 0.314 N m). ``tests/test_cfd_runs.py`` recomputes them."""
+GRID_FLOOR_SOURCE = "own runs, reports/cfd: rms change from one grid to the next"
+
+
+def grid_floor(channel: str, in_flight: bool) -> float:
+    """Least standard uncertainty of a load by its grid, without a grid study. [1]
+
+    >>> grid_floor("thrust_N", False), grid_floor("CQ", True)
+    (0.057, 0.082)
+    """
+    thrust = channel in ("thrust_N", "duct_thrust_N", "CT")
+    return GRID_FLOOR["flight" if in_flight else "rest"]["thrust_N" if thrust else "torque_Nm"]
+
+
+def _flies(d: Dataset) -> NDArray[np.bool_]:
+    """Rows with an airspeed."""
+    V, J = d.values.get("airspeed_m_s"), d.values.get("J")
+    out = np.zeros(len(d), dtype=bool)
+    if V is not None:
+        out |= np.nan_to_num(V) > 0.5
+    if J is not None:
+        out |= np.nan_to_num(J) > 0.02
+    return out
+
+
+def with_grid_floor(d: Dataset, u_grid: float = math.nan) -> Dataset:
+    """Loads of CFD with what their grid is worth: a stated uncertainty [1], else the floor; the note says which."""
+    random = {k: v.copy() for k, v in d.u.items() if np.isfinite(v).any()}
+    numerics: dict[str, Any] = {}
+    flies = _flies(d)
+    for name in ("thrust_N", "duct_thrust_N", "torque_Nm", "power_W", "CT", "CQ", "CP"):
+        if name in d:
+            least = np.array([grid_floor(name, bool(f)) for f in flies])
+            numerics[name] = np.abs(d[name]) * (least if math.isnan(u_grid) else u_grid)
+    parts = {"random": {k: np.nan_to_num(v) for k, v in random.items() if k in numerics}, "numerics": numerics}
+    note = (
+        floor_note(bool(flies.any()), bool(flies.all()))
+        if math.isnan(u_grid)
+        else f"u of the grid {u_grid:.2%}, as stated"
+    )
+    kept = {k: v for k, v in random.items() if k not in numerics}
+    return Dataset(d.kind, d.name, d.values, kept, d.flags, d.provenance, d.labels, parts, (note, *d.notes), d.units,
+                   d.lines, d.texts)  # fmt: skip
+
+
+def floor_note(some_fly: bool, all_fly: bool) -> str:
+    """What a run without a grid study is told."""
+    states = [s for s, wanted in (("rest", not all_fly), ("flight", some_fly)) if wanted]
+    words = "; ".join(f"in {s}" if s == "flight" else "at rest" for s in states)
+    sizes = "; ".join(
+        f"thrust {GRID_FLOOR[s]['thrust_N']:.1%}, torque {GRID_FLOOR[s]['torque_Nm']:.1%}" for s in states
+    )
+    return f"no grid study: at least {sizes} ({words}; {GRID_FLOOR_SOURCE})"
+
+
+def conditions_of(d: Dataset) -> dict[str, tuple[str, ...]]:
+    """Conditions of a CFD recording as texts, each with all values that its rows have; {} where none is stated."""
+    out: dict[str, tuple[str, ...]] = {}
+    stated: Mapping[str, Any] = d.provenance.get("conditions", {})
+    for name, value in stated.items():
+        if name in CONDITIONS and value not in (None, "") and value == value:
+            out[name] = (_text(value),)
+    for name, cells in d.texts.items():
+        key = _ALIAS.get(name.lower(), name.lower())
+        if key in CONDITIONS and (found := sorted({c.strip() for c in cells if c.strip()})):
+            out.setdefault(key, tuple(found))
+    for name, values in d.values.items():
+        key = _ALIAS.get(name.lower(), name.lower())
+        if key in CONDITIONS and np.isfinite(values).any():
+            out.setdefault(key, tuple(_text(v) for v in np.unique(values[np.isfinite(values)])))
+    return out
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, (int, float, np.floating)):
+        number = float(value)
+        return f"{number:,.0f}" if abs(number) >= 1e4 else f"{number:g}"
+    return str(value)
+
+
+def conditions_that_differ(a: Dataset, b: Dataset) -> dict[str, tuple[str, str]]:
+    """Conditions that both recordings state and that are not the same: name to the two, in the order of importance.
+
+    >>> one = Dataset("cfd", "a", {"thrust_N": [1.0]}, provenance={"conditions": {"cells": 1e6, "solver": "SST"}})
+    >>> two = Dataset("cfd", "b", {"thrust_N": [1.1]}, provenance={"conditions": {"cells": 2e6, "solver": "SST"}})
+    >>> conditions_that_differ(one, two)
+    {'cells': ('1,000,000', '2,000,000')}
+    """
+    first, second = conditions_of(a), conditions_of(b)
+    out = {}
+    for name in CONDITIONS:
+        if name in first and name in second and not _alike(name, first[name], second[name]):
+            out[name] = (_few(first[name]), _few(second[name]))
+    return out
+
+
+def _alike(name: str, a: tuple[str, ...], b: tuple[str, ...]) -> bool:
+    if set(a) == set(b):
+        return True
+    if name in ("cells", "y_plus", "domain_over_D") and len(a) == len(b) == 1:
+        x, y = (float(v[0].replace(",", "")) for v in (a, b))
+        return abs(x - y) <= _LIKE_CELLS * max(abs(x), abs(y))
+    return False
+
+
+def _few(values: tuple[str, ...]) -> str:
+    return ", ".join(values[:4]) + (", ..." if len(values) > 4 else "")
+
+
+def grid_that_differs(a: Dataset, b: Dataset) -> str:
+    """What of the grid is not the same in two recordings, as a sentence; empty where nothing is.
+
+    Before any physics: on another grid the same flow gives other loads.
+    """
+    differ = {k: v for k, v in conditions_that_differ(a, b).items() if k in _GRID}
+    levels = [conditions_of(d).get("grid_level") for d in (a, b)]
+    if not differ or (all(levels) and "grid_level" not in differ):  # on one level another geometry has other cells
+        return ""
+    words = {"grid_level": "level", "cells": "cells"}
+    return "the grid differs: " + "; ".join(f"{words[k]} {one} and {two}" for k, (one, two) in differ.items())
+
+
+_WALLS = {"kOmegaSST": "k-omega SST", "realizableKE": "realizable k-epsilon"}
+_FAR = {"free": 5.0, "pipe": 1.0}  # Domain of our own campaigns over the disk, diameters [1] (reports/cfd)
+
+
+def _one(d: Dataset, name: str, row: int) -> Any:
+    """A condition of one row, by any of its names; None where it is not stated."""
+    for key in (name, *(k for k, v in _ALIAS.items() if v == name)):
+        if key in d.texts and d.texts[key][row].strip():
+            return d.texts[key][row].strip()
+        if key in d and math.isfinite(d[key][row]):
+            return float(d[key][row])
+    return d.provenance.get("conditions", {}).get(name)
+
+
+def audit_of(
+    d: Dataset, diameter_m: float, pitch_m: float, ducted: bool, a_sound: float, row: int = 0
+) -> tuple[AuditLine, ...]:
+    """Audit of one row of a CFD recording: a run of anybody, or a campaign of our own."""
+
+    def get(name: str) -> Any:
+        return _one(d, name, row)
+
+    rpm = float(d["rpm"][row]) if "rpm" in d else math.nan
+    n, V = rpm / 60.0, _number(get("airspeed_m_s"), 0.0)
+    thrust, rho = _number(get("thrust_N")), _number(get("density_kg_m3"), 1.225)
+    solver, own = get("solver"), "balance_mass" in d
+    compressible = get("compressible")
+    if compressible is None and isinstance(solver, str):
+        compressible = {"compressible": True, "incompressible": False}.get(solver)
+    domain = get("domain_over_D")
+    turbulence = str(get("turbulence") or "")
+    facts = CfdFacts(
+        M_tip=math.pi * n * diameter_m / a_sound, J=V / (n * diameter_m) if n > 0 else 0.0,
+        pitch_over_D=pitch_m / diameter_m, CT=thrust / (rho * n**2 * diameter_m**4) if n > 0 else math.nan,
+        domain_over_D=_number(domain) if domain is not None else _FAR.get(str(get("domain")), math.nan),
+        compressible=None if compressible is None else bool(compressible),
+        grids=_whole(get("grids"), 0 if own else None), u_grid=_number(get("u_grid")), cells=_number(get("cells")),
+        drift=_number(get("drift_thrust")), wall=str(get("wall") or ("function" if own else "")),
+        y_plus=_number(get("y_plus"), _number(get("yplus_avg"))), turbulence=_WALLS.get(turbulence, turbulence),
+        thrust_from="forces" if own or get("thrust_from") == "forces" else "",
+        steady_mrf=True if own else get("steady"), skew_deg=_number(get("sideslip_deg"), 0.0),
+        mass_balance=_number(get("balance_mass")), momentum_balance=_number(get("balance_momentum")), ducted=ducted,
+    )  # fmt: skip
+    return audit(facts)
+
+
+def remark_of(conditions: Mapping[str, Any]) -> str:
+    """Set-up of a run in the set phrases that the audit of references reads.
+
+    >>> remark_of({"steady": True, "turbulence": "k-omega SST", "cells": 2e6, "drift_thrust": 0.004})
+    'MRF; k-omega SST; 2000000 cells; drift 0.4 %; forces integrated'
+    """
+    walls = {
+        "function": "wall functions",
+        "scalable": "scalable wall functions",
+        "automatic": "automatic wall functions",
+    }
+    steady, compressible = conditions.get("steady"), conditions.get("compressible")
+    known: list[tuple[Any, str]] = [
+        (conditions.get("program"), "{}"),
+        ({True: "MRF", False: "sliding mesh"}.get(steady) if steady is not None else None, "{}"),
+        (conditions.get("turbulence"), "{}"), (walls.get(str(conditions.get("wall"))), "{}"),
+        ({True: "compressible", False: "incompressible"}.get(compressible) if compressible is not None else None, "{}"),
+        (conditions.get("domain_over_D"), "domain {:g} D"), (conditions.get("y_plus"), "y+ {:g}"),
+        (conditions.get("cells"), "{:.0f} cells"),
+        ("no grid study" if conditions.get("grids", 2) < 2 and "u_grid" not in conditions else None, "{}"),
+        (100.0 * conditions["u_grid"] if "u_grid" in conditions else None, "u_grid {:.3g} %"),
+        (100.0 * abs(conditions["drift_thrust"]) if "drift_thrust" in conditions else None, "drift {:.3g} %"),
+        ("forces integrated" if conditions.get("thrust_from", "forces") == "forces" else None, "{}"),
+    ]  # fmt: skip
+    return "; ".join(form.format(value) for value, form in known if value is not None)
+
+
+def references_of(run: Dataset, where: str) -> list[Reference]:
+    """Points of a run as recorded values of a case: thrust, torque, the duct's part."""
+    out = []
+    remark = remark_of(run.provenance.get("conditions", {}))
+    loads = (("thrust", "thrust_N", "N"), ("torque", "torque_Nm", "N m"), ("duct_thrust", "duct_thrust_N", "N"))
+    sha256 = str(run.provenance.get("sha256", ""))
+    for quantity, channel, unit in (*loads, ("CT", "CT", "-"), ("CQ", "CQ", "-")):
+        for i in range(len(run) if channel in run else 0):
+            value = float(run[channel][i])
+            if not math.isfinite(value):
+                continue
+            state = {k: float(run[k][i]) for k in ("rpm", "airspeed_m_s", "density_kg_m3") if k in run}
+            out.append(Reference(
+                quantity, value, float(run.u[channel][i]), channel, "cfd", run.name, remark,
+                f"{number_text(value, 4)} {unit}", where=f"{where}:{i + 1}", sha256=sha256, **state,
+            ))  # fmt: skip
+    return out
+
+
+def _number(value: Any, other: float = math.nan) -> float:
+    return float(value) if isinstance(value, (int, float, np.floating)) and math.isfinite(value) else other
+
+
+def _whole(value: Any, other: int | None) -> int | None:
+    return int(value) if isinstance(value, (int, float)) and math.isfinite(value) else other
+
+
+def faults_first(lines: Iterable[AuditLine]) -> list[AuditLine]:
+    """What an audit finds, the worst first; settings that are fine are left out."""
+    order = ("fault", "doubtful", "not stated")
+    return sorted((x for x in lines if x.status in order), key=lambda x: order.index(x.status))

@@ -1,0 +1,513 @@
+"""The promise of a CFD run: whatever program wrote its files, they become one recording that every command takes."""
+# ruff: noqa: E501 - samples as they look in files
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bemt.base.errors import InputError
+from bemt.commands.cli import main
+from bemt.readers.cfd_run import RunToml, toml_text
+from bemt.recordings.cfd_run import assemble
+from bemt.recordings.cfd_setup import GRID_FLOOR, conditions_that_differ, grid_floor
+
+T, Q, RPM = 3.8, 0.062, 8000.0
+"""Thrust [N], torque [N m] and speed of every run made here."""
+PERIOD = 60.0 / RPM
+
+
+def times(turns: float = 8.0, per_turn: int = 60) -> np.ndarray:
+    return PERIOD / per_turn * np.arange(1, int(turns * per_turn) + 1)
+
+
+def course(t: np.ndarray, mean: float) -> np.ndarray:
+    """A start-up that dies out, and a ripple of the blade passage."""
+    return mean * (1.0 + 0.04 * np.sin(4 * math.pi * t / PERIOD) + 3.0 * np.exp(-t / (0.12 * PERIOD)))
+
+
+def rfile(name: str, values: np.ndarray, t: np.ndarray | None) -> str:
+    clock = "Time Step" if t is not None else "Iteration"
+    names = f'"{clock}" "{name}"' + (' "flow-time"' if t is not None else "")
+    rows = [f"{k} {v:.7g}" + (f" {t[k - 1]:.7g}" if t is not None else "") for k, v in enumerate(values, 1)]
+    return f'"{name}-rfile"\n"{clock}" "{name} etc.."\n({names})\n' + "\n".join(rows) + "\n"
+
+
+def fluent(put: Callable[..., Path], zones: bool = False) -> list[str]:
+    t = times()
+    put("thrust.out", rfile("thrust", course(t, -T), t))
+    put("torque.out", rfile("torque", course(t, Q), t))
+    return ["thrust.out", "torque.out"]
+
+
+def steady(mean: float, n: int = 500) -> np.ndarray:
+    k = np.arange(1, n + 1)
+    return mean * (1.0 - np.exp(-k / 20.0))
+
+
+def foam(put: Callable[..., Path]) -> list[str]:
+    for file, axis in (("force", T), ("moment", -Q)):
+        names = " ".join(f"{p}_{a}" for p in ("total", "pressure", "viscous") for a in "xyz")
+        rows = "".join(
+            f"{k}\t0.01 -0.01 {v:.8e}\t0.01 -0.01 {0.9 * v:.8e}\t0 0 {0.1 * v:.8e}\n"
+            for k, v in enumerate(steady(axis), 1)
+        )
+        put(f"postProcessing/forces/0/{file}.dat", f"# {file.title()}\n# CofR : (0 0 0)\n#\n# Time \t{names}\n{rows}")
+    put("postProcessing/outlet/0/surfaceFieldValue.dat",
+        "# Region type : patch outlet\n# Faces : 432\n# Area : 1.0e-02\n# Time\tareaAverage(p)\n" + "".join(f"{k}\t5.0\n" for k in range(1, 501)))  # fmt: skip
+    return ["."]
+
+
+def star(put: Callable[..., Path], timed: bool = False) -> list[str]:
+    t = times()
+    for name, unit, what, mean in (("Thrust 1", "N", "Thrust", T), ("Torque 1", "N-m", "Moment", Q)):
+        head = '"Physical Time: Physical Time (s)"' if timed else '"Iteration"'
+        clock, v = (t, course(t, mean)) if timed else (np.arange(1.0, 501), steady(mean))
+        rows = "".join(f"{c:.8g},{x:.8g}\n" for c, x in zip(clock, v, strict=True))
+        put(f"{name.split()[0].lower()}.csv", f'{head},"{name} Monitor: {what} ({unit})"\n{rows}')
+    return ["thrust.csv", "torque.csv"]
+
+
+AREA, LENGTH, SPEED, RHO = 0.03, 0.1, 80.0, 1.225
+FORCE = 0.5 * RHO * SPEED**2 * AREA
+
+
+def su2(put: Callable[..., Path]) -> list[str]:
+    head = '"Time_Iter","Outer_Iter","Inner_Iter",     "rms[Rho]"     ,   "RefForce"   ,   "CFx"   ,   "CFy"   ,   "CFz"   ,   "CMx"   ,   "CMy"   ,   "CMz"   \n'
+    rows = zip(steady(T / FORCE), steady(Q / FORCE / LENGTH), strict=True)
+    put(
+        "history.csv",
+        head
+        + "".join(f"0, 0, {k}, -5.0, {FORCE:.9g}, 0, 0, {f:.9g}, 0, 0, {m:.9g}\n" for k, (f, m) in enumerate(rows)),
+    )
+    return ["history.csv"]
+
+
+def flow360(put: Callable[..., Path]) -> list[str]:
+    rows = zip(steady(T / FORCE), steady(Q / FORCE / LENGTH), strict=True)
+    text = "physical_step, pseudo_step, CL, CD, CFx, CFy, CFz, CMx, CMy, CMz, HeatTransfer\n"
+    put(
+        "total_forces_v2.csv",
+        text
+        + "".join(
+            f"0, {10 * k}, 0, 0, 0, 0, {f:.9g}, 0, 0, {m:.9g}, 0,\n".replace(", 0,\n", ", 0\n")
+            for k, (f, m) in enumerate(rows)
+        ),
+    )
+    return ["total_forces_v2.csv"]
+
+
+def post(put: Callable[..., Path]) -> list[str]:
+    rows = "".join(f"{n}, {T * (n / RPM) ** 2:.7g}, {Q * (n / RPM) ** 2:.7g}\n" for n in (4000, 6000, 8000))
+    put("chart.csv", f"[Name]\nTable 1\n\n[Data]\nrpm [ rev min^-1 ], Thrust [ N ], Torque [ J ]\n{rows}")
+    return ["chart.csv"]
+
+
+def workbench(put: Callable[..., Path]) -> list[str]:
+    head = "# 5/22/2017 3:33:44 PM\n# The parameters defined in the project are:\n# ,P1 - rpm [rev min^-1],P2 - thrust-op [N],P3 - torque-op [N m]\n#\n# The following header line defines the name of the columns by reference to the parameters.\nName,P1,P2,P3\n"
+    rows = "".join(
+        f"DP {k},{n},{-T * (n / RPM) ** 2:.7g},{Q * (n / RPM) ** 2:.7g}\n" for k, n in enumerate((4000, 6000, 8000))
+    )
+    put("points.csv", head + rows + "DP 3,10000,,\n")
+    return ["points.csv"]
+
+
+def force_report(put: Callable[..., Path]) -> list[str]:
+    text = '                  "Force Report"\n'
+    for title, unit, total in (
+        ("Forces - Direction Vector (0 0 1)", "Forces [N]", T),
+        ("Moments - Moment Center (0 0 0) Moment Axis (0 0 1)", "Moments [N m]", Q),
+    ):
+        zones = {"blade": 0.7 * total, "hub": 0.1 * total, "duct": 0.2 * total}
+        rows = [f"{z}    {0.9 * v:.8g}   {0.1 * v:.8g}   {v:.8g}" for z, v in [*zones.items(), ("Net", total)]]
+        rule = "------ ------ ------ ------"
+        text += (
+            f"\n{title}\n          {unit}\nZone      Pressure   Viscous   Total\n"
+            + "\n".join([*rows[:3], rule, rows[3]])
+            + "\n"
+        )
+    put("report.txt", text)
+    return ["report.txt"]
+
+
+REFERENCE = f"area={AREA},length={LENGTH},speed={SPEED},density={RHO}"
+RUNS: dict[str, tuple[Callable[..., list[str]], list[str]]] = {
+    "Fluent, transient": (fluent, ["--rpm", "8000", "--unit", "thrust=N", "--unit", "torque=N m"]),
+    "Fluent force report": (force_report, ["--rpm", "8000", "--zones", "blade", "hub", "duct"]),
+    "CFD-Post": (post, []),
+    "Workbench": (workbench, []),
+    "STAR-CCM+ by iteration": (star, ["--rpm", "8000"]),
+    "STAR-CCM+ by time": (lambda put: star(put, timed=True), ["--rpm", "8000"]),
+    "OpenFOAM": (foam, ["--rpm", "8000"]),
+    "SU2": (su2, ["--rpm", "8000", "--reference", f"length={LENGTH}"]),
+    "Flow360": (flow360, ["--rpm", "8000", "--reference", REFERENCE]),
+}
+"""Program: how its files are made, options of its import."""
+
+
+@pytest.fixture
+def put(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Path]:
+    monkeypatch.chdir(tmp_path)
+
+    def write(name: str, text: str) -> Path:
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+        return path
+
+    return write
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_every_program_becomes_the_same_run(
+    name: str, put: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    make, options = RUNS[name]
+    assert main(["import", *make(put), *options, "--airspeed", "0", "--out", "out/run.toml", "--json"]) == 0
+    (run,) = json.loads(capsys.readouterr().out)["runs"]
+    last = run["points"][-1]
+    duct = "report" in name
+    assert (last["rpm"], last["airspeed_m_s"]) == (RPM, 0.0)
+    assert last["thrust_N"] == pytest.approx(T, rel=1e-4)
+    assert last["torque_Nm"] == pytest.approx(0.8 * Q if duct else Q, rel=1e-4)
+    assert last.get("duct_thrust_N") == (pytest.approx(0.2 * T) if duct else None)
+    assert last["u_thrust_N"] >= GRID_FLOOR["rest"]["thrust_N"] * T * 0.999
+    written = load_run("out/run.toml")  # what was written is the same run, from another folder
+    assert written["thrust_N"][-1] == pytest.approx(last["thrust_N"], rel=1e-8)
+    assert written["torque_Nm"][-1] == pytest.approx(last["torque_Nm"], rel=1e-8)
+
+
+def load_run(path: str) -> Any:
+    from bemt.recordings.load import import_file
+
+    return import_file(path)
+
+
+def test_what_no_file_says_is_asked_for_all_at_once_and_as_it_is_typed(
+    put: Callable[..., Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    files = fluent(put)
+    assert main(["import", *files]) == 0
+    said = capsys.readouterr().out
+    assert '--unit thrust="N"' in said and '--unit torque="N m"' in said and "--rpm N" in said
+    assert main(["import", *files, "--rpm", "8000", "--unit", "thrust=N"]) == 2
+    assert "torque.out: torque: got no unit" in capsys.readouterr().err
+    assert main(["import", *files, "--rpm", "8000", "--unit", "thrust=kg"]) == 2
+    assert "write kgf" in capsys.readouterr().err
+    put("flow.csv", "")
+    with pytest.raises(InputError, match="--reference area=A,length=L,speed=V"):
+        run_of(flow360(put), {"rpm": RPM})
+
+
+def run_of(files: list[str], head: dict[str, Any], **more: Any) -> Any:
+    return assemble(RunToml.model_validate({"run": {"files": tuple(files), **head}, **more}), Path(), "run")
+
+
+UNITS = {"columns": {"thrust": {"unit": "N"}, "torque": {"unit": "N m"}}}
+
+
+def test_unit_sign_and_sector_are_applied_once(put: Callable[..., Path]) -> None:
+    files = fluent(put)
+    plain = run_of(files, {"rpm": RPM}, **UNITS)
+    assert (float(plain["thrust_N"][0]), float(plain["torque_Nm"][0])) == pytest.approx((T, Q), rel=1e-4)
+    assert any("taken as positive" in n for n in plain.notes)  # the thrust was projected backwards, and that is said
+    told = {"columns": {"thrust": {"unit": "lbf", "sign": 1}, "torque": {"unit": "N m", "sign": -1}}}
+    own = run_of(files, {"rpm": RPM, "sector": 3}, **told)
+    assert own["thrust_N"][0] == pytest.approx(-3 * T * 4.4482216, rel=1e-4)
+    assert own["torque_Nm"][0] == pytest.approx(-3 * Q, rel=1e-4)
+    assert own.u["thrust_N"][0] == pytest.approx(3 * 4.4482216 * plain.u["thrust_N"][0], rel=1e-3)
+
+
+def test_a_column_is_named_by_its_unit(put: Callable[..., Path], capsys: pytest.CaptureFixture[str]) -> None:
+    t = times()
+    put("a.out", rfile("report-def-0", course(t, T), t))
+    put("b.out", rfile("report-def-1", course(t, Q), t))
+    args = ["--rpm", "8000", "--unit", "report-def-0=N", "--unit", "report-def-1=N m", "--out", "run.toml"]
+    assert main(["import", "a.out", "b.out", *args]) == 0
+    assert load_run("run.toml")["torque_Nm"][0] == pytest.approx(Q, rel=1e-4)
+    capsys.readouterr()
+    assert main(["import", "a.out", "--rpm", "8000"]) == 0
+    assert '--unit "report-def-0=N"' in capsys.readouterr().out
+
+
+def test_files_that_are_not_one_run_are_refused(put: Callable[..., Path]) -> None:
+    t = times()
+    put("thrust.out", rfile("thrust", course(t, T), t))
+    put("torque.out", rfile("torque", course(t, Q), t + 100.0))
+    with pytest.raises(InputError, match="not one run|files of one run"):
+        run_of(["thrust.out", "torque.out"], {"rpm": RPM}, **UNITS)
+    put("thrust_1_1.out", rfile("thrust", course(t, 2 * T), t * 0.5))
+    with pytest.raises(InputError, match="another clock"):
+        run_of(["thrust.out", "thrust_1_1.out"], {"rpm": RPM}, **UNITS)
+
+
+def test_a_history_that_goes_on_in_a_second_file_is_joined(put: Callable[..., Path]) -> None:
+    whole = steady(T)
+    put("thrust.out", rfile("thrust", whole, None))
+    rows = rfile("thrust", whole, None).splitlines(keepends=True)
+    put("a.out", "".join(rows[:203]))
+    put("b.out", "".join(rows[:3] + rows[203:]))
+    one, two = run_of(["thrust.out"], {"rpm": RPM}, **UNITS), run_of(["a.out", "b.out"], {"rpm": RPM}, **UNITS)
+    assert one["thrust_N"][0] == two["thrust_N"][0] and any("joined at step 201" in n for n in two.notes)
+
+
+def test_a_speed_in_the_file_is_not_replaced(put: Callable[..., Path], capsys: pytest.CaptureFixture[str]) -> None:
+    post(put)
+    assert run_of(["chart.csv"], {})["rpm"].tolist() == [4000.0, 6000.0, 8000.0]
+    for text in (Path("chart.csv").read_text(), Path("chart.csv").read_text().replace("[ rev min^-1 ]", "[ furlong ]")):
+        put("chart.csv", text)
+        with pytest.raises(InputError, match="4000, 6000, 8000"):
+            run_of(["chart.csv"], {"rpm": 8000.0})
+
+
+def test_zones_that_count_are_asked_for(put: Callable[..., Path]) -> None:
+    text = rfile("thrust(blade)", steady(0.8 * T), None)
+    names = text.splitlines(keepends=True)
+    rows = "".join(f"{k} {0.8 * T:.6g} {0.2 * T:.6g}\n" for k in range(1, 200))
+    put("thrust.out", names[0] + names[1] + '("Iteration" "thrust(blade)" "thrust(shroud)")\n' + rows)
+    with pytest.raises(InputError, match="--zones blade,shroud"):
+        run_of(["thrust.out"], {"rpm": RPM}, **UNITS)
+    run = run_of(["thrust.out"], {"rpm": RPM, "zones": ("blade", "shroud")}, **UNITS)
+    assert (float(run["thrust_N"][0]), float(run["duct_thrust_N"][0])) == pytest.approx((T, 0.2 * T), rel=1e-5)
+    with pytest.raises(InputError, match="Zones: blade, shroud"):
+        run_of(["thrust.out"], {"rpm": RPM, "zones": ("blade", "hub")}, **UNITS)
+
+
+def test_the_start_up_is_cut_and_a_run_that_moves_says_so(put: Callable[..., Path]) -> None:
+    k = np.arange(1.0, 301.0)
+    put("thrust.out", rfile("thrust", T * (1.0 + 0.001 * k), None))
+    run = run_of(["thrust.out"], {"rpm": RPM}, **UNITS)
+    drift = run.provenance["drift"]["thrust_N"]
+    assert drift == pytest.approx(0.059 / 1.27, rel=0.02) and any("not settled: thrust" in n for n in run.notes)
+    assert run.u["thrust_N"][0] > drift * T
+    put("thrust.out", rfile("thrust", T * np.exp(-k / 30.0), None))
+    with pytest.raises(InputError, match="a run that has converged"):
+        run_of(["thrust.out"], {"rpm": RPM}, **UNITS)
+    t = times(turns=0.6)
+    put("thrust.out", rfile("thrust", course(t, T), t))
+    with pytest.raises(InputError, match="revolutions recorded"):
+        run_of(["thrust.out"], {"rpm": RPM}, **UNITS)
+
+
+def test_propeller_info_of_openfoam_gives_coefficients(put: Callable[..., Path]) -> None:
+    rows = "".join(f"{k}\t25\t2.5\t0.5\t0.2\t0.3\t0.53\n" for k in range(1, 40))
+    put(
+        "propellerPerformance.dat",
+        f"# Propeller performance\n# Radius : 0.1\n#\n# Time\tn\tURef\tJ\tKT\t10*KQ\teta0\n{rows}",
+    )
+    run = run_of(["propellerPerformance.dat"], {})
+    found = {k: float(v[0]) for k, v in run.values.items()}
+    assert found == pytest.approx({"rpm": 1500.0, "airspeed_m_s": 2.5, "CT": 0.2, "CQ": 0.03, "J": 0.5})
+    assert run.u["CT"][0] == pytest.approx(grid_floor("CT", True) * 0.2)
+
+
+def test_a_written_run_is_read_back() -> None:
+    document = {"run": {"files": ("a b.out", "täglich.out"), "rpm": 8000.0, "zones": ("blade:1", "hub")},
+                "columns": {"torque": {"column": 'q"1', "sign": -1}}, "setup": {"steady": False, "cells": 2.5e6}}  # fmt: skip
+    import tomllib
+
+    made = RunToml.model_validate(document)
+    assert RunToml.model_validate(_tuples(tomllib.loads(toml_text(made)))) == made
+
+
+def _tuples(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {k: _tuples(v) for k, v in value.items()}
+    return tuple(value) if isinstance(value, list) else value
+
+
+def test_a_run_toml_says_all_its_faults(put: Callable[..., Path], capsys: pytest.CaptureFixture[str]) -> None:
+    put(
+        "run.toml",
+        '[run]\nfiles = ["absent.out"]\nsector = 0\n[columns]\nthrust = { unit = "kg", sign = 2 }\ntork = {}\n',
+    )
+    assert main(["import", "run.toml"]) == 2
+    said = capsys.readouterr().out
+    assert all(word in said for word in ("run.sector", "columns.thrust", "columns.tork"))
+
+
+@pytest.mark.parametrize(
+    ("head", "word"),
+    [(b"\x89HDF\r\n\x1a\n" + bytes(64), "HDF5"), (b"FORMAT\ntype: ensight gold\n\nGEOMETRY\nmodel: a.geo\n", "EnSight"),
+     (b"# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\n", "VTK"), (b'<?xml version="1.0"?>\n<VTKFile type="PolyData">\n', "VTK")],
+)  # fmt: skip
+def test_fields_get_one_sentence_with_the_export_to_make(
+    head: bytes, word: str, put: Callable[..., Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    put("field.dat", "").write_bytes(head)
+    assert main(["import", "field.dat"]) == 2
+    said = capsys.readouterr().out
+    assert word in said and "report file of thrust and torque (Fluent)" in said and len(said.splitlines()) == 2
+
+
+def test_the_grid_is_named_before_any_physics(put: Callable[..., Path], capsys: pytest.CaptureFixture[str]) -> None:
+    files = fluent(put)
+    for name, cells in (("coarse", "1e6"), ("fine", "4e6")):
+        args = [
+            "--rpm",
+            "8000",
+            "--unit",
+            "thrust=N",
+            "--unit",
+            "torque=N m",
+            "--setup",
+            f"cells={cells}",
+            f"grid_level={name}",
+        ]
+        assert main(["import", *files, *args, "--out", f"{name}.toml"]) == 0
+    a, b = load_run("coarse.toml"), load_run("fine.toml")
+    assert conditions_that_differ(a, b) == {"grid_level": ("coarse", "fine"), "cells": ("1,000,000", "4,000,000")}
+    assert conditions_that_differ(a, a) == {}
+    capsys.readouterr()
+    assert main(["compare", "coarse.toml", "fine.toml", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["verdict"], found["effects"]) == ("insufficient", []) and found["rule"].startswith(
+        "the grid differs: level coarse and fine"
+    )
+    assert found["ratios"]["thrust_N"]["ratio"] == pytest.approx(1.0)
+
+
+def test_two_grids_of_an_own_campaign_are_named(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = str(project / "reports/cfd/prop_8x5_rest/recording.csv")
+    assert main(["compare", path, path, "--rows-a", "level=5", "--rows-b", "level=6", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["rule"].startswith("the grid differs: level 5 and 6")
+    assert found["ratios"]["thrust_N"]["ratio"] == pytest.approx(23.01206 / 21.37395, rel=1e-5)
+
+
+def test_the_floor_is_what_our_own_grids_differ_by(project: Path) -> None:
+    """Changes from each grid to the next one of the same set-up, at rest and in flight."""
+    same = ("rpm", "airspeed_m_s", "solver", "gas", "sector", "turbulence", "tip_gap_mm")
+    changes: dict[str, list[tuple[float, float]]] = {"rest": [], "flight": []}
+    for name in ("prop_8x5_grid", "prop_8x5_rest", "ds30_spinner", "ds30_vanes"):
+        groups: dict[tuple[str, ...], dict[float, tuple[float, float]]] = {}
+        with (project / "reports/cfd" / name / "recording.csv").open(newline="") as stream:
+            for row in csv.DictReader(stream):
+                if row["converged"] == "1":
+                    key = tuple(row[k] for k in same)
+                    groups.setdefault(key, {})[float(row["level"])] = (float(row["thrust_N"]), float(row["torque_Nm"]))
+        for levels in groups.values():
+            found = [levels[k] for k in sorted(levels)]
+            changes["rest"] += [(b[0] / a[0] - 1, b[1] / a[1] - 1) for a, b in zip(found, found[1:], strict=False)]
+    # one level, cells arranged in two ways (prop_8x5_zone; reports/cfd/README.md)
+    changes["rest"].append((21.37 / 23.96 - 1, 0.362 / 0.418 - 1))
+    changes["flight"].append((14.97 / 16.64 - 1, 0.314 / 0.342 - 1))
+    assert len(changes["rest"]) == 10
+    for state, pairs in changes.items():
+        thrust, torque = np.sqrt(np.mean(np.square(pairs), axis=0))
+        assert GRID_FLOOR[state]["thrust_N"] == pytest.approx(thrust, abs=6e-4)
+        assert GRID_FLOOR[state]["torque_Nm"] == pytest.approx(torque, abs=6e-4)
+
+
+def ds30(put: Callable[..., Path], folder: str = "") -> list[str]:
+    """The fan of the thesis as a transient run of Fluent writes it: two zones in one file, 55,000 rev/min, 1 deg a step."""
+    period = 60.0 / 55000.0
+    t = period / 360.0 * np.arange(1, 360 * 6 + 1)
+    ripple = 1.0 + 0.01 * np.sin(2 * math.pi * 11 * t / period) + 4.0 * np.exp(-t / (0.3 * period))
+    rows = "".join(
+        f"{k} {-17.0 * r:.7g} {-6.5 * r:.7g} {c:.7g}\n" for k, (r, c) in enumerate(zip(ripple, t, strict=True), 1)
+    )
+    head = (
+        '"thrust-rfile"\n"Time Step" "thrust(rotor) etc.."\n("Time Step" "thrust(rotor)" "thrust(duct)" "flow-time")\n'
+    )
+    put(f"{folder}thrust-rfile.out", head + rows)
+    put(f"{folder}torque-rfile.out", rfile("torque", 0.285 * ripple, t))
+    return [f"{folder}thrust-rfile.out", f"{folder}torque-rfile.out"]
+
+
+DS30 = ["--rpm", "55000", "--unit", "thrust=N", "--unit", "torque=N m", "--zones", "rotor,duct", "--airspeed", "0"]
+
+
+def test_one_point_stands_beside_bemt_on_one_screen(
+    put: Callable[..., Path], project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    case = str(project / "cases" / "ds30")
+    assert main(["import", *ds30(put), *DS30, "--out", "run.toml"]) == 0
+    capsys.readouterr()
+    assert main(["compare", "run.toml", "--case", case, "--out", "out", "--quiet"]) == 0
+    found = json.loads(Path("out/comparison.json").read_text())
+    (point,) = found["points"]
+    loads = point["loads"]
+    assert loads["thrust_N"]["cfd"] == pytest.approx(23.5, rel=1e-3) and loads["torque_Nm"]["cfd"] == pytest.approx(
+        0.285, rel=1e-3
+    )
+    assert loads["duct_share"]["cfd"] == pytest.approx(6.5 / 23.5, rel=1e-3)
+    for load in loads.values():
+        assert load["u_cfd"] > 0 and load["u_bemt"] > 0 and set(load["u_bemt_by"]) == {"input", "model", "numerics"}
+        assert load["u_both"] == pytest.approx(math.hypot(load["u_cfd"], load["u_bemt"]))
+    assert {"grid study", "domain against disk"} <= {line["topic"] for line in found["audit"]}
+    from bemt.compare import one_run
+
+    screen = one_run.text(found)
+    assert len(screen.splitlines()) <= 40 and max(map(len, screen.splitlines())) <= 120
+    assert "no grid study: at least" in screen and "No cause is named from one point" in screen
+    assert not {"verdict", "effects"} & found.keys()
+
+
+@pytest.mark.slow
+def test_the_fan_of_the_thesis_goes_the_whole_road(
+    put: Callable[..., Path], project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    case = tmp_path / "ds30"
+    shutil.copytree(project / "cases" / "ds30", case)
+    assert main(["import", *ds30(put), *DS30, "--out", str(case / "run.toml")]) == 0
+    assert main(["compare", str(case / "run.toml"), "--case", str(case)]) == 0
+    capsys.readouterr()
+    assert main(["diagnose", str(case / "run.toml"), "--case", str(case), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["verdict"] == "insufficient"
+    assert main(["sweep", str(case), "--json"]) == 0
+    (result,) = json.loads(capsys.readouterr().out)["cases"]
+    (row,) = [r for r in result["rows"] if r["source"] == "cfd" and r["origin"] == "run.toml"]
+    assert row["thrust_N"] == pytest.approx(23.5, rel=1e-3) and row["torque_Nm"] == pytest.approx(0.285, rel=1e-3)
+    assert any(a["reference"] == row["label"] for a in result["audit"])
+    assert main(["report", str(case), "--out", "page", "--quiet"]) == 0
+    assert "run.toml" in next(Path("page").glob("*.html")).read_text()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [n for n in RUNS if n != "Fluent, transient"])
+def test_every_program_goes_from_import_to_diagnose(
+    name: str, put: Callable[..., Path], project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    make, options = RUNS[name]
+    case = str(project / "cases" / "prop_8x5")
+    assert main(["import", *make(put), *options, "--out", "run.toml"]) == 0
+    assert main(["compare", "run.toml", "--case", case]) == 0
+    assert main(["diagnose", "run.toml", "--case", case]) == 0
+
+
+def test_the_shared_exports_become_runs(shared_data: Path) -> None:
+    folder = shared_data / "cfd_exports"
+    screw = {"columns": {"torque": {"column": "report-def-0", "unit": "N m"}}}
+    run = assemble(
+        RunToml.model_validate({"run": {"files": ("screw/report-def-0-rfile_1_1.out",), "rpm": 130.2}, **screw}), folder
+    )
+    assert run["torque_Nm"][0] == pytest.approx(0.17547, abs=5e-6)
+    run = assemble(
+        RunToml.model_validate(
+            {"run": {"files": ("openfoam_propeller/force.dat", "openfoam_propeller/moment.dat"), "rpm": 900.0}}
+        ),
+        folder,
+    )
+    assert run["thrust_N"][0] == pytest.approx(878.467, rel=1e-4) and run.u["thrust_N"][0] > 0.072 * 878.0
+    points = {"columns": {"rpm": {"unit": "rad/s"}, "torque": {"unit": "N m"}}}
+    run = assemble(RunToml.model_validate({"run": {"files": ("axial_fan/DesignPoints.csv",)}, **points}), folder)
+    assert run["rpm"] == pytest.approx(1485.24, rel=1e-4) and run["torque_Nm"][0] == 0.0597
+    run = assemble(
+        RunToml.model_validate({"run": {"files": ("force_report/FX", "force_report/MX"), "rpm": 100.0}}), folder
+    )
+    assert run["thrust_N"][0] == pytest.approx(412.506, rel=1e-5)
+    sphere = {"files": ("openfoam_old/0/forces.dat", "openfoam_old/100/forces.dat"), "rpm": 100.0, "axis": "x"}
+    with pytest.raises(InputError, match="a run that has converged"):  # two starts of one history, joined
+        assemble(RunToml.model_validate({"run": sphere}), folder)
+    with pytest.raises(InputError, match="another clock"):
+        files = ("screw/report-def-0-rfile.out", "screw/report-def-0-rfile_1_1.out")
+        assemble(RunToml.model_validate({"run": {"files": files, "rpm": 130.2}, **screw}), folder)
