@@ -77,8 +77,11 @@ def as_built_of(file: CaseFile, folder: Path, rotor: Rotor, counting_assumptions
     blade, stated = file.blade, file.blade.as_built
     if stated is not None and stated.file is not None:
         return _posterior(folder / stated.file)
-    moved = {item.key for item in file.assumptions} if counting_assumptions else set()
+    assumed = {item.key for item in file.assumptions}
+    moved = assumed if counting_assumptions else set()
     declared = {what for what, keys in MOVED.items() if moved & set(keys)}
+    if not assumed & set(MOVED["chord"]):  # a chord that is no assumption was measured
+        declared.add("chord")
     source = known_from(blade)
     drawn_section = blade.section is not None and blade.section.dat is not None
     drawn_section = drawn_section or bool(file.polars) or source in ("cad", "scan")
