@@ -21,6 +21,7 @@ from bemt.case.prepare import prepare_case
 from bemt.compare.doubts import one_rotor, speed_in_doubt, wind_of
 from bemt.dataset import Dataset
 from bemt.diagnose import record as records
+from bemt.readers._headings import surely_shaft_speed
 from bemt.recordings.channels import file_name, named, stated
 from bemt.recordings.check import check
 
@@ -64,6 +65,7 @@ def load(
 ) -> Record:  # fmt: skip
     """Read one recording, whatever its format."""
     from bemt.recordings.cfd_run import is_run, run_at
+    from bemt.recordings.cfd_setup import one_grid
     from bemt.recordings.load import import_file
     from bemt.recordings.reduce import reduce, reduction
 
@@ -72,7 +74,8 @@ def load(
         _one_setup(imported, path)
         one_rotor(imported, path, "`compare A B --rows-b rotor={} --case CASE` takes one of them")
     if is_run(imported):
-        made = records.from_series(imported, case)
+        points, shared = one_grid(imported)
+        made = records.from_series(points, case, shared)
         return replace(made, notes=(*made.notes, *imported.notes))
     imported = _filled(imported, rpm, airspeed_m_s)
     speed_in_doubt(imported, path)
@@ -130,6 +133,16 @@ def _filled(imported: Dataset, rpm: float | None, airspeed_m_s: float | None) ->
     """Recording with the speed and the airspeed that the user states where it has no column of them."""
     known = named(imported).values
     told, notes = {}, []
+    if rpm is not None and "rpm" not in known:
+        for name, v in imported.values.items():
+            varies = not imported.unit(name) and np.unique(v[np.isfinite(v)]).size > 1
+            heading = imported.provenance.get("headings", {}).get(name) or name
+            if varies and surely_shaft_speed(heading):
+                got = f"--rpm {rpm:g}, and a column of {np.unique(v).size} speeds without a unit"
+                hint = f"Head it {heading} (rev/min) or {heading} (rad/s), and leave out --rpm"
+                raise InputError(
+                    Fault(str(imported.provenance.get("file", "")), heading, got, "one source of the speed", hint)
+                )
     for name, value, same in (("rpm", rpm, ("rpm",)), ("airspeed_m_s", airspeed_m_s, ("airspeed_m_s", "J"))):
         if value is None:
             continue

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,6 +30,8 @@ CONDITIONS = (
 _GRID = ("grid_level", "cells")
 _ALIAS = {"level": "grid_level", "grid": "grid_level", "mesh": "grid_level", "grid level": "grid_level"}
 _LIKE_CELLS, _LIKE_SIZE = 0.02, 0.02
+SETTLED = 0.01
+"""Standard uncertainty of a settled load from point to point on one grid, share of it [1]."""
 GRID_FLOOR: Mapping[str, Mapping[str, float]] = {
     "rest": {"thrust_N": 0.057, "torque_Nm": 0.080},
     "flight": {"thrust_N": 0.100, "torque_Nm": 0.082},
@@ -81,6 +84,14 @@ def with_grid_floor(d: Dataset, u_grid: float = math.nan) -> Dataset:
     kept = {k: v for k, v in random.items() if k not in numerics}
     return Dataset(d.kind, d.name, d.values, kept, d.flags, d.provenance, d.labels, parts, (note, *d.notes), d.units,
                    d.lines, d.texts)  # fmt: skip
+
+
+def one_grid(run: Dataset) -> tuple[Dataset, dict[str, dict[str, float]]]:
+    """Points of a run with what each has of its own, and what one grid makes wrong at all of them alike: a gain [1]."""
+    shared = {k: {"gain": float(np.nanmax(v / np.abs(run[k])))} for k, v in run.u_by.get("numerics", {}).items()}
+    none = np.zeros(len(run))
+    u = {k: np.hypot(run.u_by.get("random", {}).get(k, none), SETTLED * np.abs(run[k])) for k in shared}
+    return replace(run, u=u, u_by={}), shared
 
 
 def floor_note(some_fly: bool, all_fly: bool) -> str:
